@@ -47,31 +47,50 @@
 #[doc(inline)]
 pub use {nav_sim_calibration as calibration, nav_sim_navigation as navigation, nav_sim_signal as signal};
 
-pub use jobs::export;
+pub use export::export;
 
 // Values of arguments.
 mod parse;
-// Parameters for other programs.
-pub mod export;
-// Which model, on the user's own recordings.
-pub mod choose;
 // What follows a job.
 pub mod observer;
-// Words and pages.
+// Words and shapes that several results share.
 pub mod report;
 // Files.
 pub mod formats;
-// The engine of studies.
-pub mod study;
-// A room for each command: job, result, document.
-mod tune;
-// What a command does, as one call.
-pub mod jobs;
-mod require;
+// From here on a room for each command: request, job, result, document. The main job.
+pub mod run;
 // Recorded drives.
 pub mod fuse;
-// The main job, from a request to its document.
-pub mod run;
+// Errors and remarks of the jobs that read recordings.
+pub mod jobs;
+// Parameters for other programs.
+pub mod export;
+// Recordings to models.
+pub mod calibrate;
+// Figures of the paper.
+mod paper;
+// Wavelet variances.
+mod wv;
+// Models to recordings.
+pub mod synthesize;
+// Calibrations that are not made yet.
+mod design;
+// Which model, on the user's own recordings.
+pub mod choose;
+// Ratios between runs.
+mod compare;
+// The estimators themselves.
+pub mod efficiency;
+// Scenarios, candidates and outages, in parts.
+pub mod study;
+// Factors on a model.
+mod tune;
+// The IMU that is needed.
+mod require;
+// Catalogued IMUs.
+mod datasheet;
+// A directory to start from.
+mod init;
 // All that most programs need.
 pub mod prelude;
 // Arguments, words and exit codes.

@@ -13,7 +13,7 @@ use nav_sim::calibration::efficiency::{Design, target};
 use nav_sim::calibration::{
     Bootstrap, ModelChoice, Outcome, Pool, Replicate, Settings, calibrate, grouped, infer,
 };
-use nav_sim::formats::efficiency_file;
+use nav_sim::efficiency::file as efficiency_file;
 use nav_sim::signal::noise::Synthesizer;
 use nav_sim::signal::rng::StreamKey;
 use nav_sim::signal::wavelet::both;

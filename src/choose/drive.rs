@@ -3,6 +3,7 @@
 use super::candidate::{Candidate, Inflation};
 use super::laboratory::Laboratory;
 use super::score::Score;
+use crate::jobs::JobError;
 use nav_sim_calibration::{CalibrationError, model_of};
 use nav_sim_navigation::ekf::{Belief, BeliefError};
 use nav_sim_navigation::monte_carlo;
@@ -33,6 +34,17 @@ pub struct Drive {
 /// Why candidates cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum ChoiceError {
+    /// Recordings that cannot be measured.
+    #[error(transparent)]
+    Job(#[from] JobError),
+    /// Too few recordings to leave one out.
+    #[error("{recordings} recordings are too few to leave one out: {needed} or more are needed")]
+    TooFew {
+        /// How many there are.
+        recordings: usize,
+        /// How many are needed.
+        needed: usize,
+    },
     /// Trajectory, rates, fixes and recordings do not fit together.
     #[error(transparent)]
     Experiment(#[from] ExperimentError),

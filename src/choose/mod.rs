@@ -35,15 +35,21 @@
 //! ```
 
 mod candidate;
+mod document;
 mod drive;
+mod files;
 mod influence;
+mod job;
 mod laboratory;
 mod ranking;
 mod score;
 
 pub use candidate::{Candidate, Inflation};
+pub(crate) use document::{ChoiceReport, RankedPlace};
 pub use drive::{ChoiceError, Drive, Fold};
+pub(crate) use files::claim_choice;
 pub use influence::{Influence, RecordingInfluence, ScaleInfluence};
+pub use job::{ChoiceDrive, Chosen, choose};
 pub use laboratory::{Laboratory, Unit};
 pub use ranking::{Contender, Difference, FoldScore, Mean, Placed, Ranking};
 pub use score::{EndScore, Score};

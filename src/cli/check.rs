@@ -1,11 +1,10 @@
 //! `nav-sim check`: whether a file is what it should be.
 
 use super::{Failure, Session, parse, read};
+use crate::efficiency;
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
-use crate::formats::{
-    contamination_file, curve_file, datasheet, efficiency_file, model_file, parameters_file, scenario_file,
-};
+use crate::formats::{contamination_file, curve_file, datasheet, model_file, parameters_file, scenario_file};
 use crate::report::six_digits;
 use nav_sim_navigation::fusion::alignment::moves;
 use std::path::{Path, PathBuf};
@@ -107,7 +106,7 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             Ok(format!("a study of {candidates} candidates, {sets} outage sets, {} runs each", study.runs))
         }
         FileKind::Efficiency => {
-            let study = efficiency_file::read(path)?;
+            let study = efficiency::file::read(path)?;
             Ok(format!("a study of estimators on {} sets of recordings", study.sets))
         }
         FileKind::Model => model(path, session),

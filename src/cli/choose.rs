@@ -4,20 +4,17 @@ use super::calibrate::ESTIMATORS;
 use super::jobs::unknown_model;
 use super::parse::words;
 use super::pictures::PlotArgs;
-use super::read::placed;
+use super::read::{self, placed};
 use super::recordings::{ReadingArgs, Said};
 use super::run::Words;
-use super::{Failure, Session, read};
-use crate::choose::{Candidate, Inflation};
-use crate::formats::model_file::CalibrationNote;
-use crate::jobs::{self, CalibrationOptions, ChoiceDrive, EstimatorChoice};
-use crate::report::ChoiceReport;
+use super::{Failure, Session};
+use crate::calibrate::{CalibrationNote, CalibrationOptions};
+use crate::choose::{self, Candidate, ChoiceDrive, ChoiceReport, Inflation};
 use crate::run::{OutageFlag, checked_scenario};
-use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim};
+use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_signal::imu::Channel;
 use std::path::PathBuf;
 
 /// Choose the noise model for a filter by navigating on recordings left out of its calibration
@@ -79,7 +76,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let candidates = candidates(args)?;
     let inputs = args.inputs.iter().chain([&args.trajectory]).chain(&args.scenario).map(PathBuf::as_path);
-    let _own = jobs::claim_choice(&args.out, inputs, session.existing())?;
+    let _own = choose::claim_choice(&args.out, inputs, session.existing())?;
     let _picture = args.plot.claim(args.inputs.iter().chain([&args.trajectory]), session)?;
     let scenario = checked_scenario(args.scenario.as_deref(), &args.outages)?;
     let trajectory = read::trajectory(&args.trajectory, session)?;
@@ -95,7 +92,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     };
     let drive = ChoiceDrive { trajectory, scenario, outages: outages.clone(), seed, runs: args.runs };
     let words = Words::new(session);
-    let chosen = jobs::choose(&args.inputs, &options, &candidates, drive, &mut Said::new(session), &words)?;
+    let chosen = choose::choose(&args.inputs, &options, &candidates, drive, &mut Said::new(session), &words)?;
     let shown = args.trajectory.display().to_string();
     let report = ChoiceReport {
         ranking: &chosen.ranking,

@@ -2,9 +2,9 @@
 
 use super::pictures::{PlotArgs, claim_output};
 use super::{Failure, Session};
+use crate::compare::{self, Comparison};
 use crate::formats::atomic::{self, Written};
-use crate::jobs;
-use crate::report::{self, Answer, Comparison};
+use crate::report::{self, Answer};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use std::path::{Path, PathBuf};
 
@@ -67,7 +67,7 @@ pub(super) fn compare(args: &Args, cause: &str, session: &Session) -> Result<Com
     let _own = claim_output(Some(out), &inputs, Written::Comparison, session)?;
     let _page = claim_output(Some(&page), &inputs, Written::Page, session)?;
     let _picture = args.plot.claim(&inputs, session)?;
-    let found = jobs::compare(&args.runs, &args.reference, states(&args.states)?)?;
+    let found = compare::compare(&args.runs, &args.reference, states(&args.states)?)?;
     let found = Comparison { cause: cause.to_owned(), ..found };
     let document = match args.table {
         None => session.answer(&found),

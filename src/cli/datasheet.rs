@@ -6,7 +6,6 @@ use crate::formats::atomic::Written;
 use crate::formats::datasheet::{self, CATALOGUE, Datasheet, Entry, Figure, Quantity};
 use crate::formats::model_file;
 use crate::formats::suggest::nearest;
-use crate::jobs;
 use nav_sim_signal::imu::Sensor;
 use std::path::PathBuf;
 
@@ -102,7 +101,11 @@ impl Figures {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.list {
-        let listed = if session.json() { jobs::catalogue_json()? } else { jobs::catalogue_text()? };
+        let listed = if session.json() {
+            crate::datasheet::catalogue_json()?
+        } else {
+            crate::datasheet::catalogue_text()?
+        };
         session.result(listed.trim_end());
         return Ok(());
     }

@@ -2,9 +2,11 @@
 
 use super::compare::compare;
 use super::{Cli, Command, Failure, Session, read};
+use crate::compare::Comparison;
 use crate::formats::atomic::Existing;
 use crate::formats::{FileError, atomic, model_file};
-use crate::report::{self, Answer, Comparison, StudyCurves, TrajectorySeries, paper_figures, paper_page};
+use crate::paper::{StudyCurves, paper_figures, paper_page};
+use crate::report::{self, Answer, TrajectorySeries};
 use clap::Parser;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

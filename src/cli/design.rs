@@ -1,13 +1,11 @@
 //! `nav-sim design`: how many recordings, and how long.
 
 use super::calibrate::ESTIMATORS;
-use super::parse;
 use super::pictures::PlotArgs;
-use super::{Failure, Session, read};
+use super::{Failure, Session, parse, read};
+use crate::design::{self, Design, DesignInputs, Designs, Destination};
 use crate::formats::model_file::ModelFile;
-use crate::jobs::{self, DesignInputs, Destination, NavigateInputs, TrueImu};
-use crate::report::{Design, Designs};
-use crate::run::{OutageFlag, windows_of};
+use crate::run::{NavigateInputs, OutageFlag, TrueImu, windows_of};
 use nav_sim_calibration::{Bootstrap, Estimator, Settings};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::{Method, Scenario};
@@ -111,7 +109,7 @@ fn designs(
     let mut designs = Vec::new();
     for k in recordings {
         for h in &hours {
-            let design = jobs::design(&mut inputs, k, *h);
+            let design = design::design(&mut inputs, k, *h);
             designs.push(design.map_err(|e| Failure::input(e).hint("more, or longer recordings"))?);
         }
     }

@@ -1,9 +1,9 @@
 //! `nav-sim efficiency`: Monte-Carlo study of the estimators themselves.
 
 use super::{Failure, Session};
-use crate::formats::{atomic, efficiency_file};
-use crate::jobs::EstimatorStudy;
-use crate::report::{self, EfficiencyFile};
+use crate::efficiency::{self, EfficiencyFile, EstimatorStudy};
+use crate::formats::atomic;
+use crate::report;
 use nav_sim_calibration::efficiency::StudyError;
 use std::path::{Path, PathBuf};
 
@@ -39,7 +39,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let file = efficiency_file::read(&args.study)?;
+    let file = efficiency::file::read(&args.study)?;
     let mut design = file.design;
     if let Some(samples) = args.samples {
         design = design.with_samples(samples as usize);
@@ -71,7 +71,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 fn write(out: &Path, results: &EfficiencyFile, session: &Session) -> Result<(), Failure> {
     let document = session.answer(results);
-    atomic::write(&out.join("results.csv"), report::efficiency_csv(results))?;
+    atomic::write(&out.join("results.csv"), efficiency::efficiency_csv(results))?;
     atomic::write(&out.join("results.json"), report::json(results))?;
     atomic::write(&out.join("rmse.svg"), document.svg())?;
     Ok(atomic::write(&out.join("report.html"), document.html())?)

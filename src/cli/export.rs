@@ -3,9 +3,9 @@
 use super::parse::one_of;
 use super::pictures::claim_output;
 use super::{Failure, Session};
+use crate::export::{self, Export, ExportError, Recorded, Target};
 use crate::formats::atomic::{self, Written};
 use crate::formats::model_file::{self, ModelFile};
-use crate::jobs::{self, Export, ExportError, Recorded, Target};
 use crate::report;
 use nav_sim_calibration::duration;
 use nav_sim_signal::noise::practical::{Horizon, Policy};
@@ -53,7 +53,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let file = model_file::read(&args.model)?;
     let shown = args.model.display().to_string();
     let _own = claim_output(args.out.as_deref(), [&args.model], Written::Export, session)?;
-    let export = jobs::exported(&file, args.target, args.policy, args.horizon)
+    let export = export::exported(&file, args.target, args.policy, args.horizon)
         .map_err(|e| Failure::input(format!("{shown}: {e}")).maybe_hint(advice(&e)))?;
     let text = export.text(&shown);
     if let Some(out) = &args.out {
@@ -80,7 +80,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 fn certificate(export: &Export, file: &ModelFile, session: &Session) -> Result<(), Failure> {
     let recorded = Recorded::like(file, session.seed(None), export.settings.horizon.to_s);
     let certificates =
-        jobs::certify(export, &file.model, &file.missing, recorded).map_err(Failure::could_not)?;
+        export::certify(export, &file.model, &file.missing, recorded).map_err(Failure::could_not)?;
     let made = format!(
         "{} recordings of {:.0} s",
         recorded.recordings,

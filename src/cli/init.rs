@@ -1,7 +1,7 @@
 //! `nav-sim init`: a directory to start from.
 
 use super::{Failure, Session};
-use crate::jobs::{self, StartFiles};
+use crate::init::{self, StartFiles};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -24,7 +24,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let StartFiles { written, kept } = jobs::write_start_files(&args.directory)?;
+    let StartFiles { written, kept } = init::write_start_files(&args.directory)?;
     let [written, kept] =
         [written, kept].map(|paths| paths.iter().map(|p| p.display().to_string()).collect());
     let (written, kept): (Vec<String>, Vec<String>) = (written, kept);

@@ -19,11 +19,6 @@ impl From<JobError> for Failure {
             JobError::Single { .. } => {
                 Self::input(format!("--estimator {e}")).hint("awv, sr-awv and dr-awv take several")
             }
-            JobError::TooFew { .. } => Self::input(e).hint(
-                "each recording is a file; nav-sim calibrate takes fewer, and nav-sim tune makes its model honest for \
-                 another truth",
-            ),
-            JobError::Choice(e) => of_choice(&e),
             JobError::OtherTrajectory { .. } => {
                 Self::input(e).hint("compare runs along one and the same trajectory file")
             }
@@ -52,15 +47,22 @@ impl From<JobError> for Failure {
     }
 }
 
-fn of_choice(e: &ChoiceError) -> Failure {
-    match e {
-        ChoiceError::Calibration { candidate, source } => of_calibration(source).within(candidate),
-        ChoiceError::Own { source, .. } => {
-            Failure::input(e).maybe_hint(of_calibration(source).advice().map(str::to_owned))
+impl From<ChoiceError> for Failure {
+    fn from(e: ChoiceError) -> Self {
+        match e {
+            ChoiceError::Job(e) => e.into(),
+            ChoiceError::TooFew { .. } => {
+                Self::input(e).hint("each recording is a file; nav-sim calibrate takes fewer")
+            }
+            ChoiceError::Calibration { candidate, source } => of_calibration(&source).within(&candidate),
+            ChoiceError::Own { ref source, .. } => {
+                let hint = of_calibration(source).advice().map(str::to_owned);
+                Self::input(e).maybe_hint(hint)
+            }
+            ChoiceError::Experiment(ExperimentError::FixBetweenSamples { .. }) => Self::input(e)
+                .hint("the IMU has the rate of the recordings: another [gnss] rate_hz in --scenario"),
+            ChoiceError::Experiment(_) | ChoiceError::Belief { .. } => Self::input(e),
         }
-        ChoiceError::Experiment(ExperimentError::FixBetweenSamples { .. }) => Failure::input(e)
-            .hint("the IMU has the rate of the recordings: another [gnss] rate_hz in --scenario"),
-        ChoiceError::Experiment(_) | ChoiceError::Belief { .. } => Failure::input(e),
     }
 }
 

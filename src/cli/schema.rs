@@ -1,9 +1,8 @@
 //! `nav-sim schema`: JSON schemas of the files people write.
 
 use super::{Failure, Session};
-use crate::formats::{
-    contamination_file, efficiency_file, fusion_files, model_file, parameters_file, trajectory_file,
-};
+use crate::efficiency;
+use crate::formats::{contamination_file, fusion_files, model_file, parameters_file, trajectory_file};
 use crate::study::Study;
 use nav_sim_navigation::scenario::Scenario;
 
@@ -49,7 +48,7 @@ fn schema(of: Kind) -> serde_json::Value {
     match of {
         Kind::Scenario => schemars::schema_for!(Scenario).to_value(),
         Kind::Study => schemars::schema_for!(Study).to_value(),
-        Kind::Efficiency => efficiency_file::schema(),
+        Kind::Efficiency => efficiency::file::schema(),
         Kind::Model => model_file::schema(),
         Kind::Parameters => parameters_file::schema(),
         Kind::Initial => fusion_files::initial_schema(),

@@ -5,7 +5,7 @@ use super::{Failure, Session, read};
 use crate::formats::contamination_file;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::recordings::FileFormat;
-use crate::jobs::Synthesis;
+use crate::synthesize::Synthesis;
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::contamination::{Contamination, Rule};
 use std::path::{Path, PathBuf};

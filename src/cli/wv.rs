@@ -6,8 +6,8 @@ use super::recordings::{RecordingArgs, Said};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use crate::formats::atomic::Written;
-use crate::jobs::{self, Intervals, WaveletOptions};
 use crate::report::{self, Answer};
+use crate::wv::{self, Intervals, WaveletOptions};
 use std::path::PathBuf;
 
 /// Compute wavelet variances (classical, robust) and Allan deviations of static recordings
@@ -56,12 +56,12 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         tuning,
         intervals,
     };
-    let file = jobs::wavelet_variances(&args.files, &options, &mut Said::new(session))?;
+    let file = wv::wavelet_variances(&args.files, &options, &mut Said::new(session))?;
     let json = report::json(&file);
     let written = args.out.iter().try_for_each(|out| session.write(out, &json));
     let drawn = args.plot.draw(&file.document(), session);
     match () {
-        () if session.csv() => session.result(report::signals_csv(&file).trim_end()),
+        () if session.csv() => session.result(wv::signals_csv(&file).trim_end()),
         () if args.per_file && !session.json() => session.result(side_by_side(&file)),
         () => {
             session.answer(&file);
@@ -72,7 +72,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 /// A table for each sensor and axis.
 fn side_by_side(file: &report::SignalsFile) -> String {
-    let tables = report::wavelet::side_by_side(file).into_iter();
+    let tables = wv::side_by_side(file).into_iter();
     tables
         .map(|(title, table)| format!("{title}\n{}", table.columns(report::WIDTH)))
         .collect::<Vec<_>>()

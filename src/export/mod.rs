@@ -20,7 +20,9 @@
 //! ```
 
 mod autopilots;
+mod certify;
 mod filters;
+mod job;
 mod json;
 mod layout;
 mod sheet;
@@ -29,6 +31,8 @@ mod target;
 mod vision;
 mod words;
 
+pub(crate) use certify::{Recorded, certify};
+pub use job::{export, exported};
 pub(crate) use json::parameters as parameters_json;
 pub(crate) use sheet::Quantity;
 pub use target::Target;

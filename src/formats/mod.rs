@@ -6,8 +6,6 @@ pub(crate) mod curve_file;
 pub mod datasheet;
 pub(crate) mod difference;
 pub mod draws_file;
-pub(crate) mod efficiency_directory;
-pub mod efficiency_file;
 mod error;
 pub(crate) mod file_kind;
 pub(crate) mod fusion_files;

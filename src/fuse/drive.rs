@@ -7,7 +7,7 @@ use crate::formats::fusion_files::{self, read_gnss, read_imu, read_initial};
 use crate::formats::input;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::trajectory_file::{self, load_reference};
-use crate::jobs::turn_on;
+use crate::run::turn_on;
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::fusion::alignment::{Alignment, coarse};
 use nav_sim_navigation::fusion::mounting::{self, Mounted, Mounting};

@@ -1,7 +1,7 @@
 //! The filter of a fusion: made for a recording whose trajectory is not known.
 
 use super::FuseError;
-use crate::jobs::Reduced;
+use crate::run::Reduced;
 use nav_sim_navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim_navigation::gnss::GnssFix;
 use nav_sim_navigation::metrics::ReductionSummary;

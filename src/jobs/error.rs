@@ -1,8 +1,7 @@
 //! Why a job has no result.
 
-use super::NavigateError;
-use crate::choose::ChoiceError;
 use crate::formats::FileError;
+use crate::run::NavigateError;
 use nav_sim_calibration::efficiency::StudyError;
 use nav_sim_calibration::{AnticipationError, CalibrationError, Estimator, SignalError};
 use nav_sim_navigation::metrics::ComparisonError;
@@ -33,17 +32,6 @@ pub enum JobError {
         /// The one it is a copy of.
         first: String,
     },
-    /// Too few recordings to leave one out.
-    #[error("{recordings} recordings are too few to leave one out: {needed} or more are needed")]
-    TooFew {
-        /// How many there are.
-        recordings: usize,
-        /// How many are needed.
-        needed: usize,
-    },
-    /// Candidates that cannot be compared.
-    #[error(transparent)]
-    Choice(#[from] ChoiceError),
     /// Parameters or a contamination that a recording cannot have.
     #[error(transparent)]
     Replicate(#[from] ReplicateError),

@@ -200,7 +200,7 @@ fn distinct_labels(candidates: &[CandidateResult]) -> Vec<Label> {
 }
 
 /// Each name once, where it stood first.
-pub(super) fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+pub(crate) fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut unique = Vec::new();
     for name in names {
         if !unique.contains(&name) {
@@ -220,11 +220,11 @@ fn signed(error: &RatioError) -> String {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use super::*;
     use nav_sim_navigation::metrics::StateRatio;
 
-    pub(in crate::report) fn candidate(run: &str, pct: f64, is_reference: bool) -> CandidateResult {
+    pub(crate) fn candidate(run: &str, pct: f64, is_reference: bool) -> CandidateResult {
         let error = RatioError { pct, ci95_pct: Some([pct - 0.5, pct + 0.5]) };
         let state = StateRatio {
             asee: error,

@@ -3,14 +3,14 @@
 use nav_sim_document::{Axis, Chart, Colour, Panel, Series};
 
 /// Values of one kind, one a row: value and interval; NaN: none.
-pub(super) struct Dots<'a> {
-    pub(super) name: &'a str,
-    pub(super) colour: Colour,
-    pub(super) points: Vec<[f64; 3]>,
+pub(crate) struct Dots<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) colour: Colour,
+    pub(crate) points: Vec<[f64; 3]>,
 }
 
 /// A chart with a row for each name, from top to bottom; `level`: a value to compare with, and its name.
-pub(super) fn dot_chart(
+pub(crate) fn dot_chart(
     title: &str,
     axis: Axis,
     names: impl IntoIterator<Item = String>,

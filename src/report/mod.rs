@@ -1,44 +1,30 @@
 //! Results as files: tables, JSON, self-contained pages (`page`). The module computes no statistic and touches
 //! no file: every function returns a text, and the command line writes it.
 
-pub(crate) mod calibration;
-mod choose;
 mod closure;
-mod comparison;
-mod comparison_table;
-mod curves;
-mod design;
-mod dots;
-mod efficiency;
-mod fits;
+pub(crate) mod comparison_table;
+pub(crate) mod curve_chart;
+pub(crate) mod curves;
+pub(crate) mod dots;
 mod manifest;
-mod merged_study;
 mod output;
-mod pages;
 mod recording;
 pub(crate) mod requirement;
 #[cfg(test)]
 pub(crate) mod sample;
-mod states;
+pub(crate) mod states;
 mod study;
 pub(crate) mod tables;
-mod trajectory;
-mod turn_on;
+pub(crate) mod trajectory;
 mod unexpected;
 pub(crate) mod verdict;
-pub(crate) mod wavelet;
 
 use nav_sim_document::Document;
 use serde::Serialize;
 
-pub(crate) use choose::{ChoiceReport, RankedPlace};
 pub(crate) use closure::TrajectoryCheck;
-pub(crate) use comparison::{Comparison, RatioCurves};
 pub(crate) use comparison_table::{CandidateResult, Label};
 pub(crate) use curves::{CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile};
-pub(crate) use design::{Design, DesignedParameter, DesignedQuantile, Designs};
-pub(crate) use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv};
-pub(crate) use fits::FitsFile;
 pub(crate) use manifest::contents;
 pub use manifest::{Input, Manifest, ModelNote};
 /// A result: what is printed, drawn or saved of it is it itself as JSON, or its document.
@@ -47,12 +33,11 @@ pub(crate) trait Answer: Serialize {
     fn document(&self) -> Document;
 }
 
-pub(crate) use merged_study::{MergedStudy, ShownCell, ShownColumn};
 pub use nav_sim_document::readable;
 pub(crate) use nav_sim_document::{seconds, six_digits};
 pub(crate) use output::{OutputFile, json};
-pub(crate) use pages::{STATES, StudyCurves, error_of, paper_figures, paper_page, tone};
 pub(crate) use recording::{gnss_csv, imu_csv, initial_toml};
+pub(crate) use states::{STATES, error_of, tone};
 #[cfg(any(test, feature = "parquet"))]
 pub(crate) use study::ValueKind;
 pub(crate) use study::{
@@ -62,7 +47,6 @@ pub(crate) use study::{
 pub use trajectory::TrajectorySeries;
 pub(crate) use trajectory::trajectory_svg;
 pub(crate) use unexpected::{reduction_doubt, reduction_line, unexpected_in_words, unexpected_line};
-pub(crate) use wavelet::signals_csv;
 
 /// Names of `nav_sim_document` for files that have not moved to documents yet.
 pub(crate) mod page {

@@ -67,7 +67,7 @@ impl TrajectorySeries {
     }
 
     /// Height, speed and attitude. At least so much is shown that rounding does not fill a panel.
-    pub(super) fn over_time(&self, outages: &[(f64, f64)]) -> Chart {
+    pub(crate) fn over_time(&self, outages: &[(f64, f64)]) -> Chart {
         let values = |value: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
             self.t_s.iter().enumerate().map(|(i, t)| (*t, value(i))).collect()
         };

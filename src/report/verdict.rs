@@ -47,7 +47,7 @@ fn words(summary: &Summary) -> String {
             let percent = 100.0 * (verdict.detectable_state_ratio - 1.0);
             let needed = verdict.runs_to_decide.unwrap_or_default();
             format!(
-                "undecided: {} miss errors below {percent:.0} % in one state; {needed} would decide",
+                "undecided: {} cannot show an error below {percent:.0} % in one state; {needed} would decide",
                 independent(verdict.independent_runs)
             )
         }

@@ -5,7 +5,7 @@ use super::needed::NeededImu;
 use super::question::{BeyondLinear, CURVE_S, LONGEST_S, Question};
 use super::ranking::{RankedUnit, Ranking};
 use crate::formats::model_file::{ModelFile, PROGRAM, TurnOn};
-use crate::jobs::turn_on;
+use crate::run::turn_on;
 use nav_sim_navigation::ekf::BeliefError;
 use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{

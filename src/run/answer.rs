@@ -1,9 +1,8 @@
 //! The answer of a run, and its directory.
 
-use super::{charts, document};
+use super::{Navigation, charts, document};
 use crate::formats::FileError;
 use crate::formats::atomic::AtomicDir;
-use crate::jobs::Navigation;
 use crate::report::tables::{epochs_csv, fan_csv, runs_csv};
 use crate::report::{Answer, Manifest, OutputFile, TrajectorySeries, json};
 use nav_sim_document::{Document, svg};

@@ -1,9 +1,9 @@
 //! The document of a run: verdict, outages, notes, charts and tables.
 
+use super::Navigation;
 use super::answer::RunAnswer;
 use super::budgets::budgets;
 use super::charts::{fan_chart, horizontal, horizontal_caption, nees, rmse_and_asee, states, windows};
-use crate::jobs::Navigation;
 use crate::report::requirement::requirement_line;
 use crate::report::verdict::verdict_lines;
 use crate::report::{

@@ -1,7 +1,7 @@
 //! Why a run has no answer.
 
+use super::NavigateError;
 use crate::formats::FileError;
-use crate::jobs::NavigateError;
 use nav_sim_navigation::metrics::Requirement;
 use nav_sim_navigation::sensors::outage::OutageError;
 use nav_sim_signal::noise::continuous::RateError;

@@ -22,18 +22,23 @@ mod budgets;
 mod charts;
 mod document;
 mod error;
+mod navigate;
 mod prepared;
 pub(crate) mod read;
+mod reduction;
 mod request;
+pub(crate) mod turn_on;
+mod uncertainty;
 
 pub(crate) use answer::RUN_FILES;
 pub use answer::RunAnswer;
 pub use error::RunError;
+pub use navigate::{NavigateError, NavigateInputs, Navigation, Note, TrueImu, navigate};
 pub use prepared::PreparedRun;
+pub(crate) use reduction::Reduced;
 pub use request::{FilterRequest, OutageFlag, RunRequest};
 pub(crate) use request::{checked_scenario, windows_of};
 
-use crate::jobs::Note;
 use crate::observer::Observer;
 
 /// Seed of a run for which neither the request nor the scenario has one, where nobody draws it.

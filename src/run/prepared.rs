@@ -2,11 +2,10 @@
 
 use super::answer::RunAnswer;
 use super::error::RunError;
-use super::read;
 use super::request::RunRequest;
+use super::{NavigateInputs, Note, TrueImu, navigate, read};
 use crate::formats::model_file::ModelFile;
 use crate::formats::{FileError, draws_file, input};
-use crate::jobs::{NavigateInputs, Note, TrueImu, navigate};
 use crate::observer::Observer;
 use crate::report::{Input, Manifest, ModelNote, TrajectorySeries};
 use nav_sim_navigation::metrics::Requirement;

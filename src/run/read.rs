@@ -1,10 +1,10 @@
 //! Inputs read; what is doubtful about them is remarked.
 
 use super::error::RunError;
+use super::{Note, turn_on};
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::recordings::{self, ReadOptions};
 use crate::formats::{FileError, trajectory_file};
-use crate::jobs::{self, Note};
 use crate::observer::Observer;
 use crate::report::readable;
 use nav_sim_navigation::ekf::InitialSettings;
@@ -72,13 +72,13 @@ pub(crate) fn recordings(
 
 /// Lets the filter expect the turn-on bias that its model states, where settings are silent.
 pub(crate) fn expect_turn_on(initial: &mut InitialSettings, file: &ModelFile, path: &Path, notes: Notes<'_>) {
-    let set = jobs::turn_on::expect(initial, &file.turn_on.unwrap_or_default());
+    let set = turn_on::expect(initial, &file.turn_on.unwrap_or_default());
     tell_turn_on("the filter expects", &set, path, notes);
 }
 
 /// Gives the true IMU the turn-on bias that the model of its errors states, where settings are silent; a 0 is a setting.
 pub(crate) fn make_turn_on(imu: &mut ImuSettings, file: &ModelFile, path: &Path, notes: Notes<'_>) {
-    let set = jobs::turn_on::make(imu, &file.turn_on.unwrap_or_default());
+    let set = turn_on::make(imu, &file.turn_on.unwrap_or_default());
     tell_turn_on("the true IMU has", &set, path, notes);
 }
 

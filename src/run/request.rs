@@ -48,7 +48,7 @@ pub struct RunRequest {
     /// rmse_pos_e_m, yaw_deg and the other states; or "consistent"; exit code 3 if it is not met
     #[arg(long, value_name = "NAME<=LIMIT")]
     pub require: Vec<Requirement>,
-    /// Scenario file whose [gnss] section is used
+    /// Scenario file whose section gnss is used
     #[arg(long, value_name = "FILE")]
     pub gnss: Option<PathBuf>,
     /// All settings of the run in one TOML file; flags override it (see `nav-sim schema scenario`)

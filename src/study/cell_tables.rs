@@ -7,7 +7,8 @@ use super::plan::{Kept, NamedUnit};
 use super::planned::Planned;
 use super::unit::Finding;
 use super::unit_file::{self, UnitFileError};
-use crate::report::{self, ColumnResult, Label, ShownCell, ShownColumn, TableRow};
+use super::{ShownCell, ShownColumn};
+use crate::report::{self, ColumnResult, Label, TableRow};
 use nav_sim_navigation::metrics::{self, Measured};
 use nav_sim_navigation::simulation::RunRecord;
 

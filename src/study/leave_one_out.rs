@@ -3,8 +3,7 @@
 use super::cell_tables::CellTables;
 use super::grid::{Cell, Grid};
 use super::planned::Planned;
-use crate::choose::{Contender, Fold, Ranking, Score};
-use crate::report::{ChoiceReport, RankedPlace};
+use crate::choose::{ChoiceReport, Contender, Fold, RankedPlace, Ranking, Score};
 use nav_sim_navigation::sensors::outage::Outage;
 
 /// What the recordings say, where all but the recording is the same.

@@ -1,5 +1,6 @@
 //! Merging: units to tables.
 
+use super::MergedStudy;
 use super::cell_tables::CellTables;
 use super::description::Metric;
 use super::failure::StudyError;
@@ -11,7 +12,7 @@ use super::tables::Tables;
 use crate::formats::FileError;
 use crate::formats::atomic::AtomicDir;
 use crate::observer::Observer;
-use crate::report::{self, MergedStudy};
+use crate::report;
 use nav_sim_document::Document;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use rayon::prelude::*;

@@ -39,6 +39,7 @@ mod calibrating;
 mod cell_tables;
 mod check;
 mod description;
+mod document;
 mod error;
 mod failure;
 pub(crate) mod file;
@@ -62,6 +63,7 @@ pub mod unit_file;
 mod unit_words;
 
 pub(crate) use description::Study;
+pub(crate) use document::{MergedStudy, ShownCell, ShownColumn};
 pub use error::DescriptionError;
 pub use failure::StudyError;
 pub use grid::Grid;

@@ -7,8 +7,9 @@ use super::parse::words;
 use super::recordings::{RecordingArgs, Said};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
+use crate::calibrate::{self, CalibrationOptions, EstimatorChoice, ModelFiles};
 use crate::formats::parameters_file;
-use crate::jobs::{self, CalibrationOptions, EstimatorChoice, JobError, ModelFiles};
+use crate::jobs::JobError;
 use nav_sim_calibration::{
     Bootstrap, Estimator, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, Trim, Weighting,
 };
@@ -136,7 +137,7 @@ fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), 
         bootstrap: bootstrap(args, session),
         turn_on: true,
     };
-    let measured = jobs::measure(&args.inputs, &options, &mut Said::new(session))?;
+    let measured = calibrate::measure(&args.inputs, &options, &mut Said::new(session))?;
     let files: Vec<PathBuf> = measured.report.files.iter().map(|f| f.path.clone()).collect();
     outputs.retain(|files| measured.settings.estimators.contains(&files.estimator));
     let inputs = files.iter().map(|f| read::input("recording", f)).collect::<Result<Vec<_>, _>>()?;
@@ -150,7 +151,8 @@ fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), 
 
 /// Fitting curves that come from elsewhere.
 fn curves(args: &Args, path: &Path, settings: &Settings, session: &Session) -> Result<(), Failure> {
-    let curves_of = |sensor| jobs::read_curves(path, args.recordings.reading.rate_hz(), sensor, settings);
+    let curves_of =
+        |sensor| calibrate::read_curves(path, args.recordings.reading.rate_hz(), sensor, settings);
     let curves = match curves_of(args.recordings.sensor()) {
         // What is only printed needs a sensor for its units alone.
         Err(JobError::NoSensor { .. }) if args.out.is_none() => {

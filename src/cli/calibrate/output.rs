@@ -1,11 +1,9 @@
 //! The files of a calibration: one model and its curves for each estimator.
 
 use super::Args;
+use crate::calibrate::{Calibration, CalibrationAnswer, CalibrationNote, FitsFile, ModelFiles};
 use crate::cli::{Failure, Session, read};
-use crate::formats::model_file::CalibrationNote;
-use crate::jobs::{Calibration, ModelFiles};
-use crate::report::calibration::CalibrationAnswer;
-use crate::report::{FitsFile, Input};
+use crate::report::Input;
 use nav_sim_calibration::{Settings, diagnose};
 use nav_sim_signal::wavelet::Convention;
 

@@ -1,9 +1,9 @@
 //! What a job tells, in words.
 
 use crate::cli::{Progress, Session};
-use crate::jobs::Note;
 use crate::observer::Observer;
 use crate::report::{reduction_doubt, reduction_line, unexpected_line};
+use crate::run::Note;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 

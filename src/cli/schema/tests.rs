@@ -1,9 +1,9 @@
 //! The ranges of schemas are those of the readers.
 
 use super::{Kind, schema};
+use crate::efficiency;
 use crate::formats::{
-    FileError, contamination_file, efficiency_file, fusion_files, model_file, parameters_file, scenario_file,
-    trajectory_file,
+    FileError, contamination_file, fusion_files, model_file, parameters_file, scenario_file, trajectory_file,
 };
 use crate::study;
 use serde_json::Value;
@@ -245,7 +245,7 @@ fn read(kind: Kind, path: &Path) -> Result<(), FileError> {
     match kind {
         Kind::Scenario => scenario_file::read(path).map(|_| ()),
         Kind::Study => study::file::read(path).map(|_| ()),
-        Kind::Efficiency => efficiency_file::read(path).map(|_| ()),
+        Kind::Efficiency => efficiency::file::read(path).map(|_| ()),
         Kind::Model => model_file::read(path).map(|_| ()),
         Kind::Parameters => parameters_file::check(path),
         Kind::Initial => fusion_files::read_initial(path).map(|_| ()),

@@ -17,14 +17,13 @@
 //! A sensor or axis that is not in the file is noise-free in [`ModelFile::model`] and listed in
 //! [`ModelFile::missing`].
 
-mod calibrated;
 mod description;
+mod provenance;
 mod read;
 mod write;
 
-pub(crate) use calibrated::CalibrationNote;
-pub use calibrated::Misfit;
 pub(crate) use description::schema;
+pub use provenance::Misfit;
 pub(crate) use read::from_text;
 pub use read::read;
 pub(crate) use write::to_toml;

@@ -1,0 +1,177 @@
+//! The files of a calibration: for each estimator a model, the curves behind it and the draws behind its intervals.
+
+use super::model_file::with_turn_on;
+use super::{Calibration, CalibrationNote};
+use crate::formats::atomic::{AtomicFile, Claim, Existing, Written};
+use crate::formats::draws_file::DrawsFile;
+use crate::formats::model_file::ModelFile;
+use crate::formats::{FileError, Place, atomic, draws_file, hash, model_file};
+use crate::report::{self, CurvesFile};
+use nav_sim_calibration::{Diagnosis, Estimator, Outcome};
+use nav_sim_signal::noise::Model;
+use std::path::{Path, PathBuf};
+
+/// The files of one estimator.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct ModelFiles {
+    /// The estimator.
+    pub estimator: Estimator,
+    /// The model file.
+    pub model: PathBuf,
+    /// The curves, `<model>.wv.json` beside it.
+    pub curves: PathBuf,
+    /// The page, `<model>.html` beside it.
+    pub page: PathBuf,
+    /// The figures of the page, `<model>.svg` beside it.
+    pub figures: PathBuf,
+    /// The draws behind its intervals, `<model>.draws.json` beside it.
+    pub draws: PathBuf,
+}
+
+impl ModelFiles {
+    /// The files of each estimator: of several `<out>_<estimator>.toml`.
+    pub(crate) fn of(out: &Path, estimators: &[Estimator]) -> Vec<Self> {
+        let files = |estimator: &Estimator| {
+            let suffix = if estimators.len() > 1 { format!("_{estimator}") } else { String::new() };
+            let model = with_suffix(out, &suffix);
+            let [curves, page, figures] =
+                ["wv.json", "html", "svg"].map(|ending| model.with_extension(ending));
+            Self { estimator: *estimator, curves, draws: draws_file::beside(&model), page, figures, model }
+        };
+        estimators.iter().map(files).collect()
+    }
+
+    /// The files of each estimator, claimed before the work. None of them is an input.
+    ///
+    /// # Errors
+    /// When one cannot be made, is an input or not of a calibration, or another command writes it.
+    pub(crate) fn claim(
+        out: &Path,
+        estimators: &[Estimator],
+        inputs: &[PathBuf],
+        existing: Existing,
+    ) -> Result<(Vec<Self>, Vec<Claim>), FileError> {
+        is_file(out)?;
+        let all = Self::of(out, estimators);
+        let kinds = [Written::Calibrated, Written::Curves, Written::Draws, Written::Page, Written::Svg];
+        let paths = all
+            .iter()
+            .flat_map(|f| [&f.model, &f.curves, &f.draws, &f.page, &f.figures].into_iter().zip(kinds));
+        let claim = |(path, kind): (&PathBuf, Written)| {
+            atomic::claim_result(path, inputs.iter().map(PathBuf::as_path), kind, existing)
+        };
+        let claims = paths.map(claim).collect::<Result<_, _>>()?;
+        Ok((all, claims))
+    }
+
+    /// Writes the files of all estimators, the pages among them; their names.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub(crate) fn write_all<'a>(
+        all: &'a [Self],
+        calibration: &Calibration,
+        note: &CalibrationNote,
+        diagnoses: &[Diagnosis],
+    ) -> Result<Vec<&'a Path>, FileError> {
+        let has_draws = calibration.outcomes.iter().any(|o| o.inference.is_some());
+        let mut written = Vec::new();
+        for files in all {
+            files.write(calibration, note)?;
+            files.write_page(calibration, diagnoses)?;
+            let draws = has_draws.then_some(&files.draws);
+            written.extend(
+                [&files.model, &files.curves].into_iter().chain(draws).chain([&files.page, &files.figures]),
+            );
+        }
+        Ok(written.into_iter().map(PathBuf::as_path).collect())
+    }
+
+    fn contents(&self, calibration: &Calibration, note: &CalibrationNote) -> (String, ModelFile) {
+        let Calibration { groups, outcomes, settings, turn_on, .. } = calibration;
+        let chosen: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == self.estimator).collect();
+        let curves = report::json(&CurvesFile::new(groups, &chosen, settings));
+        let blake3 = hash::of_bytes(curves.as_bytes());
+        let means = turn_on.iter().filter(|t| t.estimator == self.estimator);
+        let model = with_turn_on(note.model_file(&chosen, settings, Some(&blake3)), means);
+        (curves, model)
+    }
+
+    /// Writes the models of the estimator, with the hash of their curves in them.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub(crate) fn write(&self, calibration: &Calibration, note: &CalibrationNote) -> Result<(), FileError> {
+        let (curves, model) = self.contents(calibration, note);
+        let chosen: Vec<&Outcome> =
+            calibration.outcomes.iter().filter(|o| o.estimator == self.estimator).collect();
+        let draws = DrawsFile::of(&chosen, calibration.settings.rate_hz);
+        let draws =
+            draws.map(|draws| serde_json::to_string(&draws).expect("plain structs are always JSON") + "\n");
+        // All are on the disk before any has its name. Should the model not get its name, the hash in it tells that the
+        // curves are not of it, and its parameters that the draws are not.
+        let draws = draws.map(|text| atomic::filled(&self.draws, text.as_bytes())).transpose()?;
+        let curves = atomic::filled(&self.curves, curves.as_bytes())?;
+        let model = atomic::filled(&self.model, model_file::to_toml(&model).as_bytes())?;
+        draws.map_or(Ok(()), AtomicFile::commit)?;
+        curves.commit()?;
+        model.commit()
+    }
+
+    /// Writes the curves of the estimator, and in the place of its own model one with inflated parameters: intervals and
+    /// draws, which are of its own, are left out.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub(crate) fn write_inflated(
+        &self,
+        calibration: &Calibration,
+        note: &CalibrationNote,
+        inflated: &Model,
+        inflation: &str,
+    ) -> Result<(), FileError> {
+        let (curves, own) = self.contents(calibration, note);
+        let mut provenance = own.provenance.unwrap_or_default();
+        provenance.insert("inflation".to_owned(), inflation.into());
+        let provenance = Some(provenance);
+        let model = ModelFile { missing: own.missing, provenance, ..ModelFile::new(inflated.clone()) };
+        let curves = atomic::filled(&self.curves, curves.as_bytes())?;
+        let model = atomic::filled(&self.model, model_file::to_toml(&model).as_bytes())?;
+        curves.commit()?;
+        model.commit()
+    }
+}
+
+impl ModelFiles {
+    /// Writes the page of the models of the estimator, and its figures.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub(crate) fn write_page(
+        &self,
+        calibration: &Calibration,
+        diagnoses: &[Diagnosis],
+    ) -> Result<(), FileError> {
+        let shown = calibration.shown(diagnoses, |outcome| outcome.estimator == self.estimator);
+        let document = shown.document();
+        atomic::write(&self.page, document.html())?;
+        atomic::write(&self.figures, document.svg())
+    }
+}
+
+/// Refuses what is no regular file: several files are made of a model's, by its name.
+fn is_file(out: &Path) -> Result<(), FileError> {
+    let is_directory =
+        out.is_dir() || out.file_name().is_none() || out.as_os_str().to_string_lossy().ends_with('/');
+    if !is_directory && out.as_os_str() != "-" && (out.is_file() || !out.exists()) {
+        return Ok(());
+    }
+    let error = FileError::contents(out.display().to_string(), Place::Itself, "is not a file");
+    Err(error.advice("name a file, such as model.toml"))
+}
+
+fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+    let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let extension = path.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
+    path.with_file_name(format!("{stem}{suffix}{extension}"))
+}

@@ -1,0 +1,369 @@
+//! Calibration: from static recordings, or directories of them, to a noise model for each sensor or axis.
+
+use super::ShownCalibration;
+use crate::formats::recordings::{FileReport, ReadOptions, Report};
+use crate::formats::{hash, recordings};
+use crate::jobs::{JobError, Remark, Remarks};
+use crate::report::CurvesFile;
+use nav_sim_calibration::{
+    self, Advance, Beginning, Beginnings, Bootstrap, Diagnosis, Estimator, Group, Outcome, Pool, Replicate,
+    Settings, SignalError, TurnOnSpread, WarmUp, grouped, infer_telling, replicates, turn_on, warm_up,
+};
+use nav_sim_signal::imu::{Channel, Recording, Signal};
+use nav_sim_signal::names::UnknownName;
+use nav_sim_signal::noise::Model;
+use nav_sim_signal::wavelet::{Tuning, default_levels};
+use rayon::prelude::*;
+use std::cell::RefCell;
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Which estimators.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EstimatorChoice {
+    /// This one.
+    One(Estimator),
+    /// The three averages; of a single recording GMWM and RGMWM.
+    All,
+}
+
+impl Default for EstimatorChoice {
+    fn default() -> Self {
+        Self::One(Estimator::default())
+    }
+}
+
+impl fmt::Display for EstimatorChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::One(estimator) => estimator.fmt(f),
+            Self::All => f.write_str("all"),
+        }
+    }
+}
+
+impl FromStr for EstimatorChoice {
+    type Err = UnknownName;
+
+    fn from_str(word: &str) -> Result<Self, Self::Err> {
+        if word == "all" { Ok(Self::All) } else { word.parse().map(Self::One) }
+    }
+}
+
+impl EstimatorChoice {
+    /// Whether it takes one recording at a time, however many there are.
+    #[must_use]
+    pub fn is_single(self) -> bool {
+        matches!(self, Self::One(estimator) if estimator.is_single())
+    }
+
+    /// The estimators that it may come to.
+    pub(crate) fn possible(self) -> Vec<Estimator> {
+        match self {
+            Self::One(estimator) => vec![estimator],
+            Self::All => [1, 2].into_iter().flat_map(|n| self.estimators(n)).flatten().collect(),
+        }
+    }
+
+    /// The estimators for so many recordings.
+    fn estimators(self, recordings: usize) -> Result<Vec<Estimator>, JobError> {
+        match self {
+            Self::One(estimator) if estimator.is_single() && recordings > 1 => {
+                Err(JobError::Single { estimator, recordings })
+            }
+            Self::One(estimator) => Ok(vec![estimator]),
+            Self::All if recordings == 1 => Ok(vec![Estimator::Gmwm, Estimator::Rgmwm]),
+            Self::All => Ok(vec![Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv]),
+        }
+    }
+}
+
+/// How to calibrate recordings.
+#[derive(Debug, Clone)]
+pub struct CalibrationOptions {
+    /// How recordings are read.
+    pub reading: ReadOptions,
+    /// Whether the warm-up found in each recording is left out.
+    pub skip_warm_up: bool,
+    /// Number of scales; `None`: of each recording one less than its length allows.
+    pub scales: Option<u32>,
+    /// Which estimators.
+    pub estimators: EstimatorChoice,
+    /// Which signals are replicates of one another; `None`: as the estimators need it ([`Settings::pool`]).
+    pub pool: Option<Pool>,
+    /// How models are fitted; the estimators and the rate in it follow from the recordings.
+    pub settings: Settings,
+    /// The bootstrap behind intervals and goodness of fit; `None`: neither is computed.
+    pub bootstrap: Option<Bootstrap>,
+    /// Whether the recordings' means are asked for a turn-on bias.
+    pub turn_on: bool,
+}
+
+impl Default for CalibrationOptions {
+    fn default() -> Self {
+        Self {
+            reading: ReadOptions::default(),
+            skip_warm_up: false,
+            scales: None,
+            estimators: EstimatorChoice::default(),
+            pool: None,
+            settings: Settings::default(),
+            bootstrap: Some(Bootstrap::default()),
+            turn_on: true,
+        }
+    }
+}
+
+/// Recordings that were measured and found to be replicates of one another.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Measured {
+    /// What was found in the files.
+    pub report: Report,
+    /// The wavelet variances.
+    pub groups: Vec<Group>,
+    /// The recordings that do not begin as they go on.
+    pub beginnings: Beginnings,
+    /// How models are fitted.
+    pub settings: Settings,
+    /// The draws behind intervals.
+    pub bootstrap: Option<Bootstrap>,
+    /// Whether the recordings' means are asked for a turn-on bias.
+    pub turn_on: bool,
+}
+
+/// A calibration: the fitted models and the wavelet variances behind them.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Calibration {
+    /// The wavelet variances.
+    pub groups: Vec<Group>,
+    /// The fitted models: for each group, one per estimator.
+    pub outcomes: Vec<Outcome>,
+    /// How they were fitted.
+    pub settings: Settings,
+    /// The recordings that do not begin as they go on.
+    pub beginnings: Beginnings,
+    /// Turn-on bias from the recordings' means, for each estimator and sensor; empty if it was not tested.
+    pub turn_on: Vec<TurnOnSpread>,
+}
+
+/// Calibrates recordings, or directories of them.
+///
+/// # Errors
+/// As [`measure`] and [`Measured::calibrate`].
+pub fn calibrate(
+    paths: &[PathBuf],
+    options: &CalibrationOptions,
+    remarks: &mut dyn Remarks,
+) -> Result<Calibration, JobError> {
+    measure(paths, options, remarks)?.calibrate(&|_| {})
+}
+
+/// The first half of [`calibrate()`], which reads the files: errors in them are known before the long half begins.
+///
+/// # Errors
+/// When a recording cannot be read, is too short, or is no replicate of its own; when the estimator takes one recording only.
+pub fn measure(
+    paths: &[PathBuf],
+    options: &CalibrationOptions,
+    remarks: &mut dyn Remarks,
+) -> Result<Measured, JobError> {
+    let CalibrationOptions { reading, skip_warm_up, scales, estimators, pool, settings, bootstrap, turn_on } =
+        options;
+    // As many scales as parameters, and one that the default leaves out.
+    let needed = scales.map_or(2 << settings.model.parameters(), |j| 1 << j);
+    let reading = ReadOptions { min_samples: needed, ..reading.clone() };
+    let look =
+        |recording: Recording| MeasuredRecording::new(recording, *skip_warm_up, *scales, &settings.tuning);
+    let (looks, report) = visit(paths, &reading, &look, remarks)?;
+    let looks = looks.into_iter().collect::<Result<Vec<_>, _>>()?;
+    distinct(&looks)?;
+    let rate_hz = report.files[0].rate_hz;
+    let beginnings = beginnings(&looks, (reading.skip_s, *skip_warm_up), rate_hz);
+    shortest(&report, *scales, remarks);
+    let estimators = estimators.estimators(report.files.iter().map(|f| f.samples.len()).sum())?;
+    let settings = Settings { estimators, rate_hz, ..settings.clone() };
+    if *pool == Some(Pool::Sensor) && settings.pool() == Pool::Axes {
+        return Err(JobError::Pooled);
+    }
+    let mut measured: Vec<_> = looks.into_iter().flat_map(|look| look.replicates).collect();
+    one_switching_on(&report, &mut measured);
+    let groups = grouped(measured, pool.unwrap_or(settings.pool()));
+    Ok(Measured { report, groups, beginnings, settings, bootstrap: *bootstrap, turn_on: *turn_on })
+}
+
+impl Measured {
+    /// How many steps the second half is.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        let draws = self.bootstrap.map_or(0, |bootstrap| bootstrap.draws as u64);
+        (self.groups.len() * self.settings.estimators.len()) as u64 * (self.settings.model.steps() + draws)
+    }
+
+    /// The second half, which fits; `advance` is told how many more of its [`Measured::steps`] are done.
+    ///
+    /// # Errors
+    /// When a trim leaves no replicate, or a curve is too short for the model.
+    pub fn calibrate(self, advance: Advance<'_>) -> Result<Calibration, JobError> {
+        let Self { groups, beginnings, settings, bootstrap, turn_on, .. } = self;
+        let outcomes = nav_sim_calibration::calibrate_telling(&groups, &settings, advance)?;
+        let calibration = Calibration { groups, outcomes, settings, beginnings, turn_on: Vec::new() };
+        let calibration = if turn_on { calibration.with_turn_on() } else { calibration };
+        Ok(calibration.with_inference(bootstrap, advance))
+    }
+}
+
+impl Calibration {
+    /// The noise model of an estimator, at the rate of the recordings; axes without a recording have no noise.
+    #[must_use]
+    pub fn model(&self, estimator: Estimator) -> Model {
+        let own = self.outcomes.iter().filter(|o| o.estimator == estimator);
+        nav_sim_calibration::model_of(own, self.settings.rate_hz)
+    }
+
+    /// The fits that are chosen, to be shown.
+    pub(crate) fn shown<'a>(
+        &'a self,
+        diagnoses: &'a [Diagnosis],
+        is_chosen: impl Fn(&Outcome) -> bool,
+    ) -> ShownCalibration<'a> {
+        let outcomes: Vec<(usize, &Outcome)> =
+            self.outcomes.iter().enumerate().filter(|(_, outcome)| is_chosen(outcome)).collect();
+        let chosen: Vec<&Outcome> = outcomes.iter().map(|(_, outcome)| *outcome).collect();
+        ShownCalibration {
+            curves: CurvesFile::new(&self.groups, &chosen, &self.settings),
+            outcomes,
+            diagnoses,
+            turn_on: &self.turn_on,
+            beginnings: &self.beginnings,
+            settings: &self.settings,
+        }
+    }
+
+    /// The same with what the recordings' means say.
+    fn with_turn_on(mut self) -> Self {
+        let of_estimator = |e: &Estimator| {
+            let own: Vec<&Outcome> = self.outcomes.iter().filter(|o| o.estimator == *e).collect();
+            turn_on(&self.groups, &own)
+        };
+        self.turn_on = self.settings.estimators.iter().flat_map(of_estimator).collect();
+        self
+    }
+
+    /// The same with intervals and goodness of fit, if they are asked for.
+    pub(crate) fn with_inference(mut self, bootstrap: Option<Bootstrap>, advance: Advance<'_>) -> Self {
+        if let Some(bootstrap) = bootstrap {
+            infer_telling(&self.groups, &mut self.outcomes, &self.settings, bootstrap, advance);
+        }
+        self
+    }
+}
+
+/// Shows recordings one by one; what was found in them is remarked.
+pub(crate) fn visit<T: Send>(
+    paths: &[PathBuf],
+    reading: &ReadOptions,
+    look: &(dyn Fn(Recording) -> T + Sync),
+    remarks: &mut dyn Remarks,
+) -> Result<(Vec<T>, Report), JobError> {
+    let listener = RefCell::new(&mut *remarks);
+    let tell = |done, all| listener.borrow_mut().progress(done, all);
+    let (looks, report) = recordings::visit(paths, reading, look, &tell)?;
+    remarks.remark(Remark::Read(&report));
+    Ok((looks, report))
+}
+
+/// Wavelet variances and hashes of a recording; its samples are dropped.
+struct MeasuredRecording {
+    recording: String,
+    /// What tells the samples of each signal from others.
+    signals: Vec<(Channel, String)>,
+    warm_ups: Vec<(Channel, WarmUp)>,
+    replicates: Vec<(Channel, Replicate)>,
+}
+
+impl MeasuredRecording {
+    fn new(
+        recording: Recording,
+        skip_warm_up: bool,
+        levels: Option<u32>,
+        tuning: &Tuning,
+    ) -> Result<Self, SignalError> {
+        let signals = recording.signals.par_iter().map(|s| (s.channel, hash::samples(&s.samples))).collect();
+        let (recording, warm_ups) = without_warm_up(recording, skip_warm_up);
+        let replicates = replicates(&recording, levels, tuning)?;
+        Ok(Self { recording: recording.name, signals, warm_ups, replicates })
+    }
+}
+
+/// The stretches of one file are of one switching-on: the mean of the first of them counts.
+fn one_switching_on(report: &Report, measured: &mut [(Channel, Replicate)]) {
+    let later: Vec<String> =
+        report.files.iter().flat_map(|file| file.recordings().skip(1)).map(|(name, _)| name).collect();
+    let of_later = measured.iter_mut().filter(|(_, replicate)| later.contains(&replicate.name));
+    of_later.for_each(|(_, replicate)| replicate.mean = f64::NAN);
+}
+
+/// Refuses copies of a recording.
+fn distinct(looks: &[MeasuredRecording]) -> Result<(), JobError> {
+    for (i, look) in looks.iter().enumerate() {
+        let copy = |other: &&MeasuredRecording| {
+            other.recording != look.recording && other.signals.iter().any(|s| look.signals.contains(s))
+        };
+        if let Some(first) = looks[..i].iter().find(copy) {
+            return Err(JobError::Copy { copy: look.recording.clone(), first: first.recording.clone() });
+        }
+    }
+    Ok(())
+}
+
+/// The recordings that do not begin as they go on after what was skipped.
+fn beginnings(looks: &[MeasuredRecording], (skipped_s, left_out): (f64, bool), rate_hz: f64) -> Beginnings {
+    let beginning = |look: &MeasuredRecording| Beginning {
+        recording: look.recording.clone(),
+        signals: look.warm_ups.clone(),
+        skip_s: longest(&look.warm_ups).map(|n| (skipped_s + n as f64 / rate_hz).ceil()),
+    };
+    let found = looks.iter().filter(|look| !look.warm_ups.is_empty());
+    Beginnings { all: found.map(beginning).collect(), left_out }
+}
+
+/// Samples to leave out of a recording for all its signals; none where that does not help one of them.
+fn longest(signals: &[(Channel, WarmUp)]) -> Option<usize> {
+    let helps = signals.iter().all(|(_, w)| w.change.is_some());
+    signals.iter().map(|(_, w)| w.samples).max().filter(|_| helps)
+}
+
+/// How the signals of a recording begin; if it is to be left out, the recording without that.
+pub(crate) fn without_warm_up(
+    mut recording: Recording,
+    leave_out: bool,
+) -> (Recording, Vec<(Channel, WarmUp)>) {
+    let begins_otherwise = |s: &Signal| warm_up(&s.samples).map(|w| (s.channel, w));
+    let found: Vec<_> = recording.signals.par_iter().filter_map(begins_otherwise).collect();
+    if let Some(samples) = longest(&found).filter(|_| leave_out) {
+        for signal in &mut recording.signals {
+            signal.samples.drain(..samples);
+        }
+    }
+    (recording, found)
+}
+
+/// Remarks which recording is so much shorter than the others that it lacks scales, or costs all of them scales.
+fn shortest(report: &Report, scales: Option<u32>, remarks: &mut dyn Remarks) {
+    let levels = |samples: usize| scales.unwrap_or(u32::MAX).min(default_levels(samples));
+    let recordings = report.files.iter().flat_map(FileReport::recordings);
+    let Some((recording, samples)) = recordings.clone().min_by_key(|(_, samples)| levels(*samples)) else {
+        return;
+    };
+    let mut found: Vec<u32> = recordings.map(|(_, samples)| levels(samples)).collect();
+    found.sort_unstable();
+    // Scales are averaged up to the last that more than half of the recordings have ([`calibration::average`]).
+    let (scales, used, usual) = (found[0], found[(found.len() - 1) / 2], found[found.len() / 2]);
+    let short = found.iter().filter(|own| **own < used).count();
+    if scales < usual {
+        remarks.remark(Remark::Shortest { recording: &recording, samples, scales, short, used, usual });
+    }
+}

@@ -1,0 +1,187 @@
+//! The model file of a calibration.
+
+use super::{notes, turn_on_remark};
+use crate::formats::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn};
+use crate::report::Input;
+use nav_sim_calibration::{Estimator, Outcome, ParameterLimit, Settings, TurnOnSpread, tau_s};
+use nav_sim_signal::imu::{Axis, Channel, Sensor};
+use nav_sim_signal::noise::Model;
+use nav_sim_signal::wavelet::Convention;
+use toml::{Table, Value};
+
+/// What a calibration leaves in the file beside the model.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct CalibrationNote {
+    /// How the tuning constant follows from the efficiency.
+    pub efficiency_convention: Convention,
+    /// Seed of the bootstrap, if there was one.
+    pub seed: Option<u64>,
+    /// How the recordings were read and grouped, key by key: what was left out at their beginning, gaps, axes, scales, pool.
+    pub reading: Table,
+    /// The recordings or the curve, and the parameters file.
+    pub inputs: Vec<Input>,
+}
+
+impl CalibrationNote {
+    /// The model file of the outcomes of one estimator. Channels of no group are missing in it. `curves`: BLAKE3, in
+    /// hexadecimal, of the file of curves that goes beside it.
+    pub(crate) fn model_file(
+        &self,
+        outcomes: &[&Outcome],
+        settings: &Settings,
+        curves: Option<&str>,
+    ) -> ModelFile {
+        let mut file = ModelFile::new(Model { rate_hz: settings.rate_hz, axes: Default::default() });
+        file.missing = Channel::ALL.to_vec();
+        for outcome in outcomes {
+            for channel in outcome.scope.channels() {
+                file.model.axes[channel.index()] = outcome.fit.composite.clone();
+                file.missing.retain(|c| *c != channel);
+                file.intervals.extend(intervals(outcome, channel));
+            }
+        }
+        let mut provenance = self.provenance(outcomes, settings);
+        if let Some(blake3) = curves {
+            provenance.insert("curves_blake3".to_owned(), blake3.into());
+        }
+        file.provenance = Some(provenance);
+        file
+    }
+
+    fn provenance(&self, outcomes: &[&Outcome], settings: &Settings) -> Table {
+        let mut table = Table::new();
+        let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);
+        let estimator = outcomes.first().map_or(Estimator::Given, |o| o.estimator);
+        put("program", PROGRAM.into());
+        put("schema", (SCHEMA as i64).into());
+        put("estimator", estimator.name().into());
+        put("model", settings.model.to_string().into());
+        put("weighting", settings.weighting.name().into());
+        if let Some(range) = settings.fit_range {
+            put("fit_range_s", vec![range.from_s, range.to_s].into());
+        }
+        if let Some(seed) = self.seed {
+            // TOML integers are signed; larger seeds go as text.
+            put("seed", i64::try_from(seed).map_or_else(|_| seed.to_string().into(), Value::from));
+        }
+        if estimator.is_robust() {
+            put("efficiency", settings.tuning.efficiency().into());
+            put("efficiency_convention", self.efficiency_convention.name().into());
+        }
+        for (key, value) in &self.reading {
+            put(key, value.clone());
+        }
+        if !settings.limits.is_empty() {
+            put("limits", settings.limits.iter().map(limit).collect::<Vec<_>>().into());
+        }
+        put("fits", outcomes.iter().map(|o| fit(o, settings)).collect::<Vec<_>>().into());
+        put("inputs", self.inputs.iter().map(input).collect::<Vec<_>>().into());
+        table
+    }
+}
+
+/// A model file with the turn-on biases that the recordings' means show; why or why not stands in the provenance.
+pub(super) fn with_turn_on<'a>(
+    mut file: ModelFile,
+    means: impl Iterator<Item = &'a TurnOnSpread>,
+) -> ModelFile {
+    let mut turn_on = TurnOn::default();
+    let mut remarks = Table::new();
+    for found in means {
+        remarks.insert(found.sensor.name().to_owned(), turn_on_remark(found).into());
+        let Some(sigmas) = found.sigmas() else { continue };
+        let of_axis = |axis: Axis| {
+            let channel = Channel { sensor: found.sensor, axis };
+            if file.missing.contains(&channel) { 0.0 } else { sigmas[axis as usize] }
+        };
+        let sigmas = Some(Axis::ALL.map(of_axis));
+        match found.sensor {
+            Sensor::Accel => turn_on.accel_m_s2 = sigmas,
+            Sensor::Gyro => turn_on.gyro_rad_s = sigmas,
+        }
+    }
+    file.turn_on = (turn_on != TurnOn::default()).then_some(turn_on);
+    if let Some(provenance) = file.provenance.as_mut().filter(|_| !remarks.is_empty()) {
+        provenance.insert("turn_on".to_owned(), remarks.into());
+    }
+    file
+}
+
+fn intervals(outcome: &Outcome, channel: Channel) -> Vec<Interval> {
+    let labels = outcome.fit.composite.labels();
+    let all = outcome.inference.iter().flat_map(|i| &i.intervals).filter(|i| i.low.is_finite());
+    all.map(|i| Interval {
+        channel,
+        process: labels[i.of.process].clone(),
+        parameter: i.of.parameter.name().to_owned(),
+        low: i.low,
+        high: i.high,
+    })
+    .collect()
+}
+
+fn fit(outcome: &Outcome, settings: &Settings) -> Table {
+    let fit = &outcome.fit;
+    let mut table = Table::new();
+    let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);
+    let count = |n: usize| Value::from(n as i64);
+    put("signals", outcome.scope.name().into());
+    put("model", outcome.spec.to_string().into());
+    put("replicates", count(outcome.replicates));
+    put("recordings", count(outcome.recordings));
+    if outcome.estimator == Estimator::DrAwv {
+        put("trim", count(settings.trim.count(outcome.replicates)));
+    }
+    put("scales", count(outcome.curve.levels.len()));
+    put("objective", fit.objective.into());
+    put("termination", fit.termination.name().into());
+    put("combinations", count(fit.combinations));
+    put("starts", count(fit.starts));
+    put("agreeing", count(fit.agreeing));
+    if let Some(runner_up) = fit.runner_up {
+        put("runner_up", runner_up.into());
+    }
+    if let Some(inference) = &outcome.inference {
+        put("bootstrap", count(inference.draws));
+        if let Some(goodness) = inference.goodness {
+            put("j_dof", count(goodness.dof));
+            put("j_p_value", goodness.p_value.into());
+        }
+    }
+    if let Some(misfit) = outcome.misfit() {
+        put("worst_ratio", misfit.worst.ratio.into());
+        put("worst_tau_s", tau_s(misfit.worst.level, settings.rate_hz).into());
+    }
+    put("notes", notes(outcome, settings).into());
+    table
+}
+
+/// A parameter that was fixed or bounded beforehand.
+fn limit(limit: &ParameterLimit) -> Table {
+    let ParameterLimit { sensor, axis, process, parameter, low, high } = limit;
+    let signals = match (sensor, axis) {
+        (None, _) => "all".to_owned(),
+        (Some(sensor), None) => sensor.name().to_owned(),
+        (Some(sensor), Some(axis)) => Channel { sensor: *sensor, axis: *axis }.to_string(),
+    };
+    let mut table = Table::new();
+    let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);
+    put("signals", signals.into());
+    put("process", process.as_str().into());
+    put("parameter", parameter.as_str().into());
+    match (low, high) {
+        (Some(low), Some(high)) if low.to_bits() == high.to_bits() => {
+            put("fix", (*low).into());
+        }
+        _ => {
+            for (key, bound) in [("lower", low), ("upper", high)] {
+                bound.map(|value| put(key, value.into()));
+            }
+        }
+    }
+    table
+}
+
+fn input(input: &Input) -> Table {
+    Table::try_from(input).expect("three words")
+}
