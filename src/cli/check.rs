@@ -186,8 +186,16 @@ fn recording(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<Str
         Ok(recordings) => recordings,
         Err(refusal) => return moving(path, session).ok_or(refusal),
     };
-    let described = recordings.iter().map(|r| {
-        format!("{} channels of {} samples at {} Hz", r.signals.len(), r.len(), six_digits(r.rate_hz))
-    });
-    Ok(format!("read as a static recording, {}", described.collect::<Vec<_>>().join("; ")))
+    let mut described: Vec<String> = recordings
+        .iter()
+        .map(|r| {
+            format!("{} channels of {} samples at {} Hz", r.signals.len(), r.len(), six_digits(r.rate_hz))
+        })
+        .collect();
+    described.dedup();
+    let count = match recordings.len() {
+        1 => "a static recording".to_owned(),
+        n => format!("{n} static recordings"),
+    };
+    Ok(format!("read as {count}, {}", described.join("; ")))
 }

@@ -74,7 +74,8 @@ pub(crate) struct DesignedQuantile {
 /// 0.83 to 0.88 of that, the mean 0.92 to 0.95, and 32 to 33 % were wider (AWV and DR-AWV); those of white noise were 0.93
 /// to 0.98 of it. All of them held the truth in 96 to 98.5 % of the cases: a scatter read off twelve signals is more often
 /// less than more, for which Student's quantile makes amends.
-const STATED: &str = "one calibration states another interval: where ± 100 % are expected, half are below 0.85 of it, one in three above";
+const STATED: &str =
+    "where ± 100 % are expected, half of the calibrations state below 0.85 of it, one in three more";
 
 /// A part of an interval this large is nearly all of it.
 const NEARLY_ALL: f64 = 0.8;

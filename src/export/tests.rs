@@ -212,7 +212,7 @@ fn every_value_has_its_unit_on_its_line() {
     for target in Target::ALL {
         let export = if target.bias() == Bias::Walk { walks(target) } else { markovs(target) };
         let text = export.text("model.toml");
-        assert!(text.contains("times the Allan deviation of the model") && text.contains("200 Hz"), "{text}");
+        assert!(text.contains(" × the model") && text.contains("200 Hz"), "{text}");
         for entry in &export.entries {
             let line = text.lines().find(|l| l.contains(entry.key) && l.contains(&number(entry.value.abs())));
             assert!(line.is_some() && text.contains(&format!("{}; ", entry.unit)), "{}:\n{text}", entry.key);

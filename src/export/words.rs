@@ -30,7 +30,7 @@ impl Export {
     pub(crate) fn summary(&self) -> Vec<String> {
         let line = |s: &SensorExport| {
             let (low, high) = (s.closure.lowest.ratio, s.closure.highest.ratio);
-            let off = format!("{low:.2} to {high:.2} times the Allan deviation of the model");
+            let off = format!("{low:.2} to {high:.2} × the model");
             format!("{}: {}; {off}", s.sensor.name(), parameters(s))
         };
         self.sensors.iter().map(line).collect()

@@ -49,7 +49,7 @@ pub(crate) fn reduction_line(quality: &ReductionQuality) -> String {
             true => format!(", {} {}", REPORTED_NAMES[state], more(most)),
             false => String::new(),
         };
-        format!("; RMSE at outage ends against --filter full: horizontal {}{largest}", more(horizontal))
+        format!("; RMSE over --filter full at outages: horizontal {}{largest}", more(horizontal))
     });
     format!("reduced filter: NEES {} (9 if right){cost}", readable(quality.nees))
 }

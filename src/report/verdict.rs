@@ -46,9 +46,10 @@ fn words(summary: &Summary) -> String {
         VerdictKind::Undecided => {
             let percent = 100.0 * (verdict.detectable_state_ratio - 1.0);
             let needed = verdict.runs_to_decide.unwrap_or_default();
+            let miss = if verdict.independent_runs == 1.0 { "misses" } else { "miss" };
+            let runs = independent(verdict.independent_runs);
             format!(
-                "undecided: {} cannot show an error below {percent:.0} % in one state; {needed} would decide",
-                independent(verdict.independent_runs)
+                "undecided: {runs} {miss} errors below {percent:.0} % in one state; {needed} would decide"
             )
         }
         VerdictKind::Doubtful => {

@@ -101,24 +101,23 @@ fn sources(outage: &OutageSummary) -> Option<String> {
 /// Intervals that the calibrations of the models leave.
 fn by_calibration(outage: &OutageSummary) -> Option<String> {
     let shown = |name: &str, value: f64, (low, high): (f64, f64)| {
-        format!("{name} {} [{}, {}]", readable(value), readable(low), readable(high))
+        format!("{name} {} m [{}, {}]", readable(value), readable(low), readable(high))
     };
     let h = &outage.horizontal_error_end_m;
-    let p95 = h.p95_ci95.0.zip(h.p95_ci95.1).map(|ends| shown("horizontal p95 (m)", h.p95, ends));
+    let p95 = h.p95_ci95.0.zip(h.p95_ci95.1).map(|ends| shown("p95", h.p95, ends));
     let of_east = |name: &str, value: &PerState<f64>, interval: &Option<PerState<(f64, f64)>>| {
         interval.map(|interval| shown(name, value.0[1], interval.0[1]))
     };
-    let rmse = of_east("RMSE pos_e_m", &outage.rmse_end, &outage.rmse_end_ci95);
-    let asee = of_east("ASEE pos_e_m", &outage.asee_end, &outage.asee_end_ci95);
+    let rmse = of_east("RMSE east", &outage.rmse_end, &outage.rmse_end_ci95);
+    let asee = of_east("ASEE east", &outage.asee_end, &outage.asee_end_ci95);
     let is_known = outage.asee_end_ci95.is_some() || outage.rmse_end_ci95.is_some();
     let all: Vec<String> = [p95, rmse, asee].into_iter().flatten().collect();
     let place = window(outage.start_s, outage.end_s);
     (is_known && !all.is_empty())
-        .then(|| format!("by the calibration, 95 %, at the end of {place}: {}", all.join(", ")))
+        .then(|| format!("95 % by the calibration, end of {place}: {}", all.join(", ")))
 }
 
-const TOO_LARGE: &str =
-    "its errors are too large for a linear filter; another MODEL or nav-sim tune does not change that";
+const TOO_LARGE: &str = "errors too large for a linear filter; another MODEL or nav-sim tune does not help";
 
 /// What helps: by what the belief lacks, where linear analysis finds the filter wrong already; errors that are large are then
 /// its consequence.

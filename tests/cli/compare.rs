@@ -1,11 +1,11 @@
 //! `nav-sim compare` on made-up run directories whose ratios are known.
 
 use assert_cmd::Command;
-use nav_sim::jobs::Navigation;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::simulation::{EpochSums, OutageRecord, RunRecord, RunResult};
 use nav_sim::report::{Input, Manifest, ModelNote, TrajectorySeries};
+use nav_sim::run::Navigation;
 use nav_sim::run::RunAnswer;
 use std::path::Path;
 

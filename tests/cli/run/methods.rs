@@ -128,7 +128,7 @@ fn few_runs_do_not_hide_a_filter_that_is_wrong() {
     let command = "run drive.toml imu.toml --truth rough.toml --outage 20:50 --seed 2";
     let sampled = done(place.path(), &format!("{command} --runs 2 -o out"));
     let verdict = sampled.stdout.lines().next().unwrap();
-    assert!(verdict.starts_with("verdict: undecided: 2 runs cannot show an error below "), "{verdict}");
+    assert!(verdict.starts_with("verdict: undecided: 2 runs miss errors below "), "{verdict}");
     assert!(verdict.ends_with("; by covariance analysis overconfident"), "{verdict}");
     assert!(sampled.stderr.contains("warning: the filter is overconfident: "), "{}", sampled.stderr);
     done(place.path(), &format!("{command} --method lincov -o expected"));
