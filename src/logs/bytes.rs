@@ -81,6 +81,14 @@ impl<'a> Bytes<'a> {
         Some(values)
     }
 
+    pub(crate) fn skip_f64s(&mut self, count: usize) -> Option<()> {
+        match count.checked_sub(1) {
+            // the first aligns
+            Some(rest) => self.f64().and_then(|_| self.take(rest * size_of::<f64>())).map(|_| ()),
+            None => Some(()),
+        }
+    }
+
     /// A string behind its length.
     pub(crate) fn string(&mut self) -> Option<&'a [u8]> {
         let length = self.u32()?;

@@ -88,6 +88,12 @@ pub struct Fix {
     pub sd_v_ned_m_s: Option<[f64; 3]>,
 }
 
+/// Standard deviations, where they are some: 0 and the largest number stand for unknown ones.
+pub(crate) fn stated(sd: [f64; 3]) -> Option<[f64; 3]> {
+    const UNKNOWN: f64 = 1e6;
+    sd.iter().all(|s| *s > 0.0 && *s < UNKNOWN).then_some(sd)
+}
+
 /// Anything with a stamp.
 pub(crate) trait Stamped {
     fn stamp_ns(&self) -> i64;

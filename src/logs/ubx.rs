@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::format::{Format, Opened};
 use crate::input::{Input, Origin};
 use crate::recognise::{UBX_SYNC, ubx_checksum};
-use crate::sample::{Clock, Fix, ImuSample, Motion, NS, Stamp};
+use crate::sample::{Clock, Fix, ImuSample, Motion, NS, Stamp, stated};
 use crate::stream::Stream;
 use std::collections::BTreeMap;
 
@@ -219,9 +219,9 @@ fn pvt(payload: &[u8]) -> Option<Fix> {
         lat_deg: lat / 1e7,
         lon_deg: lon / 1e7,
         h_m: milli(h),
-        sd_ned_m: Some([horizontal, horizontal, vertical]),
+        sd_ned_m: stated([horizontal, horizontal, vertical]),
         v_ned_m_s: Some(pvt.velocity.map(|v| milli(v.into()))),
-        sd_v_ned_m_s: Some([milli(pvt.speed_accuracy.into()); 3]),
+        sd_v_ned_m_s: stated([milli(pvt.speed_accuracy.into()); 3]),
     })
 }
 

@@ -4,7 +4,7 @@ use crate::bytes::{Alignment, Bytes, Order};
 use crate::channel::Content;
 use crate::container::Message;
 use crate::error::Error;
-use crate::sample::{Fix, ImuSample, Motion, NS, Stamp};
+use crate::sample::{Fix, ImuSample, Motion, NS, Stamp, stated};
 
 /// Content of a type of messages.
 pub(crate) fn content(type_name: &str) -> Content {
@@ -62,11 +62,11 @@ fn short(message: &Message) -> Error {
 pub(crate) fn imu(encoding: &str, message: &Message, stamp: Stamp) -> Result<Option<ImuSample>, Error> {
     let Body { mut bytes, stamp_ns } = body(encoding, message, stamp)?;
     let mut motion = || {
-        bytes.f64s::<13>()?;
+        bytes.skip_f64s(4 + 9)?;
         let gyro_rad_s = bytes.f64s()?;
-        bytes.f64s::<9>()?;
+        bytes.skip_f64s(9)?;
         let accel_m_s2 = bytes.f64s()?;
-        bytes.f64s::<9>()?;
+        bytes.skip_f64s(9)?;
         Some(Motion::Rates { accel_m_s2, gyro_rad_s })
     };
     let motion = motion().ok_or_else(|| short(message))?;
@@ -85,8 +85,9 @@ pub(crate) fn fix(encoding: &str, message: &Message, stamp: Stamp) -> Result<Opt
         rest().ok_or_else(|| short(message))?;
     // the covariance is that of east, north, up (m²); type 0 is unknown
     let sd = [covariance[4], covariance[0], covariance[8]].map(f64::sqrt);
-    let sd_ned_m = (covariance_type != 0).then_some(sd);
+    let sd_ned_m = if covariance_type == 0 { None } else { stated(sd) };
     let (gps_tow_ms, v_ned_m_s, sd_v_ned_m_s) = (None, None, None);
     let fix = Fix { stamp_ns, gps_tow_ms, lat_deg, lon_deg, h_m, sd_ned_m, v_ned_m_s, sd_v_ned_m_s };
-    Ok((status >= 0).then_some(fix))
+    let is_place = [lat_deg, lon_deg, h_m].iter().all(|v| v.is_finite());
+    Ok((status >= 0 && is_place).then_some(fix))
 }

@@ -28,7 +28,7 @@ fn recovered(bytes: &[u8]) -> (usize, u64) {
 }
 
 type Reader = fn(&[u8]);
-const FILES: [(&str, Reader); 15] = [
+const FILES: [(&str, Reader); 18] = [
     ("ros2_zstd.mcap", fuzz::mcap),
     ("ros2_lz4.mcap", fuzz::mcap),
     ("ros2_indexless.mcap", fuzz::mcap),
@@ -36,6 +36,9 @@ const FILES: [(&str, Reader); 15] = [
     ("ros2_unordered.mcap", fuzz::mcap),
     ("ros2_unordered_unchunked.mcap", fuzz::mcap),
     ("rosbags.mcap", fuzz::mcap),
+    ("ros1.mcap", fuzz::mcap),
+    ("big_endian.mcap", fuzz::mcap),
+    ("ros1_unordered.bag", fuzz::bag),
     ("ros1_none.bag", fuzz::bag),
     ("ros1_bz2.bag", fuzz::bag),
     ("ros1_lz4.bag", fuzz::bag),

@@ -2,7 +2,7 @@
 
 use super::layout::{Field, Layout};
 use crate::channel::Content;
-use crate::sample::{Fix, ImuSample, Motion, Stamp};
+use crate::sample::{Fix, ImuSample, Motion, Stamp, stated};
 
 /// Content of a topic, and its rank: what the autopilot fuses comes before what a single device measures.
 pub(super) fn content(name: &str, layout: &Layout) -> (Content, u8) {
@@ -146,9 +146,9 @@ impl FixFields {
             lat_deg: lat?,
             lon_deg: lon?,
             h_m: h?,
-            sd_ned_m: Some([horizontal, horizontal, vertical?]),
+            sd_ned_m: stated([horizontal, horizontal, vertical?]),
             v_ned_m_s: has_velocity.then_some(velocity),
-            sd_v_ned_m_s: has_velocity.then_some([speed; 3]),
+            sd_v_ned_m_s: stated([speed; 3]).filter(|_| has_velocity),
         };
         Some((value(self.fix_type)? >= THREE_DIMENSIONS).then_some(fix))
     }

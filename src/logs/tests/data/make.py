@@ -9,6 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType
 from mcap.writer import Writer as McapWriter
 from mcap_ros2.reader import read_ros2_messages
@@ -110,6 +111,23 @@ def shuffled(items):
     return [items[k] for k in np.argsort(places)]
 
 
+def encoded(name, count, encoding, encode):
+    """Messages of an encoding that mcap-ros2-support does not write."""
+    store, version = (ROS1, 1) if encoding == "ros1" else (ROS2, 2)
+    with open(HERE / name, "wb") as file:
+        writer = McapWriter(file, compression=CompressionType.ZSTD)
+        writer.start(f"ros{version}", "mcap")
+        channels = {}
+        for topic, kind, ns, message in messages(store, count):
+            if topic not in channels:
+                type_name = kind.replace("/msg", "") if version == 1 else kind
+                schema = writer.register_schema(
+                    type_name, f"ros{version}msg", store.generate_msgdef(kind, ros_version=version)[0].encode())
+                channels[topic] = writer.register_channel(topic, encoding, schema)
+            writer.add_message(channels[topic], ns, bytes(encode(message, kind)), ns)
+        writer.finish()
+
+
 def rosbags_mcap(name, count):
     with Bag2(HERE / "directory", version=9, storage_plugin=StoragePlugin.MCAP) as bag:
         topics = {}
@@ -122,7 +140,7 @@ def rosbags_mcap(name, count):
     (HERE / "directory").rmdir()
 
 
-def bag(name, count, compression, extra=()):
+def bag(name, count, compression, extra=(), order=list):
     (HERE / name).unlink(missing_ok=True)
     writer = Bag1(HERE / name)
     writer.chunk_threshold = 4000
@@ -130,7 +148,7 @@ def bag(name, count, compression, extra=()):
         writer.set_compression(compression)
     with writer:
         topics = {}
-        for topic, kind, ns, message in messages(ROS1, count):
+        for topic, kind, ns, message in order(list(messages(ROS1, count))):
             for topic in [topic, *(extra if topic == "/imu" else ())]:
                 if topic not in topics:
                     topics[topic] = writer.add_connection(topic, kind, typestore=ROS1)
@@ -233,7 +251,12 @@ def row(writer, file, topic, stamps, columns):
 
 
 def read_ros(name, topic):
-    """The messages by rosbags, or by mcap where rosbags refuses them: without index and not in order."""
+    """The messages by rosbags; where it refuses them by mcap: without index and not in order, or of ROS 1 in MCAP."""
+    if name == "ros1.mcap":
+        with open(HERE / name, "rb") as file:
+            for schema, _, m in make_reader(file).iter_messages([topic]):
+                yield ROS1.deserialize_ros1(m.data, schema.name.replace("/", "/msg/"))
+        return
     if "unordered_unchunked" in name:
         yield from (m.ros_msg for m in read_ros2_messages(HERE / name, topics=[topic]))
         return
@@ -311,6 +334,9 @@ def main():
     mcap("ros2_unordered.mcap", 40, order=shuffled, chunk_size=4000, compression=CompressionType.ZSTD)
     mcap("ros2_unordered_unchunked.mcap", 12, order=shuffled, use_chunking=False)
     rosbags_mcap("rosbags.mcap", 12)
+    encoded("ros1.mcap", 12, "ros1", ROS1.serialize_ros1)
+    encoded("big_endian.mcap", 12, "cdr", lambda m, kind: ROS2.serialize_cdr(m, kind, little_endian=False))
+    bag("ros1_unordered.bag", 40, Bag1.CompressionFormat.LZ4, order=shuffled)
     bag("ros1_none.bag", 12, None)
     bag("ros1_bz2.bag", 40, Bag1.CompressionFormat.BZ2)
     bag("ros1_lz4.bag", 40, Bag1.CompressionFormat.LZ4)
