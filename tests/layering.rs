@@ -10,11 +10,12 @@ use std::{
 };
 
 /// Each crate's list of modules, in layer order.
-const CRATES: [&str; 5] = [
+const CRATES: [&str; 6] = [
     "src/signal/lib.rs",
     "src/calibration/lib.rs",
     "src/navigation/lib.rs",
     "src/document/lib.rs",
+    "src/logs/lib.rs",
     "src/lib.rs",
 ];
 

@@ -1,0 +1,102 @@
+//! Numbers within the bytes of a message.
+
+/// Order of a number's bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Order {
+    Little,
+    Big,
+}
+
+/// Alignment of numbers to their own size, at most to so many bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Alignment {
+    Packed,
+    UpTo(usize),
+}
+
+/// Bytes of a message, read in order; `None` beyond their end.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bytes<'a> {
+    all: &'a [u8],
+    at: usize,
+    order: Order,
+    alignment: Alignment,
+}
+
+impl<'a> Bytes<'a> {
+    pub(crate) const fn little(all: &'a [u8]) -> Self {
+        Self::new(all, Order::Little, Alignment::Packed)
+    }
+
+    pub(crate) const fn new(all: &'a [u8], order: Order, alignment: Alignment) -> Self {
+        Self { all, at: 0, order, alignment }
+    }
+
+    pub(crate) fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+        let taken = self.all.get(self.at..self.at.checked_add(count)?)?;
+        self.at += count;
+        Some(taken)
+    }
+
+    fn number<const N: usize>(&mut self) -> Option<[u8; N]> {
+        if let Alignment::UpTo(most) = self.alignment {
+            self.at = self.at.next_multiple_of(N.min(most));
+        }
+        let mut bytes = *self.take(N)?.first_chunk::<N>()?;
+        if self.order == Order::Big {
+            bytes.reverse();
+        }
+        Some(bytes)
+    }
+
+    pub(crate) fn u8(&mut self) -> Option<u8> {
+        self.number().map(u8::from_le_bytes)
+    }
+
+    pub(crate) fn u16(&mut self) -> Option<u16> {
+        self.number().map(u16::from_le_bytes)
+    }
+
+    pub(crate) fn u32(&mut self) -> Option<u32> {
+        self.number().map(u32::from_le_bytes)
+    }
+
+    pub(crate) fn i32(&mut self) -> Option<i32> {
+        self.number().map(i32::from_le_bytes)
+    }
+
+    pub(crate) fn u64(&mut self) -> Option<u64> {
+        self.number().map(u64::from_le_bytes)
+    }
+
+    pub(crate) fn f64(&mut self) -> Option<f64> {
+        self.number().map(f64::from_le_bytes)
+    }
+
+    pub(crate) fn f64s<const N: usize>(&mut self) -> Option<[f64; N]> {
+        let mut values = [0.0; N];
+        for value in &mut values {
+            *value = self.f64()?;
+        }
+        Some(values)
+    }
+
+    pub(crate) fn skip_f64s(&mut self, count: usize) -> Option<()> {
+        match count.checked_sub(1) {
+            // the first aligns
+            Some(rest) => self.f64().and_then(|_| self.take(rest * size_of::<f64>())).map(|_| ()),
+            None => Some(()),
+        }
+    }
+
+    /// A string behind its length.
+    pub(crate) fn string(&mut self) -> Option<&'a [u8]> {
+        let length = self.u32()?;
+        self.take(length as usize)
+    }
+}
+
+/// Text of a name in a file.
+pub(crate) fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}

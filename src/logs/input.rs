@@ -1,0 +1,170 @@
+//! Bytes of a log, with their offsets.
+
+use crate::error::{Error, Place};
+use std::fs::File;
+use std::io::{self, BufReader, Cursor, Read, Seek, SeekFrom};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Bytes that are read at once.
+const BUFFER: usize = 1 << 16;
+
+/// Origin of the bytes, which can be opened several times.
+#[derive(Debug, Clone)]
+pub(crate) enum Origin {
+    File(PathBuf),
+    Bytes(Arc<[u8]>),
+}
+
+impl Origin {
+    pub(crate) fn open(&self) -> Result<Input, Error> {
+        match self {
+            Self::File(path) => {
+                let file = File::open(path)?;
+                let length = file.metadata()?.len();
+                Ok(Input::new(Box::new(file), length, Within::File))
+            }
+            Self::Bytes(bytes) => {
+                let length = bytes.len() as u64;
+                Ok(Input::new(Box::new(Cursor::new(Arc::clone(bytes))), length, Within::File))
+            }
+        }
+    }
+
+    /// The first bytes, at most so many.
+    pub(crate) fn head(&self, most: u64) -> Result<Vec<u8>, Error> {
+        let mut input = self.open()?;
+        let most = most.min(input.length);
+        input.bytes(most, most)
+    }
+}
+
+trait Source: Read + Seek + Send {}
+impl<T: Read + Seek + Send> Source for T {}
+
+/// Place of the bytes in the file.
+enum Within {
+    File,
+    /// Unpacked bytes of the chunk at this offset.
+    Chunk(u64),
+}
+
+/// Bytes to be read in order, with seeking.
+pub(crate) struct Input {
+    source: BufReader<Box<dyn Source>>,
+    position: u64,
+    length: u64,
+    within: Within,
+}
+
+impl Input {
+    fn new(source: Box<dyn Source>, length: u64, within: Within) -> Self {
+        Self { source: BufReader::with_capacity(BUFFER, source), position: 0, length, within }
+    }
+
+    /// The unpacked bytes of a chunk.
+    pub(crate) fn chunk(bytes: Vec<u8>, offset: u64) -> Self {
+        let length = bytes.len() as u64;
+        Self::new(Box::new(Cursor::new(bytes)), length, Within::Chunk(offset))
+    }
+
+    pub(crate) const fn position(&self) -> u64 {
+        self.position
+    }
+
+    pub(crate) const fn length(&self) -> u64 {
+        self.length
+    }
+
+    pub(crate) const fn left(&self) -> u64 {
+        self.length.saturating_sub(self.position)
+    }
+
+    /// Byte of the file.
+    pub(crate) const fn offset(&self) -> u64 {
+        match self.within {
+            Within::File => self.position,
+            Within::Chunk(offset) => offset,
+        }
+    }
+
+    /// Holds when so many bytes are there.
+    pub(crate) fn expect(&self, needed: u64) -> Result<(), Error> {
+        let left = self.left();
+        if needed <= left {
+            return Ok(());
+        }
+        match self.within {
+            Within::File => {
+                let place = Place::byte(self.position);
+                Err(Error::Truncated { place, needed, left })
+            }
+            Within::Chunk(offset) => Err(Error::malformed(offset, "a record goes beyond its chunk")),
+        }
+    }
+
+    pub(crate) fn skip(&mut self, bytes: u64) -> Result<(), Error> {
+        self.expect(bytes)?;
+        let step = i64::try_from(bytes).map_err(|_| io::Error::from(io::ErrorKind::InvalidInput))?;
+        self.source.seek_relative(step)?;
+        self.position += bytes;
+        Ok(())
+    }
+
+    pub(crate) fn seek(&mut self, position: u64) -> Result<(), Error> {
+        let step = i128::from(position) - i128::from(self.position);
+        match i64::try_from(step) {
+            Ok(step) => self.source.seek_relative(step)?,
+            Err(_) => _ = self.source.seek(SeekFrom::Start(position))?,
+        }
+        self.position = position;
+        Ok(())
+    }
+
+    fn fill(&mut self, into: &mut [u8]) -> Result<(), Error> {
+        self.expect(into.len() as u64)?;
+        self.source.read_exact(into)?;
+        self.position += into.len() as u64;
+        Ok(())
+    }
+
+    pub(crate) fn array<const N: usize>(&mut self) -> Result<[u8; N], Error> {
+        let mut bytes = [0; N];
+        self.fill(&mut bytes)?;
+        Ok(bytes)
+    }
+
+    pub(crate) fn u8(&mut self) -> Result<u8, Error> {
+        Ok(self.array::<1>()?[0])
+    }
+
+    pub(crate) fn u16(&mut self) -> Result<u16, Error> {
+        self.array().map(u16::from_le_bytes)
+    }
+
+    pub(crate) fn u32(&mut self) -> Result<u32, Error> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    pub(crate) fn u64(&mut self) -> Result<u64, Error> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    /// So many bytes, which are there and not too many: both are known before anything is allocated.
+    pub(crate) fn bytes(&mut self, count: u64, limit: u64) -> Result<Vec<u8>, Error> {
+        self.expect(count)?;
+        if count > limit {
+            let place = Place::byte(self.offset());
+            return Err(Error::TooLarge { place, bytes: count, limit });
+        }
+        let mut bytes = vec![0; count as usize];
+        self.fill(&mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// The bytes from here on, as many as there are or so many.
+    #[cfg(feature = "npz")]
+    pub(crate) fn take(self, bytes: u64) -> impl Read {
+        self.source.take(bytes)
+    }
+}

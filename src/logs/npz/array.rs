@@ -1,0 +1,161 @@
+//! An array in NumPy's own format (`numpy.lib.format`).
+
+use crate::bytes::{Alignment, Bytes, Order};
+use crate::error::Error;
+use std::io::{self, Read};
+
+/// Longest header (bytes).
+const LONGEST_HEADER: usize = 1 << 16;
+/// Numbers that are read together.
+const BLOCK: usize = 8192;
+
+/// Array of numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Array {
+    /// Length of each dimension.
+    pub shape: Vec<usize>,
+    /// Numbers, the last dimension running fastest.
+    pub values: Vec<f64>,
+}
+
+/// Header of an array.
+struct Header {
+    number: Number,
+    order: Order,
+    shape: Vec<usize>,
+    is_fortran: bool,
+}
+
+/// Types of numbers.
+#[derive(Clone, Copy)]
+enum Number {
+    Signed(usize),
+    Unsigned(usize),
+    Float(usize),
+}
+
+impl Number {
+    const fn size(self) -> usize {
+        let (Self::Signed(size) | Self::Unsigned(size) | Self::Float(size)) = self;
+        size
+    }
+
+    fn read(self, bytes: &mut Bytes<'_>) -> Option<f64> {
+        Some(match self {
+            Self::Signed(1) => bytes.u8()?.cast_signed().into(),
+            Self::Signed(2) => bytes.u16()?.cast_signed().into(),
+            Self::Signed(4) => bytes.i32()?.into(),
+            Self::Signed(_) => bytes.u64()?.cast_signed() as f64,
+            Self::Unsigned(1) => bytes.u8()?.into(),
+            Self::Unsigned(2) => bytes.u16()?.into(),
+            Self::Unsigned(4) => bytes.u32()?.into(),
+            Self::Unsigned(_) => bytes.u64()? as f64,
+            Self::Float(4) => f32::from_bits(bytes.u32()?).into(),
+            Self::Float(_) => bytes.f64()?,
+        })
+    }
+}
+
+/// Reads an array that has so many bytes with its header.
+pub(super) fn read(from: &mut impl Read, size: u64, offset: u64) -> Result<Array, Error> {
+    let fault = |error: io::Error| Error::malformed(offset, format!("an array cannot be unpacked: {error}"));
+    let (text, header_bytes) = header_text(from).map_err(fault)?;
+    let header = Header::parse(&text, offset)?;
+    let count = header.shape.iter().try_fold(1_usize, |count, n| count.checked_mul(*n));
+    let bytes = count.and_then(|count| count.checked_mul(header.number.size()));
+    let Some((count, bytes)) =
+        count.zip(bytes).filter(|(_, bytes)| *bytes as u64 == size.saturating_sub(header_bytes))
+    else {
+        return Err(Error::malformed(
+            offset,
+            format!("an array of shape {:?} in {size} bytes", header.shape),
+        ));
+    };
+    let mut values = Vec::new();
+    let mut block = vec![0; BLOCK * header.number.size()];
+    let mut left = bytes;
+    while left > 0 {
+        let part = &mut block[..left.min(BLOCK * header.number.size())];
+        from.read_exact(part).map_err(fault)?;
+        left -= part.len();
+        let mut numbers = Bytes::new(part, header.order, Alignment::Packed);
+        values.extend(std::iter::from_fn(|| header.number.read(&mut numbers)));
+    }
+    debug_assert_eq!(values.len(), count);
+    if header.is_fortran {
+        values = transposed(&values, &header.shape);
+    }
+    Ok(Array { shape: header.shape, values })
+}
+
+/// The header's text, and the bytes up to its end.
+fn header_text(from: &mut impl Read) -> io::Result<(String, u64)> {
+    let mut start = [0; 10];
+    from.read_exact(&mut start)?;
+    if !start.starts_with(b"\x93NUMPY") {
+        return Err(io::Error::other("not an array"));
+    }
+    let mut length = usize::from(u16::from_le_bytes([start[8], start[9]]));
+    let mut before = 10;
+    if start[6] > 1 {
+        let mut more = [0; 2];
+        from.read_exact(&mut more)?;
+        length |= usize::from(u16::from_le_bytes(more)) << 16;
+        before = 12;
+    }
+    if length > LONGEST_HEADER {
+        return Err(io::Error::other(format!("a header of {length} bytes")));
+    }
+    let mut text = vec![0; length];
+    from.read_exact(&mut text)?;
+    Ok((crate::bytes::text(&text), (before + length) as u64))
+}
+
+impl Header {
+    /// The dictionary `{'descr': '<f8', 'fortran_order': False, 'shape': (40, 3), }`.
+    fn parse(text: &str, offset: u64) -> Result<Self, Error> {
+        let value = |key: &str| Some(text.split_once(key)?.1.trim_start_matches([' ', ':']));
+        let fault =
+            || Error::malformed(offset, format!("the header of an array does not parse: {}", text.trim()));
+        let kind = value("'descr'").ok_or_else(fault)?;
+        let (order, number) = number(kind).ok_or_else(|| Error::encoding(offset, kind.as_bytes()))?;
+        let shape = value("'shape'").and_then(|v| v.strip_prefix('(')?.split_once(')')).ok_or_else(fault)?.0;
+        let lengths = shape.split(',').map(str::trim).filter(|n| !n.is_empty());
+        let shape = lengths.map(|n| n.parse().map_err(|_| fault())).collect::<Result<_, _>>()?;
+        let is_fortran = value("'fortran_order'").ok_or_else(fault)?.starts_with("True");
+        Ok(Self { number, order, shape, is_fortran })
+    }
+}
+
+/// Order and type of numbers from `'<f8'`.
+fn number(text: &str) -> Option<(Order, Number)> {
+    let code = text.strip_prefix('\'')?.split_once('\'')?.0;
+    let mut characters = code.chars();
+    let order = if characters.next()? == '>' { Order::Big } else { Order::Little };
+    let kind = characters.next()?;
+    let size = characters.as_str().parse().ok()?;
+    let number = match (kind, size) {
+        ('f', 4 | 8) => Number::Float(size),
+        ('i', 1 | 2 | 4 | 8) => Number::Signed(size),
+        ('u' | 'b', 1) | ('u', 2 | 4 | 8) => Number::Unsigned(size),
+        _ => return None,
+    };
+    Some((order, number))
+}
+
+/// Numbers of an array whose first dimension runs fastest, the last running fastest.
+fn transposed(values: &[f64], shape: &[usize]) -> Vec<f64> {
+    let mut steps = vec![1; shape.len()];
+    for k in 1..shape.len() {
+        steps[k] = steps[k - 1] * shape[k - 1];
+    }
+    let place = |mut row_major: usize| {
+        let mut at = 0;
+        for k in (0..shape.len()).rev() {
+            at += row_major % shape[k] * steps[k];
+            row_major /= shape[k];
+        }
+        at
+    };
+    (0..values.len()).map(|k| values[place(k)]).collect()
+}

@@ -1,0 +1,110 @@
+//! Samples of one channel, in order, as they are read.
+
+use crate::channel::Channel;
+use crate::error::{Error, Place};
+use crate::sample::Stamped;
+
+/// Handling of a damaged file.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum OnDamage {
+    /// An error.
+    #[default]
+    Refuse,
+    /// The file is taken to end before the damage, and [`Damage`] says where that is.
+    Recover,
+}
+
+/// Damage that ended the reading.
+#[derive(Debug)]
+pub struct Damage {
+    /// The error that it would have been.
+    pub error: Error,
+    /// Bytes before it.
+    pub read_bytes: u64,
+    /// Bytes of the file.
+    pub file_bytes: u64,
+}
+
+/// Message of a channel, or what was made of it, with its byte in the file.
+pub(crate) type Located<T> = Result<(u64, T), Error>;
+/// Samples as a format makes them.
+pub(crate) type Stream<T> = Box<dyn Iterator<Item = Located<T>> + Send>;
+
+/// Samples of one channel, in order of time. After an error there are no more.
+pub struct Samples<T> {
+    stream: Stream<T>,
+    topic: String,
+    last_ns: Option<i64>,
+    on_damage: OnDamage,
+    file_bytes: u64,
+    damage: Option<Damage>,
+    is_done: bool,
+}
+
+impl<T> Samples<T> {
+    pub(crate) fn new(stream: Stream<T>, channel: &Channel, on_damage: OnDamage, file_bytes: u64) -> Self {
+        let topic = channel.topic.clone();
+        Self { stream, topic, last_ns: None, on_damage, file_bytes, damage: None, is_done: false }
+    }
+
+    /// Topic that is read.
+    #[must_use]
+    pub fn topic(&self) -> &str {
+        &self.topic
+    }
+
+    /// Damage that ended the samples, in a file that is recovered; that of the file as a whole is
+    /// [`Log::damage`](crate::Log::damage).
+    #[must_use]
+    pub const fn damage(&self) -> Option<&Damage> {
+        self.damage.as_ref()
+    }
+
+    fn end(&mut self, error: Error) -> Option<Error> {
+        self.is_done = true;
+        let error = error.of_topic(&self.topic);
+        match (self.on_damage, error.place()) {
+            (OnDamage::Recover, Some(place)) => {
+                let (read_bytes, file_bytes) = (place.offset, self.file_bytes);
+                self.damage = Some(Damage { error, read_bytes, file_bytes });
+                None
+            }
+            _ => Some(error),
+        }
+    }
+}
+
+impl<T: Stamped> Iterator for Samples<T> {
+    type Item = Result<T, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.is_done {
+            return None;
+        }
+        match self.stream.next() {
+            None => {
+                self.is_done = true;
+                None
+            }
+            Some(Err(error)) => self.end(error).map(Err),
+            Some(Ok((offset, sample))) => {
+                let to_ns = sample.stamp_ns();
+                match self.last_ns.replace(to_ns) {
+                    Some(from_ns) if to_ns < from_ns => {
+                        self.end(Error::TimeBack { place: Place::byte(offset), from_ns, to_ns }).map(Err)
+                    }
+                    _ => Some(Ok(sample)),
+                }
+            }
+        }
+    }
+}
+
+impl<T> std::fmt::Debug for Samples<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Samples")
+            .field("topic", &self.topic)
+            .field("damage", &self.damage)
+            .finish_non_exhaustive()
+    }
+}
