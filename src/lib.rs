@@ -65,6 +65,8 @@ pub mod fuse;
 pub mod jobs;
 // Parameters for other programs.
 pub mod export;
+// Contents of a log.
+pub mod inspect;
 // Recordings to models.
 pub mod calibrate;
 // Figures of the paper.

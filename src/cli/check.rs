@@ -4,7 +4,9 @@ use super::{Failure, Session, parse, read};
 use crate::efficiency;
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
+use crate::formats::logs::LogOptions;
 use crate::formats::{contamination_file, curve_file, datasheet, model_file, parameters_file, scenario_file};
+use crate::inspect::inspect;
 use crate::report::six_digits;
 use nav_sim_navigation::fusion::alignment::moves;
 use std::path::{Path, PathBuf};
@@ -110,6 +112,10 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             Ok(format!("a study of estimators on {} sets of recordings", study.sets))
         }
         FileKind::Model => model(path, session),
+        FileKind::Log => {
+            let log = inspect(path, &LogOptions::default())?;
+            Ok(format!("{} of {} channels (nav-sim inspect lists them)", log.format, log.channels.len()))
+        }
         FileKind::CatalogueEntry => {
             let sheet = datasheet::read(path)?;
             let name = sheet.name.unwrap_or_default();

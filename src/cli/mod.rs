@@ -17,6 +17,7 @@ mod exit;
 mod export;
 mod fuse;
 mod init;
+mod inspect;
 mod interrupt;
 mod jobs;
 mod man;
@@ -74,6 +75,7 @@ enum Command {
     Design(design::Args),
     Fuse(fuse::Args),
     Compare(compare::Args),
+    Inspect(inspect::Args),
     Export(export::Args),
     Batch(batch::Args),
     Efficiency(efficiency::Args),
@@ -116,6 +118,7 @@ impl Command {
             Self::Tune(args) => tune::run(&args, session),
             Self::Fuse(args) => fuse::run(&args, session),
             Self::Compare(args) => compare::run(&args, session),
+            Self::Inspect(args) => inspect::run(&args, session),
             Self::Export(args) => export::run(&args, session),
             Self::Batch(args) => batch::run(&args, session),
             Self::Efficiency(args) => efficiency::run(&args, session),

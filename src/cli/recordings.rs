@@ -3,9 +3,11 @@
 use super::axes::ChannelSet;
 use super::parse::words;
 use super::{Progress, Session};
+use crate::formats::logs::LogOptions;
 use crate::formats::recordings::{Gaps, ReadOptions, Report};
 use crate::jobs::{Remark, Remarks};
 use crate::report::six_digits;
+use nav_sim_logs::{OnDamage, Stamp};
 use nav_sim_signal::imu::{Channel, Sensor};
 
 /// How recordings are read.
@@ -21,7 +23,49 @@ pub(crate) struct ReadingArgs {
     /// What to do where the time jumps or stands still
     #[arg(long, value_parser = words::<Gaps>(GAPS), default_value_t)]
     gaps: Gaps,
+    /// Topic of the IMU in a log that has several
+    #[arg(long, value_name = "NAME")]
+    topic: Option<String>,
+    #[command(flatten)]
+    log: LogArgs,
 }
+
+/// What is read of a log.
+#[derive(clap::Args, Debug)]
+pub(crate) struct LogArgs {
+    /// Stamps of a log: header, of the measurement; log, of its arrival
+    #[arg(long, value_name = "WHICH", value_parser = words::<Stamps>(STAMPS), default_value_t)]
+    stamp: Stamps,
+    /// Read a damaged log up to the damage
+    #[arg(long)]
+    recover: bool,
+}
+
+impl LogArgs {
+    /// The same, of a topic.
+    pub(crate) fn options(&self, topic: Option<String>) -> LogOptions {
+        LogOptions {
+            topic,
+            stamp: if self.stamp == Stamps::Log { Stamp::Log } else { Stamp::Header },
+            on_damage: if self.recover { OnDamage::Recover } else { OnDamage::Refuse },
+        }
+    }
+}
+
+/// Stamps of a log by their names.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+enum Stamps {
+    #[default]
+    Header,
+    Log,
+}
+
+nav_sim_signal::named!(Stamps { Header = "header", Log = "log" });
+
+const STAMPS: &[(&str, &str)] = &[
+    ("header", "Of the measurement, as the message states it"),
+    ("log", "Of arrival, as the logger states it"),
+];
 
 /// How recordings are read, and which of their signals are used.
 #[derive(clap::Args, Debug)]
@@ -82,13 +126,20 @@ impl ReadingArgs {
         if let Some(rate_hz) = self.rate_hz {
             table.insert("rate_hz_given".to_owned(), rate_hz.into());
         }
+        if let Some(topic) = &self.topic {
+            table.insert("topic".to_owned(), topic.as_str().into());
+        }
+        if self.log.stamp != Stamps::default() {
+            table.insert("stamp".to_owned(), self.log.stamp.name().into());
+        }
         table
     }
 
     /// How the files are to be read.
     pub(crate) fn options(&self) -> ReadOptions {
         let skip_s = if let Skip::Seconds(s) = self.skip_s { s } else { 0.0 };
-        ReadOptions { rate_hz: self.rate_hz, skip_s, gaps: self.gaps, ..ReadOptions::default() }
+        let log = self.log.options(self.topic.clone());
+        ReadOptions { rate_hz: self.rate_hz, skip_s, gaps: self.gaps, log, ..ReadOptions::default() }
     }
 }
 

@@ -286,6 +286,9 @@ pub(crate) enum Setting {
     StartFiles,
     FixSigma,
     RemoveLine,
+    Topic,
+    Stamp,
+    Recover,
 }
 
 impl Setting {
@@ -307,6 +310,9 @@ impl Setting {
                 "remove the line, and split the recording at the gap that it leaves, or ignore that"
             }
             Self::FixSigma => "give standard deviations for all fixes",
+            Self::Topic => "name the topic",
+            Self::Stamp => "take the stamps of arrival",
+            Self::Recover => "read what stands before the damage",
         }
     }
 }

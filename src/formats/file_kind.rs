@@ -1,7 +1,7 @@
 //! What kind of file a path holds, by its ending and its contents.
 
 use super::fusion_files::{bare_row, is_nmea};
-use super::{FileError, source};
+use super::{FileError, logs, source};
 use flate2::read::GzDecoder;
 use std::io::Read;
 use std::path::Path;
@@ -35,6 +35,8 @@ pub(crate) enum FileKind {
     Gnss,
     /// A recording of an IMU under way.
     Imu,
+    /// A log.
+    Log,
     /// A static recording, or a directory of them.
     Recording,
 }
@@ -50,6 +52,11 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, FileError> {
     let name = path.to_string_lossy().to_lowercase();
     if path.is_dir() || name.ends_with(".npy") {
         return Ok(FileKind::Recording);
+    }
+    match logs::kind_of(path) {
+        Some(nav_sim_logs::Kind::Npz) => return Ok(FileKind::Recording),
+        Some(_) => return Ok(FileKind::Log),
+        None => {}
     }
     let plain = name.strip_suffix(".gz").unwrap_or(&name);
     if [".nav", ".tum", ".gpx"].iter().any(|ending| plain.ends_with(ending)) {

@@ -11,6 +11,7 @@ pub(crate) mod file_kind;
 pub(crate) mod fusion_files;
 pub(crate) mod hash;
 pub(crate) mod input;
+pub mod logs;
 pub mod model_file;
 pub(crate) mod npy;
 pub(crate) mod parameters_file;

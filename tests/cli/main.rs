@@ -31,6 +31,7 @@ mod file_commands;
 mod fuse;
 mod help_examples;
 mod laboratory;
+mod logs;
 mod pages;
 mod readme;
 mod require;

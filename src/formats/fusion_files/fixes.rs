@@ -2,10 +2,10 @@
 
 use super::nmea::{self, is_nmea};
 use super::rtklib::{self, is_rtklib};
-use super::{Remark, bare_columns, table, time_back};
+use super::{Remark, bare_columns, log, table, time_back};
 use crate::formats::trajectory_file::columns::{Column, Columns, Known, Unit};
 use crate::formats::trajectory_file::table::{Table, text};
-use crate::formats::{FileError as Error, Place, Setting};
+use crate::formats::{FileError as Error, Place, Setting, logs};
 use glam::DVec3;
 use nav_sim_navigation::earth::{MAX_LATITUDE, geodetic_to_ecef};
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
@@ -182,20 +182,30 @@ pub(crate) fn read_gnss(
     clock_s: Option<(f64, f64)>,
 ) -> Result<(Vec<GnssFix>, Vec<Remark>), Error> {
     let shown = path.display().to_string();
-    let text = text(path)?;
-    if let Some(error) = of_another_kind(&shown, &text) {
-        return Err(error);
-    }
-    let (fixes, remarks) = if is_nmea(&text) {
-        nmea::fixes(&shown, &text, unsaid, clock_s)?
-    } else {
-        of_table(path, text, unsaid)?
+    let (fixes, remarks) = match logs::kind_of(path) {
+        Some(_) => log::fixes(path, unsaid)?,
+        None => of_text(path, text(path)?, unsaid, clock_s)?,
     };
     for pair in fixes.windows(2) {
         check_step(&shown, pair[1].0, &pair[0].1, &pair[1].1)?;
     }
     let fixes = fixes.into_iter().map(|(_, fix)| fix).collect();
     Ok((fixes, remarks.into_iter().map(|r| r.of_file(&shown)).collect()))
+}
+
+/// The fixes of a text: sentences or a table.
+fn of_text(
+    path: &Path,
+    text: String,
+    unsaid: Option<&FixSigma>,
+    clock_s: Option<(f64, f64)>,
+) -> Result<Fixes, Error> {
+    let shown = path.display().to_string();
+    match of_another_kind(&shown, &text) {
+        Some(error) => Err(error),
+        None if is_nmea(&text) => nmea::fixes(&shown, &text, unsaid, clock_s),
+        None => of_table(path, text, unsaid),
+    }
 }
 
 /// Fixes with their lines, and remarks.

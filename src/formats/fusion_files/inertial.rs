@@ -8,7 +8,7 @@ use crate::formats::recordings::time_unit::unit_of_step;
 use crate::formats::recordings::timing::median_step;
 use crate::formats::recordings::{self, Raw, ReadOptions};
 use crate::formats::trajectory_file::table::text;
-use crate::formats::{FileError as Error, Place};
+use crate::formats::{FileError as Error, Place, logs};
 use glam::DVec3;
 use nav_sim_navigation::fusion::gap::{LONGEST_S, bridged};
 use nav_sim_navigation::strapdown::MAX_ROTATION;
@@ -51,7 +51,8 @@ struct Columns {
 /// # Errors
 /// Whatever is wrong with it, with its line.
 pub(crate) fn read_imu(path: &Path) -> Result<ImuFile, Error> {
-    let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"));
+    let packed =
+        path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) || logs::kind_of(path).is_some();
     let text = if packed { None } else { Some(text(path)?) };
     let columns = match text.as_ref().and_then(|text| Some((text, bare_columns(text)?))) {
         Some((text, 7..=8)) => kf_gins(path, text)?,

@@ -4,6 +4,7 @@
 mod fixes;
 mod inertial;
 mod initial;
+mod log;
 mod nmea;
 mod rtklib;
 

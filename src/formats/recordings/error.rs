@@ -72,7 +72,7 @@ pub(super) fn empty(path: &str) -> FileError {
 /// A directory without recordings.
 pub(super) fn no_files(path: String) -> FileError {
     FileError::contents(path, Place::Within, "no recordings in it")
-        .advice("recordings end in .csv, .tsv, .txt (also .gz) or .npy")
+        .advice("recordings end in .csv, .tsv, .txt (also .gz), .npy, .npz, .mcap, .bag, .ulg or .ubx")
 }
 
 /// At most `longest` characters of what a file holds, safe to print.

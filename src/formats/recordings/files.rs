@@ -13,7 +13,7 @@ pub(super) struct File {
     pub(super) from_directory: bool,
 }
 
-const ENDINGS: [&str; 4] = ["csv", "tsv", "txt", "npy"];
+const ENDINGS: [&str; 9] = ["csv", "tsv", "txt", "npy", "npz", "mcap", "bag", "ulg", "ubx"];
 
 /// The files, in the order given, those of a directory in name order.
 pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, FileError> {

@@ -1,4 +1,4 @@
-//! Static recordings: text tables with a header (CSV, TSV, gzipped or not) and `.npy` arrays, one replicate
+//! Static recordings: text tables with a header (CSV, TSV, gzipped or not), `.npy` and `.npz` arrays and logs, one replicate
 //! a file, a directory being all its recordings in name order.
 //!
 //! Columns are found by their names (`header`), their units by the names' endings; what was found, and
@@ -7,11 +7,14 @@
 
 pub(crate) mod header;
 
+#[cfg(feature = "npz")]
+mod archive;
 mod array;
 pub(in crate::formats) mod checks;
 pub(in crate::formats) mod error;
 mod files;
 mod lines;
+mod log;
 mod manifest;
 mod options;
 mod prepared;
@@ -30,7 +33,7 @@ pub use write::FileFormat;
 
 pub(in crate::formats) use table::Raw;
 
-use super::{FileError, Kind};
+use super::{FileError, Kind, logs};
 use error::no_files;
 use nav_sim_signal::imu::Recording;
 use prepared::Prepared;
@@ -115,10 +118,12 @@ fn held<T>(
 
 /// Reads a file's columns.
 pub(in crate::formats) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
-        array::load(path, options)
-    } else {
-        text::load(path, options)
+    match logs::kind_of(path) {
+        #[cfg(feature = "npz")]
+        Some(nav_sim_logs::Kind::Npz) => archive::load(path, options),
+        Some(_) => log::load(path, options),
+        None if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) => array::load(path, options),
+        None => text::load(path, options),
     }
 }
 

@@ -1,5 +1,6 @@
 //! How recordings are read.
 
+use crate::formats::logs::LogOptions;
 use nav_sim_signal::imu::Channel;
 
 /// How recordings are read.
@@ -16,6 +17,8 @@ pub struct ReadOptions {
     pub channels: Option<Vec<Channel>>,
     /// Names of the columns, for files without a header and instead of the header of those with one.
     pub columns: Option<Vec<String>>,
+    /// What is read of a log.
+    pub log: LogOptions,
     /// Fewest samples a recording must have (at least 2).
     pub min_samples: usize,
     /// Bytes of one file's samples that are held in memory (512 MiB); those of a longer one wait in a temporary file.
@@ -30,6 +33,7 @@ impl Default for ReadOptions {
             gaps: Gaps::default(),
             channels: None,
             columns: None,
+            log: LogOptions::default(),
             min_samples: 2,
             hold_bytes: 512 << 20,
         }

@@ -1,0 +1,67 @@
+//! Logs of robots, flight controllers and receivers ([`nav_sim_logs`]), among the files that are read.
+
+use super::{FileError, Place, Setting};
+use nav_sim_logs::{Damage, Error, HEAD, Kind, Log, OnDamage, Stamp, recognise};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// Choice of what is read of a log.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct LogOptions {
+    /// Topic of the IMU; none: the only one.
+    pub topic: Option<String>,
+    /// Stamps: of the measurement, or of its arrival.
+    pub stamp: Stamp,
+    /// Whether a damaged file is read up to the damage.
+    pub on_damage: OnDamage,
+}
+
+/// The kind of log that a file is by its first bytes; none for tables and arrays. What cannot be opened is for its reader
+/// to refuse, and a pipe gives its bytes once.
+pub(crate) fn kind_of(path: &Path) -> Option<Kind> {
+    let file = File::open(path).ok().filter(|file| file.metadata().is_ok_and(|data| data.is_file()))?;
+    let mut head = Vec::new();
+    file.take(HEAD as u64).read_to_end(&mut head).ok()?;
+    recognise(&head)
+}
+
+/// Opens a log.
+///
+/// # Errors
+/// When it is not of a format that is read, or is damaged and not to be recovered.
+pub(crate) fn open(path: &Path, options: &LogOptions) -> Result<Log, FileError> {
+    Log::open(path, options.on_damage).map_err(|e| refused(path, e))
+}
+
+/// The refusal of a log, with what helps.
+pub(crate) fn refused(path: &Path, error: Error) -> FileError {
+    let hint = error.hint();
+    let shown = path.display().to_string();
+    match error {
+        Error::Io(source) => FileError::io(path, source),
+        Error::SeveralTopics { .. } | Error::NoTopic { .. } => {
+            FileError::contents(shown, Place::Within, error.to_string()).setting(Setting::Topic)
+        }
+        Error::TimeBack { .. } => {
+            FileError::contents(shown, Place::Within, error.to_string()).setting(Setting::Stamp)
+        }
+        Error::Truncated { .. }
+        | Error::StillWritten { .. }
+        | Error::Crc { .. }
+        | Error::Malformed { .. } => {
+            FileError::contents(shown, Place::Within, error.to_string()).setting(Setting::Recover)
+        }
+        Error::NotRead(_) => {
+            let refusal = FileError::contents(shown, Place::Itself, format!("is {error}"));
+            refusal.advice_if(hint.map(|command| format!("convert it: {command}")))
+        }
+        _ => FileError::contents(shown, Place::Within, error.to_string()).advice_if(hint.map(str::to_owned)),
+    }
+}
+
+/// Words on damage before which the reading ended.
+pub(crate) fn recovered(damage: &Damage) -> String {
+    let Damage { error, read_bytes, file_bytes } = damage;
+    format!("{error}; read up to there, {read_bytes} of {file_bytes} bytes")
+}

@@ -1,0 +1,176 @@
+//! Contents of a log: channels with their rates, gaps and spans.
+
+use crate::formats::FileError;
+use crate::formats::logs::{self, LogOptions};
+use crate::report::Answer;
+use nav_sim_document::{Cell, Document, Importance, Table, Tone, shortest, six_digits};
+use nav_sim_logs::{Channel, Content, Error, Log};
+use serde::Serialize;
+use std::path::Path;
+
+/// A step of this many times the median one is a gap.
+const GAP: f64 = 1.5;
+
+/// Contents of a log.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Inspection {
+    /// The file.
+    pub file: String,
+    /// Its format, in words.
+    pub format: &'static str,
+    /// Its channels, in order of their topics.
+    pub channels: Vec<InspectedChannel>,
+    /// Damage before which the reading ended.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damage: Option<String>,
+}
+
+/// A channel of a log.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct InspectedChannel {
+    /// Topic, or name of the messages.
+    pub topic: String,
+    /// Type of the messages.
+    #[serde(rename = "type")]
+    pub type_name: String,
+    /// `imu`, `fix` or `other`.
+    pub content: &'static str,
+    /// Number of messages.
+    pub messages: u64,
+    /// Time from the first to the last message (s).
+    pub span_s: f64,
+    /// Messages a second: by the median step of samples and fixes, by the span of others.
+    pub rate_hz: Option<f64>,
+    /// Steps of more than 1.5 times the median one; of samples and fixes.
+    pub gaps: Option<u64>,
+    /// The longest step (s).
+    pub longest_step_s: Option<f64>,
+    /// Largest departure of 95 % of the steps from the median one (s).
+    pub jitter_s: Option<f64>,
+    /// Units that the channel is read in.
+    pub units: Option<&'static str>,
+}
+
+/// Reads the channels of a log, and every stamp of its samples and fixes.
+///
+/// ```
+/// use nav_sim::inspect::inspect;
+///
+/// let log = inspect("src/logs/tests/data/ros2_zstd.mcap".as_ref(), &Default::default())?;
+/// let imu = log.channels.iter().find(|channel| channel.content == "imu").expect("one is there");
+/// assert_eq!((imu.topic.as_str(), imu.messages, imu.units), ("/imu", 40, Some("m/s², rad/s")));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// When the file is not a log that is read, or is damaged and not to be recovered.
+pub fn inspect(path: &Path, options: &LogOptions) -> Result<Inspection, FileError> {
+    let log = logs::open(path, options)?;
+    let channels = log.channels().iter().map(|channel| inspected(&log, channel, options));
+    Ok(Inspection {
+        file: path.display().to_string(),
+        format: log.kind().name(),
+        channels: channels.collect::<Result<_, _>>().map_err(|e| logs::refused(path, e))?,
+        damage: log.damage().map(logs::recovered),
+    })
+}
+
+fn inspected(log: &Log, channel: &Channel, options: &LogOptions) -> Result<InspectedChannel, Error> {
+    let topic = Some(channel.topic.as_str());
+    let (content, units, stamps) = match channel.content {
+        _ if channel.messages == 0 => ("other", None, Vec::new()),
+        Content::Imu => {
+            let samples = log.imu(topic, options.stamp)?;
+            let stamps = samples.map(|sample| Ok(sample?.stamp_ns)).collect::<Result<Vec<i64>, Error>>()?;
+            ("imu", Some("m/s², rad/s"), stamps)
+        }
+        Content::Fix => {
+            let fixes = log.fixes(topic, options.stamp)?;
+            let stamps = fixes.map(|fix| Ok(fix?.stamp_ns)).collect::<Result<Vec<i64>, Error>>()?;
+            ("fix", Some("deg, m"), stamps)
+        }
+        Content::Other => ("other", None, Vec::new()),
+    };
+    let ends = channel.first_ns.zip(channel.last_ns);
+    let span_s = ends.map_or(0.0, |(first, last)| last.saturating_sub(first) as f64 * 1e-9);
+    let by_span = (span_s > 0.0).then(|| channel.messages.saturating_sub(1) as f64 / span_s);
+    let steps = Steps::of(&stamps);
+    Ok(InspectedChannel {
+        topic: channel.topic.clone(),
+        type_name: channel.type_name.clone(),
+        content,
+        messages: channel.messages,
+        span_s,
+        rate_hz: steps.as_ref().map(|steps| six_digits(1.0 / steps.median_s)).or(by_span),
+        gaps: steps.as_ref().map(|steps| steps.gaps),
+        longest_step_s: steps.as_ref().map(|steps| steps.longest_s),
+        jitter_s: steps.as_ref().map(|steps| steps.jitter_s),
+        units,
+    })
+}
+
+/// Steps from one stamp to the next.
+struct Steps {
+    median_s: f64,
+    longest_s: f64,
+    jitter_s: f64,
+    gaps: u64,
+}
+
+impl Steps {
+    fn of(stamps_ns: &[i64]) -> Option<Self> {
+        let mut steps: Vec<f64> =
+            stamps_ns.windows(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * 1e-9).collect();
+        steps.sort_by(f64::total_cmp);
+        let median_s = *steps.get(steps.len() / 2).filter(|step| **step > 0.0)?;
+        let mut off: Vec<f64> = steps.iter().map(|step| (step - median_s).abs()).collect();
+        off.sort_by(f64::total_cmp);
+        Some(Self {
+            median_s,
+            longest_s: *steps.last()?,
+            jitter_s: off[(off.len() * 95).div_ceil(100) - 1],
+            gaps: steps.iter().filter(|step| **step > GAP * median_s).count() as u64,
+        })
+    }
+}
+
+impl Answer for Inspection {
+    fn document(&self) -> Document {
+        let of = |content: &str| {
+            let topics = self.channels.iter().filter(|c| c.content == content).map(|c| c.topic.as_str());
+            topics.collect::<Vec<_>>().join(", ")
+        };
+        let named = |name: &str, topics: String| {
+            format!("{name} {}", if topics.is_empty() { "none" } else { &topics })
+        };
+        let topics = [named("IMU", of("imu")), named("GNSS", of("fix"))].join("; ");
+        let line = format!("{}: {}; {topics}", self.file, self.format);
+        let tone = if self.damage.is_some() { Tone::Doubtful } else { Tone::Good };
+        let mut document = Document::new("Contents of a log", tone, [line]);
+        let head = ["channel", "type", "messages", "span (s)", "rate (Hz)", "gaps", "jitter (s)", "units"];
+        let mut table = Table::new(head);
+        let rank =
+            |channel: &InspectedChannel| ["imu", "fix", "other"].iter().position(|c| *c == channel.content);
+        let mut ranked: Vec<(usize, &InspectedChannel)> = self.channels.iter().enumerate().collect();
+        ranked.sort_by_key(|(_, channel)| rank(channel));
+        for (k, channel) in ranked {
+            let number = |value: Option<f64>, key: &str| {
+                value.map_or(Cell::from("–"), |value| Cell::number(value, &format!("/channels/{k}/{key}")))
+            };
+            let figures = |text: Option<String>| text.map_or(Cell::from("–"), Cell::figures);
+            table.row(vec![
+                channel.topic.as_str().into(),
+                channel.type_name.as_str().into(),
+                Cell::figures(channel.messages.to_string()),
+                number(Some(channel.span_s), "span_s"),
+                figures(channel.rate_hz.map(|rate_hz| shortest(six_digits(rate_hz)))),
+                figures(channel.gaps.map(|gaps| gaps.to_string())),
+                number(channel.jitter_s, "jitter_s"),
+                channel.units.unwrap_or("–").into(),
+            ]);
+        }
+        document.lead(table);
+        self.damage.iter().for_each(|damage| document.note(Importance::Warning, damage.as_str()));
+        document
+    }
+}
