@@ -1,7 +1,7 @@
 //! The whole of a calibration: groups of replicates × estimators → fits, and how sure they are.
 
-use crate::curve::{AverageError, Estimator, Group, average};
-use crate::fit::{FitError, Weighting, estimate, expected, fit_with_covariance};
+use crate::curve::{AverageError, Estimator, Group, average, implied};
+use crate::fit::{Fit, FitError, Weighting, estimate, expected, fit_with_covariance};
 use crate::model::LimitError;
 use crate::outcome::{Advance, Bootstrap, ModelChoice, Outcome, Settings};
 use crate::selection::choose;
@@ -96,6 +96,7 @@ fn fit_telling(
     advance: Advance<'_>,
 ) -> Result<Outcome, CalibrationError> {
     let error = |source: Cause| CalibrationError::new(group, estimator, source);
+    let without_root = curve.ignored.clone();
     leave_out(&mut curve, settings);
     let (spec, ranking) = match &settings.model {
         ModelChoice::Given(spec) => {
@@ -108,8 +109,12 @@ fn fit_telling(
             (spec, Some(ranking))
         }
     };
-    let fit = estimate(estimator, &curve, &spec, settings.rate_hz, settings.weighting)
+    let mut fit = estimate(estimator, &curve, &spec, settings.rate_hz, settings.weighting)
         .map_err(|e| error(e.into()))?;
+    while count_exceeded(&mut curve, &without_root, &fit, settings) {
+        fit = estimate(estimator, &curve, &spec, settings.rate_hz, settings.weighting)
+            .map_err(|e| error(e.into()))?;
+    }
     let mut outcome = Outcome {
         scope: group.scope,
         replicates: group.replicates.len(),
@@ -134,6 +139,22 @@ fn leave_out(curve: &mut Curve, settings: &Settings) {
     let outside = |level: &&u32| !range.holds(**level, settings.rate_hz) && !curve.ignored.contains(*level);
     let outside: Vec<u32> = curve.levels.iter().filter(outside).copied().collect();
     curve.ignored.extend(outside);
+}
+
+/// Counts the scales without a root at which a fit exceeds the classical variance, which bounds the noise from above; whether
+/// there are any.
+fn count_exceeded(curve: &mut Curve, without_root: &[u32], fit: &Fit, settings: &Settings) -> bool {
+    let is_in_range =
+        |level: u32| settings.fit_range.is_none_or(|range| range.holds(level, settings.rate_hz));
+    let implied = implied(&fit.composite, curve);
+    let scales = curve.levels.iter().zip(&curve.wv).zip(implied);
+    let is_exceeded = |level: &u32| without_root.contains(level) && is_in_range(*level);
+    let exceeded =
+        scales.filter(|((level, wv), nu)| is_exceeded(level) && nu > *wv).map(|((level, _), _)| *level);
+    let exceeded: Vec<u32> = exceeded.collect();
+    let before = curve.ignored.len();
+    curve.ignored.retain(|level| !exceeded.contains(level));
+    curve.ignored.len() < before
 }
 
 /// Number of draws behind the covariance of a curve: deviations are then known to 1/√4000 = 1.6 %.

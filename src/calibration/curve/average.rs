@@ -131,26 +131,25 @@ pub struct Replicate {
 impl Replicate {
     /// The wavelet variance that an estimator uses, at index level − 1.
     pub(crate) fn value(&self, estimator: Estimator, index: usize) -> f64 {
-        if estimator.is_robust() { self.robust[index].value } else { self.classical[index] }
+        if self.is_robust(estimator, index) { self.robust[index].value } else { self.classical[index] }
+    }
+
+    /// Whether that is the robust one: on coarse steps a robust estimator too takes the classical one.
+    pub(crate) fn is_robust(&self, estimator: Estimator, index: usize) -> bool {
+        estimator.is_robust() && self.robust[index].status != Status::Coarse
+    }
+
+    /// The wavelet variances that an estimator uses, from level 1 on (units²).
+    #[must_use]
+    pub fn values(&self, estimator: Estimator) -> Vec<f64> {
+        (0..self.levels()).map(|index| self.value(estimator, index)).collect()
     }
 
     /// Number of levels at which it has wavelet variances.
     pub(crate) fn levels(&self) -> usize {
         self.classical.len()
     }
-
-    /// Whether the steps of a quantiser make the robust wavelet variance (index level − 1) another than the classical one. Of
-    /// finer steps, or where the two agree, it is as good as ever.
-    fn is_moved_by_steps(&self, index: usize, classical_edof: f64, efficiency: f64) -> bool {
-        let ratio = (self.classical[index] / self.robust[index].value).ln();
-        // (1/e − 1)·2/eta is the variance of the logarithm of the two of Gaussian coefficients (see `diagnosis`).
-        let sigma = ((1.0 / efficiency - 1.0) * 2.0 / classical_edof).sqrt();
-        self.robust[index].is_stepped() && ratio.abs() > LEAST_MOVE.max(3.0 * sigma)
-    }
 }
-
-/// Classical over robust, less one, from which the steps of a quantiser are said to move a variance: less hardly moves a fit.
-const LEAST_MOVE: f64 = 0.02;
 
 /// Why replicates have no average.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -189,9 +188,9 @@ fn majority(replicates: &[Replicate]) -> usize {
 ///
 /// The paper's slips are resolved: SR-AWV's weights sum to one (its 1/J must be 1/K), DR-AWV keeps the
 /// order statistics a + 1 … K − a (2a are dropped), weights of the kept ones renormalised. `tuning` is
-/// that of the robust wavelet variances; the degrees of freedom are those of the replicates' eta3 combined. A level
-/// at which half of the kept ones or more have no admissible robust variance, or one that a quantiser's steps move, is ignored in
-/// fits.
+/// that of the robust wavelet variances; the degrees of freedom are those of the replicates' eta3 combined. Where a
+/// quantiser's steps move a robust variance the classical one serves. A level at which half of the kept ones or more have no
+/// admissible root is ignored in fits; its value is the average of the classical ones, which bounds the noise from above.
 ///
 /// # Errors
 /// When there is no replicate, more than one for a single-replicate estimator, or none left by the trim.
@@ -218,29 +217,44 @@ pub fn average(
     let mut curve = Curve { quantization, ..Curve::default() };
     for level in 1..=levels as u32 {
         let long_enough = replicates.iter().filter(|r| r.levels() >= level as usize);
-        let mut kept: Vec<Term> =
-            long_enough.map(|r| Term::new(r, level, estimator, tuning.efficiency())).collect();
+        let replicates: Vec<&Replicate> = long_enough.collect();
         // A trim by a number, of which too few are left at the longest scales.
-        if !is_enough(kept.len()) {
+        if !is_enough(replicates.len()) {
             break;
         }
         curve.levels.push(level);
-        // Scale by scale: a recording that is abnormal at long scales still serves at short ones.
-        kept.sort_by(|a, b| a.nu.total_cmp(&b.nu));
-        let trim = dropped(kept.len());
-        let kept = &kept[trim..kept.len() - trim];
+        let kept_of = |estimator: Estimator| {
+            let terms = replicates.iter().map(|r| Term::new(r, level, estimator, tuning.efficiency()));
+            trimmed(terms.collect(), dropped(replicates.len()))
+        };
+        let mut kept = kept_of(estimator);
+        // A value without a root is the nearest there is, not an estimate.
+        if estimator.is_robust() && is_majority(&kept, |term| term.is_without_root) {
+            curve.ignored.push(level);
+            kept = kept_of(Estimator::Awv);
+        }
+        if estimator.is_robust() && is_majority(&kept, |term| !term.is_robust) {
+            curve.classical.push(level);
+        }
         let total: f64 = kept.iter().map(|t| t.samples).sum();
         curve.wv.push(kept.iter().map(|t| t.samples / total * t.nu).sum());
         // var(Σ w nu) = Σ w²·2 nu²/eta, the replicates' true nu taken equal.
         let inverse: f64 = kept.iter().map(|t| (t.samples / total).powi(2) / t.edof).sum();
         curve.edof.push(1.0 / inverse);
-        // A value without a root is the nearest there is, not an estimate, and one on coarse steps is that of another law: a
-        // majority of these is no curve.
-        if 2 * kept.iter().filter(|t| !t.is_estimate).count() >= kept.len() {
-            curve.ignored.push(level);
-        }
     }
     Ok(curve)
+}
+
+/// The terms without so many at either end. Scale by scale: a recording that is abnormal at long scales still serves at short
+/// ones.
+fn trimmed(mut terms: Vec<Term>, trim: usize) -> Vec<Term> {
+    terms.sort_by(|a, b| a.nu.total_cmp(&b.nu));
+    terms.truncate(terms.len() - trim);
+    terms.split_off(trim)
+}
+
+fn is_majority(terms: &[Term], is_counted: fn(&&Term) -> bool) -> bool {
+    2 * terms.iter().filter(is_counted).count() >= terms.len()
 }
 
 /// Contribution of one replicate at one level.
@@ -248,18 +262,22 @@ struct Term {
     samples: f64,
     nu: f64,
     edof: f64,
-    is_estimate: bool,
+    is_robust: bool,
+    is_without_root: bool,
 }
 
 impl Term {
     fn new(replicate: &Replicate, level: u32, estimator: Estimator, efficiency: f64) -> Self {
         let i = level as usize - 1;
         let eta3 = interval::edof_eta3(replicate.samples, level);
-        let edof = if estimator.is_robust() { interval::edof_robust(eta3, efficiency) } else { eta3 };
-        let is_estimate = !estimator.is_robust()
-            || replicate.robust[i].status != Status::NoRoot
-                && !replicate.is_moved_by_steps(i, eta3, efficiency);
-        Self { samples: replicate.samples as f64, nu: replicate.value(estimator, i), edof, is_estimate }
+        let is_robust = replicate.is_robust(estimator, i);
+        Self {
+            samples: replicate.samples as f64,
+            nu: replicate.value(estimator, i),
+            edof: if is_robust { interval::edof_robust(eta3, efficiency) } else { eta3 },
+            is_robust,
+            is_without_root: is_robust && replicate.robust[i].status == Status::NoRoot,
+        }
     }
 }
 
