@@ -209,6 +209,32 @@ mod tests {
     use crate::outcome::FitRange;
     use approx::assert_relative_eq;
 
+    /// White noise and random walk of which the middle scales are without a root, their classical variances a tenth of the model's
+    /// at one of them: the fit counts that scale, and no other that bounds it from far above.
+    #[test]
+    fn a_scale_without_a_root_bounds_the_fit() {
+        let model = Composite::new(vec![
+            Process::White(White::new(1.0).unwrap()),
+            Process::RandomWalk(RandomWalk::new(1e-4).unwrap()),
+        ]);
+        let levels: Vec<u32> = (1..=12).collect();
+        let wv = levels.iter().map(|l| {
+            model.haar_wv(*l)
+                * match l {
+                    6 => 0.1,
+                    7 => 10.0,
+                    _ => 1.0,
+                }
+        });
+        let curve =
+            Curve { wv: wv.collect(), edof: vec![1e3; 12], ignored: vec![6, 7], levels, ..Curve::default() };
+        let group = Group { scope: Scope { sensor: Sensor::Accel, axis: None }, replicates: Vec::new() };
+        let model = ModelChoice::Given("WN+RW".parse().unwrap());
+        let settings = Settings { model, ..Settings::default() };
+        let outcome = fit_curve(&group, Estimator::Given, curve, &settings).unwrap();
+        assert_eq!(outcome.curve.ignored, [7]);
+    }
+
     /// A curve that no sum of WN, AR1 and RW describes; of the scales 2 to 13 alone, given as a range or as all that there
     /// are, the fit is the same.
     #[test]

@@ -1,6 +1,7 @@
 //! From the wavelet variances of K replicates to one curve
 //! ([Minaretzis](crate::bibliography::Minaretzis24), eqs. 4–8).
 
+use super::differing::between;
 use crate::imu::Axis;
 use crate::wavelet::{Curve, RobustVariance, Status, Tuning, interval};
 use std::fmt;
@@ -214,7 +215,9 @@ pub fn average(
         return Err(AverageError::Trim { trim: dropped(count), replicates: count });
     }
     let quantization = estimator.is_robust().then(|| *tuning.quantization());
-    let mut curve = Curve { quantization, ..Curve::default() };
+    let kept_of_all = (count - 2 * dropped(count)) as f64;
+    let differing = between(replicates, estimator, tuning) / kept_of_all;
+    let mut curve = Curve { quantization, differing, ..Curve::default() };
     for level in 1..=levels as u32 {
         let long_enough = replicates.iter().filter(|r| r.levels() >= level as usize);
         let replicates: Vec<&Replicate> = long_enough.collect();
@@ -362,10 +365,10 @@ mod tests {
     }
 
     /// Gaussian numbers of 0.3 steps, rounded: nu of level j is their variance over 2^j, that of the law of three numbers −1, 0,
-    /// 1 (0.2 % beyond; P(1) = P(Z > 5/3) = 0.0478, variance 0.0956). The scales that a fit counts are right to four standard
-    /// deviations, √(2/(0.6 eta)), and the 1.3 % of fine steps; the first, which is off by more, is not counted.
+    /// 1 (0.2 % beyond; P(1) = P(Z > 5/3) = 0.0478, variance 0.0956). Every scale counts and is right to four standard deviations,
+    /// √(2/eta), and the 1.3 % of fine steps; the first is the classical variance, with all its degrees of freedom.
     #[test]
-    fn scales_that_coarse_steps_move_are_not_counted() {
+    fn scales_that_coarse_steps_move_are_classical() {
         use crate::wavelet::both;
         use rand::{RngExt, SeedableRng};
         let mut generator = crate::rng::Generator::seed_from_u64(5);
@@ -377,12 +380,24 @@ mod tests {
             |estimator| average(std::slice::from_ref(&one), estimator, Trim::Count(0), &tuning()).unwrap();
         assert_eq!(curve(Estimator::Gmwm).ignored, [0; 0]);
         let curve = curve(Estimator::Rgmwm);
-        assert!(curve.ignored.contains(&1) && curve.ignored.len() < 7, "{:?}", curve.ignored);
+        assert!(curve.ignored.is_empty() && curve.classical.contains(&1), "{curve:?}");
+        assert_relative_eq!(curve.edof[0], interval::edof_eta3(1 << 17, 1));
         for ((level, nu), edof) in curve.levels.iter().zip(&curve.wv).zip(&curve.edof) {
             let off = (nu / (0.0956 / f64::from(*level).exp2()) - 1.0).abs();
             let allowed = 0.013 + 4.0 * (2.0 / edof).sqrt();
-            assert!(curve.ignored.contains(level) || off < allowed, "level {level}: {off}");
+            assert!(off < allowed, "level {level}: {off}");
         }
+    }
+
+    /// Two of three replicates without a root at the first level: its value is the classical average, which no fit counts.
+    #[test]
+    fn a_scale_without_a_root_is_bounded_by_the_classical_average() {
+        let mut replicates = eight()[..3].to_vec();
+        replicates[..2].iter_mut().for_each(|r| r.robust[0].status = Status::NoRoot);
+        let curve = average(&replicates, Estimator::SrAwv, Trim::Count(0), &tuning()).unwrap();
+        assert_eq!((curve.ignored, curve.classical), (vec![1], vec![1]));
+        assert_relative_eq!(curve.wv[0], 2.0);
+        assert_relative_eq!(curve.wv[1], 20.0);
     }
 
     #[test]

@@ -177,8 +177,8 @@ impl<'a> CurveSampler<'a> {
             self.replicates.iter().zip(ratios).zip(edof).map(drawn_replicate).collect();
         let curve = average(&replicates, self.estimator, settings.trim, &settings.tuning).ok()?;
         // The draws have a root everywhere; what the fit left out, it leaves out of every draw.
-        let Curve { classical, ignored, .. } = self.curve.clone();
-        Some(Curve { classical, ignored, ..curve })
+        let Curve { differing, classical, ignored, .. } = self.curve.clone();
+        Some(Curve { differing, classical, ignored, ..curve })
     }
 
     /// Relative bias of a robust variance with so many degrees of freedom.

@@ -13,6 +13,9 @@ pub struct Curve {
     pub edof: Vec<f64>,
     /// Response of robust variances to quantization noise; none for classical ones, which read it as it is.
     pub quantization: Option<QuantizationResponse>,
+    /// Variance of ln nu, at all scales alike, by which the curve of other recordings would differ beyond the degrees of
+    /// freedom; 0 where it is not known.
+    pub differing: f64,
     /// Levels of a robust curve whose variance is the classical one, which reads quantization noise as it is.
     pub classical: Vec<u32>,
     /// Levels without weight in a fit.

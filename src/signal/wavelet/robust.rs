@@ -55,13 +55,14 @@ impl RobustVariance {
         self.zeros > MOST_ZEROS
     }
 
-    /// Whether the steps make it another than the classical variance, whose degrees of freedom are given. Of finer steps, or
-    /// where the two agree, it is as good as ever.
+    /// Whether the steps leave it without a root, or make it another than the classical variance, whose degrees of freedom are
+    /// given. Of finer steps, or where the two agree, it is as good as ever.
     fn is_moved_by_steps(&self, classical: f64, edof: f64, efficiency: f64) -> bool {
         let ratio = (classical / self.value).ln();
         // (1/e − 1)·2/eta is the variance of the logarithm of the two of Gaussian coefficients.
         let sigma = ((1.0 / efficiency - 1.0) * 2.0 / edof).sqrt();
-        self.is_stepped() && ratio.abs() > LEAST_MOVE.max(3.0 * sigma)
+        let is_moved = ratio.abs() > LEAST_MOVE.max(3.0 * sigma);
+        self.is_stepped() && (is_moved || self.status == Status::NoRoot)
     }
 }
 
