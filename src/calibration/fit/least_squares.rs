@@ -4,7 +4,7 @@ use super::assemble::assemble;
 use super::objective::{Component, Objective, Range, whitening};
 use super::optimise::Termination;
 use super::result::{Fit, FitError};
-use super::search::{COMBINATIONS, search};
+use super::search::{Effort, search};
 use super::weighting::{Weighting, inverse_deviations};
 use crate::curve::implied;
 use crate::curve::sampling::SamplingLaw;
@@ -25,7 +25,7 @@ pub fn fit(curve: &Curve, spec: &ModelSpec, rate_hz: f64, weighting: Weighting) 
     let observed = Weights { weighting, nu: curve.wv.clone(), mixing: None };
     // The observed variances are the only ones there are before a model; what is low by chance weighs too
     // much in this round.
-    let first = fit_near(curve, spec, rate_hz, observed, COMBINATIONS, &[])?;
+    let first = fit_near(curve, spec, rate_hz, observed, Effort::WHOLE, &[])?;
     match weighting {
         Weighting::Model => settled(curve, spec, rate_hz, first),
         Weighting::Full => {
@@ -50,7 +50,7 @@ pub(crate) fn expected(curve: &Curve, fit: &Fit) -> Vec<f64> {
 
 /// Fits with the weights of the last result until they are those of the result itself.
 fn settled(curve: &Curve, spec: &ModelSpec, rate_hz: f64, first: Fit) -> Result<Fit, FitError> {
-    let (mut visited, last) = reweighted(curve, spec, rate_hz, first, MOST_ROUNDS, COMBINATIONS)?;
+    let (mut visited, last) = reweighted(curve, spec, rate_hz, first, MOST_ROUNDS, Effort::WHOLE)?;
     if is_settled(curve, &last) {
         return Ok(last.at_own_weights(curve));
     }
@@ -59,8 +59,8 @@ fn settled(curve: &Curve, spec: &ModelSpec, rate_hz: f64, first: Fit) -> Result<
     visited.push(last);
     let recent = visited.into_iter().rev().take(2);
     let within = recent.map(|fit| {
-        let own = Fit { minima: fit.minima.iter().take(1).cloned().collect(), ..fit };
-        reweighted(curve, spec, rate_hz, own, MOST_ROUNDS, NO_GRID).map(|(_, fit)| fit)
+        reweighted(curve, spec, rate_hz, fit.within_its_basin(), MOST_ROUNDS, Effort::WITHIN)
+            .map(|(_, fit)| fit)
     });
     let ended = within.collect::<Result<Vec<_>, _>>()?.into_iter().map(|fit| {
         let termination = if is_settled(curve, &fit) { fit.termination } else { Termination::IterationLimit };
@@ -82,18 +82,24 @@ fn reweighted(
     rate_hz: f64,
     first: Fit,
     rounds: usize,
-    combinations: usize,
+    effort: Effort,
 ) -> Result<(Vec<Fit>, Fit), FitError> {
     let (mut before, mut last) = (Vec::new(), first);
     while before.len() < rounds && !is_settled(curve, &last) {
         let weights = Weights { weighting: Weighting::Model, nu: expected(curve, &last), mixing: None };
-        let next = fit_near(curve, spec, rate_hz, weights, combinations, &last.minima)?;
+        let next = fit_near(curve, spec, rate_hz, weights, effort, &last.minima)?;
         before.push(std::mem::replace(&mut last, next));
     }
     Ok((before, last))
 }
 
 impl Fit {
+    /// The same with its own minimum as the only one known.
+    fn within_its_basin(mut self) -> Self {
+        self.minima.truncate(1);
+        self
+    }
+
     /// The same with its objective and residuals in standard deviations of the curve where the model holds: in the weights of
     /// the fit a scale far above the model counts little, and a model would be the less rejected the more it misses.
     fn at_own_weights(self, curve: &Curve) -> Self {
@@ -137,11 +143,8 @@ pub(crate) fn fit_with_covariance(
         diagonal => f64::from(u8::from(diagonal)),
     });
     let mixing = Some(Arc::new(whitening(&own)));
-    fit_near(curve, spec, rate_hz, Weights { weighting: Weighting::Full, nu, mixing }, COMBINATIONS, &[])
+    fit_near(curve, spec, rate_hz, Weights { weighting: Weighting::Full, nu, mixing }, Effort::WHOLE, &[])
 }
-
-/// Combinations tried for a curve that resembles one already fitted.
-const FEW: usize = 300;
 
 /// The same for a curve that resembles one already fitted: a coarser grid, and the minima of that one.
 pub(crate) fn refit(
@@ -158,18 +161,17 @@ pub(crate) fn refit(
         Weighting::Edof | Weighting::Interval | Weighting::None => curve.wv.clone(),
     };
     let weights = Weights { weighting, nu, mixing: like.mixing.clone() };
-    let first = fit_near(curve, spec, rate_hz, weights, FEW, &like.minima)?;
+    let first = fit_near(curve, spec, rate_hz, weights, Effort::AGAIN, &like.minima)?;
     match weighting {
         Weighting::Model => {
-            let (_, last) = reweighted(curve, spec, rate_hz, first, FEW_ROUNDS, NO_GRID)?;
+            // The weights change little: the basin of the first round is that of the others.
+            let (_, last) =
+                reweighted(curve, spec, rate_hz, first.within_its_basin(), FEW_ROUNDS, Effort::WITHIN)?;
             Ok(last.at_own_weights(curve))
         }
         _ => Ok(first),
     }
 }
-
-/// Descents from the known minima only.
-const NO_GRID: usize = 0;
 
 /// Weights of the scales of a curve.
 struct Weights {
@@ -184,7 +186,7 @@ fn fit_near(
     spec: &ModelSpec,
     rate_hz: f64,
     weights: Weights,
-    combinations: usize,
+    effort: Effort,
     known: &[Vec<f64>],
 ) -> Result<Fit, FitError> {
     check(curve, spec)?;
@@ -192,7 +194,7 @@ fn fit_near(
     let components = limited.map(|(kind, limits)| component(*kind, *limits, curve, rate_hz)).collect();
     let Weights { weighting, nu, mixing } = weights;
     let objective = Objective::new(curve, weighting, &nu, mixing.clone(), components);
-    let found = search(&objective, combinations, known);
+    let found = search(&objective, effort, known);
     Ok(Fit { mixing, weighted_for: nu, ..assemble(&objective, &found, spec, rate_hz)? })
 }
 

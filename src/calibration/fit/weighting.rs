@@ -65,7 +65,7 @@ pub(crate) fn inverse_deviations(curve: &Curve, nu: &[f64]) -> Vec<f64> {
 
 /// Factor of √Omega where a variance is so many times that of the model: 1 up to one standard deviation above it, the inverse
 /// square from two on. On 120 contaminated sets of Minaretzis' Section IV this gave random walks as near as
-/// [`Weighting::Edof`] does, and on clean ones a median nearer to the truth (docs/validation.md).
+/// [`Weighting::Edof`] does, and on clean ones a median nearer to the truth (docs/mathematics.md).
 fn trust(ratio: f64, edof: f64) -> f64 {
     let above = (score(ratio, edof) - 1.0).clamp(0.0, 1.0);
     // Smooth at either end: the derivatives of a fit with respect to its curve rest on that of the weights.
