@@ -1,7 +1,7 @@
 //! What classical and robust variances differ by, and recordings drift by, without an outlier or another noise.
 
 use super::*;
-use crate::outcome::{Note, Outcome};
+use crate::outcome::Note;
 use rand::SeedableRng;
 
 /// Four recordings of Gaussian numbers, of a deviation in steps and a bias that differs, rounded to whole steps; `glitches` of
