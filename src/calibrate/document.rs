@@ -112,7 +112,9 @@ impl ShownCalibration<'_> {
     /// A row a figure of a model.
     fn figures_table(&self) -> Table {
         let fits: Vec<&Outcome> = self.outcomes.iter().map(|(_, o)| *o).collect();
-        let mut table = Table::new([policy().as_str(), "value", "95 % interval", "averages of"]);
+        let of_one = fits.iter().all(|outcome| outcome.recordings == 1);
+        let interval = if of_one { "95 %, this power-on" } else { "95 %, mean of power-ons" };
+        let mut table = Table::new([policy().as_str(), "value", interval, "averages of"]);
         for (index, outcome) in &self.outcomes {
             let name = words::fit_name(outcome, &fits);
             for row in figures(outcome, self.settings.rate_hz) {

@@ -180,7 +180,7 @@ fn note_line(note: &Note, outcome: &Outcome) -> String {
             format!("axes differ: {largest} has up to {ratio} times the wavelet variance of {smallest}; --pool axes fits each")
         }),
         Note::LeftOut([first, last]) => format!(
-            "scales {} to {} are not fitted: coarse quantisation or too many outliers",
+            "scales {} to {} are not fitted: too many outliers",
             duration(*first),
             duration(*last)
         ),

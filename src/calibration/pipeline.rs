@@ -1,7 +1,7 @@
 //! The whole of a calibration: groups of replicates × estimators → fits, and how sure they are.
 
-use crate::curve::{AverageError, Estimator, Group, average};
-use crate::fit::{FitError, Weighting, estimate, expected, fit_with_covariance};
+use crate::curve::{AverageError, Estimator, Group, average, implied};
+use crate::fit::{Fit, FitError, Weighting, estimate, expected, fit_with_covariance};
 use crate::model::LimitError;
 use crate::outcome::{Advance, Bootstrap, ModelChoice, Outcome, Settings};
 use crate::selection::choose;
@@ -96,6 +96,7 @@ fn fit_telling(
     advance: Advance<'_>,
 ) -> Result<Outcome, CalibrationError> {
     let error = |source: Cause| CalibrationError::new(group, estimator, source);
+    let without_root = curve.ignored.clone();
     leave_out(&mut curve, settings);
     let (spec, ranking) = match &settings.model {
         ModelChoice::Given(spec) => {
@@ -108,8 +109,12 @@ fn fit_telling(
             (spec, Some(ranking))
         }
     };
-    let fit = estimate(estimator, &curve, &spec, settings.rate_hz, settings.weighting)
+    let mut fit = estimate(estimator, &curve, &spec, settings.rate_hz, settings.weighting)
         .map_err(|e| error(e.into()))?;
+    while count_exceeded(&mut curve, &without_root, &fit, settings) {
+        fit = estimate(estimator, &curve, &spec, settings.rate_hz, settings.weighting)
+            .map_err(|e| error(e.into()))?;
+    }
     let mut outcome = Outcome {
         scope: group.scope,
         replicates: group.replicates.len(),
@@ -134,6 +139,22 @@ fn leave_out(curve: &mut Curve, settings: &Settings) {
     let outside = |level: &&u32| !range.holds(**level, settings.rate_hz) && !curve.ignored.contains(*level);
     let outside: Vec<u32> = curve.levels.iter().filter(outside).copied().collect();
     curve.ignored.extend(outside);
+}
+
+/// Counts the scales without a root at which a fit exceeds the classical variance, which bounds the noise from above; whether
+/// there are any.
+fn count_exceeded(curve: &mut Curve, without_root: &[u32], fit: &Fit, settings: &Settings) -> bool {
+    let is_in_range =
+        |level: u32| settings.fit_range.is_none_or(|range| range.holds(level, settings.rate_hz));
+    let implied = implied(&fit.composite, curve);
+    let scales = curve.levels.iter().zip(&curve.wv).zip(implied);
+    let is_exceeded = |level: &u32| without_root.contains(level) && is_in_range(*level);
+    let exceeded =
+        scales.filter(|((level, wv), nu)| is_exceeded(level) && nu > *wv).map(|((level, _), _)| *level);
+    let exceeded: Vec<u32> = exceeded.collect();
+    let before = curve.ignored.len();
+    curve.ignored.retain(|level| !exceeded.contains(level));
+    curve.ignored.len() < before
 }
 
 /// Number of draws behind the covariance of a curve: deviations are then known to 1/√4000 = 1.6 %.
@@ -187,6 +208,32 @@ mod tests {
     use crate::noise::{Ar1, Composite, Process, RandomWalk, White};
     use crate::outcome::FitRange;
     use approx::assert_relative_eq;
+
+    /// White noise and random walk of which the middle scales are without a root, their classical variances a tenth of the model's
+    /// at one of them: the fit counts that scale, and no other that bounds it from far above.
+    #[test]
+    fn a_scale_without_a_root_bounds_the_fit() {
+        let model = Composite::new(vec![
+            Process::White(White::new(1.0).unwrap()),
+            Process::RandomWalk(RandomWalk::new(1e-4).unwrap()),
+        ]);
+        let levels: Vec<u32> = (1..=12).collect();
+        let wv = levels.iter().map(|l| {
+            model.haar_wv(*l)
+                * match l {
+                    6 => 0.1,
+                    7 => 10.0,
+                    _ => 1.0,
+                }
+        });
+        let curve =
+            Curve { wv: wv.collect(), edof: vec![1e3; 12], ignored: vec![6, 7], levels, ..Curve::default() };
+        let group = Group { scope: Scope { sensor: Sensor::Accel, axis: None }, replicates: Vec::new() };
+        let model = ModelChoice::Given("WN+RW".parse().unwrap());
+        let settings = Settings { model, ..Settings::default() };
+        let outcome = fit_curve(&group, Estimator::Given, curve, &settings).unwrap();
+        assert_eq!(outcome.curve.ignored, [7]);
+    }
 
     /// A curve that no sum of WN, AR1 and RW describes; of the scales 2 to 13 alone, given as a range or as all that there
     /// are, the fit is the same.

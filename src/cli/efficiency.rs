@@ -1,9 +1,11 @@
 //! `nav-sim efficiency`: Monte-Carlo study of the estimators themselves.
 
+use super::parse::words;
 use super::{Failure, Session};
 use crate::efficiency::{self, EfficiencyFile, EstimatorStudy};
 use crate::formats::atomic;
 use crate::report;
+use nav_sim_calibration::Weighting;
 use nav_sim_calibration::efficiency::StudyError;
 use std::path::{Path, PathBuf};
 
@@ -32,11 +34,17 @@ pub(crate) struct Args {
     /// Samples of a replicate, instead of the study's
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u64).range(4..=1 << 40))]
     samples: Option<u64>,
+    /// Weights of the scales, instead of the study's
+    #[arg(long, value_name = "W", value_parser = words::<Weighting>(&WEIGHTINGS))]
+    weighting: Option<Weighting>,
     /// Also write sensitivity.csv: how far one outlier, or one replicate with an abnormal random walk, moves
     /// each estimate of the first set, against its size
     #[arg(long)]
     sensitivity: bool,
 }
+
+const WEIGHTINGS: [(&str, &str); 2] =
+    [(Weighting::Model.name(), "Those of calibrate"), (Weighting::Edof.name(), "Those of the literature")];
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let file = efficiency::file::read(&args.study)?;
@@ -44,6 +52,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if let Some(samples) = args.samples {
         design = design.with_samples(samples as usize);
     }
+    design.weighting = args.weighting.unwrap_or(design.weighting);
     let of_study = |e: StudyError| Failure::input(format!("{}: {e}", args.study.display()));
     let mut study = EstimatorStudy::new(design).map_err(of_study)?;
     study.design.seed = session.seed(file.seed);

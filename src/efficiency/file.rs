@@ -14,6 +14,7 @@
 //! estimators = ["awv", "sr-awv", "dr-awv"] # default: these; also avlr (models of WN, QN, RW, DR)
 //! trim = 2                                 # replicates that dr-awv drops at each end (default: 30 %)
 //! efficiency = 0.6                         # of the robust wavelet variance (default)
+//! weighting = "model"                      # weights of the scales, as of calibrate (default)
 //! ```
 
 use crate::formats::toml_file::{Source, Version};
@@ -82,6 +83,28 @@ struct Description {
     #[serde(default = "efficiency")]
     #[schemars(range(min = Tuning::EFFICIENCIES.0, max = Tuning::EFFICIENCIES.1))]
     efficiency: f64,
+    /// Weights of the scales (default: as of calibrate)
+    #[serde(default)]
+    weighting: Weights,
+}
+
+/// Weights of the scales that can be studied.
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(inline)]
+enum Weights {
+    #[default]
+    Model,
+    Edof,
+}
+
+impl From<Weights> for Weighting {
+    fn from(weights: Weights) -> Self {
+        match weights {
+            Weights::Model => Self::Model,
+            Weights::Edof => Self::Edof,
+        }
+    }
 }
 
 /// An estimator that averages several replicates.
@@ -146,7 +169,7 @@ pub fn read(path: &Path) -> Result<StudyFile, FileError> {
         trim: d.trim.map_or(Trim::default(), |a| Trim::Count(a as usize)),
         tuning: Tuning::new(d.efficiency, Convention::Exact)
             .map_err(|_| source.refused("efficiency", "is not between 0.3 and 0.99"))?,
-        weighting: Weighting::Edof,
+        weighting: d.weighting.into(),
         spread: file.spread.unwrap_or_default(),
         model: file.model,
     };
@@ -301,6 +324,9 @@ mod tests {
         assert_eq!(s.design.estimators, [Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv]);
         assert_eq!(s.design.trim.count(8), 2);
         assert!((s.design.tuning.efficiency() - 0.6).abs() < 1e-9);
+        assert_eq!(s.design.weighting, Weighting::default());
+        let edof = study(&format!("weighting = \"edof\"\n{STUDY}")).unwrap();
+        assert_eq!(edof.design.weighting, Weighting::Edof);
     }
 
     #[test]

@@ -102,6 +102,7 @@ fn identity(design: &Design) -> Value {
         "fit": design.spec.to_string(),
         "trim": design.trim.count(design.replicates as usize),
         "efficiency": design.tuning.efficiency(),
+        "weighting": design.weighting.name(),
     })
 }
 

@@ -127,6 +127,8 @@ fn named_curve(
         let place = Place::Part(format!("curve {number}, scale {}", i + 1).into());
         push(&mut curve, path, &place, [entry.tau_s[i] * rate_hz, entry.wv[i], entry.edof[i]])?;
     }
+    let level = |tau_s: &f64| (tau_s * rate_hz).log2().round() as u32;
+    curve.classical = entry.classical_tau_s.iter().map(level).collect();
     let estimator = (!entry.estimator.is_empty()).then(|| entry.estimator.clone());
     Ok(NamedCurve { sensor: Some(sensor), axis, rate_hz: Some(rate_hz), estimator, curve })
 }

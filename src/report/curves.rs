@@ -165,6 +165,9 @@ pub(crate) struct FittedCurve {
     /// Efficiency of the robust wavelet variance, where it is one: says how it reads quantization noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub efficiency: Option<f64>,
+    /// Scales (s) at which it is the classical one all the same.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub classical_tau_s: Vec<f64>,
     /// Lower ends of the 95 % intervals.
     #[serde(default)]
     pub ci_low: Vec<f64>,
@@ -217,11 +220,7 @@ fn fitted(outcome: &Outcome, replicates: &[Replicate], settings: &Settings) -> F
         file: r.name.clone(),
         axis: r.axis.map(|a| a.name().to_owned()),
         samples: r.samples,
-        wv: if estimator.is_robust() {
-            r.robust.iter().map(|v| v.value).collect()
-        } else {
-            r.classical.clone()
-        },
+        wv: r.values(*estimator),
     };
     FittedCurve {
         sensor: outcome.scope.sensor.name().to_owned(),
@@ -231,6 +230,7 @@ fn fitted(outcome: &Outcome, replicates: &[Replicate], settings: &Settings) -> F
         wv: band.wv,
         edof: curve.edof.clone(),
         efficiency: estimator.is_robust().then(|| settings.tuning.efficiency()),
+        classical_tau_s: curve.classical.iter().map(|level| tau_s(*level, settings.rate_hz)).collect(),
         ci_low: band.ci_low,
         ci_high: band.ci_high,
         implied: implied(model, curve),

@@ -30,7 +30,7 @@ const fn is_quantization(process: &Process) -> bool {
 pub fn implied(model: &Composite, curve: &Curve) -> Vec<f64> {
     let at_level = |level: &u32| {
         let nu = model.haar_wv(*level);
-        match &curve.quantization {
+        match curve.response(*level) {
             None => nu,
             Some(response) => nu * response.factor(quantization_share(model, *level)).0,
         }
@@ -41,7 +41,7 @@ pub fn implied(model: &Composite, curve: &Curve) -> Vec<f64> {
 /// Its derivatives with respect to all parameters of the model, level by level.
 pub(crate) fn implied_gradients(model: &Composite, curve: &Curve) -> Vec<Vec<f64>> {
     let at_level = |level: &u32| {
-        let Some(response) = &curve.quantization else { return model.haar_wv_gradient(*level) };
+        let Some(response) = curve.response(*level) else { return model.haar_wv_gradient(*level) };
         let scale = Response::new(response, quantization_share(model, *level));
         let of_process = |process: &Process| {
             let scale = if is_quantization(process) { scale.quantization } else { scale.others };

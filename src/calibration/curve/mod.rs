@@ -1,6 +1,7 @@
 //! Wavelet-variance curves: of replicates, averaged, as a model implies them, and how they scatter.
 
 mod average;
+mod differing;
 pub(crate) mod implied;
 mod replicates;
 pub(crate) mod robust_scale;

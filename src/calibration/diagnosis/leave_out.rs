@@ -47,6 +47,8 @@ pub(super) fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &
     let with = &outcome.curve;
     // The same scales in both fits: else the change of a parameter would be one of scales.
     without.ignored.clone_from(&with.ignored);
+    without.classical.clone_from(&with.classical);
+    without.differing = with.differing;
     let moves = with.levels.iter().zip(&with.wv).zip(&with.edof).zip(&without.wv);
     let movement = |(((level, with), edof), without): (((&u32, &f64), &f64), &f64)| {
         let ratio = without / with;

@@ -60,7 +60,7 @@ pub(super) enum Test {
 
 /// ln (classical / robust) at a level.
 pub(super) fn excess_of_classical(r: &Replicate, level: usize) -> f64 {
-    (r.value(Estimator::Awv, level) / r.value(Estimator::SrAwv, level)).ln()
+    (r.classical[level] / r.robust[level].value).ln()
 }
 
 impl Test {

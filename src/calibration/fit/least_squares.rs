@@ -2,9 +2,10 @@
 
 use super::assemble::assemble;
 use super::objective::{Component, Objective, Range, whitening};
+use super::optimise::Termination;
 use super::result::{Fit, FitError};
-use super::search::{COMBINATIONS, search};
-use super::weighting::Weighting;
+use super::search::{Effort, search};
+use super::weighting::{Weighting, inverse_deviations};
 use crate::curve::implied;
 use crate::curve::sampling::SamplingLaw;
 use crate::model::{Limits, ModelSpec};
@@ -24,9 +25,9 @@ pub fn fit(curve: &Curve, spec: &ModelSpec, rate_hz: f64, weighting: Weighting) 
     let observed = Weights { weighting, nu: curve.wv.clone(), mixing: None };
     // The observed variances are the only ones there are before a model; what is low by chance weighs too
     // much in this round.
-    let first = fit_near(curve, spec, rate_hz, observed, COMBINATIONS, &[])?;
+    let first = fit_near(curve, spec, rate_hz, observed, Effort::WHOLE, &[])?;
     match weighting {
-        Weighting::Model => reweighted(curve, spec, rate_hz, first, MOST_ROUNDS, COMBINATIONS),
+        Weighting::Model => settled(curve, spec, rate_hz, first),
         Weighting::Full => {
             fit_with_covariance(curve, spec, rate_hz, &covariance(curve, &first), expected(curve, &first))
         }
@@ -47,26 +48,70 @@ pub(crate) fn expected(curve: &Curve, fit: &Fit) -> Vec<f64> {
     implied(&fit.composite, curve).iter().zip(&curve.wv).map(|(nu, wv)| nu.max(1e-6 * wv)).collect()
 }
 
-/// Fits with the weights of the last result.
+/// Fits with the weights of the last result until they are those of the result itself.
+fn settled(curve: &Curve, spec: &ModelSpec, rate_hz: f64, first: Fit) -> Result<Fit, FitError> {
+    let (mut visited, last) = reweighted(curve, spec, rate_hz, first, MOST_ROUNDS, Effort::WHOLE)?;
+    if is_settled(curve, &last) {
+        return Ok(last.at_own_weights(curve));
+    }
+    // The weights of each of two minima lead the search to the other: both are followed within their own basin, and the one
+    // that is nearer to the curve by its own weights is taken.
+    visited.push(last);
+    let recent = visited.into_iter().rev().take(2);
+    let within = recent.map(|fit| {
+        reweighted(curve, spec, rate_hz, fit.within_its_basin(), MOST_ROUNDS, Effort::WITHIN)
+            .map(|(_, fit)| fit)
+    });
+    let ended = within.collect::<Result<Vec<_>, _>>()?.into_iter().map(|fit| {
+        let termination = if is_settled(curve, &fit) { fit.termination } else { Termination::IterationLimit };
+        Fit { termination, ..fit.at_own_weights(curve) }
+    });
+    Ok(ended.min_by(|a, b| a.objective.total_cmp(&b.objective)).expect("two fits"))
+}
+
+/// Whether the weights of a fit are those of its own result.
+fn is_settled(curve: &Curve, fit: &Fit) -> bool {
+    let nu = expected(curve, fit);
+    nu.iter().zip(&fit.weighted_for).all(|(a, b)| (a / b - 1.0).abs() < SETTLED)
+}
+
+/// Fits with the weights of the last result; those before the last, and the last.
 fn reweighted(
     curve: &Curve,
     spec: &ModelSpec,
     rate_hz: f64,
     first: Fit,
     rounds: usize,
-    combinations: usize,
-) -> Result<Fit, FitError> {
-    let mut last = first;
-    for _ in 0..rounds {
-        let nu = expected(curve, &last);
-        let change = nu.iter().zip(&last.weighted_for).map(|(a, b)| (a / b - 1.0).abs());
-        if change.fold(0.0, f64::max) < SETTLED {
-            break;
-        }
-        let weights = Weights { weighting: Weighting::Model, nu, mixing: None };
-        last = fit_near(curve, spec, rate_hz, weights, combinations, &last.minima)?;
+    effort: Effort,
+) -> Result<(Vec<Fit>, Fit), FitError> {
+    let (mut before, mut last) = (Vec::new(), first);
+    while before.len() < rounds && !is_settled(curve, &last) {
+        let weights = Weights { weighting: Weighting::Model, nu: expected(curve, &last), mixing: None };
+        let next = fit_near(curve, spec, rate_hz, weights, effort, &last.minima)?;
+        before.push(std::mem::replace(&mut last, next));
     }
-    Ok(last)
+    Ok((before, last))
+}
+
+impl Fit {
+    /// The same with its own minimum as the only one known.
+    fn within_its_basin(mut self) -> Self {
+        self.minima.truncate(1);
+        self
+    }
+
+    /// The same with its objective and residuals in standard deviations of the curve where the model holds: in the weights of
+    /// the fit a scale far above the model counts little, and a model would be the less rejected the more it misses.
+    fn at_own_weights(self, curve: &Curve) -> Self {
+        let nu = expected(curve, &self);
+        let pairs = inverse_deviations(curve, &nu).into_iter().zip(curve.wv.iter().zip(&nu));
+        let residuals: Vec<f64> = pairs.map(|(root, (wv, nu))| root * (wv - nu)).collect();
+        let objective = residuals.iter().map(|r| r * r).sum();
+        // Of other minima what is known is how far they are behind by the weights of the fit.
+        let behind = |other: f64| objective * (other / self.objective).max(1.0);
+        let runner_up = self.runner_up.map(behind).filter(|other: &f64| other.is_finite());
+        Self { objective, residuals, runner_up, ..self }
+    }
 }
 
 /// Relative covariance of a curve of independent degrees of freedom, by the large-sample law of a model
@@ -98,11 +143,8 @@ pub(crate) fn fit_with_covariance(
         diagonal => f64::from(u8::from(diagonal)),
     });
     let mixing = Some(Arc::new(whitening(&own)));
-    fit_near(curve, spec, rate_hz, Weights { weighting: Weighting::Full, nu, mixing }, COMBINATIONS, &[])
+    fit_near(curve, spec, rate_hz, Weights { weighting: Weighting::Full, nu, mixing }, Effort::WHOLE, &[])
 }
-
-/// Combinations tried for a curve that resembles one already fitted.
-const FEW: usize = 300;
 
 /// The same for a curve that resembles one already fitted: a coarser grid, and the minima of that one.
 pub(crate) fn refit(
@@ -119,15 +161,17 @@ pub(crate) fn refit(
         Weighting::Edof | Weighting::Interval | Weighting::None => curve.wv.clone(),
     };
     let weights = Weights { weighting, nu, mixing: like.mixing.clone() };
-    let first = fit_near(curve, spec, rate_hz, weights, FEW, &like.minima)?;
+    let first = fit_near(curve, spec, rate_hz, weights, Effort::AGAIN, &like.minima)?;
     match weighting {
-        Weighting::Model => reweighted(curve, spec, rate_hz, first, FEW_ROUNDS, NO_GRID),
+        Weighting::Model => {
+            // The weights change little: the basin of the first round is that of the others.
+            let (_, last) =
+                reweighted(curve, spec, rate_hz, first.within_its_basin(), FEW_ROUNDS, Effort::WITHIN)?;
+            Ok(last.at_own_weights(curve))
+        }
         _ => Ok(first),
     }
 }
-
-/// Descents from the known minima only.
-const NO_GRID: usize = 0;
 
 /// Weights of the scales of a curve.
 struct Weights {
@@ -142,7 +186,7 @@ fn fit_near(
     spec: &ModelSpec,
     rate_hz: f64,
     weights: Weights,
-    combinations: usize,
+    effort: Effort,
     known: &[Vec<f64>],
 ) -> Result<Fit, FitError> {
     check(curve, spec)?;
@@ -150,7 +194,7 @@ fn fit_near(
     let components = limited.map(|(kind, limits)| component(*kind, *limits, curve, rate_hz)).collect();
     let Weights { weighting, nu, mixing } = weights;
     let objective = Objective::new(curve, weighting, &nu, mixing.clone(), components);
-    let found = search(&objective, combinations, known);
+    let found = search(&objective, effort, known);
     Ok(Fit { mixing, weighted_for: nu, ..assemble(&objective, &found, spec, rate_hz)? })
 }
 
@@ -216,4 +260,50 @@ fn within(range: Range, high: Option<f64>, low: Option<f64>) -> Range {
     let high = high.unwrap_or(range.high);
     let low = low.unwrap_or_else(|| range.low.min(high));
     Range { low, high: high.max(low) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::{Ar1, Composite, Process, Quantization, RandomWalk, White};
+    use crate::rng::Generator;
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+
+    /// N2 with 8 to 30 % of noise at every scale, a third of it unknown to the degrees of freedom: on some of these curves the
+    /// weights of one minimum lead to another and back. What is called converged has the weights of its own result.
+    #[test]
+    fn a_fit_is_called_converged_where_its_weights_are_its_own() {
+        let model = Composite::new(vec![
+            Process::White(White::new(1.0).unwrap()),
+            Process::Quantization(Quantization::new(0.5).unwrap()),
+            Process::Ar1(Ar1::new(0.9, 1e-3).unwrap()),
+            Process::Ar1(Ar1::new(0.999, 1e-5).unwrap()),
+            Process::RandomWalk(RandomWalk::new(1e-8).unwrap()),
+        ]);
+        let levels: Vec<u32> = (1..=14).collect();
+        let mut generator = Generator::seed_from_u64(29);
+        let mut unsettled = 0;
+        for k in 0..30 {
+            let noise = 0.08 + 0.22 * f64::from(k % 3) / 2.0;
+            let off = |_| (noise * generator.sample::<f64, _>(StandardNormal)).exp();
+            let wv = levels
+                .iter()
+                .map(|l| model.haar_wv(*l))
+                .zip(levels.iter().map(off))
+                .map(|(nu, off)| nu * off);
+            let curve = Curve {
+                wv: wv.collect(),
+                edof: vec![3.0 / (noise * noise); levels.len()],
+                levels: levels.clone(),
+                ..Curve::default()
+            };
+            let fit = fit(&curve, &ModelSpec::n2(), 1.0, Weighting::Model).unwrap();
+            let is_converged = fit.termination == Termination::Converged;
+            unsettled += u32::from(!is_converged);
+            assert_eq!(is_converged, is_settled(&curve, &fit), "curve {k}");
+        }
+        // Most can be followed within the basin of either minimum.
+        assert!(unsettled <= 3, "{unsettled}");
+    }
 }

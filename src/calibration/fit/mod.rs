@@ -16,6 +16,7 @@ pub(crate) use objective::Range;
 pub use optimise::Termination;
 pub use result::{Fit, FitError};
 pub use weighting::Weighting;
+pub(crate) use weighting::score;
 
 use crate::curve::Estimator;
 use crate::model::ModelSpec;

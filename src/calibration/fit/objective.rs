@@ -96,8 +96,8 @@ pub(crate) struct Objective {
     roots: Vec<f64>,
     /// Matrix that mixes the scales so that their relative errors are uncorrelated ([`whitening`]).
     mixing: Option<Arc<DMatrix<f64>>>,
-    /// Response of a robust curve to quantization noise, where the model has some.
-    quantization: Option<QuantizationResponse>,
+    /// Response of a robust curve to quantization noise, level by level, where the model has some; none: as it is.
+    quantization: Option<Vec<Option<QuantizationResponse>>>,
     pub(crate) target: Vec<f64>,
     pub(crate) length: f64,
     pub(crate) components: Vec<Component>,
@@ -155,7 +155,8 @@ impl Objective {
         let length = dot(&target, &target).sqrt();
         let target = target.iter().map(|b| b / length).collect();
         let has_quantization = components.iter().any(|c| c.kind == Kind::Quantization);
-        let quantization = curve.quantization.filter(|_| has_quantization);
+        let responses = || curve.levels.iter().map(|level| curve.response(*level).copied()).collect();
+        let quantization = (has_quantization && curve.quantization.is_some()).then(responses);
         Self { levels: curve.levels.clone(), roots, mixing, quantization, target, length, components }
     }
 
@@ -211,8 +212,11 @@ impl Objective {
                     own += nu;
                 }
             }
-            // Of nothing nothing is a part.
-            if all > 0.0 { Response::new(quantization, (own / all).clamp(0.0, 1.0)) } else { Response::PLAIN }
+            match &quantization[level] {
+                Some(response) if all > 0.0 => Response::new(response, (own / all).clamp(0.0, 1.0)),
+                // Of nothing nothing is a part.
+                _ => Response::PLAIN,
+            }
         };
         (0..self.levels.len()).map(at_level).collect()
     }

@@ -10,12 +10,26 @@ use super::objective::{Column, NEARLY_SETTLED, Objective, Range, Shape, dot};
 use super::optimise::{End, Termination, descend};
 use rayon::prelude::*;
 
-/// Limit of the number of combinations of the grid, where its dimensions are alike.
-pub(crate) const COMBINATIONS: usize = 6000;
 /// Largest number of points in one dimension.
 const POINTS: usize = 160;
-/// Largest number of local minima of the grid from which a descent starts.
-const STARTS: usize = 16;
+
+/// Effort of a search.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Effort {
+    /// Limit of the number of combinations of the grid, where its dimensions are alike; 0: no grid where minima are known.
+    combinations: usize,
+    /// Largest number of local minima of the grid from which a descent starts.
+    starts: usize,
+}
+
+impl Effort {
+    /// For a curve of which nothing is known.
+    pub(crate) const WHOLE: Self = Self { combinations: 6000, starts: 16 };
+    /// For a curve that resembles one already fitted: its minima are known, and another is seldom far from the grid's best.
+    pub(crate) const AGAIN: Self = Self { combinations: 300, starts: 2 };
+    /// Descents from the known minima only.
+    pub(crate) const WITHIN: Self = Self { combinations: 0, starts: 1 };
+}
 
 /// Result of the search.
 #[derive(Debug)]
@@ -28,9 +42,8 @@ pub(crate) struct Found {
     pub(crate) combinations: usize,
 }
 
-/// Searches all coordinates, on a grid of at most so many combinations of alike dimensions (none for 0) and from the `known`
-/// minima of a similar curve.
-pub(crate) fn search(objective: &Objective, combinations: usize, known: &[Vec<f64>]) -> Found {
+/// Searches all coordinates, on a grid and from the `known` minima of a similar curve.
+pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) -> Found {
     let dimensions: Vec<(usize, Range)> = objective.shaped().collect();
     if dimensions.is_empty() {
         let cost = objective.solve(&[]).cost();
@@ -39,12 +52,12 @@ pub(crate) fn search(objective: &Objective, combinations: usize, known: &[Vec<f6
     }
     let mut starts = known.to_vec();
     let mut tried = 0;
-    if combinations > 0 || known.is_empty() {
-        let grid = Grid::new(objective, &dimensions, combinations);
+    if effort.combinations > 0 || known.is_empty() {
+        let grid = Grid::new(objective, &dimensions, effort.combinations);
         let choices = grid.choices();
         tried = choices.len();
         // The grid first: of ends with the same cost the sort keeps that order, whatever is known.
-        starts.splice(0..0, grid.starts(&choices));
+        starts.splice(0..0, grid.starts(&choices, effort.starts));
     }
     let mut ends: Vec<End> = starts.par_iter().map(|start| descend(objective, start)).collect();
     ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -127,8 +140,8 @@ impl<'a> Grid<'a> {
         1.0 - 2.0 * linear + quadratic
     }
 
-    /// The local minima of the grid, best first.
-    fn starts(&self, choices: &[Vec<usize>]) -> Vec<Vec<f64>> {
+    /// The local minima of the grid, best first, so many at most.
+    fn starts(&self, choices: &[Vec<usize>], most: usize) -> Vec<Vec<f64>> {
         let costs: Vec<f64> = choices.par_iter().with_min_len(64).map(|c| self.cost(c)).collect();
         let table: std::collections::HashMap<&[usize], f64> =
             choices.iter().map(Vec::as_slice).zip(costs.iter().copied()).collect();
@@ -143,7 +156,7 @@ impl<'a> Grid<'a> {
         minima.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(b.1)));
         // A flat stretch (a process without amplitude) is one minimum.
         minima.dedup_by(|b, a| (b.0 - a.0).abs() <= 1e-9 * a.0.abs());
-        minima.truncate(STARTS);
+        minima.truncate(most);
         let point = |choice: &Vec<usize>| choice.iter().zip(&self.points).map(|(i, p)| p[*i]).collect();
         minima.into_iter().map(|(_, choice)| point(choice)).collect()
     }

@@ -2,6 +2,7 @@
 
 use super::Outcome;
 use crate::curve::implied;
+use crate::fit::score;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Scales missed by more standard deviations than this are told.
@@ -35,14 +36,6 @@ pub struct Misfit {
 
 /// Probability of the scores of all scales together below which a model is not said to fit, where no J-test was made.
 const IMPOSSIBLE: f64 = 1e-4;
-
-/// The normal score of a chi-square over its degrees of freedom (Wilson and Hilferty): of few degrees the ratio less one over
-/// its deviation would never be far below zero, however improbable it is.
-fn score(ratio: f64, edof: f64) -> f64 {
-    // (chi²/eta)^(1/3) is nearly normal with mean 1 − 2/(9 eta) and variance 2/(9 eta).
-    let variance = 2.0 / (9.0 * edof);
-    (ratio.cbrt() - 1.0 + variance) / variance.sqrt()
-}
 
 /// A curve against its model.
 #[derive(Debug, Clone, PartialEq)]
@@ -145,7 +138,8 @@ impl Outcome {
 
 #[cfg(test)]
 mod tests {
-    use super::{Departure, Miss, score};
+    use super::{Departure, Miss};
+    use crate::fit::score;
     use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
     /// Twelve scales that are off by one deviation each are what chance brings: P(chi-square of 12 > 12) = 0.4457 (tables). Off by

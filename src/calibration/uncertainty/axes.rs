@@ -29,7 +29,7 @@ pub(crate) fn axes_differ(
         Axis::ALL.into_iter().filter(|axis| replicates.iter().any(|r| r.axis == Some(*axis))).collect();
     let table = layout(replicates, &axes)?;
     let degrees = |r: &Replicate, level: u32| match edof_eta3(r.samples, level) {
-        edof if estimator.is_robust() => edof_robust(edof, tuning.efficiency()),
+        edof if r.is_robust(estimator, level as usize - 1) => edof_robust(edof, tuning.efficiency()),
         edof => edof,
     };
     let is_usable = |r: &Replicate, level: u32| r.levels() >= level as usize && degrees(r, level) >= LEAST;

@@ -162,21 +162,28 @@ impl<'a> CurveSampler<'a> {
     fn curve(&self, ratios: Vec<Vec<f64>>, settings: &Settings) -> Option<Curve> {
         let edof = self.spread.iter().flat_map(|s| &s.edof);
         let drawn_replicate = |((replicate, ratios), edof): ((&Replicate, Vec<f64>), &Vec<f64>)| {
-            let levels = self.centre.iter().zip(ratios).zip(edof).take(replicate.levels());
+            let levels = self.centre.iter().zip(ratios).zip(edof).take(replicate.levels()).enumerate();
             // The law gives ratios whose mean is 1; robust variances of few coefficients read high, and so
             // must those drawn.
-            like(replicate, levels.map(|((nu, ratio), edof)| nu * ratio * (1.0 + self.bias(*edof))).collect())
+            let bias = |j: usize, edof: f64| {
+                if replicate.is_robust(self.estimator, j) { self.bias(edof) } else { 0.0 }
+            };
+            like(
+                replicate,
+                levels.map(|(j, ((nu, ratio), edof))| nu * ratio * (1.0 + bias(j, *edof))).collect(),
+            )
         };
         let replicates: Vec<Replicate> =
             self.replicates.iter().zip(ratios).zip(edof).map(drawn_replicate).collect();
         let curve = average(&replicates, self.estimator, settings.trim, &settings.tuning).ok()?;
         // The draws have a root everywhere; what the fit left out, it leaves out of every draw.
-        Some(Curve { ignored: self.curve.ignored.clone(), ..curve })
+        let Curve { differing, classical, ignored, .. } = self.curve.clone();
+        Some(Curve { differing, classical, ignored, ..curve })
     }
 
-    /// Relative bias of a robust variance with so many degrees of freedom; 0 for a classical one.
+    /// Relative bias of a robust variance with so many degrees of freedom.
     fn bias(&self, edof: f64) -> f64 {
-        if self.estimator.is_robust() { (self.bias_times_edof / edof).min(LARGEST_BIAS) } else { 0.0 }
+        (self.bias_times_edof / edof).min(LARGEST_BIAS)
     }
 
     /// A curve from elsewhere, which scatters by its degrees of freedom.
@@ -191,10 +198,17 @@ impl<'a> CurveSampler<'a> {
     }
 }
 
-/// A replicate of the same length with other variances.
+/// A replicate of the same length with other variances, classical where that replicate's are.
 pub(crate) fn like(replicate: &Replicate, nu: Vec<f64>) -> Replicate {
-    let robust =
-        nu.iter().map(|value| RobustVariance { value: *value, status: Status::Ok, zeros: 0.0 }).collect();
+    let status = |j: usize| match replicate.robust.get(j).map(|robust| robust.status) {
+        Some(Status::Coarse) => Status::Coarse,
+        _ => Status::Ok,
+    };
+    let robust = nu
+        .iter()
+        .enumerate()
+        .map(|(j, nu)| RobustVariance { value: *nu, status: status(j), zeros: 0.0 })
+        .collect();
     Replicate {
         name: String::new(),
         axis: replicate.axis,

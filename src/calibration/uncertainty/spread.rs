@@ -208,11 +208,11 @@ impl Spread {
 }
 
 fn edof(replicate: &Replicate, estimator: Estimator, law: &SamplingLaw, tuning: &Tuning) -> Vec<f64> {
-    if estimator.is_robust() {
-        law.robust_edof(replicate.samples, tuning)
-    } else {
-        law.edof(replicate.samples)
-    }
+    let (robust, classical) = (law.robust_edof(replicate.samples, tuning), law.edof(replicate.samples));
+    // A short recording lacks the longest scales.
+    let is_robust = |j: usize| j < replicate.levels() && replicate.is_robust(estimator, j);
+    let pairs = robust.into_iter().zip(classical).enumerate();
+    pairs.map(|(j, (robust, classical))| if is_robust(j) { robust } else { classical }).collect()
 }
 
 /// The degrees of freedom of a variance over those of the plain one, K − 1. That of K Gaussian numbers of which the

@@ -86,10 +86,7 @@ pub(super) const ESTIMATORS: [(&str, &str); 7] = [
 ];
 
 const WEIGHTINGS: [(&str, &str); 5] = [
-    (
-        Weighting::Model.name(),
-        "Degrees of freedom / (2 wv²), wv that of the fitted model: the inverse variance",
-    ),
+    (Weighting::Model.name(), "Inverse variance by the fitted model; a scale far above it weighs less"),
     (
         Weighting::Edof.name(),
         "The same with the observed wv: the convention of the literature, low where wv is low by chance",

@@ -208,7 +208,7 @@ impl Clock {
         if step <= 0.0 {
             return Err(self.still(&raw.path));
         }
-        let irregular = |s: f64| s > 1.5 * median || s < 0.5 * median;
+        let irregular = |s: f64| is_gap(s, median) || s < 0.5 * median;
         let breaks: Vec<usize> =
             steps().enumerate().filter(|(_, s)| irregular(*s)).map(|(i, _)| i + 1).collect();
         if let (Gaps::Refuse, Some(first)) = (options.gaps, breaks.first()) {
@@ -227,6 +227,12 @@ impl Clock {
             return Err(FileError::contents(raw.path.as_str(), line, message).setting(Setting::Gaps));
         }
         let rate = |step: f64| rounded(1.0 / (step * self.unit_s));
+        if let Some([first, last]) = drift(&self.since).map(|steps| steps.map(|s| six_digits(rate(s)))) {
+            let message =
+                format!("the rate changes from {first} Hz in the first tenth to {last} Hz in the last");
+            return Err(FileError::contents(raw.path.as_str(), Place::Within, message)
+                .advice("split the file where the rate changes: a wavelet variance is of one rate"));
+        }
         // The whole span averages the jitter.
         let found = rate(if breaks.is_empty() { mean_step(&self.since) } else { step });
         let given = options.rate_hz.unwrap_or(found);
@@ -302,5 +308,42 @@ fn mean_step(times: &[f64]) -> f64 {
 /// The step of the samples: gaps do not change the median. Where the stamps are late (coarse, in bursts) and no sample is
 /// lost, no single step is that of the samples, but the span is theirs.
 fn step_of(times: &[f64], gaps: Gaps) -> f64 {
-    if gaps == Gaps::Ignore { mean_step(times) } else { median_step(times) }
+    if gaps == Gaps::Ignore && !has_lost_samples(times) { mean_step(times) } else { median_step(times) }
+}
+
+fn is_gap(step: f64, median: f64) -> bool {
+    step > 1.5 * median
+}
+
+/// Share of gaps up to which samples are lost; coarse stamps jump more often, and late ones are followed by short steps.
+const MOST_LOST: f64 = 0.1;
+
+/// Whether the irregular steps are gaps that lost samples leave, and the others those of the samples.
+fn has_lost_samples(times: &[f64]) -> bool {
+    let median = median_step(times);
+    let steps = || times.windows(2).map(|w| w[1] - w[0]);
+    let gaps = steps().filter(|s| is_gap(*s, median)).count();
+    gaps > 0 && (gaps as f64) < MOST_LOST * times.len() as f64 && !steps().any(|s| s < 0.5 * median)
+}
+
+/// Steps of the first and the last tenth, where they differ by more than 1 % and what single stamps may be off by.
+fn drift(times: &[f64]) -> Option<[f64; 2]> {
+    /// Steps of a tenth from which on its mean tells.
+    const LEAST: usize = 10;
+    let tenth = times.len() / 10;
+    if tenth < LEAST {
+        return None;
+    }
+    let (median, lost) = (median_step(times), has_lost_samples(times));
+    let ends = [&times[..=tenth], &times[times.len() - tenth - 1..]];
+    let regular = |part: &[f64]| -> Vec<f64> {
+        part.windows(2).map(|w| w[1] - w[0]).filter(|s| !(lost && is_gap(*s, median))).collect()
+    };
+    let [first, last] = ends.map(regular);
+    let mean = |steps: &[f64]| steps.iter().sum::<f64>() / steps.len() as f64;
+    let longest = first.iter().chain(&last).copied().fold(0.0, f64::max);
+    let means = [mean(&first), mean(&last)];
+    // A stamp at either end of a tenth may be late by as much as the longest step.
+    let allowed = DISAGREEING + 2.0 * longest / (means[0].min(means[1]) * tenth as f64);
+    ((means[1] / means[0]).ln().abs() > allowed).then_some(means)
 }

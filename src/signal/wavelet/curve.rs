@@ -13,7 +13,12 @@ pub struct Curve {
     pub edof: Vec<f64>,
     /// Response of robust variances to quantization noise; none for classical ones, which read it as it is.
     pub quantization: Option<QuantizationResponse>,
-    /// Levels without weight in a fit: robust variances without an admissible root.
+    /// Variance of ln nu, at all scales alike, by which the curve of other recordings would differ beyond the degrees of
+    /// freedom; 0 where it is not known.
+    pub differing: f64,
+    /// Levels of a robust curve whose variance is the classical one, which reads quantization noise as it is.
+    pub classical: Vec<u32>,
+    /// Levels without weight in a fit.
     pub ignored: Vec<u32>,
 }
 
@@ -22,4 +27,10 @@ impl Curve {
     pub const WV_RANGE: (f64, f64) = (1e-100, 1e100);
     /// Degrees of freedom that are accepted.
     pub const EDOF_RANGE: (f64, f64) = (1e-15, 1e15);
+
+    /// Response to quantization noise at a level; none where it is read as it is.
+    #[must_use]
+    pub fn response(&self, level: u32) -> Option<&QuantizationResponse> {
+        self.quantization.as_ref().filter(|_| !self.classical.contains(&level))
+    }
 }

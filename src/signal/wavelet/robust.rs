@@ -9,6 +9,7 @@
 //! (means of 1000 records; the command is in docs/limits.md).
 
 use super::haar::{Compensated, Pyramid, array, pairwise};
+use super::interval::edof_eta3;
 use super::{Tuning, WaveletError};
 use multiversion::multiversion;
 
@@ -17,7 +18,8 @@ use multiversion::multiversion;
 pub enum Status {
     /// The falling root.
     Ok,
-    /// The falling root, but more than half of the coefficients are exactly zero (coarse quantisation).
+    /// The steps of a quantiser move it, or leave more than half of the coefficients at zero: the classical variance is
+    /// the better known one.
     Coarse,
     /// No admissible root (too many gross outliers, or too few coefficients): the value that comes closest.
     NoRoot,
@@ -52,7 +54,20 @@ impl RobustVariance {
     pub fn is_stepped(&self) -> bool {
         self.zeros > MOST_ZEROS
     }
+
+    /// Whether the steps leave it without a root, or make it another than the classical variance, whose degrees of freedom are
+    /// given. Of finer steps, or where the two agree, it is as good as ever.
+    fn is_moved_by_steps(&self, classical: f64, edof: f64, efficiency: f64) -> bool {
+        let ratio = (classical / self.value).ln();
+        // (1/e − 1)·2/eta is the variance of the logarithm of the two of Gaussian coefficients.
+        let sigma = ((1.0 / efficiency - 1.0) * 2.0 / edof).sqrt();
+        let is_moved = ratio.abs() > LEAST_MOVE.max(3.0 * sigma);
+        self.is_stepped() && (is_moved || self.status == Status::NoRoot)
+    }
 }
+
+/// Classical over robust, less one, from which the steps of a quantiser are said to move a variance: less hardly moves a fit.
+const LEAST_MOVE: f64 = 0.02;
 
 /// Classical and robust wavelet variance at levels 1 … `levels` in one walk.
 ///
@@ -65,15 +80,19 @@ pub fn both(
 ) -> Result<(Vec<f64>, Vec<RobustVariance>), WaveletError> {
     let mut pyramid = Pyramid::new(signal, levels)?;
     let mut squares = Vec::new();
-    let mut walk = || {
+    let mut walk = |level: u32| {
         // The M-estimate is scale-equivariant: it is taken of (2m·W)², and the factor goes on once, at the
         // end. `half` is read before the step doubles it.
         let scale = 0.5 / pyramid.half as f64;
         let classical = pyramid.next_squares(&mut squares);
-        let robust = m_scale(&squares, tuning);
-        (classical, RobustVariance { value: robust.value * scale * scale, ..robust })
+        let found = m_scale(&squares, tuning);
+        let mut robust = RobustVariance { value: found.value * scale * scale, ..found };
+        if robust.is_moved_by_steps(classical, edof_eta3(signal.len(), level), tuning.efficiency()) {
+            robust.status = Status::Coarse;
+        }
+        (classical, robust)
     };
-    Ok((0..levels).map(|_| walk()).unzip())
+    Ok((1..=levels).map(&mut walk).unzip())
 }
 
 /// The M-estimate of the mean of the given squares of zero-mean Gaussian numbers.

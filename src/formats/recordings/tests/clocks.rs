@@ -24,12 +24,49 @@ fn time_is_checked() {
     assert!(
         report.files[0].warnings[0].contains("split at 1 gaps or duplicates in time, the first in line 11")
     );
-    // Ignored, 19 samples are taken as evenly spaced over 0.19 s; that one may be lost is told.
+    // Ignored, a lost sample leaves the rate of the others.
     let (whole, report) = read(&[path], &with(Gaps::Ignore)).unwrap();
     assert_eq!((whole.len(), whole[0].len()), (1, 19));
-    assert_close(&[whole[0].rate_hz], &[18.0 / 0.19]);
+    assert_close(&[whole[0].rate_hz], &[100.0]);
     let warning = &report.files[0].warnings[0];
-    assert!(warning.contains("94.7368 Hz over the whole, 100 Hz by the median step"), "{warning}");
+    assert!(warning.contains("1 gaps or duplicates in time ignored, the first in line 11"), "{warning}");
+}
+
+/// 2000 rows at 100 Hz before as many at 149 Hz, and 7000 of 10 ms before 8000 of 20 ms (half the median step is no gap); of a
+/// clock that is 0.5 % faster in the end, and of steps that jitter by 40 %, nothing is said.
+#[test]
+fn a_rate_that_changes_is_refused() {
+    let times = |steps: &dyn Fn(usize) -> f64, n: usize| {
+        let stamps: Vec<f64> = (0..n)
+            .scan(0.0, |at, k| {
+                *at += steps(k);
+                Some(*at)
+            })
+            .collect();
+        stamped("t_s", n, |k| format!("{:.6}", stamps[k]))
+    };
+    let faster = times(&|k| if k < 2000 { 0.01 } else { 1.0 / 149.0 }, 4000);
+    let (message, hint) = refusal_with("a.csv", &faster, &ReadOptions::default());
+    assert_eq!(message, "a.csv: the rate changes from 100 Hz in the first tenth to 149 Hz in the last");
+    assert!(hint.contains("split the file"), "{hint}");
+    let slower = times(&|k| if k < 7000 { 0.01 } else { 0.02 }, 15_000);
+    assert!(refusal_with("a.csv", &slower, &ReadOptions::default()).0.contains("from 100 Hz"));
+    for steps in
+        [&(|k: usize| 0.01 * (1.0 - 0.005 * k as f64 / 4000.0)) as &dyn Fn(usize) -> f64, &|k: usize| {
+            0.01 * (1.0 + 0.4 * (k as f64 * 2.4).sin())
+        }]
+    {
+        assert!(read_one("a.csv", &times(steps, 4000), &ReadOptions::default()).is_ok());
+    }
+}
+
+/// 40 of 2000 samples lost, never two in turn: the rate is that of the samples, whatever is made of the gaps.
+#[test]
+fn lost_samples_do_not_change_the_rate() {
+    let kept: Vec<usize> = (0..2000).filter(|k| k % 50 != 25).collect();
+    let text = stamped("t_s", kept.len(), |i| format!("{:.2}", 0.01 * kept[i] as f64));
+    let r = read_one("a.csv", &text, &ReadOptions { gaps: Gaps::Ignore, ..ReadOptions::default() }).unwrap();
+    assert!((r.rate_hz / 100.0 - 1.0).abs() < 1e-6, "{}", r.rate_hz);
 }
 
 #[test]
