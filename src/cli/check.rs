@@ -164,14 +164,14 @@ fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
 }
 
 fn imu(path: &Path, session: &Session) -> Result<String, Failure> {
-    let imu = read_imu(path).map_err(read::refused_for_fusion)?;
+    let imu = read_imu(path, None).map_err(read::refused_for_fusion)?;
     imu.remarks.iter().for_each(|remark| session.printer.remark(remark));
     Ok(format!("an IMU recording of {} samples at {:.2} Hz, for fuse", imu.samples.len(), imu.rate_hz))
 }
 
 /// What is no static recording may be one of a drive or a flight, which `fuse` reads.
 fn moving(path: &Path, session: &Session) -> Option<String> {
-    let imu = read_imu(path).ok()?;
+    let imu = read_imu(path, None).ok()?;
     if !moves(&imu.samples) {
         return None;
     }

@@ -281,7 +281,7 @@ fn standing_still_needs_an_initial_state() {
     let ran = nav_sim(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml -o out");
     assert_eq!(ran.code, 2);
     assert!(
-        ran.stderr.contains("no fix moves at 3.0 m/s") && ran.stderr.contains("--initial FILE"),
+        ran.stderr.contains("no fix moves at 0.5 m/s") && ran.stderr.contains("--initial FILE"),
         "{}",
         ran.stderr
     );
