@@ -7,7 +7,9 @@ use crate::formats::{
     contamination_file, curve_file, datasheet, efficiency_file, model_file, parameters_file, scenario_file,
 };
 use crate::report::six_digits;
+use nav_sim_document::seconds;
 use nav_sim_navigation::fusion::alignment::moves;
+use nav_sim_navigation::gnss::FixSigma;
 use std::path::{Path, PathBuf};
 
 /// Check scenario, study, model, trajectory and recording files without running anything
@@ -135,8 +137,8 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
         }
         FileKind::Trajectory => {
             let trajectory = read::trajectory(path, session)?;
-            let seconds = trajectory.end_s() - trajectory.start_s();
-            Ok(format!("a trajectory of {seconds} s"))
+            let span = trajectory.end_s() - trajectory.start_s();
+            Ok(format!("a trajectory of {span} s"))
         }
         FileKind::Initial => {
             let start = read_initial(path)?;
@@ -156,11 +158,20 @@ fn model(path: &Path, session: &Session) -> Result<String, Failure> {
 }
 
 fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
-    let (fixes, remarks) = read_gnss(path, None, None).map_err(read::refused_for_fusion)?;
+    // standard deviations that no file states are an option of fuse
+    let given = FixSigma { pos_m: [1.0; 3], vel_m_s: Some([1.0; 3]) };
+    let read = read_gnss(path, None, None).map(|read| (read, ""));
+    let ((fixes, remarks), unsaid) = match read {
+        Err(e) => match read_gnss(path, Some(&given), None) {
+            Ok(read) => (read, ", without standard deviations (fuse --gnss-sigma)"),
+            Err(_) => return Err(read::refused_for_fusion(e)),
+        },
+        Ok(read) => read,
+    };
     remarks.iter().for_each(|remark| session.printer.remark(remark));
     let span = fixes.first().zip(fixes.last()).map_or(0.0, |(a, b)| b.t_s - a.t_s);
     let velocity = if fixes.iter().any(|f| f.velocity.is_some()) { " with velocity" } else { "" };
-    Ok(format!("{} GNSS fixes{velocity} over {span} s", fixes.len()))
+    Ok(format!("{} GNSS fixes{velocity} over {} s{unsaid}", fixes.len(), seconds(span)))
 }
 
 fn imu(path: &Path, session: &Session) -> Result<String, Failure> {

@@ -267,7 +267,7 @@ fn bad_imu_data_and_flags_are_refused() {
         "rec/initial.toml",
         |t| t.replace("t_s = 0.0", "t_s = 500.0"),
         "--initial rec/initial.toml",
-        &["the start at 500 s is not within the IMU's 0 to 100 s"],
+        &["the start at 500.00 s is not within the IMU's 0 to 100 s"],
     );
 }
 

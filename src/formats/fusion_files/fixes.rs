@@ -161,6 +161,13 @@ impl<'a> FixColumns<'a> {
 
 /// A file of fixes that is not read, told by its first characters.
 fn of_another_kind(path: &str, text: &str) -> Option<Error> {
+    // the sync characters of UBX, of which the first is no text
+    if text.starts_with("\u{fffd}b") {
+        return Some(
+            Error::contents(path, 1_u64, "UBX messages of a receiver, not a table of fixes")
+                .advice("convert them to NMEA or to a solution of RTKLIB (.pos)"),
+        );
+    }
     let text = text.trim_start_matches('\u{feff}').trim_start();
     let error = || {
         Error::contents(path, 1_u64, "XML, as GPX and KML are, not a table of fixes")
@@ -189,7 +196,7 @@ pub(crate) fn read_gnss(
     let (fixes, remarks) = if is_nmea(&text) {
         nmea::fixes(&shown, &text, unsaid, clock_s)?
     } else {
-        of_table(path, text, unsaid)?
+        of_table(path, text, (unsaid, clock_s))?
     };
     for pair in fixes.windows(2) {
         check_step(&shown, pair[1].0, &pair[0].1, &pair[1].1)?;
@@ -202,11 +209,15 @@ pub(crate) fn read_gnss(
 pub(super) type Fixes = (Vec<(u64, GnssFix)>, Vec<Remark>);
 
 /// The fixes of a table, of KF-GINS or of RTKLIB.
-fn of_table(path: &Path, mut text: String, unsaid: Option<&FixSigma>) -> Result<Fixes, Error> {
+fn of_table(
+    path: &Path,
+    mut text: String,
+    (unsaid, clock_s): (Option<&FixSigma>, Option<(f64, f64)>),
+) -> Result<Fixes, Error> {
     let mut remarks = Vec::new();
     let is_rtklib = is_rtklib(&text);
     if is_rtklib {
-        let (table, remark) = rtklib::rows(&path.display().to_string(), &text)?;
+        let (table, remark) = rtklib::rows(&path.display().to_string(), &text, clock_s)?;
         (text, remarks) = (table, vec![Remark::note(remark)]);
     }
     let bare = bare_columns(&text);

@@ -57,7 +57,7 @@ pub enum AlignmentError {
     #[error("no fix with IMU samples around it to level with")]
     NoLevel,
     /// No specific force to level with.
-    #[error("no IMU samples after the first moving fix at {t_s} s to level with")]
+    #[error("no IMU samples after the first moving fix at {t_s:.2} s to level with")]
     NoSamples {
         /// The fix (s).
         t_s: f64,
