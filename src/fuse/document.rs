@@ -333,6 +333,8 @@ const STATES: [(&str, &str); 9] = [
 ];
 /// Points of a curve that is smooth: more do not show.
 const MOST: usize = 120;
+/// Fixes of one fate in a panel: more lie on one another.
+const MOST_FIXES: usize = 1000;
 /// Points of a map along its larger half.
 const PIXELS: f64 = 400.0;
 /// Velocities of a reference that are known worse than this are not drawn: its positions jump (m/s).
@@ -453,7 +455,9 @@ const FATES: [(Use, &str, Colour); 3] = [
 /// A series for each fate of fixes.
 fn fixes(fixes: &[FixRecord], value: &dyn Fn(&FixRecord) -> f64) -> Vec<Series> {
     let of_fate = |(fate, name, colour): (Use, &str, Colour)| {
-        let points = fixes.iter().filter(|f| f.used == fate).map(|f| (f.t_s, value(f), f64::NAN));
+        let of_fate: Vec<&FixRecord> = fixes.iter().filter(|f| f.used == fate).collect();
+        let every = of_fate.len().div_ceil(MOST_FIXES).max(1);
+        let points = of_fate.into_iter().step_by(every).map(|f| (f.t_s, value(f), f64::NAN));
         let points: Vec<_> = points.collect();
         (!points.is_empty()).then(|| Series::points(name, colour, points))
     };
