@@ -8,7 +8,9 @@ use crate::formats::logs::LogOptions;
 use crate::formats::{contamination_file, curve_file, datasheet, model_file, parameters_file, scenario_file};
 use crate::inspect::inspect;
 use crate::report::six_digits;
+use nav_sim_document::seconds;
 use nav_sim_navigation::fusion::alignment::moves;
+use nav_sim_navigation::gnss::FixSigma;
 use std::path::{Path, PathBuf};
 
 /// Check scenario, study, model, trajectory and recording files without running anything
@@ -140,8 +142,8 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
         }
         FileKind::Trajectory => {
             let trajectory = read::trajectory(path, session)?;
-            let seconds = trajectory.end_s() - trajectory.start_s();
-            Ok(format!("a trajectory of {seconds} s"))
+            let span = trajectory.end_s() - trajectory.start_s();
+            Ok(format!("a trajectory of {span} s"))
         }
         FileKind::Initial => {
             let start = read_initial(path)?;
@@ -161,22 +163,31 @@ fn model(path: &Path, session: &Session) -> Result<String, Failure> {
 }
 
 fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
-    let (fixes, remarks) = read_gnss(path, None, None).map_err(read::refused_for_fusion)?;
+    // standard deviations that no file states are an option of fuse
+    let given = FixSigma { pos_m: [1.0; 3], vel_m_s: Some([1.0; 3]) };
+    let read = read_gnss(path, None, None).map(|read| (read, ""));
+    let ((fixes, remarks), unsaid) = match read {
+        Err(e) => match read_gnss(path, Some(&given), None) {
+            Ok(read) => (read, ", without standard deviations (fuse --gnss-sigma)"),
+            Err(_) => return Err(read::refused_for_fusion(e)),
+        },
+        Ok(read) => read,
+    };
     remarks.iter().for_each(|remark| session.printer.remark(remark));
     let span = fixes.first().zip(fixes.last()).map_or(0.0, |(a, b)| b.t_s - a.t_s);
     let velocity = if fixes.iter().any(|f| f.velocity.is_some()) { " with velocity" } else { "" };
-    Ok(format!("{} GNSS fixes{velocity} over {span} s", fixes.len()))
+    Ok(format!("{} GNSS fixes{velocity} over {} s{unsaid}", fixes.len(), seconds(span)))
 }
 
 fn imu(path: &Path, session: &Session) -> Result<String, Failure> {
-    let imu = read_imu(path).map_err(read::refused_for_fusion)?;
+    let imu = read_imu(path, None).map_err(read::refused_for_fusion)?;
     imu.remarks.iter().for_each(|remark| session.printer.remark(remark));
     Ok(format!("an IMU recording of {} samples at {:.2} Hz, for fuse", imu.samples.len(), imu.rate_hz))
 }
 
 /// What is no static recording may be one of a drive or a flight, which `fuse` reads.
 fn moving(path: &Path, session: &Session) -> Option<String> {
-    let imu = read_imu(path).ok()?;
+    let imu = read_imu(path, None).ok()?;
     if !moves(&imu.samples) {
         return None;
     }

@@ -1,6 +1,6 @@
 //! What kind of file a path holds, by its ending and its contents.
 
-use super::fusion_files::{bare_row, is_nmea};
+use super::fusion_files::{bare_row, is_nmea, is_rtklib};
 use super::{FileError, logs, source};
 use flate2::read::GzDecoder;
 use std::io::Read;
@@ -140,7 +140,7 @@ fn table_kind(text: &str) -> FileKind {
     };
     if let Some(kind) = bare_kind(text) {
         kind
-    } else if is_nmea(text) {
+    } else if is_nmea(text) || is_rtklib(text) {
         FileKind::Gnss
     } else if text.trim_start_matches('\u{feff}').trim_start().starts_with("ini lat") {
         FileKind::Trajectory

@@ -10,7 +10,7 @@ use nav_sim_document::{
 };
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::fusion::{
-    Drift, Finding, FixRecord, FromReference, Row, SmoothedOutage, Solution, Use,
+    ClocksApart, Drift, Finding, FixRecord, FromReference, Row, SmoothedOutage, Solution, Use,
 };
 use nav_sim_navigation::metrics::{VerdictKind, chi_square_band};
 use std::path::Path;
@@ -87,9 +87,9 @@ impl FuseAnswer {
     /// What helps where the solution is overconfident.
     pub(crate) fn advice(&self) -> &'static str {
         if self.summary.nis_per_component < 1.0 {
-            "errors of fixes that last make a filter overconfident: --gnss-sigma-factor; or the reference's axes differ"
+            "axes and clock of the reference may be others than those of the solution"
         } else {
-            "check axes (--axes, --mounting), units, start (--initial), clocks (--gnss-delay) and antenna (--lever-arm)"
+            "check axes (--mounting), units, start (--initial), clocks (--gnss-delay) and antenna (--lever-arm)"
         }
     }
 
@@ -122,6 +122,11 @@ impl FuseAnswer {
         let fixes = format!("NIS per component, {used} fixes used, {withheld} withheld, {rejected} rejected");
         let nis = Cell::number(summary.nis_per_component, "/nis_per_component");
         table.row([fixes.into(), nis, Cell::figures("–")]);
+        if let Some(ends) = &summary.ends {
+            let name = format!("error over σ at the ends of {} outages and gaps, rms", ends.count);
+            let ratio = Cell::number(ends.error_over_sigma, "/ends/error_over_sigma");
+            table.row([name.into(), ratio, Cell::figures("–")]);
+        }
         let rows = &self.solution.rows;
         let square = |row: &Row| row.sigma[0].powi(2) + row.sigma[1].powi(2);
         let sigma = (rows.iter().map(square).sum::<f64>() / rows.len() as f64).sqrt();
@@ -229,13 +234,18 @@ fn evidence(finding: &Finding) -> String {
             per_component.sqrt()
         ),
         Finding::Nis { per_component } => format!(
-            "NIS {} per component: the stated errors of the fixes are too large, or last; a reference decides",
+            "NIS {} per component: the stated errors of the fixes are too large; a reference decides",
             readable(per_component)
         ),
+        Finding::Correlated { lag_1, pos_sigma_factor } => lasting(lag_1, pos_sigma_factor),
         Finding::Minutes { bad, of, worst_s, nis_per_component } => format!(
             "in {bad} of {of} minutes the fixes are too far from the solution: NIS {} after {} s",
             readable(nis_per_component),
             seconds(worst_s)
+        ),
+        Finding::Ends(ends) => format!(
+            "at the ends of {} outages and gaps errors are {:.1} times as large as stated (p = {:.0e})",
+            ends.count, ends.error_over_sigma, ends.p_value
         ),
         Finding::Rejected { rejected, of } => format!("{rejected} of {of} fixes were rejected"),
         Finding::Reference(c) => format!(
@@ -245,17 +255,33 @@ fn evidence(finding: &Finding) -> String {
     }
 }
 
+/// Errors of fixes that last, and what is made of that.
+fn lasting(lag_1: f64, pos_sigma_factor: f64) -> String {
+    let made = if pos_sigma_factor > 1.0 {
+        format!("positions count as {pos_sigma_factor:.1} times as uncertain")
+    } else {
+        "the position's σ is too small".to_owned()
+    };
+    format!("the errors of the fixes last (correlation {lag_1:.2} from one to the next): {made}")
+}
+
+/// Clocks that are not the same, and the option that makes them so.
+pub(super) fn apart(clocks: &ClocksApart) -> String {
+    let [now, then] = clocks.correlation;
+    let delay = match clocks.sigma_s {
+        Some(sigma_s) => format!("{:.3} (± {sigma_s:.3})", clocks.delay_s),
+        None => format!("{:.1}", clocks.delay_s),
+    };
+    format!(
+        "the clocks are apart: --gnss-delay={delay} makes the turns agree (correlation {then:.2}, now {now:.2})"
+    )
+}
+
 /// A cause and the options that take it away.
 fn cause(cause: &Cause) -> String {
     let three = |v: DVec3| format!("{:.2},{:.2},{:.2}", v.x, v.y, v.z);
     match cause {
-        Cause::Clocks(clocks) => {
-            let [now, then] = clocks.correlation;
-            format!(
-                "the clocks are apart: --gnss-delay={:.1} makes the turns agree (correlation {then:.2}, now {now:.2})",
-                clocks.delay_s
-            )
-        }
+        Cause::Clocks(clocks) => apart(clocks),
         Cause::Displaced(found) => {
             let arm = found
                 .lever_arm_b
@@ -263,7 +289,8 @@ fn cause(cause: &Cause) -> String {
             let delay = found.delay_s.map(|[delay, sigma]| format!("--gnss-delay={delay:.3} (± {sigma:.3})"));
             let options: Vec<_> = arm.into_iter().chain(delay).collect();
             let [now, then] = found.nis;
-            format!("the fixes agree with {}: NIS {then:.2}, now {now:.2}", options.join(" "))
+            let (now, then) = (readable(now), readable(then));
+            format!("the fixes agree with {}: NIS {then}, now {now}", options.join(" "))
         }
     }
 }
@@ -306,6 +333,8 @@ const STATES: [(&str, &str); 9] = [
 ];
 /// Points of a curve that is smooth: more do not show.
 const MOST: usize = 120;
+/// Fixes of one fate in a panel: more lie on one another.
+const MOST_FIXES: usize = 1000;
 /// Points of a map along its larger half.
 const PIXELS: f64 = 400.0;
 /// Velocities of a reference that are known worse than this are not drawn: its positions jump (m/s).
@@ -426,7 +455,9 @@ const FATES: [(Use, &str, Colour); 3] = [
 /// A series for each fate of fixes.
 fn fixes(fixes: &[FixRecord], value: &dyn Fn(&FixRecord) -> f64) -> Vec<Series> {
     let of_fate = |(fate, name, colour): (Use, &str, Colour)| {
-        let points = fixes.iter().filter(|f| f.used == fate).map(|f| (f.t_s, value(f), f64::NAN));
+        let of_fate: Vec<&FixRecord> = fixes.iter().filter(|f| f.used == fate).collect();
+        let every = of_fate.len().div_ceil(MOST_FIXES).max(1);
+        let points = of_fate.into_iter().step_by(every).map(|f| (f.t_s, value(f), f64::NAN));
         let points: Vec<_> = points.collect();
         (!points.is_empty()).then(|| Series::points(name, colour, points))
     };

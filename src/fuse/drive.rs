@@ -1,19 +1,19 @@
 //! From the files of a request to a solution and its figures.
 
 use super::manifest::{Configuration, FuseManifest, Kind};
-use super::summary::{Cause, Fixes, FuseSummary, FuseVerdict, Initial};
+use super::summary::{Cause, FixCorrelation, Fixes, FuseSummary, FuseVerdict, Initial};
 use super::{FuseError, FuseRequest, filter};
 use crate::formats::fusion_files::{self, read_gnss, read_imu, read_initial};
 use crate::formats::input;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::trajectory_file::{self, load_reference};
 use crate::run::turn_on;
-use nav_sim_navigation::ekf::InitialSettings;
-use nav_sim_navigation::fusion::alignment::{Alignment, coarse};
-use nav_sim_navigation::fusion::mounting::{self, Mounted, Mounting};
+use nav_sim_navigation::ekf::{Belief, InitialSettings};
+use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
+use nav_sim_navigation::fusion::mounting::{self, Mounted, Mounting, MountingError};
 use nav_sim_navigation::fusion::{
-    Assessment, Displaced, Recorded, Settings, Solution, Start, assess, check_clocks, clocks_apart,
-    displaced, fuse, outcome,
+    Assessment, Recorded, Settings, Solution, Start, Whiteness, assess, check_clocks, clocks_apart,
+    displaced, fuse_correlated, outcome,
 };
 use nav_sim_navigation::gnss::GnssFix;
 use nav_sim_navigation::metrics::{ReductionSummary, VerdictKind};
@@ -91,10 +91,11 @@ impl Drive {
         let settings = request.settings()?;
         let inputs =
             request.files().map(|(role, path)| input::input(role, path)).collect::<Result<_, _>>()?;
-        let imu = read_imu(&request.imu)?;
+        let (unsaid, gnss_sigma_factor) = request.fix_sigma();
+        let [position, velocity] = gnss_sigma_factor;
+        let imu = read_imu(&request.imu, request.columns.as_deref())?;
         let span_s = imu.samples.first().zip(imu.samples.last()).map(|(first, last)| (first.t_s, last.t_s));
-        let (mut gnss, remarks) = read_gnss(&request.gnss, request.gnss_sigma.as_ref(), span_s)?;
-        let [position, velocity] = request.gnss_sigma_factor;
+        let (mut gnss, remarks) = read_gnss(&request.gnss, unsaid.as_ref(), span_s)?;
         for fix in &mut gnss {
             *fix = fix.with_sigmas_times(position, velocity);
             fix.t_s -= request.gnss_delay_s;
@@ -123,8 +124,10 @@ impl Drive {
             mounted: request.mounted(),
             filter: request.filter,
             initial: expected.clone(),
-            gnss_sigma: request.gnss_sigma,
-            gnss_sigma_factor: request.gnss_sigma_factor,
+            gnss_sigma: unsaid,
+            gnss_sigma_factor,
+            gnss_correlation: request.gnss_correlation,
+            heading: request.given_heading(),
             gnss_delay_s: request.gnss_delay_s,
         };
         let manifest = FuseManifest {
@@ -168,29 +171,42 @@ impl Drive {
         settings.outages = placed.windows;
         let mounting = match self.request.mounted() {
             Mounted::AsGiven => None,
-            Mounted::AsFound => Some(mounting::find(&recorded, &settings, &belief)?),
+            Mounted::AsFound => {
+                let found = mounting::find(&recorded, &settings, &belief);
+                Some(found.map_err(|e| self.not_mounted(e, &recorded, &settings, &belief))?)
+            }
         };
         if let Some(Mounting { q_s_b, sigma_b, .. }) = mounting {
             (settings.q_s_b, settings.mounting_sigma_b) = (q_s_b, sigma_b);
         }
-        let Alignment { start, doubts } = match self.initial {
-            Some(start) => Alignment { start: beside_mounting(start, &settings), doubts: Vec::new() },
-            None => coarse(&recorded, &settings, &belief)?,
+        let Alignment { start, doubts } = match (&self.initial, self.request.given_heading()) {
+            (Some(start), _) => {
+                Alignment { start: beside_mounting(start.clone(), &settings), doubts: Vec::new() }
+            }
+            (None, Some(heading)) => towards(&recorded, &settings, &belief, heading)?,
+            (None, None) => coarse(&recorded, &settings, &belief)?,
         };
         let is_early = |outage: &Outage| outage.end_s <= start.t_s;
         let early = settings.outages.iter().copied().filter(is_early).map(FuseNote::EarlyOutage);
         self.notes.extend(early.collect::<Vec<_>>());
         settings.outages.retain(|outage| !is_early(outage));
-        let solution = fuse(&recorded, &belief, &start, &settings, self.reference.as_ref())?;
-        if self.reference.is_some() && solution.rows.iter().all(|row| row.error.is_none()) {
+        let asked = (self.reference.as_ref(), self.request.gnss_correlation);
+        let weighed = fuse_correlated(&recorded, &belief, &start, &settings, asked)?;
+        if self.reference.is_some() && weighed.solution.rows.iter().all(|row| row.error.is_none()) {
             return Err(FuseError::NothingInCommon);
         }
-        self.notes.extend(doubt_heading(&solution, &settings.outages).map(FuseNote::Heading));
-        let outcome = outcome(&solution, &settings.outages);
-        let Assessment { verdict: kind, findings } = assess(&solution, &outcome, &doubts);
-        let scene = || displaced(&recorded, &belief, &start, &settings);
-        let explained = (kind >= VerdictKind::Doubtful).then(|| cause(&recorded, scene)).flatten();
+        self.notes.extend(doubt_heading(&weighed.solution, &settings.outages).map(FuseNote::Heading));
+        let outcome = outcome(&weighed.solution, &settings.outages);
+        let Assessment { verdict, findings } = assess(&weighed, &outcome, &doubts);
+        let is_correlated = weighed.whiteness.as_ref().is_some_and(Whiteness::is_correlated);
+        let is_unexplained =
+            verdict >= VerdictKind::Doubtful || verdict == VerdictKind::Undecided && is_correlated;
+        let scene =
+            Scene { belief: &belief, start: &start, settings: &settings, is_given: self.initial.is_some() };
+        let explained =
+            is_unexplained.then(|| scene.cause(&Recorded { gnss: &weighed.gnss, ..recorded })).flatten();
         let cause = explained.map(|cause| cause.after(self.request.gnss_delay_s));
+        let kind = if cause.is_some() { verdict.max(VerdictKind::Doubtful) } else { verdict };
         let against = |(verdict, finding)| (verdict > VerdictKind::Consistent).then_some(finding);
         let evidence = findings.into_iter().filter_map(against).collect();
         let constants = belief.groups.iter().flatten().filter(|g| g.is_constant()).count();
@@ -199,22 +215,60 @@ impl Drive {
             schema_version: 1,
             method: "fusion",
             verdict: FuseVerdict { kind, evidence, cause },
-            imu_samples: solution.samples,
+            imu_samples: weighed.solution.samples,
             imu_rate_hz: self.imu_rate_hz,
             start_s: start.t_s,
-            end_s: solution.rows.last().map_or(start.t_s, |row| row.t_s),
+            end_s: weighed.solution.rows.last().map_or(start.t_s, |row| row.t_s),
             filter_states: belief.states,
             turn_on_states: 3 * constants,
             initial: Initial::new(&start, self.request.initial_file().map(|path| path.as_path())),
             mounting: mounting.as_ref().map(Into::into),
             fixes: Fixes { used, withheld, rejected },
             nis_per_component: outcome.nis_per_component,
+            gnss_correlation: FixCorrelation::of(&weighed),
             outages: outcome.outages,
+            ends: outcome.ends,
             reference: outcome.reference,
             smoothed: outcome.smoothed,
         };
-        Ok(FuseAnswer { solution, summary, reduction, notes: self.notes, inputs: self.manifest.inputs })
+        Ok(FuseAnswer {
+            solution: weighed.solution,
+            summary,
+            reduction,
+            notes: self.notes,
+            inputs: self.manifest.inputs,
+        })
     }
+}
+
+impl Drive {
+    /// Why the mounting is not found: the clocks, where they are apart.
+    fn not_mounted(
+        &self,
+        e: MountingError,
+        recorded: &Recorded<'_>,
+        settings: &Settings,
+        belief: &Belief,
+    ) -> FuseError {
+        let Some(clocks) = clocks_apart(recorded) else { return e.into() };
+        let gnss = earlier(recorded.gnss, clocks.delay_s);
+        let there = Recorded { gnss: &gnss, ..*recorded };
+        let rest = || {
+            let found = mounting::find(&there, settings, belief).ok()?;
+            let settings =
+                Settings { q_s_b: found.q_s_b, mounting_sigma_b: found.sigma_b, ..settings.clone() };
+            let start = coarse(&there, &settings, belief).ok()?.start;
+            displaced(&there, belief, &start, &settings)?.delay_s
+        };
+        let mut clocks = rest().map_or(clocks, |[delay_s, sigma_s]| clocks.refined(delay_s, sigma_s));
+        clocks.delay_s += self.request.gnss_delay_s;
+        FuseError::Apart(e, clocks)
+    }
+}
+
+/// Fixes so much earlier (s).
+fn earlier(gnss: &[GnssFix], seconds: f64) -> Vec<GnssFix> {
+    gnss.iter().map(|fix| GnssFix { t_s: fix.t_s - seconds, ..*fix }).collect()
 }
 
 impl From<fusion_files::Remark> for FuseNote {
@@ -226,9 +280,35 @@ impl From<fusion_files::Remark> for FuseNote {
     }
 }
 
-/// Cause of large innovations: the clocks, else the antenna or a small delay.
-fn cause(recorded: &Recorded<'_>, displaced: impl FnOnce() -> Option<Displaced>) -> Option<Cause> {
-    clocks_apart(recorded).map(Cause::Clocks).or_else(|| displaced().map(Cause::Displaced))
+/// What a cause is looked for with.
+struct Scene<'a> {
+    belief: &'a Belief,
+    start: &'a Start,
+    settings: &'a Settings,
+    /// Whether the start was given.
+    is_given: bool,
+}
+
+impl Scene<'_> {
+    /// Cause of innovations that are large or last: the clocks, else the antenna or a small delay.
+    fn cause(&self, recorded: &Recorded<'_>) -> Option<Cause> {
+        let Some(clocks) = clocks_apart(recorded) else {
+            return displaced(recorded, self.belief, self.start, self.settings).map(Cause::Displaced);
+        };
+        // turns of the course tell it to tenths of a second, the innovations tell the rest
+        let gnss = earlier(recorded.gnss, clocks.delay_s);
+        let rest = self.rest(&Recorded { gnss: &gnss, ..*recorded });
+        Some(Cause::Clocks(rest.map_or(clocks, |[delay_s, sigma_s]| clocks.refined(delay_s, sigma_s))))
+    }
+
+    /// Delay that is left, and its standard deviation (s).
+    fn rest(&self, recorded: &Recorded<'_>) -> Option<[f64; 2]> {
+        let start = match self.is_given {
+            true => self.start.clone(),
+            false => coarse(recorded, self.settings, self.belief).ok()?.start,
+        };
+        displaced(recorded, self.belief, &start, self.settings)?.delay_s
+    }
 }
 
 impl Cause {

@@ -2,9 +2,9 @@
 
 use crate::formats::FileError;
 use nav_sim_navigation::ekf::BeliefError;
-use nav_sim_navigation::fusion::FusionError;
 use nav_sim_navigation::fusion::alignment::AlignmentError;
 use nav_sim_navigation::fusion::mounting::MountingError;
+use nav_sim_navigation::fusion::{ClocksApart, FusionError};
 use nav_sim_navigation::sensors::outage::OutageError;
 use nav_sim_signal::noise::{ParameterError, continuous};
 
@@ -39,6 +39,9 @@ pub enum FuseError {
     /// The drive does not show how the IMU is mounted.
     #[error(transparent)]
     Mounting(#[from] MountingError),
+    /// The clocks are apart, and so the drive does not show how the IMU is mounted.
+    #[error("{0}")]
+    Apart(MountingError, ClocksApart),
     /// The reference is of another time.
     #[error("the reference and the solution have no time in common")]
     NothingInCommon,
@@ -52,6 +55,7 @@ impl FuseError {
             Self::Fusion(e @ FusionError::Clocks { .. }) => {
                 return e.delay_s().map(|s| format!("--gnss-delay {s}"));
             }
+            Self::Apart(_, clocks) => return Some(super::document::apart(clocks)),
             Self::Outage(e) => return e.hint().map(str::to_owned),
             Self::Fusion(FusionError::Start { .. }) => {
                 "give t_s of the initial state on the clock of the IMU"
@@ -63,7 +67,7 @@ impl FuseError {
                 "fewer rows a second (--rate-hz), or a filter of fewer states"
             }
             Self::Fusion(FusionError::Diverged { .. }) => "check axes, units and the initial state",
-            Self::Alignment(_) => "give the start with --initial FILE",
+            Self::Alignment(_) => "give --heading DEG:SD, or the whole start with --initial FILE",
             Self::Mounting(_) => {
                 "give --mounting ROLL,PITCH,YAW, or minutes of driving with braking and turns, and velocities in the fixes"
             }

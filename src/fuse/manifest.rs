@@ -2,8 +2,8 @@
 
 use crate::report::{Input, contents};
 use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
-use nav_sim_navigation::fusion::Settings;
 use nav_sim_navigation::fusion::mounting::Mounted;
+use nav_sim_navigation::fusion::{Correlation, Heading, Settings};
 use nav_sim_navigation::gnss::FixSigma;
 use serde::{Deserialize, Serialize};
 
@@ -48,6 +48,12 @@ pub(crate) struct Configuration {
     pub(crate) gnss_sigma: Option<FixSigma>,
     /// Factors of the standard deviations of position and velocity.
     pub(crate) gnss_sigma_factor: [f64; 2],
+    /// How long errors of positions last.
+    #[serde(default)]
+    pub(crate) gnss_correlation: Correlation,
+    /// Heading at the start, where it was given.
+    #[serde(default)]
+    pub(crate) heading: Option<Heading>,
     /// How much earlier than its time a fix is taken to be (s).
     pub(crate) gnss_delay_s: f64,
 }

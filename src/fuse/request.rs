@@ -5,8 +5,8 @@ use glam::{DMat3, DQuat, DVec3};
 use nav_sim_navigation::earth::GravityModel;
 use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
 use nav_sim_navigation::frames::RollPitchYaw;
-use nav_sim_navigation::fusion::Settings;
 use nav_sim_navigation::fusion::mounting::Mounted;
+use nav_sim_navigation::fusion::{Correlation, Heading, Settings};
 use nav_sim_navigation::gnss::FixSigma;
 use nav_sim_navigation::sensors::gnss::MAX_LEVER_ARM_M;
 use nav_sim_navigation::sensors::outage::Outage;
@@ -36,13 +36,14 @@ pub struct FuseRequest {
     #[arg(long = "lever-arm", value_name = "X,Y,Z", value_parser = numbers::<3>, default_value = "0,0,0",
         hide_default_value = true, allow_hyphen_values = true)]
     pub lever_arm_m: [f64; 3],
+    /// Heading at the start (degrees) and its standard deviation, where the course does not show it
+    #[arg(long, value_name = "DEG:SD", allow_hyphen_values = true)]
+    pub heading: Option<HeadingChoice>,
     /// Attitude of the IMU in the vehicle (degrees) if its axes are not front, right, down; after a colon the standard
-    /// deviations about the vehicle's front, right, down; auto: estimated from the drive of a road vehicle
-    #[arg(long, value_name = "ROLL,PITCH,YAW[:SD,SD,SD]|auto", allow_hyphen_values = true)]
+    /// deviations about the vehicle's front, right, down (1 where not given); flu or rfu: axes of that name; auto:
+    /// estimated from the drive of a road vehicle
+    #[arg(long, value_name = "ROLL,PITCH,YAW[:SD,SD,SD]|flu|rfu|auto", allow_hyphen_values = true)]
     pub mounting: Option<MountingChoice>,
-    /// Axes as the logger has them; --mounting applies after this
-    #[arg(long, value_name = "AXES", value_enum, default_value_t)]
-    pub axes: LoggerAxes,
     /// Reference trajectory to compare with; stretches where it jumps are left out
     #[arg(long, value_name = "TRAJECTORY")]
     pub reference: Option<PathBuf>,
@@ -58,15 +59,18 @@ pub struct FuseRequest {
     #[arg(long, value_name = "ACCEL,GYRO", value_parser = at_least_zero)]
     pub turn_on_bias: Option<[f64; 2]>,
     /// Standard deviations where the GNSS file states none: of the position in m, and after a colon of the velocity in
-    /// m/s; each one number or north,east,down
-    #[arg(long, value_name = "POS[:VEL]", value_parser = fix_sigma)]
-    pub gnss_sigma: Option<FixSigma>,
+    /// m/s; each one number or north,east,down. x3 or x3:2: times what it states
+    #[arg(long, value_name = "POS[:VEL]|xPOS[:VEL]", value_parser = gnss_sigma)]
+    pub gnss_sigma: Option<GnssSigma>,
     /// Time by which receiver or logger stamp the fixes late (s)
     #[arg(long = "gnss-delay", value_name = "S", value_parser = number, default_value = "0", allow_hyphen_values = true)]
     pub gnss_delay_s: f64,
-    /// Multiply the receiver's standard deviations, of position and of velocity
-    #[arg(long, value_name = "POS,VEL", value_parser = numbers::<2>, default_value = "1,1", hide_default_value = true)]
-    pub gnss_sigma_factor: [f64; 2],
+    /// How long errors of positions last: as the innovations show, no longer than a fix, or so many seconds
+    #[arg(long, value_name = "auto|none|SECONDS", value_parser = correlation, default_value = "auto")]
+    pub gnss_correlation: Correlation,
+    /// Names of the IMU's columns, for a file without a header or instead of it
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub columns: Option<Vec<String>>,
     /// Rows of the solution per second
     #[arg(long, value_name = "HZ", value_parser = number, default_value = "10")]
     pub rate_hz: f64,
@@ -83,15 +87,16 @@ impl Default for FuseRequest {
             model: PathBuf::new(),
             initial: "auto".into(),
             lever_arm_m: [0.0; 3],
+            heading: None,
             mounting: None,
-            axes: LoggerAxes::Frd,
             reference: None,
             outages: Vec::new(),
             filter: FilterStates::default(),
             turn_on_bias: None,
             gnss_sigma: None,
             gnss_delay_s: 0.0,
-            gnss_sigma_factor: [1.0; 2],
+            gnss_correlation: Correlation::Auto,
+            columns: None,
             rate_hz: 10.0,
             smooth: false,
         }
@@ -121,6 +126,20 @@ impl FuseRequest {
         if self.mounting == Some(MountingChoice::Auto) { Mounted::AsFound } else { Mounted::AsGiven }
     }
 
+    /// Standard deviations where the file states none, and factors of those that it states.
+    pub(super) fn fix_sigma(&self) -> (Option<FixSigma>, [f64; 2]) {
+        match self.gnss_sigma {
+            Some(GnssSigma::Unsaid(sigma)) => (Some(sigma), [1.0; 2]),
+            Some(GnssSigma::Times(factors)) => (None, factors),
+            None => (None, [1.0; 2]),
+        }
+    }
+
+    /// Heading at the start, where it is given.
+    pub(super) fn given_heading(&self) -> Option<Heading> {
+        self.heading.map(|given| Heading { yaw: given.deg * DEG, sigma: given.sigma_deg * DEG })
+    }
+
     /// The filter's expectation of constant biases, over that of a file.
     pub(super) fn expected(&self, of_file: InitialSettings) -> InitialSettings {
         let Some([accel, gyro]) = self.turn_on_bias else { return of_file };
@@ -140,18 +159,19 @@ impl FuseRequest {
         if !(self.rate_hz > 0.0 && self.rate_hz <= MAX_RATE_HZ) {
             return refuse(format!("--rate-hz {}: not a rate of 0 to {MAX_RATE_HZ} Hz", self.rate_hz));
         }
-        if !self.gnss_sigma_factor.iter().all(|factor| *factor > 0.0) {
-            return refuse("--gnss-sigma-factor: not two numbers > 0".to_owned());
+        if self.heading.is_some() && self.initial_file().is_some() {
+            return refuse("--heading beside --initial FILE, which states it".to_owned());
         }
-        let (frd, mounting_sigma_b) = match self.mounting {
+        let (q_s_b, mounting_sigma_b) = match self.mounting {
             Some(MountingChoice::Angles { deg: [roll, pitch, yaw], sigma_deg }) => (
                 RollPitchYaw { roll: roll * DEG, pitch: pitch * DEG, yaw: yaw * DEG }.to_quat(),
                 DVec3::from(sigma_deg) * DEG,
             ),
+            Some(MountingChoice::Axes(axes)) => (axes.to_frd(), DVec3::ZERO),
             _ => (DQuat::IDENTITY, DVec3::ZERO),
         };
         Ok(Settings {
-            q_s_b: frd * self.axes.to_frd(),
+            q_s_b,
             mounting_sigma_b,
             lever_arm_b: self.lever_arm_m.into(),
             gravity: GravityModel::default(),
@@ -163,28 +183,22 @@ impl FuseRequest {
     }
 }
 
-/// Axes as loggers name them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum, Serialize, Deserialize)]
+/// Axes as loggers name them, where they are not front, right, down.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LoggerAxes {
-    /// Front, right, down
-    #[default]
-    Frd,
-    /// Front, left, up
+    /// Front, left, up.
     Flu,
-    /// Right, front, up: east, north, up of an IMU that points north
+    /// Right, front, up: east, north, up of an IMU that points north.
     Rfu,
-    /// The same as rfu
-    Enu,
 }
 
 impl LoggerAxes {
     /// Takes a vector in the logger's axes to front, right, down.
     fn to_frd(self) -> DQuat {
         let columns = match self {
-            Self::Frd => return DQuat::IDENTITY,
             Self::Flu => [DVec3::X, DVec3::NEG_Y, DVec3::NEG_Z],
-            Self::Rfu | Self::Enu => [DVec3::Y, DVec3::X, DVec3::NEG_Z],
+            Self::Rfu => [DVec3::Y, DVec3::X, DVec3::NEG_Z],
         };
         DQuat::from_mat3(&DMat3::from_cols(columns[0], columns[1], columns[2]))
     }
@@ -196,6 +210,8 @@ impl LoggerAxes {
 pub enum MountingChoice {
     /// Found from the drive.
     Auto,
+    /// Axes that have a name.
+    Axes(LoggerAxes),
     /// Given.
     Angles {
         /// Roll, pitch, yaw (degrees).
@@ -205,27 +221,69 @@ pub enum MountingChoice {
     },
 }
 
-/// Largest standard deviation of a mounting that small angles describe (degrees).
-const MAX_MOUNTING_SIGMA_DEG: f64 = 30.0;
+/// Largest standard deviation of an attitude that small angles describe (degrees).
+const MAX_SIGMA_DEG: f64 = 30.0;
 
 impl FromStr for MountingChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if text == "auto" {
-            return Ok(Self::Auto);
+        match text {
+            "auto" => return Ok(Self::Auto),
+            "flu" => return Ok(Self::Axes(LoggerAxes::Flu)),
+            "rfu" | "enu" => return Ok(Self::Axes(LoggerAxes::Rfu)),
+            _ => {}
         }
-        let (angles, sigma) = text.split_once(':').unwrap_or((text, "0,0,0"));
+        // nobody mounts by less, and what a drive shows is known no better
+        let (angles, sigma) = text.split_once(':').unwrap_or((text, "1,1,1"));
         match (list(angles), list(sigma)) {
             (Some(deg), Some(sigma_deg))
-                if sigma_deg.iter().all(|s: &f64| (0.0..=MAX_MOUNTING_SIGMA_DEG).contains(s)) =>
+                if sigma_deg.iter().all(|s: &f64| (0.0..=MAX_SIGMA_DEG).contains(s)) =>
             {
                 Ok(Self::Angles { deg, sigma_deg })
             }
-            _ => Err("expected degrees, such as -9.5,-60.8,-166.8 or -9.5,-60.8,-166.8:1.5,0.5,0.8, or auto"
-                .into()),
+            _ => Err(
+                "expected degrees, such as -9.5,-60.8,-166.8 or -9.5,-60.8,-166.8:1.5,0.5,0.8, or flu, rfu, auto"
+                    .into(),
+            ),
         }
     }
+}
+
+/// Heading of the vehicle at the start.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HeadingChoice {
+    /// From north, clockwise (degrees).
+    pub deg: f64,
+    /// Standard deviation (degrees).
+    pub sigma_deg: f64,
+}
+
+impl FromStr for HeadingChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts =
+            text.split_once(':').and_then(|(deg, sigma)| Some((number(deg).ok()?, number(sigma).ok()?)));
+        match parts {
+            Some((deg, sigma_deg)) if sigma_deg > 0.0 && sigma_deg <= MAX_SIGMA_DEG && deg.abs() <= 360.0 => {
+                Ok(Self { deg, sigma_deg })
+            }
+            _ => Err(format!(
+                "expected degrees and a standard deviation of up to {MAX_SIGMA_DEG}, such as 90:5"
+            )),
+        }
+    }
+}
+
+/// Standard deviations of fixes, as a user gives them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GnssSigma {
+    /// Where the file states none.
+    Unsaid(FixSigma),
+    /// Times what the file states, of position and of velocity.
+    Times([f64; 2]),
 }
 
 /// Finite numbers between commas.
@@ -245,6 +303,27 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
 fn at_least_zero(text: &str) -> Result<[f64; 2], &'static str> {
     let pair = list(text).filter(|pair| pair.iter().all(|x| *x >= 0.0));
     pair.ok_or("expected two numbers ≥ 0, such as 0.1,0.002")
+}
+
+fn correlation(text: &str) -> Result<Correlation, &'static str> {
+    match text {
+        "auto" => Ok(Correlation::Auto),
+        "none" => Ok(Correlation::None),
+        _ => number(text)
+            .ok()
+            .filter(|seconds| *seconds > 0.0)
+            .map(Correlation::Seconds)
+            .ok_or("expected auto, none, or a correlation time in seconds"),
+    }
+}
+
+fn gnss_sigma(text: &str) -> Result<GnssSigma, &'static str> {
+    let Some(factors) = text.strip_prefix('x') else { return fix_sigma(text).map(GnssSigma::Unsaid) };
+    let (position, velocity) = factors.split_once(':').unwrap_or((factors, factors));
+    let factor = |text: &str| number(text).ok().filter(|factor| *factor > 0.0);
+    let both = factor(position).zip(factor(velocity));
+    both.map(|(position, velocity)| GnssSigma::Times([position, velocity]))
+        .ok_or("expected factors > 0: x3 or x3:2")
 }
 
 /// `POS` or `N,E,D` in metres, then `:VEL` or `:N,E,D` in m/s.
@@ -267,7 +346,7 @@ mod tests {
     #[test]
     fn axes_of_loggers_are_rotations_to_front_right_down() {
         let to = |axes: LoggerAxes, v: DVec3| (axes.to_frd() * v).round();
-        for axes in [LoggerAxes::Flu, LoggerAxes::Rfu, LoggerAxes::Enu] {
+        for axes in [LoggerAxes::Flu, LoggerAxes::Rfu] {
             assert_eq!(to(axes, DVec3::Z), DVec3::NEG_Z, "{axes:?}");
         }
         assert_eq!((to(LoggerAxes::Flu, DVec3::X), to(LoggerAxes::Flu, DVec3::Y)), (DVec3::X, DVec3::NEG_Y));
@@ -288,12 +367,11 @@ mod tests {
 
     #[test]
     fn a_request_is_a_file_too() {
-        let text = r#"{ "imu": "a", "gnss": "b", "model": "c", "mounting": "auto", "filter": "full", "axes": "flu" }"#;
+        let text = r#"{ "imu": "a", "gnss": "b", "model": "c", "mounting": "auto", "filter": "full" }"#;
         let request: FuseRequest = serde_json::from_str(text).unwrap();
         let expected = FuseRequest {
             mounting: Some(MountingChoice::Auto),
             filter: FilterStates::Full,
-            axes: LoggerAxes::Flu,
             ..FuseRequest::new("a", "b", "c")
         };
         assert_eq!(request, expected);

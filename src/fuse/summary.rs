@@ -1,10 +1,12 @@
 //! Verdict and figures of a fusion: `summary.json`.
 
+use nav_sim_document::seconds;
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
 use nav_sim_navigation::fusion::mounting::Mounting;
 use nav_sim_navigation::fusion::{
-    ClocksApart, Displaced, Finding, Found, FromReference, Levelling, OutageDrift, SmoothedOutcome, Start,
+    ClocksApart, Displaced, Ends, Finding, Found, FromReference, Levelling, OutageDrift, SmoothedOutcome,
+    Start, Weighed, outcome,
 };
 use nav_sim_navigation::metrics::VerdictKind;
 use nav_sim_signal::units::DEG;
@@ -41,14 +43,44 @@ pub struct FuseSummary {
     pub(super) fixes: Fixes,
     /// Mean NIS of the fixes used, divided by their number of components: 1 if right.
     pub nis_per_component: f64,
+    /// Correlation of the innovations, and what the filter makes of it; none where fixes are few.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gnss_correlation: Option<FixCorrelation>,
     /// Errors at the ends of outages.
     pub outages: Vec<OutageDrift>,
+    /// The ends of all outages and gaps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ends: Option<Ends>,
     /// Differences from the reference.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reference: Option<FromReference>,
     /// Figures of the smoothed solution.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub smoothed: Option<SmoothedOutcome>,
+}
+
+/// Errors of fixes that last.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FixCorrelation {
+    /// Autocorrelation of the innovations of position from one fix to the next, standard deviations as stated.
+    pub lag_1: f64,
+    /// What white innovations exceed once in a thousand recordings, or what is worth a word.
+    pub limit: f64,
+    /// Whether they are correlated.
+    pub is_correlated: bool,
+    /// How many times the stated standard deviation of position the filter believes.
+    pub pos_sigma_factor: f64,
+    /// Mean NIS per component, standard deviations as stated.
+    pub nis_as_stated: f64,
+}
+
+impl FixCorrelation {
+    pub(super) fn of(weighed: &Weighed) -> Option<Self> {
+        let (white, nis_as_stated) = (weighed.whiteness?, outcome(weighed.judged(), &[]).nis_per_component);
+        let (lag_1, limit) = (white.lag_1, white.limit);
+        let (is_correlated, pos_sigma_factor) = (white.is_correlated(), weighed.pos_sigma_factor);
+        Some(Self { lag_1, limit, is_correlated, pos_sigma_factor, nis_as_stated })
+    }
 }
 
 /// Verdict on a solution.
@@ -125,11 +157,14 @@ fn how(start: &Start, found: &Found) -> Vec<String> {
     let (speed, sigma) = (start.state.v_n.truncate().length(), found.course_sigma_deg);
     let reversing = if found.is_reversing { ", reversing" } else { "" };
     let t_s = start.t_s;
+    let source = if found.is_given {
+        "as given".to_owned()
+    } else {
+        format!("from the course of the fix at {} s ({speed:.1} m/s{reversing})", seconds(t_s))
+    };
     let mut how = vec![
         format!("roll {roll:.2}°, pitch {pitch:.2}° ± {tilt_sigma:.2}° {level}"),
-        format!(
-            "heading {yaw:.1}° ± {sigma:.1}° from the course of the fix at {t_s} s ({speed:.1} m/s{reversing})"
-        ),
+        format!("heading {yaw:.1}° ± {sigma:.1}° {source}"),
         "biases start at zero".to_owned(),
     ];
     how.extend(found.moved_deg.map(|moved| {
@@ -145,8 +180,12 @@ impl From<&Mounting> for MountingRow {
         // hundredths are what is printed; + 0 takes the sign from -0
         let [roll_deg, pitch_deg, yaw_deg] = found.angles_deg().map(|a| (a * 100.0).round() / 100.0 + 0.0);
         let km = found.way_m / 1000.0;
+        let widened = match found.sigma_factor {
+            1.0 => String::new(),
+            factor => format!("; the fixes taken as {factor:.1} times as uncertain as they state"),
+        };
         let how = format!(
-            "from gravity, accelerations and turns, and the attitude of the IMU beside the track over {km:.1} km; the roads taken as level across on average, the vehicle as going where it looks"
+            "from gravity, accelerations and turns, and the attitude of the IMU beside the track over {km:.1} km; the roads taken as level across on average, the vehicle as going where it looks{widened}"
         );
         Self { roll_deg, pitch_deg, yaw_deg, sigma_deg: found.sigma_deg(), how }
     }

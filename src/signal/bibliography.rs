@@ -41,6 +41,8 @@ sources! {
     Sarkka13;
     /// L. Ljung: *System Identification: Theory for the User*, 2nd ed., Prentice Hall, 1999 (prediction-error method).
     Ljung99;
+    /// R. K. Mehra: *On the identification of variances and adaptive Kalman filtering*, IEEE Trans. Automatic Control 15, 1970.
+    Mehra70;
     /// NIMA TR8350.2: *Department of Defense World Geodetic System 1984*, 3rd ed., 2000.
     Wgs84;
     /// P. S. Maybeck: *Stochastic Models, Estimation, and Control*, vol. 1, Academic Press, 1979.

@@ -70,7 +70,7 @@ fn a_fusion_is_known_by_its_configuration_and_the_contents_of_its_files() {
     done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o log");
     fs::copy(place.path().join("log/imu.csv"), place.path().join("copy.csv")).unwrap();
     let start = "--initial log/initial.toml";
-    let given = "--outage 8:11 --gnss-sigma-factor 2,1 --mounting 0,0,1:1,1,1";
+    let given = "--outage 8:11 --gnss-sigma x2:1 --mounting 0,0,1:1,1,1";
     let fuse = format!("fuse log/imu.csv log/gnss.csv imu.toml {start}");
     let first = plain(place.path(), &format!("{fuse} {given} -o out"));
     assert_eq!(first.code, 0, "{}", first.stderr);
@@ -80,15 +80,14 @@ fn a_fusion_is_known_by_its_configuration_and_the_contents_of_its_files() {
     assert_eq!(configuration["settings"]["outages"][0]["end_s"], 11.0);
     assert_eq!(configuration["gnss_sigma_factor"], serde_json::json!([2.0, 1.0]));
     let same = [
-        "fuse copy.csv log/gnss.csv imu.toml --mounting=0,0,1.0:1,1,1 --gnss-sigma-factor 2.0,1.0",
-        " --outage 8.0:11 --lever-arm 0,0,0 --axes frd --filter 15 --rate-hz 10 -j 1 -q --out=out ",
+        "fuse copy.csv log/gnss.csv imu.toml --mounting=0,0,1.0:1,1,1 --gnss-sigma x2.0:1.0",
+        " --outage 8.0:11 --lever-arm 0,0,0 --filter 15 --rate-hz 10 -j 1 -q --out=out ",
         start,
     ]
     .concat();
     let again = plain(place.path(), &same);
     assert_eq!(again.code, 0, "{}", again.stderr);
-    for other in ["--smooth", "--lever-arm 0,0,1", "--gnss-sigma 5", "--turn-on-bias 0.02,1e-4", "--axes flu"]
-    {
+    for other in ["--smooth", "--lever-arm 0,0,1", "--gnss-correlation none", "--turn-on-bias 0.02,1e-4"] {
         refused(
             &plain(place.path(), &format!("{fuse} {given} {other} -o out")),
             "holds the result of another",

@@ -267,7 +267,7 @@ fn bad_imu_data_and_flags_are_refused() {
         "rec/initial.toml",
         |t| t.replace("t_s = 0.0", "t_s = 500.0"),
         "--initial rec/initial.toml",
-        &["the start at 500 s is not within the IMU's 0 to 100 s"],
+        &["the start at 500.00 s is not within the IMU's 0 to 100 s"],
     );
 }
 
@@ -281,7 +281,7 @@ fn standing_still_needs_an_initial_state() {
     let ran = nav_sim(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml -o out");
     assert_eq!(ran.code, 2);
     assert!(
-        ran.stderr.contains("no fix moves at 3.0 m/s") && ran.stderr.contains("--initial FILE"),
+        ran.stderr.contains("no fix moves at 0.5 m/s") && ran.stderr.contains("--initial FILE"),
         "{}",
         ran.stderr
     );

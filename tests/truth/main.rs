@@ -18,6 +18,7 @@ mod calibration_truth;
 mod case_study;
 mod choose;
 mod consistency;
+mod correlated;
 mod covariance_truth;
 mod displaced;
 mod estimator_bias;

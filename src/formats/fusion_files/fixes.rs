@@ -204,7 +204,7 @@ fn of_text(
     match of_another_kind(&shown, &text) {
         Some(error) => Err(error),
         None if is_nmea(&text) => nmea::fixes(&shown, &text, unsaid, clock_s),
-        None => of_table(path, text, unsaid),
+        None => of_table(path, text, (unsaid, clock_s)),
     }
 }
 
@@ -212,11 +212,15 @@ fn of_text(
 pub(super) type Fixes = (Vec<(u64, GnssFix)>, Vec<Remark>);
 
 /// The fixes of a table, of KF-GINS or of RTKLIB.
-fn of_table(path: &Path, mut text: String, unsaid: Option<&FixSigma>) -> Result<Fixes, Error> {
+fn of_table(
+    path: &Path,
+    mut text: String,
+    (unsaid, clock_s): (Option<&FixSigma>, Option<(f64, f64)>),
+) -> Result<Fixes, Error> {
     let mut remarks = Vec::new();
     let is_rtklib = is_rtklib(&text);
     if is_rtklib {
-        let (table, remark) = rtklib::rows(&path.display().to_string(), &text)?;
+        let (table, remark) = rtklib::rows(&path.display().to_string(), &text, clock_s)?;
         (text, remarks) = (table, vec![Remark::note(remark)]);
     }
     let bare = bare_columns(&text);

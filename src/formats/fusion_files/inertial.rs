@@ -46,21 +46,22 @@ struct Columns {
 
 /// Reads a recording: a table whose headers are those of static recordings (rates, or increments over the
 /// interval that ends at the time given), or the text of KF-GINS: time, three angle increments (rad), three
-/// velocity increments (m/s), and perhaps an odometer's speed, which is left.
+/// velocity increments (m/s), and perhaps an odometer's speed, which is left. `names` are those of the columns of a file
+/// without a header.
 ///
 /// # Errors
 /// Whatever is wrong with it, with its line.
-pub(crate) fn read_imu(path: &Path) -> Result<ImuFile, Error> {
+pub(crate) fn read_imu(path: &Path, names: Option<&[String]>) -> Result<ImuFile, Error> {
     let packed =
         path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) || logs::kind_of(path).is_some();
-    let text = if packed { None } else { Some(text(path)?) };
+    let text = if packed || names.is_some() { None } else { Some(text(path)?) };
     let columns = match text.as_ref().and_then(|text| Some((text, bare_columns(text)?))) {
         Some((text, 7..=8)) => kf_gins(path, text)?,
         Some((_, columns)) => {
             let message = format!("{columns} columns without a header");
             return Err(Error::contents(path.display().to_string(), Place::Within, message).advice(KF_GINS));
         }
-        None => headed(path)?,
+        None => headed(path, names)?,
     };
     columns.increments()
 }
@@ -94,8 +95,9 @@ fn kf_gins(path: &Path, text: &str) -> Result<Columns, Error> {
     })
 }
 
-fn headed(path: &Path) -> Result<Columns, Error> {
-    let options = ReadOptions { hold_bytes: usize::MAX, ..ReadOptions::default() };
+fn headed(path: &Path, names: Option<&[String]>) -> Result<Columns, Error> {
+    let columns = names.map(<[String]>::to_vec);
+    let options = ReadOptions { hold_bytes: usize::MAX, columns, ..ReadOptions::default() };
     let mut raw = recordings::load(path, &options)?;
     let shown = raw.path.clone();
     let from_gravity = gravity_factor(&raw)?;

@@ -12,6 +12,7 @@ pub(crate) use fixes::read_gnss;
 pub(crate) use inertial::read_imu;
 pub(crate) use initial::{initial_schema, read_initial};
 pub(in crate::formats) use nmea::is_nmea;
+pub(in crate::formats) use rtklib::is_rtklib;
 
 use crate::formats::trajectory_file::table::{self, Numbers, Table};
 use crate::formats::{FileError, Kind};

@@ -1,6 +1,7 @@
 //! Worth of a solution: by its own innovations, and by a reference where there is one.
 
-use super::{FixRecord, FromReference, Outcome, Solution, Use};
+use super::outcome::nis_per_component;
+use super::{Ends, FixRecord, FromReference, Outcome, Solution, Use, Weighed};
 use crate::metrics::VerdictKind;
 use crate::simulation::REPORTED_NAMES;
 use serde::Serialize;
@@ -9,8 +10,7 @@ use serde::Serialize;
 /// Receivers state their standard deviations to a factor like that; right solutions of real drives have a NIS below
 /// 1.5, most of them far below 1.
 const NIS_LIMITS: (f64, f64) = (2.0, 4.0);
-/// NIS per component below which the fixes do not tell: their standard deviations are too large, or their errors last,
-/// and then the position's are too small.
+/// NIS per component below which the fixes do not tell: their standard deviations are too large.
 const NIS_LOW: f64 = 0.5;
 /// Components of which the mean NIS of a right filter stays below the first limit.
 const FEWEST: usize = 50;
@@ -19,6 +19,8 @@ const STRETCH_S: f64 = 60.0;
 const BAD_STRETCHES: f64 = 0.1;
 /// Share of rejected fixes that is doubtful, and that is too much.
 const REJECTED: (f64, f64) = (0.1, 0.5);
+/// How improbable errors at the ends of outages are doubtful, and how many times the stated ones, then, are too much.
+const ENDS: (f64, f64) = (1e-3, 2.0);
 /// Root mean square of error over standard deviation, of all states together, that is not right: below and above.
 /// A drive in which no error ever changes shows nine of them once: chi-square is below 9/4 once in 76 such drives, above
 /// 81/4 once in 61.
@@ -46,6 +48,13 @@ pub enum Finding {
         /// Pitch (degrees).
         pitch_deg: f64,
     },
+    /// Errors of the fixes that last.
+    Correlated {
+        /// Autocorrelation of the innovations of position from one fix to the next.
+        lag_1: f64,
+        /// How many times the stated standard deviation of position the filter believes.
+        pos_sigma_factor: f64,
+    },
     /// Mean NIS of the fixes used.
     Nis {
         /// Divided by the number of components: 1 if right.
@@ -69,6 +78,8 @@ pub enum Finding {
         /// Those used and rejected.
         of: usize,
     },
+    /// Errors at the ends of outages and gaps.
+    Ends(Ends),
     /// Errors against the reference.
     Reference(Confidence),
 }
@@ -105,7 +116,7 @@ impl FromReference {
         let largest = states().max_by(by_size).unwrap_or_default();
         let (verdict, worst) = if all > ALL_STATES.1 || largest.1 > ONE_STATE {
             (VerdictKind::Overconfident, largest)
-        } else if all < ALL_STATES.0 {
+        } else if all < ALL_STATES.0 && largest.1 < 1.0 {
             (VerdictKind::Underconfident, states().min_by(by_size).unwrap_or_default())
         } else {
             (VerdictKind::Consistent, largest)
@@ -125,16 +136,26 @@ pub(super) fn nis_bound(components: usize) -> f64 {
     bound(NIS_LIMITS.1, components)
 }
 
-/// Judges a solution. `of_start` is what speaks against the start, as the alignment found it.
+/// Judges a solution: its fixes with standard deviations as stated, its errors as believed. `of_start` is what speaks
+/// against the start, as the alignment found it.
 #[must_use]
-pub fn assess(solution: &Solution, outcome: &Outcome, of_start: &[(VerdictKind, Finding)]) -> Assessment {
+pub fn assess(weighed: &Weighed, outcome: &Outcome, of_start: &[(VerdictKind, Finding)]) -> Assessment {
     let mut findings = of_start.to_vec();
-    findings.push(nis(solution, outcome));
-    findings.extend(stretches(solution));
+    let of_fixes = weighed.judged();
+    let correlated = correlated(weighed);
+    findings.push(match (nis(of_fixes), correlated) {
+        // errors that last make small innovations of right standard deviations
+        ((VerdictKind::Undecided, Finding::Nis { .. }), Some(correlated)) => correlated,
+        (nis, _) => nis,
+    });
+    findings.extend(correlated.filter(|found| !findings.contains(found)));
+    findings.extend(stretches(of_fixes));
     findings.extend(rejected(outcome));
+    findings.extend(ends(outcome));
     if let Some(reference) = outcome.reference {
         // the reference tells what fixes do not
-        findings.retain(|(verdict, _)| *verdict != VerdictKind::Undecided);
+        let is_told = |finding: &Finding| matches!(finding, Finding::Correlated { .. });
+        findings.retain(|(verdict, finding)| *verdict != VerdictKind::Undecided && !is_told(finding));
         let confidence = reference.confidence();
         findings.push((confidence.verdict, Finding::Reference(confidence)));
     }
@@ -143,13 +164,27 @@ pub fn assess(solution: &Solution, outcome: &Outcome, of_start: &[(VerdictKind, 
     Assessment { verdict, findings }
 }
 
+/// Whether the fixes contradict a solution.
+pub(super) fn is_contradicted(solution: &Solution, of_start: &[(VerdictKind, Finding)]) -> bool {
+    let found = [Some(nis(solution)), stretches(solution)];
+    of_start.iter().chain(found.iter().flatten()).any(|(verdict, _)| *verdict == VerdictKind::Overconfident)
+}
+
+/// Errors that last: with standard deviations as stated, those of the position are too small.
+fn correlated(weighed: &Weighed) -> Option<(VerdictKind, Finding)> {
+    let lag_1 = weighed.whiteness.filter(super::Whiteness::is_correlated)?.lag_1;
+    let pos_sigma_factor = weighed.pos_sigma_factor;
+    let verdict = if pos_sigma_factor > 1.0 { VerdictKind::Undecided } else { VerdictKind::Doubtful };
+    Some((verdict, Finding::Correlated { lag_1, pos_sigma_factor }))
+}
+
 fn used(solution: &Solution) -> impl Iterator<Item = &FixRecord> {
     solution.fixes.iter().filter(|f| f.used == Use::Used)
 }
 
-fn nis(solution: &Solution, outcome: &Outcome) -> (VerdictKind, Finding) {
+fn nis(solution: &Solution) -> (VerdictKind, Finding) {
     let components: usize = used(solution).map(|f| f.innovation.len()).sum();
-    let per_component = outcome.nis_per_component;
+    let per_component = nis_per_component(solution);
     let verdict = match per_component {
         _ if components == 0 => return (VerdictKind::Doubtful, Finding::NoFix),
         nis if nis > nis_bound(components) => VerdictKind::Overconfident,
@@ -203,6 +238,14 @@ fn rejected(outcome: &Outcome) -> Option<(VerdictKind, Finding)> {
     Some((verdict, Finding::Rejected { rejected, of }))
 }
 
+/// Errors at the ends of outages and gaps that are not as stated.
+fn ends(outcome: &Outcome) -> Option<(VerdictKind, Finding)> {
+    let ends = outcome.ends.filter(|ends| ends.p_value < ENDS.0)?;
+    let is_much = ends.error_over_sigma > ENDS.1;
+    let verdict = if is_much { VerdictKind::Overconfident } else { VerdictKind::Doubtful };
+    Some((verdict, Finding::Ends(ends)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -218,6 +261,7 @@ mod tests {
             innovation: vec![0.0; 3],
             sigma: vec![1.0; 3],
             nis: 3.0 * nis(k),
+            horizontal_nis: 2.0 * nis(k),
             horizontal_sigma_m: 1.0,
             error: None,
         };
@@ -225,7 +269,17 @@ mod tests {
     }
 
     fn judged(solution: &Solution) -> Assessment {
-        assess(solution, &outcome(solution, &[]), &[])
+        assess(&weighed(solution), &outcome(solution, &[]), &[])
+    }
+
+    fn weighed(solution: &Solution) -> Weighed {
+        Weighed {
+            solution: solution.clone(),
+            as_stated: None,
+            whiteness: crate::fusion::Whiteness::of(&solution.fixes),
+            pos_sigma_factor: 1.0,
+            gnss: Vec::new(),
+        }
     }
 
     #[test]
@@ -261,6 +315,48 @@ mod tests {
         assert_eq!(judged(&all).verdict, VerdictKind::Overconfident);
     }
 
+    /// Nine outages of ends 1.8 times as far as stated are doubtful, 2.5 times is too much, and 1.3 is chance: of chi-square
+    /// of 18 degrees 58, 113 and 30 are exceeded with probabilities of 4e-6, 1e-15 and 0.03.
+    #[test]
+    fn ends_of_outages_count() {
+        let verdict = |ratio: f64| {
+            let mut all = solution(|k| if k % 60 == 59 { ratio * ratio } else { 0.9 }, 600);
+            all.fixes.retain(|f| f.t_s % 60.0 >= 59.0 || f.t_s % 60.0 < 30.0);
+            let outcome = outcome(&all, &[]);
+            assert_eq!(outcome.ends.unwrap().count, 10);
+            assert!((outcome.ends.unwrap().error_over_sigma / ratio - 1.0).abs() < 1e-12);
+            assess(&weighed(&all), &outcome, &[])
+                .findings
+                .into_iter()
+                .find(|(_, f)| matches!(f, Finding::Ends(_)))
+        };
+        assert_eq!(
+            [1.3, 1.8, 2.5].map(|ratio| verdict(ratio).map(|(kind, _)| kind)),
+            [None, Some(VerdictKind::Doubtful), Some(VerdictKind::Overconfident)]
+        );
+    }
+
+    /// Innovations of position whose neighbours are alike: what is small is then no sign of large standard deviations, and
+    /// is not called consistent.
+    #[test]
+    fn errors_that_last_are_told() {
+        let mut all = solution(|_| 0.3, 600);
+        for (k, fix) in all.fixes.iter_mut().enumerate() {
+            fix.innovation = vec![if k % 40 < 20 { 0.5 } else { -0.5 }; 3];
+        }
+        let found = judged(&all);
+        let Finding::Correlated { lag_1, pos_sigma_factor } = found.findings[0].1 else {
+            panic!("{found:?}")
+        };
+        // of 599 pairs 29 are of either sign
+        assert!((lag_1 - (1.0 - 2.0 * 29.0 / 599.0)).abs() < 1e-12 && pos_sigma_factor == 1.0, "{found:?}");
+        assert_eq!(found.verdict, VerdictKind::Doubtful);
+        assert!(!found.findings.iter().any(|(kind, _)| *kind == VerdictKind::Undecided), "{found:?}");
+        let answered = Weighed { pos_sigma_factor: 4.3, ..weighed(&all) };
+        let found = assess(&answered, &outcome(&all, &[]), &[]);
+        assert_eq!(found.verdict, VerdictKind::Undecided);
+    }
+
     /// The reference decides, also where the fixes do not tell.
     #[test]
     fn a_reference_decides_and_names_the_state_farthest_off() {
@@ -275,7 +371,8 @@ mod tests {
                 nees_dof: 9,
                 velocity_sigma_m_s: 0.0,
             };
-            let assessment = assess(&all, &Outcome { reference: Some(reference), ..outcome(&all, &[]) }, &[]);
+            let assessment =
+                assess(&weighed(&all), &Outcome { reference: Some(reference), ..outcome(&all, &[]) }, &[]);
             let Finding::Reference(confidence) = assessment.findings[0].1 else { panic!("{assessment:?}") };
             (assessment.verdict, confidence.worst_state)
         };
@@ -283,7 +380,10 @@ mod tests {
         assert_eq!(judged(with(8, 1.4), 9.0), (VerdictKind::Consistent, "yaw_deg"));
         assert_eq!(judged(with(8, 1.4), 9.0 * 1.6 * 1.6), (VerdictKind::Overconfident, "yaw_deg"));
         assert_eq!(judged(with(2, 3.1), 9.0), (VerdictKind::Overconfident, "pos_d_m"));
-        assert_eq!(judged(with(6, 0.1), 9.0 * 0.16), (VerdictKind::Underconfident, "roll_deg"));
+        let all_small = |state: usize| std::array::from_fn(|i| if i == state { 0.1 } else { 0.4 });
+        assert_eq!(judged(all_small(6), 9.0 * 0.16), (VerdictKind::Underconfident, "roll_deg"));
+        // of one state that is not small the word would be wrong
+        assert_eq!(judged(with(6, 0.1), 9.0 * 0.16).0, VerdictKind::Consistent);
     }
 
     /// Right standard deviations are called wrong by chance in fewer than 1 of 18 drives, however little errors change

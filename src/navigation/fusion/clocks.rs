@@ -33,8 +33,20 @@ const LEAST: f64 = 0.005;
 pub struct ClocksApart {
     /// Time that the clock of the fixes is ahead of the IMU's (s).
     pub delay_s: f64,
+    /// Its standard deviation (s), where the innovations tell it finer than the turns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma_s: Option<f64>,
     /// Correlation of the turns, as the clocks are and without the delay.
     pub correlation: [f64; 2],
+}
+
+impl ClocksApart {
+    /// With what is left of the delay, and how well that is known (s).
+    #[must_use]
+    pub fn refined(mut self, rest_s: f64, sigma_s: f64) -> Self {
+        (self.delay_s, self.sigma_s) = (self.delay_s + rest_s, Some(sigma_s));
+        self
+    }
 }
 
 /// The lag at which the turns agree; none where they agree as they are, or at no lag.
@@ -50,8 +62,11 @@ pub fn clocks_apart(recorded: &Recorded<'_>) -> Option<ClocksApart> {
     // 1 − r², for r < 0 more than 1: turns that go against each other explain less than nothing.
     let unexplained = |r: f64| 1.0 - r * r.abs();
     let is_other = best >= SAME && unexplained(now) > UNEXPLAINED * unexplained(best).max(LEAST);
-    (is_other && lag_s.abs() >= SHORTEST_S)
-        .then_some(ClocksApart { delay_s: -lag_s, correlation: [now, best] })
+    (is_other && lag_s.abs() >= SHORTEST_S).then_some(ClocksApart {
+        delay_s: -lag_s,
+        sigma_s: None,
+        correlation: [now, best],
+    })
 }
 
 /// A stretch between two fixes and the mean rate of the course in it (rad/s, without its sign).

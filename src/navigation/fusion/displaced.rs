@@ -3,14 +3,16 @@
 //! The innovations change almost linearly with the place of the antenna and with the delay of the fixes. The filter is
 //! run with each a little off; least squares over the innovations of all fixes give the values at which they are
 //! smallest ([Ljung](crate::bibliography::Ljung99), ch. 7: the prediction-error method, which is maximum likelihood
-//! here). What was found is a cause only if the filter, run with it, makes a solution to be believed: an explanation is
-//! tested by taking the cause away.
+//! here). What was found is a cause only if the NIS of the filter, run with it, is smaller: an explanation is tested by
+//! taking the cause away.
 
-use super::{FixRecord, Recorded, Settings, Start, Use, fuse};
+use super::correlation::sigma_factor;
+use super::{FixRecord, Recorded, Settings, Start, Use, Whiteness, fuse};
 use crate::ekf::Belief;
 use crate::gnss::GnssFix;
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
+use rayon::prelude::*;
 use serde::Serialize;
 use std::ops::Range;
 
@@ -21,12 +23,13 @@ const ANTENNA: Range<usize> = 0..3;
 const DELAY: Range<usize> = 3..4;
 /// How much of a recording is looked at (s).
 const MOST_S: f64 = 1200.0;
-/// Gauss-Newton steps: the second one corrects what a solution that was far off made of the first.
-const STEPS: usize = 2;
+/// Gauss-Newton steps at most, and the share of the NIS that another one must take away: a solution that is far off makes
+/// little of the first.
+const STEPS: (usize, f64) = (5, 0.02);
 /// A part whose absence costs less than this in −2 ln(likelihood) is no part of the cause: odds of e^10.
 const COSTLY: f64 = 20.0;
-/// Mean NIS per component with which the solution is to be believed, and the share of it now that is a gain.
-const BELIEVED: (f64, f64) = (2.0, 0.9);
+/// Share of the NIS that a cause leaves at most: what receivers state is right to a factor, so its level tells nothing.
+const LEFT: f64 = 0.9;
 /// An antenna farther off (m) and a delay longer (s) are none: what is wrong is something else.
 const FARTHEST: (f64, f64) = (10.0, 1.0);
 
@@ -41,8 +44,7 @@ pub struct Displaced {
     pub nis: [f64; 2],
 }
 
-/// Finds where the antenna is and how late the fixes are, where that makes a solution to be believed of one that is
-/// less so.
+/// Finds where the antenna is and how late the fixes are, where that makes the innovations smaller.
 #[must_use]
 pub fn displaced(
     recorded: &Recorded<'_>,
@@ -55,24 +57,27 @@ pub fn displaced(
     let gnss = &recorded.gnss[..recorded.gnss.partition_point(|f| f.t_s <= to_s)];
     let scene = Scene { recorded: Recorded { imu, gnss }, belief, start, settings };
     let now = scene.innovations(&Vector4::zeros())?;
-    // innovations as small as stated need no explanation
-    if now.nis() < 1.0 {
-        return None;
-    }
     let (mut x, mut normal) = (Vector4::zeros(), scene.normal(&Vector4::zeros(), &now)?);
     let mut best = scene.step(&mut x, &normal)?;
-    for _ in 1..STEPS {
+    for _ in 1..STEPS.0 {
+        let before = best.nis();
         normal = scene.normal(&x, &best)?;
         best = scene.step(&mut x, &normal)?;
+        if best.nis() > (1.0 - STEPS.1) * before {
+            break;
+        }
     }
-    // fixes whose errors last make any gain as much larger as their NIS
-    let scale = best.nis().max(1.0);
+    let scale = best.scale();
     let kept = normal.needed(&x, scale)?;
     let (x, covariance) = normal.without_the_rest(&x, &kept)?;
+    // either would do where both are kept for want of one that is needed by itself
+    if normal.cost(&x, 0..4)? < COSTLY * scale {
+        return None;
+    }
     let nis = [now.nis(), scene.innovations(&x)?.nis()];
     let antenna_b = DVec3::new(x[0], x[1], x[2]);
-    let is_believed = nis[1] < BELIEVED.0 && nis[1] < BELIEVED.1 * nis[0];
-    if !is_believed || antenna_b.length() > FARTHEST.0 || x[3].abs() > FARTHEST.1 {
+    let is_cause = nis[1] < LEFT * nis[0];
+    if !is_cause || antenna_b.length() > FARTHEST.0 || x[3].abs() > FARTHEST.1 {
         return None;
     }
     let sigma = covariance.diagonal().map(|v| (v * scale).sqrt());
@@ -123,12 +128,8 @@ impl Scene<'_> {
 
     /// The normal equations about `x`, where the innovations are `there`.
     fn normal(&self, x: &Vector4<f64>, there: &Innovations) -> Option<Normal> {
-        let mut aside = Vec::new();
-        for (k, off) in OFF.into_iter().enumerate() {
-            let mut y = *x;
-            y[k] += off;
-            aside.push(self.innovations(&y)?);
-        }
+        let off = |k: usize| self.innovations(&(x + Vector4::ith(k, OFF[k])));
+        let aside = (0..4).into_par_iter().map(off).collect::<Option<Vec<_>>>()?;
         let (mut information, mut gradient) = (Matrix4::zeros(), Vector4::zeros());
         for (i, fix) in there.of_fix.iter().enumerate() {
             let Some(fix) = fix else { continue };
@@ -157,6 +158,15 @@ impl Innovations {
     }
 }
 
+impl Innovations {
+    /// How many times a gain of independent innovations of NIS 1: errors that are larger, and errors that last, make any
+    /// gain as much larger (the sum of the autocorrelations of ρᵏ is (1 + ρ)/(1 − ρ)).
+    fn scale(&self) -> f64 {
+        let lag_1 = Whiteness::of(self.of_fix.iter().flatten()).map_or(0.0, |w| w.lag_1);
+        self.nis() * sigma_factor(lag_1).powi(2)
+    }
+}
+
 /// Least squares: the inverse of the information about the four, and the gradient.
 struct Normal {
     inverse: Matrix4<f64>,
@@ -164,15 +174,17 @@ struct Normal {
 }
 
 impl Normal {
+    /// What the absence of a part costs in −2 ln(likelihood), the others as good as they can be.
+    fn cost(&self, x: &Vector4<f64>, part: Range<usize>) -> Option<f64> {
+        let n = part.len();
+        let block = self.inverse.view((part.start, part.start), (n, n)).into_owned();
+        let of: DVector<f64> = x.rows(part.start, n).into_owned();
+        Some(of.dot(&(DMatrix::try_inverse(block)? * &of)))
+    }
+
     /// The parts that `x` owes its gain to. Costs count `scale` times less.
     fn needed(&self, x: &Vector4<f64>, scale: f64) -> Option<Vec<Range<usize>>> {
-        let cost = |part: &Range<usize>| {
-            let n = part.len();
-            let block = self.inverse.view((part.start, part.start), (n, n)).into_owned();
-            let of: DVector<f64> = x.rows(part.start, n).into_owned();
-            Some(of.dot(&(DMatrix::try_inverse(block)? * &of)))
-        };
-        let [antenna, delay] = [cost(&ANTENNA)?, cost(&DELAY)?];
+        let [antenna, delay] = [self.cost(x, ANTENNA)?, self.cost(x, DELAY)?];
         let limit = COSTLY * scale;
         Some(match (antenna > limit, delay > limit) {
             (true, true) => vec![ANTENNA, DELAY],

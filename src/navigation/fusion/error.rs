@@ -12,7 +12,7 @@ pub enum FusionError {
         gnss: (f64, f64),
     },
     /// It begins after the data end, or before they begin.
-    #[error("the start at {t_s} s is not within the IMU's {} to {} s", .imu.0, .imu.1)]
+    #[error("the start at {t_s:.2} s is not within the IMU's {} to {} s", .imu.0, .imu.1)]
     Start {
         /// The start (s).
         t_s: f64,
@@ -21,7 +21,7 @@ pub enum FusionError {
     },
     /// The initial position is not where the fixes are.
     #[error(
-        "the initial position is {metres:.0} m from the fix at {t_s} s, with a standard deviation of {sigma_m:.1} m"
+        "the initial position is {metres:.0} m from the fix at {t_s:.2} s, with a standard deviation of {sigma_m:.1} m"
     )]
     Place {
         /// The first fix after the start (s).
@@ -32,7 +32,7 @@ pub enum FusionError {
         sigma_m: f64,
     },
     /// Latitude and longitude lose their meaning.
-    #[error("latitude {lat_deg:.3}° at {t_s} s is beyond ±89.9°")]
+    #[error("latitude {lat_deg:.3}° at {t_s:.2} s is beyond ±89.9°")]
     Pole {
         /// When (s).
         t_s: f64,
@@ -50,7 +50,7 @@ pub enum FusionError {
         states: usize,
     },
     /// State or covariance stopped being finite.
-    #[error("the filter diverged at {t_s} s")]
+    #[error("the filter diverged at {t_s:.2} s")]
     Diverged {
         /// When (s).
         t_s: f64,

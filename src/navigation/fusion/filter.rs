@@ -88,9 +88,12 @@ impl Filter {
             DMatrix::from_fn(components, components, |i, j| if i == j { sigma[i].powi(2) } else { 0.0 });
         let s = &h * self.ekf.p.lane(0) * h.transpose() + noise;
         let sigma = s.diagonal().map(f64::sqrt).as_slice().to_vec();
+        let (north_east, of_these) = (z.rows(0, 2).into_owned(), s.view((0, 0), (2, 2)).into_owned());
+        let horizontal_nis = of_these.cholesky().map_or(f64::NAN, |c| north_east.dot(&c.solve(&north_east)));
         let nis = s.cholesky().map_or(f64::NAN, |c| z.dot(&c.solve(&z)));
         let before = self.ekf.p.variances(R).lane(0);
         FixRecord {
+            horizontal_nis,
             horizontal_sigma_m: (before.x + before.y).sqrt(),
             t_s: fix.t_s,
             used: Use::Used,

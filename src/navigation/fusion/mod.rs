@@ -48,6 +48,7 @@
 pub mod alignment;
 mod assessment;
 mod clocks;
+mod correlation;
 mod displaced;
 mod error;
 mod filter;
@@ -58,9 +59,12 @@ mod smoother;
 
 pub use assessment::{Assessment, Confidence, Finding, assess};
 pub use clocks::{ClocksApart, clocks_apart};
+pub use correlation::{Correlation, Weighed, Whiteness, fuse_correlated};
 pub use displaced::{Displaced, displaced};
 pub use error::FusionError;
-pub use outcome::{Drift, FromReference, OutageDrift, Outcome, SmoothedOutage, SmoothedOutcome, outcome};
+pub use outcome::{
+    Drift, Ends, FromReference, OutageDrift, Outcome, SmoothedOutage, SmoothedOutcome, outcome,
+};
 
 use crate::earth::{GravityModel, MAX_LATITUDE, geodetic_to_ecef};
 use crate::ekf::{Belief, InitialSettings, nis_limit};
@@ -125,13 +129,26 @@ pub struct Start {
     pub found: Option<Found>,
 }
 
+/// Heading at the start that is given.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Heading {
+    /// From north (rad).
+    #[serde(rename = "yaw_rad")]
+    pub yaw: f64,
+    /// Standard deviation (rad).
+    #[serde(rename = "sigma_rad")]
+    pub sigma: f64,
+}
+
 /// How [`alignment::coarse`] found a start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Found {
     /// Where roll and pitch come from.
     pub level: Levelling,
-    /// Standard deviation of the course as a heading (degrees).
+    /// Standard deviation of the course as a heading, or of the heading that was given (degrees).
     pub course_sigma_deg: f64,
+    /// Whether the heading was given.
+    pub is_given: bool,
     /// Whether the vehicle goes backwards along its course.
     pub is_reversing: bool,
     /// How far the fixes of the next minute move the heading from the course (degrees), where that is more than three
@@ -203,6 +220,8 @@ pub struct FixRecord {
     pub sigma: Vec<f64>,
     /// Normalised innovation squared.
     pub nis: f64,
+    /// The same of the horizontal position alone: chi-square of two degrees if right.
+    pub horizontal_nis: f64,
     /// Horizontal standard deviation of the IMU's position just before, by the filter alone (m).
     pub horizontal_sigma_m: f64,
     /// Difference from the reference just before.

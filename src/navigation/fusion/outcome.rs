@@ -1,9 +1,11 @@
 //! Figures of a fusion: fixes used, consistency, errors at the ends of outages. They serialize as `summary.json` has them.
 
-use super::{Confidence, Nine, Row, RowError, Solution, Use};
+use super::correlation::middle;
+use super::{Confidence, FixRecord, Nine, Row, RowError, Solution, Use};
 use crate::metrics::PerState;
 use crate::sensors::outage::Outage;
 use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Distance at the end of an outage, and what the filter states of it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -33,6 +35,17 @@ pub struct OutageDrift {
     pub end_from_reference: Option<Drift>,
 }
 
+/// Innovations of the fixes that end outages and gaps, all together: the only ones that the filter was not led to.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Ends {
+    /// How many outages and gaps.
+    pub count: usize,
+    /// Root mean square of the horizontal error over its standard deviation: 1 if right.
+    pub error_over_sigma: f64,
+    /// Probability of as large a one if right.
+    pub p_value: f64,
+}
+
 /// Figures of a solution.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Outcome {
@@ -42,6 +55,8 @@ pub struct Outcome {
     pub nis_per_component: f64,
     /// Errors at the end of each outage.
     pub outages: Vec<OutageDrift>,
+    /// The ends of all outages and gaps, where there are any.
+    pub ends: Option<Ends>,
     /// Differences of the rows from the reference, where one reaches them.
     pub reference: Option<FromReference>,
     /// Figures of the smoothed solution, where there is one.
@@ -106,15 +121,37 @@ pub struct SmoothedOutage {
 #[must_use]
 pub fn outcome(solution: &Solution, outages: &[Outage]) -> Outcome {
     let count = |kind: Use| solution.fixes.iter().filter(|f| f.used == kind).count();
-    let used = || solution.fixes.iter().filter(|f| f.used == Use::Used);
-    let components: usize = used().map(|f| f.innovation.len()).sum();
     Outcome {
         fixes: [count(Use::Used), count(Use::Withheld), count(Use::Rejected)],
-        nis_per_component: used().map(|f| f.nis).sum::<f64>() / components as f64,
+        nis_per_component: nis_per_component(solution),
         outages: outages.iter().map(|o| drift(solution, *o)).collect(),
+        ends: ends(solution),
         reference: from_reference(&solution.rows),
         smoothed: solution.smoothed.as_ref().map(|rows| smoothed(&solution.rows, rows, outages)),
     }
+}
+
+/// Time without a fix from which one is a test of the IMU (s), and how many of their median interval.
+const APART: (f64, f64) = (10.0, 5.0);
+
+/// The fixes that nothing was used before for so long. Their horizontal innovations are two normal numbers each, and the
+/// sum of m of their squares, normalised, is chi-square of 2m degrees.
+fn ends(solution: &Solution) -> Option<Ends> {
+    let known: Vec<&FixRecord> = solution.fixes.iter().filter(|f| f.used != Use::Withheld).collect();
+    let steps: Vec<f64> = known.windows(2).map(|w| w[1].t_s - w[0].t_s).collect();
+    let apart_s = APART.0.max(APART.1 * middle(steps)?);
+    let of_ends: Vec<f64> =
+        known.windows(2).filter(|w| w[1].t_s - w[0].t_s > apart_s).map(|w| w[1].horizontal_nis).collect();
+    let (count, sum) = (of_ends.len(), of_ends.iter().sum::<f64>());
+    let degrees = 2.0 * count as f64;
+    let p_value = ChiSquared::new(degrees).ok()?.sf(sum);
+    Some(Ends { count, error_over_sigma: (sum / degrees).sqrt(), p_value })
+}
+
+/// Mean NIS of the fixes used, divided by their number of components.
+pub(super) fn nis_per_component(solution: &Solution) -> f64 {
+    let used = || solution.fixes.iter().filter(|f| f.used == Use::Used);
+    used().map(|f| f.nis).sum::<f64>() / used().map(|f| f.innovation.len()).sum::<usize>() as f64
 }
 
 fn from_reference(rows: &[Row]) -> Option<FromReference> {

@@ -22,7 +22,7 @@ fn inputs_as_loggers_and_receivers_have_them() {
         done(place.path(), &format!("fuse {arguments} rec/gnss.csv imu.toml -o out"));
         table(&at("out/solution.csv")).pop().unwrap()
     };
-    let (frd, flu) = (end("rec/imu.csv"), end("--axes flu flu.csv"));
+    let (frd, flu) = (end("rec/imu.csv"), end("--mounting flu flu.csv"));
     for i in 0..10 {
         assert!((frd[i] - flu[i]).abs() < 1e-6 * (1.0 + frd[i].abs()), "column {i}: {} {}", frd[i], flu[i]);
     }

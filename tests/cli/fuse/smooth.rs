@@ -55,7 +55,7 @@ fn a_smoothed_solution_has_a_verdict_by_the_reference() {
         [("imu.toml", 1.0, "consistent"), ("imu.toml", 0.3, "overconfident"), (worse, 10.0, "underconfident")]
     {
         let fuse = format!("fuse rec/imu.csv rec/gnss.csv {model} {start} --outage 300:360 --smooth -o out");
-        nav_sim(place.path(), &format!("{fuse} --gnss-sigma-factor {factor},{factor}"));
+        nav_sim(place.path(), &format!("{fuse} --gnss-sigma x{factor}"));
         let summary = fs::read_to_string(place.path().join("out/summary.json")).unwrap();
         let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
         let confidence = &summary["smoothed"]["confidence"];

@@ -2,6 +2,7 @@
 
 use super::{DAY_S, Log};
 use crate::formats::fusion_files::fixes::WEEK_S;
+use crate::formats::fusion_files::rtklib::{GPS_EPOCH_S, leap_s};
 use std::collections::BTreeMap;
 
 /// What a receiver is off that counts GPS weeks in ten bits (s).
@@ -35,7 +36,7 @@ pub(super) struct Clock {
 }
 
 impl Log {
-    /// Unix time where the IMU runs in it from one time to the other, else seconds of the first day. A receiver whose week
+    /// Unix time where the IMU runs in it from one time to the other, else seconds of the first day, else GPS time. A receiver whose week
     /// counter has rolled over is known by dates that are the IMU's after 1024 weeks, or twice that.
     pub(super) fn clock(&self, imu_s: Option<(f64, f64)>) -> Clock {
         let time_of_epoch = |e: &super::Epoch| DAY_S * e.day + e.time_s;
@@ -44,11 +45,19 @@ impl Log {
             let both = imu_s.zip(span);
             both.is_some_and(|(imu, gnss)| imu.0 <= origin_s + gnss.1 && origin_s + gnss.0 <= imu.1)
         };
-        let origins =
-            self.dates.most().map(|midnight_s| [0.0, 1.0, 2.0].map(|n| midnight_s + n * ROLLOVER_S));
-        match origins.and_then(|all| all.into_iter().position(overlaps).map(|n| (n, all[n]))) {
-            Some((n, origin_s)) => Clock { origin_s, words: "Unix time", is_rolled: n > 0 },
-            None => Clock { words: "seconds of the day (UTC)", ..Clock::default() },
+        let midnight_s = self.dates.most();
+        let origins = midnight_s.map(|midnight_s| [0.0, 1.0, 2.0].map(|n| midnight_s + n * ROLLOVER_S));
+        if let Some((n, origin_s)) =
+            origins.and_then(|all| all.into_iter().enumerate().find(|(_, s)| overlaps(*s)))
+        {
+            return Clock { origin_s, words: "Unix time", is_rolled: n > 0 };
+        }
+        let day = Clock { words: "seconds of the day (UTC)", ..Clock::default() };
+        let gps_s = midnight_s.map(|s| s - GPS_EPOCH_S as f64 + leap_s(s)).unwrap_or(f64::NAN);
+        let of_gps = [(gps_s, "seconds of GPS time"), (gps_s.rem_euclid(WEEK_S), "seconds of the GPS week")];
+        match of_gps.into_iter().find(|(origin_s, _)| !overlaps(0.0) && overlaps(*origin_s)) {
+            Some((origin_s, words)) => Clock { origin_s, words, is_rolled: false },
+            None => day,
         }
     }
 }

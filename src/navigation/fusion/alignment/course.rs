@@ -1,6 +1,6 @@
 //! The course of the vehicle from GNSS: velocities as measured, or from positions a second or more apart.
 
-use super::{MIN_SPEED, between};
+use super::between;
 use crate::earth::radii;
 use crate::frames::wrap_angle;
 use crate::gnss::GnssFix;
@@ -12,10 +12,36 @@ use glam::DVec3;
 const SLIP: f64 = 2.0 * DEG;
 /// Distance from the axle that does not steer to the IMU (m): in a turn the course there leaves the axis.
 const AXLE_M: f64 = 2.0;
+/// Slowest course that is taken as a heading, and how many of its standard deviations: of what goes fast at times, as road
+/// vehicles do, and of what never does, as people, carts and small robots.
+const FAST: (f64, f64) = (3.0, 5.0);
+pub(super) const SLOW: (f64, f64) = (0.5, 10.0);
+/// What sways to the side at a walk (m/s).
+const SWAY: f64 = 0.15;
 /// Shortest time from one position to another that gives a velocity, and the longest (s).
 const BASELINE_S: (f64, f64) = (1.0, 3.0);
 /// What a vehicle may accelerate between two positions, of which their mean velocity says nothing (m/s²).
 const ACCELERATION: f64 = 2.0;
+
+/// How a drive goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::fusion) enum Pace {
+    Fast,
+    Slow,
+}
+
+impl Pace {
+    /// The speed from which a course is a heading, where velocities are known as well as `sigma` (m/s).
+    pub(in crate::fusion) fn needed(self, sigma: f64) -> f64 {
+        let (least, sigmas) = if self == Self::Fast { FAST } else { SLOW };
+        least.max(sigmas * sigma)
+    }
+
+    /// How far the axis is from the course at such a speed (rad).
+    pub(in crate::fusion) fn slip(self, speed: f64) -> f64 {
+        if self == Self::Fast { SLIP } else { SLIP.hypot(SWAY / speed) }
+    }
+}
 
 /// A fix with its velocity and the standard deviations of it (m/s).
 #[derive(Debug, Clone, Copy)]
@@ -25,6 +51,7 @@ pub(in crate::fusion) struct Moving {
     pub(in crate::fusion) sigma_n: DVec3,
     /// Half the time between the two positions it comes from: it is as old as that (s); 0 as measured.
     pub(in crate::fusion) lag_s: f64,
+    pub(in crate::fusion) pace: Pace,
 }
 
 impl Moving {
@@ -38,7 +65,7 @@ impl Moving {
 
     /// The speed from which the course of this fix is a heading (m/s).
     pub(in crate::fusion) fn needed(&self) -> f64 {
-        MIN_SPEED.max(5.0 * self.sigma())
+        self.pace.needed(self.sigma())
     }
 
     /// The direction in which it moves (rad from north).
@@ -56,7 +83,7 @@ impl Moving {
         let rate = if seconds > 0.0 { sum(around) / seconds } else { 0.0 };
         // the first fast fix is one whose error makes it fast: the vehicle moves more slowly than it says
         let speed = self.speed() - 1.5 * self.sigma();
-        (self.sigma() / speed).hypot(SLIP).hypot(turned).hypot(rate * AXLE_M / speed)
+        (self.sigma() / speed).hypot(self.pace.slip(speed)).hypot(turned).hypot(rate * AXLE_M / speed)
     }
 }
 
@@ -66,15 +93,23 @@ pub(in crate::fusion) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<
     let last = imu.last().map_or(f64::NEG_INFINITY, |s| s.t_s);
     let inside = |m: &Moving| m.fix.t_s >= first && m.fix.t_s < last;
     let velocity = |(i, fix): (usize, &GnssFix)| match fix.velocity {
-        Some(velocity) => {
-            Some(Moving { fix: *fix, v_n: velocity.v_n(), sigma_n: velocity.sigma_n(), lag_s: 0.0 })
-        }
+        Some(velocity) => Some(Moving {
+            fix: *fix,
+            v_n: velocity.v_n(),
+            sigma_n: velocity.sigma_n(),
+            lag_s: 0.0,
+            pace: Pace::Fast,
+        }),
         None => {
             let earlier = gnss[..i].partition_point(|f| f.t_s <= fix.t_s - BASELINE_S.0 + 1e-6);
             derived(&gnss[earlier.checked_sub(1)?], fix)
         }
     };
-    gnss.iter().enumerate().filter_map(velocity).filter(inside).collect()
+    let mut all: Vec<Moving> = gnss.iter().enumerate().filter_map(velocity).filter(inside).collect();
+    if first_fast(&all, f64::NEG_INFINITY).is_none() {
+        all.iter_mut().for_each(|moving| moving.pace = Pace::Slow);
+    }
+    all
 }
 
 /// Fixes one after the other that are at least `apart_s` apart, with when their velocities were (s).
@@ -122,5 +157,5 @@ fn derived(before: &GnssFix, fix: &GnssFix) -> Option<Moving> {
     let lag_s = 0.5 * dt;
     let variance = (fix.pos_sigma_n.powf(2.0) + before.pos_sigma_n.powf(2.0)) / (dt * dt);
     let sigma_n = (variance + DVec3::splat((ACCELERATION * lag_s).powi(2))).powf(0.5);
-    Some(Moving { fix: *fix, v_n, sigma_n, lag_s })
+    Some(Moving { fix: *fix, v_n, sigma_n, lag_s, pace: Pace::Fast })
 }

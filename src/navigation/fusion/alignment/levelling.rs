@@ -3,11 +3,12 @@
 
 use super::course::Moving;
 use super::{BiasSigma, between, carried};
-use crate::earth::radii;
+use crate::earth::{gravity_down, radii};
+use crate::ekf::Belief;
 use crate::frames::{RollPitchYaw, wrap_angle};
 use crate::fusion::{Levelling, Recorded, Settings};
 use crate::gnss::GnssFix;
-use crate::imu::ImuIncrement;
+use crate::imu::{ImuIncrement, Sensor};
 use glam::{DQuat, DVec3};
 
 /// Lengths of static windows (s). A long one leaves less acceleration that GNSS does not see.
@@ -25,10 +26,10 @@ const QUIET: f64 = 3.0;
 
 /// What levelling needs to know.
 pub(super) struct Scene<'a> {
-    pub(super) recorded: Recorded<'a>,
-    pub(super) settings: &'a Settings,
-    pub(super) bias: BiasSigma,
-    pub(super) g: f64,
+    recorded: Recorded<'a>,
+    settings: &'a Settings,
+    bias: BiasSigma,
+    g: f64,
 }
 
 /// Roll and pitch at the first moving fix.
@@ -70,7 +71,19 @@ pub fn moves(imu: &[ImuIncrement]) -> bool {
     window(imu, DQuat::IDENTITY).spread.0 >= STILL.0
 }
 
-impl Scene<'_> {
+impl<'a> Scene<'a> {
+    /// About a fix.
+    pub(super) fn new(
+        recorded: &Recorded<'a>,
+        settings: &'a Settings,
+        belief: &Belief,
+        fix: &GnssFix,
+    ) -> Self {
+        let sigma = |sensor| belief.initial_bias_sigma(sensor);
+        let bias = BiasSigma { accel: sigma(Sensor::Accel), gyro: sigma(Sensor::Gyro) };
+        Self { recorded: *recorded, settings, bias, g: gravity_down(settings.gravity, fix.lat.sin(), fix.h) }
+    }
+
     /// The tilt's standard deviation with the biases and a levelling of age `age_s` (rad).
     fn tilt_sigma(&self, age_s: f64, own: f64) -> f64 {
         (self.bias.accel / self.g).hypot(self.bias.gyro * age_s).hypot(own).hypot(0.3 * crate::units::DEG)

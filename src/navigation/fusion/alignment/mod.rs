@@ -12,22 +12,20 @@ mod levelling;
 mod trial;
 
 use super::assessment::Finding;
-use super::{Found, Recorded, Settings, Start};
-use crate::earth::{gravity_down, radii};
+use super::{Found, Heading, Recorded, Settings, Start};
+use crate::earth::radii;
 use crate::ekf::{Belief, InitialSettings};
 use crate::frames::{NavState, RollPitchYaw, wrap_angle};
 use crate::gnss::GnssFix;
-use crate::imu::{ImuIncrement, Sensor};
+use crate::imu::ImuIncrement;
 use crate::metrics::VerdictKind;
 use crate::units::DEG;
-use course::{Moving, courses, first_fast, nearest_to_fast};
+use course::{Moving, SLOW, courses, first_fast, nearest_to_fast};
 use glam::{DQuat, DVec3};
 pub use levelling::moves;
 use levelling::{Level, Scene};
 use std::f64::consts::PI;
 
-/// Slowest course that is taken as a heading (m/s).
-pub(crate) const MIN_SPEED: f64 = 3.0;
 /// How much later other starts are tried (s), where none at the first moving fix agrees with what follows.
 const LATER_S: [f64; 5] = [15.0, 30.0, 60.0, 120.0, 240.0];
 /// Tilt beyond which the axes of an IMU are hardly those of a vehicle (rad).
@@ -47,15 +45,19 @@ struct BiasSigma {
 pub enum AlignmentError {
     /// It never moves fast enough.
     #[error(
-        "no course: no fix moves at {MIN_SPEED:.1} m/s and five standard deviations{}",
+        "no course: no fix moves at {:.1} m/s and ten standard deviations{}",
+        SLOW.0,
         .nearest.map_or_else(String::new, |(t, v, s)| format!(" (nearest: {v:.2} ± {s:.2} m/s at {t:.2} s)"))
     )]
     NoCourse {
         /// The fix that comes nearest to it: when (s), its speed and the standard deviation of that (m/s).
         nearest: Option<(f64, f64, f64)>,
     },
+    /// A heading was given, and nothing to level with.
+    #[error("no fix with IMU samples around it to level with")]
+    NoLevel,
     /// No specific force to level with.
-    #[error("no IMU samples after the first moving fix at {t_s} s to level with")]
+    #[error("no IMU samples after the first moving fix at {t_s:.2} s to level with")]
     NoSamples {
         /// The fix (s).
         t_s: f64,
@@ -80,8 +82,7 @@ pub fn coarse(
     settings: &Settings,
     belief: &Belief,
 ) -> Result<Alignment, AlignmentError> {
-    let withheld = |f: &GnssFix| settings.outages.iter().any(|o| o.withholds(f.t_s));
-    let gnss: Vec<GnssFix> = recorded.gnss.iter().filter(|f| !withheld(f)).copied().collect();
+    let gnss = kept(recorded, settings);
     let recorded = Recorded { gnss: &gnss, ..*recorded };
     let courses = courses(&gnss, recorded.imu);
     let Some(first) = first_fast(&courses, f64::NEG_INFINITY) else {
@@ -111,11 +112,45 @@ pub fn coarse(
     best.map(finished).ok_or(AlignmentError::NoSamples { t_s: first_s })
 }
 
+/// The fixes that are not withheld.
+fn kept(recorded: &Recorded<'_>, settings: &Settings) -> Vec<GnssFix> {
+    let withheld = |f: &&GnssFix| settings.outages.iter().any(|o| o.withholds(f.t_s));
+    recorded.gnss.iter().filter(|f| !withheld(f)).copied().collect()
+}
+
+/// The start at the first fix where the IMU can be levelled, its heading given: it need not move.
+///
+/// # Errors
+/// When there is nothing to level with.
+pub fn towards(
+    recorded: &Recorded<'_>,
+    settings: &Settings,
+    belief: &Belief,
+    heading: Heading,
+) -> Result<Alignment, AlignmentError> {
+    let gnss = kept(recorded, settings);
+    let recorded = Recorded { gnss: &gnss, ..*recorded };
+    let courses = courses(&gnss, recorded.imu);
+    let sigma = heading.sigma.hypot(settings.mounting_sigma_b.z);
+    let start_at = |at: usize| {
+        let scene = Scene::new(&recorded, settings, belief, &courses[at].fix);
+        let rest = scene.at_rest(&courses[..at], &courses[at]);
+        let level = rest.or_else(|| scene.in_motion(&courses[at..], heading.yaw, sigma))?;
+        Some(start(&courses[at], &level, Along::Given, (heading.yaw, sigma), settings))
+    };
+    let mut start = (0..courses.len()).find_map(start_at).ok_or(AlignmentError::NoLevel)?;
+    let trial = trial::alone(&recorded, belief, settings, &start);
+    trial::widen(&recorded, belief, settings, &mut start);
+    Ok(Candidate { start, trial }.alignment())
+}
+
 /// Which way the vehicle goes along its course.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Direction {
+enum Along {
     Forwards,
     Backwards,
+    /// Not asked: the heading is given.
+    Given,
 }
 
 /// A start that was tried on the fixes after it.
@@ -158,10 +193,7 @@ fn candidates(
     at: usize,
 ) -> Vec<Candidate> {
     let moving = &courses[at];
-    let sigma = |sensor| belief.initial_bias_sigma(sensor);
-    let bias = BiasSigma { accel: sigma(Sensor::Accel), gyro: sigma(Sensor::Gyro) };
-    let g = gravity_down(settings.gravity, moving.fix.lat.sin(), moving.fix.h);
-    let scene = Scene { recorded: *recorded, settings, bias, g };
+    let scene = Scene::new(recorded, settings, belief, &moving.fix);
     // the course is the heading of the vehicle; how the IMU sits in it is not better known than the mounting
     let heading_sigma = moving.heading_sigma(recorded.imu).hypot(settings.mounting_sigma_b.z);
     let in_motion = |heading| scene.in_motion(&courses[at..], heading, heading_sigma);
@@ -172,8 +204,8 @@ fn candidates(
     let mut levels: Vec<[Level; 2]> = [rest, motion].into_iter().flatten().collect();
     levels.sort_by(|a, b| a[0].sigma.total_cmp(&b[0].sigma));
     let tried = |[f, b]: [Level; 2]| {
-        let starts = [(f, Direction::Forwards, forwards), (b, Direction::Backwards, backwards)]
-            .map(|(level, direction, yaw)| start(moving, &level, direction, (yaw, heading_sigma), settings));
+        let starts = [(f, Along::Forwards, forwards), (b, Along::Backwards, backwards)]
+            .map(|(level, along, yaw)| start(moving, &level, along, (yaw, heading_sigma), settings));
         let trial = trial::opposite(recorded, belief, settings, starts.each_ref());
         let [f, b] = starts;
         Candidate { start: if trial.better == 0 { f } else { b }, trial }
@@ -184,7 +216,7 @@ fn candidates(
 fn start(
     moving: &Moving,
     level: &Level,
-    direction: Direction,
+    along: Along,
     (yaw, heading_sigma): (f64, f64),
     settings: &Settings,
 ) -> Start {
@@ -210,7 +242,8 @@ fn start(
     let found = Found {
         level: level.from,
         course_sigma_deg: heading,
-        is_reversing: direction == Direction::Backwards,
+        is_given: along == Along::Given,
+        is_reversing: along == Along::Backwards,
         moved_deg: None,
     };
     Start { t_s: fix.t_s, state, sigma, found: Some(found) }

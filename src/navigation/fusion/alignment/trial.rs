@@ -104,6 +104,12 @@ pub(super) fn opposite(
     }
 }
 
+/// Runs the filter from a start that has no other beside it, over the first minute.
+pub(super) fn alone(recorded: &Recorded<'_>, belief: &Belief, settings: &Settings, start: &Start) -> Trial {
+    let agreement = agreement(recorded, belief, settings, start, start.t_s + TRIAL_S);
+    Trial { better: 0, decided: true, agreements: [agreement; 2] }
+}
+
 /// Widens the standard deviation of a heading that is not the course: wind sets an aircraft off, currents a boat. The
 /// smoother, from all fixes of the first minute, says how far.
 pub(super) fn widen(recorded: &Recorded<'_>, belief: &Belief, settings: &Settings, start: &mut Start) {

@@ -44,6 +44,8 @@ pub struct Mounting {
     pub sigma_b: DVec3,
     /// Distance driven with a known course (m).
     pub way_m: f64,
+    /// How many times the stated standard deviations of the fixes it was found with.
+    pub sigma_factor: f64,
 }
 
 impl Mounting {
@@ -135,7 +137,7 @@ pub fn find(
     let gnss: Vec<GnssFix> = recorded.gnss.iter().filter(|f| !withheld(f)).copied().collect();
     let recorded = Recorded { gnss: &gnss, ..*recorded };
     let rough = track::along(&recorded, settings)?;
-    let fine = refined::through(&recorded, settings, belief, &rough)?;
+    let (fine, sigma_factor) = refined(&recorded, settings, belief, &rough)?;
     let named = ["roll", "pitch", "yaw"].into_iter().zip(fine.sigma_b.to_array());
     // NaN is not determined either
     let worst = named.into_iter().find(|(_, sigma)| sigma.is_nan() || *sigma > DETERMINED);
@@ -144,5 +146,29 @@ pub fn find(
         return Err(MountingError::NotDetermined { axis, sigma_deg, limit_deg });
     }
     let angles = RollPitchYaw::from_quat(fine.q_s_b * settings.q_s_b.inverse());
-    Ok(Mounting { q_s_b: fine.q_s_b, angles, sigma_b: fine.sigma_b, way_m: fine.way_m })
+    Ok(Mounting { q_s_b: fine.q_s_b, angles, sigma_b: fine.sigma_b, way_m: fine.way_m, sigma_factor })
+}
+
+/// Most that the standard deviations of fixes are widened by: what contradicts more is not the receiver's word.
+const MOST_WIDENED: f64 = 5.0;
+
+/// Refined with standard deviations as stated, or where the fixes contradict those, with what makes their NIS 1.
+fn refined(
+    recorded: &Recorded<'_>,
+    settings: &Settings,
+    belief: &Belief,
+    rough: &track::Rough,
+) -> Result<(refined::Refined, f64), MountingError> {
+    let (mut gnss, mut factor) = (recorded.gnss.to_vec(), 1.0);
+    loop {
+        match refined::through(&Recorded { gnss: &gnss, ..*recorded }, settings, belief, rough) {
+            Err(MountingError::Contradicted { nis_per_component: nis })
+                if nis > 1.0 && factor * nis.sqrt() <= MOST_WIDENED =>
+            {
+                factor *= nis.sqrt();
+                gnss = recorded.gnss.iter().map(|fix| fix.with_sigmas_times(factor, factor)).collect();
+            }
+            found => return Ok((found?, factor)),
+        }
+    }
 }

@@ -4,18 +4,18 @@ use super::MountingError;
 use super::blocks::{BLOCK_S, Blocks, FEWEST};
 use super::track::{Rough, track_attitude};
 use crate::ekf::Belief;
-use crate::fusion::alignment::{Alignment, MIN_SPEED, coarse};
-use crate::fusion::assessment::assess;
-use crate::fusion::outcome::outcome;
+use crate::fusion::alignment::course::{Pace, courses};
+use crate::fusion::alignment::{Alignment, coarse};
+use crate::fusion::assessment::is_contradicted;
+use crate::fusion::outcome::nis_per_component;
 use crate::fusion::{Recorded, Row, Settings, fuse};
-use crate::metrics::VerdictKind;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
 
 /// Rows of the filter's solution a second.
 const ROWS_HZ: f64 = 2.0;
-/// Slip, and banks and slopes of roads beside those of the track, at a time (rad).
-const AT_A_TIME: DVec3 = DVec3::new(2.0 * DEG, 1.0 * DEG, 2.0 * DEG);
+/// Banks and slopes of roads beside those of the track, at a time (rad).
+const AT_A_TIME: DVec3 = DVec3::new(2.0 * DEG, 1.0 * DEG, 0.0);
 /// What a body leans and nods under an acceleration (rad per m/s²), and how far the IMU is from the axle that does not
 /// steer (m): in a turn the course there leaves the axis.
 const LEAN: f64 = 1.0 * DEG;
@@ -71,13 +71,13 @@ pub(super) fn through(
     // what the rows state is then of the IMU's attitude
     let settings = Settings { mounting_sigma_b: DVec3::ZERO, ..settings };
     let solution = fuse(recorded, belief, &start, &settings, None)?;
-    let outcome = outcome(&solution, &settings.outages);
     // attitudes of a filter that the fixes contradict are no worse than it states only by chance
-    if assess(&solution, &outcome, &doubts).verdict == VerdictKind::Overconfident {
-        return Err(MountingError::Contradicted { nis_per_component: outcome.nis_per_component });
+    if is_contradicted(&solution, &doubts) {
+        return Err(MountingError::Contradicted { nis_per_component: nis_per_component(&solution) });
     }
+    let pace = courses(recorded.gnss, recorded.imu).first().map_or(Pace::Fast, |moving| moving.pace);
     let mut moments: Vec<Moment> =
-        solution.rows.windows(3).filter_map(|w| moment(&w[0], &w[1], &w[2])).collect();
+        solution.rows.windows(3).filter_map(|w| moment([&w[0], &w[1], &w[2]], pace)).collect();
     turn_to_front(&mut moments)?;
     let mean = mean(&moments);
     upright(&moments, mean)?;
@@ -96,10 +96,10 @@ pub(super) fn through(
 }
 
 /// The vehicle beside its track at a row that moves fast enough for a course.
-fn moment(before: &Row, row: &Row, after: &Row) -> Option<Moment> {
+fn moment([before, row, after]: [&Row; 3], pace: Pace) -> Option<Moment> {
     let (v_n, speed) = (row.state.v_n, row.state.v_n.truncate().length());
     let of_velocity = row.sigma[3].max(row.sigma[4]);
-    if speed < MIN_SPEED.max(5.0 * of_velocity) {
+    if speed < pace.needed(of_velocity) {
         return None;
     }
     let seconds = after.t_s - before.t_s;
@@ -108,7 +108,7 @@ fn moment(before: &Row, row: &Row, after: &Row) -> Option<Moment> {
     let rate = turned.to_scaled_axis().length() / seconds;
     let lean = LEAN * acceleration.length();
     // ω · lever/speed is the angle between the course at the IMU and the axis of the body in a turn.
-    let slip = (rate * AXLE_M / speed).hypot(of_velocity / speed);
+    let slip = (rate * AXLE_M / speed).hypot(of_velocity / speed).hypot(pace.slip(speed));
     let of_filter = DVec3::new(row.sigma[6], row.sigma[7], row.sigma[8]) * DEG;
     // About the front axis lean in turns; about the right axis nod, and the error of the slope by that of the
     // vertical velocity; about down slip.

@@ -51,7 +51,9 @@ pub(super) fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<Roug
     let mut seen = Blocks::default();
     stretches.iter().for_each(|s| seen.add(s.t_s, 0.0, 1.0));
     if seen.count() < FEWEST {
-        let seconds = stretches.windows(2).map(|w| (w[1].t_s - w[0].t_s).min(APART_S.1)).sum();
+        // the sum of nothing is -0
+        let seconds =
+            stretches.windows(2).map(|w| (w[1].t_s - w[0].t_s).min(APART_S.1)).fold(0.0, |a, b| a + b);
         return Err(MountingError::TooSlow { seconds, needed: FEWEST as f64 * BLOCK_S });
     }
     let weights: f64 = stretches.iter().map(|s| s.weight).sum();
