@@ -4,7 +4,9 @@ use super::estimate::PerState;
 use crate::ekf::Belief;
 use crate::ekf::belief::BiasGroup;
 use crate::imu::Channel;
-use crate::noise::{Ar1, Composite, Model, ParameterError, Process, RandomWalk, White, continuous, reduction};
+use crate::noise::{
+    Ar1, Composite, Model, ParameterError, Process, RandomWalk, White, continuous, reduction,
+};
 use crate::simulation::REPORTED;
 use crate::simulation::lincov::{Assessment, Consistency};
 use glam::DVec3;

@@ -87,7 +87,8 @@ pub fn reduce(
 /// Whether a filter with one bias an axis carries the noise as it is: at most one of its processes is a bias.
 #[must_use]
 pub fn is_exact(noise: &Composite) -> bool {
-    let is_bias = |p: &&Process| matches!(p, Process::Ar1(_) | Process::GaussMarkov(_) | Process::RandomWalk(_));
+    let is_bias =
+        |p: &&Process| matches!(p, Process::Ar1(_) | Process::GaussMarkov(_) | Process::RandomWalk(_));
     noise.processes.iter().filter(is_bias).count() <= 1
 }
 

@@ -38,6 +38,7 @@ mod heading;
 mod input;
 mod joint;
 mod mean;
+mod outline;
 mod pass;
 mod reduce;
 mod root;
@@ -49,10 +50,12 @@ mod tune;
 pub(crate) use branch::{Moments, errors_in_outages};
 pub use consistency::{Departure, DrawFactors, FilterConsistency, UpperEnd};
 pub use heading::{HeadingDoubt, weak_heading};
-pub use pass::{Assessment, Consistency, ErrorLaw, FilterPass, Instant, Judged, assess};
+pub use pass::{
+    Assessment, Consistency, ErrorLaw, FilterPass, Instant, Judged, assess, strapdown_over_sigma,
+};
 pub use reduce::{Alike, drive, reduced_belief};
 pub(crate) use root::Crossing;
 pub use track::Track;
-pub use truth::{DRIFT, NamedSource, TrueErrors, TruthSide};
+pub use truth::{DRIFT, NamedSource, STRAPDOWN, TrueErrors, TruthSide};
 pub(crate) use tune::times;
 pub use tune::{Aim, Factor, Filter, Per, Task, scaled};

@@ -1,0 +1,202 @@
+//! Tracks of fewer and longer steps, for the many passes of a search.
+
+use super::input::{SCALED, SIGNALS};
+use super::joint::add_scaled;
+use super::track::{Mark, Measured, NAV, Nav, Row, Step, Track};
+
+/// Longest step of an outline (s): with fixes, and without.
+const OUTLINE_STEP_S: [f64; 2] = [3.0, 10.0];
+/// Time between two reports of an outline (s).
+const REPORT_S: f64 = 10.0;
+/// Longest drive that an outline has as a whole (s).
+const WHOLE_S: f64 = 1200.0;
+/// What it has of a longer one before each outage, in which biases settle, and after it (s).
+const AROUND_S: [f64; 2] = [240.0, 60.0];
+
+impl Track {
+    /// As [`Self::merged`], with a report every ten, and white noise through its mean over a step as well: a tenth faster
+    /// for the hundreds of passes of a search, and within 1e-3 in every ratio.
+    #[must_use]
+    pub fn coarse(&self) -> Self {
+        let mut track = self.merged();
+        track.steps.iter_mut().for_each(|step| step.white = Vec::new());
+        let mut reports = 0;
+        for mark in &mut track.marks {
+            reports += usize::from(mark.report);
+            // One report in ten: reports enter the cost of a search as an average, and errors change slowly.
+            mark.report &= reports % 10 == 0;
+        }
+        track
+    }
+
+    /// The same with one step from mark to mark, at most a second: a few times faster. White noise is exact; a bias is
+    /// its mean over the step, which leaves up to 1e-4 of an error after ten seconds without fixes, 1.2e-3 after five.
+    #[must_use]
+    pub fn merged(&self) -> Self {
+        let (mut steps, mut marks, mut done) = (Vec::new(), self.marks.clone(), 0);
+        for mark in &mut marks {
+            // Between marks alone: no step may reach over a measurement.
+            steps.extend(self.steps[done..mark.steps].iter().cloned().reduce(|a, b| a.then(&b)));
+            (done, mark.steps) = (mark.steps, steps.len());
+        }
+        Self { steps, marks, ..self.clone() }
+    }
+
+    /// The drive in one or two hundred steps, whatever its length: what the search for a reduction passes along. Several fixes
+    /// are one of their mean at the last of them; of a long drive there are the start and what is around the longest
+    /// outages, one after the other.
+    #[must_use]
+    pub(super) fn outline(&self) -> Self {
+        let (windows, last_fixes) = (self.windows(), self.last_fixes());
+        let is_kept = |mark: &Mark| windows.iter().any(|w| w[0] <= mark.after_s && mark.after_s <= w[1]);
+        let (mut steps, mut marks, mut block) = (Vec::new(), Vec::new(), Block::default());
+        let mut report_s = f64::NEG_INFINITY;
+        for (i, (leg, mark)) in
+            self.legs(0..self.marks.len()).enumerate().filter(|(_, (_, mark))| is_kept(mark))
+        {
+            block.add(leg, mark, i.checked_sub(1).map_or(0.0, |before| self.marks[before].after_s));
+            let next = self.marks.get(i + 1).filter(|next| is_kept(next) && next.outages.is_empty());
+            // An outage begins with its first missing fix and ends with the first fix after it, no step later.
+            let is_bound = !mark.outages.is_empty() || last_fixes.contains(&i);
+            if !is_bound && next.is_some_and(|next| block.has_room_until(next.after_s)) {
+                continue;
+            }
+            let Block { step, fix, height, .. } = std::mem::take(&mut block);
+            steps.extend(step);
+            let report = mark.after_s - report_s >= REPORT_S - SLACK_S;
+            report_s = if report { mark.after_s } else { report_s };
+            let rows = fix.mean().chain(height.mean()).collect();
+            marks.push(Mark { steps: steps.len(), rows, report, ..mark.clone() });
+        }
+        Self { steps, marks, outages: self.outages, start: self.start, perfect: self.perfect }
+    }
+
+    /// Beginning and end of what an outline has of the drive (s).
+    fn windows(&self) -> Vec<[f64; 2]> {
+        let end_s = self.marks.last().map_or(0.0, |mark| mark.after_s);
+        if end_s <= WHOLE_S {
+            return vec![[0.0, end_s]];
+        }
+        let mut outages: Vec<[f64; 2]> = Vec::new();
+        let mut fix_s = 0.0;
+        for mark in &self.marks {
+            outages.extend((!mark.outages.is_empty()).then_some([fix_s, mark.after_s]));
+            fix_s = if mark.fix { mark.after_s } else { fix_s };
+        }
+        if outages.is_empty() {
+            return vec![[0.0, WHOLE_S]];
+        }
+        outages.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
+        let around = outages.into_iter().map(|[start_s, end_s]| [start_s - AROUND_S[0], end_s + AROUND_S[1]]);
+        let mut windows = vec![[0.0, AROUND_S[0]]];
+        let mut total_s = AROUND_S[0];
+        for window in around {
+            if total_s >= WHOLE_S {
+                break;
+            }
+            total_s += window[1] - window[0];
+            windows.push(window);
+        }
+        windows
+    }
+
+    /// Marks whose fix is followed by a gap.
+    fn last_fixes(&self) -> Vec<usize> {
+        let fixes: Vec<usize> = (0..self.marks.len()).filter(|i| self.marks[*i].fix).collect();
+        let gap_s = |pair: &[usize]| self.marks[pair[1]].after_s - self.marks[pair[0]].after_s;
+        let interval_s = fixes.windows(2).map(gap_s).fold(f64::INFINITY, f64::min);
+        fixes.windows(2).filter(|pair| gap_s(pair) > 1.5 * interval_s).map(|pair| pair[0]).collect()
+    }
+}
+
+/// Times of marks are sums of samples: this much apart they are the same (s).
+const SLACK_S: f64 = 1e-6;
+
+/// Steps and measurements that become one of each.
+#[derive(Default)]
+struct Block {
+    begin_s: f64,
+    step: Option<Step>,
+    fix: Together,
+    height: Together,
+}
+
+impl Block {
+    /// Adds a mark with the steps that lead to it from `before_s`.
+    fn add(&mut self, leg: &[Step], mark: &Mark, before_s: f64) {
+        if self.step.is_none() {
+            self.begin_s = before_s;
+        }
+        self.step = self.step.take().into_iter().chain(leg.iter().cloned()).reduce(|a, b| a.of_means(&b));
+        let (height, fix): (Vec<Row>, Vec<Row>) = mark.rows.iter().partition(|r| r.what == Measured::Height);
+        self.fix.add(fix);
+        self.height.add(height);
+    }
+
+    fn has_room_until(&self, after_s: f64) -> bool {
+        after_s - self.begin_s <= OUTLINE_STEP_S[usize::from(self.fix.count == 0)] + SLACK_S
+    }
+}
+
+/// Measurements of one kind, taken at the last of them.
+#[derive(Default)]
+struct Together {
+    rows: Vec<Row>,
+    count: u32,
+}
+
+impl Together {
+    fn add(&mut self, rows: Vec<Row>) {
+        if !rows.is_empty() {
+            (self.rows, self.count) = (rows, self.count + 1);
+        }
+    }
+
+    /// One measurement of the mean of their noise.
+    fn mean(self) -> impl Iterator<Item = Row> {
+        let count = f64::from(self.count);
+        self.rows.into_iter().map(move |row| Row { r: row.r / count, ..row })
+    }
+}
+
+impl Step {
+    /// This step and then another, as one.
+    fn then(self, next: &Self) -> Self {
+        let none = [0.0; SIGNALS];
+        // White noise of the two parts is independent: through the mean of a second it would move a position by
+        // a quarter of T³ where it is a third.
+        let mut white = self.white_noise();
+        for (sum, more) in white.iter_mut().zip(next.white_noise()) {
+            let carried = sum.map(|column| next.map(&column, &none));
+            for (i, more) in more.iter().enumerate() {
+                // Symmetric: the rows of a carried covariance are its columns.
+                sum[i] = next.map(&carried.map(|column| column[i]), &none);
+                add_scaled(&mut sum[i], 1.0, more);
+            }
+        }
+        Self { white, ..self.of_means(next) }
+    }
+
+    /// Its `white`, whether it is there or follows from the mean over the step.
+    fn white_noise(&self) -> Vec<[Nav; NAV]> {
+        let of_mean = |b: &Nav| b.map(|factor| b.map(|b| b * factor / f64::from(self.samples)));
+        if self.white.is_empty() {
+            self.b[..SCALED].iter().map(of_mean).collect()
+        } else {
+            self.white.clone()
+        }
+    }
+
+    /// The same with white noise through its mean over the step, as that of a bias.
+    fn of_means(&self, next: &Self) -> Self {
+        let none = [0.0; SIGNALS];
+        let mut b = self.b.map(|column| next.map(&column, &none));
+        for (sum, column) in b.iter_mut().flatten().zip(next.b.iter().flatten()) {
+            // The response to a constant input: that of the first part, carried through the second, and that
+            // of the second.
+            *sum += column;
+        }
+        let m = self.m.map(|column| next.map(&column, &none));
+        Self { samples: self.samples + next.samples, m, b, white: Vec::new() }
+    }
+}
