@@ -33,5 +33,6 @@ mod mounting;
 mod reduction;
 mod require;
 mod smoothing;
+mod strapdown_error;
 mod trajectories;
 mod tune;

@@ -5,7 +5,7 @@ use super::joint::add_scaled;
 use super::track::{Mark, Measured, NAV, Nav, Row, Step, Track};
 
 /// Longest step of an outline (s): with fixes, and without.
-const OUTLINE_STEP_S: [f64; 2] = [3.0, 10.0];
+const OUTLINE_STEP_S: [f64; 2] = [5.0, 10.0];
 /// Time between two reports of an outline (s).
 const REPORT_S: f64 = 10.0;
 /// Longest drive that an outline has as a whole (s).
@@ -198,5 +198,45 @@ impl Step {
         }
         let m = self.m.map(|column| next.map(&column, &none));
         Self { samples: self.samples + next.samples, m, b, white: Vec::new() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::noise::Model;
+    use crate::scenario::Scenario;
+    use crate::sensors::outage::Outage;
+    use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
+
+    /// Of a drive of an hour it has no more steps than of one that is as long as the whole that it may have, and every outage
+    /// begins and ends where it did.
+    #[test]
+    fn the_outline_of_a_long_drive_is_no_longer() {
+        let outline = |duration_s: f64| {
+            let north =
+                Segment { kind: Kind::Straight(Length::Duration(duration_s)), climb_m: 0.0, ramp_s: None };
+            let start = Start { t_s: 0.0, lat: 0.9, lon: 0.2, h: 0.0, heading: 0.0, speed: 20.0 };
+            let drive =
+                Profile { start, bank: Bank::None, ramp_s: 2.0, segments: vec![north] }.build().unwrap();
+            let mut scenario = Scenario::default();
+            scenario.imu.rate_hz = 10.0;
+            let silent = Model { rate_hz: 10.0, axes: Default::default() };
+            let outages = [Outage { start_s: 600.0, end_s: 663.0 }];
+            let track = scenario.track(&drive, &silent, &outages).unwrap().outline();
+            let end = track.marks.iter().position(|mark| !mark.outages.is_empty()).unwrap();
+            let [.., last_fix, _] = track.marks[..end]
+                .iter()
+                .filter(|m| !m.rows.is_empty() || m.after_s > 600.0)
+                .collect::<Vec<_>>()[..]
+            else {
+                panic!()
+            };
+            assert_eq!(track.marks[end].after_s, 663.0);
+            assert!(last_fix.after_s > 600.0 && last_fix.rows.is_empty());
+            assert!(track.marks.iter().any(|mark| mark.after_s == 599.0 && !mark.rows.is_empty()));
+            track.steps.len()
+        };
+        let (short, long) = (outline(1200.0), outline(3600.0));
+        assert!(long < short && short < 500, "{short} {long}");
     }
 }

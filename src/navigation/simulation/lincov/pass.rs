@@ -4,7 +4,7 @@ use super::errors::Errors;
 use super::input::Sources;
 use super::joint::{Gain, Joint};
 use super::sides::Sides;
-use super::track::{Measured, NAV, Nav, Track};
+use super::track::{Mark, Measured, NAV, Nav, Track};
 use super::truth::{TrueErrors, TruthSide};
 use crate::ekf::Belief;
 use crate::ekf::covariance::PSI;
@@ -14,6 +14,9 @@ use crate::simulation::{BIASES, REPORTED};
 use crate::units::DEG;
 use glam::DVec3;
 use nalgebra::SMatrix;
+
+/// Yaw error over that of attitude at a pitch of 80°: 1/cos(pitch).
+const STEEP: f64 = 5.76;
 
 /// How a filter's covariance stands to that of its true errors, at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -171,7 +174,9 @@ impl<'a> FilterPass<'a> {
     #[must_use]
     pub fn yaw_while_measured(&self) -> Vec<(f64, f64)> {
         let reports = self.track.marks.iter().filter(|mark| mark.report).zip(&self.reports);
-        let measured = reports.filter(|(mark, _)| !mark.rows.is_empty());
+        // Near the vertical roll and yaw are no separate angles: yaw is uncertain there however well the attitude is known.
+        let is_separate = |mark: &Mark| mark.jacobian[2].length() < STEEP;
+        let measured = reports.filter(|(mark, _)| !mark.rows.is_empty() && is_separate(mark));
         measured.map(|(mark, p)| (mark.after_s, deviations(&mark.jacobian, p)[REPORTED - 1])).collect()
     }
 
