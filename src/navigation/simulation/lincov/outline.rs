@@ -8,10 +8,6 @@ use super::track::{Mark, Measured, NAV, Nav, Row, Step, Track};
 const OUTLINE_STEP_S: [f64; 2] = [5.0, 10.0];
 /// Time between two reports of an outline (s).
 const REPORT_S: f64 = 10.0;
-/// Longest drive that an outline has as a whole (s).
-const WHOLE_S: f64 = 1200.0;
-/// What it has of a longer one before each outage, in which biases settle, and after it (s).
-const AROUND_S: [f64; 2] = [240.0, 60.0];
 
 impl Track {
     /// As [`Self::merged`], with a report every ten, and white noise through its mean over a step as well: a tenth faster
@@ -42,20 +38,16 @@ impl Track {
         Self { steps, marks, ..self.clone() }
     }
 
-    /// The drive in one or two hundred steps, whatever its length: what the search for a reduction passes along. Several fixes
-    /// are one of their mean at the last of them; of a long drive there are the start and what is around the longest
-    /// outages, one after the other.
+    /// The drive in a fifth of the steps or fewer: what the search for a reduction passes along. Several fixes are one of their
+    /// mean at the last of them.
     #[must_use]
     pub(super) fn outline(&self) -> Self {
-        let (windows, last_fixes) = (self.windows(), self.last_fixes());
-        let is_kept = |mark: &Mark| windows.iter().any(|w| w[0] <= mark.after_s && mark.after_s <= w[1]);
+        let last_fixes = self.last_fixes();
         let (mut steps, mut marks, mut block) = (Vec::new(), Vec::new(), Block::default());
         let mut report_s = f64::NEG_INFINITY;
-        for (i, (leg, mark)) in
-            self.legs(0..self.marks.len()).enumerate().filter(|(_, (_, mark))| is_kept(mark))
-        {
+        for (i, (leg, mark)) in self.legs(0..self.marks.len()).enumerate() {
             block.add(leg, mark, i.checked_sub(1).map_or(0.0, |before| self.marks[before].after_s));
-            let next = self.marks.get(i + 1).filter(|next| is_kept(next) && next.outages.is_empty());
+            let next = self.marks.get(i + 1).filter(|next| next.outages.is_empty());
             // An outage begins with its first missing fix and ends with the first fix after it, no step later.
             let is_bound = !mark.outages.is_empty() || last_fixes.contains(&i);
             if !is_bound && next.is_some_and(|next| block.has_room_until(next.after_s)) {
@@ -69,35 +61,6 @@ impl Track {
             marks.push(Mark { steps: steps.len(), rows, report, ..mark.clone() });
         }
         Self { steps, marks, outages: self.outages, start: self.start, perfect: self.perfect }
-    }
-
-    /// Beginning and end of what an outline has of the drive (s).
-    fn windows(&self) -> Vec<[f64; 2]> {
-        let end_s = self.marks.last().map_or(0.0, |mark| mark.after_s);
-        if end_s <= WHOLE_S {
-            return vec![[0.0, end_s]];
-        }
-        let mut outages: Vec<[f64; 2]> = Vec::new();
-        let mut fix_s = 0.0;
-        for mark in &self.marks {
-            outages.extend((!mark.outages.is_empty()).then_some([fix_s, mark.after_s]));
-            fix_s = if mark.fix { mark.after_s } else { fix_s };
-        }
-        if outages.is_empty() {
-            return vec![[0.0, WHOLE_S]];
-        }
-        outages.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
-        let around = outages.into_iter().map(|[start_s, end_s]| [start_s - AROUND_S[0], end_s + AROUND_S[1]]);
-        let mut windows = vec![[0.0, AROUND_S[0]]];
-        let mut total_s = AROUND_S[0];
-        for window in around {
-            if total_s >= WHOLE_S {
-                break;
-            }
-            total_s += window[1] - window[0];
-            windows.push(window);
-        }
-        windows
     }
 
     /// Marks whose fix is followed by a gap.
@@ -208,10 +171,9 @@ mod tests {
     use crate::sensors::outage::Outage;
     use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
 
-    /// Of a drive of an hour it has no more steps than of one that is as long as the whole that it may have, and every outage
-    /// begins and ends where it did.
+    /// A step covers several seconds, and every outage begins and ends where it did.
     #[test]
-    fn the_outline_of_a_long_drive_is_no_longer() {
+    fn an_outline_is_a_quarter_of_the_drive() {
         let outline = |duration_s: f64| {
             let north =
                 Segment { kind: Kind::Straight(Length::Duration(duration_s)), climb_m: 0.0, ramp_s: None };
@@ -236,7 +198,6 @@ mod tests {
             assert!(track.marks.iter().any(|mark| mark.after_s == 599.0 && !mark.rows.is_empty()));
             track.steps.len()
         };
-        let (short, long) = (outline(1200.0), outline(3600.0));
-        assert!(long < short && short < 500, "{short} {long}");
+        assert!(outline(1200.0) < 300 && outline(3600.0) < 900);
     }
 }
