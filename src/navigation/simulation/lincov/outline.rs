@@ -5,7 +5,7 @@ use super::joint::add_scaled;
 use super::track::{Mark, Measured, NAV, Nav, Row, Step, Track};
 
 /// Longest step of an outline (s): with fixes, and without.
-const OUTLINE_STEP_S: [f64; 2] = [5.0, 10.0];
+const OUTLINE_STEP_S: [f64; 2] = [2.0, 5.0];
 /// Time between two reports of an outline (s).
 const REPORT_S: f64 = 10.0;
 
@@ -38,7 +38,7 @@ impl Track {
         Self { steps, marks, ..self.clone() }
     }
 
-    /// The drive in a fifth of the steps or fewer: what the search for a reduction passes along. Several fixes are one of their
+    /// The drive in half of the steps or fewer: what the search for a reduction passes along. Several fixes are one of their
     /// mean at the last of them.
     #[must_use]
     pub(super) fn outline(&self) -> Self {
