@@ -3,7 +3,7 @@
 
 use crate::earth::{GravityModel, MAX_LATITUDE, ned_difference};
 use crate::frames::NavState;
-use crate::lanes::Vec3;
+use crate::lanes::{Lanes, Vec3};
 use crate::linalg::larger;
 use crate::sensors::ideal_imu::{self, ideal_imu};
 use crate::strapdown::{self, Strapdown};
@@ -98,6 +98,7 @@ impl Closure {
                 return Err(Error::Pole { t_s });
             }
             closure.widen(&truth, &ins.lane(0));
+            damp(&mut ins, &truth, dt);
         }
         Ok(closure)
     }
@@ -122,10 +123,41 @@ impl Closure {
     }
 }
 
+/// Time constant at which height and vertical velocity return to the reference (s). Left alone their errors grow by e in 400 s,
+/// since gravity falls with height ([Groves](crate::bibliography::Groves13), sec. 5.7.2), rounding as much as any: after two
+/// hours that is no property of the trajectory. A minute is short beside it, and long beside what a vehicle does.
+const VERTICAL_S: f64 = 60.0;
+
+/// Takes the error of the vertical channel back over one sample of `dt` seconds.
+fn damp(ins: &mut Strapdown, truth: &NavState, dt: f64) {
+    let kept = (-dt / VERTICAL_S).exp();
+    ins.h = Lanes::splat(truth.h + kept * (ins.h[0] - truth.h));
+    ins.v_n[2] = Lanes::splat(truth.v_n.z + kept * (ins.v_n[2][0] - truth.v_n.z));
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
     use glam::{DQuat, DVec3};
+
+    /// Ten hours of a car at 10 Hz: rounding alone would have left the ground by e^90.
+    #[test]
+    fn ten_hours_close() {
+        let cycle = [
+            Kind::Accelerate { to_speed: 15.0, by: Acceleration::Duration(20.0) },
+            Kind::Straight(Length::Duration(820.0)),
+            Kind::Turn { angle: 1.5, by: Turning::Duration(20.0) },
+            Kind::Accelerate { to_speed: 8.0, by: Acceleration::Duration(20.0) },
+            Kind::Turn { angle: -1.4, by: Turning::Duration(20.0) },
+        ];
+        let segment = |kind: &Kind| Segment { kind: kind.clone(), climb_m: 0.0, ramp_s: None };
+        let segments = cycle.iter().cycle().take(40 * cycle.len()).map(segment).collect();
+        let start = Start { t_s: 0.0, lat: 0.8, lon: 0.1, h: 0.0, heading: 0.7, speed: 0.0 };
+        let drive = Profile { start, bank: Bank::None, ramp_s: 2.0, segments }.build().unwrap();
+        let closure = Closure::new(&drive, 10.0, GravityModel::default()).unwrap();
+        assert!(closure.duration_s >= 36_000.0 && closure.within(&Bounds::default()), "{closure:?}");
+    }
 
     /// A navigation that became NaN, at any epoch, is the largest error there is.
     #[test]

@@ -13,7 +13,7 @@ use crate::sensors::imu::Truth;
 use crate::sensors::outage::{
     FixedData, Fixes, Outage, OutageError, OutagePlan, PeriodicOutages, PlacedOutages, RandomOutages,
 };
-use crate::simulation::lincov::{Alike, Track, reduced_belief};
+use crate::simulation::lincov::{Alike, STRAPDOWN, Track, reduced_belief};
 use crate::simulation::{Experiment, ExperimentError, samples_per};
 use crate::trajectory::Trajectory;
 use crate::units::{Probability, SettingError};
@@ -275,6 +275,13 @@ impl Scenario {
         found
     }
 
+    /// The integration error of the strapdown, where the largest is a tenth of sigma: a hundredth of a mean square.
+    #[must_use]
+    pub fn unexpected_integration(&self, over_sigma: f64) -> Option<Unexpected> {
+        let rate_hz = self.imu.rate_hz;
+        (over_sigma > 0.1).then_some(Unexpected::Integration { rate_hz, over_sigma })
+    }
+
     /// The outages on a trajectory that lasts from `span_s.0` to `span_s.1`.
     ///
     /// # Errors
@@ -329,6 +336,13 @@ pub enum Unexpected {
         /// How long they last (s).
         correlation_time_s: f64,
     },
+    /// A strapdown that is too slow for the motion.
+    Integration {
+        /// Rate of the IMU (Hz).
+        rate_hz: f64,
+        /// Its largest error over the sigma that the filter states.
+        over_sigma: f64,
+    },
 }
 
 impl Unexpected {
@@ -340,6 +354,7 @@ impl Unexpected {
             Self::Scale { sensor, .. } => vec![format!("{}.scale", sensor.name())],
             Self::Misalignment { .. } => Sensor::ALL.map(|s| format!("{}.misalignment", s.name())).into(),
             Self::CorrelatedPositions { .. } => vec!["gnss.correlated".to_owned()],
+            Self::Integration { .. } => vec![STRAPDOWN.to_owned()],
         }
     }
 }

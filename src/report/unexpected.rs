@@ -32,6 +32,13 @@ pub(crate) fn unexpected_in_words(unexpected: &Unexpected) -> (String, String) {
             ),
             "a larger gnss.pos_sigma_m".to_owned(),
         ),
+        Unexpected::Integration { rate_hz, over_sigma } => (
+            format!(
+                "at {rate_hz} Hz the strapdown alone errs by {} sigma on this motion",
+                readable(*over_sigma)
+            ),
+            "a larger imu.rate_hz".to_owned(),
+        ),
     }
 }
 

@@ -62,7 +62,9 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
 
 /// Sentences beside the verdict: what helps a filter that is overconfident, where errors come from, what is left to know.
 fn notes(summary: &Summary, manifest: &Manifest, page: &mut Document) {
-    let unexpected = manifest.configuration.unexpected();
+    let scenario = &manifest.configuration;
+    let mut unexpected = scenario.unexpected();
+    unexpected.extend(scenario.unexpected_integration(summary.strapdown_over_sigma));
     let (own, analysed) = (summary.verdict.kind, summary.verdict.by_covariance_analysis);
     let is_undecided = own == VerdictKind::Undecided && analysed == Some(VerdictKind::Overconfident);
     if own == VerdictKind::Overconfident || is_undecided {
@@ -144,9 +146,14 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], manifest: &Manifest) -> 
     if is_recorded || is_modelled {
         return "the errors are not those of MODEL: nav-sim tune finds variances that cover them".to_owned();
     }
-    // no draw is in a covariance analysis: what is larger there is noise that a filter has no state for
+    // no draw is in a covariance analysis: what is larger there is an error that a filter has no state for
     if summary.method == Method::Lincov.name() && !is_too_large {
-        return "MODEL has noise that no filter contains: nav-sim tune --truth MODEL covers it".to_owned();
+        return match unexpected.first() {
+            Some(found) => unexpected_line(found),
+            None => {
+                "MODEL has noise that no filter contains: nav-sim tune --truth MODEL covers it".to_owned()
+            }
+        };
     }
     TOO_LARGE.to_owned()
 }

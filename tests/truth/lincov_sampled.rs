@@ -385,6 +385,7 @@ fn budgets_add_up_to_the_true_errors_and_to_the_believed_ones() {
         "gyro.misalignment",
         "drift",
         "gnss.correlated",
+        "strapdown",
     ];
     assert_eq!(names, expected);
 }

@@ -34,5 +34,6 @@ mod mounting;
 mod reduction;
 mod require;
 mod smoothing;
+mod strapdown_error;
 mod trajectories;
 mod tune;

@@ -6,6 +6,7 @@ use nav_sim::formats::trajectory_file::{Options, load};
 use nav_sim::navigation::scenario::{Reduction, Scenario};
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{Assessment, assess};
+use nav_sim_signal::noise::{Composite, Model, Process, RandomWalk, White};
 use std::path::Path;
 
 /// What the filter of a model does on a trajectory with outages.
@@ -51,6 +52,29 @@ fn the_default_filter_is_honest_and_that_by_wavelet_variance_is_not() {
     }
     let wavelet = cell("consumer_mems", "land_vehicle", &outages(90.0), Reduction::Wavelet);
     assert!(wavelet[1] > 1.4 && wavelet[2] > 10.0, "{wavelet:?}");
+}
+
+/// White noise and a random walk an axis fit 15 states as they are: nothing is lost, and the NEES is 9 to rounding.
+#[test]
+fn a_model_of_fifteen_states_is_its_own_reduction() {
+    let axis = |white: f64, walk: f64| {
+        Composite::new(vec![
+            Process::White(White::new(white).unwrap()),
+            Process::RandomWalk(RandomWalk::new(walk).unwrap()),
+        ])
+    };
+    let model = Model::pooled(100.0, &axis(5.4e-5, 3.3e-11), &axis(1e-8, 1e-14));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (path, _) = load(&root.join("trajectories/land_vehicle.toml"), &Options::default()).unwrap();
+    let (scenario, outages) = (Scenario::default(), outages(90.0));
+    let track = scenario.track(&path, &model, &outages).unwrap();
+    let end = |scenario: &Scenario| {
+        let belief = scenario.belief(&model, &outages, &track).unwrap();
+        assess(&track, &belief, &model).outage_ends[1]
+    };
+    let (reduced, full) = (end(&scenario), end(&scenario.with_full_noise()));
+    assert!((reduced.nees - 9.0).abs() < 1e-6, "{reduced:?}");
+    assert!((0..9).all(|i| (reduced.rmse[i] / full.rmse[i] - 1.0).abs() < 1e-12), "{reduced:?} {full:?}");
 }
 
 /// One early outage: what is chosen for its end may not give the rest of the drive away. Root mean square of error over

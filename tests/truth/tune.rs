@@ -144,3 +144,30 @@ fn the_worst_of_two_truths_is_covered() {
     let factors = drive.factors(&truths, Per::Sensor, Aim::Worst);
     assert!(factors.len() == 2 && factors.iter().all(|f| (2.0..6.0).contains(&f.on_variance)), "{factors:?}");
 }
+
+/// The factors are the smallest to 2 %: with all of them less by that, or any one of them, some error exceeds its sigma.
+#[test]
+fn no_factor_is_larger_than_it_must_be() {
+    let drive = drive();
+    let truth = model(9.0, 4.0);
+    let factors = drive.factors(std::slice::from_ref(&truth), Per::Sensor, Aim::Worst);
+    let largest = |factors: &[Factor]| {
+        let belief = drive.belief(&scaled(&model(1.0, 1.0), factors));
+        let experiment = drive.scenario.experiment(&drive.trajectory, Truth::Model(&truth), &[], &OUTAGES, 1);
+        let record = Expected::along(&drive.track, &experiment, &belief, &truth).unwrap().record;
+        let ends = &record.outages[0];
+        let at_end = (0..9).map(|i| (ends.error_end[i] / ends.see_end[i]).powi(2));
+        at_end.chain(record.normalised_sq).fold(0.0, f64::max).sqrt()
+    };
+    assert!(largest(&factors) < 1.0015, "{factors:?}");
+    let smaller = |is_of: &dyn Fn(usize) -> bool| -> Vec<Factor> {
+        let less = |(i, f): (usize, &Factor)| Factor {
+            on_variance: f.on_variance * if is_of(i) { 0.98 } else { 1.0 },
+            ..f.clone()
+        };
+        factors.iter().enumerate().map(less).collect()
+    };
+    for factors in [smaller(&|_| true), smaller(&|i| i == 0), smaller(&|i| i == 1)] {
+        assert!(largest(&factors) > 1.001, "{} {factors:?}", largest(&factors));
+    }
+}

@@ -295,8 +295,17 @@ impl AxisBelief {
         axis
     }
 
+    /// White noise and one bias: those of the model where it has no more, else its reduction.
     fn reduced(model: &Model, channel: Channel, interval_s: f64, window_s: f64) -> Result<Self, BeliefError> {
-        let reduced = reduction::reduce(model.axis(channel), model.rate_hz, interval_s, window_s)
+        let noise = model.axis(channel);
+        if reduction::is_exact(noise) {
+            let mut axis = Self::full(noise);
+            if axis.biases.is_empty() {
+                axis.push(0.0, 0.0, 0.0);
+            }
+            return Ok(axis);
+        }
+        let reduced = reduction::reduce(noise, model.rate_hz, interval_s, window_s)
             .map_err(|source| BeliefError::Reduction { channel, source })?;
         let mut axis = Self { white: reduced.white.sigma2(), biases: vec![] };
         axis.push(reduced.bias.phi(), reduced.bias.sigma2(), reduced.initial_variance);
@@ -311,6 +320,28 @@ impl AxisBelief {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::noise::{Ar1, GaussMarkov, Quantization, RandomWalk, White};
+
+    /// The filter of 15 states of a model with one bias an axis, whichever it is, is the filter with all states.
+    #[test]
+    fn a_model_that_fits_15_states_is_taken_as_it_is() {
+        let white = Process::White(White::new(5e-5).unwrap());
+        let biases = [
+            Process::RandomWalk(RandomWalk::new(3.3e-11).unwrap()),
+            Process::Ar1(Ar1::new(0.9999, 1e-11).unwrap()),
+            Process::GaussMarkov(GaussMarkov::new(0.01, 1e-6, 100.0).unwrap()),
+        ];
+        let quantization = Process::Quantization(Quantization::new(1e-7).unwrap());
+        for axes in [[0, 0, 0], [1, 1, 1], [2, 2, 2], [0, 1, 2]] {
+            let axis = |i: usize| Composite::new(vec![white, biases[axes[i]], quantization]);
+            let mut model = Model::pooled(100.0, &axis(0), &axis(0));
+            for channel in Channel::ALL {
+                model.axes[channel.index()] = axis(channel.axis as usize);
+            }
+            let made = |states| Belief::new(&model, states, 1.0, 800.0).unwrap();
+            assert_eq!(made(FilterStates::Reduced15), made(FilterStates::Full));
+        }
+    }
 
     /// Two steps of half a sample and of one and a half are two whole ones: b_{k+1} = phi b_k + w twice.
     #[test]

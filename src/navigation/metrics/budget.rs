@@ -26,6 +26,9 @@ impl Budget {
             filter.errors_at_ends(&source.side).iter().map(squares).collect()
         };
         let of_source: Vec<Vec<[f64; REPORTED]>> = sources.par_iter().map(squares).collect();
+        let is_there = |ends: &[[f64; REPORTED]]| ends.iter().flatten().any(|square| *square != 0.0);
+        let (sources, of_source): (Vec<&NamedSource>, Vec<_>) =
+            sources.iter().zip(of_source).filter(|(_, ends)| is_there(ends)).unzip();
         let outages = of_source.first().map_or(0, Vec::len);
         let budget = |k: usize| {
             let mut total = [0.0; REPORTED];

@@ -126,6 +126,7 @@ impl Expected {
             lincov: None,
             agreement: None,
             is_contradicted: false,
+            strapdown_over_sigma: 0.0,
             require: Vec::new(),
         }
     }

@@ -4,7 +4,9 @@ use super::estimate::PerState;
 use crate::ekf::Belief;
 use crate::ekf::belief::BiasGroup;
 use crate::imu::Channel;
-use crate::noise::{Ar1, Composite, Model, ParameterError, Process, White, continuous, reduction};
+use crate::noise::{
+    Ar1, Composite, Model, ParameterError, Process, RandomWalk, White, continuous, reduction,
+};
 use crate::simulation::REPORTED;
 use crate::simulation::lincov::{Assessment, Consistency};
 use glam::DVec3;
@@ -36,9 +38,9 @@ pub struct AxisReduction {
     pub bias_phi: f64,
     /// Its innovation variance (units²).
     pub bias_sigma2: f64,
-    /// Its correlation time (s).
+    /// Its correlation time (s); infinite of a random walk.
     pub bias_t_corr_s: f64,
-    /// Its stationary standard deviation (units).
+    /// Its stationary standard deviation (units); infinite of a random walk.
     pub bias_sigma: f64,
     /// Standard deviation at the start (units).
     pub initial_sigma: f64,
@@ -108,12 +110,19 @@ impl AxisReduction {
         // white noise alone has no bias: the first group, if any, is then what the filter expects beside the model
         let none = BiasGroup { phi: DVec3::ZERO, ..BiasGroup::constant(0.0) };
         let group = belief.groups[sensor].first().filter(|group| !group.is_constant()).unwrap_or(&none);
-        let (white, bias) =
-            (White::new(belief.white[sensor][i])?, Ar1::new(group.phi[i], group.innovation[i])?);
+        let white = White::new(belief.white[sensor][i])?;
+        let (phi, innovation) = (group.phi[i], group.innovation[i]);
+        // Of a random walk correlation time and variance have no bound; they are null in JSON.
+        let (bias, bias_sigma) = if phi < 1.0 {
+            let bias = Ar1::new(phi, innovation)?;
+            (Process::Ar1(bias), bias.variance().sqrt())
+        } else {
+            (Process::RandomWalk(RandomWalk::new(innovation)?), f64::INFINITY)
+        };
         let is_quantization = |p: &&Process| matches!(p, Process::Quantization(_));
         // Compared with the model as a filter can carry it: quantization noise is left out on both sides.
         let kept = reduction::carried(noise);
-        let pair = Composite::new(vec![Process::White(white), Process::Ar1(bias)]);
+        let pair = Composite::new(vec![Process::White(white), bias]);
         // Haar scales are 2, 4, 8 … samples: the nearest in the logarithm. 2^40 samples is beyond any record.
         let level = |seconds: f64| (seconds * model.rate_hz).max(2.0).log2().round().min(40.0) as u32;
         let [first, last] = scales_s.map(level);
@@ -123,10 +132,10 @@ impl AxisReduction {
         Ok(Self {
             axis: channel.to_string(),
             white_sigma2: white.sigma2(),
-            bias_phi: bias.phi(),
-            bias_sigma2: bias.sigma2(),
-            bias_t_corr_s: continuous::correlation_time_s(bias.phi(), model.rate_hz),
-            bias_sigma: bias.variance().sqrt(),
+            bias_phi: phi,
+            bias_sigma2: innovation,
+            bias_t_corr_s: continuous::correlation_time_s(phi, model.rate_hz),
+            bias_sigma,
             initial_sigma: group.initial[i].sqrt(),
             misfit: if exact { 0.0 } else { (first..=last).map(distance).fold(0.0, f64::max) },
             quantization_left_out: noise.processes.iter().any(|p| is_quantization(&p)),

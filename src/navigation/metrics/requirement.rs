@@ -1,8 +1,8 @@
 //! Limits that the errors must keep.
 
 use super::summary::{OutageSummary, Summary};
-use super::verdict::{TOLERANCE, Verdict, VerdictKind};
-use crate::simulation::REPORTED_NAMES;
+use super::verdict::{Verdict, VerdictKind};
+use crate::simulation::{REPORTED_NAMES, TOLERANCE};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;

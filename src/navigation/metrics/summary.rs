@@ -51,6 +51,10 @@ pub struct Summary {
     /// What the reduction to 15 states leaves of the model; none for the full filter.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reduction: Option<ReductionSummary>,
+    /// Largest error that the strapdown alone makes at the IMU's rate, over the sigma that the filter states; 0 (and not in
+    /// files) where the trajectory closes.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub strapdown_over_sigma: f64,
     /// What covariance analysis expects, where it stands beside runs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lincov: Option<Box<Summary>>,
@@ -63,6 +67,11 @@ pub struct Summary {
     /// What was required, and whether it is met.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub require: Vec<Met>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands references")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// ASEE and RMSE as means over epochs.
@@ -249,6 +258,7 @@ impl Summary {
             lincov: None,
             agreement: None,
             is_contradicted: false,
+            strapdown_over_sigma: 0.0,
             require: Vec::new(),
         }
     }

@@ -12,13 +12,11 @@
 
 use super::consistency::chi_square_interval;
 use super::estimate::Estimate;
-use crate::simulation::{NEES_DOF, OutageRecord, REPORTED, REPORTED_NAMES, RunRecord};
+use crate::simulation::{NEES_DOF, OutageRecord, REPORTED, REPORTED_NAMES, RunRecord, TOLERANCE};
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// Probability at which a right filter is called wrong, all statistics together.
 const LEVEL: f64 = 0.01;
-/// Errors that differ by less than this share from the filter's standard deviations are let pass.
-pub(super) const TOLERANCE: f64 = 0.1;
 /// Runs decide where errors so much larger than the filter's standard deviations would alarm: of all states together, of
 /// one state.
 const DECISIVE: [f64; 2] = [1.25, 1.5];

@@ -36,7 +36,7 @@ pub struct ImuSettings {
     /// Scale-factor error of the gyroscopes (parts per million).
     #[schemars(with = "NonNegative", range(max = 1e5))]
     pub scale_ppm_gyro: f64,
-    /// Misalignment: what each axis of both sensors takes of each other axis (rad).
+    /// Misalignment: what each axis takes of each other axis of its sensor (rad): six independent numbers a sensor.
     #[schemars(with = "NonNegative", range(max = 0.1))]
     pub misalignment_rad: f64,
 }

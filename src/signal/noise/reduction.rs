@@ -24,7 +24,7 @@ pub struct Reduced {
     /// Variance of the bias at the start (units²): that of the model's stationary processes; random walks
     /// start at 0.
     pub initial_variance: f64,
-    /// Largest |ln(reduced/model)| of the wavelet variance over the scales fitted; 0 for an exact reduction.
+    /// Largest |ln(reduced/model)| of the wavelet variance over the scales fitted.
     pub misfit: f64,
 }
 
@@ -61,9 +61,6 @@ pub fn reduce(
     window_s: f64,
 ) -> Result<Reduced, ReductionError> {
     let kept = carried(noise);
-    if let Some(exact) = exact(&kept) {
-        return exact;
-    }
     // Level 1 (two samples) is the first there is; level 40 is three and a half centuries at 100 Hz.
     let level = |seconds: f64| (seconds * rate_hz).max(2.0).log2().round();
     let levels: Vec<u32> = (level(interval_s) as u32..=level(window_s).min(40.0) as u32).collect();
@@ -87,11 +84,12 @@ pub fn reduce(
     })
 }
 
-/// Whether the noise of an axis already is white noise and at most one stationary bias, beside what the pair does not
-/// stand for.
+/// Whether a filter with one bias an axis carries the noise as it is: at most one of its processes is a bias.
 #[must_use]
 pub fn is_exact(noise: &Composite) -> bool {
-    exact(&carried(noise)).is_some()
+    let is_bias =
+        |p: &&Process| matches!(p, Process::Ar1(_) | Process::GaussMarkov(_) | Process::RandomWalk(_));
+    noise.processes.iter().filter(is_bias).count() <= 1
 }
 
 /// The processes that the pair stands for: without quantization noise and without drift.
@@ -99,25 +97,6 @@ pub fn is_exact(noise: &Composite) -> bool {
 pub fn carried(noise: &Composite) -> Composite {
     let apart = |p: &&Process| matches!(p, Process::Quantization(_) | Process::Drift(_));
     Composite::new(noise.processes.iter().filter(|p| !apart(p)).copied().collect())
-}
-
-/// The model itself when it already is white noise and at most one stationary bias.
-fn exact(kept: &Composite) -> Option<Result<Reduced, ReductionError>> {
-    let mut white = 0.0;
-    let mut bias = None;
-    for process in &kept.processes {
-        match process {
-            Process::White(p) => white += p.sigma2(),
-            Process::Ar1(p) if bias.is_none() => bias = Some(*p),
-            Process::GaussMarkov(p) if bias.is_none() => bias = Some(p.ar1()),
-            _ => return None,
-        }
-    }
-    let none = Ar1::new(0.0, 0.0);
-    Some((|| {
-        let bias = bias.map_or(none, Ok)?;
-        Ok(Reduced { white: White::new(white)?, bias, initial_variance: bias.variance(), misfit: 0.0 })
-    })())
 }
 
 fn stationary_variance(noise: &Composite) -> f64 {
@@ -246,14 +225,6 @@ mod tests {
         ]
     }
 
-    #[test]
-    fn white_noise_and_one_bias_are_left_as_they_are() {
-        let model = Composite::new(vec![ar1(0.999, 1e-9), n2()[0], n2()[4]]);
-        let reduced = reduce(&model, 100.0, 1.0, 800.0).unwrap();
-        assert_eq!((reduced.white.sigma2(), reduced.bias), (5e-5, Ar1::new(0.999, 1e-9).unwrap()));
-        assert!((reduced.initial_variance / (1e-9 / (1.0 - 0.999 * 0.999)) - 1.0).abs() < 1e-12);
-    }
-
     /// Splitting the bias of a reducible model into two equal halves changes nothing but the form, so the
     /// fit must find the model itself.
     #[test]
@@ -283,8 +254,6 @@ mod tests {
 
     #[test]
     fn degenerate_models_are_reduced_too() {
-        let none = reduce(&Composite::default(), 100.0, 1.0, 800.0).unwrap();
-        assert_eq!((none.white.sigma2(), none.bias.sigma2(), none.initial_variance), (0.0, 0.0, 0.0));
         let walk = Composite::new(vec![n2()[3]]);
         let reduced = reduce(&walk, 100.0, 1.0, 800.0).unwrap();
         // a random walk is a Gauss-Markov process of infinite correlation time

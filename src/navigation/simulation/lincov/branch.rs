@@ -51,7 +51,7 @@ pub(crate) fn errors_in_outages(
         for place in together {
             let way = &ways[*place];
             for (steps, mark) in track.legs(at..way.start) {
-                pass.follow(steps);
+                pass.follow(steps, mark);
                 pass.measure(mark, |_| true);
             }
             at = at.max(way.start);
@@ -63,9 +63,9 @@ pub(crate) fn errors_in_outages(
             let is_blind = !track.marks[way.clone()].iter().flat_map(|mark| &mark.rows).any(is_height);
             for (index, (steps, mark)) in way.clone().zip(track.legs(way.clone())) {
                 if is_blind {
-                    steps.iter().for_each(|step| pass.errors.step(step))
+                    pass.errors.follow(steps, mark);
                 } else {
-                    pass.follow(steps)
+                    pass.follow(steps, mark);
                 }
                 // The end is looked at before its measurements, a report after them, as in the runs.
                 if index + 1 == way.end {
@@ -110,11 +110,10 @@ impl<'a> Pass<'a> {
         Self { filter: Joint::new(track.start, own), errors: Errors::at_start(track, sides, truth) }
     }
 
-    pub(super) fn follow(&mut self, steps: &[Step]) {
-        for step in steps {
-            self.filter.step(step);
-            self.errors.step(step);
-        }
+    /// Over the steps that lead to a mark.
+    pub(super) fn follow(&mut self, steps: &[Step], mark: &Mark) {
+        steps.iter().for_each(|step| self.filter.step(step));
+        self.errors.follow(steps, mark);
     }
 
     /// The measurements of a mark that are wanted.

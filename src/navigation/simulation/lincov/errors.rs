@@ -1,6 +1,6 @@
 //! The true errors of a filter as they are taken along a track.
 
-use super::joint::{Gain, Joint};
+use super::joint::{Gain, Joint, add_scaled};
 use super::mean::Mean;
 use super::pass::{Instant, Judged};
 use super::sides::Sides;
@@ -19,12 +19,22 @@ impl<'a> Errors<'a> {
     /// Those of the start.
     pub(super) fn at_start(track: &Track, sides: &'a Sides, truth: &'a TruthSide) -> Self {
         let begin = if truth.starts_off { track.start } else { [[0.0; NAV]; NAV] };
-        Self { truth, joint: Joint::new(begin, sides), mean: Mean::new(sides) }
+        // A mean is rare (drifts, a strapdown too slow for the motion): without one its propagation is spared.
+        let drifts = sides.t.states.iter().any(|s| s.level != 0.0);
+        let is_off = truth.integrates && !track.is_closed();
+        let mean = (drifts || is_off).then(|| Mean::new(sides));
+        Self { truth, joint: Joint::new(begin, sides), mean }
     }
 
-    pub(super) fn step(&mut self, step: &Step) {
-        self.joint.step(step);
-        self.mean.iter_mut().for_each(|mean| mean.step(step));
+    /// Over the steps that lead to a mark.
+    pub(super) fn follow(&mut self, steps: &[Step], mark: &Mark) {
+        for step in steps {
+            self.joint.step(step);
+            self.mean.iter_mut().for_each(|mean| mean.step(step));
+        }
+        if self.truth.integrates {
+            self.mean.iter_mut().for_each(|mean| add_scaled(&mut mean.values.x, 1.0, &mark.closure));
+        }
     }
 
     /// Corrects by a measurement with the filter's gain; returns the expected square of the innovation.

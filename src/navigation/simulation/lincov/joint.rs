@@ -5,6 +5,7 @@ use super::input::{SIGNALS, StepOfSource};
 use super::sides::{Inputs, Sides};
 use super::track::{NAV, Nav, Row, Step};
 use crate::simulation::BIASES;
+use multiversion::multiversion;
 
 /// Covariance of z = \[x; b\] jointly with states t that no measurement corrects.
 ///
@@ -84,8 +85,15 @@ impl<'a> Joint<'a> {
         Column { x, b, t }
     }
 
-    /// Over one step: A P Aᵀ + Q in blocks.
+    /// Over one step.
     pub(super) fn step(&mut self, step: &Step) {
+        over(self, step);
+    }
+
+    /// A P Aᵀ + Q in blocks.
+    #[inline(always)]
+    fn propagate(&mut self, step: &Step) {
+        let signals = self.sides.signals;
         let inputs = self.sides.over(step);
         let (nb, nt) = (inputs.b.len(), inputs.t.len());
         let elapsed = self.elapsed;
@@ -97,20 +105,20 @@ impl<'a> Joint<'a> {
             inputs.b.iter().zip(&self.xb).for_each(|(s, x)| u[s.signal] += mean(s) * x[j]);
             inputs.t.iter().zip(&self.xt).for_each(|(s, x)| u[s.signal] += mean(s) * x[j]);
             // Into a copy: the cross terms below still need P before the step.
-            gx[j] = step.map(&self.xx[j], &u);
+            gx[j] = step.map(&self.xx[j], &u[..signals]);
         }
         for j in 0..nb {
             let mut u = [0.0; SIGNALS];
             inputs.b.iter().zip(&self.bb[j * nb..]).for_each(|(s, p)| u[s.signal] += mean(s) * p);
             inputs.t.iter().zip(&self.bt[j * nt..]).for_each(|(s, p)| u[s.signal] += mean(s) * p);
-            self.xb[j] = step.map(&self.xb[j], &u);
+            self.xb[j] = step.map(&self.xb[j], &u[..signals]);
         }
         for j in 0..nt {
             let mut u = [0.0; SIGNALS];
             inputs.b.iter().enumerate().for_each(|(i, s)| u[s.signal] += mean(s) * self.bt[i * nt + j]);
             // The states t are independent: of column j only its own variance feeds its signal.
             u[inputs.t[j].signal] += mean(&inputs.t[j]) * self.tt[j];
-            self.xt[j] = step.map(&self.xt[j], &u);
+            self.xt[j] = step.map(&self.xt[j], &u[..signals]);
         }
         // (A P) Aᵀ: the same map on the rows of A P.
         for i in 0..NAV {
@@ -118,7 +126,7 @@ impl<'a> Joint<'a> {
             let mut u = [0.0; SIGNALS];
             inputs.b.iter().zip(&self.xb).for_each(|(s, x)| u[s.signal] += mean(s) * x[i]);
             inputs.t.iter().zip(&self.xt).for_each(|(s, x)| u[s.signal] += mean(s) * x[i]);
-            self.xx[i] = step.map(&row, &u);
+            self.xx[i] = step.map(&row, &u[..signals]);
         }
         // The states themselves last: the maps above are of their values at the beginning of the step.
         self.step_biases(step, inputs);
@@ -135,6 +143,7 @@ impl<'a> Joint<'a> {
         }
     }
 
+    #[inline(always)]
     fn step_biases(&mut self, step: &Step, inputs: &Inputs) {
         let (nb, nt) = (inputs.b.len(), inputs.t.len());
         let decay = |x: &mut Nav, s: &StepOfSource| {
@@ -179,6 +188,11 @@ impl<'a> Joint<'a> {
 
     /// z ← z − k y for an innovation y; the gain belongs to a filter that need not be right.
     pub(super) fn correct(&mut self, y: &Innovation, gain: &Gain) {
+        corrected(self, y, gain);
+    }
+
+    #[inline(always)]
+    fn update(&mut self, y: &Innovation, gain: &Gain) {
         let (nb, nt, with) = (self.xb.len(), self.xt.len(), &y.with);
         // P − k cᵀ − c kᵀ + k s kᵀ, by (s k − c) kᵀ − k cᵀ
         // With the optimal gain s k = c and the first term is zero. Here c is of the truth and k of the
@@ -250,13 +264,12 @@ pub(super) struct Gain {
 }
 
 impl Step {
-    #[inline]
-    pub(super) fn map(&self, x: &Nav, e: &[f64; SIGNALS]) -> Nav {
+    #[inline(always)]
+    pub(super) fn map(&self, x: &Nav, e: &[f64]) -> Nav {
         let mut out = [0.0; NAV];
         for (column, x) in self.m.iter().zip(x) {
             add_scaled(&mut out, *x, column);
         }
-        // most filters have no scale factors
         for (column, e) in self.b.iter().zip(e).filter(|(_, e)| **e != 0.0) {
             add_scaled(&mut out, *e, column);
         }
@@ -264,7 +277,18 @@ impl Step {
     }
 }
 
-#[inline]
+// Products and sums of nine, for the widest vectors that the machine has: the same digits on each, since nothing is fused.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2"))]
+fn over(joint: &mut Joint<'_>, step: &Step) {
+    joint.propagate(step);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2"))]
+fn corrected(joint: &mut Joint<'_>, y: &Innovation, gain: &Gain) {
+    joint.update(y, gain);
+}
+
+#[inline(always)]
 pub(super) fn add_scaled(to: &mut Nav, factor: f64, x: &Nav) {
     for (to, x) in to.iter_mut().zip(x) {
         *to += factor * x;

@@ -16,18 +16,15 @@ pub(super) struct Mean<'a> {
 }
 
 impl<'a> Mean<'a> {
-    /// Errors that are zero at the start; none where all states of the truth have mean zero and so has everything else.
-    pub(super) fn new(sides: &'a Sides) -> Option<Self> {
+    /// Errors that are zero at the start.
+    pub(super) fn new(sides: &'a Sides) -> Self {
         let (b, t) = (&sides.b, &sides.t);
-        // A mean is rare (drifts of the truth): without one the whole propagation is spared.
-        t.states.iter().any(|s| s.level != 0.0).then(|| {
-            let values = Column {
-                x: [0.0; NAV],
-                b: vec![0.0; b.states.len()],
-                t: t.states.iter().map(|s| s.level).collect(),
-            };
-            Self { sides, values, elapsed: 0.0 }
-        })
+        let values = Column {
+            x: [0.0; NAV],
+            b: vec![0.0; b.states.len()],
+            t: t.states.iter().map(|s| s.level).collect(),
+        };
+        Self { sides, values, elapsed: 0.0 }
     }
 
     /// Over one step.

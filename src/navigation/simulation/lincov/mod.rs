@@ -34,10 +34,12 @@ mod column;
 mod consistency;
 mod descent;
 mod errors;
+mod factor;
 mod heading;
 mod input;
 mod joint;
 mod mean;
+mod outline;
 mod pass;
 mod reduce;
 mod root;
@@ -48,11 +50,14 @@ mod tune;
 
 pub(crate) use branch::{Moments, errors_in_outages};
 pub use consistency::{Departure, DrawFactors, FilterConsistency, UpperEnd};
+pub(crate) use factor::times;
+pub use factor::{Factor, scaled};
 pub use heading::{HeadingDoubt, weak_heading};
-pub use pass::{Assessment, Consistency, ErrorLaw, FilterPass, Instant, Judged, assess};
+pub use pass::{
+    Assessment, Consistency, ErrorLaw, FilterPass, Instant, Judged, assess, strapdown_over_sigma,
+};
 pub use reduce::{Alike, drive, reduced_belief};
 pub(crate) use root::Crossing;
 pub use track::Track;
-pub use truth::{DRIFT, NamedSource, TrueErrors, TruthSide};
-pub(crate) use tune::times;
-pub use tune::{Aim, Factor, Filter, Per, Task, scaled};
+pub use truth::{DRIFT, NamedSource, STRAPDOWN, TrueErrors, TruthSide};
+pub use tune::{Aim, Filter, Per, Task};

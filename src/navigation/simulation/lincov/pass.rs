@@ -4,7 +4,7 @@ use super::errors::Errors;
 use super::input::Sources;
 use super::joint::{Gain, Joint};
 use super::sides::Sides;
-use super::track::{Measured, NAV, Nav, Track};
+use super::track::{Mark, Measured, NAV, Nav, Track};
 use super::truth::{TrueErrors, TruthSide};
 use crate::ekf::Belief;
 use crate::ekf::covariance::PSI;
@@ -14,6 +14,9 @@ use crate::simulation::{BIASES, REPORTED};
 use crate::units::DEG;
 use glam::DVec3;
 use nalgebra::SMatrix;
+
+/// Yaw error over that of attitude at a pitch of 80°: 1/cos(pitch).
+const STEEP: f64 = 5.76;
 
 /// How a filter's covariance stands to that of its true errors, at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,6 +73,20 @@ impl Assessment {
 #[must_use]
 pub fn assess(track: &Track, belief: &Belief, truth: &Model) -> Assessment {
     FilterPass::new(track, belief).assess_side(&TruthSide::as_expected(belief, truth, !track.perfect))
+}
+
+/// Largest error of any reported state that the strapdown alone makes at the IMU's rate, over the standard deviation that the
+/// filter states of it; 0 where the closure along the track is good.
+#[must_use]
+pub fn strapdown_over_sigma(track: &Track, belief: &Belief) -> f64 {
+    if track.is_closed() {
+        return 0.0;
+    }
+    let law = FilterPass::new(track, belief).errors(&TruthSide::of_strapdown());
+    // At the start there is no error yet, and perhaps no standard deviation.
+    let instants = law.reports.iter().skip(1).chain(&law.outage_ends);
+    let ratios = instants.flat_map(|judged| std::iter::zip(judged.errors.rmse(), judged.sigma()));
+    ratios.map(|(error, sigma)| error / sigma).fold(0.0, f64::max)
 }
 
 /// The law of a filter's true errors at one instant: normal, with this mean and covariance, in the filter's navigation states
@@ -153,6 +170,16 @@ impl<'a> FilterPass<'a> {
         &self.biases
     }
 
+    /// Times from the start (s) of the reports at which something is measured, and the standard deviations of yaw there (degrees).
+    #[must_use]
+    pub fn yaw_while_measured(&self) -> Vec<(f64, f64)> {
+        let reports = self.track.marks.iter().filter(|mark| mark.report).zip(&self.reports);
+        // Near the vertical roll and yaw are no separate angles: yaw is uncertain there however well the attitude is known.
+        let is_separate = |mark: &Mark| mark.jacobian[2].length() < STEEP;
+        let measured = reports.filter(|(mark, _)| !mark.rows.is_empty() && is_separate(mark));
+        measured.map(|(mark, p)| (mark.after_s, deviations(&mark.jacobian, p)[REPORTED - 1])).collect()
+    }
+
     /// Standard deviations that the filter states of the reported states (m, m/s, degrees), just before the first fix
     /// after each outage (or at the end).
     #[must_use]
@@ -209,7 +236,7 @@ impl<'a> FilterPass<'a> {
         let (mut gains, mut reports) = (self.gains.iter(), self.reports.iter());
         let (mut law, mut ends) = (ErrorLaw::default(), vec![None; self.track.outages]);
         for (steps, mark) in self.track.legs(0..marks) {
-            steps.iter().for_each(|step| errors.step(step));
+            errors.follow(steps, mark);
             mark.outages.iter().for_each(|o| ends[*o] = Some(errors.judged(mark, &self.ends[*o])));
             law.nis.1 += u64::from(mark.fix);
             for (row, (gain, believed)) in mark.rows.iter().zip(&mut gains) {

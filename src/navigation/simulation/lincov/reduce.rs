@@ -41,7 +41,7 @@ pub fn reduced_belief(model: &Model, wavelet: Belief, track: &Track, alike: Alik
     if free.is_empty() {
         return wavelet;
     }
-    let track = track.coarse();
+    let track = track.outline();
     // The interval of fixes and the window matter to a reduction alone; here each process has a state.
     let full = Belief::new(model, FilterStates::Full, 1.0, 1.0);
     let best = full.map_or(Vec::new(), |full| horizontal_m(&assess(&track, &full, model)).collect());

@@ -8,6 +8,8 @@ use super::track::{Step, Track};
 pub(super) struct Sides {
     pub(super) b: Sources,
     pub(super) t: Sources,
+    /// Signals that they reach: most filters have neither scale factors nor misalignments.
+    pub(super) signals: usize,
     /// By the number of samples of a step; few numbers occur.
     inputs: Vec<(u32, Inputs)>,
 }
@@ -30,7 +32,8 @@ impl Sides {
                 inputs.push((step.samples, Inputs::new(&b, &t, step.samples)));
             }
         }
-        Self { b, t, inputs }
+        let signals = b.states.iter().chain(&t.states).map(|s| s.signal + 1).max().unwrap_or(0);
+        Self { b, t, signals, inputs }
     }
 
     /// What they do over a step of the track.

@@ -1,18 +1,20 @@
 //! A trajectory as a linear filter sees it: maps of the navigation error, and when it is measured.
 
 use super::super::plan::{Event, Experiment, ExperimentError, Plan};
-use super::input::{CROSSED, SCALED, SIGNALS, Source, place};
+use super::input::{CROSSED, SIGNALS, Source, place};
 use super::joint::add_scaled;
+use crate::closure::Bounds;
+use crate::earth::ned_difference;
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, ErrorMap, NavError, Sample};
 use crate::ekf::fix_rows;
 use crate::ekf::initial::psi_of_angles;
-use crate::frames::RollPitchYaw;
+use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::ImuSample;
-use crate::lanes::Vec3;
+use crate::lanes::{Quat, Vec3};
 use crate::strapdown::Strapdown;
 use crate::units::DEG;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use std::ops::Range;
 
 /// Navigation states: R, V, PSI.
@@ -51,7 +53,7 @@ pub(super) enum Measured {
 pub(super) struct Row {
     pub(super) h: [f64; NAV + 3],
     /// The rate that scale factors and misalignments of the gyroscope multiply (rad/s).
-    omega_ib_b: DVec3,
+    pub(super) omega_ib_b: DVec3,
     /// Variance of its white noise.
     pub(super) r: f64,
     pub(super) what: Measured,
@@ -92,6 +94,8 @@ pub(super) struct Mark {
     pub(super) outages: Vec<usize>,
     /// Roll, pitch, yaw errors (rad) from `psi_n` (rad), at the true attitude.
     pub(super) jacobian: [DVec3; 3],
+    /// Error of the strapdown algorithm over the steps that lead here (m, m/s, rad), which no sensor makes.
+    pub(super) closure: Nav,
 }
 
 /// A trajectory with its fixes, ready for any number of passes.
@@ -141,44 +145,23 @@ impl Track {
                 report: event.report,
                 outages: plan.outages.iter().enumerate().filter(ends).map(|(i, _)| i).collect(),
                 jacobian: RollPitchYaw::from_quat(event.reference.q_b_n).jacobian_of_psi_n(),
+                closure: line.close(&event.reference),
             });
         }
+        drop_closed(&mut marks);
         let (outages, perfect) = (plan.outages.len(), experiment.initial.perfect);
         Ok(Self { steps, marks, outages, start: start(plan), perfect })
+    }
+
+    /// Whether the strapdown makes no error along it.
+    pub(super) fn is_closed(&self) -> bool {
+        self.marks.iter().all(|mark| mark.closure == [0.0; NAV])
     }
 
     /// Some marks, each with the steps that lead to it.
     pub(super) fn legs(&self, marks: Range<usize>) -> impl Iterator<Item = (&[Step], &Mark)> {
         let begin = |mark: usize| mark.checked_sub(1).map_or(0, |before| self.marks[before].steps);
         marks.map(move |mark| (&self.steps[begin(mark)..self.marks[mark].steps], &self.marks[mark]))
-    }
-
-    /// As [`Self::merged`], with a report every ten, and white noise through its mean over a step as well: a tenth faster
-    /// for the hundreds of passes of a search, and within 1e-3 in every ratio.
-    #[must_use]
-    pub fn coarse(&self) -> Self {
-        let mut track = self.merged();
-        track.steps.iter_mut().for_each(|step| step.white = Vec::new());
-        let mut reports = 0;
-        for mark in &mut track.marks {
-            reports += usize::from(mark.report);
-            // One report in ten: reports enter the cost of a search as an average, and errors change slowly.
-            mark.report &= reports % 10 == 0;
-        }
-        track
-    }
-
-    /// The same with one step from mark to mark, at most a second: a few times faster. White noise is exact; a bias is
-    /// its mean over the step, which leaves up to 1e-4 of an error after ten seconds without fixes, 1.2e-3 after five.
-    #[must_use]
-    pub fn merged(&self) -> Self {
-        let (mut steps, mut marks, mut done) = (Vec::new(), self.marks.clone(), 0);
-        for mark in &mut marks {
-            // Between marks alone: no step may reach over a measurement.
-            steps.extend(self.steps[done..mark.steps].iter().cloned().reduce(|a, b| a.then(&b)));
-            (done, mark.steps) = (mark.steps, steps.len());
-        }
-        Self { steps, marks, ..self.clone() }
     }
 }
 
@@ -230,6 +213,22 @@ impl Linearisation {
         step
     }
 
+    /// Error of the strapdown since the reference was met last (m, m/s, rad), estimate less truth; it goes on from the reference.
+    fn close(&mut self, reference: &NavState) -> Nav {
+        let ins = &mut self.ins;
+        let r = ned_difference(reference, ins.lat, ins.lon, ins.h);
+        let v: [f64; 3] = std::array::from_fn(|i| ins.v_n[i] - reference.v_n[i]);
+        let q = &ins.q_b_n;
+        let found = DQuat::from_xyzw(q.v[0], q.v[1], q.v[2], q.w).normalize();
+        let turned = found * reference.q_b_n.conjugate();
+        // found = exp(psi_n) · reference, and q and −q are the same rotation
+        let psi = turned.xyz() * 2.0_f64.copysign(turned.w);
+        // The sample before and its Coriolis term stay: coning and sculling are of two samples.
+        (ins.lat, ins.lon, ins.h) = (reference.lat, reference.lon, reference.h);
+        (ins.v_n, ins.q_b_n) = (Vec3::splat(reference.v_n), Quat::splat(reference.q_b_n));
+        flat(&[r.to_array(), v, psi.to_array()].map(Vec3))
+    }
+
     fn rows(&self, plan: &Plan<'_>, event: &Event) -> Vec<Row> {
         let experiment = plan.experiment;
         let mut rows = Vec::new();
@@ -252,41 +251,22 @@ impl Linearisation {
     }
 }
 
+/// Sets the errors of the strapdown to zero where all of them together stay below what a closure may have: beside the errors
+/// of any receiver and IMU they are nothing, and a mean need not be propagated.
+fn drop_closed(marks: &mut [Mark]) {
+    let bounds = Bounds::default();
+    let mut sum = [0.0; NAV];
+    marks.iter().for_each(|mark| add_scaled(&mut sum, 1.0, &mark.closure));
+    let length = |block: usize| sum[3 * block..3 * block + 3].iter().map(|x| x * x).sum::<f64>().sqrt();
+    let is_closed = length(R) <= bounds.position_m
+        && length(V) <= bounds.velocity_m_s
+        && length(PSI) <= bounds.attitude_rad;
+    if is_closed {
+        marks.iter_mut().for_each(|mark| mark.closure = [0.0; NAV]);
+    }
+}
+
 impl Step {
-    /// This step and then another, as one.
-    fn then(self, next: &Self) -> Self {
-        let none = [0.0; SIGNALS];
-        let mut b = self.b.map(|column| next.map(&column, &none));
-        for (sum, column) in b.iter_mut().flatten().zip(next.b.iter().flatten()) {
-            // The response to a constant input: that of the first part, carried through the second, and that
-            // of the second.
-            *sum += column;
-        }
-        // White noise of the two parts is independent: through the mean of a second it would move a position by
-        // a quarter of T³ where it is a third.
-        let mut white = self.white_noise();
-        for (sum, more) in white.iter_mut().zip(next.white_noise()) {
-            let carried = sum.map(|column| next.map(&column, &none));
-            for (i, more) in more.iter().enumerate() {
-                // Symmetric: the rows of a carried covariance are its columns.
-                sum[i] = next.map(&carried.map(|column| column[i]), &none);
-                add_scaled(&mut sum[i], 1.0, more);
-            }
-        }
-        let m = self.m.map(|column| next.map(&column, &none));
-        Self { samples: self.samples + next.samples, m, b, white }
-    }
-
-    /// Its `white`, whether it is there or follows from the mean over the step.
-    fn white_noise(&self) -> Vec<[Nav; NAV]> {
-        let of_mean = |b: &Nav| b.map(|factor| b.map(|b| b * factor / f64::from(self.samples)));
-        if self.white.is_empty() {
-            self.b[..SCALED].iter().map(of_mean).collect()
-        } else {
-            self.white.clone()
-        }
-    }
-
     /// The map of a sample after this one, or of the Earth, which feels no sample; of the first `signals` signals.
     fn apply(&mut self, map: &impl ErrorMap<f64>, sample: &ImuSample, signals: usize) {
         let zero = Vec3([0.0; 3]);

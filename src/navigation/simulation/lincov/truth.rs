@@ -18,6 +18,8 @@ pub struct TruthSide {
     pub(super) starts_off: bool,
     /// Whether the white noise of positions, velocities and heights is there.
     noise: [bool; 3],
+    /// Whether the strapdown integrates the samples with the error that it has at the IMU's rate.
+    pub(super) integrates: bool,
 }
 
 /// What may be true of an IMU and its receiver: a noise model at the IMU's rate, and what is wrong beside it. Where
@@ -60,6 +62,8 @@ impl NamedSource {
 
 /// The name of the source that all drifts are.
 pub const DRIFT: &str = "drift";
+/// The name of the source that the integration error of the strapdown is.
+pub const STRAPDOWN: &str = "strapdown";
 
 impl TruthSide {
     /// Several independent sources together.
@@ -69,6 +73,7 @@ impl TruthSide {
         for NamedSource { side: part, .. } in parts {
             all.inertial.extend(&part.inertial);
             all.starts_off |= part.starts_off;
+            all.integrates |= part.integrates;
             all.noise.iter_mut().zip(part.noise).for_each(|(there, more)| *there |= more);
         }
         all
@@ -87,7 +92,13 @@ impl TruthSide {
         }
         parts.extend(inertial(DRIFT.to_owned(), drifts));
         parts.extend(correlated(experiment.gnss, experiment.rate_hz));
+        parts.push(NamedSource::new(STRAPDOWN, Self::of_strapdown()));
         parts
+    }
+
+    /// The integration error of the strapdown alone.
+    pub(super) fn of_strapdown() -> Self {
+        Self { integrates: true, ..Self::default() }
     }
 
     /// The sources that a filter believes in: its bias states instead of a model's processes.
@@ -106,14 +117,14 @@ impl TruthSide {
     pub(super) fn as_expected(belief: &Belief, model: &Model, starts_off: bool) -> Self {
         let mut inertial = Sources::of_model(model);
         inertial.states.extend(Sources::beside_model(belief));
-        Self { inertial, starts_off, noise: [true; 3] }
+        Self { inertial, starts_off, noise: [true; 3], integrates: false }
     }
 
     /// The same, with what the settings of the true IMU and of the receiver state in the place of what the filter
-    /// expects: turn-on biases (a 0 too), scale factors, misalignment, correlated errors of positions.
+    /// expects: turn-on biases (a 0 too), scale factors, misalignment, correlated errors of positions. The strapdown errs.
     pub(super) fn as_stated(belief: &Belief, errors: &TrueErrors, starts_off: bool) -> Self {
         let TrueErrors { model, imu, gnss } = errors;
-        let mut all = Self::as_expected(belief, model, starts_off);
+        let mut all = Self { integrates: true, ..Self::as_expected(belief, model, starts_off) };
         let mut stated: Vec<NamedSource> = correlated(gnss, imu.rate_hz).into_iter().collect();
         // the processes of the model come first and stay; an expectation has its place in the list after them
         let own = Sources::of_model(model).states.len();

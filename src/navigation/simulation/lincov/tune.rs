@@ -7,15 +7,16 @@
 
 use super::consistency::{DrawFactors, FilterConsistency, UpperEnd};
 use super::descent::Descent;
+use super::factor::{Factor, MAX_LN, multiplied, scaled, set};
 use super::pass::{Assessment, FilterPass};
 use super::reduce::divergence;
 use super::root::Crossing;
 use super::track::Track;
 use super::truth::TrueErrors;
 use crate::ekf::{Belief, BeliefError};
-use crate::imu::{Channel, Sensor};
-use crate::noise::{Model, Process};
-use crate::simulation::{NEES_DOF, REPORTED};
+use crate::imu::Sensor;
+use crate::noise::Model;
+use crate::simulation::{NEES_DOF, REPORTED, TOLERANCE as VERDICT_TOLERANCE};
 use rayon::prelude::*;
 
 /// How a model becomes a filter.
@@ -68,27 +69,6 @@ pub struct Task<'a> {
     pub allow_smaller: bool,
 }
 
-/// What is multiplied, and by what.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Factor {
-    /// The sensor.
-    pub sensor: Sensor,
-    /// Label of the process, as [`crate::noise::Composite::labels`]; none: all of the sensor's.
-    pub process: Option<String>,
-    /// The factor on its variance.
-    pub on_variance: f64,
-}
-
-impl Factor {
-    /// Whether the search ended at the largest factor that it tries, e^12: the factor says nothing then.
-    #[must_use]
-    pub fn is_at_limit(&self) -> bool {
-        self.on_variance.ln().abs() > MAX_LN - 1e-6
-    }
-}
-
-/// Largest logarithm of a factor.
-const MAX_LN: f64 = 12.0;
 const ITERATIONS: usize = 60;
 /// A step that gains less divergence is the last.
 const ENOUGH: f64 = 1e-6;
@@ -102,8 +82,10 @@ const OVERCONFIDENT: f64 = 200.0;
 const TOLERANCE: f64 = 0.005;
 /// How often at most what draws add is found anew.
 const ROUNDS: usize = 5;
-/// How close the last factor brings it.
+/// An error that exceeds its sigma by less than this share is as large as stated.
 const EXACT: f64 = 1e-3;
+/// How close the factors come to the smallest, as a logarithm.
+const RESOLUTION: f64 = 0.005;
 
 impl Task<'_> {
     /// The factors, 1 for all where the filter is consistent already.
@@ -126,7 +108,7 @@ impl Task<'_> {
                 break;
             }
             let found = self.consistency_and_draws(self.filter, &factors)?;
-            if self.excess(&found.0).abs() <= TOLERANCE {
+            if self.excess(&found.0).abs() <= TOLERANCE || is_as_cautious_as_may_be(&found.0) {
                 break;
             }
             draw_factors = found.1;
@@ -162,14 +144,37 @@ impl Task<'_> {
         // From the model as it is, which keeps factors small; and from one factor on all that makes it consistent, since between
         // the two the valley may be flat. The second counts where it is better by what can be seen.
         let unchanged = vec![0.0; factors.len()];
-        let exact = |ln: &[f64]| self.exact(factors, ln, low, draw_factors);
-        let alike = exact(&unchanged)?.iter().map(|f| f.on_variance.ln()).collect();
+        let at = |ln: &[f64]| self.consistency_with(self.filter, &set(factors, ln), draw_factors);
+        let exact = |ln: &[f64]| self.exact(ln, low, &at);
+        let alike = exact(&unchanged)?;
         let near = descent.minimum(unchanged.clone()).unwrap_or(unchanged);
         let best = match descent.minimum(alike) {
             Some(far) if cost(&far) < cost(&near) - VISIBLE => far,
             _ => near,
         };
-        exact(&best)
+        let mut best = exact(&best)?;
+        if self.aim == Aim::Worst {
+            self.lower_alone(&mut best, low, &at)?;
+        }
+        Ok(set(factors, &best))
+    }
+
+    /// Lowers each factor whose noise binds no error, until it does.
+    fn lower_alone(&self, ln: &mut [f64], low: f64, at: &At<'_>) -> Result<(), BeliefError> {
+        for i in 0..ln.len() {
+            let moved = |by: f64| {
+                let mut moved = ln.to_vec();
+                moved[i] += by;
+                moved
+            };
+            let covers = |by: f64| Ok(self.excess(&at(&moved(by))?) <= EXACT);
+            let bounds = (low - ln[i], 0.0);
+            // A filter that may be no more cautious covers no upper end: there is nothing to lower.
+            if bounds.0 < -RESOLUTION && covers(0.0)? {
+                ln[i] += smallest(bounds, covers)?;
+            }
+        }
+        Ok(())
     }
 
     /// Every truth under a filter made of the scaled model.
@@ -275,92 +280,73 @@ impl Task<'_> {
         }
     }
 
-    /// One more factor on all of them, no factor below the lowest, so that the filter is consistent.
-    fn exact(
-        &self,
-        factors: &[Factor],
-        ln: &[f64],
-        low: f64,
-        draw_factors: Option<&DrawFactors>,
-    ) -> Result<Vec<Factor>, BeliefError> {
-        let moved = |by: f64| {
-            let ln: Vec<f64> = ln.iter().map(|x| (x + by).clamp(low, MAX_LN)).collect();
-            set(factors, &ln)
-        };
+    /// The logarithms with one number added to all, none below the lowest: the filter is consistent in the mean, or the least
+    /// cautious that covers the worst.
+    fn exact(&self, ln: &[f64], low: f64, at: &At<'_>) -> Result<Vec<f64>, BeliefError> {
+        let moved = |by: f64| -> Vec<f64> { ln.iter().map(|x| (x + by).clamp(low, MAX_LN)).collect() };
         // Down to where the largest factor meets the lowest bound: below that nothing changes any more.
         let highest = ln.iter().copied().fold(low, f64::max);
-        let crossing = Crossing { bounds: (low - highest, MAX_LN), step: 0.1, exact: EXACT };
-        let excess = |by: f64| {
-            let consistency = self.consistency_with(self.filter, &moved(by), draw_factors)?;
-            Ok::<_, BeliefError>(self.excess(&consistency))
-        };
-        let (by, _) = crossing.from(0.0, excess)?;
-        Ok(moved(by))
+        let bounds = (low - highest, MAX_LN);
+        if self.aim == Aim::Mean {
+            let crossing = Crossing { bounds, step: 0.1, exact: EXACT };
+            let (by, _) = crossing.from(0.0, |by| Ok::<_, BeliefError>(self.excess(&at(&moved(by))?)))?;
+            return Ok(moved(by));
+        }
+        let covering = smallest(bounds, |by| Ok(self.excess(&at(&moved(by))?) <= EXACT))?;
+        // Draws have upper ends that the filter cannot cover and still be what `run` calls consistent: then it is as cautious
+        // as it may be.
+        let too_cautious = |by: f64| Ok(is_too_cautious(&at(&moved(by))?));
+        if self.drawn.is_some() && too_cautious(covering)? {
+            let by = smallest((bounds.0, covering), too_cautious)? - RESOLUTION;
+            return Ok(moved(by.max(bounds.0)));
+        }
+        Ok(moved(covering))
     }
 }
 
-/// The factors of a model, all 1. Processes without amplitude have none, nor has quantization noise, which no
-/// filter contains.
-fn multiplied(model: &Model, per: Per) -> Vec<Factor> {
-    let mut factors: Vec<Factor> = Vec::new();
-    for channel in Channel::ALL {
-        let axis = model.axis(channel);
-        for (_, label) in axis.processes.iter().zip(axis.labels()).filter(|(p, _)| is_felt(p)) {
-            let process = (per == Per::Process).then_some(label);
-            if !factors.iter().any(|f| f.sensor == channel.sensor && f.process == process) {
-                factors.push(Factor { sensor: channel.sensor, process, on_variance: 1.0 });
+/// The consistency of the tuned filter for logarithms of the factors.
+type At<'a> = dyn Fn(&[f64]) -> Result<FilterConsistency, BeliefError> + 'a;
+
+/// Whether `run` calls the filter underconfident.
+fn is_too_cautious(found: &FilterConsistency) -> bool {
+    found.range[0] < 1.0 / (1.0 + VERDICT_TOLERANCE)
+}
+
+/// Whether it would, were its variances larger by what the search resolves.
+fn is_as_cautious_as_may_be(found: &FilterConsistency) -> bool {
+    !is_too_cautious(found) && found.range[0] < 1.0 / (1.0 + VERDICT_TOLERANCE) + 2.0 * RESOLUTION
+}
+
+/// The smallest number within bounds for which a condition holds that goes on holding above; the upper bound where it holds for
+/// none. A bracket from 0 first, then halves of it.
+fn smallest(
+    (low, high): (f64, f64),
+    holds: impl Fn(f64) -> Result<bool, BeliefError>,
+) -> Result<f64, BeliefError> {
+    let start = 0.0_f64.clamp(low, high);
+    let (mut fails, mut fits, mut step) = (start, start, 2.0 * RESOLUTION);
+    if holds(start)? {
+        while fails == fits || holds(fails)? {
+            fits = fails;
+            fails = (fits - step).max(low);
+            step *= 2.0;
+            if fails == fits {
+                return Ok(low);
+            }
+        }
+    } else {
+        while fails == fits || !holds(fits)? {
+            fails = fits;
+            fits = (fails + step).min(high);
+            step *= 2.0;
+            if fails == fits {
+                return Ok(high);
             }
         }
     }
-    factors
-}
-
-/// Whether a filter models the process and its amplitude is not zero.
-fn is_felt(process: &Process) -> bool {
-    let (_, amplitude) = amplitude(process);
-    amplitude != 0.0 && !matches!(process, Process::Quantization(_))
-}
-
-/// The parameter that a process is proportional to.
-fn amplitude(process: &Process) -> (&'static str, f64) {
-    match process {
-        Process::White(p) => ("sigma2", p.sigma2()),
-        Process::Quantization(p) => ("q2", p.q2()),
-        Process::Ar1(p) => ("sigma2", p.sigma2()),
-        Process::RandomWalk(p) => ("gamma2", p.gamma2()),
-        Process::Drift(p) => ("slope", p.slope()),
-        Process::GaussMarkov(p) => ("s2", p.s2()),
-        Process::Ma1(p) => ("sigma2", p.sigma2()),
+    while fits - fails > RESOLUTION {
+        let middle = 0.5 * (fails + fits);
+        if holds(middle)? { fits = middle } else { fails = middle }
     }
-}
-
-fn set(factors: &[Factor], ln: &[f64]) -> Vec<Factor> {
-    factors.iter().zip(ln).map(|(f, ln)| Factor { on_variance: ln.exp(), ..f.clone() }).collect()
-}
-
-/// A model whose processes are multiplied; the factors are the same at any sample rate.
-#[must_use]
-pub fn scaled(model: &Model, factors: &[Factor]) -> Model {
-    let mut scaled = model.clone();
-    for channel in Channel::ALL {
-        let axis = &mut scaled.axes[channel.index()];
-        for (process, label) in axis.processes.iter_mut().zip(model.axis(channel).labels()) {
-            let own =
-                |f: &&Factor| f.sensor == channel.sensor && f.process.as_ref().is_none_or(|p| *p == label);
-            if let Some(factor) = factors.iter().find(own).filter(|_| is_felt(process)) {
-                *process = times(process, factor.on_variance, model.rate_hz);
-            }
-        }
-    }
-    scaled
-}
-
-/// A process whose variance is multiplied.
-pub(crate) fn times(process: &Process, on_variance: f64, rate_hz: f64) -> Process {
-    let (name, value) = amplitude(process);
-    // a drift has an amplitude, the others a variance
-    let factor = if matches!(process, Process::Drift(_)) { on_variance.sqrt() } else { on_variance };
-    let changed = process.with_parameter(name, value * factor, rate_hz).and_then(Result::ok);
-    // beyond the largest number nothing is left to enlarge
-    changed.unwrap_or(*process)
+    Ok(fits)
 }
