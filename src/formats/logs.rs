@@ -20,7 +20,8 @@ pub struct LogOptions {
 /// The kind of log that a file is by its first bytes; none for tables and arrays. What cannot be opened is for its reader
 /// to refuse, and a pipe gives its bytes once.
 pub(crate) fn kind_of(path: &Path) -> Option<Kind> {
-    let file = File::open(path).ok().filter(|file| file.metadata().is_ok_and(|data| data.is_file()))?;
+    std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?;
+    let file = File::open(path).ok()?;
     let mut head = Vec::new();
     file.take(HEAD as u64).read_to_end(&mut head).ok()?;
     recognise(&head)

@@ -179,11 +179,12 @@ fn fusion_with_scale_factors_is_nearer_to_the_reference() {
     done(path, "trajectory record drive.toml imu.toml --scenario scenario.toml --seed 3 -o rec");
     let start = fs::read_to_string(path.join("rec/initial.toml")).unwrap();
     assert!(start.contains("accel_scale_sigma_ppm = 3000.0\n"), "{start}");
-    let nees = |flags: &str| {
+    let nees = |scale_ppm: &str, states: &str| {
+        let known = start.replace("accel_scale_sigma_ppm = 3000.0\n", scale_ppm);
+        fs::write(path.join("start.toml"), known).unwrap();
         let command = format!(
-            "fuse rec/imu.csv rec/gnss.csv imu.toml --initial rec/initial.toml --reference rec/reference.csv {flags} \
-             -o out{}",
-            flags.len()
+            "fuse rec/imu.csv rec/gnss.csv imu.toml --initial start.toml --reference rec/reference.csv \
+             --filter {states} -o out{states}"
         );
         let ran = nav_sim(path, &format!("{command} --format json"));
         let summary: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
@@ -193,7 +194,8 @@ fn fusion_with_scale_factors_is_nearer_to_the_reference() {
             summary["reference"]["nees_mean"].as_f64().unwrap(),
         )
     };
-    let (told, unaware) = (nees("--filter 21 --scale-ppm 3000,3000"), nees("--scale-ppm 0,0"));
+    let both = "accel_scale_sigma_ppm = 3000.0\ngyro_scale_sigma_ppm = 3000.0\n";
+    let (told, unaware) = (nees(both, "21"), nees("", "15"));
     println!("fuse: {told:?} {unaware:?}");
     // exit code 3: the reference contradicts the solution
     assert_eq!((told.0, told.1, unaware.0, unaware.1), (0, 21, 3, 15));
@@ -209,8 +211,10 @@ fn a_model_with_a_drift_runs_with_any_filter() {
         let command = format!(
             "run drive.toml imu.toml --runs 1 --outage 30:40 --filter {states} --seed 1 -o o{states}"
         );
-        let said = done(place.path(), &command).stdout;
-        assert!(said.contains(&format!("{number} states")), "{said}");
+        done(place.path(), &command);
+        let summary = fs::read_to_string(place.path().join(format!("o{states}/summary.json"))).unwrap();
+        let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+        assert_eq!(summary["filter_states"], number, "{states}");
     }
 }
 
