@@ -36,7 +36,7 @@ pub struct Drive {
 pub enum ChoiceError {
     /// Recordings that cannot be measured.
     #[error(transparent)]
-    Job(#[from] JobError),
+    Job(Box<JobError>),
     /// Too few recordings to leave one out.
     #[error("{recordings} recordings are too few to leave one out: {needed} or more are needed")]
     TooFew {
@@ -72,6 +72,12 @@ pub enum ChoiceError {
         /// Why.
         source: BeliefError,
     },
+}
+
+impl From<JobError> for ChoiceError {
+    fn from(e: JobError) -> Self {
+        Self::Job(Box::new(e))
+    }
 }
 
 /// One recording left out.

@@ -50,7 +50,7 @@ impl From<JobError> for Failure {
 impl From<ChoiceError> for Failure {
     fn from(e: ChoiceError) -> Self {
         match e {
-            ChoiceError::Job(e) => e.into(),
+            ChoiceError::Job(e) => (*e).into(),
             ChoiceError::TooFew { .. } => {
                 Self::input(e).hint("each recording is a file; nav-sim calibrate takes fewer")
             }

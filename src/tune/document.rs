@@ -31,9 +31,7 @@ impl Answer for TuneResult {
             document.note(Importance::Remark, format!("--filter {states} tunes the default of run"));
         }
         if self.is_drawn {
-            let largest = readable(self.after.largest.ratio);
-            let counted =
-                format!("upper ends of the 95 % intervals that run states: errors up to {largest} × sigma");
+            let counted = "errors count up to the upper end of the 95 % interval that run states";
             document.note(Importance::Remark, counted);
         }
         let truths: Vec<&str> = self.truths.iter().map(String::as_str).collect();

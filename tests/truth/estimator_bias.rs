@@ -69,6 +69,9 @@ fn estimates_are_unbiased_however_much_quantization_noise_there_is() {
 /// freedom. Weighted by the observed variance its low values rule: of 200 recordings random walks were 19 % low in the mean
 /// and 37 times too low at worst. By that of the model the mean of 100 estimates is the truth to four of its standard errors
 /// (plus the 21 % by which the robust variance of that scale reads high, at a quarter of the weight), none is 20 times too low.
+/// A robust variance that is high beyond chance counts little, as a shock would: of 2.3 % of recordings the last scale but one,
+/// which has five degrees of freedom, is that by chance, and without it a random walk may read as none. Of 100 recordings more
+/// than 7 have a probability of 2e-3.
 #[test]
 fn a_scale_that_is_low_by_chance_does_not_rule() {
     let truth = Composite::new(vec![
@@ -76,7 +79,7 @@ fn a_scale_that_is_low_by_chance_does_not_rule() {
         Process::RandomWalk(RandomWalk::new(1e-5).unwrap()),
     ]);
     let spec: ModelSpec = "WN+RW".parse().unwrap();
-    for (estimator, allowed) in [(Estimator::Gmwm, 0.0), (Estimator::Rgmwm, 0.05)] {
+    for (estimator, allowed, most) in [(Estimator::Gmwm, 0.0, 0), (Estimator::Rgmwm, 0.05, 7)] {
         let ratio = |run: u64| {
             let key = StreamKey { seed: 5, scenario: "low", run, source: "", process: "" };
             let mut signal = vec![0.0; 1 << 14];
@@ -89,7 +92,8 @@ fn a_scale_that_is_low_by_chance_does_not_rule() {
         let mean = ratios.iter().sum::<f64>() / 100.0;
         let error = (ratios.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / 99.0 / 100.0).sqrt();
         assert!((mean - 1.0).abs() < 4.0 * error + allowed, "{}: {mean} ± {error}", estimator.name());
-        assert!(ratios.iter().all(|r| *r > 0.05), "{}: {ratios:?}", estimator.name());
+        let low = ratios.iter().filter(|r| **r < 0.05).count();
+        assert!(low <= most, "{}: {ratios:?}", estimator.name());
     }
 }
 

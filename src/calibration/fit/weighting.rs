@@ -7,8 +7,8 @@ use crate::wavelet::{Curve, interval};
 pub enum Weighting {
     /// edof/(2 nu(theta)²), the inverse variance of nu_hat where the model holds, with edof limited by what recordings differ
     /// by. The fit is repeated until the weights are those of its own result; a variance that is low by chance weighs no more
-    /// than others. One that is high beyond chance weighs less with the fourth power of how high it is, so that a step or a
-    /// shock at some scales does not draw the model with it.
+    /// than others. A robust one that is high beyond chance weighs less with the fourth power of how high it is, so that a
+    /// step or a shock at some scales does not draw the model with it.
     #[default]
     Model,
     /// edof/(2 nu_hat²), the convention of the literature: what is low by chance weighs most.
@@ -34,7 +34,8 @@ nav_sim_signal::named!(
 impl Weighting {
     /// √Omega_j of each scale (1/units²), where its variance is taken to be `nu`.
     pub(crate) fn roots(self, curve: &Curve, nu: &[f64]) -> Vec<f64> {
-        if self == Self::Model {
+        // A classical variance has no protection of its own that its weight could keep.
+        if self == Self::Model && curve.quantization.is_some() {
             let plain = inverse_deviations(curve, nu).into_iter();
             let scales = curve.wv.iter().zip(nu).zip(&curve.edof);
             return plain.zip(scales).map(|(root, ((wv, nu), edof))| root * trust(wv / nu, *edof)).collect();
@@ -42,7 +43,8 @@ impl Weighting {
         let root = |((nu, edof), level): ((&f64, &f64), &u32)| match self {
             _ if curve.ignored.contains(level) => 0.0,
             // var nu_hat = 2 nu²/eta.
-            Self::Model | Self::Edof | Self::Full => (0.5 * edof).sqrt() / nu,
+            Self::Model => 1.0 / (nu * (2.0 / edof + curve.differing).sqrt()),
+            Self::Edof | Self::Full => (0.5 * edof).sqrt() / nu,
             Self::Interval => {
                 let (low, high) = interval::interval(*nu, *edof, 0.95);
                 1.0 / (high - low)
@@ -66,7 +68,14 @@ pub(crate) fn inverse_deviations(curve: &Curve, nu: &[f64]) -> Vec<f64> {
 /// Factor of √Omega where a variance is so many times that of the model: 1 up to one standard deviation above it, the inverse
 /// square from two on. On 120 contaminated sets of Minaretzis' Section IV this gave random walks as near as
 /// [`Weighting::Edof`] does, and on clean ones a median nearer to the truth (docs/mathematics.md).
+///
+/// Of fewer than four degrees of freedom even twice the model is chance (one in nine of three), and the last scale of a
+/// recording is all that tells of its random walk.
 fn trust(ratio: f64, edof: f64) -> f64 {
+    const FEWEST: f64 = 4.0;
+    if edof < FEWEST {
+        return 1.0;
+    }
     let above = (score(ratio, edof) - 1.0).clamp(0.0, 1.0);
     // Smooth at either end: the derivatives of a fit with respect to its curve rest on that of the weights.
     ratio.powf(-2.0 * above * above * (3.0 - 2.0 * above))

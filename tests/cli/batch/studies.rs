@@ -97,7 +97,8 @@ fn shipped_studies_are_studies_and_their_schema_knows_their_keys() {
 #[test]
 fn fixes_too_rare_for_the_reduction_are_blamed_on_their_rate() {
     let place = place();
-    let walk = MODEL.replace("\"AR1\", phi = 0.9999, sigma2", "\"RW\", gamma2");
+    // two biases an axis: one alone is its own filter
+    let walk = MODEL.replace("{ type = \"AR1\"", "{ type = \"RW\", gamma2 = 1e-14 }, { type = \"AR1\"");
     fs::write(place.path().join("imu.toml"), walk).unwrap();
     let rare = STUDY.replace("{ sweep = { start_s = 30, duration_s = [2, 4, 8, 16] } }, ", "")
         + "[[gnss]]\nname = \"rare\"\nsettings.rate_hz = 0.001\n";

@@ -73,7 +73,8 @@ fn covariance_analysis_is_a_method_of_run() {
 fn fixes_too_rare_for_the_reduction_are_blamed_on_their_rate() {
     let place = place();
     fs::write(place.path().join("rare.toml"), "[gnss]\nrate_hz = 0.001\n").unwrap();
-    let walk = MODEL.replace("\"AR1\", phi = 0.9999, sigma2", "\"RW\", gamma2");
+    // two biases an axis: one alone is its own filter
+    let walk = MODEL.replace("{ type = \"AR1\"", "{ type = \"RW\", gamma2 = 1e-14 }, { type = \"AR1\"");
     fs::write(place.path().join("walk.toml"), walk).unwrap();
     let full = "hint: raise it, or take the full filter (--filter full)";
     for (command, hint) in [

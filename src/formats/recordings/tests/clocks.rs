@@ -56,7 +56,7 @@ fn a_rate_that_changes_is_refused() {
             0.01 * (1.0 + 0.4 * (k as f64 * 2.4).sin())
         }]
     {
-        assert!(read_one("a.csv", &times(steps, 4000), &ReadOptions::default()).is_ok());
+        assert!(read_one("a.csv", times(steps, 4000), &ReadOptions::default()).is_ok());
     }
 }
 

@@ -16,7 +16,7 @@ use super::truth::TrueErrors;
 use crate::ekf::{Belief, BeliefError};
 use crate::imu::Sensor;
 use crate::noise::Model;
-use crate::simulation::{NEES_DOF, REPORTED, TOLERANCE as VERDICT_TOLERANCE};
+use crate::simulation::{NEES_DOF, REPORTED};
 use rayon::prelude::*;
 
 /// How a model becomes a filter.
@@ -108,7 +108,7 @@ impl Task<'_> {
                 break;
             }
             let found = self.consistency_and_draws(self.filter, &factors)?;
-            if self.excess(&found.0).abs() <= TOLERANCE || is_as_cautious_as_may_be(&found.0) {
+            if self.excess(&found.0).abs() <= TOLERANCE {
                 break;
             }
             draw_factors = found.1;
@@ -169,7 +169,6 @@ impl Task<'_> {
             };
             let covers = |by: f64| Ok(self.excess(&at(&moved(by))?) <= EXACT);
             let bounds = (low - ln[i], 0.0);
-            // A filter that may be no more cautious covers no upper end: there is nothing to lower.
             if bounds.0 < -RESOLUTION && covers(0.0)? {
                 ln[i] += smallest(bounds, covers)?;
             }
@@ -293,29 +292,12 @@ impl Task<'_> {
             return Ok(moved(by));
         }
         let covering = smallest(bounds, |by| Ok(self.excess(&at(&moved(by))?) <= EXACT))?;
-        // Draws have upper ends that the filter cannot cover and still be what `run` calls consistent: then it is as cautious
-        // as it may be.
-        let too_cautious = |by: f64| Ok(is_too_cautious(&at(&moved(by))?));
-        if self.drawn.is_some() && too_cautious(covering)? {
-            let by = smallest((bounds.0, covering), too_cautious)? - RESOLUTION;
-            return Ok(moved(by.max(bounds.0)));
-        }
         Ok(moved(covering))
     }
 }
 
 /// The consistency of the tuned filter for logarithms of the factors.
 type At<'a> = dyn Fn(&[f64]) -> Result<FilterConsistency, BeliefError> + 'a;
-
-/// Whether `run` calls the filter underconfident.
-fn is_too_cautious(found: &FilterConsistency) -> bool {
-    found.range[0] < 1.0 / (1.0 + VERDICT_TOLERANCE)
-}
-
-/// Whether it would, were its variances larger by what the search resolves.
-fn is_as_cautious_as_may_be(found: &FilterConsistency) -> bool {
-    !is_too_cautious(found) && found.range[0] < 1.0 / (1.0 + VERDICT_TOLERANCE) + 2.0 * RESOLUTION
-}
 
 /// The smallest number within bounds for which a condition holds that goes on holding above; the upper bound where it holds for
 /// none. A bracket from 0 first, then halves of it.
