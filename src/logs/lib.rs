@@ -9,7 +9,7 @@
 //! | u-blox UBX | `ubx` | ESF-MEAS | NAV-PVT |
 //! | NumPy .npz | `npz` | arrays by name, in the module of that name | |
 //!
-//! All features are on by default. [`recognise`] tells these formats, and others that are not read, by their first
+//! All features are on by default. [`recognise()`] tells these formats, and others that are not read, by their first
 //! bytes. The opening example is that of [`Log`].
 
 #![cfg_attr(
