@@ -69,14 +69,12 @@ pub(crate) fn inverse_deviations(curve: &Curve, nu: &[f64]) -> Vec<f64> {
 /// square from two on. On 120 contaminated sets of Minaretzis' Section IV this gave random walks as near as
 /// [`Weighting::Edof`] does, and on clean ones a median nearer to the truth (docs/mathematics.md).
 ///
-/// Of fewer than four degrees of freedom even twice the model is chance (one in nine of three), and the last scale of a
-/// recording is all that tells of its random walk.
+/// Of fewer than four degrees of freedom two standard deviations are still chance, and the last scale of a recording is all
+/// that tells of its random walk: such a scale loses its weight from two to three.
 fn trust(ratio: f64, edof: f64) -> f64 {
     const FEWEST: f64 = 4.0;
-    if edof < FEWEST {
-        return 1.0;
-    }
-    let above = (score(ratio, edof) - 1.0).clamp(0.0, 1.0);
+    let begin = if edof < FEWEST { 2.0 } else { 1.0 };
+    let above = (score(ratio, edof) - begin).clamp(0.0, 1.0);
     // Smooth at either end: the derivatives of a fit with respect to its curve rest on that of the weights.
     ratio.powf(-2.0 * above * above * (3.0 - 2.0 * above))
 }
