@@ -1,7 +1,7 @@
 //! The only place that writes to the terminal: results to stdout, everything said to stderr.
 
+use super::Failure;
 use super::common::{Color, Common};
-use super::exit::Failure;
 use crate::formats::fusion_files::Remark;
 use crate::formats::system_words;
 use std::borrow::Cow;
