@@ -94,9 +94,8 @@ pub(crate) struct Tuned {
 impl TuneRequest {
     /// The factors.
     pub(crate) fn tuned(&self, notes: Notes<'_>) -> Result<Tuned, Failure> {
-        self.refuse_recordings()?;
-        let mut scenario = checked_scenario(self.scenario.as_deref(), &self.outages)?;
         let files = self.inputs()?;
+        let mut scenario = checked_scenario(self.scenario.as_deref(), &self.outages)?;
         let file = read::model(&self.model, notes)?;
         let model = read::at_rate(&self.model, &file.model, scenario.imu.rate_hz, notes)?;
         read::expect_turn_on(&mut scenario.initial, &file, &self.model, notes);
@@ -155,6 +154,7 @@ impl TuneRequest {
 
     /// The files that are read.
     pub(crate) fn inputs(&self) -> Result<Vec<Input>, Failure> {
+        self.refuse_recordings()?;
         let draws = draws_file::beside(&self.model);
         let mut named = vec![("model", &self.model)];
         named.extend((self.intervals && draws.exists()).then_some(("draws", &draws)));
