@@ -49,6 +49,10 @@ pub(in crate::cli) fn failure(e: RunError) -> Failure {
         }),
         RunError::Rate { from_hz, .. } => Failure::input(&e)
             .hint(format!("set rate_hz = {from_hz} in the [imu] section of a --scenario file")),
+        RunError::NoSpread(_) => Failure::input(&e).hint(
+            "nav-sim calibrate writes one where three recordings or more differ, or leave --spread out",
+        ),
+        RunError::Drawn { .. } => Failure::input(&e),
         RunError::Outages => Failure::input(&e).hint("give the windows, or none alone"),
         RunError::Outage { ref source, .. } => {
             Failure::input(&e).maybe_hint(source.hint().map(str::to_owned))
@@ -79,6 +83,7 @@ fn impossible(e: NavigateError, model: &Path, settings: Option<&Path>) -> Failur
         NavigateError::Reduction(e) => Failure::could_not(e),
         NavigateError::RecordedTruth => failure
             .hint("calibrate the recordings and give the model with --truth, or use --method monte-carlo"),
+        NavigateError::DrawnTruth => failure.hint("leave --spread out, or use --method monte-carlo"),
         NavigateError::Gate(_) => failure.hint("remove the key, or use --method monte-carlo"),
         NavigateError::NotFinite => {
             Failure::could_not(e).hint("do the models fit the IMU, are [imu] and [initial] plausible?")
