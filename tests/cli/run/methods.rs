@@ -340,3 +340,37 @@ fn of_many_outages_the_largest_errors_are_shown() {
     );
     assert!(ran.stdout.lines().count() <= 20, "{}", ran.stdout);
 }
+
+/// A law without width is another truth, to the last bit; with one every run has its own.
+#[test]
+fn each_run_has_a_truth_of_its_own() {
+    let law = |sd: &str| {
+        format!(
+            "\n[[spread.gyro]]\nprocess = \"WN\"\nparameter = \"sigma2\"\ndistribution = \"lognormal\"\nmedian = 4e-8\nsd = {sd}\n"
+        )
+    };
+    let place = place();
+    let put = |name: &str, text: String| fs::write(place.path().join(name), text).unwrap();
+    let white = MODEL.split("[gyro]").nth(1).unwrap().split("sigma2 = ").nth(1).unwrap();
+    let white = white.split([',', ' ', '}']).next().unwrap();
+    let (accel, gyro) = MODEL.split_once("[gyro]").unwrap();
+    let truth = format!("{accel}[gyro]{}", gyro.replacen(white, "4e-8", 1));
+    put("fixed.toml", format!("{MODEL}{}", law("0.0")));
+    put("drawn.toml", format!("{MODEL}{}", law("0.5")));
+    put("truth.toml", truth);
+    let runs = |arguments: &str, out: &str| {
+        done(place.path(), &format!("run drive.toml {arguments} --runs 9 --outage 30:40 --seed 5 -o {out}"));
+        fs::read_to_string(place.path().join(out).join("runs.csv")).unwrap()
+    };
+    let fixed = runs("fixed.toml --spread", "fixed");
+    assert_eq!(fixed, runs("imu.toml --truth truth.toml", "truth"));
+    let drawn = runs("drawn.toml --spread", "drawn");
+    assert_ne!(drawn, fixed);
+    let manifest = fs::read_to_string(place.path().join("drawn/manifest.json")).unwrap();
+    assert!(manifest.contains("\"spread\": true"), "{manifest}");
+}
+
+#[test]
+fn a_spread_that_is_not_there_or_cannot_be_analysed_is_refused() {
+    refused("run drive.toml imu.toml --spread --seed 1", 2, "imu.toml: no [spread] to draw parameters from");
+}
