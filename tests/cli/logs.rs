@@ -77,6 +77,25 @@ fn of_several_imus_one_is_named() {
     assert_eq!(ran.code, 0, "{}", ran.stderr);
 }
 
+/// `fuse` names the topics of the IMU and of the fixes.
+#[test]
+fn of_several_imus_fuse_takes_the_one_named() {
+    let place = tempfile::tempdir().unwrap();
+    fs::write(place.path().join("imu.toml"), MODEL).unwrap();
+    let bag = data("ros1_two_imus.bag");
+    let fuse = |options: &str| {
+        let command = format!("fuse {0} {0} imu.toml {options}", bag.display());
+        let ran = nav_sim(place.path(), &command);
+        assert_eq!(ran.code, 2, "{}", ran.stdout);
+        ran.stderr
+    };
+    assert!(fuse("").contains("hint: --topic NAME"), "{}", fuse(""));
+    // no word of the topic: four hundredths of a second are no drive
+    assert!(!fuse("--topic /imu_rear").contains("have IMU samples"), "{}", fuse("--topic /imu_rear"));
+    let none = fuse("--topic /imu_rear,/none");
+    assert!(none.contains("no topic has") && none.contains("/none"), "{none}");
+}
+
 /// A damaged log is refused before any work, with the byte; what stands before the damage is read where that is asked for,
 /// and how much that is is said.
 #[test]
