@@ -209,12 +209,6 @@ fn bad_fixes_are_refused_by_line_and_value() {
         "",
         &["line 1: unknown column \"sdn_m\"", "hint: did you mean \"sd_n_m\"?"],
     );
-    refused(
-        gnss,
-        shifted(5000.0),
-        "",
-        &["the clocks do not overlap: IMU 0 to 100 s, GNSS 5001 to 5100 s", "hint: --gnss-delay 5001"],
-    );
 }
 
 #[test]

@@ -53,8 +53,8 @@ struct Columns {
 /// # Errors
 /// Whatever is wrong with it, with its line.
 pub(crate) fn read_imu(path: &Path, names: Option<&[String]>, topic: Option<&str>) -> Result<ImuFile, Error> {
-    let packed =
-        path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) || logs::kind_of(path).is_some();
+    let ends_in = |ending: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
+    let packed = ends_in("npy") || ends_in("parquet") || path.is_dir() || logs::kind_of(path).is_some();
     let text = if packed || names.is_some() { None } else { Some(text(path)?) };
     let columns = match text.as_ref().and_then(|text| Some((text, bare_columns(text)?))) {
         Some((text, 7..=8)) => kf_gins(path, text)?,
