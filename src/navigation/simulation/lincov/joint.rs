@@ -149,7 +149,7 @@ impl<'a> Joint<'a> {
         let decay = |x: &mut Nav, s: &StepOfSource| {
             x.iter_mut().for_each(|v| *v *= s.decay);
             // The w of the step moves the mean input and the state together: cov(x, s) = b q_cross.
-            add_scaled(x, s.q_cross, &step.b[s.signal]);
+            step.b.get(s.signal).into_iter().for_each(|b| add_scaled(x, s.q_cross, b));
         };
         self.xb.iter_mut().zip(&inputs.b).for_each(|(x, s)| decay(x, s));
         self.xt.iter_mut().zip(&inputs.t).for_each(|(x, s)| decay(x, s));
