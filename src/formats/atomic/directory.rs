@@ -83,7 +83,8 @@ impl AtomicDir {
     /// When a declared file was not written, the disk is full, or a rename is refused.
     pub(crate) fn commit(mut self) -> Result<(), FileError> {
         for name in &self.names {
-            flush(&self.staging.path().join(name)).map_err(|e| FileError::io(&self.destination.join(name), e))?;
+            flush(&self.staging.path().join(name))
+                .map_err(|e| FileError::io(&self.destination.join(name), e))?;
         }
         let moved =
             if self.destination.is_dir() { self.replace() } else { self.staging.rename(&self.destination) };
