@@ -57,6 +57,9 @@ pub mod observer;
 pub mod report;
 // Files.
 pub mod formats;
+// What a request comes to, or what went wrong.
+pub mod answered;
+pub mod failure;
 // From here on a room for each command: request, job, result, document. The main job.
 pub mod run;
 // Recorded drives.
@@ -72,23 +75,23 @@ pub mod calibrate;
 // Figures of the paper.
 mod paper;
 // Wavelet variances.
-mod wv;
+pub mod wv;
 // Models to recordings.
 pub mod synthesize;
 // Calibrations that are not made yet.
-mod design;
+pub mod design;
 // Which model, on the user's own recordings.
 pub mod choose;
 // Ratios between runs.
-mod compare;
+pub mod compare;
 // The estimators themselves.
 pub mod efficiency;
 // Scenarios, candidates and outages, in parts.
 pub mod study;
 // Factors on a model.
-mod tune;
+pub mod tune;
 // The IMU that is needed.
-mod require;
+pub mod require;
 // Catalogued IMUs.
 mod datasheet;
 // A directory to start from.

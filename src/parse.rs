@@ -75,3 +75,53 @@ where
 {
     PossibleValuesParser::new(names).try_map(|name| name.parse())
 }
+
+/// Values that files and requests write as the command line does, for `#[serde(with = "parse::text")]`: by `Display` and
+/// `FromStr`. A number stands for its text.
+pub(crate) mod text {
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serializer};
+    use std::fmt::Display;
+    use std::str::FromStr;
+
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Written {
+        Text(String),
+        Count(u64),
+        Number(f64),
+    }
+
+    pub(crate) fn serialize<T: Display, S: Serializer>(value: &T, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_str(value)
+    }
+
+    pub(crate) fn deserialize<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(
+        from: D,
+    ) -> Result<T, D::Error> {
+        let text = match Written::deserialize(from)? {
+            Written::Text(text) => text,
+            Written::Count(count) => count.to_string(),
+            Written::Number(number) => number.to_string(),
+        };
+        text.parse().map_err(|e| D::Error::custom(format!("\"{text}\": {e}")))
+    }
+}
+
+/// Makes a type with `Display` and `FromStr` one that is written so.
+macro_rules! textual {
+    ($type:ty) => {
+        impl serde::Serialize for $type {
+            fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+                $crate::parse::text::serialize(self, to)
+            }
+        }
+
+        impl<'de> serde::Deserialize<'de> for $type {
+            fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+                $crate::parse::text::deserialize(from)
+            }
+        }
+    };
+}
+pub(crate) use textual;

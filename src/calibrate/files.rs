@@ -77,7 +77,7 @@ impl ModelFiles {
         let has_draws = calibration.outcomes.iter().any(|o| o.inference.is_some());
         let mut written = Vec::new();
         for files in all {
-            files.write(calibration, note)?;
+            Self::write(&files.texts(calibration, note, None))?;
             files.write_page(calibration, diagnoses)?;
             let draws = has_draws.then_some(&files.draws);
             written.extend(
@@ -97,48 +97,46 @@ impl ModelFiles {
         (curves, model)
     }
 
-    /// Writes the models of the estimator, with the hash of their curves in them.
-    ///
-    /// # Errors
-    /// When the system refuses.
-    pub(crate) fn write(&self, calibration: &Calibration, note: &CalibrationNote) -> Result<(), FileError> {
-        let (curves, model) = self.contents(calibration, note);
+    /// The draws behind the intervals of the estimator; none without bootstrap.
+    fn drawn(&self, calibration: &Calibration) -> Option<String> {
         let chosen: Vec<&Outcome> =
             calibration.outcomes.iter().filter(|o| o.estimator == self.estimator).collect();
-        let draws = DrawsFile::of(&chosen, calibration.settings.rate_hz);
-        let draws =
-            draws.map(|draws| serde_json::to_string(&draws).expect("plain structs are always JSON") + "\n");
-        // All are on the disk before any has its name. Should the model not get its name, the hash in it tells that the
-        // curves are not of it, and its parameters that the draws are not.
-        let draws = draws.map(|text| atomic::filled(&self.draws, text.as_bytes())).transpose()?;
-        let curves = atomic::filled(&self.curves, curves.as_bytes())?;
-        let model = atomic::filled(&self.model, model_file::to_toml(&model).as_bytes())?;
-        draws.map_or(Ok(()), AtomicFile::commit)?;
-        curves.commit()?;
-        model.commit()
+        let draws = DrawsFile::of(&chosen, calibration.settings.rate_hz)?;
+        Some(serde_json::to_string(&draws).expect("plain structs are always JSON") + "\n")
     }
 
-    /// Writes the curves of the estimator, and in the place of its own model one with inflated parameters: intervals and
-    /// draws, which are of its own, are left out.
-    ///
-    /// # Errors
-    /// When the system refuses.
-    pub(crate) fn write_inflated(
+    /// Draws, curves and model: paths and texts, in the order in which they get their names. Of a model that is inflated
+    /// (and how) there are no intervals and draws, which are of its own.
+    pub(crate) fn texts(
         &self,
         calibration: &Calibration,
         note: &CalibrationNote,
-        inflated: &Model,
-        inflation: &str,
-    ) -> Result<(), FileError> {
+        inflated: Option<(&Model, &str)>,
+    ) -> Vec<(PathBuf, String)> {
         let (curves, own) = self.contents(calibration, note);
-        let mut provenance = own.provenance.unwrap_or_default();
-        provenance.insert("inflation".to_owned(), inflation.into());
-        let provenance = Some(provenance);
-        let model = ModelFile { missing: own.missing, provenance, ..ModelFile::new(inflated.clone()) };
-        let curves = atomic::filled(&self.curves, curves.as_bytes())?;
-        let model = atomic::filled(&self.model, model_file::to_toml(&model).as_bytes())?;
-        curves.commit()?;
-        model.commit()
+        let (draws, model) = match inflated {
+            None => (self.drawn(calibration), own),
+            Some((inflated, how)) => {
+                let mut provenance = own.provenance.unwrap_or_default();
+                provenance.insert("inflation".to_owned(), how.into());
+                let provenance = Some(provenance);
+                (None, ModelFile { missing: own.missing, provenance, ..ModelFile::new(inflated.clone()) })
+            }
+        };
+        let model = model_file::to_toml(&model);
+        let texts = [(&self.draws, draws), (&self.curves, Some(curves)), (&self.model, Some(model))];
+        texts.into_iter().filter_map(|(path, text)| Some((path.clone(), text?))).collect()
+    }
+
+    /// Writes them.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub(crate) fn write(texts: &[(PathBuf, String)]) -> Result<(), FileError> {
+        // All are on the disk before any has its name. Should the model not get its name, the hash in it tells that the
+        // curves are not of it, and its parameters that the draws are not.
+        let filled = texts.iter().map(|(path, text)| atomic::filled(path, text.as_bytes()));
+        filled.collect::<Result<Vec<_>, _>>()?.into_iter().try_for_each(AtomicFile::commit)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Calibration: from static recordings, or directories of them, to a noise model for each sensor or axis.
 
-use super::ShownCalibration;
+use super::{CalibrationAnswer, FitsFile, ShownCalibration};
 use crate::formats::recordings::{FileReport, ReadOptions, Report};
 use crate::formats::{hash, recordings};
 use crate::jobs::{JobError, Remark, Remarks};
@@ -221,6 +221,18 @@ impl Calibration {
     pub fn model(&self, estimator: Estimator) -> Model {
         let own = self.outcomes.iter().filter(|o| o.estimator == estimator);
         nav_sim_calibration::model_of(own, self.settings.rate_hz)
+    }
+
+    /// What `calibrate` answers of it. `files`: those that were written.
+    pub(crate) fn answer<'a>(
+        &'a self,
+        diagnoses: &'a [Diagnosis],
+        files: Vec<String>,
+    ) -> CalibrationAnswer<'a> {
+        CalibrationAnswer {
+            file: FitsFile::new(&self.outcomes, diagnoses, &self.turn_on, &self.settings, files),
+            shown: self.shown(diagnoses, |_| true),
+        }
     }
 
     /// The fits that are chosen, to be shown.

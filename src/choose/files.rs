@@ -7,7 +7,7 @@ use crate::formats::atomic::{AtomicDir, Claim, Existing, Found, claim_directory}
 use crate::formats::input::input;
 use crate::report::{Answer, json};
 use nav_sim_calibration::diagnose;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The files of a choice, in the order of writing.
 const FILES: [&str; 6] =
@@ -31,7 +31,23 @@ pub(crate) fn claim_choice<'a>(
 }
 
 impl Chosen {
-    /// Writes the directory. To what is noted of the calibration the trajectory and the recordings are added.
+    /// The winner's files, with the trajectory and the recordings in what is noted of its calibration.
+    pub(crate) fn texts(
+        &self,
+        files: &ModelFiles,
+        trajectory: &Path,
+        mut note: CalibrationNote,
+    ) -> Result<Vec<(PathBuf, String)>, FileError> {
+        note.inputs.push(input("trajectory", trajectory)?);
+        for file in &self.files {
+            note.inputs.push(input("recording", file)?);
+        }
+        let how = self.winner.inflation;
+        let inflated = (how != Inflation::None).then(|| (&self.model, how.name()));
+        Ok(files.texts(&self.calibration, &note, inflated))
+    }
+
+    /// Writes the directory.
     ///
     /// # Errors
     /// When the system refuses.
@@ -39,30 +55,26 @@ impl Chosen {
         &self,
         out: &Path,
         trajectory: &Path,
-        mut note: CalibrationNote,
+        note: CalibrationNote,
         report: &ChoiceReport<'_>,
     ) -> Result<(), FileError> {
         let mut directory = AtomicDir::create(out)?;
-        let model = directory.path("model.toml");
-        directory.path("model.wv.json");
+        let files = self.model_files(&directory.path("model.toml"));
         directory.path("model.html");
-        note.inputs.push(input("trajectory", trajectory)?);
-        for file in &self.files {
-            note.inputs.push(input("recording", file)?);
+        let texts = self.texts(&files, trajectory, note)?;
+        for (path, _) in &texts {
+            directory.path(&path.file_name().unwrap_or_default().to_string_lossy());
         }
-        let Self { calibration, model: inflated, winner, .. } = self;
-        for files in ModelFiles::of(&model, &[winner.estimator]) {
-            if winner.inflation == Inflation::None {
-                files.write(calibration, &note)?;
-                directory.path("model.draws.json");
-            } else {
-                files.write_inflated(calibration, &note, inflated, winner.inflation.name())?;
-            }
-            let Calibration { groups, outcomes, settings, .. } = calibration;
-            files.write_page(calibration, &diagnose(groups, outcomes, settings))?;
-        }
+        ModelFiles::write(&texts)?;
+        let Calibration { groups, outcomes, settings, .. } = &self.calibration;
+        files.write_page(&self.calibration, &diagnose(groups, outcomes, settings))?;
         directory.write("report.html", report.document().html())?;
         directory.write("ranking.json", json(report))?;
         directory.commit()
+    }
+
+    /// The files of the winner.
+    pub(crate) fn model_files(&self, model: &Path) -> ModelFiles {
+        ModelFiles::of(model, &[self.winner.estimator]).remove(0)
     }
 }

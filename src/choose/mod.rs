@@ -37,11 +37,13 @@
 mod candidate;
 mod document;
 mod drive;
+mod failure;
 mod files;
 mod influence;
 mod job;
 mod laboratory;
 mod ranking;
+mod request;
 mod score;
 
 pub use candidate::{Candidate, Inflation};
@@ -52,4 +54,5 @@ pub use influence::{Influence, RecordingInfluence, ScaleInfluence};
 pub use job::{ChoiceDrive, Chosen, choose};
 pub use laboratory::{Laboratory, Unit};
 pub use ranking::{Contender, Difference, FoldScore, Mean, Placed, Ranking};
+pub use request::ChoiceRequest;
 pub use score::{EndScore, Score};

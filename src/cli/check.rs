@@ -6,6 +6,7 @@ use crate::formats::file_kind::{self, FileKind};
 use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
 use crate::formats::logs::LogOptions;
 use crate::formats::{contamination_file, curve_file, datasheet, model_file, parameters_file, scenario_file};
+use crate::fuse::FuseError;
 use crate::inspect::inspect;
 use crate::report::six_digits;
 use nav_sim_document::seconds;
@@ -169,7 +170,7 @@ fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
     let ((fixes, remarks), unsaid) = match read {
         Err(e) => match read_gnss(path, Some(&given), None) {
             Ok(read) => (read, ", without standard deviations (fuse --gnss-sigma)"),
-            Err(_) => return Err(read::refused_for_fusion(e)),
+            Err(_) => return Err(FuseError::from(e).into()),
         },
         Ok(read) => read,
     };
@@ -180,7 +181,7 @@ fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
 }
 
 fn imu(path: &Path, session: &Session) -> Result<String, Failure> {
-    let imu = read_imu(path, None).map_err(read::refused_for_fusion)?;
+    let imu = read_imu(path, None).map_err(FuseError::from)?;
     imu.remarks.iter().for_each(|remark| session.printer.remark(remark));
     Ok(format!("an IMU recording of {} samples at {:.2} Hz, for fuse", imu.samples.len(), imu.rate_hz))
 }

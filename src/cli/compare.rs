@@ -2,10 +2,9 @@
 
 use super::pictures::{PlotArgs, claim_output};
 use super::{Failure, Session};
-use crate::compare::{self, Comparison};
+use crate::compare::{CompareRequest, Comparison};
 use crate::formats::atomic::{self, Written};
 use crate::report::{self, Answer};
-use nav_sim_navigation::simulation::REPORTED_NAMES;
 use std::path::{Path, PathBuf};
 
 /// Compare runs: verdicts, and ratios of ASEE and RMSE per outage and state
@@ -24,15 +23,8 @@ Examples:
       --runs 8 --seed 1 -o out/with_15
   nav-sim compare out/with_15 --reference out/with_all --state all")]
 pub(crate) struct Args {
-    /// Run directories
-    #[arg(required = true, value_name = "DIR")]
-    runs: Vec<PathBuf>,
-    /// Run directory to compare with
-    #[arg(long, value_name = "DIR")]
-    reference: PathBuf,
-    /// States in the table (repeatable), or "all"
-    #[arg(long = "state", value_name = "STATE", default_values = ["pos_e_m", "roll_deg"])]
-    states: Vec<String>,
+    #[command(flatten)]
+    request: CompareRequest,
     /// Where to write the comparison [default: comparison.json]
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -61,13 +53,13 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 pub(super) fn compare(args: &Args, cause: &str, session: &Session) -> Result<Comparison, Failure> {
     let out = args.out.as_deref().unwrap_or(Path::new("comparison.json"));
     let page = out.with_extension("html");
-    let read_from = args.runs.iter().chain([&args.reference]);
+    let read_from = args.request.runs.iter().chain([&args.request.reference]);
     let inputs: Vec<PathBuf> =
         read_from.flat_map(|run| crate::run::RUN_FILES.map(|name| run.join(name))).collect();
     let _own = claim_output(Some(out), &inputs, Written::Comparison, session)?;
     let _page = claim_output(Some(&page), &inputs, Written::Page, session)?;
     let _picture = args.plot.claim(&inputs, session)?;
-    let found = compare::compare(&args.runs, &args.reference, states(&args.states)?)?;
+    let found = args.request.comparison()?;
     let found = Comparison { cause: cause.to_owned(), ..found };
     let document = match args.table {
         None => session.answer(&found),
@@ -87,16 +79,4 @@ pub(super) fn compare(args: &Args, cause: &str, session: &Session) -> Result<Com
     args.plot.draw(&document, session)?;
     session.say(format!("wrote {}, {}", out.display(), page.display()));
     Ok(found)
-}
-
-pub(super) fn states(names: &[String]) -> Result<Vec<usize>, Failure> {
-    if names.iter().any(|n| n == "all") {
-        return Ok((0..REPORTED_NAMES.len()).collect());
-    }
-    let index = |name: &String| {
-        let found = REPORTED_NAMES.iter().position(|n| n == name);
-        let known = || format!("one of {}, or all", REPORTED_NAMES.join(", "));
-        found.ok_or_else(|| Failure::input(format!("--state {name} is no state")).hint(known()))
-    };
-    names.iter().map(index).collect()
 }

@@ -1,8 +1,8 @@
 //! `nav-sim fuse`: the filter on recorded data.
 
-use super::{Failure, Session, read};
+use super::{Failure, Session};
 use crate::formats::atomic::{AtomicDir, Found, claim_directory};
-use crate::fuse::{Drive, FILES, FuseAnswer, FuseError, FuseManifest, FuseRequest, directory};
+use crate::fuse::{Drive, FILES, FuseAnswer, FuseManifest, FuseRequest, directory};
 use nav_sim_navigation::metrics::VerdictKind;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -35,7 +35,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let begin = Instant::now();
-    let drive = Drive::read(&args.request).map_err(refused)?;
+    let drive = Drive::read(&args.request)?;
     let manifest = FuseManifest { command: super::given(), ..drive.manifest.clone() };
     let recognise = |text: &str| {
         let present = serde_json::from_str(text);
@@ -43,7 +43,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     };
     let inputs = manifest.inputs.iter().map(|input| Path::new(&input.path));
     let _own = claim_directory(&args.out, &FILES, inputs, session.existing(), recognise)?;
-    let answer = drive.fuse().map_err(refused)?;
+    let answer = drive.fuse()?;
     write(&answer, &FuseManifest { wall_s: begin.elapsed().as_secs_f64(), ..manifest }, &args.out)?;
     session.answer(&answer);
     session.wrote(&args.out);
@@ -53,14 +53,6 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             Err(Failure::bound(message).hint(answer.advice()))
         }
         _ => Ok(()),
-    }
-}
-
-fn refused(e: FuseError) -> Failure {
-    match e {
-        FuseError::File(e) => read::refused_for_fusion(e),
-        e if e.is_input() => Failure::input(&e).maybe_hint(e.hint()),
-        e => Failure::could_not(&e).maybe_hint(e.hint()),
     }
 }
 

@@ -1,8 +1,8 @@
 //! `nav-sim inspect`: the contents of a log.
 
-use super::recordings::LogArgs;
 use super::{Failure, Session};
 use crate::inspect;
+use crate::jobs::LogRequest;
 use std::path::PathBuf;
 
 /// List the channels of a log: MCAP, ROS 1 bag, PX4 ULog, u-blox UBX
@@ -20,7 +20,7 @@ pub(crate) struct Args {
     #[arg(value_name = "FILE")]
     file: PathBuf,
     #[command(flatten)]
-    log: LogArgs,
+    log: LogRequest,
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {

@@ -1,6 +1,5 @@
 //! The command line: one file per subcommand, each its `Args` and a `run(args, &Session)`.
 
-mod axes;
 mod batch;
 mod bench;
 mod calibrate;
@@ -13,13 +12,11 @@ mod datasheet;
 mod demo;
 mod design;
 mod efficiency;
-mod exit;
 mod export;
 mod fuse;
 mod init;
 mod inspect;
 mod interrupt;
-mod jobs;
 mod man;
 mod pictures;
 mod printer;
@@ -32,8 +29,6 @@ mod schema;
 mod synthesize;
 mod trajectory;
 mod tune;
-mod tuning;
-mod turn_on;
 mod version;
 mod wv;
 
@@ -47,8 +42,8 @@ use std::num::ParseIntError;
 use std::process::ExitCode;
 use std::sync::OnceLock;
 
+pub(crate) use crate::failure::Failure;
 pub(crate) use common::{Common, Session};
-pub(crate) use exit::Failure;
 pub(crate) use printer::Printer;
 pub(crate) use progress::Progress;
 
@@ -259,6 +254,62 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
 
 #[cfg(test)]
 mod tests {
+    use clap::FromArgMatches;
+    use serde::{Serialize, de::DeserializeOwned};
+    use std::fmt::Debug;
+
+    /// A request has the defaults of the flags, is a file with their names, and comes back from one as it was.
+    fn is_a_file_too<R>(words: &str, table: &str)
+    where
+        R: clap::Args + Debug + PartialEq + Serialize + DeserializeOwned,
+    {
+        let flags = R::augment_args(clap::Command::new("x")).try_get_matches_from(words.split(' ')).unwrap();
+        let of_flags = R::from_arg_matches(&flags).unwrap();
+        let of_table: R = toml::from_str(table).unwrap();
+        assert_eq!(of_flags, of_table);
+        let again: R = serde_json::from_str(&serde_json::to_string(&of_flags).unwrap()).unwrap();
+        assert_eq!(again, of_flags);
+        assert!(toml::from_str::<R>("no_such_key = 1").is_err());
+    }
+
+    #[test]
+    fn requests_are_files_with_the_names_and_defaults_of_flags() {
+        is_a_file_too::<crate::wv::WaveletRequest>("x a.csv", "files = ['a.csv']");
+        is_a_file_too::<crate::wv::WaveletRequest>(
+            "x a.csv --skip-s 60 --axes gyro,accel.x --scales 1s:100s --intervals large-sample",
+            "files = ['a.csv']\nintervals = 'large-sample'\ntuning.scales = '1s:100s'\n\
+             recordings = { axes = ['gyro', 'accel.x'], reading = { skip_s = 60.0 } }",
+        );
+        is_a_file_too::<crate::calibrate::CalibrationRequest>("x a b", "inputs = ['a', 'b']");
+        is_a_file_too::<crate::calibrate::CalibrationRequest>(
+            "x a --estimator all --trim 30% --weighting edof --pool axes --skip-s auto --gaps split --rate-hz 100",
+            "inputs = ['a']\nestimator = 'all'\ntrim = '30%'\nweighting = 'edof'\npool = 'axes'\n\
+             recordings.reading = { skip_s = 'auto', gaps = 'split', rate_hz = 100.0 }",
+        );
+        is_a_file_too::<crate::tune::TuneRequest>(
+            "x m --truth a b --for mean --per process --outage none",
+            "model = 'm'\ntruth = ['a', 'b']\nfor = 'mean'\nper = 'process'\noutage = ['none']",
+        );
+        is_a_file_too::<crate::tune::TuneRequest>("x m", "model = 'm'");
+        is_a_file_too::<crate::require::RequireRequest>(
+            "x t --outage 60 --require p95_m<=5 --catalogue",
+            "trajectory = 't'\noutage = 60\nrequire = ['p95_m<=5']\ncatalogue = 'built-in'",
+        );
+        is_a_file_too::<crate::design::DesignRequest>("x m", "model = 'm'");
+        is_a_file_too::<crate::choose::ChoiceRequest>(
+            "x a --trajectory t --model N1,auto --filter 21,full --inflate x10",
+            "inputs = ['a']\ntrajectory = 't'\nmodel = ['N1', 'auto']\nfilter = [21, 'full']\ninflate = ['x10']",
+        );
+        is_a_file_too::<crate::choose::ChoiceRequest>(
+            "x a --trajectory t",
+            "inputs = ['a']\ntrajectory = 't'",
+        );
+        is_a_file_too::<crate::compare::CompareRequest>("x a --reference r", "runs = ['a']\nreference = 'r'");
+        is_a_file_too::<crate::synthesize::SynthesisRequest>("x m", "model = 'm'");
+        is_a_file_too::<crate::run::RunRequest>("x t m", "trajectory = 't'\nmodel = 'm'");
+        is_a_file_too::<crate::fuse::FuseRequest>("x i g m", "imu = 'i'\ngnss = 'g'\nmodel = 'm'");
+    }
+
     #[test]
     fn the_command_line_is_consistent() {
         super::command().debug_assert();

@@ -1,13 +1,11 @@
 //! `nav-sim wv`: wavelet variance of static recordings.
 
-use super::parse::words;
 use super::pictures::{PlotArgs, claim_output};
-use super::recordings::{RecordingArgs, Said};
-use super::tuning::TuningArgs;
+use super::recordings::Said;
 use super::{Failure, Session, read};
 use crate::formats::atomic::Written;
 use crate::report::{self, Answer};
-use crate::wv::{self, Intervals, WaveletOptions};
+use crate::wv::{self, WaveletRequest};
 use std::path::PathBuf;
 
 /// Compute wavelet variances (classical, robust) and Allan deviations of static recordings
@@ -18,16 +16,8 @@ Examples:
   nav-sim wv calib_data/formats/euroc.csv --axes gyro --intervals large-sample
   nav-sim wv calib_data/formats/compressed.csv.gz --format json -o static.wv.json")]
 pub(crate) struct Args {
-    /// Recordings, or directories of recordings
-    #[arg(required = true, value_name = "FILE")]
-    files: Vec<PathBuf>,
     #[command(flatten)]
-    recordings: RecordingArgs,
-    #[command(flatten)]
-    tuning: TuningArgs,
-    /// Where the degrees of freedom of the intervals come from
-    #[arg(long, value_parser = words::<Intervals>(&INTERVALS), default_value_t, help_heading = "Wavelet variance")]
-    intervals: Intervals,
+    request: WaveletRequest,
     /// Print one table for each sensor and axis, with the recordings side by side
     #[arg(long, conflicts_with = "verbose")]
     per_file: bool,
@@ -38,27 +28,13 @@ pub(crate) struct Args {
     plot: PlotArgs,
 }
 
-const INTERVALS: [(&str, &str); 2] = [
-    (Intervals::Eta3.name(), "The field's usual ones, conservative beyond the first scale"),
-    (Intervals::LargeSample.name(), "From the autocovariance of the coefficients: with the stated coverage"),
-];
-
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let tuning = args.tuning.tuning()?;
-    let inputs = read::listed(&args.files)?;
+    args.request.tuning.tuning()?;
+    let inputs = read::listed(&args.request.files)?;
     let _own = claim_output(args.out.as_deref(), &inputs, Written::Signals, session)?;
     let _pictures = args.plot.claim(&inputs, session)?;
-    let intervals = args.intervals;
-    let options = WaveletOptions {
-        reading: args.recordings.options(),
-        skip_warm_up: args.recordings.reading.skips_warm_up(),
-        scales: args.tuning.levels(),
-        tuning,
-        intervals,
-    };
-    let file = wv::wavelet_variances(&args.files, &options, &mut Said::new(session))?;
-    let json = report::json(&file);
-    let written = args.out.iter().try_for_each(|out| session.write(out, &json));
+    let file = args.request.curves(&mut Said::new(session))?;
+    let written = args.out.iter().try_for_each(|out| session.write(out, report::json(&file)));
     let drawn = args.plot.draw(&file.document(), session);
     match () {
         () if session.csv() => session.result(wv::signals_csv(&file).trim_end()),

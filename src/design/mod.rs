@@ -2,6 +2,8 @@
 
 mod document;
 mod job;
+mod request;
 
 pub(crate) use document::{Design, DesignedParameter, DesignedQuantile, Designs};
 pub(crate) use job::{DesignInputs, Destination, design};
+pub use request::DesignRequest;

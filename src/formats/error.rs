@@ -232,6 +232,15 @@ impl FileError {
         self
     }
 
+    /// The line, from 1, where it is of one.
+    #[must_use]
+    pub fn line(&self) -> Option<u64> {
+        match self.place {
+            Place::Line(line) | Place::Character(line, _) => Some(line),
+            _ => None,
+        }
+    }
+
     /// Whether the system, not the contents or the request, is at fault.
     pub(crate) fn is_system(&self) -> bool {
         matches!(&self.kind, Kind::System(source) if !is_damage(source.kind()))

@@ -16,11 +16,17 @@
 mod document;
 mod drive;
 mod error;
+mod failure;
 mod files;
 mod filter;
 mod manifest;
 mod request;
 mod summary;
+
+use crate::answered::{Answered, contents};
+use crate::failure::Failure;
+use crate::report::OutputFile;
+use nav_sim_navigation::metrics::VerdictKind;
 
 pub(crate) use drive::Drive;
 pub use drive::{FuseAnswer, FuseNote};
@@ -36,4 +42,22 @@ pub use summary::{Cause, FuseSummary};
 /// A setting out of range, a file that cannot be used, data and settings that do not fit together.
 pub fn fuse(request: &FuseRequest) -> Result<FuseAnswer, FuseError> {
     Drive::read(request)?.fuse()
+}
+
+impl FuseRequest {
+    /// As `nav-sim fuse` prints and writes it.
+    ///
+    /// # Errors
+    /// As [`fuse()`].
+    pub fn answer(&self) -> Result<Answered, Failure> {
+        let drive = Drive::read(self)?;
+        let manifest = drive.manifest.clone();
+        let answer = drive.fuse()?;
+        let is_page = |file: &OutputFile<'_>| file.name.ends_with(".html");
+        let mut files = directory(&answer, &manifest);
+        files.retain(|file| !is_page(file));
+        let unmet = (answer.summary.verdict.kind == VerdictKind::Overconfident)
+            .then(|| Failure::bound("the solution is overconfident").hint(answer.advice()));
+        Ok(Answered { files: contents(files), unmet, ..Answered::of(&answer) })
+    }
 }

@@ -1,7 +1,13 @@
 //! Errors and remarks of the jobs that read recordings.
 
 mod error;
+mod failure;
+mod reading;
 mod remarks;
 
 pub use error::JobError;
+pub(crate) use failure::{of_calibration, unknown_model};
+pub use reading::{
+    ChannelSet, LogRequest, ReadingRequest, RecordingRequest, Scales, Skip, Stamps, TuningRequest,
+};
 pub use remarks::{Remark, Remarks, Silence};

@@ -28,7 +28,7 @@ pub(crate) use curves::{CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, S
 pub(crate) use manifest::contents;
 pub use manifest::{Input, Manifest, ModelNote};
 /// A result: what is printed, drawn or saved of it is it itself as JSON, or its document.
-pub(crate) trait Answer: Serialize {
+pub trait Answer: Serialize {
     /// What it says, in words, tables and charts.
     fn document(&self) -> Document;
 }

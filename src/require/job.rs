@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 /// The outage that is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Ask {
+pub enum Ask {
     /// One of this length (s), from every second on.
     Length(f64),
     /// This one.

@@ -5,6 +5,8 @@ mod job;
 mod needed;
 mod question;
 mod ranking;
+mod request;
 
-pub(crate) use job::{Ask, CatalogueUnit, Misplaced, Requirements};
-pub(crate) use ranking::stated_in_words;
+pub use job::Ask;
+pub(crate) use job::{CatalogueUnit, Misplaced, Requirements};
+pub use request::{Catalogue, LimitFlag, RequireRequest};

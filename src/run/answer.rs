@@ -89,7 +89,7 @@ impl RunAnswer {
 
     /// The files of a run directory, the manifest last: where it is, the rest is whole. Without runs (covariance analysis)
     /// there is no table of them.
-    fn files(&self) -> Vec<OutputFile<'_>> {
+    pub(super) fn files(&self) -> Vec<OutputFile<'_>> {
         let [epochs_name, fan_name, runs_name, summary_name, page_name, manifest_name] = RUN_FILES;
         let Navigation { runs, epochs, fan, .. } = &self.navigation;
         let texts = [(epochs_name, epochs_csv(epochs)), (fan_name, fan_csv(fan)), (summary_name, json(self))];

@@ -4,6 +4,8 @@ use super::answer::RunAnswer;
 use super::error::RunError;
 use super::request::RunRequest;
 use super::{NavigateInputs, Note, TrueImu, navigate, read};
+use crate::answered::{Answered, contents};
+use crate::failure::Failure;
 use crate::formats::model_file::ModelFile;
 use crate::formats::{FileError, draws_file, input};
 use crate::observer::Observer;
@@ -131,6 +133,21 @@ impl RunRequest {
         named.extend(input::listed(&self.recordings)?.into_iter().map(|path| ("static", path)));
         named.extend([one("scenario", &self.scenario), one("gnss", &self.gnss)].into_iter().flatten());
         named.iter().map(|(role, path)| input::input(role, path)).collect()
+    }
+}
+
+impl RunRequest {
+    /// As `nav-sim run` prints and writes it.
+    ///
+    /// # Errors
+    /// What is wrong with a file or a setting, or that the run cannot be made.
+    pub fn answer(
+        &self,
+        draw: impl FnOnce() -> u64,
+        observer: &dyn Observer<Note>,
+    ) -> Result<Answered, Failure> {
+        let answer = self.prepare(draw, observer)?.navigate(observer)?;
+        Ok(Answered { files: contents(answer.files()), unmet: answer.unmet(), ..Answered::of(&answer) })
     }
 }
 

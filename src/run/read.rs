@@ -4,25 +4,27 @@ use super::error::RunError;
 use super::{Note, turn_on};
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::recordings::{self, ReadOptions};
-use crate::formats::{FileError, trajectory_file};
+use crate::formats::trajectory_file;
 use crate::observer::Observer;
 use crate::report::readable;
 use nav_sim_navigation::ekf::InitialSettings;
+use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::defects::ImuSettings;
+use nav_sim_navigation::sensors::outage::{Outage, OutageError};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_navigation::trajectory::plausibility::{Excess, Limits, examine};
 use nav_sim_signal::imu::{Recording, Sensor};
 use nav_sim_signal::noise::{Model, continuous};
 use std::path::{Path, PathBuf};
 
-type Notes<'a> = &'a dyn Observer<Note>;
+pub(crate) type Notes<'a> = &'a dyn Observer<Note>;
 
 fn warn(notes: Notes<'_>, texts: impl IntoIterator<Item = impl ToString>) {
     texts.into_iter().for_each(|text| notes.remark(&Note::Warning(text.to_string())));
 }
 
 /// A trajectory; where no vehicle moves so.
-pub(crate) fn trajectory(path: &Path, notes: Notes<'_>) -> Result<Trajectory, FileError> {
+pub(crate) fn trajectory(path: &Path, notes: Notes<'_>) -> Result<Trajectory, RunError> {
     let (trajectory, warnings) = trajectory_file::load(path, &trajectory_file::Options::default())?;
     warn(notes, warnings);
     let (_, beyond) = examine(&trajectory, &Limits::default());
@@ -39,7 +41,7 @@ pub(crate) fn trajectory(path: &Path, notes: Notes<'_>) -> Result<Trajectory, Fi
 }
 
 /// A model; the axes that it does not name.
-pub(crate) fn model(path: &Path, notes: Notes<'_>) -> Result<ModelFile, FileError> {
+pub(crate) fn model(path: &Path, notes: Notes<'_>) -> Result<ModelFile, RunError> {
     let file = model_file::read(path)?;
     warn(notes, file.doubts(path));
     Ok(file)
@@ -62,12 +64,24 @@ pub(crate) fn recordings(
     paths: &[PathBuf],
     rate_hz: Option<f64>,
     notes: Notes<'_>,
-) -> Result<Vec<Recording>, FileError> {
+) -> Result<Vec<Recording>, RunError> {
     let options = ReadOptions { rate_hz, ..ReadOptions::default() };
     let (recordings, report) = recordings::read(paths, &options)?;
     warn(notes, report.all_warnings());
     report.files.iter().for_each(|file| notes.remark(&Note::Detail(file.to_string())));
     Ok(recordings)
+}
+
+/// The outages on a trajectory; what is doubtful about them.
+pub(crate) fn placed(
+    scenario: &Scenario,
+    trajectory: &Trajectory,
+    seed: u64,
+    notes: Notes<'_>,
+) -> Result<Vec<Outage>, OutageError> {
+    let placed = scenario.outages_on((trajectory.start_s(), trajectory.end_s()), seed)?;
+    placed.remarks.into_iter().for_each(|remark| notes.remark(&Note::Outage(remark)));
+    Ok(placed.windows)
 }
 
 /// Lets the filter expect the turn-on bias that its model states, where settings are silent.

@@ -2,6 +2,8 @@
 
 mod document;
 mod job;
+mod request;
 mod result;
 
-pub(crate) use job::{Truths, TuneInputs, tune, tuned};
+pub use request::TuneRequest;
+pub(crate) use request::Tuned;

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 /// Where the degrees of freedom of intervals are from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum Intervals {
+pub enum Intervals {
     /// The field's usual ones, conservative beyond the first scale.
     #[default]
     Eta3,
@@ -21,6 +21,7 @@ pub(crate) enum Intervals {
 }
 
 nav_sim_signal::named!(Intervals { Eta3 = "eta3", LargeSample = "large-sample" });
+crate::parse::textual!(Intervals);
 
 /// How wavelet variances are taken.
 #[derive(Debug, Clone, Default)]

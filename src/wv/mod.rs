@@ -2,6 +2,8 @@
 
 mod document;
 mod job;
+mod request;
 
 pub(crate) use document::{side_by_side, signals_csv};
-pub(crate) use job::{Intervals, WaveletOptions, wavelet_variances};
+pub use job::Intervals;
+pub use request::WaveletRequest;

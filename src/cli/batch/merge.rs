@@ -30,7 +30,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let states = crate::cli::compare::states(&args.states)?;
+    let states = crate::compare::states(&args.states)?;
     let planned = args.place.planned(session.asked_seed())?;
     let options = MergeOptions { states, threads: session.threads() };
     let merged = study::merge(&planned, &options, &Watch::new(session, || true)).map_err(|e| match e {

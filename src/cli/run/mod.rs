@@ -5,13 +5,9 @@ mod words;
 
 use super::pictures::PlotArgs;
 use super::{Failure, Session};
-use crate::report::requirement::requirement_line;
-use crate::run::{RunError, RunRequest};
-use nav_sim_navigation::metrics::Summary;
+use crate::run::RunRequest;
 use std::path::PathBuf;
 
-use output::failure;
-pub(super) use output::no_filter;
 pub(super) use words::Words;
 
 /// Navigate by INS/GNSS along TRAJECTORY with MODEL in the filter: Monte Carlo or covariance analysis
@@ -51,36 +47,5 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let document = session.answer(&answer);
     args.plot.write(&document, || answer.svg(), session)?;
     session.wrote(&args.out);
-    succeeded(&answer.navigation.summary)
-}
-
-/// Whether all runs stayed finite, the filter is not off by far, and everything required is met.
-fn succeeded(summary: &Summary) -> Result<(), Failure> {
-    let Summary { diverged, runs, verdict, .. } = summary;
-    if *diverged > 0 && diverged == runs {
-        let failure = Failure::could_not(format!("all {runs} runs diverged: there is no result"));
-        return Err(failure.hint("does the model fit the IMU, are [imu] and [initial] plausible?"));
-    }
-    if *diverged > 0 {
-        let failure = Failure::bound(format!("{diverged} of {runs} runs diverged"));
-        return Err(failure
-            .hint("their indices are in summary.json, under diverged_runs; they are in no other number"));
-    }
-    let missed: Vec<String> =
-        summary.require.iter().filter(|met| !met.met).map(|met| requirement_line(met, summary)).collect();
-    if !missed.is_empty() {
-        return Err(Failure::bound(missed.join("; ")));
-    }
-    if verdict.is_far_off() {
-        let message =
-            format!("the filter is overconfident by far: NEES {:.0}, 9 if it is right", summary.nees.mean);
-        return Err(Failure::bound(message).hint("the results are written; does MODEL describe the errors?"));
-    }
-    Ok(())
-}
-
-impl From<RunError> for Failure {
-    fn from(e: RunError) -> Self {
-        failure(e)
-    }
+    answer.unmet().map_or(Ok(()), Err)
 }

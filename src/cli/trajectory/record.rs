@@ -1,11 +1,13 @@
 //! `nav-sim trajectory record`.
 
 use super::{Source, wrote};
-use crate::cli::{Failure, Session, read, turn_on};
+use crate::cli::run::Words;
+use crate::cli::{Failure, Session, read};
 use crate::formats::atomic::{AtomicDir, Claim, Found, claim_directory};
 use crate::formats::scenario_file;
 use crate::formats::trajectory_file::{Rows, write_rows};
 use crate::report::{gnss_csv, imu_csv, initial_toml};
+use crate::run::read::make_turn_on;
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::simulation::{Plan, record};
@@ -48,7 +50,7 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let file = read::model(&args.model, session)?;
     let model = continuous::at_rate(&file.model, scenario.imu.rate_hz)
         .map_err(|e| Failure::input(format!("{shown}: {e}")))?;
-    turn_on::make(&mut scenario.imu, &file, &args.model, session);
+    make_turn_on(&mut scenario.imu, &file, &args.model, &Words::new(session));
     let seed = session.seed(scenario.run.seed);
     // a recording is what IMU and receiver give: no barometer, no filter
     let scenario = Scenario { baro: None, ..scenario };

@@ -1,5 +1,9 @@
 //! Replicate recordings of a noise model, as the files of one directory.
 
+mod request;
+
+pub use request::SynthesisRequest;
+
 use crate::formats::atomic::{AtomicDir, Claim, Existing, Found, claim_directory};
 use crate::formats::model_file::ModelFile;
 use crate::formats::recordings::{FileFormat, is_recording};

@@ -1,12 +1,10 @@
-//! Why a job has no result, in the words of the command line: which flag helps.
+//! Why a job has no result: which flag helps.
 
-use super::Failure;
-use crate::choose::ChoiceError;
+use super::JobError;
+use crate::failure::Failure;
 use crate::formats::suggest;
-use crate::jobs::JobError;
 use nav_sim_calibration::{AverageError, CalibrationError, Cause, FitError, ModelSpec, SpecError};
 use nav_sim_navigation::metrics::ComparisonError;
-use nav_sim_navigation::simulation::ExperimentError;
 
 impl From<JobError> for Failure {
     fn from(e: JobError) -> Self {
@@ -47,26 +45,7 @@ impl From<JobError> for Failure {
     }
 }
 
-impl From<ChoiceError> for Failure {
-    fn from(e: ChoiceError) -> Self {
-        match e {
-            ChoiceError::Job(e) => (*e).into(),
-            ChoiceError::TooFew { .. } => {
-                Self::input(e).hint("each recording is a file; nav-sim calibrate takes fewer")
-            }
-            ChoiceError::Calibration { candidate, source } => of_calibration(&source).within(&candidate),
-            ChoiceError::Own { ref source, .. } => {
-                let hint = of_calibration(source).advice().map(str::to_owned);
-                Self::input(e).maybe_hint(hint)
-            }
-            ChoiceError::Experiment(ExperimentError::FixBetweenSamples { .. }) => Self::input(e)
-                .hint("the IMU has the rate of the recordings: another [gnss] rate_hz in --scenario"),
-            ChoiceError::Experiment(_) | ChoiceError::Belief { .. } => Self::input(e),
-        }
-    }
-}
-
-fn of_calibration(e: &CalibrationError) -> Failure {
+pub(crate) fn of_calibration(e: &CalibrationError) -> Failure {
     let hint = match &e.source {
         Cause::Fit(FitError::TooFewScales { .. }) => {
             Some("record for longer, or a --model with fewer processes")
@@ -84,7 +63,7 @@ fn of_calibration(e: &CalibrationError) -> Failure {
 }
 
 /// Not a `--model`.
-pub(super) fn unknown_model(e: SpecError) -> Failure {
+pub(crate) fn unknown_model(e: SpecError) -> Failure {
     let hint = suggest::model(&e, ModelSpec::legal().chain(["auto"]));
     Failure::input(format!("--model: {e}")).hint(hint)
 }

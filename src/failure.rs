@@ -1,49 +1,56 @@
-//! What went wrong, as the user reads it, and the exit code it means.
+//! What went wrong with a request, as the user reads it, and the exit code that it means.
 
 use crate::formats::{FileError, Setting};
 use nav_sim_calibration::SignalError;
 use nav_sim_navigation::sensors::outage::OutageError;
 use std::fmt;
 
-/// A failure: exit code, message and hint. 1 could not (I/O, numerics); 2 usage or configuration;
+/// A request without an answer: exit code, message and hint. 1 could not (I/O, numerics); 2 usage or configuration;
 /// 3 a stated bound was not met; 75 stopped early, resume; 130 interrupted (143 by SIGTERM, 129 by SIGHUP).
 #[derive(Debug)]
-pub(crate) struct Failure {
+pub struct Failure {
     code: u8,
     message: String,
     hint: Option<String>,
+    place: Option<(String, Option<u64>)>,
 }
 
+impl std::error::Error for Failure {}
+
 impl Failure {
+    fn new(code: u8, message: &impl ToString) -> Self {
+        Self { code, message: message.to_string(), hint: None, place: None }
+    }
+
     /// Wrong input: usage, configuration, data (exit code 2).
     pub(crate) fn input(message: impl ToString) -> Self {
-        Self { code: 2, message: message.to_string(), hint: None }
+        Self::new(2, &message)
     }
 
     /// Could not: I/O, numerics (exit code 1).
     pub(crate) fn could_not(message: impl ToString) -> Self {
-        Self { code: 1, message: message.to_string(), hint: None }
+        Self::new(1, &message)
     }
 
     /// A stated bound was not met (exit code 3).
     pub(crate) fn bound(message: impl ToString) -> Self {
-        Self { code: 3, message: message.to_string(), hint: None }
+        Self::new(3, &message)
     }
 
     /// Stopped early, to be resumed (exit code 75).
     pub(crate) fn stopped(message: impl ToString) -> Self {
-        Self { code: 75, message: message.to_string(), hint: None }
+        Self::new(75, &message)
     }
 
     /// Interrupted by the user (exit code 130).
     pub(crate) fn interrupted(message: impl ToString) -> Self {
-        Self { code: 130, message: message.to_string(), hint: None }
+        Self::new(130, &message)
     }
 
     /// What is wrong with a file, for a command whose options `option` knows.
     pub(crate) fn of_file(e: &FileError, option: impl Fn(Setting) -> Option<&'static str>) -> Self {
         let failure = if e.is_system() { Self::could_not(e) } else { Self::input(e) };
-        failure.maybe_hint(e.hint_with(option))
+        Self { place: Some((e.path.to_string(), e.line())), ..failure }.maybe_hint(e.hint_with(option))
     }
 
     /// The same, of a part.
@@ -63,12 +70,28 @@ impl Failure {
         self
     }
 
-    pub(crate) const fn code(&self) -> u8 {
+    /// Exit code of the program.
+    #[must_use]
+    pub const fn code(&self) -> u8 {
         self.code
     }
 
-    pub(crate) fn advice(&self) -> Option<&str> {
+    /// What helps.
+    #[must_use]
+    pub fn advice(&self) -> Option<&str> {
         self.hint.as_deref()
+    }
+
+    /// The file that is at fault.
+    #[must_use]
+    pub fn file(&self) -> Option<&str> {
+        self.place.as_ref().map(|(file, _)| file.as_str())
+    }
+
+    /// The line in it, from 1.
+    #[must_use]
+    pub fn line(&self) -> Option<u64> {
+        self.place.as_ref().and_then(|(_, line)| *line)
     }
 }
 
@@ -109,6 +132,16 @@ pub(crate) const fn option_for(setting: Setting) -> &'static str {
         Setting::Stamp => "--stamp log takes the times of arrival",
         Setting::Recover => "--recover reads what stands before the damage",
         Setting::StartFiles => "start from the files that nav-sim init makes",
+    }
+}
+
+/// What helps where the setting is no option of the command.
+pub(crate) const fn option_elsewhere(setting: Setting) -> &'static str {
+    match setting {
+        Setting::Origin => {
+            "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M"
+        }
+        other => option_for(other),
     }
 }
 

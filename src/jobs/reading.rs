@@ -1,0 +1,307 @@
+//! How recordings are read and their wavelet variances taken: arguments that several commands share.
+
+use crate::failure::Failure;
+use crate::formats::logs::LogOptions;
+use crate::formats::recordings::{Gaps, ReadOptions};
+use crate::parse;
+use nav_sim_calibration::FitRange;
+use nav_sim_logs::{OnDamage, Stamp};
+use nav_sim_signal::imu::{Channel, Sensor};
+use nav_sim_signal::wavelet::{Convention, Tuning};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
+
+/// How recordings are read.
+#[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+#[command(next_help_heading = "Recordings")]
+pub struct ReadingRequest {
+    /// Sample rate (Hz) of files without a time column
+    #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
+    pub rate_hz: Option<f64>,
+    /// Seconds to leave out at the beginning of each file (warm-up); auto: what differs from the rest of each file
+    #[arg(long, value_name = "S|auto", default_value_t)]
+    pub skip_s: Skip,
+    /// What to do where the time jumps or stands still
+    #[arg(long, value_parser = parse::words::<Gaps>(GAPS), default_value_t)]
+    #[serde(with = "parse::text")]
+    pub gaps: Gaps,
+    /// Topic of the IMU in a log that has several
+    #[arg(long, value_name = "NAME")]
+    pub topic: Option<String>,
+    #[command(flatten)]
+    /// What is read of a log.
+    pub log: LogRequest,
+}
+
+/// What is read of a log.
+#[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+pub struct LogRequest {
+    /// Stamps of a log: header, of the measurement; log, of its arrival
+    #[arg(long, value_name = "WHICH", value_parser = parse::words::<Stamps>(STAMPS), default_value_t)]
+    pub stamp: Stamps,
+    /// Read a damaged log up to the damage
+    #[arg(long)]
+    pub recover: bool,
+}
+
+impl LogRequest {
+    /// The same, of a topic.
+    pub(crate) fn options(&self, topic: Option<String>) -> LogOptions {
+        LogOptions {
+            topic,
+            stamp: if self.stamp == Stamps::Log { Stamp::Log } else { Stamp::Header },
+            on_damage: if self.recover { OnDamage::Recover } else { OnDamage::Refuse },
+        }
+    }
+}
+
+/// Stamps of a log by their names.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Stamps {
+    /// Of the measurement.
+    #[default]
+    Header,
+    /// Of arrival.
+    Log,
+}
+
+parse::textual!(Stamps);
+
+nav_sim_signal::named!(Stamps { Header = "header", Log = "log" });
+
+const STAMPS: &[(&str, &str)] = &[
+    ("header", "Of the measurement, as the message states it"),
+    ("log", "Of arrival, as the logger states it"),
+];
+
+/// How recordings are read, and which of their signals are used.
+#[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+#[command(next_help_heading = "Recordings")]
+pub struct RecordingRequest {
+    #[command(flatten)]
+    /// How they are read.
+    pub reading: ReadingRequest,
+    /// Signals to use: all, accel, gyro, x, accel.x, … (repeatable or comma-separated; default: all)
+    #[arg(long, value_name = "AXES", value_delimiter = ',')]
+    pub axes: Vec<ChannelSet>,
+}
+
+const GAPS: &[(&str, &str)] = &[
+    ("refuse", "Refuse the file"),
+    (
+        "split",
+        "Make each stretch between gaps a recording of its own (but not one 16 times shorter than the longest)",
+    ),
+    ("ignore", "Take the samples as evenly spaced over the whole time: stamped late, none lost"),
+];
+
+/// What is left out at the beginning.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Skip {
+    /// So many seconds.
+    Seconds(f64),
+    /// What is found not to be as the rest.
+    Auto,
+}
+
+parse::textual!(Skip);
+
+impl Default for Skip {
+    fn default() -> Self {
+        Self::Seconds(0.0)
+    }
+}
+
+impl fmt::Display for Skip {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Seconds(seconds) => seconds.fmt(f),
+            Self::Auto => f.write_str("auto"),
+        }
+    }
+}
+
+impl FromStr for Skip {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            _ => parse::non_negative(text).map(Self::Seconds).map_err(|e| format!("{e}, nor auto")),
+        }
+    }
+}
+
+/// What one word of `--axes` stands for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChannelSet {
+    word: String,
+    /// The signals.
+    pub channels: Vec<Channel>,
+}
+
+parse::textual!(ChannelSet);
+
+impl fmt::Display for ChannelSet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.word)
+    }
+}
+
+impl FromStr for ChannelSet {
+    type Err = String;
+
+    /// `all`, a sensor (`accel`), an axis of both sensors (`x`) or one channel (`accel.x`).
+    fn from_str(word: &str) -> Result<Self, String> {
+        let channels = Channel::named(word);
+        match channels.as_slice() {
+            [] => Err("not all, accel, gyro, x, y, z, or one channel such as accel.x".into()),
+            _ => Ok(Self { word: word.to_owned(), channels }),
+        }
+    }
+}
+
+impl ReadingRequest {
+    /// Whether each recording's own warm-up is left out.
+    pub(crate) fn skips_warm_up(&self) -> bool {
+        self.skip_s == Skip::Auto
+    }
+
+    /// What decides what is read of the files, for the provenance of a result.
+    pub(crate) fn provenance(&self) -> toml::Table {
+        let skip_s = match self.skip_s {
+            Skip::Seconds(s) => s.into(),
+            Skip::Auto => "auto".into(),
+        };
+        let mut table = toml::Table::new();
+        table.insert("skip_s".to_owned(), skip_s);
+        table.insert("gaps".to_owned(), self.gaps.name().into());
+        if let Some(rate_hz) = self.rate_hz {
+            table.insert("rate_hz_given".to_owned(), rate_hz.into());
+        }
+        if let Some(topic) = &self.topic {
+            table.insert("topic".to_owned(), topic.as_str().into());
+        }
+        if self.log.stamp != Stamps::default() {
+            table.insert("stamp".to_owned(), self.log.stamp.name().into());
+        }
+        table
+    }
+
+    /// How the files are to be read.
+    pub(crate) fn options(&self) -> ReadOptions {
+        let skip_s = if let Skip::Seconds(s) = self.skip_s { s } else { 0.0 };
+        let log = self.log.options(self.topic.clone());
+        ReadOptions { rate_hz: self.rate_hz, skip_s, gaps: self.gaps, log, ..ReadOptions::default() }
+    }
+}
+
+impl RecordingRequest {
+    fn channels(&self) -> impl Iterator<Item = &Channel> {
+        self.axes.iter().flat_map(|set| &set.channels)
+    }
+
+    /// The sensor whose signals alone are asked for.
+    pub(crate) fn sensor(&self) -> Option<Sensor> {
+        let of_sensor = |sensor: &Sensor| {
+            let mut channels = self.channels().peekable();
+            channels.peek().is_some() && channels.all(|channel| channel.sensor == *sensor)
+        };
+        Sensor::ALL.into_iter().find(of_sensor)
+    }
+
+    /// What decides what is read of the files, for the provenance of a result.
+    pub(crate) fn provenance(&self) -> toml::Table {
+        let mut table = self.reading.provenance();
+        if !self.axes.is_empty() {
+            let channels = self.channels().map(ToString::to_string);
+            table.insert("axes".to_owned(), channels.collect::<Vec<_>>().into());
+        }
+        table
+    }
+
+    /// How the files are to be read.
+    pub(crate) fn options(&self) -> ReadOptions {
+        let channels = (!self.axes.is_empty()).then(|| self.channels().copied().collect());
+        ReadOptions { channels, ..self.reading.options() }
+    }
+}
+
+/// How wavelet variances are taken.
+#[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+#[command(next_help_heading = "Wavelet variance")]
+pub struct TuningRequest {
+    /// Efficiency of the robust wavelet variance at the Gaussian model, 0.3 to 0.99
+    #[arg(long, value_name = "E", default_value_t = Tuning::DEFAULT_EFFICIENCY)]
+    pub efficiency: f64,
+    /// Number of scales, 2, 4, 8, … samples (default: of each signal one less than its length allows); or those that are
+    /// fitted, such as 1s:1000s
+    #[arg(long, value_name = "J|FROM:TO")]
+    pub scales: Option<Scales>,
+}
+
+impl Default for TuningRequest {
+    fn default() -> Self {
+        Self { efficiency: Tuning::DEFAULT_EFFICIENCY, scales: None }
+    }
+}
+
+/// Scales that are asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scales {
+    /// The first ones.
+    Count(u32),
+    /// All, of which these are fitted.
+    Fitted(FitRange),
+}
+
+parse::textual!(Scales);
+
+impl fmt::Display for Scales {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Count(count) => count.fmt(f),
+            Self::Fitted(FitRange { from_s, to_s }) => write!(f, "{from_s}:{to_s}"),
+        }
+    }
+}
+
+impl FromStr for Scales {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if !text.contains(':') {
+            let count = text.parse().ok().filter(|count| (1..=62).contains(count));
+            return count
+                .map(Self::Count)
+                .ok_or_else(|| "not a number from 1 to 62, nor a range such as 1s:1000s".into());
+        }
+        let (from_s, to_s) = parse::seconds_range(text)?;
+        if from_s >= to_s {
+            return Err("the shorter scale comes first".into());
+        }
+        Ok(Self::Fitted(FitRange { from_s, to_s }))
+    }
+}
+
+impl TuningRequest {
+    pub(crate) fn tuning(&self) -> Result<Tuning, Failure> {
+        Tuning::new(self.efficiency, Convention::Exact)
+            .map_err(|e| Failure::input(format!("--efficiency: {e}")))
+    }
+
+    /// Number of scales, if it is given.
+    pub(crate) fn levels(&self) -> Option<u32> {
+        if let Some(Scales::Count(count)) = self.scales { Some(count) } else { None }
+    }
+
+    /// The scales that are fitted, if they are given.
+    pub(crate) fn fitted(&self) -> Option<FitRange> {
+        if let Some(Scales::Fitted(range)) = self.scales { Some(range) } else { None }
+    }
+}
