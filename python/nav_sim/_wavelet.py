@@ -113,7 +113,8 @@ class WaveletVariances(Answer):
 
         def curve(name: str, share: float) -> Curve:
             figures = {key: _finite(entry[name][key]) for key in ("wv", "ci_low", "ci_high")}
-            return Curve(tau_s=tau_s, edof=share * edof, **figures)
+            # the engine has no fewer than one
+            return Curve(tau_s=tau_s, edof=np.maximum(share * edof, 1.0), **figures)
 
         named = {key: entry[key] for key in ("file", "sensor", "axis", "samples")}
         return {**named, "classical": curve("classical", 1.0), "robust": curve("robust", efficiency)}

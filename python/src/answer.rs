@@ -2,6 +2,7 @@
 
 use crate::{error, table};
 use nav_sim::answered::Answered;
+use nav_sim::document::Importance;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -46,7 +47,20 @@ impl Answer {
 
     /// As the terminal shows it.
     fn summary(&self, py: Python<'_>) -> String {
-        py.detach(|| self.shown(&self.answered.document.terminal(WIDTH)))
+        py.detach(|| {
+            let document = &self.answered.document;
+            let text = document.terminal(WIDTH);
+            let spoken = document.spoken(false).map(|note| match note.importance {
+                Importance::Warning => format!("\nwarning: {}", note.text),
+                _ => format!("\nnote: {}", note.text),
+            });
+            self.shown(&(text.trim_end().to_owned() + &spoken.collect::<String>()))
+        })
+    }
+
+    /// Its verdict, a line each.
+    fn verdict(&self) -> Vec<String> {
+        self.answered.document.verdict.lines.iter().map(|line| self.shown(line)).collect()
     }
 
     /// As a page of its own.

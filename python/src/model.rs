@@ -2,9 +2,11 @@
 
 use crate::error;
 use crate::work::work;
+use nav_sim::export::exported;
 use nav_sim::failure::Failure;
 use nav_sim::formats::model_file::{self, ModelFile};
-use nav_sim::prelude::{AxisParameters, Channel, Composite, Horizon, Pair, Policy, Sensor};
+use nav_sim::prelude::{AxisParameters, Channel, Composite, Horizon, Pair, Policy, Sensor, Target};
+use nav_sim::signal::noise::practical::Minimum;
 use nav_sim::signal::noise::{ReplicateError, VirtualImu};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -112,6 +114,26 @@ pub(crate) fn model_practical(
     Ok(Value::Object(sensors).to_string())
 }
 
+/// A model as the file of another program; `name` is that of the model in its head.
+#[pyfunction]
+#[pyo3(signature = (text, name, target, policy, from_s, to_s))]
+pub(crate) fn model_export(
+    py: Python<'_>,
+    text: &str,
+    name: &str,
+    target: &str,
+    policy: &str,
+    from_s: f64,
+    to_s: f64,
+) -> PyResult<String> {
+    let file = read(py, text, None)?;
+    let refused = |message: String| error::raise(py, &message, None, None, None);
+    let target: Target = target.parse().map_err(|e| refused(format!("target: {e}")))?;
+    let policy: Policy = policy.parse().map_err(|e| refused(format!("policy: {e}")))?;
+    let export = exported(&file, target, policy, Horizon { from_s, to_s });
+    Ok(export.map_err(|e| refused(format!("{name}: {e}")))?.text(name))
+}
+
 /// Longest averaging time at which a minimum of the Allan deviation is believed (s).
 const LONGEST_S: f64 = 10_000.0;
 
@@ -129,7 +151,6 @@ fn figures(sensor: Sensor, found: &AxisParameters) -> Value {
         ],
     };
     let Pair { density: n, walk: k, .. } = found.walk;
-    let markov = &found.markov.markov;
     let (sigma, t_corr_s) = found.markov.markov.map(|markov| (markov.sigma, markov.t_corr_s)).unzip();
     let instability = found.minimum.as_ref().map(Minimum::bias_instability);
     json!({ density: n, walk: k, bias: sigma, "bias_correlation_time_s": t_corr_s, floor: instability })

@@ -8,6 +8,7 @@ use nav_sim::calibrate::CalibrationRequest;
 use nav_sim::choose::ChoiceRequest;
 use nav_sim::compare::CompareRequest;
 use nav_sim::design::DesignRequest;
+use nav_sim::document::{Importance, Note as Said};
 use nav_sim::failure::Failure;
 use nav_sim::fuse::FuseRequest;
 use nav_sim::jobs::{Remark, Remarks};
@@ -31,14 +32,15 @@ struct Clerk<'a> {
 }
 
 impl Clerk<'_> {
-    fn warn(&self, texts: impl IntoIterator<Item = String>) {
-        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).extend(texts);
+    fn warn(&self, said: Vec<Said>) {
+        let doubts = said.into_iter().filter(|said| said.importance == Importance::Warning);
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).extend(doubts.map(|said| said.text));
     }
 }
 
 impl Observer<Note> for Clerk<'_> {
     fn remark(&self, note: &Note) {
-        self.warn(note.warning());
+        self.warn(note.said());
     }
 
     fn begin(&self, runs: u64) {
@@ -66,7 +68,7 @@ impl Remarks for Reader<'_> {
     }
 
     fn remark(&mut self, remark: Remark<'_>) {
-        self.0.warn(remark.warnings());
+        self.0.warn(remark.said());
     }
 }
 

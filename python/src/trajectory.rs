@@ -39,9 +39,9 @@ pub(crate) fn trajectory_states<'py>(
             let [lat, lon] = [state.lat / DEG, state.lon / DEG];
             [t_s, lat, lon, state.h, n, e, d, roll / DEG, pitch / DEG, yaw / DEG]
         });
-        Ok((states.collect::<Vec<_>>(), doubts))
+        Ok::<_, Failure>((states.collect::<Vec<_>>(), doubts))
     })?;
-    let (states, doubts) = read.map_err(|e| error::of_failure(py, &Failure::from(e), hidden))?;
+    let (states, doubts) = read.map_err(|failure| error::of_failure(py, &failure, hidden))?;
     let columns = PyDict::new(py);
     for (k, name) in COLUMNS.into_iter().enumerate() {
         columns.set_item(name, PyArray1::from_vec(py, states.iter().map(|state| state[k]).collect()))?;
