@@ -36,8 +36,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let begin = Instant::now();
     let drive = Drive::read(&args.request)?;
-    let command = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
-    let manifest = FuseManifest { command, ..drive.manifest.clone() };
+    let manifest = FuseManifest { command: super::given(), ..drive.manifest.clone() };
     let recognise = |text: &str| {
         let present = serde_json::from_str(text);
         Ok(present.map_or(Found::Foreign, |present| Found::result(manifest.is_same_fusion(&present))))

@@ -2,8 +2,6 @@
 
 use super::{Failure, Printer};
 use crate::formats::atomic;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use signal_hook::iterator::Signals;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
@@ -11,15 +9,11 @@ static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 /// From now on a signal removes what is being written and ends the process: exit code 128 + signal, 130 for
 /// Ctrl-C, with advice. A signal that this process was started to ignore (by `nohup`, say) is still ignored.
 pub(super) fn watch(printer: Printer, advice: Option<String>) {
-    let ignored = ignored();
-    let wanted = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
-    let Ok(mut signals) = Signals::new(wanted) else { return };
-    std::thread::spawn(move || {
-        let Some(signal) = signals.forever().next() else { return };
+    system::on_signal(move |signal| {
         INTERRUPTED.store(true, Ordering::SeqCst);
         atomic::remove_unfinished();
         let failure = Failure::interrupted("interrupted; what was being written is removed");
-        printer.failure(&failure.maybe_hint(advice));
+        printer.failure(&failure.maybe_hint(advice.clone()));
         std::process::exit(128 + signal);
     });
 }
@@ -31,9 +25,35 @@ pub(super) fn settle() {
     }
 }
 
-/// The signals that this process ignores, a bit each from the lowest on. Where that cannot be known: none.
-fn ignored() -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    mask.and_then(|hex| u64::from_str_radix(hex.trim(), 16).ok()).unwrap_or(0)
+#[cfg(unix)]
+mod system {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    use signal_hook::iterator::Signals;
+
+    /// Calls `end` with the first signal that asks the process to end.
+    pub(super) fn on_signal(end: impl FnOnce(i32) + Send + 'static) {
+        let ignored = ignored();
+        let wanted = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
+        let Ok(mut signals) = Signals::new(wanted) else { return };
+        std::thread::spawn(move || signals.forever().next().map(end));
+    }
+
+    /// The signals that this process ignores, a bit each from the lowest on. Where that cannot be known: none.
+    fn ignored() -> u64 {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+        mask.and_then(|hex| u64::from_str_radix(hex.trim(), 16).ok()).unwrap_or(0)
+    }
+}
+
+#[cfg(windows)]
+mod system {
+    /// What the C library calls Ctrl-C.
+    const SIGINT: i32 = 2;
+
+    /// Calls `end` at Ctrl-C, Ctrl-Break or when the console is closed: a console has no other signals.
+    pub(super) fn on_signal(end: impl Fn(i32) + Send + 'static) {
+        // where there is no console there is nobody to interrupt
+        let _ = ctrlc::set_handler(move || end(SIGINT));
+    }
 }

@@ -40,6 +40,7 @@ use std::ffi::{OsStr, OsString};
 use std::io::Write;
 use std::num::ParseIntError;
 use std::process::ExitCode;
+use std::sync::OnceLock;
 
 pub(crate) use crate::failure::Failure;
 pub(crate) use common::{Common, Session};
@@ -206,14 +207,32 @@ fn end(e: &clap::Error) -> ! {
     std::process::exit(failure.code().into())
 }
 
-/// Parses the arguments of the process, does what they ask for and maps the outcome to an exit code.
+/// The command line of this process, as it was given.
+static GIVEN: OnceLock<Vec<String>> = OnceLock::new();
+
+/// The words of the command line, for manifests.
+fn given() -> Vec<String> {
+    GIVEN.get().cloned().unwrap_or_default()
+}
+
+/// Does what the arguments of the process ask for.
 #[must_use]
 pub fn main() -> ExitCode {
-    let given = words(std::env::args_os());
-    let words: Vec<String> = given.iter().map(|w| w.to_string_lossy().into_owned()).collect();
+    run(std::env::args_os()).into()
+}
+
+/// Parses a command line, the program first, does what it asks for and returns the exit code. Once a process: what is wrong with
+/// the words, and Ctrl-C, end the process itself.
+#[must_use]
+pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
+    let given: Vec<OsString> = given.into_iter().collect();
+    let lossy = |all: &[OsString]| all.iter().map(|w| w.to_string_lossy().into_owned()).collect::<Vec<_>>();
+    let _ = GIVEN.set(lossy(&given));
+    let given = words(given.into_iter());
+    let words = lossy(&given);
     if given.len() < 2 {
         let _ = writeln!(std::io::stderr(), "{OVERVIEW}");
-        return ExitCode::from(2);
+        return 2;
     }
     let known = command().color(color_choice(&words)).version(&*version::version(&words).leak());
     let matches = known.try_get_matches_from(&given).unwrap_or_else(|e| end(&e));
@@ -225,10 +244,10 @@ pub fn main() -> ExitCode {
     let outcome = Session::new(cli.common).and_then(|session| cli.command.run(&session));
     interrupt::settle();
     match outcome {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(failure) => {
             printer.failure(&failure);
-            ExitCode::from(failure.code())
+            failure.code()
         }
     }
 }

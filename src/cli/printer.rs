@@ -4,6 +4,7 @@ use super::Failure;
 use super::common::{Color, Common};
 use crate::formats::fusion_files::Remark;
 use crate::formats::system_words;
+use nav_sim_document::{Importance, Note};
 use std::borrow::Cow;
 use std::io::{ErrorKind, IsTerminal, Write};
 
@@ -83,6 +84,15 @@ impl Printer {
     pub(crate) fn detail(&self, text: &str) {
         if self.verbose {
             self.say(text);
+        }
+    }
+
+    /// A remark, by its importance.
+    pub(crate) fn note(&self, note: &Note) {
+        match note.importance {
+            Importance::Warning => self.warn(&note.text),
+            Importance::Remark => self.say(&note.text),
+            Importance::Detail => self.detail(&note.text),
         }
     }
 

@@ -30,6 +30,7 @@ mod reduction;
 mod request;
 pub(crate) mod turn_on;
 mod uncertainty;
+mod words;
 
 pub(crate) use answer::RUN_FILES;
 pub use answer::RunAnswer;

@@ -1,8 +1,7 @@
-//! What a job tells, in words.
+//! What a job tells, said.
 
 use crate::cli::{Progress, Session};
 use crate::observer::Observer;
-use crate::report::{reduction_doubt, reduction_line, unexpected_line};
 use crate::run::Note;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -27,23 +26,7 @@ impl<'a> Words<'a> {
 
 impl Observer<Note> for Words<'_> {
     fn remark(&self, note: &Note) {
-        let printer = &self.session.printer;
-        match note {
-            Note::Warning(text) => printer.warn(text),
-            Note::Remark(text) => printer.say(text),
-            Note::Detail(text) => printer.detail(text),
-            Note::LargeBias(sensor, sigma) => printer.warn(&format!(
-                "the filter starts with a bias of {sigma:.3} {} ({sensor}): an AR1 of phi near 1?",
-                sensor.unit()
-            )),
-            Note::Unexpected(found) => printer.warn(&unexpected_line(found)),
-            Note::Reduction(quality) => {
-                printer.say(&reduction_line(quality));
-                reduction_doubt(quality).iter().for_each(|doubt| printer.warn(doubt));
-            }
-            Note::Heading(doubt) => printer.warn(&doubt.to_string()),
-            Note::Outage(remark) => printer.warn(&remark.to_string()),
-        }
+        note.said().iter().for_each(|said| self.session.printer.note(said));
     }
 
     fn begin(&self, runs: u64) {

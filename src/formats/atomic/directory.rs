@@ -83,8 +83,8 @@ impl AtomicDir {
     /// When a declared file was not written, the disk is full, or a rename is refused.
     pub(crate) fn commit(mut self) -> Result<(), FileError> {
         for name in &self.names {
-            let sync = File::open(self.staging.path().join(name)).and_then(|f| f.sync_all());
-            sync.map_err(|e| FileError::io(&self.destination.join(name), e))?;
+            flush(&self.staging.path().join(name))
+                .map_err(|e| FileError::io(&self.destination.join(name), e))?;
         }
         let moved =
             if self.destination.is_dir() { self.replace() } else { self.staging.rename(&self.destination) };
@@ -102,6 +102,11 @@ impl AtomicDir {
         self.staging.rename(&moving)?;
         move_files(&moving, &self.destination)
     }
+}
+
+/// Has the disk take a file that was written. Windows flushes through a handle for writing only.
+fn flush(path: &Path) -> io::Result<()> {
+    File::options().read(true).write(cfg!(windows)).open(path)?.sync_all()
 }
 
 /// What temporary directories in `destination` are named after.

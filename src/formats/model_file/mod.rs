@@ -24,8 +24,7 @@ mod write;
 
 pub(crate) use description::schema;
 pub use provenance::Misfit;
-pub(crate) use read::from_text;
-pub use read::read;
+pub use read::{from_text, read};
 pub(crate) use write::to_toml;
 pub use write::write;
 

@@ -32,7 +32,7 @@ const NOT_A_MODEL: &str =
 ///
 /// # Errors
 /// As [`read`].
-pub(crate) fn from_text(path: &Path, text: &str) -> Result<ModelFile, FileError> {
+pub fn from_text(path: &Path, text: &str) -> Result<ModelFile, FileError> {
     parse(&Source::new(&path.display().to_string(), text))
 }
 

@@ -1,0 +1,204 @@
+"""What a request comes to."""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from nav_sim import _native
+from nav_sim._errors import NavSimWarning
+from nav_sim._inputs import FloatArray, Staging, StrPath
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: Is told how many units are done, of how many; True: a bar of tqdm.
+Progress = Union[Callable[[int, int], object], bool, None]
+
+Columns = dict[str, npt.NDArray[Any]]
+
+
+class Answer:
+    """The answer of the command of the same name.
+
+    `data` is what the command prints as JSON, `summary()` what it prints in words, `to_html()` its page, `write()` the files
+    that it makes.
+    """
+
+    def __init__(self, native: _native.Answer) -> None:
+        self._native = native
+
+    @cached_property
+    def data(self) -> dict[str, Any]:
+        """All figures, as the JSON of the command has them."""
+        found: dict[str, Any] = json.loads(self._native.json())
+        return found
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in a word, such as "consistent"; in words where there is no single one."""
+        found = self.data.get("verdict")
+        kind = found.get("kind") if isinstance(found, dict) else None
+        return kind if isinstance(kind, str) else "\n".join(self._native.verdict())
+
+    @property
+    def unmet(self) -> str | None:
+        """The bound that is not met, where one was asked for."""
+        return self._native.unmet
+
+    @property
+    def files(self) -> list[str]:
+        """Names of the files that the command makes."""
+        return self._native.names()
+
+    def text(self, name: str) -> str:
+        """The text of one of `files`."""
+        return self._native.text(name)
+
+    def table(self, name: str) -> Columns:
+        """One of `files` that is a table: columns by name."""
+        return {key: np.asarray(values) for key, values in self._native.table(name).items()}
+
+    def summary(self) -> str:
+        """What the command prints."""
+        return self._native.summary()
+
+    def to_html(self, path: StrPath) -> Path:
+        """Writes the page of the command, which needs no other file."""
+        page = Path(path)
+        page.write_text(self._native.html(), encoding="utf-8")
+        return page
+
+    def write(self, directory: StrPath) -> Path:
+        """Writes the files of the command."""
+        place = Path(directory)
+        place.mkdir(parents=True, exist_ok=True)
+        for name in self.files:
+            (place / name).write_text(self.text(name), encoding="utf-8", newline="\n")
+        return place
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.verdict.splitlines()[0] if self.verdict else ''}>"
+
+    def __str__(self) -> str:
+        return self.summary()
+
+
+A = TypeVar("A", bound=Answer)
+
+
+def ask(kind: type[A], command: str, staging: Staging, progress: Progress = None, **request: Any) -> A:
+    """The answer to a request; what is None in it is left to the engine."""
+    text = json.dumps(stated(request))
+    with bar(progress) as told:
+        native = _native.answer(command, text, staging.hidden, told)
+    for warning in native.warnings:
+        warnings.warn(warning, NavSimWarning, stacklevel=3)
+    return kind(native)
+
+
+def stated(request: Mapping[str, Any]) -> dict[str, Any]:
+    """A request without what is None in it."""
+    inner = {key: stated(value) if isinstance(value, Mapping) else value for key, value in request.items()}
+    return {key: _plain(value) for key, value in inner.items() if value is not None}
+
+
+def _plain(value: Any) -> Any:
+    """A value that JSON has."""
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    return value
+
+
+class bar:
+    """A progress bar of tqdm, a function, or nothing."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._bar: Any = None
+
+    def __enter__(self) -> Callable[[int, int], object] | None:
+        if self._progress is True:
+            from tqdm.auto import tqdm
+
+            self._bar = tqdm()
+            return self._show
+        return self._progress or None
+
+    def _show(self, done: int, total: int) -> None:
+        self._bar.total = total
+        self._bar.update(done - self._bar.n)
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+def windows(outages: Sequence[tuple[float, float]] | str | None) -> list[str] | None:
+    """Outages as the command has them: `START:END`, or none at all."""
+    if outages is None:
+        return None
+    if isinstance(outages, str):
+        return [outages]
+    if len(outages) == 0:
+        return ["none"]
+    return [one if isinstance(one, str) else f"{float(one[0])!r}:{float(one[1])!r}" for one in outages]
+
+
+def flattened(entries: Sequence[Mapping[str, Any]]) -> Columns:
+    """Entries of JSON as columns; figures within figures have both names, pairs have two columns."""
+    rows = [_flat(entry) for entry in entries]
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: _column([row.get(name) for row in rows]) for name in names}
+
+
+def _flat(entry: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, value in entry.items():
+        name = f"{before}{key}"
+        if isinstance(value, Mapping):
+            flat.update(_flat(value, f"{name}_"))
+        elif isinstance(value, list) and len(value) == 2:
+            flat[f"{name}_low"], flat[f"{name}_high"] = value
+        elif not isinstance(value, list):
+            flat[name] = value
+    return flat
+
+
+def _column(values: list[Any]) -> npt.NDArray[Any]:
+    if any(isinstance(value, str) for value in values):
+        return np.asarray(["" if value is None else str(value) for value in values])
+    return np.asarray([np.nan if value is None else value for value in values], dtype=np.float64)
+
+
+def axes_or_new(ax: Axes | None) -> Axes:
+    """Axes to draw in, of a figure of their own where none are given."""
+    if ax is not None:
+        return ax
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as e:
+        raise ImportError("plots need matplotlib: pip install 'nav-sim[plot]'") from e
+    try:
+        # where there is a notebook or a window, pyplot shows the figure
+        import matplotlib.pyplot as plt
+
+        found: Axes = plt.subplots()[1]
+    except ImportError:
+        found = Figure().add_subplot()
+    return found
+
+
+__all__ = ["Answer", "Columns", "FloatArray", "Progress", "ask", "axes_or_new", "flattened", "windows"]

@@ -1,0 +1,191 @@
+"""Noise models."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Union
+
+import numpy as np
+
+from nav_sim import _native, _toml
+from nav_sim._answer import axes_or_new
+from nav_sim._errors import NavSimError
+from nav_sim._inputs import FloatArray, Staging, StrPath
+from nav_sim._wavelet import Curve
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: A process as model files have it: {"type": "WN", "sigma2": 5e-5}.
+Process = Mapping[str, Any]
+#: The processes of a sensor, the same for its axes, or by axis.
+Processes = Union[Sequence[Process], Mapping[str, Sequence[Process]]]
+
+CHANNELS = tuple(f"{sensor}.{axis}" for sensor in ("accel", "gyro") for axis in "xyz")
+
+
+class Model:
+    """The noise of an IMU: for each axis a sum of processes, at a rate.
+
+        Model(rate_hz=100, gyro=[{"type": "WN", "sigma2": 1e-6}, {"type": "RW", "gamma2": 1e-13}])
+
+    Types and parameters, per sample: WN sigma2, QN q2, AR1 phi and sigma2 (of the innovation), RW gamma2 (of the increment),
+    DR slope, GM, MA1; m/s² for accelerometers, rad/s for gyroscopes. A sensor that is left out has no noise.
+    """
+
+    def __init__(self, rate_hz: float, accel: Processes | None = None, gyro: Processes | None = None) -> None:
+        sensors = {name: _axes(given) for name, given in (("accel", accel), ("gyro", gyro)) if given is not None}
+        self._take(_toml.dumps({"schema": 1, "rate_hz": float(rate_hz), **sensors}), None)
+
+    def _take(self, text: str, path: str | None) -> None:
+        self._text, self._path = text, path
+        self._contents: dict[str, Any] = json.loads(_native.model_contents(text, path))
+
+    @classmethod
+    def from_toml(cls, text: str) -> Model:
+        """The model of a text as model files have it."""
+        return cls._of(text, None)
+
+    @classmethod
+    def _of(cls, text: str, path: str | None) -> Model:
+        model = cls.__new__(cls)
+        model._take(text, path)
+        return model
+
+    @classmethod
+    def read(cls, path: StrPath) -> Model:
+        """Reads a model file (TOML), as `calibrate` writes it."""
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as e:
+            reason = getattr(e, "strerror", None) or str(e)
+            raise NavSimError(f"{os.fspath(path)}: {reason}", file=os.fspath(path)) from None
+        return cls._of(text, os.fspath(path))
+
+    def write(self, path: StrPath) -> Path:
+        """Writes it as a model file."""
+        place = Path(path)
+        place.write_text(self._text, encoding="utf-8", newline="\n")
+        return place
+
+    def to_toml(self) -> str:
+        """Its text as model files have it, with intervals and provenance where they are known."""
+        return self._text
+
+    @property
+    def rate_hz(self) -> float:
+        """The rate that its parameters are for (Hz)."""
+        return float(self._contents["rate_hz"])
+
+    @property
+    def processes(self) -> dict[str, list[dict[str, Any]]]:
+        """The processes of each channel that it has: `processes["gyro.x"]`."""
+        return {channel: list(self._contents["channels"][channel]) for channel in self.channels}
+
+    @cached_property
+    def channels(self) -> list[str]:
+        """The channels that it has."""
+        return [channel for channel in CHANNELS if channel in self._contents["channels"]]
+
+    def __add__(self, other: Model) -> Model:
+        """The model whose noise is the sum of the two, at one and the same rate."""
+        if not isinstance(other, Model):
+            return NotImplemented
+        if other.rate_hz != self.rate_hz:
+            raise NavSimError(f"models of {self.rate_hz} Hz and of {other.rate_hz} Hz have no sum")
+        own, more = self.processes, other.processes
+        sensors: dict[str, dict[str, list[Process]]] = {"accel": {}, "gyro": {}}
+        for channel in CHANNELS:
+            sensor, axis = channel.split(".")
+            both = [*own.get(channel, []), *more.get(channel, [])]
+            if both:
+                sensors[sensor][axis] = both
+        return Model(self.rate_hz, sensors["accel"] or None, sensors["gyro"] or None)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Model) and self._contents == other._contents
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        sums = {channel: "+".join(p["type"] for p in own) for channel, own in self.processes.items()}
+        return f"<Model at {self.rate_hz} Hz: {', '.join(f'{channel} {sum}' for channel, sum in sums.items())}>"
+
+    def synthesize(
+        self,
+        *,
+        samples: int | None = None,
+        duration_s: float | None = None,
+        replicate: int = 1,
+        seed: int = 1,
+        spread: bool = False,
+    ) -> dict[str, FloatArray]:
+        """A static recording of it, mean free: a column a channel, as `nav-sim synthesize` writes replicate number `replicate`.
+
+        `spread` draws the parameters of the replicate from the spread that the model file states.
+        """
+        if (samples is None) == (duration_s is None):
+            raise NavSimError("samples, duration_s: give one of them")
+        count = round(duration_s * self.rate_hz) if samples is None and duration_s is not None else samples
+        for name, value, least in (("samples", count, 1), ("replicate", replicate, 1), ("seed", seed, 0)):
+            if not isinstance(value, (int, np.integer)) or value < least:
+                raise NavSimError(f"{name}: {value} is not a whole number from {least} on")
+        assert count is not None
+        return _native.model_recording(self._text, int(count), int(replicate), int(seed), spread)
+
+    def wavelet_variance(self, channel: str, scales: int = 20) -> Curve:
+        """The wavelet variance that a channel implies at the scales 2, 4, 8, … samples: `tau_s` and `wv`."""
+        wv = _native.model_wavelet(self._text, channel, scales)
+        return Curve(tau_s=2.0 ** np.arange(1, scales + 1) / self.rate_hz, wv=wv)
+
+    def practical(self, policy: str = "matched", horizon_s: tuple[float, float] = (1.0, 100.0)) -> dict[str, dict[str, float | None]]:
+        """The figures that data sheets and other filters have, of the noisiest axis of each sensor.
+
+        Noise density and random walk stand for the model over averages of `horizon_s`: "matched" (its Allan deviation at 1 s and
+        the closest bias), "envelope" (nowhere below it) or "strict" (WN and RW as they are). What a model does not have is None.
+        """
+        found: dict[str, dict[str, float | None]] = json.loads(_native.model_practical(self._text, policy, *horizon_s))
+        return found
+
+    def export(self, target: str, path: StrPath | None = None, *, policy: str = "matched", horizon_s: tuple[float, float] = (1.0, 100.0)) -> str:
+        """Its parameters as the file of another program: "kalibr", "openvins", "px4", "gtsam", "matlab" and others.
+
+        Returns the text, and writes it where a path is given.
+        """
+        name = self._path or "model"
+        text = _native.model_export(self._text, name, target, policy, *horizon_s)
+        if path is not None:
+            Path(path).write_text(text + "\n", encoding="utf-8", newline="\n")
+        return text
+
+    def plot(self, channel: str, ax: Axes | None = None, scales: int = 20, **line: Any) -> Axes:
+        """Draws the wavelet variance that a channel implies."""
+        ax = axes_or_new(ax)
+        curve = self.wavelet_variance(channel, scales)
+        ax.loglog(curve["tau_s"], curve["wv"], label=channel, **line)
+        ax.set_xlabel("scale (s)")
+        ax.set_ylabel("wavelet variance")
+        return ax
+
+
+def _axes(given: Processes) -> dict[str, Any]:
+    if isinstance(given, Mapping):
+        return {axis: {"processes": _inline(own)} for axis, own in given.items()}
+    return {"processes": _inline(given)}
+
+
+def _inline(processes: Sequence[Process]) -> _toml.Inline:
+    return _toml.Inline(processes)
+
+
+def staged(model: StrPath | Model, name: str, staging: Staging) -> str:
+    """The file of a model: its own where it was read from one and nothing was changed."""
+    if not isinstance(model, Model):
+        return os.fspath(model)
+    if model._path is not None:
+        return model._path
+    return staging.text(f"{name}.toml", model._text)

@@ -1,0 +1,335 @@
+"""INS/GNSS navigation: simulated, analysed, and of recorded data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from nav_sim import _model, _trajectory
+from nav_sim._answer import Answer, Columns, Progress, ask, axes_or_new, flattened, windows
+from nav_sim._errors import NavSimError
+from nav_sim._inputs import Staging, StrPath, Table, columns, is_path
+from nav_sim._model import Model
+from nav_sim._trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: Windows without fixes: pairs of start and end (s); [] or "none": none at all; None: 300 to 390 s and 700 to 790 s.
+Outages = Union[Sequence[tuple[float, float]], str, None]
+#: A trajectory: a file, columns, or a `Trajectory`.
+AnyTrajectory = Union[StrPath, Table, Trajectory]
+#: A noise model: a file or a `Model`.
+AnyModel = Union[StrPath, Model]
+#: Settings: a file, or its tables as a dict.
+Settings = Union[StrPath, Mapping[str, Any]]
+
+
+class Run(Answer):
+    """Errors of a navigation, by Monte Carlo or covariance analysis: `nav-sim run`.
+
+    `epochs` and `fan` over time, `runs` run by run, `outages` outage by outage: dicts of columns. ASEE (averaged standard
+    estimation error) is what the filter believes of its error, RMSE how wrong it is.
+    """
+
+    @cached_property
+    def epochs(self) -> Columns:
+        """Once a second: `t_s`, `asee_…`, `rmse_…`, `bias_…` of each state, `nees`, `coverage`."""
+        return self.table("epochs.csv")
+
+    @cached_property
+    def fan(self) -> Columns:
+        """Quantiles of the horizontal position error over time (m)."""
+        return self.table("fan.csv")
+
+    @cached_property
+    def runs(self) -> Columns:
+        """Errors of each run at the ends of outages; of Monte Carlo only."""
+        return self.table("runs.csv")
+
+    @cached_property
+    def outages(self) -> Columns:
+        """A row an outage: `start_s`, `end_s`, `rmse_end_pos_e_m`, `horizontal_error_end_m_p95` and all else in `data`."""
+        return flattened(self.data["outages"])
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the horizontal error over time, true and believed; outages are grey."""
+        ax = axes_or_new(ax)
+        for name, label in (("rmse", "true (RMSE)"), ("asee", "believed (ASEE)")):
+            north, east = (self.epochs[f"{name}_pos_{axis}_m"] for axis in "ne")
+            ax.semilogy(self.epochs["t_s"], np.hypot(north, east), label=label)
+        _shade(ax, self.outages)
+        ax.set_xlabel("time (s)")
+        ax.set_ylabel("horizontal error (m)")
+        ax.legend()
+        return ax
+
+
+def _shade(ax: Axes, outages: Columns) -> None:
+    for start_s, end_s in zip(outages.get("start_s", ()), outages.get("end_s", ())):
+        ax.axvspan(start_s, end_s, color="0.9", zorder=0)
+
+
+def run(
+    trajectory: AnyTrajectory,
+    model: AnyModel,
+    *,
+    truth: AnyModel | None = None,
+    static: StrPath | Table | Sequence[StrPath | Table] | None = None,
+    rate_hz: float | None = None,
+    outages: Outages = None,
+    runs: int | None = None,
+    method: str | None = None,
+    filter: str | int | None = None,
+    turn_on_bias: tuple[float, float] | None = None,
+    scale_ppm: tuple[float, float] | None = None,
+    require: str | Sequence[str] | None = None,
+    gnss: Settings | None = None,
+    scenario: Settings | None = None,
+    seed: int | None = None,
+    progress: Progress = None,
+) -> Run:
+    """Navigates by INS/GNSS along a trajectory with a noise model in the filter: `nav-sim run`.
+
+    Parameters
+    ----------
+    trajectory
+        A file, columns (`t_s`, `lat_deg`, `lon_deg`, `h_m`, …) or a `Trajectory`.
+    model
+        What the filter believes of the IMU.
+    truth
+        What makes the errors of the IMU, if not the same model.
+    static
+        Recordings whose windows make them, as to `calibrate`; `rate_hz` (Hz) where there is no time in them.
+    outages
+        Windows without fixes: pairs of start and end (s); [] for none; None for 300 to 390 s and 700 to 790 s.
+    runs
+        Runs of Monte Carlo (100).
+    method
+        "monte-carlo", "lincov" (no sampling) or "both".
+    filter
+        States: 15, 21 (and scale factors) or "full" (one for each process).
+    turn_on_bias, scale_ppm
+        Constant biases (m/s², rad/s) and scale factors (ppm) that the filter expects: standard deviations, accelerometer first.
+    require
+        Limits such as "p95_m<=5" or "consistent"; `.unmet` says whether they are missed.
+    gnss, scenario
+        All other settings, by a file or as a dict: `scenario={"imu": {"rate_hz": 200.0}}`; of `gnss` the section of that name.
+    seed
+        Of all random numbers; that of the scenario, or 1, without it.
+
+    Returns
+    -------
+    `.epochs`, `.outages`, `.verdict`, `.plot()`, `.summary()`, `.to_html(path)`, `.write(directory)`.
+    """
+    with Staging() as staging:
+        recordings = None if static is None else staging.recordings(static, "static", None)
+        return ask(
+            Run,
+            "run",
+            staging,
+            progress,
+            trajectory=_trajectory.staged(trajectory, staging),
+            model=_model.staged(model, "model", staging),
+            truth=None if truth is None else _model.staged(truth, "truth", staging),
+            static=recordings,
+            rate_hz=rate_hz,
+            outage=windows(outages),
+            runs=runs,
+            filter={"states": states(filter), "turn_on_bias": turn_on_bias, "scale_ppm": scale_ppm},
+            method=method,
+            require=[require] if isinstance(require, str) else require,
+            gnss=None if gnss is None else staging.settings(gnss, "gnss"),
+            scenario=None if scenario is None else staging.settings(scenario, "scenario"),
+            seed=seed,
+        )
+
+
+def lincov(
+    trajectory: AnyTrajectory,
+    model: AnyModel,
+    *,
+    truth: AnyModel | None = None,
+    outages: Outages = None,
+    filter: str | int | None = None,
+    turn_on_bias: tuple[float, float] | None = None,
+    scale_ppm: tuple[float, float] | None = None,
+    require: str | Sequence[str] | None = None,
+    gnss: Settings | None = None,
+    scenario: Settings | None = None,
+    progress: Progress = None,
+) -> Run:
+    """The same by linear covariance analysis, which draws nothing: `nav-sim run --method lincov`. Arguments as of `run`."""
+    return run(
+        trajectory,
+        model,
+        truth=truth,
+        outages=outages,
+        method="lincov",
+        filter=filter,
+        turn_on_bias=turn_on_bias,
+        scale_ppm=scale_ppm,
+        require=require,
+        gnss=gnss,
+        scenario=scenario,
+        progress=progress,
+    )
+
+
+def states(filter: str | int | None) -> str | None:
+    """The name of a filter."""
+    return None if filter is None else str(filter)
+
+
+class Fusion(Answer):
+    """The filter on recorded data: `nav-sim fuse`. `solution`, `innovations` and `errors` are dicts of columns."""
+
+    @cached_property
+    def solution(self) -> Columns:
+        """`t_s`, `lat_deg`, `lon_deg`, `h_m`, velocity, attitude, biases, and their standard deviations `sd_…`."""
+        return self.table("solution.csv")
+
+    @cached_property
+    def smoothed(self) -> Columns:
+        """The same, of all fixes; with `smooth=True`."""
+        return self.table("smoothed.csv")
+
+    @cached_property
+    def innovations(self) -> Columns:
+        """Every fix: innovation, its standard deviation, whether it was used."""
+        return self.table("innovations.csv")
+
+    @cached_property
+    def errors(self) -> Columns:
+        """Differences from the reference, with `reference=`."""
+        return self.table("errors.csv")
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the way: longitude and latitude."""
+        ax = axes_or_new(ax)
+        ax.plot(self.solution["lon_deg"], self.solution["lat_deg"])
+        ax.set_aspect(1.0 / np.cos(np.radians(self.solution["lat_deg"][0])))
+        ax.set_xlabel("longitude (°)")
+        ax.set_ylabel("latitude (°)")
+        return ax
+
+
+#: Attitude of the IMU in the vehicle: "flu", "rfu", "auto", angles (°), or angles and standard deviations (°).
+Mounting = Union[str, Sequence[float], tuple[Sequence[float], Sequence[float]]]
+
+
+def fuse(
+    imu: StrPath | Table,
+    gnss: StrPath | Table,
+    model: AnyModel,
+    *,
+    initial: Settings = "auto",
+    lever_arm_m: Sequence[float] = (0.0, 0.0, 0.0),
+    heading_deg: tuple[float, float] | None = None,
+    mounting: Mounting | None = None,
+    reference: AnyTrajectory | None = None,
+    outages: Sequence[tuple[float, float]] = (),
+    filter: str | int = 15,
+    turn_on_bias: tuple[float, float] | None = None,
+    gnss_sigma: float | Mapping[str, Any] | None = None,
+    gnss_delay_s: float = 0.0,
+    gnss_correlation: str | float = "auto",
+    rate_hz: float = 10.0,
+    smooth: bool = False,
+    progress: Progress = None,
+) -> Fusion:
+    """Fuses recorded IMU and GNSS data: `nav-sim fuse`.
+
+    Parameters
+    ----------
+    imu
+        A file, or columns: `t_s`, and rates `gyro_x_rad_s` … `accel_z_m_s2` or increments `dtheta_x_rad` … `dv_z_m_s`.
+    gnss
+        A file, or columns: `t_s`, `lat_deg`, `lon_deg`, `h_m`, `sd_n_m`, `sd_e_m`, `sd_d_m`, and velocities `v_n_m_s` … with
+        `sd_vn_m_s` ….
+    model
+        What the filter believes of the IMU.
+    initial
+        The state at the start, by a file or as a dict; "auto": level from the IMU, heading from the course.
+    lever_arm_m
+        The antenna from the IMU: front, right, down (m).
+    heading_deg
+        Heading at the start and its standard deviation (°).
+    mounting
+        "flu" or "rfu" (axes of that name), "auto" (found from the drive), or roll, pitch, yaw (°), with standard deviations
+        ((roll, pitch, yaw), (sd, sd, sd)).
+    reference
+        A trajectory to compare with.
+    outages
+        Windows in which fixes are withheld, on the clock of the data (s).
+    gnss_sigma
+        A factor on the stated standard deviations, or {"pos_m": [n, e, d], "vel_m_s": [n, e, d]} where none are stated.
+    gnss_delay_s
+        How late fixes are stamped (s).
+    gnss_correlation
+        How long errors of positions last: "auto", "none", or seconds.
+    rate_hz
+        Rows of the solution a second.
+    smooth
+        Also estimate every row from all fixes.
+
+    Returns
+    -------
+    `.solution`, `.innovations`, `.errors`, `.verdict`, `.plot()`, `.summary()`, `.to_html(path)`, `.write(directory)`.
+    """
+    with Staging() as staging:
+        heading = None if heading_deg is None else dict(zip(("deg", "sigma_deg"), map(float, heading_deg)))
+        lasts = gnss_correlation if isinstance(gnss_correlation, str) else {"seconds": float(gnss_correlation)}
+        return ask(
+            Fusion,
+            "fuse",
+            staging,
+            progress,
+            imu=imu if is_path(imu) else staging.arrays("imu", columns(imu, "imu")),  # type: ignore[arg-type]
+            gnss=staging.table(gnss, "gnss"),
+            model=_model.staged(model, "model", staging),
+            initial=staging.settings(initial, "initial"),
+            lever_arm_m=[float(x) for x in lever_arm_m],
+            heading=heading,
+            mounting=_mounting(mounting),
+            reference=None if reference is None else _reference(reference, staging),
+            outages=[{"start_s": float(a), "end_s": float(b)} for a, b in outages],
+            filter=str(filter),
+            turn_on_bias=turn_on_bias,
+            gnss_sigma=_sigma(gnss_sigma),
+            gnss_delay_s=gnss_delay_s,
+            gnss_correlation=lasts,
+            rate_hz=rate_hz,
+            smooth=smooth,
+        )
+
+
+def _reference(reference: AnyTrajectory, staging: Staging) -> str:
+    if isinstance(reference, Trajectory):
+        return reference.staged(staging)
+    return staging.table(reference, "reference")
+
+
+def _mounting(mounting: Mounting | None) -> Any:
+    if mounting is None or mounting == "auto":
+        return mounting
+    if isinstance(mounting, str):
+        return {"axes": mounting}
+    angles: Any = np.asarray(mounting, dtype=np.float64)
+    if angles.shape not in ((3,), (2, 3)):
+        raise NavSimError("mounting: roll, pitch, yaw (°) are needed, and where known three standard deviations")
+    both: npt.NDArray[np.float64] = angles if angles.ndim == 2 else np.stack([angles, np.ones(3)])
+    return {"angles": {"deg": both[0].tolist(), "sigma_deg": both[1].tolist()}}
+
+
+def _sigma(sigma: float | Mapping[str, Any] | None) -> Any:
+    if sigma is None:
+        return None
+    if isinstance(sigma, Mapping):
+        each = {key: np.broadcast_to(np.asarray(value, dtype=np.float64), 3) for key, value in sigma.items()}
+        return {"unsaid": {key: value.tolist() for key, value in each.items()}}
+    return {"times": [float(sigma), float(sigma)]}

@@ -1,0 +1,85 @@
+"""Reference trajectories."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nav_sim import _native
+from nav_sim._answer import axes_or_new
+from nav_sim._errors import NavSimWarning
+from nav_sim._inputs import FloatArray, Staging, StrPath, Table, columns, is_path
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+class Trajectory:
+    """A motion: a file, or columns.
+
+    Columns are `t_s`, `lat_deg`, `lon_deg`, `h_m`, and `roll_deg`, `pitch_deg`, `yaw_deg` where they are known; without them
+    heading and pitch follow the path. `n_m`, `e_m`, `d_m` are metres north, east and down of `origin` (latitude and longitude in
+    degrees, height in m). Files: motion profiles (.toml), tables (.csv), KF-GINS (.nav), TUM, GPX.
+    """
+
+    def __init__(self, source: StrPath | Table, origin: tuple[float, float, float] | None = None) -> None:
+        if is_path(source):
+            self._path: str | None = os.fspath(source)  # type: ignore[arg-type]
+            self._columns: dict[str, FloatArray] = {}
+        else:
+            self._path, self._columns = None, columns(source, "trajectory")  # type: ignore[arg-type]
+        self._origin = origin
+        # what is wrong with it is known from the start
+        self.start_s, self.end_s = (float(self.states(rate_hz=1.0)["t_s"][k]) for k in (0, -1))
+
+    def staged(self, staging: Staging) -> str:
+        """Its file."""
+        if self._path is not None:
+            return self._path
+        path = staging.table(self._columns, "trajectory")
+        if self._origin is not None:
+            head = "# origin: " + ", ".join(repr(float(x)) for x in self._origin) + "\n"
+            Path(path).write_text(head + Path(path).read_text(encoding="utf-8"), encoding="utf-8")
+        return path
+
+    def states(self, rate_hz: float = 10.0) -> dict[str, FloatArray]:
+        """Position, velocity (`v_n_m_s` …) and attitude at that rate, smoothly between the samples."""
+        with Staging() as staging:
+            path = self.staged(staging)
+            found, doubts = _native.trajectory_states(path, float(rate_hz), staging.hidden)
+        for doubt in doubts if not getattr(self, "_doubted", False) else []:
+            warnings.warn(doubt, NavSimWarning, stacklevel=3)
+        self._doubted = True
+        return found
+
+    def write(self, path: StrPath) -> Path:
+        """Writes its file, or its columns as a table."""
+        with Staging() as staging:
+            return Path(shutil.copyfile(self.staged(staging), path))
+
+    def plot(self, ax: Axes | None = None, **line: Any) -> Axes:
+        """Draws the way: longitude and latitude, a second a point."""
+        ax = axes_or_new(ax)
+        states = self.states(rate_hz=1.0)
+        ax.plot(states["lon_deg"], states["lat_deg"], **line)
+        ax.set_aspect(1.0 / np.cos(np.radians(states["lat_deg"][0])))
+        ax.set_xlabel("longitude (°)")
+        ax.set_ylabel("latitude (°)")
+        return ax
+
+    def __repr__(self) -> str:
+        return f"<Trajectory: {self._path or 'columns'}, {self.start_s:g} s to {self.end_s:g} s>"
+
+
+def staged(trajectory: StrPath | Table | Trajectory, staging: Staging) -> str:
+    """The file of a trajectory."""
+    if isinstance(trajectory, Trajectory):
+        return trajectory.staged(staging)
+    return staging.table(trajectory, "trajectory")
+
+

@@ -1,0 +1,147 @@
+//! Requests in: JSON with the keys of the commands' options.
+
+use crate::answer::Answer;
+use crate::error;
+use crate::work::{Meter, work};
+use nav_sim::answered::Answered;
+use nav_sim::calibrate::CalibrationRequest;
+use nav_sim::choose::ChoiceRequest;
+use nav_sim::compare::CompareRequest;
+use nav_sim::design::DesignRequest;
+use nav_sim::document::{Importance, Note as Said};
+use nav_sim::failure::Failure;
+use nav_sim::fuse::FuseRequest;
+use nav_sim::jobs::{Remark, Remarks};
+use nav_sim::observer::Observer;
+use nav_sim::require::RequireRequest;
+use nav_sim::run::{Note, RunRequest};
+use nav_sim::tune::TuneRequest;
+use nav_sim::wv::WaveletRequest;
+use pyo3::prelude::*;
+use serde::de::DeserializeOwned;
+use std::ffi::OsString;
+use std::sync::{Mutex, PoisonError};
+
+/// Seed where neither the request nor a file has one: the same call gives the same answer.
+const SEED: u64 = 1;
+
+/// Takes down what a job warns of, and counts what it does.
+struct Clerk<'a> {
+    meter: &'a Meter,
+    warnings: Mutex<Vec<String>>,
+}
+
+impl Clerk<'_> {
+    fn warn(&self, said: Vec<Said>) {
+        let doubts = said.into_iter().filter(|said| said.importance == Importance::Warning);
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).extend(doubts.map(|said| said.text));
+    }
+}
+
+impl Observer<Note> for Clerk<'_> {
+    fn remark(&self, note: &Note) {
+        self.warn(note.said());
+    }
+
+    fn begin(&self, runs: u64) {
+        self.meter.begin(runs);
+    }
+
+    fn advance(&self, runs: u64) {
+        self.meter.advance(runs);
+    }
+
+    fn go_on(&self) -> bool {
+        self.meter.goes_on()
+    }
+}
+
+/// The same for jobs that read recordings.
+struct Reader<'a>(&'a Clerk<'a>);
+
+impl Remarks for Reader<'_> {
+    fn progress(&mut self, done: usize, all: usize) {
+        match done {
+            0 => self.0.meter.begin(all as u64),
+            _ => self.0.meter.advance(1),
+        }
+    }
+
+    fn remark(&mut self, remark: Remark<'_>) {
+        self.0.warn(remark.said());
+    }
+}
+
+/// What `command` answers to a request. `hidden`: a directory that no text shows.
+#[pyfunction]
+#[pyo3(signature = (command, request, hidden, progress))]
+pub(crate) fn answer(
+    py: Python<'_>,
+    command: String,
+    request: String,
+    hidden: String,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Answer> {
+    let (answered, warnings) = work(py, progress, move |meter| {
+        let clerk = Clerk { meter, warnings: Mutex::default() };
+        let answered = answered(&command, &request, &clerk);
+        (answered, clerk.warnings.into_inner().unwrap_or_else(PoisonError::into_inner))
+    })?;
+    let shown = |text: String| if hidden.is_empty() { text } else { text.replace(&hidden, "") };
+    match answered {
+        Ok(answered) => {
+            let warnings = warnings.into_iter().map(shown).collect();
+            Ok(Answer::new(answered, hidden, warnings))
+        }
+        Err(Refusal::Request(message)) => Err(error::raise(py, &message, None, None, None)),
+        Err(Refusal::Failure(failure)) => Err(error::of_failure(py, &failure, &hidden)),
+    }
+}
+
+/// Why there is no answer.
+enum Refusal {
+    /// The request cannot be read.
+    Request(String),
+    /// There is no answer to it.
+    Failure(Failure),
+}
+
+impl From<Failure> for Refusal {
+    fn from(failure: Failure) -> Self {
+        Self::Failure(failure)
+    }
+}
+
+fn answered(command: &str, request: &str, clerk: &Clerk<'_>) -> Result<Answered, Refusal> {
+    let mut reader = Reader(clerk);
+    Ok(match command {
+        "wv" => parse::<WaveletRequest>(request)?.answer(&mut reader)?,
+        "calibrate" => {
+            let advance = |steps| clerk.meter.advance(steps);
+            parse::<CalibrationRequest>(request)?.answer(&mut reader, &advance)?
+        }
+        "run" => parse::<RunRequest>(request)?.answer(|| SEED, clerk)?,
+        "fuse" => parse::<FuseRequest>(request)?.answer()?,
+        "tune" => parse::<TuneRequest>(request)?.answer(clerk)?,
+        "require" => parse::<RequireRequest>(request)?.answer(clerk)?,
+        "design" => parse::<DesignRequest>(request)?.answer(clerk)?,
+        "choose" => parse::<ChoiceRequest>(request)?.answer(|| SEED, &mut reader, clerk)?,
+        "compare" => parse::<CompareRequest>(request)?.answer()?,
+        _ => return Err(Refusal::Request(format!("there is no command {command}"))),
+    })
+}
+
+/// A request, or what is wrong with it: where in the JSON is of no use to who gave arguments.
+fn parse<T: DeserializeOwned>(request: &str) -> Result<T, Refusal> {
+    serde_json::from_str(request).map_err(|e| {
+        let text = e.to_string();
+        let (message, _) = text.rsplit_once(" at line ").unwrap_or((&text, ""));
+        Refusal::Request(message.to_owned())
+    })
+}
+
+/// The command line: does what its words, the program first, ask for, and returns the exit code.
+#[pyfunction]
+pub(crate) fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
+    py.detach(|| nav_sim::cli::run(words))
+}

@@ -1,0 +1,70 @@
+//! Wavelet variances of one signal in memory.
+
+use crate::error;
+use crate::work::work;
+use nav_sim::signal::wavelet::{
+    Convention, RobustVariance, Tuning, WaveletError, both, default_levels, haar, interval,
+};
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// Scale by scale.
+struct Variances {
+    wv: Vec<f64>,
+    edof: Vec<f64>,
+    ends: Vec<(f64, f64)>,
+}
+
+/// Confidence of the intervals.
+const CONFIDENCE: f64 = 0.95;
+
+/// The wavelet variance of `x`: dict of `wv`, `edof`, `ci_low`, `ci_high`, scale by scale from 2 samples on.
+#[pyfunction]
+#[pyo3(signature = (x, scales, efficiency))]
+pub(crate) fn wavelet<'py>(
+    py: Python<'py>,
+    x: PyReadonlyArray1<'py, f64>,
+    scales: Option<u32>,
+    efficiency: Option<f64>,
+) -> PyResult<Bound<'py, PyDict>> {
+    // a copy, so that Ctrl-C need not wait and nobody changes what is being read
+    let signal = without_mean(x.as_array().to_vec());
+    let found = work(py, None, move |_| variances(&signal, scales, efficiency))?;
+    let found = found.map_err(|e| error::raise(py, &format!("x: {e}"), None, None, None))?;
+    let columns = PyDict::new(py);
+    let (low, high) = found.ends.into_iter().unzip();
+    for (name, values) in [("wv", found.wv), ("edof", found.edof), ("ci_low", low), ("ci_high", high)] {
+        columns.set_item(name, PyArray1::from_vec(py, values))?;
+    }
+    Ok(columns)
+}
+
+/// The samples less their mean, summed about the first of them, as the readers of recordings do it: a large offset costs no
+/// digits.
+fn without_mean(mut samples: Vec<f64>) -> Vec<f64> {
+    let Some(first) = samples.first().copied() else { return samples };
+    let mean = first + samples.iter().map(|v| v - first).sum::<f64>() / samples.len() as f64;
+    samples.iter_mut().for_each(|v| *v -= mean);
+    samples
+}
+
+fn variances(
+    signal: &[f64],
+    scales: Option<u32>,
+    efficiency: Option<f64>,
+) -> Result<Variances, WaveletError> {
+    let levels = scales.unwrap_or_else(|| default_levels(signal.len()));
+    let classical = |level| interval::edof_eta3(signal.len(), level);
+    let (wv, edof): (Vec<f64>, Vec<f64>) = match efficiency {
+        None => (haar::classical(signal, levels)?, (1..=levels).map(classical).collect()),
+        Some(efficiency) => {
+            let tuning = Tuning::new(efficiency, Convention::Exact)?;
+            let robust: Vec<RobustVariance> = both(signal, levels, &tuning)?.1;
+            let edof = (1..=levels).map(|level| interval::edof_robust(classical(level), efficiency));
+            (robust.iter().map(|r| r.value).collect(), edof.collect())
+        }
+    };
+    let ends = wv.iter().zip(&edof).map(|(wv, edof)| interval::interval(*wv, *edof, CONFIDENCE)).collect();
+    Ok(Variances { wv, edof, ends })
+}

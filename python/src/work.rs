@@ -1,0 +1,116 @@
+//! Jobs that leave Python free: other threads run, Ctrl-C ends them, progress is told.
+
+use crate::error;
+use pyo3::prelude::*;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex, OnceLock};
+use std::time::Duration;
+
+/// How often Python is asked whether to stop, and told how far a job is.
+const SLICE: Duration = Duration::from_millis(50);
+
+/// Counts what a job has done, and stops it.
+///
+/// Threads that work never touch Python: they count here, and the calling thread looks.
+#[derive(Debug, Default)]
+pub(crate) struct Meter {
+    done: AtomicU64,
+    total: AtomicU64,
+    is_stopped: AtomicBool,
+}
+
+/// What a stopped job unwinds with.
+struct Stopped;
+
+impl Meter {
+    pub(crate) fn begin(&self, units: u64) {
+        self.done.store(0, Ordering::Relaxed);
+        self.total.store(units, Ordering::Relaxed);
+    }
+
+    /// Counts. Unwinds where the job is to stop, as it has no other way out: its unfinished files go with it.
+    pub(crate) fn advance(&self, units: u64) {
+        if self.is_stopped.load(Ordering::Relaxed) {
+            resume_unwind(Box::new(Stopped));
+        }
+        self.done.fetch_add(units, Ordering::Relaxed);
+    }
+
+    pub(crate) fn goes_on(&self) -> bool {
+        !self.is_stopped.load(Ordering::Relaxed)
+    }
+
+    fn reached(&self) -> (u64, u64) {
+        let total = self.total.load(Ordering::Relaxed);
+        // a step that is counted between the two is told next time
+        (self.done.load(Ordering::Relaxed).min(total), total)
+    }
+}
+
+/// Does a job on a thread of its own and waits for it without Python's lock.
+///
+/// A job that nobody waits for any longer ends at its next step, in the background.
+pub(crate) fn work<T: Send + 'static>(
+    py: Python<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+    job: impl FnOnce(&Meter) -> T + Send + 'static,
+) -> PyResult<T> {
+    in_this_process(py)?;
+    let meter = Arc::new(Meter::default());
+    let counted = Arc::clone(&meter);
+    let (sender, receiver) = channel();
+    std::thread::spawn(move || {
+        let outcome = catch_unwind(AssertUnwindSafe(|| job(&counted)));
+        // nobody waits after Ctrl-C
+        drop(sender.send(outcome));
+    });
+    // a receiver is of one thread at a time, and `detach` asks for more
+    let receiver = Mutex::new(receiver);
+    let next = || receiver.lock().map_or(Err(RecvTimeoutError::Disconnected), |r| r.recv_timeout(SLICE));
+    let mut told = (0, 0);
+    loop {
+        match py.detach(next) {
+            Ok(Ok(outcome)) => {
+                tell(progress, &meter, &mut told)?;
+                return Ok(outcome);
+            }
+            Ok(Err(panic)) => return Err(defect(py, panic.as_ref())),
+            Err(RecvTimeoutError::Disconnected) => return Err(defect(py, &())),
+            Err(RecvTimeoutError::Timeout) => {
+                let heard = py.check_signals().and_then(|()| tell(progress, &meter, &mut told));
+                heard.inspect_err(|_| meter.is_stopped.store(true, Ordering::Relaxed))?;
+            }
+        }
+    }
+}
+
+fn tell(progress: Option<&Bound<'_, PyAny>>, meter: &Meter, told: &mut (u64, u64)) -> PyResult<()> {
+    let reached = meter.reached();
+    if let Some(progress) = progress.filter(|_| reached != *told && reached.1 > 0) {
+        progress.call1(reached)?;
+    }
+    *told = reached;
+    Ok(())
+}
+
+/// A panic, which is never of the user's making.
+fn defect(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+    error::raise(py, &format!("a defect of nav-sim, please report it: {text}"), None, None, None)
+}
+
+/// Refuses to work in a fork: the threads that work stayed with the parent, and a job would wait for them for ever.
+fn in_this_process(py: Python<'_>) -> PyResult<()> {
+    static FIRST: OnceLock<u32> = OnceLock::new();
+    if *FIRST.get_or_init(std::process::id) == std::process::id() {
+        return Ok(());
+    }
+    let hint =
+        "start workers with multiprocessing.get_context(\"spawn\"), or import nav_sim in the workers alone";
+    let message = "this process is a fork of one in which nav_sim has worked";
+    Err(error::raise(py, message, None, None, Some(hint)))
+}

@@ -1,0 +1,119 @@
+"""Calibrations."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import Command, table, without_times
+
+import nav_sim
+from nav_sim import Model, NavSimError, calibrate
+
+USUAL: dict[str, Any] = {"model": "AR1+RW+WN", "bootstrap": 20}
+WORDS = ("--model", "AR1+RW+WN", "--bootstrap", 20, "--seed", 1, "-q")
+
+
+def test_it_answers_as_the_command(recordings: Path, command: Command, tmp_path: Path) -> None:
+    said = command("calibrate", recordings, *WORDS, "--format", "json", "-o", tmp_path / "model.toml").stdout
+    fit = calibrate(recordings, **USUAL)
+    assert without_times(fit._native.json()) == without_times(said)
+    assert fit.files == ["model.draws.json", "model.wv.json", "model.toml"]
+    for name in fit.files:
+        assert fit.text(name) == (tmp_path / name).read_text(encoding="utf-8"), name
+    fit.write(tmp_path / "own")
+    assert (tmp_path / "own" / "model.toml").read_bytes() == (tmp_path / "model.toml").read_bytes()
+
+
+def test_arrays_tables_and_files_are_the_same(recordings: Path) -> None:
+    paths = sorted(recordings.glob("replicate_*.csv"))
+    tables = [table(path) for path in paths]
+    arrays = [np.stack([columns[name] for name in columns if name != "t_s"], axis=1) for columns in tables]
+    frames = [pytest.importorskip("pandas").DataFrame(columns) for columns in tables]
+    polars = [pytest.importorskip("polars").DataFrame(columns) for columns in tables]
+    kinds = np.dtype([(name, float) for name in tables[0]])
+    structured = [np.array(list(zip(*columns.values())), dtype=kinds) for columns in tables]
+    wanted = calibrate(paths, **USUAL).parameters["value"]
+    for given in (tables, frames, polars, structured):
+        np.testing.assert_array_equal(calibrate(given, **USUAL).parameters["value"], wanted)
+    np.testing.assert_array_equal(calibrate(arrays, rate_hz=100.0, **USUAL).parameters["value"], wanted)
+
+
+def test_a_single_signal() -> None:
+    # white noise of variance 4: 65536 samples know it to sqrt(2/65536) = 0.55 %; five deviations
+    x = 2.0 * np.random.default_rng(1).standard_normal(65536)
+    fit = calibrate(x, rate_hz=200.0, axes="gyro.z", estimator="gmwm", model="WN", bootstrap=0)
+    assert fit.model.channels == ["gyro.z"]
+    assert fit.parameters["value"][0] == pytest.approx(4.0, rel=0.028)
+    assert fit.parameters["unit"][0] == "(rad/s)²"
+    assert fit.model.rate_hz == 200.0
+
+
+def test_parameters_curves_and_model(recordings: Path) -> None:
+    fit = calibrate(recordings, **USUAL)
+    rows = list(zip(fit.parameters["sensor"], fit.parameters["process"], fit.parameters["parameter"]))
+    assert ("gyro", "AR1", "phi") in rows and ("accel", "WN", "sigma2") in rows
+    assert [p["type"] for p in fit.model.processes["gyro.x"]] == ["WN", "AR1", "RW"]
+    assert fit.model == Model.from_toml(fit.text("model.toml"))
+    curve = fit.curves[0]
+    assert len(curve["tau_s"]) == len(curve["implied"]) == len(curve["wv"])
+    assert fit.verdict and fit.summary()
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    assert fit.plot(sensor="gyro").get_xscale() == "log"
+    pyplot.close("all")
+
+
+def test_texts_show_the_argument_and_not_where_it_was_put() -> None:
+    rng = np.random.default_rng(2)
+    fit = calibrate([rng.standard_normal((512, 6)) for _ in range(2)], rate_hz=100.0, model="WN", bootstrap=0)
+    texts = [fit._native.json(), fit.summary(), fit._native.html(), *map(fit.text, fit.files)]
+    assert not any("nav-sim-" in text.replace("nav-sim-python", "") and "/tmp/" in text for text in texts)
+    files = [r["file"] for r in json.loads(fit.text("model.wv.json"))["curves"][0]["replicates"]]
+    assert set(files) == {"recordings[0].npz", "recordings[1].npz"}
+
+
+def test_several_estimators_have_a_model_each(recordings: Path) -> None:
+    fit = calibrate(recordings, estimator="all", **USUAL)
+    assert list(fit.models) == ["awv", "sr-awv", "dr-awv"]
+
+
+@pytest.mark.parametrize(
+    ("given", "arguments", "words"),
+    [
+        (np.zeros((100, 5)), {"rate_hz": 100.0}, "recordings: 5 columns whose channels are not known"),
+        (np.zeros((10, 2, 3)), {"rate_hz": 100.0}, "recordings: 3 dimensions"),
+        ([], {}, "recordings: there is nothing in it"),
+        ({"gyro_x_rad_s": [1.0, 2.0], "gyro_y_rad_s": [1.0]}, {"rate_hz": 1.0}, "recordings: gyro_y_rad_s has 1 rows"),
+        ({}, {}, "recordings: there are no columns"),
+        ({"gyro_x_rad_s": np.r_[np.zeros(50), np.nan, np.ones(50)]}, {"rate_hz": 1.0}, "recordings.npz, line 51"),
+        ("no/such/place", {}, "no/such/place"),
+        (7, {}, "recordings"),
+    ],
+)
+def test_what_is_no_recording_is_refused_by_name(given: Any, arguments: dict[str, Any], words: str) -> None:
+    with pytest.raises(NavSimError) as refused:
+        calibrate(given, **arguments)
+    assert str(refused.value).startswith(words), str(refused.value)
+
+
+def test_hints_name_arguments(recordings: Path) -> None:
+    with pytest.raises(NavSimError) as refused:
+        calibrate(np.random.default_rng(1).standard_normal((512, 6)))
+    assert "rate_hz=" in (refused.value.hint or "") and "--" not in str(refused.value)
+    with pytest.raises(NavSimError) as refused:
+        calibrate(recordings, estimator="best")
+    assert "best" in refused.value.message
+    line = recordings.parent / "broken.csv"
+    line.write_text("t_s,gyro_x_rad_s\n0.0,1.0\n0.01,abc\n", encoding="utf-8")
+    with pytest.raises(NavSimError) as refused:
+        nav_sim.calibrate(line)
+    assert refused.value.file == str(line) and refused.value.line == 3
+
+
+def test_progress_is_told(recordings: Path) -> None:
+    told: list[tuple[int, int]] = []
+    calibrate(recordings, progress=lambda done, total: told.append((done, total)), **USUAL)
+    assert told and all(0 <= done <= total for done, total in told)

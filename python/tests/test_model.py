@@ -1,0 +1,112 @@
+"""Noise models and trajectories."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import CONSUMER, DRIVE, TACTICAL, Command
+
+from nav_sim import Model, NavSimError, NavSimWarning, Trajectory
+
+
+def white_and_walk() -> Model:
+    return Model(100.0, gyro=[{"type": "WN", "sigma2": 1e-6}, {"type": "RW", "gamma2": 1e-12}])
+
+
+def test_a_model_of_processes() -> None:
+    model = white_and_walk()
+    assert model.channels == ["gyro.x", "gyro.y", "gyro.z"]
+    assert model.processes["gyro.y"] == [{"type": "WN", "sigma2": 1e-6}, {"type": "RW", "gamma2": 1e-12}]
+    by_axis = Model(100.0, accel={"x": [{"type": "QN", "q2": 1e-7}]})
+    assert by_axis.channels == ["accel.x"]
+    both = model + by_axis
+    assert both.channels == ["accel.x", *model.channels] and both != model
+    assert Model.from_toml(both.to_toml()) == both
+    with pytest.raises(NavSimError, match="50"):
+        model + Model(50.0, gyro=[{"type": "WN", "sigma2": 1.0}])
+
+
+def test_a_model_file_comes_back_as_it_was(tmp_path: Path) -> None:
+    model = Model.read(CONSUMER)
+    assert Model.read(model.write(tmp_path / "m.toml")) == model
+    assert (tmp_path / "m.toml").read_text(encoding="utf-8") == CONSUMER.read_text(encoding="utf-8")
+
+
+def test_what_is_no_model_is_refused() -> None:
+    with pytest.raises(NavSimError, match="no/such"):
+        Model.read("no/such.toml")
+    for arguments in ((-1.0, [], []), (100.0, [{"type": "XX"}]), (100.0, [{"type": "WN", "sigma2": -1.0}]), (100.0,)):
+        with pytest.raises(NavSimError):
+            Model(*arguments)  # type: ignore[arg-type]
+    with pytest.raises(NavSimError) as refused:
+        Model.from_toml("schema = 1\nrate_hz = 100.0\n[gyro]\nprocesses = 3\n")
+    assert refused.value.line == 4
+
+
+def test_a_recording_is_that_of_the_command(command: Command, tmp_path: Path) -> None:
+    words = ("--replicates", 2, "--samples", 500, "--seed", 7, "--format-out", "npy", "-q", "-o", tmp_path / "static")
+    command("synthesize", TACTICAL, *words)
+    own = Model.read(TACTICAL).synthesize(samples=500, replicate=2, seed=7)
+    np.testing.assert_array_equal(np.stack([*own.values()], axis=1), np.load(tmp_path / "static" / "replicate_2.npy"))
+    assert len(Model.read(TACTICAL).synthesize(duration_s=2.0)["gyro_x_rad_s"]) == 200
+    for arguments in ({}, {"samples": 0}, {"samples": 5, "duration_s": 1.0}, {"samples": 5, "seed": -1}):
+        with pytest.raises(NavSimError):
+            white_and_walk().synthesize(**arguments)  # type: ignore[arg-type]
+
+
+def test_the_wavelet_variance_of_white_noise_and_a_walk() -> None:
+    # white noise sigma²/2^j; random walk gamma² (4^j + 2)/(12·2^j) with 2^j samples (the Haar filter's variance)
+    curve = white_and_walk().wavelet_variance("gyro.x", 6)
+    tau = 2.0 ** np.arange(1, 7)
+    np.testing.assert_allclose(curve["wv"], 1e-6 / tau + 1e-12 * (tau**2 + 2.0) / (12.0 * tau), rtol=1e-12)
+    np.testing.assert_allclose(curve["tau_s"], tau / 100.0)
+
+
+def test_practical_figures_are_those_of_the_processes() -> None:
+    # N = sigma sqrt(dt), K = gamma sqrt(f) (IEEE 952)
+    figures = white_and_walk().practical("strict")["gyro"]
+    assert figures["density_rad_s_per_sqrt_hz"] == pytest.approx(1e-3 / np.sqrt(100.0))
+    assert figures["walk_rad_s2_per_sqrt_hz"] == pytest.approx(1e-6 * np.sqrt(100.0))
+    with pytest.raises(NavSimError, match="policy"):
+        white_and_walk().practical("loose")
+
+
+def test_an_export_is_that_of_the_command(command: Command, tmp_path: Path) -> None:
+    for target in ("kalibr", "px4", "kf-gins"):
+        command("export", TACTICAL, "--target", target, "-o", tmp_path / "out", "-q", "--force")
+        Model.read(TACTICAL).export(target, tmp_path / "own")
+        assert (tmp_path / "own").read_bytes() == (tmp_path / "out").read_bytes(), target
+    with pytest.raises(NavSimError, match="target"):
+        Model.read(TACTICAL).export("abacus")
+    with pytest.raises(NavSimError, match="accel"):
+        white_and_walk().export("kalibr")
+
+
+def test_a_trajectory_of_columns(tmp_path: Path) -> None:
+    t_s = np.arange(0.0, 20.0, 0.5)
+    line = {"t_s": t_s, "n_m": 10.0 * t_s, "e_m": 0.0 * t_s, "d_m": 0.0 * t_s}
+    with pytest.warns(NavSimWarning, match="no attitude"):
+        way = Trajectory(line, origin=(45.0, 7.0, 200.0))
+    states = way.states(2.0)
+    # due north at 10 m/s, without attitude in the columns: the heading is that of the path
+    np.testing.assert_allclose(states["v_n_m_s"], 10.0, rtol=1e-4)
+    np.testing.assert_allclose(states["yaw_deg"], 0.0, atol=1e-3)
+    assert (way.start_s, states["lat_deg"][0], states["h_m"][0]) == (0.0, pytest.approx(45.0), pytest.approx(200.0))
+    with pytest.warns(NavSimWarning, match="no attitude"):
+        again = Trajectory(way.write(tmp_path / "way.csv"))
+    np.testing.assert_array_equal(again.states()["lat_deg"], way.states()["lat_deg"])
+
+
+def test_a_trajectory_of_a_file() -> None:
+    way = Trajectory(str(DRIVE))
+    assert way.end_s > 100.0 and "figure_eight" in repr(way)
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    way.plot()
+    pyplot.close("all")
+    for wrong in ("no/such.toml", {"t_s": [0.0]}, {}, 5):
+        with pytest.raises(NavSimError):
+            Trajectory(wrong)  # type: ignore[arg-type]
+    with pytest.raises(NavSimError, match="rate_hz"):
+        way.states(-1.0)
