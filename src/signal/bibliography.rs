@@ -66,6 +66,11 @@ sources! {
     /// J. J. Moré: *The Levenberg-Marquardt algorithm: implementation and theory*, Numerical Analysis, Lecture Notes in
     /// Mathematics 630, 1978.
     More78;
+    /// J. Solà, J. Deray, D. Atchuthan: *A micro Lie theory for state estimation in robotics*, arXiv 1812.01537, 2018.
+    Sola18;
+    /// S. Goffin, S. Bonnabel, O. Brüls, P. Sacré: *Iterated Invariant Extended Kalman Filter (IterIEKF)*, arXiv
+    /// 2404.10665, 2024.
+    Goffin24;
     /// D. J. Best, D. E. Roberts: *Algorithm AS 91: The percentage points of the χ² distribution*, Applied Statistics 24,
     /// 1975.
     BestRoberts75;
