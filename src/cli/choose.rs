@@ -5,11 +5,12 @@ use super::jobs::unknown_model;
 use super::parse::words;
 use super::pictures::PlotArgs;
 use super::read::{self, placed};
-use super::recordings::{ReadingArgs, Said};
+use super::recordings::{ReadingArgs, Said, WHOLE};
 use super::run::Words;
 use super::{Failure, Session};
 use crate::calibrate::{CalibrationNote, CalibrationOptions};
 use crate::choose::{self, Candidate, ChoiceDrive, ChoiceReport, Inflation};
+use crate::formats::recordings::Gaps;
 use crate::run::{OutageFlag, checked_scenario};
 use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim};
 use nav_sim_navigation::ekf::FilterStates;
@@ -69,6 +70,9 @@ pub(crate) struct Args {
     /// Directory to make
     #[arg(long, short, value_name = "DIR", default_value = "out/choice")]
     out: PathBuf,
+    /// What to do where the time jumps or stands still
+    #[arg(long, value_parser = words::<Gaps>(WHOLE), default_value_t)]
+    gaps: Gaps,
     #[command(flatten)]
     recordings: ReadingArgs,
 }
@@ -83,7 +87,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let seed = session.seed(scenario.run.seed);
     let outages = outages(&scenario, (trajectory.start_s(), trajectory.end_s()), seed, session)?;
     let options = CalibrationOptions {
-        reading: args.recordings.options(),
+        reading: args.recordings.options(args.gaps),
         skip_warm_up: args.recordings.skips_warm_up(),
         settings: Settings { trim: args.trim, ..Settings::default() },
         bootstrap: Some(Bootstrap { seed, ..Bootstrap::default() }),
@@ -103,7 +107,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     };
     let note = CalibrationNote {
         efficiency_convention: nav_sim_signal::wavelet::Convention::Exact,
-        reading: args.recordings.provenance(),
+        reading: args.recordings.provenance(args.gaps),
         seed: Some(seed),
         inputs: Vec::new(),
     };

@@ -148,6 +148,7 @@ mod tests {
                 samples: SAMPLES,
                 classical: vec![],
                 robust: vec![],
+                coverage: Vec::new(),
                 trend: f64::NAN,
                 mean: f64::NAN,
             };
