@@ -40,7 +40,7 @@ pub(crate) struct Args {
     /// abnormal replicates too), or the curve of a single recording (gmwm, rgmwm; avlr: slopes of its Allan deviation)
     #[arg(long, value_parser = words::<EstimatorChoice>(&ESTIMATORS), default_value_t)]
     estimator: EstimatorChoice,
-    /// Sum of WN QN AR1 GM MA1 RW DR such as 2*AR1+RW+WN+QN, N1 = AR1+RW+WN, N2 = 2*AR1+RW+WN+QN, or auto: the
+    /// Sum of WN QN AR1 GM MA1 FN RW DR such as 2*AR1+RW+WN+QN, N1 = AR1+RW+WN, N2 = 2*AR1+RW+WN+QN, or auto: the
     /// simplest sum of WN QN RW DR and up to two AR1 that fits as well as the best one, with the reasons
     #[arg(long, value_name = "SUM", default_value = ModelSpec::USUAL)]
     model: String,
