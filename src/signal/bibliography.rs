@@ -21,6 +21,12 @@ sources! {
     /// S. Guerrier, R. Molinari, Y. Stebler: *Theoretical limitations of Allan variance-based regression
     /// for time series model estimation*, IEEE Signal Processing Letters 23, 2016 (AVLR).
     Guerrier16;
+    /// N. J. Kasdin: *Discrete simulation of colored noise and stochastic processes and 1/f^α power law noise generation*,
+    /// Proceedings of the IEEE 83, 1995.
+    Kasdin95;
+    /// D. Mondal, D. B. Percival: *Wavelet variance analysis for gappy time series*, Annals of the Institute of Statistical
+    /// Mathematics 62, 2010.
+    MondalPercival10;
     /// D. Mondal, D. B. Percival: *M-estimation of wavelet variance*, Ann. Inst. Stat. Math. 64, 2012.
     MondalPercival12;
     /// D. B. Percival: *On estimation of the wavelet variance*, Biometrika 82, 1995.
