@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nav_sim import _native
-from nav_sim._errors import NavSimWarning
+from nav_sim._errors import NavSimWarning, as_arguments
 from nav_sim._inputs import FloatArray, Staging, StrPath
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ def ask(kind: type[A], command: str, staging: Staging, progress: Progress = None
     with bar(progress) as told:
         native = _native.answer(command, text, staging.hidden, told)
     for warning in native.warnings:
-        warnings.warn(warning, NavSimWarning, stacklevel=3)
+        warnings.warn(as_arguments(warning), NavSimWarning, stacklevel=3)
     return kind(native)
 
 

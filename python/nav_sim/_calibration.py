@@ -33,7 +33,13 @@ class Calibration(Answer):
         """The noise model of each estimator."""
         files = [name for name in self.files if name.endswith(".toml")]
         named = zip(dict.fromkeys(fit["estimator"] for fit in self.data["fits"]), files)
-        return {estimator: Model.from_toml(self.text(name)) for estimator, name in named}
+        return {estimator: self._model(name) for estimator, name in named}
+
+    def _model(self, name: str) -> Model:
+        model = Model.from_toml(self.text(name))
+        draws = name.removesuffix(".toml") + ".draws.json"
+        model._draws = self.text(draws) if draws in self.files else None
+        return model
 
     @property
     def verdict(self) -> str:

@@ -43,6 +43,8 @@ class Model:
 
     def _take(self, text: str, path: str | None) -> None:
         self._text, self._path = text, path
+        # the draws behind the intervals of a calibration, which `lincov` and `tune` read beside the model
+        self._draws: str | None = None
         self._contents: dict[str, Any] = json.loads(_native.model_contents(text, path))
 
     @classmethod
@@ -67,9 +69,11 @@ class Model:
         return cls._of(text, os.fspath(path))
 
     def write(self, path: StrPath) -> Path:
-        """Writes it as a model file."""
+        """Writes it as a model file; where a calibration made it, the draws behind its intervals too (`….draws.json`)."""
         place = Path(path)
         place.write_text(self._text, encoding="utf-8", newline="\n")
+        if self._draws is not None:
+            place.with_suffix(".draws.json").write_text(self._draws, encoding="utf-8", newline="\n")
         return place
 
     def to_toml(self) -> str:
@@ -123,10 +127,12 @@ class Model:
         replicate: int = 1,
         seed: int = 1,
         spread: bool = False,
+        contaminate: StrPath | None = None,
     ) -> dict[str, FloatArray]:
-        """A static recording of it, mean free: a column a channel, as `nav-sim synthesize` writes replicate number `replicate`.
+        """A static recording of it, a column a channel: what `nav-sim synthesize` writes as replicate number `replicate`.
 
-        `spread` draws the parameters of the replicate from the spread that the model file states.
+        `spread` draws the parameters of the replicate from the spread that the model file states; `contaminate` corrupts the
+        recording as a scenario of the paper ("section5-II") or a file says.
         """
         if (samples is None) == (duration_s is None):
             raise NavSimError("samples, duration_s: give one of them")
@@ -135,7 +141,8 @@ class Model:
             if not isinstance(value, (int, np.integer)) or value < least:
                 raise NavSimError(f"{name}: {value} is not a whole number from {least} on")
         assert count is not None
-        return _native.model_recording(self._text, int(count), int(replicate), int(seed), spread)
+        corrupts = None if contaminate is None else os.fspath(contaminate)
+        return _native.model_recording(self._text, int(count), int(replicate), int(seed), spread, corrupts)
 
     def wavelet_variance(self, channel: str, scales: int = 20) -> Curve:
         """The wavelet variance that a channel implies at the scales 2, 4, 8, … samples: `tau_s` and `wv`."""
@@ -188,4 +195,6 @@ def staged(model: StrPath | Model, name: str, staging: Staging) -> str:
         return os.fspath(model)
     if model._path is not None:
         return model._path
+    if model._draws is not None:
+        staging.text(f"{name}.draws.json", model._draws)
     return staging.text(f"{name}.toml", model._text)

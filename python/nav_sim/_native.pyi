@@ -7,6 +7,8 @@ from typing import final
 import numpy as np
 import numpy.typing as npt
 
+__all__: list[str]
+
 _Floats = npt.NDArray[np.float64]
 
 @final
@@ -34,7 +36,9 @@ def model_export(
     text: str, name: str, target: str, policy: str, from_s: float, to_s: float
 ) -> str: ...
 def model_practical(text: str, policy: str, from_s: float, to_s: float) -> str: ...
-def model_recording(text: str, samples: int, replicate: int, seed: int, spread: bool) -> dict[str, _Floats]: ...
+def model_recording(
+    text: str, samples: int, replicate: int, seed: int, spread: bool, contaminate: str | None
+) -> dict[str, _Floats]: ...
 def model_wavelet(text: str, channel: str, scales: int) -> _Floats: ...
 def trajectory_states(
     path: str | PathLike[str], rate_hz: float, hidden: str

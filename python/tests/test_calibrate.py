@@ -117,3 +117,12 @@ def test_progress_is_told(recordings: Path) -> None:
     told: list[tuple[int, int]] = []
     calibrate(recordings, progress=lambda done, total: told.append((done, total)), **USUAL)
     assert told and all(0 <= done <= total for done, total in told)
+
+
+def test_a_calibrated_model_keeps_its_intervals(recordings: Path, short: Path, tmp_path: Path) -> None:
+    fit = calibrate(recordings, **USUAL)
+    written = nav_sim.lincov(short, fit.model.write(tmp_path / "m.toml"), outages=[(20, 40)])
+    in_memory = nav_sim.lincov(short, fit.model, outages=[(20, 40)])
+    interval = in_memory.outages["horizontal_error_end_m_p95_ci95_low"]
+    assert np.isfinite(interval).all()
+    np.testing.assert_array_equal(interval, written.outages["horizontal_error_end_m_p95_ci95_low"])
