@@ -1,12 +1,12 @@
 # %% [markdown]
 # # Calibrate your IMU
 #
-# From static recordings to a noise model, and from that to the parameters of a filter. The recordings here are simulated, as
-# columns of a dict; a list of your files in their place (CSV, .npy, .npz, ROS bags, PX4 and u-blox logs) does as well.
+# From static recordings to a noise model, and from that to the parameters of a filter. The recordings here are
+# simulated, as columns of a dict; a list of your files in their place (CSV, .npy, .npz, ROS bags, PX4 and u-blox logs)
+# does as well.
 
 # %%
 import matplotlib.pyplot as plt
-
 import nav_sim
 
 imu = nav_sim.Model.read("calib_data/consumer_mems.toml")
@@ -30,7 +30,9 @@ print(fit.summary())
 fit.plot(sensor="gyro")
 
 # %%
-for row in zip(*(fit.parameters[key] for key in ("sensor", "process", "parameter", "value", "ci_low", "ci_high", "unit"))):
+for row in zip(
+    *(fit.parameters[key] for key in ("sensor", "process", "parameter", "value", "ci_low", "ci_high", "unit"))
+):
     print("{:6} {:6} {:7} {:.3g} [{:.3g}, {:.3g}] {}".format(*row))
 
 # %% [markdown]

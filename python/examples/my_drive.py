@@ -1,8 +1,8 @@
 # %% [markdown]
 # # My drive
 #
-# Recorded IMU and GNSS data through the filter: arrays, data frames or files. The drive here is simulated by the command, and
-# the model is one of the IMU's class.
+# Recorded IMU and GNSS data through the filter: arrays, data frames or files. The drive here is simulated by the
+# command, and the model is one of the IMU's class.
 
 # %%
 import csv
@@ -12,13 +12,21 @@ import tempfile
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+import nav_sim
 import numpy as np
 import numpy.typing as npt
 
-import nav_sim
-
 place = Path(tempfile.mkdtemp()) / "drive"
-words = ["trajectory", "record", "trajectories/figure_eight.toml", "calib_data/tactical.toml", "--seed", "1", "-o", str(place)]
+words = [
+    "trajectory",
+    "record",
+    "trajectories/figure_eight.toml",
+    "calib_data/tactical.toml",
+    "--seed",
+    "1",
+    "-o",
+    str(place),
+]
 subprocess.run([sys.executable, "-m", "nav_sim", *words], check=True)
 
 
@@ -36,7 +44,9 @@ print(list(imu), list(gnss))
 # The solution, with a window in which fixes are withheld: its end says what the filter is worth.
 
 # %%
-drive = nav_sim.fuse(imu, gnss, "calib_data/tactical.toml", reference=place / "reference.csv", outages=[(100.0, 130.0)], smooth=True)
+drive = nav_sim.fuse(
+    imu, gnss, "calib_data/tactical.toml", reference=place / "reference.csv", outages=[(100.0, 130.0)], smooth=True
+)
 print(drive.summary())
 drive.plot()
 
@@ -44,7 +54,9 @@ drive.plot()
 figure, ax = plt.subplots()
 error_m = np.hypot(drive.errors["err_pos_n_m"], drive.errors["err_pos_e_m"])
 ax.semilogy(drive.errors["t_s"], error_m, label="error")
-ax.semilogy(drive.solution["t_s"], 2.0 * np.hypot(drive.solution["sd_n_m"], drive.solution["sd_e_m"]), label="2 σ believed")
+ax.semilogy(
+    drive.solution["t_s"], 2.0 * np.hypot(drive.solution["sd_n_m"], drive.solution["sd_e_m"]), label="2 σ believed"
+)
 ax.set_xlabel("time (s)")
 ax.set_ylabel("horizontal (m)")
 ax.legend()

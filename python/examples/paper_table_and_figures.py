@@ -1,16 +1,15 @@
 # %% [markdown]
 # # Table I, Figures 2 and 7 of Minaretzis et al. 2024
 #
-# A virtual IMU is calibrated from clean recordings (I), from corrupted ones (II), and from corrupted ones of which two are
-# abnormal (III); its models navigate a drive of 15 minutes with two outages. `SAMPLES` and `SETS` are small here, so that it
-# takes a minute, and single figures differ from the paper's; at its size they are 524284 and 500.
+# A virtual IMU is calibrated from clean recordings (I), from corrupted ones (II), and from corrupted ones of which two
+# are abnormal (III); its models navigate a drive of 15 minutes with two outages. `SAMPLES` and `SETS` are small here,
+# so that it takes a minute, and single figures differ from the paper's; at its size they are 524284 and 500.
 
 # %%
 import matplotlib.pyplot as plt
+import nav_sim
 import numpy as np
 import numpy.typing as npt
-
-import nav_sim
 
 SAMPLES, SETS = 60_000, 6
 SCENARIOS = {"I": None, "II": "section5-II", "III": "section5-III"}
@@ -28,7 +27,8 @@ def recordings(model: nav_sim.Model, contaminate: str | None, seed: int) -> list
 
 
 # %% [markdown]
-# Three estimators in three scenarios: nine models, and the ASEE of the filter that has each of them, by covariance analysis.
+# Three estimators in three scenarios: nine models, and the ASEE of the filter that has each of them, by covariance
+# analysis.
 
 # %%
 runs = {}
@@ -45,7 +45,9 @@ for scenario, contaminate in SCENARIOS.items():
 
 # %%
 reference = runs["I", "awv"].outages
-print(f"{'scenario':10}{'outage':>8}" + "".join(f"{e + ' ' + s:>18}" for s in ("pos_e_m", "roll_deg") for e in ESTIMATORS))
+print(
+    f"{'scenario':10}{'outage':>8}" + "".join(f"{e + ' ' + s:>18}" for s in ("pos_e_m", "roll_deg") for e in ESTIMATORS)
+)
 for scenario in SCENARIOS:
     for k in range(2):
         ratios = [
@@ -71,16 +73,25 @@ axes[0].set_ylabel("(ASEE ratio − 1) · 100, east")
 axes[0].legend()
 
 # %% [markdown]
-# Figure 2: the robust RMSE of each estimator, √(median² + MAD²) of the relative errors over sets of eight recordings of an
-# accelerometer (eq. 15 of the paper).
+# Figure 2: the robust RMSE of each estimator, √(median² + MAD²) of the relative errors over sets of eight recordings
+# of an accelerometer (eq. 15 of the paper).
 
 # %%
-n1 = nav_sim.Model(100.0, accel=[{"type": "WN", "sigma2": 5e-5}, {"type": "AR1", "phi": 0.98, "sigma2": 2e-8}, {"type": "RW", "gamma2": 2e-11}])
+n1 = nav_sim.Model(
+    100.0,
+    accel=[
+        {"type": "WN", "sigma2": 5e-5},
+        {"type": "AR1", "phi": 0.98, "sigma2": 2e-8},
+        {"type": "RW", "gamma2": 2e-11},
+    ],
+)
 truth = {(p["type"], name): value for p in n1.processes["accel.x"] for name, value in p.items() if name != "type"}
 found: dict[tuple[str, str], list[dict[tuple[str, str], float]]] = {}
 for scenario, contaminate in {"I": None, "II": "section4-II", "III": "section4-III"}.items():
     for seed in range(SETS):
-        fit = nav_sim.calibrate(recordings(n1, contaminate, seed), rate_hz=100.0, estimator="all", model="N1", bootstrap=0)
+        fit = nav_sim.calibrate(
+            recordings(n1, contaminate, seed), rate_hz=100.0, estimator="all", model="N1", bootstrap=0
+        )
         for estimator in ESTIMATORS:
             processes = fit.models[estimator].processes["accel.x"]
             own = {(p["type"], name): value for p in processes for name, value in p.items() if name != "type"}

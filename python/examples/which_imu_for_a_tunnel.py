@@ -5,9 +5,8 @@
 
 # %%
 import matplotlib.pyplot as plt
-import numpy as np
-
 import nav_sim
+import numpy as np
 
 drive = nav_sim.Trajectory("trajectories/land_vehicle.toml")
 models = {
@@ -15,12 +14,17 @@ models = {
     "consumer": nav_sim.Model.read("calib_data/consumer_mems.toml"),
 }
 # a tactical one whose gyroscopes are ten times as noisy
-gyro = [{**p, **{k: 100.0 * v for k, v in p.items() if k in ("sigma2", "gamma2", "q2")}} for p in models["tactical"].processes["gyro.x"]]
-models["noisy gyroscopes"] = nav_sim.Model(models["tactical"].rate_hz, accel=models["tactical"].processes["accel.x"], gyro=gyro)
+gyro = [
+    {**p, **{k: 100.0 * v for k, v in p.items() if k in ("sigma2", "gamma2", "q2")}}
+    for p in models["tactical"].processes["gyro.x"]
+]
+models["noisy gyroscopes"] = nav_sim.Model(
+    models["tactical"].rate_hz, accel=models["tactical"].processes["accel.x"], gyro=gyro
+)
 
 # %% [markdown]
-# ASEE (what a filter believes of its own error) and the 95 % quantile of the horizontal error against the outage's length: a
-# row an IMU and length, for `pandas.DataFrame(table)`.
+# ASEE (what a filter believes of its own error) and the 95 % quantile of the horizontal error against the outage's
+# length: a row an IMU and length, for `pandas.DataFrame(table)`.
 
 # %%
 rows = []

@@ -7,9 +7,10 @@
     drive = nav_sim.lincov("trajectories/land_vehicle.toml", fit.model, outages=[(300, 390)])
     drive.plot()                                                    # needs nav-sim[plot]
 
-Units are in the names (`gyro_x_rad_s`, `t_s`, `lat_deg`). A result is a dict of NumPy arrays, which `pandas.DataFrame` and
-`polars.DataFrame` take, or has such dicts; `.summary()` and `.to_html(path)` are the texts of the command. The same seed gives
-the bytes of the command. What cannot be done raises `NavSimError`, what is doubtful warns `NavSimWarning`.
+Units are in the names (`gyro_x_rad_s`, `t_s`, `lat_deg`). A result is a dict of NumPy arrays, which `pandas.DataFrame`
+and `polars.DataFrame` take, or has such dicts; `.summary()` and `.to_html(path)` are the texts of the command. The
+same seed gives the bytes of the command. What cannot be done raises `NavSimError`, what is doubtful warns
+`NavSimWarning`.
 """
 
 from __future__ import annotations

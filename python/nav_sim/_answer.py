@@ -29,8 +29,8 @@ Columns = dict[str, npt.NDArray[Any]]
 class Answer:
     """The answer of the command of the same name.
 
-    `data` is what the command prints as JSON, `summary()` what it prints in words, `to_html()` its page, `write()` the files
-    that it makes.
+    `data` is what the command prints as JSON, `summary()` what it prints in words, `to_html()` its page, `write()` the
+    files that it makes.
     """
 
     def __init__(self, native: _native.Answer) -> None:

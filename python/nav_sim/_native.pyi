@@ -7,7 +7,18 @@ from typing import final
 import numpy as np
 import numpy.typing as npt
 
-__all__: list[str]
+__all__ = [
+    "Answer",
+    "answer",
+    "main",
+    "model_contents",
+    "model_export",
+    "model_practical",
+    "model_recording",
+    "model_wavelet",
+    "trajectory_states",
+    "wavelet",
+]
 
 _Floats = npt.NDArray[np.float64]
 
@@ -27,14 +38,10 @@ class Answer:
     def text(self, name: str) -> str: ...
     def table(self, name: str) -> dict[str, _Floats | list[str]]: ...
 
-def answer(
-    command: str, request: str, hidden: str, progress: Callable[[int, int], object] | None
-) -> Answer: ...
+def answer(command: str, request: str, hidden: str, progress: Callable[[int, int], object] | None) -> Answer: ...
 def main(words: list[str]) -> int: ...
 def model_contents(text: str, path: str | None) -> str: ...
-def model_export(
-    text: str, name: str, target: str, policy: str, from_s: float, to_s: float
-) -> str: ...
+def model_export(text: str, name: str, target: str, policy: str, from_s: float, to_s: float) -> str: ...
 def model_practical(text: str, policy: str, from_s: float, to_s: float) -> str: ...
 def model_recording(
     text: str, samples: int, replicate: int, seed: int, spread: bool, contaminate: str | None

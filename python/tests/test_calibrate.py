@@ -6,11 +6,10 @@ import json
 from pathlib import Path
 from typing import Any
 
+import nav_sim
 import numpy as np
 import pytest
 from conftest import Command, table, without_times
-
-import nav_sim
 from nav_sim import Model, NavSimError, calibrate
 
 USUAL: dict[str, Any] = {"model": "AR1+RW+WN", "bootstrap": 20}

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from conftest import CONSUMER, DRIVE, TACTICAL, Command, table
-
 from nav_sim import Model, NavSimError, NavSimWarning, Trajectory
 
 
@@ -37,9 +37,15 @@ def test_a_model_file_comes_back_as_it_was(tmp_path: Path) -> None:
 def test_what_is_no_model_is_refused() -> None:
     with pytest.raises(NavSimError, match="no/such"):
         Model.read("no/such.toml")
-    for arguments in ((-1.0, [], []), (100.0, [{"type": "XX"}]), (100.0, [{"type": "WN", "sigma2": -1.0}]), (100.0,)):
+    wrong: list[tuple[Any, ...]] = [
+        (-1.0, [], []),
+        (100.0, [{"type": "XX"}]),
+        (100.0, [{"type": "WN", "sigma2": -1.0}]),
+        (100.0,),
+    ]
+    for arguments in wrong:
         with pytest.raises(NavSimError):
-            Model(*arguments)  # type: ignore[arg-type]
+            Model(*arguments)
     with pytest.raises(NavSimError) as refused:
         Model.from_toml("schema = 1\nrate_hz = 100.0\n[gyro]\nprocesses = 3\n")
     assert refused.value.line == 4
@@ -60,7 +66,7 @@ def test_the_length_of_a_recording() -> None:
     assert len(Model.read(TACTICAL).synthesize(duration_s=2.0)["gyro_x_rad_s"]) == 200
     for arguments in ({}, {"samples": 0}, {"samples": 5, "duration_s": 1.0}, {"samples": 5, "seed": -1}):
         with pytest.raises(NavSimError):
-            white_and_walk().synthesize(**arguments)  # type: ignore[arg-type]
+            white_and_walk().synthesize(**arguments)
 
 
 def test_the_wavelet_variance_of_white_noise_and_a_walk() -> None:

@@ -11,11 +11,10 @@ import threading
 import time
 from pathlib import Path
 
+import nav_sim
 import numpy as np
 import pytest
 from conftest import DRIVE, TACTICAL, Command
-
-import nav_sim
 
 
 def python(script: str, *words: object) -> subprocess.Popen[str]:
