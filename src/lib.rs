@@ -60,9 +60,10 @@ pub mod observer;
 pub mod report;
 // Files.
 pub mod formats;
-// What a request comes to, or what went wrong.
-pub mod answered;
+// What went wrong.
 pub mod failure;
+// What a request comes to.
+pub mod answered;
 // From here on a room for each command: request, job, result, document. The main job.
 pub mod run;
 // Recorded drives.

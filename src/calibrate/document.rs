@@ -84,7 +84,8 @@ impl ShownCalibration<'_> {
     /// Remarks, the most important first.
     fn notes(&self, fits: &[&Outcome]) -> Vec<(Importance, String)> {
         let settings = self.settings;
-        let mut notes = Vec::new();
+        let mut notes: Vec<(Importance, String)> = Vec::new();
+        notes.extend(fits.iter().find_map(|o| self.too_loud(o)).map(|line| (Importance::Warning, line)));
         for sensor in Sensor::ALL {
             let lines = words::recording_notes(sensor, fits, self.diagnoses, settings).into_iter();
             notes.extend(lines.map(|line| (Importance::Warning, format!("{}: {line}", sensor.name()))));
@@ -107,6 +108,18 @@ impl ShownCalibration<'_> {
             notes.extend(lines.map(noted));
         }
         notes
+    }
+
+    /// A gyroscope of more noise than any that is sold, such as one in degrees under the name of radians.
+    fn too_loud(&self, outcome: &Outcome) -> Option<String> {
+        const MOST_DEG_SQRT_H: f64 = 5.0;
+        let is_gyro = outcome.scope.sensor == Sensor::Gyro;
+        let rows = figures(outcome, self.settings.rate_hz);
+        let n = rows.first().filter(|row| is_gyro && row.name.ends_with(" N"))?.value.ok()?;
+        (n > MOST_DEG_SQRT_H).then(|| {
+            let n = readable(n);
+            format!("gyro: N of {n} deg/sqrt(h), where MEMS have 0.05 to 3: columns in degrees are named gyro_x_deg_s")
+        })
     }
 
     /// A row a figure of a model.

@@ -77,8 +77,10 @@ impl ModelFiles {
         let has_draws = calibration.outcomes.iter().any(|o| o.inference.is_some());
         let mut written = Vec::new();
         for files in all {
+            // drawn before the first name changes: no model stands beside the page of another for the time of drawing
+            let page = files.page(calibration, diagnoses)?;
             Self::write(&files.texts(calibration, note, None))?;
-            files.write_page(calibration, diagnoses)?;
+            page.into_iter().try_for_each(AtomicFile::commit)?;
             let draws = has_draws.then_some(&files.draws);
             written.extend(
                 [&files.model, &files.curves].into_iter().chain(draws).chain([&files.page, &files.figures]),
@@ -141,6 +143,14 @@ impl ModelFiles {
 }
 
 impl ModelFiles {
+    /// The page of the models of the estimator and its figures, on the disk without their names.
+    fn page(&self, calibration: &Calibration, diagnoses: &[Diagnosis]) -> Result<[AtomicFile; 2], FileError> {
+        let shown = calibration.shown(diagnoses, |outcome| outcome.estimator == self.estimator);
+        let document = shown.document();
+        let page = atomic::filled(&self.page, document.html().as_bytes())?;
+        Ok([page, atomic::filled(&self.figures, document.svg().as_bytes())?])
+    }
+
     /// Writes the page of the models of the estimator, and its figures.
     ///
     /// # Errors
@@ -150,10 +160,7 @@ impl ModelFiles {
         calibration: &Calibration,
         diagnoses: &[Diagnosis],
     ) -> Result<(), FileError> {
-        let shown = calibration.shown(diagnoses, |outcome| outcome.estimator == self.estimator);
-        let document = shown.document();
-        atomic::write(&self.page, document.html())?;
-        atomic::write(&self.figures, document.svg())
+        self.page(calibration, diagnoses)?.into_iter().try_for_each(AtomicFile::commit)
     }
 }
 

@@ -4,8 +4,8 @@ use super::turn_on::TurnOnEntry;
 use super::{notes, reasons};
 use crate::export::parameters_json;
 use nav_sim_calibration::{
-    Candidate, Diagnosis, Goodness, Indistinct, LevelSpread, Miss, Outcome, ParameterInterval, Practical,
-    Ranking, Settings, TurnOnSpread, tau_s,
+    Candidate, Diagnosis, Goodness, Indistinct, LevelSpread, Miss, Outcome, ParameterInterval,
+    ParameterSpread, Practical, Ranking, Settings, TurnOnSpread, tau_s,
 };
 use nav_sim_signal::noise::{Composite, ParameterRef, Process};
 use serde::Serialize;
@@ -57,6 +57,8 @@ pub(crate) struct FitEntry {
     pub spread: Vec<LevelSpread>,
     /// Probability that replicates of one noise differ as much at some scale; none of a single signal.
     pub spread_p_value: Option<f64>,
+    /// Parameters that differ between recordings, as laws of model files.
+    pub parameter_spread: Vec<Map<String, Value>>,
     /// Alike processes that cannot be told apart.
     pub indistinct: Option<IndistinctEntry>,
     /// N, K, B and T, each in SI and in the unit of data sheets, with 95 % intervals where the bootstrap determines them.
@@ -181,6 +183,9 @@ impl FitEntry {
             goodness: inference.and_then(|i| i.goodness),
             spread: inference.map_or(Vec::new(), |i| i.spread.clone()),
             spread_p_value: inference.and_then(|i| i.alike),
+            parameter_spread: inference.map_or(Vec::new(), |i| {
+                i.varying.iter().map(|found| parameter_spread(found, &labels)).collect()
+            }),
             indistinct: inference
                 .and_then(|i| i.indistinct.as_ref())
                 .map(|i| IndistinctEntry::new(i, &labels)),
@@ -237,6 +242,21 @@ impl<'a> FitsFile<'a> {
             files,
         }
     }
+}
+
+/// The law of a parameter between recordings, with the keys of model files.
+fn parameter_spread(found: &ParameterSpread, labels: &[String]) -> Map<String, Value> {
+    let ParameterSpread { of, median, median_ci95, sd, sd_ci95 } = found;
+    let entries: [(&str, Value); 7] = [
+        ("process", labels[of.process].as_str().into()),
+        ("parameter", of.parameter.name().into()),
+        ("distribution", "lognormal".into()),
+        ("median", (*median).into()),
+        ("median_ci95", median_ci95.to_vec().into()),
+        ("sd", (*sd).into()),
+        ("sd_ci95", sd_ci95.to_vec().into()),
+    ];
+    entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
 fn processes_json(model: &Composite, intervals: &[ParameterInterval]) -> Vec<Map<String, Value>> {

@@ -3,9 +3,11 @@
 use super::{notes, turn_on_remark};
 use crate::formats::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn};
 use crate::report::Input;
-use nav_sim_calibration::{Estimator, Outcome, ParameterLimit, Settings, TurnOnSpread, tau_s};
+use nav_sim_calibration::{
+    Estimator, Outcome, ParameterLimit, ParameterSpread, Settings, TurnOnSpread, tau_s,
+};
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
-use nav_sim_signal::noise::Model;
+use nav_sim_signal::noise::{Law, LognormalIntervals, Model, Spread, Variation};
 use nav_sim_signal::wavelet::Convention;
 use toml::{Table, Value};
 
@@ -40,6 +42,7 @@ impl CalibrationNote {
                 file.intervals.extend(intervals(outcome, channel));
             }
         }
+        file.spread = spread(outcomes, settings.rate_hz);
         let mut provenance = self.provenance(outcomes, settings);
         if let Some(blake3) = curves {
             provenance.insert("curves_blake3".to_owned(), blake3.into());
@@ -105,6 +108,24 @@ pub(super) fn with_turn_on<'a>(
         provenance.insert("turn_on".to_owned(), remarks.into());
     }
     file
+}
+
+/// The laws by which the parameters of recordings differ; none where none is known to.
+fn spread(outcomes: &[&Outcome], rate_hz: f64) -> Option<Spread> {
+    let mut spread = Spread::default();
+    for outcome in outcomes {
+        let (composite, labels) = (&outcome.fit.composite, outcome.fit.composite.labels());
+        let variation = |found: &ParameterSpread| {
+            let ci95 = Some(LognormalIntervals { median: found.median_ci95, sd: found.sd_ci95 });
+            let law = Law::Lognormal { median: found.median, sd: found.sd, ci95 };
+            let (process, parameter) = (&labels[found.of.process], found.of.parameter.name());
+            Variation::new(composite, rate_hz, process, parameter, law).ok()
+        };
+        let varying = outcome.inference.iter().flat_map(|i| &i.varying);
+        let laws: Vec<Variation> = varying.filter_map(variation).collect();
+        outcome.scope.channels().iter().for_each(|c| spread.axes[c.index()].clone_from(&laws));
+    }
+    (spread != Spread::default()).then_some(spread)
 }
 
 fn intervals(outcome: &Outcome, channel: Channel) -> Vec<Interval> {

@@ -25,7 +25,7 @@ pub(super) fn verdict(outcomes: &[&Outcome], diagnoses: &[Diagnosis], settings: 
     lines
 }
 
-/// `accel: N1 does not fit (p = 0.005): data/model 0.33 at 0.02 s (not fitted), 1.26 at 1.28 s; 6 of 16 scales off`
+/// `accel: N1 does not fit: data/model 0.33 at 0.02 s (not fitted), 1.26 at 1.28 s; 6 of 16 scales off (all together: p = 0.005)`
 fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {
     let (spec, departure) = (&outcome.spec, outcome.departure());
     let ratio = |miss: Miss| {
@@ -33,24 +33,25 @@ fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {
         format!("{} at {}{left_out}", readable(miss.ratio), duration(tau_s(miss.level, rate_hz)))
     };
     let test = outcome.inference.as_ref().and_then(|i| i.goodness);
-    let p = test.map_or(String::new(), |g| format!(" (p = {:.3})", g.p_value));
+    let p = |of: &str| test.map_or(String::new(), |g| format!(" ({of}p = {:.3})", g.p_value));
     if let Some(Misfit { worst, .. }) = outcome.misfit() {
         let fitted = departure.worst().filter(|miss| miss.level != worst.level);
         let ratios: Vec<String> = [Some(worst), fitted].into_iter().flatten().map(ratio).collect();
         let (missed, scales) = (departure.missed.len(), departure.scales);
         return format!(
-            "{name}: {spec} does not fit{p}: data/model {}; {missed} of {scales} scales off",
-            ratios.join(", ")
+            "{name}: {spec} does not fit: data/model {}; {missed} of {scales} scales off{}",
+            ratios.join(", "),
+            p("all together: ")
         );
     }
     let off = departure.furthest.map_or(String::new(), |m| {
-        format!(": at most {} off, at {}", percent((m.ratio - 1.0).abs()), duration(tau_s(m.level, rate_hz)))
+        format!(", within {} at all scales known to 10 %", percent((m.ratio - 1.0).abs()))
     });
-    let known = departure.known_to.map_or(String::new(), |level| {
-        format!(", of scales known to 10 % (up to {})", duration(tau_s(level, rate_hz)))
-    });
+    let known = departure
+        .known_to
+        .map_or(String::new(), |level| format!(" (up to {})", duration(tau_s(level, rate_hz))));
     let left_out = departure.left_out.map_or(String::new(), |miss| format!("; data/model {}", ratio(miss)));
-    format!("{name}: {spec} fits{p}{off}{known}{left_out}")
+    format!("{name}: {spec} fits{}{off}{known}{left_out}", p(""))
 }
 
 /// Whether the models of a sensor fit, in a line; none without one.

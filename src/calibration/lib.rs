@@ -65,8 +65,9 @@ pub use format::{duration, percent};
 pub use model::{BoundDomain, LimitError, Limits, ModelSpec, SpecError};
 pub use outcome::{
     Advance, AxesDiffer, Bootstrap, Candidate, Departure, FitRange, Goodness, Indistinct, Inference,
-    LevelSpread, Misfit, Miss, ModelChoice, Note, Outcome, ParameterInterval, ParameterLimit, Practical,
-    PracticalIntervals, Ranking, Settings, Share, TooSimple, Undetermined, model_of, put, shares, tau_s,
+    LevelSpread, Misfit, Miss, ModelChoice, Note, Outcome, ParameterInterval, ParameterLimit,
+    ParameterSpread, Practical, PracticalIntervals, Ranking, Settings, Share, TooSimple, Undetermined,
+    model_of, put, shares, tau_s,
 };
 pub use pipeline::{CalibrationError, Cause, calibrate, calibrate_telling, fit_curve, infer, infer_telling};
 pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_on};

@@ -24,6 +24,8 @@ pub(crate) struct ChoiceReport<'a> {
     pub ranking: &'a Ranking,
     /// What decides the error, where it was asked.
     pub influence: Option<&'a Influence>,
+    /// The recordings that judge no candidate.
+    pub abnormal: &'a [String],
     /// The outages at whose ends they are judged.
     pub outages: &'a [Outage],
     /// The trajectory, as it was named.
@@ -97,6 +99,13 @@ impl ChoiceReport<'_> {
     /// What else is to be known, the most important first.
     fn notes(&self, document: &mut Document) {
         let ranking = self.ranking;
+        if !self.abnormal.is_empty() {
+            let (names, verb) =
+                (self.abnormal.join(", "), if self.abnormal.len() == 1 { "is" } else { "are" });
+            let text =
+                format!("{names} {verb} abnormal, and no judge of candidates: nav-sim calibrate says how");
+            document.note(Importance::Warning, text);
+        }
         if !ranking.undescribed.is_empty() {
             let names = ranking.undescribed.join(", ");
             let cure = if 2 * ranking.undescribed.len() > ranking.winner().folds.len() {

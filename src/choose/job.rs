@@ -46,14 +46,16 @@ pub struct Chosen {
     pub influence: Influence,
     /// Its noise model.
     pub model: Model,
+    /// The recordings that are calibrated on but judge no candidate.
+    pub abnormal: Vec<String>,
     /// The files that were read, in the order of the recordings.
     pub files: Vec<PathBuf>,
 }
 
 /// Fewest recordings of which one can be left out: two remain to be averaged.
-const FEWEST: usize = 3;
+pub(super) const FEWEST: usize = 3;
 
-/// Leaves out one recording after the other and ranks candidates by what they do on it. Files are read twice, so that
+/// Leaves out one recording after the other, but those that are abnormal, and ranks candidates by what they do on it. Files are read twice, so that
 /// no more than a few are in memory. `options.estimators` and the model of `options.settings` count nothing: the
 /// candidates have theirs.
 ///
@@ -91,9 +93,11 @@ pub fn choose(
     let drive = Drive::new(&trajectory, scenario, outages, rate_hz, seed)?;
     let runs: Vec<u64> =
         samples.iter().map(|count| runs.unwrap_or_else(|| runs_on(&drive, *count))).collect();
-    observer.begin(runs.iter().sum());
+    let judges = laboratory.judges().map_err(JobError::from)?;
+    observer.begin(judges.iter().map(|k| runs[*k]).sum());
     let mut folds: Vec<(String, Fold)> = Vec::new();
-    for (k, file) in files.iter().enumerate() {
+    for &k in &judges {
+        let file = &files[k];
         let read = samples_of(file, &options)?;
         let advance = |n| observer.advance(n);
         let fold = drive.leave_out(&laboratory, k, &read, candidates, runs[k], &advance)?;
@@ -111,8 +115,12 @@ pub fn choose(
     let calibration =
         Calibration { groups, outcomes, settings, beginnings: Default::default(), turn_on: Vec::new() }
             .with_inference(options.bootstrap, &|_| {});
+    let is_judge = |(k, _): &(usize, &FileReport)| judges.contains(k);
+    let abnormal =
+        files.iter().enumerate().filter(|found| !is_judge(found)).map(|(_, file)| file.file.clone());
+    let abnormal = abnormal.collect();
     let files = files.into_iter().map(|file| file.path).collect();
-    Ok(Chosen { ranking, winner, calibration, influence, model, files })
+    Ok(Chosen { ranking, winner, calibration, influence, model, abnormal, files })
 }
 
 /// The rate of which that of the fixes is a whole divisor, if the clock of the recordings (Hz) shows it to within its own

@@ -1,9 +1,10 @@
 //! The recordings of a laboratory, measured, and the models that are made of all but one of them.
 
 use super::candidate::Candidate;
+use super::job::FEWEST;
 use nav_sim_calibration::{
-    CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Outcome, Pool, Replicate, Settings,
-    calibrate, grouped, model_of,
+    CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Outcome, Pool, Replicate, Settings, Verdict,
+    calibrate, diagnose, grouped, model_of,
 };
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::Model;
@@ -66,6 +67,27 @@ impl Laboratory {
     /// The recordings but one.
     pub(super) fn others(&self, without: Option<usize>) -> impl Iterator<Item = usize> {
         (0..self.units.len()).filter(move |k| Some(*k) != without)
+    }
+
+    /// The recordings that judge candidates: an abnormal one has errors that the IMU does not have in use, and a score that
+    /// outweighs all others. All, where too few are normal.
+    ///
+    /// # Errors
+    /// When a curve is too short for the model.
+    pub(crate) fn judges(&self) -> Result<Vec<usize>, CalibrationError> {
+        let all: Vec<usize> = self.others(None).collect();
+        let n2 = ModelChoice::Given(ModelSpec::n2());
+        let (groups, outcomes, settings) =
+            self.fit(&self.units.iter().collect::<Vec<_>>(), Estimator::DrAwv, &n2, self.pool)?;
+        let abnormal: Vec<String> = diagnose(&groups, &outcomes, &settings)
+            .into_iter()
+            .filter(|diagnosis| diagnosis.verdict != Verdict::Normal)
+            .map(|diagnosis| diagnosis.name)
+            .collect();
+        let is_normal =
+            |k: &usize| self.units[*k].replicates.iter().all(|(_, r)| !abnormal.contains(&r.name));
+        let normal: Vec<usize> = all.iter().copied().filter(is_normal).collect();
+        Ok(if normal.len() < FEWEST { all } else { normal })
     }
 
     /// The noise of one recording as it was met: N2 fitted to the classical wavelet variance of each axis.

@@ -78,6 +78,7 @@ impl ChoiceMade {
         ChoiceReport {
             ranking: &self.chosen.ranking,
             influence: Some(&self.chosen.influence),
+            abnormal: &self.chosen.abnormal,
             outages: &self.outages,
             trajectory: &self.trajectory,
             seed: self.seed,

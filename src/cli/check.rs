@@ -166,9 +166,9 @@ fn model(path: &Path, session: &Session) -> Result<String, Failure> {
 fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
     // standard deviations that no file states are an option of fuse
     let given = FixSigma { pos_m: [1.0; 3], vel_m_s: Some([1.0; 3]) };
-    let read = read_gnss(path, None, None).map(|read| (read, ""));
+    let read = read_gnss(path, None, None, None).map(|read| (read, ""));
     let ((fixes, remarks), unsaid) = match read {
-        Err(e) => match read_gnss(path, Some(&given), None) {
+        Err(e) => match read_gnss(path, Some(&given), None, None) {
             Ok(read) => (read, ", without standard deviations (fuse --gnss-sigma)"),
             Err(_) => return Err(FuseError::from(e).into()),
         },
@@ -181,14 +181,14 @@ fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
 }
 
 fn imu(path: &Path, session: &Session) -> Result<String, Failure> {
-    let imu = read_imu(path, None).map_err(FuseError::from)?;
+    let imu = read_imu(path, None, None).map_err(FuseError::from)?;
     imu.remarks.iter().for_each(|remark| session.printer.remark(remark));
     Ok(format!("an IMU recording of {} samples at {:.2} Hz, for fuse", imu.samples.len(), imu.rate_hz))
 }
 
 /// What is no static recording may be one of a drive or a flight, which `fuse` reads.
 fn moving(path: &Path, session: &Session) -> Option<String> {
-    let imu = read_imu(path, None).ok()?;
+    let imu = read_imu(path, None, None).ok()?;
     if !moves(&imu.samples) {
         return None;
     }

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// Choose the noise model for a filter by navigating on recordings left out of its calibration
 ///
 /// Leaves out one recording at a time, calibrates every candidate on the others and navigates along TRAJECTORY with
-/// windows of the one left out. Ranks the candidates by the mean log density of the true errors at the ends of outages
+/// windows of the one left out; abnormal recordings are not left out, and judge nothing. Ranks the candidates by the mean log density of the true errors at the ends of outages
 /// under the filter's covariance, which rewards accuracy and consistency together. Also prints RMSE, NEES and coverage,
 /// with intervals over recordings. Writes report.html, ranking.json and model.toml, the winner calibrated on all
 /// recordings.

@@ -18,7 +18,7 @@ pub(crate) struct Common {
     /// Worker threads, at most 1024 (default: one per core)
     #[arg(long, short = 'j', global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
-    /// Print errors only
+    /// Print verdict and table only, no notes
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
     /// Print more

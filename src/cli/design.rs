@@ -9,9 +9,8 @@ use crate::design::DesignRequest;
 ///
 /// Draws the wavelet variances of recordings from their sampling distribution, with the [spread] of MODEL between
 /// recordings, and calibrates them as `nav-sim calibrate` would. The expected interval is made of the scatter of these
-/// estimates about MODEL. What one calibration states is made of the scatter of its own recordings: where a parameter is
-/// known to ± 100 %, half the intervals are narrower than 0.85 of the expected one and one in three is wider (1000 simulated).
-/// 200 draws know such an interval to about 20 %. With --trajectory there is also the
+/// estimates about MODEL. What one calibration states is made of the scatter of its own recordings, half of them more and half
+/// less; where a parameter is known to ± 100 %, rather less. 200 draws know such an interval to about 20 %. With --trajectory there is also the
 /// interval on the horizontal error (95 % quantile) at the end of each outage, for a filter that knows the IMU.
 /// Without --recordings or --hours a table of several is printed.
 #[derive(clap::Args, Debug)]

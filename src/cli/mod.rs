@@ -254,7 +254,6 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
 
 #[cfg(test)]
 mod tests {
-    use clap::FromArgMatches;
     use serde::{Serialize, de::DeserializeOwned};
     use std::fmt::Debug;
 

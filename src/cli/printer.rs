@@ -111,9 +111,14 @@ impl Printer {
     }
 }
 
+/// Whether a character turns the direction of what follows, and so shows a name as another (Unicode TR 36, sec. 2.1).
+const fn turns(c: char) -> bool {
+    matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
 /// A text whose control characters (of file names, say) do nothing to a terminal; lines and tabulators stay.
 fn safe(text: &str) -> Cow<'_, str> {
-    let is_unsafe = |c: char| c.is_control() && c != '\n' && c != '\t';
+    let is_unsafe = |c: char| turns(c) || c.is_control() && c != '\n' && c != '\t';
     if !text.contains(is_unsafe) {
         return Cow::Borrowed(text);
     }
@@ -129,5 +134,7 @@ mod tests {
     fn control_characters_are_shown() {
         assert_eq!(safe("a\tb\nc \u{b5}m"), "a\tb\nc \u{b5}m");
         assert_eq!(safe("ri\u{1b}[31mght\u{9b}\r"), "ri\\u{1b}[31mght\\u{9b}\\r");
+        // shown as run.exe.csv
+        assert_eq!(safe("run\u{202e}vsc.exe"), "run\\u{202e}vsc.exe");
     }
 }

@@ -72,6 +72,10 @@ fn block(block: &Block, html: &mut String) {
         }
         Block::Table { table, .. } => self::table(table),
         Block::Charts(charts, caption) => match charts.as_slice() {
+            // The head of a section stands for the title of its first chart.
+            [chart] if html.ends_with(&format!("<h2>{}</h2>\n", escape(&chart.title))) => {
+                drawn(chart, caption)
+            }
             [chart] => figure(chart, caption),
             charts if charts.iter().any(|chart| chart.size != Size::Small) => {
                 let figures: String = charts.iter().map(|chart| figure(chart, "")).collect();
@@ -124,10 +128,16 @@ fn table(table: &Table) -> String {
 }
 
 fn figure(chart: &Chart, caption: &str) -> String {
+    let title = format!("<figure>\n<h3>{}</h3>\n", escape(&chart.title));
+    drawn(chart, caption).replacen("<figure>\n", &title, 1)
+}
+
+/// A chart without its title.
+fn drawn(chart: &Chart, caption: &str) -> String {
     let canvases: &[Canvas] = if chart.size == Size::Small { &[SMALL] } else { &[WIDE, NARROW] };
     let drawn: String = canvases.iter().filter_map(|canvas| drawing(chart, canvas)).collect();
     let inside = if drawn.is_empty() { "<p>No value to show.</p>\n" } else { &drawn };
-    format!("<figure>\n<h3>{}</h3>\n{inside}{}</figure>\n", escape(&chart.title), captioned(caption))
+    format!("<figure>\n{inside}{}</figure>\n", captioned(caption))
 }
 
 fn captioned(caption: &str) -> String {

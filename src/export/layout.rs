@@ -10,8 +10,9 @@ pub(super) struct Layout {
     pub(super) entries: fn(&Values) -> Vec<Entry>,
     /// What it takes a bias for.
     pub(super) bias: Bias,
-    /// What begins a comment.
+    /// What begins a comment, and what ends it.
     pub(super) comment: &'static str,
+    pub(super) comment_end: &'static str,
     /// A line that must be the very first.
     pub(super) first: Option<&'static str>,
     /// Lines before the entries.
@@ -20,6 +21,8 @@ pub(super) struct Layout {
     pub(super) close: &'static str,
     /// One entry.
     pub(super) line: fn(&Entry) -> String,
+    /// All entries, where they stand in blocks.
+    pub(super) blocks: Option<fn(&[Entry]) -> Vec<String>>,
     /// The document that keys and units are from.
     pub(super) source: &'static str,
 }
@@ -29,10 +32,12 @@ pub(super) const PLAIN: Layout = Layout {
     entries: |_| Vec::new(),
     bias: Bias::Walk,
     comment: "#",
+    comment_end: "",
     first: None,
     open: "",
     close: "",
     line: yaml,
+    blocks: None,
     source: "",
 };
 
@@ -42,11 +47,17 @@ impl Export {
     pub fn text(&self, model: &str) -> String {
         let layout = self.target.layout();
         let mut lines: Vec<String> = layout.first.iter().map(|l| (*l).to_owned()).collect();
-        let head = self.head(model);
-        lines.extend(head.iter().map(|l| format!("{} {l}", layout.comment)));
-        lines.push(format!("{} Keys and units: {}", layout.comment, layout.source));
+        let mut head = self.head(model);
+        head.push(format!("Keys and units: {}", layout.source));
+        // two hyphens end the comment of XML
+        let said =
+            |l: &String| if layout.comment_end.is_empty() { l.clone() } else { l.replace("--", "- -") };
+        lines.extend(head.iter().map(|l| format!("{} {}{}", layout.comment, said(l), layout.comment_end)));
         lines.extend((!layout.open.is_empty()).then(|| layout.open.to_owned()));
-        lines.extend(self.entries.iter().map(layout.line));
+        match layout.blocks {
+            Some(blocks) => lines.extend(blocks(&self.entries)),
+            None => lines.extend(self.entries.iter().map(layout.line)),
+        }
         lines.extend((!layout.close.is_empty()).then(|| layout.close.to_owned()));
         lines.join("\n")
     }

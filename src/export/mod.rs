@@ -22,9 +22,11 @@
 mod autopilots;
 mod certify;
 mod filters;
+mod gazebo;
 mod job;
 mod json;
 mod layout;
+mod lidar;
 mod sheet;
 mod simulators;
 mod target;

@@ -1,7 +1,7 @@
 //! The programs that are known.
 
 use super::layout::Layout;
-use super::{autopilots, filters, simulators, vision};
+use super::{autopilots, filters, gazebo, lidar, simulators, vision};
 use nav_sim_signal::noise::practical::Bias;
 
 /// A program that parameters are written for.
@@ -15,6 +15,12 @@ pub enum Target {
     Vins,
     /// GTSAM, `PreintegrationCombinedParams`.
     Gtsam,
+    /// LIO-SAM.
+    LioSam,
+    /// FAST-LIO2 and FAST-LIVO2.
+    FastLio,
+    /// Covariances of `sensor_msgs/Imu`.
+    RosImuCovariance,
     /// PX4, EKF2.
     Px4,
     /// `ArduPilot`, EKF3.
@@ -31,6 +37,8 @@ pub enum Target {
     Pyins,
     /// MATLAB, `imuSensor`.
     Matlab,
+    /// Gazebo, SDF.
+    Gazebo,
 }
 
 nav_sim_signal::named!(
@@ -39,6 +47,9 @@ nav_sim_signal::named!(
         OpenVins = "openvins",
         Vins = "vins",
         Gtsam = "gtsam",
+        LioSam = "lio-sam",
+        FastLio = "fast-lio",
+        RosImuCovariance = "ros-imu-covariance",
         Px4 = "px4",
         ArduPilot = "ardupilot",
         KfGins = "kf-gins",
@@ -47,6 +58,7 @@ nav_sim_signal::named!(
         GnssInsSim = "gnss-ins-sim",
         Pyins = "pyins",
         Matlab = "matlab",
+        Gazebo = "gazebo",
     }
 );
 
@@ -67,6 +79,9 @@ impl Target {
             Self::OpenVins => vision::OPENVINS,
             Self::Vins => vision::VINS,
             Self::Gtsam => vision::GTSAM,
+            Self::LioSam => lidar::LIO_SAM,
+            Self::FastLio => lidar::FAST_LIO,
+            Self::RosImuCovariance => lidar::ROS_IMU_COVARIANCE,
             Self::Px4 => autopilots::PX4,
             Self::ArduPilot => autopilots::ARDUPILOT,
             Self::KfGins => filters::KF_GINS,
@@ -75,6 +90,7 @@ impl Target {
             Self::Pyins => filters::PYINS,
             Self::GnssInsSim => simulators::GNSS_INS_SIM,
             Self::Matlab => simulators::MATLAB,
+            Self::Gazebo => gazebo::GAZEBO,
         }
     }
 }

@@ -3,6 +3,7 @@
 //!
 //! They carry the uncertainty of a calibration on into what is computed from its model.
 
+use super::model_file::ModelFile;
 use super::{FileError, source};
 use nav_sim_calibration::Outcome;
 use nav_sim_signal::imu::Channel;
@@ -61,8 +62,37 @@ pub(crate) fn beside(model: &Path) -> PathBuf {
 /// # Errors
 /// Why those that are there cannot be used, in words.
 pub(crate) fn usable(path: &Path, model: &Model, rate_hz: f64) -> Result<Option<Draws>, String> {
+    usable_as(path, model, rate_hz, &|draws| draws)
+}
+
+/// The same of single recordings: what is drawn about a model with a spread differs by that too.
+///
+/// # Errors
+/// As [`usable`].
+pub(crate) fn of_recordings(
+    path: &Path,
+    file: &ModelFile,
+    rate_hz: f64,
+    seed: u64,
+) -> Result<Option<Draws>, String> {
+    let of_recording = |(run, centre): (u64, &Model)| match &file.spread {
+        Some(spread) => spread.draw_about(centre, &file.model, seed, run).unwrap_or_else(|_| centre.clone()),
+        None => centre.clone(),
+    };
+    usable_as(path, &file.model, rate_hz, &|draws| Draws {
+        models: (0..).zip(&draws.models).map(of_recording).collect(),
+        ..draws
+    })
+}
+
+fn usable_as(
+    path: &Path,
+    model: &Model,
+    rate_hz: f64,
+    made: &dyn Fn(Draws) -> Draws,
+) -> Result<Option<Draws>, String> {
     let Some(file) = read(path).map_err(|e| e.to_string())? else { return Ok(None) };
-    let draws = file.draws(model).and_then(|draws| draws.at_rate(rate_hz).ok());
+    let draws = file.draws(model).and_then(|draws| made(draws).at_rate(rate_hz).ok());
     draws.map(Some).ok_or_else(|| format!("{} is not of {}", beside(path).display(), path.display()))
 }
 

@@ -314,6 +314,12 @@ fn add(document: &mut Document, note: &FuseNote) {
                 format!("outage {span} ends before the start of the solution: it is left out"),
             )
         }
+        FuseNote::Origin(delay_s) => (
+            Importance::Warning,
+            format!(
+                "the clocks had nothing in common: fused with --gnss-delay={delay_s:.2}, from turns and innovations"
+            ),
+        ),
         FuseNote::Heading(doubt) => (Importance::Warning, doubt.to_string()),
     };
     document.note(importance, text);

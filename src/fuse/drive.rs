@@ -12,8 +12,8 @@ use nav_sim_navigation::ekf::{Belief, InitialSettings};
 use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
 use nav_sim_navigation::fusion::mounting::{self, Mounted, Mounting, MountingError};
 use nav_sim_navigation::fusion::{
-    Assessment, Recorded, Settings, Solution, Start, Whiteness, assess, check_clocks, clocks_apart,
-    displaced, fuse_correlated, outcome,
+    Assessment, ClocksApart, Recorded, Settings, Solution, Start, Whiteness, assess, check_clocks,
+    clocks_apart, displaced, earlier, fuse, fuse_correlated, outcome, rest_of_origin, rough_origin,
 };
 use nav_sim_navigation::gnss::GnssFix;
 use nav_sim_navigation::metrics::{ReductionSummary, VerdictKind};
@@ -40,6 +40,8 @@ pub enum FuseNote {
     Outage(OutageRemark),
     /// An outage ends before the start of the solution.
     EarlyOutage(Outage),
+    /// Clocks of IMU and fixes had nothing in common: the delay with which they have (s).
+    Origin(f64),
     /// The motion hardly shows the heading.
     Heading(HeadingDoubt),
 }
@@ -93,9 +95,10 @@ impl Drive {
             request.files().map(|(role, path)| input::input(role, path)).collect::<Result<_, _>>()?;
         let (unsaid, gnss_sigma_factor) = request.fix_sigma();
         let [position, velocity] = gnss_sigma_factor;
-        let imu = read_imu(&request.imu, request.columns.as_deref())?;
+        let topic = request.topic.clone().unwrap_or_default();
+        let imu = read_imu(&request.imu, request.columns.as_deref(), topic.imu.as_deref())?;
         let span_s = imu.samples.first().zip(imu.samples.last()).map(|(first, last)| (first.t_s, last.t_s));
-        let (mut gnss, remarks) = read_gnss(&request.gnss, unsaid.as_ref(), span_s)?;
+        let (mut gnss, remarks) = read_gnss(&request.gnss, unsaid.as_ref(), span_s, topic.fixes.as_deref())?;
         for fix in &mut gnss {
             *fix = fix.with_sigmas_times(position, velocity);
             fix.t_s -= request.gnss_delay_s;
@@ -159,8 +162,8 @@ impl Drive {
     /// # Errors
     /// Data and settings that do not fit together, or a filter that diverges.
     pub(crate) fn fuse(mut self) -> Result<FuseAnswer, FuseError> {
-        let recorded = Recorded { imu: &self.imu, gnss: &self.gnss };
-        check_clocks(&recorded)?;
+        let origin_s = self.common_origin()?;
+        let mut recorded = Recorded { imu: &self.imu, gnss: &self.gnss };
         let mut settings = self.settings.clone();
         let of_model = (&self.model.model, self.request.filter, &self.expected);
         let (belief, reduction) = filter::belief(of_model, self.imu_rate_hz, &self.gnss, &settings.outages)?;
@@ -179,6 +182,11 @@ impl Drive {
         if let Some(Mounting { q_s_b, sigma_b, .. }) = mounting {
             (settings.q_s_b, settings.mounting_sigma_b) = (q_s_b, sigma_b);
         }
+        let rest_s = origin_s.map_or(0.0, |_| rest_of_origin(&recorded, &belief, &settings));
+        let gnss = earlier(recorded.gnss, rest_s);
+        recorded.gnss = &gnss;
+        let delay_s = self.request.gnss_delay_s + origin_s.unwrap_or(0.0) + rest_s;
+        self.notes.extend(origin_s.map(|_| FuseNote::Origin(delay_s)));
         let Alignment { start, doubts } = match (&self.initial, self.request.given_heading()) {
             (Some(start), _) => {
                 Alignment { start: beside_mounting(start.clone(), &settings), doubts: Vec::new() }
@@ -205,7 +213,7 @@ impl Drive {
             Scene { belief: &belief, start: &start, settings: &settings, is_given: self.initial.is_some() };
         let explained =
             is_unexplained.then(|| scene.cause(&Recorded { gnss: &weighed.gnss, ..recorded })).flatten();
-        let cause = explained.map(|cause| cause.after(self.request.gnss_delay_s));
+        let cause = explained.map(|cause| cause.after(delay_s));
         let kind = if cause.is_some() { verdict.max(VerdictKind::Doubtful) } else { verdict };
         let against = |(verdict, finding)| (verdict > VerdictKind::Consistent).then_some(finding);
         let evidence = findings.into_iter().filter_map(against).collect();
@@ -242,6 +250,16 @@ impl Drive {
 }
 
 impl Drive {
+    /// Brings fixes to the clock of the IMU where the two have nothing in common and no delay is given; by how much (s).
+    fn common_origin(&mut self) -> Result<Option<f64>, FuseError> {
+        let recorded = Recorded { imu: &self.imu, gnss: &self.gnss };
+        let Err(apart) = check_clocks(&recorded) else { return Ok(None) };
+        let is_free = self.request.gnss_delay_s == 0.0;
+        let origin_s = is_free.then(|| rough_origin(&recorded)).flatten().ok_or(apart)?;
+        self.gnss = earlier(&self.gnss, origin_s);
+        Ok(Some(origin_s))
+    }
+
     /// Why the mounting is not found: the clocks, where they are apart.
     fn not_mounted(
         &self,
@@ -266,11 +284,6 @@ impl Drive {
     }
 }
 
-/// Fixes so much earlier (s).
-fn earlier(gnss: &[GnssFix], seconds: f64) -> Vec<GnssFix> {
-    gnss.iter().map(|fix| GnssFix { t_s: fix.t_s - seconds, ..*fix }).collect()
-}
-
 impl From<fusion_files::Remark> for FuseNote {
     fn from(remark: fusion_files::Remark) -> Self {
         match remark {
@@ -292,22 +305,37 @@ struct Scene<'a> {
 impl Scene<'_> {
     /// Cause of innovations that are large or last: the clocks, else the antenna or a small delay.
     fn cause(&self, recorded: &Recorded<'_>) -> Option<Cause> {
-        let Some(clocks) = clocks_apart(recorded) else {
-            return displaced(recorded, self.belief, self.start, self.settings).map(Cause::Displaced);
-        };
-        // turns of the course tell it to tenths of a second, the innovations tell the rest
-        let gnss = earlier(recorded.gnss, clocks.delay_s);
-        let rest = self.rest(&Recorded { gnss: &gnss, ..*recorded });
-        Some(Cause::Clocks(rest.map_or(clocks, |[delay_s, sigma_s]| clocks.refined(delay_s, sigma_s))))
+        let small = || displaced(recorded, self.belief, self.start, self.settings).map(Cause::Displaced);
+        self.clocks(recorded).map(Cause::Clocks).or_else(small)
     }
 
-    /// Delay that is left, and its standard deviation (s).
-    fn rest(&self, recorded: &Recorded<'_>) -> Option<[f64; 2]> {
-        let start = match self.is_given {
-            true => self.start.clone(),
-            false => coarse(recorded, self.settings, self.belief).ok()?.start,
-        };
-        displaced(recorded, self.belief, &start, self.settings)?.delay_s
+    /// Clocks that are apart, where the innovations are smaller when they are not: the course of what walks or slips has
+    /// other turns than its body.
+    fn clocks(&self, recorded: &Recorded<'_>) -> Option<ClocksApart> {
+        let clocks = clocks_apart(recorded)?;
+        // turns of the course tell it to tenths of a second, the innovations tell the rest
+        let gnss = earlier(recorded.gnss, clocks.delay_s);
+        let there = Recorded { gnss: &gnss, ..*recorded };
+        let rest =
+            displaced(&there, self.belief, &self.start(&there)?, self.settings).and_then(|d| d.delay_s);
+        let clocks = rest.map_or(clocks, |[delay_s, sigma_s]| clocks.refined(delay_s, sigma_s));
+        let gnss = earlier(recorded.gnss, clocks.delay_s);
+        let without = self.nis(&Recorded { gnss: &gnss, ..*recorded })?;
+        self.nis(recorded).is_none_or(|now| without < now).then_some(clocks)
+    }
+
+    /// Mean NIS per component with a start of its own.
+    fn nis(&self, recorded: &Recorded<'_>) -> Option<f64> {
+        let solution = fuse(recorded, self.belief, &self.start(recorded)?, self.settings, None).ok()?;
+        Some(outcome(&solution, &[]).nis_per_component).filter(|nis| nis.is_finite())
+    }
+
+    fn start(&self, recorded: &Recorded<'_>) -> Option<Start> {
+        if self.is_given {
+            Some(self.start.clone())
+        } else {
+            coarse(recorded, self.settings, self.belief).ok().map(|a| a.start)
+        }
     }
 }
 

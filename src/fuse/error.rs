@@ -63,11 +63,11 @@ impl FuseError {
             Self::Fusion(FusionError::Place { .. }) => {
                 "check t_s, lat_deg, lon_deg and pos_sigma_m of the initial state"
             }
-            Self::Fusion(FusionError::Memory { .. }) => {
-                "fewer rows a second (--rate-hz), or a filter of fewer states"
-            }
+            Self::Fusion(FusionError::Memory { .. }) => "a filter of fewer states, or the drive in parts",
             Self::Fusion(FusionError::Diverged { .. }) => "check axes, units and the initial state",
-            Self::Alignment(_) => "give --heading DEG:SD, or the whole start with --initial FILE",
+            Self::Alignment(_) => {
+                "give the heading with --initial DEG:SD, or the whole start with --initial FILE"
+            }
             Self::Mounting(_) => {
                 "give --mounting ROLL,PITCH,YAW, or minutes of driving with braking and turns, and velocities in the fixes"
             }

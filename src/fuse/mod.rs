@@ -33,7 +33,7 @@ pub use drive::{FuseAnswer, FuseNote};
 pub use error::FuseError;
 pub(crate) use files::{FILES, directory};
 pub(crate) use manifest::FuseManifest;
-pub use request::{FuseRequest, GnssSigma, HeadingChoice, LoggerAxes, MountingChoice};
+pub use request::{FuseRequest, GnssSigma, LoggerAxes, MountingChoice, StartChoice, TopicChoice};
 pub use summary::{Cause, FuseSummary};
 
 /// Reads the files of a request and fuses them.

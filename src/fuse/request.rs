@@ -10,11 +10,14 @@ use nav_sim_navigation::fusion::{Correlation, Heading, Settings};
 use nav_sim_navigation::gnss::FixSigma;
 use nav_sim_navigation::sensors::gnss::MAX_LEVER_ARM_M;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_signal::imu::MAX_RATE_HZ;
 use nav_sim_signal::units::DEG;
 use serde::{Deserialize, Serialize};
+use std::fmt::{self, Display, Formatter};
 use std::path::PathBuf;
 use std::str::FromStr;
+
+/// Rows of the solution per second.
+const ROWS_HZ: f64 = 10.0;
 
 /// Files and settings of a fusion: the arguments of `nav-sim fuse`.
 #[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -29,16 +32,20 @@ pub struct FuseRequest {
     /// Noise model that the filter believes
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
-    /// Initial state (TOML), or auto: level from the IMU, heading from the GNSS course
-    #[arg(long, value_name = "FILE|auto", default_value = "auto")]
-    pub initial: PathBuf,
+    /// Initial state: a file (TOML); the heading and its standard deviation (degrees), where the course does not show it;
+    /// auto: level from the IMU, heading from the GNSS course
+    #[arg(
+        long,
+        alias = "heading",
+        value_name = "FILE|DEG:SD|auto",
+        default_value = "auto",
+        allow_hyphen_values = true
+    )]
+    pub initial: StartChoice,
     /// GNSS antenna from the IMU: front, right, down (m)
     #[arg(long = "lever-arm", value_name = "X,Y,Z", value_parser = numbers::<3>, default_value = "0,0,0",
         hide_default_value = true, allow_hyphen_values = true)]
     pub lever_arm_m: [f64; 3],
-    /// Heading at the start (degrees) and its standard deviation, where the course does not show it
-    #[arg(long, value_name = "DEG:SD", allow_hyphen_values = true)]
-    pub heading: Option<HeadingChoice>,
     /// Attitude of the IMU in the vehicle (degrees) if its axes are not front, right, down; after a colon the standard
     /// deviations about the vehicle's front, right, down (1 where not given); flu or rfu: axes of that name; auto:
     /// estimated from the drive of a road vehicle
@@ -71,9 +78,9 @@ pub struct FuseRequest {
     /// Names of the IMU's columns, for a file without a header or instead of it
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub columns: Option<Vec<String>>,
-    /// Rows of the solution per second
-    #[arg(long, value_name = "HZ", value_parser = number, default_value = "10")]
-    pub rate_hz: f64,
+    /// Topic of the IMU in a log that has several; after a comma that of the fixes
+    #[arg(long, value_name = "IMU[,FIXES]")]
+    pub topic: Option<TopicChoice>,
     /// Also smooth the solution: every row is then estimated from all fixes, later ones included
     #[arg(long)]
     pub smooth: bool,
@@ -85,9 +92,8 @@ impl Default for FuseRequest {
             imu: PathBuf::new(),
             gnss: PathBuf::new(),
             model: PathBuf::new(),
-            initial: "auto".into(),
+            initial: StartChoice::Auto,
             lever_arm_m: [0.0; 3],
-            heading: None,
             mounting: None,
             reference: None,
             outages: Vec::new(),
@@ -97,7 +103,7 @@ impl Default for FuseRequest {
             gnss_delay_s: 0.0,
             gnss_correlation: Correlation::Auto,
             columns: None,
-            rate_hz: 10.0,
+            topic: None,
             smooth: false,
         }
     }
@@ -111,7 +117,7 @@ impl FuseRequest {
 
     /// The file of the initial state; none where it is found in the data.
     pub(super) fn initial_file(&self) -> Option<&PathBuf> {
-        (self.initial.as_os_str() != "auto").then_some(&self.initial)
+        if let StartChoice::File(path) = &self.initial { Some(path) } else { None }
     }
 
     /// Every file that is read, by its role.
@@ -137,7 +143,8 @@ impl FuseRequest {
 
     /// Heading at the start, where it is given.
     pub(super) fn given_heading(&self) -> Option<Heading> {
-        self.heading.map(|given| Heading { yaw: given.deg * DEG, sigma: given.sigma_deg * DEG })
+        let StartChoice::Heading { deg, sigma_deg } = self.initial else { return None };
+        Some(Heading { yaw: deg * DEG, sigma: sigma_deg * DEG })
     }
 
     /// The filter's expectation of constant biases, over that of a file.
@@ -156,12 +163,6 @@ impl FuseRequest {
         if !self.lever_arm_m.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
             return refuse(format!("--lever-arm {x},{y},{z}: more than {MAX_LEVER_ARM_M} m"));
         }
-        if !(self.rate_hz > 0.0 && self.rate_hz <= MAX_RATE_HZ) {
-            return refuse(format!("--rate-hz {}: not a rate of 0 to {MAX_RATE_HZ} Hz", self.rate_hz));
-        }
-        if self.heading.is_some() && self.initial_file().is_some() {
-            return refuse("--heading beside --initial FILE, which states it".to_owned());
-        }
         let (q_s_b, mounting_sigma_b) = match self.mounting {
             Some(MountingChoice::Angles { deg: [roll, pitch, yaw], sigma_deg }) => (
                 RollPitchYaw { roll: roll * DEG, pitch: pitch * DEG, yaw: yaw * DEG }.to_quat(),
@@ -177,7 +178,7 @@ impl FuseRequest {
             gravity: GravityModel::default(),
             outages: self.outages.clone(),
             nis_gate: None,
-            rows_hz: self.rate_hz,
+            rows_hz: ROWS_HZ,
             smooth: self.smooth,
         })
     }
@@ -250,29 +251,83 @@ impl FromStr for MountingChoice {
     }
 }
 
-/// Heading of the vehicle at the start.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct HeadingChoice {
-    /// From north, clockwise (degrees).
-    pub deg: f64,
-    /// Standard deviation (degrees).
-    pub sigma_deg: f64,
+/// Start of a fusion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub enum StartChoice {
+    /// Found in the data.
+    Auto,
+    /// Found in the data but for the heading.
+    Heading {
+        /// From north, clockwise (degrees).
+        deg: f64,
+        /// Standard deviation (degrees).
+        sigma_deg: f64,
+    },
+    /// Stated in a file.
+    File(PathBuf),
 }
 
-impl FromStr for HeadingChoice {
+impl FromStr for StartChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let parts =
-            text.split_once(':').and_then(|(deg, sigma)| Some((number(deg).ok()?, number(sigma).ok()?)));
-        match parts {
-            Some((deg, sigma_deg)) if sigma_deg > 0.0 && sigma_deg <= MAX_SIGMA_DEG && deg.abs() <= 360.0 => {
-                Ok(Self { deg, sigma_deg })
+        let numbers = text.split_once(':').map(|(deg, sigma)| (number(deg), number(sigma)));
+        match numbers {
+            _ if text == "auto" => Ok(Self::Auto),
+            Some((Ok(deg), Ok(sigma_deg)))
+                if sigma_deg > 0.0 && sigma_deg <= MAX_SIGMA_DEG && deg.abs() <= 360.0 =>
+            {
+                Ok(Self::Heading { deg, sigma_deg })
             }
-            _ => Err(format!(
-                "expected degrees and a standard deviation of up to {MAX_SIGMA_DEG}, such as 90:5"
+            Some((Ok(_), Ok(_))) => Err(format!(
+                "expected a heading and its standard deviation of up to {MAX_SIGMA_DEG}°, such as 90:5"
             )),
+            _ => Ok(Self::File(text.into())),
         }
+    }
+}
+
+impl TryFrom<String> for StartChoice {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl From<StartChoice> for String {
+    fn from(start: StartChoice) -> Self {
+        start.to_string()
+    }
+}
+
+impl Display for StartChoice {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Heading { deg, sigma_deg } => write!(f, "{deg}:{sigma_deg}"),
+            Self::File(path) => write!(f, "{}", path.display()),
+        }
+    }
+}
+
+/// Topics of a log that has several.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct TopicChoice {
+    /// Of the IMU; none: the only one.
+    pub imu: Option<String>,
+    /// Of the fixes; none: the only one.
+    pub fixes: Option<String>,
+}
+
+impl FromStr for TopicChoice {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let (imu, fixes) = text.split_once(',').unwrap_or((text, ""));
+        let named = |name: &str| (!name.is_empty()).then(|| name.to_owned());
+        Ok(Self { imu: named(imu), fixes: named(fixes) })
     }
 }
 
@@ -376,5 +431,19 @@ mod tests {
         };
         assert_eq!(request, expected);
         assert!(serde_json::from_str::<FuseRequest>(r#"{ "imu": "a", "delay": 1 }"#).is_err());
+    }
+
+    #[test]
+    fn a_start_is_a_file_a_heading_or_found() {
+        let start = |text: &str| text.parse::<StartChoice>();
+        assert_eq!(start("auto"), Ok(StartChoice::Auto));
+        assert_eq!(start("-90:5"), Ok(StartChoice::Heading { deg: -90.0, sigma_deg: 5.0 }));
+        assert_eq!(start("a/initial.toml"), Ok(StartChoice::File("a/initial.toml".into())));
+        for bad in ["400:5", "90:0", "90:31"] {
+            assert!(start(bad).is_err(), "{bad}");
+        }
+        for text in ["auto", "-90:5", "a:b.toml"] {
+            assert_eq!(start(text).unwrap().to_string(), text);
+        }
     }
 }

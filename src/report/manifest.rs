@@ -17,6 +17,9 @@ pub struct Manifest {
     pub seed: Option<u64>,
     /// The resolved configuration: every key, outages one by one.
     pub configuration: Scenario,
+    /// Whether the truth of each run was drawn from the spread of its model.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub spread: bool,
     /// Every file that was read.
     pub inputs: Vec<Input>,
     /// BLAKE3 of the tables and the summary, by their names. (Directories made before have none.)
@@ -60,7 +63,7 @@ impl Manifest {
 
     /// Whether a run of the one is a run of the other: all that decides the results is the same.
     pub(crate) fn is_same_run(&self, other: &Self) -> bool {
-        (&self.version, self.seed) == (&other.version, other.seed)
+        (&self.version, self.seed, self.spread) == (&other.version, other.seed, other.spread)
             && (&self.configuration, &self.model) == (&other.configuration, &other.model)
             && contents(&self.inputs) == contents(&other.inputs)
     }

@@ -20,7 +20,7 @@ pub(crate) fn unexpected_in_words(unexpected: &Unexpected) -> (String, String) {
             format!(
                 "the true {sensor} has a scale-factor error of {ppm} ppm, the filter expects {expected_ppm}"
             ),
-            format!("initial.{} gives it states", InitialSettings::scale_key(*sensor)),
+            format!("--scale-ppm (initial.{}) gives it states", InitialSettings::scale_key(*sensor)),
         ),
         Unexpected::Misalignment { angle_rad } => (
             format!("the true IMU has a misalignment of {angle_rad} rad, the filter expects none"),

@@ -135,6 +135,7 @@ mod tests {
             command: ["nav-sim", "run", "a<b.toml"].map(str::to_owned).to_vec(),
             seed: Some(7),
             configuration: Scenario::default(),
+            spread: false,
             inputs: vec![Input { role: "trajectory".into(), path: "a<b.toml".into(), blake3: "ab".into() }],
             outputs: Default::default(),
             model: ModelNote { estimator: Some("dr-awv".into()) },

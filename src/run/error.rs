@@ -25,6 +25,17 @@ pub enum RunError {
         /// Why.
         source: RateError,
     },
+    /// A model without a spread, from which parameters were to be drawn.
+    #[error("{}: no [spread] to draw parameters from", .0.display())]
+    NoSpread(PathBuf),
+    /// A model drawn from a spread that cannot be converted to the rate of the IMU.
+    #[error("a model drawn from the [spread] of {}: {source}", path.display())]
+    Drawn {
+        /// File of the spread.
+        path: PathBuf,
+        /// Why.
+        source: RateError,
+    },
     /// A setting that is refused.
     #[error(transparent)]
     Setting(#[from] SettingError),

@@ -23,6 +23,10 @@ impl From<RunError> for Failure {
             }),
             RunError::Rate { from_hz, .. } => Failure::input(&e)
                 .hint(format!("set rate_hz = {from_hz} in the [imu] section of a --scenario file")),
+            RunError::NoSpread(_) => Self::input(&e).hint(
+                "nav-sim calibrate writes one where three recordings or more differ, or leave --spread out",
+            ),
+            RunError::Drawn { .. } => Self::input(&e),
             RunError::Outages => Failure::input(&e).hint("give the windows, or none alone"),
             RunError::Outage { ref source, .. } => {
                 Failure::input(&e).maybe_hint(source.hint().map(str::to_owned))
@@ -90,6 +94,7 @@ fn impossible(e: NavigateError, model: &Path, settings: Option<&Path>) -> Failur
         NavigateError::Reduction(e) => Failure::could_not(e),
         NavigateError::RecordedTruth => failure
             .hint("calibrate the recordings and give the model with --truth, or use --method monte-carlo"),
+        NavigateError::DrawnTruth => failure.hint("leave --spread out, or use --method monte-carlo"),
         NavigateError::Gate(_) => failure.hint("remove the key, or use --method monte-carlo"),
         NavigateError::NotFinite => {
             Failure::could_not(e).hint("do the models fit the IMU, are [imu] and [initial] plausible?")

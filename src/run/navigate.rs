@@ -45,6 +45,8 @@ pub enum TrueImu {
     AsBelieved,
     /// Another model, at the rate of the IMU.
     Model(Model),
+    /// A model for each run, at the rate of the IMU: drawn from the spread of one.
+    Drawn(Vec<Model>),
     /// Windows of static recordings.
     Recordings(Vec<Recording>),
 }
@@ -101,6 +103,9 @@ pub enum NavigateError {
     /// Recordings have no covariance.
     #[error("covariance analysis needs a model of what makes the errors; static recordings have none")]
     RecordedTruth,
+    /// Each run has a truth of its own.
+    #[error("covariance analysis is of one truth; --spread draws one for each run")]
+    DrawnTruth,
     /// A gate makes gains random.
     #[error("covariance analysis has no gate: filter.nis_gate = {0} makes the gains depend on what is drawn")]
     Gate(f64),
@@ -183,8 +188,10 @@ pub fn navigate(
 
 /// Whether covariance analysis can do what is asked for.
 fn possible(inputs: &NavigateInputs, scenario: &Scenario) -> Result<(), NavigateError> {
-    if let TrueImu::Recordings(_) = inputs.truth {
-        return Err(NavigateError::RecordedTruth);
+    match inputs.truth {
+        TrueImu::Recordings(_) => return Err(NavigateError::RecordedTruth),
+        TrueImu::Drawn(_) => return Err(NavigateError::DrawnTruth),
+        TrueImu::AsBelieved | TrueImu::Model(_) => {}
     }
     scenario.filter.nis_gate.map_or(Ok(()), |p| Err(NavigateError::Gate(p)))
 }
@@ -369,6 +376,7 @@ impl NavigateInputs {
         match &self.truth {
             TrueImu::AsBelieved => Truth::Model(&self.model),
             TrueImu::Model(model) => Truth::Model(model),
+            TrueImu::Drawn(models) => Truth::Drawn(models),
             TrueImu::Recordings(recordings) => Truth::Static(recordings),
         }
     }
@@ -378,7 +386,7 @@ impl NavigateInputs {
         match &self.truth {
             TrueImu::AsBelieved => Some(&self.model),
             TrueImu::Model(model) => Some(model),
-            TrueImu::Recordings(_) => None,
+            TrueImu::Drawn(_) | TrueImu::Recordings(_) => None,
         }
     }
 }

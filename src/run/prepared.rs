@@ -13,6 +13,7 @@ use crate::report::{Input, Manifest, ModelNote, TrajectorySeries};
 use nav_sim_navigation::metrics::Requirement;
 use nav_sim_navigation::scenario::{Method, Scenario};
 use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_signal::noise::{Model, continuous};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -43,10 +44,13 @@ impl RunRequest {
     ) -> Result<PreparedRun, RunError> {
         let mut scenario = self.settings()?;
         let files = self.files()?;
-        let (inputs, model) = self.inputs(&mut scenario, observer)?;
+        let (mut inputs, model, made_by) = self.inputs(&mut scenario, observer)?;
         let is_drawn = scenario.run.method != Method::Lincov || scenario.outage_random.is_some();
         scenario.run.seed = self.seed.or(scenario.run.seed).or_else(|| is_drawn.then(draw));
         let seed = scenario.run.seed.unwrap_or_default();
+        if self.spread {
+            inputs.truth = TrueImu::Drawn(self.drawn(&made_by, &scenario, seed)?);
+        }
         let span = (inputs.trajectory.start_s(), inputs.trajectory.end_s());
         let placed = scenario.outages_on(span, seed).map_err(|source| {
             let file = self.scenario.clone().filter(|_| self.outages.is_empty());
@@ -70,6 +74,7 @@ impl RunRequest {
             command: Vec::new(),
             seed: scenario.run.seed,
             configuration,
+            spread: self.spread,
             inputs: files,
             outputs: BTreeMap::new(),
             model: ModelNote { estimator: model.estimator() },
@@ -82,13 +87,25 @@ impl RunRequest {
         Ok(PreparedRun { manifest, inputs, scenario, outages, seed, require, model, settings })
     }
 
-    /// The models, the trajectory and the recordings; turn-on biases that the models state go into the scenario where it is
+    /// The model that makes the errors of each run: its parameters drawn at its own rate, then brought to that of the IMU.
+    fn drawn(&self, file: &ModelFile, scenario: &Scenario, seed: u64) -> Result<Vec<Model>, RunError> {
+        let path = self.truth.as_ref().unwrap_or(&self.model);
+        let spread = file.spread.as_ref().ok_or_else(|| RunError::NoSpread(path.clone()))?;
+        let of_run = |run| {
+            let drawn = spread.draw(&file.model, seed, run).expect("the spread was read with its model");
+            continuous::at_rate(&drawn, scenario.imu.rate_hz)
+                .map_err(|source| RunError::Drawn { path: path.clone(), source })
+        };
+        (0..scenario.run.runs).map(of_run).collect()
+    }
+
+    /// The models, the trajectory and the recordings, the file of the filter's model and that of what makes the errors; turn-on biases that the models state go into the scenario where it is
     /// silent.
     fn inputs(
         &self,
         scenario: &mut Scenario,
         observer: &dyn Observer<Note>,
-    ) -> Result<(NavigateInputs, ModelFile), RunError> {
+    ) -> Result<(NavigateInputs, ModelFile, ModelFile), RunError> {
         let imu_hz = scenario.imu.rate_hz;
         let read_model = |path: &Path| {
             let file = read::model(path, observer)?;
@@ -114,6 +131,7 @@ impl RunRequest {
             })
         };
         let model_draws = draws(&self.model, &file);
+        let made_by = truth.as_ref().map_or(&file, |(_, file)| file).clone();
         let (truth, truth_draws) = match (truth, self.recordings.as_slice()) {
             (Some((model, file)), []) => {
                 let drawn = self.truth.as_deref().and_then(|path| draws(path, &file));
@@ -122,7 +140,7 @@ impl RunRequest {
             (None, []) => (TrueImu::AsBelieved, None),
             (_, paths) => (TrueImu::Recordings(read::recordings(paths, self.rate_hz, observer)?), None),
         };
-        Ok((NavigateInputs { trajectory, model, truth, model_draws, truth_draws }, file))
+        Ok((NavigateInputs { trajectory, model, truth, model_draws, truth_draws }, file, made_by))
     }
 
     /// Every file that is read, with its hash.

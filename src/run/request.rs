@@ -23,6 +23,9 @@ pub struct RunRequest {
     /// Noise model that makes the INS errors (default: MODEL itself)
     #[arg(long, value_name = "MODEL2", conflicts_with = "recordings")]
     pub truth: Option<PathBuf>,
+    /// Draw the parameters that make the errors of each run from the [spread] of their model
+    #[arg(long, conflicts_with = "recordings")]
+    pub spread: bool,
     /// Static recording whose windows make the INS errors (repeatable)
     #[arg(long = "static", value_name = "FILE")]
     #[serde(rename = "static")]

@@ -61,6 +61,11 @@ sources! {
     BarShalom01;
     /// R. C. Paule, J. Mandel: *Consensus values and weighting factors*, J. Res. National Bureau of Standards 87, 1982.
     PauleMandel82;
+    /// W. Viechtbauer: *Confidence intervals for the amount of heterogeneity in meta-analysis*, Statistics in Medicine 26, 2007.
+    Viechtbauer07;
+    /// J. J. Moré: *The Levenberg-Marquardt algorithm: implementation and theory*, Numerical Analysis, Lecture Notes in
+    /// Mathematics 630, 1978.
+    More78;
     /// D. J. Best, D. E. Roberts: *Algorithm AS 91: The percentage points of the χ² distribution*, Applied Statistics 24,
     /// 1975.
     BestRoberts75;

@@ -60,7 +60,13 @@ fn ranked(grid: &Grid, place: &Place, seed: u64) -> RankedPlace {
     let contenders: Vec<Contender> = grid.columns.iter().map(contender).collect();
     let ranking = Ranking::new(&contenders, &place.folds);
     let [trajectory, _, scenario, gnss, outages] = grid.names(place.cell);
-    let report =
-        ChoiceReport { ranking: &ranking, influence: None, outages: &place.outages, trajectory, seed };
+    let report = ChoiceReport {
+        ranking: &ranking,
+        influence: None,
+        abnormal: &[],
+        outages: &place.outages,
+        trajectory,
+        seed,
+    };
     report.of_place([trajectory, scenario, gnss, outages].join(", "))
 }

@@ -72,13 +72,15 @@ pub(super) fn plan_in(directory: &Path) -> Result<Option<Plan>, FileError> {
     };
     let plan: Plan = serde_json::from_str(&text)
         .map_err(|e| damaged(e.line(), e.to_string().split(" at line ").next().unwrap_or_default()))?;
-    let sizes = [plan.unit_runs.len(), plan.trajectories.len()];
-    let fits = |files: &Vec<Input>| files.len() == 1 || files.len() == plan.study.truth.len();
-    if sizes != [plan.study.trajectory.len(); 2]
-        || plan.models.len() != plan.study.candidates().len()
-        || !plan.models.iter().all(fits)
-    {
-        return Err(damaged(1, "its numbers of trajectories and models are not those of its study"));
+    let study = &plan.study;
+    let sizes = [plan.unit_runs.len(), plan.trajectories.len(), plan.truths.len(), plan.models.len()];
+    let wanted =
+        [study.trajectory.len(), study.trajectory.len(), study.truth.len(), study.candidates().len()];
+    // a scenario or receiver that no file gives is the default
+    let given = [plan.scenarios.len(), plan.gnss.len()];
+    let fits = |files: &Vec<Input>| files.len() == 1 || files.len() == study.truth.len();
+    if sizes != wanted || given != [study.scenario.len(), study.gnss.len()] || !plan.models.iter().all(fits) {
+        return Err(damaged(1, "its lists are not as long as those of its study"));
     }
     Ok(Some(plan))
 }
@@ -212,7 +214,7 @@ impl Planned {
         if let Some(first) = foreign.first() {
             let example = unit_file::path(&self.directory, first);
             let (units, example) = (foreign.len(), example.display());
-            let text = format!("{units} unit files are of another plan and left out, such as {example}");
+            let text = format!("unit files of another plan are left out: {units}, such as {example}");
             observer.remark(&Remark::warning(text));
         }
         Ok(())

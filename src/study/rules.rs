@@ -13,6 +13,15 @@ pub(super) fn unique(axis: &str, names: &[(usize, &str)]) -> Result<(), Descript
     if let Some((i, _)) = names.iter().find(|(_, name)| name.trim().is_empty()) {
         return Err(DescriptionError::Unnamed { axis: axis(), entry: i + 1 });
     }
+    if let Some((i, name)) = names.iter().find(|(_, name)| is_no_name(name)) {
+        let reason =
+            "names begin with no = + - @ and have no control characters: tables are opened in spreadsheets";
+        return Err(DescriptionError::refused(
+            &format!("{}[{}].name", axis(), i + 1),
+            name.escape_debug(),
+            reason,
+        ));
+    }
     let mut seen = std::collections::HashSet::new();
     match names.iter().find(|(_, name)| !seen.insert(*name)) {
         Some((i, name)) => {
@@ -20,6 +29,11 @@ pub(super) fn unique(axis: &str, names: &[(usize, &str)]) -> Result<(), Descript
         }
         None => Ok(()),
     }
+}
+
+/// Whether a spreadsheet would compute a name, or a terminal obey it.
+fn is_no_name(name: &str) -> bool {
+    name.starts_with(['=', '+', '-', '@']) || name.contains(char::is_control)
 }
 
 /// An entry says one of several things.

@@ -30,8 +30,8 @@ pub struct TuneRequest {
     #[arg(long = "truth", value_name = "MODEL2", num_args = 1..)]
     #[serde(rename = "truth")]
     pub truths: Vec<PathBuf>,
-    /// Truths are MODEL itself and the draws of its calibration (MODEL.draws.json, which `calibrate` writes): errors count up
-    /// to the upper end of the 95 % interval that `run` states
+    /// Truths are MODEL itself and the draws of its calibration (MODEL.draws.json, which `calibrate` writes), each with the
+    /// parameters of a recording of its own where MODEL has a [spread]: errors count up to the upper end of their 95 % interval
     #[arg(long, conflicts_with = "truths")]
     pub intervals: bool,
     /// Trajectory: motion profile (.toml) or table (.csv) [default: a built-in drive with outages of that length]
@@ -94,9 +94,8 @@ pub(crate) struct Tuned {
 impl TuneRequest {
     /// The factors.
     pub(crate) fn tuned(&self, notes: Notes<'_>) -> Result<Tuned, Failure> {
-        self.refuse_recordings()?;
-        let mut scenario = checked_scenario(self.scenario.as_deref(), &self.outages)?;
         let files = self.inputs()?;
+        let mut scenario = checked_scenario(self.scenario.as_deref(), &self.outages)?;
         let file = read::model(&self.model, notes)?;
         let model = read::at_rate(&self.model, &file.model, scenario.imu.rate_hz, notes)?;
         read::expect_turn_on(&mut scenario.initial, &file, &self.model, notes);
@@ -155,6 +154,7 @@ impl TuneRequest {
 
     /// The files that are read.
     pub(crate) fn inputs(&self) -> Result<Vec<Input>, Failure> {
+        self.refuse_recordings()?;
         let draws = draws_file::beside(&self.model);
         let mut named = vec![("model", &self.model)];
         named.extend((self.intervals && draws.exists()).then_some(("draws", &draws)));
@@ -178,7 +178,7 @@ impl TuneRequest {
             TrueErrors { model, imu, gnss }
         };
         let truths = if self.intervals {
-            let draws = draws(&self.model, file, scenario.imu.rate_hz)?;
+            let draws = draws(&self.model, file, scenario.imu.rate_hz, self.seed.unwrap_or(1))?;
             let estimate = true_errors(&self.model, model.clone(), file);
             let names =
                 vec![format!("{} and the {} draws beside it", self.model.display(), draws.models.len())];
@@ -234,10 +234,11 @@ impl TuneRequest {
 }
 
 /// The draws beside a model file; what the intervals in the file itself leave out is how its parameters hang together.
-fn draws(path: &Path, file: &ModelFile, rate_hz: f64) -> Result<Draws, Failure> {
+fn draws(path: &Path, file: &ModelFile, rate_hz: f64, seed: u64) -> Result<Draws, Failure> {
     let missing =
         || format!("{}: the draws of its calibration are missing", draws_file::beside(path).display());
-    let found = draws_file::usable(path, &file.model, rate_hz).and_then(|draws| draws.ok_or_else(missing));
+    let found =
+        draws_file::of_recordings(path, file, rate_hz, seed).and_then(|draws| draws.ok_or_else(missing));
     found.map_err(|doubt| {
         Failure::input(doubt)
             .hint("calibrate again: the draws are written beside MODEL, unless with --bootstrap 0")

@@ -223,7 +223,7 @@ fn units_of_another_plan_are_named_and_left_out() {
     fs::copy(&stray, inner.join(stray.file_name().unwrap())).unwrap();
     for command in ["plan", "run", "merge", "status"] {
         let said = done(dir, &format!("{command} study.toml -o six"));
-        assert!(said.contains("1 unit files are of another plan and left out, such as six/units/"), "{said}");
+        assert!(said.contains("unit files of another plan are left out: 1, such as six/units/"), "{said}");
     }
     assert_eq!(results(&dir.join("six")), undisturbed);
 }
@@ -280,7 +280,7 @@ fn tables_of_an_earlier_plan_do_not_survive() {
     let study = STUDY.replace("seed = 5", "seed = 6").replace(", \"epochs\"]", "]");
     fs::write(dir.join("study.toml"), &study).unwrap();
     let said = done(dir, "plan study.toml -o out");
-    assert!(said.contains("50 unit files are of another plan and left out"), "{said}");
+    assert!(said.contains("unit files of another plan are left out: 50, such as"), "{said}");
     refused(dir, "merge study.toml -o out", 1);
     let again = whole(dir, "out");
     let names: Vec<&str> = again.iter().map(|(name, _)| name.as_str()).collect();

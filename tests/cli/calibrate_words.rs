@@ -118,7 +118,10 @@ fn bad_data_are_told_in_a_line() {
     let output = nav_sim(dir.path()).args(fit).assert().success();
     let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
     let first = text.lines().next().unwrap();
-    assert!(first.starts_with("gyro: WN does not fit (p = ") && first.contains("data/model "), "{first}");
+    assert!(
+        first.starts_with("gyro: WN does not fit: data/model ") && first.contains("(all together: p = "),
+        "{first}"
+    );
     assert!(
         text.lines().nth(1).unwrap().starts_with("1 of 4 recordings are abnormal: run3 (gyro noise"),
         "{text}"
@@ -160,7 +163,7 @@ fn terminal_and_page_name_the_same_scale() {
     let output = nav_sim(dir.path()).args(fit).assert().success();
     let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
     let verdict = text.lines().next().unwrap().split_once(": ").unwrap().1;
-    let told = verdict.split(": ").last().unwrap();
+    let told = verdict.split(": ").nth(1).unwrap().split(" (all").next().unwrap();
     assert_eq!(told, "data/model 1.50 at 0.16 s; 1 of 10 scales off", "{text}");
     let page = std::fs::read_to_string(dir.path().join("m.html")).unwrap();
     assert!(page.contains(told), "{told}");
@@ -265,4 +268,48 @@ fn the_hint_at_a_missing_sample_leads_on() {
     std::fs::write(&path, format!("t_s,gyro_x_rad_s,gyro_y_rad_s\n{rows}")).unwrap();
     let said = refusal(dir.path(), &fit, 2);
     assert!(said.contains("hint: write the time in seconds"), "{said}");
+}
+
+/// Degrees under the name of radians: 57 times the noise, which no gyroscope has.
+#[test]
+fn a_gyroscope_louder_than_any_is_doubted() {
+    let dir = tempfile::tempdir().unwrap();
+    let model = |sigma2: f64| {
+        format!("schema = 1\nrate_hz = 100.0\n[gyro]\nprocesses = [{{ type = \"WN\", sigma2 = {sigma2} }}]\n")
+    };
+    // 0.3 deg/sqrt(h) at 100 Hz: (0.3/60 deg/sqrt(s))² · 100 Hz, in rad²/s²
+    let sigma2 = (0.3_f64 / 60.0).to_radians().powi(2) * 100.0;
+    for (factor, is_doubted) in [(1.0, false), (1.0_f64.to_degrees().powi(2), true)] {
+        std::fs::write(dir.path().join("imu.toml"), model(sigma2 * factor)).unwrap();
+        let make = [
+            "synthesize",
+            "imu.toml",
+            "--samples",
+            "4096",
+            "--axes",
+            "gyro",
+            "--seed",
+            "1",
+            "-o",
+            "r",
+            "--force",
+        ];
+        nav_sim(dir.path()).args(make).assert().success();
+        let fit = [
+            "calibrate",
+            "r",
+            "--estimator",
+            "gmwm",
+            "--model",
+            "WN",
+            "--seed",
+            "1",
+            "-o",
+            "m.toml",
+            "--force",
+        ];
+        let output = nav_sim(dir.path()).args(fit).assert().success();
+        let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
+        assert_eq!(said.contains("columns in degrees are named gyro_x_deg_s"), is_doubted, "{said}");
+    }
 }

@@ -69,6 +69,7 @@ fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest)) {
         command: vec![],
         seed: Some(7),
         configuration: Scenario { outage, ..Scenario::default() },
+        spread: false,
         inputs: vec![input("trajectory", "t.csv", b"t"), input("truth", "m.toml", b"m")],
         outputs: Default::default(),
         model: ModelNote::default(),

@@ -54,6 +54,46 @@ fn a_recording_has_the_same_curves_in_every_format() {
     for file in ["log.mcap", "log.bag", "arrays.npz"] {
         assert_eq!(curves(file), expected, "{file}");
     }
+    #[cfg(feature = "parquet")]
+    assert_eq!(curves("table.parquet"), expected);
+    #[cfg(not(feature = "parquet"))]
+    {
+        let ran = nav_sim(&formats, "wv table.parquet");
+        assert!(
+            ran.code == 2 && ran.stderr.contains("hint: build with --features parquet"),
+            "{}",
+            ran.stderr
+        );
+    }
+}
+
+/// The same recording as the files of KITTI have it: one line of thirty numbers a sample, times beside them.
+#[test]
+fn a_directory_of_kitti_is_one_recording() {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("calib_data/formats/own.csv");
+    let place = tempfile::tempdir().unwrap();
+    fs::create_dir_all(place.path().join("oxts/data")).unwrap();
+    let text = fs::read_to_string(&own).unwrap();
+    let mut times = String::new();
+    for (k, line) in text.lines().skip(1).enumerate() {
+        let cells: Vec<&str> = line.split(',').collect();
+        let mut numbers = ["0"; 30];
+        numbers[11..14].copy_from_slice(&cells[1..4]);
+        numbers[17..20].copy_from_slice(&cells[4..7]);
+        fs::write(place.path().join(format!("oxts/data/{k:010}.txt")), numbers.join(" ")).unwrap();
+        times += &format!("2011-09-26 13:02:{:02}.{:02}0000000\n", 20 + k / 100, k % 100);
+    }
+    fs::write(place.path().join("oxts/timestamps.txt"), times).unwrap();
+    let variances = |file: &str| {
+        let ran = nav_sim(place.path(), &format!("wv {file} --format json"));
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        let found: Value = serde_json::from_str(&ran.stdout).unwrap();
+        found["signals"].as_array().unwrap().iter().map(|s| s["classical"]["wv"].clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(variances("oxts"), variances(&own.display().to_string()));
+    fs::write(place.path().join("oxts/data/0000000007.txt"), "1 2 3").unwrap();
+    let ran = nav_sim(place.path(), "wv oxts");
+    assert!(ran.code == 2 && ran.stderr.contains("0000000007.txt, line 1"), "{}", ran.stderr);
 }
 
 /// A gyroscope without a unit could be in degrees or radians: it is not guessed.
@@ -75,6 +115,25 @@ fn of_several_imus_one_is_named() {
     assert!(ran.stderr.contains("hint: --topic NAME"), "{}", ran.stderr);
     let ran = nav_sim(Path::new("."), &format!("wv {} --topic /imu_rear --format json", bag.display()));
     assert_eq!(ran.code, 0, "{}", ran.stderr);
+}
+
+/// `fuse` names the topics of the IMU and of the fixes.
+#[test]
+fn of_several_imus_fuse_takes_the_one_named() {
+    let place = tempfile::tempdir().unwrap();
+    fs::write(place.path().join("imu.toml"), MODEL).unwrap();
+    let bag = data("ros1_two_imus.bag");
+    let fuse = |options: &str| {
+        let command = format!("fuse {0} {0} imu.toml {options}", bag.display());
+        let ran = nav_sim(place.path(), &command);
+        assert_eq!(ran.code, 2, "{}", ran.stdout);
+        ran.stderr
+    };
+    assert!(fuse("").contains("hint: --topic NAME"), "{}", fuse(""));
+    // no word of the topic: four hundredths of a second are no drive
+    assert!(!fuse("--topic /imu_rear").contains("have IMU samples"), "{}", fuse("--topic /imu_rear"));
+    let none = fuse("--topic /imu_rear,/none");
+    assert!(none.contains("no topic has") && none.contains("/none"), "{none}");
 }
 
 /// A damaged log is refused before any work, with the byte; what stands before the damage is read where that is asked for,

@@ -193,3 +193,38 @@ fn tune_or_run(dir: &Path, arguments: &str) -> std::process::Output {
     let mut command = Command::cargo_bin("nav-sim").unwrap();
     command.current_dir(dir).args(arguments.split_whitespace()).output().unwrap()
 }
+
+/// A calibration known for certain whose recordings differ: sigma2 of both sensors by a log-sd of 0.3, on each axis for itself.
+/// Errors that one axis makes alone have an upper end of e^(1.96·0.3/2) of theirs, and a factor of e^(1.96·0.3) = 1.8 on the
+/// variance covers it; those that three axes share have less. The ends of 200 draws are known to 7 %.
+#[test]
+fn intervals_with_a_spread_cover_what_recordings_differ_by() {
+    let dir = tempfile::tempdir().unwrap();
+    let white = "processes = [{ type = \"WN\", sigma2 = 1e-6 }]\n";
+    let law =
+        "process = \"WN\"\nparameter = \"sigma2\"\ndistribution = \"lognormal\"\nmedian = 1e-6\nsd = 0.3\n";
+    let plain = format!("rate_hz = 100.0\n[accel]\n{white}[gyro]\n{white}");
+    let spread = format!("{plain}[[spread.accel]]\n{law}[[spread.gyro]]\n{law}");
+    let signals = |name: &str| {
+        format!(
+            "{{\"signals\": \"{name}\", \"stretch\": 1.0, \"parameters\": [\"WN sigma2\"], \"estimate\": [1e-6], \"draws\": [{}]}}",
+            vec!["[1e-6]"; 200].join(",")
+        )
+    };
+    let draws = format!(
+        "{{\"schema_version\": 1, \"rate_hz\": 100.0, \"signals\": [{}, {}]}}",
+        signals("accel"),
+        signals("gyro")
+    );
+    let factors = |name: &str, text: &str| -> Vec<f64> {
+        std::fs::write(dir.path().join(format!("{name}.toml")), text).unwrap();
+        std::fs::write(dir.path().join(format!("{name}.draws.json")), &draws).unwrap();
+        let output =
+            tune_or_run(dir.path(), &format!("tune {name}.toml --intervals --outage 60:90 --format json"));
+        let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+        found["factors"].as_array().unwrap().iter().map(|f| f["on_variance"].as_f64().unwrap()).collect()
+    };
+    assert!(factors("plain", &plain).iter().all(|f| (f - 1.0).abs() < 5e-3));
+    let covered = factors("spread", &spread);
+    assert!(covered.iter().any(|f| *f > 1.2) && covered.iter().all(|f| *f < 1.8 * 1.14), "{covered:?}");
+}

@@ -27,14 +27,18 @@ pub(super) fn between(replicates: &[Replicate], estimator: Estimator, tuning: &T
         (1..).map_while(at_level).filter(|(scatter, _)| scatter.is_finite()).collect();
     let excess = |b2: f64| scales.iter().map(|(s2, noise)| s2 / (noise + b2) - 1.0).sum::<f64>();
     // At the largest scatter no term is above 0.
-    let (mut low, mut high) = (0.0, scales.iter().map(|(s2, _)| *s2).fold(0.0, f64::max));
-    if excess(low) <= 0.0 {
+    falling_root(excess, scales.iter().map(|(s2, _)| *s2).fold(0.0, f64::max))
+}
+
+/// The root of a falling function between 0 and `high`, halved to rounding; 0 where it is not positive there.
+pub(crate) fn falling_root(function: impl Fn(f64) -> f64, high: f64) -> f64 {
+    let (mut low, mut high) = (0.0, high);
+    if function(low) <= 0.0 {
         return 0.0;
     }
-    // Halved to rounding.
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if excess(middle) > 0.0 { low = middle } else { high = middle }
+        if function(middle) > 0.0 { low = middle } else { high = middle }
     }
     low
 }

@@ -10,6 +10,7 @@ pub(crate) mod shape;
 mod stationarity;
 
 pub use average::{AverageError, Estimator, Replicate, Trim, TrimError, average};
+pub(crate) use differing::falling_root;
 pub use implied::implied;
 pub use replicates::{Group, Pool, Scope, SignalError, grouped, replicates, trend};
 pub use robust_scale::median;

@@ -1,6 +1,6 @@
 //! Expectations under the laws of parameters.
 
-use crate::noise::Law;
+use crate::noise::{Law, Parameter};
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Number of nodes by which a law is replaced: exact for polynomials of degree 95 under a beta law.
@@ -8,12 +8,17 @@ const NODES: usize = 48;
 /// A normal law is cut off so many standard deviations from its centre: 1e-19 of it lies beyond.
 const CUT: f64 = 9.0;
 
-/// Values and weights (of sum 1) that stand for a law about `centre` (the model's value) on a domain.
-pub(super) fn nodes(law: Law, centre: f64, domain: (f64, f64)) -> Vec<(f64, f64)> {
+/// Values and weights (of sum 1) that stand for the law of a parameter about `centre` (the model's value).
+pub(super) fn nodes(law: Law, centre: f64, parameter: Parameter) -> Vec<(f64, f64)> {
     match law {
         Law::Beta { a, b, low, width } => beta(a, b).map(|(x, w)| (low + width * x, w)).collect(),
-        Law::Normal { sd } if sd > 0.0 => normal(centre, sd, domain),
+        Law::Normal { sd } if sd > 0.0 => normal(centre, sd, parameter.domain()),
         Law::Normal { .. } => vec![(centre, 1.0)],
+        Law::Lognormal { median, sd, .. } if sd > 0.0 => {
+            let scaled = normal(parameter.scaled(median), sd, (f64::NEG_INFINITY, f64::INFINITY));
+            scaled.into_iter().map(|(x, w)| (parameter.unscaled(x), w)).collect()
+        }
+        Law::Lognormal { median, .. } => vec![(median, 1.0)],
     }
 }
 
@@ -66,8 +71,8 @@ fn beta(a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> {
 mod tests {
     use super::*;
 
-    fn mean(law: Law, centre: f64, domain: (f64, f64), f: impl Fn(f64) -> f64) -> f64 {
-        nodes(law, centre, domain).into_iter().map(|(x, w)| w * f(x)).sum()
+    fn mean(law: Law, centre: f64, parameter: Parameter, f: impl Fn(f64) -> f64) -> f64 {
+        nodes(law, centre, parameter).into_iter().map(|(x, w)| w * f(x)).sum()
     }
 
     /// E B^k = Π (a + i)/(a + b + i).
@@ -77,7 +82,7 @@ mod tests {
             let law = Law::Beta { a, b, low: 0.0, width: 1.0 };
             for k in 0..12 {
                 let exact: f64 = (0..k).map(|i| (a + f64::from(i)) / (a + b + f64::from(i))).product();
-                let found = mean(law, 0.0, (0.0, 1.0), |x| x.powi(k));
+                let found = mean(law, 0.0, Parameter::Sigma2, |x| x.powi(k));
                 assert!((found - exact).abs() < 1e-13, "{a}, {b}, {k}: {found} {exact}");
             }
         }
@@ -87,10 +92,24 @@ mod tests {
     #[test]
     fn moments_of_normal_laws() {
         let law = Law::Normal { sd: 2.0 };
-        let half = mean(law, 0.0, (0.0, f64::INFINITY), |x| x);
+        let half = mean(law, 0.0, Parameter::Sigma2, |x| x);
         assert!((half - 2.0 * (2.0 / std::f64::consts::PI).sqrt()).abs() < 1e-11, "{half}");
-        let whole = mean(law, 3.0, (f64::NEG_INFINITY, f64::INFINITY), |x| (0.5 * x).exp());
+        let whole = mean(law, 3.0, Parameter::Slope, |x| (0.5 * x).exp());
         assert!((whole / 2.0_f64.exp() - 1.0).abs() < 1e-11, "{whole}");
-        assert_eq!(nodes(Law::Normal { sd: 0.0 }, 3.0, (0.0, 9.0)), [(3.0, 1.0)]);
+        assert_eq!(nodes(Law::Normal { sd: 0.0 }, 3.0, Parameter::Sigma2), [(3.0, 1.0)]);
+    }
+
+    /// E exp(k(mu + sd Z)) = median^k exp(k² sd²/2); of phi the logarithm of 1/κ is normal, so E κ likewise.
+    #[test]
+    fn moments_of_lognormal_laws() {
+        let law = Law::Lognormal { median: 3.0, sd: 0.5, ci95: None };
+        for k in 1..4 {
+            let exact = (3.0_f64.ln() * f64::from(k) + 0.125 * f64::from(k * k)).exp();
+            let found = mean(law, 1.0, Parameter::Sigma2, |x| x.powi(k));
+            assert!((found / exact - 1.0).abs() < 1e-11, "{k}: {found} {exact}");
+        }
+        let law = Law::Lognormal { median: 0.9, sd: 0.5, ci95: None };
+        let kappa = mean(law, 0.5, Parameter::Phi, |phi| -phi.ln());
+        assert!((kappa / (-0.9_f64.ln() * 0.125_f64.exp()) - 1.0).abs() < 1e-11, "{kappa}");
     }
 }

@@ -77,7 +77,7 @@ fn weighted<'a>(
         let name = law.parameter();
         let own = process.kind().parameters().iter().zip(process.values()).find(|(p, _)| p.name() == name);
         let (parameter, centre) = own.ok_or_else(|| law.no_parameter(process))?;
-        let nodes = nodes(law.law(), centre, parameter.domain());
+        let nodes = nodes(law.law(), centre, *parameter);
         let mut next = Vec::with_capacity(all.len() * nodes.len());
         for (process, weight) in &all {
             for (value, node) in &nodes {

@@ -46,6 +46,8 @@ pub struct Inference {
     /// Probability that replicates of one noise differ as much at some scale (see [`ALIKE_LEVEL`](crate::ALIKE_LEVEL)); none of a
     /// single signal.
     pub alike: Option<f64>,
+    /// Parameters that are known to differ between recordings; none where [`alike`](Self::alike) does not say that these differ.
+    pub varying: Vec<ParameterSpread>,
     /// Alike processes that cannot be told apart, and the simpler model.
     pub indistinct: Option<Indistinct>,
     /// Intervals of N, K and B.
@@ -115,6 +117,21 @@ pub struct LevelSpread {
     pub within: f64,
     /// Standard deviation of the differences beyond that.
     pub between: f64,
+}
+
+/// How a parameter differs between recordings: its logarithm (of phi and beta that of the correlation time) is normal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParameterSpread {
+    /// The parameter.
+    pub of: ParameterRef,
+    /// Its median (units of the parameter).
+    pub median: f64,
+    /// 95 % interval of that.
+    pub median_ci95: [f64; 2],
+    /// Standard deviation of the logarithm.
+    pub sd: f64,
+    /// 95 % interval of that.
+    pub sd_ci95: [f64; 2],
 }
 
 /// The 95 % interval of one parameter.

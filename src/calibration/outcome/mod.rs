@@ -8,8 +8,8 @@ mod settings;
 
 pub use departure::{Departure, Misfit, Miss};
 pub use inference::{
-    AxesDiffer, Bootstrap, Goodness, Indistinct, Inference, LevelSpread, ParameterInterval, Practical,
-    PracticalIntervals, Undetermined,
+    AxesDiffer, Bootstrap, Goodness, Indistinct, Inference, LevelSpread, ParameterInterval, ParameterSpread,
+    Practical, PracticalIntervals, Undetermined,
 };
 pub use note::{Note, Share, shares};
 pub use ranking::{Candidate, Ranking, TooSimple};

@@ -13,6 +13,7 @@ use super::intervals::intervals;
 use super::practical;
 use super::sandwich::standard_errors;
 use super::spread::Spread;
+use super::varying::parameter_spreads;
 use crate::curve::{Estimator, Group};
 use crate::fit::Fit;
 use crate::outcome::{Advance, Bootstrap, Indistinct, Inference, LevelSpread, Outcome, Settings, tau_s};
@@ -68,16 +69,23 @@ fn by_bootstrap(
     let errors = standard_errors(outcome, settings, &sampler.covariance_as_recorded(CURVES, &name, settings));
     let spread = sampler.spread.as_ref();
     let stretch = spread.map_or(1.0, Spread::student);
+    let intervals = intervals(outcome, &fits, stretch, &errors);
+    let alike =
+        spread.and_then(|s| alike::p_value(&group.replicates, outcome.estimator, s, &sampler.law, &name));
+    let varying = match alike {
+        Some(p) if p <= alike::LEVEL => parameter_spreads(group, outcome, &intervals, settings, bootstrap),
+        _ => Vec::new(),
+    };
     Inference {
         draws: bootstrap.draws,
         fitted: fits.len(),
         drawn: fits.iter().map(|fit| fit.composite.clone()).collect(),
         stretch,
-        intervals: intervals(outcome, &fits, stretch, &errors),
+        intervals,
         goodness: (outcome.estimator != Estimator::Avlr).then(|| goodness(outcome, &fits)),
         spread: spread.map_or(Vec::new(), |s| level_spreads(s, &outcome.curve.levels, settings.rate_hz)),
-        alike: spread
-            .and_then(|s| alike::p_value(&group.replicates, outcome.estimator, s, &sampler.law, &name)),
+        alike,
+        varying,
         indistinct: None,
         practical: practical::intervals(outcome, &fits, stretch, settings.rate_hz),
     }

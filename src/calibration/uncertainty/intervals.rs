@@ -131,7 +131,7 @@ fn holding(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
 /// The processes of a draw in the order of the model; none where one has vanished. Alike ones are told apart by
 /// their correlation times: those that are there, in the draw and in the model, keep their order, and so many of
 /// them are paired as can be, the nearest.
-fn matched<'a>(estimate: &Fit, spec: &ModelSpec, fit: &'a Fit) -> Vec<Option<&'a Process>> {
+pub(super) fn matched<'a>(estimate: &Fit, spec: &ModelSpec, fit: &'a Fit) -> Vec<Option<&'a Process>> {
     let (drawn, model) = (&fit.composite.processes, &estimate.composite.processes);
     let is_present = |fit: &Fit, i: usize| !fit.zero.contains(&i) && !fit.at_end.contains(&i);
     let kinds = spec.kinds();
@@ -209,33 +209,14 @@ impl Draws {
         Self { parameter, quantiles: [low, high], median, stretch }
     }
 
-    /// The parameter on the scale on which its law does not depend on its value: ln κ, theta, or the
-    /// logarithm.
-    fn scale(&self, value: f64) -> f64 {
-        match self.parameter {
-            // ln κ = −ln T but for the rate: phi as the correlation time that it stands for.
-            Parameter::Phi => (-value.ln()).ln(),
-            Parameter::Theta => value,
-            _ => value.ln(),
-        }
-    }
-
-    fn back(&self, scaled: f64) -> f64 {
-        match self.parameter {
-            Parameter::Phi => (-scaled.exp()).exp(),
-            Parameter::Theta => scaled.clamp(-1.0, 1.0),
-            _ => scaled.exp(),
-        }
-    }
-
     /// Distances of the quantiles from the median on that scale, stretched.
     fn distances(&self) -> [f64; 2] {
-        self.quantiles.map(|q| self.stretch * (self.scale(q) - self.scale(self.median)))
+        self.quantiles.map(|q| self.stretch * (self.parameter.scaled(q) - self.parameter.scaled(self.median)))
     }
 
     /// The quantiles, their distances stretched; as they are where one is at a bound.
     fn stretched(&self) -> [f64; 2] {
-        let ends = self.distances().map(|d| self.back(self.scale(self.median) + d));
+        let ends = self.distances().map(|d| self.parameter.unscaled(self.parameter.scaled(self.median) + d));
         if ends.iter().all(|e| e.is_finite()) { ends } else { self.quantiles }
     }
 
@@ -248,10 +229,10 @@ impl Draws {
     fn mirrored(&self, estimate: f64) -> Option<[f64; 2]> {
         // 2·estimate − quantile is the mirror image; written with the median, whose distance from the
         // quantiles is what is stretched.
-        let centre = 2.0 * self.scale(estimate) - self.scale(self.median);
-        let mut ends = self.distances().map(|d| self.back(centre - d));
+        let centre = 2.0 * self.parameter.scaled(estimate) - self.parameter.scaled(self.median);
+        let mut ends = self.distances().map(|d| self.parameter.unscaled(centre - d));
         ends.sort_by(f64::total_cmp);
-        (ends.iter().all(|e| e.is_finite()) && self.scale(estimate).is_finite()).then_some(ends)
+        (ends.iter().all(|e| e.is_finite()) && self.parameter.scaled(estimate).is_finite()).then_some(ends)
     }
 }
 
@@ -274,11 +255,11 @@ pub(crate) fn scale_interval(estimate: f64, drawn: Vec<f64>, draws: usize, stret
 }
 
 /// Probability beyond either end of a 95 % interval.
-const TAIL: f64 = 0.025;
+pub(super) const TAIL: f64 = 0.025;
 
 /// Quantile of sorted draws, interpolated; NaN of none. The k-th of n is at k/(n + 1), so that one draw more is
 /// beyond it with that probability exactly ([Davison and Hinkley](crate::bibliography::DavisonHinkley97), Section 5.2).
-fn quantile(sorted: &[f64], p: f64) -> f64 {
+pub(super) fn quantile(sorted: &[f64], p: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
     let at = (p * (sorted.len() + 1) as f64 - 1.0).clamp(0.0, last as f64);
     let below = at.floor() as usize;

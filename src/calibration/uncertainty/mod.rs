@@ -11,6 +11,7 @@ pub(crate) mod intervals;
 pub(crate) mod practical;
 mod sandwich;
 pub(crate) mod spread;
+mod varying;
 
 pub use alike::LEVEL as ALIKE_LEVEL;
 pub use bootstrap::Scattering;

@@ -12,12 +12,12 @@
 use crate::curve::robust_scale::{MAD_TO_DEVIATION, median};
 use crate::curve::sampling::SamplingLaw;
 use crate::curve::shape::Shape;
-use crate::curve::{Estimator, Replicate};
+use crate::curve::{Estimator, Replicate, falling_root};
 use crate::rng::Generator;
 use crate::wavelet::Tuning;
 use rand::RngExt;
 use rand_distr::StandardNormal;
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 /// Quantile 0.975 of the normal law.
 const NORMAL_975: f64 = 1.959_963_984_540_054;
@@ -50,13 +50,13 @@ pub(crate) struct Spread {
 
 /// A signal's place among the recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Origin {
-    recording: usize,
-    position: usize,
+pub(super) struct Origin {
+    pub(super) recording: usize,
+    pub(super) position: usize,
 }
 
 /// Signals of one name are of one recording; a signal of its axis has the same position in every recording.
-fn origins(replicates: &[Replicate]) -> Vec<Origin> {
+pub(super) fn origins(replicates: &[Replicate]) -> Vec<Origin> {
     let first = |is_same: &dyn Fn(&Replicate) -> bool| replicates.iter().position(is_same);
     let ranked = |firsts: Vec<Option<usize>>| -> Vec<usize> {
         let mut known = firsts.clone();
@@ -129,14 +129,29 @@ impl Spread {
         self.student_where(&self.between)
     }
 
-    /// The same where replicates differ by these standard deviations.
-    pub(crate) fn student_where(&self, between: &[f64]) -> f64 {
+    /// The same where replicates differ by these standard deviations, times the median of the deviation that so few replicates show,
+    /// over the true one: what half of all calibrations stretch the true scatter by, or less.
+    pub(crate) fn stated_where(&self, between: &[f64]) -> f64 {
         if self.units.len() < 2 {
             return 1.0;
         }
-        let freedom = (self.share_of_freedom * self.freedom(between)).max(1.0);
+        let freedom = self.left_of(self.freedom(between));
+        let median = ChiSquared::new(freedom).map_or(freedom, |law| law.inverse_cdf(0.5));
+        self.student_where(between) * (median / freedom).sqrt()
+    }
+
+    fn student_where(&self, between: &[f64]) -> f64 {
+        if self.units.len() < 2 {
+            return 1.0;
+        }
+        let freedom = self.left_of(self.freedom(between));
         let student = StudentsT::new(0.0, 1.0, freedom).map_or(NORMAL_975, |law| law.inverse_cdf(0.975));
         student / NORMAL_975
+    }
+
+    /// Degrees of freedom that the estimator leaves of so many.
+    fn left_of(&self, freedom: f64) -> f64 {
+        (self.share_of_freedom * freedom).max(1.0)
     }
 
     /// Degrees of freedom of the variance of a mean: of its part that follows from the signals' own noise one less than
@@ -218,12 +233,12 @@ fn edof(replicate: &Replicate, estimator: Estimator, law: &SamplingLaw, tuning: 
 /// The degrees of freedom of a variance over those of the plain one, K − 1. That of K Gaussian numbers of which the
 /// distant are clipped scatters as a chi-square of 0.87 (K − 1) degrees does (Satterthwaite's rule; 0.78 to 0.96 for K =
 /// 5 … 24).
-const fn share_of_freedom(estimator: Estimator) -> f64 {
+pub(super) const fn share_of_freedom(estimator: Estimator) -> f64 {
     if matches!(estimator, Estimator::DrAwv) { 0.87 } else { 1.0 }
 }
 
 /// Factor that makes the clipped variance of K Gaussian numbers unbiased: 1.075 for K = 8.
-fn small_sample(count: usize) -> f64 {
+pub(super) fn small_sample(count: usize) -> f64 {
     1.0 + 0.6 / count as f64
 }
 
@@ -269,14 +284,7 @@ impl Scatter {
         };
         // At twice the range each residual is below ½, so their mean square is below 1: the root lies before
         // it.
-        let (mut low, mut high) = (0.0, 2.0 * range);
-        if weighted(low).1 * correction.sqrt() > 1.0 {
-            // Halved to rounding.
-            for _ in 0..60 {
-                let middle = 0.5 * (low + high);
-                if weighted(middle).1 * correction.sqrt() > 1.0 { low = middle } else { high = middle }
-            }
-        }
+        let low = falling_root(|between| weighted(between).1 * correction.sqrt() - 1.0, 2.0 * range);
         let (mut units, length) = weighted(low);
         if length > 0.0 {
             units.iter_mut().for_each(|z| *z /= length);
@@ -287,26 +295,26 @@ impl Scatter {
 
 /// Residuals from the weighted mean in standard deviations (weights: 1/variance); clipped ones are those from the
 /// weighted median, within [`CLIP`] deviations by their median, about their own weighted mean.
-fn residuals(values: &[f64], weights: &[f64], clipped: bool) -> Vec<f64> {
-    let mean = |values: &[f64]| {
-        let sum: f64 = values.iter().zip(weights).map(|(x, w)| x * w).sum();
-        sum / weights.iter().sum::<f64>()
-    };
-    let mut kept = values.to_vec();
-    if clipped {
-        let centre = weighted_median(values, weights);
-        let distances: Vec<f64> =
-            values.iter().zip(weights).map(|(x, w)| (x - centre).abs() * w.sqrt()).collect();
-        // Distances are in the standard deviations of each replicate: a short recording scatters more and is
-        // not clipped for that.
-        let most = CLIP * MAD_TO_DEVIATION * median(&distances);
-        for (x, w) in kept.iter_mut().zip(weights) {
-            let most = most / w.sqrt();
-            *x = x.clamp(centre - most, centre + most);
-        }
-    }
-    let mean = mean(&kept);
+fn residuals(values: &[f64], weights: &[f64], is_clipped: bool) -> Vec<f64> {
+    let kept = if is_clipped { clipped(values, weights) } else { values.to_vec() };
+    let sum: f64 = kept.iter().zip(weights).map(|(x, w)| x * w).sum();
+    let mean = sum / weights.iter().sum::<f64>();
     kept.iter().zip(weights).map(|(x, w)| (x - mean) * w.sqrt()).collect()
+}
+
+/// The values within [`CLIP`] deviations of their weighted median, those beyond at the ends.
+pub(super) fn clipped(values: &[f64], weights: &[f64]) -> Vec<f64> {
+    let centre = weighted_median(values, weights);
+    let distances: Vec<f64> =
+        values.iter().zip(weights).map(|(x, w)| (x - centre).abs() * w.sqrt()).collect();
+    // Distances are in the standard deviations of each replicate: a short recording scatters more and is
+    // not clipped for that.
+    let most = CLIP * MAD_TO_DEVIATION * median(&distances);
+    let clip = |(x, w): (&f64, &f64)| {
+        let most = most / w.sqrt();
+        x.clamp(centre - most, centre + most)
+    };
+    values.iter().zip(weights).map(clip).collect()
 }
 
 /// The value below which half of the weight lies; the mean of two where it lies between them.

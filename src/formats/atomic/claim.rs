@@ -7,7 +7,7 @@
 use super::directory::{AtomicDir, recover};
 use super::file::{AtomicFile, make_parent};
 use super::temporary::Temporary;
-use super::written::Written;
+use super::written::{Found, Written};
 use crate::formats::{FileError, Place, Setting};
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -148,27 +148,6 @@ pub(crate) enum Existing {
     Keep,
     /// Another takes its place.
     Replace,
-}
-
-/// What stands where a result is to be written; in a directory told by its last file, which appears when the others are whole.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Found {
-    /// Nothing that may be replaced.
-    Foreign,
-    /// Another result: how so.
-    Other(&'static str),
-    /// An earlier result of what is to be written, or nothing.
-    Same,
-}
-
-impl Found {
-    /// A result of this command, by whether all that decides it is the same.
-    pub(crate) const fn result(is_same: bool) -> Self {
-        match is_same {
-            true => Self::Same,
-            false => Self::Other("holds the result of another configuration, other inputs or another seed"),
-        }
-    }
 }
 
 /// Claims a directory before the work whose results are to be written there: none of `files` is an input, the

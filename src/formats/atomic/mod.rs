@@ -7,11 +7,11 @@ mod file;
 mod temporary;
 mod written;
 
-pub(crate) use claim::{Claim, Existing, Found, claim_directory, claim_file, claim_result};
+pub(crate) use claim::{Claim, Existing, claim_directory, claim_file, claim_result};
 pub(crate) use directory::{AtomicDir, recover};
 pub(crate) use file::AtomicFile;
 pub(crate) use temporary::remove_unfinished;
-pub(crate) use written::Written;
+pub(crate) use written::{Found, Written};
 
 use super::FileError;
 use std::io::Write;

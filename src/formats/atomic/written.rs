@@ -1,6 +1,5 @@
 //! Kinds of files that nav-sim writes, known by what stands in them.
 
-use super::claim::Found;
 use crate::formats::source;
 use std::io::Read;
 use std::path::Path;
@@ -95,4 +94,25 @@ fn head(path: &Path) -> Option<String> {
         false => file.take(HEAD).read_to_end(&mut bytes),
     };
     read.is_ok().then(|| String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// What stands where a result is to be written; in a directory told by its last file, which appears when the others are whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Found {
+    /// Nothing that may be replaced.
+    Foreign,
+    /// Another result: how so.
+    Other(&'static str),
+    /// An earlier result of what is to be written, or nothing.
+    Same,
+}
+
+impl Found {
+    /// A result of this command, by whether all that decides it is the same.
+    pub(crate) const fn result(is_same: bool) -> Self {
+        match is_same {
+            true => Self::Same,
+            false => Self::Other("holds the result of another configuration, other inputs or another seed"),
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! Recorded IMU data.
 
 use super::{Remark, bare_columns, table, time_back};
+use crate::formats::logs::LogOptions;
 use crate::formats::recordings::checks::{check_gravity, gravity_factor};
 use crate::formats::recordings::error::storage;
 use crate::formats::recordings::header::{Role, Unit};
@@ -47,13 +48,13 @@ struct Columns {
 /// Reads a recording: a table whose headers are those of static recordings (rates, or increments over the
 /// interval that ends at the time given), or the text of KF-GINS: time, three angle increments (rad), three
 /// velocity increments (m/s), and perhaps an odometer's speed, which is left. `names` are those of the columns of a file
-/// without a header.
+/// without a header, `topic` is that of a log that has several.
 ///
 /// # Errors
 /// Whatever is wrong with it, with its line.
-pub(crate) fn read_imu(path: &Path, names: Option<&[String]>) -> Result<ImuFile, Error> {
-    let packed =
-        path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) || logs::kind_of(path).is_some();
+pub(crate) fn read_imu(path: &Path, names: Option<&[String]>, topic: Option<&str>) -> Result<ImuFile, Error> {
+    let ends_in = |ending: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
+    let packed = ends_in("npy") || ends_in("parquet") || path.is_dir() || logs::kind_of(path).is_some();
     let text = if packed || names.is_some() { None } else { Some(text(path)?) };
     let columns = match text.as_ref().and_then(|text| Some((text, bare_columns(text)?))) {
         Some((text, 7..=8)) => kf_gins(path, text)?,
@@ -61,7 +62,7 @@ pub(crate) fn read_imu(path: &Path, names: Option<&[String]>) -> Result<ImuFile,
             let message = format!("{columns} columns without a header");
             return Err(Error::contents(path.display().to_string(), Place::Within, message).advice(KF_GINS));
         }
-        None => headed(path, names)?,
+        None => headed(path, names, topic)?,
     };
     columns.increments()
 }
@@ -95,9 +96,10 @@ fn kf_gins(path: &Path, text: &str) -> Result<Columns, Error> {
     })
 }
 
-fn headed(path: &Path, names: Option<&[String]>) -> Result<Columns, Error> {
+fn headed(path: &Path, names: Option<&[String]>, topic: Option<&str>) -> Result<Columns, Error> {
     let columns = names.map(<[String]>::to_vec);
-    let options = ReadOptions { hold_bytes: usize::MAX, columns, ..ReadOptions::default() };
+    let log = LogOptions { topic: topic.map(str::to_owned), ..LogOptions::default() };
+    let options = ReadOptions { hold_bytes: usize::MAX, columns, log, ..ReadOptions::default() };
     let mut raw = recordings::load(path, &options)?;
     let shown = raw.path.clone();
     let from_gravity = gravity_factor(&raw)?;

@@ -2,23 +2,29 @@
 
 use super::Remark;
 use super::fixes::Fixes;
+use super::rtklib::of_unix;
 use crate::formats::logs::{self, LogOptions};
 use crate::formats::{FileError, Place, Setting};
 use glam::DVec3;
-use nav_sim_logs::Fix;
+use nav_sim_logs::{Clock, Fix};
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
 use nav_sim_signal::units::DEG;
 use std::path::Path;
 
-/// Reads fixes; `unsaid` are the standard deviations where the log states none.
+/// Reads fixes of a topic, of several; `unsaid` are the standard deviations where the log states none, `imu_s` is when the IMU
+/// begins and ends.
 ///
 /// # Errors
 /// When the log is damaged, has no fixes, or states no standard deviations where none are given.
-pub(super) fn fixes(path: &Path, unsaid: Option<&FixSigma>) -> Result<Fixes, FileError> {
+pub(super) fn fixes(
+    path: &Path,
+    (unsaid, topic): (Option<&FixSigma>, Option<&str>),
+    imu_s: Option<(f64, f64)>,
+) -> Result<Fixes, FileError> {
     let refused = |e| logs::refused(path, e);
     let options = LogOptions::default();
     let log = logs::open(path, &options)?;
-    let mut read = log.fixes(None, options.stamp).map_err(refused)?;
+    let mut read = log.fixes(topic, options.stamp).map_err(refused)?;
     let mut fixes = Vec::new();
     for (row, fix) in read.by_ref().enumerate() {
         let fix = of_log(&fix.map_err(refused)?, unsaid).ok_or_else(|| {
@@ -27,7 +33,14 @@ pub(super) fn fixes(path: &Path, unsaid: Option<&FixSigma>) -> Result<Fixes, Fil
         })?;
         fixes.push((row as u64 + 1, fix));
     }
-    Ok((fixes, vec![Remark::note(format!("fixes of {}", read.topic()))]))
+    let mut said = format!("fixes of {}", read.topic());
+    let is_dated = log.channels().iter().any(|c| c.topic == read.topic() && c.clock == Clock::Unix);
+    let span_s = fixes.first().zip(fixes.last()).map(|((_, first), (_, last))| (first.t_s, last.t_s));
+    if let Some(clock) = span_s.filter(|_| is_dated).and_then(|span_s| of_unix(span_s, imu_s)) {
+        fixes.iter_mut().for_each(|(_, fix)| fix.t_s -= clock.origin_s);
+        said = format!("{said}, in {}", clock.name);
+    }
+    Ok((fixes, vec![Remark::note(said)]))
 }
 
 /// The same fix with angles in radians; none without standard deviations.
@@ -53,7 +66,7 @@ mod tests {
     #[test]
     fn fixes_of_a_log_are_those_of_its_writer() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/logs/tests/data/ros2_zstd.mcap");
-        let (fixes, _) = fixes(&path, None).unwrap();
+        let (fixes, _) = fixes(&path, (None, None), None).unwrap();
         let sum = |of: fn(&GnssFix) -> f64| fixes.iter().map(|(_, fix)| of(fix)).sum::<f64>();
         assert_eq!(fixes.len(), 4);
         assert!((sum(|f| f.lat) / DEG - 186.000_007_999_999_98).abs() < 1e-11);

@@ -37,20 +37,47 @@ pub(super) fn leap_s(unix_s: f64) -> f64 {
     LEAPS.iter().find(|(from_s, _)| unix_s >= *from_s).map_or(0.0, |(_, leap)| *leap)
 }
 
-/// What is taken from GPS time (s) for the clock of an IMU, and its name: the first that the IMU ran in, else the second
-/// of the GPS week.
-fn clock(span_s: (f64, f64), imu_s: Option<(f64, f64)>) -> (f64, String) {
-    let (week, epoch_s) = ((span_s.0 / WEEK_S).floor(), GPS_EPOCH_S as f64);
-    let of_week = (week * WEEK_S, format!("seconds of GPS week {week}"));
-    let leap_s = leap_s(span_s.0 + epoch_s);
-    let others = [
-        (leap_s - epoch_s, format!("Unix time, {leap_s} s behind GPS time")),
-        (0.0, "seconds of GPS time".to_owned()),
-    ];
-    let runs = |(origin_s, _): &(f64, String)| {
-        imu_s.is_some_and(|imu| imu.0 <= span_s.1 - origin_s && span_s.0 - origin_s <= imu.1)
-    };
-    if runs(&of_week) { of_week } else { others.into_iter().find(runs).unwrap_or(of_week) }
+/// Clock that an IMU may run in.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ClockOfImu {
+    /// What is taken from the times of the fixes (s).
+    pub(super) origin_s: f64,
+    /// Its name.
+    pub(super) name: String,
+}
+
+/// The clocks that IMUs run in beside fixes in GPS time that begin then (s): seconds of the week, Unix time, GPS time.
+fn clocks(begin_s: f64) -> [ClockOfImu; 3] {
+    let (week, epoch_s) = ((begin_s / WEEK_S).floor(), GPS_EPOCH_S as f64);
+    let leap_s = leap_s(begin_s + epoch_s);
+    [
+        ClockOfImu { origin_s: week * WEEK_S, name: format!("seconds of GPS week {week}") },
+        ClockOfImu { origin_s: leap_s - epoch_s, name: format!("Unix time, {leap_s} s behind GPS time") },
+        ClockOfImu { origin_s: 0.0, name: "seconds of GPS time".to_owned() },
+    ]
+}
+
+/// Whether an IMU runs in a clock beside fixes of such times.
+fn runs(clock: &ClockOfImu, span_s: (f64, f64), imu_s: Option<(f64, f64)>) -> bool {
+    imu_s.is_some_and(|imu| imu.0 <= span_s.1 - clock.origin_s && span_s.0 - clock.origin_s <= imu.1)
+}
+
+/// The clock of an IMU beside fixes in GPS time (s): the first that it ran in, else the second of the GPS week.
+fn clock(span_s: (f64, f64), imu_s: Option<(f64, f64)>) -> ClockOfImu {
+    let [of_week, unix, gps] = clocks(span_s.0);
+    let others = [&of_week, &unix, &gps];
+    others.into_iter().find(|clock| runs(clock, span_s, imu_s)).unwrap_or(&of_week).clone()
+}
+
+/// The same beside fixes in Unix time, where the IMU runs in another.
+pub(super) fn of_unix(span_s: (f64, f64), imu_s: Option<(f64, f64)>) -> Option<ClockOfImu> {
+    let unix = ClockOfImu { origin_s: 0.0, name: String::new() };
+    // to GPS time
+    let gps_s = leap_s(span_s.0) - GPS_EPOCH_S as f64;
+    let [of_week, _, gps] =
+        clocks(span_s.0 + gps_s).map(|c| ClockOfImu { origin_s: c.origin_s - gps_s, ..c });
+    let found = [unix, gps, of_week].into_iter().find(|clock| runs(clock, span_s, imu_s))?;
+    (found.origin_s != 0.0).then_some(found)
 }
 
 /// Columns of velocity north, east, up (m/s) and of their standard deviations, where they are in the header.
@@ -109,7 +136,7 @@ pub(super) fn rows(path: &str, text: &str, imu_s: Option<(f64, f64)>) -> Result<
     let columns =
         velocity(names).filter(|columns| read.iter().all(|(.., cells)| moving(cells, *columns).is_some()));
     let ends = read.first().zip(read.last()).map_or((0.0, 0.0), |(first, last)| (first.1, last.1));
-    let (origin_s, clock) = clock(ends, imu_s);
+    let ClockOfImu { origin_s, name: clock } = clock(ends, imu_s);
     let (mut table, mut lines) = (String::new(), 0);
     for (i, t_s, cells) in &read {
         let three = |v: [f64; 3]| v.map(|v| v.to_string()).join(" ");
@@ -186,6 +213,19 @@ mod tests {
         // what states no deviation of one velocity states none
         let (table, said) = rows("a.pos", &format!("{head}{row}0\n"), None).unwrap();
         assert!(table.ends_with("400.8 2.0 2.1 4.0\n") && !said.contains("velocity"), "{table} {said}");
+    }
+
+    /// Fixes in Unix time beside IMUs in GPS time and in its weeks; an IMU of no known clock leaves them.
+    #[test]
+    fn dated_fixes_come_to_the_clock_of_the_imu() {
+        let unix_s = (1_614_556_783.25, 1_614_556_883.25);
+        let of = |start_s: f64| of_unix(unix_s, Some((start_s - 5.0, start_s + 5.0)));
+        let gps_s = 2147.0 * WEEK_S + 86_401.25;
+        for (start_s, name) in [(gps_s, "seconds of GPS time"), (86_401.25, "seconds of GPS week 2147")] {
+            let clock = of(start_s).unwrap();
+            assert_eq!((unix_s.0 - clock.origin_s, clock.name.as_str()), (start_s, name));
+        }
+        assert_eq!([of(unix_s.0), of(3_326.0), of_unix(unix_s, None)], [None, None, None]);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::formats::toml_file::{Between, Finite, NonNegative, OneOrEach, Positive, Stationary, Version};
 use nav_sim_signal::imu::MAX_RATE_HZ;
-use nav_sim_signal::noise::Law;
+use nav_sim_signal::noise::{Law, LognormalIntervals};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -145,6 +145,15 @@ pub(super) enum LawTable {
     Beta { process: String, parameter: String, a: Finite, b: Finite, low: Finite, width: Finite },
     /// A normal law about the parameter
     Normal { process: String, parameter: String, sd: Finite },
+    /// A normal law of the logarithm of the parameter, of phi and beta of that of the correlation time
+    Lognormal {
+        process: String,
+        parameter: String,
+        median: Finite,
+        median_ci95: Option<Ends>,
+        sd: Finite,
+        sd_ci95: Option<Ends>,
+    },
 }
 
 impl LawTable {
@@ -155,6 +164,10 @@ impl LawTable {
                 (process, parameter, Law::Beta { a: a.0, b: b.0, low: low.0, width: width.0 })
             }
             Self::Normal { process, parameter, sd } => (process, parameter, Law::Normal { sd: sd.0 }),
+            Self::Lognormal { process, parameter, median, median_ci95, sd, sd_ci95 } => {
+                let ci95 = median_ci95.zip(*sd_ci95).map(|(median, sd)| LognormalIntervals { median, sd });
+                (process, parameter, Law::Lognormal { median: median.0, sd: sd.0, ci95 })
+            }
         }
     }
 }

@@ -216,6 +216,7 @@ fn refuse_law(source: &Source, key: &str, e: &SpreadError) -> FileError {
             refused("parameter", format!("is no parameter of {process}")).advice(there(&known))
         }
         SpreadError::Constant { name, domain, .. } => refused(name, format!("is not {domain}")),
+        SpreadError::Lognormal => refused("distribution", "needs a parameter > 0".to_owned()),
         SpreadError::Reaches(e) => refused(
             "distribution",
             format!("reaches {} = {}, which is not {}", e.parameter, e.value, e.domain),

@@ -3,7 +3,7 @@ use super::*;
 use crate::formats::FileError;
 use crate::formats::toml_file::Source;
 use nav_sim_signal::imu::{Axis, Sensor};
-use nav_sim_signal::noise::{Composite, Law, Process, Variation};
+use nav_sim_signal::noise::{Composite, Law, LognormalIntervals, Process, Variation};
 
 const ACCEL_X: Channel = Channel { sensor: Sensor::Accel, axis: Axis::X };
 
@@ -63,7 +63,12 @@ fn what_is_written_reads_back_to_the_same_bits() {
     let pooled = Variation::new(&n2(), 100.0, "AR1_1", "phi", beta).unwrap();
     let normal = Variation::new(&n2(), 100.0, "WN", "sigma2", Law::Normal { sd: 1e-7 }).unwrap();
     let mut spread = Spread::default();
-    spread.axes[..3].fill(vec![pooled, normal.clone()]);
+    let intervals = LognormalIntervals { median: [0.9998, 0.99995], sd: [0.1 + 0.2, 0.7] };
+    let lognormal = Law::Lognormal { median: 0.9999, sd: 0.45, ci95: Some(intervals) };
+    let lognormal = Variation::new(&n2(), 100.0, "AR1_2", "phi", lognormal).unwrap();
+    let plain = Law::Lognormal { median: 2e-11, sd: 0.0, ci95: None };
+    let plain = Variation::new(&n2(), 100.0, "RW", "gamma2", plain).unwrap();
+    spread.axes[..3].fill(vec![pooled, normal.clone(), lognormal, plain]);
     spread.axes[5].push(normal);
     file.spread = Some(spread);
     file.turn_on = Some(TurnOn { accel_m_s2: Some([0.02; 3]), gyro_rad_s: Some([1e-3, 0.1 + 0.2, 0.0]) });

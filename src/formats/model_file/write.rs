@@ -112,6 +112,13 @@ fn law(v: &Variation) -> String {
             format!("distribution = \"beta\"\na = {a:?}\nb = {b:?}\nlow = {low:?}\nwidth = {width:?}")
         }
         Law::Normal { sd } => format!("distribution = \"normal\"\nsd = {sd:?}"),
+        Law::Lognormal { median, sd, ci95: None } => {
+            format!("distribution = \"lognormal\"\nmedian = {median:?}\nsd = {sd:?}")
+        }
+        Law::Lognormal { median, sd, ci95: Some(ci95) } => format!(
+            "distribution = \"lognormal\"\nmedian = {median:?}\nmedian{CI} = {:?}\nsd = {sd:?}\nsd{CI} = {:?}",
+            ci95.median, ci95.sd
+        ),
     };
     format!("process = \"{}\"\nparameter = \"{}\"\n{constants}\n", v.process(), v.parameter())
 }

@@ -1,6 +1,7 @@
 //! Which files are meant: directories stand for the recordings in them.
 
 use super::error::{no_files, unreadable};
+use super::oxts::is_oxts;
 use crate::formats::{FileError, Place};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -13,14 +14,14 @@ pub(super) struct File {
     pub(super) from_directory: bool,
 }
 
-const ENDINGS: [&str; 9] = ["csv", "tsv", "txt", "npy", "npz", "mcap", "bag", "ulg", "ubx"];
+const ENDINGS: [&str; 10] = ["csv", "tsv", "txt", "npy", "npz", "mcap", "bag", "ulg", "ubx", "parquet"];
 
 /// The files, in the order given, those of a directory in name order.
 pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, FileError> {
     let mut files = Vec::new();
     for path in paths {
         let io = |source| unreadable(path, source);
-        if std::fs::metadata(path).map_err(io)?.is_dir() {
+        if std::fs::metadata(path).map_err(io)?.is_dir() && !is_oxts(path) {
             let inside = listing(path).map_err(io)?;
             if inside.is_empty() {
                 return Err(no_files(path.display().to_string()));

@@ -17,6 +17,9 @@ mod lines;
 mod log;
 mod manifest;
 mod options;
+mod oxts;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod prepared;
 mod report;
 mod table;
@@ -33,6 +36,8 @@ pub use write::FileFormat;
 
 pub(in crate::formats) use table::Raw;
 
+#[cfg(not(feature = "parquet"))]
+use super::Place;
 use super::{FileError, Kind, logs};
 use error::no_files;
 use nav_sim_signal::imu::Recording;
@@ -118,11 +123,21 @@ fn held<T>(
 
 /// Reads a file's columns.
 pub(in crate::formats) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
+    let ends_in = |ending: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
     match logs::kind_of(path) {
         #[cfg(feature = "npz")]
         Some(nav_sim_logs::Kind::Npz) => archive::load(path, options),
         Some(_) => log::load(path, options),
-        None if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) => array::load(path, options),
+        None if ends_in("npy") => array::load(path, options),
+        #[cfg(feature = "parquet")]
+        None if ends_in("parquet") => parquet::load(path, options),
+        #[cfg(not(feature = "parquet"))]
+        None if ends_in("parquet") => {
+            let message = "is Apache Parquet, which this build does not read";
+            Err(FileError::contents(path.display().to_string(), Place::Itself, message)
+                .advice("build with --features parquet, or write CSV"))
+        }
+        None if oxts::is_oxts(path) => oxts::load(path, options),
         None => text::load(path, options),
     }
 }

@@ -8,8 +8,7 @@ use super::table::{BETWEEN, BEYOND, Column, LARGEST, Lines, Notes, Raw, empty_co
 use super::values::Values;
 use crate::formats::error::decimal_comma;
 use crate::formats::{FileError, Kind, Place, Setting, source};
-use flate2::read::MultiGzDecoder;
-use std::io::{BufRead, BufReader, Cursor, Read};
+use std::io::{BufRead, Cursor, Read};
 use std::path::Path;
 
 type Reader = Box<dyn BufRead>;
@@ -22,16 +21,7 @@ const BUFFER: usize = 1 << 17;
 pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
     let name = path.display().to_string();
     let io = |source| unreadable(path, source);
-    let file = source::open(path).map_err(io)?;
-    let gzipped = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
-    let reader: Reader = if gzipped {
-        Box::new(BufReader::with_capacity(
-            BUFFER,
-            MultiGzDecoder::new(BufReader::with_capacity(BUFFER, file)),
-        ))
-    } else {
-        Box::new(BufReader::with_capacity(BUFFER, file))
-    };
+    let reader = source::table(path).map_err(io)?;
     parse(&name, reader, options)
 }
 

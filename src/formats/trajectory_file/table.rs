@@ -1,8 +1,7 @@
 //! Text tables of numbers.
 
 use crate::formats::{FileError as Error, Kind, Place, source};
-use flate2::read::MultiGzDecoder;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, Read};
 use std::path::Path;
 
 /// A text table of numbers.
@@ -20,10 +19,7 @@ pub(in crate::formats) struct Table {
 
 /// Opens a file, unpacking it when its name ends in `.gz`.
 pub(in crate::formats) fn open(path: &Path) -> Result<Box<dyn BufRead>, Error> {
-    let io = |source| Error::io(path, source);
-    let file = BufReader::with_capacity(1 << 16, source::open(path).map_err(io)?);
-    let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
-    Ok(if packed { Box::new(BufReader::new(MultiGzDecoder::new(file))) } else { Box::new(file) })
+    source::table(path).map_err(|source| Error::io(path, source))
 }
 
 /// The whole text of a file; what is not UTF-8 in it (a degree sign of another encoding) is replaced.

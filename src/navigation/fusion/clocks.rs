@@ -52,6 +52,19 @@ impl ClocksApart {
 /// The lag at which the turns agree; none where they agree as they are, or at no lag.
 #[must_use]
 pub fn clocks_apart(recorded: &Recorded<'_>) -> Option<ClocksApart> {
+    let [lag_s, best, now] = agreement(recorded)?;
+    // 1 − r², for r < 0 more than 1: turns that go against each other explain less than nothing.
+    let unexplained = |r: f64| 1.0 - r * r.abs();
+    let is_other = unexplained(now) > UNEXPLAINED * unexplained(best).max(LEAST);
+    (is_other && lag_s.abs() >= SHORTEST_S).then_some(ClocksApart {
+        delay_s: -lag_s,
+        sigma_s: None,
+        correlation: [now, best],
+    })
+}
+
+/// The lag of the gyroscopes at which the turns are the same ones (s), their correlation there and as the clocks are.
+pub(super) fn agreement(recorded: &Recorded<'_>) -> Option<[f64; 3]> {
     let turns = turns(recorded);
     let turned = Turned::new(recorded.imu);
     let steps = (LONGEST_S / STEP_S) as i32;
@@ -59,14 +72,7 @@ pub fn clocks_apart(recorded: &Recorded<'_>) -> Option<ClocksApart> {
     let tried = lags.filter_map(|lag_s| Some((lag_s, correlation(&turns, &turned, lag_s)?)));
     let (lag_s, best) = tried.max_by(|a, b| a.1.total_cmp(&b.1))?;
     let now = correlation(&turns, &turned, 0.0)?;
-    // 1 − r², for r < 0 more than 1: turns that go against each other explain less than nothing.
-    let unexplained = |r: f64| 1.0 - r * r.abs();
-    let is_other = best >= SAME && unexplained(now) > UNEXPLAINED * unexplained(best).max(LEAST);
-    (is_other && lag_s.abs() >= SHORTEST_S).then_some(ClocksApart {
-        delay_s: -lag_s,
-        sigma_s: None,
-        correlation: [now, best],
-    })
+    (best >= SAME).then_some([lag_s, best, now])
 }
 
 /// A stretch between two fixes and the mean rate of the course in it (rad/s, without its sign).

@@ -54,6 +54,7 @@ mod error;
 mod filter;
 pub mod gap;
 pub mod mounting;
+mod origin;
 mod outcome;
 mod smoother;
 
@@ -62,6 +63,7 @@ pub use clocks::{ClocksApart, clocks_apart};
 pub use correlation::{Correlation, Weighed, Whiteness, fuse_correlated};
 pub use displaced::{Displaced, displaced};
 pub use error::FusionError;
+pub use origin::{earlier, rest_of_origin, rough_origin};
 pub use outcome::{
     Drift, Ends, FromReference, OutageDrift, Outcome, SmoothedOutage, SmoothedOutcome, outcome,
 };

@@ -12,6 +12,8 @@ use crate::rng::StreamKey;
 pub enum Truth<'a> {
     /// Synthesised from a model, per run and axis.
     Model(&'a Model),
+    /// Synthesised from a model of each run's own: parameters that differ from one switching-on to the next.
+    Drawn(&'a [Model]),
     /// A window of a static recording for each run, all axes together, so that correlation between axes
     /// survives; windows are spread evenly, and each starts from the level best known there (`Windows`).
     Static(&'a [Recording]),
@@ -20,6 +22,9 @@ pub enum Truth<'a> {
 /// Why recordings cannot make the errors of a run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TruthError {
+    /// No model at all.
+    #[error("no model drawn")]
+    NoModel,
     /// No recording at all.
     #[error("no static recording given")]
     None,
@@ -66,6 +71,8 @@ pub enum TruthError {
 pub(crate) enum ErrorSource<'a> {
     /// Synthesised from a model.
     Model(&'a Model),
+    /// Synthesised from a model of each run's own.
+    Drawn(&'a [Model]),
     /// Windows of recordings.
     Windows(Windows<'a>),
 }
@@ -79,6 +86,7 @@ impl<'a> Truth<'a> {
         self.check(imu_hz, samples)?;
         Ok(match self {
             Self::Model(model) => ErrorSource::Model(model),
+            Self::Drawn(models) => ErrorSource::Drawn(models),
             Self::Static(recordings) => ErrorSource::Windows(Windows::new(recordings)),
         })
     }
@@ -90,9 +98,14 @@ impl Truth<'_> {
     /// # Errors
     /// What is missing, and by how much.
     pub(crate) fn check(&self, imu_hz: f64, samples: usize) -> Result<(), TruthError> {
+        let check_model = |model: &Model| match same_rate(model.rate_hz, imu_hz) {
+            true => Ok(()),
+            false => Err(TruthError::ModelRate { model_hz: model.rate_hz, imu_hz }),
+        };
         match self {
-            Self::Model(model) if same_rate(model.rate_hz, imu_hz) => Ok(()),
-            Self::Model(model) => Err(TruthError::ModelRate { model_hz: model.rate_hz, imu_hz }),
+            Self::Model(model) => check_model(model),
+            Self::Drawn([]) => Err(TruthError::NoModel),
+            Self::Drawn(models) => models.iter().try_for_each(check_model),
             Self::Static([]) => Err(TruthError::None),
             Self::Static(recordings) => {
                 recordings.iter().try_for_each(|r| check_recording(r, imu_hz, samples))
@@ -106,7 +119,7 @@ impl Truth<'_> {
     /// with others. None for a model, which gives every run noise of its own.
     pub(crate) fn independent_windows(&self, samples: usize) -> Option<f64> {
         match self {
-            Self::Model(_) => None,
+            Self::Model(_) | Self::Drawn(_) => None,
             Self::Static(recordings) => {
                 // By length, not by count: windows that overlap share samples, and a fraction of a window is
                 // worth its fraction.
@@ -148,12 +161,17 @@ enum ChannelErrors<'a> {
 impl<'a> ImuErrors<'a> {
     /// The errors of run `key.run` over `samples` samples, as many as the source was made for.
     pub(crate) fn new(errors: &ErrorSource<'a>, key: StreamKey<'_>, samples: usize) -> Self {
-        let channels = match errors {
-            ErrorSource::Model(model) => Channel::ALL.map(|channel| {
+        let synthesised = |model: &Model| {
+            Channel::ALL.map(|channel| {
                 let source = channel.to_string();
                 let synthesizer = Synthesizer::new(model.axis(channel), StreamKey { source: &source, ..key });
                 ChannelErrors::Synthesised(Box::new(synthesizer))
-            }),
+            })
+        };
+        let channels = match errors {
+            ErrorSource::Model(model) => synthesised(model),
+            // Of fewer models than runs each is taken again.
+            ErrorSource::Drawn(models) => synthesised(&models[(key.run % models.len() as u64) as usize]),
             ErrorSource::Windows(windows) => {
                 windows.of_run(key, samples).map(|(window, level)| ChannelErrors::Recorded(window, level))
             }

@@ -165,7 +165,7 @@ impl<'a> Plan<'a> {
     pub(super) fn reference(experiment: &'a Experiment<'a>) -> Result<Self, ExperimentError> {
         Self::with_source(experiment, |samples| match experiment.truth {
             Truth::Model(model) => Ok(ErrorSource::Model(model)),
-            Truth::Static(_) => experiment.truth.source(experiment.rate_hz, samples),
+            Truth::Drawn(_) | Truth::Static(_) => experiment.truth.source(experiment.rate_hz, samples),
         })
     }
 

@@ -181,6 +181,27 @@ impl Parameter {
         matches!(self, Self::Phi | Self::Beta | Self::Theta)
     }
 
+    /// A value on the scale on which the law of an estimate does not depend on it, and on which recordings differ: the logarithm,
+    /// of phi that of κ = −ln phi = 1/(T·rate), the correlation time but for sign and rate; theta as it is.
+    #[must_use]
+    pub fn scaled(self, value: f64) -> f64 {
+        match self {
+            Self::Phi => (-value.ln()).ln(),
+            Self::Theta => value,
+            _ => value.ln(),
+        }
+    }
+
+    /// The value that is there on that scale.
+    #[must_use]
+    pub fn unscaled(self, scaled: f64) -> f64 {
+        match self {
+            Self::Phi => (-scaled.exp()).exp(),
+            Self::Theta => scaled.clamp(-1.0, 1.0),
+            _ => scaled.exp(),
+        }
+    }
+
     /// Ends of its domain, (low, high).
     #[must_use]
     pub const fn domain(self) -> (f64, f64) {

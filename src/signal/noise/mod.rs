@@ -48,7 +48,7 @@ pub use ma1::Ma1;
 pub use quantization::Quantization;
 pub use random_walk::RandomWalk;
 pub use replicate::{ReplicateError, VirtualImu};
-pub use spread::{Law, Spread, SpreadError, Variation};
+pub use spread::{Law, LognormalIntervals, Spread, SpreadError, Variation};
 pub use synthesis::Synthesizer;
 pub use white::White;
 

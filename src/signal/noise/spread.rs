@@ -17,11 +17,20 @@
 //! parameter = "sigma2"
 //! distribution = "normal"           # about the model's value, drawn again while outside its domain
 //! sd = 1.0e-9
+//!
+//! [[spread.gyro]]
+//! process = "AR1"
+//! parameter = "sigma2"
+//! distribution = "lognormal"        # of phi and beta: the correlation time is
+//! median = 2.1e-9
+//! median_ci95 = [1.6e-9, 2.8e-9]    # of both, where they were estimated
+//! sd = 0.3                          # of the logarithm
+//! sd_ci95 = [0.18, 0.62]
 //! ```
 //! A parameter without a law keeps the model's value. Every axis of every replicate draws for itself, also
 //! where one law stands for three axes.
 
-use super::{Composite, Model, ParameterError, Process};
+use super::{Composite, Model, Parameter, ParameterError, Process};
 use crate::imu::Channel;
 use crate::rng::{Generator, StreamKey};
 use rand::RngExt;
@@ -58,10 +67,16 @@ pub enum SpreadError {
         /// What would be accepted.
         domain: &'static str,
     },
+    /// Theta may be negative.
+    #[error("theta has no logarithm: a lognormal law is of variances, slopes, phi and beta")]
+    Lognormal,
     /// The law would draw values that the process cannot have.
     #[error("the law reaches values that are refused: {0}")]
     Reaches(ParameterError),
 }
+
+/// Largest standard deviation of a logarithm.
+const LARGEST_SD: f64 = 10.0;
 
 /// A distribution.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -82,6 +97,26 @@ pub enum Law {
         /// Standard deviation before truncation (units of the parameter).
         sd: f64,
     },
+    /// Normal on the scale of [`Parameter::scaled`]: of a variance or slope the logarithm, of phi and beta that of the correlation
+    /// time.
+    Lognormal {
+        /// Median (units of the parameter).
+        median: f64,
+        /// Standard deviation of the logarithm.
+        sd: f64,
+        /// 95 % intervals of the two, where they were estimated.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        ci95: Option<LognormalIntervals>,
+    },
+}
+
+/// What recordings leave open of a lognormal law: 95 % intervals.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct LognormalIntervals {
+    /// Of the median (units of the parameter).
+    pub median: [f64; 2],
+    /// Of the standard deviation of the logarithm.
+    pub sd: [f64; 2],
 }
 
 /// The law of one parameter of one process of one axis.
@@ -118,6 +153,7 @@ impl Variation {
                 let value = variation.centre(&noise.processes[at])?;
                 (value, value)
             }
+            Law::Lognormal { median, .. } => (median, median),
         };
         for end in [low, high] {
             variation.applied(&noise.processes[at], end, rate_hz)?;
@@ -159,6 +195,12 @@ impl Variation {
                 check("sd", sd, (0.0..=1.0).contains(&sd), "between 0 and 1")
             }
             Law::Normal { sd } => check("sd", sd, sd >= 0.0, "a finite number ≥ 0"),
+            Law::Lognormal { .. } if self.parameter == Parameter::Theta.name() => Err(SpreadError::Lognormal),
+            Law::Lognormal { median, sd, .. } => {
+                check("median", median, median > 0.0, "a finite number > 0")?;
+                // ±8 standard deviations of 10 are 1e±35: more is a slip, and would leave the range of numbers.
+                check("sd", sd, (0.0..=LARGEST_SD).contains(&sd), "between 0 and 10")
+            }
         }
     }
 
@@ -169,9 +211,14 @@ impl Variation {
     }
 
     fn centre(&self, process: &Process) -> Result<f64, SpreadError> {
-        let parameters = process.parameters();
-        let found = parameters.iter().find(|(n, _)| *n == self.parameter);
-        found.map(|(_, v)| *v).ok_or_else(|| self.no_parameter(process))
+        Ok(self.found(process)?.1)
+    }
+
+    /// The parameter and its value.
+    fn found(&self, process: &Process) -> Result<(Parameter, f64), SpreadError> {
+        let mut parameters = process.kind().parameters().iter().zip(process.values());
+        let found = parameters.find(|(p, _)| p.name() == self.parameter);
+        found.map(|(p, value)| (*p, value)).ok_or_else(|| self.no_parameter(process))
     }
 
     fn applied(&self, process: &Process, value: f64, rate_hz: f64) -> Result<Process, SpreadError> {
@@ -195,6 +242,12 @@ impl Variation {
                         done => return done,
                     }
                 }
+            }
+            Law::Lognormal { median, sd: 0.0, .. } => self.applied(process, median, rate_hz),
+            Law::Lognormal { median, sd, .. } => {
+                let (parameter, _) = self.found(process)?;
+                let scaled = parameter.scaled(median) + sd * g.sample::<f64, _>(StandardNormal);
+                self.applied(process, parameter.unscaled(scaled), rate_hz)
             }
         }
     }
@@ -231,6 +284,39 @@ impl Spread {
             }
         }
         Ok(drawn)
+    }
+}
+
+impl Spread {
+    /// The model of one replicate of another centre: what is drawn about `model`, moved as `centre` lies from it on the scale of each
+    /// parameter; parameters without a law are those of `centre`.
+    ///
+    /// # Errors
+    /// As [`Spread::draw`]; `centre` has the processes of the model.
+    pub fn draw_about(
+        &self,
+        centre: &Model,
+        model: &Model,
+        seed: u64,
+        replicate: u64,
+    ) -> Result<Model, SpreadError> {
+        let drawn = self.draw(model, seed, replicate)?;
+        let mut moved = centre.clone();
+        for (axis, laws) in self.axes.iter().enumerate() {
+            let labels = drawn.axes[axis].labels();
+            for variation in laws {
+                let Some(at) = labels.iter().position(|l| *l == variation.process) else { continue };
+                let value = |model: &Model| variation.found(&model.axes[axis].processes[at]);
+                let ((parameter, own), (_, from), (_, to)) = (value(&drawn)?, value(model)?, value(centre)?);
+                let scaled = parameter.scaled(own) + parameter.scaled(to) - parameter.scaled(from);
+                let process = &mut moved.axes[axis].processes[at];
+                // An amplitude of 0 has no logarithm: what was drawn stands.
+                *process = variation
+                    .applied(process, parameter.unscaled(scaled), model.rate_hz)
+                    .or_else(|_| variation.applied(process, own, model.rate_hz))?;
+            }
+        }
+        Ok(moved)
     }
 }
 
@@ -296,6 +382,25 @@ mod tests {
         assert!((mean - 2.0 * (2.0 / pi).sqrt()).abs() < bound, "{mean}");
     }
 
+    /// The logarithm of sigma2 and that of the correlation time of phi, −1/ln phi, are normal: the mean of 4000 is within five of
+    /// its standard deviations, their deviation within five of 1/√8000.
+    #[test]
+    fn lognormal_is_of_variances_and_of_correlation_times() {
+        let law = |median| Law::Lognormal { median, sd: 0.3, ci95: None };
+        let time = |phi: f64| -1.0 / phi.ln();
+        for (process, parameter, at, median, of) in
+            [("WN", "sigma2", (0, 0), 5e-5, (|x| x) as fn(f64) -> f64), ("AR1", "phi", (1, 0), 0.98, time)]
+        {
+            let x = drawn(&spread(process, parameter, law(median)), 4000, 0, at);
+            let logs: Vec<f64> = x.iter().map(|x| (of(*x) / of(median)).ln()).collect();
+            let n = logs.len() as f64;
+            let mean = logs.iter().sum::<f64>() / n;
+            let sd = (logs.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
+            assert!(mean.abs() < 5.0 * 0.3 / n.sqrt(), "{process}: {mean}");
+            assert!((sd / 0.3 - 1.0).abs() < 5.0 / (2.0 * n).sqrt(), "{process}: {sd}");
+        }
+    }
+
     #[test]
     fn axes_and_replicates_draw_for_themselves_and_repeat() {
         let s = spread("WN", "sigma2", Law::Beta { a: 3.0, b: 4.0, low: 5e-5, width: 5e-6 });
@@ -303,6 +408,24 @@ mod tests {
         assert_ne!(x[..1], x[1..2]);
         assert_ne!(x, y);
         assert_eq!(x, drawn(&s, 3, 0, (0, 0)));
+    }
+
+    /// About a centre of twice the variance and half the correlation time the same draws are twice and half as large.
+    #[test]
+    fn draws_move_with_their_centre() {
+        let mut s = spread("WN", "sigma2", Law::Beta { a: 3.0, b: 4.0, low: 5e-5, width: 5e-6 });
+        let phi = Law::Lognormal { median: 0.98, sd: 0.3, ci95: None };
+        s.axes[0].push(Variation::new(&n1(), RATE, "AR1", "phi", phi).unwrap());
+        let model = Model::pooled(RATE, &n1(), &n1());
+        let mut centre = model.clone();
+        centre.axes[0].processes[0] = Process::from_values("WN", &[1e-4], RATE).unwrap().unwrap();
+        centre.axes[0].processes[1] =
+            Process::from_values("AR1", &[0.985_f64.powi(2), 3e-8], RATE).unwrap().unwrap();
+        let (own, moved) = (s.draw(&model, 1, 5).unwrap(), s.draw_about(&centre, &model, 1, 5).unwrap());
+        let value = |m: &Model, p: usize, v: usize| m.axes[0].processes[p].values()[v];
+        assert!((value(&moved, 0, 0) / value(&own, 0, 0) - 2.0).abs() < 1e-12);
+        assert!((value(&moved, 1, 0).ln() / value(&own, 1, 0).ln() - 2.0).abs() < 1e-12);
+        assert_eq!(value(&moved, 1, 1), 3e-8);
     }
 
     #[test]
@@ -326,6 +449,10 @@ mod tests {
         assert_eq!(refusal("WN", "sigma2", beta(0.0, 0.0, 1.0)), "a = 0 is not a finite number > 0");
         assert_eq!(refusal("AR1", "phi", normal(2.0)), "sd = 2 is not between 0 and 1");
         assert_eq!(refusal("WN", "sigma2", normal(f64::NAN)), "sd = NaN is not a finite number ≥ 0");
+        let lognormal = |median, sd| Law::Lognormal { median, sd, ci95: None };
+        assert_eq!(refusal("WN", "sigma2", lognormal(0.0, 0.1)), "median = 0 is not a finite number > 0");
+        assert_eq!(refusal("WN", "sigma2", lognormal(1.0, 11.0)), "sd = 11 is not between 0 and 10");
+        assert!(refusal("AR1", "phi", lognormal(1.5, 0.1)).contains("phi = 1.5 is not between"));
         assert_eq!(
             refusal("AR1", "phi", beta(1.0, 0.5, 0.5)),
             "the law reaches values that are refused: AR1: phi = 1 is not between −1 and 1 (exclusive)"

@@ -72,3 +72,42 @@ fn the_scheduler_says_which_shard() {
     let too_many = batch(dir, "run study.toml -o out -j 65535");
     assert_eq!(too_many.status.code(), Some(2));
 }
+
+/// A plan whose lists were cut is damaged: every list that cells are made of, emptied and lengthened.
+#[test]
+fn a_plan_with_other_lists_is_refused_by_its_file() {
+    let place = place();
+    let dir = place.path();
+    done(dir, "plan study.toml -o out");
+    let path = dir.join("out/plan.json");
+    let whole: serde_json::Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+    for list in ["trajectories", "truths", "models", "unit_runs", "scenarios", "gnss"] {
+        let mut cut = whole.clone();
+        let entries = cut[list].as_array_mut().unwrap();
+        match entries.pop() {
+            Some(_) => entries.clear(),
+            None => continue,
+        }
+        fs::write(&path, cut.to_string()).unwrap();
+        for command in ["status", "run", "merge"] {
+            let said = refused(dir, &format!("{command} study.toml -o out"), 2);
+            assert!(
+                said.contains("plan.json") && said.contains("its lists are not as long"),
+                "{list}: {said}"
+            );
+        }
+    }
+}
+
+/// A name that a spreadsheet would compute or a terminal obey is none.
+#[test]
+fn names_are_no_formulas() {
+    let place = place();
+    let dir = place.path();
+    for name in ["=cmd|x", "-2+3", "@SUM(1)", "a\\u001b[31m"] {
+        let named = STUDY.replace("name = \"wrong\"", &format!("name = \"{name}\""));
+        fs::write(dir.join("named.toml"), named).unwrap();
+        let said = refused(dir, "plan named.toml -o named", 2);
+        assert!(said.contains("names begin with no = + - @"), "{said}");
+    }
+}

@@ -49,7 +49,7 @@ fn a_smoothed_solution_has_a_verdict_by_the_reference() {
     let shipped = |name: &str| fs::read_to_string(format!("{}/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
     let place = place_with(&shipped("trajectories/land_vehicle.toml"), &shipped("calib_data/tactical.toml"));
     done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o rec");
-    let start = "--initial rec/initial.toml --reference rec/reference.csv --rate-hz 1";
+    let start = "--initial rec/initial.toml --reference rec/reference.csv";
     let worse = concat!(env!("CARGO_MANIFEST_DIR"), "/calib_data/consumer_mems.toml");
     for (model, factor, verdict) in
         [("imu.toml", 1.0, "consistent"), ("imu.toml", 0.3, "overconfident"), (worse, 10.0, "underconfident")]
@@ -78,10 +78,7 @@ fn a_smoothed_solution_has_a_verdict_by_the_reference() {
 #[test]
 fn without_outages_or_a_reference_it_says_what_it_knows() {
     let place = recorded();
-    let ran = nav_sim(
-        place.path(),
-        "fuse rec/imu.csv rec/gnss.csv imu.toml --filter 21 --smooth --rate-hz 1 -o out",
-    );
+    let ran = nav_sim(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml --filter 21 --smooth  -o out");
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     let line = ran.stdout.lines().find(|l| l.contains("horizontal 1 σ")).unwrap();
     assert!(line.split_whitespace().count() > 6 && !ran.stdout.contains("RMSE"), "{line}");

@@ -317,6 +317,37 @@ fn the_remedy_is_for_what_the_filter_does_not_expect() {
     );
 }
 
+/// Scale factors err most where the vehicle turns, not at the ends of outages: runs name them all the same. A bias that is
+/// twice what the filter expects is no noise of the model, whose white noise and random walks every filter contains.
+#[test]
+fn no_cause_is_named_that_is_not_there() {
+    let place = place();
+    let walk = |white: &str, walk: &str| {
+        format!("processes = [{{ type = \"WN\", sigma2 = {white} }}, {{ type = \"RW\", gamma2 = {walk} }}]")
+    };
+    let model = format!(
+        "rate_hz = 100.0\n[accel]\n{}\n[gyro]\n{}\n",
+        walk("5.4e-5", "3.3e-11"),
+        walk("1e-7", "1e-15")
+    );
+    let put = |name: &str, text: &str| fs::write(place.path().join(name), text).unwrap();
+    put("walk.toml", &model);
+    put("scaled.toml", "imu.scale_ppm_accel = 500\nimu.scale_ppm_gyro = 500\n");
+    put("biased.toml", "imu.turn_on_bias_accel_m_s2 = 0.01\ninitial.accel_bias_sigma_m_s2 = 0.0053\n");
+    let drive = format!("{}/trajectories/land_vehicle.toml", env!("CARGO_MANIFEST_DIR"));
+    let warning = |options: &str| {
+        let ran = nav_sim(place.path(), &format!("run {drive} walk.toml --seed 1 {options} -o out"));
+        let of_filter = |line: &&str| line.starts_with("warning: the filter is overconfident");
+        ran.stderr.lines().find(of_filter).unwrap().to_owned()
+    };
+    for method in ["lincov", "monte-carlo --runs 40"] {
+        let said = warning(&format!("--scenario scaled.toml --method {method}"));
+        assert!(said.contains("a scale-factor error of 500 ppm") && said.contains("--scale-ppm"), "{said}");
+    }
+    let said = warning("--scenario biased.toml --filter full --outage 20:60 --method lincov");
+    assert!(said.contains("nav-sim tune --scenario") && !said.contains("noise"), "{said}");
+}
+
 /// Of eight outages the table has the six with the largest errors, in time order, and says so: what is printed stays on a screen.
 #[test]
 fn of_many_outages_the_largest_errors_are_shown() {
@@ -339,4 +370,38 @@ fn of_many_outages_the_largest_errors_are_shown() {
         ran.stderr
     );
     assert!(ran.stdout.lines().count() <= 20, "{}", ran.stdout);
+}
+
+/// A law without width is another truth, to the last bit; with one every run has its own.
+#[test]
+fn each_run_has_a_truth_of_its_own() {
+    let law = |sd: &str| {
+        format!(
+            "\n[[spread.gyro]]\nprocess = \"WN\"\nparameter = \"sigma2\"\ndistribution = \"lognormal\"\nmedian = 4e-8\nsd = {sd}\n"
+        )
+    };
+    let place = place();
+    let put = |name: &str, text: String| fs::write(place.path().join(name), text).unwrap();
+    let white = MODEL.split("[gyro]").nth(1).unwrap().split("sigma2 = ").nth(1).unwrap();
+    let white = white.split([',', ' ', '}']).next().unwrap();
+    let (accel, gyro) = MODEL.split_once("[gyro]").unwrap();
+    let truth = format!("{accel}[gyro]{}", gyro.replacen(white, "4e-8", 1));
+    put("fixed.toml", format!("{MODEL}{}", law("0.0")));
+    put("drawn.toml", format!("{MODEL}{}", law("0.5")));
+    put("truth.toml", truth);
+    let runs = |arguments: &str, out: &str| {
+        done(place.path(), &format!("run drive.toml {arguments} --runs 9 --outage 30:40 --seed 5 -o {out}"));
+        fs::read_to_string(place.path().join(out).join("runs.csv")).unwrap()
+    };
+    let fixed = runs("fixed.toml --spread", "fixed");
+    assert_eq!(fixed, runs("imu.toml --truth truth.toml", "truth"));
+    let drawn = runs("drawn.toml --spread", "drawn");
+    assert_ne!(drawn, fixed);
+    let manifest = fs::read_to_string(place.path().join("drawn/manifest.json")).unwrap();
+    assert!(manifest.contains("\"spread\": true"), "{manifest}");
+}
+
+#[test]
+fn a_spread_that_is_not_there_or_cannot_be_analysed_is_refused() {
+    refused("run drive.toml imu.toml --spread --seed 1", 2, "imu.toml: no [spread] to draw parameters from");
 }

@@ -149,7 +149,7 @@ impl<'a> Joint<'a> {
         let decay = |x: &mut Nav, s: &StepOfSource| {
             x.iter_mut().for_each(|v| *v *= s.decay);
             // The w of the step moves the mean input and the state together: cov(x, s) = b q_cross.
-            add_scaled(x, s.q_cross, &step.b[s.signal]);
+            step.b.get(s.signal).into_iter().for_each(|b| add_scaled(x, s.q_cross, b));
         };
         self.xb.iter_mut().zip(&inputs.b).for_each(|(x, s)| decay(x, s));
         self.xt.iter_mut().zip(&inputs.t).for_each(|(x, s)| decay(x, s));
@@ -202,21 +202,22 @@ impl<'a> Joint<'a> {
             add_scaled(&mut self.xx[j], gain.x[j], &rest_x);
             add_scaled(&mut self.xx[j], -with.x[j], &gain.x);
         }
-        for j in 0..nb {
-            add_scaled(&mut self.xb[j], gain.b[j], &rest_x);
-            add_scaled(&mut self.xb[j], -with.b[j], &gain.x);
-            let rest = y.s * gain.b[j] - with.b[j];
-            for i in 0..nb {
-                self.bb[j * nb + i] += rest * gain.b[i] - gain.b[j] * with.b[i];
+        let (mut bb, mut bt) = (self.bb.chunks_exact_mut(nb.max(1)), self.bt.chunks_exact_mut(nt.max(1)));
+        for (xb, (k, c)) in self.xb.iter_mut().zip(gain.b.iter().zip(&with.b)) {
+            add_scaled(xb, *k, &rest_x);
+            add_scaled(xb, -c, &gain.x);
+            let rest = y.s * k - c;
+            let row = bb.next().into_iter().flatten();
+            for (p, (other, with)) in row.zip(gain.b.iter().zip(&with.b)) {
+                *p += rest * other - k * with;
             }
-            for i in 0..nt {
-                // t has no gain: a measurement does not change what truly makes the errors, only the
-                // estimate's relation to it.
-                self.bt[j * nt + i] -= gain.b[j] * with.t[i];
-            }
+            // t has no gain: a measurement does not change what truly makes the errors, only the
+            // estimate's relation to it.
+            let row = bt.next().into_iter().flatten();
+            row.zip(&with.t).for_each(|(p, with)| *p -= k * with);
         }
-        for j in 0..nt {
-            add_scaled(&mut self.xt[j], -with.t[j], &gain.x);
+        for (xt, c) in self.xt.iter_mut().zip(&with.t) {
+            add_scaled(xt, -c, &gain.x);
         }
         self.symmetrise();
     }

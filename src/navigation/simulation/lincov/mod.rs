@@ -32,6 +32,7 @@
 mod branch;
 mod column;
 mod consistency;
+mod damped;
 mod descent;
 mod errors;
 mod factor;

@@ -72,7 +72,7 @@ impl Assessment {
 /// the same drift is in every run, [`super::TruthSide`] adds the errors instead of their variances.
 #[must_use]
 pub fn assess(track: &Track, belief: &Belief, truth: &Model) -> Assessment {
-    FilterPass::new(track, belief).assess_side(&TruthSide::as_expected(belief, truth, !track.perfect))
+    FilterPass::new(track, belief).errors_as_expected(belief, truth).assessment()
 }
 
 /// Largest error of any reported state that the strapdown alone makes at the IMU's rate, over the standard deviation that the
@@ -207,13 +207,12 @@ impl<'a> FilterPass<'a> {
 
     /// As [`assess`], of the filter's own belief, where settings state more of the true errors than a noise model.
     pub(super) fn assess_stated(&self, belief: &Belief, truth: &TrueErrors) -> Assessment {
-        self.assess_side(&TruthSide::as_stated(belief, truth, !self.track.perfect))
+        self.errors(&TruthSide::as_stated(belief, truth, !self.track.perfect)).assessment()
     }
 
-    fn assess_side(&self, truth: &TruthSide) -> Assessment {
-        let law = self.errors(truth);
-        let consistency = |all: &[Judged]| all.iter().map(Judged::consistency).collect();
-        Assessment { reports: consistency(&law.reports), outage_ends: consistency(&law.outage_ends) }
+    /// The errors of which [`assess`] tells.
+    pub(super) fn errors_as_expected(&self, belief: &Belief, truth: &Model) -> ErrorLaw {
+        self.errors(&TruthSide::as_expected(belief, truth, !self.track.perfect))
     }
 
     /// The true errors of the filter.
@@ -255,6 +254,13 @@ impl<'a> FilterPass<'a> {
     }
 }
 
+impl ErrorLaw {
+    pub(super) fn assessment(&self) -> Assessment {
+        let consistency = |all: &[Judged]| all.iter().map(Judged::consistency).collect();
+        Assessment { reports: consistency(&self.reports), outage_ends: consistency(&self.outage_ends) }
+    }
+}
+
 impl Instant {
     /// Mean squares and products of the true errors.
     #[must_use]
@@ -289,6 +295,19 @@ impl Judged {
     #[must_use]
     pub fn sigma(&self) -> [f64; REPORTED] {
         deviations(&self.errors.jacobian, &self.believed)
+    }
+
+    /// L⁻¹ P_true L⁻ᵀ with P = L Lᵀ: the identity where the filter is right; NaN where P is not positive definite.
+    pub(super) fn whitened(&self) -> SMatrix<f64, NAV, NAV> {
+        let moments = self.errors.moments();
+        let p = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| self.believed[j][i]);
+        let mut m = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| moments[j][i]);
+        let Some(l) = p.cholesky().map(|p| p.l()) else { return SMatrix::repeat(f64::NAN) };
+        for _ in 0..2 {
+            l.solve_lower_triangular_mut(&mut m);
+            m.transpose_mut();
+        }
+        m
     }
 
     /// How the filter's covariance stands to that of its true errors.

@@ -6,9 +6,9 @@
 //! the errors it truly makes, in the sense of the Kullback-Leibler divergence, along a trajectory with its fixes and
 //! outages.
 
-use super::descent::Descent;
-use super::pass::{Assessment, Consistency, assess};
-use super::track::Track;
+use super::damped::{Damped, Part, Value};
+use super::pass::{Assessment, Consistency, ErrorLaw, FilterPass, Judged, assess};
+use super::track::{NAV, Track};
 use crate::earth::GravityModel;
 use crate::ekf::{Belief, FilterStates, InitialSettings};
 use crate::imu::{Axis, Channel};
@@ -99,16 +99,24 @@ impl Search<'_> {
         belief
     }
 
-    fn cost(&self, ln: &Factors) -> f64 {
-        let assessment = assess(&self.track, &self.belief(ln), self.model);
-        cost(&assessment) + self.lost(&assessment) + RIDGE * ln.iter().map(|x| x * x).sum::<f64>()
+    /// The cost and what it is made of.
+    fn value(&self, ln: &Factors) -> Value {
+        let belief = self.belief(ln);
+        let law = FilterPass::new(&self.track, &belief).errors_as_expected(&belief, self.model);
+        let assessment = law.assessment();
+        let steep: Vec<Steep> = steep(&assessment).into_iter().chain(self.lost(&assessment)).collect();
+        let ridge = RIDGE * ln.iter().map(|x| x * x).sum::<f64>();
+        let cost = divergence(&assessment, |_| 0.0) + steep.iter().map(Steep::cost).sum::<f64>() + ridge;
+        let bent = |x: &f64| Part { value: *x, curvature: 2.0 * RIDGE };
+        let parts = shape(&law).chain(steep.iter().map(Steep::part)).chain(ln.iter().map(bent)).collect();
+        Value { cost, parts }
     }
 
     /// What the horizontal position at the outage ends loses to the filter with all states counts where it is a fiftieth, steeply.
-    fn lost(&self, assessment: &Assessment) -> f64 {
-        let lost = |(own, best): (f64, &f64)| ((own / best).ln().max(0.0) / LOST).powi(4);
-        let lost: Vec<f64> = horizontal_m(assessment).zip(&self.best).map(lost).collect();
-        ENDS * LOST_WEIGHT * lost.iter().sum::<f64>() / lost.len().max(1) as f64
+    fn lost(&self, assessment: &Assessment) -> Vec<Steep> {
+        let weight = ENDS * LOST_WEIGHT / self.best.len().max(1) as f64;
+        let lost = |(own, best): (f64, &f64)| Steep { x: (own / best).ln().max(0.0), scale: LOST, weight };
+        horizontal_m(assessment).zip(&self.best).map(lost).collect()
     }
 
     /// The factors that are free descend from where the search starts.
@@ -118,9 +126,9 @@ impl Search<'_> {
             self.free.iter().zip(free).for_each(|(i, x)| ln[*i] = *x);
             ln
         };
-        let cost = |free: &[f64]| self.cost(&factors(free));
+        let value = |free: &[f64]| self.value(&factors(free));
         let descent =
-            Descent { cost: &cost, bounds: (-MAX_LN, MAX_LN), iterations: ITERATIONS, enough: ENOUGH };
+            Damped { value: &value, bounds: (-MAX_LN, MAX_LN), iterations: ITERATIONS, enough: ENOUGH };
         let start = self.free.iter().map(|i| START[*i]).collect();
         descent.minimum(start).map_or([0.0; FACTORS], |found| factors(&found))
     }
@@ -133,8 +141,8 @@ const RIDGE: f64 = 5e-4;
 const ITERATIONS: usize = 40;
 /// Largest logarithm of a factor.
 const MAX_LN: f64 = 6.0;
-/// A step that gains less is the last: 2e-4 of divergence is 1 % in one standard deviation.
-const ENOUGH: f64 = 2e-4;
+/// A step that gains less is the last: 2e-3 of divergence is 1 % in each of nine standard deviations.
+const ENOUGH: f64 = 2e-3;
 /// Share of the outage ends in the cost.
 const ENDS: f64 = 0.3;
 /// A ratio whose logarithm is this far from 0 begins to count for itself, with this weight.
@@ -154,26 +162,65 @@ fn horizontal_m(assessment: &Assessment) -> impl Iterator<Item = f64> {
     assessment.outage_ends.iter().map(|end| end.rmse[0].hypot(end.rmse[1]))
 }
 
-/// The divergence at the outage ends and on the average; a single state whose ratio is a tenth off, at an outage's end or
-/// over the whole way, counts beside it, steeply: the divergence alone gives one state away for eight. So does the mean
-/// NEES: the divergence is that of a filter that is rather underconfident.
-fn cost(assessment: &Assessment) -> f64 {
-    let ends = divergence(assessment, |end| end.ratio().into_iter().map(steep).sum());
+/// A logarithm that costs its fourth power: `scale` off costs `weight`, half of that a sixteenth, twice as much sixteen times;
+/// both directions count alike.
+#[derive(Debug, Clone, Copy)]
+struct Steep {
+    x: f64,
+    scale: f64,
+    weight: f64,
+}
+
+impl Steep {
+    fn cost(&self) -> f64 {
+        self.weight * (self.x / self.scale).powi(4)
+    }
+
+    fn part(&self) -> Part {
+        // The square of (x/scale)², whose slope is 2 x/scale²: as Gauss and Newton have it, so that a step halves x.
+        Part { value: self.x, curvature: 8.0 * self.weight * self.x.powi(2) / self.scale.powi(4) }
+    }
+}
+
+/// What costs beside the divergence: a single state whose ratio is a tenth off, at an outage's end or over the whole way,
+/// since the divergence alone gives one state away for eight; and the mean NEES, since the divergence is that of a filter
+/// that is rather underconfident.
+fn steep(assessment: &Assessment) -> Vec<Steep> {
+    let ends = &assessment.outage_ends;
+    let of_end = ENDS * OFF_WEIGHT / ends.len() as f64;
+    let at_ends = ends.iter().flat_map(|end| end.ratio());
+    let mut all: Vec<Steep> = at_ends.map(|r| Steep { x: r.ln(), scale: OFF, weight: of_end }).collect();
     let reports = assessment.reports.get(1..).unwrap_or_default();
     if reports.is_empty() {
-        return ends;
+        return all;
     }
     let mean = |of: &dyn Fn(&Consistency) -> f64| reports.iter().map(of).sum::<f64>() / reports.len() as f64;
     // Root mean square over the way, so that one bad minute is not hidden by an hour that is good.
-    let ratios: f64 = (0..REPORTED).map(|i| steep(mean(&|c| c.ratio()[i].powi(2)).sqrt())).sum();
-    let nees = (mean(&|c| c.nees) / NEES_DOF as f64).ln() / NEES_OFF;
-    ends + WAY * (ratios + NEES_WEIGHT * nees.powi(4))
+    let over_way = |i: usize| 0.5 * mean(&|c| c.ratio()[i].powi(2)).ln();
+    all.extend((0..REPORTED).map(|i| Steep { x: over_way(i), scale: OFF, weight: WAY * OFF_WEIGHT }));
+    let nees = (mean(&|c| c.nees) / NEES_DOF as f64).ln();
+    all.push(Steep { x: nees, scale: NEES_OFF, weight: WAY * NEES_WEIGHT });
+    all
 }
 
-fn steep(ratio: f64) -> f64 {
-    // The fourth power: 8 % off cost 0.4, 4 % a sixteenth of that, 16 % sixteen times as much; in the
-    // logarithm, so that both directions count alike.
-    OFF_WEIGHT * (ratio.ln() / OFF).powi(4)
+/// What the divergence is made of: P⁻¹ P_true as L⁻¹ P_true L⁻ᵀ. Where that is near the identity, the divergence is half of
+/// the squares of what its elements are off, and so its second derivative with respect to each of them is the weight of the instant.
+fn shape(law: &ErrorLaw) -> impl Iterator<Item = Part> {
+    let reports = law.reports.get(1..).unwrap_or_default();
+    let of_ends = if law.outage_ends.is_empty() { 0.0 } else { ENDS };
+    let weighted = |all: &[Judged], weight: f64| {
+        let weight = weight / all.len().max(1) as f64;
+        all.iter().map(|judged| (judged.whitened(), weight)).collect::<Vec<_>>()
+    };
+    let all = weighted(&law.outage_ends, of_ends).into_iter().chain(weighted(reports, 1.0 - of_ends));
+    all.flat_map(|(m, weight)| {
+        // An element off the diagonal is there twice.
+        let part = move |(i, j): (usize, usize)| Part {
+            value: m[(i, j)],
+            curvature: if i == j { weight } else { 2.0 * weight },
+        };
+        (0..NAV).flat_map(|i| (0..=i).map(move |j| (i, j))).map(part)
+    })
 }
 
 /// The divergence on the average and at the outage ends, where `beside` is added to it.

@@ -26,12 +26,12 @@ pub(super) type Nav = [f64; NAV];
 pub(super) const STEP_S: f64 = 0.2;
 
 /// What happens to the navigation error over a step: x⁺ = `m` x + `b` e, e the errors of the biases (estimate
-/// less truth) of the signals, their means over the step. Columns.
+/// less truth) of the signals, their means over the step. Columns; `b` of the signals that the track follows.
 #[derive(Debug, Clone)]
 pub(super) struct Step {
     pub(super) samples: u32,
     pub(super) m: [Nav; NAV],
-    pub(super) b: [Nav; SIGNALS],
+    pub(super) b: Vec<Nav>,
     /// Covariance of the navigation error for white noise of variance 1 in each sample of a signal, by signals that are not
     /// multiplied; none where it acts through its mean over the step, as that of a bias does.
     pub(super) white: Vec<[Nav; NAV]>,
@@ -190,7 +190,7 @@ impl Linearisation {
             // Samples of the noise model's rate, which need not be the rate at which the motion is sampled.
             samples: (samples.len() as f64 * self.dt * self.noise_hz).round().max(1.0) as u32,
             m: std::array::from_fn(unit),
-            b: [[0.0; NAV]; SIGNALS],
+            b: vec![[0.0; NAV]; self.signals],
             white: Vec::new(),
         };
         let mut age = 0.0;
@@ -198,17 +198,17 @@ impl Linearisation {
             self.omega_ib_b = sample.omega_ib_b;
             let (dtheta, dv) = (sample.omega_ib_b * self.dt, sample.f_ib_b * self.dt);
             let trace = self.ins.step(Vec3::splat(dtheta), Vec3::splat(dv), self.dt);
-            step.apply(&Sample::new(&trace, self.dt), sample, self.signals);
+            step.apply(&Sample::new(&trace, self.dt), sample);
             age += self.dt;
             if age + 0.5 * self.dt > EARTH_STEP_S {
-                step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, sample, self.signals);
+                step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, sample);
                 age = 0.0;
             }
         }
         // A measurement meets a covariance that has all of the Earth's terms, as `settle` gives it in the
         // filter.
         if let Some(sample) = samples.last().filter(|_| age > 0.0) {
-            step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, sample, self.signals);
+            step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, sample);
         }
         step
     }
@@ -267,13 +267,13 @@ fn drop_closed(marks: &mut [Mark]) {
 }
 
 impl Step {
-    /// The map of a sample after this one, or of the Earth, which feels no sample; of the first `signals` signals.
-    fn apply(&mut self, map: &impl ErrorMap<f64>, sample: &ImuSample, signals: usize) {
+    /// The map of a sample after this one, or of the Earth, which feels no sample.
+    fn apply(&mut self, map: &impl ErrorMap<f64>, sample: &ImuSample) {
         let zero = Vec3([0.0; 3]);
         for column in &mut self.m {
             *column = flat(&map.apply(triples(column), zero, zero));
         }
-        for (signal, column) in self.b.iter_mut().enumerate().take(signals) {
+        for (signal, column) in self.b.iter_mut().enumerate() {
             let (sensor, axis, by) = place(signal);
             let measured = [sample.f_ib_b, sample.omega_ib_b][sensor];
             let mut input = [zero, zero];
