@@ -51,9 +51,9 @@ ax.legend()
 # The IMU that 20 m need, and whether one of ours is it.
 
 # %%
-needed = nav_sim.require(drive, outage=60.0, limits="p95_m<=20")
+needed = nav_sim.require(drive, outage=(300.0, 360.0), limits="p95_m<=20")
 print(needed.summary())
-given = nav_sim.require(drive, models["tactical"], outage=60.0, limits="p95_m<=20")
+given = nav_sim.require(drive, models["tactical"], outage=(300.0, 360.0), limits="p95_m<=20")
 print(given.summary())
 print("met" if given.unmet is None else given.unmet)
 plt.show()

@@ -240,7 +240,7 @@ def fuse(
     gnss_sigma: float | Mapping[str, Any] | None = None,
     gnss_delay_s: float = 0.0,
     gnss_correlation: str | float = "auto",
-    rate_hz: float = 10.0,
+    topic: tuple[str | None, str | None] | None = None,
     smooth: bool = False,
     progress: Progress = None,
 ) -> Fusion:
@@ -260,7 +260,7 @@ def fuse(
     lever_arm_m
         The antenna from the IMU: front, right, down (m).
     heading_deg
-        Heading at the start and its standard deviation (°).
+        Heading at the start and its standard deviation (°), where the course does not show it.
     mounting
         "flu" or "rfu" (axes of that name), "auto" (found from the drive), or roll, pitch, yaw (°), with standard
         deviations ((roll, pitch, yaw), (sd, sd, sd)).
@@ -274,8 +274,8 @@ def fuse(
         How late fixes are stamped (s).
     gnss_correlation
         How long errors of positions last: "auto", "none", or seconds.
-    rate_hz
-        Rows of the solution a second.
+    topic
+        Topics of IMU and fixes in a log that has several.
     smooth
         Also estimate every row from all fixes.
 
@@ -284,7 +284,9 @@ def fuse(
     `.solution`, `.innovations`, `.errors`, `.verdict`, `.plot()`, `.summary()`, `.to_html(path)`, `.write(directory)`.
     """
     with Staging() as staging:
-        heading = None if heading_deg is None else dict(zip(("deg", "sigma_deg"), map(float, heading_deg)))
+        if heading_deg is not None:
+            deg, sigma_deg = map(float, heading_deg)
+            initial = f"{deg!r}:{sigma_deg!r}"
         lasts = gnss_correlation if isinstance(gnss_correlation, str) else {"seconds": float(gnss_correlation)}
         return ask(
             Fusion,
@@ -296,7 +298,6 @@ def fuse(
             model=_model.staged(model, "model", staging),
             initial=staging.settings(initial, "initial"),
             lever_arm_m=[float(x) for x in lever_arm_m],
-            heading=heading,
             mounting=_mounting(mounting),
             reference=None if reference is None else _reference(reference, staging),
             outages=[{"start_s": float(a), "end_s": float(b)} for a, b in outages],
@@ -305,7 +306,7 @@ def fuse(
             gnss_sigma=_sigma(gnss_sigma),
             gnss_delay_s=gnss_delay_s,
             gnss_correlation=lasts,
-            rate_hz=rate_hz,
+            topic=None if topic is None else {"imu": topic[0], "fixes": topic[1]},
             smooth=smooth,
         )
 

@@ -118,6 +118,7 @@ def test_progress_is_told(recordings: Path) -> None:
     assert told and all(0 <= done <= total for done, total in told)
 
 
+@pytest.mark.filterwarnings("ignore::nav_sim.NavSimWarning")
 def test_a_calibrated_model_keeps_its_intervals(recordings: Path, short: Path, tmp_path: Path) -> None:
     fit = calibrate(recordings, **USUAL)
     written = nav_sim.lincov(short, fit.model.write(tmp_path / "m.toml"), outages=[(20, 40)])

@@ -86,6 +86,48 @@ def test_compare(short: Path, command: Command, tmp_path: Path) -> None:
     assert own.table("comparison.csv")
 
 
+STUDY = """
+runs = 4
+unit_runs = 2
+seed = 1
+reference = "tactical"
+[[trajectory]]
+file = "short.csv"
+[[truth]]
+model = "{TACTICAL}"
+[[candidate]]
+name = "tactical"
+model = "{TACTICAL}"
+[[candidate]]
+name = "consumer"
+model = "{CONSUMER}"
+[[outages]]
+sweep = {{ start_s = 20, duration_s = [5, 20] }}
+"""
+
+
+def test_a_study(short: Path, command: Command, tmp_path: Path) -> None:
+    (tmp_path / "short.csv").write_bytes(short.read_bytes())
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY.format(TACTICAL=TACTICAL.as_posix(), CONSUMER=CONSUMER.as_posix()), encoding="utf-8")
+    for step in ("plan", "run", "merge"):
+        command("batch", step, path, "-o", tmp_path / "command", "-q")
+    study = nav_sim.Study(path, tmp_path / "own")
+    with pytest.raises(nav_sim.NavSimError, match="plan"):
+        study.run()
+    units = study.plan()
+    with pytest.raises(nav_sim.NavSimError):
+        study.merge()
+    assert study.run(shard=(0, 2)) + study.run(shard=(1, 2)) == units
+    assert study.run() == 0
+    tables = study.merge()
+    for name in ("outages.csv", "runs.csv"):
+        assert tables.text(name) == (tmp_path / "command" / "results" / name).read_text(encoding="utf-8"), name
+    assert set(tables.outages["candidate"]) == {"tactical", "consumer"} and tables.summary()
+    with pytest.raises(nav_sim.NavSimError, match="shard"):
+        study.run(shard=(2, 2))
+
+
 def test_wrong_arguments(tmp_path: Path) -> None:
     with pytest.raises(nav_sim.NavSimError, match="p95"):
         nav_sim.require(DRIVE, outage=30, limits="p95=50")

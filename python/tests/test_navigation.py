@@ -111,6 +111,17 @@ def test_a_fusion_is_that_of_the_command(drive: Path, command: Command, tmp_path
     assert own.innovations["status"].dtype.kind == "U" and own.solution["t_s"].dtype == np.float64
 
 
+def test_a_start_that_is_given(drive: Path, command: Command, tmp_path: Path) -> None:
+    files = (drive / "imu.csv", drive / "gnss.csv", TACTICAL)
+    said = command("fuse", *files, "--initial", "90:5", "-q", "--format", "json", "-o", tmp_path / "a", code=3).stdout
+    wrong = fuse(*files, heading_deg=(90, 5))
+    assert json.loads(wrong._native.json()) == json.loads(said) and wrong.unmet is not None
+    said = command(
+        "fuse", *files, "--initial", drive / "initial.toml", "-q", "--format", "json", "-o", tmp_path / "b"
+    ).stdout
+    assert json.loads(fuse(*files, initial=drive / "initial.toml")._native.json()) == json.loads(said)
+
+
 def test_a_fusion_of_arrays_is_that_of_files(drive: Path, tactical: Model) -> None:
     imu, gnss = table(drive / "imu.csv"), table(drive / "gnss.csv")
     own = fuse(imu, gnss, tactical, mounting=(0.0, 0.0, 0.0), heading_deg=None, lever_arm_m=np.zeros(3).tolist())
