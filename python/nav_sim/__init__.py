@@ -7,9 +7,10 @@
     drive = nav_sim.lincov("trajectories/land_vehicle.toml", fit.model, outages=[(300, 390)])
     drive.plot()                                                    # needs nav-sim[plot]
 
-Units are in the names (`gyro_x_rad_s`, `t_s`, `lat_deg`). A result is a dict of NumPy arrays, which `pandas.DataFrame` and
-`polars.DataFrame` take, or has such dicts; `.summary()` and `.to_html(path)` are the texts of the command. The same seed gives
-the bytes of the command. What cannot be done raises `NavSimError`, what is doubtful warns `NavSimWarning`.
+Units are in the names (`gyro_x_rad_s`, `t_s`, `lat_deg`). A result is a dict of NumPy arrays, which `pandas.DataFrame`
+and `polars.DataFrame` take, or has such dicts; `.summary()` and `.to_html(path)` are the texts of the command. The
+same seed gives the bytes of the command. What cannot be done raises `NavSimError`, what is doubtful warns
+`NavSimWarning`.
 """
 
 from __future__ import annotations
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     from nav_sim._navigation import fuse as fuse
     from nav_sim._navigation import lincov as lincov
     from nav_sim._navigation import run as run
+    from nav_sim._study import Study as Study
+    from nav_sim._study import StudyTables as StudyTables
     from nav_sim._trajectory import Trajectory as Trajectory
     from nav_sim._wavelet import Curve as Curve
     from nav_sim._wavelet import WaveletVariances as WaveletVariances
@@ -50,6 +53,7 @@ _HOMES = {
     "_errors": ["NavSimError", "NavSimWarning"],
     "_model": ["Model"],
     "_navigation": ["Fusion", "Run", "fuse", "lincov", "run"],
+    "_study": ["Study", "StudyTables"],
     "_trajectory": ["Trajectory"],
     "_wavelet": ["Curve", "WaveletVariances", "allan_deviation", "wavelet_variance", "wv"],
 }

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nav_sim import _native
-from nav_sim._errors import NavSimWarning
+from nav_sim._errors import NavSimWarning, as_arguments
 from nav_sim._inputs import FloatArray, Staging, StrPath
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ Columns = dict[str, npt.NDArray[Any]]
 class Answer:
     """The answer of the command of the same name.
 
-    `data` is what the command prints as JSON, `summary()` what it prints in words, `to_html()` its page, `write()` the files
-    that it makes.
+    `data` is what the command prints as JSON, `summary()` what it prints in words, `to_html()` its page, `write()` the
+    files that it makes.
     """
 
     def __init__(self, native: _native.Answer) -> None:
@@ -101,7 +101,7 @@ def ask(kind: type[A], command: str, staging: Staging, progress: Progress = None
     with bar(progress) as told:
         native = _native.answer(command, text, staging.hidden, told)
     for warning in native.warnings:
-        warnings.warn(warning, NavSimWarning, stacklevel=3)
+        warnings.warn(as_arguments(warning), NavSimWarning, stacklevel=3)
     return kind(native)
 
 

@@ -33,7 +33,13 @@ class Calibration(Answer):
         """The noise model of each estimator."""
         files = [name for name in self.files if name.endswith(".toml")]
         named = zip(dict.fromkeys(fit["estimator"] for fit in self.data["fits"]), files)
-        return {estimator: Model.from_toml(self.text(name)) for estimator, name in named}
+        return {estimator: self._model(name) for estimator, name in named}
+
+    def _model(self, name: str) -> Model:
+        model = Model.from_toml(self.text(name))
+        draws = name.removesuffix(".toml") + ".draws.json"
+        model._draws = self.text(draws) if draws in self.files else None
+        return model
 
     @property
     def verdict(self) -> str:
@@ -44,14 +50,14 @@ class Calibration(Answer):
     def parameters(self) -> Columns:
         """Every parameter of every fit, a row each: a dict of columns.
 
-        `estimator`, `sensor`, `axis`, `process` ("AR1_2"), `parameter` ("phi"), `value`, `ci_low` and `ci_high` (the 95 %
-        interval, NaN where the data do not determine it), `unit`.
+        `estimator`, `sensor`, `axis`, `process` ("AR1_2"), `parameter` ("phi"), `value`, `ci_low` and `ci_high` (the
+        95 % interval, NaN where the data do not determine it), `unit`.
         """
         return flattened([row for fit in self.data["fits"] for row in _parameters(fit)])
 
     @cached_property
     def curves(self) -> list[dict[str, Any]]:
-        """The curves that were fitted: `tau_s`, `wv`, `ci_low`, `ci_high`, `implied` (by the model) and where they are of."""
+        """The fitted curves: `tau_s`, `wv`, `ci_low`, `ci_high`, `implied` (by the model) and what they are of."""
         files = [name for name in self.files if name.endswith(".wv.json")]
         found = [entry for name in files for entry in json.loads(self.text(name))["curves"]]
         return [{key: _array(value) for key, value in entry.items() if key != "replicates"} for entry in found]
@@ -134,9 +140,10 @@ def calibrate(
     Parameters
     ----------
     recordings
-        One or a list of: a path (CSV, .npy, .npz, .mcap, .bag, .ulg, .ubx; a directory is all its recordings), a table (dict of
-        columns, data frame, structured array) with the names `accel_x_m_s2` … `gyro_z_rad_s` and `t_s`, or an array of 6 columns
-        (accelerometer x, y, z in m/s², gyroscope x, y, z in rad/s), of 3 with `axes="gyro"`, of 1 with `axes="gyro.x"`.
+        One or a list of: a path (CSV, .npy, .npz, .mcap, .bag, .ulg, .ubx; a directory is all its recordings), a table
+        (dict of columns, data frame, structured array) with the names `accel_x_m_s2` … `gyro_z_rad_s` and `t_s`, or an
+        array of 6 columns (accelerometer x, y, z in m/s², gyroscope x, y, z in rad/s), of 3 with `axes="gyro"`, of 1
+        with `axes="gyro.x"`.
     rate_hz
         Sample rate (Hz), where there is no time in the recordings.
     estimator

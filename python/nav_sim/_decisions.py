@@ -43,9 +43,9 @@ def tune(
 ) -> Choice:
     """The smallest factors on a model that make its filter consistent with other truths: `nav-sim tune`.
 
-    `truth` are models that may make the errors, such as those of single recordings; `intervals=True` takes the draws of the
-    model's own calibration instead. `aim` is "worst" or "mean" (the option --for), `per` "sensor" or "process". `.model` is the
-    tuned one.
+    `truth` are models that may make the errors, such as those of single recordings; `intervals=True` takes the draws
+    of the model's own calibration instead. `aim` is "worst" or "mean" (the option --for), `per` "sensor" or "process".
+    `.model` is the tuned one.
     """
     truths = [truth] if isinstance(truth, (str, os.PathLike, Model)) else truth or []
     with Staging() as staging:
@@ -82,8 +82,9 @@ def require(
 ) -> Choice:
     """The IMU that keeps the errors at the end of an outage within limits: `nav-sim require`.
 
-    With a `model` it is judged, without one `.model` is what is needed. `outage` is a length (s), a pair of start and end, or
-    "longest"; `limits` such as "p95_m<=5"; `catalogue=True` ranks the catalogued IMUs, a path those of a directory.
+    With a `model` it is judged, without one `.model` is what is needed. `outage` is a length (s), a pair of start and
+    end, or "longest"; `limits` such as "p95_m<=5"; `catalogue=True` ranks the catalogued IMUs, a path those of a
+    directory.
     """
     asked = outage if isinstance(outage, str) else _window(outage)
     with Staging() as staging:

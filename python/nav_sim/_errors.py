@@ -27,10 +27,10 @@ class NavSimError(Exception):
         line: int | None = None,
         hint: str | None = None,
     ) -> None:
-        self.message = _as_arguments(message)
+        self.message = as_arguments(message)
         self.file = file
         self.line = line
-        self.hint = None if hint is None else _as_arguments(hint)
+        self.hint = None if hint is None else as_arguments(hint)
         super().__init__(message, file, line, hint)
 
     def __str__(self) -> str:
@@ -42,10 +42,10 @@ class NavSimWarning(UserWarning):
 
 
 #: Options of the commands whose arguments here have another name.
-_RENAMED = {"outage": "outages", "truth": "truth"}
+_RENAMED = {"outage": "outages", "lever_arm": "lever_arm_m", "heading": "heading_deg", "for": "aim"}
 
 
-def _as_arguments(text: str) -> str:
+def as_arguments(text: str) -> str:
     """Options of the command line as arguments of functions: `--rate-hz` is `rate_hz=`."""
 
     def argument(match: re.Match[str]) -> str:

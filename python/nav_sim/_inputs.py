@@ -1,7 +1,7 @@
 """What users have, as the files that the engine reads.
 
-A path goes through as it is. Arrays and tables are written to a directory of their own in the formats of the command, so that
-one reader checks both; no text that comes back shows the directory, only the name of the argument.
+A path goes through as it is. Arrays and tables are written to a directory of their own in the formats of the command,
+so that one reader checks both; no text that comes back shows the directory, only the name of the argument.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol, TypeAlias, Union
+from typing import Any, Protocol, TypeAlias, TypeGuard, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -38,7 +38,7 @@ Table: TypeAlias = Union[Mapping[str, npt.ArrayLike], Frame, npt.NDArray[np.void
 SIX = tuple(f"{sensor}_{axis}_{unit}" for sensor, unit in (("accel", "m_s2"), ("gyro", "rad_s")) for axis in "xyz")
 
 
-def is_path(value: object) -> bool:
+def is_path(value: object) -> TypeGuard[StrPath]:
     """Whether a value names a file."""
     return isinstance(value, (str, os.PathLike))
 
@@ -131,10 +131,16 @@ class Staging:
             np.savez(file, **named)  # type: ignore[arg-type]
         return str(path)
 
+    def columns(self, value: StrPath | Table, name: str) -> str:
+        """A table as arrays by name."""
+        if is_path(value):
+            return os.fspath(value)
+        return self.arrays(name, columns(value, name))  # type: ignore[arg-type]
+
     def table(self, value: StrPath | Table, name: str) -> str:
         """A table as text with a header."""
         if is_path(value):
-            return os.fspath(value)  # type: ignore[arg-type]
+            return os.fspath(value)
         found = columns(value, name)  # type: ignore[arg-type]
         rows = zip(*(values.tolist() for values in found.values()))
         lines = [",".join(found), *(",".join(map(repr, row)) for row in rows)]
@@ -179,7 +185,9 @@ def _channels(value: npt.ArrayLike, name: str, channel: str | None) -> dict[str,
         raise NavSimError(f"{name}: {array.ndim} dimensions; rows are samples, columns are channels")
     names = _names(array.shape[1], channel)
     if names is None:
-        hint = 'give a dict of columns such as {"gyro_x_rad_s": x}, or axes="gyro.x" for one signal, axes="gyro" for three'
+        hint = (
+            'give a dict of columns such as {"gyro_x_rad_s": x}, or axes="gyro.x" for one signal, axes="gyro" for three'
+        )
         raise NavSimError(f"{name}: {array.shape[1]} columns whose channels are not known", hint=hint)
     return {column: np.ascontiguousarray(array[:, k]) for k, column in enumerate(names)}
 

@@ -15,7 +15,7 @@ from nav_sim import _native, _toml
 from nav_sim._answer import axes_or_new
 from nav_sim._errors import NavSimError
 from nav_sim._inputs import FloatArray, Staging, StrPath
-from nav_sim._wavelet import Curve
+from nav_sim._wavelet import Curve, scales_s
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,8 +33,9 @@ class Model:
 
         Model(rate_hz=100, gyro=[{"type": "WN", "sigma2": 1e-6}, {"type": "RW", "gamma2": 1e-13}])
 
-    Types and parameters, per sample: WN sigma2, QN q2, AR1 phi and sigma2 (of the innovation), RW gamma2 (of the increment),
-    DR slope, GM, MA1; m/s² for accelerometers, rad/s for gyroscopes. A sensor that is left out has no noise.
+    Types and parameters, per sample: WN sigma2, QN q2, AR1 phi and sigma2 (of the innovation), RW gamma2 (of the
+    increment), DR slope, GM, MA1; m/s² for accelerometers, rad/s for gyroscopes. A sensor that is left out has no
+    noise.
     """
 
     def __init__(self, rate_hz: float, accel: Processes | None = None, gyro: Processes | None = None) -> None:
@@ -43,6 +44,8 @@ class Model:
 
     def _take(self, text: str, path: str | None) -> None:
         self._text, self._path = text, path
+        # the draws behind the intervals of a calibration, which `lincov` and `tune` read beside the model
+        self._draws: str | None = None
         self._contents: dict[str, Any] = json.loads(_native.model_contents(text, path))
 
     @classmethod
@@ -67,9 +70,11 @@ class Model:
         return cls._of(text, os.fspath(path))
 
     def write(self, path: StrPath) -> Path:
-        """Writes it as a model file."""
+        """Writes it as a model file; of a calibration the draws behind its intervals too (`….draws.json`)."""
         place = Path(path)
         place.write_text(self._text, encoding="utf-8", newline="\n")
+        if self._draws is not None:
+            place.with_suffix(".draws.json").write_text(self._draws, encoding="utf-8", newline="\n")
         return place
 
     def to_toml(self) -> str:
@@ -101,7 +106,7 @@ class Model:
         sensors: dict[str, dict[str, list[Process]]] = {"accel": {}, "gyro": {}}
         for channel in CHANNELS:
             sensor, axis = channel.split(".")
-            both = [*own.get(channel, []), *more.get(channel, [])]
+            both: list[Process] = [*own.get(channel, []), *more.get(channel, [])]
             if both:
                 sensors[sensor][axis] = both
         return Model(self.rate_hz, sensors["accel"] or None, sensors["gyro"] or None)
@@ -123,10 +128,13 @@ class Model:
         replicate: int = 1,
         seed: int = 1,
         spread: bool = False,
+        contaminate: StrPath | None = None,
     ) -> dict[str, FloatArray]:
-        """A static recording of it, mean free: a column a channel, as `nav-sim synthesize` writes replicate number `replicate`.
+        """A static recording of it, a column a channel: what `nav-sim synthesize` writes as replicate number
+        `replicate`.
 
-        `spread` draws the parameters of the replicate from the spread that the model file states.
+        `spread` draws the parameters of the replicate from the spread that the model file states; `contaminate`
+        corrupts the recording as a scenario of the paper ("section5-II") or a file says.
         """
         if (samples is None) == (duration_s is None):
             raise NavSimError("samples, duration_s: give one of them")
@@ -135,23 +143,34 @@ class Model:
             if not isinstance(value, (int, np.integer)) or value < least:
                 raise NavSimError(f"{name}: {value} is not a whole number from {least} on")
         assert count is not None
-        return _native.model_recording(self._text, int(count), int(replicate), int(seed), spread)
+        corrupts = None if contaminate is None else os.fspath(contaminate)
+        return _native.model_recording(self._text, int(count), int(replicate), int(seed), spread, corrupts)
 
     def wavelet_variance(self, channel: str, scales: int = 20) -> Curve:
         """The wavelet variance that a channel implies at the scales 2, 4, 8, … samples: `tau_s` and `wv`."""
         wv = _native.model_wavelet(self._text, channel, scales)
-        return Curve(tau_s=2.0 ** np.arange(1, scales + 1) / self.rate_hz, wv=wv)
+        return Curve(tau_s=scales_s(scales, self.rate_hz), wv=wv)
 
-    def practical(self, policy: str = "matched", horizon_s: tuple[float, float] = (1.0, 100.0)) -> dict[str, dict[str, float | None]]:
+    def practical(
+        self, policy: str = "matched", horizon_s: tuple[float, float] = (1.0, 100.0)
+    ) -> dict[str, dict[str, float | None]]:
         """The figures that data sheets and other filters have, of the noisiest axis of each sensor.
 
-        Noise density and random walk stand for the model over averages of `horizon_s`: "matched" (its Allan deviation at 1 s and
-        the closest bias), "envelope" (nowhere below it) or "strict" (WN and RW as they are). What a model does not have is None.
+        Noise density and random walk stand for the model over averages of `horizon_s`: "matched" (its Allan deviation
+        at 1 s and the closest bias), "envelope" (nowhere below it) or "strict" (WN and RW as they are). What a model
+        does not have is None.
         """
         found: dict[str, dict[str, float | None]] = json.loads(_native.model_practical(self._text, policy, *horizon_s))
         return found
 
-    def export(self, target: str, path: StrPath | None = None, *, policy: str = "matched", horizon_s: tuple[float, float] = (1.0, 100.0)) -> str:
+    def export(
+        self,
+        target: str,
+        path: StrPath | None = None,
+        *,
+        policy: str = "matched",
+        horizon_s: tuple[float, float] = (1.0, 100.0),
+    ) -> str:
         """Its parameters as the file of another program: "kalibr", "openvins", "px4", "gtsam", "matlab" and others.
 
         Returns the text, and writes it where a path is given.
@@ -188,4 +207,6 @@ def staged(model: StrPath | Model, name: str, staging: Staging) -> str:
         return os.fspath(model)
     if model._path is not None:
         return model._path
+    if model._draws is not None:
+        staging.text(f"{name}.draws.json", model._draws)
     return staging.text(f"{name}.toml", model._text)

@@ -2,10 +2,28 @@
 
 from collections.abc import Callable
 from os import PathLike
+from pathlib import Path
 from typing import final
 
 import numpy as np
 import numpy.typing as npt
+
+__all__ = [
+    "Answer",
+    "answer",
+    "columns",
+    "main",
+    "model_contents",
+    "model_export",
+    "model_practical",
+    "model_recording",
+    "model_wavelet",
+    "study_merge",
+    "study_plan",
+    "study_run",
+    "trajectory_states",
+    "wavelet",
+]
 
 _Floats = npt.NDArray[np.float64]
 
@@ -25,17 +43,32 @@ class Answer:
     def text(self, name: str) -> str: ...
     def table(self, name: str) -> dict[str, _Floats | list[str]]: ...
 
-def answer(
-    command: str, request: str, hidden: str, progress: Callable[[int, int], object] | None
-) -> Answer: ...
+def answer(command: str, request: str, hidden: str, progress: Callable[[int, int], object] | None) -> Answer: ...
+def columns(text: str) -> dict[str, _Floats | list[str]]: ...
 def main(words: list[str]) -> int: ...
 def model_contents(text: str, path: str | None) -> str: ...
-def model_export(
-    text: str, name: str, target: str, policy: str, from_s: float, to_s: float
-) -> str: ...
+def model_export(text: str, name: str, target: str, policy: str, from_s: float, to_s: float) -> str: ...
 def model_practical(text: str, policy: str, from_s: float, to_s: float) -> str: ...
-def model_recording(text: str, samples: int, replicate: int, seed: int, spread: bool) -> dict[str, _Floats]: ...
+def model_recording(
+    text: str, samples: int, replicate: int, seed: int, spread: bool, contaminate: str | None
+) -> dict[str, _Floats]: ...
 def model_wavelet(text: str, channel: str, scales: int) -> _Floats: ...
+def study_merge(
+    study: str | PathLike[str], directory: str | PathLike[str], progress: Callable[[int, int], object] | None
+) -> tuple[Answer, Path]: ...
+def study_plan(
+    study: str | PathLike[str],
+    directory: str | PathLike[str],
+    seed: int | None,
+    progress: Callable[[int, int], object] | None,
+) -> tuple[int, list[str]]: ...
+def study_run(
+    study: str | PathLike[str],
+    directory: str | PathLike[str],
+    shard: int,
+    shards: int,
+    progress: Callable[[int, int], object] | None,
+) -> tuple[tuple[int, int], list[str]]: ...
 def trajectory_states(
     path: str | PathLike[str], rate_hz: float, hidden: str
 ) -> tuple[dict[str, _Floats], list[str]]: ...

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from nav_sim import _model, _trajectory
 from nav_sim._answer import Answer, Columns, Progress, ask, axes_or_new, flattened, windows
 from nav_sim._errors import NavSimError
-from nav_sim._inputs import Staging, StrPath, Table, columns, is_path
+from nav_sim._inputs import Staging, StrPath, Table
 from nav_sim._model import Model
 from nav_sim._trajectory import Trajectory
 
@@ -32,8 +32,8 @@ Settings = Union[StrPath, Mapping[str, Any]]
 class Run(Answer):
     """Errors of a navigation, by Monte Carlo or covariance analysis: `nav-sim run`.
 
-    `epochs` and `fan` over time, `runs` run by run, `outages` outage by outage: dicts of columns. ASEE (averaged standard
-    estimation error) is what the filter believes of its error, RMSE how wrong it is.
+    `epochs` and `fan` over time, `runs` run by run, `outages` outage by outage: dicts of columns. ASEE (averaged
+    standard estimation error) is what the filter believes of its error, RMSE how wrong it is.
     """
 
     @cached_property
@@ -53,7 +53,7 @@ class Run(Answer):
 
     @cached_property
     def outages(self) -> Columns:
-        """A row an outage: `start_s`, `end_s`, `rmse_end_pos_e_m`, `horizontal_error_end_m_p95` and all else in `data`."""
+        """A row an outage: `start_s`, `end_s`, `rmse_end_pos_e_m`, `horizontal_error_end_m_p95`, as in `data`."""
         return flattened(self.data["outages"])
 
     def plot(self, ax: Axes | None = None) -> Axes:
@@ -114,11 +114,13 @@ def run(
     filter
         States: 15, 21 (and scale factors) or "full" (one for each process).
     turn_on_bias, scale_ppm
-        Constant biases (m/s², rad/s) and scale factors (ppm) that the filter expects: standard deviations, accelerometer first.
+        Constant biases (m/s², rad/s) and scale factors (ppm) that the filter expects: standard deviations,
+        accelerometer first.
     require
         Limits such as "p95_m<=5" or "consistent"; `.unmet` says whether they are missed.
     gnss, scenario
-        All other settings, by a file or as a dict: `scenario={"imu": {"rate_hz": 200.0}}`; of `gnss` the section of that name.
+        All other settings, by a file or as a dict: `scenario={"imu": {"rate_hz": 200.0}}`; of `gnss` the section of
+        that name.
     seed
         Of all random numbers; that of the scenario, or 1, without it.
 
@@ -163,7 +165,7 @@ def lincov(
     scenario: Settings | None = None,
     progress: Progress = None,
 ) -> Run:
-    """The same by linear covariance analysis, which draws nothing: `nav-sim run --method lincov`. Arguments as of `run`."""
+    """The same without sampling, by linear covariance analysis: `nav-sim run --method lincov`. Arguments as of `run`."""
     return run(
         trajectory,
         model,
@@ -238,7 +240,7 @@ def fuse(
     gnss_sigma: float | Mapping[str, Any] | None = None,
     gnss_delay_s: float = 0.0,
     gnss_correlation: str | float = "auto",
-    rate_hz: float = 10.0,
+    topic: tuple[str | None, str | None] | None = None,
     smooth: bool = False,
     progress: Progress = None,
 ) -> Fusion:
@@ -249,8 +251,8 @@ def fuse(
     imu
         A file, or columns: `t_s`, and rates `gyro_x_rad_s` … `accel_z_m_s2` or increments `dtheta_x_rad` … `dv_z_m_s`.
     gnss
-        A file, or columns: `t_s`, `lat_deg`, `lon_deg`, `h_m`, `sd_n_m`, `sd_e_m`, `sd_d_m`, and velocities `v_n_m_s` … with
-        `sd_vn_m_s` ….
+        A file, or columns: `t_s`, `lat_deg`, `lon_deg`, `h_m`, `sd_n_m`, `sd_e_m`, `sd_d_m`, and velocities `v_n_m_s`
+        … with `sd_vn_m_s` ….
     model
         What the filter believes of the IMU.
     initial
@@ -258,10 +260,10 @@ def fuse(
     lever_arm_m
         The antenna from the IMU: front, right, down (m).
     heading_deg
-        Heading at the start and its standard deviation (°).
+        Heading at the start and its standard deviation (°), where the course does not show it.
     mounting
-        "flu" or "rfu" (axes of that name), "auto" (found from the drive), or roll, pitch, yaw (°), with standard deviations
-        ((roll, pitch, yaw), (sd, sd, sd)).
+        "flu" or "rfu" (axes of that name), "auto" (found from the drive), or roll, pitch, yaw (°), with standard
+        deviations ((roll, pitch, yaw), (sd, sd, sd)).
     reference
         A trajectory to compare with.
     outages
@@ -272,8 +274,8 @@ def fuse(
         How late fixes are stamped (s).
     gnss_correlation
         How long errors of positions last: "auto", "none", or seconds.
-    rate_hz
-        Rows of the solution a second.
+    topic
+        Topics of IMU and fixes in a log that has several.
     smooth
         Also estimate every row from all fixes.
 
@@ -282,19 +284,20 @@ def fuse(
     `.solution`, `.innovations`, `.errors`, `.verdict`, `.plot()`, `.summary()`, `.to_html(path)`, `.write(directory)`.
     """
     with Staging() as staging:
-        heading = None if heading_deg is None else dict(zip(("deg", "sigma_deg"), map(float, heading_deg)))
+        if heading_deg is not None:
+            deg, sigma_deg = map(float, heading_deg)
+            initial = f"{deg!r}:{sigma_deg!r}"
         lasts = gnss_correlation if isinstance(gnss_correlation, str) else {"seconds": float(gnss_correlation)}
         return ask(
             Fusion,
             "fuse",
             staging,
             progress,
-            imu=imu if is_path(imu) else staging.arrays("imu", columns(imu, "imu")),  # type: ignore[arg-type]
+            imu=staging.columns(imu, "imu"),
             gnss=staging.table(gnss, "gnss"),
             model=_model.staged(model, "model", staging),
             initial=staging.settings(initial, "initial"),
             lever_arm_m=[float(x) for x in lever_arm_m],
-            heading=heading,
             mounting=_mounting(mounting),
             reference=None if reference is None else _reference(reference, staging),
             outages=[{"start_s": float(a), "end_s": float(b)} for a, b in outages],
@@ -303,7 +306,7 @@ def fuse(
             gnss_sigma=_sigma(gnss_sigma),
             gnss_delay_s=gnss_delay_s,
             gnss_correlation=lasts,
-            rate_hz=rate_hz,
+            topic=None if topic is None else {"imu": topic[0], "fixes": topic[1]},
             smooth=smooth,
         )
 

@@ -22,14 +22,15 @@ if TYPE_CHECKING:
 class Trajectory:
     """A motion: a file, or columns.
 
-    Columns are `t_s`, `lat_deg`, `lon_deg`, `h_m`, and `roll_deg`, `pitch_deg`, `yaw_deg` where they are known; without them
-    heading and pitch follow the path. `n_m`, `e_m`, `d_m` are metres north, east and down of `origin` (latitude and longitude in
-    degrees, height in m). Files: motion profiles (.toml), tables (.csv), KF-GINS (.nav), TUM, GPX.
+    Columns are `t_s`, `lat_deg`, `lon_deg`, `h_m`, and `roll_deg`, `pitch_deg`, `yaw_deg` where they are known;
+    without them heading and pitch follow the path. `n_m`, `e_m`, `d_m` are metres north, east and down of `origin`
+    (latitude and longitude in degrees, height in m). Files: motion profiles (.toml), tables (.csv), KF-GINS (.nav),
+    TUM, GPX.
     """
 
     def __init__(self, source: StrPath | Table, origin: tuple[float, float, float] | None = None) -> None:
         if is_path(source):
-            self._path: str | None = os.fspath(source)  # type: ignore[arg-type]
+            self._path: str | None = os.fspath(source)
             self._columns: dict[str, FloatArray] = {}
         else:
             self._path, self._columns = None, columns(source, "trajectory")  # type: ignore[arg-type]
@@ -81,5 +82,3 @@ def staged(trajectory: StrPath | Table | Trajectory, staging: Staging) -> str:
     if isinstance(trajectory, Trajectory):
         return trajectory.staged(staging)
     return staging.table(trajectory, "trajectory")
-
-

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 class Curve(dict[str, FloatArray]):
     """A variance or deviation, scale by scale: a dict of arrays of one length.
 
-    `tau_s` are the times (s), `ci_low` and `ci_high` the ends of the 95 % intervals, `edof` the equivalent degrees of freedom;
-    the figure itself is `wv` (units²) or `adev` (units).
+    `tau_s` are the times (s), `ci_low` and `ci_high` the ends of the 95 % intervals, `edof` the equivalent degrees of
+    freedom; the figure itself is `wv` (units²) or `adev` (units).
     """
 
     def plot(self, ax: Axes | None = None, **line: Any) -> Axes:
@@ -66,8 +66,13 @@ def wavelet_variance(
     """
     rate = _rate(rate_hz)
     found = _native.wavelet(vector(x, "x"), scales, efficiency if robust else None)
-    count = len(found["wv"])
-    return Curve(tau_s=2.0 ** np.arange(1, count + 1) / rate, **found)
+    return Curve(tau_s=scales_s(len(found["wv"]), rate), **found)
+
+
+def scales_s(count: int, rate_hz: float) -> FloatArray:
+    """The first scales, 2, 4, 8, … samples (s)."""
+    scales: FloatArray = np.exp2(np.arange(1.0, count + 1.0)) / rate_hz
+    return scales
 
 
 def allan_deviation(
@@ -147,9 +152,9 @@ def wv(
 ) -> WaveletVariances:
     """Wavelet variances (classical, robust) of static recordings: `nav-sim wv`.
 
-    The recordings are given as to `calibrate`. `axes` takes some of the signals ("gyro", "accel.x"); `intervals` is "eta3" or
-    "large-sample"; `skip_s` leaves out seconds at the beginning, "auto" what is not as the rest; `gaps` is "keep", "refuse", "split"
-    or "ignore".
+    The recordings are given as to `calibrate`. `axes` takes some of the signals ("gyro", "accel.x"); `intervals` is
+    "eta3" or "large-sample"; `skip_s` leaves out seconds at the beginning, "auto" what is not as the rest; `gaps` is
+    "keep", "refuse", "split" or "ignore".
     """
     with Staging() as staging:
         files = staging.recordings(recordings, "recordings", axes if isinstance(axes, str) else None)

@@ -2,7 +2,7 @@
 
 use crate::{error, table};
 use nav_sim::answered::Answered;
-use nav_sim::document::Importance;
+use nav_sim::document::{Document, Importance};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -12,15 +12,29 @@ const WIDTH: usize = 120;
 /// The answer to a request: as the command prints, draws and writes it.
 #[pyclass(frozen, module = "nav_sim._native")]
 pub(crate) struct Answer {
-    answered: Answered,
+    json: String,
+    document: Document,
+    files: Vec<(String, String)>,
+    unmet: Option<String>,
     hidden: String,
     #[pyo3(get)]
     warnings: Vec<String>,
 }
 
 impl Answer {
-    pub(crate) const fn new(answered: Answered, hidden: String, warnings: Vec<String>) -> Self {
-        Self { answered, hidden, warnings }
+    pub(crate) fn new(answered: Answered, hidden: String, warnings: Vec<String>) -> Self {
+        let unmet = answered.unmet.map(|unmet| unmet.to_string());
+        Self { files: answered.files, hidden, ..Self::of(answered.json, answered.document, unmet, warnings) }
+    }
+
+    /// An answer whose files are where the engine wrote them.
+    pub(crate) const fn of(
+        json: String,
+        document: Document,
+        unmet: Option<String>,
+        warnings: Vec<String>,
+    ) -> Self {
+        Self { json, document, files: Vec::new(), unmet, hidden: String::new(), warnings }
     }
 
     /// A text without the directory of what came as arrays. JSON writes the backslashes of Windows twice.
@@ -32,7 +46,7 @@ impl Answer {
     }
 
     fn file(&self, py: Python<'_>, name: &str) -> PyResult<&str> {
-        let found = self.answered.files.iter().find(|(own, _)| own == name);
+        let found = self.files.iter().find(|(own, _)| own == name);
         let missing = || error::raise(py, &format!("there is no {name} in this answer"), None, None, None);
         found.map(|(_, text)| text.as_str()).ok_or_else(missing)
     }
@@ -42,13 +56,13 @@ impl Answer {
 impl Answer {
     /// As JSON.
     fn json(&self) -> String {
-        self.shown(&self.answered.json)
+        self.shown(&self.json)
     }
 
     /// As the terminal shows it.
     fn summary(&self, py: Python<'_>) -> String {
         py.detach(|| {
-            let document = &self.answered.document;
+            let document = &self.document;
             let text = document.terminal(WIDTH);
             let spoken = document.spoken(false).map(|note| match note.importance {
                 Importance::Warning => format!("\nwarning: {}", note.text),
@@ -60,17 +74,17 @@ impl Answer {
 
     /// Its verdict, a line each.
     fn verdict(&self) -> Vec<String> {
-        self.answered.document.verdict.lines.iter().map(|line| self.shown(line)).collect()
+        self.document.verdict.lines.iter().map(|line| self.shown(line)).collect()
     }
 
     /// As a page of its own.
     fn html(&self, py: Python<'_>) -> String {
-        py.detach(|| self.shown(&self.answered.document.html()))
+        py.detach(|| self.shown(&self.document.html()))
     }
 
     /// Names of the files that the command writes.
     fn names(&self) -> Vec<String> {
-        self.answered.files.iter().map(|(name, _)| name.clone()).collect()
+        self.files.iter().map(|(name, _)| name.clone()).collect()
     }
 
     /// The text of one of them.
@@ -86,6 +100,6 @@ impl Answer {
     /// Why the command would end with exit code 3.
     #[getter]
     fn unmet(&self) -> Option<String> {
-        self.answered.unmet.as_ref().map(|unmet| self.shown(&unmet.to_string()))
+        self.unmet.as_deref().map(|unmet| self.shown(unmet))
     }
 }

@@ -4,6 +4,7 @@ mod answer;
 mod error;
 mod model;
 mod request;
+mod study;
 mod table;
 mod trajectory;
 mod wavelet;
@@ -17,6 +18,10 @@ mod native {
     use crate::model::{model_contents, model_export, model_practical, model_recording, model_wavelet};
     #[pymodule_export]
     use crate::request::{answer, main};
+    #[pymodule_export]
+    use crate::study::{study_merge, study_plan, study_run};
+    #[pymodule_export]
+    use crate::table::columns;
     #[pymodule_export]
     use crate::trajectory::trajectory_states;
     #[pymodule_export]

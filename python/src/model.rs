@@ -4,6 +4,7 @@ use crate::error;
 use crate::work::work;
 use nav_sim::export::exported;
 use nav_sim::failure::Failure;
+use nav_sim::formats::contamination_file;
 use nav_sim::formats::model_file::{self, ModelFile};
 use nav_sim::prelude::{AxisParameters, Channel, Composite, Horizon, Pair, Policy, Sensor, Target};
 use nav_sim::signal::noise::practical::Minimum;
@@ -36,7 +37,7 @@ pub(crate) fn model_contents(py: Python<'_>, text: &str, path: Option<&str>) -> 
 
 /// One recording of a model, counted from 1: a column a channel.
 #[pyfunction]
-#[pyo3(signature = (text, samples, replicate, seed, spread))]
+#[pyo3(signature = (text, samples, replicate, seed, spread, contaminate))]
 pub(crate) fn model_recording<'py>(
     py: Python<'py>,
     text: &str,
@@ -44,18 +45,21 @@ pub(crate) fn model_recording<'py>(
     replicate: u64,
     seed: u64,
     spread: bool,
+    contaminate: Option<&str>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let file = read(py, text, None)?;
-    let made = work(py, None, move |meter| -> Result<Vec<(Channel, Vec<f64>)>, ReplicateError> {
+    let found = contaminate.map(|name| contamination_file::find(name, file.model.rate_hz)).transpose();
+    let contamination = found.map_err(|e| error::of_failure(py, &Failure::from(e), ""))?;
+    let made = work(py, None, move |meter| {
         let spread = file.spread.as_ref().filter(|_| spread);
-        let imu = VirtualImu { model: &file.model, spread, contamination: None, seed };
+        let imu = VirtualImu { model: &file.model, spread, contamination: contamination.as_ref(), seed };
         let model = imu.model_of(replicate)?;
         let present = Channel::ALL.into_iter().filter(|channel| !file.missing.contains(channel));
         let signal = |channel| {
             meter.advance(1);
             Ok((channel, imu.signal(&model, replicate, channel, samples)?))
         };
-        present.map(signal).collect()
+        present.map(signal).collect::<Result<Vec<_>, ReplicateError>>()
     })?;
     let made = made.map_err(|e| error::raise(py, &e.to_string(), None, None, None))?;
     let columns = PyDict::new(py);

@@ -23,18 +23,30 @@ use std::ffi::OsString;
 use std::sync::{Mutex, PoisonError};
 
 /// Seed where neither the request nor a file has one: the same call gives the same answer.
-const SEED: u64 = 1;
+pub(crate) const SEED: u64 = 1;
 
 /// Takes down what a job warns of, and counts what it does.
-struct Clerk<'a> {
-    meter: &'a Meter,
+pub(crate) struct Clerk<'a> {
+    pub(crate) meter: &'a Meter,
     warnings: Mutex<Vec<String>>,
 }
 
-impl Clerk<'_> {
+impl<'a> Clerk<'a> {
+    pub(crate) fn new(meter: &'a Meter) -> Self {
+        Self { meter, warnings: Mutex::default() }
+    }
+
+    pub(crate) fn warn_of(&self, doubt: String) {
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(doubt);
+    }
+
     fn warn(&self, said: Vec<Said>) {
         let doubts = said.into_iter().filter(|said| said.importance == Importance::Warning);
-        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).extend(doubts.map(|said| said.text));
+        doubts.for_each(|said| self.warn_of(said.text));
+    }
+
+    pub(crate) fn warnings(self) -> Vec<String> {
+        self.warnings.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -83,9 +95,9 @@ pub(crate) fn answer(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Answer> {
     let (answered, warnings) = work(py, progress, move |meter| {
-        let clerk = Clerk { meter, warnings: Mutex::default() };
+        let clerk = Clerk::new(meter);
         let answered = answered(&command, &request, &clerk);
-        (answered, clerk.warnings.into_inner().unwrap_or_else(PoisonError::into_inner))
+        (answered, clerk.warnings())
     })?;
     let shown = |text: String| if hidden.is_empty() { text } else { text.replace(&hidden, "") };
     match answered {

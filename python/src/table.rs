@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 /// A CSV with a header: numbers as arrays, where a cell without one is NaN; other columns as lists of texts.
+#[pyfunction]
 pub(crate) fn columns<'py>(py: Python<'py>, text: &str) -> PyResult<Bound<'py, PyDict>> {
     let (names, columns) =
         py.detach(|| parse(text)).map_err(|e| pyo3::exceptions::PyValueError::new_err(e.to_string()))?;

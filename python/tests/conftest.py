@@ -10,9 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 import nav_sim
+import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 DRIVE = ROOT / "trajectories" / "figure_eight.toml"

@@ -6,11 +6,10 @@ import json
 from pathlib import Path
 from typing import Any
 
+import nav_sim
 import numpy as np
 import pytest
 from conftest import Command, table, without_times
-
-import nav_sim
 from nav_sim import Model, NavSimError, calibrate
 
 USUAL: dict[str, Any] = {"model": "AR1+RW+WN", "bootstrap": 20}
@@ -117,3 +116,13 @@ def test_progress_is_told(recordings: Path) -> None:
     told: list[tuple[int, int]] = []
     calibrate(recordings, progress=lambda done, total: told.append((done, total)), **USUAL)
     assert told and all(0 <= done <= total for done, total in told)
+
+
+@pytest.mark.filterwarnings("ignore::nav_sim.NavSimWarning")
+def test_a_calibrated_model_keeps_its_intervals(recordings: Path, short: Path, tmp_path: Path) -> None:
+    fit = calibrate(recordings, **USUAL)
+    written = nav_sim.lincov(short, fit.model.write(tmp_path / "m.toml"), outages=[(20, 40)])
+    in_memory = nav_sim.lincov(short, fit.model, outages=[(20, 40)])
+    interval = in_memory.outages["horizontal_error_end_m_p95_ci95_low"]
+    assert np.isfinite(interval).all()
+    np.testing.assert_array_equal(interval, written.outages["horizontal_error_end_m_p95_ci95_low"])

@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import nav_sim
 import pytest
 from conftest import CONSUMER, DRIVE, TACTICAL, Command, first_seconds, without_times
-
-import nav_sim
 
 
 def test_tune(short: Path, command: Command, tmp_path: Path) -> None:
@@ -33,7 +32,21 @@ def test_require(short: Path, command: Command, tmp_path: Path) -> None:
 
 
 def test_design(command: Command) -> None:
-    words = ("--recordings", 4, "--hours", 0.1, "--draws", 40, "--estimator", "awv", "--seed", 1, "--format", "json", "-q")
+    words = (
+        "--recordings",
+        4,
+        "--hours",
+        0.1,
+        "--draws",
+        40,
+        "--estimator",
+        "awv",
+        "--seed",
+        1,
+        "--format",
+        "json",
+        "-q",
+    )
     said = command("design", TACTICAL, *words).stdout
     own = nav_sim.design(TACTICAL, recordings=4, hours=0.1, draws=40, estimator="awv", seed=1)
     assert own._native.json() == said
@@ -42,11 +55,22 @@ def test_design(command: Command) -> None:
 def test_choose(recordings: Path, tmp_path: Path, command: Command) -> None:
     # a drive as long as the recordings
     path = first_seconds(30.0, tmp_path / "drive.csv")
-    words = ("--trajectory", path, "--outage", "10:15", "--model", "WN+RW", "--estimator", "awv", "--runs", 2, "--seed", 1)
-    said = command("choose", recordings, *words, "--format", "json", "-q", "-o", tmp_path / "chosen").stdout
-    own = nav_sim.choose(
-        recordings, path, outages=[(10, 15)], model=["WN+RW"], estimator=["awv"], runs=2, seed=1
+    words = (
+        "--trajectory",
+        path,
+        "--outage",
+        "10:15",
+        "--model",
+        "WN+RW",
+        "--estimator",
+        "awv",
+        "--runs",
+        2,
+        "--seed",
+        1,
     )
+    said = command("choose", recordings, *words, "--format", "json", "-q", "-o", tmp_path / "chosen").stdout
+    own = nav_sim.choose(recordings, path, outages=[(10, 15)], model=["WN+RW"], estimator=["awv"], runs=2, seed=1)
     assert without_times(own._native.json()) == without_times(said)
     assert own.model == nav_sim.Model.read(tmp_path / "chosen" / "model.toml")
 
@@ -54,10 +78,54 @@ def test_choose(recordings: Path, tmp_path: Path, command: Command) -> None:
 def test_compare(short: Path, command: Command, tmp_path: Path) -> None:
     for name, filter in (("full", "full"), ("15", 15)):
         nav_sim.run(short, TACTICAL, runs=4, outages=[(20, 40)], filter=filter, seed=1).write(tmp_path / name)
-    said = command("compare", tmp_path / "15", "--reference", tmp_path / "full", "--format", "json", "-q", cwd=tmp_path).stdout
+    said = command(
+        "compare", tmp_path / "15", "--reference", tmp_path / "full", "--format", "json", "-q", cwd=tmp_path
+    ).stdout
     own = nav_sim.compare(tmp_path / "15", tmp_path / "full")
     assert own._native.json() == said
     assert own.table("comparison.csv")
+
+
+STUDY = """
+runs = 4
+unit_runs = 2
+seed = 1
+reference = "tactical"
+[[trajectory]]
+file = "short.csv"
+[[truth]]
+model = "{TACTICAL}"
+[[candidate]]
+name = "tactical"
+model = "{TACTICAL}"
+[[candidate]]
+name = "consumer"
+model = "{CONSUMER}"
+[[outages]]
+sweep = {{ start_s = 20, duration_s = [5, 20] }}
+"""
+
+
+def test_a_study(short: Path, command: Command, tmp_path: Path) -> None:
+    (tmp_path / "short.csv").write_bytes(short.read_bytes())
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY.format(TACTICAL=TACTICAL.as_posix(), CONSUMER=CONSUMER.as_posix()), encoding="utf-8")
+    for step in ("plan", "run", "merge"):
+        command("batch", step, path, "-o", tmp_path / "command", "-q")
+    study = nav_sim.Study(path, tmp_path / "own")
+    with pytest.raises(nav_sim.NavSimError, match="plan"):
+        study.run()
+    units = study.plan()
+    with pytest.raises(nav_sim.NavSimError):
+        study.merge()
+    assert study.run(shard=(0, 2)) + study.run(shard=(1, 2)) == units
+    assert study.run() == 0
+    tables = study.merge()
+    for name in ("outages.csv", "runs.csv"):
+        assert tables.text(name) == (tmp_path / "command" / "results" / name).read_text(encoding="utf-8"), name
+    assert set(tables.outages["candidate"]) == {"tactical", "consumer"} and tables.summary()
+    with pytest.raises(nav_sim.NavSimError, match="shard"):
+        study.run(shard=(2, 2))
 
 
 def test_wrong_arguments(tmp_path: Path) -> None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from conftest import CONSUMER, DRIVE, TACTICAL, Command
-
+from conftest import CONSUMER, DRIVE, TACTICAL, Command, table
 from nav_sim import Model, NavSimError, NavSimWarning, Trajectory
 
 
@@ -37,23 +37,36 @@ def test_a_model_file_comes_back_as_it_was(tmp_path: Path) -> None:
 def test_what_is_no_model_is_refused() -> None:
     with pytest.raises(NavSimError, match="no/such"):
         Model.read("no/such.toml")
-    for arguments in ((-1.0, [], []), (100.0, [{"type": "XX"}]), (100.0, [{"type": "WN", "sigma2": -1.0}]), (100.0,)):
+    wrong: list[tuple[Any, ...]] = [
+        (-1.0, [], []),
+        (100.0, [{"type": "XX"}]),
+        (100.0, [{"type": "WN", "sigma2": -1.0}]),
+        (100.0,),
+    ]
+    for arguments in wrong:
         with pytest.raises(NavSimError):
-            Model(*arguments)  # type: ignore[arg-type]
+            Model(*arguments)
     with pytest.raises(NavSimError) as refused:
         Model.from_toml("schema = 1\nrate_hz = 100.0\n[gyro]\nprocesses = 3\n")
     assert refused.value.line == 4
 
 
-def test_a_recording_is_that_of_the_command(command: Command, tmp_path: Path) -> None:
-    words = ("--replicates", 2, "--samples", 500, "--seed", 7, "--format-out", "npy", "-q", "-o", tmp_path / "static")
-    command("synthesize", TACTICAL, *words)
-    own = Model.read(TACTICAL).synthesize(samples=500, replicate=2, seed=7)
-    np.testing.assert_array_equal(np.stack([*own.values()], axis=1), np.load(tmp_path / "static" / "replicate_2.npy"))
+@pytest.mark.parametrize("contaminate", [None, "section5-III"])
+def test_a_recording_is_that_of_the_command(contaminate: str | None, command: Command, tmp_path: Path) -> None:
+    words = ("--replicates", 2, "--samples", 60000, "--spread", "--seed", 7, "-q", "-o", tmp_path / "static")
+    command("synthesize", CONSUMER, *words, *(("--contaminate", contaminate) if contaminate else ()))
+    own = Model.read(CONSUMER).synthesize(samples=60000, replicate=2, seed=7, spread=True, contaminate=contaminate)
+    # the file has ten digits
+    for name, values in table(tmp_path / "static" / "replicate_2.csv").items():
+        if name != "t_s":
+            np.testing.assert_allclose(own[name], values, rtol=6e-10, err_msg=name)
+
+
+def test_the_length_of_a_recording() -> None:
     assert len(Model.read(TACTICAL).synthesize(duration_s=2.0)["gyro_x_rad_s"]) == 200
     for arguments in ({}, {"samples": 0}, {"samples": 5, "duration_s": 1.0}, {"samples": 5, "seed": -1}):
         with pytest.raises(NavSimError):
-            white_and_walk().synthesize(**arguments)  # type: ignore[arg-type]
+            white_and_walk().synthesize(**arguments)
 
 
 def test_the_wavelet_variance_of_white_noise_and_a_walk() -> None:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import nav_sim
 import numpy as np
 import pytest
 from conftest import CONSUMER, DRIVE, TACTICAL, Command, table, without_times
-
-import nav_sim
 from nav_sim import Model, NavSimError, Trajectory, fuse, lincov, run
 
 FILES = ["epochs.csv", "fan.csv", "runs.csv"]
@@ -49,9 +48,11 @@ def test_covariance_analysis_is_that_of_the_command(command: Command, tmp_path: 
     assert own.unmet is not None and own.verdict == "overconfident"
 
 
-def test_models_trajectories_and_settings_in_memory_are_those_of_files(short: Path, tactical: Model, tmp_path: Path) -> None:
+def test_models_trajectories_and_settings_in_memory_are_those_of_files(
+    short: Path, tactical: Model, tmp_path: Path
+) -> None:
     (tmp_path / "scenario.toml").write_text(
-        "[imu]\nscale_ppm_gyro = 300\n[gnss]\npos_sigma_m = [1.0, 1.5, 3.0]\n[[outage]]\nstart_s = 20.0\nend_s = 40.0\n",
+        "[imu]\nscale_ppm_gyro = 300\n[gnss]\npos_sigma_m = [1.0, 1.5, 3.0]\n[[outage]]\nstart_s = 20\nend_s = 40.0\n",
         encoding="utf-8",
     )
     settings = {
@@ -84,9 +85,14 @@ def test_bounds_are_told(short: Path) -> None:
 
 
 def test_wrong_arguments_are_refused() -> None:
-    for arguments in ({"filter": 16}, {"require": "p95<5"}, {"scenario": {"imu": {"rate": 1.0}}}, {"turn_on_bias": (1,)}):
+    for arguments in (
+        {"filter": 16},
+        {"require": "p95<5"},
+        {"scenario": {"imu": {"rate": 1.0}}},
+        {"turn_on_bias": (1,)},
+    ):
         with pytest.raises(NavSimError):
-            lincov(DRIVE, TACTICAL, **arguments)  # type: ignore[arg-type]
+            lincov(DRIVE, TACTICAL, **arguments)
     with pytest.raises(NavSimError, match="no/such"):
         lincov("no/such.toml", TACTICAL)
     with pytest.raises(NavSimError) as refused:
@@ -103,6 +109,17 @@ def test_a_fusion_is_that_of_the_command(drive: Path, command: Command, tmp_path
     for name in ("solution.csv", "innovations.csv", "errors.csv", "smoothed.csv", "solution.kml"):
         assert own.text(name) == (tmp_path / "fused" / name).read_text(encoding="utf-8"), name
     assert own.innovations["status"].dtype.kind == "U" and own.solution["t_s"].dtype == np.float64
+
+
+def test_a_start_that_is_given(drive: Path, command: Command, tmp_path: Path) -> None:
+    files = (drive / "imu.csv", drive / "gnss.csv", TACTICAL)
+    said = command("fuse", *files, "--initial", "90:5", "-q", "--format", "json", "-o", tmp_path / "a", code=3).stdout
+    wrong = fuse(*files, heading_deg=(90, 5))
+    assert json.loads(wrong._native.json()) == json.loads(said) and wrong.unmet is not None
+    said = command(
+        "fuse", *files, "--initial", drive / "initial.toml", "-q", "--format", "json", "-o", tmp_path / "b"
+    ).stdout
+    assert json.loads(fuse(*files, initial=drive / "initial.toml")._native.json()) == json.loads(said)
 
 
 def test_a_fusion_of_arrays_is_that_of_files(drive: Path, tactical: Model) -> None:

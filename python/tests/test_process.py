@@ -11,11 +11,10 @@ import threading
 import time
 from pathlib import Path
 
+import nav_sim
 import numpy as np
 import pytest
 from conftest import DRIVE, TACTICAL, Command
-
-import nav_sim
 
 
 def python(script: str, *words: object) -> subprocess.Popen[str]:
@@ -101,9 +100,11 @@ def test_many_calls_leave_memory_flat() -> None:
 
     def calls(count: int) -> None:
         for _ in range(count):
-            nav_sim.wavelet_variance(x, 1.0, robust=True)
-            with pytest.raises(nav_sim.NavSimError):
+            nav_sim.wavelet_variance(x, 1.0)
+            try:
                 nav_sim.wavelet_variance(wrong, 1.0)
+            except nav_sim.NavSimError:
+                pass
 
     x = np.random.default_rng(1).standard_normal(2000)
     wrong = np.full(2000, np.nan)
@@ -117,7 +118,8 @@ def test_many_calls_leave_memory_flat() -> None:
 def test_the_command_is_the_program(command: Command, tmp_path: Path) -> None:
     assert command("--version").stdout.startswith("nav-sim ")
     assert "lincov" in command("run", "--help").stdout
-    assert "no/such" in command("wv", "no/such.csv", code=2).stderr or command("wv", "no/such.csv", code=1)
+    assert "no/such.csv" in command("wv", "no/such.csv", code=1).stderr
+    assert "--no-such" in command("wv", "--no-such", code=2).stderr
     done = command("run", DRIVE, TACTICAL, "--method", "lincov", "-q", "-o", tmp_path / "run")
     assert "horizontal" in done.stdout
     assert '"nav-sim"' in (tmp_path / "run" / "manifest.json").read_text(encoding="utf-8")

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import nav_sim
 import numpy as np
 import pytest
 from conftest import Command, table
-
-import nav_sim
 from nav_sim import NavSimError, allan_deviation, wavelet_variance
 
 
@@ -103,7 +102,7 @@ def test_what_is_no_signal_is_refused_by_name(x: object, rate_hz: float, words: 
 def test_too_many_scales_and_no_efficiency() -> None:
     for arguments in ({"scales": 10}, {"scales": 0}, {"robust": True, "efficiency": 2.0}):
         with pytest.raises(NavSimError):
-            wavelet_variance(np.arange(64.0), 1.0, **arguments)  # type: ignore[arg-type]
+            wavelet_variance(np.arange(64.0), 1.0, **arguments)
 
 
 def test_frames_take_a_curve() -> None:
