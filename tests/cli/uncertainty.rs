@@ -145,7 +145,7 @@ fn flicker_noise_is_read_by_all() {
     let fitted = &found["fits"][0]["processes"][1];
     let [low, high] = [0, 1].map(|i| fitted["b2_ci95"][i].as_f64().unwrap());
     assert!(low < 1e-8 && 1e-8 < high && high < 2.0 * low, "{fitted}");
-    done(dir, "export m.toml --target kalibr");
+    done(dir, "export imu.toml --target kalibr");
     let lincov = done(dir, "run drive.toml imu.toml --method lincov --filter full --outage 30:45 -o full");
     assert!(lincov.stdout.starts_with("verdict: consistent"), "{}", lincov.stdout);
     done(dir, "run drive.toml imu.toml --runs 4 --outage 30:45 --seed 1 -o runs");
