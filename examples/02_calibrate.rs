@@ -30,6 +30,7 @@ fn replicate(k: u64, tuning: &Tuning) -> Result<Replicate, Box<dyn std::error::E
         samples: SAMPLES,
         classical,
         robust,
+        coverage: Vec::new(),
         trend: f64::NAN,
         mean: f64::NAN,
     })

@@ -1,8 +1,8 @@
 //! How often the 95 % intervals of a calibration contain the truth, and the mean error of the estimates: sets of
 //! eight replicates of the paper's Section IV (clean, parameters drawn for each), theta_0 by quadrature.
 //!
-//! `cargo run --release --example 05_interval_coverage -- SETS SAMPLES DRAWS CASE` (default 200 65536 199 paper). Other
-//! cases, six replicates of one noise: `qn32`, `qn50`, `qn66`, `qn86` (white noise, random walk, and quantization noise that
+//! `cargo run --release --example 05_interval_coverage -- SETS SAMPLES DRAWS CASE LOST BURST` (default 200 65536 199 paper
+//! 0 1: LOST per cent of the samples are missing, BURST at a time). Other cases, six replicates of one noise: `qn32`, `qn50`, `qn66`, `qn86` (white noise, random walk, and quantization noise that
 //! is so many per cent of the first scale), `n2` (two AR1, 64 %); `single`: white noise and random walk, one recording.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
@@ -11,40 +11,49 @@ mod cases;
 use cases::case;
 use nav_sim::calibration::efficiency::{Design, target};
 use nav_sim::calibration::{
-    Bootstrap, ModelChoice, Outcome, Pool, Replicate, Settings, calibrate, grouped, infer,
+    Bootstrap, ModelChoice, Outcome, Pool, Settings, calibrate, grouped, infer, replicates,
 };
 use nav_sim::efficiency::file as efficiency_file;
+use nav_sim::signal::imu::{Recording, Signal};
 use nav_sim::signal::noise::Synthesizer;
-use nav_sim::signal::rng::StreamKey;
-use nav_sim::signal::wavelet::both;
+use nav_sim::signal::rng::{Generator, StreamKey};
+use rand::RngExt;
 use rayon::prelude::*;
 use std::error::Error;
 use std::path::Path;
 
 type Failure = Box<dyn Error + Send + Sync>;
 
+/// Missing samples: their share, and how many are lost at a time.
+#[derive(Clone, Copy)]
+struct Holes {
+    share: f64,
+    burst: usize,
+}
+
+fn lose(signal: &mut [f64], Holes { share, burst }: Holes, generator: &mut Generator) {
+    let mut lost = 0;
+    while (lost as f64) < share * signal.len() as f64 {
+        let start = generator.random_range(0..signal.len() - burst);
+        for x in &mut signal[start..start + burst] {
+            lost += usize::from(!x.is_nan());
+            *x = f64::NAN;
+        }
+    }
+}
+
 /// The fits of one set, with their intervals.
-fn set(design: &Design, set: u64, draws: usize) -> Result<Vec<Outcome>, Failure> {
+fn set(design: &Design, set: u64, draws: usize, holes: Holes) -> Result<Vec<Outcome>, Failure> {
     let mut measured = Vec::new();
     for run in 0..design.replicates {
         let drawn = design.spread.draw(&design.model, set, run)?;
         let key = StreamKey { seed: set, scenario: "coverage", run, source: "", process: "" };
         let mut signal = vec![0.0; design.samples];
         Synthesizer::new(drawn.axis(design.channel), key).fill(&mut signal);
-        let (classical, robust) = both(&signal, design.levels, &design.tuning)?;
-        let (name, axis) = (run.to_string(), Some(design.channel.axis));
-        measured.push((
-            design.channel,
-            Replicate {
-                name,
-                axis,
-                samples: design.samples,
-                classical,
-                robust,
-                trend: f64::NAN,
-                mean: f64::NAN,
-            },
-        ));
+        lose(&mut signal, holes, &mut StreamKey { process: "holes", ..key }.generator());
+        let signals = vec![Signal { channel: design.channel, mean: 0.0, samples: signal }];
+        let recording = Recording { name: run.to_string(), rate_hz: design.model.rate_hz, signals };
+        measured.extend(replicates(&recording, Some(design.levels), &design.tuning)?);
     }
     let settings = Settings {
         estimators: design.estimators.clone(),
@@ -66,13 +75,15 @@ fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let number = |i: usize, default: usize| arguments.get(i).map_or(Ok(default), |a| a.parse::<usize>());
     let (sets, samples, draws) = (number(0, 200)?, number(1, 1 << 16)?, number(2, 199)?);
+    let share = arguments.get(4).map_or(Ok(0.0), |a| a.parse::<f64>())? / 100.0;
+    let holes = Holes { share, burst: number(5, 1)? };
     let name = arguments.get(3).map_or("paper", String::as_str);
     let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/paper_fig2.toml");
     let design = case(name, efficiency_file::read(&study)?.design.with_samples(samples))?;
     let aim = target(&design)?;
     let (names, truth) = (Design::parameters(&aim.fit.composite), Design::values(&aim.fit.composite));
     let all: Vec<Vec<Outcome>> =
-        (0..sets as u64).into_par_iter().map(|s| set(&design, s, draws)).collect::<Result<_, _>>()?;
+        (0..sets as u64).into_par_iter().map(|s| set(&design, s, draws, holes)).collect::<Result<_, _>>()?;
     println!(
         "{name}: {sets} sets, {samples} samples, {draws} draws; mean of estimate over truth, and its standard error; truth in \
          the 95 % interval (below it, above it, no interval)"

@@ -189,7 +189,8 @@ def choose(
             runs=runs,
             trim=None if trim is None else str(trim),
             scenario=None if scenario is None else staging.settings(scenario, "scenario"),
-            recordings=reading(rate_hz, skip_s, gaps, None)["reading"],
+            recordings=reading(rate_hz, skip_s, None, None)["reading"],
+            gaps=gaps,
             seed=seed,
         )
 

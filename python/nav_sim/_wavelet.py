@@ -135,7 +135,7 @@ def reading(
     """How recordings are read, as a request has it."""
     words = axes.split(",") if isinstance(axes, str) else axes
     skip = None if skip_s is None else str(skip_s)
-    return {"reading": {"rate_hz": rate_hz, "skip_s": skip, "gaps": gaps}, "axes": words}
+    return {"reading": {"rate_hz": rate_hz, "skip_s": skip}, "gaps": gaps, "axes": words}
 
 
 def wv(
@@ -154,7 +154,7 @@ def wv(
 
     The recordings are given as to `calibrate`. `axes` takes some of the signals ("gyro", "accel.x"); `intervals` is
     "eta3" or "large-sample"; `skip_s` leaves out seconds at the beginning, "auto" what is not as the rest; `gaps` is
-    "refuse", "split" or "ignore".
+    "keep", "refuse", "split" or "ignore".
     """
     with Staging() as staging:
         files = staging.recordings(recordings, "recordings", axes if isinstance(axes, str) else None)

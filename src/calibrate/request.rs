@@ -31,7 +31,7 @@ pub struct CalibrationRequest {
     #[arg(long, value_parser = parse::words::<EstimatorChoice>(&ESTIMATORS), default_value_t)]
     #[serde(with = "parse::text")]
     pub estimator: EstimatorChoice,
-    /// Sum of WN QN AR1 GM MA1 RW DR such as 2*AR1+RW+WN+QN, N1 = AR1+RW+WN, N2 = 2*AR1+RW+WN+QN, or auto: the
+    /// Sum of WN QN AR1 GM MA1 FN RW DR such as 2*AR1+RW+WN+QN, N1 = AR1+RW+WN, N2 = 2*AR1+RW+WN+QN, or auto: the
     /// simplest sum of WN QN RW DR and up to two AR1 that fits as well as the best one, with the reasons
     #[arg(long, value_name = "SUM", default_value = ModelSpec::USUAL)]
     pub model: String,

@@ -150,6 +150,7 @@ impl Anticipated<'_> {
             samples: self.samples,
             classical: Vec::new(),
             robust: Vec::new(),
+            coverage: Vec::new(),
             trend: f64::NAN,
             mean: f64::NAN,
         };

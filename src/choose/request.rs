@@ -6,7 +6,8 @@ use super::{Candidate, Inflation};
 use crate::answered::Answered;
 use crate::calibrate::{CalibrationNote, CalibrationOptions, ESTIMATORS};
 use crate::failure::Failure;
-use crate::jobs::{ReadingRequest, Remarks, unknown_model};
+use crate::formats::recordings::Gaps;
+use crate::jobs::{ReadingRequest, Remarks, WHOLE, unknown_model};
 use crate::observer::Observer;
 use crate::parse;
 use crate::run::{Note, OutageFlag, checked_scenario, read};
@@ -54,6 +55,10 @@ pub struct ChoiceRequest {
     /// Scenario file: receiver, start, what filters expect (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     pub scenario: Option<PathBuf>,
+    /// What to do where the time jumps or stands still
+    #[arg(long, value_parser = parse::words::<Gaps>(WHOLE), default_value_t)]
+    #[serde(with = "parse::text")]
+    pub gaps: Gaps,
     /// How recordings are read.
     #[command(flatten)]
     pub recordings: ReadingRequest,
@@ -106,7 +111,7 @@ impl ChoiceRequest {
             .hint("give one with --outage START:END"));
         }
         let options = CalibrationOptions {
-            reading: self.recordings.options(),
+            reading: self.recordings.options(self.gaps),
             skip_warm_up: self.recordings.skips_warm_up(),
             settings: Settings { trim: self.trim, ..Settings::default() },
             bootstrap: Some(Bootstrap { seed, ..Bootstrap::default() }),
@@ -139,7 +144,7 @@ impl ChoiceRequest {
     pub(crate) fn note(&self, made: &ChoiceMade) -> CalibrationNote {
         CalibrationNote {
             efficiency_convention: Convention::Exact,
-            reading: self.recordings.provenance(),
+            reading: self.recordings.provenance(self.gaps),
             seed: Some(made.seed),
             inputs: Vec::new(),
         }

@@ -283,7 +283,7 @@ mod tests {
         is_a_file_too::<crate::calibrate::CalibrationRequest>(
             "x a --estimator all --trim 30% --weighting edof --pool axes --skip-s auto --gaps split --rate-hz 100",
             "inputs = ['a']\nestimator = 'all'\ntrim = '30%'\nweighting = 'edof'\npool = 'axes'\n\
-             recordings.reading = { skip_s = 'auto', gaps = 'split', rate_hz = 100.0 }",
+             recordings = { gaps = 'split', reading = { skip_s = 'auto', rate_hz = 100.0 } }",
         );
         is_a_file_too::<crate::tune::TuneRequest>(
             "x m --truth a b --for mean --per process --outage none",

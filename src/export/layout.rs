@@ -3,6 +3,9 @@
 use super::{Entry, Export, Values};
 use nav_sim_signal::noise::practical::Bias;
 
+/// Lines of all entries together.
+pub(super) type Blocks = fn(&[Entry]) -> Vec<String>;
+
 /// A target's parameters and the syntax of its file.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout {
@@ -22,7 +25,7 @@ pub(super) struct Layout {
     /// One entry.
     pub(super) line: fn(&Entry) -> String,
     /// All entries, where they stand in blocks.
-    pub(super) blocks: Option<fn(&[Entry]) -> Vec<String>>,
+    pub(super) blocks: Option<Blocks>,
     /// The document that keys and units are from.
     pub(super) source: &'static str,
 }

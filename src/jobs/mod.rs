@@ -7,6 +7,7 @@ mod remarks;
 
 pub use error::JobError;
 pub(crate) use failure::{of_calibration, unknown_model};
+pub(crate) use reading::WHOLE;
 pub use reading::{
     ChannelSet, LogRequest, ReadingRequest, RecordingRequest, Scales, Skip, Stamps, TuningRequest,
 };

@@ -23,10 +23,6 @@ pub struct ReadingRequest {
     /// Seconds to leave out at the beginning of each file (warm-up); auto: what differs from the rest of each file
     #[arg(long, value_name = "S|auto", default_value_t)]
     pub skip_s: Skip,
-    /// What to do where the time jumps or stands still
-    #[arg(long, value_parser = parse::words::<Gaps>(GAPS), default_value_t)]
-    #[serde(with = "parse::text")]
-    pub gaps: Gaps,
     /// Topic of the IMU in a log that has several
     #[arg(long, value_name = "NAME")]
     pub topic: Option<String>,
@@ -78,19 +74,37 @@ const STAMPS: &[(&str, &str)] = &[
 ];
 
 /// How recordings are read, and which of their signals are used.
-#[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 #[command(next_help_heading = "Recordings")]
 pub struct RecordingRequest {
     #[command(flatten)]
     /// How they are read.
     pub reading: ReadingRequest,
+    /// What to do where the time jumps or stands still
+    #[arg(long, value_parser = parse::words::<Gaps>(GAPS), default_value_t = Gaps::Keep)]
+    #[serde(with = "parse::text")]
+    pub gaps: Gaps,
     /// Signals to use: all, accel, gyro, x, accel.x, … (repeatable or comma-separated; default: all)
     #[arg(long, value_name = "AXES", value_delimiter = ',')]
     pub axes: Vec<ChannelSet>,
 }
 
+impl Default for RecordingRequest {
+    fn default() -> Self {
+        Self { reading: ReadingRequest::default(), gaps: Gaps::Keep, axes: Vec::new() }
+    }
+}
+
 const GAPS: &[(&str, &str)] = &[
+    ("keep", "Leave out what is missing, if it is less than a tenth; refuse the file otherwise"),
+    WHOLE[0],
+    WHOLE[1],
+    WHOLE[2],
+];
+
+/// The same of windows that are navigated, in which nothing may be missing.
+pub(crate) const WHOLE: &[(&str, &str)] = &[
     ("refuse", "Refuse the file"),
     (
         "split",
@@ -172,14 +186,14 @@ impl ReadingRequest {
     }
 
     /// What decides what is read of the files, for the provenance of a result.
-    pub(crate) fn provenance(&self) -> toml::Table {
+    pub(crate) fn provenance(&self, gaps: Gaps) -> toml::Table {
         let skip_s = match self.skip_s {
             Skip::Seconds(s) => s.into(),
             Skip::Auto => "auto".into(),
         };
         let mut table = toml::Table::new();
         table.insert("skip_s".to_owned(), skip_s);
-        table.insert("gaps".to_owned(), self.gaps.name().into());
+        table.insert("gaps".to_owned(), gaps.name().into());
         if let Some(rate_hz) = self.rate_hz {
             table.insert("rate_hz_given".to_owned(), rate_hz.into());
         }
@@ -193,10 +207,10 @@ impl ReadingRequest {
     }
 
     /// How the files are to be read.
-    pub(crate) fn options(&self) -> ReadOptions {
+    pub(crate) fn options(&self, gaps: Gaps) -> ReadOptions {
         let skip_s = if let Skip::Seconds(s) = self.skip_s { s } else { 0.0 };
         let log = self.log.options(self.topic.clone());
-        ReadOptions { rate_hz: self.rate_hz, skip_s, gaps: self.gaps, log, ..ReadOptions::default() }
+        ReadOptions { rate_hz: self.rate_hz, skip_s, gaps, log, ..ReadOptions::default() }
     }
 }
 
@@ -216,7 +230,7 @@ impl RecordingRequest {
 
     /// What decides what is read of the files, for the provenance of a result.
     pub(crate) fn provenance(&self) -> toml::Table {
-        let mut table = self.reading.provenance();
+        let mut table = self.reading.provenance(self.gaps);
         if !self.axes.is_empty() {
             let channels = self.channels().map(ToString::to_string);
             table.insert("axes".to_owned(), channels.collect::<Vec<_>>().into());
@@ -227,7 +241,7 @@ impl RecordingRequest {
     /// How the files are to be read.
     pub(crate) fn options(&self) -> ReadOptions {
         let channels = (!self.axes.is_empty()).then(|| self.channels().copied().collect());
-        ReadOptions { channels, ..self.reading.options() }
+        ReadOptions { channels, ..self.reading.options(self.gaps) }
     }
 }
 

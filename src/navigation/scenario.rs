@@ -2,7 +2,7 @@
 //! [Minaretzis et al.](crate::bibliography::Minaretzis24), Section V.
 
 use crate::earth::GravityModel;
-use crate::ekf::{Belief, BeliefError, FilterStates, InitialSettings};
+use crate::ekf::{Belief, BeliefError, FilterStates, FixUpdate, InitialSettings};
 use crate::imu::Sensor;
 use crate::noise::Model;
 use crate::noise::reduction::{self, ReductionError};
@@ -99,6 +99,8 @@ pub struct FilterSettings {
     pub reduction: Reduction,
     /// How gravity decreases with height, for truth and filter alike.
     pub gravity: GravityModel,
+    /// How the filter uses a fix.
+    pub update: FixUpdate,
     /// A fix is not used when its NIS is above the chi-square quantile of this probability; without it, every
     /// fix is used.
     #[schemars(with = "Option<Probability>")]
@@ -151,6 +153,7 @@ impl Scenario {
             initial: &self.initial,
             defects: &self.imu,
             baro: self.baro.as_ref(),
+            update: self.filter.update,
             nis_gate: self.filter.nis_gate,
             outages,
             seed,

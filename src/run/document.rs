@@ -10,7 +10,7 @@ use crate::report::{
     Manifest, STATES, reduction_doubt, reduction_line, tone, unexpected_in_words, unexpected_line,
 };
 use nav_sim_document::{Cell, Document, Importance, Table, Tone, readable, window};
-use nav_sim_navigation::ekf::InitialSettings;
+use nav_sim_navigation::ekf::{FixUpdate, InitialSettings};
 use nav_sim_navigation::metrics::{
     Agreement, EpochMetrics, FanEpoch, Met, OutageSummary, PerState, Summary, VerdictKind,
 };
@@ -121,6 +121,20 @@ fn by_calibration(outage: &OutageSummary) -> Option<String> {
 
 const TOO_LARGE: &str = "errors too large for a linear filter; another MODEL or nav-sim tune does not help";
 
+/// The same, with the update that helps: where errors are too large after fixes that follow an outage, not before them.
+fn too_large(summary: &Summary, manifest: &Manifest) -> String {
+    let verdict = &summary.verdict;
+    let is_after = |first: usize| {
+        let is_met_again = summary.outages[first].reconvergence_s.p50.is_finite();
+        is_met_again && verdict.worst_outage.is_none_or(|outage| outage > first)
+    };
+    let is_linear = manifest.configuration.filter.update == FixUpdate::Ekf;
+    match is_linear && verdict.beyond_linear.is_some_and(is_after) {
+        true => format!("{TOO_LARGE}; filter.update = \"iterated\" does"),
+        false => TOO_LARGE.to_owned(),
+    }
+}
+
 /// What helps: by what the belief lacks, where linear analysis finds the filter wrong already; errors that are large are then
 /// its consequence.
 fn remedy(summary: &Summary, unexpected: &[Unexpected], manifest: &Manifest) -> String {
@@ -128,7 +142,7 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], manifest: &Manifest) -> 
     let ratios =
         quality.into_iter().flat_map(|q| q.outage_end.iter().chain([&q.mean]).flat_map(|state| state.0));
     if summary.is_contradicted {
-        return TOO_LARGE.to_owned();
+        return too_large(summary, manifest);
     }
     if let Some(largest) = largest_unexpected(summary, unexpected) {
         return largest;
@@ -137,7 +151,7 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], manifest: &Manifest) -> 
     let [is_recorded, is_modelled] = ["static", "truth"].map(|role| !manifest.hashes(role).is_empty());
     // what recordings contain is unknown, and so is whether linear analysis would find the filter wrong
     if is_recorded && is_too_large {
-        return TOO_LARGE.to_owned();
+        return too_large(summary, manifest);
     }
     // where the reduced filter is right about the errors of its own model, the errors are of something else
     if ratios.fold(0.0, f64::max) > 1.0 + summary.verdict.tolerance {
@@ -153,7 +167,7 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], manifest: &Manifest) -> 
     match unexpected.first() {
         Some(found) if is_analysed => unexpected_line(found),
         None if is_expected && !is_too_large => beside_the_states(summary).to_owned(),
-        _ => TOO_LARGE.to_owned(),
+        _ => too_large(summary, manifest),
     }
 }
 

@@ -21,6 +21,12 @@ sources! {
     /// S. Guerrier, R. Molinari, Y. Stebler: *Theoretical limitations of Allan variance-based regression
     /// for time series model estimation*, IEEE Signal Processing Letters 23, 2016 (AVLR).
     Guerrier16;
+    /// N. J. Kasdin: *Discrete simulation of colored noise and stochastic processes and 1/f^α power law noise generation*,
+    /// Proceedings of the IEEE 83, 1995.
+    Kasdin95;
+    /// D. Mondal, D. B. Percival: *Wavelet variance analysis for gappy time series*, Annals of the Institute of Statistical
+    /// Mathematics 62, 2010.
+    MondalPercival10;
     /// D. Mondal, D. B. Percival: *M-estimation of wavelet variance*, Ann. Inst. Stat. Math. 64, 2012.
     MondalPercival12;
     /// D. B. Percival: *On estimation of the wavelet variance*, Biometrika 82, 1995.
@@ -66,6 +72,11 @@ sources! {
     /// J. J. Moré: *The Levenberg-Marquardt algorithm: implementation and theory*, Numerical Analysis, Lecture Notes in
     /// Mathematics 630, 1978.
     More78;
+    /// J. Solà, J. Deray, D. Atchuthan: *A micro Lie theory for state estimation in robotics*, arXiv 1812.01537, 2018.
+    Sola18;
+    /// S. Goffin, S. Bonnabel, O. Brüls, P. Sacré: *Iterated Invariant Extended Kalman Filter (IterIEKF)*, arXiv
+    /// 2404.10665, 2024.
+    Goffin24;
     /// D. J. Best, D. E. Roberts: *Algorithm AS 91: The percentage points of the χ² distribution*, Applied Statistics 24,
     /// 1975.
     BestRoberts75;

@@ -72,9 +72,10 @@ fn degrees_of_freedom(
 ) -> Result<Vec<f64>, WaveletError> {
     let levels = 1..=replicate.classical.len() as u32;
     match (intervals, recording.signal(channel)) {
-        (Intervals::LargeSample, Some(signal)) => levels
+        // Of a signal with holes eta3 of what is there.
+        (Intervals::LargeSample, Some(signal)) if replicate.coverage.is_empty() => levels
             .map(|level| Ok(interval::edof_large_sample(&haar::coefficients(&signal.samples, level)?, level)))
             .collect(),
-        _ => Ok(levels.map(|level| interval::edof_eta3(replicate.samples, level)).collect()),
+        _ => Ok(levels.map(|level| replicate.edof_eta3(level)).collect()),
     }
 }

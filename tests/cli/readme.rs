@@ -17,8 +17,9 @@ fn pages() -> Vec<PathBuf> {
         entries.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "md"))
     };
     let readme = Path::new(ROOT).join("README.md");
-    let mut pages: Vec<PathBuf> =
-        std::iter::once(readme).chain(inside("docs")).chain(inside("docs/how-to")).collect();
+    let mut pages: Vec<PathBuf> = std::iter::once(readme)
+        .chain(["docs", "docs/how-to", "docs/answers"].into_iter().flat_map(inside))
+        .collect();
     pages.sort();
     pages
 }

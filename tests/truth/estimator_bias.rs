@@ -25,7 +25,16 @@ fn model(share: f64) -> Composite {
 fn measured(signal: &[f64]) -> Replicate {
     let (classical, robust) = both(signal, 13, &tuning()).unwrap();
     let (samples, trend) = (signal.len(), trend(signal));
-    Replicate { name: String::new(), axis: None, samples, classical, robust, trend, mean: f64::NAN }
+    Replicate {
+        name: String::new(),
+        axis: None,
+        samples,
+        classical,
+        robust,
+        coverage: Vec::new(),
+        trend,
+        mean: f64::NAN,
+    }
 }
 
 /// Six recordings of 2^15 samples, 16 sets: the mean of an estimate over the truth is 1 to four of its standard errors

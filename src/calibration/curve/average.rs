@@ -123,6 +123,8 @@ pub struct Replicate {
     pub classical: Vec<f64>,
     /// Robust wavelet variance at the same levels.
     pub robust: Vec<RobustVariance>,
+    /// Factor of the degrees of freedom of each level for the samples that are missing; empty where none are.
+    pub coverage: Vec<f64>,
     /// Mean of its later half less that of its earlier half (units): what a slow drift moves most. NaN where not known.
     pub trend: f64,
     /// Mean of the signal (units): gravity, Earth rate and the bias of this switching-on. NaN where not known.
@@ -144,6 +146,17 @@ impl Replicate {
     #[must_use]
     pub fn values(&self, estimator: Estimator) -> Vec<f64> {
         (0..self.levels()).map(|index| self.value(estimator, index)).collect()
+    }
+
+    /// The part of the degrees of freedom of a whole signal that missing samples leave, at index level − 1.
+    pub(crate) fn covered(&self, index: usize) -> f64 {
+        self.coverage.get(index).copied().unwrap_or(1.0)
+    }
+
+    /// eta3 of the samples that are there.
+    #[must_use]
+    pub fn edof_eta3(&self, level: u32) -> f64 {
+        (interval::edof_eta3(self.samples, level) * self.covered(level as usize - 1)).max(1.0)
     }
 
     /// Number of levels at which it has wavelet variances.
@@ -272,7 +285,7 @@ struct Term {
 impl Term {
     fn new(replicate: &Replicate, level: u32, estimator: Estimator, efficiency: f64) -> Self {
         let i = level as usize - 1;
-        let eta3 = interval::edof_eta3(replicate.samples, level);
+        let eta3 = replicate.edof_eta3(level);
         let is_robust = replicate.is_robust(estimator, i);
         Self {
             samples: replicate.samples as f64,

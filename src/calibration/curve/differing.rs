@@ -5,7 +5,7 @@ use super::average::{Estimator, Replicate};
 use super::robust_scale::{MAD_TO_DEVIATION, median};
 use super::shape::variance_of_log;
 use crate::wavelet::Tuning;
-use crate::wavelet::interval::{edof_eta3, edof_robust};
+use crate::wavelet::interval::edof_robust;
 
 /// Replicates from which on a scatter is told.
 const LEAST: usize = 3;
@@ -44,7 +44,7 @@ pub(crate) fn falling_root(function: impl Fn(f64) -> f64, high: f64) -> f64 {
 }
 
 fn degrees(replicate: &Replicate, estimator: Estimator, level: u32, tuning: &Tuning) -> f64 {
-    let eta3 = edof_eta3(replicate.samples, level);
+    let eta3 = replicate.edof_eta3(level);
     let is_robust = replicate.is_robust(estimator, level as usize - 1);
     if is_robust { edof_robust(eta3, tuning.efficiency()) } else { eta3 }
 }
@@ -64,6 +64,7 @@ fn scatter(logs: &[f64], estimator: Estimator) -> f64 {
 mod tests {
     use super::*;
     use crate::rng::Generator;
+    use crate::wavelet::interval::edof_eta3;
     use crate::wavelet::{RobustVariance, Status};
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
@@ -87,6 +88,7 @@ mod tests {
                     samples: 1 << 16,
                     robust: nu.iter().map(robust).collect(),
                     classical: nu,
+                    coverage: Vec::new(),
                     trend: f64::NAN,
                     mean: f64::NAN,
                 }

@@ -2,7 +2,7 @@
 
 use super::average::Replicate;
 use crate::imu::{Axis, Channel, Recording, Sensor, Signal};
-use crate::wavelet::{Tuning, WaveletError, both, default_levels};
+use crate::wavelet::{Gappy, Tuning, WaveletError, both, default_levels, gappy};
 use rayon::prelude::*;
 
 /// Sensor, and axis if not all, that one model is for.
@@ -74,7 +74,7 @@ pub struct SignalError {
     pub source: WaveletError,
 }
 
-/// The wavelet variances of all signals of a recording, in their order. Without a number of levels there are as
+/// The wavelet variances of all signals of a recording, in their order; missing samples are NaN. Without a number of levels there are as
 /// many as usual for its length.
 ///
 /// # Errors
@@ -88,12 +88,19 @@ pub fn replicates(
         let (channel, samples) = (signal.channel, signal.samples.len());
         let levels = levels.unwrap_or_else(|| default_levels(samples));
         let error = |source| SignalError { recording: recording.name.clone(), channel, source };
-        let (classical, robust) = both(&signal.samples, levels, tuning).map_err(error)?;
+        let (classical, robust, coverage) = if signal.samples.iter().any(|x| x.is_nan()) {
+            let Gappy { classical, robust, coverage } =
+                gappy(&signal.samples, levels, tuning).map_err(error)?;
+            (classical, robust, coverage)
+        } else {
+            let (classical, robust) = both(&signal.samples, levels, tuning).map_err(error)?;
+            (classical, robust, Vec::new())
+        };
         let (name, axis) = (recording.name.clone(), Some(channel.axis));
         let trend = trend(&signal.samples);
         // Of the samples themselves too: a warm-up may have been left out after the mean was taken.
-        let mean = signal.mean + signal.samples.iter().sum::<f64>() / samples as f64;
-        Ok((channel, Replicate { name, axis, samples, classical, robust, trend, mean }))
+        let mean = signal.mean + mean_about(0.0, &signal.samples);
+        Ok((channel, Replicate { name, axis, samples, classical, robust, coverage, trend, mean }))
     };
     recording.signals.par_iter().map(replicate).collect()
 }
@@ -103,9 +110,14 @@ pub fn replicates(
 pub fn trend(samples: &[f64]) -> f64 {
     let half = samples.len() / 2;
     // Half by half about their first value, so that no digits of a small change are lost.
-    let first = samples.first().copied().unwrap_or(0.0);
-    let mean = |part: &[f64]| part.iter().map(|x| x - first).sum::<f64>() / half as f64;
-    mean(&samples[samples.len() - half..]) - mean(&samples[..half])
+    let first = samples.iter().copied().find(|x| !x.is_nan()).unwrap_or(0.0);
+    mean_about(first, &samples[samples.len() - half..]) - mean_about(first, &samples[..half])
+}
+
+/// Mean distance from a value of the samples that are there; missing ones are NaN.
+pub(super) fn mean_about(value: f64, samples: &[f64]) -> f64 {
+    let present = || samples.iter().filter(|x| !x.is_nan());
+    present().map(|x| x - value).sum::<f64>() / present().count() as f64
 }
 
 /// The groups, in the order of [`Channel::ALL`].

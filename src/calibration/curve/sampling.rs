@@ -234,6 +234,7 @@ fn spectrum(process: &Process, sin2: f64) -> f64 {
         Process::Ar1(p) => p.sigma2() / distance(p.phi()),
         Process::GaussMarkov(p) => p.ar1().sigma2() / distance(p.ar1().phi()),
         Process::Ma1(p) => p.sigma2() * distance(-p.theta()),
+        Process::Flicker(p) => p.b2() / (2.0 * sin2.sqrt()),
         Process::RandomWalk(p) => p.gamma2() / (4.0 * sin2),
         Process::Drift(_) => 0.0,
     }

@@ -7,9 +7,10 @@
 //! first is out of place at 1 in 10⁴, the first part is given up and the next looked at. What remains is cut into sixteen
 //! again, until nothing is out of place: whoever leaves out what is said is not told of more.
 
+use super::replicates::mean_about;
 use crate::imu::Channel;
 use crate::wavelet::interval::edof_eta3;
-use crate::wavelet::{classical, default_levels};
+use crate::wavelet::{Tuning, classical, default_levels, gappy};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Parts of a record.
@@ -92,7 +93,7 @@ pub fn warm_up(samples: &[f64]) -> Option<WarmUp> {
 fn change(samples: &[f64], left: usize) -> Option<Change> {
     let part = &samples[left..];
     let levels = default_levels(part.len());
-    let (with, without) = (classical(samples, levels).ok()?, classical(part, levels).ok()?);
+    let (with, without) = (variances(samples, levels)?, variances(part, levels)?);
     let of_level = |level: u32| {
         let ratio = without[level as usize - 1] / with[level as usize - 1];
         // The whole contains the part, so the variance of their difference is the difference of the
@@ -104,6 +105,14 @@ fn change(samples: &[f64], left: usize) -> Option<Change> {
     surest.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, change)| change)
 }
 
+fn variances(samples: &[f64], levels: u32) -> Option<Vec<f64>> {
+    if samples.iter().any(|x| x.is_nan()) {
+        let found = gappy(samples, levels, &Tuning::default()).ok()?.classical;
+        return Some(found).filter(|found| found.len() == levels as usize);
+    }
+    classical(samples, levels).ok()
+}
+
 /// One look: the parts that are out of place.
 fn look(samples: &[f64]) -> Option<WarmUp> {
     let length = samples.len() / PARTS;
@@ -111,10 +120,13 @@ fn look(samples: &[f64]) -> Option<WarmUp> {
         return None;
     }
     let parts: Vec<&[f64]> = samples.chunks_exact(length).take(PARTS).collect();
-    let means: Vec<f64> = parts.iter().map(|p| p.iter().sum::<f64>() / length as f64).collect();
+    let means: Vec<f64> = parts.iter().map(|p| mean_about(0.0, p)).collect();
     let steps: Vec<f64> = means.windows(2).map(|m| m[1] - m[0]).collect();
     // ln: a factor in the noise is then a shift, and the scatter of a variance does not depend on its size.
-    let squares = |p: &&[f64]| p.windows(2).map(|x| (x[1] - x[0]).powi(2)).sum::<f64>().ln();
+    let squares = |p: &&[f64]| {
+        let present = || p.windows(2).map(|x| (x[1] - x[0]).powi(2)).filter(|square| !square.is_nan());
+        (present().sum::<f64>() * (length - 1) as f64 / present().count() as f64).ln()
+    };
     let noise: Vec<f64> = parts.iter().map(squares).collect();
     let mut found = None;
     // The parts that are compared with the last eight must not be among them; a step needs two parts.

@@ -76,8 +76,16 @@ fn diagnosed(recordings: impl Iterator<Item = [Vec<f64>; 3]>, settings: &Setting
         for (axis, signal) in Axis::ALL.into_iter().zip(signals) {
             let (classical, robust) = both(&signal, LEVELS, &settings.tuning).unwrap();
             let (name, samples, trend) = (format!("run{file}"), signal.len(), trend(&signal));
-            let replicate =
-                Replicate { name, axis: Some(axis), samples, classical, robust, trend, mean: f64::NAN };
+            let replicate = Replicate {
+                name,
+                axis: Some(axis),
+                samples,
+                classical,
+                robust,
+                coverage: Vec::new(),
+                trend,
+                mean: f64::NAN,
+            };
             replicates.push((Channel { sensor: Sensor::Accel, axis }, replicate));
         }
     }

@@ -191,6 +191,7 @@ impl Design {
             samples: samples.len(),
             classical,
             robust,
+            coverage: Vec::new(),
             trend: f64::NAN,
             mean: f64::NAN,
         })

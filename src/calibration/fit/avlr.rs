@@ -7,6 +7,7 @@
 //! |---|---|---|
 //! | QN | −1 | 3 Q²/m² |
 //! | WN | −½ | sigma2/m |
+//! | FN | 0 | (2 ln 2/π) B² |
 //! | RW | +½ | gamma2·m/3 |
 //! | DR | +1 | slope²·m²/2 |
 //!
@@ -20,8 +21,9 @@
 use super::optimise::Termination;
 use super::result::{Fit, FitError};
 use crate::model::ModelSpec;
-use crate::noise::{Composite, Drift, Kind, Process, Quantization, RandomWalk, White};
+use crate::noise::{Composite, Drift, FlickerNoise, Kind, Process, Quantization, RandomWalk, White};
 use crate::wavelet::Curve;
+use std::f64::consts::{LN_2, PI};
 
 /// Slopes this near to a term's are taken as its own.
 const NEAR: f64 = 0.15;
@@ -80,6 +82,7 @@ fn term(kind: Kind, points: &[(f64, f64)]) -> Result<Process, FitError> {
         Kind::White => Process::White(White::new(at_one(-0.5).powi(2))?),
         Kind::Quantization if !begins(points, -1.0) => Process::Quantization(Quantization::new(0.0)?),
         Kind::Quantization => Process::Quantization(Quantization::new(at_one(-1.0).powi(2) / 3.0)?),
+        Kind::Flicker => Process::Flicker(FlickerNoise::new(at_one(0.0).powi(2) / (2.0 * LN_2 / PI))?),
         Kind::RandomWalk => Process::RandomWalk(RandomWalk::new(3.0 * at_one(0.5).powi(2))?),
         Kind::Drift => Process::Drift(Drift::new(std::f64::consts::SQRT_2 * at_one(1.0))?),
         Kind::Ar1 | Kind::GaussMarkov | Kind::Ma1 => return Err(FitError::NoSlope { process: kind.code() }),

@@ -10,7 +10,7 @@
 use super::bounded::{Bounded, MOST, Matrix, Vector, cholesky_solve};
 use super::weighting::Weighting;
 use crate::curve::implied::Response;
-use crate::noise::{Ar1, Drift, GaussMarkov, Kind, Ma1, Quantization, RandomWalk, White};
+use crate::noise::{Ar1, Drift, FlickerNoise, GaussMarkov, Kind, Ma1, Quantization, RandomWalk, White};
 use crate::wavelet::{Curve, QuantizationResponse};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -38,6 +38,7 @@ impl Component {
         match self.kind {
             Kind::White => (White::haar_shape(level), 0.0),
             Kind::Quantization => (Quantization::haar_shape(level), 0.0),
+            Kind::Flicker => (FlickerNoise::haar_shape(level), 0.0),
             Kind::RandomWalk => (RandomWalk::haar_shape(level), 0.0),
             Kind::Drift => (Drift::haar_shape(level), 0.0),
             Kind::Ar1 => of_log(u, |kappa| Ar1::haar_shape_of_kappa(kappa, level)),

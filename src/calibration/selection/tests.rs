@@ -42,6 +42,7 @@ fn recordings(set: u64, noise: impl Fn(u64) -> Composite, settings: &Settings) -
                 samples: 4096,
                 classical,
                 robust,
+                coverage: Vec::new(),
                 trend: f64::NAN,
                 mean: f64::NAN,
             },

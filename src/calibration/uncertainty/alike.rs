@@ -144,6 +144,7 @@ mod tests {
                 samples: SAMPLES,
                 classical,
                 robust,
+                coverage: Vec::new(),
                 trend: f64::NAN,
                 mean: f64::NAN,
             }

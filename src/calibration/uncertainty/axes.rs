@@ -11,7 +11,7 @@ use crate::curve::{Estimator, Replicate};
 use crate::imu::Axis;
 use crate::outcome::AxesDiffer;
 use crate::wavelet::Tuning;
-use crate::wavelet::interval::{edof_eta3, edof_robust};
+use crate::wavelet::interval::edof_robust;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 /// Degrees of freedom from which on ln nu is near enough to Gaussian.
@@ -28,7 +28,7 @@ pub(crate) fn axes_differ(
     let axes: Vec<Axis> =
         Axis::ALL.into_iter().filter(|axis| replicates.iter().any(|r| r.axis == Some(*axis))).collect();
     let table = layout(replicates, &axes)?;
-    let degrees = |r: &Replicate, level: u32| match edof_eta3(r.samples, level) {
+    let degrees = |r: &Replicate, level: u32| match r.edof_eta3(level) {
         edof if r.is_robust(estimator, level as usize - 1) => edof_robust(edof, tuning.efficiency()),
         edof => edof,
     };
@@ -125,7 +125,16 @@ mod tests {
             let signal: Vec<f64> = (0..2048).map(|_| normal()).collect();
             let (classical, robust) = both(&signal, 8, &Tuning::default()).unwrap();
             let (name, trend) = (format!("run{}", k / 3), f64::NAN);
-            Replicate { name, axis: Some(axis), samples: 2048, classical, robust, trend, mean: f64::NAN }
+            Replicate {
+                name,
+                axis: Some(axis),
+                samples: 2048,
+                classical,
+                robust,
+                coverage: Vec::new(),
+                trend,
+                mean: f64::NAN,
+            }
         };
         (0..3 * recordings).map(recording).collect()
     }

@@ -213,6 +213,7 @@ pub(crate) fn like(replicate: &Replicate, nu: Vec<f64>) -> Replicate {
         name: String::new(),
         axis: replicate.axis,
         samples: replicate.samples,
+        coverage: replicate.coverage.clone(),
         classical: nu,
         robust,
         trend: f64::NAN,

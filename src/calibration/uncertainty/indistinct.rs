@@ -169,6 +169,7 @@ mod tests {
                 samples: SAMPLES,
                 classical: vec![],
                 robust: vec![],
+                coverage: Vec::new(),
                 trend: f64::NAN,
                 mean: f64::NAN,
             };

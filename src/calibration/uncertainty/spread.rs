@@ -227,7 +227,8 @@ fn edof(replicate: &Replicate, estimator: Estimator, law: &SamplingLaw, tuning: 
     // A short recording lacks the longest scales.
     let is_robust = |j: usize| j < replicate.levels() && replicate.is_robust(estimator, j);
     let pairs = robust.into_iter().zip(classical).enumerate();
-    pairs.map(|(j, (robust, classical))| if is_robust(j) { robust } else { classical }).collect()
+    let whole = |(j, (robust, classical))| (j, if is_robust(j) { robust } else { classical });
+    pairs.map(whole).map(|(j, edof)| (edof * replicate.covered(j)).max(1.0)).collect()
 }
 
 /// The degrees of freedom of a variance over those of the plain one, K − 1. That of K Gaussian numbers of which the

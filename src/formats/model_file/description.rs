@@ -93,6 +93,12 @@ pub(super) enum ProcessTable {
         sigma2: Finite,
         sigma2_ci95: Option<Ends>,
     },
+    /// Flicker noise, B²: bias instability
+    FN {
+        #[schemars(with = "NonNegative")]
+        b2: Finite,
+        b2_ci95: Option<Ends>,
+    },
     /// Random walk: variance of an increment
     RW {
         #[schemars(with = "NonNegative")]

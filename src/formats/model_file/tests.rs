@@ -171,7 +171,7 @@ fn wrong_keys_are_refused_with_what_was_meant() {
     );
     assert_eq!(
         process_refusal("type = \"ARI\", phi = 0.5, sigma2 = 1"),
-        "m.toml, line 4: \"accel.processes[1].type\" = \"ARI\" is not one of \"WN\", \"QN\", \"AR1\", \"GM\", \"MA1\", \"RW\", \"DR\" | did you mean \"AR1\"?"
+        "m.toml, line 4: \"accel.processes[1].type\" = \"ARI\" is not one of \"WN\", \"QN\", \"AR1\", \"GM\", \"MA1\", \"FN\", \"RW\", \"DR\" | did you mean \"AR1\"?"
     );
     assert_eq!(
         process_refusal("type = \"flicker\""),

@@ -46,10 +46,12 @@ pub enum Gaps {
     /// Refuse the file.
     #[default]
     Refuse,
+    /// Leave out what is missing where it is less than a tenth; refuse the file otherwise. Missing samples are NaN.
+    Keep,
     /// Make each stretch between such steps a recording of its own.
     Split,
     /// Take the samples as evenly spaced over the whole time all the same (late stamps, not lost samples).
     Ignore,
 }
 
-nav_sim_signal::named!(Gaps { Refuse = "refuse", Split = "split", Ignore = "ignore" });
+nav_sim_signal::named!(Gaps { Refuse = "refuse", Keep = "keep", Split = "split", Ignore = "ignore" });

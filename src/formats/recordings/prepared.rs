@@ -19,6 +19,8 @@ pub(super) struct Prepared {
     columns: Vec<Signals>,
     /// The stretches of samples that become recordings.
     pieces: Vec<Range<usize>>,
+    /// Samples before which others are missing, and how many.
+    holes: Vec<(usize, usize)>,
 }
 
 /// The signals of one column.
@@ -53,10 +55,12 @@ impl Prepared {
         for i in 0..pieces.len() {
             checks::plausible(&means_of(i), &mut report)?;
         }
-        report.samples = pieces.iter().map(Range::len).collect();
+        let holes = timing.holes;
+        report.samples =
+            pieces.iter().map(|p| p.len() + missing(&holes, p).map(|(_, n)| n).sum::<usize>()).collect();
         report.rate_hz = timing.rate_hz;
         report.means = means_of(0);
-        Ok((Self { path: raw.path.clone(), rate_hz: timing.rate_hz, columns, pieces }, report))
+        Ok((Self { path: raw.path.clone(), rate_hz: timing.rate_hz, columns, pieces, holes }, report))
     }
 
     pub(super) fn is_stored(&self) -> bool {
@@ -70,7 +74,9 @@ impl Prepared {
             let Signals { column, channel, factor, means } = signals;
             let stretches = column.values.into_stretches(&self.pieces);
             let stretches = stretches.map_err(storage(&self.path))?;
-            for ((recording, samples), mean) in recordings.iter_mut().zip(stretches).zip(means) {
+            let pieces = recordings.iter_mut().zip(&self.pieces).zip(stretches).zip(means);
+            for (((recording, piece), samples), mean) in pieces {
+                let samples = with_holes(samples, piece, &self.holes);
                 recording.signals.push(signal(channel, samples, factor, mean));
             }
         }
@@ -82,6 +88,7 @@ impl Prepared {
         let recording_of_signal = |(i, piece, signals): (usize, &Range<usize>, &Signals)| {
             let samples = signals.column.values.stretch(piece.clone());
             let samples = samples.map_err(storage(&self.path))?;
+            let samples = with_holes(samples, piece, &self.holes);
             let signal = signal(signals.channel, samples, signals.factor, signals.means[i]);
             Ok(Recording { signals: vec![signal], ..self.recording(i) })
         };
@@ -100,6 +107,31 @@ impl Prepared {
 fn signal(channel: Channel, mut samples: Vec<f64>, factor: f64, mean: f64) -> Signal {
     samples.iter_mut().for_each(|v| *v = *v * factor - mean);
     Signal { channel, mean, samples }
+}
+
+/// The holes within a stretch.
+fn missing<'a>(
+    holes: &'a [(usize, usize)],
+    piece: &'a Range<usize>,
+) -> impl Iterator<Item = &'a (usize, usize)> {
+    holes.iter().filter(|(sample, _)| *sample > piece.start && *sample < piece.end)
+}
+
+/// The samples of a stretch with NaN where some are missing.
+fn with_holes(samples: Vec<f64>, piece: &Range<usize>, holes: &[(usize, usize)]) -> Vec<f64> {
+    if missing(holes, piece).next().is_none() {
+        return samples;
+    }
+    let mut whole = Vec::with_capacity(samples.len() + missing(holes, piece).map(|(_, n)| n).sum::<usize>());
+    let mut done = 0;
+    for (sample, lost) in missing(holes, piece) {
+        let next = sample - piece.start;
+        whole.extend_from_slice(&samples[done..next]);
+        whole.extend(std::iter::repeat_n(f64::NAN, *lost));
+        done = next;
+    }
+    whole.extend_from_slice(&samples[done..]);
+    whole
 }
 
 /// Of the stretches between gaps those shorter than the longest by more than this are left out.

@@ -21,6 +21,8 @@ pub(super) struct Timing {
     pub(super) rate_hz: f64,
     /// First samples of the stretches after a gap, if the file is to be split.
     pub(super) breaks: Vec<usize>,
+    /// Samples before which others are missing, and how many, if they are to be kept apart.
+    pub(super) holes: Vec<(usize, usize)>,
 }
 
 /// Finds the rate and checks the steps; frees the time column.
@@ -57,7 +59,7 @@ pub(super) fn timing(
         (None, _, Some(ticks), _) => Clock::counting(ticks, raw, 4_294_967_296.0, 1e-4)?,
         (None, _, None, Some((rate_hz, source))) => {
             report.rate_from = source.into();
-            return Ok(Timing { rate_hz, breaks: Vec::new() });
+            return Ok(Timing { rate_hz, breaks: Vec::new(), holes: Vec::new() });
         }
         (None, _, None, None) => {
             let message = "no time column, and no rate is given";
@@ -68,7 +70,7 @@ pub(super) fn timing(
     report.rate_from = clock.source;
     doubt(&timing, &clock.name, raw, options, report);
     let breaks = if options.gaps == Gaps::Split { timing.breaks } else { Vec::new() };
-    Ok(Timing { rate_hz: timing.rate_hz, breaks })
+    Ok(Timing { rate_hz: timing.rate_hz, breaks, holes: timing.holes })
 }
 
 /// Refuses a rate that is given where the file, or the manifest beside it, states another.
@@ -113,7 +115,17 @@ fn doubt(timing: &Checked, column: &str, raw: &Raw, options: &ReadOptions, repor
                 };
                 format!("{n} gaps or duplicates in time ignored, the first in line {first}{rates}")
             }
-            _ => format!("split at {n} gaps or duplicates in time, the first in line {first}"),
+            Gaps::Keep => {
+                let lost: usize = timing.holes.iter().map(|(_, lost)| lost).sum();
+                let there = raw.columns.first().map_or(0, |c| c.values.len());
+                let share = 100.0 * lost as f64 / (there + lost) as f64;
+                format!(
+                    "{lost} samples ({share:.2} %) are missing in {n} gaps, the first before line {first}"
+                )
+            }
+            Gaps::Refuse | Gaps::Split => {
+                format!("split at {n} gaps or duplicates in time, the first in line {first}")
+            }
         });
     }
 }
@@ -126,6 +138,7 @@ struct Checked {
     /// The rate of its median step (Hz).
     step_hz: f64,
     breaks: Vec<usize>,
+    holes: Vec<(usize, usize)>,
 }
 
 /// A rate that is given may differ from the clock's by so much without a word: it was rounded.
@@ -211,7 +224,9 @@ impl Clock {
         let irregular = |s: f64| is_gap(s, median) || s < 0.5 * median;
         let breaks: Vec<usize> =
             steps().enumerate().filter(|(_, s)| irregular(*s)).map(|(i, _)| i + 1).collect();
-        if let (Gaps::Refuse, Some(first)) = (options.gaps, breaks.first()) {
+        let holes = if options.gaps == Gaps::Keep { self.holes(&breaks) } else { None };
+        let is_refused = options.gaps == Gaps::Refuse || options.gaps == Gaps::Keep && holes.is_none();
+        if let (true, Some(first)) = (is_refused, breaks.first()) {
             let (line, from, to) = step_at(first - 1);
             let step = rounded(median * self.unit_s);
             let what = if self.since[*first] - self.since[*first - 1] > median {
@@ -234,7 +249,14 @@ impl Clock {
                 .advice("split the file where the rate changes: a wavelet variance is of one rate"));
         }
         // The whole span averages the jitter.
-        let found = rate(if breaks.is_empty() { mean_step(&self.since) } else { step });
+        let found = rate(match &holes {
+            Some(holes) => {
+                let lost: usize = holes.iter().map(|(_, lost)| lost).sum();
+                mean_step(&self.since) * (self.since.len() - 1) as f64 / (self.since.len() - 1 + lost) as f64
+            }
+            None if breaks.is_empty() => mean_step(&self.since),
+            None => step,
+        });
         let given = options.rate_hz.unwrap_or(found);
         if options.gaps != Gaps::Ignore && (found / given - 1.0).abs() > DISAGREEING {
             let message =
@@ -243,7 +265,25 @@ impl Clock {
                 FileError::contents(raw.path.as_str(), Place::Within, message).setting(Setting::WrongRate)
             );
         }
-        Ok(Checked { rate_hz: given, found_hz: found, step_hz: rate(median), breaks })
+        let holes = holes.unwrap_or_default();
+        Ok(Checked { rate_hz: given, found_hz: found, step_hz: rate(median), breaks, holes })
+    }
+
+    /// The samples after which time went on for longer than to the next one, and how many are missing before them; none where they
+    /// are a tenth or more, or time stands still somewhere.
+    fn holes(&self, breaks: &[usize]) -> Option<Vec<(usize, usize)>> {
+        let median = median_step(&self.since);
+        let step = |i: usize| self.since[i] - self.since[i - 1];
+        if breaks.iter().any(|i| !is_gap(step(*i), median)) {
+            return None;
+        }
+        // Coarse stamps round single steps; their mean is that of the samples.
+        let regular = self.since[self.since.len() - 1] - breaks.iter().map(|i| step(*i)).sum::<f64>();
+        let regular = regular / (self.since.len() - 1 - breaks.len()) as f64;
+        let lost = |i: &usize| (*i, ((step(*i) / regular).round() as usize).max(2) - 1);
+        let holes: Vec<(usize, usize)> = breaks.iter().map(lost).collect();
+        let lost: usize = holes.iter().map(|(_, lost)| lost).sum();
+        ((lost as f64) < MOST_LOST * (lost + self.since.len()) as f64).then_some(holes)
     }
 
     /// A clock that does not advance, or by coarser steps than those of the samples.

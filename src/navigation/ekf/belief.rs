@@ -19,7 +19,7 @@ use super::initial::InitialSettings;
 use super::states::FilterStates;
 use super::unknowns::{KINDS, Unknown, UnknownKind};
 use crate::imu::{Axis, Channel, Sensor};
-use crate::noise::{Composite, Model, Process, reduction};
+use crate::noise::{Composite, Ladder, Model, Process, reduction};
 use crate::units::SettingError;
 use glam::DVec3;
 
@@ -280,6 +280,12 @@ impl AxisBelief {
         let mut axis = Self { white: 0.0, biases: vec![] };
         for process in &noise.processes {
             match process {
+                // the parts have none of their own
+                Process::Flicker(p) => {
+                    let parts = Self::full(&Composite::new(p.parts(Ladder::FILTER)));
+                    axis.white += parts.white;
+                    axis.biases.extend(parts.biases);
+                }
                 Process::White(p) => axis.white += p.sigma2(),
                 // its long-run variance: what a filter that integrates feels
                 Process::Ma1(p) => axis.white += (1.0 + p.theta()).powi(2) * p.sigma2(),

@@ -6,6 +6,7 @@ use super::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, Sample};
 use super::initial::{InitialSettings, psi_of_angles};
 use super::transition::Transition;
 use super::unknowns::{Regressor, UnknownKind};
+use super::update::FixUpdate;
 use crate::frames::NavState;
 use crate::imu::{ImuSample, Sensor};
 use crate::lanes::{Kernel, Lanes, Level, Mat3, Vec3, Wide, dispatch};
@@ -42,6 +43,7 @@ pub struct Ekf {
     pub(super) transition: Option<Transition>,
     pub(super) scratch: Scratch,
     pub(super) level: Level,
+    pub(super) fix_update: FixUpdate,
 }
 
 /// Working vectors of the measurement update, one entry a state.
@@ -97,7 +99,14 @@ impl Ekf {
             transition: None,
             scratch: Scratch { ph: zeros(), gain: zeros(), error: zeros() },
             level: Level::best(),
+            fix_update: FixUpdate::default(),
         }
+    }
+
+    /// The same filter with another update by fixes.
+    #[must_use]
+    pub(crate) fn with_update(self, fix_update: FixUpdate) -> Self {
+        Self { fix_update, ..self }
     }
 
     /// The same filter with other vector units, for comparison; portable where the machine lacks them.

@@ -11,6 +11,7 @@ pub mod dynamics;
 pub mod filter;
 pub mod gate;
 pub mod initial;
+mod iterated;
 mod snapshot;
 pub mod states;
 mod transition;
@@ -28,7 +29,7 @@ pub use states::FilterStates;
 pub use unknowns::{Unknown, UnknownKind};
 pub(crate) use update::fix_rows;
 pub(crate) use update::update_height;
-pub use update::{Fix, update};
+pub use update::{Fix, FixUpdate, update};
 
 #[cfg(test)]
 mod tests;

@@ -40,13 +40,18 @@ impl Ekf {
             // The other lanes get no correction: zero moves them nowhere.
             to[0] = *from;
         }
-        dispatch(self.level, Correct(self));
+        apply_correction(self);
     }
 
     /// What the last update took out of the state of the first lane.
     pub(crate) fn correction(&self) -> DVector<f64> {
         DVector::from_iterator(self.p.dim(), self.scratch.error.iter().map(|error| error[0]))
     }
+}
+
+/// Takes the estimated errors out of the state and the estimates of all lanes.
+pub(super) fn apply_correction(ekf: &mut Ekf) {
+    dispatch(ekf.level, Correct(ekf));
 }
 
 struct Correct<'a>(&'a mut Ekf);

@@ -77,7 +77,7 @@ impl Part {
 
     const fn of_process(sensor: Sensor, kind: Kind) -> Self {
         match kind {
-            Kind::Ar1 | Kind::GaussMarkov | Kind::RandomWalk => Self::Correlated(sensor),
+            Kind::Ar1 | Kind::GaussMarkov | Kind::Flicker | Kind::RandomWalk => Self::Correlated(sensor),
             Kind::White | Kind::Quantization | Kind::Ma1 => Self::White(sensor),
             Kind::Drift => Self::Drift,
         }

@@ -202,7 +202,8 @@ impl Candidate {
         let outage =
             || std::array::from_fn(|_| OutageRecord { reconvergence_s: f64::NAN, ..Default::default() });
         Self {
-            ekf: Ekf::new(nominal, belief, &plan.start, plan.experiment.initial),
+            ekf: Ekf::new(nominal, belief, &plan.start, plan.experiment.initial)
+                .with_update(plan.experiment.update),
             live,
             trace: Vec::with_capacity(plan.events.len()),
             outages: plan.experiment.outages.iter().map(|_| outage()).collect(),

@@ -1,7 +1,7 @@
 //! What all runs of an experiment share, computed once: ideal samples, reference, schedule.
 
 use crate::earth::{GravityModel, MAX_LATITUDE};
-use crate::ekf::{Belief, InitialSettings};
+use crate::ekf::{Belief, FixUpdate, InitialSettings};
 use crate::frames::NavState;
 use crate::imu::ImuSample;
 use crate::noise::continuous::same_rate;
@@ -38,6 +38,8 @@ pub struct Experiment<'a> {
     pub defects: &'a ImuSettings,
     /// A barometer, if there is one.
     pub baro: Option<&'a BaroSettings>,
+    /// How the filters use a fix.
+    pub update: FixUpdate,
     /// Probability of the gate on the NIS of fixes, if there is one.
     pub nis_gate: Option<f64>,
     /// When fixes are missing.

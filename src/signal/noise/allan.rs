@@ -5,7 +5,7 @@
 
 use super::ar1::fast_shape;
 use super::slow_ar1::Slow;
-use super::{Ar1, Composite, Process};
+use super::{Ar1, Composite, FlickerNoise, Process};
 use std::f64::consts::LN_2;
 
 impl Process {
@@ -22,6 +22,7 @@ impl Process {
                 let sum = 1.0 + p.theta();
                 p.sigma2() * (m * sum * sum - 3.0 * p.theta()) / (m * m)
             }
+            Self::Flicker(p) => FlickerNoise::allan_shape(p.b2(), samples),
             Self::Ar1(p) => of_ar1(p, samples.max(1)),
             Self::GaussMarkov(p) => p.s2() * unit_markov(p.beta() / p.rate_hz(), samples.max(1)),
         }

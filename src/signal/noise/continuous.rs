@@ -96,6 +96,8 @@ fn process_at_rate(process: &Process, from_hz: f64, to_hz: f64) -> Result<Proces
     Ok(match process {
         // What is kept: N² = sigma2/f, K² = gamma2·f, and the slope per second.
         Process::White(p) => Process::White(White::new(p.sigma2() * ratio)?),
+        // B² is that of every rate.
+        Process::Flicker(p) => Process::Flicker(*p),
         Process::RandomWalk(p) => Process::RandomWalk(RandomWalk::new(p.gamma2() / ratio)?),
         Process::Drift(p) => Process::Drift(Drift::new(p.slope() / ratio)?),
         Process::GaussMarkov(p) => Process::GaussMarkov(GaussMarkov::new(p.beta(), p.s2(), to_hz)?),

@@ -1,6 +1,8 @@
 //! The kinds of process and their parameters: what files, specifications and fits call them, in one table.
 
-use super::{Ar1, Drift, GaussMarkov, Ma1, ParameterError, Process, Quantization, RandomWalk, White};
+use super::{
+    Ar1, Drift, FlickerNoise, GaussMarkov, Ma1, ParameterError, Process, Quantization, RandomWalk, White,
+};
 
 /// A kind of process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -15,6 +17,8 @@ pub enum Kind {
     GaussMarkov,
     /// First-order moving average.
     Ma1,
+    /// Flicker noise.
+    Flicker,
     /// Random walk.
     RandomWalk,
     /// Drift.
@@ -36,6 +40,8 @@ pub enum Parameter {
     S2,
     /// Quantization Q².
     Q2,
+    /// Flicker noise B².
+    B2,
     /// Increment variance of a random walk.
     Gamma2,
     /// Drift per sample.
@@ -61,7 +67,7 @@ struct Row {
 }
 
 /// One row a kind, in the order of [`Kind::ALL`].
-const TABLE: [Row; 7] = [
+const TABLE: [Row; 8] = [
     Row { code: White::CODE, parameters: &[Parameter::Sigma2], units: "({u})², per sample" },
     Row { code: Quantization::CODE, parameters: &[Parameter::Q2], units: "({u})²" },
     Row {
@@ -75,6 +81,7 @@ const TABLE: [Row; 7] = [
         parameters: &[Parameter::Theta, Parameter::Sigma2],
         units: "({u})², innovation variance per sample",
     },
+    Row { code: FlickerNoise::CODE, parameters: &[Parameter::B2], units: "({u})²" },
     Row {
         code: RandomWalk::CODE,
         parameters: &[Parameter::Gamma2],
@@ -85,12 +92,13 @@ const TABLE: [Row; 7] = [
 
 impl Kind {
     /// All kinds, in the order in which models list them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::White,
         Self::Quantization,
         Self::Ar1,
         Self::GaussMarkov,
         Self::Ma1,
+        Self::Flicker,
         Self::RandomWalk,
         Self::Drift,
     ];
@@ -152,6 +160,7 @@ impl Kind {
             (Self::Ar1, &[phi, sigma2]) => Ar1::new(phi, sigma2).map(Process::Ar1),
             (Self::GaussMarkov, &[beta, s2]) => GaussMarkov::new(beta, s2, rate_hz).map(Process::GaussMarkov),
             (Self::Ma1, &[theta, sigma2]) => Ma1::new(theta, sigma2).map(Process::Ma1),
+            (Self::Flicker, &[b2]) => FlickerNoise::new(b2).map(Process::Flicker),
             (Self::RandomWalk, &[gamma2]) => RandomWalk::new(gamma2).map(Process::RandomWalk),
             (Self::Drift, &[slope]) => Drift::new(slope).map(Process::Drift),
             _ => return None,
@@ -170,6 +179,7 @@ impl Parameter {
             Self::Sigma2 => "sigma2",
             Self::S2 => "s2",
             Self::Q2 => "q2",
+            Self::B2 => "b2",
             Self::Gamma2 => "gamma2",
             Self::Slope => "slope",
         }
@@ -208,7 +218,7 @@ impl Parameter {
         match self {
             Self::Phi | Self::Theta => (-1.0, 1.0),
             Self::Slope => (f64::NEG_INFINITY, f64::INFINITY),
-            Self::Beta | Self::Sigma2 | Self::S2 | Self::Q2 | Self::Gamma2 => (0.0, f64::INFINITY),
+            Self::Beta | Self::Sigma2 | Self::S2 | Self::Q2 | Self::B2 | Self::Gamma2 => (0.0, f64::INFINITY),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Variance of the mean of a recording about the level at which it was switched on.
 
-use super::{Ar1, Composite, Process};
+use super::{Ar1, Composite, Ladder, Process};
 
 impl Composite {
     /// Variance of the mean of the first N samples after a switching-on (units²), as [`super::Synthesizer`] makes them: a
@@ -20,6 +20,7 @@ fn mean_variance(process: &Process, n: f64) -> f64 {
         Process::GaussMarkov(p) => of_ar1(&p.ar1(), n),
         // Step i is in n + 1 − i of the samples: γ² Σ i²/n².
         Process::RandomWalk(p) => p.gamma2() * (n + 1.0) * (2.0 * n + 1.0) / (6.0 * n),
+        Process::Flicker(p) => p.parts(Ladder::FINE).iter().map(|part| mean_variance(part, n)).sum(),
         Process::Drift(_) => 0.0,
         Process::Ma1(p) => {
             // W_1 … W_(n−1) occur in two samples, with 1 and theta; W_n in one with 1, W_0 in one with theta.

@@ -21,6 +21,7 @@ mod composite;
 pub mod continuous;
 mod drift;
 mod flicker;
+mod flicker_noise;
 mod gauss_markov;
 mod kind;
 mod ma1;
@@ -42,6 +43,7 @@ pub use ar1::Ar1;
 pub use composite::Composite;
 pub use drift::Drift;
 pub use flicker::Flicker;
+pub use flicker_noise::{FlickerNoise, Ladder};
 pub use gauss_markov::GaussMarkov;
 pub use kind::{Kind, Parameter, ParameterRef, labels};
 pub use ma1::Ma1;
@@ -95,6 +97,8 @@ pub enum Process {
     GaussMarkov(GaussMarkov),
     /// First-order moving average, "MA1".
     Ma1(Ma1),
+    /// Flicker noise, "FN".
+    Flicker(FlickerNoise),
 }
 
 /// As in model files: its code as `type`, and its parameters.
@@ -120,6 +124,7 @@ impl Process {
             Self::Drift(_) => Kind::Drift,
             Self::GaussMarkov(_) => Kind::GaussMarkov,
             Self::Ma1(_) => Kind::Ma1,
+            Self::Flicker(_) => Kind::Flicker,
         }
     }
 
@@ -134,6 +139,7 @@ impl Process {
             Self::Drift(p) => vec![p.slope()],
             Self::GaussMarkov(p) => vec![p.beta(), p.s2()],
             Self::Ma1(p) => vec![p.theta(), p.sigma2()],
+            Self::Flicker(p) => vec![p.b2()],
         }
     }
 
@@ -150,6 +156,7 @@ impl Process {
             Self::Drift(p) => p.haar_wv(level),
             Self::GaussMarkov(p) => p.haar_wv(level),
             Self::Ma1(p) => p.haar_wv(level),
+            Self::Flicker(p) => p.haar_wv(level),
         }
     }
 
@@ -165,6 +172,7 @@ impl Process {
                 vec![p.sigma2() * derivative, value]
             }
             Self::RandomWalk(_) => vec![RandomWalk::haar_shape(level)],
+            Self::Flicker(_) => vec![FlickerNoise::haar_shape(level)],
             Self::Drift(p) => vec![2.0 * p.slope() * Drift::haar_shape(level)],
             Self::GaussMarkov(p) => {
                 let (value, derivative) = GaussMarkov::haar_shape(p.beta() / p.rate_hz(), level);

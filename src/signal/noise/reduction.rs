@@ -4,7 +4,7 @@
 //! weights, over the scales from one GNSS interval to [`window_s`]. Quantization noise is left out: its
 //! integral is bounded. So is a drift: the filter has a state for its slope. The reduction is a pure function of model, interval and window.
 
-use super::{Ar1, Composite, GaussMarkov, ParameterError, Process, White};
+use super::{Ar1, Composite, GaussMarkov, Ladder, ParameterError, Process, White};
 use nalgebra::{Matrix3, Vector3};
 
 /// Longest time scale that matters to a filter whose longest outage is given (s): eight times the outage,
@@ -89,7 +89,8 @@ pub fn reduce(
 pub fn is_exact(noise: &Composite) -> bool {
     let is_bias =
         |p: &&Process| matches!(p, Process::Ar1(_) | Process::GaussMarkov(_) | Process::RandomWalk(_));
-    noise.processes.iter().filter(is_bias).count() <= 1
+    let is_flicker = |p: &Process| matches!(p, Process::Flicker(_));
+    noise.processes.iter().filter(is_bias).count() <= 1 && !noise.processes.iter().any(is_flicker)
 }
 
 /// The processes that the pair stands for: without quantization noise and without drift.
@@ -105,7 +106,10 @@ fn stationary_variance(noise: &Composite) -> f64 {
         Process::GaussMarkov(p) => p.s2(),
         _ => 0.0,
     };
-    noise.processes.iter().map(variance).sum()
+    let flicker =
+        noise.processes.iter().filter_map(|p| if let Process::Flicker(p) = p { Some(p) } else { None });
+    let parts = flicker.flat_map(|p| p.parts(Ladder::FILTER));
+    noise.processes.iter().copied().chain(parts).map(|p| variance(&p)).sum()
 }
 
 /// Least squares of ln(reduced/model) in (ln sigma2, ln variance, ln kappa), kappa = dt/T.

@@ -1,7 +1,7 @@
 //! Synthesis: draws the noise of one axis from its model, block by block.
 
 use super::normal::Ziggurat;
-use super::{Ar1, Composite, Process};
+use super::{Ar1, Composite, Ladder, Process};
 use crate::rng::{Generator, StreamKey};
 use rand::RngExt;
 
@@ -10,7 +10,7 @@ use rand::RngExt;
 /// Every process of the sum draws from a stream of its own, so that adding or removing one changes no
 /// other's numbers. What comes out does not depend on the sizes of the blocks it is asked for.
 ///
-/// AR1 and GM start stationary; MA1 and QN have a past; RW starts at 0 (its first sample is its first
+/// FN is a sum of AR1 ([`Ladder::FINE`]). AR1 and GM start stationary; MA1 and QN have a past; RW starts at 0 (its first sample is its first
 /// increment) and DR at one slope (X_t = slope·t, t = 1, 2, …).
 #[derive(Debug, Clone)]
 pub struct Synthesizer {
@@ -31,7 +31,15 @@ impl Synthesizer {
     pub fn new(noise: &Composite, key: StreamKey<'_>) -> Self {
         let mut synthesizer = Self { direct: Vec::new(), recursive: Vec::new() };
         for (process, label) in noise.processes.iter().zip(noise.labels()) {
-            synthesizer.add(process, StreamKey { process: &label, ..key }.generator());
+            match process {
+                Process::Flicker(flicker) => {
+                    for (i, part) in flicker.parts(Ladder::FINE).iter().enumerate() {
+                        let label = format!("{label}.{i}");
+                        synthesizer.add(part, StreamKey { process: &label, ..key }.generator());
+                    }
+                }
+                _ => synthesizer.add(process, StreamKey { process: &label, ..key }.generator()),
+            }
         }
         synthesizer
     }

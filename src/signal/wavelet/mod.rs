@@ -12,6 +12,7 @@
 //! ```
 
 mod curve;
+mod gappy;
 pub mod haar;
 pub mod interval;
 mod quantization;
@@ -19,6 +20,7 @@ pub mod robust;
 mod tuning;
 
 pub use curve::Curve;
+pub use gappy::{Gappy, gappy};
 pub use haar::classical;
 pub use quantization::QuantizationResponse;
 pub use robust::{RobustVariance, Status, both};

@@ -57,7 +57,7 @@ impl RobustVariance {
 
     /// Whether the steps leave it without a root, or make it another than the classical variance, whose degrees of freedom are
     /// given. Of finer steps, or where the two agree, it is as good as ever.
-    fn is_moved_by_steps(&self, classical: f64, edof: f64, efficiency: f64) -> bool {
+    pub(super) fn is_moved_by_steps(&self, classical: f64, edof: f64, efficiency: f64) -> bool {
         let ratio = (classical / self.value).ln();
         // (1/e − 1)·2/eta is the variance of the logarithm of the two of Gaussian coefficients.
         let sigma = ((1.0 / efficiency - 1.0) * 2.0 / edof).sqrt();

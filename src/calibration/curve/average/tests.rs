@@ -11,7 +11,16 @@ fn tuning() -> Tuning {
 fn replicate(samples: usize, classical: f64, robust: f64) -> Replicate {
     let robust = vec![RobustVariance { value: robust, status: Status::Ok, zeros: 0.0 }; 2];
     let (name, classical) = (String::new(), vec![classical; 2]);
-    Replicate { name, axis: None, samples, classical, robust, trend: f64::NAN, mean: f64::NAN }
+    Replicate {
+        name,
+        axis: None,
+        samples,
+        classical,
+        robust,
+        coverage: Vec::new(),
+        trend: f64::NAN,
+        mean: f64::NAN,
+    }
 }
 
 fn eight() -> Vec<Replicate> {

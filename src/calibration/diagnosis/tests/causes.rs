@@ -53,7 +53,16 @@ fn coarse_steps_take_no_scale_from_one_recording() {
         (0..32 * SAMPLES).map(|_| (0.3 * generator.sample::<f64, _>(StandardNormal)).round()).collect();
     let (classical, robust) = both(&signal, LEVELS, &settings().tuning).unwrap();
     let (name, axis, samples) = ("run".to_owned(), Some(Axis::X), signal.len());
-    let one = Replicate { name, axis, samples, classical, robust, trend: f64::NAN, mean: f64::NAN };
+    let one = Replicate {
+        name,
+        axis,
+        samples,
+        classical,
+        robust,
+        coverage: Vec::new(),
+        trend: f64::NAN,
+        mean: f64::NAN,
+    };
     let groups = grouped(vec![(Channel { sensor: Sensor::Accel, axis: Axis::X }, one)], Pool::Axes);
     let estimators = vec![Estimator::Gmwm, Estimator::Rgmwm, Estimator::SrAwv];
     let model = ModelChoice::Given("WN".parse().unwrap());

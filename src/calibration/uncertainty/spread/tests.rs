@@ -83,6 +83,7 @@ fn coverage(between: f64, is_shared: bool) -> f64 {
                     samples: SAMPLES,
                     classical: vec![(differs + own).exp()],
                     robust: Vec::new(),
+                    coverage: Vec::new(),
                     trend: f64::NAN,
                     mean: f64::NAN,
                 });
@@ -127,6 +128,7 @@ fn a_level_that_a_short_recording_lacks_scatters_as_the_others_show() {
         samples: 1 << 40,
         classical: logs.iter().map(|log| log.exp()).collect(),
         robust: Vec::new(),
+        coverage: Vec::new(),
         trend: f64::NAN,
         mean: f64::NAN,
     };

@@ -206,3 +206,29 @@ fn the_end_of_a_gps_week_is_no_step_back() {
         stamped("t_s", 100, |k| format!("{}", 7200.0 + 0.01 * k as f64 - if k < 50 { 0.0 } else { 3600.0 }));
     assert!(refusal(back).contains("time goes back"));
 }
+
+/// Of 2000 samples at 100 Hz 40 single ones and a burst of 60 lost: the places are where they were, and the rate is that of the
+/// samples. A tenth lost, or time that stands still, is refused as ever.
+#[test]
+fn lost_samples_keep_their_places() {
+    let keep = ReadOptions { gaps: Gaps::Keep, ..ReadOptions::default() };
+    let stamps = |is_lost: &dyn Fn(usize) -> bool| {
+        let kept: Vec<usize> = (0..2000).filter(|k| !is_lost(*k)).collect();
+        stamped("t_s", kept.len(), |i| format!("{:.2}", 0.01 * kept[i] as f64))
+    };
+    let is_lost = |k: usize| k % 50 == 25 || (1001..1061).contains(&k);
+    let lost = (0..2000).filter(|k| is_lost(*k)).count();
+    let (_files, path) = Files::with("a.csv", &stamps(&is_lost));
+    let (recordings, report) = read(&[path], &keep).unwrap();
+    let samples = &recordings[0].signals[0].samples;
+    assert_eq!((samples.len(), report.files[0].samples[0]), (2000, 2000));
+    assert!((0..2000).all(|k| samples[k].is_nan() == is_lost(k)));
+    assert!((recordings[0].rate_hz / 100.0 - 1.0).abs() < 1e-6, "{}", recordings[0].rate_hz);
+    let warning = &report.files[0].warnings[0];
+    let share = lost as f64 / 20.0;
+    assert!(warning.contains(&format!("{lost} samples ({share:.2} %) are missing in 40 gaps")), "{warning}");
+    let often = stamps(&|k| k % 9 == 5);
+    assert!(refusal_with("a.csv", &often, &keep).0.contains("gap in time"));
+    let twice = format!("{}1,1\n", stamped("t_s", 20, |i| format!("{:.2}", 0.05 * (i.min(18)) as f64)));
+    assert!(refusal_with("a.csv", &twice, &keep).0.contains("in time"));
+}

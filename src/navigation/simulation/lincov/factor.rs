@@ -54,6 +54,7 @@ fn amplitude(process: &Process) -> (&'static str, f64) {
         Process::White(p) => ("sigma2", p.sigma2()),
         Process::Quantization(p) => ("q2", p.q2()),
         Process::Ar1(p) => ("sigma2", p.sigma2()),
+        Process::Flicker(p) => ("b2", p.b2()),
         Process::RandomWalk(p) => ("gamma2", p.gamma2()),
         Process::Drift(p) => ("slope", p.slope()),
         Process::GaussMarkov(p) => ("s2", p.s2()),

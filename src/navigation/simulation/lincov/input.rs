@@ -3,7 +3,7 @@
 use crate::ekf::belief::BiasGroup;
 use crate::ekf::{Belief, UnknownKind};
 use crate::imu::{Channel, Sensor};
-use crate::noise::{Model, Process};
+use crate::noise::{Ladder, Model, Process};
 
 /// Signals of an IMU; again each multiplied by its own sample, what a scale factor adds; and each multiplied by
 /// the samples of the other two axes of its sensor, what a misalignment adds.
@@ -248,6 +248,10 @@ impl Sources {
 
     pub(super) fn add(&mut self, signal: usize, process: &Process) {
         let state = match process {
+            Process::Flicker(p) => {
+                p.parts(Ladder::FINE).iter().for_each(|part| self.add(signal, part));
+                return;
+            }
             Process::White(p) => {
                 self.white[signal] += p.sigma2();
                 return;

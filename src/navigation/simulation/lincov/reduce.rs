@@ -10,7 +10,7 @@ use super::damped::{Damped, Part, Value};
 use super::pass::{Assessment, Consistency, ErrorLaw, FilterPass, Judged, assess};
 use super::track::{NAV, Track};
 use crate::earth::GravityModel;
-use crate::ekf::{Belief, FilterStates, InitialSettings};
+use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings};
 use crate::imu::{Axis, Channel};
 use crate::noise::{Model, Process, reduction};
 use crate::sensors::defects::ImuSettings;
@@ -289,6 +289,7 @@ pub fn drive(model: &Model, gnss: &GnssSettings, outages_s: &[f64]) -> Option<Tr
         initial: &InitialSettings::default(),
         defects: &ImuSettings::default(),
         baro: None,
+        update: FixUpdate::default(),
         nis_gate: None,
         outages: &outages,
         seed: 0,
