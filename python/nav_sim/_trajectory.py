@@ -36,7 +36,9 @@ class Trajectory:
             self._path, self._columns = None, columns(source, "trajectory")  # type: ignore[arg-type]
         self._origin = origin
         # what is wrong with it is known from the start
-        self.start_s, self.end_s = (float(self.states(rate_hz=1.0)["t_s"][k]) for k in (0, -1))
+        t_s = self.states(rate_hz=100.0)["t_s"]
+        #: Times of the first and the last sample (s).
+        self.start_s, self.end_s = float(t_s[0]), float(t_s[-1])
 
     def staged(self, staging: Staging) -> str:
         """Its file."""
