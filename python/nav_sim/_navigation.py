@@ -167,7 +167,7 @@ def lincov(
     scenario: Settings | None = None,
     progress: Progress = None,
 ) -> Run:
-    """The same without sampling, by linear covariance analysis: `nav-sim run --method lincov`. Arguments as of `run`."""
+    """The same without sampling, by covariance analysis: `nav-sim run --method lincov`. Arguments as of `run`."""
     return run(
         trajectory,
         model,
