@@ -33,6 +33,9 @@ class Answer:
     files that it makes.
     """
 
+    #: Name of the page among the files of the command.
+    _page: str | None = None
+
     def __init__(self, native: _native.Answer) -> None:
         self._native = native
 
@@ -74,7 +77,7 @@ class Answer:
     def to_html(self, path: StrPath) -> Path:
         """Writes the page of the command, which needs no other file."""
         page = Path(path)
-        page.write_text(self._native.html(), encoding="utf-8")
+        page.write_text(self._native.html(), encoding="utf-8", newline="\n")
         return page
 
     def write(self, directory: StrPath) -> Path:
@@ -83,6 +86,8 @@ class Answer:
         place.mkdir(parents=True, exist_ok=True)
         for name in self.files:
             (place / name).write_text(self.text(name), encoding="utf-8", newline="\n")
+        if self._page is not None:
+            self.to_html(place / self._page)
         return place
 
     def __repr__(self) -> str:

@@ -36,6 +36,8 @@ class Run(Answer):
     standard estimation error) is what the filter believes of its error, RMSE how wrong it is.
     """
 
+    _page = "report.html"
+
     @cached_property
     def epochs(self) -> Columns:
         """Once a second: `t_s`, `asee_…`, `rmse_…`, `bias_…` of each state, `nees`, `coverage`."""
@@ -165,7 +167,7 @@ def lincov(
     scenario: Settings | None = None,
     progress: Progress = None,
 ) -> Run:
-    """The same without sampling, by linear covariance analysis: `nav-sim run --method lincov`. Arguments as of `run`."""
+    """The same without sampling, by covariance analysis: `nav-sim run --method lincov`. Arguments as of `run`."""
     return run(
         trajectory,
         model,
@@ -189,6 +191,8 @@ def states(filter: str | int | None) -> str | None:
 
 class Fusion(Answer):
     """The filter on recorded data: `nav-sim fuse`. `solution`, `innovations` and `errors` are dicts of columns."""
+
+    _page = "report.html"
 
     @cached_property
     def solution(self) -> Columns:

@@ -35,8 +35,10 @@ class Trajectory:
         else:
             self._path, self._columns = None, columns(source, "trajectory")  # type: ignore[arg-type]
         self._origin = origin
-        # what is wrong with it is known from the start
-        self.start_s, self.end_s = (float(self.states(rate_hz=1.0)["t_s"][k]) for k in (0, -1))
+        # what is wrong with it, and what is doubtful, is known from the start
+        _, (self.start_s, self.end_s), doubts = self._read(1.0)
+        for doubt in doubts:
+            warnings.warn(doubt, NavSimWarning, stacklevel=2)
 
     def staged(self, staging: Staging) -> str:
         """Its file."""
@@ -50,13 +52,12 @@ class Trajectory:
 
     def states(self, rate_hz: float = 10.0) -> dict[str, FloatArray]:
         """Position, velocity (`v_n_m_s` …) and attitude at that rate, smoothly between the samples."""
+        return self._read(float(rate_hz))[0]
+
+    def _read(self, rate_hz: float) -> tuple[dict[str, FloatArray], tuple[float, float], list[str]]:
         with Staging() as staging:
             path = self.staged(staging)
-            found, doubts = _native.trajectory_states(path, float(rate_hz), staging.hidden)
-        for doubt in doubts if not getattr(self, "_doubted", False) else []:
-            warnings.warn(doubt, NavSimWarning, stacklevel=3)
-        self._doubted = True
-        return found
+            return _native.trajectory_states(path, rate_hz, staging.hidden)
 
     def write(self, path: StrPath) -> Path:
         """Writes its file, or its columns as a table."""

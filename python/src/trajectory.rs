@@ -14,7 +14,7 @@ use std::path::PathBuf;
 const COLUMNS: [&str; 10] =
     ["t_s", "lat_deg", "lon_deg", "h_m", "v_n_m_s", "v_e_m_s", "v_d_m_s", "roll_deg", "pitch_deg", "yaw_deg"];
 
-/// The states of a trajectory file so often a second (Hz): a column each, and the doubts about the file.
+/// The states of a trajectory file so often a second (Hz), a column each; its first and last instant (s); the doubts about it.
 #[pyfunction]
 #[pyo3(signature = (path, rate_hz, hidden))]
 pub(crate) fn trajectory_states<'py>(
@@ -22,7 +22,7 @@ pub(crate) fn trajectory_states<'py>(
     path: PathBuf,
     rate_hz: f64,
     hidden: &str,
-) -> PyResult<(Bound<'py, PyDict>, Vec<String>)> {
+) -> PyResult<(Bound<'py, PyDict>, (f64, f64), Vec<String>)> {
     if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
         let message = format!("rate_hz: {rate_hz} is not a rate above 0 and up to {MAX_RATE_HZ} Hz");
         return Err(error::raise(py, &message, None, None, None));
@@ -39,14 +39,14 @@ pub(crate) fn trajectory_states<'py>(
             let [lat, lon] = [state.lat / DEG, state.lon / DEG];
             [t_s, lat, lon, state.h, n, e, d, roll / DEG, pitch / DEG, yaw / DEG]
         });
-        Ok::<_, Failure>((states.collect::<Vec<_>>(), doubts))
+        Ok::<_, Failure>((states.collect::<Vec<_>>(), (trajectory.start_s(), trajectory.end_s()), doubts))
     })?;
-    let (states, doubts) = read.map_err(|failure| error::of_failure(py, &failure, hidden))?;
+    let (states, span_s, doubts) = read.map_err(|failure| error::of_failure(py, &failure, hidden))?;
     let columns = PyDict::new(py);
     for (k, name) in COLUMNS.into_iter().enumerate() {
         columns.set_item(name, PyArray1::from_vec(py, states.iter().map(|state| state[k]).collect()))?;
     }
-    Ok((columns, doubts.iter().map(|doubt| doubt.to_string().replace(hidden, "")).collect()))
+    Ok((columns, span_s, doubts.iter().map(|doubt| doubt.to_string().replace(hidden, "")).collect()))
 }
 
 /// Highest rate that is of use (Hz).

@@ -97,6 +97,8 @@ impl AtomicDir {
         let mut order = File::create(self.staging.path().join(ORDER))?;
         order.write_all(self.names.join("\n").as_bytes())?;
         order.sync_all()?;
+        // Windows renames no directory in which a file is open
+        drop(order);
         let name = self.staging.path().with_extension(temporary::MOVING);
         let moving = self.destination.join(name.file_name().unwrap_or_default());
         self.staging.rename(&moving)?;
