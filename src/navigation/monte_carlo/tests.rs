@@ -57,6 +57,7 @@ struct Setting {
     baro: Option<BaroSettings>,
     update: FixUpdate,
     nis_gate: Option<f64>,
+    seed: u64,
 }
 
 impl Setting {
@@ -69,6 +70,7 @@ impl Setting {
             gnss: GnssSettings::default(),
             initial: InitialSettings::default(),
             outages: vec![Outage { start_s: 20.0, end_s: 40.0 }],
+            seed: 3,
             defects: ImuSettings::default(),
             baro: None,
             update: FixUpdate::default(),
@@ -90,7 +92,7 @@ impl Setting {
             update: self.update,
             nis_gate: self.nis_gate,
             outages: &self.outages,
-            seed: 3,
+            seed: self.seed,
             scenario: "",
             coverage_level: 0.95,
         }
@@ -134,6 +136,8 @@ fn a_run_does_not_depend_on_how_many_others_there_are_or_on_other_candidates() {
 #[test]
 fn the_iterated_update_is_more_consistent_after_a_long_outage() {
     let mut setting = Setting::new(460.0, &[1.0]);
+    // Runs that the number of pairs was not chosen by.
+    setting.seed = 4;
     setting.outages = vec![Outage { start_s: 60.0, end_s: 360.0 }];
     let once = setting.run(64);
     setting.update = FixUpdate::Iterated;
