@@ -124,9 +124,7 @@ pub(crate) const fn option_for(setting: Setting) -> &'static str {
         Setting::Output => "choose another output with --out",
         Setting::Force => "name another place for it, or replace it with --force",
         Setting::OutputDirectory => "choose another directory with --out",
-        Setting::RemoveLine => {
-            "remove the line, and give --gaps ignore or --gaps split for the gap that it leaves"
-        }
+        Setting::RemoveLine => "remove the line",
         Setting::FixSigma => "give them for all fixes with --gnss-sigma POS[:VEL]",
         Setting::Topic => "--topic NAME names one (nav-sim inspect lists them)",
         Setting::Stamp => "--stamp log takes the times of arrival",

@@ -21,6 +21,7 @@ mod files;
 mod filter;
 mod manifest;
 mod request;
+mod start;
 mod summary;
 
 use crate::answered::{Answered, contents};
@@ -33,7 +34,8 @@ pub use drive::{FuseAnswer, FuseNote};
 pub use error::FuseError;
 pub(crate) use files::{FILES, directory};
 pub(crate) use manifest::FuseManifest;
-pub use request::{FuseRequest, GnssSigma, LoggerAxes, MountingChoice, StartChoice, TopicChoice};
+pub use request::{FuseRequest, GnssSigma, LoggerAxes, MountingChoice};
+pub use start::{StartChoice, TopicChoice};
 pub use summary::{Cause, FuseSummary};
 
 /// Reads the files of a request and fuses them.

@@ -1,6 +1,7 @@
 //! Arguments of a fusion.
 
 use super::FuseError;
+use super::start::{StartChoice, TopicChoice};
 use glam::{DMat3, DQuat, DVec3};
 use nav_sim_navigation::earth::GravityModel;
 use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
@@ -12,7 +13,6 @@ use nav_sim_navigation::sensors::gnss::MAX_LEVER_ARM_M;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_signal::units::DEG;
 use serde::{Deserialize, Serialize};
-use std::fmt::{self, Display, Formatter};
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -223,7 +223,7 @@ pub enum MountingChoice {
 }
 
 /// Largest standard deviation of an attitude that small angles describe (degrees).
-const MAX_SIGMA_DEG: f64 = 30.0;
+pub(super) const MAX_SIGMA_DEG: f64 = 30.0;
 
 impl FromStr for MountingChoice {
     type Err = String;
@@ -251,86 +251,6 @@ impl FromStr for MountingChoice {
     }
 }
 
-/// Start of a fusion.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(into = "String", try_from = "String")]
-pub enum StartChoice {
-    /// Found in the data.
-    Auto,
-    /// Found in the data but for the heading.
-    Heading {
-        /// From north, clockwise (degrees).
-        deg: f64,
-        /// Standard deviation (degrees).
-        sigma_deg: f64,
-    },
-    /// Stated in a file.
-    File(PathBuf),
-}
-
-impl FromStr for StartChoice {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let numbers = text.split_once(':').map(|(deg, sigma)| (number(deg), number(sigma)));
-        match numbers {
-            _ if text == "auto" => Ok(Self::Auto),
-            Some((Ok(deg), Ok(sigma_deg)))
-                if sigma_deg > 0.0 && sigma_deg <= MAX_SIGMA_DEG && deg.abs() <= 360.0 =>
-            {
-                Ok(Self::Heading { deg, sigma_deg })
-            }
-            Some((Ok(_), Ok(_))) => Err(format!(
-                "expected a heading and its standard deviation of up to {MAX_SIGMA_DEG}°, such as 90:5"
-            )),
-            _ => Ok(Self::File(text.into())),
-        }
-    }
-}
-
-impl TryFrom<String> for StartChoice {
-    type Error = String;
-
-    fn try_from(text: String) -> Result<Self, String> {
-        text.parse()
-    }
-}
-
-impl From<StartChoice> for String {
-    fn from(start: StartChoice) -> Self {
-        start.to_string()
-    }
-}
-
-impl Display for StartChoice {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Auto => f.write_str("auto"),
-            Self::Heading { deg, sigma_deg } => write!(f, "{deg}:{sigma_deg}"),
-            Self::File(path) => write!(f, "{}", path.display()),
-        }
-    }
-}
-
-/// Topics of a log that has several.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct TopicChoice {
-    /// Of the IMU; none: the only one.
-    pub imu: Option<String>,
-    /// Of the fixes; none: the only one.
-    pub fixes: Option<String>,
-}
-
-impl FromStr for TopicChoice {
-    type Err = std::convert::Infallible;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let (imu, fixes) = text.split_once(',').unwrap_or((text, ""));
-        let named = |name: &str| (!name.is_empty()).then(|| name.to_owned());
-        Ok(Self { imu: named(imu), fixes: named(fixes) })
-    }
-}
-
 /// Standard deviations of fixes, as a user gives them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -347,7 +267,7 @@ fn list<const N: usize>(text: &str) -> Option<[f64; N]> {
     all?.try_into().ok()
 }
 
-fn number(text: &str) -> Result<f64, &'static str> {
+pub(super) fn number(text: &str) -> Result<f64, &'static str> {
     text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or("not a finite number")
 }
 
@@ -431,19 +351,5 @@ mod tests {
         };
         assert_eq!(request, expected);
         assert!(serde_json::from_str::<FuseRequest>(r#"{ "imu": "a", "delay": 1 }"#).is_err());
-    }
-
-    #[test]
-    fn a_start_is_a_file_a_heading_or_found() {
-        let start = |text: &str| text.parse::<StartChoice>();
-        assert_eq!(start("auto"), Ok(StartChoice::Auto));
-        assert_eq!(start("-90:5"), Ok(StartChoice::Heading { deg: -90.0, sigma_deg: 5.0 }));
-        assert_eq!(start("a/initial.toml"), Ok(StartChoice::File("a/initial.toml".into())));
-        for bad in ["400:5", "90:0", "90:31"] {
-            assert!(start(bad).is_err(), "{bad}");
-        }
-        for text in ["auto", "-90:5", "a:b.toml"] {
-            assert_eq!(start(text).unwrap().to_string(), text);
-        }
     }
 }

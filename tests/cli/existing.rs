@@ -81,7 +81,7 @@ fn a_fusion_is_known_by_its_configuration_and_the_contents_of_its_files() {
     assert_eq!(configuration["gnss_sigma_factor"], serde_json::json!([2.0, 1.0]));
     let same = [
         "fuse copy.csv log/gnss.csv imu.toml --mounting=0,0,1.0:1,1,1 --gnss-sigma x2.0:1.0",
-        " --outage 8.0:11 --lever-arm 0,0,0 --filter 15 --rate-hz 10 -j 1 -q --out=out ",
+        " --outage 8.0:11 --lever-arm 0,0,0 --filter 15 -j 1 -q --out=out ",
         start,
     ]
     .concat();

@@ -72,3 +72,82 @@ fn intervals_go_from_recordings_to_navigation() {
     assert!(ran.stderr.contains("m.draws.json, line 1: "), "{}", ran.stderr);
     done(dir, "run drive.toml m.toml --truth imu.toml --method lincov --verbose --outage 30:45 -o other");
 }
+
+/// What recordings differ by goes from them into the model, and from the model into other recordings and into plans.
+#[test]
+fn spread_goes_from_recordings_to_the_model_and_on() {
+    let law = |sensor: &str, median: &str| {
+        format!(
+            "[[spread.{sensor}]]\nprocess = \"WN\"\nparameter = \"sigma2\"\ndistribution = \"lognormal\"\nmedian = {median}\nsd = 0.3\n"
+        )
+    };
+    let place = place_with(DRIVE, &format!("{MODEL}{}{}", law("accel", "5.4e-5"), law("gyro", "2e-6")));
+    let dir = place.path();
+    done(dir, "synthesize imu.toml --spread --replicates 5 --samples 4096 --seed 1 -o made");
+    let found =
+        done(dir, "calibrate made --model WN+RW --bootstrap 60 --seed 1 --format json -o m.toml").stdout;
+    let found: Value = serde_json::from_str(&found).unwrap();
+    let spread = &found["fits"][0]["parameter_spread"][0];
+    assert_eq!((&spread["process"], &spread["distribution"]), (&"WN".into(), &"lognormal".into()), "{found}");
+    // of 12 degrees of freedom or fewer: 0.3 within a factor of two
+    assert!((0.15..0.6).contains(&spread["sd"].as_f64().unwrap()), "{spread}");
+    let text = fs::read_to_string(dir.join("m.toml")).unwrap();
+    assert!(text.contains("[[spread.accel]]") && text.contains("sd_ci95 = ["), "{text}");
+    done(dir, "synthesize m.toml --spread --replicates 2 --samples 4096 --seed 1 -o again");
+    let planned = done(dir, "design m.toml --recordings 4 --hours 0.01 --draws 40 --format json").stdout;
+    assert!(planned.contains("endless_half_width_pct"), "{planned}");
+}
+
+/// 200 s at 100 Hz without one sample in fifty: all 13 scales are there, to 81.92 s, with their degrees of freedom.
+#[test]
+fn lost_samples_cost_no_scale() {
+    let place = place_with(DRIVE, MODEL);
+    let dir = place.path();
+    done(dir, "synthesize imu.toml --replicates 1 --samples 20000 --axes gyro.x --seed 1 -o made");
+    let whole = fs::read_to_string(dir.join("made/replicate_1.csv")).unwrap();
+    // a multiplicative hash: no pattern in time
+    let is_lost = |k: usize| (k * 40_503) % 65_536 < 65_536 / 50;
+    let kept: Vec<&str> =
+        whole.lines().enumerate().filter(|(k, _)| *k == 0 || !is_lost(*k)).map(|(_, l)| l).collect();
+    fs::write(dir.join("lost.csv"), kept.join("\n") + "\n").unwrap();
+    let curves = |file: &str| -> Value {
+        serde_json::from_str(&done(dir, &format!("wv {file} --format json")).stdout).unwrap()
+    };
+    let (lost, whole) = (curves("lost.csv"), curves("made/replicate_1.csv"));
+    let (lost, whole) = (&lost["signals"][0], &whole["signals"][0]);
+    assert_eq!(lost["tau_s"], whole["tau_s"]);
+    assert_eq!(lost["tau_s"][12], 81.92);
+    for j in 0..13 {
+        let at = |curve: &Value, key: &str| curve[key][j].as_f64().unwrap();
+        let share = at(lost, "edof") / at(whole, "edof");
+        assert!((0.94..=1.0).contains(&share), "{j}: {share}");
+    }
+    done(dir, "calibrate lost.csv --model WN+RW --estimator gmwm --bootstrap 40 --seed 1 -o m.toml");
+}
+
+/// Flicker noise goes wherever a model goes, and comes back from recordings.
+#[test]
+fn flicker_noise_is_read_by_all() {
+    let axis = |sigma2: &str, b2: &str| {
+        format!("processes = [{{ type = \"WN\", sigma2 = {sigma2} }}, {{ type = \"FN\", b2 = {b2} }}]\n")
+    };
+    let model =
+        format!("rate_hz = 100.0\n[accel]\n{}[gyro]\n{}", axis("5.4e-5", "1e-7"), axis("2e-6", "1e-8"));
+    let place = place_with(DRIVE, &model);
+    let dir = place.path();
+    done(dir, "synthesize imu.toml --replicates 4 --samples 65536 --axes gyro --seed 1 -o made");
+    let found = done(
+        dir,
+        "calibrate made --model WN+FN --estimator awv --bootstrap 100 --seed 1 --format json -o m.toml",
+    )
+    .stdout;
+    let found: Value = serde_json::from_str(&found).unwrap();
+    let fitted = &found["fits"][0]["processes"][1];
+    let [low, high] = [0, 1].map(|i| fitted["b2_ci95"][i].as_f64().unwrap());
+    assert!(low < 1e-8 && 1e-8 < high && high < 2.0 * low, "{fitted}");
+    done(dir, "export imu.toml --target kalibr");
+    let lincov = done(dir, "run drive.toml imu.toml --method lincov --filter full --outage 30:45 -o full");
+    assert!(lincov.stdout.starts_with("verdict: consistent"), "{}", lincov.stdout);
+    done(dir, "run drive.toml imu.toml --runs 4 --outage 30:45 --seed 1 -o runs");
+    done(dir, "check imu.toml");
+}

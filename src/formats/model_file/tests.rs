@@ -175,7 +175,7 @@ fn wrong_keys_are_refused_with_what_was_meant() {
     );
     assert_eq!(
         process_refusal("type = \"flicker\""),
-        "m.toml, line 4: \"accel.processes[1].type\" = \"flicker\" is not one of \"WN\", \"QN\", \"AR1\", \"GM\", \"MA1\", \"RW\", \"DR\" | "
+        "m.toml, line 4: \"accel.processes[1].type\" = \"flicker\" is not one of \"WN\", \"QN\", \"AR1\", \"GM\", \"MA1\", \"FN\", \"RW\", \"DR\" | "
     );
     assert_eq!(
         process_refusal("sigma2 = 1"),
@@ -222,7 +222,7 @@ fn laws_of_spread_are_checked_against_the_model() {
     );
     assert_eq!(
         spread("process = \"AR1\"\nparameter = \"phi\"\ndistribution = \"gamma\"\n"),
-        "m.toml, line 7: \"spread.accel[1].distribution\" = \"gamma\" is not one of \"beta\", \"normal\" | "
+        "m.toml, line 7: \"spread.accel[1].distribution\" = \"gamma\" is not one of \"beta\", \"normal\", \"lognormal\" | "
     );
     assert_eq!(
         spread(
@@ -306,6 +306,6 @@ fn the_schema_has_the_bounds_of_the_reader() {
             }
         }
     }
-    // six variances, and of the shapes of AR1, GM and MA1 two ends, one and two
-    assert_eq!(bounds, 6 + 2 + 1 + 2);
+    // seven variances, and of the shapes of AR1, GM and MA1 two ends, one and two
+    assert_eq!(bounds, 7 + 2 + 1 + 2);
 }

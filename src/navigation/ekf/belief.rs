@@ -282,7 +282,12 @@ impl AxisBelief {
             match process {
                 // the parts have none of their own
                 Process::Flicker(p) => {
-                    let parts = Self::full(&Composite::new(p.parts(Ladder::FILTER)));
+                    let mut parts = Self::full(&Composite::new(p.parts(Ladder::FILTER)));
+                    let stationary: f64 = parts.biases.iter().map(|bias| bias.initial).sum();
+                    // what is slower still is as constant as the slowest
+                    if let Some(slowest) = parts.biases.last_mut() {
+                        slowest.initial += (p.initial_variance() - stationary).max(0.0);
+                    }
                     axis.white += parts.white;
                     axis.biases.extend(parts.biases);
                 }

@@ -122,6 +122,17 @@ impl FlickerNoise {
         let white = White::new(white).map(Process::White);
         std::iter::once(white).chain((0..count).map(ar1)).filter_map(Result::ok).collect()
     }
+
+    /// Variance at the beginning of what is slower than the fastest AR1 of a filter: of all that is synthesised, however slow.
+    #[must_use]
+    pub fn initial_variance(&self) -> f64 {
+        let fastest = (-1.0 / Ladder::FILTER.shortest).exp() * (1.0 - 1e-9);
+        let slow = |part: Process| match part {
+            Process::Ar1(p) if p.phi() >= fastest => p.variance(),
+            _ => 0.0,
+        };
+        self.parts(Ladder::FINE).into_iter().map(slow).sum()
+    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! weights, over the scales from one GNSS interval to [`window_s`]. Quantization noise is left out: its
 //! integral is bounded. So is a drift: the filter has a state for its slope. The reduction is a pure function of model, interval and window.
 
-use super::{Ar1, Composite, GaussMarkov, Ladder, ParameterError, Process, White};
+use super::{Ar1, Composite, GaussMarkov, ParameterError, Process, White};
 use nalgebra::{Matrix3, Vector3};
 
 /// Longest time scale that matters to a filter whose longest outage is given (s): eight times the outage,
@@ -104,12 +104,10 @@ fn stationary_variance(noise: &Composite) -> f64 {
     let variance = |p: &Process| match p {
         Process::Ar1(p) => p.variance(),
         Process::GaussMarkov(p) => p.s2(),
+        Process::Flicker(p) => p.initial_variance(),
         _ => 0.0,
     };
-    let flicker =
-        noise.processes.iter().filter_map(|p| if let Process::Flicker(p) = p { Some(p) } else { None });
-    let parts = flicker.flat_map(|p| p.parts(Ladder::FILTER));
-    noise.processes.iter().copied().chain(parts).map(|p| variance(&p)).sum()
+    noise.processes.iter().map(variance).sum()
 }
 
 /// Least squares of ln(reduced/model) in (ln sigma2, ln variance, ln kappa), kappa = dt/T.

@@ -218,7 +218,7 @@ fn lost_samples_keep_their_places() {
     };
     let is_lost = |k: usize| k % 50 == 25 || (1001..1061).contains(&k);
     let lost = (0..2000).filter(|k| is_lost(*k)).count();
-    let (_files, path) = Files::with("a.csv", &stamps(&is_lost));
+    let (_files, path) = Files::with("a.csv", stamps(&is_lost));
     let (recordings, report) = read(&[path], &keep).unwrap();
     let samples = &recordings[0].signals[0].samples;
     assert_eq!((samples.len(), report.files[0].samples[0]), (2000, 2000));
