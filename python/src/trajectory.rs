@@ -14,6 +14,9 @@ use std::path::PathBuf;
 const COLUMNS: [&str; 10] =
     ["t_s", "lat_deg", "lon_deg", "h_m", "v_n_m_s", "v_e_m_s", "v_d_m_s", "roll_deg", "pitch_deg", "yaw_deg"];
 
+/// Columns, first and last instant (s), doubts.
+type States<'py> = (Bound<'py, PyDict>, (f64, f64), Vec<String>);
+
 /// The states of a trajectory file so often a second (Hz), a column each; its first and last instant (s); the doubts about it.
 #[pyfunction]
 #[pyo3(signature = (path, rate_hz, hidden))]
@@ -22,7 +25,7 @@ pub(crate) fn trajectory_states<'py>(
     path: PathBuf,
     rate_hz: f64,
     hidden: &str,
-) -> PyResult<(Bound<'py, PyDict>, (f64, f64), Vec<String>)> {
+) -> PyResult<States<'py>> {
     if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
         let message = format!("rate_hz: {rate_hz} is not a rate above 0 and up to {MAX_RATE_HZ} Hz");
         return Err(error::raise(py, &message, None, None, None));
