@@ -107,7 +107,7 @@ COMMANDS = [
     ("fused", f"fuse recorded/imu.csv recorded/gnss.csv {TACTICAL} --initial recorded/initial.toml"
      " --reference recorded/reference.csv --outage 30:45 --smooth --format json -o @"),
     ("fused_21", f"fuse recorded/imu.csv recorded/gnss.csv {TACTICAL} --initial recorded/initial.toml --filter 21"
-     " --lever-arm 0.1,0,0 --rate-hz 2 -o @"),
+     " --lever-arm 0.1,0,0 -o @"),
     ("comparison.json", "compare run_full run_lincov --reference run_15 --state all --format json -o @"),
     ("comparison.csv", "compare run_full --reference run_15 --table csv -o full.json"),
     ("comparison.tex", "compare run_full --reference run_15 --table latex -o full.json"),
