@@ -3,7 +3,7 @@
 # later with pip. The wheel has the profile of the tests: what they have compiled is not compiled again.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-target=${CARGO_TARGET_DIR:-target}
+target=$(realpath --canonicalize-missing "${CARGO_TARGET_DIR:-target}")
 venv=$target/python
 [ -x "$venv/bin/python" ] || python3 -m venv "$venv"
 python=$venv/bin/python
