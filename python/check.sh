@@ -9,7 +9,6 @@ venv=$target/python
 python=$venv/bin/python
 "$python" -m pip install --quiet --disable-pip-version-check -r python/requirements.txt
 export PYO3_PYTHON=$python
-cargo clippy --locked --package nav-sim-python -- -D warnings
 rm -rf "$target/wheels"
 "$venv/bin/maturin" build --quiet --locked --profile dev --auditwheel skip --out "$target/wheels"
 "$python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$target"/wheels/*.whl
