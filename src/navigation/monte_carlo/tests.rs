@@ -131,24 +131,26 @@ fn a_run_does_not_depend_on_how_many_others_there_are_or_on_other_candidates() {
     assert!(with_others[0].epochs != eight[0].epochs);
 }
 
-/// After five minutes without fixes tilts are degrees: of the same runs the iterated update has the smaller NEES. The mean of the
-/// paired differences is three standard errors from zero, which chance reaches in 0.2 % (64 pairs, one-sided).
+/// After five minutes without fixes tilts are degrees: of the same runs the iterated update has the smaller NEES. In 64 other
+/// pairs the mean of the differences was 0.115 and their deviation 0.34, so that 384 put it at 6.6 standard errors; below three
+/// it falls by chance in 0.02 %.
 #[test]
 fn the_iterated_update_is_more_consistent_after_a_long_outage() {
+    const PAIRS: u64 = 384;
     let mut setting = Setting::new(460.0, &[1.0]);
-    // Runs that the number of pairs was not chosen by.
-    setting.seed = 4;
+    setting.seed = 5;
     setting.outages = vec![Outage { start_s: 60.0, end_s: 360.0 }];
-    let once = setting.run(64);
+    let once = setting.run(PAIRS);
     setting.update = FixUpdate::Iterated;
-    let iterated = setting.run(64);
+    let iterated = setting.run(PAIRS);
     let gain: Vec<f64> =
         once[0].runs.iter().zip(&iterated[0].runs).map(|(a, b)| a.nees_mean - b.nees_mean).collect();
-    let mean = gain.iter().sum::<f64>() / 64.0;
-    let variance = gain.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 63.0;
-    assert!(mean > 3.0 * (variance / 64.0).sqrt(), "{mean} {variance}");
+    let pairs = PAIRS as f64;
+    let mean = gain.iter().sum::<f64>() / pairs;
+    let variance = gain.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (pairs - 1.0);
+    assert!(mean > 3.0 * (variance / pairs).sqrt(), "{mean} {variance}");
     // Until the first fix after it nothing differs but by the fixes before, where errors are small.
-    let end = |r: &RunResult| r.runs.iter().map(|run| run.outages[0].nees_end).sum::<f64>() / 64.0;
+    let end = |r: &RunResult| r.runs.iter().map(|run| run.outages[0].nees_end).sum::<f64>() / pairs;
     assert!((end(&once[0]) / end(&iterated[0]) - 1.0).abs() < 0.01);
 }
 
