@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nav_sim import _native
-from nav_sim._errors import NavSimWarning, as_arguments
+from nav_sim._errors import NavSimError, NavSimWarning, as_arguments
 from nav_sim._inputs import FloatArray, Staging, StrPath
 
 if TYPE_CHECKING:
@@ -157,9 +157,11 @@ def windows(outages: Sequence[tuple[float, float]] | str | None) -> list[str] | 
         return None
     if isinstance(outages, str):
         return [outages]
-    if len(outages) == 0:
-        return ["none"]
-    return [one if isinstance(one, str) else f"{float(one[0])!r}:{float(one[1])!r}" for one in outages]
+    try:
+        pairs = [one if isinstance(one, str) else f"{float(one[0])!r}:{float(one[1])!r}" for one in outages]
+    except (TypeError, ValueError, IndexError, KeyError):
+        raise NavSimError(f"outages={outages!r}: not pairs of start and end (s)", hint="such as outages=[(300, 390)]") from None
+    return pairs or ["none"]
 
 
 def flattened(entries: Sequence[Mapping[str, Any]]) -> Columns:

@@ -40,7 +40,7 @@ class Run(Answer):
 
     @cached_property
     def epochs(self) -> Columns:
-        """Once a second: `t_s`, `asee_…`, `rmse_…`, `bias_…` of each state, `nees`, `coverage`."""
+        """Once a second, after the fix: `t_s`, `asee_…`, `rmse_…`, `bias_…` of each state, `nees`, `coverage`."""
         return self.table("epochs.csv")
 
     @cached_property
@@ -55,7 +55,8 @@ class Run(Answer):
 
     @cached_property
     def outages(self) -> Columns:
-        """A row an outage: `start_s`, `end_s`, `rmse_end_pos_e_m`, `horizontal_error_end_m_p95`, as in `data`."""
+        """A row an outage, before the fix that ends it: `start_s`, `end_s`, `asee_end_…` and `rmse_end_…` of each state
+        (`rmse_end_pos_e_m`), `horizontal_error_end_m_p95`, and more, as in `data`."""
         return flattened(self.data["outages"])
 
     def plot(self, ax: Axes | None = None) -> Axes:
@@ -121,7 +122,7 @@ def run(
     require
         Limits such as "p95_m<=5" or "consistent"; `.unmet` says whether they are missed.
     gnss, scenario
-        All other settings, by a file or as a dict: `scenario={"imu": {"rate_hz": 200.0}}`; of `gnss` the section of
+        All other settings, by a file or as a dict: `scenario={"gnss": {"rate_hz": 5.0}}`; of `gnss` the section of
         that name.
     seed
         Of all random numbers; that of the scenario, or 1, without it.
@@ -167,7 +168,7 @@ def lincov(
     scenario: Settings | None = None,
     progress: Progress = None,
 ) -> Run:
-    """The same without sampling, by covariance analysis: `nav-sim run --method lincov`. Arguments as of `run`."""
+    """As `run`, by covariance analysis, without sampling: `nav-sim run --method lincov`. Arguments as of `run`."""
     return run(
         trajectory,
         model,

@@ -45,6 +45,8 @@ pub(crate) fn wavelet<'py>(
 fn without_mean(mut samples: Vec<f64>) -> Vec<f64> {
     let Some(first) = samples.first().copied() else { return samples };
     let mean = first + samples.iter().map(|v| v - first).sum::<f64>() / samples.len() as f64;
+    // One sample that is no number would make all of them so, and the first would be blamed.
+    let mean = if mean.is_finite() { mean } else { 0.0 };
     samples.iter_mut().for_each(|v| *v -= mean);
     samples
 }

@@ -128,3 +128,9 @@ def test_a_fusion_of_arrays_is_that_of_files(drive: Path, tactical: Model) -> No
     files = fuse(drive / "imu.csv", drive / "gnss.csv", TACTICAL, mounting=(0.0, 0.0, 0.0))
     for key, values in files.solution.items():
         np.testing.assert_allclose(own.solution[key], values, rtol=1e-9, atol=1e-9, err_msg=key)
+
+
+def test_outages_that_are_no_pairs_are_named() -> None:
+    for wrong in [(300, 390), 5, [(300, "x")]]:
+        with pytest.raises(NavSimError, match="not pairs of start and end"):
+            lincov(DRIVE, TACTICAL, outages=wrong)  # type: ignore[arg-type]

@@ -119,3 +119,10 @@ def test_a_plot_is_drawn_where_it_is_asked_for() -> None:
     assert wavelet_variance(np.random.default_rng(5).standard_normal(256), 10.0).plot(ax=ax) is ax
     assert len(ax.lines) == 1
     pyplot.close("all")
+
+
+def test_the_sample_that_is_no_number_is_named() -> None:
+    x = np.random.default_rng(1).normal(size=1000)
+    x[500] = np.nan
+    with pytest.raises(nav_sim.NavSimError, match="sample 500 is NaN"):
+        nav_sim.wavelet_variance(x, rate_hz=100.0)

@@ -27,6 +27,11 @@ mod navigate;
 mod prepared;
 pub(crate) mod read;
 mod reduction;
+#[allow(
+    rustdoc::broken_intra_doc_links,
+    rustdoc::invalid_html_tags,
+    reason = "help texts have sections of files and names to be filled in"
+)]
 mod request;
 pub(crate) mod turn_on;
 mod uncertainty;

@@ -2,7 +2,7 @@
 //!
 //! Two loggers of one drive begin within a minute of one another. The turns of the course against those of the
 //! gyroscopes ([`super::clocks_apart`]) tell the rest to some tenths of a second; the delay among these at which the
-//! filter's innovations are smallest, and their slope there ([`super::displaced`]), tell it to hundredths.
+//! filter's innovations are smallest, and their slope there ([`super::displaced()`]), tell it to hundredths.
 
 use super::alignment::coarse;
 use super::clocks::agreement;
