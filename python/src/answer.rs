@@ -47,7 +47,7 @@ impl Answer {
 
     fn file(&self, py: Python<'_>, name: &str) -> PyResult<&str> {
         let found = self.files.iter().find(|(own, _)| own == name);
-        let missing = || error::raise(py, &format!("there is no {name} in this answer"), None, None, None);
+        let missing = || error::refused(py, &format!("there is no {name} in this answer"));
         found.map(|(_, text)| text.as_str()).ok_or_else(missing)
     }
 }

@@ -18,6 +18,11 @@ pub(crate) fn raise(
     }
 }
 
+/// Of what concerns no file.
+pub(crate) fn refused(py: Python<'_>, message: &str) -> PyErr {
+    raise(py, message, None, None, None)
+}
+
 /// A failure, in whose texts the directory of what came as arrays is left out.
 pub(crate) fn of_failure(py: Python<'_>, failure: &Failure, hidden: &str) -> PyErr {
     let shown = |text: &str| if hidden.is_empty() { text.to_owned() } else { text.replace(hidden, "") };

@@ -61,7 +61,7 @@ pub(crate) fn model_recording<'py>(
         };
         present.map(signal).collect::<Result<Vec<_>, ReplicateError>>()
     })?;
-    let made = made.map_err(|e| error::raise(py, &e.to_string(), None, None, None))?;
+    let made = made.map_err(|e| error::refused(py, &e.to_string()))?;
     let columns = PyDict::new(py);
     for (channel, samples) in made {
         let unit = if channel.sensor == Sensor::Accel { "m_s2" } else { "rad_s" };
@@ -83,7 +83,7 @@ pub(crate) fn model_wavelet<'py>(
     let file = read(py, text, None)?;
     let [channel] = Channel::named(channel)[..] else {
         let message = format!("channel: \"{channel}\" is not one, such as \"gyro.x\"");
-        return Err(error::raise(py, &message, None, None, None));
+        return Err(error::refused(py, &message));
     };
     let noise = file.model.axis(channel);
     let wv = (1..=scales).map(|level| noise.processes.iter().map(|p| p.haar_wv(level)).sum());
@@ -101,7 +101,7 @@ pub(crate) fn model_practical(
     to_s: f64,
 ) -> PyResult<String> {
     let file = read(py, text, None)?;
-    let refused = |message: String| error::raise(py, &message, None, None, None);
+    let refused = |message: String| error::refused(py, &message);
     let policy: Policy = policy.parse().map_err(|e| refused(format!("policy: {e}")))?;
     let mut sensors = Map::new();
     for sensor in Sensor::ALL {
@@ -131,7 +131,7 @@ pub(crate) fn model_export(
     to_s: f64,
 ) -> PyResult<String> {
     let file = read(py, text, None)?;
-    let refused = |message: String| error::raise(py, &message, None, None, None);
+    let refused = |message: String| error::refused(py, &message);
     let target: Target = target.parse().map_err(|e| refused(format!("target: {e}")))?;
     let policy: Policy = policy.parse().map_err(|e| refused(format!("policy: {e}")))?;
     let export = exported(&file, target, policy, Horizon { from_s, to_s });

@@ -105,7 +105,7 @@ pub(crate) fn answer(
             let warnings = warnings.into_iter().map(shown).collect();
             Ok(Answer::new(answered, hidden, warnings))
         }
-        Err(Refusal::Request(message)) => Err(error::raise(py, &message, None, None, None)),
+        Err(Refusal::Request(message)) => Err(error::refused(py, &message)),
         Err(Refusal::Failure(failure)) => Err(error::of_failure(py, &failure, &hidden)),
     }
 }

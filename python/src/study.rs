@@ -83,7 +83,7 @@ pub(crate) fn study_run(
 ) -> PyResult<((usize, usize), Vec<String>)> {
     let Some(shard) = Shard::new(shard, shards) else {
         let message = format!("shard: {shard} of {shards} is none, such as (0, 2) and (1, 2)");
-        return Err(error::raise(py, &message, None, None, None));
+        return Err(error::refused(py, &message));
     };
     watched(py, progress, move |clerk| {
         let planned = Planned::open(&study, &directory, None)?;

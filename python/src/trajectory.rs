@@ -28,7 +28,7 @@ pub(crate) fn trajectory_states<'py>(
 ) -> PyResult<States<'py>> {
     if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
         let message = format!("rate_hz: {rate_hz} is not a rate above 0 and up to {MAX_RATE_HZ} Hz");
-        return Err(error::raise(py, &message, None, None, None));
+        return Err(error::refused(py, &message));
     }
     let read = work(py, None, move |_| {
         let (trajectory, doubts) = load_trajectory(&path, &TrajectoryOptions::default())?;

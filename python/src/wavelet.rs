@@ -31,7 +31,7 @@ pub(crate) fn wavelet<'py>(
     // a copy, so that Ctrl-C need not wait and nobody changes what is being read
     let signal = without_mean(x.as_array().to_vec());
     let found = work(py, None, move |_| variances(&signal, scales, efficiency))?;
-    let found = found.map_err(|e| error::raise(py, &format!("x: {e}"), None, None, None))?;
+    let found = found.map_err(|e| error::refused(py, &format!("x: {e}")))?;
     let columns = PyDict::new(py);
     let (low, high) = found.ends.into_iter().unzip();
     for (name, values) in [("wv", found.wv), ("edof", found.edof), ("ci_low", low), ("ci_high", high)] {

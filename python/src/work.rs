@@ -100,7 +100,7 @@ fn tell(progress: Option<&Bound<'_, PyAny>>, meter: &Meter, told: &mut (u64, u64
 fn defect(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
-    error::raise(py, &format!("a defect of nav-sim, please report it: {text}"), None, None, None)
+    error::refused(py, &format!("a defect of nav-sim, please report it: {text}"))
 }
 
 /// Refuses to work in a fork: the threads that work stayed with the parent, and a job would wait for them for ever.

@@ -110,7 +110,7 @@ impl ShownCalibration<'_> {
         notes
     }
 
-    /// A gyroscope of more noise than any that is sold, such as one in degrees under the name of radians.
+    /// A gyroscope of more noise than any in the catalogue (0.02 to 2 deg/√h), such as one in degrees under the name of radians.
     fn too_loud(&self, outcome: &Outcome) -> Option<String> {
         const MOST_DEG_SQRT_H: f64 = 5.0;
         let is_gyro = outcome.scope.sensor == Sensor::Gyro;
@@ -118,7 +118,7 @@ impl ShownCalibration<'_> {
         let n = rows.first().filter(|row| is_gyro && row.name.ends_with(" N"))?.value.ok()?;
         (n > MOST_DEG_SQRT_H).then(|| {
             let n = readable(n);
-            format!("gyro: N of {n} deg/sqrt(h), where MEMS have 0.05 to 3: columns in degrees are named gyro_x_deg_s")
+            format!("gyro: N of {n} deg/sqrt(h), where catalogued units have 0.02 to 2: columns in degrees are named gyro_x_deg_s")
         })
     }
 

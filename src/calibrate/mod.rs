@@ -29,11 +29,6 @@ mod files;
 mod fits;
 mod job;
 mod model_file;
-#[allow(
-    rustdoc::broken_intra_doc_links,
-    rustdoc::invalid_html_tags,
-    reason = "help texts have sections of files and names to be filled in"
-)]
 mod request;
 mod turn_on;
 mod words;

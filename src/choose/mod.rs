@@ -43,11 +43,6 @@ mod influence;
 mod job;
 mod laboratory;
 mod ranking;
-#[allow(
-    rustdoc::broken_intra_doc_links,
-    rustdoc::invalid_html_tags,
-    reason = "help texts have sections of files and names to be filled in"
-)]
 mod request;
 mod score;
 

@@ -3,7 +3,6 @@
 use super::{Failure, Session};
 use crate::formats::atomic::{AtomicDir, Found, claim_directory};
 use crate::fuse::{Drive, FILES, FuseAnswer, FuseManifest, FuseRequest, directory};
-use nav_sim_navigation::metrics::VerdictKind;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -47,13 +46,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     write(&answer, &FuseManifest { wall_s: begin.elapsed().as_secs_f64(), ..manifest }, &args.out)?;
     session.answer(&answer);
     session.wrote(&args.out);
-    match answer.summary.verdict.kind {
-        VerdictKind::Overconfident => {
-            let message = format!("the solution in {} is overconfident", args.out.display());
-            Err(Failure::bound(message).hint(answer.advice()))
-        }
-        _ => Ok(()),
-    }
+    answer.unmet().map_or(Ok(()), Err)
 }
 
 /// Writes all files, the manifest last.

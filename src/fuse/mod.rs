@@ -20,19 +20,12 @@ mod failure;
 mod files;
 mod filter;
 mod manifest;
-#[allow(
-    rustdoc::broken_intra_doc_links,
-    rustdoc::invalid_html_tags,
-    reason = "help texts have sections of files and names to be filled in"
-)]
 mod request;
 mod start;
 mod summary;
 
 use crate::answered::{Answered, contents};
 use crate::failure::Failure;
-use crate::report::OutputFile;
-use nav_sim_navigation::metrics::VerdictKind;
 
 pub(crate) use drive::Drive;
 pub use drive::{FuseAnswer, FuseNote};
@@ -60,11 +53,7 @@ impl FuseRequest {
         let drive = Drive::read(self)?;
         let manifest = drive.manifest.clone();
         let answer = drive.fuse()?;
-        let is_page = |file: &OutputFile<'_>| file.name.ends_with(".html");
-        let mut files = directory(&answer, &manifest);
-        files.retain(|file| !is_page(file));
-        let unmet = (answer.summary.verdict.kind == VerdictKind::Overconfident)
-            .then(|| Failure::bound("the solution is overconfident").hint(answer.advice()));
-        Ok(Answered { files: contents(files), unmet, ..Answered::of(&answer) })
+        let files = contents(directory(&answer, &manifest));
+        Ok(Answered { files, unmet: answer.unmet(), ..Answered::of(&answer) })
     }
 }

@@ -7,8 +7,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 /// Start of a fusion.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(into = "String", try_from = "String")]
+#[derive(Debug, Clone, PartialEq)]
 pub enum StartChoice {
     /// Found in the data.
     Auto,
@@ -43,19 +42,7 @@ impl FromStr for StartChoice {
     }
 }
 
-impl TryFrom<String> for StartChoice {
-    type Error = String;
-
-    fn try_from(text: String) -> Result<Self, String> {
-        text.parse()
-    }
-}
-
-impl From<StartChoice> for String {
-    fn from(start: StartChoice) -> Self {
-        start.to_string()
-    }
-}
+crate::parse::textual!(StartChoice);
 
 impl Display for StartChoice {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {

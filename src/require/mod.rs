@@ -5,11 +5,6 @@ mod job;
 mod needed;
 mod question;
 mod ranking;
-#[allow(
-    rustdoc::broken_intra_doc_links,
-    rustdoc::invalid_html_tags,
-    reason = "help texts have sections of files and names to be filled in"
-)]
 mod request;
 
 pub use job::Ask;

@@ -46,7 +46,7 @@ pub struct RequireRequest {
     #[command(flatten)]
     #[serde(skip)]
     pub(crate) old: OldLimits,
-    /// Scenario file whose [gnss] section is used
+    /// Scenario file whose section gnss is used
     #[arg(long, value_name = "FILE")]
     pub gnss: Option<PathBuf>,
     /// Scenario file: receiver, start, IMU rate (see `nav-sim schema scenario`)

@@ -2,23 +2,18 @@
 
 use super::Navigation;
 use super::answer::RunAnswer;
+use super::assumptions::assumptions;
 use super::budgets::budgets;
 use super::charts::{fan_chart, horizontal, horizontal_caption, nees, rmse_and_asee, states, windows};
+use super::remedy::remedy;
 use crate::report::requirement::requirement_line;
 use crate::report::verdict::verdict_lines;
-use crate::report::{
-    Manifest, STATES, reduction_doubt, reduction_line, tone, unexpected_in_words, unexpected_line,
-};
+use crate::report::{Manifest, STATES, reduction_doubt, reduction_line, tone, unexpected_line};
 use nav_sim_document::{Cell, Document, Importance, Table, Tone, readable, window};
-use nav_sim_navigation::ekf::{FixUpdate, InitialSettings};
 use nav_sim_navigation::metrics::{
     Agreement, EpochMetrics, FanEpoch, Met, OutageSummary, PerState, Summary, VerdictKind,
 };
-use nav_sim_navigation::scenario::{Method, Unexpected};
-use nav_sim_navigation::sensors::defects::ImuSettings;
-use nav_sim_navigation::sensors::gnss::GnssSettings;
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
-use nav_sim_signal::imu::Sensor;
 
 /// Outages whose tables are shown: of more, those with the largest errors.
 const OUTAGES: usize = 3;
@@ -119,96 +114,6 @@ fn by_calibration(outage: &OutageSummary) -> Option<String> {
         .then(|| format!("95 % by the calibration, end of {place}: {}", all.join(", ")))
 }
 
-const TOO_LARGE: &str = "errors too large for a linear filter; another MODEL or nav-sim tune does not help";
-
-/// The same, with the update that helps: where errors are too large after fixes that follow an outage, not before them.
-fn too_large(summary: &Summary, manifest: &Manifest) -> String {
-    let verdict = &summary.verdict;
-    let is_after = |first: usize| {
-        let is_met_again = summary.outages[first].reconvergence_s.p50.is_finite();
-        is_met_again && verdict.worst_outage.is_none_or(|outage| outage > first)
-    };
-    let is_linear = manifest.configuration.filter.update == FixUpdate::Ekf;
-    match is_linear && verdict.beyond_linear.is_some_and(is_after) {
-        true => format!("{TOO_LARGE}; filter.update = \"iterated\" does"),
-        false => TOO_LARGE.to_owned(),
-    }
-}
-
-/// What helps: by what the belief lacks, where linear analysis finds the filter wrong already; errors that are large are then
-/// its consequence.
-fn remedy(summary: &Summary, unexpected: &[Unexpected], manifest: &Manifest) -> String {
-    let quality = summary.reduction.as_ref().and_then(|reduction| reduction.quality.as_ref());
-    let ratios =
-        quality.into_iter().flat_map(|q| q.outage_end.iter().chain([&q.mean]).flat_map(|state| state.0));
-    if summary.is_contradicted {
-        return too_large(summary, manifest);
-    }
-    if let Some(largest) = largest_unexpected(summary, unexpected) {
-        return largest;
-    }
-    let is_too_large = summary.verdict.beyond_linear.is_some();
-    let [is_recorded, is_modelled] = ["static", "truth"].map(|role| !manifest.hashes(role).is_empty());
-    // what recordings contain is unknown, and so is whether linear analysis would find the filter wrong
-    if is_recorded && is_too_large {
-        return too_large(summary, manifest);
-    }
-    // where the reduced filter is right about the errors of its own model, the errors are of something else
-    if ratios.fold(0.0, f64::max) > 1.0 + summary.verdict.tolerance {
-        return "--filter full has a state for each process of the model".to_owned();
-    }
-    if is_recorded || is_modelled {
-        return "the errors are not those of MODEL: nav-sim tune finds variances that cover them".to_owned();
-    }
-    // linear analysis, which draws nothing, finds the filter wrong already: it has no state for one of the errors
-    let is_expected = summary.method == Method::Lincov.name();
-    let is_analysed =
-        is_expected || summary.verdict.by_covariance_analysis == Some(VerdictKind::Overconfident);
-    match unexpected.first() {
-        Some(found) if is_analysed => unexpected_line(found),
-        None if is_expected && !is_too_large => beside_the_states(summary).to_owned(),
-        _ => too_large(summary, manifest),
-    }
-}
-
-/// What covers an error that is in the budgets and that no state of the filter is for.
-fn beside_the_states(summary: &Summary) -> &'static str {
-    let sources = summary.outages.iter().filter_map(|o| o.budget.as_ref()).flat_map(|budget| &budget.shares);
-    let no_filter_has = |name: &String| name.contains(".QN") || name.contains(".MA1");
-    if sources.map(|(name, _)| name).any(no_filter_has) {
-        return "MODEL has noise that no filter contains: nav-sim tune --truth MODEL covers it";
-    }
-    "the errors are not those of MODEL: nav-sim tune --scenario finds variances that cover them"
-}
-
-/// The source with the largest share of the worst error, of those that the filter does not expect, where it makes at least
-/// half of what is too much there; without an outage, which has the shares, the first.
-fn largest_unexpected(summary: &Summary, unexpected: &[Unexpected]) -> Option<String> {
-    let verdict = &summary.verdict;
-    let outage = verdict.worst_outage.or_else(|| summary.outages.len().checked_sub(1));
-    let known = outage.and_then(|k| Some((&summary.outages[k], summary.outages[k].budget.as_ref()?)));
-    let Some((outage, budget)) = known else { return unexpected.first().map(unexpected_line) };
-    let worst = REPORTED_NAMES.iter().position(|name| *name == verdict.worst_state);
-    // the state, and the share in its mean square
-    let share = |cause: &Unexpected| {
-        let sources = cause.sources();
-        let of_cause = budget.shares.iter().filter(|(name, _)| sources.contains(name));
-        let shares = of_cause.fold([0.0; REPORTED], |sum, (_, of)| std::array::from_fn(|i| sum[i] + of.0[i]));
-        let states = worst.map_or(0..REPORTED, |state| state..state + 1);
-        states.map(|state| (state, shares[state])).max_by(|a, b| a.1.total_cmp(&b.1))
-    };
-    let shares = unexpected.iter().filter_map(|cause| Some((cause, share(cause)?)));
-    let (largest, (state, share)) = shares.max_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
-    // of a mean square that is ratio² times what is believed, this share is too much
-    let excess = 1.0 - verdict.ratio.powi(-2);
-    let place = format!("{} at the end of {}", REPORTED_NAMES[state], window(outage.start_s, outage.end_s));
-    let told = || {
-        let (what, remedy) = unexpected_in_words(largest);
-        format!("{what} ({:.0} % of the mean square of {place}): {remedy}", 100.0 * share)
-    };
-    (share > 0.5 * excess).then(told)
-}
-
 /// `runs against covariance analysis: largest z -2.31 (RMSE of yaw_deg at the end of outage 1) of 22, up to 4.4 by chance; …`
 fn agreement_line(a: &Agreement) -> String {
     if a.figures == 0 {
@@ -241,81 +146,6 @@ fn fan_caption(fan: &[FanEpoch], summary: &Summary) -> String {
     };
     format!(
         "Quantiles of {whose} over time: half of all errors in the dark band, nine in ten in both.{beside}{left_out} The numbers are in fan.csv."
-    )
-}
-
-/// What the results rest on.
-fn assumptions(summary: &Summary, manifest: &Manifest) -> Vec<(&'static str, String)> {
-    let input = |role: &str| manifest.inputs.iter().find(|i| i.role == role).map_or("", |i| i.path.as_str());
-    let truth = match (input("static"), input("truth")) {
-        ("", "") => format!("{} (the model of the filter)", input("model")),
-        ("", model) => model.to_owned(),
-        (recording, _) => format!("windows of {recording}"),
-    };
-    let scenario = &manifest.configuration;
-    let mut facts = vec![
-        ("trajectory", input("trajectory").to_owned()),
-        ("model of the filter", format!("{}, {} states", input("model"), summary.filter_states)),
-        ("what makes the errors", truth),
-        ("IMU", defects(&scenario.imu)),
-        ("GNSS", receiver(&scenario.gnss)),
-        ("start (1 σ)", start(&scenario.initial)),
-    ];
-    if let Some(baro) = &scenario.baro {
-        facts.push(("barometer", format!("{} Hz; 1 σ {} m", baro.rate_hz, readable(baro.sigma_m))));
-    }
-    if summary.runs > 0 {
-        let worth = readable(summary.independent_runs);
-        facts.push((
-            "runs",
-            format!("{} ({} diverged), worth {worth} independent ones", summary.runs, summary.diverged),
-        ));
-    }
-    facts.extend(summary.seed.map(|seed| ("seed", seed.to_string())));
-    facts
-}
-
-fn three(sigma: &[f64; 3]) -> String {
-    sigma.map(readable).join(", ")
-}
-
-/// What the true IMU has beside its noise.
-fn defects(imu: &ImuSettings) -> String {
-    let [bias_a, bias_g] = Sensor::ALL.map(|sensor| readable(imu.deviations(sensor).0));
-    format!(
-        "{} Hz; turn-on bias {bias_a} m/s², {bias_g} rad/s (1 σ); scale factors {}, {} ppm; misalignment {} rad",
-        imu.rate_hz,
-        readable(imu.scale_ppm_accel),
-        readable(imu.scale_ppm_gyro),
-        readable(imu.misalignment_rad)
-    )
-}
-
-fn receiver(gnss: &GnssSettings) -> String {
-    let velocity =
-        gnss.vel_sigma_m_s.map_or("no velocity".to_owned(), |v| format!("velocity {} m/s", three(&v)));
-    let position = three(&gnss.pos_sigma_m);
-    let mut words = format!("{} Hz; 1 σ north, east, down: position {position} m, {velocity}", gnss.rate_hz);
-    if gnss.correlated_pos_sigma_m.iter().any(|sigma| *sigma > 0.0) {
-        let (sigma, time) = (three(&gnss.correlated_pos_sigma_m), readable(gnss.correlation_time_s));
-        words += &format!("; in truth a correlated position error of {sigma} m over {time} s beside it");
-    }
-    if gnss.lever_arm_m.iter().any(|x| *x != 0.0) {
-        words += &format!("; antenna {} m front, right, down of the IMU", three(&gnss.lever_arm_m));
-    }
-    words
-}
-
-/// What the filter knows at the start.
-fn start(initial: &InitialSettings) -> String {
-    if initial.perfect {
-        return "the true state".to_owned();
-    }
-    format!(
-        "position {} m, velocity {} m/s, attitude {} °",
-        three(&initial.pos_sigma_m),
-        three(&initial.vel_sigma_m_s),
-        three(&initial.att_sigma_deg)
     )
 }
 

@@ -18,6 +18,7 @@
 //! ```
 
 mod answer;
+mod assumptions;
 mod budgets;
 mod charts;
 mod document;
@@ -27,11 +28,7 @@ mod navigate;
 mod prepared;
 pub(crate) mod read;
 mod reduction;
-#[allow(
-    rustdoc::broken_intra_doc_links,
-    rustdoc::invalid_html_tags,
-    reason = "help texts have sections of files and names to be filled in"
-)]
+mod remedy;
 mod request;
 pub(crate) mod turn_on;
 mod uncertainty;

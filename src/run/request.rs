@@ -23,7 +23,7 @@ pub struct RunRequest {
     /// Noise model that makes the INS errors (default: MODEL itself)
     #[arg(long, value_name = "MODEL2", conflicts_with = "recordings")]
     pub truth: Option<PathBuf>,
-    /// Draw the parameters that make the errors of each run from the [spread] of their model
+    /// Draw the parameters that make the errors of each run from the spread that their model states
     #[arg(long, conflicts_with = "recordings")]
     pub spread: bool,
     /// Static recording whose windows make the INS errors (repeatable)
@@ -94,8 +94,7 @@ impl FilterRequest {
 }
 
 /// A value of `--outage`: a window, or that there is none.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum OutageFlag {
     /// Not even the default ones.
     None,
@@ -111,19 +110,7 @@ impl FromStr for OutageFlag {
     }
 }
 
-impl TryFrom<String> for OutageFlag {
-    type Error = NotAnOutage;
-
-    fn try_from(text: String) -> Result<Self, NotAnOutage> {
-        text.parse()
-    }
-}
-
-impl From<OutageFlag> for String {
-    fn from(flag: OutageFlag) -> Self {
-        flag.to_string()
-    }
-}
+parse::textual!(OutageFlag);
 
 impl fmt::Display for OutageFlag {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

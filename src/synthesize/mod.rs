@@ -1,10 +1,5 @@
 //! Replicate recordings of a noise model, as the files of one directory.
 
-#[allow(
-    rustdoc::broken_intra_doc_links,
-    rustdoc::invalid_html_tags,
-    reason = "help texts have sections of files and names to be filled in"
-)]
 mod request;
 
 pub use request::SynthesisRequest;

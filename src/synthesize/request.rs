@@ -30,7 +30,7 @@ pub struct SynthesisRequest {
     /// Length of each in seconds, instead of --samples
     #[arg(long, value_name = "S", value_parser = parse::positive)]
     pub duration: Option<f64>,
-    /// Draw each replicate's parameters from the model's [spread]
+    /// Draw each replicate's parameters from the spread that the model states
     #[arg(long)]
     pub spread: bool,
     /// Corrupt the replicates: a scenario of the paper (section4-II, section4-III, section5-II, section5-III) or a file

@@ -31,7 +31,7 @@ pub struct TuneRequest {
     #[serde(rename = "truth")]
     pub truths: Vec<PathBuf>,
     /// Truths are MODEL itself and the draws of its calibration (MODEL.draws.json, which `calibrate` writes), each with the
-    /// parameters of a recording of its own where MODEL has a [spread]: errors count up to the upper end of their 95 % interval
+    /// parameters of a recording of its own where MODEL states a spread: errors count up to the upper end of their 95 % interval
     #[arg(long, conflicts_with = "truths")]
     pub intervals: bool,
     /// Trajectory: motion profile (.toml) or table (.csv) [default: a built-in drive with outages of that length]

@@ -254,3 +254,38 @@ calibrate = { recordings = ["r"], leave_out = true, estimators = ["awv"], fit = 
     );
     assert!(!at.join("t").exists());
 }
+
+/// One of six recordings has noise of 0.2 s beside the model's, which no other has: it is calibrated on, judges nothing, and is
+/// named. Of six alike ones, all judge.
+#[test]
+fn an_abnormal_recording_judges_no_candidate() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    std::fs::copy(root.join("examples/quick_drive.toml"), at.join("drive.toml")).unwrap();
+    std::fs::write(at.join("model.toml"), MODEL).unwrap();
+    let bad = root.join("examples/one_bad_recording.toml");
+    for (out, contaminate, judges) in [("alike", None, 6), ("one", Some(bad.to_str().unwrap()), 5)] {
+        let mut made: Vec<&str> =
+            "synthesize model.toml --replicates 6 --samples 16384 --seed 1 -o".split(' ').collect();
+        made.push(out);
+        made.extend(contaminate.iter().flat_map(|file| ["--contaminate", file]));
+        nav_sim(at, &made).success();
+        let words = format!(
+            "choose {out} --trajectory drive.toml --outage 40:59 --seed 1 --estimator awv,dr-awv --model WN+RW --runs 8 -o of_{out}"
+        );
+        let output = nav_sim(at, &words.split(' ').collect::<Vec<_>>()).success();
+        let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
+        let ranking = std::fs::read_to_string(at.join(format!("of_{out}/ranking.json"))).unwrap();
+        let ranking: Value = serde_json::from_str(&ranking).unwrap();
+        let folds: Vec<&str> = ranking["candidates"][0]["folds"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|fold| fold["recording"].as_str().unwrap())
+            .collect();
+        assert_eq!(folds.len(), judges, "{out}: {folds:?} {said}");
+        assert_eq!(said.contains("replicate_4.csv is abnormal, and no judge"), judges == 5, "{said}");
+        assert!(judges == 6 || folds.iter().all(|name| !name.contains("replicate_4")), "{folds:?}");
+    }
+}
