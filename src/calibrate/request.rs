@@ -5,7 +5,7 @@ use super::{CalibrationNote, CalibrationOptions, EstimatorChoice, Measured, Mode
 use crate::answered::Answered;
 use crate::failure::Failure;
 use crate::formats::{input, parameters_file};
-use crate::jobs::{JobError, RecordingRequest, Remarks, TuningRequest, unknown_model};
+use crate::jobs::{JobError, RecordingRequest, Remarks, VarianceRequest, unknown_model};
 use crate::parse;
 use nav_sim_calibration::{
     Advance, Bootstrap, Estimator, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, Trim, Weighting,
@@ -56,7 +56,7 @@ pub struct CalibrationRequest {
     pub recordings: RecordingRequest,
     /// Scales and robustness.
     #[command(flatten)]
-    pub tuning: TuningRequest,
+    pub tuning: VarianceRequest,
     /// Seed of the draws.
     #[arg(skip)]
     pub seed: u64,
@@ -75,7 +75,7 @@ impl Default for CalibrationRequest {
             pool: None,
             bootstrap: Bootstrap::DRAWS as u32,
             recordings: RecordingRequest::default(),
-            tuning: TuningRequest::default(),
+            tuning: VarianceRequest::default(),
             seed: 0,
         }
     }

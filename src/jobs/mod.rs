@@ -9,6 +9,6 @@ pub use error::JobError;
 pub(crate) use failure::{of_calibration, unknown_model};
 pub(crate) use reading::WHOLE;
 pub use reading::{
-    ChannelSet, LogRequest, ReadingRequest, RecordingRequest, Scales, Skip, Stamps, TuningRequest,
+    ChannelSet, LogRequest, ReadingRequest, RecordingRequest, Scales, Skip, Stamps, VarianceRequest,
 };
 pub use remarks::{Remark, Remarks, Silence};

@@ -249,7 +249,7 @@ impl RecordingRequest {
 #[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 #[command(next_help_heading = "Wavelet variance")]
-pub struct TuningRequest {
+pub struct VarianceRequest {
     /// Efficiency of the robust wavelet variance at the Gaussian model, 0.3 to 0.99
     #[arg(long, value_name = "E", default_value_t = Tuning::DEFAULT_EFFICIENCY)]
     pub efficiency: f64,
@@ -259,7 +259,7 @@ pub struct TuningRequest {
     pub scales: Option<Scales>,
 }
 
-impl Default for TuningRequest {
+impl Default for VarianceRequest {
     fn default() -> Self {
         Self { efficiency: Tuning::DEFAULT_EFFICIENCY, scales: None }
     }
@@ -303,7 +303,7 @@ impl FromStr for Scales {
     }
 }
 
-impl TuningRequest {
+impl VarianceRequest {
     pub(crate) fn tuning(&self) -> Result<Tuning, Failure> {
         Tuning::new(self.efficiency, Convention::Exact)
             .map_err(|e| Failure::input(format!("--efficiency: {e}")))

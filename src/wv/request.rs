@@ -3,7 +3,7 @@
 use super::job::{Intervals, WaveletOptions, wavelet_variances};
 use crate::answered::Answered;
 use crate::failure::Failure;
-use crate::jobs::{RecordingRequest, Remarks, TuningRequest};
+use crate::jobs::{RecordingRequest, Remarks, VarianceRequest};
 use crate::parse;
 use crate::report::SignalsFile;
 use serde::{Deserialize, Serialize};
@@ -21,7 +21,7 @@ pub struct WaveletRequest {
     pub recordings: RecordingRequest,
     /// Scales and robustness.
     #[command(flatten)]
-    pub tuning: TuningRequest,
+    pub tuning: VarianceRequest,
     /// Where the degrees of freedom of the intervals come from
     #[arg(long, value_parser = parse::words::<Intervals>(&INTERVALS), default_value_t, help_heading = "Wavelet variance")]
     pub intervals: Intervals,
