@@ -6,6 +6,7 @@ use crate::ekf::{Belief, BeliefError, FilterStates, FixUpdate, InitialSettings};
 use crate::imu::Sensor;
 use crate::noise::Model;
 use crate::noise::reduction::{self, ReductionError};
+use crate::sensors::aiding::AidingSettings;
 use crate::sensors::baro::BaroSettings;
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
@@ -35,6 +36,9 @@ pub struct Scenario {
     /// A barometer, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baro: Option<BaroSettings>,
+    /// What the vehicle knows of its own motion.
+    #[serde(skip_serializing_if = "AidingSettings::is_none")]
+    pub aiding: AidingSettings,
     /// The start.
     pub initial: InitialSettings,
     /// Windows without fixes. Without this key and the two below: the two of the paper. An empty list: none.
@@ -153,6 +157,7 @@ impl Scenario {
             initial: &self.initial,
             defects: &self.imu,
             baro: self.baro.as_ref(),
+            aiding: &self.aiding,
             update: self.filter.update,
             nis_gate: self.filter.nis_gate,
             outages,
@@ -176,6 +181,10 @@ impl Scenario {
         if let Some(baro) = &self.baro {
             baro.validate().map_err(|e| e.in_section("baro"))?;
             self.meets_imu_samples("baro.rate_hz", baro.rate_hz)?;
+        }
+        self.aiding.validate().map_err(|e| e.in_section("aiding"))?;
+        for (aid, rate_hz) in self.aiding.rates() {
+            self.meets_imu_samples(&format!("aiding.{}.rate_hz", aid.name()), rate_hz)?;
         }
         self.meets_imu_samples("gnss.rate_hz", self.gnss.rate_hz)
     }
@@ -217,7 +226,7 @@ impl Scenario {
             // The wavelet reduction is where this search starts, hence made in either case.
             belief = reduced_belief(model, belief, track, Alike::Level);
         }
-        Ok(belief.with_initial(&self.initial))
+        Ok(belief.with_initial(&self.initial).with_vehicle(self.aiding.state_sigmas()))
     }
 
     /// Where fixes are too rare for a reduction, the key that makes them so.

@@ -175,7 +175,7 @@ impl TuneRequest {
         let true_errors = |path: &Path, model: Model, turned_on: &ModelFile| {
             let (mut imu, gnss) = (scenario.imu.clone(), scenario.gnss.clone());
             read::make_turn_on(&mut imu, turned_on, path, notes);
-            TrueErrors { model, imu, gnss }
+            TrueErrors { model, imu, gnss, aiding: scenario.aiding.clone() }
         };
         let truths = if self.intervals {
             let draws = draws(&self.model, file, scenario.imu.rate_hz, self.seed.unwrap_or(1))?;

@@ -111,6 +111,8 @@ pub struct Belief {
     pub groups: [Vec<BiasGroup>; 2],
     /// Unknown constants that act on the samples of each sensor multiplied, each kind at most once, in order.
     pub(super) unknowns: [Vec<Unknown>; 2],
+    /// Standard deviations of a wheel's scale (1), and of pitch and yaw of the vehicle's axes in those of the IMU (rad).
+    pub(crate) vehicle: DVec3,
     /// Stochastic states carried, navigation included (15 for the reduced filter).
     pub states: usize,
 }
@@ -136,6 +138,7 @@ impl Belief {
             white: [DVec3::ZERO; 2],
             groups: [vec![], vec![]],
             unknowns: [vec![], vec![]],
+            vehicle: DVec3::ZERO,
             states: 9,
         };
         for channel in Channel::ALL {
@@ -178,6 +181,15 @@ impl Belief {
         self
     }
 
+    /// With states of a vehicle's own measurements, of these deviations: scale of the wheel (1), pitch and yaw of the
+    /// vehicle's axes in those of the IMU (rad).
+    #[must_use]
+    pub(crate) fn with_vehicle(mut self, sigmas: DVec3) -> Self {
+        self.vehicle = sigmas;
+        self.states += self.vehicle.to_array().iter().filter(|sigma| **sigma > 0.0).count();
+        self
+    }
+
     fn add(&mut self, channel: Channel, axis: &AxisBelief) {
         let (sensor, i) = (channel.sensor as usize, channel.axis as usize);
         self.white[sensor][i] = axis.white;
@@ -197,13 +209,14 @@ impl Belief {
         &self.unknowns[sensor as usize]
     }
 
-    /// Blocks of the covariance: R, V, PSI, the bias groups and the unknowns.
+    /// Blocks of the covariance: R, V, PSI, the bias groups, the unknowns, and one of the vehicle.
     #[must_use]
     pub(crate) fn blocks(&self) -> usize {
         3 + Sensor::ALL
             .map(|s| self.groups[s as usize].len() + self.unknowns[s as usize].len())
             .iter()
             .sum::<usize>()
+            + usize::from(self.vehicle != DVec3::ZERO)
     }
 
     /// Adds an unknown constant to the biases of a sensor (a turn-on bias), the same deviation on each axis

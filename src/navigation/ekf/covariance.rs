@@ -2,7 +2,7 @@
 //!
 //! States by threes: [`R`] position error (m, n), [`V`] velocity error (m/s, n), `PSI` attitude error
 //! (rad, n), then one triple of axes for each bias group, accelerometer groups first (`BIAS`), and for each
-//! unknown constant that acts multiplied, in the same order.
+//! unknown constant that acts multiplied, in the same order, and at last wheel scale and mounting of a vehicle.
 //!
 //! The lower triangle is the matrix. Inside the square of the navigation states and inside that of the
 //! biases the upper triangle repeats it, so that a column can be read as a row.
@@ -37,12 +37,13 @@ pub struct Covariance {
 }
 
 /// Steps of biases that stay as they are: phi = 1, no innovation.
-const CONSTANT_BIASES: [BiasGroup; 2 * MAX_BLOCKS] = [BiasGroup::constant(0.0); 2 * MAX_BLOCKS];
+const CONSTANT_BIASES: [BiasGroup; 2 * MAX_BLOCKS + 1] = [BiasGroup::constant(0.0); 2 * MAX_BLOCKS + 1];
 
 /// The blocks behind the navigation's: what makes the errors of a sample.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sources<'a> {
-    /// The step of each block: biases of the accelerometer, of the gyroscope, unknowns of both.
+    /// The step of each block: biases of the accelerometer, of the gyroscope, unknowns of both, and what the vehicle's
+    /// own measurements have, which moves nothing.
     pub(super) steps: &'a [BiasGroup],
     /// Bias groups of each sensor.
     pub(super) biases: [usize; 2],

@@ -21,7 +21,7 @@ pub struct Ekf {
     /// The nominal navigation state.
     pub nominal: Strapdown,
     /// Estimates of the blocks behind the navigation's: bias groups, accelerometer first (m/s², rad/s), then
-    /// the unknowns of both sensors (scale factors, slopes of drifts).
+    /// the unknowns of both sensors (scale factors, slopes of drifts), then those of the vehicle.
     pub(super) estimates: Vec<Vec3>,
     /// Covariance of the error state.
     pub p: Covariance,
@@ -71,7 +71,10 @@ impl Ekf {
     pub fn new(nominal: Strapdown, belief: &Belief, about: &NavState, initial: &InitialSettings) -> Self {
         let unknowns = belief.unknowns.iter().flatten();
         let constant = unknowns.map(|u| BiasGroup { initial: u.sigma * u.sigma, ..BiasGroup::constant(0.0) });
-        let steps: Vec<BiasGroup> = belief.groups.iter().flatten().copied().chain(constant).collect();
+        let vehicle = (belief.vehicle != DVec3::ZERO)
+            .then(|| BiasGroup { initial: belief.vehicle * belief.vehicle, ..BiasGroup::constant(0.0) });
+        let steps: Vec<BiasGroup> =
+            belief.groups.iter().flatten().copied().chain(constant).chain(vehicle).collect();
         let mut p = Covariance::zeros(3 * belief.blocks());
         let square = |sigma: [f64; 3]| Matrix3::from_diagonal(&sigma.map(|s| s * s).into());
         add_block(&mut p, R, &square(initial.pos_sigma_m));

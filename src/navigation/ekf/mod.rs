@@ -5,6 +5,7 @@
 //!
 //! The filter never sees truth: it is given increments, fixes, and what it believes of the noise.
 
+mod aiding;
 pub mod belief;
 pub mod covariance;
 pub mod dynamics;
@@ -18,6 +19,7 @@ mod transition;
 pub mod unknowns;
 pub mod update;
 
+pub(crate) use aiding::{BodyVelocity, body_velocity_rows, dense_yaw_row, update_body_velocity, update_yaw};
 pub use belief::{Belief, BeliefError};
 pub use covariance::Covariance;
 pub use filter::{Ekf, advance, settle};

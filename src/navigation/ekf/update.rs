@@ -1,5 +1,6 @@
 //! GNSS updates: position and velocity of an antenna on a lever arm, as scalars in sequence.
 
+use super::aiding::Innovation;
 use super::belief::MAX_BLOCKS;
 use super::covariance::{BIAS, PSI, R, Sources, V};
 use super::filter::Ekf;
@@ -32,8 +33,8 @@ pub struct Fix {
     pub lever_arm_b: DVec3,
 }
 
-/// Most entries of a measurement row: one of R or V, three of PSI, three of each gyroscope block.
-const MAX_ROW: usize = 4 + 3 * MAX_BLOCKS;
+/// Most entries of a measurement row: three of V and PSI, three of each gyroscope block, one of the vehicle's.
+const MAX_ROW: usize = 7 + 3 * MAX_BLOCKS;
 
 impl Ekf {
     #[inline(always)]
@@ -81,6 +82,22 @@ impl Ekf {
     /// One scalar: innovation z = h·error + noise of variance r; returns its NIS.
     #[inline(always)]
     fn scalar<W: Wide>(&mut self, h: &[(usize, W)], z: W, r: f64) -> W {
+        let (innovation, s) = self.take(h, z, r);
+        innovation * innovation / s
+    }
+
+    /// The same; returns the innovation and its variance.
+    #[inline(always)]
+    pub(super) fn innovated<W: Wide>(&mut self, h: &[(usize, W)], z: W, r: f64) -> Innovation {
+        let (innovation, s) = self.take(h, z, r);
+        let mut found = [Lanes::ZERO; 2];
+        innovation.store(&mut found[0]);
+        s.store(&mut found[1]);
+        found
+    }
+
+    #[inline(always)]
+    fn take<W: Wide>(&mut self, h: &[(usize, W)], z: W, r: f64) -> (W, W) {
         let scratch = &mut self.scratch;
         let s = self.p.update(h, r, &mut scratch.ph, &mut scratch.gain);
         // What the scalars before have already explained. The nominal state moves only after the last one, so
@@ -92,7 +109,7 @@ impl Ekf {
         for (error, gain) in scratch.error.iter_mut().zip(&scratch.gain) {
             W::load(gain).mul_add(innovation, W::load(error)).store(error);
         }
-        innovation * innovation / s
+        (innovation, s)
     }
 
     /// Takes the estimated error out of the nominal state and the biases.
@@ -174,22 +191,22 @@ impl Kernel for UpdateHeight<'_> {
 }
 
 /// Where the antenna is and how it moves about the IMU, and the measurement rows that follow.
-struct Antenna<L> {
+pub(super) struct Antenna<L> {
     has_arm: bool,
     /// Lever arm in n (m).
     arm_n: Vec3<L>,
     /// Velocity of the antenna about the IMU, C (omega_eb_b × l), in n (m/s).
-    swing_n: Vec3<L>,
+    pub(super) swing_n: Vec3<L>,
     /// Change of that velocity per attitude error psi_n (m/s per rad):
     /// −\[C (omega_ib_b × l) ×\] + \[omega_ie_n ×\] \[C l ×\].
-    of_psi: Mat3<L>,
+    pub(super) of_psi: Mat3<L>,
     /// Change of that velocity per error of the gyroscope's bias (m): C \[l ×\].
-    of_bias: Mat3<L>,
+    pub(super) of_bias: Mat3<L>,
 }
 
 impl<W: Real> Antenna<W> {
     #[inline(always)]
-    fn new(ins: &Strapdown<W>, omega_ib_b: Vec3<W>, lever_arm_b: DVec3) -> Self {
+    pub(super) fn new(ins: &Strapdown<W>, omega_ib_b: Vec3<W>, lever_arm_b: DVec3) -> Self {
         let c_b_n = ins.q_b_n.to_matrix();
         let arm_b = Vec3::splat(lever_arm_b);
         let arm_n = c_b_n * arm_b;
@@ -225,17 +242,7 @@ impl<W: Wide> Antenna<W> {
         let mut row = Row::new(3 * V + axis);
         if self.has_arm {
             row.push3(3 * PSI, self.of_psi.0[axis]);
-            let of_bias = self.of_bias.0[axis];
-            let [_, gyro, unknown, gyro_unknown] = sources.starts();
-            // The rate is that of the last sample: its biases count all alike. Its white noise times the arm
-            // is left out: at 1 m it is mm/s beside the cm/s of a receiver.
-            for first in (gyro..unknown).step_by(3) {
-                row.push3(first, of_bias);
-            }
-            for (u, regressor) in sources.regressors[Sensor::Gyro as usize].iter().enumerate() {
-                let Vec3([x, y, z]) = regressor.value.load::<W>();
-                row.push3(gyro_unknown + 3 * u, [of_bias[0] * x, of_bias[1] * y, of_bias[2] * z]);
-            }
+            row.push_gyro(self.of_bias.0[axis], sources);
         }
         row
     }
@@ -273,30 +280,57 @@ pub(crate) fn fix_rows(ins: &Strapdown<f64>, omega_ib_b: DVec3, lever_arm_b: DVe
 }
 
 /// One measurement row: (state, coefficient), without allocation.
-struct Row<L> {
+pub(super) struct Row<L> {
     entries: [(usize, L); MAX_ROW],
     len: usize,
+}
+
+impl<L: Real> Default for Row<L> {
+    #[inline(always)]
+    fn default() -> Self {
+        Self { entries: [(0, L::from(0.0)); MAX_ROW], len: 0 }
+    }
 }
 
 impl<L: Real> Row<L> {
     #[inline(always)]
     fn new(state: usize) -> Self {
-        let mut entries = [(0, L::from(0.0)); MAX_ROW];
-        entries[0] = (state, L::from(1.0));
-        Self { entries, len: 1 }
+        let mut row = Self::default();
+        row.push(state, L::from(1.0));
+        row
     }
 
     #[inline(always)]
-    fn push3(&mut self, first: usize, coefficients: [L; 3]) {
-        for (i, c) in coefficients.into_iter().enumerate() {
-            self.entries[self.len] = (first + i, c);
-            self.len += 1;
-        }
+    pub(super) fn push(&mut self, state: usize, coefficient: L) {
+        self.entries[self.len] = (state, coefficient);
+        self.len += 1;
     }
 
     #[inline(always)]
-    fn entries(&self) -> &[(usize, L)] {
+    pub(super) fn push3(&mut self, first: usize, coefficients: [L; 3]) {
+        coefficients.into_iter().enumerate().for_each(|(i, c)| self.push(first + i, c));
+    }
+
+    #[inline(always)]
+    pub(super) fn entries(&self) -> &[(usize, L)] {
         &self.entries[..self.len]
+    }
+}
+
+impl<W: Wide> Row<W> {
+    /// What the error of the gyroscope's rate does, times these coefficients: its biases and its unknowns.
+    #[inline(always)]
+    pub(super) fn push_gyro(&mut self, of_bias: [W; 3], sources: &Sources<'_>) {
+        let [_, gyro, unknown, gyro_unknown] = sources.starts();
+        // The rate is that of the last sample: its biases count all alike. Its white noise times the arm
+        // is left out: at 1 m it is mm/s beside the cm/s of a receiver.
+        for first in (gyro..unknown).step_by(3) {
+            self.push3(first, of_bias);
+        }
+        for (u, regressor) in sources.regressors[Sensor::Gyro as usize].iter().enumerate() {
+            let Vec3([x, y, z]) = regressor.value.load::<W>();
+            self.push3(gyro_unknown + 3 * u, [of_bias[0] * x, of_bias[1] * y, of_bias[2] * z]);
+        }
     }
 }
 

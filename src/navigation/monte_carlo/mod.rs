@@ -164,4 +164,6 @@ impl EpochSums {
 }
 
 #[cfg(test)]
+mod aiding_tests;
+#[cfg(test)]
 mod tests;

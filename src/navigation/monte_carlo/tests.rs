@@ -7,6 +7,7 @@ use crate::frames::RollPitchYaw;
 use crate::imu::Channel;
 use crate::noise::{Ar1, Composite, Model, Process, RandomWalk, VirtualImu, White};
 use crate::rng::StreamKey;
+use crate::sensors::aiding::AidingSettings;
 use crate::sensors::baro::BaroSettings;
 use crate::sensors::defects::{Defects, ImuSettings};
 use crate::sensors::gnss::GnssSettings;
@@ -58,6 +59,7 @@ struct Setting {
     update: FixUpdate,
     nis_gate: Option<f64>,
     seed: u64,
+    aiding: AidingSettings,
 }
 
 impl Setting {
@@ -73,6 +75,7 @@ impl Setting {
             seed: 3,
             defects: ImuSettings::default(),
             baro: None,
+            aiding: AidingSettings::default(),
             update: FixUpdate::default(),
             nis_gate: None,
         }
@@ -89,6 +92,7 @@ impl Setting {
             initial: &self.initial,
             defects: &self.defects,
             baro: self.baro.as_ref(),
+            aiding: &self.aiding,
             update: self.update,
             nis_gate: self.nis_gate,
             outages: &self.outages,

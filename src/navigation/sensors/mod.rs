@@ -1,5 +1,6 @@
 //! Sensors on a trajectory: what is measured, with which errors, and when it is missing.
 
+pub mod aiding;
 pub mod baro;
 pub mod defects;
 pub mod gnss;

@@ -1,17 +1,19 @@
 //! Eight runs through the schedule: noise, prediction, fixes, and what is kept of them.
 
 use super::assessment::{Assessment, EpochLanes};
-use super::plan::{Event, Plan};
+use super::plan::{Aided, Event, Plan};
 use super::{EpochSums, OutageRecord, REPORTED, RunRecord};
 use crate::earth::radii;
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::initial::psi_of_angles;
-use crate::ekf::{Ekf, Fix, advance, nis_limit, settle, update, update_height, update_within};
-use crate::frames::NavState;
+use crate::ekf::{BodyVelocity, Ekf, Fix, advance, nis_limit, settle, update, update_body_velocity};
+use crate::ekf::{update_height, update_within, update_yaw};
+use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::ImuSample;
 use crate::lanes::{LANES, Lanes, Real, Vec3};
 use crate::linalg;
 use crate::rng::StreamKey;
+use crate::sensors::aiding::{Aid, AidNoise};
 use crate::sensors::baro::BaroNoise;
 use crate::sensors::defects::Defects;
 use crate::sensors::gnss::GnssNoise;
@@ -44,24 +46,39 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
         // At every epoch of the receiver, also within outages, so that an outage changes no random number
         // after it.
         let fix = event.gnss_epoch.then(|| source.fix(plan, event));
-        let height = source.height(event);
+        let measured = Measured {
+            fix: fix.filter(|_| event.fix),
+            height: source.height(event),
+            aids: source.aids(event),
+        };
         // Drawn once for all candidates: their errors are paired, and ratios between them scatter far less
         // than each.
         let errors = source.errors(samples);
         for candidate in &mut candidates {
             advance(&mut candidate.ekf, samples, errors);
-            candidate.at_event(plan, index, event, fix.as_ref().filter(|_| event.fix), height.as_ref());
+            candidate.at_event(plan, index, event, &measured);
         }
         done = event.sample;
     }
     candidates.into_iter().map(|c| c.finish(first, &plan.fan)).collect()
 }
 
+/// What eight runs measure at an instant.
+struct Measured {
+    fix: Option<Fix>,
+    height: Option<Lanes>,
+    /// Velocities along the vehicle's axes (m/s); of a heading the first is the yaw (rad).
+    aids: Vec<(Aid, Vec3)>,
+}
+
 /// Everything random of eight runs.
 struct Source<'a> {
+    /// Rate of the IMU (Hz).
+    rate_hz: f64,
     imu: LaneErrors<'a>,
     gnss: Vec<GnssNoise>,
     baro: Vec<BaroNoise>,
+    aiding: Vec<AidNoise>,
     /// Empty for an IMU without defects.
     defects: Vec<Defects>,
     keys: Vec<StreamKey<'a>>,
@@ -81,11 +98,13 @@ impl<'a> Source<'a> {
         let imu = keys.iter().map(|k| ImuErrors::new(&plan.errors, *k, plan.samples()));
         let gnss = keys.iter().map(|k| GnssNoise::new(experiment.gnss, *k)).collect();
         let baro = experiment.baro.iter().flat_map(|b| keys.iter().map(|k| BaroNoise::new(b, *k))).collect();
+        let aiding = keys.iter().map(|k| AidNoise::new(experiment.aiding, *k)).collect();
         let defects = match experiment.defects {
             settings if settings.is_ideal() => Vec::new(),
             settings => keys.iter().map(|k| Defects::draw(settings, *k)).collect(),
         };
-        Self { imu: LaneErrors::new(imu.collect()), gnss, baro, defects, keys }
+        let rate_hz = experiment.rate_hz;
+        Self { rate_hz, imu: LaneErrors::new(imu.collect()), gnss, baro, aiding, defects, keys }
     }
 
     /// The nominal starts: the truth and an error drawn from the initial standard deviations.
@@ -113,6 +132,25 @@ impl<'a> Source<'a> {
             h[lane] += noise.draw();
         }
         event.baro.then_some(h)
+    }
+
+    /// What the vehicle measures of itself at this epoch.
+    fn aids(&mut self, event: &Event) -> Vec<(Aid, Vec3)> {
+        let after_s = event.sample as f64 / self.rate_hz;
+        let yaw = || RollPitchYaw::from_quat(event.reference.q_b_n).yaw;
+        let mut measure = |aided: &Aided| {
+            let is_heading = aided.aid == Aid::Heading;
+            let exact = if is_heading { DVec3::X * yaw() } else { aided.v_b };
+            let axes = if is_heading { &[0] } else { aided.aid.axes() };
+            let mut value: Vec3 = Vec3::splat(exact);
+            for (lane, noise) in self.aiding.iter_mut().enumerate() {
+                for &axis in axes {
+                    value[axis][lane] += noise.draw(aided.aid, axis, after_s, aided.v_b, aided.a_b);
+                }
+            }
+            (aided.aid, value)
+        };
+        event.aids.iter().map(&mut measure).collect()
     }
 
     /// The fixes of this epoch.
@@ -213,21 +251,17 @@ impl Candidate {
     }
 
     /// Outage ends, the fix if one is used, the report if one is due.
-    fn at_event(
-        &mut self,
-        plan: &Plan<'_>,
-        index: usize,
-        event: &Event,
-        fix: Option<&Fix>,
-        height: Option<&Lanes>,
-    ) {
+    fn at_event(&mut self, plan: &Plan<'_>, index: usize, event: &Event, measured: &Measured) {
         // Before the fix of the same instant: the end of an outage is where the error is largest.
         self.end_outages(plan, index, event);
-        if let Some(fix) = fix {
+        if let Some(fix) = &measured.fix {
             self.use_fix(fix);
         }
-        if let (Some(h), Some(baro)) = (height, plan.experiment.baro) {
+        if let (Some(h), Some(baro)) = (&measured.height, plan.experiment.baro) {
             let _ = update_height(&mut self.ekf, h, baro.sigma_m);
+        }
+        for (aid, value) in &measured.aids {
+            self.use_aid(plan, *aid, value);
         }
         if event.report {
             settle(&mut self.ekf);
@@ -235,6 +269,18 @@ impl Candidate {
             self.follow_outages(plan, event, &epoch);
             self.trace.push(epoch);
         }
+    }
+
+    fn use_aid(&mut self, plan: &Plan<'_>, aid: Aid, value: &Vec3) {
+        let aiding = plan.experiment.aiding;
+        let [variance, _] = aiding.variances(aid);
+        if aid == Aid::Heading {
+            let _ = update_yaw(&mut self.ekf, &value[0], variance);
+            return;
+        }
+        let lever_arm_b = aiding.lever_arm_b(aid);
+        let velocity = BodyVelocity { value: *value, axes: aid.axes(), variance, lever_arm_b };
+        let _ = update_body_velocity(&mut self.ekf, &velocity);
     }
 
     fn use_fix(&mut self, fix: &Fix) {

@@ -5,6 +5,7 @@ use crate::ekf::{Belief, FixUpdate, InitialSettings};
 use crate::frames::NavState;
 use crate::imu::ImuSample;
 use crate::noise::continuous::same_rate;
+use crate::sensors::aiding::{Aid, AidingSettings};
 use crate::sensors::baro::BaroSettings;
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
@@ -38,6 +39,8 @@ pub struct Experiment<'a> {
     pub defects: &'a ImuSettings,
     /// A barometer, if there is one.
     pub baro: Option<&'a BaroSettings>,
+    /// What the vehicle knows of its own motion.
+    pub aiding: &'a AidingSettings,
     /// How the filters use a fix.
     pub update: FixUpdate,
     /// Probability of the gate on the NIS of fixes, if there is one.
@@ -93,6 +96,17 @@ pub enum ExperimentError {
         /// Rate of the IMU (Hz).
         imu_hz: f64,
     },
+    /// The vehicle moves sideways or up by itself.
+    #[error(
+        "aiding.nhc.sigma_m_s = {sigma_m_s}: the reference itself moves sideways and up with {rms_m_s:.2} m/s (root mean \
+         square) at this point: set lever_arm_m to the rear axle of a car, and leave the constraint to road vehicles"
+    )]
+    Sideslip {
+        /// Root mean square of lateral and vertical velocity (m/s).
+        rms_m_s: f64,
+        /// What the constraint allows (m/s).
+        sigma_m_s: f64,
+    },
     /// A fix that meets no sample.
     #[error("the IMU rate {imu_hz} Hz is not a whole multiple of the rate {fix_hz} Hz of {what}")]
     FixBetweenSamples {
@@ -100,9 +114,19 @@ pub enum ExperimentError {
         imu_hz: f64,
         /// Rate of the fixes (Hz).
         fix_hz: f64,
-        /// The sensor: GNSS or the barometer.
+        /// The sensor.
         what: &'static str,
     },
+}
+
+/// A measurement of the vehicle by itself, as it would be without error.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Aided {
+    pub(super) aid: Aid,
+    /// Velocity of the point that it belongs to, in b (m/s).
+    pub(super) v_b: DVec3,
+    /// Acceleration of the vehicle with respect to the Earth, in b (m/s²).
+    pub(super) a_b: DVec3,
 }
 
 /// Something happens after this many IMU samples.
@@ -122,6 +146,8 @@ pub(super) struct Event {
     pub(super) fix: bool,
     /// Whether the barometer has a height here.
     pub(super) baro: bool,
+    /// What the vehicle measures of itself here.
+    pub(super) aids: Vec<Aided>,
     /// Whether the epoch is reported (1 Hz).
     pub(super) report: bool,
 }
@@ -270,12 +296,18 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
     };
     let per_fix = step(gnss.rate_hz, "GNSS")?;
     let baro = experiment.baro.map(|b| step(b.rate_hz, "the barometer")).transpose()?;
+    let aids: Vec<(Aid, usize)> = experiment
+        .aiding
+        .rates()
+        .map(|(aid, rate_hz)| step(rate_hz, aid.name()).map(|step| (aid, step)))
+        .collect::<Result<_, _>>()?;
     // Rounded for each second anew: a rate that is no whole number would drift against the seconds.
     let reports = (0_u32..).map(|s| (f64::from(s) * rate_hz).round() as usize);
     let reports: Vec<usize> = reports.take_while(|k| *k <= samples).collect();
     let mut all = reports.clone();
     all.extend((per_fix..=samples).step_by(per_fix));
     all.extend(baro.iter().flat_map(|step| (*step..=samples).step_by(*step)));
+    all.extend(aids.iter().flat_map(|(_, step)| (*step..=samples).step_by(*step)));
     // The last sample is an event, so that an outage that lasts to the end has an end.
     all.push(samples);
     all.sort_unstable();
@@ -298,10 +330,17 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
             gnss_epoch,
             fix: gnss_epoch && !withheld,
             baro: baro.is_some_and(|step| sample > 0 && sample.is_multiple_of(step)),
+            aids: aided(
+                experiment,
+                t_s,
+                aids.iter().filter(|(_, step)| sample > 0 && sample.is_multiple_of(*step)),
+            ),
             report: reports.binary_search(&sample).is_ok(),
         })
     };
-    all.into_iter().map(event).collect()
+    let events: Vec<Event> = all.into_iter().map(event).collect::<Result<_, _>>()?;
+    check_sideslip(experiment, &events)?;
+    Ok(events)
 }
 
 /// IMU samples from one measurement to the next; none where measurements would fall between samples, to be used late or
@@ -312,6 +351,47 @@ pub(crate) fn samples_per(imu_hz: f64, fix_hz: f64) -> Option<usize> {
     // divisor.
     let is_whole = samples >= 0.5 && (samples - samples.round()).abs() <= 1e-6 * samples;
     is_whole.then(|| samples.round() as usize)
+}
+
+/// What the vehicle measures of itself, of these aids.
+fn aided<'a>(
+    experiment: &Experiment<'_>,
+    t_s: f64,
+    aids: impl Iterator<Item = &'a (Aid, usize)>,
+) -> Vec<Aided> {
+    let mut aids = aids.peekable();
+    if aids.peek().is_none() {
+        return Vec::new();
+    }
+    let k = experiment.trajectory.kinematics(t_s);
+    let to_b = k.q_b_e.inverse();
+    let (v_b, a_b) = (to_b * k.v_e, to_b * k.a_e);
+    let stands = v_b.length() < STANDS_M_S && k.omega_eb_b.length() < STANDS_RAD_S;
+    aids.filter(|(aid, _)| *aid != Aid::Zupt || stands)
+        .map(|(aid, _)| {
+            let swing = k.omega_eb_b.cross(experiment.aiding.lever_arm_b(*aid));
+            Aided { aid: *aid, v_b: v_b + swing, a_b }
+        })
+        .collect()
+}
+
+/// Below these a vehicle stands (m/s, rad/s): a hundredth of the pace of a walk, and what a gyroscope would not show.
+const STANDS_M_S: f64 = 0.01;
+const STANDS_RAD_S: f64 = 0.01 * DEG;
+
+/// A constraint that the reference itself does not keep tells of another vehicle, or of another point of it.
+fn check_sideslip(experiment: &Experiment<'_>, events: &[Event]) -> Result<(), ExperimentError> {
+    let Some(nhc) = &experiment.aiding.nhc else { return Ok(()) };
+    let squares: Vec<f64> = events
+        .iter()
+        .flat_map(|event| event.aids.iter().filter(|a| a.aid == Aid::Nhc))
+        .map(|a| 0.5 * (a.v_b.y * a.v_b.y + a.v_b.z * a.v_b.z))
+        .collect();
+    let rms_m_s = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
+    if rms_m_s <= nhc.sigma_m_s {
+        return Ok(());
+    }
+    Err(ExperimentError::Sideslip { rms_m_s, sigma_m_s: nhc.sigma_m_s })
 }
 
 /// Position (lat, lon, h) and velocity in n of the antenna.

@@ -42,7 +42,8 @@ impl<'a> Errors<'a> {
         // Without its noise where the source under study is another one: covariances of independent sources
         // add.
         let measured = self.joint.measured(row);
-        let y = self.joint.innovation(&measured, if self.truth.has_noise(row.what) { row.r } else { 0.0 });
+        let y =
+            self.joint.innovation(&measured, if self.truth.has_noise(row.what) { row.noise } else { 0.0 });
         let mean = self.mean.as_ref().map_or(0.0, |mean| measured.dot(&mean.values));
         self.joint.correct(&y, gain);
         self.mean.iter_mut().for_each(|m| m.correct(mean, gain));

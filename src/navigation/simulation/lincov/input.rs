@@ -4,6 +4,7 @@ use crate::ekf::belief::BiasGroup;
 use crate::ekf::{Belief, UnknownKind};
 use crate::imu::{Channel, Sensor};
 use crate::noise::{Ladder, Model, Process};
+use crate::sensors::aiding::{AidPart, Law};
 
 /// Signals of an IMU; again each multiplied by its own sample, what a scale factor adds; and each multiplied by
 /// the samples of the other two axes of its sensor, what a misalignment adds.
@@ -46,8 +47,17 @@ pub(super) struct Source {
     pub(super) initial: f64,
     /// Mean of s at the start.
     pub(super) level: f64,
-    /// The component of a fix's position that it is part of; such a source is no inertial error.
-    pub(super) position: Option<usize>,
+    /// The measurement that it is part of; such a source is no inertial error.
+    pub(super) outer: Option<Outer>,
+}
+
+/// An error of measurements that lasts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Outer {
+    /// Of a component of a fix's position.
+    Position(usize),
+    /// Of what a vehicle measures of itself.
+    Vehicle(AidPart),
 }
 
 /// A source that makes no error.
@@ -61,7 +71,7 @@ const NONE: Source = Source {
     ramp: 0.0,
     initial: 0.0,
     level: 0.0,
-    position: None,
+    outer: None,
 };
 
 /// What a source does over a step: the mean of its samples' errors is `mean`·s + w₁, and s⁺ = `decay`·s + w₂.
@@ -113,7 +123,21 @@ impl Source {
     /// the coefficient `phi` from sample to sample.
     pub(super) fn of_position(component: usize, phi: f64, sigma: f64) -> Self {
         let drive = sigma * (1.0 - phi * phi).sqrt();
-        Self { decay: phi, drive, initial: sigma * sigma, position: Some(component), ..NONE }
+        Self { decay: phi, drive, initial: sigma * sigma, outer: Some(Outer::Position(component)), ..NONE }
+    }
+
+    /// An error of what a vehicle measures of itself, at an IMU of this rate.
+    pub(super) fn of_vehicle(part: AidPart, law: Law, imu_hz: f64) -> Self {
+        let outer = Some(Outer::Vehicle(part));
+        match law {
+            // The states of the truth are negated, and so is a mean.
+            Law::Known(value) => Self { level: -value, outer, ..NONE },
+            Law::Constant(sigma) => Self { initial: sigma * sigma, outer, ..NONE },
+            Law::GaussMarkov { sigma, time_s } => {
+                let phi = (-1.0 / (imu_hz * time_s)).exp();
+                Self { outer, ..Self::of_position(0, phi, sigma) }
+            }
+        }
     }
 
     /// Error that is there after `samples` samples per unit of the state: biases count and drifts at their age, noise
@@ -195,6 +219,7 @@ impl Sources {
         white[..3].copy_from_slice(&accel);
         white[3..SCALED].copy_from_slice(&gyro);
         states.extend(Self::multiplied(belief, &UNKNOWNS));
+        states.extend(Self::of_vehicle(belief));
         Self { states, white }
     }
 
@@ -223,9 +248,17 @@ impl Sources {
         states
     }
 
+    /// Wheel scale and mounting of a vehicle, as a filter believes in them.
+    pub(super) fn of_vehicle(belief: &Belief) -> Vec<Source> {
+        let parts = [AidPart::WheelScale, AidPart::MountingPitch, AidPart::MountingYaw];
+        let states = parts.into_iter().zip(belief.vehicle.to_array()).filter(|(_, sigma)| *sigma > 0.0);
+        states.map(|(part, sigma)| Source::of_vehicle(part, Law::Constant(sigma), belief.rate_hz)).collect()
+    }
+
     /// What a belief expects beside its noise model, as it expects it: turn-on biases and scale factors.
     pub(super) fn beside_model(belief: &Belief) -> Vec<Source> {
         let mut states = Self::multiplied(belief, &[UnknownKind::ScaleFactor]);
+        states.extend(Self::of_vehicle(belief));
         for sensor in Sensor::ALL {
             for group in belief.groups[sensor as usize].iter().filter(|g| g.is_constant()) {
                 let constant = |axis| Source::bias(3 * sensor as usize + axis, 1.0, 0.0, group.initial[axis]);

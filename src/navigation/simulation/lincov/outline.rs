@@ -60,11 +60,11 @@ impl Track {
             if !is_bound && next.is_some_and(|next| block.has_room_until(next.after_s)) {
                 continue;
             }
-            let Block { step, fix, height, .. } = std::mem::take(&mut block);
+            let Block { step, measured, .. } = std::mem::take(&mut block);
             steps.extend(step);
             let report = mark.after_s - report_s >= REPORT_S - SLACK_S;
             report_s = if report { mark.after_s } else { report_s };
-            let rows = fix.mean().chain(height.mean()).collect();
+            let rows = measured.into_iter().flat_map(Together::mean).collect();
             marks.push(Mark { steps: steps.len(), rows, report, ..mark.clone() });
         }
         Self { steps, marks, outages: self.outages, start: self.start, perfect: self.perfect }
@@ -87,8 +87,8 @@ const SLACK_S: f64 = 1e-6;
 struct Block {
     begin_s: f64,
     step: Option<Step>,
-    fix: Together,
-    height: Together,
+    /// By kind, fixes first.
+    measured: [Together; Measured::KINDS],
 }
 
 impl Block {
@@ -98,13 +98,13 @@ impl Block {
             self.begin_s = before_s;
         }
         self.step = self.step.take().into_iter().chain(leg.iter().cloned()).reduce(|a, b| a.of_means(&b));
-        let (height, fix): (Vec<Row>, Vec<Row>) = mark.rows.iter().partition(|r| r.what == Measured::Height);
-        self.fix.add(fix);
-        self.height.add(height);
+        for (kind, together) in self.measured.iter_mut().enumerate() {
+            together.add(mark.rows.iter().filter(|row| row.what.kind() == kind).copied().collect());
+        }
     }
 
     fn has_room_until(&self, after_s: f64) -> bool {
-        after_s - self.begin_s <= OUTLINE_STEP_S[usize::from(self.fix.count == 0)] + SLACK_S
+        after_s - self.begin_s <= OUTLINE_STEP_S[usize::from(self.measured[0].count == 0)] + SLACK_S
     }
 }
 
@@ -125,7 +125,7 @@ impl Together {
     /// One measurement of the mean of their noise.
     fn mean(self) -> impl Iterator<Item = Row> {
         let count = f64::from(self.count);
-        self.rows.into_iter().map(move |row| Row { r: row.r / count, ..row })
+        self.rows.into_iter().map(move |row| Row { r: row.r / count, noise: row.noise / count, ..row })
     }
 }
 

@@ -4,7 +4,7 @@ use super::errors::Errors;
 use super::input::Sources;
 use super::joint::{Gain, Joint};
 use super::sides::Sides;
-use super::track::{Mark, Measured, NAV, Nav, Track};
+use super::track::{Mark, NAV, Nav, Track};
 use super::truth::{TrueErrors, TruthSide};
 use crate::ekf::Belief;
 use crate::ekf::covariance::PSI;
@@ -240,8 +240,8 @@ impl<'a> FilterPass<'a> {
             law.nis.1 += u64::from(mark.fix);
             for (row, (gain, believed)) in mark.rows.iter().zip(&mut gains) {
                 let square = errors.measure(row, gain);
-                if row.what != Measured::Height {
-                    // The gate and the NIS of runs are of fixes; a height of the barometer is none.
+                if row.what.kind() == 0 {
+                    // The gate and the NIS of runs are of fixes alone.
                     law.nis.0 += square / believed;
                 }
             }

@@ -13,6 +13,7 @@ use crate::earth::GravityModel;
 use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings};
 use crate::imu::{Axis, Channel};
 use crate::noise::{Model, Process, reduction};
+use crate::sensors::aiding::AidingSettings;
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::imu::Truth;
@@ -289,6 +290,7 @@ pub fn drive(model: &Model, gnss: &GnssSettings, outages_s: &[f64]) -> Option<Tr
         initial: &InitialSettings::default(),
         defects: &ImuSettings::default(),
         baro: None,
+        aiding: &AidingSettings::default(),
         update: FixUpdate::default(),
         nis_gate: None,
         outages: &outages,

@@ -1,17 +1,18 @@
 //! A trajectory as a linear filter sees it: maps of the navigation error, and when it is measured.
 
-use super::super::plan::{Event, Experiment, ExperimentError, Plan};
-use super::input::{CROSSED, SIGNALS, Source, place};
+use super::super::plan::{Aided, Event, Experiment, ExperimentError, Plan};
+use super::input::{CROSSED, Outer, SIGNALS, Source, place};
 use super::joint::add_scaled;
 use crate::closure::Bounds;
 use crate::earth::ned_difference;
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, ErrorMap, NavError, Sample};
-use crate::ekf::fix_rows;
 use crate::ekf::initial::psi_of_angles;
+use crate::ekf::{body_velocity_rows, dense_yaw_row, fix_rows};
 use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::ImuSample;
 use crate::lanes::{Quat, Vec3};
+use crate::sensors::aiding::Aid;
 use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
@@ -46,6 +47,22 @@ pub(super) enum Measured {
     Velocity,
     /// The height of a barometer.
     Height,
+    /// What a vehicle measures of itself, along this axis.
+    Aid(Aid, usize),
+}
+
+impl Measured {
+    /// Kinds: fixes, heights, each aid.
+    pub(super) const KINDS: usize = 2 + Aid::ALL.len();
+
+    /// Which of them.
+    pub(super) const fn kind(self) -> usize {
+        match self {
+            Self::Position(_) | Self::Velocity => 0,
+            Self::Height => 1,
+            Self::Aid(aid, _) => 2 + aid as usize,
+        }
+    }
 }
 
 /// A scalar measurement: nine coefficients of the navigation error, three of the gyroscope's error.
@@ -54,17 +71,31 @@ pub(super) struct Row {
     pub(super) h: [f64; NAV + 3],
     /// The rate that scale factors and misalignments of the gyroscope multiply (rad/s).
     pub(super) omega_ib_b: DVec3,
-    /// Variance of its white noise.
+    /// Variance of its white noise, as the filter believes.
     pub(super) r: f64,
+    /// The same in truth.
+    pub(super) noise: f64,
     pub(super) what: Measured,
+    /// Velocity of the point of the vehicle (m/s) and acceleration (m/s²), in b.
+    pub(super) motion: [DVec3; 2],
 }
 
 impl Row {
+    /// A measurement whose true noise is as the filter believes.
+    fn new(h: [f64; NAV + 3], omega_ib_b: DVec3, r: f64, what: Measured) -> Self {
+        Self { h, omega_ib_b, r, noise: r, what, motion: [DVec3::ZERO; 2] }
+    }
+
     /// The coefficient of a source's state in the measurement after `elapsed` samples, beside its part through the
     /// navigation error.
     pub(super) fn coefficient(&self, source: &Source, elapsed: f64) -> f64 {
-        if let Some(component) = source.position {
-            return f64::from(u8::from(self.what == Measured::Position(component)));
+        match (source.outer, self.what) {
+            (None, _) => {}
+            (Some(Outer::Position(of)), Measured::Position(here)) => return f64::from(u8::from(of == here)),
+            (Some(Outer::Vehicle(part)), Measured::Aid(aid, axis)) if part.aid() == aid => {
+                return part.coefficient(axis, self.motion[0], self.motion[1]);
+            }
+            (Some(_), _) => return 0.0,
         }
         match place(source.signal) {
             (0, ..) => 0.0,
@@ -238,16 +269,38 @@ impl Linearisation {
             let sigmas = gnss.pos_sigma_m.into_iter().chain(gnss.vel_sigma_m_s.into_iter().flatten());
             for (i, (h, sigma)) in h.into_iter().zip(sigmas).enumerate() {
                 let what = if i < 3 { Measured::Position(i) } else { Measured::Velocity };
-                rows.push(Row { h, omega_ib_b: self.omega_ib_b, r: sigma * sigma, what });
+                rows.push(Row::new(h, self.omega_ib_b, sigma * sigma, what));
             }
         }
         if let Some(baro) = experiment.baro.filter(|_| event.baro) {
             let mut h = [0.0; NAV + 3];
             h[3 * R + 2] = 1.0;
             let r = baro.sigma_m * baro.sigma_m;
-            rows.push(Row { h, omega_ib_b: DVec3::ZERO, r, what: Measured::Height });
+            rows.push(Row::new(h, DVec3::ZERO, r, Measured::Height));
+        }
+        for aided in &event.aids {
+            self.aid(experiment, aided, &mut rows);
         }
         rows
+    }
+}
+
+impl Linearisation {
+    /// The rows of what the vehicle measures of itself.
+    fn aid(&self, experiment: &Experiment<'_>, aided: &Aided, rows: &mut Vec<Row>) {
+        let Aided { aid, v_b, a_b } = *aided;
+        let [r, noise] = experiment.aiding.variances(aid);
+        let row = |h, axis| Row {
+            noise,
+            motion: [v_b, a_b],
+            ..Row::new(h, self.omega_ib_b, r, Measured::Aid(aid, axis))
+        };
+        if aid == Aid::Heading {
+            rows.push(row(dense_yaw_row(&self.ins), 0));
+            return;
+        }
+        let h = body_velocity_rows(&self.ins, self.omega_ib_b, experiment.aiding.lever_arm_b(aid));
+        rows.extend(aid.axes().iter().map(|axis| row(h[*axis], *axis)));
     }
 }
 

@@ -1,14 +1,18 @@
 //! What makes the true errors: independent sources, alone or together.
 
 use super::input::SIGNALS;
-use super::input::{CROSSED, SCALED, Source, Sources, place};
+use super::input::{CROSSED, Outer, SCALED, Source, Sources, place};
 use super::track::Measured;
 use crate::ekf::{Belief, UnknownKind};
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Kind, Model, Process};
+use crate::sensors::aiding::{AidError, AidingSettings};
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::simulation::plan::Experiment;
+
+/// Kinds of white noise of measurements: positions and velocities of fixes apart.
+const NOISES: usize = Measured::KINDS + 1;
 
 /// What makes the true errors along a track, whatever the filter believes.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -16,8 +20,8 @@ pub struct TruthSide {
     pub(super) inertial: Sources,
     /// Whether the start is off, as the filter believes it to be.
     pub(super) starts_off: bool,
-    /// Whether the white noise of positions, velocities and heights is there.
-    noise: [bool; 3],
+    /// Whether the white noise of positions, velocities, heights and each aid is there.
+    noise: [bool; NOISES],
     /// Whether the strapdown integrates the samples with the error that it has at the IMU's rate.
     pub(super) integrates: bool,
 }
@@ -32,13 +36,15 @@ pub struct TrueErrors {
     pub imu: ImuSettings,
     /// The true receiver, whose positions may have correlated errors.
     pub gnss: GnssSettings,
+    /// What is truly wrong with the vehicle's own measurements.
+    pub aiding: AidingSettings,
 }
 
 impl From<Model> for TrueErrors {
     /// Nothing beside the model but what the filter expects.
     fn from(model: Model) -> Self {
         let imu = ImuSettings { rate_hz: model.rate_hz, ..ImuSettings::default() };
-        Self { model, imu, gnss: GnssSettings::default() }
+        Self { model, imu, gnss: GnssSettings::default(), aiding: AidingSettings::default() }
     }
 }
 
@@ -80,7 +86,7 @@ impl TruthSide {
     }
 
     /// Every source of an experiment whose inertial noise is that of `model`, at the IMU's rate: its processes
-    /// sensor by sensor, the defects of the true IMU, start, receiver and barometer. All drifts are one source:
+    /// sensor by sensor, the defects of the true IMU, start, receiver, barometer and aiding. All drifts are one source:
     /// they are the same in every run, so that their errors add, not their variances.
     #[must_use]
     pub fn sources(experiment: &Experiment<'_>, model: &Model) -> Vec<NamedSource> {
@@ -92,6 +98,7 @@ impl TruthSide {
         }
         parts.extend(inertial(DRIFT.to_owned(), drifts));
         parts.extend(correlated(experiment.gnss, experiment.rate_hz));
+        parts.extend(lasting(experiment.aiding, experiment.rate_hz));
         parts.push(NamedSource::new(STRAPDOWN, Self::of_strapdown()));
         parts
     }
@@ -109,6 +116,7 @@ impl TruthSide {
         for sensor in Sensor::ALL {
             parts.extend(believed_of(belief, sensor));
         }
+        parts.extend(inertial("aiding".to_owned(), Sources::of_vehicle(belief)));
         parts
     }
 
@@ -117,23 +125,27 @@ impl TruthSide {
     pub(super) fn as_expected(belief: &Belief, model: &Model, starts_off: bool) -> Self {
         let mut inertial = Sources::of_model(model);
         inertial.states.extend(Sources::beside_model(belief));
-        Self { inertial, starts_off, noise: [true; 3], integrates: false }
+        Self { inertial, starts_off, noise: [true; NOISES], integrates: false }
     }
 
     /// The same, with what the settings of the true IMU and of the receiver state in the place of what the filter
     /// expects: turn-on biases (a 0 too), scale factors, misalignment, correlated errors of positions. The strapdown errs.
     pub(super) fn as_stated(belief: &Belief, errors: &TrueErrors, starts_off: bool) -> Self {
-        let TrueErrors { model, imu, gnss } = errors;
+        let TrueErrors { model, imu, gnss, aiding } = errors;
         let mut all = Self { integrates: true, ..Self::as_expected(belief, model, starts_off) };
         let mut stated: Vec<NamedSource> = correlated(gnss, imu.rate_hz).into_iter().collect();
         // the processes of the model come first and stay; an expectation has its place in the list after them
         let own = Sources::of_model(model).states.len();
         let mut expected = all.inertial.states.split_off(own);
+        let parts: Vec<Outer> = aiding.errors().into_iter().map(|error| Outer::Vehicle(error.part)).collect();
+        expected.retain(|source| source.outer.is_none_or(|outer| !parts.contains(&outer)));
+        stated.extend(lasting(aiding, imu.rate_hz));
         for sensor in Sensor::ALL {
             let first = 3 * sensor as usize;
             let (bias, (_, ppm)) = (imu.turn_on_bias(sensor), imu.deviations(sensor));
             expected.retain(|source| {
-                let is_of = |signal: usize| (signal..signal + 3).contains(&source.signal);
+                let is_of =
+                    |signal: usize| source.outer.is_none() && (signal..signal + 3).contains(&source.signal);
                 !(bias.is_some() && is_of(first) || ppm > 0.0 && is_of(SCALED + first))
             });
             stated.extend(defects(imu, sensor));
@@ -149,22 +161,26 @@ impl TruthSide {
             Measured::Position(_) => self.noise[0],
             Measured::Velocity => self.noise[1],
             Measured::Height => self.noise[2],
+            Measured::Aid(aid, _) => self.noise[3 + aid as usize],
         }
     }
 }
 
-/// Start, receiver and barometer.
+/// Start, receiver, barometer and what the vehicle measures of itself.
 fn beside_the_imu(experiment: &Experiment<'_>, starts_off: bool) -> Vec<NamedSource> {
     // One kind of white noise at a time: a budget asks for the share of each.
     let noise = |at: usize| TruthSide { noise: std::array::from_fn(|i| i == at), ..TruthSide::default() };
     let start = TruthSide { starts_off: true, ..TruthSide::default() };
     let all = [
-        ("initial", start, starts_off),
-        ("gnss.position", noise(0), true),
-        ("gnss.velocity", noise(1), experiment.gnss.vel_sigma_m_s.is_some()),
-        ("baro", noise(2), experiment.baro.is_some()),
+        ("initial".to_owned(), start, starts_off),
+        ("gnss.position".to_owned(), noise(0), true),
+        ("gnss.velocity".to_owned(), noise(1), experiment.gnss.vel_sigma_m_s.is_some()),
+        ("baro".to_owned(), noise(2), experiment.baro.is_some()),
     ];
+    let aids = experiment.aiding.rates();
+    let aids = aids.map(|(aid, _)| (format!("aiding.{}", aid.name()), noise(3 + aid as usize), true));
     all.into_iter()
+        .chain(aids)
         .filter(|(_, _, is_there)| *is_there)
         .map(|(name, side, _)| NamedSource::new(name, side))
         .collect()
@@ -224,6 +240,20 @@ fn correlated(gnss: &GnssSettings, imu_hz: f64) -> Option<NamedSource> {
     let state = |(component, sigma): (usize, f64)| Source::of_position(component, phi, sigma);
     let sigmas = gnss.correlated_pos_sigma_m.into_iter().enumerate().filter(|(_, sigma)| *sigma > 0.0);
     inertial("gnss.correlated".to_owned(), sigmas.map(state).collect())
+}
+
+/// What is wrong with the vehicle's own measurements beside white noise: parts of one name are one source.
+fn lasting(aiding: &AidingSettings, imu_hz: f64) -> Vec<NamedSource> {
+    let mut found: Vec<(String, Vec<Source>)> = Vec::new();
+    for AidError { aid, part, law } in aiding.errors() {
+        let name = format!("aiding.{}.{}", aid.name(), part.name());
+        let source = Source::of_vehicle(part, law, imu_hz);
+        match found.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, states)) => states.push(source),
+            None => found.push((name, vec![source])),
+        }
+    }
+    found.into_iter().filter_map(|(name, states)| inertial(name, states)).collect()
 }
 
 /// What a filter believes of a sensor.
