@@ -284,6 +284,7 @@ impl Scenario {
         if (0..3).any(|i| sigma_m[i] > 0.5 * pos_sigma_m[i] / fixes.sqrt()) {
             found.push(Unexpected::CorrelatedPositions { sigma_m, correlation_time_s });
         }
+        found.extend(self.aiding.unexpected().map(|(source, key)| Unexpected::Aiding { source, key }));
         found
     }
 
@@ -348,6 +349,13 @@ pub enum Unexpected {
         /// How long they last (s).
         correlation_time_s: f64,
     },
+    /// An error of what the vehicle measures of itself.
+    Aiding {
+        /// Its name in a budget.
+        source: &'static str,
+        /// The key that makes a filter expect it.
+        key: &'static str,
+    },
     /// A strapdown that is too slow for the motion.
     Integration {
         /// Rate of the IMU (Hz).
@@ -366,6 +374,7 @@ impl Unexpected {
             Self::Scale { sensor, .. } => vec![format!("{}.scale", sensor.name())],
             Self::Misalignment { .. } => Sensor::ALL.map(|s| format!("{}.misalignment", s.name())).into(),
             Self::CorrelatedPositions { .. } => vec!["gnss.correlated".to_owned()],
+            Self::Aiding { source, .. } => vec![(*source).to_owned()],
             Self::Integration { .. } => vec![STRAPDOWN.to_owned()],
         }
     }

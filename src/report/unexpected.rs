@@ -32,6 +32,13 @@ pub(crate) fn unexpected_in_words(unexpected: &Unexpected) -> (String, String) {
             ),
             "a larger gnss.pos_sigma_m".to_owned(),
         ),
+        Unexpected::Aiding { source, key } => (
+            format!("the truth has {source}, the filter expects none"),
+            match key.ends_with("sigma_m_s") || *key == "aiding.heading.sigma_deg" {
+                true => format!("a larger {key} (nav-sim tune finds it)"),
+                false => format!("{key} gives it states"),
+            },
+        ),
         Unexpected::Integration { rate_hz, over_sigma } => (
             format!(
                 "at {rate_hz} Hz the strapdown alone errs by {} sigma on this motion",

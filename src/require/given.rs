@@ -77,11 +77,39 @@ pub(crate) struct GivenImu {
     pub(super) longest: Longest,
     /// The quantity of each limit, at its worst place, after outages of growing length.
     pub(super) curves: Vec<DriftCurve>,
+    /// With and without what the vehicle knows of its own motion; empty where that is not asked.
+    pub(super) aidings: Vec<Aided>,
     /// Where the answer is beyond linear theory.
     pub beyond_linear: Option<BeyondLinear>,
 }
 
+/// Limits where the vehicle measures something of its own motion.
+#[derive(Debug, Clone)]
+pub(super) struct Aided {
+    pub(super) name: &'static str,
+    /// The hardest limit; none where no place has an outage of that length.
+    pub(super) worst: Option<Worst>,
+    pub(super) longest: Longest,
+}
+
 impl GivenImu {
+    /// A row for each aiding.
+    fn aiding_table(&self) -> Table {
+        let mut table =
+            Table::new(["aiding", "error after the outage", "limit", "longest outage within the limits"]);
+        for (i, Aided { name, worst, longest }) in self.aidings.iter().enumerate() {
+            let error = match worst {
+                Some(worst) => Cell::number(worst.value, &format!("/aidings/{i}/value")),
+                None => Cell::figures("–"),
+            };
+            let limit = worst.as_ref().map_or(String::new(), |worst| {
+                format!("{} ≤ {}", worst.limit.quantity.name(), readable(worst.limit.most))
+            });
+            table.row([(*name).into(), error, Cell::figures(limit), Cell::figures(longest.in_short())]);
+        }
+        table
+    }
+
     fn verdict(&self) -> Vec<String> {
         let (question, longest) = (&self.question, self.longest.in_words());
         let Some(margins) = &self.margins else {
@@ -153,6 +181,10 @@ impl Answer for GivenImu {
         };
         let mut document = Document::new("An IMU against its limits", Tone::from(is_good), self.verdict());
         BeyondLinear::note(self.beyond_linear.as_ref(), &mut document);
+        if !self.aidings.is_empty() {
+            document.section("What the car knows of its own motion");
+            document.lead(self.aiding_table());
+        }
         if let Some(margins) = &self.margins {
             document.section("Parts of the error");
             document.lead(Self::parts(margins));
@@ -179,6 +211,17 @@ impl Serialize for GivenImu {
             "curves": self.question.limits.iter().zip(&self.curves).map(curve).collect::<Value>(),
             "beyond_linear": self.beyond_linear,
         });
+        if !self.aidings.is_empty() {
+            let aided = |Aided { name, worst, longest }: &Aided| {
+                json!({
+                    "aiding": name,
+                    "quantity": worst.map(|w| w.limit.quantity.name()),
+                    "value": worst.map(|w| w.value),
+                    "outage": longest.json(),
+                })
+            };
+            file["aidings"] = self.aidings.iter().map(aided).collect();
+        }
         if let Some(margins) = &self.margins {
             let part =
                 |p: &PartMargin| json!({ "part": p.part.name(), "share": p.share, "factor": p.factor });

@@ -1,6 +1,6 @@
 //! Which IMU a limit on the errors after an outage needs, what a given one makes of it, and a ranking.
 
-use super::given::{GivenImu, Longest};
+use super::given::{Aided, GivenImu, Longest};
 use super::needed::NeededImu;
 use super::question::{BeyondLinear, CURVE_S, LONGEST_S, Question};
 use super::ranking::{RankedUnit, Ranking};
@@ -13,6 +13,7 @@ use nav_sim_navigation::require::{
     Worst, evenly,
 };
 use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::aiding::AidingSettings;
 use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::ExperimentError;
@@ -184,8 +185,31 @@ impl Requirements {
             question: self.question(outages),
             longest,
             curves: curve_of_limit,
+            aidings: Vec::new(),
             beyond_linear,
         })
+    }
+
+    /// The same limits without aiding, with what every car has, and with its wheel.
+    ///
+    /// # Errors
+    /// When the model has no filter.
+    pub(super) fn aidings(&self, scenario: &Scenario, model: &Model) -> Result<Vec<Aided>, RequireError> {
+        let all = [
+            ("none", AidingSettings::default()),
+            ("nhc", AidingSettings::car()),
+            ("nhc, odometer", AidingSettings::car_with_odometer()),
+        ];
+        let aided = |(name, aiding): (&'static str, AidingSettings)| {
+            let scenario = Scenario { aiding, ..scenario.clone() };
+            let long = self.long_outages();
+            let course = Course::new(&scenario, &self.trajectory, &long)?;
+            let curves = course.curves(&scenario, model)?;
+            let longest = self.longest_of(&course, (&scenario, model), &curves)?;
+            let length_s = if self.ask == Ask::Longest { longest.length_s() } else { self.ask.length_s() };
+            Ok(Aided { name, worst: Worst::of(&self.limits, &after(&curves, length_s)), longest })
+        };
+        all.into_par_iter().map(aided).collect()
     }
 
     /// Whether `run` would say that the errors in an outage are beyond linear theory: by the covariance analysis that it

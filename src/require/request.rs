@@ -18,6 +18,7 @@ use crate::run::Note;
 use crate::run::read::{self, Notes};
 use nav_sim_document::Document;
 use nav_sim_navigation::require::{Limit, Quantity, RequireError, Worst};
+use nav_sim_navigation::sensors::aiding::AidingSettings;
 use nav_sim_navigation::sensors::outage::NotAnOutage;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -49,9 +50,12 @@ pub struct RequireRequest {
     /// Scenario file whose section gnss is used
     #[arg(long, value_name = "FILE")]
     pub gnss: Option<PathBuf>,
-    /// Scenario file: receiver, start, IMU rate (see `nav-sim schema scenario`)
+    /// Scenario file: receiver, start, IMU rate, aiding (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     pub scenario: Option<PathBuf>,
+    /// What the vehicle knows of its own motion: a car moves neither sideways nor up; with MODEL, a table with and without
+    #[arg(long, value_name = "KIND", value_parser = parse::one_of::<Vehicle>(&Vehicle::NAMES))]
+    pub vehicle: Option<Vehicle>,
     /// Also print a curve of equal drift: eight gyroscope biases, and the velocity random walk that each allows
     #[arg(long, conflicts_with = "model")]
     pub iso_drift: bool,
@@ -72,11 +76,21 @@ impl Default for RequireRequest {
             old: OldLimits::default(),
             gnss: None,
             scenario: None,
+            vehicle: None,
             iso_drift: false,
             catalogue: None,
         }
     }
 }
+
+/// A vehicle that knows something of its own motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Vehicle {
+    /// A road vehicle.
+    Car,
+}
+
+nav_sim_signal::named!(Vehicle { Car = "car" }, in files);
 
 /// Limits of the release before, by a name each.
 #[derive(clap::Args, Debug, Clone, Default, PartialEq)]
@@ -226,7 +240,7 @@ impl RequireRequest {
         self.possible()?;
         let asked = self.requirements(notes)?;
         match (&self.model, &self.catalogue) {
-            (Some(path), _) => Ok((given(path, &asked, notes)?, None)),
+            (Some(path), _) => Ok((given(path, &asked, self.vehicle, notes)?, None)),
             (None, Some(Catalogue::BuiltIn)) => Ok((ranked(&catalogue(&asked)?, &asked)?, None)),
             (None, Some(Catalogue::Directory(directory))) => {
                 Ok((ranked(&units_of(directory, &asked, notes)?, &asked)?, None))
@@ -283,6 +297,9 @@ impl RequireRequest {
         if let Some(path) = &self.gnss {
             scenario.gnss = scenario_file::read(path)?.gnss;
         }
+        if self.vehicle == Some(Vehicle::Car) {
+            scenario.aiding = AidingSettings::car();
+        }
         scenario.validate().map_err(Failure::input)?;
         let trajectory = read::trajectory(&self.trajectory, notes)?;
         Requirements::new(scenario, trajectory, limits, self.outage, self.start).map_err(|e: Misplaced| {
@@ -304,7 +321,12 @@ fn sought(iso_drift: bool, requirements: &Requirements) -> Result<NeededImu, Fai
 }
 
 /// What a given IMU makes of the limits.
-fn given(path: &Path, requirements: &Requirements, notes: Notes<'_>) -> Result<Found, Failure> {
+fn given(
+    path: &Path,
+    requirements: &Requirements,
+    vehicle: Option<Vehicle>,
+    notes: Notes<'_>,
+) -> Result<Found, Failure> {
     let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
     let file = read::model(path, notes)?;
     let mut scenario = requirements.scenario.clone();
@@ -316,7 +338,11 @@ fn given(path: &Path, requirements: &Requirements, notes: Notes<'_>) -> Result<F
         notes.remark(&Note::Warning(text));
     }
     let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, notes)?;
-    Ok(Found::Given(Box::new(requirements.judged(&scenario, &model).map_err(unusable)?)))
+    let mut judged = requirements.judged(&scenario, &model).map_err(unusable)?;
+    if vehicle.is_some() {
+        judged.aidings = requirements.aidings(&scenario, &model).map_err(unusable)?;
+    }
+    Ok(Found::Given(Box::new(judged)))
 }
 
 /// The units, the best first.

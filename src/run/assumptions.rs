@@ -28,6 +28,10 @@ pub(super) fn assumptions(summary: &Summary, manifest: &Manifest) -> Vec<(&'stat
     if let Some(baro) = &scenario.baro {
         facts.push(("barometer", format!("{} Hz; 1 σ {} m", baro.rate_hz, readable(baro.sigma_m))));
     }
+    let aids: Vec<String> = scenario.aiding.in_words();
+    if !aids.is_empty() {
+        facts.push(("aiding (1 σ)", aids.join("; ")));
+    }
     if summary.runs > 0 {
         let worth = readable(summary.independent_runs);
         facts.push((

@@ -9,7 +9,8 @@ use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
-    Aim, DrawFactors, Factor, FilterConsistency, Per, Task, Track, TrueErrors, UpperEnd, scaled,
+    Aim, DrawFactors, Factor, FilterConsistency, Per, Task, Track, TrueErrors, UpperEnd, aiding_factor,
+    scaled,
 };
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Model;
@@ -64,6 +65,16 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
         reduced => scenario.filter.states = *reduced,
     }
     let filter_of_run = inputs.scenario.filter.states;
+    // What is wrong with the vehicle's own measurements no noise of the IMU stands for: their sigmas come first.
+    let aiding = &inputs.scenario.aiding;
+    let belief = scenario.with_full_noise().belief(model, outages, analysed)?;
+    let known = TrueErrors { aiding: aiding.clone(), ..TrueErrors::from((*model).clone()) };
+    let aiding_sigmas =
+        (!aiding.is_none()).then(|| aiding_factor(analysed, &belief, &known).unwrap_or(f64::NAN));
+    let widened =
+        aiding_sigmas.filter(|factor| *factor > 1.0).map(|factor| analysed.with_aiding_sigmas(factor));
+    let believed = analysed;
+    let analysed = widened.as_ref().unwrap_or(analysed);
     let full = scenario.with_full_noise();
     let full = |model: &Model| full.belief(model, outages, analysed);
     let tuned = |model: &Model| scenario.belief(model, outages, analysed);
@@ -85,7 +96,8 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
     Ok(TuneResult {
         filter: *states,
         filter_of_run,
-        before: task.consistency(task.filter, &ones)?,
+        before: Task { track: believed, ..task }.consistency(task.filter, &ones)?,
+        aiding_sigmas,
         after,
         of_run: (*states != filter_of_run).then(|| task.consistency(&of_run, &factors)).transpose()?,
         informed: task

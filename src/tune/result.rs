@@ -23,6 +23,8 @@ pub(crate) struct TuneResult {
     pub filter_of_run: FilterStates,
     /// The factors.
     pub factors: Vec<Factor>,
+    /// The factor on the sigmas of the vehicle's own measurements, where there are any; NaN where none helps.
+    pub aiding_sigmas: Option<f64>,
     /// The filter as it was.
     pub before: FilterConsistency,
     /// The tuned one.
@@ -61,7 +63,7 @@ impl TuneResult {
             return vec![unmet, format!("at best, {}", described(&name, &self.after))];
         }
         let mut lines = match changed.as_slice() {
-            [] => vec![format!("no factor is needed: {}", described(&name, &self.before))],
+            [] => vec![format!("no factor is needed: {}", described(&name, &self.after))],
             changed => {
                 let cost = self.cost(&self.after);
                 let cost = match cost.is_finite() {
@@ -77,11 +79,21 @@ impl TuneResult {
                 ]
             }
         };
+        self.of_aiding().into_iter().for_each(|line| lines.insert(0, line));
         if let Some(of_run) = &self.of_run {
             let name = format!("{}, the default of run,", filter_name(self.filter_of_run));
             lines.push(format!("tuned, {}", described(&name, of_run)));
         }
         lines
+    }
+
+    /// What covers the errors of the vehicle's own measurements.
+    fn of_aiding(&self) -> Option<String> {
+        let factor = self.aiding_sigmas.filter(|factor| *factor != 1.0)?;
+        Some(match factor.is_nan() {
+            true => "no sigma of the aiding covers its errors: give the filter states of them".to_owned(),
+            false => format!("every sigma of [aiding] × {}, and then of the model:", readable(factor)),
+        })
     }
 
     /// Whether no factor was needed.
@@ -166,6 +178,7 @@ impl Serialize for TuneResult {
             schema_version: 1,
             verdict: self.verdict().join("; "),
             factors: self.factors.iter().map(FactorEntry::of).collect(),
+            aiding_sigma_factor: self.aiding_sigmas,
             truths: &self.truths,
             horizontal_rmse_cost: self.cost(&self.after),
             filters: self.filters().map(filter).collect(),
@@ -208,6 +221,9 @@ struct TuneFile<'a> {
     schema_version: u32,
     verdict: String,
     factors: Vec<FactorEntry>,
+    /// On the sigmas of the vehicle's own measurements.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    aiding_sigma_factor: Option<f64>,
     truths: &'a [String],
     horizontal_rmse_cost: f64,
     filters: Vec<FilterEntry>,

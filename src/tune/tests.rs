@@ -18,6 +18,7 @@ fn consistency(ratio: f64, nees: f64) -> FilterConsistency {
 
 fn result(filter: FilterStates, of_run: FilterConsistency) -> TuneResult {
     TuneResult {
+        aiding_sigmas: None,
         filter,
         filter_of_run: FilterStates::Reduced15,
         factors: vec![Factor { sensor: Sensor::Gyro, process: None, on_variance: 4.0 }],

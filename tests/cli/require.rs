@@ -235,3 +235,35 @@ fn requests_that_mean_nothing_are_refused() {
         ["cannot be used with", "--out"],
     );
 }
+
+/// What a car knows of its own motion bridges more; without it the answer is that of the IMU alone.
+#[test]
+fn a_car_has_a_table_of_what_its_aiding_is_worth() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("turns.toml"), TURNS).unwrap();
+    let asked = |more: &[&str]| {
+        let model = format!("{ROOT}/calib_data/tactical.toml");
+        let all = [
+            "require",
+            "turns.toml",
+            &model,
+            "--outage",
+            "60",
+            "--require",
+            "rmse_m<=20",
+            "--format",
+            "json",
+        ];
+        let mut command = Command::cargo_bin("nav-sim").unwrap();
+        let ran = command.current_dir(dir.path()).args(all).args(more).assert().success();
+        serde_json::from_str::<Value>(&stdout(&ran)).unwrap()
+    };
+    let (free, car) = (asked(&[]), asked(&["--vehicle", "car"]));
+    assert!(free["aidings"].is_null());
+    let value = |i: usize| car["aidings"][i]["value"].as_f64().unwrap();
+    let names: Vec<&str> = (0..3).map(|i| car["aidings"][i]["aiding"].as_str().unwrap()).collect();
+    assert_eq!(names, ["none", "nhc", "nhc, odometer"]);
+    assert!((value(0) / free["value"].as_f64().unwrap() - 1.0).abs() < 1e-9);
+    assert!((value(1) / car["value"].as_f64().unwrap() - 1.0).abs() < 1e-9);
+    assert!(value(0) > value(1) && value(1) > value(2), "{car}");
+}

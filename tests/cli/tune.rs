@@ -4,6 +4,7 @@ use assert_cmd::Command;
 use serde_json::Value;
 use std::path::Path;
 
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 const MODEL: &str = r#"rate_hz = 100.0
 [accel]
 processes = [{ type = "WN", sigma2 = 1e-4 }, { type = "RW", gamma2 = 1e-10, gamma2_ci95 = [8e-11, 2e-10] }]
@@ -227,4 +228,34 @@ fn intervals_with_a_spread_cover_what_recordings_differ_by() {
     assert!(factors("plain", &plain).iter().all(|f| (f - 1.0).abs() < 5e-3));
     let covered = factors("spread", &spread);
     assert!(covered.iter().any(|f| *f > 1.2) && covered.iter().all(|f| *f < 1.8 * 1.14), "{covered:?}");
+}
+
+/// Where the filter leaves out how the IMU is mounted, no noise of the IMU stands for it: the sigma of the constraint does,
+/// and with the sigma that is found `run` calls the filter what it is.
+#[test]
+fn the_sigma_that_covers_the_errors_of_aiding_is_found() {
+    let dir = tempfile::tempdir().unwrap();
+    let scenario = |sigma: f64| {
+        let text = format!("[aiding.nhc]\nsigma_m_s = {sigma}\ntruth = {{ mounting_sigma_deg = 0.5 }}\n");
+        std::fs::write(dir.path().join("car.toml"), text).unwrap();
+    };
+    scenario(0.1);
+    let model = format!("{ROOT}/calib_data/tactical.toml");
+    let drive = format!("{ROOT}/examples/quick_drive.toml");
+    let common = ["--scenario", "car.toml", "--outage", "25:55", "--format", "json"];
+    let asked = [&[&model, "--truth", &model, "--trajectory", &drive][..], &common].concat();
+    let found: Value =
+        serde_json::from_slice(&tune(dir.path(), &asked).success().get_output().stdout).unwrap();
+    let factor = found["aiding_sigma_factor"].as_f64().unwrap();
+    assert!(factor > 1.5, "{found}");
+    let kind = |sigma: f64| {
+        scenario(sigma);
+        let mut command = Command::cargo_bin("nav-sim").unwrap();
+        let run = ["run", &drive, &model, "--method", "lincov", "--filter", "full", "-o", "out", "--force"];
+        let ran = command.current_dir(dir.path()).args(run).args(common).assert().success();
+        let summary: Value = serde_json::from_slice(&ran.get_output().stdout).unwrap();
+        summary["verdict"]["kind"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(kind(0.1), "overconfident");
+    assert_ne!(kind(0.1 * factor), "overconfident");
 }

@@ -9,6 +9,7 @@ use crate::formats::trajectory_file::{Rows, write_rows};
 use crate::report::{gnss_csv, imu_csv, initial_toml};
 use crate::run::read::make_turn_on;
 use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::aiding::AidingSettings;
 use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::simulation::{Plan, record};
 use nav_sim_signal::noise::continuous;
@@ -52,8 +53,8 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         .map_err(|e| Failure::input(format!("{shown}: {e}")))?;
     make_turn_on(&mut scenario.imu, &file, &args.model, &Words::new(session));
     let seed = session.seed(scenario.run.seed);
-    // a recording is what IMU and receiver give: no barometer, no filter
-    let scenario = Scenario { baro: None, ..scenario };
+    // a recording is what IMU and receiver give: neither barometer nor wheel, no filter
+    let scenario = Scenario { baro: None, aiding: AidingSettings::default(), ..scenario };
     let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &[], &[], seed);
     let plan = Plan::new(&experiment).map_err(Failure::input)?;
     let recording = record(&plan, 0);

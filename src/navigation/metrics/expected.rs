@@ -59,8 +59,10 @@ impl Expected {
             ends.map(|(window, end)| outage((window.start_s, window.end_s), end, &epochs)).collect();
         for outage in &mut outages {
             let window = (outage.start_s, outage.end_s);
-            // A barometer that measures in the outage corrects what grows upwards.
-            let sees_height = experiment.baro.is_some_and(|b| (window.1 - window.0) * b.rate_hz >= 1.0);
+            // A barometer or a vehicle that measures in the outage corrects what grows upwards.
+            let lasts = |rate_hz: f64| (window.1 - window.0) * rate_hz >= 1.0;
+            let sees_height = experiment.baro.is_some_and(|b| lasts(b.rate_hz))
+                || experiment.aiding.nhc.as_ref().is_some_and(|nhc| lasts(nhc.rate_hz));
             let sigma_m_s = outage.asee_end.0[VELOCITY_DOWN].value;
             outage.beyond_linear = !sees_height && is_beyond_linear(window, &epochs, sigma_m_s);
         }

@@ -90,18 +90,18 @@ fn runs_have_the_errors_that_the_analysis_states() {
     };
     let wheel =
         |scale_sigma, truth| Some(OdometerSettings { scale_sigma, truth, ..OdometerSettings::default() });
-    let mounted = NhcErrors { mounting_deg: 0.5, ..NhcErrors::default() };
+    let mounted = NhcErrors { mounting_sigma_deg: 0.5, ..NhcErrors::default() };
     let moving = NhcErrors {
-        noise_m_s: Some(0.02),
-        slip_s2_m: 0.004,
-        suspension_m_s: 0.08,
-        suspension_s: 3.0,
+        noise_sigma_m_s: Some(0.02),
+        sideslip_s2_m: 0.004,
+        walk_sigma_m_s: 0.08,
+        correlation_time_s: 3.0,
         ..NhcErrors::default()
     };
-    let scaled = OdometerErrors { scale: 0.01, ..OdometerErrors::default() };
-    let slips = OdometerErrors { slip_s2_m: 0.005, noise_m_s: Some(0.01), scale: 0.005 };
-    let creeping = ZuptErrors { creep_m_s: 0.1, ..ZuptErrors::default() };
-    let turned = HeadingErrors { offset_deg: 0.6, correlated_deg: 0.5, ..HeadingErrors::default() };
+    let scaled = OdometerErrors { scale_sigma: 0.01, ..OdometerErrors::default() };
+    let slips = OdometerErrors { slip_s2_m: 0.005, noise_sigma_m_s: Some(0.01), scale_sigma: 0.005 };
+    let creeping = ZuptErrors { walk_sigma_m_s: 0.1, ..ZuptErrors::default() };
+    let turned = HeadingErrors { offset_sigma_deg: 0.6, walk_sigma_deg: 0.5, ..HeadingErrors::default() };
     let none = AidingSettings::default;
     let zupt = |truth| Some(ZuptSettings { truth, ..ZuptSettings::default() });
     let heading = |truth| Some(HeadingSettings { truth, ..HeadingSettings::default() });
@@ -141,7 +141,7 @@ fn the_scale_of_a_wheel_moves_a_position_along_the_track() {
     let odometer = OdometerSettings {
         rate_hz: 10.0,
         sigma_m_s: 0.001,
-        truth: OdometerErrors { scale: 0.01, ..OdometerErrors::default() },
+        truth: OdometerErrors { scale_sigma: 0.01, ..OdometerErrors::default() },
         ..OdometerSettings::default()
     };
     let scenario = scenario(AidingSettings { odometer: Some(odometer), ..AidingSettings::default() });
@@ -188,7 +188,7 @@ fn zero_velocity_at_rest_has_the_steady_state_of_the_scalar_filter() {
 /// A filter that has a state for the error that there is states its errors: a NEES of nine; without, it is overconfident.
 #[test]
 fn a_state_for_the_wheel_keeps_a_filter_honest() {
-    let truth = OdometerErrors { scale: 0.02, ..OdometerErrors::default() };
+    let truth = OdometerErrors { scale_sigma: 0.02, ..OdometerErrors::default() };
     let nees = |scale_sigma| {
         let odometer =
             Some(OdometerSettings { scale_sigma, truth: truth.clone(), ..OdometerSettings::default() });

@@ -22,13 +22,15 @@ pub enum Part {
     Scale,
     /// Receiver and barometer.
     Fixes,
+    /// What the vehicle measures of itself.
+    Aiding,
     /// Position, velocity and attitude at the start.
     Start,
 }
 
 impl Part {
     /// All of them.
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 11] = [
         Self::White(Sensor::Accel),
         Self::Correlated(Sensor::Accel),
         Self::TurnOn(Sensor::Accel),
@@ -38,6 +40,7 @@ impl Part {
         Self::Drift,
         Self::Scale,
         Self::Fixes,
+        Self::Aiding,
         Self::Start,
     ];
 
@@ -51,6 +54,7 @@ impl Part {
             Self::Drift => "drift".to_owned(),
             Self::Scale => "scale factors, misalignment".to_owned(),
             Self::Fixes => "GNSS".to_owned(),
+            Self::Aiding => "aiding".to_owned(),
             Self::Start => "start".to_owned(),
         }
     }
@@ -58,7 +62,7 @@ impl Part {
     /// Whether a better IMU makes it smaller.
     #[must_use]
     pub const fn is_of_imu(self) -> bool {
-        !matches!(self, Self::Fixes | Self::Start)
+        !matches!(self, Self::Fixes | Self::Aiding | Self::Start)
     }
 
     fn of(source: &NamedSource) -> Self {
@@ -71,6 +75,7 @@ impl Part {
             DRIFT => Self::Drift,
             "initial" => Self::Start,
             fixes if fixes.starts_with("gnss.") || fixes == "baro" => Self::Fixes,
+            aiding if aiding.starts_with("aiding.") => Self::Aiding,
             _ => Sensor::ALL.into_iter().find(turn_on).map_or(Self::Scale, Self::TurnOn),
         }
     }
@@ -114,7 +119,7 @@ impl Part {
                     }
                 }
             }
-            Self::Fixes | Self::Start => (),
+            Self::Fixes | Self::Aiding | Self::Start => (),
         }
         (scenario, model)
     }

@@ -5,7 +5,7 @@ use super::input::Sources;
 use super::joint::Joint;
 use super::pass::Instant;
 use super::sides::Sides;
-use super::track::{Mark, Measured, Row, Step, Track};
+use super::track::{Mark, Row, Step, Track};
 use super::truth::TruthSide;
 use crate::ekf::Belief;
 use crate::sensors::outage::Outage;
@@ -43,7 +43,7 @@ pub(crate) fn errors_in_outages(
     let sides = Sides::of_errors(&believed, &truth.inertial, track);
     let own = Sides::of_filter(believed, track);
     let mut pass = Pass::new(track, &own, &sides, truth);
-    let is_height = |row: &Row| row.what == Measured::Height;
+    let goes_on = |row: &Row| row.what.kind() != 0;
     let mut found = vec![Vec::new(); ways.len()];
     let mut at = 0;
     for together in order.chunks(TOGETHER) {
@@ -60,7 +60,7 @@ pub(crate) fn errors_in_outages(
         let branch = |(place, mut pass): (usize, Pass<'_>)| {
             let (way, mut instants) = (&ways[place], Vec::new());
             // Without a measurement nobody asks for a gain: of the filter's own covariance nothing is needed then.
-            let is_blind = !track.marks[way.clone()].iter().flat_map(|mark| &mark.rows).any(is_height);
+            let is_blind = !track.marks[way.clone()].iter().flat_map(|mark| &mark.rows).any(goes_on);
             for (index, (steps, mark)) in way.clone().zip(track.legs(way.clone())) {
                 if is_blind {
                     pass.errors.follow(steps, mark);
@@ -71,7 +71,7 @@ pub(crate) fn errors_in_outages(
                 if index + 1 == way.end {
                     instants.push(pass.errors.instant(mark));
                 } else {
-                    pass.measure(mark, is_height);
+                    pass.measure(mark, goes_on);
                     let report = moments == Moments::Reports && mark.report;
                     instants.extend(report.then(|| pass.errors.instant(mark)));
                 }

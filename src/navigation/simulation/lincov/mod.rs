@@ -61,4 +61,4 @@ pub use reduce::{Alike, drive, reduced_belief};
 pub(crate) use root::Crossing;
 pub use track::Track;
 pub use truth::{DRIFT, NamedSource, STRAPDOWN, TrueErrors, TruthSide};
-pub use tune::{Aim, Filter, Per, Task};
+pub use tune::{Aim, Filter, Per, Task, aiding_factor};

@@ -184,6 +184,16 @@ impl Track {
         Ok(Self { steps, marks, outages, start: start(plan), perfect })
     }
 
+    /// The same where a filter believes the vehicle's own measurements to be so much worse; in truth they are as they were.
+    #[must_use]
+    pub fn with_aiding_sigmas(&self, factor: f64) -> Self {
+        let mut track = self.clone();
+        let rows = track.marks.iter_mut().flat_map(|mark| &mut mark.rows);
+        let aids = rows.filter(|row| matches!(row.what, Measured::Aid(..)));
+        aids.for_each(|row| row.r *= factor * factor);
+        track
+    }
+
     /// Whether the strapdown makes no error along it.
     pub(super) fn is_closed(&self) -> bool {
         self.marks.iter().all(|mark| mark.closure == [0.0; NAV])

@@ -296,6 +296,20 @@ impl Task<'_> {
     }
 }
 
+/// The smallest factor on the standard deviations that a filter believes of a vehicle's own measurements with which it states
+/// its errors, at the ends of outages and over the run; 1 where it does already, none where a factor of a thousand does not help.
+#[must_use]
+pub fn aiding_factor(track: &Track, belief: &Belief, truth: &TrueErrors) -> Option<f64> {
+    let largest = |ln: f64| {
+        let track = track.with_aiding_sigmas(ln.exp());
+        let assessment = FilterPass::new(&track, belief).assess_stated(belief, truth);
+        FilterConsistency::of(&[assessment], None).largest.ratio
+    };
+    let covers = |ln: f64| Ok(largest(ln) <= 1.0 + TOLERANCE);
+    let ln = smallest((0.0, 1000.0_f64.ln()), covers).ok()?;
+    (largest(ln) <= 1.0 + TOLERANCE).then(|| ln.exp())
+}
+
 /// The consistency of the tuned filter for logarithms of the factors.
 type At<'a> = dyn Fn(&[f64]) -> Result<FilterConsistency, BeliefError> + 'a;
 
