@@ -67,13 +67,12 @@ pub(crate) fn errors_in_outages(
                 } else {
                     pass.follow(steps, mark);
                 }
-                // The end is looked at before its measurements, a report after them, as in the runs.
-                if index + 1 == way.end {
-                    instants.push(pass.errors.instant(mark));
-                } else {
+                // Before the measurements, as the end of an outage in the runs: each report could be one.
+                let is_end = index + 1 == way.end;
+                let is_looked_at = is_end || moments == Moments::Reports && mark.report;
+                instants.extend(is_looked_at.then(|| pass.errors.instant(mark)));
+                if !is_end {
                     pass.measure(mark, goes_on);
-                    let report = moments == Moments::Reports && mark.report;
-                    instants.extend(report.then(|| pass.errors.instant(mark)));
                 }
             }
             (place, instants)
