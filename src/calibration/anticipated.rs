@@ -312,7 +312,10 @@ mod tests {
     fn few_recordings_widen_intervals_by_students_law() {
         let law = crate::noise::Law::Normal { sd: 0.1 };
         let axis = model().axes[0].clone();
-        let vary = || [("WN", "sigma2"), ("RW", "gamma2")].map(|(p, key)| Variation::new(&axis, 1.0, p, key, law).unwrap());
+        let vary = || {
+            [("WN", "sigma2"), ("RW", "gamma2")]
+                .map(|(p, key)| Variation::new(&axis, 1.0, p, key, law).unwrap())
+        };
         let spread = Spread { axes: std::array::from_fn(|_| vary().to_vec()) };
         let endless = anticipated(Some(&spread), 1 << 16, Scattering::BetweenRecordings);
         let inference = endless.inference.unwrap();

@@ -1,9 +1,9 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
 use super::compare::compare;
+use super::pictures::claim_output;
 use super::{Cli, Command, Failure, Session, read};
 use crate::compare::Comparison;
-use super::pictures::claim_output;
 use crate::formats::atomic::{Existing, Written};
 use crate::formats::{FileError, atomic, model_file};
 use crate::paper::{StudyCurves, paper_figures, paper_page};

@@ -3,8 +3,8 @@
 use super::MergedStudy;
 use super::cell_tables::CellTables;
 use super::description::Metric;
-use super::file::beside;
 use super::failure::StudyError;
+use super::file::beside;
 use super::leave_one_out::Folds;
 use super::plan::NamedUnit;
 use super::planned::Planned;
@@ -88,7 +88,13 @@ pub fn merge(
 /// The directory of the tables for this merge, new or of an earlier one: somebody else's files stay.
 fn claimed(planned: &Planned, results: &Path) -> Result<Claim, StudyError> {
     let files = [
-        "outages.csv", "outages.json", "runs.csv", "epochs.csv", "report.html", "ranking.json", "study.json",
+        "outages.csv",
+        "outages.json",
+        "runs.csv",
+        "epochs.csv",
+        "report.html",
+        "ranking.json",
+        "study.json",
     ];
     let inputs = planned.plan.inputs.iter().map(|input| beside(&planned.study, Path::new(&input.path)));
     let inputs: Vec<PathBuf> = inputs.collect();

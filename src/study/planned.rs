@@ -61,7 +61,7 @@ pub struct Status {
 }
 
 /// The plan in a directory, if there is one.
-pub(super) fn plan_in(directory: &Path) -> Result<Option<Plan>, FileError> {
+pub(crate) fn plan_in(directory: &Path) -> Result<Option<Plan>, FileError> {
     let path = directory.join("plan.json");
     let text = match source::text(&path) {
         Ok(text) => text,
@@ -101,7 +101,7 @@ impl Planned {
         Ok(planned)
     }
 
-    pub(super) fn new(study: &Path, directory: &Path, plan: Plan) -> Result<Self, StudyError> {
+    pub(crate) fn new(study: &Path, directory: &Path, plan: Plan) -> Result<Self, StudyError> {
         let refused = |e| StudyError::unfit(study.display(), e);
         let grid = Grid::new(&plan.study, &plan.scenarios, &plan.gnss).map_err(refused)?;
         let planned = Self { plan, grid, study: study.to_owned(), directory: directory.to_owned() };
