@@ -38,7 +38,7 @@ fn a_time_limit_and_sigterm_end_with_75_and_two_on_one_shard_do_no_harm() {
     done(dir, "plan long.toml -o long");
     // the first limit in which a unit fits, on a machine as busy as may be
     let limited = |limit: &u32| {
-        let ran = nav_sim(dir, &format!("run long.toml -o long --time-limit {limit}"));
+        let ran = batch(dir, &format!("run long.toml -o long --time-limit {limit}"));
         (ran.status.code() == Some(75)).then(|| String::from_utf8(ran.stderr).unwrap())
     };
     let said = [3, 9, 27, 81, 243].iter().find_map(limited).unwrap();
