@@ -1,11 +1,11 @@
 //! The level of the test.
 
 use super::*;
+use crate::calibrate;
 use crate::curve::{Estimator, Pool, grouped, replicates};
 use crate::imu::Channel;
 use crate::noise::{Composite, Model, Process, RandomWalk, VirtualImu, White};
 use crate::outcome::{Bootstrap, ModelChoice, Settings};
-use crate::pipeline::calibrate;
 use rayon::prelude::*;
 
 /// Each of 20 exchangeable statistics in its turn as the observed one: all twentieths, once each.
