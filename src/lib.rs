@@ -102,6 +102,9 @@ mod datasheet;
 mod init;
 // All that most programs need.
 pub mod prelude;
+// Readers of all files, for fuzzing.
+#[doc(hidden)]
+pub mod fuzz;
 // Arguments, words and exit codes.
 #[allow(
     rustdoc::broken_intra_doc_links,

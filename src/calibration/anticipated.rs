@@ -305,6 +305,28 @@ mod tests {
         assert!((deviation / (0.1 / 12.0_f64.sqrt()) - 1.0).abs() < 0.14, "{deviation}");
     }
 
+    /// Where four recordings differ at every scale, their differences are known to 3 degrees of freedom: an interval is t₀.₉₇₅(3) = 3.1824 deviations
+    /// either way, of a deviation of which half of all calibrations show √(2.3660/3) or less. With 0.1/√12 for the mean of 12, as
+    /// above, 0.0816; the ends by 400 draws are known to √(p(1 − p)/400)/f(z) = 0.134 deviations, half their distance to 4.8 %.
+    #[test]
+    fn few_recordings_widen_intervals_by_students_law() {
+        let law = crate::noise::Law::Normal { sd: 0.1 };
+        let axis = model().axes[0].clone();
+        let vary = || {
+            [("WN", "sigma2"), ("RW", "gamma2")]
+                .map(|(p, key)| Variation::new(&axis, 1.0, p, key, law).unwrap())
+        };
+        let spread = Spread { axes: std::array::from_fn(|_| vary().to_vec()) };
+        let endless = anticipated(Some(&spread), 1 << 16, Scattering::BetweenRecordings);
+        let inference = endless.inference.unwrap();
+        let stretch = 3.182_446 / 1.959_964 * (2.365_974_f64 / 3.0).sqrt();
+        assert!((inference.stretch / stretch - 1.0).abs() < 0.02, "{} {stretch}", inference.stretch);
+        let interval = &inference.intervals[0];
+        let half = 0.5 * (interval.high / interval.low).ln();
+        let expected = 1.959_964 * stretch * 0.1 / 12.0_f64.sqrt();
+        assert!((half / expected - 1.0).abs() < 4.0 * 0.048, "{half} {expected}");
+    }
+
     /// Half widths of the logarithm of sigma2: anticipated, and in the median of 120 laboratories of 4 recordings of three axes whose
     /// white noise differs by a log-sd of 0.3. Deviations from 3 degrees of freedom scatter by 0.39/0.92 = 42 %, the median of 120
     /// by 1.25·42 %/√120 = 5 %; the ends by 400 draws by 7 %: twice both are 17 %.

@@ -1,9 +1,10 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
 use super::compare::compare;
+use super::pictures::claim_output;
 use super::{Cli, Command, Failure, Session, read};
 use crate::compare::Comparison;
-use crate::formats::atomic::Existing;
+use crate::formats::atomic::{Existing, Written};
 use crate::formats::{FileError, atomic, model_file};
 use crate::paper::{StudyCurves, paper_figures, paper_page};
 use crate::report::{self, Answer, TrajectorySeries};
@@ -42,6 +43,7 @@ pub(crate) struct Args {
 
 const IMU: &str = "calib_data/consumer_mems.toml";
 const TRAJECTORY: &str = "trajectories/land_vehicle.toml";
+const NO_INPUTS: [&Path; 0] = [];
 const SCENARIOS: [&str; 3] = ["I", "II", "III"];
 const ESTIMATORS: [&str; 3] = ["awv", "sr-awv", "dr-awv"];
 
@@ -60,8 +62,12 @@ impl Progress {
     /// What is there to go on with, or a beginning.
     fn of(args: &Args, session: &Session) -> Result<Self, Failure> {
         let path = Self::path(&args.out);
-        let begun: Option<Self> =
-            std::fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str(&text).ok());
+        let there = std::fs::read_to_string(&path).ok();
+        let begun: Option<Self> = there.as_ref().and_then(|text| serde_json::from_str(text).ok());
+        if there.is_some() && begun.is_none() {
+            let message = format!("{} is not of this command: it is not replaced", path.display());
+            return Err(Failure::input(message).hint("choose another directory with --out, or move it away"));
+        }
         let seed = begun.as_ref().map(|progress| progress.seed);
         let seed = session.asked_seed().or(seed).unwrap_or_else(|| session.seed(None));
         let new = Self {
@@ -101,6 +107,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     refuse_the_impossible(args, session)?;
     let _own = atomic::claim_file(&Progress::path(&args.out), [])?;
+    let own_page = |path: &Path| claim_output(Some(path), NO_INPUTS, Written::Page, session);
+    let _pages = [own_page(&page(&args.out))?, own_page(&figures_of(&args.out).join("index.html"))?];
     let mut progress = Progress::of(args, session)?;
     let commands = commands(args, progress.seed);
     let last = commands.len() - 1;
@@ -170,6 +178,11 @@ fn page(out: &str) -> PathBuf {
     Path::new(out).join("report.html")
 }
 
+/// The directory of the paper's figures.
+fn figures_of(out: &str) -> PathBuf {
+    Path::new(out).join("figures")
+}
+
 /// Writes that page: the comparison, with links to the pages of its models and runs.
 fn index(found: Comparison, out: &str) -> Result<(), Failure> {
     let mut links = vec![("figures/index.html".to_owned(), "the paper's figures".to_owned())];
@@ -199,7 +212,7 @@ fn figures(found: &Comparison, out: &str, session: &Session) -> Result<(), Failu
     let track = TrajectorySeries::of(&trajectory);
     let mut figures = paper_figures(&curves, &track, &found.outages);
     figures.push(found.figure());
-    let directory = Path::new(out).join("figures");
+    let directory = figures_of(out);
     std::fs::create_dir_all(&directory).map_err(|e| FileError::io(&directory, e))?;
     for figure in &figures {
         atomic::write(&directory.join(figure.file_name()), figure.svg())?;

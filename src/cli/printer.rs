@@ -4,7 +4,7 @@ use super::Failure;
 use super::common::{Color, Common};
 use crate::formats::fusion_files::Remark;
 use crate::formats::system_words;
-use nav_sim_document::{Importance, Note};
+use nav_sim_document::{Importance, Note, turns};
 use std::borrow::Cow;
 use std::io::{ErrorKind, IsTerminal, Write};
 
@@ -109,11 +109,6 @@ impl Printer {
     fn painted(&self, word: &str, style: &str) -> String {
         if self.color { format!("{style}{word}\x1b[0m") } else { word.to_owned() }
     }
-}
-
-/// Whether a character turns the direction of what follows, and so shows a name as another (Unicode TR 36, sec. 2.1).
-const fn turns(c: char) -> bool {
-    matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 /// A text whose control characters (of file names, say) do nothing to a terminal; lines and tabulators stay.

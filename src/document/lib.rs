@@ -44,7 +44,7 @@ mod page;
 
 pub use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Scale, Series, Size, Stroke};
 pub use document::{Banner, Block, Document, Importance, Note, Tone};
-pub use escape::escape;
+pub use escape::{escape, turns};
 pub use names::short_names;
 pub use number::{percent, readable, seconds, shortest, six_digits, squared, window};
 pub use picture::{Form, encode, svg};

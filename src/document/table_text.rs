@@ -56,12 +56,15 @@ impl Table {
         rows.join("\n")
     }
 
-    /// CSV with its head.
+    /// CSV with its head. A name that a spreadsheet would compute stands behind an apostrophe (CWE-1236).
     #[must_use]
     pub fn csv(&self) -> String {
-        let cell = |text: &String| match text.contains([',', '"', '\n', '\r']) {
-            true => format!("\"{}\"", text.replace('"', "\"\"")),
-            false => text.clone(),
+        let cell = |text: &String| {
+            let text = if is_formula(text) { format!("'{text}") } else { text.clone() };
+            match text.contains([',', '"', '\n', '\r']) {
+                true => format!("\"{}\"", text.replace('"', "\"\"")),
+                false => text,
+            }
         };
         let line = |line: &Vec<String>| line.iter().map(cell).collect::<Vec<_>>().join(",") + "\n";
         self.lines().iter().map(line).collect()
@@ -80,6 +83,12 @@ impl Table {
             "\\begin{{tabular}}{{{layout}}}\n\\toprule\n{head}\\midrule\n{body}\\bottomrule\n\\end{{tabular}}\n"
         )
     }
+}
+
+/// Whether a text begins as a formula does and is no number.
+fn is_formula(text: &str) -> bool {
+    let number = text.split(' ').next().unwrap_or_default();
+    text.starts_with(['=', '+', '-', '@']) && text != "-" && number.parse::<f64>().is_err()
 }
 
 /// Characters of each column.
@@ -144,6 +153,8 @@ mod tests {
     fn tables_of_other_programs_are_escaped() {
         let table = table(&[&["run", "a, b"], &["x_1 & 5 %", "1 ± 2"]]);
         assert_eq!(table.csv(), "run,\"a, b\"\nx_1 & 5 %,1 ± 2\n");
+        let names = ["=cmd|x", "@SUM(1)", "-2+3", "+a", "-2.5 ± 1", "-"].map(is_formula);
+        assert_eq!(names, [true, true, true, true, false, false]);
         let latex = table.latex();
         assert!(
             latex.starts_with("\\begin{tabular}{lr}\n\\toprule\nrun & a, b \\\\\n\\midrule\n"),

@@ -243,7 +243,8 @@ impl FileError {
 
     /// Whether the system, not the contents or the request, is at fault.
     pub(crate) fn is_system(&self) -> bool {
-        matches!(&self.kind, Kind::System(source) if !is_damage(source.kind()))
+        // what has a number of the system is its own: a file that may not grow, too
+        matches!(&self.kind, Kind::System(source) if source.raw_os_error().is_some() || !is_damage(source.kind()))
     }
 
     /// What helps, in words for users of the library.
@@ -375,9 +376,10 @@ mod tests {
             (21, "a: it is a directory, not a file", Some("name a file")),
             (28, "a: no space is left on the disk", Some("make room")),
             (5, "a: Input/output error", None),
+            (27, "a: File too large", None),
         ] {
             let e = FileError::io(Path::new("a"), io::Error::from_raw_os_error(number));
-            assert_eq!(e.to_string(), told);
+            assert!(e.to_string() == told && e.is_system(), "{e}");
             let is_hinted = |start: &str| e.hint().is_some_and(|given| given.starts_with(start));
             assert!(hint.map_or(e.hint().is_none(), is_hinted), "{number}: {:?}", e.hint());
         }

@@ -17,6 +17,8 @@ pub(crate) mod npy;
 pub(crate) mod parameters_file;
 #[cfg(feature = "parquet")]
 mod parquet_file;
+#[cfg(test)]
+mod properties;
 pub mod recordings;
 pub(crate) mod run_directory;
 mod run_tables;

@@ -4,13 +4,14 @@ use super::MergedStudy;
 use super::cell_tables::CellTables;
 use super::description::Metric;
 use super::failure::StudyError;
+use super::file::beside;
 use super::leave_one_out::Folds;
 use super::plan::NamedUnit;
 use super::planned::Planned;
 use super::remark::Remark;
 use super::tables::Tables;
 use crate::formats::FileError;
-use crate::formats::atomic::AtomicDir;
+use crate::formats::atomic::{AtomicDir, Claim, Existing, Found, claim_directory};
 use crate::observer::Observer;
 use crate::report;
 use nav_sim_document::Document;
@@ -18,7 +19,7 @@ use nav_sim_navigation::simulation::REPORTED_NAMES;
 use rayon::prelude::*;
 use serde_json::json;
 use std::io::ErrorKind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// How to merge.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -60,6 +61,7 @@ pub fn merge(
         return Err(StudyError::Incomplete { units: units.len(), missing });
     }
     let results = planned.directory.join("results");
+    let _own = claimed(planned, &results)?;
     let mut out = AtomicDir::create(&results)?;
     let mut tables = Tables::create(&mut out, planned)?;
     let mut merged = subject(planned, &options.states);
@@ -81,6 +83,27 @@ pub fn merge(
     remove_stale(planned)?;
     out.commit()?;
     Ok(MergeReport { results, document, summary, diverged })
+}
+
+/// The directory of the tables for this merge, new or of an earlier one: somebody else's files stay.
+fn claimed(planned: &Planned, results: &Path) -> Result<Claim, StudyError> {
+    let files = [
+        "outages.csv",
+        "outages.json",
+        "runs.csv",
+        "epochs.csv",
+        "report.html",
+        "ranking.json",
+        "study.json",
+    ];
+    let inputs = planned.plan.inputs.iter().map(|input| beside(&planned.study, Path::new(&input.path)));
+    let inputs: Vec<PathBuf> = inputs.collect();
+    let recognise = |text: &str| {
+        let made: serde_json::Value = serde_json::from_str(text).unwrap_or_default();
+        Ok(if made.get("plan").is_some_and(|plan| plan.is_string()) { Found::Same } else { Found::Foreign })
+    };
+    let inputs = inputs.iter().map(PathBuf::as_path);
+    Ok(claim_directory(results, &files, inputs, Existing::Replace, recognise)?)
 }
 
 /// Takes cell by cell into the tables, in their order, as long as no unit is damaged; how many runs diverged, or all units

@@ -69,6 +69,7 @@ pub use failure::StudyError;
 pub use grid::Grid;
 pub use merging::{MergeOptions, MergeReport, merge};
 pub use plan::{NamedUnit, Plan, Shard, Unit};
+pub(crate) use planned::plan_in;
 pub use planned::{Planned, Status};
 pub use planning::{PlanOptions, PlanReport, Writing, plan};
 pub use remark::{Importance, Remark};

@@ -1,6 +1,7 @@
 //! The directory of a study: `plan.json`, `models/` calibrated by the plan, `units/`, and `results/`.
 
 use super::description::Study;
+use super::error::DescriptionError;
 use super::failure::StudyError;
 use super::file::{self, beside};
 use super::fingerprint::fingerprint;
@@ -8,6 +9,7 @@ use super::grid::Grid;
 use super::plan::{NamedUnit, Plan, Shard, Unit};
 use super::reader::unchanged;
 use super::remark::Remark;
+use super::rules::MAX_UNITS;
 use super::unit_file::{self, UnitFileError};
 use crate::formats::difference::{self, Difference};
 use crate::formats::{FileError, atomic, source};
@@ -59,7 +61,7 @@ pub struct Status {
 }
 
 /// The plan in a directory, if there is one.
-pub(super) fn plan_in(directory: &Path) -> Result<Option<Plan>, FileError> {
+pub(crate) fn plan_in(directory: &Path) -> Result<Option<Plan>, FileError> {
     let path = directory.join("plan.json");
     let text = match source::text(&path) {
         Ok(text) => text,
@@ -99,10 +101,24 @@ impl Planned {
         Ok(planned)
     }
 
-    pub(super) fn new(study: &Path, directory: &Path, plan: Plan) -> Result<Self, StudyError> {
+    pub(crate) fn new(study: &Path, directory: &Path, plan: Plan) -> Result<Self, StudyError> {
         let refused = |e| StudyError::unfit(study.display(), e);
         let grid = Grid::new(&plan.study, &plan.scenarios, &plan.gnss).map_err(refused)?;
-        Ok(Self { plan, grid, study: study.to_owned(), directory: directory.to_owned() })
+        let planned = Self { plan, grid, study: study.to_owned(), directory: directory.to_owned() };
+        planned.check_units()?;
+        Ok(planned)
+    }
+
+    /// Refuses more units than a directory should hold.
+    pub(super) fn check_units(&self) -> Result<(), StudyError> {
+        let Self { plan, grid, .. } = self;
+        let units = plan.unit_count(grid);
+        if units <= MAX_UNITS {
+            return Ok(());
+        }
+        let (key, value) = plan.study.unit_runs.map_or(("runs", plan.runs()), |runs| ("unit_runs", runs));
+        let reason = format!("makes {units} units, more than {MAX_UNITS}");
+        Err(StudyError::unfit(self.study.display(), DescriptionError::refused(key, value, reason)))
     }
 
     /// Refuses another study than the one that was planned, and another seed. A study without a seed takes the plan's.

@@ -83,6 +83,7 @@ pub fn plan(
     let mut planned = Planned::new(study, directory, plan)?;
     validate(&planned, &texts, observer)?;
     probe(&mut planned, &texts, options, observer)?;
+    planned.check_units()?;
     planned.remark_foreign(observer)?;
     if options.writing == Writing::Write {
         for (path, text) in &texts {

@@ -1,9 +1,13 @@
 //! Rules that every axis of a study keeps.
 
 use super::error::DescriptionError;
+use nav_sim_document::turns;
 
 /// Most cells of a study: each is planned, named and checked before the first runs.
 pub(super) const MAX_CELLS: usize = 1_000_000;
+
+/// Most units of a study: each is a file, named and looked for by every worker.
+pub(super) const MAX_UNITS: usize = 1_000_000;
 
 /// Every entry of an axis has a name, and a name of its own.
 ///
@@ -33,7 +37,7 @@ pub(super) fn unique(axis: &str, names: &[(usize, &str)]) -> Result<(), Descript
 
 /// Whether a spreadsheet would compute a name, or a terminal obey it.
 fn is_no_name(name: &str) -> bool {
-    name.starts_with(['=', '+', '-', '@']) || name.contains(char::is_control)
+    name.starts_with(['=', '+', '-', '@']) || name.contains(char::is_control) || name.contains(turns)
 }
 
 /// An entry says one of several things.

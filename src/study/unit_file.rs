@@ -18,7 +18,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 const MAGIC: &[u8] = b"nav-sim unit 5\n";
-const CHECKSUM: usize = 32;
+pub(crate) const CHECKSUM: usize = 32;
 
 /// A unit file that cannot be used.
 #[derive(Debug, thiserror::Error)]

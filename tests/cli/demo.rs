@@ -80,3 +80,19 @@ fn a_demo_that_cannot_work_makes_nothing() {
     refused(&["--samples", "89999"], "at least --samples 90000");
     refused(&["--runs", "0"], "at least --runs 1");
 }
+
+/// What the demo did not write stays, with `--force` too; told before anything is made.
+#[test]
+fn a_demo_replaces_no_file_of_others() {
+    for name in ["demo.json", "report.html", "figures/index.html"] {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        std::fs::create_dir_all(out.join("figures")).unwrap();
+        std::fs::write(out.join(name), "mine").unwrap();
+        let ran = demo(&out, &["--force"]).output().unwrap();
+        let said = String::from_utf8(ran.stderr).unwrap();
+        assert!(ran.status.code() == Some(2) && said.contains("is not of this command"), "{name}: {said}");
+        assert_eq!(std::fs::read_to_string(out.join(name)).unwrap(), "mine");
+        assert!(!out.join("I").exists());
+    }
+}

@@ -255,8 +255,10 @@ fn an_interrupt_leaves_nothing() {
     let place = Place::new();
     let began = || entries(place.0.path()).iter().any(|name| name.ends_with(".partial"));
     for (signal, code) in [("INT", 130), ("TERM", 143), ("HUP", 129)] {
-        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_nav-sim"))
+        // what starts the tests may ignore signals (`nohup`, a script's background), and a child inherits that
+        let mut child = std::process::Command::new("env")
             .current_dir(&place.0)
+            .args(["--default-signal=INT,TERM,HUP", env!("CARGO_BIN_EXE_nav-sim")])
             .args(["synthesize", "model.toml", "--replicates", "1000", "--samples", "100000", "-o", "out"])
             .stderr(std::process::Stdio::null())
             .spawn()

@@ -102,3 +102,20 @@ fn another_mounting_is_no_bias_and_means_removed_are_none() {
     let found = turn_on(&groups, &outcomes.iter().collect::<Vec<_>>());
     assert!(found.len() == 2 && found.iter().all(|f| f.finding == TurnOnFinding::Removed), "{found:?}");
 }
+
+/// The exact law: the deviation of n Gaussian numbers has mean c₄σ and variance (1 − c₄²)σ², c₄ = √(2/(n − 1)) Γ(n/2)/Γ((n − 1)/2). Its
+/// relative deviation √(1/c₄² − 1) is 0.323 for six (1/√10 = 0.316) and 0.115 for 39; what it differs by is of the order 1/(8(n − 1)).
+#[test]
+fn the_error_of_a_spread_is_that_of_its_degrees_of_freedom() {
+    use statrs::function::gamma::gamma;
+    for recordings in [6_usize, 39] {
+        let axis = MeansOfAxis { axis: Axis::X, recordings, spread: 1.0, noise: 0.0, range: 1.0 };
+        let (sensor, estimator) = (Sensor::Gyro, Estimator::Awv);
+        let finding = TurnOnFinding::Seen;
+        let found = TurnOnSpread { sensor, estimator, axes: vec![axis], p_noise: 0.0, p_drift: 0.0, finding };
+        let n = recordings as f64;
+        let c4 = (2.0 / (n - 1.0)).sqrt() * gamma(0.5 * n) / gamma(0.5 * (n - 1.0));
+        let exact = (1.0 / c4.powi(2) - 1.0).sqrt();
+        assert!((found.relative_error() / exact - 1.0).abs() < 0.15 / (n - 1.0), "{recordings}: {exact}");
+    }
+}

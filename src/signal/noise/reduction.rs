@@ -262,6 +262,22 @@ mod tests {
         assert!(reduced.misfit < 0.05, "misfit {}", reduced.misfit);
     }
 
+    /// A random walk beyond the correlation time of an AR1: the pair follows the model to eight times an outage of 300 s (level 18
+    /// is 2621 s at 100 Hz), no worse than it follows it anywhere; a pair that ends with the outage is off there by a factor of 2.4.
+    #[test]
+    fn the_pair_holds_to_eight_times_the_outage() {
+        assert_eq!([0.0, 90.0, 100.0, 300.0].map(window_s), [800.0, 800.0, 800.0, 2400.0]);
+        let model = Composite::new(vec![n2()[0], ar1(0.9999, 1e-11), n2()[3]]);
+        let off_at_the_end = |window_s: f64| {
+            let reduced = reduce(&model, 100.0, 1.0, window_s).unwrap();
+            let pair = Composite::new(vec![Process::White(reduced.white), Process::Ar1(reduced.bias)]);
+            ((pair.haar_wv(18) / model.haar_wv(18)).ln().abs(), reduced.misfit)
+        };
+        let (off, misfit) = off_at_the_end(window_s(300.0));
+        assert!(off <= misfit * (1.0 + 1e-9), "{off} {misfit}");
+        assert!(off_at_the_end(300.0).0 > 2.0_f64.ln());
+    }
+
     /// The interval that is said to be the longest is: a little below it a reduction exists, a little above none.
     #[test]
     fn the_longest_interval_is_where_reductions_end() {

@@ -73,6 +73,21 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
 
+    /// 1000 independent numbers have 1000 degrees of freedom. The tail of a record is a sum of 2 chi-square numbers of one degree,
+    /// 1/M each, at 4 lags: the inverse has a standard deviation of 2√8/M, and its mean over 2000 records one of 0.13/M. Four of these
+    /// are 5e-4; the sampling noise of the lags, 8/M, is 16 times that. (The ratio's own second order is of 8·6/M² = 5e-5.)
+    #[test]
+    fn independent_numbers_count_one_each() {
+        let (count, records) = (1000, 2000);
+        let mut generator = Generator::seed_from_u64(11);
+        let mut inverse = || {
+            let w: Vec<f64> = (0..count).map(|_| generator.sample(StandardNormal)).collect();
+            count as f64 / edof_large_sample(&w, 1)
+        };
+        let mean = (0..records).map(|_| inverse()).sum::<f64>() / f64::from(records);
+        assert!((mean - 1.0).abs() < 5.5e-4, "{mean}");
+    }
+
     /// Coefficients that never forget, cos(2π k/2^level): Σ s_k²/s_0² over the 32 lags of a sixteenth of the
     /// scale, two scales in all, is 16; eta1 = M/(step·(1 + 2·16)) to order 2^(level + 2)/M. Lags to one scale
     /// only would give twice as many degrees of freedom.

@@ -36,7 +36,12 @@ fn a_time_limit_and_sigterm_end_with_75_and_two_on_one_shard_do_no_harm() {
     // A study that lasts, to be stopped.
     fs::write(dir.join("long.toml"), STUDY.replace("runs = 77", "runs = 100000")).unwrap();
     done(dir, "plan long.toml -o long");
-    let said = refused(dir, "run long.toml -o long --time-limit 3", 75);
+    // the first limit in which a unit fits, on a machine as busy as may be
+    let limited = |limit: &u32| {
+        let ran = batch(dir, &format!("run long.toml -o long --time-limit {limit}"));
+        (ran.status.code() == Some(75)).then(|| String::from_utf8(ran.stderr).unwrap())
+    };
+    let said = [3, 9, 27, 81, 243].iter().find_map(limited).unwrap();
     assert!(said.contains("stopped by the time limit; ") && said.contains("goes on"), "{said}");
     units(&dir.join("long")).iter().for_each(|unit| fs::remove_file(unit).unwrap());
     let mut child = spawn(dir, "run long.toml -o long");
@@ -104,10 +109,40 @@ fn a_plan_with_other_lists_is_refused_by_its_file() {
 fn names_are_no_formulas() {
     let place = place();
     let dir = place.path();
-    for name in ["=cmd|x", "-2+3", "@SUM(1)", "a\\u001b[31m"] {
+    for name in ["=cmd|x", "-2+3", "@SUM(1)", "a\\u001b[31m", "a\\u202ecod"] {
         let named = STUDY.replace("name = \"wrong\"", &format!("name = \"{name}\""));
         fs::write(dir.join("named.toml"), named).unwrap();
         let said = refused(dir, "plan named.toml -o named", 2);
         assert!(said.contains("names begin with no = + - @"), "{said}");
     }
+}
+
+/// A unit is a file: so many are refused before one is named.
+#[test]
+fn more_units_than_a_directory_should_hold_are_refused() {
+    let place = place();
+    let many = STUDY.replace("runs = 77", "runs = 10000000").replace("unit_runs = 8", "unit_runs = 1");
+    fs::write(place.path().join("many.toml"), many).unwrap();
+    let said = refused(place.path(), "plan many.toml --dry-run", 2);
+    assert!(said.contains("\"unit_runs\" = 1 makes 50000000 units, more than 1000000"), "{said}");
+}
+
+/// Tables take the place of an earlier merge's, and of nothing else.
+#[test]
+fn a_merge_replaces_no_file_of_others() {
+    let place = place();
+    let dir = place.path();
+    done(dir, "plan study.toml -o out");
+    done(dir, "run study.toml -o out");
+    let page = dir.join("out/results/report.html");
+    fs::create_dir(dir.join("out/results")).unwrap();
+    fs::write(&page, "mine").unwrap();
+    for force in ["", " --force"] {
+        let said = refused(dir, &format!("merge study.toml -o out{force}"), 2);
+        assert!(said.contains("out/results is not of this command: it is not replaced"), "{said}");
+        assert_eq!(fs::read_to_string(&page).unwrap(), "mine");
+    }
+    fs::remove_file(&page).unwrap();
+    done(dir, "merge study.toml -o out");
+    done(dir, "merge study.toml -o out");
 }

@@ -194,3 +194,18 @@ fn a_pair_departs_from_a_model_without_its_random_walk() {
     let white = Pair { walk: 0.0, ..pair };
     assert_eq!(white.departs_s(&Composite::new(vec![wn(0.1 * n)]), RATE, 1e4, 2.0), None);
 }
+
+/// N²/τ = K²τ/3 at τ = √3 N/K: 173.2 s for N = 1e-3 and K = 1e-5.
+#[test]
+fn white_noise_and_random_walk_are_equal_at_the_crossover() {
+    let (n, k) = (1e-3, 1e-5);
+    let pair = Pair { density: n, walk: k, markov: None };
+    let tau_s = pair.crossover_s().unwrap();
+    assert!((tau_s / 173.205_080_756_887_7 - 1.0).abs() < 1e-12, "{tau_s}");
+    let samples = (tau_s * RATE).round() as u32;
+    let [white, walk] = [(n, 0.0), (0.0, k)].map(|(density, walk)| Pair { density, walk, markov: None });
+    let ratio = white.allan_variance(samples, RATE) / walk.allan_variance(samples, RATE);
+    // half a sample of 17 320, and what the sampling adds to a walk: 1/(2m²)
+    assert!((ratio - 1.0).abs() < 1e-4, "{ratio}");
+    assert_eq!(Pair { walk: 0.0, ..pair }.crossover_s(), None);
+}

@@ -1,5 +1,0 @@
-#![no_main]
-
-mod file;
-
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| file::recording(bytes, "a.csv"));
