@@ -46,8 +46,10 @@ pub fn request<T: DeserializeOwned>(text: &str) -> Result<T, Failure> {
 fn option(key: &str) -> String {
     let mut parts = key.split('.').map(|part| part.split('[').next().unwrap_or(part));
     let first = parts.next().unwrap_or_default();
-    let is_shared = ["recordings", "reading", "tuning", "filter"].contains(&first);
-    parts.next_back().filter(|_| is_shared).unwrap_or(first).replace('_', "-")
+    let is_shared = ["recordings", "reading", "tuning", "figures", "filter"].contains(&first);
+    // of the filter's settings its states have the name of the table
+    let own = parts.next_back().filter(|part| is_shared && *part != "states");
+    own.unwrap_or(first).replace('_', "-")
 }
 
 /// Names and contents of files.

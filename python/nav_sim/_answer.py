@@ -30,7 +30,9 @@ class Kept:
 
     def __init__(self, answer: _native.Answer | Kept) -> None:
         self._json, self._summary, self._html = answer.json(), answer.summary(), answer.html()
-        self._verdict, self.unmet, self.warnings = answer.verdict(), answer.unmet, answer.warnings
+        self._verdict: list[str] = answer.verdict()
+        self.unmet: str | None = answer.unmet
+        self.warnings: list[str] = answer.warnings
         self._files = {name: answer.text(name) for name in answer.names()}
 
     def json(self) -> str:

@@ -80,7 +80,7 @@ def require(
     catalogue: StrPath | bool | None = None,
     progress: Progress = None,
 ) -> Choice:
-    """The IMU that keeps the errors at the end of an outage within limits: `nav-sim require`.
+    """The IMU that keeps the errors at the end of an outage of a trajectory within limits: `nav-sim require`.
 
     With a `model` it is judged, without one `.model` is what is needed. `outage` is a length (s), a pair of start and
     end, or "longest", `start` where a length begins (s); `limits` such as "p95_m<=5"; `iso_drift=True` adds a
@@ -170,7 +170,7 @@ def choose(
 ) -> Choice:
     """Which estimator and model navigate best on one's own recordings, three or more: `nav-sim choose`.
 
-    Each recording makes the errors of runs whose filters were calibrated on the others. `.model` is the winner's.
+    Each recording makes the errors of runs along the trajectory whose filters were calibrated on the others. `.model` is the winner's.
     `estimator`, `model`, `filter` and `inflate` ("none", "tuned", "x10", …) list what is tried; `rate_hz`, `trim`, `skip_s`
     and `gaps` are as of `calibrate`, `outages`, `runs`, `scenario`, `seed` and `progress` as of `run`.
     """
@@ -205,7 +205,7 @@ def compare(
 ) -> Answer:
     """Ratios of ASEE and RMSE between run directories, as `Run.write` and the command make them: `nav-sim compare`.
 
-    Each of `runs` is divided by the `reference`; `states` are those of the answer's table.
+    Each of `runs` is divided by the `reference`; `states` are those of the answer's table; `progress` as of `run`.
     """
     directories = runs if isinstance(runs, (list, tuple)) else [runs]
     request: dict[str, Any] = {"runs": [path(run, "runs") for run in directories], "reference": path(reference, "reference")}

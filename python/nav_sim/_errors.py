@@ -62,10 +62,11 @@ _RENAMED = {
     "outage": "outages",
     "state": "states",
 }
+_ORIGIN = "give nav_sim.Trajectory(…, origin=(lat_deg, lon_deg, h_m))"
 #: Phrases that options alone do not make.
 _PHRASES = {
-    "give --origin LAT_DEG,LON_DEG,H_M, or a first line": "nav_sim.Trajectory(…, origin=(lat_deg, lon_deg, h_m)), or in a"
-    " file a first line",
+    "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M": _ORIGIN,
+    "give --origin LAT_DEG,LON_DEG,H_M": _ORIGIN,
     "--gnss-sigma POS[:VEL]": "gnss_sigma=",
     "--topic NAME names one (nav-sim inspect lists them)": "topic= names one (nav-sim inspect lists them)",
     "--unit NAME (nav-sim datasheet --list)": "a unit of nav_sim.catalogue()",

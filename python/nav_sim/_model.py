@@ -96,7 +96,7 @@ class Model:
         `unit` is a name of `nav_sim.catalogue()`, `entry` one's own (TOML, or its tables as a dict). Figures are texts with
         their units and go over these: `vrw` and `arw` (noise densities, "0.15 deg/sqrt(h)"), `accel_bias` and `gyro_bias`
         (instabilities, "0.5 deg/h"), `corr_time` (their correlation time, "100 s"), `accel_turn_on` and `gyro_turn_on`
-        (standard deviations, "2 mg").
+        (standard deviations, "2 mg"). `rate_hz` is that of the model.
         """
         figures = {"vrw": vrw, "arw": arw, "accel_bias": accel_bias, "gyro_bias": gyro_bias, "corr_time": corr_time}
         figures |= {"accel_turn_on": accel_turn_on, "gyro_turn_on": gyro_turn_on}

@@ -175,7 +175,7 @@ def test_local_coordinates_ask_for_an_origin() -> None:
 
 WRONG: list[tuple[dict[str, Any], str]] = [
     ({"filter": 16}, 'filter="16" is not "15"'),
-    ({"require": "p95<5"}, 'require="p95<5" is not "consistent" or NAME'),
+    ({"require": "p95<5"}, 'require=["p95<5"] is not "consistent" or NAME'),
     ({"require": 5.0}, "require=5.0 is neither a text nor a list"),
     ({"turn_on_bias": (1,)}, "turn_on_bias="),
     ({"turn_on_bias": ("a", 1.0)}, 'turn_on_bias="a" is not a number'),
