@@ -7,23 +7,27 @@ from linked import linked
 root, foreign, graph = linked()
 
 
+def name(package):
+    return f"{package['name']}@{package['version']}"
+
+
 def component(package, kind):
-    own = {"type": kind, "bom-ref": package["id"], "name": package["name"], "version": package["version"]}
+    own = {"type": kind, "bom-ref": name(package), "name": package["name"], "version": package["version"]}
     if package["source"]:
-        own["purl"] = f"pkg:cargo/{package['name']}@{package['version']}"
+        own["purl"] = f"pkg:cargo/{name(package)}"
     if package["license"]:
         own["licenses"] = [{"expression": package["license"].replace("/", " OR ")}]
     return own
 
 
-refs = {p["id"] for p in foreign} | {root["id"]}
+refs = {p["id"]: name(p) for p in [root, *foreign]}
 
 
 def reached(node):
     """Foreign crates that a crate is linked from, through the workspace's own."""
     found = set()
     for below in graph[node]:
-        found |= {below} if below in refs else reached(below)
+        found |= {refs[below]} if below in refs else reached(below)
     return found
 
 
@@ -35,7 +39,7 @@ print(
             "version": 1,
             "metadata": {"component": component(root, "application")},
             "components": [component(p, "library") for p in foreign],
-            "dependencies": [{"ref": ref, "dependsOn": sorted(reached(ref))} for ref in sorted(refs)],
+            "dependencies": [{"ref": refs[i], "dependsOn": sorted(reached(i))} for i in sorted(refs, key=refs.get)],
         },
         indent=1,
         ensure_ascii=False,
