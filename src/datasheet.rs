@@ -155,9 +155,9 @@ fn left_out(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
     let offset = sheet.given(sensor, Figure::Offset).map(|offset| {
         format!("{name}: the zero offset of ±{offset} is removed before use and not in the model")
     });
-    let scale = sheet.value(sensor, Figure::Scale).map(|ppm| {
-        format!("{name}: the scale factor of {ppm} ppm is not in the model: run --scale-ppm")
-    });
+    let scale = sheet
+        .value(sensor, Figure::Scale)
+        .map(|ppm| format!("{name}: the scale factor of {ppm} ppm is not in the model: run --scale-ppm"));
     offset.into_iter().chain(scale).collect()
 }
 

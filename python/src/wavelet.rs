@@ -74,9 +74,9 @@ fn variances(
         (wv, vec![1.0; levels as usize])
     };
     // As the command has them: of the samples that are there, and no fewer than one.
-    let classical = (1..).zip(&coverage).map(|(level, covered)| {
-        (interval::edof_eta3(signal.len(), level) * covered).max(1.0)
-    });
+    let classical = (1..)
+        .zip(&coverage)
+        .map(|(level, covered)| (interval::edof_eta3(signal.len(), level) * covered).max(1.0));
     let edof: Vec<f64> = match efficiency {
         None => classical.collect(),
         Some(efficiency) => classical.map(|edof| interval::edof_robust(edof, efficiency)).collect(),

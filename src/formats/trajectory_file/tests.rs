@@ -38,7 +38,10 @@ fn attitude_without_a_unit_is_degrees_where_radians_cannot_be() {
     assert!(read(&bare).is_ok());
     let radians = bare.replace(",0.5,-1,45", ",0.01,-0.02,0.785");
     let (message, hint) = refused(&radians);
-    assert_eq!(message, "a.csv, line 1: the unit of roll, pitch, yaw is not in the name, and no value exceeds 2π");
+    assert_eq!(
+        message,
+        "a.csv, line 1: the unit of roll, pitch, yaw is not in the name, and no value exceeds 2π"
+    );
     assert_eq!(hint, "end the names in _deg or _rad");
     assert!(read(&bare.replace(",0.5,-1,45", ",0,0,0")).is_ok());
 }
