@@ -61,10 +61,10 @@ in_empty_root() {
     local enter=(unshare --map-root-user chroot)
     [ "$(id -u)" = 0 ] && enter=(chroot)
     mkdir "$root/empty"
-    cp "$1" trajectories/figure_eight.toml calib_data/tactical.toml "$root/empty"
+    cp --recursive "$1" trajectories calib_data "$root/empty"
     "${enter[@]}" "$root/empty" /nav-sim --version -v
-    "${enter[@]}" "$root/empty" /nav-sim demo -o demo --quiet
-    "${enter[@]}" "$root/empty" /nav-sim run figure_eight.toml tactical.toml --outage 60:90 --runs 8 --seed 1 -o out --quiet
+    "${enter[@]}" "$root/empty" /nav-sim demo --samples 100000 --runs 8 --seed 1 -o demo --quiet
+    "${enter[@]}" "$root/empty" /nav-sim run trajectories/figure_eight.toml calib_data/tactical.toml --method lincov -o out --quiet
     [ -s "$root/empty/out/report.html" ]
 }
 
