@@ -63,7 +63,7 @@ in_empty_root() {
     mkdir "$root/empty"
     cp --recursive "$1" trajectories calib_data "$root/empty"
     "${enter[@]}" "$root/empty" /nav-sim --version -v
-    "${enter[@]}" "$root/empty" /nav-sim demo --samples 100000 --runs 8 --seed 1 -o demo --quiet
+    "${enter[@]}" "$root/empty" /nav-sim demo --samples 90000 --runs 1 --seed 1 -o demo --quiet
     "${enter[@]}" "$root/empty" /nav-sim run trajectories/figure_eight.toml calib_data/tactical.toml --method lincov -o out --quiet
     [ -s "$root/empty/out/report.html" ]
 }
