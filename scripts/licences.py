@@ -1,25 +1,10 @@
 """Licences of the crates that a binary is made of, from `cargo metadata` on stdin: each with its own texts."""
 
-import json
 import pathlib
-import sys
 
-metadata = json.load(sys.stdin)
-packages = {p["id"]: p for p in metadata["packages"]}
-nodes = {n["id"]: n for n in metadata["resolve"]["nodes"]}
+from linked import linked
 
-# What is linked: normal dependencies of the root, and theirs; not what builds or tests it.
-linked, waiting = set(), [metadata["resolve"]["root"]]
-while waiting:
-    node = waiting.pop()
-    if node in linked:
-        continue
-    linked.add(node)
-    for dependency in nodes[node]["deps"]:
-        if any(kind["kind"] is None for kind in dependency["dep_kinds"]):
-            waiting.append(dependency["pkg"])
-
-foreign = sorted((p for i, p in packages.items() if i in linked and p["source"]), key=lambda p: (p["name"], p["version"]))
+_, foreign, _ = linked()
 for package in foreign:
     print(f"{package['name']} {package['version']}: {package['license'] or 'see its files'}; {package['repository'] or ''}")
 

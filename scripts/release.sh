@@ -1,49 +1,121 @@
 #!/usr/bin/env bash
-# Builds the binary that is passed on: static, so that it starts on any Linux of this architecture, and packs it.
+# Makes what is passed on, tries it where nothing else is, and lists it with its SHA-256:
 #
-#   scripts/release.sh [DIRECTORY]        (default: target/packages)
+#   scripts/release.sh [DIRECTORY] [PART ...]      (default: target/packages, and all parts)
 #
-# Built for musl where its standard library is installed (rustup target add x86_64-unknown-linux-musl; a package
-# like musl-tools for the C parts), else for glibc, statically. The latter is for trying: glibc is under the LGPL.
+#   linux-x86_64, linux-aarch64   static programs (musl)
+#   windows                       program
+#   wheels                        manylinux2014, musllinux 1.2 and Windows (x86_64), and the source distribution
+#
+# Needs Rust with rustup, Python with pip, git, tar, binutils. What else it uses comes from the package index into
+# target/release-tools: zig compiles the C parts for all of them. Under the root that it makes, chroot needs root or
+# namespaces of users; a program of another processor starts where qemu or wine are.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-out=${1:-target/packages}
-arch=$(uname -m)
-rustlib=$(rustc --print sysroot)/lib/rustlib
-libc=gnu
-[ -d "$rustlib/$arch-unknown-linux-musl" ] && libc=musl
-target=$arch-unknown-linux-$libc
-echo "building for $target"
-RUSTFLAGS="${RUSTFLAGS:-} -C target-feature=+crt-static" \
-    cargo build --locked --profile dist --features pictures,parquet --bin nav-sim --target "$target"
-binary=${CARGO_TARGET_DIR:-target}/$target/dist/nav-sim
-
-# Nothing is looked for when it starts: no interpreter, no library.
-if readelf --program-headers "$binary" | grep -q INTERP || readelf --dynamic "$binary" | grep -q NEEDED; then
-    echo "error: $binary is dynamic" >&2
-    exit 1
-fi
-
-# It works where nothing else is: no library, no /proc, no /tmp.
+out=$(realpath --canonicalize-missing "${1:-target/packages}")
+parts=("${@:2}")
+[ "${#parts[@]}" = 0 ] && parts=(linux-x86_64 linux-aarch64 windows wheels)
+target=$(realpath --canonicalize-missing "${CARGO_TARGET_DIR:-target}")
+tools=$target/release-tools
+features=pictures,parquet
+version=$(sed -n '/^\[workspace.package\]/,/^\[/s/^version = "\(.*\)"/\1/p' Cargo.toml)
 root=$(mktemp -d)
 trap 'rm -rf "$root"' EXIT
-cp "$binary" trajectories/figure_eight.toml calib_data/tactical.toml "$root"
-enter=(unshare --map-root-user chroot)
-[ "$(id -u)" = 0 ] && enter=(chroot)
-"${enter[@]}" "$root" /nav-sim --version -v
-"${enter[@]}" "$root" /nav-sim run figure_eight.toml tactical.toml --outage 60:90 --runs 8 --seed 1 -o out --quiet | head -1
-[ -s "$root/out/report.html" ]
+mkdir -p "$out"
 
-# One directory in one archive, the same bytes for the same commit: no names and times of this machine.
-version=$(cargo metadata --locked --no-deps --format-version 1 | python3 -c '
-import json, sys
-print(next(p["version"] for p in json.load(sys.stdin)["packages"] if p["name"] == "nav-sim"))')
-name=nav-sim-$version-$arch-linux-$libc
-mkdir -p "$root/pack/$name" "$out"
-cp "$binary" README.md CHANGELOG.md LICENSE-APACHE LICENSE-MIT "$root/pack/$name"
-cargo metadata --locked --format-version 1 --filter-platform "$target" |
-    python3 scripts/licences.py >"$root/pack/$name/LICENCES-THIRD-PARTY.txt"
-tar --create --directory "$root/pack" --sort=name --owner=0 --group=0 --numeric-owner --mode=u+rw,go=rX \
-    --mtime="@$(git log -1 --format=%ct)" "$name" | gzip --no-name --best >"$out/$name.tar.gz"
-(cd "$out" && sha256sum "$name.tar.gz" | tee "$name.tar.gz.sha256")
-echo "$out/$name.tar.gz: $(stat --format=%s "$out/$name.tar.gz") bytes; nav-sim: $(stat --format=%s "$binary") bytes"
+[ -x "$tools/bin/python" ] || python3 -m venv "$tools"
+"$tools/bin/python" -m pip install --quiet --disable-pip-version-check \
+    maturin==1.16.0 cargo-zigbuild==0.24.1 ziglang==0.17.1 abi3audit==0.0.26
+export PATH=$tools/bin:$PATH
+
+# program TARGET: builds it, and tells where it is.
+program() {
+    rustup --quiet target add "$1"
+    cargo zigbuild --quiet --locked --profile dist --features "$features" --bin nav-sim --target "$1"
+}
+
+# pack NAME TARGET PROGRAM: one directory in one archive with licences and bill of materials; the same bytes for the same
+# commit: no names and times of this machine.
+pack() {
+    local into=$root/pack/nav-sim-$version-$1 metadata
+    mkdir -p "$into"
+    metadata=$(cargo metadata --locked --format-version 1 --features "$features" --filter-platform "$2")
+    python3 scripts/licences.py <<<"$metadata" >"$into/LICENCES-THIRD-PARTY.txt"
+    python3 scripts/sbom.py <<<"$metadata" >"$into/nav-sim.cdx.json"
+    cp "$3" README.md CHANGELOG.md LICENSE-APACHE LICENSE-MIT "$into"
+    tar --create --directory "$root/pack" --sort=name --owner=0 --group=0 --numeric-owner --mode=u+rw,go=rX \
+        --mtime="@$(git log -1 --format=%ct)" "${into##*/}" | gzip --no-name --best >"$out/${into##*/}.tar.gz"
+    cp "$into/nav-sim.cdx.json" "$out/${into##*/}.cdx.json"
+    echo "$out/${into##*/}.tar.gz: $(stat --format=%s "$out/${into##*/}.tar.gz") bytes; $3: $(stat --format=%s "$3") bytes"
+}
+
+# Nothing is looked for when it starts: no interpreter, no library.
+is_static() {
+    ! readelf --program-headers "$1" | grep -q INTERP && ! readelf --dynamic "$1" | grep -q NEEDED && return
+    echo "error: $1 is dynamic" >&2
+    exit 1
+}
+
+# It works where nothing else is: no library, no /proc, no /tmp.
+in_empty_root() {
+    local enter=(unshare --map-root-user chroot)
+    [ "$(id -u)" = 0 ] && enter=(chroot)
+    mkdir "$root/empty"
+    cp --recursive "$1" trajectories calib_data "$root/empty"
+    "${enter[@]}" "$root/empty" /nav-sim --version -v
+    "${enter[@]}" "$root/empty" /nav-sim demo --samples 90000 --runs 1 --seed 1 -o demo --quiet
+    "${enter[@]}" "$root/empty" /nav-sim run trajectories/figure_eight.toml calib_data/tactical.toml --method lincov -o out --quiet
+    [ -s "$root/empty/out/report.html" ]
+}
+
+# starts NAME COMMAND...: a program of another system, where this one can run it.
+starts() {
+    if command -v "$1" >/dev/null; then
+        "$@" --version && "$@" run trajectories/figure_eight.toml calib_data/tactical.toml --method lincov --quiet -o "$root/$1"
+    else
+        echo "not started: there is no $1"
+    fi
+}
+
+linux() {
+    local triple=$1-unknown-linux-musl
+    local binary=$target/$triple/dist/nav-sim
+    program "$triple"
+    is_static "$binary"
+    if [ "$1" = "$(uname -m)" ]; then in_empty_root "$binary"; else starts "qemu-$1-static" "$binary"; fi
+    pack "$1-linux-musl" "$triple" "$binary"
+}
+
+windows() {
+    program x86_64-pc-windows-gnu
+    local binary=$target/x86_64-pc-windows-gnu/dist/nav-sim.exe
+    starts wine "$binary"
+    pack x86_64-windows x86_64-pc-windows-gnu "$binary"
+}
+
+wheels() {
+    local build=(maturin build --quiet --locked --out "$out")
+    rustup --quiet target add x86_64-unknown-linux-gnu x86_64-unknown-linux-musl x86_64-pc-windows-gnu
+    "${build[@]}" --zig --compatibility manylinux2014 --target x86_64-unknown-linux-gnu
+    RUSTFLAGS="-C target-feature=-crt-static" \
+        "${build[@]}" --zig --compatibility musllinux_1_2 --target x86_64-unknown-linux-musl
+    "${build[@]}" --zig --target x86_64-pc-windows-gnu
+    maturin sdist --quiet --out "$out"
+    tar tzf "$out"/nav_sim-*.tar.gz | grep -qE '/LICENSE-(APACHE|MIT)$'
+    # One wheel is for every Python from 3.10 on: nothing but the stable interface is in it.
+    abi3audit --strict --summary "$out"/*.whl
+    # Its command starts in a bare environment.
+    python3 -m venv "$root/bare"
+    "$root/bare/bin/python" -m pip install --quiet --disable-pip-version-check "$out"/*manylinux*.whl
+    "$root/bare/bin/nav-sim" --version
+}
+
+for part in "${parts[@]}"; do
+    echo "== $part"
+    case $part in
+        linux-*) linux "${part#linux-}" ;;
+        windows | wheels) "$part" ;;
+        *) echo "error: no part $part" >&2 && exit 2 ;;
+    esac
+done
+(cd "$out" && rm -f SHA256SUMS && sha256sum -- * | tee SHA256SUMS)

@@ -1,10 +1,165 @@
-//! The catalogue of IMUs as a list.
+//! Models from data sheets, and the catalogue of IMUs.
 
+use crate::failure::Failure;
 use crate::formats::FileError;
-use crate::formats::datasheet::{CATALOGUE, Datasheet, Entry, catalogued};
-use crate::report;
+use crate::formats::datasheet::{CATALOGUE, Datasheet, Entry, Figure, Quantity, catalogued, read};
+use crate::formats::model_file::ModelFile;
+use crate::formats::suggest::nearest;
+use crate::{parse, report};
 use nav_sim_signal::imu::Sensor;
+use serde::Deserialize;
 use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// The arguments of `nav-sim datasheet`: an entry of the catalogue, and figures over it.
+#[derive(clap::Args, Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DatasheetRequest {
+    /// Catalogue entry (TOML)
+    #[arg(value_name = "ENTRY", conflicts_with = "unit")]
+    pub entry: Option<PathBuf>,
+    /// Catalogue entry by name (see --list)
+    #[arg(long, value_name = "NAME")]
+    pub unit: Option<String>,
+    /// Figures in the place of the entry's.
+    #[command(flatten)]
+    pub figures: Figures,
+    /// Sample rate of the model
+    #[arg(long, value_name = "HZ", value_parser = parse::rate_hz, default_value = "100")]
+    pub rate_hz: f64,
+}
+
+impl Default for DatasheetRequest {
+    fn default() -> Self {
+        Self { entry: None, unit: None, figures: Figures::default(), rate_hz: 100.0 }
+    }
+}
+
+/// Figures: a number and its unit, such as '0.15 deg/sqrt(h)'; others in a catalogue entry.
+#[derive(clap::Args, Debug, Clone, Default, PartialEq, Deserialize)]
+#[command(next_help_heading = "Figures, a number and its unit ('0.15 deg/sqrt(h)')")]
+#[serde(default, deny_unknown_fields)]
+pub struct Figures {
+    /// Velocity random walk or noise density of the accelerometers: m/s/sqrt(h), ug/sqrt(Hz), …
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Noise))]
+    pub vrw: Option<String>,
+    /// Angle random walk or noise density of the gyroscopes: deg/sqrt(h), deg/s/sqrt(Hz), …
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Noise))]
+    pub arw: Option<String>,
+    /// Bias instability of the accelerometers: ug, mg, m/s²
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Bias))]
+    pub accel_bias: Option<String>,
+    /// Bias instability of the gyroscopes: deg/h, deg/s, rad/s
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Bias))]
+    pub gyro_bias: Option<String>,
+    /// Longest correlation time of both biases: s, min, h [default: 300 s, with a warning]
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::CorrelationTime))]
+    pub corr_time: Option<String>,
+    /// Turn-on bias of the accelerometers, as a standard deviation: mg, m/s²
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::TurnOn))]
+    pub accel_turn_on: Option<String>,
+    /// Turn-on bias of the gyroscopes, as a standard deviation: deg/s, deg/h
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::TurnOn))]
+    pub gyro_turn_on: Option<String>,
+}
+
+/// Checks a figure of a sensor.
+fn figure(sensor: Sensor, figure: Figure) -> impl Fn(&str) -> Result<String, String> + Clone {
+    let parsed = move |text: &str| Quantity::parse(text, figure.units(sensor)).map(|_| text.to_owned());
+    move |text| parsed(text).map_err(|e| e.to_string())
+}
+
+impl Figures {
+    /// Puts those that are given in the place of those of an entry.
+    fn over(&self, sheet: &mut Datasheet) -> Result<(), Failure> {
+        let given = [
+            ("vrw", Sensor::Accel, Figure::Noise, &self.vrw),
+            ("arw", Sensor::Gyro, Figure::Noise, &self.arw),
+            ("accel-bias", Sensor::Accel, Figure::Bias, &self.accel_bias),
+            ("gyro-bias", Sensor::Gyro, Figure::Bias, &self.gyro_bias),
+            ("corr-time", Sensor::Accel, Figure::CorrelationTime, &self.corr_time),
+            ("corr-time", Sensor::Gyro, Figure::CorrelationTime, &self.corr_time),
+            ("accel-turn-on", Sensor::Accel, Figure::TurnOn, &self.accel_turn_on),
+            ("gyro-turn-on", Sensor::Gyro, Figure::TurnOn, &self.gyro_turn_on),
+        ];
+        for (option, sensor, figure, text) in given {
+            let Some(text) = text else { continue };
+            let quantity = Quantity::parse(text, figure.units(sensor))
+                .map_err(|e| Failure::input(format!("--{option}=\"{text}\": {e}")))?;
+            sheet.set(Entry { sensor, figure, quantity, source: Some("command line".into()), quote: None });
+        }
+        Ok(())
+    }
+}
+
+/// The model of a data sheet.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct DatasheetModel {
+    /// The model.
+    pub file: ModelFile,
+    /// What the figures lack, what had to be assumed, what does not fit together.
+    pub doubts: Vec<String>,
+    /// Figures that a model does not hold.
+    pub notes: Vec<String>,
+}
+
+impl DatasheetRequest {
+    /// The model that the figures are assumed to mean.
+    ///
+    /// # Errors
+    /// An entry that cannot be read or does not exist, a figure that cannot be read, no figure at all.
+    pub fn model(&self) -> Result<DatasheetModel, Failure> {
+        let mut sheet = match (&self.entry, &self.unit) {
+            (Some(path), _) => read(path)?,
+            (None, Some(name)) => named(name)?,
+            (None, None) => Datasheet::default(),
+        };
+        self.figures.over(&mut sheet)?;
+        let made = sheet.model_file(self.rate_hz).map_err(Failure::input)?;
+        if made.file.missing.len() == made.file.model.axes.len() {
+            let failure = Failure::input("no figure is given that makes a noise model");
+            return Err(failure.hint("give --vrw and --arw, or --unit NAME (nav-sim datasheet --list)"));
+        }
+        let doubts = Sensor::ALL.into_iter().flat_map(|sensor| lacking(&sheet, sensor)).chain(made.doubts);
+        let notes = Sensor::ALL.into_iter().flat_map(|sensor| left_out(&sheet, sensor));
+        Ok(DatasheetModel { file: made.file, doubts: doubts.collect(), notes: notes.collect() })
+    }
+}
+
+fn named(name: &str) -> Result<Datasheet, Failure> {
+    if let Some(sheet) = catalogued(name) {
+        return Ok(sheet?);
+    }
+    let failure = Failure::input(format!("--unit {name}: the catalogue has no such unit"));
+    Err(failure.hint(match nearest(name, CATALOGUE.iter().map(|(known, _)| *known)) {
+        Some(meant) => format!("did you mean {meant}?"),
+        None => "nav-sim datasheet --list shows what there is".to_owned(),
+    }))
+}
+
+fn lacking(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
+    let name = sensor.name();
+    let flag = if sensor == Sensor::Accel { "--vrw" } else { "--arw" };
+    let figures = [
+        (Figure::Noise, format!("{name}: no white noise is given ({flag})")),
+        (Figure::Bias, format!("{name}: no bias instability is given (--{name}-bias)")),
+        (Figure::TurnOn, format!("{name}: no turn-on bias is given (--{name}-turn-on)")),
+    ];
+    let is_lacking = |figure: &Figure| sheet.value(sensor, *figure).is_none();
+    figures.into_iter().filter(|(figure, _)| is_lacking(figure)).map(|(_, text)| text).collect()
+}
+
+fn left_out(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
+    let name = sensor.name();
+    let offset = sheet.given(sensor, Figure::Offset).map(|offset| {
+        format!("{name}: the zero offset of ±{offset} is removed before use and not in the model")
+    });
+    let scale = sheet
+        .value(sensor, Figure::Scale)
+        .map(|ppm| format!("{name}: the scale factor of {ppm} ppm is not in the model: run --scale-ppm"));
+    offset.into_iter().chain(scale).collect()
+}
 
 fn units() -> Result<Vec<(&'static str, Datasheet)>, FileError> {
     let units = CATALOGUE.iter().filter_map(|(name, _)| Some((*name, catalogued(name)?)));
@@ -34,7 +189,7 @@ pub(crate) fn catalogue_text() -> Result<String, FileError> {
 ///
 /// # Errors
 /// An entry that cannot be read.
-pub(crate) fn catalogue_json() -> Result<String, FileError> {
+pub fn catalogue_json() -> Result<String, FileError> {
     let figure = |e: &Entry| json!({ "sensor": e.sensor.name(), "figure": e.figure.key(), "given": e.quantity.given, "source": e.source });
     let unit = |(unit, sheet): (&str, Datasheet)| {
         let figures: Vec<Value> = sheet.entries.iter().map(figure).collect();

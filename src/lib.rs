@@ -96,8 +96,8 @@ pub mod study;
 pub mod tune;
 // The IMU that is needed.
 pub mod require;
-// Catalogued IMUs.
-mod datasheet;
+// Models from data sheets, catalogued IMUs.
+pub mod datasheet;
 // A directory to start from.
 mod init;
 // All that most programs need.

@@ -85,7 +85,7 @@ pub(crate) mod text {
     use std::str::FromStr;
 
     #[derive(Deserialize)]
-    #[serde(untagged)]
+    #[serde(untagged, expecting = "is neither a text nor a number")]
     enum Written {
         Text(String),
         Count(u64),
@@ -104,7 +104,11 @@ pub(crate) mod text {
             Written::Count(count) => count.to_string(),
             Written::Number(number) => number.to_string(),
         };
-        text.parse().map_err(|e| D::Error::custom(format!("\"{text}\": {e}")))
+        // who reports it shows the text
+        text.parse().map_err(|e: T::Err| {
+            let message = e.to_string();
+            D::Error::custom(message.strip_prefix(&format!("\"{text}\" ")).unwrap_or(&message))
+        })
     }
 }
 

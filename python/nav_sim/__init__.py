@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from nav_sim._errors import NavSimError as NavSimError
     from nav_sim._errors import NavSimWarning as NavSimWarning
     from nav_sim._model import Model as Model
+    from nav_sim._model import catalogue as catalogue
     from nav_sim._navigation import Fusion as Fusion
     from nav_sim._navigation import Run as Run
     from nav_sim._navigation import fuse as fuse
@@ -51,7 +52,7 @@ _HOMES = {
     "_calibration": ["Calibration", "calibrate"],
     "_decisions": ["Choice", "choose", "compare", "design", "require", "tune"],
     "_errors": ["NavSimError", "NavSimWarning"],
-    "_model": ["Model"],
+    "_model": ["Model", "catalogue"],
     "_navigation": ["Fusion", "Run", "fuse", "lincov", "run"],
     "_study": ["Study", "StudyTables"],
     "_trajectory": ["Trajectory"],

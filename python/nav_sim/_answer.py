@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
-import warnings
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -13,17 +12,51 @@ from typing import TYPE_CHECKING, Any, TypeVar, Union
 import numpy as np
 import numpy.typing as npt
 
-from nav_sim import _native
-from nav_sim._errors import NavSimError, NavSimWarning, as_arguments
-from nav_sim._inputs import FloatArray, Staging, StrPath
+from nav_sim import _native, _toml
+from nav_sim._errors import NavSimError, warn
+from nav_sim._inputs import FloatArray, Staging, StrPath, numbers
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Is told how many units are done, of how many; True: a bar of tqdm.
+#: Is told how many units are done, of how many; True: a bar of tqdm where it is installed, else a line.
 Progress = Union[Callable[[int, int], object], bool, None]
 
 Columns = dict[str, npt.NDArray[Any]]
+
+
+class Kept:
+    """An answer of the engine in texts, which pickle."""
+
+    def __init__(self, answer: _native.Answer | Kept) -> None:
+        self._json, self._summary, self._html = answer.json(), answer.summary(), answer.html()
+        self._verdict: list[str] = answer.verdict()
+        self.unmet: str | None = answer.unmet
+        self.warnings: list[str] = answer.warnings
+        self._files = {name: answer.text(name) for name in answer.names()}
+
+    def json(self) -> str:
+        return self._json
+
+    def summary(self) -> str:
+        return self._summary
+
+    def html(self) -> str:
+        return self._html
+
+    def verdict(self) -> list[str]:
+        return self._verdict
+
+    def names(self) -> list[str]:
+        return list(self._files)
+
+    def text(self, name: str) -> str:
+        if name not in self._files:
+            raise NavSimError(f"there is no {name} in this answer")
+        return self._files[name]
+
+    def table(self, name: str) -> dict[str, Any]:
+        return _native.columns(self.text(name))
 
 
 class Answer:
@@ -37,7 +70,10 @@ class Answer:
     _page: str | None = None
 
     def __init__(self, native: _native.Answer) -> None:
-        self._native = native
+        self._native: _native.Answer | Kept = native
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_native": Kept(self._native)}
 
     @cached_property
     def data(self) -> dict[str, Any]:
@@ -102,33 +138,28 @@ A = TypeVar("A", bound=Answer)
 
 def ask(kind: type[A], command: str, staging: Staging, progress: Progress = None, **request: Any) -> A:
     """The answer to a request; what is None in it is left to the engine."""
-    text = json.dumps(stated(request))
     with bar(progress) as told:
-        native = _native.answer(command, text, staging.hidden, told)
-    for warning in native.warnings:
-        warnings.warn(as_arguments(warning), NavSimWarning, stacklevel=3)
+        native = _native.answer(command, _toml.dumps(request), staging.hidden, told)
+    warn(native.warnings)
     return kind(native)
 
 
-def stated(request: Mapping[str, Any]) -> dict[str, Any]:
-    """A request without what is None in it."""
-    inner = {key: stated(value) if isinstance(value, Mapping) else value for key, value in request.items()}
-    return {key: _plain(value) for key, value in inner.items() if value is not None}
+class _Line:
+    """A line of figures, where there is no tqdm."""
 
+    total = 0
+    n = 0
 
-def _plain(value: Any) -> Any:
-    """A value that JSON has."""
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
-    if isinstance(value, (np.generic, np.ndarray)):
-        return value.tolist()
-    if isinstance(value, (list, tuple)):
-        return [_plain(entry) for entry in value]
-    return value
+    def update(self, steps: int) -> None:
+        self.n += steps
+        print(f"\r{self.n} of {self.total}", end="", file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        print(file=sys.stderr)
 
 
 class bar:
-    """A progress bar of tqdm, a function, or nothing."""
+    """A progress bar, a function, or nothing."""
 
     def __init__(self, progress: Progress) -> None:
         self._progress = progress
@@ -136,11 +167,18 @@ class bar:
 
     def __enter__(self) -> Callable[[int, int], object] | None:
         if self._progress is True:
-            from tqdm.auto import tqdm
-
-            self._bar = tqdm()
+            try:
+                from tqdm.auto import tqdm
+            except ImportError:
+                self._bar = _Line()
+            else:
+                self._bar = tqdm()
             return self._show
-        return self._progress or None
+        if self._progress is None or self._progress is False:
+            return None
+        if not callable(self._progress):
+            raise NavSimError(f"progress={self._progress!r} is neither a function nor True")
+        return self._progress
 
     def _show(self, done: int, total: int) -> None:
         self._bar.total = total
@@ -158,10 +196,16 @@ def windows(outages: Sequence[tuple[float, float]] | str | None) -> list[str] | 
     if isinstance(outages, str):
         return [outages]
     try:
-        pairs = [one if isinstance(one, str) else f"{float(one[0])!r}:{float(one[1])!r}" for one in outages]
-    except (TypeError, ValueError, IndexError, KeyError):
+        pairs = [one if isinstance(one, str) else window(one, "outages") for one in outages]
+    except (TypeError, NavSimError):
         raise NavSimError(f"outages={outages!r}: not pairs of start and end (s)", hint="such as outages=[(300, 390)]") from None
     return pairs or ["none"]
+
+
+def window(pair: Any, name: str) -> str:
+    """A pair of start and end (s), as the command has it."""
+    start_s, end_s = numbers(pair, name, 2)
+    return f"{start_s!r}:{end_s!r}"
 
 
 def flattened(entries: Sequence[Mapping[str, Any]]) -> Columns:
@@ -208,4 +252,4 @@ def axes_or_new(ax: Axes | None) -> Axes:
     return found
 
 
-__all__ = ["Answer", "Columns", "FloatArray", "Progress", "ask", "axes_or_new", "flattened", "windows"]
+__all__ = ["Answer", "Columns", "FloatArray", "Progress", "ask", "axes_or_new", "flattened", "window", "windows"]

@@ -158,14 +158,24 @@ def calibrate(
         "sensor": the three axes of a sensor are replicates of one another; "axes": a model for each axis.
     trim
         Replicates that dr-awv drops at each end of each scale: a number, or a share such as "30%".
+    weighting
+        Weight of a scale in the fit: "model" (inverse variance by the fitted model), "edof", "interval", "none", "full".
     parameters
         What is known beforehand: a file, or its tables as a dict.
+    efficiency
+        That of the robust variances at the Gaussian model, 0.3 to 0.99.
     scales
         How many, or those that are fitted: "1s:1000s".
+    skip_s
+        Seconds to leave out at the beginning; "auto": the warm-up, as it is found.
+    gaps
+        Recordings with samples missing: "keep" (NaN in their place), "refuse", "split", "ignore".
     bootstrap
         Draws behind the intervals; 0: no intervals.
     seed
         Seed of these draws.
+    progress
+        True shows a bar; a function is told how many recordings are done, of how many.
 
     Returns
     -------

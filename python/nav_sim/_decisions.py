@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
@@ -10,8 +9,8 @@ from typing import Any
 import numpy.typing as npt
 
 from nav_sim import _model, _trajectory
-from nav_sim._answer import Answer, Progress, ask, windows
-from nav_sim._inputs import Staging, StrPath, Table
+from nav_sim._answer import Answer, Progress, ask, window, windows
+from nav_sim._inputs import Staging, StrPath, Table, number, path, texts
 from nav_sim._model import Model
 from nav_sim._navigation import AnyModel, AnyTrajectory, Outages, Settings, states
 from nav_sim._wavelet import reading
@@ -45,9 +44,10 @@ def tune(
 
     `truth` are models that may make the errors, such as those of single recordings; `intervals=True` takes the draws
     of the model's own calibration instead. `aim` is "worst" or "mean" (the option --for), `per` "sensor" or "process".
-    `.model` is the tuned one.
+    Without a `trajectory` it is a drive of the program's own; `outages`, `filter`, `scenario`, `seed` and `progress` as
+    of `run`. `.model` is the tuned one.
     """
-    truths = [truth] if isinstance(truth, (str, os.PathLike, Model)) else truth or []
+    truths = truth or [] if isinstance(truth, (list, tuple, type(None))) else [truth]
     with Staging() as staging:
         return ask(
             Choice,
@@ -80,11 +80,12 @@ def require(
     catalogue: StrPath | bool | None = None,
     progress: Progress = None,
 ) -> Choice:
-    """The IMU that keeps the errors at the end of an outage within limits: `nav-sim require`.
+    """The IMU that keeps the errors at the end of an outage of a trajectory within limits: `nav-sim require`.
 
     With a `model` it is judged, without one `.model` is what is needed. `outage` is a length (s), a pair of start and
-    end, or "longest"; `limits` such as "p95_m<=5"; `catalogue=True` ranks the catalogued IMUs, a path those of a
-    directory.
+    end, or "longest", `start` where a length begins (s); `limits` such as "p95_m<=5"; `iso_drift=True` adds a
+    curve of sensors of equal drift; `catalogue=True` ranks the catalogued IMUs, a path those of a directory. `gnss`, `scenario` and
+    `progress` as of `run`.
     """
     asked = outage if isinstance(outage, str) else _window(outage)
     with Staging() as staging:
@@ -96,7 +97,7 @@ def require(
             trajectory=_trajectory.staged(trajectory, staging),
             model=None if model is None else _model.staged(model, "model", staging),
             outage=asked,
-            require=[limits] if isinstance(limits, str) else list(limits),
+            require=texts(limits, "limits"),
             start=start,
             gnss=None if gnss is None else staging.settings(gnss, "gnss"),
             scenario=None if scenario is None else staging.settings(scenario, "scenario"),
@@ -106,16 +107,13 @@ def require(
 
 
 def _window(outage: float | tuple[float, float]) -> str:
-    if isinstance(outage, (int, float)):
-        return repr(float(outage))
-    start_s, end_s = outage
-    return f"{float(start_s)!r}:{float(end_s)!r}"
+    return window(outage, "outage") if isinstance(outage, (list, tuple)) else repr(number(outage, "outage"))
 
 
 def _catalogue(catalogue: StrPath | bool | None) -> str | None:
     if isinstance(catalogue, bool):
         return "built-in" if catalogue else None
-    return None if catalogue is None else os.fspath(catalogue)
+    return None if catalogue is None else path(catalogue, "catalogue")
 
 
 def design(
@@ -132,7 +130,8 @@ def design(
 ) -> Answer:
     """How well recordings that are not made yet would determine a model: `nav-sim design`.
 
-    Without `recordings` or `hours` several numbers and lengths are tried.
+    Without `recordings` (how many) or `hours` (each) several are tried. `estimator` as of `calibrate`, `draws` of
+    simulated calibrations; with a `trajectory` what the spread costs there, with `outages` as of `run`; `seed`, `progress`.
     """
     with Staging() as staging:
         return ask(
@@ -171,7 +170,9 @@ def choose(
 ) -> Choice:
     """Which estimator and model navigate best on one's own recordings, three or more: `nav-sim choose`.
 
-    Each recording makes the errors of runs whose filters were calibrated on the others. `.model` is the winner's.
+    Each recording makes the errors of runs along the trajectory whose filters were calibrated on the others. `.model` is the winner's.
+    `estimator`, `model`, `filter` and `inflate` ("none", "tuned", "x10", …) list what is tried; `rate_hz`, `trim`, `skip_s`
+    and `gaps` are as of `calibrate`, `outages`, `runs`, `scenario`, `seed` and `progress` as of `run`.
     """
     with Staging() as staging:
         return ask(
@@ -182,10 +183,10 @@ def choose(
             inputs=staging.recordings(recordings, "recordings", None),
             trajectory=_trajectory.staged(trajectory, staging),
             outage=windows(outages),
-            estimator=list(estimator),
-            model=list(model),
-            filter=[str(one) for one in filter],
-            inflate=list(inflate),
+            estimator=texts(estimator, "estimator"),
+            model=texts(model, "model"),
+            filter=texts(filter, "filter"),
+            inflate=texts(inflate, "inflate"),
             runs=runs,
             trim=None if trim is None else str(trim),
             scenario=None if scenario is None else staging.settings(scenario, "scenario"),
@@ -202,8 +203,11 @@ def compare(
     states: Sequence[str] = ("pos_e_m", "roll_deg"),
     progress: Progress = None,
 ) -> Answer:
-    """Ratios of ASEE and RMSE between run directories, as `Run.write` and the command make them: `nav-sim compare`."""
-    directories = [runs] if isinstance(runs, (str, os.PathLike)) else list(runs)
-    request: dict[str, Any] = {"runs": [os.fspath(run) for run in directories], "reference": os.fspath(reference)}
+    """Ratios of ASEE and RMSE between run directories, as `Run.write` and the command make them: `nav-sim compare`.
+
+    Each of `runs` is divided by the `reference`; `states` are those of the answer's table; `progress` as of `run`.
+    """
+    directories = runs if isinstance(runs, (list, tuple)) else [runs]
+    request: dict[str, Any] = {"runs": [path(run, "runs") for run in directories], "reference": path(reference, "reference")}
     with Staging() as staging:
-        return ask(Answer, "compare", staging, progress, **request, state=list(states))
+        return ask(Answer, "compare", staging, progress, **request, state=texts(states, "states"))

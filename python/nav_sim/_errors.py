@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+import sys
+import warnings
+from collections.abc import Iterable
 
 
 class NavSimError(Exception):
@@ -13,9 +16,9 @@ class NavSimError(Exception):
 
     #: What is wrong, with file and line where they are known.
     message: str
-    #: The file at fault, or the argument that was given as arrays.
+    #: The file at fault, or the argument that was given in memory.
     file: str | None
-    #: The line in it, from 1; of arrays the row.
+    #: The line in it, from 1; of arrays and tables the index of the row.
     line: int | None
     #: What helps, where that is known.
     hint: str | None
@@ -41,8 +44,36 @@ class NavSimWarning(UserWarning):
     """Something is doubtful about the input or the result."""
 
 
+def warn(doubts: Iterable[str]) -> None:
+    """Warns of doubts, at the line outside of this package."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and frame.f_globals["__name__"].startswith("nav_sim."):
+        frame, level = frame.f_back, level + 1
+    for doubt in doubts:
+        warnings.warn(as_arguments(doubt), NavSimWarning, stacklevel=level)
+
+
 #: Options of the commands whose arguments here have another name.
-_RENAMED = {"outage": "outages", "lever_arm": "lever_arm_m", "heading": "heading_deg", "for": "aim"}
+_RENAMED = {
+    "for": "aim",
+    "heading": "heading_deg",
+    "inputs": "recordings",
+    "lever_arm": "lever_arm_m",
+    "outage": "outages",
+    "state": "states",
+}
+_ORIGIN = "give nav_sim.Trajectory(…, origin=(lat_deg, lon_deg, h_m))"
+#: Phrases that options alone do not make.
+_PHRASES = {
+    "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M": _ORIGIN,
+    "give --origin LAT_DEG,LON_DEG,H_M": _ORIGIN,
+    "--gnss-sigma POS[:VEL]": "gnss_sigma=",
+    "--topic NAME names one (nav-sim inspect lists them)": "topic= names one (nav-sim inspect lists them)",
+    "--unit NAME (nav-sim datasheet --list)": "a unit of nav_sim.catalogue()",
+    "nav-sim datasheet --list": "nav_sim.catalogue()",
+}
+#: Options whose value is a word.
+_WORD = re.compile(r"--(estimator|filter|gaps|method|model|pool) ([a-z0-9]+)")
 
 
 def as_arguments(text: str) -> str:
@@ -52,4 +83,6 @@ def as_arguments(text: str) -> str:
         name = match[1].replace("-", "_")
         return f"{_RENAMED.get(name, name)}="
 
-    return re.sub(r"--([a-z][a-z-]*[a-z])", argument, text)
+    for phrase, meant in _PHRASES.items():
+        text = text.replace(phrase, meant)
+    return re.sub(r"--([a-z][a-z-]*[a-z])=?", argument, _WORD.sub(r'--\1="\2"', text))

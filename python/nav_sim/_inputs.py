@@ -43,6 +43,50 @@ def is_path(value: object) -> TypeGuard[StrPath]:
     return isinstance(value, (str, os.PathLike))
 
 
+def path(value: object, name: str) -> str:
+    """The path of a file."""
+    if is_path(value):
+        return os.fspath(value)
+    raise NavSimError(f"{name}: a {type(value).__name__} is no path")
+
+
+def number(value: Any, name: str) -> float:
+    """One number."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise NavSimError(f"{name}={value!r} is not a number") from None
+
+
+def numbers(values: Any, name: str, count: int) -> list[float]:
+    """So many numbers."""
+    if not isinstance(values, (list, tuple, np.ndarray)) or len(values) != count:
+        raise NavSimError(f"{name}={values!r} is not {count} numbers")
+    return [number(value, name) for value in values]
+
+
+def whole(value: Any, name: str, least: int) -> int:
+    """A whole number."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+        raise NavSimError(f"{name}={value!r} is not a whole number ≥ {least}")
+    return int(value)
+
+
+def word(value: Any, name: str) -> str:
+    """A text."""
+    if isinstance(value, str):
+        return value
+    raise NavSimError(f"{name}={value!r} is not a text")
+
+
+def texts(values: Any, name: str) -> list[str]:
+    """One text or several, as a list."""
+    given = [values] if isinstance(values, (str, int)) else values
+    if not isinstance(given, (list, tuple)):
+        raise NavSimError(f"{name}={values!r} is neither a text nor a list of texts")
+    return [str(one) for one in given]
+
+
 def is_table(value: object) -> bool:
     """Whether a value has columns by name."""
     if isinstance(value, np.ndarray):
@@ -66,6 +110,8 @@ def _floats(value: npt.ArrayLike, name: str) -> FloatArray:
         raw = np.asarray(value)
         if raw.dtype.kind == "c":
             raise NavSimError(f"{name}: complex numbers, and real ones are needed")
+        if raw.dtype.kind in "mM":
+            raise NavSimError(f"{name}: dates, and seconds are needed")
         return np.asarray(raw, dtype=np.float64)
     except (TypeError, ValueError) as e:
         raise NavSimError(f"{name}: not an array of numbers: {e}") from None
@@ -83,6 +129,11 @@ def columns(table: Table, name: str) -> dict[str, FloatArray]:
         hint = "a path, a dict of arrays, a data frame or a structured array"
         raise NavSimError(f"{name}: a {type(table).__name__} is no table", hint=hint)
     found = {str(key): vector(table[key], f"{name}[{str(key)!r}]") for key in names}
+    # a pandas frame may have its time as the index
+    index = getattr(table, "index", None)
+    label = getattr(index, "name", None)
+    if isinstance(label, str) and label not in found:
+        found = {label: vector(index, f"{name}.index"), **found}  # type: ignore[arg-type]
     if not found:
         raise NavSimError(f"{name}: there are no columns in it", hint="give columns by name")
     first, rows = next((key, len(values)) for key, values in found.items())
@@ -150,7 +201,9 @@ class Staging:
         """Settings as TOML."""
         if isinstance(value, Mapping):
             return self.text(f"{name}.toml", _toml.dumps(value))
-        return os.fspath(value)
+        if is_path(value):
+            return os.fspath(value)
+        raise NavSimError(f"{name}: a {type(value).__name__} is neither a path nor a dict")
 
     def recordings(self, value: Any, name: str, channel: str | None) -> list[str]:
         """One recording or several."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
+import re
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Union
 import numpy as np
 
 from nav_sim import _native, _toml
-from nav_sim._answer import axes_or_new
-from nav_sim._errors import NavSimError
-from nav_sim._inputs import FloatArray, Staging, StrPath
+from nav_sim._answer import Columns, axes_or_new, flattened
+from nav_sim._errors import NavSimError, warn
+from nav_sim._inputs import FloatArray, Staging, StrPath, number, numbers, path, whole, word
 from nav_sim._wavelet import Curve, scales_s
 
 if TYPE_CHECKING:
@@ -38,9 +38,15 @@ class Model:
     noise.
     """
 
-    def __init__(self, rate_hz: float, accel: Processes | None = None, gyro: Processes | None = None) -> None:
-        sensors = {name: _axes(given) for name, given in (("accel", accel), ("gyro", gyro)) if given is not None}
-        self._take(_toml.dumps({"schema": 1, "rate_hz": float(rate_hz), **sensors}), None)
+    def __init__(
+        self, rate_hz: float, accel: Processes | Process | None = None, gyro: Processes | Process | None = None
+    ) -> None:
+        sensors = {name: _axes(given, name) for name, given in (("accel", accel), ("gyro", gyro)) if given is not None}
+        try:
+            self._take(_toml.dumps({"schema": 1, "rate_hz": number(rate_hz, "rate_hz"), **sensors}), None)
+        except NavSimError as e:
+            # no line of a text that the caller never saw
+            raise NavSimError(re.sub(r"^model, line \d+: ", "", e.message), hint=e.hint) from None
 
     def _take(self, text: str, path: str | None) -> None:
         self._text, self._path = text, path
@@ -60,14 +66,46 @@ class Model:
         return model
 
     @classmethod
-    def read(cls, path: StrPath) -> Model:
+    def read(cls, file: StrPath) -> Model:
         """Reads a model file (TOML), as `calibrate` writes it."""
+        name = path(file, "file")
         try:
-            text = Path(path).read_text(encoding="utf-8")
+            text = Path(name).read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as e:
             reason = getattr(e, "strerror", None) or str(e)
-            raise NavSimError(f"{os.fspath(path)}: {reason}", file=os.fspath(path)) from None
-        return cls._of(text, os.fspath(path))
+            raise NavSimError(f"{name}: {reason}", file=name) from None
+        return cls._of(text, name)
+
+    @classmethod
+    def from_datasheet(
+        cls,
+        unit: str | None = None,
+        *,
+        entry: StrPath | Mapping[str, Any] | None = None,
+        rate_hz: float = 100.0,
+        vrw: str | None = None,
+        arw: str | None = None,
+        accel_bias: str | None = None,
+        gyro_bias: str | None = None,
+        corr_time: str | None = None,
+        accel_turn_on: str | None = None,
+        gyro_turn_on: str | None = None,
+    ) -> Model:
+        """A model from the figures of a data sheet: an assumption, not a calibration (`nav-sim datasheet`).
+
+        `unit` is a name of `nav_sim.catalogue()`, `entry` one's own (TOML, or its tables as a dict). Figures are texts with
+        their units and go over these: `vrw` and `arw` (noise densities, "0.15 deg/sqrt(h)"), `accel_bias` and `gyro_bias`
+        (instabilities, "0.5 deg/h"), `corr_time` (their correlation time, "100 s"), `accel_turn_on` and `gyro_turn_on`
+        (standard deviations, "2 mg"). `rate_hz` is that of the model.
+        """
+        figures = {"vrw": vrw, "arw": arw, "accel_bias": accel_bias, "gyro_bias": gyro_bias, "corr_time": corr_time}
+        figures |= {"accel_turn_on": accel_turn_on, "gyro_turn_on": gyro_turn_on}
+        with Staging() as staging:
+            own = None if entry is None else staging.settings(entry, "entry")
+            request = {"entry": own, "unit": unit, "rate_hz": rate_hz, "figures": figures}
+            text, doubts = _native.datasheet(_toml.dumps(request), staging.hidden)
+        warn(doubts)
+        return cls._of(text, None)
 
     def write(self, path: StrPath) -> Path:
         """Writes it as a model file; of a calibration the draws behind its intervals too (`….draws.json`)."""
@@ -138,17 +176,15 @@ class Model:
         """
         if (samples is None) == (duration_s is None):
             raise NavSimError("samples, duration_s: give one of them")
-        count = round(duration_s * self.rate_hz) if samples is None and duration_s is not None else samples
-        for name, value, least in (("samples", count, 1), ("replicate", replicate, 1), ("seed", seed, 0)):
-            if not isinstance(value, (int, np.integer)) or value < least:
-                raise NavSimError(f"{name}: {value} is not a whole number from {least} on")
-        assert count is not None
-        corrupts = None if contaminate is None else os.fspath(contaminate)
-        return _native.model_recording(self._text, int(count), int(replicate), int(seed), spread, corrupts)
+        if duration_s is not None:
+            samples = round(number(duration_s, "duration_s") * self.rate_hz)
+        count, own, drawn = whole(samples, "samples", 1), whole(replicate, "replicate", 1), whole(seed, "seed", 0)
+        corrupts = None if contaminate is None else path(contaminate, "contaminate")
+        return _native.model_recording(self._text, count, own, drawn, bool(spread), corrupts)
 
     def wavelet_variance(self, channel: str, scales: int = 20) -> Curve:
         """The wavelet variance that a channel implies at the scales 2, 4, 8, … samples: `tau_s` and `wv`."""
-        wv = _native.model_wavelet(self._text, channel, scales)
+        wv = _native.model_wavelet(self._text, word(channel, "channel"), whole(scales, "scales", 1))
         return Curve(tau_s=scales_s(scales, self.rate_hz), wv=wv)
 
     def practical(
@@ -160,7 +196,9 @@ class Model:
         at 1 s and the closest bias), "envelope" (nowhere below it) or "strict" (WN and RW as they are). What a model
         does not have is None.
         """
-        found: dict[str, dict[str, float | None]] = json.loads(_native.model_practical(self._text, policy, *horizon_s))
+        found: dict[str, dict[str, float | None]] = json.loads(
+            _native.model_practical(self._text, word(policy, "policy"), *numbers(horizon_s, "horizon_s", 2))
+        )
         return found
 
     def export(
@@ -176,7 +214,8 @@ class Model:
         Returns the text, and writes it where a path is given.
         """
         name = self._path or "model"
-        text = _native.model_export(self._text, name, target, policy, *horizon_s)
+        horizon = numbers(horizon_s, "horizon_s", 2)
+        text = _native.model_export(self._text, name, word(target, "target"), word(policy, "policy"), *horizon)
         if path is not None:
             Path(path).write_text(text + "\n", encoding="utf-8", newline="\n")
         return text
@@ -191,22 +230,31 @@ class Model:
         return ax
 
 
-def _axes(given: Processes) -> dict[str, Any]:
+def _axes(given: Processes | Process, name: str) -> dict[str, Any]:
+    if isinstance(given, Mapping) and "type" in given:
+        return _axes([given], name)
     if isinstance(given, Mapping):
-        return {axis: {"processes": _inline(own)} for axis, own in given.items()}
-    return {"processes": _inline(given)}
-
-
-def _inline(processes: Sequence[Process]) -> _toml.Inline:
-    return _toml.Inline(processes)
+        return {axis: {"processes": _toml.Inline(own)} for axis, own in given.items()}
+    if isinstance(given, (list, tuple)):
+        return {"processes": _toml.Inline(given)}
+    hint = 'a list such as [{"type": "WN", "sigma2": 1e-6}]'
+    raise NavSimError(f"{name}={given!r} is not a list of processes", hint=hint)
 
 
 def staged(model: StrPath | Model, name: str, staging: Staging) -> str:
     """The file of a model: its own where it was read from one and nothing was changed."""
     if not isinstance(model, Model):
-        return os.fspath(model)
+        return path(model, name)
     if model._path is not None:
         return model._path
     if model._draws is not None:
         staging.text(f"{name}.draws.json", model._draws)
     return staging.text(f"{name}.toml", model._text)
+
+
+def catalogue() -> Columns:
+    """Catalogued IMUs, a row a figure of a data sheet: `unit` (for `Model.from_datasheet`), `name`, `class`, `sensor`,
+    `figure`, `given` (number and unit), `source`."""
+    units = json.loads(_native.catalogue())["units"]
+    rows = [{"unit": u["unit"], "name": u["name"], "class": u["class"], **figure} for u in units for figure in u["figures"]]
+    return flattened(rows)

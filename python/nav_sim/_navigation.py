@@ -12,7 +12,7 @@ import numpy.typing as npt
 from nav_sim import _model, _trajectory
 from nav_sim._answer import Answer, Columns, Progress, ask, axes_or_new, flattened, windows
 from nav_sim._errors import NavSimError
-from nav_sim._inputs import Staging, StrPath, Table
+from nav_sim._inputs import Staging, StrPath, Table, number, numbers, texts
 from nav_sim._model import Model
 from nav_sim._trajectory import Trajectory
 
@@ -40,8 +40,9 @@ class Run(Answer):
 
     @cached_property
     def epochs(self) -> Columns:
-        """Once a second, after the fix: `t_s`, `asee_…`, `rmse_…`, `bias_…` of each state, `nees`, `coverage`."""
-        return self.table("epochs.csv")
+        """Once a second, after the fix: `t_s`, `asee_…`, `rmse_…`, `bias_…` of each state, `nees`, `coverage`;
+        `asee_horizontal_m` and `rmse_horizontal_m` are the roots of the sums of squares of north and east."""
+        return _with_horizontal(self.table("epochs.csv"), "")
 
     @cached_property
     def fan(self) -> Columns:
@@ -56,20 +57,28 @@ class Run(Answer):
     @cached_property
     def outages(self) -> Columns:
         """A row an outage, before the fix that ends it: `start_s`, `end_s`, `asee_end_…` and `rmse_end_…` of each state
-        (`rmse_end_pos_e_m`), `horizontal_error_end_m_p95`, and more, as in `data`."""
-        return flattened(self.data["outages"])
+        (`rmse_end_pos_e_m`) and of the horizontal position (`asee_end_horizontal_m`), `horizontal_error_end_m_p95`, and
+        more, as in `data`."""
+        return _with_horizontal(flattened(self.data["outages"]), "end_")
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws the horizontal error over time, true and believed; outages are grey."""
         ax = axes_or_new(ax)
         for name, label in (("rmse", "true (RMSE)"), ("asee", "believed (ASEE)")):
-            north, east = (self.epochs[f"{name}_pos_{axis}_m"] for axis in "ne")
-            ax.semilogy(self.epochs["t_s"], np.hypot(north, east), label=label)
+            ax.semilogy(self.epochs["t_s"], self.epochs[f"{name}_horizontal_m"], label=label)
         _shade(ax, self.outages)
         ax.set_xlabel("time (s)")
         ax.set_ylabel("horizontal error (m)")
         ax.legend()
         return ax
+
+
+def _with_horizontal(table: Columns, place: str) -> Columns:
+    for name in ("asee", "rmse"):
+        north, east = (table.get(f"{name}_{place}pos_{axis}_m") for axis in "ne")
+        if north is not None and east is not None:
+            table[f"{name}_{place}horizontal_m"] = np.hypot(north, east)
+    return table
 
 
 def _shade(ax: Axes, outages: Columns) -> None:
@@ -126,6 +135,8 @@ def run(
         that name.
     seed
         Of all random numbers; that of the scenario, or 1, without it.
+    progress
+        True shows a bar; a function is told how many runs are done, of how many.
 
     Returns
     -------
@@ -147,7 +158,7 @@ def run(
             runs=runs,
             filter={"states": states(filter), "turn_on_bias": turn_on_bias, "scale_ppm": scale_ppm},
             method=method,
-            require=[require] if isinstance(require, str) else require,
+            require=None if require is None else texts(require, "require"),
             gnss=None if gnss is None else staging.settings(gnss, "gnss"),
             scenario=None if scenario is None else staging.settings(scenario, "scenario"),
             seed=seed,
@@ -168,7 +179,34 @@ def lincov(
     scenario: Settings | None = None,
     progress: Progress = None,
 ) -> Run:
-    """As `run`, by covariance analysis, without sampling: `nav-sim run --method lincov`. Arguments as of `run`."""
+    """The errors to expect of a navigation, by covariance analysis, without sampling: `nav-sim run --method lincov`.
+
+    Parameters
+    ----------
+    trajectory
+        A file, columns (`t_s`, `lat_deg`, `lon_deg`, `h_m`, …) or a `Trajectory`.
+    model
+        What the filter believes of the IMU.
+    truth
+        What makes the errors of the IMU, if not the same model.
+    outages
+        Windows without fixes: pairs of start and end (s); [] for none; None for 300 to 390 s and 700 to 790 s.
+    filter
+        States: 15, 21 (and scale factors) or "full" (one for each process).
+    turn_on_bias, scale_ppm
+        Constant biases (m/s², rad/s) and scale factors (ppm) that the filter expects: standard deviations,
+        accelerometer first.
+    require
+        Limits such as "p95_m<=5" or "consistent"; `.unmet` says whether they are missed.
+    gnss, scenario
+        All other settings, by a file or as a dict, as to `run`.
+    progress
+        True shows a bar; a function is told how much is done.
+
+    Returns
+    -------
+    As `run`: RMSE is the error that the truth makes in the mean, ASEE what the filter believes. `.runs` is empty.
+    """
     return run(
         trajectory,
         model,
@@ -281,8 +319,12 @@ def fuse(
         How long errors of positions last: "auto", "none", or seconds.
     topic
         Topics of IMU and fixes in a log that has several.
+    filter, turn_on_bias
+        As of `run`.
     smooth
         Also estimate every row from all fixes.
+    progress
+        True shows a bar; a function is told how much is done.
 
     Returns
     -------
@@ -290,9 +332,11 @@ def fuse(
     """
     with Staging() as staging:
         if heading_deg is not None:
-            deg, sigma_deg = map(float, heading_deg)
+            deg, sigma_deg = numbers(heading_deg, "heading_deg", 2)
             initial = f"{deg!r}:{sigma_deg!r}"
-        lasts = gnss_correlation if isinstance(gnss_correlation, str) else {"seconds": float(gnss_correlation)}
+        lasts: Any = gnss_correlation
+        if not isinstance(gnss_correlation, str):
+            lasts = {"seconds": number(gnss_correlation, "gnss_correlation")}
         return ask(
             Fusion,
             "fuse",
@@ -302,18 +346,32 @@ def fuse(
             gnss=staging.table(gnss, "gnss"),
             model=_model.staged(model, "model", staging),
             initial=staging.settings(initial, "initial"),
-            lever_arm_m=[float(x) for x in lever_arm_m],
+            lever_arm_m=numbers(lever_arm_m, "lever_arm_m", 3),
             mounting=_mounting(mounting),
             reference=None if reference is None else _reference(reference, staging),
-            outages=[{"start_s": float(a), "end_s": float(b)} for a, b in outages],
+            outages=_withheld(outages),
             filter=str(filter),
             turn_on_bias=turn_on_bias,
             gnss_sigma=_sigma(gnss_sigma),
             gnss_delay_s=gnss_delay_s,
             gnss_correlation=lasts,
-            topic=None if topic is None else {"imu": topic[0], "fixes": topic[1]},
+            topic=_topics(topic),
             smooth=smooth,
         )
+
+
+def _withheld(outages: Sequence[tuple[float, float]]) -> list[dict[str, float]]:
+    if not isinstance(outages, (list, tuple)):
+        raise NavSimError(f"outages={outages!r}: not pairs of start and end (s)", hint="such as outages=[(300, 390)]")
+    return [dict(zip(("start_s", "end_s"), numbers(pair, "outages", 2))) for pair in outages]
+
+
+def _topics(topic: tuple[str | None, str | None] | None) -> Any:
+    if topic is None:
+        return None
+    if not isinstance(topic, (list, tuple)) or len(topic) != 2:
+        raise NavSimError(f"topic={topic!r}: not a pair of names, of the IMU and of the fixes")
+    return {"imu": topic[0], "fixes": topic[1]}
 
 
 def _reference(reference: AnyTrajectory, staging: Staging) -> str:
@@ -327,7 +385,10 @@ def _mounting(mounting: Mounting | None) -> Any:
         return mounting
     if isinstance(mounting, str):
         return {"axes": mounting}
-    angles: Any = np.asarray(mounting, dtype=np.float64)
+    try:
+        angles: Any = np.asarray(mounting, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise NavSimError(f"mounting={mounting!r} is neither a text nor angles") from None
     if angles.shape not in ((3,), (2, 3)):
         raise NavSimError("mounting: roll, pitch, yaw (°) are needed, and where known three standard deviations")
     both: npt.NDArray[np.float64] = angles if angles.ndim == 2 else np.stack([angles, np.ones(3)])
@@ -340,4 +401,4 @@ def _sigma(sigma: float | Mapping[str, Any] | None) -> Any:
     if isinstance(sigma, Mapping):
         each = {key: np.broadcast_to(np.asarray(value, dtype=np.float64), 3) for key, value in sigma.items()}
         return {"unsaid": {key: value.tolist() for key, value in each.items()}}
-    return {"times": [float(sigma), float(sigma)]}
+    return {"times": [number(sigma, "gnss_sigma")] * 2}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from functools import cached_property
 from pathlib import Path
 
@@ -11,8 +10,8 @@ import numpy as np
 
 from nav_sim import _native
 from nav_sim._answer import Answer, Columns, Progress, bar
-from nav_sim._errors import NavSimError, NavSimWarning
-from nav_sim._inputs import StrPath
+from nav_sim._errors import NavSimError, warn
+from nav_sim._inputs import StrPath, path as path_of
 
 
 class StudyTables(Answer):
@@ -60,7 +59,7 @@ class Study:
     """
 
     def __init__(self, path: StrPath, directory: StrPath | None = None) -> None:
-        self.path = Path(path)
+        self.path = Path(path_of(path, "path"))
         #: Where its plan, units and results are: `out/` and its name if nothing else is said.
         self.directory = Path("out") / self.path.stem if directory is None else Path(directory)
 
@@ -68,7 +67,7 @@ class Study:
         """Checks it, calibrates its candidates and cuts it into units; returns how many."""
         with bar(progress) as told:
             units, doubts = _native.study_plan(os.fspath(self.path), os.fspath(self.directory), seed, told)
-        _warn(doubts)
+        warn(doubts)
         return units
 
     def run(self, *, shard: tuple[int, int] = (0, 1), progress: Progress = None) -> int:
@@ -76,20 +75,15 @@ class Study:
         with bar(progress) as told:
             place = (os.fspath(self.path), os.fspath(self.directory))
             (finished, _), doubts = _native.study_run(*place, *shard, told)
-        _warn(doubts)
+        warn(doubts)
         return finished
 
     def merge(self, *, progress: Progress = None) -> StudyTables:
         """Makes its tables, when all units are there."""
         with bar(progress) as told:
             native, results = _native.study_merge(os.fspath(self.path), os.fspath(self.directory), told)
-        _warn(native.warnings)
+        warn(native.warnings)
         return StudyTables(native, results)
 
     def __repr__(self) -> str:
         return f"<Study: {self.path} in {self.directory}>"
-
-
-def _warn(doubts: list[str]) -> None:
-    for doubt in doubts:
-        warnings.warn(doubt, NavSimWarning, stacklevel=3)

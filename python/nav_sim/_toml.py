@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+
+from nav_sim._errors import NavSimError
 
 
 class Inline(list[Any]):
@@ -25,7 +28,7 @@ def dumps(table: Mapping[str, Any], place: str = "") -> str:
         elif _is_tables(value):
             inner.extend(f"\n[[{name}]]\n{dumps(entry, name)}" for entry in value)
         elif value is not None:
-            lines.append(f"{key} = {_value(value)}\n")
+            lines.append(f"{key} = {_value(value, name)}\n")
     return "".join(lines + inner)
 
 
@@ -34,18 +37,23 @@ def _is_tables(value: Any) -> bool:
     return is_list and len(value) > 0 and all(isinstance(entry, Mapping) for entry in value)
 
 
-def _value(value: Any) -> str:
+def _value(value: Any, name: str) -> str:
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, bool):
         return "true" if value else "false"
+    if isinstance(value, os.PathLike):
+        value = os.fspath(value)
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, float):
         # a float that is whole stays one, and repr reads back to the same bits
         return repr(value) if math.isfinite(value) else str(value)
     if isinstance(value, (list, tuple, np.ndarray)):
-        return "[" + ", ".join(_value(entry) for entry in value) + "]"
+        return "[" + ", ".join(_value(entry, name) for entry in value) + "]"
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_value(entry)}" for key, entry in value.items()) + " }"
-    return str(value)
+        inner = ((key, _value(entry, f"{name}.{key}")) for key, entry in value.items() if entry is not None)
+        return "{ " + ", ".join(f"{key} = {text}" for key, text in inner) + " }"
+    if isinstance(value, int):
+        return str(value)
+    raise NavSimError(f"{name}: a {type(value).__name__} is neither a number nor a text")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +11,8 @@ import numpy as np
 
 from nav_sim import _native
 from nav_sim._answer import axes_or_new
-from nav_sim._errors import NavSimWarning
-from nav_sim._inputs import FloatArray, Staging, StrPath, Table, columns, is_path
+from nav_sim._errors import warn
+from nav_sim._inputs import FloatArray, Staging, StrPath, Table, columns, is_path, number, numbers
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +22,7 @@ class Trajectory:
     """A motion: a file, or columns.
 
     Columns are `t_s`, `lat_deg`, `lon_deg`, `h_m`, and `roll_deg`, `pitch_deg`, `yaw_deg` where they are known;
-    without them heading and pitch follow the path. `n_m`, `e_m`, `d_m` are metres north, east and down of `origin`
+    without them heading and pitch follow the path; names may end in `_rad` too. `n_m`, `e_m`, `d_m` are metres north, east and down of `origin`
     (latitude and longitude in degrees, height in m). Files: motion profiles (.toml), tables (.csv), KF-GINS (.nav),
     TUM, GPX.
     """
@@ -34,11 +33,10 @@ class Trajectory:
             self._columns: dict[str, FloatArray] = {}
         else:
             self._path, self._columns = None, columns(source, "trajectory")  # type: ignore[arg-type]
-        self._origin = origin
+        self._origin = None if origin is None else numbers(origin, "origin", 3)
         # what is wrong with it, and what is doubtful, is known from the start
         _, (self.start_s, self.end_s), doubts = self._read(1.0)
-        for doubt in doubts:
-            warnings.warn(doubt, NavSimWarning, stacklevel=2)
+        warn(doubts)
 
     def staged(self, staging: Staging) -> str:
         """Its file."""
@@ -46,13 +44,14 @@ class Trajectory:
             return self._path
         path = staging.table(self._columns, "trajectory")
         if self._origin is not None:
-            head = "# origin: " + ", ".join(repr(float(x)) for x in self._origin) + "\n"
-            Path(path).write_text(head + Path(path).read_text(encoding="utf-8"), encoding="utf-8")
+            # below the rows, so that these are in the lines of all tables
+            with open(path, "a", encoding="utf-8") as file:
+                file.write("# origin: " + ", ".join(map(repr, self._origin)) + "\n")
         return path
 
     def states(self, rate_hz: float = 10.0) -> dict[str, FloatArray]:
         """Position, velocity (`v_n_m_s` …) and attitude at that rate, smoothly between the samples."""
-        return self._read(float(rate_hz))[0]
+        return self._read(number(rate_hz, "rate_hz"))[0]
 
     def _read(self, rate_hz: float) -> tuple[dict[str, FloatArray], tuple[float, float], list[str]]:
         with Staging() as staging:

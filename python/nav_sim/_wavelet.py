@@ -13,7 +13,7 @@ import numpy.typing as npt
 from nav_sim import _native
 from nav_sim._answer import Answer, Progress, ask, axes_or_new
 from nav_sim._errors import NavSimError
-from nav_sim._inputs import FloatArray, Staging, StrPath, Table, vector
+from nav_sim._inputs import FloatArray, Staging, StrPath, Table, number, vector, whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,7 +50,7 @@ def wavelet_variance(
     Parameters
     ----------
     x
-        Evenly spaced samples, in any unit. Their mean does not matter.
+        Evenly spaced samples, in any unit; NaN where one is missing. Their mean does not matter.
     rate_hz
         Their rate (Hz).
     robust
@@ -65,7 +65,8 @@ def wavelet_variance(
     `tau_s`, `wv` (the unit of x squared), `edof`, `ci_low`, `ci_high`.
     """
     rate = _rate(rate_hz)
-    found = _native.wavelet(vector(x, "x"), scales, efficiency if robust else None)
+    levels = None if scales is None else whole(scales, "scales", 1)
+    found = _native.wavelet(vector(x, "x"), levels, number(efficiency, "efficiency") if robust else None)
     return Curve(tau_s=scales_s(len(found["wv"]), rate), **found)
 
 
@@ -98,7 +99,7 @@ def allan_deviation(
 
 
 def _rate(rate_hz: float) -> float:
-    rate = float(rate_hz)
+    rate = number(rate_hz, "rate_hz")
     if not (math.isfinite(rate) and rate > 0.0):
         raise NavSimError(f"rate_hz: {rate_hz} is not a rate above 0 Hz")
     return rate
@@ -152,9 +153,9 @@ def wv(
 ) -> WaveletVariances:
     """Wavelet variances (classical, robust) of static recordings: `nav-sim wv`.
 
-    The recordings are given as to `calibrate`. `axes` takes some of the signals ("gyro", "accel.x"); `intervals` is
+    The recordings are given as to `calibrate`, with `rate_hz` where there is no time in them. `axes` takes some of the signals ("gyro", "accel.x"); `intervals` is
     "eta3" or "large-sample"; `skip_s` leaves out seconds at the beginning, "auto" what is not as the rest; `gaps` is
-    "keep", "refuse", "split" or "ignore".
+    "keep", "refuse", "split" or "ignore"; `efficiency`, `scales` and `progress` are as of `calibrate`.
     """
     with Staging() as staging:
         files = staging.recordings(recordings, "recordings", axes if isinstance(axes, str) else None)

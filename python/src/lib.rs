@@ -15,7 +15,9 @@ mod native {
     #[pymodule_export]
     use crate::answer::Answer;
     #[pymodule_export]
-    use crate::model::{model_contents, model_export, model_practical, model_recording, model_wavelet};
+    use crate::model::{
+        catalogue, datasheet, model_contents, model_export, model_practical, model_recording, model_wavelet,
+    };
     #[pymodule_export]
     use crate::request::{answer, main};
     #[pymodule_export]

@@ -1,9 +1,9 @@
-//! Requests in: JSON with the keys of the commands' options.
+//! Requests in: TOML with the keys of the commands' options.
 
 use crate::answer::Answer;
 use crate::error;
 use crate::work::{Meter, work};
-use nav_sim::answered::Answered;
+use nav_sim::answered::{Answered, request};
 use nav_sim::calibrate::CalibrationRequest;
 use nav_sim::choose::ChoiceRequest;
 use nav_sim::compare::CompareRequest;
@@ -18,7 +18,6 @@ use nav_sim::run::{Note, RunRequest};
 use nav_sim::tune::TuneRequest;
 use nav_sim::wv::WaveletRequest;
 use pyo3::prelude::*;
-use serde::de::DeserializeOwned;
 use std::ffi::OsString;
 use std::sync::{Mutex, PoisonError};
 
@@ -99,56 +98,31 @@ pub(crate) fn answer(
         let answered = answered(&command, &request, &clerk);
         (answered, clerk.warnings())
     })?;
-    let shown = |text: String| if hidden.is_empty() { text } else { text.replace(&hidden, "") };
-    match answered {
-        Ok(answered) => {
-            let warnings = warnings.into_iter().map(shown).collect();
-            Ok(Answer::new(answered, hidden, warnings))
-        }
-        Err(Refusal::Request(message)) => Err(error::refused(py, &message)),
-        Err(Refusal::Failure(failure)) => Err(error::of_failure(py, &failure, &hidden)),
-    }
+    let answered = answered.map_err(|e| match e {
+        Some(failure) => error::of_failure(py, &failure, &hidden),
+        None => error::refused(py, "there is no such command"),
+    })?;
+    let warnings = warnings.iter().map(|doubt| error::shown(doubt, &hidden)).collect();
+    Ok(Answer::new(answered, hidden, warnings))
 }
 
-/// Why there is no answer.
-enum Refusal {
-    /// The request cannot be read.
-    Request(String),
-    /// There is no answer to it.
-    Failure(Failure),
-}
-
-impl From<Failure> for Refusal {
-    fn from(failure: Failure) -> Self {
-        Self::Failure(failure)
-    }
-}
-
-fn answered(command: &str, request: &str, clerk: &Clerk<'_>) -> Result<Answered, Refusal> {
+/// The answer, or the failure; no failure where there is no such command.
+fn answered(command: &str, text: &str, clerk: &Clerk<'_>) -> Result<Answered, Option<Failure>> {
     let mut reader = Reader(clerk);
     Ok(match command {
-        "wv" => parse::<WaveletRequest>(request)?.answer(&mut reader)?,
+        "wv" => request::<WaveletRequest>(text)?.answer(&mut reader)?,
         "calibrate" => {
             let advance = |steps| clerk.meter.advance(steps);
-            parse::<CalibrationRequest>(request)?.answer(&mut reader, &advance)?
+            request::<CalibrationRequest>(text)?.answer(&mut reader, &advance)?
         }
-        "run" => parse::<RunRequest>(request)?.answer(|| SEED, clerk)?,
-        "fuse" => parse::<FuseRequest>(request)?.answer()?,
-        "tune" => parse::<TuneRequest>(request)?.answer(clerk)?,
-        "require" => parse::<RequireRequest>(request)?.answer(clerk)?,
-        "design" => parse::<DesignRequest>(request)?.answer(clerk)?,
-        "choose" => parse::<ChoiceRequest>(request)?.answer(|| SEED, &mut reader, clerk)?,
-        "compare" => parse::<CompareRequest>(request)?.answer()?,
-        _ => return Err(Refusal::Request(format!("there is no command {command}"))),
-    })
-}
-
-/// A request, or what is wrong with it: where in the JSON is of no use to who gave arguments.
-fn parse<T: DeserializeOwned>(request: &str) -> Result<T, Refusal> {
-    serde_json::from_str(request).map_err(|e| {
-        let text = e.to_string();
-        let (message, _) = text.rsplit_once(" at line ").unwrap_or((&text, ""));
-        Refusal::Request(message.to_owned())
+        "run" => request::<RunRequest>(text)?.answer(|| SEED, clerk)?,
+        "fuse" => request::<FuseRequest>(text)?.answer()?,
+        "tune" => request::<TuneRequest>(text)?.answer(clerk)?,
+        "require" => request::<RequireRequest>(text)?.answer(clerk)?,
+        "design" => request::<DesignRequest>(text)?.answer(clerk)?,
+        "choose" => request::<ChoiceRequest>(text)?.answer(|| SEED, &mut reader, clerk)?,
+        "compare" => request::<CompareRequest>(text)?.answer()?,
+        _ => return Err(None),
     })
 }
 

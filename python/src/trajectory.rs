@@ -49,7 +49,7 @@ pub(crate) fn trajectory_states<'py>(
     for (k, name) in COLUMNS.into_iter().enumerate() {
         columns.set_item(name, PyArray1::from_vec(py, states.iter().map(|state| state[k]).collect()))?;
     }
-    Ok((columns, span_s, doubts.iter().map(|doubt| doubt.to_string().replace(hidden, "")).collect()))
+    Ok((columns, span_s, doubts.iter().map(|doubt| error::shown(&doubt.to_string(), hidden)).collect()))
 }
 
 /// Highest rate that is of use (Hz).

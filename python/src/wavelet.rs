@@ -3,7 +3,7 @@
 use crate::error;
 use crate::work::work;
 use nav_sim::signal::wavelet::{
-    Convention, RobustVariance, Tuning, WaveletError, both, default_levels, haar, interval,
+    Convention, RobustVariance, Tuning, WaveletError, both, default_levels, gappy, haar, interval,
 };
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -40,15 +40,20 @@ pub(crate) fn wavelet<'py>(
     Ok(columns)
 }
 
-/// The samples less their mean, summed about the first of them, as the readers of recordings do it: a large offset costs no
+/// The samples less the mean of those that are there, summed about the first of them, as the readers of recordings do it: a large offset costs no
 /// digits.
 fn without_mean(mut samples: Vec<f64>) -> Vec<f64> {
-    let Some(first) = samples.first().copied() else { return samples };
-    let mean = first + samples.iter().map(|v| v - first).sum::<f64>() / samples.len() as f64;
-    // One sample that is no number would make all of them so, and the first would be blamed.
+    let present = || samples.iter().filter(|v| !v.is_nan());
+    let Some(first) = present().next().copied() else { return samples };
+    let mean = first + present().map(|v| v - first).sum::<f64>() / present().count() as f64;
+    // An infinite one would make all of them so, and the first would be blamed.
     let mean = if mean.is_finite() { mean } else { 0.0 };
     samples.iter_mut().for_each(|v| *v -= mean);
     samples
+}
+
+fn values(robust: &[RobustVariance]) -> Vec<f64> {
+    robust.iter().map(|r| r.value).collect()
 }
 
 fn variances(
@@ -57,15 +62,24 @@ fn variances(
     efficiency: Option<f64>,
 ) -> Result<Variances, WaveletError> {
     let levels = scales.unwrap_or_else(|| default_levels(signal.len()));
-    let classical = |level| interval::edof_eta3(signal.len(), level);
-    let (wv, edof): (Vec<f64>, Vec<f64>) = match efficiency {
-        None => (haar::classical(signal, levels)?, (1..=levels).map(classical).collect()),
-        Some(efficiency) => {
-            let tuning = Tuning::new(efficiency, Convention::Exact)?;
-            let robust: Vec<RobustVariance> = both(signal, levels, &tuning)?.1;
-            let edof = (1..=levels).map(|level| interval::edof_robust(classical(level), efficiency));
-            (robust.iter().map(|r| r.value).collect(), edof.collect())
-        }
+    let tuning = efficiency.map(|efficiency| Tuning::new(efficiency, Convention::Exact)).transpose()?;
+    let (wv, coverage) = if signal.iter().any(|x| x.is_nan()) {
+        let found = gappy(signal, levels, &tuning.unwrap_or_default())?;
+        (if tuning.is_some() { values(&found.robust) } else { found.classical }, found.coverage)
+    } else {
+        let wv = match &tuning {
+            None => haar::classical(signal, levels)?,
+            Some(tuning) => values(&both(signal, levels, tuning)?.1),
+        };
+        (wv, vec![1.0; levels as usize])
+    };
+    // As the command has them: of the samples that are there, and no fewer than one.
+    let classical = (1..)
+        .zip(&coverage)
+        .map(|(level, covered)| (interval::edof_eta3(signal.len(), level) * covered).max(1.0));
+    let edof: Vec<f64> = match efficiency {
+        None => classical.collect(),
+        Some(efficiency) => classical.map(|edof| interval::edof_robust(edof, efficiency)).collect(),
     };
     let ends = wv.iter().zip(&edof).map(|(wv, edof)| interval::interval(*wv, *edof, CONFIDENCE)).collect();
     Ok(Variances { wv, edof, ends })

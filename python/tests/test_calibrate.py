@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import pickle
 from pathlib import Path
 from typing import Any
 
 import nav_sim
 import numpy as np
 import pytest
-from conftest import Command, table, without_times
+from conftest import DRIVE, Command, table, without_times
 from nav_sim import Model, NavSimError, calibrate
 
 USUAL: dict[str, Any] = {"model": "AR1+RW+WN", "bootstrap": 20}
@@ -87,7 +88,7 @@ def test_several_estimators_have_a_model_each(recordings: Path) -> None:
         ([], {}, "recordings: there is nothing in it"),
         ({"gyro_x_rad_s": [1.0, 2.0], "gyro_y_rad_s": [1.0]}, {"rate_hz": 1.0}, "recordings: gyro_y_rad_s has 1 rows"),
         ({}, {}, "recordings: there are no columns"),
-        ({"gyro_x_rad_s": np.r_[np.zeros(50), np.nan, np.ones(50)]}, {"rate_hz": 1.0}, "recordings.npz, line 51"),
+        ({"gyro_x_rad_s": np.r_[np.zeros(50), np.nan, np.ones(50)]}, {"rate_hz": 1.0}, "recordings, row 50"),
         ("no/such/place", {}, "no/such/place"),
         (7, {}, "recordings"),
     ],
@@ -126,3 +127,36 @@ def test_a_calibrated_model_keeps_its_intervals(recordings: Path, short: Path, t
     interval = in_memory.outages["horizontal_error_end_m_p95_ci95_low"]
     assert np.isfinite(interval).all()
     np.testing.assert_array_equal(interval, written.outages["horizontal_error_end_m_p95_ci95_low"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"bootstrap": "many"}, 'bootstrap="many" is not a whole number'),
+        ({"seed": 1.5}, "seed=1.5 is not a whole number"),
+        ({"efficiency": "high"}, 'efficiency="high" is not a number'),
+        ({"estimator": "best"}, 'estimator="best" is not one of awv'),
+        ({"pool": "axis"}, 'pool="axis" is not one of'),
+        ({"trim": "x"}, 'trim="x" is not a number of replicates'),
+        ({"model": object()}, "model: a object is neither"),
+        ({"axes": "gyr"}, 'axes=["gyr"] is not all, accel'),
+        ({"rate_hz": "fast"}, 'rate_hz="fast" is not a number'),
+    ],
+)
+def test_a_wrong_argument_is_named(arguments: dict[str, Any], words: str) -> None:
+    with pytest.raises(NavSimError) as refused:
+        calibrate(np.zeros((64, 6)), **{"rate_hz": 100.0, **arguments})
+    assert refused.value.message.startswith(words), refused.value.message
+
+
+@pytest.mark.filterwarnings("ignore::nav_sim.NavSimWarning")
+def test_answers_pickle(recordings: Path, tmp_path: Path) -> None:
+    fit = calibrate(recordings, **USUAL)
+    again = pickle.loads(pickle.dumps(fit))
+    for name in (*fit.files,):
+        assert again.text(name) == fit.text(name)
+    assert (again.data, again.summary(), again.verdict) == (fit.data, fit.summary(), fit.verdict)
+    assert again.model == fit.model and str(again) == str(fit)
+    assert again.to_html(tmp_path / "a.html").read_bytes() == fit.to_html(tmp_path / "b.html").read_bytes()
+    run = nav_sim.lincov(DRIVE, fit.model, outages=[(60, 90)])
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(run)).epochs["nees"], run.epochs["nees"])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
+import nav_sim
 import numpy as np
 import pytest
-from conftest import CONSUMER, DRIVE, TACTICAL, Command, table
+from conftest import CONSUMER, DRIVE, ROOT, TACTICAL, Command, table
 from nav_sim import Model, NavSimError, NavSimWarning, Trajectory
 
 
@@ -123,3 +125,54 @@ def test_a_trajectory_of_a_file() -> None:
             Trajectory(wrong)  # type: ignore[arg-type]
     with pytest.raises(NavSimError, match="rate_hz"):
         way.states(-1.0)
+
+
+def test_a_data_sheet_is_that_of_the_command(command: Command, tmp_path: Path) -> None:
+    command("datasheet", "--unit", "stim300", "--rate-hz", 200, "--corr-time", "1000 s", "-o", tmp_path / "m.toml")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", nav_sim.NavSimWarning)
+        own = Model.from_datasheet("stim300", rate_hz=200.0, corr_time="1000 s")
+        entry = ROOT / "calib_data" / "catalogue" / "stim300.toml"
+        of_entry = Model.from_datasheet(entry=entry, rate_hz=200.0, corr_time="1000 s")
+    assert own.to_toml() == of_entry.to_toml() == (tmp_path / "m.toml").read_text(encoding="utf-8")
+    units = nav_sim.catalogue()
+    assert "stim300" in units["unit"] and len(units["given"]) == len(units["source"])
+
+
+def test_a_density_is_that_of_the_sheet() -> None:
+    with pytest.warns(nav_sim.NavSimWarning) as told:
+        model = Model.from_datasheet(arw="0.15 deg/sqrt(h)", rate_hz=100.0)
+    assert any("(gyro_bias=)" in str(warning.message) for warning in told)
+    # sigma2 = N² rate: 0.15°/60/√s, squared, times 100 Hz
+    assert model.processes["gyro.x"] == [{"type": "WN", "sigma2": pytest.approx((np.radians(0.15) / 60.0) ** 2 * 100.0)}]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({}, "no figure is given"),
+        ({"unit": "stim301"}, "unit= stim301"),
+        ({"arw": "0.15 m"}, 'arw="0.15 m"'),
+        ({"arw": 0.15}, "arw=0.15 is not a text"),
+        ({"entry": {"unit": {"manufacturer": "a"}}}, "entry: "),
+    ],
+)
+def test_what_is_no_data_sheet_is_refused(arguments: dict[str, Any], words: str) -> None:
+    with pytest.raises(NavSimError) as refused:
+        Model.from_datasheet(**arguments)
+    assert refused.value.message.startswith(words), refused.value.message
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (5, "gyro=5 is not a list of processes"),
+        ([5], '"gyro.processes" = 5 is not a table'),
+        ([{"type": "WN", "sigma2": "x"}], '"gyro.processes[1].sigma2" = "x" is not a number'),
+    ],
+)
+def test_what_is_no_process_is_refused(given: Any, words: str) -> None:
+    with pytest.raises(NavSimError) as refused:
+        Model(100.0, gyro=given)
+    assert refused.value.message.startswith(words), refused.value.message
+    assert Model(100.0, gyro={"type": "WN", "sigma2": 1.0}) == Model(100.0, gyro=[{"type": "WN", "sigma2": 1.0}])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import nav_sim
 import numpy as np
@@ -84,20 +85,13 @@ def test_bounds_are_told(short: Path) -> None:
     assert lincov(short, TACTICAL, outages=[(20, 40)], require=["p95_m<=1000"]).unmet is None
 
 
-def test_wrong_arguments_are_refused() -> None:
-    for arguments in (
-        {"filter": 16},
-        {"require": "p95<5"},
-        {"scenario": {"imu": {"rate": 1.0}}},
-        {"turn_on_bias": (1,)},
-    ):
-        with pytest.raises(NavSimError):
-            lincov(DRIVE, TACTICAL, **arguments)
+def test_wrong_trajectories_are_refused() -> None:
     with pytest.raises(NavSimError, match="no/such"):
         lincov("no/such.toml", TACTICAL)
     with pytest.raises(NavSimError) as refused:
         lincov({"t_s": [0.0, 1.0, np.nan], "lat_deg": [0.0] * 3, "lon_deg": [0.0] * 3, "h_m": [0.0] * 3}, TACTICAL)
-    assert refused.value.file == "trajectory.csv" and refused.value.line == 4
+    assert refused.value.file == "trajectory" and refused.value.line == 2
+    assert refused.value.message.startswith('trajectory, row 2: column "t_s"')
 
 
 def test_a_fusion_is_that_of_the_command(drive: Path, command: Command, tmp_path: Path) -> None:
@@ -134,3 +128,68 @@ def test_outages_that_are_no_pairs_are_named() -> None:
     for wrong in [(300, 390), 5, [(300, "x")]]:
         with pytest.raises(NavSimError, match="not pairs of start and end"):
             lincov(DRIVE, TACTICAL, outages=wrong)  # type: ignore[arg-type]
+
+
+def test_horizontal_errors_have_columns(short: Path) -> None:
+    own = lincov(short, TACTICAL, outages=[(20, 40)])
+    for table, place in ((own.epochs, ""), (own.outages, "end_")):
+        for name in ("asee", "rmse"):
+            north, east = (table[f"{name}_{place}pos_{axis}_m"] for axis in "ne")
+            np.testing.assert_array_equal(table[f"{name}_{place}horizontal_m"], np.hypot(north, east))
+
+
+def frame(path: Path) -> Any:
+    return pytest.importorskip("pandas").DataFrame(table(path))
+
+
+def test_attitude_without_a_unit_is_not_guessed(short: Path) -> None:
+    drive = frame(short)
+    bare = drive.rename(columns=lambda name: name.replace("_deg", "") if name[0] in "rpy" else name)
+    np.testing.assert_array_equal(Trajectory(bare).states()["yaw_deg"], Trajectory(drive).states()["yaw_deg"])
+    angles = ["roll", "pitch", "yaw"]
+    bare[angles] = np.radians(bare[angles])
+    with pytest.raises(NavSimError, match="the unit of roll, pitch, yaw is not in the name") as refused:
+        lincov(bare, TACTICAL)
+    assert "_rad" in (refused.value.hint or "")
+    named = bare.rename(columns={name: f"{name}_rad" for name in angles})
+    np.testing.assert_allclose(Trajectory(named).states()["yaw_deg"], Trajectory(drive).states()["yaw_deg"], atol=1e-9)
+
+
+def test_a_frame_may_have_its_time_as_index_but_no_dates(short: Path) -> None:
+    drive = frame(short)
+    own = Trajectory(drive.set_index("t_s")).states()
+    np.testing.assert_array_equal(own["lat_deg"], Trajectory(drive).states()["lat_deg"])
+    with pytest.raises(NavSimError, match="t_s.*dates, and seconds are needed"):
+        Trajectory(drive.assign(t_s=drive["t_s"].astype("datetime64[s]")))
+
+
+def test_local_coordinates_ask_for_an_origin() -> None:
+    path = {"t_s": np.arange(9.0), "n_m": np.arange(9.0), "e_m": np.arange(9.0), "d_m": np.zeros(9)}
+    with pytest.raises(NavSimError) as refused:
+        lincov(path, TACTICAL)
+    assert refused.value.hint is not None and "Trajectory(…, origin=(lat_deg, lon_deg, h_m))" in refused.value.hint
+    with pytest.warns(nav_sim.NavSimWarning, match="^trajectory: no attitude"):
+        moved = Trajectory(path, origin=(46.5, 6.6, 400.0))
+    assert moved.states()["lat_deg"][0] == pytest.approx(46.5, abs=1e-12)
+
+
+WRONG: list[tuple[dict[str, Any], str]] = [
+    ({"filter": 16}, 'filter="16" is not "15"'),
+    ({"require": "p95<5"}, 'require=["p95<5"] is not "consistent" or NAME'),
+    ({"require": 5.0}, "require=5.0 is neither a text nor a list"),
+    ({"turn_on_bias": (1,)}, "turn_on_bias="),
+    ({"turn_on_bias": ("a", 1.0)}, 'turn_on_bias="a" is not a number'),
+    ({"scenario": {"imu": {"rate": 1.0}}}, 'scenario: unknown key "imu.rate"'),
+    ({"scenario": {"gnss": {"rate_hz": "x"}}}, 'scenario: "gnss.rate_hz" = "x" is not a number'),
+    ({"scenario": 3}, "scenario: a int is neither a path nor a dict"),
+    ({"truth": 3}, "truth: a int is no path"),
+    ({"outages": [(1, 2, 3)]}, "outages="),
+    ({"progress": 3}, "progress=3"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), WRONG)
+def test_a_wrong_argument_is_named(arguments: dict[str, Any], words: str) -> None:
+    with pytest.raises(NavSimError) as refused:
+        lincov(DRIVE, TACTICAL, **arguments)
+    assert refused.value.message.startswith(words), refused.value.message

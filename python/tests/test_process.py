@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import inspect
 import os
+import re
 import signal
 import subprocess
 import sys
 import textwrap
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import nav_sim
@@ -136,3 +139,37 @@ def test_every_name_is_there_and_described() -> None:
         assert getattr(nav_sim, name).__doc__, name
     with pytest.raises(AttributeError):
         nav_sim.no_such_name  # noqa: B018
+
+
+ANNOTATED = [getattr(nav_sim, name) for name in nav_sim.__all__ if inspect.isroutine(getattr(nav_sim, name))]
+
+
+@pytest.mark.parametrize("function", [*ANNOTATED, nav_sim.Model.from_datasheet], ids=lambda f: f.__name__)
+def test_every_argument_is_described(function: Callable[..., object]) -> None:
+    text = function.__doc__ or ""
+    if "with the arguments of `wavelet_variance`" in text:
+        text += nav_sim.wavelet_variance.__doc__ or ""
+    missing = [name for name in inspect.signature(function).parameters if not re.search(rf"\b{name}\b", text)]
+    assert not missing
+
+
+def test_a_doubt_points_to_the_line_of_the_caller(short: Path) -> None:
+    path = {name: values for name, values in nav_sim.Trajectory(short).states(2.0).items() if name[0] in "tlh"}
+    calls: list[Callable[[], object]] = [
+        lambda: nav_sim.Trajectory(path),
+        lambda: nav_sim.run(path, TACTICAL, runs=1, outages=[]),
+        lambda: nav_sim.lincov(path, TACTICAL, outages=[]),
+        lambda: nav_sim.Model.from_datasheet(arw="0.1 deg/sqrt(h)"),
+    ]
+    for call in calls:
+        with pytest.warns(nav_sim.NavSimWarning) as told:
+            call()
+        assert {warning.filename for warning in told} == {__file__}
+
+
+def test_progress_without_tqdm_is_a_line(
+    short: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "tqdm.auto", None)
+    nav_sim.run(short, TACTICAL, runs=3, outages=[], progress=True)
+    assert capsys.readouterr().err.endswith("3 of 3\n")

@@ -84,7 +84,7 @@ def test_whatever_numpy_takes_for_a_vector_is_one(x: object) -> None:
         (3.0, 1.0, "x: 0 dimensions"),
         ([], 1.0, "x: there is nothing in it"),
         ([1.0], 1.0, "x:"),
-        ([1.0, np.nan, 2.0, 3.0], 1.0, "x:"),
+        ([np.nan, np.nan, 2.0, np.nan], 1.0, "x:"),
         ([1.0, np.inf, 2.0, 3.0], 1.0, "x:"),
         (["a", "b"], 1.0, "x: not an array of numbers"),
         ([[1.0, 2.0], [3.0]], 1.0, "x: not an array of numbers"),
@@ -123,6 +123,20 @@ def test_a_plot_is_drawn_where_it_is_asked_for() -> None:
 
 def test_the_sample_that_is_no_number_is_named() -> None:
     x = np.random.default_rng(1).normal(size=1000)
-    x[500] = np.nan
-    with pytest.raises(nav_sim.NavSimError, match="sample 500 is NaN"):
+    x[500] = np.inf
+    with pytest.raises(nav_sim.NavSimError, match="sample 500 is "):
         nav_sim.wavelet_variance(x, rate_hz=100.0)
+
+
+def test_missing_samples_are_those_of_a_recording_with_gaps() -> None:
+    # the command finds the same samples missing by the times of the others
+    x = np.random.default_rng(6).standard_normal(4096)
+    missing = np.zeros(4096, dtype=bool)
+    missing[1000:1100] = missing[2000:2003] = True
+    given = {"t_s": np.arange(4096)[~missing] / 100.0, "gyro_z_rad_s": x[~missing]}
+    with pytest.warns(nav_sim.NavSimWarning):
+        (file,) = nav_sim.wv(given).signals
+    for name, robust in (("classical", False), ("robust", True)):
+        own = wavelet_variance(np.where(missing, np.nan, x), 100.0, robust=robust)
+        for key, values in file[name].items():
+            np.testing.assert_allclose(own[key], values, rtol=1e-12, err_msg=f"{name} {key}")

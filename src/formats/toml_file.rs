@@ -489,10 +489,14 @@ fn reason(message: &str, quoted: &[&str]) -> String {
         Some("a string") => "is not a text in quotes".to_owned(),
         Some("a sequence") => "is not a list".to_owned(),
         Some("a boolean") => "is not true or false".to_owned(),
+        Some("path string") => "is not a path".to_owned(),
+        Some(other) if other.starts_with("internally tagged enum") => "is not a table".to_owned(),
         Some(other) if !other.contains(' ') => format!("is refused: {message}"),
         Some(other) => format!("is not {}", other.strip_prefix("struct").map_or(other, |_| "a table")),
         // a type of ours says it in words that follow the value
         None if message.starts_with("is ") => message.to_owned(),
+        None if message.starts_with("not ") => format!("is {message}"),
+        None if message.starts_with("expected ") => message.replacen("expected", "is not", 1),
         None => format!("is refused: {message}"),
     }
 }
@@ -509,6 +513,8 @@ mod tests {
         part: Option<Part>,
         parts: Option<Vec<Part>>,
         words: Option<Vec<Word>>,
+        kinds: Option<Vec<Operation>>,
+        place: Option<std::path::PathBuf>,
     }
 
     #[derive(Debug, Deserialize)]
@@ -540,6 +546,8 @@ mod tests {
                 "line 2: \"parts\" = [parts] is not a list | there may be several: write [[parts]], in double brackets",
             ),
             ("count = 1\npart = 3\n", "line 2: \"part\" = 3 is not a table | "),
+            ("count = 1\nkinds = [3]\n", "line 2: \"kinds\" = 3 is not a table | "),
+            ("count = 1\nplace = 3\n", "line 2: \"place\" = 3 is not a path | "),
             (
                 "count = 1\n[part]\nx = 1\nxyz = [1, 2]\n",
                 "line 4: \"part.xyz\" = [1, 2] is not an array of length 3 | ",

@@ -25,7 +25,7 @@ mod write;
 pub(crate) use description::schema;
 pub use provenance::Misfit;
 pub use read::{from_text, read};
-pub(crate) use write::to_toml;
+pub use write::to_toml;
 pub use write::write;
 
 use nav_sim_signal::imu::{Channel, Sensor};

@@ -17,7 +17,7 @@ pub fn write(path: &Path, file: &ModelFile) -> Result<(), FileError> {
 }
 
 /// The text of a model file. A sensor whose three axes are alike is written once.
-pub(crate) fn to_toml(file: &ModelFile) -> String {
+pub fn to_toml(file: &ModelFile) -> String {
     let mut out = format!("schema = {SCHEMA}\nrate_hz = {:?}\n", file.model.rate_hz);
     for sensor in Sensor::ALL {
         let tables = Axis::ALL.map(|axis| processes(file, Channel { sensor, axis }));

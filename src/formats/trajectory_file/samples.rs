@@ -4,12 +4,13 @@ use super::columns::{Column, Columns, Known, Unit};
 use super::doubts;
 use super::table::{COLUMNS, Numbers, Table};
 use super::{Options, Warning};
-use crate::formats::{FileError as Error, Place, Setting};
+use crate::formats::{FileError as Error, Kind, Place, Setting};
 use glam::{DQuat, DVec3};
 use nav_sim_navigation::earth::{e_to_n, ecef_to_geodetic, geodetic_to_ecef};
 use nav_sim_navigation::frames::{RollPitchYaw, q_e_n, wrap_angle};
 use nav_sim_navigation::trajectory::{self, Trajectory, TrajectorySample};
 use nav_sim_signal::units::DEG;
+use std::f64::consts::TAU;
 
 /// Positions faster than this from one row to the next are no motion (m/s).
 const MAX_SPEED: f64 = 8000.0;
@@ -190,6 +191,7 @@ pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Res
     let optional = [ATTITUDE, VELOCITY].into_iter().filter(|names| any(*names)).flatten();
     let position = if is_local { LOCAL } else { GEODETIC };
     columns.require(&table, ["t_s"].into_iter().chain(position).chain(optional), COLUMNS)?;
+    check_units(&table, &columns)?;
     let all = table.rows.len();
     match numbers {
         Numbers::Finite => check_ranges(&table, &columns)?,
@@ -215,6 +217,23 @@ pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Res
         rows.doubt(None, "no attitude columns: heading and pitch follow the path, roll is 0");
     }
     Ok(rows)
+}
+
+/// Refuses angles of the attitude without a unit in their names, of which none is too large for radians.
+fn check_units(table: &Table, columns: &Columns) -> Result<(), Error> {
+    let name = |column: Column| table.columns[column.index].to_lowercase();
+    let bare: Vec<Column> = (ATTITUDE.into_iter().filter_map(|quantity| columns.get(quantity)))
+        .filter(|column| !name(*column).ends_with("deg") && !name(*column).ends_with("rad"))
+        .collect();
+    let values = || bare.iter().flat_map(|column| table.rows.iter().map(|(_, row)| row[column.index].abs()));
+    let largest = values().filter(|x| x.is_finite()).fold(0.0, f64::max);
+    if largest == 0.0 || largest > TAU {
+        return Ok(()); // alike in both units, or degrees
+    }
+    let names: Vec<String> = bare.into_iter().map(name).collect();
+    let message = format!("the unit of {} is not in the name, and no value exceeds 2π", names.join(", "));
+    Err(Error::new(table.path.as_str(), table.header_line, Kind::Columns(message.into()))
+        .advice("end the names in _deg or _rad"))
 }
 
 fn triad(columns: [Column; 3], row: &[f64]) -> DVec3 {

@@ -31,6 +31,21 @@ fn drive(replace: Option<(usize, &str)>) -> String {
     format!("{HEADER}{}\n", rows.join("\n"))
 }
 
+/// A heading of 45 may be degrees only; 0.785 may be either.
+#[test]
+fn attitude_without_a_unit_is_degrees_where_radians_cannot_be() {
+    let bare = drive(None).replacen("roll_deg,pitch_deg,yaw_deg", "Roll,pitch,yaw", 1);
+    assert!(read(&bare).is_ok());
+    let radians = bare.replace(",0.5,-1,45", ",0.01,-0.02,0.785");
+    let (message, hint) = refused(&radians);
+    assert_eq!(
+        message,
+        "a.csv, line 1: the unit of roll, pitch, yaw is not in the name, and no value exceeds 2π"
+    );
+    assert_eq!(hint, "end the names in _deg or _rad");
+    assert!(read(&bare.replace(",0.5,-1,45", ",0,0,0")).is_ok());
+}
+
 fn refused(text: &str) -> (String, String) {
     let e = read(text).unwrap_err();
     assert!(!e.is_system());
