@@ -76,6 +76,7 @@ def require(
     start: float | None = None,
     gnss: Settings | None = None,
     scenario: Settings | None = None,
+    vehicle: str | None = None,
     iso_drift: bool = False,
     catalogue: StrPath | bool | None = None,
     progress: Progress = None,
@@ -101,6 +102,7 @@ def require(
             start=start,
             gnss=None if gnss is None else staging.settings(gnss, "gnss"),
             scenario=None if scenario is None else staging.settings(scenario, "scenario"),
+            vehicle=vehicle,
             iso_drift=iso_drift,
             catalogue=_catalogue(catalogue),
         )

@@ -145,7 +145,7 @@ mod tests {
         let schema = schemars::schema_for!(Scenario).to_value();
         let mut all = Vec::new();
         numbers(&schema, &schema, "", &mut all);
-        assert_eq!(all.len(), 32, "{all:?}");
+        assert_eq!(all.len(), 59, "{all:?}");
         for (key, said, entries) in all {
             let refused = |value: f64| is_refused(&key, value, entries);
             let outside = |bound: f64, toward: f64| match said["type"].to_string().contains("integer") {
