@@ -60,6 +60,8 @@ mod run;
 mod smoother;
 pub mod standstill;
 mod vehicle;
+#[cfg(test)]
+mod vehicle_tests;
 
 pub use assessment::{Assessment, Confidence, Finding, assess};
 pub use clocks::{ClocksApart, clocks_apart};

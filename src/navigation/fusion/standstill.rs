@@ -15,7 +15,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Length of a window (s).
 pub const WINDOW_S: f64 = 0.5;
-/// Windows in motion that are taken for standstill: at most this share of the recording's own.
+/// Windows in motion that are taken for standstill without fixes or a wheel: this share of the recording's own.
 pub const FALSE_ALARMS: f64 = 1e-3;
 /// Windows at rest that are missed where their noise is white.
 pub const MISSES: f64 = 0.01;
@@ -47,8 +47,8 @@ pub struct Standstill {
     force: f64,
     /// Angular rate at rest (rad/s).
     rate: DVec3,
-    /// Largest T of a standstill per degree of freedom.
-    threshold: f64,
+    /// Largest T of a standstill per degree of freedom: where fixes or a wheel say so too, and by itself.
+    thresholds: [f64; 2],
 }
 
 /// Means, and pooled variances of a component.
@@ -99,13 +99,14 @@ impl Standstill {
             sigma: [0, 1].map(|i| (median(&|m| m.variance[i]) / of_median).sqrt()),
             force: median(&|m| m.mean[0].length()),
             rate: DVec3::from_array([0, 1, 2].map(|i| median(&|m| m.mean[1][i]))),
-            threshold: 0.0,
+            thresholds: [0.0; 2],
         };
         let of_white = ChiSquared::new(degrees(samples)).ok()?.inverse_cdf(1.0 - MISSES) / degrees(samples);
         let of_still = quantile(of(Motion::Still).map(|w| found.statistic(w)).collect(), KEPT);
         let moving: Vec<f64> = of(Motion::Moving).map(|w| found.statistic(w)).collect();
         let of_moving = if moving.is_empty() { f64::INFINITY } else { quantile(moving, FALSE_ALARMS) };
-        found.threshold = of_white.max(of_still).min(of_moving);
+        let of_rest = of_white.max(of_still);
+        found.thresholds = [of_rest, of_rest.min(of_moving)];
         Some(found)
     }
 
@@ -119,10 +120,14 @@ impl Standstill {
         window.iter().map(of_sample).sum::<f64>() / degrees(window.len())
     }
 
-    /// Whether a window is one of standstill.
+    /// Whether a window is one of standstill, of which fixes or a wheel say this.
     #[must_use]
-    pub fn stands(&self, window: &[ImuIncrement]) -> bool {
-        self.statistic(window) < self.threshold
+    pub fn stands(&self, window: &[ImuIncrement], motion: Motion) -> bool {
+        match motion {
+            Motion::Still => self.statistic(window) < self.thresholds[0],
+            Motion::Unknown => self.statistic(window) < self.thresholds[1],
+            Motion::Slow | Motion::Moving => false,
+        }
     }
 }
 
@@ -170,16 +175,17 @@ mod tests {
         imu.chunks(N).map(|window| (window, motion)).collect()
     }
 
-    /// White noise is missed once in a hundred windows: of 4000 the number is binomial, 40 ± 6.3 (four standard
-    /// deviations), and the noise, learnt from 4000 windows of 147 degrees each, moves it by 1.
+    /// White noise is missed once in a hundred windows: of 4000 the number is binomial, 40 ± 6.3. The noise is learnt to
+    /// 0.12 % (a median of 4000 deviations of 147 degrees: 1.25/√(2 · 147 · 4000)), which moves T by 0.03 of its deviation
+    /// and the number by 3: four of √(6.3² + 3²).
     #[test]
     fn white_noise_is_missed_as_rarely_as_stated() {
         let learnt = at_rest(4000, 1);
         let found = Standstill::learn(&as_moving(&learnt, Motion::Still)).unwrap();
-        assert!((found.sigma[0] / 0.05 - 1.0).abs() < 2e-3 && (found.sigma[1] / 3e-3 - 1.0).abs() < 2e-3);
+        assert!((found.sigma[0] / 0.05 - 1.0).abs() < 5e-3 && (found.sigma[1] / 3e-3 - 1.0).abs() < 5e-3);
         let fresh = at_rest(4000, 2);
-        let missed = fresh.chunks(N).filter(|window| !found.stands(window)).count();
-        assert!((missed as f64 - 40.0).abs() < 4.0 * 6.3 + 1.0, "{missed}");
+        let missed = fresh.chunks(N).filter(|window| !found.stands(window, Motion::Unknown)).count();
+        assert!((missed as f64 - 40.0).abs() < 28.0, "{missed}");
     }
 
     /// A car that sways by 0.3 m/s² and turns by 2 deg/s never stands.
@@ -191,8 +197,8 @@ mod tests {
         let mut windows = as_moving(&rest, Motion::Still);
         windows.extend(as_moving(&moves, Motion::Moving));
         let found = Standstill::learn(&windows).unwrap();
-        assert_eq!(moves.chunks(N).filter(|window| found.stands(window)).count(), 0);
-        assert!(rest.chunks(N).filter(|window| found.stands(window)).count() > 190);
+        assert_eq!(moves.chunks(N).filter(|window| found.stands(window, Motion::Unknown)).count(), 0);
+        assert!(rest.chunks(N).filter(|window| found.stands(window, Motion::Unknown)).count() > 190);
     }
 
     /// On a road as smooth as standstill the IMU cannot tell: of windows of the same kind that were not learnt from, no
@@ -204,7 +210,7 @@ mod tests {
         let mut windows = as_moving(&rest, Motion::Still);
         windows.extend(as_moving(&smooth, Motion::Moving));
         let found = Standstill::learn(&windows).unwrap();
-        let alarms = fresh.chunks(N).filter(|window| found.stands(window)).count();
+        let alarms = fresh.chunks(N).filter(|window| found.stands(window, Motion::Unknown)).count();
         assert!((alarms as f64) < 4.0 + 4.0 * 8.0_f64.sqrt(), "{alarms}");
     }
 

@@ -224,7 +224,6 @@ impl Scene<'_> {
     }
 
     fn stands(&self, test: &Standstill, k: usize) -> bool {
-        let is_possible = matches!(self.motion(self.imu[k].t_s), Motion::Still | Motion::Unknown);
-        is_possible && self.window(k).is_some_and(|window| test.stands(window))
+        self.window(k).is_some_and(|window| test.stands(window, self.motion(self.imu[k].t_s)))
     }
 }
