@@ -56,7 +56,7 @@ pub(crate) struct Configuration {
     #[serde(default)]
     pub(crate) heading: Option<Heading>,
     /// What is believed of the vehicle's own knowledge.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "AidingSettings::is_none")]
     pub(crate) aiding: AidingSettings,
     /// How much earlier than its time a fix is taken to be (s).
     pub(crate) gnss_delay_s: f64,
