@@ -276,8 +276,8 @@ impl Drive {
 
     /// Refuses a wheel of another time or unit.
     fn check_wheel(&self, recorded: &Recorded<'_>, outages: &[Outage]) -> Result<(), FuseError> {
-        /// Tyres differ by less, units by more.
-        const RATIO: Range<f64> = 0.8..1.25;
+        /// Tyres and speeds by noisy positions differ by less, units by more.
+        const RATIO: Range<f64> = 0.6..1.55;
         let span = self.imu.first().zip(self.imu.last());
         let is_within = |w: &WheelSpeed| span.is_some_and(|(a, b)| (a.t_s..=b.t_s).contains(&w.t_s));
         if !self.wheel.is_empty() && !self.wheel.iter().any(is_within) {
