@@ -283,6 +283,10 @@ def fuse(
     gnss_sigma: float | Mapping[str, Any] | None = None,
     gnss_delay_s: float = 0.0,
     gnss_correlation: str | float = "auto",
+    nhc: bool = False,
+    zupt: bool = False,
+    odometer: StrPath | Table | None = None,
+    rear_axle_m: Sequence[float] = (0.0, 0.0, 0.0),
     topic: tuple[str | None, str | None] | None = None,
     smooth: bool = False,
     progress: Progress = None,
@@ -317,6 +321,14 @@ def fuse(
         How late fixes are stamped (s).
     gnss_correlation
         How long errors of positions last: "auto", "none", or seconds.
+    nhc
+        Road vehicle: its rear axle moves neither sideways nor up.
+    zupt
+        The velocity is zero where IMU and fixes show that the vehicle stands.
+    odometer
+        Speed of a wheel: a file, or columns `t_s` and `wheel_m_s`.
+    rear_axle_m
+        Middle of the rear axle from the IMU: front, right, down (m).
     topic
         Topics of IMU and fixes in a log that has several.
     filter, turn_on_bias
@@ -355,6 +367,10 @@ def fuse(
             gnss_sigma=_sigma(gnss_sigma),
             gnss_delay_s=gnss_delay_s,
             gnss_correlation=lasts,
+            nhc=nhc,
+            zupt=zupt,
+            odometer=None if odometer is None else staging.table(odometer, "odometer"),
+            rear_axle_m=[float(x) for x in rear_axle_m],
             topic=_topics(topic),
             smooth=smooth,
         )

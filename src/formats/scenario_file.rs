@@ -70,7 +70,7 @@ mod tests {
         let (message, _) = refused("[gnss]\npos_sigma_m = [1, 2]\n");
         assert_eq!(message, "s.toml, line 2: \"gnss.pos_sigma_m\" = [1, 2] is not an array of length 3");
         let (message, _) = refused("[filter]\nstates = 16\n");
-        assert!(message.ends_with("= 16 is refused: expected \"15\", \"21\" or \"full\""), "{message}");
+        assert!(message.ends_with("= 16 is not \"15\", \"21\" or \"full\""), "{message}");
         let (message, _) = refused("[run]\nmethod = \"lincav\"\n");
         assert!(
             message.contains("\"run.method\" = \"lincav\"")

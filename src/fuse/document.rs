@@ -33,6 +33,10 @@ impl Answer for FuseAnswer {
             document.heading("Outages");
             document.table(&self.outage_table());
         }
+        if let Some(vehicle) = &summary.vehicle {
+            document.heading("Vehicle");
+            document.table(&vehicle.table());
+        }
         if let Some(reference) = &summary.reference {
             document.heading("States");
             document.table(&state_table(reference));
@@ -246,6 +250,11 @@ fn evidence(finding: &Finding) -> String {
         Finding::Ends(ends) => format!(
             "at the ends of {} outages and gaps errors are {:.1} times as large as stated (p = {:.0e})",
             ends.count, ends.error_over_sigma, ends.p_value
+        ),
+        Finding::Aid { aid, nis_per_component } => format!(
+            "{aid}: NIS {} per component, it is {:.1} times as far from the solution as stated",
+            readable(nis_per_component),
+            nis_per_component.sqrt()
         ),
         Finding::Rejected { rejected, of } => format!("{rejected} of {of} fixes were rejected"),
         Finding::Reference(c) => format!(

@@ -2,8 +2,9 @@
 
 use super::manifest::{Configuration, FuseManifest, Kind};
 use super::summary::{Cause, FixCorrelation, Fixes, FuseSummary, FuseVerdict, Initial};
+use super::vehicle::VehicleSummary;
 use super::{FuseError, FuseRequest, filter};
-use crate::formats::fusion_files::{self, read_gnss, read_imu, read_initial};
+use crate::formats::fusion_files::{self, read_gnss, read_imu, read_initial, read_wheel};
 use crate::formats::input;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::trajectory_file::{self, load_reference};
@@ -12,8 +13,9 @@ use nav_sim_navigation::ekf::{Belief, InitialSettings};
 use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
 use nav_sim_navigation::fusion::mounting::{self, Mounted, Mounting, MountingError};
 use nav_sim_navigation::fusion::{
-    Assessment, ClocksApart, Recorded, Settings, Solution, Start, Whiteness, assess, check_clocks,
-    clocks_apart, displaced, earlier, fuse, fuse_correlated, outcome, rest_of_origin, rough_origin,
+    Assessment, ClocksApart, Recorded, Settings, Solution, Start, WheelSpeed, Whiteness, assess,
+    check_clocks, clocks_apart, displaced, earlier, fuse, fuse_correlated, outcome, rest_of_origin,
+    rough_origin, vehicle_velocities, wheel_ratio,
 };
 use nav_sim_navigation::gnss::GnssFix;
 use nav_sim_navigation::metrics::{ReductionSummary, VerdictKind};
@@ -23,6 +25,7 @@ use nav_sim_navigation::trajectory::reference::Reference;
 use nav_sim_signal::imu::{ImuIncrement, Sensor};
 use nav_sim_signal::units::DEG;
 use serde::{Serialize, Serializer};
+use std::ops::Range;
 
 /// Remark on the files or the drive.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,6 +78,7 @@ pub(crate) struct Drive {
     imu: Vec<ImuIncrement>,
     imu_rate_hz: f64,
     gnss: Vec<GnssFix>,
+    wheel: Vec<WheelSpeed>,
     model: ModelFile,
     expected: InitialSettings,
     initial: Option<Start>,
@@ -104,6 +108,7 @@ impl Drive {
             fix.t_s -= request.gnss_delay_s;
         }
         let mut notes: Vec<FuseNote> = imu.remarks.into_iter().chain(remarks).map(FuseNote::from).collect();
+        let wheel = request.odometer.as_deref().map_or_else(|| Ok(Vec::new()), read_wheel)?;
         let initial = request.initial_file().map(|path| read_initial(path)).transpose()?;
         let model = model_file::read(&request.model)?;
         notes.extend(model.doubts(&request.model).into_iter().map(FuseNote::Doubt));
@@ -131,6 +136,7 @@ impl Drive {
             gnss_sigma_factor,
             gnss_correlation: request.gnss_correlation,
             heading: request.given_heading(),
+            aiding: request.aiding(),
             gnss_delay_s: request.gnss_delay_s,
         };
         let manifest = FuseManifest {
@@ -148,6 +154,7 @@ impl Drive {
             imu: imu.samples,
             imu_rate_hz: imu.rate_hz,
             gnss,
+            wheel,
             model,
             expected,
             initial,
@@ -163,7 +170,7 @@ impl Drive {
     /// Data and settings that do not fit together, or a filter that diverges.
     pub(crate) fn fuse(mut self) -> Result<FuseAnswer, FuseError> {
         let origin_s = self.common_origin()?;
-        let mut recorded = Recorded { imu: &self.imu, gnss: &self.gnss };
+        let mut recorded = Recorded { imu: &self.imu, gnss: &self.gnss, aids: &[] };
         let mut settings = self.settings.clone();
         let of_model = (&self.model.model, self.request.filter, &self.expected);
         let (belief, reduction) = filter::belief(of_model, self.imu_rate_hz, &self.gnss, &settings.outages)?;
@@ -198,6 +205,12 @@ impl Drive {
         let early = settings.outages.iter().copied().filter(is_early).map(FuseNote::EarlyOutage);
         self.notes.extend(early.collect::<Vec<_>>());
         settings.outages.retain(|outage| !is_early(outage));
+        // the start and the mounting are found without: they are what the vehicle's axes come from
+        let aiding = self.request.aiding();
+        self.check_wheel(&recorded, &settings.outages)?;
+        let aids = vehicle_velocities(&recorded, &self.wheel, &aiding, &settings.outages);
+        recorded.aids = &aids;
+        let belief = belief.with_vehicle(aiding.state_sigmas());
         let asked = (self.reference.as_ref(), self.request.gnss_correlation);
         let weighed = fuse_correlated(&recorded, &belief, &start, &settings, asked)?;
         if self.reference.is_some() && weighed.solution.rows.iter().all(|row| row.error.is_none()) {
@@ -234,6 +247,7 @@ impl Drive {
             fixes: Fixes { used, withheld, rejected },
             nis_per_component: outcome.nis_per_component,
             gnss_correlation: FixCorrelation::of(&weighed),
+            vehicle: VehicleSummary::of(&weighed.solution, &aiding),
             outages: outcome.outages,
             ends: outcome.ends,
             reference: outcome.reference,
@@ -252,12 +266,27 @@ impl Drive {
 impl Drive {
     /// Brings fixes to the clock of the IMU where the two have nothing in common and no delay is given; by how much (s).
     fn common_origin(&mut self) -> Result<Option<f64>, FuseError> {
-        let recorded = Recorded { imu: &self.imu, gnss: &self.gnss };
+        let recorded = Recorded { imu: &self.imu, gnss: &self.gnss, aids: &[] };
         let Err(apart) = check_clocks(&recorded) else { return Ok(None) };
         let is_free = self.request.gnss_delay_s == 0.0;
         let origin_s = is_free.then(|| rough_origin(&recorded)).flatten().ok_or(apart)?;
         self.gnss = earlier(&self.gnss, origin_s);
         Ok(Some(origin_s))
+    }
+
+    /// Refuses a wheel of another time or unit.
+    fn check_wheel(&self, recorded: &Recorded<'_>, outages: &[Outage]) -> Result<(), FuseError> {
+        /// Tyres and speeds by noisy positions differ by less, units by more.
+        const RATIO: Range<f64> = 0.6..1.55;
+        let span = self.imu.first().zip(self.imu.last());
+        let is_within = |w: &WheelSpeed| span.is_some_and(|(a, b)| (a.t_s..=b.t_s).contains(&w.t_s));
+        if !self.wheel.is_empty() && !self.wheel.iter().any(is_within) {
+            return Err(FuseError::WheelClock);
+        }
+        match wheel_ratio(recorded, &self.wheel, outages) {
+            Some(ratio) if !RATIO.contains(&ratio) => Err(FuseError::WheelSpeed(ratio)),
+            _ => Ok(()),
+        }
     }
 
     /// Why the mounting is not found: the clocks, where they are apart.

@@ -42,6 +42,12 @@ pub enum FuseError {
     /// The clocks are apart, and so the drive does not show how the IMU is mounted.
     #[error("{0}")]
     Apart(MountingError, ClocksApart),
+    /// The wheel is of another time.
+    #[error("the wheel and the IMU have no time in common")]
+    WheelClock,
+    /// The wheel is no wheel, or in another unit.
+    #[error("the wheel reads {0:.2} times the speed of the fixes")]
+    WheelSpeed(f64),
     /// The reference is of another time.
     #[error("the reference and the solution have no time in common")]
     NothingInCommon,
@@ -71,7 +77,8 @@ impl FuseError {
             Self::Mounting(_) => {
                 "give --mounting ROLL,PITCH,YAW, or minutes of driving with braking and turns, and velocities in the fixes"
             }
-            Self::NothingInCommon => "both need one clock",
+            Self::NothingInCommon | Self::WheelClock => "both need one clock",
+            Self::WheelSpeed(_) => "check the unit in the header: _m_s, _km_h or _mph",
             _ => return None,
         };
         Some(fixed.to_owned())

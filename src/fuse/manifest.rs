@@ -5,6 +5,7 @@ use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
 use nav_sim_navigation::fusion::mounting::Mounted;
 use nav_sim_navigation::fusion::{Correlation, Heading, Settings};
 use nav_sim_navigation::gnss::FixSigma;
+use nav_sim_navigation::sensors::aiding::AidingSettings;
 use serde::{Deserialize, Serialize};
 
 /// Source of a fusion directory.
@@ -54,6 +55,9 @@ pub(crate) struct Configuration {
     /// Heading at the start, where it was given.
     #[serde(default)]
     pub(crate) heading: Option<Heading>,
+    /// What is believed of the vehicle's own knowledge.
+    #[serde(default, skip_serializing_if = "AidingSettings::is_none")]
+    pub(crate) aiding: AidingSettings,
     /// How much earlier than its time a fix is taken to be (s).
     pub(crate) gnss_delay_s: f64,
 }

@@ -23,6 +23,7 @@ mod manifest;
 mod request;
 mod start;
 mod summary;
+mod vehicle;
 
 use crate::answered::{Answered, contents};
 use crate::failure::Failure;
@@ -35,6 +36,7 @@ pub(crate) use manifest::FuseManifest;
 pub use request::{FuseRequest, GnssSigma, LoggerAxes, MountingChoice};
 pub use start::{StartChoice, TopicChoice};
 pub use summary::{Cause, FuseSummary};
+pub use vehicle::VehicleSummary;
 
 /// Reads the files of a request and fuses them.
 ///

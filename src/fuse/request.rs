@@ -75,6 +75,19 @@ pub struct FuseRequest {
     /// How long errors of positions last: as the innovations show, no longer than a fix, or so many seconds
     #[arg(long, value_name = "auto|none|SECONDS", value_parser = correlation, default_value = "auto")]
     pub gnss_correlation: Correlation,
+    /// Road vehicle: its rear axle moves neither sideways nor up; needs the mounting of the IMU
+    #[arg(long)]
+    pub nhc: bool,
+    /// The velocity is zero where IMU and fixes show that the vehicle stands
+    #[arg(long)]
+    pub zupt: bool,
+    /// Speed of a wheel: a table of t_s and wheel_m_s (or _km_h), negative in reverse; its scale is estimated
+    #[arg(long, value_name = "FILE")]
+    pub odometer: Option<PathBuf>,
+    /// Middle of the rear axle from the IMU: front, right, down (m)
+    #[arg(long = "rear-axle", value_name = "X,Y,Z", value_parser = numbers::<3>, default_value = "0,0,0",
+        hide_default_value = true, allow_hyphen_values = true)]
+    pub rear_axle_m: [f64; 3],
     /// Names of the IMU's columns, for a file without a header or instead of it
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub columns: Option<Vec<String>>,
@@ -102,6 +115,10 @@ impl Default for FuseRequest {
             gnss_sigma: None,
             gnss_delay_s: 0.0,
             gnss_correlation: Correlation::Auto,
+            nhc: false,
+            zupt: false,
+            odometer: None,
+            rear_axle_m: [0.0; 3],
             columns: None,
             topic: None,
             smooth: false,
@@ -123,7 +140,11 @@ impl FuseRequest {
     /// Every file that is read, by its role.
     pub(super) fn files(&self) -> impl Iterator<Item = (&'static str, &PathBuf)> {
         let given = [("imu", &self.imu), ("gnss", &self.gnss), ("model", &self.model)];
-        let asked = [("initial", self.initial_file()), ("reference", self.reference.as_ref())];
+        let asked = [
+            ("initial", self.initial_file()),
+            ("odometer", self.odometer.as_ref()),
+            ("reference", self.reference.as_ref()),
+        ];
         given.into_iter().chain(asked.into_iter().filter_map(|(role, path)| Some((role, path?))))
     }
 
@@ -159,9 +180,11 @@ impl FuseRequest {
     /// A value that is out of its range.
     pub(super) fn settings(&self) -> Result<Settings, FuseError> {
         let refuse = |message: String| Err(FuseError::Setting(message));
-        let [x, y, z] = self.lever_arm_m;
-        if !self.lever_arm_m.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
-            return refuse(format!("--lever-arm {x},{y},{z}: more than {MAX_LEVER_ARM_M} m"));
+        for (option, arm) in [("--lever-arm", self.lever_arm_m), ("--rear-axle", self.rear_axle_m)] {
+            if !arm.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
+                let [x, y, z] = arm;
+                return refuse(format!("{option} {x},{y},{z}: more than {MAX_LEVER_ARM_M} m"));
+            }
         }
         let (q_s_b, mounting_sigma_b) = match self.mounting {
             Some(MountingChoice::Angles { deg: [roll, pitch, yaw], sigma_deg }) => (

@@ -1,5 +1,6 @@
 //! Verdict and figures of a fusion: `summary.json`.
 
+use super::vehicle::VehicleSummary;
 use nav_sim_document::seconds;
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
@@ -46,6 +47,9 @@ pub struct FuseSummary {
     /// Correlation of the innovations, and what the filter makes of it; none where fixes are few.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gnss_correlation: Option<FixCorrelation>,
+    /// What the vehicle knows, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vehicle: Option<VehicleSummary>,
     /// Errors at the ends of outages.
     pub outages: Vec<OutageDrift>,
     /// The ends of all outages and gaps.

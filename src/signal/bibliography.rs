@@ -43,6 +43,9 @@ sources! {
     /// H. E. Rauch, F. Tung, C. T. Striebel: *Maximum likelihood estimates of linear dynamic systems*, AIAA Journal 3,
     /// 1965 (the smoother).
     Rauch65;
+    /// I. Skog, P. Händel, J.-O. Nilsson, J. Rantakokko: *Zero-velocity detection: an algorithm evaluation*, IEEE Trans.
+    /// Biomedical Engineering 57, 2010.
+    Skog10;
     /// S. Särkkä: *Bayesian Filtering and Smoothing*, Cambridge University Press, 2013.
     Sarkka13;
     /// L. Ljung: *System Identification: Theory for the User*, 2nd ed., Prentice Hall, 1999 (prediction-error method).

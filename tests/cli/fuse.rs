@@ -7,6 +7,7 @@ mod loggers;
 mod mounting;
 mod nmea;
 mod smooth;
+mod vehicle;
 
 use crate::common::drive::{MODEL, done, nav_sim, place_with};
 use std::fs;

@@ -222,7 +222,7 @@ fn every_start_is_as_good_as_it_says() {
         let trajectory = trajectory(steps);
         for velocity in [Some(0.1), Some(0.3), Some(0.6), None] {
             recorded(&trajectory, velocity, 3, |run, recording| {
-                let data = Recorded { imu: &recording.imu, gnss: &recording.gnss };
+                let data = Recorded { imu: &recording.imu, gnss: &recording.gnss, aids: &[] };
                 // positions alone do not always have a course
                 let Ok(alignment) = coarse(&data, &settings(), &belief()) else {
                     assert!(velocity.is_none(), "{name} {velocity:?} {run}");
@@ -269,7 +269,7 @@ fn one(steps: &[Step]) -> (Trajectory, Recording) {
 }
 
 fn aligned(recording: &Recording, settings: &Settings) -> Alignment {
-    coarse(&Recorded { imu: &recording.imu, gnss: &recording.gnss }, settings, &belief()).unwrap()
+    coarse(&Recorded { imu: &recording.imu, gnss: &recording.gnss, aids: &[] }, settings, &belief()).unwrap()
 }
 
 /// For twelve seconds the velocities are turned by a right angle: a start there agrees with nothing after it.

@@ -33,7 +33,7 @@ fn told(tau_s: f64, runs: u64) -> Told {
     recorded(&trajectory, &model, &receiver, runs, |recording, start| {
         let mut gnss = recording.gnss.clone();
         gnss.iter_mut().for_each(|fix| fix.pos_sigma_n = DVec3::splat(3.0));
-        let data = Recorded { imu: &recording.imu, gnss: &gnss };
+        let data = Recorded { imu: &recording.imu, gnss: &gnss, aids: &[] };
         let asked = (Some(&reference), Correlation::Auto);
         let weighed = fuse_correlated(&data, &belief, start, &settings(), asked).unwrap();
         told.named += usize::from(weighed.as_stated.is_some());

@@ -20,7 +20,7 @@ fn found(arm_b: DVec3, late_s: f64, settings: &Settings) -> Vec<Option<Displaced
     recorded(&shipped("figure_eight.toml"), &model(), &gnss, 2, |recording: &Recording, start: &Start| {
         let mut gnss = recording.gnss.clone();
         gnss.iter_mut().for_each(|fix| fix.t_s += late_s);
-        let data = Recorded { imu: &recording.imu, gnss: &gnss };
+        let data = Recorded { imu: &recording.imu, gnss: &gnss, aids: &[] };
         all.push(displaced(&data, &belief(&model()), start, settings));
     });
     all

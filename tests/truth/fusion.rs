@@ -75,8 +75,14 @@ pub(crate) fn run(
     settings: &Settings,
     reference: &Trajectory,
 ) -> Solution {
-    fuse(&Recorded { imu, gnss }, &belief(&model()), start, settings, Some(&reference.clone().into()))
-        .unwrap()
+    fuse(
+        &Recorded { imu, gnss, aids: &[] },
+        &belief(&model()),
+        start,
+        settings,
+        Some(&reference.clone().into()),
+    )
+    .unwrap()
 }
 
 /// On recordings made from the model that the filter believes, on three shipped trajectories, the errors

@@ -37,3 +37,4 @@ mod smoothing;
 mod strapdown_error;
 mod trajectories;
 mod tune;
+mod vehicle;

@@ -45,7 +45,7 @@ fn turned(recording: &Recording, q_s_b: DQuat) -> Vec<ImuIncrement> {
 
 fn found(recording: &Recording, q_s_b: DQuat) -> Result<Mounting, MountingError> {
     let imu = turned(recording, q_s_b);
-    find(&Recorded { imu: &imu, gnss: &recording.gnss }, &settings(), &belief())
+    find(&Recorded { imu: &imu, gnss: &recording.gnss, aids: &[] }, &settings(), &belief())
 }
 
 fn land_vehicle() -> Trajectory {
@@ -81,7 +81,7 @@ fn twelve_mountings_are_found_and_fused_with() {
         assert!(rotation(mounting.angles_deg()).angle_between(mounting.q_s_b) < 1e-6);
 
         let imu = turned(recording, truth);
-        let data = Recorded { imu: &imu, gnss: &recording.gnss };
+        let data = Recorded { imu: &imu, gnss: &recording.gnss, aids: &[] };
         let settings = Settings {
             q_s_b: mounting.q_s_b,
             mounting_sigma_b: mounting.sigma_b,
@@ -173,7 +173,7 @@ fn a_filter_that_is_wrong_says_nothing_wrong() {
     recorded(&land_vehicle(), Some(0.1), 4, |run, recording| {
         let truth = rotation(MOUNTINGS[6 + run as usize]);
         let imu = turned(recording, truth);
-        match find(&Recorded { imu: &imu, gnss: &recording.gnss }, &settings(), &careless) {
+        match find(&Recorded { imu: &imu, gnss: &recording.gnss, aids: &[] }, &settings(), &careless) {
             Ok(mounting) => is_as_good_as_it_says(&mounting, truth),
             Err(MountingError::Contradicted { .. } | MountingError::Disagree { .. }) => refused += 1,
             Err(other) => panic!("{other}"),

@@ -78,7 +78,7 @@ fn at_rest_the_smoothed_position_is_the_closed_form_of_an_integrated_wiener_proc
     let smooth = Settings { smooth: true, ..settings() };
     let mut solution = Solution::default();
     recorded(&trajectory, &free, &GnssSettings::default(), 1, |recording, _| {
-        let recorded = Recorded { imu: &recording.imu, gnss: &gnss };
+        let recorded = Recorded { imu: &recording.imu, gnss: &gnss, aids: &[] };
         solution = fuse(&recorded, &belief, &start, &smooth, Some(&reference)).unwrap();
     });
     // covariance of positions at two times: the start, and ∫∫ of white acceleration
@@ -162,7 +162,14 @@ impl Experiment {
             let Recording { imu, gnss, start, .. } = record(&plan, run);
             let sigma = scenario.initial.clone();
             let start = Start { t_s: trajectory.start_s(), state: start, sigma, found: None };
-            fuse(&Recorded { imu: &imu, gnss: &gnss }, &belief, &start, &settings, Some(&reference)).unwrap()
+            fuse(
+                &Recorded { imu: &imu, gnss: &gnss, aids: &[] },
+                &belief,
+                &start,
+                &settings,
+                Some(&reference),
+            )
+            .unwrap()
         };
         (0..runs).map(solution).collect()
     }
@@ -301,7 +308,7 @@ fn a_tape_that_is_too_long_is_refused() {
             .0;
     recorded(&trajectory, &model(), &GnssSettings::default(), 1, |recording, start| {
         let imu: Vec<_> = recording.imu.iter().cycle().take(1_000_000).copied().collect();
-        let recorded = Recorded { imu: &imu, gnss: &recording.gnss };
+        let recorded = Recorded { imu: &imu, gnss: &recording.gnss, aids: &[] };
         let long = Settings { rows_hz: 30_000.0, smooth: true, ..settings() };
         let refused = fuse(&recorded, &belief(&model()), start, &long, None).unwrap_err();
         let FusionError::Memory { bytes, states: 15, .. } = refused else { panic!("{refused}") };

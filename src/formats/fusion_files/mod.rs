@@ -7,12 +7,14 @@ mod initial;
 mod log;
 mod nmea;
 mod rtklib;
+mod wheel;
 
 pub(crate) use fixes::read_gnss;
 pub(crate) use inertial::read_imu;
 pub(crate) use initial::{initial_schema, read_initial};
 pub(in crate::formats) use nmea::is_nmea;
 pub(in crate::formats) use rtklib::is_rtklib;
+pub(crate) use wheel::read_wheel;
 
 use crate::formats::trajectory_file::table::{self, Numbers, Table};
 use crate::formats::{FileError, Kind};

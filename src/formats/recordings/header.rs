@@ -132,7 +132,7 @@ const STAMP: &[&str] = &["field_header_stamp", "header_stamp", "stamp"];
 /// What a name means; `si` if the file's kind says that unit-less names are SI.
 ///
 /// None if it means nothing here; an error with the name if a gyroscope's unit is not said.
-pub(super) fn classify(name: &str, si: bool) -> Option<Result<Role, ()>> {
+pub(in crate::formats) fn classify(name: &str, si: bool) -> Option<Result<Role, ()>> {
     let name = normalise(name);
     match name.as_str() {
         "packetcounter" | "packet_counter" => return Some(Ok(Role::Counter)),
@@ -192,7 +192,7 @@ fn increment(name: &str) -> Option<Result<Role, ()>> {
 }
 
 /// Lower case; every other character than letters and digits becomes one `_` between words.
-fn normalise(name: &str) -> String {
+pub(in crate::formats) fn normalise(name: &str) -> String {
     let mut out = String::new();
     for c in name.chars().flat_map(char::to_lowercase) {
         match c {
@@ -208,7 +208,7 @@ fn normalise(name: &str) -> String {
 }
 
 /// The name without its unit, and the unit; the longest ending wins.
-fn split_unit<'a>(name: &'a str, units: &[(&[&str], f64)]) -> Option<(&'a str, f64)> {
+pub(in crate::formats) fn split_unit<'a>(name: &'a str, units: &[(&[&str], f64)]) -> Option<(&'a str, f64)> {
     let endings = units.iter().flat_map(|(names, factor)| names.iter().map(move |n| (*n, *factor)));
     let stem = |ending: &str| name.strip_suffix(ending)?.strip_suffix('_');
     let hits = endings.filter_map(|(ending, factor)| stem(ending).map(|s| (s, factor)));

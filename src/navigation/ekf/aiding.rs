@@ -1,7 +1,7 @@
 //! Measurements that a vehicle makes of itself: velocity of a point along its own axes, and yaw.
 //!
-//! The vehicle's axes are those of the IMU turned by small angles m (pitch and yaw), so that a velocity v_b in b is
-//! v_b − m × v_b along them. The wheel reads 1 + k times the forward velocity. m and k are estimated where the belief
+//! The vehicle's axes are known in b but for small angles m (pitch and yaw): a velocity v along them as they are known
+//! is v − m × v along them. The wheel reads 1 + k times the forward velocity. m and k are estimated where the belief
 //! has states of them.
 
 use super::covariance::{BIAS, PSI, V};
@@ -23,6 +23,8 @@ pub(crate) struct BodyVelocity {
     pub(crate) variance: f64,
     /// The point, from the IMU, in b (m).
     pub(crate) lever_arm_b: DVec3,
+    /// The vehicle's forward, right, down in b, where m is zero.
+    pub(crate) vehicle_b: [DVec3; 3],
 }
 
 /// What a scalar measurement found: estimate less measured, and the variance that the filter states of that.
@@ -86,7 +88,6 @@ impl Ekf {
     }
 
     /// Estimates of wheel scale (1), mounting pitch and yaw (rad), and their standard deviations, of the first lane.
-    #[allow(dead_code)]
     pub(crate) fn vehicle_estimates(&self) -> Option<[DVec3; 2]> {
         let first = self.vehicle()?;
         let sigma = self.p.variances(first / 3).lane(0).map(f64::sqrt);
@@ -103,9 +104,11 @@ impl Ekf {
         let estimates =
             states.map_or(Vec3::splat(DVec3::ZERO), |first| self.estimates[first / 3 - BIAS].load::<W>());
         let rows = BodyRows::new(&point, &ins);
+        let [forward, right, down] = measured.vehicle_b.map(Vec3::<W>::splat);
+        let in_b = |v: Vec3<W>| forward * v[0] + right * v[1] + down * v[2];
         let mut found = [[Lanes::ZERO; 2]; 3];
         for (found, &axis) in found.iter_mut().zip(measured.axes) {
-            let along_b = along(axis, estimates);
+            let along_b = in_b(along(axis, estimates));
             let [of_v, of_psi, of_gyro] = rows.along(along_b);
             let mut row = Row::default();
             row.push3(3 * V, of_v.0);
@@ -116,7 +119,7 @@ impl Ekf {
             if let Some(first) = states {
                 // wheel scale, pitch, yaw: of the forward velocity, as `along` has them
                 let (state, sign) = [(0, 1.0), (2, -1.0), (1, 1.0)][axis];
-                row.push(first + state, rows.v_b[0] * sign);
+                row.push(first + state, forward.dot(rows.v_b) * sign);
             }
             let z = along_b.dot(rows.v_b) - W::load(&measured.value[axis]);
             *found = self.innovated(row.entries(), z, measured.variance);
@@ -126,7 +129,7 @@ impl Ekf {
     }
 }
 
-/// The axis of the vehicle in b for these estimates of wheel scale, mounting pitch and yaw; forward times what the wheel
+/// The axis of the vehicle in its axes as they are known, for these estimates of wheel scale, mounting pitch and yaw; forward times what the wheel
 /// makes of it.
 #[inline(always)]
 fn along<L: Real>(axis: usize, states: Vec3<L>) -> Vec3<L> {

@@ -184,7 +184,7 @@ impl Belief {
     /// With states of a vehicle's own measurements, of these deviations: scale of the wheel (1), pitch and yaw of the
     /// vehicle's axes in those of the IMU (rad).
     #[must_use]
-    pub(crate) fn with_vehicle(mut self, sigmas: DVec3) -> Self {
+    pub fn with_vehicle(mut self, sigmas: DVec3) -> Self {
         self.vehicle = sigmas;
         self.states += self.vehicle.to_array().iter().filter(|sigma| **sigma > 0.0).count();
         self

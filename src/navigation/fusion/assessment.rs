@@ -1,7 +1,7 @@
 //! Worth of a solution: by its own innovations, and by a reference where there is one.
 
 use super::outcome::nis_per_component;
-use super::{Ends, FixRecord, FromReference, Outcome, Solution, Use, Weighed};
+use super::{AidWorth, Ends, FixRecord, FromReference, Outcome, Solution, Use, Weighed, aid_worths};
 use crate::metrics::VerdictKind;
 use crate::simulation::REPORTED_NAMES;
 use serde::Serialize;
@@ -69,6 +69,13 @@ pub enum Finding {
         /// Beginning of the worst (s).
         worst_s: f64,
         /// NIS per component of the nearest nine tenths of its fixes.
+        nis_per_component: f64,
+    },
+    /// Mean NIS of what the vehicle knows.
+    Aid {
+        /// As [`AidWorth`](super::AidWorth) has it.
+        aid: &'static str,
+        /// Divided by the number of components: 1 if right.
         nis_per_component: f64,
     },
     /// Fixes rejected by the gate.
@@ -150,6 +157,7 @@ pub fn assess(weighed: &Weighed, outcome: &Outcome, of_start: &[(VerdictKind, Fi
     });
     findings.extend(correlated.filter(|found| !findings.contains(found)));
     findings.extend(stretches(of_fixes));
+    findings.extend(aids(of_fixes));
     findings.extend(rejected(outcome));
     findings.extend(ends(outcome));
     if let Some(reference) = outcome.reference {
@@ -193,6 +201,16 @@ fn nis(solution: &Solution) -> (VerdictKind, Finding) {
         _ => VerdictKind::Consistent,
     };
     (verdict, Finding::Nis { per_component })
+}
+
+/// Aids that are farther from the solution than stated.
+fn aids(solution: &Solution) -> impl Iterator<Item = (VerdictKind, Finding)> {
+    let is_far = |w: &AidWorth| w.nis_per_component > NIS_LIMITS.0.max(w.nis_band.upper);
+    aid_worths(&solution.aids).into_iter().filter(is_far).map(
+        |AidWorth { aid, nis_per_component, .. }| {
+            (VerdictKind::Doubtful, Finding::Aid { aid, nis_per_component })
+        },
+    )
 }
 
 /// Minutes in which most fixes are far from what is stated. The farthest tenth of them is left out: single

@@ -194,23 +194,23 @@ mod tests {
     fn the_difference_of_the_clocks_is_found_with_its_sign() {
         for late_s in [18.0, -18.0, 2.0, -0.7] {
             let (imu, gnss) = drive(late_s, winding);
-            let apart = clocks_apart(&Recorded { imu: &imu, gnss: &gnss }).unwrap();
+            let apart = clocks_apart(&Recorded { imu: &imu, gnss: &gnss, aids: &[] }).unwrap();
             assert!((apart.delay_s - late_s).abs() < 0.5 * STEP_S, "{apart:?}");
         }
         let (imu, gnss) = drive_at(10, 2.0, winding);
-        let apart = clocks_apart(&Recorded { imu: &imu, gnss: &gnss }).unwrap();
+        let apart = clocks_apart(&Recorded { imu: &imu, gnss: &gnss, aids: &[] }).unwrap();
         assert!((apart.delay_s - 2.0).abs() < 0.5 * STEP_S, "{apart:?}");
     }
 
     #[test]
     fn nothing_is_said_of_one_clock_nor_of_straight_roads_nor_of_turns_that_repeat() {
         let (imu, gnss) = drive(0.0, winding);
-        assert_eq!(clocks_apart(&Recorded { imu: &imu, gnss: &gnss }), None);
+        assert_eq!(clocks_apart(&Recorded { imu: &imu, gnss: &gnss, aids: &[] }), None);
         let (imu, gnss) = drive(18.0, |_| 0.0);
-        assert_eq!(clocks_apart(&Recorded { imu: &imu, gnss: &gnss }), None);
+        assert_eq!(clocks_apart(&Recorded { imu: &imu, gnss: &gnss, aids: &[] }), None);
         // a round of 20 s: as good as they are as 20 s later
         let round = |t: f64| 0.3 * (std::f64::consts::PI * t / 10.0).sin();
         let (imu, gnss) = drive(0.0, round);
-        assert_eq!(clocks_apart(&Recorded { imu: &imu, gnss: &gnss }), None);
+        assert_eq!(clocks_apart(&Recorded { imu: &imu, gnss: &gnss, aids: &[] }), None);
     }
 }

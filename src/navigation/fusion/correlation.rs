@@ -35,7 +35,7 @@ pub enum Correlation {
     Seconds(f64),
 }
 
-/// Autocorrelation of the normalised innovations of position from one fix to the next.
+/// Autocorrelation of normalised innovations (of a fix, those of position) from one to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Whiteness {
     /// Autocorrelation at lag 1: 0 if right.
@@ -48,14 +48,21 @@ impl Whiteness {
     /// Of the fixes used; none where they are few.
     #[must_use]
     pub fn of<'a>(fixes: impl IntoIterator<Item = &'a FixRecord>) -> Option<Self> {
-        let used: Vec<&FixRecord> = fixes.into_iter().filter(|f| f.used == Use::Used).collect();
-        let interval_s = middle(used.windows(2).map(|w| w[1].t_s - w[0].t_s).collect())?;
-        let neighbours = used.windows(2).filter(|w| w[1].t_s - w[0].t_s < APART * interval_s);
+        let used = fixes.into_iter().filter(|f| f.used == Use::Used);
+        let position = |f: &FixRecord| [0, 1, 2].map(|i| f.innovation[i] / f.sigma[i]);
+        let all: Vec<(f64, [f64; 3])> = used.map(|f| (f.t_s, position(f))).collect();
+        Self::of_series(&all)
+    }
+
+    /// Of times and normalised innovations.
+    pub(super) fn of_series(series: &[(f64, impl AsRef<[f64]>)]) -> Option<Self> {
+        let interval_s = middle(series.windows(2).map(|w| w[1].0 - w[0].0).collect())?;
+        let neighbours = series.windows(2).filter(|w| w[1].0 - w[0].0 < APART * interval_s);
         let (mut product, mut square, mut pairs) = (0.0, 0.0, 0);
         for pair in neighbours {
-            let [a, b] = [0, 1].map(|k| [0, 1, 2].map(|i| pair[k].innovation[i] / pair[k].sigma[i]));
+            let [a, b] = [0, 1].map(|k: usize| pair[k].1.as_ref());
             product += a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-            square += a.iter().chain(&b).map(|z| z * z).sum::<f64>() / 2.0;
+            square += a.iter().chain(b).map(|z| z * z).sum::<f64>() / 2.0;
             pairs += a.len();
         }
         // The estimate of n independent pairs is normal about 0 with variance 1/n (Mehra, sec. III).

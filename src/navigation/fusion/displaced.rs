@@ -55,7 +55,7 @@ pub fn displaced(
     let to_s = start.t_s + MOST_S;
     let imu = &recorded.imu[..recorded.imu.partition_point(|s| s.t_s <= to_s)];
     let gnss = &recorded.gnss[..recorded.gnss.partition_point(|f| f.t_s <= to_s)];
-    let scene = Scene { recorded: Recorded { imu, gnss }, belief, start, settings };
+    let scene = Scene { recorded: Recorded { imu, gnss, ..*recorded }, belief, start, settings };
     let now = scene.innovations(&Vector4::zeros())?;
     let (mut x, mut normal) = (Vector4::zeros(), scene.normal(&Vector4::zeros(), &now)?);
     let mut best = scene.step(&mut x, &normal)?;

@@ -1,10 +1,10 @@
 //! The one place where recorded data meet the filter: one run, the same in all lanes.
 
 use super::gap::Spread;
-use super::{FixRecord, Nine, Row, RowError, Settings, Start, Use};
+use super::{AidRecord, FixRecord, Nine, Row, RowError, Settings, Start, Use, VehicleVelocity};
 use crate::earth::ned_difference;
 use crate::ekf::covariance::{PSI, R, V};
-use crate::ekf::{Belief, Ekf, Fix, advance, settle, update};
+use crate::ekf::{Belief, BodyVelocity, Ekf, Fix, advance, settle, update, update_body_velocity};
 use crate::frames::{NavState, RollPitchYaw};
 use crate::gnss::GnssFix;
 use crate::imu::{ImuIncrement, ImuSample, Sensor};
@@ -102,6 +102,26 @@ impl Filter {
             nis,
             error: None,
         }
+    }
+
+    pub(super) fn settle(&mut self) {
+        settle(&mut self.ekf);
+    }
+
+    /// Uses a velocity along the vehicle's axes.
+    pub(super) fn aid(&mut self, aid: &VehicleVelocity) -> AidRecord {
+        let to_imu = self.q_s_b.inverse();
+        let axes = aid.aid.axes();
+        let measured = BodyVelocity {
+            value: Vec3::splat(aid.velocity_b),
+            axes,
+            variance: aid.sigma_m_s * aid.sigma_m_s,
+            lever_arm_b: to_imu * aid.lever_arm_b,
+            vehicle_b: DVec3::AXES.map(|axis| to_imu * axis),
+        };
+        let found = update_body_velocity(&mut self.ekf, &measured);
+        let normalised = found[..axes.len()].iter().map(|[z, variance]| z[0] / variance[0].sqrt());
+        AidRecord { t_s: aid.t_s, aid: aid.aid, normalised: normalised.collect() }
     }
 
     pub(super) fn update(&mut self, fix: &GnssFix) {

@@ -24,7 +24,7 @@
 //! let beliefs = [Belief::new(&model, FilterStates::Full, 1.0, 800.0)?.with_initial(&scenario.initial)];
 //! let experiment = scenario.experiment(&drive, Truth::Model(&model), &beliefs, &[], 1);
 //! let recording = record(&Plan::new(&experiment)?, 0);
-//! let recorded = Recorded { imu: &recording.imu, gnss: &recording.gnss };
+//! let recorded = Recorded { imu: &recording.imu, gnss: &recording.gnss, aids: &[] };
 //! let sigma = scenario.initial.clone();
 //! let start = Start { t_s: 0.0, state: recording.start, sigma, found: None };
 //! let settings = Settings {
@@ -56,7 +56,12 @@ pub mod gap;
 pub mod mounting;
 mod origin;
 mod outcome;
+mod run;
 mod smoother;
+pub mod standstill;
+mod vehicle;
+#[cfg(test)]
+mod vehicle_tests;
 
 pub use assessment::{Assessment, Confidence, Finding, assess};
 pub use clocks::{ClocksApart, clocks_apart};
@@ -67,31 +72,32 @@ pub use origin::{earlier, rest_of_origin, rough_origin};
 pub use outcome::{
     Drift, Ends, FromReference, OutageDrift, Outcome, SmoothedOutage, SmoothedOutcome, outcome,
 };
+pub use run::fuse;
+pub use vehicle::{
+    AidRecord, AidWorth, VehicleVelocity, WheelSpeed, aid_worths, vehicle_velocities, wheel_ratio,
+};
 
-use crate::earth::{GravityModel, MAX_LATITUDE, geodetic_to_ecef};
-use crate::ekf::{Belief, InitialSettings, nis_limit};
+use crate::earth::GravityModel;
+use crate::ekf::InitialSettings;
 use crate::frames::NavState;
 use crate::gnss::GnssFix;
 use crate::imu::ImuIncrement;
 use crate::sensors::outage::Outage;
-use crate::trajectory::reference::Reference;
-use crate::units::DEG;
-use filter::Filter;
-use gap::{Bridges, Spread};
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
-use smoother::Tape;
 
 /// Position (m, north, east, down), velocity (m/s), roll, pitch, yaw (degrees).
 pub(crate) type Nine = [f64; 9];
 
-/// What was recorded, both in order of time.
+/// What was recorded, each in order of time.
 #[derive(Debug, Clone, Copy)]
 pub struct Recorded<'a> {
     /// Samples whose intervals follow one another.
     pub imu: &'a [ImuIncrement],
     /// Fixes.
     pub gnss: &'a [GnssFix],
+    /// What the vehicle knows of its own velocity.
+    pub aids: &'a [VehicleVelocity],
 }
 
 /// How it is fused.
@@ -239,6 +245,10 @@ pub struct Solution {
     pub smoothed: Option<Vec<Row>>,
     /// Every fix from start to end of the IMU.
     pub fixes: Vec<FixRecord>,
+    /// Every measurement of the vehicle by itself.
+    pub aids: Vec<AidRecord>,
+    /// Wheel scale (1), mounting pitch and yaw (rad) at the end, and their standard deviations, where they are states.
+    pub vehicle: Option<[DVec3; 2]>,
     /// IMU samples used.
     pub samples: usize,
 }
@@ -261,155 +271,4 @@ fn spans(recorded: &Recorded<'_>) -> ((f64, f64), (f64, f64)) {
         ends(imu.first().map(|s| s.t_s - s.dt_s), imu.last().map(|s| s.t_s)),
         ends(gnss.first().map(|f| f.t_s), gnss.last().map(|f| f.t_s)),
     )
-}
-
-/// Runs the filter through recorded data from `start`. A fix is applied at its own time: the sample it
-/// falls into is split there. A sample much longer than the others bridges a gap ([`gap`]). `reference` is only
-/// compared with.
-///
-/// # Errors
-/// Clocks that do not overlap, a start outside the data, a pole, divergence.
-pub fn fuse(
-    recorded: &Recorded<'_>,
-    belief: &Belief,
-    start: &Start,
-    settings: &Settings,
-    reference: Option<&Reference>,
-) -> Result<Solution, FusionError> {
-    check_clocks(recorded)?;
-    let imu = spans(recorded).0;
-    if !(imu.0 - 1e-6..imu.1).contains(&start.t_s) {
-        return Err(FusionError::Start { t_s: start.t_s, imu });
-    }
-    check_place(recorded, start, settings)?;
-    let mut filter = Filter::new(belief, start, settings);
-    let tape = match settings.smooth {
-        true => Some(Tape::new(&mut filter, start.t_s, most_marks(recorded, start, settings))?),
-        false => None,
-    };
-    let mut run = Run {
-        filter,
-        tape,
-        settings,
-        reference,
-        now: start.t_s,
-        next_row: start.t_s,
-        solution: Solution::default(),
-    };
-    let mut bridges = Bridges::new(recorded.imu);
-    let mut fixes = recorded.gnss.iter().skip_while(|f| f.t_s <= start.t_s).peekable();
-    run.row()?;
-    for sample in recorded.imu.iter().skip_while(|s| s.t_s <= start.t_s) {
-        let spread = bridges.spread(sample);
-        // a fix that is a millionth of a sample late belongs to its end
-        let slack = 1e-6 * sample.dt_s;
-        while let Some(fix) = fixes.next_if(|f| f.t_s <= sample.t_s + slack) {
-            run.advance(sample, spread, fix.t_s, slack);
-            run.fix(fix)?;
-        }
-        run.advance(sample, spread, sample.t_s, 0.0);
-        run.solution.samples += 1;
-        if sample.t_s + slack >= run.next_row {
-            run.row()?;
-        }
-    }
-    Ok(run.end())
-}
-
-/// Rows and fixes that there will be at most.
-fn most_marks(recorded: &Recorded<'_>, start: &Start, settings: &Settings) -> f64 {
-    let samples = recorded.imu.iter().filter(|s| s.t_s > start.t_s).count() as f64;
-    let rows = (spans(recorded).0.1 - start.t_s) * settings.rows_hz;
-    1.0 + rows.min(samples).ceil() + recorded.gnss.len() as f64
-}
-
-/// Refuses a start that its own and the receiver's deviations cannot explain: 10 km or 50 of both, beside
-/// the way to the first fix.
-fn check_place(recorded: &Recorded<'_>, start: &Start, settings: &Settings) -> Result<(), FusionError> {
-    const FAR: (f64, f64) = (10_000.0, 50.0);
-    let Some(fix) = recorded.gnss.iter().find(|f| f.t_s >= start.t_s) else { return Ok(()) };
-    let seconds = fix.t_s - start.t_s;
-    let place = geodetic_to_ecef(start.state.lat, start.state.lon, fix.h);
-    let metres = geodetic_to_ecef(fix.lat, fix.lon, fix.h).distance(place);
-    let [n, e, _] = start.sigma.pos_sigma_m;
-    let sigma_m = n.hypot(e).hypot(fix.pos_sigma_n.truncate().length());
-    // at twice the speed, accelerating with a gravity
-    let way = 2.0 * start.state.v_n.length() * seconds + 5.0 * seconds * seconds;
-    let allowed = FAR.0.min(FAR.1 * sigma_m) + way + settings.lever_arm_b.length();
-    if metres > allowed { Err(FusionError::Place { t_s: fix.t_s, metres, sigma_m }) } else { Ok(()) }
-}
-
-/// The state of a run through the data.
-struct Run<'a> {
-    filter: Filter,
-    tape: Option<Tape>,
-    settings: &'a Settings,
-    reference: Option<&'a Reference>,
-    now: f64,
-    next_row: f64,
-    solution: Solution,
-}
-
-impl Run<'_> {
-    /// Through the sample as far as `to`, which is taken as the sample's end when it is nearly that.
-    /// Where it bridges a gap, with the gap's uncertainty.
-    fn advance(&mut self, sample: &ImuIncrement, spread: Option<Spread>, to: f64, slack: f64) {
-        let to = if to + slack >= sample.t_s { sample.t_s } else { to };
-        if to > self.now + slack {
-            match spread {
-                None => self.filter.advance(sample, to - self.now),
-                Some(spread) => self.filter.cross(sample, to - self.now, spread),
-            }
-            self.now = to;
-        }
-    }
-
-    fn fix(&mut self, fix: &GnssFix) -> Result<(), FusionError> {
-        let mut record = self.filter.look_at(fix);
-        record.error = self.error().map(|e| e.values);
-        let withheld = self.settings.outages.iter().any(|o| o.withholds(fix.t_s));
-        let limit = self.settings.nis_gate.map(|p| nis_limit(p, record.innovation.len()));
-        record.used = match limit {
-            _ if withheld => Use::Withheld,
-            Some(limit) if record.nis > limit => Use::Rejected,
-            _ => Use::Used,
-        };
-        match &mut self.tape {
-            _ if record.used != Use::Used => {}
-            Some(tape) => tape.fix(&mut self.filter, self.now, |filter| filter.update(fix)),
-            None => self.filter.update(fix),
-        }
-        let finite = record.nis.is_finite();
-        self.solution.fixes.push(record);
-        if finite { Ok(()) } else { Err(FusionError::Diverged { t_s: self.now }) }
-    }
-
-    fn row(&mut self) -> Result<(), FusionError> {
-        self.next_row = (self.next_row + 1.0 / self.settings.rows_hz).max(self.now);
-        let mut row = self.filter.row(self.now);
-        if !(row.sigma.iter().all(|s| s.is_finite()) && row.state.q_b_n.is_finite()) {
-            return Err(FusionError::Diverged { t_s: self.now });
-        }
-        if row.state.lat.abs() > MAX_LATITUDE {
-            return Err(FusionError::Pole { t_s: self.now, lat_deg: row.state.lat / DEG });
-        }
-        row.error = self.error();
-        self.solution.rows.push(row);
-        if let Some(tape) = &mut self.tape {
-            tape.row(&mut self.filter, self.now);
-        }
-        Ok(())
-    }
-
-    /// What came out; smoothed where a tape ran along.
-    fn end(self) -> Solution {
-        let Self { mut filter, tape, mut solution, reference, .. } = self;
-        solution.smoothed = tape.map(|tape| tape.smoothed(&mut filter, &solution.rows, reference));
-        solution
-    }
-
-    /// Difference from the reference now, if it reaches here.
-    fn error(&mut self) -> Option<RowError> {
-        self.filter.error_from(self.reference?, self.now)
-    }
 }

@@ -40,7 +40,7 @@ pub fn rest_of_origin(recorded: &Recorded<'_>, belief: &Belief, settings: &Setti
     let tried = |k: i32| {
         let delay_s = f64::from(k) * TRIED.1;
         let gnss = earlier(fixes, delay_s);
-        let recorded = Recorded { imu, gnss: &gnss };
+        let recorded = Recorded { imu, gnss: &gnss, ..*recorded };
         let start = coarse(&recorded, &settings, belief).ok()?.start;
         let solution = fuse(&recorded, belief, &start, &settings, None).ok()?;
         Some((delay_s, disagreement(&solution, fixes.len()), start))
@@ -48,7 +48,7 @@ pub fn rest_of_origin(recorded: &Recorded<'_>, belief: &Belief, settings: &Setti
     let all: Vec<_> = (-TRIED.0..=TRIED.0).into_par_iter().filter_map(tried).collect();
     let Some((delay_s, _, start)) = all.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)) else { return 0.0 };
     let gnss = earlier(fixes, delay_s);
-    let found = displaced(&Recorded { imu, gnss: &gnss }, belief, &start, &settings);
+    let found = displaced(&Recorded { imu, gnss: &gnss, ..*recorded }, belief, &start, &settings);
     delay_s + found.and_then(|found| found.delay_s).map_or(0.0, |[rest_s, _]| rest_s)
 }
 

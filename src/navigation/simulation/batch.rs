@@ -279,7 +279,8 @@ impl Candidate {
             return;
         }
         let lever_arm_b = aiding.lever_arm_b(aid);
-        let velocity = BodyVelocity { value: *value, axes: aid.axes(), variance, lever_arm_b };
+        let velocity =
+            BodyVelocity { value: *value, axes: aid.axes(), variance, lever_arm_b, vehicle_b: DVec3::AXES };
         let _ = update_body_velocity(&mut self.ekf, &velocity);
     }
 

@@ -52,7 +52,7 @@ fn until(
     let imu = &recorded.imu[..recorded.imu.partition_point(|s| s.t_s <= to_s)];
     let gnss = &recorded.gnss[..recorded.gnss.partition_point(|f| f.t_s <= to_s)];
     let settings = Settings { nis_gate: None, rows_hz: 1e-3, ..settings.clone() };
-    fuse(&Recorded { imu, gnss }, belief, start, &settings, None).ok()
+    fuse(&Recorded { imu, gnss, ..*recorded }, belief, start, &settings, None).ok()
 }
 
 fn agreement(

@@ -43,7 +43,7 @@ impl AidingSettings {
     ///
     /// # Errors
     /// The first key whose value is refused, with its table within `aiding`.
-    pub(crate) fn validate(&self) -> Result<(), SettingError> {
+    pub fn validate(&self) -> Result<(), SettingError> {
         let all = [
             self.nhc.as_ref().map(NhcSettings::validate),
             self.odometer.as_ref().map(OdometerSettings::validate),
@@ -113,7 +113,8 @@ impl AidingSettings {
 
     /// Standard deviations of what a filter may have as states: scale of the wheel (1), pitch and yaw of the vehicle's
     /// axes (rad); 0 where it has none.
-    pub(crate) fn state_sigmas(&self) -> DVec3 {
+    #[must_use]
+    pub fn state_sigmas(&self) -> DVec3 {
         let scale = self.odometer.as_ref().map_or(0.0, |s| s.scale_sigma);
         let mounting = self.nhc.as_ref().map_or(0.0, |s| s.mounting_sigma_deg * DEG);
         DVec3::new(scale, mounting, mounting)
