@@ -396,4 +396,6 @@ impl RunSettings {
 }
 
 #[cfg(test)]
+mod aiding_tests;
+#[cfg(test)]
 mod tests;

@@ -164,6 +164,4 @@ impl EpochSums {
 }
 
 #[cfg(test)]
-mod aiding_tests;
-#[cfg(test)]
 mod tests;

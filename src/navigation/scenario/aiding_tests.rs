@@ -1,9 +1,9 @@
 //! Measurements of a vehicle by itself: closed forms, and runs beside the covariance analysis.
 
-use super::run;
+use super::Scenario;
 use crate::ekf::FilterStates;
+use crate::monte_carlo::run;
 use crate::noise::{Ar1, Composite, Model, Process, White};
-use crate::scenario::Scenario;
 use crate::sensors::aiding::{
     AidingSettings, HeadingErrors, HeadingSettings, NhcErrors, NhcSettings, OdometerErrors, OdometerSettings,
     ZuptErrors, ZuptSettings,
