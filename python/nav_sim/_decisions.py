@@ -85,7 +85,8 @@ def require(
 
     With a `model` it is judged, without one `.model` is what is needed. `outage` is a length (s), a pair of start and
     end, or "longest", `start` where a length begins (s); `limits` such as "p95_m<=5"; `iso_drift=True` adds a
-    curve of sensors of equal drift; `catalogue=True` ranks the catalogued IMUs, a path those of a directory. `gnss`, `scenario` and
+    curve of sensors of equal drift; `catalogue=True` ranks the catalogued IMUs, a path those of a directory. `vehicle="car"`
+    has it know that it moves neither sideways nor up. `gnss`, `scenario` and
     `progress` as of `run`.
     """
     asked = outage if isinstance(outage, str) else _window(outage)

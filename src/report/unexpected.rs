@@ -33,9 +33,9 @@ pub(crate) fn unexpected_in_words(unexpected: &Unexpected) -> (String, String) {
             "a larger gnss.pos_sigma_m".to_owned(),
         ),
         Unexpected::Aiding { source, key } => (
-            format!("the truth has {source}, the filter expects none"),
+            format!("the truth has {source}, of which the filter expects less"),
             match key.ends_with("sigma_m_s") || *key == "aiding.heading.sigma_deg" {
-                true => format!("a larger {key} (nav-sim tune finds it)"),
+                true => format!("a larger {key} (nav-sim tune --truth MODEL --scenario FILE finds how much)"),
                 false => format!("{key} gives it states"),
             },
         ),

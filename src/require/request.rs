@@ -298,6 +298,11 @@ impl RequireRequest {
             scenario.gnss = scenario_file::read(path)?.gnss;
         }
         if self.vehicle == Some(Vehicle::Car) {
+            if !scenario.aiding.is_none() {
+                return Err(
+                    Failure::input("--vehicle car beside [aiding] of --scenario").hint("give one of them")
+                );
+            }
             scenario.aiding = AidingSettings::car();
         }
         scenario.validate().map_err(Failure::input)?;

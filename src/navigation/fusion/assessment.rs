@@ -73,7 +73,7 @@ pub enum Finding {
     },
     /// Mean NIS of what the vehicle knows.
     Aid {
-        /// As [`AidWorth`](super::AidWorth) has it.
+        /// As [`super::AidWorth`] has it.
         aid: &'static str,
         /// Divided by the number of components: 1 if right.
         nis_per_component: f64,

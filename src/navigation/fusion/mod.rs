@@ -197,7 +197,7 @@ pub struct RowError {
     pub values: Nine,
     /// Standard deviations of these, by the filter and the reference's velocity together.
     pub sigma: Nine,
-    /// How well the velocity of the reference is known ([`Reference::velocity_sigma`], m/s).
+    /// How well the velocity of the reference is known (m/s).
     pub velocity_sigma: f64,
     /// Normalised by the covariance of the nine, of which these are the roots of the diagonal: its mean is 9 if both
     /// are right.

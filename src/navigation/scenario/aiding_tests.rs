@@ -85,7 +85,7 @@ fn both(scenario: &Scenario, runs: u64) -> (Judged, [[f64; REPORTED]; 2]) {
 #[test]
 fn runs_have_the_errors_that_the_analysis_states() {
     let nhc = |mounting_sigma_deg, truth| {
-        let lever_arm_m = [-1.2, 0.3, 0.5];
+        let lever_arm_m = [-0.15, 0.3, 0.5];
         Some(NhcSettings { mounting_sigma_deg, lever_arm_m, truth, ..NhcSettings::default() })
     };
     let wheel =

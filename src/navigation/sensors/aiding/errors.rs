@@ -6,6 +6,8 @@ use crate::units::DEG;
 use glam::DVec3;
 use rand_distr::{Distribution, StandardNormal};
 
+/// Acceleration times speed of a brisk drive (m²/s³): 2 m/s² at 10 m/s.
+const BRISK: f64 = 20.0;
 /// A constant is felt where the mean of a hundred measurements would show it.
 const LASTING_FIXES: f64 = 10.0;
 
@@ -19,7 +21,24 @@ impl AidingSettings {
         };
         let (nhc, odometer) = (self.nhc.as_ref(), self.odometer.as_ref());
         let (zupt, heading) = (self.zupt.as_ref(), self.heading.as_ref());
+        let slips = |slip: f64, sigma: f64| slip * BRISK > 0.5 * sigma;
         let all = [
+            (
+                nhc.is_some_and(|s| s.truth.noise_sigma_m_s.is_some_and(|noise| noise > s.sigma_m_s)),
+                ("aiding.nhc", "aiding.nhc.sigma_m_s"),
+            ),
+            (
+                nhc.is_some_and(|s| slips(s.truth.sideslip_s2_m, s.sigma_m_s)),
+                ("aiding.nhc.slip", "aiding.nhc.sigma_m_s"),
+            ),
+            (
+                odometer.is_some_and(|s| s.truth.noise_sigma_m_s.is_some_and(|noise| noise > s.sigma_m_s)),
+                ("aiding.odometer", "aiding.odometer.sigma_m_s"),
+            ),
+            (
+                odometer.is_some_and(|s| slips(s.truth.slip_s2_m, s.sigma_m_s)),
+                ("aiding.odometer.slip", "aiding.odometer.sigma_m_s"),
+            ),
             (
                 nhc.is_some_and(|s| s.mounting_sigma_deg < 0.5 * s.truth.mounting_sigma_deg),
                 ("aiding.nhc.mounting", "aiding.nhc.mounting_sigma_deg"),
@@ -145,9 +164,10 @@ impl AidPart {
         match (self, axis) {
             (Self::MountingYaw, 1) => -v_b.x,
             (Self::MountingPitch, 2) | (Self::WheelScale, 0) => v_b.x,
-            // Tyres slip outwards: against the acceleration. sin(angle) is the angle.
-            (Self::Slip, 1) => -a_b.y * v_b.x,
-            (Self::WheelSlip, 0) => a_b.x * v_b.x,
+            // Tyres slip outwards, against the acceleration, and the constraint says that they do not; a driven wheel turns
+            // more than the way. Both in either direction of travel.
+            (Self::Slip, 1) => a_b.y * v_b.x.abs(),
+            (Self::WheelSlip, 0) => a_b.x * v_b.x.abs(),
             (Self::SuspensionLateral, 1) | (Self::SuspensionVertical, 2) => 1.0,
             (Self::Creep | Self::HeadingOffset | Self::HeadingCorrelated, 0) => 1.0,
             _ => 0.0,

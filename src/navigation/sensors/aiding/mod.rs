@@ -33,7 +33,7 @@ pub struct AidingSettings {
     /// Zero velocity where the reference stands.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zupt: Option<ZuptSettings>,
-    /// Heading of two antennas or of a compass.
+    /// Heading of a compass.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heading: Option<HeadingSettings>,
 }
@@ -131,7 +131,8 @@ impl AidingSettings {
             walk_sigma_m_s: 0.05,
             correlation_time_s: 1.0,
         };
-        let nhc = NhcSettings { mounting_sigma_deg: 0.5, truth, ..NhcSettings::default() };
+        // Sideslip lasts as long as a bend: white noise of its size would be believed to average out.
+        let nhc = NhcSettings { sigma_m_s: 0.2, mounting_sigma_deg: 0.5, truth, ..NhcSettings::default() };
         Self { nhc: Some(nhc), ..Self::default() }
     }
 
@@ -139,7 +140,8 @@ impl AidingSettings {
     #[must_use]
     pub fn car_with_odometer() -> Self {
         let truth = OdometerErrors { scale_sigma: 0.01, noise_sigma_m_s: None, slip_s2_m: 0.002 };
-        let odometer = OdometerSettings { scale_sigma: 0.01, truth, ..OdometerSettings::default() };
+        let odometer =
+            OdometerSettings { sigma_m_s: 0.1, scale_sigma: 0.01, truth, ..OdometerSettings::default() };
         Self { odometer: Some(odometer), ..Self::car() }
     }
 }

@@ -140,7 +140,7 @@ pub struct HeadingErrors {
     /// Offset (1 σ, degrees), constant in a run.
     #[schemars(with = "NonNegative")]
     pub offset_sigma_deg: f64,
-    /// Error that lasts (1 σ, degrees), a Gauss-Markov process: multipath, the iron of a compass.
+    /// Error that lasts (1 σ, degrees), a Gauss-Markov process: iron about a compass.
     #[schemars(with = "NonNegative")]
     pub walk_sigma_deg: f64,
     /// Correlation time of that error (s).
