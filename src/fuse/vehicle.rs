@@ -2,7 +2,7 @@
 
 use super::FuseRequest;
 use nav_sim_document::{Cell, Table, readable};
-use nav_sim_navigation::fusion::{AidWorth, Solution, aid_worths};
+use nav_sim_navigation::fusion::{AidInnovations, Solution, aid_innovations};
 use nav_sim_navigation::sensors::aiding::{AidingSettings, NhcSettings, OdometerSettings, ZuptSettings};
 use nav_sim_signal::units::DEG;
 use serde::Serialize;
@@ -45,7 +45,7 @@ pub struct VehicleSummary {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mounting_yaw_deg: Option<Known>,
     /// Innovations of each aid that was used.
-    pub aids: Vec<AidWorth>,
+    pub aids: Vec<AidInnovations>,
 }
 
 /// An estimate and its standard deviation.
@@ -68,7 +68,7 @@ impl VehicleSummary {
             wheel_scale: known(0, 1.0),
             mounting_pitch_deg: known(1, DEG),
             mounting_yaw_deg: known(2, DEG),
-            aids: aid_worths(&solution.aids),
+            aids: aid_innovations(&solution.aids),
         })
     }
 

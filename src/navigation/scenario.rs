@@ -396,6 +396,6 @@ impl RunSettings {
 }
 
 #[cfg(test)]
-mod aiding_tests;
+pub(crate) mod aiding_tests;
 #[cfg(test)]
 mod tests;

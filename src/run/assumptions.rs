@@ -4,9 +4,11 @@ use crate::report::Manifest;
 use nav_sim_document::readable;
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::metrics::Summary;
+use nav_sim_navigation::sensors::aiding::{Aid, AidingSettings};
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::gnss::GnssSettings;
 use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::units::DEG;
 
 /// What the results rest on.
 pub(super) fn assumptions(summary: &Summary, manifest: &Manifest) -> Vec<(&'static str, String)> {
@@ -28,7 +30,7 @@ pub(super) fn assumptions(summary: &Summary, manifest: &Manifest) -> Vec<(&'stat
     if let Some(baro) = &scenario.baro {
         facts.push(("barometer", format!("{} Hz; 1 σ {} m", baro.rate_hz, readable(baro.sigma_m))));
     }
-    let aids: Vec<String> = scenario.aiding.in_words();
+    let aids: Vec<String> = scenario.aiding.rates().map(|aid| aided(&scenario.aiding, aid)).collect();
     if !aids.is_empty() {
         facts.push(("aiding (1 σ)", aids.join("; ")));
     }
@@ -57,6 +59,13 @@ fn defects(imu: &ImuSettings) -> String {
         readable(imu.scale_ppm_gyro),
         readable(imu.misalignment_rad)
     )
+}
+
+/// `nhc 0.2 m/s at 1 Hz`
+fn aided(aiding: &AidingSettings, (aid, rate_hz): (Aid, f64)) -> String {
+    let [sigma, _] = aiding.sigmas(aid);
+    let (sigma, unit) = if aid == Aid::Heading { (sigma / DEG, "°") } else { (sigma, "m/s") };
+    format!("{} {} {unit} at {rate_hz} Hz", aid.name(), readable(sigma))
 }
 
 fn receiver(gnss: &GnssSettings) -> String {

@@ -129,8 +129,8 @@ impl Ekf {
     }
 }
 
-/// The axis of the vehicle in its axes as they are known, for these estimates of wheel scale, mounting pitch and yaw; forward times what the wheel
-/// makes of it.
+/// The axis of the vehicle in its axes as they are known, for these estimates of wheel scale, mounting pitch and yaw;
+/// forward times what the wheel makes of it.
 #[inline(always)]
 fn along<L: Real>(axis: usize, states: Vec3<L>) -> Vec3<L> {
     let (zero, one) = (L::from(0.0), L::from(1.0));

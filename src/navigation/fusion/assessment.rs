@@ -1,7 +1,9 @@
 //! Worth of a solution: by its own innovations, and by a reference where there is one.
 
 use super::outcome::nis_per_component;
-use super::{AidWorth, Ends, FixRecord, FromReference, Outcome, Solution, Use, Weighed, aid_worths};
+use super::{
+    AidInnovations, Ends, FixRecord, FromReference, Outcome, Solution, Use, Weighed, aid_innovations,
+};
 use crate::metrics::VerdictKind;
 use crate::simulation::REPORTED_NAMES;
 use serde::Serialize;
@@ -73,7 +75,7 @@ pub enum Finding {
     },
     /// Mean NIS of what the vehicle knows.
     Aid {
-        /// As [`super::AidWorth`] has it.
+        /// As [`super::AidInnovations`] has it.
         aid: &'static str,
         /// Divided by the number of components: 1 if right.
         nis_per_component: f64,
@@ -205,9 +207,9 @@ fn nis(solution: &Solution) -> (VerdictKind, Finding) {
 
 /// Aids that are farther from the solution than stated.
 fn aids(solution: &Solution) -> impl Iterator<Item = (VerdictKind, Finding)> {
-    let is_far = |w: &AidWorth| w.nis_per_component > NIS_LIMITS.0.max(w.nis_band.upper);
-    aid_worths(&solution.aids).into_iter().filter(is_far).map(
-        |AidWorth { aid, nis_per_component, .. }| {
+    let is_far = |w: &AidInnovations| w.nis_per_component > NIS_LIMITS.0.max(w.nis_band.upper);
+    aid_innovations(&solution.aids).into_iter().filter(is_far).map(
+        |AidInnovations { aid, nis_per_component, .. }| {
             (VerdictKind::Doubtful, Finding::Aid { aid, nis_per_component })
         },
     )

@@ -74,7 +74,7 @@ pub use outcome::{
 };
 pub use run::fuse;
 pub use vehicle::{
-    AidRecord, AidWorth, VehicleVelocity, WheelSpeed, aid_worths, vehicle_velocities, wheel_ratio,
+    AidInnovations, AidRecord, VehicleVelocity, WheelSpeed, aid_innovations, vehicle_velocities, wheel_ratio,
 };
 
 use crate::earth::GravityModel;

@@ -63,7 +63,7 @@ impl AidRecord {
 
 /// Innovations of an aid.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct AidWorth {
+pub struct AidInnovations {
     /// `nhc`, `odometer` or `zupt`.
     pub aid: &'static str,
     /// Measurements.
@@ -78,7 +78,7 @@ pub struct AidWorth {
 
 /// The innovations of each aid there is.
 #[must_use]
-pub fn aid_worths(records: &[AidRecord]) -> Vec<AidWorth> {
+pub fn aid_innovations(records: &[AidRecord]) -> Vec<AidInnovations> {
     let worth = |aid: Aid| {
         let own: Vec<&AidRecord> = records.iter().filter(|r| r.aid == aid).collect();
         let (count, axes) = (own.len(), aid.axes().len());
@@ -86,7 +86,7 @@ pub fn aid_worths(records: &[AidRecord]) -> Vec<AidWorth> {
         let band = chi_square_band(axes, count as f64);
         let per_component = |nis: f64| nis / axes as f64;
         let series: Vec<(f64, &[f64])> = own.iter().map(|r| (r.t_s, r.normalised.as_slice())).collect();
-        (count > 0).then(|| AidWorth {
+        (count > 0).then(|| AidInnovations {
             aid: aid.name(),
             count,
             nis_per_component: own.iter().map(|r| r.nis()).sum::<f64>() / components,
@@ -121,7 +121,7 @@ pub fn vehicle_velocities(
             t_s,
             aid,
             velocity_b: DVec3::X * forward,
-            sigma_m_s: settings.variances(aid)[0].sqrt(),
+            sigma_m_s: settings.sigmas(aid)[0],
             lever_arm_b: settings.lever_arm_b(aid),
         };
         let samples = || every(imu, |s| s.t_s, rate_hz);

@@ -3,68 +3,23 @@
 
 use super::standstill::MISSES;
 use super::{
-    Recorded, Settings, Solution, Start, VehicleVelocity, WheelSpeed, aid_worths, fuse, vehicle_velocities,
+    Recorded, Settings, Solution, Start, VehicleVelocity, WheelSpeed, aid_innovations, fuse,
+    vehicle_velocities,
 };
-use crate::ekf::{Belief, FilterStates};
+use crate::ekf::Belief;
 use crate::imu::ImuIncrement;
-use crate::noise::{Ar1, Composite, Model, Process, White};
-use crate::scenario::Scenario;
+use crate::scenario::aiding_tests::{OUTAGE, consumer, scenario, town};
 use crate::sensors::aiding::{AidingSettings, NhcSettings, OdometerSettings, ZuptSettings};
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{FilterPass, TruthSide};
 use crate::simulation::{Plan, Recording, record};
 use crate::trajectory::Trajectory;
-use crate::trajectory::profile::{
-    Acceleration, Bank, Kind, Length, Profile, Segment, Start as Begin, Turning,
-};
-use crate::units::DEG;
 use glam::{DQuat, DVec3};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 use rand_distr::{Distribution, StandardNormal};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-
-const RATE_HZ: f64 = 50.0;
-const OUTAGE: Outage = Outage { start_s: 30.0, end_s: 85.0 };
-
-/// A street with bends, a stop from 44 s to 58 s, and a way on.
-fn town() -> Trajectory {
-    let straight = |s: f64| Kind::Straight(Length::Duration(s));
-    let accelerate = |to_speed: f64, s: f64| Kind::Accelerate { to_speed, by: Acceleration::Duration(s) };
-    let turn = |deg: f64, s: f64| Kind::Turn { angle: deg * DEG, by: Turning::Duration(s) };
-    let kinds = vec![
-        turn(70.0, 12.0),
-        straight(10.0),
-        turn(-120.0, 14.0),
-        accelerate(0.0, 8.0),
-        straight(14.0),
-        accelerate(16.0, 10.0),
-        turn(50.0, 10.0),
-        straight(12.0),
-    ];
-    let start = Begin { t_s: 0.0, lat: 0.8, lon: 0.1, h: 400.0, heading: 40.0 * DEG, speed: 13.0 };
-    let segment = |kind| Segment { kind, climb_m: 0.0, ramp_s: None };
-    let segments = kinds.into_iter().map(segment).collect();
-    Profile { start, bank: Bank::None, ramp_s: 2.0, segments }.build().unwrap()
-}
-
-fn model() -> Model {
-    let axis = |white: f64, deviation: f64| {
-        let phi = (-1.0 / (RATE_HZ * 200.0)).exp();
-        let bias = Ar1::new(phi, deviation * deviation * (1.0 - phi * phi)).unwrap();
-        Composite::new(vec![Process::White(White::new(white).unwrap()), Process::Ar1(bias)])
-    };
-    Model::pooled(RATE_HZ, &axis(2e-5, 0.01), &axis(5e-7, 1e-4))
-}
-
-fn scenario(aiding: &AidingSettings) -> Scenario {
-    let mut scenario = Scenario { aiding: aiding.clone(), ..Scenario::default() };
-    scenario.imu.rate_hz = RATE_HZ;
-    scenario.filter.states = FilterStates::Full;
-    scenario.initial.att_sigma_deg = [0.2, 0.2, 0.5];
-    scenario
-}
 
 fn settings() -> Settings {
     Settings {
@@ -86,11 +41,11 @@ fn nhc(mounting_sigma_deg: f64) -> AidingSettings {
 
 /// The belief of a filter with these aids, and recordings of such drives, handed to `then` with their starts.
 fn recorded(aiding: &AidingSettings, runs: u64, mut then: impl FnMut(u64, &Recording, &Start, &Belief)) {
-    let (trajectory, model) = (town(), model());
-    let aided = scenario(aiding);
+    let (trajectory, model) = (town(), consumer());
+    let aided = scenario(aiding.clone());
     let track = aided.track(&trajectory, &model, &[]).unwrap();
     let belief = aided.belief(&model, &[], &track).unwrap();
-    let plain = scenario(&AidingSettings::default());
+    let plain = scenario(AidingSettings::default());
     let experiment = plain.experiment(&trajectory, Truth::Model(&model), &[], &[], 23);
     let plan = Plan::new(&experiment).unwrap();
     for run in 0..runs {
@@ -135,7 +90,7 @@ fn the_scale_of_a_wheel_is_found() {
         let solution = fuse(&Recorded { aids: &aids, ..bare }, belief, start, &settings, None).unwrap();
         let [found, sigma] = solution.vehicle.unwrap();
         assert!(sigma.x < 0.006 && (found.x - 0.01).abs() < 4.0 * sigma.x, "{} ± {}", found.x, sigma.x);
-        let worth = aid_worths(&solution.aids)[0];
+        let worth = aid_innovations(&solution.aids)[0];
         assert_eq!((worth.aid, worth.count), ("odometer", 89));
     });
 }
@@ -182,8 +137,8 @@ fn ends(aiding: &AidingSettings, runs: u64) -> Ends {
 
 /// Horizontal deviation at the end of the outage by the covariance analysis (m).
 fn foretold(aiding: &AidingSettings) -> f64 {
-    let (trajectory, model, outages) = (town(), model(), [OUTAGE]);
-    let scenario = scenario(aiding);
+    let (trajectory, model, outages) = (town(), consumer(), [OUTAGE]);
+    let scenario = scenario(aiding.clone());
     let track = scenario.track(&trajectory, &model, &outages).unwrap();
     let belief = scenario.belief(&model, &outages, &track).unwrap();
     let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &[], &outages, 5);
@@ -237,7 +192,7 @@ fn standstill_is_measured_where_the_vehicle_stands() {
         };
         assert_eq!(of_zupt(&[OUTAGE]), 0);
         let solution = fuse(&Recorded { aids: &aids, ..bare }, belief, start, &settings(), None).unwrap();
-        let worths = aid_worths(&solution.aids);
+        let worths = aid_innovations(&solution.aids);
         assert_eq!(worths.iter().map(|w| w.aid).collect::<Vec<_>>(), ["nhc", "zupt"]);
     });
 }

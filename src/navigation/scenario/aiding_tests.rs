@@ -16,8 +16,8 @@ use crate::trajectory::Trajectory;
 use crate::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
 use crate::units::DEG;
 
-const RATE_HZ: f64 = 50.0;
-const OUTAGE: Outage = Outage { start_s: 30.0, end_s: 85.0 };
+pub(crate) const RATE_HZ: f64 = 50.0;
+pub(crate) const OUTAGE: Outage = Outage { start_s: 30.0, end_s: 85.0 };
 
 fn drive(speed: f64, kinds: Vec<Kind>) -> Trajectory {
     let start = Start { t_s: 0.0, lat: 0.8, lon: 0.1, h: 400.0, heading: 40.0 * DEG, speed };
@@ -26,8 +26,8 @@ fn drive(speed: f64, kinds: Vec<Kind>) -> Trajectory {
     Profile { start, bank: Bank::None, ramp_s: 2.0, segments }.build().unwrap()
 }
 
-/// A street with bends, a stop in the outage, and a way on.
-fn town() -> Trajectory {
+/// A street with bends, a stop from 44 s to 58 s, and a way on.
+pub(crate) fn town() -> Trajectory {
     let straight = |s: f64| Kind::Straight(Length::Duration(s));
     let accelerate = |to_speed: f64, s: f64| Kind::Accelerate { to_speed, by: Acceleration::Duration(s) };
     let turn = |deg: f64, s: f64| Kind::Turn { angle: deg * DEG, by: Turning::Duration(s) };
@@ -44,6 +44,11 @@ fn town() -> Trajectory {
     drive(13.0, kinds)
 }
 
+/// What makes the errors of runs, and a filter with a state for each process knows.
+pub(crate) fn consumer() -> Model {
+    model([2e-5, 5e-7], [0.01, 1e-4])
+}
+
 fn model(white: [f64; 2], bias: [f64; 2]) -> Model {
     let axis = |white: f64, deviation: f64| {
         let phi = (-1.0 / (RATE_HZ * 200.0)).exp();
@@ -53,7 +58,7 @@ fn model(white: [f64; 2], bias: [f64; 2]) -> Model {
     Model::pooled(RATE_HZ, &axis(white[0], bias[0]), &axis(white[1], bias[1]))
 }
 
-fn scenario(aiding: AidingSettings) -> Scenario {
+pub(crate) fn scenario(aiding: AidingSettings) -> Scenario {
     let mut scenario = Scenario { aiding, ..Scenario::default() };
     scenario.imu.rate_hz = RATE_HZ;
     scenario.filter.states = FilterStates::Full;
@@ -65,7 +70,7 @@ fn scenario(aiding: AidingSettings) -> Scenario {
 /// Errors and beliefs at the end of the outage by the covariance analysis, and the root mean squares of errors and the
 /// mean stated deviations of `runs` runs there.
 fn both(scenario: &Scenario, runs: u64) -> (Judged, [[f64; REPORTED]; 2]) {
-    let (trajectory, model) = (town(), model([2e-5, 5e-7], [0.01, 1e-4]));
+    let (trajectory, model) = (town(), consumer());
     let outages = [OUTAGE];
     let track = scenario.track(&trajectory, &model, &outages).unwrap();
     let beliefs = [scenario.belief(&model, &outages, &track).unwrap()];
@@ -120,6 +125,8 @@ fn runs_have_the_errors_that_the_analysis_states() {
     ];
     let runs = 400;
     let free = both(&scenario(none()), runs).0.errors.rmse();
+    // what a filter leaves out may harm it
+    let is_unknown = |name: &str| name.contains(',') && !name.ends_with("a state");
     for (name, aiding) in cases {
         let (judged, [rms, see]) = both(&scenario(aiding), runs);
         let (expected, sigma) = (judged.errors.rmse(), judged.sigma());
@@ -129,7 +136,7 @@ fn runs_have_the_errors_that_the_analysis_states() {
             assert!((see[i] / sigma[i] - 1.0).abs() < 0.02, "{name}, state {i}: {} {}", see[i], sigma[i]);
         }
         let horizontal = |x: [f64; REPORTED]| x[0].hypot(x[1]);
-        assert!(horizontal(expected) != horizontal(free), "{name} changes something");
+        assert!(is_unknown(name) || horizontal(expected) < horizontal(free), "{name} is of use");
     }
 }
 
@@ -205,6 +212,6 @@ fn a_constraint_that_the_reference_does_not_keep_is_refused() {
     // a point ten metres to the front swings outwards in every turn
     let nhc = Some(NhcSettings { lever_arm_m: [10.0, 0.0, 0.0], ..NhcSettings::default() });
     let scenario = scenario(AidingSettings { nhc, ..AidingSettings::default() });
-    let error = scenario.track(&town(), &model([2e-5, 5e-7], [0.01, 1e-4]), &[]).unwrap_err();
-    assert!(error.to_string().starts_with("aiding.nhc.sigma_m_s = 0.1: the reference itself"), "{error}");
+    let error = scenario.track(&town(), &consumer(), &[]).unwrap_err();
+    assert!(error.to_string().starts_with("aiding.nhc.sigma_m_s = 0.2: the reference itself"), "{error}");
 }

@@ -63,11 +63,7 @@ impl GnssSettings {
         require_positive("rate_hz", &[self.rate_hz])?;
         require_positive("pos_sigma_m", &self.pos_sigma_m)?;
         require_positive("vel_sigma_m_s", self.vel_sigma_m_s.as_ref().map_or(&[], |v| v.as_slice()))?;
-        require_finite("lever_arm_m", &self.lever_arm_m)?;
-        if let Some(long) = self.lever_arm_m.iter().find(|x| x.abs() > MAX_LEVER_ARM_M) {
-            let requirement = format!("metres from the IMU to the antenna, at most {MAX_LEVER_ARM_M}");
-            return Err(SettingError::new("lever_arm_m", long, requirement));
-        }
+        require_lever_arm(&self.lever_arm_m)?;
         require_non_negative("correlated_pos_sigma_m", &self.correlated_pos_sigma_m)?;
         require_positive("correlation_time_s", &[self.correlation_time_s])
     }
@@ -75,6 +71,21 @@ impl GnssSettings {
     /// Components of one fix: 3 (position) or 6 (and velocity).
     pub(crate) const fn components(&self) -> usize {
         if self.vel_sigma_m_s.is_some() { 6 } else { 3 }
+    }
+}
+
+/// Accepts a point of the vehicle with respect to the IMU.
+///
+/// # Errors
+/// The first coordinate that is farther than any vehicle is large.
+pub(crate) fn require_lever_arm(lever_arm_m: &[f64; 3]) -> Result<(), SettingError> {
+    require_finite("lever_arm_m", lever_arm_m)?;
+    match lever_arm_m.iter().find(|x| x.abs() > MAX_LEVER_ARM_M) {
+        Some(long) => {
+            let requirement = format!("metres from the IMU, at most {MAX_LEVER_ARM_M}");
+            Err(SettingError::new("lever_arm_m", long, requirement))
+        }
+        None => Ok(()),
     }
 }
 

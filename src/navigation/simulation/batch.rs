@@ -1,7 +1,8 @@
 //! Eight runs through the schedule: noise, prediction, fixes, and what is kept of them.
 
+use super::aided::Aided;
 use super::assessment::{Assessment, EpochLanes};
-use super::plan::{Aided, Event, Plan};
+use super::plan::{Event, Plan};
 use super::{EpochSums, OutageRecord, REPORTED, RunRecord};
 use crate::earth::radii;
 use crate::ekf::covariance::{PSI, R, V};
@@ -273,7 +274,7 @@ impl Candidate {
 
     fn use_aid(&mut self, plan: &Plan<'_>, aid: Aid, value: &Vec3) {
         let aiding = plan.experiment.aiding;
-        let [variance, _] = aiding.variances(aid);
+        let variance = aiding.sigmas(aid)[0].powi(2);
         if aid == Aid::Heading {
             let _ = update_yaw(&mut self.ekf, &value[0], variance);
             return;

@@ -1,5 +1,6 @@
 //! One lane batch: eight runs through one trajectory.
 
+mod aided;
 mod assessment;
 mod batch;
 pub mod lincov;

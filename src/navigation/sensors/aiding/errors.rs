@@ -142,6 +142,17 @@ impl AidPart {
         }
     }
 
+    /// Its stream of random numbers: its name, and the axis where a name has two.
+    const fn stream(self) -> &'static str {
+        match self {
+            Self::MountingPitch => "mounting_pitch",
+            Self::MountingYaw => "mounting_yaw",
+            Self::SuspensionLateral => "suspension_lateral",
+            Self::SuspensionVertical => "suspension_vertical",
+            other => other.name(),
+        }
+    }
+
     /// The aid that it is part of.
     pub(crate) const fn aid(self) -> Aid {
         match self {
@@ -214,20 +225,8 @@ struct Walk {
 impl AidNoise {
     /// The errors of run `key.run`.
     pub(crate) fn new(settings: &AidingSettings, key: StreamKey<'_>) -> Self {
-        const PARTS: [&str; 10] = [
-            "pitch",
-            "yaw",
-            "slip",
-            "lateral",
-            "vertical",
-            "scale",
-            "wheel_slip",
-            "creep",
-            "offset",
-            "correlated",
-        ];
         let walk = |error: AidError| {
-            let process = PARTS[error.part as usize];
+            let process = error.part.stream();
             let mut stream = StreamKey { source: error.aid.name(), process, ..key }.generator();
             let value = match error.law {
                 Law::Known(value) => value,
@@ -238,7 +237,7 @@ impl AidNoise {
         };
         let white = Aid::ALL.map(|aid| {
             let stream = |process| StreamKey { source: aid.name(), process, ..key }.generator();
-            (settings.variances(aid)[1].sqrt(), ["white_x", "white_y", "white_z"].map(stream))
+            (settings.sigmas(aid)[1], ["white_x", "white_y", "white_z"].map(stream))
         });
         Self { lasting: settings.errors().into_iter().map(walk).collect(), white }
     }

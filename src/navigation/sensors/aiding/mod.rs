@@ -56,18 +56,6 @@ impl AidingSettings {
         Ok(())
     }
 
-    /// Each that is there, as its filter believes it: `nhc 0.1 m/s at 1 Hz`.
-    #[must_use]
-    pub fn in_words(&self) -> Vec<String> {
-        let words = |(aid, rate_hz): (Aid, f64)| {
-            let sigma = self.variances(aid)[0].sqrt();
-            let (sigma, unit) = if aid == Aid::Heading { (sigma / DEG, "°") } else { (sigma, "m/s") };
-            // three digits: the square root of a square
-            format!("{} {} {unit} at {rate_hz} Hz", aid.name(), (sigma * 1e9).round() / 1e9)
-        };
-        self.rates().map(words).collect()
-    }
-
     /// Whether there is none.
     #[must_use]
     pub fn is_none(&self) -> bool {
@@ -75,7 +63,7 @@ impl AidingSettings {
     }
 
     /// Those that are there, and their rates (Hz).
-    pub(crate) fn rates(&self) -> impl Iterator<Item = (Aid, f64)> {
+    pub fn rates(&self) -> impl Iterator<Item = (Aid, f64)> {
         let rates = [
             self.nhc.as_ref().map(|s| s.rate_hz),
             self.odometer.as_ref().map(|s| s.rate_hz),
@@ -95,8 +83,9 @@ impl AidingSettings {
         arm.map_or(DVec3::ZERO, DVec3::from)
     }
 
-    /// Variances of one measurement's white noise, as the filter believes and in truth ((m/s)² or rad²).
-    pub(crate) fn variances(&self, aid: Aid) -> [f64; 2] {
+    /// Standard deviations of one measurement's white noise, as the filter believes and in truth (m/s or rad).
+    #[must_use]
+    pub fn sigmas(&self, aid: Aid) -> [f64; 2] {
         let (sigma, noise) = match aid {
             Aid::Nhc => self.nhc.as_ref().map(|s| (s.sigma_m_s, s.truth.noise_sigma_m_s)),
             Aid::Odometer => self.odometer.as_ref().map(|s| (s.sigma_m_s, s.truth.noise_sigma_m_s)),
@@ -108,7 +97,7 @@ impl AidingSettings {
             }
         }
         .unwrap_or_default();
-        [sigma, noise.unwrap_or(sigma)].map(|s| s * s)
+        [sigma, noise.unwrap_or(sigma)]
     }
 
     /// Standard deviations of what a filter may have as states: scale of the wheel (1), pitch and yaw of the vehicle's
@@ -131,8 +120,7 @@ impl AidingSettings {
             walk_sigma_m_s: 0.05,
             correlation_time_s: 1.0,
         };
-        // Sideslip lasts as long as a bend: white noise of its size would be believed to average out.
-        let nhc = NhcSettings { sigma_m_s: 0.2, mounting_sigma_deg: 0.5, truth, ..NhcSettings::default() };
+        let nhc = NhcSettings { mounting_sigma_deg: 0.5, truth, ..NhcSettings::default() };
         Self { nhc: Some(nhc), ..Self::default() }
     }
 

@@ -1,6 +1,7 @@
 //! A trajectory as a linear filter sees it: maps of the navigation error, and when it is measured.
 
-use super::super::plan::{Aided, Event, Experiment, ExperimentError, Plan};
+use super::super::aided::Aided;
+use super::super::plan::{Event, Experiment, ExperimentError, Plan};
 use super::input::{CROSSED, Outer, SIGNALS, Source, place};
 use super::joint::add_scaled;
 use crate::closure::Bounds;
@@ -299,7 +300,7 @@ impl Linearisation {
     /// The rows of what the vehicle measures of itself.
     fn aid(&self, experiment: &Experiment<'_>, aided: &Aided, rows: &mut Vec<Row>) {
         let Aided { aid, v_b, a_b } = *aided;
-        let [r, noise] = experiment.aiding.variances(aid);
+        let [r, noise] = experiment.aiding.sigmas(aid).map(|sigma| sigma * sigma);
         let row = |h, axis| Row {
             noise,
             motion: [v_b, a_b],
