@@ -8,7 +8,7 @@ use crate::noise::Model;
 use crate::noise::reduction::{self, ReductionError};
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::baro::BaroSettings;
-use crate::sensors::defects::ImuSettings;
+use crate::sensors::defects::{Defect, ImuSettings};
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::{
@@ -189,6 +189,20 @@ impl Scenario {
         self.meets_imu_samples("gnss.rate_hz", self.gnss.rate_hz)
     }
 
+    /// Refuses what covariance analysis cannot have: its gains and errors do not depend on what is drawn.
+    ///
+    /// # Errors
+    /// The key that is drawn upon.
+    pub fn analysable(&self) -> Result<(), SettingError> {
+        let because = "covariance analysis has no draws, on which its effect depends";
+        let refusal = match (self.filter.nis_gate, &self.imu.output) {
+            (Some(p), _) => SettingError::new("filter.nis_gate", p, because),
+            (None, Some(_)) => SettingError::new("imu.output", "{…}", because),
+            (None, None) => return Ok(()),
+        };
+        Err(refusal.advising("leave it out, or draw runs (monte-carlo)"))
+    }
+
     /// A measurement must fall on an IMU sample: one that does not would be used late or never.
     fn meets_imu_samples(&self, key: &str, rate_hz: f64) -> Result<(), SettingError> {
         if samples_per(self.imu.rate_hz, rate_hz).is_some() {
@@ -272,9 +286,7 @@ impl Scenario {
                 found.push(Unexpected::Scale { sensor, ppm, expected_ppm });
             }
         }
-        if self.imu.misalignment_rad > 0.0 {
-            found.push(Unexpected::Misalignment { angle_rad: self.imu.misalignment_rad });
-        }
+        found.extend(self.imu.without_states().map(Unexpected::Defect));
         let GnssSettings {
             rate_hz, pos_sigma_m, correlated_pos_sigma_m: sigma_m, correlation_time_s, ..
         } = self.gnss;
@@ -337,11 +349,8 @@ pub enum Unexpected {
         /// In the filter.
         expected_ppm: f64,
     },
-    /// A misalignment of the axes (1 σ, rad), of which no filter has states.
-    Misalignment {
-        /// Of the true IMU.
-        angle_rad: f64,
-    },
+    /// An error of the true IMU of which no filter has states.
+    Defect(Defect),
     /// Position errors that last, of which no filter has states.
     CorrelatedPositions {
         /// North, east, down (1 σ, m).
@@ -372,7 +381,9 @@ impl Unexpected {
         match self {
             Self::TurnOnBias { sensor, .. } => vec![format!("{}.turn_on_bias", sensor.name())],
             Self::Scale { sensor, .. } => vec![format!("{}.scale", sensor.name())],
-            Self::Misalignment { .. } => Sensor::ALL.map(|s| format!("{}.misalignment", s.name())).into(),
+            Self::Defect(defect) => {
+                defect.sensors.iter().map(|s| format!("{}.{}", s.name(), defect.source)).collect()
+            }
             Self::CorrelatedPositions { .. } => vec!["gnss.correlated".to_owned()],
             Self::Aiding { source, .. } => vec![(*source).to_owned()],
             Self::Integration { .. } => vec![STRAPDOWN.to_owned()],

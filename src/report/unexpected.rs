@@ -4,6 +4,7 @@ use nav_sim_document::{percent, readable};
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::metrics::ReductionQuality;
 use nav_sim_navigation::scenario::Unexpected;
+use nav_sim_navigation::sensors::defects::Defect;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 
 /// An error that the filter does not expect: what it is, and what helps.
@@ -22,10 +23,9 @@ pub(crate) fn unexpected_in_words(unexpected: &Unexpected) -> (String, String) {
             ),
             format!("--scale-ppm (initial.{}) gives it states", InitialSettings::scale_key(*sensor)),
         ),
-        Unexpected::Misalignment { angle_rad } => (
-            format!("the true IMU has a misalignment of {angle_rad} rad, the filter expects none"),
-            "a smaller imu.misalignment_rad (a calibration of the axes)".to_owned(),
-        ),
+        Unexpected::Defect(Defect { key, sigma, unit, .. }) => {
+            (format!("{key} = {sigma} {unit} is in no filter"), "calibrate the IMU for it".to_owned())
+        }
         Unexpected::CorrelatedPositions { sigma_m: [n, e, d], correlation_time_s } => (
             format!(
                 "the true receiver errs by {n}, {e}, {d} m over {correlation_time_s} s, the filter expects white errors"

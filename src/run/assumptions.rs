@@ -5,7 +5,7 @@ use nav_sim_document::readable;
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::metrics::Summary;
 use nav_sim_navigation::sensors::aiding::{Aid, AidingSettings};
-use nav_sim_navigation::sensors::defects::ImuSettings;
+use nav_sim_navigation::sensors::defects::{Defect, ImuSettings};
 use nav_sim_navigation::sensors::gnss::GnssSettings;
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::units::DEG;
@@ -52,13 +52,16 @@ fn three(sigma: &[f64; 3]) -> String {
 /// What the true IMU has beside its noise.
 fn defects(imu: &ImuSettings) -> String {
     let [bias_a, bias_g] = Sensor::ALL.map(|sensor| readable(imu.deviations(sensor).0));
-    format!(
-        "{} Hz; turn-on bias {bias_a} m/s², {bias_g} rad/s (1 σ); scale factors {}, {} ppm; misalignment {} rad",
-        imu.rate_hz,
-        readable(imu.scale_ppm_accel),
-        readable(imu.scale_ppm_gyro),
-        readable(imu.misalignment_rad)
-    )
+    let [ppm_a, ppm_g] = Sensor::ALL.map(|sensor| readable(imu.deviations(sensor).1));
+    let mut facts = vec![
+        format!("{} Hz", imu.rate_hz),
+        format!("1 σ: turn-on bias {bias_a} m/s², {bias_g} rad/s"),
+        format!("scale factors {ppm_a}, {ppm_g} ppm"),
+    ];
+    let of = |defect: Defect| format!("{} {} {}", defect.key, readable(defect.sigma), defect.unit);
+    facts.extend(imu.without_states().map(of));
+    facts.extend(imu.output.as_ref().map(|_| "samples of a range and a resolution".to_owned()));
+    facts.join("; ")
 }
 
 /// `nhc 0.2 m/s at 1 Hz`

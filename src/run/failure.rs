@@ -95,7 +95,7 @@ fn impossible(e: NavigateError, model: &Path, settings: Option<&Path>) -> Failur
         NavigateError::RecordedTruth => failure
             .hint("calibrate the recordings and give the model with --truth, or use --method monte-carlo"),
         NavigateError::DrawnTruth => failure.hint("leave --spread out, or use --method monte-carlo"),
-        NavigateError::Gate(_) => failure.hint("remove the key, or use --method monte-carlo"),
+        NavigateError::Drawn(_) => failure.hint("leave it out, or use --method monte-carlo"),
         NavigateError::NotFinite => {
             Failure::could_not(e).hint("do the models fit the IMU, are [imu] and [initial] plausible?")
         }

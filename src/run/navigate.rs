@@ -22,6 +22,7 @@ use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::{Recording, Sensor};
 use nav_sim_signal::noise::reduction::window_s;
 use nav_sim_signal::noise::{Model, ParameterError};
+use nav_sim_signal::units::SettingError;
 
 /// Inputs of [`navigate()`].
 #[derive(Debug)]
@@ -106,9 +107,9 @@ pub enum NavigateError {
     /// Each run has a truth of its own.
     #[error("covariance analysis is of one truth; --spread draws one for each run")]
     DrawnTruth,
-    /// A gate makes gains random.
-    #[error("covariance analysis has no gate: filter.nis_gate = {0} makes the gains depend on what is drawn")]
-    Gate(f64),
+    /// A setting whose effect depends on what is drawn.
+    #[error(transparent)]
+    Drawn(#[from] SettingError),
     /// Numbers ran away.
     #[error("the covariance analysis did not stay finite and positive definite")]
     NotFinite,
@@ -175,7 +176,7 @@ pub fn navigate(
         .iter()
         .for_each(|found| observer.remark(&Note::Unexpected(*found)));
     // Which fixes a gate refuses is drawn with the errors: the gains of such a filter are not those of the analysis.
-    if scenario.filter.nis_gate.is_none() {
+    if scenario.analysable().is_ok() {
         Analysis { track: &merged, ..analysis }.add_budgets(&mut navigation.summary, &belief);
     }
     if method == Method::Lincov {
@@ -193,7 +194,7 @@ fn possible(inputs: &NavigateInputs, scenario: &Scenario) -> Result<(), Navigate
         TrueImu::Drawn(_) => return Err(NavigateError::DrawnTruth),
         TrueImu::AsBelieved | TrueImu::Model(_) => {}
     }
-    scenario.filter.nis_gate.map_or(Ok(()), |p| Err(NavigateError::Gate(p)))
+    Ok(scenario.analysable()?)
 }
 
 /// What speaks against the filter before anything was computed.

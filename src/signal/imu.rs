@@ -94,6 +94,17 @@ pub struct ImuSample {
     pub f_ib_b: DVec3,
 }
 
+impl ImuSample {
+    /// What a sensor measures of it: specific force (m/s²) or angular rate (rad/s).
+    #[must_use]
+    pub const fn of(&self, sensor: Sensor) -> DVec3 {
+        match sensor {
+            Sensor::Accel => self.f_ib_b,
+            Sensor::Gyro => self.omega_ib_b,
+        }
+    }
+}
+
 /// One recorded sample: what the sensors summed up over an interval that ends at `t_s`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImuIncrement {

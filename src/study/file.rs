@@ -7,7 +7,6 @@ use crate::formats::{FileError, Kind};
 use crate::formats::{recordings, scenario_file};
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::gnss::GnssSettings;
-use nav_sim_signal::units::SettingError;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -144,13 +143,12 @@ fn unused(study: &Study, path: &Path, source: &Source) -> Result<Vec<String>, Fi
 }
 
 fn scenarios(study: &Study, path: &Path, source: &Source) -> Result<Vec<Scenario>, FileError> {
+    let possible = |scenario: &Scenario| if study.is_sampled() { Ok(()) } else { scenario.analysable() };
     let scenario = |(i, entry): (usize, &ScenarioEntry)| match (&entry.file, &entry.settings) {
-        (Some(file), _) => {
-            scenario_file::read_for(&beside(path, file), |scenario| analysable(study, scenario))
-        }
+        (Some(file), _) => scenario_file::read_for(&beside(path, file), possible),
         (None, settings) => {
             let scenario = settings.clone().unwrap_or_default();
-            let checked = scenario.validate().and_then(|()| analysable(study, &scenario));
+            let checked = scenario.validate().and_then(|()| possible(&scenario));
             let section = format!("scenario[{}].settings", i + 1);
             checked.map_err(|e| source.setting(&e.in_section(&section)))?;
             Ok(scenario)
@@ -170,19 +168,6 @@ fn receivers(study: &Study, path: &Path, source: &Source) -> Result<Vec<GnssSett
         }
     };
     study.gnss.iter().enumerate().map(receiver).collect()
-}
-
-/// Gains that depend on what is drawn have no covariance analysis.
-fn analysable(study: &Study, scenario: &Scenario) -> Result<(), SettingError> {
-    match scenario.filter.nis_gate {
-        Some(p) if !study.is_sampled() => {
-            let reason =
-                "a gate makes the gains depend on what is drawn, and covariance analysis has no draws";
-            let refusal = SettingError::new("filter.nis_gate", p, reason);
-            Err(refusal.advising("leave it out, or sample with method = \"monte-carlo\""))
-        }
-        _ => Ok(()),
-    }
 }
 
 /// A refusal by [`Study::resolve`] at the line its key stands in; `truths`: the entry of the file that each truth is of.

@@ -244,6 +244,17 @@ fn scale_factors_and_misalignments_that_a_filter_expects_or_not() {
     assert_agree("misalignment", "imu.misalignment_rad = 1e-3", &model(1.0));
 }
 
+/// What a filter has no states for: forces on gyroscopes, rectified vibration, an IMU that warms and cools.
+#[test]
+fn what_an_imu_feels_and_no_filter_expects() {
+    let pushed = "imu.g_sensitivity_rad_s_per_m_s2 = 5e-5\ngnss.lever_arm_m = [1.0, -0.5, -1.2]";
+    assert_agree("g-sensitivity", pushed, &model(1.0));
+    let rectified = "imu.vibration = { rms_m_s2 = 8.0, rectification_s2_m = 2e-4 }";
+    assert_agree("rectification", rectified, &model(1.0));
+    let warmed = "imu.temperature = { profile_c = [[5, 20], [60, 35], [80, 30]], accel_m_s2_k = 1e-3, gyro_rad_s_k = 1e-5 }";
+    assert_agree("temperature", warmed, &model(1.0));
+}
+
 #[test]
 fn a_lever_arm_a_barometer_and_a_receiver_with_memory() {
     let arm = "lever_arm_m = [1.0, -0.5, -1.2]";

@@ -56,6 +56,10 @@ turn_on_bias_gyro_rad_s = 0.1
 scale_ppm_accel = 100.0
 scale_ppm_gyro = 100.0
 misalignment_rad = 0.01
+g_sensitivity_rad_s_per_m_s2 = 0.0001
+vibration = { rms_m_s2 = 5.0, rectification_s2_m = 0.0001 }
+temperature = { profile_c = [[0.0, 20.0], [60.0, 40.0]], accel_m_s2_k = 0.001, gyro_rad_s_k = 0.00001 }
+output = { range_accel_m_s2 = 80.0, range_gyro_rad_s = 8.0, resolution_accel_m_s2 = 0.001, resolution_gyro_rad_s = 0.001 }
 [gnss]
 rate_hz = 1.0
 pos_sigma_m = [2.0, 2.0, 4.0]
@@ -211,7 +215,15 @@ const SAMPLES: [Sample; 11] = [
     Sample {
         kind: Kind::Scenario,
         text: SCENARIO,
-        loose: &["imu.rate_hz", "gnss.rate_hz", "baro.rate_hz", "start_s", "end_s"],
+        loose: &[
+            "imu.rate_hz",
+            "gnss.rate_hz",
+            "baro.rate_hz",
+            "start_s",
+            "end_s",
+            "profile_c.0.0",
+            "profile_c.1.0",
+        ],
     },
     Sample { kind: Kind::Model, text: ANY_PROCESS, loose: &["rate_hz"] },
     Sample {

@@ -9,7 +9,7 @@ use crate::noise::{Ar1, Composite, Model, Process, RandomWalk, VirtualImu, White
 use crate::rng::StreamKey;
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::baro::BaroSettings;
-use crate::sensors::defects::{Defects, ImuSettings};
+use crate::sensors::defects::{Defects, ImuSettings, Output};
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
@@ -202,6 +202,40 @@ fn matched_models_are_consistent_and_mismatched_ones_are_not() {
     assert!(end_of_outage > high, "a wrong model must show: NEES {end_of_outage}, bound {high}");
 }
 
+/// An acceleration (m/s²) along x and east for 20 s without a fix, of an IMU without noise.
+fn dragster(a: f64, defects: ImuSettings) -> Setting {
+    let straight = |k: u32| {
+        let t_s = 0.25 * f64::from(k);
+        let q_b_n = RollPitchYaw { roll: 0.0, pitch: 0.0, yaw: 90.0 * DEG }.to_quat();
+        TrajectorySample { t_s, lat: 0.0, lon: 0.5 * a * t_s * t_s / crate::earth::A, h: 0.0, q_b_n }
+    };
+    let samples: Vec<_> = (0..=80).map(straight).collect();
+    Setting {
+        trajectory: Trajectory::from_samples(&samples).unwrap(),
+        model: Model { rate_hz: 100.0, axes: Default::default() },
+        initial: InitialSettings { perfect: true, ..InitialSettings::default() },
+        outages: vec![Outage { start_s: 0.0, end_s: 100.0 }],
+        defects,
+        ..Setting::new(30.0, &[1.0])
+    }
+}
+
+/// Of 12 m/s² an IMU of ±10 puts out 10; in steps of 0.5 it puts 2.5 out for 2.3 m/s², and 10 for gravity, which adds
+/// to the error in east as in the next test.
+#[test]
+fn samples_beyond_the_range_and_between_steps_err_as_in_closed_form() {
+    let ranged = Output { range_accel_m_s2: Some(10.0), ..Output::default() };
+    let stepped = Output { resolution_accel_m_s2: 0.5, ..Output::default() };
+    let gravity_step = crate::earth::GRAVITY_EQUATOR - 10.0;
+    for (a, output, east, down) in [(12.0, ranged, -2.0, 0.0), (2.3, stepped, 0.2, gravity_step)] {
+        let defects = ImuSettings { output: Some(output), ..ImuSettings::default() };
+        let found = dragster(a, defects).run(1)[0].runs[0].outages[0].error_end[4];
+        let coriolis = crate::earth::OMEGA_IE * down * 400.0;
+        let (expected, bound) = (20.0 * east + coriolis, 3e-4 * 20.0 * a + 0.1 * coriolis.abs());
+        assert!((found - expected).abs() < bound, "{found} m/s, {expected} m/s");
+    }
+}
+
 /// Without a single fix, a straight acceleration a over t seconds along x and east leaves a velocity error
 /// of (bias + scale · a) t, and by Coriolis Ω t² times the false acceleration down: run by run, what the run
 /// drew. (The tilt by the false transport rate takes g t²/(6 R) = 1e-4 of it, and transport is v/(R Ω) ≤ 9 %
@@ -209,26 +243,12 @@ fn matched_models_are_consistent_and_mismatched_ones_are_not() {
 #[test]
 fn bias_and_scale_factor_of_the_true_imu_act_as_in_closed_form() {
     let (a, seconds) = (2.0, 20.0);
-    let straight = |k: u32| {
-        let t_s = 0.25 * f64::from(k);
-        let q_b_n = RollPitchYaw { roll: 0.0, pitch: 0.0, yaw: 90.0 * DEG }.to_quat();
-        TrajectorySample { t_s, lat: 0.0, lon: 0.5 * a * t_s * t_s / crate::earth::A, h: 0.0, q_b_n }
-    };
-    let samples: Vec<_> = (0..=80).map(straight).collect();
     let defects = ImuSettings {
         turn_on_bias_accel_m_s2: Some(0.05),
         scale_ppm_accel: 20_000.0,
         ..ImuSettings::default()
     };
-    let setting = Setting {
-        trajectory: Trajectory::from_samples(&samples).unwrap(),
-        model: Model { rate_hz: 100.0, axes: Default::default() },
-        initial: InitialSettings { perfect: true, ..InitialSettings::default() },
-        outages: vec![Outage { start_s: 0.0, end_s: 100.0 }],
-        defects: defects.clone(),
-        ..Setting::new(30.0, &[1.0])
-    };
-    for run in &setting.run(20)[0].runs {
+    for run in &dragster(a, defects.clone()).run(20)[0].runs {
         let key = StreamKey { seed: 3, scenario: "", run: run.run, source: "", process: "" };
         let drawn = Defects::draw(&defects, key);
         let along = (drawn.bias[0].x + drawn.matrix[0].x_axis.x * a) * seconds;

@@ -18,7 +18,7 @@ pub enum Part {
     TurnOn(Sensor),
     /// The drifts of both sensors: the same in every run.
     Drift,
-    /// Scale factors and misalignment of both sensors.
+    /// Scale factors, misalignment and other constants of both sensors.
     Scale,
     /// Receiver and barometer.
     Fixes,
@@ -52,7 +52,7 @@ impl Part {
             Self::Correlated(sensor) => format!("{}, correlated", sensor.name()),
             Self::TurnOn(sensor) => format!("{}, turn-on bias", sensor.name()),
             Self::Drift => "drift".to_owned(),
-            Self::Scale => "scale factors, misalignment".to_owned(),
+            Self::Scale => "scale factors and other constants".to_owned(),
             Self::Fixes => "GNSS".to_owned(),
             Self::Aiding => "aiding".to_owned(),
             Self::Start => "start".to_owned(),
@@ -106,6 +106,9 @@ impl Part {
                 imu.scale_ppm_accel *= factor;
                 imu.scale_ppm_gyro *= factor;
                 imu.misalignment_rad *= factor;
+                imu.g_sensitivity_rad_s_per_m_s2 *= factor;
+                imu.vibration.iter_mut().for_each(|v| v.rectification_s2_m *= factor);
+                imu.temperature.iter_mut().for_each(|t| t.multiply(factor));
                 scaled(&mut initial.accel_scale_sigma_ppm);
                 scaled(&mut initial.gyro_scale_sigma_ppm);
             }

@@ -61,9 +61,15 @@ fn what_the_filter_does_not_expect_is_found_of_each_sensor() {
     let scale = [Unexpected::Scale { sensor: Sensor::Accel, ppm: 300.0, expected_ppm: 0.0 }];
     assert_eq!(found("imu.scale_ppm_accel = 300"), scale);
     assert!(found("imu.scale_ppm_accel = 300\nfilter.states = 21").is_empty());
-    let crossed = found("imu.misalignment_rad = 1e-3");
-    assert_eq!(crossed, [Unexpected::Misalignment { angle_rad: 1e-3 }]);
-    assert_eq!(crossed[0].sources(), ["accel.misalignment", "gyro.misalignment"]);
+    for (setting, sources) in [
+        ("imu.misalignment_rad = 1e-3", vec!["accel.misalignment", "gyro.misalignment"]),
+        ("imu.g_sensitivity_rad_s_per_m_s2 = 1e-4", vec!["gyro.g_sensitivity"]),
+        ("imu.vibration = { rms_m_s2 = 5, rectification_s2_m = 1e-4 }", vec!["accel.rectification"]),
+        ("imu.temperature = { profile_c = [[0, 20]], gyro_rad_s_k = 1e-6 }", vec!["gyro.temperature"]),
+    ] {
+        let [found] = &found(setting)[..] else { panic!("{setting}") };
+        assert_eq!(found.sources(), sources);
+    }
     // white noise of 2 m is known to 0.2 m from the hundred fixes of the default correlation time
     let coloured = |m: f64| found(&format!("gnss.correlated_pos_sigma_m = [{m}, 0.0, 0.0]"));
     assert!(coloured(0.09).is_empty() && coloured(0.11)[0].sources() == ["gnss.correlated"]);

@@ -10,19 +10,20 @@ use crate::ekf::initial::psi_of_angles;
 use crate::ekf::{BodyVelocity, Ekf, Fix, advance, nis_limit, settle, update, update_body_velocity};
 use crate::ekf::{update_height, update_within, update_yaw};
 use crate::frames::{NavState, RollPitchYaw};
-use crate::imu::ImuSample;
+use crate::imu::Sensor;
 use crate::lanes::{LANES, Lanes, Real, Vec3};
 use crate::linalg;
 use crate::rng::StreamKey;
 use crate::sensors::aiding::{Aid, AidNoise};
 use crate::sensors::baro::BaroNoise;
-use crate::sensors::defects::Defects;
+use crate::sensors::defects::{Defects, Surroundings};
 use crate::sensors::gnss::GnssNoise;
 use crate::sensors::imu::{ImuErrors, LaneErrors};
 use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
 use rand_distr::{Distribution, StandardNormal};
+use std::ops::Range;
 
 /// What one candidate made of up to eight runs.
 #[derive(Debug)]
@@ -54,7 +55,7 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
         };
         // Drawn once for all candidates: their errors are paired, and ratios between them scatter far less
         // than each.
-        let errors = source.errors(samples);
+        let errors = source.errors(plan, done..event.sample);
         for candidate in &mut candidates {
             advance(&mut candidate.ekf, samples, errors);
             candidate.at_event(plan, index, event, &measured);
@@ -114,12 +115,24 @@ impl<'a> Source<'a> {
     }
 
     /// The inertial errors of the next samples; idle lanes repeat the ideal.
-    fn errors(&mut self, ideal: &[ImuSample]) -> &[[Vec3; 2]] {
-        let block = self.imu.next(ideal.len());
-        for (lane, defects) in self.defects.iter().enumerate() {
-            for (sample, truth) in block.iter_mut().zip(ideal) {
-                for (error, more) in sample.iter_mut().zip(defects.error(truth)) {
-                    error.set_lane(lane, error.lane(lane) + more);
+    fn errors(&mut self, plan: &Plan<'_>, samples: Range<usize>) -> &[[Vec3; 2]] {
+        let settings = plan.experiment.defects;
+        let block = self.imu.next(samples.len());
+        if !self.defects.is_empty() {
+            for (sample, k) in block.iter_mut().zip(samples.clone()) {
+                let felt = Surroundings::at(settings, &plan.ideal[k], plan.middle_s(k));
+                for (lane, defects) in self.defects.iter().enumerate() {
+                    for (error, more) in sample.iter_mut().zip(defects.error(&felt)) {
+                        error.set_lane(lane, error.lane(lane) + more);
+                    }
+                }
+            }
+        }
+        if let Some(output) = &settings.output {
+            for (sample, truth) in block.iter_mut().zip(&plan.ideal[samples]) {
+                for (lane, sensor) in (0..self.keys.len()).flat_map(|l| Sensor::ALL.map(|s| (l, s))) {
+                    let (error, exact) = (&mut sample[sensor as usize], truth.of(sensor));
+                    error.set_lane(lane, output.put(sensor, exact + error.lane(lane)) - exact);
                 }
             }
         }

@@ -235,6 +235,11 @@ impl<'a> Plan<'a> {
         self.experiment
     }
 
+    /// Time on the trajectory in the middle of a sample (s).
+    pub(super) fn middle_s(&self, sample: usize) -> f64 {
+        self.experiment.trajectory.start_s() + (sample as f64 + 0.5) / self.experiment.rate_hz
+    }
+
     /// IMU samples of one run.
     #[must_use]
     pub(crate) fn samples(&self) -> usize {

@@ -7,7 +7,7 @@ use crate::frames::NavState;
 use crate::gnss::{GnssFix, GnssVelocity};
 use crate::imu::{Channel, ImuIncrement, Sensor};
 use crate::rng::StreamKey;
-use crate::sensors::defects::Defects;
+use crate::sensors::defects::{Defects, Surroundings};
 use crate::sensors::gnss::GnssNoise;
 use crate::sensors::imu::ImuErrors;
 use glam::DVec3;
@@ -63,11 +63,14 @@ fn inertial(plan: &Plan<'_>, key: StreamKey<'_>) -> Vec<ImuIncrement> {
         DVec3::new(signals[first][k], signals[first + 1][k], signals[first + 2][k])
     };
     let dt_s = 1.0 / rate_hz;
-    let sample = |(k, ideal): (usize, &crate::imu::ImuSample)| ImuIncrement {
-        t_s: start_s + (k + 1) as f64 / rate_hz,
-        dt_s,
-        dtheta: (ideal.omega_ib_b + defects.error(ideal)[1] + triad(Sensor::Gyro, k)) * dt_s,
-        dv: (ideal.f_ib_b + defects.error(ideal)[0] + triad(Sensor::Accel, k)) * dt_s,
+    let settings = plan.experiment.defects;
+    let sample = |(k, ideal): (usize, &crate::imu::ImuSample)| {
+        let felt = Surroundings::at(settings, ideal, plan.middle_s(k));
+        let [dv, dtheta] = Sensor::ALL.map(|sensor| {
+            let value = ideal.of(sensor) + defects.error(&felt)[sensor as usize] + triad(sensor, k);
+            settings.output.as_ref().map_or(value, |output| output.put(sensor, value)) * dt_s
+        });
+        ImuIncrement { t_s: start_s + (k + 1) as f64 / rate_hz, dt_s, dtheta, dv }
     };
     plan.ideal.iter().enumerate().map(sample).collect()
 }

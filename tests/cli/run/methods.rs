@@ -145,10 +145,17 @@ fn few_runs_do_not_hide_a_filter_that_is_wrong() {
 #[test]
 fn what_covariance_analysis_cannot_do_is_refused() {
     let place = place();
-    fs::write(place.path().join("gate.toml"), "filter.nis_gate = 0.99\n").unwrap();
-    let command = "run drive.toml imu.toml --method lincov --outage none --scenario gate.toml -o out";
-    let ran = nav_sim(place.path(), command);
-    assert!(ran.code == 2 && ran.stderr.contains("covariance analysis has no gate"), "{}", ran.stderr);
+    let drawn = [
+        ("gate.toml", "filter.nis_gate = 0.99\n", "filter.nis_gate = 0.99"),
+        ("put.toml", "imu.output.resolution_accel_m_s2 = 0.01\n", "imu.output = {…}"),
+    ];
+    for (name, text, said) in drawn {
+        fs::write(place.path().join(name), text).unwrap();
+        let command =
+            format!("run drive.toml imu.toml --method lincov --outage none --scenario {name} -o out");
+        let ran = nav_sim(place.path(), &command);
+        assert!(ran.code == 2 && ran.stderr.contains(said), "{}", ran.stderr);
+    }
     // nor is there a budget beside the runs of such a filter, whose gains are drawn with the errors
     let command = "run drive.toml imu.toml --runs 2 --outage 30:45 --scenario gate.toml -o gated";
     let told = done(place.path(), command);
@@ -281,8 +288,8 @@ fn the_remedy_is_for_what_the_filter_does_not_expect() {
         (
             "--scenario crossed.toml",
             "gyro.misalignment",
-            "the true IMU has a misalignment of 0.03 rad",
-            "a smaller imu.misalignment_rad",
+            "imu.misalignment_rad = 0.03 rad is in no filter",
+            "calibrate the IMU for it",
         ),
     ];
     for (arguments, source, cause, helps) in cases {

@@ -5,24 +5,40 @@ use crate::ekf::{Belief, UnknownKind};
 use crate::imu::{Channel, Sensor};
 use crate::noise::{Ladder, Model, Process};
 use crate::sensors::aiding::{AidPart, Law};
+use crate::sensors::defects::Felt;
+use crate::simulation::BIASES;
 
-/// Signals of an IMU; again each multiplied by its own sample, what a scale factor adds; and each multiplied by
-/// the samples of the other two axes of its sensor, what a misalignment adds.
-pub(super) const SIGNALS: usize = 24;
-/// The first that is multiplied by its own sample.
+/// Signals: errors of an axis in proportion to what the IMU feels. Most filters and IMUs have the first of them alone.
+pub(super) const SIGNALS: usize = 42;
+/// The first that is multiplied by its own sample, what a scale factor adds.
 pub(super) const SCALED: usize = 6;
-/// The first that is multiplied by another axis's sample.
+/// The first that is multiplied by the sample of another axis, what a misalignment adds.
 pub(super) const CROSSED: usize = 12;
+/// The first of a gyroscope that is multiplied by a specific force.
+pub(super) const PUSHED: usize = 24;
+/// The first of an accelerometer that is multiplied by its own square.
+pub(super) const RECTIFIED: usize = 33;
+/// The first that is multiplied by the warming.
+pub(super) const WARMED: usize = 36;
 
-/// Where a signal acts: sensor, axis, and the axis of the sample that it is multiplied by, if any.
-pub(super) const fn place(signal: usize) -> (usize, usize, Option<usize>) {
+/// Where a signal acts: sensor, axis, and what it is multiplied by.
+pub(super) const fn place(signal: usize) -> (usize, usize, Felt) {
     match signal {
-        0..SCALED => (signal / 3, signal % 3, None),
-        SCALED..CROSSED => (signal % SCALED / 3, signal % 3, Some(signal % 3)),
-        _ => {
-            let (sensor, pair) = ((signal - CROSSED) / 6, (signal - CROSSED) % 6);
-            (sensor, pair / 2, Some((pair / 2 + 1 + pair % 2) % 3))
+        0..SCALED => (signal / 3, signal % 3, Felt::Unit),
+        SCALED..CROSSED => {
+            let sensor = signal % SCALED / 3;
+            (sensor, signal % 3, Felt::Sample(Sensor::ALL[sensor], signal % 3))
         }
+        CROSSED..PUSHED => {
+            let (sensor, pair) = ((signal - CROSSED) / 6, (signal - CROSSED) % 6);
+            (sensor, pair / 2, Felt::Sample(Sensor::ALL[sensor], (pair / 2 + 1 + pair % 2) % 3))
+        }
+        PUSHED..RECTIFIED => {
+            let pair = signal - PUSHED;
+            (Sensor::Gyro as usize, pair / 3, Felt::Sample(Sensor::Accel, pair % 3))
+        }
+        RECTIFIED..WARMED => (Sensor::Accel as usize, signal - RECTIFIED, Felt::Square(signal - RECTIFIED)),
+        _ => ((signal - WARMED) / 3, (signal - WARMED) % 3, Felt::Warming),
     }
 }
 
@@ -187,12 +203,12 @@ impl Source {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Sources {
     pub(super) states: Vec<Source>,
-    pub(super) white: [f64; SIGNALS],
+    pub(super) white: [f64; BIASES],
 }
 
 impl Default for Sources {
     fn default() -> Self {
-        Self { states: Vec::new(), white: [0.0; SIGNALS] }
+        Self { states: Vec::new(), white: [0.0; BIASES] }
     }
 }
 
@@ -215,9 +231,9 @@ impl Sources {
             states.extend(belief.groups[sensor as usize].iter().flat_map(|g| Self::of_group(sensor, g)));
         }
         let [accel, gyro] = belief.white.map(|w| w.to_array());
-        let mut white = [0.0; SIGNALS];
+        let mut white = [0.0; BIASES];
         white[..3].copy_from_slice(&accel);
-        white[3..SCALED].copy_from_slice(&gyro);
+        white[3..].copy_from_slice(&gyro);
         states.extend(Self::multiplied(belief, &UNKNOWNS));
         states.extend(Self::of_vehicle(belief));
         Self { states, white }

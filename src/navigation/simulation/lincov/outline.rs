@@ -1,8 +1,9 @@
 //! Tracks of fewer and longer steps, for the many passes of a search.
 
-use super::input::{SCALED, SIGNALS};
+use super::input::SIGNALS;
 use super::joint::add_scaled;
 use super::track::{Mark, Measured, NAV, Nav, Row, Step, Track};
+use crate::simulation::BIASES;
 
 /// Longest step of an outline (s): with fixes, and without.
 const OUTLINE_STEP_S: [f64; 2] = [2.0, 5.0];
@@ -151,7 +152,7 @@ impl Step {
     fn white_noise(&self) -> Vec<[Nav; NAV]> {
         let of_mean = |b: &Nav| b.map(|factor| b.map(|b| b * factor / f64::from(self.samples)));
         if self.white.is_empty() {
-            self.b[..SCALED].iter().map(of_mean).collect()
+            self.b[..BIASES].iter().map(of_mean).collect()
         } else {
             self.white.clone()
         }

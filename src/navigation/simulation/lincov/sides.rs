@@ -2,13 +2,14 @@
 
 use super::input::{SIGNALS, Sources, StepOfSource};
 use super::track::{Step, Track};
+use crate::simulation::BIASES;
 
 /// The states `b` of a filter and `t` of the truth, as [`Joint`](super::joint::Joint) has them.
 #[derive(Debug)]
 pub(super) struct Sides {
     pub(super) b: Sources,
     pub(super) t: Sources,
-    /// Signals that they reach: most filters have neither scale factors nor misalignments.
+    /// Signals that they reach: most have neither scale factors nor what comes after them.
     pub(super) signals: usize,
     /// By the number of samples of a step; few numbers occur.
     inputs: Vec<(u32, Inputs)>,
@@ -49,7 +50,7 @@ pub(super) struct Inputs {
     pub(super) b: Vec<StepOfSource>,
     pub(super) t: Vec<StepOfSource>,
     /// Variance of the white noise of a sample (units²).
-    pub(super) white: [f64; SIGNALS],
+    pub(super) white: [f64; BIASES],
     /// Variance of the part of a signal's mean over the step that is new in it: of white noise and states, of states
     /// alone (units²).
     pub(super) q_mean: [[f64; SIGNALS]; 2],
@@ -62,8 +63,9 @@ impl Inputs {
         let steps_of =
             |s: &Sources| -> Vec<StepOfSource> { s.states.iter().map(|x| x.over(samples)).collect() };
         let (bs, ts) = (steps_of(b), steps_of(t));
-        let white: [f64; SIGNALS] = std::array::from_fn(|i| b.white[i] + t.white[i]);
-        let mut q_mean = [white.map(|white| white / f64::from(samples)), [0.0; SIGNALS]];
+        let white: [f64; BIASES] = std::array::from_fn(|i| b.white[i] + t.white[i]);
+        let mut q_mean = [[0.0; SIGNALS]; 2];
+        q_mean[0].iter_mut().zip(white).for_each(|(q, white)| *q = white / f64::from(samples));
         for source in bs.iter().chain(&ts) {
             q_mean.iter_mut().for_each(|q| q[source.signal] += source.q_mean);
         }

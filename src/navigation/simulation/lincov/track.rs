@@ -2,8 +2,9 @@
 
 use super::super::aided::Aided;
 use super::super::plan::{Event, Experiment, ExperimentError, Plan};
-use super::input::{CROSSED, Outer, SIGNALS, Source, place};
+use super::input::{CROSSED, Outer, Source, place};
 use super::joint::add_scaled;
+use super::truth::defects;
 use crate::closure::Bounds;
 use crate::earth::ned_difference;
 use crate::ekf::covariance::{PSI, R, V};
@@ -11,9 +12,10 @@ use crate::ekf::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, ErrorMap, NavErr
 use crate::ekf::initial::psi_of_angles;
 use crate::ekf::{body_velocity_rows, dense_yaw_row, fix_rows};
 use crate::frames::{NavState, RollPitchYaw};
-use crate::imu::ImuSample;
+use crate::imu::Sensor;
 use crate::lanes::{Quat, Vec3};
 use crate::sensors::aiding::Aid;
+use crate::sensors::defects::Surroundings;
 use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
@@ -70,8 +72,8 @@ impl Measured {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
     pub(super) h: [f64; NAV + 3],
-    /// The rate that scale factors and misalignments of the gyroscope multiply (rad/s).
-    pub(super) omega_ib_b: DVec3,
+    /// What errors of the gyroscope are proportional to.
+    pub(super) felt: Surroundings,
     /// Variance of its white noise, as the filter believes.
     pub(super) r: f64,
     /// The same in truth.
@@ -83,8 +85,8 @@ pub(super) struct Row {
 
 impl Row {
     /// A measurement whose true noise is as the filter believes.
-    fn new(h: [f64; NAV + 3], omega_ib_b: DVec3, r: f64, what: Measured) -> Self {
-        Self { h, omega_ib_b, r, noise: r, what, motion: [DVec3::ZERO; 2] }
+    fn new(h: [f64; NAV + 3], felt: Surroundings, r: f64, what: Measured) -> Self {
+        Self { h, felt, r, noise: r, what, motion: [DVec3::ZERO; 2] }
     }
 
     /// The coefficient of a source's state in the measurement after `elapsed` samples, beside its part through the
@@ -102,8 +104,7 @@ impl Row {
             (0, ..) => 0.0,
             // The coefficient of the lever arm's velocity is per unit of the rate's error, and this is the
             // error that the source has at the instant: a bias its value, a drift its slope times its age.
-            (_, axis, None) => source.share(elapsed) * self.h[NAV + axis],
-            (_, axis, Some(by)) => source.share(elapsed) * (self.h[NAV + axis] * self.omega_ib_b[by]),
+            (_, axis, of) => source.share(elapsed) * (self.h[NAV + axis] * self.felt.value(of)),
         }
     }
 }
@@ -159,12 +160,12 @@ impl Track {
         let longest = ((STEP_S * experiment.rate_hz).round() as usize).max(1);
         let (mut steps, mut marks, mut done) = (Vec::new(), Vec::with_capacity(plan.events.len()), 0);
         for (index, event) in plan.events.iter().enumerate() {
-            let samples = &plan.ideal[done..event.sample];
+            let samples = event.sample - done;
             // Parts of equal length: what the noise processes do over a step is computed once for each length
             // that occurs.
-            let parts = samples.len().div_ceil(longest).max(1);
-            for part in samples.chunks(samples.len().div_ceil(parts).max(1)) {
-                steps.push(line.step(part));
+            let part = samples.div_ceil(samples.div_ceil(longest).max(1)).max(1);
+            for begin in (done..event.sample).step_by(part) {
+                steps.push(line.step(plan, begin..event.sample.min(begin + part)));
             }
             done = event.sample;
             let ends = |(_, (_, at)): &(usize, &(f64, usize))| *at == index;
@@ -210,10 +211,11 @@ impl Track {
 /// The reference as the strapdown passes through it.
 struct Linearisation {
     ins: Strapdown<f64>,
-    omega_ib_b: DVec3,
+    /// What the IMU feels over the last sample.
+    felt: Surroundings,
     dt: f64,
     noise_hz: f64,
-    /// Signals that are followed: those of misalignments only where there are any.
+    /// Signals that are followed: those behind scale factors only where the true IMU has them.
     signals: usize,
 }
 
@@ -221,12 +223,14 @@ impl Linearisation {
     fn new(plan: &Plan<'_>, noise_hz: f64) -> Self {
         let experiment = plan.experiment;
         let ins = Strapdown::single(&plan.start, experiment.gravity);
-        let signals = if experiment.defects.misalignment_rad > 0.0 { SIGNALS } else { CROSSED };
-        Self { ins, omega_ib_b: DVec3::ZERO, dt: 1.0 / experiment.rate_hz, noise_hz, signals }
+        let defects = Sensor::ALL.into_iter().flat_map(|sensor| defects(experiment.defects, sensor));
+        let signals =
+            defects.flat_map(|s| s.side.inertial.states).map(|s| s.signal + 1).fold(CROSSED, usize::max);
+        Self { ins, felt: Surroundings::default(), dt: 1.0 / experiment.rate_hz, noise_hz, signals }
     }
 
     /// The maps of the samples one after the other, the Earth's as the filter applies them.
-    fn step(&mut self, samples: &[ImuSample]) -> Step {
+    fn step(&mut self, plan: &Plan<'_>, samples: Range<usize>) -> Step {
         let unit = |i: usize| std::array::from_fn(|k| if i == k { 1.0 } else { 0.0 });
         let mut step = Step {
             // Samples of the noise model's rate, which need not be the rate at which the motion is sampled.
@@ -236,21 +240,22 @@ impl Linearisation {
             white: Vec::new(),
         };
         let mut age = 0.0;
-        for sample in samples {
-            self.omega_ib_b = sample.omega_ib_b;
+        for index in samples {
+            let sample = &plan.ideal[index];
+            self.felt = Surroundings::at(plan.experiment.defects, sample, plan.middle_s(index));
             let (dtheta, dv) = (sample.omega_ib_b * self.dt, sample.f_ib_b * self.dt);
             let trace = self.ins.step(Vec3::splat(dtheta), Vec3::splat(dv), self.dt);
-            step.apply(&Sample::new(&trace, self.dt), sample);
+            step.apply(&Sample::new(&trace, self.dt), &self.felt);
             age += self.dt;
             if age + 0.5 * self.dt > EARTH_STEP_S {
-                step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, sample);
+                step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, &self.felt);
                 age = 0.0;
             }
         }
         // A measurement meets a covariance that has all of the Earth's terms, as `settle` gives it in the
         // filter.
-        if let Some(sample) = samples.last().filter(|_| age > 0.0) {
-            step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, sample);
+        if age > 0.0 {
+            step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, &self.felt);
         }
         step
     }
@@ -273,21 +278,21 @@ impl Linearisation {
 
     fn rows(&self, plan: &Plan<'_>, event: &Event) -> Vec<Row> {
         let experiment = plan.experiment;
-        let mut rows = Vec::new();
+        let (mut rows, [_, omega_ib_b]) = (Vec::new(), self.felt.sample);
         if event.fix {
             let gnss = experiment.gnss;
-            let h = fix_rows(&self.ins, self.omega_ib_b, gnss.lever_arm_m.into());
+            let h = fix_rows(&self.ins, omega_ib_b, gnss.lever_arm_m.into());
             let sigmas = gnss.pos_sigma_m.into_iter().chain(gnss.vel_sigma_m_s.into_iter().flatten());
             for (i, (h, sigma)) in h.into_iter().zip(sigmas).enumerate() {
                 let what = if i < 3 { Measured::Position(i) } else { Measured::Velocity };
-                rows.push(Row::new(h, self.omega_ib_b, sigma * sigma, what));
+                rows.push(Row::new(h, self.felt, sigma * sigma, what));
             }
         }
         if let Some(baro) = experiment.baro.filter(|_| event.baro) {
             let mut h = [0.0; NAV + 3];
             h[3 * R + 2] = 1.0;
             let r = baro.sigma_m * baro.sigma_m;
-            rows.push(Row::new(h, DVec3::ZERO, r, Measured::Height));
+            rows.push(Row::new(h, self.felt, r, Measured::Height));
         }
         for aided in &event.aids {
             self.aid(experiment, aided, &mut rows);
@@ -304,13 +309,14 @@ impl Linearisation {
         let row = |h, axis| Row {
             noise,
             motion: [v_b, a_b],
-            ..Row::new(h, self.omega_ib_b, r, Measured::Aid(aid, axis))
+            ..Row::new(h, self.felt, r, Measured::Aid(aid, axis))
         };
         if aid == Aid::Heading {
             rows.push(row(dense_yaw_row(&self.ins), 0));
             return;
         }
-        let h = body_velocity_rows(&self.ins, self.omega_ib_b, experiment.aiding.lever_arm_b(aid));
+        let [_, omega_ib_b] = self.felt.sample;
+        let h = body_velocity_rows(&self.ins, omega_ib_b, experiment.aiding.lever_arm_b(aid));
         rows.extend(aid.axes().iter().map(|axis| row(h[*axis], *axis)));
     }
 }
@@ -332,18 +338,15 @@ fn drop_closed(marks: &mut [Mark]) {
 
 impl Step {
     /// The map of a sample after this one, or of the Earth, which feels no sample.
-    fn apply(&mut self, map: &impl ErrorMap<f64>, sample: &ImuSample) {
+    fn apply(&mut self, map: &impl ErrorMap<f64>, felt: &Surroundings) {
         let zero = Vec3([0.0; 3]);
         for column in &mut self.m {
             *column = flat(&map.apply(triples(column), zero, zero));
         }
         for (signal, column) in self.b.iter_mut().enumerate() {
-            let (sensor, axis, by) = place(signal);
-            let measured = [sample.f_ib_b, sample.omega_ib_b][sensor];
+            let (sensor, axis, of) = place(signal);
             let mut input = [zero, zero];
-            // Unit error of the signal: 1 for a bias, the true sample for a scale factor, that of another
-            // axis for a misalignment.
-            input[sensor].0[axis] = by.map_or(1.0, |by| measured[by]);
+            input[sensor].0[axis] = felt.value(of);
             *column = flat(&map.apply(triples(column), input[0], input[1]));
         }
     }

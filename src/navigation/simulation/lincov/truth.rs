@@ -1,7 +1,6 @@
 //! What makes the true errors: independent sources, alone or together.
 
-use super::input::SIGNALS;
-use super::input::{CROSSED, Outer, SCALED, Source, Sources, place};
+use super::input::{CROSSED, Outer, PUSHED, RECTIFIED, SCALED, Source, Sources, WARMED, place};
 use super::track::Measured;
 use crate::ekf::{Belief, UnknownKind};
 use crate::imu::{Axis, Channel, Sensor};
@@ -10,6 +9,7 @@ use crate::sensors::aiding::{AidError, AidingSettings};
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::simulation::plan::Experiment;
+use std::ops::Range;
 
 /// Kinds of white noise of measurements: positions and velocities of fixes apart.
 const NOISES: usize = Measured::KINDS + 1;
@@ -32,7 +32,7 @@ pub struct TruthSide {
 pub struct TrueErrors {
     /// What makes the inertial errors.
     pub model: Model,
-    /// Turn-on bias, scale factors and misalignment of the true IMU.
+    /// What is wrong with the true IMU beside its noise.
     pub imu: ImuSettings,
     /// The true receiver, whose positions may have correlated errors.
     pub gnss: GnssSettings,
@@ -129,7 +129,7 @@ impl TruthSide {
     }
 
     /// The same, with what the settings of the true IMU and of the receiver state in the place of what the filter
-    /// expects: turn-on biases (a 0 too), scale factors, misalignment, correlated errors of positions. The strapdown errs.
+    /// expects: turn-on biases (a 0 too), scale factors and other errors of the IMU, correlated errors of positions. The strapdown errs.
     pub(super) fn as_stated(belief: &Belief, errors: &TrueErrors, starts_off: bool) -> Self {
         let TrueErrors { model, imu, gnss, aiding } = errors;
         let mut all = Self { integrates: true, ..Self::as_expected(belief, model, starts_off) };
@@ -188,7 +188,7 @@ fn beside_the_imu(experiment: &Experiment<'_>, starts_off: bool) -> Vec<NamedSou
 
 /// A source of states alone; none where there are none.
 fn inertial(name: String, states: Vec<Source>) -> Option<NamedSource> {
-    let inertial = Sources { states, white: [0.0; SIGNALS] };
+    let inertial = Sources { states, ..Sources::default() };
     let side = TruthSide { inertial, ..TruthSide::default() };
     (!side.inertial.states.is_empty()).then(|| NamedSource::new(name, side))
 }
@@ -216,18 +216,28 @@ fn processes(model: &Model, sensor: Sensor, drifts: &mut Vec<Source>) -> Vec<Nam
     found
 }
 
-/// Turn-on bias, scale factors and misalignment of a sensor of the true IMU.
-fn defects(imu: &ImuSettings, sensor: Sensor) -> Vec<NamedSource> {
+/// What is wrong with a sensor of the true IMU beside its noise.
+pub(super) fn defects(imu: &ImuSettings, sensor: Sensor) -> Vec<NamedSource> {
     let (bias, ppm) = imu.deviations(sensor);
+    let of_temperature = imu.temperature.as_ref().map_or(0.0, |t| t.sigma(sensor));
     let first = 3 * sensor as usize;
-    let of_sensor = |signal: &usize| *signal >= CROSSED && place(*signal).0 == sensor as usize;
-    let all: [(&str, f64, Vec<usize>); 3] = [
-        ("turn_on_bias", bias, (first..first + 3).collect()),
-        ("scale", ppm * 1e-6, (SCALED + first..SCALED + first + 3).collect()),
-        ("misalignment", imu.misalignment_rad, (0..SIGNALS).filter(of_sensor).collect()),
+    let crossed = CROSSED + 2 * first;
+    let of_force = match sensor {
+        Sensor::Accel => {
+            let sigma = imu.vibration.as_ref().map_or(0.0, |v| v.rectification_s2_m);
+            ("rectification", sigma, RECTIFIED..WARMED)
+        }
+        Sensor::Gyro => ("g_sensitivity", imu.g_sensitivity_rad_s_per_m_s2, PUSHED..RECTIFIED),
+    };
+    let all = [
+        ("turn_on_bias", bias, first..first + 3),
+        ("scale", ppm * 1e-6, SCALED + first..SCALED + first + 3),
+        ("misalignment", imu.misalignment_rad, crossed..crossed + 6),
+        of_force,
+        ("temperature", of_temperature, WARMED + first..WARMED + first + 3),
     ];
-    let source = |(name, sigma, signals): (&str, f64, Vec<usize>)| {
-        let states = signals.into_iter().map(|signal| Source::constant(signal, sigma));
+    let source = |(name, sigma, signals): (&str, f64, Range<usize>)| {
+        let states = signals.map(|signal| Source::constant(signal, sigma));
         inertial(format!("{}.{name}", sensor.name()), states.filter(|s| s.initial > 0.0).collect())
     };
     all.into_iter().filter_map(source).collect()
