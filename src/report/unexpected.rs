@@ -35,7 +35,7 @@ pub(crate) fn unexpected_in_words(unexpected: &Unexpected) -> (String, String) {
         Unexpected::Aiding { source, key } => (
             format!("the truth has {source}, of which the filter expects less"),
             match key.ends_with("sigma_m_s") || *key == "aiding.heading.sigma_deg" {
-                true => format!("a larger {key} (nav-sim tune --truth MODEL --scenario FILE finds how much)"),
+                true => format!("a larger {key} (nav-sim tune --scenario FILE finds how much)"),
                 false => format!("{key} gives it states"),
             },
         ),

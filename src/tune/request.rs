@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 pub struct TuneRequest {
     /// Noise model to be tuned
     pub model: PathBuf,
-    /// Noise models that may make the errors, such as those of single recordings
+    /// Noise models that may make the errors, such as those of single recordings [default: MODEL, with the errors in SCENARIO]
     #[arg(long = "truth", value_name = "MODEL2", num_args = 1..)]
     #[serde(rename = "truth")]
     pub truths: Vec<PathBuf>,
@@ -96,6 +96,10 @@ impl TuneRequest {
     pub(crate) fn tuned(&self, notes: Notes<'_>) -> Result<Tuned, Failure> {
         let files = self.inputs()?;
         let mut scenario = checked_scenario(self.scenario.as_deref(), &self.outages)?;
+        if self.truths.is_empty() && !self.intervals && scenario.unexpected().is_empty() {
+            return Err(Failure::input("no truth to be consistent with: neither --truth nor --intervals is given")
+                .hint("give models (--truth OTHER.toml, one a recording), or --intervals for a MODEL of `nav-sim calibrate`"));
+        }
         let file = read::model(&self.model, notes)?;
         let model = read::at_rate(&self.model, &file.model, scenario.imu.rate_hz, notes)?;
         read::expect_turn_on(&mut scenario.initial, &file, &self.model, notes);
@@ -139,10 +143,6 @@ impl TuneRequest {
 
     /// A directory or a table holds samples: a truth is a model.
     fn refuse_recordings(&self) -> Result<(), Failure> {
-        if self.truths.is_empty() && !self.intervals {
-            return Err(Failure::input("no truth to be consistent with: neither --truth nor --intervals is given")
-            .hint("give models (--truth OTHER.toml, one a recording), or --intervals for a MODEL of `nav-sim calibrate`"));
-        }
         let is_samples =
             |p: &&PathBuf| p.is_dir() || p.extension().is_some_and(|e| e == "csv" || e == "npy" || e == "gz");
         match self.truths.iter().find(is_samples) {
@@ -191,7 +191,10 @@ impl TuneRequest {
                 let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, notes)?;
                 Ok::<_, Failure>((path.display().to_string(), true_errors(path, model, &file)))
             };
-            let named = self.truths.iter().map(truth).collect::<Result<Vec<_>, _>>()?;
+            // Without another, MODEL with what the scenario says is wrong beside it.
+            let own = std::slice::from_ref(&self.model);
+            let paths = if self.truths.is_empty() { own } else { &self.truths };
+            let named = paths.iter().map(truth).collect::<Result<Vec<_>, _>>()?;
             let (names, errors) = named.into_iter().unzip();
             Truths { names, errors, stretch: None }
         };

@@ -5,8 +5,8 @@ use crate::ekf::FilterStates;
 use crate::monte_carlo::run;
 use crate::noise::{Ar1, Composite, Model, Process, White};
 use crate::sensors::aiding::{
-    AidingSettings, HeadingErrors, HeadingSettings, NhcErrors, NhcSettings, OdometerErrors, OdometerSettings,
-    ZuptErrors, ZuptSettings,
+    AidingSettings, HeadingErrors, HeadingSettings, HeadingSource, NhcErrors, NhcSettings, OdometerErrors,
+    OdometerSettings, ZuptErrors, ZuptSettings,
 };
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
@@ -110,6 +110,10 @@ fn runs_have_the_errors_that_the_analysis_states() {
     let none = AidingSettings::default;
     let zupt = |truth| Some(ZuptSettings { truth, ..ZuptSettings::default() });
     let heading = |truth| Some(HeadingSettings { truth, ..HeadingSettings::default() });
+    let antennas = |truth| {
+        let source = HeadingSource::Antennas;
+        Some(HeadingSettings { source, truth, ..HeadingSettings::default() })
+    };
     let cases = [
         ("nhc", AidingSettings { nhc: nhc(0.0, NhcErrors::default()), ..none() }),
         ("nhc, mounting unknown", AidingSettings { nhc: nhc(0.0, mounted.clone()), ..none() }),
@@ -121,7 +125,8 @@ fn runs_have_the_errors_that_the_analysis_states() {
         ("zupt", AidingSettings { zupt: zupt(ZuptErrors::default()), ..none() }),
         ("zupt, creeping", AidingSettings { zupt: zupt(creeping), ..none() }),
         ("heading", AidingSettings { heading: heading(HeadingErrors::default()), ..none() }),
-        ("heading, turned", AidingSettings { heading: heading(turned), ..none() }),
+        ("heading, turned", AidingSettings { heading: heading(turned.clone()), ..none() }),
+        ("heading, of antennas", AidingSettings { heading: antennas(turned), ..none() }),
     ];
     let runs = 400;
     let free = both(&scenario(none()), runs).0.errors.rmse();

@@ -22,6 +22,8 @@ pub(super) struct Aided {
     pub(super) v_b: DVec3,
     /// Acceleration of the vehicle with respect to the Earth, in b (m/s²).
     pub(super) a_b: DVec3,
+    /// Whether an outage withholds it.
+    pub(super) withheld: bool,
 }
 
 /// What the vehicle measures of itself, of these aids.
@@ -34,6 +36,7 @@ pub(super) fn aided<'a>(
     if aids.peek().is_none() {
         return Vec::new();
     }
+    let in_outage = experiment.outages.iter().any(|outage| outage.withholds(t_s));
     let k = experiment.trajectory.kinematics(t_s);
     let to_b = k.q_b_e.inverse();
     let (v_b, a_b) = (to_b * k.v_e, to_b * k.a_e);
@@ -44,7 +47,8 @@ pub(super) fn aided<'a>(
     aids.filter(|(aid, _)| (*aid != Aid::Zupt || stands) && (*aid != Aid::Heading || has_yaw))
         .map(|(aid, _)| {
             let swing = k.omega_eb_b.cross(experiment.aiding.lever_arm_b(*aid));
-            Aided { aid: *aid, v_b: v_b + swing, a_b }
+            let withheld = in_outage && experiment.aiding.is_of_gnss(*aid);
+            Aided { aid: *aid, v_b: v_b + swing, a_b, withheld }
         })
         .collect()
 }

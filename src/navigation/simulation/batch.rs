@@ -162,9 +162,10 @@ impl<'a> Source<'a> {
                     value[axis][lane] += noise.draw(aided.aid, axis, after_s, aided.v_b, aided.a_b);
                 }
             }
-            (aided.aid, value)
+            // Drawn in outages too, as a fix is: an outage changes no random number after it.
+            (!aided.withheld).then_some((aided.aid, value))
         };
-        event.aids.iter().map(&mut measure).collect()
+        event.aids.iter().filter_map(&mut measure).collect()
     }
 
     /// The fixes of this epoch.

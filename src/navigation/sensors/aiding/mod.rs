@@ -11,8 +11,8 @@ mod settings;
 
 pub(crate) use errors::{AidError, AidNoise, AidPart, Law};
 pub use settings::{
-    HeadingErrors, HeadingSettings, NhcErrors, NhcSettings, OdometerErrors, OdometerSettings, ZuptErrors,
-    ZuptSettings,
+    HeadingErrors, HeadingSettings, HeadingSource, NhcErrors, NhcSettings, OdometerErrors, OdometerSettings,
+    ZuptErrors, ZuptSettings,
 };
 
 use crate::units::{DEG, SettingError};
@@ -20,7 +20,7 @@ use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// `[aiding]`: measurements of the vehicle by itself, which outages do not concern.
+/// `[aiding]`: measurements of the vehicle by itself, which outages do not concern but for a heading of two antennas.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AidingSettings {
@@ -33,7 +33,7 @@ pub struct AidingSettings {
     /// Zero velocity where the reference stands.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zupt: Option<ZuptSettings>,
-    /// Heading of a compass.
+    /// Heading of a compass or of two antennas.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heading: Option<HeadingSettings>,
 }
@@ -71,6 +71,12 @@ impl AidingSettings {
             self.heading.as_ref().map(|s| s.rate_hz),
         ];
         Aid::ALL.into_iter().zip(rates).filter_map(|(aid, rate)| rate.map(|rate| (aid, rate)))
+    }
+
+    /// Whether an aid is part of the receiver: it measures nothing in outages.
+    pub(crate) fn is_of_gnss(&self, aid: Aid) -> bool {
+        let heading = self.heading.as_ref().filter(|_| aid == Aid::Heading);
+        heading.is_some_and(|heading| heading.source == HeadingSource::Antennas)
     }
 
     /// The point of which an aid measures the velocity, with respect to the IMU, in b (m).

@@ -125,8 +125,21 @@ pub struct HeadingSettings {
     /// Standard deviation of one measurement, white, as the filter believes (degrees).
     #[schemars(with = "Positive")]
     pub sigma_deg: f64,
+    /// What measures it.
+    pub source: HeadingSource,
     /// What is truly wrong with it.
     pub truth: HeadingErrors,
+}
+
+/// What measures a heading.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum HeadingSource {
+    /// A compass, which outages of GNSS do not concern.
+    #[default]
+    Compass,
+    /// Two antennas of GNSS: no heading in its outages.
+    Antennas,
 }
 
 /// `[aiding.heading.truth]`: without it, the white noise is as the filter believes, and there is nothing else.
@@ -199,7 +212,12 @@ impl Default for ZuptErrors {
 
 impl Default for HeadingSettings {
     fn default() -> Self {
-        Self { rate_hz: 1.0, sigma_deg: 0.5, truth: HeadingErrors::default() }
+        Self {
+            rate_hz: 1.0,
+            sigma_deg: 0.5,
+            source: HeadingSource::default(),
+            truth: HeadingErrors::default(),
+        }
     }
 }
 

@@ -43,7 +43,7 @@ pub(crate) fn errors_in_outages(
     let sides = Sides::of_errors(&believed, &truth.inertial, track);
     let own = Sides::of_filter(believed, track);
     let mut pass = Pass::new(track, &own, &sides, truth);
-    let goes_on = |row: &Row| row.what.kind() != 0;
+    let goes_on = |row: &Row| !row.of_gnss;
     let mut found = vec![Vec::new(); ways.len()];
     let mut at = 0;
     for together in order.chunks(TOGETHER) {

@@ -81,12 +81,15 @@ pub(super) struct Row {
     pub(super) what: Measured,
     /// Velocity of the point of the vehicle (m/s) and acceleration (m/s²), in b.
     pub(super) motion: [DVec3; 2],
+    /// Whether outages withhold it.
+    pub(super) of_gnss: bool,
 }
 
 impl Row {
     /// A measurement whose true noise is as the filter believes.
     fn new(h: [f64; NAV + 3], felt: Surroundings, r: f64, what: Measured) -> Self {
-        Self { h, felt, r, noise: r, what, motion: [DVec3::ZERO; 2] }
+        let of_gnss = matches!(what, Measured::Position(_) | Measured::Velocity);
+        Self { h, felt, r, noise: r, what, motion: [DVec3::ZERO; 2], of_gnss }
     }
 
     /// The coefficient of a source's state in the measurement after `elapsed` samples, beside its part through the
@@ -294,7 +297,7 @@ impl Linearisation {
             let r = baro.sigma_m * baro.sigma_m;
             rows.push(Row::new(h, self.felt, r, Measured::Height));
         }
-        for aided in &event.aids {
+        for aided in event.aids.iter().filter(|aided| !aided.withheld) {
             self.aid(experiment, aided, &mut rows);
         }
         rows
@@ -304,11 +307,12 @@ impl Linearisation {
 impl Linearisation {
     /// The rows of what the vehicle measures of itself.
     fn aid(&self, experiment: &Experiment<'_>, aided: &Aided, rows: &mut Vec<Row>) {
-        let Aided { aid, v_b, a_b } = *aided;
+        let Aided { aid, v_b, a_b, .. } = *aided;
         let [r, noise] = experiment.aiding.sigmas(aid).map(|sigma| sigma * sigma);
         let row = |h, axis| Row {
             noise,
             motion: [v_b, a_b],
+            of_gnss: experiment.aiding.is_of_gnss(aid),
             ..Row::new(h, self.felt, r, Measured::Aid(aid, axis))
         };
         if aid == Aid::Heading {
