@@ -60,7 +60,6 @@ mod sweep;
 mod tables;
 mod unit;
 pub mod unit_file;
-mod unit_words;
 
 pub(crate) use description::Study;
 pub(crate) use document::{MergedStudy, ShownCell, ShownColumn};

@@ -4,9 +4,10 @@ use super::plan::Kept;
 use nav_sim_navigation::metrics::{self, EpochMetrics, Expected, Measured, OutageMetrics};
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::RunResult;
+use serde::{Deserialize, Serialize};
 
 /// What is found of one column.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Finding {
     /// By runs: their sums.
     Sampled(RunResult),
@@ -15,7 +16,7 @@ pub enum Finding {
 }
 
 /// What a unit found: a result for each column, its epochs reduced to what is kept.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct UnitResult {
     /// Name of the unit.
     pub id: String,

@@ -2,9 +2,10 @@
 
 use super::estimate::{Estimate, PerState, SampleSize};
 use crate::simulation::{BIASES, EpochSums, RunResult};
+use serde::{Deserialize, Serialize};
 
 /// What the runs say at one epoch (m, m/s, degrees).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EpochMetrics {
     /// Time on the trajectory (s).
     pub t_s: f64,

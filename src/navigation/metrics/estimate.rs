@@ -8,7 +8,7 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 use std::collections::HashMap;
 
 /// A value estimated from runs and its Monte-Carlo standard error (NaN when one run cannot tell).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The estimate.
     pub value: f64,
@@ -84,12 +84,15 @@ impl SampleSize {
     }
 }
 
-/// One value for each reported state; in files an object with their names as keys.
+/// One value for each reported state; in files that people read an object with their names as keys.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PerState<T>(pub [T; REPORTED]);
 
 impl<T: Serialize> Serialize for PerState<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if !serializer.is_human_readable() {
+            return self.0.serialize(serializer);
+        }
         let mut map = serializer.serialize_map(Some(REPORTED))?;
         for (name, value) in REPORTED_NAMES.iter().zip(&self.0) {
             map.serialize_entry(name, value)?;
@@ -112,6 +115,9 @@ pub(super) fn serialize_named<T: Serialize, S: Serializer>(
 
 impl<'de, T: Deserialize<'de> + Copy> Deserialize<'de> for PerState<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        if !deserializer.is_human_readable() {
+            return Deserialize::deserialize(deserializer).map(Self);
+        }
         let by_name = HashMap::<String, T>::deserialize(deserializer)?;
         let value =
             |name: &&'static str| by_name.get(*name).copied().ok_or_else(|| D::Error::missing_field(name));
@@ -121,7 +127,7 @@ impl<'de, T: Deserialize<'de> + Copy> Deserialize<'de> for PerState<T> {
 }
 
 /// A quantile and its distribution-free 95 % interval (`None` where the sample is too small for a bound).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Quantile {
     /// The sample quantile (linear between order statistics).
     pub value: f64,

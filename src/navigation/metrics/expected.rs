@@ -12,6 +12,7 @@ use crate::simulation::lincov::{ErrorLaw, FilterPass, Instant, Judged, Track, Tr
 use crate::simulation::{BIASES, COVERAGE_DOF, Experiment, NEES_DOF, OutageRecord, REPORTED, RunRecord};
 use crate::units::DEG;
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// States of the coverage statistic among those of the filter: position, attitude.
@@ -22,7 +23,7 @@ const VELOCITY_DOWN: usize = 5;
 const NEARLY_ALL: f64 = 0.999;
 
 /// The law of a filter's errors as the figures of a run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Expected {
     /// Statistics of every reporting epoch, all without a Monte-Carlo error.
     pub epochs: Vec<EpochMetrics>,

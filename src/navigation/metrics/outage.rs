@@ -5,9 +5,10 @@ use super::estimate::{Estimate, PerState, Quantile, quantile};
 use crate::sensors::outage::Outage;
 use crate::simulation::{OutageRecord, REPORTED, RunResult};
 use crate::units::{DEG, STANDARD_GRAVITY};
+use serde::{Deserialize, Serialize};
 
 /// What the runs say about one outage (m, m/s, degrees, s).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OutageMetrics {
     /// First instant without a fix (s).
     pub start_s: f64,
@@ -40,7 +41,7 @@ pub struct OutageMetrics {
 }
 
 /// Time from the outage's end until the error is back to what it was (s).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reconvergence {
     /// Median over the runs that recover.
     pub p50_s: Quantile,

@@ -13,6 +13,8 @@ pub(crate) use plan::samples_per;
 pub use plan::{Experiment, ExperimentError, Plan};
 pub use recording::{Recording, record};
 
+use serde::{Deserialize, Serialize};
+
 /// Number of reported navigation states: position, velocity (n, e, d), roll, pitch, yaw.
 pub const REPORTED: usize = 9;
 
@@ -46,7 +48,7 @@ pub const NEES_DOF: usize = 9;
 pub(crate) const COVERAGE_DOF: usize = 6;
 
 /// Sums over runs at one reporting epoch (1 Hz), from which `metrics` makes means and their errors.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct EpochSums {
     /// Time on the trajectory (s).
     pub t_s: f64,
@@ -77,7 +79,7 @@ pub struct EpochSums {
 }
 
 /// What is kept of one run in one outage.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct OutageRecord {
     /// Mean over the outage's reporting epochs (start ≤ t < end) of the SEE of each reported state.
     pub see_mean: [f64; REPORTED],
@@ -98,7 +100,7 @@ pub struct OutageRecord {
 }
 
 /// What is kept of one run.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunRecord {
     /// Run, counted from 0: with the seed it names every random number of the run.
     pub run: u64,
@@ -122,7 +124,7 @@ pub struct RunRecord {
 }
 
 /// All runs of one experiment, reduced in run order.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunResult {
     /// Reporting epochs in time order.
     pub epochs: Vec<EpochSums>,
