@@ -13,6 +13,7 @@
 //! # }
 //! ```
 
+mod charts;
 mod document;
 mod drive;
 mod error;

@@ -1,6 +1,7 @@
 //! Scenarios as files have them.
 
 use super::*;
+use crate::imu::Sensor;
 use crate::noise::{Ar1, Composite, Process, RandomWalk};
 use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
 

@@ -6,6 +6,7 @@ mod batch;
 pub mod lincov;
 mod plan;
 mod recording;
+mod source;
 
 pub use batch::{Batch, run_batch};
 pub(crate) use plan::fan_epochs;

@@ -1,7 +1,7 @@
 //! One run as its sensors record it: the data that fusion reads, made by the machinery of the runs.
 
 use super::Plan;
-use super::batch::nominal_start;
+use super::source::nominal_start;
 use crate::earth::radii;
 use crate::frames::NavState;
 use crate::gnss::{GnssFix, GnssVelocity};

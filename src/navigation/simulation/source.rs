@@ -1,0 +1,185 @@
+//! What is random of eight runs: starts, inertial errors, fixes, heights, what a vehicle measures of itself.
+
+use super::aided::Aided;
+use super::plan::{Event, Plan};
+use crate::earth::radii;
+use crate::ekf::Fix;
+use crate::ekf::initial::psi_of_angles;
+use crate::frames::{NavState, RollPitchYaw};
+use crate::imu::Sensor;
+use crate::lanes::{Lanes, Vec3};
+use crate::linalg;
+use crate::rng::StreamKey;
+use crate::sensors::aiding::{Aid, AidNoise};
+use crate::sensors::baro::BaroNoise;
+use crate::sensors::defects::{Defects, Surroundings};
+use crate::sensors::gnss::GnssNoise;
+use crate::sensors::imu::{ImuErrors, LaneErrors};
+use crate::units::DEG;
+use glam::{DQuat, DVec3};
+use rand_distr::{Distribution, StandardNormal};
+use std::ops::Range;
+
+/// What eight runs measure at an instant.
+pub(super) struct Measured {
+    pub(super) fix: Option<Fix>,
+    pub(super) height: Option<Lanes>,
+    /// Velocities along the vehicle's axes (m/s); of a heading the first is the yaw (rad).
+    pub(super) aids: Vec<(Aid, Vec3)>,
+}
+
+/// Everything random of eight runs.
+pub(super) struct Source<'a> {
+    /// Rate of the IMU (Hz).
+    rate_hz: f64,
+    imu: LaneErrors<'a>,
+    gnss: Vec<GnssNoise>,
+    baro: Vec<BaroNoise>,
+    aiding: Vec<AidNoise>,
+    /// Empty for an IMU without defects.
+    defects: Vec<Defects>,
+    keys: Vec<StreamKey<'a>>,
+}
+
+impl<'a> Source<'a> {
+    pub(super) fn new(plan: &Plan<'a>, first: u64, live: usize) -> Self {
+        let experiment = plan.experiment;
+        let key = |run| StreamKey {
+            seed: experiment.seed,
+            scenario: experiment.scenario,
+            run,
+            source: "",
+            process: "",
+        };
+        let keys: Vec<_> = (first..first + live as u64).map(key).collect();
+        let imu = keys.iter().map(|k| ImuErrors::new(&plan.errors, *k, plan.samples()));
+        let gnss = keys.iter().map(|k| GnssNoise::new(experiment.gnss, *k)).collect();
+        let baro = experiment.baro.iter().flat_map(|b| keys.iter().map(|k| BaroNoise::new(b, *k))).collect();
+        let aiding = keys.iter().map(|k| AidNoise::new(experiment.aiding, *k)).collect();
+        let defects = match experiment.defects {
+            settings if settings.is_ideal() => Vec::new(),
+            settings => keys.iter().map(|k| Defects::draw(settings, *k)).collect(),
+        };
+        let rate_hz = experiment.rate_hz;
+        Self { rate_hz, imu: LaneErrors::new(imu.collect()), gnss, baro, aiding, defects, keys }
+    }
+
+    /// The nominal starts: the truth and an error drawn from the initial standard deviations.
+    pub(super) fn starts(&self, plan: &Plan<'_>) -> Vec<NavState> {
+        self.keys.iter().map(|key| nominal_start(plan, *key)).collect()
+    }
+
+    /// The inertial errors of the next samples; idle lanes repeat the ideal.
+    pub(super) fn errors(&mut self, plan: &Plan<'_>, samples: Range<usize>) -> &[[Vec3; 2]] {
+        let settings = plan.experiment.defects;
+        let block = self.imu.next(samples.len());
+        if !self.defects.is_empty() {
+            for (sample, k) in block.iter_mut().zip(samples.clone()) {
+                let felt = Surroundings::at(settings, &plan.ideal[k], plan.middle_s(k));
+                for (lane, defects) in self.defects.iter().enumerate() {
+                    for (error, more) in sample.iter_mut().zip(defects.error(&felt)) {
+                        error.set_lane(lane, error.lane(lane) + more);
+                    }
+                }
+            }
+        }
+        if let Some(output) = &settings.output {
+            for (sample, truth) in block.iter_mut().zip(&plan.ideal[samples]) {
+                for (lane, sensor) in (0..self.keys.len()).flat_map(|l| Sensor::ALL.map(|s| (l, s))) {
+                    let (error, exact) = (&mut sample[sensor as usize], truth.of(sensor));
+                    error.set_lane(lane, output.put(sensor, exact + error.lane(lane)) - exact);
+                }
+            }
+        }
+        block
+    }
+
+    /// The heights of this epoch, if the barometer has one.
+    pub(super) fn height(&mut self, event: &Event) -> Option<Lanes> {
+        let mut h = Lanes::splat(event.reference.h);
+        for (lane, noise) in self.baro.iter_mut().enumerate().filter(|_| event.baro) {
+            h[lane] += noise.draw();
+        }
+        event.baro.then_some(h)
+    }
+
+    /// What the vehicle measures of itself at this epoch.
+    pub(super) fn aids(&mut self, event: &Event) -> Vec<(Aid, Vec3)> {
+        let after_s = event.sample as f64 / self.rate_hz;
+        let yaw = || RollPitchYaw::from_quat(event.reference.q_b_n).yaw;
+        let mut measure = |aided: &Aided| {
+            let is_heading = aided.aid == Aid::Heading;
+            let exact = if is_heading { DVec3::X * yaw() } else { aided.v_b };
+            let axes = if is_heading { &[0] } else { aided.aid.axes() };
+            let mut value: Vec3 = Vec3::splat(exact);
+            for (lane, noise) in self.aiding.iter_mut().enumerate() {
+                for &axis in axes {
+                    value[axis][lane] += noise.draw(aided.aid, axis, after_s, aided.v_b, aided.a_b);
+                }
+            }
+            // Drawn in outages too, as a fix is: an outage changes no random number after it.
+            (!aided.withheld).then_some((aided.aid, value))
+        };
+        event.aids.iter().filter_map(&mut measure).collect()
+    }
+
+    /// The fixes of this epoch.
+    pub(super) fn fix(&mut self, plan: &Plan<'_>, event: &Event) -> Fix {
+        let (antenna, velocity) = event.antenna;
+        let r = radii(antenna.x.sin());
+        let mut fix = exact_fix(plan, event);
+        for (lane, noise) in self.gnss.iter_mut().enumerate() {
+            let (position, speed) = noise.draw();
+            // Metres to angles at the antenna: the white error is small enough for one set of radii.
+            fix.lat[lane] += position.x / (r.meridian + antenna.z);
+            fix.lon[lane] += position.y / ((r.transverse + antenna.z) * antenna.x.cos());
+            // The error is down, the height up.
+            fix.h[lane] -= position.z;
+            if let Some(v_n) = &mut fix.v_n {
+                v_n.set_lane(lane, velocity + speed);
+            }
+        }
+        fix
+    }
+}
+
+/// The fix of a receiver without noise, with the standard deviations of the one that is simulated.
+pub(super) fn exact_fix(plan: &Plan<'_>, event: &Event) -> Fix {
+    let gnss = plan.experiment.gnss;
+    let (antenna, velocity) = event.antenna;
+    Fix {
+        lat: Lanes::splat(antenna.x),
+        lon: Lanes::splat(antenna.y),
+        h: Lanes::splat(antenna.z),
+        v_n: gnss.vel_sigma_m_s.map(|_| Vec3::splat(velocity)),
+        pos_sigma_m: gnss.pos_sigma_m.into(),
+        vel_sigma_m_s: gnss.vel_sigma_m_s.unwrap_or_default().into(),
+        lever_arm_b: gnss.lever_arm_m.into(),
+    }
+}
+
+pub(super) fn nominal_start(plan: &Plan<'_>, key: StreamKey<'_>) -> NavState {
+    let (truth, initial) = (plan.start, plan.experiment.initial);
+    if initial.perfect {
+        return truth;
+    }
+    let draw = |process: &'static str, sigma: [f64; 3]| {
+        let mut generator = StreamKey { source: "initial", process, ..key }.generator();
+        let mut normal = || -> f64 { StandardNormal.sample(&mut generator) };
+        DVec3::new(sigma[0] * normal(), sigma[1] * normal(), sigma[2] * normal())
+    };
+    let dr = draw("position", initial.pos_sigma_m);
+    let dv = draw("velocity", initial.vel_sigma_m_s);
+    let angles = draw("attitude", initial.att_sigma_deg.map(|s| s * DEG));
+    // Drawn as roll, pitch, yaw and brought to psi_n by the map that makes the filter's covariance: the NEES
+    // at the start is a χ² of nine degrees of freedom, to first order.
+    let psi = linalg::to_glam(&(psi_of_angles(truth.q_b_n) * linalg::to_nalgebra(angles)));
+    let r = radii(truth.lat.sin());
+    NavState {
+        lat: truth.lat + dr.x / (r.meridian + truth.h),
+        lon: truth.lon + dr.y / ((r.transverse + truth.h) * truth.lat.cos()),
+        h: truth.h - dr.z,
+        v_n: truth.v_n + dv,
+        q_b_n: DQuat::from_scaled_axis(psi) * truth.q_b_n,
+    }
+}
