@@ -1,4 +1,5 @@
 use super::*;
+use crate::metrics::Requirement;
 use crate::rng::StreamKey;
 use crate::simulation::{EpochSums, OutageRecord, RunRecord};
 use rand_distr::{Distribution, StandardNormal};
@@ -161,4 +162,21 @@ fn distances_are_counted_in_standard_errors_and_the_bound_is_students() {
     assert!(!agreement.is_broken());
     runs.outages[0].rmse_end.0[4] -= 0.25 * bound;
     assert!(Agreement::of(&runs, &expected).is_broken());
+}
+
+/// Where errors are beyond linear theory an analysis alone decides nothing of position and velocity down, and all of the rest.
+#[test]
+fn a_limit_downwards_beyond_linear_theory_is_left_to_the_runs() {
+    let result = matched(4, 6);
+    let mut summary = Summary::of(&result, &super::super::epochs(&result), 7);
+    let outage = &mut summary.outages[0];
+    (outage.beyond_linear, outage.rmse_end, outage.horizontal_error_end_m.p95) =
+        (true, PerState([1.0; 9]), 1.0);
+    let met = |text: &str, summary: &Summary| text.parse::<Requirement>().unwrap().check(summary).met;
+    let down = ["pos_d_m<=2", "vel_d_m_s<=2"];
+    let level = ["p95_m<=2", "pos_n_m<=2", "vel_e_m_s<=2", "yaw_deg<=2"];
+    assert!(down.iter().chain(&level).all(|text| met(text, &summary)));
+    summary.runs = 0;
+    assert!(!down.iter().any(|text| met(text, &summary)) && level.iter().all(|text| met(text, &summary)));
+    assert!(!met("p95_m<=0.9", &summary) && !met("pos_d_m<=0.9", &summary));
 }
