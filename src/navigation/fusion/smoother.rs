@@ -135,3 +135,35 @@ fn put_back(correction: &DVector<f64>, error: &mut DVector<f64>) {
     *error += correction;
     (0..3).for_each(|i| error[3 * PSI + i] += turned[i]);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DQuat;
+
+    /// A rotation after another is that of their product; the rest adds. What is left is of third order: 0.03³.
+    #[test]
+    fn a_correction_is_put_back_before_the_error_after_it() {
+        let (first, then) = (DVec3::new(0.02, -0.01, 0.03), DVec3::new(-0.015, 0.025, 0.01));
+        let state = |psi: DVec3, rest: f64| {
+            let mut x = DVector::repeat(15, rest);
+            (0..3).for_each(|i| x[3 * PSI + i] = psi[i]);
+            x
+        };
+        let mut error = state(then, 2.0);
+        put_back(&state(first, 0.5), &mut error);
+        let product = (DQuat::from_scaled_axis(first) * DQuat::from_scaled_axis(then)).to_scaled_axis();
+        for i in 0..15 {
+            match (3 * PSI..3 * PSI + 3).contains(&i) {
+                true => assert!((error[i] - product[i - 3 * PSI]).abs() < 2.7e-5, "{error} {product}"),
+                false => assert_eq!(error[i], 2.5),
+            }
+        }
+    }
+
+    /// Numbers of 15 states: a transition, half a symmetric matrix, two vectors, and 32 of the navigation state.
+    #[test]
+    fn a_mark_is_as_large_as_it_is() {
+        assert_eq!(bytes_of_mark(15.0), 8.0 * f64::from(225 + 120 + 30 + 32));
+    }
+}

@@ -300,16 +300,18 @@ mod tests {
         }
     }
 
-    /// (z + d)² ≤ x is |z + d| ≤ √x.
+    /// w (z + d)² ≤ w x is |z + d| ≤ √x.
     #[test]
     fn a_shift_is_that_of_a_normal_variable() {
         let normal = Normal::new(0.0, 1.0).unwrap();
-        for d in [0.3, 2.0, 7.9, 8.1, 50.0, 1e4] {
+        for d in [0.3, 2.0, 7.9, 8.1, 50.0, -50.0, 1e4] {
             for x in [0.5, 4.0, 80.0, 0.9 * d * d, d * d + 1.0, (d + 1.0) * (d + 1.0)] {
                 let root = f64::sqrt(x);
                 let expected = normal.cdf(root - d) - normal.cdf(-root - d);
-                let form = QuadraticForm::new([(1.0, d)]);
-                assert!((form.cdf(x) - expected).abs() < 1e-10, "{d} {x}: {} {expected}", form.cdf(x));
+                for w in [1.0, 1e-3] {
+                    let found = QuadraticForm::new([(w, d)]).cdf(w * x);
+                    assert!((found - expected).abs() < 1e-10, "{w} {d} {x}: {found} {expected}");
+                }
             }
         }
     }

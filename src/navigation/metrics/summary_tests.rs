@@ -1,4 +1,5 @@
 use super::*;
+use crate::metrics::Requirement;
 use crate::rng::StreamKey;
 use crate::simulation::{EpochSums, OutageRecord, RunRecord};
 use rand_distr::{Distribution, StandardNormal};
@@ -130,4 +131,52 @@ fn runs_that_share_their_noise_count_once_in_every_band() {
     let four = chi_square_band(6, 40.0);
     assert_eq!((summary.nis.lower95, summary.nis.upper95), (four.lower, four.upper));
     assert_eq!(summary.independent_runs, 4.0);
+}
+
+/// Every figure of runs at one standard error above what is expected, one of them at three below. With two independent runs
+/// Student's law is Cauchy's, whose quantile is the cotangent of π times the probability beyond it.
+#[test]
+fn distances_are_counted_in_standard_errors_and_the_bound_is_students() {
+    let result = matched(4, 6);
+    let mut runs = Summary::of(&result, &super::super::epochs(&result), 7);
+    let expected = runs.clone();
+    let above = |expected: f64| (expected + 0.25, 0.25);
+    let (verdict, accuracy, outage) = (&mut runs.verdict, &mut runs.accuracy, &mut runs.outages[0]);
+    (verdict.nees, verdict.nees_std_error) = above(expected.nees.mean);
+    (verdict.coverage, verdict.coverage_std_error) = above(expected.coverage.mean);
+    (outage.nees_end, outage.nees_end_std_error) = above(outage.nees_end);
+    for i in 0..9 {
+        let mean = &mut accuracy.rmse_mean.0[i];
+        (*mean, accuracy.rmse_mean_std_error.0[i]) = above(*mean);
+        (outage.rmse_end.0[i], outage.rmse_end_std_error.0[i]) = above(outage.rmse_end.0[i]);
+    }
+    outage.rmse_end.0[4] -= 1.0;
+    runs.independent_runs = 2.0;
+    let agreement = Agreement::of(&runs, &expected);
+    let near = |value: f64, truth: f64| (value - truth).abs() < 1e-9 * truth.abs();
+    assert!(near(agreement.nees_z, 1.0) && near(agreement.coverage_z, 1.0), "{agreement:?}");
+    assert!(near(agreement.largest_z, -3.0), "{agreement:?}");
+    assert_eq!((agreement.figures, &*agreement.largest), (21, "RMSE of vel_e_m_s at the end of outage 1"));
+    let bound = 1.0 / (std::f64::consts::PI * 1e-3 / 42.0).tan();
+    assert!((agreement.bound_z / bound - 1.0).abs() < 1e-6, "{} {bound}", agreement.bound_z);
+    assert!(!agreement.is_broken());
+    runs.outages[0].rmse_end.0[4] -= 0.25 * bound;
+    assert!(Agreement::of(&runs, &expected).is_broken());
+}
+
+/// Where errors are beyond linear theory an analysis alone decides nothing of position and velocity down, and all of the rest.
+#[test]
+fn a_limit_downwards_beyond_linear_theory_is_left_to_the_runs() {
+    let result = matched(4, 6);
+    let mut summary = Summary::of(&result, &super::super::epochs(&result), 7);
+    let outage = &mut summary.outages[0];
+    (outage.beyond_linear, outage.rmse_end, outage.horizontal_error_end_m.p95) =
+        (true, PerState([1.0; 9]), 1.0);
+    let met = |text: &str, summary: &Summary| text.parse::<Requirement>().unwrap().check(summary).met;
+    let down = ["pos_d_m<=2", "vel_d_m_s<=2"];
+    let level = ["p95_m<=2", "pos_n_m<=2", "vel_e_m_s<=2", "yaw_deg<=2"];
+    assert!(down.iter().chain(&level).all(|text| met(text, &summary)));
+    summary.runs = 0;
+    assert!(!down.iter().any(|text| met(text, &summary)) && level.iter().all(|text| met(text, &summary)));
+    assert!(!met("p95_m<=0.9", &summary) && !met("pos_d_m<=0.9", &summary));
 }
