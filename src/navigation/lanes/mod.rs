@@ -163,6 +163,7 @@ macro_rules! derived_operators {
         }
     };
 }
+#[cfg(target_arch = "x86_64")]
 pub(crate) use derived_operators;
 derived_operators!(Lanes);
 

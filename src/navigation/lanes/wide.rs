@@ -52,6 +52,7 @@ impl Level {
     }
 
     /// Whether this machine has it.
+    #[cfg(target_arch = "x86_64")]
     fn is_here(self) -> bool {
         self as u8 <= Self::best() as u8
     }

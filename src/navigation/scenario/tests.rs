@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::imu::Sensor;
-use crate::noise::{Ar1, Composite, Process, RandomWalk};
+use crate::noise::{Ar1, Composite, Drift, Process, RandomWalk, White};
+use crate::simulation::lincov::FilterPass;
 use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
 
 #[test]
@@ -116,6 +117,31 @@ fn a_rate_is_accepted_where_it_is_simulated() {
             let simulated = scenario.track(&standing(), &model, &[]).is_ok();
             assert_eq!((scenario.validate().is_ok(), simulated), (accepted, accepted), "{sensor} {rate}");
         }
+    }
+}
+
+/// A bias that grows by d in every sample, of which the filter knows |d|, moves a position at rest by
+/// d n (n + 1)(2n + 1)/(12 f²) in n samples without fixes. (Gravity's gradient takes (t/807 s)²/20 of it, and adds twice
+/// as much downwards; a step's bias is its mean, which leaves 2e-4.)
+#[test]
+fn a_drift_that_a_filter_knows_grows_with_time() {
+    let (slope, rate_hz, t_s) = (1e-6, 100.0, 10.0);
+    let axis = |slope: f64, white: f64| {
+        let (drift, white) = (Drift::new(slope).unwrap(), White::new(white).unwrap());
+        Composite::new(vec![Process::White(white), Process::Drift(drift)])
+    };
+    let model = Model::pooled(rate_hz, &axis(slope, 1e-20), &axis(1e-20, 1e-24));
+    let text = "filter.states = 'full'\n[initial]\npos_sigma_m = [1e-6, 1e-6, 1e-6]\n\
+                vel_sigma_m_s = [1e-9, 1e-9, 1e-9]\natt_sigma_deg = [1e-9, 1e-9, 1e-9]";
+    let scenario: Scenario = toml::from_str(text).unwrap();
+    let outages = [Outage { start_s: 0.5, end_s: t_s }];
+    let track = scenario.track(&standing(), &model, &outages).unwrap();
+    let belief = scenario.belief(&model, &outages, &track).unwrap();
+    let sigma = FilterPass::new(&track, &belief).sigma_at_ends()[0];
+    let n = rate_hz * t_s;
+    let expected = slope * n * (n + 1.0) * (2.0 * n + 1.0) / (12.0 * rate_hz * rate_hz);
+    for (i, sigma) in sigma.into_iter().enumerate().take(3) {
+        assert!((sigma / expected - 1.0).abs() < 1e-3, "axis {i}: {sigma} m, {expected} m");
     }
 }
 
