@@ -67,8 +67,14 @@ mod tests {
     fn wrong_types_are_refused_by_line_key_and_value() {
         let (message, _) = refused("[run]\nruns = 3\n[imu]\nrate_hz = \"fast\"\n");
         assert_eq!(message, "s.toml, line 4: \"imu.rate_hz\" = \"fast\" is not a number");
+        for longer in ["pos_sigma_m", "vel_sigma_m_s", "lever_arm_m"] {
+            let (message, _) = refused(&format!("[gnss]\n{longer} = [1, 2, 3, 4]\n"));
+            assert!(message.contains(&format!("\"gnss.{longer}\" = [1, 2, 3, 4] is not a")), "{message}");
+        }
+        let (message, _) = refused("imu.temperature.profile_c = [[0, 20, 3], [600, 45]]\n");
+        assert!(message.contains("is not a list of 2"), "{message}");
         let (message, _) = refused("[gnss]\npos_sigma_m = [1, 2]\n");
-        assert_eq!(message, "s.toml, line 2: \"gnss.pos_sigma_m\" = [1, 2] is not an array of length 3");
+        assert_eq!(message, "s.toml, line 2: \"gnss.pos_sigma_m\" = [1, 2] is not a list of 3");
         let (message, _) = refused("[filter]\nstates = 16\n");
         assert!(message.ends_with("= 16 is not \"15\", \"21\" or \"full\""), "{message}");
         let (message, _) = refused("[run]\nmethod = \"lincav\"\n");
@@ -125,7 +131,7 @@ mod tests {
         let beside = match section {
             "baro" => "rate_hz = 1.0\nsigma_m = 1.0\n",
             "imu.vibration" => "rectification_s2_m = 0.0\n",
-            "imu.temperature" => "profile_c = [[0.0, 0.0]]\n",
+            "imu.temperature" => "profile_c = [[0.0, 0.0], [1.0, 1.0]]\n",
             "outage[1]" => "start_s = 1.0\nend_s = 2.0\n",
             "outage_periodic" => "first_s = 1.0\nevery_s = 1e300\nduration_s = 1e-300\n",
             "outage_random" => "rate_per_hour = 1.0\nduration_s = 1.0\n",

@@ -5,6 +5,7 @@ use crate::run::Reduced;
 use nav_sim_navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim_navigation::gnss::GnssFix;
 use nav_sim_navigation::metrics::ReductionSummary;
+use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::gnss::GnssSettings;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov;
@@ -27,7 +28,7 @@ pub(super) fn belief(
     let interval_s = middle(steps.collect()).unwrap_or(1.0);
     let window_s = reduction::window_s(lengths.iter().copied().fold(0.0, f64::max));
     let belief = Belief::new(&model, states, interval_s, window_s)?;
-    let drive = || lincov::drive(&model, &receiver(gnss, interval_s), &lengths);
+    let drive = || lincov::drive(&model, &ImuSettings::default(), &receiver(gnss, interval_s), &lengths);
     let Some(track) = states.is_reduced().then(drive).flatten() else {
         return Ok((belief.with_initial(initial), None));
     };

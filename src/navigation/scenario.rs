@@ -11,7 +11,7 @@ use crate::noise::Model;
 use crate::noise::reduction::{self, ReductionError};
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::baro::BaroSettings;
-use crate::sensors::defects::ImuSettings;
+use crate::sensors::defects::{ImuSettings, Output};
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::{
@@ -198,7 +198,8 @@ impl Scenario {
     /// The key that is drawn upon.
     pub fn analysable(&self) -> Result<(), SettingError> {
         let because = "covariance analysis has no draws, on which its effect depends";
-        let refusal = match (self.filter.nis_gate, &self.imu.output) {
+        let output = self.imu.output.as_ref().filter(|output| **output != Output::default());
+        let refusal = match (self.filter.nis_gate, output) {
             (Some(p), _) => SettingError::new("filter.nis_gate", p, because),
             (None, Some(_)) => SettingError::new("imu.output", "{…}", because),
             (None, None) => return Ok(()),

@@ -23,9 +23,12 @@ pub(crate) fn unexpected_in_words(unexpected: &Unexpected) -> (String, String) {
             ),
             format!("--scale-ppm (initial.{}) gives it states", InitialSettings::scale_key(*sensor)),
         ),
-        Unexpected::Defect(Defect { key, sigma, unit, .. }) => {
-            (format!("{key} = {sigma} {unit} is in no filter"), "calibrate the IMU for it".to_owned())
-        }
+        Unexpected::Defect(Defect { key, sigma, unit, bias_of, .. }) => (
+            format!("{key} = {sigma} {unit} is in no filter"),
+            bias_of.map_or("calibrate the IMU for it".to_owned(), |sensor| {
+                format!("initial.{} has states of its mean", InitialSettings::bias_key(sensor))
+            }),
+        ),
         Unexpected::CorrelatedPositions { sigma_m: [n, e, d], correlation_time_s } => (
             format!(
                 "the true receiver errs by {n}, {e}, {d} m over {correlation_time_s} s, the filter expects white errors"

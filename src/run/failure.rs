@@ -66,9 +66,7 @@ impl RunAnswer {
                 "the filter is overconfident by far: NEES {:.0}, 9 if it is right",
                 summary.nees.mean
             );
-            return Some(
-                Failure::bound(message).hint("the results are written; does MODEL describe the errors?"),
-            );
+            return Some(Failure::bound(message).hint("the results are written"));
         }
         None
     }

@@ -100,8 +100,14 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
         aiding_sigmas,
         after,
         of_run: (*states != filter_of_run).then(|| task.consistency(&of_run, &factors)).transpose()?,
-        informed: task
-            .informed(|truth| knowing(&scenario, &truth.imu).belief(&truth.model, outages, analysed))?,
+        informed: truths
+            .errors
+            .iter()
+            .all(|truth| truth.imu.without_states().next().is_none())
+            .then(|| {
+                task.informed(|truth| knowing(&scenario, &truth.imu).belief(&truth.model, outages, analysed))
+            })
+            .transpose()?,
         sweep: sweep(&task, &factors, draw_factors.as_ref())?,
         factors,
         truths: truths.names.clone(),

@@ -96,9 +96,9 @@ impl TuneRequest {
     pub(crate) fn tuned(&self, notes: Notes<'_>) -> Result<Tuned, Failure> {
         let files = self.inputs()?;
         let mut scenario = checked_scenario(self.scenario.as_deref(), &self.outages)?;
-        if self.truths.is_empty() && !self.intervals && scenario.unexpected().is_empty() {
+        if self.truths.is_empty() && !self.intervals && scenario.states_no_error() {
             return Err(Failure::input("no truth to be consistent with: neither --truth nor --intervals is given")
-                .hint("give models (--truth OTHER.toml, one a recording), or --intervals for a MODEL of `nav-sim calibrate`"));
+                .hint("give models (--truth OTHER.toml, one a recording), --intervals for a MODEL of `nav-sim calibrate`, or a scenario with errors"));
         }
         let file = read::model(&self.model, notes)?;
         let model = read::at_rate(&self.model, &file.model, scenario.imu.rate_hz, notes)?;
@@ -219,9 +219,15 @@ impl TuneRequest {
     ) -> Result<(Track, Vec<Outage>), Failure> {
         let seed = self.seed.or(scenario.run.seed).unwrap_or(0);
         let Some(path) = &self.trajectory else {
+            if !scenario.aiding.is_none() || scenario.baro.is_some() || scenario.imu.temperature.is_some() {
+                return Err(Failure::input(
+                    "aiding, a barometer and a temperature profile belong to a trajectory",
+                )
+                .hint("give it with --trajectory"));
+            }
             let outages = scenario.outages_on((0.0, DAY_S), seed)?.windows;
             let lengths: Vec<f64> = outages.iter().map(|o| o.end_s - o.start_s).collect();
-            let track = drive(model, &scenario.gnss, &lengths).ok_or_else(|| {
+            let track = drive(model, &scenario.imu, &scenario.gnss, &lengths).ok_or_else(|| {
                 Failure::input("no built-in drive for this receiver")
                     .hint("give a trajectory with --trajectory")
             })?;

@@ -31,8 +31,8 @@ pub(crate) struct TuneResult {
     pub after: FilterConsistency,
     /// The tuned model in the filter that `run` makes of it, where that is another.
     pub of_run: Option<FilterConsistency>,
-    /// A filter that knows the truth, each truth its own.
-    pub informed: FilterConsistency,
+    /// A filter that knows the truth, each truth its own; none where there are errors of which no filter has states.
+    pub informed: Option<FilterConsistency>,
     /// The tuned filter with all its variances times a factor: how sharp the answer is.
     pub sweep: Vec<(f64, FilterConsistency)>,
     /// Names of the truths; of draws one for all.
@@ -135,16 +135,16 @@ impl TuneResult {
         }
     }
 
-    /// Horizontal RMSE at the outages' ends over that of a filter that knows the truth, less 1.
+    /// Horizontal RMSE at the outages' ends over that of a filter that knows the truth, less 1; NaN without one.
     pub(super) fn cost(&self, found: &FilterConsistency) -> f64 {
         let square = |h: &FilterConsistency| h.horizontal_m().map(|x| x * x).sum::<f64>();
-        (square(found) / square(&self.informed)).sqrt() - 1.0
+        (square(found) / self.informed.as_ref().map_or(f64::NAN, square)).sqrt() - 1.0
     }
 
     pub(super) fn filters(&self) -> impl Iterator<Item = (&'static str, &FilterConsistency)> {
         let tuned = [("untuned", &self.before), ("tuned", &self.after)].into_iter();
         let of_run = self.of_run.iter().map(|h| ("tuned, default of run", h));
-        tuned.chain(of_run).chain([("knows the truth", &self.informed)])
+        tuned.chain(of_run).chain(self.informed.iter().map(|h| ("knows the truth", h)))
     }
 
     /// The truth in which an error is largest.

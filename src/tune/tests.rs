@@ -25,7 +25,7 @@ fn result(filter: FilterStates, of_run: FilterConsistency) -> TuneResult {
         before: consistency(2.0, 30.0),
         after: consistency(1.0, 8.8),
         of_run: (filter != FilterStates::Reduced15).then_some(of_run),
-        informed: consistency(1.0, 9.0),
+        informed: Some(consistency(1.0, 9.0)),
         truths: vec!["truth.toml".to_owned()],
         is_drawn: false,
         aim: Aim::Worst,

@@ -248,6 +248,10 @@ fn the_sigma_that_covers_the_errors_of_aiding_is_found() {
         serde_json::from_slice(&tune(dir.path(), &asked).success().get_output().stdout).unwrap();
     let factor = found["aiding_sigma_factor"].as_f64().unwrap();
     assert!(factor > 1.5, "{found}");
+    // of the built-in drive nothing is known but its motion
+    let refused = tune(dir.path(), &[&model, "--scenario", "car.toml"]).code(2);
+    let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    assert!(said.contains("belong to a trajectory") && said.contains("--trajectory"), "{said}");
     let kind = |sigma: f64| {
         scenario(sigma);
         let mut command = Command::cargo_bin("nav-sim").unwrap();

@@ -7,7 +7,7 @@ use nav_sim_navigation::earth::MAX_LATITUDE_DEG;
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::frames::{NavState, RollPitchYaw};
 use nav_sim_navigation::fusion::Start;
-use nav_sim_signal::units::DEG;
+use nav_sim_signal::units::{DEG, exactly_if};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::Path;
@@ -42,10 +42,13 @@ struct Description {
     /// Yaw (degrees)
     yaw_deg: Between<-360, 360, false>,
     /// Standard deviations of the position north, east, down (m; default: as in scenarios)
+    #[serde(default, deserialize_with = "exactly_if")]
     pos_sigma_m: Option<[f64; 3]>,
     /// Of the velocity (m/s)
+    #[serde(default, deserialize_with = "exactly_if")]
     vel_sigma_m_s: Option<[f64; 3]>,
     /// Of roll, pitch, yaw (degrees)
+    #[serde(default, deserialize_with = "exactly_if")]
     att_sigma_deg: Option<[f64; 3]>,
     /// Of a turn-on bias of the accelerometers that the filter expects (m/s²)
     accel_bias_sigma_m_s2: Option<f64>,

@@ -268,6 +268,10 @@ fn turn_on_biases_are_one_or_three_standard_deviations() {
     for (text, reason) in [
         ("accel_m_s2 = -1", "\"turn_on.accel_m_s2\" = -1 is not a standard deviation between 0 and 10 m/s²"),
         ("gyro_rad_s = 2", "\"turn_on.gyro_rad_s\" = 2 is not a standard deviation between 0 and 1 rad/s"),
+        (
+            "gyro_rad_s = [1.0, 2.0, 3.0, 4.0]",
+            "\"turn_on.gyro_rad_s\" = [1.0, 2.0, 3.0, 4.0] is too long a list",
+        ),
         ("gyro_rad_s = [1e-3, 2e-3]", "\"turn_on.gyro_rad_s\" = [1e-3, 2e-3] is not an array of length 3"),
         ("gyro_deg_h = 1", "unknown key \"turn_on.gyro_deg_h\""),
     ] {

@@ -2,7 +2,7 @@
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
-use serde::de::{Deserializer, Error, IntoDeserializer, MapAccess, SeqAccess, Visitor};
+use serde::de::{Deserializer, Error, IgnoredAny, IntoDeserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::fmt;
@@ -136,7 +136,11 @@ impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Visitor<'de> for Either
         One::deserialize(MapAccessDeserializer::new(map)).map(OneOrEach::One)
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Self::Value, A::Error> {
-        Each::deserialize(SeqAccessDeserializer::new(list)).map(OneOrEach::Each)
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
+        let each = Each::deserialize(SeqAccessDeserializer::new(&mut list))?;
+        match list.next_element::<IgnoredAny>()? {
+            None => Ok(OneOrEach::Each(each)),
+            Some(_) => Err(A::Error::custom("is too long a list")),
+        }
     }
 }

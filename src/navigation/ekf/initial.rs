@@ -2,7 +2,7 @@
 
 use crate::frames::RollPitchYaw;
 use crate::imu::Sensor;
-use crate::units::{NonNegative, Positive, SettingError, require_non_negative, require_positive};
+use crate::units::{NonNegative, Positive, SettingError, exactly, require_non_negative, require_positive};
 use glam::DQuat;
 use nalgebra::Matrix3;
 use schemars::JsonSchema;
@@ -18,12 +18,15 @@ use serde::{Deserialize, Serialize};
 pub struct InitialSettings {
     /// Position north, east, down (m).
     #[schemars(with = "[Positive; 3]", inner(range(max = 1e5)))]
+    #[serde(deserialize_with = "exactly")]
     pub pos_sigma_m: [f64; 3],
     /// Velocity north, east, down (m/s).
     #[schemars(with = "[Positive; 3]", inner(range(max = 1000.0)))]
+    #[serde(deserialize_with = "exactly")]
     pub vel_sigma_m_s: [f64; 3],
     /// Roll, pitch, yaw (degrees).
     #[schemars(with = "[Positive; 3]", inner(range(max = 30.0)))]
+    #[serde(deserialize_with = "exactly")]
     pub att_sigma_deg: [f64; 3],
     /// Turn-on bias of the accelerometers that the filter expects beside the model's processes (m/s²): an
     /// unknown constant, one state an axis; without it, none.

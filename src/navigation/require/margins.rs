@@ -52,7 +52,7 @@ impl Part {
             Self::Correlated(sensor) => format!("{}, correlated", sensor.name()),
             Self::TurnOn(sensor) => format!("{}, turn-on bias", sensor.name()),
             Self::Drift => "drift".to_owned(),
-            Self::Scale => "scale factors and other constants".to_owned(),
+            Self::Scale => "scale factors, misalignment, g, temperature".to_owned(),
             Self::Fixes => "GNSS".to_owned(),
             Self::Aiding => "aiding".to_owned(),
             Self::Start => "start".to_owned(),

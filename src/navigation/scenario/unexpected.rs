@@ -7,6 +7,12 @@ use crate::sensors::gnss::GnssSettings;
 use crate::simulation::lincov::STRAPDOWN;
 
 impl Scenario {
+    /// Whether it says of nothing what is truly wrong with it.
+    #[must_use]
+    pub fn states_no_error(&self) -> bool {
+        self.imu.is_ideal() && self.aiding.errors().is_empty() && self.unexpected().is_empty()
+    }
+
     /// Errors that the true IMU and receiver have and the filter does not expect: its own will be larger than it says.
     #[must_use]
     pub fn unexpected(&self) -> Vec<Unexpected> {

@@ -2,7 +2,7 @@
 
 use crate::rng::{Generator, StreamKey};
 use crate::units::{
-    NonNegative, Positive, SettingError, require_finite, require_non_negative, require_positive,
+    NonNegative, Positive, SettingError, exactly, require_finite, require_non_negative, require_positive,
 };
 use glam::DVec3;
 use rand_distr::{Distribution, StandardNormal};
@@ -24,6 +24,7 @@ pub struct GnssSettings {
     pub rate_hz: f64,
     /// Position standard deviations north, east, down (m).
     #[schemars(with = "[Positive; 3]")]
+    #[serde(deserialize_with = "exactly")]
     pub pos_sigma_m: [f64; 3],
     /// Velocity standard deviations north, east, down (m/s); `None` ("none" in files): no velocity.
     #[serde(serialize_with = "sigmas_or_none", deserialize_with = "parse_sigmas_or_none")]
@@ -31,10 +32,12 @@ pub struct GnssSettings {
     pub vel_sigma_m_s: Option<[f64; 3]>,
     /// Antenna position with respect to the IMU, in b: front, right, down (m).
     #[schemars(inner(range(min = -MAX_LEVER_ARM_M, max = MAX_LEVER_ARM_M)))]
+    #[serde(deserialize_with = "exactly")]
     pub lever_arm_m: [f64; 3],
     /// Standard deviations of a correlated position error north, east, down (m): a Gauss-Markov process beside
     /// the white noise, in the true receiver only. The filter believes `pos_sigma_m`, white.
     #[schemars(with = "[NonNegative; 3]")]
+    #[serde(deserialize_with = "exactly")]
     pub correlated_pos_sigma_m: [f64; 3],
     /// Correlation time of that error (s).
     #[schemars(with = "Positive")]
@@ -193,7 +196,7 @@ impl<'de> Visitor<'de> for SigmasOrNone {
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
-        <[f64; 3]>::deserialize(de::value::SeqAccessDeserializer::new(seq)).map(Some)
+        exactly(de::value::SeqAccessDeserializer::new(seq)).map(Some)
     }
 }
 

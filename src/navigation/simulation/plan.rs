@@ -8,7 +8,7 @@ use crate::imu::ImuSample;
 use crate::noise::continuous::same_rate;
 use crate::sensors::aiding::{Aid, AidingSettings};
 use crate::sensors::baro::BaroSettings;
-use crate::sensors::defects::ImuSettings;
+use crate::sensors::defects::{ImuSettings, Surroundings};
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::ideal_imu::{self, ideal_imu};
 use crate::sensors::imu::{ErrorSource, Truth, TruthError};
@@ -235,9 +235,10 @@ impl<'a> Plan<'a> {
         self.experiment
     }
 
-    /// Time on the trajectory in the middle of a sample (s).
-    pub(super) fn middle_s(&self, sample: usize) -> f64 {
-        self.experiment.trajectory.start_s() + (sample as f64 + 0.5) / self.experiment.rate_hz
+    /// What the IMU feels over a sample, as it is in its middle.
+    pub(super) fn felt(&self, sample: usize) -> Surroundings {
+        let t_s = self.experiment.trajectory.start_s() + (sample as f64 + 0.5) / self.experiment.rate_hz;
+        Surroundings::at(self.experiment.defects, &self.ideal[sample], t_s, &self.ideal[0])
     }
 
     /// IMU samples of one run.

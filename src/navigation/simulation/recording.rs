@@ -7,7 +7,7 @@ use crate::frames::NavState;
 use crate::gnss::{GnssFix, GnssVelocity};
 use crate::imu::{Channel, ImuIncrement, Sensor};
 use crate::rng::StreamKey;
-use crate::sensors::defects::{Defects, Surroundings};
+use crate::sensors::defects::Defects;
 use crate::sensors::gnss::GnssNoise;
 use crate::sensors::imu::ImuErrors;
 use glam::DVec3;
@@ -65,7 +65,7 @@ fn inertial(plan: &Plan<'_>, key: StreamKey<'_>) -> Vec<ImuIncrement> {
     let dt_s = 1.0 / rate_hz;
     let settings = plan.experiment.defects;
     let sample = |(k, ideal): (usize, &crate::imu::ImuSample)| {
-        let felt = Surroundings::at(settings, ideal, plan.middle_s(k));
+        let felt = plan.felt(k);
         let [dv, dtheta] = Sensor::ALL.map(|sensor| {
             let value = ideal.of(sensor) + defects.error(&felt)[sensor as usize] + triad(sensor, k);
             settings.output.as_ref().map_or(value, |output| output.put(sensor, value)) * dt_s

@@ -12,7 +12,7 @@ use crate::linalg;
 use crate::rng::StreamKey;
 use crate::sensors::aiding::{Aid, AidNoise};
 use crate::sensors::baro::BaroNoise;
-use crate::sensors::defects::{Defects, Surroundings};
+use crate::sensors::defects::Defects;
 use crate::sensors::gnss::GnssNoise;
 use crate::sensors::imu::{ImuErrors, LaneErrors};
 use crate::units::DEG;
@@ -75,7 +75,7 @@ impl<'a> Source<'a> {
         let block = self.imu.next(samples.len());
         if !self.defects.is_empty() {
             for (sample, k) in block.iter_mut().zip(samples.clone()) {
-                let felt = Surroundings::at(settings, &plan.ideal[k], plan.middle_s(k));
+                let felt = plan.felt(k);
                 for (lane, defects) in self.defects.iter().enumerate() {
                     for (error, more) in sample.iter_mut().zip(defects.error(&felt)) {
                         error.set_lane(lane, error.lane(lane) + more);

@@ -1,7 +1,7 @@
 //! The settings of each kind of aiding: what a filter believes, and what is true.
 
 use crate::sensors::gnss::{MAX_LEVER_ARM_M, require_lever_arm};
-use crate::units::{NonNegative, Positive, SettingError};
+use crate::units::{NonNegative, Positive, SettingError, exactly};
 use crate::units::{require_non_negative, require_positive};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -18,6 +18,7 @@ pub struct NhcSettings {
     pub sigma_m_s: f64,
     /// The point that moves neither sideways nor up, with respect to the IMU: front, right, down (m).
     #[schemars(inner(range(min = -MAX_LEVER_ARM_M, max = MAX_LEVER_ARM_M)))]
+    #[serde(deserialize_with = "exactly")]
     pub lever_arm_m: [f64; 3],
     /// Pitch and yaw of the vehicle's axes in those of the IMU, as the filter expects them (1 σ, degrees): two states;
     /// 0: none.
@@ -61,6 +62,7 @@ pub struct OdometerSettings {
     pub sigma_m_s: f64,
     /// The wheel, or the middle of its axle, with respect to the IMU: front, right, down (m).
     #[schemars(inner(range(min = -MAX_LEVER_ARM_M, max = MAX_LEVER_ARM_M)))]
+    #[serde(deserialize_with = "exactly")]
     pub lever_arm_m: [f64; 3],
     /// Scale factor of the wheel, as the filter expects it (1 σ): a state; 0: none.
     #[schemars(with = "NonNegative")]

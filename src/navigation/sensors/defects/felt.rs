@@ -1,19 +1,20 @@
 //! What an IMU feels, and errors that are proportional to it.
 
-use super::ImuSettings;
+use super::{ImuSettings, at_most};
 use crate::imu::{ImuSample, Sensor};
-use crate::units::{NonNegative, SettingError, require_finite, require_non_negative};
+use crate::units::{NonNegative, SettingError, exactly, require_finite};
 use glam::DVec3;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// `[imu.vibration]`: accelerometers that are not linear rectify what shakes them (g² term; IEEE Std 1293): a bias of
-/// `rectification_s2_m` times the mean square of the specific force along the axis.
+/// `rectification_s2_m` times the mean square of the specific force along the axis, less that of the start, which is
+/// turn-on bias.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Vibration {
-    /// Vibration along each axis that the trajectory does not have (root mean square, m/s²).
-    #[schemars(with = "NonNegative")]
+    /// Vibration along each axis that the trajectory does not have, from the start to the end (root mean square, m/s²).
+    #[schemars(with = "NonNegative", range(max = MAX_VIBRATION))]
     #[serde(default)]
     pub rms_m_s2: f64,
     /// Error per square of the specific force (1 σ, m/s² per (m/s²)²), each axis its own: 1 mg per g² is 1.02e-4.
@@ -21,6 +22,10 @@ pub struct Vibration {
     pub rectification_s2_m: f64,
 }
 
+/// Largest vibration (m/s²): 100 g.
+const MAX_VIBRATION: f64 = 1000.0;
+/// Largest change of a bias with temperature (m/s² and rad/s per K): 10 mg, and 0.06 °/s.
+const MAX_PER_KELVIN: [f64; 2] = [0.1, 1e-3];
 /// Largest rectification (s²/m): a tenth of the specific force at g.
 const MAX_RECTIFICATION: f64 = 0.01;
 
@@ -30,40 +35,44 @@ const MAX_RECTIFICATION: f64 = 0.01;
 pub struct Temperature {
     /// Time on the trajectory (s) and temperature (°C), one pair after the other: straight between them, constant before and
     /// after. What the IMU has at the first of them is its turn-on bias.
+    #[serde(deserialize_with = "pairs")]
     pub profile_c: Vec<[f64; 2]>,
     /// Change of each accelerometer's bias (1 σ, m/s² per K).
-    #[schemars(with = "NonNegative")]
+    #[schemars(with = "NonNegative", range(max = MAX_PER_KELVIN[0]))]
     #[serde(default)]
     pub accel_m_s2_k: f64,
-    /// Change of each gyroscope's bias (1 σ, rad/s per K).
-    #[schemars(with = "NonNegative")]
+    /// Change of each gyroscope's bias (1 σ, rad/s per K): 0.005 °/s per K are 8.73e-5.
+    #[schemars(with = "NonNegative", range(max = MAX_PER_KELVIN[1]))]
     #[serde(default)]
     pub gyro_rad_s_k: f64,
 }
 
+/// Reads pairs, no triples.
+fn pairs<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 2]>, D::Error> {
+    #[derive(Deserialize)]
+    struct Pair(#[serde(deserialize_with = "exactly")] [f64; 2]);
+    Ok(Vec::<Pair>::deserialize(deserializer)?.into_iter().map(|Pair(pair)| pair).collect())
+}
+
 impl Vibration {
     pub(super) fn validate(&self) -> Result<(), SettingError> {
-        require_non_negative("rms_m_s2", &[self.rms_m_s2])?;
-        require_non_negative("rectification_s2_m", &[self.rectification_s2_m])?;
-        if self.rectification_s2_m > MAX_RECTIFICATION {
-            let requirement = format!("at most {MAX_RECTIFICATION} s²/m (mg per g² named s²/m?)");
-            return Err(SettingError::new("rectification_s2_m", self.rectification_s2_m, requirement));
-        }
-        Ok(())
+        at_most("rms_m_s2", self.rms_m_s2, MAX_VIBRATION, "mg named m/s²?")?;
+        at_most("rectification_s2_m", self.rectification_s2_m, MAX_RECTIFICATION, "mg per g² named s²/m?")
     }
 }
 
 impl Temperature {
     pub(super) fn validate(&self) -> Result<(), SettingError> {
-        require_non_negative("accel_m_s2_k", &[self.accel_m_s2_k])?;
-        require_non_negative("gyro_rad_s_k", &[self.gyro_rad_s_k])?;
+        at_most("accel_m_s2_k", self.accel_m_s2_k, MAX_PER_KELVIN[0], "mg named m/s²?")?;
+        at_most("gyro_rad_s_k", self.gyro_rad_s_k, MAX_PER_KELVIN[1], "degrees named radians?")?;
         let key = "profile_c";
         require_finite(key, self.profile_c.as_flattened())?;
-        if self.profile_c.is_empty() {
-            return Err(SettingError::new(key, "[]", "pairs of time (s) and temperature (°C)"));
+        if self.profile_c.len() < 2 {
+            let requirement = "it must be two pairs of time (s) and temperature (°C), or more";
+            return Err(SettingError::new(key, format!("{:?}", self.profile_c), requirement));
         }
         match self.profile_c.windows(2).find(|pair| pair[1][0] <= pair[0][0]) {
-            Some(pair) => Err(SettingError::new(key, format!("{pair:?}"), "times that increase")),
+            Some(pair) => Err(SettingError::new(key, format!("{pair:?}"), "its times must increase")),
             None => Ok(()),
         }
     }
@@ -113,20 +122,20 @@ pub(crate) enum Felt {
 pub(crate) struct Surroundings {
     /// Specific force (m/s²) and angular rate (rad/s) in b.
     pub(crate) sample: [DVec3; 2],
-    /// Mean square of the specific force along each axis, with the vibration ((m/s²)²).
+    /// Mean square of the specific force along each axis, with the vibration, less that of the start ((m/s²)²).
     pub(crate) square: DVec3,
     /// Temperature above that of the start (K).
     pub(crate) warming_k: f64,
 }
 
 impl Surroundings {
-    /// Of a true sample at a time on the trajectory.
-    pub(crate) fn at(settings: &ImuSettings, sample: &ImuSample, t_s: f64) -> Self {
-        let f = sample.f_ib_b;
+    /// Of a true sample at a time on the trajectory that begins with the sample `first`.
+    pub(crate) fn at(settings: &ImuSettings, sample: &ImuSample, t_s: f64, first: &ImuSample) -> Self {
+        let (f, f_0) = (sample.f_ib_b, first.f_ib_b);
         let vibration = settings.vibration.as_ref().map_or(0.0, |v| v.rms_m_s2);
         Self {
             sample: Sensor::ALL.map(|sensor| sample.of(sensor)),
-            square: f * f + DVec3::splat(vibration * vibration),
+            square: f * f - f_0 * f_0 + DVec3::splat(vibration * vibration),
             warming_k: settings.temperature.as_ref().map_or(0.0, |t| t.warming_k(t_s)),
         }
     }

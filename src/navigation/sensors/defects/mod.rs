@@ -73,10 +73,21 @@ pub struct Defect {
     pub sigma: f64,
     /// Unit of the standard deviation.
     pub unit: &'static str,
+    /// The sensor whose constant bias it mostly is, of which a filter may have states.
+    pub bias_of: Option<Sensor>,
 }
 
-/// Largest g-sensitivity (rad/s per m/s²): 570 °/s per g.
-const MAX_G_SENSITIVITY: f64 = 1.0;
+/// Largest g-sensitivity (rad/s per m/s²): 11 °/s per g.
+const MAX_G_SENSITIVITY: f64 = 0.02;
+
+/// Accepts 0 to `most`; `mistake` is what a larger value may be.
+fn at_most(key: &str, value: f64, most: f64, mistake: &str) -> Result<(), SettingError> {
+    require_non_negative(key, &[value])?;
+    if value <= most {
+        return Ok(());
+    }
+    Err(SettingError::new(key, value, format!("at most {most} ({mistake})")))
+}
 
 /// Whether a deviation is that of nothing.
 #[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
@@ -136,11 +147,7 @@ impl ImuSettings {
             return Err(SettingError::new("misalignment_rad", self.misalignment_rad, requirement));
         }
         let (key, sensitivity) = ("g_sensitivity_rad_s_per_m_s2", self.g_sensitivity_rad_s_per_m_s2);
-        require_non_negative(key, &[sensitivity])?;
-        if sensitivity > MAX_G_SENSITIVITY {
-            let requirement = format!("at most {MAX_G_SENSITIVITY} (°/s per g named rad/s per m/s²?)");
-            return Err(SettingError::new(key, sensitivity, requirement));
-        }
+        at_most(key, sensitivity, MAX_G_SENSITIVITY, "°/s per g named rad/s per m/s²?")?;
         self.vibration.iter().try_for_each(|v| v.validate().map_err(|e| e.in_section("vibration")))?;
         self.temperature.iter().try_for_each(|t| t.validate().map_err(|e| e.in_section("temperature")))?;
         self.output.iter().try_for_each(|o| o.validate().map_err(|e| e.in_section("output")))
@@ -169,7 +176,11 @@ impl ImuSettings {
     pub fn without_states(&self) -> impl Iterator<Item = Defect> + use<> {
         let rectification = self.vibration.as_ref().map_or(0.0, |v| v.rectification_s2_m);
         let [accel_k, gyro_k] = Sensor::ALL.map(|s| self.temperature.as_ref().map_or(0.0, |t| t.sigma(s)));
-        let defect = |source, sensors, key, sigma, unit| Defect { source, sensors, key, sigma, unit };
+        let defect = |source, sensors: &'static [Sensor], key, sigma, unit| {
+            // A bias of one sensor: by gravity, by steady vibration, by what the warming ends with.
+            let bias_of = if let [sensor] = sensors { Some(*sensor) } else { None };
+            Defect { source, sensors, key, sigma, unit, bias_of }
+        };
         let (both, accel, gyro): (&[Sensor], &[Sensor], &[Sensor]) =
             (&Sensor::ALL, &[Sensor::Accel], &[Sensor::Gyro]);
         let sensitivity = self.g_sensitivity_rad_s_per_m_s2;
@@ -228,7 +239,7 @@ mod tests {
             ),
             (
                 ImuSettings {
-                    output: Some(Output { range_accel_m_s2: Some(0.0), ..Output::default() }),
+                    output: Some(Output { range_accel_m_s2: Some(8.0), ..Output::default() }),
                     ..d.clone()
                 },
                 "output.range_accel_m_s2",

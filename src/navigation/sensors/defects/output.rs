@@ -1,17 +1,23 @@
 //! How an IMU puts its samples out: within a range, in steps.
 
+use super::at_most;
 use crate::imu::Sensor;
-use crate::units::{NonNegative, Positive, SettingError, require_non_negative, require_positive};
+use crate::units::{NonNegative, Positive, SettingError, require_positive};
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// Least range of an accelerometer (m/s²): less than it is full at rest.
+const LEAST_RANGE_M_S2: f64 = 10.0;
+/// Largest steps (m/s², rad/s): 0.1 g and 6 °/s.
+const MAX_STEPS: [f64; 2] = [1.0, 0.1];
 
 /// `[imu.output]`: range and resolution of its samples. Only runs have them: what they do depends on what is drawn.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
-    /// Largest magnitude of an accelerometer's sample (m/s²); without it, any.
-    #[schemars(with = "Option<Positive>")]
+    /// Largest magnitude of an accelerometer's sample (m/s²), above that of gravity: ±8 g are 78.5; without it, any.
+    #[schemars(range(min = LEAST_RANGE_M_S2))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_accel_m_s2: Option<f64>,
     /// Largest magnitude of a gyroscope's sample (rad/s); without it, any.
@@ -19,10 +25,10 @@ pub struct Output {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_gyro_rad_s: Option<f64>,
     /// Step of an accelerometer's samples (m/s²); 0: none.
-    #[schemars(with = "NonNegative")]
+    #[schemars(with = "NonNegative", range(max = MAX_STEPS[0]))]
     pub resolution_accel_m_s2: f64,
     /// Step of a gyroscope's samples (rad/s); 0: none.
-    #[schemars(with = "NonNegative")]
+    #[schemars(with = "NonNegative", range(max = MAX_STEPS[1]))]
     pub resolution_gyro_rad_s: f64,
 }
 
@@ -31,8 +37,13 @@ impl Output {
         let ranges =
             [("range_accel_m_s2", self.range_accel_m_s2), ("range_gyro_rad_s", self.range_gyro_rad_s)];
         ranges.iter().try_for_each(|(key, range)| require_positive(key, range.as_slice()))?;
-        require_non_negative("resolution_accel_m_s2", &[self.resolution_accel_m_s2])?;
-        require_non_negative("resolution_gyro_rad_s", &[self.resolution_gyro_rad_s])
+        if let Some(range) = self.range_accel_m_s2.filter(|range| *range < LEAST_RANGE_M_S2) {
+            let requirement =
+                format!("at least {LEAST_RANGE_M_S2} m/s²: gravity is in every sample (g named m/s²?)");
+            return Err(SettingError::new("range_accel_m_s2", range, requirement));
+        }
+        at_most("resolution_accel_m_s2", self.resolution_accel_m_s2, MAX_STEPS[0], "mg named m/s²?")?;
+        at_most("resolution_gyro_rad_s", self.resolution_gyro_rad_s, MAX_STEPS[1], "degrees named radians?")
     }
 
     /// Range and resolution of a sensor (m/s² or rad/s).

@@ -258,7 +258,7 @@ const DRIVE_HZ: f64 = 10.0;
 /// A built-in drive with a receiver and two outages, as long as the shortest and the longest of `outages_s` (s):
 /// for data whose reference is not known. None where the receiver's rate does not allow it.
 #[must_use]
-pub fn drive(model: &Model, gnss: &GnssSettings, outages_s: &[f64]) -> Option<Track> {
+pub fn drive(model: &Model, defects: &ImuSettings, gnss: &GnssSettings, outages_s: &[f64]) -> Option<Track> {
     let longest = outages_s.iter().copied().fold(0.0, f64::max).min(LONGEST_S);
     let shortest = outages_s.iter().copied().fold(longest, f64::min);
     let first = LEAD_S[0] + shortest;
@@ -288,7 +288,7 @@ pub fn drive(model: &Model, gnss: &GnssSettings, outages_s: &[f64]) -> Option<Tr
         beliefs: &[],
         gnss: &gnss,
         initial: &InitialSettings::default(),
-        defects: &ImuSettings::default(),
+        defects,
         baro: None,
         aiding: &AidingSettings::default(),
         update: FixUpdate::default(),

@@ -34,6 +34,8 @@ impl Sides {
             }
         }
         let signals = b.states.iter().chain(&t.states).map(|s| s.signal + 1).max().unwrap_or(0);
+        // What a track does not follow would be left out in silence.
+        debug_assert!(track.steps.iter().all(|step| signals <= step.b.len()));
         Self { b, t, signals, inputs }
     }
 

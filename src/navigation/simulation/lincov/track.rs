@@ -245,7 +245,7 @@ impl Linearisation {
         let mut age = 0.0;
         for index in samples {
             let sample = &plan.ideal[index];
-            self.felt = Surroundings::at(plan.experiment.defects, sample, plan.middle_s(index));
+            self.felt = plan.felt(index);
             let (dtheta, dv) = (sample.omega_ib_b * self.dt, sample.f_ib_b * self.dt);
             let trace = self.ins.step(Vec3::splat(dtheta), Vec3::splat(dv), self.dt);
             step.apply(&Sample::new(&trace, self.dt), &self.felt);
