@@ -5,7 +5,9 @@
 #
 #   linux-x86_64, linux-aarch64   static programs (musl)
 #   windows                       program
-#   wheels                        manylinux2014, musllinux 1.2 and Windows (x86_64), and the source distribution
+#   wheels                        manylinux2014 and musllinux 1.2 (x86_64), and the source distribution; those for Windows
+#                                 and macOS are built there by the workflow: maturin 1.16 exports a wrong name for a
+#                                 module within a package where another linker than Microsoft's is used
 #
 # Needs Rust with rustup, Python with pip, git, tar, binutils. What else it uses comes from the package index into
 # target/release-tools: zig compiles the C parts for all of them. Under the root that it makes, chroot needs root or
@@ -23,6 +25,8 @@ root=$(mktemp -d)
 trap 'rm -rf "$root"' EXIT
 mkdir -p "$out"
 
+# What is stamped with a commit is made of it.
+git diff --quiet HEAD || { echo "error: there are changes that no commit has" >&2 && exit 2; }
 [ -x "$tools/bin/python" ] || python3 -m venv "$tools"
 "$tools/bin/python" -m pip install --quiet --disable-pip-version-check \
     maturin==1.16.0 cargo-zigbuild==0.24.1 ziglang==0.17.1 abi3audit==0.0.26
@@ -95,11 +99,10 @@ windows() {
 
 wheels() {
     local build=(maturin build --quiet --locked --out "$out")
-    rustup --quiet target add x86_64-unknown-linux-gnu x86_64-unknown-linux-musl x86_64-pc-windows-gnu
+    rustup --quiet target add x86_64-unknown-linux-gnu x86_64-unknown-linux-musl
     "${build[@]}" --zig --compatibility manylinux2014 --target x86_64-unknown-linux-gnu
     RUSTFLAGS="-C target-feature=-crt-static" \
         "${build[@]}" --zig --compatibility musllinux_1_2 --target x86_64-unknown-linux-musl
-    "${build[@]}" --zig --target x86_64-pc-windows-gnu
     maturin sdist --quiet --out "$out"
     tar tzf "$out"/nav_sim-*.tar.gz | grep -qE '/LICENSE-(APACHE|MIT)$'
     # One wheel is for every Python from 3.10 on: nothing but the stable interface is in it.
