@@ -103,7 +103,7 @@ wheels() {
     "${build[@]}" --zig --compatibility manylinux2014 --target x86_64-unknown-linux-gnu
     RUSTFLAGS="-C target-feature=-crt-static" \
         "${build[@]}" --zig --compatibility musllinux_1_2 --target x86_64-unknown-linux-musl
-    maturin sdist --quiet --out "$out"
+    maturin sdist --out "$out"
     tar tzf "$out"/nav_sim-*.tar.gz | grep -qE '/LICENSE-(APACHE|MIT)$'
     # One wheel is for every Python from 3.10 on: nothing but the stable interface is in it.
     abi3audit --strict --summary "$out"/*.whl
