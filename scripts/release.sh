@@ -104,7 +104,7 @@ wheels() {
     RUSTFLAGS="-C target-feature=-crt-static" \
         "${build[@]}" --zig --compatibility musllinux_1_2 --target x86_64-unknown-linux-musl
     maturin sdist --out "$out"
-    tar tzf "$out"/nav_sim-*.tar.gz | grep -qE '/LICENSE-(APACHE|MIT)$'
+    tar tzf "$out"/nav_sim-*.tar.gz | grep -E '/LICENSE-(APACHE|MIT)$' >/dev/null
     # One wheel is for every Python from 3.10 on: nothing but the stable interface is in it.
     abi3audit --strict --summary "$out"/*.whl
     # Its command starts in a bare environment.
