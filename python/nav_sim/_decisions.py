@@ -42,10 +42,10 @@ def tune(
 ) -> Choice:
     """The smallest factors on a model that make its filter consistent with other truths: `nav-sim tune`.
 
-    `truth` are models that may make the errors, such as those of single recordings, by default the model with the errors
-    in the scenario; `intervals=True` takes the draws of its own calibration instead. `aim` is "worst" or "mean" (the option --for), `per` "sensor" or "process".
-    Without a `trajectory` it is a drive of the program's own; `outages`, `filter`, `scenario`, `seed` and `progress` as
-    of `run`. `.model` is the tuned one.
+    `truth` are models that may make the errors, such as those of single recordings, by default the model with the
+    errors in the scenario; `intervals=True` takes the draws of its own calibration instead. `aim` is "worst" or "mean"
+    (the option --for), `per` "sensor" or "process". Without a `trajectory` it is a drive of the program's own;
+    `outages`, `filter`, `scenario`, `seed` and `progress` as of `run`. `.model` is the tuned one.
     """
     truths = truth or [] if isinstance(truth, (list, tuple, type(None))) else [truth]
     with Staging() as staging:

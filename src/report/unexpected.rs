@@ -23,11 +23,16 @@ pub(crate) fn unexpected_in_words(unexpected: &Unexpected) -> (String, String) {
             ),
             format!("--scale-ppm (initial.{}) gives it states", InitialSettings::scale_key(*sensor)),
         ),
-        Unexpected::Defect(Defect { key, sigma, unit, bias_of, .. }) => (
+        Unexpected::Defect(Defect { key, sigma, unit, sensors, .. }) => (
             format!("{key} = {sigma} {unit} is in no filter"),
-            bias_of.map_or("calibrate the IMU for it".to_owned(), |sensor| {
-                format!("initial.{} has states of its mean", InitialSettings::bias_key(sensor))
-            }),
+            match sensors {
+                // By gravity, by steady vibration, by what a warming ends with: most of it is a bias.
+                [sensor] => format!(
+                    "initial.{} gives what is constant of it states",
+                    InitialSettings::bias_key(*sensor)
+                ),
+                _ => "calibrate the IMU for it".to_owned(),
+            },
         ),
         Unexpected::CorrelatedPositions { sigma_m: [n, e, d], correlation_time_s } => (
             format!(

@@ -96,7 +96,7 @@ impl TuneRequest {
     pub(crate) fn tuned(&self, notes: Notes<'_>) -> Result<Tuned, Failure> {
         let files = self.inputs()?;
         let mut scenario = checked_scenario(self.scenario.as_deref(), &self.outages)?;
-        if self.truths.is_empty() && !self.intervals && scenario.states_no_error() {
+        if self.truths.is_empty() && !self.intervals && scenario.has_no_errors() {
             return Err(Failure::input("no truth to be consistent with: neither --truth nor --intervals is given")
                 .hint("give models (--truth OTHER.toml, one a recording), --intervals for a MODEL of `nav-sim calibrate`, or a scenario with errors"));
         }

@@ -7,9 +7,9 @@ use crate::sensors::gnss::GnssSettings;
 use crate::simulation::lincov::STRAPDOWN;
 
 impl Scenario {
-    /// Whether it says of nothing what is truly wrong with it.
+    /// Whether no error of the true IMU, the receiver or the aiding is stated.
     #[must_use]
-    pub fn states_no_error(&self) -> bool {
+    pub fn has_no_errors(&self) -> bool {
         self.imu.is_ideal() && self.aiding.errors().is_empty() && self.unexpected().is_empty()
     }
 

@@ -36,18 +36,18 @@ pub struct ImuSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub turn_on_bias_gyro_rad_s: Option<f64>,
     /// Scale-factor error of the accelerometers (parts per million).
-    #[schemars(with = "NonNegative", range(max = 1e5))]
+    #[schemars(with = "NonNegative", range(max = MAX_SCALE_PPM))]
     pub scale_ppm_accel: f64,
     /// Scale-factor error of the gyroscopes (parts per million).
-    #[schemars(with = "NonNegative", range(max = 1e5))]
+    #[schemars(with = "NonNegative", range(max = MAX_SCALE_PPM))]
     pub scale_ppm_gyro: f64,
     /// Misalignment: what each axis takes of each other axis of its sensor (rad): six independent numbers a sensor.
-    #[schemars(with = "NonNegative", range(max = 0.1))]
+    #[schemars(with = "NonNegative", range(max = MAX_ANGLE_RAD))]
     pub misalignment_rad: f64,
     /// Sensitivity of the gyroscopes to specific force (rad/s per m/s²): what each axis takes of each of the three, nine
     /// independent numbers. 0.1 °/s per g are 1.78e-4.
     #[schemars(with = "NonNegative", range(max = MAX_G_SENSITIVITY))]
-    #[serde(skip_serializing_if = "is_none")]
+    #[serde(skip_serializing_if = "is_zero")]
     pub g_sensitivity_rad_s_per_m_s2: f64,
     /// What accelerometers rectify.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -73,10 +73,11 @@ pub struct Defect {
     pub sigma: f64,
     /// Unit of the standard deviation.
     pub unit: &'static str,
-    /// The sensor whose constant bias it mostly is, of which a filter may have states.
-    pub bias_of: Option<Sensor>,
 }
 
+/// Largest scale-factor error (parts per million) and misalignment (rad).
+const MAX_SCALE_PPM: f64 = 1e5;
+const MAX_ANGLE_RAD: f64 = 0.1;
 /// Largest g-sensitivity (rad/s per m/s²): 11 °/s per g.
 const MAX_G_SENSITIVITY: f64 = 0.02;
 
@@ -89,9 +90,8 @@ fn at_most(key: &str, value: f64, most: f64, mistake: &str) -> Result<(), Settin
     Err(SettingError::new(key, value, format!("at most {most} ({mistake})")))
 }
 
-/// Whether a deviation is that of nothing.
 #[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
-fn is_none(sigma: &f64) -> bool {
+fn is_zero(sigma: &f64) -> bool {
     *sigma == 0.0
 }
 
@@ -124,30 +124,18 @@ impl ImuSettings {
             return Err(SettingError::new("rate_hz", self.rate_hz, requirement));
         }
         let [(accel, _), (gyro, _)] = Sensor::ALL.map(|sensor| self.deviations(sensor));
-        require_non_negative("turn_on_bias_accel_m_s2", &[accel])?;
-        require_non_negative("turn_on_bias_gyro_rad_s", &[gyro])?;
-        if accel > MAX_BIAS_M_S2 {
-            let requirement = format!("at most {MAX_BIAS_M_S2} m/s² (mg named m/s²?)");
-            return Err(SettingError::new("turn_on_bias_accel_m_s2", accel, requirement));
-        }
-        if gyro > MAX_BIAS_RAD_S {
-            let requirement = format!("at most {MAX_BIAS_RAD_S} rad/s (degrees an hour named rad/s?)");
-            return Err(SettingError::new("turn_on_bias_gyro_rad_s", gyro, requirement));
-        }
-        for (key, ppm) in [("scale_ppm_accel", self.scale_ppm_accel), ("scale_ppm_gyro", self.scale_ppm_gyro)]
-        {
-            require_non_negative(key, &[ppm])?;
-            if ppm > 1e5 {
-                return Err(SettingError::new(key, ppm, "at most 100000 parts per million, a tenth"));
-            }
-        }
-        require_non_negative("misalignment_rad", &[self.misalignment_rad])?;
-        if self.misalignment_rad > 0.1 {
-            let requirement = "at most 0.1 rad: misalignments are small angles (degrees named radians?)";
-            return Err(SettingError::new("misalignment_rad", self.misalignment_rad, requirement));
-        }
-        let (key, sensitivity) = ("g_sensitivity_rad_s_per_m_s2", self.g_sensitivity_rad_s_per_m_s2);
-        at_most(key, sensitivity, MAX_G_SENSITIVITY, "°/s per g named rad/s per m/s²?")?;
+        let sensitivity = self.g_sensitivity_rad_s_per_m_s2;
+        at_most("turn_on_bias_accel_m_s2", accel, MAX_BIAS_M_S2, "mg named m/s²?")?;
+        at_most("turn_on_bias_gyro_rad_s", gyro, MAX_BIAS_RAD_S, "degrees an hour named rad/s?")?;
+        at_most("scale_ppm_accel", self.scale_ppm_accel, MAX_SCALE_PPM, "a tenth")?;
+        at_most("scale_ppm_gyro", self.scale_ppm_gyro, MAX_SCALE_PPM, "a tenth")?;
+        at_most("misalignment_rad", self.misalignment_rad, MAX_ANGLE_RAD, "degrees named radians?")?;
+        at_most(
+            "g_sensitivity_rad_s_per_m_s2",
+            sensitivity,
+            MAX_G_SENSITIVITY,
+            "°/s per g named rad/s per m/s²?",
+        )?;
         self.vibration.iter().try_for_each(|v| v.validate().map_err(|e| e.in_section("vibration")))?;
         self.temperature.iter().try_for_each(|t| t.validate().map_err(|e| e.in_section("temperature")))?;
         self.output.iter().try_for_each(|o| o.validate().map_err(|e| e.in_section("output")))
@@ -176,11 +164,7 @@ impl ImuSettings {
     pub fn without_states(&self) -> impl Iterator<Item = Defect> + use<> {
         let rectification = self.vibration.as_ref().map_or(0.0, |v| v.rectification_s2_m);
         let [accel_k, gyro_k] = Sensor::ALL.map(|s| self.temperature.as_ref().map_or(0.0, |t| t.sigma(s)));
-        let defect = |source, sensors: &'static [Sensor], key, sigma, unit| {
-            // A bias of one sensor: by gravity, by steady vibration, by what the warming ends with.
-            let bias_of = if let [sensor] = sensors { Some(*sensor) } else { None };
-            Defect { source, sensors, key, sigma, unit, bias_of }
-        };
+        let defect = |source, sensors, key, sigma, unit| Defect { source, sensors, key, sigma, unit };
         let (both, accel, gyro): (&[Sensor], &[Sensor], &[Sensor]) =
             (&Sensor::ALL, &[Sensor::Accel], &[Sensor::Gyro]);
         let sensitivity = self.g_sensitivity_rad_s_per_m_s2;
