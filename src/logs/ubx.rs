@@ -188,7 +188,12 @@ impl Pvt {
     const fn is_fix(&self) -> bool {
         const GNSS_3D: u8 = 3;
         const WITH_SENSORS: u8 = 4;
-        matches!(self.fix_type, GNSS_3D | WITH_SENSORS) && self.flags & 1 != 0 && self.valid & 3 == 3
+        // nanoseconds since 1970 end in 2262
+        const LAST_YEAR: i64 = 2200;
+        matches!(self.fix_type, GNSS_3D | WITH_SENSORS)
+            && self.flags & 1 != 0
+            && self.valid & 3 == 3
+            && self.date[0] <= LAST_YEAR
     }
 
     fn stamp_ns(&self) -> i64 {

@@ -206,13 +206,14 @@ fn failures(cases: u64, robust: bool) -> Vec<String> {
 }
 
 #[test]
-fn thirty_noisy_curves() {
-    let failures = failures(30, false);
+fn noisy_curves() {
+    let failures = [false, true].map(|robust| failures(6, robust)).concat();
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
 #[test]
-fn twelve_noisy_robust_curves() {
-    let failures = failures(12, true);
+#[ignore = "two minutes"]
+fn thirty_noisy_curves_and_twelve_robust() {
+    let failures = [failures(30, false), failures(12, true)].concat();
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }

@@ -13,6 +13,7 @@ use crate::earth::{self, GravityModel};
 use crate::frames::NavState;
 use crate::imu::Sensor;
 use crate::lanes::{Lanes, Level, Vec3};
+use crate::noise::{Composite, FlickerNoise, Model, Process};
 use crate::strapdown::Strapdown;
 use glam::{DQuat, DVec3};
 use nalgebra::DMatrix;
@@ -40,6 +41,34 @@ fn start() -> NavState {
 
 fn ekf(belief: &Belief, state: &NavState, initial: &InitialSettings) -> Ekf {
     Ekf::new(Strapdown::new(state, GravityModel::Wgs84), belief, state, initial)
+}
+
+/// Squares of the deviations, of attitude those of roll, pitch and yaw of a level vehicle.
+#[test]
+fn the_covariance_at_the_start_is_what_is_believed() {
+    let level = NavState { q_b_n: DQuat::IDENTITY, ..start() };
+    let initial = InitialSettings {
+        pos_sigma_m: [2.0, 3.0, 4.0],
+        vel_sigma_m_s: [0.1, 0.2, 0.3],
+        att_sigma_deg: [0.5, 0.6, 2.0],
+        ..InitialSettings::default()
+    };
+    let p = ekf(&belief(), &level, &initial).p.lane(0);
+    let angles = initial.att_sigma_deg.map(f64::to_radians);
+    let sigmas = [initial.pos_sigma_m, initial.vel_sigma_m_s, angles].concat();
+    for (i, sigma) in sigmas.iter().enumerate() {
+        assert!((p[(i, i)] - sigma * sigma).abs() < 1e-15 * (1.0 + p[(i, i)]), "{i}: {}", p[(i, i)]);
+    }
+}
+
+/// Flicker noise starts with the variance of all that is slower than its fastest bias, in however few states.
+#[test]
+fn flicker_noise_starts_with_its_variance() {
+    let noise = FlickerNoise::new(1e-8).unwrap();
+    let axis = Composite::new(vec![Process::Flicker(noise)]);
+    let belief = Belief::new(&Model::pooled(100.0, &axis, &axis), FilterStates::Full, 1.0, 800.0).unwrap();
+    let variance: f64 = belief.groups[0].iter().map(|group| group.initial.x).sum();
+    assert!((variance / noise.initial_variance() - 1.0).abs() < 1e-12, "{variance}");
 }
 
 /// Column of one unknown in the transition of a sample, by central differences of the strapdown: an estimate

@@ -44,6 +44,32 @@ fn what_is_carried_is_the_derivative_of_the_retraction() {
     }
 }
 
+/// The series and the closed forms meet: what the series leave out there is θ⁶/40320, θ⁶/362880, θ⁴/6720 and θ⁴/90720,
+/// and differences of closed forms lose θ⁻² of their digits each time.
+#[test]
+fn coefficients_of_small_angles_go_on_into_those_of_large_ones() {
+    let [below, above] = [SMALL * (1.0 - 1e-12), SMALL].map(coefficients);
+    for (k, bound) in [1e-12, 1e-12, 2e-9, 3e-10].into_iter().enumerate() {
+        assert!((below[k] - above[k]).abs() < bound, "{k}: {} {}", below[k], above[k]);
+    }
+}
+
+/// Of a measurement that is as expected: P − P Hᵀ S⁻¹ H P.
+#[test]
+fn the_posterior_is_that_of_the_kalman_update() {
+    let mut g = generator("posterior");
+    let root = DMatrix::from_fn(NAV, NAV, |_, _| g.random_range(-1.0..1.0));
+    let rows = DMatrix::from_fn(6, NAV, |_, _| g.random_range(-1.0..1.0));
+    let (prior, variances) = (&root * root.transpose(), [0.5, 1.0, 2.0, 0.1, 0.2, 0.3]);
+    let mut lane = Lane::new(prior.clone());
+    lane.step(&rows, &[0.0; 6], &variances);
+    let ph = &prior * rows.transpose();
+    let s = &rows * &ph + DMatrix::from_diagonal(&DVector::from_row_slice(&variances));
+    let expected = &prior - &ph * s.try_inverse().unwrap() * ph.transpose();
+    // rounding of the inverse, whose condition is below 1e4
+    assert!((lane.posterior(&variances) - expected).amax() < 1e-11 * prior.amax());
+}
+
 fn filter(state: &NavState, fix_update: FixUpdate) -> Ekf {
     let model = Model { rate_hz: 100.0, axes: Default::default() };
     let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
