@@ -57,6 +57,8 @@ struct Point {
 }
 
 fn track_points(path: &str, text: &str) -> Result<Vec<Point>, Error> {
+    // positions do not count a byte-order mark
+    let text = text.trim_start_matches('\u{feff}');
     let mut reader = Reader::from_str(text);
     reader.config_mut().expand_empty_elements = true;
     // Names of the open elements, from the track point on: extensions have times and elevations of their own.
