@@ -11,28 +11,27 @@ failed=0
 
 # part NAME COMMAND...: its output in NAME.txt, how it ended on the terminal.
 part() {
-    local name=$1 start=$SECONDS
+    local name=$1 start=$SECONDS ended=passed
     shift
-    if "$@" >"$night/$name.txt" 2>&1; then local ended=passed; else local ended=FAILED failed_here=1; fi
-    failed=$((failed + ${failed_here:-0}))
+    "$@" >"$night/$name.txt" 2>&1 || { ended=FAILED; failed=$((failed + 1)); }
     printf '%-10s %s, %s s\n' "$name" "$ended" $((SECONDS - start)) | tee -a "$night/parts.txt"
 }
 
 # A disk that is full after so many blocks of 512 bytes (a limit on the size of files): no result, no part of one, no wrong exit code.
-full_disk() {
-    local program=$PWD/target/debug/nav-sim place
+full_disk() (
+    program=$PWD/target/debug/nav-sim
     place=$(mktemp -d)
-    trap 'rm -rf "$place"' RETURN
-    local command=("$program" run trajectories/figure_eight.toml calib_data/tactical.toml --runs 8 --seed 1 -q -o "$place/out")
+    trap 'rm -rf "$place"' EXIT
+    command=("$program" run trajectories/figure_eight.toml calib_data/tactical.toml --runs 8 --seed 1 -q -o "$place/out")
     for blocks in 1 2 4 8 16 32 64; do
         (trap '' XFSZ; ulimit -f $blocks; "${command[@]}")
-        local code=$?
+        code=$?
         echo "$blocks blocks: exit code $code"
-        [ $code -eq 1 ] || { echo "not 1"; return 1; }
-        [ -z "$(ls -A "$place")" ] || { ls -lA "$place"; return 1; }
+        [ $code -eq 1 ] || { echo "not 1"; exit 1; }
+        [ -z "$(ls -A "$place")" ] || { ls -lA "$place"; exit 1; }
     done
     "${command[@]}" && echo "figure full_disk: 7 full disks, nothing left"
-}
+)
 
 # Workers that are killed at random points, five times the test of a push.
 kills() {

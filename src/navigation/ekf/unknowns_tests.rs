@@ -13,7 +13,7 @@ use crate::earth::{self, GravityModel};
 use crate::frames::NavState;
 use crate::imu::Sensor;
 use crate::lanes::{Lanes, Level, Vec3};
-use crate::noise::{Composite, FlickerNoise, Model, Process};
+use crate::noise::{Composite, FlickerNoise, Ma1, Model, Process, White};
 use crate::strapdown::Strapdown;
 use glam::{DQuat, DVec3};
 use nalgebra::DMatrix;
@@ -69,6 +69,16 @@ fn flicker_noise_starts_with_its_variance() {
     let belief = Belief::new(&Model::pooled(100.0, &axis, &axis), FilterStates::Full, 1.0, 800.0).unwrap();
     let variance: f64 = belief.groups[0].iter().map(|group| group.initial.x).sum();
     assert!((variance / noise.initial_variance() - 1.0).abs() < 1e-12, "{variance}");
+}
+
+/// What a filter that integrates feels of several white processes: the sum over all time of their covariance with one sample.
+#[test]
+fn white_noises_add_up_to_their_long_run_variance() {
+    let parts = [Process::White(White::new(3.0).unwrap()), Process::Ma1(Ma1::new(-0.5, 8.0).unwrap())];
+    let axis = Composite::new(parts.to_vec());
+    let belief = Belief::new(&Model::pooled(100.0, &axis, &axis), FilterStates::Full, 1.0, 800.0).unwrap();
+    // MA1: (1 + theta²) sigma² of the sample itself, theta sigma² with each neighbour
+    assert_eq!(belief.white, [DVec3::splat(3.0 + 8.0 * (1.25 - 2.0 * 0.5)); 2]);
 }
 
 /// Column of one unknown in the transition of a sample, by central differences of the strapdown: an estimate
