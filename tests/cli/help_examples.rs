@@ -73,13 +73,16 @@ fn failures(wanted: impl Fn(&str) -> bool) -> String {
     failures.join("\n\n")
 }
 
+/// Commands whose examples take seconds each: the pages of the book run them in a push.
+const SLOW: [&str; 6] = ["calibrate", "choose", "demo", "design", "require", "tune"];
+
 #[test]
 fn pasted_examples_work() {
-    assert_eq!(failures(|command| command != "demo"), "");
+    assert_eq!(failures(|command| !SLOW.contains(&command)), "");
 }
 
 #[test]
-#[ignore = "a minute: the whole case study"]
-fn the_pasted_demo_works() {
-    assert_eq!(failures(|command| command == "demo"), "");
+#[ignore = "night"]
+fn pasted_examples_of_slow_commands_work() {
+    assert_eq!(failures(|command| SLOW.contains(&command)), "");
 }

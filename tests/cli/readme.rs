@@ -1,5 +1,5 @@
-//! The shell blocks of README and book work: each `sh` block is run, those marked `slow` are only looked at; a block
-//! marked `text output` is what the block before it prints; links lead somewhere.
+//! The shell blocks of README and book work: each `sh` block is run, those marked `night` by `scripts/nightly.sh`, those
+//! marked `slow` by nobody; a block marked `text output` is what the block before it prints; links lead somewhere.
 //!
 //! After a change of words, `BLESS=1 cargo test --test cli readme` writes the outputs anew.
 
@@ -43,7 +43,7 @@ fn blocks(page: &str) -> Vec<(String, String)> {
 }
 
 /// The page with the outputs of its blocks, run one after the other in a directory of their own; or what went wrong.
-fn run(page: &Path) -> Result<String, String> {
+fn run(page: &Path, at_night: bool) -> Result<String, String> {
     let directory = tempfile::tempdir().unwrap();
     for name in ["trajectories", "calib_data", "examples"] {
         std::os::unix::fs::symlink(Path::new(ROOT).join(name), directory.path().join(name)).unwrap();
@@ -54,7 +54,7 @@ fn run(page: &Path) -> Result<String, String> {
     let mut printed = String::new();
     for (info, block) in blocks(&text) {
         match info.as_str() {
-            "sh" => {
+            "sh" | "sh night" if info == "sh" || at_night => {
                 let mut shell = Command::new("bash");
                 let shell = shell.args(["-euc", &block]).current_dir(&directory).env("PATH", &path);
                 let output = shell.output().unwrap();
@@ -87,10 +87,20 @@ fn alike(a: &str, b: &str) -> bool {
 
 #[test]
 fn shell_blocks_run() {
+    all_run(false);
+}
+
+#[test]
+#[ignore = "night"]
+fn all_shell_blocks_run() {
+    all_run(true);
+}
+
+fn all_run(at_night: bool) {
     let pages = pages();
     assert!(pages.len() > 12, "{pages:?}");
     let bless = std::env::var_os("BLESS").is_some();
-    let failure = |page: &PathBuf| match run(page) {
+    let failure = |page: &PathBuf| match run(page, at_night) {
         Err(failure) => Some(failure),
         Ok(text) if bless => std::fs::write(page, text).err().map(|e| e.to_string()),
         Ok(text) if alike(&text, &std::fs::read_to_string(page).unwrap()) => None,

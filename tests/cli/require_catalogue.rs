@@ -181,7 +181,7 @@ fn a_unit_alone_is_judged_as_in_a_catalogue() {
 #[test]
 fn the_catalogue_is_ranked_without_a_directory() {
     let dir = tempfile::tempdir().unwrap();
-    let asked = ["--outage", "30", "--require", "p95_m<=20", "--catalogue"];
+    let asked = ["--outage", "60:90", "--require", "p95_m<=20", "--catalogue"];
     let shown = stdout(&require(dir.path(), &asked).success());
     // the other units leave figures out
     assert!(shown.starts_with("hg4930 is the best of 2 units that keep the limit\n"), "{shown}");

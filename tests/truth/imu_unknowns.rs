@@ -152,7 +152,7 @@ fn a_drift_is_as_uncertain_as_its_magnitude() {
     let full = scenario("filter.states = 'full'");
     let of_signs = |(seed, signs): (u64, [f64; 6])| {
         let model = drifting(signs);
-        run(&model, &none, &[(&model, none.clone()), (&model, full.clone()), (&plain, none.clone())], seed, 8)
+        run(&model, &none, &[(&model, none.clone()), (&model, full.clone())], seed, 4)
     };
     let results: Vec<_> = (40..).zip(HADAMARD).map(of_signs).collect();
     for (i, name) in ["15", "full"].into_iter().enumerate() {
@@ -162,7 +162,8 @@ fn a_drift_is_as_uncertain_as_its_magnitude() {
         assert!(p > 1e-3, "{name}: NEES {mean}, p = {p}");
         assert_eq!(of_filter[0].filter_states, 21);
     }
-    is_outside("drift not in the model", &results[0][2]);
+    let unaware = run(&drifting(HADAMARD[0]), &none, &[(&plain, none.clone())], 40, 8);
+    is_outside("drift not in the model", &unaware[0]);
 }
 
 /// A recorded drive whose IMU has scale factors of 300 ppm: the filter of 21 states is nearer to the reference.

@@ -67,14 +67,14 @@ pub(crate) struct Shape {
 #[derive(Debug, Clone)]
 pub(crate) struct Column {
     pub(crate) values: Vec<f64>,
-    /// Derivative with respect to the coordinate, divided by the same length.
-    slopes: Vec<f64>,
     /// The length taken out.
     pub(crate) length: f64,
 }
 
-/// Solution of the linear problem.
+/// Solution of the linear problem: amplitudes where the shapes are given.
 struct LinearBest {
+    responses: Vec<Response>,
+    columns: Vec<Column>,
     gram: Matrix,
     /// Amplitudes, in units of their columns' lengths.
     x: Vector,
@@ -88,7 +88,7 @@ const SETTLED: usize = 16;
 /// Changes of the response that are rounding.
 const SETTLED_CHANGE: f64 = 1e-13;
 /// Rounds that tell which of the grid's combinations are near.
-pub(crate) const NEARLY_SETTLED: usize = 3;
+const NEARLY_SETTLED: usize = 3;
 
 /// The least-squares problem: weighted curve, in units of its length.
 #[derive(Debug, Clone)]
@@ -179,20 +179,24 @@ impl Objective {
 
     /// The column of a shape where the curve responds so, level by level.
     pub(crate) fn column(&self, shape: &Shape, responses: &[Response]) -> Column {
-        let is_quantization = self.components[shape.component].kind == Kind::Quantization;
-        let weights = self.roots.iter().zip(responses).map(|(root, response)| {
-            root * if is_quantization { response.quantization } else { response.others }
-        });
-        let weighted = |((value, slope), weight): ((&f64, &f64), f64)| (value * weight, slope * weight);
-        let (values, slopes): (Vec<f64>, Vec<f64>) =
-            shape.values.iter().zip(&shape.slopes).zip(weights).map(weighted).unzip();
-        let mut values = mixed(self.mixing.as_deref(), values);
-        let mut slopes = mixed(self.mixing.as_deref(), slopes);
+        let mut values = self.weighted(shape.component, &shape.values, responses);
         // Unit columns: the Gram matrix has a unit diagonal, and its condition is that of the shapes, not of
         // the units.
         let length = dot(&values, &values).sqrt();
-        values.iter_mut().chain(&mut slopes).for_each(|v| *v /= length);
-        Column { values, slopes, length }
+        values.iter_mut().for_each(|v| *v /= length);
+        Column { values, length }
+    }
+
+    /// What a component has at each level, in the weights of the curve.
+    fn weighted(&self, component: usize, levels: &[f64], responses: &[Response]) -> Vec<f64> {
+        let is_quantization = self.components[component].kind == Kind::Quantization;
+        let weights = self.roots.iter().zip(responses).map(|(root, response)| {
+            root * if is_quantization { response.quantization } else { response.others }
+        });
+        mixed(
+            self.mixing.as_deref(),
+            levels.iter().zip(weights).map(|(value, weight)| value * weight).collect(),
+        )
     }
 
     /// Responses of a curve that reads quantization noise as it is: 1 at every level.
@@ -238,53 +242,70 @@ impl Objective {
                 self.shape(i, if shaped { next.next().copied().unwrap_or(0.0) } else { 0.0 })
             })
             .collect();
-        self.best_amplitudes(&shapes.iter().collect::<Vec<_>>(), SETTLED)
+        let shapes: Vec<&Shape> = shapes.iter().collect();
+        let best = self.best_amplitudes(&shapes, SETTLED);
+        let jacobian = self.shaped().map(|(i, _)| self.tangent(&best, shapes[i], i)).collect();
+        let amplitudes = self.amplitudes(&best.columns, &best.x);
+        Solution { amplitudes, residuals: best.residuals, jacobian }
+    }
+
+    /// Σ residual² of the best amplitudes for shapes of all components, in their order, nearly.
+    pub(crate) fn cost_near(&self, shapes: &[&Shape]) -> f64 {
+        let residuals = self.best_amplitudes(shapes, NEARLY_SETTLED).residuals;
+        dot(&residuals, &residuals)
     }
 
     /// The best amplitudes for shapes of all components, in their order, after so many rounds at most.
-    pub(crate) fn best_amplitudes(&self, shapes: &[&Shape], rounds: usize) -> Solution {
-        let columns_of = |responses: &[Response]| -> Vec<Column> {
-            shapes.iter().map(|shape| self.column(shape, responses)).collect()
-        };
-        let mut responses = self.plain_responses();
-        let mut columns = columns_of(&responses);
-        let mut best = self.linear_best(&columns);
+    fn best_amplitudes(&self, shapes: &[&Shape], rounds: usize) -> LinearBest {
+        let mut best = self.linear_best(shapes, self.plain_responses());
         for _ in 0..if self.is_linear() { 0 } else { rounds } {
-            let next = self.responses(shapes, &self.amplitudes(&columns, &best.x));
+            let next = self.responses(shapes, &self.amplitudes(&best.columns, &best.x));
             let change = |(a, b): (&Response, &Response)| {
                 (a.others - b.others).abs().max((a.quantization - b.quantization).abs())
             };
-            if next.iter().zip(&responses).map(change).fold(0.0, f64::max) < SETTLED_CHANGE {
+            if next.iter().zip(&best.responses).map(change).fold(0.0, f64::max) < SETTLED_CHANGE {
                 break;
             }
-            responses = next;
-            columns = columns_of(&responses);
-            best = self.linear_best(&columns);
+            best = self.linear_best(shapes, next);
         }
-        let LinearBest { gram, x, active, residuals } = best;
-        let jacobian = self.shaped().map(|(i, _)| tangent(&columns, &active, &gram, i, x[i])).collect();
-        Solution { amplitudes: self.amplitudes(&columns, &x), residuals, jacobian }
+        best
     }
 
-    /// The best amplitudes of columns of all components.
-    fn linear_best(&self, columns: &[Column]) -> LinearBest {
-        let problem = self.linear_problem(columns);
+    /// The best amplitudes where the curve responds so.
+    fn linear_best(&self, shapes: &[&Shape], responses: Vec<Response>) -> LinearBest {
+        let columns: Vec<Column> = shapes.iter().map(|shape| self.column(shape, &responses)).collect();
+        let problem = self.linear_problem(&columns);
         let mut x = problem.minimise();
         // An amplitude on a bound does not follow the coordinates, so its column is left out of the
         // projection.
         let free = |x: &Vector, i: usize| x[i] > problem.lower[i] && x[i] < problem.upper[i];
         let active: Vec<usize> = (0..columns.len()).filter(|i| free(&x, *i)).collect();
         // One refinement with the residuals themselves: the normal equations know only half the digits.
-        let mut residuals = self.residuals(columns, &x);
-        if let Some(change) = project(columns, &active, &problem.gram, &residuals) {
+        let mut residuals = self.residuals(&columns, &x);
+        if let Some(change) = project(&columns, &active, &problem.gram, &residuals) {
             let mut refined = x;
             active.iter().zip(change).for_each(|(i, d)| refined[*i] += d);
             if active.iter().all(|i| free(&refined, *i)) {
                 x = refined;
-                residuals = self.residuals(columns, &x);
+                residuals = self.residuals(&columns, &x);
             }
         }
-        LinearBest { gram: problem.gram, x, active, residuals }
+        LinearBest { responses, columns, gram: problem.gram, x, active, residuals }
+    }
+
+    /// −amplitude × the part of the slope of the i-th column that the active columns cannot follow.
+    fn tangent(&self, best: &LinearBest, shape: &Shape, i: usize) -> Vec<f64> {
+        let slopes = self.weighted(i, &shape.slopes, &best.responses);
+        // d(residual)/du with the amplitudes fixed, less its part within the columns, which the amplitudes take
+        // up.
+        let (amplitude, length) = (best.x[i], best.columns[i].length);
+        let mut tangent: Vec<f64> = slopes.iter().map(|s| -amplitude * (s / length)).collect();
+        if let Some(part) = project(&best.columns, &best.active, &best.gram, &tangent) {
+            for (&a, p) in best.active.iter().zip(part) {
+                tangent.iter_mut().zip(&best.columns[a].values).for_each(|(t, v)| *t -= p * v);
+            }
+        }
+        tangent
     }
 
     /// Amplitudes in the parameters' units.
@@ -323,20 +344,6 @@ fn project(columns: &[Column], active: &[usize], gram: &Matrix, vector: &[f64]) 
     let n = active.len();
     let solution = cholesky_solve(|a, b| gram[active[a]][active[b]], right, n)?;
     Some(solution[..n].to_vec())
-}
-
-/// −amplitude × the part of a column's slope that the active columns cannot follow.
-fn tangent(columns: &[Column], active: &[usize], gram: &Matrix, i: usize, amplitude: f64) -> Vec<f64> {
-    let slopes = &columns[i].slopes;
-    // d(residual)/du with the amplitudes fixed, less its part within the columns, which the amplitudes take
-    // up.
-    let mut tangent: Vec<f64> = slopes.iter().map(|s| -amplitude * s).collect();
-    if let Some(part) = project(columns, active, gram, &tangent) {
-        for (&a, p) in active.iter().zip(part) {
-            tangent.iter_mut().zip(&columns[a].values).for_each(|(t, v)| *t -= p * v);
-        }
-    }
-    tangent
 }
 
 fn mixed(mixing: Option<&DMatrix<f64>>, values: Vec<f64>) -> Vec<f64> {

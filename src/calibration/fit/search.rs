@@ -6,7 +6,7 @@
 //! with one of them in the model, by 15 % with two, by 60 % with three and by a factor of 2 with four.
 
 use super::bounded::{Bounded, MOST};
-use super::objective::{Column, NEARLY_SETTLED, Objective, Range, Shape, dot};
+use super::objective::{Column, Objective, Range, Shape, dot};
 use super::optimise::{End, Termination, descend};
 use rayon::prelude::*;
 
@@ -120,7 +120,7 @@ impl<'a> Grid<'a> {
             let mut shapes: Vec<&Shape> = selected[..n].iter().map(|i| &self.shapes[*i]).collect();
             // The amplitudes and their bounds are in the order of the components.
             shapes.sort_unstable_by_key(|shape| shape.component);
-            return self.objective.best_amplitudes(&shapes, NEARLY_SETTLED).cost();
+            return self.objective.cost_near(&shapes);
         }
         let mut problem = Bounded::new(n);
         for a in 0..n {
@@ -143,15 +143,23 @@ impl<'a> Grid<'a> {
     /// The local minima of the grid, best first, so many at most.
     fn starts(&self, choices: &[Vec<usize>], most: usize) -> Vec<Vec<f64>> {
         let costs: Vec<f64> = choices.par_iter().with_min_len(64).map(|c| self.cost(c)).collect();
-        let table: std::collections::HashMap<&[usize], f64> =
-            choices.iter().map(Vec::as_slice).zip(costs.iter().copied()).collect();
+        // A choice as a number whose digits are its points from 1 on: ascending as the choices are, and its neighbours are the
+        // numbers whose digits differ by at most one; those that are no choice are not found.
+        let base = self.points.iter().map(Vec::len).max().unwrap_or(0) as i64 + 2;
+        let key = |choice: &[usize]| choice.iter().fold(0, |key, i| key * base + *i as i64 + 1);
+        let keys: Vec<i64> = choices.iter().map(|choice| key(choice)).collect();
+        let further =
+            |to: Vec<i64>| to.iter().flat_map(|key| [-1, 0, 1].map(|step| key * base + step)).collect();
+        let neighbours: Vec<i64> = self.points.iter().fold(vec![0], |to, _| further(to));
+        let lowest_at = |key: i64, cost: f64| {
+            let cost_at = |key: i64| keys.binary_search(&key).ok().map(|i| costs[i]);
+            neighbours.iter().all(|to| cost_at(key + to).is_none_or(|other| cost <= other))
+        };
         let mut minima: Vec<(f64, &Vec<usize>)> = costs
             .iter()
             .copied()
             .zip(choices)
-            .filter(|(cost, choice)| {
-                neighbours(choice).iter().all(|n| table.get(n.as_slice()).is_none_or(|other| cost <= other))
-            })
+            .filter(|(cost, choice)| lowest_at(key(choice), *cost))
             .collect();
         minima.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(b.1)));
         // A flat stretch (a process without amplitude) is one minimum.
@@ -177,20 +185,6 @@ impl<'a> Grid<'a> {
         }
         choices
     }
-}
-
-/// The choices that differ by at most one in each place.
-fn neighbours(choice: &[usize]) -> Vec<Vec<usize>> {
-    let mut all = vec![Vec::new()];
-    for &i in choice {
-        all = all
-            .into_iter()
-            .flat_map(|head: Vec<usize>| {
-                (i.saturating_sub(1)..=i + 1).map(move |k| [head.as_slice(), &[k]].concat())
-            })
-            .collect();
-    }
-    all
 }
 
 /// As many points as leave the number of combinations of alike dimensions at `most`, at least one more than there are

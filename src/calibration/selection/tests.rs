@@ -51,22 +51,34 @@ fn recordings(set: u64, noise: impl Fn(u64) -> Composite, settings: &Settings) -
     grouped((0..4).map(replicate).collect(), Pool::Axes).remove(0)
 }
 
-/// 8 sets each. The true model is refused with a probability of 1 % against one larger model, up to 5 % against the best
-/// of five;
-/// anything simpler is far off (the parts differ by factors at several scales). So 0.95·8 = 7.6 ± 0.62 sets choose
-/// the truth; four deviations below are 5.1.
+/// Of three models four sets each. The true model is refused with a probability of 1 % against one larger model, up to 5 % against
+/// the best of five; anything simpler is far off (the parts differ by factors at several scales). So 0.95·12 = 11.4 ± 0.75
+/// sets choose the truth; four deviations below are 8.4.
 #[test]
 fn the_truth_is_chosen() {
+    chosen_as_often_as_said(4, 9);
+}
+
+/// Of 24 sets each, so of 72: 68.4 ± 1.85, four deviations below are 61.
+#[test]
+#[ignore = "night"]
+fn the_truth_is_chosen_in_seventy_two_sets() {
+    chosen_as_often_as_said(24, 61);
+}
+
+fn chosen_as_often_as_said(sets: u64, least: usize) {
+    let mut right = 0;
     let white = Process::White(White::new(1.0).unwrap());
     let walk = Process::RandomWalk(RandomWalk::new(1e-3).unwrap());
     let correlated = Process::Ar1(Ar1::new(0.95, 0.05).unwrap());
     for truth in [vec![white], vec![white, walk], vec![white, correlated]] {
         let noise = Composite::new(truth);
         let name = noise.processes.iter().map(Process::code).collect::<Vec<_>>().join("+");
-        let chosen: Vec<String> = (0..8).map(|set| outcome(set, &noise).spec.to_string()).collect();
-        let right = chosen.iter().filter(|c| **c == name).count();
-        assert!(right >= 6, "{name}: {chosen:?}");
+        let chosen: Vec<String> = (0..sets).map(|set| outcome(set, &noise).spec.to_string()).collect();
+        right += chosen.iter().filter(|c| **c == name).count();
+        println!("{name}: {chosen:?}");
     }
+    assert!(right >= least, "{right}");
 }
 
 #[test]
@@ -83,7 +95,7 @@ fn candidates_are_ranked() {
 }
 
 /// The best is three processes of which the data show two plainly: whatever is taken passes the J-test, or none that was tried
-/// does. Of 12 sets of recordings that the sums describe, none may choose one that was tested and rejected beyond chance.
+/// does. Of 6 sets of recordings that the sums describe, none may choose one that was tested and rejected beyond chance.
 #[test]
 fn a_rejected_model_is_not_preferred_to_one_that_passes() {
     let noise = Composite::new(vec![
@@ -91,7 +103,7 @@ fn a_rejected_model_is_not_preferred_to_one_that_passes() {
         Process::Ar1(Ar1::new(0.9, 0.02).unwrap()),
         Process::RandomWalk(RandomWalk::new(1e-4).unwrap()),
     ]);
-    for set in 0..12 {
+    for set in 0..6 {
         let ranking = outcome(set, &noise).ranking.unwrap();
         let chosen = &ranking.candidates[ranking.chosen];
         assert!(chosen.j_p_value.is_some());

@@ -132,7 +132,9 @@ fn every_block_of_f_agrees_with_central_differences() {
             // some 16 units of 2.2e-16 rad
             let rounding = [4e-9, 1e-12, 4e-15][row] / PERTURBATION[column] / dt;
             let worst = (numeric - filter).amax();
-            let bound = 2e-3 * numeric.amax() + rounding;
+            // of (V, R) what changes with latitude is 1/400 of what changes with height
+            let relative = if (row, column) == (V, R) { 3e-5 } else { 2e-3 };
+            let bound = relative * numeric.amax() + rounding;
             assert!(worst <= bound, "block ({row}, {column}): {worst:e} > {bound:e}\n{numeric}{filter}");
         }
     }
