@@ -142,10 +142,27 @@ mod tests {
         );
         let qn = Process::Quantization(Quantization::new(2.0).unwrap());
         assert_relative_eq!(read(vec![qn])[0], 2.0, max_relative = 1e-12);
+        let flicker = Process::Flicker(FlickerNoise::new(4.0).unwrap());
+        // The first scales lie above the line, of which nu = ln 2/π·B²; from m = 1 to 2 the slope is −0.16, too far off.
+        let above =
+            (2..=16).map(|level| (FlickerNoise::haar_shape(level) * PI / LN_2).ln()).sum::<f64>() / 15.0;
+        assert_relative_eq!(read(vec![flicker])[0], 4.0 * above.exp(), max_relative = 1e-12);
+        assert!(above < 0.015);
         let drift = Process::Drift(Drift::new(0.1).unwrap());
         assert_relative_eq!(read(vec![drift])[0], 0.1, max_relative = 1e-12);
         let walk = Process::RandomWalk(RandomWalk::new(0.5).unwrap());
         assert_relative_eq!(read(vec![walk])[0], 0.5, max_relative = 0.011);
+    }
+
+    /// The distance with the weights `edof`: a curve twice as high at one scale is half a variance off there, in deviations
+    /// of √(2/eta).
+    #[test]
+    fn residuals_are_in_standard_deviations() {
+        let mut off = curve(&Composite::new(vec![Process::White(White::new(3.0).unwrap())]));
+        off.wv[15] *= 2.0;
+        let fit = avlr(&off, &"WN".parse().unwrap()).unwrap();
+        assert_relative_eq!(fit.residuals[15], 0.5 / (2.0 / off.edof[15]).sqrt(), max_relative = 1e-12);
+        assert!(fit.residuals[..15].iter().all(|r| r.abs() < 1e-6), "{:?}", fit.residuals);
     }
 
     /// White noise and a random walk that meet at m = 64 (sigma2/m = gamma2·m/3): where either has its slope

@@ -86,3 +86,63 @@ pub(crate) fn score(ratio: f64, edof: f64) -> f64 {
     let variance = 2.0 / (9.0 * edof);
     (ratio.cbrt() - 1.0 + variance) / variance.sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wavelet::Tuning;
+    use approx::assert_relative_eq;
+    use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+    /// Variances twice the model's but for the last scale, which does not count.
+    fn curve(edof: f64) -> Curve {
+        let (levels, ignored) = (vec![1, 2], vec![2]);
+        Curve {
+            wv: vec![6.0, 6.0],
+            edof: vec![edof; 2],
+            levels,
+            ignored,
+            differing: 0.04,
+            ..Curve::default()
+        }
+    }
+
+    #[test]
+    fn weights_are_inverse_deviations_of_the_model() {
+        let curve = curve(50.0);
+        let chi2 = ChiSquared::new(50.0).unwrap();
+        let width = 3.0 * 50.0 * (1.0 / chi2.inverse_cdf(0.025) - 1.0 / chi2.inverse_cdf(0.975));
+        for (weighting, root) in [
+            (Weighting::Model, 1.0 / (3.0 * (0.04_f64 + 0.04).sqrt())),
+            (Weighting::Edof, 1.0 / (3.0 * 0.2)),
+            (Weighting::Interval, 1.0 / width),
+            (Weighting::None, 1.0),
+        ] {
+            let roots = weighting.roots(&curve, &[3.0, 3.0]);
+            assert_relative_eq!(roots[0], root, max_relative = 1e-9);
+            assert_eq!(roots[1], 0.0, "{weighting:?}");
+        }
+    }
+
+    /// A robust variance counts less from one standard deviation above the model on (two of few degrees of freedom), and as
+    /// the inverse square of the ratio one further on. At s deviations it is (1 − v + s√v)³, v = 2/(9 eta).
+    #[test]
+    fn a_robust_scale_that_is_too_high_loses_its_weight() {
+        for (edof, begin) in [(50.0, 1.0), (3.0, 2.0)] {
+            let plain = curve(edof);
+            let quantization = Some(*Tuning::default().quantization());
+            let robust = Curve { quantization, ..plain.clone() };
+            for (beyond, power) in [(-3.0, 0.0), (-0.01, 0.0), (0.5, 1.0), (1.0, 2.0), (2.0, 2.0)] {
+                let v: f64 = 2.0 / (9.0 * edof);
+                let ratio = (1.0 - v + (begin + beyond) * v.sqrt()).powi(3);
+                let nu = [6.0 / ratio, 3.0];
+                let expected = inverse_deviations(&plain, &nu)[0] / ratio.powf(power);
+                assert_relative_eq!(Weighting::Model.roots(&robust, &nu)[0], expected, max_relative = 1e-9);
+            }
+            let nu = [3.0, 3.0];
+            for curve in [&plain, &robust] {
+                assert_eq!(Weighting::Edof.roots(curve, &nu), Weighting::Edof.roots(&plain, &nu));
+            }
+        }
+    }
+}
