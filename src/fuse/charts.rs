@@ -29,10 +29,7 @@ const UNEVEN: f64 = 0.5;
 
 pub(super) const POSITION: &str = "Dashed: horizontal 1 σ stated. Line: distance from the reference.";
 pub(super) const ERRORS: &str = "Lines: estimate less reference. Bands: ± 1 σ.";
-pub(super) const INNOVATIONS: &str =
-    "Estimated less measured position over its 1 σ; 95 % of used fixes belong into the band.";
-pub(super) const NIS: &str =
-    "Normalised innovation squared of each fix; 95 % belong into the band of a right filter.";
+pub(super) const FIXES: &str = "Of a right filter 95 % of the used fixes are in the band.";
 
 /// Colour of what is smoothed.
 const SMOOTHED: Colour = Colour::Hue(2);

@@ -48,8 +48,8 @@ impl Answer for FuseAnswer {
             document.charts(&charts::errors(solution, &outages), charts::ERRORS);
         }
         document.section("Fixes");
-        document.chart(&charts::innovations(solution, &outages), charts::INNOVATIONS);
-        document.chart(&charts::nis(&solution.fixes, &outages), charts::NIS);
+        document.chart(&charts::innovations(solution, &outages), charts::FIXES);
+        document.chart(&charts::nis(&solution.fixes, &outages), charts::FIXES);
         document.checked(CHECKED);
         self.notes.iter().for_each(|note| add(&mut document, note));
         if let Some(quality) = self.reduction.as_ref().and_then(|reduction| reduction.quality.as_ref()) {

@@ -216,8 +216,8 @@ fn sampled_runs_scatter_as_computed() {
     let (sampled, report) = (&result.epochs[at], &computed.reports[at]);
     let far = |found: Estimate, expected: f64| (found.value - expected).abs() / found.std_error;
     for i in 0..9 {
-        let ends = result.runs.iter().map(|r| r.outages[0].error_end[i]);
-        let end = far(Estimate::root_mean_square_of(ends, None), computed.outage_ends[0].rmse[i]);
+        let ends = result.runs.iter().map(|r| r.outages[0].error_end[i].powi(2));
+        let end = far(Estimate::mean_of(ends, None).root(), computed.outage_ends[0].rmse[i]);
         let later = Estimate::root_mean_square(
             SampleSize::of(sampled.count, None),
             sampled.error_sq[i],

@@ -191,7 +191,7 @@ fn assert_outage_agrees(name: &str, sampled: &RunResult, expected: &Expected) {
     let outage = &summary.outages[0];
     let records = || sampled.runs.iter().map(|r| &r.outages[0]);
     for i in 0..9 {
-        let rmse = Estimate::root_mean_square_of(records().map(|o| o.error_end[i]), None);
+        let rmse = Estimate::mean_of(records().map(|o| o.error_end[i].powi(2)), None).root();
         let z = (rmse.value - outage.rmse_end.0[i]) / rmse.std_error;
         assert!(z.abs() < BOUND, "{name}, RMSE {i} at the end: {} {}", rmse.value, outage.rmse_end.0[i]);
     }

@@ -10,6 +10,7 @@ mod result;
 mod search;
 mod weighting;
 
+pub(crate) use avlr::avlr;
 pub use least_squares::fit;
 pub(crate) use least_squares::{correlated, expected, fit_with_covariance, refit};
 pub(crate) use objective::Range;
@@ -21,7 +22,6 @@ pub(crate) use weighting::score;
 use crate::curve::Estimator;
 use crate::model::ModelSpec;
 use crate::wavelet::Curve;
-use avlr::avlr;
 
 /// The model an estimator makes of a curve.
 ///
@@ -37,20 +37,5 @@ pub fn estimate(
     match estimator {
         Estimator::Avlr => avlr(curve, spec),
         _ => fit(curve, spec, rate_hz, weighting),
-    }
-}
-
-/// The same for a curve that resembles one already fitted.
-pub(crate) fn estimate_again(
-    estimator: Estimator,
-    curve: &Curve,
-    spec: &ModelSpec,
-    rate_hz: f64,
-    weighting: Weighting,
-    like: &Fit,
-) -> Result<Fit, FitError> {
-    match estimator {
-        Estimator::Avlr => avlr(curve, spec),
-        _ => refit(curve, spec, rate_hz, weighting, like),
     }
 }

@@ -236,12 +236,10 @@ impl Objective {
     /// The best amplitudes for the coordinates given (one for each component that has one).
     pub(crate) fn solve(&self, coordinates: &[f64]) -> Solution {
         let mut next = coordinates.iter();
-        let shapes: Vec<Shape> = (0..self.components.len())
-            .map(|i| {
-                let shaped = self.components[i].coordinate.is_some();
-                self.shape(i, if shaped { next.next().copied().unwrap_or(0.0) } else { 0.0 })
-            })
-            .collect();
+        let mut coordinate_of =
+            |c: &Component| c.coordinate.and_then(|_| next.next()).copied().unwrap_or(0.0);
+        let shapes: Vec<Shape> =
+            self.components.iter().enumerate().map(|(i, c)| self.shape(i, coordinate_of(c))).collect();
         let shapes: Vec<&Shape> = shapes.iter().collect();
         let best = self.best_amplitudes(&shapes, SETTLED);
         let jacobian = self.shaped().map(|(i, _)| self.tangent(&best, shapes[i], i)).collect();

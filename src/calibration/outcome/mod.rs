@@ -16,7 +16,7 @@ pub use ranking::{Candidate, Ranking, TooSimple};
 pub use settings::{Advance, FitRange, ModelChoice, ParameterLimit, Settings};
 
 use crate::curve::{Estimator, Scope};
-use crate::fit::{Fit, FitError, estimate_again};
+use crate::fit::{Fit, FitError, avlr, refit};
 use crate::model::ModelSpec;
 use crate::noise::{Composite, Model, ParameterRef};
 use crate::wavelet::Curve;
@@ -81,6 +81,9 @@ impl Outcome {
 
     /// The fit to a curve that resembles this one.
     pub(crate) fn estimate_again(&self, curve: &Curve, settings: &Settings) -> Result<Fit, FitError> {
-        estimate_again(self.estimator, curve, &self.spec, settings.rate_hz, settings.weighting, &self.fit)
+        match self.estimator {
+            Estimator::Avlr => avlr(curve, &self.spec),
+            _ => refit(curve, &self.spec, settings.rate_hz, settings.weighting, &self.fit),
+        }
     }
 }

@@ -43,7 +43,8 @@ impl Estimate {
     }
 
     /// The square root, its standard error by linearisation: that of the square over twice the root.
-    pub(crate) fn root(self) -> Self {
+    #[must_use]
+    pub fn root(self) -> Self {
         let value = self.value.sqrt();
         let std_error = if value > 0.0 { self.std_error / (2.0 * value) } else { self.std_error };
         Self { value, std_error }
@@ -57,12 +58,6 @@ impl Estimate {
         let value = sample.clone().sum::<f64>() / n;
         // about the mean in a second pass: values of little scatter would lose it in their squares
         Self::scattered(size, value, sample.map(|x| (x - value).powi(2)).sum::<f64>() / n)
-    }
-
-    /// The root mean square of a sample, as [`mean_of`](Self::mean_of).
-    #[must_use]
-    pub fn root_mean_square_of(sample: impl Iterator<Item = f64> + Clone, windows: Option<f64>) -> Self {
-        Self::mean_of(sample.map(|x| x * x), windows).root()
     }
 }
 
@@ -178,7 +173,7 @@ mod tests {
         assert_eq!(mean.value, 3.0);
         assert!((mean.std_error - (14.0_f64 / 12.0).sqrt()).abs() < 1e-15);
         // squares 1, 4, 9, 36: mean 12.5, sample variance 769/3
-        let rms = Estimate::root_mean_square_of([1.0, -2.0, 3.0, -6.0].into_iter(), None);
+        let rms = Estimate::mean_of([1.0_f64, -2.0, 3.0, -6.0].into_iter().map(|x| x * x), None).root();
         assert!((rms.value - 12.5_f64.sqrt()).abs() < 1e-15);
         let expected = (769.0_f64 / 12.0).sqrt() / (2.0 * 12.5_f64.sqrt());
         assert!((rms.std_error - expected).abs() < 1e-14, "{} {expected}", rms.std_error);
