@@ -312,3 +312,38 @@ fn all_parameters(designs: &[Design]) -> Table {
     }
     table
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn designed(recordings: usize, hours: f64, half_width_pct: f64, floor: Option<f64>) -> Design {
+        let parameter = DesignedParameter {
+            signals: "gyro".to_owned(),
+            parameter: "WN sigma2".to_owned(),
+            value: 1.0,
+            ci95: None,
+            half_width_pct: Some(half_width_pct),
+            endless_half_width_pct: floor,
+        };
+        Design { recordings, hours, parameters: vec![parameter], horizontal_p95: Vec::new() }
+    }
+
+    /// Hours do not help where four fifths of an interval are left of endless recordings.
+    #[test]
+    fn hours_help_until_most_of_an_interval_is_what_recordings_differ_by() {
+        for (floor, count) in [(None, 0), (Some(31.9), 0), (Some(32.1), 1)] {
+            assert_eq!(designed(4, 1.0, 40.0, floor).lengths_do_not_help(), count);
+        }
+    }
+
+    #[test]
+    fn a_curve_has_the_designs_of_its_number_of_recordings() {
+        let designs =
+            [(4, 1.0, 40.0), (4, 2.0, 30.0), (6, 1.0, 35.0)].map(|(n, h, w)| designed(n, h, w, None));
+        let drawn = curves(&designs, |design| design.parameters[0].half_width_pct.unwrap_or(f64::NAN));
+        let line = |series: Series| if let Mark::Line(points, _) = series.mark { Some(points) } else { None };
+        let lines: Vec<_> = drawn.into_iter().filter_map(line).collect();
+        assert_eq!(lines, [vec![(1.0, 40.0), (2.0, 30.0)], vec![(1.0, 35.0)]]);
+    }
+}

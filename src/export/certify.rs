@@ -147,6 +147,24 @@ mod tests {
     use nav_sim_signal::noise::Ar1;
     use nav_sim_signal::noise::practical::{Horizon, Policy};
 
+    /// As many and as long as those of the calibration; a recording of 2^(J+1) samples has J scales that are used. Else 16
+    /// horizons, so that the longest average is seen eight times and more.
+    #[test]
+    fn recordings_are_like_those_of_the_calibration() {
+        let axis = Composite::new(vec![Process::White(White::new(1e-4).unwrap())]);
+        let mut file = ModelFile {
+            model: Model::pooled(100.0, &axis, &axis),
+            missing: Vec::new(),
+            turn_on: None,
+            spread: None,
+            intervals: Vec::new(),
+            provenance: None,
+        };
+        assert_eq!(Recorded::like(&file, 7, 100.0), Recorded { recordings: 4, samples: 1 << 18, seed: 7 });
+        file.provenance = toml::from_str("fits = [{ recordings = 6, scales = 14 }, { scales = 15 }]").ok();
+        assert_eq!(Recorded::like(&file, 7, 100.0), Recorded { recordings: 6, samples: 1 << 16, seed: 7 });
+    }
+
     /// White noise and random walk are the pair: within its band. With an AR1 of ten times the white noise's variance at 10 s left
     /// out (strict) the model is above it there: Allan deviation ratio by the closed forms.
     #[test]

@@ -2,7 +2,7 @@ mod messages;
 
 use super::layout::number;
 use super::*;
-use nav_sim_signal::noise::{Ar1, GaussMarkov, Process, RandomWalk, White};
+use nav_sim_signal::noise::{Ar1, GaussMarkov, Process, Quantization, RandomWalk, White};
 use nav_sim_signal::units::{DEG, STANDARD_GRAVITY};
 
 const RATE: f64 = 200.0;
@@ -280,6 +280,29 @@ fn doubts_are_told() {
     // K²/3 over K²/3 + sigma2 dt/(1 − phi)²: √(3e-10/(3e-10 + 2e-8)) = 0.122
     assert!(doubts.contains("accel: 0.12 times the model's Allan deviation at 1.00 s"), "{doubts}");
     assert_eq!(walks(Target::Kalibr).doubts(), Vec::<String>::new());
+    let still = export(Target::Kalibr, vec![white(N_A)], vec![white(N_G), walk(K_G)], Policy::Matched);
+    let doubts = still.doubts().join("\n");
+    assert!(doubts.contains("accel: K is 0") && !doubts.contains("gyro: K is 0"), "{doubts}");
+    // of 3 q²/(T/dt)² at 1 s as much as N²/T: half of the variance; an envelope has it in its N
+    let coarse = || Process::Quantization(Quantization::new(N_A * N_A * RATE * RATE / 3.0).unwrap());
+    for (policy, is_told) in [(Policy::Matched, true), (Policy::Envelope, false)] {
+        let accel = vec![white(N_A), walk(K_A), coarse()];
+        let told = export(Target::Kalibr, accel, vec![white(N_G), walk(K_G)], policy).doubts().join("\n");
+        let share = "quantization noise or drift, 50 % of the Allan variance at 1.00 s, is left out";
+        assert_eq!(told.contains(share), is_told, "{policy:?}: {told}");
+    }
+}
+
+/// A random walk has no deviation of its own at the start: that which it reaches within the horizon, 100 s, stands for it.
+#[test]
+fn a_walk_begins_with_what_it_reaches() {
+    let axis = |n, k| Composite::new(vec![white(n), walk(k)]);
+    let unstated = Settings { turn_on: [None; 2], ..settings(Policy::Strict) };
+    let model = Model::pooled(RATE, &axis(N_A, K_A), &axis(N_G, K_G));
+    let export = Export::new(Target::Pyins, &model, &[], unstated).unwrap();
+    for (key, k) in [("accel_bias_sd", K_A), ("gyro_bias_sd", K_G)] {
+        assert!((value(&export, key) / (10.0 * k) - 1.0).abs() < 1e-6, "{key}: {:e}", value(&export, key));
+    }
 }
 
 #[test]
@@ -314,6 +337,8 @@ fn a_strict_pair_does_not_drop_the_bias() {
         );
         Export::new(target, &model, &[], settings(Policy::Strict)).unwrap_err().to_string()
     };
+    // what does not wander has nothing to drop
+    export(Target::Kalibr, vec![white(N_A)], vec![white(N_G)], Policy::Strict);
     let said = refused(Target::Kalibr, || markov(1e-3, 100.0));
     assert_eq!(said, "kalibr has no Gauss-Markov bias, and the model's accel has one");
     let said = refused(Target::KfGins, || walk(K_A));

@@ -70,7 +70,7 @@ impl TuneResult {
     }
 
     /// State, time and truth of the largest error.
-    fn place(&self, found: &FilterConsistency) -> String {
+    pub(super) fn place(&self, found: &FilterConsistency) -> String {
         let mut place = REPORTED_NAMES[found.largest.state].to_owned();
         match found.largest.outage {
             Some(outage) if found.end_s.len() > 1 => {
