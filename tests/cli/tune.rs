@@ -29,6 +29,9 @@ fn the_tuned_file_has_the_factor_and_says_where_it_came_from() {
     let found: Value = serde_json::from_slice(&output.get_output().stdout).unwrap();
     assert!(found["filters"][0]["largest_ratio"].as_f64().unwrap() > 1.5, "{found}");
     assert!((found["filters"][1]["largest_ratio"].as_f64().unwrap() - 1.0).abs() < 5e-3, "{found}");
+    // two outages as long as the default, 90 s, on the built-in drive: after 300 s, and 240 s later
+    let ends = found["filters"][1]["outage_end"].as_array().unwrap();
+    assert_eq!(ends.iter().map(|end| end["after_s"].as_f64().unwrap()).collect::<Vec<_>>(), [390.0, 720.0]);
     let text = std::fs::read_to_string(dir.path().join("tuned.toml")).unwrap();
     let tuned: toml::Table = text.parse().unwrap();
     let walk = tuned["gyro"]["processes"][1]["gamma2"].as_float().unwrap();
