@@ -13,7 +13,7 @@ use crate::earth::{self, GravityModel};
 use crate::frames::NavState;
 use crate::imu::Sensor;
 use crate::lanes::{Lanes, Level, Vec3};
-use crate::noise::{Composite, FlickerNoise, Ma1, Model, Process, White};
+use crate::noise::{Composite, FlickerNoise, Ma1, Model, Process, RandomWalk, White};
 use crate::strapdown::Strapdown;
 use glam::{DQuat, DVec3};
 use nalgebra::DMatrix;
@@ -69,6 +69,26 @@ fn flicker_noise_starts_with_its_variance() {
     let belief = Belief::new(&Model::pooled(100.0, &axis, &axis), FilterStates::Full, 1.0, 800.0).unwrap();
     let variance: f64 = belief.groups[0].iter().map(|group| group.initial.x).sum();
     assert!((variance / noise.initial_variance() - 1.0).abs() < 1e-12, "{variance}");
+}
+
+/// A turn-on bias has a state beside the processes of the model, which stay; a second one adds its variance to the first, and
+/// where the model has no bias it is the only one.
+#[test]
+fn a_turn_on_bias_is_beside_what_wanders() {
+    let white = Process::White(White::new(1e-6).unwrap());
+    let walk = Process::RandomWalk(RandomWalk::new(1e-10).unwrap());
+    for (processes, others) in [(vec![white, walk], 1), (vec![white], 0)] {
+        let axis = Composite::new(processes);
+        let model = Model::pooled(100.0, &axis, &axis);
+        let mut belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
+        [0.03, 0.04].iter().for_each(|sigma| belief.add_constant(Sensor::Accel, *sigma));
+        let groups = &belief.groups[0];
+        assert_eq!((groups.len(), belief.states), (others + 1, 9 + 6 * others + 3));
+        assert!(groups[..others].iter().all(|walk| walk.innovation.x == 1e-10 && walk.initial.x == 0.0));
+        let constant = groups[others];
+        assert!(constant.phi.x == 1.0 && constant.innovation.x == 0.0, "{constant:?}");
+        assert!((constant.initial.x - 0.05 * 0.05).abs() < 1e-15, "{constant:?}");
+    }
 }
 
 /// What a filter that integrates feels of several white processes: the sum over all time of their covariance with one sample.
