@@ -1,6 +1,7 @@
 //! Rows of measurements, sums of biases, and the noise of one sample.
 
 use super::super::aiding::{body_velocity_rows, dense_yaw_row};
+use super::super::update::update_height;
 use super::*;
 use crate::frames::{RollPitchYaw, wrap_angle};
 
@@ -38,6 +39,46 @@ fn lever_arm_rows_agree_with_central_differences() {
             }
         }
     }
+}
+
+/// A fix of the antenna where the filter has it moves nothing: on a lever arm, at the date line, a turn of longitude apart.
+#[test]
+fn a_fix_of_the_antenna_where_it_is_moves_nothing() {
+    let mut g = generator("still");
+    let arm = DVec3::new(1.3, -0.7, -2.1);
+    for turns in [-1.0, 0.0, 1.0].into_iter().cycle().take(300) {
+        let (case, omega, _) = random_case(&mut g);
+        let state = NavState { lon: std::f64::consts::PI - 1e-7, ..case };
+        let mut filter = ekf(&gauss_markov_model(), FilterStates::Reduced15);
+        (0..8).for_each(|lane| filter.nominal.set_lane(lane, &state));
+        filter.omega_ib_b = Vec3::splat(omega);
+        let (r, radii) = (state.q_b_n * arm, earth::radii(state.lat.sin()));
+        let omega_eb_b = omega - state.q_b_n.inverse() * earth::omega_ie_n(state.lat);
+        let lon = state.lon + r.y / ((radii.transverse + state.h) * state.lat.cos());
+        let fix = Fix {
+            lat: Lanes::splat(state.lat + r.x / (radii.meridian + state.h)),
+            lon: Lanes::splat(lon + turns * std::f64::consts::TAU),
+            h: Lanes::splat(state.h - r.z),
+            v_n: Some(Vec3::splat(state.v_n + state.q_b_n * omega_eb_b.cross(arm))),
+            lever_arm_b: arm,
+            ..fix_at_nominal(&filter, 2.0, 0.05)
+        };
+        let nis = update(&mut filter, &fix);
+        // rounding of a longitude plus a turn, 1e-15 · 6.4e6 m, of the metres of a fix
+        let moved = error_of(&filter.nominal.lane(0), &state);
+        assert!(moved.iter().all(|moved| moved.abs() < 1e-7) && nis[0] < 1e-14, "{moved:?} {nis:?}");
+    }
+}
+
+/// A height of 0.5 m adds its information to that of the start.
+#[test]
+fn a_height_is_worth_its_variance() {
+    let mut filter = ekf(&gauss_markov_model(), FilterStates::Reduced15);
+    let before = filter.p.get::<Lanes>(2, 2)[0];
+    let height = filter.nominal.h;
+    update_height(&mut filter, &height, 0.5);
+    let after = filter.p.get::<Lanes>(2, 2)[0];
+    assert!((after * (1.0 / before + 1.0 / 0.25) - 1.0).abs() < 1e-12, "{before} {after}");
 }
 
 /// Rows of the velocity along the body's axes and of yaw, against central differences of both.
