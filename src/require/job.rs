@@ -389,3 +389,6 @@ fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
 fn worst_after(curves: &[Vec<Drift>], length_s: u32, quantity: Quantity) -> Option<f64> {
     Drift::largest(&after(curves, f64::from(length_s)), quantity).map(|(_, value)| value)
 }
+
+#[cfg(test)]
+mod tests;

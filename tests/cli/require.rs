@@ -55,6 +55,8 @@ fn the_imu_that_is_named_meets_the_limit_and_a_tighter_one_not() {
     );
     let missed = stdout(&given("9.9").code(3));
     assert!(missed.starts_with("NOT met") && missed.lines().count() <= 20, "{missed}");
+    // 9.97 to 10 m, as is judged below
+    assert!(missed.lines().next().unwrap().ends_with(", 1.01 times the limit"), "{missed}");
     // the outage that it bridges is the one that it was made for, to the second
     let longest = require(
         dir.path(),
