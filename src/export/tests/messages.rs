@@ -84,7 +84,7 @@ fn gazebo_has_a_gauss_markov_bias() {
     assert!(text.lines().all(|l| l.matches("--").count() <= 2), "{text}");
     // each value is explained once, of x
     let explained = |key: &str| text.lines().filter(|l| l.contains(&format!("<!-- {key}:"))).count();
-    assert!(export.entries.iter().all(|entry| explained(&entry.key) == 1), "{text}");
+    assert!(export.entries.iter().all(|entry| explained(entry.key) == 1), "{text}");
     // what has no bias switches it off
     let white = self::export(Target::Gazebo, vec![white(N_A)], vec![white(N_G)], Policy::Matched);
     assert_eq!(value(&white, "angular_velocity.dynamic_bias_correlation_time"), 0.0);
