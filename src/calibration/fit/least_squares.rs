@@ -270,6 +270,27 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
 
+    /// An AR1 that has to stand for a random walk takes the longest correlation time that is sought, 20 times 2^12 samples, and
+    /// is told to lie at the end; what is not there is told to be zero, and lies nowhere.
+    #[test]
+    fn a_process_at_the_end_of_its_range_is_told() {
+        let white = Process::White(White::new(1.0).unwrap());
+        let walk = Process::RandomWalk(RandomWalk::new(1e-4).unwrap());
+        let levels: Vec<u32> = (1..=12).collect();
+        let fitted = |processes: Vec<Process>| {
+            let model = Composite::new(processes);
+            let wv = levels.iter().map(|level| model.haar_wv(*level)).collect();
+            let curve = Curve { wv, edof: vec![50.0; 12], levels: levels.clone(), ..Curve::default() };
+            fit(&curve, &"WN+AR1".parse().unwrap(), 1.0, Weighting::Edof).unwrap()
+        };
+        let wandering = fitted(vec![white, walk]);
+        let Process::Ar1(ar1) = wandering.composite.processes[1] else { panic!("{:?}", wandering.composite) };
+        assert!((-ar1.phi().ln() * 20.0 * 4096.0 - 1.0).abs() < 1e-5, "{ar1:?}");
+        assert_eq!((wandering.at_end, wandering.zero), (vec![1], vec![]));
+        let still = fitted(vec![white]);
+        assert_eq!((still.at_end, still.zero), (vec![], vec![1]));
+    }
+
     /// N2 with 8 to 30 % of noise at every scale, a third of it unknown to the degrees of freedom: on some of these curves the
     /// weights of one minimum lead to another and back. What is called converged has the weights of its own result.
     #[test]
@@ -302,6 +323,18 @@ mod tests {
             let is_converged = fit.termination == Termination::Converged;
             unsettled += u32::from(!is_converged);
             assert_eq!(is_converged, is_settled(&curve, &fit), "curve {k}");
+            // the best agrees with itself; another minimum is behind it
+            assert!(
+                (1..=fit.starts).contains(&fit.agreeing),
+                "curve {k}: {} of {}",
+                fit.agreeing,
+                fit.starts
+            );
+            assert!(
+                fit.runner_up.is_none_or(|other| other > fit.objective),
+                "curve {k}: {:?}",
+                fit.runner_up
+            );
         }
         // Most can be followed within the basin of either minimum.
         assert!(unsettled <= 3, "{unsettled}");

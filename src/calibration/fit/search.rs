@@ -202,3 +202,64 @@ fn spread(range: Range, count: usize) -> Vec<f64> {
     let step = (range.high - range.low) / (count - 1) as f64;
     (0..count).map(|i| range.low + step * i as f64).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::objective::Component;
+    use super::super::weighting::Weighting;
+    use super::*;
+    use crate::noise::{Ar1, Composite, Kind, Process, RandomWalk, White};
+    use crate::wavelet::Curve;
+
+    /// By inner products that are shared, and by the amplitudes of each point: the same cost, on a curve that is 10 % off at
+    /// every scale.
+    #[test]
+    fn the_grid_has_the_cost_of_each_point() {
+        let model = Composite::new(vec![
+            Process::White(White::new(1.0).unwrap()),
+            Process::RandomWalk(RandomWalk::new(1e-7).unwrap()),
+            Process::Ar1(Ar1::new(0.9, 1e-2).unwrap()),
+            Process::Ar1(Ar1::new(0.999, 1e-5).unwrap()),
+        ]);
+        let levels: Vec<u32> = (1..=12).collect();
+        let off = |level: &u32| model.haar_wv(*level) * if level % 2 == 0 { 1.1 } else { 0.9 };
+        let curve = Curve {
+            wv: levels.iter().map(off).collect(),
+            edof: vec![50.0; 12],
+            levels: levels.clone(),
+            ..Curve::default()
+        };
+        let component = |process: &Process| Component {
+            kind: process.kind(),
+            amplitude: Range { low: 0.0, high: f64::INFINITY },
+            coordinate: (process.kind() == Kind::Ar1).then_some(Range { low: -10.0, high: 1.0 }),
+        };
+        let components = model.processes.iter().map(component).collect();
+        let objective = Objective::new(&curve, Weighting::Edof, &curve.wv, None, components);
+        let dimensions: Vec<(usize, Range)> = objective.shaped().collect();
+        let grid = Grid::new(&objective, &dimensions, 60);
+        let choices = grid.choices();
+        assert_eq!((grid.points[0].len(), choices.len()), (11, 55));
+        let mut costs = Vec::new();
+        for choice in &choices {
+            let at: Vec<f64> = choice.iter().zip(&grid.points).map(|(i, points)| points[*i]).collect();
+            costs.push(objective.solve(&at).cost());
+            let (found, exact) = (grid.cost(choice), costs[costs.len() - 1]);
+            assert!((found - exact).abs() < 1e-10, "{choice:?}: {found:e} {exact:e}");
+        }
+        // the best start is the best of all choices
+        let best = costs.iter().copied().fold(f64::INFINITY, f64::min);
+        let started = objective.solve(&grid.starts(&choices, 3)[0]).cost();
+        assert!((started - best).abs() < 1e-10, "{started:e} {best:e}");
+    }
+
+    /// Pairs 110·109/2 = 5995 of 6000, triples 34·33·32/6 = 5984, quadruples 21·20·19·18/24 = 5985.
+    #[test]
+    fn the_grid_has_as_many_points_as_it_may() {
+        let points = [1, 2, 3, 4].map(|dimensions| points_per_dimension(dimensions, 6000));
+        assert_eq!(points, [POINTS, 110, 34, 21]);
+        assert_eq!(points_per_dimension(5, 2), 6);
+        assert_eq!(spread(Range { low: -1.0, high: 1.0 }, 5), [-1.0, -0.5, 0.0, 0.5, 1.0]);
+        assert_eq!(spread(Range { low: 2.0, high: 2.0 }, 5), [2.0]);
+    }
+}

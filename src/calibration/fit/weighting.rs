@@ -140,6 +140,8 @@ mod tests {
                 assert_relative_eq!(Weighting::Model.roots(&robust, &nu)[0], expected, max_relative = 1e-9);
             }
             let nu = [3.0, 3.0];
+            let deviation = 3.0 * (2.0 / edof + 0.04).sqrt();
+            assert_relative_eq!(inverse_deviations(&plain, &nu)[0], 1.0 / deviation, max_relative = 1e-12);
             for curve in [&plain, &robust] {
                 assert_eq!(Weighting::Edof.roots(curve, &nu), Weighting::Edof.roots(&plain, &nu));
             }
