@@ -211,10 +211,8 @@ mod tests {
     use crate::noise::{Ar1, Composite, Kind, Process, RandomWalk, White};
     use crate::wavelet::Curve;
 
-    /// By inner products that are shared, and by the amplitudes of each point: the same cost, on a curve that is 10 % off at
-    /// every scale.
-    #[test]
-    fn the_grid_has_the_cost_of_each_point() {
+    /// White noise, a random walk and two AR1 to be fitted to a curve that is 10 % off at every scale.
+    fn objective() -> Objective {
         let model = Composite::new(vec![
             Process::White(White::new(1.0).unwrap()),
             Process::RandomWalk(RandomWalk::new(1e-7).unwrap()),
@@ -235,7 +233,30 @@ mod tests {
             coordinate: (process.kind() == Kind::Ar1).then_some(Range { low: -10.0, high: 1.0 }),
         };
         let components = model.processes.iter().map(component).collect();
-        let objective = Objective::new(&curve, Weighting::Edof, &curve.wv, None, components);
+        Objective::new(&curve, Weighting::Edof, &curve.wv, None, components)
+    }
+
+    /// What the best amplitudes leave, and how that changes with a correlation time, has no part that an amplitude could take.
+    #[test]
+    fn residuals_and_their_derivatives_are_orthogonal_to_the_columns() {
+        let objective = objective();
+        let at = [-2.5, -6.5];
+        let solution = objective.solve(&at);
+        let plain = objective.plain_responses();
+        assert!(solution.amplitudes.iter().all(|a| *a > 0.0), "{:?}", solution.amplitudes);
+        for (component, u) in [(0, 0.0), (1, 0.0), (2, at[0]), (3, at[1])] {
+            let column = objective.column(&objective.shape(component, u), &plain).values;
+            // rounding of the twelve products of numbers below 1
+            assert!(dot(&solution.residuals, &column).abs() < 1e-14);
+            assert!(solution.jacobian.iter().all(|tangent| dot(tangent, &column).abs() < 1e-12));
+        }
+        assert!(solution.cost() > 1e-4 && solution.jacobian.iter().all(|t| dot(t, t) > 1e-9), "{solution:?}");
+    }
+
+    /// By inner products that are shared, and by the amplitudes of each point: the same cost.
+    #[test]
+    fn the_grid_has_the_cost_of_each_point() {
+        let objective = objective();
         let dimensions: Vec<(usize, Range)> = objective.shaped().collect();
         let grid = Grid::new(&objective, &dimensions, 60);
         let choices = grid.choices();
