@@ -283,6 +283,8 @@ fn doubts_are_told() {
     let still = export(Target::Kalibr, vec![white(N_A)], vec![white(N_G), walk(K_G)], Policy::Matched);
     let doubts = still.doubts().join("\n");
     assert!(doubts.contains("accel: K is 0") && !doubts.contains("gyro: K is 0"), "{doubts}");
+    let wandering = markovs(Target::KfGins).doubts().join("\n");
+    assert!(!wandering.contains("K is 0"), "{wandering}");
     // of 3 q²/(T/dt)² at 1 s as much as N²/T: half of the variance; an envelope has it in its N
     let coarse = || Process::Quantization(Quantization::new(N_A * N_A * RATE * RATE / 3.0).unwrap());
     for (policy, is_told) in [(Policy::Matched, true), (Policy::Envelope, false)] {
