@@ -270,6 +270,23 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
 
+    #[test]
+    fn what_is_no_wavelet_variance_is_refused() {
+        let refused = |wv: f64, edof: f64| {
+            let curve = Curve {
+                wv: vec![1.0, wv, 0.25],
+                edof: vec![50.0, edof, 50.0],
+                levels: vec![1, 2, 3],
+                ..Curve::default()
+            };
+            fit(&curve, &"WN".parse().unwrap(), 1.0, Weighting::Edof).unwrap_err()
+        };
+        for value in [-1.0, 0.0, 1e101] {
+            assert_eq!(refused(value, 50.0), FitError::NotPositive { level: 2, value });
+            assert_eq!(refused(0.5, value), FitError::NoWeight { level: 2, value });
+        }
+    }
+
     /// An AR1 that has to stand for a random walk takes the longest correlation time that is sought, 20 times 2^12 samples, and
     /// is told to lie at the end; what is not there is told to be zero, and lies nowhere.
     #[test]

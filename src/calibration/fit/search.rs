@@ -208,8 +208,9 @@ mod tests {
     use super::super::objective::Component;
     use super::super::weighting::Weighting;
     use super::*;
-    use crate::noise::{Ar1, Composite, Kind, Process, RandomWalk, White};
-    use crate::wavelet::Curve;
+    use crate::curve::implied;
+    use crate::noise::{Ar1, Composite, Kind, Process, Quantization, RandomWalk, White};
+    use crate::wavelet::{Curve, Tuning};
 
     /// White noise, a random walk and two AR1 to be fitted to a curve that is 10 % off at every scale.
     fn objective() -> Objective {
@@ -268,10 +269,37 @@ mod tests {
             let (found, exact) = (grid.cost(choice), costs[costs.len() - 1]);
             assert!((found - exact).abs() < 1e-10, "{choice:?}: {found:e} {exact:e}");
         }
-        // the best start is the best of all choices
-        let best = costs.iter().copied().fold(f64::INFINITY, f64::min);
-        let started = objective.solve(&grid.starts(&choices, 3)[0]).cost();
-        assert!((started - best).abs() < 1e-10, "{started:e} {best:e}");
+        // it starts where no neighbour is lower
+        let is_near = |a: &[usize], b: &[usize]| a.iter().zip(b).all(|(a, b)| a.abs_diff(*b) <= 1);
+        let lowest =
+            |k: usize| (0..costs.len()).all(|n| !is_near(&choices[k], &choices[n]) || costs[k] <= costs[n]);
+        let mut minima: Vec<f64> = (0..costs.len()).filter(|k| lowest(*k)).map(|k| costs[k]).collect();
+        minima.sort_by(f64::total_cmp);
+        let started: Vec<f64> =
+            grid.starts(&choices, 55).iter().map(|at| objective.solve(at).cost()).collect();
+        assert_eq!(started, minima);
+    }
+
+    /// A robust curve as a model implies it: its amplitudes come back, however much quantization noise there is.
+    #[test]
+    fn amplitudes_of_a_robust_curve_come_back() {
+        for q2 in [0.01, 1.0, 100.0] {
+            let model = Composite::new(vec![
+                Process::White(White::new(1.0).unwrap()),
+                Process::Quantization(Quantization::new(q2).unwrap()),
+            ]);
+            let quantization = Some(*Tuning::default().quantization());
+            let levels: Vec<u32> = (1..=12).collect();
+            let curve = Curve { edof: vec![50.0; 12], levels, quantization, ..Curve::default() };
+            let curve = Curve { wv: implied(&model, &curve), ..curve };
+            let free = Range { low: 0.0, high: f64::INFINITY };
+            let component = |p: &Process| Component { kind: p.kind(), amplitude: free, coordinate: None };
+            let components = model.processes.iter().map(component).collect();
+            let objective = Objective::new(&curve, Weighting::Edof, &curve.wv, None, components);
+            let solution = objective.solve(&[]);
+            let [white, quantized] = solution.amplitudes[..] else { panic!("{solution:?}") };
+            assert!((white - 1.0).abs() < 1e-9 && (quantized / q2 - 1.0).abs() < 1e-9, "{q2}: {solution:?}");
+        }
     }
 
     /// Pairs 110·109/2 = 5995 of 6000, triples 34·33·32/6 = 5984, quadruples 21·20·19·18/24 = 5985.
