@@ -287,6 +287,26 @@ mod tests {
         }
     }
 
+    /// A slope of 1e-3 that may be at most half, or at least twice that: the bound itself, which is told.
+    #[test]
+    fn a_limit_holds_the_fit() {
+        let model = Composite::new(vec![
+            Process::White(White::new(1.0).unwrap()),
+            Process::Drift(crate::noise::Drift::new(1e-3).unwrap()),
+        ]);
+        let levels: Vec<u32> = (1..=12).collect();
+        let wv = levels.iter().map(|level| model.haar_wv(*level)).collect();
+        let curve = Curve { wv, edof: vec![50.0; 12], levels, ..Curve::default() };
+        for (low, high, slope) in [(None, Some(5e-4), 5e-4), (Some(2e-3), None, 2e-3), (None, None, 1e-3)] {
+            let mut spec: ModelSpec = "WN+DR".parse().unwrap();
+            spec.limit("DR", "slope", low, high).unwrap();
+            let fit = fit(&curve, &spec, 1.0, Weighting::Edof).unwrap();
+            let found = fit.composite.processes[1].values()[0];
+            assert!((found / slope - 1.0).abs() < 1e-9, "{found} {slope}");
+            assert_eq!(fit.bounded.len(), usize::from(slope != 1e-3), "{:?}", fit.bounded);
+        }
+    }
+
     /// An AR1 that has to stand for a random walk takes the longest correlation time that is sought, 20 times 2^12 samples, and
     /// is told to lie at the end; what is not there is told to be zero, and lies nowhere.
     #[test]
@@ -340,6 +360,8 @@ mod tests {
             let is_converged = fit.termination == Termination::Converged;
             unsettled += u32::from(!is_converged);
             assert_eq!(is_converged, is_settled(&curve, &fit), "curve {k}");
+            let phi = |process: &Process| if let Process::Ar1(p) = process { Some(p.phi()) } else { None };
+            assert!(fit.composite.processes.iter().filter_map(phi).is_sorted(), "curve {k}");
             // the best agrees with itself; another minimum is behind it
             assert!(
                 (1..=fit.starts).contains(&fit.agreeing),
