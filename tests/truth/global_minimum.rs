@@ -205,9 +205,10 @@ fn failures(cases: u64, robust: bool) -> Vec<String> {
     (0..cases).into_par_iter().filter_map(failure).collect()
 }
 
+/// One of N1 and one of N2.
 #[test]
-fn noisy_curves() {
-    let failures = [false, true].map(|robust| failures(3, robust)).concat();
+fn two_noisy_curves() {
+    let failures = failures(2, false);
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
