@@ -15,7 +15,7 @@ pub(super) fn assemble(
     rate_hz: f64,
 ) -> Result<Fit, FitError> {
     let unit = objective.length * objective.length;
-    let best = &found.best;
+    let best = &found.ends[0];
     let solution = objective.solve(&best.coordinates);
     let mut terms = terms(objective, &best.coordinates, &solution.amplitudes);
     for (term, limits) in terms.iter_mut().zip(spec.limits()) {

@@ -34,9 +34,7 @@ impl Effort {
 /// Result of the search.
 #[derive(Debug)]
 pub(crate) struct Found {
-    /// The best end.
-    pub(crate) best: End,
-    /// The ends of all starts, best first.
+    /// The ends of all starts, best first; one at least.
     pub(crate) ends: Vec<End>,
     /// Combinations of shapes that were tried.
     pub(crate) combinations: usize,
@@ -47,8 +45,8 @@ pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) 
     let dimensions: Vec<(usize, Range)> = objective.shaped().collect();
     if dimensions.is_empty() {
         let cost = objective.solve(&[]).cost();
-        let best = End { coordinates: Vec::new(), cost, termination: Termination::Linear };
-        return Found { ends: vec![best.clone()], best, combinations: 1 };
+        let end = End { coordinates: Vec::new(), cost, termination: Termination::Linear };
+        return Found { ends: vec![end], combinations: 1 };
     }
     let mut starts = known.to_vec();
     let mut tried = 0;
@@ -61,7 +59,7 @@ pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) 
     }
     let mut ends: Vec<End> = starts.par_iter().map(|start| descend(objective, start)).collect();
     ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    Found { best: ends[0].clone(), ends, combinations: tried }
+    Found { ends, combinations: tried }
 }
 
 /// The grid: for each dimension its points and their columns; the inner products of all columns.
