@@ -219,7 +219,7 @@ mod tests {
             Process::Ar1(Ar1::new(0.999, 1e-5).unwrap()),
         ]);
         let levels: Vec<u32> = (1..=12).collect();
-        let off = |level: &u32| model.haar_wv(*level) * if level % 2 == 0 { 1.1 } else { 0.9 };
+        let off = |level: &u32| model.haar_wv(*level) * if level.is_multiple_of(2) { 1.1 } else { 0.9 };
         let curve = Curve {
             wv: levels.iter().map(off).collect(),
             edof: vec![50.0; 12],
