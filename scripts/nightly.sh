@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What a push is too short for, in an hour of two cores: all tests with those that are ignored, kills and full disks again and again,
+# What a push is too short for: all tests with those that are ignored, kills and full disks again and again,
 # the readers at length. Then the ledger, docs/validation.md, has the figures of this night (scripts/ledger.py).
 #   scripts/nightly.sh [DIRECTORY]     exit code 1 where anything failed
 set -uo pipefail

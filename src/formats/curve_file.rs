@@ -50,7 +50,6 @@ pub(crate) fn read(path: &Path) -> Result<Vec<NamedCurve>, FileError> {
 }
 
 fn parse(path: &str, text: &str) -> Result<Vec<NamedCurve>, FileError> {
-    let text = text.trim_start_matches('\u{feff}');
     let curves = if text.trim_start().starts_with('{') { json(path, text)? } else { vec![csv(path, text)?] };
     if curves.iter().any(|c| c.curve.levels.is_empty()) || curves.is_empty() {
         return Err(FileError::contents(path, Place::Within, "no curve in it"));

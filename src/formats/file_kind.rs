@@ -72,7 +72,7 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, FileError> {
         Err(_) if is_compressed => return Ok(FileKind::Recording),
         read => read.map_err(error)?,
     };
-    let text = String::from_utf8_lossy(&head);
+    let text = source::without_mark(String::from_utf8_lossy(&head).into_owned());
     if name.ends_with(".json") || text.trim_start().starts_with('{') {
         // What this program says of its results has a version; of those only curves have wavelet variances to be read.
         let is_record = text.contains("\"schema_version\"") && !text.contains("\"wv\"");
@@ -87,7 +87,7 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, FileError> {
 }
 
 fn table_of(text: &str) -> Option<toml::Table> {
-    text.trim_start_matches('\u{feff}').parse().ok()
+    text.parse().ok()
 }
 
 /// What does not parse is read as a scenario, whose reader says where it is wrong.
@@ -142,7 +142,7 @@ fn table_kind(text: &str) -> FileKind {
         kind
     } else if is_nmea(text) || is_rtklib(text) {
         FileKind::Gnss
-    } else if text.trim_start_matches('\u{feff}').trim_start().starts_with("ini lat") {
+    } else if text.trim_start().starts_with("ini lat") {
         FileKind::Trajectory
     } else if text.lines().take(20).any(|line| line.contains("tau_samples")) {
         FileKind::Curve

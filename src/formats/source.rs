@@ -121,10 +121,15 @@ impl<R: BufRead> Read for Unpacked<R> {
 /// # Errors
 /// When the system refuses, it is longer, or it is not UTF-8 ([`is_damage`]): with the line.
 pub(crate) fn text(path: &Path) -> io::Result<String> {
-    String::from_utf8(bounded(open(path)?, LARGEST_TEXT)?).map_err(|e| {
+    String::from_utf8(bounded(open(path)?, LARGEST_TEXT)?).map(without_mark).map_err(|e| {
         let line = 1 + e.as_bytes()[..e.utf8_error().valid_up_to()].iter().filter(|b| **b == b'\n').count();
         io::Error::new(ErrorKind::InvalidData, format!("line {line} is not text in UTF-8"))
     })
+}
+
+/// A text without the byte-order mark that editors of some systems begin it with.
+pub(crate) fn without_mark(text: String) -> String {
+    text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text)
 }
 
 fn bounded(reader: impl Read, largest: u64) -> io::Result<Vec<u8>> {

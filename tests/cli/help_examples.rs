@@ -73,7 +73,7 @@ fn failures(wanted: impl Fn(&str) -> bool) -> String {
     failures.join("\n\n")
 }
 
-/// Commands whose examples take seconds each: the pages of the book run them in a push.
+/// Commands whose examples take seconds each, for the night.
 const SLOW: [&str; 6] = ["calibrate", "choose", "demo", "design", "require", "tune"];
 
 #[test]

@@ -322,7 +322,7 @@ mod tests {
         };
         let wandering = fitted(vec![white, walk]);
         let Process::Ar1(ar1) = wandering.composite.processes[1] else { panic!("{:?}", wandering.composite) };
-        assert!((-ar1.phi().ln() * 20.0 * 4096.0 - 1.0).abs() < 1e-5, "{ar1:?}");
+        assert!((-ar1.phi().ln() * 20.0 * 4096.0 - 1.0).abs() < 1e-6, "{ar1:?}");
         assert_eq!((wandering.at_end, wandering.zero), (vec![1], vec![]));
         let still = fitted(vec![white]);
         assert_eq!((still.at_end, still.zero), (vec![], vec![1]));

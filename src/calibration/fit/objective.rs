@@ -247,7 +247,7 @@ impl Objective {
         Solution { amplitudes, residuals: best.residuals, jacobian }
     }
 
-    /// Σ residual² of the best amplitudes for shapes of all components, in their order, nearly.
+    /// Σ residual² for shapes of all components, in their order; the shares of quantization noise are nearly settled.
     pub(crate) fn cost_near(&self, shapes: &[&Shape]) -> f64 {
         let residuals = self.best_amplitudes(shapes, NEARLY_SETTLED).residuals;
         dot(&residuals, &residuals)

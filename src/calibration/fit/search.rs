@@ -245,7 +245,7 @@ mod tests {
         assert!(solution.amplitudes.iter().all(|a| *a > 0.0), "{:?}", solution.amplitudes);
         for (component, u) in [(0, 0.0), (1, 0.0), (2, at[0]), (3, at[1])] {
             let column = objective.column(&objective.shape(component, u), &plain).values;
-            // rounding of the twelve products of numbers below 1
+            // rounding of the twelve products of numbers below 1, and of derivatives that are projected once
             assert!(dot(&solution.residuals, &column).abs() < 1e-14);
             assert!(solution.jacobian.iter().all(|tangent| dot(tangent, &column).abs() < 1e-12));
         }
@@ -265,6 +265,7 @@ mod tests {
             let at: Vec<f64> = choice.iter().zip(&grid.points).map(|(i, points)| points[*i]).collect();
             costs.push(objective.solve(&at).cost());
             let (found, exact) = (grid.cost(choice), costs[costs.len() - 1]);
+            // 1 − 2rᵀx + xᵀGx cancels
             assert!((found - exact).abs() < 1e-10, "{choice:?}: {found:e} {exact:e}");
         }
         // it starts where no neighbour is lower

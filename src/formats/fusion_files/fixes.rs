@@ -215,7 +215,7 @@ fn sigma_of_earth(lat: f64, lon: f64, sigma_e: DVec3) -> DVec3 {
 
 /// A file of fixes that is not read, told by its first characters.
 fn of_another_kind(path: &str, text: &str) -> Option<Error> {
-    let text = text.trim_start_matches('\u{feff}').trim_start();
+    let text = text.trim_start();
     let error = || {
         Error::contents(path, 1_u64, "XML, as GPX and KML are, not a table of fixes")
             .advice("write its points as a table t_s, lat_deg, lon_deg, h_m on the clock of the IMU")

@@ -57,8 +57,6 @@ struct Point {
 }
 
 fn track_points(path: &str, text: &str) -> Result<Vec<Point>, Error> {
-    // positions do not count a byte-order mark
-    let text = text.trim_start_matches('\u{feff}');
     let mut reader = Reader::from_str(text);
     reader.config_mut().expand_empty_elements = true;
     // Names of the open elements, from the track point on: extensions have times and elevations of their own.
@@ -145,6 +143,15 @@ mod tests {
             "<trkpt lat=\"46.0008\" lon=\"7\"><ele>508</ele><time>2024-03-01T02:00:00+02:00</time></trkpt>";
         let points: String = (0..8).map(point).collect();
         format!("<gpx>\n<trk><trkseg>\n{points}{last}</trkseg></trk></gpx>")
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_a_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.gpx");
+        std::fs::write(&path, format!("\u{feff}{}", track())).unwrap();
+        let (t, _) = super::super::load(&path, &super::super::Options::default()).unwrap();
+        assert_eq!((t.start_s(), t.end_s()), (0.0, 8.0));
     }
 
     #[test]

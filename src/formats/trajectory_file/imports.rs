@@ -75,7 +75,7 @@ pub(super) fn tum(path: &str, text: &str, options: &Options, numbers: Numbers) -
 
 /// Whether a text is a motion definition of gnss-ins-sim.
 pub(super) fn is_motion_definition(text: &str) -> bool {
-    text.trim_start_matches('\u{feff}').trim_start().starts_with("ini lat")
+    text.trim_start().starts_with("ini lat")
 }
 
 /// A motion definition of gnss-ins-sim: a start (latitude, longitude, height, body velocity, yaw, pitch, roll),

@@ -27,7 +27,7 @@ pub(in crate::formats) fn text(path: &Path) -> Result<String, Error> {
     let mut bytes = Vec::new();
     let io = |source| Error::io(path, source);
     open(path)?.read_to_end(&mut bytes).map_err(io)?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
+    Ok(source::without_mark(String::from_utf8_lossy(&bytes).into_owned()))
 }
 
 /// Which numbers a table may hold.

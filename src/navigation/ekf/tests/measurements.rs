@@ -164,6 +164,19 @@ fn noise_of_one_sample_correlates_velocity_and_attitude() {
     }
 }
 
+/// White noise w of one sample is an acceleration for dt: w dt in the velocity, w dt²/2 in the position.
+#[test]
+fn one_sample_of_white_noise_moves_the_position_by_half_a_step() {
+    let mut filter = certain(1.0, 1e-6);
+    predict(&mut filter, DVec3::ZERO, DVec3::ZERO);
+    for axis in 0..3 {
+        let of = |i: usize, j: usize| filter.p.get::<Lanes>(3 * i + axis, 3 * j + axis)[0];
+        for (found, expected) in [(of(V, V), 1e-4), (of(R, V), 0.5e-6), (of(R, R), 0.25e-8)] {
+            assert!((found / expected - 1.0).abs() < 1e-12, "axis {axis}: {found:e} for {expected:e}");
+        }
+    }
+}
+
 /// White noise keeps its density whatever the interval: velocity and attitude variance after a second are
 /// sigma² dt·1 s, at 100 Hz and in steps of 2 to 40 ms.
 #[test]
