@@ -79,15 +79,11 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, FileError> {
         return Ok(if is_record { FileKind::Record } else { FileKind::Curve });
     }
     // No table of numbers is TOML, which needs no ending then: a pipe has none.
-    let table = table_of(&text).filter(|table| !table.is_empty());
+    let table = text.parse::<toml::Table>().ok().filter(|table| !table.is_empty());
     Ok(match table {
         None if !name.ends_with(".toml") => table_kind(&text),
         table => toml_kind(&table.unwrap_or_default()),
     })
-}
-
-fn table_of(text: &str) -> Option<toml::Table> {
-    text.parse().ok()
 }
 
 /// What does not parse is read as a scenario, whose reader says where it is wrong.
@@ -160,7 +156,7 @@ mod tests {
     use super::*;
 
     fn of_toml(text: &str) -> FileKind {
-        toml_kind(&table_of(text).unwrap_or_default())
+        toml_kind(&text.parse().unwrap_or_default())
     }
 
     #[test]
