@@ -20,7 +20,13 @@ const LEVELS: u32 = 18;
 
 /// White noise, AR1 and random walk of the paper's Section IV.
 fn signal() -> Vec<f64> {
-    let key = StreamKey { seed: 1, scenario: "bench", run: 0, source: "accel.x", process: "N1" };
+    let key = StreamKey {
+        seed: 1,
+        scenario: "bench",
+        run: 0,
+        source: "accel.x",
+        process: "N1",
+    };
     let mut generator = key.generator();
     let mut normal = || generator.sample::<f64, _>(StandardNormal);
     let (mut ar1, mut walk) = (0.0, 0.0);
@@ -52,9 +58,15 @@ fn wavelet_variance(c: &mut Criterion) {
     let signal = signal();
     let tuning = Tuning::new(0.6, Convention::Exact).unwrap();
     let mut group = c.benchmark_group("wavelet variance, 524284 samples, 18 scales");
-    group.sample_size(20).measurement_time(Duration::from_secs(3));
-    group.bench_function("classical", |b| b.iter(|| wavelet::classical(black_box(&signal), LEVELS)));
-    group.bench_function("classical, naive", |b| b.iter(|| naive_classical(black_box(&signal), LEVELS)));
+    group
+        .sample_size(20)
+        .measurement_time(Duration::from_secs(3));
+    group.bench_function("classical", |b| {
+        b.iter(|| wavelet::classical(black_box(&signal), LEVELS))
+    });
+    group.bench_function("classical, naive", |b| {
+        b.iter(|| naive_classical(black_box(&signal), LEVELS))
+    });
     group.bench_function("classical and robust", |b| {
         b.iter(|| wavelet::both(black_box(&signal), LEVELS, &tuning));
     });
@@ -71,17 +83,28 @@ fn noisy_curve() -> Curve {
         Process::Ar1(Ar1::new(0.9999, 1e-11).unwrap()),
         Process::RandomWalk(RandomWalk::new(2.9e-11).unwrap()),
     ];
-    let edof: Vec<f64> = levels.iter().map(|j| interval::edof_eta3(SAMPLES, *j)).collect();
+    let edof: Vec<f64> = levels
+        .iter()
+        .map(|j| interval::edof_eta3(SAMPLES, *j))
+        .collect();
     let exact = |j: u32| n2.iter().map(|p| p.haar_wv(j)).sum::<f64>();
-    let noisy =
-        |(j, edof): (&u32, &f64)| exact(*j) * (1.0 + f64::from(*j).sin() * (2.0 / edof).sqrt().min(0.5));
-    Curve { wv: levels.iter().zip(&edof).map(noisy).collect(), edof, levels, ..Curve::default() }
+    let noisy = |(j, edof): (&u32, &f64)| {
+        exact(*j) * (1.0 + f64::from(*j).sin() * (2.0 / edof).sqrt().min(0.5))
+    };
+    Curve {
+        wv: levels.iter().zip(&edof).map(noisy).collect(),
+        edof,
+        levels,
+        ..Curve::default()
+    }
 }
 
 fn fits(c: &mut Criterion) {
     let curve = noisy_curve();
     let mut group = c.benchmark_group("fit");
-    group.sample_size(20).measurement_time(Duration::from_secs(3));
+    group
+        .sample_size(20)
+        .measurement_time(Duration::from_secs(3));
     for spec in [ModelSpec::n1(), ModelSpec::n2()] {
         group.bench_function(spec.to_string(), |b| {
             b.iter(|| fit(black_box(&curve), &spec, 100.0, Weighting::Edof));

@@ -6,7 +6,9 @@
 //! f64, strapdown and covariance.
 
 use criterion::measurement::WallTime;
-use criterion::{BatchSize, BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{
+    BatchSize, BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main,
+};
 use kinavis_ins::{ImuNoise, ImuSample, InsFilter, InsPriors, Quaternion, gravity_down};
 use kinavis_kernel::{
     Angle, Distance, GeodeticPoint, Height, Instant, Position, Speed, TrueCourse, Utc, Vector3,
@@ -42,10 +44,14 @@ fn run_epochs(c: &mut Criterion) {
         let mut load = load(states, level);
         load.noise();
         let second = |load: &mut Load<'_>| black_box(load).filter();
-        group.bench_function(name, |b| b.iter_batched_ref(|| load.clone(), second, BatchSize::SmallInput));
+        group.bench_function(name, |b| {
+            b.iter_batched_ref(|| load.clone(), second, BatchSize::SmallInput)
+        });
     }
     let mut whole = load(reduced, Level::best());
-    group.bench_function("noise-n2-six-axes", |b| b.iter(|| black_box(&mut whole).noise()));
+    group.bench_function("noise-n2-six-axes", |b| {
+        b.iter(|| black_box(&mut whole).noise())
+    });
     group.bench_function("fix", |b| b.iter(|| black_box(&mut whole).fix()));
     group.bench_function("second", |b| {
         b.iter(|| {
@@ -65,19 +71,31 @@ fn run_epochs(c: &mut Criterion) {
 fn covariance_analysis(c: &mut Criterion) {
     let model = model().expect(VALID);
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("trajectories/land_vehicle.toml");
-    let (path, _) = trajectory_file::load(&file, &trajectory_file::Options::default()).expect(VALID);
+    let (path, _) =
+        trajectory_file::load(&file, &trajectory_file::Options::default()).expect(VALID);
     let (scenario, outages) = (Scenario::default(), Outage::PAPER);
     let track = scenario.track(&path, &model, &outages).expect(VALID);
     let beliefs = [Belief::new(&model, FilterStates::Reduced15, 1.0, 800.0).expect(VALID)];
     let experiment = scenario.experiment(&path, Truth::Model(&model), &beliefs, &outages, 1);
     let sources = TruthSide::sources(&experiment, &model);
-    let (filter, truth) = (FilterPass::new(&track, &beliefs[0]), TruthSide::together(&sources));
+    let (filter, truth) = (
+        FilterPass::new(&track, &beliefs[0]),
+        TruthSide::together(&sources),
+    );
     let mut group = c.benchmark_group("lincov-900-s");
     group.sample_size(10);
-    group.bench_function("track", |b| b.iter(|| scenario.track(black_box(&path), &model, &outages)));
-    group.bench_function("gains-15", |b| b.iter(|| FilterPass::new(black_box(&track), &beliefs[0])));
-    group.bench_function("true-errors", |b| b.iter(|| black_box(&filter).errors(&truth)));
-    group.bench_function("budget", |b| b.iter(|| Budget::at_outage_ends(black_box(&filter), &sources)));
+    group.bench_function("track", |b| {
+        b.iter(|| scenario.track(black_box(&path), &model, &outages))
+    });
+    group.bench_function("gains-15", |b| {
+        b.iter(|| FilterPass::new(black_box(&track), &beliefs[0]))
+    });
+    group.bench_function("true-errors", |b| {
+        b.iter(|| black_box(&filter).errors(&truth))
+    });
+    group.bench_function("budget", |b| {
+        b.iter(|| Budget::at_outage_ends(black_box(&filter), &sources))
+    });
     group.finish();
 }
 
@@ -85,7 +103,8 @@ fn covariance_analysis(c: &mut Criterion) {
 fn dense_reference(group: &mut BenchmarkGroup<'_, WallTime>) {
     let mut p = SMatrix::<f64, 15, 15>::identity();
     let q = SMatrix::<f64, 15, 15>::identity() * 1e-9;
-    let phi = SMatrix::<f64, 15, 15>::from_fn(|i, j| f64::from(u8::from(i == j)) + 1e-4 * (i + j) as f64);
+    let phi =
+        SMatrix::<f64, 15, 15>::from_fn(|i, j| f64::from(u8::from(i == j)) + 1e-4 * (i + j) as f64);
     group.bench_function("dense-covariance-15", |b| {
         b.iter(|| {
             for _ in 0..SAMPLES {
@@ -100,14 +119,18 @@ fn dense_reference(group: &mut BenchmarkGroup<'_, WallTime>) {
 fn public_filter(group: &mut BenchmarkGroup<'_, WallTime>) {
     let start = Instant::<Utc>::from_unix_seconds(1_789_000_000);
     let place = Position::from_degrees(45.8, 5.7).expect(VALID);
-    let point =
-        GeodeticPoint::new(place, Height::above_ellipsoid(Distance::from_metres(400.0).expect(VALID)));
+    let point = GeodeticPoint::new(
+        place,
+        Height::above_ellipsoid(Distance::from_metres(400.0).expect(VALID)),
+    );
     let still = Vector3::new(Speed::ZERO, Speed::ZERO, Speed::ZERO);
-    let level = Quaternion::from_euler(Angle::ZERO, Angle::ZERO, TrueCourse::new(0.0).expect(VALID));
+    let level =
+        Quaternion::from_euler(Angle::ZERO, Angle::ZERO, TrueCourse::new(0.0).expect(VALID));
     let nominal = kinavis_ins::Strapdown::new(start, point, still, level).expect(VALID);
     let mut filter = InsFilter::new(nominal, ImuNoise::mems(), &InsPriors::standard());
     let gravity = gravity_down(45.8_f64.to_radians().sin(), 400.0);
-    let sample = ImuSample::new([0.0; 3], [0.0, 0.0, -gravity], Duration::from_millis(10)).expect(VALID);
+    let sample =
+        ImuSample::new([0.0; 3], [0.0, 0.0, -gravity], Duration::from_millis(10)).expect(VALID);
     group.bench_function("kinavis-ins-15", |b| {
         b.iter(|| {
             for _ in 0..SAMPLES {

@@ -9,22 +9,34 @@ use std::hint::black_box;
 const BLOCK: usize = 1024;
 
 fn synthesizer(processes: Vec<Process>, source: &str) -> Synthesizer {
-    let key = StreamKey { seed: 1, scenario: "bench", run: 0, source, process: "" };
+    let key = StreamKey {
+        seed: 1,
+        scenario: "bench",
+        run: 0,
+        source,
+        process: "",
+    };
     Synthesizer::new(&Composite::new(processes), key)
 }
 
 fn process(code: &str, values: &[f64]) -> Process {
-    Process::from_values(code, values, 100.0).expect("known").expect("sound")
+    Process::from_values(code, values, 100.0)
+        .expect("known")
+        .expect("sound")
 }
 
 fn single_processes(c: &mut Criterion) {
     let mut group = c.benchmark_group("one process, per sample");
     group.throughput(Throughput::Elements(BLOCK as u64));
     for kind in Kind::ALL {
-        let mut source =
-            synthesizer(vec![process(kind.code(), &[0.5, 0.5][..kind.parameters().len()])], "accel.x");
+        let mut source = synthesizer(
+            vec![process(kind.code(), &[0.5, 0.5][..kind.parameters().len()])],
+            "accel.x",
+        );
         let mut block = [0.0; BLOCK];
-        group.bench_function(kind.code(), |b| b.iter(|| source.fill(black_box(&mut block))));
+        group.bench_function(kind.code(), |b| {
+            b.iter(|| source.fill(black_box(&mut block)))
+        });
     }
     group.finish();
 }
@@ -37,13 +49,19 @@ fn six_axes_of_n2(c: &mut Criterion) {
         process("AR1", &[0.9999, 1e-11]),
         process("RW", &[2.9e-11]),
     ];
-    let axes = ["accel.x", "accel.y", "accel.z", "gyro.x", "gyro.y", "gyro.z"];
+    let axes = [
+        "accel.x", "accel.y", "accel.z", "gyro.x", "gyro.y", "gyro.z",
+    ];
     let mut sources: Vec<Synthesizer> = axes.iter().map(|a| synthesizer(n2.clone(), a)).collect();
     let mut block = [0.0; BLOCK];
     let mut group = c.benchmark_group("six axes of N2");
     group.throughput(Throughput::Elements(BLOCK as u64 * 30));
     group.bench_function("per draw (30 an epoch)", |b| {
-        b.iter(|| sources.iter_mut().for_each(|s| s.fill(black_box(&mut block))));
+        b.iter(|| {
+            sources
+                .iter_mut()
+                .for_each(|s| s.fill(black_box(&mut block)))
+        });
     });
     group.finish();
 }

@@ -20,7 +20,13 @@ fn n1(gamma2: f64) -> Result<Composite, Box<dyn std::error::Error>> {
 /// The wavelet variances of one recording; the last has a random walk a hundred times as strong.
 fn replicate(k: u64, tuning: &Tuning) -> Result<Replicate, Box<dyn std::error::Error>> {
     let noise = n1(if k == 7 { 3.3e-9 } else { 3.3e-11 })?;
-    let key = StreamKey { seed: 1, scenario: "", run: k, source: "accel.x", process: "" };
+    let key = StreamKey {
+        seed: 1,
+        scenario: "",
+        run: k,
+        source: "accel.x",
+        process: "",
+    };
     let mut signal = vec![0.0; SAMPLES];
     Synthesizer::new(&noise, key).fill(&mut signal);
     let (classical, robust) = both(&signal, LEVELS, tuning)?;
@@ -38,7 +44,9 @@ fn replicate(k: u64, tuning: &Tuning) -> Result<Replicate, Box<dyn std::error::E
 
 pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let tuning = Tuning::new(0.6, Convention::Exact)?;
-    let replicates = (0..8).map(|k| replicate(k, &tuning)).collect::<Result<Vec<_>, _>>()?;
+    let replicates = (0..8)
+        .map(|k| replicate(k, &tuning))
+        .collect::<Result<Vec<_>, _>>()?;
     let mut gamma2 = Vec::new();
     println!("random-walk variance of seven replicates: 3.3e-11, of the eighth: 3.3e-9");
     for estimator in [Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv] {

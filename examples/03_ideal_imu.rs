@@ -12,7 +12,10 @@ pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let samples = ideal_imu(&trajectory, 100.0, GravityModel::Wgs84)?;
     let seconds = trajectory.end_s() - trajectory.start_s();
     println!("{seconds:.0} s, {} samples", samples.len());
-    let fastest = samples.iter().map(|s| s.omega_ib_b.length()).fold(0.0, f64::max);
+    let fastest = samples
+        .iter()
+        .map(|s| s.omega_ib_b.length())
+        .fold(0.0, f64::max);
     println!("turns at up to {:.1} deg/s", fastest.to_degrees());
     // The vehicle stands at first: the accelerometers feel gravity, the gyroscopes the Earth's rotation.
     let first = samples[100];

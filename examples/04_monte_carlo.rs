@@ -16,7 +16,10 @@ fn model(gyro_bias_sigma: f64) -> Result<Model, Box<dyn std::error::Error>> {
     let phi = 0.9999_f64; // a correlation time of 100 s at 100 Hz
     let bias = |sigma: f64| Ar1::new(phi, sigma * sigma * (1.0 - phi * phi)).map(Process::Ar1);
     let accel = Composite::new(vec![Process::White(White::new(1e-4)?), bias(5e-3)?]);
-    let gyro = Composite::new(vec![Process::White(White::new(1e-6)?), bias(gyro_bias_sigma)?]);
+    let gyro = Composite::new(vec![
+        Process::White(White::new(1e-6)?),
+        bias(gyro_bias_sigma)?,
+    ]);
     Ok(Model::pooled(100.0, &accel, &gyro))
 }
 
@@ -27,7 +30,13 @@ pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let belief = |m: &Model| Belief::new(m, FilterStates::Full, 1.0, 800.0);
     let beliefs = [belief(&truth)?, belief(&model(1e-5)?)?];
     let scenario = Scenario::default();
-    let experiment = scenario.experiment(&trajectory, Truth::Model(&truth), &beliefs, &Outage::PAPER, 1);
+    let experiment = scenario.experiment(
+        &trajectory,
+        Truth::Model(&truth),
+        &beliefs,
+        &Outage::PAPER,
+        1,
+    );
     let results = monte_carlo::run(&experiment, 16, &|_| {})?;
     for (name, result) in ["right", "optimist"].iter().zip(&results) {
         let summary = Summary::of(result, &epochs(result), 1);
@@ -36,7 +45,10 @@ pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
             "{name:8}: NEES {:5.2} of {}, coverage {:.2} of 0.95",
             summary.nees.mean, 9, summary.coverage.mean
         );
-        println!("          after 90 s without GNSS {:.0} m (median), {:.0} m (95 %)", end.p50, end.p95);
+        println!(
+            "          after 90 s without GNSS {:.0} m (median), {:.0} m (95 %)",
+            end.p50, end.p95
+        );
     }
     let nees = |i: usize| {
         let all = epochs(&results[i]);

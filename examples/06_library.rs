@@ -5,16 +5,26 @@ use nav_sim::prelude::*;
 use std::path::Path;
 
 pub(crate) fn drift(recordings: &Path, drive: &Path) -> Result<f64, Box<dyn std::error::Error>> {
-    let options = CalibrationOptions { bootstrap: None, ..CalibrationOptions::default() };
-    let model = calibrate(&[recordings.to_owned()], &options, &mut Silence)?.model(Estimator::DrAwv);
+    let options = CalibrationOptions {
+        bootstrap: None,
+        ..CalibrationOptions::default()
+    };
+    let model =
+        calibrate(&[recordings.to_owned()], &options, &mut Silence)?.model(Estimator::DrAwv);
     let (trajectory, _) = load_trajectory(drive, &TrajectoryOptions::default())?;
     let inputs = NavigateInputs::new(trajectory, model, TrueImu::AsBelieved);
     let mut scenario = Scenario::default();
     scenario.run.runs = 16;
-    let outage = Outage { start_s: 300.0, end_s: 390.0 };
+    let outage = Outage {
+        start_s: 300.0,
+        end_s: 390.0,
+    };
     let found = navigate(&inputs, &scenario, &[outage], 1, &())?;
     let end = found.summary.outages[0].horizontal_error_end_m;
-    println!("after 90 s without GNSS: {:.0} m (median), {:.0} m (95 %)", end.p50, end.p95);
+    println!(
+        "after 90 s without GNSS: {:.0} m (median), {:.0} m (95 %)",
+        end.p50, end.p95
+    );
     Ok(end.p50)
 }
 

@@ -24,7 +24,12 @@ pub struct Answered {
 impl Answered {
     /// An answer without files and bounds.
     pub(crate) fn of(answer: &impl Answer) -> Self {
-        Self { json: json(answer), document: answer.document(), files: Vec::new(), unmet: None }
+        Self {
+            json: json(answer),
+            document: answer.document(),
+            files: Vec::new(),
+            unmet: None,
+        }
     }
 }
 
@@ -44,17 +49,24 @@ pub fn request<T: DeserializeOwned>(text: &str) -> Result<T, Failure> {
 
 /// The option of a key: those that several commands share stand in tables of their own.
 fn option(key: &str) -> String {
-    let mut parts = key.split('.').map(|part| part.split('[').next().unwrap_or(part));
+    let mut parts = key
+        .split('.')
+        .map(|part| part.split('[').next().unwrap_or(part));
     let first = parts.next().unwrap_or_default();
     let is_shared = ["recordings", "reading", "tuning", "figures", "filter"].contains(&first);
     // of the filter's settings its states have the name of the table
-    let own = parts.next_back().filter(|part| is_shared && *part != "states");
+    let own = parts
+        .next_back()
+        .filter(|part| is_shared && *part != "states");
     own.unwrap_or(first).replace('_', "-")
 }
 
 /// Names and contents of files.
 pub(crate) fn contents(files: Vec<OutputFile<'_>>) -> Vec<(String, String)> {
-    files.into_iter().map(|file| (file.name.to_owned(), file.parts.collect())).collect()
+    files
+        .into_iter()
+        .map(|file| (file.name.to_owned(), file.parts.collect()))
+        .collect()
 }
 
 #[cfg(test)]
@@ -76,7 +88,10 @@ mod tests {
     #[test]
     fn the_option_that_is_refused_is_named() {
         for (text, told) in [
-            ("bootstrap = \"many\"", "--bootstrap=\"many\" is not a whole number ≥ 0"),
+            (
+                "bootstrap = \"many\"",
+                "--bootstrap=\"many\" is not a whole number ≥ 0",
+            ),
             ("bootstrap = -1", "--bootstrap=-1 is not a whole number ≥ 0"),
             ("trim = [1]", "--trim=[1] is neither a text nor a number"),
             ("[tuning]\nskip_s = true", "--skip-s=true is not a number"),

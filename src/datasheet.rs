@@ -31,7 +31,12 @@ pub struct DatasheetRequest {
 
 impl Default for DatasheetRequest {
     fn default() -> Self {
-        Self { entry: None, unit: None, figures: Figures::default(), rate_hz: 100.0 }
+        Self {
+            entry: None,
+            unit: None,
+            figures: Figures::default(),
+            rate_hz: 100.0,
+        }
     }
 }
 
@@ -65,7 +70,8 @@ pub struct Figures {
 
 /// Checks a figure of a sensor.
 fn figure(sensor: Sensor, figure: Figure) -> impl Fn(&str) -> Result<String, String> + Clone {
-    let parsed = move |text: &str| Quantity::parse(text, figure.units(sensor)).map(|_| text.to_owned());
+    let parsed =
+        move |text: &str| Quantity::parse(text, figure.units(sensor)).map(|_| text.to_owned());
     move |text| parsed(text).map_err(|e| e.to_string())
 }
 
@@ -77,16 +83,42 @@ impl Figures {
             ("arw", Sensor::Gyro, Figure::Noise, &self.arw),
             ("accel-bias", Sensor::Accel, Figure::Bias, &self.accel_bias),
             ("gyro-bias", Sensor::Gyro, Figure::Bias, &self.gyro_bias),
-            ("corr-time", Sensor::Accel, Figure::CorrelationTime, &self.corr_time),
-            ("corr-time", Sensor::Gyro, Figure::CorrelationTime, &self.corr_time),
-            ("accel-turn-on", Sensor::Accel, Figure::TurnOn, &self.accel_turn_on),
-            ("gyro-turn-on", Sensor::Gyro, Figure::TurnOn, &self.gyro_turn_on),
+            (
+                "corr-time",
+                Sensor::Accel,
+                Figure::CorrelationTime,
+                &self.corr_time,
+            ),
+            (
+                "corr-time",
+                Sensor::Gyro,
+                Figure::CorrelationTime,
+                &self.corr_time,
+            ),
+            (
+                "accel-turn-on",
+                Sensor::Accel,
+                Figure::TurnOn,
+                &self.accel_turn_on,
+            ),
+            (
+                "gyro-turn-on",
+                Sensor::Gyro,
+                Figure::TurnOn,
+                &self.gyro_turn_on,
+            ),
         ];
         for (option, sensor, figure, text) in given {
             let Some(text) = text else { continue };
             let quantity = Quantity::parse(text, figure.units(sensor))
                 .map_err(|e| Failure::input(format!("--{option}=\"{text}\": {e}")))?;
-            sheet.set(Entry { sensor, figure, quantity, source: Some("command line".into()), quote: None });
+            sheet.set(Entry {
+                sensor,
+                figure,
+                quantity,
+                source: Some("command line".into()),
+                quote: None,
+            });
         }
         Ok(())
     }
@@ -119,11 +151,22 @@ impl DatasheetRequest {
         let made = sheet.model_file(self.rate_hz).map_err(Failure::input)?;
         if made.file.missing.len() == made.file.model.axes.len() {
             let failure = Failure::input("no figure is given that makes a noise model");
-            return Err(failure.hint("give --vrw and --arw, or --unit NAME (nav-sim datasheet --list)"));
+            return Err(
+                failure.hint("give --vrw and --arw, or --unit NAME (nav-sim datasheet --list)")
+            );
         }
-        let doubts = Sensor::ALL.into_iter().flat_map(|sensor| lacking(&sheet, sensor)).chain(made.doubts);
-        let notes = Sensor::ALL.into_iter().flat_map(|sensor| left_out(&sheet, sensor));
-        Ok(DatasheetModel { file: made.file, doubts: doubts.collect(), notes: notes.collect() })
+        let doubts = Sensor::ALL
+            .into_iter()
+            .flat_map(|sensor| lacking(&sheet, sensor))
+            .chain(made.doubts);
+        let notes = Sensor::ALL
+            .into_iter()
+            .flat_map(|sensor| left_out(&sheet, sensor));
+        Ok(DatasheetModel {
+            file: made.file,
+            doubts: doubts.collect(),
+            notes: notes.collect(),
+        })
     }
 }
 
@@ -132,22 +175,41 @@ fn named(name: &str) -> Result<Datasheet, Failure> {
         return Ok(sheet?);
     }
     let failure = Failure::input(format!("--unit {name}: the catalogue has no such unit"));
-    Err(failure.hint(match nearest(name, CATALOGUE.iter().map(|(known, _)| *known)) {
-        Some(meant) => format!("did you mean {meant}?"),
-        None => "nav-sim datasheet --list shows what there is".to_owned(),
-    }))
+    Err(failure.hint(
+        match nearest(name, CATALOGUE.iter().map(|(known, _)| *known)) {
+            Some(meant) => format!("did you mean {meant}?"),
+            None => "nav-sim datasheet --list shows what there is".to_owned(),
+        },
+    ))
 }
 
 fn lacking(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
     let name = sensor.name();
-    let flag = if sensor == Sensor::Accel { "--vrw" } else { "--arw" };
+    let flag = if sensor == Sensor::Accel {
+        "--vrw"
+    } else {
+        "--arw"
+    };
     let figures = [
-        (Figure::Noise, format!("{name}: no white noise is given ({flag})")),
-        (Figure::Bias, format!("{name}: no bias instability is given (--{name}-bias)")),
-        (Figure::TurnOn, format!("{name}: no turn-on bias is given (--{name}-turn-on)")),
+        (
+            Figure::Noise,
+            format!("{name}: no white noise is given ({flag})"),
+        ),
+        (
+            Figure::Bias,
+            format!("{name}: no bias instability is given (--{name}-bias)"),
+        ),
+        (
+            Figure::TurnOn,
+            format!("{name}: no turn-on bias is given (--{name}-turn-on)"),
+        ),
     ];
     let is_lacking = |figure: &Figure| sheet.value(sensor, *figure).is_none();
-    figures.into_iter().filter(|(figure, _)| is_lacking(figure)).map(|(_, text)| text).collect()
+    figures
+        .into_iter()
+        .filter(|(figure, _)| is_lacking(figure))
+        .map(|(_, text)| text)
+        .collect()
 }
 
 fn left_out(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
@@ -155,14 +217,16 @@ fn left_out(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
     let offset = sheet.given(sensor, Figure::Offset).map(|offset| {
         format!("{name}: the zero offset of ±{offset} is removed before use and not in the model")
     });
-    let scale = sheet
-        .value(sensor, Figure::Scale)
-        .map(|ppm| format!("{name}: the scale factor of {ppm} ppm is not in the model: run --scale-ppm"));
+    let scale = sheet.value(sensor, Figure::Scale).map(|ppm| {
+        format!("{name}: the scale factor of {ppm} ppm is not in the model: run --scale-ppm")
+    });
     offset.into_iter().chain(scale).collect()
 }
 
 fn units() -> Result<Vec<(&'static str, Datasheet)>, FileError> {
-    let units = CATALOGUE.iter().filter_map(|(name, _)| Some((*name, catalogued(name)?)));
+    let units = CATALOGUE
+        .iter()
+        .filter_map(|(name, _)| Some((*name, catalogued(name)?)));
     units.map(|(name, sheet)| Ok((name, sheet?))).collect()
 }
 
@@ -174,11 +238,16 @@ pub(crate) fn catalogue_text() -> Result<String, FileError> {
     let mut lines = Vec::new();
     for (unit, sheet) in units()? {
         let (class, name) = (sheet.class.as_deref(), sheet.name.as_deref());
-        lines.push(format!("{unit:<12} {:<12} {}", class.unwrap_or_default(), name.unwrap_or_default()));
+        lines.push(format!(
+            "{unit:<12} {:<12} {}",
+            class.unwrap_or_default(),
+            name.unwrap_or_default()
+        ));
         for sensor in Sensor::ALL {
             let of_sensor = sheet.entries.iter().filter(|e| e.sensor == sensor);
-            let shown: Vec<String> =
-                of_sensor.map(|e| format!("{} {}", e.figure.key(), e.quantity.given)).collect();
+            let shown: Vec<String> = of_sensor
+                .map(|e| format!("{} {}", e.figure.key(), e.quantity.given))
+                .collect();
             lines.push(format!("  {:<5} {}", sensor.name(), shown.join(", ")));
         }
     }
@@ -196,5 +265,7 @@ pub fn catalogue_json() -> Result<String, FileError> {
         json!({ "unit": unit, "name": sheet.name, "class": sheet.class, "figures": figures })
     };
     let units: Vec<Value> = units()?.into_iter().map(unit).collect();
-    Ok(report::json(&json!({ "schema_version": 1, "units": units })))
+    Ok(report::json(
+        &json!({ "schema_version": 1, "units": units }),
+    ))
 }

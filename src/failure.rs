@@ -19,7 +19,12 @@ impl std::error::Error for Failure {}
 
 impl Failure {
     fn new(code: u8, message: &impl ToString) -> Self {
-        Self { code, message: message.to_string(), hint: None, place: None }
+        Self {
+            code,
+            message: message.to_string(),
+            hint: None,
+            place: None,
+        }
     }
 
     /// Wrong input: usage, configuration, data (exit code 2).
@@ -49,13 +54,24 @@ impl Failure {
 
     /// What is wrong with a file, for a command whose options `option` knows.
     pub(crate) fn of_file(e: &FileError, option: impl Fn(Setting) -> Option<&'static str>) -> Self {
-        let failure = if e.is_system() { Self::could_not(e) } else { Self::input(e) };
-        Self { place: Some((e.path.to_string(), e.line())), ..failure }.maybe_hint(e.hint_with(option))
+        let failure = if e.is_system() {
+            Self::could_not(e)
+        } else {
+            Self::input(e)
+        };
+        Self {
+            place: Some((e.path.to_string(), e.line())),
+            ..failure
+        }
+        .maybe_hint(e.hint_with(option))
     }
 
     /// The same, of a part.
     pub(crate) fn within(self, part: &str) -> Self {
-        Self { message: format!("{part}: {}", self.message), ..self }
+        Self {
+            message: format!("{part}: {}", self.message),
+            ..self
+        }
     }
 
     /// With advice.

@@ -2,7 +2,9 @@
 //! small corpus with a fixed seed, `fuzz/` at length.
 
 use crate::formats::trajectory_file::{self, Options};
-use crate::formats::{contamination_file, curve_file, datasheet, draws_file, fusion_files, model_file};
+use crate::formats::{
+    contamination_file, curve_file, datasheet, draws_file, fusion_files, model_file,
+};
 use crate::formats::{parameters_file, recordings, run_directory, scenario_file};
 use crate::study::{Planned, file, plan_in, unit_file};
 use crate::{efficiency, formats::recordings::ReadOptions};
@@ -17,45 +19,89 @@ pub type Target = (&'static str, fn(&[u8]));
 
 /// All readers: recordings, drives, trajectories, then the program's own files.
 pub const TARGETS: [Target; 32] = [
-    ("recording_csv", |bytes| recording("recording_csv", "a.csv", bytes)),
-    ("recording_gz", |bytes| recording("recording_gz", "a.csv.gz", bytes)),
-    ("recording_npy", |bytes| recording("recording_npy", "a.npy", bytes)),
+    ("recording_csv", |bytes| {
+        recording("recording_csv", "a.csv", bytes)
+    }),
+    ("recording_gz", |bytes| {
+        recording("recording_gz", "a.csv.gz", bytes)
+    }),
+    ("recording_npy", |bytes| {
+        recording("recording_npy", "a.npy", bytes)
+    }),
     ("mcap", nav_sim_logs_fuzz::mcap),
     ("bag", nav_sim_logs_fuzz::bag),
     ("ulog", nav_sim_logs_fuzz::ulog),
     ("ubx", nav_sim_logs_fuzz::ubx),
     ("npz", nav_sim_logs_fuzz::npz),
-    ("imu", |bytes| _ = fusion_files::read_imu(&written("imu", "a.csv", bytes), None, None)),
-    ("imu_kf_gins", |bytes| _ = fusion_files::read_imu(&written("imu_kf_gins", "a.txt", bytes), None, None)),
+    ("imu", |bytes| {
+        _ = fusion_files::read_imu(&written("imu", "a.csv", bytes), None, None)
+    }),
+    ("imu_kf_gins", |bytes| {
+        _ = fusion_files::read_imu(&written("imu_kf_gins", "a.txt", bytes), None, None)
+    }),
     ("fixes", |bytes| fixes("fixes", "a.csv", bytes)),
-    ("fixes_kf_gins", |bytes| fixes("fixes_kf_gins", "a.txt", bytes)),
+    ("fixes_kf_gins", |bytes| {
+        fixes("fixes_kf_gins", "a.txt", bytes)
+    }),
     ("nmea", |bytes| fixes("nmea", "a.nmea", bytes)),
     ("rtklib", |bytes| fixes("rtklib", "a.pos", bytes)),
-    ("initial", |bytes| _ = fusion_files::read_initial(&written("initial", "a.toml", bytes))),
-    ("trajectory", |bytes| trajectory("trajectory", "a.csv", bytes)),
+    ("initial", |bytes| {
+        _ = fusion_files::read_initial(&written("initial", "a.toml", bytes))
+    }),
+    ("trajectory", |bytes| {
+        trajectory("trajectory", "a.csv", bytes)
+    }),
     ("tum", |bytes| trajectory("tum", "a.tum", bytes)),
     ("kf_gins", |bytes| trajectory("kf_gins", "a.nav", bytes)),
     ("gpx", |bytes| trajectory("gpx", "a.gpx", bytes)),
     ("motion", |bytes| trajectory("motion", "a.toml", bytes)),
-    ("model", |bytes| _ = model_file::read(&written("model", "a.toml", bytes))),
-    ("datasheet", |bytes| _ = datasheet::read(&written("datasheet", "a.toml", bytes))),
+    ("model", |bytes| {
+        _ = model_file::read(&written("model", "a.toml", bytes))
+    }),
+    ("datasheet", |bytes| {
+        _ = datasheet::read(&written("datasheet", "a.toml", bytes))
+    }),
     ("contamination", contamination),
-    ("parameters", |bytes| _ = parameters_file::check(&written("parameters", "a.toml", bytes))),
-    ("scenario", |bytes| _ = scenario_file::read(&written("scenario", "a.toml", bytes))),
-    ("study", |bytes| _ = file::read(&written("study", "a.toml", bytes))),
-    ("estimator_study", |bytes| _ = efficiency::file::read(&written("estimator_study", "a.toml", bytes))),
+    ("parameters", |bytes| {
+        _ = parameters_file::check(&written("parameters", "a.toml", bytes))
+    }),
+    ("scenario", |bytes| {
+        _ = scenario_file::read(&written("scenario", "a.toml", bytes))
+    }),
+    ("study", |bytes| {
+        _ = file::read(&written("study", "a.toml", bytes))
+    }),
+    ("estimator_study", |bytes| {
+        _ = efficiency::file::read(&written("estimator_study", "a.toml", bytes))
+    }),
     ("plan", plan),
     ("unit", unit),
-    ("curves", |bytes| _ = curve_file::read(&written("curves", "a.json", bytes))),
+    ("curves", |bytes| {
+        _ = curve_file::read(&written("curves", "a.json", bytes))
+    }),
     ("draws", draws),
-    ("manifest", |bytes| _ = run_directory::read(&directory("manifest", "manifest.json", bytes))),
+    ("manifest", |bytes| {
+        _ = run_directory::read(&directory("manifest", "manifest.json", bytes))
+    }),
 ];
 
-#[cfg(all(feature = "mcap", feature = "bag", feature = "ulog", feature = "ubx", feature = "npz"))]
+#[cfg(all(
+    feature = "mcap",
+    feature = "bag",
+    feature = "ulog",
+    feature = "ubx",
+    feature = "npz"
+))]
 use nav_sim_logs::fuzz as nav_sim_logs_fuzz;
 
 /// Formats that this build does not read.
-#[cfg(not(all(feature = "mcap", feature = "bag", feature = "ulog", feature = "ubx", feature = "npz")))]
+#[cfg(not(all(
+    feature = "mcap",
+    feature = "bag",
+    feature = "ulog",
+    feature = "ubx",
+    feature = "npz"
+)))]
 mod nav_sim_logs_fuzz {
     pub(super) fn mcap(_: &[u8]) {}
     pub(super) use mcap as bag;
@@ -70,7 +116,11 @@ mod nav_sim_logs_fuzz {
 /// When there is none.
 #[must_use]
 pub fn target(name: &str) -> fn(&[u8]) {
-    TARGETS.iter().find(|(known, _)| *known == name).expect("a target of that name").1
+    TARGETS
+        .iter()
+        .find(|(known, _)| *known == name)
+        .expect("a target of that name")
+        .1
 }
 
 thread_local! {
@@ -81,7 +131,10 @@ thread_local! {
 fn written(target: &str, name: &str, bytes: &[u8]) -> PathBuf {
     PLACE.with(|place| {
         let in_memory = || tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir());
-        let directory = place.get_or_init(|| in_memory().expect("a directory")).path().join(target);
+        let directory = place
+            .get_or_init(|| in_memory().expect("a directory"))
+            .path()
+            .join(target);
         fs::create_dir_all(&directory).expect("a directory");
         let path = directory.join(name);
         fs::write(&path, bytes).expect("a file");
@@ -98,20 +151,33 @@ fn directory(target: &str, name: &str, bytes: &[u8]) -> PathBuf {
 
 /// A recording without a time column is one of 100 Hz.
 fn recording(target: &str, name: &str, bytes: &[u8]) {
-    let options = ReadOptions { rate_hz: Some(100.0), ..ReadOptions::default() };
+    let options = ReadOptions {
+        rate_hz: Some(100.0),
+        ..ReadOptions::default()
+    };
     _ = recordings::read(&[written(target, name, bytes)], &options);
 }
 
 /// Fixes that state no deviations have one of 3 m.
 fn fixes(target: &str, name: &str, bytes: &[u8]) {
-    let sigma = FixSigma { pos_m: [3.0; 3], vel_m_s: None };
-    _ = fusion_files::read_gnss(&written(target, name, bytes), Some(&sigma), Some((0.0, 100.0)), None);
+    let sigma = FixSigma {
+        pos_m: [3.0; 3],
+        vel_m_s: None,
+    };
+    _ = fusion_files::read_gnss(
+        &written(target, name, bytes),
+        Some(&sigma),
+        Some((0.0, 100.0)),
+        None,
+    );
 }
 
 /// To drive along, and to compare with.
 fn trajectory(target: &str, name: &str, bytes: &[u8]) {
     let path = written(target, name, bytes);
-    let options = Options { origin: Some([0.8, 0.1, 400.0]) };
+    let options = Options {
+        origin: Some([0.8, 0.1, 400.0]),
+    };
     _ = trajectory_file::load(&path, &options);
     _ = trajectory_file::load_reference(&path, &options);
 }
@@ -124,7 +190,9 @@ fn contamination(bytes: &[u8]) {
 /// The plan, its grid, and its first units.
 fn plan(bytes: &[u8]) {
     let directory = directory("plan", "plan.json", bytes);
-    let Ok(Some(plan)) = plan_in(&directory) else { return };
+    let Ok(Some(plan)) = plan_in(&directory) else {
+        return;
+    };
     if let Ok(planned) = Planned::new(&directory.join("study.toml"), &directory, plan) {
         _ = planned
             .plan

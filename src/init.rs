@@ -55,12 +55,20 @@ pub(crate) fn write_start_files(directory: &Path) -> Result<StartFiles, FileErro
             kept.push(path);
             continue;
         }
-        made.directories.extend(path.ancestors().skip(1).filter(|p| !p.exists()).map(Path::to_owned));
+        made.directories.extend(
+            path.ancestors()
+                .skip(1)
+                .filter(|p| !p.exists())
+                .map(Path::to_owned),
+        );
         atomic::write(&path, contents)?;
         made.files.push(path);
     }
     made.directories.clear();
-    Ok(StartFiles { written: std::mem::take(&mut made.files), kept })
+    Ok(StartFiles {
+        written: std::mem::take(&mut made.files),
+        kept,
+    })
 }
 
 /// What was made so far; removed again if not all can be.
@@ -76,7 +84,8 @@ impl Drop for Made {
         for file in &self.files {
             let _ = fs::remove_file(file);
         }
-        self.directories.sort_by_key(|path| std::cmp::Reverse(path.components().count()));
+        self.directories
+            .sort_by_key(|path| std::cmp::Reverse(path.components().count()));
         for directory in &self.directories {
             let _ = fs::remove_dir(directory); // if nothing else is in it
         }

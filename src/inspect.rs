@@ -66,33 +66,48 @@ pub struct InspectedChannel {
 /// When the file is not a log that is read, or is damaged and not to be recovered.
 pub fn inspect(path: &Path, options: &LogOptions) -> Result<Inspection, FileError> {
     let log = logs::open(path, options)?;
-    let channels = log.channels().iter().map(|channel| inspected(&log, channel, options));
+    let channels = log
+        .channels()
+        .iter()
+        .map(|channel| inspected(&log, channel, options));
     Ok(Inspection {
         file: path.display().to_string(),
         format: log.kind().name(),
-        channels: channels.collect::<Result<_, _>>().map_err(|e| logs::refused(path, e))?,
+        channels: channels
+            .collect::<Result<_, _>>()
+            .map_err(|e| logs::refused(path, e))?,
         damage: log.damage().map(logs::recovered),
     })
 }
 
-fn inspected(log: &Log, channel: &Channel, options: &LogOptions) -> Result<InspectedChannel, Error> {
+fn inspected(
+    log: &Log,
+    channel: &Channel,
+    options: &LogOptions,
+) -> Result<InspectedChannel, Error> {
     let topic = Some(channel.topic.as_str());
     let (content, units, stamps) = match channel.content {
         _ if channel.messages == 0 => ("other", None, Vec::new()),
         Content::Imu => {
             let samples = log.imu(topic, options.stamp)?;
-            let stamps = samples.map(|sample| Ok(sample?.stamp_ns)).collect::<Result<Vec<i64>, Error>>()?;
+            let stamps = samples
+                .map(|sample| Ok(sample?.stamp_ns))
+                .collect::<Result<Vec<i64>, Error>>()?;
             ("imu", Some("m/s², rad/s"), stamps)
         }
         Content::Fix => {
             let fixes = log.fixes(topic, options.stamp)?;
-            let stamps = fixes.map(|fix| Ok(fix?.stamp_ns)).collect::<Result<Vec<i64>, Error>>()?;
+            let stamps = fixes
+                .map(|fix| Ok(fix?.stamp_ns))
+                .collect::<Result<Vec<i64>, Error>>()?;
             ("fix", Some("deg, m"), stamps)
         }
         Content::Other => ("other", None, Vec::new()),
     };
     let ends = channel.first_ns.zip(channel.last_ns);
-    let span_s = ends.map_or(0.0, |(first, last)| last.saturating_sub(first) as f64 * 1e-9);
+    let span_s = ends.map_or(0.0, |(first, last)| {
+        last.saturating_sub(first) as f64 * 1e-9
+    });
     let by_span = (span_s > 0.0).then(|| channel.messages.saturating_sub(1) as f64 / span_s);
     let steps = Steps::of(&stamps);
     Ok(InspectedChannel {
@@ -101,7 +116,10 @@ fn inspected(log: &Log, channel: &Channel, options: &LogOptions) -> Result<Inspe
         content,
         messages: channel.messages,
         span_s,
-        rate_hz: steps.as_ref().map(|steps| six_digits(1.0 / steps.median_s)).or(by_span),
+        rate_hz: steps
+            .as_ref()
+            .map(|steps| six_digits(1.0 / steps.median_s))
+            .or(by_span),
         gaps: steps.as_ref().map(|steps| steps.gaps),
         longest_step_s: steps.as_ref().map(|steps| steps.longest_s),
         jitter_s: steps.as_ref().map(|steps| steps.jitter_s),
@@ -119,8 +137,10 @@ struct Steps {
 
 impl Steps {
     fn of(stamps_ns: &[i64]) -> Option<Self> {
-        let mut steps: Vec<f64> =
-            stamps_ns.windows(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * 1e-9).collect();
+        let mut steps: Vec<f64> = stamps_ns
+            .windows(2)
+            .map(|pair| pair[1].saturating_sub(pair[0]) as f64 * 1e-9)
+            .collect();
         steps.sort_by(f64::total_cmp);
         let median_s = *steps.get(steps.len() / 2).filter(|step| **step > 0.0)?;
         let mut off: Vec<f64> = steps.iter().map(|step| (step - median_s).abs()).collect();
@@ -137,25 +157,51 @@ impl Steps {
 impl Answer for Inspection {
     fn document(&self) -> Document {
         let of = |content: &str| {
-            let topics = self.channels.iter().filter(|c| c.content == content).map(|c| c.topic.as_str());
+            let topics = self
+                .channels
+                .iter()
+                .filter(|c| c.content == content)
+                .map(|c| c.topic.as_str());
             topics.collect::<Vec<_>>().join(", ")
         };
         let named = |name: &str, topics: String| {
-            format!("{name} {}", if topics.is_empty() { "none" } else { &topics })
+            format!(
+                "{name} {}",
+                if topics.is_empty() { "none" } else { &topics }
+            )
         };
         let topics = [named("IMU", of("imu")), named("GNSS", of("fix"))].join("; ");
         let line = format!("{}: {}; {topics}", self.file, self.format);
-        let tone = if self.damage.is_some() { Tone::Doubtful } else { Tone::Good };
+        let tone = if self.damage.is_some() {
+            Tone::Doubtful
+        } else {
+            Tone::Good
+        };
         let mut document = Document::new("Contents of a log", tone, [line]);
-        let head = ["channel", "type", "messages", "span (s)", "rate (Hz)", "gaps", "jitter (s)", "units"];
+        let head = [
+            "channel",
+            "type",
+            "messages",
+            "span (s)",
+            "rate (Hz)",
+            "gaps",
+            "jitter (s)",
+            "units",
+        ];
         let mut table = Table::new(head);
-        let rank =
-            |channel: &InspectedChannel| ["imu", "fix", "other"].iter().position(|c| *c == channel.content);
-        let mut ranked: Vec<(usize, &InspectedChannel)> = self.channels.iter().enumerate().collect();
+        let rank = |channel: &InspectedChannel| {
+            ["imu", "fix", "other"]
+                .iter()
+                .position(|c| *c == channel.content)
+        };
+        let mut ranked: Vec<(usize, &InspectedChannel)> =
+            self.channels.iter().enumerate().collect();
         ranked.sort_by_key(|(_, channel)| rank(channel));
         for (k, channel) in ranked {
             let number = |value: Option<f64>, key: &str| {
-                value.map_or(Cell::from("–"), |value| Cell::number(value, &format!("/channels/{k}/{key}")))
+                value.map_or(Cell::from("–"), |value| {
+                    Cell::number(value, &format!("/channels/{k}/{key}"))
+                })
             };
             let figures = |text: Option<String>| text.map_or(Cell::from("–"), Cell::figures);
             table.row(vec![
@@ -170,7 +216,9 @@ impl Answer for Inspection {
             ]);
         }
         document.lead(table);
-        self.damage.iter().for_each(|damage| document.note(Importance::Warning, damage.as_str()));
+        self.damage
+            .iter()
+            .for_each(|damage| document.note(Importance::Warning, damage.as_str()));
         document
     }
 }

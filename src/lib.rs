@@ -46,8 +46,8 @@
 
 #[doc(inline)]
 pub use {
-    nav_sim_calibration as calibration, nav_sim_document as document, nav_sim_navigation as navigation,
-    nav_sim_signal as signal,
+    nav_sim_calibration as calibration, nav_sim_document as document,
+    nav_sim_navigation as navigation, nav_sim_signal as signal,
 };
 
 pub use export::export;

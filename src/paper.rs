@@ -25,11 +25,18 @@ impl PaperFigure {
 
     /// As a picture.
     pub(crate) fn svg(&self) -> String {
-        svg(&format!("Fig. {}: {}", self.number, self.caption), &self.charts)
+        svg(
+            &format!("Fig. {}: {}", self.number, self.caption),
+            &self.charts,
+        )
     }
 
     pub(crate) fn new(number: u32, caption: &str, charts: Vec<Chart>) -> Self {
-        Self { number, caption: caption.to_owned(), charts }
+        Self {
+            number,
+            caption: caption.to_owned(),
+            charts,
+        }
     }
 }
 
@@ -51,16 +58,28 @@ pub(crate) fn paper_figures(
     outages: &[(f64, f64)],
 ) -> Vec<PaperFigure> {
     let fitted_curve = |scenario: &str, estimator: &str, sensor: Sensor| {
-        let result = curves.iter().find(|c| c.scenario == scenario && c.estimator == estimator)?;
-        result.file.curves.iter().find(|c| c.sensor == sensor.name())
+        let result = curves
+            .iter()
+            .find(|c| c.scenario == scenario && c.estimator == estimator)?;
+        result
+            .file
+            .curves
+            .iter()
+            .find(|c| c.sensor == sensor.name())
     };
     let replicates = |scenario: &str| {
         let kinds = [
             ("robust", fitted_curve(scenario, "sr-awv", Sensor::Accel)),
             ("classical", fitted_curve(scenario, "awv", Sensor::Accel)),
         ];
-        let panels = kinds.into_iter().filter_map(|(kind, fitted)| Some(recordings(kind, fitted?)));
-        vec![Chart::new("Accelerometer recordings", scale_axis(), panels.collect())]
+        let panels = kinds
+            .into_iter()
+            .filter_map(|(kind, fitted)| Some(recordings(kind, fitted?)));
+        vec![Chart::new(
+            "Accelerometer recordings",
+            scale_axis(),
+            panels.collect(),
+        )]
     };
     let fit = fitted_curve("I", "awv", Sensor::Accel).map(|fitted| fitted_chart(fitted, &[]));
     vec![
@@ -68,7 +87,10 @@ pub(crate) fn paper_figures(
         PaperFigure::new(
             3,
             TRAJECTORY,
-            vec![track.map("Reference trajectory", outages), track.over_time(outages)],
+            vec![
+                track.map("Reference trajectory", outages),
+                track.over_time(outages),
+            ],
         ),
         PaperFigure::new(4, CLEAN, replicates("I")),
         PaperFigure::new(
@@ -81,8 +103,7 @@ pub(crate) fn paper_figures(
 }
 
 const ABNORMAL: &str = "Robust (above) and classical (below) wavelet variance of the recordings of scenario III, two of which are abnormal.";
-const TRAJECTORY: &str =
-    "Reference trajectory of a land vehicle on the horizontal plane, its height, speed and attitude.";
+const TRAJECTORY: &str = "Reference trajectory of a land vehicle on the horizontal plane, its height, speed and attitude.";
 const CLEAN: &str =
     "Robust (above) and classical (below) wavelet variance of the clean recordings (scenario I).";
 const AVERAGES: &str = "The wavelet variances that AWV, SR-AWV and DR-AWV are fitted to, in scenarios II and III; dashed: AWV of scenario I.";
@@ -103,32 +124,63 @@ pub(crate) fn paper_page(figures: &[PaperFigure]) -> String {
 /// A curve a recording.
 fn recordings(kind: &str, fitted: &FittedCurve) -> Panel {
     let series_of_recording = |(k, replicate): (usize, &crate::report::ReplicateCurve)| {
-        Series::line(&replicate.file, Colour::Hue(k), curve(&fitted.tau_s, &replicate.wv))
+        Series::line(
+            &replicate.file,
+            Colour::Hue(k),
+            curve(&fitted.tau_s, &replicate.wv),
+        )
     };
     let mut axis = variance_axis(&fitted.sensor);
     axis.label = format!("{kind} {}", axis.label);
-    Panel::new(axis, fitted.replicates.iter().enumerate().map(series_of_recording).collect())
+    Panel::new(
+        axis,
+        fitted
+            .replicates
+            .iter()
+            .enumerate()
+            .map(series_of_recording)
+            .collect(),
+    )
 }
 
 /// A chart a sensor, a panel a scenario.
-fn averages<'a>(fitted_curve: &dyn Fn(&str, &str, Sensor) -> Option<&'a FittedCurve>) -> Vec<Chart> {
+fn averages<'a>(
+    fitted_curve: &dyn Fn(&str, &str, Sensor) -> Option<&'a FittedCurve>,
+) -> Vec<Chart> {
     let chart = |sensor: Sensor| {
-        let panel = |scenario: &&str| {
-            let names = [("awv", "AWV"), ("sr-awv", "SR-AWV"), ("dr-awv", "DR-AWV")];
-            let mut series: Vec<Series> = fitted_curve("I", "awv", sensor)
-                .map(|clean| Series::dashed("AWV, scenario I", Colour::Ink, curve(&clean.tau_s, &clean.wv)))
-                .into_iter()
-                .collect();
-            series.extend(names.into_iter().enumerate().filter_map(|(hue, (estimator, name))| {
-                let fitted = fitted_curve(scenario, estimator, sensor)?;
-                Some(Series::line(name, Colour::Hue(hue), curve(&fitted.tau_s, &fitted.wv)))
-            }));
-            let mut axis = variance_axis(sensor.name());
-            axis.label = format!("scenario {scenario}: {}", axis.label);
-            Panel::new(axis, series)
-        };
+        let panel =
+            |scenario: &&str| {
+                let names = [("awv", "AWV"), ("sr-awv", "SR-AWV"), ("dr-awv", "DR-AWV")];
+                let mut series: Vec<Series> = fitted_curve("I", "awv", sensor)
+                    .map(|clean| {
+                        Series::dashed(
+                            "AWV, scenario I",
+                            Colour::Ink,
+                            curve(&clean.tau_s, &clean.wv),
+                        )
+                    })
+                    .into_iter()
+                    .collect();
+                series.extend(names.into_iter().enumerate().filter_map(
+                    |(hue, (estimator, name))| {
+                        let fitted = fitted_curve(scenario, estimator, sensor)?;
+                        Some(Series::line(
+                            name,
+                            Colour::Hue(hue),
+                            curve(&fitted.tau_s, &fitted.wv),
+                        ))
+                    },
+                ));
+                let mut axis = variance_axis(sensor.name());
+                axis.label = format!("scenario {scenario}: {}", axis.label);
+                Panel::new(axis, series)
+            };
         let title = sensor_name(sensor.name());
-        Chart::new(title, scale_axis(), ["II", "III"].iter().map(panel).collect())
+        Chart::new(
+            title,
+            scale_axis(),
+            ["II", "III"].iter().map(panel).collect(),
+        )
     };
     Sensor::ALL.map(chart).into()
 }
@@ -169,14 +221,25 @@ mod tests {
         };
         let scenarios = [("I", 1.0), ("II", 2.0), ("III", 3.0)];
         let estimators = ["awv", "sr-awv", "dr-awv"];
-        scenarios.iter().flat_map(|(s, f)| estimators.map(|e| model(s, e, *f))).collect()
+        scenarios
+            .iter()
+            .flat_map(|(s, f)| estimators.map(|e| model(s, e, *f)))
+            .collect()
     }
 
     #[test]
     fn every_figure_has_its_curves() {
         let figures = paper_figures(&study(), &TrajectorySeries::default(), &[(1.0, 2.0)]);
-        assert_eq!(figures.iter().map(|f| f.number).collect::<Vec<_>>(), [1, 3, 4, 5, 6]);
-        let drawn = |k: usize, name: &str| figures[k].svg().matches(&format!("data-name=\"{name}\"")).count();
+        assert_eq!(
+            figures.iter().map(|f| f.number).collect::<Vec<_>>(),
+            [1, 3, 4, 5, 6]
+        );
+        let drawn = |k: usize, name: &str| {
+            figures[k]
+                .svg()
+                .matches(&format!("data-name=\"{name}\""))
+                .count()
+        };
         // in the robust and in the classical panel
         for figure in [0, 2] {
             assert_eq!(drawn(figure, "a.csv"), 2);

@@ -7,11 +7,15 @@ use std::fmt::Debug;
 use std::str::FromStr;
 
 /// One of some words, each with what it means.
-pub(crate) fn words<T>(words: &'static [(&'static str, &'static str)]) -> impl TypedValueParser<Value = T>
+pub(crate) fn words<T>(
+    words: &'static [(&'static str, &'static str)],
+) -> impl TypedValueParser<Value = T>
 where
     T: FromStr<Err: Debug> + Clone + Send + Sync + 'static,
 {
-    let values = words.iter().map(|(word, meaning)| PossibleValue::new(*word).help(*meaning));
+    let values = words
+        .iter()
+        .map(|(word, meaning)| PossibleValue::new(*word).help(*meaning));
     PossibleValuesParser::new(values).map(|word| word.parse().expect("a word of the list"))
 }
 
@@ -45,11 +49,16 @@ pub(crate) fn seconds_range(text: &str) -> Result<(f64, f64), String> {
         let text = text.trim();
         // as results have it
         let units = [("min", 60.0), ("s", 1.0), ("h", 3600.0)];
-        let said = units.iter().find_map(|(name, unit_s)| Some((text.strip_suffix(name)?, *unit_s)));
+        let said = units
+            .iter()
+            .find_map(|(name, unit_s)| Some((text.strip_suffix(name)?, *unit_s)));
         let (number, unit_s) = said.unwrap_or((text, 1.0));
         positive(number.trim()).ok().map(|value| value * unit_s)
     };
-    match text.split_once(':').map(|(from, to)| (seconds(from), seconds(to))) {
+    match text
+        .split_once(':')
+        .map(|(from, to)| (seconds(from), seconds(to)))
+    {
         Some((Some(from_s), Some(to_s))) => Ok((from_s, to_s)),
         _ => Err("expected two times, such as 1s:100s or 1min:2h".into()),
     }
@@ -57,8 +66,10 @@ pub(crate) fn seconds_range(text: &str) -> Result<(f64, f64), String> {
 
 /// Numbers between commas.
 fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
-    let parsed: Option<Vec<f64>> =
-        text.split(',').map(|x| x.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+    let parsed: Option<Vec<f64>> = text
+        .split(',')
+        .map(|x| x.trim().parse().ok().filter(|x: &f64| x.is_finite()))
+        .collect();
     parsed?.try_into().ok()
 }
 
@@ -92,7 +103,10 @@ pub(crate) mod text {
         Number(f64),
     }
 
-    pub(crate) fn serialize<T: Display, S: Serializer>(value: &T, to: S) -> Result<S::Ok, S::Error> {
+    pub(crate) fn serialize<T: Display, S: Serializer>(
+        value: &T,
+        to: S,
+    ) -> Result<S::Ok, S::Error> {
         to.collect_str(value)
     }
 
@@ -107,7 +121,11 @@ pub(crate) mod text {
         // who reports it shows the text
         text.parse().map_err(|e: T::Err| {
             let message = e.to_string();
-            D::Error::custom(message.strip_prefix(&format!("\"{text}\" ")).unwrap_or(&message))
+            D::Error::custom(
+                message
+                    .strip_prefix(&format!("\"{text}\" "))
+                    .unwrap_or(&message),
+            )
         })
     }
 }

@@ -48,7 +48,13 @@ fn allocations(duration_s: u32) -> u64 {
     let model = throughput::model().unwrap();
     let beliefs = [FilterStates::Reduced15, FilterStates::Full]
         .map(|states| Belief::new(&model, states, 1.0, 800.0).unwrap());
-    let (scenario, outages) = (Scenario::default(), [Outage { start_s: 20.0, end_s: 30.0 }]);
+    let (scenario, outages) = (
+        Scenario::default(),
+        [Outage {
+            start_s: 20.0,
+            end_s: 30.0,
+        }],
+    );
     let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &outages, 1);
     let plan = Plan::new(&experiment).unwrap();
     let before = ALLOCATIONS.load(Ordering::Relaxed);

@@ -29,7 +29,10 @@ fn sources(path: &Path, into: &mut Vec<(String, String)>) {
         if path.is_dir() {
             sources(&path, into);
         } else if path.extension().is_some_and(|e| e == "rs") {
-            into.push((path.display().to_string(), fs::read_to_string(&path).unwrap()));
+            into.push((
+                path.display().to_string(),
+                fs::read_to_string(&path).unwrap(),
+            ));
         }
     }
 }
@@ -42,19 +45,29 @@ fn files_of(directory: &Path, module: &str) -> Vec<(String, String)> {
     }
     let single = directory.join(format!("{module}.rs"));
     if single.exists() {
-        files.push((single.display().to_string(), fs::read_to_string(&single).unwrap()));
+        files.push((
+            single.display().to_string(),
+            fs::read_to_string(&single).unwrap(),
+        ));
     }
     files
 }
 
 /// The crate modules a source text names: every `crate::module`, also inside braces; its tests left out.
 fn named(text: &str) -> Vec<String> {
-    let code: String =
-        text.lines().filter(|l| !l.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
+    let code: String = text
+        .lines()
+        .filter(|l| !l.trim_start().starts_with("//"))
+        .collect::<Vec<_>>()
+        .join("\n");
     let code = code.split("#[cfg(test)]").next().unwrap().to_owned();
     let mut names = Vec::new();
     for rest in code.split("crate::").skip(1) {
-        let word = |s: &str| s.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
+        let word = |s: &str| {
+            s.chars()
+                .take_while(|c| c.is_alphanumeric() || *c == '_')
+                .collect::<String>()
+        };
         match rest.strip_prefix('{') {
             None => names.push(word(rest)),
             Some(group) => {
@@ -85,7 +98,11 @@ fn modules_name_only_what_stands_above_them() {
         let text = fs::read_to_string(&lib).unwrap();
         let modules: Vec<&str> = text
             .lines()
-            .filter_map(|l| l.trim_start_matches("pub ").strip_prefix("mod ")?.strip_suffix(';'))
+            .filter_map(|l| {
+                l.trim_start_matches("pub ")
+                    .strip_prefix("mod ")?
+                    .strip_suffix(';')
+            })
             .collect();
         for (place, module) in modules.iter().enumerate() {
             let files = files_of(lib.parent().unwrap(), module);
@@ -93,7 +110,10 @@ fn modules_name_only_what_stands_above_them() {
             for (file, text) in files {
                 let below = |name: &str| modules[place + 1..].contains(&name);
                 violations.extend(
-                    named(&text).iter().filter(|n| below(n)).map(|n| format!("{file} names crate::{n}")),
+                    named(&text)
+                        .iter()
+                        .filter(|n| below(n))
+                        .map(|n| format!("{file} names crate::{n}")),
                 );
             }
         }
@@ -105,12 +125,21 @@ fn modules_name_only_what_stands_above_them() {
 fn only_the_command_line_sees_clock_environment_terminal() {
     let mut files = Vec::new();
     sources(&repository().join("src"), &mut files);
-    for (file, text) in files
-        .iter()
-        .filter(|(f, _)| !f.contains("/cli/") && !f.ends_with("main.rs") && !f.ends_with("tests.rs"))
-    {
-        let code: String = text.lines().filter(|l| !l.trim_start().starts_with("//")).collect();
-        for word in ["std::env", "std::time", "Instant::now", "println!", "rand::rng()", "num_threads"] {
+    for (file, text) in files.iter().filter(|(f, _)| {
+        !f.contains("/cli/") && !f.ends_with("main.rs") && !f.ends_with("tests.rs")
+    }) {
+        let code: String = text
+            .lines()
+            .filter(|l| !l.trim_start().starts_with("//"))
+            .collect();
+        for word in [
+            "std::env",
+            "std::time",
+            "Instant::now",
+            "println!",
+            "rand::rng()",
+            "num_threads",
+        ] {
             assert!(!code.contains(word), "{file} uses {word}");
         }
     }

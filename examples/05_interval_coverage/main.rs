@@ -47,12 +47,34 @@ fn set(design: &Design, set: u64, draws: usize, holes: Holes) -> Result<Vec<Outc
     let mut measured = Vec::new();
     for run in 0..design.replicates {
         let drawn = design.spread.draw(&design.model, set, run)?;
-        let key = StreamKey { seed: set, scenario: "coverage", run, source: "", process: "" };
+        let key = StreamKey {
+            seed: set,
+            scenario: "coverage",
+            run,
+            source: "",
+            process: "",
+        };
         let mut signal = vec![0.0; design.samples];
         Synthesizer::new(drawn.axis(design.channel), key).fill(&mut signal);
-        lose(&mut signal, holes, &mut StreamKey { process: "holes", ..key }.generator());
-        let signals = vec![Signal { channel: design.channel, mean: 0.0, samples: signal }];
-        let recording = Recording { name: run.to_string(), rate_hz: design.model.rate_hz, signals };
+        lose(
+            &mut signal,
+            holes,
+            &mut StreamKey {
+                process: "holes",
+                ..key
+            }
+            .generator(),
+        );
+        let signals = vec![Signal {
+            channel: design.channel,
+            mean: 0.0,
+            samples: signal,
+        }];
+        let recording = Recording {
+            name: run.to_string(),
+            rate_hz: design.model.rate_hz,
+            signals,
+        };
         measured.extend(replicates(&recording, Some(design.levels), &design.tuning)?);
     }
     let settings = Settings {
@@ -67,38 +89,69 @@ fn set(design: &Design, set: u64, draws: usize, holes: Holes) -> Result<Vec<Outc
     };
     let groups = grouped(measured, Pool::Axes);
     let mut outcomes = calibrate(&groups, &settings)?;
-    infer(&groups, &mut outcomes, &settings, Bootstrap { draws, seed: set });
+    infer(
+        &groups,
+        &mut outcomes,
+        &settings,
+        Bootstrap { draws, seed: set },
+    );
     Ok(outcomes)
 }
 
 fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let number = |i: usize, default: usize| arguments.get(i).map_or(Ok(default), |a| a.parse::<usize>());
+    let number =
+        |i: usize, default: usize| arguments.get(i).map_or(Ok(default), |a| a.parse::<usize>());
     let (sets, samples, draws) = (number(0, 200)?, number(1, 1 << 16)?, number(2, 199)?);
     let share = arguments.get(4).map_or(Ok(0.0), |a| a.parse::<f64>())? / 100.0;
-    let holes = Holes { share, burst: number(5, 1)? };
+    let holes = Holes {
+        share,
+        burst: number(5, 1)?,
+    };
     let name = arguments.get(3).map_or("paper", String::as_str);
     let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/paper_fig2.toml");
-    let design = case(name, efficiency_file::read(&study)?.design.with_samples(samples))?;
+    let design = case(
+        name,
+        efficiency_file::read(&study)?.design.with_samples(samples),
+    )?;
     let aim = target(&design)?;
-    let (names, truth) = (Design::parameters(&aim.fit.composite), Design::values(&aim.fit.composite));
-    let all: Vec<Vec<Outcome>> =
-        (0..sets as u64).into_par_iter().map(|s| set(&design, s, draws, holes)).collect::<Result<_, _>>()?;
+    let (names, truth) = (
+        Design::parameters(&aim.fit.composite),
+        Design::values(&aim.fit.composite),
+    );
+    let all: Vec<Vec<Outcome>> = (0..sets as u64)
+        .into_par_iter()
+        .map(|s| set(&design, s, draws, holes))
+        .collect::<Result<_, _>>()?;
     println!(
         "{name}: {sets} sets, {samples} samples, {draws} draws; mean of estimate over truth, and its standard error; truth in \
          the 95 % interval (below it, above it, no interval)"
     );
     for (e, estimator) in design.estimators.iter().enumerate() {
-        let rejected = all
-            .iter()
-            .filter(|o| o[e].inference.as_ref().and_then(|i| i.goodness).is_some_and(|g| g.p_value <= 0.05));
-        println!("{}: J-test rejects {:.1} % at 5 %", estimator.name(), percent(rejected.count(), sets));
+        let rejected = all.iter().filter(|o| {
+            o[e].inference
+                .as_ref()
+                .and_then(|i| i.goodness)
+                .is_some_and(|g| g.p_value <= 0.05)
+        });
+        println!(
+            "{}: J-test rejects {:.1} % at 5 %",
+            estimator.name(),
+            percent(rejected.count(), sets)
+        );
         for (p, (name, truth)) in names.iter().zip(&truth).enumerate() {
-            let (mean, error) =
-                mean_ratio(all.iter().map(|o| Design::values(&o[e].fit.composite)[p]), *truth);
-            let ends = || all.iter().filter_map(|o| Some(&o[e].inference.as_ref()?.intervals[p]));
-            let (above, below) =
-                (ends().filter(|i| i.low > *truth).count(), ends().filter(|i| i.high < *truth).count());
+            let (mean, error) = mean_ratio(
+                all.iter().map(|o| Design::values(&o[e].fit.composite)[p]),
+                *truth,
+            );
+            let ends = || {
+                all.iter()
+                    .filter_map(|o| Some(&o[e].inference.as_ref()?.intervals[p]))
+            };
+            let (above, below) = (
+                ends().filter(|i| i.low > *truth).count(),
+                ends().filter(|i| i.high < *truth).count(),
+            );
             let none = ends().filter(|i| i.low.is_nan()).count();
             let inside = percent(sets - above - below - none, sets - none);
             let [above, below, none] = [above, below, none].map(|n| percent(n, sets));

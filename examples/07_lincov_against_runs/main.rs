@@ -36,9 +36,18 @@ const STRONGER: [(&str, Kind, usize); 5] = [
 /// What is there beside noise; the filter of 21 states expects scale factors.
 const BESIDE: [(&str, &str); 5] = [
     ("as believed", ""),
-    ("turn-on bias", "imu = { turn_on_bias_accel_m_s2 = 0.02, turn_on_bias_gyro_rad_s = 2e-4 }"),
-    ("scale factor", "imu = { scale_ppm_accel = 1000, scale_ppm_gyro = 1000 }"),
-    ("coloured GNSS", "gnss = { correlated_pos_sigma_m = [3, 3, 5], correlation_time_s = 60 }"),
+    (
+        "turn-on bias",
+        "imu = { turn_on_bias_accel_m_s2 = 0.02, turn_on_bias_gyro_rad_s = 2e-4 }",
+    ),
+    (
+        "scale factor",
+        "imu = { scale_ppm_accel = 1000, scale_ppm_gyro = 1000 }",
+    ),
+    (
+        "coloured GNSS",
+        "gnss = { correlated_pos_sigma_m = [3, 3, 5], correlation_time_s = 60 }",
+    ),
     ("lever arm", "gnss = { lever_arm_m = [1.0, -0.5, -1.2] }"),
 ];
 
@@ -52,7 +61,10 @@ const EVERY_S: usize = 10;
 fn stronger(model: &Model, kind: Kind, which: usize) -> Result<Model, Failure> {
     let mut stronger = model.clone();
     for channel in Channel::ALL {
-        let mut own = stronger.axes[channel.index()].processes.iter_mut().filter(|p| p.kind() == kind);
+        let mut own = stronger.axes[channel.index()]
+            .processes
+            .iter_mut()
+            .filter(|p| p.kind() == kind);
         let process = own.nth(which).ok_or("the model has no such process")?;
         let parameter = kind.amplitude().name();
         let value = process.values().last().copied().unwrap_or(0.0);
@@ -83,7 +95,10 @@ fn compare(
     for ((states, belief), sampled) in FilterStates::ALL.iter().zip(&beliefs).zip(&sampled) {
         let expected =
             Expected::along(&track, &experiment, belief, truth).ok_or("the covariance ran away")?;
-        println!("| {name} | {case} | {states} | {} |", departures(sampled, &expected));
+        println!(
+            "| {name} | {case} | {states} | {} |",
+            departures(sampled, &expected)
+        );
     }
     Ok(())
 }
@@ -94,7 +109,11 @@ fn departures(sampled: &RunResult, expected: &Expected) -> String {
     let mut within_from_s = 0.0;
     let (mut beyond, mut all, mut worst) = (0, 0, 0.0_f64);
     let farther = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
-    for (s, e) in epochs(sampled).iter().zip(&expected.epochs).step_by(EVERY_S) {
+    for (s, e) in epochs(sampled)
+        .iter()
+        .zip(&expected.epochs)
+        .step_by(EVERY_S)
+    {
         for i in 0..9 {
             let excess = 100.0 * (s.asee.0[i].value / e.asee.0[i].value - 1.0);
             asee = farther(asee, excess);
@@ -108,7 +127,9 @@ fn departures(sampled: &RunResult, expected: &Expected) -> String {
         nees = farther(nees, (s.nees.value - e.nees.value) / s.nees.std_error);
         // where nearly nothing is left outside, one run more or less is the scatter
         let share = e.coverage.clamp(0.0, 1.0);
-        let error = (share * (1.0 - share) / s.count as f64).sqrt().max(1.0 / s.count as f64);
+        let error = (share * (1.0 - share) / s.count as f64)
+            .sqrt()
+            .max(1.0 / s.count as f64);
         coverage = farther(coverage, (s.coverage - e.coverage) / error);
     }
     let quantiles = quantiles_at_ends(sampled, expected).fold(0.0, farther);
@@ -121,9 +142,16 @@ fn departures(sampled: &RunResult, expected: &Expected) -> String {
 /// standard deviations.
 fn quantiles_at_ends(sampled: &RunResult, expected: &Expected) -> impl Iterator<Item = f64> {
     let both = |(i, outage): (usize, &OutageMetrics)| {
-        [(0.5, outage.horizontal_p50_m.value), (0.95, outage.horizontal_p95_m.value)].map(|(p, quantile)| {
-            let below =
-                sampled.runs.iter().filter(|r| r.outages[i].horizontal_error_end_m <= quantile).count();
+        [
+            (0.5, outage.horizontal_p50_m.value),
+            (0.95, outage.horizontal_p95_m.value),
+        ]
+        .map(|(p, quantile)| {
+            let below = sampled
+                .runs
+                .iter()
+                .filter(|r| r.outages[i].horizontal_error_end_m <= quantile)
+                .count();
             let count = sampled.runs.len() as f64;
             (below as f64 - p * count) / (p * (1.0 - p) * count).sqrt()
         })
@@ -136,15 +164,19 @@ fn main() -> Result<(), Failure> {
     let runs: u64 = arguments.next().map_or(Ok(2000), |a| a.parse())?;
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let model = model_file::read(&here.join("calib_data/consumer_mems.toml"))?.model;
-    let mut truths: Vec<(&str, &str, Model)> =
-        BESIDE.iter().map(|(case, settings)| (*case, *settings, model.clone())).collect();
+    let mut truths: Vec<(&str, &str, Model)> = BESIDE
+        .iter()
+        .map(|(case, settings)| (*case, *settings, model.clone()))
+        .collect();
     for (case, kind, which) in STRONGER {
         truths.push((case, "", stronger(&model, kind, which)?));
     }
     let (wanted, mut names): (Vec<String>, Vec<String>) =
         arguments.partition(|a| truths.iter().any(|(case, _, _)| case == a));
     if names.is_empty() {
-        names = ["land_vehicle", "figure_eight", "fixed_wing"].map(str::to_owned).to_vec();
+        names = ["land_vehicle", "figure_eight", "fixed_wing"]
+            .map(str::to_owned)
+            .to_vec();
     }
     println!("{runs} runs\n");
     println!(
@@ -156,7 +188,12 @@ fn main() -> Result<(), Failure> {
         let (trajectory, _) = trajectory_file::load(&file, &trajectory_file::Options::default())?;
         for (seed, (case, settings, truth)) in (1..).zip(&truths) {
             if wanted.is_empty() || wanted.iter().any(|w| w == case) {
-                compare((&trajectory, name), (case, settings), (&model, truth), (runs, seed))?;
+                compare(
+                    (&trajectory, name),
+                    (case, settings),
+                    (&model, truth),
+                    (runs, seed),
+                )?;
             }
         }
     }

@@ -56,24 +56,42 @@ impl Study {
         contamination: Option<&Contamination>,
     ) -> Result<Recording, Failure> {
         let (model, spread) = (&self.file.model, self.file.spread.as_ref());
-        let imu = VirtualImu { model, spread, contamination, seed };
+        let imu = VirtualImu {
+            model,
+            spread,
+            contamination,
+            seed,
+        };
         Ok(imu.recording(replicate, &Channel::ALL, SAMPLES)?)
     }
 
     /// Laboratory `seed`: leave-one-out, and what is true of every fold's models on fresh recordings.
     fn outcome(&self, seed: u64) -> Result<Outcome, Failure> {
-        let settings = Settings { rate_hz: self.file.model.rate_hz, ..Settings::default() };
+        let settings = Settings {
+            rate_hz: self.file.model.rate_hz,
+            ..Settings::default()
+        };
         let recordings: Vec<Recording> = (1..=self.recordings)
             .map(|k| self.recording(seed, k, self.recorded.as_ref()))
             .collect::<Result<_, _>>()?;
         let unit = |r: &Recording| {
             let replicates = replicates(r, Some(SCALES), &settings.tuning)?;
-            Ok::<_, Failure>(Unit { name: r.name.clone(), replicates })
+            Ok::<_, Failure>(Unit {
+                name: r.name.clone(),
+                replicates,
+            })
         };
         let units = recordings.iter().map(unit).collect::<Result<_, _>>()?;
         let laboratory = Laboratory::new(units, settings, None);
         let leave_out = |k: usize, r: &Recording| {
-            self.drive.leave_out(&laboratory, k, std::slice::from_ref(r), &self.candidates, RUNS, &|_| ())
+            self.drive.leave_out(
+                &laboratory,
+                k,
+                std::slice::from_ref(r),
+                &self.candidates,
+                RUNS,
+                &|_| (),
+            )
         };
         let folds: Vec<(String, Fold)> = recordings
             .iter()
@@ -95,14 +113,18 @@ impl Study {
         };
         let fresh: Vec<Recording> = (0..FRESH).map(one).collect::<Result<_, _>>()?;
         let models = self.drive.models(laboratory, None, &self.candidates)?;
-        let scores = self.drive.scores(&self.candidates, &models, &fresh, RUNS * FRESH)?;
+        let scores = self
+            .drive
+            .scores(&self.candidates, &models, &fresh, RUNS * FRESH)?;
         let scores = scores.ok_or("a recording is shorter than the drive")?;
         Ok(scores.iter().map(|s| s.log_score).collect())
     }
 
     fn judged(&self, ranking: &Ranking, truth: Vec<f64>) -> Outcome {
         let eligible = || (0..truth.len()).filter(|c| self.candidates[*c].is_eligible());
-        let best = eligible().max_by(|a, b| truth[*a].total_cmp(&truth[*b])).unwrap_or(0);
+        let best = eligible()
+            .max_by(|a, b| truth[*a].total_cmp(&truth[*b]))
+            .unwrap_or(0);
         let winner = ranking.winner().index;
         let tied = |c: usize| ranking.candidates.iter().any(|p| p.index == c && p.tied);
         let others = ranking.candidates.iter().filter(|p| p.index != winner);
@@ -111,7 +133,13 @@ impl Study {
             let difference = truth[p.index] - truth[winner];
             low <= difference && difference <= high
         });
-        Outcome { right: tied(best), best: best == winner, tells: ranking.tells, held: held.collect(), truth }
+        Outcome {
+            right: tied(best),
+            best: best == winner,
+            tells: ranking.tells,
+            held: held.collect(),
+            truth,
+        }
     }
 }
 
@@ -121,7 +149,8 @@ fn contamination(name: &str, rate_hz: f64) -> Result<Contamination, Failure> {
 
 fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let number = |i: usize, default: u64| arguments.get(i).map_or(Ok(default), |a| a.parse::<u64>());
+    let number =
+        |i: usize, default: u64| arguments.get(i).map_or(Ok(default), |a| a.parse::<u64>());
     let (laboratories, recordings) = (number(0, 100)?, number(1, 6)?);
     let case = arguments.get(2).map_or("clean", String::as_str);
     let here = |name: &str| -> PathBuf { Path::new(env!("CARGO_MANIFEST_DIR")).join(name) };
@@ -131,10 +160,19 @@ fn main() -> Result<(), Failure> {
         "clean" => None,
         scenario => Some(contamination(&format!("section5-{scenario}"), rate_hz)?),
     };
-    let operated = if case.ends_with("clean") { None } else { recorded.clone() };
-    let (trajectory, _) =
-        load_trajectory(&here("trajectories/figure_eight.toml"), &TrajectoryOptions::default())?;
-    let outage = Outage { start_s: 60.0, end_s: 90.0 };
+    let operated = if case.ends_with("clean") {
+        None
+    } else {
+        recorded.clone()
+    };
+    let (trajectory, _) = load_trajectory(
+        &here("trajectories/figure_eight.toml"),
+        &TrajectoryOptions::default(),
+    )?;
+    let outage = Outage {
+        start_s: 60.0,
+        end_s: 90.0,
+    };
     let drive = Drive::new(&trajectory, Scenario::default(), vec![outage], rate_hz, 1)?;
     let candidates: Vec<Candidate> = ["awv N2", "sr-awv N2", "dr-awv N2", "awv WN+RW"]
         .iter()
@@ -143,14 +181,26 @@ fn main() -> Result<(), Failure> {
             Ok::<_, Failure>(Candidate::new(estimator.parse()?, model.parse()?))
         })
         .collect::<Result<_, _>>()?;
-    let study = Study { file, drive, candidates, recorded, operated, recordings };
-    let all: Vec<Outcome> =
-        (1..=laboratories).into_par_iter().map(|seed| study.outcome(seed)).collect::<Result<_, _>>()?;
+    let study = Study {
+        file,
+        drive,
+        candidates,
+        recorded,
+        operated,
+        recordings,
+    };
+    let all: Vec<Outcome> = (1..=laboratories)
+        .into_par_iter()
+        .map(|seed| study.outcome(seed))
+        .collect::<Result<_, _>>()?;
     let percent = |count: usize, of: usize| 100.0 * count as f64 / of as f64;
     let share = |of: fn(&Outcome) -> bool| percent(all.iter().filter(|o| of(o)).count(), all.len());
     let held: Vec<bool> = all.iter().flat_map(|o| o.held.clone()).collect();
     println!("{case}: {laboratories} laboratories of {recordings} recordings of {SAMPLES} samples");
-    println!("the winner is truly best, or not told from what is: {:.1} %", share(|o| o.right));
+    println!(
+        "the winner is truly best, or not told from what is: {:.1} %",
+        share(|o| o.right)
+    );
     println!(
         "the winner is truly best: {:.1} %; the data tell: {:.1} %",
         share(|o| o.best),

@@ -24,7 +24,11 @@ pub(crate) struct Answer {
 impl Answer {
     pub(crate) fn new(answered: Answered, hidden: String, warnings: Vec<String>) -> Self {
         let unmet = answered.unmet.map(|unmet| unmet.to_string());
-        Self { files: answered.files, hidden, ..Self::of(answered.json, answered.document, unmet, warnings) }
+        Self {
+            files: answered.files,
+            hidden,
+            ..Self::of(answered.json, answered.document, unmet, warnings)
+        }
     }
 
     /// An answer whose files are where the engine wrote them.
@@ -34,7 +38,14 @@ impl Answer {
         unmet: Option<String>,
         warnings: Vec<String>,
     ) -> Self {
-        Self { json, document, files: Vec::new(), unmet, hidden: String::new(), warnings }
+        Self {
+            json,
+            document,
+            files: Vec::new(),
+            unmet,
+            hidden: String::new(),
+            warnings,
+        }
     }
 
     /// A text without the directory of what came as arrays. JSON writes the backslashes of Windows twice.
@@ -42,7 +53,8 @@ impl Answer {
         if self.hidden.is_empty() {
             return text.to_owned();
         }
-        text.replace(&self.hidden.replace('\\', "\\\\"), "").replace(&self.hidden, "")
+        text.replace(&self.hidden.replace('\\', "\\\\"), "")
+            .replace(&self.hidden, "")
     }
 
     fn file(&self, py: Python<'_>, name: &str) -> PyResult<&str> {
@@ -74,7 +86,12 @@ impl Answer {
 
     /// Its verdict, a line each.
     fn verdict(&self) -> Vec<String> {
-        self.document.verdict.lines.iter().map(|line| self.shown(line)).collect()
+        self.document
+            .verdict
+            .lines
+            .iter()
+            .map(|line| self.shown(line))
+            .collect()
     }
 
     /// As a page of its own.

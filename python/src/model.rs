@@ -31,8 +31,14 @@ fn read(py: Python<'_>, text: &str, path: Option<&str>) -> PyResult<ModelFile> {
 pub(crate) fn model_contents(py: Python<'_>, text: &str, path: Option<&str>) -> PyResult<String> {
     let file = read(py, text, path)?;
     let mut channels = Map::new();
-    for channel in Channel::ALL.into_iter().filter(|channel| !file.missing.contains(channel)) {
-        channels.insert(channel.to_string(), json!(file.model.axis(channel).processes));
+    for channel in Channel::ALL
+        .into_iter()
+        .filter(|channel| !file.missing.contains(channel))
+    {
+        channels.insert(
+            channel.to_string(),
+            json!(file.model.axis(channel).processes),
+        );
     }
     Ok(json!({ "rate_hz": file.model.rate_hz, "channels": channels }).to_string())
 }
@@ -40,7 +46,11 @@ pub(crate) fn model_contents(py: Python<'_>, text: &str, path: Option<&str>) -> 
 /// The model file of a data sheet, and what is doubtful about it; the request is TOML.
 #[pyfunction]
 #[pyo3(signature = (request, hidden))]
-pub(crate) fn datasheet(py: Python<'_>, request: &str, hidden: &str) -> PyResult<(String, Vec<String>)> {
+pub(crate) fn datasheet(
+    py: Python<'_>,
+    request: &str,
+    hidden: &str,
+) -> PyResult<(String, Vec<String>)> {
     let made = answered::request::<DatasheetRequest>(request).and_then(|request| request.model());
     let made = made.map_err(|failure| error::of_failure(py, &failure, hidden))?;
     Ok((model_file::to_toml(&made.file), made.doubts))
@@ -65,23 +75,38 @@ pub(crate) fn model_recording<'py>(
     contaminate: Option<&str>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let file = read(py, text, None)?;
-    let found = contaminate.map(|name| contamination_file::find(name, file.model.rate_hz)).transpose();
+    let found = contaminate
+        .map(|name| contamination_file::find(name, file.model.rate_hz))
+        .transpose();
     let contamination = found.map_err(|e| error::of_failure(py, &Failure::from(e), ""))?;
     let made = work(py, None, move |meter| {
         let spread = file.spread.as_ref().filter(|_| spread);
-        let imu = VirtualImu { model: &file.model, spread, contamination: contamination.as_ref(), seed };
+        let imu = VirtualImu {
+            model: &file.model,
+            spread,
+            contamination: contamination.as_ref(),
+            seed,
+        };
         let model = imu.model_of(replicate)?;
-        let present = Channel::ALL.into_iter().filter(|channel| !file.missing.contains(channel));
+        let present = Channel::ALL
+            .into_iter()
+            .filter(|channel| !file.missing.contains(channel));
         let signal = |channel| {
             meter.advance(1);
             Ok((channel, imu.signal(&model, replicate, channel, samples)?))
         };
-        present.map(signal).collect::<Result<Vec<_>, ReplicateError>>()
+        present
+            .map(signal)
+            .collect::<Result<Vec<_>, ReplicateError>>()
     })?;
     let made = made.map_err(|e| error::refused(py, &e.to_string()))?;
     let columns = PyDict::new(py);
     for (channel, samples) in made {
-        let unit = if channel.sensor == Sensor::Accel { "m_s2" } else { "rad_s" };
+        let unit = if channel.sensor == Sensor::Accel {
+            "m_s2"
+        } else {
+            "rad_s"
+        };
         let name = format!("{}_{}_{unit}", channel.sensor.name(), channel.axis.name());
         columns.set_item(name, PyArray1::from_vec(py, samples))?;
     }
@@ -119,16 +144,26 @@ pub(crate) fn model_practical(
 ) -> PyResult<String> {
     let file = read(py, text, None)?;
     let refused = |message: String| error::refused(py, &message);
-    let policy: Policy = policy.parse().map_err(|e| refused(format!("policy: {e}")))?;
+    let policy: Policy = policy
+        .parse()
+        .map_err(|e| refused(format!("policy: {e}")))?;
     let mut sensors = Map::new();
     for sensor in Sensor::ALL {
-        let present = Channel::ALL.into_iter().filter(|c| c.sensor == sensor && !file.missing.contains(c));
+        let present = Channel::ALL
+            .into_iter()
+            .filter(|c| c.sensor == sensor && !file.missing.contains(c));
         let axes: Vec<&Composite> = present.map(|channel| file.model.axis(channel)).collect();
         if axes.is_empty() {
             continue;
         }
         let horizon = Horizon { from_s, to_s };
-        let found = AxisParameters::of(&axes, file.model.rate_hz, horizon, policy, LONGEST_S.max(to_s));
+        let found = AxisParameters::of(
+            &axes,
+            file.model.rate_hz,
+            horizon,
+            policy,
+            LONGEST_S.max(to_s),
+        );
         let found = found.map_err(|e| refused(format!("{}: {e}", sensor.name())))?;
         sensors.insert(sensor.name().to_owned(), figures(sensor, &found));
     }
@@ -149,10 +184,16 @@ pub(crate) fn model_export(
 ) -> PyResult<String> {
     let file = read(py, text, None)?;
     let refused = |message: String| error::refused(py, &message);
-    let target: Target = target.parse().map_err(|e| refused(format!("target: {e}")))?;
-    let policy: Policy = policy.parse().map_err(|e| refused(format!("policy: {e}")))?;
+    let target: Target = target
+        .parse()
+        .map_err(|e| refused(format!("target: {e}")))?;
+    let policy: Policy = policy
+        .parse()
+        .map_err(|e| refused(format!("policy: {e}")))?;
     let export = exported(&file, target, policy, Horizon { from_s, to_s });
-    Ok(export.map_err(|e| refused(format!("{name}: {e}")))?.text(name))
+    Ok(export
+        .map_err(|e| refused(format!("{name}: {e}")))?
+        .text(name))
 }
 
 /// Longest averaging time at which a minimum of the Allan deviation is believed (s).
@@ -161,9 +202,12 @@ const LONGEST_S: f64 = 10_000.0;
 fn figures(sensor: Sensor, found: &AxisParameters) -> Value {
     // of an accelerometer, of a gyroscope
     let [density, walk, bias, floor] = match sensor {
-        Sensor::Accel => {
-            ["density_m_s2_per_sqrt_hz", "walk_m_s3_per_sqrt_hz", "bias_sigma_m_s2", "bias_instability_m_s2"]
-        }
+        Sensor::Accel => [
+            "density_m_s2_per_sqrt_hz",
+            "walk_m_s3_per_sqrt_hz",
+            "bias_sigma_m_s2",
+            "bias_instability_m_s2",
+        ],
         Sensor::Gyro => [
             "density_rad_s_per_sqrt_hz",
             "walk_rad_s2_per_sqrt_hz",
@@ -171,8 +215,16 @@ fn figures(sensor: Sensor, found: &AxisParameters) -> Value {
             "bias_instability_rad_s",
         ],
     };
-    let Pair { density: n, walk: k, .. } = found.walk;
-    let (sigma, t_corr_s) = found.markov.markov.map(|markov| (markov.sigma, markov.t_corr_s)).unzip();
+    let Pair {
+        density: n,
+        walk: k,
+        ..
+    } = found.walk;
+    let (sigma, t_corr_s) = found
+        .markov
+        .markov
+        .map(|markov| (markov.sigma, markov.t_corr_s))
+        .unzip();
     let instability = found.minimum.as_ref().map(Minimum::bias_instability);
     json!({ density: n, walk: k, bias: sigma, "bias_correlation_time_s": t_corr_s, floor: instability })
 }

@@ -32,20 +32,30 @@ pub(crate) struct Clerk<'a> {
 
 impl<'a> Clerk<'a> {
     pub(crate) fn new(meter: &'a Meter) -> Self {
-        Self { meter, warnings: Mutex::default() }
+        Self {
+            meter,
+            warnings: Mutex::default(),
+        }
     }
 
     pub(crate) fn warn_of(&self, doubt: String) {
-        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(doubt);
+        self.warnings
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(doubt);
     }
 
     fn warn(&self, said: Vec<Said>) {
-        let doubts = said.into_iter().filter(|said| said.importance == Importance::Warning);
+        let doubts = said
+            .into_iter()
+            .filter(|said| said.importance == Importance::Warning);
         doubts.for_each(|said| self.warn_of(said.text));
     }
 
     pub(crate) fn warnings(self) -> Vec<String> {
-        self.warnings.into_inner().unwrap_or_else(PoisonError::into_inner)
+        self.warnings
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -102,7 +112,10 @@ pub(crate) fn answer(
         Some(failure) => error::of_failure(py, &failure, &hidden),
         None => error::refused(py, "there is no such command"),
     })?;
-    let warnings = warnings.iter().map(|doubt| error::shown(doubt, &hidden)).collect();
+    let warnings = warnings
+        .iter()
+        .map(|doubt| error::shown(doubt, &hidden))
+        .collect();
     Ok(Answer::new(answered, hidden, warnings))
 }
 

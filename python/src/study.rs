@@ -8,7 +8,8 @@ use nav_sim::failure::Failure;
 use nav_sim::navigation::simulation::REPORTED_NAMES;
 use nav_sim::observer::Observer;
 use nav_sim::study::{
-    self, Importance, MergeOptions, PlanOptions, Planned, Remark, RunOptions, Shard, StudyError, Writing,
+    self, Importance, MergeOptions, PlanOptions, Planned, Remark, RunOptions, Shard, StudyError,
+    Writing,
 };
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -49,7 +50,10 @@ fn watched<T: Send + 'static>(
         let done = part(&clerk);
         (done, clerk.warnings())
     })?;
-    Ok((done.map_err(|e| error::of_failure(py, &Failure::from(e), ""))?, warnings))
+    Ok((
+        done.map_err(|e| error::of_failure(py, &Failure::from(e), ""))?,
+        warnings,
+    ))
 }
 
 /// Plans a study: its units, and what was warned of.
@@ -64,7 +68,12 @@ pub(crate) fn study_plan(
 ) -> PyResult<(usize, Vec<String>)> {
     watched(py, progress, move |clerk| {
         let seed = |of_study: Option<u64>| seed.or(of_study).unwrap_or(SEED);
-        let options = PlanOptions { seed: &seed, threads: threads(), clock: None, writing: Writing::Write };
+        let options = PlanOptions {
+            seed: &seed,
+            threads: threads(),
+            clock: None,
+            writing: Writing::Write,
+        };
         let planned = study::plan(&study, &directory, &options, clerk)?.planned;
         Ok(planned.plan.unit_count(&planned.grid))
     })
@@ -87,7 +96,14 @@ pub(crate) fn study_run(
     };
     watched(py, progress, move |clerk| {
         let planned = Planned::open(&study, &directory, None)?;
-        let ran = study::run(&planned, &RunOptions { shard, threads: threads() }, clerk)?;
+        let ran = study::run(
+            &planned,
+            &RunOptions {
+                shard,
+                threads: threads(),
+            },
+            clerk,
+        )?;
         Ok((ran.finished, ran.left))
     })
 }
@@ -104,7 +120,14 @@ pub(crate) fn study_merge(
     let (merged, warnings) = watched(py, progress, move |clerk| {
         let planned = Planned::open(&study, &directory, None)?;
         let states = (0..REPORTED_NAMES.len()).collect();
-        study::merge(&planned, &MergeOptions { states, threads: threads() }, clerk)
+        study::merge(
+            &planned,
+            &MergeOptions {
+                states,
+                threads: threads(),
+            },
+            clerk,
+        )
     })?;
     let unmet = (merged.diverged > 0).then(|| format!("{} runs diverged", merged.diverged));
     let answer = Answer::of(merged.summary.to_string(), merged.document, unmet, warnings);

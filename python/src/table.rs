@@ -7,8 +7,9 @@ use pyo3::types::{PyDict, PyList};
 /// A CSV with a header: numbers as arrays, where a cell without one is NaN; other columns as lists of texts.
 #[pyfunction]
 pub(crate) fn columns<'py>(py: Python<'py>, text: &str) -> PyResult<Bound<'py, PyDict>> {
-    let (names, columns) =
-        py.detach(|| parse(text)).map_err(|e| pyo3::exceptions::PyValueError::new_err(e.to_string()))?;
+    let (names, columns) = py
+        .detach(|| parse(text))
+        .map_err(|e| pyo3::exceptions::PyValueError::new_err(e.to_string()))?;
     let table = PyDict::new(py);
     for (name, cells) in names.into_iter().zip(columns) {
         match cells {
@@ -41,7 +42,11 @@ impl Column {
 }
 
 fn number(cell: &str) -> Option<f64> {
-    if cell.is_empty() { Some(f64::NAN) } else { cell.parse().ok() }
+    if cell.is_empty() {
+        Some(f64::NAN)
+    } else {
+        cell.parse().ok()
+    }
 }
 
 fn parse(text: &str) -> Result<(Vec<String>, Vec<Column>), csv::Error> {
@@ -50,7 +55,10 @@ fn parse(text: &str) -> Result<(Vec<String>, Vec<Column>), csv::Error> {
     let mut columns: Vec<Column> = names.iter().map(|_| Column::Numbers(Vec::new())).collect();
     let mut record = csv::StringRecord::new();
     while reader.read_record(&mut record)? {
-        columns.iter_mut().zip(&record).for_each(|(column, cell)| column.push(cell));
+        columns
+            .iter_mut()
+            .zip(&record)
+            .for_each(|(column, cell)| column.push(cell));
     }
     Ok((names, columns))
 }

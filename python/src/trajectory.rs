@@ -11,8 +11,18 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
 
-const COLUMNS: [&str; 10] =
-    ["t_s", "lat_deg", "lon_deg", "h_m", "v_n_m_s", "v_e_m_s", "v_d_m_s", "roll_deg", "pitch_deg", "yaw_deg"];
+const COLUMNS: [&str; 10] = [
+    "t_s",
+    "lat_deg",
+    "lon_deg",
+    "h_m",
+    "v_n_m_s",
+    "v_e_m_s",
+    "v_d_m_s",
+    "roll_deg",
+    "pitch_deg",
+    "yaw_deg",
+];
 
 /// Columns, first and last instant (s), doubts.
 type States<'py> = (Bound<'py, PyDict>, (f64, f64), Vec<String>);
@@ -27,7 +37,8 @@ pub(crate) fn trajectory_states<'py>(
     hidden: &str,
 ) -> PyResult<States<'py>> {
     if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
-        let message = format!("rate_hz: {rate_hz} is not a rate above 0 and up to {MAX_RATE_HZ} Hz");
+        let message =
+            format!("rate_hz: {rate_hz} is not a rate above 0 and up to {MAX_RATE_HZ} Hz");
         return Err(error::refused(py, &message));
     }
     let read = work(py, None, move |_| {
@@ -40,16 +51,42 @@ pub(crate) fn trajectory_states<'py>(
             let RollPitchYaw { roll, pitch, yaw } = RollPitchYaw::from_quat(state.q_b_n);
             let [n, e, d] = state.v_n.to_array();
             let [lat, lon] = [state.lat / DEG, state.lon / DEG];
-            [t_s, lat, lon, state.h, n, e, d, roll / DEG, pitch / DEG, yaw / DEG]
+            [
+                t_s,
+                lat,
+                lon,
+                state.h,
+                n,
+                e,
+                d,
+                roll / DEG,
+                pitch / DEG,
+                yaw / DEG,
+            ]
         });
-        Ok::<_, Failure>((states.collect::<Vec<_>>(), (trajectory.start_s(), trajectory.end_s()), doubts))
+        Ok::<_, Failure>((
+            states.collect::<Vec<_>>(),
+            (trajectory.start_s(), trajectory.end_s()),
+            doubts,
+        ))
     })?;
-    let (states, span_s, doubts) = read.map_err(|failure| error::of_failure(py, &failure, hidden))?;
+    let (states, span_s, doubts) =
+        read.map_err(|failure| error::of_failure(py, &failure, hidden))?;
     let columns = PyDict::new(py);
     for (k, name) in COLUMNS.into_iter().enumerate() {
-        columns.set_item(name, PyArray1::from_vec(py, states.iter().map(|state| state[k]).collect()))?;
+        columns.set_item(
+            name,
+            PyArray1::from_vec(py, states.iter().map(|state| state[k]).collect()),
+        )?;
     }
-    Ok((columns, span_s, doubts.iter().map(|doubt| error::shown(&doubt.to_string(), hidden)).collect()))
+    Ok((
+        columns,
+        span_s,
+        doubts
+            .iter()
+            .map(|doubt| error::shown(&doubt.to_string(), hidden))
+            .collect(),
+    ))
 }
 
 /// Highest rate that is of use (Hz).

@@ -34,7 +34,12 @@ pub(crate) fn wavelet<'py>(
     let found = found.map_err(|e| error::refused(py, &format!("x: {e}")))?;
     let columns = PyDict::new(py);
     let (low, high) = found.ends.into_iter().unzip();
-    for (name, values) in [("wv", found.wv), ("edof", found.edof), ("ci_low", low), ("ci_high", high)] {
+    for (name, values) in [
+        ("wv", found.wv),
+        ("edof", found.edof),
+        ("ci_low", low),
+        ("ci_high", high),
+    ] {
         columns.set_item(name, PyArray1::from_vec(py, values))?;
     }
     Ok(columns)
@@ -44,7 +49,9 @@ pub(crate) fn wavelet<'py>(
 /// digits.
 fn without_mean(mut samples: Vec<f64>) -> Vec<f64> {
     let present = || samples.iter().filter(|v| !v.is_nan());
-    let Some(first) = present().next().copied() else { return samples };
+    let Some(first) = present().next().copied() else {
+        return samples;
+    };
     let mean = first + present().map(|v| v - first).sum::<f64>() / present().count() as f64;
     // An infinite one would make all of them so, and the first would be blamed.
     let mean = if mean.is_finite() { mean } else { 0.0 };
@@ -62,10 +69,19 @@ fn variances(
     efficiency: Option<f64>,
 ) -> Result<Variances, WaveletError> {
     let levels = scales.unwrap_or_else(|| default_levels(signal.len()));
-    let tuning = efficiency.map(|efficiency| Tuning::new(efficiency, Convention::Exact)).transpose()?;
+    let tuning = efficiency
+        .map(|efficiency| Tuning::new(efficiency, Convention::Exact))
+        .transpose()?;
     let (wv, coverage) = if signal.iter().any(|x| x.is_nan()) {
         let found = gappy(signal, levels, &tuning.unwrap_or_default())?;
-        (if tuning.is_some() { values(&found.robust) } else { found.classical }, found.coverage)
+        (
+            if tuning.is_some() {
+                values(&found.robust)
+            } else {
+                found.classical
+            },
+            found.coverage,
+        )
     } else {
         let wv = match &tuning {
             None => haar::classical(signal, levels)?,
@@ -79,8 +95,14 @@ fn variances(
         .map(|(level, covered)| (interval::edof_eta3(signal.len(), level) * covered).max(1.0));
     let edof: Vec<f64> = match efficiency {
         None => classical.collect(),
-        Some(efficiency) => classical.map(|edof| interval::edof_robust(edof, efficiency)).collect(),
+        Some(efficiency) => classical
+            .map(|edof| interval::edof_robust(edof, efficiency))
+            .collect(),
     };
-    let ends = wv.iter().zip(&edof).map(|(wv, edof)| interval::interval(*wv, *edof, CONFIDENCE)).collect();
+    let ends = wv
+        .iter()
+        .zip(&edof)
+        .map(|(wv, edof)| interval::interval(*wv, *edof, CONFIDENCE))
+        .collect();
     Ok(Variances { wv, edof, ends })
 }

@@ -69,7 +69,13 @@ pub(crate) fn work<T: Send + 'static>(
     });
     // a receiver is of one thread at a time, and `detach` asks for more
     let receiver = Mutex::new(receiver);
-    let next = || receiver.lock().map_or(Err(RecvTimeoutError::Disconnected), |r| r.recv_timeout(SLICE));
+    let next = || {
+        receiver
+            .lock()
+            .map_or(Err(RecvTimeoutError::Disconnected), |r| {
+                r.recv_timeout(SLICE)
+            })
+    };
     let mut told = (0, 0);
     loop {
         match py.detach(next) {
@@ -80,7 +86,9 @@ pub(crate) fn work<T: Send + 'static>(
             Ok(Err(panic)) => return Err(defect(py, panic.as_ref())),
             Err(RecvTimeoutError::Disconnected) => return Err(defect(py, &())),
             Err(RecvTimeoutError::Timeout) => {
-                let heard = py.check_signals().and_then(|()| tell(progress, &meter, &mut told));
+                let heard = py
+                    .check_signals()
+                    .and_then(|()| tell(progress, &meter, &mut told));
                 heard.inspect_err(|_| meter.is_stopped.store(true, Ordering::Relaxed))?;
             }
         }
@@ -99,8 +107,13 @@ fn tell(progress: Option<&Bound<'_, PyAny>>, meter: &Meter, told: &mut (u64, u64
 /// A panic, which is never of the user's making.
 fn defect(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
     let text = panic.downcast_ref::<String>().map(String::as_str);
-    let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
-    error::refused(py, &format!("a defect of nav-sim, please report it: {text}"))
+    let text = text
+        .or_else(|| panic.downcast_ref::<&str>().copied())
+        .unwrap_or("no message");
+    error::refused(
+        py,
+        &format!("a defect of nav-sim, please report it: {text}"),
+    )
 }
 
 /// Refuses to work in a fork: the threads that work stayed with the parent, and a job would wait for them for ever.
@@ -109,8 +122,7 @@ fn in_this_process(py: Python<'_>) -> PyResult<()> {
     if *FIRST.get_or_init(std::process::id) == std::process::id() {
         return Ok(());
     }
-    let hint =
-        "start workers with multiprocessing.get_context(\"spawn\"), or import nav_sim in the workers alone";
+    let hint = "start workers with multiprocessing.get_context(\"spawn\"), or import nav_sim in the workers alone";
     let message = "this process is a fork of one in which nav_sim has worked";
     Err(error::raise(py, message, None, None, Some(hint)))
 }

@@ -30,23 +30,51 @@ pub(crate) fn read_curves(
     let named = curve_file::read(path)?;
     let path = || path.display().to_string();
     let rate_hz = match (named[0].rate_hz, rate_hz) {
-        (Some(stated), Some(given)) => return Err(JobError::TwoRates { path: path(), stated, given }),
-        (stated, given) => stated.or(given).ok_or_else(|| JobError::NoRate { path: path() })?,
+        (Some(stated), Some(given)) => {
+            return Err(JobError::TwoRates {
+                path: path(),
+                stated,
+                given,
+            });
+        }
+        (stated, given) => stated
+            .or(given)
+            .ok_or_else(|| JobError::NoRate { path: path() })?,
     };
     let mut curves: Vec<(Scope, Estimator, Curve)> = Vec::new();
     for named in named {
         let estimator = named.estimator.and_then(|name| name.parse().ok());
         let estimator = estimator.unwrap_or(Estimator::Given);
-        let sensor = named.sensor.or(sensor).ok_or_else(|| JobError::NoSensor { path: path() })?;
-        let scope = Scope { sensor, axis: named.axis };
-        if curves.iter().any(|(s, e, _)| (*s, *e) == (scope, estimator)) {
-            return Err(JobError::TwoCurves { path: path(), name: scope.name(), estimator });
+        let sensor = named
+            .sensor
+            .or(sensor)
+            .ok_or_else(|| JobError::NoSensor { path: path() })?;
+        let scope = Scope {
+            sensor,
+            axis: named.axis,
+        };
+        if curves
+            .iter()
+            .any(|(s, e, _)| (*s, *e) == (scope, estimator))
+        {
+            return Err(JobError::TwoCurves {
+                path: path(),
+                name: scope.name(),
+                estimator,
+            });
         }
         curves.push((scope, estimator, named.curve));
     }
     let has = |e: &Estimator| curves.iter().any(|(_, estimator, _)| estimator == e);
     let estimators = Estimator::ALL.into_iter().filter(has).collect();
-    Ok(Curves { curves, settings: Settings { estimators, rate_hz, ..settings.clone() } })
+    Ok(Curves {
+        curves,
+        settings: Settings {
+            estimators,
+            rate_hz,
+            ..settings.clone()
+        },
+    })
 }
 
 impl Curves {
@@ -59,12 +87,20 @@ impl Curves {
         let mut groups: Vec<Group> = Vec::new();
         let mut outcomes: Vec<Outcome> = Vec::new();
         for (scope, estimator, curve) in curves {
-            let group = Group { scope, replicates: Vec::new() };
+            let group = Group {
+                scope,
+                replicates: Vec::new(),
+            };
             outcomes.push(fit_curve(&group, estimator, curve, &settings)?);
             groups.push(group);
         }
-        let calibration =
-            Calibration { groups, outcomes, settings, beginnings: Default::default(), turn_on: Vec::new() };
+        let calibration = Calibration {
+            groups,
+            outcomes,
+            settings,
+            beginnings: Default::default(),
+            turn_on: Vec::new(),
+        };
         Ok(calibration.with_inference(bootstrap, &|_| {}))
     }
 }

@@ -8,7 +8,8 @@ use crate::report::Answer;
 use crate::report::comparison_table::in_order;
 use crate::report::curves::{CurvesFile, FittedCurve};
 use nav_sim_calibration::{
-    Beginnings, Diagnosis, Outcome, Ranking, Settings, TurnOnSpread, Verdict, duration, shares, tau_s,
+    Beginnings, Diagnosis, Outcome, Ranking, Settings, TurnOnSpread, Verdict, duration, shares,
+    tau_s,
 };
 use nav_sim_document::{Cell, Document, Importance, Table, Tone, readable, short_names};
 use nav_sim_signal::imu::{Axis, Sensor};
@@ -53,9 +54,16 @@ impl ShownCalibration<'_> {
         let estimators = in_order(self.outcomes.iter().map(|(_, o)| o.estimator.name()));
         let title = format!("Stochastic calibration, {}", estimators.join(", "));
         let fits: Vec<&Outcome> = self.outcomes.iter().map(|(_, o)| *o).collect();
-        let mut document =
-            Document::new(&title, self.tone(), words::verdict(&fits, self.diagnoses, self.settings));
-        document.lead(if fits.len() > 2 { self.fits_table() } else { self.figures_table() });
+        let mut document = Document::new(
+            &title,
+            self.tone(),
+            words::verdict(&fits, self.diagnoses, self.settings),
+        );
+        document.lead(if fits.len() > 2 {
+            self.fits_table()
+        } else {
+            self.figures_table()
+        });
         for (importance, note) in self.notes(&fits) {
             document.note(importance, note);
         }
@@ -71,12 +79,18 @@ impl ShownCalibration<'_> {
     }
 
     fn tone(&self) -> Tone {
-        let rejected =
-            |o: &Outcome| o.inference.as_ref().and_then(|i| i.goodness).is_some_and(|g| g.is_rejected());
+        let rejected = |o: &Outcome| {
+            o.inference
+                .as_ref()
+                .and_then(|i| i.goodness)
+                .is_some_and(|g| g.is_rejected())
+        };
         let is_abnormal = self.diagnoses.iter().any(|d| d.verdict != Verdict::Normal);
         match () {
             () if self.outcomes.iter().any(|(_, o)| rejected(o)) => Tone::Bad,
-            () if is_abnormal || self.outcomes.iter().any(|(_, o)| o.misfit().is_some()) => Tone::Doubtful,
+            () if is_abnormal || self.outcomes.iter().any(|(_, o)| o.misfit().is_some()) => {
+                Tone::Doubtful
+            }
             () => Tone::Good,
         }
     }
@@ -85,24 +99,46 @@ impl ShownCalibration<'_> {
     fn notes(&self, fits: &[&Outcome]) -> Vec<(Importance, String)> {
         let settings = self.settings;
         let mut notes: Vec<(Importance, String)> = Vec::new();
-        notes.extend(fits.iter().find_map(|o| self.too_loud(o)).map(|line| (Importance::Warning, line)));
+        notes.extend(
+            fits.iter()
+                .find_map(|o| self.too_loud(o))
+                .map(|line| (Importance::Warning, line)),
+        );
         for sensor in Sensor::ALL {
             let lines = words::recording_notes(sensor, fits, self.diagnoses, settings).into_iter();
-            notes.extend(lines.map(|line| (Importance::Warning, format!("{}: {line}", sensor.name()))));
+            notes.extend(
+                lines.map(|line| (Importance::Warning, format!("{}: {line}", sensor.name()))),
+            );
         }
         for found in self.own_means().map(|(_, found)| found) {
             let is_stored = found.sigmas().is_some();
-            let importance = if is_stored { Importance::Warning } else { Importance::Detail };
-            notes.push((importance, format!("{}: {}", found.sensor.name(), turn_on_remark(found))));
+            let importance = if is_stored {
+                Importance::Warning
+            } else {
+                Importance::Detail
+            };
+            notes.push((
+                importance,
+                format!("{}: {}", found.sensor.name(), turn_on_remark(found)),
+            ));
         }
-        notes.extend(words::beginnings(self.beginnings, fits).map(|line| (Importance::Remark, line)));
+        notes.extend(
+            words::beginnings(self.beginnings, fits).map(|line| (Importance::Remark, line)),
+        );
         for outcome in fits {
-            let reasons = outcome.ranking.iter().flat_map(|r| reasons(r, settings.rate_hz));
+            let reasons = outcome
+                .ranking
+                .iter()
+                .flat_map(|r| reasons(r, settings.rate_hz));
             let name = words::fit_name(outcome, fits);
             let lines = reasons.chain(words::notes(outcome, settings));
             let noted = |line: String| {
                 let is_detail = line.contains("no interval");
-                let importance = if is_detail { Importance::Detail } else { Importance::Remark };
+                let importance = if is_detail {
+                    Importance::Detail
+                } else {
+                    Importance::Remark
+                };
                 (importance, format!("{name}: {line}"))
             };
             notes.extend(lines.map(noted));
@@ -115,7 +151,11 @@ impl ShownCalibration<'_> {
         const MOST_DEG_SQRT_H: f64 = 5.0;
         let is_gyro = outcome.scope.sensor == Sensor::Gyro;
         let rows = figures(outcome, self.settings.rate_hz);
-        let n = rows.first().filter(|row| is_gyro && row.name.ends_with(" N"))?.value.ok()?;
+        let n = rows
+            .first()
+            .filter(|row| is_gyro && row.name.ends_with(" N"))?
+            .value
+            .ok()?;
         (n > MOST_DEG_SQRT_H).then(|| {
             let n = readable(n);
             format!("gyro: N of {n} deg/sqrt(h), where catalogued units have 0.02 to 2: columns in degrees are named gyro_x_deg_s")
@@ -126,7 +166,11 @@ impl ShownCalibration<'_> {
     fn figures_table(&self) -> Table {
         let fits: Vec<&Outcome> = self.outcomes.iter().map(|(_, o)| *o).collect();
         let of_one = fits.iter().all(|outcome| outcome.recordings == 1);
-        let interval = if of_one { "95 %, this power-on" } else { "95 %, mean of power-ons" };
+        let interval = if of_one {
+            "95 %, this power-on"
+        } else {
+            "95 %, mean of power-ons"
+        };
         let mut table = Table::new([policy().as_str(), "value", interval, "averages of"]);
         for (index, outcome) in &self.outcomes {
             let name = words::fit_name(outcome, &fits);
@@ -140,7 +184,12 @@ impl ShownCalibration<'_> {
                 };
                 let interval = row.value.err().map_or(row.interval, str::to_owned);
                 let figure = format!("{name} {} ({})", row.name, row.unit);
-                table.row([figure.into(), value, Cell::figures(interval), row.averages.into()]);
+                table.row([
+                    figure.into(),
+                    value,
+                    Cell::figures(interval),
+                    row.averages.into(),
+                ]);
             }
         }
         table
@@ -153,7 +202,9 @@ impl ShownCalibration<'_> {
         for (_, outcome) in &self.outcomes {
             let rows = figures(outcome, rate_hz);
             let cell = |letter: &str| {
-                let row = rows.iter().find(|row| row.source.is_some() && row.name.ends_with(letter));
+                let row = rows
+                    .iter()
+                    .find(|row| row.source.is_some() && row.name.ends_with(letter));
                 row.map_or_else(
                     || "–".to_owned(),
                     |row| match row.value {
@@ -162,14 +213,34 @@ impl ShownCalibration<'_> {
                     },
                 )
             };
-            let ends = rows.first().map(|n| n.interval.as_str()).filter(|ends| !ends.is_empty());
-            let times = outcome.fit.composite.processes.iter().filter_map(|p| p.correlation_time_s(rate_hz));
+            let ends = rows
+                .first()
+                .map(|n| n.interval.as_str())
+                .filter(|ends| !ends.is_empty());
+            let times = outcome
+                .fit
+                .composite
+                .processes
+                .iter()
+                .filter_map(|p| p.correlation_time_s(rate_hz));
             let fits = outcome.misfit().map_or_else(
                 || "yes".to_owned(),
-                |m| format!("no: {} at {}", readable(m.worst.ratio), duration(tau_s(m.worst.level, rate_hz))),
+                |m| {
+                    format!(
+                        "no: {} at {}",
+                        readable(m.worst.ratio),
+                        duration(tau_s(m.worst.level, rate_hz))
+                    )
+                },
             );
             table.row([
-                format!("{} {} {}", outcome.scope.name(), outcome.estimator.name(), outcome.spec).into(),
+                format!(
+                    "{} {} {}",
+                    outcome.scope.name(),
+                    outcome.estimator.name(),
+                    outcome.spec
+                )
+                .into(),
                 Cell::figures(format!(
                     "{}{}",
                     cell(" N"),
@@ -187,9 +258,16 @@ impl ShownCalibration<'_> {
     /// The section of a fit.
     fn fit(&self, index: usize, outcome: &Outcome, fitted: &FittedCurve, document: &mut Document) {
         let rate_hz = self.settings.rate_hz;
-        document.section(&format!("{} · {}", charts::group_name(fitted), outcome.spec));
+        document.section(&format!(
+            "{} · {}",
+            charts::group_name(fitted),
+            outcome.spec
+        ));
         document.facts(&self.facts(outcome));
-        document.charts(&charts::allan(fitted, outcome, self.diagnoses, rate_hz), &charts::allan_caption());
+        document.charts(
+            &charts::allan(fitted, outcome, self.diagnoses, rate_hz),
+            &charts::allan_caption(),
+        );
         document.chart(&charts::variance(fitted, self.diagnoses), charts::CAPTION);
         document.table(&parameters(outcome, index, rate_hz));
         if let Some(ranking) = &outcome.ranking {
@@ -202,26 +280,48 @@ impl ShownCalibration<'_> {
         let fit = &outcome.fit;
         let mut facts = vec![
             ("fitted to", words::signals(outcome)),
-            ("scales", format!("{} of {}", outcome.counted_levels().len(), outcome.curve.levels.len())),
+            (
+                "scales",
+                format!(
+                    "{} of {}",
+                    outcome.counted_levels().len(),
+                    outcome.curve.levels.len()
+                ),
+            ),
             (
                 "objective",
-                format!("{} ({})", readable(fit.objective), fit.termination.name().replace('_', " ")),
+                format!(
+                    "{} ({})",
+                    readable(fit.objective),
+                    fit.termination.name().replace('_', " ")
+                ),
             ),
-            ("local minima", format!("{}, {} of them the best", fit.starts, fit.agreeing)),
+            (
+                "local minima",
+                format!("{}, {} of them the best", fit.starts, fit.agreeing),
+            ),
         ];
-        let Some(inference) = &outcome.inference else { return facts };
+        let Some(inference) = &outcome.inference else {
+            return facts;
+        };
         if let Some(g) = inference.goodness {
             let (j, expected) = (readable(g.statistic), readable(g.expected));
             facts.push((
                 "J-test",
-                format!("J = {j}, median {expected} where the model holds, p = {:.3}", g.p_value),
+                format!(
+                    "J = {j}, median {expected} where the model holds, p = {:.3}",
+                    g.p_value
+                ),
             ));
         }
         if let Some((p, most)) = outcome.differing() {
             let by = nav_sim_calibration::percent(most.between);
             facts.push((
                 "signals differ",
-                format!("by {by} at {}, beyond their noise (p = {p:.3})", duration(most.tau_s)),
+                format!(
+                    "by {by} at {}, beyond their noise (p = {p:.3})",
+                    duration(most.tau_s)
+                ),
             ));
         }
         facts
@@ -229,8 +329,11 @@ impl ShownCalibration<'_> {
 
     /// The recordings beside one another: which are abnormal, and what they change.
     fn recordings(&self, document: &mut Document) {
-        let abnormal: Vec<&Diagnosis> =
-            self.diagnoses.iter().filter(|d| d.verdict != Verdict::Normal).collect();
+        let abnormal: Vec<&Diagnosis> = self
+            .diagnoses
+            .iter()
+            .filter(|d| d.verdict != Verdict::Normal)
+            .collect();
         if abnormal.is_empty() {
             return;
         }
@@ -241,8 +344,16 @@ impl ShownCalibration<'_> {
             words::stem(&shown[place]).to_owned()
         };
         document.section("Abnormal recordings");
-        let mut table =
-            Table::new(["recording", "sensor", "finding", "scales", "x (σ)", "y (σ)", "z (σ)", "p"]);
+        let mut table = Table::new([
+            "recording",
+            "sensor",
+            "finding",
+            "scales",
+            "x (σ)",
+            "y (σ)",
+            "z (σ)",
+            "p",
+        ]);
         let mut effects = Table::new(["without", "fit", "moves by (%)", "at scale", "σ"]);
         for d in abnormal {
             let mut row = |finding: &str, scales: String, deviations: &[(Axis, f64)], p: f64| {
@@ -266,7 +377,11 @@ impl ShownCalibration<'_> {
             for (finding, alarm) in [("noise", &d.noise), ("outliers", &d.outliers)] {
                 if let Some(a) = alarm {
                     let [first, last] = a.tau_s.map(duration);
-                    let scales = if first == last { first } else { format!("{first} – {last}") };
+                    let scales = if first == last {
+                        first
+                    } else {
+                        format!("{first} – {last}")
+                    };
                     row(finding, scales, &a.deviations, a.p_value);
                 }
             }
@@ -289,17 +404,31 @@ impl ShownCalibration<'_> {
 
     /// The means of the fits that are shown, each with its place in the JSON of the command.
     fn own_means(&self) -> impl Iterator<Item = (usize, &TurnOnSpread)> {
-        let is_own = |t: &TurnOnSpread| self.outcomes.iter().any(|(_, o)| o.estimator == t.estimator);
-        self.turn_on.iter().enumerate().filter(move |(_, t)| is_own(t))
+        let is_own = |t: &TurnOnSpread| {
+            self.outcomes
+                .iter()
+                .any(|(_, o)| o.estimator == t.estimator)
+        };
+        self.turn_on
+            .iter()
+            .enumerate()
+            .filter(move |(_, t)| is_own(t))
     }
 
     /// What the recordings' means say of a turn-on bias.
     fn means(&self, document: &mut Document) {
-        let mut table = Table::new(["axis", "recordings", "spread of the means", "by noise alone", "unit"]);
+        let mut table = Table::new([
+            "axis",
+            "recordings",
+            "spread of the means",
+            "by noise alone",
+            "unit",
+        ]);
         for (i, found) in self.own_means() {
             for (k, axis) in found.axes.iter().enumerate() {
-                let number =
-                    |value: f64, key: &str| Cell::number(value, &format!("/turn_on/{i}/axes/{k}/{key}"));
+                let number = |value: f64, key: &str| {
+                    Cell::number(value, &format!("/turn_on/{i}/axes/{k}/{key}"))
+                };
                 table.row([
                     format!("{} {}", found.sensor.name(), axis.axis.name()).into(),
                     number(axis.recordings as f64, "recordings"),
@@ -326,15 +455,29 @@ fn parameters(outcome: &Outcome, index: usize, rate_hz: f64) -> Table {
     for (of, value) in model.parameters() {
         let name = of.parameter.name();
         // φ is told by its distance from 1.
-        let digits = |x: f64| if name == "phi" { format!("{x:.6}") } else { readable(x) };
+        let digits = |x: f64| {
+            if name == "phi" {
+                format!("{x:.6}")
+            } else {
+                readable(x)
+            }
+        };
         let interval = interval_of(intervals, of).map_or_else(String::new, |i| match i.absent {
             None => format!("{} … {}", digits(i.low), digits(i.high)),
             Some(_) => "not determined".to_owned(),
         });
         let source = format!("/fits/{index}/processes/{}/{name}", of.process);
-        let value = if name == "phi" { Cell::figures(digits(value)) } else { Cell::number(value, &source) };
+        let value = if name == "phi" {
+            Cell::figures(digits(value))
+        } else {
+            Cell::number(value, &source)
+        };
         let is_first = last.replace(of.process) != Some(of.process);
-        let averages = if is_first { averages(&shares[of.process], rate_hz) } else { String::new() };
+        let averages = if is_first {
+            averages(&shares[of.process], rate_hz)
+        } else {
+            String::new()
+        };
         let unit = match name {
             "phi" | "theta" => String::new(),
             "beta" => " (1/s)".to_owned(),
@@ -358,7 +501,12 @@ const SHOWN: usize = 8;
 fn candidates(ranking: &Ranking) -> Table {
     let mut table = Table::new(["model", "WVIC", "objective", "optimism", "p", "J-test p"]);
     let p = |p: Option<f64>| Cell::figures(p.map_or(String::new(), |p| format!("{p:.3}")));
-    for (i, c) in ranking.candidates.iter().enumerate().take(SHOWN.max(ranking.chosen + 1)) {
+    for (i, c) in ranking
+        .candidates
+        .iter()
+        .enumerate()
+        .take(SHOWN.max(ranking.chosen + 1))
+    {
         let chosen = if i == ranking.chosen { " (chosen)" } else { "" };
         let number = |x: f64| Cell::figures(format!("{x:.4}"));
         table.row([

@@ -41,7 +41,9 @@ pub(crate) fn figures(outcome: &Outcome, rate_hz: f64) -> Vec<Row> {
         else {
             continue;
         };
-        let own = intervals.iter().find(|i| i.of.process == index && i.of.parameter == figure.parameter);
+        let own = intervals
+            .iter()
+            .find(|i| i.of.process == index && i.of.parameter == figure.parameter);
         let interval = own.map_or_else(String::new, |i| {
             let mut ends = [i.low, i.high].map(|end| (figure.convert)(end, rate_hz));
             ends.sort_by(f64::total_cmp);
@@ -68,24 +70,55 @@ fn practical_rows(outcome: &Outcome, rate_hz: f64) -> Vec<Row> {
         Sensor::Accel => ["velocity random walk N", "accel. random walk K"],
         Sensor::Gyro => ["angle random walk N", "rate random walk K"],
     };
-    let row =
-        |name: &str, source, what: Quantity, value: Result<f64, &'static str>, ends, averages: String| {
-            let (unit, factor) = what.sheet(sensor);
-            // Without draws there are no intervals to be determined.
-            let is_known = value.is_ok() && outcome.inference.is_some();
-            let interval = if is_known { interval(ends, factor) } else { String::new() };
-            let value = value.map(|x| x * factor);
-            Row { name: name.to_owned(), value, interval, unit, averages, source: Some(source) }
+    let row = |name: &str,
+               source,
+               what: Quantity,
+               value: Result<f64, &'static str>,
+               ends,
+               averages: String| {
+        let (unit, factor) = what.sheet(sensor);
+        // Without draws there are no intervals to be determined.
+        let is_known = value.is_ok() && outcome.inference.is_some();
+        let interval = if is_known {
+            interval(ends, factor)
+        } else {
+            String::new()
         };
-    let (seen, crossover) = (duration(practical.range_s), pair.crossover_s().map(duration));
-    let to = crossover.as_ref().map_or(String::new(), |t| format!("up to {t}"));
-    let until = practical.walk_until_s.map_or(String::new(), |t| format!(" to {}", duration(t)));
-    let from = crossover.map_or_else(|| format!("none up to {seen}"), |t| format!("from {t}{until}"));
+        let value = value.map(|x| x * factor);
+        Row {
+            name: name.to_owned(),
+            value,
+            interval,
+            unit,
+            averages,
+            source: Some(source),
+        }
+    };
+    let (seen, crossover) = (
+        duration(practical.range_s),
+        pair.crossover_s().map(duration),
+    );
+    let to = crossover
+        .as_ref()
+        .map_or(String::new(), |t| format!("up to {t}"));
+    let until = practical
+        .walk_until_s
+        .map_or(String::new(), |t| format!(" to {}", duration(t)));
+    let from = crossover.map_or_else(
+        || format!("none up to {seen}"),
+        |t| format!("from {t}{until}"),
+    );
     let minimum = practical.parameters.minimum;
-    let floor =
-        minimum.map_or_else(|| format!("none up to {seen}"), |m| format!("floor at {}", duration(m.tau_s)));
+    let floor = minimum.map_or_else(
+        || format!("none up to {seen}"),
+        |m| format!("floor at {}", duration(m.tau_s)),
+    );
     let floor_value = minimum.map(|m| m.bias_instability()).ok_or("not reached");
-    let walk_value = if practical.walk_is_observed() { Ok(pair.walk) } else { Err("not observed") };
+    let walk_value = if practical.walk_is_observed() {
+        Ok(pair.walk)
+    } else {
+        Err("not observed")
+    };
     vec![
         row(
             white,
@@ -103,7 +136,14 @@ fn practical_rows(outcome: &Outcome, rate_hz: f64) -> Vec<Row> {
             ends.instability,
             floor,
         ),
-        row(walk, "white_and_walk/k/data_sheet/value", Quantity::Walk, walk_value, ends.walk, from),
+        row(
+            walk,
+            "white_and_walk/k/data_sheet/value",
+            Quantity::Walk,
+            walk_value,
+            ends.walk,
+            from,
+        ),
     ]
 }
 
@@ -132,22 +172,44 @@ fn figure(process: &Process, sensor: Sensor) -> Option<Figure> {
         Sensor::Gyro => ["rad", "rad/s per s"],
     };
     let (name, parameter, value, convert, unit): (_, _, _, fn(f64, f64) -> f64, _) = match process {
-        Process::Ar1(p) if p.phi() > 0.0 => {
-            ("correlation time T", Parameter::Phi, p.phi(), |phi, rate_hz| -1.0 / (phi.ln() * rate_hz), "s")
-        }
-        Process::GaussMarkov(p) => {
-            ("correlation time T", Parameter::Beta, p.beta(), |beta, _| 1.0 / beta, "s")
-        }
+        Process::Ar1(p) if p.phi() > 0.0 => (
+            "correlation time T",
+            Parameter::Phi,
+            p.phi(),
+            |phi, rate_hz| -1.0 / (phi.ln() * rate_hz),
+            "s",
+        ),
+        Process::GaussMarkov(p) => (
+            "correlation time T",
+            Parameter::Beta,
+            p.beta(),
+            |beta, _| 1.0 / beta,
+            "s",
+        ),
         // Of the increments over a sample, as IEEE 952 has it.
-        Process::Quantization(p) => {
-            ("quantization Q", Parameter::Q2, p.q2(), |q2, rate_hz| q2.sqrt() / rate_hz, increment_unit)
-        }
-        Process::Drift(p) => {
-            ("ramp", Parameter::Slope, p.slope(), |slope, rate_hz| slope * rate_hz, ramp_unit)
-        }
+        Process::Quantization(p) => (
+            "quantization Q",
+            Parameter::Q2,
+            p.q2(),
+            |q2, rate_hz| q2.sqrt() / rate_hz,
+            increment_unit,
+        ),
+        Process::Drift(p) => (
+            "ramp",
+            Parameter::Slope,
+            p.slope(),
+            |slope, rate_hz| slope * rate_hz,
+            ramp_unit,
+        ),
         _ => return None,
     };
-    Some(Figure { name, parameter, value, convert, unit })
+    Some(Figure {
+        name,
+        parameter,
+        value,
+        convert,
+        unit,
+    })
 }
 
 /// Averaging times, half a scale each, at which a process is the largest part of the wavelet variance.

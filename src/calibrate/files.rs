@@ -32,11 +32,22 @@ impl ModelFiles {
     /// The files of each estimator: of several `<out>_<estimator>.toml`.
     pub(crate) fn of(out: &Path, estimators: &[Estimator]) -> Vec<Self> {
         let files = |estimator: &Estimator| {
-            let suffix = if estimators.len() > 1 { format!("_{estimator}") } else { String::new() };
+            let suffix = if estimators.len() > 1 {
+                format!("_{estimator}")
+            } else {
+                String::new()
+            };
             let model = with_suffix(out, &suffix);
             let [curves, page, figures] =
                 ["wv.json", "html", "svg"].map(|ending| model.with_extension(ending));
-            Self { estimator: *estimator, curves, draws: draws_file::beside(&model), page, figures, model }
+            Self {
+                estimator: *estimator,
+                curves,
+                draws: draws_file::beside(&model),
+                page,
+                figures,
+                model,
+            }
         };
         estimators.iter().map(files).collect()
     }
@@ -53,10 +64,18 @@ impl ModelFiles {
     ) -> Result<(Vec<Self>, Vec<Claim>), FileError> {
         is_file(out)?;
         let all = Self::of(out, estimators);
-        let kinds = [Written::Calibrated, Written::Curves, Written::Draws, Written::Page, Written::Svg];
-        let paths = all
-            .iter()
-            .flat_map(|f| [&f.model, &f.curves, &f.draws, &f.page, &f.figures].into_iter().zip(kinds));
+        let kinds = [
+            Written::Calibrated,
+            Written::Curves,
+            Written::Draws,
+            Written::Page,
+            Written::Svg,
+        ];
+        let paths = all.iter().flat_map(|f| {
+            [&f.model, &f.curves, &f.draws, &f.page, &f.figures]
+                .into_iter()
+                .zip(kinds)
+        });
         let claim = |(path, kind): (&PathBuf, Written)| {
             atomic::claim_result(path, inputs.iter().map(PathBuf::as_path), kind, existing)
         };
@@ -83,15 +102,27 @@ impl ModelFiles {
             page.into_iter().try_for_each(AtomicFile::commit)?;
             let draws = has_draws.then_some(&files.draws);
             written.extend(
-                [&files.model, &files.curves].into_iter().chain(draws).chain([&files.page, &files.figures]),
+                [&files.model, &files.curves]
+                    .into_iter()
+                    .chain(draws)
+                    .chain([&files.page, &files.figures]),
             );
         }
         Ok(written.into_iter().map(PathBuf::as_path).collect())
     }
 
     fn contents(&self, calibration: &Calibration, note: &CalibrationNote) -> (String, ModelFile) {
-        let Calibration { groups, outcomes, settings, turn_on, .. } = calibration;
-        let chosen: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == self.estimator).collect();
+        let Calibration {
+            groups,
+            outcomes,
+            settings,
+            turn_on,
+            ..
+        } = calibration;
+        let chosen: Vec<&Outcome> = outcomes
+            .iter()
+            .filter(|o| o.estimator == self.estimator)
+            .collect();
         let curves = report::json(&CurvesFile::new(groups, &chosen, settings));
         let blake3 = hash::of_bytes(curves.as_bytes());
         let means = turn_on.iter().filter(|t| t.estimator == self.estimator);
@@ -101,8 +132,11 @@ impl ModelFiles {
 
     /// The draws behind the intervals of the estimator; none without bootstrap.
     fn drawn(&self, calibration: &Calibration) -> Option<String> {
-        let chosen: Vec<&Outcome> =
-            calibration.outcomes.iter().filter(|o| o.estimator == self.estimator).collect();
+        let chosen: Vec<&Outcome> = calibration
+            .outcomes
+            .iter()
+            .filter(|o| o.estimator == self.estimator)
+            .collect();
         let draws = DrawsFile::of(&chosen, calibration.settings.rate_hz)?;
         Some(serde_json::to_string(&draws).expect("plain structs are always JSON") + "\n")
     }
@@ -122,12 +156,26 @@ impl ModelFiles {
                 let mut provenance = own.provenance.unwrap_or_default();
                 provenance.insert("inflation".to_owned(), how.into());
                 let provenance = Some(provenance);
-                (None, ModelFile { missing: own.missing, provenance, ..ModelFile::new(inflated.clone()) })
+                (
+                    None,
+                    ModelFile {
+                        missing: own.missing,
+                        provenance,
+                        ..ModelFile::new(inflated.clone())
+                    },
+                )
             }
         };
         let model = model_file::to_toml(&model);
-        let texts = [(&self.draws, draws), (&self.curves, Some(curves)), (&self.model, Some(model))];
-        texts.into_iter().filter_map(|(path, text)| Some((path.clone(), text?))).collect()
+        let texts = [
+            (&self.draws, draws),
+            (&self.curves, Some(curves)),
+            (&self.model, Some(model)),
+        ];
+        texts
+            .into_iter()
+            .filter_map(|(path, text)| Some((path.clone(), text?)))
+            .collect()
     }
 
     /// Writes them.
@@ -137,18 +185,30 @@ impl ModelFiles {
     pub(crate) fn write(texts: &[(PathBuf, String)]) -> Result<(), FileError> {
         // All are on the disk before any has its name. Should the model not get its name, the hash in it tells that the
         // curves are not of it, and its parameters that the draws are not.
-        let filled = texts.iter().map(|(path, text)| atomic::filled(path, text.as_bytes()));
-        filled.collect::<Result<Vec<_>, _>>()?.into_iter().try_for_each(AtomicFile::commit)
+        let filled = texts
+            .iter()
+            .map(|(path, text)| atomic::filled(path, text.as_bytes()));
+        filled
+            .collect::<Result<Vec<_>, _>>()?
+            .into_iter()
+            .try_for_each(AtomicFile::commit)
     }
 }
 
 impl ModelFiles {
     /// The page of the models of the estimator and its figures, on the disk without their names.
-    fn page(&self, calibration: &Calibration, diagnoses: &[Diagnosis]) -> Result<[AtomicFile; 2], FileError> {
+    fn page(
+        &self,
+        calibration: &Calibration,
+        diagnoses: &[Diagnosis],
+    ) -> Result<[AtomicFile; 2], FileError> {
         let shown = calibration.shown(diagnoses, |outcome| outcome.estimator == self.estimator);
         let document = shown.document();
         let page = atomic::filled(&self.page, document.html().as_bytes())?;
-        Ok([page, atomic::filled(&self.figures, document.svg().as_bytes())?])
+        Ok([
+            page,
+            atomic::filled(&self.figures, document.svg().as_bytes())?,
+        ])
     }
 
     /// Writes the page of the models of the estimator, and its figures.
@@ -160,14 +220,17 @@ impl ModelFiles {
         calibration: &Calibration,
         diagnoses: &[Diagnosis],
     ) -> Result<(), FileError> {
-        self.page(calibration, diagnoses)?.into_iter().try_for_each(AtomicFile::commit)
+        self.page(calibration, diagnoses)?
+            .into_iter()
+            .try_for_each(AtomicFile::commit)
     }
 }
 
 /// Refuses what is no regular file: several files are made of a model's, by its name.
 fn is_file(out: &Path) -> Result<(), FileError> {
-    let is_directory =
-        out.is_dir() || out.file_name().is_none() || out.as_os_str().to_string_lossy().ends_with('/');
+    let is_directory = out.is_dir()
+        || out.file_name().is_none()
+        || out.as_os_str().to_string_lossy().ends_with('/');
     if !is_directory && out.as_os_str() != "-" && (out.is_file() || !out.exists()) {
         return Ok(());
     }
@@ -176,7 +239,12 @@ fn is_file(out: &Path) -> Result<(), FileError> {
 }
 
 fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
-    let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    let extension = path.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
+    let stem = path
+        .file_stem()
+        .map(|s| s.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    let extension = path
+        .extension()
+        .map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
     path.with_file_name(format!("{stem}{suffix}{extension}"))
 }

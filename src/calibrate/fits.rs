@@ -139,7 +139,13 @@ pub(crate) struct IndistinctEntry {
 
 impl IndistinctEntry {
     fn new(indistinct: &Indistinct, labels: &[String]) -> Self {
-        let Indistinct { processes, spec, composite, p_value, intervals } = indistinct;
+        let Indistinct {
+            processes,
+            spec,
+            composite,
+            p_value,
+            intervals,
+        } = indistinct;
         Self {
             processes: processes.iter().map(|i| labels[*i].clone()).collect(),
             simpler: spec.to_string(),
@@ -168,23 +174,39 @@ impl FitEntry {
         let inference = outcome.inference.as_ref();
         let labels = fit.composite.labels();
         let labelled = |processes: &[usize]| processes.iter().map(|i| labels[*i].clone()).collect();
-        let miss =
-            |m: &Miss| MissEntry { tau_s: tau_s(m.level, rate_hz), ratio: m.ratio, deviations: m.deviations };
+        let miss = |m: &Miss| MissEntry {
+            tau_s: tau_s(m.level, rate_hz),
+            ratio: m.ratio,
+            deviations: m.deviations,
+        };
         Self {
             sensor: outcome.scope.sensor.name(),
             axis: outcome.scope.axis.map_or("all", |a| a.name()),
             estimator: outcome.estimator.name(),
             model: outcome.spec.to_string(),
-            ranking: outcome.ranking.iter().flat_map(CandidateEntry::all).collect(),
-            reasons: outcome.ranking.as_ref().map_or(Vec::new(), |r| reasons(r, rate_hz)),
+            ranking: outcome
+                .ranking
+                .iter()
+                .flat_map(CandidateEntry::all)
+                .collect(),
+            reasons: outcome
+                .ranking
+                .as_ref()
+                .map_or(Vec::new(), |r| reasons(r, rate_hz)),
             replicates: outcome.replicates,
             scales: outcome.curve.levels.len(),
-            processes: processes_json(&outcome.fit.composite, inference.map_or(&[][..], |i| &i.intervals)),
+            processes: processes_json(
+                &outcome.fit.composite,
+                inference.map_or(&[][..], |i| &i.intervals),
+            ),
             goodness: inference.and_then(|i| i.goodness),
             spread: inference.map_or(Vec::new(), |i| i.spread.clone()),
             spread_p_value: inference.and_then(|i| i.alike),
             parameter_spread: inference.map_or(Vec::new(), |i| {
-                i.varying.iter().map(|found| parameter_spread(found, &labels)).collect()
+                i.varying
+                    .iter()
+                    .map(|found| parameter_spread(found, &labels))
+                    .collect()
             }),
             indistinct: inference
                 .and_then(|i| i.indistinct.as_ref())
@@ -207,10 +229,18 @@ impl FitEntry {
 
 /// N, K, B and T as exports have them, with their intervals (SI); null where there are none.
 fn parameters(outcome: &Outcome, rate_hz: f64) -> Value {
-    let Some(practical) = outcome.practical(rate_hz) else { return Value::Null };
-    let Practical { parameters, intervals, range_s, walk_until_s } = &practical;
+    let Some(practical) = outcome.practical(rate_hz) else {
+        return Value::Null;
+    };
+    let Practical {
+        parameters,
+        intervals,
+        range_s,
+        walk_until_s,
+    } = &practical;
     let mut value = parameters_json(parameters, outcome.scope.sensor);
-    let ends = |interval: Option<[f64; 2]>| interval.map_or(Value::Null, |ends| ends.to_vec().into());
+    let ends =
+        |interval: Option<[f64; 2]>| interval.map_or(Value::Null, |ends| ends.to_vec().into());
     value["white_and_walk"]["n"]["ci95"] = ends(intervals.density);
     value["white_and_walk"]["k"]["ci95"] = ends(intervals.walk);
     value["white_and_walk"]["k"]["observed"] = practical.walk_is_observed().into();
@@ -236,7 +266,10 @@ impl<'a> FitsFile<'a> {
             schema_version: 1,
             rate_hz,
             model: settings.model.to_string(),
-            fits: outcomes.iter().map(|o| FitEntry::new(o, settings)).collect(),
+            fits: outcomes
+                .iter()
+                .map(|o| FitEntry::new(o, settings))
+                .collect(),
             replicates: diagnoses,
             turn_on: turn_on.iter().map(TurnOnEntry::new).collect(),
             files,
@@ -246,7 +279,13 @@ impl<'a> FitsFile<'a> {
 
 /// The law of a parameter between recordings, with the keys of model files.
 fn parameter_spread(found: &ParameterSpread, labels: &[String]) -> Map<String, Value> {
-    let ParameterSpread { of, median, median_ci95, sd, sd_ci95 } = found;
+    let ParameterSpread {
+        of,
+        median,
+        median_ci95,
+        sd,
+        sd_ci95,
+    } = found;
     let entries: [(&str, Value); 7] = [
         ("process", labels[of.process].as_str().into()),
         ("parameter", of.parameter.name().into()),
@@ -256,24 +295,53 @@ fn parameter_spread(found: &ParameterSpread, labels: &[String]) -> Map<String, V
         ("sd", (*sd).into()),
         ("sd_ci95", sd_ci95.to_vec().into()),
     ];
-    entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+    entries
+        .into_iter()
+        .map(|(key, value)| (key.to_owned(), value))
+        .collect()
 }
 
 fn processes_json(model: &Composite, intervals: &[ParameterInterval]) -> Vec<Map<String, Value>> {
-    model.processes.iter().enumerate().map(|(i, p)| process_json(p, i, intervals)).collect()
+    model
+        .processes
+        .iter()
+        .enumerate()
+        .map(|(i, p)| process_json(p, i, intervals))
+        .collect()
 }
 
-fn process_json(process: &Process, index: usize, intervals: &[ParameterInterval]) -> Map<String, Value> {
+fn process_json(
+    process: &Process,
+    index: usize,
+    intervals: &[ParameterInterval],
+) -> Map<String, Value> {
     let mut map = Map::new();
     map.insert("type".to_owned(), process.code().into());
     for (&parameter, value) in process.kind().parameters().iter().zip(process.values()) {
         let name = parameter.name();
         map.insert(name.to_owned(), value.into());
-        if let Some(i) = interval_of(intervals, ParameterRef { process: index, parameter }) {
-            let ends = if i.absent.is_none() { vec![i.low, i.high].into() } else { Value::Null };
+        if let Some(i) = interval_of(
+            intervals,
+            ParameterRef {
+                process: index,
+                parameter,
+            },
+        ) {
+            let ends = if i.absent.is_none() {
+                vec![i.low, i.high].into()
+            } else {
+                Value::Null
+            };
             map.insert(format!("{name}_ci95"), ends);
             let error = i.standard_error;
-            map.insert(format!("{name}_se"), if error.is_finite() { error.into() } else { Value::Null });
+            map.insert(
+                format!("{name}_se"),
+                if error.is_finite() {
+                    error.into()
+                } else {
+                    Value::Null
+                },
+            );
         }
     }
     map

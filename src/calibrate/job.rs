@@ -6,8 +6,9 @@ use crate::formats::{hash, recordings};
 use crate::jobs::{JobError, Remark, Remarks};
 use crate::report::CurvesFile;
 use nav_sim_calibration::{
-    self, Advance, Beginning, Beginnings, Bootstrap, Diagnosis, Estimator, Group, Outcome, Pool, Replicate,
-    Settings, SignalError, TurnOnSpread, WarmUp, grouped, infer_telling, replicates, turn_on, warm_up,
+    self, Advance, Beginning, Beginnings, Bootstrap, Diagnosis, Estimator, Group, Outcome, Pool,
+    Replicate, Settings, SignalError, TurnOnSpread, WarmUp, grouped, infer_telling, replicates,
+    turn_on, warm_up,
 };
 use nav_sim_signal::imu::{Channel, Recording, Signal};
 use nav_sim_signal::names::UnknownName;
@@ -47,7 +48,11 @@ impl FromStr for EstimatorChoice {
     type Err = UnknownName;
 
     fn from_str(word: &str) -> Result<Self, Self::Err> {
-        if word == "all" { Ok(Self::All) } else { word.parse().map(Self::One) }
+        if word == "all" {
+            Ok(Self::All)
+        } else {
+            word.parse().map(Self::One)
+        }
     }
 }
 
@@ -62,7 +67,11 @@ impl EstimatorChoice {
     pub(crate) fn possible(self) -> Vec<Estimator> {
         match self {
             Self::One(estimator) => vec![estimator],
-            Self::All => [1, 2].into_iter().flat_map(|n| self.estimators(n)).flatten().collect(),
+            Self::All => [1, 2]
+                .into_iter()
+                .flat_map(|n| self.estimators(n))
+                .flatten()
+                .collect(),
         }
     }
 
@@ -70,7 +79,10 @@ impl EstimatorChoice {
     fn estimators(self, recordings: usize) -> Result<Vec<Estimator>, JobError> {
         match self {
             Self::One(estimator) if estimator.is_single() && recordings > 1 => {
-                Err(JobError::Single { estimator, recordings })
+                Err(JobError::Single {
+                    estimator,
+                    recordings,
+                })
             }
             Self::One(estimator) => Ok(vec![estimator]),
             Self::All if recordings == 1 => Ok(vec![Estimator::Gmwm, Estimator::Rgmwm]),
@@ -170,13 +182,25 @@ pub fn measure(
     options: &CalibrationOptions,
     remarks: &mut dyn Remarks,
 ) -> Result<Measured, JobError> {
-    let CalibrationOptions { reading, skip_warm_up, scales, estimators, pool, settings, bootstrap, turn_on } =
-        options;
+    let CalibrationOptions {
+        reading,
+        skip_warm_up,
+        scales,
+        estimators,
+        pool,
+        settings,
+        bootstrap,
+        turn_on,
+    } = options;
     // As many scales as parameters, and one that the default leaves out.
     let needed = scales.map_or(2 << settings.model.parameters(), |j| 1 << j);
-    let reading = ReadOptions { min_samples: needed, ..reading.clone() };
-    let look =
-        |recording: Recording| MeasuredRecording::new(recording, *skip_warm_up, *scales, &settings.tuning);
+    let reading = ReadOptions {
+        min_samples: needed,
+        ..reading.clone()
+    };
+    let look = |recording: Recording| {
+        MeasuredRecording::new(recording, *skip_warm_up, *scales, &settings.tuning)
+    };
     let (looks, report) = visit(paths, &reading, &look, remarks)?;
     let looks = looks.into_iter().collect::<Result<Vec<_>, _>>()?;
     distinct(&looks)?;
@@ -184,14 +208,25 @@ pub fn measure(
     let beginnings = beginnings(&looks, (reading.skip_s, *skip_warm_up), rate_hz);
     shortest(&report, *scales, remarks);
     let estimators = estimators.estimators(report.files.iter().map(|f| f.samples.len()).sum())?;
-    let settings = Settings { estimators, rate_hz, ..settings.clone() };
+    let settings = Settings {
+        estimators,
+        rate_hz,
+        ..settings.clone()
+    };
     if *pool == Some(Pool::Sensor) && settings.pool() == Pool::Axes {
         return Err(JobError::Pooled);
     }
     let mut measured: Vec<_> = looks.into_iter().flat_map(|look| look.replicates).collect();
     one_switching_on(&report, &mut measured);
     let groups = grouped(measured, pool.unwrap_or(settings.pool()));
-    Ok(Measured { report, groups, beginnings, settings, bootstrap: *bootstrap, turn_on: *turn_on })
+    Ok(Measured {
+        report,
+        groups,
+        beginnings,
+        settings,
+        bootstrap: *bootstrap,
+        turn_on: *turn_on,
+    })
 }
 
 impl Measured {
@@ -199,7 +234,8 @@ impl Measured {
     #[must_use]
     pub fn steps(&self) -> u64 {
         let draws = self.bootstrap.map_or(0, |bootstrap| bootstrap.draws as u64);
-        (self.groups.len() * self.settings.estimators.len()) as u64 * (self.settings.model.steps() + draws)
+        (self.groups.len() * self.settings.estimators.len()) as u64
+            * (self.settings.model.steps() + draws)
     }
 
     /// The second half, which fits; `advance` is told how many more of its [`Measured::steps`] are done.
@@ -207,10 +243,27 @@ impl Measured {
     /// # Errors
     /// When a trim leaves no replicate, or a curve is too short for the model.
     pub fn calibrate(self, advance: Advance<'_>) -> Result<Calibration, JobError> {
-        let Self { groups, beginnings, settings, bootstrap, turn_on, .. } = self;
+        let Self {
+            groups,
+            beginnings,
+            settings,
+            bootstrap,
+            turn_on,
+            ..
+        } = self;
         let outcomes = nav_sim_calibration::calibrate_telling(&groups, &settings, advance)?;
-        let calibration = Calibration { groups, outcomes, settings, beginnings, turn_on: Vec::new() };
-        let calibration = if turn_on { calibration.with_turn_on() } else { calibration };
+        let calibration = Calibration {
+            groups,
+            outcomes,
+            settings,
+            beginnings,
+            turn_on: Vec::new(),
+        };
+        let calibration = if turn_on {
+            calibration.with_turn_on()
+        } else {
+            calibration
+        };
         Ok(calibration.with_inference(bootstrap, advance))
     }
 }
@@ -230,7 +283,13 @@ impl Calibration {
         files: Vec<String>,
     ) -> CalibrationAnswer<'a> {
         CalibrationAnswer {
-            file: FitsFile::new(&self.outcomes, diagnoses, &self.turn_on, &self.settings, files),
+            file: FitsFile::new(
+                &self.outcomes,
+                diagnoses,
+                &self.turn_on,
+                &self.settings,
+                files,
+            ),
             shown: self.shown(diagnoses, |_| true),
         }
     }
@@ -241,8 +300,12 @@ impl Calibration {
         diagnoses: &'a [Diagnosis],
         is_chosen: impl Fn(&Outcome) -> bool,
     ) -> ShownCalibration<'a> {
-        let outcomes: Vec<(usize, &Outcome)> =
-            self.outcomes.iter().enumerate().filter(|(_, outcome)| is_chosen(outcome)).collect();
+        let outcomes: Vec<(usize, &Outcome)> = self
+            .outcomes
+            .iter()
+            .enumerate()
+            .filter(|(_, outcome)| is_chosen(outcome))
+            .collect();
         let chosen: Vec<&Outcome> = outcomes.iter().map(|(_, outcome)| *outcome).collect();
         ShownCalibration {
             curves: CurvesFile::new(&self.groups, &chosen, &self.settings),
@@ -260,14 +323,29 @@ impl Calibration {
             let own: Vec<&Outcome> = self.outcomes.iter().filter(|o| o.estimator == *e).collect();
             turn_on(&self.groups, &own)
         };
-        self.turn_on = self.settings.estimators.iter().flat_map(of_estimator).collect();
+        self.turn_on = self
+            .settings
+            .estimators
+            .iter()
+            .flat_map(of_estimator)
+            .collect();
         self
     }
 
     /// The same with intervals and goodness of fit, if they are asked for.
-    pub(crate) fn with_inference(mut self, bootstrap: Option<Bootstrap>, advance: Advance<'_>) -> Self {
+    pub(crate) fn with_inference(
+        mut self,
+        bootstrap: Option<Bootstrap>,
+        advance: Advance<'_>,
+    ) -> Self {
         if let Some(bootstrap) = bootstrap {
-            infer_telling(&self.groups, &mut self.outcomes, &self.settings, bootstrap, advance);
+            infer_telling(
+                &self.groups,
+                &mut self.outcomes,
+                &self.settings,
+                bootstrap,
+                advance,
+            );
         }
         self
     }
@@ -303,18 +381,33 @@ impl MeasuredRecording {
         levels: Option<u32>,
         tuning: &Tuning,
     ) -> Result<Self, SignalError> {
-        let signals = recording.signals.par_iter().map(|s| (s.channel, hash::samples(&s.samples))).collect();
+        let signals = recording
+            .signals
+            .par_iter()
+            .map(|s| (s.channel, hash::samples(&s.samples)))
+            .collect();
         let (recording, warm_ups) = without_warm_up(recording, skip_warm_up);
         let replicates = replicates(&recording, levels, tuning)?;
-        Ok(Self { recording: recording.name, signals, warm_ups, replicates })
+        Ok(Self {
+            recording: recording.name,
+            signals,
+            warm_ups,
+            replicates,
+        })
     }
 }
 
 /// The stretches of one file are of one switching-on: the mean of the first of them counts.
 fn one_switching_on(report: &Report, measured: &mut [(Channel, Replicate)]) {
-    let later: Vec<String> =
-        report.files.iter().flat_map(|file| file.recordings().skip(1)).map(|(name, _)| name).collect();
-    let of_later = measured.iter_mut().filter(|(_, replicate)| later.contains(&replicate.name));
+    let later: Vec<String> = report
+        .files
+        .iter()
+        .flat_map(|file| file.recordings().skip(1))
+        .map(|(name, _)| name)
+        .collect();
+    let of_later = measured
+        .iter_mut()
+        .filter(|(_, replicate)| later.contains(&replicate.name));
     of_later.for_each(|(_, replicate)| replicate.mean = f64::NAN);
 }
 
@@ -322,30 +415,45 @@ fn one_switching_on(report: &Report, measured: &mut [(Channel, Replicate)]) {
 fn distinct(looks: &[MeasuredRecording]) -> Result<(), JobError> {
     for (i, look) in looks.iter().enumerate() {
         let copy = |other: &&MeasuredRecording| {
-            other.recording != look.recording && other.signals.iter().any(|s| look.signals.contains(s))
+            other.recording != look.recording
+                && other.signals.iter().any(|s| look.signals.contains(s))
         };
         if let Some(first) = looks[..i].iter().find(copy) {
-            return Err(JobError::Copy { copy: look.recording.clone(), first: first.recording.clone() });
+            return Err(JobError::Copy {
+                copy: look.recording.clone(),
+                first: first.recording.clone(),
+            });
         }
     }
     Ok(())
 }
 
 /// The recordings that do not begin as they go on after what was skipped.
-fn beginnings(looks: &[MeasuredRecording], (skipped_s, left_out): (f64, bool), rate_hz: f64) -> Beginnings {
+fn beginnings(
+    looks: &[MeasuredRecording],
+    (skipped_s, left_out): (f64, bool),
+    rate_hz: f64,
+) -> Beginnings {
     let beginning = |look: &MeasuredRecording| Beginning {
         recording: look.recording.clone(),
         signals: look.warm_ups.clone(),
         skip_s: longest(&look.warm_ups).map(|n| (skipped_s + n as f64 / rate_hz).ceil()),
     };
     let found = looks.iter().filter(|look| !look.warm_ups.is_empty());
-    Beginnings { all: found.map(beginning).collect(), left_out }
+    Beginnings {
+        all: found.map(beginning).collect(),
+        left_out,
+    }
 }
 
 /// Samples to leave out of a recording for all its signals; none where that does not help one of them.
 fn longest(signals: &[(Channel, WarmUp)]) -> Option<usize> {
     let helps = signals.iter().all(|(_, w)| w.change.is_some());
-    signals.iter().map(|(_, w)| w.samples).max().filter(|_| helps)
+    signals
+        .iter()
+        .map(|(_, w)| w.samples)
+        .max()
+        .filter(|_| helps)
 }
 
 /// How the signals of a recording begin; if it is to be left out, the recording without that.
@@ -354,7 +462,11 @@ pub(crate) fn without_warm_up(
     leave_out: bool,
 ) -> (Recording, Vec<(Channel, WarmUp)>) {
     let begins_otherwise = |s: &Signal| warm_up(&s.samples).map(|w| (s.channel, w));
-    let found: Vec<_> = recording.signals.par_iter().filter_map(begins_otherwise).collect();
+    let found: Vec<_> = recording
+        .signals
+        .par_iter()
+        .filter_map(begins_otherwise)
+        .collect();
     if let Some(samples) = longest(&found).filter(|_| leave_out) {
         for signal in &mut recording.signals {
             signal.samples.drain(..samples);
@@ -367,15 +479,29 @@ pub(crate) fn without_warm_up(
 fn shortest(report: &Report, scales: Option<u32>, remarks: &mut dyn Remarks) {
     let levels = |samples: usize| scales.unwrap_or(u32::MAX).min(default_levels(samples));
     let recordings = report.files.iter().flat_map(FileReport::recordings);
-    let Some((recording, samples)) = recordings.clone().min_by_key(|(_, samples)| levels(*samples)) else {
+    let Some((recording, samples)) = recordings
+        .clone()
+        .min_by_key(|(_, samples)| levels(*samples))
+    else {
         return;
     };
     let mut found: Vec<u32> = recordings.map(|(_, samples)| levels(samples)).collect();
     found.sort_unstable();
     // Scales are averaged up to the last that more than half of the recordings have ([`calibration::average`]).
-    let (scales, used, usual) = (found[0], found[(found.len() - 1) / 2], found[found.len() / 2]);
+    let (scales, used, usual) = (
+        found[0],
+        found[(found.len() - 1) / 2],
+        found[found.len() / 2],
+    );
     let short = found.iter().filter(|own| **own < used).count();
     if scales < usual {
-        remarks.remark(Remark::Shortest { recording: &recording, samples, scales, short, used, usual });
+        remarks.remark(Remark::Shortest {
+            recording: &recording,
+            samples,
+            scales,
+            short,
+            used,
+            usual,
+        });
     }
 }

@@ -33,7 +33,10 @@ impl CalibrationNote {
         settings: &Settings,
         curves: Option<&str>,
     ) -> ModelFile {
-        let mut file = ModelFile::new(Model { rate_hz: settings.rate_hz, axes: Default::default() });
+        let mut file = ModelFile::new(Model {
+            rate_hz: settings.rate_hz,
+            axes: Default::default(),
+        });
         file.missing = Channel::ALL.to_vec();
         for outcome in outcomes {
             for channel in outcome.scope.channels() {
@@ -65,20 +68,39 @@ impl CalibrationNote {
         }
         if let Some(seed) = self.seed {
             // TOML integers are signed; larger seeds go as text.
-            put("seed", i64::try_from(seed).map_or_else(|_| seed.to_string().into(), Value::from));
+            put(
+                "seed",
+                i64::try_from(seed).map_or_else(|_| seed.to_string().into(), Value::from),
+            );
         }
         if estimator.is_robust() {
             put("efficiency", settings.tuning.efficiency().into());
-            put("efficiency_convention", self.efficiency_convention.name().into());
+            put(
+                "efficiency_convention",
+                self.efficiency_convention.name().into(),
+            );
         }
         for (key, value) in &self.reading {
             put(key, value.clone());
         }
         if !settings.limits.is_empty() {
-            put("limits", settings.limits.iter().map(limit).collect::<Vec<_>>().into());
+            put(
+                "limits",
+                settings.limits.iter().map(limit).collect::<Vec<_>>().into(),
+            );
         }
-        put("fits", outcomes.iter().map(|o| fit(o, settings)).collect::<Vec<_>>().into());
-        put("inputs", self.inputs.iter().map(input).collect::<Vec<_>>().into());
+        put(
+            "fits",
+            outcomes
+                .iter()
+                .map(|o| fit(o, settings))
+                .collect::<Vec<_>>()
+                .into(),
+        );
+        put(
+            "inputs",
+            self.inputs.iter().map(input).collect::<Vec<_>>().into(),
+        );
         table
     }
 }
@@ -92,10 +114,19 @@ pub(super) fn with_turn_on<'a>(
     let mut remarks = Table::new();
     for found in means {
         remarks.insert(found.sensor.name().to_owned(), turn_on_remark(found).into());
-        let Some(sigmas) = found.sigmas() else { continue };
+        let Some(sigmas) = found.sigmas() else {
+            continue;
+        };
         let of_axis = |axis: Axis| {
-            let channel = Channel { sensor: found.sensor, axis };
-            if file.missing.contains(&channel) { 0.0 } else { sigmas[axis as usize] }
+            let channel = Channel {
+                sensor: found.sensor,
+                axis,
+            };
+            if file.missing.contains(&channel) {
+                0.0
+            } else {
+                sigmas[axis as usize]
+            }
         };
         let sigmas = Some(Axis::ALL.map(of_axis));
         match found.sensor {
@@ -116,21 +147,36 @@ fn spread(outcomes: &[&Outcome], rate_hz: f64) -> Option<Spread> {
     for outcome in outcomes {
         let (composite, labels) = (&outcome.fit.composite, outcome.fit.composite.labels());
         let variation = |found: &ParameterSpread| {
-            let ci95 = Some(LognormalIntervals { median: found.median_ci95, sd: found.sd_ci95 });
-            let law = Law::Lognormal { median: found.median, sd: found.sd, ci95 };
+            let ci95 = Some(LognormalIntervals {
+                median: found.median_ci95,
+                sd: found.sd_ci95,
+            });
+            let law = Law::Lognormal {
+                median: found.median,
+                sd: found.sd,
+                ci95,
+            };
             let (process, parameter) = (&labels[found.of.process], found.of.parameter.name());
             Variation::new(composite, rate_hz, process, parameter, law).ok()
         };
         let varying = outcome.inference.iter().flat_map(|i| &i.varying);
         let laws: Vec<Variation> = varying.filter_map(variation).collect();
-        outcome.scope.channels().iter().for_each(|c| spread.axes[c.index()].clone_from(&laws));
+        outcome
+            .scope
+            .channels()
+            .iter()
+            .for_each(|c| spread.axes[c.index()].clone_from(&laws));
     }
     (spread != Spread::default()).then_some(spread)
 }
 
 fn intervals(outcome: &Outcome, channel: Channel) -> Vec<Interval> {
     let labels = outcome.fit.composite.labels();
-    let all = outcome.inference.iter().flat_map(|i| &i.intervals).filter(|i| i.low.is_finite());
+    let all = outcome
+        .inference
+        .iter()
+        .flat_map(|i| &i.intervals)
+        .filter(|i| i.low.is_finite());
     all.map(|i| Interval {
         channel,
         process: labels[i.of.process].clone(),
@@ -171,7 +217,10 @@ fn fit(outcome: &Outcome, settings: &Settings) -> Table {
     }
     if let Some(misfit) = outcome.misfit() {
         put("worst_ratio", misfit.worst.ratio.into());
-        put("worst_tau_s", tau_s(misfit.worst.level, settings.rate_hz).into());
+        put(
+            "worst_tau_s",
+            tau_s(misfit.worst.level, settings.rate_hz).into(),
+        );
     }
     put("notes", notes(outcome, settings).into());
     table
@@ -179,11 +228,22 @@ fn fit(outcome: &Outcome, settings: &Settings) -> Table {
 
 /// A parameter that was fixed or bounded beforehand.
 fn limit(limit: &ParameterLimit) -> Table {
-    let ParameterLimit { sensor, axis, process, parameter, low, high } = limit;
+    let ParameterLimit {
+        sensor,
+        axis,
+        process,
+        parameter,
+        low,
+        high,
+    } = limit;
     let signals = match (sensor, axis) {
         (None, _) => "all".to_owned(),
         (Some(sensor), None) => sensor.name().to_owned(),
-        (Some(sensor), Some(axis)) => Channel { sensor: *sensor, axis: *axis }.to_string(),
+        (Some(sensor), Some(axis)) => Channel {
+            sensor: *sensor,
+            axis: *axis,
+        }
+        .to_string(),
     };
     let mut table = Table::new();
     let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);

@@ -8,8 +8,8 @@ use crate::formats::{input, parameters_file};
 use crate::jobs::{JobError, RecordingRequest, Remarks, VarianceRequest, unknown_model};
 use crate::parse;
 use nav_sim_calibration::{
-    Advance, Bootstrap, Estimator, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, Trim, Weighting,
-    diagnose,
+    Advance, Bootstrap, Estimator, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, Trim,
+    Weighting, diagnose,
 };
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::wavelet::Convention;
@@ -21,7 +21,11 @@ use std::path::{Path, PathBuf};
 #[serde(default, deny_unknown_fields)]
 pub struct CalibrationRequest {
     /// Recordings, or directories of recordings
-    #[arg(value_name = "INPUT", required_unless_present = "curve", conflicts_with = "curve")]
+    #[arg(
+        value_name = "INPUT",
+        required_unless_present = "curve",
+        conflicts_with = "curve"
+    )]
     pub inputs: Vec<PathBuf>,
     /// Fit a curve instead of recordings: CSV tau_samples,wv,edof, or a .wv.json of calibrate or wv
     #[arg(long, value_name = "FILE", conflicts_with_all = OF_RECORDINGS)]
@@ -86,32 +90,62 @@ const OF_RECORDINGS: [&str; 6] = ["estimator", "trim", "pool", "skip_s", "gaps",
 
 /// Those of several recordings first, then those of one.
 pub(crate) const ESTIMATORS: [(&str, &str); 7] = [
-    (Estimator::Awv.name(), "Average of the classical wavelet variances"),
-    (Estimator::SrAwv.name(), "Average of the robust wavelet variances"),
-    (Estimator::DrAwv.name(), "Trimmed average of the robust wavelet variances"),
-    (Estimator::Gmwm.name(), "Classical wavelet variance of one recording"),
-    (Estimator::Rgmwm.name(), "Robust wavelet variance of one recording"),
+    (
+        Estimator::Awv.name(),
+        "Average of the classical wavelet variances",
+    ),
+    (
+        Estimator::SrAwv.name(),
+        "Average of the robust wavelet variances",
+    ),
+    (
+        Estimator::DrAwv.name(),
+        "Trimmed average of the robust wavelet variances",
+    ),
+    (
+        Estimator::Gmwm.name(),
+        "Classical wavelet variance of one recording",
+    ),
+    (
+        Estimator::Rgmwm.name(),
+        "Robust wavelet variance of one recording",
+    ),
     (
         Estimator::Avlr.name(),
         "Slopes of the Allan deviation of one recording, read off one by one: WN, QN, RW, DR",
     ),
-    ("all", "The three averages (of one recording: gmwm and rgmwm)"),
+    (
+        "all",
+        "The three averages (of one recording: gmwm and rgmwm)",
+    ),
 ];
 
 const WEIGHTINGS: [(&str, &str); 5] = [
-    (Weighting::Model.name(), "Inverse variance by the fitted model; a scale far above it weighs less"),
+    (
+        Weighting::Model.name(),
+        "Inverse variance by the fitted model; a scale far above it weighs less",
+    ),
     (
         Weighting::Edof.name(),
         "The same with the observed wv: the convention of the literature, low where wv is low by chance",
     ),
-    (Weighting::Interval.name(), "1 / (width of the 95 % interval)²"),
+    (
+        Weighting::Interval.name(),
+        "1 / (width of the 95 % interval)²",
+    ),
     (Weighting::None.name(), "1"),
-    (Weighting::Full.name(), "The inverse of the covariance between scales, by bootstrap"),
+    (
+        Weighting::Full.name(),
+        "The inverse of the covariance between scales, by bootstrap",
+    ),
 ];
 
 const POOLS: [(&str, &str); 2] = [
     (Pool::Axes.name(), "Those of one axis: one model per axis"),
-    (Pool::Sensor.name(), "Those of all axes of a sensor: one model per sensor"),
+    (
+        Pool::Sensor.name(),
+        "Those of all axes of a sensor: one model per sensor",
+    ),
 ];
 
 impl CalibrationRequest {
@@ -130,7 +164,11 @@ impl CalibrationRequest {
     }
 
     /// The recordings, read and measured.
-    pub(crate) fn measure(&self, settings: Settings, remarks: &mut dyn Remarks) -> Result<Measured, Failure> {
+    pub(crate) fn measure(
+        &self,
+        settings: Settings,
+        remarks: &mut dyn Remarks,
+    ) -> Result<Measured, Failure> {
         let options = CalibrationOptions {
             reading: self.recordings.options(),
             skip_warm_up: self.recordings.reading.skips_warm_up(),
@@ -145,8 +183,13 @@ impl CalibrationRequest {
     }
 
     /// The curves in the place of recordings, and whether they do not say of which sensor: then as of an accelerometer.
-    pub(crate) fn curves(&self, path: &Path, settings: &Settings) -> Result<(Curves, bool), Failure> {
-        let curves_of = |sensor| read_curves(path, self.recordings.reading.rate_hz, sensor, settings);
+    pub(crate) fn curves(
+        &self,
+        path: &Path,
+        settings: &Settings,
+    ) -> Result<(Curves, bool), Failure> {
+        let curves_of =
+            |sensor| read_curves(path, self.recordings.reading.rate_hz, sensor, settings);
         match curves_of(self.recordings.sensor()) {
             Err(JobError::NoSensor { .. }) => Ok((curves_of(Some(Sensor::Accel))?, true)),
             read => Ok((read?, false)),
@@ -155,12 +198,23 @@ impl CalibrationRequest {
 
     /// The draws behind intervals.
     pub(crate) fn draws(&self) -> Option<Bootstrap> {
-        (self.bootstrap > 0).then_some(Bootstrap { draws: self.bootstrap as usize, seed: self.seed })
+        (self.bootstrap > 0).then_some(Bootstrap {
+            draws: self.bootstrap as usize,
+            seed: self.seed,
+        })
     }
 
     /// What is recorded of a calibration of these files.
-    pub(crate) fn note(&self, files: &[PathBuf], settings: &Settings) -> Result<CalibrationNote, Failure> {
-        let role = if self.curve.is_some() { "curve" } else { "recording" };
+    pub(crate) fn note(
+        &self,
+        files: &[PathBuf],
+        settings: &Settings,
+    ) -> Result<CalibrationNote, Failure> {
+        let role = if self.curve.is_some() {
+            "curve"
+        } else {
+            "recording"
+        };
         let fitted = files
             .iter()
             .map(|path| (role, path))
@@ -169,7 +223,9 @@ impl CalibrationRequest {
             efficiency_convention: Convention::Exact,
             reading: self.reading(settings),
             seed: self.draws().map(|draws| draws.seed),
-            inputs: fitted.map(|(role, path)| input::input(role, path)).collect::<Result<_, _>>()?,
+            inputs: fitted
+                .map(|(role, path)| input::input(role, path))
+                .collect::<Result<_, _>>()?,
         })
     }
 
@@ -177,22 +233,45 @@ impl CalibrationRequest {
     ///
     /// # Errors
     /// What is wrong with a file or a setting, or that there is no fit.
-    pub fn answer(&self, remarks: &mut dyn Remarks, advance: Advance<'_>) -> Result<Answered, Failure> {
+    pub fn answer(
+        &self,
+        remarks: &mut dyn Remarks,
+        advance: Advance<'_>,
+    ) -> Result<Answered, Failure> {
         let settings = self.settings()?;
         let (calibration, files) = match &self.curve {
-            Some(path) => (self.curves(path, &settings)?.0.calibrate(self.draws())?, vec![path.clone()]),
+            Some(path) => (
+                self.curves(path, &settings)?.0.calibrate(self.draws())?,
+                vec![path.clone()],
+            ),
             None => {
                 let measured = self.measure(settings, remarks)?;
-                let files = measured.report.files.iter().map(|f| f.path.clone()).collect();
+                let files = measured
+                    .report
+                    .files
+                    .iter()
+                    .map(|f| f.path.clone())
+                    .collect();
                 (measured.calibrate(advance)?, files)
             }
         };
         let note = self.note(&files, &calibration.settings)?;
-        let diagnoses = diagnose(&calibration.groups, &calibration.outcomes, &calibration.settings);
+        let diagnoses = diagnose(
+            &calibration.groups,
+            &calibration.outcomes,
+            &calibration.settings,
+        );
         let made = ModelFiles::of(Path::new("model.toml"), &calibration.settings.estimators);
-        let files = made.iter().flat_map(|files| files.texts(&calibration, &note, None));
-        let files = files.map(|(path, text)| (path.display().to_string(), text)).collect();
-        Ok(Answered { files, ..Answered::of(&calibration.answer(&diagnoses, Vec::new())) })
+        let files = made
+            .iter()
+            .flat_map(|files| files.texts(&calibration, &note, None));
+        let files = files
+            .map(|(path, text)| (path.display().to_string(), text))
+            .collect();
+        Ok(Answered {
+            files,
+            ..Answered::of(&calibration.answer(&diagnoses, Vec::new()))
+        })
     }
 
     /// How the recordings were read and grouped; of a curve nothing is known.
@@ -201,7 +280,10 @@ impl CalibrationRequest {
             return toml::Table::new();
         }
         let mut table = self.recordings.provenance();
-        table.insert("pool".to_owned(), self.pool.unwrap_or(settings.pool()).name().into());
+        table.insert(
+            "pool".to_owned(),
+            self.pool.unwrap_or(settings.pool()).name().into(),
+        );
         if let Some(scales) = self.tuning.levels() {
             table.insert("scales".to_owned(), i64::from(scales).into());
         }
@@ -210,22 +292,31 @@ impl CalibrationRequest {
 
     fn structure(&self) -> Result<ModelChoice, Failure> {
         let chosen: ModelChoice = self.model.parse().map_err(unknown_model)?;
-        if self.estimator == EstimatorChoice::One(Estimator::Avlr) && self.tuning.fitted().is_some() {
-            let message = "--scales FROM:TO with --estimator avlr: slopes are read where they are found";
-            return Err(Failure::input(message).hint("--estimator gmwm fits the same curve over a range"));
+        if self.estimator == EstimatorChoice::One(Estimator::Avlr) && self.tuning.fitted().is_some()
+        {
+            let message =
+                "--scales FROM:TO with --estimator avlr: slopes are read where they are found";
+            return Err(
+                Failure::input(message).hint("--estimator gmwm fits the same curve over a range")
+            );
         }
         if self.estimator != EstimatorChoice::One(Estimator::Avlr) {
             return Ok(chosen);
         }
         let without = match &chosen {
-            ModelChoice::Given(spec) => spec.kinds().iter().find(|k| k.shape().is_some()).map(|k| k.code()),
+            ModelChoice::Given(spec) => spec
+                .kinds()
+                .iter()
+                .find(|k| k.shape().is_some())
+                .map(|k| k.code()),
             ModelChoice::Auto => Some("the AR1 of auto"),
         };
         match without {
             None => Ok(chosen),
             Some(name) => {
-                let message =
-                    format!("--estimator avlr: {name} has no slope of its own in the Allan deviation");
+                let message = format!(
+                    "--estimator avlr: {name} has no slope of its own in the Allan deviation"
+                );
                 Err(Failure::input(message)
                 .hint("--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope); or --estimator gmwm"))
             }
@@ -233,14 +324,20 @@ impl CalibrationRequest {
     }
 
     fn limits(&self, model: &ModelChoice) -> Result<Vec<ParameterLimit>, Failure> {
-        let Some(path) = &self.parameters else { return Ok(Vec::new()) };
+        let Some(path) = &self.parameters else {
+            return Ok(Vec::new());
+        };
         let conflict = |message: &str, hint: &str| Err(Failure::input(message).hint(hint));
         match model {
-            ModelChoice::Auto => {
-                conflict("--parameters with --model auto: whose parameters?", "name the --model, such as N2")
-            }
+            ModelChoice::Auto => conflict(
+                "--parameters with --model auto: whose parameters?",
+                "name the --model, such as N2",
+            ),
             ModelChoice::Given(_) if self.estimator == EstimatorChoice::One(Estimator::Avlr) => {
-                conflict("--parameters: avlr reads slopes, it cannot be bounded", "--estimator gmwm")
+                conflict(
+                    "--parameters: avlr reads slopes, it cannot be bounded",
+                    "--estimator gmwm",
+                )
             }
             ModelChoice::Given(spec) => {
                 let limits = parameters_file::read(path, spec)?;
@@ -248,8 +345,10 @@ impl CalibrationRequest {
                 match of_axis {
                     Some(l) if self.pool != Some(Pool::Axes) && !self.estimator.is_single() => {
                         let axis = l.axis.map_or("x", |a| a.name());
-                        let message =
-                            format!("{}: the axis {axis} is named, but the axes are pooled", path.display());
+                        let message = format!(
+                            "{}: the axis {axis} is named, but the axes are pooled",
+                            path.display()
+                        );
                         conflict(&message, "--pool axes")
                     }
                     _ => Ok(limits),

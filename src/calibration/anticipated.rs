@@ -59,10 +59,14 @@ impl Anticipated<'_> {
         scattering: Scattering,
         bootstrap: Bootstrap,
     ) -> Result<Vec<Outcome>, AnticipationError> {
-        let settings =
-            Settings { estimators: vec![estimator], rate_hz: self.model.rate_hz, ..settings.clone() };
+        let settings = Settings {
+            estimators: vec![estimator],
+            rate_hz: self.model.rate_hz,
+            ..settings.clone()
+        };
         let scopes = self.scopes();
-        let of_scope = |scope: &Scope| self.outcome(*scope, estimator, &settings, scattering, bootstrap);
+        let of_scope =
+            |scope: &Scope| self.outcome(*scope, estimator, &settings, scattering, bootstrap);
         scopes.par_iter().map(of_scope).collect()
     }
 
@@ -70,14 +74,22 @@ impl Anticipated<'_> {
     fn scopes(&self) -> Vec<Scope> {
         let axis = |sensor, axis| self.model.axis(Channel { sensor, axis });
         let of_sensor = |sensor: Sensor| {
-            let alike = Axis::ALL.iter().all(|a| axis(sensor, *a) == axis(sensor, Axis::X));
+            let alike = Axis::ALL
+                .iter()
+                .all(|a| axis(sensor, *a) == axis(sensor, Axis::X));
             match alike {
                 true => vec![Scope { sensor, axis: None }],
-                false => Axis::ALL.map(|a| Scope { sensor, axis: Some(a) }).to_vec(),
+                false => Axis::ALL
+                    .map(|a| Scope {
+                        sensor,
+                        axis: Some(a),
+                    })
+                    .to_vec(),
             }
         };
         let all = Sensor::ALL.into_iter().flat_map(of_sensor);
-        all.filter(|scope| !self.model.axis(scope.channels()[0]).processes.is_empty()).collect()
+        all.filter(|scope| !self.model.axis(scope.channels()[0]).processes.is_empty())
+            .collect()
     }
 
     fn outcome(
@@ -91,9 +103,18 @@ impl Anticipated<'_> {
         let composite = in_order(self.model.axis(scope.channels()[0]));
         let group = self.expected(scope, &composite, estimator, settings)?;
         let spec = ModelSpec::of(composite.processes.iter().map(Process::kind));
-        let settings = &Settings { model: ModelChoice::Given(spec), ..settings.clone() };
+        let settings = &Settings {
+            model: ModelChoice::Given(spec),
+            ..settings.clone()
+        };
         let failed = |source| CalibrationError::of(&group, estimator, source);
-        let curve = average(&group.replicates, estimator, settings.trim, &settings.tuning).map_err(failed)?;
+        let curve = average(
+            &group.replicates,
+            estimator,
+            settings.trim,
+            &settings.tuning,
+        )
+        .map_err(failed)?;
         let mut outcome = fit_curve(&group, estimator, curve, settings)?;
         // The fit is kept for its minima, from which the draws are fitted; the centre of the draws is the
         // model itself.
@@ -112,11 +133,16 @@ impl Anticipated<'_> {
             let curve = sampler.draw_with(&key, &between, scattering, settings);
             Ok(curve.and_then(|curve| outcome.estimate_again(&curve, settings).ok()))
         };
-        let fits: Vec<Option<Fit>> =
-            (0..bootstrap.draws).into_par_iter().map(draw).collect::<Result<_, _>>()?;
+        let fits: Vec<Option<Fit>> = (0..bootstrap.draws)
+            .into_par_iter()
+            .map(draw)
+            .collect::<Result<_, _>>()?;
         let fits: Vec<Fit> = fits.into_iter().flatten().collect();
         let differ = self.differ_by(scope, &outcome, bootstrap)?;
-        let stretch = sampler.spread.as_ref().map_or(1.0, |spread| spread.stated_where(&differ));
+        let stretch = sampler
+            .spread
+            .as_ref()
+            .map_or(1.0, |spread| spread.stated_where(&differ));
         let unknown = vec![f64::NAN; outcome.fit.composite.parameters().count()];
         outcome.inference = Some(Inference {
             draws: bootstrap.draws,
@@ -161,13 +187,23 @@ impl Anticipated<'_> {
                 ..like(&template, values.to_vec())
             };
             let channels = scope.channels();
-            let replicates = channels.iter().flat_map(|c| (0..self.recordings).map(move |k| (k, c)));
-            Group { scope, replicates: replicates.map(|(k, c)| expected_replicate(k, c)).collect() }
+            let replicates = channels
+                .iter()
+                .flat_map(|c| (0..self.recordings).map(move |k| (k, c)));
+            Group {
+                scope,
+                replicates: replicates.map(|(k, c)| expected_replicate(k, c)).collect(),
+            }
         };
         let first = group(&classical);
         // what a robust variance reads of quantization noise is known once there is a curve
-        let curve = average(&first.replicates, estimator, settings.trim, &settings.tuning)
-            .map_err(|source| CalibrationError::of(&first, estimator, source))?;
+        let curve = average(
+            &first.replicates,
+            estimator,
+            settings.trim,
+            &settings.tuning,
+        )
+        .map_err(|source| CalibrationError::of(&first, estimator, source))?;
         Ok(group(&implied(composite, &curve)))
     }
 
@@ -202,17 +238,31 @@ impl Anticipated<'_> {
         let curve = &outcome.curve;
         let centre = implied(&outcome.fit.composite, curve);
         let Some(spread) = self.spread else {
-            return Ok(vec![vec![1.0; centre.len()]; self.recordings * scope.channels().len()]);
+            return Ok(vec![
+                vec![1.0; centre.len()];
+                self.recordings * scope.channels().len()
+            ]);
         };
-        let recorded = (0..self.recordings)
-            .map(|k| spread.draw(self.model, bootstrap.seed, (run * self.recordings + k) as u64));
+        let recorded = (0..self.recordings).map(|k| {
+            spread.draw(
+                self.model,
+                bootstrap.seed,
+                (run * self.recordings + k) as u64,
+            )
+        });
         let recorded: Vec<Model> = recorded.collect::<Result<_, _>>()?;
         let ratio = |model: &Model, channel: Channel| {
             let own = implied(&in_order(model.axis(channel)), curve);
-            own.iter().zip(&centre).map(|(own, centre)| own / centre).collect()
+            own.iter()
+                .zip(&centre)
+                .map(|(own, centre)| own / centre)
+                .collect()
         };
         let channels = scope.channels();
-        Ok(channels.iter().flat_map(|c| recorded.iter().map(move |m| ratio(m, *c))).collect())
+        Ok(channels
+            .iter()
+            .flat_map(|c| recorded.iter().map(move |m| ratio(m, *c)))
+            .collect())
     }
 }
 
@@ -257,17 +307,31 @@ mod tests {
     /// Standard deviations of the logarithms of sigma2 and gamma2.
     fn scatter(composites: &[Composite]) -> [f64; 2] {
         std::array::from_fn(|i| {
-            let logs: Vec<f64> = composites.iter().map(|c| c.processes[i].values()[0].ln()).collect();
+            let logs: Vec<f64> = composites
+                .iter()
+                .map(|c| c.processes[i].values()[0].ln())
+                .collect();
             let mean = logs.iter().sum::<f64>() / logs.len() as f64;
-            (logs.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (logs.len() as f64 - 1.0)).sqrt()
+            (logs.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (logs.len() as f64 - 1.0))
+                .sqrt()
         })
     }
 
     fn anticipated(spread: Option<&Spread>, samples: usize, scattering: Scattering) -> Outcome {
         let model = model();
-        let plan = Anticipated { model: &model, spread, recordings: RECORDINGS, samples };
-        let bootstrap = Bootstrap { draws: 400, seed: 1 };
-        plan.outcomes(Estimator::Awv, &settings(), scattering, bootstrap).unwrap().remove(0)
+        let plan = Anticipated {
+            model: &model,
+            spread,
+            recordings: RECORDINGS,
+            samples,
+        };
+        let bootstrap = Bootstrap {
+            draws: 400,
+            seed: 1,
+        };
+        plan.outcomes(Estimator::Awv, &settings(), scattering, bootstrap)
+            .unwrap()
+            .remove(0)
     }
 
     /// By force: recordings made and calibrated, 150 times. Its scatter is known to 1/√300 = 5.8 %, that of 400 draws to
@@ -276,17 +340,31 @@ mod tests {
     fn fits_scatter_as_those_of_recordings_that_are_made() {
         let model = model();
         let made = |seed: u64| {
-            let imu = VirtualImu { model: &model, spread: None, contamination: None, seed };
+            let imu = VirtualImu {
+                model: &model,
+                spread: None,
+                contamination: None,
+                seed,
+            };
             let accel = Channel::named("accel");
             let mut signals = Vec::new();
             for run in 1..=RECORDINGS as u64 {
                 let recording = imu.recording(run, &accel, SAMPLES).unwrap();
                 signals.extend(replicates(&recording, None, &settings().tuning).unwrap());
             }
-            calibrate(&grouped(signals, Pool::Sensor), &settings()).unwrap().remove(0).fit.composite
+            calibrate(&grouped(signals, Pool::Sensor), &settings())
+                .unwrap()
+                .remove(0)
+                .fit
+                .composite
         };
         let forced = scatter(&(0..150).map(made).collect::<Vec<_>>());
-        let drawn = scatter(&anticipated(None, SAMPLES, Scattering::All).inference.unwrap().drawn);
+        let drawn = scatter(
+            &anticipated(None, SAMPLES, Scattering::All)
+                .inference
+                .unwrap()
+                .drawn,
+        );
         for (drawn, forced) in drawn.into_iter().zip(forced) {
             assert!((drawn / forced - 1.0).abs() < 0.27, "{drawn} {forced}");
         }
@@ -299,10 +377,15 @@ mod tests {
         let law = crate::noise::Law::Normal { sd: 0.1 };
         let axis = model().axes[0].clone();
         let vary = || vec![Variation::new(&axis, 1.0, "WN", "sigma2", law).unwrap()];
-        let spread = Spread { axes: std::array::from_fn(|_| vary()) };
+        let spread = Spread {
+            axes: std::array::from_fn(|_| vary()),
+        };
         let endless = anticipated(Some(&spread), 1 << 16, Scattering::BetweenRecordings);
         let deviation = scatter(&endless.inference.unwrap().drawn)[0];
-        assert!((deviation / (0.1 / 12.0_f64.sqrt()) - 1.0).abs() < 0.14, "{deviation}");
+        assert!(
+            (deviation / (0.1 / 12.0_f64.sqrt()) - 1.0).abs() < 0.14,
+            "{deviation}"
+        );
     }
 
     /// Where four recordings differ at every scale, their differences are known to 3 degrees of freedom: an interval is t₀.₉₇₅(3) = 3.1824 deviations
@@ -316,15 +399,24 @@ mod tests {
             [("WN", "sigma2"), ("RW", "gamma2")]
                 .map(|(p, key)| Variation::new(&axis, 1.0, p, key, law).unwrap())
         };
-        let spread = Spread { axes: std::array::from_fn(|_| vary().to_vec()) };
+        let spread = Spread {
+            axes: std::array::from_fn(|_| vary().to_vec()),
+        };
         let endless = anticipated(Some(&spread), 1 << 16, Scattering::BetweenRecordings);
         let inference = endless.inference.unwrap();
         let stretch = 3.182_446 / 1.959_964 * (2.365_974_f64 / 3.0).sqrt();
-        assert!((inference.stretch / stretch - 1.0).abs() < 0.02, "{} {stretch}", inference.stretch);
+        assert!(
+            (inference.stretch / stretch - 1.0).abs() < 0.02,
+            "{} {stretch}",
+            inference.stretch
+        );
         let interval = &inference.intervals[0];
         let half = 0.5 * (interval.high / interval.low).ln();
         let expected = 1.959_964 * stretch * 0.1 / 12.0_f64.sqrt();
-        assert!((half / expected - 1.0).abs() < 4.0 * 0.048, "{half} {expected}");
+        assert!(
+            (half / expected - 1.0).abs() < 4.0 * 0.048,
+            "{half} {expected}"
+        );
     }
 
     /// Half widths of the logarithm of sigma2: anticipated, and in the median of 120 laboratories of 4 recordings of three axes whose
@@ -332,10 +424,16 @@ mod tests {
     /// by 1.25·42 %/√120 = 5 %; the ends by 400 draws by 7 %: twice both are 17 %.
     #[test]
     fn laboratories_state_what_was_anticipated() {
-        let law = crate::noise::Law::Lognormal { median: 1.0, sd: 0.3, ci95: None };
+        let law = crate::noise::Law::Lognormal {
+            median: 1.0,
+            sd: 0.3,
+            ci95: None,
+        };
         let axis = model().axes[0].clone();
         let vary = || vec![Variation::new(&axis, 1.0, "WN", "sigma2", law).unwrap()];
-        let spread = Spread { axes: std::array::from_fn(|_| vary()) };
+        let spread = Spread {
+            axes: std::array::from_fn(|_| vary()),
+        };
         let half = |outcome: &Outcome| {
             let interval = &outcome.inference.as_ref().unwrap().intervals[0];
             0.5 * (interval.high / interval.low).ln()
@@ -343,18 +441,37 @@ mod tests {
         let planned = half(&anticipated(Some(&spread), SAMPLES, Scattering::All));
         let model = model();
         let laboratory = |seed: u64| {
-            let imu = VirtualImu { model: &model, spread: Some(&spread), contamination: None, seed };
+            let imu = VirtualImu {
+                model: &model,
+                spread: Some(&spread),
+                contamination: None,
+                seed,
+            };
             let signals = (1..=RECORDINGS as u64).flat_map(|run| {
-                let recording = imu.recording(run, &Channel::named("accel"), SAMPLES).unwrap();
+                let recording = imu
+                    .recording(run, &Channel::named("accel"), SAMPLES)
+                    .unwrap();
                 replicates(&recording, None, &settings().tuning).unwrap()
             });
             let groups = grouped(signals.collect(), Pool::Sensor);
             let mut outcomes = calibrate(&groups, &settings()).unwrap();
-            crate::infer(&groups, &mut outcomes, &settings(), Bootstrap { draws: 100, seed: 1 });
+            crate::infer(
+                &groups,
+                &mut outcomes,
+                &settings(),
+                Bootstrap {
+                    draws: 100,
+                    seed: 1,
+                },
+            );
             half(&outcomes[0])
         };
         let mut stated: Vec<f64> = (0..120).into_par_iter().map(laboratory).collect();
         stated.sort_by(f64::total_cmp);
-        assert!((planned / stated[60] - 1.0).abs() < 0.17, "{planned} {}", stated[60]);
+        assert!(
+            (planned / stated[60] - 1.0).abs() < 0.17,
+            "{planned} {}",
+            stated[60]
+        );
     }
 }

@@ -27,5 +27,9 @@ fn three_digits(x: f64) -> String {
     }
     let decimals = (2 - x.max(1e-3).log10().floor() as i32).clamp(0, 6) as usize;
     let text = format!("{x:.decimals$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
 }

@@ -53,22 +53,25 @@ pub mod efficiency;
 
 pub use anticipated::{Anticipated, AnticipationError};
 pub use curve::{
-    AverageError, Beginning, Beginnings, Change, Estimator, Group, Pool, Replicate, Scope, SignalError, Trim,
-    TrimError, WarmUp, average, grouped, implied, median, replicates, trend, warm_up,
+    AverageError, Beginning, Beginnings, Change, Estimator, Group, Pool, Replicate, Scope,
+    SignalError, Trim, TrimError, WarmUp, average, grouped, implied, median, replicates, trend,
+    warm_up,
 };
 pub use diagnosis::{
-    Alarm, AxisScores, CoarseSteps, CommonDrift, CommonOutliers, Diagnosis, DriftAlarm, GaussianQuantization,
-    LeftOut, Movement, Verdict, diagnose,
+    Alarm, AxisScores, CoarseSteps, CommonDrift, CommonOutliers, Diagnosis, DriftAlarm,
+    GaussianQuantization, LeftOut, Movement, Verdict, diagnose,
 };
 pub use fit::{Fit, FitError, Termination, Weighting, estimate, fit};
 pub use format::{duration, percent};
 pub use model::{BoundDomain, LimitError, Limits, ModelSpec, SpecError};
 pub use outcome::{
-    Advance, AxesDiffer, Bootstrap, Candidate, Departure, FitRange, Goodness, Indistinct, Inference,
-    LevelSpread, Misfit, Miss, ModelChoice, Note, Outcome, ParameterInterval, ParameterLimit,
-    ParameterSpread, Practical, PracticalIntervals, Ranking, Settings, Share, TooSimple, Undetermined,
-    model_of, put, shares, tau_s,
+    Advance, AxesDiffer, Bootstrap, Candidate, Departure, FitRange, Goodness, Indistinct,
+    Inference, LevelSpread, Misfit, Miss, ModelChoice, Note, Outcome, ParameterInterval,
+    ParameterLimit, ParameterSpread, Practical, PracticalIntervals, Ranking, Settings, Share,
+    TooSimple, Undetermined, model_of, put, shares, tau_s,
 };
-pub use pipeline::{CalibrationError, Cause, calibrate, calibrate_telling, fit_curve, infer, infer_telling};
+pub use pipeline::{
+    CalibrationError, Cause, calibrate, calibrate_telling, fit_curve, infer, infer_telling,
+};
 pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_on};
 pub use uncertainty::{ALIKE_LEVEL, CurveInfluence, Scattering, WIDEST, derived_interval};

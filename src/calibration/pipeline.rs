@@ -30,7 +30,11 @@ impl CalibrationError {
     }
 
     fn new(group: &Group, estimator: Estimator, source: impl Into<Cause>) -> Self {
-        Self { group: group.scope.name(), estimator: estimator.name(), source: source.into() }
+        Self {
+            group: group.scope.name(),
+            estimator: estimator.name(),
+            source: source.into(),
+        }
     }
 }
 
@@ -66,10 +70,18 @@ pub fn calibrate_telling(
     settings: &Settings,
     advance: Advance<'_>,
 ) -> Result<Vec<Outcome>, CalibrationError> {
-    let jobs: Vec<_> = groups.iter().flat_map(|g| settings.estimators.iter().map(move |e| (g, *e))).collect();
+    let jobs: Vec<_> = groups
+        .iter()
+        .flat_map(|g| settings.estimators.iter().map(move |e| (g, *e)))
+        .collect();
     let run = |&(group, estimator): &(&Group, Estimator)| {
-        let curve = average(&group.replicates, estimator, settings.trim, &settings.tuning)
-            .map_err(|source| CalibrationError::new(group, estimator, source))?;
+        let curve = average(
+            &group.replicates,
+            estimator,
+            settings.trim,
+            &settings.tuning,
+        )
+        .map_err(|source| CalibrationError::new(group, estimator, source))?;
         fit_telling(group, estimator, curve, settings, advance)
     };
     jobs.par_iter().map(run).collect()
@@ -101,7 +113,12 @@ fn fit_telling(
     let (spec, ranking) = match &settings.model {
         ModelChoice::Given(spec) => {
             advance(settings.model.steps());
-            (settings.limited(spec, group.scope).map_err(|e| error(e.into()))?, None)
+            (
+                settings
+                    .limited(spec, group.scope)
+                    .map_err(|e| error(e.into()))?,
+                None,
+            )
         }
         ModelChoice::Auto => {
             let (spec, ranking) =
@@ -109,11 +126,23 @@ fn fit_telling(
             (spec, Some(ranking))
         }
     };
-    let mut fit = estimate(estimator, &curve, &spec, settings.rate_hz, settings.weighting)
-        .map_err(|e| error(e.into()))?;
+    let mut fit = estimate(
+        estimator,
+        &curve,
+        &spec,
+        settings.rate_hz,
+        settings.weighting,
+    )
+    .map_err(|e| error(e.into()))?;
     while count_exceeded(&mut curve, &without_root, &fit, settings) {
-        fit = estimate(estimator, &curve, &spec, settings.rate_hz, settings.weighting)
-            .map_err(|e| error(e.into()))?;
+        fit = estimate(
+            estimator,
+            &curve,
+            &spec,
+            settings.rate_hz,
+            settings.weighting,
+        )
+        .map_err(|e| error(e.into()))?;
     }
     let mut outcome = Outcome {
         scope: group.scope,
@@ -135,8 +164,11 @@ fn fit_telling(
 
 /// Gives no weight to the scales outside the range of a fit.
 fn leave_out(curve: &mut Curve, settings: &Settings) {
-    let Some(range) = settings.fit_range else { return };
-    let outside = |level: &&u32| !range.holds(**level, settings.rate_hz) && !curve.ignored.contains(*level);
+    let Some(range) = settings.fit_range else {
+        return;
+    };
+    let outside =
+        |level: &&u32| !range.holds(**level, settings.rate_hz) && !curve.ignored.contains(*level);
     let outside: Vec<u32> = curve.levels.iter().filter(outside).copied().collect();
     curve.ignored.extend(outside);
 }
@@ -144,13 +176,17 @@ fn leave_out(curve: &mut Curve, settings: &Settings) {
 /// Counts the scales without a root at which a fit exceeds the classical variance, which bounds the noise from above; whether
 /// there are any.
 fn count_exceeded(curve: &mut Curve, without_root: &[u32], fit: &Fit, settings: &Settings) -> bool {
-    let is_in_range =
-        |level: u32| settings.fit_range.is_none_or(|range| range.holds(level, settings.rate_hz));
+    let is_in_range = |level: u32| {
+        settings
+            .fit_range
+            .is_none_or(|range| range.holds(level, settings.rate_hz))
+    };
     let implied = implied(&fit.composite, curve);
     let scales = curve.levels.iter().zip(&curve.wv).zip(implied);
     let is_exceeded = |level: &u32| without_root.contains(level) && is_in_range(*level);
-    let exceeded =
-        scales.filter(|((level, wv), nu)| is_exceeded(level) && nu > *wv).map(|((level, _), _)| *level);
+    let exceeded = scales
+        .filter(|((level, wv), nu)| is_exceeded(level) && nu > *wv)
+        .map(|((level, _), _)| *level);
     let exceeded: Vec<u32> = exceeded.collect();
     let before = curve.ignored.len();
     curve.ignored.retain(|level| !exceeded.contains(level));
@@ -182,7 +218,12 @@ fn weigh_fully(group: &Group, outcome: &mut Outcome, settings: &Settings) -> Res
 
 /// Fills in the inference of every outcome from its group. The same seed gives the same numbers on any number of
 /// threads.
-pub fn infer(groups: &[Group], outcomes: &mut [Outcome], settings: &Settings, bootstrap: Bootstrap) {
+pub fn infer(
+    groups: &[Group],
+    outcomes: &mut [Outcome],
+    settings: &Settings,
+    bootstrap: Bootstrap,
+) {
     infer_telling(groups, outcomes, settings, bootstrap, &|_| {});
 }
 
@@ -195,7 +236,9 @@ pub fn infer_telling(
     advance: Advance<'_>,
 ) {
     outcomes.par_iter_mut().for_each(|outcome| {
-        let Some(group) = groups.iter().find(|g| g.scope == outcome.scope) else { return };
+        let Some(group) = groups.iter().find(|g| g.scope == outcome.scope) else {
+            return;
+        };
         outcome.inference = Some(inference(group, outcome, settings, bootstrap, advance));
     });
 }
@@ -226,11 +269,25 @@ mod tests {
                     _ => 1.0,
                 }
         });
-        let curve =
-            Curve { wv: wv.collect(), edof: vec![1e3; 12], ignored: vec![6, 7], levels, ..Curve::default() };
-        let group = Group { scope: Scope { sensor: Sensor::Accel, axis: None }, replicates: Vec::new() };
+        let curve = Curve {
+            wv: wv.collect(),
+            edof: vec![1e3; 12],
+            ignored: vec![6, 7],
+            levels,
+            ..Curve::default()
+        };
+        let group = Group {
+            scope: Scope {
+                sensor: Sensor::Accel,
+                axis: None,
+            },
+            replicates: Vec::new(),
+        };
         let model = ModelChoice::Given("WN+RW".parse().unwrap());
-        let settings = Settings { model, ..Settings::default() };
+        let settings = Settings {
+            model,
+            ..Settings::default()
+        };
         let outcome = fit_curve(&group, Estimator::Given, curve, &settings).unwrap();
         assert_eq!(outcome.curve.ignored, [7]);
     }
@@ -246,10 +303,22 @@ mod tests {
         ]);
         let levels: Vec<u32> = (1..=16).collect();
         // Off by a few per cent from scale to scale, and by a factor of two at the first one.
-        let off = |level: u32| 1.0 + 0.03 * f64::from(level).sin() + f64::from(u8::from(level == 1));
-        let wv = levels.iter().map(|level| model.haar_wv(*level) * off(*level)).collect();
-        let edof = levels.iter().map(|level| 1e6 / f64::from(*level).exp2()).collect();
-        let whole = Curve { levels, wv, edof, ..Curve::default() };
+        let off =
+            |level: u32| 1.0 + 0.03 * f64::from(level).sin() + f64::from(u8::from(level == 1));
+        let wv = levels
+            .iter()
+            .map(|level| model.haar_wv(*level) * off(*level))
+            .collect();
+        let edof = levels
+            .iter()
+            .map(|level| 1e6 / f64::from(*level).exp2())
+            .collect();
+        let whole = Curve {
+            levels,
+            wv,
+            edof,
+            ..Curve::default()
+        };
         let part = |values: &[f64]| values[1..13].to_vec();
         let short = Curve {
             levels: (2..=13).collect(),
@@ -257,8 +326,17 @@ mod tests {
             edof: part(&whole.edof),
             ..Curve::default()
         };
-        let group = Group { scope: Scope { sensor: Sensor::Accel, axis: None }, replicates: Vec::new() };
-        let range = FitRange { from_s: 0.04, to_s: 81.92 };
+        let group = Group {
+            scope: Scope {
+                sensor: Sensor::Accel,
+                axis: None,
+            },
+            replicates: Vec::new(),
+        };
+        let range = FitRange {
+            from_s: 0.04,
+            to_s: 81.92,
+        };
         for weighting in [Weighting::Model, Weighting::Full] {
             let settings = |fit_range| Settings {
                 model: ModelChoice::Given("WN+AR1+RW".parse().unwrap()),
@@ -270,13 +348,34 @@ mod tests {
             let fit = |curve: &Curve, range| {
                 fit_curve(&group, Estimator::Given, curve.clone(), &settings(range)).unwrap()
             };
-            let (ranged, shortened, all) = (fit(&whole, Some(range)), fit(&short, None), fit(&whole, None));
-            assert_eq!((ranged.counted_levels().len(), ranged.departure().scales), (12, 12));
+            let (ranged, shortened, all) = (
+                fit(&whole, Some(range)),
+                fit(&short, None),
+                fit(&whole, None),
+            );
+            assert_eq!(
+                (ranged.counted_levels().len(), ranged.departure().scales),
+                (12, 12)
+            );
             // The covariance of the second is that of a first fit, known to 1e-8 or so; at a minimum parameters are known to the
             // square root of what the objective is known to.
-            let (known, near) = if weighting == Weighting::Full { (1e-7, 3e-4) } else { (1e-9, 1e-6) };
-            assert_relative_eq!(ranged.fit.objective, shortened.fit.objective, max_relative = known);
-            let values = |o: &Outcome| o.fit.composite.parameters().map(|(_, x)| x).collect::<Vec<_>>();
+            let (known, near) = if weighting == Weighting::Full {
+                (1e-7, 3e-4)
+            } else {
+                (1e-9, 1e-6)
+            };
+            assert_relative_eq!(
+                ranged.fit.objective,
+                shortened.fit.objective,
+                max_relative = known
+            );
+            let values = |o: &Outcome| {
+                o.fit
+                    .composite
+                    .parameters()
+                    .map(|(_, x)| x)
+                    .collect::<Vec<_>>()
+            };
             for (a, b) in values(&ranged).into_iter().zip(values(&shortened)) {
                 assert_relative_eq!(a, b, max_relative = near);
             }

@@ -84,8 +84,12 @@ impl TurnOnSpread {
     #[must_use]
     pub fn sigmas(&self) -> Option<[f64; 3]> {
         let seen = self.finding == TurnOnFinding::Seen;
-        let spread_of_axis =
-            |axis: Axis| self.axes.iter().find(|a| a.axis == axis).map_or(self.spread(), |a| a.spread);
+        let spread_of_axis = |axis: Axis| {
+            self.axes
+                .iter()
+                .find(|a| a.axis == axis)
+                .map_or(self.spread(), |a| a.spread)
+        };
         seen.then(|| Axis::ALL.map(spread_of_axis))
     }
 
@@ -123,11 +127,15 @@ impl TurnOnSpread {
 /// `outcomes`: those of one estimator.
 #[must_use]
 pub fn turn_on(groups: &[Group], outcomes: &[&Outcome]) -> Vec<TurnOnSpread> {
-    let mut found: Vec<TurnOnSpread> =
-        Sensor::ALL.into_iter().filter_map(|sensor| of_sensor(groups, outcomes, sensor)).collect();
+    let mut found: Vec<TurnOnSpread> = Sensor::ALL
+        .into_iter()
+        .filter_map(|sensor| of_sensor(groups, outcomes, sensor))
+        .collect();
     // A mounting is that of both sensors.
     if found.iter().any(|f| f.finding == TurnOnFinding::Moved) {
-        found.iter_mut().for_each(|f| f.finding = TurnOnFinding::Moved);
+        found
+            .iter_mut()
+            .for_each(|f| f.finding = TurnOnFinding::Moved);
     }
     found
 }
@@ -152,7 +160,11 @@ fn of_sensor(groups: &[Group], outcomes: &[&Outcome], sensor: Sensor) -> Option<
     // Scaled as for the slowest process that counts as noise: for a faster one the probability is too large,
     // never too small.
     let p_drift = FisherSnedecor::new(dof, trends).map_or(f64::NAN, |law| law.sf(f / SLOWEST));
-    let limit = if sensor == Sensor::Accel { OTHER_TILT_M_S2 } else { TURNING_RAD_S };
+    let limit = if sensor == Sensor::Accel {
+        OTHER_TILT_M_S2
+    } else {
+        TURNING_RAD_S
+    };
     let finding = if axes.iter().any(|m| m.of_axis().range > limit) {
         TurnOnFinding::Moved
     } else if axes.iter().all(Means::are_removed) {
@@ -163,7 +175,14 @@ fn of_sensor(groups: &[Group], outcomes: &[&Outcome], sensor: Sensor) -> Option<
         TurnOnFinding::WithinNoise
     };
     let axes = axes.iter().map(Means::of_axis).collect();
-    Some(TurnOnSpread { sensor, estimator, axes, p_noise, p_drift, finding })
+    Some(TurnOnSpread {
+        sensor,
+        estimator,
+        axes,
+        p_noise,
+        p_drift,
+        finding,
+    })
 }
 
 /// The recordings of one axis, each with the variance of its mean by the fitted noise (units²).
@@ -174,15 +193,28 @@ struct Means<'a> {
 
 impl<'a> Means<'a> {
     fn new(groups: &'a [Group], outcomes: &[&Outcome], channel: Channel) -> Option<Self> {
-        let outcome = outcomes.iter().find(|o| o.scope.channels().contains(&channel))?;
+        let outcome = outcomes
+            .iter()
+            .find(|o| o.scope.channels().contains(&channel))?;
         let group = groups.iter().find(|g| g.scope == outcome.scope)?;
         let known = |r: &&Replicate| {
-            r.axis == Some(channel.axis) && r.mean.is_finite() && r.trend.is_finite() && r.samples > 1
+            r.axis == Some(channel.axis)
+                && r.mean.is_finite()
+                && r.trend.is_finite()
+                && r.samples > 1
         };
         let with_variance = |r: &'a Replicate| (r, outcome.fit.composite.mean_variance(r.samples));
-        let replicates: Vec<_> = group.replicates.iter().filter(known).map(with_variance).collect();
+        let replicates: Vec<_> = group
+            .replicates
+            .iter()
+            .filter(known)
+            .map(with_variance)
+            .collect();
         let enough = replicates.len() > 1 && replicates.iter().all(|(_, variance)| *variance > 0.0);
-        enough.then_some(Self { axis: channel.axis, replicates })
+        enough.then_some(Self {
+            axis: channel.axis,
+            replicates,
+        })
     }
 
     /// Σ (m_k − m)²/v_k about the weighted mean m.
@@ -190,28 +222,48 @@ impl<'a> Means<'a> {
         let first = self.replicates[0].0.mean;
         let weights: f64 = self.replicates.iter().map(|(_, v)| 1.0 / v).sum();
         // About the first one, so that gravity costs no digits.
-        let mean = self.replicates.iter().map(|(r, v)| (r.mean - first) / v).sum::<f64>() / weights;
-        self.replicates.iter().map(|(r, v)| (r.mean - first - mean).powi(2) / v).sum()
+        let mean = self
+            .replicates
+            .iter()
+            .map(|(r, v)| (r.mean - first) / v)
+            .sum::<f64>()
+            / weights;
+        self.replicates
+            .iter()
+            .map(|(r, v)| (r.mean - first - mean).powi(2) / v)
+            .sum()
     }
 
     /// Σ trend²/v_k
     fn trends(&self) -> f64 {
-        self.replicates.iter().map(|(r, v)| r.trend * r.trend / v).sum()
+        self.replicates
+            .iter()
+            .map(|(r, v)| r.trend * r.trend / v)
+            .sum()
     }
 
     fn are_removed(&self) -> bool {
-        self.replicates.iter().all(|(r, v)| r.mean.abs() < REMOVED * v.sqrt())
+        self.replicates
+            .iter()
+            .all(|(r, v)| r.mean.abs() < REMOVED * v.sqrt())
     }
 
     fn of_axis(&self) -> MeansOfAxis {
         let recordings = self.replicates.len();
         let first = self.replicates[0].0.mean;
-        let means: Vec<f64> = self.replicates.iter().map(|(r, _)| r.mean - first).collect();
+        let means: Vec<f64> = self
+            .replicates
+            .iter()
+            .map(|(r, _)| r.mean - first)
+            .collect();
         let mean = means.iter().sum::<f64>() / recordings as f64;
         let squares: f64 = means.iter().map(|m| (m - mean) * (m - mean)).sum();
         let noise = self.replicates.iter().map(|(_, v)| v).sum::<f64>() / recordings as f64;
-        let (low, high) =
-            means.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), m| (a.min(*m), b.max(*m)));
+        let (low, high) = means
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), m| {
+                (a.min(*m), b.max(*m))
+            });
         MeansOfAxis {
             axis: self.axis,
             recordings,

@@ -39,7 +39,12 @@ impl Candidate {
     #[must_use]
     pub fn new(estimator: Estimator, model: ModelSpec) -> Self {
         let (filter, inflation) = (FilterStates::default(), Inflation::default());
-        Self { estimator, model: ModelChoice::Given(model), filter, inflation }
+        Self {
+            estimator,
+            model: ModelChoice::Given(model),
+            filter,
+            inflation,
+        }
     }
 
     /// What is compared where nothing else is said: the three averages of N2, and beside AWV what else is done in
@@ -51,9 +56,18 @@ impl Candidate {
             n2(Estimator::Awv),
             n2(Estimator::SrAwv),
             n2(Estimator::DrAwv),
-            Self { filter: FilterStates::Full, ..n2(Estimator::Awv) },
-            Self { inflation: Inflation::Tuned, ..n2(Estimator::Awv) },
-            Self { inflation: Inflation::Tenfold, ..n2(Estimator::Awv) },
+            Self {
+                filter: FilterStates::Full,
+                ..n2(Estimator::Awv)
+            },
+            Self {
+                inflation: Inflation::Tuned,
+                ..n2(Estimator::Awv)
+            },
+            Self {
+                inflation: Inflation::Tenfold,
+                ..n2(Estimator::Awv)
+            },
             two_slopes(Estimator::Awv),
             n2(Estimator::Gmwm),
             two_slopes(Estimator::Avlr),
@@ -77,7 +91,12 @@ impl Candidate {
                 };
                 for &filter in filters {
                     for &inflation in inflations {
-                        let candidate = Self { estimator, model: model.clone(), filter, inflation };
+                        let candidate = Self {
+                            estimator,
+                            model: model.clone(),
+                            filter,
+                            inflation,
+                        };
                         if !all.contains(&candidate) {
                             all.push(candidate);
                         }
@@ -108,7 +127,10 @@ fn white_and_walk() -> ModelSpec {
 /// Whether every process has a slope of its own in the Allan deviation.
 fn is_of_slopes(model: &ModelChoice) -> bool {
     match model {
-        ModelChoice::Given(spec) => spec.kinds().iter().all(|kind: &Kind| kind.shape().is_none()),
+        ModelChoice::Given(spec) => spec
+            .kinds()
+            .iter()
+            .all(|kind: &Kind| kind.shape().is_none()),
         ModelChoice::Auto => false,
     }
 }
@@ -137,7 +159,10 @@ mod tests {
     #[test]
     fn names_tell_candidates_apart() {
         let mut names: Vec<String> = Candidate::usual().iter().map(ToString::to_string).collect();
-        assert_eq!((names[0].as_str(), names[8].as_str()), ("awv N2, 15", "avlr WN+RW, 15"));
+        assert_eq!(
+            (names[0].as_str(), names[8].as_str()),
+            ("awv N2, 15", "avlr WN+RW, 15")
+        );
         let count = names.len();
         names.sort_unstable();
         names.dedup();

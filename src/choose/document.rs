@@ -5,8 +5,8 @@ use crate::report::Answer;
 use crate::report::comparison_table::in_order;
 use crate::report::dots::{Dots, dot_chart};
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, Tone, readable,
-    short_names, window,
+    Axis, Cell, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, Tone,
+    readable, short_names, window,
 };
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::NEES_DOF;
@@ -74,7 +74,9 @@ impl ChoiceReport<'_> {
         let recordings = winner.folds.len();
         let first = match (ranking.tells, eligible) {
             (_, 1) => format!("{name}: there is no other candidate"),
-            (true, _) => format!("{name} is the best of {eligible} candidates on {recordings} recordings"),
+            (true, _) => {
+                format!("{name} is the best of {eligible} candidates on {recordings} recordings")
+            }
             (false, _) => format!(
                 "undecided: {recordings} recordings cannot tell {eligible} candidates apart; {name} scores highest"
             ),
@@ -82,9 +84,17 @@ impl ChoiceReport<'_> {
         let mut lines = vec![first];
         let tied: Vec<&str> = self.tied().collect();
         if ranking.tells && !tied.is_empty() {
-            let more =
-                if tied.len() > NAMED { format!(" and {} more", tied.len() - NAMED) } else { String::new() };
-            let named = tied.iter().take(NAMED).copied().collect::<Vec<_>>().join("; ");
+            let more = if tied.len() > NAMED {
+                format!(" and {} more", tied.len() - NAMED)
+            } else {
+                String::new()
+            };
+            let named = tied
+                .iter()
+                .take(NAMED)
+                .copied()
+                .collect::<Vec<_>>()
+                .join("; ");
             lines.push(format!("cannot be told from it: {named}{more}"));
         }
         lines.push(format!(
@@ -100,10 +110,17 @@ impl ChoiceReport<'_> {
     fn notes(&self, document: &mut Document) {
         let ranking = self.ranking;
         if !self.abnormal.is_empty() {
-            let (names, verb) =
-                (self.abnormal.join(", "), if self.abnormal.len() == 1 { "is" } else { "are" });
-            let text =
-                format!("{names} {verb} abnormal, and no judge of candidates: nav-sim calibrate says how");
+            let (names, verb) = (
+                self.abnormal.join(", "),
+                if self.abnormal.len() == 1 {
+                    "is"
+                } else {
+                    "are"
+                },
+            );
+            let text = format!(
+                "{names} {verb} abnormal, and no judge of candidates: nav-sim calibrate says how"
+            );
             document.note(Importance::Warning, text);
         }
         if !ranking.undescribed.is_empty() {
@@ -113,11 +130,17 @@ impl ChoiceReport<'_> {
             } else {
                 "look at it with nav-sim calibrate"
             };
-            document.note(Importance::Warning, format!("no candidate describes {names}: {cure}"));
+            document.note(
+                Importance::Warning,
+                format!("no candidate describes {names}: {cure}"),
+            );
         }
         if !ranking.decisive.is_empty() {
             let names = ranking.decisive.join(", or without ");
-            document.note(Importance::Warning, format!("without {names} another candidate would win"));
+            document.note(
+                Importance::Warning,
+                format!("without {names} another candidate would win"),
+            );
         }
         if ranking.winner().folds.iter().any(|fold| fold.windows == 0) {
             document.note(
@@ -132,9 +155,15 @@ impl ChoiceReport<'_> {
         let right = NEES_DOF as f64;
         let mut of_kind = |word: &str, is_so: &dyn Fn(&Placed) -> bool| {
             let all = ranking.candidates.iter().filter(|p| p.eligible && is_so(p));
-            let names = all.map(|p| p.candidate.as_str()).collect::<Vec<_>>().join("; ");
+            let names = all
+                .map(|p| p.candidate.as_str())
+                .collect::<Vec<_>>()
+                .join("; ");
             if !names.is_empty() {
-                document.note(Importance::Detail, format!("{word} over the recordings: {names}"));
+                document.note(
+                    Importance::Detail,
+                    format!("{word} over the recordings: {names}"),
+                );
             }
         };
         of_kind("overconfident", &|p| p.nees.ci95.0 > right);
@@ -146,8 +175,13 @@ impl ChoiceReport<'_> {
 
     /// A row for each candidate.
     fn table(&self) -> Table {
-        let mut table =
-            Table::new(["candidate", "log score (nats)", "NEES (9)", "RMSE (m)", "against the best (%)"]);
+        let mut table = Table::new([
+            "candidate",
+            "log score (nats)",
+            "NEES (9)",
+            "RMSE (m)",
+            "against the best (%)",
+        ]);
         for placed in &self.ranking.candidates {
             let is_winner = placed.index == self.ranking.winner().index;
             let mark = match (is_winner, placed.eligible, placed.tied) {
@@ -181,12 +215,14 @@ impl ChoiceReport<'_> {
     fn beliefs(&self) -> Table {
         let mut table = Table::new(["candidate", "RMSE (m)", "believed (m)", "coverage (0.95)"]);
         for (i, p) in self.ranking.candidates.iter().enumerate() {
-            let number = |value: f64, key: &str| Cell::number(value, &format!("/candidates/{i}/{key}"));
+            let number =
+                |value: f64, key: &str| Cell::number(value, &format!("/candidates/{i}/{key}"));
             table.row([
                 p.candidate.as_str().into(),
                 number(p.rmse_m, "rmse_m"),
                 number(p.believed_m, "believed_m"),
-                p.coverage.map_or_else(|| Cell::figures("–"), |c| number(c, "coverage")),
+                p.coverage
+                    .map_or_else(|| Cell::figures("–"), |c| number(c, "coverage")),
             ]);
         }
         table
@@ -194,11 +230,18 @@ impl ChoiceReport<'_> {
 
     /// Recording by recording: NEES and log score of every candidate.
     fn folds(&self) -> Table {
-        let heads = self.recordings().into_iter().map(|name| format!("{name}: NEES (nats)"));
+        let heads = self
+            .recordings()
+            .into_iter()
+            .map(|name| format!("{name}: NEES (nats)"));
         let mut table = Table::new(["candidate"]).and(heads);
         for p in &self.ranking.candidates {
             let cell = |fold: &FoldScore| {
-                Cell::figures(format!("{} ({:.1})", readable(fold.score.nees), fold.score.log_score))
+                Cell::figures(format!(
+                    "{} ({:.1})",
+                    readable(fold.score.nees),
+                    fold.score.log_score
+                ))
             };
             table.row(std::iter::once(p.candidate.as_str().into()).chain(p.folds.iter().map(cell)));
         }
@@ -207,30 +250,51 @@ impl ChoiceReport<'_> {
 
     fn recordings(&self) -> Vec<String> {
         let folds = &self.ranking.winner().folds;
-        short_names(&folds.iter().map(|fold| fold.recording.as_str()).collect::<Vec<_>>())
+        short_names(
+            &folds
+                .iter()
+                .map(|fold| fold.recording.as_str())
+                .collect::<Vec<_>>(),
+        )
     }
 
     /// Which scales of which sensors decide: a line each, those of a quarter of the largest influence or more.
     pub(crate) fn decisive_scales(&self) -> Vec<String> {
-        let scales = self.influence.map_or(&[][..], |influence| &influence.scales);
+        let scales = self
+            .influence
+            .map_or(&[][..], |influence| &influence.scales);
         let largest = scales.iter().map(|s| s.on_error.abs()).fold(0.0, f64::max);
         let mut lines: Vec<String> = Vec::new();
         for (i, first) in scales.iter().enumerate() {
             if scales[..i].iter().any(|s| s.signals == first.signals) {
                 continue;
             }
-            let of_signals: Vec<_> = scales.iter().filter(|s| s.signals == first.signals).collect();
+            let of_signals: Vec<_> = scales
+                .iter()
+                .filter(|s| s.signals == first.signals)
+                .collect();
             // the scales around the one that counts most
             let decides = |s: &&ScaleInfluence| s.on_error >= DECISIVE * largest;
             let peak = (0..of_signals.len())
                 .max_by(|a, b| of_signals[*a].on_error.total_cmp(&of_signals[*b].on_error))
                 .unwrap_or(0);
-            let before = of_signals[..peak].iter().rev().take_while(|s| decides(s)).count();
-            let felt: Vec<_> = of_signals[peak - before..].iter().take_while(|s| decides(s)).collect();
+            let before = of_signals[..peak]
+                .iter()
+                .rev()
+                .take_while(|s| decides(s))
+                .count();
+            let felt: Vec<_> = of_signals[peak - before..]
+                .iter()
+                .take_while(|s| decides(s))
+                .collect();
             let sum: f64 = of_signals.iter().map(|s| s.on_error).sum();
             let range = match (felt.first(), felt.last()) {
                 (Some(from), Some(to)) => {
-                    format!("mostly from {} to {} s", readable(from.tau_s), readable(to.tau_s))
+                    format!(
+                        "mostly from {} to {} s",
+                        readable(from.tau_s),
+                        readable(to.tau_s)
+                    )
                 }
                 _ => "and no scale decides".to_owned(),
             };
@@ -245,7 +309,9 @@ impl ChoiceReport<'_> {
 
     /// What decides: scales and recordings.
     fn decides(&self, document: &mut Document) {
-        let Some(influence) = self.influence else { return };
+        let Some(influence) = self.influence else {
+            return;
+        };
         document.section("What decides");
         if !influence.scales.is_empty() {
             document.chart(&over_scales(&influence.scales), INFLUENCE);
@@ -253,8 +319,9 @@ impl ChoiceReport<'_> {
         document.text("What each recording adds to the expected horizontal error, to first order, with each way of averaging.");
         let mut table = Table::new(["recording", "awv (%)", "sr-awv (%)", "dr-awv (%)"]);
         for (i, r) in influence.recordings.iter().enumerate() {
-            let cell =
-                |value: f64, key: &str| Cell::number(value, &format!("/influence/recordings/{i}/{key}"));
+            let cell = |value: f64, key: &str| {
+                Cell::number(value, &format!("/influence/recordings/{i}/{key}"))
+            };
             table.row([
                 r.recording.clone().into(),
                 cell(r.awv_pct, "awv_pct"),
@@ -271,13 +338,23 @@ impl ChoiceReport<'_> {
         let names = || placed.iter().map(|p| p.candidate.clone());
         let of = |value: &dyn Fn(&Placed) -> Mean| {
             let point = |p: &Placed| {
-                let Mean { value, ci95: (low, high) } = value(p);
+                let Mean {
+                    value,
+                    ci95: (low, high),
+                } = value(p);
                 [value, low, high]
             };
             placed.iter().map(point).collect::<Vec<_>>()
         };
-        let alone = |value: f64| Mean { value, ci95: (f64::NAN, f64::NAN) };
-        let dots = |name, colour, points| Dots { name, colour, points };
+        let alone = |value: f64| Mean {
+            value,
+            ci95: (f64::NAN, f64::NAN),
+        };
+        let dots = |name, colour, points| Dots {
+            name,
+            colour,
+            points,
+        };
         let scores = dots("", Colour::BELIEVED, of(&|p| p.difference.log_score));
         let nees = dots("NEES", Colour::Ink, of(&|p| p.nees));
         let real = dots("true RMSE", Colour::REAL, of(&|p| alone(p.rmse_m)));
@@ -291,21 +368,40 @@ impl ChoiceReport<'_> {
                 Some(("best", 0.0)),
                 &[scores],
             ),
-            dot_chart("Consistency at the ends of outages", Axis::log("NEES"), names(), right, &[nees]),
-            dot_chart("Accuracy", Axis::log("horizontal error (m)"), names(), None, &[real, believed]),
+            dot_chart(
+                "Consistency at the ends of outages",
+                Axis::log("NEES"),
+                names(),
+                right,
+                &[nees],
+            ),
+            dot_chart(
+                "Accuracy",
+                Axis::log("horizontal error (m)"),
+                names(),
+                None,
+                &[real, believed],
+            ),
         ]
     }
 
     fn tied(&self) -> impl Iterator<Item = &str> {
         let others = self.ranking.candidates.iter().skip(1);
-        others.filter(|p| p.eligible && p.tied).map(|p| p.candidate.as_str())
+        others
+            .filter(|p| p.eligible && p.tied)
+            .map(|p| p.candidate.as_str())
     }
 
     /// One of several rankings.
     pub(crate) fn of_place(&self, name: String) -> RankedPlace {
         let mut json = serde_json::to_value(self).expect("plain structs are always JSON");
         json["place"] = name.as_str().into();
-        RankedPlace { name, verdict: self.verdict(), table: self.table(), json }
+        RankedPlace {
+            name,
+            verdict: self.verdict(),
+            table: self.table(),
+            json,
+        }
     }
 }
 
@@ -328,10 +424,18 @@ impl Serialize for ChoiceReport<'_> {
 
 impl Answer for ChoiceReport<'_> {
     fn document(&self) -> Document {
-        let tone = if self.ranking.tells { Tone::Good } else { Tone::Undecided };
+        let tone = if self.ranking.tells {
+            Tone::Good
+        } else {
+            Tone::Undecided
+        };
         let mut document = Document::new("Which noise model", tone, self.verdict());
         self.notes(&mut document);
-        let ends: Vec<String> = self.outages.iter().map(|o| window(o.start_s, o.end_s)).collect();
+        let ends: Vec<String> = self
+            .outages
+            .iter()
+            .map(|o| window(o.start_s, o.end_s))
+            .collect();
         document.facts(&[
             ("trajectory", self.trajectory.to_owned()),
             ("outages", ends.join(", ")),
@@ -360,18 +464,35 @@ const INFLUENCE: &str = "Growth of the horizontal error at the ends of outages w
 
 /// NEES of each candidate on each recording.
 fn fold_chart(placed: &[Placed], recordings: Vec<String>) -> Chart {
-    let mut series = vec![Series::new("right", Colour::RIGHT, Mark::Level(NEES_DOF as f64))];
+    let mut series = vec![Series::new(
+        "right",
+        Colour::RIGHT,
+        Mark::Level(NEES_DOF as f64),
+    )];
     for (hue, p) in placed.iter().enumerate() {
         let beside = 0.6 * ((hue as f64 + 0.5) / placed.len() as f64 - 0.5);
         let point = |(k, fold): (usize, &FoldScore)| {
             let (x, y) = (k as f64 + beside, fold.score.nees);
-            Interval { x, y, low: f64::NAN, high: f64::NAN }
+            Interval {
+                x,
+                y,
+                low: f64::NAN,
+                high: f64::NAN,
+            }
         };
         let points = p.folds.iter().enumerate().map(point).collect();
-        series.push(Series::new(&p.candidate, Colour::Hue(hue), Mark::Points(points)));
+        series.push(Series::new(
+            &p.candidate,
+            Colour::Hue(hue),
+            Mark::Points(points),
+        ));
     }
     let panel = Panel::new(Axis::log("NEES"), series);
-    Chart::new("NEES on the recording left out", Axis::names(recordings), vec![panel])
+    Chart::new(
+        "NEES on the recording left out",
+        Axis::names(recordings),
+        vec![panel],
+    )
 }
 
 /// Influence over scales, a line a sensor or axis.
@@ -384,7 +505,11 @@ fn over_scales(scales: &[ScaleInfluence]) -> Chart {
         Series::line(name, Colour::Hue(hue), line)
     }));
     let panel = Panel::new(Axis::linear("% of error for 1 %"), series);
-    Chart::new("Influence of the wavelet variance", Axis::log("scale (s)"), vec![panel])
+    Chart::new(
+        "Influence of the wavelet variance",
+        Axis::log("scale (s)"),
+        vec![panel],
+    )
 }
 
 /// A number in a table that is wide enough already: two decimals at most.
@@ -411,5 +536,9 @@ fn interval(value: f64, (low, high): (f64, f64), shown: &dyn Fn(f64) -> String) 
 /// A number with its sign.
 fn signed(x: f64) -> String {
     let shown = readable(x);
-    if x > 0.0 && x.is_finite() { format!("+{shown}") } else { shown }
+    if x > 0.0 && x.is_finite() {
+        format!("+{shown}")
+    } else {
+        shown
+    }
 }

@@ -109,11 +109,23 @@ impl Drive {
             scenario.imu.rate_hz = rate_hz;
         }
         // what comes after the last outage is not judged
-        let judged_s = outages.iter().map(|o| o.end_s).fold(f64::NEG_INFINITY, f64::max);
+        let judged_s = outages
+            .iter()
+            .map(|o| o.end_s)
+            .fold(f64::NEG_INFINITY, f64::max);
         let trajectory = trajectory.until(judged_s + 1.0 / scenario.gnss.rate_hz);
-        let none = Model { rate_hz, axes: Default::default() };
+        let none = Model {
+            rate_hz,
+            axes: Default::default(),
+        };
         let track = scenario.track(&trajectory, &none, &outages)?;
-        Ok(Self { trajectory, scenario, outages, seed, track })
+        Ok(Self {
+            trajectory,
+            scenario,
+            outages,
+            seed,
+            track,
+        })
     }
 
     pub(super) const fn track(&self) -> &Track {
@@ -124,7 +136,10 @@ impl Drive {
     pub(super) fn full_belief(&self, model: &Model) -> Result<Belief, ChoiceError> {
         let full = self.scenario.with_full_noise();
         full.belief(model, &self.outages, &self.track)
-            .map_err(|source| ChoiceError::Belief { candidate: "all states".to_owned(), source })
+            .map_err(|source| ChoiceError::Belief {
+                candidate: "all states".to_owned(),
+                source,
+            })
     }
 
     /// How many windows as long as the trajectory lie side by side in so many samples.
@@ -157,12 +172,20 @@ impl Drive {
         } else {
             recordings.iter().filter(|r| is_long(r)).cloned().collect()
         };
-        let sampled = if usable.is_empty() { None } else { self.sampled(&beliefs, &usable, runs, progress)? };
+        let sampled = if usable.is_empty() {
+            None
+        } else {
+            self.sampled(&beliefs, &usable, runs, progress)?
+        };
         if sampled.is_none() {
             progress(runs);
         }
         let windows = if sampled.is_some() { runs } else { 0 };
-        Ok(Fold { scores: sampled.unwrap_or_else(|| expected.clone()), expected: Some(expected), windows })
+        Ok(Fold {
+            scores: sampled.unwrap_or_else(|| expected.clone()),
+            expected: Some(expected),
+            windows,
+        })
     }
 
     /// The model of every candidate, of all recordings but one, inflated as it says.
@@ -177,14 +200,21 @@ impl Drive {
     ) -> Result<Vec<Model>, ChoiceError> {
         let mut made: Vec<(&Candidate, Model)> = Vec::new();
         for candidate in candidates {
-            if !made.iter().any(|(other, _)| other.is_calibrated_as(candidate)) {
+            if !made
+                .iter()
+                .any(|(other, _)| other.is_calibrated_as(candidate))
+            {
                 let calibrated = laboratory.calibrate(candidate, without);
-                let (_, outcomes, settings) = calibrated.map_err(|source| uncalibrated(candidate, source))?;
+                let (_, outcomes, settings) =
+                    calibrated.map_err(|source| uncalibrated(candidate, source))?;
                 made.push((candidate, model_of(&outcomes, settings.rate_hz)));
             }
         }
         let inflated = |candidate: &Candidate| {
-            let (_, model) = made.iter().find(|(c, _)| c.is_calibrated_as(candidate)).expect("made above");
+            let (_, model) = made
+                .iter()
+                .find(|(c, _)| c.is_calibrated_as(candidate))
+                .expect("made above");
             self.inflated(laboratory, without, candidate, model)
         };
         candidates.iter().map(inflated).collect()
@@ -207,13 +237,19 @@ impl Drive {
             Inflation::Tuned => {
                 let others: Vec<usize> = laboratory.others(without).collect();
                 let model_of = |k: &usize| own_model(laboratory, *k).cloned();
-                let truths: Vec<Model> = others.par_iter().map(model_of).collect::<Result<_, _>>()?;
+                let truths: Vec<Model> =
+                    others.par_iter().map(model_of).collect::<Result<_, _>>()?;
                 self.tuned(candidate, model, &truths)
             }
         }
     }
 
-    fn tuned(&self, candidate: &Candidate, model: &Model, truths: &[Model]) -> Result<Model, ChoiceError> {
+    fn tuned(
+        &self,
+        candidate: &Candidate,
+        model: &Model,
+        truths: &[Model],
+    ) -> Result<Model, ChoiceError> {
         let full = self.scenario.with_full_noise();
         let full = |model: &Model| full.belief(model, &self.outages, &self.track);
         let truths: Vec<TrueErrors> = truths.iter().cloned().map(TrueErrors::from).collect();
@@ -234,12 +270,18 @@ impl Drive {
     }
 
     /// What each candidate's filter believes.
-    fn beliefs(&self, candidates: &[Candidate], models: &[Model]) -> Result<Vec<Belief>, ChoiceError> {
+    fn beliefs(
+        &self,
+        candidates: &[Candidate],
+        models: &[Model],
+    ) -> Result<Vec<Belief>, ChoiceError> {
         let pairs: Vec<(&Candidate, &Model)> = candidates.iter().zip(models).collect();
         let belief = |(candidate, model): &(&Candidate, &Model)| {
             let mut scenario = self.scenario.clone();
             scenario.filter.states = candidate.filter;
-            scenario.belief(model, &self.outages, &self.track).map_err(|source| unfit(candidate, source))
+            scenario
+                .belief(model, &self.outages, &self.track)
+                .map_err(|source| unfit(candidate, source))
         };
         pairs.par_iter().map(belief).collect()
     }
@@ -255,7 +297,12 @@ impl Drive {
         recordings: &[Recording],
         runs: u64,
     ) -> Result<Option<Vec<Score>>, ChoiceError> {
-        Ok(self.sampled(&self.beliefs(candidates, models)?, recordings, runs, &|_| ())?)
+        Ok(self.sampled(
+            &self.beliefs(candidates, models)?,
+            recordings,
+            runs,
+            &|_| (),
+        )?)
     }
 
     /// Every filter on the same windows; none where the recordings are shorter than the trajectory.
@@ -267,11 +314,16 @@ impl Drive {
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<Option<Vec<Score>>, ExperimentError> {
         let truth = Truth::Static(recordings);
-        let experiment = self.scenario.experiment(&self.trajectory, truth, beliefs, &self.outages, self.seed);
+        let experiment =
+            self.scenario
+                .experiment(&self.trajectory, truth, beliefs, &self.outages, self.seed);
         match monte_carlo::run(&experiment, runs, progress) {
-            Ok(results) => {
-                Ok(Some(results.iter().map(|r| Score::of_runs(&r.runs, r.outages.len())).collect()))
-            }
+            Ok(results) => Ok(Some(
+                results
+                    .iter()
+                    .map(|r| Score::of_runs(&r.runs, r.outages.len()))
+                    .collect(),
+            )),
             // a window counts the last sample too
             Err(ExperimentError::Truth(TruthError::TooShort { .. })) => Ok(None),
             Err(e) => Err(e),
@@ -288,8 +340,9 @@ impl Drive {
             self.seed,
         );
         let sources = TruthSide::together(&TruthSide::sources(&experiment, truth));
-        let score =
-            |belief: &Belief| Score::expected(&FilterPass::new(&self.track, belief).errors_at_ends(&sources));
+        let score = |belief: &Belief| {
+            Score::expected(&FilterPass::new(&self.track, belief).errors_at_ends(&sources))
+        };
         beliefs.par_iter().map(score).collect()
     }
 }
@@ -302,15 +355,25 @@ fn own_model(laboratory: &Laboratory, k: usize) -> Result<&Model, ChoiceError> {
 }
 
 fn uncalibrated(candidate: &Candidate, source: CalibrationError) -> ChoiceError {
-    ChoiceError::Calibration { candidate: candidate.to_string(), source: Box::new(source) }
+    ChoiceError::Calibration {
+        candidate: candidate.to_string(),
+        source: Box::new(source),
+    }
 }
 
 /// Ten times every standard deviation.
 fn tenfold(model: &Model) -> Model {
-    let factors = Sensor::ALL.map(|sensor| Factor { sensor, process: None, on_variance: 100.0 });
+    let factors = Sensor::ALL.map(|sensor| Factor {
+        sensor,
+        process: None,
+        on_variance: 100.0,
+    });
     scaled(model, &factors)
 }
 
 fn unfit(candidate: &Candidate, source: BeliefError) -> ChoiceError {
-    ChoiceError::Belief { candidate: candidate.to_string(), source }
+    ChoiceError::Belief {
+        candidate: candidate.to_string(),
+        source,
+    }
 }

@@ -12,13 +12,17 @@ impl From<ChoiceError> for Failure {
             ChoiceError::TooFew { .. } => {
                 Self::input(e).hint("each recording is a file; nav-sim calibrate takes fewer")
             }
-            ChoiceError::Calibration { candidate, source } => of_calibration(&source).within(&candidate),
+            ChoiceError::Calibration { candidate, source } => {
+                of_calibration(&source).within(&candidate)
+            }
             ChoiceError::Own { ref source, .. } => {
                 let hint = of_calibration(source).advice().map(str::to_owned);
                 Self::input(e).maybe_hint(hint)
             }
             ChoiceError::Experiment(ExperimentError::FixBetweenSamples { .. }) => Self::input(e)
-                .hint("the IMU has the rate of the recordings: another [gnss] rate_hz in --scenario"),
+                .hint(
+                    "the IMU has the rate of the recordings: another [gnss] rate_hz in --scenario",
+                ),
             ChoiceError::Experiment(_) | ChoiceError::Belief { .. } => Self::input(e),
         }
     }

@@ -10,8 +10,14 @@ use nav_sim_calibration::diagnose;
 use std::path::{Path, PathBuf};
 
 /// The files of a choice, in the order of writing.
-const FILES: [&str; 6] =
-    ["model.toml", "model.wv.json", "model.html", "model.draws.json", "report.html", "ranking.json"];
+const FILES: [&str; 6] = [
+    "model.toml",
+    "model.wv.json",
+    "model.html",
+    "model.draws.json",
+    "report.html",
+    "ranking.json",
+];
 
 /// Whether the directory can be made, found out before the work. A ranking does not tell what it was made of.
 ///
@@ -25,7 +31,11 @@ pub(crate) fn claim_choice<'a>(
     let recognise = |text: &str| {
         let present = serde_json::from_str::<serde_json::Value>(text).unwrap_or_default();
         let is_ours = present["candidates"].is_array() && present["influence"].is_object();
-        Ok(if is_ours { Found::Other("holds the result of an earlier choose") } else { Found::Foreign })
+        Ok(if is_ours {
+            Found::Other("holds the result of an earlier choose")
+        } else {
+            Found::Foreign
+        })
     };
     claim_directory(out, &FILES, inputs, existing, recognise)
 }
@@ -66,7 +76,12 @@ impl Chosen {
             directory.path(&path.file_name().unwrap_or_default().to_string_lossy());
         }
         ModelFiles::write(&texts)?;
-        let Calibration { groups, outcomes, settings, .. } = &self.calibration;
+        let Calibration {
+            groups,
+            outcomes,
+            settings,
+            ..
+        } = &self.calibration;
         files.write_page(&self.calibration, &diagnose(groups, outcomes, settings))?;
         directory.write("report.html", report.document().html())?;
         directory.write("ranking.json", json(report))?;

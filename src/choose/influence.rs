@@ -68,7 +68,9 @@ impl Drive {
         let mut scales = Vec::new();
         let mut by_group: Vec<(&Group, Vec<f64>)> = Vec::new();
         for (group, outcome) in groups.iter().zip(outcomes) {
-            let Some(influence) = CurveInfluence::of(outcome, settings) else { continue };
+            let Some(influence) = CurveInfluence::of(outcome, settings) else {
+                continue;
+            };
             let on_error = self.on_error(&model, outcome, &influence, settings)?;
             let levels = outcome.curve.levels.iter().zip(&on_error);
             scales.extend(levels.map(|(level, on_error)| ScaleInfluence {
@@ -93,7 +95,10 @@ impl Drive {
                 dr_awv_pct: adds(Estimator::DrAwv),
             }
         };
-        Ok(Influence { scales, recordings: (0..laboratory.units().len()).map(recording).collect() })
+        Ok(Influence {
+            scales,
+            recordings: (0..laboratory.units().len()).map(recording).collect(),
+        })
     }
 
     /// d ln(error) / d ln(nu_j), scale by scale of one fit.
@@ -107,16 +112,25 @@ impl Drive {
         let slope = |m: usize| {
             let log_rmse = |by: f64| {
                 let moved = influence.moved(&outcome.fit.composite, m, by, settings.rate_hz);
-                let composite = moved.expect("a thousandth of the way to the end of its domain is within it");
+                let composite =
+                    moved.expect("a thousandth of the way to the end of its domain is within it");
                 let mut changed = model.clone();
                 put(&composite, outcome.scope, &mut changed);
                 self.horizontal_rmse(&changed).map(f64::ln)
             };
             Ok::<f64, ChoiceError>((log_rmse(STEP)? - log_rmse(-STEP)?) / (2.0 * STEP))
         };
-        let slopes: Vec<f64> =
-            (0..influence.parameters.len()).into_par_iter().map(slope).collect::<Result<_, _>>()?;
-        let along = |j: usize| slopes.iter().enumerate().map(|(m, s)| s * influence.passed_on[(m, j)]).sum();
+        let slopes: Vec<f64> = (0..influence.parameters.len())
+            .into_par_iter()
+            .map(slope)
+            .collect::<Result<_, _>>()?;
+        let along = |j: usize| {
+            slopes
+                .iter()
+                .enumerate()
+                .map(|(m, s)| s * influence.passed_on[(m, j)])
+                .sum()
+        };
         Ok((0..outcome.curve.levels.len()).map(along).collect())
     }
 
@@ -127,7 +141,10 @@ impl Drive {
     pub fn horizontal_rmse(&self, model: &Model) -> Result<f64, ChoiceError> {
         let belief = self.full_belief(model)?;
         let ends = assess(self.track(), &belief, model).outage_ends;
-        let squares: f64 = ends.iter().map(|end| end.rmse[0].powi(2) + end.rmse[1].powi(2)).sum();
+        let squares: f64 = ends
+            .iter()
+            .map(|end| end.rmse[0].powi(2) + end.rmse[1].powi(2))
+            .sum();
         Ok((squares / ends.len() as f64).sqrt())
     }
 }
@@ -141,12 +158,32 @@ fn added(
     estimator: Estimator,
     settings: &Settings,
 ) -> f64 {
-    let names: Vec<&str> = laboratory.units()[k].replicates.iter().map(|(_, r)| r.name.as_str()).collect();
-    let others: Vec<_> =
-        group.replicates.iter().filter(|r| !names.contains(&r.name.as_str())).cloned().collect();
-    let curve = |replicates: &[_]| average(replicates, estimator, settings.trim, &settings.tuning).ok();
-    let (Some(all), Some(without)) = (curve(&group.replicates), curve(&others)) else { return f64::NAN };
-    let ratios = all.wv.iter().zip(&without.wv).map(|(with, without)| (with / without).ln());
+    let names: Vec<&str> = laboratory.units()[k]
+        .replicates
+        .iter()
+        .map(|(_, r)| r.name.as_str())
+        .collect();
+    let others: Vec<_> = group
+        .replicates
+        .iter()
+        .filter(|r| !names.contains(&r.name.as_str()))
+        .cloned()
+        .collect();
+    let curve =
+        |replicates: &[_]| average(replicates, estimator, settings.trim, &settings.tuning).ok();
+    let (Some(all), Some(without)) = (curve(&group.replicates), curve(&others)) else {
+        return f64::NAN;
+    };
+    let ratios = all
+        .wv
+        .iter()
+        .zip(&without.wv)
+        .map(|(with, without)| (with / without).ln());
     // a scale without a robust variance counts nothing
-    on_error.iter().zip(ratios).map(|(i, ln)| i * ln).filter(|x| x.is_finite()).sum()
+    on_error
+        .iter()
+        .zip(ratios)
+        .map(|(i, ln)| i * ln)
+        .filter(|x| x.is_finite())
+        .sum()
 }

@@ -70,29 +70,56 @@ pub fn choose(
     remarks: &mut dyn Remarks,
     observer: &dyn Observer<Note>,
 ) -> Result<Chosen, ChoiceError> {
-    let options = CalibrationOptions { estimators: EstimatorChoice::One(Estimator::Awv), ..options.clone() };
+    let options = CalibrationOptions {
+        estimators: EstimatorChoice::One(Estimator::Awv),
+        ..options.clone()
+    };
     let asked_pool = options.pool;
-    let mut measured = measure(paths, &CalibrationOptions { pool: None, ..options.clone() }, remarks)?;
+    let mut measured = measure(
+        paths,
+        &CalibrationOptions {
+            pool: None,
+            ..options.clone()
+        },
+        remarks,
+    )?;
     let found_hz = measured.settings.rate_hz;
     let rate_hz = nominal_hz(found_hz, drive.scenario.gnss.rate_hz);
     if rate_hz != found_hz {
-        remarks.remark(Remark::Rate { found_hz, taken_hz: rate_hz });
+        remarks.remark(Remark::Rate {
+            found_hz,
+            taken_hz: rate_hz,
+        });
         measured.settings.rate_hz = rate_hz;
     }
     // The clocks of the files are not quite alike: one rate is that of all.
-    let reading = ReadOptions { rate_hz: Some(rate_hz), ..options.reading.clone() };
+    let reading = ReadOptions {
+        rate_hz: Some(rate_hz),
+        ..options.reading.clone()
+    };
     let options = CalibrationOptions { reading, ..options };
     let files = measured.report.files.clone();
     if files.len() < FEWEST {
-        return Err(ChoiceError::TooFew { recordings: files.len(), needed: FEWEST });
+        return Err(ChoiceError::TooFew {
+            recordings: files.len(),
+            needed: FEWEST,
+        });
     }
     let units = units(&measured);
     let samples: Vec<usize> = units.iter().map(samples_in).collect();
     let laboratory = Laboratory::new(units, measured.settings, asked_pool);
-    let ChoiceDrive { trajectory, scenario, outages, seed, runs } = drive;
+    let ChoiceDrive {
+        trajectory,
+        scenario,
+        outages,
+        seed,
+        runs,
+    } = drive;
     let drive = Drive::new(&trajectory, scenario, outages, rate_hz, seed)?;
-    let runs: Vec<u64> =
-        samples.iter().map(|count| runs.unwrap_or_else(|| runs_on(&drive, *count))).collect();
+    let runs: Vec<u64> = samples
+        .iter()
+        .map(|count| runs.unwrap_or_else(|| runs_on(&drive, *count)))
+        .collect();
     let judges = laboratory.judges().map_err(JobError::from)?;
     observer.begin(judges.iter().map(|k| runs[*k]).sum());
     let mut folds: Vec<(String, Fold)> = Vec::new();
@@ -108,19 +135,37 @@ pub fn choose(
     let ranking = Ranking::new(&contenders, &folds);
     let winner = candidates[ranking.winner().index].clone();
     // an estimator of single recordings never wins: this is of all of them
-    let (groups, outcomes, settings) = laboratory.calibrate(&winner, None).map_err(JobError::from)?;
+    let (groups, outcomes, settings) = laboratory
+        .calibrate(&winner, None)
+        .map_err(JobError::from)?;
     let calibrated = model_of(&outcomes, settings.rate_hz);
     let model = drive.inflated(&laboratory, None, &winner, &calibrated)?;
     let influence = drive.influence(&laboratory, &groups, &outcomes, &settings)?;
-    let calibration =
-        Calibration { groups, outcomes, settings, beginnings: Default::default(), turn_on: Vec::new() }
-            .with_inference(options.bootstrap, &|_| {});
+    let calibration = Calibration {
+        groups,
+        outcomes,
+        settings,
+        beginnings: Default::default(),
+        turn_on: Vec::new(),
+    }
+    .with_inference(options.bootstrap, &|_| {});
     let is_judge = |(k, _): &(usize, &FileReport)| judges.contains(k);
-    let abnormal =
-        files.iter().enumerate().filter(|found| !is_judge(found)).map(|(_, file)| file.file.clone());
+    let abnormal = files
+        .iter()
+        .enumerate()
+        .filter(|found| !is_judge(found))
+        .map(|(_, file)| file.file.clone());
     let abnormal = abnormal.collect();
     let files = files.into_iter().map(|file| file.path).collect();
-    Ok(Chosen { ranking, winner, calibration, influence, model, abnormal, files })
+    Ok(Chosen {
+        ranking,
+        winner,
+        calibration,
+        influence,
+        model,
+        abnormal,
+        files,
+    })
 }
 
 /// The rate of which that of the fixes is a whole divisor, if the clock of the recordings (Hz) shows it to within its own
@@ -131,7 +176,11 @@ fn nominal_hz(found_hz: f64, fix_hz: f64) -> f64 {
     let nominal_hz = (found_hz / fix_hz).round() * fix_hz;
     let apart = (nominal_hz / found_hz - 1.0).abs();
     // To the precision of a rate that is written with seven digits it is one already.
-    if apart > 1e-6 && apart <= CLOCK { nominal_hz } else { found_hz }
+    if apart > 1e-6 && apart <= CLOCK {
+        nominal_hz
+    } else {
+        found_hz
+    }
 }
 
 /// The recordings, each with its signals' wavelet variances.
@@ -139,14 +188,22 @@ fn units(measured: &Measured) -> Vec<Unit> {
     let signals = || {
         measured.groups.iter().flat_map(|group| {
             let axis_of = move |axis: Option<Axis>| axis.or(group.scope.axis).unwrap_or(Axis::X);
-            let channel = move |axis| Channel { sensor: group.scope.sensor, axis: axis_of(axis) };
+            let channel = move |axis| Channel {
+                sensor: group.scope.sensor,
+                axis: axis_of(axis),
+            };
             group.replicates.iter().map(move |r| (channel(r.axis), r))
         })
     };
     let unit = |file: &FileReport| {
         let names: Vec<String> = file.recordings().map(|(name, _)| name).collect();
-        let replicates = signals().filter(|(_, r)| names.contains(&r.name)).map(|(c, r)| (c, r.clone()));
-        Unit { name: file.file.clone(), replicates: replicates.collect() }
+        let replicates = signals()
+            .filter(|(_, r)| names.contains(&r.name))
+            .map(|(c, r)| (c, r.clone()));
+        Unit {
+            name: file.file.clone(),
+            replicates: replicates.collect(),
+        }
     };
     measured.report.files.iter().map(unit).collect()
 }

@@ -3,8 +3,8 @@
 use super::candidate::Candidate;
 use super::job::FEWEST;
 use nav_sim_calibration::{
-    CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Outcome, Pool, Replicate, Settings, Verdict,
-    calibrate, diagnose, grouped, model_of,
+    CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Outcome, Pool, Replicate, Settings,
+    Verdict, calibrate, diagnose, grouped, model_of,
 };
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::Model;
@@ -38,7 +38,12 @@ impl Laboratory {
     #[must_use]
     pub fn new(units: Vec<Unit>, settings: Settings, pool: Option<Pool>) -> Self {
         let models = units.iter().map(|_| OnceLock::new()).collect();
-        Self { units, settings, pool, models }
+        Self {
+            units,
+            settings,
+            pool,
+            models,
+        }
     }
 
     /// The recordings.
@@ -77,15 +82,23 @@ impl Laboratory {
     pub(crate) fn judges(&self) -> Result<Vec<usize>, CalibrationError> {
         let all: Vec<usize> = self.others(None).collect();
         let n2 = ModelChoice::Given(ModelSpec::n2());
-        let (groups, outcomes, settings) =
-            self.fit(&self.units.iter().collect::<Vec<_>>(), Estimator::DrAwv, &n2, self.pool)?;
+        let (groups, outcomes, settings) = self.fit(
+            &self.units.iter().collect::<Vec<_>>(),
+            Estimator::DrAwv,
+            &n2,
+            self.pool,
+        )?;
         let abnormal: Vec<String> = diagnose(&groups, &outcomes, &settings)
             .into_iter()
             .filter(|diagnosis| diagnosis.verdict != Verdict::Normal)
             .map(|diagnosis| diagnosis.name)
             .collect();
-        let is_normal =
-            |k: &usize| self.units[*k].replicates.iter().all(|(_, r)| !abnormal.contains(&r.name));
+        let is_normal = |k: &usize| {
+            self.units[*k]
+                .replicates
+                .iter()
+                .all(|(_, r)| !abnormal.contains(&r.name))
+        };
         let normal: Vec<usize> = all.iter().copied().filter(is_normal).collect();
         Ok(if normal.len() < FEWEST { all } else { normal })
     }
@@ -112,11 +125,24 @@ impl Laboratory {
         model: &ModelChoice,
         pool: Option<Pool>,
     ) -> Result<Calibrated, CalibrationError> {
-        let settings =
-            Settings { estimators: vec![estimator], model: model.clone(), ..self.settings.clone() };
+        let settings = Settings {
+            estimators: vec![estimator],
+            model: model.clone(),
+            ..self.settings.clone()
+        };
         // an estimator of single recordings cannot pool axes
-        let pool = if estimator.is_single() { Pool::Axes } else { pool.unwrap_or(settings.pool()) };
-        let groups = grouped(units.iter().flat_map(|unit| unit.replicates.clone()).collect(), pool);
+        let pool = if estimator.is_single() {
+            Pool::Axes
+        } else {
+            pool.unwrap_or(settings.pool())
+        };
+        let groups = grouped(
+            units
+                .iter()
+                .flat_map(|unit| unit.replicates.clone())
+                .collect(),
+            pool,
+        );
         let outcomes = calibrate(&groups, &settings)?;
         Ok((groups, outcomes, settings))
     }

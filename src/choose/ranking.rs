@@ -23,7 +23,10 @@ pub struct Contender {
 
 impl From<&Candidate> for Contender {
     fn from(candidate: &Candidate) -> Self {
-        Self { name: candidate.to_string(), eligible: candidate.is_eligible() }
+        Self {
+            name: candidate.to_string(),
+            eligible: candidate.is_eligible(),
+        }
     }
 }
 
@@ -115,28 +118,43 @@ impl Ranking {
     /// Without a candidate that may be chosen, or without a recording.
     #[must_use]
     pub fn new(candidates: &[Contender], folds: &[(String, Fold)]) -> Self {
-        let eligible: Vec<usize> = (0..candidates.len()).filter(|c| candidates[*c].eligible).collect();
+        let eligible: Vec<usize> = (0..candidates.len())
+            .filter(|c| candidates[*c].eligible)
+            .collect();
         let all: Vec<&Fold> = folds.iter().map(|(_, fold)| fold).collect();
         let winner = best(&eligible, &all).expect("one may be chosen, of one recording at least");
         let rivals = eligible.len().saturating_sub(1).max(1);
-        let mut placed: Vec<Placed> =
-            (0..candidates.len()).map(|c| place(c, &candidates[c], winner, rivals, folds)).collect();
+        let mut placed: Vec<Placed> = (0..candidates.len())
+            .map(|c| place(c, &candidates[c], winner, rivals, folds))
+            .collect();
         placed.sort_by(|a, b| {
             let order = b.log_score.value.total_cmp(&a.log_score.value);
             b.eligible.cmp(&a.eligible).then(order)
         });
         let without = |left_out: usize| {
-            let rest: Vec<&Fold> =
-                all.iter().enumerate().filter(|(k, _)| *k != left_out).map(|(_, f)| *f).collect();
+            let rest: Vec<&Fold> = all
+                .iter()
+                .enumerate()
+                .filter(|(k, _)| *k != left_out)
+                .map(|(_, f)| *f)
+                .collect();
             best(&eligible, &rest).is_some_and(|other| other != winner)
         };
         let named = |k: usize| folds[k].0.clone();
-        let least = |fold: &Fold| fold.scores.iter().map(|s| s.nees).fold(f64::INFINITY, f64::min);
+        let least = |fold: &Fold| {
+            fold.scores
+                .iter()
+                .map(|s| s.nees)
+                .fold(f64::INFINITY, f64::min)
+        };
         let fails = |k: &usize| least(all[*k]) > FAILS;
         let tells = folds.len() >= FEWEST && placed.iter().any(|p| p.eligible && !p.tied);
         Self {
             candidates: placed,
-            decisive: (0..folds.len()).filter(|k| without(*k)).map(named).collect(),
+            decisive: (0..folds.len())
+                .filter(|k| without(*k))
+                .map(named)
+                .collect(),
             undescribed: (0..folds.len()).filter(fails).map(named).collect(),
             tells,
         }
@@ -154,17 +172,33 @@ fn best(eligible: &[usize], folds: &[&Fold]) -> Option<usize> {
     let score = |c: usize| folds.iter().map(|f| f.scores[c].log_score).sum::<f64>();
     // the first of equals
     let higher = |best: usize, c: usize| if score(c) > score(best) { c } else { best };
-    eligible.iter().copied().reduce(higher).filter(|_| !folds.is_empty())
+    eligible
+        .iter()
+        .copied()
+        .reduce(higher)
+        .filter(|_| !folds.is_empty())
 }
 
-fn place(c: usize, candidate: &Contender, winner: usize, rivals: usize, folds: &[(String, Fold)]) -> Placed {
+fn place(
+    c: usize,
+    candidate: &Contender,
+    winner: usize,
+    rivals: usize,
+    folds: &[(String, Fold)],
+) -> Placed {
     let scores = || folds.iter().map(|(_, fold)| &fold.scores[c]);
     let per_recording = |value: &dyn Fn(&Score) -> f64| scores().map(value).collect::<Vec<f64>>();
     let paired = |value: &dyn Fn(&Score) -> f64| -> Vec<f64> {
-        folds.iter().map(|(_, f)| value(&f.scores[c]) - value(&f.scores[winner])).collect()
+        folds
+            .iter()
+            .map(|(_, f)| value(&f.scores[c]) - value(&f.scores[winner]))
+            .collect()
     };
     let density = paired(&|s| s.log_score);
-    let (log_score, joint95) = (interval(&density, 0.05), interval(&density, 0.05 / rivals as f64).ci95);
+    let (log_score, joint95) = (
+        interval(&density, 0.05),
+        interval(&density, 0.05 / rivals as f64).ci95,
+    );
     let root_mean_square =
         |values: Vec<f64>| (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
     let fold = |(recording, fold): &(String, Fold)| FoldScore {
@@ -186,7 +220,11 @@ fn place(c: usize, candidate: &Contender, winner: usize, rivals: usize, folds: &
         believed_m: root_mean_square(per_recording(&|s| s.believed_m)),
         nees: positive(interval(&per_recording(&|s| s.nees), 0.05)),
         coverage: coverage.map(|all| all.iter().sum::<f64>() / all.len() as f64),
-        difference: Difference { log_score, joint95, rmse_pct: rmse_ratio_pct(c, winner, folds) },
+        difference: Difference {
+            log_score,
+            joint95,
+            rmse_pct: rmse_ratio_pct(c, winner, folds),
+        },
         folds: folds.iter().map(fold).collect(),
     }
 }
@@ -195,19 +233,26 @@ fn place(c: usize, candidate: &Contender, winner: usize, rivals: usize, folds: &
 /// logarithm of the ratio (its derivative with respect to the recording's weight).
 fn rmse_ratio_pct(c: usize, winner: usize, folds: &[(String, Fold)]) -> Mean {
     let square = |candidate: usize, fold: &Fold| fold.scores[candidate].rmse_m.powi(2);
-    let mean =
-        |candidate: usize| folds.iter().map(|(_, f)| square(candidate, f)).sum::<f64>() / folds.len() as f64;
+    let mean = |candidate: usize| {
+        folds.iter().map(|(_, f)| square(candidate, f)).sum::<f64>() / folds.len() as f64
+    };
     let (own, best) = (mean(c), mean(winner));
     let added = |(_, f): &(String, Fold)| 0.5 * (square(c, f) / own - square(winner, f) / best);
     let spread = interval(&folds.iter().map(added).collect::<Vec<_>>(), 0.05);
     let percent = |more: f64| 100.0 * (0.5 * (own / best).ln() + more).exp_m1();
-    Mean { value: percent(0.0), ci95: (percent(spread.ci95.0), percent(spread.ci95.1)) }
+    Mean {
+        value: percent(0.0),
+        ci95: (percent(spread.ci95.0), percent(spread.ci95.1)),
+    }
 }
 
 /// The interval of what cannot be negative: that of its logarithm.
 fn positive(Mean { value, ci95 }: Mean) -> Mean {
     let factor = ((ci95.1 - value) / value).exp();
-    Mean { value, ci95: (value / factor, value * factor) }
+    Mean {
+        value,
+        ci95: (value / factor, value * factor),
+    }
 }
 
 /// Mean of values, one a recording, and its interval at level 1 − `alpha`. Models of different folds share all but two
@@ -218,9 +263,13 @@ fn interval(values: &[f64], alpha: f64) -> Mean {
     let n = values.len() as f64;
     let value = values.iter().sum::<f64>() / n;
     let variance = values.iter().map(|x| (x - value).powi(2)).sum::<f64>() / (n - 1.0);
-    let t = StudentsT::new(0.0, 1.0, n - 1.0).map_or(f64::NAN, |law| law.inverse_cdf(1.0 - 0.5 * alpha));
+    let t = StudentsT::new(0.0, 1.0, n - 1.0)
+        .map_or(f64::NAN, |law| law.inverse_cdf(1.0 - 0.5 * alpha));
     let half = t * (variance * (1.0 / n + 1.0 / (n - 1.0))).sqrt();
-    Mean { value, ci95: (value - half, value + half) }
+    Mean {
+        value,
+        ci95: (value - half, value + half),
+    }
 }
 
 #[cfg(test)]
@@ -239,7 +288,11 @@ mod tests {
             outages: Vec::new(),
         };
         let scores: Vec<Score> = scores.iter().map(score).collect();
-        Fold { expected: None, scores, windows: 16 }
+        Fold {
+            expected: None,
+            scores,
+            windows: 16,
+        }
     }
 
     /// What stands beside one another agrees: the ratio is that of the RMSE shown, though the mean of the recordings' own
@@ -249,25 +302,53 @@ mod tests {
     #[test]
     fn the_ratio_of_the_rmse_is_that_of_the_rmse_shown() {
         let with = |rmse_m: [f64; 2]| {
-            let scores = rmse_m.map(|rmse_m| Score { rmse_m, ..fold(&[0.0]).scores[0].clone() }).to_vec();
-            Fold { scores, ..fold(&[]) }
+            let scores = rmse_m
+                .map(|rmse_m| Score {
+                    rmse_m,
+                    ..fold(&[0.0]).scores[0].clone()
+                })
+                .to_vec();
+            Fold {
+                scores,
+                ..fold(&[])
+            }
         };
-        let folds = [("a".to_owned(), with([10.0, 9.0])), ("b".to_owned(), with([1.0, 2.0]))];
+        let folds = [
+            ("a".to_owned(), with([10.0, 9.0])),
+            ("b".to_owned(), with([1.0, 2.0])),
+        ];
         let Mean { value, ci95 } = rmse_ratio_pct(0, 1, &folds);
-        assert!((value - 100.0 * ((101.0_f64 / 85.0).sqrt() - 1.0)).abs() < 1e-9, "{value}");
+        assert!(
+            (value - 100.0 * ((101.0_f64 / 85.0).sqrt() - 1.0)).abs() < 1e-9,
+            "{value}"
+        );
         let added = 0.5 * (100.0 / 50.5 - 81.0 / 42.5);
         let half = 12.706_204_7 * (2.0 * f64::powi(added, 2) * 1.5).sqrt();
         let high = 100.0 * ((101.0_f64 / 85.0).sqrt() * half.exp() - 1.0);
-        assert!((ci95.1 / high - 1.0).abs() < 1e-6 && ci95.0 > -100.0, "{ci95:?} {high}");
-        let nees = positive(Mean { value: 30.0, ci95: (-20.0, 80.0) });
-        assert!(nees.ci95.0 > 0.0 && (nees.ci95.0 * nees.ci95.1 / 900.0 - 1.0).abs() < 1e-12, "{nees:?}");
+        assert!(
+            (ci95.1 / high - 1.0).abs() < 1e-6 && ci95.0 > -100.0,
+            "{ci95:?} {high}"
+        );
+        let nees = positive(Mean {
+            value: 30.0,
+            ci95: (-20.0, 80.0),
+        });
+        assert!(
+            nees.ci95.0 > 0.0 && (nees.ci95.0 * nees.ci95.1 / 900.0 - 1.0).abs() < 1e-12,
+            "{nees:?}"
+        );
     }
 
     fn ranked(estimators: &[Estimator], folds: &[&[f64]]) -> Ranking {
-        let candidates: Vec<Contender> =
-            estimators.iter().map(|e| Contender::from(&Candidate::new(*e, "WN".parse().unwrap()))).collect();
-        let folds: Vec<(String, Fold)> =
-            folds.iter().enumerate().map(|(k, s)| (format!("r{k}"), fold(s))).collect();
+        let candidates: Vec<Contender> = estimators
+            .iter()
+            .map(|e| Contender::from(&Candidate::new(*e, "WN".parse().unwrap())))
+            .collect();
+        let folds: Vec<(String, Fold)> = folds
+            .iter()
+            .enumerate()
+            .map(|(k, s)| (format!("r{k}"), fold(s)))
+            .collect();
         Ranking::new(&candidates, &folds)
     }
 
@@ -284,7 +365,15 @@ mod tests {
     #[test]
     fn differences_are_paired() {
         let two = [Estimator::Awv, Estimator::SrAwv];
-        let found = ranked(&two, &[&[-10.0, -11.0], &[-50.0, -51.1], &[-20.0, -20.9], &[-90.0, -91.0]]);
+        let found = ranked(
+            &two,
+            &[
+                &[-10.0, -11.0],
+                &[-50.0, -51.1],
+                &[-20.0, -20.9],
+                &[-90.0, -91.0],
+            ],
+        );
         assert!(found.tells && found.winner().index == 0 && !found.candidates[1].tied);
         assert!((found.candidates[1].difference.log_score.value + 1.0).abs() < 1e-12);
     }
@@ -293,7 +382,15 @@ mod tests {
     #[test]
     fn a_recording_that_decides_is_named() {
         let two = [Estimator::Awv, Estimator::SrAwv];
-        let found = ranked(&two, &[&[-10.0, -11.0], &[-10.0, -11.0], &[-10.0, -11.0], &[-30.0, -10.0]]);
+        let found = ranked(
+            &two,
+            &[
+                &[-10.0, -11.0],
+                &[-10.0, -11.0],
+                &[-10.0, -11.0],
+                &[-30.0, -10.0],
+            ],
+        );
         assert_eq!((found.winner().index, found.tells), (1, false));
         assert_eq!(found.decisive, ["r3"]);
         assert!(found.candidates.iter().all(|c| c.tied));
@@ -310,7 +407,15 @@ mod tests {
     fn a_candidate_that_diverges_is_last() {
         let two = [Estimator::Awv, Estimator::SrAwv];
         let diverged = f64::NEG_INFINITY;
-        let found = ranked(&two, &[&[diverged, -11.0], &[-1.0, -11.0], &[-1.0, -11.0], &[-1.0, -11.0]]);
+        let found = ranked(
+            &two,
+            &[
+                &[diverged, -11.0],
+                &[-1.0, -11.0],
+                &[-1.0, -11.0],
+                &[-1.0, -11.0],
+            ],
+        );
         assert_eq!((found.winner().index, found.candidates[1].index), (1, 0));
         assert!(!found.candidates[1].tied);
     }

@@ -113,14 +113,31 @@ impl ChoiceRequest {
         let options = CalibrationOptions {
             reading: self.recordings.options(self.gaps),
             skip_warm_up: self.recordings.skips_warm_up(),
-            settings: Settings { trim: self.trim, ..Settings::default() },
-            bootstrap: Some(Bootstrap { seed, ..Bootstrap::default() }),
+            settings: Settings {
+                trim: self.trim,
+                ..Settings::default()
+            },
+            bootstrap: Some(Bootstrap {
+                seed,
+                ..Bootstrap::default()
+            }),
             turn_on: false,
             ..CalibrationOptions::default()
         };
-        let drive = ChoiceDrive { trajectory, scenario, outages: outages.clone(), seed, runs: self.runs };
+        let drive = ChoiceDrive {
+            trajectory,
+            scenario,
+            outages: outages.clone(),
+            seed,
+            runs: self.runs,
+        };
         let chosen = choose(&self.inputs, &options, &candidates, drive, remarks, notes)?;
-        Ok(ChoiceMade { chosen, outages, trajectory: self.trajectory.display().to_string(), seed })
+        Ok(ChoiceMade {
+            chosen,
+            outages,
+            trajectory: self.trajectory.display().to_string(),
+            seed,
+        })
     }
 
     /// As `nav-sim choose` prints it; the winner is the file `model.toml`.
@@ -135,9 +152,17 @@ impl ChoiceRequest {
     ) -> Result<Answered, Failure> {
         let made = self.made(draw, remarks, notes)?;
         let files = made.chosen.model_files("model.toml".as_ref());
-        let texts = made.chosen.texts(&files, &self.trajectory, self.note(&made))?;
-        let files = texts.into_iter().map(|(path, text)| (path.display().to_string(), text)).collect();
-        Ok(Answered { files, ..Answered::of(&made.report()) })
+        let texts = made
+            .chosen
+            .texts(&files, &self.trajectory, self.note(&made))?;
+        let files = texts
+            .into_iter()
+            .map(|(path, text)| (path.display().to_string(), text))
+            .collect();
+        Ok(Answered {
+            files,
+            ..Answered::of(&made.report())
+        })
     }
 
     /// What is recorded of the winner's calibration.
@@ -152,7 +177,13 @@ impl ChoiceRequest {
 
     /// Those that are usual, or all combinations of what is given.
     pub(crate) fn candidates(&self) -> Result<Vec<Candidate>, Failure> {
-        let Self { estimator, model, filter, inflate, .. } = self;
+        let Self {
+            estimator,
+            model,
+            filter,
+            inflate,
+            ..
+        } = self;
         if estimator.is_empty() && model.is_empty() && filter.is_empty() && inflate.is_empty() {
             return Ok(Candidate::usual());
         }
@@ -165,15 +196,29 @@ impl ChoiceRequest {
         }
         let averages = [Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv];
         let candidates = Candidate::product(
-            if estimator.is_empty() { &averages } else { estimator },
+            if estimator.is_empty() {
+                &averages
+            } else {
+                estimator
+            },
             &models,
-            if filter.is_empty() { &[FilterStates::Reduced15] } else { filter },
-            if inflate.is_empty() { &[Inflation::None] } else { inflate },
+            if filter.is_empty() {
+                &[FilterStates::Reduced15]
+            } else {
+                filter
+            },
+            if inflate.is_empty() {
+                &[Inflation::None]
+            } else {
+                inflate
+            },
         );
         if candidates.iter().any(Candidate::is_eligible) {
             return Ok(candidates);
         }
-        Err(Failure::input("no candidate uses all recordings: gmwm, rgmwm and avlr take one at a time")
-            .hint("add awv, sr-awv or dr-awv to --estimator"))
+        Err(Failure::input(
+            "no candidate uses all recordings: gmwm, rgmwm and avlr take one at a time",
+        )
+        .hint("add awv, sr-awv or dr-awv to --estimator"))
     }
 }

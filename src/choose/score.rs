@@ -42,11 +42,15 @@ pub struct EndScore {
 impl Score {
     /// Of runs with so many outages.
     pub(crate) fn of_runs(runs: &[RunRecord], outages: usize) -> Self {
-        let kept: Vec<&[OutageRecord]> =
-            runs.iter().filter(|r| !r.diverged).map(|r| r.outages.as_slice()).collect();
+        let kept: Vec<&[OutageRecord]> = runs
+            .iter()
+            .filter(|r| !r.diverged)
+            .map(|r| r.outages.as_slice())
+            .collect();
         let diverged = runs.len() - kept.len();
         let end = |i: usize| {
-            let mean = |value: &dyn Fn(&OutageRecord) -> f64| mean(kept.iter().map(|run| value(&run[i])));
+            let mean =
+                |value: &dyn Fn(&OutageRecord) -> f64| mean(kept.iter().map(|run| value(&run[i])));
             EndScore {
                 rmse_m: mean(&|o| o.horizontal_error_end_m.powi(2)).sqrt(),
                 believed_m: mean(&|o| o.see_end[0].powi(2) + o.see_end[1].powi(2)).sqrt(),
@@ -58,8 +62,19 @@ impl Score {
         let inside = |o: &OutageRecord| f64::from(u8::from(o.nees_end <= limit));
         let coverage = mean(kept.iter().flat_map(|run| run.iter()).map(inside));
         let outages = (0..outages).map(end).collect();
-        let score = Self { coverage: Some(coverage), diverged, ..Self::of_ends(outages) };
-        Self { log_score: if diverged > 0 { f64::NEG_INFINITY } else { score.log_score }, ..score }
+        let score = Self {
+            coverage: Some(coverage),
+            diverged,
+            ..Self::of_ends(outages)
+        };
+        Self {
+            log_score: if diverged > 0 {
+                f64::NEG_INFINITY
+            } else {
+                score.log_score
+            },
+            ..score
+        }
     }
 
     /// As covariance analysis expects it.

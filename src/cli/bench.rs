@@ -32,7 +32,13 @@ struct Costs {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let costs = measure(args.rounds as usize)?;
-    let Costs { dispatch, noise_ns, filter_ns, fix_ns, run_epochs_per_s_and_core: rate } = &costs;
+    let Costs {
+        dispatch,
+        noise_ns,
+        filter_ns,
+        fix_ns,
+        run_epochs_per_s_and_core: rate,
+    } = &costs;
     let text = || {
         format!(
             "vector units  {dispatch}\n\

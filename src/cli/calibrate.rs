@@ -32,7 +32,12 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut request = args.request.clone();
     let settings = request.settings()?;
     match &args.request.curve {
-        Some(path) => curves(&mut request, path, (&settings, args.out.as_deref()), session),
+        Some(path) => curves(
+            &mut request,
+            path,
+            (&settings, args.out.as_deref()),
+            session,
+        ),
         None => recordings(&mut request, settings, args.out.as_deref(), session),
     }
 }
@@ -46,11 +51,20 @@ fn recordings(
     let out = out.unwrap_or(Path::new("model.toml"));
     let listed = read::listed(&request.inputs)?;
     let guarded: Vec<PathBuf> = listed.iter().chain(&request.parameters).cloned().collect();
-    let (mut outputs, _claims) =
-        ModelFiles::claim(out, &request.estimator.possible(), &guarded, session.existing())?;
+    let (mut outputs, _claims) = ModelFiles::claim(
+        out,
+        &request.estimator.possible(),
+        &guarded,
+        session.existing(),
+    )?;
     draw(request, session);
     let measured = request.measure(settings, &mut Said::new(session))?;
-    let files: Vec<PathBuf> = measured.report.files.iter().map(|f| f.path.clone()).collect();
+    let files: Vec<PathBuf> = measured
+        .report
+        .files
+        .iter()
+        .map(|f| f.path.clone())
+        .collect();
     outputs.retain(|files| measured.settings.estimators.contains(&files.estimator));
     // Before the long half: what was read is still there.
     let note = request.note(&files, &measured.settings)?;
@@ -71,15 +85,30 @@ fn curves(
     let (curves, is_unsaid) = request.curves(path, settings)?;
     match out {
         // What is only printed needs a sensor for its units alone.
-        None if is_unsaid => session
-            .say(format!("{}: taken as of an accelerometer (--axes gyro: of a gyroscope)", path.display())),
-        Some(_) if is_unsaid => return Err(JobError::NoSensor { path: path.display().to_string() }.into()),
+        None if is_unsaid => session.say(format!(
+            "{}: taken as of an accelerometer (--axes gyro: of a gyroscope)",
+            path.display()
+        )),
+        Some(_) if is_unsaid => {
+            return Err(JobError::NoSensor {
+                path: path.display().to_string(),
+            }
+            .into());
+        }
         _ => (),
     }
-    let inputs: Vec<PathBuf> =
-        [path].into_iter().map(Path::to_owned).chain(request.parameters.clone()).collect();
+    let inputs: Vec<PathBuf> = [path]
+        .into_iter()
+        .map(Path::to_owned)
+        .chain(request.parameters.clone())
+        .collect();
     let (outputs, _claims) = match out {
-        Some(out) => ModelFiles::claim(out, &curves.settings.estimators, &inputs, session.existing())?,
+        Some(out) => ModelFiles::claim(
+            out,
+            &curves.settings.estimators,
+            &inputs,
+            session.existing(),
+        )?,
         None => Default::default(),
     };
     draw(request, session);
@@ -102,9 +131,16 @@ fn finish(
     note: &CalibrationNote,
     session: &Session,
 ) -> Result<(), Failure> {
-    let diagnoses = diagnose(&calibration.groups, &calibration.outcomes, &calibration.settings);
+    let diagnoses = diagnose(
+        &calibration.groups,
+        &calibration.outcomes,
+        &calibration.settings,
+    );
     let files = ModelFiles::write_all(outputs, calibration, note, &diagnoses)?;
-    let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    let files: Vec<String> = files
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect();
     session.answer(&calibration.answer(&diagnoses, files.clone()));
     if !files.is_empty() {
         session.say(format!("wrote {}", files.join(", ")));

@@ -5,7 +5,9 @@ use crate::efficiency;
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
 use crate::formats::logs::LogOptions;
-use crate::formats::{contamination_file, curve_file, datasheet, model_file, parameters_file, scenario_file};
+use crate::formats::{
+    contamination_file, curve_file, datasheet, model_file, parameters_file, scenario_file,
+};
 use crate::fuse::FuseError;
 use crate::inspect::inspect;
 use crate::report::six_digits;
@@ -57,15 +59,25 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     for path in &args.files {
         let file = path.display().to_string();
         match check(path, args.rate_hz, session) {
-            Ok(found) if session.json() => checked.push(Checked { file, ok: true, found }),
+            Ok(found) if session.json() => checked.push(Checked {
+                file,
+                ok: true,
+                found,
+            }),
             Ok(found) => {
                 session.result(format!("{file}: {found}"));
                 if args.dry_run {
-                    resolved(path)?.into_iter().for_each(|text| session.result(text.trim_end()));
+                    resolved(path)?
+                        .into_iter()
+                        .for_each(|text| session.result(text.trim_end()));
                 }
             }
             Err(failure) => {
-                checked.push(Checked { file, ok: false, found: failure.to_string() });
+                checked.push(Checked {
+                    file,
+                    ok: false,
+                    found: failure.to_string(),
+                });
                 failures.push(failure);
             }
         }
@@ -79,16 +91,28 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if all == 1 {
         return Err(last);
     }
-    failures.iter().chain([&last]).for_each(|failure| session.printer.failure(failure));
+    failures
+        .iter()
+        .chain([&last])
+        .for_each(|failure| session.printer.failure(failure));
     let message = format!("{wrong} of {all} files are refused");
-    let unreadable = failures.iter().chain([&last]).any(|failure| failure.code() == 1);
-    Err(if unreadable { Failure::could_not(message) } else { Failure::input(message) })
+    let unreadable = failures
+        .iter()
+        .chain([&last])
+        .any(|failure| failure.code() == 1);
+    Err(if unreadable {
+        Failure::could_not(message)
+    } else {
+        Failure::input(message)
+    })
 }
 
 /// The configuration that a file stands for, every key of it.
 fn resolved(path: &Path) -> Result<Option<String>, Failure> {
     let text = match file_kind::of(path)? {
-        FileKind::Scenario => toml::to_string(&scenario_file::read(path)?).map_err(Failure::could_not)?,
+        FileKind::Scenario => {
+            toml::to_string(&scenario_file::read(path)?).map_err(Failure::could_not)?
+        }
         FileKind::Study => {
             toml::to_string(&crate::study::file::read(path)?.study).map_err(Failure::could_not)?
         }
@@ -107,22 +131,38 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
         }
         FileKind::Study => {
             let study = crate::study::named_files::read(path)?.study;
-            let (candidates, sets) = (study.candidates().len(), study.outage_sets().map_or(0, |s| s.len()));
-            Ok(format!("a study of {candidates} candidates, {sets} outage sets, {} runs each", study.runs))
+            let (candidates, sets) = (
+                study.candidates().len(),
+                study.outage_sets().map_or(0, |s| s.len()),
+            );
+            Ok(format!(
+                "a study of {candidates} candidates, {sets} outage sets, {} runs each",
+                study.runs
+            ))
         }
         FileKind::Efficiency => {
             let study = efficiency::file::read(path)?;
-            Ok(format!("a study of estimators on {} sets of recordings", study.sets))
+            Ok(format!(
+                "a study of estimators on {} sets of recordings",
+                study.sets
+            ))
         }
         FileKind::Model => model(path, session),
         FileKind::Log => {
             let log = inspect(path, &LogOptions::default())?;
-            Ok(format!("{} of {} channels (nav-sim inspect lists them)", log.format, log.channels.len()))
+            Ok(format!(
+                "{} of {} channels (nav-sim inspect lists them)",
+                log.format,
+                log.channels.len()
+            ))
         }
         FileKind::CatalogueEntry => {
             let sheet = datasheet::read(path)?;
             let name = sheet.name.unwrap_or_default();
-            Ok(format!("a catalogue entry, {name}, of {} figures", sheet.entries.len()))
+            Ok(format!(
+                "a catalogue entry, {name}, of {} figures",
+                sheet.entries.len()
+            ))
         }
         FileKind::Parameters => {
             parameters_file::check(path)?;
@@ -130,17 +170,24 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
         }
         FileKind::Contamination => {
             // The rate only turns seconds into samples.
-            let rules = contamination_file::find(&path.to_string_lossy(), rate_hz.unwrap_or(100.0))?.rules;
+            let rules =
+                contamination_file::find(&path.to_string_lossy(), rate_hz.unwrap_or(100.0))?.rules;
             Ok(format!("a contamination of {} operations", rules.len()))
         }
         FileKind::Curve => {
             let curves = curve_file::read(path)?;
-            let scales: Vec<String> = curves.iter().map(|c| c.curve.levels.len().to_string()).collect();
-            Ok(format!("wavelet-variance curves, of {} scales", scales.join(", ")))
+            let scales: Vec<String> = curves
+                .iter()
+                .map(|c| c.curve.levels.len().to_string())
+                .collect();
+            Ok(format!(
+                "wavelet-variance curves, of {} scales",
+                scales.join(", ")
+            ))
         }
-        FileKind::Record => {
-            Ok("a record that nav-sim wrote beside a result: nothing in it to be checked".to_owned())
-        }
+        FileKind::Record => Ok(
+            "a record that nav-sim wrote beside a result: nothing in it to be checked".to_owned(),
+        ),
         FileKind::Trajectory => {
             let trajectory = read::trajectory(path, session)?;
             let span = trajectory.end_s() - trajectory.start_s();
@@ -158,14 +205,25 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
 
 fn model(path: &Path, session: &Session) -> Result<String, Failure> {
     let file = read::model(path, session)?;
-    let labels: Vec<String> = file.model.axes.iter().map(|axis| axis.labels().join(" + ")).collect();
+    let labels: Vec<String> = file
+        .model
+        .axes
+        .iter()
+        .map(|axis| axis.labels().join(" + "))
+        .collect();
     let (accel, gyro) = (&labels[0], &labels[3]);
-    Ok(format!("a noise model at {} Hz, accel {accel}, gyro {gyro}", file.model.rate_hz))
+    Ok(format!(
+        "a noise model at {} Hz, accel {accel}, gyro {gyro}",
+        file.model.rate_hz
+    ))
 }
 
 fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
     // standard deviations that no file states are an option of fuse
-    let given = FixSigma { pos_m: [1.0; 3], vel_m_s: Some([1.0; 3]) };
+    let given = FixSigma {
+        pos_m: [1.0; 3],
+        vel_m_s: Some([1.0; 3]),
+    };
     let read = read_gnss(path, None, None, None).map(|read| (read, ""));
     let ((fixes, remarks), unsaid) = match read {
         Err(e) => match read_gnss(path, Some(&given), None, None) {
@@ -174,16 +232,35 @@ fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
         },
         Ok(read) => read,
     };
-    remarks.iter().for_each(|remark| session.printer.remark(remark));
-    let span = fixes.first().zip(fixes.last()).map_or(0.0, |(a, b)| b.t_s - a.t_s);
-    let velocity = if fixes.iter().any(|f| f.velocity.is_some()) { " with velocity" } else { "" };
-    Ok(format!("{} GNSS fixes{velocity} over {} s{unsaid}", fixes.len(), seconds(span)))
+    remarks
+        .iter()
+        .for_each(|remark| session.printer.remark(remark));
+    let span = fixes
+        .first()
+        .zip(fixes.last())
+        .map_or(0.0, |(a, b)| b.t_s - a.t_s);
+    let velocity = if fixes.iter().any(|f| f.velocity.is_some()) {
+        " with velocity"
+    } else {
+        ""
+    };
+    Ok(format!(
+        "{} GNSS fixes{velocity} over {} s{unsaid}",
+        fixes.len(),
+        seconds(span)
+    ))
 }
 
 fn imu(path: &Path, session: &Session) -> Result<String, Failure> {
     let imu = read_imu(path, None, None).map_err(FuseError::from)?;
-    imu.remarks.iter().for_each(|remark| session.printer.remark(remark));
-    Ok(format!("an IMU recording of {} samples at {:.2} Hz, for fuse", imu.samples.len(), imu.rate_hz))
+    imu.remarks
+        .iter()
+        .for_each(|remark| session.printer.remark(remark));
+    Ok(format!(
+        "an IMU recording of {} samples at {:.2} Hz, for fuse",
+        imu.samples.len(),
+        imu.rate_hz
+    ))
 }
 
 /// What is no static recording may be one of a drive or a flight, which `fuse` reads.
@@ -192,7 +269,9 @@ fn moving(path: &Path, session: &Session) -> Option<String> {
     if !moves(&imu.samples) {
         return None;
     }
-    imu.remarks.iter().for_each(|remark| session.printer.remark(remark));
+    imu.remarks
+        .iter()
+        .for_each(|remark| session.printer.remark(remark));
     let (samples, rate_hz) = (imu.samples.len(), imu.rate_hz);
     Some(format!(
         "an IMU recording of {samples} samples at {rate_hz:.2} Hz that moves, for fuse; not a static one"
@@ -207,7 +286,12 @@ fn recording(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<Str
     let mut described: Vec<String> = recordings
         .iter()
         .map(|r| {
-            format!("{} channels of {} samples at {} Hz", r.signals.len(), r.len(), six_digits(r.rate_hz))
+            format!(
+                "{} channels of {} samples at {} Hz",
+                r.signals.len(),
+                r.len(),
+                six_digits(r.rate_hz)
+            )
         })
         .collect();
     described.dedup();

@@ -33,15 +33,23 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let request = ChoiceRequest { seed: session.asked_seed(), ..args.request.clone() };
+    let request = ChoiceRequest {
+        seed: session.asked_seed(),
+        ..args.request.clone()
+    };
     request.candidates()?;
     let read = request.inputs.iter().chain([&request.trajectory]);
     let guarded = read.clone().chain(&request.scenario).map(PathBuf::as_path);
     let _own = choose::claim_choice(&args.out, guarded, session.existing())?;
     let _picture = args.plot.claim(read, session)?;
-    let made = request.made(|| session.seed(None), &mut Said::new(session), &Words::new(session))?;
+    let made = request.made(
+        || session.seed(None),
+        &mut Said::new(session),
+        &Words::new(session),
+    )?;
     let report = made.report();
-    made.chosen.write(&args.out, &request.trajectory, request.note(&made), &report)?;
+    made.chosen
+        .write(&args.out, &request.trajectory, request.note(&made), &report)?;
     let document = session.answer(&report);
     args.plot.draw(&document, session)?;
     session.say(format!(

@@ -39,7 +39,8 @@ pub(crate) struct Common {
 }
 
 fn seed(text: &str) -> Result<u64, String> {
-    text.parse().map_err(|_| format!("not a whole number from 0 to {}", u64::MAX))
+    text.parse()
+        .map_err(|_| format!("not a whole number from 0 to {}", u64::MAX))
 }
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -72,17 +73,36 @@ impl Session {
     /// Starts the threads asked for.
     pub(crate) fn new(common: Common) -> Result<Self, Failure> {
         let threads = common.threads.map_or(0, usize::from); // 0: one per core
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::could_not)?;
-        Ok(Self { printer: Printer::new(&common), common, drawn: OnceLock::new() })
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .map_err(Failure::could_not)?;
+        Ok(Self {
+            printer: Printer::new(&common),
+            common,
+            drawn: OnceLock::new(),
+        })
     }
 
     /// A session for a command that another one runs: with that command's seed; `muted`, its results and
     /// remarks are kept back.
     pub(crate) fn within(&self, inner: &Common, muted: bool) -> Self {
         let quiet = self.common.quiet || (muted && !self.common.verbose);
-        let common = Common { seed: inner.seed, quiet, ..self.common.clone() };
-        let printer = if muted { Printer::new(&common).without_results() } else { Printer::new(&common) };
-        Self { printer, common, drawn: OnceLock::new() }
+        let common = Common {
+            seed: inner.seed,
+            quiet,
+            ..self.common.clone()
+        };
+        let printer = if muted {
+            Printer::new(&common).without_results()
+        } else {
+            Printer::new(&common)
+        };
+        Self {
+            printer,
+            common,
+            drawn: OnceLock::new(),
+        }
     }
 
     /// Puts a result to stdout: as JSON where that is asked for, else as text.
@@ -153,7 +173,11 @@ impl Session {
 
     /// What may become of results that are there already.
     pub(crate) const fn existing(&self) -> Existing {
-        if self.common.force { Existing::Replace } else { Existing::Keep }
+        if self.common.force {
+            Existing::Replace
+        } else {
+            Existing::Keep
+        }
     }
 
     /// Whether stdout gets CSV rather than text.
@@ -179,7 +203,10 @@ impl Session {
             self.say(format!("seed {seed} (drawn; repeat with --seed {seed})"));
             seed
         };
-        self.common.seed.or(of_file).unwrap_or_else(|| *self.drawn.get_or_init(draw))
+        self.common
+            .seed
+            .or(of_file)
+            .unwrap_or_else(|| *self.drawn.get_or_init(draw))
     }
 
     /// The seed of the command line, if there is one.

@@ -54,13 +54,17 @@ pub(super) fn compare(args: &Args, cause: &str, session: &Session) -> Result<Com
     let out = args.out.as_deref().unwrap_or(Path::new("comparison.json"));
     let page = out.with_extension("html");
     let read_from = args.request.runs.iter().chain([&args.request.reference]);
-    let inputs: Vec<PathBuf> =
-        read_from.flat_map(|run| crate::run::RUN_FILES.map(|name| run.join(name))).collect();
+    let inputs: Vec<PathBuf> = read_from
+        .flat_map(|run| crate::run::RUN_FILES.map(|name| run.join(name)))
+        .collect();
     let _own = claim_output(Some(out), &inputs, Written::Comparison, session)?;
     let _page = claim_output(Some(&page), &inputs, Written::Page, session)?;
     let _picture = args.plot.claim(&inputs, session)?;
     let found = args.request.comparison()?;
-    let found = Comparison { cause: cause.to_owned(), ..found };
+    let found = Comparison {
+        cause: cause.to_owned(),
+        ..found
+    };
     let document = match args.table {
         None => session.answer(&found),
         Some(form) => {

@@ -31,24 +31,40 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.list {
-        let listed = if session.json() { catalogue_json()? } else { catalogue_text()? };
+        let listed = if session.json() {
+            catalogue_json()?
+        } else {
+            catalogue_text()?
+        };
         session.result(listed.trim_end());
         return Ok(());
     }
-    let _own = claim_output(args.out.as_deref(), &args.request.entry, Written::Datasheet, session)?;
+    let _own = claim_output(
+        args.out.as_deref(),
+        &args.request.entry,
+        Written::Datasheet,
+        session,
+    )?;
     let made = args.request.model()?;
     session.warn_all(&made.doubts);
     made.notes.iter().for_each(|note| session.say(note));
     let Some(out) = &args.out else {
         let toml = model_file::to_toml(&made.file);
-        session.result(&if session.json() { as_json(&toml)? } else { toml.trim_end().to_owned() });
+        session.result(&if session.json() {
+            as_json(&toml)?
+        } else {
+            toml.trim_end().to_owned()
+        });
         return Ok(());
     };
     model_file::write(out, &made.file)?;
     if session.json() {
         session.result(&as_json(&model_file::to_toml(&made.file))?);
     }
-    session.say(format!("wrote {}: an assumption, not a calibration", out.display()));
+    session.say(format!(
+        "wrote {}: an assumption, not a calibration",
+        out.display()
+    ));
     Ok(())
 }
 

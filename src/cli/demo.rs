@@ -63,13 +63,22 @@ impl Progress {
     fn of(args: &Args, session: &Session) -> Result<Self, Failure> {
         let path = Self::path(&args.out);
         let there = std::fs::read_to_string(&path).ok();
-        let begun: Option<Self> = there.as_ref().and_then(|text| serde_json::from_str(text).ok());
+        let begun: Option<Self> = there
+            .as_ref()
+            .and_then(|text| serde_json::from_str(text).ok());
         if there.is_some() && begun.is_none() {
-            let message = format!("{} is not of this command: it is not replaced", path.display());
-            return Err(Failure::input(message).hint("choose another directory with --out, or move it away"));
+            let message = format!(
+                "{} is not of this command: it is not replaced",
+                path.display()
+            );
+            return Err(Failure::input(message)
+                .hint("choose another directory with --out, or move it away"));
         }
         let seed = begun.as_ref().map(|progress| progress.seed);
-        let seed = session.asked_seed().or(seed).unwrap_or_else(|| session.seed(None));
+        let seed = session
+            .asked_seed()
+            .or(seed)
+            .unwrap_or_else(|| session.seed(None));
         let new = Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             seed,
@@ -79,9 +88,20 @@ impl Progress {
             commands: commands(args, seed).len(),
         };
         match begun {
-            Some(begun) if begun == (Self { commands_done: begun.commands_done, ..new.clone() }) => Ok(begun),
+            Some(begun)
+                if begun
+                    == (Self {
+                        commands_done: begun.commands_done,
+                        ..new.clone()
+                    }) =>
+            {
+                Ok(begun)
+            }
             Some(_) if session.existing() == Existing::Keep => {
-                let message = format!("{} is of a demo of another seed, size or version", path.display());
+                let message = format!(
+                    "{} is of a demo of another seed, size or version",
+                    path.display()
+                );
                 Err(Failure::input(message)
                     .hint("name another directory with --out, or replace it with --force"))
             }
@@ -108,15 +128,26 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     refuse_the_impossible(args, session)?;
     let _own = atomic::claim_file(&Progress::path(&args.out), [])?;
     let own_page = |path: &Path| claim_output(Some(path), NO_INPUTS, Written::Page, session);
-    let _pages = [own_page(&page(&args.out))?, own_page(&figures_of(&args.out).join("index.html"))?];
+    let _pages = [
+        own_page(&page(&args.out))?,
+        own_page(&figures_of(&args.out).join("index.html"))?,
+    ];
     let mut progress = Progress::of(args, session)?;
     let commands = commands(args, progress.seed);
     let last = commands.len() - 1;
     // what is compared is shown again, and what was removed is made again
-    let done = commands.iter().take(progress.commands_done.min(last)).take_while(|c| is_there(c)).count();
+    let done = commands
+        .iter()
+        .take(progress.commands_done.min(last))
+        .take_while(|c| is_there(c))
+        .count();
     if done > 0 {
-        let told =
-            format!("{}: {done} of {} commands are done, seed {}", args.out, commands.len(), progress.seed);
+        let told = format!(
+            "{}: {done} of {} commands are done, seed {}",
+            args.out,
+            commands.len(),
+            progress.seed
+        );
         session.say(&told);
     }
     progress.write(&args.out)?;
@@ -138,20 +169,28 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         progress.write(&args.out)?;
         bar.add(1);
     }
-    session.say(format!("all results on one page: {}", page(&args.out).display()));
+    session.say(format!(
+        "all results on one page: {}",
+        page(&args.out).display()
+    ));
     Ok(())
 }
 
 /// Refuses no runs, and recordings in which no window is as long as the trajectory, before anything is made.
 fn refuse_the_impossible(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.runs == 0 {
-        return Err(Failure::input("--runs 0: there is nothing to compare").hint("at least --runs 1"));
+        return Err(
+            Failure::input("--runs 0: there is nothing to compare").hint("at least --runs 1")
+        );
     }
     let of_repository = |e: Failure| {
         e.hint("the demo takes its IMU and its trajectory from the top of the repository: run it there")
     };
     let trajectory = read::trajectory(Path::new(TRAJECTORY), session).map_err(of_repository)?;
-    let rate_hz = model_file::read(Path::new(IMU)).map_err(|e| of_repository(e.into()))?.model.rate_hz;
+    let rate_hz = model_file::read(Path::new(IMU))
+        .map_err(|e| of_repository(e.into()))?
+        .model
+        .rate_hz;
     let needed = ((trajectory.end_s() - trajectory.start_s()) * rate_hz).ceil();
     if args.samples as f64 >= needed {
         return Ok(());
@@ -165,12 +204,18 @@ fn refuse_the_impossible(args: &Args, session: &Session) -> Result<(), Failure> 
 
 /// Whether what a command makes is there: what follows its `-o`, or a model of each estimator beside it.
 fn is_there(command: &[String]) -> bool {
-    let Some(output) = command.last().map(Path::new) else { return false };
+    let Some(output) = command.last().map(Path::new) else {
+        return false;
+    };
     if command[0] != "calibrate" {
         return output.exists();
     }
     let scenario = output.file_stem().unwrap_or_default().to_string_lossy();
-    ESTIMATORS.iter().all(|estimator| output.with_file_name(format!("{scenario}_{estimator}.toml")).exists())
+    ESTIMATORS.iter().all(|estimator| {
+        output
+            .with_file_name(format!("{scenario}_{estimator}.toml"))
+            .exists()
+    })
 }
 
 /// The page that leads to all others.
@@ -185,28 +230,43 @@ fn figures_of(out: &str) -> PathBuf {
 
 /// Writes that page: the comparison, with links to the pages of its models and runs.
 fn index(found: Comparison, out: &str) -> Result<(), Failure> {
-    let mut links = vec![("figures/index.html".to_owned(), "the paper's figures".to_owned())];
+    let mut links = vec![(
+        "figures/index.html".to_owned(),
+        "the paper's figures".to_owned(),
+    )];
     for name in names() {
-        links.push((format!("models/{name}.html"), format!("model {name}: curves and parameters")));
+        links.push((
+            format!("models/{name}.html"),
+            format!("model {name}: curves and parameters"),
+        ));
         links.push((
             format!("runs/{name}/report.html"),
             format!("navigation with {name}: errors and consistency"),
         ));
     }
-    Ok(atomic::write(&page(out), Comparison { links, ..found }.document().html())?)
+    Ok(atomic::write(
+        &page(out),
+        Comparison { links, ..found }.document().html(),
+    )?)
 }
 
 /// Writes the paper's figures and a page of them; Figure 2 is of `nav-sim efficiency`.
 fn figures(found: &Comparison, out: &str, session: &Session) -> Result<(), Failure> {
     let mut curves = Vec::new();
-    for (scenario, estimator) in
-        SCENARIOS.iter().flat_map(|scenario| ESTIMATORS.iter().map(move |estimator| (scenario, estimator)))
-    {
+    for (scenario, estimator) in SCENARIOS.iter().flat_map(|scenario| {
+        ESTIMATORS
+            .iter()
+            .map(move |estimator| (scenario, estimator))
+    }) {
         let path = Path::new(out).join(format!("models/{scenario}_{estimator}.wv.json"));
         let text = std::fs::read_to_string(&path).map_err(|e| FileError::io(&path, e))?;
         let file = serde_json::from_str(&text).map_err(Failure::could_not)?;
         let (scenario, estimator) = ((*scenario).to_owned(), (*estimator).to_owned());
-        curves.push(StudyCurves { scenario, estimator, file });
+        curves.push(StudyCurves {
+            scenario,
+            estimator,
+            file,
+        });
     }
     let trajectory = read::trajectory(Path::new(TRAJECTORY), session)?;
     let track = TrajectorySeries::of(&trajectory);
@@ -224,19 +284,35 @@ fn figures(found: &Comparison, out: &str, session: &Session) -> Result<(), Failu
 
 /// Scenario and estimator of each model.
 fn names() -> Vec<String> {
-    SCENARIOS.iter().flat_map(|s| ESTIMATORS.iter().map(move |e| format!("{s}_{e}"))).collect()
+    SCENARIOS
+        .iter()
+        .flat_map(|s| ESTIMATORS.iter().map(move |e| format!("{s}_{e}")))
+        .collect()
 }
 
 /// The commands, as words.
 fn commands(args: &Args, seed: u64) -> Vec<Vec<String>> {
-    let synthesize = |rest: String| format!("synthesize {IMU} --samples {} --spread {rest}", args.samples);
+    let synthesize = |rest: String| {
+        format!(
+            "synthesize {IMU} --samples {} --spread {rest}",
+            args.samples
+        )
+    };
     let mut lines = Vec::new();
     for scenario in SCENARIOS {
-        let corrupted =
-            if scenario == "I" { String::new() } else { format!("--contaminate section5-{scenario}") };
-        lines.push(synthesize(format!("--replicates 8 --axes x {corrupted} --seed {seed} -o @/{scenario}")));
+        let corrupted = if scenario == "I" {
+            String::new()
+        } else {
+            format!("--contaminate section5-{scenario}")
+        };
+        lines.push(synthesize(format!(
+            "--replicates 8 --axes x {corrupted} --seed {seed} -o @/{scenario}"
+        )));
     }
-    lines.push(synthesize(format!("--seed {} -o @/ninth", seed.wrapping_add(1))));
+    lines.push(synthesize(format!(
+        "--seed {} -o @/ninth",
+        seed.wrapping_add(1)
+    )));
     for scenario in SCENARIOS {
         lines.push(format!(
             "calibrate @/{scenario} --estimator all --seed {seed} -o @/models/{scenario}.toml"
@@ -249,10 +325,20 @@ fn commands(args: &Args, seed: u64) -> Vec<Vec<String>> {
             args.runs
         )
     }));
-    let candidates: Vec<String> = names().iter().map(|name| format!("@/runs/{name}")).collect();
-    lines.push(format!("compare {} --reference @/runs/I_awv -o @/comparison.json", candidates.join(" ")));
+    let candidates: Vec<String> = names()
+        .iter()
+        .map(|name| format!("@/runs/{name}"))
+        .collect();
+    lines.push(format!(
+        "compare {} --reference @/runs/I_awv -o @/comparison.json",
+        candidates.join(" ")
+    ));
     // The directory takes its place after the words are apart: its name may hold blanks.
-    let words = |line: &String| line.split_whitespace().map(|word| word.replace('@', &args.out)).collect();
+    let words = |line: &String| {
+        line.split_whitespace()
+            .map(|word| word.replace('@', &args.out))
+            .collect()
+    };
     lines.iter().map(words).collect()
 }
 

@@ -28,8 +28,14 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let request = DesignRequest { seed: session.asked_seed(), ..args.request.clone() };
-    let _pictures = args.plot.claim(std::iter::once(&request.model).chain(&request.trajectory), session)?;
+    let request = DesignRequest {
+        seed: session.asked_seed(),
+        ..args.request.clone()
+    };
+    let _pictures = args.plot.claim(
+        std::iter::once(&request.model).chain(&request.trajectory),
+        session,
+    )?;
     let designs = request.made(&Words::new(session))?;
     let document = session.answer(&designs);
     args.plot.draw(&document, session)

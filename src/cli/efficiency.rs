@@ -43,8 +43,10 @@ pub(crate) struct Args {
     sensitivity: bool,
 }
 
-const WEIGHTINGS: [(&str, &str); 2] =
-    [(Weighting::Model.name(), "Those of calibrate"), (Weighting::Edof.name(), "Those of the literature")];
+const WEIGHTINGS: [(&str, &str); 2] = [
+    (Weighting::Model.name(), "Those of calibrate"),
+    (Weighting::Edof.name(), "Those of the literature"),
+];
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let file = efficiency::file::read(&args.study)?;
@@ -72,7 +74,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     study.estimate(sets, block, &mut directory, &|sets| progress.add(sets))?;
     write(&args.out, &study.results(sets, &directory), session)?;
     if args.sensitivity {
-        atomic::write(&args.out.join("sensitivity.csv"), study.sensitivity().map_err(of_study)?)?;
+        atomic::write(
+            &args.out.join("sensitivity.csv"),
+            study.sensitivity().map_err(of_study)?,
+        )?;
     }
     session.wrote(&args.out);
     Ok(())
@@ -80,7 +85,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 fn write(out: &Path, results: &EfficiencyFile, session: &Session) -> Result<(), Failure> {
     let document = session.answer(results);
-    atomic::write(&out.join("results.csv"), efficiency::efficiency_csv(results))?;
+    atomic::write(
+        &out.join("results.csv"),
+        efficiency::efficiency_csv(results),
+    )?;
     atomic::write(&out.join("results.json"), report::json(results))?;
     atomic::write(&out.join("rmse.svg"), document.svg())?;
     Ok(atomic::write(&out.join("report.html"), document.html())?)

@@ -79,8 +79,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 /// Says where the model lies outside the band of recordings of the exported pair.
 fn certificate(export: &Export, file: &ModelFile, session: &Session) -> Result<(), Failure> {
     let recorded = Recorded::like(file, session.seed(None), export.settings.horizon.to_s);
-    let certificates =
-        export::certify(export, &file.model, &file.missing, recorded).map_err(Failure::could_not)?;
+    let certificates = export::certify(export, &file.model, &file.missing, recorded)
+        .map_err(Failure::could_not)?;
     let made = format!(
         "{} recordings of {:.0} s",
         recorded.recordings,
@@ -103,9 +103,9 @@ fn certificate(export: &Export, file: &ModelFile, session: &Session) -> Result<(
 
 fn advice(e: &ExportError) -> Option<String> {
     match e {
-        ExportError::NoSensor { .. } => {
-            Some("calibrate recordings of both sensors, or write the other one's section by hand".into())
-        }
+        ExportError::NoSensor { .. } => Some(
+            "calibrate recordings of both sensors, or write the other one's section by hand".into(),
+        ),
         ExportError::NoSuchBias { .. } | ExportError::TwoTimes { .. } => {
             Some("--policy matched fits the bias that the target has, over --horizon".to_owned())
         }

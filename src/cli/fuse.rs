@@ -35,15 +35,27 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let begin = Instant::now();
     let drive = Drive::read(&args.request)?;
-    let manifest = FuseManifest { command: super::given(), ..drive.manifest.clone() };
+    let manifest = FuseManifest {
+        command: super::given(),
+        ..drive.manifest.clone()
+    };
     let recognise = |text: &str| {
         let present = serde_json::from_str(text);
-        Ok(present.map_or(Found::Foreign, |present| Found::result(manifest.is_same_fusion(&present))))
+        Ok(present.map_or(Found::Foreign, |present| {
+            Found::result(manifest.is_same_fusion(&present))
+        }))
     };
     let inputs = manifest.inputs.iter().map(|input| Path::new(&input.path));
     let _own = claim_directory(&args.out, &FILES, inputs, session.existing(), recognise)?;
     let answer = drive.fuse()?;
-    write(&answer, &FuseManifest { wall_s: begin.elapsed().as_secs_f64(), ..manifest }, &args.out)?;
+    write(
+        &answer,
+        &FuseManifest {
+            wall_s: begin.elapsed().as_secs_f64(),
+            ..manifest
+        },
+        &args.out,
+    )?;
     session.answer(&answer);
     session.wrote(&args.out);
     answer.unmet().map_or(Ok(()), Err)
@@ -60,6 +72,7 @@ fn write(answer: &FuseAnswer, manifest: &FuseManifest, out: &Path) -> Result<(),
     }
     made.commit()?;
     // what an earlier fusion smoothed is not of this one; where there is none, there is nothing to remove
-    old.iter().for_each(|name| drop(std::fs::remove_file(out.join(name))));
+    old.iter()
+        .for_each(|name| drop(std::fs::remove_file(out.join(name))));
     Ok(())
 }

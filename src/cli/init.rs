@@ -28,7 +28,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let [written, kept] =
         [written, kept].map(|paths| paths.iter().map(|p| p.display().to_string()).collect());
     let (written, kept): (Vec<String>, Vec<String>) = (written, kept);
-    kept.iter().for_each(|path| session.say(format!("kept {path}")));
+    kept.iter()
+        .for_each(|path| session.say(format!("kept {path}")));
     if session.json() {
         let json = json!({ "schema_version": 1, "written": written, "kept": kept });
         session.result(json);

@@ -21,7 +21,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         None => root,
         Some(name) => subcommand(root, name)?,
     };
-    clap_mangen::Man::new(of_command).render(&mut page).map_err(Failure::could_not)?;
+    clap_mangen::Man::new(of_command)
+        .render(&mut page)
+        .map_err(Failure::could_not)?;
     session.result(String::from_utf8_lossy(&page).trim_end());
     Ok(())
 }
@@ -29,8 +31,18 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 /// A subcommand with the common flags, which clap hands down when it builds.
 fn subcommand(mut root: clap::Command, name: &str) -> Result<clap::Command, Failure> {
     root.build();
-    let found = root.get_subcommands().find(|c| c.get_name() == name).cloned();
-    let known = || root.get_subcommands().map(clap::Command::get_name).collect::<Vec<_>>().join(", ");
+    let found = root
+        .get_subcommands()
+        .find(|c| c.get_name() == name)
+        .cloned();
+    let known = || {
+        root.get_subcommands()
+            .map(clap::Command::get_name)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
     let unknown = || Failure::input(format!("no command is named \"{name}\"")).hint(known());
-    Ok(found.ok_or_else(unknown)?.display_name(format!("nav-sim-{name}")))
+    Ok(found
+        .ok_or_else(unknown)?
+        .display_name(format!("nav-sim-{name}")))
 }

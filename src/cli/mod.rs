@@ -99,7 +99,9 @@ impl Command {
     fn run(self, session: &Session) -> Result<(), Failure> {
         if session.csv() && !matches!(self, Self::Wv(_)) {
             let failure = Failure::input("--format csv: only wv prints CSV");
-            return Err(failure.hint("compare has --table csv; other commands write CSV files to --out"));
+            return Err(
+                failure.hint("compare has --table csv; other commands write CSV files to --out")
+            );
         }
         match self {
             Self::Wv(args) => wv::run(&args, session),
@@ -155,8 +157,16 @@ fn command() -> clap::Command {
 
 /// `--color` as written, for the help and usage errors, which clap prints before it has read the flags.
 fn color_choice(words: &[String]) -> clap::ColorChoice {
-    let after = words.iter().skip_while(|w| *w != "--color").nth(1).map(String::as_str);
-    match words.iter().find_map(|w| w.strip_prefix("--color=")).or(after) {
+    let after = words
+        .iter()
+        .skip_while(|w| *w != "--color")
+        .nth(1)
+        .map(String::as_str);
+    match words
+        .iter()
+        .find_map(|w| w.strip_prefix("--color="))
+        .or(after)
+    {
         Some("always") => clap::ColorChoice::Always,
         Some("never") => clap::ColorChoice::Never,
         _ => clap::ColorChoice::Auto,
@@ -192,14 +202,21 @@ fn is_bare_option(word: &OsStr) -> bool {
 /// Ends the program as clap would, with clearer words where a count or a format is wrong.
 fn end(e: &clap::Error) -> ! {
     let said = |kind| e.get(kind).map(ToString::to_string).unwrap_or_default();
-    let (option, value) = (said(ContextKind::InvalidArg), said(ContextKind::InvalidValue));
+    let (option, value) = (
+        said(ContextKind::InvalidArg),
+        said(ContextKind::InvalidValue),
+    );
     let is_count = e.kind() == ErrorKind::ValueValidation
-        && e.source().is_some_and(|source| source.downcast_ref::<ParseIntError>().is_some());
+        && e.source()
+            .is_some_and(|source| source.downcast_ref::<ParseIntError>().is_some());
     let failure = if is_count {
-        Failure::input(format!("{option}: \"{value}\" is not a count")).hint("a whole number such as 100")
+        Failure::input(format!("{option}: \"{value}\" is not a count"))
+            .hint("a whole number such as 100")
     } else if e.kind() == ErrorKind::InvalidValue && option.starts_with("--format") {
-        Failure::input(format!("--format \"{value}\" is none of text, json, csv (of wv)"))
-            .hint("compare has --table csv, latex and markdown")
+        Failure::input(format!(
+            "--format \"{value}\" is none of text, json, csv (of wv)"
+        ))
+        .hint("compare has --table csv, latex and markdown")
     } else {
         e.exit()
     };
@@ -226,7 +243,11 @@ pub fn main() -> ExitCode {
 #[must_use]
 pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
     let given: Vec<OsString> = given.into_iter().collect();
-    let lossy = |all: &[OsString]| all.iter().map(|w| w.to_string_lossy().into_owned()).collect::<Vec<_>>();
+    let lossy = |all: &[OsString]| {
+        all.iter()
+            .map(|w| w.to_string_lossy().into_owned())
+            .collect::<Vec<_>>()
+    };
     let _ = GIVEN.set(lossy(&given));
     let given = words(given.into_iter());
     let words = lossy(&given);
@@ -234,8 +255,12 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
         let _ = writeln!(std::io::stderr(), "{OVERVIEW}");
         return 2;
     }
-    let known = command().color(color_choice(&words)).version(&*version::version(&words).leak());
-    let matches = known.try_get_matches_from(&given).unwrap_or_else(|e| end(&e));
+    let known = command()
+        .color(color_choice(&words))
+        .version(&*version::version(&words).leak());
+    let matches = known
+        .try_get_matches_from(&given)
+        .unwrap_or_else(|e| end(&e));
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     let printer = Printer::new(&cli.common);
     if !cli.command.heeds_signals() {
@@ -262,7 +287,9 @@ mod tests {
     where
         R: clap::Args + Debug + PartialEq + Serialize + DeserializeOwned,
     {
-        let flags = R::augment_args(clap::Command::new("x")).try_get_matches_from(words.split(' ')).unwrap();
+        let flags = R::augment_args(clap::Command::new("x"))
+            .try_get_matches_from(words.split(' '))
+            .unwrap();
         let of_flags = R::from_arg_matches(&flags).unwrap();
         let of_table: R = toml::from_str(table).unwrap();
         assert_eq!(of_flags, of_table);
@@ -303,7 +330,10 @@ mod tests {
             "x a --trajectory t",
             "inputs = ['a']\ntrajectory = 't'",
         );
-        is_a_file_too::<crate::compare::CompareRequest>("x a --reference r", "runs = ['a']\nreference = 'r'");
+        is_a_file_too::<crate::compare::CompareRequest>(
+            "x a --reference r",
+            "runs = ['a']\nreference = 'r'",
+        );
         is_a_file_too::<crate::synthesize::SynthesisRequest>("x m", "model = 'm'");
         is_a_file_too::<crate::run::RunRequest>("x t m", "trajectory = 't'\nmodel = 'm'");
         is_a_file_too::<crate::fuse::FuseRequest>("x i g m", "imu = 'i'\ngnss = 'g'\nmodel = 'm'");
@@ -318,9 +348,19 @@ mod tests {
     fn negative_numbers_belong_to_the_option_before_them() {
         let joined = |text: &str| {
             let words = super::words(text.split(' ').map(Into::into));
-            words.iter().map(|w| w.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" ")
+            words
+                .iter()
+                .map(|w| w.to_string_lossy().into_owned())
+                .collect::<Vec<_>>()
+                .join(" ")
         };
-        assert_eq!(joined("run --seed -1 --outage -5:3 -v"), "run --seed=-1 --outage=-5:3 -v");
-        assert_eq!(joined("run a --p95-m=3 -.5 -- -3"), "run a --p95-m=3 -.5 -- -3");
+        assert_eq!(
+            joined("run --seed -1 --outage -5:3 -v"),
+            "run --seed=-1 --outage=-5:3 -v"
+        );
+        assert_eq!(
+            joined("run a --p95-m=3 -.5 -- -3"),
+            "run a --p95-m=3 -.5 -- -3"
+        );
     }
 }

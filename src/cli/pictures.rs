@@ -21,7 +21,10 @@ impl PlotArgs {
         inputs: impl IntoIterator<Item: AsRef<Path>> + Clone,
         session: &Session,
     ) -> Result<Vec<Claim>, Failure> {
-        self.plots.iter().map(|path| claim_picture(path, inputs.clone(), session)).collect()
+        self.plots
+            .iter()
+            .map(|path| claim_picture(path, inputs.clone(), session))
+            .collect()
     }
 
     /// Writes what is asked for of a document.
@@ -48,7 +51,8 @@ impl PlotArgs {
 }
 
 fn is_page(path: &Path) -> bool {
-    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("html"))
+    path.extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("html"))
 }
 
 /// Claims a page or a picture before the work; refuses one of another form.
@@ -72,7 +76,12 @@ fn claim_own(
     session: &Session,
 ) -> Result<Claim, Failure> {
     let inputs: Vec<_> = inputs.into_iter().collect();
-    Ok(atomic::claim_result(path, inputs.iter().map(AsRef::as_ref), kind, session.existing())?)
+    Ok(atomic::claim_result(
+        path,
+        inputs.iter().map(AsRef::as_ref),
+        kind,
+        session.existing(),
+    )?)
 }
 
 /// Claims an output of that kind, if one is asked for.
@@ -82,7 +91,8 @@ pub(super) fn claim_output(
     kind: Written,
     session: &Session,
 ) -> Result<Option<Claim>, Failure> {
-    path.map(|path| claim_own(path, inputs, kind, session)).transpose()
+    path.map(|path| claim_own(path, inputs, kind, session))
+        .transpose()
 }
 
 /// The form of a picture, by its name.
@@ -90,9 +100,17 @@ fn form(path: &Path) -> Result<Form, Failure> {
     let (forms, hint) = if cfg!(feature = "pictures") {
         ("SVG or PNG", "name a file that ends in .svg or .png")
     } else {
-        ("SVG", "name a file that ends in .svg; PNG needs a build with --features pictures")
+        (
+            "SVG",
+            "name a file that ends in .svg; PNG needs a build with --features pictures",
+        )
     };
-    let refused = || Failure::input(format!("{}: a picture is written as {forms}", path.display()));
+    let refused = || {
+        Failure::input(format!(
+            "{}: a picture is written as {forms}",
+            path.display()
+        ))
+    };
     Form::of(path).ok_or_else(|| refused().hint(hint))
 }
 

@@ -25,17 +25,30 @@ impl Printer {
             Color::Always => true,
             Color::Never => false,
         };
-        Self { quiet: common.quiet, verbose: common.verbose, color, muted: false }
+        Self {
+            quiet: common.quiet,
+            verbose: common.verbose,
+            color,
+            muted: false,
+        }
     }
 
     /// For what is wrong before the flags are read.
     pub(crate) const fn plain() -> Self {
-        Self { quiet: false, verbose: false, color: false, muted: false }
+        Self {
+            quiet: false,
+            verbose: false,
+            color: false,
+            muted: false,
+        }
     }
 
     /// The same, but results are kept back.
     pub(crate) const fn without_results(self) -> Self {
-        Self { muted: true, ..self }
+        Self {
+            muted: true,
+            ..self
+        }
     }
 
     /// A result, to stdout. Where nobody reads any longer nothing is shown, and the command goes on: its files and its
@@ -69,7 +82,11 @@ impl Printer {
 
     /// A doubt about the input or the result, to stderr.
     pub(crate) fn warn(&self, text: &str) {
-        self.line(&format!("{} {}", self.painted("warning:", "\x1b[1;33m"), safe(text)));
+        self.line(&format!(
+            "{} {}",
+            self.painted("warning:", "\x1b[1;33m"),
+            safe(text)
+        ));
     }
 
     /// What is said of a file that was read, to stderr.
@@ -99,15 +116,27 @@ impl Printer {
     /// What went wrong and what to do about it, to stderr, even with `--quiet`.
     pub(crate) fn failure(&self, failure: &Failure) {
         let message = failure.to_string();
-        let mut text = format!("{} {}\n", self.painted("error:", "\x1b[1;31m"), safe(&message));
+        let mut text = format!(
+            "{} {}\n",
+            self.painted("error:", "\x1b[1;31m"),
+            safe(&message)
+        );
         if let Some(advice) = failure.advice() {
-            text += &format!("\n{} {}\n", self.painted("hint:", "\x1b[1;36m"), safe(advice));
+            text += &format!(
+                "\n{} {}\n",
+                self.painted("hint:", "\x1b[1;36m"),
+                safe(advice)
+            );
         }
         let _ = std::io::stderr().write_all(text.as_bytes());
     }
 
     fn painted(&self, word: &str, style: &str) -> String {
-        if self.color { format!("{style}{word}\x1b[0m") } else { word.to_owned() }
+        if self.color {
+            format!("{style}{word}\x1b[0m")
+        } else {
+            word.to_owned()
+        }
     }
 }
 
@@ -117,7 +146,13 @@ fn safe(text: &str) -> Cow<'_, str> {
     if !text.contains(is_unsafe) {
         return Cow::Borrowed(text);
     }
-    let shown = |c: char| if is_unsafe(c) { c.escape_default().to_string() } else { c.to_string() };
+    let shown = |c: char| {
+        if is_unsafe(c) {
+            c.escape_default().to_string()
+        } else {
+            c.to_string()
+        }
+    };
     Cow::Owned(text.chars().map(shown).collect())
 }
 
@@ -128,7 +163,10 @@ mod tests {
     #[test]
     fn control_characters_are_shown() {
         assert_eq!(safe("a\tb\nc \u{b5}m"), "a\tb\nc \u{b5}m");
-        assert_eq!(safe("ri\u{1b}[31mght\u{9b}\r"), "ri\\u{1b}[31mght\\u{9b}\\r");
+        assert_eq!(
+            safe("ri\u{1b}[31mght\u{9b}\r"),
+            "ri\\u{1b}[31mght\\u{9b}\\r"
+        );
         // shown as run.exe.csv
         assert_eq!(safe("run\u{202e}vsc.exe"), "run\\u{202e}vsc.exe");
     }

@@ -30,7 +30,12 @@ impl Progress {
     pub(super) fn new(unit: &str, total: u64) -> Self {
         if !std::io::stderr().is_terminal() {
             let (unit, done) = (unit.to_owned(), AtomicU64::new(0));
-            return Self::Lines(Lines { unit, total, done, start: Instant::now() });
+            return Self::Lines(Lines {
+                unit,
+                total,
+                done,
+                start: Instant::now(),
+            });
         }
         let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
         let template = "{bar:30} {pos}/{len} {msg}, {per_sec}, {eta} left";
@@ -71,7 +76,10 @@ impl Lines {
         let rate = done as f64 / elapsed;
         let left = self.total.saturating_sub(done) as f64 / rate;
         let percent = done * 100 / self.total.max(1);
-        format!("{percent:3} %  {done}/{} {}, {rate:.3}/s, {left:.0} s left", self.total, self.unit)
+        format!(
+            "{percent:3} %  {done}/{} {}, {rate:.3}/s, {left:.0} s left",
+            self.total, self.unit
+        )
     }
 }
 
@@ -85,7 +93,9 @@ mod tests {
             unit: "runs".into(),
             total: 40,
             done: AtomicU64::new(0),
-            start: Instant::now().checked_sub(std::time::Duration::from_secs(10)).unwrap(),
+            start: Instant::now()
+                .checked_sub(std::time::Duration::from_secs(10))
+                .unwrap(),
         };
         let line = lines.line(20);
         assert!(line.starts_with(" 50 %  20/40 runs, "), "{line}");

@@ -11,13 +11,18 @@ pub(crate) struct Said<'a> {
 
 impl<'a> Said<'a> {
     pub(crate) const fn new(session: &'a Session) -> Self {
-        Self { session, progress: None }
+        Self {
+            session,
+            progress: None,
+        }
     }
 }
 
 impl Remarks for Said<'_> {
     fn progress(&mut self, done: usize, all: usize) {
-        let progress = self.progress.get_or_insert_with(|| self.session.progress("recordings", all as u64));
+        let progress = self
+            .progress
+            .get_or_insert_with(|| self.session.progress("recordings", all as u64));
         if done > 0 {
             progress.add(1);
         }
@@ -25,6 +30,9 @@ impl Remarks for Said<'_> {
 
     fn remark(&mut self, remark: Remark<'_>) {
         self.progress = None;
-        remark.said().iter().for_each(|said| self.session.printer.note(said));
+        remark
+            .said()
+            .iter()
+            .for_each(|said| self.session.printer.note(said));
     }
 }

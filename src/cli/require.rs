@@ -36,8 +36,16 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let request = &args.request;
     request.possible()?;
-    let _pictures = args.plot.claim(std::iter::once(&request.trajectory).chain(&request.model), session)?;
-    let _own = claim_output(args.out.as_deref(), [&request.trajectory], Written::Required, session)?;
+    let _pictures = args.plot.claim(
+        std::iter::once(&request.trajectory).chain(&request.model),
+        session,
+    )?;
+    let _own = claim_output(
+        args.out.as_deref(),
+        [&request.trajectory],
+        Written::Required,
+        session,
+    )?;
     let (found, needed) = request.found(&Words::new(session))?;
     let drawn = args.plot.draw(&session.answer(&found), session);
     if let (Some(out), Some(file)) = (&args.out, needed) {

@@ -2,7 +2,9 @@
 
 use super::{Failure, Session};
 use crate::efficiency;
-use crate::formats::{contamination_file, fusion_files, model_file, parameters_file, trajectory_file};
+use crate::formats::{
+    contamination_file, fusion_files, model_file, parameters_file, trajectory_file,
+};
 use crate::study::Study;
 use nav_sim_navigation::scenario::Scenario;
 

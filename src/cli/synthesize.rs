@@ -27,7 +27,10 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let request = SynthesisRequest { seed: session.asked_seed(), ..args.request.clone() };
+    let request = SynthesisRequest {
+        seed: session.asked_seed(),
+        ..args.request.clone()
+    };
     let job = request.synthesis(|| session.seed(None), &Words::new(session))?;
     let contamination = request.contaminate.as_deref().map(Path::new);
     let inputs = contamination.into_iter().chain([request.model.as_path()]);

@@ -33,10 +33,18 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let request = TuneRequest { seed: session.asked_seed(), ..args.request.clone() };
+    let request = TuneRequest {
+        seed: session.asked_seed(),
+        ..args.request.clone()
+    };
     let files = request.inputs()?;
     let _pictures = args.plot.claim(files.iter().map(|f| &f.path), session)?;
-    let _own = claim_output(args.out.as_deref(), files.iter().map(|f| &f.path), Written::Tuned, session)?;
+    let _own = claim_output(
+        args.out.as_deref(),
+        files.iter().map(|f| &f.path),
+        Written::Tuned,
+        session,
+    )?;
     let Tuned { result, model } = request.tuned(&Words::new(session))?;
     args.plot.draw(&session.answer(&result), session)?;
     if let Some(unmet) = request.failure(&result) {

@@ -13,9 +13,21 @@ pub(super) fn version(words: &[String]) -> String {
     if !asked {
         return number;
     }
-    let library = if cfg!(target_env = "musl") { "musl" } else { "gnu" };
-    let linked = if cfg!(target_feature = "crt-static") { "static" } else { "dynamic" };
-    let profile = if cfg!(debug_assertions) { "debug" } else { "release" };
+    let library = if cfg!(target_env = "musl") {
+        "musl"
+    } else {
+        "gnu"
+    };
+    let linked = if cfg!(target_feature = "crt-static") {
+        "static"
+    } else {
+        "dynamic"
+    };
+    let profile = if cfg!(debug_assertions) {
+        "debug"
+    } else {
+        "release"
+    };
     let level = Level::best();
     let features = match (cfg!(feature = "pictures"), cfg!(feature = "parquet")) {
         (true, true) => "pictures, parquet",

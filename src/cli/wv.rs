@@ -34,7 +34,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let _own = claim_output(args.out.as_deref(), &inputs, Written::Signals, session)?;
     let _pictures = args.plot.claim(&inputs, session)?;
     let file = args.request.curves(&mut Said::new(session))?;
-    let written = args.out.iter().try_for_each(|out| session.write(out, report::json(&file)));
+    let written = args
+        .out
+        .iter()
+        .try_for_each(|out| session.write(out, report::json(&file)));
     let drawn = args.plot.draw(&file.document(), session);
     match () {
         () if session.csv() => session.result(wv::signals_csv(&file).trim_end()),

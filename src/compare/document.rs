@@ -6,7 +6,8 @@ use crate::report::comparison_table::{CandidateResult, Layout, ratio_rows, ratio
 use crate::report::states::{SPOKEN, axis_of, tone};
 use crate::report::verdict::{gravest, verdict_in_short};
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names, window,
+    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
+    window,
 };
 use nav_sim_navigation::metrics::{Measured, OutageComparison, Verdict, VerdictKind};
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
@@ -28,7 +29,9 @@ impl RatioCurves {
         let pct = |i: usize, a: &[f64; REPORTED], b: &[f64; REPORTED]| 100.0 * (a[i] / b[i] - 1.0);
         Self {
             t_s: candidate.epochs.iter().map(|e| e.t_s).collect(),
-            asee_pct: both.map(|(c, r)| std::array::from_fn(|i| pct(i, &c.asee, &r.asee))).collect(),
+            asee_pct: both
+                .map(|(c, r)| std::array::from_fn(|i| pct(i, &c.asee, &r.asee)))
+                .collect(),
         }
     }
 }
@@ -132,9 +135,15 @@ impl Comparison {
         curves: Vec<RatioCurves>,
         outages: Vec<(f64, f64)>,
     ) -> Self {
-        let others = candidates.iter().filter(|c| !c.is_reference).map(|c| (c.run.as_str(), &c.verdict));
+        let others = candidates
+            .iter()
+            .filter(|c| !c.is_reference)
+            .map(|c| (c.run.as_str(), &c.verdict));
         let verdicts = std::iter::once(reference).chain(others);
-        let row = |(run, verdict): (&str, &Verdict)| VerdictRow { run: run.to_owned(), verdict: *verdict };
+        let row = |(run, verdict): (&str, &Verdict)| VerdictRow {
+            run: run.to_owned(),
+            verdict: *verdict,
+        };
         let verdicts = verdicts.map(row).collect();
         let (mut all_rows, mut consistency) = (Vec::new(), Vec::new());
         for candidate in &candidates {
@@ -174,7 +183,13 @@ impl Comparison {
 
     /// The same for other programs.
     pub(crate) fn csv(&self) -> String {
-        ratio_rows(&self.candidates, &self.states, &self.outages, &self.reference).csv()
+        ratio_rows(
+            &self.candidates,
+            &self.states,
+            &self.outages,
+            &self.reference,
+        )
+        .csv()
     }
 
     /// The paper's Figure 7, beside its other ones.
@@ -190,7 +205,10 @@ impl Comparison {
         let scenario = reference.map_or("", |c| c.label.scenario.as_str());
         let others: Vec<(&CandidateResult, String)> = match layout.is_grid() {
             true => {
-                let others = self.candidates.iter().filter(|c| c.label.scenario != scenario);
+                let others = self
+                    .candidates
+                    .iter()
+                    .filter(|c| c.label.scenario != scenario);
                 others.map(|c| (c, c.label.estimator.clone())).collect()
             }
             false => {
@@ -204,7 +222,9 @@ impl Comparison {
             let (own, worst) = (range(&[only], state)?, worst(only)?);
             let [name, reference] =
                 [&only.run, &self.reference].map(|run| short_names(&[run.as_str()]).concat());
-            return Some(format!("{name} against {reference}: uncertainty of {in_state} {own}, {worst}"));
+            return Some(format!(
+                "{name} against {reference}: uncertainty of {in_state} {own}, {worst}"
+            ));
         }
         let mut names: Vec<&str> = Vec::new();
         others.iter().for_each(|(_, name)| {
@@ -213,40 +233,78 @@ impl Comparison {
             }
         });
         let cost = |name: &&str| {
-            let of_name: Vec<_> = others.iter().filter(|(_, other)| other == name).map(|(c, _)| *c).collect();
+            let of_name: Vec<_> = others
+                .iter()
+                .filter(|(_, other)| other == name)
+                .map(|(c, _)| *c)
+                .collect();
             range(&of_name, state).map(|range| format!("{name} {range}"))
         };
         let costs: Vec<String> = names.iter().filter_map(cost).collect();
-        let named = costs.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+        let named = costs
+            .iter()
+            .take(NAMED)
+            .map(String::as_str)
+            .collect::<Vec<_>>()
+            .join(", ");
         let more = if costs.len() > NAMED { ", …" } else { "" };
         let cause = match self.cause.as_str() {
-            "" => format!("against {}:", short_names(&[self.reference.as_str()]).concat()),
+            "" => format!(
+                "against {}:",
+                short_names(&[self.reference.as_str()]).concat()
+            ),
             cause => cause.to_owned(),
         };
-        (!costs.is_empty()).then(|| format!("{cause} {named}{more} of the uncertainty of {in_state}"))
+        (!costs.is_empty())
+            .then(|| format!("{cause} {named}{more} of the uncertainty of {in_state}"))
     }
 
     /// Departure of the ASEE over time: a chart a scenario, with a curve an estimator; where the names of the runs tell
     /// neither, one with all runs.
     fn charts(&self) -> Vec<Chart> {
-        let all: Vec<(&CandidateResult, &RatioCurves)> =
-            self.candidates.iter().zip(&self.curves).filter(|(c, _)| !c.is_reference).collect();
+        let all: Vec<(&CandidateResult, &RatioCurves)> = self
+            .candidates
+            .iter()
+            .zip(&self.curves)
+            .filter(|(c, _)| !c.is_reference)
+            .collect();
         let layout = Layout::of(&self.candidates);
         if !layout.is_grid() || layout.scenarios.len() > SCENARIOS {
             let names = short_names(&all.iter().map(|(c, _)| c.run.as_str()).collect::<Vec<_>>());
             let curve = |(hue, (name, (_, curves)))| (name, hue, curves);
-            let curves: Vec<_> = names.iter().map(String::as_str).zip(all).enumerate().map(curve).collect();
+            let curves: Vec<_> = names
+                .iter()
+                .map(String::as_str)
+                .zip(all)
+                .enumerate()
+                .map(curve)
+                .collect();
             return vec![self.chart(&self.title(), &curves)];
         }
-        let hue = |estimator: &str| layout.estimators.iter().position(|e| e == estimator).unwrap_or(0);
+        let hue = |estimator: &str| {
+            layout
+                .estimators
+                .iter()
+                .position(|e| e == estimator)
+                .unwrap_or(0)
+        };
         let of_scenario = |scenario: &String| {
             let curve = |(c, curves): &(&'_ CandidateResult, &'_ RatioCurves)| {
-                (c.label.estimator.clone(), hue(&c.label.estimator), (*curves).clone())
+                (
+                    c.label.estimator.clone(),
+                    hue(&c.label.estimator),
+                    (*curves).clone(),
+                )
             };
-            let of_scenario = all.iter().filter(|(c, _)| c.label.scenario == *scenario).map(curve);
+            let of_scenario = all
+                .iter()
+                .filter(|(c, _)| c.label.scenario == *scenario)
+                .map(curve);
             let curves: Vec<(String, usize, RatioCurves)> = of_scenario.collect();
-            let curves: Vec<_> =
-                curves.iter().map(|(name, hue, curves)| (name.as_str(), *hue, curves)).collect();
+            let curves: Vec<_> = curves
+                .iter()
+                .map(|(name, hue, curves)| (name.as_str(), *hue, curves))
+                .collect();
             let title = format!("{}, scenario {scenario}", self.title());
             (!curves.is_empty()).then(|| self.chart(&title, &curves))
         };
@@ -254,35 +312,62 @@ impl Comparison {
     }
 
     fn title(&self) -> String {
-        format!("ASEE against {}", short_names(&[self.reference.as_str()]).concat())
+        format!(
+            "ASEE against {}",
+            short_names(&[self.reference.as_str()]).concat()
+        )
     }
 
     fn chart(&self, title: &str, curves: &[(&str, usize, &RatioCurves)]) -> Chart {
         let panel = |state: &usize| {
             let line = |(name, hue, curves): &(&str, usize, &RatioCurves)| {
-                let points = curves.t_s.iter().zip(&curves.asee_pct).map(|(t, pct)| (*t, pct[*state]));
+                let points = curves
+                    .t_s
+                    .iter()
+                    .zip(&curves.asee_pct)
+                    .map(|(t, pct)| (*t, pct[*state]));
                 Series::line(name, Colour::Hue(*hue), points.collect())
             };
             let zero = Series::new("", Colour::Ink, Mark::Level(0.0));
-            let axis = Axis::linear(&format!("{}: (ratio − 1)·100 (%)", SPOKEN[*state])).including(-1.0, 1.0);
-            let series = std::iter::once(zero).chain(curves.iter().map(line)).collect();
-            Panel { height: 0.8, ..Panel::new(axis, series) }
+            let axis = Axis::linear(&format!("{}: (ratio − 1)·100 (%)", SPOKEN[*state]))
+                .including(-1.0, 1.0);
+            let series = std::iter::once(zero)
+                .chain(curves.iter().map(line))
+                .collect();
+            Panel {
+                height: 0.8,
+                ..Panel::new(axis, series)
+            }
         };
         let panels = self.states.iter().map(panel).collect();
-        Chart::new(title, Axis::linear("time (s)"), panels).with_outages(&self.outages).in_group("time")
+        Chart::new(title, Axis::linear("time (s)"), panels)
+            .with_outages(&self.outages)
+            .in_group("time")
     }
 
     /// A row a run and outage, as they stand in comparison.json.
     fn consistency_table(&self) -> Table {
-        let errors = self.states.iter().map(|s| format!("RMSE {} (%)", axis_of(*s)));
+        let errors = self
+            .states
+            .iter()
+            .map(|s| format!("RMSE {} (%)", axis_of(*s)));
         let mut table =
             Table::new(["run", "outage", "NEES", "NEES of the reference", "coverage"]).and(errors);
-        let names = short_names(&self.consistency.iter().map(|row| row.run.as_str()).collect::<Vec<_>>());
+        let names = short_names(
+            &self
+                .consistency
+                .iter()
+                .map(|row| row.run.as_str())
+                .collect::<Vec<_>>(),
+        );
         for (i, (row, name)) in self.consistency.iter().zip(names).enumerate() {
             let source_of = |key: &str| format!("/consistency/{i}/{key}");
             let mut cells: Vec<Cell> = vec![
                 name.into(),
-                self.outages.get(row.outage).map_or_else(String::new, |w| window(w.0, w.1)).into(),
+                self.outages
+                    .get(row.outage)
+                    .map_or_else(String::new, |w| window(w.0, w.1))
+                    .into(),
                 Cell::number(row.nees_mean, &source_of("nees_mean")),
                 Cell::number(row.nees_mean_reference, &source_of("nees_mean_reference")),
                 Cell::number(row.coverage_mean, &source_of("coverage_mean")),
@@ -290,7 +375,10 @@ impl Comparison {
             for state in &self.states {
                 let k = REPORTED * i + state;
                 let pointer = format!("/rows/{k}/rmse_end_ratio_error_pct");
-                cells.push(Cell::number(self.rows[k].rmse_end_ratio_error_pct, &pointer));
+                cells.push(Cell::number(
+                    self.rows[k].rmse_end_ratio_error_pct,
+                    &pointer,
+                ));
             }
             table.row(cells);
         }
@@ -303,7 +391,9 @@ impl Answer for Comparison {
         let kind = gravest(self.verdicts.iter().map(|row| &row.verdict));
         let lines = self.cost().into_iter().chain(verdict_lines(&self.verdicts));
         let mut document = Document::new("What the filters believe, compared", tone(kind), lines);
-        self.doubts.iter().for_each(|doubt| document.note(Importance::Warning, doubt));
+        self.doubts
+            .iter()
+            .for_each(|doubt| document.note(Importance::Warning, doubt));
         if !self.outages.is_empty() && !self.candidates.is_empty() {
             document.text(&format!(
                 "Mean over the outage of (ASEE ratio − 1)·100 against {}; {}.",
@@ -313,7 +403,9 @@ impl Answer for Comparison {
             document.lead(Layout::of(&self.candidates).by_state(&self.states, &self.outages));
         }
         if !self.links.is_empty() {
-            document.folded("Pages of the single results", |page| page.links(&self.links));
+            document.folded("Pages of the single results", |page| {
+                page.links(&self.links)
+            });
         }
         document.text(CAPTION);
         document.charts(&self.charts(), "");
@@ -328,8 +420,13 @@ impl Answer for Comparison {
 
 /// Smallest and largest departure of the ASEE of a state, over runs and outages: "+3 %", "+24 to +35 %".
 fn range(candidates: &[&CandidateResult], state: usize) -> Option<String> {
-    let all = candidates.iter().flat_map(|c| &c.outages).map(|outage| outage.states[state].asee.pct);
-    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), pct| (a.min(pct), b.max(pct)));
+    let all = candidates
+        .iter()
+        .flat_map(|c| &c.outages)
+        .map(|outage| outage.states[state].asee.pct);
+    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), pct| {
+        (a.min(pct), b.max(pct))
+    });
     let [low_text, high_text] = [low, high].map(|pct| format!("{pct:+.0}"));
     match low_text == high_text {
         _ if low > high => None,
@@ -340,8 +437,10 @@ fn range(candidates: &[&CandidateResult], state: usize) -> Option<String> {
 
 /// The state whose ASEE departs most: "most in roll (+8 %)".
 fn worst(candidate: &CandidateResult) -> Option<String> {
-    let all =
-        candidate.outages.iter().flat_map(|outage| outage.states.iter().map(|s| s.asee.pct).enumerate());
+    let all = candidate
+        .outages
+        .iter()
+        .flat_map(|outage| outage.states.iter().map(|s| s.asee.pct).enumerate());
     let (state, pct) = all.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
     Some(format!("most in {} ({pct:+.0} %)", SPOKEN[state]))
 }
@@ -351,34 +450,48 @@ fn rows<'a>(
     outage: usize,
     comparison: &'a OutageComparison,
 ) -> impl Iterator<Item = Row> + 'a {
-    REPORTED_NAMES.iter().zip(&comparison.states).map(move |(state, ratio)| Row {
-        run: candidate.run.clone(),
-        paired: candidate.is_paired,
-        outage,
-        state,
-        ratio_error_pct: ratio.asee.pct,
-        abs_ratio_error_pct: ratio.asee_abs_pct,
-        ci95_pct: ratio.asee.ci95_pct,
-        calibration_half_pct: ratio.calibration_half_pct,
-        rmse_end_ratio_error_pct: ratio.rmse_end.pct,
-        rmse_end_ci95_pct: ratio.rmse_end.ci95_pct,
-    })
+    REPORTED_NAMES
+        .iter()
+        .zip(&comparison.states)
+        .map(move |(state, ratio)| Row {
+            run: candidate.run.clone(),
+            paired: candidate.is_paired,
+            outage,
+            state,
+            ratio_error_pct: ratio.asee.pct,
+            abs_ratio_error_pct: ratio.asee_abs_pct,
+            ci95_pct: ratio.asee.ci95_pct,
+            calibration_half_pct: ratio.calibration_half_pct,
+            rmse_end_ratio_error_pct: ratio.rmse_end.pct,
+            rmse_end_ci95_pct: ratio.rmse_end.ci95_pct,
+        })
 }
 
 /// How many filters are consistent and undecided, and which are neither: one line, or one a kind where that is long.
 pub(crate) fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
-    let names = short_names(&verdicts.iter().map(|row| row.run.as_str()).collect::<Vec<_>>());
+    let names = short_names(
+        &verdicts
+            .iter()
+            .map(|row| row.run.as_str())
+            .collect::<Vec<_>>(),
+    );
     let mut kinds: Vec<VerdictKind> = verdicts.iter().map(|row| row.verdict.kind).collect();
     kinds.sort_unstable_by(|a, b| b.cmp(a));
     kinds.dedup();
     let part = |kind: &VerdictKind| {
-        let of_kind: Vec<_> =
-            verdicts.iter().zip(&names).filter(|(row, _)| row.verdict.kind == *kind).collect();
+        let of_kind: Vec<_> = verdicts
+            .iter()
+            .zip(&names)
+            .filter(|(row, _)| row.verdict.kind == *kind)
+            .collect();
         let count = format!("{} of {} filters {kind}", of_kind.len(), verdicts.len());
         match kind {
             VerdictKind::Consistent => count,
             VerdictKind::Undecided => {
-                let needed = of_kind.iter().filter_map(|(row, _)| row.verdict.runs_to_decide).max();
+                let needed = of_kind
+                    .iter()
+                    .filter_map(|(row, _)| row.verdict.runs_to_decide)
+                    .max();
                 format!("{count} ({} runs would decide)", needed.unwrap_or_default())
             }
             VerdictKind::Doubtful => format!("{count} (beyond linear theory: run --method both)"),
@@ -386,14 +499,20 @@ pub(crate) fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
                 let named = |(row, name): &(&VerdictRow, &String)| {
                     format!("{name} ({})", verdict_in_short(&row.verdict))
                 };
-                let worst = of_kind.iter().max_by(|a, b| a.0.verdict.nees.total_cmp(&b.0.verdict.nees));
+                let worst = of_kind
+                    .iter()
+                    .max_by(|a, b| a.0.verdict.nees.total_cmp(&b.0.verdict.nees));
                 format!("{count}, most: {}", worst.map(named).unwrap_or_default())
             }
         }
     };
     let parts: Vec<String> = kinds.iter().map(part).collect();
     let line = parts.join("; ");
-    if line.chars().count() <= LINE { vec![line] } else { parts }
+    if line.chars().count() <= LINE {
+        vec![line]
+    } else {
+        parts
+    }
 }
 
 /// Characters of a line.
@@ -403,14 +522,18 @@ const NAMED: usize = 3;
 /// Scenarios that have a chart each; of more, one chart has all runs.
 const SCENARIOS: usize = 6;
 
-const FIGURE: &str =
-    "Departure of the ASEE of each filter from that of AWV in scenario I, (ratio − 1)·100; outages shaded.";
+const FIGURE: &str = "Departure of the ASEE of each filter from that of AWV in scenario I, (ratio − 1)·100; outages shaded.";
 
 const CAPTION: &str = "ASEE (averaged standard estimation error) is the filter's own standard deviation: 0 % is as the reference believes.";
 
 /// What the ± of the table are.
 pub(crate) fn meaning_of_intervals(candidates: &[CandidateResult]) -> &'static str {
-    let states = || candidates.iter().flat_map(|c| &c.outages).flat_map(|outage| &outage.states);
+    let states = || {
+        candidates
+            .iter()
+            .flat_map(|c| &c.outages)
+            .flat_map(|outage| &outage.states)
+    };
     if states().any(|state| state.calibration_half_pct.is_some()) {
         "± half the 95 % interval, Monte Carlo and calibrations"
     } else if states().all(|state| state.asee.ci95_pct.is_none()) {
@@ -428,8 +551,12 @@ mod tests {
     #[test]
     fn the_file_has_the_keys_of_the_interface() {
         let verdict = Verdict::of(&[], 2, None);
-        let file =
-            Comparison::new(("I/awv", &verdict), vec![candidate("II/awv", 3.0, false)], vec![], vec![]);
+        let file = Comparison::new(
+            ("I/awv", &verdict),
+            vec![candidate("II/awv", 3.0, false)],
+            vec![],
+            vec![],
+        );
         let json = serde_json::to_value(&file).unwrap();
         assert_eq!(json["reference"], "I/awv");
         assert_eq!(json["rows"].as_array().unwrap().len(), 18);
@@ -438,7 +565,10 @@ mod tests {
             (&row["run"], &row["outage"], &row["state"]),
             (&"II/awv".into(), &1.into(), &"pos_e_m".into())
         );
-        assert_eq!((&row["ratio_error_pct"], &row["ci95_pct"][0]), (&3.0.into(), &2.5.into()));
+        assert_eq!(
+            (&row["ratio_error_pct"], &row["ci95_pct"][0]),
+            (&3.0.into(), &2.5.into())
+        );
         assert_eq!(row["abs_ratio_error_pct"], 4.0);
     }
 }

@@ -25,18 +25,33 @@ pub(crate) fn compare(
         let run = path.display().to_string();
         let candidate = run_directory::read(path)?;
         let differences = differences(&candidate.manifest, &directory.manifest);
-        let doubt = |what: &&str| format!("{run}: {what} not that of the reference; the runs are not paired");
+        let doubt = |what: &&str| {
+            format!("{run}: {what} not that of the reference; the runs are not paired")
+        };
         // two covariance analyses have no runs that could be paired, and nothing by chance that pairing would take away
         if !(candidate.experiment.is_expected && directory.experiment.is_expected) {
             doubts.extend(differences.iter().map(doubt));
         }
         let is_reference = is_same_place(path, reference);
-        curves.push(RatioCurves::of(&candidate.experiment, &directory.experiment));
-        candidates.push(compared(run, &candidate, &directory, differences.is_empty(), is_reference)?);
+        curves.push(RatioCurves::of(
+            &candidate.experiment,
+            &directory.experiment,
+        ));
+        candidates.push(compared(
+            run,
+            &candidate,
+            &directory,
+            differences.is_empty(),
+            is_reference,
+        )?);
     }
     let outages = directory.experiment.outages;
     let comparison = Comparison::new((&name, &directory.verdict), candidates, curves, outages);
-    Ok(Comparison { doubts, states, ..comparison })
+    Ok(Comparison {
+        doubts,
+        states,
+        ..comparison
+    })
 }
 
 /// One run.
@@ -51,10 +66,16 @@ fn compared(
         return Err(JobError::OtherTrajectory { run });
     }
     let outages = metrics::compare(&candidate.experiment, &reference.experiment, is_paired);
-    let mut outages = outages.map_err(|source| JobError::Ratio { run: run.clone(), source })?;
+    let mut outages = outages.map_err(|source| JobError::Ratio {
+        run: run.clone(),
+        source,
+    })?;
     // the reference is itself, whatever its calibration leaves open
     if !is_reference {
-        let open = candidate.asee_mean_ci95.iter().zip(&reference.asee_mean_ci95);
+        let open = candidate
+            .asee_mean_ci95
+            .iter()
+            .zip(&reference.asee_mean_ci95);
         for (outage, ends) in outages.iter_mut().zip(open) {
             if let (Some(interval), Some(of_reference)) = ends {
                 outage.widen(interval, of_reference);
@@ -62,7 +83,14 @@ fn compared(
         }
     }
     let label = Label::of(&run, candidate.manifest.model.estimator.as_deref());
-    Ok(CandidateResult { run, label, is_reference, is_paired, verdict: candidate.verdict, outages })
+    Ok(CandidateResult {
+        run,
+        label,
+        is_reference,
+        is_paired,
+        verdict: candidate.verdict,
+        outages,
+    })
 }
 
 /// What makes two runs differ beside the model in the filter; then run k did not see the same noise.
@@ -72,21 +100,35 @@ fn differences(candidate: &Manifest, reference: &Manifest) -> Vec<&'static str> 
     let all = [
         ("the method is", is_expected[0] != is_expected[1]),
         // covariance analysis draws nothing, and so differs in nothing by its seed
-        ("the seed is", is_expected == [false, false] && candidate.seed != reference.seed),
-        ("what makes the errors is", truth(candidate) != truth(reference)),
+        (
+            "the seed is",
+            is_expected == [false, false] && candidate.seed != reference.seed,
+        ),
+        (
+            "what makes the errors is",
+            truth(candidate) != truth(reference),
+        ),
         ("[imu] is", c.imu != r.imu),
         ("[gnss] is", c.gnss != r.gnss),
         ("[initial] is", c.initial != r.initial),
     ];
-    all.into_iter().filter_map(|(what, differs)| differs.then_some(what)).collect()
+    all.into_iter()
+        .filter_map(|(what, differs)| differs.then_some(what))
+        .collect()
 }
 
 /// What made the INS errors: a recording, a model, or the filter's own.
 fn truth(manifest: &Manifest) -> Vec<&str> {
     let given = ["static", "truth", "model"].map(|role| manifest.hashes(role));
-    given.into_iter().find(|hashes| !hashes.is_empty()).unwrap_or_default()
+    given
+        .into_iter()
+        .find(|hashes| !hashes.is_empty())
+        .unwrap_or_default()
 }
 
 fn is_same_place(a: &Path, b: &Path) -> bool {
-    a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
+    a.canonicalize()
+        .ok()
+        .zip(b.canonicalize().ok())
+        .is_some_and(|(a, b)| a == b)
 }

@@ -26,7 +26,11 @@ pub struct CompareRequest {
 impl Default for CompareRequest {
     fn default() -> Self {
         let states = ["pos_e_m", "roll_deg"].map(str::to_owned).to_vec();
-        Self { runs: Vec::new(), reference: PathBuf::new(), states }
+        Self {
+            runs: Vec::new(),
+            reference: PathBuf::new(),
+            states,
+        }
     }
 }
 
@@ -42,7 +46,10 @@ impl CompareRequest {
     /// When a directory cannot be read, or is of something else.
     pub fn answer(&self) -> Result<Answered, Failure> {
         let found = self.comparison()?;
-        Ok(Answered { files: vec![("comparison.csv".to_owned(), found.csv())], ..Answered::of(&found) })
+        Ok(Answered {
+            files: vec![("comparison.csv".to_owned(), found.csv())],
+            ..Answered::of(&found)
+        })
     }
 }
 

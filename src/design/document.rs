@@ -3,7 +3,8 @@
 use crate::report::Answer;
 use crate::report::dots::{Dots, dot_chart};
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone, readable, window,
+    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone, readable,
+    window,
 };
 use serde::Serialize;
 
@@ -74,22 +75,29 @@ pub(crate) struct DesignedQuantile {
 /// 0.83 to 0.88 of that, the mean 0.92 to 0.95, and 32 to 33 % were wider (AWV and DR-AWV); those of white noise were 0.93
 /// to 0.98 of it. All of them held the truth in 96 to 98.5 % of the cases: a scatter read off twelve signals is more often
 /// less than more, for which Student's quantile makes amends.
-const STATED: &str =
-    "where ± 100 % are expected, half of the calibrations state below 0.85 of it, one in three more";
+const STATED: &str = "where ± 100 % are expected, half of the calibrations state below 0.85 of it, one in three more";
 
 /// A part of an interval this large is nearly all of it.
 const NEARLY_ALL: f64 = 0.8;
 
 impl Design {
     fn undetermined(&self) -> usize {
-        self.parameters.iter().filter(|p| p.half_width_pct.is_none()).count()
+        self.parameters
+            .iter()
+            .filter(|p| p.half_width_pct.is_none())
+            .count()
     }
 
     /// The parameter that would be known least: its name, and how well.
     fn least_known(&self) -> String {
-        let known = self.parameters.iter().filter_map(|p| Some((p, p.half_width_pct?)));
+        let known = self
+            .parameters
+            .iter()
+            .filter_map(|p| Some((p, p.half_width_pct?)));
         let widest = known.max_by(|a, b| a.1.total_cmp(&b.1));
-        widest.map_or("–".to_owned(), |(p, half)| format!("{} ± {} %", p.name(), readable(half)))
+        widest.map_or("–".to_owned(), |(p, half)| {
+            format!("{} ± {} %", p.name(), readable(half))
+        })
     }
 
     /// Parameters whose intervals are nearly all due to what recordings differ by: longer ones tell no more.
@@ -117,10 +125,20 @@ impl Designs {
         );
         let p95 = largest.horizontal_p95.iter().map(|q| {
             let (window, half) = (window(q.start_s, q.end_s), readable(q.half_width_pct));
-            format!("horizontal p95 at the end of {window}: {} m ± {half} %", readable(q.p95_m))
+            format!(
+                "horizontal p95 at the end of {window}: {} m ± {half} %",
+                readable(q.p95_m)
+            )
         });
         let lines = std::iter::once(first).chain(p95).collect();
-        (if open == 0 { Tone::Good } else { Tone::Doubtful }, lines)
+        (
+            if open == 0 {
+                Tone::Good
+            } else {
+                Tone::Doubtful
+            },
+            lines,
+        )
     }
 
     /// A row a design, or of one design a row a parameter.
@@ -128,14 +146,27 @@ impl Designs {
         if let [design] = self.designs.as_slice() {
             return parameters(design);
         }
-        let windows = self.designs.first().into_iter().flat_map(|d| &d.horizontal_p95);
-        let windows = windows.map(|q| format!("p95 at the end of {} (± %)", window(q.start_s, q.end_s)));
-        let mut table = Table::new(["recordings", "hours", "parameter known least", "not determined"])
-            .and(windows)
-            .with_keys(2);
+        let windows = self
+            .designs
+            .first()
+            .into_iter()
+            .flat_map(|d| &d.horizontal_p95);
+        let windows =
+            windows.map(|q| format!("p95 at the end of {} (± %)", window(q.start_s, q.end_s)));
+        let mut table = Table::new([
+            "recordings",
+            "hours",
+            "parameter known least",
+            "not determined",
+        ])
+        .and(windows)
+        .with_keys(2);
         for (i, design) in self.designs.iter().enumerate() {
             let p95 = design.horizontal_p95.iter().enumerate().map(|(k, q)| {
-                Cell::number(q.half_width_pct, &format!("/designs/{i}/horizontal_p95/{k}/half_width_pct"))
+                Cell::number(
+                    q.half_width_pct,
+                    &format!("/designs/{i}/horizontal_p95/{k}/half_width_pct"),
+                )
             });
             let keys = [
                 Cell::figures(design.recordings.to_string()),
@@ -167,7 +198,9 @@ impl Answer for Designs {
             document.chart(&beside(design), BESIDE);
         } else {
             let parameters = designs.first().map_or(0, |d| d.parameters.len());
-            let charts: Vec<Chart> = (0..parameters).filter_map(|k| against_hours(designs, k)).collect();
+            let charts: Vec<Chart> = (0..parameters)
+                .filter_map(|k| against_hours(designs, k))
+                .collect();
             document.charts(&charts, AGAINST);
         }
         if designs.iter().any(|d| !d.horizontal_p95.is_empty()) {
@@ -193,7 +226,10 @@ const AGAINST: &str = "Half of the 95 % interval to expect (% of the value) agai
 
 /// Every parameter of one design.
 fn parameters(design: &Design) -> Table {
-    let floors = design.parameters.iter().any(|p| p.endless_half_width_pct.is_some());
+    let floors = design
+        .parameters
+        .iter()
+        .any(|p| p.endless_half_width_pct.is_some());
     let mut table = Table::new(["parameter", "value", "from", "to", "± (%)"])
         .and(floors.then(|| "± however long (%)".to_owned()));
     for (k, p) in design.parameters.iter().enumerate() {
@@ -220,24 +256,52 @@ fn beside(design: &Design) -> Chart {
         let point = |p: &DesignedParameter| [value(p).unwrap_or(f64::NAN), f64::NAN, f64::NAN];
         design.parameters.iter().map(point).collect::<Vec<_>>()
     };
-    let mut dots =
-        vec![Dots { name: "this plan", colour: Colour::REAL, points: points(&|p| p.half_width_pct) }];
-    if design.parameters.iter().any(|p| p.endless_half_width_pct.is_some()) {
+    let mut dots = vec![Dots {
+        name: "this plan",
+        colour: Colour::REAL,
+        points: points(&|p| p.half_width_pct),
+    }];
+    if design
+        .parameters
+        .iter()
+        .any(|p| p.endless_half_width_pct.is_some())
+    {
         let points = points(&|p| p.endless_half_width_pct);
-        dots.push(Dots { name: "however long", colour: Colour::Soft, points });
+        dots.push(Dots {
+            name: "however long",
+            colour: Colour::Soft,
+            points,
+        });
     }
     let names = design.parameters.iter().map(DesignedParameter::name);
-    dot_chart("Intervals to expect", Axis::log("half width (%)"), names, None, &dots)
+    dot_chart(
+        "Intervals to expect",
+        Axis::log("half width (%)"),
+        names,
+        None,
+        &dots,
+    )
 }
 
 /// One parameter of several designs: a curve for each number of recordings.
 fn against_hours(designs: &[Design], k: usize) -> Option<Chart> {
     let name = designs.first()?.parameters[k].name();
-    let value = |d: &Design| d.parameters.get(k).and_then(|p| p.half_width_pct).unwrap_or(f64::NAN);
+    let value = |d: &Design| {
+        d.parameters
+            .get(k)
+            .and_then(|p| p.half_width_pct)
+            .unwrap_or(f64::NAN)
+    };
     let mut series = curves(designs, value);
     for (hue, count) in counts(designs).into_iter().enumerate() {
         let last = designs.iter().rfind(|d| d.recordings == count)?;
-        let Some(floor) = last.parameters.get(k).and_then(|p| p.endless_half_width_pct) else { continue };
+        let Some(floor) = last
+            .parameters
+            .get(k)
+            .and_then(|p| p.endless_half_width_pct)
+        else {
+            continue;
+        };
         let hours = designs.iter().map(|d| d.hours);
         let line = hours.clone().fold(f64::INFINITY, f64::min)..=hours.fold(0.0, f64::max);
         let points = vec![(*line.start(), floor), (*line.end(), floor)];
@@ -261,7 +325,11 @@ fn curves(designs: &[Design], value: impl Fn(&Design) -> f64) -> Vec<Series> {
         let name = format!("{count} recordings");
         Series::dotted_line(&name, Colour::Hue(hue), points)
     };
-    counts(designs).into_iter().enumerate().flat_map(curve).collect()
+    counts(designs)
+        .into_iter()
+        .enumerate()
+        .flat_map(curve)
+        .collect()
 }
 
 /// The horizontal error: a panel an outage.
@@ -269,17 +337,36 @@ fn navigation(designs: &[Design]) -> Chart {
     let outages = designs.first().map_or(0, |d| d.horizontal_p95.len());
     let panel = |k: usize| {
         let q = &designs[0].horizontal_p95[k];
-        let value = |d: &Design| d.horizontal_p95.get(k).map_or(f64::NAN, |q| q.half_width_pct);
+        let value = |d: &Design| {
+            d.horizontal_p95
+                .get(k)
+                .map_or(f64::NAN, |q| q.half_width_pct)
+        };
         let label = format!("{} (%)", window(q.start_s, q.end_s));
         let mut series = curves(designs, value);
         series.insert(0, Series::new("", Colour::Soft, Mark::Level(0.0)));
-        Panel { height: 0.8, ..Panel::new(Axis::linear(&label), series) }
+        Panel {
+            height: 0.8,
+            ..Panel::new(Axis::linear(&label), series)
+        }
     };
-    Chart::new("Horizontal error, 95 % quantile", Axis::log("hours"), (0..outages).map(panel).collect())
+    Chart::new(
+        "Horizontal error, 95 % quantile",
+        Axis::log("hours"),
+        (0..outages).map(panel).collect(),
+    )
 }
 
 fn quantiles(designs: &[Design]) -> Table {
-    let mut table = Table::new(["recordings", "hours", "outage", "p95 (m)", "from", "to", "half width (%)"]);
+    let mut table = Table::new([
+        "recordings",
+        "hours",
+        "outage",
+        "p95 (m)",
+        "from",
+        "to",
+        "half width (%)",
+    ]);
     for (i, d) in designs.iter().enumerate() {
         for (k, q) in d.horizontal_p95.iter().enumerate() {
             let source_of = |key: &str| format!("/designs/{i}/horizontal_p95/{k}/{key}");
@@ -299,16 +386,30 @@ fn quantiles(designs: &[Design]) -> Table {
 
 /// Half widths: a row a parameter, a column a design.
 fn all_parameters(designs: &[Design]) -> Table {
-    let plans = designs.iter().map(|d| format!("{} × {} h (± %)", d.recordings, d.hours));
+    let plans = designs
+        .iter()
+        .map(|d| format!("{} × {} h (± %)", d.recordings, d.hours));
     let mut table = Table::new(["parameter", "value"]).and(plans);
-    for (k, p) in designs.iter().take(1).flat_map(|d| &d.parameters).enumerate() {
-        let cell = |(i, d): (usize, &Design)| match d.parameters.get(k).and_then(|p| p.half_width_pct) {
-            Some(half) => Cell::number(half, &format!("/designs/{i}/parameters/{k}/half_width_pct")),
-            None => Cell::figures("not determined"),
-        };
+    for (k, p) in designs
+        .iter()
+        .take(1)
+        .flat_map(|d| &d.parameters)
+        .enumerate()
+    {
+        let cell =
+            |(i, d): (usize, &Design)| match d.parameters.get(k).and_then(|p| p.half_width_pct) {
+                Some(half) => {
+                    Cell::number(half, &format!("/designs/{i}/parameters/{k}/half_width_pct"))
+                }
+                None => Cell::figures("not determined"),
+            };
         let value = Cell::number(p.value, &format!("/designs/0/parameters/{k}/value"));
         let first = [Cell::from(p.name()), value];
-        table.row(first.into_iter().chain(designs.iter().enumerate().map(cell)));
+        table.row(
+            first
+                .into_iter()
+                .chain(designs.iter().enumerate().map(cell)),
+        );
     }
     table
 }
@@ -326,7 +427,12 @@ mod tests {
             half_width_pct: Some(half_width_pct),
             endless_half_width_pct: floor,
         };
-        Design { recordings, hours, parameters: vec![parameter], horizontal_p95: Vec::new() }
+        Design {
+            recordings,
+            hours,
+            parameters: vec![parameter],
+            horizontal_p95: Vec::new(),
+        }
     }
 
     /// Hours do not help where four fifths of an interval are left of endless recordings.
@@ -339,10 +445,18 @@ mod tests {
 
     #[test]
     fn a_curve_has_the_designs_of_its_number_of_recordings() {
-        let designs =
-            [(4, 1.0, 40.0), (4, 2.0, 30.0), (6, 1.0, 35.0)].map(|(n, h, w)| designed(n, h, w, None));
-        let drawn = curves(&designs, |design| design.parameters[0].half_width_pct.unwrap_or(f64::NAN));
-        let line = |series: Series| if let Mark::Line(points, _) = series.mark { Some(points) } else { None };
+        let designs = [(4, 1.0, 40.0), (4, 2.0, 30.0), (6, 1.0, 35.0)]
+            .map(|(n, h, w)| designed(n, h, w, None));
+        let drawn = curves(&designs, |design| {
+            design.parameters[0].half_width_pct.unwrap_or(f64::NAN)
+        });
+        let line = |series: Series| {
+            if let Mark::Line(points, _) = series.mark {
+                Some(points)
+            } else {
+                None
+            }
+        };
         let lines: Vec<_> = drawn.into_iter().filter_map(line).collect();
         assert_eq!(lines, [vec![(1.0, 40.0), (2.0, 30.0)], vec![(1.0, 35.0)]]);
     }

@@ -48,16 +48,30 @@ pub(crate) fn design(
 ) -> Result<Design, JobError> {
     let model = &inputs.file.model;
     let samples = (hours * 3600.0 * model.rate_hz).round() as usize;
-    let anticipated = Anticipated { model, spread: inputs.file.spread.as_ref(), recordings, samples };
-    let outcomes =
-        |scattering| anticipated.outcomes(inputs.estimator, inputs.settings, scattering, inputs.bootstrap);
+    let anticipated = Anticipated {
+        model,
+        spread: inputs.file.spread.as_ref(),
+        recordings,
+        samples,
+    };
+    let outcomes = |scattering| {
+        anticipated.outcomes(
+            inputs.estimator,
+            inputs.settings,
+            scattering,
+            inputs.bootstrap,
+        )
+    };
     let all = outcomes(Scattering::All)?;
-    let mut parameters: Vec<DesignedParameter> =
-        all.iter().flat_map(|o| designed(o, model.rate_hz)).collect();
+    let mut parameters: Vec<DesignedParameter> = all
+        .iter()
+        .flat_map(|o| designed(o, model.rate_hz))
+        .collect();
     if inputs.file.spread.is_some() {
         let endless = outcomes(Scattering::BetweenRecordings)?;
-        for (parameter, endless) in
-            parameters.iter_mut().zip(endless.iter().flat_map(|o| designed(o, model.rate_hz)))
+        for (parameter, endless) in parameters
+            .iter_mut()
+            .zip(endless.iter().flat_map(|o| designed(o, model.rate_hz)))
         {
             parameter.endless_half_width_pct = endless.half_width_pct;
         }
@@ -66,7 +80,12 @@ pub(crate) fn design(
         Some(destination) => quantiles(destination, &all, model.rate_hz)?,
         None => Vec::new(),
     };
-    Ok(Design { recordings, hours, parameters, horizontal_p95 })
+    Ok(Design {
+        recordings,
+        hours,
+        parameters,
+        horizontal_p95,
+    })
 }
 
 /// The parameters of an outcome; correlation times in the place of phi and beta, of which a per cent says nothing.
@@ -74,10 +93,17 @@ fn designed(outcome: &Outcome, rate_hz: f64) -> Vec<DesignedParameter> {
     let composite = &outcome.fit.composite;
     let values: Vec<_> = composite.parameters().collect();
     let parameter_of_interval = |interval: &ParameterInterval| {
-        let (_, value) = *values.iter().find(|(parameter, _)| *parameter == interval.of)?;
-        let (name, label) = (composite.name_of(interval.of), &composite.labels()[interval.of.process]);
+        let (_, value) = *values
+            .iter()
+            .find(|(parameter, _)| *parameter == interval.of)?;
+        let (name, label) = (
+            composite.name_of(interval.of),
+            &composite.labels()[interval.of.process],
+        );
         let (parameter, shown): (String, &dyn Fn(f64) -> f64) = match interval.of.parameter {
-            Parameter::Phi => (format!("{label} correlation_time_s"), &|phi| -1.0 / (rate_hz * phi.ln())),
+            Parameter::Phi => (format!("{label} correlation_time_s"), &|phi| {
+                -1.0 / (rate_hz * phi.ln())
+            }),
             Parameter::Beta => (format!("{label} correlation_time_s"), &|beta| 1.0 / beta),
             _ => (name, &|value| value),
         };
@@ -95,7 +121,12 @@ fn designed(outcome: &Outcome, rate_hz: f64) -> Vec<DesignedParameter> {
             endless_half_width_pct: None,
         })
     };
-    outcome.inference.iter().flat_map(|i| &i.intervals).filter_map(parameter_of_interval).collect()
+    outcome
+        .inference
+        .iter()
+        .flat_map(|i| &i.intervals)
+        .filter_map(parameter_of_interval)
+        .collect()
 }
 
 fn half_width_pct(value: f64, [low, high]: [f64; 2]) -> f64 {
@@ -109,16 +140,30 @@ fn quantiles(
     rate_hz: f64,
 ) -> Result<Vec<DesignedQuantile>, JobError> {
     let mut model = destination.inputs.model.clone();
-    outcomes.iter().for_each(|outcome| outcome.put_into(&mut model));
+    outcomes
+        .iter()
+        .for_each(|outcome| outcome.put_into(&mut model));
     let draws = DrawsFile::of(&outcomes.iter().collect::<Vec<_>>(), rate_hz);
     destination.inputs.model_draws = draws.and_then(|draws| draws.draws(&model));
     destination.inputs.model = model;
-    let found = navigate(destination.inputs, destination.scenario, destination.outages, 0, &())?;
+    let found = navigate(
+        destination.inputs,
+        destination.scenario,
+        destination.outages,
+        0,
+        &(),
+    )?;
     let quantile = |o: &OutageSummary| {
         let h = &o.horizontal_error_end_m;
         let ci95: [f64; 2] = h.p95_ci95.0.zip(h.p95_ci95.1)?.into();
         let half_width_pct = half_width_pct(h.p95, ci95);
-        Some(DesignedQuantile { start_s: o.start_s, end_s: o.end_s, p95_m: h.p95, ci95, half_width_pct })
+        Some(DesignedQuantile {
+            start_s: o.start_s,
+            end_s: o.end_s,
+            p95_m: h.p95,
+            ci95,
+            half_width_pct,
+        })
     };
     Ok(found.summary.outages.iter().filter_map(quantile).collect())
 }

@@ -84,9 +84,15 @@ impl DesignRequest {
             let inputs = NavigateInputs::new(trajectory, file.model.clone(), TrueImu::AsBelieved);
             navigation = Some((inputs, outages));
         }
-        let destination =
-            navigation.as_mut().map(|(inputs, outages)| Destination { inputs, scenario: &scenario, outages });
-        Ok(Designs { schema_version: 1, designs: self.designs(&file, destination)? })
+        let destination = navigation.as_mut().map(|(inputs, outages)| Destination {
+            inputs,
+            scenario: &scenario,
+            outages,
+        });
+        Ok(Designs {
+            schema_version: 1,
+            designs: self.designs(&file, destination)?,
+        })
     }
 
     /// As `nav-sim design` prints it.
@@ -109,18 +115,32 @@ impl DesignRequest {
     }
 
     /// One design for each number of recordings and length.
-    fn designs(&self, file: &ModelFile, navigation: Option<Destination<'_>>) -> Result<Vec<Design>, Failure> {
+    fn designs(
+        &self,
+        file: &ModelFile,
+        navigation: Option<Destination<'_>>,
+    ) -> Result<Vec<Design>, Failure> {
         let settings = Settings::default();
-        let bootstrap = Bootstrap { draws: self.draws as usize, seed: self.seed.unwrap_or(1) };
-        let mut inputs =
-            DesignInputs { file, estimator: self.estimator, settings: &settings, bootstrap, navigation };
+        let bootstrap = Bootstrap {
+            draws: self.draws as usize,
+            seed: self.seed.unwrap_or(1),
+        };
+        let mut inputs = DesignInputs {
+            file,
+            estimator: self.estimator,
+            settings: &settings,
+            bootstrap,
+            navigation,
+        };
         let recordings = self.recordings.map_or(vec![3, 6, 12], |k| vec![k as usize]);
         let hours = self.hours.map_or(vec![1.0, 3.0, 10.0], |h| vec![h]);
         let mut designs = Vec::new();
         for k in recordings {
             for h in &hours {
                 let design = design(&mut inputs, k, *h);
-                designs.push(design.map_err(|e| Failure::input(e).hint("more, or longer recordings"))?);
+                designs.push(
+                    design.map_err(|e| Failure::input(e).hint("more, or longer recordings"))?,
+                );
             }
         }
         Ok(designs)

@@ -38,7 +38,11 @@ pub(crate) fn is_shown(value: f64, scale: &Scale) -> bool {
 }
 
 /// What an axis shows: the values with some air, none without a value.
-pub(crate) fn range(axis: &Axis, values: impl Iterator<Item = f64>, air: f64) -> Option<(f64, f64)> {
+pub(crate) fn range(
+    axis: &Axis,
+    values: impl Iterator<Item = f64>,
+    air: f64,
+) -> Option<(f64, f64)> {
     if let Scale::Names(names) = &axis.scale {
         return Some((-0.5, names.len() as f64 - 0.5));
     }
@@ -47,10 +51,17 @@ pub(crate) fn range(axis: &Axis, values: impl Iterator<Item = f64>, air: f64) ->
     let (low, high) = extremes(shown)?;
     Some(match axis.scale {
         Scale::Log => {
-            let air = if low == high { 2.0 } else { (high / low).powf(air).max(1.0 + 2.0 * air) };
+            let air = if low == high {
+                2.0
+            } else {
+                (high / low).powf(air).max(1.0 + 2.0 * air)
+            };
             (low / air, high * air)
         }
-        _ if low == high => (low - 0.1 * low.abs().max(1.0), high + 0.1 * high.abs().max(1.0)),
+        _ if low == high => (
+            low - 0.1 * low.abs().max(1.0),
+            high + 0.1 * high.abs().max(1.0),
+        ),
         _ => (low - air * (high - low), high + air * (high - low)),
     })
 }
@@ -66,7 +77,11 @@ pub(crate) fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> 
 /// Places of an axis that have a label, and the labels; `most`: about how many.
 pub(crate) fn ticks(axis: &Axis, range: (f64, f64), most: usize) -> Vec<(f64, String)> {
     match &axis.scale {
-        Scale::Names(names) => names.iter().enumerate().map(|(k, name)| (k as f64, name.clone())).collect(),
+        Scale::Names(names) => names
+            .iter()
+            .enumerate()
+            .map(|(k, name)| (k as f64, name.clone()))
+            .collect(),
         Scale::Log if range.1 / range.0 >= 6.0 => decades(range, most),
         _ => steps(range, most),
     }
@@ -80,10 +95,17 @@ fn decades((low, high): (f64, f64), most: usize) -> Vec<(f64, String)> {
     let every = (spanned / most as f64).ceil().max(1.0) as i32;
     let all = exponents
         .filter(|e| e.rem_euclid(every) == 0)
-        .flat_map(|e| factors.iter().map(move |f| (f64::from(*f) * 10f64.powi(e), *f, e)));
+        .flat_map(|e| {
+            factors
+                .iter()
+                .map(move |f| (f64::from(*f) * 10f64.powi(e), *f, e))
+        });
     let shown: Vec<_> = all.filter(|(v, ..)| (low..=high).contains(v)).collect();
     let is_plain = shown.iter().all(|(v, ..)| (1e-3..2e4).contains(v));
-    shown.into_iter().map(|(v, f, e)| (v, if is_plain { plain(v) } else { power(f, e) })).collect()
+    shown
+        .into_iter()
+        .map(|(v, f, e)| (v, if is_plain { plain(v) } else { power(f, e) }))
+        .collect()
 }
 
 /// Between the labelled powers of ten: 2 to 9 times each.
@@ -97,22 +119,34 @@ pub(crate) fn minor_ticks((low, high): (f64, f64)) -> Vec<f64> {
 fn steps((low, high): (f64, f64), most: usize) -> Vec<(f64, String)> {
     let raw = (high - low) / most as f64;
     let exponent = raw.log10().floor();
-    let choice = [1.0, 2.0, 5.0, 10.0].into_iter().find(|m| m * 10f64.powf(exponent) >= raw * 0.999);
+    let choice = [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .find(|m| m * 10f64.powf(exponent) >= raw * 0.999);
     let step = choice.unwrap_or(10.0) * 10f64.powf(exponent);
-    let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
+    let (first, last) = (
+        (low / step - 1e-9).ceil() as i64,
+        (high / step + 1e-9).floor() as i64,
+    );
     let largest = low.abs().max(high.abs());
     let label = |v: f64| match largest {
         m if !(1e-4..1e6).contains(&m) => readable(v).replace('-', "−"),
         _ => plain((v / step).round() * step),
     };
-    (first..=last).map(|k| k as f64 * step).map(|v| (v, label(v))).collect()
+    (first..=last)
+        .map(|k| k as f64 * step)
+        .map(|v| (v, label(v)))
+        .collect()
 }
 
 /// A number without an exponent.
 fn plain(value: f64) -> String {
     let rounded = format!("{value:.6}");
     let short = rounded.trim_end_matches('0').trim_end_matches('.');
-    if short == "-0" { "0".to_owned() } else { short.replace('-', "−") }
+    if short == "-0" {
+        "0".to_owned()
+    } else {
+        short.replace('-', "−")
+    }
 }
 
 /// `10⁻³` or `2·10⁻³`.
@@ -120,7 +154,11 @@ fn power(factor: i32, exponent: i32) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     let raised = |c: char| c.to_digit(10).map_or('⁻', |d| DIGITS[d as usize]);
     let exponent: String = exponent.to_string().chars().map(raised).collect();
-    if factor == 1 { format!("10{exponent}") } else { format!("{factor}·10{exponent}") }
+    if factor == 1 {
+        format!("10{exponent}")
+    } else {
+        format!("{factor}·10{exponent}")
+    }
 }
 
 #[cfg(test)]
@@ -128,33 +166,69 @@ mod tests {
     use super::*;
 
     fn labels(axis: &Axis, range: (f64, f64)) -> Vec<String> {
-        ticks(axis, range, 8).into_iter().map(|(_, label)| label).collect()
+        ticks(axis, range, 8)
+            .into_iter()
+            .map(|(_, label)| label)
+            .collect()
     }
 
     #[test]
     fn ticks_are_round_numbers() {
-        assert_eq!(labels(&Axis::linear(""), (0.0, 900.0)), ["0", "200", "400", "600", "800"]);
-        assert_eq!(labels(&Axis::linear(""), (-0.021, 0.02)), ["−0.02", "−0.01", "0", "0.01", "0.02"]);
-        assert_eq!(labels(&Axis::log(""), (0.4, 12.0)), ["0.5", "1", "2", "5", "10"]);
-        assert_eq!(labels(&Axis::log(""), (0.02, 3e3)), ["0.1", "1", "10", "100", "1000"]);
-        assert_eq!(labels(&Axis::log(""), (3e-9, 2e-6)), ["10⁻⁸", "10⁻⁷", "10⁻⁶"]);
-        assert_eq!(labels(&Axis::log(""), (0.9, 1.3)).first().map(String::as_str), Some("0.9"));
-        assert_eq!(labels(&Axis::names(vec!["a".into(), "b".into()]), (-0.5, 1.5)), ["a", "b"]);
+        assert_eq!(
+            labels(&Axis::linear(""), (0.0, 900.0)),
+            ["0", "200", "400", "600", "800"]
+        );
+        assert_eq!(
+            labels(&Axis::linear(""), (-0.021, 0.02)),
+            ["−0.02", "−0.01", "0", "0.01", "0.02"]
+        );
+        assert_eq!(
+            labels(&Axis::log(""), (0.4, 12.0)),
+            ["0.5", "1", "2", "5", "10"]
+        );
+        assert_eq!(
+            labels(&Axis::log(""), (0.02, 3e3)),
+            ["0.1", "1", "10", "100", "1000"]
+        );
+        assert_eq!(
+            labels(&Axis::log(""), (3e-9, 2e-6)),
+            ["10⁻⁸", "10⁻⁷", "10⁻⁶"]
+        );
+        assert_eq!(
+            labels(&Axis::log(""), (0.9, 1.3))
+                .first()
+                .map(String::as_str),
+            Some("0.9")
+        );
+        assert_eq!(
+            labels(&Axis::names(vec!["a".into(), "b".into()]), (-0.5, 1.5)),
+            ["a", "b"]
+        );
     }
 
     #[test]
     fn many_decades_are_labelled_now_and_then() {
         let shown = ticks(&Axis::log(""), (1e-12, 1e3), 5);
         assert_eq!(
-            shown.iter().map(|t| t.0.log10().round()).collect::<Vec<_>>(),
+            shown
+                .iter()
+                .map(|t| t.0.log10().round())
+                .collect::<Vec<_>>(),
             [-12., -9., -6., -3., 0., 3.]
         );
     }
 
     #[test]
     fn ends_of_the_range_are_ends_of_the_axis() {
-        let ruler = Ruler { range: (1.0, 100.0), is_log: true, pixels: (200.0, 0.0) };
-        assert_eq!((ruler.at(1.0), ruler.at(10.0), ruler.at(100.0)), (200.0, 100.0, 0.0));
+        let ruler = Ruler {
+            range: (1.0, 100.0),
+            is_log: true,
+            pixels: (200.0, 0.0),
+        };
+        assert_eq!(
+            (ruler.at(1.0), ruler.at(10.0), ruler.at(100.0)),
+            (200.0, 100.0, 0.0)
+        );
         assert_eq!(ruler.within(1e9), 0.0);
     }
 
@@ -164,7 +238,11 @@ mod tests {
         let (low, high) = range(&Axis::log(""), values.into_iter(), 0.0).unwrap();
         assert_eq!((low, high), (1.0, 100.0));
         assert_eq!(
-            range(&Axis::linear("").including(-3.0, 5.0), values.into_iter(), 0.0),
+            range(
+                &Axis::linear("").including(-3.0, 5.0),
+                values.into_iter(),
+                0.0
+            ),
             Some((-3.0, 100.0))
         );
         assert_eq!(range(&Axis::linear(""), [f64::NAN].into_iter(), 0.0), None);

@@ -19,12 +19,30 @@ pub(crate) struct Canvas {
     pub(crate) map: f64,
 }
 
-pub(crate) const WIDE: Canvas =
-    Canvas { class: "wide", width: 960.0, panel: 250.0, font: 14.0, labels: 10, map: 480.0 };
-pub(crate) const NARROW: Canvas =
-    Canvas { class: "narrow", width: 358.0, panel: 200.0, font: 12.0, labels: 5, map: 340.0 };
-pub(crate) const SMALL: Canvas =
-    Canvas { class: "small", width: 310.0, panel: 150.0, font: 12.0, labels: 5, map: 260.0 };
+pub(crate) const WIDE: Canvas = Canvas {
+    class: "wide",
+    width: 960.0,
+    panel: 250.0,
+    font: 14.0,
+    labels: 10,
+    map: 480.0,
+};
+pub(crate) const NARROW: Canvas = Canvas {
+    class: "narrow",
+    width: 358.0,
+    panel: 200.0,
+    font: 12.0,
+    labels: 5,
+    map: 340.0,
+};
+pub(crate) const SMALL: Canvas = Canvas {
+    class: "small",
+    width: 310.0,
+    panel: 150.0,
+    font: 12.0,
+    labels: 5,
+    map: 260.0,
+};
 
 /// A coordinate to a tenth of a pixel, without idle zeros.
 pub(crate) fn short(pixels: f64) -> String {

@@ -25,22 +25,35 @@ pub struct Axis {
 impl Axis {
     /// A linear axis.
     pub fn linear(label: &str) -> Self {
-        Self { label: label.to_owned(), scale: Scale::Linear, include: None }
+        Self {
+            label: label.to_owned(),
+            scale: Scale::Linear,
+            include: None,
+        }
     }
 
     /// A logarithmic axis.
     pub fn log(label: &str) -> Self {
-        Self { scale: Scale::Log, ..Self::linear(label) }
+        Self {
+            scale: Scale::Log,
+            ..Self::linear(label)
+        }
     }
 
     /// An axis of names.
     pub fn names(names: Vec<String>) -> Self {
-        Self { scale: Scale::Names(names), ..Self::linear("") }
+        Self {
+            scale: Scale::Names(names),
+            ..Self::linear("")
+        }
     }
 
     /// The same, showing at least the values from `low` to `high`.
     pub fn including(self, low: f64, high: f64) -> Self {
-        Self { include: Some((low, high)), ..self }
+        Self {
+            include: Some((low, high)),
+            ..self
+        }
     }
 
     /// The same with zero inside, as an axis of errors must be.
@@ -156,7 +169,11 @@ pub struct Series {
 impl Series {
     /// A series.
     pub fn new(name: &str, colour: Colour, mark: Mark) -> Self {
-        Self { name: name.to_owned(), colour, mark }
+        Self {
+            name: name.to_owned(),
+            colour,
+            mark,
+        }
     }
 
     /// A line.
@@ -172,13 +189,29 @@ impl Series {
     /// A line with a point at each of its ends and bends.
     pub fn dotted_line(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> [Self; 2] {
         let dots = points.clone().into_iter().map(|(x, y)| (x, y, f64::NAN));
-        [Self::line(name, colour, points), Self::points(name, colour, dots)]
+        [
+            Self::line(name, colour, points),
+            Self::points(name, colour, dots),
+        ]
     }
 
     /// Points (x, y, half of the interval; NaN: none).
-    pub fn points(name: &str, colour: Colour, points: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
-        let point = |(x, y, half): (f64, f64, f64)| Interval { x, y, low: y - half, high: y + half };
-        Self::new(name, colour, Mark::Points(points.into_iter().map(point).collect()))
+    pub fn points(
+        name: &str,
+        colour: Colour,
+        points: impl IntoIterator<Item = (f64, f64, f64)>,
+    ) -> Self {
+        let point = |(x, y, half): (f64, f64, f64)| Interval {
+            x,
+            y,
+            low: y - half,
+            high: y + half,
+        };
+        Self::new(
+            name,
+            colour,
+            Mark::Points(points.into_iter().map(point).collect()),
+        )
     }
 
     /// A dashed line.
@@ -201,7 +234,11 @@ pub struct Panel {
 impl Panel {
     /// A panel of the usual height.
     pub fn new(y: Axis, series: Vec<Series>) -> Self {
-        Self { y, series, height: 1.0 }
+        Self {
+            y,
+            series,
+            height: 1.0,
+        }
     }
 }
 
@@ -250,21 +287,33 @@ impl Chart {
     /// A map: east to the right, north up, in metres, one scale.
     pub fn map(title: &str, series: Vec<Series>) -> Self {
         let panel = Panel::new(Axis::linear("north (m)"), series);
-        Self { is_map: true, ..Self::new(title, Axis::linear("east (m)"), vec![panel]) }
+        Self {
+            is_map: true,
+            ..Self::new(title, Axis::linear("east (m)"), vec![panel])
+        }
     }
 
     /// The same with outages (start, end) marked.
     pub fn with_outages(self, outages: &[(f64, f64)]) -> Self {
-        Self { stripes: ("outage".to_owned(), outages.to_vec()), ..self }
+        Self {
+            stripes: ("outage".to_owned(), outages.to_vec()),
+            ..self
+        }
     }
 
     /// The same in a group of charts that are zoomed together.
     pub fn in_group(self, group: &str) -> Self {
-        Self { group: group.to_owned(), ..self }
+        Self {
+            group: group.to_owned(),
+            ..self
+        }
     }
 
     /// The same, small.
     pub fn small(self) -> Self {
-        Self { size: Size::Small, ..self }
+        Self {
+            size: Size::Small,
+            ..self
+        }
     }
 }

@@ -97,9 +97,21 @@ pub struct Document {
 
 impl Document {
     /// A document of a verdict alone.
-    pub fn new<L: Into<String>>(title: &str, tone: Tone, lines: impl IntoIterator<Item = L>) -> Self {
-        let verdict = Banner { tone, lines: lines.into_iter().map(Into::into).collect() };
-        Self { title: title.to_owned(), verdict, blocks: Vec::new(), notes: Vec::new() }
+    pub fn new<L: Into<String>>(
+        title: &str,
+        tone: Tone,
+        lines: impl IntoIterator<Item = L>,
+    ) -> Self {
+        let verdict = Banner {
+            tone,
+            lines: lines.into_iter().map(Into::into).collect(),
+        };
+        Self {
+            title: title.to_owned(),
+            verdict,
+            blocks: Vec::new(),
+            notes: Vec::new(),
+        }
     }
 
     /// Begins a section.
@@ -119,18 +131,26 @@ impl Document {
 
     /// Adds names and what they are.
     pub fn facts(&mut self, facts: &[(&str, String)]) {
-        let owned = facts.iter().map(|(name, value)| ((*name).to_owned(), value.clone()));
+        let owned = facts
+            .iter()
+            .map(|(name, value)| ((*name).to_owned(), value.clone()));
         self.blocks.push(Block::Facts(owned.collect()));
     }
 
     /// Adds the table that a terminal shows.
     pub fn lead(&mut self, table: Table) {
-        self.blocks.push(Block::Table { table, is_lead: true });
+        self.blocks.push(Block::Table {
+            table,
+            is_lead: true,
+        });
     }
 
     /// Adds a table.
     pub fn table(&mut self, table: &Table) {
-        self.blocks.push(Block::Table { table: table.clone(), is_lead: false });
+        self.blocks.push(Block::Table {
+            table: table.clone(),
+            is_lead: false,
+        });
     }
 
     /// Adds a chart and what is to be seen in it.
@@ -140,7 +160,8 @@ impl Document {
 
     /// Adds charts, small ones side by side; one below the other on a phone.
     pub fn charts(&mut self, charts: &[Chart], caption: &str) {
-        self.blocks.push(Block::Charts(charts.to_vec(), caption.to_owned()));
+        self.blocks
+            .push(Block::Charts(charts.to_vec(), caption.to_owned()));
     }
 
     /// Adds links to files beside the page: relative path and what is there.
@@ -168,9 +189,14 @@ impl Document {
 
     /// Adds a note behind those of its importance, once.
     pub fn note(&mut self, importance: Importance, text: impl Into<String>) {
-        let note = Note { importance, text: text.into() };
+        let note = Note {
+            importance,
+            text: text.into(),
+        };
         if !self.notes.contains(&note) {
-            let place = self.notes.partition_point(|other| other.importance <= importance);
+            let place = self
+                .notes
+                .partition_point(|other| other.importance <= importance);
             self.notes.insert(place, note);
         }
     }

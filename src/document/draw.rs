@@ -16,26 +16,47 @@ pub(crate) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
     let mut svg = String::new();
     let legend = Legend::of(chart);
     let mut top = 0.0;
-    let x_values = chart.panels.iter().flat_map(|p| p.series.iter()).flat_map(|s| xs(&s.mark));
+    let x_values = chart
+        .panels
+        .iter()
+        .flat_map(|p| p.series.iter())
+        .flat_map(|s| xs(&s.mark));
     let shown_y: Vec<Option<(f64, f64)>> = chart.panels.iter().map(y_range).collect();
     if shown_y.iter().all(Option::is_none) {
         return None;
     }
-    let air = if chart.x.scale == Scale::Log || chart.is_map { 0.03 } else { 0.0 };
+    let air = if chart.x.scale == Scale::Log || chart.is_map {
+        0.03
+    } else {
+        0.0
+    };
     let shown_x = range(&chart.x, x_values.collect::<Vec<_>>().into_iter(), air)?;
-    let y_ticks = |panel: &Panel, range, height: f64| ticks(&panel.y, range, (height / 42.0).ceil() as usize);
+    let y_ticks =
+        |panel: &Panel, range, height: f64| ticks(&panel.y, range, (height / 42.0).ceil() as usize);
     let widest = chart.panels.iter().zip(&shown_y).flat_map(|(p, range)| {
         range.map_or_else(Vec::new, |range| y_ticks(p, range, canvas.panel * p.height))
     });
-    let left = 10.0 + widest.map(|(_, label)| text_width(&label, canvas.font)).fold(24.0, f64::max);
+    let left = 10.0
+        + widest
+            .map(|(_, label)| text_width(&label, canvas.font))
+            .fold(24.0, f64::max);
     let right = canvas.width - GAP;
     // the first of slanted names begins left of its place
-    let left = slanted_names(chart, canvas, right - left)
-        .map_or(left, |(longest, slot)| left.max(0.79 * longest - 0.4 * slot));
+    let left = slanted_names(chart, canvas, right - left).map_or(left, |(longest, slot)| {
+        left.max(0.79 * longest - 0.4 * slot)
+    });
     for (i, (panel, range)) in chart.panels.iter().zip(&shown_y).enumerate() {
         let Some(range) = *range else { continue };
-        let mut x = Ruler { range: shown_x, is_log: chart.x.scale == Scale::Log, pixels: (left, right) };
-        let mut y = Ruler { range, is_log: panel.y.scale == Scale::Log, pixels: (0.0, 0.0) };
+        let mut x = Ruler {
+            range: shown_x,
+            is_log: chart.x.scale == Scale::Log,
+            pixels: (left, right),
+        };
+        let mut y = Ruler {
+            range,
+            is_log: panel.y.scale == Scale::Log,
+            pixels: (0.0, 0.0),
+        };
         let mut height = canvas.panel * panel.height;
         if chart.is_map {
             height = equalise(&mut x, &mut y, canvas);
@@ -45,7 +66,12 @@ pub(crate) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
         let sketch = Sketch {
             chart,
             panel,
-            frame: Frame { x, y, scales: [&chart.x.scale, &panel.y.scale], most: canvas.width as usize },
+            frame: Frame {
+                x,
+                y,
+                scales: [&chart.x.scale, &panel.y.scale],
+                most: canvas.width as usize,
+            },
         };
         let is_last = i + 1 == chart.panels.len();
         let y_ticks = y_ticks(panel, sketch.frame.y.range, height);
@@ -98,7 +124,13 @@ impl Sketch<'_> {
                 short(height),
                 short(right)
             );
-            text(svg, "tick", (left - 6.0, height + 0.35 * canvas.font), "end", label);
+            text(
+                svg,
+                "tick",
+                (left - 6.0, height + 0.35 * canvas.font),
+                "end",
+                label,
+            );
         }
         let below = self.x_axis(canvas, is_last, svg);
         *svg += "</g>\n";
@@ -192,7 +224,13 @@ impl Sketch<'_> {
             if is_last && slanted_name.is_some() {
                 slanted(svg, (place + 4.0, y.pixels.0 + 16.0), label);
             } else if is_last {
-                text(svg, "tick", (place, y.pixels.0 + canvas.font + 5.0), "middle", label);
+                text(
+                    svg,
+                    "tick",
+                    (place, y.pixels.0 + canvas.font + 5.0),
+                    "middle",
+                    label,
+                );
             }
         }
         let labels = slanted_name.map_or(canvas.font + 9.0, |(longest, _)| 0.62 * longest + 22.0);
@@ -200,7 +238,13 @@ impl Sketch<'_> {
             return labels + 4.0;
         }
         if is_last {
-            text(svg, "name", (x.pixels.1, y.pixels.0 + labels + canvas.font), "end", &self.chart.x.label);
+            text(
+                svg,
+                "name",
+                (x.pixels.1, y.pixels.0 + labels + canvas.font),
+                "end",
+                &self.chart.x.label,
+            );
         }
         labels + canvas.font + 8.0
     }
@@ -219,9 +263,23 @@ impl Sketch<'_> {
         for (k, (series, px, py)) in named.enumerate() {
             let width = text_width(&series.name, canvas.font);
             let is_right = px + 8.0 + width < x.pixels.1;
-            let (anchor, px) = if is_right { ("start", px + 7.0) } else { ("end", px - 7.0) };
-            let py = if k % 2 == 0 { py - 6.0 } else { py + canvas.font + 3.0 };
-            text(svg, &format!("place {}", series.colour.class()), (px, py), anchor, &series.name);
+            let (anchor, px) = if is_right {
+                ("start", px + 7.0)
+            } else {
+                ("end", px - 7.0)
+            };
+            let py = if k % 2 == 0 {
+                py - 6.0
+            } else {
+                py + canvas.font + 3.0
+            };
+            text(
+                svg,
+                &format!("place {}", series.colour.class()),
+                (px, py),
+                anchor,
+                &series.name,
+            );
         }
     }
 
@@ -231,10 +289,18 @@ impl Sketch<'_> {
         let metres_per_pixel = (x.range.1 - x.range.0) / (x.pixels.1 - x.pixels.0);
         let most = 0.22 * (x.pixels.1 - x.pixels.0) * metres_per_pixel;
         let power = 10f64.powf(most.log10().floor());
-        let length = [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|l| *l <= most).unwrap_or(power);
+        let length = [5.0, 2.0, 1.0]
+            .into_iter()
+            .map(|m| m * power)
+            .find(|l| *l <= most)
+            .unwrap_or(power);
         let (right, bottom) = (x.pixels.1 - 10.0, y.pixels.0 - 10.0);
         let left = right - length / metres_per_pixel;
-        let label = if length >= 1000.0 { format!("{} km", length / 1000.0) } else { format!("{length} m") };
+        let label = if length >= 1000.0 {
+            format!("{} km", length / 1000.0)
+        } else {
+            format!("{length} m")
+        };
         let _ = writeln!(
             svg,
             "<path class=\"scale\" d=\"M{} {}v5H{}v-5\"/>",
@@ -242,14 +308,25 @@ impl Sketch<'_> {
             short(bottom - 5.0),
             short(right)
         );
-        text(svg, "tick", (0.5 * (left + right), bottom - 0.5 * canvas.font), "middle", &label);
+        text(
+            svg,
+            "tick",
+            (0.5 * (left + right), bottom - 0.5 * canvas.font),
+            "middle",
+            &label,
+        );
     }
 }
 
 /// Where the names of the x axis have no room beside one another: the width of the longest, and the room of each.
 fn slanted_names(chart: &Chart, canvas: &Canvas, width: f64) -> Option<(f64, f64)> {
-    let Scale::Names(names) = &chart.x.scale else { return None };
-    let longest = names.iter().map(|name| text_width(name, canvas.font)).fold(0.0, f64::max);
+    let Scale::Names(names) = &chart.x.scale else {
+        return None;
+    };
+    let longest = names
+        .iter()
+        .map(|name| text_width(name, canvas.font))
+        .fold(0.0, f64::max);
     let slot = width / names.len().max(1) as f64;
     (longest > slot - 6.0).then_some((longest, slot))
 }
@@ -268,7 +345,9 @@ fn xs(mark: &Mark) -> Vec<f64> {
 fn ys(mark: &Mark) -> Vec<f64> {
     match mark {
         Mark::Line(points, _) => points.iter().map(|p| p.1).collect(),
-        Mark::Band(points) | Mark::InnerBand(points) => points.iter().flat_map(|p| [p.1, p.2]).collect(),
+        Mark::Band(points) | Mark::InnerBand(points) => {
+            points.iter().flat_map(|p| [p.1, p.2]).collect()
+        }
         Mark::Points(points) => points.iter().flat_map(|p| [p.y, p.low, p.high]).collect(),
         Mark::Bars(bars) => bars.iter().flat_map(|b| [b.1, b.2]).collect(),
         Mark::Level(y) => vec![*y],
@@ -281,7 +360,11 @@ fn ys(mark: &Mark) -> Vec<f64> {
 fn is_main(mark: &Mark) -> bool {
     matches!(
         mark,
-        Mark::Line(_, Stroke::Plain) | Mark::Level(_) | Mark::Points(_) | Mark::Place(..) | Mark::Reading(..)
+        Mark::Line(_, Stroke::Plain)
+            | Mark::Level(_)
+            | Mark::Points(_)
+            | Mark::Place(..)
+            | Mark::Reading(..)
     )
 }
 
@@ -293,10 +376,16 @@ fn y_range(panel: &Panel) -> Option<(f64, f64)> {
     let has_bars = panel.series.iter().any(|s| matches!(s.mark, Mark::Bars(_)));
     let air = if has_bars { 0.0 } else { 0.04 };
     let values: Vec<f64> = panel.series.iter().flat_map(|s| ys(&s.mark)).collect();
-    let main = panel.series.iter().filter(|s| is_main(&s.mark)).flat_map(|s| match &s.mark {
-        Mark::Points(points) if panel.y.scale == Scale::Log => points.iter().map(|p| p.y).collect(),
-        mark => ys(mark),
-    });
+    let main = panel
+        .series
+        .iter()
+        .filter(|s| is_main(&s.mark))
+        .flat_map(|s| match &s.mark {
+            Mark::Points(points) if panel.y.scale == Scale::Log => {
+                points.iter().map(|p| p.y).collect()
+            }
+            mark => ys(mark),
+        });
     let Some((low, high)) = extremes(main.filter(|y| is_shown(*y, &panel.y.scale))) else {
         return range(&panel.y, values.into_iter(), air);
     };

@@ -3,7 +3,10 @@
 /// Text made safe inside HTML and SVG.
 #[must_use]
 pub fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
 }
 
 /// Whether a character turns the direction of what follows, and so shows a name as another (Unicode TR 36, sec. 2.1).

@@ -36,24 +36,39 @@ pub(crate) struct Legend<'a> {
 impl<'a> Legend<'a> {
     pub(crate) fn of(chart: &'a Chart) -> Self {
         let mut entries: Vec<Entry<'a>> = Vec::new();
-        for (panel, series) in
-            chart.panels.iter().enumerate().flat_map(|(i, p)| p.series.iter().map(move |s| (i, s)))
+        for (panel, series) in chart
+            .panels
+            .iter()
+            .enumerate()
+            .flat_map(|(i, p)| p.series.iter().map(move |s| (i, s)))
         {
-            if series.name.is_empty() || matches!(series.mark, Mark::Place(..) | Mark::Reading(..)) {
+            if series.name.is_empty() || matches!(series.mark, Mark::Place(..) | Mark::Reading(..))
+            {
                 continue;
             }
             match entries.iter_mut().find(|e| e.name == series.name) {
                 Some(entry) => entry.series.push(series),
-                None => entries.push(Entry { name: &series.name, panel, series: vec![series] }),
+                None => entries.push(Entry {
+                    name: &series.name,
+                    panel,
+                    series: vec![series],
+                }),
             }
         }
-        let has_stripes = !chart.stripes.1.is_empty() && !chart.is_map && !chart.stripes.0.is_empty();
-        Self { entries, stripes: has_stripes.then_some(chart.stripes.0.as_str()) }
+        let has_stripes =
+            !chart.stripes.1.is_empty() && !chart.is_map && !chart.stripes.0.is_empty();
+        Self {
+            entries,
+            stripes: has_stripes.then_some(chart.stripes.0.as_str()),
+        }
     }
 
     /// The number of a name, of which the script knows what to hide.
     pub(crate) fn key(&self, name: &str) -> usize {
-        self.entries.iter().position(|e| e.name == name).unwrap_or(self.entries.len())
+        self.entries
+            .iter()
+            .position(|e| e.name == name)
+            .unwrap_or(self.entries.len())
     }
 
     /// Draws what one panel tells, beginning behind `title`, at the height `top`; returns where it ends.
@@ -71,13 +86,35 @@ impl<'a> Legend<'a> {
         if self.entries.len() + usize::from(self.stripes.is_some()) < 2 {
             return top + line;
         }
-        let x = if title.is_empty() { left } else { left + text_width(title, canvas.font) + SPACE };
-        let mut pen = Pen { left, x, y: top, line, canvas };
-        for (k, entry) in self.entries.iter().enumerate().filter(|(_, e)| e.panel == panel) {
+        let x = if title.is_empty() {
+            left
+        } else {
+            left + text_width(title, canvas.font) + SPACE
+        };
+        let mut pen = Pen {
+            left,
+            x,
+            y: top,
+            line,
+            canvas,
+        };
+        for (k, entry) in self
+            .entries
+            .iter()
+            .enumerate()
+            .filter(|(_, e)| e.panel == panel)
+        {
             let name = fitting(entry.name, canvas);
             let (x, y) = pen.place(&name);
-            let _ = write!(svg, "<g class=\"key {}\" data-k=\"{k}\">", entry.series[0].colour.class());
-            entry.series.iter().for_each(|s| swatch(&s.mark, (x, y + 0.5 * line - 1.0), svg));
+            let _ = write!(
+                svg,
+                "<g class=\"key {}\" data-k=\"{k}\">",
+                entry.series[0].colour.class()
+            );
+            entry
+                .series
+                .iter()
+                .for_each(|s| swatch(&s.mark, (x, y + 0.5 * line - 1.0), svg));
             text(svg, "", (x + SWATCH + 6.0, y + canvas.font), "start", &name);
             *svg += "</g>\n";
         }
@@ -139,14 +176,18 @@ impl Pen<'_> {
 fn swatch(mark: &Mark, (x, y): (f64, f64), svg: &mut String) {
     let square = || format!("M{} {}h{SWATCH}v12h-{SWATCH}Z", short(x), short(y - 6.0));
     let (class, d) = match mark {
-        Mark::Line(_, stroke) => (stroke.class(), format!("M{} {}h{SWATCH}", short(x), short(y))),
+        Mark::Line(_, stroke) => (
+            stroke.class(),
+            format!("M{} {}h{SWATCH}", short(x), short(y)),
+        ),
         Mark::Level(_) => ("line level", format!("M{} {}h{SWATCH}", short(x), short(y))),
         Mark::Band(_) | Mark::Zone(..) => ("area", square()),
         Mark::InnerBand(_) => ("area inner", square()),
         Mark::Bars(_) => ("bar", square()),
-        Mark::Points(_) | Mark::Place(..) | Mark::Reading(..) => {
-            ("dot", format!("M{} {}h0", short(x + 0.5 * SWATCH), short(y)))
-        }
+        Mark::Points(_) | Mark::Place(..) | Mark::Reading(..) => (
+            "dot",
+            format!("M{} {}h0", short(x + 0.5 * SWATCH), short(y)),
+        ),
     };
     let _ = write!(svg, "<path class=\"{class}\" d=\"{d}\"/>");
 }

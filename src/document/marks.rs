@@ -46,7 +46,11 @@ impl Frame<'_> {
             Mark::Level(y) => path(svg, "line level", &self.span(*y)),
             Mark::Zone(low, high) => {
                 let (a, b) = self.x.range;
-                path(svg, "area", &self.band(&[(a, *low, *high), (b, *low, *high)]));
+                path(
+                    svg,
+                    "area",
+                    &self.band(&[(a, *low, *high), (b, *low, *high)]),
+                );
             }
             Mark::Place(x, y) => path(svg, "dot", &format!("M{}h0", self.point(*x, *y))),
             Mark::Reading(x, y) => {
@@ -78,9 +82,12 @@ impl Frame<'_> {
         let is_drawn = |p: &(f64, f64, f64)| {
             is_shown(p.0, self.scales[0]) && is_shown(p.2, self.scales[1]) && !p.1.is_nan()
         };
-        let pieces = points.split(|p| !is_drawn(p)).filter(|piece| !piece.is_empty());
+        let pieces = points
+            .split(|p| !is_drawn(p))
+            .filter(|piece| !piece.is_empty());
         let closed = |piece: &[(f64, f64, f64)]| {
-            let corner = |x: f64, y: f64| format!("{} {}", short(self.x.at(x)), short(self.y.within(y)));
+            let corner =
+                |x: f64, y: f64| format!("{} {}", short(self.x.at(x)), short(self.y.within(y)));
             let forth = piece.iter().map(|p| corner(p.0, p.2));
             let back = piece.iter().rev().map(|p| corner(p.0, p.1));
             format!("M{}Z", forth.chain(back).collect::<Vec<_>>().join("L"))
@@ -92,13 +99,23 @@ impl Frame<'_> {
         let shown = || points.iter().filter(|p| self.shows(p.x, p.y));
         let with_bar = |p: &&Interval| !(p.low.is_nan() && p.high.is_nan());
         let bar = |p: &Interval| {
-            let [low, high] =
-                [p.low, p.high].map(|end| short(self.y.within(if end.is_nan() { p.y } else { end })));
+            let [low, high] = [p.low, p.high]
+                .map(|end| short(self.y.within(if end.is_nan() { p.y } else { end })));
             format!("M{} {low}V{high}", short(self.x.at(p.x)))
         };
-        path(svg, "whisker", &shown().filter(with_bar).map(bar).collect::<String>());
-        let class = if points.len() > MANY { "dot small" } else { "dot" };
-        let mut dots: Vec<String> = shown().map(|p| format!("M{}h0", self.point(p.x, p.y))).collect();
+        path(
+            svg,
+            "whisker",
+            &shown().filter(with_bar).map(bar).collect::<String>(),
+        );
+        let class = if points.len() > MANY {
+            "dot small"
+        } else {
+            "dot"
+        };
+        let mut dots: Vec<String> = shown()
+            .map(|p| format!("M{}h0", self.point(p.x, p.y)))
+            .collect();
         dots.dedup();
         path(svg, class, &dots.concat());
     }
@@ -110,7 +127,10 @@ impl Frame<'_> {
             let [low, high] = [*from, *to].map(|y| short(self.y.within(y)));
             format!("M{left} {low}H{right}V{high}H{left}Z")
         };
-        bars.iter().filter(|(_, from, to)| from != to).map(bar).collect()
+        bars.iter()
+            .filter(|(_, from, to)| from != to)
+            .map(bar)
+            .collect()
     }
 
     fn span(&self, y: f64) -> String {
@@ -137,14 +157,24 @@ fn thinned(points: &[(f64, f64)], most: usize) -> Vec<(f64, f64)> {
     let bucket = points.len().div_ceil(most / 2);
     if !points.is_sorted_by(|a, b| a.0 <= b.0) {
         // a track: what is lowest in y says nothing of its shape
-        return points.iter().step_by(bucket.div_ceil(2)).chain(points.last()).copied().collect();
+        return points
+            .iter()
+            .step_by(bucket.div_ceil(2))
+            .chain(points.last())
+            .copied()
+            .collect();
     }
     let extremes = |chunk: &[(f64, f64)]| {
         let by_y = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
         let gap = chunk.iter().find(|p| !p.1.is_finite()).copied();
         let known = || chunk.iter().filter(|p| p.1.is_finite());
-        let mut pair: Vec<(f64, f64)> =
-            known().min_by(by_y).into_iter().chain(known().max_by(by_y)).copied().chain(gap).collect();
+        let mut pair: Vec<(f64, f64)> = known()
+            .min_by(by_y)
+            .into_iter()
+            .chain(known().max_by(by_y))
+            .copied()
+            .chain(gap)
+            .collect();
         pair.sort_by(|a, b| a.0.total_cmp(&b.0));
         pair.dedup();
         pair
@@ -159,10 +189,15 @@ fn thinned_band(points: &[(f64, f64, f64)], most: usize) -> Vec<(f64, f64, f64)>
     }
     let cover = |chunk: &[(f64, f64, f64)]| {
         let low = chunk.iter().fold(f64::INFINITY, |low, p| low.min(p.1));
-        let high = chunk.iter().fold(f64::NEG_INFINITY, |high, p| high.max(p.2));
+        let high = chunk
+            .iter()
+            .fold(f64::NEG_INFINITY, |high, p| high.max(p.2));
         (chunk[chunk.len() / 2].0, low, high)
     };
-    points.chunks(points.len().div_ceil(most)).map(cover).collect()
+    points
+        .chunks(points.len().div_ceil(most))
+        .map(cover)
+        .collect()
 }
 
 #[cfg(test)]
@@ -170,15 +205,34 @@ mod tests {
     use super::*;
 
     fn frame(y: &Scale) -> Frame<'_> {
-        let ruler = |pixels| Ruler { range: (1.0, 11.0), is_log: false, pixels };
-        Frame { x: ruler((0.0, 100.0)), y: ruler((100.0, 0.0)), scales: [&Scale::Linear, y], most: 100 }
+        let ruler = |pixels| Ruler {
+            range: (1.0, 11.0),
+            is_log: false,
+            pixels,
+        };
+        Frame {
+            x: ruler((0.0, 100.0)),
+            y: ruler((100.0, 0.0)),
+            scales: [&Scale::Linear, y],
+            most: 100,
+        }
     }
 
     #[test]
     fn what_cannot_be_shown_breaks_the_line() {
-        let points = [(1.0, 1.0), (2.0, f64::NAN), (3.0, 2.0), (4.0, 3.0), (5.0, -1.0), (6.0, 3.0)];
+        let points = [
+            (1.0, 1.0),
+            (2.0, f64::NAN),
+            (3.0, 2.0),
+            (4.0, 3.0),
+            (5.0, -1.0),
+            (6.0, 3.0),
+        ];
         assert_eq!(frame(&Scale::Log).line(&points), "M0 100M20 90L30 80M50 80");
-        assert_eq!(frame(&Scale::Linear).line(&points[2..]), "M20 90L30 80L40 120L50 80");
+        assert_eq!(
+            frame(&Scale::Linear).line(&points[2..]),
+            "M20 90L30 80L40 120L50 80"
+        );
     }
 
     #[test]
@@ -202,7 +256,11 @@ mod tests {
         };
         let points: Vec<(f64, f64)> = (0..100_000).map(|i| (f64::from(i), value(i))).collect();
         let thin = thinned(&points, 1000);
-        assert!(thin.len() <= 1501 && thin.iter().any(|p| p.1 == 9.0) && thin.iter().any(|p| p.1.is_nan()));
+        assert!(
+            thin.len() <= 1501
+                && thin.iter().any(|p| p.1 == 9.0)
+                && thin.iter().any(|p| p.1.is_nan())
+        );
         let band: Vec<_> = points.iter().map(|(x, y)| (*x, -y, *y)).collect();
         let thin = thinned_band(&band, 1000);
         assert!(thin.len() <= 1000 && thin.iter().any(|p| (p.1, p.2) == (-9.0, 9.0)));

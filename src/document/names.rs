@@ -3,15 +3,21 @@
 /// Each path by the shortest of its ends that no other one of them has: `run1.csv`, or `a/run1.csv` beside `b/run1.csv`.
 pub fn short_names(paths: &[&str]) -> Vec<String> {
     let parts: Vec<Vec<&str>> = paths.iter().map(|path| components(path)).collect();
-    let tail = |parts: &[&str], length: usize| parts[parts.len().saturating_sub(length)..].join("/");
+    let tail =
+        |parts: &[&str], length: usize| parts[parts.len().saturating_sub(length)..].join("/");
     let shortest = |components: &Vec<&str>| {
         let is_alone = |length: &usize| {
             let name = tail(components, *length);
-            parts.iter().all(|other| other == components || tail(other, *length) != name)
+            parts
+                .iter()
+                .all(|other| other == components || tail(other, *length) != name)
         };
         (1..components.len()).find(is_alone)
     };
-    let named = parts.iter().zip(paths).map(|(components, path)| (components, path, shortest(components)));
+    let named = parts
+        .iter()
+        .zip(paths)
+        .map(|(components, path)| (components, path, shortest(components)));
     named
         .map(|(components, path, length)| {
             length.map_or_else(|| (*path).to_owned(), |length| tail(components, length))
@@ -21,7 +27,9 @@ pub fn short_names(paths: &[&str]) -> Vec<String> {
 
 /// The names that a path is made of.
 fn components(path: &str) -> Vec<&str> {
-    path.split(['/', '\\']).filter(|part| !part.is_empty() && *part != ".").collect()
+    path.split(['/', '\\'])
+        .filter(|part| !part.is_empty() && *part != ".")
+        .collect()
 }
 
 #[cfg(test)]
@@ -34,9 +42,18 @@ mod tests {
             (&["/data/2026/imu/run1.csv"], &["run1.csv"]),
             (&["/d/run1.csv", "/d/run2.csv"], &["run1.csv", "run2.csv"]),
             // the same recording twice is one
-            (&["/d/a.csv", "/d/a.csv", "/d/b.csv"], &["a.csv", "a.csv", "b.csv"]),
-            (&["x/II/awv", "x/III/awv", "x/III/sr-awv"], &["II/awv", "III/awv", "sr-awv"]),
-            (&["out/a/run", "out/b/run", "out/b"], &["a/run", "b/run", "b"]),
+            (
+                &["/d/a.csv", "/d/a.csv", "/d/b.csv"],
+                &["a.csv", "a.csv", "b.csv"],
+            ),
+            (
+                &["x/II/awv", "x/III/awv", "x/III/sr-awv"],
+                &["II/awv", "III/awv", "sr-awv"],
+            ),
+            (
+                &["out/a/run", "out/b/run", "out/b"],
+                &["a/run", "b/run", "b"],
+            ),
             (&["run", "a/run", "./b"], &["run", "a/run", "./b"]),
             (&["", "C:\\data\\a.csv"], &["", "a.csv"]),
         ];

@@ -4,7 +4,11 @@
 /// long; `NaN` for what is unknown.
 pub fn shortest(x: f64) -> String {
     let plain = x == 0.0 || (1e-5..1e15).contains(&x.abs()) || !x.is_finite();
-    if plain { format!("{x}") } else { format!("{x:e}") }
+    if plain {
+        format!("{x}")
+    } else {
+        format!("{x:e}")
+    }
 }
 
 /// A time of a schedule, to a hundredth of a second.
@@ -60,23 +64,64 @@ mod tests {
 
     #[test]
     fn shortest_texts_read_back_to_the_same_number() {
-        let numbers = [0.0, -0.0, 0.1, 300.0, 1.0 / 3.0, 2e-9, -6.02e23, 5e-324, f64::MAX, 1e-5, 9.9e-6];
+        let numbers = [
+            0.0,
+            -0.0,
+            0.1,
+            300.0,
+            1.0 / 3.0,
+            2e-9,
+            -6.02e23,
+            5e-324,
+            f64::MAX,
+            1e-5,
+            9.9e-6,
+        ];
         for x in numbers {
-            assert_eq!(shortest(x).parse::<f64>().unwrap().to_bits(), x.to_bits(), "{x:e}");
+            assert_eq!(
+                shortest(x).parse::<f64>().unwrap().to_bits(),
+                x.to_bits(),
+                "{x:e}"
+            );
         }
-        assert_eq!([300.0, 0.1, 2e-9, f64::NAN].map(shortest), ["300", "0.1", "2e-9", "NaN"]);
+        assert_eq!(
+            [300.0, 0.1, 2e-9, f64::NAN].map(shortest),
+            ["300", "0.1", "2e-9", "NaN"]
+        );
     }
 
     #[test]
     fn times_are_rounded() {
-        assert_eq!([300.0, 412.345_678_901_2, 0.1].map(seconds), ["300", "412.35", "0.1"]);
+        assert_eq!(
+            [300.0, 412.345_678_901_2, 0.1].map(seconds),
+            ["300", "412.35", "0.1"]
+        );
     }
 
     #[test]
     fn readable_numbers_have_three_significant_digits() {
-        let shown = [0.0, 1234.5, 123.4, 12.34, 1.234, 0.1234, 0.01, 0.000_123, f64::NAN].map(readable);
-        assert_eq!(shown, ["0", "1234", "123", "12.3", "1.23", "0.123", "0.0100", "1.23e-4", "–"]);
+        let shown = [
+            0.0,
+            1234.5,
+            123.4,
+            12.34,
+            1.234,
+            0.1234,
+            0.01,
+            0.000_123,
+            f64::NAN,
+        ]
+        .map(readable);
+        assert_eq!(
+            shown,
+            [
+                "0", "1234", "123", "12.3", "1.23", "0.123", "0.0100", "1.23e-4", "–"
+            ]
+        );
         let carried = [0.000_999_6, 0.099_96, 0.9996, -9.996, 99.96, 999_600.0].map(readable);
-        assert_eq!(carried, ["0.00100", "0.100", "1.00", "-10.0", "100", "1.00e6"]);
+        assert_eq!(
+            carried,
+            ["0.00100", "0.100", "1.00", "-10.0", "100", "1.00e6"]
+        );
     }
 }

@@ -29,13 +29,22 @@ impl Document {
             Tone::Doubtful => "doubtful",
             Tone::Bad => "bad",
         };
-        let verdict = self.verdict.lines.iter().map(|line| escape(line)).collect::<Vec<_>>().join("<br>\n");
+        let verdict = self
+            .verdict
+            .lines
+            .iter()
+            .map(|line| escape(line))
+            .collect::<Vec<_>>()
+            .join("<br>\n");
         let mut body = format!("<h1>{title}</h1>\n<p class=\"verdict {tone}\">{verdict}</p>\n");
         let (first, others) = self.notes().split_at(NOTES.min(self.notes().len()));
         body += &notes(first);
         if !others.is_empty() {
             let (count, others) = (others.len(), notes(others));
-            let _ = writeln!(body, "<details><summary>Further notes: {count}</summary>\n{others}</details>");
+            let _ = writeln!(
+                body,
+                "<details><summary>Further notes: {count}</summary>\n{others}</details>"
+            );
         }
         self.blocks.iter().for_each(|b| block(b, &mut body));
         format!(
@@ -50,12 +59,19 @@ const VIEWPORT: &str = "<meta name=\"viewport\" content=\"width=device-width, in
 
 fn notes(notes: &[Note]) -> String {
     let item = |note: &Note| {
-        let class = if note.importance == Importance::Warning { " class=\"warning\"" } else { "" };
+        let class = if note.importance == Importance::Warning {
+            " class=\"warning\""
+        } else {
+            ""
+        };
         format!("<li{class}>{}</li>\n", escape(&note.text))
     };
     match notes {
         [] => String::new(),
-        _ => format!("<ul class=\"notes\">\n{}</ul>\n", notes.iter().map(item).collect::<String>()),
+        _ => format!(
+            "<ul class=\"notes\">\n{}</ul>\n",
+            notes.iter().map(item).collect::<String>()
+        ),
     }
 }
 
@@ -68,7 +84,10 @@ fn block(block: &Block, html: &mut String) {
             let fact = |(name, value): &(String, String)| {
                 format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value))
             };
-            format!("<dl>\n{}</dl>\n", facts.iter().map(fact).collect::<String>())
+            format!(
+                "<dl>\n{}</dl>\n",
+                facts.iter().map(fact).collect::<String>()
+            )
         }
         Block::Table { table, .. } => self::table(table),
         Block::Charts(charts, caption) => match charts.as_slice() {
@@ -83,28 +102,45 @@ fn block(block: &Block, html: &mut String) {
             }
             charts => {
                 let figures: String = charts.iter().map(|chart| figure(chart, "")).collect();
-                format!("<div class=\"charts\">\n{figures}</div>\n{}", captioned(caption))
+                format!(
+                    "<div class=\"charts\">\n{figures}</div>\n{}",
+                    captioned(caption)
+                )
             }
         },
         Block::Links(links) => {
             let link = |(path, name): &(String, String)| {
-                format!("<li><a href=\"{}\">{}</a></li>\n", escape(path), escape(name))
+                format!(
+                    "<li><a href=\"{}\">{}</a></li>\n",
+                    escape(path),
+                    escape(name)
+                )
             };
-            format!("<ul>\n{}</ul>\n", links.iter().map(link).collect::<String>())
+            format!(
+                "<ul>\n{}</ul>\n",
+                links.iter().map(link).collect::<String>()
+            )
         }
         Block::Code(text) => format!("<pre>{}</pre>\n", escape(text)),
         Block::Checked(words) => format!("<p class=\"checked\">Checked: {}</p>\n", escape(words)),
         Block::Folded(title, blocks) => {
             let mut inside = String::new();
             blocks.iter().for_each(|b| self::block(b, &mut inside));
-            format!("<details><summary>{}</summary>\n{inside}</details>\n", escape(title))
+            format!(
+                "<details><summary>{}</summary>\n{inside}</details>\n",
+                escape(title)
+            )
         }
     };
 }
 
 fn table(table: &Table) -> String {
     let name = |(column, name): (usize, &String)| {
-        let class = if table.is_numeric(column) { " class=\"number\"" } else { "" };
+        let class = if table.is_numeric(column) {
+            " class=\"number\""
+        } else {
+            ""
+        };
         format!("<th{class}>{}</th>", escape(name))
     };
     let cell = |cell: &Cell| {
@@ -134,14 +170,29 @@ fn figure(chart: &Chart, caption: &str) -> String {
 
 /// A chart without its title.
 fn drawn(chart: &Chart, caption: &str) -> String {
-    let canvases: &[Canvas] = if chart.size == Size::Small { &[SMALL] } else { &[WIDE, NARROW] };
-    let drawn: String = canvases.iter().filter_map(|canvas| drawing(chart, canvas)).collect();
-    let inside = if drawn.is_empty() { "<p>No value to show.</p>\n" } else { &drawn };
+    let canvases: &[Canvas] = if chart.size == Size::Small {
+        &[SMALL]
+    } else {
+        &[WIDE, NARROW]
+    };
+    let drawn: String = canvases
+        .iter()
+        .filter_map(|canvas| drawing(chart, canvas))
+        .collect();
+    let inside = if drawn.is_empty() {
+        "<p>No value to show.</p>\n"
+    } else {
+        &drawn
+    };
     format!("<figure>\n{inside}{}</figure>\n", captioned(caption))
 }
 
 fn captioned(caption: &str) -> String {
-    if caption.is_empty() { String::new() } else { format!("<figcaption>{}</figcaption>\n", escape(caption)) }
+    if caption.is_empty() {
+        String::new()
+    } else {
+        format!("<figcaption>{}</figcaption>\n", escape(caption))
+    }
 }
 
 fn drawing(chart: &Chart, canvas: &Canvas) -> Option<String> {

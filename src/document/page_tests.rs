@@ -3,15 +3,26 @@ use crate::{Axis, Cell, Chart, Colour, Document, Mark, Panel, Series, Table, Ton
 use crate::{Form, encode};
 
 fn chart() -> Chart {
-    let curve = (0..50).map(|i| (f64::from(i), 1.0 + f64::from(i))).collect();
-    let band = (0..50).map(|i| (f64::from(i), 0.5, 2.0 + f64::from(i))).collect();
+    let curve = (0..50)
+        .map(|i| (f64::from(i), 1.0 + f64::from(i)))
+        .collect();
+    let band = (0..50)
+        .map(|i| (f64::from(i), 0.5, 2.0 + f64::from(i)))
+        .collect();
     let upper = vec![
         Series::new("confidence <95 %>", Colour::BELIEVED, Mark::Band(band)),
         Series::line("RMSE", Colour::REAL, curve),
         Series::new("", Colour::Soft, Mark::Level(9.0)),
     ];
-    let lower = vec![Series::line("RMSE", Colour::REAL, vec![(0.0, 1.0), (49.0, f64::NAN)])];
-    let panels = vec![Panel::new(Axis::log("error (m)"), upper), Panel::new(Axis::linear("ratio"), lower)];
+    let lower = vec![Series::line(
+        "RMSE",
+        Colour::REAL,
+        vec![(0.0, 1.0), (49.0, f64::NAN)],
+    )];
+    let panels = vec![
+        Panel::new(Axis::log("error (m)"), upper),
+        Panel::new(Axis::linear("ratio"), lower),
+    ];
     Chart::new("a<b", Axis::linear("time (s)"), panels).with_outages(&[(10.0, 20.0), (80.0, 90.0)])
 }
 
@@ -31,7 +42,11 @@ fn a_chart_is_drawn_for_a_screen_and_for_a_phone() {
     assert_eq!(html.matches("<svg class=\"plot\"").count(), 4);
     assert_eq!(html.matches("class=\"outage\" x").count(), 6); // and one in each legend
     assert_eq!(html.matches("<g class=\"key h1\"").count(), 2);
-    assert!(html.contains(">a&lt;b</h3>") && html.contains("It is &lt;bad&gt;.") && !html.contains("NaN"));
+    assert!(
+        html.contains(">a&lt;b</h3>")
+            && html.contains("It is &lt;bad&gt;.")
+            && !html.contains("NaN")
+    );
 }
 
 /// The page asks nothing of the network.
@@ -47,7 +62,11 @@ fn a_page_is_self_contained() {
 
 #[test]
 fn nothing_to_show_is_said() {
-    let empty = Chart::new("t", Axis::linear("x"), vec![Panel::new(Axis::log("y"), vec![])]);
+    let empty = Chart::new(
+        "t",
+        Axis::linear("x"),
+        vec![Panel::new(Axis::log("y"), vec![])],
+    );
     assert!(page(&empty).contains("No value to show."));
     let picture = svg("title", &[empty, chart()]);
     assert!(picture.starts_with("<svg xmlns=") && picture.ends_with("</svg>\n"));
@@ -65,22 +84,36 @@ fn a_map_has_one_scale() {
     let html = page(&Chart::map("map", series));
     let from = html.find("class=\"line\" d=\"M").unwrap() + 17;
     let path = &html[from..from + html[from..].find('"').unwrap()];
-    let points: Vec<Vec<f64>> =
-        path.split('L').map(|p| p.split(' ').map(|c| c.parse().unwrap()).collect()).collect();
+    let points: Vec<Vec<f64>> = path
+        .split('L')
+        .map(|p| p.split(' ').map(|c| c.parse().unwrap()).collect())
+        .collect();
     let (east, north) = (points[1][0] - points[0][0], points[1][1] - points[2][1]);
     // Four coordinates in tenths of a pixel.
     assert!((east - north).abs() < 0.21 && east > 100.0, "{path}");
-    assert!(html.contains(">start</text>") && html.contains(">20 m</text>"), "{path}");
+    assert!(
+        html.contains(">start</text>") && html.contains(">20 m</text>"),
+        "{path}"
+    );
 }
 
 #[test]
 fn tables_say_where_their_numbers_are_from() {
     let mut table = Table::new(["state", "RMSE (m)"]).and(["note".to_owned()]);
-    table.row(["<north>".into(), Cell::number(1.2345, "/rmse/pos_n_m"), "x".into()]);
+    table.row([
+        "<north>".into(),
+        Cell::number(1.2345, "/rmse/pos_n_m"),
+        "x".into(),
+    ]);
     let html = super::table(&table);
-    assert!(html.contains("<th class=\"number\">RMSE (m)</th>"), "{html}");
     assert!(
-        html.contains("<td>&lt;north&gt;</td><td class=\"number\" data-json=\"/rmse/pos_n_m\">1.23</td>"),
+        html.contains("<th class=\"number\">RMSE (m)</th>"),
+        "{html}"
+    );
+    assert!(
+        html.contains(
+            "<td>&lt;north&gt;</td><td class=\"number\" data-json=\"/rmse/pos_n_m\">1.23</td>"
+        ),
         "{html}"
     );
 }
@@ -88,7 +121,12 @@ fn tables_say_where_their_numbers_are_from() {
 #[test]
 fn a_picture_has_no_names_of_colours_that_browsers_alone_know() {
     let picture = svg("title", &[chart()]);
-    assert!(["var(", "@media", ":root"].iter().all(|word| !picture.contains(word)), "{picture}");
+    assert!(
+        ["var(", "@media", ":root"]
+            .iter()
+            .all(|word| !picture.contains(word)),
+        "{picture}"
+    );
 }
 
 /// White paper, ink where the title is, and a line in its own colour, at 300 dots an inch of 96 pixels.
@@ -98,24 +136,48 @@ fn a_picture_can_be_dots() {
     let picture = svg("title", &[chart()]);
     let dots = resvg::tiny_skia::Pixmap::decode_png(&encode(picture, Form::Png).unwrap()).unwrap();
     assert_eq!(dots.width(), 3100); // of 992 pixels
-    let colour = |x, y| dots.pixel(x, y).map(|p| (p.red(), p.green(), p.blue())).unwrap();
+    let colour = |x, y| {
+        dots.pixel(x, y)
+            .map(|p| (p.red(), p.green(), p.blue()))
+            .unwrap()
+    };
     assert_eq!(colour(2, 2), (255, 255, 255));
     let in_title = (50..200).flat_map(|x| (50..100).map(move |y| (x, y)));
-    assert!(in_title.clone().any(|(x, y)| colour(x, y) == (0x1b, 0x1f, 0x24)));
+    assert!(
+        in_title
+            .clone()
+            .any(|(x, y)| colour(x, y) == (0x1b, 0x1f, 0x24))
+    );
     let everywhere = (0..dots.width()).flat_map(|x| (0..dots.height()).map(move |y| (x, y)));
-    assert!(everywhere.clone().filter(|&(x, y)| colour(x, y) == (0xcc, 0x4e, 0x00)).count() > 1000);
+    assert!(
+        everywhere
+            .clone()
+            .filter(|&(x, y)| colour(x, y) == (0xcc, 0x4e, 0x00))
+            .count()
+            > 1000
+    );
 }
 
 /// A name that is wider than the picture loses its middle, not its end: beginnings are alike.
 #[test]
 fn a_legend_stays_within_its_picture() {
-    let name = format!("{}_x, classical", "recording_of_the_unit_on_the_rate_table_".repeat(4));
+    let name = format!(
+        "{}_x, classical",
+        "recording_of_the_unit_on_the_rate_table_".repeat(4)
+    );
     let lines = vec![
         Series::line(&name, Colour::BELIEVED, vec![(0.0, 1.0), (1.0, 2.0)]),
         Series::line("model", Colour::REAL, vec![(0.0, 1.0), (1.0, 2.0)]),
     ];
-    let html = page(&Chart::new("t", Axis::linear("x"), vec![Panel::new(Axis::linear("y"), lines)]));
-    assert!(!html.contains(&format!(">{name}</text>")) && html.matches("…").count() >= 2, "{html}");
+    let html = page(&Chart::new(
+        "t",
+        Axis::linear("x"),
+        vec![Panel::new(Axis::linear("y"), lines)],
+    ));
+    assert!(
+        !html.contains(&format!(">{name}</text>")) && html.matches("…").count() >= 2,
+        "{html}"
+    );
     assert!(html.contains("_x, classical</text>"), "{html}");
 }
 
@@ -123,7 +185,10 @@ fn a_legend_stays_within_its_picture() {
 #[test]
 fn a_character_that_no_picture_can_hold_is_an_error() {
     let refused = encode(svg("a\u{1}b", &[chart()]), Form::Png).unwrap_err();
-    assert!(refused.starts_with("the picture cannot be drawn as PNG: "), "{refused}");
+    assert!(
+        refused.starts_with("the picture cannot be drawn as PNG: "),
+        "{refused}"
+    );
 }
 
 /// The name of a file in a script that the font lacks is drawn with question marks, not with boxes.
@@ -131,7 +196,10 @@ fn a_character_that_no_picture_can_hold_is_an_error() {
 #[test]
 fn what_the_font_lacks_is_drawn_as_question_marks() {
     let dots = |title: &str| {
-        let named = Chart { title: title.to_owned(), ..chart() };
+        let named = Chart {
+            title: title.to_owned(),
+            ..chart()
+        };
         encode(svg("t", &[named]), Form::Png).unwrap()
     };
     assert!(dots("\u{6d4b}\u{8bd5} \u{d55c} \u{1f697} \u{3c3}") == dots("?? ? ? \u{3c3}"));
@@ -146,8 +214,14 @@ fn an_inner_band_has_a_swatch_of_its_own() {
         Series::new("5 to 95 %", Colour::REAL, Mark::Band(band(0.5))),
         Series::new("25 to 75 %", Colour::REAL, Mark::InnerBand(band(0.2))),
     ];
-    let picture =
-        svg("t", &[Chart::new("t", Axis::linear("x"), vec![Panel::new(Axis::linear("y"), series)])]);
+    let picture = svg(
+        "t",
+        &[Chart::new(
+            "t",
+            Axis::linear("x"),
+            vec![Panel::new(Axis::linear("y"), series)],
+        )],
+    );
     // each in its panel and in the legend
     for class in ["class=\"area\"", "class=\"area inner\""] {
         assert_eq!(picture.matches(class).count(), 2, "{class}: {picture}");

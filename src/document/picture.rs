@@ -40,10 +40,15 @@ pub fn svg(title: &str, charts: &[Chart]) -> String {
     let line = 2.0 * WIDE.font;
     let (mut body, mut top) = (String::new(), MARGIN);
     for chart in charts {
-        let Some((inside, height)) = draw(chart, &WIDE) else { continue };
+        let Some((inside, height)) = draw(chart, &WIDE) else {
+            continue;
+        };
         let _ = writeln!(body, "<g transform=\"translate({MARGIN} {top})\">");
         text(&mut body, "title", (0.0, WIDE.font), "start", &chart.title);
-        let _ = writeln!(body, "<g transform=\"translate(0 {line})\">\n{inside}</g></g>");
+        let _ = writeln!(
+            body,
+            "<g transform=\"translate(0 {line})\">\n{inside}</g></g>"
+        );
         top += line + height + MARGIN;
     }
     let (width, title, style) = (WIDE.width + 2.0 * MARGIN, escape(title), plain_style());
@@ -57,7 +62,9 @@ pub fn svg(title: &str, charts: &[Chart]) -> String {
 /// The charts' style with the colours of the day in the place of their names: browsers alone know such names.
 fn plain_style() -> String {
     let by_day = COLOURS.split(['{', '}']).nth(1).unwrap_or_default();
-    let declarations = by_day.split(';').filter_map(|declaration| declaration.trim().split_once(':'));
+    let declarations = by_day
+        .split(';')
+        .filter_map(|declaration| declaration.trim().split_once(':'));
     let named = declarations.filter(|(name, _)| name.starts_with("--"));
     named.fold(CHART_STYLE.to_owned(), |style, (name, colour)| {
         style.replace(&format!("var({name})"), colour.trim())
@@ -72,8 +79,7 @@ pub fn encode(svg: String, form: Form) -> Result<Vec<u8>, String> {
     match form {
         Form::Svg => Ok(svg.into_bytes()),
         #[cfg(feature = "pictures")]
-        Form::Png => {
-            crate::png::png(&svg).map_err(|cause| format!("the picture cannot be drawn as PNG: {cause}"))
-        }
+        Form::Png => crate::png::png(&svg)
+            .map_err(|cause| format!("the picture cannot be drawn as PNG: {cause}")),
     }
 }

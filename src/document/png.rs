@@ -23,7 +23,10 @@ fn parsed(svg: &str) -> Result<usvg::Tree, String> {
         fonts.load_font_source(usvg::fontdb::Source::Binary(Arc::new(font)));
     }
     fonts.set_sans_serif_family("DejaVu Sans");
-    let options = usvg::Options { fontdb: Arc::new(fonts), ..usvg::Options::default() };
+    let options = usvg::Options {
+        fontdb: Arc::new(fonts),
+        ..usvg::Options::default()
+    };
     usvg::Tree::from_str(svg, &options).map_err(|e| e.to_string())
 }
 
@@ -32,11 +35,22 @@ pub(crate) fn png(svg: &str) -> Result<Vec<u8>, String> {
     let picture = parsed(&drawable(svg))?;
     let (width, height) = (picture.size().width(), picture.size().height());
     let zoom = (DENSITY / PIXELS_AN_INCH).min((MOST_DOTS / (width * height)).sqrt());
-    let dots = picture.size().to_int_size().scale_by(zoom).ok_or("it has no size")?;
+    let dots = picture
+        .size()
+        .to_int_size()
+        .scale_by(zoom)
+        .ok_or("it has no size")?;
     let mut dotted =
         tiny_skia::Pixmap::new(dots.width(), dots.height()).ok_or("it does not fit into memory")?;
-    resvg::render(&picture, tiny_skia::Transform::from_scale(zoom, zoom), &mut dotted.as_mut());
-    dotted.encode_png().map(|png| signed(&png)).map_err(|e| e.to_string())
+    resvg::render(
+        &picture,
+        tiny_skia::Transform::from_scale(zoom, zoom),
+        &mut dotted.as_mut(),
+    );
+    dotted
+        .encode_png()
+        .map(|png| signed(&png))
+        .map_err(|e| e.to_string())
 }
 
 /// With the name of the program in a text chunk behind the signature and the header.

@@ -15,23 +15,38 @@ impl Cell {
     /// A number, shown with three digits; `pointer` says where it stands in the result as JSON, such as
     /// `/outages/0/nees_end`: tests hold the page against it.
     pub fn number(value: f64, pointer: &str) -> Self {
-        Self { text: readable(value), pointer: pointer.to_owned(), is_number: true }
+        Self {
+            text: readable(value),
+            pointer: pointer.to_owned(),
+            is_number: true,
+        }
     }
 
     /// A share, shown in per cent; `pointer` as that of [`Self::number`].
     pub fn share(value: f64, pointer: &str) -> Self {
-        Self { text: percent(value), ..Self::number(value, pointer) }
+        Self {
+            text: percent(value),
+            ..Self::number(value, pointer)
+        }
     }
 
     /// A number, or several, as they are to be shown.
     pub fn figures(text: impl Into<String>) -> Self {
-        Self { text: text.into(), pointer: String::new(), is_number: true }
+        Self {
+            text: text.into(),
+            pointer: String::new(),
+            is_number: true,
+        }
     }
 }
 
 impl<T: Into<String>> From<T> for Cell {
     fn from(text: T) -> Self {
-        Self { text: text.into(), pointer: String::new(), is_number: false }
+        Self {
+            text: text.into(),
+            pointer: String::new(),
+            is_number: false,
+        }
     }
 }
 
@@ -47,7 +62,11 @@ pub struct Table {
 impl Table {
     /// An empty table.
     pub fn new<const N: usize>(head: [&str; N]) -> Self {
-        Self { head: head.map(str::to_owned).into(), rows: Vec::new(), keys: 1 }
+        Self {
+            head: head.map(str::to_owned).into(),
+            rows: Vec::new(),
+            keys: 1,
+        }
     }
 
     /// The same with further columns.
@@ -58,9 +77,15 @@ impl Table {
 
     /// A table of texts, the first row its head.
     pub fn of_rows(rows: &[Vec<String>]) -> Self {
-        let Some((head, rows)) = rows.split_first() else { return Self::new([]) };
+        let Some((head, rows)) = rows.split_first() else {
+            return Self::new([]);
+        };
         let cells = |row: &Vec<String>| row.iter().map(|text| Cell::from(text.clone())).collect();
-        Self { head: head.clone(), rows: rows.iter().map(cells).collect(), keys: 1 }
+        Self {
+            head: head.clone(),
+            rows: rows.iter().map(cells).collect(),
+            keys: 1,
+        }
     }
 
     /// The same with so many columns that name a row.
@@ -82,18 +107,30 @@ impl Table {
 
     /// Whether all cells of a column are numbers.
     pub(crate) fn is_numeric(&self, column: usize) -> bool {
-        !self.rows.is_empty() && self.rows.iter().all(|row| row.get(column).is_some_and(|c| c.is_number))
+        !self.rows.is_empty()
+            && self
+                .rows
+                .iter()
+                .all(|row| row.get(column).is_some_and(|c| c.is_number))
     }
 
     /// The same without columns of which no row knows anything, for results that have no such figures.
     pub fn without_unknown(self) -> Self {
         let is_known = |cell: &Cell| cell.text.contains(|letter| !"[–, ]".contains(letter));
-        let kept: Vec<bool> =
-            (0..self.head.len()).map(|k| self.rows.iter().any(|row| is_known(&row[k]))).collect();
+        let kept: Vec<bool> = (0..self.head.len())
+            .map(|k| self.rows.iter().any(|row| is_known(&row[k])))
+            .collect();
         fn only<T>(row: Vec<T>, kept: &[bool]) -> Vec<T> {
-            row.into_iter().zip(kept).filter_map(|(cell, kept)| kept.then_some(cell)).collect()
+            row.into_iter()
+                .zip(kept)
+                .filter_map(|(cell, kept)| kept.then_some(cell))
+                .collect()
         }
         let rows = self.rows.into_iter().map(|row| only(row, &kept)).collect();
-        Self { head: only(self.head, &kept), rows, ..self }
+        Self {
+            head: only(self.head, &kept),
+            rows,
+            ..self
+        }
     }
 }

@@ -5,7 +5,10 @@ use crate::table::Table;
 impl Table {
     /// Head and rows as texts, each line of its own.
     fn lines(&self) -> Vec<Vec<String>> {
-        let rows = self.rows.iter().map(|row| row.iter().map(|cell| cell.text.clone()).collect());
+        let rows = self
+            .rows
+            .iter()
+            .map(|row| row.iter().map(|cell| cell.text.clone()).collect());
         std::iter::once(self.head.clone()).chain(rows).collect()
     }
 
@@ -16,41 +19,76 @@ impl Table {
         let lines = self.lines();
         let widths = widths(&lines);
         let room = |columns: &[usize]| columns.iter().map(|c| widths[*c] + GAP).sum::<usize>();
-        let (keys, others): (Vec<usize>, Vec<usize>) = (0..widths.len()).partition(|c| *c < self.keys);
-        let fits = |size: &usize| others.chunks(*size).all(|part| room(&keys) + room(part) <= width);
+        let (keys, others): (Vec<usize>, Vec<usize>) =
+            (0..widths.len()).partition(|c| *c < self.keys);
+        let fits = |size: &usize| {
+            others
+                .chunks(*size)
+                .all(|part| room(&keys) + room(part) <= width)
+        };
         let most = (1..=others.len()).rev().find(fits).unwrap_or(1);
         // parts of about as many columns: those of one state stay together
-        let size = others.len().div_ceil(others.len().div_ceil(most).max(1)).max(1);
+        let size = others
+            .len()
+            .div_ceil(others.len().div_ceil(most).max(1))
+            .max(1);
         let line = |line: &Vec<String>, columns: &[usize]| {
             let cell = |c: &usize| match (line.get(*c).map_or("", String::as_str), widths[*c]) {
                 (text, width) if self.is_numeric(*c) => format!("  {text:>width$}"),
                 (text, width) => format!("  {text:<width$}"),
             };
-            columns.iter().map(cell).collect::<String>().trim_end().to_owned()
+            columns
+                .iter()
+                .map(cell)
+                .collect::<String>()
+                .trim_end()
+                .to_owned()
         };
         let part = |part: &[usize]| {
             let columns = [&keys, part].concat();
-            lines.iter().map(|l| line(l, &columns)).collect::<Vec<_>>().join("\n")
+            lines
+                .iter()
+                .map(|l| line(l, &columns))
+                .collect::<Vec<_>>()
+                .join("\n")
         };
         if others.is_empty() {
             part(&[])
         } else {
-            others.chunks(size).map(part).collect::<Vec<_>>().join("\n\n")
+            others
+                .chunks(size)
+                .map(part)
+                .collect::<Vec<_>>()
+                .join("\n\n")
         }
     }
 
     /// A table in Markdown.
     #[must_use]
     pub fn markdown(&self) -> String {
-        let escaped =
-            |text: &String| text.replace('|', "\\|").replace('<', "&lt;").replace(['\n', '\r'], " ");
-        let lines: Vec<Vec<String>> =
-            self.lines().iter().map(|line| line.iter().map(escaped).collect()).collect();
+        let escaped = |text: &String| {
+            text.replace('|', "\\|")
+                .replace('<', "&lt;")
+                .replace(['\n', '\r'], " ")
+        };
+        let lines: Vec<Vec<String>> = self
+            .lines()
+            .iter()
+            .map(|line| line.iter().map(escaped).collect())
+            .collect();
         let widths = widths(&lines);
         let row = |line: &Vec<String>| {
-            line.iter().zip(&widths).map(|(cell, w)| format!("| {cell:<w$} ")).collect::<String>() + "|"
+            line.iter()
+                .zip(&widths)
+                .map(|(cell, w)| format!("| {cell:<w$} "))
+                .collect::<String>()
+                + "|"
         };
-        let rule = widths.iter().map(|w| format!("|{}", "-".repeat(w + 2))).collect::<String>() + "|";
+        let rule = widths
+            .iter()
+            .map(|w| format!("|{}", "-".repeat(w + 2)))
+            .collect::<String>()
+            + "|";
         let mut rows: Vec<String> = lines.iter().map(row).collect();
         rows.insert(1, rule);
         rows.join("\n")
@@ -60,7 +98,11 @@ impl Table {
     #[must_use]
     pub fn csv(&self) -> String {
         let cell = |text: &String| {
-            let text = if is_formula(text) { format!("'{text}") } else { text.clone() };
+            let text = if is_formula(text) {
+                format!("'{text}")
+            } else {
+                text.clone()
+            };
             match text.contains([',', '"', '\n', '\r']) {
                 true => format!("\"{}\"", text.replace('"', "\"\"")),
                 false => text,
@@ -74,7 +116,13 @@ impl Table {
     #[must_use]
     pub fn latex(&self) -> String {
         let line = |line: &Vec<String>| {
-            format!("{} \\\\\n", line.iter().map(|cell| latex_cell(cell)).collect::<Vec<_>>().join(" & "))
+            format!(
+                "{} \\\\\n",
+                line.iter()
+                    .map(|cell| latex_cell(cell))
+                    .collect::<Vec<_>>()
+                    .join(" & ")
+            )
         };
         let layout = format!("l{}", "r".repeat(self.head.len().saturating_sub(1)));
         let body: String = self.lines()[1..].iter().map(line).collect();
@@ -93,7 +141,13 @@ fn is_formula(text: &str) -> bool {
 
 /// Characters of each column.
 fn widths(lines: &[Vec<String>]) -> Vec<usize> {
-    let width = |c: usize| lines.iter().filter_map(|l| l.get(c)).map(|cell| cell.chars().count()).max();
+    let width = |c: usize| {
+        lines
+            .iter()
+            .filter_map(|l| l.get(c))
+            .map(|cell| cell.chars().count())
+            .max()
+    };
     (0..lines[0].len()).map(|c| width(c).unwrap_or(0)).collect()
 }
 
@@ -108,7 +162,9 @@ fn latex_cell(text: &str) -> String {
 
 /// A number with a sign or a power of ten in LaTeX: a hyphen is no minus.
 fn latex_number(text: &str) -> Option<String> {
-    text.parse::<f64>().ok().filter(|number| number.is_finite())?;
+    text.parse::<f64>()
+        .ok()
+        .filter(|number| number.is_finite())?;
     match (text.split_once('e'), text.strip_prefix('-')) {
         (Some((factor, power)), _) => Some(format!("${factor}\\times10^{{{power}}}$")),
         (None, Some(size)) => Some(format!("$-${size}")),
@@ -139,14 +195,20 @@ mod tests {
 
     fn table(rows: &[&[&str]]) -> Table {
         Table::of_rows(
-            &rows.iter().map(|row| row.iter().map(|cell| (*cell).to_owned()).collect()).collect::<Vec<_>>(),
+            &rows
+                .iter()
+                .map(|row| row.iter().map(|cell| (*cell).to_owned()).collect())
+                .collect::<Vec<_>>(),
         )
     }
 
     #[test]
     fn names_stay_in_their_cells() {
         let markdown = table(&[&["run"], &["a|b\n<script>"]]).markdown();
-        assert_eq!(markdown, "| run              |\n|------------------|\n| a\\|b &lt;script> |");
+        assert_eq!(
+            markdown,
+            "| run              |\n|------------------|\n| a\\|b &lt;script> |"
+        );
     }
 
     #[test]
@@ -160,11 +222,18 @@ mod tests {
             latex.starts_with("\\begin{tabular}{lr}\n\\toprule\nrun & a, b \\\\\n\\midrule\n"),
             "{latex}"
         );
-        assert!(latex.contains("x\\_1 \\& 5 \\% & 1 $\\pm$ 2 \\\\\n\\bottomrule"), "{latex}");
+        assert!(
+            latex.contains("x\\_1 \\& 5 \\% & 1 $\\pm$ 2 \\\\\n\\bottomrule"),
+            "{latex}"
+        );
         let set = ["-1.67 ± 5e-4 (1.67)", "9.50, -2e-3", "a-4 -b 1e400"].map(latex_cell);
         assert_eq!(
             set,
-            ["$-$1.67 $\\pm$ $5\\times10^{-4}$ (1.67)", "9.50, $-2\\times10^{-3}$", "a-4 -b 1e400"]
+            [
+                "$-$1.67 $\\pm$ $5\\times10^{-4}$ (1.67)",
+                "9.50, $-2\\times10^{-3}$",
+                "a-4 -b 1e400"
+            ]
         );
     }
 
@@ -173,17 +242,42 @@ mod tests {
     fn wide_tables_are_cut_and_lose_nothing() {
         let row = |k: usize| {
             let cells = (0..9).map(|c| format!("{:>20}", format!("{k}.{c}")));
-            std::iter::once(format!("{k:>10}")).chain(cells).collect::<Vec<String>>()
+            std::iter::once(format!("{k:>10}"))
+                .chain(cells)
+                .collect::<Vec<String>>()
         };
         let table = Table::of_rows(&(0..3).map(row).collect::<Vec<_>>());
-        let parts: Vec<String> = table.columns(100).split("\n\n").map(str::to_owned).collect();
+        let parts: Vec<String> = table
+            .columns(100)
+            .split("\n\n")
+            .map(str::to_owned)
+            .collect();
         assert_eq!(parts.len(), 3);
-        assert!(parts.iter().flat_map(|part| part.lines()).all(|line| line.chars().count() <= 100));
-        let words: Vec<&str> =
-            parts.iter().flat_map(|part| part.lines().nth(2)).flat_map(str::split_whitespace).collect();
-        assert_eq!(words, ["2", "2.0", "2.1", "2.2", "2", "2.3", "2.4", "2.5", "2", "2.6", "2.7", "2.8"]);
+        assert!(
+            parts
+                .iter()
+                .flat_map(|part| part.lines())
+                .all(|line| line.chars().count() <= 100)
+        );
+        let words: Vec<&str> = parts
+            .iter()
+            .flat_map(|part| part.lines().nth(2))
+            .flat_map(str::split_whitespace)
+            .collect();
+        assert_eq!(
+            words,
+            [
+                "2", "2.0", "2.1", "2.2", "2", "2.3", "2.4", "2.5", "2", "2.6", "2.7", "2.8"
+            ]
+        );
         // nothing can be done about a column that is wider than a terminal
-        assert_eq!(Table::of_rows(&[vec!["a".repeat(100), "b".repeat(100)]]).columns(100).lines().count(), 1);
+        assert_eq!(
+            Table::of_rows(&[vec!["a".repeat(100), "b".repeat(100)]])
+                .columns(100)
+                .lines()
+                .count(),
+            1
+        );
     }
 
     #[test]
@@ -191,6 +285,9 @@ mod tests {
         let mut table = Table::new(["state", "RMSE (m)"]);
         table.row(["north".into(), Cell::number(12.0, "")]);
         table.row(["east".into(), Cell::number(1.0, "")]);
-        assert_eq!(table.columns(100), "  state  RMSE (m)\n  north      12.0\n  east       1.00");
+        assert_eq!(
+            table.columns(100),
+            "  state  RMSE (m)\n  north      12.0\n  east       1.00"
+        );
     }
 }

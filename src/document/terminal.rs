@@ -14,17 +14,26 @@ impl Document {
     pub fn terminal(&self, width: usize) -> String {
         let verdict = self.verdict.lines.join("\n");
         let lead = self.blocks.iter().find_map(|block| match block {
-            Block::Table { table, is_lead: true } => Some(table),
+            Block::Table {
+                table,
+                is_lead: true,
+            } => Some(table),
             _ => None,
         });
-        let Some(table) = lead else { return verdict + "\n" };
+        let Some(table) = lead else {
+            return verdict + "\n";
+        };
         let mut shown = table.clone();
         let room = LINES.saturating_sub(self.verdict.lines.len());
         while shown.columns(width).lines().count() > room && shown.rows.len() > 1 {
             shown.rows.pop();
         }
         let hidden = table.rows.len() - shown.rows.len();
-        let more = if hidden > 0 { format!("  … {hidden} more rows (--verbose)\n") } else { String::new() };
+        let more = if hidden > 0 {
+            format!("  … {hidden} more rows (--verbose)\n")
+        } else {
+            String::new()
+        };
         format!("{verdict}\n\n{}\n{more}", shown.columns(width))
     }
 
@@ -39,7 +48,10 @@ impl Document {
     /// The notes that a terminal shows, the most important first; all of them to those who ask for more.
     pub fn spoken(&self, is_verbose: bool) -> impl Iterator<Item = &Note> {
         let is_spoken = move |note: &&Note| is_verbose || note.importance < Importance::Detail;
-        self.notes().iter().filter(is_spoken).take(if is_verbose { usize::MAX } else { NOTES })
+        self.notes()
+            .iter()
+            .filter(is_spoken)
+            .take(if is_verbose { usize::MAX } else { NOTES })
     }
 }
 
@@ -49,7 +61,10 @@ fn blocks(all: &[Block], width: usize, text: &mut String) {
             Block::Section(title) => *text += &format!("\n{}\n", title.to_uppercase()),
             Block::Heading(words) | Block::Text(words) => *text += &format!("\n{words}\n"),
             Block::Facts(facts) => {
-                let rows: Vec<Vec<String>> = facts.iter().map(|(k, v)| vec![k.clone(), v.clone()]).collect();
+                let rows: Vec<Vec<String>> = facts
+                    .iter()
+                    .map(|(k, v)| vec![k.clone(), v.clone()])
+                    .collect();
                 *text += &format!("\n{}\n", Table::of_rows(&rows).columns(usize::MAX));
             }
             Block::Table { table, .. } => *text += &format!("\n{}\n", table.columns(width)),
@@ -70,7 +85,11 @@ mod tests {
 
     #[test]
     fn a_screen_has_verdict_lead_and_three_notes() {
-        let mut document = Document::new("t", Tone::Undecided, ["undecided: 8 runs", "100 runs decide"]);
+        let mut document = Document::new(
+            "t",
+            Tone::Undecided,
+            ["undecided: 8 runs", "100 runs decide"],
+        );
         let mut table = Table::new(["row"]);
         (0..40).for_each(|k| table.row([k.to_string().into()]));
         document.table(&Table::new(["other"]));
@@ -81,7 +100,10 @@ mod tests {
         }
         document.note(Importance::Warning, "last said, first told");
         let text = document.terminal(100);
-        assert!(text.starts_with("undecided: 8 runs\n100 runs decide\n\n  row\n  0\n"), "{text}");
+        assert!(
+            text.starts_with("undecided: 8 runs\n100 runs decide\n\n  row\n  0\n"),
+            "{text}"
+        );
         assert!(
             text.ends_with("  12\n  … 27 more rows (--verbose)\n") && text.lines().count() <= 18,
             "{text}"

@@ -130,7 +130,11 @@ impl From<AveragingEstimator> for Estimator {
 }
 
 fn default_estimators() -> Vec<AveragingEstimator> {
-    vec![AveragingEstimator::Awv, AveragingEstimator::SrAwv, AveragingEstimator::DrAwv]
+    vec![
+        AveragingEstimator::Awv,
+        AveragingEstimator::SrAwv,
+        AveragingEstimator::DrAwv,
+    ]
 }
 
 const fn efficiency() -> f64 {
@@ -165,7 +169,10 @@ pub fn read(path: &Path) -> Result<StudyFile, FileError> {
         levels: levels(&source, d.levels, samples)?,
         scenarios: scenarios(&source, &d.scenarios, file.model.rate_hz, beside)?,
         estimators: estimators(&source, d.estimators)?,
-        spec: d.fit.parse().map_err(|e| source.refused("fit", format!("is not a model: {e}")))?,
+        spec: d
+            .fit
+            .parse()
+            .map_err(|e| source.refused("fit", format!("is not a model: {e}")))?,
         trim: d.trim.map_or(Trim::default(), |a| Trim::Count(a as usize)),
         tuning: Tuning::new(d.efficiency, Convention::Exact)
             .map_err(|_| source.refused("efficiency", "is not between 0.3 and 0.99"))?,
@@ -176,7 +183,12 @@ pub fn read(path: &Path) -> Result<StudyFile, FileError> {
     enough(&source, &design)?;
     fit_has_slopes(&source, &design)?;
     has_targets(&source, &design)?;
-    Ok(StudyFile { design, seed: d.seed, sets: d.sets, model })
+    Ok(StudyFile {
+        design,
+        seed: d.seed,
+        sets: d.sets,
+        model,
+    })
 }
 
 /// More than fits memory and file formats.
@@ -192,8 +204,13 @@ fn at_least(source: &Source, key: &str, value: u64, least: u64) -> Result<(), Fi
 
 fn channel(source: &Source, name: Option<&str>, missing: &[Channel]) -> Result<Channel, FileError> {
     let names = || Channel::ALL.map(|c| c.to_string()).join(", ");
-    let Some(channel) = Channel::ALL.into_iter().find(|c| c.to_string() == name.unwrap_or("accel.x")) else {
-        return Err(source.refused("axis", "is no axis").advice(format!("axes: {}", names())));
+    let Some(channel) = Channel::ALL
+        .into_iter()
+        .find(|c| c.to_string() == name.unwrap_or("accel.x"))
+    else {
+        return Err(source
+            .refused("axis", "is no axis")
+            .advice(format!("axes: {}", names())));
     };
     if missing.contains(&channel) {
         let key = if name.is_some() { "axis" } else { "model" };
@@ -208,7 +225,8 @@ fn levels(source: &Source, levels: Option<u64>, samples: usize) -> Result<u32, F
         None => Ok(default_levels(samples)),
         Some(levels) if (1..=u64::from(most)).contains(&levels) => Ok(levels as u32),
         Some(_) => {
-            let reason = format!("is not between 1 and {most}, the most that {samples} samples allow");
+            let reason =
+                format!("is not between 1 and {most}, the most that {samples} samples allow");
             Err(source.refused("levels", reason))
         }
     }
@@ -235,13 +253,23 @@ fn scenarios(
                 .refused("scenarios", format!("names {name}, which is not there"))
                 .advice_if(hint));
         }
-        let place = if preset { name.clone() } else { file.display().to_string() };
-        Ok(Contamination { name: name.clone(), ..contamination_file::find(&place, rate_hz)? })
+        let place = if preset {
+            name.clone()
+        } else {
+            file.display().to_string()
+        };
+        Ok(Contamination {
+            name: name.clone(),
+            ..contamination_file::find(&place, rate_hz)?
+        })
     };
     names.iter().map(find).collect()
 }
 
-fn estimators(source: &Source, named: Vec<AveragingEstimator>) -> Result<Vec<Estimator>, FileError> {
+fn estimators(
+    source: &Source,
+    named: Vec<AveragingEstimator>,
+) -> Result<Vec<Estimator>, FileError> {
     let repeated = (1..named.len()).any(|i| named[..i].contains(&named[i]));
     if named.is_empty() || repeated {
         return Err(source.refused("estimators", "is not a list of different estimators"));
@@ -255,7 +283,9 @@ fn enough(source: &Source, design: &Design) -> Result<(), FileError> {
     // Not 2·trim: the number is the user's.
     if design.estimators.contains(&Estimator::DrAwv) && trim >= replicates.div_ceil(2) {
         let reason = format!("are too few: {}", AverageError::Trim { trim, replicates });
-        return Err(source.refused("replicates", reason).advice("a smaller \"trim\""));
+        return Err(source
+            .refused("replicates", reason)
+            .advice("a smaller \"trim\""));
     }
     Ok(())
 }
@@ -265,8 +295,13 @@ fn fit_has_slopes(source: &Source, design: &Design) -> Result<(), FileError> {
     let without = design.spec.kinds().iter().find(|k| k.shape().is_some());
     match without {
         Some(kind) if design.estimators.contains(&Estimator::Avlr) => {
-            let reason = format!("has avlr, which cannot tell {}: it has no slope of its own", kind.code());
-            Err(source.refused("estimators", reason).advice("fit = \"WN+RW\", a sum of WN, QN, RW, DR"))
+            let reason = format!(
+                "has avlr, which cannot tell {}: it has no slope of its own",
+                kind.code()
+            );
+            Err(source
+                .refused("estimators", reason)
+                .advice("fit = \"WN+RW\", a sum of WN, QN, RW, DR"))
         }
         _ => Ok(()),
     }
@@ -277,11 +312,24 @@ fn fit_has_slopes(source: &Source, design: &Design) -> Result<(), FileError> {
 fn has_targets(source: &Source, design: &Design) -> Result<(), FileError> {
     let axis = design.channel.index();
     // one process in two forms
-    let alike = |kind: Kind| if kind == Kind::GaussMarkov { Kind::Ar1 } else { kind };
-    let there: Vec<Kind> = design.model.axes[axis].processes.iter().map(|p| alike(p.kind())).collect();
+    let alike = |kind: Kind| {
+        if kind == Kind::GaussMarkov {
+            Kind::Ar1
+        } else {
+            kind
+        }
+    };
+    let there: Vec<Kind> = design.model.axes[axis]
+        .processes
+        .iter()
+        .map(|p| alike(p.kind()))
+        .collect();
     let fitted: Vec<Kind> = design.spec.kinds().iter().copied().map(alike).collect();
     let count = |kinds: &[Kind], kind: Kind| kinds.iter().filter(|k| **k == kind).count();
-    if there.iter().any(|kind| count(&there, *kind) > count(&fitted, *kind)) {
+    if there
+        .iter()
+        .any(|kind| count(&there, *kind) > count(&fitted, *kind))
+    {
         return Ok(()); // another model: its target is what comes nearest
     }
     let is_varied = !design.spread.axes[axis].is_empty();
@@ -289,15 +337,22 @@ fn has_targets(source: &Source, design: &Design) -> Result<(), FileError> {
         0 => true,
         of_kind => !is_varied && count(&fitted, alike(**kind)) > of_kind,
     };
-    let Some(extra) = design.spec.kinds().iter().find(is_extra) else { return Ok(()) };
+    let Some(extra) = design.spec.kinds().iter().find(is_extra) else {
+        return Ok(());
+    };
     let has = match count(&there, alike(*extra)) {
         0 => format!("no {}", extra.code()),
         of_kind => format!("{of_kind} {} only", extra.code()),
     };
-    let reason =
-        format!("is more than the model: {} has {has}, so that there is no true value", design.channel);
+    let reason = format!(
+        "is more than the model: {} has {has}, so that there is no true value",
+        design.channel
+    );
     let codes: Vec<&str> = there.iter().map(|kind| kind.code()).collect();
-    let advice = format!("fit = \"{}\", or a model with such a process", codes.join("+"));
+    let advice = format!(
+        "fit = \"{}\", or a model with such a process",
+        codes.join("+")
+    );
     Err(source.refused("fit", reason).advice(advice))
 }
 
@@ -314,14 +369,18 @@ mod tests {
         let path = dir.path().join("s.toml");
         std::fs::write(&path, text).unwrap();
         let place = format!("{}/", dir.path().display());
-        read(&path).map_err(|e| format!("{e} | {}", e.hint().unwrap_or_default()).replace(&place, ""))
+        read(&path)
+            .map_err(|e| format!("{e} | {}", e.hint().unwrap_or_default()).replace(&place, ""))
     }
 
     #[test]
     fn defaults_are_the_papers() {
         let s = study(STUDY).unwrap();
         assert_eq!((s.sets, s.seed, s.design.levels), (3, None, 5));
-        assert_eq!(s.design.estimators, [Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv]);
+        assert_eq!(
+            s.design.estimators,
+            [Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv]
+        );
         assert_eq!(s.design.trim.count(8), 2);
         assert!((s.design.tuning.efficiency() - 0.6).abs() < 1e-9);
         assert_eq!(s.design.weighting, Weighting::default());
@@ -346,17 +405,32 @@ mod tests {
                  fit = \"WN\", or a model with such a process"
             )
         };
-        assert_eq!(with("fit = \"WN\"", "fit = \"WN+AR1\""), more("WN+AR1", "no AR1"));
-        assert_eq!(with("fit = \"WN\"", "fit = \"WN+GM\""), more("WN+GM", "no GM"));
+        assert_eq!(
+            with("fit = \"WN\"", "fit = \"WN+AR1\""),
+            more("WN+AR1", "no AR1")
+        );
+        assert_eq!(
+            with("fit = \"WN\"", "fit = \"WN+GM\""),
+            more("WN+GM", "no GM")
+        );
         // another model than that of the data has the nearest as its target
         assert!(study(&STUDY.replace("fit = \"WN\"", "fit = \"QN\"")).is_ok());
-        assert_eq!(with("fit = ", "fits = "), "s.toml, line 2: unknown key \"fits\" | did you mean \"fit\"?");
-        assert_eq!(with("sets = 3\n", ""), "s.toml, line 1: \"sets\" is missing | add the key \"sets\"");
+        assert_eq!(
+            with("fit = ", "fits = "),
+            "s.toml, line 2: unknown key \"fits\" | did you mean \"fit\"?"
+        );
+        assert_eq!(
+            with("sets = 3\n", ""),
+            "s.toml, line 1: \"sets\" is missing | add the key \"sets\""
+        );
         assert_eq!(
             with("sets = 3", "sets = -1"),
             "s.toml, line 5: \"sets\" = -1 is not a whole number ≥ 0 | "
         );
-        assert_eq!(with("sets = 3", "sets = 0"), "s.toml, line 5: \"sets\" = 0 is not a whole number ≥ 1 | ");
+        assert_eq!(
+            with("sets = 3", "sets = 0"),
+            "s.toml, line 5: \"sets\" = 0 is not a whole number ≥ 1 | "
+        );
         assert_eq!(
             with("samples = 64", "samples = 64\nlevels = 7"),
             "s.toml, line 5: \"levels\" = 7 is not between 1 and 6, the most that 64 samples allow | "

@@ -5,7 +5,8 @@ use super::{EfficiencyFile, EfficiencyRow};
 use crate::formats::FileError;
 use crate::jobs::JobError;
 use nav_sim_calibration::efficiency::{
-    Accuracy, Design, Estimate, Movement, StudyError, Target, abnormal_curve, accuracy, outlier_curve, target,
+    Accuracy, Design, Estimate, Movement, StudyError, Target, abnormal_curve, accuracy,
+    outlier_curve, target,
 };
 use nav_sim_signal::noise::{Process, contamination::Contamination};
 use rayon::prelude::*;
@@ -27,7 +28,10 @@ impl EstimatorStudy {
     /// When the design means no study.
     pub(crate) fn new(design: Design) -> Result<Self, StudyError> {
         design.check()?;
-        Ok(Self { aim: target(&design)?, design })
+        Ok(Self {
+            aim: target(&design)?,
+            design,
+        })
     }
 
     /// Opens or makes the directory of the study.
@@ -35,7 +39,11 @@ impl EstimatorStudy {
     /// # Errors
     /// When it is of another study, damaged, or cannot be written to.
     pub(crate) fn open(&self, path: &Path) -> Result<StudyDirectory, FileError> {
-        StudyDirectory::open(path, &identity(&self.design), layout(&self.design, &self.aim))
+        StudyDirectory::open(
+            path,
+            &identity(&self.design),
+            layout(&self.design, &self.aim),
+        )
     }
 
     /// Estimates from the sets that are not done yet, block by block of so many: a block is kept as soon as it is done.
@@ -69,7 +77,12 @@ impl EstimatorStudy {
     #[must_use]
     pub(crate) fn results(&self, sets: u64, directory: &StudyDirectory) -> EfficiencyFile {
         let results = rows(&self.design, &self.aim, &directory.done[..sets as usize]);
-        EfficiencyFile { schema_version: 1, sets, study: identity(&self.design), results }
+        EfficiencyFile {
+            schema_version: 1,
+            sets,
+            study: identity(&self.design),
+            results,
+        }
     }
 
     /// How far one outlier or abnormal replicates move each estimate, as CSV: disturbance, size, estimator, parameter,
@@ -110,7 +123,10 @@ fn layout(design: &Design, aim: &Target) -> Layout {
     let row = |(s, e): (&Contamination, &str)| (s.name.clone(), e.to_owned());
     let rows_of_scenario = |s| design.estimators.iter().map(move |e| row((s, e.name())));
     let rows = design.scenarios.iter().flat_map(rows_of_scenario).collect();
-    Layout { rows, parameters: Design::parameters(&aim.fit.composite) }
+    Layout {
+        rows,
+        parameters: Design::parameters(&aim.fit.composite),
+    }
 }
 
 /// How far the estimates of all sets are from what they aim at.
@@ -120,11 +136,15 @@ fn rows(design: &Design, aim: &Target, sets: &[Vec<Estimate>]) -> Vec<Efficiency
     let width = design.estimators.len();
     let mut rows = Vec::new();
     for (s, scenario) in design.scenarios.iter().enumerate() {
-        let estimates =
-            |e: usize, p: usize| sets.iter().map(|set| set[s * width + e].theta[p]).collect::<Vec<_>>();
+        let estimates = |e: usize, p: usize| {
+            sets.iter()
+                .map(|set| set[s * width + e].theta[p])
+                .collect::<Vec<_>>()
+        };
         let judge = |e: usize, p: usize| accuracy(&estimates(e, p), targets[p], design.seed);
-        let cells: Vec<(usize, usize)> =
-            (0..width).flat_map(|e| (0..names.len()).map(move |p| (e, p))).collect();
+        let cells: Vec<(usize, usize)> = (0..width)
+            .flat_map(|e| (0..names.len()).map(move |p| (e, p)))
+            .collect();
         let judged: Vec<Accuracy> = cells.par_iter().map(|(e, p)| judge(*e, *p)).collect();
         for ((e, p), own) in cells.into_iter().zip(&judged) {
             let roots: usize = sets.iter().map(|set| set[s * width + e].without_root).sum();
@@ -157,8 +177,14 @@ fn sensitivity(design: &Design, aim: &Target) -> Result<String, StudyError> {
     let unit = white.unwrap_or_else(|| 2.0 * noise.haar_wv(1)).sqrt();
     let outliers: Vec<f64> = (0..=9).map(|k| 10_f64.powi(k)).collect();
     let factors: Vec<f64> = (0..=10).map(|k| 4_f64.powi(k)).collect();
-    let mut curves = vec![("outlier_in_sigmas".to_owned(), outlier_curve(design, unit, &outliers)?)];
-    let walks = noise.processes.iter().any(|p| matches!(p, Process::RandomWalk(_)));
+    let mut curves = vec![(
+        "outlier_in_sigmas".to_owned(),
+        outlier_curve(design, unit, &outliers)?,
+    )];
+    let walks = noise
+        .processes
+        .iter()
+        .any(|p| matches!(p, Process::RandomWalk(_)));
     let most = design.trim.count(design.replicates as usize) as u64 + 1;
     for count in (1..=most).filter(|_| walks) {
         let name = format!("random_walk_variance_factor_of_{count}");
@@ -169,7 +195,10 @@ fn sensitivity(design: &Design, aim: &Target) -> Result<String, StudyError> {
         for Movement { size, changes } in curve {
             for (estimator, changes) in design.estimators.iter().zip(changes) {
                 for (name, change) in names.iter().zip(changes) {
-                    text += &format!("{disturbance},{size},{},{name},{change:e}\n", estimator.name());
+                    text += &format!(
+                        "{disturbance},{size},{},{name},{change:e}\n",
+                        estimator.name()
+                    );
                 }
             }
         }

@@ -5,7 +5,14 @@ use super::{Entry, Values};
 
 pub(super) const PX4: Layout = Layout {
     entries: px4,
-    line: |entry| format!("param set {} {}  # {}", entry.key, number(entry.value), remark(entry)),
+    line: |entry| {
+        format!(
+            "param set {} {}  # {}",
+            entry.key,
+            number(entry.value),
+            remark(entry)
+        )
+    },
     source: "PX4 parameter reference, group EKF2",
     ..PLAIN
 };
@@ -19,7 +26,12 @@ const PX4_STEP_S: f64 = 0.01;
 fn px4(v: &Values) -> Vec<Entry> {
     step_noise(
         v,
-        ["EKF2_ACC_NOISE", "EKF2_GYR_NOISE", "EKF2_ACC_B_NOISE", "EKF2_GYR_B_NOISE"],
+        [
+            "EKF2_ACC_NOISE",
+            "EKF2_GYR_NOISE",
+            "EKF2_ACC_B_NOISE",
+            "EKF2_GYR_B_NOISE",
+        ],
         [[0.01, 1.0], [0.0001, 0.1], [0.0, 0.01], [0.0, 0.01]],
         PX4_STEP_S,
         "EKF2_PREDICT_US = 10000",
@@ -43,8 +55,18 @@ const ARDUPILOT_STEP_S: f64 = 0.012;
 fn ardupilot(v: &Values) -> Vec<Entry> {
     step_noise(
         v,
-        ["EK3_ACC_P_NSE", "EK3_GYRO_P_NSE", "EK3_ABIAS_P_NSE", "EK3_GBIAS_P_NSE"],
-        [[0.01, 1.0], [0.0001, 0.1], [0.00001, 0.02], [0.00001, 0.001]],
+        [
+            "EK3_ACC_P_NSE",
+            "EK3_GYRO_P_NSE",
+            "EK3_ABIAS_P_NSE",
+            "EK3_GBIAS_P_NSE",
+        ],
+        [
+            [0.01, 1.0],
+            [0.0001, 0.1],
+            [0.00001, 0.02],
+            [0.00001, 0.001],
+        ],
         ARDUPILOT_STEP_S,
         "EKF_TARGET_DT = 0.012",
     )
@@ -57,14 +79,22 @@ fn step_noise(
     step_s: f64,
     setting: &str,
 ) -> Vec<Entry> {
-    let values = [v.accel.density, v.gyro.density, v.accel.walk, v.gyro.walk].map(|x| x / step_s.sqrt());
+    let values =
+        [v.accel.density, v.gyro.density, v.accel.walk, v.gyro.walk].map(|x| x / step_s.sqrt());
     let units = ["m/s^2", "rad/s", "m/s^3", "rad/s^2"];
-    let names =
-        ["N/sqrt(dt), white noise", "N/sqrt(dt), white noise", "K/sqrt(dt), bias", "K/sqrt(dt), bias"];
+    let names = [
+        "N/sqrt(dt), white noise",
+        "N/sqrt(dt), white noise",
+        "K/sqrt(dt), bias",
+        "K/sqrt(dt), bias",
+    ];
     (0..4)
         .map(|i| {
             let [low, high] = ranges[i];
-            let meaning = format!("{}, dt = {step_s} s ({setting}), range {low} to {high}", names[i]);
+            let meaning = format!(
+                "{}, dt = {step_s} s ({setting}), range {low} to {high}",
+                names[i]
+            );
             Entry::new(keys[i], values[i], units[i], meaning).within(low, high)
         })
         .collect()

@@ -7,7 +7,8 @@ use crate::jobs::JobError;
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::noise::practical::Pair;
 use nav_sim_signal::noise::{
-    Composite, GaussMarkov, Model, ParameterError, Process, RandomWalk, Synthesizer, White, continuous,
+    Composite, GaussMarkov, Model, ParameterError, Process, RandomWalk, Synthesizer, White,
+    continuous,
 };
 use nav_sim_signal::rng::StreamKey;
 use nav_sim_signal::wavelet::{classical, default_levels, interval};
@@ -29,13 +30,23 @@ impl Recorded {
     #[must_use]
     pub(crate) fn like(file: &ModelFile, seed: u64, horizon_s: f64) -> Self {
         const MOST: usize = 1 << 22;
-        let recordings = file.most_of_fits("recordings").filter(|n| *n > 0).map_or(4, i64::unsigned_abs);
+        let recordings = file
+            .most_of_fits("recordings")
+            .filter(|n| *n > 0)
+            .map_or(4, i64::unsigned_abs);
         // A recording has one scale more than is used.
-        let samples = file.most_of_fits("scales").filter(|n| (1..40).contains(n)).map_or_else(
-            || ((16.0 * horizon_s * file.model.rate_hz) as usize).next_power_of_two(),
-            |scales| 1_usize << (scales + 1),
-        );
-        Self { recordings, samples: samples.min(MOST), seed }
+        let samples = file
+            .most_of_fits("scales")
+            .filter(|n| (1..40).contains(n))
+            .map_or_else(
+                || ((16.0 * horizon_s * file.model.rate_hz) as usize).next_power_of_two(),
+                |scales| 1_usize << (scales + 1),
+            );
+        Self {
+            recordings,
+            samples: samples.min(MOST),
+            seed,
+        }
     }
 }
 
@@ -82,8 +93,11 @@ pub(crate) fn certify(
 ) -> Result<Vec<Certificate>, JobError> {
     let of_sensor = |s: &crate::export::SensorExport| {
         let is_of_sensor = |c: &Channel| c.sensor == s.sensor && !missing.contains(c);
-        let axes: Vec<&Composite> =
-            Channel::ALL.iter().filter(|c| is_of_sensor(c)).map(|c| model.axis(*c)).collect();
+        let axes: Vec<&Composite> = Channel::ALL
+            .iter()
+            .filter(|c| is_of_sensor(c))
+            .map(|c| model.axis(*c))
+            .collect();
         let pair = composite(&s.exported, model.rate_hz).map_err(JobError::Pair)?;
         let levels = default_levels(recorded.samples);
         let horizon = export.settings.horizon;
@@ -94,18 +108,27 @@ pub(crate) fn certify(
         let variances = variances(&pair, s.sensor, levels, recorded)?;
         let confidence = 1.0 - 0.05 / usable.len().max(1) as f64;
         let scale = |level: u32| {
-            let mean =
-                variances.iter().map(|nu| nu[level as usize - 1]).sum::<f64>() / variances.len() as f64;
+            let mean = variances
+                .iter()
+                .map(|nu| nu[level as usize - 1])
+                .sum::<f64>()
+                / variances.len() as f64;
             let edof = recorded.recordings as f64 * interval::edof_eta3(recorded.samples, level);
             let (low, high) = interval::interval(mean, edof, confidence);
-            let largest = axes.iter().map(|axis| axis.haar_wv(level)).fold(0.0, f64::max);
+            let largest = axes
+                .iter()
+                .map(|axis| axis.haar_wv(level))
+                .fold(0.0, f64::max);
             CertifiedScale {
                 average_s: average_s(level),
                 ratio: (largest / mean).sqrt(),
                 inside: (low..=high).contains(&largest),
             }
         };
-        Ok(Certificate { sensor: s.sensor, scales: usable.into_iter().map(scale).collect() })
+        Ok(Certificate {
+            sensor: s.sensor,
+            scales: usable.into_iter().map(scale).collect(),
+        })
     };
     export.sensors.iter().map(of_sensor).collect()
 }
@@ -119,19 +142,32 @@ fn variances(
 ) -> Result<Vec<Vec<f64>>, JobError> {
     let recording_variances = |run: u64| {
         let (seed, source) = (recorded.seed, sensor.name());
-        let key = StreamKey { seed, scenario: "certify", run, source, process: "" };
+        let key = StreamKey {
+            seed,
+            scenario: "certify",
+            run,
+            source,
+            process: "",
+        };
         let mut signal = vec![0.0; recorded.samples];
         Synthesizer::new(pair, key).fill(&mut signal);
         Ok(classical(&signal, levels)?)
     };
-    (0..recorded.recordings).into_par_iter().map(recording_variances).collect()
+    (0..recorded.recordings)
+        .into_par_iter()
+        .map(recording_variances)
+        .collect()
 }
 
 /// The pair as a noise model.
 fn composite(pair: &Pair, rate_hz: f64) -> Result<Composite, ParameterError> {
-    let mut processes = vec![Process::White(White::new(pair.density * pair.density * rate_hz)?)];
+    let mut processes = vec![Process::White(White::new(
+        pair.density * pair.density * rate_hz,
+    )?)];
     if pair.walk > 0.0 {
-        processes.push(Process::RandomWalk(RandomWalk::new(continuous::walk_gamma2(pair.walk, rate_hz))?));
+        processes.push(Process::RandomWalk(RandomWalk::new(
+            continuous::walk_gamma2(pair.walk, rate_hz),
+        )?));
     }
     if let Some(m) = pair.markov.filter(|m| m.sigma > 0.0) {
         let (beta, s2) = (m.t_corr_s.recip(), m.sigma * m.sigma);
@@ -160,9 +196,24 @@ mod tests {
             intervals: Vec::new(),
             provenance: None,
         };
-        assert_eq!(Recorded::like(&file, 7, 100.0), Recorded { recordings: 4, samples: 1 << 18, seed: 7 });
-        file.provenance = toml::from_str("fits = [{ recordings = 6, scales = 14 }, { scales = 15 }]").ok();
-        assert_eq!(Recorded::like(&file, 7, 100.0), Recorded { recordings: 6, samples: 1 << 16, seed: 7 });
+        assert_eq!(
+            Recorded::like(&file, 7, 100.0),
+            Recorded {
+                recordings: 4,
+                samples: 1 << 18,
+                seed: 7
+            }
+        );
+        file.provenance =
+            toml::from_str("fits = [{ recordings = 6, scales = 14 }, { scales = 15 }]").ok();
+        assert_eq!(
+            Recorded::like(&file, 7, 100.0),
+            Recorded {
+                recordings: 6,
+                samples: 1 << 16,
+                seed: 7
+            }
+        );
     }
 
     /// White noise and random walk are the pair: within its band. With an AR1 of ten times the white noise's variance at 10 s left
@@ -179,7 +230,11 @@ mod tests {
             turn_on: [None; 2],
             misfit: None,
         };
-        let recorded = Recorded { recordings: 4, samples: 1 << 18, seed: 1 };
+        let recorded = Recorded {
+            recordings: 4,
+            samples: 1 << 18,
+            seed: 1,
+        };
         let certificates = |processes: Vec<Process>| {
             let axis = Composite::new(processes);
             let model = Model::pooled(100.0, &axis, &axis);

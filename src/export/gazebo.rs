@@ -20,31 +20,36 @@ pub(super) const GAZEBO: Layout = Layout {
 /// σ_d² = −s²τ/2·expm1(−2dt/τ): stationary with s²τ/2, so that s = σ√(2/τ) makes a Gauss-Markov process of σ exactly, from
 /// zero at the start (<https://github.com/gazebosim/gz-sensors>, `GaussianNoiseModel.cc`).
 fn gazebo(v: &Values) -> Vec<Entry> {
-    let of_sensor =
-        |s: &SensorValues, keys: [&'static str; 5], unit: &'static str, drive_unit: &'static str| {
-            let n = format!("N sqrt(f), white noise of a sample at {} Hz", v.rate_hz);
-            // without a bias both are zero, which switches it off
-            let (drive, time_s) = match s.markov.sigma > 0.0 {
-                true => (s.markov.sigma * (2.0 / s.markov.t_corr_s).sqrt(), s.markov.t_corr_s),
-                false => (0.0, 0.0),
-            };
-            let turn_on = match s.turn_on {
-                Some(_) => "turn-on bias, standard deviation",
-                None => "the model states no turn-on bias",
-            };
-            [
-                Entry::new(keys[0], s.density * v.rate_hz.sqrt(), unit, n),
-                Entry::new(keys[1], 0.0, unit, "mean of the turn-on bias"),
-                Entry::new(keys[2], s.turn_on.unwrap_or(0.0), unit, turn_on),
-                Entry::new(
-                    keys[3],
-                    drive,
-                    drive_unit,
-                    "sigma sqrt(2/T) of the Gauss-Markov bias, which starts at 0",
-                ),
-                Entry::new(keys[4], time_s, "s", "its correlation time"),
-            ]
+    let of_sensor = |s: &SensorValues,
+                     keys: [&'static str; 5],
+                     unit: &'static str,
+                     drive_unit: &'static str| {
+        let n = format!("N sqrt(f), white noise of a sample at {} Hz", v.rate_hz);
+        // without a bias both are zero, which switches it off
+        let (drive, time_s) = match s.markov.sigma > 0.0 {
+            true => (
+                s.markov.sigma * (2.0 / s.markov.t_corr_s).sqrt(),
+                s.markov.t_corr_s,
+            ),
+            false => (0.0, 0.0),
         };
+        let turn_on = match s.turn_on {
+            Some(_) => "turn-on bias, standard deviation",
+            None => "the model states no turn-on bias",
+        };
+        [
+            Entry::new(keys[0], s.density * v.rate_hz.sqrt(), unit, n),
+            Entry::new(keys[1], 0.0, unit, "mean of the turn-on bias"),
+            Entry::new(keys[2], s.turn_on.unwrap_or(0.0), unit, turn_on),
+            Entry::new(
+                keys[3],
+                drive,
+                drive_unit,
+                "sigma sqrt(2/T) of the Gauss-Markov bias, which starts at 0",
+            ),
+            Entry::new(keys[4], time_s, "s", "its correlation time"),
+        ]
+    };
     const GYRO: [&str; 5] = [
         "angular_velocity.stddev",
         "angular_velocity.bias_mean",
@@ -76,7 +81,11 @@ fn blocks(entries: &[Entry]) -> Vec<String> {
             lines.extend(sensor.iter().map(|entry| {
                 let key = element(entry).1;
                 let line = format!("      <{key}>{}</{key}>", number(entry.value));
-                if axis == "x" { format!("{line}  <!-- {}: {} -->", entry.key, remark(entry)) } else { line }
+                if axis == "x" {
+                    format!("{line}  <!-- {}: {} -->", entry.key, remark(entry))
+                } else {
+                    line
+                }
             }));
             lines.push(format!("    </noise></{axis}>"));
         }

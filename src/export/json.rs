@@ -9,8 +9,11 @@ impl Export {
     /// As a JSON document.
     pub(crate) fn json(&self, model: &str) -> Value {
         let horizon = self.settings.horizon;
-        let sensors: Map<String, Value> =
-            self.sensors.iter().map(|s| (s.sensor.name().to_owned(), sensor(s))).collect();
+        let sensors: Map<String, Value> = self
+            .sensors
+            .iter()
+            .map(|s| (s.sensor.name().to_owned(), sensor(s)))
+            .collect();
         json!({
             "schema_version": 1,
             "target": self.target.name(),
@@ -30,11 +33,13 @@ fn entry(e: &Entry) -> Value {
 }
 
 fn sensor(s: &SensorExport) -> Value {
-    let axis = |((channel, p), deviation): (&(nav_sim_signal::imu::Channel, AxisParameters), &f64)| {
-        let mut value = parameters(p, s.sensor);
-        value["allan_deviation_at_1_s"] = json!({ "value": deviation, "unit": s.sensor.unit() });
-        (channel.axis.name().to_owned(), value)
-    };
+    let axis =
+        |((channel, p), deviation): (&(nav_sim_signal::imu::Channel, AxisParameters), &f64)| {
+            let mut value = parameters(p, s.sensor);
+            value["allan_deviation_at_1_s"] =
+                json!({ "value": deviation, "unit": s.sensor.unit() });
+            (channel.axis.name().to_owned(), value)
+        };
     let axes: Map<String, Value> = s.axes.iter().zip(&s.deviation_at_1_s).map(axis).collect();
     let ratio = |r: Ratio| json!({ "ratio": r.ratio, "tau_s": r.tau_s });
     json!({

@@ -53,9 +53,17 @@ impl Export {
         let mut head = self.head(model);
         head.push(format!("Keys and units: {}", layout.source));
         // two hyphens end the comment of XML
-        let said =
-            |l: &String| if layout.comment_end.is_empty() { l.clone() } else { l.replace("--", "- -") };
-        lines.extend(head.iter().map(|l| format!("{} {}{}", layout.comment, said(l), layout.comment_end)));
+        let said = |l: &String| {
+            if layout.comment_end.is_empty() {
+                l.clone()
+            } else {
+                l.replace("--", "- -")
+            }
+        };
+        lines.extend(
+            head.iter()
+                .map(|l| format!("{} {}{}", layout.comment, said(l), layout.comment_end)),
+        );
         lines.extend((!layout.open.is_empty()).then(|| layout.open.to_owned()));
         match layout.blocks {
             Some(blocks) => lines.extend(blocks(&self.entries)),
@@ -73,7 +81,11 @@ pub(crate) fn number(value: f64) -> String {
     }
     if (1e-3..1e6).contains(&value.abs()) {
         let plain = format!("{value}");
-        return if plain.contains('.') { plain } else { plain + ".0" };
+        return if plain.contains('.') {
+            plain
+        } else {
+            plain + ".0"
+        };
     }
     let text = format!("{value:e}");
     match text.split_once('e') {
@@ -84,9 +96,18 @@ pub(crate) fn number(value: f64) -> String {
 
 /// Unit, meaning, and what the range of the target does not hold.
 pub(super) fn remark(entry: &Entry) -> String {
-    let wanted =
-        entry.wanted.map(|w| format!("; the model says {}, outside the documented range", number(w)));
-    format!("{}; {}{}", entry.unit, entry.meaning, wanted.unwrap_or_default())
+    let wanted = entry.wanted.map(|w| {
+        format!(
+            "; the model says {}, outside the documented range",
+            number(w)
+        )
+    });
+    format!(
+        "{}; {}{}",
+        entry.unit,
+        entry.meaning,
+        wanted.unwrap_or_default()
+    )
 }
 
 /// Three equal axes, between commas.
@@ -96,5 +117,10 @@ pub(super) fn triple(value: f64) -> String {
 
 /// `key: value  # unit; meaning`
 pub(super) fn yaml(entry: &Entry) -> String {
-    format!("{}: {}  # {}", entry.key, number(entry.value), remark(entry))
+    format!(
+        "{}: {}  # {}",
+        entry.key,
+        number(entry.value),
+        remark(entry)
+    )
 }

@@ -15,7 +15,10 @@ pub(super) const LIO_SAM: Layout = Layout {
 /// (<https://github.com/TixiaoShan/LIO-SAM>, `imuPreintegration.cpp`).
 fn lio_sam(v: &Values) -> Vec<Entry> {
     let rate = format!("continuous-time, IMU at {} Hz", v.rate_hz);
-    let (n, k) = (format!("white noise N, {rate}"), format!("bias random walk K, {rate}"));
+    let (n, k) = (
+        format!("white noise N, {rate}"),
+        format!("bias random walk K, {rate}"),
+    );
     vec![
         Entry::new("imuAccNoise", v.accel.density, "m/s^2/sqrt(Hz)", n.as_str()),
         Entry::new("imuGyrNoise", v.gyro.density, "rad/s/sqrt(Hz)", n.as_str()),
@@ -47,7 +50,12 @@ fn fast_lio(v: &Values) -> Vec<Entry> {
         } else {
             String::new()
         };
-        Entry::new(key, value, unit, format!("{symbol} f, of a sample at {} Hz{times}", v.rate_hz))
+        Entry::new(
+            key,
+            value,
+            unit,
+            format!("{symbol} f, of a sample at {} Hz{times}", v.rate_hz),
+        )
     };
     let [noise, bias] = SHIPPED;
     vec![
@@ -62,7 +70,11 @@ pub(super) const ROS_IMU_COVARIANCE: Layout = Layout {
     entries: ros_imu_covariance,
     line: |entry| {
         let x = number(entry.value);
-        format!("{}: [{x}, 0.0, 0.0, 0.0, {x}, 0.0, 0.0, 0.0, {x}]  # {}", entry.key, remark(entry))
+        format!(
+            "{}: [{x}, 0.0, 0.0, 0.0, {x}, 0.0, 0.0, 0.0, {x}]  # {}",
+            entry.key,
+            remark(entry)
+        )
     },
     open: "orientation_covariance: [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]  # no orientation is measured",
     source: "sensor_msgs/Imu.msg: covariances about x, y, z, row by row",
@@ -76,7 +88,17 @@ fn ros_imu_covariance(v: &Values) -> Vec<Entry> {
     let meaning = format!("N^2 f, white noise of a sample at {} Hz", v.rate_hz);
     let variance = |density: f64| density * density * v.rate_hz;
     vec![
-        Entry::new("angular_velocity_covariance", variance(v.gyro.density), "(rad/s)^2", meaning.as_str()),
-        Entry::new("linear_acceleration_covariance", variance(v.accel.density), "(m/s^2)^2", meaning),
+        Entry::new(
+            "angular_velocity_covariance",
+            variance(v.gyro.density),
+            "(rad/s)^2",
+            meaning.as_str(),
+        ),
+        Entry::new(
+            "linear_acceleration_covariance",
+            variance(v.accel.density),
+            "(m/s^2)^2",
+            meaning,
+        ),
     ]
 }

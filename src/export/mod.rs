@@ -82,7 +82,9 @@ pub enum ExportError {
         target: &'static str,
     },
     /// Two correlation times are to be taken as they are, and the target has one.
-    #[error("KF-GINS has one correlation time, the model's sensors have {accel_s:.3} s and {gyro_s:.3} s")]
+    #[error(
+        "KF-GINS has one correlation time, the model's sensors have {accel_s:.3} s and {gyro_s:.3} s"
+    )]
     TwoTimes {
         /// Of the accelerometer (s).
         accel_s: f64,
@@ -116,7 +118,13 @@ pub struct Entry {
 
 impl Entry {
     fn new(key: &'static str, value: f64, unit: &'static str, meaning: impl Into<String>) -> Self {
-        Self { key, value, unit, meaning: meaning.into(), wanted: None }
+        Self {
+            key,
+            value,
+            unit,
+            meaning: meaning.into(),
+            wanted: None,
+        }
     }
 
     /// The same within a documented range.
@@ -180,16 +188,26 @@ impl Export {
     ) -> Result<Self, ExportError> {
         let mut curves = Vec::new();
         for sensor in Sensor::ALL {
-            let channels: Vec<Channel> =
-                Channel::ALL.into_iter().filter(|c| c.sensor == sensor && !missing.contains(c)).collect();
+            let channels: Vec<Channel> = Channel::ALL
+                .into_iter()
+                .filter(|c| c.sensor == sensor && !missing.contains(c))
+                .collect();
             if channels.is_empty() {
-                return Err(ExportError::NoSensor { sensor, target: target.name() });
+                return Err(ExportError::NoSensor {
+                    sensor,
+                    target: target.name(),
+                });
             }
             let axes: Vec<&Composite> = channels.iter().map(|c| model.axis(*c)).collect();
-            let lacking =
-                (settings.policy == Policy::Strict).then(|| lacking(target.bias(), &axes)).flatten();
+            let lacking = (settings.policy == Policy::Strict)
+                .then(|| lacking(target.bias(), &axes))
+                .flatten();
             if let Some(bias) = lacking {
-                return Err(ExportError::NoSuchBias { bias, sensor, target: target.name() });
+                return Err(ExportError::NoSuchBias {
+                    bias,
+                    sensor,
+                    target: target.name(),
+                });
             }
             let curve = Curve::largest(&axes, model.rate_hz, settings.horizon)
                 .map_err(|source| ExportError::Curve { sensor, source })?;
@@ -205,10 +223,19 @@ impl Export {
             (target, sensors.each_ref().map(|s| s.exported.markov))
             && (accel.t_corr_s / gyro.t_corr_s - 1.0).abs() > 1e-9
         {
-            return Err(ExportError::TwoTimes { accel_s: accel.t_corr_s, gyro_s: gyro.t_corr_s });
+            return Err(ExportError::TwoTimes {
+                accel_s: accel.t_corr_s,
+                gyro_s: gyro.t_corr_s,
+            });
         }
         let entries = (target.layout().entries)(&Values::new(model.rate_hz, &sensors));
-        Ok(Self { target, rate_hz: model.rate_hz, settings, sensors, entries })
+        Ok(Self {
+            target,
+            rate_hz: model.rate_hz,
+            settings,
+            sensors,
+            entries,
+        })
     }
 }
 
@@ -243,8 +270,14 @@ impl SensorExport {
     ) -> Result<Self, ExportError> {
         let sensor = channels[0].sensor;
         let parameters = |axes: &[&Composite]| {
-            AxisParameters::of(axes, model.rate_hz, settings.horizon, settings.policy, settings.range_s)
-                .map_err(|source| ExportError::Curve { sensor, source })
+            AxisParameters::of(
+                axes,
+                model.rate_hz,
+                settings.horizon,
+                settings.policy,
+                settings.range_s,
+            )
+            .map_err(|source| ExportError::Curve { sensor, source })
         };
         let all: Vec<&Composite> = channels.iter().map(|c| model.axis(*c)).collect();
         let mut axes = Vec::new();
@@ -259,7 +292,10 @@ impl SensorExport {
         let spread = largest.markov.markov.map_or(walked, |m| m.sigma);
         Ok(Self {
             sensor,
-            deviation_at_1_s: all.iter().map(|a| a.allan_variance(second).sqrt()).collect(),
+            deviation_at_1_s: all
+                .iter()
+                .map(|a| a.allan_variance(second).sqrt())
+                .collect(),
             axes,
             largest,
             exported,
@@ -296,7 +332,10 @@ struct SensorValues {
 }
 
 /// The correlation time that a search leaves to a bias of no size means nothing.
-const NO_BIAS: Markov = Markov { sigma: 0.0, t_corr_s: f64::INFINITY };
+const NO_BIAS: Markov = Markov {
+    sigma: 0.0,
+    t_corr_s: f64::INFINITY,
+};
 
 impl Values {
     fn new(rate_hz: f64, sensors: &[SensorExport; 2]) -> Self {
@@ -304,7 +343,11 @@ impl Values {
             density: s.exported.density,
             // Programs that list K beside a Gauss-Markov bias do not use it; it is that of the other pair.
             walk: s.largest.walk.walk,
-            markov: s.exported.markov.filter(|m| m.sigma > 0.0).unwrap_or(NO_BIAS),
+            markov: s
+                .exported
+                .markov
+                .filter(|m| m.sigma > 0.0)
+                .unwrap_or(NO_BIAS),
             bias_sd: s.bias_sd,
             turn_on: s.turn_on,
             bias_meaning: if s.turn_on.is_some() {
@@ -313,7 +356,11 @@ impl Values {
                 "standard deviation of the moving bias; the model states no turn-on bias"
             },
         };
-        Self { rate_hz, accel: of_sensor(&sensors[0]), gyro: of_sensor(&sensors[1]) }
+        Self {
+            rate_hz,
+            accel: of_sensor(&sensors[0]),
+            gyro: of_sensor(&sensors[1]),
+        }
     }
 }
 

@@ -14,9 +14,16 @@ pub(super) const GNSS_INS_SIM: Layout = Layout {
     open: "import numpy as np\n\nimu_err = {",
     close: "}",
     line: |entry| {
-        let values =
-            if entry.value.is_finite() { triple(entry.value) } else { "np.inf, np.inf, np.inf".into() };
-        format!("    '{}': np.array([{values}]),  # {}", entry.key, remark(entry))
+        let values = if entry.value.is_finite() {
+            triple(entry.value)
+        } else {
+            "np.inf, np.inf, np.inf".into()
+        };
+        format!(
+            "    '{}': np.array([{values}]),  # {}",
+            entry.key,
+            remark(entry)
+        )
     },
     source: "gnss-ins-sim README, \"Define the IMU model\"",
     ..PLAIN
@@ -31,20 +38,48 @@ fn gnss_ins_sim(v: &Values) -> Vec<Entry> {
     let ((accel_b, a_meaning), (gyro_b, g_meaning)) = (constant(&v.accel), constant(&v.gyro));
     vec![
         Entry::new("gyro_b", gyro_b / DEG_PER_HOUR, "deg/hr", g_meaning),
-        Entry::new("gyro_arw", v.gyro.density / DEG * ROOT_HOUR, "deg/rt-hr", n.as_str()),
-        Entry::new("gyro_b_stability", v.gyro.markov.sigma / DEG_PER_HOUR, "deg/hr", sigma),
-        Entry::new("gyro_b_corr", v.gyro.markov.t_corr_s, "s", "its correlation time"),
+        Entry::new(
+            "gyro_arw",
+            v.gyro.density / DEG * ROOT_HOUR,
+            "deg/rt-hr",
+            n.as_str(),
+        ),
+        Entry::new(
+            "gyro_b_stability",
+            v.gyro.markov.sigma / DEG_PER_HOUR,
+            "deg/hr",
+            sigma,
+        ),
+        Entry::new(
+            "gyro_b_corr",
+            v.gyro.markov.t_corr_s,
+            "s",
+            "its correlation time",
+        ),
         Entry::new("accel_b", accel_b, "m/s^2", a_meaning),
-        Entry::new("accel_vrw", v.accel.density * ROOT_HOUR, "m/s/rt-hr", n.as_str()),
+        Entry::new(
+            "accel_vrw",
+            v.accel.density * ROOT_HOUR,
+            "m/s/rt-hr",
+            n.as_str(),
+        ),
         Entry::new("accel_b_stability", v.accel.markov.sigma, "m/s^2", sigma),
-        Entry::new("accel_b_corr", v.accel.markov.t_corr_s, "s", "its correlation time"),
+        Entry::new(
+            "accel_b_corr",
+            v.accel.markov.t_corr_s,
+            "s",
+            "its correlation time",
+        ),
     ]
 }
 
 /// The constant bias to simulate: that of one standard deviation, where the model states a turn-on bias.
 fn constant(sensor: &SensorValues) -> (f64, &'static str) {
     match sensor.turn_on {
-        Some(sigma) => (sigma, "constant bias, one standard deviation of the turn-on bias"),
+        Some(sigma) => (
+            sigma,
+            "constant bias, one standard deviation of the turn-on bias",
+        ),
         None => (0.0, "constant bias; the model states no turn-on bias"),
     }
 }
@@ -62,7 +97,12 @@ pub(super) const MATLAB: Layout = Layout {
             number(-entry.value),
             remark(entry)
         ),
-        _ => format!("{} = {};  % {}", entry.key, number(entry.value), remark(entry)),
+        _ => format!(
+            "{} = {};  % {}",
+            entry.key,
+            number(entry.value),
+            remark(entry)
+        ),
     },
     source: "MATLAB, accelparams, gyroparams and imuSensor (Navigation Toolbox)",
     ..PLAIN
@@ -89,13 +129,43 @@ fn matlab(v: &Values) -> Vec<Entry> {
     let (a, g) = (&v.accel, &v.gyro);
     vec![
         Entry::new("SampleRate", v.rate_hz, "Hz", "rate of the IMU"),
-        Entry::new("accel.NoiseDensity", a.density, "(m/s^2)/sqrt(Hz)", n.as_str()),
-        Entry::new("accel.BiasInstability", drive(a.markov), "m/s^2", innovation.as_str()),
-        Entry::new("accel.BiasInstabilityCoefficients", phi(a.markov.t_corr_s), "1", pole(a.markov)),
+        Entry::new(
+            "accel.NoiseDensity",
+            a.density,
+            "(m/s^2)/sqrt(Hz)",
+            n.as_str(),
+        ),
+        Entry::new(
+            "accel.BiasInstability",
+            drive(a.markov),
+            "m/s^2",
+            innovation.as_str(),
+        ),
+        Entry::new(
+            "accel.BiasInstabilityCoefficients",
+            phi(a.markov.t_corr_s),
+            "1",
+            pole(a.markov),
+        ),
         Entry::new("accel.RandomWalk", 0.0, "(m/s^2)*sqrt(Hz)", none),
-        Entry::new("gyro.NoiseDensity", g.density, "(rad/s)/sqrt(Hz)", n.as_str()),
-        Entry::new("gyro.BiasInstability", drive(g.markov), "rad/s", innovation.as_str()),
-        Entry::new("gyro.BiasInstabilityCoefficients", phi(g.markov.t_corr_s), "1", pole(g.markov)),
+        Entry::new(
+            "gyro.NoiseDensity",
+            g.density,
+            "(rad/s)/sqrt(Hz)",
+            n.as_str(),
+        ),
+        Entry::new(
+            "gyro.BiasInstability",
+            drive(g.markov),
+            "rad/s",
+            innovation.as_str(),
+        ),
+        Entry::new(
+            "gyro.BiasInstabilityCoefficients",
+            phi(g.markov.t_corr_s),
+            "1",
+            pole(g.markov),
+        ),
         Entry::new("gyro.RandomWalk", 0.0, "(rad/s)*sqrt(Hz)", none),
     ]
 }

@@ -26,7 +26,13 @@ fn markov(sigma: f64, t_corr_s: f64) -> Process {
 
 fn settings(policy: Policy) -> Settings {
     let turn_on = [Some(0.05), Some(10.0 * DEG / 3600.0)];
-    Settings { policy, horizon: Horizon::default(), range_s: 1e4, turn_on, misfit: None }
+    Settings {
+        policy,
+        horizon: Horizon::default(),
+        range_s: 1e4,
+        turn_on,
+        misfit: None,
+    }
 }
 
 fn export(target: Target, accel: Vec<Process>, gyro: Vec<Process>, policy: Policy) -> Export {
@@ -35,23 +41,44 @@ fn export(target: Target, accel: Vec<Process>, gyro: Vec<Process>, policy: Polic
 }
 
 fn walks(target: Target) -> Export {
-    export(target, vec![white(N_A), walk(K_A)], vec![white(N_G), walk(K_G)], Policy::Matched)
+    export(
+        target,
+        vec![white(N_A), walk(K_A)],
+        vec![white(N_G), walk(K_G)],
+        Policy::Matched,
+    )
 }
 
 /// Biases of 40 µg and 5 °/h, 300 s each.
 fn markovs(target: Target) -> Export {
-    let (accel, gyro) = (markov(40e-6 * STANDARD_GRAVITY, 300.0), markov(5.0 * DEG / 3600.0, 300.0));
-    export(target, vec![white(N_A), accel], vec![white(N_G), gyro], Policy::Strict)
+    let (accel, gyro) = (
+        markov(40e-6 * STANDARD_GRAVITY, 300.0),
+        markov(5.0 * DEG / 3600.0, 300.0),
+    );
+    export(
+        target,
+        vec![white(N_A), accel],
+        vec![white(N_G), gyro],
+        Policy::Strict,
+    )
 }
 
 fn value(export: &Export, key: &str) -> f64 {
-    export.entries.iter().find(|e| e.key == key).unwrap_or_else(|| panic!("{key}")).value
+    export
+        .entries
+        .iter()
+        .find(|e| e.key == key)
+        .unwrap_or_else(|| panic!("{key}"))
+        .value
 }
 
 fn assert_values(export: &Export, expected: &[(&str, f64)]) {
     for (key, expected) in expected {
         let found = value(export, key);
-        assert!((found / expected - 1.0).abs() < 1e-12, "{key}: {found:e} {expected:e}");
+        assert!(
+            (found / expected - 1.0).abs() < 1e-12,
+            "{key}: {found:e} {expected:e}"
+        );
     }
 }
 
@@ -61,7 +88,10 @@ fn kalibr_reads_back_the_densities() {
     for target in [Target::Kalibr, Target::OpenVins] {
         let text = walks(target).text("model.toml");
         let read = |key: &str| -> f64 {
-            let line = text.lines().find_map(|l| l.trim().strip_prefix(key)?.strip_prefix(": ")).unwrap();
+            let line = text
+                .lines()
+                .find_map(|l| l.trim().strip_prefix(key)?.strip_prefix(": "))
+                .unwrap();
             line.split('#').next().unwrap().trim().parse().unwrap()
         };
         let expected = [
@@ -85,8 +115,12 @@ fn vins_has_noise_of_a_sample() {
     let dt = 1.0_f64 / 200.0;
     let of_end = (1.0 / (200.0 * 2.0 * (dt / 2.0).powi(2))).sqrt();
     let root = 200.0_f64.sqrt();
-    let expected =
-        [("acc_n", N_A * of_end), ("gyr_n", N_G * of_end), ("acc_w", K_A * root), ("gyr_w", K_G * root)];
+    let expected = [
+        ("acc_n", N_A * of_end),
+        ("gyr_n", N_G * of_end),
+        ("acc_w", K_A * root),
+        ("gyr_w", K_G * root),
+    ];
     assert_values(&walks(Target::Vins), &expected);
 }
 
@@ -105,23 +139,43 @@ fn gtsam_has_covariances() {
 #[test]
 fn autopilots_grow_as_the_noise_does() {
     let (n_a, n_g, k_a, k_g) = (0.02, 1e-3, 1e-4, 2e-6);
-    let noise =
-        |target| export(target, vec![white(n_a), walk(k_a)], vec![white(n_g), walk(k_g)], Policy::Matched);
+    let noise = |target| {
+        export(
+            target,
+            vec![white(n_a), walk(k_a)],
+            vec![white(n_g), walk(k_g)],
+            Policy::Matched,
+        )
+    };
     let px4 = [
         ("EKF2_ACC_NOISE", n_a),
         ("EKF2_GYR_NOISE", n_g),
         ("EKF2_ACC_B_NOISE", k_a),
         ("EKF2_GYR_B_NOISE", k_g),
     ];
-    let ardupilot =
-        [("EK3_ACC_P_NSE", n_a), ("EK3_GYRO_P_NSE", n_g), ("EK3_ABIAS_P_NSE", k_a), ("EK3_GBIAS_P_NSE", k_g)];
-    for (target, dt, keys) in [(Target::Px4, 0.01_f64, px4), (Target::ArduPilot, 0.012, ardupilot)] {
+    let ardupilot = [
+        ("EK3_ACC_P_NSE", n_a),
+        ("EK3_GYRO_P_NSE", n_g),
+        ("EK3_ABIAS_P_NSE", k_a),
+        ("EK3_GBIAS_P_NSE", k_g),
+    ];
+    for (target, dt, keys) in [
+        (Target::Px4, 0.01_f64, px4),
+        (Target::ArduPilot, 0.012, ardupilot),
+    ] {
         let export = noise(target);
         for (key, density) in keys {
             let variance_of_a_second = (dt * value(&export, key)).powi(2) / dt;
-            assert!((variance_of_a_second / (density * density) - 1.0).abs() < 1e-12, "{key}");
+            assert!(
+                (variance_of_a_second / (density * density) - 1.0).abs() < 1e-12,
+                "{key}"
+            );
         }
-        assert!(export.doubts().iter().any(|d| d.contains("vibration")), "{:?}", export.doubts());
+        assert!(
+            export.doubts().iter().any(|d| d.contains("vibration")),
+            "{:?}",
+            export.doubts()
+        );
     }
 }
 
@@ -129,20 +183,39 @@ fn autopilots_grow_as_the_noise_does() {
 #[test]
 fn values_outside_documented_ranges_are_told() {
     let export = walks(Target::Px4);
-    let accel = export.entries.iter().find(|e| e.key == "EKF2_ACC_NOISE").unwrap();
+    let accel = export
+        .entries
+        .iter()
+        .find(|e| e.key == "EKF2_ACC_NOISE")
+        .unwrap();
     assert!((accel.wanted.unwrap() / (N_A / 0.1) - 1.0).abs() < 1e-12);
     assert_eq!(accel.value, 0.01);
     let told = "EKF2_ACC_NOISE is 1.000e-2, the end of its range; the model says 3.333e-3";
-    assert!(export.doubts().iter().any(|d| d == told), "{:?}", export.doubts());
-    assert!(export.text("m").contains("param set EKF2_ACC_NOISE 0.01  # m/s^2; "), "{}", export.text("m"));
+    assert!(
+        export.doubts().iter().any(|d| d == told),
+        "{:?}",
+        export.doubts()
+    );
+    assert!(
+        export
+            .text("m")
+            .contains("param set EKF2_ACC_NOISE 0.01  # m/s^2; "),
+        "{}",
+        export.text("m")
+    );
 }
 
 /// Every Gauss-Markov target in the units of its documents: 0.15 °/√h, 0.02 m/s/√h, 5 °/h, 40 µg, 300 s.
 #[test]
 fn gauss_markov_targets_have_data_sheet_units() {
     let milligal = 40e-6 * STANDARD_GRAVITY / 1e-5;
-    let kf_gins =
-        [("arw", 0.15), ("vrw", 0.02), ("gbstd", 5.0), ("abstd", milligal), ("corrtime", 300.0 / 3600.0)];
+    let kf_gins = [
+        ("arw", 0.15),
+        ("vrw", 0.02),
+        ("gbstd", 5.0),
+        ("abstd", milligal),
+        ("corrtime", 300.0 / 3600.0),
+    ];
     assert_values(&markovs(Target::KfGins), &kf_gins);
     let simulator = [
         ("gyro_arw", 0.15),
@@ -200,24 +273,42 @@ fn pyins_has_si_units() {
 #[test]
 fn matlabs_filter_is_the_gauss_markov_bias() {
     let export = markovs(Target::Matlab);
-    let (b, phi) =
-        (value(&export, "gyro.BiasInstability"), value(&export, "gyro.BiasInstabilityCoefficients"));
+    let (b, phi) = (
+        value(&export, "gyro.BiasInstability"),
+        value(&export, "gyro.BiasInstabilityCoefficients"),
+    );
     let sigma = 5.0 * DEG / 3600.0;
     assert!((b / (1.0 - phi * phi).sqrt() / sigma - 1.0).abs() < 1e-10);
     assert!((phi.ln() * 300.0 * RATE + 1.0).abs() < 1e-10);
-    assert_values(&export, &[("gyro.NoiseDensity", N_G), ("accel.NoiseDensity", N_A)]);
+    assert_values(
+        &export,
+        &[("gyro.NoiseDensity", N_G), ("accel.NoiseDensity", N_A)],
+    );
 }
 
 /// Each line of every target carries its unit; head and certificate are comments.
 #[test]
 fn every_value_has_its_unit_on_its_line() {
     for target in Target::ALL {
-        let export = if target.bias() == Bias::Walk { walks(target) } else { markovs(target) };
+        let export = if target.bias() == Bias::Walk {
+            walks(target)
+        } else {
+            markovs(target)
+        };
         let text = export.text("model.toml");
-        assert!(text.contains(" × the model") && text.contains("200 Hz"), "{text}");
+        assert!(
+            text.contains(" × the model") && text.contains("200 Hz"),
+            "{text}"
+        );
         for entry in &export.entries {
-            let line = text.lines().find(|l| l.contains(entry.key) && l.contains(&number(entry.value.abs())));
-            assert!(line.is_some() && text.contains(&format!("{}; ", entry.unit)), "{}:\n{text}", entry.key);
+            let line = text
+                .lines()
+                .find(|l| l.contains(entry.key) && l.contains(&number(entry.value.abs())));
+            assert!(
+                line.is_some() && text.contains(&format!("{}; ", entry.unit)),
+                "{}:\n{text}",
+                entry.key
+            );
         }
     }
 }
@@ -226,26 +317,36 @@ fn every_value_has_its_unit_on_its_line() {
 /// sensors, and the certificate is of that pair.
 #[test]
 fn kf_gins_has_one_correlation_time() {
-    let (accel, gyro) = (vec![white(1e-4), markov(1e-3, 10.0)], vec![white(1e-5), markov(1e-4, 40.0)]);
+    let (accel, gyro) = (
+        vec![white(1e-4), markov(1e-3, 10.0)],
+        vec![white(1e-5), markov(1e-4, 40.0)],
+    );
     let export = export(Target::KfGins, accel.clone(), gyro.clone(), Policy::Matched);
-    let curves =
-        [accel, gyro].map(|p| Curve::largest(&[&Composite::new(p)], RATE, Horizon::default()).unwrap());
+    let curves = [accel, gyro]
+        .map(|p| Curve::largest(&[&Composite::new(p)], RATE, Horizon::default()).unwrap());
     let misfit = |t_corr_s: f64| -> f64 {
-        let samples: Vec<u32> =
-            (0..=106).map(|k| (RATE * 2.0_f64.powf(f64::from(k) / 16.0)).round() as u32).collect();
+        let samples: Vec<u32> = (0..=106)
+            .map(|k| (RATE * 2.0_f64.powf(f64::from(k) / 16.0)).round() as u32)
+            .collect();
         let of_sensor = |curve: &Curve, processes: &[Process]| -> f64 {
             let pair = curve.pair(Policy::Matched, Bias::MarkovOf(t_corr_s));
             let model = Composite::new(processes.to_vec());
-            let log = |m: &u32| 0.5 * (pair.allan_variance(*m, RATE) / model.allan_variance(*m)).ln();
+            let log =
+                |m: &u32| 0.5 * (pair.allan_variance(*m, RATE) / model.allan_variance(*m)).ln();
             samples.iter().map(|m| log(m).powi(2)).sum()
         };
         of_sensor(&curves[0], &[white(1e-4), markov(1e-3, 10.0)])
             + of_sensor(&curves[1], &[white(1e-5), markov(1e-4, 40.0)])
     };
     let found_s = value(&export, "corrtime") * 3600.0;
-    let best =
-        (0..=60).map(|i| 2.0 * 100.0_f64.powf(f64::from(i) / 60.0)).map(misfit).fold(f64::MAX, f64::min);
-    assert!(10.0 < found_s && found_s < 40.0 && misfit(found_s) < 1.001 * best, "{found_s} s");
+    let best = (0..=60)
+        .map(|i| 2.0 * 100.0_f64.powf(f64::from(i) / 60.0))
+        .map(misfit)
+        .fold(f64::MAX, f64::min);
+    assert!(
+        10.0 < found_s && found_s < 40.0 && misfit(found_s) < 1.001 * best,
+        "{found_s} s"
+    );
     assert!((export.sensors[0].exported.markov.unwrap().t_corr_s / found_s - 1.0).abs() < 1e-12);
 }
 
@@ -260,11 +361,25 @@ fn a_sensor_without_a_bias_has_no_say_in_the_correlation_time() {
         let accel_moves = export(Target::KfGins, moving.clone(), still.clone(), policy);
         for (export, sensor) in [(gyro_moves, 1), (accel_moves, 0)] {
             let markov = export.sensors[sensor].exported.markov.unwrap();
-            assert!((value(&export, "corrtime") * 3600.0 / t_s - 1.0).abs() < 1e-2, "{policy:?} {markov:?}");
-            assert!((markov.sigma / bias - 1.0).abs() < 1e-2, "{policy:?} {markov:?}");
+            assert!(
+                (value(&export, "corrtime") * 3600.0 / t_s - 1.0).abs() < 1e-2,
+                "{policy:?} {markov:?}"
+            );
+            assert!(
+                (markov.sigma / bias - 1.0).abs() < 1e-2,
+                "{policy:?} {markov:?}"
+            );
         }
-        let walk = export(Target::KfGins, vec![white(N_A), walk(K_A)], still.clone(), policy);
-        assert!((value(&walk, "corrtime") * 3600.0 / 3000.0 - 1.0).abs() < 1e-6, "{policy:?}");
+        let walk = export(
+            Target::KfGins,
+            vec![white(N_A), walk(K_A)],
+            still.clone(),
+            policy,
+        );
+        assert!(
+            (value(&walk, "corrtime") * 3600.0 / 3000.0 - 1.0).abs() < 1e-6,
+            "{policy:?}"
+        );
     }
     // where nothing wanders, no time is said
     let white = export(Target::NaveGo, still.clone(), still, Policy::Matched);
@@ -274,23 +389,46 @@ fn a_sensor_without_a_bias_has_no_say_in_the_correlation_time() {
 #[test]
 fn doubts_are_told() {
     let fast = Process::Ar1(Ar1::new(0.5, 1e-6).unwrap());
-    let strict = export(Target::Kalibr, vec![fast, walk(K_A)], vec![white(N_G), walk(K_G)], Policy::Strict);
+    let strict = export(
+        Target::Kalibr,
+        vec![fast, walk(K_A)],
+        vec![white(N_G), walk(K_G)],
+        Policy::Strict,
+    );
     let doubts = strict.doubts().join("\n");
-    assert!(doubts.contains("accel: N is 0") && doubts.contains("--policy matched"), "{doubts}");
+    assert!(
+        doubts.contains("accel: N is 0") && doubts.contains("--policy matched"),
+        "{doubts}"
+    );
     // K²/3 over K²/3 + sigma2 dt/(1 − phi)²: √(3e-10/(3e-10 + 2e-8)) = 0.122
-    assert!(doubts.contains("accel: 0.12 times the model's Allan deviation at 1.00 s"), "{doubts}");
+    assert!(
+        doubts.contains("accel: 0.12 times the model's Allan deviation at 1.00 s"),
+        "{doubts}"
+    );
     assert_eq!(walks(Target::Kalibr).doubts(), Vec::<String>::new());
-    let still = export(Target::Kalibr, vec![white(N_A)], vec![white(N_G), walk(K_G)], Policy::Matched);
+    let still = export(
+        Target::Kalibr,
+        vec![white(N_A)],
+        vec![white(N_G), walk(K_G)],
+        Policy::Matched,
+    );
     let doubts = still.doubts().join("\n");
-    assert!(doubts.contains("accel: K is 0") && !doubts.contains("gyro: K is 0"), "{doubts}");
+    assert!(
+        doubts.contains("accel: K is 0") && !doubts.contains("gyro: K is 0"),
+        "{doubts}"
+    );
     let wandering = markovs(Target::KfGins).doubts().join("\n");
     assert!(!wandering.contains("K is 0"), "{wandering}");
     // of 3 q²/(T/dt)² at 1 s as much as N²/T: half of the variance; an envelope has it in its N
-    let coarse = || Process::Quantization(Quantization::new(N_A * N_A * RATE * RATE / 3.0).unwrap());
+    let coarse =
+        || Process::Quantization(Quantization::new(N_A * N_A * RATE * RATE / 3.0).unwrap());
     for (policy, is_told) in [(Policy::Matched, true), (Policy::Envelope, false)] {
         let accel = vec![white(N_A), walk(K_A), coarse()];
-        let told = export(Target::Kalibr, accel, vec![white(N_G), walk(K_G)], policy).doubts().join("\n");
-        let share = "quantization noise or drift, 50 % of the Allan variance at 1.00 s, is left out";
+        let told = export(Target::Kalibr, accel, vec![white(N_G), walk(K_G)], policy)
+            .doubts()
+            .join("\n");
+        let share =
+            "quantization noise or drift, 50 % of the Allan variance at 1.00 s, is left out";
         assert_eq!(told.contains(share), is_told, "{policy:?}: {told}");
     }
 }
@@ -299,11 +437,18 @@ fn doubts_are_told() {
 #[test]
 fn a_walk_begins_with_what_it_reaches() {
     let axis = |n, k| Composite::new(vec![white(n), walk(k)]);
-    let unstated = Settings { turn_on: [None; 2], ..settings(Policy::Strict) };
+    let unstated = Settings {
+        turn_on: [None; 2],
+        ..settings(Policy::Strict)
+    };
     let model = Model::pooled(RATE, &axis(N_A, K_A), &axis(N_G, K_G));
     let export = Export::new(Target::Pyins, &model, &[], unstated).unwrap();
     for (key, k) in [("accel_bias_sd", K_A), ("gyro_bias_sd", K_G)] {
-        assert!((value(&export, key) / (10.0 * k) - 1.0).abs() < 1e-6, "{key}: {:e}", value(&export, key));
+        assert!(
+            (value(&export, key) / (10.0 * k) - 1.0).abs() < 1e-6,
+            "{key}: {:e}",
+            value(&export, key)
+        );
     }
 }
 
@@ -316,16 +461,26 @@ fn axes_that_differ_are_told() {
     let export = Export::new(Target::Kalibr, &model, &[], settings(Policy::Strict)).unwrap();
     assert_values(&export, &[("accelerometer_noise_density", 2.0 * N_A)]);
     let told = export.doubts().join("\n");
-    assert!(told.contains("accel: axes differ (Allan deviation at 1 s: x 0.50, y 0.50, z 1.00)"), "{told}");
+    assert!(
+        told.contains("accel: axes differ (Allan deviation at 1 s: x 0.50, y 0.50, z 1.00)"),
+        "{told}"
+    );
     let missing: Vec<Channel> = Channel::named("gyro");
-    let refused = Export::new(Target::Kalibr, &model, &missing, settings(Policy::Strict)).unwrap_err();
-    assert_eq!(refused.to_string(), "the model has no gyro, and kalibr needs both sensors");
+    let refused =
+        Export::new(Target::Kalibr, &model, &missing, settings(Policy::Strict)).unwrap_err();
+    assert_eq!(
+        refused.to_string(),
+        "the model has no gyro, and kalibr needs both sensors"
+    );
 }
 
 #[test]
 fn numbers_are_numbers_in_yaml() {
     let shown = [2e-5, 1.25e-7, 100.0, 0.02, 0.0, 1e7].map(number);
-    assert_eq!(shown, ["2.0e-5", "1.25e-7", "100.0", "0.02", "0.0", "1.0e7"]);
+    assert_eq!(
+        shown,
+        ["2.0e-5", "1.25e-7", "100.0", "0.02", "0.0", "1.0e7"]
+    );
 }
 
 /// A strict pair takes the model's bias as it is, of either kind, or is refused.
@@ -337,12 +492,25 @@ fn a_strict_pair_does_not_drop_the_bias() {
             &Composite::new(vec![white(N_A), bias()]),
             &Composite::new(vec![white(N_G), bias()]),
         );
-        Export::new(target, &model, &[], settings(Policy::Strict)).unwrap_err().to_string()
+        Export::new(target, &model, &[], settings(Policy::Strict))
+            .unwrap_err()
+            .to_string()
     };
     // what does not wander has nothing to drop
-    export(Target::Kalibr, vec![white(N_A)], vec![white(N_G)], Policy::Strict);
+    export(
+        Target::Kalibr,
+        vec![white(N_A)],
+        vec![white(N_G)],
+        Policy::Strict,
+    );
     let said = refused(Target::Kalibr, || markov(1e-3, 100.0));
-    assert_eq!(said, "kalibr has no Gauss-Markov bias, and the model's accel has one");
+    assert_eq!(
+        said,
+        "kalibr has no Gauss-Markov bias, and the model's accel has one"
+    );
     let said = refused(Target::KfGins, || walk(K_A));
-    assert_eq!(said, "kf-gins has no random walk, and the model's accel has one");
+    assert_eq!(
+        said,
+        "kf-gins has no random walk, and the model's accel has one"
+    );
 }

@@ -14,12 +14,35 @@ pub(super) const KALIBR: Layout = Layout {
 /// (<https://github.com/ethz-asl/kalibr/wiki/IMU-Noise-Model>).
 fn kalibr(v: &Values) -> Vec<Entry> {
     let rate = format!("continuous-time, IMU at {} Hz", v.rate_hz);
-    let (n, k) = (format!("white noise N, {rate}"), format!("bias random walk K, {rate}"));
+    let (n, k) = (
+        format!("white noise N, {rate}"),
+        format!("bias random walk K, {rate}"),
+    );
     vec![
-        Entry::new("accelerometer_noise_density", v.accel.density, "m/s^2/sqrt(Hz)", n.as_str()),
-        Entry::new("accelerometer_random_walk", v.accel.walk, "m/s^3/sqrt(Hz)", k.as_str()),
-        Entry::new("gyroscope_noise_density", v.gyro.density, "rad/s/sqrt(Hz)", n.as_str()),
-        Entry::new("gyroscope_random_walk", v.gyro.walk, "rad/s^2/sqrt(Hz)", k.as_str()),
+        Entry::new(
+            "accelerometer_noise_density",
+            v.accel.density,
+            "m/s^2/sqrt(Hz)",
+            n.as_str(),
+        ),
+        Entry::new(
+            "accelerometer_random_walk",
+            v.accel.walk,
+            "m/s^3/sqrt(Hz)",
+            k.as_str(),
+        ),
+        Entry::new(
+            "gyroscope_noise_density",
+            v.gyro.density,
+            "rad/s/sqrt(Hz)",
+            n.as_str(),
+        ),
+        Entry::new(
+            "gyroscope_random_walk",
+            v.gyro.walk,
+            "rad/s^2/sqrt(Hz)",
+            k.as_str(),
+        ),
         Entry::new("update_rate", v.rate_hz, "Hz", "rate of the IMU"),
     ]
 }
@@ -54,8 +77,18 @@ fn vins(v: &Values) -> Vec<Entry> {
     vec![
         Entry::new("acc_n", v.accel.density * midpoint, "m/s^2", noise.clone()),
         Entry::new("gyr_n", v.gyro.density * midpoint, "rad/s", noise),
-        Entry::new("acc_w", v.accel.walk * root, "m/s^3", per("K sqrt(f), bias random walk of a sample")),
-        Entry::new("gyr_w", v.gyro.walk * root, "rad/s^2", per("K sqrt(f), bias random walk of a sample")),
+        Entry::new(
+            "acc_w",
+            v.accel.walk * root,
+            "m/s^3",
+            per("K sqrt(f), bias random walk of a sample"),
+        ),
+        Entry::new(
+            "gyr_w",
+            v.gyro.walk * root,
+            "rad/s^2",
+            per("K sqrt(f), bias random walk of a sample"),
+        ),
     ]
 }
 
@@ -64,7 +97,12 @@ pub(super) const GTSAM: Layout = Layout {
     comment: "//",
     open: "auto params = gtsam::PreintegrationCombinedParams::MakeSharedU(9.80665);  // m/s^2; gravity, z up",
     line: |entry| {
-        format!("params->{}({} * gtsam::I_3x3);  // {}", entry.key, number(entry.value), remark(entry))
+        format!(
+            "params->{}({} * gtsam::I_3x3);  // {}",
+            entry.key,
+            number(entry.value),
+            remark(entry)
+        )
     },
     source: "GTSAM, PreintegrationParams.h and PreintegrationCombinedParams.h; setIntegrationCovariance is not a matter of the IMU",
     ..PLAIN
@@ -77,9 +115,29 @@ fn gtsam(v: &Values) -> Vec<Entry> {
     let rate = format!("continuous-time, IMU at {} Hz", v.rate_hz);
     let (n, k) = (format!("N^2, {rate}"), format!("K^2, {rate}"));
     vec![
-        Entry::new("setAccelerometerCovariance", square(v.accel.density), "(m/s^2)^2/Hz", n.as_str()),
-        Entry::new("setGyroscopeCovariance", square(v.gyro.density), "(rad/s)^2/Hz", n.as_str()),
-        Entry::new("setBiasAccCovariance", square(v.accel.walk), "(m/s^3)^2/Hz", k.as_str()),
-        Entry::new("setBiasOmegaCovariance", square(v.gyro.walk), "(rad/s^2)^2/Hz", k.as_str()),
+        Entry::new(
+            "setAccelerometerCovariance",
+            square(v.accel.density),
+            "(m/s^2)^2/Hz",
+            n.as_str(),
+        ),
+        Entry::new(
+            "setGyroscopeCovariance",
+            square(v.gyro.density),
+            "(rad/s)^2/Hz",
+            n.as_str(),
+        ),
+        Entry::new(
+            "setBiasAccCovariance",
+            square(v.accel.walk),
+            "(m/s^3)^2/Hz",
+            k.as_str(),
+        ),
+        Entry::new(
+            "setBiasOmegaCovariance",
+            square(v.gyro.walk),
+            "(rad/s^2)^2/Hz",
+            k.as_str(),
+        ),
     ]
 }

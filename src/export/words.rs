@@ -38,15 +38,24 @@ impl Export {
 
     /// What a user should know before pasting, the most important first.
     pub(crate) fn doubts(&self) -> Vec<String> {
-        let mut doubts: Vec<String> =
-            self.settings.misfit.iter().map(|misfit| format!("the model {misfit}")).collect();
+        let mut doubts: Vec<String> = self
+            .settings
+            .misfit
+            .iter()
+            .map(|misfit| format!("the model {misfit}"))
+            .collect();
         doubts.extend(self.sensors.iter().flat_map(|s| self.doubts_of(s)));
         doubts.extend(self.entries.iter().filter_map(|e| {
             let wanted = e.wanted?;
-            Some(format!("{} is {:.3e}, the end of its range; the model says {wanted:.3e}", e.key, e.value))
+            Some(format!(
+                "{} is {:.3e}, the end of its range; the model says {wanted:.3e}",
+                e.key, e.value
+            ))
         }));
         if self.target.is_autopilot() {
-            doubts.push("a recording at rest has no vibration: these values are a lower bound".to_owned());
+            doubts.push(
+                "a recording at rest has no vibration: these values are a lower bound".to_owned(),
+            );
         }
         doubts
     }
@@ -78,21 +87,30 @@ impl Export {
             ));
         }
         doubts.extend(axes_differ(s));
-        doubts.into_iter().map(|doubt| format!("{}: {doubt}", s.sensor.name())).collect()
+        doubts
+            .into_iter()
+            .map(|doubt| format!("{}: {doubt}", s.sensor.name()))
+            .collect()
     }
 }
 
 /// The axes beside the largest, where they differ or some are missing.
 fn axes_differ(s: &SensorExport) -> Option<String> {
     let largest = s.deviation_at_1_s.iter().copied().fold(0.0, f64::max);
-    if s.deviation_at_1_s.iter().all(|d| *d >= (1.0 - NOTABLE) * largest) {
+    if s.deviation_at_1_s
+        .iter()
+        .all(|d| *d >= (1.0 - NOTABLE) * largest)
+    {
         return (s.axes.len() < 3).then(|| format!("the model has {} of three axes", s.axes.len()));
     }
     let ratio = |((channel, _), d): (&(nav_sim_signal::imu::Channel, _), &f64)| {
         format!("{} {:.2}", channel.axis.name(), d / largest)
     };
     let ratios: Vec<String> = s.axes.iter().zip(&s.deviation_at_1_s).map(ratio).collect();
-    Some(format!("axes differ (Allan deviation at 1 s: {}); the largest is exported", ratios.join(", ")))
+    Some(format!(
+        "axes differ (Allan deviation at 1 s: {}); the largest is exported",
+        ratios.join(", ")
+    ))
 }
 
 /// `N 0.42 deg/sqrt(h), K 12 deg/h/sqrt(h), B 8.3 deg/h at 160 s`.
@@ -101,14 +119,30 @@ fn parameters(s: &SensorExport) -> String {
         let (unit, factor) = what.sheet(s.sensor);
         format!("{} {unit}", readable(x * factor))
     };
-    let Pair { density, walk, markov } = s.exported;
+    let Pair {
+        density,
+        walk,
+        markov,
+    } = s.exported;
     let bias = markov.map_or_else(
         || format!("K {}", figure(Quantity::Walk, walk)),
-        |m| format!("bias {} with T = {}", figure(Quantity::Bias, m.sigma), seconds(m.t_corr_s)),
+        |m| {
+            format!(
+                "bias {} with T = {}",
+                figure(Quantity::Bias, m.sigma),
+                seconds(m.t_corr_s)
+            )
+        },
     );
     let floor = s.largest.minimum.map_or_else(
         || "B not reached".to_owned(),
-        |m| format!("B {} at {}", figure(Quantity::Bias, m.bias_instability()), seconds(m.tau_s)),
+        |m| {
+            format!(
+                "B {} at {}",
+                figure(Quantity::Bias, m.bias_instability()),
+                seconds(m.tau_s)
+            )
+        },
     );
     format!("N {}, {bias}, {floor}", figure(Quantity::Density, density))
 }

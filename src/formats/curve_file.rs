@@ -30,8 +30,18 @@ const LAYOUT: &str = "a curve is a CSV with the columns tau_samples,wv,edof (tau
                       written by calibrate or wv";
 
 /// A value of a column or key that means nothing.
-fn refused(path: &str, place: &Place, column: &str, value: impl Display, expected: &str) -> FileError {
-    FileError::contents(path, place.clone(), format!("{column} = {value} is not {expected}"))
+fn refused(
+    path: &str,
+    place: &Place,
+    column: &str,
+    value: impl Display,
+    expected: &str,
+) -> FileError {
+    FileError::contents(
+        path,
+        place.clone(),
+        format!("{column} = {value} is not {expected}"),
+    )
 }
 
 /// Reads the curves of a file.
@@ -50,7 +60,11 @@ pub(crate) fn read(path: &Path) -> Result<Vec<NamedCurve>, FileError> {
 }
 
 fn parse(path: &str, text: &str) -> Result<Vec<NamedCurve>, FileError> {
-    let curves = if text.trim_start().starts_with('{') { json(path, text)? } else { vec![csv(path, text)?] };
+    let curves = if text.trim_start().starts_with('{') {
+        json(path, text)?
+    } else {
+        vec![csv(path, text)?]
+    };
     if curves.iter().any(|c| c.curve.levels.is_empty()) || curves.is_empty() {
         return Err(FileError::contents(path, Place::Within, "no curve in it"));
     }
@@ -62,9 +76,20 @@ fn csv(path: &str, text: &str) -> Result<NamedCurve, FileError> {
     let columns = table.named(["tau_samples", "wv", "edof"])?;
     let mut curve = Curve::default();
     for (line, row) in &table.rows {
-        push(&mut curve, path, &Place::Line(*line), columns.map(|column| row[column]))?;
+        push(
+            &mut curve,
+            path,
+            &Place::Line(*line),
+            columns.map(|column| row[column]),
+        )?;
     }
-    Ok(NamedCurve { sensor: None, axis: None, rate_hz: None, estimator: None, curve })
+    Ok(NamedCurve {
+        sensor: None,
+        axis: None,
+        rate_hz: None,
+        estimator: None,
+        curve,
+    })
 }
 
 /// What tells the file of `wv` from that of `calibrate`.
@@ -75,7 +100,10 @@ struct Signals {
 
 fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, FileError> {
     let syntax = |e: serde_json::Error| FileError::contents(path, e.line(), e.to_string());
-    let is_of_wv = serde_json::from_str::<Signals>(text).map_err(syntax)?.signals.is_some();
+    let is_of_wv = serde_json::from_str::<Signals>(text)
+        .map_err(syntax)?
+        .signals
+        .is_some();
     let head = Place::Part("head".into());
     let file = if is_of_wv {
         let file: SignalsFile = serde_json::from_str(text).map_err(syntax)?;
@@ -95,10 +123,18 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, FileError> {
     }
     if !(file.rate_hz.is_finite() && file.rate_hz > 0.0) {
         let rate = Place::Part("rate".into());
-        return Err(refused(path, &rate, "rate_hz", file.rate_hz, "a finite number > 0"));
+        return Err(refused(
+            path,
+            &rate,
+            "rate_hz",
+            file.rate_hz,
+            "a finite number > 0",
+        ));
     }
     let numbered = (1..).zip(&file.curves);
-    numbered.map(|(number, entry)| named_curve(path, number, entry, file.rate_hz)).collect()
+    numbered
+        .map(|(number, entry)| named_curve(path, number, entry, file.rate_hz))
+        .collect()
 }
 
 /// One curve of a JSON file.
@@ -110,26 +146,42 @@ fn named_curve(
 ) -> Result<NamedCurve, FileError> {
     let (tau, wv, edof) = (entry.tau_s.len(), entry.wv.len(), entry.edof.len());
     if tau != wv || tau != edof {
-        let message =
-            format!("curve {number} has {tau} scales, {wv} wavelet variances and {edof} degrees of freedom");
+        let message = format!(
+            "curve {number} has {tau} scales, {wv} wavelet variances and {edof} degrees of freedom"
+        );
         return Err(FileError::contents(path, Place::Within, message));
     }
     let place = Place::Part(format!("curve {number}").into());
     let sensor = entry.sensor.parse();
-    let sensor = sensor.map_err(|_| refused(path, &place, "sensor", &entry.sensor, "accel or gyro"))?;
+    let sensor =
+        sensor.map_err(|_| refused(path, &place, "sensor", &entry.sensor, "accel or gyro"))?;
     let axis = Axis::ALL.into_iter().find(|a| a.name() == entry.axis);
     if axis.is_none() && entry.axis != "all" {
         return Err(refused(path, &place, "axis", &entry.axis, "x, y, z or all"));
     }
-    let mut curve = Curve { quantization: quantization(path, &place, entry.efficiency)?, ..Curve::default() };
+    let mut curve = Curve {
+        quantization: quantization(path, &place, entry.efficiency)?,
+        ..Curve::default()
+    };
     for i in 0..tau {
         let place = Place::Part(format!("curve {number}, scale {}", i + 1).into());
-        push(&mut curve, path, &place, [entry.tau_s[i] * rate_hz, entry.wv[i], entry.edof[i]])?;
+        push(
+            &mut curve,
+            path,
+            &place,
+            [entry.tau_s[i] * rate_hz, entry.wv[i], entry.edof[i]],
+        )?;
     }
     let level = |tau_s: &f64| (tau_s * rate_hz).log2().round() as u32;
     curve.classical = entry.classical_tau_s.iter().map(level).collect();
     let estimator = (!entry.estimator.is_empty()).then(|| entry.estimator.clone());
-    Ok(NamedCurve { sensor: Some(sensor), axis, rate_hz: Some(rate_hz), estimator, curve })
+    Ok(NamedCurve {
+        sensor: Some(sensor),
+        axis,
+        rate_hz: Some(rate_hz),
+        estimator,
+        curve,
+    })
 }
 
 /// How robust variances of an efficiency read quantization noise.
@@ -138,17 +190,30 @@ fn quantization(
     place: &Place,
     efficiency: Option<f64>,
 ) -> Result<Option<QuantizationResponse>, FileError> {
-    let Some(efficiency) = efficiency else { return Ok(None) };
+    let Some(efficiency) = efficiency else {
+        return Ok(None);
+    };
     // The efficiency in a file is the true one, which the other convention puts a little beyond the range.
     let tuning = Tuning::new(efficiency.clamp(0.3, 0.99), Convention::Exact);
     match tuning {
         Ok(tuning) if efficiency > 0.0 && efficiency <= 1.0 => Ok(Some(*tuning.quantization())),
-        _ => Err(refused(path, place, "efficiency", efficiency, "a number above 0, up to 1")),
+        _ => Err(refused(
+            path,
+            place,
+            "efficiency",
+            efficiency,
+            "a number above 0, up to 1",
+        )),
     }
 }
 
 /// Appends a point (scale in samples, wavelet variance, degrees of freedom); scales are powers of two, ascending.
-fn push(curve: &mut Curve, path: &str, place: &Place, [tau, wv, edof]: [f64; 3]) -> Result<(), FileError> {
+fn push(
+    curve: &mut Curve,
+    path: &str,
+    place: &Place,
+    [tau, wv, edof]: [f64; 3],
+) -> Result<(), FileError> {
     let refuse = |column, value: f64, expected| Err(refused(path, place, column, value, expected));
     let level = tau.log2().round();
     // Scales in seconds come back from a division by the rate.
@@ -156,7 +221,11 @@ fn push(curve: &mut Curve, path: &str, place: &Place, [tau, wv, edof]: [f64; 3])
     if !is_power {
         return refuse("tau_samples", tau, "a power of two ≥ 2");
     }
-    if curve.levels.last().is_some_and(|last| *last >= level as u32) {
+    if curve
+        .levels
+        .last()
+        .is_some_and(|last| *last >= level as u32)
+    {
         return refuse("tau_samples", tau, "greater than the one before");
     }
     let positive = |range: (f64, f64), value: f64| value >= range.0 && value <= range.1;
@@ -202,12 +271,24 @@ mod tests {
             edof: vec![10.0, 5.0],
             ..FittedCurve::default()
         };
-        let file = CurvesFile { schema_version: 1, rate_hz: 30.0, curves: vec![entry] };
+        let file = CurvesFile {
+            schema_version: 1,
+            rate_hz: 30.0,
+            curves: vec![entry],
+        };
         let read = json("m.wv.json", &to_json(&file)).unwrap();
-        assert_eq!((read[0].sensor, read[0].axis, read[0].rate_hz), (Some(Sensor::Gyro), None, Some(30.0)));
+        assert_eq!(
+            (read[0].sensor, read[0].axis, read[0].rate_hz),
+            (Some(Sensor::Gyro), None, Some(30.0))
+        );
         assert_eq!(
             read[0].curve,
-            Curve { levels: vec![1, 2], wv: vec![2e-7, 1e-7], edof: vec![10.0, 5.0], ..Curve::default() }
+            Curve {
+                levels: vec![1, 2],
+                wv: vec![2e-7, 1e-7],
+                edof: vec![10.0, 5.0],
+                ..Curve::default()
+            }
         );
     }
 
@@ -215,8 +296,14 @@ mod tests {
     fn refusals_name_the_line_and_the_value() {
         let message = |text: &str| csv("c.csv", text).unwrap_err().to_string();
         let head = "tau_samples,wv,edof\n";
-        assert_eq!(message("tau,wv,edof\n2,1,1\n"), "c.csv, line 1: no column is named \"tau_samples\"");
-        assert_eq!(message(&format!("{head}2,x,1\n")), "c.csv, line 2: column \"wv\": \"x\" is not a number");
+        assert_eq!(
+            message("tau,wv,edof\n2,1,1\n"),
+            "c.csv, line 1: no column is named \"tau_samples\""
+        );
+        assert_eq!(
+            message(&format!("{head}2,x,1\n")),
+            "c.csv, line 2: column \"wv\": \"x\" is not a number"
+        );
         assert_eq!(
             message(&format!("{head}3,1,1\n")),
             "c.csv, line 2: tau_samples = 3 is not a power of two ≥ 2"
@@ -225,7 +312,10 @@ mod tests {
             message(&format!("{head}4,1,1\n2,1,1\n")),
             "c.csv, line 3: tau_samples = 2 is not greater than the one before"
         );
-        assert_eq!(message(&format!("{head}2,NaN,1\n")), "c.csv, line 2: column \"wv\": NaN is not finite");
+        assert_eq!(
+            message(&format!("{head}2,NaN,1\n")),
+            "c.csv, line 2: column \"wv\": NaN is not finite"
+        );
         assert_eq!(
             message(&format!("{head}2,1,0\n")),
             "c.csv, line 2: edof = 0 is not a number from 1e-15 to 1e15"
@@ -235,13 +325,22 @@ mod tests {
             message(&format!("{head}2,1,1e16\n"))
                 .starts_with("c.csv, line 2: edof = 10000000000000000 is not")
         );
-        assert!(message(&format!("{head}2,1e170,1\n")).contains("is not a number from 1e-100 to 1e100"));
-        let later = to_json(&CurvesFile { schema_version: 9, rate_hz: 30.0, curves: vec![] });
+        assert!(
+            message(&format!("{head}2,1e170,1\n")).contains("is not a number from 1e-100 to 1e100")
+        );
+        let later = to_json(&CurvesFile {
+            schema_version: 9,
+            rate_hz: 30.0,
+            curves: vec![],
+        });
         assert_eq!(
             json("c.json", &later).unwrap_err().to_string(),
             "c.json, head: schema_version = 9 is not 1, which this version reads"
         );
         let json_error = json("c.json", "{\"rate_hz\": 1}").unwrap_err().to_string();
-        assert!(json_error.starts_with("c.json, line 1: missing field"), "{json_error}");
+        assert!(
+            json_error.starts_with("c.json, line 1: missing field"),
+            "{json_error}"
+        );
     }
 }

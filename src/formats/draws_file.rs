@@ -76,7 +76,9 @@ pub(crate) fn of_recordings(
     seed: u64,
 ) -> Result<Option<Draws>, String> {
     let of_recording = |(run, centre): (u64, &Model)| match &file.spread {
-        Some(spread) => spread.draw_about(centre, &file.model, seed, run).unwrap_or_else(|_| centre.clone()),
+        Some(spread) => spread
+            .draw_about(centre, &file.model, seed, run)
+            .unwrap_or_else(|_| centre.clone()),
         None => centre.clone(),
     };
     usable_as(path, &file.model, rate_hz, &|draws| Draws {
@@ -91,9 +93,15 @@ fn usable_as(
     rate_hz: f64,
     made: &dyn Fn(Draws) -> Draws,
 ) -> Result<Option<Draws>, String> {
-    let Some(file) = read(path).map_err(|e| e.to_string())? else { return Ok(None) };
-    let draws = file.draws(model).and_then(|draws| made(draws).at_rate(rate_hz).ok());
-    draws.map(Some).ok_or_else(|| format!("{} is not of {}", beside(path).display(), path.display()))
+    let Some(file) = read(path).map_err(|e| e.to_string())? else {
+        return Ok(None);
+    };
+    let draws = file
+        .draws(model)
+        .and_then(|draws| made(draws).at_rate(rate_hz).ok());
+    draws
+        .map(Some)
+        .ok_or_else(|| format!("{} is not of {}", beside(path).display(), path.display()))
 }
 
 /// The draws beside a model file; none where there is no such file.
@@ -111,12 +119,14 @@ pub fn read(model: &Path) -> Result<Option<DrawsFile>, FileError> {
         FileError::contents(path.display().to_string(), line as u64, message)
             .advice("calibrate again, or remove the file")
     };
-    let file: DrawsFile = serde_json::from_str(&text).map_err(|e| refused(e.line(), e.to_string()))?;
+    let file: DrawsFile =
+        serde_json::from_str(&text).map_err(|e| refused(e.line(), e.to_string()))?;
     match file.schema_version {
         SCHEMA_VERSION => Ok(Some(file)),
-        other => {
-            Err(refused(1, format!("\"schema_version\" is {other}; this nav-sim reads {SCHEMA_VERSION}")))
-        }
+        other => Err(refused(
+            1,
+            format!("\"schema_version\" is {other}; this nav-sim reads {SCHEMA_VERSION}"),
+        )),
     }
 }
 
@@ -142,14 +152,24 @@ impl DrawsFile {
             })
         };
         let signals = outcomes.iter().map(signals).collect::<Option<_>>()?;
-        Some(Self { schema_version: SCHEMA_VERSION, rate_hz, signals })
+        Some(Self {
+            schema_version: SCHEMA_VERSION,
+            rate_hz,
+            signals,
+        })
     }
 
     /// The models of the draws of `model`, as it is in the file beside; none where the draws are not of it.
     #[must_use]
     pub fn draws(&self, model: &Model) -> Option<Draws> {
-        let is_of = |s: &SignalDraws, channel: Channel| Channel::named(&s.signals).contains(&channel);
-        let count = self.signals.iter().map(|s| s.draws.len()).min().filter(|count| *count > 0)?;
+        let is_of =
+            |s: &SignalDraws, channel: Channel| Channel::named(&s.signals).contains(&channel);
+        let count = self
+            .signals
+            .iter()
+            .map(|s| s.draws.len())
+            .min()
+            .filter(|count| *count > 0)?;
         let mut models = vec![model.clone(); count];
         for channel in Channel::ALL {
             let axis = model.axis(channel);
@@ -179,8 +199,14 @@ impl Draws {
     /// # Errors
     /// As [`continuous::at_rate`].
     pub(crate) fn at_rate(&self, rate_hz: f64) -> Result<Self, RateError> {
-        let models = self.models.iter().map(|model| continuous::at_rate(model, rate_hz));
-        Ok(Self { models: models.collect::<Result<_, _>>()?, stretch: self.stretch })
+        let models = self
+            .models
+            .iter()
+            .map(|model| continuous::at_rate(model, rate_hz));
+        Ok(Self {
+            models: models.collect::<Result<_, _>>()?,
+            stretch: self.stretch,
+        })
     }
 }
 
@@ -203,7 +229,10 @@ mod tests {
 
     fn axis(scale: f64) -> Composite {
         let ar1 = Ar1::new(1.0 - 1e-4 * scale, 1e-9 * scale).unwrap();
-        Composite::new(vec![Process::White(White::new(1e-6 * scale).unwrap()), Process::Ar1(ar1)])
+        Composite::new(vec![
+            Process::White(White::new(1e-6 * scale).unwrap()),
+            Process::Ar1(ar1),
+        ])
     }
 
     fn file() -> (Model, DrawsFile) {
@@ -212,12 +241,18 @@ mod tests {
             stretch: 1.0 + base / 10.0,
             parameters: vec!["WN sigma2".into(), "AR1 phi".into(), "AR1 sigma2".into()],
             estimate: values(&axis(base)),
-            draws: [0.9, 1.2].map(|factor| values(&axis(base * factor))).to_vec(),
+            draws: [0.9, 1.2]
+                .map(|factor| values(&axis(base * factor)))
+                .to_vec(),
         };
         let signals = vec![signals("accel", 1.0), signals("gyro", 2.0)];
         (
             Model::pooled(100.0, &axis(1.0), &axis(2.0)),
-            DrawsFile { schema_version: 1, rate_hz: 100.0, signals },
+            DrawsFile {
+                schema_version: 1,
+                rate_hz: 100.0,
+                signals,
+            },
         )
     }
 
@@ -231,7 +266,10 @@ mod tests {
         let found = read(&path).unwrap().unwrap();
         assert_eq!(found, file);
         let draws = found.draws(&model).unwrap();
-        assert_eq!(draws.models[1], Model::pooled(100.0, &axis(1.2), &axis(2.4)));
+        assert_eq!(
+            draws.models[1],
+            Model::pooled(100.0, &axis(1.2), &axis(2.4))
+        );
         assert_eq!((draws.models.len(), draws.stretch), (2, 1.2));
     }
 

@@ -90,11 +90,17 @@ impl fmt::Display for Kind {
         match self {
             Self::System(source) => f.write_str(&system_words(source)),
             Self::Empty(message) => f.write_str(message),
-            Self::Header(message) | Self::Columns(message) | Self::Contents(message) => f.write_str(message),
+            Self::Header(message) | Self::Columns(message) | Self::Contents(message) => {
+                f.write_str(message)
+            }
             Self::UnknownKey(key) => write!(f, "unknown key \"{key}\""),
             Self::MissingKey(key) => write!(f, "{key} is missing"),
             Self::Value { key, value, reason } => write!(f, "\"{key}\" = {value} {reason}"),
-            Self::Cell { column, value, reason } => write!(f, "column \"{column}\": {value} {reason}"),
+            Self::Cell {
+                column,
+                value,
+                reason,
+            } => write!(f, "column \"{column}\": {value} {reason}"),
         }
     }
 }
@@ -113,7 +119,12 @@ pub(crate) fn system_words(error: &io::Error) -> Cow<'static, str> {
         K::QuotaExceeded => "no space is left within the quota",
         _ => {
             let text = error.to_string();
-            return text.split(" (os error").next().unwrap_or_default().to_owned().into();
+            return text
+                .split(" (os error")
+                .next()
+                .unwrap_or_default()
+                .to_owned()
+                .into();
         }
     };
     words.into()
@@ -126,7 +137,9 @@ impl fmt::Display for FileError {
             Place::Within => write!(f, "{path}: {kind}"),
             Place::Itself => write!(f, "{path} {kind}"),
             Place::Line(line) => write!(f, "{path}, line {line}: {kind}"),
-            Place::Character(line, column) => write!(f, "{path}, line {line}, column {column}: {kind}"),
+            Place::Character(line, column) => {
+                write!(f, "{path}, line {line}, column {column}: {kind}")
+            }
             Place::Part(part) => write!(f, "{path}, {part}: {kind}"),
         }
     }
@@ -144,7 +157,12 @@ impl std::error::Error for FileError {
 impl FileError {
     /// Something wrong, without a remedy.
     pub(crate) fn new(path: impl Into<Box<str>>, place: impl Into<Place>, kind: Kind) -> Self {
-        Self { path: path.into(), place: place.into(), kind, remedies: Vec::new() }
+        Self {
+            path: path.into(),
+            place: place.into(),
+            kind,
+            remedies: Vec::new(),
+        }
     }
 
     /// What the system said of a file, and what helps.
@@ -156,11 +174,17 @@ impl FileError {
                 Some("change the permissions of the file or its directory, or name another path")
             }
             K::IsADirectory => Some("name a file"),
-            K::NotADirectory | K::AlreadyExists => Some("name another path, or move that file away"),
+            K::NotADirectory | K::AlreadyExists => {
+                Some("name another path, or move that file away")
+            }
             K::StorageFull | K::QuotaExceeded => Some("make room, or name a path on another disk"),
             _ => None,
         };
-        let error = Self::new(path.display().to_string(), Place::Within, Kind::System(source));
+        let error = Self::new(
+            path.display().to_string(),
+            Place::Within,
+            Kind::System(source),
+        );
         error.advice_if(advice.map(str::to_owned))
     }
 
@@ -174,7 +198,11 @@ impl FileError {
             _ => source,
         };
         let error = Self::io(path, source);
-        if error.remedies.is_empty() { error.advice("name another path") } else { error }
+        if error.remedies.is_empty() {
+            error.advice("name another path")
+        } else {
+            error
+        }
     }
 
     /// Contents that are refused, in words.
@@ -196,14 +224,30 @@ impl FileError {
     ) -> Self {
         let (value, reason) = (value.into(), reason.into());
         let is_decimal = &*reason == "is not a number" && decimal_comma(value.trim_matches('"'));
-        let error = Self::new(path, line, Kind::Cell { column: column.into(), value, reason });
-        if is_decimal { error.advice("write decimals with a point: 0.5, not 0,5") } else { error }
+        let error = Self::new(
+            path,
+            line,
+            Kind::Cell {
+                column: column.into(),
+                value,
+                reason,
+            },
+        );
+        if is_decimal {
+            error.advice("write decimals with a point: 0.5, not 0,5")
+        } else {
+            error
+        }
     }
 
     /// A row with too few or too many values.
     pub(super) fn row_length(path: &str, line: u64, found: usize, expected: usize) -> Self {
-        Self::contents(path, line, format!("{found} values, but {expected} columns"))
-            .advice("every row needs one value a column; was the file cut off?")
+        Self::contents(
+            path,
+            line,
+            format!("{found} values, but {expected} columns"),
+        )
+        .advice("every row needs one value a column; was the file cut off?")
     }
 
     /// With advice, beside what it has.
@@ -254,7 +298,10 @@ impl FileError {
     }
 
     /// What helps, where `words` says how a setting is made. What cannot be set there is left out.
-    pub(crate) fn hint_with(&self, words: impl Fn(Setting) -> Option<&'static str>) -> Option<String> {
+    pub(crate) fn hint_with(
+        &self,
+        words: impl Fn(Setting) -> Option<&'static str>,
+    ) -> Option<String> {
         let known = self.remedies.iter().filter_map(|remedy| match remedy {
             Remedy::Advice(advice) => Some(advice.as_ref()),
             Remedy::Setting(setting) => words(*setting),
@@ -333,9 +380,13 @@ mod tests {
 
     #[test]
     fn a_decimal_comma_is_told_wherever_a_cell_is_no_number() {
-        let hint = |value: &str| FileError::cell("a.csv", 2, "t_s", value, "is not a number").hint();
+        let hint =
+            |value: &str| FileError::cell("a.csv", 2, "t_s", value, "is not a number").hint();
         for value in ["\"0,05\"", "-1,5e3"] {
-            assert_eq!(hint(value).unwrap(), "write decimals with a point: 0.5, not 0,5");
+            assert_eq!(
+                hint(value).unwrap(),
+                "write decimals with a point: 0.5, not 0,5"
+            );
         }
         assert_eq!((hint("\"1,2,3\""), hint("\"abc\"")), (None, None));
     }
@@ -347,11 +398,16 @@ mod tests {
             .setting(Setting::ColumnNames)
             .setting(Setting::Channels);
         assert_eq!(e.to_string(), "a.csv, line 3: no unit");
-        assert_eq!(e.hint().unwrap(), "name it, or give the names of the columns, or leave the channel out");
+        assert_eq!(
+            e.hint().unwrap(),
+            "name it, or give the names of the columns, or leave the channel out"
+        );
         let only_names = |setting| (setting == Setting::ColumnNames).then_some("--columns");
         assert_eq!(e.hint_with(only_names).unwrap(), "name it, or --columns");
         assert_eq!(
-            FileError::contents("a", Place::Within, "b").setting(Setting::Gaps).hint_with(|_| None),
+            FileError::contents("a", Place::Within, "b")
+                .setting(Setting::Gaps)
+                .hint_with(|_| None),
             None
         );
     }
@@ -359,7 +415,9 @@ mod tests {
     #[test]
     fn damage_is_not_the_systems_fault() {
         let e = |kind: io::ErrorKind| FileError::io(Path::new("a.gz"), kind.into());
-        assert!(e(io::ErrorKind::NotFound).is_system() && !e(io::ErrorKind::UnexpectedEof).is_system());
+        assert!(
+            e(io::ErrorKind::NotFound).is_system() && !e(io::ErrorKind::UnexpectedEof).is_system()
+        );
         assert!(!FileError::contents("a", Place::Itself, "is cut off").is_system());
         assert!(e(io::ErrorKind::UnexpectedEof).hint().is_some());
     }
@@ -370,9 +428,21 @@ mod tests {
     fn the_system_is_told_in_our_words() {
         for (number, told, hint) in [
             (2, "a: No such file or directory", None),
-            (13, "a: the system does not permit it", Some("change the permissions")),
-            (17, "a: a file is where a directory is needed", Some("name another path")),
-            (20, "a: a file is where a directory is needed", Some("name another path")),
+            (
+                13,
+                "a: the system does not permit it",
+                Some("change the permissions"),
+            ),
+            (
+                17,
+                "a: a file is where a directory is needed",
+                Some("name another path"),
+            ),
+            (
+                20,
+                "a: a file is where a directory is needed",
+                Some("name another path"),
+            ),
             (21, "a: it is a directory, not a file", Some("name a file")),
             (28, "a: no space is left on the disk", Some("make room")),
             (5, "a: Input/output error", None),
@@ -381,7 +451,11 @@ mod tests {
             let e = FileError::io(Path::new("a"), io::Error::from_raw_os_error(number));
             assert!(e.to_string() == told && e.is_system(), "{e}");
             let is_hinted = |start: &str| e.hint().is_some_and(|given| given.starts_with(start));
-            assert!(hint.map_or(e.hint().is_none(), is_hinted), "{number}: {:?}", e.hint());
+            assert!(
+                hint.map_or(e.hint().is_none(), is_hinted),
+                "{number}: {:?}",
+                e.hint()
+            );
         }
     }
 }

@@ -59,13 +59,20 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, FileError> {
         None => {}
     }
     let plain = name.strip_suffix(".gz").unwrap_or(&name);
-    if [".nav", ".tum", ".gpx"].iter().any(|ending| plain.ends_with(ending)) {
+    if [".nav", ".tum", ".gpx"]
+        .iter()
+        .any(|ending| plain.ends_with(ending))
+    {
         return Ok(FileKind::Trajectory);
     }
     let error = |e| FileError::io(path, e);
     let file = source::open(path).map_err(error)?;
     let is_compressed = plain != name;
-    let reader: Box<dyn Read> = if is_compressed { Box::new(GzDecoder::new(file)) } else { file };
+    let reader: Box<dyn Read> = if is_compressed {
+        Box::new(GzDecoder::new(file))
+    } else {
+        file
+    };
     let mut head = Vec::new();
     match reader.take(HEAD).read_to_end(&mut head) {
         // A damaged one: the reader of recordings says how.
@@ -76,10 +83,17 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, FileError> {
     if name.ends_with(".json") || text.trim_start().starts_with('{') {
         // What this program says of its results has a version; of those only curves have wavelet variances to be read.
         let is_record = text.contains("\"schema_version\"") && !text.contains("\"wv\"");
-        return Ok(if is_record { FileKind::Record } else { FileKind::Curve });
+        return Ok(if is_record {
+            FileKind::Record
+        } else {
+            FileKind::Curve
+        });
     }
     // No table of numbers is TOML, which needs no ending then: a pipe has none.
-    let table = text.parse::<toml::Table>().ok().filter(|table| !table.is_empty());
+    let table = text
+        .parse::<toml::Table>()
+        .ok()
+        .filter(|table| !table.is_empty());
     Ok(match table {
         None if !name.ends_with(".toml") => table_kind(&text),
         table => toml_kind(&table.unwrap_or_default()),
@@ -89,7 +103,11 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, FileError> {
 /// What does not parse is read as a scenario, whose reader says where it is wrong.
 fn toml_kind(table: &toml::Table) -> FileKind {
     let has = |keys: &[&str]| keys.iter().any(|key| table.contains_key(*key));
-    let sensors = || ["accel", "gyro"].iter().filter_map(|sensor| table.get(*sensor));
+    let sensors = || {
+        ["accel", "gyro"]
+            .iter()
+            .filter_map(|sensor| table.get(*sensor))
+    };
     if has(&["unit"]) {
         FileKind::CatalogueEntry
     } else if sensors().any(toml::Value::is_array) {
@@ -113,10 +131,16 @@ fn toml_kind(table: &toml::Table) -> FileKind {
 
 /// Whether there is a bound of a parameter in it.
 fn bounds(value: &toml::Value) -> bool {
-    let Some(table) = value.as_table() else { return false };
-    let of_parameter =
-        ["lower", "upper", "fix"].iter().any(|key| table.get(*key).is_some_and(|v| !v.is_table()));
-    of_parameter || table.iter().any(|(key, value)| key != "spread" && bounds(value))
+    let Some(table) = value.as_table() else {
+        return false;
+    };
+    let of_parameter = ["lower", "upper", "fix"]
+        .iter()
+        .any(|key| table.get(*key).is_some_and(|v| !v.is_table()));
+    of_parameter
+        || table
+            .iter()
+            .any(|(key, value)| key != "spread" && bounds(value))
 }
 
 /// The texts of KF-GINS, numbers between blanks without a header: increments are small, latitudes are not.
@@ -130,9 +154,12 @@ fn bare_kind(text: &str) -> Option<FileKind> {
 }
 
 fn table_kind(text: &str) -> FileKind {
-    let position = |line: &str| line.contains("lat_deg") || line.contains("n_m") && line.contains("e_m");
+    let position =
+        |line: &str| line.contains("lat_deg") || line.contains("n_m") && line.contains("e_m");
     let fixes = |line: &str| {
-        position(line) && ["sd_", "std_", "sigma_"].iter().any(|s| line.contains(s)) && !line.contains("yaw")
+        position(line)
+            && ["sd_", "std_", "sigma_"].iter().any(|s| line.contains(s))
+            && !line.contains("yaw")
     };
     if let Some(kind) = bare_kind(text) {
         kind
@@ -140,7 +167,11 @@ fn table_kind(text: &str) -> FileKind {
         FileKind::Gnss
     } else if text.trim_start().starts_with("ini lat") {
         FileKind::Trajectory
-    } else if text.lines().take(20).any(|line| line.contains("tau_samples")) {
+    } else if text
+        .lines()
+        .take(20)
+        .any(|line| line.contains("tau_samples"))
+    {
         FileKind::Curve
     } else if text.lines().take(20).any(fixes) {
         FileKind::Gnss
@@ -162,26 +193,68 @@ mod tests {
     #[test]
     fn contents_tell_the_kind() {
         assert_eq!(of_toml("[accel]\nprocesses = []"), FileKind::Model);
-        assert_eq!(of_toml("[unit]\nname = 'a'\n[gyro]\nnoise = {}"), FileKind::CatalogueEntry);
+        assert_eq!(
+            of_toml("[unit]\nname = 'a'\n[gyro]\nnoise = {}"),
+            FileKind::CatalogueEntry
+        );
         assert_eq!(of_toml("start = {}\nsegment = []"), FileKind::Trajectory);
         assert_eq!(of_toml("runs = 3\n[[candidate]]"), FileKind::Study);
-        assert_eq!(of_toml("sets = 500\nmodel = 'n1.toml'"), FileKind::Efficiency);
+        assert_eq!(
+            of_toml("sets = 500\nmodel = 'n1.toml'"),
+            FileKind::Efficiency
+        );
         assert_eq!(of_toml("[run]\nruns = 3"), FileKind::Scenario);
-        assert_eq!(of_toml("[gyro.AR1_1]\nphi = { fix = 0.98 }"), FileKind::Parameters);
-        assert_eq!(of_toml("[WN]\nsigma2 = { lower = 0.1 }"), FileKind::Parameters);
-        assert_eq!(of_toml("[[accel]]\noperation = 'ar1'"), FileKind::Contamination);
-        assert_eq!(table_kind("$GPGGA,123519,4807.038,N,01131.000,E,1"), FileKind::Gnss);
+        assert_eq!(
+            of_toml("[gyro.AR1_1]\nphi = { fix = 0.98 }"),
+            FileKind::Parameters
+        );
+        assert_eq!(
+            of_toml("[WN]\nsigma2 = { lower = 0.1 }"),
+            FileKind::Parameters
+        );
+        assert_eq!(
+            of_toml("[[accel]]\noperation = 'ar1'"),
+            FileKind::Contamination
+        );
+        assert_eq!(
+            table_kind("$GPGGA,123519,4807.038,N,01131.000,E,1"),
+            FileKind::Gnss
+        );
         assert_eq!(table_kind("tau_samples,wv,edof"), FileKind::Curve);
-        assert_eq!(of_toml("t_s = 0\nlat_deg = 46\nyaw_deg = 3"), FileKind::Initial);
-        assert_eq!(table_kind("t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m"), FileKind::Gnss);
-        assert_eq!(table_kind("t_s,lat_deg,lon_deg,h_m,yaw_deg,sd_yaw_deg"), FileKind::Trajectory);
-        assert_eq!(table_kind("ini lat (deg),ini lon (deg)"), FileKind::Trajectory);
+        assert_eq!(
+            of_toml("t_s = 0\nlat_deg = 46\nyaw_deg = 3"),
+            FileKind::Initial
+        );
+        assert_eq!(
+            table_kind("t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m"),
+            FileKind::Gnss
+        );
+        assert_eq!(
+            table_kind("t_s,lat_deg,lon_deg,h_m,yaw_deg,sd_yaw_deg"),
+            FileKind::Trajectory
+        );
+        assert_eq!(
+            table_kind("ini lat (deg),ini lon (deg)"),
+            FileKind::Trajectory
+        );
         assert_eq!(table_kind("1 30.5 114.2 20 1 1 2\n"), FileKind::Gnss);
-        assert_eq!(table_kind("1 30.5 114.2 20 0 0 0 1 1 2 0.1 0.1 0.1\n"), FileKind::Gnss);
-        assert_eq!(table_kind("1 1e-5 2e-5 -1e-5 0.01 0.02 -0.098\n"), FileKind::Imu);
+        assert_eq!(
+            table_kind("1 30.5 114.2 20 0 0 0 1 1 2 0.1 0.1 0.1\n"),
+            FileKind::Gnss
+        );
+        assert_eq!(
+            table_kind("1 1e-5 2e-5 -1e-5 0.01 0.02 -0.098\n"),
+            FileKind::Imu
+        );
         assert_eq!(of_toml("= broken"), FileKind::Scenario);
-        assert_eq!(table_kind("# origin\nt_s, lat_deg, lon_deg"), FileKind::Trajectory);
-        assert_eq!(table_kind("t_s,accel_x_m_s2,gyro_z_rad_s"), FileKind::Recording);
+        assert_eq!(
+            table_kind("# origin\nt_s, lat_deg, lon_deg"),
+            FileKind::Trajectory
+        );
+        assert_eq!(
+            table_kind("t_s,accel_x_m_s2,gyro_z_rad_s"),
+            FileKind::Recording
+        );
     }
 
     #[test]
@@ -194,7 +267,13 @@ mod tests {
             ("66", "{ \"curves\": [] }", FileKind::Curve),
         ] {
             let path = dir.path().join(name);
-            assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+            assert!(
+                std::process::Command::new("mkfifo")
+                    .arg(&path)
+                    .status()
+                    .unwrap()
+                    .success()
+            );
             let writer = std::thread::spawn({
                 let path = path.clone();
                 move || std::fs::write(path, text).unwrap()

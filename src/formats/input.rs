@@ -10,7 +10,11 @@ use std::path::{Path, PathBuf};
 /// When the system refuses.
 pub(crate) fn input(role: &str, path: &Path) -> Result<Input, FileError> {
     let blake3 = hash::as_read(path).map_err(|e| FileError::io(path, e))?;
-    Ok(Input { role: role.to_owned(), path: path.display().to_string(), blake3 })
+    Ok(Input {
+        role: role.to_owned(),
+        path: path.display().to_string(),
+        blake3,
+    })
 }
 
 /// BLAKE3 of a file as it is now, in hexadecimal.
@@ -35,7 +39,11 @@ pub(crate) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
         let refused = |e| FileError::io(path, e);
         let entries = std::fs::read_dir(path).map_err(refused)?;
         let entries = entries.collect::<Result<Vec<_>, _>>().map_err(refused)?;
-        let mut within: Vec<PathBuf> = entries.iter().map(|e| e.path()).filter(|p| p.is_file()).collect();
+        let mut within: Vec<PathBuf> = entries
+            .iter()
+            .map(|e| e.path())
+            .filter(|p| p.is_file())
+            .collect();
         within.sort();
         files.extend(within);
     }

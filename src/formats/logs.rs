@@ -20,7 +20,9 @@ pub struct LogOptions {
 /// The kind of log that a file is by its first bytes; none for tables and arrays. What cannot be opened is for its reader
 /// to refuse, and a pipe gives its bytes once.
 pub(crate) fn kind_of(path: &Path) -> Option<Kind> {
-    std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?;
+    std::fs::metadata(path)
+        .ok()
+        .filter(std::fs::Metadata::is_file)?;
     let file = File::open(path).ok()?;
     let mut head = Vec::new();
     file.take(HEAD as u64).read_to_end(&mut head).ok()?;
@@ -57,12 +59,17 @@ pub(crate) fn refused(path: &Path, error: Error) -> FileError {
             let refusal = FileError::contents(shown, Place::Itself, format!("is {error}"));
             refusal.advice_if(hint.map(|command| format!("convert it: {command}")))
         }
-        _ => FileError::contents(shown, Place::Within, error.to_string()).advice_if(hint.map(str::to_owned)),
+        _ => FileError::contents(shown, Place::Within, error.to_string())
+            .advice_if(hint.map(str::to_owned)),
     }
 }
 
 /// Words on damage before which the reading ended.
 pub(crate) fn recovered(damage: &Damage) -> String {
-    let Damage { error, read_bytes, file_bytes } = damage;
+    let Damage {
+        error,
+        read_bytes,
+        file_bytes,
+    } = damage;
     format!("{error}; read up to there, {read_bytes} of {file_bytes} bytes")
 }

@@ -62,15 +62,29 @@ fn parse<R: Read>(path: &str, mut reader: R, size: u64) -> Result<Array<R>, File
         return Err(malformed("the header is cut off"));
     }
     let mut text = Vec::new();
-    reader.by_ref().take(length).read_to_end(&mut text).map_err(io)?;
+    reader
+        .by_ref()
+        .take(length)
+        .read_to_end(&mut text)
+        .map_err(io)?;
     let header = Header::parse(path, &String::from_utf8_lossy(&text))?;
-    let elements = header.rows.checked_mul(header.columns).and_then(|n| n.checked_mul(header.width));
+    let elements = header
+        .rows
+        .checked_mul(header.columns)
+        .and_then(|n| n.checked_mul(header.width));
     let expected = elements.map_or(u64::MAX, |n| n as u64);
     if size - before < expected {
-        let message = format!("cut off: {expected} bytes of elements expected, {} found", size - before);
+        let message = format!(
+            "cut off: {expected} bytes of elements expected, {} found",
+            size - before
+        );
         return Err(FileError::contents(path, Place::Within, message));
     }
-    Ok(Array { path: path.to_owned(), header, elements: reader })
+    Ok(Array {
+        path: path.to_owned(),
+        header,
+        elements: reader,
+    })
 }
 
 fn malformed(path: &str, defect: &str) -> FileError {
@@ -82,38 +96,65 @@ impl Header {
         let malformed = |what| malformed(path, what);
         let after = |key: &str| {
             let (_, rest) = text.split_once(key)?;
-            Some(rest.trim_start_matches(['\'', '"']).trim_start().strip_prefix(':')?.trim_start())
+            Some(
+                rest.trim_start_matches(['\'', '"'])
+                    .trim_start()
+                    .strip_prefix(':')?
+                    .trim_start(),
+            )
         };
         let dtype = after("descr").ok_or_else(|| malformed("its header has no type"))?;
         let unknown = || {
             let dtype: String = dtype.chars().take_while(|c| *c != ',').take(30).collect();
-            let message = format!("elements of type {dtype} are not read, only f4, f8, i1 … i8, u1 … u8");
+            let message =
+                format!("elements of type {dtype} are not read, only f4, f8, i1 … i8, u1 … u8");
             FileError::contents(path, Place::Within, message)
         };
-        let code = dtype.strip_prefix(['\'', '"']).and_then(|d| d.split(['\'', '"']).next());
-        let (big_endian, kind, width) = element_type(code.ok_or_else(unknown)?).ok_or_else(unknown)?;
+        let code = dtype
+            .strip_prefix(['\'', '"'])
+            .and_then(|d| d.split(['\'', '"']).next());
+        let (big_endian, kind, width) =
+            element_type(code.ok_or_else(unknown)?).ok_or_else(unknown)?;
         let fortran = after("fortran_order").ok_or_else(|| malformed("its header has no order"))?;
         let shape = after("shape").and_then(|s| s.strip_prefix('(')?.split_once(')'));
         let (shape, _) = shape.ok_or_else(|| malformed("its header has no shape"))?;
-        let sizes: Option<Vec<usize>> =
-            shape.split(',').map(str::trim).filter(|s| !s.is_empty()).map(|s| s.parse().ok()).collect();
+        let sizes: Option<Vec<usize>> = shape
+            .split(',')
+            .map(str::trim)
+            .filter(|s| !s.is_empty())
+            .map(|s| s.parse().ok())
+            .collect();
         let (rows, columns) = match sizes.as_deref() {
             Some(&[rows]) => (rows, 1),
             Some(&[rows, columns]) => (rows, columns),
             Some(other) => {
-                let message = format!("an array of {} dimensions, samples × columns are needed", other.len());
+                let message = format!(
+                    "an array of {} dimensions, samples × columns are needed",
+                    other.len()
+                );
                 return Err(FileError::contents(path, Place::Within, message));
             }
             None => return Err(malformed("its header has no shape")),
         };
-        Ok(Self { kind, width, big_endian, fortran: fortran.starts_with("True"), rows, columns })
+        Ok(Self {
+            kind,
+            width,
+            big_endian,
+            fortran: fortran.starts_with("True"),
+            rows,
+            columns,
+        })
     }
 
     #[inline]
     fn element(&self, bytes: &[u8]) -> f64 {
         let mut wide = [0_u8; 8];
         for (i, byte) in wide.iter_mut().enumerate().take(self.width) {
-            *byte = bytes[if self.big_endian { self.width - 1 - i } else { i }];
+            *byte = bytes[if self.big_endian {
+                self.width - 1 - i
+            } else {
+                i
+            }];
         }
         let unsigned = u64::from_le_bytes(wide);
         let unused = 64 - 8 * self.width as u32;
@@ -128,7 +169,9 @@ impl Header {
 
 /// Byte order, kind and width of a type code such as `<f8`.
 fn element_type(code: &str) -> Option<(bool, u8, usize)> {
-    let &[order, kind, width] = code.as_bytes() else { return None };
+    let &[order, kind, width] = code.as_bytes() else {
+        return None;
+    };
     let width = usize::from(width.checked_sub(b'0')?);
     let known = match kind {
         b'f' => matches!(width, 4 | 8),
@@ -152,14 +195,24 @@ impl<R: Read> Array<R> {
         mut self,
         mut show: impl FnMut(usize, usize, f64) -> Result<(), FileError>,
     ) -> Result<(), FileError> {
-        let Header { rows, columns, width, fortran, .. } = self.header;
+        let Header {
+            rows,
+            columns,
+            width,
+            fortran,
+            ..
+        } = self.header;
         let mut bytes = [0; 8];
         for i in 0..rows * columns {
             let element = &mut bytes[..width];
             self.elements
                 .read_exact(element)
                 .map_err(|source| FileError::io(Path::new(&self.path), source))?;
-            let (row, column) = if fortran { (i % rows, i / rows) } else { (i / columns, i % columns) };
+            let (row, column) = if fortran {
+                (i % rows, i / rows)
+            } else {
+                (i / columns, i % columns)
+            };
             show(row, column, self.header.element(element))?;
         }
         Ok(())
@@ -171,7 +224,8 @@ impl<R: Read> Array<R> {
 /// # Errors
 /// When the system refuses.
 pub(crate) fn write_header(to: &mut impl Write, rows: usize, columns: usize) -> io::Result<()> {
-    let mut text = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
+    let mut text =
+        format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
     // Elements begin at a multiple of 64 bytes; the header ends in a newline.
     while !(10 + text.len() + 1).is_multiple_of(64) {
         text.push(' ');
@@ -189,8 +243,12 @@ mod tests {
 
     fn file(version: u8, header: &str, elements: &[u8]) -> Vec<u8> {
         let length = header.len() as u32;
-        let mut bytes =
-            [MAGIC, &[version, 0], &length.to_le_bytes()[..if version == 1 { 2 } else { 4 }]].concat();
+        let mut bytes = [
+            MAGIC,
+            &[version, 0],
+            &length.to_le_bytes()[..if version == 1 { 2 } else { 4 }],
+        ]
+        .concat();
         bytes.extend(header.as_bytes());
         bytes.extend(elements);
         bytes
@@ -224,10 +282,16 @@ mod tests {
     #[test]
     fn orders_types_and_versions() {
         let header = "{'descr': '>i2', 'fortran_order': True, 'shape': (2, 3), }\n";
-        let elements: Vec<u8> = [1_i16, -2, 3, -4, 5, -6].iter().flat_map(|v| v.to_be_bytes()).collect();
+        let elements: Vec<u8> = [1_i16, -2, 3, -4, 5, -6]
+            .iter()
+            .flat_map(|v| v.to_be_bytes())
+            .collect();
         let expected = vec![vec![1.0, -2.0], vec![3.0, -4.0], vec![5.0, -6.0]];
         for version in [1, 2, 3] {
-            assert_eq!(read_bytes(&file(version, header, &elements)).unwrap(), expected);
+            assert_eq!(
+                read_bytes(&file(version, header, &elements)).unwrap(),
+                expected
+            );
         }
         let vector = file(
             1,
@@ -245,7 +309,10 @@ mod tests {
             message(b"PK\x03\x04 zip file"),
             "a.npy: not a NumPy array: it does not begin with \\x93NUMPY"
         );
-        assert_eq!(message(b"\x93NUM"), "a.npy: not a NumPy array: the header is cut off");
+        assert_eq!(
+            message(b"\x93NUM"),
+            "a.npy: not a NumPy array: the header is cut off"
+        );
         assert_eq!(
             with("{'descr': '|O', 'fortran_order': False, 'shape': (1,), }"),
             "a.npy: elements of type '|O' are not read, only f4, f8, i1 … i8, u1 … u8"

@@ -74,15 +74,30 @@ struct Part {
 impl Description {
     /// The parts, the more special later: they win.
     fn parts(self) -> Vec<Part> {
-        let mut parts = vec![Part { path: String::new(), sensor: None, axis: None, processes: self.all }];
+        let mut parts = vec![Part {
+            path: String::new(),
+            sensor: None,
+            axis: None,
+            processes: self.all,
+        }];
         let mut of_axes = Vec::new();
         for (sensor, own) in Sensor::ALL.into_iter().zip([self.accel, self.gyro]) {
             let (path, sensor) = (sensor.name().to_owned(), Some(sensor));
             for (axis, processes) in Axis::ALL.into_iter().zip([own.x, own.y, own.z]) {
                 let path = format!("{path}.{}", axis.name());
-                of_axes.push(Part { path, sensor, axis: Some(axis), processes });
+                of_axes.push(Part {
+                    path,
+                    sensor,
+                    axis: Some(axis),
+                    processes,
+                });
             }
-            parts.push(Part { path, sensor, axis: None, processes: own.all });
+            parts.push(Part {
+                path,
+                sensor,
+                axis: None,
+                processes: own.all,
+            });
         }
         parts.extend(of_axes);
         parts
@@ -105,7 +120,8 @@ pub(crate) fn read(path: &Path, spec: &ModelSpec) -> Result<Vec<ParameterLimit>,
 pub(crate) fn check(path: &Path) -> Result<(), FileError> {
     let source = Source::read(path)?;
     let parts = source.get::<Description>()?.parts();
-    let spec = spec_of(parts.iter().flat_map(|part| part.processes.keys())).unwrap_or_else(ModelSpec::n2);
+    let spec =
+        spec_of(parts.iter().flat_map(|part| part.processes.keys())).unwrap_or_else(ModelSpec::n2);
     limits(&source, source.get()?, &spec).map(|_| ())
 }
 
@@ -118,7 +134,10 @@ fn spec_of<'a>(labels: impl Iterator<Item = &'a String>) -> Option<ModelSpec> {
         let most: &mut usize = terms.entry(code).or_insert(0);
         *most = count.max(*most).max(1 + usize::from(label.contains('_')));
     }
-    let sum: Vec<String> = terms.iter().map(|(code, count)| format!("{count}*{code}")).collect();
+    let sum: Vec<String> = terms
+        .iter()
+        .map(|(code, count)| format!("{count}*{code}"))
+        .collect();
     sum.join("+").parse().ok()
 }
 
@@ -132,24 +151,44 @@ fn limits(
     for part in description.parts() {
         let of_model = |process: &&String| !labels.contains(process);
         if let Some(process) = part.processes.keys().find(of_model) {
-            return Err(not_of_the_model(source, &dotted(&part.path, process), &labels, spec));
+            return Err(not_of_the_model(
+                source,
+                &dotted(&part.path, process),
+                &labels,
+                spec,
+            ));
         }
         for process in &labels {
-            let Some(ranges) = part.processes.get(process) else { continue };
+            let Some(ranges) = part.processes.get(process) else {
+                continue;
+            };
             let (path, legal) = (dotted(&part.path, process), spec.parameter_names(process));
             if let Some(unknown) = ranges.keys().find(|name| !legal.contains(&name.as_str())) {
                 return Err(source.unknown(&dotted(&path, unknown), legal.iter().copied()));
             }
             for parameter in legal {
-                let Some(range) = ranges.get(parameter) else { continue };
+                let Some(range) = ranges.get(parameter) else {
+                    continue;
+                };
                 let path = dotted(&path, parameter);
                 let (low, high) = bounds(source, &path, *range)?;
                 spec.clone()
                     .limit(process, parameter, low, high)
-                    .map_err(|e| source.refused(&path, format!("is not possible: {e}")).advice(e.hint()))?;
+                    .map_err(|e| {
+                        source
+                            .refused(&path, format!("is not possible: {e}"))
+                            .advice(e.hint())
+                    })?;
                 let (process, parameter) = (process.clone(), parameter.to_owned());
                 let Part { sensor, axis, .. } = part;
-                limits.push(ParameterLimit { sensor, axis, process, parameter, low, high });
+                limits.push(ParameterLimit {
+                    sensor,
+                    axis,
+                    process,
+                    parameter,
+                    low,
+                    high,
+                });
             }
         }
     }
@@ -159,14 +198,21 @@ fn limits(
 /// The refusal of a process that there is, but not in this model, or that there is not.
 fn not_of_the_model(source: &Source, path: &str, labels: &[String], spec: &ModelSpec) -> FileError {
     let process = path.rsplit('.').next().unwrap_or_default();
-    if Kind::ALL.iter().any(|k| Some(k.code()) == process.split('_').next()) {
+    if Kind::ALL
+        .iter()
+        .any(|k| Some(k.code()) == process.split('_').next())
+    {
         let refusal = source.refused(path, format!("is no process of the model {spec}"));
         return refusal.advice(format!("its processes: {}", labels.join(", ")));
     }
     source.unknown(path, labels.iter().map(String::as_str))
 }
 
-fn bounds(source: &Source, path: &str, range: Range) -> Result<(Option<f64>, Option<f64>), FileError> {
+fn bounds(
+    source: &Source,
+    path: &str,
+    range: Range,
+) -> Result<(Option<f64>, Option<f64>), FileError> {
     let [fix, lower, upper] = [range.fix, range.lower, range.upper].map(|value| value.map(|v| v.0));
     let reason = match (fix, lower, upper) {
         (Some(value), None, None) => return Ok((Some(value), Some(value))),
@@ -186,10 +232,18 @@ pub(crate) fn schema() -> serde_json::Value {
     let range = range.to_value();
     let of_kind = |kind: Kind| {
         let bounded = |is_shape| bounded(range.clone(), &BoundDomain::of(kind, is_shape));
-        let ranges: Map<String, Value> =
-            kind.parameters().iter().map(|p| (p.name().to_owned(), bounded(p.is_shape()))).collect();
-        let repeats = if matches!(kind, Kind::Ar1 | Kind::GaussMarkov) { "(_[1-9])?" } else { "" };
-        let table = json!({ "type": "object", "properties": ranges, "additionalProperties": false });
+        let ranges: Map<String, Value> = kind
+            .parameters()
+            .iter()
+            .map(|p| (p.name().to_owned(), bounded(p.is_shape())))
+            .collect();
+        let repeats = if matches!(kind, Kind::Ar1 | Kind::GaussMarkov) {
+            "(_[1-9])?"
+        } else {
+            ""
+        };
+        let table =
+            json!({ "type": "object", "properties": ranges, "additionalProperties": false });
         (format!("^{}{repeats}$", kind.code()), table)
     };
     let processes: Map<String, Value> = Kind::ALL.into_iter().map(of_kind).collect();
@@ -204,7 +258,8 @@ pub(crate) fn schema() -> serde_json::Value {
     file["$schema"] = "https://json-schema.org/draft/2020-12/schema".into();
     file["title"] = "Parameters".into();
     file["description"] =
-        "What is known of a model's parameters before it is fitted: nav-sim calibrate --parameters".into();
+        "What is known of a model's parameters before it is fitted: nav-sim calibrate --parameters"
+            .into();
     file
 }
 
@@ -226,7 +281,9 @@ mod tests {
 
     fn read(text: &str) -> Result<Vec<ParameterLimit>, String> {
         let source = Source::new("p.toml", text);
-        let limits = source.get().and_then(|description| limits(&source, description, &ModelSpec::n2()));
+        let limits = source
+            .get()
+            .and_then(|description| limits(&source, description, &ModelSpec::n2()));
         limits.map_err(|e| format!("{e} | {}", e.hint().unwrap_or_default()))
     }
 
@@ -234,7 +291,10 @@ mod tests {
     fn the_special_comes_after_the_general() {
         let text = "[accel.x.WN]\nsigma2 = { fix = 3 }\n[WN]\nsigma2 = { lower = 1 }\n[gyro.AR1_2]\nphi = { lower = 0.9, upper = 0.99 }\n";
         let limits = read(text).unwrap();
-        let shown: Vec<_> = limits.iter().map(|l| (l.sensor, l.axis, l.low, l.high)).collect();
+        let shown: Vec<_> = limits
+            .iter()
+            .map(|l| (l.sensor, l.axis, l.low, l.high))
+            .collect();
         let (accel, gyro) = (Some(Sensor::Accel), Some(Sensor::Gyro));
         assert_eq!(
             shown,
@@ -249,7 +309,10 @@ mod tests {
     #[test]
     fn mistakes_are_named() {
         for (text, expected) in [
-            ("[WM]\n", "p.toml, line 1: unknown key \"WM\" | did you mean \"WN\"?"),
+            (
+                "[WM]\n",
+                "p.toml, line 1: unknown key \"WM\" | did you mean \"WN\"?",
+            ),
             (
                 "[DR]\nslope = { fix = 1 }\n",
                 "p.toml, line 1: \"DR\" = [DR] is no process of the model WN+QN+2*AR1+RW | its processes: WN, QN, AR1_1, AR1_2, RW",
@@ -270,7 +333,10 @@ mod tests {
                 "[gyro.RW]\ngamma2 = { fix = -1 }\n",
                 "p.toml, line 2: \"gyro.RW.gamma2\" = { fix = -1 } is not possible: RW gamma2: -1 is not a number from 0 to 1e100 | ",
             ),
-            ("[WN]\nsigma2 = 3\n", "p.toml, line 2: \"WN.sigma2\" = 3 is not a table | "),
+            (
+                "[WN]\nsigma2 = 3\n",
+                "p.toml, line 2: \"WN.sigma2\" = 3 is not a table | ",
+            ),
         ] {
             let message = read(text).unwrap_err();
             assert!(message.starts_with(expected), "{message}");

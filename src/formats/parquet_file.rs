@@ -50,11 +50,14 @@ fn schema(columns: &[TableColumn]) -> Result<Type, ParquetError> {
             ValueKind::Float => Physical::DOUBLE,
         };
         let logical = (*kind == ValueKind::Text).then_some(LogicalType::String);
-        let builder = Type::primitive_type_builder(name, physical).with_repetition(Repetition::REQUIRED);
+        let builder =
+            Type::primitive_type_builder(name, physical).with_repetition(Repetition::REQUIRED);
         builder.with_logical_type(logical).build().map(Arc::new)
     };
     let fields = columns.iter().map(field).collect::<Result<Vec<_>, _>>()?;
-    Type::group_type_builder("nav_sim").with_fields(fields).build()
+    Type::group_type_builder("nav_sim")
+        .with_fields(fields)
+        .build()
 }
 
 fn row_group(
@@ -64,14 +67,28 @@ fn row_group(
 ) -> Result<(), ParquetError> {
     let mut group = to.next_row_group()?;
     for i in 0..columns {
-        let Some(mut column) = group.next_column()? else { break };
+        let Some(mut column) = group.next_column()? else {
+            break;
+        };
         match column.untyped() {
             ColumnWriter::DoubleColumnWriter(writer) => {
-                let float = |row: &TableRow| if let Value::Float(x) = row[i] { x } else { f64::NAN };
+                let float = |row: &TableRow| {
+                    if let Value::Float(x) = row[i] {
+                        x
+                    } else {
+                        f64::NAN
+                    }
+                };
                 writer.write_batch(&rows.iter().map(float).collect::<Vec<_>>(), None, None)?;
             }
             ColumnWriter::Int64ColumnWriter(writer) => {
-                let int = |row: &TableRow| if let Value::Int(n) = row[i] { n as i64 } else { 0 };
+                let int = |row: &TableRow| {
+                    if let Value::Int(n) = row[i] {
+                        n as i64
+                    } else {
+                        0
+                    }
+                };
                 writer.write_batch(&rows.iter().map(int).collect::<Vec<_>>(), None, None)?;
             }
             ColumnWriter::ByteArrayColumnWriter(writer) => {

@@ -34,8 +34,8 @@ fn variance() -> impl Strategy<Value = f64> {
 
 fn composite() -> impl Strategy<Value = Composite> {
     let white = variance().prop_map(|v| Process::White(White::new(v).unwrap()));
-    let ar1 =
-        (0.01..0.999_999_9_f64, variance()).prop_map(|(phi, v)| Process::Ar1(Ar1::new(phi, v).unwrap()));
+    let ar1 = (0.01..0.999_999_9_f64, variance())
+        .prop_map(|(phi, v)| Process::Ar1(Ar1::new(phi, v).unwrap()));
     let walk = variance().prop_map(|v| Process::RandomWalk(RandomWalk::new(v).unwrap()));
     let steps = variance().prop_map(|v| Process::Quantization(Quantization::new(v).unwrap()));
     (white, ar1, walk, steps)
@@ -44,20 +44,41 @@ fn composite() -> impl Strategy<Value = Composite> {
 
 fn draws() -> impl Strategy<Value = DrawsFile> {
     let row = || prop::collection::vec(any::<f64>().prop_filter("finite", |x| x.is_finite()), 3);
-    (1e-3..1e4_f64, row(), prop::collection::vec(row(), 0..5)).prop_map(|(rate_hz, estimate, draws)| {
-        let parameters = vec!["WN sigma2".to_owned(); 3];
-        let signals =
-            SignalDraws { signals: "accel".to_owned(), stretch: rate_hz, parameters, estimate, draws };
-        DrawsFile { schema_version: 1, rate_hz, signals: vec![signals] }
-    })
+    (1e-3..1e4_f64, row(), prop::collection::vec(row(), 0..5)).prop_map(
+        |(rate_hz, estimate, draws)| {
+            let parameters = vec!["WN sigma2".to_owned(); 3];
+            let signals = SignalDraws {
+                signals: "accel".to_owned(),
+                stretch: rate_hz,
+                parameters,
+                estimate,
+                draws,
+            };
+            DrawsFile {
+                schema_version: 1,
+                rate_hz,
+                signals: vec![signals],
+            }
+        },
+    )
 }
 
 fn signals() -> impl Strategy<Value = Vec<(Channel, Vec<f64>)>> {
     prop::collection::vec(-0.1..0.1_f64, 8 * 6).prop_map(|all| {
         // at rest and level: the third axis of the accelerometer has gravity
         let gravity = |c: usize| if c == 2 { -9.81 } else { 0.0 };
-        let column = |c: usize| all.iter().skip(c).step_by(6).map(|x| x + gravity(c)).collect();
-        Channel::ALL.iter().enumerate().map(|(c, channel)| (*channel, column(c))).collect()
+        let column = |c: usize| {
+            all.iter()
+                .skip(c)
+                .step_by(6)
+                .map(|x| x + gravity(c))
+                .collect()
+        };
+        Channel::ALL
+            .iter()
+            .enumerate()
+            .map(|(c, channel)| (*channel, column(c)))
+            .collect()
     })
 }
 
@@ -65,7 +86,13 @@ fn signals() -> impl Strategy<Value = Vec<(Channel, Vec<f64>)>> {
 fn drive() -> impl Strategy<Value = String> {
     prop::collection::vec((-1e-4..1e-4_f64, -1e-4..1e-4_f64, -5.0..5.0_f64), 12).prop_map(|rows| {
         let row = |(k, (lat, lon, h)): (usize, &(f64, f64, f64))| {
-            format!("{k},{},{},{},0.5,-0.25,{}\n", 46.5 + 1e-3 * k as f64 + lat, 6.5 + lon, 400.0 + h, 3 * k)
+            format!(
+                "{k},{},{},{},0.5,-0.25,{}\n",
+                46.5 + 1e-3 * k as f64 + lat,
+                6.5 + lon,
+                400.0 + h,
+                3 * k
+            )
         };
         let rows: String = rows.iter().enumerate().map(row).collect();
         format!("t_s,lat_deg,lon_deg,h_m,roll_deg,pitch_deg,yaw_deg\n{rows}")

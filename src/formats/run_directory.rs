@@ -47,7 +47,13 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, FileError> {
         runs
     };
     let (verdict, asee_mean_ci95) = found(directory, &manifest)?;
-    let outages = manifest.configuration.outage.iter().flatten().map(|o| (o.start_s, o.end_s)).collect();
+    let outages = manifest
+        .configuration
+        .outage
+        .iter()
+        .flatten()
+        .map(|o| (o.start_s, o.end_s))
+        .collect();
     let independent_windows = manifest.independent_windows;
     let experiment = Measured {
         epochs,
@@ -57,7 +63,12 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, FileError> {
         is_expected,
         beyond_linear: verdict.beyond_linear,
     };
-    Ok(RunDirectory { manifest, experiment, verdict, asee_mean_ci95 })
+    Ok(RunDirectory {
+        manifest,
+        experiment,
+        verdict,
+        asee_mean_ci95,
+    })
 }
 
 /// The verdict, and the intervals that the calibration leaves outage by outage, from the summary.
@@ -74,15 +85,28 @@ fn found(directory: &Path, manifest: &Manifest) -> Result<(Verdict, Vec<OpenEnds
     let (path, summary) = text(directory, "summary.json")?;
     let found: Found = serde_json::from_str(&summary).map_err(|e| not_json(&path, &e))?;
     as_written(directory, manifest, "summary.json", &summary)?;
-    Ok((found.verdict, found.outages.into_iter().map(|o| o.asee_mean_ci95).collect()))
+    Ok((
+        found.verdict,
+        found
+            .outages
+            .into_iter()
+            .map(|o| o.asee_mean_ci95)
+            .collect(),
+    ))
 }
 
 /// Refuses a file that is not the one the manifest tells of; what can be read of it was, for a more exact message.
-fn as_written(directory: &Path, manifest: &Manifest, name: &str, text: &str) -> Result<(), FileError> {
+fn as_written(
+    directory: &Path,
+    manifest: &Manifest,
+    name: &str,
+    text: &str,
+) -> Result<(), FileError> {
     match manifest.outputs.get(name) {
         Some(blake3) if *blake3 != hash::of_bytes(text.as_bytes()) => {
             let path = directory.join(name).display().to_string();
-            let message = "is not what its manifest.json says (BLAKE3): it is damaged, or was changed";
+            let message =
+                "is not what its manifest.json says (BLAKE3): it is damaged, or was changed";
             Err(FileError::contents(path, Place::Within, message).advice(REPEAT))
         }
         _ => Ok(()),
@@ -110,7 +134,9 @@ fn expected_run(path: &str, summary: &str, epochs: &[EpochRow]) -> Result<RunRec
         nees_end: o.nees_end,
         ..OutageRecord::default()
     };
-    let mean = |value: &dyn Fn(&EpochRow) -> f64| epochs.iter().map(value).sum::<f64>() / epochs.len() as f64;
+    let mean = |value: &dyn Fn(&EpochRow) -> f64| {
+        epochs.iter().map(value).sum::<f64>() / epochs.len() as f64
+    };
     Ok(RunRecord {
         outages: expected.outages.into_iter().map(outage).collect(),
         nees_mean: mean(&|e| e.nees),
@@ -128,11 +154,17 @@ fn manifest(directory: &Path) -> Result<Manifest, FileError> {
         return Ok(manifest);
     }
     let message = format!("\"schema_version\" is {found}; this nav-sim reads {expected}");
-    Err(FileError::contents(path, Place::Within, message).advice("repeat the run with this version"))
+    Err(FileError::contents(path, Place::Within, message)
+        .advice("repeat the run with this version"))
 }
 
 fn not_json(path: &str, e: &serde_json::Error) -> FileError {
-    let message = e.to_string().split(" at line ").next().unwrap_or_default().to_owned();
+    let message = e
+        .to_string()
+        .split(" at line ")
+        .next()
+        .unwrap_or_default()
+        .to_owned();
     FileError::contents(path, e.line(), message).advice(REPEAT)
 }
 

@@ -13,7 +13,9 @@ pub(super) const REPEAT: &str = "repeat the run, or put back its files";
 /// # Errors
 /// A missing or doubled column, or a value that is not a finite number (unless no run is left at the epoch).
 pub(super) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, FileError> {
-    Table::read(path, text.as_bytes(), None, Numbers::Any).and_then(|t| epochs(&t)).map_err(damaged)
+    Table::read(path, text.as_bytes(), None, Numbers::Any)
+        .and_then(|t| epochs(&t))
+        .map_err(damaged)
 }
 
 /// Reads `runs.csv` back: a row for each outage of a run, or one that ends where outages begin.
@@ -21,28 +23,58 @@ pub(super) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, File
 /// # Errors
 /// A missing column or a value that is not a number.
 pub(super) fn parse_runs(path: &str, text: &str) -> Result<Vec<RunRecord>, FileError> {
-    Table::read(path, text.as_bytes(), None, Numbers::UpTo("outage")).and_then(|t| runs(&t)).map_err(damaged)
+    Table::read(path, text.as_bytes(), None, Numbers::UpTo("outage"))
+        .and_then(|t| runs(&t))
+        .map_err(damaged)
 }
 
 fn epochs(table: &Table) -> Result<Vec<EpochRow>, FileError> {
     let (asee, rmse) = (states(table, "asee_")?, states(table, "rmse_")?);
     let [t_s, nees, coverage] = table.named(["t_s", "nees", "coverage"])?;
-    let columns: Vec<usize> = asee.iter().chain(&rmse).copied().chain([nees, coverage]).collect();
+    let columns: Vec<usize> = asee
+        .iter()
+        .chain(&rmse)
+        .copied()
+        .chain([nees, coverage])
+        .collect();
     let epoch = |(line, row): &(u64, Vec<f64>)| {
         finite_or_lost(table, *line, row, &columns)?;
         let [asee, rmse] = [asee, rmse].map(|columns| columns.map(|column| row[column]));
-        Ok(EpochRow { t_s: row[t_s], asee, rmse, nees: row[nees], coverage: row[coverage] })
+        Ok(EpochRow {
+            t_s: row[t_s],
+            asee,
+            rmse,
+            nees: row[nees],
+            coverage: row[coverage],
+        })
     };
     table.rows.iter().map(epoch).collect()
 }
 
 fn runs(table: &Table) -> Result<Vec<RunRecord>, FileError> {
-    let of_run = ["run", "diverged", "nis_mean", "fixes", "nees_mean", "coverage"];
-    let of_outage = ["outage", "nees_end", "log_density_end", "horizontal_error_end_m", "reconvergence_s"];
+    let of_run = [
+        "run",
+        "diverged",
+        "nis_mean",
+        "fixes",
+        "nees_mean",
+        "coverage",
+    ];
+    let of_outage = [
+        "outage",
+        "nees_end",
+        "log_density_end",
+        "horizontal_error_end_m",
+        "reconvergence_s",
+    ];
     let [run, diverged, nis, fixes, nees, coverage] = table.named(of_run)?;
     let [outage, nees_end, log_density, horizontal, reconvergence] = table.named(of_outage)?;
     let normalised = states(table, "normalised_sq_")?;
-    let ends = [states(table, "see_mean_")?, states(table, "see_end_")?, states(table, "error_end_")?];
+    let ends = [
+        states(table, "see_mean_")?,
+        states(table, "see_end_")?,
+        states(table, "error_end_")?,
+    ];
     let mut runs: Vec<RunRecord> = Vec::new();
     for (_, row) in &table.rows {
         let number = row[run] as u64;
@@ -59,7 +91,9 @@ fn runs(table: &Table) -> Result<Vec<RunRecord>, FileError> {
                 horizontal_m: Vec::new(), // its quantiles are in fan.csv
             });
         }
-        let Some(last) = runs.last_mut().filter(|_| !row[outage].is_nan()) else { continue };
+        let Some(last) = runs.last_mut().filter(|_| !row[outage].is_nan()) else {
+            continue;
+        };
         let [see_mean, see_end, error_end] = ends.map(|columns| columns.map(|column| row[column]));
         last.outages.push(OutageRecord {
             see_mean,
@@ -75,11 +109,21 @@ fn runs(table: &Table) -> Result<Vec<RunRecord>, FileError> {
 }
 
 fn states(table: &Table, prefix: &str) -> Result<[usize; REPORTED], FileError> {
-    table.named(REPORTED_NAMES.map(|n| format!("{prefix}{n}")).each_ref().map(String::as_str))
+    table.named(
+        REPORTED_NAMES
+            .map(|n| format!("{prefix}{n}"))
+            .each_ref()
+            .map(String::as_str),
+    )
 }
 
 /// Refuses a row of an epoch in which some values are finite and others not. Where no run is left, all are NaN.
-fn finite_or_lost(table: &Table, line: u64, row: &[f64], columns: &[usize]) -> Result<(), FileError> {
+fn finite_or_lost(
+    table: &Table,
+    line: u64,
+    row: &[f64],
+    columns: &[usize],
+) -> Result<(), FileError> {
     let is_lost = columns.iter().all(|column| row[*column].is_nan());
     match columns.iter().find(|column| !row[**column].is_finite()) {
         Some(column) if !is_lost => {
@@ -112,7 +156,10 @@ mod tests {
         let rows = parse_epochs("e.csv", &text).unwrap();
         assert_eq!(rows.len(), result.epochs.len());
         for (row, metric) in rows.iter().zip(&expected) {
-            assert_eq!((row.t_s, row.nees, row.coverage), (metric.t_s, metric.nees.value, metric.coverage));
+            assert_eq!(
+                (row.t_s, row.nees, row.coverage),
+                (metric.t_s, metric.nees.value, metric.coverage)
+            );
             assert_eq!(row.asee, metric.asee.0.map(|e| e.value));
             assert_eq!(row.rmse, metric.rmse.0.map(|e| e.value));
         }
@@ -123,27 +170,50 @@ mod tests {
     fn runs_read_back_exactly() {
         let mut result = sample::result();
         result.runs[1].outages[0].reconvergence_s = 2.5e-9;
-        assert_eq!(parse_runs("r.csv", &runs_csv(&result).collect::<String>()).unwrap(), result.runs);
+        assert_eq!(
+            parse_runs("r.csv", &runs_csv(&result).collect::<String>()).unwrap(),
+            result.runs
+        );
         for run in &mut result.runs {
             run.outages.clear();
         }
-        assert_eq!(parse_runs("r.csv", &runs_csv(&result).collect::<String>()).unwrap(), result.runs);
+        assert_eq!(
+            parse_runs("r.csv", &runs_csv(&result).collect::<String>()).unwrap(),
+            result.runs
+        );
     }
 
     #[test]
     fn unreadable_tables_are_refused_by_line_and_column() {
         let text = epochs_csv(&metrics::epochs(&sample::result()));
-        let error = parse_epochs("e.csv", &text.replacen("rmse_yaw_deg", "rmse_yow_deg", 1)).unwrap_err();
-        assert_eq!(error.to_string(), "e.csv, line 1: no column is named \"rmse_yaw_deg\"");
+        let error =
+            parse_epochs("e.csv", &text.replacen("rmse_yaw_deg", "rmse_yow_deg", 1)).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "e.csv, line 1: no column is named \"rmse_yaw_deg\""
+        );
         let broken: String = text
             .lines()
             .enumerate()
-            .map(|(i, l)| if i == 2 { format!("x{l}\n") } else { format!("{l}\n") })
+            .map(|(i, l)| {
+                if i == 2 {
+                    format!("x{l}\n")
+                } else {
+                    format!("{l}\n")
+                }
+            })
             .collect();
         let error = parse_epochs("e.csv", &broken).unwrap_err();
-        assert_eq!(error.to_string(), "e.csv, line 3: column \"t_s\": \"x1\" is not a number");
-        let error = parse_epochs("e.csv", &text.replacen("rmse_yaw_deg", "rmse_roll_deg", 1)).unwrap_err();
-        assert_eq!(error.to_string(), "e.csv, line 1: two columns are named \"rmse_roll_deg\"");
+        assert_eq!(
+            error.to_string(),
+            "e.csv, line 3: column \"t_s\": \"x1\" is not a number"
+        );
+        let error =
+            parse_epochs("e.csv", &text.replacen("rmse_yaw_deg", "rmse_roll_deg", 1)).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "e.csv, line 1: two columns are named \"rmse_roll_deg\""
+        );
         let cut = &text[..text.rfind(',').unwrap()];
         let error = parse_epochs("e.csv", cut).unwrap_err().to_string();
         assert!(error.ends_with("38 values, but 39 columns"), "{error}");
@@ -158,8 +228,14 @@ mod tests {
         cells[3] = "nan";
         let damaged = text.replacen(text.lines().nth(2).unwrap(), &cells.join(","), 1);
         let error = parse_epochs("e.csv", &damaged).unwrap_err();
-        assert_eq!(error.to_string(), "e.csv, line 3: column \"asee_pos_e_m\": NaN is not finite");
-        result.epochs[1] = EpochSums { t_s: result.epochs[1].t_s, ..EpochSums::default() };
+        assert_eq!(
+            error.to_string(),
+            "e.csv, line 3: column \"asee_pos_e_m\": NaN is not finite"
+        );
+        result.epochs[1] = EpochSums {
+            t_s: result.epochs[1].t_s,
+            ..EpochSums::default()
+        };
         let rows = parse_epochs("e.csv", &epochs_csv(&metrics::epochs(&result))).unwrap();
         assert!(rows[1].asee[1].is_nan() && rows[1].nees.is_nan());
     }

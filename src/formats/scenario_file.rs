@@ -30,7 +30,10 @@ fn from_source(
     rule: impl FnOnce(&Scenario) -> Result<(), SettingError>,
 ) -> Result<Scenario, FileError> {
     let scenario: Scenario = source.get()?;
-    scenario.validate().and_then(|()| rule(&scenario)).map_err(|e| source.setting(&e))?;
+    scenario
+        .validate()
+        .and_then(|()| rule(&scenario))
+        .map_err(|e| source.setting(&e))?;
     Ok(scenario)
 }
 
@@ -46,7 +49,8 @@ mod tests {
 
     #[test]
     fn typos_are_answered_with_the_nearest_key() {
-        let (message, hint) = refused("[run]\nruns = 3\n[gnss]\nrate_hz = 1\npos_sgima_m = [1, 1, 1]\n");
+        let (message, hint) =
+            refused("[run]\nruns = 3\n[gnss]\nrate_hz = 1\npos_sgima_m = [1, 1, 1]\n");
         assert_eq!(message, "s.toml, line 5: unknown key \"gnss.pos_sgima_m\"");
         assert_eq!(hint.unwrap(), "did you mean \"pos_sigma_m\"?");
         let (message, hint) = refused("[gps]\nrate_hz = 1\n");
@@ -66,17 +70,29 @@ mod tests {
     #[test]
     fn wrong_types_are_refused_by_line_key_and_value() {
         let (message, _) = refused("[run]\nruns = 3\n[imu]\nrate_hz = \"fast\"\n");
-        assert_eq!(message, "s.toml, line 4: \"imu.rate_hz\" = \"fast\" is not a number");
+        assert_eq!(
+            message,
+            "s.toml, line 4: \"imu.rate_hz\" = \"fast\" is not a number"
+        );
         for longer in ["pos_sigma_m", "vel_sigma_m_s", "lever_arm_m"] {
             let (message, _) = refused(&format!("[gnss]\n{longer} = [1, 2, 3, 4]\n"));
-            assert!(message.contains(&format!("\"gnss.{longer}\" = [1, 2, 3, 4] is not a")), "{message}");
+            assert!(
+                message.contains(&format!("\"gnss.{longer}\" = [1, 2, 3, 4] is not a")),
+                "{message}"
+            );
         }
         let (message, _) = refused("imu.temperature.profile_c = [[0, 20, 3], [600, 45]]\n");
         assert!(message.contains("is not a list of 2"), "{message}");
         let (message, _) = refused("[gnss]\npos_sigma_m = [1, 2]\n");
-        assert_eq!(message, "s.toml, line 2: \"gnss.pos_sigma_m\" = [1, 2] is not a list of 3");
+        assert_eq!(
+            message,
+            "s.toml, line 2: \"gnss.pos_sigma_m\" = [1, 2] is not a list of 3"
+        );
         let (message, _) = refused("[filter]\nstates = 16\n");
-        assert!(message.ends_with("= 16 is not \"15\", \"21\" or \"full\""), "{message}");
+        assert!(
+            message.ends_with("= 16 is not \"15\", \"21\" or \"full\""),
+            "{message}"
+        );
         let (message, _) = refused("[run]\nmethod = \"lincav\"\n");
         assert!(
             message.contains("\"run.method\" = \"lincav\"")
@@ -88,7 +104,10 @@ mod tests {
     #[test]
     fn values_out_of_range_are_refused_by_line_key_and_value() {
         let (message, _) = refused("[run]\nruns = 0\n");
-        assert_eq!(message, "s.toml, line 2: \"run.runs\" = 0 is refused: at least one run");
+        assert_eq!(
+            message,
+            "s.toml, line 2: \"run.runs\" = 0 is refused: at least one run"
+        );
         let (message, _) =
             refused("[[outage]]\nstart_s = 1\nend_s = 2\n[[outage]]\nstart_s = 5\nend_s = 5\n");
         assert_eq!(
@@ -96,7 +115,10 @@ mod tests {
             "s.toml, line 6: \"outage[2].end_s\" = 5 is refused: it must come after start_s = 5"
         );
         let (message, hint) = refused("[imu]\nrate_hz = 7.5\n");
-        assert!(message.starts_with("s.toml, line 1: \"gnss.rate_hz\" = 1 is refused"), "{message}");
+        assert!(
+            message.starts_with("s.toml, line 1: \"gnss.rate_hz\" = 1 is refused"),
+            "{message}"
+        );
         assert!(hint.unwrap().contains("default"));
     }
 
@@ -106,7 +128,12 @@ mod tests {
             return numbers(root.pointer(&name[1..]).unwrap(), root, key, into);
         }
         for (name, part) in schema["properties"].as_object().into_iter().flatten() {
-            numbers(part, root, format!("{key}.{name}").trim_start_matches('.'), into);
+            numbers(
+                part,
+                root,
+                format!("{key}.{name}").trim_start_matches('.'),
+                into,
+            );
         }
         for part in schema["anyOf"].as_array().into_iter().flatten() {
             numbers(part, root, key, into);
@@ -125,9 +152,16 @@ mod tests {
     /// Whether a scenario with this value of one key is refused for it.
     fn is_refused(key: &str, value: f64, entries: usize) -> bool {
         let (section, name) = key.rsplit_once('.').unwrap();
-        let value =
-            if ["runs", "seed"].contains(&name) { format!("{value:.0}") } else { format!("{value:?}") };
-        let value = if entries > 1 { format!("[1.0, {value}, 1.0]") } else { value };
+        let value = if ["runs", "seed"].contains(&name) {
+            format!("{value:.0}")
+        } else {
+            format!("{value:?}")
+        };
+        let value = if entries > 1 {
+            format!("[1.0, {value}, 1.0]")
+        } else {
+            value
+        };
         let beside = match section {
             "baro" => "rate_hz = 1.0\nsigma_m = 1.0\n",
             "imu.vibration" => "rectification_s2_m = 0.0\n",
@@ -137,13 +171,21 @@ mod tests {
             "outage_random" => "rate_per_hour = 1.0\nduration_s = 1.0\n",
             _ => "",
         };
-        let beside: String =
-            beside.split_inclusive('\n').filter(|l| !l.starts_with(&format!("{name} "))).collect();
-        let head = if section.ends_with(']') { "[[outage]]".to_owned() } else { format!("[{section}]") };
+        let beside: String = beside
+            .split_inclusive('\n')
+            .filter(|l| !l.starts_with(&format!("{name} ")))
+            .collect();
+        let head = if section.ends_with(']') {
+            "[[outage]]".to_owned()
+        } else {
+            format!("[{section}]")
+        };
         let source = Source::new("s.toml", &format!("{head}\n{beside}{name} = {value}\n"));
         let scenario: Result<Scenario, _> = source.get();
         scenario.map_or(true, |scenario| {
-            scenario.validate().is_err_and(|e| e.key == key && !e.requirement.contains("multiple"))
+            scenario
+                .validate()
+                .is_err_and(|e| e.key == key && !e.requirement.contains("multiple"))
         })
     }
 
@@ -158,27 +200,41 @@ mod tests {
         assert_eq!(all.len(), 68);
         for (key, said, entries) in all {
             let refused = |value: f64| is_refused(&key, value, entries);
-            let outside = |bound: f64, toward: f64| match said["type"].to_string().contains("integer") {
-                true => bound + toward,
-                false if bound == 0.0 => toward * f64::MIN_POSITIVE,
-                false => bound + toward * bound.abs() * 1e-15,
-            };
+            let outside =
+                |bound: f64, toward: f64| match said["type"].to_string().contains("integer") {
+                    true => bound + toward,
+                    false if bound == 0.0 => toward * f64::MIN_POSITIVE,
+                    false => bound + toward * bound.abs() * 1e-15,
+                };
             for (name, toward, ends) in [
                 ("minimum", -1.0, -1e300),
                 ("exclusiveMinimum", -1.0, 0.0),
                 ("maximum", 1.0, 1e300),
                 ("exclusiveMaximum", 1.0, 0.0),
             ] {
-                let Some(bound) = said[name].as_f64() else { continue };
+                let Some(bound) = said[name].as_f64() else {
+                    continue;
+                };
                 let is_open = ends == 0.0;
                 assert_eq!(refused(bound), is_open, "{key} {name} {bound}");
                 assert!(refused(outside(bound, toward)), "{key} {name} {bound}");
-                assert!(!is_open || !refused(outside(bound, -toward)), "{key} {name} {bound}");
+                assert!(
+                    !is_open || !refused(outside(bound, -toward)),
+                    "{key} {name} {bound}"
+                );
             }
             let is_bounded = |a: &str, b: &str| said[a].is_number() || said[b].is_number();
-            let is_time = ["start_s", "end_s", "first_s", "seed"].iter().any(|name| key.ends_with(name));
-            assert!(is_time || is_bounded("minimum", "exclusiveMinimum"), "{key}: {said}");
-            assert!(is_bounded("maximum", "exclusiveMaximum") || !refused(1e9), "{key}: {said}");
+            let is_time = ["start_s", "end_s", "first_s", "seed"]
+                .iter()
+                .any(|name| key.ends_with(name));
+            assert!(
+                is_time || is_bounded("minimum", "exclusiveMinimum"),
+                "{key}: {said}"
+            );
+            assert!(
+                is_bounded("maximum", "exclusiveMaximum") || !refused(1e9),
+                "{key}: {said}"
+            );
         }
     }
 

@@ -49,13 +49,19 @@ const MOST_PACKED: u64 = 40;
 /// When the system refuses.
 pub(crate) fn table(path: &Path) -> io::Result<Box<dyn BufRead>> {
     let file = BufReader::with_capacity(BUFFER, open(path)?);
-    if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("gz")) {
+    if path
+        .extension()
+        .is_none_or(|e| !e.eq_ignore_ascii_case("gz"))
+    {
         return Ok(Box::new(file));
     }
     let packed = std::fs::metadata(path)?.len();
     let largest = LARGEST_PIPE.max(packed.saturating_mul(MOST_PACKED));
     let inner = BufReader::with_capacity(BUFFER, MultiGzDecoder::new(file));
-    Ok(Box::new(BufReader::with_capacity(BUFFER, Unpacked::new(inner, largest))))
+    Ok(Box::new(BufReader::with_capacity(
+        BUFFER,
+        Unpacked::new(inner, largest),
+    )))
 }
 
 /// Lines of a packed table, as far as they are those of a table: what a small file holds has no bound of its own.
@@ -74,21 +80,43 @@ struct Unpacked<R> {
 impl<R: BufRead> Unpacked<R> {
     const fn new(inner: R, largest: u64) -> Self {
         let line = Vec::new();
-        Self { inner, line, given: 0, before: Vec::new(), lines: 0, equal: 0, left: largest, largest }
+        Self {
+            inner,
+            line,
+            given: 0,
+            before: Vec::new(),
+            lines: 0,
+            equal: 0,
+            left: largest,
+            largest,
+        }
     }
 
     fn next_line(&mut self) -> io::Result<()> {
         std::mem::swap(&mut self.line, &mut self.before);
         (self.given, self.lines) = (0, self.lines + 1);
         self.line.clear();
-        self.inner.by_ref().take(LONGEST_LINE as u64).read_until(b'\n', &mut self.line)?;
-        self.equal = if self.line == self.before { self.equal + 1 } else { 0 };
+        self.inner
+            .by_ref()
+            .take(LONGEST_LINE as u64)
+            .read_until(b'\n', &mut self.line)?;
+        self.equal = if self.line == self.before {
+            self.equal + 1
+        } else {
+            0
+        };
         let refuse = |what: String| Err(io::Error::new(ErrorKind::InvalidData, what));
         if self.line.len() == LONGEST_LINE {
-            return refuse(format!("line {} is longer than 64 KiB: not a table of text", self.lines));
+            return refuse(format!(
+                "line {} is longer than 64 KiB: not a table of text",
+                self.lines
+            ));
         }
         if self.equal >= MOST_EQUAL && !self.line.is_empty() {
-            return refuse(format!("line {} and the {MOST_EQUAL} before it are the same", self.lines));
+            return refuse(format!(
+                "line {} and the {MOST_EQUAL} before it are the same",
+                self.lines
+            ));
         }
         let Some(left) = self.left.checked_sub(self.line.len() as u64) else {
             return refuse(format!("unpacks to more than {} MiB", self.largest >> 20));
@@ -109,7 +137,8 @@ impl<R: BufRead> Read for Unpacked<R> {
                 }
             }
             let count = (buffer.len() - filled).min(self.line.len() - self.given);
-            buffer[filled..filled + count].copy_from_slice(&self.line[self.given..self.given + count]);
+            buffer[filled..filled + count]
+                .copy_from_slice(&self.line[self.given..self.given + count]);
             (filled, self.given) = (filled + count, self.given + count);
         }
         Ok(filled)
@@ -121,15 +150,25 @@ impl<R: BufRead> Read for Unpacked<R> {
 /// # Errors
 /// When the system refuses, it is longer, or it is not UTF-8 ([`is_damage`]): with the line.
 pub(crate) fn text(path: &Path) -> io::Result<String> {
-    String::from_utf8(bounded(open(path)?, LARGEST_TEXT)?).map(without_mark).map_err(|e| {
-        let line = 1 + e.as_bytes()[..e.utf8_error().valid_up_to()].iter().filter(|b| **b == b'\n').count();
-        io::Error::new(ErrorKind::InvalidData, format!("line {line} is not text in UTF-8"))
-    })
+    String::from_utf8(bounded(open(path)?, LARGEST_TEXT)?)
+        .map(without_mark)
+        .map_err(|e| {
+            let line = 1 + e.as_bytes()[..e.utf8_error().valid_up_to()]
+                .iter()
+                .filter(|b| **b == b'\n')
+                .count();
+            io::Error::new(
+                ErrorKind::InvalidData,
+                format!("line {line} is not text in UTF-8"),
+            )
+        })
 }
 
 /// A text without the byte-order mark that editors of some systems begin it with.
 pub(crate) fn without_mark(text: String) -> String {
-    text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text)
+    text.strip_prefix('\u{feff}')
+        .map(str::to_owned)
+        .unwrap_or(text)
 }
 
 fn bounded(reader: impl Read, largest: u64) -> io::Result<Vec<u8>> {
@@ -145,7 +184,10 @@ fn bounded(reader: impl Read, largest: u64) -> io::Result<Vec<u8>> {
 /// Whether an error of the system is one of the contents: no text, no compressed data, cut off, too long.
 pub(crate) const fn is_damage(kind: ErrorKind) -> bool {
     use ErrorKind as K;
-    matches!(kind, K::InvalidData | K::InvalidInput | K::UnexpectedEof | K::FileTooLarge)
+    matches!(
+        kind,
+        K::InvalidData | K::InvalidInput | K::UnexpectedEof | K::FileTooLarge
+    )
 }
 
 #[cfg(test)]
@@ -178,7 +220,9 @@ mod tests {
             let read = Unpacked::new(Cursor::new(text), largest).read_to_end(&mut out);
             read.map(|_| out).map_err(|e| e.to_string())
         };
-        let rows: Vec<u8> = (0..9000).flat_map(|k| format!("{k},{}\n", k % 7).into_bytes()).collect();
+        let rows: Vec<u8> = (0..9000)
+            .flat_map(|k| format!("{k},{}\n", k % 7).into_bytes())
+            .collect();
         assert_eq!(unpacked(&rows, 1 << 20).unwrap(), rows);
         assert_eq!(unpacked(b"a\nb", 1 << 20).unwrap(), b"a\nb");
         let long = [b"t\n".to_vec(), vec![b'7'; 1 << 17]].concat();
@@ -187,15 +231,27 @@ mod tests {
             "line 2 is longer than 64 KiB: not a table of text"
         );
         let equal = [b"t,x\n".to_vec(), b"0,1\n".repeat(70_000)].concat();
-        assert_eq!(unpacked(&equal, 1 << 20).unwrap_err(), "line 65538 and the 65536 before it are the same");
-        assert_eq!(unpacked(&rows, 1 << 10).unwrap_err(), "unpacks to more than 0 MiB");
+        assert_eq!(
+            unpacked(&equal, 1 << 20).unwrap_err(),
+            "line 65538 and the 65536 before it are the same"
+        );
+        assert_eq!(
+            unpacked(&rows, 1 << 10).unwrap_err(),
+            "unpacks to more than 0 MiB"
+        );
     }
 
     #[test]
     fn a_pipe_reads_the_same_again() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("pipe");
-        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        assert!(
+            std::process::Command::new("mkfifo")
+                .arg(&path)
+                .status()
+                .unwrap()
+                .success()
+        );
         let writer = std::thread::spawn({
             let path = path.clone();
             move || std::fs::write(path, "a = 1\n").unwrap()

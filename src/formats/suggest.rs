@@ -4,7 +4,10 @@ use nav_sim_calibration::SpecError;
 
 /// The candidate nearest to `word`, if near enough to be what was meant: at most one edit in three
 /// letters, or one begins with the other ("rate", "rate_hz"). Case is ignored; ties go to the first.
-pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub(crate) fn nearest<'a>(
+    word: &str,
+    candidates: impl IntoIterator<Item = &'a str>,
+) -> Option<&'a str> {
     let lower = word.to_lowercase();
     let near = |candidate: &&str| {
         let candidate = candidate.to_lowercase();
@@ -14,7 +17,9 @@ pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a s
             && (candidate.starts_with(&lower) || lower.starts_with(&candidate));
         (begins || edits <= (longest / 3).max(1) && edits < longest).then_some(edits)
     };
-    let scored = candidates.into_iter().filter_map(|c| near(&c).map(|edits| (edits, c)));
+    let scored = candidates
+        .into_iter()
+        .filter_map(|c| near(&c).map(|edits| (edits, c)));
     scored.min_by_key(|(edits, _)| *edits).map(|(_, best)| best)
 }
 

@@ -38,7 +38,12 @@ impl TableFiles {
         name: &str,
         columns: Vec<TableColumn>,
     ) -> Result<Self, FileError> {
-        let mut table = Self { name: name.to_owned(), columns, writers: Vec::new(), rows: Vec::new() };
+        let mut table = Self {
+            name: name.to_owned(),
+            columns,
+            writers: Vec::new(),
+            rows: Vec::new(),
+        };
         table.begin(directory, "csv", Csv::new)?;
         #[cfg(feature = "parquet")]
         table.begin(directory, "parquet", ParquetWriter::new)?;
@@ -62,7 +67,8 @@ impl TableFiles {
     ) -> Result<(), FileError> {
         let path = directory.path(&format!("{}.{ending}", self.name));
         let made = File::create(&path).and_then(|file| writer(file, &self.columns));
-        self.writers.push(Box::new(made.map_err(|e| FileError::io(&path, e))?));
+        self.writers
+            .push(Box::new(made.map_err(|e| FileError::io(&path, e))?));
         Ok(())
     }
 
@@ -70,7 +76,10 @@ impl TableFiles {
     ///
     /// # Errors
     /// When the disk is full.
-    pub(crate) fn add(&mut self, rows: impl IntoIterator<Item = TableRow>) -> Result<(), FileError> {
+    pub(crate) fn add(
+        &mut self,
+        rows: impl IntoIterator<Item = TableRow>,
+    ) -> Result<(), FileError> {
         for row in rows {
             self.rows.push(row);
             if self.rows.len() == GROUP {
@@ -83,7 +92,9 @@ impl TableFiles {
     fn flush(&mut self) -> Result<(), FileError> {
         let rows = std::mem::take(&mut self.rows);
         for writer in &mut self.writers {
-            writer.rows(&self.columns, &rows).map_err(|e| FileError::io(Path::new(&self.name), e))?;
+            writer
+                .rows(&self.columns, &rows)
+                .map_err(|e| FileError::io(Path::new(&self.name), e))?;
         }
         Ok(())
     }
@@ -95,7 +106,10 @@ impl TableFiles {
     pub(crate) fn finish(mut self) -> Result<(), FileError> {
         self.flush()?;
         let name = self.name;
-        let finished = self.writers.into_iter().try_for_each(|writer| writer.finish());
+        let finished = self
+            .writers
+            .into_iter()
+            .try_for_each(|writer| writer.finish());
         finished.map_err(|e| FileError::io(Path::new(&name), e))
     }
 }
@@ -139,7 +153,11 @@ impl Json {
 impl TableWriter for Json {
     fn rows(&mut self, columns: &[TableColumn], rows: &[TableRow]) -> io::Result<()> {
         rows.iter().try_for_each(|row| {
-            let separator: &[u8] = if std::mem::take(&mut self.is_empty) { b"\n" } else { b",\n" };
+            let separator: &[u8] = if std::mem::take(&mut self.is_empty) {
+                b"\n"
+            } else {
+                b",\n"
+            };
             self.to.write_all(separator)?;
             json_row(&mut self.to, columns, row)
         })
@@ -203,17 +221,30 @@ mod tests {
     const ROWS: usize = GROUP + 3;
 
     fn row(k: usize) -> TableRow {
-        let x = if k == 1 { f64::NAN } else { (k as f64 + 0.1).sqrt() * 1e-7 };
-        vec![Value::Text(format!("a,\"{}\"", k % 3)), Value::Int(k as u64), Value::Float(x)]
+        let x = if k == 1 {
+            f64::NAN
+        } else {
+            (k as f64 + 0.1).sqrt() * 1e-7
+        };
+        vec![
+            Value::Text(format!("a,\"{}\"", k % 3)),
+            Value::Int(k as u64),
+            Value::Float(x),
+        ]
     }
 
     fn written() -> tempfile::TempDir {
         let dir = tempfile::tempdir().unwrap();
         let mut out = AtomicDir::create(&dir.path().join("results")).unwrap();
-        let columns = [("name", ValueKind::Text), ("run", ValueKind::Int), ("error_m", ValueKind::Float)];
+        let columns = [
+            ("name", ValueKind::Text),
+            ("run", ValueKind::Int),
+            ("error_m", ValueKind::Float),
+        ];
         let columns = columns.map(|(n, k)| (n.to_owned(), k)).to_vec();
-        let mut table =
-            TableFiles::create(&mut out, "t", columns).and_then(|table| table.with_json(&mut out)).unwrap();
+        let mut table = TableFiles::create(&mut out, "t", columns)
+            .and_then(|table| table.with_json(&mut out))
+            .unwrap();
         table.add((0..ROWS).map(row)).unwrap();
         table.finish().unwrap();
         out.commit().unwrap();
@@ -229,8 +260,13 @@ mod tests {
         let json: Vec<serde_json::Value> = serde_json::from_str(&json).unwrap();
         assert_eq!([csv.len(), json.len()], [ROWS; 2]);
         for k in 0..ROWS {
-            let [Value::Text(name), Value::Int(run), Value::Float(x)] = &row(k)[..] else { panic!() };
-            assert_eq!((&csv[k][0], &csv[k][1]), (name.as_str(), run.to_string().as_str()));
+            let [Value::Text(name), Value::Int(run), Value::Float(x)] = &row(k)[..] else {
+                panic!()
+            };
+            assert_eq!(
+                (&csv[k][0], &csv[k][1]),
+                (name.as_str(), run.to_string().as_str())
+            );
             assert_eq!(csv[k][2].parse::<f64>().unwrap().to_bits(), x.to_bits());
             assert_eq!(
                 (json[k]["name"].as_str(), json[k]["run"].as_u64()),
@@ -250,10 +286,17 @@ mod tests {
         let reader = SerializedFileReader::new(file).unwrap();
         assert_eq!(reader.num_row_groups(), 2);
         for (k, found) in reader.get_row_iter(None).unwrap().enumerate() {
-            let found: Vec<Field> =
-                found.unwrap().get_column_iter().map(|(_, field)| field.clone()).collect();
-            let [Value::Text(name), Value::Int(run), Value::Float(x)] = &row(k)[..] else { panic!() };
-            let [Field::Str(n), Field::Long(r), Field::Double(y)] = &found[..] else { panic!() };
+            let found: Vec<Field> = found
+                .unwrap()
+                .get_column_iter()
+                .map(|(_, field)| field.clone())
+                .collect();
+            let [Value::Text(name), Value::Int(run), Value::Float(x)] = &row(k)[..] else {
+                panic!()
+            };
+            let [Field::Str(n), Field::Long(r), Field::Double(y)] = &found[..] else {
+                panic!()
+            };
             assert_eq!((n, *r as u64, y.to_bits()), (name, *run, x.to_bits()));
         }
     }
@@ -263,8 +306,9 @@ mod tests {
         let (a, b) = (written(), written());
         for entry in std::fs::read_dir(a.path().join("results")).unwrap() {
             let name = entry.unwrap().file_name();
-            let bytes =
-                |dir: &tempfile::TempDir| std::fs::read(dir.path().join("results").join(&name)).unwrap();
+            let bytes = |dir: &tempfile::TempDir| {
+                std::fs::read(dir.path().join("results").join(&name)).unwrap()
+            };
             assert_eq!(bytes(&a), bytes(&b), "{name:?}");
         }
     }

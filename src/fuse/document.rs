@@ -24,7 +24,11 @@ impl Answer for FuseAnswer {
         };
         let mut document = Document::new("INS/GNSS fusion of recorded data", tone, self.verdict());
         document.facts(&self.facts());
-        let outages: Vec<_> = summary.outages.iter().map(|o| (o.outage.start_s, o.outage.end_s)).collect();
+        let outages: Vec<_> = summary
+            .outages
+            .iter()
+            .map(|o| (o.outage.start_s, o.outage.end_s))
+            .collect();
         document.section("Figures");
         document.lead(self.figures());
         if !outages.is_empty() {
@@ -40,7 +44,10 @@ impl Answer for FuseAnswer {
             document.table(&state_table(reference));
         }
         document.section("Track");
-        document.chart(&charts::map(solution, &outages), "North and east of the start.");
+        document.chart(
+            &charts::map(solution, &outages),
+            "North and east of the start.",
+        );
         document.section("Position");
         document.chart(&charts::position(solution, &outages), charts::POSITION);
         if solution.rows.iter().any(|row| row.error.is_some()) {
@@ -52,7 +59,11 @@ impl Answer for FuseAnswer {
         document.chart(&charts::nis(&solution.fixes, &outages), charts::FIXES);
         document.checked(CHECKED);
         self.notes.iter().for_each(|note| add(&mut document, note));
-        if let Some(quality) = self.reduction.as_ref().and_then(|reduction| reduction.quality.as_ref()) {
+        if let Some(quality) = self
+            .reduction
+            .as_ref()
+            .and_then(|reduction| reduction.quality.as_ref())
+        {
             match reduction_doubt(quality) {
                 Some(doubt) => document.note(Importance::Warning, doubt),
                 None => document.note(Importance::Remark, reduction_line(quality)),
@@ -69,9 +80,15 @@ impl FuseAnswer {
         let verdict = &summary.verdict;
         let mut evidence = verdict.evidence.iter().map(evidence);
         let first = evidence.next().unwrap_or_else(|| {
-            let nees = summary.reference.map(|r| format!(", NEES {} (9 if right)", readable(r.nees_mean)));
+            let nees = summary
+                .reference
+                .map(|r| format!(", NEES {} (9 if right)", readable(r.nees_mean)));
             let nis = readable(summary.nis_per_component);
-            format!("NIS {nis} per component over {} fixes{}", summary.fixes.used, nees.unwrap_or_default())
+            format!(
+                "NIS {nis} per component over {} fixes{}",
+                summary.fixes.used,
+                nees.unwrap_or_default()
+            )
         });
         let mut lines = vec![format!("{}: {first}", verdict.kind)];
         lines.extend(verdict.cause.as_ref().map(cause));
@@ -97,9 +114,16 @@ impl FuseAnswer {
 
     fn facts(&self) -> Vec<(&str, String)> {
         let summary = &self.summary;
-        let name =
-            |path: &str| Path::new(path).file_name().map_or_else(String::new, |n| n.to_string_lossy().into());
-        let mut facts: Vec<_> = self.inputs.iter().map(|i| (i.role.as_str(), name(&i.path))).collect();
+        let name = |path: &str| {
+            Path::new(path)
+                .file_name()
+                .map_or_else(String::new, |n| n.to_string_lossy().into())
+        };
+        let mut facts: Vec<_> = self
+            .inputs
+            .iter()
+            .map(|i| (i.role.as_str(), name(&i.path)))
+            .collect();
         let (samples, rate_hz) = (summary.imu_samples, summary.imu_rate_hz);
         let span = window(summary.start_s, summary.end_s);
         let states = summary.filter_states - summary.turn_on_states;
@@ -120,26 +144,48 @@ impl FuseAnswer {
         let summary = &self.summary;
         let smoothed = summary.smoothed.as_ref();
         let mut table = Table::new(["", "filter", "smoothed"]);
-        let Fixes { used, withheld, rejected } = summary.fixes;
-        let fixes = format!("NIS per component, {used} fixes used, {withheld} withheld, {rejected} rejected");
+        let Fixes {
+            used,
+            withheld,
+            rejected,
+        } = summary.fixes;
+        let fixes = format!(
+            "NIS per component, {used} fixes used, {withheld} withheld, {rejected} rejected"
+        );
         let nis = Cell::number(summary.nis_per_component, "/nis_per_component");
         table.row([fixes.into(), nis, Cell::figures("–")]);
         if let Some(ends) = &summary.ends {
-            let name = format!("error over σ at the ends of {} outages and gaps, rms", ends.count);
+            let name = format!(
+                "error over σ at the ends of {} outages and gaps, rms",
+                ends.count
+            );
             let ratio = Cell::number(ends.error_over_sigma, "/ends/error_over_sigma");
             table.row([name.into(), ratio, Cell::figures("–")]);
         }
         let rows = &self.solution.rows;
         let square = |row: &Row| row.sigma[0].powi(2) + row.sigma[1].powi(2);
         let sigma = (rows.iter().map(square).sum::<f64>() / rows.len() as f64).sqrt();
-        let of_smoothed =
-            number(smoothed.map(|s| s.horizontal_sigma_rms_m), "/smoothed/horizontal_sigma_rms_m");
-        table.row(["horizontal 1 σ, rms (m)".into(), Cell::figures(readable(sigma)), of_smoothed]);
-        let both = [summary.reference.as_ref(), smoothed.and_then(|s| s.reference.as_ref())];
+        let of_smoothed = number(
+            smoothed.map(|s| s.horizontal_sigma_rms_m),
+            "/smoothed/horizontal_sigma_rms_m",
+        );
+        table.row([
+            "horizontal 1 σ, rms (m)".into(),
+            Cell::figures(readable(sigma)),
+            of_smoothed,
+        ]);
+        let both = [
+            summary.reference.as_ref(),
+            smoothed.and_then(|s| s.reference.as_ref()),
+        ];
         let shown: [Figure; 7] = [
             ("NEES (9 if right)", "nees_mean", |r| r.nees_mean),
-            ("horizontal RMSE (m)", "horizontal_rmse_m", |r| r.horizontal_rmse_m),
-            ("horizontal error, largest (m)", "horizontal_max_m", |r| r.horizontal_max_m),
+            ("horizontal RMSE (m)", "horizontal_rmse_m", |r| {
+                r.horizontal_rmse_m
+            }),
+            ("horizontal error, largest (m)", "horizontal_max_m", |r| {
+                r.horizontal_max_m
+            }),
             ("down RMSE (m)", "rmse/pos_d_m", |r| r.rmse.0[2]),
             ("roll RMSE (°)", "rmse/roll_deg", |r| r.rmse.0[6]),
             ("pitch RMSE (°)", "rmse/pitch_deg", |r| r.rmse.0[7]),
@@ -147,19 +193,38 @@ impl FuseAnswer {
         ];
         for (name, key, value) in shown.into_iter().filter(|_| both[0].is_some()) {
             let [filter, smoothed] = both.map(|reference| reference.map(value));
-            let pointers = [format!("/reference/{key}"), format!("/smoothed/reference/{key}")];
-            table.row([name.into(), number(filter, &pointers[0]), number(smoothed, &pointers[1])]);
+            let pointers = [
+                format!("/reference/{key}"),
+                format!("/smoothed/reference/{key}"),
+            ];
+            table.row([
+                name.into(),
+                number(filter, &pointers[0]),
+                number(smoothed, &pointers[1]),
+            ]);
         }
         for o in &summary.outages {
-            let name = format!("end of outage {}: error (1 σ) (m)", window(o.outage.start_s, o.outage.end_s));
-            table.row([name.into(), drift(o.end_from_reference.or(o.end_from_fix)), Cell::figures("–")]);
+            let name = format!(
+                "end of outage {}: error (1 σ) (m)",
+                window(o.outage.start_s, o.outage.end_s)
+            );
+            table.row([
+                name.into(),
+                drift(o.end_from_reference.or(o.end_from_fix)),
+                Cell::figures("–"),
+            ]);
         }
         table.without_unknown()
     }
 
     /// Errors at the ends of outages, and the largest in them.
     fn outage_table(&self) -> Table {
-        let mut table = Table::new(["outage", "fixes withheld", "end: from the next fix (1 σ) (m)"]).and(
+        let mut table = Table::new([
+            "outage",
+            "fixes withheld",
+            "end: from the next fix (1 σ) (m)",
+        ])
+        .and(
             [
                 "end: from the reference (1 σ) (m)",
                 "largest 1 σ (m)",
@@ -173,7 +238,10 @@ impl FuseAnswer {
             let smoothed = self.summary.smoothed.as_ref();
             let inside = smoothed.and_then(|s| s.outages.iter().find(|s| s.outage == o.outage));
             let largest = |key: &str, value: fn(&SmoothedOutage) -> Option<f64>| {
-                number(inside.and_then(value), &format!("/smoothed/outages/{i}/{key}"))
+                number(
+                    inside.and_then(value),
+                    &format!("/smoothed/outages/{i}/{key}"),
+                )
             };
             table.row([
                 window(o.outage.start_s, o.outage.end_s).into(),
@@ -199,7 +267,13 @@ fn number(value: Option<f64>, pointer: &str) -> Cell {
 
 /// A distance and what the filter states of it.
 fn drift(end: Option<Drift>) -> Cell {
-    let text = end.map(|end| format!("{} ({})", readable(end.horizontal_m), readable(end.expected_sigma_m)));
+    let text = end.map(|end| {
+        format!(
+            "{} ({})",
+            readable(end.horizontal_m),
+            readable(end.expected_sigma_m)
+        )
+    });
     Cell::figures(text.unwrap_or_else(|| "–".to_owned()))
 }
 
@@ -207,9 +281,14 @@ fn drift(end: Option<Drift>) -> Cell {
 fn state_table(reference: &FromReference) -> Table {
     let mut table = Table::new(["state", "RMSE", "error over σ, rms"]);
     for (i, (key, name)) in STATES.iter().enumerate() {
-        let cell = |value: f64, group: &str| Cell::number(value, &format!("/reference/{group}/{key}"));
+        let cell =
+            |value: f64, group: &str| Cell::number(value, &format!("/reference/{group}/{key}"));
         let [rmse, ratio] = [reference.rmse.0[i], reference.error_over_sigma.0[i]];
-        table.row([(*name).into(), cell(rmse, "rmse"), cell(ratio, "error_over_sigma")]);
+        table.row([
+            (*name).into(),
+            cell(rmse, "rmse"),
+            cell(ratio, "error_over_sigma"),
+        ]);
     }
     table
 }
@@ -225,7 +304,10 @@ fn evidence(finding: &Finding) -> String {
         Finding::Direction => {
             "the fixes do not tell whether the vehicle goes forwards or backwards".to_owned()
         }
-        Finding::NotLevel { roll_deg, pitch_deg } => {
+        Finding::NotLevel {
+            roll_deg,
+            pitch_deg,
+        } => {
             format!(
                 "the axes are not front, right, down: roll {roll_deg:.0}°, pitch {pitch_deg:.0}° at the start"
             )
@@ -239,8 +321,16 @@ fn evidence(finding: &Finding) -> String {
             "NIS {} per component: the stated errors of the fixes are too large; a reference decides",
             readable(per_component)
         ),
-        Finding::Correlated { lag_1, pos_sigma_factor } => lasting(lag_1, pos_sigma_factor),
-        Finding::Minutes { bad, of, worst_s, nis_per_component } => format!(
+        Finding::Correlated {
+            lag_1,
+            pos_sigma_factor,
+        } => lasting(lag_1, pos_sigma_factor),
+        Finding::Minutes {
+            bad,
+            of,
+            worst_s,
+            nis_per_component,
+        } => format!(
             "in {bad} of {of} minutes the fixes are too far from the solution: NIS {} after {} s",
             readable(nis_per_component),
             seconds(worst_s)
@@ -249,7 +339,10 @@ fn evidence(finding: &Finding) -> String {
             "at the ends of {} outages and gaps errors are {:.1} times as large as stated (p = {:.0e})",
             ends.count, ends.error_over_sigma, ends.p_value
         ),
-        Finding::Aid { aid, nis_per_component } => format!(
+        Finding::Aid {
+            aid,
+            nis_per_component,
+        } => format!(
             "{aid}: NIS {} per component, it is {:.1} times as far from the solution as stated",
             readable(nis_per_component),
             nis_per_component.sqrt()
@@ -293,11 +386,16 @@ fn cause(cause: &Cause) -> String {
             let arm = found
                 .lever_arm_b
                 .map(|[arm, sigma]| format!("--lever-arm={} (± {})", three(arm), three(sigma)));
-            let delay = found.delay_s.map(|[delay, sigma]| format!("--gnss-delay={delay:.3} (± {sigma:.3})"));
+            let delay = found
+                .delay_s
+                .map(|[delay, sigma]| format!("--gnss-delay={delay:.3} (± {sigma:.3})"));
             let options: Vec<_> = arm.into_iter().chain(delay).collect();
             let [now, then] = found.nis;
             let (now, then) = (readable(now), readable(then));
-            format!("the fixes agree with {}: NIS {then}, now {now}", options.join(" "))
+            format!(
+                "the fixes agree with {}: NIS {then}, now {now}",
+                options.join(" ")
+            )
         }
     }
 }
@@ -306,12 +404,17 @@ fn add(document: &mut Document, note: &FuseNote) {
     let (importance, text) = match note {
         FuseNote::Read(text) => (Importance::Remark, text.clone()),
         FuseNote::Doubt(text) => (Importance::Warning, text.clone()),
-        FuseNote::Rate([from, to]) => {
-            (Importance::Detail, format!("the model was converted from {from} Hz to {to:.3} Hz"))
-        }
+        FuseNote::Rate([from, to]) => (
+            Importance::Detail,
+            format!("the model was converted from {from} Hz to {to:.3} Hz"),
+        ),
         FuseNote::TurnOn(sensor, sigma) => (
             Importance::Remark,
-            format!("the model states a turn-on bias: {} {} ({sensor})", readable(*sigma), sensor.unit()),
+            format!(
+                "the model states a turn-on bias: {} {} ({sensor})",
+                readable(*sigma),
+                sensor.unit()
+            ),
         ),
         FuseNote::Outage(remark) => (Importance::Warning, remark.to_string()),
         FuseNote::EarlyOutage(outage) => {

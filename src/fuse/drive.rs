@@ -95,36 +95,83 @@ impl Drive {
     /// A setting out of range, a file that cannot be used.
     pub(crate) fn read(request: &FuseRequest) -> Result<Self, FuseError> {
         let settings = request.settings()?;
-        let inputs =
-            request.files().map(|(role, path)| input::input(role, path)).collect::<Result<_, _>>()?;
+        let inputs = request
+            .files()
+            .map(|(role, path)| input::input(role, path))
+            .collect::<Result<_, _>>()?;
         let (unsaid, gnss_sigma_factor) = request.fix_sigma();
         let [position, velocity] = gnss_sigma_factor;
         let topic = request.topic.clone().unwrap_or_default();
-        let imu = read_imu(&request.imu, request.columns.as_deref(), topic.imu.as_deref())?;
-        let span_s = imu.samples.first().zip(imu.samples.last()).map(|(first, last)| (first.t_s, last.t_s));
-        let (mut gnss, remarks) = read_gnss(&request.gnss, unsaid.as_ref(), span_s, topic.fixes.as_deref())?;
+        let imu = read_imu(
+            &request.imu,
+            request.columns.as_deref(),
+            topic.imu.as_deref(),
+        )?;
+        let span_s = imu
+            .samples
+            .first()
+            .zip(imu.samples.last())
+            .map(|(first, last)| (first.t_s, last.t_s));
+        let (mut gnss, remarks) = read_gnss(
+            &request.gnss,
+            unsaid.as_ref(),
+            span_s,
+            topic.fixes.as_deref(),
+        )?;
         for fix in &mut gnss {
             *fix = fix.with_sigmas_times(position, velocity);
             fix.t_s -= request.gnss_delay_s;
         }
-        let mut notes: Vec<FuseNote> = imu.remarks.into_iter().chain(remarks).map(FuseNote::from).collect();
-        let wheel = request.odometer.as_deref().map_or_else(|| Ok(Vec::new()), read_wheel)?;
-        let initial = request.initial_file().map(|path| read_initial(path)).transpose()?;
+        let mut notes: Vec<FuseNote> = imu
+            .remarks
+            .into_iter()
+            .chain(remarks)
+            .map(FuseNote::from)
+            .collect();
+        let wheel = request
+            .odometer
+            .as_deref()
+            .map_or_else(|| Ok(Vec::new()), read_wheel)?;
+        let initial = request
+            .initial_file()
+            .map(|path| read_initial(path))
+            .transpose()?;
         let model = model_file::read(&request.model)?;
-        notes.extend(model.doubts(&request.model).into_iter().map(FuseNote::Doubt));
+        notes.extend(
+            model
+                .doubts(&request.model)
+                .into_iter()
+                .map(FuseNote::Doubt),
+        );
         if (model.model.rate_hz / imu.rate_hz - 1.0).abs() > 0.01 {
             notes.push(FuseNote::Rate([model.model.rate_hz, imu.rate_hz]));
         }
-        let of_file = initial.as_ref().map(|start| start.sigma.clone()).unwrap_or_default();
+        let of_file = initial
+            .as_ref()
+            .map(|start| start.sigma.clone())
+            .unwrap_or_default();
         let mut expected = request.expected(of_file);
         let stated = turn_on::expect(&mut expected, &model.turn_on.unwrap_or_default());
-        notes.extend(stated.into_iter().map(|(sensor, sigma)| FuseNote::TurnOn(sensor, sigma)));
-        expected.validate().map_err(|e| FuseError::Setting(e.to_string()))?;
+        notes.extend(
+            stated
+                .into_iter()
+                .map(|(sensor, sigma)| FuseNote::TurnOn(sensor, sigma)),
+        );
+        expected
+            .validate()
+            .map_err(|e| FuseError::Setting(e.to_string()))?;
         let options = trajectory_file::Options::default();
-        let reference =
-            request.reference.as_deref().map(|path| load_reference(path, &options)).transpose()?;
+        let reference = request
+            .reference
+            .as_deref()
+            .map(|path| load_reference(path, &options))
+            .transpose()?;
         let reference = reference.map(|(reference, warnings)| {
-            notes.extend(warnings.iter().map(|warning| FuseNote::Doubt(warning.to_string())));
+            notes.extend(
+                warnings
+                    .iter()
+                    .map(|warning| FuseNote::Doubt(warning.to_string())),
+            );
             reference
         });
         let configuration = Configuration {
@@ -170,14 +217,23 @@ impl Drive {
     /// Data and settings that do not fit together, or a filter that diverges.
     pub(crate) fn fuse(mut self) -> Result<FuseAnswer, FuseError> {
         let origin_s = self.common_origin()?;
-        let mut recorded = Recorded { imu: &self.imu, gnss: &self.gnss, aids: &[] };
+        let mut recorded = Recorded {
+            imu: &self.imu,
+            gnss: &self.gnss,
+            aids: &[],
+        };
         let mut settings = self.settings.clone();
         let of_model = (&self.model.model, self.request.filter, &self.expected);
-        let (belief, reduction) = filter::belief(of_model, self.imu_rate_hz, &self.gnss, &settings.outages)?;
-        let plan = OutagePlan { fixed: settings.outages, ..OutagePlan::default() };
+        let (belief, reduction) =
+            filter::belief(of_model, self.imu_rate_hz, &self.gnss, &settings.outages)?;
+        let plan = OutagePlan {
+            fixed: settings.outages,
+            ..OutagePlan::default()
+        };
         let times_s: Vec<f64> = self.gnss.iter().map(|fix| fix.t_s).collect();
         let placed = plan.on(&FixedData::recorded(&times_s), 0)?;
-        self.notes.extend(placed.remarks.into_iter().map(FuseNote::Outage));
+        self.notes
+            .extend(placed.remarks.into_iter().map(FuseNote::Outage));
         settings.outages = placed.windows;
         let mounting = match self.request.mounted() {
             Mounted::AsGiven => None,
@@ -193,16 +249,23 @@ impl Drive {
         let gnss = earlier(recorded.gnss, rest_s);
         recorded.gnss = &gnss;
         let delay_s = self.request.gnss_delay_s + origin_s.unwrap_or(0.0) + rest_s;
-        self.notes.extend(origin_s.map(|_| FuseNote::Origin(delay_s)));
+        self.notes
+            .extend(origin_s.map(|_| FuseNote::Origin(delay_s)));
         let Alignment { start, doubts } = match (&self.initial, self.request.given_heading()) {
-            (Some(start), _) => {
-                Alignment { start: beside_mounting(start.clone(), &settings), doubts: Vec::new() }
-            }
+            (Some(start), _) => Alignment {
+                start: beside_mounting(start.clone(), &settings),
+                doubts: Vec::new(),
+            },
             (None, Some(heading)) => towards(&recorded, &settings, &belief, heading)?,
             (None, None) => coarse(&recorded, &settings, &belief)?,
         };
         let is_early = |outage: &Outage| outage.end_s <= start.t_s;
-        let early = settings.outages.iter().copied().filter(is_early).map(FuseNote::EarlyOutage);
+        let early = settings
+            .outages
+            .iter()
+            .copied()
+            .filter(is_early)
+            .map(FuseNote::EarlyOutage);
         self.notes.extend(early.collect::<Vec<_>>());
         settings.outages.retain(|outage| !is_early(outage));
         // the start and the mounting are found without: they are what the vehicle's axes come from
@@ -216,35 +279,73 @@ impl Drive {
         if self.reference.is_some() && weighed.solution.rows.iter().all(|row| row.error.is_none()) {
             return Err(FuseError::NothingInCommon);
         }
-        self.notes.extend(doubt_heading(&weighed.solution, &settings.outages).map(FuseNote::Heading));
+        self.notes
+            .extend(doubt_heading(&weighed.solution, &settings.outages).map(FuseNote::Heading));
         let outcome = outcome(&weighed.solution, &settings.outages);
         let Assessment { verdict, findings } = assess(&weighed, &outcome, &doubts);
-        let is_correlated = weighed.whiteness.as_ref().is_some_and(Whiteness::is_correlated);
+        let is_correlated = weighed
+            .whiteness
+            .as_ref()
+            .is_some_and(Whiteness::is_correlated);
         let is_unexplained =
             verdict >= VerdictKind::Doubtful || verdict == VerdictKind::Undecided && is_correlated;
-        let scene =
-            Scene { belief: &belief, start: &start, settings: &settings, is_given: self.initial.is_some() };
-        let explained =
-            is_unexplained.then(|| scene.cause(&Recorded { gnss: &weighed.gnss, ..recorded })).flatten();
+        let scene = Scene {
+            belief: &belief,
+            start: &start,
+            settings: &settings,
+            is_given: self.initial.is_some(),
+        };
+        let explained = is_unexplained
+            .then(|| {
+                scene.cause(&Recorded {
+                    gnss: &weighed.gnss,
+                    ..recorded
+                })
+            })
+            .flatten();
         let cause = explained.map(|cause| cause.after(delay_s));
-        let kind = if cause.is_some() { verdict.max(VerdictKind::Doubtful) } else { verdict };
+        let kind = if cause.is_some() {
+            verdict.max(VerdictKind::Doubtful)
+        } else {
+            verdict
+        };
         let against = |(verdict, finding)| (verdict > VerdictKind::Consistent).then_some(finding);
         let evidence = findings.into_iter().filter_map(against).collect();
-        let constants = belief.groups.iter().flatten().filter(|g| g.is_constant()).count();
+        let constants = belief
+            .groups
+            .iter()
+            .flatten()
+            .filter(|g| g.is_constant())
+            .count();
         let [used, withheld, rejected] = outcome.fixes;
         let summary = FuseSummary {
             schema_version: 1,
             method: "fusion",
-            verdict: FuseVerdict { kind, evidence, cause },
+            verdict: FuseVerdict {
+                kind,
+                evidence,
+                cause,
+            },
             imu_samples: weighed.solution.samples,
             imu_rate_hz: self.imu_rate_hz,
             start_s: start.t_s,
-            end_s: weighed.solution.rows.last().map_or(start.t_s, |row| row.t_s),
+            end_s: weighed
+                .solution
+                .rows
+                .last()
+                .map_or(start.t_s, |row| row.t_s),
             filter_states: belief.states,
             turn_on_states: 3 * constants,
-            initial: Initial::new(&start, self.request.initial_file().map(|path| path.as_path())),
+            initial: Initial::new(
+                &start,
+                self.request.initial_file().map(|path| path.as_path()),
+            ),
             mounting: mounting.as_ref().map(Into::into),
-            fixes: Fixes { used, withheld, rejected },
+            fixes: Fixes {
+                used,
+                withheld,
+                rejected,
+            },
             nis_per_component: outcome.nis_per_component,
             gnss_correlation: FixCorrelation::of(&weighed),
             vehicle: VehicleSummary::of(&weighed.solution, &aiding),
@@ -266,10 +367,19 @@ impl Drive {
 impl Drive {
     /// Brings fixes to the clock of the IMU where the two have nothing in common and no delay is given; by how much (s).
     fn common_origin(&mut self) -> Result<Option<f64>, FuseError> {
-        let recorded = Recorded { imu: &self.imu, gnss: &self.gnss, aids: &[] };
-        let Err(apart) = check_clocks(&recorded) else { return Ok(None) };
+        let recorded = Recorded {
+            imu: &self.imu,
+            gnss: &self.gnss,
+            aids: &[],
+        };
+        let Err(apart) = check_clocks(&recorded) else {
+            return Ok(None);
+        };
         let is_free = self.request.gnss_delay_s == 0.0;
-        let origin_s = is_free.then(|| rough_origin(&recorded)).flatten().ok_or(apart)?;
+        let origin_s = is_free
+            .then(|| rough_origin(&recorded))
+            .flatten()
+            .ok_or(apart)?;
         self.gnss = earlier(&self.gnss, origin_s);
         Ok(Some(origin_s))
     }
@@ -279,7 +389,8 @@ impl Drive {
         /// Tyres and speeds by noisy positions differ by less, units by more.
         const RATIO: Range<f64> = 0.6..1.55;
         let span = self.imu.first().zip(self.imu.last());
-        let is_within = |w: &WheelSpeed| span.is_some_and(|(a, b)| (a.t_s..=b.t_s).contains(&w.t_s));
+        let is_within =
+            |w: &WheelSpeed| span.is_some_and(|(a, b)| (a.t_s..=b.t_s).contains(&w.t_s));
         if !self.wheel.is_empty() && !self.wheel.iter().any(is_within) {
             return Err(FuseError::WheelClock);
         }
@@ -297,17 +408,27 @@ impl Drive {
         settings: &Settings,
         belief: &Belief,
     ) -> FuseError {
-        let Some(clocks) = clocks_apart(recorded) else { return e.into() };
+        let Some(clocks) = clocks_apart(recorded) else {
+            return e.into();
+        };
         let gnss = earlier(recorded.gnss, clocks.delay_s);
-        let there = Recorded { gnss: &gnss, ..*recorded };
+        let there = Recorded {
+            gnss: &gnss,
+            ..*recorded
+        };
         let rest = || {
             let found = mounting::find(&there, settings, belief).ok()?;
-            let settings =
-                Settings { q_s_b: found.q_s_b, mounting_sigma_b: found.sigma_b, ..settings.clone() };
+            let settings = Settings {
+                q_s_b: found.q_s_b,
+                mounting_sigma_b: found.sigma_b,
+                ..settings.clone()
+            };
             let start = coarse(&there, &settings, belief).ok()?.start;
             displaced(&there, belief, &start, &settings)?.delay_s
         };
-        let mut clocks = rest().map_or(clocks, |[delay_s, sigma_s]| clocks.refined(delay_s, sigma_s));
+        let mut clocks = rest().map_or(clocks, |[delay_s, sigma_s]| {
+            clocks.refined(delay_s, sigma_s)
+        });
         clocks.delay_s += self.request.gnss_delay_s;
         FuseError::Apart(e, clocks)
     }
@@ -334,7 +455,8 @@ struct Scene<'a> {
 impl Scene<'_> {
     /// Cause of innovations that are large or last: the clocks, else the antenna or a small delay.
     fn cause(&self, recorded: &Recorded<'_>) -> Option<Cause> {
-        let small = || displaced(recorded, self.belief, self.start, self.settings).map(Cause::Displaced);
+        let small =
+            || displaced(recorded, self.belief, self.start, self.settings).map(Cause::Displaced);
         self.clocks(recorded).map(Cause::Clocks).or_else(small)
     }
 
@@ -344,18 +466,35 @@ impl Scene<'_> {
         let clocks = clocks_apart(recorded)?;
         // turns of the course tell it to tenths of a second, the innovations tell the rest
         let gnss = earlier(recorded.gnss, clocks.delay_s);
-        let there = Recorded { gnss: &gnss, ..*recorded };
-        let rest =
-            displaced(&there, self.belief, &self.start(&there)?, self.settings).and_then(|d| d.delay_s);
-        let clocks = rest.map_or(clocks, |[delay_s, sigma_s]| clocks.refined(delay_s, sigma_s));
+        let there = Recorded {
+            gnss: &gnss,
+            ..*recorded
+        };
+        let rest = displaced(&there, self.belief, &self.start(&there)?, self.settings)
+            .and_then(|d| d.delay_s);
+        let clocks = rest.map_or(clocks, |[delay_s, sigma_s]| {
+            clocks.refined(delay_s, sigma_s)
+        });
         let gnss = earlier(recorded.gnss, clocks.delay_s);
-        let without = self.nis(&Recorded { gnss: &gnss, ..*recorded })?;
-        self.nis(recorded).is_none_or(|now| without < now).then_some(clocks)
+        let without = self.nis(&Recorded {
+            gnss: &gnss,
+            ..*recorded
+        })?;
+        self.nis(recorded)
+            .is_none_or(|now| without < now)
+            .then_some(clocks)
     }
 
     /// Mean NIS per component with a start of its own.
     fn nis(&self, recorded: &Recorded<'_>) -> Option<f64> {
-        let solution = fuse(recorded, self.belief, &self.start(recorded)?, self.settings, None).ok()?;
+        let solution = fuse(
+            recorded,
+            self.belief,
+            &self.start(recorded)?,
+            self.settings,
+            None,
+        )
+        .ok()?;
         Some(outcome(&solution, &[]).nis_per_component).filter(|nis| nis.is_finite())
     }
 
@@ -363,7 +502,9 @@ impl Scene<'_> {
         if self.is_given {
             Some(self.start.clone())
         } else {
-            coarse(recorded, self.settings, self.belief).ok().map(|a| a.start)
+            coarse(recorded, self.settings, self.belief)
+                .ok()
+                .map(|a| a.start)
         }
     }
 }
@@ -373,7 +514,10 @@ impl Cause {
     fn after(mut self, given_s: f64) -> Self {
         match &mut self {
             Self::Clocks(clocks) => clocks.delay_s += given_s,
-            Self::Displaced(found) => found.delay_s.iter_mut().for_each(|[delay_s, _]| *delay_s += given_s),
+            Self::Displaced(found) => found
+                .delay_s
+                .iter_mut()
+                .for_each(|[delay_s, _]| *delay_s += given_s),
         }
         self
     }
@@ -391,6 +535,9 @@ fn beside_mounting(mut start: Start, settings: &Settings) -> Start {
 /// Heading that the motion between outages hardly shows.
 fn doubt_heading(solution: &Solution, outages: &[Outage]) -> Option<HeadingDoubt> {
     let start_s = solution.rows.first()?.t_s;
-    let fixed = solution.rows.iter().filter(|row| !outages.iter().any(|o| o.withholds(row.t_s)));
+    let fixed = solution
+        .rows
+        .iter()
+        .filter(|row| !outages.iter().any(|o| o.withholds(row.t_s)));
     weak_heading(fixed.map(|row| (row.t_s - start_s, row.sigma[8])))
 }

@@ -69,7 +69,9 @@ impl FuseError {
             Self::Fusion(FusionError::Place { .. }) => {
                 "check t_s, lat_deg, lon_deg and pos_sigma_m of the initial state"
             }
-            Self::Fusion(FusionError::Memory { .. }) => "a filter of fewer states, or the drive in parts",
+            Self::Fusion(FusionError::Memory { .. }) => {
+                "a filter of fewer states, or the drive in parts"
+            }
             Self::Fusion(FusionError::Diverged { .. }) => "check axes, units and the initial state",
             Self::Alignment(_) => {
                 "give the heading with --initial DEG:SD, or the whole start with --initial FILE"
@@ -86,6 +88,9 @@ impl FuseError {
 
     /// Whether the data are at fault rather than the numerics.
     pub(crate) const fn is_input(&self) -> bool {
-        !matches!(self, Self::Reduction(_) | Self::Fusion(FusionError::Diverged { .. }))
+        !matches!(
+            self,
+            Self::Reduction(_) | Self::Fusion(FusionError::Diverged { .. })
+        )
     }
 }

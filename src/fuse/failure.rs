@@ -26,6 +26,7 @@ impl FuseAnswer {
     #[must_use]
     pub fn unmet(&self) -> Option<Failure> {
         let is_overconfident = self.summary.verdict.kind == VerdictKind::Overconfident;
-        is_overconfident.then(|| Failure::bound("the solution is overconfident").hint(self.advice()))
+        is_overconfident
+            .then(|| Failure::bound("the solution is overconfident").hint(self.advice()))
     }
 }

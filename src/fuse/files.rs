@@ -26,13 +26,25 @@ pub(crate) const FILES: [&str; 10] = [
     "manifest.json",
 ];
 
-const COMPONENTS: [&str; 6] = ["pos_n_m", "pos_e_m", "pos_d_m", "vel_n_m_s", "vel_e_m_s", "vel_d_m_s"];
+const COMPONENTS: [&str; 6] = [
+    "pos_n_m",
+    "pos_e_m",
+    "pos_d_m",
+    "vel_n_m_s",
+    "vel_e_m_s",
+    "vel_d_m_s",
+];
 
 /// The files of a fusion directory, the manifest last; `errors.csv` is empty but for its header without a
 /// reference.
 pub(crate) fn directory(answer: &FuseAnswer, manifest: &FuseManifest) -> Vec<OutputFile<'static>> {
-    let FuseAnswer { solution, summary, .. } = answer;
-    let title = manifest.inputs.first().map_or("solution", |imu| imu.path.as_str());
+    let FuseAnswer {
+        solution, summary, ..
+    } = answer;
+    let title = manifest
+        .inputs
+        .first()
+        .map_or("solution", |imu| imu.path.as_str());
     let smoothed = solution.smoothed.as_deref();
     let contents = [
         Some(solution_csv(&solution.rows)),
@@ -47,17 +59,29 @@ pub(crate) fn directory(answer: &FuseAnswer, manifest: &FuseManifest) -> Vec<Out
         Some(json(manifest)),
     ];
     let files = FILES.into_iter().zip(contents);
-    files.filter_map(|(name, text)| Some(OutputFile::whole(name, text?))).collect()
+    files
+        .filter_map(|(name, text)| Some(OutputFile::whole(name, text?)))
+        .collect()
 }
 
 fn header(groups: &[(&str, &[&str])]) -> String {
-    let names = groups.iter().flat_map(|(prefix, names)| names.iter().map(move |n| format!("{prefix}{n}")));
-    std::iter::once("t_s".to_owned()).chain(names).collect::<Vec<_>>().join(",") + "\n"
+    let names = groups
+        .iter()
+        .flat_map(|(prefix, names)| names.iter().map(move |n| format!("{prefix}{n}")));
+    std::iter::once("t_s".to_owned())
+        .chain(names)
+        .collect::<Vec<_>>()
+        .join(",")
+        + "\n"
 }
 
 /// A number with as many digits as its size deserves: 1e-10 degrees are 0.01 mm.
 fn fixed(x: f64, digits: usize) -> String {
-    if x.is_finite() && x.abs() < 1e15 { format!("{x:.digits$}") } else { shortest(x) }
+    if x.is_finite() && x.abs() < 1e15 {
+        format!("{x:.digits$}")
+    } else {
+        shortest(x)
+    }
 }
 
 /// `solution.csv` and `smoothed.csv`: states, their standard deviations (those of latitude and longitude in degrees), bias
@@ -80,9 +104,19 @@ fn solution_csv(rows: &[Row]) -> String {
         cells.extend(state.iter().zip(digits).map(|(x, d)| fixed(*x, d)));
         cells.extend([sd_lat, sd_lon].map(|x| format!("{x:.4e}")));
         cells.extend(sd[2..].iter().map(|x| fixed(*x, 6)));
-        cells.extend(row.bias.iter().flat_map(|b| b.to_array()).map(|x| fixed(x, 9)));
+        cells.extend(
+            row.bias
+                .iter()
+                .flat_map(|b| b.to_array())
+                .map(|x| fixed(x, 9)),
+        );
         cells.extend(sd[..2].iter().map(|x| fixed(*x, 6)));
-        cells.extend(row.bias_sigma.iter().flat_map(|b| b.to_array()).map(|x| fixed(x, 9)));
+        cells.extend(
+            row.bias_sigma
+                .iter()
+                .flat_map(|b| b.to_array())
+                .map(|x| fixed(x, 9)),
+        );
         text += &(cells.join(",") + "\n");
     }
     text
@@ -90,16 +124,23 @@ fn solution_csv(rows: &[Row]) -> String {
 
 /// `innovations.csv`: every fix; 1 where it was used, and why not where it was not.
 fn innovations_csv(solution: &Solution) -> String {
-    let mut text =
-        header(&[("", &["used", "status"]), ("", &COMPONENTS), ("sd_", &COMPONENTS), ("", &["nis", "dof"])]);
+    let mut text = header(&[
+        ("", &["used", "status"]),
+        ("", &COMPONENTS),
+        ("sd_", &COMPONENTS),
+        ("", &["nis", "dof"]),
+    ]);
     for fix in &solution.fixes {
         let status = match fix.used {
             Use::Used => "used",
             Use::Withheld => "withheld",
             Use::Rejected => "rejected",
         };
-        let mut cells =
-            vec![fixed(fix.t_s, 6), u8::from(fix.used == Use::Used).to_string(), status.to_owned()];
+        let mut cells = vec![
+            fixed(fix.t_s, 6),
+            u8::from(fix.used == Use::Used).to_string(),
+            status.to_owned(),
+        ];
         for list in [&fix.innovation, &fix.sigma] {
             cells.extend((0..6).map(|i| list.get(i).map_or_else(String::new, |x| fixed(*x, 6))));
         }
@@ -113,7 +154,13 @@ fn errors_csv(rows: &[Row]) -> String {
     let mut text = header(&[("err_", &REPORTED_NAMES), ("", &["nees"])]);
     for (row, error) in rows.iter().filter_map(|row| Some((row, row.error?))) {
         let cells: Vec<String> = error.values.iter().map(|x| fixed(*x, 6)).collect();
-        let _ = writeln!(text, "{},{},{}", fixed(row.t_s, 6), cells.join(","), fixed(error.nees, 4));
+        let _ = writeln!(
+            text,
+            "{},{},{}",
+            fixed(row.t_s, 6),
+            cells.join(","),
+            fixed(error.nees, 4)
+        );
     }
     text
 }
@@ -124,7 +171,11 @@ fn kml(rows: &[Row], name: &str, title: &str) -> String {
     let mut last = f64::NEG_INFINITY;
     for (k, row) in rows.iter().enumerate() {
         if row.t_s - last >= 1.0 - 1e-6 || k + 1 == rows.len() {
-            let (lon, lat, h) = (wrap_angle(row.state.lon) / DEG, row.state.lat / DEG, row.state.h);
+            let (lon, lat, h) = (
+                wrap_angle(row.state.lon) / DEG,
+                row.state.lat / DEG,
+                row.state.h,
+            );
             let _ = write!(line, "{lon:.8},{lat:.8},{h:.2} ");
             last = row.t_s;
         }

@@ -28,14 +28,31 @@ pub(super) fn belief(
     let interval_s = middle(steps.collect()).unwrap_or(1.0);
     let window_s = reduction::window_s(lengths.iter().copied().fold(0.0, f64::max));
     let belief = Belief::new(&model, states, interval_s, window_s)?;
-    let drive = || lincov::drive(&model, &ImuSettings::default(), &receiver(gnss, interval_s), &lengths);
+    let drive = || {
+        lincov::drive(
+            &model,
+            &ImuSettings::default(),
+            &receiver(gnss, interval_s),
+            &lengths,
+        )
+    };
     let Some(track) = states.is_reduced().then(drive).flatten() else {
         return Ok((belief.with_initial(initial), None));
     };
-    let belief = lincov::reduced_belief(&model, belief, &track, lincov::Alike::All).with_initial(initial);
+    let belief =
+        lincov::reduced_belief(&model, belief, &track, lincov::Alike::All).with_initial(initial);
     let full = Belief::new(&model, FilterStates::Full, interval_s, window_s);
-    let full = full.ok().map(|full| full.with_initial(&beside(states, initial)));
-    let reduced = Reduced { model: &model, belief: &belief, full, track: &track, interval_s, window_s };
+    let full = full
+        .ok()
+        .map(|full| full.with_initial(&beside(states, initial)));
+    let reduced = Reduced {
+        model: &model,
+        belief: &belief,
+        full,
+        track: &track,
+        interval_s,
+        window_s,
+    };
     let summary = reduced.summary(&())?;
     Ok((belief, Some(summary)))
 }
@@ -61,8 +78,13 @@ fn beside(states: FilterStates, initial: &InitialSettings) -> InitialSettings {
 fn receiver(gnss: &[GnssFix], interval_s: f64) -> GnssSettings {
     let defaults = GnssSettings::default();
     let position = |i: usize| middle(gnss.iter().map(|fix| fix.pos_sigma_n[i]).collect());
-    let velocity =
-        |i: usize| middle(gnss.iter().filter_map(|fix| Some(fix.velocity?.sigma_n()[i])).collect());
+    let velocity = |i: usize| {
+        middle(
+            gnss.iter()
+                .filter_map(|fix| Some(fix.velocity?.sigma_n()[i]))
+                .collect(),
+        )
+    };
     let velocities = [0, 1, 2].map(velocity);
     let has_velocity = velocities.iter().all(Option::is_some);
     GnssSettings {
@@ -77,9 +99,18 @@ fn receiver(gnss: &[GnssFix], interval_s: f64) -> GnssSettings {
 /// its own rate.
 fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, continuous::RateError> {
     let kept = |axis: &Composite| {
-        let processes = axis.processes.iter().filter(|p| !matches!(p, Process::Quantization(_)));
+        let processes = axis
+            .processes
+            .iter()
+            .filter(|p| !matches!(p, Process::Quantization(_)));
         Composite::new(processes.copied().collect())
     };
     let axes = std::array::from_fn(|i| kept(&model.axes[i]));
-    continuous::at_rate(&Model { rate_hz: model.rate_hz, axes }, rate_hz)
+    continuous::at_rate(
+        &Model {
+            rate_hz: model.rate_hz,
+            axes,
+        },
+        rate_hz,
+    )
 }

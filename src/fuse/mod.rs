@@ -57,6 +57,10 @@ impl FuseRequest {
         let manifest = drive.manifest.clone();
         let answer = drive.fuse()?;
         let files = contents(directory(&answer, &manifest));
-        Ok(Answered { files, unmet: answer.unmet(), ..Answered::of(&answer) })
+        Ok(Answered {
+            files,
+            unmet: answer.unmet(),
+            ..Answered::of(&answer)
+        })
     }
 }

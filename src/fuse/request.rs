@@ -49,7 +49,11 @@ pub struct FuseRequest {
     /// Attitude of the IMU in the vehicle (degrees) if its axes are not front, right, down; after a colon the standard
     /// deviations about the vehicle's front, right, down (1 where not given); flu or rfu: axes of that name; auto:
     /// estimated from the drive of a road vehicle
-    #[arg(long, value_name = "ROLL,PITCH,YAW[:SD,SD,SD]|flu|rfu|auto", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "ROLL,PITCH,YAW[:SD,SD,SD]|flu|rfu|auto",
+        allow_hyphen_values = true
+    )]
     pub mounting: Option<MountingChoice>,
     /// Reference trajectory to compare with; stretches where it jumps are left out
     #[arg(long, value_name = "TRAJECTORY")]
@@ -128,29 +132,54 @@ impl Default for FuseRequest {
 
 impl FuseRequest {
     /// A fusion of these files with default settings.
-    pub fn new(imu: impl Into<PathBuf>, gnss: impl Into<PathBuf>, model: impl Into<PathBuf>) -> Self {
-        Self { imu: imu.into(), gnss: gnss.into(), model: model.into(), ..Self::default() }
+    pub fn new(
+        imu: impl Into<PathBuf>,
+        gnss: impl Into<PathBuf>,
+        model: impl Into<PathBuf>,
+    ) -> Self {
+        Self {
+            imu: imu.into(),
+            gnss: gnss.into(),
+            model: model.into(),
+            ..Self::default()
+        }
     }
 
     /// The file of the initial state; none where it is found in the data.
     pub(super) fn initial_file(&self) -> Option<&PathBuf> {
-        if let StartChoice::File(path) = &self.initial { Some(path) } else { None }
+        if let StartChoice::File(path) = &self.initial {
+            Some(path)
+        } else {
+            None
+        }
     }
 
     /// Every file that is read, by its role.
     pub(super) fn files(&self) -> impl Iterator<Item = (&'static str, &PathBuf)> {
-        let given = [("imu", &self.imu), ("gnss", &self.gnss), ("model", &self.model)];
+        let given = [
+            ("imu", &self.imu),
+            ("gnss", &self.gnss),
+            ("model", &self.model),
+        ];
         let asked = [
             ("initial", self.initial_file()),
             ("odometer", self.odometer.as_ref()),
             ("reference", self.reference.as_ref()),
         ];
-        given.into_iter().chain(asked.into_iter().filter_map(|(role, path)| Some((role, path?))))
+        given.into_iter().chain(
+            asked
+                .into_iter()
+                .filter_map(|(role, path)| Some((role, path?))),
+        )
     }
 
     /// Source of the mounting.
     pub(super) fn mounted(&self) -> Mounted {
-        if self.mounting == Some(MountingChoice::Auto) { Mounted::AsFound } else { Mounted::AsGiven }
+        if self.mounting == Some(MountingChoice::Auto) {
+            Mounted::AsFound
+        } else {
+            Mounted::AsGiven
+        }
     }
 
     /// Standard deviations where the file states none, and factors of those that it states.
@@ -164,14 +193,25 @@ impl FuseRequest {
 
     /// Heading at the start, where it is given.
     pub(super) fn given_heading(&self) -> Option<Heading> {
-        let StartChoice::Heading { deg, sigma_deg } = self.initial else { return None };
-        Some(Heading { yaw: deg * DEG, sigma: sigma_deg * DEG })
+        let StartChoice::Heading { deg, sigma_deg } = self.initial else {
+            return None;
+        };
+        Some(Heading {
+            yaw: deg * DEG,
+            sigma: sigma_deg * DEG,
+        })
     }
 
     /// The filter's expectation of constant biases, over that of a file.
     pub(super) fn expected(&self, of_file: InitialSettings) -> InitialSettings {
-        let Some([accel, gyro]) = self.turn_on_bias else { return of_file };
-        InitialSettings { accel_bias_sigma_m_s2: Some(accel), gyro_bias_sigma_rad_s: Some(gyro), ..of_file }
+        let Some([accel, gyro]) = self.turn_on_bias else {
+            return of_file;
+        };
+        InitialSettings {
+            accel_bias_sigma_m_s2: Some(accel),
+            gyro_bias_sigma_rad_s: Some(gyro),
+            ..of_file
+        }
     }
 
     /// Settings of the filter's run.
@@ -180,15 +220,28 @@ impl FuseRequest {
     /// A value that is out of its range.
     pub(super) fn settings(&self) -> Result<Settings, FuseError> {
         let refuse = |message: String| Err(FuseError::Setting(message));
-        for (option, arm) in [("--lever-arm", self.lever_arm_m), ("--rear-axle", self.rear_axle_m)] {
+        for (option, arm) in [
+            ("--lever-arm", self.lever_arm_m),
+            ("--rear-axle", self.rear_axle_m),
+        ] {
             if !arm.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
                 let [x, y, z] = arm;
-                return refuse(format!("{option} {x},{y},{z}: more than {MAX_LEVER_ARM_M} m"));
+                return refuse(format!(
+                    "{option} {x},{y},{z}: more than {MAX_LEVER_ARM_M} m"
+                ));
             }
         }
         let (q_s_b, mounting_sigma_b) = match self.mounting {
-            Some(MountingChoice::Angles { deg: [roll, pitch, yaw], sigma_deg }) => (
-                RollPitchYaw { roll: roll * DEG, pitch: pitch * DEG, yaw: yaw * DEG }.to_quat(),
+            Some(MountingChoice::Angles {
+                deg: [roll, pitch, yaw],
+                sigma_deg,
+            }) => (
+                RollPitchYaw {
+                    roll: roll * DEG,
+                    pitch: pitch * DEG,
+                    yaw: yaw * DEG,
+                }
+                .to_quat(),
                 DVec3::from(sigma_deg) * DEG,
             ),
             Some(MountingChoice::Axes(axes)) => (axes.to_frd(), DVec3::ZERO),
@@ -291,7 +344,10 @@ fn list<const N: usize>(text: &str) -> Option<[f64; N]> {
 }
 
 pub(super) fn number(text: &str) -> Result<f64, &'static str> {
-    text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or("not a finite number")
+    text.parse()
+        .ok()
+        .filter(|x: &f64| x.is_finite())
+        .ok_or("not a finite number")
 }
 
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
@@ -316,7 +372,9 @@ fn correlation(text: &str) -> Result<Correlation, &'static str> {
 }
 
 fn gnss_sigma(text: &str) -> Result<GnssSigma, &'static str> {
-    let Some(factors) = text.strip_prefix('x') else { return fix_sigma(text).map(GnssSigma::Unsaid) };
+    let Some(factors) = text.strip_prefix('x') else {
+        return fix_sigma(text).map(GnssSigma::Unsaid);
+    };
     let (position, velocity) = factors.split_once(':').unwrap_or((factors, factors));
     let factor = |text: &str| number(text).ok().filter(|factor| *factor > 0.0);
     let both = factor(position).zip(factor(velocity));
@@ -332,8 +390,13 @@ fn fix_sigma(text: &str) -> Result<FixSigma, &'static str> {
             "expected metres above 0, one or three (north, east, down), and after a colon m/s: 2,2,4:0.1",
         )
     };
-    let (position, velocity) = text.split_once(':').map_or((text, None), |(p, v)| (p, Some(v)));
-    Ok(FixSigma { pos_m: three(position)?, vel_m_s: velocity.map(three).transpose()? })
+    let (position, velocity) = text
+        .split_once(':')
+        .map_or((text, None), |(p, v)| (p, Some(v)));
+    Ok(FixSigma {
+        pos_m: three(position)?,
+        vel_m_s: velocity.map(three).transpose()?,
+    })
 }
 
 #[cfg(test)]
@@ -347,9 +410,18 @@ mod tests {
         for axes in [LoggerAxes::Flu, LoggerAxes::Rfu] {
             assert_eq!(to(axes, DVec3::Z), DVec3::NEG_Z, "{axes:?}");
         }
-        assert_eq!((to(LoggerAxes::Flu, DVec3::X), to(LoggerAxes::Flu, DVec3::Y)), (DVec3::X, DVec3::NEG_Y));
-        assert_eq!((to(LoggerAxes::Rfu, DVec3::X), to(LoggerAxes::Rfu, DVec3::Y)), (DVec3::Y, DVec3::X));
-        assert_eq!(FuseRequest::default().settings().unwrap().q_s_b, DQuat::IDENTITY);
+        assert_eq!(
+            (to(LoggerAxes::Flu, DVec3::X), to(LoggerAxes::Flu, DVec3::Y)),
+            (DVec3::X, DVec3::NEG_Y)
+        );
+        assert_eq!(
+            (to(LoggerAxes::Rfu, DVec3::X), to(LoggerAxes::Rfu, DVec3::Y)),
+            (DVec3::Y, DVec3::X)
+        );
+        assert_eq!(
+            FuseRequest::default().settings().unwrap().q_s_b,
+            DQuat::IDENTITY
+        );
     }
 
     #[test]
@@ -357,7 +429,10 @@ mod tests {
         let sigma = |text| fix_sigma(text).map(|s| (s.pos_m, s.vel_m_s));
         assert_eq!(sigma("2"), Ok(([2.0; 3], None)));
         assert_eq!(sigma("2,2,4:0.1"), Ok(([2.0, 2.0, 4.0], Some([0.1; 3]))));
-        assert_eq!(sigma("1:0.1,0.1,0.2"), Ok(([1.0; 3], Some([0.1, 0.1, 0.2]))));
+        assert_eq!(
+            sigma("1:0.1,0.1,0.2"),
+            Ok(([1.0; 3], Some([0.1, 0.1, 0.2])))
+        );
         for bad in ["", "0", "1,2", "nan", "1:", "1:2:3", "1,2,-3"] {
             assert!(sigma(bad).is_err(), "{bad}");
         }
@@ -365,7 +440,8 @@ mod tests {
 
     #[test]
     fn a_request_is_a_file_too() {
-        let text = r#"{ "imu": "a", "gnss": "b", "model": "c", "mounting": "auto", "filter": "full" }"#;
+        let text =
+            r#"{ "imu": "a", "gnss": "b", "model": "c", "mounting": "auto", "filter": "full" }"#;
         let request: FuseRequest = serde_json::from_str(text).unwrap();
         let expected = FuseRequest {
             mounting: Some(MountingChoice::Auto),

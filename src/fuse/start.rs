@@ -26,7 +26,9 @@ impl FromStr for StartChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let numbers = text.split_once(':').map(|(deg, sigma)| (number(deg), number(sigma)));
+        let numbers = text
+            .split_once(':')
+            .map(|(deg, sigma)| (number(deg), number(sigma)));
         match numbers {
             _ if text == "auto" => Ok(Self::Auto),
             Some((Ok(deg), Ok(sigma_deg)))
@@ -69,7 +71,10 @@ impl FromStr for TopicChoice {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let (imu, fixes) = text.split_once(',').unwrap_or((text, ""));
         let named = |name: &str| (!name.is_empty()).then(|| name.to_owned());
-        Ok(Self { imu: named(imu), fixes: named(fixes) })
+        Ok(Self {
+            imu: named(imu),
+            fixes: named(fixes),
+        })
     }
 }
 
@@ -81,8 +86,17 @@ mod tests {
     fn a_start_is_a_file_a_heading_or_found() {
         let start = |text: &str| text.parse::<StartChoice>();
         assert_eq!(start("auto"), Ok(StartChoice::Auto));
-        assert_eq!(start("-90:5"), Ok(StartChoice::Heading { deg: -90.0, sigma_deg: 5.0 }));
-        assert_eq!(start("a/initial.toml"), Ok(StartChoice::File("a/initial.toml".into())));
+        assert_eq!(
+            start("-90:5"),
+            Ok(StartChoice::Heading {
+                deg: -90.0,
+                sigma_deg: 5.0
+            })
+        );
+        assert_eq!(
+            start("a/initial.toml"),
+            Ok(StartChoice::File("a/initial.toml".into()))
+        );
         for bad in ["400:5", "90:0", "90:31"] {
             assert!(start(bad).is_err(), "{bad}");
         }

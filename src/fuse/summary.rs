@@ -6,8 +6,8 @@ use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
 use nav_sim_navigation::fusion::mounting::Mounting;
 use nav_sim_navigation::fusion::{
-    ClocksApart, Displaced, Ends, Finding, Found, FromReference, Levelling, OutageDrift, SmoothedOutcome,
-    Start, Weighed, outcome,
+    ClocksApart, Displaced, Ends, Finding, Found, FromReference, Levelling, OutageDrift,
+    SmoothedOutcome, Start, Weighed, outcome,
 };
 use nav_sim_navigation::metrics::VerdictKind;
 use nav_sim_signal::units::DEG;
@@ -15,8 +15,17 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-pub(super) const STATE: [&str; 9] =
-    ["lat_deg", "lon_deg", "h_m", "v_n_m_s", "v_e_m_s", "v_d_m_s", "roll_deg", "pitch_deg", "yaw_deg"];
+pub(super) const STATE: [&str; 9] = [
+    "lat_deg",
+    "lon_deg",
+    "h_m",
+    "v_n_m_s",
+    "v_e_m_s",
+    "v_d_m_s",
+    "roll_deg",
+    "pitch_deg",
+    "yaw_deg",
+];
 
 /// `summary.json` of a fusion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -80,10 +89,19 @@ pub struct FixCorrelation {
 
 impl FixCorrelation {
     pub(super) fn of(weighed: &Weighed) -> Option<Self> {
-        let (white, nis_as_stated) = (weighed.whiteness?, outcome(weighed.judged(), &[]).nis_per_component);
+        let (white, nis_as_stated) = (
+            weighed.whiteness?,
+            outcome(weighed.judged(), &[]).nis_per_component,
+        );
         let (lag_1, limit) = (white.lag_1, white.limit);
         let (is_correlated, pos_sigma_factor) = (white.is_correlated(), weighed.pos_sigma_factor);
-        Some(Self { lag_1, limit, is_correlated, pos_sigma_factor, nis_as_stated })
+        Some(Self {
+            lag_1,
+            limit,
+            is_correlated,
+            pos_sigma_factor,
+            nis_as_stated,
+        })
     }
 }
 
@@ -139,10 +157,18 @@ impl Initial {
     pub(super) fn new(start: &Start, file: Option<&Path>) -> Self {
         let how = match (&start.found, file) {
             (Some(found), _) => how(start, found),
-            (None, file) => file.iter().map(|file| format!("as {} says", file.display())).collect(),
+            (None, file) => file
+                .iter()
+                .map(|file| format!("as {} says", file.display()))
+                .collect(),
         };
         let state = STATE.into_iter().zip(values(&start.state)).collect();
-        Self { t_s: start.t_s, state, sigma: start.sigma.clone(), how }
+        Self {
+            t_s: start.t_s,
+            state,
+            sigma: start.sigma.clone(),
+            how,
+        }
     }
 }
 
@@ -155,16 +181,25 @@ fn how(start: &Start, found: &Found) -> Vec<String> {
             format!("from levelling at rest until {until_s:.2} s, carried on by the gyroscopes")
         }
         Levelling::InMotion(seconds) => {
-            format!("from accelerations over the {seconds:.1} s after it (no better static window before)")
+            format!(
+                "from accelerations over the {seconds:.1} s after it (no better static window before)"
+            )
         }
     };
     let (speed, sigma) = (start.state.v_n.truncate().length(), found.course_sigma_deg);
-    let reversing = if found.is_reversing { ", reversing" } else { "" };
+    let reversing = if found.is_reversing {
+        ", reversing"
+    } else {
+        ""
+    };
     let t_s = start.t_s;
     let source = if found.is_given {
         "as given".to_owned()
     } else {
-        format!("from the course of the fix at {} s ({speed:.1} m/s{reversing})", seconds(t_s))
+        format!(
+            "from the course of the fix at {} s ({speed:.1} m/s{reversing})",
+            seconds(t_s)
+        )
     };
     let mut how = vec![
         format!("roll {roll:.2}°, pitch {pitch:.2}° ± {tilt_sigma:.2}° {level}"),
@@ -182,7 +217,9 @@ fn how(start: &Start, found: &Found) -> Vec<String> {
 impl From<&Mounting> for MountingRow {
     fn from(found: &Mounting) -> Self {
         // hundredths are what is printed; + 0 takes the sign from -0
-        let [roll_deg, pitch_deg, yaw_deg] = found.angles_deg().map(|a| (a * 100.0).round() / 100.0 + 0.0);
+        let [roll_deg, pitch_deg, yaw_deg] = found
+            .angles_deg()
+            .map(|a| (a * 100.0).round() / 100.0 + 0.0);
         let km = found.way_m / 1000.0;
         let widened = match found.sigma_factor {
             1.0 => String::new(),
@@ -191,7 +228,13 @@ impl From<&Mounting> for MountingRow {
         let how = format!(
             "from gravity, accelerations and turns, and the attitude of the IMU beside the track over {km:.1} km; the roads taken as level across on average, the vehicle as going where it looks{widened}"
         );
-        Self { roll_deg, pitch_deg, yaw_deg, sigma_deg: found.sigma_deg(), how }
+        Self {
+            roll_deg,
+            pitch_deg,
+            yaw_deg,
+            sigma_deg: found.sigma_deg(),
+            how,
+        }
     }
 }
 
@@ -199,5 +242,15 @@ impl From<&Mounting> for MountingRow {
 pub(super) fn values(s: &NavState) -> [f64; 9] {
     let rpy = RollPitchYaw::from_quat(s.q_b_n);
     let [roll, pitch, yaw] = [rpy.roll, rpy.pitch, rpy.yaw].map(|a| a / DEG);
-    [s.lat / DEG, wrap_angle(s.lon) / DEG, s.h, s.v_n.x, s.v_n.y, s.v_n.z, roll, pitch, yaw]
+    [
+        s.lat / DEG,
+        wrap_angle(s.lon) / DEG,
+        s.h,
+        s.v_n.x,
+        s.v_n.y,
+        s.v_n.z,
+        roll,
+        pitch,
+        yaw,
+    ]
 }

@@ -3,7 +3,9 @@
 use super::FuseRequest;
 use nav_sim_document::{Cell, Table, readable};
 use nav_sim_navigation::fusion::{AidInnovations, Solution, aid_innovations};
-use nav_sim_navigation::sensors::aiding::{AidingSettings, NhcSettings, OdometerSettings, ZuptSettings};
+use nav_sim_navigation::sensors::aiding::{
+    AidingSettings, NhcSettings, OdometerSettings, ZuptSettings,
+};
 use nav_sim_signal::units::DEG;
 use serde::Serialize;
 
@@ -77,10 +79,21 @@ impl VehicleSummary {
         let mut table = Table::new(["", "value", "1 σ, or 95 % if right", "correlation"]);
         let states = [
             ("wheel scale", "wheel_scale", self.wheel_scale),
-            ("mounting pitch (°)", "mounting_pitch_deg", self.mounting_pitch_deg),
-            ("mounting yaw (°)", "mounting_yaw_deg", self.mounting_yaw_deg),
+            (
+                "mounting pitch (°)",
+                "mounting_pitch_deg",
+                self.mounting_pitch_deg,
+            ),
+            (
+                "mounting yaw (°)",
+                "mounting_yaw_deg",
+                self.mounting_yaw_deg,
+            ),
         ];
-        for (name, key, known) in states.into_iter().filter_map(|(n, k, known)| Some((n, k, known?))) {
+        for (name, key, known) in states
+            .into_iter()
+            .filter_map(|(n, k, known)| Some((n, k, known?)))
+        {
             let cell = |value, part: &str| Cell::number(value, &format!("/vehicle/{key}/{part}"));
             table.row([
                 name.into(),
@@ -91,8 +104,14 @@ impl VehicleSummary {
         }
         for (i, aid) in self.aids.iter().enumerate() {
             let pointer = |key: &str| format!("/vehicle/aids/{i}/{key}");
-            let band = format!("{}–{}", readable(aid.nis_band.lower), readable(aid.nis_band.upper));
-            let lag_1 = aid.whiteness.map(|w| Cell::number(w.lag_1, &pointer("whiteness/lag_1")));
+            let band = format!(
+                "{}–{}",
+                readable(aid.nis_band.lower),
+                readable(aid.nis_band.upper)
+            );
+            let lag_1 = aid
+                .whiteness
+                .map(|w| Cell::number(w.lag_1, &pointer("whiteness/lag_1")));
             table.row([
                 format!("{}: NIS per component, {} used", aid.aid, aid.count).into(),
                 Cell::number(aid.nis_per_component, &pointer("nis_per_component")),

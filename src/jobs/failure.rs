@@ -20,9 +20,10 @@ impl From<JobError> for Failure {
             JobError::OtherTrajectory { .. } => {
                 Self::input(e).hint("compare runs along one and the same trajectory file")
             }
-            JobError::Ratio { source: ComparisonError::Runs { .. }, .. } => {
-                Self::input(e).hint("make both with one number of --runs")
-            }
+            JobError::Ratio {
+                source: ComparisonError::Runs { .. },
+                ..
+            } => Self::input(e).hint("make both with one number of --runs"),
             JobError::Replicate(_)
             | JobError::Anticipation(_)
             | JobError::Navigate(_)
@@ -30,9 +31,14 @@ impl From<JobError> for Failure {
             | JobError::Pair(_)
             | JobError::Ratio { .. } => Self::input(e),
             JobError::Pooled => Self::input(format!("--pool sensor: {e}")).hint("--pool axes"),
-            JobError::TwoRates { path, stated, given } => {
-                let message =
-                    format!("{path}: the curve says its rate, {stated} Hz; --rate-hz {given} is another");
+            JobError::TwoRates {
+                path,
+                stated,
+                given,
+            } => {
+                let message = format!(
+                    "{path}: the curve says its rate, {stated} Hz; --rate-hz {given} is another"
+                );
                 Self::input(message).hint("leave --rate-hz out: it is for a CSV curve")
             }
             JobError::NoRate { .. } => Self::input(e)
@@ -50,13 +56,15 @@ pub(crate) fn of_calibration(e: &CalibrationError) -> Failure {
         Cause::Fit(FitError::TooFewScales { .. }) => {
             Some("record for longer, or a --model with fewer processes")
         }
-        Cause::Fit(FitError::NoSlope { .. }) => {
-            Some("--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope)")
-        }
+        Cause::Fit(FitError::NoSlope { .. }) => Some(
+            "--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope)",
+        ),
         Cause::Fit(FitError::NotPositive { .. }) => Some(
             "the signal is quantised so coarsely that scales are silent: --estimator awv, or another range",
         ),
-        Cause::Average(AverageError::Trim { .. }) => Some("a smaller --trim, or --estimator sr-awv"),
+        Cause::Average(AverageError::Trim { .. }) => {
+            Some("a smaller --trim, or --estimator sr-awv")
+        }
         _ => None,
     };
     Failure::input(e).maybe_hint(hint.map(str::to_owned))

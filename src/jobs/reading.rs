@@ -48,8 +48,16 @@ impl LogRequest {
     pub(crate) fn options(&self, topic: Option<String>) -> LogOptions {
         LogOptions {
             topic,
-            stamp: if self.stamp == Stamps::Log { Stamp::Log } else { Stamp::Header },
-            on_damage: if self.recover { OnDamage::Recover } else { OnDamage::Refuse },
+            stamp: if self.stamp == Stamps::Log {
+                Stamp::Log
+            } else {
+                Stamp::Header
+            },
+            on_damage: if self.recover {
+                OnDamage::Recover
+            } else {
+                OnDamage::Refuse
+            },
         }
     }
 }
@@ -92,12 +100,19 @@ pub struct RecordingRequest {
 
 impl Default for RecordingRequest {
     fn default() -> Self {
-        Self { reading: ReadingRequest::default(), gaps: Gaps::Keep, axes: Vec::new() }
+        Self {
+            reading: ReadingRequest::default(),
+            gaps: Gaps::Keep,
+            axes: Vec::new(),
+        }
     }
 }
 
 const GAPS: &[(&str, &str)] = &[
-    ("keep", "Leave out what is missing, if it is less than a tenth; refuse the file otherwise"),
+    (
+        "keep",
+        "Leave out what is missing, if it is less than a tenth; refuse the file otherwise",
+    ),
     WHOLE[0],
     WHOLE[1],
     WHOLE[2],
@@ -110,7 +125,10 @@ pub(crate) const WHOLE: &[(&str, &str)] = &[
         "split",
         "Make each stretch between gaps a recording of its own (but not one 16 times shorter than the longest)",
     ),
-    ("ignore", "Take the samples as evenly spaced over the whole time: stamped late, none lost"),
+    (
+        "ignore",
+        "Take the samples as evenly spaced over the whole time: stamped late, none lost",
+    ),
 ];
 
 /// What is left out at the beginning.
@@ -145,7 +163,9 @@ impl FromStr for Skip {
     fn from_str(text: &str) -> Result<Self, String> {
         match text {
             "auto" => Ok(Self::Auto),
-            _ => parse::non_negative(text).map(Self::Seconds).map_err(|e| format!("{e}, nor auto")),
+            _ => parse::non_negative(text)
+                .map(Self::Seconds)
+                .map_err(|e| format!("{e}, nor auto")),
         }
     }
 }
@@ -174,7 +194,10 @@ impl FromStr for ChannelSet {
         let channels = Channel::named(word);
         match channels.as_slice() {
             [] => Err("not all, accel, gyro, x, y, z, or one channel such as accel.x".into()),
-            _ => Ok(Self { word: word.to_owned(), channels }),
+            _ => Ok(Self {
+                word: word.to_owned(),
+                channels,
+            }),
         }
     }
 }
@@ -208,9 +231,19 @@ impl ReadingRequest {
 
     /// How the files are to be read.
     pub(crate) fn options(&self, gaps: Gaps) -> ReadOptions {
-        let skip_s = if let Skip::Seconds(s) = self.skip_s { s } else { 0.0 };
+        let skip_s = if let Skip::Seconds(s) = self.skip_s {
+            s
+        } else {
+            0.0
+        };
         let log = self.log.options(self.topic.clone());
-        ReadOptions { rate_hz: self.rate_hz, skip_s, gaps, log, ..ReadOptions::default() }
+        ReadOptions {
+            rate_hz: self.rate_hz,
+            skip_s,
+            gaps,
+            log,
+            ..ReadOptions::default()
+        }
     }
 }
 
@@ -241,7 +274,10 @@ impl RecordingRequest {
     /// How the files are to be read.
     pub(crate) fn options(&self) -> ReadOptions {
         let channels = (!self.axes.is_empty()).then(|| self.channels().copied().collect());
-        ReadOptions { channels, ..self.reading.options(self.gaps) }
+        ReadOptions {
+            channels,
+            ..self.reading.options(self.gaps)
+        }
     }
 }
 
@@ -261,7 +297,10 @@ pub struct VarianceRequest {
 
 impl Default for VarianceRequest {
     fn default() -> Self {
-        Self { efficiency: Tuning::DEFAULT_EFFICIENCY, scales: None }
+        Self {
+            efficiency: Tuning::DEFAULT_EFFICIENCY,
+            scales: None,
+        }
     }
 }
 
@@ -311,11 +350,19 @@ impl VarianceRequest {
 
     /// Number of scales, if it is given.
     pub(crate) fn levels(&self) -> Option<u32> {
-        if let Some(Scales::Count(count)) = self.scales { Some(count) } else { None }
+        if let Some(Scales::Count(count)) = self.scales {
+            Some(count)
+        } else {
+            None
+        }
     }
 
     /// The scales that are fitted, if they are given.
     pub(crate) fn fitted(&self) -> Option<FitRange> {
-        if let Some(Scales::Fitted(range)) = self.scales { Some(range) } else { None }
+        if let Some(Scales::Fitted(range)) = self.scales {
+            Some(range)
+        } else {
+            None
+        }
     }
 }

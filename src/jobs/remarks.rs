@@ -47,14 +47,28 @@ impl Remark<'_> {
                     six_digits(found_hz)
                 ),
             ),
-            Self::Shortest { recording, samples, scales, short: 0, usual, .. } => (
+            Self::Shortest {
+                recording,
+                samples,
+                scales,
+                short: 0,
+                usual,
+                ..
+            } => (
                 Importance::Warning,
                 format!(
                     "{recording}: its {samples} samples limit all recordings to {scales} scales; without it there would be \
                      more (half of them have {usual}): leave it out for those"
                 ),
             ),
-            Self::Shortest { recording, samples, scales, short, used, .. } => {
+            Self::Shortest {
+                recording,
+                samples,
+                scales,
+                short,
+                used,
+                ..
+            } => {
                 let others = match short {
                     1 => String::new(),
                     _ => format!(" ({} more are short)", short - 1),
@@ -76,17 +90,30 @@ const FEW: usize = 2;
 fn read(report: &Report) -> Vec<Note> {
     let is_many = report.files.len() > FEW;
     let note = |importance, text| Note { importance, text };
-    let summary =
-        is_many.then(|| note(Importance::Remark, format!("{} (--verbose: each of them)", report.summary())));
-    let each = if is_many { Importance::Detail } else { Importance::Remark };
+    let summary = is_many.then(|| {
+        note(
+            Importance::Remark,
+            format!("{} (--verbose: each of them)", report.summary()),
+        )
+    });
+    let each = if is_many {
+        Importance::Detail
+    } else {
+        Importance::Remark
+    };
     let of_files = report.files.iter().flat_map(|file| {
         let ignored = (!file.ignored.is_empty()).then(|| {
-            note(Importance::Detail, format!("{}: passed over: {}", file.file, file.ignored.join(", ")))
+            note(
+                Importance::Detail,
+                format!("{}: passed over: {}", file.file, file.ignored.join(", ")),
+            )
         });
         std::iter::once(note(each, file.to_string())).chain(ignored)
     });
-    let doubts =
-        report.all_warnings().into_iter().map(|warning| note(Importance::Warning, warning.to_string()));
+    let doubts = report
+        .all_warnings()
+        .into_iter()
+        .map(|warning| note(Importance::Warning, warning.to_string()));
     summary.into_iter().chain(of_files).chain(doubts).collect()
 }
 

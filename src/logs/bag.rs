@@ -35,7 +35,11 @@ pub(crate) struct Bag {
 impl Dialect for Bag {
     fn start(&mut self, input: &mut Input) -> Result<(), Error> {
         let magic = input.array()?;
-        if magic == MAGIC { Ok(()) } else { Err(Error::encoding(0, magic.trim_ascii_end())) }
+        if magic == MAGIC {
+            Ok(())
+        } else {
+            Err(Error::encoding(0, magic.trim_ascii_end()))
+        }
     }
 
     fn record(&mut self, input: &mut Input) -> Result<Option<Record>, Error> {
@@ -55,9 +59,17 @@ impl Dialect for Bag {
                 let compression = fields.bytes(b"compression").ok_or_else(fault)?.to_vec();
                 let unpacked = fields.u32(b"size").ok_or_else(fault)?.into();
                 let offset = input.offset();
-                Ok(Some(Record::Chunk(Chunk { offset, compression, packed: size, unpacked, crc: 0 })))
+                Ok(Some(Record::Chunk(Chunk {
+                    offset,
+                    compression,
+                    packed: size,
+                    unpacked,
+                    crc: 0,
+                })))
             }
-            [opcode::INDEX] => index(fields, &input.bytes(size, LARGEST_RECORD)?).ok_or_else(fault).map(Some),
+            [opcode::INDEX] => index(fields, &input.bytes(size, LARGEST_RECORD)?)
+                .ok_or_else(fault)
+                .map(Some),
             [opcode::CONNECTION] => {
                 let data = input.bytes(size, LARGEST_RECORD)?;
                 connection(fields, &data).ok_or_else(fault).map(Some)
@@ -73,7 +85,9 @@ impl Dialect for Bag {
     fn finish(&self, input: &Input) -> Result<(), Error> {
         let [stated, found] = self.chunks;
         if self.index == 0 || self.index > input.length() || found < stated {
-            return Err(Error::StillWritten { place: Place::byte(input.offset()) });
+            return Err(Error::StillWritten {
+                place: Place::byte(input.offset()),
+            });
         }
         Ok(())
     }
@@ -89,10 +103,15 @@ impl Bag {
             if let Some(name) = fields.bytes(b"encryptor").filter(|name| !name.is_empty()) {
                 return Err(Error::encoding(offset, name));
             }
-            let index = fields.bytes(b"index_pos").and_then(|b| Bytes::little(b).u64());
+            let index = fields
+                .bytes(b"index_pos")
+                .and_then(|b| Bytes::little(b).u64());
             let chunks = fields.u32(b"chunk_count");
             let (Some(index), Some(chunks)) = (index, chunks) else {
-                return Err(Error::malformed(offset, "the start of the bag does not parse"));
+                return Err(Error::malformed(
+                    offset,
+                    "the start of the bag does not parse",
+                ));
             };
             (self.index, self.chunks[0]) = (index, chunks);
         }
@@ -108,7 +127,10 @@ impl<'a> Fields<'a> {
     fn bytes(self, name: &[u8]) -> Option<&'a [u8]> {
         let mut bytes = Bytes::little(self.0);
         while let Some(field) = bytes.string() {
-            if let Some(value) = field.strip_prefix(name).and_then(|rest| rest.strip_prefix(b"=")) {
+            if let Some(value) = field
+                .strip_prefix(name)
+                .and_then(|rest| rest.strip_prefix(b"="))
+            {
                 return Some(value);
             }
         }
@@ -127,16 +149,31 @@ fn time_ns(bytes: &mut Bytes<'_>) -> Option<i64> {
 
 fn message(fields: Fields<'_>, size: u64) -> Option<Record> {
     let log_ns = time_ns(&mut Bytes::little(fields.bytes(b"time")?))?;
-    Some(Record::Message(Head { channel: fields.u32(b"conn")?, log_ns, size }))
+    Some(Record::Message(Head {
+        channel: fields.u32(b"conn")?,
+        log_ns,
+        size,
+    }))
 }
 
 /// Times and places of a connection's messages in the chunk before.
 fn index(fields: Fields<'_>, entries: &[u8]) -> Option<Record> {
     const ENTRY: usize = 12;
-    let times = || entries.chunks_exact(ENTRY).filter_map(|e| time_ns(&mut Bytes::little(e)));
-    let (Some(first_ns), Some(last_ns)) = (times().min(), times().max()) else { return Some(Record::Other) };
+    let times = || {
+        entries
+            .chunks_exact(ENTRY)
+            .filter_map(|e| time_ns(&mut Bytes::little(e)))
+    };
+    let (Some(first_ns), Some(last_ns)) = (times().min(), times().max()) else {
+        return Some(Record::Other);
+    };
     let messages = (entries.len() / ENTRY) as u64;
-    Some(Record::Index(Tally { channel: fields.u32(b"conn")?, messages, first_ns, last_ns }))
+    Some(Record::Index(Tally {
+        channel: fields.u32(b"conn")?,
+        messages,
+        first_ns,
+        last_ns,
+    }))
 }
 
 fn connection(fields: Fields<'_>, data: &[u8]) -> Option<Record> {

@@ -29,7 +29,12 @@ impl<'a> Bytes<'a> {
     }
 
     pub(crate) const fn new(all: &'a [u8], order: Order, alignment: Alignment) -> Self {
-        Self { all, at: 0, order, alignment }
+        Self {
+            all,
+            at: 0,
+            order,
+            alignment,
+        }
     }
 
     pub(crate) fn take(&mut self, count: usize) -> Option<&'a [u8]> {
@@ -84,7 +89,10 @@ impl<'a> Bytes<'a> {
     pub(crate) fn skip_f64s(&mut self, count: usize) -> Option<()> {
         match count.checked_sub(1) {
             // the first aligns
-            Some(rest) => self.f64().and_then(|_| self.take(rest * size_of::<f64>())).map(|_| ()),
+            Some(rest) => self
+                .f64()
+                .and_then(|_| self.take(rest * size_of::<f64>()))
+                .map(|_| ()),
             None => Some(()),
         }
     }

@@ -48,7 +48,11 @@ impl Content {
 }
 
 impl Channel {
-    pub(crate) fn new(topic: impl Into<String>, type_name: impl Into<String>, content: Content) -> Self {
+    pub(crate) fn new(
+        topic: impl Into<String>,
+        type_name: impl Into<String>,
+        content: Content,
+    ) -> Self {
         Self {
             topic: topic.into(),
             type_name: type_name.into(),
@@ -75,18 +79,31 @@ pub(crate) fn choose<'a>(
     content: Content,
     topic: Option<&str>,
 ) -> Result<&'a Channel, Error> {
-    let fitting = || channels.iter().filter(|c| c.content == content && c.messages > 0);
+    let fitting = || {
+        channels
+            .iter()
+            .filter(|c| c.content == content && c.messages > 0)
+    };
     let names = || fitting().map(|c| c.topic.clone()).collect::<Vec<_>>();
     if let Some(topic) = topic {
         let what = || format!("{} and the name {topic}", content.words());
         let named = fitting().find(|c| c.topic == topic);
-        return named.ok_or_else(|| Error::NoTopic { what: what(), topics: names() });
+        return named.ok_or_else(|| Error::NoTopic {
+            what: what(),
+            topics: names(),
+        });
     }
     let rank = fitting().map(|c| c.rank).min();
     let mut best = fitting().filter(|c| Some(c.rank) == rank);
     match (best.next(), best.next()) {
-        (None, _) => Err(Error::NoTopic { what: content.words().to_owned(), topics: Vec::new() }),
+        (None, _) => Err(Error::NoTopic {
+            what: content.words().to_owned(),
+            topics: Vec::new(),
+        }),
         (Some(only), None) => Ok(only),
-        _ => Err(Error::SeveralTopics { what: content.words(), topics: names() }),
+        _ => Err(Error::SeveralTopics {
+            what: content.words(),
+            topics: names(),
+        }),
     }
 }

@@ -14,14 +14,19 @@ pub struct Place {
 
 impl Place {
     pub(crate) const fn byte(offset: u64) -> Self {
-        Self { offset, topic: None }
+        Self {
+            offset,
+            topic: None,
+        }
     }
 }
 
 impl Display for Place {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         write!(f, "byte {}", self.offset)?;
-        self.topic.iter().try_for_each(|topic| write!(f, ", topic {topic}"))
+        self.topic
+            .iter()
+            .try_for_each(|topic| write!(f, ", topic {topic}"))
     }
 }
 
@@ -35,7 +40,11 @@ pub enum Error {
     /// A record goes beyond the end of the file.
     #[error("{place}: cut off, a record of {needed} bytes has {left}")]
     #[expect(missing_docs, reason = "bytes, as the message says")]
-    Truncated { place: Place, needed: u64, left: u64 },
+    Truncated {
+        place: Place,
+        needed: u64,
+        left: u64,
+    },
     /// The file lacks the end that its writer puts there last.
     #[error("{place}: the end is missing: still being written, or its writer was stopped")]
     #[expect(missing_docs, reason = "the place of the end")]
@@ -43,7 +52,11 @@ pub enum Error {
     /// A checksum differs.
     #[error("{place}: CRC failed, stored {stored:08x}, computed {computed:08x}")]
     #[expect(missing_docs, reason = "checksums, as the message says")]
-    Crc { place: Place, stored: u32, computed: u32 },
+    Crc {
+        place: Place,
+        stored: u32,
+        computed: u32,
+    },
     /// An encoding or a compression that is not known.
     #[error("{place}: unknown encoding {encoding:?}")]
     #[expect(missing_docs, reason = "its name in the file")]
@@ -51,15 +64,26 @@ pub enum Error {
     /// A length beyond what any such message has.
     #[error("{place}: {bytes} bytes where at most {limit} make sense")]
     #[expect(missing_docs, reason = "bytes, as the message says")]
-    TooLarge { place: Place, bytes: u64, limit: u64 },
+    TooLarge {
+        place: Place,
+        bytes: u64,
+        limit: u64,
+    },
     /// Stamps of a topic run backwards.
     #[error("{place}: time goes back from {} s to {} s", seconds(*.from_ns), seconds(*.to_ns))]
     #[expect(missing_docs, reason = "stamps, as the message says")]
-    TimeBack { place: Place, from_ns: i64, to_ns: i64 },
+    TimeBack {
+        place: Place,
+        from_ns: i64,
+        to_ns: i64,
+    },
     /// Several topics could be meant.
     #[error("{} topics have {what}: {}", .topics.len(), .topics.join(", "))]
     #[expect(missing_docs, reason = "the choice")]
-    SeveralTopics { what: &'static str, topics: Vec<String> },
+    SeveralTopics {
+        what: &'static str,
+        topics: Vec<String>,
+    },
     /// No topic is the one that is wanted.
     #[error("no topic has {what}{}", in_place_of(.topics))]
     #[expect(missing_docs, reason = "the topics that are there instead")]
@@ -78,12 +102,18 @@ pub enum Error {
 
 impl Error {
     pub(crate) fn malformed(offset: u64, what: impl Into<String>) -> Self {
-        Self::Malformed { place: Place::byte(offset), what: what.into() }
+        Self::Malformed {
+            place: Place::byte(offset),
+            what: what.into(),
+        }
     }
 
     pub(crate) fn encoding(offset: u64, encoding: &[u8]) -> Self {
         let encoding = String::from_utf8_lossy(encoding).into_owned();
-        Self::Encoding { place: Place::byte(offset), encoding }
+        Self::Encoding {
+            place: Place::byte(offset),
+            encoding,
+        }
     }
 
     /// Place of the fault, where it has one.
@@ -136,9 +166,17 @@ impl Error {
 
 fn seconds(ns: i64) -> String {
     let sign = if ns < 0 { "-" } else { "" };
-    format!("{sign}{}.{:09}", ns.unsigned_abs() / 1_000_000_000, ns.unsigned_abs() % 1_000_000_000)
+    format!(
+        "{sign}{}.{:09}",
+        ns.unsigned_abs() / 1_000_000_000,
+        ns.unsigned_abs() % 1_000_000_000
+    )
 }
 
 fn in_place_of(topics: &[String]) -> String {
-    if topics.is_empty() { String::new() } else { format!("; there are {}", topics.join(", ")) }
+    if topics.is_empty() {
+        String::new()
+    } else {
+        format!("; there are {}", topics.join(", "))
+    }
 }

@@ -6,7 +6,9 @@ use crate::{Content, Kind, OnDamage, Stamp};
 
 fn log(kind: Kind, bytes: &[u8]) {
     for on_damage in [OnDamage::Refuse, OnDamage::Recover] {
-        let Ok(log) = Log::of_kind(kind, Origin::Bytes(bytes.into()), on_damage) else { continue };
+        let Ok(log) = Log::of_kind(kind, Origin::Bytes(bytes.into()), on_damage) else {
+            continue;
+        };
         for channel in log.channels() {
             let topic = Some(channel.topic.as_str());
             match channel.content {

@@ -26,7 +26,11 @@ impl Origin {
             }
             Self::Bytes(bytes) => {
                 let length = bytes.len() as u64;
-                Ok(Input::new(Box::new(Cursor::new(Arc::clone(bytes))), length, Within::File))
+                Ok(Input::new(
+                    Box::new(Cursor::new(Arc::clone(bytes))),
+                    length,
+                    Within::File,
+                ))
             }
         }
     }
@@ -59,7 +63,12 @@ pub(crate) struct Input {
 
 impl Input {
     fn new(source: Box<dyn Source>, length: u64, within: Within) -> Self {
-        Self { source: BufReader::with_capacity(BUFFER, source), position: 0, length, within }
+        Self {
+            source: BufReader::with_capacity(BUFFER, source),
+            position: 0,
+            length,
+            within,
+        }
     }
 
     /// The unpacked bytes of a chunk.
@@ -97,15 +106,22 @@ impl Input {
         match self.within {
             Within::File => {
                 let place = Place::byte(self.position);
-                Err(Error::Truncated { place, needed, left })
+                Err(Error::Truncated {
+                    place,
+                    needed,
+                    left,
+                })
             }
-            Within::Chunk(offset) => Err(Error::malformed(offset, "a record goes beyond its chunk")),
+            Within::Chunk(offset) => {
+                Err(Error::malformed(offset, "a record goes beyond its chunk"))
+            }
         }
     }
 
     pub(crate) fn skip(&mut self, bytes: u64) -> Result<(), Error> {
         self.expect(bytes)?;
-        let step = i64::try_from(bytes).map_err(|_| io::Error::from(io::ErrorKind::InvalidInput))?;
+        let step =
+            i64::try_from(bytes).map_err(|_| io::Error::from(io::ErrorKind::InvalidInput))?;
         self.source.seek_relative(step)?;
         self.position += bytes;
         Ok(())
@@ -155,7 +171,11 @@ impl Input {
         self.expect(count)?;
         if count > limit {
             let place = Place::byte(self.offset());
-            return Err(Error::TooLarge { place, bytes: count, limit });
+            return Err(Error::TooLarge {
+                place,
+                bytes: count,
+                limit,
+            });
         }
         let mut bytes = vec![0; count as usize];
         self.fill(&mut bytes)?;

@@ -13,8 +13,18 @@
 //! bytes. The opening example is that of [`Log`].
 
 #![cfg_attr(
-    not(all(feature = "mcap", feature = "bag", feature = "ulog", feature = "ubx", feature = "npz")),
-    allow(dead_code, unused_variables, reason = "what formats share, where some are left out")
+    not(all(
+        feature = "mcap",
+        feature = "bag",
+        feature = "ulog",
+        feature = "ubx",
+        feature = "npz"
+    )),
+    allow(
+        dead_code,
+        unused_variables,
+        reason = "what formats share, where some are left out"
+    )
 )]
 
 // L0: errors, samples, bytes

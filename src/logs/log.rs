@@ -75,8 +75,19 @@ impl Log {
             Kind::Ubx => crate::ubx::open(origin),
             _ => Err(Error::NotRead(kind)),
         };
-        let Opened { channels, damage, format } = opened?;
-        Ok(Self { kind, channels, damage, on_damage, file_bytes, format })
+        let Opened {
+            channels,
+            damage,
+            format,
+        } = opened?;
+        Ok(Self {
+            kind,
+            channels,
+            damage,
+            on_damage,
+            file_bytes,
+            format,
+        })
     }
 
     /// Format of the file.
@@ -104,7 +115,12 @@ impl Log {
     /// When there is no such topic, or several and none is named.
     pub fn imu(&self, topic: Option<&str>, stamp: Stamp) -> Result<Samples<ImuSample>, Error> {
         let channel = choose(&self.channels, Content::Imu, topic)?;
-        Ok(Samples::new(self.format.imu(channel, stamp)?, channel, self.on_damage, self.file_bytes))
+        Ok(Samples::new(
+            self.format.imu(channel, stamp)?,
+            channel,
+            self.on_damage,
+            self.file_bytes,
+        ))
     }
 
     /// Fixes of a receiver: of this topic, or of the only one.
@@ -113,7 +129,12 @@ impl Log {
     /// When there is no such topic, or several and none is named.
     pub fn fixes(&self, topic: Option<&str>, stamp: Stamp) -> Result<Samples<Fix>, Error> {
         let channel = choose(&self.channels, Content::Fix, topic)?;
-        Ok(Samples::new(self.format.fixes(channel, stamp)?, channel, self.on_damage, self.file_bytes))
+        Ok(Samples::new(
+            self.format.fixes(channel, stamp)?,
+            channel,
+            self.on_damage,
+            self.file_bytes,
+        ))
     }
 }
 

@@ -45,8 +45,12 @@ impl Dialect for Mcap {
         }
         let (code, length) = (input.u8()?, input.u64()?);
         input.expect(length)?;
-        let fault =
-            || Error::malformed(offset, format!("record {code:#04x} of {length} bytes does not parse"));
+        let fault = || {
+            Error::malformed(
+                offset,
+                format!("record {code:#04x} of {length} bytes does not parse"),
+            )
+        };
         match code {
             0 => Err(Error::malformed(offset, "record of kind 0")),
             opcode::CHUNK => chunk(input, length).map(|chunk| Some(Record::Chunk(chunk))),
@@ -58,7 +62,11 @@ impl Dialect for Mcap {
             opcode::FOOTER => {
                 input.skip(length)?;
                 self.has_footer = input.array()? == MAGIC;
-                if self.has_footer { Ok(None) } else { Err(fault()) }
+                if self.has_footer {
+                    Ok(None)
+                } else {
+                    Err(fault())
+                }
             }
             _ => {
                 input.skip(length)?;
@@ -68,7 +76,13 @@ impl Dialect for Mcap {
     }
 
     fn finish(&self, input: &Input) -> Result<(), Error> {
-        if self.has_footer { Ok(()) } else { Err(Error::StillWritten { place: Place::byte(input.offset()) }) }
+        if self.has_footer {
+            Ok(())
+        } else {
+            Err(Error::StillWritten {
+                place: Place::byte(input.offset()),
+            })
+        }
     }
 }
 
@@ -85,7 +99,12 @@ impl Mcap {
             opcode::CHANNEL => {
                 let type_name = self.types.get(&bytes.u16()?).cloned().unwrap_or_default();
                 let (topic, encoding) = (text(bytes.string()?), text(bytes.string()?));
-                Some(Record::Channel(Definition { id: id.into(), topic, type_name, encoding }))
+                Some(Record::Channel(Definition {
+                    id: id.into(),
+                    topic,
+                    type_name,
+                    encoding,
+                }))
             }
             _ => index(id, &mut bytes),
         }
@@ -96,14 +115,23 @@ impl Mcap {
 fn index(channel: u16, bytes: &mut Bytes<'_>) -> Option<Record> {
     const ENTRY: usize = 16;
     let entries = bytes.string()?;
-    let times = || entries.chunks_exact(ENTRY).filter_map(|e| Bytes::little(e).u64()).map(|t| t as i64);
+    let times = || {
+        entries
+            .chunks_exact(ENTRY)
+            .filter_map(|e| Bytes::little(e).u64())
+            .map(|t| t as i64)
+    };
     let tally = Tally {
         channel: channel.into(),
         messages: (entries.len() / ENTRY) as u64,
         first_ns: times().min().unwrap_or(i64::MAX),
         last_ns: times().max().unwrap_or(i64::MIN),
     };
-    Some(if tally.messages == 0 { Record::Other } else { Record::Index(tally) })
+    Some(if tally.messages == 0 {
+        Record::Other
+    } else {
+        Record::Index(tally)
+    })
 }
 
 /// A message behind its channel, number and two times.
@@ -113,7 +141,11 @@ fn message(input: &mut Input, length: u64, fault: impl Fn() -> Error) -> Result<
     input.u32()?;
     let log_ns = i64::try_from(input.u64()?).map_err(|_| fault())?;
     input.u64()?;
-    Ok(Record::Message(Head { channel, log_ns, size }))
+    Ok(Record::Message(Head {
+        channel,
+        log_ns,
+        size,
+    }))
 }
 
 /// A chunk behind its times, length, CRC and compression.
@@ -127,7 +159,16 @@ fn chunk(input: &mut Input, length: u64) -> Result<Chunk, Error> {
     let packed = input.u64()?;
     let offset = input.offset();
     if (input.position() - start).checked_add(packed) != Some(length) {
-        return Err(Error::malformed(offset, "a chunk has not the length of its record"));
+        return Err(Error::malformed(
+            offset,
+            "a chunk has not the length of its record",
+        ));
     }
-    Ok(Chunk { offset, compression, packed, unpacked, crc })
+    Ok(Chunk {
+        offset,
+        compression,
+        packed,
+        unpacked,
+        crc,
+    })
 }

@@ -122,10 +122,16 @@ pub fn recognise(head: &[u8]) -> Option<Kind> {
         });
     }
     // the label of the first line stands in its columns 61 to 80
-    if head.get(60..80).is_some_and(|label| label == b"RINEX VERSION / TYPE") {
+    if head
+        .get(60..80)
+        .is_some_and(|label| label == b"RINEX VERSION / TYPE")
+    {
         return Some(Kind::Rinex);
     }
-    head.windows(2).enumerate().any(|(i, w)| w == UBX_SYNC && is_ubx(&head[i..])).then_some(Kind::Ubx)
+    head.windows(2)
+        .enumerate()
+        .any(|(i, w)| w == UBX_SYNC && is_ubx(&head[i..]))
+        .then_some(Kind::Ubx)
 }
 
 /// Name of the first file in a zip archive.
@@ -137,7 +143,9 @@ fn first_name(head: &[u8]) -> Option<&[u8]> {
 /// A whole message of u-blox with its checksum; or the start of one that is the first of the file, as it may
 /// be longer than the bytes that are here.
 fn is_ubx(bytes: &[u8]) -> bool {
-    let Some(length) = bytes.get(4..).and_then(|b| b.first_chunk()) else { return false };
+    let Some(length) = bytes.get(4..).and_then(|b| b.first_chunk()) else {
+        return false;
+    };
     let length = usize::from(u16::from_le_bytes(*length));
     bytes.get(2..8 + length).is_some_and(|body| {
         let (summed, sum) = body.split_at(4 + length);

@@ -59,10 +59,19 @@ impl Motion {
     #[must_use]
     pub fn rates(&self) -> ([f64; 3], [f64; 3]) {
         match *self {
-            Self::Rates { accel_m_s2, gyro_rad_s } => (accel_m_s2, gyro_rad_s),
-            Self::Increments { dv_m_s, dtheta_rad, dv_dt_s, dtheta_dt_s } => {
-                (dv_m_s.map(|v| v / dv_dt_s), dtheta_rad.map(|a| a / dtheta_dt_s))
-            }
+            Self::Rates {
+                accel_m_s2,
+                gyro_rad_s,
+            } => (accel_m_s2, gyro_rad_s),
+            Self::Increments {
+                dv_m_s,
+                dtheta_rad,
+                dv_dt_s,
+                dtheta_dt_s,
+            } => (
+                dv_m_s.map(|v| v / dv_dt_s),
+                dtheta_rad.map(|a| a / dtheta_dt_s),
+            ),
         }
     }
 }

@@ -42,9 +42,22 @@ pub struct Samples<T> {
 }
 
 impl<T> Samples<T> {
-    pub(crate) fn new(stream: Stream<T>, channel: &Channel, on_damage: OnDamage, file_bytes: u64) -> Self {
+    pub(crate) fn new(
+        stream: Stream<T>,
+        channel: &Channel,
+        on_damage: OnDamage,
+        file_bytes: u64,
+    ) -> Self {
         let topic = channel.topic.clone();
-        Self { stream, topic, last_ns: None, on_damage, file_bytes, damage: None, is_done: false }
+        Self {
+            stream,
+            topic,
+            last_ns: None,
+            on_damage,
+            file_bytes,
+            damage: None,
+            is_done: false,
+        }
     }
 
     /// Topic that is read.
@@ -66,7 +79,11 @@ impl<T> Samples<T> {
         match (self.on_damage, error.place()) {
             (OnDamage::Recover, Some(place)) => {
                 let (read_bytes, file_bytes) = (place.offset, self.file_bytes);
-                self.damage = Some(Damage { error, read_bytes, file_bytes });
+                self.damage = Some(Damage {
+                    error,
+                    read_bytes,
+                    file_bytes,
+                });
                 None
             }
             _ => Some(error),
@@ -90,9 +107,13 @@ impl<T: Stamped> Iterator for Samples<T> {
             Some(Ok((offset, sample))) => {
                 let to_ns = sample.stamp_ns();
                 match self.last_ns.replace(to_ns) {
-                    Some(from_ns) if to_ns < from_ns => {
-                        self.end(Error::TimeBack { place: Place::byte(offset), from_ns, to_ns }).map(Err)
-                    }
+                    Some(from_ns) if to_ns < from_ns => self
+                        .end(Error::TimeBack {
+                            place: Place::byte(offset),
+                            from_ns,
+                            to_ns,
+                        })
+                        .map(Err),
                     _ => Some(Ok(sample)),
                 }
             }

@@ -19,10 +19,16 @@ const MS: i64 = NS / 1000;
 
 /// Opens a log.
 pub(crate) fn open(origin: Origin) -> Result<Opened, Error> {
-    let mut messages = Messages { input: origin.open()?, only: None, rejected: 0 };
+    let mut messages = Messages {
+        input: origin.open()?,
+        only: None,
+        rejected: 0,
+    };
     let mut channels = BTreeMap::new();
     while let Some(message) = messages.next_message()? {
-        let channel = channels.entry(message.id).or_insert_with(|| new_channel(message.id));
+        let channel = channels
+            .entry(message.id)
+            .or_insert_with(|| new_channel(message.id));
         let stamp_ns = match message.id {
             NAV_PVT => pvt(&message.payload).map(|fix| fix.stamp_ns),
             ESF_MEAS => time_tag_ns(&message.payload),
@@ -39,13 +45,20 @@ pub(crate) fn open(origin: Origin) -> Result<Opened, Error> {
         rejected.messages = messages.rejected;
         channels.push(rejected);
     }
-    Ok(Opened { channels, damage: None, format: Box::new(Ubx { origin }) })
+    Ok(Opened {
+        channels,
+        damage: None,
+        format: Box::new(Ubx { origin }),
+    })
 }
 
 fn new_channel(id: [u8; 2]) -> Channel {
     match id {
         NAV_PVT => Channel::new("NAV-PVT", "UBX-NAV-PVT", Content::Fix),
-        ESF_MEAS => Channel { clock: Clock::Boot, ..Channel::new("ESF-MEAS", "UBX-ESF-MEAS", Content::Imu) },
+        ESF_MEAS => Channel {
+            clock: Clock::Boot,
+            ..Channel::new("ESF-MEAS", "UBX-ESF-MEAS", Content::Imu)
+        },
         [class, number] => {
             let name = format!("UBX-{class:02X}-{number:02X}");
             Channel::new(name.clone(), name, Content::Other)
@@ -91,7 +104,11 @@ impl Messages {
             }
             let id = [head[0], head[1]];
             if self.only.is_none_or(|only| only == id) {
-                return Ok(Some(Message { offset, id, payload: body.split_off(4) }));
+                return Ok(Some(Message {
+                    offset,
+                    id,
+                    payload: body.split_off(4),
+                }));
             }
         }
         Ok(None)
@@ -116,9 +133,15 @@ impl Ubx {
         only: [u8; 2],
         mut decode: impl FnMut(&[u8]) -> Option<T> + Send + 'static,
     ) -> Result<Stream<T>, Error> {
-        let messages = Messages { input: self.origin.open()?, only: Some(only), rejected: 0 };
+        let messages = Messages {
+            input: self.origin.open()?,
+            only: Some(only),
+            rejected: 0,
+        };
         Ok(Box::new(messages.filter_map(move |message| {
-            message.map(|m| decode(&m.payload).map(|sample| (m.offset, sample))).transpose()
+            message
+                .map(|m| decode(&m.payload).map(|sample| (m.offset, sample)))
+                .transpose()
         })))
     }
 }
@@ -206,7 +229,11 @@ impl Pvt {
 /// Days from 1 January 1970 to a date of the Gregorian calendar: years from March on, so that the odd day of a leap
 /// year comes last.
 fn days([year, month, day]: [i64; 3]) -> i64 {
-    let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
+    let (year, month) = if month > 2 {
+        (year, month - 3)
+    } else {
+        (year - 1, month + 9)
+    };
     let (era, year) = (year.div_euclid(400), year.rem_euclid(400));
     era * 146_097 + year * 365 + year / 4 - year / 100 + (153 * month + 2) / 5 + day - 1 - 719_468
 }
@@ -249,7 +276,10 @@ impl Measured {
     fn add(&mut self, payload: &[u8]) -> Option<ImuSample> {
         let time_ns = time_tag_ns(payload)?;
         if time_ns != self.time_ns {
-            *self = Self { time_ns, ..Self::default() };
+            *self = Self {
+                time_ns,
+                ..Self::default()
+            };
         }
         let mut bytes = Bytes::little(payload.get(8..)?);
         let count = payload[5] >> 3;
@@ -257,9 +287,18 @@ impl Measured {
             self.put(bytes.u32()?);
         }
         let all = |axes: [Option<f64>; 3]| Some([axes[0]?, axes[1]?, axes[2]?]);
-        let motion = Motion::Rates { accel_m_s2: all(self.accel_m_s2)?, gyro_rad_s: all(self.gyro_rad_s)? };
-        *self = Self { time_ns, ..Self::default() };
-        Some(ImuSample { stamp_ns: time_ns, motion })
+        let motion = Motion::Rates {
+            accel_m_s2: all(self.accel_m_s2)?,
+            gyro_rad_s: all(self.gyro_rad_s)?,
+        };
+        *self = Self {
+            time_ns,
+            ..Self::default()
+        };
+        Some(ImuSample {
+            stamp_ns: time_ns,
+            motion,
+        })
     }
 
     /// A measurement: 24 bits with sign, then its type.

@@ -25,7 +25,11 @@ impl Chunk {
     pub(crate) fn open(&self, input: &mut Input) -> Result<Input, Error> {
         if self.unpacked > LARGEST_CHUNK {
             let place = Place::byte(self.offset);
-            return Err(Error::TooLarge { place, bytes: self.unpacked, limit: LARGEST_CHUNK });
+            return Err(Error::TooLarge {
+                place,
+                bytes: self.unpacked,
+                limit: LARGEST_CHUNK,
+            });
         }
         let packed = input.bytes(self.packed, LARGEST_CHUNK)?;
         let bytes = match self.compression.as_slice() {
@@ -40,7 +44,10 @@ impl Chunk {
             unknown => return Err(Error::encoding(self.offset, unknown)),
         };
         if bytes.len() as u64 != self.unpacked {
-            return Err(Error::malformed(self.offset, "a chunk has not the length it states"));
+            return Err(Error::malformed(
+                self.offset,
+                "a chunk has not the length it states",
+            ));
         }
         self.check(&bytes)?;
         Ok(Input::chunk(bytes, self.offset))
@@ -48,20 +55,36 @@ impl Chunk {
 
     /// Unpacks at most a byte more than the chunk states; memory grows with what is unpacked, not with what is stated.
     fn unpack<R: Read>(&self, decoder: impl FnOnce() -> io::Result<R>) -> Result<Vec<u8>, Error> {
-        let fault =
-            |error: io::Error| Error::malformed(self.offset, format!("a chunk cannot be unpacked: {error}"));
+        let fault = |error: io::Error| {
+            Error::malformed(self.offset, format!("a chunk cannot be unpacked: {error}"))
+        };
         let mut bytes = Vec::with_capacity(self.unpacked.min(8 * self.packed) as usize);
-        decoder().map_err(fault)?.take(self.unpacked + 1).read_to_end(&mut bytes).map_err(fault)?;
+        decoder()
+            .map_err(fault)?
+            .take(self.unpacked + 1)
+            .read_to_end(&mut bytes)
+            .map_err(fault)?;
         Ok(bytes)
     }
 
     #[cfg(feature = "mcap")]
     fn check(&self, bytes: &[u8]) -> Result<(), Error> {
-        let (stored, computed) = (self.crc, if self.crc == 0 { 0 } else { crc32fast::hash(bytes) });
+        let (stored, computed) = (
+            self.crc,
+            if self.crc == 0 {
+                0
+            } else {
+                crc32fast::hash(bytes)
+            },
+        );
         if stored == computed {
             return Ok(());
         }
-        Err(Error::Crc { place: Place::byte(self.offset), stored, computed })
+        Err(Error::Crc {
+            place: Place::byte(self.offset),
+            stored,
+            computed,
+        })
     }
 
     #[cfg(not(feature = "mcap"))]

@@ -16,7 +16,9 @@ pub enum Error {
     #[error(transparent)]
     Imu(#[from] ideal_imu::Error),
     /// Too much rotation in a sample.
-    #[error("the vehicle turns {angle_deg:.0}° within one sample at {t_s} s: too slow a rate for it")]
+    #[error(
+        "the vehicle turns {angle_deg:.0}° within one sample at {t_s} s: too slow a rate for it"
+    )]
     Rotation {
         /// Angle (deg).
         angle_deg: f64,
@@ -63,7 +65,11 @@ impl Default for Bounds {
     /// 15 cm, 1 mm/s, 1 µrad: beside metres of GNSS and inertial error, nothing. Smooth driving for 900 s at
     /// 100 Hz stays far below; shaken at 1–2 Hz the position comes to 1.4 cm.
     fn default() -> Self {
-        Self { position_m: 0.15, velocity_m_s: 1e-3, attitude_rad: 1e-6 }
+        Self {
+            position_m: 0.15,
+            velocity_m_s: 1e-3,
+            attitude_rad: 1e-6,
+        }
     }
 }
 
@@ -72,7 +78,11 @@ impl Closure {
     ///
     /// # Errors
     /// An impossible rate, a rotation too fast for it, a pole.
-    pub fn new(trajectory: &Trajectory, rate_hz: f64, gravity: GravityModel) -> Result<Self, Error> {
+    pub fn new(
+        trajectory: &Trajectory,
+        rate_hz: f64,
+        gravity: GravityModel,
+    ) -> Result<Self, Error> {
         let samples = ideal_imu(trajectory, rate_hz, gravity)?;
         let dt = 1.0 / rate_hz;
         let mut ins = Strapdown::new(&trajectory.state(trajectory.start_s()), gravity);
@@ -90,7 +100,10 @@ impl Closure {
             let t_s = trajectory.start_s() + (k + 1) as f64 / rate_hz;
             let dtheta = sample.omega_ib_b * dt;
             if dtheta.length() > strapdown::MAX_ROTATION {
-                return Err(Error::Rotation { angle_deg: dtheta.length() / crate::units::DEG, t_s });
+                return Err(Error::Rotation {
+                    angle_deg: dtheta.length() / crate::units::DEG,
+                    t_s,
+                });
             }
             ins.step(Vec3::splat(dtheta), Vec3::splat(sample.f_ib_b * dt), dt);
             let truth = trajectory.state(t_s);
@@ -138,32 +151,83 @@ fn damp(ins: &mut Strapdown, truth: &NavState, dt: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
+    use crate::trajectory::profile::{
+        Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
+    };
     use glam::{DQuat, DVec3};
 
     /// Ten hours of a car at 10 Hz: rounding alone would have left the ground by e^90.
     #[test]
     fn ten_hours_close() {
         let cycle = [
-            Kind::Accelerate { to_speed: 15.0, by: Acceleration::Duration(20.0) },
+            Kind::Accelerate {
+                to_speed: 15.0,
+                by: Acceleration::Duration(20.0),
+            },
             Kind::Straight(Length::Duration(820.0)),
-            Kind::Turn { angle: 1.5, by: Turning::Duration(20.0) },
-            Kind::Accelerate { to_speed: 8.0, by: Acceleration::Duration(20.0) },
-            Kind::Turn { angle: -1.4, by: Turning::Duration(20.0) },
+            Kind::Turn {
+                angle: 1.5,
+                by: Turning::Duration(20.0),
+            },
+            Kind::Accelerate {
+                to_speed: 8.0,
+                by: Acceleration::Duration(20.0),
+            },
+            Kind::Turn {
+                angle: -1.4,
+                by: Turning::Duration(20.0),
+            },
         ];
-        let segment = |kind: &Kind| Segment { kind: kind.clone(), climb_m: 0.0, ramp_s: None };
-        let segments = cycle.iter().cycle().take(40 * cycle.len()).map(segment).collect();
-        let start = Start { t_s: 0.0, lat: 0.8, lon: 0.1, h: 0.0, heading: 0.7, speed: 0.0 };
-        let drive = Profile { start, bank: Bank::None, ramp_s: 2.0, segments }.build().unwrap();
+        let segment = |kind: &Kind| Segment {
+            kind: kind.clone(),
+            climb_m: 0.0,
+            ramp_s: None,
+        };
+        let segments = cycle
+            .iter()
+            .cycle()
+            .take(40 * cycle.len())
+            .map(segment)
+            .collect();
+        let start = Start {
+            t_s: 0.0,
+            lat: 0.8,
+            lon: 0.1,
+            h: 0.0,
+            heading: 0.7,
+            speed: 0.0,
+        };
+        let drive = Profile {
+            start,
+            bank: Bank::None,
+            ramp_s: 2.0,
+            segments,
+        }
+        .build()
+        .unwrap();
         let closure = Closure::new(&drive, 10.0, GravityModel::default()).unwrap();
-        assert!(closure.duration_s >= 36_000.0 && closure.within(&Bounds::default()), "{closure:?}");
+        assert!(
+            closure.duration_s >= 36_000.0 && closure.within(&Bounds::default()),
+            "{closure:?}"
+        );
     }
 
     /// A navigation that became NaN, at any epoch, is the largest error there is.
     #[test]
     fn what_is_not_finite_is_never_within_bounds() {
-        let state = NavState { lat: 0.8, lon: 0.1, h: 400.0, v_n: DVec3::ZERO, q_b_n: DQuat::IDENTITY };
-        let lost = NavState { h: f64::NAN, v_n: DVec3::NAN, q_b_n: DQuat::NAN, ..state };
+        let state = NavState {
+            lat: 0.8,
+            lon: 0.1,
+            h: 400.0,
+            v_n: DVec3::ZERO,
+            q_b_n: DQuat::IDENTITY,
+        };
+        let lost = NavState {
+            h: f64::NAN,
+            v_n: DVec3::NAN,
+            q_b_n: DQuat::NAN,
+            ..state
+        };
         let mut closure = Closure {
             rate_hz: 100.0,
             duration_s: 1.0,
@@ -177,9 +241,15 @@ mod tests {
         closure.widen(&state, &lost);
         closure.widen(&state, &state);
         assert!(
-            closure.position_m.is_nan() && closure.velocity_m_s.is_nan() && closure.attitude_rad.is_nan()
+            closure.position_m.is_nan()
+                && closure.velocity_m_s.is_nan()
+                && closure.attitude_rad.is_nan()
         );
         assert!(!closure.within(&Bounds::default()));
-        assert!(!closure.within(&Bounds { position_m: f64::INFINITY, velocity_m_s: 1.0, attitude_rad: 1.0 }));
+        assert!(!closure.within(&Bounds {
+            position_m: f64::INFINITY,
+            velocity_m_s: 1.0,
+            attitude_rad: 1.0
+        }));
     }
 }

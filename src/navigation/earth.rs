@@ -58,7 +58,10 @@ impl<R: Real> Parallel<R> {
     #[inline(always)]
     pub(crate) fn at(sin_lat: R) -> Self {
         let w2 = sin_lat * sin_lat * -E2 + 1.0;
-        Self { sin_lat, per_w: R::from(1.0) / w2.sqrt() }
+        Self {
+            sin_lat,
+            per_w: R::from(1.0) / w2.sqrt(),
+        }
     }
 
     /// The parallel at a sine that differs by less than 1e-6: one Newton step of the inverse root, exact to
@@ -66,7 +69,10 @@ impl<R: Real> Parallel<R> {
     #[inline(always)]
     pub(crate) fn nearby(&self, sin_lat: R) -> Self {
         let w2 = sin_lat * sin_lat * -E2 + 1.0;
-        Self { sin_lat, per_w: self.per_w * (w2 * self.per_w * self.per_w * -0.5 + 1.5) }
+        Self {
+            sin_lat,
+            per_w: self.per_w * (w2 * self.per_w * self.per_w * -0.5 + 1.5),
+        }
     }
 
     /// Radii of curvature.
@@ -74,7 +80,10 @@ impl<R: Real> Parallel<R> {
     pub(crate) fn radii(&self) -> Radii<R> {
         // R_E = a/w and R_N = a (1 − e²)/w³ with w² = 1 − e² sin² lat.
         let transverse = self.per_w * A;
-        Radii { meridian: transverse * (self.per_w * self.per_w) * (1.0 - E2), transverse }
+        Radii {
+            meridian: transverse * (self.per_w * self.per_w) * (1.0 - E2),
+            transverse,
+        }
     }
 
     /// Normal gravity at height h (m), down component of g_n (m/s²; centrifugal part included). North and
@@ -108,7 +117,15 @@ pub fn radii<R: Real>(sin_lat: R) -> Radii<R> {
 
 /// How gravity falls with height.
 #[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Default,
+    serde::Serialize,
+    serde::Deserialize,
+    schemars::JsonSchema,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum GravityModel {
@@ -135,7 +152,11 @@ pub fn geodetic_to_ecef(lat: f64, lon: f64, h: f64) -> DVec3 {
     let (sin_lat, cos_lat) = lat.sin_cos();
     let (sin_lon, cos_lon) = lon.sin_cos();
     let n = radii(sin_lat).transverse;
-    DVec3::new((n + h) * cos_lat * cos_lon, (n + h) * cos_lat * sin_lon, (n * (1.0 - E2) + h) * sin_lat)
+    DVec3::new(
+        (n + h) * cos_lat * cos_lon,
+        (n + h) * cos_lat * sin_lon,
+        (n * (1.0 - E2) + h) * sin_lat,
+    )
 }
 
 /// Latitude, longitude (rad) and height (m) of a position in e: fixed-point iteration of
@@ -222,7 +243,11 @@ mod tests {
         let gamma = |u: f64| MU / (u * u + e * e) - OMEGA_IE.powi(2) * a * a / 3.0 * dq(u) / q(b);
         for h in [0.0, 1000.0, 10_000.0] {
             let series = gravity_down(GravityModel::Wgs84, 1.0, h);
-            assert!((series - gamma(b + h)).abs() < 2e-6, "h = {h}: {series} against {}", gamma(b + h));
+            assert!(
+                (series - gamma(b + h)).abs() < 2e-6,
+                "h = {h}: {series} against {}",
+                gamma(b + h)
+            );
         }
     }
 
@@ -231,7 +256,11 @@ mod tests {
         for lat in [-90.0, -89.95, -45.0, -1e-9, 0.0, 30.0, 60.0, 89.999, 90.0] {
             for h in [-5000.0, 0.0, 12_000.0, 400_000.0] {
                 let (la, lo, hh) = ecef_to_geodetic(geodetic_to_ecef(lat * DEG, 179.999 * DEG, h));
-                assert!((la - lat * DEG).abs() < 1e-15 * 4.0, "{lat} {h}: {}", la / DEG);
+                assert!(
+                    (la - lat * DEG).abs() < 1e-15 * 4.0,
+                    "{lat} {h}: {}",
+                    la / DEG
+                );
                 assert!((hh - h).abs() < 4e-9, "{lat} {h}: {hh}");
                 assert!(lat.abs() == 90.0 || (lo - 179.999 * DEG).abs() < 1e-14);
             }

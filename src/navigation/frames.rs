@@ -63,7 +63,11 @@ impl RollPitchYaw {
         // in n, solved for the angles.
         let (sy, cy) = self.yaw.sin_cos();
         let (tp, cp) = (self.pitch.tan(), self.pitch.cos());
-        [DVec3::new(cy / cp, sy / cp, 0.0), DVec3::new(-sy, cy, 0.0), DVec3::new(cy * tp, sy * tp, 1.0)]
+        [
+            DVec3::new(cy / cp, sy / cp, 0.0),
+            DVec3::new(-sy, cy, 0.0),
+            DVec3::new(cy * tp, sy * tp, 1.0),
+        ]
     }
 }
 
@@ -72,7 +76,8 @@ impl RollPitchYaw {
 pub fn q_e_n(lat: f64, lon: f64) -> DQuat {
     // From n to e: a turn by the longitude about the axis of the Earth, then by −lat − 90° about the new y
     // axis, east. Asked for is its inverse.
-    (DQuat::from_rotation_z(lon) * DQuat::from_rotation_y(-lat - std::f64::consts::FRAC_PI_2)).inverse()
+    (DQuat::from_rotation_z(lon) * DQuat::from_rotation_y(-lat - std::f64::consts::FRAC_PI_2))
+        .inverse()
 }
 
 /// Wraps an angle to (−π, π]; one that is there already comes back as it is, to the last bit.
@@ -82,7 +87,11 @@ pub fn wrap_angle(angle: f64) -> f64 {
         return angle;
     }
     let wrapped = angle.rem_euclid(std::f64::consts::TAU);
-    if wrapped > std::f64::consts::PI { wrapped - std::f64::consts::TAU } else { wrapped }
+    if wrapped > std::f64::consts::PI {
+        wrapped - std::f64::consts::TAU
+    } else {
+        wrapped
+    }
 }
 
 #[cfg(test)]
@@ -93,7 +102,12 @@ mod tests {
     #[test]
     fn euler_angles_rotate_in_the_order_yaw_pitch_roll() {
         // Nose north-east and 30° up: the front axis in n is (cos45 cos30, sin45 cos30, −sin30).
-        let q = RollPitchYaw { roll: 0.4, pitch: 30.0 * DEG, yaw: 45.0 * DEG }.to_quat();
+        let q = RollPitchYaw {
+            roll: 0.4,
+            pitch: 30.0 * DEG,
+            yaw: 45.0 * DEG,
+        }
+        .to_quat();
         let (s, c) = (45.0 * DEG).sin_cos();
         let expected = DVec3::new(c * 0.75_f64.sqrt(), s * 0.75_f64.sqrt(), -0.5);
         assert!((q * DVec3::X).abs_diff_eq(expected, 1e-15));
@@ -111,13 +125,19 @@ mod tests {
 
     #[test]
     fn euler_jacobian_agrees_with_central_differences() {
-        let a = RollPitchYaw { roll: 0.7, pitch: -0.9, yaw: 2.4 };
+        let a = RollPitchYaw {
+            roll: 0.7,
+            pitch: -0.9,
+            yaw: 2.4,
+        };
         let jacobian = a.jacobian_of_psi_n();
-        let angles = |psi: DVec3| RollPitchYaw::from_quat(DQuat::from_scaled_axis(psi) * a.to_quat());
+        let angles =
+            |psi: DVec3| RollPitchYaw::from_quat(DQuat::from_scaled_axis(psi) * a.to_quat());
         for (k, axis) in DVec3::AXES.into_iter().enumerate() {
             let (p, m) = (angles(axis * 1e-6), angles(axis * -1e-6));
-            for (row, (p, m)) in
-                [(p.roll, m.roll), (p.pitch, m.pitch), (p.yaw, m.yaw)].into_iter().enumerate()
+            for (row, (p, m)) in [(p.roll, m.roll), (p.pitch, m.pitch), (p.yaw, m.yaw)]
+                .into_iter()
+                .enumerate()
             {
                 assert!(((p - m) / 2e-6 - jacobian[row][k]).abs() < 1e-9);
             }

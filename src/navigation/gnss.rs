@@ -56,7 +56,8 @@ impl GnssVelocity {
     /// Standard deviations of [`Self::v_n`] (m/s).
     #[must_use]
     pub fn sigma_n(&self) -> DVec3 {
-        self.horizontal_sigma.extend(self.down.map_or(OPEN_M_S, |(_, sigma)| sigma))
+        self.horizontal_sigma
+            .extend(self.down.map_or(OPEN_M_S, |(_, sigma)| sigma))
     }
 }
 
@@ -85,7 +86,9 @@ impl GnssFix {
     /// in the order of north, east, down of the position and of the velocity.
     #[must_use]
     pub fn components(&self) -> usize {
-        3 + self.velocity.map_or(0, |measured| 2 + usize::from(measured.down.is_some()))
+        3 + self
+            .velocity
+            .map_or(0, |measured| 2 + usize::from(measured.down.is_some()))
     }
 }
 
@@ -113,8 +116,14 @@ mod tests {
         assert_eq!((fix(None).components(), halved.components()), (5, 5));
         assert_eq!(halved.pos_sigma_n, DVec3::splat(0.5));
         let velocity = halved.velocity.unwrap();
-        assert_eq!((velocity.horizontal_sigma, velocity.down), (DVec2::new(0.05, 0.1), None));
+        assert_eq!(
+            (velocity.horizontal_sigma, velocity.down),
+            (DVec2::new(0.05, 0.1), None)
+        );
         let bad = fix(Some((3.0, 1500.0))).with_sigmas_times(0.5, 0.5);
-        assert_eq!((bad.components(), bad.velocity.unwrap().sigma_n().z), (6, 750.0));
+        assert_eq!(
+            (bad.components(), bad.velocity.unwrap().sigma_n().z),
+            (6, 750.0)
+        );
     }
 }

@@ -34,7 +34,11 @@ pub(crate) struct Link {
 
 impl Link {
     /// From the covariance here, the transition and the predicted covariance there, which may be singular.
-    pub(crate) fn new(p: &DMatrix<f64>, transition: &DMatrix<f64>, predicted: &DMatrix<f64>) -> Self {
+    pub(crate) fn new(
+        p: &DMatrix<f64>,
+        transition: &DMatrix<f64>,
+        predicted: &DMatrix<f64>,
+    ) -> Self {
         let root = root(predicted);
         // P⁻ = L Lᵀ, W = L⁻¹ Φ P: C = (L⁻ᵀ W)ᵀ, D = P − Wᵀ W
         let mut w = transition * p;
@@ -44,7 +48,10 @@ impl Link {
         let mut rest = Vec::with_capacity(n * (n + 1) / 2);
         rest.extend(lower(n).map(|(i, j)| p[(i, j)] - w.column(i).dot(&w.column(j))));
         let _ = root.tr_solve_lower_triangular_mut(&mut w);
-        Self { gain: w.transpose(), rest }
+        Self {
+            gain: w.transpose(),
+            rest,
+        }
     }
 
     /// Mean and covariance of the error there become those of the error here.
@@ -71,8 +78,9 @@ fn root(p: &DMatrix<f64>) -> DMatrix<f64> {
     let n = p.nrows();
     let mut l = DMatrix::zeros(n, n);
     for j in 0..n {
-        let rest =
-            |l: &DMatrix<f64>, i: usize| p[(i, j)] - (0..j).map(|k| l[(i, k)] * l[(j, k)]).sum::<f64>();
+        let rest = |l: &DMatrix<f64>, i: usize| {
+            p[(i, j)] - (0..j).map(|k| l[(i, k)] * l[(j, k)]).sum::<f64>()
+        };
         let pivot = rest(&l, j);
         // The pivot is what the states before leave of this variance: the rounding of n products cannot be
         // told from it.
@@ -153,8 +161,10 @@ mod tests {
                 let before = phi * all.view((here, 0), (DIM, next)).into_owned();
                 let p = all.view((here, here), (DIM, DIM)).into_owned();
                 all.view_mut((next, 0), (DIM, next)).copy_from(&before);
-                all.view_mut((0, next), (next, DIM)).copy_from(&before.transpose());
-                all.view_mut((next, next), (DIM, DIM)).copy_from(&(phi * p * phi.transpose() + &self.noise));
+                all.view_mut((0, next), (next, DIM))
+                    .copy_from(&before.transpose());
+                all.view_mut((next, next), (DIM, DIM))
+                    .copy_from(&(phi * p * phi.transpose() + &self.noise));
             }
             all
         }
@@ -164,11 +174,13 @@ mod tests {
             let measured: Vec<usize> = (0..INSTANTS).filter(|k| self.rows[*k].is_some()).collect();
             let mut h = DMatrix::zeros(measured.len(), DIM * INSTANTS);
             for (m, &k) in measured.iter().enumerate() {
-                h.view_mut((m, DIM * k), (1, DIM)).copy_from(self.rows[k].as_ref().unwrap());
+                h.view_mut((m, DIM * k), (1, DIM))
+                    .copy_from(self.rows[k].as_ref().unwrap());
             }
             let z = DVector::from_iterator(measured.len(), measured.iter().map(|k| z[*k]));
             let prior = self.prior();
-            let s = &h * &prior * h.transpose() + DMatrix::identity(measured.len(), measured.len()) * R;
+            let s =
+                &h * &prior * h.transpose() + DMatrix::identity(measured.len(), measured.len()) * R;
             let gain = &prior * h.transpose() * s.try_inverse().unwrap();
             (&gain * z, &prior - gain * h * &prior)
         }

@@ -15,7 +15,8 @@ use crate::sensors::defects::{ImuSettings, Output};
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::{
-    FixedData, Fixes, Outage, OutageError, OutagePlan, PeriodicOutages, PlacedOutages, RandomOutages,
+    FixedData, Fixes, Outage, OutageError, OutagePlan, PeriodicOutages, PlacedOutages,
+    RandomOutages,
 };
 use crate::simulation::lincov::{Alike, Track, reduced_belief};
 use crate::simulation::{Experiment, ExperimentError, samples_per};
@@ -77,7 +78,12 @@ pub struct RunSettings {
 
 impl Default for RunSettings {
     fn default() -> Self {
-        Self { runs: 100, seed: None, method: Method::MonteCarlo, coverage_level: 0.95 }
+        Self {
+            runs: 100,
+            seed: None,
+            method: Method::MonteCarlo,
+            coverage_level: 0.95,
+        }
     }
 }
 
@@ -130,9 +136,11 @@ pub enum Reduction {
 impl FilterSettings {
     fn validate(&self) -> Result<(), SettingError> {
         match self.nis_gate {
-            Some(p) if !(p > 0.0 && p < 1.0) => {
-                Err(SettingError::new("nis_gate", p, "a probability between 0 and 1, such as 0.999"))
-            }
+            Some(p) if !(p > 0.0 && p < 1.0) => Err(SettingError::new(
+                "nis_gate",
+                p,
+                "a probability between 0 and 1, such as 0.999",
+            )),
             _ => Ok(()),
         }
     }
@@ -178,7 +186,9 @@ impl Scenario {
         self.run.validate().map_err(|e| e.in_section("run"))?;
         self.imu.validate().map_err(|e| e.in_section("imu"))?;
         self.gnss.validate().map_err(|e| e.in_section("gnss"))?;
-        self.initial.validate().map_err(|e| e.in_section("initial"))?;
+        self.initial
+            .validate()
+            .map_err(|e| e.in_section("initial"))?;
         self.outages().validate()?;
         self.filter.validate().map_err(|e| e.in_section("filter"))?;
         if let Some(baro) = &self.baro {
@@ -198,7 +208,11 @@ impl Scenario {
     /// The key that is drawn upon.
     pub fn analysable(&self) -> Result<(), SettingError> {
         let because = "covariance analysis has no draws, on which its effect depends";
-        let output = self.imu.output.as_ref().filter(|output| **output != Output::default());
+        let output = self
+            .imu
+            .output
+            .as_ref()
+            .filter(|output| **output != Output::default());
         let refusal = match (self.filter.nis_gate, output) {
             (Some(p), _) => SettingError::new("filter.nis_gate", p, because),
             (None, Some(_)) => SettingError::new("imu.output", "{…}", because),
@@ -212,7 +226,10 @@ impl Scenario {
         if samples_per(self.imu.rate_hz, rate_hz).is_some() {
             return Ok(());
         }
-        let requirement = format!("imu.rate_hz = {} must be a whole multiple of it", self.imu.rate_hz);
+        let requirement = format!(
+            "imu.rate_hz = {} must be a whole multiple of it",
+            self.imu.rate_hz
+        );
         Err(SettingError::new(key, rate_hz, requirement))
     }
 
@@ -233,26 +250,37 @@ impl Scenario {
     ///
     /// # Errors
     /// When the model has no such filter.
-    pub fn belief(&self, model: &Model, outages: &[Outage], track: &Track) -> Result<Belief, BeliefError> {
-        let longest = outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
+    pub fn belief(
+        &self,
+        model: &Model,
+        outages: &[Outage],
+        track: &Track,
+    ) -> Result<Belief, BeliefError> {
+        let longest = outages
+            .iter()
+            .map(|o| o.end_s - o.start_s)
+            .fold(0.0, f64::max);
         // The scales over which the reduction has to agree: from one fix, below which the filter sees none of
         // them, to several times the longest outage.
         let (interval_s, window_s) = (1.0 / self.gnss.rate_hz, reduction::window_s(longest));
-        let mut belief =
-            Belief::new(model, self.filter.states, interval_s, window_s).map_err(|e| self.blame(e))?;
+        let mut belief = Belief::new(model, self.filter.states, interval_s, window_s)
+            .map_err(|e| self.blame(e))?;
         if self.filter.states.is_reduced() && self.filter.reduction == Reduction::Covariance {
             // The wavelet reduction is where this search starts, hence made in either case.
             belief = reduced_belief(model, belief, track, Alike::Level);
         }
-        Ok(belief.with_initial(&self.initial).with_vehicle(self.aiding.state_sigmas()))
+        Ok(belief
+            .with_initial(&self.initial)
+            .with_vehicle(self.aiding.state_sigmas()))
     }
 
     /// Where fixes are too rare for a reduction, the key that makes them so.
     fn blame(&self, error: BeliefError) -> BeliefError {
         match error {
-            BeliefError::Reduction { source: source @ ReductionError::TooFewScales { .. }, .. } => {
-                SettingError::new("gnss.rate_hz", self.gnss.rate_hz, source.to_string()).into()
-            }
+            BeliefError::Reduction {
+                source: source @ ReductionError::TooFewScales { .. },
+                ..
+            } => SettingError::new("gnss.rate_hz", self.gnss.rate_hz, source.to_string()).into(),
             other => other,
         }
     }
@@ -278,16 +306,23 @@ impl Scenario {
     /// # Errors
     /// One asked for that does not begin on the trajectory, or withholds no fix.
     pub fn outages_on(&self, span_s: (f64, f64), seed: u64) -> Result<PlacedOutages, OutageError> {
-        let fixes = Fixes::Every { interval_s: 1.0 / self.gnss.rate_hz };
+        let fixes = Fixes::Every {
+            interval_s: 1.0 / self.gnss.rate_hz,
+        };
         self.outages().on(&FixedData { span_s, fixes }, seed)
     }
 
     /// The outages asked for: the paper's two when nothing is said.
     pub(crate) fn outages(&self) -> OutagePlan {
-        let said = self.outage.is_some() || self.outage_periodic.is_some() || self.outage_random.is_some();
+        let said =
+            self.outage.is_some() || self.outage_periodic.is_some() || self.outage_random.is_some();
         OutagePlan {
             fixed: self.outage.clone().unwrap_or_default(),
-            default: if said { Vec::new() } else { Outage::PAPER.to_vec() },
+            default: if said {
+                Vec::new()
+            } else {
+                Outage::PAPER.to_vec()
+            },
             periodic: self.outage_periodic,
             random: self.outage_random,
         }
@@ -300,12 +335,20 @@ impl RunSettings {
             return Err(SettingError::new("runs", self.runs, "at least one run"));
         }
         if self.runs > MAX_RUNS {
-            return Err(SettingError::new("runs", self.runs, format!("at most {MAX_RUNS} runs")));
+            return Err(SettingError::new(
+                "runs",
+                self.runs,
+                format!("at most {MAX_RUNS} runs"),
+            ));
         }
         if self.coverage_level > 0.0 && self.coverage_level < 1.0 {
             return Ok(());
         }
-        Err(SettingError::new("coverage_level", self.coverage_level, "it must lie between 0 and 1"))
+        Err(SettingError::new(
+            "coverage_level",
+            self.coverage_level,
+            "it must lie between 0 and 1",
+        ))
     }
 }
 

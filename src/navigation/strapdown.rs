@@ -207,7 +207,10 @@ impl<L: Real> Strapdown<L> {
 
         // Attitude: b turns by phi_b, n by zeta (≤ 3e-4 rad, second order suffices to rounding).
         let half_zeta = zeta * half;
-        let q_n = Quat { w: half_zeta.dot(half_zeta) * -0.5 + 1.0, v: -half_zeta };
+        let q_n = Quat {
+            w: half_zeta.dot(half_zeta) * -0.5 + 1.0,
+            v: -half_zeta,
+        };
         // Renormalised at every step: products of unit quaternions lose their norm by a random walk of
         // rounding, and a norm off by 1e-10 would scale the specific force.
         self.q_b_n = (q_n * self.q_b_n * Quat::from_rotation_vector(phi_b)).renormalised();
@@ -247,7 +250,11 @@ impl<L: Real> Strapdown<L> {
         Middle {
             v_n,
             omega_ie_n: Vec3([cos_lat * OMEGA_IE, L::from(0.0), sin_lat * -OMEGA_IE]),
-            omega_en_n: Vec3([east, -(v_n[0] * per_meridian), -(east * sin_lat * per_cos_lat)]),
+            omega_en_n: Vec3([
+                east,
+                -(v_n[0] * per_meridian),
+                -(east * sin_lat * per_cos_lat),
+            ]),
             gravity: parallel.nearby(sin_lat).gravity_down(self.gravity, h),
             per_meridian,
             per_transverse,
@@ -283,8 +290,19 @@ mod tests {
     }
 
     fn start(lat_deg: f64, v_n: DVec3) -> NavState {
-        let q_b_n = RollPitchYaw { roll: 0.1, pitch: -0.2, yaw: 2.0 }.to_quat();
-        NavState { lat: lat_deg * DEG, lon: 3.1, h: 500.0, v_n, q_b_n }
+        let q_b_n = RollPitchYaw {
+            roll: 0.1,
+            pitch: -0.2,
+            yaw: 2.0,
+        }
+        .to_quat();
+        NavState {
+            lat: lat_deg * DEG,
+            lon: 3.1,
+            h: 500.0,
+            v_n,
+            q_b_n,
+        }
     }
 
     /// At rest on the Earth the sensors feel Earth rate and −g: nothing may move.
@@ -296,7 +314,11 @@ mod tests {
         let b = state.q_b_n.inverse();
         let mut ins = Strapdown::new(&state, GravityModel::Wgs84);
         for _ in 0..90_000 {
-            ins.step(Vec3::splat(b * omega_n * 0.01), Vec3::splat(b * f_n * 0.01), 0.01);
+            ins.step(
+                Vec3::splat(b * omega_n * 0.01),
+                Vec3::splat(b * f_n * 0.01),
+                0.01,
+            );
         }
         let end = ins.lane(7);
         let moved = earth::ned_difference(&state, end.lat, end.lon, end.h);
@@ -312,8 +334,14 @@ mod tests {
     #[test]
     fn flight_along_a_parallel_closes_over_one_hour() {
         let v_n = DVec3::new(0.0, 200.0, 0.0);
-        let state = NavState { q_b_n: DQuat::IDENTITY, ..start(48.0, v_n) };
-        let (w_ie, w_en) = (earth::omega_ie_n(state.lat), earth::omega_en_n(state.lat, state.h, v_n));
+        let state = NavState {
+            q_b_n: DQuat::IDENTITY,
+            ..start(48.0, v_n)
+        };
+        let (w_ie, w_en) = (
+            earth::omega_ie_n(state.lat),
+            earth::omega_en_n(state.lat, state.h, v_n),
+        );
         let g_n = DVec3::Z * gravity_down(GravityModel::Wgs84, state.lat.sin(), state.h);
         let f_n = (2.0 * w_ie + w_en).cross(v_n) - g_n;
         let mut ins = Strapdown::new(&state, GravityModel::Wgs84);
@@ -328,7 +356,10 @@ mod tests {
         let error = earth::ned_difference(&expected, end.lat, end.lon, end.h);
         // Second order in n's rotation per sample: (2e-6)²·g/4 = 1e-11 m/s², 0.06 mm in an hour; the
         // vertical channel is unstable and multiplies it by cosh(√(2g/R)·3600 s) = 280 at most.
-        assert!(error.truncate().length() < 1e-3 && error.z.abs() < 1.7e-2, "error {error}");
+        assert!(
+            error.truncate().length() < 1e-3 && error.z.abs() < 1.7e-2,
+            "error {error}"
+        );
         let dv = end.v_n - v_n;
         assert!(dv.truncate().length() < 1e-6 && dv.z.abs() < 1e-5, "{dv}");
     }
@@ -344,18 +375,34 @@ mod tests {
         };
         // Body rate of a coning motion (exact): omega (−sin a sin ωt, sin a cos ωt, 2 sin²(a/2)) rotated.
         let drift = |dt: f64| {
-            let state = NavState { lat: 0.0, lon: 0.0, h: 0.0, v_n: DVec3::ZERO, q_b_n: attitude(0.0) };
+            let state = NavState {
+                lat: 0.0,
+                lon: 0.0,
+                h: 0.0,
+                v_n: DVec3::ZERO,
+                q_b_n: attitude(0.0),
+            };
             let mut ins = Strapdown::new(&state, GravityModel::Wgs84);
             let steps = (20.0 / dt).round() as usize;
             for k in 0..steps {
                 let (a, b) = (k as f64 * dt * omega, (k + 1) as f64 * dt * omega);
                 let (sa, cz) = (amplitude.sin(), 1.0 - amplitude.cos());
-                let integral = DVec3::new(sa * (b.cos() - a.cos()), sa * (b.sin() - a.sin()), -cz * (b - a));
+                let integral = DVec3::new(
+                    sa * (b.cos() - a.cos()),
+                    sa * (b.sin() - a.sin()),
+                    -cz * (b - a),
+                );
                 // Earth rate as the body feels it, at the interval's middle, so that n does not drift
                 let mid = attitude((k as f64 + 0.5) * dt);
                 let earth = mid.inverse() * earth::omega_ie_n(0.0) * dt;
                 ins.step(Vec3::splat(integral + earth), Vec3::ZERO, dt);
-                ins.set_lane(0, &NavState { q_b_n: ins.lane(0).q_b_n, ..state });
+                ins.set_lane(
+                    0,
+                    &NavState {
+                        q_b_n: ins.lane(0).q_b_n,
+                        ..state
+                    },
+                );
             }
             angle(ins.lane(0).q_b_n, attitude(20.0))
         };

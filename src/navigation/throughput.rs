@@ -8,7 +8,9 @@ use crate::ekf::{Belief, BeliefError, Ekf, FilterStates, Fix, InitialSettings, a
 use crate::frames::NavState;
 use crate::imu::ImuSample;
 use crate::lanes::{LANES, Lanes, Level, Vec3};
-use crate::noise::{Ar1, Composite, Model, ParameterError, Process, Quantization, RandomWalk, White};
+use crate::noise::{
+    Ar1, Composite, Model, ParameterError, Process, Quantization, RandomWalk, White,
+};
 use crate::rng::StreamKey;
 use crate::sensors::imu::{ErrorSource, ImuErrors, LaneErrors};
 use crate::strapdown::Strapdown;
@@ -53,16 +55,33 @@ impl<'a> Load<'a> {
     pub fn new(model: &'a Model, states: FilterStates, level: Level) -> Result<Self, BeliefError> {
         // Fixes at 1 Hz and the shortest window of the reduction, as in a default run.
         let belief = Belief::new(model, states, 1.0, 800.0)?;
-        let start = NavState { lat: 0.8, lon: 0.1, h: 400.0, v_n: DVec3::ZERO, q_b_n: DQuat::IDENTITY };
+        let start = NavState {
+            lat: 0.8,
+            lon: 0.1,
+            h: 400.0,
+            v_n: DVec3::ZERO,
+            q_b_n: DQuat::IDENTITY,
+        };
         let gravity = GravityModel::Wgs84;
         // At rest the accelerometers measure the reaction of the ground, −g.
         let f_ib_b = DVec3::NEG_Z * gravity_down(gravity, start.lat.sin(), start.h);
-        let key = |run| StreamKey { seed: 1, scenario: "", run, source: "", process: "" };
-        let imu = (0..LANES as u64).map(|run| ImuErrors::new(&ErrorSource::Model(model), key(run), SAMPLES));
+        let key = |run| StreamKey {
+            seed: 1,
+            scenario: "",
+            run,
+            source: "",
+            process: "",
+        };
+        let imu = (0..LANES as u64)
+            .map(|run| ImuErrors::new(&ErrorSource::Model(model), key(run), SAMPLES));
         let settings = InitialSettings::default();
         Ok(Self {
-            ekf: Ekf::new(Strapdown::new(&start, gravity), &belief, &start, &settings).at_level(level),
-            samples: [ImuSample { omega_ib_b: DVec3::ZERO, f_ib_b }; SAMPLES],
+            ekf: Ekf::new(Strapdown::new(&start, gravity), &belief, &start, &settings)
+                .at_level(level),
+            samples: [ImuSample {
+                omega_ib_b: DVec3::ZERO,
+                f_ib_b,
+            }; SAMPLES],
             errors: LaneErrors::new(imu.collect()),
             fix: Fix {
                 lat: Lanes::splat(start.lat),

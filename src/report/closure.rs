@@ -60,7 +60,10 @@ impl TrajectoryCheck {
             },
             beyond_limits: beyond.iter().map(ToString::to_string).collect(),
             warnings,
-            closure: Closed { closure, within_bounds: closure.within(&bounds) },
+            closure: Closed {
+                closure,
+                within_bounds: closure.within(&bounds),
+            },
             bounds,
         }
     }
@@ -78,22 +81,51 @@ impl TrajectoryCheck {
     /// The same for people; limits of speed, acceleration, jerk and rate (deg/s) as they were given.
     pub(crate) fn text(&self, [speed, acceleration, jerk, rate_deg_s]: [f64; 4]) -> String {
         let (l, c, b) = (&self.largest, &self.closure.closure, &self.bounds);
-        let verdict = if self.is_closed() { "within bounds" } else { "BEYOND A BOUND" };
-        let Self { file, start_s, end_s, points, path_m, .. } = self;
+        let verdict = if self.is_closed() {
+            "within bounds"
+        } else {
+            "BEYOND A BOUND"
+        };
+        let Self {
+            file,
+            start_s,
+            end_s,
+            points,
+            path_m,
+            ..
+        } = self;
         let rows = [
-            format!("{file}: {} s from {start_s} s, {points} points", end_s - start_s),
+            format!(
+                "{file}: {} s from {start_s} s, {points} points",
+                end_s - start_s
+            ),
             format!("  path          {path_m:.1} m"),
             format!("  speed         {:8.3} m/s    limit {speed}", l.speed_m_s),
-            format!("  acceleration  {:8.3} m/s²   limit {acceleration}", l.acceleration_m_s2),
+            format!(
+                "  acceleration  {:8.3} m/s²   limit {acceleration}",
+                l.acceleration_m_s2
+            ),
             format!("  jerk (0.1 s)  {:8.3} m/s³   limit {jerk}", l.jerk_m_s3),
-            format!("  angular rate  {:8.3} deg/s  limit {rate_deg_s}", l.rate_deg_s),
-            format!("closure at {} Hz over {} s: {verdict}", c.rate_hz, c.duration_s),
+            format!(
+                "  angular rate  {:8.3} deg/s  limit {rate_deg_s}",
+                l.rate_deg_s
+            ),
+            format!(
+                "closure at {} Hz over {} s: {verdict}",
+                c.rate_hz, c.duration_s
+            ),
             format!(
                 "  position      {:.3e} m (horizontal {:.3e})  bound {:e}",
                 c.position_m, c.horizontal_m, b.position_m
             ),
-            format!("  velocity      {:.3e} m/s  bound {:e}", c.velocity_m_s, b.velocity_m_s),
-            format!("  attitude      {:.3e} rad  bound {:e}", c.attitude_rad, b.attitude_rad),
+            format!(
+                "  velocity      {:.3e} m/s  bound {:e}",
+                c.velocity_m_s, b.velocity_m_s
+            ),
+            format!(
+                "  attitude      {:.3e} rad  bound {:e}",
+                c.attitude_rad, b.attitude_rad
+            ),
         ];
         rows.join("\n")
     }
@@ -117,14 +149,25 @@ impl TrajectoryCheck {
             (c.velocity_m_s, b.velocity_m_s, "m/s"),
             (c.attitude_rad, b.attitude_rad, "rad"),
         ];
-        let beyond = all.into_iter().filter(|(found, bound, _)| found.is_nan() || found > bound);
-        let text = beyond.map(|(found, bound, unit)| format!("{found:.3e} {unit}, beyond {bound:e} {unit}"));
-        format!("closure at {} Hz is {}", c.rate_hz, text.collect::<Vec<_>>().join("; "))
+        let beyond = all
+            .into_iter()
+            .filter(|(found, bound, _)| found.is_nan() || found > bound);
+        let text = beyond
+            .map(|(found, bound, unit)| format!("{found:.3e} {unit}, beyond {bound:e} {unit}"));
+        format!(
+            "closure at {} Hz is {}",
+            c.rate_hz,
+            text.collect::<Vec<_>>().join("; ")
+        )
     }
 }
 
 /// Length of the path (m): chords between the points.
 fn path_length(trajectory: &Trajectory) -> f64 {
-    let places: Vec<_> = trajectory.knots().iter().map(|t| trajectory.kinematics(*t).r_e).collect();
+    let places: Vec<_> = trajectory
+        .knots()
+        .iter()
+        .map(|t| trajectory.kinematics(*t).r_e)
+        .collect();
     places.windows(2).map(|w| w[0].distance(w[1])).sum()
 }

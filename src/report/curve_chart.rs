@@ -15,12 +15,19 @@ pub(crate) fn variance_axis(sensor: &str) -> Axis {
 
 /// Unit of a sensor, by its name in files.
 pub(crate) fn unit(sensor: &str) -> &'static str {
-    Sensor::ALL.into_iter().find(|s| s.name() == sensor).map_or("", Sensor::unit)
+    Sensor::ALL
+        .into_iter()
+        .find(|s| s.name() == sensor)
+        .map_or("", Sensor::unit)
 }
 
 /// A sensor in words.
 pub(crate) fn sensor_name(sensor: &str) -> &'static str {
-    if sensor == Sensor::Accel.name() { "Accelerometer" } else { "Gyroscope" }
+    if sensor == Sensor::Accel.name() {
+        "Accelerometer"
+    } else {
+        "Gyroscope"
+    }
 }
 
 /// Points of a curve.
@@ -30,5 +37,12 @@ pub(crate) fn curve(tau_s: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
 
 /// The area between two curves.
 pub(crate) fn band(tau_s: &[f64], low: &[f64], high: &[f64]) -> Mark {
-    Mark::Band(tau_s.iter().zip(low).zip(high).map(|((t, a), b)| (*t, *a, *b)).collect())
+    Mark::Band(
+        tau_s
+            .iter()
+            .zip(low)
+            .zip(high)
+            .map(|((t, a), b)| (*t, *a, *b))
+            .collect(),
+    )
 }

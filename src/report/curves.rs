@@ -29,7 +29,12 @@ impl Band {
     fn new(wv: Vec<f64>, edof: &[f64], status: Vec<String>) -> Self {
         let ends = |(nu, edof): (&f64, &f64)| interval::interval(*nu, *edof, CONFIDENCE);
         let (ci_low, ci_high) = wv.iter().zip(edof).map(ends).unzip();
-        Self { wv, ci_low, ci_high, status }
+        Self {
+            wv,
+            ci_low,
+            ci_high,
+            status,
+        }
     }
 }
 
@@ -63,8 +68,15 @@ impl SignalCurves {
         edof: Vec<f64>,
         efficiency: f64,
     ) -> Self {
-        let robust_edof: Vec<f64> = edof.iter().map(|e| interval::edof_robust(*e, efficiency)).collect();
-        let (values, status) = replicate.robust.iter().map(|r| (r.value, r.status.name().to_owned())).unzip();
+        let robust_edof: Vec<f64> = edof
+            .iter()
+            .map(|e| interval::edof_robust(*e, efficiency))
+            .collect();
+        let (values, status) = replicate
+            .robust
+            .iter()
+            .map(|r| (r.value, r.status.name().to_owned()))
+            .unzip();
         Self {
             file: replicate.name.clone(),
             sensor: channel.sensor.name().to_owned(),
@@ -97,7 +109,12 @@ pub(crate) struct SignalsFile {
 
 impl SignalsFile {
     /// The file of some signals.
-    pub(crate) fn new(rate_hz: f64, efficiency: f64, edof_method: &str, signals: Vec<SignalCurves>) -> Self {
+    pub(crate) fn new(
+        rate_hz: f64,
+        efficiency: f64,
+        edof_method: &str,
+        signals: Vec<SignalCurves>,
+    ) -> Self {
         Self {
             schema_version: SCHEMA_VERSION,
             rate_hz,
@@ -114,23 +131,32 @@ impl From<SignalsFile> for CurvesFile {
     fn from(file: SignalsFile) -> Self {
         let efficiency = file.efficiency;
         let curves = file.signals.into_iter().flat_map(|s| {
-            let robust_edof = s.edof.iter().map(|e| interval::edof_robust(*e, efficiency)).collect();
-            let curve_of_estimator = |estimator: Estimator, wv: Vec<f64>, edof: Vec<f64>| FittedCurve {
-                efficiency: estimator.is_robust().then_some(efficiency),
-                sensor: s.sensor.clone(),
-                axis: s.axis.clone(),
-                estimator: estimator.name().to_owned(),
-                tau_s: s.tau_s.clone(),
-                wv,
-                edof,
-                ..FittedCurve::default()
-            };
+            let robust_edof = s
+                .edof
+                .iter()
+                .map(|e| interval::edof_robust(*e, efficiency))
+                .collect();
+            let curve_of_estimator =
+                |estimator: Estimator, wv: Vec<f64>, edof: Vec<f64>| FittedCurve {
+                    efficiency: estimator.is_robust().then_some(efficiency),
+                    sensor: s.sensor.clone(),
+                    axis: s.axis.clone(),
+                    estimator: estimator.name().to_owned(),
+                    tau_s: s.tau_s.clone(),
+                    wv,
+                    edof,
+                    ..FittedCurve::default()
+                };
             [
                 curve_of_estimator(Estimator::Gmwm, s.classical.wv.clone(), s.edof.clone()),
                 curve_of_estimator(Estimator::Rgmwm, s.robust.wv.clone(), robust_edof),
             ]
         });
-        Self { schema_version: file.schema_version, rate_hz: file.rate_hz, curves: curves.collect() }
+        Self {
+            schema_version: file.schema_version,
+            rate_hz: file.rate_hz,
+            curves: curves.collect(),
+        }
     }
 }
 
@@ -202,16 +228,29 @@ pub(crate) struct ReplicateCurve {
 impl CurvesFile {
     /// The file of some outcomes and the groups they are of.
     pub(crate) fn new(groups: &[Group], outcomes: &[&Outcome], settings: &Settings) -> Self {
-        let replicates =
-            |o: &Outcome| groups.iter().find(|g| g.scope == o.scope).map_or(&[][..], |g| &g.replicates);
+        let replicates = |o: &Outcome| {
+            groups
+                .iter()
+                .find(|g| g.scope == o.scope)
+                .map_or(&[][..], |g| &g.replicates)
+        };
         let curve = |o: &&Outcome| fitted(o, replicates(o), settings);
         let curves = outcomes.iter().map(curve).collect();
-        Self { schema_version: SCHEMA_VERSION, rate_hz: settings.rate_hz, curves }
+        Self {
+            schema_version: SCHEMA_VERSION,
+            rate_hz: settings.rate_hz,
+            curves,
+        }
     }
 }
 
 fn fitted(outcome: &Outcome, replicates: &[Replicate], settings: &Settings) -> FittedCurve {
-    let Outcome { curve, fit, estimator, .. } = outcome;
+    let Outcome {
+        curve,
+        fit,
+        estimator,
+        ..
+    } = outcome;
     let band = Band::new(curve.wv.clone(), &curve.edof, Vec::new());
     let model = &fit.composite;
     let over_levels = |f: &dyn Fn(u32) -> f64| curve.levels.iter().map(|level| f(*level)).collect();
@@ -230,11 +269,17 @@ fn fitted(outcome: &Outcome, replicates: &[Replicate], settings: &Settings) -> F
         wv: band.wv,
         edof: curve.edof.clone(),
         efficiency: estimator.is_robust().then(|| settings.tuning.efficiency()),
-        classical_tau_s: curve.classical.iter().map(|level| tau_s(*level, settings.rate_hz)).collect(),
+        classical_tau_s: curve
+            .classical
+            .iter()
+            .map(|level| tau_s(*level, settings.rate_hz))
+            .collect(),
         ci_low: band.ci_low,
         ci_high: band.ci_high,
         implied: implied(model, curve),
-        processes: parts.map(|(label, p)| (label, over_levels(&|level| p.haar_wv(level)))).collect(),
+        processes: parts
+            .map(|(label, p)| (label, over_levels(&|level| p.haar_wv(level))))
+            .collect(),
         replicates: replicates.iter().map(replicate).collect(),
     }
 }

@@ -22,19 +22,34 @@ pub(crate) fn dot_chart(
     let rows = names.len() as f64;
     let mut series: Vec<Series> = Vec::new();
     if let Some((name, value)) = level {
-        series.push(Series::dashed(name, Colour::RIGHT, vec![(value, -0.5), (value, rows - 0.5)]));
+        series.push(Series::dashed(
+            name,
+            Colour::RIGHT,
+            vec![(value, -0.5), (value, rows - 0.5)],
+        ));
     }
     for (k, kind) in dots.iter().enumerate() {
         let beside = 0.3 * ((k as f64 + 0.5) / dots.len() as f64 - 0.5);
         let height = |row: usize| rows - 1.0 - row as f64 - beside;
         let interval = |(row, [_, low, high]): (usize, &[f64; 3])| {
-            [(*low, height(row)), (*high, height(row)), (f64::NAN, f64::NAN)]
+            [
+                (*low, height(row)),
+                (*high, height(row)),
+                (f64::NAN, f64::NAN),
+            ]
         };
         let point = |(row, [value, ..]): (usize, &[f64; 3])| (*value, height(row), f64::NAN);
         let intervals = kind.points.iter().enumerate().flat_map(interval).collect();
         series.push(Series::line("", kind.colour, intervals));
-        series.push(Series::points(kind.name, kind.colour, kind.points.iter().enumerate().map(point)));
+        series.push(Series::points(
+            kind.name,
+            kind.colour,
+            kind.points.iter().enumerate().map(point),
+        ));
     }
-    let panel = Panel { height: 0.1 * (rows + 1.0), ..Panel::new(Axis::names(names), series) };
+    let panel = Panel {
+        height: 0.1 * (rows + 1.0),
+        ..Panel::new(Axis::names(names), series)
+    };
     Chart::new(title, axis, vec![panel])
 }

@@ -70,18 +70,28 @@ impl Manifest {
 
     /// Whether another run would be a run of this one, had this one its seed.
     pub(crate) fn differs_in_seed(&self, other: &Self) -> bool {
-        let mut seeded = Self { seed: other.seed, ..self.clone() };
+        let mut seeded = Self {
+            seed: other.seed,
+            ..self.clone()
+        };
         seeded.configuration.run.seed = other.configuration.run.seed;
         self.seed != other.seed && seeded.is_same_run(other)
     }
 
     /// The hashes of the inputs of a role, in the order given.
     pub(crate) fn hashes(&self, role: &str) -> Vec<&str> {
-        self.inputs.iter().filter(|i| i.role == role).map(|i| i.blake3.as_str()).collect()
+        self.inputs
+            .iter()
+            .filter(|i| i.role == role)
+            .map(|i| i.blake3.as_str())
+            .collect()
     }
 }
 
 /// What files hold and what for, wherever they are.
 pub(crate) fn contents(inputs: &[Input]) -> Vec<(&str, &str)> {
-    inputs.iter().map(|i| (i.role.as_str(), i.blake3.as_str())).collect()
+    inputs
+        .iter()
+        .map(|i| (i.role.as_str(), i.blake3.as_str()))
+        .collect()
 }

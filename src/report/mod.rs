@@ -41,12 +41,14 @@ pub(crate) use states::{STATES, error_of, tone};
 #[cfg(any(test, feature = "parquet"))]
 pub(crate) use study::ValueKind;
 pub(crate) use study::{
-    ColumnResult, TableColumn, TableRow, Value, epoch_columns, epoch_rows, outage_columns, outage_rows,
-    run_columns, run_rows,
+    ColumnResult, TableColumn, TableRow, Value, epoch_columns, epoch_rows, outage_columns,
+    outage_rows, run_columns, run_rows,
 };
 pub use trajectory::TrajectorySeries;
 pub(crate) use trajectory::trajectory_svg;
-pub(crate) use unexpected::{reduction_doubt, reduction_line, unexpected_in_words, unexpected_line};
+pub(crate) use unexpected::{
+    reduction_doubt, reduction_line, unexpected_in_words, unexpected_line,
+};
 
 /// Names of `nav_sim_document` for files that have not moved to documents yet.
 pub(crate) mod page {

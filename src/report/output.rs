@@ -11,11 +11,15 @@ pub(crate) struct OutputFile<'a> {
 impl OutputFile<'_> {
     /// A small file.
     pub(crate) fn whole(name: &'static str, text: String) -> Self {
-        Self { name, parts: Box::new(std::iter::once(text)) }
+        Self {
+            name,
+            parts: Box::new(std::iter::once(text)),
+        }
     }
 }
 
 /// Indented JSON with a final newline; NaN is null.
 pub(crate) fn json(value: &impl serde::Serialize) -> String {
-    serde_json::to_string_pretty(value).expect("plain structs with text keys are always JSON") + "\n"
+    serde_json::to_string_pretty(value).expect("plain structs with text keys are always JSON")
+        + "\n"
 }

@@ -10,7 +10,8 @@ use std::fmt::Write as _;
 /// `imu.csv`: mean rates over the interval that ends at the time given.
 pub(crate) fn imu_csv(samples: &[ImuIncrement]) -> String {
     let mut text =
-        "t_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2\n".to_owned();
+        "t_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2\n"
+            .to_owned();
     for s in samples {
         let (w, f) = (s.dtheta / s.dt_s, s.dv / s.dt_s);
         // 1e-10 rad/s and 1e-8 m/s²: a thousandth of the noise of the best sensors
@@ -44,7 +45,11 @@ pub(crate) fn gnss_csv(fixes: &[GnssFix]) -> String {
         );
         if let Some(velocity) = f.velocity {
             let (v, s) = (velocity.v_n(), velocity.sigma_n());
-            let _ = write!(text, ",{:.5},{:.5},{:.5},{},{},{}", v.x, v.y, v.z, s.x, s.y, s.z);
+            let _ = write!(
+                text,
+                ",{:.5},{:.5},{:.5},{},{},{}",
+                v.x, v.y, v.z, s.x, s.y, s.z
+            );
         }
         text.push('\n');
     }
@@ -58,9 +63,15 @@ pub(crate) fn initial_toml(t_s: f64, state: &NavState, sigma: &InitialSettings) 
     let list = |x: [f64; 3]| format!("[{:?}, {:?}, {:?}]", x[0], x[1], x[2]);
     let beside = |sensor: Sensor| {
         let bias = (InitialSettings::bias_key(sensor), sigma.bias_sigma(sensor));
-        let scale = (InitialSettings::scale_key(sensor), sigma.scale_sigma_ppm(sensor));
-        let said = [bias, scale].into_iter().filter_map(|(key, sigma)| Some((key, sigma?)));
-        said.map(|(key, sigma)| format!("{key} = {sigma:?}\n")).collect::<String>()
+        let scale = (
+            InitialSettings::scale_key(sensor),
+            sigma.scale_sigma_ppm(sensor),
+        );
+        let said = [bias, scale]
+            .into_iter()
+            .filter_map(|(key, sigma)| Some((key, sigma?)));
+        said.map(|(key, sigma)| format!("{key} = {sigma:?}\n"))
+            .collect::<String>()
     };
     format!(
         "t_s = {t_s:?}\nlat_deg = {:.10}\nlon_deg = {:.10}\nh_m = {:.4}\nv_n_m_s = {:.5}\nv_e_m_s = {:.5}\n\

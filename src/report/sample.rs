@@ -7,7 +7,12 @@ pub(crate) fn result() -> RunResult {
     let runs = 4;
     let epoch = |t: u32| {
         let outage = (4..8).contains(&t);
-        let sigma = 0.3 + if outage { f64::from(t - 3).powi(2) } else { 0.1 * f64::from(t % 3) };
+        let sigma = 0.3
+            + if outage {
+                f64::from(t - 3).powi(2)
+            } else {
+                0.1 * f64::from(t % 3)
+            };
         let n = f64::from(runs);
         EpochSums {
             t_s: f64::from(t),

@@ -47,18 +47,32 @@ pub(crate) struct ColumnResult<'a> {
     pub measured: &'a Measured,
 }
 
-const KEYS: [&str; 7] = ["trajectory", "truth", "scenario", "gnss", "outage_set", "candidate", "filter"];
+const KEYS: [&str; 7] = [
+    "trajectory",
+    "truth",
+    "scenario",
+    "gnss",
+    "outage_set",
+    "candidate",
+    "filter",
+];
 
 /// Names of the states without their units, and the units.
 fn states() -> [(&'static str, &'static str); REPORTED] {
     REPORTED_NAMES.map(|name| {
-        let unit = ["_m_s", "_deg", "_m"].into_iter().find(|unit| name.ends_with(unit)).unwrap_or("");
+        let unit = ["_m_s", "_deg", "_m"]
+            .into_iter()
+            .find(|unit| name.ends_with(unit))
+            .unwrap_or("");
         (&name[..name.len() - unit.len()], &unit[unit.len().min(1)..])
     })
 }
 
 fn columns(names: impl IntoIterator<Item = (String, ValueKind)>) -> Vec<TableColumn> {
-    KEYS.iter().map(|k| ((*k).to_owned(), ValueKind::Text)).chain(names).collect()
+    KEYS.iter()
+        .map(|k| ((*k).to_owned(), ValueKind::Text))
+        .chain(names)
+        .collect()
 }
 
 fn floats(names: Vec<String>) -> impl Iterator<Item = (String, ValueKind)> {
@@ -66,11 +80,16 @@ fn floats(names: Vec<String>) -> impl Iterator<Item = (String, ValueKind)> {
 }
 
 fn ints<const N: usize>(names: [&str; N]) -> impl Iterator<Item = (String, ValueKind)> {
-    names.map(|name| (name.to_owned(), ValueKind::Int)).into_iter()
+    names
+        .map(|name| (name.to_owned(), ValueKind::Int))
+        .into_iter()
 }
 
 fn keys(result: &ColumnResult<'_>) -> TableRow {
-    let names = result.cell.into_iter().chain([result.candidate, result.filter]);
+    let names = result
+        .cell
+        .into_iter()
+        .chain([result.candidate, result.filter]);
     names.map(|name| Value::Text(name.to_owned())).collect()
 }
 
@@ -99,7 +118,13 @@ pub(crate) fn outage_columns() -> Vec<TableColumn> {
         names.extend(prefixed(&format!("{prefix}_std_error")));
     }
     names.extend(
-        ["nees_end", "nees_end_std_error", "log_density_end", "log_density_end_std_error"].map(str::to_owned),
+        [
+            "nees_end",
+            "nees_end_std_error",
+            "log_density_end",
+            "log_density_end_std_error",
+        ]
+        .map(str::to_owned),
     );
     names.push("verdict_ratio".to_owned());
     names.extend(HORIZONTAL.map(str::to_owned));
@@ -108,13 +133,27 @@ pub(crate) fn outage_columns() -> Vec<TableColumn> {
         names.extend(["asee_ratio_error", "asee_ratio_abs_error"].map(ratio));
         names.extend(["low", "high"].map(|end| format!("asee_ratio_error_{state}_ci95_{end}_pct")));
         names.push(format!("rmse_end_ratio_error_{state}_pct"));
-        names.extend(["low", "high"].map(|end| format!("rmse_end_ratio_error_{state}_ci95_{end}_pct")));
+        names.extend(
+            ["low", "high"].map(|end| format!("rmse_end_ratio_error_{state}_ci95_{end}_pct")),
+        );
     }
     names.extend(
-        ["nees_mean", "nees_mean_reference", "coverage_mean", "coverage_mean_reference"].map(str::to_owned),
+        [
+            "nees_mean",
+            "nees_mean_reference",
+            "coverage_mean",
+            "coverage_mean_reference",
+        ]
+        .map(str::to_owned),
     );
-    let words = ["reference", "verdict", "verdict_state"].map(|name| (name.to_owned(), ValueKind::Text));
-    columns(words.into_iter().chain(ints(["outage", "runs", "diverged"])).chain(floats(names)))
+    let words =
+        ["reference", "verdict", "verdict_state"].map(|name| (name.to_owned(), ValueKind::Text));
+    columns(
+        words
+            .into_iter()
+            .chain(ints(["outage", "runs", "diverged"]))
+            .chain(floats(names)),
+    )
 }
 
 /// One row an outage; a set without outages has no row.
@@ -124,7 +163,12 @@ pub(crate) fn outage_rows(
     comparison: Option<&[OutageComparison]>,
 ) -> Vec<TableRow> {
     let runs = result.measured.sampled().len() as u64;
-    let diverged = result.measured.sampled().iter().filter(|r| r.diverged).count() as u64;
+    let diverged = result
+        .measured
+        .sampled()
+        .iter()
+        .filter(|r| r.diverged)
+        .count() as u64;
     let verdict = result.measured.verdict();
     let words = [result.reference, verdict.kind.name(), verdict.worst_state];
     let row = |(i, outage): (usize, &OutageMetrics)| {
@@ -150,10 +194,18 @@ fn outage_values(o: &OutageMetrics, verdict_ratio: f64, kept: u64) -> Vec<f64> {
         values.extend(estimates.0.map(|e| e.std_error));
     }
     values.extend([o.nees_end.value, o.nees_end.std_error]);
-    values.extend([o.log_density_end.value, o.log_density_end.std_error, verdict_ratio]);
+    values.extend([
+        o.log_density_end.value,
+        o.log_density_end.std_error,
+        verdict_ratio,
+    ]);
     for quantile in [&o.horizontal_p50_m, &o.horizontal_p95_m] {
         let (low, high) = quantile.ci95;
-        values.extend([quantile.value, low.unwrap_or(f64::NAN), high.unwrap_or(f64::NAN)]);
+        values.extend([
+            quantile.value,
+            low.unwrap_or(f64::NAN),
+            high.unwrap_or(f64::NAN),
+        ]);
     }
     let r = &o.reconvergence;
     let never = r.never.map_or(f64::NAN, |never| never as f64 / kept as f64);
@@ -162,13 +214,28 @@ fn outage_values(o: &OutageMetrics, verdict_ratio: f64, kept: u64) -> Vec<f64> {
 }
 
 fn ratio_values(comparison: Option<&OutageComparison>) -> Vec<f64> {
-    let Some(c) = comparison else { return vec![f64::NAN; 7 * REPORTED + 4] };
-    let of_state = |s: &metrics::StateRatio| {
-        let [[low, high], [rmse_low, rmse_high]] =
-            [s.asee.ci95_pct, s.rmse_end.ci95_pct].map(|interval| interval.unwrap_or([f64::NAN; 2]));
-        [s.asee.pct, s.asee_abs_pct, low, high, s.rmse_end.pct, rmse_low, rmse_high]
+    let Some(c) = comparison else {
+        return vec![f64::NAN; 7 * REPORTED + 4];
     };
-    c.states.iter().flat_map(of_state).chain(c.nees).chain(c.coverage).collect()
+    let of_state = |s: &metrics::StateRatio| {
+        let [[low, high], [rmse_low, rmse_high]] = [s.asee.ci95_pct, s.rmse_end.ci95_pct]
+            .map(|interval| interval.unwrap_or([f64::NAN; 2]));
+        [
+            s.asee.pct,
+            s.asee_abs_pct,
+            low,
+            high,
+            s.rmse_end.pct,
+            rmse_low,
+            rmse_high,
+        ]
+    };
+    c.states
+        .iter()
+        .flat_map(of_state)
+        .chain(c.nees)
+        .chain(c.coverage)
+        .collect()
 }
 
 /// Columns of the table of epochs.
@@ -193,7 +260,12 @@ pub(crate) fn epoch_rows(result: &ColumnResult<'_>, epochs: &[EpochMetrics]) -> 
             values.extend(estimates.0.map(|e| e.std_error));
         }
         values.extend(e.bias.0.map(|e| e.value));
-        values.extend([e.mean_pos_err_m.value, e.mean_att_err_deg.value, e.nees.value, e.coverage]);
+        values.extend([
+            e.mean_pos_err_m.value,
+            e.mean_att_err_deg.value,
+            e.nees.value,
+            e.coverage,
+        ]);
         values.extend(e.bias_asee);
         row.extend(values.into_iter().map(Value::Float));
         row
@@ -203,9 +275,20 @@ pub(crate) fn epoch_rows(result: &ColumnResult<'_>, epochs: &[EpochMetrics]) -> 
 
 /// Columns of the table of runs.
 pub(crate) fn run_columns() -> Vec<TableColumn> {
-    let mut names: Vec<String> = ["nis_mean", "nees_mean", "coverage"].map(str::to_owned).into();
-    names.extend(["see_mean", "see_end", "error_end"].into_iter().flat_map(prefixed));
-    let ends = ["nees_end", "log_density_end", "horizontal_error_end_m", "reconvergence_s"];
+    let mut names: Vec<String> = ["nis_mean", "nees_mean", "coverage"]
+        .map(str::to_owned)
+        .into();
+    names.extend(
+        ["see_mean", "see_end", "error_end"]
+            .into_iter()
+            .flat_map(prefixed),
+    );
+    let ends = [
+        "nees_end",
+        "log_density_end",
+        "horizontal_error_end_m",
+        "reconvergence_s",
+    ];
     names.extend(ends.map(str::to_owned));
     columns(ints(["run", "outage", "diverged", "fixes"]).chain(floats(names)))
 }
@@ -219,7 +302,12 @@ pub(crate) fn run_rows(result: &ColumnResult<'_>) -> Vec<TableRow> {
             row.extend([run.run, i as u64, u64::from(run.diverged), run.nis.1].map(Value::Int));
             let whole = [run.nis.0, run.nees_mean, run.covered].into_iter();
             let states = whole.chain(o.see_mean).chain(o.see_end).chain(o.error_end);
-            let ends = [o.nees_end, o.log_density_end, o.horizontal_error_end_m, o.reconvergence_s];
+            let ends = [
+                o.nees_end,
+                o.log_density_end,
+                o.horizontal_error_end_m,
+                o.reconvergence_s,
+            ];
             row.extend(states.chain(ends).map(Value::Float));
             rows.push(row);
         }

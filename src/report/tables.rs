@@ -2,12 +2,16 @@
 
 use super::number::shortest;
 use nav_sim_navigation::metrics::{EpochMetrics, FAN_LEVELS, FanEpoch, PerState};
-use nav_sim_navigation::simulation::{BIAS_NAMES, OutageRecord, REPORTED, REPORTED_NAMES, RunResult};
+use nav_sim_navigation::simulation::{
+    BIAS_NAMES, OutageRecord, REPORTED, REPORTED_NAMES, RunResult,
+};
 
 const EPOCH_ENDS: [&str; 4] = ["mean_pos_err_m", "mean_att_err_deg", "nees", "coverage"];
 
 fn named(prefix: &str) -> impl Iterator<Item = String> {
-    REPORTED_NAMES.iter().map(move |name| format!("{prefix}{name}"))
+    REPORTED_NAMES
+        .iter()
+        .map(move |name| format!("{prefix}{name}"))
 }
 
 /// Columns of `epochs.csv`.
@@ -15,16 +19,28 @@ fn epoch_columns() -> Vec<String> {
     let states = ["asee_", "rmse_", "bias_"].into_iter().flat_map(named);
     let ends = EPOCH_ENDS.map(str::to_owned);
     let biases = BIAS_NAMES.iter().map(|name| format!("asee_{name}"));
-    ["t_s", "gnss"].map(str::to_owned).into_iter().chain(states).chain(ends).chain(biases).collect()
+    ["t_s", "gnss"]
+        .map(str::to_owned)
+        .into_iter()
+        .chain(states)
+        .chain(ends)
+        .chain(biases)
+        .collect()
 }
 
 /// `epochs.csv`: one row a reporting epoch (1 Hz), means over runs.
 pub(crate) fn epochs_csv(epochs: &[EpochMetrics]) -> String {
-    let values = |all: &PerState<nav_sim_navigation::metrics::Estimate>| all.0.map(|e| shortest(e.value));
+    let values =
+        |all: &PerState<nav_sim_navigation::metrics::Estimate>| all.0.map(|e| shortest(e.value));
     let row = |e: &EpochMetrics| {
         let mut row = vec![shortest(e.t_s), u8::from(e.gnss).to_string()];
         row.extend([&e.asee, &e.rmse, &e.bias].into_iter().flat_map(values));
-        let ends = [e.mean_pos_err_m.value, e.mean_att_err_deg.value, e.nees.value, e.coverage];
+        let ends = [
+            e.mean_pos_err_m.value,
+            e.mean_att_err_deg.value,
+            e.nees.value,
+            e.coverage,
+        ];
         row.extend(ends.into_iter().chain(e.bias_asee).map(shortest));
         row.join(",")
     };
@@ -37,24 +53,50 @@ pub(crate) fn fan_csv(fan: &[FanEpoch]) -> String {
     let has_lincov = fan.iter().any(|e| e.lincov_m.is_some());
     let prefixes: &[&str] = if has_lincov { &["", "lincov_"] } else { &[""] };
     let column = |prefix: &str, p: f64| format!("{prefix}p{:02.0}_m", 100.0 * p);
-    let quantiles = prefixes.iter().flat_map(|prefix| FAN_LEVELS.map(|p| column(prefix, p)));
+    let quantiles = prefixes
+        .iter()
+        .flat_map(|prefix| FAN_LEVELS.map(|p| column(prefix, p)));
     let header: Vec<String> = std::iter::once("t_s".to_owned()).chain(quantiles).collect();
     let row = |e: &FanEpoch| {
-        let quantiles = e.quantiles_m.into_iter().chain(e.lincov_m.into_iter().flatten());
+        let quantiles = e
+            .quantiles_m
+            .into_iter()
+            .chain(e.lincov_m.into_iter().flatten());
         // errors are kept in single precision: more digits would say what nobody knows
         let quantiles = quantiles.map(|q| (q as f32).to_string());
-        std::iter::once(shortest(e.t_s)).chain(quantiles).collect::<Vec<_>>().join(",")
+        std::iter::once(shortest(e.t_s))
+            .chain(quantiles)
+            .collect::<Vec<_>>()
+            .join(",")
     };
     lines(header.join(","), fan.iter().map(row))
 }
 
 /// Columns of `runs.csv`.
 fn run_columns() -> Vec<String> {
-    let start = ["run", "diverged", "nis_mean", "fixes", "nees_mean", "coverage"].map(str::to_owned);
-    let whole = start.into_iter().chain(named("normalised_sq_")).chain(["outage".to_owned()]);
-    let ends =
-        ["nees_end", "log_density_end", "horizontal_error_end_m", "reconvergence_s"].map(str::to_owned);
-    let states = ["see_mean_", "see_end_", "error_end_"].into_iter().flat_map(named);
+    let start = [
+        "run",
+        "diverged",
+        "nis_mean",
+        "fixes",
+        "nees_mean",
+        "coverage",
+    ]
+    .map(str::to_owned);
+    let whole = start
+        .into_iter()
+        .chain(named("normalised_sq_"))
+        .chain(["outage".to_owned()]);
+    let ends = [
+        "nees_end",
+        "log_density_end",
+        "horizontal_error_end_m",
+        "reconvergence_s",
+    ]
+    .map(str::to_owned);
+    let states = ["see_mean_", "see_end_", "error_end_"]
+        .into_iter()
+        .flat_map(named);
     whole.chain(states).chain(ends).collect()
 }
 
@@ -63,20 +105,43 @@ pub(crate) fn runs_csv(result: &RunResult) -> impl Iterator<Item = String> {
     let columns = run_columns();
     let of_an_outage = columns.len() - 6 - REPORTED;
     let rows = result.runs.iter().flat_map(move |run| {
-        let counts = format!("{},{},{},{}", run.run, u8::from(run.diverged), shortest(run.nis.0), run.nis.1);
-        let whole = [run.nees_mean, run.covered].into_iter().chain(run.normalised_sq).map(shortest);
+        let counts = format!(
+            "{},{},{},{}",
+            run.run,
+            u8::from(run.diverged),
+            shortest(run.nis.0),
+            run.nis.1
+        );
+        let whole = [run.nees_mean, run.covered]
+            .into_iter()
+            .chain(run.normalised_sq)
+            .map(shortest);
         let start = format!("{counts},{}", whole.collect::<Vec<_>>().join(","));
-        let empty = run.outages.is_empty().then(|| format!("{start}{}\n", ",".repeat(of_an_outage)));
-        let of_outage = move |(i, outage)| format!("{start},{i},{}\n", outage_cells(outage).join(","));
-        empty.into_iter().chain(run.outages.iter().enumerate().map(of_outage))
+        let empty = run
+            .outages
+            .is_empty()
+            .then(|| format!("{start}{}\n", ",".repeat(of_an_outage)));
+        let of_outage =
+            move |(i, outage)| format!("{start},{i},{}\n", outage_cells(outage).join(","));
+        empty
+            .into_iter()
+            .chain(run.outages.iter().enumerate().map(of_outage))
     });
     std::iter::once(columns.join(",") + "\n").chain(rows)
 }
 
 fn outage_cells(outage: &OutageRecord) -> Vec<String> {
-    let states = outage.see_mean.iter().chain(&outage.see_end).chain(&outage.error_end);
-    let ends =
-        [outage.nees_end, outage.log_density_end, outage.horizontal_error_end_m, outage.reconvergence_s];
+    let states = outage
+        .see_mean
+        .iter()
+        .chain(&outage.see_end)
+        .chain(&outage.error_end);
+    let ends = [
+        outage.nees_end,
+        outage.log_density_end,
+        outage.horizontal_error_end_m,
+        outage.reconvergence_s,
+    ];
     states.chain(&ends).copied().map(shortest).collect()
 }
 
@@ -96,13 +161,20 @@ mod tests {
     #[test]
     fn the_columns_are_those_of_the_interface() {
         let header = epoch_columns().join(", ");
-        assert!(header.starts_with("t_s, gnss, asee_pos_n_m, asee_pos_e_m, asee_pos_d_m, asee_vel_n_m_s, "));
         assert!(
-            header.contains("asee_yaw_deg, rmse_pos_n_m") && header.contains("rmse_yaw_deg, bias_pos_n_m")
+            header.starts_with(
+                "t_s, gnss, asee_pos_n_m, asee_pos_e_m, asee_pos_d_m, asee_vel_n_m_s, "
+            )
         );
         assert!(
-            header.contains("bias_yaw_deg, mean_pos_err_m, mean_att_err_deg, nees, coverage, asee_b_ax_m_s2")
+            header.contains("asee_yaw_deg, rmse_pos_n_m")
+                && header.contains("rmse_yaw_deg, bias_pos_n_m")
         );
-        assert!(header.ends_with("asee_b_az_m_s2, asee_b_gx_rad_s, asee_b_gy_rad_s, asee_b_gz_rad_s"));
+        assert!(header.contains(
+            "bias_yaw_deg, mean_pos_err_m, mean_att_err_deg, nees, coverage, asee_b_ax_m_s2"
+        ));
+        assert!(
+            header.ends_with("asee_b_az_m_s2, asee_b_gx_rad_s, asee_b_gy_rad_s, asee_b_gz_rad_s")
+        );
     }
 }

@@ -39,7 +39,9 @@ impl TrajectorySeries {
             series.north_east_m.push([moved.x, moved.y]);
             series.height_m.push(state.h);
             series.speed_m_s.push(state.v_n.length());
-            series.rpy_deg.push([rpy.roll, rpy.pitch, rpy.yaw].map(|a| a / DEG));
+            series
+                .rpy_deg
+                .push([rpy.roll, rpy.pitch, rpy.yaw].map(|a| a / DEG));
         }
         series
     }
@@ -51,14 +53,19 @@ impl TrajectorySeries {
         let mut series = vec![Series::line("reference", Colour::BELIEVED, way)];
         for (start_s, end_s) in outages {
             let instants = self.t_s.iter().zip(&self.north_east_m);
-            let within = instants.filter(|(t, _)| (start_s..end_s).contains(t)).map(|(_, p)| east_north(p));
+            let within = instants
+                .filter(|(t, _)| (start_s..end_s).contains(t))
+                .map(|(_, p)| east_north(p));
             series.push(Series::new(
                 "outage",
                 Colour::REAL,
                 Mark::Line(within.collect(), super::page::Stroke::Bold),
             ));
         }
-        let ends = [("start", self.north_east_m.first()), ("end", self.north_east_m.last())];
+        let ends = [
+            ("start", self.north_east_m.first()),
+            ("end", self.north_east_m.last()),
+        ];
         series.extend(ends.into_iter().filter_map(|(name, p)| {
             let (east, north) = east_north(p?);
             Some(Series::new(name, Colour::RIGHT, Mark::Place(east, north)))
@@ -69,7 +76,11 @@ impl TrajectorySeries {
     /// Height, speed and attitude. At least so much is shown that rounding does not fill a panel.
     pub(crate) fn over_time(&self, outages: &[(f64, f64)]) -> Chart {
         let values = |value: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
-            self.t_s.iter().enumerate().map(|(i, t)| (*t, value(i))).collect()
+            self.t_s
+                .iter()
+                .enumerate()
+                .map(|(i, t)| (*t, value(i)))
+                .collect()
         };
         let rpy = |k: usize| values(&|i| self.rpy_deg[i][k]);
         let line = |name: &str, hue: usize, points| Series::line(name, Colour::Hue(hue), points);
@@ -77,20 +88,47 @@ impl TrajectorySeries {
             height: 0.6,
             ..Panel::new(Axis::linear(label).including(low, high), series)
         };
-        let height = self.height_m.first().map_or((0.0, 1.0), |h| (h - 1.0, h + 1.0));
+        let height = self
+            .height_m
+            .first()
+            .map_or((0.0, 1.0), |h| (h - 1.0, h + 1.0));
         let panels = vec![
-            panel("height (m)", height, vec![line("", 0, values(&|i| self.height_m[i]))]),
-            panel("speed (m/s)", (0.0, 1.0), vec![line("", 0, values(&|i| self.speed_m_s[i]))]),
-            panel("roll, pitch (°)", (-1.0, 1.0), vec![line("roll", 0, rpy(0)), line("pitch", 1, rpy(1))]),
+            panel(
+                "height (m)",
+                height,
+                vec![line("", 0, values(&|i| self.height_m[i]))],
+            ),
+            panel(
+                "speed (m/s)",
+                (0.0, 1.0),
+                vec![line("", 0, values(&|i| self.speed_m_s[i]))],
+            ),
+            panel(
+                "roll, pitch (°)",
+                (-1.0, 1.0),
+                vec![line("roll", 0, rpy(0)), line("pitch", 1, rpy(1))],
+            ),
             panel("yaw (°)", (-1.0, 1.0), vec![line("", 0, broken(&rpy(2)))]),
         ];
-        Chart::new("Height, speed and attitude", Axis::linear("time (s)"), panels).with_outages(outages)
+        Chart::new(
+            "Height, speed and attitude",
+            Axis::linear("time (s)"),
+            panels,
+        )
+        .with_outages(outages)
     }
 }
 
 /// The picture; `outages` are (start, end) in seconds.
-pub(crate) fn trajectory_svg(title: &str, series: &TrajectorySeries, outages: &[(f64, f64)]) -> String {
-    svg(title, &[series.map(title, outages), series.over_time(outages)])
+pub(crate) fn trajectory_svg(
+    title: &str,
+    series: &TrajectorySeries,
+    outages: &[(f64, f64)],
+) -> String {
+    svg(
+        title,
+        &[series.map(title, outages), series.over_time(outages)],
+    )
 }
 
 /// The line is broken where the heading passes ±180°.
@@ -114,7 +152,9 @@ mod tests {
             north_east_m: (0..n).map(|k| [100.0 * f64::from(k), 0.0]).collect(),
             height_m: vec![400.0; n as usize],
             speed_m_s: vec![100.0; n as usize],
-            rpy_deg: (0..n).map(|k| [0.0, 0.0, if k < 5 { 179.0 } else { -179.0 }]).collect(),
+            rpy_deg: (0..n)
+                .map(|k| [0.0, 0.0, if k < 5 { 179.0 } else { -179.0 }])
+                .collect(),
         }
     }
 
@@ -124,14 +164,27 @@ mod tests {
         assert!(svg.starts_with("<svg xmlns=") && svg.ends_with("</svg>\n"));
         assert_eq!(svg.matches("class=\"outage\" x").count(), 5); // a stripe in each panel, and the legend
         assert_eq!(svg.matches("data-name=\"outage\"").count(), 1); // on the map
-        assert!(svg.contains("<title>a&lt;b</title>") && !svg.contains("NaN") && !svg.contains("href"));
+        assert!(
+            svg.contains("<title>a&lt;b</title>") && !svg.contains("NaN") && !svg.contains("href")
+        );
     }
 
     #[test]
     fn the_heading_is_broken_where_it_wraps() {
         let s = series();
-        let yaw: Vec<_> = s.t_s.iter().zip(&s.rpy_deg).map(|(t, r)| (*t, r[2])).collect();
+        let yaw: Vec<_> = s
+            .t_s
+            .iter()
+            .zip(&s.rpy_deg)
+            .map(|(t, r)| (*t, r[2]))
+            .collect();
         let pieces = broken(&yaw);
-        assert_eq!(pieces.split(|p| p.1.is_nan()).map(<[_]>::len).collect::<Vec<_>>(), [5, 6, 0]);
+        assert_eq!(
+            pieces
+                .split(|p| p.1.is_nan())
+                .map(<[_]>::len)
+                .collect::<Vec<_>>(),
+            [5, 6, 0]
+        );
     }
 }

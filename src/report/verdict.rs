@@ -11,7 +11,9 @@ const WIDTH: usize = 111;
 pub(crate) fn verdict_lines(summary: &Summary) -> Vec<String> {
     let verdict = &summary.verdict;
     let mut lines = vec![words(summary)];
-    let Some(analysed) = verdict.by_covariance_analysis else { return lines };
+    let Some(analysed) = verdict.by_covariance_analysis else {
+        return lines;
+    };
     if summary.is_contradicted {
         let line = format!(
             "{} in the runs, {analysed} by covariance analysis: errors are no longer small",
@@ -30,30 +32,56 @@ pub(crate) fn verdict_lines(summary: &Summary) -> Vec<String> {
 
 fn words(summary: &Summary) -> String {
     let (verdict, runs, diverged) = (&summary.verdict, summary.runs, summary.diverged);
-    let windows: Vec<(f64, f64)> = summary.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
-    let nees = format!("NEES {} (9 if right)", with_error(verdict.nees, verdict.nees_std_error));
-    let by = if verdict.is_expected() { " by covariance analysis" } else { "" };
+    let windows: Vec<(f64, f64)> = summary
+        .outages
+        .iter()
+        .map(|o| (o.start_s, o.end_s))
+        .collect();
+    let nees = format!(
+        "NEES {} (9 if right)",
+        with_error(verdict.nees, verdict.nees_std_error)
+    );
+    let by = if verdict.is_expected() {
+        " by covariance analysis"
+    } else {
+        ""
+    };
     let kind = verdict.kind;
     match kind {
         VerdictKind::Diverged if diverged == runs => format!("diverged: all {runs} runs"),
         VerdictKind::Diverged => {
-            format!("diverged: {diverged} of {runs} runs; of the others, {}", departure(verdict, &windows))
+            format!(
+                "diverged: {diverged} of {runs} runs; of the others, {}",
+                departure(verdict, &windows)
+            )
         }
         VerdictKind::Overconfident | VerdictKind::Underconfident => {
             let far = if verdict.is_far_off() { " by far" } else { "" };
-            format!("{kind}{far}{by}: {}; NEES {}", departure(verdict, &windows), readable(verdict.nees))
+            format!(
+                "{kind}{far}{by}: {}; NEES {}",
+                departure(verdict, &windows),
+                readable(verdict.nees)
+            )
         }
         VerdictKind::Undecided => {
             let percent = 100.0 * (verdict.detectable_state_ratio - 1.0);
             let needed = verdict.runs_to_decide.unwrap_or_default();
-            let miss = if verdict.independent_runs == 1.0 { "misses" } else { "miss" };
+            let miss = if verdict.independent_runs == 1.0 {
+                "misses"
+            } else {
+                "miss"
+            };
             let runs = independent(verdict.independent_runs);
             format!(
                 "undecided: {runs} {miss} errors below {percent:.0} % in one state; {needed} would decide"
             )
         }
         VerdictKind::Doubtful => {
-            format!("doubtful: NEES {}{by}, {}", readable(verdict.nees), beyond(verdict, &windows))
+            format!(
+                "doubtful: NEES {}{by}, {}",
+                readable(verdict.nees),
+                beyond(verdict, &windows)
+            )
         }
         VerdictKind::Consistent | VerdictKind::NotMet => {
             let rest = match verdict.is_expected() {
@@ -68,8 +96,9 @@ fn words(summary: &Summary) -> String {
 /// Until where covariance analysis holds, and what decides then.
 fn beyond(verdict: &Verdict, outages: &[(f64, f64)]) -> String {
     let outage = verdict.beyond_linear.and_then(|k| outages.get(k));
-    let place = outage
-        .map_or_else(String::new, |(start_s, end_s)| format!(" in outage {}", window(*start_s, *end_s)));
+    let place = outage.map_or_else(String::new, |(start_s, end_s)| {
+        format!(" in outage {}", window(*start_s, *end_s))
+    });
     format!("beyond linear theory{place}: confirm with --method both")
 }
 
@@ -88,30 +117,49 @@ fn departure(verdict: &Verdict, outages: &[(f64, f64)]) -> String {
         None => "over the run".to_owned(),
     };
     let times = with_error(verdict.ratio, verdict.ratio_std_error);
-    format!("errors {times} times sigma in {} {place}", state_in_words(verdict.worst_state))
+    format!(
+        "errors {times} times sigma in {} {place}",
+        state_in_words(verdict.worst_state)
+    )
 }
 
 fn with_error(value: f64, error: f64) -> String {
-    if error > 0.0 { format!("{} ± {error:.2}", readable(value)) } else { readable(value) }
+    if error > 0.0 {
+        format!("{} ± {error:.2}", readable(value))
+    } else {
+        readable(value)
+    }
 }
 
 /// A state, or all of them, in words.
 pub(crate) fn state_in_words(name: StateName) -> &'static str {
-    if name == ALL_STATES { "all states together" } else { name }
+    if name == ALL_STATES {
+        "all states together"
+    } else {
+        name
+    }
 }
 
 /// For a line or a cell among several: "NEES 1189, 34.6 × in yaw_deg"; of runs too few to decide, how many would:
 /// "NEES 8.7, 0.91 × in yaw_deg, 27 runs would decide".
 pub(crate) fn verdict_in_short(verdict: &Verdict) -> String {
-    let decide =
-        verdict.runs_to_decide.map_or_else(String::new, |runs| format!(", {runs} runs would decide"));
+    let decide = verdict
+        .runs_to_decide
+        .map_or_else(String::new, |runs| format!(", {runs} runs would decide"));
     let state = state_in_words(verdict.worst_state);
-    format!("NEES {}, {} × in {state}{decide}", readable(verdict.nees), readable(verdict.ratio))
+    format!(
+        "NEES {}, {} × in {state}{decide}",
+        readable(verdict.nees),
+        readable(verdict.ratio)
+    )
 }
 
 /// The gravest of several.
 pub(crate) fn gravest<'a>(verdicts: impl Iterator<Item = &'a Verdict>) -> VerdictKind {
-    verdicts.map(|verdict| verdict.kind).max().unwrap_or(VerdictKind::Consistent)
+    verdicts
+        .map(|verdict| verdict.kind)
+        .max()
+        .unwrap_or(VerdictKind::Consistent)
 }
 
 #[cfg(test)]
@@ -149,17 +197,37 @@ mod tests {
     fn verdicts_are_told_in_one_line() {
         let line = |runs: u64, scale: f64| {
             let lines = verdict_lines(&summary(runs, scale));
-            assert!(lines.len() == 1 && lines[0].chars().count() <= WIDTH, "{lines:?}");
+            assert!(
+                lines.len() == 1 && lines[0].chars().count() <= WIDTH,
+                "{lines:?}"
+            );
             lines[0].clone()
         };
-        assert_eq!(line(100, 1.0), "consistent: NEES 9.00 (9 if right), coverage 0.500; 100 runs");
+        assert_eq!(
+            line(100, 1.0),
+            "consistent: NEES 9.00 (9 if right), coverage 0.500; 100 runs"
+        );
         let over = line(100, 1.5);
-        assert!(over.starts_with("overconfident: errors 1.50 times sigma in "), "{over}");
+        assert!(
+            over.starts_with("overconfident: errors 1.50 times sigma in "),
+            "{over}"
+        );
         assert!(over.contains("at the end of outage 300.12–390 s"), "{over}");
-        assert!(line(100, 0.5).starts_with("underconfident: errors 0.500"), "{}", line(100, 0.5));
-        assert!(line(100, 12.0).starts_with("overconfident by far: "), "{}", line(100, 12.0));
+        assert!(
+            line(100, 0.5).starts_with("underconfident: errors 0.500"),
+            "{}",
+            line(100, 0.5)
+        );
+        assert!(
+            line(100, 12.0).starts_with("overconfident by far: "),
+            "{}",
+            line(100, 12.0)
+        );
         let few = line(8, 1.0);
-        assert!(few.starts_with("undecided: 8 runs miss") && few.ends_with(" would decide"), "{few}");
+        assert!(
+            few.starts_with("undecided: 8 runs miss") && few.ends_with(" would decide"),
+            "{few}"
+        );
     }
 
     /// The word of covariance analysis stands beside the verdict; what the runs contradict comes first.
@@ -168,8 +236,16 @@ mod tests {
         let mut found = summary(8, 1.0);
         found.verdict.by_covariance_analysis = Some(VerdictKind::Overconfident);
         let lines = verdict_lines(&found);
-        assert!(lines.join("\n").ends_with("by covariance analysis overconfident"), "{lines:?}");
+        assert!(
+            lines
+                .join("\n")
+                .ends_with("by covariance analysis overconfident"),
+            "{lines:?}"
+        );
         found.is_contradicted = true;
-        assert!(verdict_lines(&found)[0].starts_with("undecided in the runs, overconfident by"), "{lines:?}");
+        assert!(
+            verdict_lines(&found)[0].starts_with("undecided in the runs, overconfident by"),
+            "{lines:?}"
+        );
     }
 }

@@ -1,11 +1,13 @@
 //! A given IMU against its limits.
 
 use super::question::{
-    BeyondLinear, CHECKED, CURVE_S, DRIFT, DriftCurve, LONGEST_S, Question, drift_chart, points, points_json,
-    quantity_in_words, value,
+    BeyondLinear, CHECKED, CURVE_S, DRIFT, DriftCurve, LONGEST_S, Question, drift_chart, points,
+    points_json, quantity_in_words, value,
 };
 use crate::report::Answer;
-use nav_sim_document::{Cell, Colour, Document, Mark, Series, Table, Tone, percent, readable, seconds};
+use nav_sim_document::{
+    Cell, Colour, Document, Mark, Series, Table, Tone, percent, readable, seconds,
+};
 use nav_sim_navigation::require::{Limit, Margins, PartMargin, Worst};
 use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
@@ -43,7 +45,9 @@ impl Longest {
 
     fn in_words(self) -> String {
         match self {
-            Self::AtLeast(s) if s < LONGEST_S => format!("{}, to the end of the trajectory", self.in_short()),
+            Self::AtLeast(s) if s < LONGEST_S => {
+                format!("{}, to the end of the trajectory", self.in_short())
+            }
             Self::AtLeast(_) => format!("{}, longer ones are not looked at", self.in_short()),
             Self::Never(worst) => {
                 let (name, value) = (worst.limit.quantity.name(), readable(worst.value));
@@ -59,7 +63,8 @@ impl Longest {
             Self::AtLeast(s) => json!({ "at_least_s": s }),
             Self::Never(worst) => {
                 let (quantity, most) = (worst.limit.quantity.name(), worst.limit.most);
-                let with_all_fixes = json!({ "quantity": quantity, "value": worst.value, "limit": most });
+                let with_all_fixes =
+                    json!({ "quantity": quantity, "value": worst.value, "limit": most });
                 json!({ "longest_s": 0.0, "with_all_fixes": with_all_fixes })
             }
         }
@@ -95,17 +100,38 @@ pub(super) struct Aided {
 impl GivenImu {
     /// A row for each aiding.
     fn aiding_table(&self) -> Table {
-        let mut table =
-            Table::new(["aiding", "error after the outage", "limit", "longest outage within the limits"]);
-        for (i, Aided { name, worst, longest }) in self.aidings.iter().enumerate() {
+        let mut table = Table::new([
+            "aiding",
+            "error after the outage",
+            "limit",
+            "longest outage within the limits",
+        ]);
+        for (
+            i,
+            Aided {
+                name,
+                worst,
+                longest,
+            },
+        ) in self.aidings.iter().enumerate()
+        {
             let error = match worst {
                 Some(worst) => Cell::number(worst.value, &format!("/aidings/{i}/value")),
                 None => Cell::figures("–"),
             };
             let limit = worst.as_ref().map_or(String::new(), |worst| {
-                format!("{} ≤ {}", worst.limit.quantity.name(), readable(worst.limit.most))
+                format!(
+                    "{} ≤ {}",
+                    worst.limit.quantity.name(),
+                    readable(worst.limit.most)
+                )
             });
-            table.row([(*name).into(), error, Cell::figures(limit), Cell::figures(longest.in_short())]);
+            table.row([
+                (*name).into(),
+                error,
+                Cell::figures(limit),
+                Cell::figures(longest.in_short()),
+            ]);
         }
         table
     }
@@ -114,12 +140,17 @@ impl GivenImu {
         let (question, longest) = (&self.question, self.longest.in_words());
         let Some(margins) = &self.margins else {
             let (limits, starts) = (question.limits_in_words(), question.starts());
-            return vec![format!("longest outage within {limits}: {longest} ({starts})")];
+            return vec![format!(
+                "longest outage within {limits}: {longest} ({starts})"
+            )];
         };
         let word = if margins.met() { "met" } else { "NOT met" };
         let times = readable(margins.worst.value / margins.worst.limit.most);
         let mut lines = vec![
-            format!("{word}: {}, {times} times the limit", question.worst(&margins.worst)),
+            format!(
+                "{word}: {}, {times} times the limit",
+                question.worst(&margins.worst)
+            ),
             format!("asked: {}", question.in_words()),
             format!("longest outage within the limits, from the same starts: {longest}"),
         ];
@@ -136,15 +167,26 @@ impl GivenImu {
             true => format!("an IMU without errors would leave {name} {without}"),
             false => format!("no IMU keeps the limit: GNSS and start alone leave {name} {without}"),
         };
-        Some(format!("{} decides ({}); {better}", binding.part.name(), percent(binding.share)))
+        Some(format!(
+            "{} decides ({}); {better}",
+            binding.part.name(),
+            percent(binding.share)
+        ))
     }
 
     fn parts(margins: &Margins) -> Table {
-        let mut table =
-            Table::new(["part of the error", "share", "factor on its sigma that alone meets the limit"]);
+        let mut table = Table::new([
+            "part of the error",
+            "share",
+            "factor on its sigma that alone meets the limit",
+        ]);
         let binding = margins.binding().map(|binding| binding.part);
         for (i, p) in margins.parts.iter().enumerate() {
-            let mark = if Some(p.part) == binding { " (binding)" } else { "" };
+            let mark = if Some(p.part) == binding {
+                " (binding)"
+            } else {
+                ""
+            };
             let factor = match p.factor {
                 Some(factor) => Cell::number(factor, &format!("/parts/{i}/factor")),
                 None if !p.part.is_of_imu() => Cell::figures(""),
@@ -161,11 +203,16 @@ impl GivenImu {
     }
 
     fn drift_table(&self) -> Table {
-        let names = self.question.limits.iter().map(|l| quantity_in_words(l.quantity).to_owned());
+        let names = self
+            .question
+            .limits
+            .iter()
+            .map(|l| quantity_in_words(l.quantity).to_owned());
         let mut table = Table::new(["outage (s)"]).and(names);
         for (k, length_s) in CURVE_S.iter().enumerate() {
-            let cell =
-                |(i, curve): (usize, &DriftCurve)| value(curve[k], &format!("/curves/{i}/points/{k}/value"));
+            let cell = |(i, curve): (usize, &DriftCurve)| {
+                value(curve[k], &format!("/curves/{i}/points/{k}/value"))
+            };
             let first = Cell::figures(length_s.to_string());
             table.row(std::iter::once(first).chain(self.curves.iter().enumerate().map(cell)));
         }
@@ -179,7 +226,11 @@ impl Answer for GivenImu {
             Some(margins) => margins.met(),
             None => self.longest.length_s() > 0.0,
         };
-        let mut document = Document::new("An IMU against its limits", Tone::from(is_good), self.verdict());
+        let mut document = Document::new(
+            "An IMU against its limits",
+            Tone::from(is_good),
+            self.verdict(),
+        );
         BeyondLinear::note(self.beyond_linear.as_ref(), &mut document);
         if !self.aidings.is_empty() {
             document.section("What the car knows of its own motion");
@@ -212,7 +263,11 @@ impl Serialize for GivenImu {
             "beyond_linear": self.beyond_linear,
         });
         if !self.aidings.is_empty() {
-            let aided = |Aided { name, worst, longest }: &Aided| {
+            let aided = |Aided {
+                             name,
+                             worst,
+                             longest,
+                         }: &Aided| {
                 json!({
                     "aiding": name,
                     "quantity": worst.map(|w| w.limit.quantity.name()),
@@ -223,8 +278,7 @@ impl Serialize for GivenImu {
             file["aidings"] = self.aidings.iter().map(aided).collect();
         }
         if let Some(margins) = &self.margins {
-            let part =
-                |p: &PartMargin| json!({ "part": p.part.name(), "share": p.share, "factor": p.factor });
+            let part = |p: &PartMargin| json!({ "part": p.part.name(), "share": p.share, "factor": p.factor });
             let without = &margins.without_imu;
             file["met"] = json!(margins.met());
             file["quantity"] = json!(margins.worst.limit.quantity.name());

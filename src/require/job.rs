@@ -9,8 +9,8 @@ use crate::run::turn_on;
 use nav_sim_navigation::ekf::BeliefError;
 use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{
-    Answer, Course, Drift, IMU_PARAMETERS, ImuParameters, Limit, Margins, Need, Quantity, RequireError,
-    Worst, evenly,
+    Answer, Course, Drift, IMU_PARAMETERS, ImuParameters, Limit, Margins, Need, Quantity,
+    RequireError, Worst, evenly,
 };
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::aiding::AidingSettings;
@@ -99,11 +99,25 @@ impl Requirements {
         let (lasts_s, length_s) = (span_s.1 - span_s.0, ask.length_s());
         let settled_s = span_s.0 + SETTLED_S.min(0.5 * (lasts_s - length_s)).max(0.0);
         let first_s = first_s.unwrap_or(settled_s);
-        let begins_s = if let Ask::Window(outage) = ask { outage.start_s } else { first_s };
+        let begins_s = if let Ask::Window(outage) = ask {
+            outage.start_s
+        } else {
+            first_s
+        };
         if begins_s < span_s.0 || begins_s + length_s > span_s.1 {
-            return Err(Misplaced { length_s, begins_s, span_s });
+            return Err(Misplaced {
+                length_s,
+                begins_s,
+                span_s,
+            });
         }
-        Ok(Self { scenario, trajectory, limits, ask, first_s })
+        Ok(Self {
+            scenario,
+            trajectory,
+            limits,
+            ask,
+            first_s,
+        })
     }
 
     /// The IMU that is needed, and a curve of equal drift if wished.
@@ -114,7 +128,12 @@ impl Requirements {
         let outages = self.outages();
         let course = self.course(&outages)?;
         let scenario = &self.with_stated_turn_on();
-        let need = Need { course: &course, scenario, limits: &self.limits, t_corr_s: CORRELATION_TIME_S };
+        let need = Need {
+            course: &course,
+            scenario,
+            limits: &self.limits,
+            t_corr_s: CORRELATION_TIME_S,
+        };
         let (imu, shares) = need.allocated()?;
         let model = imu.model(self.scenario.imu.rate_hz);
         let ends = course.drifts(scenario, &model)?;
@@ -148,8 +167,16 @@ impl Requirements {
     }
 
     fn stated_turn_on(&self) -> TurnOn {
-        let sigma = |sensor| self.scenario.imu.turn_on_bias(sensor).map(|sigma| [sigma; 3]);
-        TurnOn { accel_m_s2: sigma(Sensor::Accel), gyro_rad_s: sigma(Sensor::Gyro) }
+        let sigma = |sensor| {
+            self.scenario
+                .imu
+                .turn_on_bias(sensor)
+                .map(|sigma| [sigma; 3])
+        };
+        TurnOn {
+            accel_m_s2: sigma(Sensor::Accel),
+            gyro_rad_s: sigma(Sensor::Gyro),
+        }
     }
 
     /// What a model makes of the limits, and the longest outage that it bridges within them: at the places that the outage
@@ -157,7 +184,11 @@ impl Requirements {
     ///
     /// # Errors
     /// When the model has no filter.
-    pub(crate) fn judged(&self, scenario: &Scenario, model: &Model) -> Result<GivenImu, RequireError> {
+    pub(crate) fn judged(
+        &self,
+        scenario: &Scenario,
+        model: &Model,
+    ) -> Result<GivenImu, RequireError> {
         let long = self.long_outages();
         let course = self.course(&long)?;
         let curves = course.curves(scenario, model)?;
@@ -167,8 +198,10 @@ impl Requirements {
         let (margins, outages, judged) = if self.ask == Ask::Longest {
             let length_s = longest.length_s();
             let worst = Worst::of(&self.limits, &after(&curves, length_s));
-            let judged = worst
-                .map(|worst| Outage { end_s: long[worst.place].start_s + length_s, ..long[worst.place] });
+            let judged = worst.map(|worst| Outage {
+                end_s: long[worst.place].start_s + length_s,
+                ..long[worst.place]
+            });
             (None, long, judged)
         } else {
             let outages = self.outages();
@@ -194,20 +227,35 @@ impl Requirements {
     ///
     /// # Errors
     /// When the model has no filter.
-    pub(super) fn aidings(&self, scenario: &Scenario, model: &Model) -> Result<Vec<Aided>, RequireError> {
+    pub(super) fn aidings(
+        &self,
+        scenario: &Scenario,
+        model: &Model,
+    ) -> Result<Vec<Aided>, RequireError> {
         let all = [
             ("none", AidingSettings::default()),
             ("nhc", AidingSettings::car()),
             ("nhc, odometer", AidingSettings::car_with_odometer()),
         ];
         let aided = |(name, aiding): (&'static str, AidingSettings)| {
-            let scenario = Scenario { aiding, ..scenario.clone() };
+            let scenario = Scenario {
+                aiding,
+                ..scenario.clone()
+            };
             let long = self.long_outages();
             let course = Course::new(&scenario, &self.trajectory, &long)?;
             let curves = course.curves(&scenario, model)?;
             let longest = self.longest_of(&course, (&scenario, model), &curves)?;
-            let length_s = if self.ask == Ask::Longest { longest.length_s() } else { self.ask.length_s() };
-            Ok(Aided { name, worst: Worst::of(&self.limits, &after(&curves, length_s)), longest })
+            let length_s = if self.ask == Ask::Longest {
+                longest.length_s()
+            } else {
+                self.ask.length_s()
+            };
+            Ok(Aided {
+                name,
+                worst: Worst::of(&self.limits, &after(&curves, length_s)),
+                longest,
+            })
         };
         all.into_par_iter().map(aided).collect()
     }
@@ -223,8 +271,11 @@ impl Requirements {
         let (scenario, outages) = (scenario.with_full_noise(), [outage]);
         let track = scenario.track(&self.trajectory, model, &outages)?;
         let belief = scenario.belief(model, &outages, &track)?;
-        let experiment = scenario.experiment(&self.trajectory, Truth::Model(model), &[], &outages, 0);
-        let Some(expected) = Expected::along(&track, &experiment, &belief, model) else { return Ok(None) };
+        let experiment =
+            scenario.experiment(&self.trajectory, Truth::Model(model), &[], &outages, 0);
+        let Some(expected) = Expected::along(&track, &experiment, &belief, model) else {
+            return Ok(None);
+        };
         Ok(expected.outages.first().and_then(BeyondLinear::of))
     }
 
@@ -236,8 +287,12 @@ impl Requirements {
     pub(crate) fn ranked(&self, units: &[CatalogueUnit]) -> Result<Ranking, RequireError> {
         let outages = self.long_outages();
         let course = self.course(&outages)?;
-        let named = |name: &str, e| RequireError::Unit { name: name.to_owned(), source: Box::new(e) };
-        let ranked = |unit: &CatalogueUnit| self.rank(&course, unit).map_err(|e| named(&unit.name, e));
+        let named = |name: &str, e| RequireError::Unit {
+            name: name.to_owned(),
+            source: Box::new(e),
+        };
+        let ranked =
+            |unit: &CatalogueUnit| self.rank(&course, unit).map_err(|e| named(&unit.name, e));
         let ranked: Vec<Result<RankedUnit, RequireError>> = units.par_iter().map(ranked).collect();
         let mut units = ranked.into_iter().collect::<Result<Vec<_>, _>>()?;
         units.sort_by(|a, b| match (a.is_complete(), b.is_complete()) {
@@ -245,7 +300,10 @@ impl Requirements {
             (false, false) => a.name.cmp(&b.name),
             (a, b) => b.cmp(&a),
         });
-        Ok(Ranking { units, question: self.question(self.outages()) })
+        Ok(Ranking {
+            units,
+            question: self.question(self.outages()),
+        })
     }
 
     fn rank(&self, course: &Course<'_>, unit: &CatalogueUnit) -> Result<RankedUnit, RequireError> {
@@ -259,7 +317,11 @@ impl Requirements {
             worst,
             curve: CURVE_S.map(|s| worst_after(&curves, s, self.limits[0].quantity)),
             longest: self.longest_of(course, (&unit.scenario, &unit.model), &curves)?,
-            beyond_linear: self.beyond_linear(&unit.scenario, &unit.model, self.outages()[worst.place])?,
+            beyond_linear: self.beyond_linear(
+                &unit.scenario,
+                &unit.model,
+                self.outages()[worst.place],
+            )?,
         })
     }
 
@@ -273,12 +335,16 @@ impl Requirements {
         let first = curves.first().map_or(&[][..], Vec::as_slice);
         let lengths: Vec<f64> = first.iter().map(|d| d.after_s).collect();
         let is_missed = |length_s: &f64| {
-            after(curves, *length_s).iter().any(|drift| self.limits.iter().any(|l| drift.exceeds(l)))
+            after(curves, *length_s)
+                .iter()
+                .any(|drift| self.limits.iter().any(|l| drift.exceeds(l)))
         };
         Ok(match lengths.iter().position(is_missed) {
             Some(0) => {
                 let worst = Worst::of(&self.limits, &course.with_all_fixes(scenario, model)?);
-                worst.filter(|worst| worst.margin() < 0.0).map_or(Longest::Seconds(0.0), Longest::Never)
+                worst
+                    .filter(|worst| worst.margin() < 0.0)
+                    .map_or(Longest::Seconds(0.0), Longest::Never)
             }
             Some(first) => Longest::Seconds(lengths[first - 1]),
             None => Longest::AtLeast(lengths.last().copied().unwrap_or(0.0)),
@@ -292,7 +358,12 @@ impl Requirements {
         let stated = file.turn_on.unwrap_or_default();
         turn_on::expect(&mut scenario.initial, &stated);
         turn_on::make(&mut scenario.imu, &stated);
-        CatalogueUnit { name, model, scenario, not_stated: file.not_stated() }
+        CatalogueUnit {
+            name,
+            model,
+            scenario,
+            not_stated: file.not_stated(),
+        }
     }
 
     /// The model file of an IMU that is needed.
@@ -312,7 +383,11 @@ impl Requirements {
         let stated = self.stated_turn_on();
         let turn_on = (stated != TurnOn::default()).then_some(stated);
         let model = imu.model(self.scenario.imu.rate_hz);
-        ModelFile { provenance: Some(provenance), turn_on, ..ModelFile::new(model) }
+        ModelFile {
+            provenance: Some(provenance),
+            turn_on,
+            ..ModelFile::new(model)
+        }
     }
 
     /// The places of the outage; those of one second where the longest is sought.
@@ -335,7 +410,10 @@ impl Requirements {
     fn long_outages(&self) -> Vec<Outage> {
         let end_s = self.trajectory.end_s();
         // The same places whatever is made of them: a unit is judged alike alone and in a ranking.
-        let lasting = |o: Outage| Outage { end_s: end_s.min(o.start_s + LONGEST_S).max(o.end_s), ..o };
+        let lasting = |o: Outage| Outage {
+            end_s: end_s.min(o.start_s + LONGEST_S).max(o.end_s),
+            ..o
+        };
         let places = match self.ask {
             // Where the longest is sought every length is, at all places that leave room for it.
             Ask::Longest => self.places(self.ask.length_s(), self.mean_length_s()),
@@ -357,7 +435,10 @@ impl Requirements {
     }
 
     fn question(&self, outages: Vec<Outage>) -> Question {
-        Question { limits: self.limits.clone(), outages }
+        Question {
+            limits: self.limits.clone(),
+            outages,
+        }
     }
 }
 
@@ -380,7 +461,10 @@ fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
     const SAME_S: f64 = 1e-3;
     let drift_of_curve = |curve: &Vec<Drift>| {
         let first = curve.partition_point(|d| d.after_s < length_s - SAME_S);
-        curve.get(first).filter(|d| d.after_s < length_s + SAME_S).copied()
+        curve
+            .get(first)
+            .filter(|d| d.after_s < length_s + SAME_S)
+            .copied()
     };
     curves.iter().filter_map(drift_of_curve).collect()
 }

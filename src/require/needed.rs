@@ -5,7 +5,9 @@ use crate::report::Answer;
 use nav_sim_document::{
     Axis, Cell, Chart, Colour, Document, Importance, Panel, Series, Table, Tone, percent, readable,
 };
-use nav_sim_navigation::require::{Answer as Bound, IMU_PARAMETERS, ImuParameters, IsoDrift, Worst};
+use nav_sim_navigation::require::{
+    Answer as Bound, IMU_PARAMETERS, ImuParameters, IsoDrift, Worst,
+};
 use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
 
@@ -43,8 +45,13 @@ impl NeededImu {
     }
 
     fn figures(&self) -> Table {
-        let mut table =
-            Table::new(["figure", "at most, equal shares", "share", "if alone", "others 10 × better"]);
+        let mut table = Table::new([
+            "figure",
+            "at most, equal shares",
+            "share",
+            "if alone",
+            "others 10 × better",
+        ]);
         for i in 0..IMU_PARAMETERS {
             let pointer = |key: &str| format!("/figures/{i}/{key}");
             table.row([
@@ -52,7 +59,11 @@ impl NeededImu {
                 bound(i, &Bound::AtMost(self.imu.values[i]), &pointer("allocated")),
                 Cell::share(self.shares[i], &pointer("share")),
                 bound(i, &self.alone[i], &pointer("alone")),
-                bound(i, &self.others_better[i], &pointer("others_10_times_better")),
+                bound(
+                    i,
+                    &self.others_better[i],
+                    &pointer("others_10_times_better"),
+                ),
             ]);
         }
         let of_gnss = Cell::share(self.shares[IMU_PARAMETERS], "/share_of_gnss_and_start");
@@ -84,7 +95,11 @@ impl NeededImu {
         }
         let series = Series::dotted_line("limit kept exactly", Colour::REAL, line).into();
         let panel = Panel::new(Axis::log(ImuParameters::NAMES[0]), series);
-        let chart = Chart::new("IMUs of equal drift", Axis::log(ImuParameters::NAMES[3]), vec![panel]);
+        let chart = Chart::new(
+            "IMUs of equal drift",
+            Axis::log(ImuParameters::NAMES[3]),
+            vec![panel],
+        );
         document.section("Equal drift");
         document.text(&held);
         document.table(&table);
@@ -101,7 +116,10 @@ impl Answer for NeededImu {
         let lines = [
             format!("needed for {}", self.question.in_words()),
             format!("an IMU {}", self.turn_on_in_words()),
-            format!("hardest: {}, where GNSS and start take {gnss}", self.question.worst(&self.worst)),
+            format!(
+                "hardest: {}, where GNSS and start take {gnss}",
+                self.question.worst(&self.worst)
+            ),
         ];
         let mut document = Document::new("The IMU that a limit needs", Tone::Good, lines);
         BeyondLinear::note(self.beyond_linear.as_ref(), &mut document);

@@ -1,6 +1,8 @@
 //! Limits, the places of an outage, and what all answers share: curves of drift, doubts.
 
-use nav_sim_document::{Axis, Cell, Chart, Document, Importance, Panel, Series, readable, seconds, window};
+use nav_sim_document::{
+    Axis, Cell, Chart, Document, Importance, Panel, Series, readable, seconds, window,
+};
 use nav_sim_navigation::metrics::OutageMetrics;
 use nav_sim_navigation::require::{Limit, Quantity, Worst};
 use nav_sim_navigation::sensors::outage::Outage;
@@ -32,14 +34,20 @@ pub(crate) struct BeyondLinear {
 impl BeyondLinear {
     /// None where linear theory covers the outage.
     pub(super) fn of(outage: &OutageMetrics) -> Option<Self> {
-        outage.beyond_linear.then_some(Self { start_s: outage.start_s, end_s: outage.end_s })
+        outage.beyond_linear.then_some(Self {
+            start_s: outage.start_s,
+            end_s: outage.end_s,
+        })
     }
 
     /// Warns of it.
     pub(super) fn note(beyond: Option<&Self>, document: &mut Document) {
         if let Some(Self { start_s, end_s }) = beyond {
             let place = window(*start_s, *end_s);
-            document.note(Importance::Warning, format!("beyond linear theory in outage {place}: {CONFIRM}"));
+            document.note(
+                Importance::Warning,
+                format!("beyond linear theory in outage {place}: {CONFIRM}"),
+            );
         }
     }
 }
@@ -51,7 +59,10 @@ pub(super) fn warn_of_units(names: &[&str], document: &mut Document) {
         1..=3 => names.join(", "),
         more => format!("{more} units"),
     };
-    document.note(Importance::Warning, format!("beyond linear theory: {units}: {CONFIRM}"));
+    document.note(
+        Importance::Warning,
+        format!("beyond linear theory: {units}: {CONFIRM}"),
+    );
 }
 
 /// What was asked, and where.
@@ -67,16 +78,30 @@ impl Question {
     /// `p95_m ≤ 5 after an outage of 60 s (the worst of 541 starts tried, 300 to 840 s)`
     pub(super) fn in_words(&self) -> String {
         let first = self.outages[0];
-        let worst = if self.outages.len() > 1 { "the worst of " } else { "" };
+        let worst = if self.outages.len() > 1 {
+            "the worst of "
+        } else {
+            ""
+        };
         let length = seconds(first.end_s - first.start_s);
-        format!("{} after an outage of {length} s ({worst}{})", self.limits_in_words(), self.starts())
+        format!(
+            "{} after an outage of {length} s ({worst}{})",
+            self.limits_in_words(),
+            self.starts()
+        )
     }
 
     /// Places where the outage was tried: `541 starts tried, 300 to 840 s`, or `from 300 s on`.
     pub(super) fn starts(&self) -> String {
-        let [first, last] = [self.outages.first(), self.outages.last()].map(|o| o.map_or(0.0, |o| o.start_s));
+        let [first, last] =
+            [self.outages.first(), self.outages.last()].map(|o| o.map_or(0.0, |o| o.start_s));
         if last > first {
-            format!("{} starts tried, {} to {} s", self.outages.len(), seconds(first), seconds(last))
+            format!(
+                "{} starts tried, {} to {} s",
+                self.outages.len(),
+                seconds(first),
+                seconds(last)
+            )
         } else {
             format!("from {} s on", seconds(first))
         }
@@ -105,7 +130,11 @@ impl Question {
     pub(super) fn worst(&self, worst: &Worst) -> String {
         let outage = self.outages.get(worst.place).unwrap_or(&self.outages[0]);
         let place = window(outage.start_s, outage.end_s);
-        format!("{} {} at the end of outage {place}", worst.limit.quantity.name(), readable(worst.value))
+        format!(
+            "{} {} at the end of outage {place}",
+            worst.limit.quantity.name(),
+            readable(worst.value)
+        )
     }
 }
 
@@ -122,16 +151,31 @@ pub(super) const fn quantity_in_words(quantity: Quantity) -> &'static str {
 }
 
 pub(super) fn points_json(curve: &DriftCurve) -> Vec<Value> {
-    CURVE_S.iter().zip(curve).map(|(s, x)| json!({ "outage_s": s, "value": x })).collect()
+    CURVE_S
+        .iter()
+        .zip(curve)
+        .map(|(s, x)| json!({ "outage_s": s, "value": x }))
+        .collect()
 }
 
 pub(super) fn drift_chart(quantity: Quantity, series: Vec<Series>) -> Chart {
-    let panel = Panel { height: 1.3, ..Panel::new(Axis::log(quantity_in_words(quantity)), series) };
-    Chart::new("Drift without fixes", Axis::log("length of the outage (s)"), vec![panel])
+    let panel = Panel {
+        height: 1.3,
+        ..Panel::new(Axis::log(quantity_in_words(quantity)), series)
+    };
+    Chart::new(
+        "Drift without fixes",
+        Axis::log("length of the outage (s)"),
+        vec![panel],
+    )
 }
 
 pub(super) fn points(curve: &DriftCurve) -> Vec<(f64, f64)> {
-    CURVE_S.iter().zip(curve).map(|(s, x)| (f64::from(*s), x.unwrap_or(f64::NAN))).collect()
+    CURVE_S
+        .iter()
+        .zip(curve)
+        .map(|(s, x)| (f64::from(*s), x.unwrap_or(f64::NAN)))
+        .collect()
 }
 
 pub(super) fn value(x: Option<f64>, pointer: &str) -> Cell {

@@ -64,11 +64,19 @@ impl Ranking {
     }
 
     fn verdict(&self) -> Vec<String> {
-        let met: Vec<&str> = self.units.iter().filter(|u| u.is_met()).map(|u| u.name.as_str()).collect();
+        let met: Vec<&str> = self
+            .units
+            .iter()
+            .filter(|u| u.is_met())
+            .map(|u| u.name.as_str())
+            .collect();
         let asked = self.question.in_words();
         let answer = match met.as_slice() {
             [] => "no unit keeps the limit by figures that are all stated".to_owned(),
-            [best, ..] => format!("{best} is the best of {} units that keep the limit", met.len()),
+            [best, ..] => format!(
+                "{best} is the best of {} units that keep the limit",
+                met.len()
+            ),
         };
         let mut lines = vec![answer, format!("asked: {asked}")];
         let missing = self.incomplete().len();
@@ -90,10 +98,19 @@ impl Ranking {
                 true => "open",
                 false => "not met",
             };
-            let cell =
-                |(k, x): (usize, &Option<f64>)| value(*x, &format!("/units/{}/curve/{k}/value", first + i));
-            let begin = [unit.name.clone().into(), limit.into(), Cell::figures(unit.longest.in_short())];
-            table.row(begin.into_iter().chain(unit.curve.iter().enumerate().map(cell)));
+            let cell = |(k, x): (usize, &Option<f64>)| {
+                value(*x, &format!("/units/{}/curve/{k}/value", first + i))
+            };
+            let begin = [
+                unit.name.clone().into(),
+                limit.into(),
+                Cell::figures(unit.longest.in_short()),
+            ];
+            table.row(
+                begin
+                    .into_iter()
+                    .chain(unit.curve.iter().enumerate().map(cell)),
+            );
         }
         table
     }
@@ -101,7 +118,10 @@ impl Ranking {
     fn missing(&self) -> Table {
         let mut table = Table::new(["unit", "not stated"]);
         for unit in self.incomplete() {
-            table.row([unit.name.clone().into(), stated_in_words(&unit.not_stated).into()]);
+            table.row([
+                unit.name.clone().into(),
+                stated_in_words(&unit.not_stated).into(),
+            ]);
         }
         table
     }
@@ -113,16 +133,30 @@ impl Ranking {
             true => Series::line(&unit.name, Colour::Hue(k), points(&unit.curve)),
             false => Series::thin("others", Colour::Soft, points(&unit.curve)),
         };
-        let limit = Series::new("limit", Colour::Ink, Mark::Level(self.question.limits[0].most));
+        let limit = Series::new(
+            "limit",
+            Colour::Ink,
+            Mark::Level(self.question.limits[0].most),
+        );
         // what stands behind is drawn first
-        std::iter::once(limit).chain(self.units.iter().enumerate().rev().map(curve)).collect()
+        std::iter::once(limit)
+            .chain(self.units.iter().enumerate().rev().map(curve))
+            .collect()
     }
 }
 
 impl Answer for Ranking {
     fn document(&self) -> Document {
-        let mut document = Document::new("IMUs against a limit", Tone::from(self.is_met()), self.verdict());
-        let beyond = self.units.iter().filter(|u| u.beyond_linear.is_some()).map(|u| u.name.as_str());
+        let mut document = Document::new(
+            "IMUs against a limit",
+            Tone::from(self.is_met()),
+            self.verdict(),
+        );
+        let beyond = self
+            .units
+            .iter()
+            .filter(|u| u.beyond_linear.is_some())
+            .map(|u| u.name.as_str());
         warn_of_units(&beyond.collect::<Vec<_>>(), &mut document);
         let quantity = quantity_in_words(self.question.curve_of());
         let columns = format!(

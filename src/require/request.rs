@@ -127,11 +127,18 @@ impl FromStr for LimitFlag {
     fn from_str(text: &str) -> Result<Self, String> {
         let limit = || {
             let (name, most) = text.split_once("<=").or_else(|| text.split_once('<'))?;
-            let quantity = Quantity::ALL.into_iter().find(|quantity| quantity.name() == name.trim())?;
-            Some(Self(Limit { quantity, most: parse::positive(most.trim()).ok()? }))
+            let quantity = Quantity::ALL
+                .into_iter()
+                .find(|quantity| quantity.name() == name.trim())?;
+            Some(Self(Limit {
+                quantity,
+                most: parse::positive(most.trim()).ok()?,
+            }))
         };
         let names = Quantity::ALL.map(Quantity::name).join(", ");
-        limit().ok_or_else(|| format!("expected NAME<=LIMIT with a positive limit, NAME one of {names}"))
+        limit().ok_or_else(|| {
+            format!("expected NAME<=LIMIT with a positive limit, NAME one of {names}")
+        })
     }
 }
 
@@ -153,9 +160,10 @@ impl FromStr for Ask {
     fn from_str(text: &str) -> Result<Self, String> {
         match text {
             "longest" => Ok(Self::Longest),
-            window if window.contains(':') => {
-                window.parse().map(Self::Window).map_err(|e: NotAnOutage| e.to_string())
-            }
+            window if window.contains(':') => window
+                .parse()
+                .map(Self::Window)
+                .map_err(|e: NotAnOutage| e.to_string()),
             length => parse::positive(length)
                 .map(Self::Length)
                 .map_err(|_| "expected a length in seconds, START:END or longest".to_owned()),
@@ -191,7 +199,11 @@ impl FromStr for Catalogue {
     type Err = std::convert::Infallible;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Ok(if text == Self::BUILT_IN { Self::BuiltIn } else { Self::Directory(text.into()) })
+        Ok(if text == Self::BUILT_IN {
+            Self::BuiltIn
+        } else {
+            Self::Directory(text.into())
+        })
     }
 }
 
@@ -226,7 +238,10 @@ impl Found {
                 let margins = judged.margins.as_ref().filter(|margins| !margins.met())?;
                 let Worst { limit, value, .. } = margins.worst;
                 let [value, most] = [value, limit.most].map(|x| limit.quantity.shown(x));
-                Some(Failure::bound(format!("{} is {value}, the limit is {most}", limit.quantity.name())))
+                Some(Failure::bound(format!(
+                    "{} is {value}, the limit is {most}",
+                    limit.quantity.name()
+                )))
             }
             Self::Ranked(ranking) => (!ranking.is_met())
                 .then(|| Failure::bound("no unit keeps the limits by figures that are all stated")),
@@ -259,16 +274,27 @@ impl RequireRequest {
     /// What is wrong with a file or a setting, or that no IMU keeps the limits.
     pub fn answer(&self, notes: &dyn Observer<Note>) -> Result<Answered, Failure> {
         let (found, needed) = self.found(notes)?;
-        let files =
-            needed.map(|file| ("needed.toml".to_owned(), model_file::to_toml(&file))).into_iter().collect();
-        Ok(Answered { files, unmet: found.unmet(), ..Answered::of(&found) })
+        let files = needed
+            .map(|file| ("needed.toml".to_owned(), model_file::to_toml(&file)))
+            .into_iter()
+            .collect();
+        Ok(Answered {
+            files,
+            unmet: found.unmet(),
+            ..Answered::of(&found)
+        })
     }
 
     /// Refuses what contradicts itself.
     pub(crate) fn possible(&self) -> Result<(), Failure> {
         if let (Ask::Window(outage), Some(start_s)) = (self.outage, self.start) {
-            let message = format!("--start {start_s} beside --outage {}:{}", outage.start_s, outage.end_s);
-            return Err(Failure::input(message).hint("an outage of a length alone has an earliest start"));
+            let message = format!(
+                "--start {start_s} beside --outage {}:{}",
+                outage.start_s, outage.end_s
+            );
+            return Err(
+                Failure::input(message).hint("an outage of a length alone has an earliest start")
+            );
         }
         if self.model.is_none() && self.outage == Ask::Longest {
             return Err(Failure::input("--outage longest needs a MODEL")
@@ -279,9 +305,23 @@ impl RequireRequest {
 
     /// The limits that are given; at least one.
     fn limits(&self) -> Result<Vec<Limit>, Failure> {
-        let OldLimits { p95_m, p50_m, rmse_m, roll_deg, pitch_deg, yaw_deg } = self.old;
-        let old = Quantity::ALL.into_iter().zip([p95_m, p50_m, rmse_m, roll_deg, pitch_deg, yaw_deg]);
-        let old = old.filter_map(|(quantity, most)| Some(Limit { quantity, most: most? }));
+        let OldLimits {
+            p95_m,
+            p50_m,
+            rmse_m,
+            roll_deg,
+            pitch_deg,
+            yaw_deg,
+        } = self.old;
+        let old = Quantity::ALL
+            .into_iter()
+            .zip([p95_m, p50_m, rmse_m, roll_deg, pitch_deg, yaw_deg]);
+        let old = old.filter_map(|(quantity, most)| {
+            Some(Limit {
+                quantity,
+                most: most?,
+            })
+        });
         let limits: Vec<Limit> = self.limits.iter().map(|limit| limit.0).chain(old).collect();
         if limits.is_empty() {
             let hint = "give one, such as --require 'p95_m<=5' or --require 'yaw_deg<=1'";
@@ -293,24 +333,36 @@ impl RequireRequest {
     /// What is asked, with the files read.
     fn requirements(&self, notes: Notes<'_>) -> Result<Requirements, Failure> {
         let limits = self.limits()?;
-        let mut scenario = self.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
+        let mut scenario = self
+            .scenario
+            .as_deref()
+            .map(scenario_file::read)
+            .transpose()?
+            .unwrap_or_default();
         if let Some(path) = &self.gnss {
             scenario.gnss = scenario_file::read(path)?.gnss;
         }
         if self.vehicle == Some(Vehicle::Car) {
             if !scenario.aiding.is_none() {
                 return Err(
-                    Failure::input("--vehicle car beside [aiding] of --scenario").hint("give one of them")
+                    Failure::input("--vehicle car beside [aiding] of --scenario")
+                        .hint("give one of them"),
                 );
             }
             scenario.aiding = AidingSettings::car();
         }
         scenario.validate().map_err(Failure::input)?;
         let trajectory = read::trajectory(&self.trajectory, notes)?;
-        Requirements::new(scenario, trajectory, limits, self.outage, self.start).map_err(|e: Misplaced| {
-            let earlier = if self.start.is_some() { ", or an earlier --start" } else { "" };
-            Failure::input(e).hint(format!("a shorter --outage{earlier}"))
-        })
+        Requirements::new(scenario, trajectory, limits, self.outage, self.start).map_err(
+            |e: Misplaced| {
+                let earlier = if self.start.is_some() {
+                    ", or an earlier --start"
+                } else {
+                    ""
+                };
+                Failure::input(e).hint(format!("a shorter --outage{earlier}"))
+            },
+        )
     }
 }
 
@@ -339,7 +391,10 @@ fn given(
     read::make_turn_on(&mut scenario.imu, &file, path, notes);
     let not_stated = stated_in_words(&file.not_stated());
     if !not_stated.is_empty() {
-        let text = format!("{}: what is not stated counts as none: {not_stated}", path.display());
+        let text = format!(
+            "{}: what is not stated counts as none: {not_stated}",
+            path.display()
+        );
         notes.remark(&Note::Warning(text));
     }
     let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, notes)?;
@@ -352,7 +407,9 @@ fn given(
 
 /// The units, the best first.
 fn ranked(units: &[CatalogueUnit], requirements: &Requirements) -> Result<Found, Failure> {
-    Ok(Found::Ranked(requirements.ranked(units).map_err(Failure::input)?))
+    Ok(Found::Ranked(
+        requirements.ranked(units).map_err(Failure::input)?,
+    ))
 }
 
 /// The units that are known by name.
@@ -365,21 +422,30 @@ fn catalogue(requirements: &Requirements) -> Result<Vec<CatalogueUnit>, Failure>
 }
 
 /// The model files and catalogue entries of a directory.
-fn units_of(directory: &Path, asked: &Requirements, notes: Notes<'_>) -> Result<Vec<CatalogueUnit>, Failure> {
+fn units_of(
+    directory: &Path,
+    asked: &Requirements,
+    notes: Notes<'_>,
+) -> Result<Vec<CatalogueUnit>, Failure> {
     if !directory.exists() {
-        let message = format!("--catalogue {}: there is no such directory", directory.display());
-        return Err(
-            Failure::input(message).hint("without a directory, --catalogue ranks the catalogued IMUs")
+        let message = format!(
+            "--catalogue {}: there is no such directory",
+            directory.display()
         );
+        return Err(Failure::input(message)
+            .hint("without a directory, --catalogue ranks the catalogued IMUs"));
     }
     let mut paths = listed(&[directory.to_owned()])?;
     paths.retain(|p| p.extension().is_some_and(|e| e == "toml"));
     if paths.is_empty() {
         let message = format!("{}: no model file (.toml)", directory.display());
-        return Err(Failure::input(message).hint("make them with `nav-sim calibrate` or `nav-sim datasheet`"));
+        return Err(Failure::input(message)
+            .hint("make them with `nav-sim calibrate` or `nav-sim datasheet`"));
     }
     let unit = |path: &PathBuf| {
-        let name = path.file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        let name = path
+            .file_stem()
+            .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         if file_kind::of(path)? == FileKind::CatalogueEntry {
             return of_sheet(name, &datasheet::read(path)?, asked);
         }
@@ -390,8 +456,14 @@ fn units_of(directory: &Path, asked: &Requirements, notes: Notes<'_>) -> Result<
     paths.iter().map(unit).collect()
 }
 
-fn of_sheet(name: String, sheet: &Datasheet, requirements: &Requirements) -> Result<CatalogueUnit, Failure> {
+fn of_sheet(
+    name: String,
+    sheet: &Datasheet,
+    requirements: &Requirements,
+) -> Result<CatalogueUnit, Failure> {
     let made = sheet.model_file(requirements.scenario.imu.rate_hz);
-    let file = made.map_err(|e| Failure::input(format!("{name}: {e}")))?.file;
+    let file = made
+        .map_err(|e| Failure::input(format!("{name}: {e}")))?
+        .file;
     Ok(requirements.unit(name, &file, file.model.clone()))
 }

@@ -30,7 +30,11 @@ impl Serialize for RunAnswer {
             throughput_epochs_per_s: f64,
         }
         let throughput_epochs_per_s = self.manifest.throughput_epochs_per_s;
-        WithThroughput { summary: &self.navigation.summary, throughput_epochs_per_s }.serialize(serializer)
+        WithThroughput {
+            summary: &self.navigation.summary,
+            throughput_epochs_per_s,
+        }
+        .serialize(serializer)
     }
 }
 
@@ -41,14 +45,24 @@ impl Answer for RunAnswer {
 }
 
 /// Names of the files of a run directory.
-pub(crate) const RUN_FILES: [&str; 6] =
-    ["epochs.csv", "fan.csv", "runs.csv", "summary.json", "report.html", "manifest.json"];
+pub(crate) const RUN_FILES: [&str; 6] = [
+    "epochs.csv",
+    "fan.csv",
+    "runs.csv",
+    "summary.json",
+    "report.html",
+    "manifest.json",
+];
 
 impl RunAnswer {
     /// From what was found, where it comes from, and the way.
     #[must_use]
     pub const fn new(navigation: Navigation, manifest: Manifest, track: TrajectorySeries) -> Self {
-        Self { navigation, manifest, track }
+        Self {
+            navigation,
+            manifest,
+            track,
+        }
     }
 
     /// Its words, tables and charts: what the terminal shows a part of and the page all.
@@ -59,7 +73,12 @@ impl RunAnswer {
 
     /// The horizontal error, its percentiles and the NEES over time, as SVG.
     pub(crate) fn svg(&self) -> String {
-        let Navigation { epochs, fan, summary, .. } = &self.navigation;
+        let Navigation {
+            epochs,
+            fan,
+            summary,
+            ..
+        } = &self.navigation;
         let shown = [
             charts::horizontal(epochs, summary),
             charts::fan_chart(fan, summary),
@@ -70,7 +89,11 @@ impl RunAnswer {
 
     /// Puts how long the runs took (s) on record.
     pub fn took(&mut self, wall_s: f64) {
-        let epochs = self.navigation.runs.as_ref().map_or(0, |runs| runs.run_epochs) as f64;
+        let epochs = self
+            .navigation
+            .runs
+            .as_ref()
+            .map_or(0, |runs| runs.run_epochs) as f64;
         self.manifest.wall_s = wall_s;
         self.manifest.throughput_epochs_per_s = if wall_s > 0.0 { epochs / wall_s } else { 0.0 };
     }
@@ -90,17 +113,42 @@ impl RunAnswer {
     /// The files of a run directory, the manifest last: where it is, the rest is whole. Without runs (covariance analysis)
     /// there is no table of them.
     pub(super) fn files(&self) -> Vec<OutputFile<'_>> {
-        let [epochs_name, fan_name, runs_name, summary_name, page_name, manifest_name] = RUN_FILES;
-        let Navigation { runs, epochs, fan, .. } = &self.navigation;
-        let texts = [(epochs_name, epochs_csv(epochs)), (fan_name, fan_csv(fan)), (summary_name, json(self))];
+        let [
+            epochs_name,
+            fan_name,
+            runs_name,
+            summary_name,
+            page_name,
+            manifest_name,
+        ] = RUN_FILES;
+        let Navigation {
+            runs, epochs, fan, ..
+        } = &self.navigation;
+        let texts = [
+            (epochs_name, epochs_csv(epochs)),
+            (fan_name, fan_csv(fan)),
+            (summary_name, json(self)),
+        ];
         let hashes = texts.iter().map(|(name, text)| (*name, digest([text])));
-        let runs_hash = runs.as_ref().map(|result| (runs_name, digest(runs_csv(result))));
-        let outputs = hashes.chain(runs_hash).map(|(name, hash)| (name.to_owned(), hash)).collect();
-        let manifest = Manifest { outputs, ..self.manifest.clone() };
-        let mut files: Vec<OutputFile<'_>> =
-            texts.into_iter().map(|(name, text)| OutputFile::whole(name, text)).collect();
-        let table =
-            runs.as_ref().map(|result| OutputFile { name: runs_name, parts: Box::new(runs_csv(result)) });
+        let runs_hash = runs
+            .as_ref()
+            .map(|result| (runs_name, digest(runs_csv(result))));
+        let outputs = hashes
+            .chain(runs_hash)
+            .map(|(name, hash)| (name.to_owned(), hash))
+            .collect();
+        let manifest = Manifest {
+            outputs,
+            ..self.manifest.clone()
+        };
+        let mut files: Vec<OutputFile<'_>> = texts
+            .into_iter()
+            .map(|(name, text)| OutputFile::whole(name, text))
+            .collect();
+        let table = runs.as_ref().map(|result| OutputFile {
+            name: runs_name,
+            parts: Box::new(runs_csv(result)),
+        });
         files.splice(2..2, table);
         files.push(OutputFile::whole(page_name, self.document().html()));
         files.push(OutputFile::whole(manifest_name, json(&manifest)));
@@ -136,19 +184,42 @@ mod tests {
             seed: Some(7),
             configuration: Scenario::default(),
             spread: false,
-            inputs: vec![Input { role: "trajectory".into(), path: "a<b.toml".into(), blake3: "ab".into() }],
+            inputs: vec![Input {
+                role: "trajectory".into(),
+                path: "a<b.toml".into(),
+                blake3: "ab".into(),
+            }],
             outputs: Default::default(),
-            model: ModelNote { estimator: Some("dr-awv".into()) },
+            model: ModelNote {
+                estimator: Some("dr-awv".into()),
+            },
             threads: 2,
             independent_windows: None,
             wall_s: 2.0,
             throughput_epochs_per_s: 2400.0,
         };
         let quantiles_m = [0.1, 0.2, 0.4, 0.8, 1.6];
-        let fan = [4.0, 8.0].map(|t_s| FanEpoch { t_s, quantiles_m, lincov_m: None });
-        let navigation = Navigation { runs: Some(result), epochs, fan: fan.to_vec(), summary };
-        let answer = RunAnswer { navigation, manifest, track: TrajectorySeries::default() };
-        answer.files().into_iter().map(|file| (file.name, file.parts.collect())).collect()
+        let fan = [4.0, 8.0].map(|t_s| FanEpoch {
+            t_s,
+            quantiles_m,
+            lincov_m: None,
+        });
+        let navigation = Navigation {
+            runs: Some(result),
+            epochs,
+            fan: fan.to_vec(),
+            summary,
+        };
+        let answer = RunAnswer {
+            navigation,
+            manifest,
+            track: TrajectorySeries::default(),
+        };
+        answer
+            .files()
+            .into_iter()
+            .map(|file| (file.name, file.parts.collect()))
+            .collect()
     }
 
     #[test]
@@ -158,9 +229,15 @@ mod tests {
         let manifest: Manifest = serde_json::from_str(&files[5].1).unwrap();
         assert_eq!(manifest.hashes("trajectory"), ["ab"]);
         assert_eq!(manifest.configuration, Scenario::default());
-        for (name, text) in files.iter().filter(|(name, _)| !["report.html", "manifest.json"].contains(name))
+        for (name, text) in files
+            .iter()
+            .filter(|(name, _)| !["report.html", "manifest.json"].contains(name))
         {
-            assert_eq!(manifest.outputs[*name], blake3::hash(text.as_bytes()).to_hex().as_str(), "{name}");
+            assert_eq!(
+                manifest.outputs[*name],
+                blake3::hash(text.as_bytes()).to_hex().as_str(),
+                "{name}"
+            );
         }
     }
 
@@ -174,12 +251,23 @@ mod tests {
         let cells: Vec<(&str, &str)> = page
             .split("data-json=\"")
             .skip(1)
-            .map(|rest| (rest.split('"').next().unwrap(), rest.split(['>', '<']).nth(1).unwrap()))
+            .map(|rest| {
+                (
+                    rest.split('"').next().unwrap(),
+                    rest.split(['>', '<']).nth(1).unwrap(),
+                )
+            })
             .collect();
         assert!(cells.len() > 40, "{}", cells.len());
         for (source, shown) in cells {
-            let value = summary.pointer(source).unwrap_or_else(|| panic!("{source} is not in summary.json"));
-            assert_eq!(shown, crate::report::readable(value.as_f64().unwrap_or(f64::NAN)), "{source}");
+            let value = summary
+                .pointer(source)
+                .unwrap_or_else(|| panic!("{source} is not in summary.json"));
+            assert_eq!(
+                shown,
+                crate::report::readable(value.as_f64().unwrap_or(f64::NAN)),
+                "{source}"
+            );
         }
     }
 }

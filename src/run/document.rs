@@ -4,7 +4,9 @@ use super::Navigation;
 use super::answer::RunAnswer;
 use super::assumptions::assumptions;
 use super::budgets::budgets;
-use super::charts::{fan_chart, horizontal, horizontal_caption, nees, rmse_and_asee, states, windows};
+use super::charts::{
+    fan_chart, horizontal, horizontal_caption, nees, rmse_and_asee, states, windows,
+};
 use super::remedy::remedy;
 use crate::report::requirement::requirement_line;
 use crate::report::verdict::verdict_lines;
@@ -24,13 +26,34 @@ const SOURCES: usize = 3;
 
 /// The document of an answer.
 pub(super) fn document(answer: &RunAnswer) -> Document {
-    let RunAnswer { navigation: Navigation { epochs, fan, summary, .. }, manifest, track } = answer;
+    let RunAnswer {
+        navigation:
+            Navigation {
+                epochs,
+                fan,
+                summary,
+                ..
+            },
+        manifest,
+        track,
+    } = answer;
     let windows = windows(summary);
-    let title = if summary.runs > 0 { "INS/GNSS Monte-Carlo run" } else { "INS/GNSS covariance analysis" };
+    let title = if summary.runs > 0 {
+        "INS/GNSS Monte-Carlo run"
+    } else {
+        "INS/GNSS covariance analysis"
+    };
     let (kept, missed): (Vec<&Met>, Vec<&Met>) = summary.require.iter().partition(|met| met.met);
-    let tone = if missed.is_empty() { tone(summary.verdict.kind) } else { Tone::Bad };
+    let tone = if missed.is_empty() {
+        tone(summary.verdict.kind)
+    } else {
+        Tone::Bad
+    };
     // What the command ends with is what the reader asked for: it comes before the filter.
-    let mut lines: Vec<String> = missed.iter().map(|met| requirement_line(met, summary)).collect();
+    let mut lines: Vec<String> = missed
+        .iter()
+        .map(|met| requirement_line(met, summary))
+        .collect();
     let mut verdict = verdict_lines(summary);
     verdict[0] = format!("verdict: {}", verdict[0]);
     lines.extend(verdict);
@@ -61,47 +84,84 @@ fn notes(summary: &Summary, manifest: &Manifest, page: &mut Document) {
     let mut unexpected = scenario.unexpected();
     unexpected.extend(scenario.unexpected_integration(summary.strapdown_over_sigma));
     let (own, analysed) = (summary.verdict.kind, summary.verdict.by_covariance_analysis);
-    let is_undecided = own == VerdictKind::Undecided && analysed == Some(VerdictKind::Overconfident);
+    let is_undecided =
+        own == VerdictKind::Undecided && analysed == Some(VerdictKind::Overconfident);
     if own == VerdictKind::Overconfident || is_undecided {
         let remedy = remedy(summary, &unexpected, manifest);
-        page.note(Importance::Warning, format!("the filter is overconfident: {remedy}"));
+        page.note(
+            Importance::Warning,
+            format!("the filter is overconfident: {remedy}"),
+        );
     }
-    unexpected.iter().for_each(|found| page.note(Importance::Detail, unexpected_line(found)));
-    let quality = summary.reduction.as_ref().and_then(|reduction| reduction.quality.as_ref());
+    unexpected
+        .iter()
+        .for_each(|found| page.note(Importance::Detail, unexpected_line(found)));
+    let quality = summary
+        .reduction
+        .as_ref()
+        .and_then(|reduction| reduction.quality.as_ref());
     if let Some(quality) = quality {
         page.note(Importance::Detail, reduction_line(quality));
-        reduction_doubt(quality).into_iter().for_each(|doubt| page.note(Importance::Detail, doubt));
+        reduction_doubt(quality)
+            .into_iter()
+            .for_each(|doubt| page.note(Importance::Detail, doubt));
     }
     let shown = largest(summary, 1);
     for outage in shown.iter().map(|k| &summary.outages[*k]) {
-        sources(outage).into_iter().for_each(|line| page.note(Importance::Remark, line));
-        by_calibration(outage).into_iter().for_each(|line| page.note(Importance::Remark, line));
+        sources(outage)
+            .into_iter()
+            .for_each(|line| page.note(Importance::Remark, line));
+        by_calibration(outage)
+            .into_iter()
+            .for_each(|line| page.note(Importance::Remark, line));
     }
     if summary.outages.len() > LISTED {
         let all = summary.outages.len();
-        let text =
-            format!("the table has the {LISTED} of {all} outages with the largest errors, the page all");
+        let text = format!(
+            "the table has the {LISTED} of {all} outages with the largest errors, the page all"
+        );
         page.note(Importance::Remark, text);
     }
     let agreement = summary.agreement.as_ref().map(agreement_line);
-    agreement.into_iter().for_each(|line| page.note(Importance::Detail, line));
+    agreement
+        .into_iter()
+        .for_each(|line| page.note(Importance::Detail, line));
 }
 
 /// `sources of the horizontal error at the end of 300–390 s: gyro.AR1 78 %, gyro.WN 11 %, gnss.velocity 10 %`
 fn sources(outage: &OutageSummary) -> Option<String> {
-    let ranked = outage.budget.as_ref()?.ranked(&[0, 1]).into_iter().take(SOURCES);
-    let shares: Vec<String> = ranked.map(|(name, share)| format!("{name} {:.0} %", 100.0 * share)).collect();
+    let ranked = outage
+        .budget
+        .as_ref()?
+        .ranked(&[0, 1])
+        .into_iter()
+        .take(SOURCES);
+    let shares: Vec<String> = ranked
+        .map(|(name, share)| format!("{name} {:.0} %", 100.0 * share))
+        .collect();
     let place = window(outage.start_s, outage.end_s);
-    Some(format!("sources of the horizontal error at the end of {place}: {}", shares.join(", ")))
+    Some(format!(
+        "sources of the horizontal error at the end of {place}: {}",
+        shares.join(", ")
+    ))
 }
 
 /// Intervals that the calibrations of the models leave.
 fn by_calibration(outage: &OutageSummary) -> Option<String> {
     let shown = |name: &str, value: f64, (low, high): (f64, f64)| {
-        format!("{name} {} m [{}, {}]", readable(value), readable(low), readable(high))
+        format!(
+            "{name} {} m [{}, {}]",
+            readable(value),
+            readable(low),
+            readable(high)
+        )
     };
     let h = &outage.horizontal_error_end_m;
-    let p95 = h.p95_ci95.0.zip(h.p95_ci95.1).map(|ends| shown("p95", h.p95, ends));
+    let p95 = h
+        .p95_ci95
+        .0
+        .zip(h.p95_ci95.1)
+        .map(|ends| shown("p95", h.p95, ends));
     let of_east = |name: &str, value: &PerState<f64>, interval: &Option<PerState<(f64, f64)>>| {
         interval.map(|interval| shown(name, value.0[1], interval.0[1]))
     };
@@ -110,8 +170,12 @@ fn by_calibration(outage: &OutageSummary) -> Option<String> {
     let is_known = outage.asee_end_ci95.is_some() || outage.rmse_end_ci95.is_some();
     let all: Vec<String> = [p95, rmse, asee].into_iter().flatten().collect();
     let place = window(outage.start_s, outage.end_s);
-    (is_known && !all.is_empty())
-        .then(|| format!("95 % by the calibration, end of {place}: {}", all.join(", ")))
+    (is_known && !all.is_empty()).then(|| {
+        format!(
+            "95 % by the calibration, end of {place}: {}",
+            all.join(", ")
+        )
+    })
 }
 
 /// `runs against covariance analysis: largest z -2.31 (RMSE of yaw_deg at the end of outage 1) of 22, up to 4.4 by chance; …`
@@ -127,7 +191,11 @@ fn agreement_line(a: &Agreement) -> String {
 
 /// A table of figures, of which a covariance analysis does not have all: no draw, hence no interval.
 fn known(table: Table, summary: &Summary) -> Table {
-    if summary.runs > 0 { table } else { table.without_unknown() }
+    if summary.runs > 0 {
+        table
+    } else {
+        table.without_unknown()
+    }
 }
 
 fn fan_caption(fan: &[FanEpoch], summary: &Summary) -> String {
@@ -151,7 +219,8 @@ fn fan_caption(fan: &[FanEpoch], summary: &Summary) -> String {
 
 /// Positions of the outages with the largest errors, in time order.
 fn largest(summary: &Summary, count: usize) -> Vec<usize> {
-    let error = |i: &usize| summary.outages[*i].rmse_end.0[0].hypot(summary.outages[*i].rmse_end.0[1]);
+    let error =
+        |i: &usize| summary.outages[*i].rmse_end.0[0].hypot(summary.outages[*i].rmse_end.0[1]);
     let mut all: Vec<usize> = (0..summary.outages.len()).collect();
     all.sort_by(|a, b| error(b).total_cmp(&error(a)));
     all.truncate(count);
@@ -163,7 +232,10 @@ fn outages(summary: &Summary, page: &mut Document) {
     if summary.outages.is_empty() {
         page.section("Accuracy over the run");
         let a = &summary.accuracy;
-        page.lead(pairs(&[("mean", "/accuracy".to_owned(), &a.rmse_mean, &a.asee_mean)], "mean"));
+        page.lead(pairs(
+            &[("mean", "/accuracy".to_owned(), &a.rmse_mean, &a.asee_mean)],
+            "mean",
+        ));
         return;
     }
     page.section("At the ends of outages");
@@ -173,16 +245,29 @@ fn outages(summary: &Summary, page: &mut Document) {
             let h = &o.horizontal_error_end_m;
             [h.p50_ci95, h.p95_ci95].iter().any(|ci| ci.0.is_some())
         });
-    let brackets = if has_intervals { "; brackets are 95 % intervals" } else { "" };
-    page.text(&format!("Just before the first fix after the outage{brackets}."));
+    let brackets = if has_intervals {
+        "; brackets are 95 % intervals"
+    } else {
+        ""
+    };
+    page.text(&format!(
+        "Just before the first fix after the outage{brackets}."
+    ));
     page.table(&known(ends(summary), summary));
     by_state(summary, page);
 }
 
 /// Horizontal errors at the ends of outages, and how soon fixes mend them.
 fn ends(summary: &Summary) -> Table {
-    let is_expected = summary.outages.iter().any(|o| o.horizontal_error_end_m.p999.is_some());
-    let (last, key) = if is_expected { ("99.9 % (m)", "p999") } else { ("largest (m)", "max") };
+    let is_expected = summary
+        .outages
+        .iter()
+        .any(|o| o.horizontal_error_end_m.p999.is_some());
+    let (last, key) = if is_expected {
+        ("99.9 % (m)", "p999")
+    } else {
+        ("largest (m)", "max")
+    };
     let mut table = Table::new([
         "outage",
         "horizontal, median (m)",
@@ -205,7 +290,10 @@ fn ends(summary: &Summary) -> Table {
             interval(h.p50_ci95),
             Cell::number(h.p95, &source_of("horizontal_error_end_m/p95")),
             interval(h.p95_ci95),
-            Cell::number(h.p999.unwrap_or(h.max), &source_of(&format!("horizontal_error_end_m/{key}"))),
+            Cell::number(
+                h.p999.unwrap_or(h.max),
+                &source_of(&format!("horizontal_error_end_m/{key}")),
+            ),
             Cell::number(o.reconvergence_s.p50, &source_of("reconvergence_s/p50")),
         ]);
     }
@@ -215,13 +303,19 @@ fn ends(summary: &Summary) -> Table {
 /// State by state, the outages with the largest errors.
 fn by_state(summary: &Summary, page: &mut Document) {
     let shown = largest(summary, OUTAGES);
-    let names: Vec<String> =
-        shown.iter().map(|i| &summary.outages[*i]).map(|o| window(o.start_s, o.end_s)).collect();
+    let names: Vec<String> = shown
+        .iter()
+        .map(|i| &summary.outages[*i])
+        .map(|o| window(o.start_s, o.end_s))
+        .collect();
     let table = |suffix: &str| {
         let errors_of_outage = |i: &usize| {
             let o = &summary.outages[*i];
-            let (rmse, asee) =
-                if suffix == "end" { (&o.rmse_end, &o.asee_end) } else { (&o.rmse_mean, &o.asee_mean) };
+            let (rmse, asee) = if suffix == "end" {
+                (&o.rmse_end, &o.asee_end)
+            } else {
+                (&o.rmse_mean, &o.asee_mean)
+            };
             (format!("/outages/{i}"), rmse, asee)
         };
         let columns: Vec<Pair<'_>> = names
@@ -248,8 +342,9 @@ type Pair<'a> = (&'a str, String, &'a PerState<f64>, &'a PerState<f64>);
 
 /// State by state, both at the same time.
 fn pairs(columns: &[Pair<'_>], suffix: &str) -> Table {
-    let heads =
-        columns.iter().flat_map(|(name, ..)| ["RMSE", "ASEE", "ratio"].map(|what| format!("{what}, {name}")));
+    let heads = columns
+        .iter()
+        .flat_map(|(name, ..)| ["RMSE", "ASEE", "ratio"].map(|what| format!("{what}, {name}")));
     let mut table = Table::new(["state"]).and(heads);
     for (i, state) in STATES.iter().enumerate() {
         let cells = columns.iter().flat_map(|(_, place, rmse, asee)| {
@@ -268,7 +363,11 @@ fn pairs(columns: &[Pair<'_>], suffix: &str) -> Table {
 
 fn consistency(epochs: &[EpochMetrics], summary: &Summary, page: &mut Document) {
     page.section("Consistency");
-    let covered = if summary.runs > 0 { "share of runs" } else { "share of errors" };
+    let covered = if summary.runs > 0 {
+        "share of runs"
+    } else {
+        "share of errors"
+    };
     page.chart(
         &nees(epochs, summary),
         &format!(
@@ -277,9 +376,21 @@ fn consistency(epochs: &[EpochMetrics], summary: &Summary, page: &mut Document) 
         ),
     );
     let (nees, nis, coverage) = (&summary.nees, &summary.nis, &summary.coverage);
-    let share = |x: f64| if x.is_finite() { format!("{:.0} %", x * 100.0) } else { "–".to_owned() };
-    let mut table =
-        Table::new(["", "mean", "if the filter is right", "95 % band from", "to", "epochs inside"]);
+    let share = |x: f64| {
+        if x.is_finite() {
+            format!("{:.0} %", x * 100.0)
+        } else {
+            "–".to_owned()
+        }
+    };
+    let mut table = Table::new([
+        "",
+        "mean",
+        "if the filter is right",
+        "95 % band from",
+        "to",
+        "epochs inside",
+    ]);
     let all_fixes = format!("NIS, all {} fixes", nis.fixes);
     let rows = [
         (
@@ -290,7 +401,14 @@ fn consistency(epochs: &[EpochMetrics], summary: &Summary, page: &mut Document) 
             [nees.lower95, nees.upper95],
             nees.fraction_inside,
         ),
-        (&all_fixes, "nis", nis.mean, nis.dof as f64, [nis.lower95, nis.upper95], f64::NAN),
+        (
+            &all_fixes,
+            "nis",
+            nis.mean,
+            nis.dof as f64,
+            [nis.lower95, nis.upper95],
+            f64::NAN,
+        ),
         (
             "coverage, per epoch",
             "coverage",
@@ -316,7 +434,10 @@ fn consistency(epochs: &[EpochMetrics], summary: &Summary, page: &mut Document) 
 fn provenance(manifest: &Manifest, page: &mut Document) {
     page.section("Provenance");
     // the command, the threads and the time taken are in manifest.json: this page is the same for the same seed
-    page.text(&format!("nav-sim {}; the command is in manifest.json.", manifest.version));
+    page.text(&format!(
+        "nav-sim {}; the command is in manifest.json.",
+        manifest.version
+    ));
     let mut table = Table::new(["input", "file", "BLAKE3"]);
     for i in &manifest.inputs {
         table.row([i.role.clone(), i.path.clone(), i.blake3.clone()].map(Cell::from));
@@ -328,8 +449,15 @@ fn provenance(manifest: &Manifest, page: &mut Document) {
 
 /// The outages with the largest errors in one line each.
 fn lead(summary: &Summary) -> Table {
-    let is_expected = summary.outages.iter().any(|o| o.horizontal_error_end_m.p999.is_some());
-    let (last, key) = if is_expected { ("p99.9 (m)", "p999") } else { ("max (m)", "max") };
+    let is_expected = summary
+        .outages
+        .iter()
+        .any(|o| o.horizontal_error_end_m.p999.is_some());
+    let (last, key) = if is_expected {
+        ("p99.9 (m)", "p999")
+    } else {
+        ("max (m)", "max")
+    };
     let mut table = Table::new([
         "outage",
         "horizontal p50 (m)",
@@ -350,10 +478,17 @@ fn lead(summary: &Summary) -> Table {
             window(o.start_s, o.end_s).into(),
             number(h.p50, "horizontal_error_end_m/p50"),
             number(h.p95, "horizontal_error_end_m/p95"),
-            number(h.p999.unwrap_or(h.max), &format!("horizontal_error_end_m/{key}")),
+            number(
+                h.p999.unwrap_or(h.max),
+                &format!("horizontal_error_end_m/{key}"),
+            ),
             number(o.rmse_end.0[1], "rmse_end/pos_e_m"),
             number(o.asee_end.0[1], "asee_end/pos_e_m"),
-            Cell::figures(format!("{} {}", readable(ratio(farthest)), REPORTED_NAMES[farthest])),
+            Cell::figures(format!(
+                "{} {}",
+                readable(ratio(farthest)),
+                REPORTED_NAMES[farthest]
+            )),
         ]);
     }
     table
@@ -361,15 +496,23 @@ fn lead(summary: &Summary) -> Table {
 
 /// How horizontal position (east), roll and yaw at the end of the outage with the largest errors follow from each parameter.
 fn sensitivity(summary: &Summary, page: &mut Document) {
-    let known = summary.outages.iter().filter_map(|o| Some((o, o.sensitivity.as_ref()?)));
+    let known = summary
+        .outages
+        .iter()
+        .filter_map(|o| Some((o, o.sensitivity.as_ref()?)));
     let east = |o: &OutageSummary| o.rmse_end.0[1];
-    let Some((outage, slopes)) = known.max_by(|a, b| east(a.0).total_cmp(&east(b.0))) else { return };
+    let Some((outage, slopes)) = known.max_by(|a, b| east(a.0).total_cmp(&east(b.0))) else {
+        return;
+    };
     let states = [1, 6, 8];
     let mut table = Table::new(["parameter"]).and(states.map(|i| REPORTED_NAMES[i].to_owned()));
     for (name, of_state) in &slopes.0 {
         let slopes = states.map(|i| Cell::figures(format!("{:+.3}", of_state.0[i])));
         table.row(std::iter::once(Cell::from(name.clone())).chain(slopes));
     }
-    let title = format!("d ln RMSE / d ln parameter at the end of {}", window(outage.start_s, outage.end_s));
+    let title = format!(
+        "d ln RMSE / d ln parameter at the end of {}",
+        window(outage.start_s, outage.end_s)
+    );
     page.folded(&title, |page| page.table(&table));
 }

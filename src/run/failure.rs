@@ -45,10 +45,18 @@ impl RunAnswer {
     #[must_use]
     pub fn unmet(&self) -> Option<Failure> {
         let summary = &self.navigation.summary;
-        let Summary { diverged, runs, verdict, .. } = summary;
+        let Summary {
+            diverged,
+            runs,
+            verdict,
+            ..
+        } = summary;
         if *diverged > 0 && diverged == runs {
-            let failure = Failure::could_not(format!("all {runs} runs diverged: there is no result"));
-            return Some(failure.hint("does the model fit the IMU, are [imu] and [initial] plausible?"));
+            let failure =
+                Failure::could_not(format!("all {runs} runs diverged: there is no result"));
+            return Some(
+                failure.hint("does the model fit the IMU, are [imu] and [initial] plausible?"),
+            );
         }
         if *diverged > 0 {
             let failure = Failure::bound(format!("{diverged} of {runs} runs diverged"));
@@ -56,8 +64,12 @@ impl RunAnswer {
                 "their indices are in summary.json, under diverged_runs; they are in no other number",
             ));
         }
-        let missed: Vec<String> =
-            summary.require.iter().filter(|met| !met.met).map(|met| requirement_line(met, summary)).collect();
+        let missed: Vec<String> = summary
+            .require
+            .iter()
+            .filter(|met| !met.met)
+            .map(|met| requirement_line(met, summary))
+            .collect();
         if !missed.is_empty() {
             return Some(Failure::bound(missed.join("; ")));
         }
@@ -80,7 +92,9 @@ fn impossible(e: NavigateError, model: &Path, settings: Option<&Path>) -> Failur
             failure.hint("each run takes a window as long as the trajectory: record for longer")
         }
         NavigateError::Experiment(ExperimentError::Truth(TruthError::Rate { rate_hz, .. })) => {
-            failure.hint(format!("set rate_hz = {rate_hz} in the [imu] section of a --scenario file"))
+            failure.hint(format!(
+                "set rate_hz = {rate_hz} in the [imu] section of a --scenario file"
+            ))
         }
         NavigateError::Experiment(_) => failure,
         NavigateError::Belief(e) => no_filter(
@@ -90,18 +104,25 @@ fn impossible(e: NavigateError, model: &Path, settings: Option<&Path>) -> Failur
             "raise it, or take the full filter (--filter full), which reduces nothing",
         ),
         NavigateError::Reduction(e) => Failure::could_not(e),
-        NavigateError::RecordedTruth => failure
-            .hint("calibrate the recordings and give the model with --truth, or use --method monte-carlo"),
-        NavigateError::DrawnTruth => failure.hint("leave --spread out, or use --method monte-carlo"),
-        NavigateError::Drawn(_) => failure.hint("leave it out, or use --method monte-carlo"),
-        NavigateError::NotFinite => {
-            Failure::could_not(e).hint("do the models fit the IMU, are [imu] and [initial] plausible?")
+        NavigateError::RecordedTruth => failure.hint(
+            "calibrate the recordings and give the model with --truth, or use --method monte-carlo",
+        ),
+        NavigateError::DrawnTruth => {
+            failure.hint("leave --spread out, or use --method monte-carlo")
         }
+        NavigateError::Drawn(_) => failure.hint("leave it out, or use --method monte-carlo"),
+        NavigateError::NotFinite => Failure::could_not(e)
+            .hint("do the models fit the IMU, are [imu] and [initial] plausible?"),
     }
 }
 
 /// Why a model has no filter: by the file that is at fault, of the model and the one with the settings; `advice` is on settings.
-pub(crate) fn no_filter(e: &BeliefError, model: &Path, settings: Option<&Path>, advice: &str) -> Failure {
+pub(crate) fn no_filter(
+    e: &BeliefError,
+    model: &Path,
+    settings: Option<&Path>,
+    advice: &str,
+) -> Failure {
     let within = |failure: Failure, file: &Path| failure.within(&file.display().to_string());
     match e {
         BeliefError::Setting(_) => {

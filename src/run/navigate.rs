@@ -7,8 +7,8 @@ use crate::formats::draws_file::Draws;
 use crate::observer::Observer;
 use nav_sim_navigation::ekf::{Belief, BeliefError};
 use nav_sim_navigation::metrics::{
-    Agreement, Budget, EpochMetrics, Expected, FanEpoch, ReductionQuality, ReductionSummary, Sensitivities,
-    Summary, epochs, expected_fan, fan,
+    Agreement, Budget, EpochMetrics, Expected, FanEpoch, ReductionQuality, ReductionSummary,
+    Sensitivities, Summary, epochs, expected_fan, fan,
 };
 use nav_sim_navigation::monte_carlo;
 use nav_sim_navigation::scenario::{Method, Scenario, Unexpected};
@@ -102,7 +102,9 @@ pub enum NavigateError {
     #[error(transparent)]
     Reduction(#[from] ParameterError),
     /// Recordings have no covariance.
-    #[error("covariance analysis needs a model of what makes the errors; static recordings have none")]
+    #[error(
+        "covariance analysis needs a model of what makes the errors; static recordings have none"
+    )]
     RecordedTruth,
     /// Each run has a truth of its own.
     #[error("covariance analysis is of one truth; --spread draws one for each run")]
@@ -139,19 +141,33 @@ pub fn navigate(
     heading(&FilterPass::new(&merged, &belief))
         .iter()
         .for_each(|doubt| observer.remark(&Note::Heading(*doubt)));
-    let experiment =
-        scenario.experiment(&inputs.trajectory, inputs.truth(), std::slice::from_ref(&belief), outages, seed);
+    let experiment = scenario.experiment(
+        &inputs.trajectory,
+        inputs.truth(),
+        std::slice::from_ref(&belief),
+        outages,
+        seed,
+    );
     let analysis = Analysis::new(&experiment, inputs, &track);
     let expected = match method {
         // beside runs that were asked for alone it may be impossible
-        Method::MonteCarlo => possible(inputs, scenario).ok().and_then(|()| analysis.expected(&belief)),
-        Method::Lincov | Method::Both => Some(analysis.expected(&belief).ok_or(NavigateError::NotFinite)?),
+        Method::MonteCarlo => possible(inputs, scenario)
+            .ok()
+            .and_then(|()| analysis.expected(&belief)),
+        Method::Lincov | Method::Both => {
+            Some(analysis.expected(&belief).ok_or(NavigateError::NotFinite)?)
+        }
     };
     let mut navigation = match (method, expected) {
         (Method::Lincov, Some((epochs, mut summary))) => {
             // Nothing is drawn but outages; a seed that is given stays on record.
             summary.seed = scenario.outage_random.map(|_| seed).or(scenario.run.seed);
-            Navigation { runs: None, epochs, fan: analysis.fan(&belief), summary }
+            Navigation {
+                runs: None,
+                epochs,
+                fan: analysis.fan(&belief),
+                summary,
+            }
         }
         (method, expected) => {
             let mut sampled = sampled(&experiment, scenario.run.runs, seed, observer)?;
@@ -177,11 +193,20 @@ pub fn navigate(
         .for_each(|found| observer.remark(&Note::Unexpected(*found)));
     // Which fixes a gate refuses is drawn with the errors: the gains of such a filter are not those of the analysis.
     if scenario.analysable().is_ok() {
-        Analysis { track: &merged, ..analysis }.add_budgets(&mut navigation.summary, &belief);
+        Analysis {
+            track: &merged,
+            ..analysis
+        }
+        .add_budgets(&mut navigation.summary, &belief);
     }
     if method == Method::Lincov {
         analysis.add_sensitivities(&mut navigation.summary, &belief);
-        let full = |model: &Model| scenario.with_full_noise().belief(model, outages, &track).ok();
+        let full = |model: &Model| {
+            scenario
+                .with_full_noise()
+                .belief(model, outages, &track)
+                .ok()
+        };
         analysis.add_intervals(&mut navigation.summary, &belief, inputs, &full);
     }
     Ok(navigation)
@@ -198,9 +223,17 @@ fn possible(inputs: &NavigateInputs, scenario: &Scenario) -> Result<(), Navigate
 }
 
 /// What speaks against the filter before anything was computed.
-fn doubt(inputs: &NavigateInputs, belief: &Belief, scenario: &Scenario, observer: &dyn Observer<Note>) {
+fn doubt(
+    inputs: &NavigateInputs,
+    belief: &Belief,
+    scenario: &Scenario,
+    observer: &dyn Observer<Note>,
+) {
     if let TrueImu::Recordings(recordings) = &inputs.truth {
-        recordings.iter().filter_map(motion).for_each(|doubt| observer.remark(&Note::Warning(doubt)));
+        recordings
+            .iter()
+            .filter_map(motion)
+            .for_each(|doubt| observer.remark(&Note::Warning(doubt)));
     }
     // A Gauss-Markov process of phi ≈ 1 may have any stationary variance: a filter that starts with it believes
     // nothing of its first sensor readings.
@@ -210,7 +243,10 @@ fn doubt(inputs: &NavigateInputs, belief: &Belief, scenario: &Scenario, observer
             observer.remark(&Note::LargeBias(sensor, sigma));
         }
     }
-    scenario.unexpected().into_iter().for_each(|found| observer.remark(&Note::Unexpected(found)));
+    scenario
+        .unexpected()
+        .into_iter()
+        .for_each(|found| observer.remark(&Note::Unexpected(found)));
 }
 
 /// Means over a second that differ so much are motion, not noise: m/s², rad/s.
@@ -248,10 +284,23 @@ fn reduction(
     if !scenario.filter.states.is_reduced() {
         return Ok(None);
     }
-    let longest = outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
+    let longest = outages
+        .iter()
+        .map(|o| o.end_s - o.start_s)
+        .fold(0.0, f64::max);
     let (interval_s, window_s) = (1.0 / scenario.gnss.rate_hz, window_s(longest));
-    let full = scenario.with_full_noise().belief(&inputs.model, outages, track).ok();
-    let reduced = Reduced { model: &inputs.model, belief, full, track, interval_s, window_s };
+    let full = scenario
+        .with_full_noise()
+        .belief(&inputs.model, outages, track)
+        .ok();
+    let reduced = Reduced {
+        model: &inputs.model,
+        belief,
+        full,
+        track,
+        interval_s,
+        window_s,
+    };
     Ok(Some(reduced.summary(observer)?))
 }
 
@@ -286,7 +335,11 @@ struct Analysis<'a> {
 
 impl<'a> Analysis<'a> {
     fn new(experiment: &'a Experiment<'a>, inputs: &'a NavigateInputs, track: &'a Track) -> Self {
-        Self { experiment, track, model: inputs.truth_model() }
+        Self {
+            experiment,
+            track,
+            model: inputs.truth_model(),
+        }
     }
 
     /// The expected figures; none where the covariance runs away.
@@ -298,15 +351,24 @@ impl<'a> Analysis<'a> {
 
     /// Quantiles of the horizontal error over time; none where nothing models what makes the errors.
     fn fan(&self, belief: &Belief) -> Vec<FanEpoch> {
-        let Some(model) = self.model else { return Vec::new() };
+        let Some(model) = self.model else {
+            return Vec::new();
+        };
         let truth = TruthSide::together(&TruthSide::sources(self.experiment, model));
-        expected_fan(&FilterPass::new(self.track, belief), &truth, self.experiment.outages)
+        expected_fan(
+            &FilterPass::new(self.track, belief),
+            &truth,
+            self.experiment.outages,
+        )
     }
 
     /// How the errors at the ends of outages follow from the parameters of what makes them.
     fn add_sensitivities(&self, summary: &mut Summary, belief: &Belief) {
-        let (Some(model), track) = (self.model, self.track.coarse()) else { return };
-        let ends = Sensitivities::at_outage_ends(&FilterPass::new(&track, belief), self.experiment, model);
+        let (Some(model), track) = (self.model, self.track.coarse()) else {
+            return;
+        };
+        let ends =
+            Sensitivities::at_outage_ends(&FilterPass::new(&track, belief), self.experiment, model);
         for (outage, sensitivity) in summary.outages.iter_mut().zip(ends) {
             outage.sensitivity = Some(sensitivity);
         }
@@ -320,7 +382,11 @@ impl<'a> Analysis<'a> {
         inputs: &NavigateInputs,
         full: &(dyn Fn(&Model) -> Option<Belief> + Sync),
     ) {
-        let analysed = Analysed { experiment: self.experiment, track: self.track, belief };
+        let analysed = Analysed {
+            experiment: self.experiment,
+            track: self.track,
+            belief,
+        };
         let truth_draws = match inputs.truth {
             TrueImu::AsBelieved => inputs.model_draws.as_ref(),
             _ => inputs.truth_draws.as_ref(),
@@ -336,8 +402,11 @@ impl<'a> Analysis<'a> {
     /// What the errors at the ends of outages are made of, and what the filter believes they are.
     fn add_budgets(&self, summary: &mut Summary, belief: &Belief) {
         let filter = FilterPass::new(self.track, belief);
-        let at_ends = |sources: &[NamedSource]| Budget::at_outage_ends(&filter, sources).into_iter();
-        let mut truth = self.model.map(|model| at_ends(&TruthSide::sources(self.experiment, model)));
+        let at_ends =
+            |sources: &[NamedSource]| Budget::at_outage_ends(&filter, sources).into_iter();
+        let mut truth = self
+            .model
+            .map(|model| at_ends(&TruthSide::sources(self.experiment, model)));
         let believed = at_ends(&TruthSide::believed(self.experiment, belief));
         for (outage, believed) in summary.outages.iter_mut().zip(believed) {
             outage.budget = truth.as_mut().and_then(Iterator::next);
@@ -352,7 +421,12 @@ impl Navigation {
     pub fn of_runs(result: RunResult, seed: u64) -> Self {
         let epochs = epochs(&result);
         let summary = Summary::of(&result, &epochs, seed);
-        Self { fan: fan(&result), runs: Some(result), epochs, summary }
+        Self {
+            fan: fan(&result),
+            runs: Some(result),
+            epochs,
+            summary,
+        }
     }
 
     /// Runs beside what was expected of them.
@@ -370,7 +444,13 @@ impl NavigateInputs {
     /// Along a trajectory, with models that are known for certain.
     #[must_use]
     pub const fn new(trajectory: Trajectory, model: Model, truth: TrueImu) -> Self {
-        Self { trajectory, model, truth, model_draws: None, truth_draws: None }
+        Self {
+            trajectory,
+            model,
+            truth,
+            model_draws: None,
+            truth_draws: None,
+        }
     }
 
     fn truth(&self) -> Truth<'_> {

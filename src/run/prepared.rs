@@ -46,7 +46,10 @@ impl RunRequest {
         let files = self.files()?;
         let (mut inputs, model, made_by) = self.inputs(&mut scenario, observer)?;
         let is_drawn = scenario.run.method != Method::Lincov || scenario.outage_random.is_some();
-        scenario.run.seed = self.seed.or(scenario.run.seed).or_else(|| is_drawn.then(draw));
+        scenario.run.seed = self
+            .seed
+            .or(scenario.run.seed)
+            .or_else(|| is_drawn.then(draw));
         let seed = scenario.run.seed.unwrap_or_default();
         if self.spread {
             inputs.truth = TrueImu::Drawn(self.drawn(&made_by, &scenario, seed)?);
@@ -56,13 +59,21 @@ impl RunRequest {
             let file = self.scenario.clone().filter(|_| self.outages.is_empty());
             RunError::Outage { file, source }
         })?;
-        placed.remarks.into_iter().for_each(|remark| observer.remark(&Note::Outage(remark)));
+        placed
+            .remarks
+            .into_iter()
+            .for_each(|remark| observer.remark(&Note::Outage(remark)));
         let outages = placed.windows;
-        if let Some(wanting) = self.require.iter().find(|r| outages.is_empty() && r.needs_outage()) {
+        if let Some(wanting) = self
+            .require
+            .iter()
+            .find(|r| outages.is_empty() && r.needs_outage())
+        {
             return Err(RunError::NoOutage(*wanting));
         }
         if scenario.run.method == Method::Lincov && self.runs.is_some() {
-            let text = "--runs is ignored with --method lincov; --method both adds Monte-Carlo runs";
+            let text =
+                "--runs is ignored with --method lincov; --method both adds Monte-Carlo runs";
             observer.remark(&Note::Warning(text.to_owned()));
         }
         let mut configuration = scenario.clone();
@@ -77,24 +88,51 @@ impl RunRequest {
             spread: self.spread,
             inputs: files,
             outputs: BTreeMap::new(),
-            model: ModelNote { estimator: model.estimator() },
+            model: ModelNote {
+                estimator: model.estimator(),
+            },
             threads: 0,
             independent_windows: None,
             wall_s: 0.0,
             throughput_epochs_per_s: 0.0,
         };
-        let (require, model, settings) = (self.require.clone(), self.model.clone(), self.settings_file());
-        Ok(PreparedRun { manifest, inputs, scenario, outages, seed, require, model, settings })
+        let (require, model, settings) = (
+            self.require.clone(),
+            self.model.clone(),
+            self.settings_file(),
+        );
+        Ok(PreparedRun {
+            manifest,
+            inputs,
+            scenario,
+            outages,
+            seed,
+            require,
+            model,
+            settings,
+        })
     }
 
     /// The model that makes the errors of each run: its parameters drawn at its own rate, then brought to that of the IMU.
-    fn drawn(&self, file: &ModelFile, scenario: &Scenario, seed: u64) -> Result<Vec<Model>, RunError> {
+    fn drawn(
+        &self,
+        file: &ModelFile,
+        scenario: &Scenario,
+        seed: u64,
+    ) -> Result<Vec<Model>, RunError> {
         let path = self.truth.as_ref().unwrap_or(&self.model);
-        let spread = file.spread.as_ref().ok_or_else(|| RunError::NoSpread(path.clone()))?;
+        let spread = file
+            .spread
+            .as_ref()
+            .ok_or_else(|| RunError::NoSpread(path.clone()))?;
         let of_run = |run| {
-            let drawn = spread.draw(&file.model, seed, run).expect("the spread was read with its model");
-            continuous::at_rate(&drawn, scenario.imu.rate_hz)
-                .map_err(|source| RunError::Drawn { path: path.clone(), source })
+            let drawn = spread
+                .draw(&file.model, seed, run)
+                .expect("the spread was read with its model");
+            continuous::at_rate(&drawn, scenario.imu.rate_hz).map_err(|source| RunError::Drawn {
+                path: path.clone(),
+                source,
+            })
         };
         (0..scenario.run.runs).map(of_run).collect()
     }
@@ -138,19 +176,47 @@ impl RunRequest {
                 (TrueImu::Model(model), drawn)
             }
             (None, []) => (TrueImu::AsBelieved, None),
-            (_, paths) => (TrueImu::Recordings(read::recordings(paths, self.rate_hz, observer)?), None),
+            (_, paths) => (
+                TrueImu::Recordings(read::recordings(paths, self.rate_hz, observer)?),
+                None,
+            ),
         };
-        Ok((NavigateInputs { trajectory, model, truth, model_draws, truth_draws }, file, made_by))
+        Ok((
+            NavigateInputs {
+                trajectory,
+                model,
+                truth,
+                model_draws,
+                truth_draws,
+            },
+            file,
+            made_by,
+        ))
     }
 
     /// Every file that is read, with its hash.
     fn files(&self) -> Result<Vec<Input>, FileError> {
-        let one = |role: &'static str, path: &Option<PathBuf>| path.clone().map(|path| (role, path));
-        let mut named = vec![("trajectory", self.trajectory.clone()), ("model", self.model.clone())];
+        let one =
+            |role: &'static str, path: &Option<PathBuf>| path.clone().map(|path| (role, path));
+        let mut named = vec![
+            ("trajectory", self.trajectory.clone()),
+            ("model", self.model.clone()),
+        ];
         named.extend(one("truth", &self.truth));
-        named.extend(input::listed(&self.recordings)?.into_iter().map(|path| ("static", path)));
-        named.extend([one("scenario", &self.scenario), one("gnss", &self.gnss)].into_iter().flatten());
-        named.iter().map(|(role, path)| input::input(role, path)).collect()
+        named.extend(
+            input::listed(&self.recordings)?
+                .into_iter()
+                .map(|path| ("static", path)),
+        );
+        named.extend(
+            [one("scenario", &self.scenario), one("gnss", &self.gnss)]
+                .into_iter()
+                .flatten(),
+        );
+        named
+            .iter()
+            .map(|(role, path)| input::input(role, path))
+            .collect()
     }
 }
 
@@ -165,7 +231,11 @@ impl RunRequest {
         observer: &dyn Observer<Note>,
     ) -> Result<Answered, Failure> {
         let answer = self.prepare(draw, observer)?.navigate(observer)?;
-        Ok(Answered { files: contents(answer.files()), unmet: answer.unmet(), ..Answered::of(&answer) })
+        Ok(Answered {
+            files: contents(answer.files()),
+            unmet: answer.unmet(),
+            ..Answered::of(&answer)
+        })
     }
 }
 
@@ -175,12 +245,34 @@ impl PreparedRun {
     /// # Errors
     /// What does not fit together, what the method cannot do, or a covariance that runs away.
     pub fn navigate(self, observer: &dyn Observer<Note>) -> Result<RunAnswer, RunError> {
-        let Self { mut manifest, inputs, scenario, outages, seed, require, model, settings } = self;
+        let Self {
+            mut manifest,
+            inputs,
+            scenario,
+            outages,
+            seed,
+            require,
+            model,
+            settings,
+        } = self;
         let found = navigate(&inputs, &scenario, &outages, seed, observer);
-        let mut navigation =
-            found.map_err(|e| RunError::Navigate { model, settings, source: Box::new(e) })?;
-        navigation.summary.require = require.iter().map(|r| r.check(&navigation.summary)).collect();
-        manifest.independent_windows = navigation.runs.as_ref().and_then(|runs| runs.independent_windows);
-        Ok(RunAnswer::new(navigation, manifest, TrajectorySeries::of(&inputs.trajectory)))
+        let mut navigation = found.map_err(|e| RunError::Navigate {
+            model,
+            settings,
+            source: Box::new(e),
+        })?;
+        navigation.summary.require = require
+            .iter()
+            .map(|r| r.check(&navigation.summary))
+            .collect();
+        manifest.independent_windows = navigation
+            .runs
+            .as_ref()
+            .and_then(|runs| runs.independent_windows);
+        Ok(RunAnswer::new(
+            navigation,
+            manifest,
+            TrajectorySeries::of(&inputs.trajectory),
+        ))
     }
 }

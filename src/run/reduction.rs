@@ -31,8 +31,18 @@ impl Reduced<'_> {
     ///
     /// # Errors
     /// When a parameter of the belief is outside its domain.
-    pub(crate) fn summary(&self, observer: &dyn Observer<Note>) -> Result<ReductionSummary, ParameterError> {
-        let Self { model, belief, track, interval_s, window_s, .. } = *self;
+    pub(crate) fn summary(
+        &self,
+        observer: &dyn Observer<Note>,
+    ) -> Result<ReductionSummary, ParameterError> {
+        let Self {
+            model,
+            belief,
+            track,
+            interval_s,
+            window_s,
+            ..
+        } = *self;
         let mut summary = ReductionSummary::of(model, belief, interval_s, window_s)?;
         if summary.is_exact() {
             return Ok(summary);

@@ -85,10 +85,12 @@ impl FilterRequest {
     pub(crate) fn over(&self, states: &mut FilterStates, initial: &mut InitialSettings) {
         *states = self.states.unwrap_or(*states);
         if let Some([accel, gyro]) = self.turn_on_bias {
-            (initial.accel_bias_sigma_m_s2, initial.gyro_bias_sigma_rad_s) = (Some(accel), Some(gyro));
+            (initial.accel_bias_sigma_m_s2, initial.gyro_bias_sigma_rad_s) =
+                (Some(accel), Some(gyro));
         }
         if let Some([accel, gyro]) = self.scale_ppm {
-            (initial.accel_scale_sigma_ppm, initial.gyro_scale_sigma_ppm) = (Some(accel), Some(gyro));
+            (initial.accel_scale_sigma_ppm, initial.gyro_scale_sigma_ppm) =
+                (Some(accel), Some(gyro));
         }
     }
 }
@@ -106,7 +108,11 @@ impl FromStr for OutageFlag {
     type Err = NotAnOutage;
 
     fn from_str(text: &str) -> Result<Self, NotAnOutage> {
-        if text == "none" { Ok(Self::None) } else { text.parse().map(Self::Window) }
+        if text == "none" {
+            Ok(Self::None)
+        } else {
+            text.parse().map(Self::Window)
+        }
     }
 }
 
@@ -135,7 +141,10 @@ pub(crate) fn windows_of(outages: &[OutageFlag]) -> Result<Vec<Outage>, RunError
 
 /// A scenario file, the default without one, with the outages of a request in the place of its own.
 fn scenario_with(path: Option<&Path>, outages: &[OutageFlag]) -> Result<Scenario, RunError> {
-    let mut scenario = path.map(scenario_file::read).transpose()?.unwrap_or_default();
+    let mut scenario = path
+        .map(scenario_file::read)
+        .transpose()?
+        .unwrap_or_default();
     if !outages.is_empty() {
         scenario.outage = Some(windows_of(outages)?);
         (scenario.outage_periodic, scenario.outage_random) = (None, None);
@@ -144,7 +153,10 @@ fn scenario_with(path: Option<&Path>, outages: &[OutageFlag]) -> Result<Scenario
 }
 
 /// The same, checked.
-pub(crate) fn checked_scenario(path: Option<&Path>, outages: &[OutageFlag]) -> Result<Scenario, RunError> {
+pub(crate) fn checked_scenario(
+    path: Option<&Path>,
+    outages: &[OutageFlag],
+) -> Result<Scenario, RunError> {
     let scenario = scenario_with(path, outages)?;
     scenario.validate()?;
     Ok(scenario)
@@ -159,7 +171,8 @@ impl RunRequest {
         }
         scenario.run.runs = self.runs.unwrap_or(scenario.run.runs);
         scenario.run.method = self.method.unwrap_or(scenario.run.method);
-        self.filter.over(&mut scenario.filter.states, &mut scenario.initial);
+        self.filter
+            .over(&mut scenario.filter.states, &mut scenario.initial);
         scenario.validate()?;
         Ok(scenario)
     }
@@ -180,7 +193,13 @@ mod tests {
         let text = "trajectory = \"a.csv\"\nmodel = \"m.toml\"\noutage = [\"30:45\"]\nrequire = [\"p95_m<=5\", \"consistent\"]\n\
                     method = \"lincov\"\n[filter]\nstates = \"full\"\nscale_ppm = [100.0, 200.0]\n";
         let request: RunRequest = toml::from_str(text).unwrap();
-        assert_eq!(request.outages, [OutageFlag::Window(Outage { start_s: 30.0, end_s: 45.0 })]);
+        assert_eq!(
+            request.outages,
+            [OutageFlag::Window(Outage {
+                start_s: 30.0,
+                end_s: 45.0
+            })]
+        );
         assert_eq!(request.require[1].name(), "consistent");
         let again: RunRequest = toml::from_str(&toml::to_string(&request).unwrap()).unwrap();
         assert_eq!(again, request);

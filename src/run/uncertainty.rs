@@ -38,12 +38,15 @@ impl Analysed<'_> {
         let figures = |model: &Model| -> Vec<Figures> {
             let truth = TruthSide::together(&TruthSide::sources(self.experiment, model));
             let ends = filter.errors_at_ends(&truth);
-            let figures = |end: &Instant| [&end.rmse()[..], &horizontal_quantiles(end, QUANTILES)].concat();
+            let figures =
+                |end: &Instant| [&end.rmse()[..], &horizontal_quantiles(end, QUANTILES)].concat();
             ends.iter().map(|end| figures(&end.errors)).collect()
         };
         for (outage, interval) in outages.iter_mut().zip(intervals(truth, draws, &figures)) {
             let rmse = outage.rmse_end.0;
-            outage.rmse_end_ci95 = Some(PerState(std::array::from_fn(|i| interval.about(i, rmse[i]))));
+            outage.rmse_end_ci95 = Some(PerState(std::array::from_fn(|i| {
+                interval.about(i, rmse[i])
+            })));
             let h = &mut outage.horizontal_error_end_m;
             let ends = |(low, high): (f64, f64)| (Some(low), Some(high));
             h.p50_ci95 = ends(interval.about(rmse.len(), h.p50));
@@ -62,15 +65,25 @@ impl Analysed<'_> {
     ) {
         let track = self.track.merged();
         let figures = |model: &Model| -> Vec<Figures> {
-            let Some(belief) = full(model) else { return Vec::new() };
+            let Some(belief) = full(model) else {
+                return Vec::new();
+            };
             let filter = FilterPass::new(&track, &belief);
             let means = filter.sigma_means(self.experiment.outages);
-            filter.sigma_at_ends().iter().zip(means).map(|(end, mean)| [&end[..], &mean].concat()).collect()
+            filter
+                .sigma_at_ends()
+                .iter()
+                .zip(means)
+                .map(|(end, mean)| [&end[..], &mean].concat())
+                .collect()
         };
         for (outage, interval) in outages.iter_mut().zip(intervals(model, draws, &figures)) {
             let (end, mean) = (outage.asee_end.0, outage.asee_mean.0);
-            outage.asee_end_ci95 = Some(PerState(std::array::from_fn(|i| interval.about(i, end[i]))));
-            let of_mean = PerState(std::array::from_fn(|i| interval.about(end.len() + i, mean[i])));
+            outage.asee_end_ci95 =
+                Some(PerState(std::array::from_fn(|i| interval.about(i, end[i]))));
+            let of_mean = PerState(std::array::from_fn(|i| {
+                interval.about(end.len() + i, mean[i])
+            }));
             // An outage between two reports has no mean.
             outage.asee_mean_ci95 = Some(of_mean).filter(|_| mean.iter().all(|x| x.is_finite()));
         }
@@ -103,8 +116,15 @@ fn intervals(
     let of_draws: Vec<Vec<Figures>> = draws.models.par_iter().map(figures).collect();
     let of_outage = |(k, estimate): (usize, Figures)| Drawn {
         estimate,
-        draws: of_draws.iter().filter_map(|ends| ends.get(k).cloned()).collect(),
+        draws: of_draws
+            .iter()
+            .filter_map(|ends| ends.get(k).cloned())
+            .collect(),
         stretch: draws.stretch,
     };
-    figures(estimate).into_iter().enumerate().map(of_outage).collect()
+    figures(estimate)
+        .into_iter()
+        .enumerate()
+        .map(of_outage)
+        .collect()
 }

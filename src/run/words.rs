@@ -24,7 +24,9 @@ impl Note {
             Self::Reduction(quality) => {
                 let mut said = one(Importance::Remark, reduction_line(quality));
                 said.extend(
-                    reduction_doubt(quality).into_iter().flat_map(|text| one(Importance::Warning, text)),
+                    reduction_doubt(quality)
+                        .into_iter()
+                        .flat_map(|text| one(Importance::Warning, text)),
                 );
                 said
             }

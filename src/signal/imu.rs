@@ -53,10 +53,16 @@ pub struct Channel {
 impl Channel {
     /// All six channels: accelerometer x, y, z, gyroscope x, y, z.
     pub const ALL: [Self; 6] = {
-        let mut all = [Self { sensor: Sensor::Accel, axis: Axis::X }; 6];
+        let mut all = [Self {
+            sensor: Sensor::Accel,
+            axis: Axis::X,
+        }; 6];
         let mut i = 0;
         while i < 6 {
-            all[i] = Self { sensor: Sensor::ALL[i / 3], axis: Axis::ALL[i % 3] };
+            all[i] = Self {
+                sensor: Sensor::ALL[i / 3],
+                axis: Axis::ALL[i % 3],
+            };
             i += 1;
         }
         all
@@ -72,7 +78,10 @@ impl Channel {
     #[must_use]
     pub fn named(word: &str) -> Vec<Self> {
         let meant = |c: &Self| {
-            word == "all" || word == c.sensor.name() || word == c.axis.name() || word == c.to_string()
+            word == "all"
+                || word == c.sensor.name()
+                || word == c.axis.name()
+                || word == c.to_string()
         };
         Self::ALL.into_iter().filter(meant).collect()
     }

@@ -43,9 +43,13 @@ impl StreamKey<'_> {
     #[must_use]
     pub fn generator(&self) -> Generator {
         let mut hasher = blake3::Hasher::new();
-        hasher.update(&self.seed.to_le_bytes()).update(&self.run.to_le_bytes());
+        hasher
+            .update(&self.seed.to_le_bytes())
+            .update(&self.run.to_le_bytes());
         for part in [self.scenario, self.source, self.process] {
-            hasher.update(&(part.len() as u64).to_le_bytes()).update(part.as_bytes());
+            hasher
+                .update(&(part.len() as u64).to_le_bytes())
+                .update(part.as_bytes());
         }
         Generator::from_seed(*hasher.finalize().as_bytes())
     }
@@ -56,20 +60,40 @@ mod tests {
     use super::*;
     use rand::Rng;
 
-    const KEY: StreamKey<'_> = StreamKey { seed: 1, scenario: "", run: 0, source: "accel.x", process: "WN" };
+    const KEY: StreamKey<'_> = StreamKey {
+        seed: 1,
+        scenario: "",
+        run: 0,
+        source: "accel.x",
+        process: "WN",
+    };
 
     #[test]
     fn streams_differ_in_every_part_of_the_key() {
         let keys = [
             KEY,
             StreamKey { seed: 2, ..KEY },
-            StreamKey { scenario: "a", ..KEY },
+            StreamKey {
+                scenario: "a",
+                ..KEY
+            },
             StreamKey { run: 1, ..KEY },
-            StreamKey { source: "accel.y", ..KEY },
-            StreamKey { process: "QN", ..KEY },
-            StreamKey { source: "accel.xW", process: "N", ..KEY },
+            StreamKey {
+                source: "accel.y",
+                ..KEY
+            },
+            StreamKey {
+                process: "QN",
+                ..KEY
+            },
+            StreamKey {
+                source: "accel.xW",
+                process: "N",
+                ..KEY
+            },
         ];
-        let first: std::collections::HashSet<u64> = keys.iter().map(|k| k.generator().next_u64()).collect();
+        let first: std::collections::HashSet<u64> =
+            keys.iter().map(|k| k.generator().next_u64()).collect();
         assert_eq!(first.len(), keys.len());
     }
 
@@ -78,6 +102,9 @@ mod tests {
     fn golden_values() {
         let mut g = KEY.generator();
         let drawn: [u64; 2] = [g.next_u64(), g.next_u64()];
-        assert_eq!(drawn, [6_952_805_350_898_267_710, 12_540_074_639_726_233_183]);
+        assert_eq!(
+            drawn,
+            [6_952_805_350_898_267_710, 12_540_074_639_726_233_183]
+        );
     }
 }

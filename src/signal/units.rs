@@ -36,7 +36,12 @@ impl SettingError {
     /// The refusal of a value.
     #[must_use]
     pub fn new(key: &str, value: impl ToString, requirement: impl Into<String>) -> Self {
-        Self { key: key.to_owned(), value: value.to_string(), requirement: requirement.into(), advice: None }
+        Self {
+            key: key.to_owned(),
+            value: value.to_string(),
+            requirement: requirement.into(),
+            advice: None,
+        }
     }
 
     /// The same with what to do about it.
@@ -98,7 +103,8 @@ pub fn exactly<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
     let list = Vec::<T>::deserialize(deserializer)?;
     let length = list.len();
     let expected = format!("a list of {N}");
-    list.try_into().map_err(|_| D::Error::invalid_length(length, &expected.as_str()))
+    list.try_into()
+        .map_err(|_| D::Error::invalid_length(length, &expected.as_str()))
 }
 
 /// The same where the list may be missing (with `default`).
@@ -135,7 +141,12 @@ pub fn require_finite(key: &str, values: &[f64]) -> Result<(), SettingError> {
     require(key, values, "a finite number", |_| true)
 }
 
-fn require(key: &str, values: &[f64], what: &str, ok: impl Fn(f64) -> bool) -> Result<(), SettingError> {
+fn require(
+    key: &str,
+    values: &[f64],
+    what: &str,
+    ok: impl Fn(f64) -> bool,
+) -> Result<(), SettingError> {
     match values.iter().find(|v| !(v.is_finite() && ok(**v))) {
         Some(bad) => Err(SettingError::new(key, bad, format!("it must be {what}"))),
         None => Ok(()),

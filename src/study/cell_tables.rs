@@ -36,7 +36,10 @@ impl CellTables {
         for named in units {
             match unit_file::read(&planned.directory, &named.1) {
                 Ok(unit) if findings.is_empty() => findings = unit.columns,
-                Ok(unit) => findings.iter_mut().zip(unit.columns).for_each(|(sum, later)| sum.append(later)),
+                Ok(unit) => findings
+                    .iter_mut()
+                    .zip(unit.columns)
+                    .for_each(|(sum, later)| sum.append(later)),
                 Err(e @ UnitFileError::Io { .. }) => return Err(e.into()),
                 Err(_) => damaged.push(named.clone()),
             }
@@ -52,21 +55,31 @@ impl CellTables {
             cell,
             windows: measured.first().map_or(Vec::new(), |m| m.outages.clone()),
             runs_of_columns: Vec::new(),
-            shown: ShownCell { name: grid.short_name(cell), columns: Vec::new() },
+            shown: ShownCell {
+                name: grid.short_name(cell),
+                columns: Vec::new(),
+            },
             outages: Vec::new(),
             epochs: Vec::new(),
             runs: Vec::new(),
             diverged: 0,
         };
-        for ((i, column), (finding, measured_here)) in
-            grid.columns.iter().enumerate().zip(findings.iter().zip(&measured))
+        for ((i, column), (finding, measured_here)) in grid
+            .columns
+            .iter()
+            .enumerate()
+            .zip(findings.iter().zip(&measured))
         {
             // the reference that has the same filter
             let is_reference = |c: &Column| c.candidate == reference.0 && c.filter == column.filter;
             let of_reference = grid.columns.iter().position(is_reference).unwrap_or(0);
             let comparison = match plan.kept() {
                 Kept::Runs => None,
-                _ => Some(metrics::compare(measured_here, &measured[of_reference], true)?),
+                _ => Some(metrics::compare(
+                    measured_here,
+                    &measured[of_reference],
+                    true,
+                )?),
             };
             let filter = grid.filter(cell, column).name();
             let result = ColumnResult {
@@ -77,12 +90,22 @@ impl CellTables {
                 measured: measured_here,
             };
             let outages = finding.outages();
-            tables.outages.extend(report::outage_rows(&result, &outages, comparison.as_deref()));
+            tables.outages.extend(report::outage_rows(
+                &result,
+                &outages,
+                comparison.as_deref(),
+            ));
             tables.runs.extend(report::run_rows(&result));
             if plan.study.keeps(Metric::Epochs) {
-                tables.epochs.extend(report::epoch_rows(&result, &finding.epochs()));
+                tables
+                    .epochs
+                    .extend(report::epoch_rows(&result, &finding.epochs()));
             }
-            tables.diverged += measured_here.sampled().iter().filter(|r| r.diverged).count() as u64;
+            tables.diverged += measured_here
+                .sampled()
+                .iter()
+                .filter(|r| r.diverged)
+                .count() as u64;
             let (name, label) = shown_names(&plan.study, column, filter);
             let is_reference = comparison.is_some() && of_reference == i;
             let verdict = measured_here.verdict();

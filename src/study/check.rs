@@ -26,18 +26,31 @@ impl Study {
     }
 
     fn name_all(&mut self) {
-        self.trajectory.iter_mut().for_each(|e| name_after(&mut e.name, Some(&e.file)));
+        self.trajectory
+            .iter_mut()
+            .for_each(|e| name_after(&mut e.name, Some(&e.file)));
         for e in &mut self.truth {
             let synthesised = e.synthesize.as_ref().map(|s| &s.model);
-            name_after(&mut e.name, e.model.as_ref().or(e.recordings.first()).or(synthesised));
+            name_after(
+                &mut e.name,
+                e.model.as_ref().or(e.recordings.first()).or(synthesised),
+            );
         }
         for e in &mut self.candidate {
-            let synthesised = e.calibrate.as_ref().and_then(|c| c.synthesize.as_ref()).map(|s| &s.model);
+            let synthesised = e
+                .calibrate
+                .as_ref()
+                .and_then(|c| c.synthesize.as_ref())
+                .map(|s| &s.model);
             let recorded = e.calibrate.as_ref().and_then(|c| c.recordings.first());
             name_after(&mut e.name, e.model.as_ref().or(recorded).or(synthesised));
         }
-        self.scenario.iter_mut().for_each(|e| name_after(&mut e.name, e.file.as_ref()));
-        self.gnss.iter_mut().for_each(|e| name_after(&mut e.name, e.file.as_ref()));
+        self.scenario
+            .iter_mut()
+            .for_each(|e| name_after(&mut e.name, e.file.as_ref()));
+        self.gnss
+            .iter_mut()
+            .for_each(|e| name_after(&mut e.name, e.file.as_ref()));
         for e in self.outages.iter_mut().filter(|e| e.name.is_empty()) {
             let kinds = [
                 ("windows", e.windows.is_some()),
@@ -45,14 +58,17 @@ impl Study {
                 ("periodic", e.periodic.is_some()),
                 ("random", e.random.is_some()),
             ];
-            e.name =
-                kinds.iter().find(|(_, is_given)| *is_given).map_or(String::new(), |(n, _)| (*n).to_owned());
+            e.name = kinds
+                .iter()
+                .find(|(_, is_given)| *is_given)
+                .map_or(String::new(), |(n, _)| (*n).to_owned());
         }
     }
 
     fn check_numbers(&self) -> Result<(), DescriptionError> {
-        let refuse =
-            |key: &str, value: String, reason: &str| Err(DescriptionError::refused(key, value, reason));
+        let refuse = |key: &str, value: String, reason: &str| {
+            Err(DescriptionError::refused(key, value, reason))
+        };
         if self.schema != 1 {
             return refuse(
                 "schema",
@@ -72,7 +88,11 @@ impl Study {
             return refuse("method", format!("\"{}\"", self.method.name()), reason);
         }
         if self.metrics.is_empty() {
-            return refuse("metrics", "[]".into(), "is empty; choose of outages, ratios, epochs");
+            return refuse(
+                "metrics",
+                "[]".into(),
+                "is empty; choose of outages, ratios, epochs",
+            );
         }
         Ok(())
     }
@@ -81,24 +101,38 @@ impl Study {
     fn check_axes(&self) -> Result<(), DescriptionError> {
         let empty = |key: &str, is_given: bool| match is_given {
             true => Ok(()),
-            false => Err(DescriptionError::Empty { axis: key.to_owned() }),
+            false => Err(DescriptionError::Empty {
+                axis: key.to_owned(),
+            }),
         };
         empty("trajectory", !self.trajectory.is_empty())?;
         empty("truth", !self.truth.is_empty())?;
         empty("candidate", !self.candidate.is_empty())?;
         for (i, e) in self.truth.iter().enumerate() {
-            let said = [e.model.is_some(), !e.recordings.is_empty(), e.synthesize.is_some()];
+            let said = [
+                e.model.is_some(),
+                !e.recordings.is_empty(),
+                e.synthesize.is_some(),
+            ];
             let key = format!("truth[{}]", i + 1);
             exactly_one(key.clone(), &said, "model, recordings, synthesize")?;
             check_rate(&key, e.rate_hz)?;
             if e.each && e.recordings.is_empty() {
-                return Err(DescriptionError::refused(&format!("{key}.each"), true, "is of recordings"));
+                return Err(DescriptionError::refused(
+                    &format!("{key}.each"),
+                    true,
+                    "is of recordings",
+                ));
             }
         }
         self.check_truth_is_modelled()?;
         for (i, e) in self.candidate.iter().enumerate() {
             let key = format!("candidate[{}]", i + 1);
-            exactly_one(key.clone(), &[e.model.is_some(), e.calibrate.is_some()], "model, calibrate")?;
+            exactly_one(
+                key.clone(),
+                &[e.model.is_some(), e.calibrate.is_some()],
+                "model, calibrate",
+            )?;
             let Some(step) = &e.calibrate else { continue };
             let said = [!step.recordings.is_empty(), step.synthesize.is_some()];
             exactly_one(format!("{key}.calibrate"), &said, "recordings, synthesize")?;
@@ -112,7 +146,11 @@ impl Study {
             }
             if let Err(source) = step.fit.parse::<ModelSpec>() {
                 let (key, fit) = (format!("{key}.calibrate.fit"), step.fit.clone());
-                return Err(DescriptionError::NotModel { key, fit, source: Box::new(source) });
+                return Err(DescriptionError::NotModel {
+                    key,
+                    fit,
+                    source: Box::new(source),
+                });
             }
             let key = format!("{key}.calibrate.estimators");
             empty(&key, !step.estimators.is_empty())?;
@@ -130,10 +168,17 @@ impl Study {
             exactly_one(format!("gnss[{}]", i + 1), &said, "file, settings")?;
         }
         let syntheses = self.syntheses();
-        match syntheses.iter().find(|(_, s)| s.replicates == 0 || s.samples < Synthesis::LEAST_SAMPLES) {
+        match syntheses
+            .iter()
+            .find(|(_, s)| s.replicates == 0 || s.samples < Synthesis::LEAST_SAMPLES)
+        {
             Some((key, s)) => {
                 let value = format!("{} of {} samples", s.replicates, s.samples);
-                Err(DescriptionError::refused(key, value, "cannot be made: at least 1 of 2 samples"))
+                Err(DescriptionError::refused(
+                    key,
+                    value,
+                    "cannot be made: at least 1 of 2 samples",
+                ))
             }
             None => Ok(()),
         }
@@ -164,11 +209,20 @@ impl Study {
 
     /// No filter twice: its columns could not be told apart.
     fn check_filters(&self) -> Result<(), DescriptionError> {
-        match self.filters.iter().enumerate().find(|(i, f)| self.filters[..*i].contains(f)) {
+        match self
+            .filters
+            .iter()
+            .enumerate()
+            .find(|(i, f)| self.filters[..*i].contains(f))
+        {
             Some((_, filter)) => {
                 let twice = serde_json::to_string(filter).unwrap_or_default();
                 let shown = serde_json::to_string(&self.filters).unwrap_or_default();
-                Err(DescriptionError::refused("filters", shown, format!("names {twice} twice")))
+                Err(DescriptionError::refused(
+                    "filters",
+                    shown,
+                    format!("names {twice} twice"),
+                ))
             }
             None => Ok(()),
         }
@@ -177,12 +231,27 @@ impl Study {
     /// Names of every axis.
     fn names(&self) -> [(&'static str, Vec<&str>); 6] {
         [
-            ("trajectory", self.trajectory.iter().map(|e| e.name.as_str()).collect()),
-            ("truth", self.truth.iter().map(|e| e.name.as_str()).collect()),
-            ("candidate", self.candidate.iter().map(|e| e.name.as_str()).collect()),
-            ("scenario", self.scenario.iter().map(|e| e.name.as_str()).collect()),
+            (
+                "trajectory",
+                self.trajectory.iter().map(|e| e.name.as_str()).collect(),
+            ),
+            (
+                "truth",
+                self.truth.iter().map(|e| e.name.as_str()).collect(),
+            ),
+            (
+                "candidate",
+                self.candidate.iter().map(|e| e.name.as_str()).collect(),
+            ),
+            (
+                "scenario",
+                self.scenario.iter().map(|e| e.name.as_str()).collect(),
+            ),
             ("gnss", self.gnss.iter().map(|e| e.name.as_str()).collect()),
-            ("outages", self.outages.iter().map(|e| e.name.as_str()).collect()),
+            (
+                "outages",
+                self.outages.iter().map(|e| e.name.as_str()).collect(),
+            ),
         ]
     }
 }
@@ -201,7 +270,11 @@ fn check_rate(entry: &str, rate_hz: Option<f64>) -> Result<(), DescriptionError>
     match rate_hz {
         Some(rate_hz) if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) => {
             let reason = format!("is not a rate: it must be > 0 and at most {MAX_RATE_HZ}");
-            Err(DescriptionError::refused(&format!("{entry}.rate_hz"), rate_hz, reason))
+            Err(DescriptionError::refused(
+                &format!("{entry}.rate_hz"),
+                rate_hz,
+                reason,
+            ))
         }
         _ => Ok(()),
     }

@@ -292,8 +292,12 @@ impl Study {
             ))
         });
         let of_truths = self.truth.iter().enumerate();
-        let of_truths = of_truths
-            .filter_map(|(i, e)| Some((format!("truth[{}].synthesize", i + 1), e.synthesize.as_ref()?)));
+        let of_truths = of_truths.filter_map(|(i, e)| {
+            Some((
+                format!("truth[{}].synthesize", i + 1),
+                e.synthesize.as_ref()?,
+            ))
+        });
         of_candidates.chain(of_truths).collect()
     }
 
@@ -306,7 +310,10 @@ impl Study {
         for (i, entry) in self.outages.iter().enumerate() {
             sets.extend(expand(entry, i)?.into_iter().map(|set| (i, set)));
         }
-        let names: Vec<(usize, &str)> = sets.iter().map(|(i, set)| (*i, set.name.as_str())).collect();
+        let names: Vec<(usize, &str)> = sets
+            .iter()
+            .map(|(i, set)| (*i, set.name.as_str()))
+            .collect();
         unique("outages", &names)?;
         Ok(sets.into_iter().map(|(_, set)| set).collect())
     }
@@ -319,11 +326,17 @@ impl Study {
                 vec![(e.name.clone(), i, Some(step.estimators[0]))]
             }
             Some(step) => {
-                let label = |estimator: &Estimator| (format!("{}/{estimator}", e.name), i, Some(*estimator));
+                let label = |estimator: &Estimator| {
+                    (format!("{}/{estimator}", e.name), i, Some(*estimator))
+                };
                 step.estimators.iter().map(label).collect()
             }
         };
-        self.candidate.iter().enumerate().flat_map(labels_of_entry).collect()
+        self.candidate
+            .iter()
+            .enumerate()
+            .flat_map(labels_of_entry)
+            .collect()
     }
 
     /// Whether a candidate is calibrated without the recordings that make the errors.
@@ -337,9 +350,14 @@ impl Study {
     /// When no candidate has that name.
     pub(crate) fn reference(&self) -> Result<usize, DescriptionError> {
         let candidates = self.candidates();
-        let names: Vec<(usize, &str)> = candidates.iter().map(|(name, i, _)| (*i, name.as_str())).collect();
+        let names: Vec<(usize, &str)> = candidates
+            .iter()
+            .map(|(name, i, _)| (*i, name.as_str()))
+            .collect();
         unique("candidate", &names)?;
-        let Some(wanted) = &self.reference else { return Ok(0) };
+        let Some(wanted) = &self.reference else {
+            return Ok(0);
+        };
         let found = candidates.iter().position(|(name, ..)| name == wanted);
         found.ok_or_else(|| DescriptionError::NoReference {
             reference: wanted.clone(),
@@ -350,7 +368,11 @@ impl Study {
     /// Files that the study names: what for, and where.
     pub(crate) fn files(&self) -> Vec<(&'static str, &Path)> {
         let mut files: Vec<(&'static str, &Path)> = Vec::new();
-        files.extend(self.trajectory.iter().map(|e| ("trajectory", e.file.as_path())));
+        files.extend(
+            self.trajectory
+                .iter()
+                .map(|e| ("trajectory", e.file.as_path())),
+        );
         for e in &self.truth {
             files.extend(e.model.iter().map(|p| ("truth", p.as_path())));
             files.extend(e.recordings.iter().map(|p| ("static", p.as_path())));
@@ -360,9 +382,21 @@ impl Study {
             let recordings = e.calibrate.iter().flat_map(|c| &c.recordings);
             files.extend(recordings.map(|p| ("recording", p.as_path())));
         }
-        files.extend(self.syntheses().into_iter().map(|(_, s)| ("virtual IMU", s.model.as_path())));
-        files.extend(self.scenario.iter().filter_map(|e| Some(("scenario", e.file.as_deref()?))));
-        files.extend(self.gnss.iter().filter_map(|e| Some(("gnss", e.file.as_deref()?))));
+        files.extend(
+            self.syntheses()
+                .into_iter()
+                .map(|(_, s)| ("virtual IMU", s.model.as_path())),
+        );
+        files.extend(
+            self.scenario
+                .iter()
+                .filter_map(|e| Some(("scenario", e.file.as_deref()?))),
+        );
+        files.extend(
+            self.gnss
+                .iter()
+                .filter_map(|e| Some(("gnss", e.file.as_deref()?))),
+        );
         files
     }
 

@@ -5,7 +5,8 @@ use crate::report::comparison_table::{CandidateResult, Label, ratio_table};
 use crate::report::states::tone;
 use crate::report::verdict::{gravest, verdict_in_short};
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, readable, window,
+    Axis, Cell, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table,
+    readable, window,
 };
 use nav_sim_navigation::metrics::{OutageComparison, OutageMetrics, Verdict, VerdictKind};
 
@@ -69,12 +70,20 @@ impl MergedStudy {
     pub(crate) fn document(&self) -> Document {
         let columns = self.cells.iter().flat_map(|cell| &cell.columns);
         let kind = gravest(columns.map(|column| &column.verdict));
-        let mut lines: Vec<String> = self.rankings.iter().take(1).flat_map(|r| r.verdict.clone()).collect();
+        let mut lines: Vec<String> = self
+            .rankings
+            .iter()
+            .take(1)
+            .flat_map(|r| r.verdict.clone())
+            .collect();
         lines.extend(self.verdict());
         lines.push(self.subject.clone());
         let mut document = Document::new("Study", tone(kind), lines);
         for place in &self.rankings {
-            document.section(&format!("Candidates on recordings left out: {}", place.name));
+            document.section(&format!(
+                "Candidates on recordings left out: {}",
+                place.name
+            ));
             place.verdict.iter().for_each(|line| document.text(line));
             document.table(&place.table);
         }
@@ -86,13 +95,23 @@ impl MergedStudy {
         document.section("Verdict on each filter");
         document.text("NEES over the run (9 if right); error over its standard deviation in the state that is farthest off.");
         document.table(&self.verdict_table());
-        for cell in self.cells.iter().filter(|c| c.columns.len() > 1 && c.columns[0].comparison.is_some()) {
-            document.section(&format!("{}: ASEE relative to {}", cell.name, self.reference));
+        for cell in self
+            .cells
+            .iter()
+            .filter(|c| c.columns.len() > 1 && c.columns[0].comparison.is_some())
+        {
+            document.section(&format!(
+                "{}: ASEE relative to {}",
+                cell.name, self.reference
+            ));
             document.text("Mean over the outage of (ratio − 1)·100 ± half the 95 % interval.");
             document.table(&cell.ratio_table(&self.states));
         }
         if self.more > 0 {
-            document.note(Importance::Remark, format!("{} more cells are in outages.csv", self.more));
+            document.note(
+                Importance::Remark,
+                format!("{} more cells are in outages.csv", self.more),
+            );
         }
         document
     }
@@ -100,10 +119,16 @@ impl MergedStudy {
     /// Candidate by candidate: in how many cells its filter is as good as it believes, and what it is in the others.
     fn verdict(&self) -> Vec<String> {
         const LINES: usize = 4;
-        let Some(first) = self.cells.first() else { return vec!["the study has no cell".to_owned()] };
+        let Some(first) = self.cells.first() else {
+            return vec!["the study has no cell".to_owned()];
+        };
         let of_column = |(k, column): (usize, &ShownColumn)| {
-            let verdicts =
-                || self.cells.iter().filter_map(move |cell| cell.columns.get(k)).map(|c| &c.verdict);
+            let verdicts = || {
+                self.cells
+                    .iter()
+                    .filter_map(move |cell| cell.columns.get(k))
+                    .map(|c| &c.verdict)
+            };
             let told = VerdictKind::ALL.iter().filter_map(|kind| {
                 let of_kind = verdicts().filter(|verdict| verdict.kind == *kind).count();
                 (of_kind > 0).then(|| format!("{kind} in {of_kind}"))
@@ -111,8 +136,11 @@ impl MergedStudy {
             format!("{}: {}", column.name, told.collect::<Vec<_>>().join(", "))
         };
         let all: Vec<String> = first.columns.iter().enumerate().map(of_column).collect();
-        let cells =
-            if self.cells.len() == 1 { "one cell".to_owned() } else { format!("{} cells", self.cells.len()) };
+        let cells = if self.cells.len() == 1 {
+            "one cell".to_owned()
+        } else {
+            format!("{} cells", self.cells.len())
+        };
         let line = format!("of {cells}, {}", all.join("; "));
         match line.chars().count() <= 120 {
             true => vec![line],
@@ -132,9 +160,15 @@ impl MergedStudy {
         let mut table = self.table(&["cell"], "");
         for cell in &self.cells {
             let shown = |column: &ShownColumn| {
-                Cell::from(format!("{}, {}", column.verdict.kind, verdict_in_short(&column.verdict)))
+                Cell::from(format!(
+                    "{}, {}",
+                    column.verdict.kind,
+                    verdict_in_short(&column.verdict)
+                ))
             };
-            table.row(std::iter::once(cell.name.as_str().into()).chain(cell.columns.iter().map(shown)));
+            table.row(
+                std::iter::once(cell.name.as_str().into()).chain(cell.columns.iter().map(shown)),
+            );
         }
         table
     }
@@ -143,7 +177,9 @@ impl MergedStudy {
     fn drift_table(&self) -> Table {
         let mut table = self.table(&["cell", "outage"], " (m)");
         for ShownCell { name, columns } in &self.cells {
-            let Some(first) = columns.first() else { continue };
+            let Some(first) = columns.first() else {
+                continue;
+            };
             for (i, o) in first.outages.iter().enumerate() {
                 let shown = |column: &ShownColumn| {
                     let o = &column.outages[i];
@@ -162,8 +198,11 @@ impl MergedStudy {
     fn drift(&self) -> Option<Chart> {
         let cells = &self.cells;
         let duration = |o: &OutageMetrics| o.end_s - o.start_s;
-        let mut lengths: Vec<f64> =
-            cells.iter().flat_map(|c| &c.columns).flat_map(|c| c.outages.iter().map(duration)).collect();
+        let mut lengths: Vec<f64> = cells
+            .iter()
+            .flat_map(|c| &c.columns)
+            .flat_map(|c| c.outages.iter().map(duration))
+            .collect();
         lengths.sort_by(f64::total_cmp);
         lengths.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
         if lengths.len() < 2 {
@@ -172,7 +211,10 @@ impl MergedStudy {
         let names: Vec<&str> = cells[0].columns.iter().map(|c| c.name.as_str()).collect();
         let mut series = Vec::new();
         for (k, name) in names.iter().enumerate() {
-            let outages = cells.iter().filter_map(|c| c.columns.get(k)).flat_map(|c| &c.outages);
+            let outages = cells
+                .iter()
+                .filter_map(|c| c.columns.get(k))
+                .flat_map(|c| &c.outages);
             // beside one another, by two per cent of the length
             let beside = 1.0 + 0.02 * (k as f64 - 0.5 * (names.len() as f64 - 1.0));
             let point = |o: &OutageMetrics| Interval {
@@ -184,11 +226,18 @@ impl MergedStudy {
             let mut points: Vec<Interval> = outages.map(point).collect();
             points.sort_by(|a, b| a.x.total_cmp(&b.x));
             if points.windows(2).all(|pair| pair[0].x < pair[1].x) {
-                series.push(Series::line(name, Colour::Hue(k), points.iter().map(|p| (p.x, p.y)).collect()));
+                series.push(Series::line(
+                    name,
+                    Colour::Hue(k),
+                    points.iter().map(|p| (p.x, p.y)).collect(),
+                ));
             }
             series.push(Series::new(name, Colour::Hue(k), Mark::Points(points)));
         }
-        let panel = Panel { height: 1.3, ..Panel::new(Axis::log("horizontal error (m)"), series) };
+        let panel = Panel {
+            height: 1.3,
+            ..Panel::new(Axis::log("horizontal error (m)"), series)
+        };
         Some(Chart::new(
             "Drift against the length of an outage",
             Axis::log("length of the outage (s)"),
@@ -209,7 +258,10 @@ impl ShownCell {
             outages: column.comparison.clone().unwrap_or_default(),
         };
         let candidates: Vec<CandidateResult> = self.columns.iter().map(candidate).collect();
-        let outages = self.columns.first().map_or(&[][..], |column| &column.outages);
+        let outages = self
+            .columns
+            .first()
+            .map_or(&[][..], |column| &column.outages);
         let outages: Vec<(f64, f64)> = outages.iter().map(|o| (o.start_s, o.end_s)).collect();
         ratio_table(&candidates, states, &outages)
     }
@@ -242,7 +294,10 @@ mod tests {
         let table = cell.ratio_table(&[1]).csv();
         let rows: Vec<&str> = table.lines().collect();
         let window = window(outages[0].start_s, outages[0].end_s);
-        assert!(rows[1].starts_with(&format!("right,{window},reference")), "{table}");
+        assert!(
+            rows[1].starts_with(&format!("right,{window},reference")),
+            "{table}"
+        );
         assert_eq!(rows.len(), 1 + 2 * outages.len());
     }
 }

@@ -87,7 +87,11 @@ pub enum DescriptionError {
 impl DescriptionError {
     /// The refusal of a value.
     pub(crate) fn refused(key: &str, value: impl ToString, reason: impl Into<String>) -> Self {
-        Self::Refused { key: key.to_owned(), value: value.to_string(), reason: reason.into() }
+        Self::Refused {
+            key: key.to_owned(),
+            value: value.to_string(),
+            reason: reason.into(),
+        }
     }
 
     /// The key to look for in the file, dotted.
@@ -110,21 +114,29 @@ impl DescriptionError {
     pub(crate) fn hint(&self) -> Option<String> {
         match self {
             Self::NotModel { source, .. } => Some(suggest::model(source, ModelSpec::legal())),
-            Self::NotSingle { .. } => {
-                Some("give it one recording, or take awv, sr-awv or dr-awv, which average several".into())
+            Self::NotSingle { .. } => Some(
+                "give it one recording, or take awv, sr-awv or dr-awv, which average several"
+                    .into(),
+            ),
+            Self::Empty { axis } if axis.contains('[') => {
+                Some("a list without values makes no cell".into())
             }
-            Self::Empty { axis } if axis.contains('[') => Some("a list without values makes no cell".into()),
             Self::Empty { axis } => Some(format!("add a [[{axis}]] to the study")),
-            Self::Duplicate { .. } | Self::Unnamed { .. } => Some("give each entry a \"name\"".into()),
-            Self::NoModel { .. } => {
-                Some("calibrate a model of the recordings and name it with \"model\", or sample".into())
+            Self::Duplicate { .. } | Self::Unnamed { .. } => {
+                Some("give each entry a \"name\"".into())
             }
-            Self::NoReference { reference, candidates } => {
-                Some(match nearest(reference, candidates.iter().map(String::as_str)) {
+            Self::NoModel { .. } => Some(
+                "calibrate a model of the recordings and name it with \"model\", or sample".into(),
+            ),
+            Self::NoReference {
+                reference,
+                candidates,
+            } => Some(
+                match nearest(reference, candidates.iter().map(String::as_str)) {
                     Some(meant) => format!("did you mean \"{meant}\"?"),
                     None => format!("candidates: {}", candidates.join(", ")),
-                })
-            }
+                },
+            ),
             _ => None,
         }
     }

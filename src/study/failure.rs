@@ -56,7 +56,9 @@ pub enum StudyError {
         left: usize,
     },
     /// A covariance that ran away.
-    #[error("{cell}: the covariance analysis of {column} did not stay finite and positive definite")]
+    #[error(
+        "{cell}: the covariance analysis of {column} did not stay finite and positive definite"
+    )]
     NotFinite {
         /// Names of the cell.
         cell: String,
@@ -110,14 +112,21 @@ impl From<FileError> for StudyError {
 
 impl StudyError {
     pub(super) fn unfit(part: impl ToString, reason: impl ToString) -> Self {
-        Self::Unfit { part: part.to_string(), reason: reason.to_string(), hint: None }
+        Self::Unfit {
+            part: part.to_string(),
+            reason: reason.to_string(),
+            hint: None,
+        }
     }
 
     /// Whether contents or the request are at fault (rather than the machine).
     pub(crate) fn is_usage(&self) -> bool {
         match self {
             Self::File(e) => !e.is_system(),
-            Self::Unit(_) | Self::Comparison(_) | Self::NotFinite { .. } | Self::LostModel { .. } => false,
+            Self::Unit(_)
+            | Self::Comparison(_)
+            | Self::NotFinite { .. }
+            | Self::LostModel { .. } => false,
             _ => true,
         }
     }

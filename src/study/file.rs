@@ -41,16 +41,27 @@ pub(crate) fn read(path: &Path) -> Result<StudyFile, FileError> {
         ("gnss", study.gnss.is_empty()),
         ("outages", study.outages.is_empty()),
     ];
-    if let Some((key, _)) = empty.into_iter().find(|(key, is_empty)| *is_empty && source.has(key)) {
+    if let Some((key, _)) = empty
+        .into_iter()
+        .find(|(key, is_empty)| *is_empty && source.has(key))
+    {
         return Err(source.refused(key, "makes no cell; leave the key out for the default"));
     }
     let written = one_truth_each(&mut study, path)?;
-    let checked = study.resolve().and_then(|()| study.reference()).and_then(|_| single(&study, path));
+    let checked = study
+        .resolve()
+        .and_then(|()| study.reference())
+        .and_then(|_| single(&study, path));
     checked.map_err(|e| located(&e, &written, &source))?;
     let scenarios = scenarios(&study, path, &source)?;
     let gnss = receivers(&study, path, &source)?;
     let unused = unused(&study, path, &source)?;
-    Ok(StudyFile { study, scenarios, gnss, unused })
+    Ok(StudyFile {
+        study,
+        scenarios,
+        gnss,
+        unused,
+    })
 }
 
 /// Puts a truth for each recording in the place of one that says so.
@@ -72,9 +83,21 @@ fn one_truth_each(study: &mut Study, path: &Path) -> Result<Vec<usize>, FileErro
                     Some(name) if is_directory => given.join(name),
                     _ => given.clone(),
                 };
-                let stem = named.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-                let name = if entry.name.is_empty() { stem } else { format!("{}/{stem}", entry.name) };
-                truths.push(TruthEntry { name, recordings: vec![named], each: false, ..entry.clone() });
+                let stem = named
+                    .file_stem()
+                    .map(|s| s.to_string_lossy().into_owned())
+                    .unwrap_or_default();
+                let name = if entry.name.is_empty() {
+                    stem
+                } else {
+                    format!("{}/{stem}", entry.name)
+                };
+                truths.push(TruthEntry {
+                    name,
+                    recordings: vec![named],
+                    each: false,
+                    ..entry.clone()
+                });
                 written.push(number);
             }
         }
@@ -87,11 +110,16 @@ fn one_truth_each(study: &mut Study, path: &Path) -> Result<Vec<usize>, FileErro
 /// known when it is made.
 fn single(study: &Study, path: &Path) -> Result<(), DescriptionError> {
     for (i, entry) in (1..).zip(&study.candidate) {
-        let Some(step) = entry.calibrate.as_ref().filter(|step| !step.leave_out) else { continue };
-        let Some(estimator) = step.estimators.iter().find(|e| e.is_single()) else { continue };
+        let Some(step) = entry.calibrate.as_ref().filter(|step| !step.leave_out) else {
+            continue;
+        };
+        let Some(estimator) = step.estimators.iter().find(|e| e.is_single()) else {
+            continue;
+        };
         let recordings = step.synthesize.as_ref().map_or_else(
             || {
-                let places: Vec<PathBuf> = step.recordings.iter().map(|r| beside(path, r)).collect();
+                let places: Vec<PathBuf> =
+                    step.recordings.iter().map(|r| beside(path, r)).collect();
                 // what is not there is told later, by its key
                 recordings::listed(&places).map_or(places.len(), |files| files.len()) as u64
             },
@@ -99,7 +127,11 @@ fn single(study: &Study, path: &Path) -> Result<(), DescriptionError> {
         );
         if recordings > 1 {
             let key = format!("candidate[{i}].calibrate.estimators");
-            return Err(DescriptionError::NotSingle { key, estimator: *estimator, recordings });
+            return Err(DescriptionError::NotSingle {
+                key,
+                estimator: *estimator,
+                recordings,
+            });
         }
     }
     Ok(())
@@ -129,7 +161,9 @@ fn unused(study: &Study, path: &Path, source: &Source) -> Result<Vec<String>, Fi
             Some(file) => Some(Source::read(&beside(path, file))?.get()?),
             None => written.settings,
         };
-        let keys = of_run.into_iter().flat_map(|OfRun { run }| run.into_iter().map(|(key, _)| key));
+        let keys = of_run
+            .into_iter()
+            .flat_map(|OfRun { run }| run.into_iter().map(|(key, _)| key));
         let keys: Vec<String> = keys.filter(|key| key != "coverage_level").collect();
         if !keys.is_empty() {
             said.push(format!(
@@ -143,7 +177,13 @@ fn unused(study: &Study, path: &Path, source: &Source) -> Result<Vec<String>, Fi
 }
 
 fn scenarios(study: &Study, path: &Path, source: &Source) -> Result<Vec<Scenario>, FileError> {
-    let possible = |scenario: &Scenario| if study.is_sampled() { Ok(()) } else { scenario.analysable() };
+    let possible = |scenario: &Scenario| {
+        if study.is_sampled() {
+            Ok(())
+        } else {
+            scenario.analysable()
+        }
+    };
     let scenario = |(i, entry): (usize, &ScenarioEntry)| match (&entry.file, &entry.settings) {
         (Some(file), _) => scenario_file::read_for(&beside(path, file), possible),
         (None, settings) => {
@@ -163,7 +203,8 @@ fn receivers(study: &Study, path: &Path, source: &Source) -> Result<Vec<GnssSett
         (None, settings) => {
             let gnss = settings.clone().unwrap_or_default();
             let section = format!("gnss[{}].settings", i + 1);
-            gnss.validate().map_err(|e| source.setting(&e.in_section(&section)))?;
+            gnss.validate()
+                .map_err(|e| source.setting(&e.in_section(&section)))?;
             Ok(gnss)
         }
     };
@@ -173,11 +214,22 @@ fn receivers(study: &Study, path: &Path, source: &Source) -> Result<Vec<GnssSett
 /// A refusal by [`Study::resolve`] at the line its key stands in; `truths`: the entry of the file that each truth is of.
 fn located(error: &DescriptionError, truths: &[usize], source: &Source) -> FileError {
     let mut key = error.key();
-    if let Some((number, rest)) = key.strip_prefix("truth[").and_then(|rest| rest.split_once(']')) {
-        let written = number.parse().ok().and_then(|i: usize| truths.get(i.checked_sub(1)?));
-        key = written.map_or_else(|| "truth".to_owned(), |number| format!("truth[{number}]{rest}"));
+    if let Some((number, rest)) = key
+        .strip_prefix("truth[")
+        .and_then(|rest| rest.split_once(']'))
+    {
+        let written = number
+            .parse()
+            .ok()
+            .and_then(|i: usize| truths.get(i.checked_sub(1)?));
+        key = written.map_or_else(
+            || "truth".to_owned(),
+            |number| format!("truth[{number}]{rest}"),
+        );
     }
-    source.error(&key, Kind::Contents(error.to_string().into())).advice_if(error.hint())
+    source
+        .error(&key, Kind::Contents(error.to_string().into()))
+        .advice_if(error.hint())
 }
 
 #[cfg(test)]
@@ -196,17 +248,26 @@ mod tests {
         let path = dir.path().join("s.toml");
         std::fs::write(&path, text).unwrap();
         let place = format!("{}/", dir.path().display());
-        read(&path).map_err(|e| format!("{e} | {}", e.hint().unwrap_or_default()).replace(&place, ""))
+        read(&path)
+            .map_err(|e| format!("{e} | {}", e.hint().unwrap_or_default()).replace(&place, ""))
     }
 
     #[test]
     fn names_and_defaults_are_filled_in() {
         let file = study(STUDY).unwrap();
         let s = &file.study;
-        assert_eq!((s.trajectory[0].name.as_str(), s.truth[0].name.as_str()), ("land", "m"));
+        assert_eq!(
+            (s.trajectory[0].name.as_str(), s.truth[0].name.as_str()),
+            ("land", "m")
+        );
         let candidates: Vec<String> = s.candidates().into_iter().map(|(name, ..)| name).collect();
         assert_eq!(candidates, ["m", "II/awv", "II/dr-awv"]);
-        let sets: Vec<String> = s.outage_sets().unwrap().into_iter().map(|o| o.name).collect();
+        let sets: Vec<String> = s
+            .outage_sets()
+            .unwrap()
+            .into_iter()
+            .map(|o| o.name)
+            .collect();
         assert_eq!(sets, ["sweep(300,10)", "sweep(300,20)"]);
         assert!(file.scenarios.is_empty() && file.gnss.is_empty());
     }
@@ -216,8 +277,11 @@ mod tests {
     fn runs_of_a_scenario_are_said_to_be_unused() {
         let with = |scenario: &str| {
             let dir = tempfile::tempdir().unwrap();
-            std::fs::write(dir.path().join("own.toml"), "[run]\nruns = 3\nseed = 4\ncoverage_level = 0.9\n")
-                .unwrap();
+            std::fs::write(
+                dir.path().join("own.toml"),
+                "[run]\nruns = 3\nseed = 4\ncoverage_level = 0.9\n",
+            )
+            .unwrap();
             let path = dir.path().join("s.toml");
             std::fs::write(&path, format!("{STUDY}[[scenario]]\n{scenario}\n")).unwrap();
             read(&path).unwrap().unused
@@ -228,8 +292,14 @@ mod tests {
             )]
         };
         assert_eq!(with("file = \"own.toml\""), told("own", "runs, seed"));
-        assert_eq!(with("name = \"a\"\nsettings.run.runs = 3"), told("a", "runs"));
-        assert_eq!(with("name = \"a\"\nsettings.run.coverage_level = 0.9"), [""; 0]);
+        assert_eq!(
+            with("name = \"a\"\nsettings.run.runs = 3"),
+            told("a", "runs")
+        );
+        assert_eq!(
+            with("name = \"a\"\nsettings.run.coverage_level = 0.9"),
+            [""; 0]
+        );
     }
 
     #[test]
@@ -237,8 +307,9 @@ mod tests {
         let with = |from: &str, to: &str| study(&STUDY.replace(from, to)).unwrap_err();
         for key in ["filters", "scenario", "gnss", "outages"] {
             let text = format!("{key} = []\n{}", STUDY.split("[[outages]]").next().unwrap());
-            let refusal =
-                format!("s.toml, line 1: \"{key}\" = [] makes no cell; leave the key out for the default | ");
+            let refusal = format!(
+                "s.toml, line 1: \"{key}\" = [] makes no cell; leave the key out for the default | "
+            );
             assert_eq!(study(&text).unwrap_err(), refusal);
         }
         assert_eq!(
@@ -327,7 +398,10 @@ mod tests {
             "s.toml, line 14: \"scenario[2].settings.gnss.rate_hz\" = -1 is refused: it must be a finite number > 0 | "
         );
         assert_eq!(
-            with("[[outages]]", "[[gnss]]\nname = \"a\"\nsettings.rate_hz = -1\n[[outages]]"),
+            with(
+                "[[outages]]",
+                "[[gnss]]\nname = \"a\"\nsettings.rate_hz = -1\n[[outages]]"
+            ),
             "s.toml, line 11: \"gnss[1].settings.rate_hz\" = -1 is refused: it must be a finite number > 0 | "
         );
     }

@@ -18,26 +18,47 @@ const RUNS: u64 = 3;
 /// filters, a fix, an outage. Another processor, system library or compiler may round the last digit of a
 /// sine otherwise; units of the two would make a table that neither of them makes.
 pub(crate) fn fingerprint() -> String {
-    let bits = results().map_or_else(|| b"this build runs no experiment".to_vec(), |found| encode(&found));
+    let bits = results().map_or_else(
+        || b"this build runs no experiment".to_vec(),
+        |found| encode(&found),
+    );
     blake3::hash(&bits).to_hex()[..16].to_owned()
 }
 
 fn results() -> Option<UnitResult> {
     let trajectory = Trajectory::from_samples(&samples()).ok()?;
     let model = model()?;
-    let (scenario, outages) = (Scenario::default(), [Outage { start_s: 1.5, end_s: 2.5 }]);
+    let (scenario, outages) = (
+        Scenario::default(),
+        [Outage {
+            start_s: 1.5,
+            end_s: 2.5,
+        }],
+    );
     let belief = |states| Belief::new(&model, states, 1.0, 800.0).ok();
-    let beliefs = [belief(FilterStates::Reduced15)?, belief(FilterStates::Full)?];
+    let beliefs = [
+        belief(FilterStates::Reduced15)?,
+        belief(FilterStates::Full)?,
+    ];
     let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &outages, 1);
     let results = monte_carlo::run(&experiment, RUNS, &|_| {}).ok()?;
     let columns = results.into_iter().map(Finding::Sampled).collect();
-    Some(UnitResult { id: String::new(), first: 0, runs: RUNS, columns })
+    Some(UnitResult {
+        id: String::new(),
+        first: 0,
+        runs: RUNS,
+        columns,
+    })
 }
 
 fn samples() -> Vec<TrajectorySample> {
     let sample = |k: u32| {
         let t_s = f64::from(k);
-        let attitude = RollPitchYaw { roll: 0.1 * t_s.sin(), pitch: 0.05, yaw: 0.2 * t_s };
+        let attitude = RollPitchYaw {
+            roll: 0.1 * t_s.sin(),
+            pitch: 0.05,
+            yaw: 0.2 * t_s,
+        };
         TrajectorySample {
             t_s,
             lat: 0.8 + 3e-6 * (0.2 * t_s).sin(),
@@ -69,7 +90,9 @@ mod tests {
     fn the_experiment_runs_and_repeats() {
         let found = results().unwrap();
         let is_whole = |column: &Finding| match column {
-            Finding::Sampled(r) => r.runs.len() == RUNS as usize && r.runs.iter().all(|run| !run.diverged),
+            Finding::Sampled(r) => {
+                r.runs.len() == RUNS as usize && r.runs.iter().all(|run| !run.diverged)
+            }
             Finding::Expected(_) => false,
         };
         assert!(found.columns.len() == 2 && found.columns.iter().all(is_whole));

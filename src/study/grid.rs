@@ -65,16 +65,32 @@ impl Grid {
         scenarios: &[Scenario],
         gnss: &[GnssSettings],
     ) -> Result<Self, DescriptionError> {
-        let named = |names: Vec<String>| if names.is_empty() { vec!["default".to_owned()] } else { names };
+        let named = |names: Vec<String>| {
+            if names.is_empty() {
+                vec!["default".to_owned()]
+            } else {
+                names
+            }
+        };
         let scenario_names = named(study.scenario.iter().map(|e| e.name.clone()).collect());
-        let or_default = if scenarios.is_empty() { vec![Scenario::default()] } else { scenarios.to_vec() };
+        let or_default = if scenarios.is_empty() {
+            vec![Scenario::default()]
+        } else {
+            scenarios.to_vec()
+        };
         let gnss_names = named(study.gnss.iter().map(|e| e.name.clone()).collect());
-        let receivers = if gnss.is_empty() { vec![None] } else { gnss.iter().cloned().map(Some).collect() };
+        let receivers = if gnss.is_empty() {
+            vec![None]
+        } else {
+            gnss.iter().cloned().map(Some).collect()
+        };
         let sets = study.outage_sets()?;
         let outages = if sets.is_empty() {
             vec![("default".to_owned(), None)]
         } else {
-            sets.into_iter().map(|s| (s.name.clone(), Some(s))).collect()
+            sets.into_iter()
+                .map(|s| (s.name.clone(), Some(s)))
+                .collect()
         };
         let grid = Self {
             trajectories: study.trajectory.iter().map(|e| e.name.clone()).collect(),
@@ -93,14 +109,20 @@ impl Grid {
 
     /// Number of cells.
     pub(crate) fn len(&self) -> usize {
-        self.per_trajectory().saturating_mul(self.trajectories.len())
+        self.per_trajectory()
+            .saturating_mul(self.trajectories.len())
     }
 
     /// Cells of each trajectory.
     pub(crate) fn per_trajectory(&self) -> usize {
-        [self.truths.len(), self.scenarios.len(), self.gnss.len(), self.outages.len()]
-            .into_iter()
-            .fold(1, usize::saturating_mul)
+        [
+            self.truths.len(),
+            self.scenarios.len(),
+            self.gnss.len(),
+            self.outages.len(),
+        ]
+        .into_iter()
+        .fold(1, usize::saturating_mul)
     }
 
     /// A cell by its position; the last axis (outages) is the fastest.
@@ -115,7 +137,14 @@ impl Grid {
         let gnss = digit(self.gnss.len());
         let scenario = digit(self.scenarios.len());
         let truth = digit(self.truths.len());
-        Cell { index, trajectory: rest, truth, scenario, gnss, outages }
+        Cell {
+            index,
+            trajectory: rest,
+            truth,
+            scenario,
+            gnss,
+            outages,
+        }
     }
 
     /// The names of a cell, in the order trajectory, truth, scenario, gnss, outages.
@@ -138,9 +167,18 @@ impl Grid {
             self.gnss.len(),
             self.outages.len(),
         ];
-        let names = self.names(cell).into_iter().zip(sizes).filter(|(_, n)| *n > 1).map(|(name, _)| name);
+        let names = self
+            .names(cell)
+            .into_iter()
+            .zip(sizes)
+            .filter(|(_, n)| *n > 1)
+            .map(|(name, _)| name);
         let name = names.collect::<Vec<_>>().join(", ");
-        if name.is_empty() { self.names(cell)[0].to_owned() } else { name }
+        if name.is_empty() {
+            self.names(cell)[0].to_owned()
+        } else {
+            name
+        }
     }
 
     /// The resolved scenario of a cell, without runs.
@@ -167,12 +205,12 @@ impl Grid {
                 let mut variant = scenario.clone();
                 variant.filter.states = column.filter.unwrap_or(variant.filter.states);
                 let states = variant.filter.states;
-                found.extend(
-                    variant
-                        .unexpected()
-                        .iter()
-                        .map(|found| format!("scenario {name}, filter {states}: {}", unexpected_line(found))),
-                );
+                found.extend(variant.unexpected().iter().map(|found| {
+                    format!(
+                        "scenario {name}, filter {states}: {}",
+                        unexpected_line(found)
+                    )
+                }));
             }
         }
         let mut seen = std::collections::HashSet::new();
@@ -182,7 +220,9 @@ impl Grid {
 
     /// The filter of a column in a cell.
     pub(crate) fn filter(&self, cell: Cell, column: &Column) -> FilterStates {
-        column.filter.unwrap_or(self.scenarios[cell.scenario].1.filter.states)
+        column
+            .filter
+            .unwrap_or(self.scenarios[cell.scenario].1.filter.states)
     }
 }
 
@@ -193,7 +233,14 @@ fn columns(study: &Study) -> Vec<Column> {
     };
     let candidates = study.candidates().into_iter().enumerate();
     let columns_of = |(candidate, (name, ..)): (usize, (String, usize, Option<Estimator>))| {
-        filters.iter().map(move |f| Column { candidate, name: name.clone(), filter: *f }).collect::<Vec<_>>()
+        filters
+            .iter()
+            .map(move |f| Column {
+                candidate,
+                name: name.clone(),
+                filter: *f,
+            })
+            .collect::<Vec<_>>()
     };
     candidates.flat_map(columns_of).collect()
 }

@@ -31,7 +31,11 @@ pub(super) enum Work<'a> {
     /// For runs.
     Sampling(&'a simulation::Plan<'a>),
     /// For covariance analysis.
-    Analysis { track: &'a Track, experiment: &'a Experiment<'a>, truth: &'a Model },
+    Analysis {
+        track: &'a Track,
+        experiment: &'a Experiment<'a>,
+        truth: &'a Model,
+    },
 }
 
 impl Work<'_> {
@@ -51,22 +55,40 @@ impl Work<'_> {
                     None => return Ok(None),
                 }
             }
-            Self::Analysis { track, experiment, truth } => {
+            Self::Analysis {
+                track,
+                experiment,
+                truth,
+            } => {
                 let grid = &planned.grid;
                 let of_column = |(belief, column): (&Belief, &Column)| {
-                    let expected = Expected::along(track, experiment, belief, truth).map(Finding::Expected);
+                    let expected =
+                        Expected::along(track, experiment, belief, truth).map(Finding::Expected);
                     let cell = || grid.names(grid.cell(unit.cell)).join(", ");
-                    expected
-                        .ok_or_else(|| StudyError::NotFinite { cell: cell(), column: column.name.clone() })
+                    expected.ok_or_else(|| StudyError::NotFinite {
+                        cell: cell(),
+                        column: column.name.clone(),
+                    })
                 };
-                let columns = experiment.beliefs.par_iter().zip(&grid.columns).map(of_column);
+                let columns = experiment
+                    .beliefs
+                    .par_iter()
+                    .zip(&grid.columns)
+                    .map(of_column);
                 let columns = columns.collect::<Result<_, _>>()?;
                 progress(unit.runs);
                 columns
             }
         };
-        columns.iter_mut().for_each(|finding| finding.reduce(planned.plan.kept()));
-        Ok(Some(UnitResult { id: id.to_owned(), first: unit.first, runs: unit.runs, columns }))
+        columns
+            .iter_mut()
+            .for_each(|finding| finding.reduce(planned.plan.kept()));
+        Ok(Some(UnitResult {
+            id: id.to_owned(),
+            first: unit.first,
+            runs: unit.runs,
+            columns,
+        }))
     }
 }
 
@@ -88,8 +110,18 @@ impl<'a> Inputs<'a> {
         made: &'a [(String, String)],
         observer: &'a dyn Observer<Remark>,
     ) -> Self {
-        let reader = Reader { study: &planned.study, observer };
-        Self { planned, reader, made, trajectory: None, truth: None, models: HashMap::new() }
+        let reader = Reader {
+            study: &planned.study,
+            observer,
+        };
+        Self {
+            planned,
+            reader,
+            made,
+            trajectory: None,
+            truth: None,
+            models: HashMap::new(),
+        }
     }
 
     /// Calls `f` with a cell, set up.
@@ -98,7 +130,11 @@ impl<'a> Inputs<'a> {
         cell: Cell,
         f: impl FnOnce(&Work<'_>) -> Result<T, StudyError>,
     ) -> Result<T, StudyError> {
-        self.set_up(cell, &self.planned.grid.scenario(cell, self.planned.plan.seed), f)
+        self.set_up(
+            cell,
+            &self.planned.grid.scenario(cell, self.planned.plan.seed),
+            f,
+        )
     }
 
     /// Refuses a cell whose parts do not fit together. Filters are reduced the quick way: what is refused is the same.
@@ -131,14 +167,20 @@ impl<'a> Inputs<'a> {
         let bare = scenario.experiment(&trajectory, truth, &[], &outages, plan.seed);
         let track = Track::along(&bare).map_err(|e| StudyError::unfit(&name, e))?;
         let beliefs = self.beliefs(cell, scenario, &track, &outages)?;
-        let experiment = Experiment { beliefs: &beliefs, ..bare };
+        let experiment = Experiment {
+            beliefs: &beliefs,
+            ..bare
+        };
         let sampling;
         f(&match (plan.study.method, truth) {
-            (Method::Lincov, Truth::Model(truth)) => {
-                Work::Analysis { track: &track, experiment: &experiment, truth }
-            }
+            (Method::Lincov, Truth::Model(truth)) => Work::Analysis {
+                track: &track,
+                experiment: &experiment,
+                truth,
+            },
             _ => {
-                sampling = simulation::Plan::new(&experiment).map_err(|e| StudyError::unfit(&name, e))?;
+                sampling =
+                    simulation::Plan::new(&experiment).map_err(|e| StudyError::unfit(&name, e))?;
                 Work::Sampling(&sampling)
             }
         })
@@ -148,12 +190,16 @@ impl<'a> Inputs<'a> {
     pub(super) fn outages(&mut self, cell: Cell) -> Result<PlacedOutages, StudyError> {
         let trajectory = self.trajectory(cell.trajectory)?;
         let span_s = (trajectory.start_s(), trajectory.end_s());
-        let Planned { plan, grid, study, .. } = self.planned;
-        grid.scenario(cell, plan.seed).outages_on(span_s, plan.seed).map_err(|e| StudyError::Unfit {
-            part: format!("{}: {}", study.display(), grid.names(cell).join(", ")),
-            reason: e.to_string(),
-            hint: e.hint().map(str::to_owned),
-        })
+        let Planned {
+            plan, grid, study, ..
+        } = self.planned;
+        grid.scenario(cell, plan.seed)
+            .outages_on(span_s, plan.seed)
+            .map_err(|e| StudyError::Unfit {
+                part: format!("{}: {}", study.display(), grid.names(cell).join(", ")),
+                reason: e.to_string(),
+                hint: e.hint().map(str::to_owned),
+            })
     }
 
     /// Duration of a trajectory (s).
@@ -176,7 +222,9 @@ impl<'a> Inputs<'a> {
         kept(&mut self.truth, index, || {
             let entry = &plan.study.truth[index];
             if self.reader.truth_hash(entry, plan.seed)? != plan.truths[index] {
-                return Err(StudyError::Changed { what: format!("the truth \"{}\"", entry.name) });
+                return Err(StudyError::Changed {
+                    what: format!("the truth \"{}\"", entry.name),
+                });
             }
             self.reader.truth(entry, plan.seed)
         })

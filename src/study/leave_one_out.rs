@@ -32,14 +32,32 @@ impl Folds {
         if !planned.plan.study.leaves_out() || tables.windows.is_empty() {
             return;
         }
-        let scores: Vec<Score> =
-            tables.runs_of_columns.iter().map(|runs| Score::of_runs(runs, tables.windows.len())).collect();
-        let fold = Fold { scores, expected: None, windows: planned.plan.runs() };
+        let scores: Vec<Score> = tables
+            .runs_of_columns
+            .iter()
+            .map(|runs| Score::of_runs(runs, tables.windows.len()))
+            .collect();
+        let fold = Fold {
+            scores,
+            expected: None,
+            windows: planned.plan.runs(),
+        };
         let truth = planned.grid.truths[tables.cell.truth].clone();
-        let known = self.places.iter().position(|place| same_place(place.cell, tables.cell));
+        let known = self
+            .places
+            .iter()
+            .position(|place| same_place(place.cell, tables.cell));
         let place = known.unwrap_or_else(|| {
-            let outages = tables.windows.iter().map(|&(start_s, end_s)| Outage { start_s, end_s }).collect();
-            self.places.push(Place { cell: tables.cell, outages, folds: Vec::new() });
+            let outages = tables
+                .windows
+                .iter()
+                .map(|&(start_s, end_s)| Outage { start_s, end_s })
+                .collect();
+            self.places.push(Place {
+                cell: tables.cell,
+                outages,
+                folds: Vec::new(),
+            });
             self.places.len() - 1
         });
         self.places[place].folds.push((truth, fold));
@@ -48,14 +66,20 @@ impl Folds {
     /// The ranking of each place.
     pub(super) fn ranked(&self, planned: &Planned) -> Vec<RankedPlace> {
         let grid = &planned.grid;
-        self.places.iter().map(|place| ranked(grid, place, planned.plan.seed)).collect()
+        self.places
+            .iter()
+            .map(|place| ranked(grid, place, planned.plan.seed))
+            .collect()
     }
 }
 
 fn ranked(grid: &Grid, place: &Place, seed: u64) -> RankedPlace {
     let contender = |column| {
         let filter = grid.filter(place.cell, column).name();
-        Contender { name: format!("{}, {filter}", column.name), eligible: true }
+        Contender {
+            name: format!("{}, {filter}", column.name),
+            eligible: true,
+        }
     };
     let contenders: Vec<Contender> = grid.columns.iter().map(contender).collect();
     let ranking = Ranking::new(&contenders, &place.folds);

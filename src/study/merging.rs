@@ -58,7 +58,10 @@ pub fn merge(
     let units = planned.plan.named_units(&planned.grid);
     let missing = planned.missing()?;
     if !missing.is_empty() {
-        return Err(StudyError::Incomplete { units: units.len(), missing });
+        return Err(StudyError::Incomplete {
+            units: units.len(),
+            missing,
+        });
     }
     let results = planned.directory.join("results");
     let _own = claimed(planned, &results)?;
@@ -66,23 +69,44 @@ pub fn merge(
     let mut tables = Tables::create(&mut out, planned)?;
     let mut merged = subject(planned, &options.states);
     let mut folds = Folds::default();
-    let diverged = match gather(planned, &units, options.threads, &mut tables, &mut merged, &mut folds)? {
+    let diverged = match gather(
+        planned,
+        &units,
+        options.threads,
+        &mut tables,
+        &mut merged,
+        &mut folds,
+    )? {
         Ok(diverged) => diverged,
-        Err(missing) => return Err(StudyError::Incomplete { units: units.len(), missing }),
+        Err(missing) => {
+            return Err(StudyError::Incomplete {
+                units: units.len(),
+                missing,
+            });
+        }
     };
     tables.finish()?;
     merged.rankings = folds.ranked(planned);
     let document = merged.document();
     out.write("report.html", document.html())?;
     if !merged.rankings.is_empty() {
-        let rankings: Vec<&serde_json::Value> = merged.rankings.iter().map(|place| &place.json).collect();
-        out.write("ranking.json", report::json(&json!({ "schema_version": 1, "rankings": rankings })))?;
+        let rankings: Vec<&serde_json::Value> =
+            merged.rankings.iter().map(|place| &place.json).collect();
+        out.write(
+            "ranking.json",
+            report::json(&json!({ "schema_version": 1, "rankings": rankings })),
+        )?;
     }
     let summary = summary(planned, units.len(), diverged);
     out.write("study.json", report::json(&summary))?;
     remove_stale(planned)?;
     out.commit()?;
-    Ok(MergeReport { results, document, summary, diverged })
+    Ok(MergeReport {
+        results,
+        document,
+        summary,
+        diverged,
+    })
 }
 
 /// The directory of the tables for this merge, new or of an earlier one: somebody else's files stay.
@@ -96,14 +120,28 @@ fn claimed(planned: &Planned, results: &Path) -> Result<Claim, StudyError> {
         "ranking.json",
         "study.json",
     ];
-    let inputs = planned.plan.inputs.iter().map(|input| beside(&planned.study, Path::new(&input.path)));
+    let inputs = planned
+        .plan
+        .inputs
+        .iter()
+        .map(|input| beside(&planned.study, Path::new(&input.path)));
     let inputs: Vec<PathBuf> = inputs.collect();
     let recognise = |text: &str| {
         let made: serde_json::Value = serde_json::from_str(text).unwrap_or_default();
-        Ok(if made.get("plan").is_some_and(|plan| plan.is_string()) { Found::Same } else { Found::Foreign })
+        Ok(if made.get("plan").is_some_and(|plan| plan.is_string()) {
+            Found::Same
+        } else {
+            Found::Foreign
+        })
     };
     let inputs = inputs.iter().map(PathBuf::as_path);
-    Ok(claim_directory(results, &files, inputs, Existing::Replace, recognise)?)
+    Ok(claim_directory(
+        results,
+        &files,
+        inputs,
+        Existing::Replace,
+        recognise,
+    )?)
 }
 
 /// Takes cell by cell into the tables, in their order, as long as no unit is damaged; how many runs diverged, or all units
@@ -120,8 +158,10 @@ fn gather(
     let mut damaged = Vec::new();
     let mut diverged = 0;
     for wave in cells.chunks(cells_at_once(planned, threads)) {
-        let found: Vec<Result<Result<CellTables, Vec<NamedUnit>>, StudyError>> =
-            wave.par_iter().map(|units| CellTables::make(planned, units)).collect();
+        let found: Vec<Result<Result<CellTables, Vec<NamedUnit>>, StudyError>> = wave
+            .par_iter()
+            .map(|units| CellTables::make(planned, units))
+            .collect();
         for cell in found {
             match cell? {
                 Ok(cell) if damaged.is_empty() => {
@@ -135,20 +175,35 @@ fn gather(
             }
         }
     }
-    Ok(if damaged.is_empty() { Ok(diverged) } else { Err(damaged) })
+    Ok(if damaged.is_empty() {
+        Ok(diverged)
+    } else {
+        Err(damaged)
+    })
 }
 
 /// A merged study without cells.
 fn subject(planned: &Planned, states: &[usize]) -> MergedStudy {
     let study = &planned.plan.study;
-    let same = if study.filters.len() > 1 { " with the same filter" } else { "" };
+    let same = if study.filters.len() > 1 {
+        " with the same filter"
+    } else {
+        ""
+    };
     let runs = match study.is_sampled() {
         true => format!("{} runs a cell", study.runs),
         false => "covariance analysis".to_owned(),
     };
-    let name = planned.study.file_stem().unwrap_or_default().to_string_lossy();
+    let name = planned
+        .study
+        .file_stem()
+        .unwrap_or_default()
+        .to_string_lossy();
     MergedStudy {
-        subject: format!("study {name} on {}, {runs}", planned.grid.trajectories.join(", ")),
+        subject: format!(
+            "study {name} on {}, {runs}",
+            planned.grid.trajectories.join(", ")
+        ),
         reference: format!("{}{same}", planned.reference().1),
         states: states.to_vec(),
         cells: Vec::new(),
@@ -167,9 +222,16 @@ fn cells_at_once(planned: &Planned, threads: usize) -> usize {
 
 /// Removes tables of an earlier plan that this one does not write; all others are replaced.
 fn remove_stale(planned: &Planned) -> Result<(), StudyError> {
-    let epochs: &[&str] =
-        if planned.plan.study.keeps(Metric::Epochs) { &[] } else { &["epochs.csv", "epochs.parquet"] };
-    let ranking: &[&str] = if planned.plan.study.leaves_out() { &[] } else { &["ranking.json"] };
+    let epochs: &[&str] = if planned.plan.study.keeps(Metric::Epochs) {
+        &[]
+    } else {
+        &["epochs.csv", "epochs.parquet"]
+    };
+    let ranking: &[&str] = if planned.plan.study.leaves_out() {
+        &[]
+    } else {
+        &["ranking.json"]
+    };
     for name in epochs.iter().chain(ranking) {
         let path = planned.directory.join("results").join(name);
         match std::fs::remove_file(&path) {

@@ -20,7 +20,11 @@ fn exist(study: &Path) -> Result<(), FileError> {
     let source = Source::read(study)?;
     let table: toml::Table = source.get()?;
     for axis in ["trajectory", "truth", "candidate", "scenario", "gnss"] {
-        let entries = table.get(axis).and_then(toml::Value::as_array).into_iter().flatten();
+        let entries = table
+            .get(axis)
+            .and_then(toml::Value::as_array)
+            .into_iter()
+            .flatten();
         for (i, entry) in (1..).zip(entries) {
             of_entry(study, &source, &format!("{axis}[{i}]"), entry)?;
         }
@@ -29,13 +33,26 @@ fn exist(study: &Path) -> Result<(), FileError> {
 }
 
 /// The files of an entry, and of the steps within it.
-fn of_entry(study: &Path, source: &Source, path: &str, entry: &toml::Value) -> Result<(), FileError> {
+fn of_entry(
+    study: &Path,
+    source: &Source,
+    path: &str,
+    entry: &toml::Value,
+) -> Result<(), FileError> {
     let named = |key: &str| entry.get(key).and_then(toml::Value::as_str);
-    let recordings = entry.get("recordings").and_then(toml::Value::as_array).into_iter().flatten();
+    let recordings = entry
+        .get("recordings")
+        .and_then(toml::Value::as_array)
+        .into_iter()
+        .flatten();
     let recordings = recordings.filter_map(|named| Some(("recordings", named.as_str()?)));
     let is_file = |named: &&str| !contamination_file::names().contains(named);
-    let contamination = named("contaminate").filter(is_file).map(|named| ("contaminate", named));
-    let single = ["file", "model"].into_iter().filter_map(|key| Some((key, named(key)?)));
+    let contamination = named("contaminate")
+        .filter(is_file)
+        .map(|named| ("contaminate", named));
+    let single = ["file", "model"]
+        .into_iter()
+        .filter_map(|key| Some((key, named(key)?)));
     for (key, named) in single.chain(recordings).chain(contamination) {
         exists(study, source, &format!("{path}.{key}"), named)?;
     }
@@ -56,5 +73,10 @@ fn exists(study: &Path, source: &Source, key: &str, named: &str) -> Result<(), F
         || "paths are relative to the study file".to_owned(),
         |meant| format!("did you mean \"{meant}\"?"),
     );
-    Err(source.refused(key, format!("names {}, which does not exist", path.display())).advice(hint))
+    Err(source
+        .refused(
+            key,
+            format!("names {}, which does not exist", path.display()),
+        )
+        .advice(hint))
 }

@@ -95,7 +95,11 @@ impl Shard {
     /// One of `count`, from 0.
     #[must_use]
     pub const fn new(index: u64, count: u64) -> Option<Self> {
-        if index < count { Some(Self { index, count }) } else { None }
+        if index < count {
+            Some(Self { index, count })
+        } else {
+            None
+        }
     }
 
     /// Index and count.
@@ -165,31 +169,52 @@ impl Plan {
             })
         };
         let all = (0..grid.len()).flat_map(of_cell).enumerate();
-        all.map(|(index, (cell, first, runs))| Unit { index, cell, first, runs })
+        all.map(|(index, (cell, first, runs))| Unit {
+            index,
+            cell,
+            first,
+            runs,
+        })
     }
 
     /// Number of units.
     #[must_use]
     pub fn unit_count(&self, grid: &Grid) -> usize {
         let cells = grid.per_trajectory();
-        (0..grid.trajectories.len()).map(|t| self.units_per_cell(t).saturating_mul(cells)).sum()
+        (0..grid.trajectories.len())
+            .map(|t| self.units_per_cell(t).saturating_mul(cells))
+            .sum()
     }
 
     /// Processor time of a unit by the estimate (s). Runs are computed as many at a time as there are lanes: a unit of
     /// one run lasts as long as one of eight.
     pub(crate) fn unit_s(&self, grid: &Grid, unit: Unit) -> f64 {
-        let run_s = self.estimate.run_s.get(grid.cell(unit.cell).trajectory).copied().unwrap_or(0.0);
+        let run_s = self
+            .estimate
+            .run_s
+            .get(grid.cell(unit.cell).trajectory)
+            .copied()
+            .unwrap_or(0.0);
         run_s * unit.runs.next_multiple_of(self.lanes()) as f64
     }
 
     /// Runs that are computed together.
     pub(crate) const fn lanes(&self) -> u64 {
-        if self.study.is_sampled() { LANES as u64 } else { 1 }
+        if self.study.is_sampled() {
+            LANES as u64
+        } else {
+            1
+        }
     }
 
     /// Hash of everything that decides the bytes of a cell's units.
     fn cell_hash(&self, grid: &Grid, cell: Cell) -> blake3::Hash {
-        let column = |c: &Column| (self.model(c.candidate, cell.truth).blake3.as_str(), grid.filter(cell, c));
+        let column = |c: &Column| {
+            (
+                self.model(c.candidate, cell.truth).blake3.as_str(),
+                grid.filter(cell, c),
+            )
+        };
         let key = CellKey {
             version: &self.version,
             numerics: &self.numerics,
@@ -211,17 +236,25 @@ impl Plan {
             let named = |unit: &Unit| {
                 let mut hasher = blake3::Hasher::new();
                 hasher.update(hash.as_bytes());
-                hasher.update(&unit.first.to_le_bytes()).update(&unit.runs.to_le_bytes());
+                hasher
+                    .update(&unit.first.to_le_bytes())
+                    .update(&unit.runs.to_le_bytes());
                 (*unit, hasher.finalize().to_hex()[..32].to_owned())
             };
             units.iter().map(named).collect::<Vec<_>>()
         };
-        units.chunk_by(|a, b| a.cell == b.cell).flat_map(of_cell).collect()
+        units
+            .chunk_by(|a, b| a.cell == b.cell)
+            .flat_map(of_cell)
+            .collect()
     }
 
     /// The plan's own name: hash of everything but the estimate.
     pub(crate) fn id(&self) -> String {
-        let bare = Self { estimate: Estimate::default(), ..self.clone() };
+        let bare = Self {
+            estimate: Estimate::default(),
+            ..self.clone()
+        };
         blake3::hash(&json(&bare)).to_hex()[..16].to_owned()
     }
 }
@@ -245,8 +278,11 @@ mod tests {
         let mut study: Study = toml::from_str(text).unwrap();
         change(&mut study);
         study.resolve().unwrap();
-        let prepared =
-            |blake3: &str| Input { role: String::new(), path: String::new(), blake3: blake3.into() };
+        let prepared = |blake3: &str| Input {
+            role: String::new(),
+            path: String::new(),
+            blake3: blake3.into(),
+        };
         let plan = Plan {
             schema_version: 2,
             version: "0".into(),
@@ -270,7 +306,12 @@ mod tests {
     fn shards_share_out_the_units() {
         assert_eq!((Shard::new(3, 3), Shard::new(0, 0)), (None, None));
         for unit in 0..20 {
-            assert_eq!((0..3).filter(|i| Shard::new(*i, 3).unwrap().has(unit)).count(), 1);
+            assert_eq!(
+                (0..3)
+                    .filter(|i| Shard::new(*i, 3).unwrap().has(unit))
+                    .count(),
+                1
+            );
         }
     }
 
@@ -279,8 +320,16 @@ mod tests {
         let (plan, grid) = plan(|_| {});
         let units = plan.named_units(&grid);
         assert_eq!((grid.len(), grid.columns.len()), (12, 4));
-        assert_eq!((units.len(), plan.unit_count(&grid)), (6 * 3 + 6 * 32, 6 * 3 + 6 * 32));
-        assert!(units.iter().enumerate().all(|(i, (unit, _))| unit.index == i));
+        assert_eq!(
+            (units.len(), plan.unit_count(&grid)),
+            (6 * 3 + 6 * 32, 6 * 3 + 6 * 32)
+        );
+        assert!(
+            units
+                .iter()
+                .enumerate()
+                .all(|(i, (unit, _))| unit.index == i)
+        );
         for cell in 0..grid.len() {
             let mut next = 0;
             for (unit, _) in units.iter().filter(|(u, _)| u.cell == cell) {
@@ -289,8 +338,9 @@ mod tests {
             }
             assert_eq!(next, 250);
         }
-        let cells: HashSet<[String; 5]> =
-            (0..12).map(|i| grid.names(grid.cell(i)).map(str::to_owned)).collect();
+        let cells: HashSet<[String; 5]> = (0..12)
+            .map(|i| grid.names(grid.cell(i)).map(str::to_owned))
+            .collect();
         assert_eq!(cells.len(), 12);
     }
 
@@ -299,7 +349,11 @@ mod tests {
     fn a_unit_lasts_as_long_as_its_batches() {
         let (mut plan, grid) = plan(|_| {});
         plan.estimate.run_s = vec![0.5, 0.25];
-        let seconds = |plan: &Plan| plan.units(&grid).map(|unit| plan.unit_s(&grid, unit)).sum::<f64>();
+        let seconds = |plan: &Plan| {
+            plan.units(&grid)
+                .map(|unit| plan.unit_s(&grid, unit))
+                .sum::<f64>()
+        };
         assert_eq!(seconds(&plan), 6.0 * (0.5 * 8.0 * 33.0 + 0.25 * 256.0));
         plan.unit_runs = vec![1, 8];
         assert_eq!(seconds(&plan), 6.0 * (0.5 * 8.0 * 250.0 + 0.25 * 256.0));
@@ -308,10 +362,19 @@ mod tests {
     #[test]
     fn names_differ_in_everything_that_decides_the_bytes_and_in_nothing_else() {
         let (base, grid) = plan(|_| {});
-        let names: HashSet<String> = base.named_units(&grid).into_iter().map(|(_, id)| id).collect();
+        let names: HashSet<String> = base
+            .named_units(&grid)
+            .into_iter()
+            .map(|(_, id)| id)
+            .collect();
         assert_eq!(names.len(), base.unit_count(&grid));
         let shared = |other: &(Plan, Grid)| {
-            other.0.named_units(&other.1).iter().filter(|u| names.contains(&u.1)).count()
+            other
+                .0
+                .named_units(&other.1)
+                .iter()
+                .filter(|u| names.contains(&u.1))
+                .count()
         };
         let with = |change: &dyn Fn(&mut Plan)| {
             let mut other = base.clone();
@@ -326,7 +389,10 @@ mod tests {
         assert_eq!(with(&|p| p.study.metrics = vec![Metric::Outages]), 0);
         assert_eq!(with(&|p| p.trajectories[1] = "c".into()), 6 * 3);
         // another candidate's name changes no number, and more runs keep the units there are
-        assert_eq!(shared(&plan(|s| s.candidate[1].name = "other".into())), names.len());
+        assert_eq!(
+            shared(&plan(|s| s.candidate[1].name = "other".into())),
+            names.len()
+        );
         assert_eq!(shared(&plan(|s| s.runs = 1000)), 6 * 2 + 6 * 31);
     }
 }

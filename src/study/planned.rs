@@ -72,17 +72,36 @@ pub(crate) fn plan_in(directory: &Path) -> Result<Option<Plan>, FileError> {
         FileError::contents(path.display().to_string(), line, message)
             .advice("remove the directory and plan again")
     };
-    let plan: Plan = serde_json::from_str(&text)
-        .map_err(|e| damaged(e.line(), e.to_string().split(" at line ").next().unwrap_or_default()))?;
+    let plan: Plan = serde_json::from_str(&text).map_err(|e| {
+        damaged(
+            e.line(),
+            e.to_string().split(" at line ").next().unwrap_or_default(),
+        )
+    })?;
     let study = &plan.study;
-    let sizes = [plan.unit_runs.len(), plan.trajectories.len(), plan.truths.len(), plan.models.len()];
-    let wanted =
-        [study.trajectory.len(), study.trajectory.len(), study.truth.len(), study.candidates().len()];
+    let sizes = [
+        plan.unit_runs.len(),
+        plan.trajectories.len(),
+        plan.truths.len(),
+        plan.models.len(),
+    ];
+    let wanted = [
+        study.trajectory.len(),
+        study.trajectory.len(),
+        study.truth.len(),
+        study.candidates().len(),
+    ];
     // a scenario or receiver that no file gives is the default
     let given = [plan.scenarios.len(), plan.gnss.len()];
     let fits = |files: &Vec<Input>| files.len() == 1 || files.len() == study.truth.len();
-    if sizes != wanted || given != [study.scenario.len(), study.gnss.len()] || !plan.models.iter().all(fits) {
-        return Err(damaged(1, "its lists are not as long as those of its study"));
+    if sizes != wanted
+        || given != [study.scenario.len(), study.gnss.len()]
+        || !plan.models.iter().all(fits)
+    {
+        return Err(damaged(
+            1,
+            "its lists are not as long as those of its study",
+        ));
     }
     Ok(Some(plan))
 }
@@ -94,8 +113,9 @@ impl Planned {
     /// When there is no plan, or that of another study.
     pub fn open(study: &Path, directory: &Path, seed: Option<u64>) -> Result<Self, StudyError> {
         let file = file::read(study)?;
-        let plan =
-            plan_in(directory)?.ok_or_else(|| StudyError::NoPlan { directory: directory.to_owned() })?;
+        let plan = plan_in(directory)?.ok_or_else(|| StudyError::NoPlan {
+            directory: directory.to_owned(),
+        })?;
         let planned = Self::new(study, directory, plan)?;
         planned.must_be_of(&file.study, seed)?;
         Ok(planned)
@@ -104,7 +124,12 @@ impl Planned {
     pub(crate) fn new(study: &Path, directory: &Path, plan: Plan) -> Result<Self, StudyError> {
         let refused = |e| StudyError::unfit(study.display(), e);
         let grid = Grid::new(&plan.study, &plan.scenarios, &plan.gnss).map_err(refused)?;
-        let planned = Self { plan, grid, study: study.to_owned(), directory: directory.to_owned() };
+        let planned = Self {
+            plan,
+            grid,
+            study: study.to_owned(),
+            directory: directory.to_owned(),
+        };
         planned.check_units()?;
         Ok(planned)
     }
@@ -116,23 +141,41 @@ impl Planned {
         if units <= MAX_UNITS {
             return Ok(());
         }
-        let (key, value) = plan.study.unit_runs.map_or(("runs", plan.runs()), |runs| ("unit_runs", runs));
+        let (key, value) = plan
+            .study
+            .unit_runs
+            .map_or(("runs", plan.runs()), |runs| ("unit_runs", runs));
         let reason = format!("makes {units} units, more than {MAX_UNITS}");
-        Err(StudyError::unfit(self.study.display(), DescriptionError::refused(key, value, reason)))
+        Err(StudyError::unfit(
+            self.study.display(),
+            DescriptionError::refused(key, value, reason),
+        ))
     }
 
     /// Refuses another study than the one that was planned, and another seed. A study without a seed takes the plan's.
     pub(super) fn must_be_of(&self, study: &Study, seed: Option<u64>) -> Result<(), StudyError> {
         let other = |Difference { key, found, wanted }| {
             let plan = self.directory.join("plan.json");
-            Err(StudyError::OtherStudy { plan, key, found, wanted })
+            Err(StudyError::OtherStudy {
+                plan,
+                key,
+                found,
+                wanted,
+            })
         };
         let planned = &self.plan;
         if let Some(seed) = seed.filter(|seed| *seed != planned.seed) {
             let [found, wanted] = [planned.seed, seed].map(|seed| seed.to_string());
-            return other(Difference { key: "seed".to_owned(), found, wanted });
+            return other(Difference {
+                key: "seed".to_owned(),
+                found,
+                wanted,
+            });
         }
-        let study = Study { seed: study.seed.or(planned.study.seed), ..study.clone() };
+        let study = Study {
+            seed: study.seed.or(planned.study.seed),
+            ..study.clone()
+        };
         let keys = |study: &Study| match serde_json::to_value(study) {
             Ok(serde_json::Value::Object(keys)) => keys,
             _ => serde_json::Map::new(),
@@ -142,7 +185,8 @@ impl Planned {
 
     /// Writes the plan.
     pub(super) fn write_plan(&self) -> Result<(), FileError> {
-        let json = serde_json::to_string_pretty(&self.plan).expect("plain structs are always JSON") + "\n";
+        let json =
+            serde_json::to_string_pretty(&self.plan).expect("plain structs are always JSON") + "\n";
         atomic::write(&self.directory.join("plan.json"), json)
     }
 
@@ -150,7 +194,11 @@ impl Planned {
     pub(super) fn same_numbers(&self) -> Result<(), StudyError> {
         let planned = (self.plan.version.clone(), self.plan.numerics.clone());
         let here = (env!("CARGO_PKG_VERSION").to_owned(), fingerprint());
-        if planned == here { Ok(()) } else { Err(StudyError::OtherNumbers { planned, here }) }
+        if planned == here {
+            Ok(())
+        } else {
+            Err(StudyError::OtherNumbers { planned, here })
+        }
     }
 
     /// Refuses a study one of whose files is not what it was when the study was planned.
@@ -159,13 +207,22 @@ impl Planned {
     /// # Errors
     /// The file.
     pub(crate) fn inputs_unchanged(&self) -> Result<(), StudyError> {
-        let files = self.plan.inputs.iter().map(|i| (beside(&self.study, Path::new(&i.path)), &i.blake3));
-        files.filter(|(path, _)| path.exists()).try_for_each(|(path, blake3)| unchanged(&path, blake3))
+        let files = self
+            .plan
+            .inputs
+            .iter()
+            .map(|i| (beside(&self.study, Path::new(&i.path)), &i.blake3));
+        files
+            .filter(|(path, _)| path.exists())
+            .try_for_each(|(path, blake3)| unchanged(&path, blake3))
     }
 
     /// Processor time of all units by the plan's probe (s).
     pub(crate) fn processor_s(&self) -> f64 {
-        self.plan.units(&self.grid).map(|unit| self.plan.unit_s(&self.grid, unit)).sum()
+        self.plan
+            .units(&self.grid)
+            .map(|unit| self.plan.unit_s(&self.grid, unit))
+            .sum()
     }
 
     /// The units of the plan and what is there of them: all of them are read.
@@ -175,24 +232,35 @@ impl Planned {
     pub fn status(&self) -> Result<Status, StudyError> {
         let units = self.survey(Shard::ALL)?;
         let is_done = |(_, _, state): &&(Unit, String, UnitState)| *state == UnitState::Whole;
-        let is_damaged = |(_, _, state): &&(Unit, String, UnitState)| matches!(state, UnitState::Damaged(_));
+        let is_damaged =
+            |(_, _, state): &&(Unit, String, UnitState)| matches!(state, UnitState::Damaged(_));
         let cells = units.chunk_by(|(a, ..), (b, ..)| a.cell == b.cell);
         let left = units.iter().filter(|unit| !is_done(unit));
         Ok(Status {
             units: units.len(),
             done: units.iter().filter(is_done).count(),
             damaged: units.iter().filter(is_damaged).count(),
-            cells_done: cells.filter(|cell| cell.iter().all(|unit| is_done(&unit))).count(),
-            left_s: left.map(|(unit, ..)| self.plan.unit_s(&self.grid, *unit)).sum(),
+            cells_done: cells
+                .filter(|cell| cell.iter().all(|unit| is_done(&unit)))
+                .count(),
+            left_s: left
+                .map(|(unit, ..)| self.plan.unit_s(&self.grid, *unit))
+                .sum(),
             foreign: self.foreign()?,
         })
     }
 
     /// The units of a shard and what is there of each.
-    pub(super) fn survey(&self, shard: Shard) -> Result<Vec<(Unit, String, UnitState)>, StudyError> {
+    pub(super) fn survey(
+        &self,
+        shard: Shard,
+    ) -> Result<Vec<(Unit, String, UnitState)>, StudyError> {
         let present = self.unit_names()?;
         let state = |(unit, id): NamedUnit| {
-            let state = match present.contains(&id).then(|| unit_file::read(&self.directory, &id)) {
+            let state = match present
+                .contains(&id)
+                .then(|| unit_file::read(&self.directory, &id))
+            {
                 None | Some(Err(UnitFileError::Missing { .. })) => UnitState::Missing,
                 Some(Ok(_)) => UnitState::Whole,
                 Some(Err(e @ UnitFileError::Damaged { .. })) => UnitState::Damaged(e.to_string()),
@@ -201,7 +269,10 @@ impl Planned {
             Ok((unit, id, state))
         };
         let units = self.plan.named_units(&self.grid).into_iter();
-        units.filter(|(unit, _)| shard.has(unit.index)).map(state).collect()
+        units
+            .filter(|(unit, _)| shard.has(unit.index))
+            .map(state)
+            .collect()
     }
 
     /// The units of which there is no file.
@@ -230,7 +301,8 @@ impl Planned {
         if let Some(first) = foreign.first() {
             let example = unit_file::path(&self.directory, first);
             let (units, example) = (foreign.len(), example.display());
-            let text = format!("unit files of another plan are left out: {units}, such as {example}");
+            let text =
+                format!("unit files of another plan are left out: {units}, such as {example}");
             observer.remark(&Remark::warning(text));
         }
         Ok(())
@@ -241,7 +313,10 @@ impl Planned {
         let mut names = BTreeSet::new();
         for inner in entries(&self.directory.join("units"))? {
             for path in entries(&inner)? {
-                let stem = path.file_name().and_then(|n| n.to_str()).and_then(|n| n.strip_suffix(".unit"));
+                let stem = path
+                    .file_name()
+                    .and_then(|n| n.to_str())
+                    .and_then(|n| n.strip_suffix(".unit"));
                 names.extend(stem.filter(|n| !n.starts_with('.')).map(str::to_owned));
             }
         }
@@ -253,7 +328,9 @@ fn entries(path: &Path) -> Result<Vec<PathBuf>, FileError> {
     let io = |e| FileError::io(path, e);
     match fs::read_dir(path) {
         Ok(entries) => entries.map(|e| e.map(|e| e.path()).map_err(io)).collect(),
-        Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(Vec::new()),
+        Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
+            Ok(Vec::new())
+        }
         Err(e) => Err(io(e)),
     }
 }

@@ -76,7 +76,10 @@ pub fn plan(
         planned.must_be_of(&file.study, Some(seed))?;
         restore(&planned, reader)?;
         planned.remark_foreign(observer)?;
-        return Ok(PlanReport { planned, was_there: true });
+        return Ok(PlanReport {
+            planned,
+            was_there: true,
+        });
     }
     let seed = (options.seed)(file.study.seed);
     let (plan, texts) = prepared(file, seed, reader)?;
@@ -91,47 +94,90 @@ pub fn plan(
         }
         planned.write_plan()?;
     }
-    Ok(PlanReport { planned, was_there: false })
+    Ok(PlanReport {
+        planned,
+        was_there: false,
+    })
 }
 
 /// The plan is there: its inputs must be what they were; calibrated models that are lost or damaged are made again.
 fn restore(planned: &Planned, reader: Reader<'_>) -> Result<(), StudyError> {
-    let Planned { plan, directory, study, .. } = planned;
+    let Planned {
+        plan,
+        directory,
+        study,
+        ..
+    } = planned;
     for input in &plan.inputs {
         unchanged(&beside(study, Path::new(&input.path)), &input.blake3)?;
     }
-    let is_whole = |m: &Input| hash::of_file(&directory.join(&m.path)).is_ok_and(|found| found == m.blake3);
-    let mut lost = plan.models.iter().flatten().filter(|m| m.role == CALIBRATED && !is_whole(m)).peekable();
+    let is_whole =
+        |m: &Input| hash::of_file(&directory.join(&m.path)).is_ok_and(|found| found == m.blake3);
+    let mut lost = plan
+        .models
+        .iter()
+        .flatten()
+        .filter(|m| m.role == CALIBRATED && !is_whole(m))
+        .peekable();
     if lost.peek().is_none() {
         return Ok(());
     }
-    let (_, texts) = models(&plan.study, plan.seed, &|path| input_of(&plan.inputs, path), reader)?;
+    let (_, texts) = models(
+        &plan.study,
+        plan.seed,
+        &|path| input_of(&plan.inputs, path),
+        reader,
+    )?;
     for model in lost {
         let path = directory.join(&model.path);
         // made otherwise by another build: it has another name
         let Some((_, text)) = texts.iter().find(|(made, _)| *made == model.path) else {
-            return Err(StudyError::Changed { what: path.display().to_string() });
+            return Err(StudyError::Changed {
+                what: path.display().to_string(),
+            });
         };
         atomic::write(&path, text)?;
-        reader.observer.remark(&Remark::note(format!("wrote {} again", path.display())));
+        reader
+            .observer
+            .remark(&Remark::note(format!("wrote {} again", path.display())));
     }
     Ok(())
 }
 
 /// The plan without its units, and the texts of the models calibrated for it.
-fn prepared(file: StudyFile, seed: u64, reader: Reader<'_>) -> Result<(Plan, ModelTexts), StudyError> {
-    let StudyFile { study, scenarios, gnss, unused } = file;
+fn prepared(
+    file: StudyFile,
+    seed: u64,
+    reader: Reader<'_>,
+) -> Result<(Plan, ModelTexts), StudyError> {
+    let StudyFile {
+        study,
+        scenarios,
+        gnss,
+        unused,
+    } = file;
     reader.doubt(unused);
     let inputs = input_hashes(&study, reader)?;
-    let trajectories = study.trajectory.iter().map(|e| input_of(&inputs, &e.file).blake3).collect();
-    let truths = study.truth.iter().map(|e| reader.truth_hash(e, seed)).collect::<Result<_, _>>()?;
+    let trajectories = study
+        .trajectory
+        .iter()
+        .map(|e| input_of(&inputs, &e.file).blake3)
+        .collect();
+    let truths = study
+        .truth
+        .iter()
+        .map(|e| reader.truth_hash(e, seed))
+        .collect::<Result<_, _>>()?;
     let (models, texts) = models(&study, seed, &|path| input_of(&inputs, path), reader)?;
     let plan = Plan {
         schema_version: Plan::SCHEMA_VERSION,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         numerics: fingerprint(),
         seed,
-        unit_runs: vec![unit_runs_asked(&study).unwrap_or(study.runs_of_cell()); study.trajectory.len()],
+        unit_runs: vec![
+            unit_runs_asked(&study).unwrap_or(study.runs_of_cell());
+            study.trajectory.len()
+        ],
         study,
         scenarios,
         gnss,
@@ -150,8 +196,15 @@ fn input_hashes(study: &Study, reader: Reader<'_>) -> Result<Vec<Input>, FileErr
     let mut found: Vec<Input> = Vec::new();
     for (role, path) in study.files() {
         for file in input::listed(&[beside(reader.study, path)])? {
-            let relative = file.strip_prefix(base).unwrap_or(&file).display().to_string();
-            let input = Input { path: relative, ..input::input(role, &file)? };
+            let relative = file
+                .strip_prefix(base)
+                .unwrap_or(&file)
+                .display()
+                .to_string();
+            let input = Input {
+                path: relative,
+                ..input::input(role, &file)?
+            };
             if !found.contains(&input) {
                 found.push(input);
             }
@@ -163,8 +216,16 @@ fn input_hashes(study: &Study, reader: Reader<'_>) -> Result<Vec<Input>, FileErr
 /// The model file, or whatever else, at a path of the study.
 fn input_of(inputs: &[Input], path: &Path) -> Input {
     let path = path.display().to_string();
-    let blake3 = inputs.iter().find(|i| i.path == path).map(|i| i.blake3.clone()).unwrap_or_default();
-    Input { role: "model".to_owned(), path, blake3 }
+    let blake3 = inputs
+        .iter()
+        .find(|i| i.path == path)
+        .map(|i| i.blake3.clone())
+        .unwrap_or_default();
+    Input {
+        role: "model".to_owned(),
+        path,
+        blake3,
+    }
 }
 
 /// Everything that would stop a run later: one cell of each trajectory, truth and scenario is set up, and
@@ -197,7 +258,9 @@ fn validate(
     match without.as_slice() {
         [] => {}
         [cell] => {
-            observer.remark(&Remark::warning(format!("cell \"{cell}\" has no outages: its table is empty")));
+            observer.remark(&Remark::warning(format!(
+                "cell \"{cell}\" has no outages: its table is empty"
+            )));
         }
         [cell, ..] => {
             let text = format!(
@@ -207,7 +270,9 @@ fn validate(
             observer.remark(&Remark::warning(text));
         }
     }
-    grid.doubts().into_iter().for_each(|doubt| observer.remark(&Remark::warning(doubt)));
+    grid.doubts()
+        .into_iter()
+        .for_each(|doubt| observer.remark(&Remark::warning(doubt)));
     Ok(())
 }
 
@@ -218,14 +283,23 @@ fn probe(
     options: &PlanOptions<'_>,
     observer: &dyn Observer<Remark>,
 ) -> Result<(), StudyError> {
-    let Some(clock) = options.clock else { return Ok(()) };
+    let Some(clock) = options.clock else {
+        return Ok(());
+    };
     let mut inputs = Inputs::new(planned, texts, observer);
     let (grid, plan) = (&planned.grid, &planned.plan);
-    let first = Unit { index: 0, cell: 0, first: 0, runs: plan.runs().min(LANES as u64) };
+    let first = Unit {
+        index: 0,
+        cell: 0,
+        first: 0,
+        runs: plan.runs().min(LANES as u64),
+    };
     let before_s = clock();
     let (run_s, unit) = inputs.with_cell(grid.cell(0), |work| {
         let start_s = clock();
-        let unit = work.unit(planned, (first, ""), &())?.expect("nothing stops it");
+        let unit = work
+            .unit(planned, (first, ""), &())?
+            .expect("nothing stops it");
         let run_s = match work {
             // Eight runs take as long as one: the lanes of the processor.
             Work::Sampling(_) => (clock() - start_s) / LANES as f64,
@@ -243,24 +317,39 @@ fn probe(
     let run_s: Vec<f64> = scale.iter().map(|s| s * run_s).collect();
     let unit_runs: Vec<u64> = match unit_runs_asked(&plan.study) {
         Some(runs) => vec![runs; run_s.len()],
-        None => run_s.iter().map(|s| unit_runs(*s, plan.runs(), options.threads)).collect(),
+        None => run_s
+            .iter()
+            .map(|s| unit_runs(*s, plan.runs(), options.threads))
+            .collect(),
     };
     // epochs inside outages are as many on any trajectory
     let is_all = plan.kept() == Kept::AllEpochs;
     let bytes_per_cell = |t: usize| {
         let units = plan.runs().div_ceil(unit_runs[t]) as f64;
-        let epochs = if is_all { (epochs as f64 * scale[t]) as usize } else { epochs };
+        let epochs = if is_all {
+            (epochs as f64 * scale[t]) as usize
+        } else {
+            epochs
+        };
         units * unit_file::size(&unit, unit_runs[t].min(plan.runs()), epochs)
     };
     let bytes = (0..run_s.len()).map(bytes_per_cell).sum::<f64>() * grid.per_trajectory() as f64;
-    planned.plan.estimate = Estimate { run_s, threads: options.threads, bytes };
+    planned.plan.estimate = Estimate {
+        run_s,
+        threads: options.threads,
+        bytes,
+    };
     planned.plan.unit_runs = unit_runs;
     Ok(())
 }
 
 /// What the study says of the size of units; covariance analysis has one unit a cell.
 const fn unit_runs_asked(study: &Study) -> Option<u64> {
-    if study.is_sampled() { study.unit_runs } else { Some(1) }
+    if study.is_sampled() {
+        study.unit_runs
+    } else {
+        Some(1)
+    }
 }
 
 /// Runs of a unit that lasts about two minutes on these threads: a multiple of eight.

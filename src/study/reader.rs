@@ -34,7 +34,8 @@ pub(super) struct Reader<'a> {
 
 impl Reader<'_> {
     pub(super) fn trajectory(&self, path: &Path) -> Result<Trajectory, FileError> {
-        let (trajectory, warnings) = trajectory_file::load(path, &trajectory_file::Options::default())?;
+        let (trajectory, warnings) =
+            trajectory_file::load(path, &trajectory_file::Options::default())?;
         self.doubt(warnings);
         Ok(trajectory)
     }
@@ -51,15 +52,25 @@ impl Reader<'_> {
         paths: &[PathBuf],
         rate_hz: Option<f64>,
     ) -> Result<Vec<Recording>, FileError> {
-        let (recordings, report) =
-            recordings::read(paths, &ReadOptions { rate_hz, ..ReadOptions::default() })?;
+        let (recordings, report) = recordings::read(
+            paths,
+            &ReadOptions {
+                rate_hz,
+                ..ReadOptions::default()
+            },
+        )?;
         self.doubt(report.all_warnings());
-        report.files.iter().for_each(|file| self.observer.remark(&Remark::detail(file)));
+        report
+            .files
+            .iter()
+            .for_each(|file| self.observer.remark(&Remark::detail(file)));
         Ok(recordings)
     }
 
     pub(super) fn doubt(&self, doubts: impl IntoIterator<Item = impl ToString>) {
-        doubts.into_iter().for_each(|doubt| self.observer.remark(&Remark::warning(doubt)));
+        doubts
+            .into_iter()
+            .for_each(|doubt| self.observer.remark(&Remark::warning(doubt)));
     }
 
     /// What paths of the study mean.
@@ -77,16 +88,25 @@ impl Reader<'_> {
         let files = recordings::listed(&self.beside(recordings))?;
         // by their contents: the same file may be named in two ways
         let pairs = hashes(&files)?.into_iter().zip(&files);
-        let others: Vec<PathBuf> =
-            pairs.filter(|(hash, _)| !of_truth.contains(hash)).map(|(_, file)| file.clone()).collect();
+        let others: Vec<PathBuf> = pairs
+            .filter(|(hash, _)| !of_truth.contains(hash))
+            .map(|(_, file)| file.clone())
+            .collect();
         if others.is_empty() || others.len() == files.len() {
-            return Err(StudyError::NothingLeftOut { truth: truth.name.clone(), left: others.len() });
+            return Err(StudyError::NothingLeftOut {
+                truth: truth.name.clone(),
+                left: others.len(),
+            });
         }
         Ok(others)
     }
 
     /// Virtual recordings of the study, means removed: those of `nav-sim synthesize` with the same model and seed.
-    pub(super) fn synthesised(&self, step: &Synthesis, seed: u64) -> Result<Vec<Recording>, StudyError> {
+    pub(super) fn synthesised(
+        &self,
+        step: &Synthesis,
+        seed: u64,
+    ) -> Result<Vec<Recording>, StudyError> {
         let path = beside(self.study, &step.model);
         let file = self.model(&path)?;
         let contamination = self.contamination(step, file.model.rate_hz)?;
@@ -109,22 +129,36 @@ impl Reader<'_> {
             seed: step.seed.unwrap_or(seed),
         };
         let recording = |replicate: u64| imu.recording(replicate, &channels, step.samples);
-        let recordings: Result<_, ReplicateError> =
-            (1..=step.replicates).into_par_iter().map(recording).collect();
+        let recordings: Result<_, ReplicateError> = (1..=step.replicates)
+            .into_par_iter()
+            .map(recording)
+            .collect();
         recordings.map_err(|e| StudyError::unfit(path.display(), e))
     }
 
-    fn contamination(&self, step: &Synthesis, rate_hz: f64) -> Result<Option<Contamination>, FileError> {
-        let Some(name) = &step.contaminate else { return Ok(None) };
+    fn contamination(
+        &self,
+        step: &Synthesis,
+        rate_hz: f64,
+    ) -> Result<Option<Contamination>, FileError> {
+        let Some(name) = &step.contaminate else {
+            return Ok(None);
+        };
         let is_known = contamination_file::names().contains(&name.as_str());
-        let place = if is_known { PathBuf::from(name) } else { beside(self.study, Path::new(name)) };
+        let place = if is_known {
+            PathBuf::from(name)
+        } else {
+            beside(self.study, Path::new(name))
+        };
         contamination_file::find(&place.to_string_lossy(), rate_hz).map(Some)
     }
 
     /// What makes the errors of a truth.
     pub(super) fn truth(&self, entry: &TruthEntry, seed: u64) -> Result<TruthSource, StudyError> {
         if let Some(model) = &entry.model {
-            return Ok(TruthSource::Model(self.model(&beside(self.study, model))?.model));
+            return Ok(TruthSource::Model(
+                self.model(&beside(self.study, model))?.model,
+            ));
         }
         let recordings = match &entry.synthesize {
             Some(step) => self.synthesised(step, seed.wrapping_add(TRUTH_SEED))?,
@@ -146,16 +180,24 @@ impl Reader<'_> {
             hasher.update(hash.as_bytes());
         }
         if let Some(step) = &entry.synthesize {
-            hasher.update(self.synthesis_hash(step, seed.wrapping_add(TRUTH_SEED))?.as_bytes());
+            hasher.update(
+                self.synthesis_hash(step, seed.wrapping_add(TRUTH_SEED))?
+                    .as_bytes(),
+            );
         }
         Ok(hasher.finalize().to_hex().to_string())
     }
 
     fn synthesis_hash(&self, step: &Synthesis, seed: u64) -> Result<String, FileError> {
-        let step = Synthesis { seed: Some(step.seed.unwrap_or(seed)), ..step.clone() };
+        let step = Synthesis {
+            seed: Some(step.seed.unwrap_or(seed)),
+            ..step.clone()
+        };
         let model = beside(self.study, &step.model);
         let rate_hz = model_file::read(&model)?.model.rate_hz;
-        let rules = self.contamination(&step, rate_hz)?.map(|contamination| contamination.rules);
+        let rules = self
+            .contamination(&step, rate_hz)?
+            .map(|contamination| contamination.rules);
         let identity = serde_json::json!([step, input::fingerprint(&model)?, rules]);
         Ok(hash::of_bytes(identity.to_string().as_bytes()))
     }
@@ -170,5 +212,7 @@ pub(super) fn unchanged(path: &Path, blake3: &str) -> Result<(), StudyError> {
     if input::fingerprint(path)? == blake3 {
         return Ok(());
     }
-    Err(StudyError::Changed { what: path.display().to_string() })
+    Err(StudyError::Changed {
+        what: path.display().to_string(),
+    })
 }

@@ -22,14 +22,23 @@ pub struct Remark {
 
 impl Remark {
     pub(super) fn detail(text: impl ToString) -> Self {
-        Self { importance: Importance::Detail, text: text.to_string() }
+        Self {
+            importance: Importance::Detail,
+            text: text.to_string(),
+        }
     }
 
     pub(super) fn note(text: impl ToString) -> Self {
-        Self { importance: Importance::Note, text: text.to_string() }
+        Self {
+            importance: Importance::Note,
+            text: text.to_string(),
+        }
     }
 
     pub(super) fn warning(text: impl ToString) -> Self {
-        Self { importance: Importance::Warning, text: text.to_string() }
+        Self {
+            importance: Importance::Warning,
+            text: text.to_string(),
+        }
     }
 }

@@ -15,11 +15,13 @@ pub(super) const MAX_UNITS: usize = 1_000_000;
 pub(super) fn unique(axis: &str, names: &[(usize, &str)]) -> Result<(), DescriptionError> {
     let axis = || axis.to_owned();
     if let Some((i, _)) = names.iter().find(|(_, name)| name.trim().is_empty()) {
-        return Err(DescriptionError::Unnamed { axis: axis(), entry: i + 1 });
+        return Err(DescriptionError::Unnamed {
+            axis: axis(),
+            entry: i + 1,
+        });
     }
     if let Some((i, name)) = names.iter().find(|(_, name)| is_no_name(name)) {
-        let reason =
-            "names begin with no = + - @ and have no control characters: tables are opened in spreadsheets";
+        let reason = "names begin with no = + - @ and have no control characters: tables are opened in spreadsheets";
         return Err(DescriptionError::refused(
             &format!("{}[{}].name", axis(), i + 1),
             name.escape_debug(),
@@ -28,20 +30,28 @@ pub(super) fn unique(axis: &str, names: &[(usize, &str)]) -> Result<(), Descript
     }
     let mut seen = std::collections::HashSet::new();
     match names.iter().find(|(_, name)| !seen.insert(*name)) {
-        Some((i, name)) => {
-            Err(DescriptionError::Duplicate { axis: axis(), entry: i + 1, name: (*name).to_owned() })
-        }
+        Some((i, name)) => Err(DescriptionError::Duplicate {
+            axis: axis(),
+            entry: i + 1,
+            name: (*name).to_owned(),
+        }),
         None => Ok(()),
     }
 }
 
 /// Whether a spreadsheet would compute a name, or a terminal obey it.
 fn is_no_name(name: &str) -> bool {
-    name.starts_with(['=', '+', '-', '@']) || name.contains(char::is_control) || name.contains(turns)
+    name.starts_with(['=', '+', '-', '@'])
+        || name.contains(char::is_control)
+        || name.contains(turns)
 }
 
 /// An entry says one of several things.
-pub(super) fn exactly_one(key: String, given: &[bool], keys: &'static str) -> Result<(), DescriptionError> {
+pub(super) fn exactly_one(
+    key: String,
+    given: &[bool],
+    keys: &'static str,
+) -> Result<(), DescriptionError> {
     match given.iter().filter(|s| **s).count() {
         1 => Ok(()),
         _ => Err(DescriptionError::NotOne { key, keys }),

@@ -75,7 +75,10 @@ pub fn run(
             Ok(())
         })?;
     }
-    Ok(RunReport { finished, left: pending.len() - finished })
+    Ok(RunReport {
+        finished,
+        left: pending.len() - finished,
+    })
 }
 
 /// How many units are computed at once: more than one where each has too few batches for the threads.
@@ -146,8 +149,13 @@ pub fn verify(
     if whole.is_empty() && damaged.is_empty() {
         return Err(StudyError::NothingDone);
     }
-    let key =
-        StreamKey { seed: options.seed, scenario: "", run: 0, source: "batch.verify", process: "units" };
+    let key = StreamKey {
+        seed: options.seed,
+        scenario: "",
+        run: 0,
+        source: "batch.verify",
+        process: "units",
+    };
     let mut chosen: Vec<&NamedUnit> = whole.sample(&mut key.generator(), options.units).collect();
     chosen.sort_by_key(|(unit, _)| unit.index);
     observer.begin(chosen.iter().map(|(unit, _)| unit.runs).sum());
@@ -162,5 +170,10 @@ pub fn verify(
             different.push(format!("{id} ({})", planned.grid.names(cell).join(", ")));
         }
     }
-    Ok(VerifyReport { whole: whole.len(), compared: chosen.len(), damaged, different })
+    Ok(VerifyReport {
+        whole: whole.len(),
+        compared: chosen.len(),
+        damaged,
+        different,
+    })
 }

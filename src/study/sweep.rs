@@ -108,9 +108,16 @@ pub(crate) struct OutageSet {
 }
 
 /// The sets an entry stands for.
-pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet>, DescriptionError> {
-    let said =
-        [entry.windows.is_some(), entry.sweep.is_some(), entry.periodic.is_some(), entry.random.is_some()];
+pub(super) fn expand(
+    entry: &OutagesEntry,
+    index: usize,
+) -> Result<Vec<OutageSet>, DescriptionError> {
+    let said = [
+        entry.windows.is_some(),
+        entry.sweep.is_some(),
+        entry.periodic.is_some(),
+        entry.random.is_some(),
+    ];
     let key = format!("outages[{}]", index + 1);
     exactly_one(key.clone(), &said, "windows, sweep, periodic, random")?;
     let swept = swept(entry);
@@ -122,11 +129,18 @@ pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet
     }
     let sets = match (&entry.windows, swept) {
         (Some(windows), _) => {
-            vec![(OutagePlan { fixed: windows.clone(), ..OutagePlan::default() }, Vec::new())]
+            vec![(
+                OutagePlan {
+                    fixed: windows.clone(),
+                    ..OutagePlan::default()
+                },
+                Vec::new(),
+            )]
         }
-        (None, Some((axes, plan))) => {
-            product(&axes).into_iter().map(|values| (plan(&values), values)).collect()
-        }
+        (None, Some((axes, plan))) => product(&axes)
+            .into_iter()
+            .map(|values| (plan(&values), values))
+            .collect(),
         (None, None) => Vec::new(),
     };
     if sets.is_empty() {
@@ -134,9 +148,14 @@ pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet
     }
     let several = sets.len() > 1;
     let named = |(plan, values): (OutagePlan, Vec<f64>)| {
-        plan.validate().map_err(|e| refused(entry, &key, &values, e))?;
+        plan.validate()
+            .map_err(|e| refused(entry, &key, &values, e))?;
         let values: Vec<String> = values.iter().map(f64::to_string).collect();
-        let name = if several { format!("{}({})", entry.name, values.join(",")) } else { entry.name.clone() };
+        let name = if several {
+            format!("{}({})", entry.name, values.join(","))
+        } else {
+            entry.name.clone()
+        };
         Ok(OutageSet { name, plan })
     };
     sets.into_iter().map(named).collect()
@@ -146,15 +165,31 @@ pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet
 fn refused(entry: &OutagesEntry, key: &str, values: &[f64], e: SettingError) -> DescriptionError {
     // a window that does not end after its start has no length
     let e = match (&entry.sweep, values) {
-        (Some(_), [_, duration_s]) if e.key.ends_with("end_s") => {
-            SettingError::new("sweep.duration_s", duration_s, "it must be a finite number > 0")
-        }
+        (Some(_), [_, duration_s]) if e.key.ends_with("end_s") => SettingError::new(
+            "sweep.duration_s",
+            duration_s,
+            "it must be a finite number > 0",
+        ),
         _ => e,
     };
-    let fixed = if entry.sweep.is_some() { ("outage[1]", "sweep") } else { ("outage[", "windows[") };
-    let names = [fixed, ("outage_periodic", "periodic"), ("outage_random", "random")];
-    let written = names.iter().fold(e.key, |name, (of_plan, of_entry)| name.replace(of_plan, of_entry));
-    DescriptionError::refused(&format!("{key}.{written}"), e.value, format!("is refused: {}", e.requirement))
+    let fixed = if entry.sweep.is_some() {
+        ("outage[1]", "sweep")
+    } else {
+        ("outage[", "windows[")
+    };
+    let names = [
+        fixed,
+        ("outage_periodic", "periodic"),
+        ("outage_random", "random"),
+    ];
+    let written = names.iter().fold(e.key, |name, (of_plan, of_entry)| {
+        name.replace(of_plan, of_entry)
+    });
+    DescriptionError::refused(
+        &format!("{key}.{written}"),
+        e.value,
+        format!("is refused: {}", e.requirement),
+    )
 }
 
 /// What an entry is swept over, and the outages of one combination.
@@ -163,15 +198,27 @@ type Swept<'a> = (Vec<&'a OneOrMany>, fn(&[f64]) -> OutagePlan);
 fn swept(entry: &OutagesEntry) -> Option<Swept<'_>> {
     match (&entry.sweep, &entry.periodic, &entry.random) {
         (Some(s), ..) => Some((vec![&s.start_s, &s.duration_s], |v| OutagePlan {
-            fixed: vec![Outage { start_s: v[0], end_s: v[0] + v[1] }],
+            fixed: vec![Outage {
+                start_s: v[0],
+                end_s: v[0] + v[1],
+            }],
             ..OutagePlan::default()
         })),
-        (_, Some(p), _) => Some((vec![&p.first_s, &p.every_s, &p.duration_s], |v| OutagePlan {
-            periodic: Some(PeriodicOutages { first_s: v[0], every_s: v[1], duration_s: v[2] }),
-            ..OutagePlan::default()
+        (_, Some(p), _) => Some((vec![&p.first_s, &p.every_s, &p.duration_s], |v| {
+            OutagePlan {
+                periodic: Some(PeriodicOutages {
+                    first_s: v[0],
+                    every_s: v[1],
+                    duration_s: v[2],
+                }),
+                ..OutagePlan::default()
+            }
         })),
         (.., Some(r)) => Some((vec![&r.rate_per_hour, &r.duration_s], |v| OutagePlan {
-            random: Some(RandomOutages { rate_per_hour: v[0], duration_s: v[1] }),
+            random: Some(RandomOutages {
+                rate_per_hour: v[0],
+                duration_s: v[1],
+            }),
             ..OutagePlan::default()
         })),
         _ => None,
@@ -182,8 +229,12 @@ fn swept(entry: &OutagesEntry) -> Option<Swept<'_>> {
 fn product(axes: &[&OneOrMany]) -> Vec<Vec<f64>> {
     let mut combinations: Vec<Vec<f64>> = vec![Vec::new()];
     for axis in axes {
-        let longer =
-            |c: &Vec<f64>| axis.values().iter().map(|v| [&c[..], &[*v]].concat()).collect::<Vec<_>>();
+        let longer = |c: &Vec<f64>| {
+            axis.values()
+                .iter()
+                .map(|v| [&c[..], &[*v]].concat())
+                .collect::<Vec<_>>()
+        };
         combinations = combinations.iter().flat_map(longer).collect();
     }
     combinations
@@ -203,9 +254,24 @@ mod tests {
                 "24",
                 "it must come after start_s = 25",
             ),
-            ("sweep = { start_s = [300, 400], duration_s = [10, 0] }", "sweep.duration_s", "0", positive),
-            ("sweep = { start_s = 300, duration_s = -4 }", "sweep.duration_s", "-4", positive),
-            ("sweep = { start_s = 300, duration_s = nan }", "sweep.duration_s", "NaN", positive),
+            (
+                "sweep = { start_s = [300, 400], duration_s = [10, 0] }",
+                "sweep.duration_s",
+                "0",
+                positive,
+            ),
+            (
+                "sweep = { start_s = 300, duration_s = -4 }",
+                "sweep.duration_s",
+                "-4",
+                positive,
+            ),
+            (
+                "sweep = { start_s = 300, duration_s = nan }",
+                "sweep.duration_s",
+                "NaN",
+                positive,
+            ),
             (
                 "sweep = { start_s = inf, duration_s = 4 }",
                 "sweep.start_s",
@@ -218,12 +284,20 @@ mod tests {
                 "0",
                 positive,
             ),
-            ("random = { rate_per_hour = 4, duration_s = [0, 4] }", "random.duration_s", "0", positive),
+            (
+                "random = { rate_per_hour = 4, duration_s = [0, 4] }",
+                "random.duration_s",
+                "0",
+                positive,
+            ),
         ];
         for (text, key, value, requirement) in cases {
             let entry: OutagesEntry = toml::from_str(text).unwrap();
             let refusal = expand(&entry, 0).unwrap_err().to_string();
-            assert_eq!(refusal, format!("\"outages[1].{key}\" = {value} is refused: {requirement}"));
+            assert_eq!(
+                refusal,
+                format!("\"outages[1].{key}\" = {value} is refused: {requirement}")
+            );
         }
     }
 }

@@ -17,14 +17,19 @@ pub(super) struct Tables {
 
 impl Tables {
     pub(super) fn create(out: &mut AtomicDir, planned: &Planned) -> Result<Self, StudyError> {
-        let outages = TableFiles::create(out, "outages", report::outage_columns())?.with_json(out)?;
+        let outages =
+            TableFiles::create(out, "outages", report::outage_columns())?.with_json(out)?;
         let runs = TableFiles::create(out, "runs", report::run_columns())?;
         let epochs = planned
             .plan
             .study
             .keeps(Metric::Epochs)
             .then(|| TableFiles::create(out, "epochs", report::epoch_columns()));
-        Ok(Self { outages, runs, epochs: epochs.transpose()? })
+        Ok(Self {
+            outages,
+            runs,
+            epochs: epochs.transpose()?,
+        })
     }
 
     pub(super) fn add(&mut self, cell: &CellTables) -> Result<(), StudyError> {

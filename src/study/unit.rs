@@ -34,7 +34,11 @@ impl Finding {
     pub fn windows(&self) -> Vec<(f64, f64)> {
         match self {
             Self::Sampled(result) => result.outages.clone(),
-            Self::Expected(expected) => expected.outages.iter().map(|o| (o.start_s, o.end_s)).collect(),
+            Self::Expected(expected) => expected
+                .outages
+                .iter()
+                .map(|o| (o.start_s, o.end_s))
+                .collect(),
         }
     }
 
@@ -72,9 +76,13 @@ impl Finding {
     /// Drops the sums at epochs that are not kept.
     pub(super) fn reduce(&mut self, kept: Kept) {
         let windows = self.windows();
-        let inside =
-            |t_s: f64| windows.iter().any(|&(start_s, end_s)| Outage { start_s, end_s }.withholds(t_s));
-        let keeps = |t_s: f64| kept == Kept::AllEpochs || (kept == Kept::OutageEpochs && inside(t_s));
+        let inside = |t_s: f64| {
+            windows
+                .iter()
+                .any(|&(start_s, end_s)| Outage { start_s, end_s }.withholds(t_s))
+        };
+        let keeps =
+            |t_s: f64| kept == Kept::AllEpochs || (kept == Kept::OutageEpochs && inside(t_s));
         match self {
             Self::Sampled(result) => result.epochs.retain(|e| keeps(e.t_s)),
             Self::Expected(expected) => expected.epochs.retain(|e| keeps(e.t_s)),

@@ -42,7 +42,10 @@ pub enum UnitFileError {
 
 /// Where a unit's file stands in a study directory: `units/ab/abcd….unit`.
 pub(crate) fn path(directory: &Path, id: &str) -> PathBuf {
-    directory.join("units").join(id.get(..2).unwrap_or("00")).join(format!("{id}.unit"))
+    directory
+        .join("units")
+        .join(id.get(..2).unwrap_or("00"))
+        .join(format!("{id}.unit"))
 }
 
 /// Size (bytes) of the file of a unit like this one, with so many runs, and so many epochs in each column.
@@ -92,12 +95,24 @@ pub fn read(directory: &Path, id: &str) -> Result<UnitResult, UnitFileError> {
     let shown = || file.display().to_string();
     let bytes = fs::read(&file).map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => UnitFileError::Missing { path: shown() },
-        io::ErrorKind::IsADirectory => UnitFileError::Damaged { path: shown(), what: "it is a directory" },
-        _ => UnitFileError::Io { path: shown(), source },
+        io::ErrorKind::IsADirectory => UnitFileError::Damaged {
+            path: shown(),
+            what: "it is a directory",
+        },
+        _ => UnitFileError::Io {
+            path: shown(),
+            source,
+        },
     })?;
-    let unit = decode(&bytes).map_err(|what| UnitFileError::Damaged { path: shown(), what })?;
+    let unit = decode(&bytes).map_err(|what| UnitFileError::Damaged {
+        path: shown(),
+        what,
+    })?;
     if unit.id != id {
-        return Err(UnitFileError::Damaged { path: shown(), what: "it holds another unit" });
+        return Err(UnitFileError::Damaged {
+            path: shown(),
+            what: "it holds another unit",
+        });
     }
     Ok(unit)
 }
@@ -121,7 +136,9 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<UnitResult, &'static str> {
     if blake3::hash(content).as_bytes() != checksum {
         return Err("its checksum is wrong");
     }
-    let unit = content.strip_prefix(MAGIC).ok_or("its version is not supported")?;
+    let unit = content
+        .strip_prefix(MAGIC)
+        .ok_or("its version is not supported")?;
     match postcard::take_from_bytes(unit) {
         Ok((unit, [])) => Ok(unit),
         _ => Err("it is no unit"),
@@ -179,7 +196,12 @@ mod tests {
                 independent_windows: Some(5.8),
             })
         };
-        UnitResult { id: "ab12".into(), first: 16, runs: 2, columns: vec![column(15), column(27)] }
+        UnitResult {
+            id: "ab12".into(),
+            first: 16,
+            runs: 2,
+            columns: vec![column(15), column(27)],
+        }
     }
 
     #[test]
@@ -188,7 +210,10 @@ mod tests {
         write(dir.path(), &unit()).unwrap();
         assert!(dir.path().join("units/ab/ab12.unit").exists());
         assert_eq!(read(dir.path(), "ab12").unwrap(), unit());
-        assert!(matches!(read(dir.path(), "ab13").unwrap_err(), UnitFileError::Missing { .. }));
+        assert!(matches!(
+            read(dir.path(), "ab13").unwrap_err(),
+            UnitFileError::Missing { .. }
+        ));
     }
 
     #[test]
@@ -206,14 +231,23 @@ mod tests {
         for at in 0..whole.len() {
             let mut bytes = whole.clone();
             bytes[at] ^= 0x10;
-            assert_eq!(decode(&bytes).unwrap_err(), "its checksum is wrong", "byte {at}");
+            assert_eq!(
+                decode(&bytes).unwrap_err(),
+                "its checksum is wrong",
+                "byte {at}"
+            );
         }
     }
 
     /// A right checksum over a list that announces more than 2^60 columns, of which there is none.
     #[test]
     fn a_list_that_announces_more_than_there_is_is_refused() {
-        let empty = UnitResult { id: "ab12".into(), first: 0, runs: 0, columns: Vec::new() };
+        let empty = UnitResult {
+            id: "ab12".into(),
+            first: 0,
+            runs: 0,
+            columns: Vec::new(),
+        };
         let whole = encode(&empty);
         let end = whole.len() - CHECKSUM - 1;
         let mut forged = [&whole[..end], &[0xff; 8], &[0x7f]].concat();
@@ -226,8 +260,15 @@ mod tests {
     fn a_unit_under_another_name_is_refused() {
         let dir = tempfile::tempdir().unwrap();
         write(dir.path(), &unit()).unwrap();
-        fs::rename(path(dir.path(), "ab12"), dir.path().join("units/ab/abff.unit")).unwrap();
+        fs::rename(
+            path(dir.path(), "ab12"),
+            dir.path().join("units/ab/abff.unit"),
+        )
+        .unwrap();
         let e = read(dir.path(), "abff").unwrap_err().to_string();
-        assert!(e.ends_with("units/ab/abff.unit is damaged: it holds another unit"), "{e}");
+        assert!(
+            e.ends_with("units/ab/abff.unit is damaged: it holds another unit"),
+            "{e}"
+        );
     }
 }

@@ -54,13 +54,20 @@ impl Synthesis {
         existing: Existing,
     ) -> Result<Claim, FileError> {
         let (names, own) = (self.names(), self.identity());
-        let files: Vec<&str> = names.iter().map(String::as_str).chain(["manifest.json"]).collect();
+        let files: Vec<&str> = names
+            .iter()
+            .map(String::as_str)
+            .chain(["manifest.json"])
+            .collect();
         let recognise = |text: &str| {
-            let Some(made) = made(text) else { return Ok(Found::Foreign) };
+            let Some(made) = made(text) else {
+                return Ok(Found::Foreign);
+            };
             no_others(out, &names, &made)?;
             let present: Value = serde_json::from_str(text).unwrap_or_default();
-            let is_same =
-                own.as_object().is_some_and(|own| own.iter().all(|(key, value)| present[key] == *value));
+            let is_same = own
+                .as_object()
+                .is_some_and(|own| own.iter().all(|(key, value)| present[key] == *value));
             Ok(Found::result(is_same && made == names))
         };
         claim_directory(out, &files, inputs, existing, recognise)
@@ -81,8 +88,11 @@ impl Synthesis {
             Ok(model)
         };
         // Collected before the first failure is looked for, so that it is the same at any number of threads.
-        let outcomes: Vec<Result<Model, JobError>> = (0..names.len()).into_par_iter().map(write).collect();
-        let models = outcomes.into_iter().collect::<Result<Vec<Model>, JobError>>()?;
+        let outcomes: Vec<Result<Model, JobError>> =
+            (0..names.len()).into_par_iter().map(write).collect();
+        let models = outcomes
+            .into_iter()
+            .collect::<Result<Vec<Model>, JobError>>()?;
         let text = report::json(&self.manifest(&names, &models));
         directory.write("manifest.json", &text)?;
         directory.commit()?;
@@ -90,18 +100,35 @@ impl Synthesis {
     }
 
     fn names(&self) -> Vec<String> {
-        (1..=self.replicates).map(|k| format!("replicate_{k}.{}", self.format)).collect()
+        (1..=self.replicates)
+            .map(|k| format!("replicate_{k}.{}", self.format))
+            .collect()
     }
 
     /// Writes a replicate and returns the model it was made from; `shown`: where the file will be.
-    fn write_replicate(&self, replicate: u64, path: &Path, shown: &Path) -> Result<Model, JobError> {
+    fn write_replicate(
+        &self,
+        replicate: u64,
+        path: &Path,
+        shown: &Path,
+    ) -> Result<Model, JobError> {
         let spread = self.file.spread.as_ref().filter(|_| self.spread);
         let contamination = self.contamination.as_ref();
-        let imu = VirtualImu { model: &self.file.model, spread, contamination, seed: self.seed };
+        let imu = VirtualImu {
+            model: &self.file.model,
+            spread,
+            contamination,
+            seed: self.seed,
+        };
         let model = imu.model_of(replicate)?;
         let signal = |c: &Channel| Ok((*c, imu.signal(&model, replicate, *c, self.samples)?));
-        let signals = self.channels.iter().map(signal).collect::<Result<Vec<_>, ReplicateError>>()?;
-        let written = File::create(path).and_then(|file| self.format.write(file, model.rate_hz, &signals));
+        let signals = self
+            .channels
+            .iter()
+            .map(signal)
+            .collect::<Result<Vec<_>, ReplicateError>>()?;
+        let written =
+            File::create(path).and_then(|file| self.format.write(file, model.rate_hz, &signals));
         written.map_err(|e| FileError::io(shown, e))?;
         Ok(model)
     }
@@ -109,9 +136,15 @@ impl Synthesis {
     /// What was drawn.
     fn manifest(&self, names: &[String], models: &[Model]) -> Value {
         let entry = |(i, (name, model)): (usize, (&String, &Model))| {
-            let contaminated = self.contamination.as_ref().is_some_and(|c| c.touches(i as u64 + 1));
-            let axes: Map<String, Value> =
-                self.channels.iter().map(|c| (c.to_string(), json!(model.axis(*c).processes))).collect();
+            let contaminated = self
+                .contamination
+                .as_ref()
+                .is_some_and(|c| c.touches(i as u64 + 1));
+            let axes: Map<String, Value> = self
+                .channels
+                .iter()
+                .map(|c| (c.to_string(), json!(model.axis(*c).processes)))
+                .collect();
             json!({ "file": name, "contaminated": contaminated, "axes": axes })
         };
         let replicates: Vec<Value> = names.iter().zip(models).enumerate().map(entry).collect();
@@ -142,20 +175,31 @@ impl Synthesis {
 fn no_others(directory: &Path, names: &[String], made: &[String]) -> Result<(), FileError> {
     let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
     let inside = entries.filter_map(|e| e.file_name().into_string().ok());
-    let mut inside: Vec<String> = inside.filter(|n| is_recording(n) && !n.starts_with('.')).collect();
+    let mut inside: Vec<String> = inside
+        .filter(|n| is_recording(n) && !n.starts_with('.'))
+        .collect();
     inside.sort();
     let refusal = |message: String, advice: &'static str| {
         let path = directory.display().to_string();
-        FileError::contents(path, Place::Itself, message).advice(advice).setting(Setting::OutputDirectory)
+        FileError::contents(path, Place::Itself, message)
+            .advice(advice)
+            .setting(Setting::OutputDirectory)
     };
-    if let Some(other) = inside.iter().find(|n| !made.contains(n) && names.contains(n)) {
-        return Err(refusal(format!("holds {other}, which this command did not make"), "move it away"));
+    if let Some(other) = inside
+        .iter()
+        .find(|n| !made.contains(n) && names.contains(n))
+    {
+        return Err(refusal(
+            format!("holds {other}, which this command did not make"),
+            "move it away",
+        ));
     }
     match inside.iter().find(|n| !names.contains(n)) {
         None => Ok(()),
         Some(stale) => {
-            let message =
-                format!("already holds {stale}, which this command would leave beside its own outputs");
+            let message = format!(
+                "already holds {stale}, which this command would leave beside its own outputs"
+            );
             Err(refusal(message, "remove it"))
         }
     }
@@ -165,6 +209,8 @@ fn no_others(directory: &Path, names: &[String], made: &[String]) -> Result<(), 
 fn made(manifest: &str) -> Option<Vec<String>> {
     let manifest: Value = serde_json::from_str(manifest).ok()?;
     let name = |replicate: &Value| replicate["file"].as_str().map(str::to_owned);
-    let replicates = manifest["replicates"].as_array().filter(|_| manifest["command"] == "synthesize")?;
+    let replicates = manifest["replicates"]
+        .as_array()
+        .filter(|_| manifest["command"] == "synthesize")?;
     replicates.iter().map(name).collect()
 }

@@ -37,7 +37,12 @@ pub struct SynthesisRequest {
     #[arg(long, value_name = "NAME|FILE")]
     pub contaminate: Option<String>,
     /// Signals to make: all, accel, gyro, x, accel.x, … (comma-separated)
-    #[arg(long, value_name = "AXES", value_delimiter = ',', default_value = "all")]
+    #[arg(
+        long,
+        value_name = "AXES",
+        value_delimiter = ',',
+        default_value = "all"
+    )]
     pub axes: Vec<ChannelSet>,
     /// Seed of all random numbers; drawn without it.
     #[arg(skip)]
@@ -70,14 +75,19 @@ impl SynthesisRequest {
         let shown = self.model.display();
         if self.spread && file.spread.is_none() {
             let hint = "see the head of calib_data/consumer_mems.toml, or leave --spread out";
-            return Err(Failure::input(format!("{shown}: no [spread] to draw parameters from")).hint(hint));
+            return Err(
+                Failure::input(format!("{shown}: no [spread] to draw parameters from")).hint(hint),
+            );
         }
         if file.turn_on.is_some() {
             notes.remark(&Note::Remark(format!(
                 "{shown}: its turn-on biases are not drawn: recordings are of noise about their mean"
             )));
         }
-        let contamination = self.contaminate.as_deref().map(|c| contamination(c, file.model.rate_hz));
+        let contamination = self
+            .contaminate
+            .as_deref()
+            .map(|c| contamination(c, file.model.rate_hz));
         let contamination = contamination.transpose()?;
         let channels = self.wanted(&file, notes)?;
         reaches(contamination.as_ref(), self.replicates, &channels, notes)?;
@@ -87,11 +97,16 @@ impl SynthesisRequest {
         };
         let bytes = samples * channels.len() as f64 * 8.0;
         if samples < 2.0 {
-            return Err(Failure::input(format!("a recording needs at least 2 samples; these are {samples}")));
+            return Err(Failure::input(format!(
+                "a recording needs at least 2 samples; these are {samples}"
+            )));
         }
-        if bytes >= isize::MAX as f64 || Vec::<u8>::new().try_reserve_exact(bytes as usize).is_err() {
+        if bytes >= isize::MAX as f64 || Vec::<u8>::new().try_reserve_exact(bytes as usize).is_err()
+        {
             let gigabytes = bytes / 1e9;
-            return Err(Failure::could_not(format!("{samples} samples need {gigabytes:.0} GB of memory")));
+            return Err(Failure::could_not(format!(
+                "{samples} samples need {gigabytes:.0} GB of memory"
+            )));
         }
         Ok(Synthesis {
             input: input::input("model", &self.model)?,
@@ -107,13 +122,21 @@ impl SynthesisRequest {
     }
 
     /// The channels to make: those asked for that the model has.
-    fn wanted(&self, file: &ModelFile, notes: &dyn Observer<Note>) -> Result<Vec<Channel>, Failure> {
+    fn wanted(
+        &self,
+        file: &ModelFile,
+        notes: &dyn Observer<Note>,
+    ) -> Result<Vec<Channel>, Failure> {
         let asked = |c: &Channel| self.axes.iter().any(|set| set.channels.contains(c));
-        let (missing, present): (Vec<Channel>, Vec<Channel>) =
-            Channel::ALL.into_iter().filter(asked).partition(|c| file.missing.contains(c));
+        let (missing, present): (Vec<Channel>, Vec<Channel>) = Channel::ALL
+            .into_iter()
+            .filter(asked)
+            .partition(|c| file.missing.contains(c));
         let shown = self.model.display();
         if present.is_empty() {
-            return Err(Failure::input(format!("{shown} has no noise model for the axes asked for")));
+            return Err(Failure::input(format!(
+                "{shown} has no noise model for the axes asked for"
+            )));
         }
         for channel in missing {
             notes.remark(&Note::Warning(format!(
@@ -132,16 +155,20 @@ fn reaches(
     channels: &[Channel],
     notes: &dyn Observer<Note>,
 ) -> Result<(), Failure> {
-    let Some(contamination) = contamination else { return Ok(()) };
+    let Some(contamination) = contamination else {
+        return Ok(());
+    };
     let Contamination { name, rules } = contamination;
     if !(1..=replicates).any(|replicate| contamination.touches(replicate)) {
-        let message = format!("--contaminate {name}: it touches none of the replicates 1 to {replicates}");
-        return Err(
-            Failure::input(message).hint("replicates are counted from 1; more of them with --replicates")
-        );
+        let message =
+            format!("--contaminate {name}: it touches none of the replicates 1 to {replicates}");
+        return Err(Failure::input(message)
+            .hint("replicates are counted from 1; more of them with --replicates"));
     }
     let made = |rule: &Rule| channels.iter().any(|c| c.sensor == rule.sensor);
-    let Some(Rule { sensor, place, .. }) = rules.iter().find(|rule| !made(rule)) else { return Ok(()) };
+    let Some(Rule { sensor, place, .. }) = rules.iter().find(|rule| !made(rule)) else {
+        return Ok(());
+    };
     let message = format!("{place}: corrupts the {}, which is not made", sensor.name());
     if rules.iter().any(made) {
         notes.remark(&Note::Detail(message));

@@ -3,8 +3,8 @@
 use super::result::{TuneResult, kind};
 use crate::report::Answer;
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone, readable, seconds,
-    short_names,
+    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone, readable,
+    seconds, short_names,
 };
 use nav_sim_navigation::metrics::VerdictKind;
 use nav_sim_navigation::simulation::lincov::{Aim, FilterConsistency};
@@ -22,13 +22,19 @@ impl Answer for TuneResult {
         };
         let mut document = Document::new("Factors on a noise model", tone, self.verdict());
         if found == VerdictKind::Underconfident && self.aim == Aim::Worst {
-            let why =
-                "no error exceeds its sigma in any truth; --for mean aims at the right NEES in the mean";
+            let why = "no error exceeds its sigma in any truth; --for mean aims at the right NEES in the mean";
             document.note(Importance::Remark, why);
         }
-        if self.of_run.as_ref().is_some_and(|of_run| kind(of_run) == VerdictKind::Overconfident) {
+        if self
+            .of_run
+            .as_ref()
+            .is_some_and(|of_run| kind(of_run) == VerdictKind::Overconfident)
+        {
             let states = self.filter_of_run;
-            document.note(Importance::Remark, format!("--filter {states} tunes the default of run"));
+            document.note(
+                Importance::Remark,
+                format!("--filter {states} tunes the default of run"),
+            );
         }
         if self.is_drawn {
             let counted = "errors count up to the upper end of the 95 % interval that run states";
@@ -50,11 +56,16 @@ impl Answer for TuneResult {
 
 impl TuneResult {
     fn table(&self) -> Table {
-        let ends = self.before.end_s.iter().map(|t| format!("RMSE {} s (m)", seconds(*t)));
+        let ends = self
+            .before
+            .end_s
+            .iter()
+            .map(|t| format!("RMSE {} s (m)", seconds(*t)));
         let nees = format!("NEES ({NEES_DOF})");
         let mut table = Table::new(["filter", "verdict", &nees, "RMSE/sigma", "in"]).and(ends);
         for (i, (name, found)) in self.filters().enumerate() {
-            let number = |value: f64, key: String| Cell::number(value, &format!("/filters/{i}/{key}"));
+            let number =
+                |value: f64, key: String| Cell::number(value, &format!("/filters/{i}/{key}"));
             let mut row = vec![
                 name.into(),
                 kind(found).to_string().into(),
@@ -63,7 +74,9 @@ impl TuneResult {
                 self.place(found).into(),
             ];
             let ends = found.horizontal_m().enumerate();
-            row.extend(ends.map(|(k, rmse)| number(rmse, format!("outage_end/{k}/horizontal_rmse_m"))));
+            row.extend(
+                ends.map(|(k, rmse)| number(rmse, format!("outage_end/{k}/horizontal_rmse_m"))),
+            );
             table.row(row);
         }
         table
@@ -79,12 +92,20 @@ impl TuneResult {
             None if !found.end_s.is_empty() => place += " over the run",
             _ => {}
         }
-        if self.truths.len() > 1 { format!("{place}, {}", self.worst_truth(found)) } else { place }
+        if self.truths.len() > 1 {
+            format!("{place}, {}", self.worst_truth(found))
+        } else {
+            place
+        }
     }
 
     fn factor_table(&self) -> Table {
-        let mut table =
-            Table::new(["sensor", "process", "factor on the variance", "on the standard deviation"]);
+        let mut table = Table::new([
+            "sensor",
+            "process",
+            "factor on the variance",
+            "on the standard deviation",
+        ]);
         for (i, f) in self.factors.iter().enumerate() {
             table.row([
                 f.sensor.name().into(),
@@ -98,20 +119,30 @@ impl TuneResult {
 
     fn sweep_chart(&self) -> Chart {
         let curve = |value: &dyn Fn(&FilterConsistency) -> f64| {
-            let points = self.sweep.iter().map(|(factor, found)| (*factor, value(found)));
+            let points = self
+                .sweep
+                .iter()
+                .map(|(factor, found)| (*factor, value(found)));
             Series::line("tuned × factor", Colour::REAL, points.collect())
         };
         let right = |y: f64| Series::new("right", Colour::RIGHT, Mark::Level(y));
         let nees = Axis::log(&format!("NEES ({NEES_DOF} if right)"));
         let mut panels = vec![
             Panel::new(nees, vec![right(NEES_DOF as f64), curve(&|h| h.nees)]),
-            Panel::new(Axis::log("largest RMSE/sigma"), vec![right(1.0), curve(&|h| h.largest.ratio)]),
+            Panel::new(
+                Axis::log("largest RMSE/sigma"),
+                vec![right(1.0), curve(&|h| h.largest.ratio)],
+            ),
         ];
         if !self.after.end_s.is_empty() {
             let cost = vec![curve(&|h| 100.0 * self.cost(h))];
             panels.push(Panel::new(Axis::linear("cost (%)").with_zero(), cost));
         }
         panels.iter_mut().for_each(|panel| panel.height = 0.7);
-        Chart::new("Consistency and cost against the variances", Axis::log("factor on all variances"), panels)
+        Chart::new(
+            "Consistency and cost against the variances",
+            Axis::log("factor on all variances"),
+            panels,
+        )
     }
 }

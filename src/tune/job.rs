@@ -9,8 +9,8 @@ use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
-    Aim, DrawFactors, Factor, FilterConsistency, Per, Task, Track, TrueErrors, UpperEnd, aiding_factor,
-    scaled,
+    Aim, DrawFactors, Factor, FilterConsistency, Per, Task, Track, TrueErrors, UpperEnd,
+    aiding_factor, scaled,
 };
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Model;
@@ -50,13 +50,23 @@ pub(crate) struct Truths {
 /// # Errors
 /// When a model has no filter.
 pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
-    let TuneInputs { model, truths, track, outages, states, per, aim, .. } = inputs;
+    let TuneInputs {
+        model,
+        truths,
+        track,
+        outages,
+        states,
+        per,
+        aim,
+        ..
+    } = inputs;
     // Draws are many: within 1.2e-3 the analysis is the same with one step from fix to fix, which `run` takes for them too.
     let merged = truths.stretch.map(|_| track.merged());
     let analysed = merged.as_ref().unwrap_or(track);
     // The interval that `run` states for an error: the filter and its standard deviation are the same in all draws.
-    let upper_end =
-        |stretch| move |estimate: f64, draws: Vec<f64>| derived_interval(estimate, draws, stretch)[1];
+    let upper_end = |stretch| {
+        move |estimate: f64, draws: Vec<f64>| derived_interval(estimate, draws, stretch)[1]
+    };
     let upper_end = truths.stretch.map(upper_end);
     let mut scenario = inputs.scenario.clone();
     match states {
@@ -67,12 +77,18 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
     let filter_of_run = inputs.scenario.filter.states;
     // What is wrong with the vehicle's own measurements no noise of the IMU stands for: their sigmas come first.
     let aiding = &inputs.scenario.aiding;
-    let belief = scenario.with_full_noise().belief(model, outages, analysed)?;
-    let known = TrueErrors { aiding: aiding.clone(), ..TrueErrors::from((*model).clone()) };
+    let belief = scenario
+        .with_full_noise()
+        .belief(model, outages, analysed)?;
+    let known = TrueErrors {
+        aiding: aiding.clone(),
+        ..TrueErrors::from((*model).clone())
+    };
     let aiding_sigmas =
         (!aiding.is_none()).then(|| aiding_factor(analysed, &belief, &known).unwrap_or(f64::NAN));
-    let widened =
-        aiding_sigmas.filter(|factor| *factor > 1.0).map(|factor| analysed.with_aiding_sigmas(factor));
+    let widened = aiding_sigmas
+        .filter(|factor| *factor > 1.0)
+        .map(|factor| analysed.with_aiding_sigmas(factor));
     let believed = analysed;
     let analysed = widened.as_ref().unwrap_or(analysed);
     let full = scenario.with_full_noise();
@@ -91,21 +107,35 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
         allow_smaller: false,
     };
     let factors = task.factors()?;
-    let ones: Vec<Factor> = factors.iter().map(|f| Factor { on_variance: 1.0, ..f.clone() }).collect();
+    let ones: Vec<Factor> = factors
+        .iter()
+        .map(|f| Factor {
+            on_variance: 1.0,
+            ..f.clone()
+        })
+        .collect();
     let (after, draw_factors) = task.consistency_and_draws(task.filter, &factors)?;
     Ok(TuneResult {
         filter: *states,
         filter_of_run,
-        before: Task { track: believed, ..task }.consistency(task.filter, &ones)?,
+        before: Task {
+            track: believed,
+            ..task
+        }
+        .consistency(task.filter, &ones)?,
         aiding_sigmas,
         after,
-        of_run: (*states != filter_of_run).then(|| task.consistency(&of_run, &factors)).transpose()?,
+        of_run: (*states != filter_of_run)
+            .then(|| task.consistency(&of_run, &factors))
+            .transpose()?,
         informed: truths
             .errors
             .iter()
             .all(|truth| truth.imu.without_states().next().is_none())
             .then(|| {
-                task.informed(|truth| knowing(&scenario, &truth.imu).belief(&truth.model, outages, analysed))
+                task.informed(|truth| {
+                    knowing(&scenario, &truth.imu).belief(&truth.model, outages, analysed)
+                })
             })
             .transpose()?,
         sweep: sweep(&task, &factors, draw_factors.as_ref())?,
@@ -125,8 +155,14 @@ fn knowing(scenario: &Scenario, imu: &ImuSettings) -> Scenario {
         let known = (imu.turn_on_bias(sensor), Some(ppm).filter(|ppm| *ppm > 0.0));
         let initial = &mut knowing.initial;
         let (bias, scale) = match sensor {
-            Sensor::Accel => (&mut initial.accel_bias_sigma_m_s2, &mut initial.accel_scale_sigma_ppm),
-            Sensor::Gyro => (&mut initial.gyro_bias_sigma_rad_s, &mut initial.gyro_scale_sigma_ppm),
+            Sensor::Accel => (
+                &mut initial.accel_bias_sigma_m_s2,
+                &mut initial.accel_scale_sigma_ppm,
+            ),
+            Sensor::Gyro => (
+                &mut initial.gyro_bias_sigma_rad_s,
+                &mut initial.gyro_scale_sigma_ppm,
+            ),
         };
         (*bias, *scale) = (known.0.or(*bias), known.1.or(*scale));
     }
@@ -141,24 +177,44 @@ fn sweep(
 ) -> Result<Vec<(f64, FilterConsistency)>, BeliefError> {
     let times = |power: i32| {
         let on_variances = f64::from(power).exp2();
-        let scaled = |f: &Factor| Factor { on_variance: f.on_variance * on_variances, ..f.clone() };
+        let scaled = |f: &Factor| Factor {
+            on_variance: f.on_variance * on_variances,
+            ..f.clone()
+        };
         let factors: Vec<Factor> = factors.iter().map(scaled).collect();
-        Ok((on_variances, task.consistency_with(task.filter, &factors, draw_factors)?))
+        Ok((
+            on_variances,
+            task.consistency_with(task.filter, &factors, draw_factors)?,
+        ))
     };
     (-4..=4).map(times).collect()
 }
 
 /// The tuned model, and where it came from; `goal`: the aim and what was taken for true.
-pub(crate) fn tuned(file: &ModelFile, factors: &[Factor], goal: &str, inputs: &[Input]) -> ModelFile {
+pub(crate) fn tuned(
+    file: &ModelFile,
+    factors: &[Factor],
+    goal: &str,
+    inputs: &[Input],
+) -> ModelFile {
     let mut provenance = toml::Table::new();
     let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
     put("program", PROGRAM.into());
     put("made_by", "tune".into());
     put("honest_for", goal.into());
     let table = |t: Result<toml::Table, toml::ser::Error>| toml::Value::from(t.unwrap_or_default());
-    let entries = factors.iter().map(|f| table(toml::Table::try_from(FactorEntry::of(f))));
+    let entries = factors
+        .iter()
+        .map(|f| table(toml::Table::try_from(FactorEntry::of(f))));
     put("factors", entries.collect::<Vec<_>>().into());
-    put("inputs", inputs.iter().map(|i| table(toml::Table::try_from(i))).collect::<Vec<_>>().into());
+    put(
+        "inputs",
+        inputs
+            .iter()
+            .map(|i| table(toml::Table::try_from(i)))
+            .collect::<Vec<_>>()
+            .into(),
+    );
     let (missing, turn_on) = (file.missing.clone(), file.turn_on);
     ModelFile {
         missing,

@@ -78,7 +78,8 @@ impl Default for TuneRequest {
 }
 
 /// What helps where fixes are too rare to reduce a model.
-const RARE_FIXES: &str = "raise it: the verdict is of the filter of 15 states too, whatever --filter tunes";
+const RARE_FIXES: &str =
+    "raise it: the verdict is of the filter of 15 states too, whatever --filter tunes";
 
 /// Longest schedule of outages that is looked at where no trajectory says how long (s).
 const DAY_S: f64 = 86_400.0;
@@ -115,9 +116,21 @@ impl TuneRequest {
             per: self.per,
             aim: self.aim,
         });
-        let result = result.map_err(|e| no_filter(&e, &self.model, self.scenario.as_deref(), RARE_FIXES))?;
-        let goal = format!("{} of {}", self.aim, if self.intervals { "intervals" } else { "truths" });
-        let model = result.unmet().is_none().then(|| tuned(&file, &result.factors, &goal, &files));
+        let result =
+            result.map_err(|e| no_filter(&e, &self.model, self.scenario.as_deref(), RARE_FIXES))?;
+        let goal = format!(
+            "{} of {}",
+            self.aim,
+            if self.intervals {
+                "intervals"
+            } else {
+                "truths"
+            }
+        );
+        let model = result
+            .unmet()
+            .is_none()
+            .then(|| tuned(&file, &result.factors, &goal, &files));
         Ok(Tuned { result, model })
     }
 
@@ -127,7 +140,10 @@ impl TuneRequest {
     /// What is wrong with a file or a setting.
     pub fn answer(&self, notes: &dyn Observer<Note>) -> Result<Answered, Failure> {
         let tuned = self.tuned(notes)?;
-        let model = tuned.model.as_ref().map(|model| ("tuned.toml".to_owned(), model_file::to_toml(model)));
+        let model = tuned
+            .model
+            .as_ref()
+            .map(|model| ("tuned.toml".to_owned(), model_file::to_toml(model)));
         Ok(Answered {
             files: model.into_iter().collect(),
             unmet: self.failure(&tuned.result),
@@ -137,18 +153,28 @@ impl TuneRequest {
 
     /// That no factors make the filter consistent, where none do.
     pub(crate) fn failure(&self, result: &TuneResult) -> Option<Failure> {
-        let message = format!("{}: {}; no tuned model is written", self.model.display(), result.unmet()?);
+        let message = format!(
+            "{}: {}; no tuned model is written",
+            self.model.display(),
+            result.unmet()?
+        );
         Some(Failure::bound(message).hint(result.remedy()))
     }
 
     /// A directory or a table holds samples: a truth is a model.
     fn refuse_recordings(&self) -> Result<(), Failure> {
-        let is_samples =
-            |p: &&PathBuf| p.is_dir() || p.extension().is_some_and(|e| e == "csv" || e == "npy" || e == "gz");
+        let is_samples = |p: &&PathBuf| {
+            p.is_dir()
+                || p.extension()
+                    .is_some_and(|e| e == "csv" || e == "npy" || e == "gz")
+        };
         match self.truths.iter().find(is_samples) {
             None => Ok(()),
-            Some(path) => Err(Failure::input(format!("--truth {}: recordings, not a model", path.display()))
-                .hint("make a model of each: nav-sim calibrate FILE --estimator gmwm -o FILE.toml")),
+            Some(path) => Err(Failure::input(format!(
+                "--truth {}: recordings, not a model",
+                path.display()
+            ))
+            .hint("make a model of each: nav-sim calibrate FILE --estimator gmwm -o FILE.toml")),
         }
     }
 
@@ -161,7 +187,10 @@ impl TuneRequest {
         named.extend(self.truths.iter().map(|p| ("truth", p)));
         named.extend(self.trajectory.iter().map(|p| ("trajectory", p)));
         named.extend(self.scenario.iter().map(|p| ("scenario", p)));
-        named.iter().map(|(role, path)| Ok(input::input(role, path)?)).collect()
+        named
+            .iter()
+            .map(|(role, path)| Ok(input::input(role, path)?))
+            .collect()
     }
 
     /// What may be true, at the rate of the IMU: noise, turn-on bias, and what the scenario states of the true IMU and
@@ -175,16 +204,36 @@ impl TuneRequest {
         let true_errors = |path: &Path, model: Model, turned_on: &ModelFile| {
             let (mut imu, gnss) = (scenario.imu.clone(), scenario.gnss.clone());
             read::make_turn_on(&mut imu, turned_on, path, notes);
-            TrueErrors { model, imu, gnss, aiding: scenario.aiding.clone() }
+            TrueErrors {
+                model,
+                imu,
+                gnss,
+                aiding: scenario.aiding.clone(),
+            }
         };
         let truths = if self.intervals {
-            let draws = draws(&self.model, file, scenario.imu.rate_hz, self.seed.unwrap_or(1))?;
+            let draws = draws(
+                &self.model,
+                file,
+                scenario.imu.rate_hz,
+                self.seed.unwrap_or(1),
+            )?;
             let estimate = true_errors(&self.model, model.clone(), file);
-            let names =
-                vec![format!("{} and the {} draws beside it", self.model.display(), draws.models.len())];
-            let drawn = draws.models.into_iter().map(|model| TrueErrors { model, ..estimate.clone() });
+            let names = vec![format!(
+                "{} and the {} draws beside it",
+                self.model.display(),
+                draws.models.len()
+            )];
+            let drawn = draws.models.into_iter().map(|model| TrueErrors {
+                model,
+                ..estimate.clone()
+            });
             let errors = std::iter::once(estimate.clone()).chain(drawn).collect();
-            Truths { names, errors, stretch: Some(draws.stretch) }
+            Truths {
+                names,
+                errors,
+                stretch: Some(draws.stretch),
+            }
         } else {
             let truth = |path: &PathBuf| {
                 let file = read::model(path, notes)?;
@@ -193,20 +242,35 @@ impl TuneRequest {
             };
             // Without another, MODEL with what the scenario says is wrong beside it.
             let own = std::slice::from_ref(&self.model);
-            let paths = if self.truths.is_empty() { own } else { &self.truths };
+            let paths = if self.truths.is_empty() {
+                own
+            } else {
+                &self.truths
+            };
             let named = paths.iter().map(truth).collect::<Result<Vec<_>, _>>()?;
             let (names, errors) = named.into_iter().unzip();
-            Truths { names, errors, stretch: None }
+            Truths {
+                names,
+                errors,
+                stretch: None,
+            }
         };
         let mut doubts = Vec::new();
         for truth in &truths.errors {
-            for doubt in (Scenario { imu: truth.imu.clone(), ..scenario.clone() }).unexpected() {
+            for doubt in (Scenario {
+                imu: truth.imu.clone(),
+                ..scenario.clone()
+            })
+            .unexpected()
+            {
                 if !doubts.contains(&doubt) {
                     doubts.push(doubt);
                 }
             }
         }
-        doubts.into_iter().for_each(|doubt| notes.remark(&Note::Unexpected(doubt)));
+        doubts
+            .into_iter()
+            .for_each(|doubt| notes.remark(&Note::Unexpected(doubt)));
         Ok(truths)
     }
 
@@ -219,7 +283,10 @@ impl TuneRequest {
     ) -> Result<(Track, Vec<Outage>), Failure> {
         let seed = self.seed.or(scenario.run.seed).unwrap_or(0);
         let Some(path) = &self.trajectory else {
-            if !scenario.aiding.is_none() || scenario.baro.is_some() || scenario.imu.temperature.is_some() {
+            if !scenario.aiding.is_none()
+                || scenario.baro.is_some()
+                || scenario.imu.temperature.is_some()
+            {
                 return Err(Failure::input(
                     "aiding, a barometer and a temperature profile belong to a trajectory",
                 )
@@ -237,17 +304,23 @@ impl TuneRequest {
         };
         let trajectory = read::trajectory(path, notes)?;
         let outages = read::placed(scenario, &trajectory, seed, notes)?;
-        let track = scenario.track(&trajectory, model, &outages).map_err(Failure::input)?;
+        let track = scenario
+            .track(&trajectory, model, &outages)
+            .map_err(Failure::input)?;
         Ok((track, outages))
     }
 }
 
 /// The draws beside a model file; what the intervals in the file itself leave out is how its parameters hang together.
 fn draws(path: &Path, file: &ModelFile, rate_hz: f64, seed: u64) -> Result<Draws, Failure> {
-    let missing =
-        || format!("{}: the draws of its calibration are missing", draws_file::beside(path).display());
-    let found =
-        draws_file::of_recordings(path, file, rate_hz, seed).and_then(|draws| draws.ok_or_else(missing));
+    let missing = || {
+        format!(
+            "{}: the draws of its calibration are missing",
+            draws_file::beside(path).display()
+        )
+    };
+    let found = draws_file::of_recordings(path, file, rate_hz, seed)
+        .and_then(|draws| draws.ok_or_else(missing));
     found.map_err(|doubt| {
         Failure::input(doubt)
             .hint("calibrate again: the draws are written beside MODEL, unless with --bootstrap 0")

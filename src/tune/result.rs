@@ -63,7 +63,10 @@ impl TuneResult {
             return vec![unmet, format!("at best, {}", described(&name, &self.after))];
         }
         let mut lines = match changed.as_slice() {
-            [] => vec![format!("no factor is needed: {}", described(&name, &self.after))],
+            [] => vec![format!(
+                "no factor is needed: {}",
+                described(&name, &self.after)
+            )],
             changed => {
                 let cost = self.cost(&self.after);
                 let cost = match cost.is_finite() {
@@ -79,7 +82,9 @@ impl TuneResult {
                 ]
             }
         };
-        self.of_aiding().into_iter().for_each(|line| lines.insert(0, line));
+        self.of_aiding()
+            .into_iter()
+            .for_each(|line| lines.insert(0, line));
         if let Some(of_run) = &self.of_run {
             let name = format!("{}, the default of run,", filter_name(self.filter_of_run));
             lines.push(format!("tuned, {}", described(&name, of_run)));
@@ -91,8 +96,12 @@ impl TuneResult {
     fn of_aiding(&self) -> Option<String> {
         let factor = self.aiding_sigmas.filter(|factor| *factor != 1.0)?;
         Some(match factor.is_nan() {
-            true => "no sigma of the aiding covers its errors: give the filter states of them".to_owned(),
-            false => format!("every sigma of [aiding] × {}, and then of the model:", readable(factor)),
+            true => "no sigma of the aiding covers its errors: give the filter states of them"
+                .to_owned(),
+            false => format!(
+                "every sigma of [aiding] × {}, and then of the model:",
+                readable(factor)
+            ),
         })
     }
 
@@ -110,12 +119,23 @@ impl TuneResult {
             Aim::Mean => self.after.nees / NEES_DOF as f64 > (1.0 + TOLERANCE).powi(2),
         };
         let is_at_limit = self.factors.iter().any(Factor::is_at_limit);
-        let names: Vec<&str> = self.without_factor.iter().map(|sensor| sensor.name()).collect();
-        if !names.is_empty() && (is_overconfident || is_at_limit || self.cost(&self.after) > ABSURD) {
+        let names: Vec<&str> = self
+            .without_factor
+            .iter()
+            .map(|sensor| sensor.name())
+            .collect();
+        if !names.is_empty() && (is_overconfident || is_at_limit || self.cost(&self.after) > ABSURD)
+        {
             let names = names.join(" and ");
-            return Some(format!("the model has no {names} noise to multiply, where the truth has some"));
+            return Some(format!(
+                "the model has no {names} noise to multiply, where the truth has some"
+            ));
         }
-        let limit = if is_at_limit { ": a factor is the largest that is tried" } else { "" };
+        let limit = if is_at_limit {
+            ": a factor is the largest that is tried"
+        } else {
+            ""
+        };
         let unmet = || format!("larger noise alone does not make this filter consistent{limit}");
         (is_overconfident || is_at_limit).then(unmet)
     }
@@ -144,12 +164,18 @@ impl TuneResult {
     pub(super) fn filters(&self) -> impl Iterator<Item = (&'static str, &FilterConsistency)> {
         let tuned = [("untuned", &self.before), ("tuned", &self.after)].into_iter();
         let of_run = self.of_run.iter().map(|h| ("tuned, default of run", h));
-        tuned.chain(of_run).chain(self.informed.iter().map(|h| ("knows the truth", h)))
+        tuned
+            .chain(of_run)
+            .chain(self.informed.iter().map(|h| ("knows the truth", h)))
     }
 
     /// The truth in which an error is largest.
     pub(super) fn worst_truth(&self, found: &FilterConsistency) -> &str {
-        &self.truths[if self.is_drawn { 0 } else { found.largest.truth }]
+        &self.truths[if self.is_drawn {
+            0
+        } else {
+            found.largest.truth
+        }]
     }
 }
 
@@ -195,23 +221,35 @@ fn is_changed(factor: &Factor) -> bool {
 /// `the full filter is overconfident: errors 0.95 to 1.31 × sigma`
 fn described(name: &str, found: &FilterConsistency) -> String {
     let [smallest, largest] = found.range.map(readable);
-    format!("the {name} is {}: errors {smallest} to {largest} × sigma", kind(found))
+    format!(
+        "the {name} is {}: errors {smallest} to {largest} × sigma",
+        kind(found)
+    )
 }
 
 /// `filter of 15 states`
 fn filter_name(states: FilterStates) -> String {
-    if states == FilterStates::Full { "full filter".to_owned() } else { format!("filter of {states} states") }
+    if states == FilterStates::Full {
+        "full filter".to_owned()
+    } else {
+        format!("filter of {states} states")
+    }
 }
 
 /// `gyro RW × 4.02, accel × 1.59`; of many the largest.
 fn factors_in_words(changed: &[&Factor]) -> String {
     let word = |f: &&Factor| {
-        let process = f.process.as_ref().map_or(String::new(), |p| format!(" {p}"));
+        let process = f
+            .process
+            .as_ref()
+            .map_or(String::new(), |p| format!(" {p}"));
         format!("{}{process} × {}", f.sensor.name(), readable(f.on_variance))
     };
     let larger = |a: &&&Factor, b: &&&Factor| a.on_variance.total_cmp(&b.on_variance);
     match changed.iter().max_by(larger) {
-        Some(largest) if changed.len() > 3 => format!("{} factors up to {}", changed.len(), word(largest)),
+        Some(largest) if changed.len() > 3 => {
+            format!("{} factors up to {}", changed.len(), word(largest))
+        }
         _ => changed.iter().map(word).collect::<Vec<_>>().join(", "),
     }
 }
@@ -252,8 +290,16 @@ pub(super) struct FactorEntry {
 
 impl FactorEntry {
     pub(super) fn of(factor: &Factor) -> Self {
-        let Factor { sensor, process, on_variance } = factor.clone();
-        Self { sensor: sensor.name(), process, on_variance }
+        let Factor {
+            sensor,
+            process,
+            on_variance,
+        } = factor.clone();
+        Self {
+            sensor: sensor.name(),
+            process,
+            on_variance,
+        }
     }
 }
 

@@ -9,7 +9,12 @@ fn consistency(ratio: f64, nees: f64) -> FilterConsistency {
     let (end_s, rmse_end) = (vec![90.0], vec![[1.0; 9]]);
     FilterConsistency {
         nees,
-        largest: Departure { ratio, state: 8, outage: Some(0), truth: 0 },
+        largest: Departure {
+            ratio,
+            state: 8,
+            outage: Some(0),
+            truth: 0,
+        },
         range: [0.95, ratio],
         end_s,
         rmse_end,
@@ -21,7 +26,11 @@ fn result(filter: FilterStates, of_run: FilterConsistency) -> TuneResult {
         aiding_sigmas: None,
         filter,
         filter_of_run: FilterStates::Reduced15,
-        factors: vec![Factor { sensor: Sensor::Gyro, process: None, on_variance: 4.0 }],
+        factors: vec![Factor {
+            sensor: Sensor::Gyro,
+            process: None,
+            on_variance: 4.0,
+        }],
         before: consistency(2.0, 30.0),
         after: consistency(1.0, 8.8),
         of_run: (filter != FilterStates::Reduced15).then_some(of_run),
@@ -43,9 +52,20 @@ fn the_verdict_has_factors_cost_and_both_filters() {
         lines[0],
         "gyro × 4.00 (variance); cost 0.0 % of horizontal RMSE; NEES 30.0 → 8.80 (9 if right)"
     );
-    assert_eq!(lines[1], "tuned, the full filter is consistent: errors 0.950 to 1.00 × sigma");
-    assert!(lines[2].contains("the default of run, is overconfident: errors 0.950 to 1.19"), "{lines:?}");
-    assert_eq!(result(FilterStates::Reduced15, consistency(1.0, 8.8)).verdict().len(), 2);
+    assert_eq!(
+        lines[1],
+        "tuned, the full filter is consistent: errors 0.950 to 1.00 × sigma"
+    );
+    assert!(
+        lines[2].contains("the default of run, is overconfident: errors 0.950 to 1.19"),
+        "{lines:?}"
+    );
+    assert_eq!(
+        result(FilterStates::Reduced15, consistency(1.0, 8.8))
+            .verdict()
+            .len(),
+        2
+    );
 }
 
 /// Never green where a filter is over- or underconfident; what `run` calls underconfident is called so.
@@ -55,8 +75,14 @@ fn the_colour_is_that_of_the_worst_word() {
     assert_eq!(tuned.document().verdict.tone, Tone::Doubtful);
     tuned.after.range[0] = 0.756;
     let document = tuned.document();
-    assert!(document.verdict.lines[1].contains("is underconfident: errors 0.756 to"), "{document:?}");
-    assert!(document.notes()[0].text.contains("--for mean"), "{document:?}");
+    assert!(
+        document.verdict.lines[1].contains("is underconfident: errors 0.756 to"),
+        "{document:?}"
+    );
+    assert!(
+        document.notes()[0].text.contains("--for mean"),
+        "{document:?}"
+    );
     tuned.factors[0].on_variance = 1.0;
     (tuned.before, tuned.after) = (consistency(1.0, 9.0), consistency(1.0, 9.0));
     assert_eq!(tuned.document().verdict.tone, Tone::Good);
@@ -106,11 +132,21 @@ fn what_is_not_met_has_its_reason() {
         assert_eq!(tuned.unmet().is_none(), is_met, "{nees}");
     }
     tuned.without_factor.push(Sensor::Accel);
-    assert!(tuned.unmet().unwrap().starts_with("the model has no accel noise to multiply"));
+    assert!(
+        tuned
+            .unmet()
+            .unwrap()
+            .starts_with("the model has no accel noise to multiply")
+    );
     tuned.after.nees = 9.0;
     assert_eq!(tuned.unmet(), None);
     tuned.after.rmse_end = vec![[2.1; 9]];
-    assert!(tuned.unmet().unwrap().starts_with("the model has no accel noise to multiply"));
+    assert!(
+        tuned
+            .unmet()
+            .unwrap()
+            .starts_with("the model has no accel noise to multiply")
+    );
 }
 
 #[test]
@@ -119,8 +155,14 @@ fn a_factor_on_the_aiding_is_told_where_there_is_one() {
     for (factor, told) in [
         (None, None),
         (Some(1.0), None),
-        (Some(2.5), Some("every sigma of [aiding] × 2.50, and then of the model:")),
-        (Some(f64::NAN), Some("no sigma of the aiding covers its errors: give the filter states of them")),
+        (
+            Some(2.5),
+            Some("every sigma of [aiding] × 2.50, and then of the model:"),
+        ),
+        (
+            Some(f64::NAN),
+            Some("no sigma of the aiding covers its errors: give the filter states of them"),
+        ),
     ] {
         tuned.aiding_sigmas = factor;
         assert_eq!(tuned.of_aiding().as_deref(), told);

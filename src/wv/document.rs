@@ -6,7 +6,9 @@ use crate::report::comparison_table::in_order;
 use crate::report::curve_chart::{band, curve, scale_axis, sensor_name, unit, variance_axis};
 use crate::report::curves::{Band, SignalCurves, SignalsFile};
 use nav_sim_calibration::{duration, median};
-use nav_sim_document::{Cell, Chart, Colour, Document, Panel, Series, Table, Tone, short_names, shortest};
+use nav_sim_document::{
+    Cell, Chart, Colour, Document, Panel, Series, Table, Tone, short_names, shortest,
+};
 
 /// Degrees of freedom from which on robust over classical tells of outliers rather than of chance.
 const LEAST: f64 = 100.0;
@@ -29,14 +31,29 @@ impl Answer for SignalsFile {
                     ),
                 )
             }
-            _ => (Tone::Good, "classical and robust wavelet variances agree".to_owned()),
+            _ => (
+                Tone::Good,
+                "classical and robust wavelet variances agree".to_owned(),
+            ),
         };
-        let median = if count > 1 { format!(", median of {count} recordings") } else { String::new() };
-        let head =
-            format!("Allan deviation over averages{median}; ratio: robust/classical, * less than by chance");
-        let mut document = Document::new("Wavelet variance of static recordings", tone, [verdict, head]);
+        let median = if count > 1 {
+            format!(", median of {count} recordings")
+        } else {
+            String::new()
+        };
+        let head = format!(
+            "Allan deviation over averages{median}; ratio: robust/classical, * less than by chance"
+        );
+        let mut document = Document::new(
+            "Wavelet variance of static recordings",
+            tone,
+            [verdict, head],
+        );
         document.lead(digest(self));
-        let charts: Vec<Chart> = channels(self).into_iter().map(|channel| chart(self, channel)).collect();
+        let charts: Vec<Chart> = channels(self)
+            .into_iter()
+            .map(|channel| chart(self, channel))
+            .collect();
         document.charts(&charts, "Robust wavelet variance; dashed: classical, which outliers raise. τ is twice the averaging time.");
         for (title, table) in side_by_side(self) {
             document.folded(&title, |inside| inside.table(&table));
@@ -58,15 +75,23 @@ fn chart(file: &SignalsFile, (sensor, axis): (&str, &str)) -> Chart {
         let k = files.iter().position(|name| *name == s.file).unwrap_or(0);
         let (name, colour) = (names[k], Colour::Hue(k));
         if files.len() == 1 {
-            series.push(Series::new("95 %", colour, band(&s.tau_s, &s.robust.ci_low, &s.robust.ci_high)));
+            series.push(Series::new(
+                "95 %",
+                colour,
+                band(&s.tau_s, &s.robust.ci_low, &s.robust.ci_high),
+            ));
         }
         series.push(Series::dashed("", colour, curve(&s.tau_s, &s.classical.wv)));
         series.push(Series::line(name, colour, curve(&s.tau_s, &s.robust.wv)));
     }
     let title = format!("{} {axis}", sensor_name(sensor));
-    Chart::new(&title, scale_axis(), vec![Panel::new(variance_axis(sensor), series)])
-        .small()
-        .in_group("scales")
+    Chart::new(
+        &title,
+        scale_axis(),
+        vec![Panel::new(variance_axis(sensor), series)],
+    )
+    .small()
+    .in_group("scales")
 }
 
 /// The recordings, each once.
@@ -77,7 +102,10 @@ fn recordings(file: &SignalsFile) -> Vec<&str> {
 /// The scale at which classical over robust is largest of those that are well known, and that ratio.
 fn excess(s: &SignalCurves) -> Option<(f64, f64)> {
     let ratio = |i: usize| (s.tau_s[i], s.classical.wv[i] / s.robust.wv[i]);
-    let told = (0..s.tau_s.len()).filter(|i| s.edof[*i] >= LEAST).map(ratio).filter(|r| r.1.is_finite());
+    let told = (0..s.tau_s.len())
+        .filter(|i| s.edof[*i] >= LEAST)
+        .map(ratio)
+        .filter(|r| r.1.is_finite());
     told.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
@@ -86,29 +114,47 @@ fn excess(s: &SignalCurves) -> Option<(f64, f64)> {
 /// classical one.
 fn digest(file: &SignalsFile) -> Table {
     let decades = decades(file);
-    let times = decades.iter().map(|i| duration(allan_time_s(&longest(file).tau_s, *i)));
+    let times = decades
+        .iter()
+        .map(|i| duration(allan_time_s(&longest(file).tau_s, *i)));
     let head = times.chain(["lowest", "ratio"].map(str::to_owned));
     let mut table = Table::new(["axis"]).and(head);
     let row = |(sensor, axis): (&str, &str)| {
         let signals = signals_of(file, sensor, axis);
         let median_at = |i: usize| {
-            let of_files = signals.iter().filter_map(|s| Some(allan_deviation(*s.classical.wv.get(i)?)));
+            let of_files = signals
+                .iter()
+                .filter_map(|s| Some(allan_deviation(*s.classical.wv.get(i)?)));
             let all: Vec<f64> = of_files.collect();
             (!all.is_empty()).then(|| median(&all))
         };
-        let cells = decades.iter().map(|i| median_at(*i).map_or(String::new(), |x| format!("{x:.2e}")));
+        let cells = decades
+            .iter()
+            .map(|i| median_at(*i).map_or(String::new(), |x| format!("{x:.2e}")));
         let name = format!("{sensor}.{axis} ({})", unit(sensor));
         let scales = signals.iter().map(|s| s.tau_s.len()).max().unwrap_or(0);
-        let lowest = (0..scales).filter_map(|i| Some((i, median_at(i)?))).min_by(|a, b| a.1.total_cmp(&b.1));
+        let lowest = (0..scales)
+            .filter_map(|i| Some((i, median_at(i)?)))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
         let lowest = lowest.map_or(String::new(), |(i, deviation)| {
-            format!("{deviation:.2e} at {}", duration(allan_time_s(&longest(file).tau_s, i)))
+            format!(
+                "{deviation:.2e} at {}",
+                duration(allan_time_s(&longest(file).tau_s, i))
+            )
         });
-        let ratios: Vec<Ratio> = signals.iter().flat_map(|s| ratios(s, file.efficiency)).collect();
+        let ratios: Vec<Ratio> = signals
+            .iter()
+            .flat_map(|s| ratios(s, file.efficiency))
+            .collect();
         let ratio = least_ratio(&ratios).map_or(String::new(), |(r, mark)| format!("{r:.2}{mark}"));
         let figures = cells.chain([lowest, ratio]).map(Cell::figures);
-        std::iter::once(Cell::from(name)).chain(figures).collect::<Vec<Cell>>()
+        std::iter::once(Cell::from(name))
+            .chain(figures)
+            .collect::<Vec<Cell>>()
     };
-    channels(file).into_iter().for_each(|channel| table.row(row(channel)));
+    channels(file)
+        .into_iter()
+        .for_each(|channel| table.row(row(channel)));
     table
 }
 
@@ -120,13 +166,20 @@ pub(crate) fn side_by_side(file: &SignalsFile) -> Vec<(String, Table)> {
         let mut table = Table::new(["averages of"]).and(names);
         for i in 0..signals.iter().map(|s| s.tau_s.len()).max().unwrap_or(0) {
             let cell = |s: &&SignalCurves| {
-                let deviation = s.classical.wv.get(i).map(|wv| format!("{:.3e}", allan_deviation(*wv)));
+                let deviation = s
+                    .classical
+                    .wv
+                    .get(i)
+                    .map(|wv| format!("{:.3e}", allan_deviation(*wv)));
                 Cell::figures(deviation.unwrap_or_default())
             };
             let time = duration(allan_time_s(&longest(file).tau_s, i));
             table.row(std::iter::once(Cell::from(time)).chain(signals.iter().map(cell)));
         }
-        (format!("{sensor}.{axis}: Allan deviation ({})", unit(sensor)), table)
+        (
+            format!("{sensor}.{axis}: Allan deviation ({})", unit(sensor)),
+            table,
+        )
     };
     channels(file).into_iter().map(table).collect()
 }
@@ -144,8 +197,12 @@ pub(crate) fn signals_csv(file: &SignalsFile) -> String {
         };
         for i in 0..s.tau_s.len() {
             let band = |b: &Band| [b.wv[i], b.ci_low[i], b.ci_high[i]].map(shortest).join(",");
-            let allan =
-                [allan_time_s(&s.tau_s, i), allan_deviation(s.classical.wv[i])].map(shortest).join(",");
+            let allan = [
+                allan_time_s(&s.tau_s, i),
+                allan_deviation(s.classical.wv[i]),
+            ]
+            .map(shortest)
+            .join(",");
             text += &format!(
                 "{name},{},{},{},{},{},{},{},{allan}\n",
                 s.sensor,
@@ -172,7 +229,10 @@ fn allan_deviation(wv: f64) -> f64 {
 }
 
 fn signals_of<'a>(file: &'a SignalsFile, sensor: &str, axis: &str) -> Vec<&'a SignalCurves> {
-    file.signals.iter().filter(|s| s.sensor == sensor && s.axis == axis).collect()
+    file.signals
+        .iter()
+        .filter(|s| s.sensor == sensor && s.axis == axis)
+        .collect()
 }
 
 /// Sensors and axes, as they first appear.
@@ -199,7 +259,9 @@ fn decades(file: &SignalsFile) -> Vec<usize> {
     let (first, last) = (log(0).floor() as i32, log(tau_s.len() - 1).ceil() as i32);
     let nearest = |decade: i32| {
         let distance = |i: &usize| (log(*i) - f64::from(decade)).abs();
-        (0..tau_s.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+        (0..tau_s.len())
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .unwrap_or(0)
     };
     let mut found: Vec<usize> = (first..=last).map(nearest).collect();
     found.dedup();
@@ -272,7 +334,10 @@ mod tests {
         let text = digest(&file(3)).csv();
         let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
         assert_eq!(rows.len(), 2);
-        assert_eq!(rows[0][1..6], ["0.01 s", "0.08 s", "1.28 s", "10.2 s", "81.9 s"]);
+        assert_eq!(
+            rows[0][1..6],
+            ["0.01 s", "0.08 s", "1.28 s", "10.2 s", "81.9 s"]
+        );
         assert_eq!(rows[1][..2], ["gyro.z (rad/s)", "1.00e1"]);
         assert_eq!(rows[1][5..], ["1.10e-1", "1.10e-1 at 81.9 s", "0.90 *"]);
     }
@@ -285,8 +350,14 @@ mod tests {
         let tuning = Tuning::new(0.6, Convention::Exact).unwrap();
         let row = |seed: u64, outliers: usize| {
             let mut generator = Generator::seed_from_u64(seed);
-            let mut signal: Vec<f64> = (0..4096).map(|_| generator.sample(StandardNormal)).collect();
-            signal.iter_mut().step_by(50).take(outliers).for_each(|x| *x *= 10.0);
+            let mut signal: Vec<f64> = (0..4096)
+                .map(|_| generator.sample(StandardNormal))
+                .collect();
+            signal
+                .iter_mut()
+                .step_by(50)
+                .take(outliers)
+                .for_each(|x| *x *= 10.0);
             let (classical, robust) = nav_sim_signal::wavelet::both(&signal, 8, &tuning).unwrap();
             let ratios: Vec<Ratio> = (1..=8_u32)
                 .map(|level| (level, interval::edof_eta3(4096, level)))
@@ -310,7 +381,10 @@ mod tests {
         let tables = side_by_side(&file(2));
         assert_eq!(tables.len(), 1);
         let text = tables[0].1.csv();
-        assert!(text.starts_with("averages of,run0.csv,run1.csv\n") && text.lines().count() == 15, "{text}");
+        assert!(
+            text.starts_with("averages of,run0.csv,run1.csv\n") && text.lines().count() == 15,
+            "{text}"
+        );
         assert_eq!(signals_csv(&file(2)).lines().count(), 1 + 2 * 14);
     }
 }

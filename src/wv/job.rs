@@ -47,21 +47,53 @@ pub(crate) fn wavelet_variances(
     options: &WaveletOptions,
     remarks: &mut dyn Remarks,
 ) -> Result<SignalsFile, JobError> {
-    let WaveletOptions { reading, skip_warm_up, scales, tuning, intervals } = options;
+    let WaveletOptions {
+        reading,
+        skip_warm_up,
+        scales,
+        tuning,
+        intervals,
+    } = options;
     // Four samples have a scale.
-    let reading = ReadOptions { min_samples: scales.map_or(4, |j| 1 << j), ..reading.clone() };
+    let reading = ReadOptions {
+        min_samples: scales.map_or(4, |j| 1 << j),
+        ..reading.clone()
+    };
     let look = |recording: Recording| -> Result<Vec<SignalCurves>, JobError> {
-        let recording = if *skip_warm_up { without_warm_up(recording, true).0 } else { recording };
+        let recording = if *skip_warm_up {
+            without_warm_up(recording, true).0
+        } else {
+            recording
+        };
         let measured = replicates(&recording, *scales, tuning)?;
         let curves = |(channel, replicate): &(Channel, Replicate)| {
             let edof = degrees_of_freedom(*intervals, &recording, *channel, replicate)?;
-            Ok(SignalCurves::new(*channel, replicate, recording.rate_hz, edof, tuning.efficiency()))
+            Ok(SignalCurves::new(
+                *channel,
+                replicate,
+                recording.rate_hz,
+                edof,
+                tuning.efficiency(),
+            ))
         };
-        Ok(measured.par_iter().map(curves).collect::<Result<_, WaveletError>>()?)
+        Ok(measured
+            .par_iter()
+            .map(curves)
+            .collect::<Result<_, WaveletError>>()?)
     };
     let (looks, report) = visit(paths, &reading, &look, remarks)?;
-    let signals = looks.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
-    Ok(SignalsFile::new(report.files[0].rate_hz, tuning.efficiency(), intervals.name(), signals))
+    let signals = looks
+        .into_iter()
+        .collect::<Result<Vec<_>, _>>()?
+        .into_iter()
+        .flatten()
+        .collect();
+    Ok(SignalsFile::new(
+        report.files[0].rate_hz,
+        tuning.efficiency(),
+        intervals.name(),
+        signals,
+    ))
 }
 
 fn degrees_of_freedom(
@@ -74,7 +106,12 @@ fn degrees_of_freedom(
     match (intervals, recording.signal(channel)) {
         // Of a signal with holes eta3 of what is there.
         (Intervals::LargeSample, Some(signal)) if replicate.coverage.is_empty() => levels
-            .map(|level| Ok(interval::edof_large_sample(&haar::coefficients(&signal.samples, level)?, level)))
+            .map(|level| {
+                Ok(interval::edof_large_sample(
+                    &haar::coefficients(&signal.samples, level)?,
+                    level,
+                ))
+            })
             .collect(),
         _ => Ok(levels.map(|level| replicate.edof_eta3(level)).collect()),
     }

@@ -28,8 +28,14 @@ pub struct WaveletRequest {
 }
 
 const INTERVALS: [(&str, &str); 2] = [
-    (Intervals::Eta3.name(), "The field's usual ones, conservative beyond the first scale"),
-    (Intervals::LargeSample.name(), "From the autocovariance of the coefficients: with the stated coverage"),
+    (
+        Intervals::Eta3.name(),
+        "The field's usual ones, conservative beyond the first scale",
+    ),
+    (
+        Intervals::LargeSample.name(),
+        "From the autocovariance of the coefficients: with the stated coverage",
+    ),
 ];
 
 impl WaveletRequest {

@@ -12,7 +12,9 @@ fn killed_workers_leave_a_study_that_merges_to_the_bytes_of_an_undisturbed_one()
     let place = place();
     let dir = place.path();
     // units of some 10 ms, so that kills fall into them
-    let study = STUDY.replace("runs = 77", "runs = 395").replace("unit_runs = 8", "unit_runs = 40");
+    let study = STUDY
+        .replace("runs = 77", "runs = 395")
+        .replace("unit_runs = 8", "unit_runs = 40");
     std::fs::write(dir.join("study.toml"), study).unwrap();
     done(dir, "plan study.toml -o whole");
     let start = Instant::now();
@@ -25,7 +27,8 @@ fn killed_workers_leave_a_study_that_merges_to_the_bytes_of_an_undisturbed_one()
     let mut random = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(1);
     let (mut kills, mut amid) = (0, 0);
     while kills < 20 || amid < 3 {
-        let mut workers = [0, 1].map(|i| spawn(dir, &format!("run study.toml -o killed --shard {i}/2 -j 1")));
+        let mut workers =
+            [0, 1].map(|i| spawn(dir, &format!("run study.toml -o killed --shard {i}/2 -j 1")));
         std::thread::sleep(undisturbed.mul_f64(random.random_range(0.0..0.35)));
         for worker in &mut workers {
             worker.kill().unwrap();
@@ -36,7 +39,10 @@ fn killed_workers_leave_a_study_that_merges_to_the_bytes_of_an_undisturbed_one()
         amid += usize::from(!there.is_empty() && there.len() < UNITS);
         if there.len() == UNITS {
             // Faster than the kills: some work is taken back.
-            there.iter().step_by(2).for_each(|file| std::fs::remove_file(file).unwrap());
+            there
+                .iter()
+                .step_by(2)
+                .for_each(|file| std::fs::remove_file(file).unwrap());
         }
         assert!(kills < 200, "no worker gets to a unit");
     }

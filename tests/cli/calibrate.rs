@@ -23,7 +23,13 @@ pub(super) fn truth() -> [Process; 3] {
 }
 
 pub(super) fn signal(run: u64, source: &str) -> Vec<f64> {
-    let key = StreamKey { seed: 7, scenario: "calibrate", run, source, process: "" };
+    let key = StreamKey {
+        seed: 7,
+        scenario: "calibrate",
+        run,
+        source,
+        process: "",
+    };
     let mut generator = key.generator();
     let mut normal = || generator.sample::<f64, _>(StandardNormal);
     let mut ar1 = (4e-8_f64 / (1.0 - 0.98 * 0.98)).sqrt() * normal();
@@ -60,12 +66,21 @@ pub(super) fn nav_sim(dir: &Path) -> Command {
 }
 
 pub(super) fn json(dir: &Path, arguments: &[&str]) -> Value {
-    let output = nav_sim(dir).args(arguments).args(["--format", "json", "-q"]).assert().success();
+    let output = nav_sim(dir)
+        .args(arguments)
+        .args(["--format", "json", "-q"])
+        .assert()
+        .success();
     serde_json::from_slice(&output.get_output().stdout).unwrap()
 }
 
 pub(super) fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap_or_else(|| panic!("{value}")).iter().map(|v| v.as_f64().unwrap()).collect()
+    value
+        .as_array()
+        .unwrap_or_else(|| panic!("{value}"))
+        .iter()
+        .map(|v| v.as_f64().unwrap())
+        .collect()
 }
 
 #[track_caller]
@@ -79,53 +94,94 @@ pub(super) fn refusal(dir: &Path, arguments: &[&str], code: i32) -> String {
 fn recordings_become_a_model_file_and_its_curves() {
     let dir = tempfile::tempdir().unwrap();
     recordings(dir.path(), 6);
-    let out =
-        json(dir.path(), &["calibrate", "runs", "--model", "N1", "--estimator", "all", "-o", "imu.toml"]);
+    let out = json(
+        dir.path(),
+        &[
+            "calibrate",
+            "runs",
+            "--model",
+            "N1",
+            "--estimator",
+            "all",
+            "-o",
+            "imu.toml",
+        ],
+    );
     assert_eq!(out["fits"].as_array().unwrap().len(), 3);
     let replicates = out["replicates"].as_array().unwrap();
     assert_eq!(replicates.len(), 6);
-    assert!(replicates.iter().all(|r| r["verdict"] == "normal"), "{replicates:?}");
+    assert!(
+        replicates.iter().all(|r| r["verdict"] == "normal"),
+        "{replicates:?}"
+    );
     for replicate in replicates {
-        assert_eq!(replicate["scores"]["y"]["noise"].as_array().unwrap().len(), 13);
+        assert_eq!(
+            replicate["scores"]["y"]["noise"].as_array().unwrap().len(),
+            13
+        );
         // Three estimators, four parameters each.
         let left_out = replicate["left_out"].as_array().unwrap();
         assert!(
-            left_out.len() == 3 && left_out.iter().all(|l| l["parameters"].as_array().unwrap().len() == 4)
+            left_out.len() == 3
+                && left_out
+                    .iter()
+                    .all(|l| l["parameters"].as_array().unwrap().len() == 4)
         );
     }
     let model = Composite::new(truth().to_vec());
     for estimator in ["awv", "sr-awv", "dr-awv"] {
         let file =
-            nav_sim::formats::model_file::read(&dir.path().join(format!("imu_{estimator}.toml"))).unwrap();
+            nav_sim::formats::model_file::read(&dir.path().join(format!("imu_{estimator}.toml")))
+                .unwrap();
         assert_eq!(file.model.rate_hz.round() as i64, 50);
         let missing: Vec<String> = file.missing.iter().map(ToString::to_string).collect();
-        assert_eq!(missing, ["accel.x", "accel.y", "accel.z"], "pooled: one model for the three axes");
+        assert_eq!(
+            missing,
+            ["accel.x", "accel.y", "accel.z"],
+            "pooled: one model for the three axes"
+        );
         // Four parameters on each of three axes, each with its interval or why there is none.
         let provenance = file.provenance.unwrap();
         let notes = provenance["fits"][0]["notes"].to_string();
-        assert_eq!(file.intervals.len() + 3 * notes.matches("no interval").count(), 12, "{notes}");
+        assert_eq!(
+            file.intervals.len() + 3 * notes.matches("no interval").count(),
+            12,
+            "{notes}"
+        );
         for i in file.intervals {
             assert!(i.low < i.high && i.low >= 0.0, "{i:?}");
         }
         assert_eq!(provenance["estimator"].as_str(), Some(estimator));
-        let text = std::fs::read_to_string(dir.path().join(format!("imu_{estimator}.wv.json"))).unwrap();
+        let text =
+            std::fs::read_to_string(dir.path().join(format!("imu_{estimator}.wv.json"))).unwrap();
         let curves: Value = serde_json::from_str(&text).unwrap();
         let curve = &curves["curves"][0];
-        assert_eq!((curve["sensor"].as_str(), curve["axis"].as_str()), (Some("gyro"), Some("all")));
+        assert_eq!(
+            (curve["sensor"].as_str(), curve["axis"].as_str()),
+            (Some("gyro"), Some("all"))
+        );
         assert_eq!(curve["replicates"].as_array().unwrap().len(), 12);
         let (wv, edof) = (numbers(&curve["wv"]), numbers(&curve["edof"]));
         assert_eq!(wv.len(), 13);
-        let parts: Vec<Vec<f64>> = ["WN", "AR1", "RW"].map(|l| numbers(&curve["processes"][l])).to_vec();
+        let parts: Vec<Vec<f64>> = ["WN", "AR1", "RW"]
+            .map(|l| numbers(&curve["processes"][l]))
+            .to_vec();
         for i in 0..13 {
             // The degrees of freedom are conservative: five deviations, 13 × 3 values.
             let deviation = (wv[i] / model.haar_wv(i as u32 + 1) - 1.0) / (2.0 / edof[i]).sqrt();
-            assert!(deviation.abs() < 5.0, "{estimator}, level {}: {deviation}", i + 1);
+            assert!(
+                deviation.abs() < 5.0,
+                "{estimator}, level {}: {deviation}",
+                i + 1
+            );
             let implied = curve["implied"][i].as_f64().unwrap();
             assert!((parts.iter().map(|p| p[i]).sum::<f64>() / implied - 1.0).abs() < 1e-12);
             let (low, high) = (numbers(&curve["ci_low"])[i], numbers(&curve["ci_high"])[i]);
             assert!(low < wv[i] && wv[i] < high);
             assert!(
-                (curve["tau_s"][i].as_f64().unwrap() / (0.02 * 2_f64.powi(i as i32 + 1)) - 1.0).abs() < 1e-6
+                (curve["tau_s"][i].as_f64().unwrap() / (0.02 * 2_f64.powi(i as i32 + 1)) - 1.0)
+                    .abs()
+                    < 1e-6
             );
         }
     }
@@ -135,15 +191,44 @@ fn recordings_become_a_model_file_and_its_curves() {
 fn a_curve_written_is_a_curve_read() {
     let dir = tempfile::tempdir().unwrap();
     recordings(dir.path(), 3);
-    let first = json(dir.path(), &["calibrate", "runs", "--model", "N1", "--pool", "axes", "-o", "imu.toml"]);
-    let again = json(dir.path(), &["calibrate", "--curve", "imu.wv.json", "--model", "AR1+WN+RW"]);
+    let first = json(
+        dir.path(),
+        &[
+            "calibrate",
+            "runs",
+            "--model",
+            "N1",
+            "--pool",
+            "axes",
+            "-o",
+            "imu.toml",
+        ],
+    );
+    let again = json(
+        dir.path(),
+        &[
+            "calibrate",
+            "--curve",
+            "imu.wv.json",
+            "--model",
+            "AR1+WN+RW",
+        ],
+    );
     assert_eq!(first["fits"].as_array().unwrap().len(), 2);
-    for (a, b) in first["fits"].as_array().unwrap().iter().zip(again["fits"].as_array().unwrap()) {
+    for (a, b) in first["fits"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(again["fits"].as_array().unwrap())
+    {
         assert_eq!(
             (&a["sensor"], &a["axis"], &a["termination"]),
             (&b["sensor"], &b["axis"], &b["termination"])
         );
-        assert!((a["objective"].as_f64().unwrap() / b["objective"].as_f64().unwrap() - 1.0).abs() < 1e-9);
+        assert!(
+            (a["objective"].as_f64().unwrap() / b["objective"].as_f64().unwrap() - 1.0).abs()
+                < 1e-9
+        );
     }
     assert_eq!(first["fits"][1]["axis"], "y");
 }
@@ -159,20 +244,44 @@ fn a_short_recording_is_left_out_at_the_same_scales() {
     let short: Vec<&str> = text.lines().take(1 + SAMPLES / 10).collect();
     std::fs::write(&path, short.join("\n") + "\n").unwrap();
     let fit = |weighting: &str, inputs: &[&str], scales: &[&str]| {
-        let flags = ["--model", "N1", "--estimator", "awv", "--weighting", weighting];
-        json(dir.path(), &[&["calibrate"], inputs, &flags, scales].concat())
+        let flags = [
+            "--model",
+            "N1",
+            "--estimator",
+            "awv",
+            "--weighting",
+            weighting,
+        ];
+        json(
+            dir.path(),
+            &[&["calibrate"], inputs, &flags, scales].concat(),
+        )
     };
     // With the full covariance it ends at all: the scales of the whole are mixed.
-    assert_eq!(fit("full", &["runs"], &[])["replicates"][3]["left_out"].as_array().unwrap().len(), 1);
+    assert_eq!(
+        fit("full", &["runs"], &[])["replicates"][3]["left_out"]
+            .as_array()
+            .unwrap()
+            .len(),
+        1
+    );
     let all = fit("edof", &["runs"], &[]);
     let moved = &all["replicates"][3]["left_out"][0]["parameters"];
     let scales = all["fits"][0]["scales"].to_string();
     let others = ["runs/run0.csv", "runs/run1.csv", "runs/run2.csv"];
     let rest = fit("edof", &others, &["--scales", &scales]);
-    for (i, (process, name)) in [(0, "sigma2"), (1, "phi"), (1, "sigma2")].into_iter().enumerate() {
-        let expected = rest["fits"][0]["processes"][process][name].as_f64().unwrap();
+    for (i, (process, name)) in [(0, "sigma2"), (1, "phi"), (1, "sigma2")]
+        .into_iter()
+        .enumerate()
+    {
+        let expected = rest["fits"][0]["processes"][process][name]
+            .as_f64()
+            .unwrap();
         let without = moved[i]["without"].as_f64().unwrap();
-        assert!((without / expected - 1.0).abs() < 1e-5, "{name}: {without} {expected}");
+        assert!(
+            (without / expected - 1.0).abs() < 1e-5,
+            "{name}: {without} {expected}"
+        );
     }
 }
 
@@ -184,9 +293,21 @@ fn the_curves_of_wv_give_the_fits_of_their_recording() {
     json(dir.path(), &["wv", "runs/run1.csv", "-o", "one.wv.json"]);
     let direct = json(
         dir.path(),
-        &["calibrate", "runs/run1.csv", "--estimator", "all", "--model", "N1", "-o", "m.toml"],
+        &[
+            "calibrate",
+            "runs/run1.csv",
+            "--estimator",
+            "all",
+            "--model",
+            "N1",
+            "-o",
+            "m.toml",
+        ],
     );
-    let fits = json(dir.path(), &["calibrate", "--curve", "one.wv.json", "--model", "N1"]);
+    let fits = json(
+        dir.path(),
+        &["calibrate", "--curve", "one.wv.json", "--model", "N1"],
+    );
     let sorted = |out: &Value| {
         let key = |f: &Value| (f["estimator"].to_string(), f["axis"].to_string());
         let mut fits: Vec<_> = out["fits"]
@@ -207,14 +328,34 @@ fn the_curves_of_wv_give_the_fits_of_their_recording() {
     let text = std::fs::read_to_string(dir.path().join("one.wv.json")).unwrap();
     let edited: Value = serde_json::from_str(&text).unwrap();
     let edited = Value::Object(
-        edited.as_object().unwrap().clone().into_iter().chain([("efficiency".into(), 0.into())]).collect(),
+        edited
+            .as_object()
+            .unwrap()
+            .clone()
+            .into_iter()
+            .chain([("efficiency".into(), 0.into())])
+            .collect(),
     );
     std::fs::write(dir.path().join("none.wv.json"), edited.to_string()).unwrap();
-    let stderr = refusal(dir.path(), &["calibrate", "--curve", "none.wv.json", "--model", "N1"], 2);
-    assert!(stderr.contains("none.wv.json, head: efficiency = 0 is not a number above 0"), "{stderr}");
+    let stderr = refusal(
+        dir.path(),
+        &["calibrate", "--curve", "none.wv.json", "--model", "N1"],
+        2,
+    );
+    assert!(
+        stderr.contains("none.wv.json, head: efficiency = 0 is not a number above 0"),
+        "{stderr}"
+    );
     json(dir.path(), &["wv", "runs", "-o", "two.wv.json"]);
-    let stderr = refusal(dir.path(), &["calibrate", "--curve", "two.wv.json", "--model", "N1"], 2);
-    assert!(stderr.contains("two.wv.json: there are two curves of gyro.x for gmwm"), "{stderr}");
+    let stderr = refusal(
+        dir.path(),
+        &["calibrate", "--curve", "two.wv.json", "--model", "N1"],
+        2,
+    );
+    assert!(
+        stderr.contains("two.wv.json: there are two curves of gyro.x for gmwm"),
+        "{stderr}"
+    );
 }
 
 #[test]
@@ -223,27 +364,81 @@ fn a_table_of_exact_values_gives_back_its_parameters() {
     let mut text = "tau_samples,wv,edof\n".to_owned();
     for level in 1..=15_u32 {
         let wv: f64 = truth().iter().map(|p| p.haar_wv(level)).sum();
-        writeln!(text, "{},{wv:e},{}", 1_u64 << level, 5e5 / f64::from(level).exp2()).unwrap();
+        writeln!(
+            text,
+            "{},{wv:e},{}",
+            1_u64 << level,
+            5e5 / f64::from(level).exp2()
+        )
+        .unwrap();
     }
     std::fs::write(dir.path().join("curve.csv"), text).unwrap();
-    let stderr = refusal(dir.path(), &["calibrate", "--curve", "curve.csv", "--model", "N1"], 2);
-    assert!(stderr.contains("curve.csv: the curve does not say its sample rate"), "{stderr}");
-    assert!(stderr.contains("hint: give the rate with --rate-hz"), "{stderr}");
-    let out = json(dir.path(), &["calibrate", "--curve", "curve.csv", "--model", "N1", "--rate-hz", "50"]);
+    let stderr = refusal(
+        dir.path(),
+        &["calibrate", "--curve", "curve.csv", "--model", "N1"],
+        2,
+    );
+    assert!(
+        stderr.contains("curve.csv: the curve does not say its sample rate"),
+        "{stderr}"
+    );
+    assert!(
+        stderr.contains("hint: give the rate with --rate-hz"),
+        "{stderr}"
+    );
+    let out = json(
+        dir.path(),
+        &[
+            "calibrate",
+            "--curve",
+            "curve.csv",
+            "--model",
+            "N1",
+            "--rate-hz",
+            "50",
+        ],
+    );
     let processes = &out["fits"][0]["processes"];
     for (i, process) in truth().iter().enumerate() {
         assert_eq!(processes[i]["type"], process.code());
         for (name, value) in process.parameters() {
-            assert!((processes[i][name].as_f64().unwrap() / value - 1.0).abs() < 1e-8, "{name}");
+            assert!(
+                (processes[i][name].as_f64().unwrap() / value - 1.0).abs() < 1e-8,
+                "{name}"
+            );
         }
     }
     assert_eq!(out["files"].as_array().unwrap().len(), 0);
-    let stderr =
-        refusal(dir.path(), &["calibrate", "--curve", "curve.csv", "--rate-hz", "50", "-o", "m.toml"], 2);
-    assert!(stderr.contains("curve.csv: the curve does not say of which sensor it is"), "{stderr}");
+    let stderr = refusal(
+        dir.path(),
+        &[
+            "calibrate",
+            "--curve",
+            "curve.csv",
+            "--rate-hz",
+            "50",
+            "-o",
+            "m.toml",
+        ],
+        2,
+    );
+    assert!(
+        stderr.contains("curve.csv: the curve does not say of which sensor it is"),
+        "{stderr}"
+    );
     json(
         dir.path(),
-        &["calibrate", "--curve", "curve.csv", "--rate-hz", "50", "--axes", "gyro", "-o", "m.toml"],
+        &[
+            "calibrate",
+            "--curve",
+            "curve.csv",
+            "--rate-hz",
+            "50",
+            "--axes",
+            "gyro",
+            "-o",
+            "m.toml",
+        ],
     );
     assert!(dir.path().join("m.toml").exists());
 }
@@ -254,7 +449,17 @@ fn threads_do_not_change_a_byte() {
     recordings(dir.path(), 4);
     for threads in ["1", "2"] {
         let out = format!("m{threads}.toml");
-        let seeded = ["calibrate", "runs", "-q", "--seed", "4", "-j", threads, "-o", &out];
+        let seeded = [
+            "calibrate",
+            "runs",
+            "-q",
+            "--seed",
+            "4",
+            "-j",
+            threads,
+            "-o",
+            &out,
+        ];
         nav_sim(dir.path()).args(seeded).assert().success();
     }
     let read = |name: &str| std::fs::read_to_string(dir.path().join(name)).unwrap();
@@ -270,7 +475,10 @@ fn wv_prints_the_curves_of_every_signal() {
     let out = json(dir.path(), &["wv", "runs/run1.csv"]);
     let signals = out["signals"].as_array().unwrap();
     assert_eq!(signals.len(), 2);
-    assert_eq!((&signals[1]["sensor"], &signals[1]["axis"]), (&"gyro".into(), &"y".into()));
+    assert_eq!(
+        (&signals[1]["sensor"], &signals[1]["axis"]),
+        (&"gyro".into(), &"y".into())
+    );
     assert_eq!(signals[0]["samples"], SAMPLES);
     let x = signal(1, "gyro.x");
     let mean = x.iter().sum::<f64>() / SAMPLES as f64;
@@ -285,21 +493,56 @@ fn wv_prints_the_curves_of_every_signal() {
     }
     assert_eq!(signals[0]["robust"]["status"][0], "ok");
     let wide = numbers(&signals[0]["classical"]["ci_high"]);
-    let out = json(dir.path(), &["wv", "runs/run1.csv", "--intervals", "large-sample", "--scales", "5"]);
+    let out = json(
+        dir.path(),
+        &[
+            "wv",
+            "runs/run1.csv",
+            "--intervals",
+            "large-sample",
+            "--scales",
+            "5",
+        ],
+    );
     let narrow = numbers(&out["signals"][0]["classical"]["ci_high"]);
-    assert_eq!((narrow.len(), out["edof_method"].as_str()), (5, Some("large-sample")));
+    assert_eq!(
+        (narrow.len(), out["edof_method"].as_str()),
+        (5, Some("large-sample"))
+    );
     assert!(narrow[4] < wide[4]);
     let text = |more: &[&str]| {
-        let output = nav_sim(dir.path()).args(["wv", "runs"]).args(more).assert().success();
+        let output = nav_sim(dir.path())
+            .args(["wv", "runs"])
+            .args(more)
+            .assert()
+            .success();
         String::from_utf8(output.get_output().stdout.clone()).unwrap()
     };
     let (digest, all) = (text(&[]), text(&["--verbose"]));
-    assert!(digest.lines().count() <= 20 && digest.contains("gyro.x (rad/s)"), "{digest}");
-    assert!(all.contains("gyro.x: Allan deviation (rad/s)") && all.contains("run0.csv"), "{all}");
-    assert!(["run0.csv", "run1.csv"].iter().all(|name| text(&["--per-file"]).contains(name)));
-    assert!(text(&["--per-file"]).lines().all(|line| line.chars().count() <= 120));
+    assert!(
+        digest.lines().count() <= 20 && digest.contains("gyro.x (rad/s)"),
+        "{digest}"
+    );
+    assert!(
+        all.contains("gyro.x: Allan deviation (rad/s)") && all.contains("run0.csv"),
+        "{all}"
+    );
+    assert!(
+        ["run0.csv", "run1.csv"]
+            .iter()
+            .all(|name| text(&["--per-file"]).contains(name))
+    );
+    assert!(
+        text(&["--per-file"])
+            .lines()
+            .all(|line| line.chars().count() <= 120)
+    );
     assert_eq!(text(&["--format", "csv"]).lines().count(), 1 + 4 * 13);
-    let stderr = refusal(dir.path(), &["check", "runs/run0.csv", "--format", "csv"], 2);
+    let stderr = refusal(
+        dir.path(),
+        &["check", "runs/run0.csv", "--format", "csv"],
+        2,
+    );
     assert!(stderr.contains("only wv prints CSV"), "{stderr}");
 }
 
@@ -310,37 +553,90 @@ fn parameters_can_be_fixed_and_bounded() {
     recordings(dir.path(), 2);
     let spec = "[gyro.WN]\nsigma2 = { fix = 4e-6 }\n[AR1]\nphi = { lower = 0.5, upper = 0.9 }\n";
     std::fs::write(dir.path().join("p.toml"), spec).unwrap();
-    let calibrate = ["calibrate", "runs", "--model", "N1", "--estimator", "awv", "-o", "m.toml"];
-    let out = json(dir.path(), &[&calibrate[..], &["--parameters", "p.toml"]].concat());
+    let calibrate = [
+        "calibrate",
+        "runs",
+        "--model",
+        "N1",
+        "--estimator",
+        "awv",
+        "-o",
+        "m.toml",
+    ];
+    let out = json(
+        dir.path(),
+        &[&calibrate[..], &["--parameters", "p.toml"]].concat(),
+    );
     let processes = &out["fits"][0]["processes"];
-    assert_eq!(processes[0]["sigma2"].to_string(), "4e-6", "as given, to the last bit");
-    assert!(processes[0].get("sigma2_ci95").is_none(), "nothing is estimated of it");
+    assert_eq!(
+        processes[0]["sigma2"].to_string(),
+        "4e-6",
+        "as given, to the last bit"
+    );
+    assert!(
+        processes[0].get("sigma2_ci95").is_none(),
+        "nothing is estimated of it"
+    );
     assert_eq!(processes[1]["phi"].to_string(), "0.9");
     let notes = out["fits"][0]["notes"].to_string();
-    assert!(notes.contains("AR1 phi = 0.9 is at the bound given"), "{notes}");
+    assert!(
+        notes.contains("AR1 phi = 0.9 is at the bound given"),
+        "{notes}"
+    );
     let scales = out["fits"][0]["scales"].as_u64().unwrap();
     assert_eq!(
         out["fits"][0]["goodness"]["dof"].as_u64().unwrap(),
         scales - 3,
         "phi, sigma2 and gamma2 are free"
     );
-    std::fs::write(dir.path().join("p.toml"), "[AR1]\nphi = { lower = 0.9, upper = 0.5 }\n").unwrap();
-    let stderr = refusal(dir.path(), &[&calibrate[..], &["--parameters", "p.toml"]].concat(), 2);
+    std::fs::write(
+        dir.path().join("p.toml"),
+        "[AR1]\nphi = { lower = 0.9, upper = 0.5 }\n",
+    )
+    .unwrap();
+    let stderr = refusal(
+        dir.path(),
+        &[&calibrate[..], &["--parameters", "p.toml"]].concat(),
+        2,
+    );
     assert!(
-        stderr.contains("p.toml, line 2: \"AR1.phi\" = { lower = 0.9, upper = 0.5 } is not possible"),
+        stderr
+            .contains("p.toml, line 2: \"AR1.phi\" = { lower = 0.9, upper = 0.5 } is not possible"),
         "{stderr}"
     );
-    std::fs::write(dir.path().join("p.toml"), "[gyro.x.WN]\nsigma2 = { fix = 1 }\n").unwrap();
-    let stderr = refusal(dir.path(), &[&calibrate[..], &["--parameters", "p.toml"]].concat(), 2);
-    assert!(stderr.contains("the axes are pooled") && stderr.contains("hint: --pool axes"), "{stderr}");
+    std::fs::write(
+        dir.path().join("p.toml"),
+        "[gyro.x.WN]\nsigma2 = { fix = 1 }\n",
+    )
+    .unwrap();
+    let stderr = refusal(
+        dir.path(),
+        &[&calibrate[..], &["--parameters", "p.toml"]].concat(),
+        2,
+    );
+    assert!(
+        stderr.contains("the axes are pooled") && stderr.contains("hint: --pool axes"),
+        "{stderr}"
+    );
 }
 
 #[test]
 fn a_model_is_chosen_and_slopes_are_read() {
     let dir = tempfile::tempdir().unwrap();
     recordings(dir.path(), 2);
-    let out =
-        json(dir.path(), &["calibrate", "runs", "--model", "auto", "--estimator", "awv", "--pool", "axes"]);
+    let out = json(
+        dir.path(),
+        &[
+            "calibrate",
+            "runs",
+            "--model",
+            "auto",
+            "--estimator",
+            "awv",
+            "--pool",
+            "axes",
+        ],
+    );
     let fit = &out["fits"][0];
     let ranking = fit["ranking"].as_array().unwrap();
     let chosen: Vec<&Value> = ranking.iter().filter(|c| c["chosen"] == true).collect();
@@ -360,10 +656,22 @@ fn a_model_is_chosen_and_slopes_are_read() {
     let out = json(dir.path(), &[&avlr[..], &["--model", "WN+QN+RW"]].concat());
     let fit = &out["fits"][0];
     assert_eq!(fit["zero"].to_string(), "[\"QN\"]");
-    assert!(fit["notes"].to_string().contains("QN is zero") && fit["goodness"].is_null(), "{fit}");
+    assert!(
+        fit["notes"].to_string().contains("QN is zero") && fit["goodness"].is_null(),
+        "{fit}"
+    );
     let full = json(
         dir.path(),
-        &["calibrate", "runs", "--model", "N1", "--estimator", "awv", "--weighting", "full"],
+        &[
+            "calibrate",
+            "runs",
+            "--model",
+            "N1",
+            "--estimator",
+            "awv",
+            "--weighting",
+            "full",
+        ],
     );
     let sigma2 = full["fits"][0]["processes"][0]["sigma2"].as_f64().unwrap();
     assert!((sigma2 / 4e-6 - 1.0).abs() < 0.1, "{sigma2}");

@@ -8,23 +8,51 @@ fn what_is_printed_fits_a_screen() {
     let dir = tempfile::tempdir().unwrap();
     recordings(dir.path(), 4);
     let lines = |more: &[&str]| {
-        let arguments =
-            ["calibrate", "runs", "--bootstrap", "19", "--no-progress", "--seed", "1", "-o", "m.toml"];
-        let output = nav_sim(dir.path()).args(arguments).args(more).assert().success();
+        let arguments = [
+            "calibrate",
+            "runs",
+            "--bootstrap",
+            "19",
+            "--no-progress",
+            "--seed",
+            "1",
+            "-o",
+            "m.toml",
+        ];
+        let output = nav_sim(dir.path())
+            .args(arguments)
+            .args(more)
+            .assert()
+            .success();
         let output = output.get_output();
         let all = [&output.stdout, &output.stderr].map(|t| String::from_utf8(t.clone()).unwrap());
-        (all[0].lines().count() + all[1].lines().count(), all[0].clone())
+        (
+            all[0].lines().count() + all[1].lines().count(),
+            all[0].clone(),
+        )
     };
     let (count, text) = lines(&[]);
     assert!(count <= 20, "{count} lines: {text}");
     let first = text.lines().next().unwrap();
-    assert!(first.starts_with("gyro: ") && first.contains(" fit"), "{text}");
+    assert!(
+        first.starts_with("gyro: ") && first.contains(" fit"),
+        "{text}"
+    );
     assert!(text.contains("4 recordings, none abnormal"), "{text}");
-    assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
-    assert!(text.contains("angle random walk N") && text.contains("deg/sqrt(h)"), "{text}");
+    assert!(
+        text.lines().all(|line| line.chars().count() <= 120),
+        "{text}"
+    );
+    assert!(
+        text.contains("angle random walk N") && text.contains("deg/sqrt(h)"),
+        "{text}"
+    );
     assert!(first.contains("(p = "), "{text}");
     let table: Vec<&str> = text.lines().filter(|line| line.starts_with("  ")).collect();
-    assert!(table.len() > 6 && table.iter().all(|row| row.chars().count() <= 100), "{text}");
+    assert!(
+        table.len() > 6 && table.iter().all(|row| row.chars().count() <= 100),
+        "{text}"
+    );
     assert!(lines(&["--verbose"]).0 > count);
     assert!(lines(&["--estimator", "all"]).0 <= 20);
 }
@@ -38,13 +66,25 @@ fn quantization_is_that_of_increments() {
     let model = format!("schema = 1\nrate_hz = 50.0\n[accel]\n{processes}\n[gyro]\n{processes}\n");
     std::fs::write(dir.path().join("imu.toml"), model).unwrap();
     let synthesize = "synthesize imu.toml --replicates 4 --samples 16384 --axes x --seed 1 -o made";
-    nav_sim(dir.path()).args(synthesize.split(' ')).assert().success();
+    nav_sim(dir.path())
+        .args(synthesize.split(' '))
+        .assert()
+        .success();
     let calibrate = "calibrate made --model WN+QN --bootstrap 0 --seed 1 -o m.toml";
-    let output = nav_sim(dir.path()).args(calibrate.split(' ')).assert().success();
+    let output = nav_sim(dir.path())
+        .args(calibrate.split(' '))
+        .assert()
+        .success();
     let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
-    let rows: Vec<&str> = text.lines().filter(|line| line.contains("quantization Q")).collect();
+    let rows: Vec<&str> = text
+        .lines()
+        .filter(|line| line.contains("quantization Q"))
+        .collect();
     for (row, unit) in rows.iter().zip(["m/s", "rad"]) {
-        let rest = row.split(&format!("quantization Q ({unit})")).nth(1).unwrap();
+        let rest = row
+            .split(&format!("quantization Q ({unit})"))
+            .nth(1)
+            .unwrap();
         let value: f64 = rest.split_whitespace().next().unwrap().parse().unwrap();
         assert!((value / 4e-4 - 1.0).abs() < 0.08, "{row}");
     }
@@ -56,27 +96,55 @@ fn quantization_is_that_of_increments() {
 #[test]
 fn practitioners_parameters_are_those_of_export() {
     let dir = tempfile::tempdir().unwrap();
-    let processes = "processes = [{ type = \"WN\", sigma2 = 4e-6 }, { type = \"RW\", gamma2 = 1e-12 }]";
+    let processes =
+        "processes = [{ type = \"WN\", sigma2 = 4e-6 }, { type = \"RW\", gamma2 = 1e-12 }]";
     let model = format!("schema = 1\nrate_hz = 50.0\n[accel]\n{processes}\n[gyro]\n{processes}\n");
     std::fs::write(dir.path().join("imu.toml"), model).unwrap();
-    let synthesize =
-        ["synthesize", "imu.toml", "--replicates", "3", "--samples", "16384", "--seed", "1", "-o", "made"];
+    let synthesize = [
+        "synthesize",
+        "imu.toml",
+        "--replicates",
+        "3",
+        "--samples",
+        "16384",
+        "--seed",
+        "1",
+        "-o",
+        "made",
+    ];
     nav_sim(dir.path()).args(synthesize).assert().success();
-    let calibrate =
-        ["calibrate", "made", "--model", "WN+RW", "--bootstrap", "39", "--seed", "1", "-o", "m.toml"];
+    let calibrate = [
+        "calibrate",
+        "made",
+        "--model",
+        "WN+RW",
+        "--bootstrap",
+        "39",
+        "--seed",
+        "1",
+        "-o",
+        "m.toml",
+    ];
     let out = json(dir.path(), &calibrate);
     let exported = json(dir.path(), &["export", "m.toml", "--target", "kalibr"]);
     for fit in out["fits"].as_array().unwrap() {
         let own = &fit["parameters"]["white_and_walk"];
-        let of_export = &exported["sensors"][fit["sensor"].as_str().unwrap()]["axes"]["x"]["white_and_walk"];
+        let of_export =
+            &exported["sensors"][fit["sensor"].as_str().unwrap()]["axes"]["x"]["white_and_walk"];
         for key in ["n", "k"] {
             assert_eq!(own[key]["value"], of_export[key]["value"], "{fit}");
             assert_eq!(own[key]["data_sheet"], of_export[key]["data_sheet"]);
         }
         let density = own["n"]["value"].as_f64().unwrap();
-        assert!((density / (4e-6_f64 / 50.0).sqrt() - 1.0).abs() < 0.02, "{density}");
+        assert!(
+            (density / (4e-6_f64 / 50.0).sqrt() - 1.0).abs() < 0.02,
+            "{density}"
+        );
         let ends = numbers(&own["n"]["ci95"]);
-        assert!(ends[0] < density && density < ends[1] && ends[1] / ends[0] < 1.05, "{ends:?}");
+        assert!(
+            ends[0] < density && density < ends[1] && ends[1] / ends[0] < 1.05,
+            "{ends:?}"
+        );
         assert!(fit["missed"].as_array().unwrap().is_empty());
     }
 }
@@ -119,11 +187,15 @@ fn bad_data_are_told_in_a_line() {
     let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
     let first = text.lines().next().unwrap();
     assert!(
-        first.starts_with("gyro: WN does not fit: data/model ") && first.contains("(all together: p = "),
+        first.starts_with("gyro: WN does not fit: data/model ")
+            && first.contains("(all together: p = "),
         "{first}"
     );
     assert!(
-        text.lines().nth(1).unwrap().starts_with("1 of 4 recordings are abnormal: run3 (gyro noise"),
+        text.lines()
+            .nth(1)
+            .unwrap()
+            .starts_with("1 of 4 recordings are abnormal: run3 (gyro noise"),
         "{text}"
     );
     let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
@@ -163,8 +235,17 @@ fn terminal_and_page_name_the_same_scale() {
     let output = nav_sim(dir.path()).args(fit).assert().success();
     let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
     let verdict = text.lines().next().unwrap().split_once(": ").unwrap().1;
-    let told = verdict.split(": ").nth(1).unwrap().split(" (all").next().unwrap();
-    assert_eq!(told, "data/model 1.50 at 0.16 s; 1 of 10 scales off", "{text}");
+    let told = verdict
+        .split(": ")
+        .nth(1)
+        .unwrap()
+        .split(" (all")
+        .next()
+        .unwrap();
+    assert_eq!(
+        told, "data/model 1.50 at 0.16 s; 1 of 10 scales off",
+        "{text}"
+    );
     let page = std::fs::read_to_string(dir.path().join("m.html")).unwrap();
     assert!(page.contains(told), "{told}");
 }
@@ -175,17 +256,40 @@ fn terminal_and_page_name_the_same_scale() {
 fn the_page_and_the_terminal_say_the_same_of_n_and_k() {
     let dir = tempfile::tempdir().unwrap();
     recordings(dir.path(), 2);
-    let fit = ["calibrate", "runs", "--model", "N1", "--bootstrap", "19", "--seed", "1", "-o", "m.toml"];
+    let fit = [
+        "calibrate",
+        "runs",
+        "--model",
+        "N1",
+        "--bootstrap",
+        "19",
+        "--seed",
+        "1",
+        "-o",
+        "m.toml",
+    ];
     let print = |more: &[&str]| {
         let output = nav_sim(dir.path()).args(fit).args(more).assert().success();
         String::from_utf8(output.get_output().stdout.clone()).unwrap()
     };
     let text = print(&[]);
-    let row = text.lines().find(|l| l.contains("angle random walk N")).unwrap();
-    let value = row.split("(deg/sqrt(h))").nth(1).unwrap().split_whitespace().next().unwrap();
+    let row = text
+        .lines()
+        .find(|l| l.contains("angle random walk N"))
+        .unwrap();
+    let value = row
+        .split("(deg/sqrt(h))")
+        .nth(1)
+        .unwrap()
+        .split_whitespace()
+        .next()
+        .unwrap();
     let page = std::fs::read_to_string(dir.path().join("m.html")).unwrap();
     let cell = "/fits/0/parameters/white_and_walk/n/data_sheet/value\">";
-    let (figure, chart) = (page.find(cell).unwrap(), page.find("<svg class=\"chart").unwrap());
+    let (figure, chart) = (
+        page.find(cell).unwrap(),
+        page.find("<svg class=\"chart").unwrap(),
+    );
     assert!(figure < chart, "the figures stand first");
     assert!(page.contains(&format!("{cell}{value}</td>")), "{value}");
     assert!(page.contains("N is read at 1 s, K at 3 s"));
@@ -197,7 +301,8 @@ fn the_page_and_the_terminal_say_the_same_of_n_and_k() {
 #[test]
 fn a_random_walk_that_nobody_saw_is_not_stated() {
     let dir = tempfile::tempdir().unwrap();
-    let processes = "processes = [{ type = \"WN\", sigma2 = 4e-6 }, { type = \"RW\", gamma2 = 4e-12 }]";
+    let processes =
+        "processes = [{ type = \"WN\", sigma2 = 4e-6 }, { type = \"RW\", gamma2 = 4e-12 }]";
     let model = format!("schema = 1\nrate_hz = 50.0\n[gyro]\n{processes}\n");
     std::fs::write(dir.path().join("imu.toml"), model).unwrap();
     for (samples, is_observed) in [("3000", false), ("32768", true)] {
@@ -214,12 +319,32 @@ fn a_random_walk_that_nobody_saw_is_not_stated() {
             "made",
         ];
         nav_sim(dir.path()).args(make).assert().success();
-        let fit =
-            ["calibrate", "made", "--model", "WN+RW", "--bootstrap", "19", "--seed", "1", "-o", "m.toml"];
-        let text =
-            String::from_utf8(nav_sim(dir.path()).args(fit).assert().success().get_output().stdout.clone());
+        let fit = [
+            "calibrate",
+            "made",
+            "--model",
+            "WN+RW",
+            "--bootstrap",
+            "19",
+            "--seed",
+            "1",
+            "-o",
+            "m.toml",
+        ];
+        let text = String::from_utf8(
+            nav_sim(dir.path())
+                .args(fit)
+                .assert()
+                .success()
+                .get_output()
+                .stdout
+                .clone(),
+        );
         let text = text.unwrap();
-        let row = text.lines().find(|l| l.contains("rate random walk K")).unwrap();
+        let row = text
+            .lines()
+            .find(|l| l.contains("rate random walk K"))
+            .unwrap();
         assert_eq!(!row.contains("not observed"), is_observed, "{text}");
         assert_eq!(
             json(dir.path(), &fit)["fits"][0]["parameters"]["white_and_walk"]["k"]["observed"],
@@ -233,14 +358,37 @@ fn a_random_walk_that_nobody_saw_is_not_stated() {
 fn fits_say_how_far_they_are() {
     let dir = tempfile::tempdir().unwrap();
     recordings(dir.path(), 3);
-    for more in [&["--model", "N1", "--estimator", "all"][..], &["--model", "auto", "--axes", "gyro.x"]] {
-        let fit = ["calibrate", "runs", "--bootstrap", "40", "--seed", "1", "-o", "m.toml"];
+    for more in [
+        &["--model", "N1", "--estimator", "all"][..],
+        &["--model", "auto", "--axes", "gyro.x"],
+    ] {
+        let fit = [
+            "calibrate",
+            "runs",
+            "--bootstrap",
+            "40",
+            "--seed",
+            "1",
+            "-o",
+            "m.toml",
+        ];
         let output = nav_sim(dir.path()).args(fit).args(more).assert().success();
         let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
-        let lines: Vec<&str> = said.lines().filter(|l| l.contains(" steps of the fits, ")).collect();
+        let lines: Vec<&str> = said
+            .lines()
+            .filter(|l| l.contains(" steps of the fits, "))
+            .collect();
         assert!(lines.last().unwrap().starts_with("100 %"), "{said}");
-        assert!((if more[1] == "auto" { 3 } else { 10 }..=10).contains(&lines.len()), "{said}");
-        let quiet = nav_sim(dir.path()).args(fit).args(more).arg("--no-progress").assert().success();
+        assert!(
+            (if more[1] == "auto" { 3 } else { 10 }..=10).contains(&lines.len()),
+            "{said}"
+        );
+        let quiet = nav_sim(dir.path())
+            .args(fit)
+            .args(more)
+            .arg("--no-progress")
+            .assert()
+            .success();
         assert!(!String::from_utf8_lossy(&quiet.get_output().stderr).contains("steps of the fits"));
     }
 }
@@ -252,19 +400,43 @@ fn the_hint_at_a_missing_sample_leads_on() {
     recordings(dir.path(), 1);
     let path = dir.path().join("runs/run0.csv");
     let text = std::fs::read_to_string(&path).unwrap();
-    let fit = ["calibrate", "runs", "--model", "WN+RW", "--bootstrap", "0", "-o", "m.toml"];
+    let fit = [
+        "calibrate",
+        "runs",
+        "--model",
+        "WN+RW",
+        "--bootstrap",
+        "0",
+        "-o",
+        "m.toml",
+    ];
     let with = |line: &str| {
-        let edit = |(i, l): (usize, &str)| if i == 99 { line.to_owned() } else { format!("{l}\n") };
-        std::fs::write(&path, text.lines().enumerate().map(edit).collect::<String>()).unwrap();
+        let edit = |(i, l): (usize, &str)| {
+            if i == 99 {
+                line.to_owned()
+            } else {
+                format!("{l}\n")
+            }
+        };
+        std::fs::write(
+            &path,
+            text.lines().enumerate().map(edit).collect::<String>(),
+        )
+        .unwrap();
     };
     for cell in ["", "nan"] {
         with(&format!("1.96,{cell},0\n"));
         let said = refusal(dir.path(), &fit, 2);
-        assert!(said.contains("line 100") && said.contains("hint: remove the line"), "{said}");
+        assert!(
+            said.contains("line 100") && said.contains("hint: remove the line"),
+            "{said}"
+        );
     }
     with("");
     nav_sim(dir.path()).args(fit).assert().success();
-    let rows: String = (0..50).map(|k| format!("2024-05-01T10:00:{k:02}.0,0.1,0.2\n")).collect();
+    let rows: String = (0..50)
+        .map(|k| format!("2024-05-01T10:00:{k:02}.0,0.1,0.2\n"))
+        .collect();
     std::fs::write(&path, format!("t_s,gyro_x_rad_s,gyro_y_rad_s\n{rows}")).unwrap();
     let said = refusal(dir.path(), &fit, 2);
     assert!(said.contains("hint: write the time in seconds"), "{said}");
@@ -275,7 +447,9 @@ fn the_hint_at_a_missing_sample_leads_on() {
 fn a_gyroscope_louder_than_any_is_doubted() {
     let dir = tempfile::tempdir().unwrap();
     let model = |sigma2: f64| {
-        format!("schema = 1\nrate_hz = 100.0\n[gyro]\nprocesses = [{{ type = \"WN\", sigma2 = {sigma2} }}]\n")
+        format!(
+            "schema = 1\nrate_hz = 100.0\n[gyro]\nprocesses = [{{ type = \"WN\", sigma2 = {sigma2} }}]\n"
+        )
     };
     // 0.3 deg/sqrt(h) at 100 Hz: (0.3/60 deg/sqrt(s))² · 100 Hz, in rad²/s²
     let sigma2 = (0.3_f64 / 60.0).to_radians().powi(2) * 100.0;
@@ -310,6 +484,10 @@ fn a_gyroscope_louder_than_any_is_doubted() {
         ];
         let output = nav_sim(dir.path()).args(fit).assert().success();
         let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
-        assert_eq!(said.contains("columns in degrees are named gyro_x_deg_s"), is_doubted, "{said}");
+        assert_eq!(
+            said.contains("columns in degrees are named gyro_x_deg_s"),
+            is_doubted,
+            "{said}"
+        );
     }
 }

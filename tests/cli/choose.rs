@@ -12,11 +12,21 @@ processes = [{ type = "WN", sigma2 = 1e-5 }, { type = "RW", gamma2 = 1e-10 }]
 processes = [{ type = "WN", sigma2 = 1e-8 }, { type = "RW", gamma2 = 1e-10 }]
 "#;
 
-const DRIVE: [&str; 6] =
-    ["--trajectory", "trajectories/figure_eight.toml", "--outage", "40:60", "--seed", "1"];
+const DRIVE: [&str; 6] = [
+    "--trajectory",
+    "trajectories/figure_eight.toml",
+    "--outage",
+    "40:60",
+    "--seed",
+    "1",
+];
 
 fn nav_sim(directory: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
-    Command::cargo_bin("nav-sim").unwrap().current_dir(directory).args(arguments).assert()
+    Command::cargo_bin("nav-sim")
+        .unwrap()
+        .current_dir(directory)
+        .args(arguments)
+        .assert()
 }
 
 /// Recordings of [`MODEL`], long enough for the way to the end of the outage, or not.
@@ -52,8 +62,21 @@ fn said(assert: &assert_cmd::assert::Assert) -> String {
 #[test]
 fn the_model_that_made_the_recordings_is_chosen_and_written() {
     let directory = recordings("16384", "4");
-    let arguments = ["--estimator", "awv,gmwm", "--model", "WN,WN+RW", "--inflate", "none,x10", "-o", "out"];
-    let output = choose(directory.path(), &[&arguments[..], &["--format", "json"]].concat()).success();
+    let arguments = [
+        "--estimator",
+        "awv,gmwm",
+        "--model",
+        "WN,WN+RW",
+        "--inflate",
+        "none,x10",
+        "-o",
+        "out",
+    ];
+    let output = choose(
+        directory.path(),
+        &[&arguments[..], &["--format", "json"]].concat(),
+    )
+    .success();
     let found: Value = serde_json::from_slice(&output.get_output().stdout).unwrap();
     assert_eq!(found["winner"], "awv WN+RW, 15", "{found}");
     let candidates = found["candidates"].as_array().unwrap();
@@ -61,7 +84,10 @@ fn the_model_that_made_the_recordings_is_chosen_and_written() {
     let of = |name: &str| candidates.iter().find(|c| c["candidate"] == name).unwrap();
     // without the random walk the filter is lost, ten times the deviations are far too many
     let nees = |name: &str| of(name)["nees"]["value"].as_f64().unwrap();
-    assert!(nees("awv WN, 15") > 90.0 && nees("awv WN+RW, 15, x10") < 3.0, "{found}");
+    assert!(
+        nees("awv WN, 15") > 90.0 && nees("awv WN+RW, 15, x10") < 3.0,
+        "{found}"
+    );
     // four recordings hold some nine windows side by side: 9 ± √(18/9), of which three are allowed
     assert!((nees("awv WN+RW, 15") - 9.0).abs() < 4.3, "{found}");
     assert_eq!(
@@ -75,23 +101,46 @@ fn the_model_that_made_the_recordings_is_chosen_and_written() {
         let (sampled, expected) = (&fold["rmse_m"], &fold["expected"]["rmse_m"]);
         let ratio = sampled.as_f64().unwrap() / expected.as_f64().unwrap();
         // two windows of two components: the root of a chi-square of four degrees over four, outside in 1e-3
-        assert!(fold["windows"] == 16 && (0.15..2.4).contains(&ratio), "{fold}");
+        assert!(
+            fold["windows"] == 16 && (0.15..2.4).contains(&ratio),
+            "{fold}"
+        );
     }
     let file = std::fs::read_to_string(directory.path().join("out/ranking.json")).unwrap();
     assert_eq!(serde_json::from_str::<Value>(&file).unwrap(), found);
-    let model: toml::Table =
-        std::fs::read_to_string(directory.path().join("out/model.toml")).unwrap().parse().unwrap();
+    let model: toml::Table = std::fs::read_to_string(directory.path().join("out/model.toml"))
+        .unwrap()
+        .parse()
+        .unwrap();
     // a random walk of 12 signals of 164 s, seen from some 3 s on: 12 × 50 steps, known to √(2/600) = 6 %; six of these
     let walk = model["gyro"]["processes"][1]["gamma2"].as_float().unwrap();
     assert!((walk / 1e-10 - 1.0).abs() < 0.4, "{walk}");
     assert_eq!(model["provenance"]["estimator"].as_str(), Some("awv"));
     // what is there is not replaced
     let again = choose(directory.path(), &["-o", "out"]).code(2);
-    assert!(said(&again).contains("holds the result of an earlier choose"), "{}", said(&again));
-    let force = ["--estimator", "awv", "--model", "WN+RW", "-o", "out", "--force"];
+    assert!(
+        said(&again).contains("holds the result of an earlier choose"),
+        "{}",
+        said(&again)
+    );
+    let force = [
+        "--estimator",
+        "awv",
+        "--model",
+        "WN+RW",
+        "-o",
+        "out",
+        "--force",
+    ];
     choose(directory.path(), &force).success();
     let replaced = std::fs::read_to_string(directory.path().join("out/ranking.json")).unwrap();
-    assert_eq!(serde_json::from_str::<Value>(&replaced).unwrap()["candidates"].as_array().unwrap().len(), 1);
+    assert_eq!(
+        serde_json::from_str::<Value>(&replaced).unwrap()["candidates"]
+            .as_array()
+            .unwrap()
+            .len(),
+        1
+    );
 }
 
 /// Twelve candidates on one screen, the best of them; with `--verbose` all, with what is believed and covered.
@@ -104,17 +153,35 @@ fn what_is_printed_fits_a_screen() {
         String::from_utf8(output.get_output().stdout.clone()).unwrap()
     };
     let brief = text(&[]);
-    assert!(brief.lines().count() <= 20 && brief.contains("log score (nats)"), "{brief}");
-    assert!(brief.lines().all(|line| line.chars().count() <= 120), "{brief}");
+    assert!(
+        brief.lines().count() <= 20 && brief.contains("log score (nats)"),
+        "{brief}"
+    );
+    assert!(
+        brief.lines().all(|line| line.chars().count() <= 120),
+        "{brief}"
+    );
     assert!(!brief.contains("believed (m)"), "{brief}");
     let whole = text(&["--verbose"]);
-    assert!(whole.contains("believed (m)") && whole.contains("coverage"), "{whole}");
+    assert!(
+        whole.contains("believed (m)") && whole.contains("coverage"),
+        "{whole}"
+    );
 }
 
 #[test]
 fn recordings_shorter_than_the_drive_are_judged_by_covariance_analysis() {
     let directory = recordings("4096", "3");
-    let arguments = ["--estimator", "awv", "--model", "WN,WN+RW", "-j", "1", "--plot", "choice.svg"];
+    let arguments = [
+        "--estimator",
+        "awv",
+        "--model",
+        "WN,WN+RW",
+        "-j",
+        "1",
+        "--plot",
+        "choice.svg",
+    ];
     let output = choose(directory.path(), &arguments).success();
     let shown = String::from_utf8(output.get_output().stdout.clone()).unwrap();
     assert!(
@@ -122,9 +189,15 @@ fn recordings_shorter_than_the_drive_are_judged_by_covariance_analysis() {
         "{shown}"
     );
     let notes = String::from_utf8(output.get_output().stderr.clone()).unwrap();
-    assert!(notes.contains("judged by covariance analysis") && shown.lines().count() <= 20, "{notes}");
     assert!(
-        shown.lines().filter(|line| line.starts_with("  ")).all(|line| line.chars().count() <= 120),
+        notes.contains("judged by covariance analysis") && shown.lines().count() <= 20,
+        "{notes}"
+    );
+    assert!(
+        shown
+            .lines()
+            .filter(|line| line.starts_with("  "))
+            .all(|line| line.chars().count() <= 120),
         "{shown}"
     );
     let svg = std::fs::read_to_string(directory.path().join("choice.svg")).unwrap();
@@ -148,24 +221,56 @@ fn a_warm_up_that_is_left_out_counts_for_nothing() {
         std::fs::write(&first, format!("{header}\n{rows}")).unwrap();
         let arguments = ["--estimator", "awv", "--model", "WN+RW", "-o", out];
         choose(directory.path(), &[&arguments[..], more].concat()).success();
-        let file = std::fs::read_to_string(directory.path().join(out).join("ranking.json")).unwrap();
-        let fold = serde_json::from_str::<Value>(&file).unwrap()["candidates"][0]["folds"][0].clone();
-        [&fold["rmse_m"], &fold["nees"], &fold["believed_m"], &fold["expected"]["nees"]]
-            .map(|v| v.as_f64().unwrap())
+        let file =
+            std::fs::read_to_string(directory.path().join(out).join("ranking.json")).unwrap();
+        let fold =
+            serde_json::from_str::<Value>(&file).unwrap()["candidates"][0]["folds"][0].clone();
+        [
+            &fold["rmse_m"],
+            &fold["nees"],
+            &fold["believed_m"],
+            &fold["expected"]["nees"],
+        ]
+        .map(|v| v.as_f64().unwrap())
     };
     let lines: Vec<&str> = rows.lines().collect();
-    let never: String = lines[WARM_UP..].iter().map(|row| format!("{row}\n")).collect();
-    let begun: String = lines[..WARM_UP].iter().map(|row| warm(row)).chain([never.clone()]).collect();
-    let (left_out, never) = (ranking(begun, "auto", &["--skip-s", "auto"]), ranking(never, "never", &[]));
+    let never: String = lines[WARM_UP..]
+        .iter()
+        .map(|row| format!("{row}\n"))
+        .collect();
+    let begun: String = lines[..WARM_UP]
+        .iter()
+        .map(|row| warm(row))
+        .chain([never.clone()])
+        .collect();
+    let (left_out, never) = (
+        ranking(begun, "auto", &["--skip-s", "auto"]),
+        ranking(never, "never", &[]),
+    );
     // samples are kept from the first one of the file on: the same but for their rounding
-    assert!(left_out.iter().zip(never).all(|(a, b)| (a / b - 1.0).abs() < 1e-8), "{left_out:?} {never:?}");
+    assert!(
+        left_out
+            .iter()
+            .zip(never)
+            .all(|(a, b)| (a / b - 1.0).abs() < 1e-8),
+        "{left_out:?} {never:?}"
+    );
 }
 
 #[test]
 fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
     let directory = recordings("8192", "3");
     let ranking = |threads: &str| {
-        let arguments = ["--estimator", "awv", "--model", "WN+RW", "-j", threads, "-o", threads];
+        let arguments = [
+            "--estimator",
+            "awv",
+            "--model",
+            "WN+RW",
+            "-j",
+            threads,
+            "-o",
+            threads,
+        ];
         choose(directory.path(), &arguments).success();
         std::fs::read(directory.path().join(threads).join("ranking.json")).unwrap()
     };
@@ -180,13 +285,32 @@ fn what_cannot_be_compared_is_refused() {
         assert!(words.iter().all(|word| said.contains(word)), "{said}");
         assert!(!directory.path().join("out/choice").exists());
     };
-    refused(&[], ["2 recordings are too few to leave one out", "hint: each recording is a file"]);
-    refused(&["--estimator", "gmwm"], ["no candidate uses all recordings", "add awv"]);
+    refused(
+        &[],
+        [
+            "2 recordings are too few to leave one out",
+            "hint: each recording is a file",
+        ],
+    );
+    refused(
+        &["--estimator", "gmwm"],
+        ["no candidate uses all recordings", "add awv"],
+    );
     refused(&["--model", "N3"], ["--model", "hint"]);
     refused(&["--inflate", "more"], ["more", "none, tuned, x10"]);
-    let none = ["choose", "r", "--trajectory", "trajectories/figure_eight.toml", "--outage", "none"];
+    let none = [
+        "choose",
+        "r",
+        "--trajectory",
+        "trajectories/figure_eight.toml",
+        "--outage",
+        "none",
+    ];
     let message = said(&nav_sim(directory.path(), &none).code(2));
-    assert!(message.contains("judged at the ends of outages"), "{message}");
+    assert!(
+        message.contains("judged at the ends of outages"),
+        "{message}"
+    );
 }
 
 /// The same folds as a study, which can be spread and resumed: the same models on the same windows, so the same scores.
@@ -211,8 +335,11 @@ calibrate = { recordings = ["r"], leave_out = true, estimators = ["awv"], fit = 
 "#;
     std::fs::write(at.join("study.toml"), study).unwrap();
     for arguments in ["plan", "run --shard 0/2", "run --shard 1/2", "merge"] {
-        let arguments: Vec<&str> =
-            ["batch"].into_iter().chain(arguments.split(' ')).chain(["study.toml", "-o", "s"]).collect();
+        let arguments: Vec<&str> = ["batch"]
+            .into_iter()
+            .chain(arguments.split(' '))
+            .chain(["study.toml", "-o", "s"])
+            .collect();
         nav_sim(at, &arguments).success();
     }
     let output = nav_sim(
@@ -225,11 +352,17 @@ calibrate = { recordings = ["r"], leave_out = true, estimators = ["awv"], fit = 
     let read = |name: &str| -> Value {
         serde_json::from_str(&std::fs::read_to_string(at.join(name)).unwrap()).unwrap()
     };
-    let (chosen, studied) = (read("out/choice/ranking.json"), read("s/results/ranking.json"));
+    let (chosen, studied) = (
+        read("out/choice/ranking.json"),
+        read("s/results/ranking.json"),
+    );
     let studied = &studied["rankings"][0];
     assert_eq!(studied["place"], "drive, default, default, windows");
-    for (a, b) in
-        chosen["candidates"].as_array().unwrap().iter().zip(studied["candidates"].as_array().unwrap())
+    for (a, b) in chosen["candidates"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(studied["candidates"].as_array().unwrap())
     {
         for key in ["index", "log_score", "rmse_m", "nees", "difference", "tied"] {
             assert_eq!(a[key], b[key], "{key}: {a} {b}");
@@ -238,10 +371,26 @@ calibrate = { recordings = ["r"], leave_out = true, estimators = ["awv"], fit = 
     // a recording is left out of nothing that it is not in
     std::fs::write(
         at.join("study.toml"),
-        study.replace("recordings = [\"r\"], each", "recordings = [\"model.csv\"], each"),
+        study.replace(
+            "recordings = [\"r\"], each",
+            "recordings = [\"model.csv\"], each",
+        ),
     )
     .unwrap();
-    nav_sim(at, &["synthesize", "model.toml", "--samples", "12288", "--seed", "2", "-o", "other"]).success();
+    nav_sim(
+        at,
+        &[
+            "synthesize",
+            "model.toml",
+            "--samples",
+            "12288",
+            "--seed",
+            "2",
+            "-o",
+            "other",
+        ],
+    )
+    .success();
     let name = std::fs::read_dir(at.join("other"))
         .unwrap()
         .map(|e| e.unwrap().path())
@@ -264,9 +413,16 @@ fn an_abnormal_recording_judges_no_candidate() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
-    std::fs::copy(root.join("examples/quick_drive.toml"), at.join("drive.toml")).unwrap();
+    std::fs::copy(
+        root.join("examples/quick_drive.toml"),
+        at.join("drive.toml"),
+    )
+    .unwrap();
     std::fs::write(at.join("model.toml"), MODEL).unwrap();
-    let bad = root.join("examples/one_bad_recording.toml").display().to_string();
+    let bad = root
+        .join("examples/one_bad_recording.toml")
+        .display()
+        .to_string();
     let made = "synthesize model.toml --replicates 6 --samples 16384 --seed 1 -o r --contaminate";
     nav_sim(at, &made.split(' ').chain([&*bad]).collect::<Vec<_>>()).success();
     let words = "choose r --trajectory drive.toml --outage 40:59 --seed 1 --estimator awv,dr-awv --model WN+RW --runs 8 -o of_r";
@@ -276,7 +432,14 @@ fn an_abnormal_recording_judges_no_candidate() {
     let ranking: Value = serde_json::from_str(&ranking).unwrap();
     let folds = ranking["candidates"][0]["folds"].as_array().unwrap();
     assert_eq!(folds.len(), 5, "{folds:?} {said}");
-    assert!(said.contains("replicate_4.csv is abnormal, and no judge"), "{said}");
-    let judged = |name: &str| folds.iter().any(|fold| fold["recording"].as_str().unwrap().contains(name));
+    assert!(
+        said.contains("replicate_4.csv is abnormal, and no judge"),
+        "{said}"
+    );
+    let judged = |name: &str| {
+        folds
+            .iter()
+            .any(|fold| fold["recording"].as_str().unwrap().contains(name))
+    };
     assert!(judged("replicate_3") && !judged("replicate_4"), "{folds:?}");
 }

@@ -13,11 +13,17 @@ fn usage_errors_exit_with_2_and_suggest() {
     let output = nav_sim().arg("compar").output().unwrap();
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2));
-    assert!(said.contains("error: unrecognized subcommand") && said.contains("'compare'"), "{said}");
+    assert!(
+        said.contains("error: unrecognized subcommand") && said.contains("'compare'"),
+        "{said}"
+    );
     let alone = nav_sim().output().unwrap();
     let overview = String::from_utf8(alone.stderr).unwrap();
     assert_eq!(alone.status.code(), Some(2));
-    assert!(overview.lines().count() <= 20 && overview.contains("calibrate"), "{overview}");
+    assert!(
+        overview.lines().count() <= 20 && overview.contains("calibrate"),
+        "{overview}"
+    );
 }
 
 #[test]
@@ -31,14 +37,21 @@ fn a_closed_pipe_is_success() {
         .unwrap();
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
-    assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));
+    assert_eq!(
+        (output.status.code(), output.stderr.as_slice()),
+        (Some(0), &b""[..])
+    );
 }
 
 /// Nobody reads what is shown: the files are written all the same, and the exit code is that of the verdict.
 #[test]
 fn a_closed_pipe_loses_neither_files_nor_the_verdict() {
     let place = drive::place_with(drive::DRIVE, drive::MODEL);
-    std::fs::write(place.path().join("rough.toml"), drive::MODEL.replace("1e-9", "1e-4")).unwrap();
+    std::fs::write(
+        place.path().join("rough.toml"),
+        drive::MODEL.replace("1e-9", "1e-4"),
+    )
+    .unwrap();
     let code = |arguments: &str| {
         let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_nav-sim"))
             .current_dir(place.path())
@@ -53,16 +66,31 @@ fn a_closed_pipe_loses_neither_files_nor_the_verdict() {
     let run = "run drive.toml imu.toml --runs 8 --outage 20:50 --seed 3 -o";
     assert_eq!(code(&format!("{run} bad --truth rough.toml")), 3);
     assert_eq!(code(&format!("{run} good")), 0);
-    assert_eq!(code("compare good --reference bad -o comparison.json --plot ratios.svg"), 0);
-    assert_eq!(code("tune imu.toml --truth rough.toml -o tuned.toml --plot tuned.html"), 0);
-    for file in ["comparison.json", "comparison.html", "ratios.svg", "tuned.toml", "tuned.html"] {
+    assert_eq!(
+        code("compare good --reference bad -o comparison.json --plot ratios.svg"),
+        0
+    );
+    assert_eq!(
+        code("tune imu.toml --truth rough.toml -o tuned.toml --plot tuned.html"),
+        0
+    );
+    for file in [
+        "comparison.json",
+        "comparison.html",
+        "ratios.svg",
+        "tuned.toml",
+        "tuned.html",
+    ] {
         assert!(place.path().join(file).exists(), "{file}");
     }
 }
 
 #[test]
 fn a_full_disk_exits_with_1() {
-    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let full = std::fs::File::options()
+        .write(true)
+        .open("/dev/full")
+        .unwrap();
     let program = env!("CARGO_BIN_EXE_nav-sim");
     let output = std::process::Command::new(program)
         .args(["man"])
@@ -82,7 +110,9 @@ fn a_full_disk_exits_with_1() {
 fn what_the_system_refuses_is_said_in_words() {
     let place = tempfile::tempdir().unwrap();
     let at = |name: &str| place.path().join(name);
-    let rows: String = (0..100).map(|k| format!("{:.2},{}\n", 0.01 * f64::from(k), k % 7)).collect();
+    let rows: String = (0..100)
+        .map(|k| format!("{:.2},{}\n", 0.01 * f64::from(k), k % 7))
+        .collect();
     std::fs::write(at("a.csv"), format!("t_s,gyro_x_rad_s\n{rows}")).unwrap();
     std::fs::write(at("cut.csv.gz"), [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 3, 0x8d]).unwrap();
     std::fs::create_dir(at("there")).unwrap();
@@ -92,16 +122,39 @@ fn what_the_system_refuses_is_said_in_words() {
             "a.csv/x.json: a file is where a directory is needed",
             "name another path",
         ),
-        ("wv a.csv -o there", "there: it is a directory, not a file", "name a file"),
-        ("run there there", "there: it is a directory, not a file", "name a file"),
-        ("wv cut.csv.gz", "cut.csv.gz: ", "the file is cut off, or not gzipped"),
+        (
+            "wv a.csv -o there",
+            "there: it is a directory, not a file",
+            "name a file",
+        ),
+        (
+            "run there there",
+            "there: it is a directory, not a file",
+            "name a file",
+        ),
+        (
+            "wv cut.csv.gz",
+            "cut.csv.gz: ",
+            "the file is cut off, or not gzipped",
+        ),
     ] {
         let mut program = nav_sim();
-        let output = program.current_dir(place.path()).args(command.split(' ')).output().unwrap();
+        let output = program
+            .current_dir(place.path())
+            .args(command.split(' '))
+            .output()
+            .unwrap();
         let said = String::from_utf8(output.stderr).unwrap();
         assert!(said.contains(&format!("error: {told}")), "{said}");
-        assert!(said.contains(&format!("hint: {hint}")) && !said.contains("os error"), "{said}");
-        assert_eq!(said.matches("is cut off").count(), usize::from(hint.contains("cut")), "{said}");
+        assert!(
+            said.contains(&format!("hint: {hint}")) && !said.contains("os error"),
+            "{said}"
+        );
+        assert_eq!(
+            said.matches("is cut off").count(),
+            usize::from(hint.contains("cut")),
+            "{said}"
+        );
     }
 }
 
@@ -111,19 +164,33 @@ fn colour_comes_when_asked_for_only() {
         let args = ["--color", color, "man", "nope"];
         String::from_utf8(nav_sim().args(args).output().unwrap().stderr).unwrap()
     };
-    assert!(said("auto").starts_with("error: no command is named \"nope\"\n\nhint: "), "{}", said("auto"));
-    assert!(said("always").starts_with("\u{1b}[1;31merror:\u{1b}[0m no command"), "{}", said("always"));
+    assert!(
+        said("auto").starts_with("error: no command is named \"nope\"\n\nhint: "),
+        "{}",
+        said("auto")
+    );
+    assert!(
+        said("always").starts_with("\u{1b}[1;31merror:\u{1b}[0m no command"),
+        "{}",
+        said("always")
+    );
 }
 
 #[test]
 fn a_directory_that_is_no_run_is_refused_with_advice() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().to_str().unwrap();
-    let output = nav_sim().args(["compare", path, "--reference", path]).output().unwrap();
+    let output = nav_sim()
+        .args(["compare", path, "--reference", path])
+        .output()
+        .unwrap();
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1), "{said}");
     let expected = format!("error: {path}/manifest.json: No such file or directory");
-    assert!(said.starts_with(&expected) && said.contains("\n\nhint: not a finished run directory"), "{said}");
+    assert!(
+        said.starts_with(&expected) && said.contains("\n\nhint: not a finished run directory"),
+        "{said}"
+    );
 }
 
 /// Pipes are read once and serve as files do: what is computed and what is recorded of them is of the same bytes.
@@ -137,14 +204,27 @@ fn inputs_may_be_pipes() {
         "set -e; {program} synthesize <(cat {model}) --samples 512 --seed 1 -o out; \
          {program} wv <(cat out/replicate_1.csv) > piped; {program} wv out/replicate_1.csv > plain"
     );
-    let output =
-        std::process::Command::new("bash").current_dir(&directory).args(["-c", &script]).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = std::process::Command::new("bash")
+        .current_dir(&directory)
+        .args(["-c", &script])
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     let read = |name: &str| std::fs::read_to_string(directory.path().join(name)).unwrap();
     let manifest: serde_json::Value = serde_json::from_str(&read("out/manifest.json")).unwrap();
     let bytes = std::fs::read(&model).unwrap();
-    assert_eq!(manifest["model_blake3"], blake3::hash(&bytes).to_hex().to_string());
-    assert_eq!(read("piped").replace("/dev/fd/63", "out/replicate_1.csv"), read("plain"));
+    assert_eq!(
+        manifest["model_blake3"],
+        blake3::hash(&bytes).to_hex().to_string()
+    );
+    assert_eq!(
+        read("piped").replace("/dev/fd/63", "out/replicate_1.csv"),
+        read("plain")
+    );
 }
 
 #[test]
@@ -152,10 +232,18 @@ fn text_that_is_not_utf_8_is_refused_with_its_line() {
     let directory = tempfile::tempdir().unwrap();
     let model = directory.path().join("a.toml");
     std::fs::write(&model, b"schema = 1\n# \xe9\n").unwrap();
-    let output = nav_sim().arg("synthesize").arg(&model).args(["-o", "x"]).output().unwrap();
+    let output = nav_sim()
+        .arg("synthesize")
+        .arg(&model)
+        .args(["-o", "x"])
+        .output()
+        .unwrap();
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(said.contains("a.toml: line 2 is not text in UTF-8"), "{said}");
+    assert!(
+        said.contains("a.toml: line 2 is not text in UTF-8"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -166,7 +254,10 @@ fn the_version_says_more_if_asked() {
         String::from_utf8(output.stdout).unwrap()
     };
     let short = format!("nav-sim {}\n", env!("CARGO_PKG_VERSION"));
-    assert_eq!([said(&["--version"]), said(&["-V"])], [short.clone(), short]);
+    assert_eq!(
+        [said(&["--version"]), said(&["-V"])],
+        [short.clone(), short]
+    );
     for words in [&["--version", "-v"][..], &["--verbose", "-V"], &["-vV"]] {
         let long = said(words);
         assert!(
@@ -182,19 +273,43 @@ fn the_version_says_more_if_asked() {
 #[test]
 fn negative_values_are_refused_in_the_words_of_their_option() {
     for (arguments, reason) in [
-        ("run a.toml b.toml --seed -1", "not a whole number from 0 to"),
-        ("run a.toml b.toml --runs -3", "\"-3\" is not a count\n\nhint: a whole number"),
-        ("compare a --reference b --format latex", "compare has --table csv, latex and markdown"),
+        (
+            "run a.toml b.toml --seed -1",
+            "not a whole number from 0 to",
+        ),
+        (
+            "run a.toml b.toml --runs -3",
+            "\"-3\" is not a count\n\nhint: a whole number",
+        ),
+        (
+            "compare a --reference b --format latex",
+            "compare has --table csv, latex and markdown",
+        ),
         ("calibrate a --skip-s -5", "not a finite number ≥ 0"),
-        ("design a --recordings 3 --hours -2", "not a finite number > 0"),
-        ("require a.toml --outage 60 --p95-m -3", "not a finite number > 0"),
-        ("run a.toml b.toml --turn-on-bias -0.3,0.01", "expected two numbers ≥ 0"),
-        ("datasheet --arw -0.15deg/h", "does not begin with a number > 0"),
+        (
+            "design a --recordings 3 --hours -2",
+            "not a finite number > 0",
+        ),
+        (
+            "require a.toml --outage 60 --p95-m -3",
+            "not a finite number > 0",
+        ),
+        (
+            "run a.toml b.toml --turn-on-bias -0.3,0.01",
+            "expected two numbers ≥ 0",
+        ),
+        (
+            "datasheet --arw -0.15deg/h",
+            "does not begin with a number > 0",
+        ),
     ] {
         let output = nav_sim().args(arguments.split(' ')).output().unwrap();
         let said = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2), "{arguments}: {said}");
-        assert!(said.contains(reason) && !said.contains("tip:"), "{arguments}: {said}");
+        assert!(
+            said.contains(reason) && !said.contains("tip:"),
+            "{arguments}: {said}"
+        );
     }
 }
 
@@ -204,16 +319,38 @@ fn json_is_spoken_by_commands_that_write_files() {
     let place = tempfile::tempdir().unwrap();
     let json = |arguments: &str| -> serde_json::Value {
         let arguments = arguments.split(' ').chain(["--format", "json"]);
-        let output = nav_sim().current_dir(place.path()).args(arguments).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let output = nav_sim()
+            .current_dir(place.path())
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         serde_json::from_slice(&output.stdout).unwrap()
     };
     let made = json("init .");
-    assert!(made["written"].as_array().unwrap().iter().any(|f| f == "./imu.toml"), "{made}");
+    assert!(
+        made["written"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|f| f == "./imu.toml"),
+        "{made}"
+    );
     assert_eq!(json("init .")["kept"], made["written"]);
     let drive = "trajectories/figure_eight.toml";
-    for (command, file) in [("plot", "eight.svg"), ("convert", "eight.csv"), ("generate", "rows.csv")] {
-        assert_eq!(json(&format!("trajectory {command} {drive} -o {file}"))["written"][0], file);
+    for (command, file) in [
+        ("plot", "eight.svg"),
+        ("convert", "eight.csv"),
+        ("generate", "rows.csv"),
+    ] {
+        assert_eq!(
+            json(&format!("trajectory {command} {drive} -o {file}"))["written"][0],
+            file
+        );
     }
     let units = json("datasheet --list");
     assert!(

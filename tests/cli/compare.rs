@@ -15,7 +15,11 @@ const RUNS: u32 = 20;
 /// An input with the hash of its contents.
 fn input(role: &str, path: &str, contents: &[u8]) -> Input {
     let blake3 = blake3::hash(contents).to_hex().to_string();
-    Input { role: role.to_owned(), path: path.to_owned(), blake3 }
+    Input {
+        role: role.to_owned(),
+        path: path.to_owned(),
+        blake3,
+    }
 }
 
 fn result(factor: f64) -> RunResult {
@@ -62,15 +66,24 @@ fn result(factor: f64) -> RunResult {
 
 fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest)) {
     let result = result(factor);
-    let outage = Some(vec![Outage { start_s: 4.0, end_s: 8.0 }]);
+    let outage = Some(vec![Outage {
+        start_s: 4.0,
+        end_s: 8.0,
+    }]);
     let mut manifest = Manifest {
         schema_version: Manifest::SCHEMA_VERSION,
         version: "0".into(),
         command: vec![],
         seed: Some(7),
-        configuration: Scenario { outage, ..Scenario::default() },
+        configuration: Scenario {
+            outage,
+            ..Scenario::default()
+        },
         spread: false,
-        inputs: vec![input("trajectory", "t.csv", b"t"), input("truth", "m.toml", b"m")],
+        inputs: vec![
+            input("trajectory", "t.csv", b"t"),
+            input("truth", "m.toml", b"m"),
+        ],
         outputs: Default::default(),
         model: ModelNote::default(),
         threads: 1,
@@ -79,7 +92,11 @@ fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest)) {
         throughput_epochs_per_s: 1.0,
     };
     change(&mut manifest);
-    let answer = RunAnswer::new(Navigation::of_runs(result, 7), manifest, TrajectorySeries::default());
+    let answer = RunAnswer::new(
+        Navigation::of_runs(result, 7),
+        manifest,
+        TrajectorySeries::default(),
+    );
     answer.write(directory).unwrap();
 }
 
@@ -97,7 +114,11 @@ fn compare(directory: &Path, arguments: &[&str]) -> Ran {
         .output()
         .unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    Ran { code: output.status.code().unwrap(), stdout: text(output.stdout), stderr: text(output.stderr) }
+    Ran {
+        code: output.status.code().unwrap(),
+        stdout: text(output.stdout),
+        stderr: text(output.stderr),
+    }
 }
 
 #[test]
@@ -106,7 +127,10 @@ fn ratios_are_those_that_were_made() {
     write(&directory.path().join("I_awv"), 1.0, |_| {});
     write(&directory.path().join("II_awv"), 1.75, |_| {});
     write(&directory.path().join("II_sr-awv"), 0.9, |_| {});
-    let ran = compare(directory.path(), &["I_awv", "II_awv", "II_sr-awv", "--reference", "I_awv"]);
+    let ran = compare(
+        directory.path(),
+        &["I_awv", "II_awv", "II_sr-awv", "--reference", "I_awv"],
+    );
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     for cell in ["+75.00", "-10.00", "SR-AWV (%)", "reference", "4–8 s"] {
         assert!(ran.stdout.contains(cell), "{cell} in\n{}", ran.stdout);
@@ -116,12 +140,29 @@ fn ratios_are_those_that_were_made() {
     let cost = "against I_awv: AWV +75 %, SR-AWV -10 % of the uncertainty of East position";
     assert_eq!(lines.next(), Some(cost), "{}", ran.stdout);
     let verdict = lines.next().unwrap();
-    let words = ["1 of 3 filters underconfident, most: II_awv (NEES 9.00, 0.", "2 of 3 filters undecided ("];
-    assert!(words.iter().all(|words| ran.stdout.contains(words)), "{verdict}");
-    assert!(ran.stdout.lines().count() <= 20 && ran.stdout.lines().all(|line| line.chars().count() <= 120));
+    let words = [
+        "1 of 3 filters underconfident, most: II_awv (NEES 9.00, 0.",
+        "2 of 3 filters undecided (",
+    ];
+    assert!(
+        words.iter().all(|words| ran.stdout.contains(words)),
+        "{verdict}"
+    );
+    assert!(
+        ran.stdout.lines().count() <= 20
+            && ran.stdout.lines().all(|line| line.chars().count() <= 120)
+    );
     // the same table for other programs, outages by their times
     let table = |form| {
-        let runs = ["I_awv", "II_awv", "II_sr-awv", "--reference", "I_awv", "--state", "pos_e_m"];
+        let runs = [
+            "I_awv",
+            "II_awv",
+            "II_sr-awv",
+            "--reference",
+            "I_awv",
+            "--state",
+            "pos_e_m",
+        ];
         compare(directory.path(), &[&runs[..], &["--table", form]].concat()).stdout
     };
     let csv = table("csv");
@@ -135,32 +176,68 @@ fn ratios_are_those_that_were_made() {
                 .to_owned()
         )
     );
-    assert_eq!(rows[1], ["I", "AWV", "I_awv", "I_awv", "4", "8", "pos_e_m", "", "", "", "", ""]);
-    assert_eq!(rows[2][..7], ["II", "AWV", "II_awv", "I_awv", "4", "8", "pos_e_m"]);
+    assert_eq!(
+        rows[1],
+        [
+            "I", "AWV", "I_awv", "I_awv", "4", "8", "pos_e_m", "", "", "", "", ""
+        ]
+    );
+    assert_eq!(
+        rows[2][..7],
+        ["II", "AWV", "II_awv", "I_awv", "4", "8", "pos_e_m"]
+    );
     let number = |cell: &str| cell.parse::<f64>().unwrap();
     for (row, pct) in [(&rows[2], 75.0), (&rows[3], -10.0)] {
         assert!(
             (number(row[7]) - pct).abs() < 1e-9 && (number(row[11]) - f64::abs(pct)).abs() < 1e-9,
             "{csv}"
         );
-        assert!(number(row[8]) <= number(row[7]) && number(row[7]) <= number(row[9]), "{csv}");
+        assert!(
+            number(row[8]) <= number(row[7]) && number(row[7]) <= number(row[9]),
+            "{csv}"
+        );
         assert_eq!(row[10], "", "{csv}");
     }
     let latex = table("latex");
-    assert!(latex.starts_with("\\begin{tabular}{lrrr}") && latex.contains("II & 4--8 s & +75.00"), "{latex}");
-    assert!(latex.contains("& $-$10.00 ") && latex.contains("East SR-AWV (\\%)"), "{latex}");
+    assert!(
+        latex.starts_with("\\begin{tabular}{lrrr}") && latex.contains("II & 4--8 s & +75.00"),
+        "{latex}"
+    );
+    assert!(
+        latex.contains("& $-$10.00 ") && latex.contains("East SR-AWV (\\%)"),
+        "{latex}"
+    );
     let text = std::fs::read_to_string(directory.path().join("comparison.json")).unwrap();
     let json: serde_json::Value = serde_json::from_str(&text).unwrap();
-    assert_eq!((&json["reference"], &json["paired"]), (&"I_awv".into(), &true.into()));
-    let kinds: Vec<&str> =
-        json["verdicts"].as_array().unwrap().iter().map(|v| v["kind"].as_str().unwrap()).collect();
+    assert_eq!(
+        (&json["reference"], &json["paired"]),
+        (&"I_awv".into(), &true.into())
+    );
+    let kinds: Vec<&str> = json["verdicts"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|v| v["kind"].as_str().unwrap())
+        .collect();
     assert_eq!(kinds, ["undecided", "underconfident", "undecided"]);
-    let row =
-        json["rows"].as_array().unwrap().iter().find(|r| r["run"] == "II_awv" && r["state"] == "roll_deg");
+    let row = json["rows"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|r| r["run"] == "II_awv" && r["state"] == "roll_deg");
     let row = row.unwrap();
-    assert!((row["ratio_error_pct"].as_f64().unwrap() - 75.0).abs() < 1e-9, "{row}");
-    assert!((row["ci95_pct"][1].as_f64().unwrap() - 75.0).abs() < 1e-6, "{row}");
-    assert!(row["rmse_end_ratio_error_pct"].as_f64().unwrap().abs() < 1e-9, "{row}");
+    assert!(
+        (row["ratio_error_pct"].as_f64().unwrap() - 75.0).abs() < 1e-9,
+        "{row}"
+    );
+    assert!(
+        (row["ci95_pct"][1].as_f64().unwrap() - 75.0).abs() < 1e-6,
+        "{row}"
+    );
+    assert!(
+        row["rmse_end_ratio_error_pct"].as_f64().unwrap().abs() < 1e-9,
+        "{row}"
+    );
 }
 
 /// The verdict is that of the run's own directory: covariance analysis may know more than these runs show.
@@ -177,12 +254,24 @@ fn verdicts_are_those_of_the_directories() {
     let manifest = directory.path().join("b/manifest.json");
     let mut json: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(&manifest).unwrap()).unwrap();
-    json["outputs"].as_object_mut().unwrap().remove("summary.json"); // which would not be what was written
+    json["outputs"]
+        .as_object_mut()
+        .unwrap()
+        .remove("summary.json"); // which would not be what was written
     std::fs::write(manifest, json.to_string()).unwrap();
     let ran = compare(directory.path(), &["a", "b", "--reference", "a"]);
     let verdict = "1 of 2 filters overconfident, most: b (NEES 9.00, ";
-    assert!(ran.stdout.contains(verdict), "{}\n{}", ran.stdout, ran.stderr);
-    assert!(ran.stdout.contains("1 of 2 filters undecided ("), "{}", ran.stdout);
+    assert!(
+        ran.stdout.contains(verdict),
+        "{}\n{}",
+        ran.stdout,
+        ran.stderr
+    );
+    assert!(
+        ran.stdout.contains("1 of 2 filters undecided ("),
+        "{}",
+        ran.stdout
+    );
 }
 
 /// A file is replaced only if it is a comparison.
@@ -195,7 +284,9 @@ fn a_file_that_is_no_comparison_is_left_alone() {
     let ran = compare(directory.path(), &["a", "--reference", "a"]);
     assert_eq!(ran.code, 2);
     assert!(
-        ran.stderr.starts_with("error: comparison.json is not of this command: it is not replaced\n\nhint: "),
+        ran.stderr.starts_with(
+            "error: comparison.json is not of this command: it is not replaced\n\nhint: "
+        ),
         "{}",
         ran.stderr
     );
@@ -218,37 +309,70 @@ fn many_runs_in_deep_directories_are_readable() {
         .flat_map(|scenario| ["awv", "sr-awv", "dr-awv"].map(|e| format!("{deep}/{scenario}_{e}")))
         .collect();
     for (k, name) in (0_u32..).zip(&names) {
-        write(&directory.path().join(name), 1.0 + 0.01 * f64::from(k), |_| {});
+        write(
+            &directory.path().join(name),
+            1.0 + 0.01 * f64::from(k),
+            |_| {},
+        );
     }
-    let all: Vec<&str> = names.iter().map(String::as_str).chain(["--reference", names[0].as_str()]).collect();
+    let all: Vec<&str> = names
+        .iter()
+        .map(String::as_str)
+        .chain(["--reference", names[0].as_str()])
+        .collect();
     let ran = compare(directory.path(), &all);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    assert!(ran.stdout.lines().all(|line| line.chars().count() <= 120), "{}", ran.stdout);
+    assert!(
+        ran.stdout.lines().all(|line| line.chars().count() <= 120),
+        "{}",
+        ran.stdout
+    );
     assert!(ran.stdout.lines().count() <= 20, "{}", ran.stdout);
     for word in ["AWV (%)", "SR-AWV (%)", "DR-AWV (%)", "East", "roll", "III"] {
-        assert!(ran.stdout.contains(&format!("  {word}")), "{word}: {}", ran.stdout);
+        assert!(
+            ran.stdout.contains(&format!("  {word}")),
+            "{word}: {}",
+            ran.stdout
+        );
     }
-    assert!(!ran.stdout.lines().any(|line| line.contains(&format!("{deep}/II_"))), "{}", ran.stdout);
+    assert!(
+        !ran.stdout
+            .lines()
+            .any(|line| line.contains(&format!("{deep}/II_"))),
+        "{}",
+        ran.stdout
+    );
     let (a, b) = (format!("{deep}/x/drive"), format!("{deep}/y/drive"));
     for (name, factor) in [(&a, 1.0), (&b, 1.1)] {
         write(&directory.path().join(name), factor, |_| {});
     }
-    let ran = compare(directory.path(), &[&a, &b, "--reference", &names[0], "--plot", "c.svg"]);
+    let ran = compare(
+        directory.path(),
+        &[&a, &b, "--reference", &names[0], "--plot", "c.svg"],
+    );
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     let svg = std::fs::read_to_string(directory.path().join("c.svg")).unwrap();
-    assert!(svg.contains(">x/drive<") && svg.contains(">y/drive<") && !svg.contains(">a/very"), "{svg}");
+    assert!(
+        svg.contains(">x/drive<") && svg.contains(">y/drive<") && !svg.contains(">a/very"),
+        "{svg}"
+    );
 }
 
 #[test]
 fn another_trajectory_or_other_outages_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     write(&directory.path().join("a"), 1.0, |_| {});
-    write(&directory.path().join("b"), 1.0, |m| m.inputs[0] = input("trajectory", "u.csv", b"u"));
-    write(&directory.path().join("c"), 1.0, |m| m.configuration.outage = Some(vec![]));
+    write(&directory.path().join("b"), 1.0, |m| {
+        m.inputs[0] = input("trajectory", "u.csv", b"u")
+    });
+    write(&directory.path().join("c"), 1.0, |m| {
+        m.configuration.outage = Some(vec![])
+    });
     let ran = compare(directory.path(), &["b", "--reference", "a"]);
     assert_eq!(ran.code, 2);
     assert!(
-        ran.stderr.starts_with("error: b: not the trajectory of the reference\n\nhint: "),
+        ran.stderr
+            .starts_with("error: b: not the trajectory of the reference\n\nhint: "),
         "{}",
         ran.stderr
     );
@@ -268,13 +392,29 @@ fn another_seed_or_truth_is_said_and_unpaired() {
         m.inputs.truncate(1);
     });
     write(&directory.path().join("c"), 1.2, |_| {});
-    let ran = compare(directory.path(), &["b", "c", "--reference", "a", "--format", "json"]);
+    let ran = compare(
+        directory.path(),
+        &["b", "c", "--reference", "a", "--format", "json"],
+    );
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    assert!(ran.stderr.contains("warning: b: the seed is not that of the reference"), "{}", ran.stderr);
-    assert!(ran.stderr.contains("warning: b: what makes the errors is not"), "{}", ran.stderr);
+    assert!(
+        ran.stderr
+            .contains("warning: b: the seed is not that of the reference"),
+        "{}",
+        ran.stderr
+    );
+    assert!(
+        ran.stderr
+            .contains("warning: b: what makes the errors is not"),
+        "{}",
+        ran.stderr
+    );
     let json: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
     let ci = &json["rows"][0]["ci95_pct"];
-    assert!(ci[1].as_f64().unwrap() - ci[0].as_f64().unwrap() > 5.0, "{ci}");
+    assert!(
+        ci[1].as_f64().unwrap() - ci[0].as_f64().unwrap() > 5.0,
+        "{ci}"
+    );
     assert_eq!(json["paired"], false);
     // the other run is paired all the same
     for row in json["rows"].as_array().unwrap() {
@@ -287,7 +427,9 @@ fn a_damaged_table_is_refused_by_file_line_and_column() {
     let directory = tempfile::tempdir().unwrap();
     write(&directory.path().join("a"), 1.0, |_| {});
     let path = directory.path().join("a/epochs.csv");
-    let text = std::fs::read_to_string(&path).unwrap().replacen("\n3,", "\nthree,", 1);
+    let text = std::fs::read_to_string(&path)
+        .unwrap()
+        .replacen("\n3,", "\nthree,", 1);
     std::fs::write(&path, text).unwrap();
     let ran = compare(directory.path(), &["a", "--reference", "a"]);
     assert_eq!(ran.code, 2);
@@ -300,8 +442,10 @@ fn a_damaged_table_is_refused_by_file_line_and_column() {
 fn a_table_that_was_changed_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     write(&directory.path().join("a"), 1.0, |_| {});
-    let (epochs, manifest) =
-        (directory.path().join("a/epochs.csv"), directory.path().join("a/manifest.json"));
+    let (epochs, manifest) = (
+        directory.path().join("a/epochs.csv"),
+        directory.path().join("a/manifest.json"),
+    );
     let text = std::fs::read_to_string(&epochs).unwrap();
     let row = text.lines().nth(6).unwrap();
     let changed = |cell: &str| {
@@ -312,7 +456,11 @@ fn a_table_that_was_changed_is_refused() {
     let refused = |expected: &str| {
         let ran = compare(directory.path(), &["a", "--reference", "a"]);
         assert_eq!(ran.code, 2);
-        assert!(ran.stderr.starts_with(expected) && ran.stderr.contains("\n\nhint: "), "{}", ran.stderr);
+        assert!(
+            ran.stderr.starts_with(expected) && ran.stderr.contains("\n\nhint: "),
+            "{}",
+            ran.stderr
+        );
         assert!(!directory.path().join("comparison.json").exists());
     };
     std::fs::write(&epochs, changed("nan")).unwrap();
@@ -321,7 +469,16 @@ fn a_table_that_was_changed_is_refused() {
     refused("error: a/epochs.csv: is not what its manifest.json says");
     let mut old: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(&manifest).unwrap()).unwrap();
-    assert_eq!(old.as_object_mut().unwrap().remove("outputs").unwrap().as_object().unwrap().len(), 4);
+    assert_eq!(
+        old.as_object_mut()
+            .unwrap()
+            .remove("outputs")
+            .unwrap()
+            .as_object()
+            .unwrap()
+            .len(),
+        4
+    );
     std::fs::write(&manifest, old.to_string()).unwrap();
     let ran = compare(directory.path(), &["a", "--reference", "a"]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
@@ -330,7 +487,15 @@ fn a_table_that_was_changed_is_refused() {
 #[test]
 fn an_unknown_state_is_refused_with_the_known_ones() {
     let directory = tempfile::tempdir().unwrap();
-    let ran = compare(directory.path(), &["a", "--reference", "a", "--state", "east"]);
+    let ran = compare(
+        directory.path(),
+        &["a", "--reference", "a", "--state", "east"],
+    );
     assert_eq!(ran.code, 2);
-    assert!(ran.stderr.contains("--state east is no state\n\nhint: one of pos_n_m, "), "{}", ran.stderr);
+    assert!(
+        ran.stderr
+            .contains("--state east is no state\n\nhint: one of pos_n_m, "),
+        "{}",
+        ran.stderr
+    );
 }

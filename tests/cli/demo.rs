@@ -16,7 +16,12 @@ fn demo(out: &Path, more: &[&str]) -> Command {
         "1",
         "-o",
     ]);
-    command.arg(out).args(more).arg("--no-progress").stdout(Stdio::null()).stderr(Stdio::piped());
+    command
+        .arg(out)
+        .args(more)
+        .arg("--no-progress")
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped());
     command
 }
 
@@ -24,20 +29,31 @@ fn demo(out: &Path, more: &[&str]) -> Command {
 fn progress(out: &Path) -> (u64, u64) {
     let text = std::fs::read_to_string(out.join("demo.json")).unwrap_or_default();
     let progress: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
-    ["commands_done", "seed"].map(|key| progress[key].as_u64().unwrap_or(0)).into()
+    ["commands_done", "seed"]
+        .map(|key| progress[key].as_u64().unwrap_or(0))
+        .into()
 }
 
 /// Ended as soon as `until` finds what it waits for (by SIGTERM: tests may be started to ignore Ctrl-C); what was said after that.
 fn interrupted(mut child: Child, until: impl Fn(&mut Child) -> bool) -> String {
     while !until(&mut child) {
-        assert!(child.try_wait().unwrap().is_none(), "it ended before it was interrupted");
+        assert!(
+            child.try_wait().unwrap().is_none(),
+            "it ended before it was interrupted"
+        );
         std::thread::sleep(Duration::from_millis(20));
     }
-    Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
+    Command::new("kill")
+        .args(["-TERM", &child.id().to_string()])
+        .status()
+        .unwrap();
     let ended = child.wait_with_output().unwrap();
     let said = String::from_utf8(ended.stderr).unwrap();
     assert_eq!(ended.status.code(), Some(128 + 15), "{said}");
-    assert!(said.ends_with("hint: the same command goes on where it was\n"), "{said}");
+    assert!(
+        said.ends_with("hint: the same command goes on where it was\n"),
+        "{said}"
+    );
     said
 }
 
@@ -63,19 +79,33 @@ fn an_interrupted_demo_goes_on() {
 
     let refused = demo(&out, &["--seed", "1"]).output().unwrap();
     let said = String::from_utf8(refused.stderr).unwrap();
-    assert!(refused.status.code() == Some(2) && said.contains("is of a demo of another seed"), "{said}");
+    assert!(
+        refused.status.code() == Some(2) && said.contains("is of a demo of another seed"),
+        "{said}"
+    );
 
     // four syntheses, and a calibration, whose models have names of their own
-    let said = interrupted(demo(&out, &["--verbose"]).spawn().unwrap(), |_| progress(&out).0 >= 5);
-    assert!(said.contains(&format!("{done} of 17 commands are done, seed {seed}\n")), "{said}");
+    let said = interrupted(demo(&out, &["--verbose"]).spawn().unwrap(), |_| {
+        progress(&out).0 >= 5
+    });
+    assert!(
+        said.contains(&format!("{done} of 17 commands are done, seed {seed}\n")),
+        "{said}"
+    );
     let commands: Vec<&str> = said.lines().filter(|line| line.starts_with("$ ")).collect();
-    assert!(!commands.is_empty() && !commands.iter().any(|c| c.ends_with("/I")), "{said}");
+    assert!(
+        !commands.is_empty() && !commands.iter().any(|c| c.ends_with("/I")),
+        "{said}"
+    );
 
     let (done, same) = progress(&out);
     assert!((5..17).contains(&done) && same == seed, "{done} {same}");
     interrupted(demo(&out, &["--verbose"]).spawn().unwrap(), |child| {
         let said = line(child);
-        assert!(!said.starts_with("$ ") || said.contains("/models/II.toml"), "{said}");
+        assert!(
+            !said.starts_with("$ ") || said.contains("/models/II.toml"),
+            "{said}"
+        );
         said.starts_with("$ ")
     });
     assert_eq!(progress(&out), (done, seed));
@@ -88,10 +118,18 @@ fn a_demo_that_cannot_work_makes_nothing() {
     let refused = |more: &[&str], said: &str| {
         let out = dir.path().join("out");
         let mut command = Command::new(env!("CARGO_BIN_EXE_nav-sim"));
-        command.current_dir(env!("CARGO_MANIFEST_DIR")).arg("demo").args(more).arg("-o").arg(&out);
+        command
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .arg("demo")
+            .args(more)
+            .arg("-o")
+            .arg(&out);
         let ended = command.output().unwrap();
         let stderr = String::from_utf8(ended.stderr).unwrap();
-        assert!(ended.status.code() == Some(2) && stderr.contains(said), "{stderr}");
+        assert!(
+            ended.status.code() == Some(2) && stderr.contains(said),
+            "{stderr}"
+        );
         assert!(!out.exists());
     };
     refused(&["--samples", "89999"], "at least --samples 90000");
@@ -108,7 +146,10 @@ fn a_demo_replaces_no_file_of_others() {
         std::fs::write(out.join(name), "mine").unwrap();
         let ran = demo(&out, &["--force"]).output().unwrap();
         let said = String::from_utf8(ran.stderr).unwrap();
-        assert!(ran.status.code() == Some(2) && said.contains("is not of this command"), "{name}: {said}");
+        assert!(
+            ran.status.code() == Some(2) && said.contains("is not of this command"),
+            "{name}: {said}"
+        );
         assert_eq!(std::fs::read_to_string(out.join(name)).unwrap(), "mine");
         assert!(!out.join("I").exists());
     }

@@ -50,8 +50,10 @@ fn a_program_calibrates_a_directory_and_runs() {
         .current_dir(root)
         .output();
     assert!(made.unwrap().status.success());
-    let drift =
-        library::drift(&place.path().join("recordings"), &root.join("trajectories/land_vehicle.toml"));
+    let drift = library::drift(
+        &place.path().join("recordings"),
+        &root.join("trajectories/land_vehicle.toml"),
+    );
     assert!((0.1..1000.0).contains(&drift.unwrap()));
 }
 
@@ -70,9 +72,15 @@ fn examples_are_short() {
 #[test]
 fn the_walk_through_is_what_the_demo_prints() {
     let script = include_str!("../../examples/paper_section5.sh");
-    let commands: Vec<&str> = script.lines().filter(|l| l.starts_with("nav-sim ")).collect();
+    let commands: Vec<&str> = script
+        .lines()
+        .filter(|l| l.starts_with("nav-sim "))
+        .collect();
     let arguments = ["demo", "--seed", "1", "--print", "-o", "out/paper_section5"];
-    let output = Command::new(env!("CARGO_BIN_EXE_nav-sim")).args(arguments).output().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_nav-sim"))
+        .args(arguments)
+        .output()
+        .unwrap();
     let printed = String::from_utf8(output.stdout).unwrap();
     assert_eq!(commands, printed.lines().collect::<Vec<_>>());
 }
@@ -82,13 +90,27 @@ fn the_walk_through_is_what_the_demo_prints() {
 fn the_example_scenario_says_the_defaults() {
     let text = include_str!("../../examples/scenario.toml");
     let uncomment = |line: &str| {
-        let bare = line.trim_start_matches("# ").split(" #").next().unwrap().trim_end().to_owned();
-        let is_toml = bare.starts_with('[') || (bare.contains(" = ") && !bare.contains("outage = []"));
-        if is_toml && !bare.contains("  ") { format!("{bare}\n") } else { String::new() }
+        let bare = line
+            .trim_start_matches("# ")
+            .split(" #")
+            .next()
+            .unwrap()
+            .trim_end()
+            .to_owned();
+        let is_toml =
+            bare.starts_with('[') || (bare.contains(" = ") && !bare.contains("outage = []"));
+        if is_toml && !bare.contains("  ") {
+            format!("{bare}\n")
+        } else {
+            String::new()
+        }
     };
     let said: Scenario = toml::from_str(&text.lines().map(uncomment).collect::<String>()).unwrap();
     let outages = Some(Outage::PAPER.to_vec());
-    let mut expected = Scenario { outage: outages, ..Scenario::default() };
+    let mut expected = Scenario {
+        outage: outages,
+        ..Scenario::default()
+    };
     expected.run.seed = Some(1);
     // without the key there is none: what stands there is a value of use
     assert!(said.filter.nis_gate.is_some() && said.baro.is_some());
@@ -99,16 +121,23 @@ fn the_example_scenario_says_the_defaults() {
     of.temperature.clone_from(&from.temperature);
     of.output.clone_from(&from.output);
     assert_eq!(said, expected);
-    assert_eq!(toml::from_str::<Scenario>(text).unwrap(), Scenario::default());
+    assert_eq!(
+        toml::from_str::<Scenario>(text).unwrap(),
+        Scenario::default()
+    );
 }
 
 /// Every command of the demo that draws numbers is given the seed.
 #[test]
 fn the_demo_draws_nothing_that_its_seed_does_not_decide() {
-    let printed =
-        assert_cmd::Command::cargo_bin("nav-sim").unwrap().args(["demo", "--seed", "7", "--print"]).output();
+    let printed = assert_cmd::Command::cargo_bin("nav-sim")
+        .unwrap()
+        .args(["demo", "--seed", "7", "--print"])
+        .output();
     let printed = String::from_utf8(printed.unwrap().stdout).unwrap();
-    let drawing = printed.lines().filter(|l| !l.starts_with("nav-sim compare"));
+    let drawing = printed
+        .lines()
+        .filter(|l| !l.starts_with("nav-sim compare"));
     assert_eq!(drawing.clone().count(), 16);
     assert!(drawing.clone().all(|l| l.contains(" --seed ")), "{printed}");
 }

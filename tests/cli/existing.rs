@@ -10,7 +10,11 @@ segment = [{ kind = \"straight\", duration_s = 5 }, { kind = \"accelerate\", to_
 
 fn refused(ran: &Ran, what: &str) {
     assert_eq!(ran.code, 2, "{what}: {}", ran.stderr);
-    assert!(ran.stderr.contains(what) && ran.stderr.contains("--force"), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains(what) && ran.stderr.contains("--force"),
+        "{}",
+        ran.stderr
+    );
 }
 
 /// Each command twice, then as it makes something else.
@@ -18,24 +22,65 @@ fn refused(ran: &Ran, what: &str) {
 fn files_take_the_place_of_their_kind_and_directories_that_of_the_same_run() {
     let place = place_with(DRIVE, MODEL);
     let at = |name: &str| place.path().join(name);
-    done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
-    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o log");
-    done(place.path(), "run drive.toml imu.toml --runs 2 --outage none --seed 1 -o reference");
+    done(
+        place.path(),
+        "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec",
+    );
+    done(
+        place.path(),
+        "trajectory record drive.toml imu.toml --seed 3 -o log",
+    );
+    done(
+        place.path(),
+        "run drive.toml imu.toml --runs 2 --outage none --seed 1 -o reference",
+    );
     let calibrate = "calibrate rec --model WN+RW --bootstrap 0 -o out.toml";
     let fuse = "fuse log/imu.csv log/gnss.csv imu.toml --initial log/initial.toml -o fused";
     for (command, change, file) in [
-        ("run drive.toml imu.toml --runs 2 --outage none --seed 1 -o run", "--seed 2", "run/summary.json"),
+        (
+            "run drive.toml imu.toml --runs 2 --outage none --seed 1 -o run",
+            "--seed 2",
+            "run/summary.json",
+        ),
         (fuse, "--lever-arm 1,0,0", "fused/solution.csv"),
-        ("synthesize imu.toml --samples 64 --seed 1 -o made", "--samples 65", "made/replicate_1.csv"),
-        ("trajectory record drive.toml imu.toml --seed 1 -o again", "--seed 2", "again/imu.csv"),
+        (
+            "synthesize imu.toml --samples 64 --seed 1 -o made",
+            "--samples 65",
+            "made/replicate_1.csv",
+        ),
+        (
+            "trajectory record drive.toml imu.toml --seed 1 -o again",
+            "--seed 2",
+            "again/imu.csv",
+        ),
         (calibrate, "--weighting edof", "out.toml"),
         (calibrate, "--weighting ci", "out.svg"),
-        ("export imu.toml --target kalibr -o imu.yaml", "--policy envelope", "imu.yaml"),
-        ("datasheet --unit stim300 -o sheet.toml", "--rate-hz 200", "sheet.toml"),
-        ("compare run --reference reference", "--reference run", "comparison.json"),
+        (
+            "export imu.toml --target kalibr -o imu.yaml",
+            "--policy envelope",
+            "imu.yaml",
+        ),
+        (
+            "datasheet --unit stim300 -o sheet.toml",
+            "--rate-hz 200",
+            "sheet.toml",
+        ),
+        (
+            "compare run --reference reference",
+            "--reference run",
+            "comparison.json",
+        ),
         ("wv rec -o wv.json --plot wv.html", "--scales 5", "wv.json"),
-        ("trajectory convert drive.toml --rate-hz 1 -o drive.csv", "--rate-hz 2", "drive.csv"),
-        ("trajectory generate drive.toml --rate-hz 1 -o drive.csv.gz", "--rate-hz 2", "drive.csv.gz"),
+        (
+            "trajectory convert drive.toml --rate-hz 1 -o drive.csv",
+            "--rate-hz 2",
+            "drive.csv",
+        ),
+        (
+            "trajectory generate drive.toml --rate-hz 1 -o drive.csv.gz",
+            "--rate-hz 2",
+            "drive.csv.gz",
+        ),
     ] {
         for _ in 0..2 {
             let ran = plain(place.path(), command);
@@ -47,7 +92,8 @@ fn files_take_the_place_of_their_kind_and_directories_that_of_the_same_run() {
             Some((start, rest)) => {
                 format!(
                     "{start}{change}{}",
-                    rest.split_once(' ').map_or(String::new(), |(_, end)| format!(" {end}"))
+                    rest.split_once(' ')
+                        .map_or(String::new(), |(_, end)| format!(" {end}"))
                 )
             }
             None => format!("{command} {change}"),
@@ -67,18 +113,29 @@ fn files_take_the_place_of_their_kind_and_directories_that_of_the_same_run() {
 #[test]
 fn a_fusion_is_known_by_its_configuration_and_the_contents_of_its_files() {
     let place = place_with(DRIVE, MODEL);
-    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o log");
-    fs::copy(place.path().join("log/imu.csv"), place.path().join("copy.csv")).unwrap();
+    done(
+        place.path(),
+        "trajectory record drive.toml imu.toml --seed 3 -o log",
+    );
+    fs::copy(
+        place.path().join("log/imu.csv"),
+        place.path().join("copy.csv"),
+    )
+    .unwrap();
     let start = "--initial log/initial.toml";
     let given = "--outage 8:11 --gnss-sigma x2:1 --mounting 0,0,1:1,1,1";
     let fuse = format!("fuse log/imu.csv log/gnss.csv imu.toml {start}");
     let first = plain(place.path(), &format!("{fuse} {given} -o out"));
     assert_eq!(first.code, 0, "{}", first.stderr);
     let manifest: serde_json::Value =
-        serde_json::from_str(&fs::read_to_string(place.path().join("out/manifest.json")).unwrap()).unwrap();
+        serde_json::from_str(&fs::read_to_string(place.path().join("out/manifest.json")).unwrap())
+            .unwrap();
     let configuration = &manifest["configuration"];
     assert_eq!(configuration["settings"]["outages"][0]["end_s"], 11.0);
-    assert_eq!(configuration["gnss_sigma_factor"], serde_json::json!([2.0, 1.0]));
+    assert_eq!(
+        configuration["gnss_sigma_factor"],
+        serde_json::json!([2.0, 1.0])
+    );
     let same = [
         "fuse copy.csv log/gnss.csv imu.toml --mounting=0,0,1.0:1,1,1 --gnss-sigma x2.0:1.0",
         " --outage 8.0:11 --lever-arm 0,0,0 --filter 15 -j 1 -q --out=out ",
@@ -87,7 +144,12 @@ fn a_fusion_is_known_by_its_configuration_and_the_contents_of_its_files() {
     .concat();
     let again = plain(place.path(), &same);
     assert_eq!(again.code, 0, "{}", again.stderr);
-    for other in ["--smooth", "--lever-arm 0,0,1", "--gnss-correlation none", "--turn-on-bias 0.02,1e-4"] {
+    for other in [
+        "--smooth",
+        "--lever-arm 0,0,1",
+        "--gnss-correlation none",
+        "--turn-on-bias 0.02,1e-4",
+    ] {
         refused(
             &plain(place.path(), &format!("{fuse} {given} {other} -o out")),
             "holds the result of another",
@@ -104,16 +166,28 @@ fn a_fusion_is_known_by_its_configuration_and_the_contents_of_its_files() {
 fn what_another_command_writes_is_refused_at_once() {
     let place = place_with(DRIVE, MODEL);
     let at = |name: &str| place.path().join(name);
-    done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
+    done(
+        place.path(),
+        "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec",
+    );
     fs::create_dir(at("there")).unwrap();
     let run = "run drive.toml imu.toml --runs 2 --outage none --seed 1 --force";
     for (command, marker, output) in [
         (format!("{run} -o new"), ".new.claim", "new"),
         (format!("{run} -o there"), "there/.claim", "there"),
-        (format!("{run} -o new --plot a.svg"), ".a.svg.claim", "a.svg"),
-        ("calibrate rec --model WN --bootstrap 0 -o m.toml --force".to_owned(), ".m.toml.claim", "m.toml"),
         (
-            "tune imu.toml --truth imu.toml --trajectory drive.toml --outage 5:10 -o t.toml".to_owned(),
+            format!("{run} -o new --plot a.svg"),
+            ".a.svg.claim",
+            "a.svg",
+        ),
+        (
+            "calibrate rec --model WN --bootstrap 0 -o m.toml --force".to_owned(),
+            ".m.toml.claim",
+            "m.toml",
+        ),
+        (
+            "tune imu.toml --truth imu.toml --trajectory drive.toml --outage 5:10 -o t.toml"
+                .to_owned(),
             ".t.toml.claim",
             "t.toml",
         ),
@@ -140,33 +214,63 @@ fn what_another_command_writes_is_refused_at_once() {
 fn what_nav_sim_did_not_write_is_never_replaced() {
     let place = place_with(DRIVE, MODEL);
     let at = |name: &str| place.path().join(name);
-    done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
+    done(
+        place.path(),
+        "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec",
+    );
     let header = "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n";
     let own_table = format!("{header}0.0,46.5,6.5,400.0,0.0,0.0,0.0,0.0,0.0,0.0\n");
     let own_model = fs::read_to_string(at("imu.toml")).unwrap();
     let calibrate = "calibrate rec --model WN --bootstrap 0 -o";
     for (command, file, own) in [
         (format!("{calibrate} m.toml"), "m.toml", own_model.as_str()),
-        (format!("{calibrate} m.toml"), "m.wv.json", "{ \"schema_version\": 1 }"),
+        (
+            format!("{calibrate} m.toml"),
+            "m.wv.json",
+            "{ \"schema_version\": 1 }",
+        ),
         (format!("{calibrate} m.toml"), "m.html", "<html></html>"),
         (format!("{calibrate} m.toml"), "m.svg", "<svg></svg>"),
-        ("datasheet --unit stim300 -o imu.toml".to_owned(), "imu.toml", own_model.as_str()),
+        (
+            "datasheet --unit stim300 -o imu.toml".to_owned(),
+            "imu.toml",
+            own_model.as_str(),
+        ),
         ("wv rec -o a.json".to_owned(), "a.json", "{}"),
-        ("trajectory convert drive.toml --rate-hz 1 -o own.csv".to_owned(), "own.csv", own_table.as_str()),
-        ("trajectory plot drive.toml -o drive.svg".to_owned(), "drive.svg", "<svg></svg>"),
+        (
+            "trajectory convert drive.toml --rate-hz 1 -o own.csv".to_owned(),
+            "own.csv",
+            own_table.as_str(),
+        ),
+        (
+            "trajectory plot drive.toml -o drive.svg".to_owned(),
+            "drive.svg",
+            "<svg></svg>",
+        ),
     ] {
         fs::write(at(file), own).unwrap();
         for force in ["", " --force"] {
             let ran = plain(place.path(), &format!("{command}{force}"));
             let told = format!("{file} is not of this command: it is not replaced");
-            assert!(ran.code == 2 && ran.stderr.contains(&told), "{command}: {}", ran.stderr);
-            assert!(ran.stdout.is_empty() && !ran.stderr.contains("4096"), "{command}: {}", ran.stderr);
+            assert!(
+                ran.code == 2 && ran.stderr.contains(&told),
+                "{command}: {}",
+                ran.stderr
+            );
+            assert!(
+                ran.stdout.is_empty() && !ran.stderr.contains("4096"),
+                "{command}: {}",
+                ran.stderr
+            );
             assert_eq!(fs::read_to_string(at(file)).unwrap(), own, "{command}");
         }
         fs::remove_file(at(file)).unwrap();
     }
     done(place.path(), "datasheet --unit stim300 -o m.toml");
-    refused(&plain(place.path(), &format!("{calibrate} m.toml")), "m.toml holds another kind of result");
+    refused(
+        &plain(place.path(), &format!("{calibrate} m.toml")),
+        "m.toml holds another kind of result",
+    );
     done(place.path(), &format!("{calibrate} m.toml"));
 }
 
@@ -176,9 +280,13 @@ fn a_second_calibration_takes_the_place_of_the_first() {
     let place = place_with(DRIVE, MODEL);
     let text = |name: &str| fs::read_to_string(place.path().join(name)).unwrap();
     for (rec, seed) in [("a", 1), ("b", 2)] {
-        done(place.path(), &format!("synthesize imu.toml --samples 4096 --seed {seed} -o {rec}"));
-        let calibrate = "calibrate {rec} --axes gyro.x --estimator rgmwm --model WN+RW --bootstrap 19"
-            .replace("{rec}", rec);
+        done(
+            place.path(),
+            &format!("synthesize imu.toml --samples 4096 --seed {seed} -o {rec}"),
+        );
+        let calibrate =
+            "calibrate {rec} --axes gyro.x --estimator rgmwm --model WN+RW --bootstrap 19"
+                .replace("{rec}", rec);
         let ran = plain(place.path(), &calibrate);
         assert_eq!(ran.code, 0, "{}", ran.stderr);
         done(place.path(), &format!("{calibrate} --seed 1 -o {rec}.toml"));
@@ -191,7 +299,16 @@ fn a_second_calibration_takes_the_place_of_the_first() {
         .filter(|name| name.starts_with("model"))
         .collect();
     names.sort();
-    assert_eq!(names, ["model.draws.json", "model.html", "model.svg", "model.toml", "model.wv.json"]);
+    assert_eq!(
+        names,
+        [
+            "model.draws.json",
+            "model.html",
+            "model.svg",
+            "model.toml",
+            "model.wv.json"
+        ]
+    );
 }
 
 /// A run whose seed is drawn is another one the next time: the hint says how to make the first one again.
@@ -203,7 +320,12 @@ fn a_run_of_another_seed_is_told_the_first_ones() {
     for (runs, is_same) in [("--runs 2", true), ("--runs 3", false)] {
         let ran = plain(place.path(), &format!("{run} {runs}"));
         refused(&ran, "holds the result of another");
-        assert_eq!(ran.stderr.contains("with --seed 77,"), is_same, "{}", ran.stderr);
+        assert_eq!(
+            ran.stderr.contains("with --seed 77,"),
+            is_same,
+            "{}",
+            ran.stderr
+        );
     }
 }
 
@@ -211,9 +333,15 @@ fn a_run_of_another_seed_is_told_the_first_ones() {
 #[test]
 fn two_outputs_of_one_name_are_refused_at_once() {
     let place = place_with(DRIVE, MODEL);
-    done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
+    done(
+        place.path(),
+        "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec",
+    );
     for (command, output) in [
-        ("run drive.toml imu.toml --runs 2 --outage none -o a.svg --plot a.svg", "a.svg"),
+        (
+            "run drive.toml imu.toml --runs 2 --outage none -o a.svg --plot a.svg",
+            "a.svg",
+        ),
         ("calibrate rec --model WN --bootstrap 0 -o a.svg", "a.svg"),
         ("wv rec -o a.html --plot a.html", "a.html"),
         ("compare log --reference log -o a.html", "a.html"),
@@ -221,7 +349,11 @@ fn two_outputs_of_one_name_are_refused_at_once() {
     ] {
         let ran = plain(place.path(), command);
         let told = format!("error: {output} is another output of the same command\n");
-        assert!(ran.code == 2 && ran.stderr.contains(&told), "{}", ran.stderr);
+        assert!(
+            ran.code == 2 && ran.stderr.contains(&told),
+            "{}",
+            ran.stderr
+        );
         assert!(!place.path().join(output).exists(), "{command}");
     }
 }
@@ -231,14 +363,21 @@ fn two_outputs_of_one_name_are_refused_at_once() {
 fn calibrate_begins_where_init_ended_and_replaces_no_other_model() {
     let place = tempfile::tempdir().unwrap();
     let calibrate = "calibrate rec --model WN+RW --bootstrap 0 --seed 1";
-    for command in ["init .", "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec", calibrate]
-    {
+    for command in [
+        "init .",
+        "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec",
+        calibrate,
+    ] {
         let ran = plain(place.path(), command);
         assert_eq!(ran.code, 0, "{command}\n{}", ran.stderr);
     }
     let own = fs::read(place.path().join("imu.toml")).unwrap();
     let ran = plain(place.path(), &format!("{calibrate} -o imu.toml"));
-    assert!(ran.code == 2 && ran.stderr.contains("imu.toml is not of this command"), "{}", ran.stderr);
+    assert!(
+        ran.code == 2 && ran.stderr.contains("imu.toml is not of this command"),
+        "{}",
+        ran.stderr
+    );
     assert!(fs::read(place.path().join("imu.toml")).unwrap() == own);
 }
 
@@ -246,9 +385,16 @@ fn calibrate_begins_where_init_ended_and_replaces_no_other_model() {
 #[test]
 fn an_empty_file_in_a_directory_is_passed_over() {
     let place = place_with(DRIVE, MODEL);
-    done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
+    done(
+        place.path(),
+        "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec",
+    );
     fs::write(place.path().join("rec/all.txt"), "").unwrap();
     let ran = plain(place.path(), "wv rec");
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    assert!(ran.stderr.contains("all.txt: passed over, it is empty"), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("all.txt: passed over, it is empty"),
+        "{}",
+        ran.stderr
+    );
 }

@@ -5,7 +5,11 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 fn nav_sim(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_nav-sim")).current_dir(directory).args(arguments).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_nav-sim"))
+        .current_dir(directory)
+        .args(arguments)
+        .output()
+        .unwrap()
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -37,13 +41,19 @@ fn place() -> tempfile::TempDir {
 
 /// `key: value  # …` of a YAML file.
 fn yaml(text: &str, key: &str) -> f64 {
-    let line = text.lines().find_map(|l| l.trim().strip_prefix(key)?.strip_prefix(": ")).unwrap();
+    let line = text
+        .lines()
+        .find_map(|l| l.trim().strip_prefix(key)?.strip_prefix(": "))
+        .unwrap();
     line.split('#').next().unwrap().trim().parse().unwrap()
 }
 
 /// Allan deviation of adjacent means of `m` samples, from its definition.
 fn allan_deviation(samples: &[f64], m: usize) -> f64 {
-    let means: Vec<f64> = samples.chunks_exact(m).map(|c| c.iter().sum::<f64>() / m as f64).collect();
+    let means: Vec<f64> = samples
+        .chunks_exact(m)
+        .map(|c| c.iter().sum::<f64>() / m as f64)
+        .collect();
     let squares: f64 = means.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum();
     (0.5 * squares / (means.len() - 1) as f64).sqrt()
 }
@@ -53,22 +63,44 @@ fn allan_deviation(samples: &[f64], m: usize) -> f64 {
 #[test]
 fn the_exported_density_is_the_allan_deviation_of_a_recording() {
     let place = place();
-    let arguments = ["synthesize", "model.toml", "--duration", "4000", "--seed", "1", "-o", "recordings"];
+    let arguments = [
+        "synthesize",
+        "model.toml",
+        "--duration",
+        "4000",
+        "--seed",
+        "1",
+        "-o",
+        "recordings",
+    ];
     assert!(nav_sim(place.path(), &arguments).status.success());
-    let recording = std::fs::read_to_string(place.path().join("recordings/replicate_1.csv")).unwrap();
+    let recording =
+        std::fs::read_to_string(place.path().join("recordings/replicate_1.csv")).unwrap();
     let header: Vec<&str> = recording.lines().next().unwrap().split(',').collect();
     let column = |name: &str| -> Vec<f64> {
         let place = header.iter().position(|h| *h == name).unwrap();
-        recording.lines().skip(1).map(|l| l.split(',').nth(place).unwrap().parse().unwrap()).collect()
+        recording
+            .lines()
+            .skip(1)
+            .map(|l| l.split(',').nth(place).unwrap().parse().unwrap())
+            .collect()
     };
-    let output = nav_sim(place.path(), &["export", "model.toml", "--target", "kalibr"]);
+    let output = nav_sim(
+        place.path(),
+        &["export", "model.toml", "--target", "kalibr"],
+    );
     assert!(output.status.success(), "{}", text(&output.stderr));
     let exported = text(&output.stdout);
-    let pairs =
-        [("accel_x_m_s2", "accelerometer_noise_density"), ("gyro_z_rad_s", "gyroscope_noise_density")];
+    let pairs = [
+        ("accel_x_m_s2", "accelerometer_noise_density"),
+        ("gyro_z_rad_s", "gyroscope_noise_density"),
+    ];
     for (signal, key) in pairs {
         let (read, measured) = (yaml(&exported, key), allan_deviation(&column(signal), 50));
-        assert!((read / measured - 1.0).abs() < 0.1, "{key}: {read:e} {measured:e}");
+        assert!(
+            (read / measured - 1.0).abs() < 0.1,
+            "{key}: {read:e} {measured:e}"
+        );
     }
 }
 
@@ -76,34 +108,74 @@ fn the_exported_density_is_the_allan_deviation_of_a_recording() {
 #[test]
 fn strict_warns_and_writes_a_file() {
     let place = place();
-    let arguments = ["export", "model.toml", "--target", "openvins", "--policy", "strict", "-o", "imu.yaml"];
+    let arguments = [
+        "export",
+        "model.toml",
+        "--target",
+        "openvins",
+        "--policy",
+        "strict",
+        "-o",
+        "imu.yaml",
+    ];
     let output = nav_sim(place.path(), &arguments);
     let said = text(&output.stderr);
     assert!(output.status.success(), "{said}");
-    assert!(said.contains("warning: accel: N is 0, with which many filters fail"), "{said}");
+    assert!(
+        said.contains("warning: accel: N is 0, with which many filters fail"),
+        "{said}"
+    );
     let file = std::fs::read_to_string(place.path().join("imu.yaml")).unwrap();
-    assert!(file.starts_with("%YAML:1.0\n# openvins: model.toml, 50 Hz, policy strict"), "{file}");
-    assert!(file.contains("# Warning: accel: N is 0") && file.contains("\nimu0:\n  rostopic: "), "{file}");
+    assert!(
+        file.starts_with("%YAML:1.0\n# openvins: model.toml, 50 Hz, policy strict"),
+        "{file}"
+    );
+    assert!(
+        file.contains("# Warning: accel: N is 0") && file.contains("\nimu0:\n  rostopic: "),
+        "{file}"
+    );
     assert_eq!(yaml(&file, "accelerometer_noise_density"), 0.0);
-    assert!((yaml(&file, "gyroscope_noise_density") / (1e-6_f64 / 50.0).sqrt() - 1.0).abs() < 1e-12);
+    assert!(
+        (yaml(&file, "gyroscope_noise_density") / (1e-6_f64 / 50.0).sqrt() - 1.0).abs() < 1e-12
+    );
     assert!((yaml(&file, "gyroscope_random_walk") / (1e-14_f64 * 50.0).sqrt() - 1.0).abs() < 1e-12);
 }
 
 #[test]
 fn json_has_all_numbers_with_units() {
     let place = place();
-    let arguments = ["export", "model.toml", "--target", "vins", "--format", "json", "--horizon", "2:60s"];
+    let arguments = [
+        "export",
+        "model.toml",
+        "--target",
+        "vins",
+        "--format",
+        "json",
+        "--horizon",
+        "2:60s",
+    ];
     let output = nav_sim(place.path(), &arguments);
     let json: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!((&json["target"], &json["policy"]), (&"vins".into(), &"matched".into()));
+    assert_eq!(
+        (&json["target"], &json["policy"]),
+        (&"vins".into(), &"matched".into())
+    );
     assert_eq!(json["horizon_s"], serde_json::json!([2.0, 60.0]));
     let entries = json["entries"].as_array().unwrap();
     let keys: Vec<&str> = entries.iter().map(|e| e["key"].as_str().unwrap()).collect();
     assert_eq!(keys, ["acc_n", "gyr_n", "acc_w", "gyr_w"]);
-    assert!(entries.iter().all(|e| e["value"].is_f64() && e["unit"].is_string()), "{entries:?}");
+    assert!(
+        entries
+            .iter()
+            .all(|e| e["value"].is_f64() && e["unit"].is_string()),
+        "{entries:?}"
+    );
     let gyro = &json["sensors"]["gyro"];
     let n = &gyro["exported"]["n"];
-    let (si, sheet) = (n["value"].as_f64().unwrap(), n["data_sheet"]["value"].as_f64().unwrap());
+    let (si, sheet) = (
+        n["value"].as_f64().unwrap(),
+        n["data_sheet"]["value"].as_f64().unwrap(),
+    );
     assert!((sheet / (si.to_degrees() * 60.0) - 1.0).abs() < 1e-12);
     assert_eq!(n["data_sheet"]["unit"], "deg/sqrt(h)");
     // the minimum of N²/τ + K²τ/3, √3 N/K = 346 s, within the 10 000 s of a model that no calibration made
@@ -119,7 +191,11 @@ fn what_cannot_be_exported_is_refused() {
     std::fs::write(place.path().join("accel.toml"), accel_only).unwrap();
     let refused = |arguments: &[&str]| {
         let output = nav_sim(place.path(), &[&["export"], arguments].concat());
-        assert_eq!((output.status.code(), output.stdout.as_slice()), (Some(2), &b""[..]), "{arguments:?}");
+        assert_eq!(
+            (output.status.code(), output.stdout.as_slice()),
+            (Some(2), &b""[..]),
+            "{arguments:?}"
+        );
         text(&output.stderr)
     };
     let said = refused(&["model.toml", "--target", "kalbr"]);
@@ -129,9 +205,15 @@ fn what_cannot_be_exported_is_refused() {
         said.starts_with("error: accel.toml: the model has no gyro, and px4 needs both sensors"),
         "{said}"
     );
-    assert!(said.contains("\n\nhint: calibrate recordings of both sensors"), "{said}");
+    assert!(
+        said.contains("\n\nhint: calibrate recordings of both sensors"),
+        "{said}"
+    );
     let said = refused(&["model.toml", "--target", "px4", "--horizon", "100s:1s"]);
-    assert!(said.contains("the horizon 100 s to 1 s is refused"), "{said}");
+    assert!(
+        said.contains("the horizon 100 s to 1 s is refused"),
+        "{said}"
+    );
     let said = refused(&["model.toml", "--target", "px4", "--horizon", "soon"]);
     assert!(said.contains("such as 1s:100s"), "{said}");
     let said = refused(&["model.toml", "--target", "px4", "-o", "model.toml"]);
@@ -142,11 +224,23 @@ fn what_cannot_be_exported_is_refused() {
 #[test]
 fn an_export_is_certified_or_not() {
     let place = place();
-    let flags =
-        ["export", "model.toml", "--target", "kalibr", "--policy", "strict", "--certify", "--seed", "1"];
+    let flags = [
+        "export",
+        "model.toml",
+        "--target",
+        "kalibr",
+        "--policy",
+        "strict",
+        "--certify",
+        "--seed",
+        "1",
+    ];
     let output = nav_sim(place.path(), &flags);
     let said = text(&output.stderr);
     assert!(output.status.success(), "{said}");
-    assert!(said.contains("gyro: certified: within the 95 % band of 4 recordings"), "{said}");
+    assert!(
+        said.contains("gyro: certified: within the 95 % band of 4 recordings"),
+        "{said}"
+    );
     assert!(said.contains("accel: not certified: outside"), "{said}");
 }

@@ -10,24 +10,47 @@ fn check_looks_at_every_file() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     std::fs::write(place.path().join("bad.toml"), "[run]\nruns = 0\n").unwrap();
     std::fs::write(place.path().join("worse.toml"), "[gps]\n").unwrap();
-    let timeless: String =
-        (0..100).map(|k| format!("{},{}\n", f64::from(k % 7) * 1e-3, f64::from(k % 5) * 1e-4)).collect();
-    std::fs::write(place.path().join("timeless.csv"), format!("accel_x_m_s2,gyro_x_rad_s\n{timeless}"))
-        .unwrap();
+    let timeless: String = (0..100)
+        .map(|k| format!("{},{}\n", f64::from(k % 7) * 1e-3, f64::from(k % 5) * 1e-4))
+        .collect();
+    std::fs::write(
+        place.path().join("timeless.csv"),
+        format!("accel_x_m_s2,gyro_x_rad_s\n{timeless}"),
+    )
+    .unwrap();
     let check = |arguments: &[&str]| {
-        let output = nav_sim().current_dir(place.path()).arg("check").args(arguments).output().unwrap();
+        let output = nav_sim()
+            .current_dir(place.path())
+            .arg("check")
+            .args(arguments)
+            .output()
+            .unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-        (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+        (
+            output.status.code().unwrap(),
+            text(output.stdout),
+            text(output.stderr),
+        )
     };
     let good = root.join("calib_data/tactical.toml");
     let (code, out, said) = check(&["bad.toml", "worse.toml", good.to_str().unwrap()]);
     assert_eq!(code, 2, "{said}");
-    assert!(said.contains("bad.toml, line 2") && said.contains("worse.toml, line 1"), "{said}");
+    assert!(
+        said.contains("bad.toml, line 2") && said.contains("worse.toml, line 1"),
+        "{said}"
+    );
     assert!(said.contains("2 of 3 files are refused"), "{said}");
     assert!(out.contains("tactical.toml: a noise model"), "{out}");
-    assert!(check(&["timeless.csv"]).2.contains("hint: give the rate with --rate-hz"));
+    assert!(
+        check(&["timeless.csv"])
+            .2
+            .contains("hint: give the rate with --rate-hz")
+    );
     let (code, out, said) = check(&["timeless.csv", "--rate-hz", "50"]);
-    assert!(code == 0 && out.contains("2 channels of 100 samples at 50 Hz"), "{out}{said}");
+    assert!(
+        code == 0 && out.contains("2 channels of 100 samples at 50 Hz"),
+        "{out}{said}"
+    );
     let entry = root.join("calib_data/catalogue/stim300.toml");
     let (code, out, said) = check(&[entry.to_str().unwrap()]);
     assert!(
@@ -43,8 +66,16 @@ fn check_looks_at_every_file() {
 fn the_files_of_init_are_what_they_should_be() {
     let place = tempfile::tempdir().unwrap();
     let ran = |arguments: &[&str]| {
-        let output = nav_sim().current_dir(place.path()).args(arguments).output().unwrap();
-        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        let output = nav_sim()
+            .current_dir(place.path())
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert!(
+            output.status.success(),
+            "{arguments:?}: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         String::from_utf8(output.stdout).unwrap()
     };
     ran(&["init", "."]);
@@ -62,22 +93,38 @@ fn the_files_of_init_are_what_they_should_be() {
         assert!(said.starts_with(&format!("{file}: {kind}")), "{said}");
     }
     let resolved = ran(&["check", "scenario.toml", "--dry-run"]);
-    let scenario = resolved.split_once('\n').unwrap().1.parse::<toml::Table>().unwrap();
+    let scenario = resolved
+        .split_once('\n')
+        .unwrap()
+        .1
+        .parse::<toml::Table>()
+        .unwrap();
     assert_eq!(scenario["gnss"]["rate_hz"].as_float(), Some(1.0));
     assert!(ran(&["check", "imu.toml", "--dry-run"]).contains("beta = 0.0033333"));
     // Every key of the file is in the schema, each of its processes is one of the schema's.
     let schema: serde_json::Value = serde_json::from_str(&ran(&["schema", "model"])).unwrap();
-    let model: toml::Table = std::fs::read_to_string(place.path().join("imu.toml")).unwrap().parse().unwrap();
+    let model: toml::Table = std::fs::read_to_string(place.path().join("imu.toml"))
+        .unwrap()
+        .parse()
+        .unwrap();
     for (key, _) in &model {
         assert!(schema["properties"][key].is_object(), "{key}");
     }
-    let kinds = schema["properties"]["gyro"]["properties"]["processes"]["items"]["oneOf"].as_array().unwrap();
+    let kinds = schema["properties"]["gyro"]["properties"]["processes"]["items"]["oneOf"]
+        .as_array()
+        .unwrap();
     for process in model["gyro"]["processes"].as_array().unwrap() {
         let process = process.as_table().unwrap();
-        let is_own =
-            |k: &&serde_json::Value| k["properties"]["type"]["const"] == process["type"].as_str().unwrap();
+        let is_own = |k: &&serde_json::Value| {
+            k["properties"]["type"]["const"] == process["type"].as_str().unwrap()
+        };
         let kind = kinds.iter().find(is_own).unwrap();
-        assert!(process.keys().all(|key| kind["properties"][key].is_object()), "{process}");
+        assert!(
+            process
+                .keys()
+                .all(|key| kind["properties"][key].is_object()),
+            "{process}"
+        );
     }
 }
 
@@ -87,17 +134,40 @@ fn schemas_describe_the_tables_of_profiles_and_contaminations() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     for (kind, file, word, lists) in [
         ("profile", "examples/motion.toml", "kind", &["segment"][..]),
-        ("profile", "trajectories/figure_eight.toml", "kind", &["segment"]),
-        ("contamination", "examples/contamination.toml", "operation", &["accel", "gyro"]),
-        ("contamination", "calib_data/contamination/section5-III.toml", "operation", &["accel", "gyro"]),
+        (
+            "profile",
+            "trajectories/figure_eight.toml",
+            "kind",
+            &["segment"],
+        ),
+        (
+            "contamination",
+            "examples/contamination.toml",
+            "operation",
+            &["accel", "gyro"],
+        ),
+        (
+            "contamination",
+            "calib_data/contamination/section5-III.toml",
+            "operation",
+            &["accel", "gyro"],
+        ),
     ] {
         let output = nav_sim().args(["schema", kind]).output().unwrap();
         let schema: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         let definition = |of: &serde_json::Value| {
             schema["$defs"][of["$ref"].as_str().unwrap().rsplit('/').next().unwrap()].clone()
         };
-        let table: toml::Table = std::fs::read_to_string(root.join(file)).unwrap().parse().unwrap();
-        assert!(table.keys().all(|key| schema["properties"][key].is_object()), "{file}");
+        let table: toml::Table = std::fs::read_to_string(root.join(file))
+            .unwrap()
+            .parse()
+            .unwrap();
+        assert!(
+            table
+                .keys()
+                .all(|key| schema["properties"][key].is_object()),
+            "{file}"
+        );
         for (list, entry) in lists
             .iter()
             .filter_map(|l| Some((l, table.get(*l)?.as_array()?)))
@@ -106,11 +176,17 @@ fn schemas_describe_the_tables_of_profiles_and_contaminations() {
             let items = definition(&schema["properties"][list]["items"]);
             let name = entry[word].as_str().unwrap();
             let mut kinds = items["oneOf"].as_array().unwrap().iter();
-            let own = kinds.find(|of| of["properties"][word]["const"] == name).unwrap();
+            let own = kinds
+                .find(|of| of["properties"][word]["const"] == name)
+                .unwrap();
             let keys = &definition(own)["properties"];
-            let is_known =
-                |key: &String| key == word || keys[key].is_object() || items["properties"][key].is_object();
-            assert!(entry.as_table().unwrap().keys().all(is_known), "{file}: {entry}");
+            let is_known = |key: &String| {
+                key == word || keys[key].is_object() || items["properties"][key].is_object()
+            };
+            assert!(
+                entry.as_table().unwrap().keys().all(is_known),
+                "{file}: {entry}"
+            );
         }
     }
 }
@@ -119,8 +195,12 @@ fn schemas_describe_the_tables_of_profiles_and_contaminations() {
 #[test]
 fn init_makes_every_file_that_the_help_names() {
     let place = tempfile::tempdir().unwrap();
-    nav_sim().args(["init", place.path().to_str().unwrap()]).assert().success();
-    let help = String::from_utf8(nav_sim().args(["man", "--help"]).output().unwrap().stdout).unwrap();
+    nav_sim()
+        .args(["init", place.path().to_str().unwrap()])
+        .assert()
+        .success();
+    let help =
+        String::from_utf8(nav_sim().args(["man", "--help"]).output().unwrap().stdout).unwrap();
     assert!(help.starts_with("Examples:"));
     let mut texts = vec![help];
     for command in [
@@ -136,18 +216,30 @@ fn init_makes_every_file_that_the_help_names() {
         "check",
         "batch",
     ] {
-        texts.push(String::from_utf8(nav_sim().args([command, "--help"]).output().unwrap().stdout).unwrap());
+        texts.push(
+            String::from_utf8(nav_sim().args([command, "--help"]).output().unwrap().stdout)
+                .unwrap(),
+        );
     }
     for sub in ["generate", "check", "convert", "plot", "record"] {
         texts.push(
-            String::from_utf8(nav_sim().args(["trajectory", sub, "--help"]).output().unwrap().stdout)
-                .unwrap(),
+            String::from_utf8(
+                nav_sim()
+                    .args(["trajectory", sub, "--help"])
+                    .output()
+                    .unwrap()
+                    .stdout,
+            )
+            .unwrap(),
         );
     }
     for text in texts {
         let examples = text.split("\n\n").next().unwrap();
         for word in examples.split_whitespace() {
-            if ["calib_data/", "trajectories/", "examples/"].iter().any(|d| word.starts_with(d)) {
+            if ["calib_data/", "trajectories/", "examples/"]
+                .iter()
+                .any(|d| word.starts_with(d))
+            {
                 assert!(place.path().join(word).exists(), "{word}");
             }
         }
@@ -162,12 +254,29 @@ fn init_makes_all_its_files_or_none() {
     std::fs::create_dir(&study).unwrap();
     std::fs::write(study.join("examples"), "in the way").unwrap();
     let output = nav_sim().arg("init").arg(&study).output().unwrap();
-    assert_eq!((output.status.code(), output.stdout.as_slice()), (Some(1), &b""[..]));
-    let left: Vec<_> = std::fs::read_dir(&study).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(
+        (output.status.code(), output.stdout.as_slice()),
+        (Some(1), &b""[..])
+    );
+    let left: Vec<_> = std::fs::read_dir(&study)
+        .unwrap()
+        .map(|e| e.unwrap().file_name())
+        .collect();
     assert_eq!(left, ["examples"]);
     std::fs::remove_file(study.join("examples")).unwrap();
-    assert!(nav_sim().arg("init").arg(&study).output().unwrap().status.success());
-    assert!(study.join("calib_data/formats/own.csv").exists() && study.join("examples/phone.toml").exists());
+    assert!(
+        nav_sim()
+            .arg("init")
+            .arg(&study)
+            .output()
+            .unwrap()
+            .status
+            .success()
+    );
+    assert!(
+        study.join("calib_data/formats/own.csv").exists()
+            && study.join("examples/phone.toml").exists()
+    );
 }
 
 /// What heading is called elsewhere; a recording with a gap, which `check` has no option for; what `check` took it for.
@@ -176,22 +285,39 @@ fn check_hints_at_what_helps() {
     let place = tempfile::tempdir().unwrap();
     let check = |name: &str, text: &str| {
         std::fs::write(place.path().join(name), text).unwrap();
-        let output = nav_sim().current_dir(place.path()).args(["check", name]).output().unwrap();
+        let output = nav_sim()
+            .current_dir(place.path())
+            .args(["check", name])
+            .output()
+            .unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-        (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+        (
+            output.status.code().unwrap(),
+            text(output.stdout),
+            text(output.stderr),
+        )
     };
     let profile = "start = { lat_deg = 46, lon_deg = 6, h_m = 0, yaw_deg = 3 }\nsegment = []\n";
     let (code, _, said) = check("drive.toml", profile);
-    assert!(code == 2 && said.contains("did you mean \"heading_deg\"?"), "{said}");
+    assert!(
+        code == 2 && said.contains("did you mean \"heading_deg\"?"),
+        "{said}"
+    );
     let table = |skipped: std::ops::Range<u32>| -> String {
         let rows = (0..2000_u32).filter(|k| !skipped.contains(k));
         let rows = rows.map(|k| format!("{},{}\n", f64::from(k) / 100.0, f64::from(k % 7) * 1e-3));
         "t_s,gyro_x_rad_s\n".to_owned() + &rows.collect::<String>()
     };
     let (code, _, said) = check("gap.csv", &table(500..800));
-    assert!(code == 2 && said.contains("fuse bridges gaps of up to 5 s"), "{said}");
+    assert!(
+        code == 2 && said.contains("fuse bridges gaps of up to 5 s"),
+        "{said}"
+    );
     let (_, found, _) = check("whole.csv", &table(0..0));
-    assert!(found.starts_with("whole.csv: read as a static recording, 1 channels"), "{found}");
+    assert!(
+        found.starts_with("whole.csv: read as a static recording, 1 channels"),
+        "{found}"
+    );
 }
 
 /// A model in the place of the trajectory, and the trajectory in that of the model.
@@ -199,9 +325,19 @@ fn check_hints_at_what_helps() {
 fn arguments_in_another_order_are_told() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     let (model, drive) = ("calib_data/tactical.toml", "trajectories/land_vehicle.toml");
-    for arguments in [["run", model, drive, "-q"], ["synthesize", drive, "-o", "never"]] {
-        let output = nav_sim().current_dir(root).args(arguments).output().unwrap();
+    for arguments in [
+        ["run", model, drive, "-q"],
+        ["synthesize", drive, "-o", "never"],
+    ] {
+        let output = nav_sim()
+            .current_dir(root)
+            .args(arguments)
+            .output()
+            .unwrap();
         let said = String::from_utf8(output.stderr).unwrap();
-        assert!(output.status.code() == Some(2) && said.contains("arguments in another order?"), "{said}");
+        assert!(
+            output.status.code() == Some(2) && said.contains("arguments in another order?"),
+            "{said}"
+        );
     }
 }

@@ -32,13 +32,20 @@ fn place() -> tempfile::TempDir {
 /// A place with a recorded drive in `rec`.
 fn recorded() -> tempfile::TempDir {
     let place = place();
-    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o rec");
+    done(
+        place.path(),
+        "trajectory record drive.toml imu.toml --seed 3 -o rec",
+    );
     place
 }
 
 fn table(path: &Path) -> Vec<Vec<f64>> {
     let text = fs::read_to_string(path).unwrap();
-    let cells = |line: &str| line.split(',').map(|c| c.parse().unwrap_or(f64::NAN)).collect();
+    let cells = |line: &str| {
+        line.split(',')
+            .map(|c| c.parse().unwrap_or(f64::NAN))
+            .collect()
+    };
     text.lines().skip(1).map(cells).collect()
 }
 
@@ -49,36 +56,86 @@ fn a_fusion_directory_holds_what_the_interface_says() {
         place.path(),
         "fuse rec/imu.csv rec/gnss.csv imu.toml --reference rec/reference.csv --outage 60:75 -o out --verbose",
     );
-    assert!(ran.stdout.contains("from levelling at rest until"), "{}", ran.stdout);
-    assert!(ran.stdout.contains("from the course of the fix at"), "{}", ran.stdout);
+    assert!(
+        ran.stdout.contains("from levelling at rest until"),
+        "{}",
+        ran.stdout
+    );
+    assert!(
+        ran.stdout.contains("from the course of the fix at"),
+        "{}",
+        ran.stdout
+    );
     assert!(ran.stdout.contains(" 15 withheld"), "{}", ran.stdout);
     let out = place.path().join("out");
-    let header = fs::read_to_string(out.join("solution.csv")).unwrap().lines().next().unwrap().to_owned();
+    let header = fs::read_to_string(out.join("solution.csv"))
+        .unwrap()
+        .lines()
+        .next()
+        .unwrap()
+        .to_owned();
     assert!(header.starts_with(
         "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg,sd_lat_deg,"
     ));
-    assert!(header.contains(",sd_yaw_deg,b_ax_m_s2,b_ay_m_s2,b_az_m_s2,b_gx_rad_s,b_gy_rad_s,b_gz_rad_s"));
-    let deviations = "sd_b_ax_m_s2,sd_b_ay_m_s2,sd_b_az_m_s2,sd_b_gx_rad_s,sd_b_gy_rad_s,sd_b_gz_rad_s";
+    assert!(
+        header
+            .contains(",sd_yaw_deg,b_ax_m_s2,b_ay_m_s2,b_az_m_s2,b_gx_rad_s,b_gy_rad_s,b_gz_rad_s")
+    );
+    let deviations =
+        "sd_b_ax_m_s2,sd_b_ay_m_s2,sd_b_az_m_s2,sd_b_gx_rad_s,sd_b_gy_rad_s,sd_b_gz_rad_s";
     assert!(header.ends_with(&format!(",sd_n_m,sd_e_m,{deviations}")));
     let summary: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
     let outage = &summary["outages"][0];
-    assert_eq!((&summary["fixes"]["withheld"], &outage["fixes_withheld"]), (&15.into(), &15.into()));
-    let (drift, sigma) =
-        (&outage["end_from_reference"]["horizontal_m"], &outage["end_from_reference"]["expected_sigma_m"]);
-    assert!(drift.as_f64().unwrap() < 4.0 * sigma.as_f64().unwrap(), "{outage}");
+    assert_eq!(
+        (&summary["fixes"]["withheld"], &outage["fixes_withheld"]),
+        (&15.into(), &15.into())
+    );
+    let (drift, sigma) = (
+        &outage["end_from_reference"]["horizontal_m"],
+        &outage["end_from_reference"]["expected_sigma_m"],
+    );
+    assert!(
+        drift.as_f64().unwrap() < 4.0 * sigma.as_f64().unwrap(),
+        "{outage}"
+    );
     assert!(summary["reference"]["rmse"]["pos_n_m"].as_f64().unwrap() < 10.0);
     // the coarse alignment is as good as it says, at its own epoch, in every state
-    let (errors, solution) = (table(&out.join("errors.csv")), table(&out.join("solution.csv")));
-    let sd = |i: usize| if i < 2 { solution[0][25 + i] } else { solution[0][10 + i] };
+    let (errors, solution) = (
+        table(&out.join("errors.csv")),
+        table(&out.join("solution.csv")),
+    );
+    let sd = |i: usize| {
+        if i < 2 {
+            solution[0][25 + i]
+        } else {
+            solution[0][10 + i]
+        }
+    };
     for i in 0..9 {
-        assert!(errors[0][1 + i].abs() < 4.0 * sd(i), "state {i}: {} against {}", errors[0][1 + i], sd(i));
+        assert!(
+            errors[0][1 + i].abs() < 4.0 * sd(i),
+            "state {i}: {} against {}",
+            errors[0][1 + i],
+            sd(i)
+        );
     }
-    assert!(fs::read_to_string(out.join("solution.kml")).unwrap().contains("<LineString>"));
-    assert!(fs::read_to_string(out.join("manifest.json")).unwrap().contains("\"kind\": \"fusion\""));
+    assert!(
+        fs::read_to_string(out.join("solution.kml"))
+            .unwrap()
+            .contains("<LineString>")
+    );
+    assert!(
+        fs::read_to_string(out.join("manifest.json"))
+            .unwrap()
+            .contains("\"kind\": \"fusion\"")
+    );
     // states of the turn-on bias are not the scale factors of `--filter 21`
     let states = |flags: &str| {
-        done(place.path(), &format!("fuse rec/imu.csv rec/gnss.csv imu.toml {flags} -o other"));
+        done(
+            place.path(),
+            &format!("fuse rec/imu.csv rec/gnss.csv imu.toml {flags} -o other"),
+        );
         let text = fs::read_to_string(place.path().join("other/summary.json")).unwrap();
         let summary: serde_json::Value = serde_json::from_str(&text).unwrap();
         ["filter_states", "turn_on_states"].map(|key| summary[key].as_u64().unwrap())
@@ -94,16 +151,25 @@ fn rates_increments_and_kf_gins_texts_give_one_solution() {
     let place = recorded();
     let at = |name: &str| place.path().join(name);
     let (imu, gnss) = (table(&at("rec/imu.csv")), table(&at("rec/gnss.csv")));
-    let mut csv = "t_s,dtheta_x_rad,dtheta_y_rad,dtheta_z_rad,dv_x_m_s,dv_y_m_s,dv_z_m_s\n".to_owned();
+    let mut csv =
+        "t_s,dtheta_x_rad,dtheta_y_rad,dtheta_z_rad,dv_x_m_s,dv_y_m_s,dv_z_m_s\n".to_owned();
     let mut text = String::new();
     for row in &imu {
-        let cells: Vec<String> = row[1..].iter().map(|x| format!("{:.14}", x * 0.01)).collect();
+        let cells: Vec<String> = row[1..]
+            .iter()
+            .map(|x| format!("{:.14}", x * 0.01))
+            .collect();
         csv += &format!("{},{}\n", row[0], cells.join(","));
         text += &format!("  {:.6}   {}\n", row[0], cells.join("  "));
     }
     let fixes: String = gnss
         .iter()
-        .map(|r| format!("{} {:.10} {:.10} {:.4} {} {} {}\n", r[0], r[1], r[2], r[3], r[4], r[5], r[6]))
+        .map(|r| {
+            format!(
+                "{} {:.10} {:.10} {:.4} {} {} {}\n",
+                r[0], r[1], r[2], r[3], r[4], r[5], r[6]
+            )
+        })
         .collect();
     let position_only: String =
         "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m\n".to_owned() + &fixes.replace(' ', ",");
@@ -112,7 +178,12 @@ fn rates_increments_and_kf_gins_texts_give_one_solution() {
     let odometer: String = text.lines().map(|l| format!("{l}  3.25\n")).collect();
     let full: String = gnss
         .iter()
-        .map(|r| [0, 1, 2, 3, 7, 8, 9, 4, 5, 6, 10, 11, 12].map(|i| r[i].to_string()).join(" ") + "\n")
+        .map(|r| {
+            [0, 1, 2, 3, 7, 8, 9, 4, 5, 6, 10, 11, 12]
+                .map(|i| r[i].to_string())
+                .join(" ")
+                + "\n"
+        })
         .collect();
     let four = |l: &str| l.split(',').take(4).collect::<Vec<_>>().join(",") + "\n";
     let bare: String = position_only.lines().map(four).collect();
@@ -128,18 +199,33 @@ fn rates_increments_and_kf_gins_texts_give_one_solution() {
         fs::write(at(name), contents).unwrap();
     }
     let end = |files: &str| {
-        done(place.path(), &format!("fuse {files} imu.toml --initial rec/initial.toml -o out"));
+        done(
+            place.path(),
+            &format!("fuse {files} imu.toml --initial rec/initial.toml -o out"),
+        );
         table(&at("out/solution.csv")).pop().unwrap()
     };
     let sigma = format!("{},{},{}", gnss[0][4], gnss[0][5], gnss[0][6]);
     let given = format!("--gnss-sigma {sigma} rec/imu.csv bare.csv");
-    let ends =
-        ["rec/imu.csv pos.csv", "inc.csv pos.csv", "imu.txt gnss.txt", "imu8.txt gnss.txt", &given].map(end);
+    let ends = [
+        "rec/imu.csv pos.csv",
+        "inc.csv pos.csv",
+        "imu.txt gnss.txt",
+        "imu8.txt gnss.txt",
+        &given,
+    ]
+    .map(end);
     let with_velocity = ["rec/imu.csv rec/gnss.csv", "imu.txt gnss13.txt"].map(end);
-    let pairs = ends[1..].iter().map(|e| (&ends[0], e)).chain([(&with_velocity[0], &with_velocity[1])]);
+    let pairs = ends[1..]
+        .iter()
+        .map(|e| (&ends[0], e))
+        .chain([(&with_velocity[0], &with_velocity[1])]);
     for (first, end) in pairs {
         for (column, (x, y)) in first.iter().zip(end).enumerate() {
-            assert!((x - y).abs() <= 2e-6 * (1.0 + x.abs()), "column {column}: {x} {y}");
+            assert!(
+                (x - y).abs() <= 2e-6 * (1.0 + x.abs()),
+                "column {column}: {x} {y}"
+            );
         }
     }
 }
@@ -149,7 +235,10 @@ fn refused(name: &str, edit: impl Fn(&str) -> String, flags: &str, expected: &[&
     let place = recorded();
     let path = place.path().join(name);
     fs::write(&path, edit(&fs::read_to_string(&path).unwrap())).unwrap();
-    let ran = nav_sim(place.path(), &format!("fuse rec/imu.csv rec/gnss.csv imu.toml {flags} -o out"));
+    let ran = nav_sim(
+        place.path(),
+        &format!("fuse rec/imu.csv rec/gnss.csv imu.toml {flags} -o out"),
+    );
     assert_eq!(ran.code, 2, "{expected:?}\n{}", ran.stderr);
     for text in expected {
         assert!(ran.stderr.contains(text), "{text}\n{}", ran.stderr);
@@ -191,7 +280,10 @@ fn bad_fixes_are_refused_by_line_and_value() {
         gnss,
         cell(5, 4, "0"),
         "",
-        &["gnss.csv, line 5: column \"sd_n_m\": 0 is not a standard deviation", "hint: "],
+        &[
+            "gnss.csv, line 5: column \"sd_n_m\": 0 is not a standard deviation",
+            "hint: ",
+        ],
     );
     refused(
         gnss,
@@ -199,16 +291,44 @@ fn bad_fixes_are_refused_by_line_and_value() {
         "",
         &["line 5: column \"sd_vd_m_s\": -0.1 is not a standard deviation"],
     );
-    refused(gnss, cell(7, 1, "89.95"), "", &["line 7: column \"lat_deg\": 89.95 is too near a pole"]);
-    refused(gnss, cell(7, 1, "-146.5"), "", &["line 7: column \"lat_deg\": -146.5 is not a latitude"]);
-    refused(gnss, cell(7, 1, "6.5"), "", &["line 7: the fix is", "swapped"]);
-    refused(gnss, cell(9, 0, "2"), "", &["line 9: time goes from 7 s to 2 s: it must increase"]);
-    refused(gnss, cell(9, 3, "NaN"), "", &["line 9: column \"h_m\": NaN is not finite"]);
+    refused(
+        gnss,
+        cell(7, 1, "89.95"),
+        "",
+        &["line 7: column \"lat_deg\": 89.95 is too near a pole"],
+    );
+    refused(
+        gnss,
+        cell(7, 1, "-146.5"),
+        "",
+        &["line 7: column \"lat_deg\": -146.5 is not a latitude"],
+    );
+    refused(
+        gnss,
+        cell(7, 1, "6.5"),
+        "",
+        &["line 7: the fix is", "swapped"],
+    );
+    refused(
+        gnss,
+        cell(9, 0, "2"),
+        "",
+        &["line 9: time goes from 7 s to 2 s: it must increase"],
+    );
+    refused(
+        gnss,
+        cell(9, 3, "NaN"),
+        "",
+        &["line 9: column \"h_m\": NaN is not finite"],
+    );
     refused(
         gnss,
         cell(1, 4, "sdn_m"),
         "",
-        &["line 1: unknown column \"sdn_m\"", "hint: did you mean \"sd_n_m\"?"],
+        &[
+            "line 1: unknown column \"sdn_m\"",
+            "hint: did you mean \"sd_n_m\"?",
+        ],
     );
 }
 
@@ -221,8 +341,21 @@ fn bad_imu_data_and_flags_are_refused() {
         "",
         &["imu.csv, line 50: column \"gyro_y_rad_s\": \"inf\" is not finite"],
     );
-    refused(imu, cell(50, 0, "0.1"), "", &["imu.csv, line 50: time goes from 0.48 s to 0.1 s"]);
-    refused(imu, cell(50, 1, "99"), "", &["imu.csv, line 50: a rotation of", "hint: is the unit right?"]);
+    refused(
+        imu,
+        cell(50, 0, "0.1"),
+        "",
+        &["imu.csv, line 50: time goes from 0.48 s to 0.1 s"],
+    );
+    refused(
+        imu,
+        cell(50, 1, "99"),
+        "",
+        &[
+            "imu.csv, line 50: a rotation of",
+            "hint: is the unit right?",
+        ],
+    );
     refused(
         imu,
         |t| {
@@ -233,7 +366,12 @@ fn bad_imu_data_and_flags_are_refused() {
         "",
         &["far from 9.81 m/s²"],
     );
-    refused(imu, |t| t.replace("gyro_z_rad_s", "magnet_z"), "", &["channel gyro.z is missing"]);
+    refused(
+        imu,
+        |t| t.replace("gyro_z_rad_s", "magnet_z"),
+        "",
+        &["channel gyro.z is missing"],
+    );
     let same = |t: &str| t.to_owned();
     let gap = |t: &str| {
         t.lines()
@@ -242,12 +380,20 @@ fn bad_imu_data_and_flags_are_refused() {
             .map(|(_, l)| l.to_owned() + "\n")
             .collect()
     };
-    refused(imu, gap, "", &["line 101: no samples from 0.99 s to 13.5 s: 5 s can be bridged"]);
+    refused(
+        imu,
+        gap,
+        "",
+        &["line 101: no samples from 0.99 s to 13.5 s: 5 s can be bridged"],
+    );
     refused(
         imu,
         same,
         "--outage 300:400",
-        &["outage 300:400 does not lie on the data", "hint: the fixes run from 1 to 100 s"],
+        &[
+            "outage 300:400 does not lie on the data",
+            "hint: the fixes run from 1 to 100 s",
+        ],
     );
     refused(imu, same, "--lever-arm 1,2", &["expected 3 numbers"]);
     refused(
@@ -270,23 +416,51 @@ fn standing_still_needs_an_initial_state() {
     let place = place();
     let still = "start = { lat_deg = 46.5, lon_deg = 6.5, h_m = 400, heading_deg = 40 }\nsegment = [{ kind = \"straight\", duration_s = 30 }]\n";
     fs::write(place.path().join("drive.toml"), still).unwrap();
-    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o rec");
-    let ran = nav_sim(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml -o out");
+    done(
+        place.path(),
+        "trajectory record drive.toml imu.toml --seed 3 -o rec",
+    );
+    let ran = nav_sim(
+        place.path(),
+        "fuse rec/imu.csv rec/gnss.csv imu.toml -o out",
+    );
     assert_eq!(ran.code, 2);
     assert!(
         ran.stderr.contains("no fix moves at 0.5 m/s") && ran.stderr.contains("--initial FILE"),
         "{}",
         ran.stderr
     );
-    done(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml --initial rec/initial.toml -o out");
+    done(
+        place.path(),
+        "fuse rec/imu.csv rec/gnss.csv imu.toml --initial rec/initial.toml -o out",
+    );
     // or the heading alone: known no better than given, as nothing moves
-    let ran = done(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml --heading 38:2 -o given --verbose");
-    assert!(ran.stdout.contains("heading 38.0° ± 2.0° as given"), "{}", ran.stdout);
-    let last = table(&place.path().join("given/solution.csv")).pop().unwrap();
+    let ran = done(
+        place.path(),
+        "fuse rec/imu.csv rec/gnss.csv imu.toml --heading 38:2 -o given --verbose",
+    );
+    assert!(
+        ran.stdout.contains("heading 38.0° ± 2.0° as given"),
+        "{}",
+        ran.stdout
+    );
+    let last = table(&place.path().join("given/solution.csv"))
+        .pop()
+        .unwrap();
     let (yaw, sd_yaw) = (last[9], last[18]);
-    assert!((yaw - 38.0).abs() < 1.0 && (1.5..2.1).contains(&sd_yaw), "{yaw} {sd_yaw}");
-    let ran = nav_sim(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml --heading 38:50 -o given");
-    assert!(ran.code == 2 && ran.stderr.contains("standard deviation of up to 30°"), "{}", ran.stderr);
+    assert!(
+        (yaw - 38.0).abs() < 1.0 && (1.5..2.1).contains(&sd_yaw),
+        "{yaw} {sd_yaw}"
+    );
+    let ran = nav_sim(
+        place.path(),
+        "fuse rec/imu.csv rec/gnss.csv imu.toml --heading 38:50 -o given",
+    );
+    assert!(
+        ran.code == 2 && ran.stderr.contains("standard deviation of up to 30°"),
+        "{}",
+        ran.stderr
+    );
 }
 
 /// Positions alone: the heading is never turned round, and every state of the coarse alignment is as good as
@@ -294,23 +468,48 @@ fn standing_still_needs_an_initial_state() {
 #[test]
 fn alignment_from_positions_alone_is_as_good_as_it_says() {
     let place = place();
-    let fast = DRIVE.replace("to_speed_m_s = 10, duration_s = 10", "to_speed_m_s = 28, duration_s = 14");
+    let fast = DRIVE.replace(
+        "to_speed_m_s = 10, duration_s = 10",
+        "to_speed_m_s = 28, duration_s = 14",
+    );
     fs::write(place.path().join("drive.toml"), fast).unwrap();
     for seed in 1..=6 {
-        done(place.path(), &format!("trajectory record drive.toml imu.toml --seed {seed} -o rec"));
+        done(
+            place.path(),
+            &format!("trajectory record drive.toml imu.toml --seed {seed} -o rec"),
+        );
         let gnss = fs::read_to_string(place.path().join("rec/gnss.csv")).unwrap();
         let positions = |l: &str| l.split(',').take(7).collect::<Vec<_>>().join(",") + "\n";
-        fs::write(place.path().join("pos.csv"), gnss.lines().map(positions).collect::<String>()).unwrap();
-        let ran =
-            done(place.path(), "fuse rec/imu.csv pos.csv imu.toml --reference rec/reference.csv -o out");
+        fs::write(
+            place.path().join("pos.csv"),
+            gnss.lines().map(positions).collect::<String>(),
+        )
+        .unwrap();
+        let ran = done(
+            place.path(),
+            "fuse rec/imu.csv pos.csv imu.toml --reference rec/reference.csv -o out",
+        );
         assert!(!ran.stderr.contains("reversing"), "{}", ran.stderr);
         assert!(ran.stdout.starts_with("consistent"), "{}", ran.stdout);
         let out = place.path().join("out");
-        let (errors, solution) = (table(&out.join("errors.csv")), table(&out.join("solution.csv")));
-        let sd = |i: usize| if i < 2 { solution[0][25 + i] } else { solution[0][10 + i] };
+        let (errors, solution) = (
+            table(&out.join("errors.csv")),
+            table(&out.join("solution.csv")),
+        );
+        let sd = |i: usize| {
+            if i < 2 {
+                solution[0][25 + i]
+            } else {
+                solution[0][10 + i]
+            }
+        };
         for i in 0..9 {
             let (error, sd) = (errors[0][1 + i], sd(i));
-            assert!(error.abs() < 4.0 * sd, "seed {seed}, state {i}: {error} against {sd}\n{}", ran.stderr);
+            assert!(
+                error.abs() < 4.0 * sd,
+                "seed {seed}, state {i}: {error} against {sd}\n{}",
+                ran.stderr
+            );
         }
     }
 }
@@ -328,31 +527,65 @@ fn useless_fusions_are_refused_or_said() {
         &["the initial position is 11", "hint: check t_s"],
     );
     let same = |t: &str| t.to_owned();
-    refused(initial, same, "--lever-arm 800,0,-1200", &["--lever-arm 800,0,-1200: more than 100 m"]);
-    refused(initial, same, "--outage 90.2:90.7", &["outage 90.2:90.7 withholds no fix"]);
+    refused(
+        initial,
+        same,
+        "--lever-arm 800,0,-1200",
+        &["--lever-arm 800,0,-1200: more than 100 m"],
+    );
+    refused(
+        initial,
+        same,
+        "--outage 90.2:90.7",
+        &["outage 90.2:90.7 withholds no fix"],
+    );
     let place = recorded();
     let turned = "fuse rec/imu.csv rec/gnss.csv imu.toml --initial rec/initial.toml --mounting 0,0,90 -o out";
     let ran = nav_sim(place.path(), turned);
-    assert!(ran.stdout.contains("NIS") && ran.stderr.contains("--mounting"), "{}", ran.stderr);
-    let ran = done(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml --initial rec/initial.toml -o out");
+    assert!(
+        ran.stdout.contains("NIS") && ran.stderr.contains("--mounting"),
+        "{}",
+        ran.stderr
+    );
+    let ran = done(
+        place.path(),
+        "fuse rec/imu.csv rec/gnss.csv imu.toml --initial rec/initial.toml -o out",
+    );
     assert!(!ran.stderr.contains("warning"), "{}", ran.stderr);
     let twice = "fuse rec/imu.csv rec/gnss.csv imu.toml --outage 60:70 --outage 65:75 -o out";
     let ran = done(place.path(), twice);
-    assert!(ran.stderr.contains("overlap or touch") && ran.stdout.contains("60–75 s"), "{}", ran.stdout);
+    assert!(
+        ran.stderr.contains("overlap or touch") && ran.stdout.contains("60–75 s"),
+        "{}",
+        ran.stdout
+    );
 }
 
 /// East of 180° what is recorded is what `fuse` reads.
 #[test]
 fn a_recording_across_the_antimeridian_is_fused() {
     let place = place();
-    let drive =
-        DRIVE.replace("lon_deg = 6.5", "lon_deg = 179.9999").replace("heading_deg = 40", "heading_deg = 90");
+    let drive = DRIVE
+        .replace("lon_deg = 6.5", "lon_deg = 179.9999")
+        .replace("heading_deg = 40", "heading_deg = 90");
     fs::write(place.path().join("drive.toml"), drive).unwrap();
-    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o rec");
+    done(
+        place.path(),
+        "trajectory record drive.toml imu.toml --seed 3 -o rec",
+    );
     for name in ["rec/gnss.csv", "rec/reference.csv"] {
-        let longitudes: Vec<f64> = table(&place.path().join(name)).iter().map(|row| row[2]).collect();
-        assert!(longitudes.iter().all(|l| -180.0 < *l && *l <= 180.0), "{name}");
-        assert!(longitudes.iter().any(|l| *l < 0.0) && longitudes.iter().any(|l| *l > 0.0), "{name}");
+        let longitudes: Vec<f64> = table(&place.path().join(name))
+            .iter()
+            .map(|row| row[2])
+            .collect();
+        assert!(
+            longitudes.iter().all(|l| -180.0 < *l && *l <= 180.0),
+            "{name}"
+        );
+        assert!(
+            longitudes.iter().any(|l| *l < 0.0) && longitudes.iter().any(|l| *l > 0.0),
+            "{name}"
+        );
     }
     let ran = done(
         place.path(),

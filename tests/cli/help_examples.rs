@@ -6,17 +6,29 @@ use std::process::{Command, Output};
 const PROGRAM: &str = env!("CARGO_BIN_EXE_nav-sim");
 
 fn help(path: &[String]) -> String {
-    let output = Command::new(PROGRAM).args(path).arg("--help").output().unwrap();
+    let output = Command::new(PROGRAM)
+        .args(path)
+        .arg("--help")
+        .output()
+        .unwrap();
     assert!(output.status.success(), "{path:?} --help fails");
     String::from_utf8(output.stdout).unwrap()
 }
 
 /// Names under "Commands:" in a help text.
 fn subcommands(help: &str) -> Vec<String> {
-    let section = help.lines().skip_while(|l| *l != "Commands:").skip(1).take_while(|l| !l.is_empty());
+    let section = help
+        .lines()
+        .skip_while(|l| *l != "Commands:")
+        .skip(1)
+        .take_while(|l| !l.is_empty());
     let name = |l: &str| l.split_whitespace().next().map(str::to_owned);
     // a wrapped description is indented deeper than a name
-    section.filter(|l| !l.starts_with("   ")).filter_map(name).filter(|n| n != "help").collect()
+    section
+        .filter(|l| !l.starts_with("   "))
+        .filter_map(name)
+        .filter(|n| n != "help")
+        .collect()
 }
 
 /// All commands below one, as paths of names.
@@ -26,18 +38,35 @@ fn commands(path: &[String]) -> Vec<Vec<String>> {
         let below = commands(&path);
         std::iter::once(path).chain(below)
     };
-    subcommands(&help(path)).into_iter().flat_map(deeper).collect()
+    subcommands(&help(path))
+        .into_iter()
+        .flat_map(deeper)
+        .collect()
 }
 
 /// The lines under "Examples:", which must come first.
 fn examples(path: &[String]) -> Vec<String> {
     let help = help(path);
     let mut lines = help.lines();
-    assert_eq!(lines.next(), Some("Examples:"), "{path:?} --help does not lead with examples");
-    let text: String = lines.take_while(|l| !l.is_empty()).map(|l| format!("{l}\n")).collect();
-    let examples: Vec<String> = text.replace("\\\n", " ").lines().map(|l| l.trim().to_owned()).collect();
+    assert_eq!(
+        lines.next(),
+        Some("Examples:"),
+        "{path:?} --help does not lead with examples"
+    );
+    let text: String = lines
+        .take_while(|l| !l.is_empty())
+        .map(|l| format!("{l}\n"))
+        .collect();
+    let examples: Vec<String> = text
+        .replace("\\\n", " ")
+        .lines()
+        .map(|l| l.trim().to_owned())
+        .collect();
     assert_eq!(examples.len(), 3, "{path:?}: {examples:?}");
-    assert!(examples.iter().all(|e| e.starts_with("nav-sim ")), "{path:?}, a line is too long: {examples:?}");
+    assert!(
+        examples.iter().all(|e| e.starts_with("nav-sim ")),
+        "{path:?}, a line is too long: {examples:?}"
+    );
     examples
 }
 
@@ -45,7 +74,12 @@ fn examples(path: &[String]) -> Vec<String> {
 fn paste(line: &str, directory: &Path) -> Output {
     let bin = Path::new(PROGRAM).parent().unwrap().display().to_string();
     let path = format!("{bin}:{}", std::env::var("PATH").unwrap_or_default());
-    Command::new("bash").args(["-c", line]).current_dir(directory).env("PATH", path).output().unwrap()
+    Command::new("bash")
+        .args(["-c", line])
+        .current_dir(directory)
+        .env("PATH", path)
+        .output()
+        .unwrap()
 }
 
 fn checkout() -> tempfile::TempDir {

@@ -19,22 +19,32 @@ fn refused(directory: &Path, command: &str) -> Ran {
 #[test]
 fn choose_takes_the_error_of_a_clock_from_the_rate() {
     let place = place_with(DRIVE, MODEL);
-    done(place.path(), "synthesize imu.toml --replicates 3 --samples 4096 --seed 1 -o rec");
+    done(
+        place.path(),
+        "synthesize imu.toml --replicates 3 --samples 4096 --seed 1 -o rec",
+    );
     for file in fs::read_dir(place.path().join("rec")).unwrap() {
         let path = file.unwrap().path();
         if path.extension().is_some_and(|e| e == "csv") {
             let text = fs::read_to_string(&path).unwrap();
             let row = |(k, line): (usize, &str)| match line.split_once(',') {
-                Some((_, values)) if k > 0 => format!("{:.7},{values}\n", (k - 1) as f64 / 100.0123),
+                Some((_, values)) if k > 0 => {
+                    format!("{:.7},{values}\n", (k - 1) as f64 / 100.0123)
+                }
                 _ => format!("{line}\n"),
             };
             fs::write(&path, text.lines().enumerate().map(row).collect::<String>()).unwrap();
         }
     }
-    let choose = "choose rec --trajectory drive.toml --outage 15:25 --estimator awv --model WN+RW --seed 1";
+    let choose =
+        "choose rec --trajectory drive.toml --outage 15:25 --estimator awv --model WN+RW --seed 1";
     let ran = plain(place.path(), &format!("{choose} -o a"));
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    assert!(ran.stderr.contains("run at 100.012 Hz: taken as 100 Hz"), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("run at 100.012 Hz: taken as 100 Hz"),
+        "{}",
+        ran.stderr
+    );
     let model = fs::read_to_string(place.path().join("a/model.toml")).unwrap();
     assert!(model.contains("\nrate_hz = 100.0\n"), "{model}");
 }
@@ -42,33 +52,75 @@ fn choose_takes_the_error_of_a_clock_from_the_rate() {
 #[test]
 fn models_and_curves_say_what_they_are_of() {
     let place = place_with(DRIVE, MODEL);
-    done(place.path(), "synthesize imu.toml --replicates 1 --samples 4096 --axes gyro.x --seed 1 -o rec");
+    done(
+        place.path(),
+        "synthesize imu.toml --replicates 1 --samples 4096 --axes gyro.x --seed 1 -o rec",
+    );
     // Two estimators of one signal are told apart.
     let calibrate = "calibrate rec --model WN --bootstrap 0";
-    let ran = plain(place.path(), &format!("{calibrate} --estimator all --scales 0.001min:1h -o both.toml"));
+    let ran = plain(
+        place.path(),
+        &format!("{calibrate} --estimator all --scales 0.001min:1h -o both.toml"),
+    );
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     for name in ["gyro.x gmwm ", "gyro.x rgmwm "] {
-        assert!(ran.stdout.lines().any(|line| line.trim_start().starts_with(name)), "{}", ran.stdout);
+        assert!(
+            ran.stdout
+                .lines()
+                .any(|line| line.trim_start().starts_with(name)),
+            "{}",
+            ran.stdout
+        );
     }
     let ran = refused(place.path(), &format!("{calibrate} -o -"));
-    assert!(ran.stderr.contains("- is not a file") && !place.path().join("-").exists(), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("- is not a file") && !place.path().join("-").exists(),
+        "{}",
+        ran.stderr
+    );
     // A curve that does not say its sensor.
-    fs::write(place.path().join("c.csv"), "tau_samples,wv,edof\n2,4,900\n4,2,400\n8,1,200\n").unwrap();
+    fs::write(
+        place.path().join("c.csv"),
+        "tau_samples,wv,edof\n2,4,900\n4,2,400\n8,1,200\n",
+    )
+    .unwrap();
     let curve = "calibrate --curve c.csv --rate-hz 100 --model WN --bootstrap 0";
     let told = |more: &str| plain(place.path(), &format!("{curve}{more}")).stderr;
-    assert!(told("").contains("taken as of an accelerometer"), "{}", told(""));
-    assert!(!told(" --axes gyro").contains("taken as"), "{}", told(" --axes gyro"));
+    assert!(
+        told("").contains("taken as of an accelerometer"),
+        "{}",
+        told("")
+    );
+    assert!(
+        !told(" --axes gyro").contains("taken as"),
+        "{}",
+        told(" --axes gyro")
+    );
 }
 
 /// What the program wrote beside a result is no broken curve.
 #[test]
 fn check_knows_its_own_records() {
     let place = place_with(DRIVE, MODEL);
-    done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
-    done(place.path(), "calibrate rec --model WN --bootstrap 9 --seed 1 -o m.toml");
-    let ran = plain(place.path(), "check rec/manifest.json m.draws.json m.wv.json");
+    done(
+        place.path(),
+        "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec",
+    );
+    done(
+        place.path(),
+        "calibrate rec --model WN --bootstrap 9 --seed 1 -o m.toml",
+    );
+    let ran = plain(
+        place.path(),
+        "check rec/manifest.json m.draws.json m.wv.json",
+    );
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     let lines: Vec<&str> = ran.stdout.lines().collect();
-    assert!(lines[..2].iter().all(|line| line.contains("a record that nav-sim wrote")), "{lines:?}");
+    assert!(
+        lines[..2]
+            .iter()
+            .all(|line| line.contains("a record that nav-sim wrote")),
+        "{lines:?}"
+    );
     assert!(lines[2].contains("wavelet-variance curves"), "{lines:?}");
 }

@@ -15,10 +15,17 @@ fn numbers_as_in(page: &str, results: &Value) -> usize {
     let cells: Vec<(&str, &str)> = page
         .split("data-json=\"")
         .skip(1)
-        .map(|rest| (rest.split('"').next().unwrap(), rest.split(['>', '<']).nth(1).unwrap()))
+        .map(|rest| {
+            (
+                rest.split('"').next().unwrap(),
+                rest.split(['>', '<']).nth(1).unwrap(),
+            )
+        })
         .collect();
     for (source, shown) in &cells {
-        let value = results.pointer(source).unwrap_or_else(|| panic!("{source} is not in the results"));
+        let value = results
+            .pointer(source)
+            .unwrap_or_else(|| panic!("{source} is not in the results"));
         let value = value.as_f64().unwrap_or(f64::NAN);
         let expected = match shown.strip_suffix(" %") {
             Some(_) => format!("{:.0} %", 100.0 * value),
@@ -40,7 +47,10 @@ fn is_whole(page: &str) {
 
 /// Noise of 4096 samples, three recordings.
 fn recordings(place: &Path) {
-    done(place, "synthesize imu.toml --replicates 3 --samples 4096 --seed 1 -o static");
+    done(
+        place,
+        "synthesize imu.toml --replicates 3 --samples 4096 --seed 1 -o static",
+    );
 }
 
 #[test]
@@ -50,7 +60,12 @@ fn calibrate_writes_its_page_beside_the_model_the_same_on_any_number_of_threads(
     recordings(dir);
     let command = "calibrate static --model WN+RW --seed 1 --bootstrap 20 --format json -o m.toml";
     let ran = done(dir, &format!("{command} -j 1"));
-    assert!(ran.stderr.contains("m.wv.json, m.draws.json, m.html, m.svg"), "{}", ran.stderr);
+    assert!(
+        ran.stderr
+            .contains("m.wv.json, m.draws.json, m.html, m.svg"),
+        "{}",
+        ran.stderr
+    );
     let page = text(&dir.join("m.html"));
     is_whole(&page);
     assert!(page.contains("Accelerometer, all axes") && page.contains("data / model"));
@@ -60,13 +75,21 @@ fn calibrate_writes_its_page_beside_the_model_the_same_on_any_number_of_threads(
         let (own, walk) = (&fit["parameters"], &fit["parameters"]["white_and_walk"]);
         1 + usize::from(own["minimum"].is_object()) + usize::from(walk["k"]["observed"] == true)
     };
-    let stated: usize = results["fits"].as_array().unwrap().iter().map(practical).sum();
+    let stated: usize = results["fits"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(practical)
+        .sum();
     // recordings, spread and noise of the means of six axes
     assert_eq!(numbers_as_in(&page, &results), 4 + stated + 18);
     let picture = text(&dir.join("m.svg"));
     assert!(picture.starts_with("<svg xmlns=") && picture.ends_with("</svg>\n"));
     done(dir, &format!("{command} -j 2"));
-    assert_eq!((page, picture), (text(&dir.join("m.html")), text(&dir.join("m.svg"))));
+    assert_eq!(
+        (page, picture),
+        (text(&dir.join("m.html")), text(&dir.join("m.svg")))
+    );
 }
 
 #[test]
@@ -75,8 +98,15 @@ fn a_page_of_somebody_else_is_not_replaced() {
     let dir = place.path();
     recordings(dir);
     fs::write(dir.join("m.html"), "<p>mine</p>").unwrap();
-    let ran = nav_sim(dir, "calibrate static --model WN --seed 1 --bootstrap 0 -o m.toml");
-    assert!(ran.code == 2 && ran.stderr.contains("m.html is not of this command"), "{}", ran.stderr);
+    let ran = nav_sim(
+        dir,
+        "calibrate static --model WN --seed 1 --bootstrap 0 -o m.toml",
+    );
+    assert!(
+        ran.code == 2 && ran.stderr.contains("m.html is not of this command"),
+        "{}",
+        ran.stderr
+    );
     assert!(text(&dir.join("m.html")) == "<p>mine</p>" && !dir.join("m.toml").exists());
 }
 
@@ -90,15 +120,27 @@ fn wv_writes_a_page_and_a_picture_where_it_is_told() {
     assert!(text(&dir.join("curves.svg")).contains("Gyroscope"));
     let ran = nav_sim(dir, "wv static --plot curves.PNG");
     if cfg!(feature = "pictures") {
-        assert!(fs::read(dir.join("curves.PNG")).unwrap().starts_with(b"\x89PNG\r\n\x1a\n"));
+        assert!(
+            fs::read(dir.join("curves.PNG"))
+                .unwrap()
+                .starts_with(b"\x89PNG\r\n\x1a\n")
+        );
     } else {
         let said = "curves.PNG: a picture is written as SVG\n\nhint: name a file that ends in .svg; PNG needs a build";
         assert!(ran.code == 2 && ran.stderr.contains(said), "{}", ran.stderr);
     }
     let ran = nav_sim(dir, "wv static --plot curves");
-    assert!(ran.code == 2 && ran.stderr.contains("curves: a picture is written as SVG"), "{}", ran.stderr);
+    assert!(
+        ran.code == 2 && ran.stderr.contains("curves: a picture is written as SVG"),
+        "{}",
+        ran.stderr
+    );
     let ran = nav_sim(dir, "wv static --plot static/replicate_1.csv");
-    assert!(ran.code == 2 && ran.stderr.contains("a picture is written as SVG"), "{}", ran.stderr);
+    assert!(
+        ran.code == 2 && ran.stderr.contains("a picture is written as SVG"),
+        "{}",
+        ran.stderr
+    );
 }
 
 #[test]
@@ -123,9 +165,18 @@ fn runs_and_their_comparison_have_pages_with_the_numbers_of_their_results() {
         assert!(page.contains(word), "{word}");
     }
     let svg = text(&dir.join("run.svg"));
-    assert!(svg.contains("Horizontal position error") && svg.contains("Percentiles of the horizontal"));
-    let ran = done(dir, "compare I_dr-awv --reference I_awv -o out/c.json --plot c.svg");
-    assert!(ran.stderr.contains("wrote out/c.json, out/c.html"), "{}", ran.stderr);
+    assert!(
+        svg.contains("Horizontal position error") && svg.contains("Percentiles of the horizontal")
+    );
+    let ran = done(
+        dir,
+        "compare I_dr-awv --reference I_awv -o out/c.json --plot c.svg",
+    );
+    assert!(
+        ran.stderr.contains("wrote out/c.json, out/c.html"),
+        "{}",
+        ran.stderr
+    );
     let page = text(&dir.join("out/c.html"));
     is_whole(&page);
     let comparison: Value = serde_json::from_str(&text(&dir.join("out/c.json"))).unwrap();
@@ -137,28 +188,58 @@ fn runs_and_their_comparison_have_pages_with_the_numbers_of_their_results() {
 fn tune_require_and_design_write_a_page_with_the_numbers_they_print() {
     let place = place_with(DRIVE, MODEL);
     let dir = place.path();
-    fs::write(dir.join("worse.toml"), MODEL.replace("sigma2 = ", "sigma2 = 4")).unwrap();
+    fs::write(
+        dir.join("worse.toml"),
+        MODEL.replace("sigma2 = ", "sigma2 = 4"),
+    )
+    .unwrap();
     let commands = [
-        ("tune imu.toml --truth worse.toml --trajectory drive.toml --outage 30:40", 4 * 3 + 2),
-        ("require drive.toml --outage 10 --p95-m 50 --iso-drift", 4 * 3 + 1 + 8),
-        ("require drive.toml imu.toml --outage 30:40 --p95-m 50", 4 + 2 + 2),
+        (
+            "tune imu.toml --truth worse.toml --trajectory drive.toml --outage 30:40",
+            4 * 3 + 2,
+        ),
+        (
+            "require drive.toml --outage 10 --p95-m 50 --iso-drift",
+            4 * 3 + 1 + 8,
+        ),
+        (
+            "require drive.toml imu.toml --outage 30:40 --p95-m 50",
+            4 + 2 + 2,
+        ),
         ("require drive.toml imu.toml --outage longest --p95-m 50", 2),
-        ("require drive.toml --outage 10 --p95-m 50 --catalogue", 17 * 2),
+        (
+            "require drive.toml --outage 10 --p95-m 50 --catalogue",
+            17 * 2,
+        ),
         ("design imu.toml --recordings 3 --hours 0.2 --draws 40", 2),
     ];
     for (k, (command, least)) in commands.into_iter().enumerate() {
-        let ran = nav_sim(dir, &format!("{command} --format json --plot {k}.html --plot {k}.svg"));
+        let ran = nav_sim(
+            dir,
+            &format!("{command} --format json --plot {k}.html --plot {k}.svg"),
+        );
         assert!(ran.code == 0 || ran.code == 3, "{command}: {}", ran.stderr);
-        assert!(ran.stderr.contains(&format!("wrote {k}.html")), "{}", ran.stderr);
+        assert!(
+            ran.stderr.contains(&format!("wrote {k}.html")),
+            "{}",
+            ran.stderr
+        );
         let page = text(&dir.join(format!("{k}.html")));
         is_whole(&page);
         // what has no figure is an empty picture
         let svg = text(&dir.join(format!("{k}.svg")));
-        assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"), "{svg}");
+        assert!(
+            svg.starts_with("<svg") && svg.ends_with("</svg>\n"),
+            "{svg}"
+        );
         let numbers = numbers_as_in(&page, &serde_json::from_str(&ran.stdout).unwrap());
         assert!(numbers >= least, "{command}: {numbers}");
     }
     fs::write(dir.join("worse.html"), MODEL).unwrap();
     let ran = nav_sim(dir, "tune imu.toml --truth worse.html --plot worse.html");
-    assert!(ran.code == 2 && ran.stderr.contains("would be overwritten"), "{}", ran.stderr);
+    assert!(
+        ran.code == 2 && ran.stderr.contains("would be overwritten"),
+        "{}",
+        ran.stderr
+    );
 }

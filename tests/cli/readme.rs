@@ -14,11 +14,17 @@ const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 fn pages() -> Vec<PathBuf> {
     let inside = |directory: &str| {
         let entries = std::fs::read_dir(Path::new(ROOT).join(directory)).unwrap();
-        entries.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "md"))
+        entries
+            .map(|e| e.unwrap().path())
+            .filter(|p| p.extension().is_some_and(|e| e == "md"))
     };
     let readme = Path::new(ROOT).join("README.md");
     let mut pages: Vec<PathBuf> = std::iter::once(readme)
-        .chain(["docs", "docs/how-to", "docs/answers"].into_iter().flat_map(inside))
+        .chain(
+            ["docs", "docs/how-to", "docs/answers"]
+                .into_iter()
+                .flat_map(inside),
+        )
         .collect();
     pages.sort();
     pages
@@ -46,9 +52,14 @@ fn blocks(page: &str) -> Vec<(String, String)> {
 fn run(page: &Path, at_night: bool) -> Result<String, String> {
     let directory = tempfile::tempdir().unwrap();
     for name in ["trajectories", "calib_data", "examples"] {
-        std::os::unix::fs::symlink(Path::new(ROOT).join(name), directory.path().join(name)).unwrap();
+        std::os::unix::fs::symlink(Path::new(ROOT).join(name), directory.path().join(name))
+            .unwrap();
     }
-    let bin = Path::new(env!("CARGO_BIN_EXE_nav-sim")).parent().unwrap().display().to_string();
+    let bin = Path::new(env!("CARGO_BIN_EXE_nav-sim"))
+        .parent()
+        .unwrap()
+        .display()
+        .to_string();
     let path = format!("{bin}:{}", std::env::var("PATH").unwrap());
     let mut text = std::fs::read_to_string(page).unwrap();
     let mut printed = String::new();
@@ -56,7 +67,10 @@ fn run(page: &Path, at_night: bool) -> Result<String, String> {
         match info.as_str() {
             "sh" | "sh night" if info == "sh" || at_night => {
                 let mut shell = Command::new("bash");
-                let shell = shell.args(["-euc", &block]).current_dir(&directory).env("PATH", &path);
+                let shell = shell
+                    .args(["-euc", &block])
+                    .current_dir(&directory)
+                    .env("PATH", &path);
                 let output = shell.output().unwrap();
                 if !output.status.success() {
                     let said = String::from_utf8_lossy(&output.stderr);
@@ -104,9 +118,10 @@ fn all_run(at_night: bool) {
         Err(failure) => Some(failure),
         Ok(text) if bless => std::fs::write(page, text).err().map(|e| e.to_string()),
         Ok(text) if alike(&text, &std::fs::read_to_string(page).unwrap()) => None,
-        Ok(text) => {
-            Some(format!("{} shows other outputs (BLESS=1 writes them anew):\n{text}", page.display()))
-        }
+        Ok(text) => Some(format!(
+            "{} shows other outputs (BLESS=1 writes them anew):\n{text}",
+            page.display()
+        )),
     };
     let failures: Vec<String> = pages.par_iter().filter_map(failure).collect();
     assert!(failures.is_empty(), "{}", failures.join("\n\n"));
@@ -115,7 +130,9 @@ fn all_run(at_night: bool) {
 /// Numbers of a picture, and what stands between them.
 fn numbers(picture: &str) -> (Vec<f64>, String) {
     let is_number = |c: char| c.is_ascii_digit() || c == '.';
-    let words = picture.split(|c| !is_number(c)).filter_map(|word| word.parse().ok());
+    let words = picture
+        .split(|c| !is_number(c))
+        .filter_map(|word| word.parse().ok());
     (words.collect(), picture.replace(is_number, ""))
 }
 
@@ -125,18 +142,39 @@ fn numbers(picture: &str) -> (Vec<f64>, String) {
 fn pictures_are_current() {
     let made = tempfile::tempdir().unwrap();
     let script = ["scripts/pictures.sh", env!("CARGO_BIN_EXE_nav-sim")];
-    let ran = Command::new("sh").current_dir(ROOT).args(script).arg(made.path()).output().unwrap();
-    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    let ran = Command::new("sh")
+        .current_dir(ROOT)
+        .args(script)
+        .arg(made.path())
+        .output()
+        .unwrap();
+    assert!(
+        ran.status.success(),
+        "{}",
+        String::from_utf8_lossy(&ran.stderr)
+    );
     for name in ["calibration.svg", "run.svg"] {
         let link = format!("figures/{name})");
-        let shown = pages().iter().any(|page| std::fs::read_to_string(page).unwrap().contains(&link));
+        let shown = pages()
+            .iter()
+            .any(|page| std::fs::read_to_string(page).unwrap().contains(&link));
         assert!(shown, "{name}");
         let read = |directory: &Path| std::fs::read_to_string(directory.join(name)).unwrap();
         let (there, words) = numbers(&read(&Path::new(ROOT).join("docs/figures")));
         let (new, new_words) = numbers(&read(made.path()));
-        assert!(words == new_words && there.len() == new.len(), "{name}: scripts/pictures.sh");
-        let farthest = there.iter().zip(&new).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(there.len() > 500 && farthest <= 0.2, "{name}: {farthest}; scripts/pictures.sh");
+        assert!(
+            words == new_words && there.len() == new.len(),
+            "{name}: scripts/pictures.sh"
+        );
+        let farthest = there
+            .iter()
+            .zip(&new)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
+        assert!(
+            there.len() > 500 && farthest <= 0.2,
+            "{name}: {farthest}; scripts/pictures.sh"
+        );
     }
 }
 
@@ -145,12 +183,20 @@ fn pictures_are_current() {
 fn links_lead_somewhere() {
     for page in pages() {
         let text = std::fs::read_to_string(&page).unwrap();
-        for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+        for link in text
+            .split("](")
+            .skip(1)
+            .filter_map(|rest| rest.split(')').next())
+        {
             let file = link.split('#').next().unwrap();
             if file.is_empty() || file.starts_with("http") {
                 continue;
             }
-            assert!(page.parent().unwrap().join(file).exists(), "{}: {link}", page.display());
+            assert!(
+                page.parent().unwrap().join(file).exists(),
+                "{}: {link}",
+                page.display()
+            );
         }
     }
 }
@@ -158,9 +204,16 @@ fn links_lead_somewhere() {
 /// Every command has its row, and every row is a command.
 #[test]
 fn the_table_of_commands_is_complete() {
-    let help = Command::new(env!("CARGO_BIN_EXE_nav-sim")).arg("help").output().unwrap();
+    let help = Command::new(env!("CARGO_BIN_EXE_nav-sim"))
+        .arg("help")
+        .output()
+        .unwrap();
     let help = String::from_utf8(help.stdout).unwrap();
-    let section = help.lines().skip_while(|l| *l != "Commands:").skip(1).take_while(|l| !l.is_empty());
+    let section = help
+        .lines()
+        .skip_while(|l| *l != "Commands:")
+        .skip(1)
+        .take_while(|l| !l.is_empty());
     let mut commands: Vec<&str> = section
         .filter(|l| !l.starts_with("   "))
         .filter_map(|l| l.split_whitespace().next())
@@ -172,7 +225,9 @@ fn the_table_of_commands_is_complete() {
         .skip(2)
         .take_while(|l| l.starts_with('|'));
     let first_cell = |l: &'static str| l.split('|').nth(1).unwrap();
-    let mut named: Vec<&str> = rows.flat_map(|l| first_cell(l).split('`').skip(1).step_by(2)).collect();
+    let mut named: Vec<&str> = rows
+        .flat_map(|l| first_cell(l).split('`').skip(1).step_by(2))
+        .collect();
     commands.sort_unstable();
     named.sort_unstable();
     assert_eq!(named, commands);

@@ -25,7 +25,11 @@ segment = [
 pub fn require(dir: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
     let trajectory = format!("{ROOT}/trajectories/figure_eight.toml");
     let mut command = Command::cargo_bin("nav-sim").unwrap();
-    command.current_dir(dir).args(["require", &trajectory]).args(arguments).assert()
+    command
+        .current_dir(dir)
+        .args(["require", &trajectory])
+        .args(arguments)
+        .assert()
 }
 
 pub fn stdout(assert: &assert_cmd::assert::Assert) -> String {
@@ -36,14 +40,26 @@ pub fn stdout(assert: &assert_cmd::assert::Assert) -> String {
 fn the_imu_that_is_named_meets_the_limit_and_a_tighter_one_not() {
     let dir = tempfile::tempdir().unwrap();
     let outage = ["--outage", "60:90"];
-    let asked = ["--require", "p95_m<=10", "-o", "needed.toml", "--format", "json"];
+    let asked = [
+        "--require",
+        "p95_m<=10",
+        "-o",
+        "needed.toml",
+        "--format",
+        "json",
+    ];
     let found = require(dir.path(), &[&outage[..], &asked].concat()).success();
     let found: Value = serde_json::from_str(&stdout(&found)).unwrap();
     assert_eq!(found["figures"].as_array().unwrap().len(), 4);
     let given = |limit: &str| {
         require(
             dir.path(),
-            &[&["needed.toml"], &outage[..], &["--require", &format!("p95_m<={limit}")]].concat(),
+            &[
+                &["needed.toml"],
+                &outage[..],
+                &["--require", &format!("p95_m<={limit}")],
+            ]
+            .concat(),
         )
     };
     let met = stdout(&given("10").success());
@@ -54,29 +70,72 @@ fn the_imu_that_is_named_meets_the_limit_and_a_tighter_one_not() {
         "{met}"
     );
     let missed = stdout(&given("9.9").code(3));
-    assert!(missed.starts_with("NOT met") && missed.lines().count() <= 20, "{missed}");
+    assert!(
+        missed.starts_with("NOT met") && missed.lines().count() <= 20,
+        "{missed}"
+    );
     // 9.97 to 10 m, as is judged below
-    assert!(missed.lines().next().unwrap().ends_with(", 1.01 times the limit"), "{missed}");
+    assert!(
+        missed
+            .lines()
+            .next()
+            .unwrap()
+            .ends_with(", 1.01 times the limit"),
+        "{missed}"
+    );
     // the outage that it bridges is the one that it was made for, to the second
     let longest = require(
         dir.path(),
-        &["needed.toml", "--outage", "60:61", "--require", "p95_m<=10", "--format", "json"],
+        &[
+            "needed.toml",
+            "--outage",
+            "60:61",
+            "--require",
+            "p95_m<=10",
+            "--format",
+            "json",
+        ],
     );
     let longest: Value = serde_json::from_str(&stdout(&longest.success())).unwrap();
     let seconds = longest["outage"]["longest_s"].as_f64().unwrap();
     assert!((29.0..=31.0).contains(&seconds), "{longest}");
     // `run` takes steps of a fifth of a second where the search takes one: its reserve covers that
     let drive = format!("{ROOT}/trajectories/figure_eight.toml");
-    let run = ["run", &drive, "needed.toml", "--filter", "full", "--method", "lincov", "--outage", "60:90"];
+    let run = [
+        "run",
+        &drive,
+        "needed.toml",
+        "--filter",
+        "full",
+        "--method",
+        "lincov",
+        "--outage",
+        "60:90",
+    ];
     let mut run_command = Command::cargo_bin("nav-sim").unwrap();
-    run_command.current_dir(dir.path()).args(run).args(["--require", "p95_m<=10"]).assert().success();
+    run_command
+        .current_dir(dir.path())
+        .args(run)
+        .args(["--require", "p95_m<=10"])
+        .assert()
+        .success();
     // met: the longest is no shorter than what was asked for; not met: it is
     for (limit, is_met) in [("10", true), ("9.97", false)] {
-        let asked =
-            ["needed.toml", "--outage", "60:90", "--require", &format!("p95_m<={limit}"), "--format", "json"];
+        let asked = [
+            "needed.toml",
+            "--outage",
+            "60:90",
+            "--require",
+            &format!("p95_m<={limit}"),
+            "--format",
+            "json",
+        ];
         let judged: Value = serde_json::from_str(&stdout(&require(dir.path(), &asked))).unwrap();
         let seconds = judged["outage"]["longest_s"].as_f64().unwrap();
-        assert!(judged["met"] == is_met && (seconds >= 30.0) == is_met, "{limit}: {judged}");
+        assert!(
+            judged["met"] == is_met && (seconds >= 30.0) == is_met,
+            "{limit}: {judged}"
+        );
     }
 }
 
@@ -85,21 +144,37 @@ fn the_imu_that_is_named_meets_the_limit_and_a_tighter_one_not() {
 #[test]
 fn the_turn_on_biases_of_a_needed_imu_are_said_and_written() {
     let dir = tempfile::tempdir().unwrap();
-    std::fs::write(dir.path().join("biased.toml"), "[imu]\nturn_on_bias_accel_m_s2 = 0.02\n").unwrap();
+    std::fs::write(
+        dir.path().join("biased.toml"),
+        "[imu]\nturn_on_bias_accel_m_s2 = 0.02\n",
+    )
+    .unwrap();
     let asked = ["--outage", "60:90", "--require", "p95_m<=10"];
     let needed = |more: &[&str], out: &str| {
-        let said = stdout(&require(dir.path(), &[&asked[..], &["-o", out], more].concat()).success());
+        let said =
+            stdout(&require(dir.path(), &[&asked[..], &["-o", out], more].concat()).success());
         (said, std::fs::read_to_string(dir.path().join(out)).unwrap())
     };
     let (said, file) = needed(&[], "needed.toml");
-    assert!(said.contains("an IMU without turn-on bias ([imu] of --scenario states one)"), "{said}");
-    assert!(file.contains("turn_on_bias = \"without turn-on bias") && !file.contains("[turn_on]"), "{file}");
+    assert!(
+        said.contains("an IMU without turn-on bias ([imu] of --scenario states one)"),
+        "{said}"
+    );
+    assert!(
+        file.contains("turn_on_bias = \"without turn-on bias") && !file.contains("[turn_on]"),
+        "{file}"
+    );
     let (said, file) = needed(&["--scenario", "biased.toml"], "biased_imu.toml");
-    assert!(said.contains("an IMU with turn-on biases of 0.0200 m/s² (accel) and 0 rad/s (gyro)"), "{said}");
+    assert!(
+        said.contains("an IMU with turn-on biases of 0.0200 m/s² (accel) and 0 rad/s (gyro)"),
+        "{said}"
+    );
     assert!(file.contains("[turn_on]\naccel_m_s2 = 0.02"), "{file}");
     let walk = |file: &str| -> f64 {
         let provenance = file.parse::<toml::Table>().unwrap()["provenance"].clone();
-        provenance["velocity random walk (m/s/√h)"].as_float().unwrap()
+        provenance["velocity random walk (m/s/√h)"]
+            .as_float()
+            .unwrap()
     };
     let unbiased = std::fs::read_to_string(dir.path().join("needed.toml")).unwrap();
     assert!(walk(&file) < walk(&unbiased), "{file}{unbiased}");
@@ -113,24 +188,53 @@ fn a_limit_that_no_fix_keeps_is_told_with_the_error_without_an_outage() {
     let dir = tempfile::tempdir().unwrap();
     let file = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
     file("rare.toml", "[gnss]\nrate_hz = 0.5\n");
-    file("every_other.toml", "[outage_periodic]\nfirst_s = 1\nevery_s = 2\nduration_s = 1\n");
+    file(
+        "every_other.toml",
+        "[outage_periodic]\nfirst_s = 1\nevery_s = 2\nduration_s = 1\n",
+    );
     let model = format!("{ROOT}/calib_data/tactical.toml");
-    let asked = [&model, "--scenario", "rare.toml", "--outage", "62:92", "--require", "p95_m<=0.5"];
+    let asked = [
+        &model,
+        "--scenario",
+        "rare.toml",
+        "--outage",
+        "62:92",
+        "--require",
+        "p95_m<=0.5",
+    ];
     let said = stdout(&require(dir.path(), &asked).code(3));
-    assert!(said.contains("from the same starts: none; even without an outage p95_m is "), "{said}");
-    let judged = stdout(&require(dir.path(), &[&asked[..], &["--format", "json"]].concat()));
+    assert!(
+        said.contains("from the same starts: none; even without an outage p95_m is "),
+        "{said}"
+    );
+    let judged = stdout(&require(
+        dir.path(),
+        &[&asked[..], &["--format", "json"]].concat(),
+    ));
     let judged: Value = serde_json::from_str(&judged).unwrap();
     let drive = format!("{ROOT}/trajectories/figure_eight.toml");
-    let run = ["run", &drive, &model, "--filter", "full", "--method", "lincov"];
+    let run = [
+        "run", &drive, &model, "--filter", "full", "--method", "lincov",
+    ];
     let mut command = Command::cargo_bin("nav-sim").unwrap();
-    let command = command.current_dir(dir.path()).args(run).args(["--scenario", "every_other.toml"]);
+    let command = command
+        .current_dir(dir.path())
+        .args(run)
+        .args(["--scenario", "every_other.toml"]);
     command.args(["-o", "run"]).assert().success();
     let summary = std::fs::read_to_string(dir.path().join("run/summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&summary).unwrap();
     let outages = summary["outages"].as_array().unwrap();
-    let before_fix = outages.iter().find(|outage| outage["end_s"] == 62.0).unwrap();
-    let expected = before_fix["horizontal_error_end_m"]["p95"].as_f64().unwrap();
-    let found = judged["outage"]["with_all_fixes"]["value"].as_f64().unwrap();
+    let before_fix = outages
+        .iter()
+        .find(|outage| outage["end_s"] == 62.0)
+        .unwrap();
+    let expected = before_fix["horizontal_error_end_m"]["p95"]
+        .as_f64()
+        .unwrap();
+    let found = judged["outage"]["with_all_fixes"]["value"]
+        .as_f64()
+        .unwrap();
     // steps of a second against those of a fifth: the reserve of the search
     assert!((found / expected - 1.0).abs() < 2e-3, "{found} {expected}");
     assert_eq!(judged["outage"]["longest_s"], 0.0);
@@ -145,7 +249,14 @@ fn the_longest_outage_is_sought_to_the_end_of_a_short_drive() {
     let longest = |arguments: &[&str]| {
         let asked = ["require", "drive.toml", &model, "--outage", "longest"];
         let mut command = Command::cargo_bin("nav-sim").unwrap();
-        stdout(&command.current_dir(dir.path()).args(asked).args(arguments).assert().success())
+        stdout(
+            &command
+                .current_dir(dir.path())
+                .args(asked)
+                .args(arguments)
+                .assert()
+                .success(),
+        )
     };
     // of 180 s, 100 s are left from 80 s on
     let all = longest(&["--start", "80", "--require", "p95_m<=1000"]);
@@ -157,15 +268,32 @@ fn the_longest_outage_is_sought_to_the_end_of_a_short_drive() {
     let seconds = found["outage"]["longest_s"].as_f64().unwrap();
     assert!(seconds > 50.0 && seconds < 100.0, "{found}");
     let later = format!("80:{}", 80.0 + seconds);
-    let judged = ["require", "drive.toml", &model, "--outage", &later, "--require", "p95_m<=8"];
-    Command::cargo_bin("nav-sim").unwrap().current_dir(dir.path()).args(judged).assert().success();
+    let judged = [
+        "require",
+        "drive.toml",
+        &model,
+        "--outage",
+        &later,
+        "--require",
+        "p95_m<=8",
+    ];
+    Command::cargo_bin("nav-sim")
+        .unwrap()
+        .current_dir(dir.path())
+        .args(judged)
+        .assert()
+        .success();
 }
 
 /// Where `run` says of the outage that is judged that its errors are beyond linear theory, the answer says so too.
 #[test]
 fn an_answer_beyond_linear_theory_says_so_as_run_does() {
     let dir = tempfile::tempdir().unwrap();
-    std::fs::write(dir.path().join("start.toml"), "[initial]\natt_sigma_deg = [0.5, 0.5, 10]\n").unwrap();
+    std::fs::write(
+        dir.path().join("start.toml"),
+        "[initial]\natt_sigma_deg = [0.5, 0.5, 10]\n",
+    )
+    .unwrap();
     let drive = format!("{ROOT}/trajectories/land_vehicle.toml");
     let told = |arguments: &[&str]| {
         let mut command = Command::cargo_bin("nav-sim").unwrap();
@@ -173,35 +301,88 @@ fn an_answer_beyond_linear_theory_says_so_as_run_does() {
         let output = output.get_output();
         String::from_utf8([&output.stdout[..], &output.stderr].concat()).unwrap()
     };
-    let required =
-        |arguments: &[&str]| told(&[&["require", &drive, "--scenario", "start.toml"], arguments].concat());
+    let required = |arguments: &[&str]| {
+        told(&[&["require", &drive, "--scenario", "start.toml"], arguments].concat())
+    };
     let run = |model: &str, outage: &str| {
-        let experiment = ["run", &drive, model, "--scenario", "start.toml", "--outage", outage];
-        told(&[&experiment[..], &["--method", "lincov", "--filter", "full", "--force", "-o", "run"]].concat())
+        let experiment = [
+            "run",
+            &drive,
+            model,
+            "--scenario",
+            "start.toml",
+            "--outage",
+            outage,
+        ];
+        told(
+            &[
+                &experiment[..],
+                &[
+                    "--method", "lincov", "--filter", "full", "--force", "-o", "run",
+                ],
+            ]
+            .concat(),
+        )
     };
     let line = |said: &str, outage: &str| {
-        said.contains(&format!("beyond linear theory in outage {outage} s: confirm with"))
+        said.contains(&format!(
+            "beyond linear theory in outage {outage} s: confirm with"
+        ))
     };
     let consumer = format!("{ROOT}/calib_data/consumer_mems.toml");
-    let long = required(&[&consumer, "--outage", "300:700", "--require", "p95_m<=20000"]);
-    assert!(line(&long, "300–700") && line(&run(&consumer, "300:700"), "300–700"), "{long}");
-    let short = required(&[&consumer, "--outage", "300:360", "--require", "p95_m<=20000"]);
-    assert!(!line(&short, "300–360") && !line(&run(&consumer, "300:360"), "300–360"), "{short}");
+    let long = required(&[
+        &consumer,
+        "--outage",
+        "300:700",
+        "--require",
+        "p95_m<=20000",
+    ]);
+    assert!(
+        line(&long, "300–700") && line(&run(&consumer, "300:700"), "300–700"),
+        "{long}"
+    );
+    let short = required(&[
+        &consumer,
+        "--outage",
+        "300:360",
+        "--require",
+        "p95_m<=20000",
+    ]);
+    assert!(
+        !line(&short, "300–360") && !line(&run(&consumer, "300:360"), "300–360"),
+        "{short}"
+    );
 }
 
 /// The curve of equal drift says what it holds beside.
 #[test]
 fn the_curve_of_equal_drift_names_the_figures_it_keeps() {
     let dir = tempfile::tempdir().unwrap();
-    let asked = ["--outage", "60:90", "--require", "p95_m<=10", "--iso-drift", "--verbose"];
+    let asked = [
+        "--outage",
+        "60:90",
+        "--require",
+        "p95_m<=10",
+        "--iso-drift",
+        "--verbose",
+    ];
     let shown = stdout(&require(dir.path(), &asked).success());
     let allocated = |figure: &str| {
-        let row = shown.lines().find_map(|line| line.trim_start().strip_prefix(figure)).unwrap();
+        let row = shown
+            .lines()
+            .find_map(|line| line.trim_start().strip_prefix(figure))
+            .unwrap();
         row.split_whitespace().next().unwrap().to_owned()
     };
-    let [bias, walk] = ["accelerometer bias instability (µg)", "angle random walk (deg/√h)"]
-        .map(|figure| format!("{figure} {}", allocated(figure)));
-    assert!(shown.contains(&format!("Beside {bias} and {walk}.")), "{shown}");
+    let [bias, walk] = [
+        "accelerometer bias instability (µg)",
+        "angle random walk (deg/√h)",
+    ]
+    .map(|figure| format!("{figure} {}", allocated(figure)));
+    assert!(
+        shown.contains(&format!("Beside {bias} and {walk}.")),
+        "{shown}"
+    );
 }
 
 #[test]
@@ -212,10 +393,26 @@ fn requests_that_mean_nothing_are_refused() {
         let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
         assert!(words.iter().all(|word| said.contains(word)), "{said}");
     };
-    refused(&["--outage", "30"], ["no limit is given", "hint: give one, such as --require"]);
-    refused(&["--outage", "longest", "--require", "p95_m<=5"], ["needs a MODEL", "hint"]);
-    let window = ["--outage", "60:90", "--start", "70", "--require", "p95_m<=5"];
-    refused(&window, ["--start 70 beside --outage 60:90", "a length alone"]);
+    refused(
+        &["--outage", "30"],
+        ["no limit is given", "hint: give one, such as --require"],
+    );
+    refused(
+        &["--outage", "longest", "--require", "p95_m<=5"],
+        ["needs a MODEL", "hint"],
+    );
+    let window = [
+        "--outage",
+        "60:90",
+        "--start",
+        "70",
+        "--require",
+        "p95_m<=5",
+    ];
+    refused(
+        &window,
+        ["--start 70 beside --outage 60:90", "a length alone"],
+    );
     refused(
         &["--outage", "1e5", "--require", "p95_m<=5"],
         ["is not on the trajectory", "a shorter --outage"],
@@ -224,16 +421,37 @@ fn requests_that_mean_nothing_are_refused() {
         &["--outage", "60:90", "--require", "p95_m<=0.01"],
         ["no IMU keeps p95_m ≤ 0.01 m", "a larger limit"],
     );
-    let nowhere = ["--outage", "60:90", "--require", "p95_m<=5", "--catalogue", "nowhere"];
-    refused(&nowhere, ["--catalogue nowhere: there is no such directory", "hint"]);
+    let nowhere = [
+        "--outage",
+        "60:90",
+        "--require",
+        "p95_m<=5",
+        "--catalogue",
+        "nowhere",
+    ];
+    refused(
+        &nowhere,
+        ["--catalogue nowhere: there is no such directory", "hint"],
+    );
     // the poorest IMU keeps them: to look further made a noise without a finite variance, and a panic
     for (loose, shown) in [("1e6", "1.00e6 m:"), ("1e300", "1.00e300 m:")] {
         let said = format!("no IMU is too poor for p95_m ≤ {shown}");
-        refused(&["--outage", "60:90", "--require", &format!("p95_m<={loose}")], [&said, "a smaller limit"]);
+        refused(
+            &["--outage", "60:90", "--require", &format!("p95_m<={loose}")],
+            [&said, "a smaller limit"],
+        );
     }
     let model = format!("{ROOT}/calib_data/tactical.toml");
     refused(
-        &[&model, "--outage", "30", "--require", "p95_m<=5", "-o", "x.toml"],
+        &[
+            &model,
+            "--outage",
+            "30",
+            "--require",
+            "p95_m<=5",
+            "-o",
+            "x.toml",
+        ],
         ["cannot be used with", "--out"],
     );
 }
@@ -257,13 +475,20 @@ fn a_car_has_a_table_of_what_its_aiding_is_worth() {
             "json",
         ];
         let mut command = Command::cargo_bin("nav-sim").unwrap();
-        let ran = command.current_dir(dir.path()).args(all).args(more).assert().success();
+        let ran = command
+            .current_dir(dir.path())
+            .args(all)
+            .args(more)
+            .assert()
+            .success();
         serde_json::from_str::<Value>(&stdout(&ran)).unwrap()
     };
     let (free, car) = (asked(&[]), asked(&["--vehicle", "car"]));
     assert!(free["aidings"].is_null());
     let value = |i: usize| car["aidings"][i]["value"].as_f64().unwrap();
-    let names: Vec<&str> = (0..3).map(|i| car["aidings"][i]["aiding"].as_str().unwrap()).collect();
+    let names: Vec<&str> = (0..3)
+        .map(|i| car["aidings"][i]["aiding"].as_str().unwrap())
+        .collect();
     assert_eq!(names, ["none", "nhc", "nhc, odometer"]);
     assert!((value(0) / free["value"].as_f64().unwrap() - 1.0).abs() < 1e-9);
     assert!((value(1) / car["value"].as_f64().unwrap() - 1.0).abs() < 1e-9);

@@ -11,12 +11,28 @@ fn a_catalogue_names_the_units_beyond_linear_theory() {
     let drive = format!("{ROOT}/trajectories/land_vehicle.toml");
     std::fs::create_dir(dir.path().join("units")).unwrap();
     for file in ["consumer_mems.toml", "tactical.toml"] {
-        std::fs::copy(format!("{ROOT}/calib_data/{file}"), dir.path().join("units").join(file)).unwrap();
+        std::fs::copy(
+            format!("{ROOT}/calib_data/{file}"),
+            dir.path().join("units").join(file),
+        )
+        .unwrap();
     }
     let judged = |arguments: &[&str]| {
-        let asked = ["require", &drive, "--outage", "300:600", "--require", "p95_m<=20000"];
+        let asked = [
+            "require",
+            &drive,
+            "--outage",
+            "300:600",
+            "--require",
+            "p95_m<=20000",
+        ];
         let mut command = Command::cargo_bin("nav-sim").unwrap();
-        let ran = command.current_dir(dir.path()).args(asked).args(arguments).assert().success();
+        let ran = command
+            .current_dir(dir.path())
+            .args(asked)
+            .args(arguments)
+            .assert()
+            .success();
         let said = String::from_utf8_lossy(&ran.get_output().stderr).into_owned();
         let units = ["consumer_mems", "in outage 300–600 s"];
         let is_told = units.iter().any(|unit| {
@@ -33,7 +49,11 @@ fn a_catalogue_names_the_units_beyond_linear_theory() {
         let name = unit["unit"].as_str().unwrap();
         let alone = json(&[&format!("units/{name}.toml")]);
         assert_eq!(unit["beyond_linear"], alone["beyond_linear"], "{name}");
-        assert_eq!(unit["beyond_linear"].is_null(), name == "tactical", "{unit}");
+        assert_eq!(
+            unit["beyond_linear"].is_null(),
+            name == "tactical",
+            "{unit}"
+        );
     }
 }
 
@@ -48,7 +68,17 @@ fn a_directory_of_models_is_ranked() {
     }
     // a catalogue entry that states no bias: as good as it looks it cannot be called
     std::fs::write(units.join("silent.toml"), entry_with(["", ""])).unwrap();
-    let arguments = |limit| ["--outage", "30", "--require", limit, "--catalogue", "units", "--verbose"];
+    let arguments = |limit| {
+        [
+            "--outage",
+            "30",
+            "--require",
+            limit,
+            "--catalogue",
+            "units",
+            "--verbose",
+        ]
+    };
     let shown = stdout(&require(dir.path(), &arguments("p95_m<=10")).success());
     let place = |name: &str| shown.find(&format!("  {name} ")).unwrap();
     // it is not ranked, however good its figures
@@ -56,11 +86,20 @@ fn a_directory_of_models_is_ranked() {
         place("tactical") < place("consumer_mems") && place("consumer_mems") < place("silent"),
         "{shown}"
     );
-    assert!(shown.starts_with("tactical is the best of 1 units that keep the limit"), "{shown}");
-    assert!(shown.contains("  open ") && shown.contains("bias, turn-on\n"), "{shown}");
+    assert!(
+        shown.starts_with("tactical is the best of 1 units that keep the limit"),
+        "{shown}"
+    );
+    assert!(
+        shown.contains("  open ") && shown.contains("bias, turn-on\n"),
+        "{shown}"
+    );
     // only the unit that states too little is within 1.7 m: none meets the limit
     let none = stdout(&require(dir.path(), &arguments("p95_m<=1.7")).code(3));
-    assert!(none.contains("  open ") && !none.contains("  met "), "{none}");
+    assert!(
+        none.contains("  open ") && !none.contains("  met "),
+        "{none}"
+    );
 }
 
 /// Curves of a ranking are of one quantity, that of the first limit, whichever limit is the hardest for a unit.
@@ -69,10 +108,25 @@ fn the_curves_of_a_ranking_are_of_one_quantity() {
     let dir = tempfile::tempdir().unwrap();
     let file = "tactical.toml";
     std::fs::create_dir(dir.path().join("units")).unwrap();
-    std::fs::copy(format!("{ROOT}/calib_data/{file}"), dir.path().join("units").join(file)).unwrap();
+    std::fs::copy(
+        format!("{ROOT}/calib_data/{file}"),
+        dir.path().join("units").join(file),
+    )
+    .unwrap();
     let ranked = |limits: &[&str]| -> Value {
-        let asked = ["--outage", "60:90", "--catalogue", "units", "--format", "json"];
-        serde_json::from_str(&stdout(&require(dir.path(), &[&asked[..], limits].concat()))).unwrap()
+        let asked = [
+            "--outage",
+            "60:90",
+            "--catalogue",
+            "units",
+            "--format",
+            "json",
+        ];
+        serde_json::from_str(&stdout(&require(
+            dir.path(),
+            &[&asked[..], limits].concat(),
+        )))
+        .unwrap()
     };
     let (alone, both) = (
         ranked(&["--require", "p95_m<=100"]),
@@ -101,11 +155,16 @@ fn a_unit_whose_turn_on_bias_is_not_stated_is_open() {
     let dir = tempfile::tempdir().unwrap();
     let units = dir.path().join("units");
     std::fs::create_dir(&units).unwrap();
-    let figure = |key: &str, value: &str| format!("{key} = {{ value = \"{value}\", source = \"s\" }}\n");
+    let figure =
+        |key: &str, value: &str| format!("{key} = {{ value = \"{value}\", source = \"s\" }}\n");
     let biases = [figure("bias", "1 ug"), figure("bias", "0.001 deg/h")];
     let entry = |name: &str, key: &str, more: [&str; 2]| {
         let more = [0, 1].map(|i| {
-            let figure = if key.is_empty() { String::new() } else { figure(key, more[i]) };
+            let figure = if key.is_empty() {
+                String::new()
+            } else {
+                figure(key, more[i])
+            };
             format!("{}{figure}", biases[i])
         });
         let text = entry_with([&more[0], &more[1]]);
@@ -117,22 +176,58 @@ fn a_unit_whose_turn_on_bias_is_not_stated_is_open() {
     entry("large", "turn_on", ["20 mg", "0.001 deg/h"]);
     let mut command = Command::cargo_bin("nav-sim").unwrap();
     let made = ["datasheet", "units/silent.toml", "-o", "units/made.toml"];
-    command.current_dir(dir.path()).args(made).assert().success();
-    let asked = ["--outage", "60:120", "--require", "p95_m<=20", "--catalogue", "units", "--format", "json"];
-    let ranked: Value = serde_json::from_str(&stdout(&require(dir.path(), &asked).success())).unwrap();
+    command
+        .current_dir(dir.path())
+        .args(made)
+        .assert()
+        .success();
+    let asked = [
+        "--outage",
+        "60:120",
+        "--require",
+        "p95_m<=20",
+        "--catalogue",
+        "units",
+        "--format",
+        "json",
+    ];
+    let ranked: Value =
+        serde_json::from_str(&stdout(&require(dir.path(), &asked).success())).unwrap();
     let units = ranked["units"].as_array().unwrap();
     let unit = |name: &str| units.iter().find(|unit| unit["unit"] == name).unwrap();
     for name in ["silent", "removed", "made"] {
-        assert_eq!(unit(name)["not_stated"], serde_json::json!(["accel turn_on", "gyro turn_on"]), "{name}");
+        assert_eq!(
+            unit(name)["not_stated"],
+            serde_json::json!(["accel turn_on", "gyro turn_on"]),
+            "{name}"
+        );
         assert_eq!(unit(name)["met"], false);
     }
-    assert!(unit("small")["met"] == true && units[0]["unit"] == "small", "{ranked}");
+    assert!(
+        unit("small")["met"] == true && units[0]["unit"] == "small",
+        "{ranked}"
+    );
     // filters tell a bias from a tilt in turns only: 20 mg leave more than any of the others
-    assert!(unit("large")["value"].as_f64() > unit("silent")["value"].as_f64(), "{ranked}");
-    let alone =
-        require(dir.path(), &["units/made.toml", "--outage", "60:120", "--require", "p95_m<=20"]).success();
+    assert!(
+        unit("large")["value"].as_f64() > unit("silent")["value"].as_f64(),
+        "{ranked}"
+    );
+    let alone = require(
+        dir.path(),
+        &[
+            "units/made.toml",
+            "--outage",
+            "60:120",
+            "--require",
+            "p95_m<=20",
+        ],
+    )
+    .success();
     let said = String::from_utf8(alone.get_output().stderr.clone()).unwrap();
-    assert!(said.contains("units/made.toml: what is not stated counts as none: turn-on"), "{said}");
+    assert!(
+        said.contains("units/made.toml: what is not stated counts as none: turn-on"),
+        "{said}"
+    );
 }
 
 /// Every second, and the same figures to the last digit, whether a unit is judged alone or among others: one meets the
@@ -144,7 +239,11 @@ fn a_unit_alone_is_judged_as_in_a_catalogue() {
     std::fs::create_dir(dir.path().join("units")).unwrap();
     let names = ["consumer_mems", "tactical"];
     for file in names.map(|name| format!("{name}.toml")) {
-        std::fs::copy(format!("{ROOT}/calib_data/{file}"), dir.path().join("units").join(file)).unwrap();
+        std::fs::copy(
+            format!("{ROOT}/calib_data/{file}"),
+            dir.path().join("units").join(file),
+        )
+        .unwrap();
     }
     let judged = |arguments: &[&str]| -> Value {
         let asked = [
@@ -160,19 +259,31 @@ fn a_unit_alone_is_judged_as_in_a_catalogue() {
             "json",
         ];
         let mut command = Command::cargo_bin("nav-sim").unwrap();
-        let ran = command.current_dir(dir.path()).args(asked).args(arguments).assert();
+        let ran = command
+            .current_dir(dir.path())
+            .args(asked)
+            .args(arguments)
+            .assert();
         serde_json::from_str(&stdout(&ran)).unwrap()
     };
     let ranked = judged(&["--catalogue", "units"]);
     assert_eq!(ranked["question"]["outages"].as_array().unwrap().len(), 91);
     let verdicts = names.map(|name| {
         let alone = judged(&[&format!("units/{name}.toml")]);
-        let among = ranked["units"].as_array().unwrap().iter().find(|unit| unit["unit"] == name).unwrap();
+        let among = ranked["units"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|unit| unit["unit"] == name)
+            .unwrap();
         assert_eq!(alone["question"], ranked["question"]);
         for key in ["met", "quantity", "value", "place", "outage"] {
             assert_eq!(alone[key], among[key], "{name}: {key}");
         }
-        assert!((1..90).contains(&alone["place"].as_u64().unwrap()), "{alone}");
+        assert!(
+            (1..90).contains(&alone["place"].as_u64().unwrap()),
+            "{alone}"
+        );
         alone["met"].as_bool().unwrap()
     });
     assert_eq!(verdicts, [false, true]);
@@ -184,7 +295,16 @@ fn the_catalogue_is_ranked_without_a_directory() {
     let asked = ["--outage", "60:90", "--require", "p95_m<=20", "--catalogue"];
     let shown = stdout(&require(dir.path(), &asked).success());
     // the other units leave figures out
-    assert!(shown.starts_with("hg4930 is the best of 2 units that keep the limit\n"), "{shown}");
-    assert!(shown.contains("\n15 units are not ranked") && shown.contains("\n  stim300  met "), "{shown}");
-    assert!(shown.lines().count() <= 20 && shown.lines().all(|line| line.chars().count() <= 120), "{shown}");
+    assert!(
+        shown.starts_with("hg4930 is the best of 2 units that keep the limit\n"),
+        "{shown}"
+    );
+    assert!(
+        shown.contains("\n15 units are not ranked") && shown.contains("\n  stim300  met "),
+        "{shown}"
+    );
+    assert!(
+        shown.lines().count() <= 20 && shown.lines().all(|line| line.chars().count() <= 120),
+        "{shown}"
+    );
 }

@@ -9,7 +9,10 @@ use std::fs;
 use std::path::Path;
 
 fn place() -> tempfile::TempDir {
-    place_with(DRIVE, &format!("{MODEL}[provenance]\nestimator = \"dr-awv\"\n"))
+    place_with(
+        DRIVE,
+        &format!("{MODEL}[provenance]\nestimator = \"dr-awv\"\n"),
+    )
 }
 
 /// The command fails with this code, its message starts so, and it leaves no output behind.
@@ -19,8 +22,15 @@ fn refused(arguments: &str, code: i32, message: &str) {
     assert_eq!(ran.code, code, "{arguments}\n{}", ran.stderr);
     let said = ran.stderr.split("error: ").nth(1).unwrap_or_default();
     assert!(said.starts_with(message), "{arguments}\n{}", ran.stderr);
-    let left: Vec<_> = fs::read_dir(place.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
-    assert!(left.iter().all(|name| name == "drive.toml" || name == "imu.toml"), "{left:?}");
+    let left: Vec<_> = fs::read_dir(place.path())
+        .unwrap()
+        .map(|e| e.unwrap().file_name())
+        .collect();
+    assert!(
+        left.iter()
+            .all(|name| name == "drive.toml" || name == "imu.toml"),
+        "{left:?}"
+    );
 }
 
 fn json(path: &Path) -> Value {
@@ -30,40 +40,77 @@ fn json(path: &Path) -> Value {
 #[test]
 fn a_run_directory_holds_what_the_interface_says() {
     let place = place();
-    let ran = done(place.path(), "run drive.toml imu.toml --runs 10 --outage 30:40 --seed 5 -o out");
-    assert!(ran.stdout.starts_with("verdict: undecided: 10 runs miss "), "{}", ran.stdout);
+    let ran = done(
+        place.path(),
+        "run drive.toml imu.toml --runs 10 --outage 30:40 --seed 5 -o out",
+    );
     assert!(
-        ran.stdout.lines().all(|line| line.chars().count() <= 120) && ran.stdout.lines().count() <= 20,
+        ran.stdout.starts_with("verdict: undecided: 10 runs miss "),
+        "{}",
+        ran.stdout
+    );
+    assert!(
+        ran.stdout.lines().all(|line| line.chars().count() <= 120)
+            && ran.stdout.lines().count() <= 20,
         "{}",
         ran.stdout
     );
     let out = place.path().join("out");
     let summary = json(&out.join("summary.json"));
     assert_eq!(
-        (&summary["runs"], &summary["filter_states"], &summary["seed"]),
+        (
+            &summary["runs"],
+            &summary["filter_states"],
+            &summary["seed"]
+        ),
         (&10.into(), &15.into(), &5.into())
     );
     assert_eq!(summary["outages"][0]["end_s"], 40.0);
-    assert!(summary["outages"][0]["asee_mean"]["pos_e_m"].as_f64().unwrap() > 0.1);
+    assert!(
+        summary["outages"][0]["asee_mean"]["pos_e_m"]
+            .as_f64()
+            .unwrap()
+            > 0.1
+    );
     assert_eq!(summary["verdict"]["kind"], "undecided");
     assert_eq!(summary["verdict"]["by_covariance_analysis"], "consistent");
-    assert!((20..40).contains(&summary["verdict"]["runs_to_decide"].as_u64().unwrap()), "{summary}");
+    assert!(
+        (20..40).contains(&summary["verdict"]["runs_to_decide"].as_u64().unwrap()),
+        "{summary}"
+    );
     let manifest = json(&out.join("manifest.json"));
     assert!(summary["throughput_epochs_per_s"].as_f64().unwrap() > 0.0);
     for outage in summary["outages"].as_array().unwrap() {
         let verdict = &outage["verdict"];
-        assert!(verdict["kind"].is_string() && verdict["worst_state"].is_string(), "{verdict}");
+        assert!(
+            verdict["kind"].is_string() && verdict["worst_state"].is_string(),
+            "{verdict}"
+        );
         assert!(verdict["ratio"].as_f64().unwrap() > 0.0, "{verdict}");
     }
     assert!(manifest["throughput_epochs_per_s"].as_f64().unwrap() > 0.0);
     assert_eq!(manifest["configuration"]["run"]["seed"], 5);
-    assert_eq!(manifest["inputs"][0]["blake3"], blake3::hash(DRIVE.as_bytes()).to_hex().as_str());
+    assert_eq!(
+        manifest["inputs"][0]["blake3"],
+        blake3::hash(DRIVE.as_bytes()).to_hex().as_str()
+    );
     assert_eq!(manifest["model"]["estimator"], "dr-awv");
     let epochs = fs::read_to_string(out.join("epochs.csv")).unwrap();
     assert_eq!(epochs.lines().count(), 62); // header, 0 … 60 s
-    let fixes: Vec<&str> = epochs.lines().skip(1).map(|l| l.split(',').nth(1).unwrap()).collect();
-    assert_eq!((fixes[29], fixes[30], fixes[39], fixes[40]), ("1", "0", "0", "1"));
-    assert!(fs::read_to_string(out.join("report.html")).unwrap().contains("</html>"));
+    let fixes: Vec<&str> = epochs
+        .lines()
+        .skip(1)
+        .map(|l| l.split(',').nth(1).unwrap())
+        .collect();
+    assert_eq!(
+        (fixes[29], fixes[30], fixes[39], fixes[40]),
+        ("1", "0", "0", "1")
+    );
+    assert!(
+        fs::read_to_string(out.join("report.html"))
+            .unwrap()
+            .contains("</html>")
+    );
 }
 
 #[test]
@@ -73,7 +120,13 @@ fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
     let one = done(place.path(), &format!("{command} -j 1 -o one"));
     let two = done(place.path(), &format!("{command} -j 2 -o two"));
     assert_eq!(one.stdout, two.stdout);
-    for name in ["epochs.csv", "fan.csv", "runs.csv", "summary.json", "report.html"] {
+    for name in [
+        "epochs.csv",
+        "fan.csv",
+        "runs.csv",
+        "summary.json",
+        "report.html",
+    ] {
         // how fast it was found is the one number that the seed does not determine
         let timeless = |run: &str| {
             let text = fs::read_to_string(place.path().join(run).join(name)).unwrap();
@@ -89,10 +142,26 @@ fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
 #[test]
 fn a_seed_that_is_drawn_is_said_recorded_and_repeats_the_run() {
     let place = place();
-    let ran = done(place.path(), "run drive.toml imu.toml --runs 2 --outage none -o drawn");
-    let seed = ran.stderr.split("--seed ").nth(1).unwrap().split(')').next().unwrap();
-    assert_eq!(json(&place.path().join("drawn/manifest.json"))["seed"].to_string(), seed);
-    done(place.path(), &format!("run drive.toml imu.toml --runs 2 --outage none -o again --seed {seed}"));
+    let ran = done(
+        place.path(),
+        "run drive.toml imu.toml --runs 2 --outage none -o drawn",
+    );
+    let seed = ran
+        .stderr
+        .split("--seed ")
+        .nth(1)
+        .unwrap()
+        .split(')')
+        .next()
+        .unwrap();
+    assert_eq!(
+        json(&place.path().join("drawn/manifest.json"))["seed"].to_string(),
+        seed
+    );
+    done(
+        place.path(),
+        &format!("run drive.toml imu.toml --runs 2 --outage none -o again --seed {seed}"),
+    );
     let read = |run: &str| fs::read(place.path().join(run).join("epochs.csv")).unwrap();
     assert_eq!(read("drawn"), read("again"));
 }
@@ -101,12 +170,27 @@ fn a_seed_that_is_drawn_is_said_recorded_and_repeats_the_run() {
 #[test]
 fn a_filter_that_is_far_off_is_told_first() {
     let place = place();
-    fs::write(place.path().join("rough.toml"), MODEL.replace("1e-9", "1e-4")).unwrap();
-    let command = "run drive.toml imu.toml --truth rough.toml --runs 8 --outage 20:50 --seed 3 -o out";
+    fs::write(
+        place.path().join("rough.toml"),
+        MODEL.replace("1e-9", "1e-4"),
+    )
+    .unwrap();
+    let command =
+        "run drive.toml imu.toml --truth rough.toml --runs 8 --outage 20:50 --seed 3 -o out";
     let ran = nav_sim(place.path(), command);
     assert_eq!(ran.code, 3, "{}", ran.stderr);
-    assert!(ran.stdout.starts_with("verdict: overconfident by far: errors "), "{}", ran.stdout);
-    assert!(ran.stderr.contains("warning: the filter is overconfident: "), "{}", ran.stderr);
+    assert!(
+        ran.stdout
+            .starts_with("verdict: overconfident by far: errors "),
+        "{}",
+        ran.stdout
+    );
+    assert!(
+        ran.stderr
+            .contains("warning: the filter is overconfident: "),
+        "{}",
+        ran.stderr
+    );
     let verdict = &json(&place.path().join("out/summary.json"))["verdict"];
     assert_eq!(verdict["kind"], "overconfident");
     assert!(
@@ -121,13 +205,22 @@ fn a_filter_that_is_far_off_is_told_first() {
 #[test]
 fn accuracy_is_told_without_outages() {
     let place = place();
-    let ran = done(place.path(), "run drive.toml imu.toml --runs 8 --outage none --seed 3 -o out");
-    for word in ["RMSE, mean", "ASEE, mean", "ratio, mean", "position down (m)"] {
+    let ran = done(
+        place.path(),
+        "run drive.toml imu.toml --runs 8 --outage none --seed 3 -o out",
+    );
+    for word in [
+        "RMSE, mean",
+        "ASEE, mean",
+        "ratio, mean",
+        "position down (m)",
+    ] {
         assert!(ran.stdout.contains(word), "{word} in {}", ran.stdout);
     }
     let accuracy = &json(&place.path().join("out/summary.json"))["accuracy"];
     let ratio = |state: &str| {
-        accuracy["rmse_mean"][state].as_f64().unwrap() / accuracy["asee_mean"][state].as_f64().unwrap()
+        accuracy["rmse_mean"][state].as_f64().unwrap()
+            / accuracy["asee_mean"][state].as_f64().unwrap()
     };
     // 8 runs of a matched filter, some tens of independent seconds each
     assert!((0.6..1.5).contains(&ratio("pos_e_m")) && (0.6..1.5).contains(&ratio("vel_n_m_s")));
@@ -138,20 +231,38 @@ fn times_of_random_outages_are_rounded() {
     let place = place();
     let scenario = "[outage_random]\nrate_per_hour = 1000\nduration_s = 5.5\n";
     fs::write(place.path().join("s.toml"), scenario).unwrap();
-    let ran = done(place.path(), "run drive.toml imu.toml --scenario s.toml --runs 1 --seed 1 -o out");
+    let ran = done(
+        place.path(),
+        "run drive.toml imu.toml --scenario s.toml --runs 1 --seed 1 -o out",
+    );
     let row = |line: &&str| line.contains(" s  ");
-    let shown = ran.stdout.lines().find(row).unwrap().trim_start().split(" s").next().unwrap();
+    let shown = ran
+        .stdout
+        .lines()
+        .find(row)
+        .unwrap()
+        .trim_start()
+        .split(" s")
+        .next()
+        .unwrap();
     // hundredths of seconds within a minute
-    assert!(shown.split('–').all(|t| t.len() <= 5 && t.parse::<f64>().is_ok()), "{shown}");
+    assert!(
+        shown
+            .split('–')
+            .all(|t| t.len() <= 5 && t.parse::<f64>().is_ok()),
+        "{shown}"
+    );
 }
 
 #[test]
 fn flags_win_over_the_scenario_file() {
     let place = place();
-    let scenario =
-        "outage = [{ start_s = 20, end_s = 30 }]\nrun = { runs = 3, seed = 4 }\n[gnss]\nrate_hz = 2\n";
+    let scenario = "outage = [{ start_s = 20, end_s = 30 }]\nrun = { runs = 3, seed = 4 }\n[gnss]\nrate_hz = 2\n";
     fs::write(place.path().join("s.toml"), scenario).unwrap();
-    let ran = done(place.path(), "run drive.toml imu.toml --scenario s.toml --runs 2 --format json -o out");
+    let ran = done(
+        place.path(),
+        "run drive.toml imu.toml --scenario s.toml --runs 2 --format json -o out",
+    );
     let summary: Value = serde_json::from_str(&ran.stdout).unwrap();
     assert_eq!((&summary["runs"], &summary["seed"]), (&2.into(), &4.into()));
     assert_eq!(summary["outages"][0]["start_s"], 20.0);
@@ -161,15 +272,31 @@ fn flags_win_over_the_scenario_file() {
 #[test]
 fn candidates_with_the_same_seed_are_paired() {
     let place = place();
-    fs::write(place.path().join("louder.toml"), MODEL.replace("1e-9", "4e-9")).unwrap();
+    fs::write(
+        place.path().join("louder.toml"),
+        MODEL.replace("1e-9", "4e-9"),
+    )
+    .unwrap();
     let common = "--runs 8 --outage 30:50 --seed 3 --truth imu.toml";
-    done(place.path(), &format!("run drive.toml imu.toml {common} -o reference"));
-    done(place.path(), &format!("run drive.toml louder.toml {common} -o louder"));
-    let ran = done(place.path(), "compare louder reference --reference reference --state pos_e_m");
+    done(
+        place.path(),
+        &format!("run drive.toml imu.toml {common} -o reference"),
+    );
+    done(
+        place.path(),
+        &format!("run drive.toml louder.toml {common} -o louder"),
+    );
+    let ran = done(
+        place.path(),
+        "compare louder reference --reference reference --state pos_e_m",
+    );
     assert!(!ran.stderr.contains("warning"), "{}", ran.stderr);
     let comparison = json(&place.path().join("comparison.json"));
     let row = &comparison["rows"][1];
-    assert_eq!((&comparison["paired"], &row["state"]), (&true.into(), &"pos_e_m".into()));
+    assert_eq!(
+        (&comparison["paired"], &row["state"]),
+        (&true.into(), &"pos_e_m".into())
+    );
     // the filter that believes in more noise believes itself less, beyond doubt
     assert!(row["ci95_pct"][0].as_f64().unwrap() > 0.0, "{row}");
 }
@@ -177,10 +304,14 @@ fn candidates_with_the_same_seed_are_paired() {
 #[test]
 fn a_trajectory_shorter_than_the_default_outages_runs_without_them_and_says_so() {
     let place = place();
-    let ran = done(place.path(), "run drive.toml imu.toml --runs 1 --seed 1 -o out");
+    let ran = done(
+        place.path(),
+        "run drive.toml imu.toml --runs 1 --seed 1 -o out",
+    );
     assert!(
-        ran.stderr
-            .contains("warning: the default outage 300:390 is left out: the trajectory lasts from 0 to 60 s"),
+        ran.stderr.contains(
+            "warning: the default outage 300:390 is left out: the trajectory lasts from 0 to 60 s"
+        ),
         "{}",
         ran.stderr
     );
@@ -189,44 +320,122 @@ fn a_trajectory_shorter_than_the_default_outages_runs_without_them_and_says_so()
 #[test]
 fn refusals_name_what_is_wrong_and_leave_nothing() {
     let base = "run drive.toml imu.toml --seed 1 -o out";
-    refused("run none.toml imu.toml -o out", 1, "none.toml: No such file");
-    refused("run drive.toml none.toml -o out", 1, "none.toml: No such file");
-    refused("run drive.toml drive.toml -o out", 2, "drive.toml, line 3: unknown key \"segment\"");
-    refused(&format!("{base} --outage 70:90"), 2, "outage 70:90 does not lie on the data");
-    refused(&format!("{base} --outage=-10:20"), 2, "outage -10:20 does not lie on the data");
-    refused(&format!("{base} --outage 30.2:30.7"), 2, "outage 30.2:30.7 withholds no fix");
-    refused(&format!("{base} --outage none --outage 30:40"), 2, "--outage none stands beside other outages");
-    refused(&format!("{base} --outage 40:30"), 2, "invalid value '40:30' for '--outage <START:END>'");
-    refused(&format!("{base} --outage soon"), 2, "invalid value 'soon' for '--outage <START:END>'");
-    refused(&format!("{base} --runs 0"), 2, "run.runs = 0 is refused: at least one run");
-    refused(&format!("{base} --filter 16"), 2, "invalid value '16' for '--filter <STATES>'");
-    refused(&format!("{base} --threads 0"), 2, "invalid value '0' for '--threads <N>'");
-    refused(&format!("{base} --truth a --static b"), 2, "the argument '--truth <MODEL2>' cannot be used");
-    refused("run drive.toml imu.toml --outage none --seed 1 -o imu.toml", 1, "imu.toml: ");
+    refused(
+        "run none.toml imu.toml -o out",
+        1,
+        "none.toml: No such file",
+    );
+    refused(
+        "run drive.toml none.toml -o out",
+        1,
+        "none.toml: No such file",
+    );
+    refused(
+        "run drive.toml drive.toml -o out",
+        2,
+        "drive.toml, line 3: unknown key \"segment\"",
+    );
+    refused(
+        &format!("{base} --outage 70:90"),
+        2,
+        "outage 70:90 does not lie on the data",
+    );
+    refused(
+        &format!("{base} --outage=-10:20"),
+        2,
+        "outage -10:20 does not lie on the data",
+    );
+    refused(
+        &format!("{base} --outage 30.2:30.7"),
+        2,
+        "outage 30.2:30.7 withholds no fix",
+    );
+    refused(
+        &format!("{base} --outage none --outage 30:40"),
+        2,
+        "--outage none stands beside other outages",
+    );
+    refused(
+        &format!("{base} --outage 40:30"),
+        2,
+        "invalid value '40:30' for '--outage <START:END>'",
+    );
+    refused(
+        &format!("{base} --outage soon"),
+        2,
+        "invalid value 'soon' for '--outage <START:END>'",
+    );
+    refused(
+        &format!("{base} --runs 0"),
+        2,
+        "run.runs = 0 is refused: at least one run",
+    );
+    refused(
+        &format!("{base} --filter 16"),
+        2,
+        "invalid value '16' for '--filter <STATES>'",
+    );
+    refused(
+        &format!("{base} --threads 0"),
+        2,
+        "invalid value '0' for '--threads <N>'",
+    );
+    refused(
+        &format!("{base} --truth a --static b"),
+        2,
+        "the argument '--truth <MODEL2>' cannot be used",
+    );
+    refused(
+        "run drive.toml imu.toml --outage none --seed 1 -o imu.toml",
+        1,
+        "imu.toml: ",
+    );
 }
 
 #[test]
 fn a_recording_that_is_too_short_is_refused_by_how_much() {
     let place = place();
     let mut csv =
-        "t_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s\n".to_owned();
+        "t_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s\n"
+            .to_owned();
     for k in 0..4000 {
         let noise = f64::from((k * 7919) % 1000 - 500) * 1e-5;
         let g = 9.81 + noise;
-        csv += &format!("{},{noise},{noise},{g},{noise},{noise},{noise}\n", f64::from(k) / 100.0);
+        csv += &format!(
+            "{},{noise},{noise},{g},{noise},{noise},{noise}\n",
+            f64::from(k) / 100.0
+        );
     }
     fs::write(place.path().join("static.csv"), csv).unwrap();
-    let ran = nav_sim(place.path(), "run drive.toml imu.toml --static static.csv --runs 1 --seed 1 -o out");
+    let ran = nav_sim(
+        place.path(),
+        "run drive.toml imu.toml --static static.csv --runs 1 --seed 1 -o out",
+    );
     assert_eq!(ran.code, 2, "{}", ran.stderr);
-    assert!(ran.stderr.contains("lasts 40 s, the trajectory 60 s: 20 s too short"), "{}", ran.stderr);
-    assert!(ran.stderr.contains("hint: each run takes a window as long as the trajectory"), "{}", ran.stderr);
+    assert!(
+        ran.stderr
+            .contains("lasts 40 s, the trajectory 60 s: 20 s too short"),
+        "{}",
+        ran.stderr
+    );
+    assert!(
+        ran.stderr
+            .contains("hint: each run takes a window as long as the trajectory"),
+        "{}",
+        ran.stderr
+    );
 }
 
 /// Whatever ends a run before its time, nothing is left that looks like one.
 #[test]
 fn a_run_that_is_killed_leaves_nothing_to_clean_up() {
     let place = place();
-    let names = || fs::read_dir(place.path()).unwrap().map(|e| e.unwrap().file_name()).collect::<Vec<_>>();
+    let names = || {
+        fs::read_dir(place.path())
+            .unwrap()
+            .map(|e| e.unwrap().file_name())
+            .collect::<Vec<_>>()
+    };
     let before = names();
     let command = "run drive.toml imu.toml --runs 1000000 --outage none --seed 1 -q -o out";
     let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_nav-sim"))
@@ -236,16 +445,28 @@ fn a_run_that_is_killed_leaves_nothing_to_clean_up() {
         .unwrap();
     // before its output is claimed it only tries whether it may write there
     while !place.path().join(".out.claim").exists() {
-        assert!(child.try_wait().unwrap().is_none(), "a million runs already?");
+        assert!(
+            child.try_wait().unwrap().is_none(),
+            "a million runs already?"
+        );
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
     child.kill().unwrap();
     child.wait().unwrap();
     // but for the marker of its output, which is in nobody's way and goes with the next run
-    let left: Vec<_> = names().into_iter().filter(|name| !before.contains(name)).collect();
+    let left: Vec<_> = names()
+        .into_iter()
+        .filter(|name| !before.contains(name))
+        .collect();
     assert_eq!(left, [".out.claim"]);
-    done(place.path(), "run drive.toml imu.toml --runs 2 --outage none --seed 1 -q -o out");
-    let left: Vec<_> = names().into_iter().filter(|name| !before.contains(name)).collect();
+    done(
+        place.path(),
+        "run drive.toml imu.toml --runs 2 --outage none --seed 1 -q -o out",
+    );
+    let left: Vec<_> = names()
+        .into_iter()
+        .filter(|name| !before.contains(name))
+        .collect();
     assert_eq!(left, ["out"]);
 }
 
@@ -262,16 +483,33 @@ baro = { rate_hz = 2, sigma_m = 0.5 }
 outage = [{ start_s = 30, end_s = 45 }]
 ";
     fs::write(place.path().join("s.toml"), scenario).unwrap();
-    done(place.path(), "run drive.toml imu.toml --runs 8 --seed 2 --outage 30:45 -o plain");
+    done(
+        place.path(),
+        "run drive.toml imu.toml --runs 8 --seed 2 --outage 30:45 -o plain",
+    );
     // a filter that expects none of it is lost
-    let ran = nav_sim(place.path(), "run drive.toml imu.toml --runs 8 --seed 2 --scenario s.toml -o worse");
+    let ran = nav_sim(
+        place.path(),
+        "run drive.toml imu.toml --runs 8 --seed 2 --scenario s.toml -o worse",
+    );
     assert_eq!(ran.code, 3, "{}", ran.stderr);
-    let (plain, worse) =
-        (json(&place.path().join("plain/summary.json")), json(&place.path().join("worse/summary.json")));
+    let (plain, worse) = (
+        json(&place.path().join("plain/summary.json")),
+        json(&place.path().join("worse/summary.json")),
+    );
     let nees = |summary: &Value| summary["nees"]["mean"].as_f64().unwrap();
-    assert!(nees(&worse) > 2.0 * nees(&plain), "{} {}", nees(&plain), nees(&worse));
+    assert!(
+        nees(&worse) > 2.0 * nees(&plain),
+        "{} {}",
+        nees(&plain),
+        nees(&worse)
+    );
     assert!(worse["nis"]["rejected"].as_u64().unwrap() > 10 && plain["nis"]["rejected"] == 0);
-    let down = |summary: &Value| summary["outages"][0]["asee_mean"]["pos_d_m"].as_f64().unwrap();
+    let down = |summary: &Value| {
+        summary["outages"][0]["asee_mean"]["pos_d_m"]
+            .as_f64()
+            .unwrap()
+    };
     assert!(down(&worse) < 0.5 * down(&plain));
     let kept = json(&place.path().join("worse/manifest.json"));
     assert_eq!(kept["configuration"]["imu"]["scale_ppm_gyro"], 2000.0);
@@ -287,53 +525,113 @@ fn the_reduction_of_the_model_is_said_and_kept() {
         "phi = 0.9999, sigma2 = 1e-9 }, { type = \"AR1\", phi = 0.99, sigma2 = 1e-7 }",
     );
     fs::write(place.path().join("two.toml"), two).unwrap();
-    let ran = done(place.path(), "run drive.toml two.toml --runs 2 --outage 20:40 --seed 1 -o out");
-    let told: Vec<&str> = ran.stderr.lines().filter(|line| line.contains("reduced")).collect();
-    assert!(told.len() == 1 && told[0].starts_with("reduced filter: NEES "), "{}", ran.stderr);
+    let ran = done(
+        place.path(),
+        "run drive.toml two.toml --runs 2 --outage 20:40 --seed 1 -o out",
+    );
+    let told: Vec<&str> = ran
+        .stderr
+        .lines()
+        .filter(|line| line.contains("reduced"))
+        .collect();
+    assert!(
+        told.len() == 1 && told[0].starts_with("reduced filter: NEES "),
+        "{}",
+        ran.stderr
+    );
     let reduction = &json(&place.path().join("out/summary.json"))["reduction"];
     assert_eq!(reduction["axes"].as_array().unwrap().len(), 6);
-    let ratio = reduction["quality"]["outage_end"][0]["pos_e_m"].as_f64().unwrap();
+    let ratio = reduction["quality"]["outage_end"][0]["pos_e_m"]
+        .as_f64()
+        .unwrap();
     assert!((0.5..2.0).contains(&ratio), "{ratio}");
-    let ran = done(place.path(), "run drive.toml imu.toml --runs 2 --outage 20:40 --seed 1 -o same");
+    let ran = done(
+        place.path(),
+        "run drive.toml imu.toml --runs 2 --outage 20:40 --seed 1 -o same",
+    );
     assert!(!ran.stderr.contains("reduced"), "{}", ran.stderr);
-    assert_eq!(json(&place.path().join("same/summary.json"))["reduction"]["axes"][0]["misfit"], 0.0);
-    done(place.path(), "run drive.toml two.toml --filter full --runs 2 --outage 20:40 --seed 1 -o full");
+    assert_eq!(
+        json(&place.path().join("same/summary.json"))["reduction"]["axes"][0]["misfit"],
+        0.0
+    );
+    done(
+        place.path(),
+        "run drive.toml two.toml --filter full --runs 2 --outage 20:40 --seed 1 -o full",
+    );
     assert!(json(&place.path().join("full/summary.json"))["reduction"].is_null());
 }
 
 #[test]
 fn doubtful_requests_are_said() {
     let place = place();
-    let ran =
-        done(place.path(), "run drive.toml imu.toml --outage 10:20 --outage 15:30 --runs 1 --seed 1 -o out");
-    assert!(ran.stderr.contains("warning: outages that overlap or touch are made one"), "{}", ran.stderr);
-    let ran = done(place.path(), "run drive.toml imu.toml --outage 50:70 --runs 1 --seed 1 -o out");
+    let ran = done(
+        place.path(),
+        "run drive.toml imu.toml --outage 10:20 --outage 15:30 --runs 1 --seed 1 -o out",
+    );
     assert!(
-        ran.stderr.contains("warning: outage 50:70 is cut: the trajectory ends at 60 s"),
+        ran.stderr
+            .contains("warning: outages that overlap or touch are made one"),
+        "{}",
+        ran.stderr
+    );
+    let ran = done(
+        place.path(),
+        "run drive.toml imu.toml --outage 50:70 --runs 1 --seed 1 -o out",
+    );
+    assert!(
+        ran.stderr
+            .contains("warning: outage 50:70 is cut: the trajectory ends at 60 s"),
         "{}",
         ran.stderr
     );
     fs::write(
         place.path().join("wild.toml"),
-        MODEL.replace("phi = 0.9999, sigma2 = 1e-9", "phi = 0.9999999, sigma2 = 1e-5"),
+        MODEL.replace(
+            "phi = 0.9999, sigma2 = 1e-9",
+            "phi = 0.9999999, sigma2 = 1e-5",
+        ),
     )
     .unwrap();
-    let ran = done(place.path(), "run drive.toml wild.toml --outage none --runs 1 --seed 1 -o wild");
-    assert!(ran.stderr.contains("the filter starts with a bias of 7.071 m/s²"), "{}", ran.stderr);
+    let ran = done(
+        place.path(),
+        "run drive.toml wild.toml --outage none --runs 1 --seed 1 -o wild",
+    );
+    assert!(
+        ran.stderr
+            .contains("the filter starts with a bias of 7.071 m/s²"),
+        "{}",
+        ran.stderr
+    );
 }
 
 /// The manifest of another command is not replaced; that of a run is.
 #[test]
 fn a_directory_of_another_command_is_refused() {
     let place = place();
-    done(place.path(), "synthesize imu.toml --replicates 1 --samples 1000 --seed 1 -o made");
+    done(
+        place.path(),
+        "synthesize imu.toml --replicates 1 --samples 1000 --seed 1 -o made",
+    );
     let before = fs::read(place.path().join("made/manifest.json")).unwrap();
-    let ran = nav_sim(place.path(), "run drive.toml imu.toml --runs 1 --outage none --seed 1 -o made");
+    let ran = nav_sim(
+        place.path(),
+        "run drive.toml imu.toml --runs 1 --outage none --seed 1 -o made",
+    );
     assert_eq!(ran.code, 2, "{}", ran.stderr);
-    assert!(ran.stderr.contains("made is not of this command"), "{}", ran.stderr);
-    assert_eq!(fs::read(place.path().join("made/manifest.json")).unwrap(), before);
+    assert!(
+        ran.stderr.contains("made is not of this command"),
+        "{}",
+        ran.stderr
+    );
+    assert_eq!(
+        fs::read(place.path().join("made/manifest.json")).unwrap(),
+        before
+    );
     for _ in 0..2 {
-        done(place.path(), "run drive.toml imu.toml --runs 1 --outage none --seed 1 -o mine");
+        done(
+            place.path(),
+            "run drive.toml imu.toml --runs 1 --outage none --seed 1 -o mine",
+        );
     }
 }
 
@@ -341,31 +639,71 @@ fn a_directory_of_another_command_is_refused() {
 #[test]
 fn motion_in_a_static_recording_is_said() {
     let place = place();
-    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o rec");
+    done(
+        place.path(),
+        "trajectory record drive.toml imu.toml --seed 3 -o rec",
+    );
     let short = DRIVE.replace("duration_s = 35", "duration_s = 5");
     fs::write(place.path().join("short.toml"), short).unwrap();
-    let command = "run short.toml imu.toml --static rec/imu.csv --runs 1 --outage none --seed 1 -o out";
+    let command =
+        "run short.toml imu.toml --static rec/imu.csv --runs 1 --outage none --seed 1 -o out";
     let ran = nav_sim(place.path(), command);
-    assert!(ran.stderr.contains("imu.csv: not static? The mean over a second of accel.x"), "{}", ran.stderr);
+    assert!(
+        ran.stderr
+            .contains("imu.csv: not static? The mean over a second of accel.x"),
+        "{}",
+        ran.stderr
+    );
 }
 
 #[test]
 fn check_knows_the_files_of_a_fusion_and_speaks_json() {
     let place = place();
-    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o rec");
-    let ran = done(place.path(), "check rec/initial.toml rec/gnss.csv rec/reference.csv --format json");
+    done(
+        place.path(),
+        "trajectory record drive.toml imu.toml --seed 3 -o rec",
+    );
+    let ran = done(
+        place.path(),
+        "check rec/initial.toml rec/gnss.csv rec/reference.csv --format json",
+    );
     let said: Value = serde_json::from_str(&ran.stdout).unwrap();
-    let found: Vec<&str> = said.as_array().unwrap().iter().map(|f| f["found"].as_str().unwrap()).collect();
-    let expected =
-        ["an initial state at 0 s", "60 GNSS fixes with velocity over 59 s", "a trajectory of 60 s"];
+    let found: Vec<&str> = said
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|f| f["found"].as_str().unwrap())
+        .collect();
+    let expected = [
+        "an initial state at 0 s",
+        "60 GNSS fixes with velocity over 59 s",
+        "a trajectory of 60 s",
+    ];
     assert_eq!(found, expected);
-    let slow: String = (0..9).map(|k| format!("{},46.5,6.5,{k}\n", 1000 * k)).collect();
-    fs::write(place.path().join("ms.csv"), format!("t_s,lat_deg,lon_deg,h_m\n{slow}")).unwrap();
-    fs::write(place.path().join("deep.toml"), DRIVE.replace("h_m = 400", "h_m = -7e6")).unwrap();
-    for (file, message) in [("ms.csv", "milliseconds (t_ms)?"), ("deep.toml", "no height within")] {
+    let slow: String = (0..9)
+        .map(|k| format!("{},46.5,6.5,{k}\n", 1000 * k))
+        .collect();
+    fs::write(
+        place.path().join("ms.csv"),
+        format!("t_s,lat_deg,lon_deg,h_m\n{slow}"),
+    )
+    .unwrap();
+    fs::write(
+        place.path().join("deep.toml"),
+        DRIVE.replace("h_m = 400", "h_m = -7e6"),
+    )
+    .unwrap();
+    for (file, message) in [
+        ("ms.csv", "milliseconds (t_ms)?"),
+        ("deep.toml", "no height within"),
+    ] {
         let ran = nav_sim(place.path(), &format!("check {file} --format json"));
         let said: Value = serde_json::from_str(&ran.stdout).unwrap();
-        assert!(ran.code == 2 && said[0]["ok"] == false && ran.stderr.contains(message), "{}", ran.stderr);
+        assert!(
+            ran.code == 2 && said[0]["ok"] == false && ran.stderr.contains(message),
+            "{}",
+            ran.stderr
+        );
     }
 }
 
@@ -377,6 +715,9 @@ fn a_trajectory_of_a_few_seconds_is_run() {
                  segment = [{ kind = \"straight\", duration_s = 4 }]\n";
     fs::write(place.path().join("short.toml"), short).unwrap();
     for outage in ["none", "1:3"] {
-        done(place.path(), &format!("run short.toml imu.toml --outage {outage} --runs 1 --seed 5 -o out"));
+        done(
+            place.path(),
+            &format!("run short.toml imu.toml --outage {outage} --runs 1 --seed 5 -o out"),
+        );
     }
 }

@@ -40,9 +40,16 @@ impl Place {
     /// Exit code and what was said.
     fn run(&self, args: &[&str]) -> (i32, String) {
         let mut command = Command::new(env!("CARGO_BIN_EXE_nav-sim"));
-        let output =
-            command.current_dir(&self.0).args(["synthesize", "--no-progress"]).args(args).output().unwrap();
-        (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
+        let output = command
+            .current_dir(&self.0)
+            .args(["synthesize", "--no-progress"])
+            .args(args)
+            .output()
+            .unwrap();
+        (
+            output.status.code().unwrap(),
+            String::from_utf8(output.stderr).unwrap(),
+        )
     }
 
     fn make(&self, out: &str, args: &[&str]) {
@@ -51,7 +58,8 @@ impl Place {
     }
 
     fn manifest(&self, out: &str) -> Value {
-        serde_json::from_str(&fs::read_to_string(self.path(out).join("manifest.json")).unwrap()).unwrap()
+        serde_json::from_str(&fs::read_to_string(self.path(out).join("manifest.json")).unwrap())
+            .unwrap()
     }
 
     fn bytes(&self, file: &str) -> Vec<u8> {
@@ -60,8 +68,10 @@ impl Place {
 }
 
 fn entries(directory: &Path) -> Vec<String> {
-    let mut names: Vec<String> =
-        fs::read_dir(directory).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    let mut names: Vec<String> = fs::read_dir(directory)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
     names.sort();
     names
 }
@@ -69,18 +79,37 @@ fn entries(directory: &Path) -> Vec<String> {
 #[test]
 fn replicates_read_back_and_the_manifest_says_what_was_drawn() {
     let place = Place::new();
-    place.make("out", &["--replicates", "3", "--samples", "400", "--spread"]);
+    place.make(
+        "out",
+        &["--replicates", "3", "--samples", "400", "--spread"],
+    );
     assert_eq!(
         entries(&place.path("out")),
-        ["manifest.json", "replicate_1.csv", "replicate_2.csv", "replicate_3.csv"]
+        [
+            "manifest.json",
+            "replicate_1.csv",
+            "replicate_2.csv",
+            "replicate_3.csv"
+        ]
     );
     let (recordings, _) = read(&[place.path("out")], &ReadOptions::default()).unwrap();
-    assert_eq!(recordings.iter().map(|r| (r.len(), r.signals.len())).collect::<Vec<_>>(), [(400, 4); 3]);
+    assert_eq!(
+        recordings
+            .iter()
+            .map(|r| (r.len(), r.signals.len()))
+            .collect::<Vec<_>>(),
+        [(400, 4); 3]
+    );
 
     let manifest = place.manifest("out");
-    assert_eq!((manifest["seed"].as_u64(), manifest["samples"].as_u64()), (Some(5), Some(400)));
+    assert_eq!(
+        (manifest["seed"].as_u64(), manifest["samples"].as_u64()),
+        (Some(5), Some(400))
+    );
     let drawn = |replicate: usize, axis: &str| {
-        manifest["replicates"][replicate]["axes"][axis][0]["sigma2"].as_f64().unwrap()
+        manifest["replicates"][replicate]["axes"][axis][0]["sigma2"]
+            .as_f64()
+            .unwrap()
     };
     assert!((1e-4..=2e-4).contains(&drawn(0, "accel.x")));
     assert!((drawn(0, "accel.x") - drawn(1, "accel.x")).abs() > 0.0);
@@ -110,18 +139,50 @@ fn contamination_adds_to_the_same_noise() {
     .unwrap();
     let args = ["--replicates", "2", "--samples", "300", "--axes", "x"];
     place.make("clean", &args);
-    place.make("dirty", &[&args[..], &["--contaminate", "step.toml"]].concat());
-    assert_eq!(place.bytes("clean/replicate_1.csv"), place.bytes("dirty/replicate_1.csv"));
+    place.make(
+        "dirty",
+        &[&args[..], &["--contaminate", "step.toml"]].concat(),
+    );
+    assert_eq!(
+        place.bytes("clean/replicate_1.csv"),
+        place.bytes("dirty/replicate_1.csv")
+    );
     let x = |out: &str, row: usize| -> f64 {
         let text = fs::read_to_string(place.path(out).join("replicate_2.csv")).unwrap();
-        text.lines().nth(row + 1).unwrap().split(',').nth(1).unwrap().parse().unwrap()
+        text.lines()
+            .nth(row + 1)
+            .unwrap()
+            .split(',')
+            .nth(1)
+            .unwrap()
+            .parse()
+            .unwrap()
     };
     assert!((x("dirty", 149) - x("clean", 149)).abs() < 1e-15);
     assert!((x("dirty", 150) - x("clean", 150) - 1.0).abs() < 1e-8);
-    assert_eq!(place.manifest("dirty")["replicates"][0]["contaminated"], false);
-    assert_eq!(place.manifest("dirty")["replicates"][1]["contaminated"], true);
-    place.make("paper", &["--replicates", "9", "--samples", "4096", "--contaminate", "section5-III"]);
-    assert_eq!(place.manifest("paper")["replicates"][8]["contaminated"], false);
+    assert_eq!(
+        place.manifest("dirty")["replicates"][0]["contaminated"],
+        false
+    );
+    assert_eq!(
+        place.manifest("dirty")["replicates"][1]["contaminated"],
+        true
+    );
+    place.make(
+        "paper",
+        &[
+            "--replicates",
+            "9",
+            "--samples",
+            "4096",
+            "--contaminate",
+            "section5-III",
+        ],
+    );
+    assert_eq!(
+        place.manifest("paper")["replicates"][8]["contaminated"],
+        false
+    );
 }
 
 #[test]
@@ -140,7 +201,13 @@ fn mistakes_are_refused_and_leave_nothing() {
     )
     .unwrap();
     refused(
-        &["model.toml", "--replicates", "8", "--contaminate", "plain.toml"],
+        &[
+            "model.toml",
+            "--replicates",
+            "8",
+            "--contaminate",
+            "plain.toml",
+        ],
         "--contaminate plain.toml: it touches none of the replicates 1 to 8",
         "replicates are counted from 1",
     );
@@ -154,14 +221,35 @@ fn mistakes_are_refused_and_leave_nothing() {
         "plain.toml: no [spread] to draw parameters from",
         "leave --spread out",
     );
-    refused(&["plain.toml", "--axes", "accel"], "plain.toml has no noise model for the axes asked for", "");
-    refused(&["model.toml", "--duration", "0.01"], "a recording needs at least 2 samples; these are 1", "");
-    refused(&["model.toml", "--samples", "1"], "invalid value '1'", "");
-    refused(&["model.toml", "--axes", "wheel"], "invalid value 'wheel'", "such as accel.x");
-    fs::write(place.path("plain.toml"), "[[accel]]\noperation = \"replace\"\npoints = 500\nsigma = 1\n")
-        .unwrap();
     refused(
-        &["model.toml", "--samples", "100", "--contaminate", "plain.toml"],
+        &["plain.toml", "--axes", "accel"],
+        "plain.toml has no noise model for the axes asked for",
+        "",
+    );
+    refused(
+        &["model.toml", "--duration", "0.01"],
+        "a recording needs at least 2 samples; these are 1",
+        "",
+    );
+    refused(&["model.toml", "--samples", "1"], "invalid value '1'", "");
+    refused(
+        &["model.toml", "--axes", "wheel"],
+        "invalid value 'wheel'",
+        "such as accel.x",
+    );
+    fs::write(
+        place.path("plain.toml"),
+        "[[accel]]\noperation = \"replace\"\npoints = 500\nsigma = 1\n",
+    )
+    .unwrap();
+    refused(
+        &[
+            "model.toml",
+            "--samples",
+            "100",
+            "--contaminate",
+            "plain.toml",
+        ],
         "plain.toml, line 1: the replacement of points needs 500 samples, the record has 100 (replicate 1)",
         "",
     );
@@ -181,12 +269,21 @@ fn mistakes_are_refused_and_leave_nothing() {
     )
     .unwrap();
     refused(
-        &["plain.toml", "--axes", "gyro", "--contaminate", "section4-III"],
+        &[
+            "plain.toml",
+            "--axes",
+            "gyro",
+            "--contaminate",
+            "section4-III",
+        ],
         "section4-III, line 5: corrupts the accel, which is not made",
         "another contamination",
     );
-    fs::write(place.path("plain.toml"), "[[accel]]\noperation = \"replace\"\npoints = 500\nsigma = 1\n")
-        .unwrap();
+    fs::write(
+        place.path("plain.toml"),
+        "[[accel]]\noperation = \"replace\"\npoints = 500\nsigma = 1\n",
+    )
+    .unwrap();
     refused(&["plain.toml"], "plain.toml, line 1: \"accel[1]\"", "");
 }
 
@@ -196,7 +293,8 @@ fn an_unknown_contamination_is_answered_with_the_nearest() {
     let (code, said) = place.run(&["model.toml", "--contaminate", "section5-IIII", "-o", "out"]);
     assert_eq!(code, 1);
     assert!(
-        said.contains("section5-IIII: No such file") && said.contains("did you mean \"section5-III\"?"),
+        said.contains("section5-IIII: No such file")
+            && said.contains("did you mean \"section5-III\"?"),
         "{said}"
     );
 }
@@ -205,24 +303,48 @@ fn an_unknown_contamination_is_answered_with_the_nearest() {
 fn recordings_of_another_job_are_not_mixed_in_and_inputs_not_overwritten() {
     let place = Place::new();
     place.make("out", &["--replicates", "3", "--samples", "10"]);
-    let again = ["model.toml", "--replicates", "3", "--samples", "20", "--seed", "5", "-o", "out"];
+    let again = [
+        "model.toml",
+        "--replicates",
+        "3",
+        "--samples",
+        "20",
+        "--seed",
+        "5",
+        "-o",
+        "out",
+    ];
     let (code, said) = place.run(&again);
     assert_eq!(code, 2);
-    assert!(said.contains("out holds the result of another configuration"), "{said}");
+    assert!(
+        said.contains("out holds the result of another configuration"),
+        "{said}"
+    );
     let (code, said) = place.run(&[&again[..], &["--force"]].concat());
     assert_eq!(code, 0, "{said}");
     let (code, said) = place.run(&again);
     assert_eq!(code, 0, "the same once more: {said}");
     let (recordings, _) = read(&[place.path("out")], &ReadOptions::default()).unwrap();
     assert_eq!(recordings[0].len(), 20);
-    let (code, said) = place.run(&["model.toml", "--replicates", "2", "--samples", "10", "-o", "out"]);
+    let (code, said) = place.run(&[
+        "model.toml",
+        "--replicates",
+        "2",
+        "--samples",
+        "10",
+        "-o",
+        "out",
+    ]);
     assert_eq!(code, 2);
     assert!(said.contains("out already holds replicate_3.csv"), "{said}");
 
     fs::rename(place.path("model.toml"), place.path("manifest.json")).unwrap();
     let (code, said) = place.run(&["manifest.json", "--samples", "10", "-o", "."]);
     assert_eq!(code, 2);
-    assert!(said.contains("manifest.json is an input of this command and would be overwritten"), "{said}");
+    assert!(
+        said.contains("manifest.json is an input of this command and would be overwritten"),
+        "{said}"
+    );
     assert_eq!(place.bytes("manifest.json"), MODEL.as_bytes());
 }
 
@@ -232,7 +354,15 @@ fn recordings_that_this_command_did_not_make_are_left_alone() {
     let place = Place::new();
     let own = "t_s,accel_x_m_s2\n0,1\n0.01,2\n";
     let refused = |message: &str| {
-        let (code, said) = place.run(&["model.toml", "--replicates", "2", "--samples", "10", "-o", "own"]);
+        let (code, said) = place.run(&[
+            "model.toml",
+            "--replicates",
+            "2",
+            "--samples",
+            "10",
+            "-o",
+            "own",
+        ]);
         assert_eq!(code, 2, "{said}");
         assert!(said.contains(message), "{said}");
         assert_eq!(place.bytes("own/replicate_2.csv"), own.as_bytes());
@@ -253,13 +383,29 @@ fn recordings_that_this_command_did_not_make_are_left_alone() {
 #[test]
 fn an_interrupt_leaves_nothing() {
     let place = Place::new();
-    let began = || entries(place.0.path()).iter().any(|name| name.ends_with(".partial"));
+    let began = || {
+        entries(place.0.path())
+            .iter()
+            .any(|name| name.ends_with(".partial"))
+    };
     for (signal, code) in [("INT", 130), ("TERM", 143), ("HUP", 129)] {
         // what starts the tests may ignore signals (`nohup`, a script's background), and a child inherits that
         let mut child = std::process::Command::new("env")
             .current_dir(&place.0)
-            .args(["--default-signal=INT,TERM,HUP", env!("CARGO_BIN_EXE_nav-sim")])
-            .args(["synthesize", "model.toml", "--replicates", "1000", "--samples", "100000", "-o", "out"])
+            .args([
+                "--default-signal=INT,TERM,HUP",
+                env!("CARGO_BIN_EXE_nav-sim"),
+            ])
+            .args([
+                "synthesize",
+                "model.toml",
+                "--replicates",
+                "1000",
+                "--samples",
+                "100000",
+                "-o",
+                "out",
+            ])
             .stderr(std::process::Stdio::null())
             .spawn()
             .unwrap();
@@ -268,7 +414,13 @@ fn an_interrupt_leaves_nothing() {
             std::thread::sleep(std::time::Duration::from_millis(5));
         }
         let kill = format!("kill -{signal} {}", child.id());
-        assert!(std::process::Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+        assert!(
+            std::process::Command::new("sh")
+                .args(["-c", &kill])
+                .status()
+                .unwrap()
+                .success()
+        );
         assert_eq!(child.wait().unwrap().code(), Some(code));
         assert_eq!(entries(place.0.path()), ["model.toml"]);
     }
@@ -277,7 +429,18 @@ fn an_interrupt_leaves_nothing() {
          while kill -0 $! && ! ls -A | grep -q partial; do :; done; kill -HUP $!; wait $!",
         env!("CARGO_BIN_EXE_nav-sim")
     );
-    let ran = std::process::Command::new("sh").current_dir(&place.0).args(["-c", &script]).output().unwrap();
-    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-    assert_eq!(entries(&place.path("out")), ["manifest.json", "replicate_1.csv"]);
+    let ran = std::process::Command::new("sh")
+        .current_dir(&place.0)
+        .args(["-c", &script])
+        .output()
+        .unwrap();
+    assert!(
+        ran.status.success(),
+        "{}",
+        String::from_utf8_lossy(&ran.stderr)
+    );
+    assert_eq!(
+        entries(&place.path("out")),
+        ["manifest.json", "replicate_1.csv"]
+    );
 }

@@ -15,14 +15,28 @@ fn json(path: &Path) -> Value {
 fn intervals_go_from_recordings_to_navigation() {
     let place = place_with(DRIVE, MODEL);
     let dir = place.path();
-    done(dir, "synthesize imu.toml --replicates 4 --samples 8192 --seed 1 -o made");
+    done(
+        dir,
+        "synthesize imu.toml --replicates 4 --samples 8192 --seed 1 -o made",
+    );
     let said = done(dir, "calibrate made --model WN+RW --seed 1 -o m.toml").stderr;
-    assert!(said.contains("wrote m.toml, m.wv.json, m.draws.json"), "{said}");
+    assert!(
+        said.contains("wrote m.toml, m.wv.json, m.draws.json"),
+        "{said}"
+    );
     let analysis = |model: &str, out: &str| {
-        done(dir, &format!("run drive.toml {model} --method lincov --outage 30:45 {out}"))
+        done(
+            dir,
+            &format!("run drive.toml {model} --method lincov --outage 30:45 {out}"),
+        )
     };
     let ran = analysis("m.toml", "-o out -j 1");
-    assert!(ran.stderr.contains("95 % by the calibration, end of 30–45 s: p95 "), "{}", ran.stdout);
+    assert!(
+        ran.stderr
+            .contains("95 % by the calibration, end of 30–45 s: p95 "),
+        "{}",
+        ran.stdout
+    );
     let summary = json(&dir.join("out/summary.json"));
     let outage = &summary["outages"][0];
     let holds = |ends: &Value, value: &Value| {
@@ -31,7 +45,10 @@ fn intervals_go_from_recordings_to_navigation() {
     };
     for state in nav_sim::navigation::simulation::REPORTED_NAMES {
         for figure in ["asee_end", "asee_mean", "rmse_end"] {
-            holds(&outage[format!("{figure}_ci95")][state], &outage[figure][state]);
+            holds(
+                &outage[format!("{figure}_ci95")][state],
+                &outage[figure][state],
+            );
         }
     }
     // Over the outage the position leans on the fixes before it, whose noise is no part of the calibration: the interval
@@ -42,15 +59,27 @@ fn intervals_go_from_recordings_to_navigation() {
     };
     let [mean, end] = ["asee_mean_ci95", "asee_end_ci95"].map(half_of_log);
     assert!(0.0 < mean && mean < 0.8 * end, "{mean} {end}");
-    done(dir, "run drive.toml imu.toml --method lincov --outage 30:45 -o known");
+    done(
+        dir,
+        "run drive.toml imu.toml --method lincov --outage 30:45 -o known",
+    );
     done(dir, "compare out --reference known -o ratios.json");
-    let rows = json(&dir.join("ratios.json"))["rows"].as_array().unwrap().clone();
-    assert!(rows.iter().all(|row| row["calibration_half_pct"].is_null()), "one of them has no draws");
+    let rows = json(&dir.join("ratios.json"))["rows"]
+        .as_array()
+        .unwrap()
+        .clone();
+    assert!(
+        rows.iter().all(|row| row["calibration_half_pct"].is_null()),
+        "one of them has no draws"
+    );
     fs::copy(dir.join("m.toml"), dir.join("n.toml")).unwrap();
     fs::copy(dir.join("m.draws.json"), dir.join("n.draws.json")).unwrap();
     analysis("n.toml", "-o same");
     done(dir, "compare out --reference same -o even.json");
-    let rows = json(&dir.join("even.json"))["rows"].as_array().unwrap().clone();
+    let rows = json(&dir.join("even.json"))["rows"]
+        .as_array()
+        .unwrap()
+        .clone();
     let east = rows.iter().find(|row| row["state"] == "pos_e_m").unwrap();
     let expected = 100.0 * mean.hypot(mean);
     assert!(
@@ -59,18 +88,41 @@ fn intervals_go_from_recordings_to_navigation() {
     );
     let horizontal = &outage["horizontal_error_end_m"];
     holds(&horizontal["p95_ci95"], &horizontal["p95"]);
-    assert!(outage["sensitivity"]["gyro.RW.gamma2"]["yaw_deg"].as_f64().unwrap() > 0.0);
+    assert!(
+        outage["sensitivity"]["gyro.RW.gamma2"]["yaw_deg"]
+            .as_f64()
+            .unwrap()
+            > 0.0
+    );
     analysis("m.toml", "-o again -j 2");
     assert_eq!(json(&dir.join("again/summary.json")), summary);
 
-    let edited = fs::read_to_string(dir.join("m.toml")).unwrap().replacen("sigma2 = ", "sigma2 = 1", 1);
+    let edited =
+        fs::read_to_string(dir.join("m.toml"))
+            .unwrap()
+            .replacen("sigma2 = ", "sigma2 = 1", 1);
     fs::write(dir.join("m.toml"), edited).unwrap();
     let ran = analysis("m.toml", "-o other");
-    assert!(ran.stderr.contains("m.draws.json is not of m.toml: no intervals"), "{}", ran.stderr);
+    assert!(
+        ran.stderr
+            .contains("m.draws.json is not of m.toml: no intervals"),
+        "{}",
+        ran.stderr
+    );
     fs::write(dir.join("m.draws.json"), "{").unwrap();
-    let ran = nav_sim(dir, "run drive.toml m.toml --method lincov --outage 30:45 -o other");
-    assert!(ran.stderr.contains("m.draws.json, line 1: "), "{}", ran.stderr);
-    done(dir, "run drive.toml m.toml --truth imu.toml --method lincov --verbose --outage 30:45 -o other");
+    let ran = nav_sim(
+        dir,
+        "run drive.toml m.toml --method lincov --outage 30:45 -o other",
+    );
+    assert!(
+        ran.stderr.contains("m.draws.json, line 1: "),
+        "{}",
+        ran.stderr
+    );
+    done(
+        dir,
+        "run drive.toml m.toml --truth imu.toml --method lincov --verbose --outage 30:45 -o other",
+    );
 }
 
 /// What recordings differ by goes from them into the model, and from the model into other recordings and into plans.
@@ -81,20 +133,46 @@ fn spread_goes_from_recordings_to_the_model_and_on() {
             "[[spread.{sensor}]]\nprocess = \"WN\"\nparameter = \"sigma2\"\ndistribution = \"lognormal\"\nmedian = {median}\nsd = 0.3\n"
         )
     };
-    let place = place_with(DRIVE, &format!("{MODEL}{}{}", law("accel", "5.4e-5"), law("gyro", "2e-6")));
+    let place = place_with(
+        DRIVE,
+        &format!("{MODEL}{}{}", law("accel", "5.4e-5"), law("gyro", "2e-6")),
+    );
     let dir = place.path();
-    done(dir, "synthesize imu.toml --spread --replicates 5 --samples 4096 --seed 1 -o made");
-    let found =
-        done(dir, "calibrate made --model WN+RW --bootstrap 60 --seed 1 --format json -o m.toml").stdout;
+    done(
+        dir,
+        "synthesize imu.toml --spread --replicates 5 --samples 4096 --seed 1 -o made",
+    );
+    let found = done(
+        dir,
+        "calibrate made --model WN+RW --bootstrap 60 --seed 1 --format json -o m.toml",
+    )
+    .stdout;
     let found: Value = serde_json::from_str(&found).unwrap();
     let spread = &found["fits"][0]["parameter_spread"][0];
-    assert_eq!((&spread["process"], &spread["distribution"]), (&"WN".into(), &"lognormal".into()), "{found}");
+    assert_eq!(
+        (&spread["process"], &spread["distribution"]),
+        (&"WN".into(), &"lognormal".into()),
+        "{found}"
+    );
     // of 12 degrees of freedom or fewer: 0.3 within a factor of two
-    assert!((0.15..0.6).contains(&spread["sd"].as_f64().unwrap()), "{spread}");
+    assert!(
+        (0.15..0.6).contains(&spread["sd"].as_f64().unwrap()),
+        "{spread}"
+    );
     let text = fs::read_to_string(dir.join("m.toml")).unwrap();
-    assert!(text.contains("[[spread.accel]]") && text.contains("sd_ci95 = ["), "{text}");
-    done(dir, "synthesize m.toml --spread --replicates 2 --samples 4096 --seed 1 -o again");
-    let planned = done(dir, "design m.toml --recordings 4 --hours 0.01 --draws 40 --format json").stdout;
+    assert!(
+        text.contains("[[spread.accel]]") && text.contains("sd_ci95 = ["),
+        "{text}"
+    );
+    done(
+        dir,
+        "synthesize m.toml --spread --replicates 2 --samples 4096 --seed 1 -o again",
+    );
+    let planned = done(
+        dir,
+        "design m.toml --recordings 4 --hours 0.01 --draws 40 --format json",
+    )
+    .stdout;
     assert!(planned.contains("endless_half_width_pct"), "{planned}");
 }
 
@@ -103,12 +181,19 @@ fn spread_goes_from_recordings_to_the_model_and_on() {
 fn lost_samples_cost_no_scale() {
     let place = place_with(DRIVE, MODEL);
     let dir = place.path();
-    done(dir, "synthesize imu.toml --replicates 1 --samples 20000 --axes gyro.x --seed 1 -o made");
+    done(
+        dir,
+        "synthesize imu.toml --replicates 1 --samples 20000 --axes gyro.x --seed 1 -o made",
+    );
     let whole = fs::read_to_string(dir.join("made/replicate_1.csv")).unwrap();
     // a multiplicative hash: no pattern in time
     let is_lost = |k: usize| (k * 40_503) % 65_536 < 65_536 / 50;
-    let kept: Vec<&str> =
-        whole.lines().enumerate().filter(|(k, _)| *k == 0 || !is_lost(*k)).map(|(_, l)| l).collect();
+    let kept: Vec<&str> = whole
+        .lines()
+        .enumerate()
+        .filter(|(k, _)| *k == 0 || !is_lost(*k))
+        .map(|(_, l)| l)
+        .collect();
     fs::write(dir.join("lost.csv"), kept.join("\n") + "\n").unwrap();
     let curves = |file: &str| -> Value {
         serde_json::from_str(&done(dir, &format!("wv {file} --format json")).stdout).unwrap()
@@ -122,20 +207,31 @@ fn lost_samples_cost_no_scale() {
         let share = at(lost, "edof") / at(whole, "edof");
         assert!((0.94..=1.0).contains(&share), "{j}: {share}");
     }
-    done(dir, "calibrate lost.csv --model WN+RW --estimator gmwm --bootstrap 40 --seed 1 -o m.toml");
+    done(
+        dir,
+        "calibrate lost.csv --model WN+RW --estimator gmwm --bootstrap 40 --seed 1 -o m.toml",
+    );
 }
 
 /// Flicker noise goes wherever a model goes, and comes back from recordings.
 #[test]
 fn flicker_noise_is_read_by_all() {
     let axis = |sigma2: &str, b2: &str| {
-        format!("processes = [{{ type = \"WN\", sigma2 = {sigma2} }}, {{ type = \"FN\", b2 = {b2} }}]\n")
+        format!(
+            "processes = [{{ type = \"WN\", sigma2 = {sigma2} }}, {{ type = \"FN\", b2 = {b2} }}]\n"
+        )
     };
-    let model =
-        format!("rate_hz = 100.0\n[accel]\n{}[gyro]\n{}", axis("5.4e-5", "1e-7"), axis("2e-6", "1e-8"));
+    let model = format!(
+        "rate_hz = 100.0\n[accel]\n{}[gyro]\n{}",
+        axis("5.4e-5", "1e-7"),
+        axis("2e-6", "1e-8")
+    );
     let place = place_with(DRIVE, &model);
     let dir = place.path();
-    done(dir, "synthesize imu.toml --replicates 4 --samples 65536 --axes gyro --seed 1 -o made");
+    done(
+        dir,
+        "synthesize imu.toml --replicates 4 --samples 65536 --axes gyro --seed 1 -o made",
+    );
     let found = done(
         dir,
         "calibrate made --model WN+FN --estimator awv --bootstrap 100 --seed 1 --format json -o m.toml",
@@ -146,8 +242,18 @@ fn flicker_noise_is_read_by_all() {
     let [low, high] = [0, 1].map(|i| fitted["b2_ci95"][i].as_f64().unwrap());
     assert!(low < 1e-8 && 1e-8 < high && high < 2.0 * low, "{fitted}");
     done(dir, "export imu.toml --target kalibr");
-    let lincov = done(dir, "run drive.toml imu.toml --method lincov --filter full --outage 30:45 -o full");
-    assert!(lincov.stdout.starts_with("verdict: consistent"), "{}", lincov.stdout);
-    done(dir, "run drive.toml imu.toml --runs 4 --outage 30:45 --seed 1 -o runs");
+    let lincov = done(
+        dir,
+        "run drive.toml imu.toml --method lincov --filter full --outage 30:45 -o full",
+    );
+    assert!(
+        lincov.stdout.starts_with("verdict: consistent"),
+        "{}",
+        lincov.stdout
+    );
+    done(
+        dir,
+        "run drive.toml imu.toml --runs 4 --outage 30:45 --seed 1 -o runs",
+    );
     done(dir, "check imu.toml");
 }

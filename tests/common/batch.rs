@@ -25,15 +25,27 @@ pub const UNITS: usize = 50;
 pub fn place() -> tempfile::TempDir {
     let dir = place_with(DRIVE, MODEL);
     std::fs::write(dir.path().join("study.toml"), STUDY).unwrap();
-    std::fs::write(dir.path().join("wrong.toml"), MODEL.replace("4e-12", "4e-13")).unwrap();
+    std::fs::write(
+        dir.path().join("wrong.toml"),
+        MODEL.replace("4e-12", "4e-13"),
+    )
+    .unwrap();
     dir
 }
 
 /// `nav-sim batch …` in a directory.
 pub fn command(dir: &Path, arguments: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_nav-sim"));
-    command.current_dir(dir).arg("batch").args(arguments.split_whitespace());
-    for variable in ["HQ_TASK_ID", "SLURM_ARRAY_TASK_ID", "PBS_ARRAY_INDEX", "JOB_COMPLETION_INDEX"] {
+    command
+        .current_dir(dir)
+        .arg("batch")
+        .args(arguments.split_whitespace());
+    for variable in [
+        "HQ_TASK_ID",
+        "SLURM_ARRAY_TASK_ID",
+        "PBS_ARRAY_INDEX",
+        "JOB_COMPLETION_INDEX",
+    ] {
         command.env_remove(variable);
     }
     command
@@ -47,7 +59,11 @@ pub fn batch(dir: &Path, arguments: &str) -> Output {
 pub fn done(dir: &Path, arguments: &str) -> String {
     let output = batch(dir, arguments);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{arguments}: {:?}\n{said}", output.status);
+    assert!(
+        output.status.success(),
+        "{arguments}: {:?}\n{said}",
+        output.status
+    );
     said
 }
 
@@ -61,7 +77,11 @@ pub fn refused(dir: &Path, arguments: &str, code: i32) -> String {
 
 pub fn spawn(dir: &Path, arguments: &str) -> Child {
     let mut command = command(dir, arguments);
-    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    command
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
 }
 
 /// Every merged file with its bytes.
@@ -69,7 +89,12 @@ pub fn results(dir: &Path) -> Vec<(String, Vec<u8>)> {
     let entries = std::fs::read_dir(dir.join("results")).unwrap();
     let mut files: Vec<(String, Vec<u8>)> = entries
         .map(|e| e.unwrap().path())
-        .map(|p| (p.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(&p).unwrap()))
+        .map(|p| {
+            (
+                p.file_name().unwrap().to_string_lossy().into_owned(),
+                std::fs::read(&p).unwrap(),
+            )
+        })
         .collect();
     files.sort();
     files
@@ -77,10 +102,16 @@ pub fn results(dir: &Path) -> Vec<(String, Vec<u8>)> {
 
 /// The unit files of a study directory.
 pub fn units(dir: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(dir.join("units")) else { return Vec::new() };
-    let inner = entries.flatten().flat_map(|e| std::fs::read_dir(e.path()).unwrap().flatten());
-    let mut files: Vec<PathBuf> =
-        inner.map(|e| e.path()).filter(|p| p.extension().is_some_and(|e| e == "unit")).collect();
+    let Ok(entries) = std::fs::read_dir(dir.join("units")) else {
+        return Vec::new();
+    };
+    let inner = entries
+        .flatten()
+        .flat_map(|e| std::fs::read_dir(e.path()).unwrap().flatten());
+    let mut files: Vec<PathBuf> = inner
+        .map(|e| e.path())
+        .filter(|p| p.extension().is_some_and(|e| e == "unit"))
+        .collect();
     files.sort();
     files
 }

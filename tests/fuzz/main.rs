@@ -31,7 +31,9 @@ fn corpus(target: &str) -> Vec<Vec<u8>> {
 }
 
 fn entries(directory: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(directory) else { return Vec::new() };
+    let Ok(entries) = std::fs::read_dir(directory) else {
+        return Vec::new();
+    };
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
     paths.sort();
     paths
@@ -61,20 +63,29 @@ fn tried((name, read): Target, numbers: Range<u64>) -> u64 {
     for number in numbers {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(number);
         let [file, other] = [0, 1].map(|_| &files[random.random_range(0..files.len())]);
-        attempt(&mutate::changed(file, other, &mut random), &format!("change {number}"));
+        attempt(
+            &mutate::changed(file, other, &mut random),
+            &format!("change {number}"),
+        );
     }
     executions
 }
 
 #[test]
 fn no_reader_panics_on_a_damaged_file() {
-    let asked = |name: &str| std::env::var(name).ok().map(|text| text.parse::<u64>().unwrap());
+    let asked = |name: &str| {
+        std::env::var(name)
+            .ok()
+            .map(|text| text.parse::<u64>().unwrap())
+    };
     let first = asked("NAV_SIM_FUZZ_FIRST").unwrap_or(0);
     let numbers = first..first + asked("NAV_SIM_FUZZ").unwrap_or(CHANGED);
     let next = AtomicUsize::new(0);
     let only = std::env::var("NAV_SIM_FUZZ_TARGET").ok();
-    let wanted: Vec<Target> =
-        TARGETS.into_iter().filter(|(name, _)| only.as_deref().is_none_or(|only| only == *name)).collect();
+    let wanted: Vec<Target> = TARGETS
+        .into_iter()
+        .filter(|(name, _)| only.as_deref().is_none_or(|only| only == *name))
+        .collect();
     let worker = || {
         let mut executions = 0;
         while let Some(target) = wanted.get(next.fetch_add(1, Ordering::Relaxed)) {
@@ -86,7 +97,10 @@ fn no_reader_panics_on_a_damaged_file() {
     };
     let total: u64 = std::thread::scope(|scope| {
         let workers = [0, 1].map(|_| scope.spawn(worker));
-        workers.into_iter().map(|worker| worker.join().unwrap()).sum()
+        workers
+            .into_iter()
+            .map(|worker| worker.join().unwrap())
+            .sum()
     });
     println!("figure fuzz: {total} executions, no panic");
 }

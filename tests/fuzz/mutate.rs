@@ -81,15 +81,28 @@ fn change(bytes: &mut Vec<u8>, other: &[u8], random: &mut impl Rng) {
 /// A short part, sometimes a long one.
 fn part(length: usize, random: &mut impl Rng) -> (usize, usize) {
     let from = random.random_range(0..=length);
-    let most = if random.random_range(0..4) == 0 { length } else { 40 };
+    let most = if random.random_range(0..4) == 0 {
+        length
+    } else {
+        40
+    };
     (from, (from + random.random_range(0..=most)).min(length))
 }
 
 /// Another number in the place of the next one.
 fn number(bytes: &mut Vec<u8>, at: usize, random: &mut impl Rng) {
     let is_of_number = |b: &u8| b.is_ascii_digit() || matches!(b, b'.' | b'-' | b'+' | b'e');
-    let Some(from) = bytes[at..].iter().position(u8::is_ascii_digit).map(|k| at + k) else { return };
-    let to = bytes[from..].iter().position(|b| !is_of_number(b)).map_or(bytes.len(), |k| from + k);
+    let Some(from) = bytes[at..]
+        .iter()
+        .position(u8::is_ascii_digit)
+        .map(|k| at + k)
+    else {
+        return;
+    };
+    let to = bytes[from..]
+        .iter()
+        .position(|b| !is_of_number(b))
+        .map_or(bytes.len(), |k| from + k);
     let word = WORDS[random.random_range(0..12)];
     _ = bytes.splice(from..to, word.iter().copied());
 }

@@ -87,9 +87,24 @@ const DRIVES: [(&str, &[Step]); 8] = [
     ),
     (
         "backwards for long",
-        &[(12.0, 0.0, 0.0), (6.0, -0.8, 0.0), (15.0, 0.0, 0.04), (15.0, 0.0, -0.04), (15.0, 0.0, 0.0)],
+        &[
+            (12.0, 0.0, 0.0),
+            (6.0, -0.8, 0.0),
+            (15.0, 0.0, 0.04),
+            (15.0, 0.0, -0.04),
+            (15.0, 0.0, 0.0),
+        ],
     ),
-    ("no rest", &[(4.0, 1.2, 0.0), (8.0, 0.0, 0.06), (20.0, 0.0, -0.02), (6.0, 0.6, 0.0), (30.0, 0.0, 0.02)]),
+    (
+        "no rest",
+        &[
+            (4.0, 1.2, 0.0),
+            (8.0, 0.0, 0.06),
+            (20.0, 0.0, -0.02),
+            (6.0, 0.6, 0.0),
+            (30.0, 0.0, 0.02),
+        ],
+    ),
     (
         "away slowly",
         &[
@@ -127,7 +142,11 @@ pub(crate) fn trajectory(steps: &[Step]) -> Trajectory {
         for _ in 0..(seconds / DT_S).round() as u32 {
             if k.is_multiple_of(10) {
                 let (north, east) = (n + AXLE_M * f64::cos(yaw), e + AXLE_M * f64::sin(yaw));
-                let attitude = RollPitchYaw { roll: 1.0 * DEG, pitch: -2.0 * DEG, yaw: wrap_angle(yaw) };
+                let attitude = RollPitchYaw {
+                    roll: 1.0 * DEG,
+                    pitch: -2.0 * DEG,
+                    yaw: wrap_angle(yaw),
+                };
                 samples.push(TrajectorySample {
                     t_s: f64::from(k) * DT_S,
                     lat: lat + north / (r.meridian + h),
@@ -208,7 +227,10 @@ fn normalised(alignment: &Alignment, trajectory: &Trajectory) -> [f64; 3] {
         [a.roll, a.pitch, a.yaw]
     };
     let start = &alignment.start;
-    let (found, truth) = (angles(start.state.q_b_n), angles(trajectory.state(start.t_s).q_b_n));
+    let (found, truth) = (
+        angles(start.state.q_b_n),
+        angles(trajectory.state(start.t_s).q_b_n),
+    );
     std::array::from_fn(|i| wrap_angle(found[i] - truth[i]) / DEG / start.sigma.att_sigma_deg[i])
 }
 
@@ -222,7 +244,11 @@ fn every_start_is_as_good_as_it_says() {
         let trajectory = trajectory(steps);
         for velocity in [Some(0.1), Some(0.3), Some(0.6), None] {
             recorded(&trajectory, velocity, 3, |run, recording| {
-                let data = Recorded { imu: &recording.imu, gnss: &recording.gnss, aids: &[] };
+                let data = Recorded {
+                    imu: &recording.imu,
+                    gnss: &recording.gnss,
+                    aids: &[],
+                };
                 // positions alone do not always have a course
                 let Ok(alignment) = coarse(&data, &settings(), &belief()) else {
                     assert!(velocity.is_none(), "{name} {velocity:?} {run}");
@@ -230,14 +256,20 @@ fn every_start_is_as_good_as_it_says() {
                 };
                 let z = normalised(&alignment, &trajectory);
                 let how = &alignment.start.found;
-                assert!(z.iter().all(|z| z.abs() < 4.0), "{name} {velocity:?} {run}: {z:?} {how:?}");
+                assert!(
+                    z.iter().all(|z| z.abs() < 4.0),
+                    "{name} {velocity:?} {run}: {z:?} {how:?}"
+                );
                 (0..3).for_each(|i| sums[i] += z[i] * z[i]);
                 starts += 1.0;
             });
         }
     }
     let largest = starts + 3.7 * f64::sqrt(2.0 * starts);
-    assert!(sums.iter().all(|sum| *sum < largest), "{sums:?} of {starts}");
+    assert!(
+        sums.iter().all(|sum| *sum < largest),
+        "{sums:?} of {starts}"
+    );
 }
 
 /// In a wind from the side the course is no heading: 15° off, seven deviations of a road vehicle's. The start says that it
@@ -249,14 +281,24 @@ fn a_heading_beside_the_course_is_not_believed_as_if_it_were_the_course() {
         let t_s = 0.1 * f64::from(k);
         let s = straight.state(t_s);
         let q_b_n = s.q_b_n * DQuat::from_rotation_z(15.0 * DEG);
-        TrajectorySample { t_s, lat: s.lat, lon: s.lon, h: s.h, q_b_n }
+        TrajectorySample {
+            t_s,
+            lat: s.lat,
+            lon: s.lon,
+            h: s.h,
+            q_b_n,
+        }
     };
     let samples: Vec<_> = (0..(10.0 * straight.end_s()) as u32).map(sample).collect();
     let crabbing = Trajectory::from_samples(&samples).unwrap();
     recorded(&crabbing, Some(0.1), 6, |run, recording| {
         let alignment = aligned(recording, &settings());
         let z = normalised(&alignment, &crabbing);
-        assert!(z.iter().all(|z| z.abs() < 4.0), "{run}: {z:?} {:?}", alignment.start.found);
+        assert!(
+            z.iter().all(|z| z.abs() < 4.0),
+            "{run}: {z:?} {:?}",
+            alignment.start.found
+        );
     });
 }
 
@@ -264,25 +306,43 @@ fn a_heading_beside_the_course_is_not_believed_as_if_it_were_the_course() {
 fn one(steps: &[Step]) -> (Trajectory, Recording) {
     let trajectory = trajectory(steps);
     let mut found = None;
-    recorded(&trajectory, Some(0.1), 1, |_, recording| found = Some(recording.clone()));
+    recorded(&trajectory, Some(0.1), 1, |_, recording| {
+        found = Some(recording.clone())
+    });
     (trajectory, found.unwrap())
 }
 
 fn aligned(recording: &Recording, settings: &Settings) -> Alignment {
-    coarse(&Recorded { imu: &recording.imu, gnss: &recording.gnss, aids: &[] }, settings, &belief()).unwrap()
+    coarse(
+        &Recorded {
+            imu: &recording.imu,
+            gnss: &recording.gnss,
+            aids: &[],
+        },
+        settings,
+        &belief(),
+    )
+    .unwrap()
 }
 
 /// For twelve seconds the velocities are turned by a right angle: a start there agrees with nothing after it.
 #[test]
 fn a_start_that_the_next_minute_contradicts_is_given_up_for_a_later_one() {
     let (trajectory, mut recording) = one(DRIVES[0].1);
-    for fix in recording.gnss.iter_mut().filter(|f| (15.0..30.0).contains(&f.t_s)) {
+    for fix in recording
+        .gnss
+        .iter_mut()
+        .filter(|f| (15.0..30.0).contains(&f.t_s))
+    {
         let velocity = fix.velocity.as_mut().unwrap();
         velocity.horizontal = velocity.horizontal.perp();
     }
     let found = aligned(&recording, &settings());
     let z = normalised(&found, &trajectory);
-    assert!(found.start.t_s > 30.0 && z.iter().all(|z| z.abs() < 4.0), "{z:?} {found:?}");
+    assert!(
+        found.start.t_s > 30.0 && z.iter().all(|z| z.abs() < 4.0),
+        "{z:?} {found:?}"
+    );
     assert!(found.doubts.is_empty(), "{found:?}");
 }
 
@@ -290,11 +350,27 @@ fn a_start_that_the_next_minute_contradicts_is_given_up_for_a_later_one() {
 #[test]
 fn a_wrong_mounting_is_told() {
     let (_, recording) = one(DRIVES[1].1);
-    let turned = |q_s_b| aligned(&recording, &Settings { q_s_b, ..settings() }).doubts;
+    let turned = |q_s_b| {
+        aligned(
+            &recording,
+            &Settings {
+                q_s_b,
+                ..settings()
+            },
+        )
+        .doubts
+    };
     let sideways = turned(DQuat::from_rotation_z(90.0 * DEG));
-    assert!(matches!(sideways[0], (VerdictKind::Overconfident, Finding::Start { .. })), "{sideways:?}");
+    assert!(
+        matches!(
+            sideways[0],
+            (VerdictKind::Overconfident, Finding::Start { .. })
+        ),
+        "{sideways:?}"
+    );
     let down = turned(DQuat::from_rotation_x(180.0 * DEG));
-    let is_not_level = |(_, finding): &(VerdictKind, Finding)| matches!(finding, Finding::NotLevel { .. });
+    let is_not_level =
+        |(_, finding): &(VerdictKind, Finding)| matches!(finding, Finding::NotLevel { .. });
     assert!(down.iter().any(is_not_level), "{down:?}");
     let edge = turned(DQuat::from_rotation_y(-60.0 * DEG));
     assert!(edge.iter().any(is_not_level), "{edge:?}");
@@ -309,14 +385,33 @@ fn what_the_fixes_do_not_tell_is_said() {
     recording.gnss.retain(|f| f.t_s > 60.0);
     let found = aligned(&recording, &settings());
     assert!(normalised(&found, &trajectory)[2].abs() < 4.0, "{found:?}");
-    assert!(found.doubts.iter().any(|(_, finding)| *finding == Finding::Direction), "{found:?}");
+    assert!(
+        found
+            .doubts
+            .iter()
+            .any(|(_, finding)| *finding == Finding::Direction),
+        "{found:?}"
+    );
 }
 
 /// Fixes that are withheld are not looked at.
 #[test]
 fn a_withheld_fix_starts_nothing() {
     let (_, recording) = one(DRIVES[0].1);
-    let outages = vec![Outage { start_s: 10.0, end_s: 40.0 }];
+    let outages = vec![Outage {
+        start_s: 10.0,
+        end_s: 40.0,
+    }];
     assert!(aligned(&recording, &settings()).start.t_s < 30.0);
-    assert!(aligned(&recording, &Settings { outages, ..settings() }).start.t_s >= 40.0);
+    assert!(
+        aligned(
+            &recording,
+            &Settings {
+                outages,
+                ..settings()
+            }
+        )
+        .start
+        .t_s >= 40.0
+    );
 }

@@ -3,7 +3,8 @@
 //! the laboratory's own filter truly has.
 
 use nav_sim::calibration::{
-    Bootstrap, Estimator, ModelChoice, Outcome, Pool, Settings, calibrate, grouped, infer, replicates,
+    Bootstrap, Estimator, ModelChoice, Outcome, Pool, Settings, calibrate, grouped, infer,
+    replicates,
 };
 use nav_sim::formats::draws_file::{Draws, DrawsFile};
 use nav_sim::navigation::metrics::Summary;
@@ -43,7 +44,12 @@ impl World {
             rate_hz: self.truth.rate_hz,
             ..Settings::default()
         };
-        let imu = VirtualImu { model: &self.truth, spread: None, contamination: None, seed };
+        let imu = VirtualImu {
+            model: &self.truth,
+            spread: None,
+            contamination: None,
+            seed,
+        };
         let mut measured = Vec::new();
         for run in 1..=self.recordings {
             let recording = imu.recording(run, &Channel::ALL, self.samples).unwrap();
@@ -51,10 +57,22 @@ impl World {
         }
         let groups = grouped(measured, Pool::Sensor);
         let mut outcomes = calibrate(&groups, &settings).unwrap();
-        infer(&groups, &mut outcomes, &settings, Bootstrap { draws: 200, seed });
+        infer(
+            &groups,
+            &mut outcomes,
+            &settings,
+            Bootstrap { draws: 200, seed },
+        );
         let outcomes: Vec<&Outcome> = outcomes.iter().collect();
-        let model = Model::pooled(settings.rate_hz, &outcomes[0].fit.composite, &outcomes[1].fit.composite);
-        let draws = DrawsFile::of(&outcomes, settings.rate_hz).unwrap().draws(&model).unwrap();
+        let model = Model::pooled(
+            settings.rate_hz,
+            &outcomes[0].fit.composite,
+            &outcomes[1].fit.composite,
+        );
+        let draws = DrawsFile::of(&outcomes, settings.rate_hz)
+            .unwrap()
+            .draws(&model)
+            .unwrap();
         Calibrated { model, draws }
     }
 
@@ -64,7 +82,9 @@ impl World {
         inputs.model_draws = draws;
         let span = (self.trajectory.start_s(), self.trajectory.end_s());
         let outages = self.scenario.outages_on(span, 0).unwrap().windows;
-        navigate(&inputs, &self.scenario, &outages, 0, &()).unwrap().summary
+        navigate(&inputs, &self.scenario, &outages, 0, &())
+            .unwrap()
+            .summary
     }
 
     /// How many of the laboratories' intervals hold the truth: of the ASEE and of the RMSE at the end of the last outage,
@@ -76,15 +96,23 @@ impl World {
         for Calibrated { model, draws } in laboratories {
             let stated = self.analysis(model, TrueImu::AsBelieved, Some(draws.clone()));
             let truly = self.analysis(model, TrueImu::Model(self.truth.clone()), None);
-            let (stated, truly) = (stated.outages.last().unwrap(), truly.outages.last().unwrap());
-            let holds = |(low, high): (f64, f64), value: f64| u64::from(low <= value && value <= high);
+            let (stated, truly) = (
+                stated.outages.last().unwrap(),
+                truly.outages.last().unwrap(),
+            );
+            let holds =
+                |(low, high): (f64, f64), value: f64| u64::from(low <= value && value <= high);
             for i in 0..9 {
                 of_asee[i] += holds(stated.asee_end_ci95.unwrap().0[i], asee.0[i]);
                 of_rmse[i] += holds(stated.rmse_end_ci95.unwrap().0[i], truly.rmse_end.0[i]);
             }
-            let (h, t) = (&stated.horizontal_error_end_m, &truly.horizontal_error_end_m);
-            for (count, (ends, value)) in
-                of_quantiles.iter_mut().zip([(h.p50_ci95, t.p50), (h.p95_ci95, t.p95)])
+            let (h, t) = (
+                &stated.horizontal_error_end_m,
+                &truly.horizontal_error_end_m,
+            );
+            for (count, (ends, value)) in of_quantiles
+                .iter_mut()
+                .zip([(h.p50_ci95, t.p50), (h.p95_ci95, t.p95)])
             {
                 *count += holds((ends.0.unwrap(), ends.1.unwrap()), value);
             }
@@ -97,7 +125,10 @@ impl World {
 fn short(states: &str) -> World {
     let axis = |unit: f64| {
         let ar1 = Ar1::new(0.99, 2e-7 * unit).unwrap();
-        Composite::new(vec![Process::White(White::new(2e-5 * unit).unwrap()), Process::Ar1(ar1)])
+        Composite::new(vec![
+            Process::White(White::new(2e-5 * unit).unwrap()),
+            Process::Ar1(ar1),
+        ])
     };
     let scenario = format!(
         "run.method = \"lincov\"\nfilter.states = \"{states}\"\nimu.rate_hz = 10\noutage = [{{ start_s = 70, end_s = 110 }}]"
@@ -132,6 +163,12 @@ fn intervals_of_many_laboratories() {
             "figure calibration_intervals: filter {states}: {least} to {most} of {LABORATORIES} hold the truth"
         );
         let share = |n: &u64| *n as f64 / LABORATORIES as f64;
-        assert!(asee.iter().chain(&rmse).chain(&quantiles).map(share).all(|s| (s - 0.95).abs() < 0.062));
+        assert!(
+            asee.iter()
+                .chain(&rmse)
+                .chain(&quantiles)
+                .map(share)
+                .all(|s| (s - 0.95).abs() < 0.062)
+        );
     }
 }

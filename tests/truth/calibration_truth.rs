@@ -15,7 +15,12 @@ fn truth(file: &str) -> Value {
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+    value
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|v| v.as_f64().unwrap())
+        .collect()
 }
 
 fn composite(components: &Value, theta: &[f64], rate_hz: f64) -> Composite {
@@ -39,7 +44,10 @@ fn composite(components: &Value, theta: &[f64], rate_hz: f64) -> Composite {
 #[track_caller]
 fn assert_relative(actual: f64, expected: f64, tolerance: f64, what: &str) {
     let error = ((actual - expected) / expected).abs();
-    assert!(error <= tolerance, "{what}: {actual:e}, truth {expected:e}, relative error {error:e}");
+    assert!(
+        error <= tolerance,
+        "{what}: {actual:e}, truth {expected:e}, relative error {error:e}"
+    );
 }
 
 #[test]
@@ -53,7 +61,12 @@ fn theoretical_wavelet_variance_and_derivatives() {
         let nu = numbers(&case["nu"]);
         for (i, row) in case["dnu_dtheta"].as_array().unwrap().iter().enumerate() {
             let level = i as u32 + 1;
-            assert_relative(model.haar_wv(level), nu[i], 1e-13, &format!("{name}, level {level}"));
+            assert_relative(
+                model.haar_wv(level),
+                nu[i],
+                1e-13,
+                &format!("{name}, level {level}"),
+            );
             let gradient = model.haar_wv_gradient(level);
             assert_eq!(gradient.len(), theta.len());
             for (p, (actual, expected)) in gradient.iter().zip(numbers(row)).enumerate() {
@@ -92,16 +105,32 @@ fn wavelet_variance_of_a_signal() {
     for i in 0..11 {
         let level = i as u32 + 1;
         let expected = |key: &str| truth[key][i].as_f64().unwrap();
-        assert_relative(classical[i], expected("classical"), 1e-12, &format!("classical {level}"));
-        assert_eq!(coefficient_count(4096, level) as u64, truth["M"][i].as_u64().unwrap());
+        assert_relative(
+            classical[i],
+            expected("classical"),
+            1e-12,
+            &format!("classical {level}"),
+        );
+        assert_eq!(
+            coefficient_count(4096, level) as u64,
+            truth["M"][i].as_u64().unwrap()
+        );
         let edof = interval::edof_eta3(4096, level);
         assert_relative(edof, expected("edof"), 1e-15, "edof");
         let (low, high) = interval::interval(classical[i], edof, 0.95);
         assert_relative(low, expected("ci_low"), 1e-9, &format!("low {level}"));
         assert_relative(high, expected("ci_high"), 1e-9, &format!("high {level}"));
         if comparable[i].as_bool().unwrap() {
-            assert_relative(robust[i].value, expected("robust"), 1e-12, &format!("robust {level}"));
-            assert_eq!(robust[i].status.name(), truth["robust_status"][i].as_str().unwrap());
+            assert_relative(
+                robust[i].value,
+                expected("robust"),
+                1e-12,
+                &format!("robust {level}"),
+            );
+            assert_eq!(
+                robust[i].status.name(),
+                truth["robust_status"][i].as_str().unwrap()
+            );
         }
     }
 }
@@ -116,7 +145,10 @@ fn exact_curves_give_back_their_parameters() {
     for case in cases {
         let wv = numbers(&case["nu_hat"]);
         let levels: Vec<u32> = (1..=wv.len() as u32).collect();
-        let edof = levels.iter().map(|j| interval::edof_eta3(samples, *j)).collect();
+        let edof = levels
+            .iter()
+            .map(|j| interval::edof_eta3(samples, *j))
+            .collect();
         let spec: String = case["components"]
             .as_array()
             .unwrap()
@@ -124,23 +156,40 @@ fn exact_curves_give_back_their_parameters() {
             .map(|c| c.as_str().unwrap())
             .collect::<Vec<_>>()
             .join("+");
-        let curve = Curve { levels, wv, edof, ..Curve::default() };
+        let curve = Curve {
+            levels,
+            wv,
+            edof,
+            ..Curve::default()
+        };
         let fit = fit(&curve, &spec.parse().unwrap(), 1.0, Weighting::Edof).unwrap();
         // The truth lists AR1s by descending correlation time, the fit by ascending.
         let expected = composite(&case["components"], &numbers(&case["theta"]), 1.0);
         for code in ["WN", "QN", "AR1", "RW"] {
             let of = |c: &Composite| -> Vec<f64> {
-                let mut found: Vec<_> =
-                    c.processes.iter().filter(|p| p.code() == code).map(Process::parameters).collect();
+                let mut found: Vec<_> = c
+                    .processes
+                    .iter()
+                    .filter(|p| p.code() == code)
+                    .map(Process::parameters)
+                    .collect();
                 found.sort_by(|a, b| a[0].1.total_cmp(&b[0].1));
                 found.concat().into_iter().map(|(_, v)| v).collect()
             };
             for (actual, expected) in of(&fit.composite).iter().zip(of(&expected)) {
-                assert_relative(*actual, expected, 1e-3 * tolerance, &format!("{spec} {code}"));
+                assert_relative(
+                    *actual,
+                    expected,
+                    1e-3 * tolerance,
+                    &format!("{spec} {code}"),
+                );
             }
         }
         assert_eq!(fit.termination, Termination::Converged);
-        assert!(fit.objective < 1e-15 && fit.zero.is_empty() && fit.at_end.is_empty(), "{fit:?}");
+        assert!(
+            fit.objective < 1e-15 && fit.zero.is_empty() && fit.at_end.is_empty(),
+            "{fit:?}"
+        );
         let phis: Vec<f64> = fit
             .composite
             .processes

@@ -11,8 +11,9 @@ type TableOne = BTreeMap<(String, String, String), [f64; 2]>;
 fn table_one(directory: &Path) -> TableOne {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let study = std::fs::read_to_string(root.join("examples/paper_table1.toml")).unwrap();
-    let study =
-        study.replace("\"../", &format!("\"{}/", root.display())).replace("\nruns = 100\n", "\nruns = 8\n");
+    let study = study
+        .replace("\"../", &format!("\"{}/", root.display()))
+        .replace("\nruns = 100\n", "\nruns = 8\n");
     assert!(study.contains("\nruns = 8\n"));
     std::fs::write(directory.join("study.toml"), study).unwrap();
     for step in ["plan", "run", "merge"] {
@@ -22,8 +23,18 @@ fn table_one(directory: &Path) -> TableOne {
     let row = |row: Result<BTreeMap<String, String>, csv::Error>| {
         let row = row.unwrap();
         let number = |name: &str| row[name].parse::<f64>().unwrap();
-        let ratios = [number("asee_ratio_error_pos_e_pct"), number("asee_ratio_error_roll_pct")];
-        ((row["candidate"].clone(), row["filter"].clone(), row["outage"].clone()), ratios)
+        let ratios = [
+            number("asee_ratio_error_pos_e_pct"),
+            number("asee_ratio_error_roll_pct"),
+        ];
+        (
+            (
+                row["candidate"].clone(),
+                row["filter"].clone(),
+                row["outage"].clone(),
+            ),
+            ratios,
+        )
     };
     rows.deserialize().map(row).collect()
 }
@@ -34,22 +45,37 @@ fn table_one(directory: &Path) -> TableOne {
 fn the_papers_table_one_has_its_ordering() {
     let place = tempfile::tempdir().unwrap();
     let table = table_one(place.path());
-    assert_eq!(table.len(), 9 * 2 * 2, "nine models, two filters, two outages");
+    assert_eq!(
+        table.len(),
+        9 * 2 * 2,
+        "nine models, two filters, two outages"
+    );
     for (filter, outage) in [("full", "0"), ("full", "1"), ("15", "0"), ("15", "1")] {
         for (state, name) in ["pos_e", "roll"].into_iter().enumerate() {
-            let ratio =
-                |candidate: &str| table[&(candidate.to_owned(), filter.to_owned(), outage.to_owned())][state];
+            let ratio = |candidate: &str| {
+                table[&(candidate.to_owned(), filter.to_owned(), outage.to_owned())][state]
+            };
             let shown = format!("{name}, filter {filter}, outage {outage}");
             // clean recordings: robustness costs little
             for candidate in ["I/sr-awv", "I/dr-awv"] {
-                assert!(ratio(candidate).abs() < 5.0, "{shown}: {candidate} {}", ratio(candidate));
+                assert!(
+                    ratio(candidate).abs() < 5.0,
+                    "{shown}: {candidate} {}",
+                    ratio(candidate)
+                );
             }
             // outliers: the classical average is twice as far off as the robust ones
             let [awv, sr, dr] = ["II/awv", "II/sr-awv", "II/dr-awv"].map(ratio);
-            assert!(awv > 40.0 && sr < 0.6 * awv && dr < 0.6 * awv, "{shown}: II {awv} {sr} {dr}");
+            assert!(
+                awv > 40.0 && sr < 0.6 * awv && dr < 0.6 * awv,
+                "{shown}: II {awv} {sr} {dr}"
+            );
             // abnormal replicates beside them: trimming across replicates is closest
             let [awv, sr, dr] = ["III/awv", "III/sr-awv", "III/dr-awv"].map(ratio);
-            assert!(dr < sr && sr < 0.6 * awv && awv > 40.0, "{shown}: III {awv} {sr} {dr}");
+            assert!(
+                dr < sr && sr < 0.6 * awv && awv > 40.0,
+                "{shown}: III {awv} {sr} {dr}"
+            );
         }
     }
 }

@@ -23,7 +23,10 @@ fn curve(model: &Composite) -> Curve {
     let levels: Vec<u32> = (1..=17).collect();
     let wobble = |level: u32| 1.0 + 0.02 * (f64::from(level * level % 7) - 3.0);
     Curve {
-        wv: levels.iter().map(|l| model.haar_wv(*l) * wobble(*l)).collect(),
+        wv: levels
+            .iter()
+            .map(|l| model.haar_wv(*l) * wobble(*l))
+            .collect(),
         edof: levels.iter().map(|l| f64::from(1 << (18 - l))).collect(),
         levels,
         ..Curve::default()
@@ -43,19 +46,39 @@ fn influence_in_navigation_is_that_of_brute_force() {
         rate_hz: RATE_HZ,
         ..Settings::default()
     };
-    let group = |sensor| Group { scope: Scope { sensor, axis: None }, replicates: Vec::new() };
-    let fitted =
-        |sensor, curve: &Curve| fit_curve(&group(sensor), Estimator::Awv, curve.clone(), &settings).unwrap();
-    let outcomes = sensors.clone().map(|(sensor, curve)| fitted(sensor, &curve));
+    let group = |sensor| Group {
+        scope: Scope { sensor, axis: None },
+        replicates: Vec::new(),
+    };
+    let fitted = |sensor, curve: &Curve| {
+        fit_curve(&group(sensor), Estimator::Awv, curve.clone(), &settings).unwrap()
+    };
+    let outcomes = sensors
+        .clone()
+        .map(|(sensor, curve)| fitted(sensor, &curve));
     let laboratory = Laboratory::new(Vec::new(), settings.clone(), None);
     let groups = sensors.clone().map(|(sensor, _)| group(sensor));
-    for (name, start_s) in [("figure_eight", 60.0), ("land_vehicle", 300.0), ("fixed_wing", 200.0)] {
+    for (name, start_s) in [
+        ("figure_eight", 60.0),
+        ("land_vehicle", 300.0),
+        ("fixed_wing", 200.0),
+    ] {
         let path = format!("trajectories/{name}.toml");
-        let (trajectory, _) = load_trajectory(path.as_ref(), &TrajectoryOptions::default()).unwrap();
-        let outage = Outage { start_s, end_s: start_s + 60.0 };
+        let (trajectory, _) =
+            load_trajectory(path.as_ref(), &TrajectoryOptions::default()).unwrap();
+        let outage = Outage {
+            start_s,
+            end_s: start_s + 60.0,
+        };
         let drive = Drive::new(&trajectory, Scenario::default(), vec![outage], RATE_HZ, 1).unwrap();
-        let influence = drive.influence(&laboratory, &groups, &outcomes, &settings).unwrap();
-        let largest = influence.scales.iter().map(|s| s.on_error.abs()).fold(0.0, f64::max);
+        let influence = drive
+            .influence(&laboratory, &groups, &outcomes, &settings)
+            .unwrap();
+        let largest = influence
+            .scales
+            .iter()
+            .map(|s| s.on_error.abs())
+            .fold(0.0, f64::max);
         let mut compared = 0;
         for (at, scale) in influence.scales.iter().enumerate() {
             if scale.on_error.abs() < 0.05 * largest {
@@ -68,7 +91,10 @@ fn influence_in_navigation_is_that_of_brute_force() {
                 let again = fitted(sensors[of].0, &changed);
                 let composites = [0, 1].map(|s| if s == of { &again } else { &outcomes[s] });
                 let [accel, gyro] = composites.map(|o| &o.fit.composite);
-                drive.horizontal_rmse(&Model::pooled(RATE_HZ, accel, gyro)).unwrap().ln()
+                drive
+                    .horizontal_rmse(&Model::pooled(RATE_HZ, accel, gyro))
+                    .unwrap()
+                    .ln()
             };
             let brute = (error(5e-3) - error(-5e-3)) / 1e-2;
             let off = (scale.on_error / brute - 1.0).abs();
@@ -81,6 +107,10 @@ fn influence_in_navigation_is_that_of_brute_force() {
             );
             compared += 1;
         }
-        assert!(compared >= 4, "{name}: {compared} of {}", influence.scales.len());
+        assert!(
+            compared >= 4,
+            "{name}: {compared} of {}",
+            influence.scales.len()
+        );
     }
 }

@@ -18,11 +18,16 @@ use std::path::Path;
 const RUNS: u64 = 48;
 /// Where the runs are looked at (s): inside and outside of the outage, the errors' memory apart.
 const LOOKS: [usize; 6] = [60, 250, 389, 500, 650, 850];
-const OUTAGES: [Outage; 1] = [Outage { start_s: 300.0, end_s: 390.0 }];
+const OUTAGES: [Outage; 1] = [Outage {
+    start_s: 300.0,
+    end_s: 390.0,
+}];
 const TRAJECTORIES: [&str; 3] = ["land_vehicle.toml", "figure_eight.toml", "fixed_wing.toml"];
 
 fn trajectory(name: &str) -> Trajectory {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("trajectories").join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("trajectories")
+        .join(name);
     load(&path, &Options::default()).unwrap().0
 }
 
@@ -30,7 +35,10 @@ fn trajectory(name: &str) -> Trajectory {
 fn axis(sigma2: f64, s: f64, t_s: f64) -> Composite {
     let phi = (-0.01 / t_s).exp();
     let bias = Ar1::new(phi, s * s * (1.0 - phi * phi)).unwrap();
-    Composite::new(vec![Process::White(White::new(sigma2).unwrap()), Process::Ar1(bias)])
+    Composite::new(vec![
+        Process::White(White::new(sigma2).unwrap()),
+        Process::Ar1(bias),
+    ])
 }
 
 /// Scales: accelerometer white, bias variance, correlation time; the same of the gyroscope.
@@ -100,19 +108,37 @@ fn report(trajectory: &str, filter: &str, result: &RunResult) -> f64 {
 #[test]
 fn matched_models_are_inside_and_a_factor_of_four_is_outside() {
     let right = model([1.0; 6]);
-    let names = ["accel white", "accel bias", "accel time", "gyro white", "gyro bias", "gyro time"];
+    let names = [
+        "accel white",
+        "accel bias",
+        "accel time",
+        "gyro white",
+        "gyro bias",
+        "gyro time",
+    ];
     let with = |i: usize, factor: f64| {
         let mut scale = [1.0; 6];
         scale[i] = factor;
         model(scale)
     };
     // too little noise, or a bias that changes too slowly: a filter that trusts itself too much
-    let factor = |i: usize| if names[i].ends_with("time") { 4.0 } else { 0.25 };
+    let factor = |i: usize| {
+        if names[i].ends_with("time") {
+            4.0
+        } else {
+            0.25
+        }
+    };
     let belief = |m: &Model, states| Belief::new(m, states, 1.0, 800.0).unwrap();
-    let mut beliefs = vec![belief(&right, FilterStates::Reduced15), belief(&right, FilterStates::Full)];
+    let mut beliefs = vec![
+        belief(&right, FilterStates::Reduced15),
+        belief(&right, FilterStates::Full),
+    ];
     beliefs.extend((0..6).map(|i| belief(&with(i, factor(i)), FilterStates::Reduced15)));
     let (mut matched, mut wrong) = (Vec::new(), vec![f64::INFINITY; names.len()]);
-    println!("| trajectory | filter | NEES | at 389 s | NIS | coverage | p |\n|---|---|---|---|---|---|---|");
+    println!(
+        "| trajectory | filter | NEES | at 389 s | NIS | coverage | p |\n|---|---|---|---|---|---|---|"
+    );
     for name in TRAJECTORIES {
         let results = run(&trajectory(name), &right, &beliefs);
         matched.push(report(name, "15", &results[0]));
@@ -132,17 +158,26 @@ fn the_full_filter_of_a_larger_model_is_inside() {
     let larger = |small: &Composite, slow_s: f64, gamma2: f64| {
         let phi = (-0.01_f64 / 700.0).exp();
         let mut processes = small.processes.clone();
-        processes.push(Process::Ar1(Ar1::new(phi, slow_s * slow_s * (1.0 - phi * phi)).unwrap()));
+        processes.push(Process::Ar1(
+            Ar1::new(phi, slow_s * slow_s * (1.0 - phi * phi)).unwrap(),
+        ));
         processes.push(Process::RandomWalk(RandomWalk::new(gamma2).unwrap()));
         Composite::new(processes)
     };
     let small = model([1.0; 6]);
-    let (accel, gyro) = (larger(&small.axes[0], 0.01, 1e-10), larger(&small.axes[3], 1e-4, 1e-14));
+    let (accel, gyro) = (
+        larger(&small.axes[0], 0.01, 1e-10),
+        larger(&small.axes[3], 1e-4, 1e-14),
+    );
     let truth = Model::pooled(100.0, &accel, &gyro);
     let belief = Belief::new(&truth, FilterStates::Full, 1.0, 800.0).unwrap();
     assert_eq!(belief.states, 27);
     for name in TRAJECTORIES {
-        let p = report(name, "27", &run(&trajectory(name), &truth, std::slice::from_ref(&belief))[0]);
+        let p = report(
+            name,
+            "27",
+            &run(&trajectory(name), &truth, std::slice::from_ref(&belief))[0],
+        );
         assert!(p > 1e-3, "{name}: {p}");
     }
 }
@@ -153,7 +188,10 @@ fn the_full_filter_of_a_larger_model_is_inside() {
 /// √(2/256) = 9 %).
 #[test]
 fn long_outages_shift_the_velocity_down_by_the_square_of_the_tilts() {
-    let outages = [Outage { start_s: 100.0, end_s: 400.0 }];
+    let outages = [Outage {
+        start_s: 100.0,
+        end_s: 400.0,
+    }];
     let mut file = nav_sim::formats::model_file::read(
         &Path::new(env!("CARGO_MANIFEST_DIR")).join("calib_data/consumer_mems.toml"),
     )
@@ -162,29 +200,70 @@ fn long_outages_shift_the_velocity_down_by_the_square_of_the_tilts() {
     let scenario = Scenario::default();
     let trajectory = trajectory("land_vehicle.toml");
     let track = scenario.track(&trajectory, &file.model, &outages).unwrap();
-    let full = scenario.with_full_noise().belief(&file.model, &outages, &track).unwrap();
+    let full = scenario
+        .with_full_noise()
+        .belief(&file.model, &outages, &track)
+        .unwrap();
     let beliefs = [full];
-    let experiment = scenario.experiment(&trajectory, Truth::Model(&file.model), &beliefs, &outages, 5);
-    let result = monte_carlo::run(&experiment, 256, &|_| {}).unwrap().remove(0);
+    let experiment = scenario.experiment(
+        &trajectory,
+        Truth::Model(&file.model),
+        &beliefs,
+        &outages,
+        5,
+    );
+    let result = monte_carlo::run(&experiment, 256, &|_| {})
+        .unwrap()
+        .remove(0);
     let epochs = nav_sim::navigation::metrics::epochs(&result);
-    let tilts = |e: &EpochMetrics| [6, 7].map(|i| e.rmse.0[i].value.to_radians().powi(2)).iter().sum::<f64>();
-    let shift: f64 =
-        epochs.iter().filter(|e| outages[0].withholds(e.t_s)).map(|e| 9.80665 / 2.0 * tilts(e)).sum();
+    let tilts = |e: &EpochMetrics| {
+        [6, 7]
+            .map(|i| e.rmse.0[i].value.to_radians().powi(2))
+            .iter()
+            .sum::<f64>()
+    };
+    let shift: f64 = epochs
+        .iter()
+        .filter(|e| outages[0].withholds(e.t_s))
+        .map(|e| 9.80665 / 2.0 * tilts(e))
+        .sum();
     let end = epochs.iter().rev().find(|e| e.t_s < 399.5).unwrap();
     let (mean, error) = (end.bias.0[5].value, end.bias.0[5].std_error);
-    assert!((mean - shift).abs() < 3.5 * error + 0.1 * shift, "{mean} ± {error} against {shift}");
+    assert!(
+        (mean - shift).abs() < 3.5 * error + 0.1 * shift,
+        "{mean} ± {error} against {shift}"
+    );
     assert!(mean > 3.0 * error, "{mean} ± {error} could be chance");
     // linear theory knows where it ends; a height in ten minutes falls into no outage of five, one a second corrects it
     let baros = [
         None,
-        Some(BaroSettings { rate_hz: 1.0 / 600.0, sigma_m: 1.0 }),
-        Some(BaroSettings { rate_hz: 1.0, sigma_m: 1.0 }),
+        Some(BaroSettings {
+            rate_hz: 1.0 / 600.0,
+            sigma_m: 1.0,
+        }),
+        Some(BaroSettings {
+            rate_hz: 1.0,
+            sigma_m: 1.0,
+        }),
     ];
     for (baro, is_beyond) in baros.into_iter().zip([true, true, false]) {
-        let scenario = Scenario { baro, ..Scenario::default() };
+        let scenario = Scenario {
+            baro,
+            ..Scenario::default()
+        };
         let track = scenario.track(&trajectory, &file.model, &outages).unwrap();
-        let experiment = scenario.experiment(&trajectory, Truth::Model(&file.model), &beliefs, &outages, 5);
+        let experiment = scenario.experiment(
+            &trajectory,
+            Truth::Model(&file.model),
+            &beliefs,
+            &outages,
+            5,
+        );
         let expected = Expected::along(&track, &experiment, &beliefs[0], &file.model).unwrap();
-        assert_eq!(expected.outages[0].beyond_linear, is_beyond, "{:?}", scenario.baro);
+        assert_eq!(
+            expected.outages[0].beyond_linear, is_beyond,
+            "{:?}",
+            scenario.baro
+        );
     }
 }

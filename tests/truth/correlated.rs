@@ -24,7 +24,11 @@ fn told(tau_s: f64, runs: u64) -> Told {
         correlation_time_s: tau_s.max(1.0),
         ..GnssSettings::default()
     };
-    let receiver = if tau_s > 0.0 { receiver(0.1, 3.0) } else { receiver(3.0, 0.0) };
+    let receiver = if tau_s > 0.0 {
+        receiver(0.1, 3.0)
+    } else {
+        receiver(3.0, 0.0)
+    };
     let tactical = Path::new(env!("CARGO_MANIFEST_DIR")).join("calib_data/tactical.toml");
     let model = model_file::read(&tactical).unwrap().model;
     let (belief, trajectory) = (belief(&model), shipped("land_vehicle.toml"));
@@ -32,12 +36,21 @@ fn told(tau_s: f64, runs: u64) -> Told {
     let mut told = Told::default();
     recorded(&trajectory, &model, &receiver, runs, |recording, start| {
         let mut gnss = recording.gnss.clone();
-        gnss.iter_mut().for_each(|fix| fix.pos_sigma_n = DVec3::splat(3.0));
-        let data = Recorded { imu: &recording.imu, gnss: &gnss, aids: &[] };
+        gnss.iter_mut()
+            .for_each(|fix| fix.pos_sigma_n = DVec3::splat(3.0));
+        let data = Recorded {
+            imu: &recording.imu,
+            gnss: &gnss,
+            aids: &[],
+        };
         let asked = (Some(&reference), Correlation::Auto);
         let weighed = fuse_correlated(&data, &belief, start, &settings(), asked).unwrap();
         told.named += usize::from(weighed.as_stated.is_some());
-        for (sum, solution) in told.nees.iter_mut().zip([weighed.judged(), &weighed.solution]) {
+        for (sum, solution) in told
+            .nees
+            .iter_mut()
+            .zip([weighed.judged(), &weighed.solution])
+        {
             *sum += outcome(solution, &[]).reference.unwrap().nees_mean / runs as f64;
         }
     });
@@ -63,9 +76,15 @@ fn errors_that_last_are_named_and_answered() {
 #[ignore = "half a minute"]
 fn errors_that_last_are_named_and_answered_in_forty_drives() {
     let white = told(0.0, 40);
-    assert!(white.named <= 2 && (8.0..11.0).contains(&white.nees[1]), "{white:?}");
+    assert!(
+        white.named <= 2 && (8.0..11.0).contains(&white.nees[1]),
+        "{white:?}"
+    );
     for tau_s in [10.0, 60.0, 300.0] {
         let lasting = told(tau_s, 40);
-        assert!(lasting.named >= 38 && lasting.nees[1] <= 17.0, "{lasting:?}");
+        assert!(
+            lasting.named >= 38 && lasting.nees[1] <= 17.0,
+            "{lasting:?}"
+        );
     }
 }

@@ -21,25 +21,43 @@ fn rows(path: &Path) -> Vec<Vec<f64>> {
     let bytes = std::fs::read(path).unwrap();
     let mut text = String::new();
     if path.extension().is_some_and(|e| e == "gz") {
-        flate2::read::GzDecoder::new(&bytes[..]).read_to_string(&mut text).unwrap();
+        flate2::read::GzDecoder::new(&bytes[..])
+            .read_to_string(&mut text)
+            .unwrap();
     } else {
         text = String::from_utf8(bytes).unwrap();
     }
-    let numbers = text.lines().filter(|l| l.starts_with(|c: char| c.is_ascii_digit()));
-    numbers.map(|l| l.split(',').map(|c| c.parse().unwrap()).collect()).collect()
+    let numbers = text
+        .lines()
+        .filter(|l| l.starts_with(|c: char| c.is_ascii_digit()));
+    numbers
+        .map(|l| l.split(',').map(|c| c.parse().unwrap()).collect())
+        .collect()
 }
 
 /// Columns t, lat, lon, h, v_n (3), roll, pitch, yaw in degrees and metres.
 fn state(row: &[f64]) -> NavState {
-    let angles = RollPitchYaw { roll: row[7] * DEG, pitch: row[8] * DEG, yaw: row[9] * DEG };
+    let angles = RollPitchYaw {
+        roll: row[7] * DEG,
+        pitch: row[8] * DEG,
+        yaw: row[9] * DEG,
+    };
     let v_n = DVec3::from_slice(&row[4..7]);
-    NavState { lat: row[1] * DEG, lon: row[2] * DEG, h: row[3], v_n, q_b_n: angles.to_quat() }
+    NavState {
+        lat: row[1] * DEG,
+        lon: row[2] * DEG,
+        h: row[3],
+        v_n,
+        q_b_n: angles.to_quat(),
+    }
 }
 
 fn axis(density: f64, deviation: f64) -> Composite {
     Composite::new(vec![
         Process::White(White::new(white_sigma2(density, RATE_HZ)).unwrap()),
-        Process::GaussMarkov(GaussMarkov::new(1.0 / 600.0, deviation * deviation, RATE_HZ).unwrap()),
+        Process::GaussMarkov(
+            GaussMarkov::new(1.0 / 600.0, deviation * deviation, RATE_HZ).unwrap(),
+        ),
     ])
 }
 
@@ -48,18 +66,27 @@ fn deviations(ekf: &Ekf, truth: &NavState) -> Vec<f64> {
     let p = ekf.p.lane(0);
     let jacobian = RollPitchYaw::from_quat(truth.q_b_n).jacobian_of_psi_n();
     let angle = |row: &DVec3| {
-        let variance: f64 = (0..9).map(|k| row[k / 3] * row[k % 3] * p[(6 + k / 3, 6 + k % 3)]).sum();
+        let variance: f64 = (0..9)
+            .map(|k| row[k / 3] * row[k % 3] * p[(6 + k / 3, 6 + k % 3)])
+            .sum();
         variance.sqrt() / DEG
     };
     let sigma = |i: usize| p[(i, i)].sqrt();
-    (0..6).map(sigma).chain(jacobian.iter().map(angle)).chain((12..15).chain(9..12).map(sigma)).collect()
+    (0..6)
+        .map(sigma)
+        .chain(jacobian.iter().map(angle))
+        .chain((12..15).chain(9..12).map(sigma))
+        .collect()
 }
 
 /// The largest relative difference of a standard deviation, at any second and state. `truth` has a row a
 /// second: state, then standard deviations. Fixes of 1.5 m, none during the outages.
 fn worst_difference(increments: &[Vec<f64>], truth: &[Vec<f64>], outages: &[(f64, f64)]) -> f64 {
-    let model =
-        Model::pooled(RATE_HZ, &axis(0.06 / 60.0, 0.02), &axis(0.15 * DEG / 60.0, 20.0 * DEG_PER_HOUR));
+    let model = Model::pooled(
+        RATE_HZ,
+        &axis(0.06 / 60.0, 0.02),
+        &axis(0.15 * DEG / 60.0, 20.0 * DEG_PER_HOUR),
+    );
     let belief = Belief::new(&model, FilterStates::Reduced15, 1.0, 800.0).unwrap();
     let initial = InitialSettings {
         pos_sigma_m: [2.0; 3],
@@ -68,7 +95,12 @@ fn worst_difference(increments: &[Vec<f64>], truth: &[Vec<f64>], outages: &[(f64
         ..InitialSettings::default()
     };
     let start = state(&truth[0]);
-    let mut ekf = Ekf::new(Strapdown::new(&start, GravityModel::FirstOrder), &belief, &start, &initial);
+    let mut ekf = Ekf::new(
+        Strapdown::new(&start, GravityModel::FirstOrder),
+        &belief,
+        &start,
+        &initial,
+    );
     let mut worst = 0.0_f64;
     for (k, row) in increments.iter().enumerate().skip(1) {
         advance(&mut ekf, &[sample(row)], &[[Vec3::ZERO; 2]]);
@@ -76,7 +108,10 @@ fn worst_difference(increments: &[Vec<f64>], truth: &[Vec<f64>], outages: &[(f64
             continue;
         }
         let here = state(&truth[k / 100]);
-        if !outages.iter().any(|(after, until)| *after < row[0] && row[0] <= *until) {
+        if !outages
+            .iter()
+            .any(|(after, until)| *after < row[0] && row[0] <= *until)
+        {
             let fix = Fix {
                 lat: Lanes::splat(here.lat),
                 lon: Lanes::splat(here.lon),
@@ -98,7 +133,10 @@ fn worst_difference(increments: &[Vec<f64>], truth: &[Vec<f64>], outages: &[(f64
 
 fn sample(row: &[f64]) -> ImuSample {
     let rates = |at: usize| DVec3::from_slice(&row[at..at + 3]) * RATE_HZ;
-    ImuSample { omega_ib_b: rates(1), f_ib_b: rates(4) }
+    ImuSample {
+        omega_ib_b: rates(1),
+        f_ib_b: rates(4),
+    }
 }
 
 /// 60 s: within 2e-4 of pyins in every state. The two linearise about the same truth and differ in the order
@@ -107,7 +145,11 @@ fn sample(row: &[f64]) -> ImuSample {
 fn standard_deviations_are_those_of_an_independent_filter() {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
     let increments = rows(&directory.join("imu_60s_100hz.csv.gz"));
-    let worst = worst_difference(&increments, &rows(&directory.join("cov15_gm_pos_60s.csv")), &[]);
+    let worst = worst_difference(
+        &increments,
+        &rows(&directory.join("cov15_gm_pos_60s.csv")),
+        &[],
+    );
     assert!(worst < 2e-4, "{worst:e}");
     assert_eq!(increments.len(), 6001);
 }
@@ -123,20 +165,39 @@ fn standard_deviations_are_those_of_an_independent_filter() {
 fn the_whole_reference_drive() {
     let directory = std::path::PathBuf::from(std::env::var("NAV_SIM_TRUTH").unwrap());
     let increments = rows(&directory.join("imu_incr_900s_100hz.csv.gz"));
-    let truth: Vec<_> = rows(&directory.join("truth_900s_100hz.csv.gz")).into_iter().step_by(100).collect();
+    let truth: Vec<_> = rows(&directory.join("truth_900s_100hz.csv.gz"))
+        .into_iter()
+        .step_by(100)
+        .collect();
     let sigmas = rows(&directory.join("cov15_gm_pos_100hz.csv"));
-    let joined: Vec<_> = truth.iter().zip(&sigmas).map(|(t, s)| [&t[..10], &s[1..]].concat()).collect();
-    let worst = worst_difference(&increments[..=89_900], &joined, &[(300.0, 360.0), (600.0, 720.0)]);
+    let joined: Vec<_> = truth
+        .iter()
+        .zip(&sigmas)
+        .map(|(t, s)| [&t[..10], &s[1..]].concat())
+        .collect();
+    let worst = worst_difference(
+        &increments[..=89_900],
+        &joined,
+        &[(300.0, 360.0), (600.0, 720.0)],
+    );
 
     let mut ins = Strapdown::new(&state(&truth[0]), GravityModel::FirstOrder);
     let mut errors = Vec::new();
     for (k, row) in increments.iter().enumerate().skip(1) {
         let s = sample(row);
         let dt = 1.0 / RATE_HZ;
-        ins.step(Vec3::splat(s.omega_ib_b * dt), Vec3::splat(s.f_ib_b * dt), dt);
+        ins.step(
+            Vec3::splat(s.omega_ib_b * dt),
+            Vec3::splat(s.f_ib_b * dt),
+            dt,
+        );
         if k % 100 == 0 {
             let end = ins.lane(0);
-            errors.push(ned_difference(&state(&truth[k / 100]), end.lat, end.lon, end.h).truncate().length());
+            errors.push(
+                ned_difference(&state(&truth[k / 100]), end.lat, end.lon, end.h)
+                    .truncate()
+                    .length(),
+            );
         }
     }
     println!(

@@ -1,8 +1,12 @@
 //! What estimates are off by in the mean. Quantization noise in robust fits: its wavelet coefficients are not Gaussian, and
 //! the estimators know by how much their variance is read high. Last scales: what is low by chance does not rule the fit.
 
-use nav_sim::calibration::{Estimator, ModelSpec, Replicate, Trim, Weighting, average, fit, implied};
-use nav_sim::signal::noise::{Ar1, Composite, Process, Quantization, RandomWalk, Synthesizer, White};
+use nav_sim::calibration::{
+    Estimator, ModelSpec, Replicate, Trim, Weighting, average, fit, implied,
+};
+use nav_sim::signal::noise::{
+    Ar1, Composite, Process, Quantization, RandomWalk, Synthesizer, White,
+};
 use nav_sim::signal::rng::StreamKey;
 use nav_sim::signal::wavelet::{Convention, Curve, Tuning, both};
 use nav_sim_calibration::trend;
@@ -45,24 +49,35 @@ fn estimates_are_unbiased_however_much_quantization_noise_there_is() {
     for share in [0.32, 0.66, 0.86] {
         let truth = model(share);
         let replicate = |set: u64, run: u64| {
-            let key = StreamKey { seed: set, scenario: "quantization", run, source: "", process: "" };
+            let key = StreamKey {
+                seed: set,
+                scenario: "quantization",
+                run,
+                source: "",
+                process: "",
+            };
             let mut signal = vec![0.0; 1 << 15];
             Synthesizer::new(&truth, key).fill(&mut signal);
             measured(&signal)
         };
-        let sets: Vec<Vec<Replicate>> =
-            (0..SETS).into_par_iter().map(|set| (0..6).map(|run| replicate(set, run)).collect()).collect();
+        let sets: Vec<Vec<Replicate>> = (0..SETS)
+            .into_par_iter()
+            .map(|set| (0..6).map(|run| replicate(set, run)).collect())
+            .collect();
         for estimator in [Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv] {
             let fitted = |replicates: &Vec<Replicate>| {
                 let curve = average(replicates, estimator, Trim::Fraction(0.3), &tuning()).unwrap();
-                fit(&curve, &"WN+QN+RW".parse().unwrap(), 1.0, Weighting::Model).unwrap().composite
+                fit(&curve, &"WN+QN+RW".parse().unwrap(), 1.0, Weighting::Model)
+                    .unwrap()
+                    .composite
             };
             let fits: Vec<Composite> = sets.par_iter().map(fitted).collect();
             for process in 0..2 {
                 let value = |model: &Composite| model.processes[process].parameters()[0].1;
                 let ratios: Vec<f64> = fits.iter().map(|f| value(f) / value(&truth)).collect();
                 let mean = ratios.iter().sum::<f64>() / SETS as f64;
-                let scatter = ratios.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (SETS - 1) as f64;
+                let scatter =
+                    ratios.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (SETS - 1) as f64;
                 let error = (scatter / SETS as f64).sqrt();
                 assert!(
                     (mean - 1.0).abs() < 4.0 * error && error < 0.008,
@@ -90,17 +105,28 @@ fn a_scale_that_is_low_by_chance_does_not_rule() {
     let spec: ModelSpec = "WN+RW".parse().unwrap();
     for (estimator, allowed, most) in [(Estimator::Gmwm, 0.0, 0), (Estimator::Rgmwm, 0.05, 7)] {
         let ratio = |run: u64| {
-            let key = StreamKey { seed: 5, scenario: "low", run, source: "", process: "" };
+            let key = StreamKey {
+                seed: 5,
+                scenario: "low",
+                run,
+                source: "",
+                process: "",
+            };
             let mut signal = vec![0.0; 1 << 14];
             Synthesizer::new(&truth, key).fill(&mut signal);
-            let curve = average(&[measured(&signal)], estimator, Trim::Count(0), &tuning()).unwrap();
+            let curve =
+                average(&[measured(&signal)], estimator, Trim::Count(0), &tuning()).unwrap();
             let found = fit(&curve, &spec, 1.0, Weighting::Model).unwrap();
             found.composite.processes[1].parameters()[0].1 / 1e-5
         };
         let ratios: Vec<f64> = (0..100).into_par_iter().map(ratio).collect();
         let mean = ratios.iter().sum::<f64>() / 100.0;
         let error = (ratios.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / 99.0 / 100.0).sqrt();
-        assert!((mean - 1.0).abs() < 4.0 * error + allowed, "{}: {mean} ± {error}", estimator.name());
+        assert!(
+            (mean - 1.0).abs() < 4.0 * error + allowed,
+            "{}: {mean} ± {error}",
+            estimator.name()
+        );
         let low = ratios.iter().filter(|r| **r < 0.05).count();
         assert!(low <= most, "{}: {ratios:?}", estimator.name());
     }
@@ -110,7 +136,13 @@ fn a_scale_that_is_low_by_chance_does_not_rule() {
 #[test]
 fn exact_robust_curves_give_their_parameters_back() {
     let levels: Vec<u32> = (1..=16).collect();
-    for (q2, sigma2) in [(1e-9, 5e-5), (1e-6, 5e-5), (3e-5, 5e-5), (3e-4, 5e-5), (3e-5, 1e-6)] {
+    for (q2, sigma2) in [
+        (1e-9, 5e-5),
+        (1e-6, 5e-5),
+        (3e-5, 5e-5),
+        (3e-4, 5e-5),
+        (3e-5, 1e-6),
+    ] {
         let truth = Composite::new(vec![
             Process::White(White::new(sigma2).unwrap()),
             Process::Quantization(Quantization::new(q2).unwrap()),
@@ -118,7 +150,10 @@ fn exact_robust_curves_give_their_parameters_back() {
             Process::Ar1(Ar1::new(0.9995, 1e-9).unwrap()),
             Process::RandomWalk(RandomWalk::new(1e-10).unwrap()),
         ]);
-        let edof = levels.iter().map(|j| 6.0 * 131_072.0 / f64::from(*j).exp2()).collect();
+        let edof = levels
+            .iter()
+            .map(|j| 6.0 * 131_072.0 / f64::from(*j).exp2())
+            .collect();
         let mut curve = Curve {
             levels: levels.clone(),
             edof,
@@ -132,8 +167,15 @@ fn exact_robust_curves_give_their_parameters_back() {
             pairs.flat_map(|(a, b)| a.parameters().into_iter().zip(b.parameters()))
         {
             // A q2 of 1e-9 is 3e-5 of the first scale: known to that much less.
-            let allowed = if name == "q2" && q2 < 1e-8 { 1e-4 } else { 1e-7 };
-            assert!((value / expected - 1.0).abs() < allowed, "q2 {q2:e}: {name} {value:e} {expected:e}");
+            let allowed = if name == "q2" && q2 < 1e-8 {
+                1e-4
+            } else {
+                1e-7
+            };
+            assert!(
+                (value / expected - 1.0).abs() < allowed,
+                "q2 {q2:e}: {name} {value:e} {expected:e}"
+            );
         }
     }
 }

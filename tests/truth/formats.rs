@@ -7,13 +7,22 @@ use nav_sim::signal::noise::Composite;
 use std::path::{Path, PathBuf};
 
 fn shipped(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("calib_data").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("calib_data")
+        .join(name)
 }
 
 fn recording(name: &str, rate_hz: Option<f64>) -> Recording {
-    let options = ReadOptions { rate_hz, ..ReadOptions::default() };
+    let options = ReadOptions {
+        rate_hz,
+        ..ReadOptions::default()
+    };
     let (mut recordings, report) = read(&[shipped(name)], &options).unwrap();
-    assert!(report.all_warnings().is_empty(), "{name}: {:?}", report.all_warnings());
+    assert!(
+        report.all_warnings().is_empty(),
+        "{name}: {:?}",
+        report.all_warnings()
+    );
     assert_eq!(recordings.len(), 1, "{name}");
     recordings.remove(0)
 }
@@ -35,13 +44,25 @@ fn every_format_holds_the_same_recording() {
         ("formats/array.npy", Some(100.0), 6, 1e-6),
     ] {
         let other = recording(name, rate_hz);
-        assert!((other.rate_hz - 100.0).abs() < 1e-6, "{name}: {} Hz", other.rate_hz);
-        assert_eq!((other.len(), other.signals.len()), (500, channels), "{name}");
+        assert!(
+            (other.rate_hz - 100.0).abs() < 1e-6,
+            "{name}: {} Hz",
+            other.rate_hz
+        );
+        assert_eq!(
+            (other.len(), other.signals.len()),
+            (500, channels),
+            "{name}"
+        );
         for signal in &other.signals {
             let reference = own.signal(signal.channel).unwrap();
             for (a, b) in signal.samples.iter().zip(&reference.samples) {
                 let (a, b) = (a + signal.mean, b + reference.mean);
-                assert!((a - b).abs() < digits, "{name}, {}: {a}, {b}", signal.channel);
+                assert!(
+                    (a - b).abs() < digits,
+                    "{name}, {}: {a}, {b}",
+                    signal.channel
+                );
             }
         }
     }
@@ -64,20 +85,39 @@ fn the_virtual_imus_are_what_they_say() {
     let (micro_g, deg_h) = (9.806_65e-6, 1.0_f64.to_radians() / 3600.0);
     let deg_root_h = 1.0_f64.to_radians() / 60.0;
     for (name, accel_density, accel_floor, arw, gyro_floor) in [
-        ("consumer_mems.toml", (75.0, 0.5), (40.0, 0.5), (0.42, 0.005), (8.3, 0.05)),
-        ("tactical.toml", (51.0, 0.5), (12.0, 0.5), (0.04, 0.0005), (0.29, 0.005)),
+        (
+            "consumer_mems.toml",
+            (75.0, 0.5),
+            (40.0, 0.5),
+            (0.42, 0.005),
+            (8.3, 0.05),
+        ),
+        (
+            "tactical.toml",
+            (51.0, 0.5),
+            (12.0, 0.5),
+            (0.04, 0.0005),
+            (0.29, 0.005),
+        ),
     ] {
         let file = model_file::read(&shipped(name)).unwrap();
         assert!(file.missing.is_empty());
         assert!(file.spread.unwrap().axes.iter().all(|laws| laws.len() == 7));
         let (accel, gyro) = (&file.model.axes[0], &file.model.axes[3]);
         for (what, value, (said, digits)) in [
-            ("accel density", noise_density(accel, 100.0) / micro_g, accel_density),
+            (
+                "accel density",
+                noise_density(accel, 100.0) / micro_g,
+                accel_density,
+            ),
             ("accel floor", floor(accel) / micro_g, accel_floor),
             ("gyro density", noise_density(gyro, 100.0) / deg_root_h, arw),
             ("gyro floor", floor(gyro) / deg_h, gyro_floor),
         ] {
-            assert!((value - said).abs() < digits, "{name}, {what}: {value}, said {said}");
+            assert!(
+                (value - said).abs() < digits,
+                "{name}, {what}: {value}, said {said}"
+            );
         }
     }
 }

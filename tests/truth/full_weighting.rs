@@ -27,7 +27,10 @@ fn relative_covariance() -> DMatrix<f64> {
         let mut sum = 0.0;
         for lag in -(b.len() as i64)..=(a.len() as i64) {
             let term = |(t, h): (usize, &f64)| {
-                usize::try_from(t as i64 - lag).ok().and_then(|s| b.get(s)).map_or(0.0, |g| h * g)
+                usize::try_from(t as i64 - lag)
+                    .ok()
+                    .and_then(|s| b.get(s))
+                    .map_or(0.0, |g| h * g)
             };
             let c: f64 = a.iter().enumerate().map(term).sum();
             let overlap = (counts[0].min(counts[1] - lag) - 0_i64.max(-lag)).max(0);
@@ -50,23 +53,37 @@ fn variances_are_those_of_the_closed_form() {
     let inverse = DVector::from_fn(LEVELS as usize, |j, _| 1.0 / covariance[(j, j)]);
     let weights = &inverse / inverse.sum();
     let diagonal = weights.dot(&(&covariance * &weights));
-    assert!(2.0 / SAMPLES as f64 <= full && full < diagonal, "{full} {diagonal}");
+    assert!(
+        2.0 / SAMPLES as f64 <= full && full < diagonal,
+        "{full} {diagonal}"
+    );
 
     let noise = Composite::new(vec![Process::White(White::new(1.0).unwrap())]);
     let spec: ModelSpec = "WN".parse().unwrap();
     let mut estimates = [Vec::new(), Vec::new()];
     for run in 0..SIGNALS {
-        let key = StreamKey { seed: 9, scenario: "", run, source: "", process: "" };
+        let key = StreamKey {
+            seed: 9,
+            scenario: "",
+            run,
+            source: "",
+            process: "",
+        };
         let mut signal = vec![0.0; SAMPLES];
         Synthesizer::new(&noise, key).fill(&mut signal);
-        let edof = (0..LEVELS as usize).map(|j| 2.0 / covariance[(j, j)]).collect();
+        let edof = (0..LEVELS as usize)
+            .map(|j| 2.0 / covariance[(j, j)])
+            .collect();
         let curve = Curve {
             levels: (1..=LEVELS).collect(),
             wv: classical(&signal, LEVELS).unwrap(),
             edof,
             ..Curve::default()
         };
-        for (weighting, into) in [Weighting::Edof, Weighting::Full].into_iter().zip(&mut estimates) {
+        for (weighting, into) in [Weighting::Edof, Weighting::Full]
+            .into_iter()
+            .zip(&mut estimates)
+        {
             let fit = fit(&curve, &spec, 1.0, weighting).unwrap();
             into.push(fit.composite.processes[0].parameters()[0].1);
         }

@@ -17,14 +17,29 @@ use rayon::prelude::*;
 fn best_amplitudes(columns: &[DVector<f64>], target: &DVector<f64>) -> DVector<f64> {
     let mut best = (target.norm_squared(), DVector::zeros(columns.len()));
     for subset in 1_u32..1 << columns.len() {
-        let chosen: Vec<usize> = (0..columns.len()).filter(|i| subset >> i & 1 == 1).collect();
-        let a = DMatrix::from_columns(&chosen.iter().map(|i| columns[*i].clone()).collect::<Vec<_>>());
+        let chosen: Vec<usize> = (0..columns.len())
+            .filter(|i| subset >> i & 1 == 1)
+            .collect();
+        let a = DMatrix::from_columns(
+            &chosen
+                .iter()
+                .map(|i| columns[*i].clone())
+                .collect::<Vec<_>>(),
+        );
         let qr = a.clone().qr();
-        let Some(x) = qr.r().solve_upper_triangular(&(qr.q().transpose() * target)) else { continue };
+        let Some(x) = qr
+            .r()
+            .solve_upper_triangular(&(qr.q().transpose() * target))
+        else {
+            continue;
+        };
         let cost = (target - a * &x).norm_squared();
         if x.iter().all(|v| *v >= 0.0) && cost < best.0 {
             best = (cost, DVector::zeros(columns.len()));
-            chosen.iter().zip(x.iter()).for_each(|(i, v)| best.1[*i] = *v);
+            chosen
+                .iter()
+                .zip(x.iter())
+                .for_each(|(i, v)| best.1[*i] = *v);
         }
     }
     best.1
@@ -35,7 +50,11 @@ fn best_amplitudes(columns: &[DVector<f64>], target: &DVector<f64>) -> DVector<f
 fn reduced(curve: &Curve, quantization: bool, log_kappas: &[f64]) -> f64 {
     let weights = DVector::from_iterator(
         curve.wv.len(),
-        curve.wv.iter().zip(&curve.edof).map(|(nu, eta)| (0.5 * eta).sqrt() / nu),
+        curve
+            .wv
+            .iter()
+            .zip(&curve.edof)
+            .map(|(nu, eta)| (0.5 * eta).sqrt() / nu),
     );
     let column = |shape: &dyn Fn(u32) -> f64| {
         let c = DVector::from_iterator(weights.len(), curve.levels.iter().map(|j| shape(*j)));
@@ -51,18 +70,28 @@ fn reduced(curve: &Curve, quantization: bool, log_kappas: &[f64]) -> f64 {
     }
     let target = DVector::from_column_slice(&curve.wv).component_mul(&weights);
     let mut factors = DVector::repeat(weights.len(), 1.0);
-    let rounds = if curve.quantization.is_some() && quantization { 6 } else { 1 };
+    let rounds = if curve.quantization.is_some() && quantization {
+        6
+    } else {
+        1
+    };
     let mut cost = f64::INFINITY;
     for _ in 0..rounds {
-        let weighted: Vec<_> =
-            columns.iter().map(|c| c.component_mul(&factors).component_mul(&weights)).collect();
+        let weighted: Vec<_> = columns
+            .iter()
+            .map(|c| c.component_mul(&factors).component_mul(&weights))
+            .collect();
         let x = best_amplitudes(&weighted, &target);
-        let nu = columns.iter().zip(x.iter()).fold(DVector::zeros(weights.len()), |sum, (c, v)| sum + c * *v);
+        let nu = columns
+            .iter()
+            .zip(x.iter())
+            .fold(DVector::zeros(weights.len()), |sum, (c, v)| sum + c * *v);
         if let Some(response) = curve.quantization.filter(|_| quantization) {
             let own = &columns[columns.len() - 1] * x[columns.len() - 1];
             factors = own.zip_map(&nu, |own, all| response.factor(own / all).0);
         }
-        cost = cost.min((&target - nu.component_mul(&factors).component_mul(&weights)).norm_squared());
+        cost =
+            cost.min((&target - nu.component_mul(&factors).component_mul(&weights)).norm_squared());
     }
     cost
 }
@@ -84,11 +113,15 @@ fn simplex(f: &dyn Fn(&[f64]) -> f64, start: &[f64]) -> f64 {
         for _ in 0..100 {
             s.sort_by(|a, b| a.0.total_cmp(&b.0));
             let worst = s[n].1.clone();
-            let centre: Vec<f64> =
-                (0..n).map(|k| s[..n].iter().map(|v| v.1[k]).sum::<f64>() / n as f64).collect();
+            let centre: Vec<f64> = (0..n)
+                .map(|k| s[..n].iter().map(|v| v.1[k]).sum::<f64>() / n as f64)
+                .collect();
             let towards = |t: f64| {
-                let p: Vec<f64> =
-                    centre.iter().zip(&worst).map(|(c, w)| (c + t * (c - w)).clamp(-18.0, 1.5)).collect();
+                let p: Vec<f64> = centre
+                    .iter()
+                    .zip(&worst)
+                    .map(|(c, w)| (c + t * (c - w)).clamp(-18.0, 1.5))
+                    .collect();
                 (f(&p), p)
             };
             let mut next = towards(1.0);
@@ -102,7 +135,12 @@ fn simplex(f: &dyn Fn(&[f64]) -> f64, start: &[f64]) -> f64 {
             } else {
                 let first = s[0].1.clone();
                 for vertex in &mut s[1..] {
-                    let p: Vec<f64> = vertex.1.iter().zip(&first).map(|(a, b)| 0.5 * (a + b)).collect();
+                    let p: Vec<f64> = vertex
+                        .1
+                        .iter()
+                        .zip(&first)
+                        .map(|(a, b)| 0.5 * (a + b))
+                        .collect();
                     *vertex = (f(&p), p);
                 }
             }
@@ -125,9 +163,12 @@ fn draw(generator: &mut Generator, n2: bool) -> Composite {
         Process::RandomWalk(RandomWalk::new(log_uniform(1e-12, 1e-10)).unwrap()),
     ];
     if n2 {
-        processes.push(Process::Quantization(Quantization::new(log_uniform(1e-7, 1e-4)).unwrap()));
-        processes
-            .push(Process::Ar1(Ar1::new(1.0 - log_uniform(5e-5, 2e-3), log_uniform(1e-11, 1e-9)).unwrap()));
+        processes.push(Process::Quantization(
+            Quantization::new(log_uniform(1e-7, 1e-4)).unwrap(),
+        ));
+        processes.push(Process::Ar1(
+            Ar1::new(1.0 - log_uniform(5e-5, 2e-3), log_uniform(1e-11, 1e-9)).unwrap(),
+        ));
     }
     Composite::new(processes)
 }
@@ -137,7 +178,9 @@ fn simulate(model: &Composite, samples: usize, generator: &mut Generator) -> Vec
     for process in &model.processes {
         let mut normal = || generator.sample::<f64, _>(StandardNormal);
         match process {
-            Process::White(p) => x.iter_mut().for_each(|x| *x += p.sigma2().sqrt() * normal()),
+            Process::White(p) => x
+                .iter_mut()
+                .for_each(|x| *x += p.sigma2().sqrt() * normal()),
             Process::RandomWalk(p) => {
                 let mut level = 0.0;
                 x.iter_mut().for_each(|x| {
@@ -170,20 +213,40 @@ fn simulate(model: &Composite, samples: usize, generator: &mut Generator) -> Vec
 fn failures(cases: u64, robust: bool) -> Vec<String> {
     let tuning = Tuning::new(0.6, Convention::Exact).unwrap();
     let failure = |case: u64| {
-        let key = StreamKey { seed: 42, scenario: "global minimum", run: case, source: "", process: "" };
+        let key = StreamKey {
+            seed: 42,
+            scenario: "global minimum",
+            run: case,
+            source: "",
+            process: "",
+        };
         let mut generator = key.generator();
         let n2 = case % 2 == 1;
         let model = draw(&mut generator, n2);
         let samples = 1 << 16;
         let signal = simulate(&model, samples, &mut generator);
         let levels: Vec<u32> = (1..=15).collect();
-        let edof = levels.iter().map(|j| interval::edof_eta3(samples, *j)).collect();
+        let edof = levels
+            .iter()
+            .map(|j| interval::edof_eta3(samples, *j))
+            .collect();
         let (classical, m_scales) = both(&signal, 15, &tuning).unwrap();
         let curve = match robust {
-            false => Curve { wv: classical, edof, levels, ..Curve::default() },
+            false => Curve {
+                wv: classical,
+                edof,
+                levels,
+                ..Curve::default()
+            },
             true => {
                 let wv = m_scales.iter().map(|v| v.value).collect();
-                Curve { wv, edof, levels, quantization: Some(*tuning.quantization()), ..Curve::default() }
+                Curve {
+                    wv,
+                    edof,
+                    levels,
+                    quantization: Some(*tuning.quantization()),
+                    ..Curve::default()
+                }
             }
         };
         let spec = if n2 { ModelSpec::n2() } else { ModelSpec::n1() };
@@ -192,15 +255,25 @@ fn failures(cases: u64, robust: bool) -> Vec<String> {
         let f = |u: &[f64]| reduced(&curve, n2, u);
         let mut starts: Vec<(f64, Vec<f64>)> = (0..150 * dimensions)
             .map(|_| {
-                let u: Vec<f64> = (0..dimensions).map(|_| generator.random_range(-13.0..1.5)).collect();
+                let u: Vec<f64> = (0..dimensions)
+                    .map(|_| generator.random_range(-13.0..1.5))
+                    .collect();
                 (f(&u), u)
             })
             .collect();
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         starts.truncate(8);
-        let exhaustive = starts.iter().map(|(_, u)| simplex(&f, u)).fold(f64::INFINITY, f64::min);
+        let exhaustive = starts
+            .iter()
+            .map(|(_, u)| simplex(&f, u))
+            .fold(f64::INFINITY, f64::min);
         let excess = fit.objective / exhaustive - 1.0;
-        (excess > 1e-6).then(|| format!("case {case}: fit {:e}, exhaustive {exhaustive:e}", fit.objective))
+        (excess > 1e-6).then(|| {
+            format!(
+                "case {case}: fit {:e}, exhaustive {exhaustive:e}",
+                fit.objective
+            )
+        })
     };
     (0..cases).into_par_iter().filter_map(failure).collect()
 }

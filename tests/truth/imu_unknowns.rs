@@ -18,7 +18,10 @@ use std::path::Path;
 const RUNS: u64 = 24;
 /// Where the runs are looked at (s), inside and outside of the outage.
 const LOOKS: [usize; 5] = [60, 250, 389, 500, 850];
-const OUTAGES: [Outage; 1] = [Outage { start_s: 300.0, end_s: 390.0 }];
+const OUTAGES: [Outage; 1] = [Outage {
+    start_s: 300.0,
+    end_s: 390.0,
+}];
 
 fn trajectory() -> Trajectory {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("trajectories/land_vehicle.toml");
@@ -32,12 +35,20 @@ fn axis(sigma2: f64, biases: &[(f64, f64)]) -> Composite {
         Process::Ar1(Ar1::new(phi, s * s * (1.0 - phi * phi)).unwrap())
     };
     let white = Process::White(White::new(sigma2).unwrap());
-    Composite::new(std::iter::once(white).chain(biases.iter().map(ar1)).collect())
+    Composite::new(
+        std::iter::once(white)
+            .chain(biases.iter().map(ar1))
+            .collect(),
+    )
 }
 
 /// A tactical IMU whose model the filter of 15 states carries as it is.
 fn tactical() -> Model {
-    Model::pooled(100.0, &axis(1e-5, &[(5e-4, 200.0)]), &axis(1e-8, &[(5e-6, 300.0)]))
+    Model::pooled(
+        100.0,
+        &axis(1e-5, &[(5e-4, 200.0)]),
+        &axis(1e-8, &[(5e-6, 300.0)]),
+    )
 }
 
 fn scenario(text: &str) -> Scenario {
@@ -71,7 +82,9 @@ fn improbability(results: &[&RunResult]) -> (f64, f64) {
     for look in LOOKS {
         let count: u64 = results.iter().map(|r| r.epochs[look].count).sum();
         let sum: f64 = results.iter().map(|r| r.epochs[look].nees[0]).sum();
-        let p = ChiSquared::new((NEES_DOF as u64 * count) as f64).unwrap().cdf(sum);
+        let p = ChiSquared::new((NEES_DOF as u64 * count) as f64)
+            .unwrap()
+            .cdf(sum);
         smallest = smallest.min(2.0 * p.min(1.0 - p));
         mean += sum / count as f64 / LOOKS.len() as f64;
     }
@@ -80,21 +93,31 @@ fn improbability(results: &[&RunResult]) -> (f64, f64) {
 
 fn is_inside(what: &str, result: &RunResult) {
     let (p, mean) = improbability(&[result]);
-    println!("{what}: {} states, NEES {mean:.2}, p = {p:.1e}", result.filter_states);
+    println!(
+        "{what}: {} states, NEES {mean:.2}, p = {p:.1e}",
+        result.filter_states
+    );
     assert!(p > 1e-3, "{what}: NEES {mean}, p = {p}");
 }
 
 fn is_outside(what: &str, result: &RunResult) {
     let (p, mean) = improbability(&[result]);
-    println!("{what}: {} states, NEES {mean:.2}, p = {p:.1e}", result.filter_states);
-    assert!(p < 1e-9 && mean > 1.5 * NEES_DOF as f64, "{what}: NEES {mean}, p = {p}");
+    println!(
+        "{what}: {} states, NEES {mean:.2}, p = {p:.1e}",
+        result.filter_states
+    );
+    assert!(
+        p < 1e-9 && mean > 1.5 * NEES_DOF as f64,
+        "{what}: NEES {mean}, p = {p}"
+    );
 }
 
 /// 0.02 m/s² and 1e-4 rad/s of turn-on bias: constant states hold them, with 15 states and with all.
 #[test]
 fn a_turn_on_bias_that_is_expected_is_found() {
     let bias = "[imu]\nturn_on_bias_accel_m_s2 = 0.02\nturn_on_bias_gyro_rad_s = 1e-4\n";
-    let expected = format!("{bias}[initial]\naccel_bias_sigma_m_s2 = 0.02\ngyro_bias_sigma_rad_s = 1e-4\n");
+    let expected =
+        format!("{bias}[initial]\naccel_bias_sigma_m_s2 = 0.02\ngyro_bias_sigma_rad_s = 1e-4\n");
     let larger = Model::pooled(
         100.0,
         &axis(1e-5, &[(5e-4, 200.0), (1e-3, 2.0)]),
@@ -103,10 +126,19 @@ fn a_turn_on_bias_that_is_expected_is_found() {
     let full = scenario(&format!("{expected}[filter]\nstates = \"full\""));
     let (reduced, unaware) = (scenario(&expected), scenario(bias));
     let model = tactical();
-    let found = run(&model, &unaware, &[(&model, reduced), (&model, unaware.clone())], 31, RUNS);
+    let found = run(
+        &model,
+        &unaware,
+        &[(&model, reduced), (&model, unaware.clone())],
+        31,
+        RUNS,
+    );
     is_inside("turn-on bias, 15", &found[0]);
     is_outside("turn-on bias not expected, 15", &found[1]);
-    is_inside("turn-on bias, full", &run(&larger, &unaware, &[(&larger, full)], 32, RUNS)[0]);
+    is_inside(
+        "turn-on bias, full",
+        &run(&larger, &unaware, &[(&larger, full)], 32, RUNS)[0],
+    );
 }
 
 /// 300 ppm on every axis: the filter of 21 states expects it, and any filter that is told.
@@ -114,10 +146,12 @@ fn a_turn_on_bias_that_is_expected_is_found() {
 fn scale_factors_of_300_ppm_are_found_by_21_states() {
     let imu = scenario("[imu]\nscale_ppm_accel = 300\nscale_ppm_gyro = 300");
     let model = tactical();
-    let told =
-        "[filter]\nstates = \"full\"\n[initial]\naccel_scale_sigma_ppm = 300\ngyro_scale_sigma_ppm = 300";
-    let filters =
-        [(&model, scenario("filter.states = 21")), (&model, scenario(told)), (&model, scenario(""))];
+    let told = "[filter]\nstates = \"full\"\n[initial]\naccel_scale_sigma_ppm = 300\ngyro_scale_sigma_ppm = 300";
+    let filters = [
+        (&model, scenario("filter.states = 21")),
+        (&model, scenario(told)),
+        (&model, scenario("")),
+    ];
     let found = run(&model, &imu, &filters, 33, RUNS);
     is_inside("scale factors, 21", &found[0]);
     is_inside("scale factors, full and told", &found[1]);
@@ -144,7 +178,8 @@ fn a_drift_is_as_uncertain_as_its_magnitude() {
     let drifting = |signs: [f64; 6]| {
         let mut model = tactical();
         for ((axis, slope), sign) in model.axes.iter_mut().zip(slopes).zip(signs) {
-            axis.processes.push(Process::Drift(Drift::new(sign * slope).unwrap()));
+            axis.processes
+                .push(Process::Drift(Drift::new(sign * slope).unwrap()));
         }
         model
     };
@@ -152,17 +187,32 @@ fn a_drift_is_as_uncertain_as_its_magnitude() {
     let full = scenario("filter.states = 'full'");
     let of_signs = |(seed, signs): (u64, [f64; 6])| {
         let model = drifting(signs);
-        run(&model, &none, &[(&model, none.clone()), (&model, full.clone())], seed, 4)
+        run(
+            &model,
+            &none,
+            &[(&model, none.clone()), (&model, full.clone())],
+            seed,
+            4,
+        )
     };
     let results: Vec<_> = (40..).zip(HADAMARD).map(of_signs).collect();
     for (i, name) in ["15", "full"].into_iter().enumerate() {
         let of_filter: Vec<&RunResult> = results.iter().map(|r| &r[i]).collect();
         let (p, mean) = improbability(&of_filter);
-        println!("drift, {name}: {} states, NEES {mean:.2}, p = {p:.1e}", of_filter[0].filter_states);
+        println!(
+            "drift, {name}: {} states, NEES {mean:.2}, p = {p:.1e}",
+            of_filter[0].filter_states
+        );
         assert!(p > 1e-3, "{name}: NEES {mean}, p = {p}");
         assert_eq!(of_filter[0].filter_states, 21);
     }
-    let unaware = run(&drifting(HADAMARD[0]), &none, &[(&plain, none.clone())], 40, 8);
+    let unaware = run(
+        &drifting(HADAMARD[0]),
+        &none,
+        &[(&plain, none.clone())],
+        40,
+        8,
+    );
     is_outside("drift not in the model", &unaware[0]);
 }
 
@@ -177,9 +227,15 @@ fn fusion_with_scale_factors_is_nearer_to_the_reference() {
     let settings = "[imu]\nscale_ppm_accel = 3000\nscale_ppm_gyro = 3000\n\
         [initial]\naccel_scale_sigma_ppm = 3000\n";
     fs::write(path.join("scenario.toml"), settings).unwrap();
-    done(path, "trajectory record drive.toml imu.toml --scenario scenario.toml --seed 3 -o rec");
+    done(
+        path,
+        "trajectory record drive.toml imu.toml --scenario scenario.toml --seed 3 -o rec",
+    );
     let start = fs::read_to_string(path.join("rec/initial.toml")).unwrap();
-    assert!(start.contains("accel_scale_sigma_ppm = 3000.0\n"), "{start}");
+    assert!(
+        start.contains("accel_scale_sigma_ppm = 3000.0\n"),
+        "{start}"
+    );
     let nees = |scale_ppm: &str, states: &str| {
         let known = start.replace("accel_scale_sigma_ppm = 3000.0\n", scale_ppm);
         fs::write(path.join("start.toml"), known).unwrap();
@@ -200,20 +256,27 @@ fn fusion_with_scale_factors_is_nearer_to_the_reference() {
     println!("fuse: {told:?} {unaware:?}");
     // exit code 3: the reference contradicts the solution
     assert_eq!((told.0, told.1, unaware.0, unaware.1), (0, 21, 3, 15));
-    assert!(told.2 < 20.0 && unaware.2 > 3.0 * told.2, "{told:?} {unaware:?}");
+    assert!(
+        told.2 < 20.0 && unaware.2 > 3.0 * told.2,
+        "{told:?} {unaware:?}"
+    );
 }
 
 /// A model with a drift can be calibrated, and so it can be used: with any filter.
 #[test]
 fn a_model_with_a_drift_runs_with_any_filter() {
-    let model = MODEL.replace("sigma2 = 2e-6 }", "sigma2 = 2e-6 }, { type = \"DR\", slope = 1e-8 }");
+    let model = MODEL.replace(
+        "sigma2 = 2e-6 }",
+        "sigma2 = 2e-6 }, { type = \"DR\", slope = 1e-8 }",
+    );
     let place = place_with(DRIVE, &model);
     for (states, number) in [("15", 18), ("21", 24), ("full", 18)] {
         let command = format!(
             "run drive.toml imu.toml --runs 1 --outage 30:40 --filter {states} --seed 1 -o o{states}"
         );
         done(place.path(), &command);
-        let summary = fs::read_to_string(place.path().join(format!("o{states}/summary.json"))).unwrap();
+        let summary =
+            fs::read_to_string(place.path().join(format!("o{states}/summary.json"))).unwrap();
         let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
         assert_eq!(summary["filter_states"], number, "{states}");
     }
@@ -223,15 +286,32 @@ fn a_model_with_a_drift_runs_with_any_filter() {
 fn what_the_filter_does_not_expect_is_warned_of() {
     let place = place_with(DRIVE, MODEL);
     let path = place.path();
-    fs::write(path.join("s.toml"), "imu = { turn_on_bias_accel_m_s2 = 0.02, scale_ppm_gyro = 300 }\n")
-        .unwrap();
+    fs::write(
+        path.join("s.toml"),
+        "imu = { turn_on_bias_accel_m_s2 = 0.02, scale_ppm_gyro = 300 }\n",
+    )
+    .unwrap();
     let command = "run drive.toml imu.toml --runs 1 --outage 30:40 --seed 1 --scenario s.toml";
     // its errors may be large enough for a bad verdict, exit code 3
     let said = nav_sim(path, &format!("{command} -o a")).stderr;
-    assert!(said.contains("the true accel has a turn-on bias of 0.02 m/s²"), "{said}");
-    assert!(said.contains("the true gyro has a scale-factor error of 300 ppm"), "{said}");
-    let said = done(path, &format!("{command} --turn-on-bias 0.02,0 --filter 21 -o b")).stderr;
+    assert!(
+        said.contains("the true accel has a turn-on bias of 0.02 m/s²"),
+        "{said}"
+    );
+    assert!(
+        said.contains("the true gyro has a scale-factor error of 300 ppm"),
+        "{said}"
+    );
+    let said = done(
+        path,
+        &format!("{command} --turn-on-bias 0.02,0 --filter 21 -o b"),
+    )
+    .stderr;
     assert!(!said.contains("the true"), "{said}");
     let refused = nav_sim(path, "run drive.toml imu.toml --filter 16 -o c");
-    assert!(refused.code == 2 && refused.stderr.contains("\"15\", \"21\" or \"full\""), "{}", refused.stderr);
+    assert!(
+        refused.code == 2 && refused.stderr.contains("\"15\", \"21\" or \"full\""),
+        "{}",
+        refused.stderr
+    );
 }

@@ -11,16 +11,36 @@ use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::navigation::trajectory::profile::{
     Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
 };
-use nav_sim::signal::noise::{Ar1, Composite, Drift, Ma1, Model, Process, Quantization, RandomWalk, White};
+use nav_sim::signal::noise::{
+    Ar1, Composite, Drift, Ma1, Model, Process, Quantization, RandomWalk, White,
+};
 use nav_sim_navigation::simulation::lincov::{DRIFT, FilterPass, TruthSide, assess};
 
 const RATE_HZ: f64 = 100.0;
 
 fn trajectory(kinds: Vec<Kind>) -> Trajectory {
-    let start = Start { t_s: 0.0, lat: 0.8, lon: 0.1, h: 0.0, heading: 0.7, speed: 0.0 };
-    let segment = |kind| Segment { kind, climb_m: 0.0, ramp_s: None };
+    let start = Start {
+        t_s: 0.0,
+        lat: 0.8,
+        lon: 0.1,
+        h: 0.0,
+        heading: 0.7,
+        speed: 0.0,
+    };
+    let segment = |kind| Segment {
+        kind,
+        climb_m: 0.0,
+        ramp_s: None,
+    };
     let segments = kinds.into_iter().map(segment).collect();
-    Profile { start, bank: Bank::None, ramp_s: 1.0, segments }.build().unwrap()
+    Profile {
+        start,
+        bank: Bank::None,
+        ramp_s: 1.0,
+        segments,
+    }
+    .build()
+    .unwrap()
 }
 
 fn still(seconds: f64) -> Kind {
@@ -33,9 +53,18 @@ fn standing(process: Process) -> [f64; 2] {
     let noise = Composite::new(vec![process]);
     let model = Model::pooled(RATE_HZ, &noise, &Composite::default());
     let trajectory = trajectory(vec![still(20.0)]);
-    let initial = InitialSettings { perfect: true, ..InitialSettings::default() };
-    let scenario = Scenario { initial, ..Scenario::default() };
-    let outages = [Outage { start_s: 0.0, end_s: 20.0 }];
+    let initial = InitialSettings {
+        perfect: true,
+        ..InitialSettings::default()
+    };
+    let scenario = Scenario {
+        initial,
+        ..Scenario::default()
+    };
+    let outages = [Outage {
+        start_s: 0.0,
+        end_s: 20.0,
+    }];
     let track = scenario.track(&trajectory, &model, &outages).unwrap();
     let white = Composite::new(vec![Process::White(White::new(1e-4).unwrap())]);
     let belief = Model::pooled(RATE_HZ, &white, &white);
@@ -54,13 +83,25 @@ fn a_filter_that_is_right_is_so_after_hours() {
     ]);
     let gyro = Composite::new(vec![Process::White(White::new(1e-10).unwrap())]);
     let model = Model::pooled(5.0, &noise, &gyro);
-    let path =
-        trajectory(vec![Kind::Accelerate { to_speed: 9.0, by: Acceleration::Peak(1.5) }, still(14_400.0)]);
+    let path = trajectory(vec![
+        Kind::Accelerate {
+            to_speed: 9.0,
+            by: Acceleration::Peak(1.5),
+        },
+        still(14_400.0),
+    ]);
     let track = Scenario::default().track(&path, &model, &[]).unwrap();
     let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
     let reports = assess(&track, &belief, &model).reports;
-    let farthest = reports.iter().map(|r| (r.nees - 9.0).abs()).fold(0.0, f64::max);
-    assert!(reports.len() > 14_400 && farthest < 1e-9, "{farthest:e} of {}", reports.len());
+    let farthest = reports
+        .iter()
+        .map(|r| (r.nees - 9.0).abs())
+        .fold(0.0, f64::max);
+    assert!(
+        reports.len() > 14_400 && farthest < 1e-9,
+        "{farthest:e} of {}",
+        reports.len()
+    );
 }
 
 /// The vertical channel over n samples of dt, whose gravity gradient (time constant 570 s) adds (20/570)²/6,
@@ -72,7 +113,11 @@ fn a_vehicle_that_stands_has_the_closed_forms_of_each_process() {
     let (dt, n) = (1.0 / RATE_HZ, 2000.0_f64);
     let t = n * dt;
     let near = |found: f64, variance: f64| {
-        assert!((found / variance.sqrt() - 1.0).abs() < 1.5e-3, "{found} {}", variance.sqrt());
+        assert!(
+            (found / variance.sqrt() - 1.0).abs() < 1.5e-3,
+            "{found} {}",
+            variance.sqrt()
+        );
     };
     let [v, r] = standing(Process::White(White::new(1e-4).unwrap()));
     near(v, 1e-4 * dt * dt * n);
@@ -84,12 +129,18 @@ fn a_vehicle_that_stands_has_the_closed_forms_of_each_process() {
     near(v, 2e-4 * dt * dt);
     let theta = -0.6_f64;
     let [v, _] = standing(Process::Ma1(Ma1::new(theta, 1e-4).unwrap()));
-    near(v, 1e-4 * dt * dt * ((1.0 + theta).powi(2) * (n - 1.0) + theta * theta + 1.0));
+    near(
+        v,
+        1e-4 * dt * dt * ((1.0 + theta).powi(2) * (n - 1.0) + theta * theta + 1.0),
+    );
     // of a Gauss-Markov process that starts anywhere: 2 s² T² (t/T − 1 + e^{−t/T})
     let (time, phi) = (5.0_f64, (-dt / 5.0).exp());
     let [v, _] = standing(Process::Ar1(Ar1::new(phi, 1e-8).unwrap()));
     let variance = 1e-8 / (1.0 - phi * phi);
-    near(v, 2.0 * variance * time * time * (t / time - 1.0 + (-t / time).exp()));
+    near(
+        v,
+        2.0 * variance * time * time * (t / time - 1.0 + (-t / time).exp()),
+    );
 }
 
 /// d ln RMSE of the velocity down after 20 s without a fix, by the logarithm of a quantity of the accelerometer's noise.
@@ -97,16 +148,37 @@ fn slope_of_standing(process: Process, quantity: &str) -> f64 {
     let noise = Composite::new(vec![process]);
     let truth = Model::pooled(RATE_HZ, &noise, &Composite::default());
     let path = trajectory(vec![still(20.0)]);
-    let initial = InitialSettings { perfect: true, ..InitialSettings::default() };
-    let scenario = Scenario { initial, ..Scenario::default() };
-    let outages = [Outage { start_s: 0.0, end_s: 20.0 }];
+    let initial = InitialSettings {
+        perfect: true,
+        ..InitialSettings::default()
+    };
+    let scenario = Scenario {
+        initial,
+        ..Scenario::default()
+    };
+    let outages = [Outage {
+        start_s: 0.0,
+        end_s: 20.0,
+    }];
     let track = scenario.track(&path, &truth, &outages).unwrap();
     let white = Composite::new(vec![Process::White(White::new(1e-4).unwrap())]);
-    let beliefs =
-        [Belief::new(&Model::pooled(RATE_HZ, &white, &white), FilterStates::Reduced15, 1.0, 800.0).unwrap()];
+    let beliefs = [Belief::new(
+        &Model::pooled(RATE_HZ, &white, &white),
+        FilterStates::Reduced15,
+        1.0,
+        800.0,
+    )
+    .unwrap()];
     let experiment = scenario.experiment(&path, Truth::Model(&truth), &beliefs, &outages, 1);
-    let all = &Sensitivities::at_outage_ends(&FilterPass::new(&track, &beliefs[0]), &experiment, &truth)[0].0;
-    all.iter().find(|(name, _)| name == quantity).unwrap_or_else(|| panic!("{quantity}: {all:?}")).1.0[5]
+    let all =
+        &Sensitivities::at_outage_ends(&FilterPass::new(&track, &beliefs[0]), &experiment, &truth)
+            [0]
+        .0;
+    all.iter()
+        .find(|(name, _)| name == quantity)
+        .unwrap_or_else(|| panic!("{quantity}: {all:?}"))
+        .1
+        .0[5]
 }
 
 /// The sum of n samples of an AR1 has the variance n/(1 − phi)² − 2 phi (1 − phiⁿ)/((1 − phi)³ (1 + phi)) times sigma2,
@@ -117,17 +189,30 @@ fn slope_of_standing(process: Process, quantity: &str) -> f64 {
 fn the_sensitivity_to_a_parameter_is_the_derivative_up_to_the_end_of_its_domain() {
     let n = 2000.0;
     let near = |what: &str, found: f64, expected: f64| {
-        assert!((found / expected - 1.0).abs() < 2e-3, "{what}: {found} {expected}");
+        assert!(
+            (found / expected - 1.0).abs() < 2e-3,
+            "{what}: {found} {expected}"
+        );
     };
     for phi in [-0.3, -0.9, -0.995_f64] {
         let found = slope_of_standing(Process::Ar1(Ar1::new(phi, 1e-4).unwrap()), "accel.AR1.phi");
         let (less, more, power) = (1.0 - phi, 1.0 + phi, phi.powf(n));
-        let (sum, ends) = (n / (less * less), 2.0 * phi * (1.0 - power) / (less.powi(3) * more));
+        let (sum, ends) = (
+            n / (less * less),
+            2.0 * phi * (1.0 - power) / (less.powi(3) * more),
+        );
         let of_ends = 1.0 - n * power / (1.0 - power) + 3.0 * phi / less - phi / more;
-        near("phi", found, 0.5 * (2.0 * phi / less * sum - of_ends * ends) / (sum - ends));
+        near(
+            "phi",
+            found,
+            0.5 * (2.0 * phi / less * sum - of_ends * ends) / (sum - ends),
+        );
     }
     for theta in [0.5, 0.995, 1.0, -0.9, -0.995, -1.0_f64] {
-        let found = slope_of_standing(Process::Ma1(Ma1::new(theta, 1e-4).unwrap()), "accel.MA1.theta");
+        let found = slope_of_standing(
+            Process::Ma1(Ma1::new(theta, 1e-4).unwrap()),
+            "accel.MA1.theta",
+        );
         let variance = (1.0 + theta).powi(2) * (n - 1.0) + theta * theta + 1.0;
         let expected = theta * ((1.0 + theta) * (n - 1.0) + theta) / variance;
         near("theta", found, expected);
@@ -148,7 +233,10 @@ fn a_drift_of_the_gyroscope_is_felt_at_the_end_of_a_lever_arm() {
     scenario.initial.vel_sigma_m_s = [100.0; 3];
     scenario.gnss.lever_arm_m = [arm_m, 0.0, 0.0];
     (scenario.gnss.pos_sigma_m, scenario.gnss.vel_sigma_m_s) = ([1e6; 3], Some([1e-3; 3]));
-    let outages = [Outage { start_s: 0.0, end_s: n / RATE_HZ }];
+    let outages = [Outage {
+        start_s: 0.0,
+        end_s: n / RATE_HZ,
+    }];
     let track = scenario.track(&path, &truth, &outages).unwrap();
     let white = |sigma2| Composite::new(vec![Process::White(White::new(sigma2).unwrap())]);
     let believed = Model::pooled(RATE_HZ, &white(1e-4), &white(1e-8));
@@ -157,7 +245,12 @@ fn a_drift_of_the_gyroscope_is_felt_at_the_end_of_a_lever_arm() {
     let sources = TruthSide::sources(&experiment, &truth);
     let drift = sources.iter().find(|source| source.name == DRIFT).unwrap();
     let law = FilterPass::new(&track, &beliefs[0]).errors(&drift.side);
-    let fix = law.reports.iter().map(|report| &report.errors).find(|errors| errors.fix).unwrap();
+    let fix = law
+        .reports
+        .iter()
+        .map(|report| &report.errors)
+        .find(|errors| errors.fix)
+        .unwrap();
     assert_eq!(fix.after_s, n / RATE_HZ);
     let [north, east, down] = [3, 4, 5].map(|i| fix.rmse()[i]);
     let expected = arm_m * slope * n;
@@ -177,21 +270,32 @@ fn wrong() -> (Model, Belief) {
         if !belief {
             processes.push(Process::RandomWalk(RandomWalk::new(2e-9 * scale).unwrap()));
             processes.push(Process::Ar1(Ar1::new(0.98, 1e-6 * scale).unwrap()));
-            processes.push(Process::Quantization(Quantization::new(1e-4 * scale).unwrap()));
+            processes.push(Process::Quantization(
+                Quantization::new(1e-4 * scale).unwrap(),
+            ));
             processes.push(Process::Ma1(Ma1::new(0.4, 3e-5 * scale).unwrap()));
         }
         Composite::new(processes)
     };
     let model = |belief| Model::pooled(RATE_HZ, &axis(1.0, belief), &axis(1e-3, belief));
-    (model(false), Belief::new(&model(true), FilterStates::Reduced15, 1.0, 800.0).unwrap())
+    (
+        model(false),
+        Belief::new(&model(true), FilterStates::Reduced15, 1.0, 800.0).unwrap(),
+    )
 }
 
 /// 400 runs of a filter that is wrong, with a lever arm: RMSE, NEES and mean standard deviations at the end of an
 /// outage and after it. Of 18 RMSE the largest deviation stays below 4.2 standard errors with p = 5e-4.
 #[test]
 fn sampled_runs_scatter_as_computed() {
-    let turn = |deg: f64, s: f64| Kind::Turn { angle: deg.to_radians(), by: Turning::Duration(s) };
-    let faster = |to_speed: f64| Kind::Accelerate { to_speed, by: Acceleration::Duration(8.0) };
+    let turn = |deg: f64, s: f64| Kind::Turn {
+        angle: deg.to_radians(),
+        by: Turning::Duration(s),
+    };
+    let faster = |to_speed: f64| Kind::Accelerate {
+        to_speed,
+        by: Acceleration::Duration(8.0),
+    };
     let path = trajectory(vec![
         still(5.0),
         faster(12.0),
@@ -206,7 +310,10 @@ fn sampled_runs_scatter_as_computed() {
     let (truth, belief) = wrong();
     let mut scenario = Scenario::default();
     scenario.gnss.lever_arm_m = [1.0, -0.5, -1.2];
-    let outages = [Outage { start_s: 35.0, end_s: 55.0 }];
+    let outages = [Outage {
+        start_s: 35.0,
+        end_s: 55.0,
+    }];
     let beliefs = [belief];
     let experiment = scenario.experiment(&path, Truth::Model(&truth), &beliefs, &outages, 7);
     let result = &monte_carlo::run(&experiment, 400, &|_| {}).unwrap()[0];
@@ -216,24 +323,49 @@ fn sampled_runs_scatter_as_computed() {
     let (sampled, report) = (&result.epochs[at], &computed.reports[at]);
     let far = |found: Estimate, expected: f64| (found.value - expected).abs() / found.std_error;
     for i in 0..9 {
-        let ends = result.runs.iter().map(|r| r.outages[0].error_end[i].powi(2));
-        let end = far(Estimate::mean_of(ends, None).root(), computed.outage_ends[0].rmse[i]);
+        let ends = result
+            .runs
+            .iter()
+            .map(|r| r.outages[0].error_end[i].powi(2));
+        let end = far(
+            Estimate::mean_of(ends, None).root(),
+            computed.outage_ends[0].rmse[i],
+        );
         let later = Estimate::root_mean_square(
             SampleSize::of(sampled.count, None),
             sampled.error_sq[i],
             sampled.error_4[i],
         );
-        assert!(end < 4.2 && far(later, report.rmse[i]) < 4.2, "state {i}: {end}");
+        assert!(
+            end < 4.2 && far(later, report.rmse[i]) < 4.2,
+            "state {i}: {end}"
+        );
         let see = sampled.see[i] / sampled.count as f64;
-        assert!((see / report.sigma[i] - 1.0).abs() < 5e-3, "state {i}: {see} {}", report.sigma[i]);
+        assert!(
+            (see / report.sigma[i] - 1.0).abs() < 5e-3,
+            "state {i}: {see} {}",
+            report.sigma[i]
+        );
     }
     let biases = FilterPass::new(&track, &beliefs[0]).bias_sigmas()[at];
     for (sum, sigma) in sampled.bias_see.iter().zip(biases) {
         let see = sum / sampled.count as f64;
-        assert!(sigma > 0.0 && (see / sigma - 1.0).abs() < 5e-3, "{see} {sigma}");
+        assert!(
+            sigma > 0.0 && (see / sigma - 1.0).abs() < 5e-3,
+            "{see} {sigma}"
+        );
     }
-    let nees = Estimate::mean(SampleSize::of(sampled.count, None), sampled.nees[0], sampled.nees[1]);
-    assert!(far(nees, report.nees) < 4.2, "{} {}", nees.value, report.nees);
+    let nees = Estimate::mean(
+        SampleSize::of(sampled.count, None),
+        sampled.nees[0],
+        sampled.nees[1],
+    );
+    assert!(
+        far(nees, report.nees) < 4.2,
+        "{} {}",
+        nees.value,
+        report.nees
+    );
     // and the filter is wrong enough for that to be a test
     assert!(report.nees > 12.0 && computed.outage_ends[0].ratio()[0] > 1.3);
 }
@@ -251,17 +383,26 @@ fn a_matched_filter_is_right() {
     let model = Model::pooled(RATE_HZ, &noise, &gyro);
     let path = trajectory(vec![
         still(10.0),
-        Kind::Accelerate { to_speed: 9.0, by: Acceleration::Peak(1.5) },
+        Kind::Accelerate {
+            to_speed: 9.0,
+            by: Acceleration::Peak(1.5),
+        },
         still(30.0),
     ]);
     let scenario = Scenario::default();
-    let outages = [Outage { start_s: 15.0, end_s: 30.0 }];
+    let outages = [Outage {
+        start_s: 15.0,
+        end_s: 30.0,
+    }];
     let track = scenario.track(&path, &model, &outages).unwrap();
     let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
     let computed = assess(&track, &belief, &model);
     assert!(belief.white[0] != DVec3::ZERO && !computed.reports.is_empty());
     for found in computed.reports.iter().chain(&computed.outage_ends) {
-        assert!((found.nees - 9.0).abs() < 1e-6 && found.divergence.abs() < 1e-6, "{found:?}");
+        assert!(
+            (found.nees - 9.0).abs() < 1e-6 && found.divergence.abs() < 1e-6,
+            "{found:?}"
+        );
         assert!(found.ratio().iter().all(|r| (r - 1.0).abs() < 1e-8));
     }
 }

@@ -13,7 +13,9 @@ use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::navigation::trajectory::profile::{
     Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
 };
-use nav_sim::signal::noise::{Ar1, Composite, Drift, Model, Process, Quantization, RandomWalk, White};
+use nav_sim::signal::noise::{
+    Ar1, Composite, Drift, Model, Process, Quantization, RandomWalk, White,
+};
 use nav_sim_navigation::earth::gravity_down;
 use nav_sim_navigation::metrics::{Budget, FAN_LEVELS};
 use nav_sim_navigation::metrics::{expected_fan, fan};
@@ -22,15 +24,24 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 
 const RATE_HZ: f64 = 100.0;
 const RUNS: u64 = 400;
-const OUTAGE: Outage = Outage { start_s: 70.0, end_s: 100.0 };
+const OUTAGE: Outage = Outage {
+    start_s: 70.0,
+    end_s: 100.0,
+};
 /// Standard errors that a figure may be off: 117 RMSE of a case beyond it with probability 1e-4 (Bonferroni; the
 /// scatter of 400 squares is nearly normal).
 const BOUND: f64 = 4.9;
 
 pub(super) fn drive() -> Trajectory {
     let still = |s: f64| Kind::Straight(Length::Duration(s));
-    let faster = |to_speed: f64| Kind::Accelerate { to_speed, by: Acceleration::Duration(8.0) };
-    let turn = |deg: f64| Kind::Turn { angle: deg.to_radians(), by: Turning::Duration(9.0) };
+    let faster = |to_speed: f64| Kind::Accelerate {
+        to_speed,
+        by: Acceleration::Duration(8.0),
+    };
+    let turn = |deg: f64| Kind::Turn {
+        angle: deg.to_radians(),
+        by: Turning::Duration(9.0),
+    };
     let kinds = [
         faster(12.0),
         turn(90.0),
@@ -48,10 +59,28 @@ pub(super) fn drive() -> Trajectory {
         turn(-45.0),
         still(8.0),
     ];
-    let start = Start { t_s: 0.0, lat: 0.8, lon: 0.1, h: 300.0, heading: 0.7, speed: 6.0 };
-    let segment = |kind| Segment { kind, climb_m: 1.0, ramp_s: None };
+    let start = Start {
+        t_s: 0.0,
+        lat: 0.8,
+        lon: 0.1,
+        h: 300.0,
+        heading: 0.7,
+        speed: 6.0,
+    };
+    let segment = |kind| Segment {
+        kind,
+        climb_m: 1.0,
+        ramp_s: None,
+    };
     let segments = kinds.map(segment).into();
-    Profile { start, bank: Bank::None, ramp_s: 1.0, segments }.build().unwrap()
+    Profile {
+        start,
+        bank: Bank::None,
+        ramp_s: 1.0,
+        segments,
+    }
+    .build()
+    .unwrap()
 }
 
 /// White and quantization noise, a fast and a slow correlated bias, a random walk; all variances times `scale`.
@@ -88,7 +117,12 @@ fn assert_agree(name: &str, scenario: &str, truth: &Model) {
     assert_outage_agrees(name, sampled, &expected);
     let nis = Estimate::mean_of(sampled.runs.iter().map(|r| r.nis.0), None);
     let z = (nis.value - expected.record.nis.0) / nis.std_error;
-    assert!(z.abs() < BOUND, "{name}: NIS {} {}", nis.value, expected.record.nis.0);
+    assert!(
+        z.abs() < BOUND,
+        "{name}: NIS {} {}",
+        nis.value,
+        expected.record.nis.0
+    );
 }
 
 /// Every ten seconds: ASEE within half a percent, RMSE and bias within their standard errors, NEES and coverage.
@@ -108,13 +142,21 @@ fn assert_epochs_agree(name: &str, sampled: &RunResult, expected: &Expected) {
         };
         for i in 0..9 {
             let ratio = s.asee.0[i].value / e.asee.0[i].value;
-            assert!((ratio - 1.0).abs() < 5e-3, "{name}, ASEE {i} at {} s: {ratio}", s.t_s);
+            assert!(
+                (ratio - 1.0).abs() < 5e-3,
+                "{name}, ASEE {i} at {} s: {ratio}",
+                s.t_s
+            );
             near(&format!("RMSE {i}"), s.rmse.0[i], e.rmse.0[i].value);
             near(&format!("bias {i}"), s.bias.0[i], e.bias.0[i].value);
         }
         near("NEES", s.nees, e.nees.value);
         near("position error", s.mean_pos_err_m, e.mean_pos_err_m.value);
-        near("attitude error", s.mean_att_err_deg, e.mean_att_err_deg.value);
+        near(
+            "attitude error",
+            s.mean_att_err_deg,
+            e.mean_att_err_deg.value,
+        );
         let binomial = (e.coverage * (1.0 - e.coverage) / RUNS as f64).sqrt();
         // where nearly nothing is left outside, the law of the few is Poisson's: two of them more
         let slack = BOUND * binomial + 2.0 / RUNS as f64;
@@ -152,13 +194,23 @@ fn out_of_place(sampled: &RunResult, expected: &[FanEpoch]) -> Vec<(f64, f64, us
         let mut errors: Vec<f64> = sampled.runs.iter().map(error).collect();
         errors.sort_by(f64::total_cmp);
         // a perfect start has no error but rounding
-        let known = FAN_LEVELS.iter().zip(expected.quantiles_m).zip(own_row.quantiles_m);
+        let known = FAN_LEVELS
+            .iter()
+            .zip(expected.quantiles_m)
+            .zip(own_row.quantiles_m);
         for ((p, quantile), own) in known.filter(|((_, quantile), _)| *quantile > 1e-6) {
             let binomial = Binomial::new(*p, RUNS).unwrap();
             let [l, u] = [share, 1.0 - share].map(|q| binomial.inverse_cdf(q) as usize);
-            assert!(errors[l - 1] <= own && own <= errors[u], "the quantile of the runs is among them");
+            assert!(
+                errors[l - 1] <= own && own <= errors[u],
+                "the quantile of the runs is among them"
+            );
             if quantile < errors[l - 1] || errors[u] < quantile {
-                found.push((expected.t_s, *p, errors.iter().filter(|e| **e <= quantile).count()));
+                found.push((
+                    expected.t_s,
+                    *p,
+                    errors.iter().filter(|e| **e <= quantile).count(),
+                ));
             }
         }
     }
@@ -181,7 +233,12 @@ fn the_fan_of_another_truth_is_out_of_place() {
     let matched = expected_fan(&FilterPass::new(&track, &beliefs[0]), &side, &outages);
     let strangers = out_of_place(sampled, &matched);
     for p in [0.5, 0.75, 0.95] {
-        assert!(strangers.iter().any(|(t_s, level, _)| (*t_s, *level) == (99.0, p)), "{p}: {strangers:?}");
+        assert!(
+            strangers
+                .iter()
+                .any(|(t_s, level, _)| (*t_s, *level) == (99.0, p)),
+            "{p}: {strangers:?}"
+        );
     }
 }
 
@@ -193,25 +250,48 @@ fn assert_outage_agrees(name: &str, sampled: &RunResult, expected: &Expected) {
     for i in 0..9 {
         let rmse = Estimate::mean_of(records().map(|o| o.error_end[i].powi(2)), None).root();
         let z = (rmse.value - outage.rmse_end.0[i]) / rmse.std_error;
-        assert!(z.abs() < BOUND, "{name}, RMSE {i} at the end: {} {}", rmse.value, outage.rmse_end.0[i]);
+        assert!(
+            z.abs() < BOUND,
+            "{name}, RMSE {i} at the end: {} {}",
+            rmse.value,
+            outage.rmse_end.0[i]
+        );
     }
     let nees = Estimate::mean_of(records().map(|o| o.nees_end), None);
-    assert!(((nees.value - outage.nees_end) / nees.std_error).abs() < BOUND, "{name}: {}", nees.value);
+    assert!(
+        ((nees.value - outage.nees_end) / nees.std_error).abs() < BOUND,
+        "{name}: {}",
+        nees.value
+    );
     let density = Estimate::mean_of(records().map(|o| o.log_density_end), None);
     let off = (density.value - outage.log_density_end) / density.std_error;
-    assert!(off.abs() < BOUND, "{name}: {} against {}", density.value, outage.log_density_end);
+    assert!(
+        off.abs() < BOUND,
+        "{name}: {} against {}",
+        density.value,
+        outage.log_density_end
+    );
     let h = &outage.horizontal_error_end_m;
     for (p, quantile) in [(0.5, h.p50), (0.95, h.p95)] {
-        let below = records().filter(|o| o.horizontal_error_end_m <= quantile).count() as f64;
+        let below = records()
+            .filter(|o| o.horizontal_error_end_m <= quantile)
+            .count() as f64;
         let (mean, deviation) = (p * RUNS as f64, (p * (1.0 - p) * RUNS as f64).sqrt());
-        assert!((below - mean).abs() < 4.0 * deviation, "{name}: {below} of {RUNS} below p = {p}");
+        assert!(
+            (below - mean).abs() < 4.0 * deviation,
+            "{name}: {below} of {RUNS} below p = {p}"
+        );
     }
 }
 
 #[test]
 fn matched_filters_of_15_21_and_full_states() {
     for states in FilterStates::ALL {
-        assert_agree(states.name(), &format!("filter.states = '{states}'"), &model(1.0));
+        assert_agree(
+            states.name(),
+            &format!("filter.states = '{states}'"),
+            &model(1.0),
+        );
     }
 }
 
@@ -258,12 +338,25 @@ fn what_an_imu_feels_and_no_filter_expects() {
 #[test]
 fn a_lever_arm_a_barometer_and_a_receiver_with_memory() {
     let arm = "lever_arm_m = [1.0, -0.5, -1.2]";
-    let gyro = "imu = { scale_ppm_gyro = 2000, misalignment_rad = 1e-3, turn_on_bias_gyro_rad_s = 2e-4 }";
-    assert_agree("lever arm", &format!("gnss = {{ {arm} }}\n{gyro}"), &model(1.0));
+    let gyro =
+        "imu = { scale_ppm_gyro = 2000, misalignment_rad = 1e-3, turn_on_bias_gyro_rad_s = 2e-4 }";
+    assert_agree(
+        "lever arm",
+        &format!("gnss = {{ {arm} }}\n{gyro}"),
+        &model(1.0),
+    );
     let gnss = "correlated_pos_sigma_m = [3, 2, 5], correlation_time_s = 30, rate_hz = 2";
     let baro = "baro = { rate_hz = 1, sigma_m = 0.5 }";
-    assert_agree("coloured", &format!("gnss = {{ {gnss} }}\n{baro}"), &model(1.0));
-    assert_agree("position only", "gnss.vel_sigma_m_s = 'none'\ninitial.perfect = true", &model(1.0));
+    assert_agree(
+        "coloured",
+        &format!("gnss = {{ {gnss} }}\n{baro}"),
+        &model(1.0),
+    );
+    assert_agree(
+        "position only",
+        "gnss.vel_sigma_m_s = 'none'\ninitial.perfect = true",
+        &model(1.0),
+    );
 }
 
 /// A drift is the same in every run: it is in the mean of the errors, with its sign.
@@ -271,7 +364,9 @@ fn a_lever_arm_a_barometer_and_a_receiver_with_memory() {
 fn drifts_are_in_the_mean_of_the_errors() {
     let mut truth = model(1.0);
     for (axis, slope) in [(0, 2e-6), (1, -3e-6), (4, 3e-9), (5, -5e-9)] {
-        truth.axes[axis].processes.push(Process::Drift(Drift::new(slope).unwrap()));
+        truth.axes[axis]
+            .processes
+            .push(Process::Drift(Drift::new(slope).unwrap()));
     }
     assert_agree("drift", "", &truth);
     assert_agree("drift full", "filter.states = 'full'", &truth);
@@ -282,10 +377,31 @@ fn drifts_are_in_the_mean_of_the_errors() {
 /// gravity gradient (time constant 570 s) adds (20/570)²/6, and the step of the covariance (0.2 s) is exact here.
 #[test]
 fn constants_of_the_true_imu_have_their_closed_forms() {
-    let still = Segment { kind: Kind::Straight(Length::Duration(20.0)), climb_m: 0.0, ramp_s: None };
-    let start = Start { t_s: 0.0, lat: 0.8, lon: 0.1, h: 0.0, heading: 0.7, speed: 0.0 };
-    let path = Profile { start, bank: Bank::None, ramp_s: 1.0, segments: vec![still] }.build().unwrap();
-    let outages = [Outage { start_s: 0.0, end_s: 20.0 }];
+    let still = Segment {
+        kind: Kind::Straight(Length::Duration(20.0)),
+        climb_m: 0.0,
+        ramp_s: None,
+    };
+    let start = Start {
+        t_s: 0.0,
+        lat: 0.8,
+        lon: 0.1,
+        h: 0.0,
+        heading: 0.7,
+        speed: 0.0,
+    };
+    let path = Profile {
+        start,
+        bank: Bank::None,
+        ramp_s: 1.0,
+        segments: vec![still],
+    }
+    .build()
+    .unwrap();
+    let outages = [Outage {
+        start_s: 0.0,
+        end_s: 20.0,
+    }];
     let white = Composite::new(vec![Process::White(White::new(1e-4).unwrap())]);
     let believed = Model::pooled(RATE_HZ, &white, &white);
     let down = |imu: &str, truth: &Model| {
@@ -294,20 +410,30 @@ fn constants_of_the_true_imu_have_their_closed_forms() {
         let beliefs = [scenario.belief(&believed, &outages, &track).unwrap()];
         let experiment = scenario.experiment(&path, Truth::Model(truth), &beliefs, &outages, 1);
         let sources = TruthSide::together(&TruthSide::sources(&experiment, truth));
-        let end = FilterPass::new(&track, &beliefs[0]).errors(&sources).outage_ends[0];
+        let end = FilterPass::new(&track, &beliefs[0])
+            .errors(&sources)
+            .outage_ends[0];
         (end.errors.rmse()[2], end.errors.mean[2])
     };
-    let none = Model { rate_hz: RATE_HZ, axes: Default::default() };
+    let none = Model {
+        rate_hz: RATE_HZ,
+        axes: Default::default(),
+    };
     let (bias, mean) = down("imu.turn_on_bias_accel_m_s2 = 0.01", &none);
     assert!((bias / 2.0 - 1.0).abs() < 1.5e-3 && mean == 0.0, "{bias}");
     let (scale, _) = down("imu.scale_ppm_accel = 1000", &none);
     let g = gravity_down(GravityModel::default(), 0.8_f64.sin(), 0.0);
     assert!((scale / (1e-3 * g * 200.0) - 1.0).abs() < 1.5e-3, "{scale}");
     let mut drifting = none.clone();
-    drifting.axes[2].processes.push(Process::Drift(Drift::new(1e-6).unwrap()));
+    drifting.axes[2]
+        .processes
+        .push(Process::Drift(Drift::new(1e-6).unwrap()));
     let (rmse, mean) = down("", &drifting);
     // 100 a second, each a hundredth of a second later: k f t³/6 (1 + 3/(2n))
-    assert!((mean / (1e-6 * RATE_HZ * 8000.0 / 6.0) - 1.0).abs() < 2e-3, "{mean}");
+    assert!(
+        (mean / (1e-6 * RATE_HZ * 8000.0 / 6.0) - 1.0).abs() < 2e-3,
+        "{mean}"
+    );
     assert!((rmse / mean.abs() - 1.0).abs() < 1e-12, "{rmse} {mean}");
 }
 
@@ -327,14 +453,28 @@ fn sensitivities_to_variances_are_half_the_shares() {
     let of = |name: &str| sensitivities.0.iter().find(|(n, _)| n == name).unwrap().1;
     let mut compared = 0;
     for (source, shares) in &budget.shares {
-        let parameter = ["WN.sigma2", "QN.q2", "AR1_1.sigma2", "AR1_2.sigma2", "RW.gamma2"]
-            .into_iter()
-            .find(|p| source.split_once('.').is_some_and(|(_, label)| p.split('.').next() == Some(label)));
+        let parameter = [
+            "WN.sigma2",
+            "QN.q2",
+            "AR1_1.sigma2",
+            "AR1_2.sigma2",
+            "RW.gamma2",
+        ]
+        .into_iter()
+        .find(|p| {
+            source
+                .split_once('.')
+                .is_some_and(|(_, label)| p.split('.').next() == Some(label))
+        });
         let Some(parameter) = parameter else { continue };
         let sensor = source.split('.').next().unwrap();
         let slopes = of(&format!("{sensor}.{parameter}"));
         for i in 0..9 {
-            assert!((slopes.0[i] - 0.5 * shares.0[i]).abs() < 1e-4, "{source}, state {i}: {}", slopes.0[i]);
+            assert!(
+                (slopes.0[i] - 0.5 * shares.0[i]).abs() < 1e-4,
+                "{source}, state {i}: {}",
+                slopes.0[i]
+            );
         }
         compared += 1;
     }
@@ -356,7 +496,9 @@ fn budgets_add_up_to_the_true_errors_and_to_the_believed_ones() {
     let scenario: Scenario = toml::from_str(text).unwrap();
     let (path, believed, outages) = (drive(), model(1.0), [OUTAGE]);
     let mut truth = model(4.0);
-    truth.axes[3].processes.push(Process::Drift(Drift::new(1e-9).unwrap()));
+    truth.axes[3]
+        .processes
+        .push(Process::Drift(Drift::new(1e-9).unwrap()));
     let track = scenario.track(&path, &believed, &outages).unwrap();
     let beliefs = [scenario.belief(&believed, &outages, &track).unwrap()];
     let experiment = scenario.experiment(&path, Truth::Model(&truth), &beliefs, &outages, 1);
@@ -371,7 +513,12 @@ fn budgets_add_up_to_the_true_errors_and_to_the_believed_ones() {
             assert!((sum - 1.0).abs() < 1e-9, "state {i}: {sum}");
             let ratio = budget.total[i] / deviations[i].powi(2);
             assert!((ratio - 1.0).abs() < 1e-9, "state {i}: {ratio}");
-            assert!(budget.shares.iter().all(|(_, shares)| shares.0[i] >= -1e-12));
+            assert!(
+                budget
+                    .shares
+                    .iter()
+                    .all(|(_, shares)| shares.0[i] >= -1e-12)
+            );
         }
     }
     let names: Vec<&str> = sources.iter().map(|source| source.name.as_str()).collect();

@@ -10,7 +10,9 @@ const OFFSET: f64 = 9.8125;
 
 /// The whole number of a sample: a mix of the bits of its index.
 fn k(t: usize) -> i64 {
-    let mut z = (t as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mut z = (t as u64)
+        .wrapping_add(1)
+        .wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     ((z ^ (z >> 31)) >> 35) as i64 - (1 << 28)
@@ -38,7 +40,10 @@ fn a_hundred_million_samples_keep_twelve_digits() {
     let signal: Vec<f64> = (0..SAMPLES).map(|t| OFFSET + k(t) as f64 * UNIT).collect();
     let start = std::time::Instant::now();
     let nu = classical(&signal, LEVELS).unwrap();
-    println!("classical, 10^8 samples, {LEVELS} scales: {:.2} s", start.elapsed().as_secs_f64());
+    println!(
+        "classical, 10^8 samples, {LEVELS} scales: {:.2} s",
+        start.elapsed().as_secs_f64()
+    );
     for level in [1, 2, 3, 8, 15, 20, 25] {
         let error = nu[level as usize - 1] / exact(level) - 1.0;
         println!("level {level}: {error:.1e}");

@@ -33,19 +33,36 @@ const MOUNTINGS: [[f64; 3]; 12] = [
 ];
 
 fn rotation([roll, pitch, yaw]: [f64; 3]) -> DQuat {
-    RollPitchYaw { roll: roll * DEG, pitch: pitch * DEG, yaw: yaw * DEG }.to_quat()
+    RollPitchYaw {
+        roll: roll * DEG,
+        pitch: pitch * DEG,
+        yaw: yaw * DEG,
+    }
+    .to_quat()
 }
 
 /// The recording as an IMU mounted like that makes it.
 fn turned(recording: &Recording, q_s_b: DQuat) -> Vec<ImuIncrement> {
     let into = q_s_b.inverse();
-    let turn = |s: &ImuIncrement| ImuIncrement { dtheta: into * s.dtheta, dv: into * s.dv, ..*s };
+    let turn = |s: &ImuIncrement| ImuIncrement {
+        dtheta: into * s.dtheta,
+        dv: into * s.dv,
+        ..*s
+    };
     recording.imu.iter().map(turn).collect()
 }
 
 fn found(recording: &Recording, q_s_b: DQuat) -> Result<Mounting, MountingError> {
     let imu = turned(recording, q_s_b);
-    find(&Recorded { imu: &imu, gnss: &recording.gnss, aids: &[] }, &settings(), &belief())
+    find(
+        &Recorded {
+            imu: &imu,
+            gnss: &recording.gnss,
+            aids: &[],
+        },
+        &settings(),
+        &belief(),
+    )
 }
 
 fn land_vehicle() -> Trajectory {
@@ -61,7 +78,11 @@ fn off(mounting: &Mounting, truth: DQuat) -> DVec3 {
 fn is_as_good_as_it_says(mounting: &Mounting, truth: DQuat) {
     let off = off(mounting, truth);
     println!("off {} deg, sigma {:?}", off / DEG, mounting.sigma_deg());
-    assert!((off / mounting.sigma_b).abs().max_element() < 3.0, "{} {mounting:?}", off / DEG);
+    assert!(
+        (off / mounting.sigma_b).abs().max_element() < 3.0,
+        "{} {mounting:?}",
+        off / DEG
+    );
     assert!(mounting.sigma_b.max_element() < 3.0 * DEG, "{mounting:?}");
 }
 
@@ -81,7 +102,11 @@ fn twelve_mountings_are_found_and_fused_with() {
         assert!(rotation(mounting.angles_deg()).angle_between(mounting.q_s_b) < 1e-6);
 
         let imu = turned(recording, truth);
-        let data = Recorded { imu: &imu, gnss: &recording.gnss, aids: &[] };
+        let data = Recorded {
+            imu: &imu,
+            gnss: &recording.gnss,
+            aids: &[],
+        };
         let settings = Settings {
             q_s_b: mounting.q_s_b,
             mounting_sigma_b: mounting.sigma_b,
@@ -91,7 +116,11 @@ fn twelve_mountings_are_found_and_fused_with() {
         let start = coarse(&data, &settings, &belief()).unwrap().start;
         let solution = fuse(&data, &belief(), &start, &settings, Some(&reference)).unwrap();
         for (sum, look) in nees.iter_mut().zip(looks) {
-            let row = solution.rows.iter().find(|row| row.t_s >= f64::from(look)).unwrap();
+            let row = solution
+                .rows
+                .iter()
+                .find(|row| row.t_s >= f64::from(look))
+                .unwrap();
             *sum += row.error.unwrap().nees;
         }
     });
@@ -120,17 +149,34 @@ fn a_drive_that_does_not_show_it_is_refused() {
         refusal.unwrap()
     };
     let stands = refusal(&[(200.0, 0.0, 0.0)], Some(0.1));
-    assert!(matches!(stands, MountingError::TooSlow { seconds: 0.0, .. }), "{stands}");
+    assert!(
+        matches!(stands, MountingError::TooSlow { seconds: 0.0, .. }),
+        "{stands}"
+    );
     let short = refusal(&[(10.0, 1.0, 0.0), (60.0, 0.0, 0.02)], Some(0.1));
     assert!(matches!(short, MountingError::TooSlow { .. }), "{short}");
     let straight = |accelerate_s: f64| [(accelerate_s, 0.05, 0.0), (400.0, 0.0, 0.0)];
     let even = refusal(&straight(100.0), Some(0.6));
-    assert!(matches!(even, MountingError::NotDetermined { .. }), "{even}");
+    assert!(
+        matches!(even, MountingError::NotDetermined { .. }),
+        "{even}"
+    );
     // as far backwards as forwards, round and round
-    let forwards = [(4.0, 1.5, 0.0), (60.0, 0.0, 0.05), (4.0, -1.5, 0.0), (5.0, 0.0, 0.0)];
+    let forwards = [
+        (4.0, 1.5, 0.0),
+        (60.0, 0.0, 0.05),
+        (4.0, -1.5, 0.0),
+        (5.0, 0.0, 0.0),
+    ];
     let backwards = forwards.map(|(seconds, accel, curve)| (seconds, -accel, curve));
-    let both = refusal(&[forwards, backwards, forwards, backwards].concat(), Some(0.1));
-    let is_told = matches!(both, MountingError::Directions { .. } | MountingError::NotDetermined { .. });
+    let both = refusal(
+        &[forwards, backwards, forwards, backwards].concat(),
+        Some(0.1),
+    );
+    let is_told = matches!(
+        both,
+        MountingError::Directions { .. } | MountingError::NotDetermined { .. }
+    );
     assert!(is_told, "{both}");
 }
 
@@ -139,7 +185,10 @@ fn a_drive_that_does_not_show_it_is_refused() {
 fn an_aircraft_is_refused() {
     recorded(&shipped("fixed_wing.toml"), Some(0.1), 1, |_, recording| {
         let refusal = found(recording, rotation(MOUNTINGS[0])).unwrap_err();
-        assert!(matches!(refusal, MountingError::Banks { bank_deg } if bank_deg < 35.0), "{refusal}");
+        assert!(
+            matches!(refusal, MountingError::Banks { bank_deg } if bank_deg < 35.0),
+            "{refusal}"
+        );
     });
 }
 
@@ -148,7 +197,12 @@ fn an_aircraft_is_refused() {
 fn some_way_backwards_does_not_matter() {
     let mut steps: Vec<Step> = vec![(10.0, 0.0, 0.0)];
     for turn in [0.03, -0.04, 0.05, -0.02, 0.04, -0.05] {
-        steps.extend([(5.0, -0.9, 0.0), (5.0, 0.0, turn), (5.0, 0.9, 0.0), (3.0, 0.0, 0.0)]);
+        steps.extend([
+            (5.0, -0.9, 0.0),
+            (5.0, 0.0, turn),
+            (5.0, 0.9, 0.0),
+            (3.0, 0.0, 0.0),
+        ]);
         steps.extend([
             (8.0, 1.3, 0.0),
             (25.0, 0.0, turn),
@@ -158,7 +212,12 @@ fn some_way_backwards_does_not_matter() {
         ]);
     }
     // level attitudes beside the road's are part of the mounting: a body that leans by 1° and looks down by 2°
-    let body = RollPitchYaw { roll: 1.0 * DEG, pitch: -2.0 * DEG, yaw: 0.0 }.to_quat();
+    let body = RollPitchYaw {
+        roll: 1.0 * DEG,
+        pitch: -2.0 * DEG,
+        yaw: 0.0,
+    }
+    .to_quat();
     recorded(&trajectory(&steps), Some(0.1), 2, |run, recording| {
         let truth = rotation(MOUNTINGS[3 + run as usize]);
         is_as_good_as_it_says(&found(recording, truth).unwrap(), body * truth);
@@ -173,9 +232,19 @@ fn a_filter_that_is_wrong_says_nothing_wrong() {
     recorded(&land_vehicle(), Some(0.1), 4, |run, recording| {
         let truth = rotation(MOUNTINGS[6 + run as usize]);
         let imu = turned(recording, truth);
-        match find(&Recorded { imu: &imu, gnss: &recording.gnss, aids: &[] }, &settings(), &careless) {
+        match find(
+            &Recorded {
+                imu: &imu,
+                gnss: &recording.gnss,
+                aids: &[],
+            },
+            &settings(),
+            &careless,
+        ) {
             Ok(mounting) => is_as_good_as_it_says(&mounting, truth),
-            Err(MountingError::Contradicted { .. } | MountingError::Disagree { .. }) => refused += 1,
+            Err(MountingError::Contradicted { .. } | MountingError::Disagree { .. }) => {
+                refused += 1
+            }
             Err(other) => panic!("{other}"),
         }
     });

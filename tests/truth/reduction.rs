@@ -12,7 +12,9 @@ use std::path::Path;
 /// What the filter of a model does on a trajectory with outages.
 fn assessed(model: &str, trajectory: &str, outages: &[Outage], reduction: Reduction) -> Assessment {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let model = model_file::read(&root.join(format!("calib_data/{model}.toml"))).unwrap().model;
+    let model = model_file::read(&root.join(format!("calib_data/{model}.toml")))
+        .unwrap()
+        .model;
     let path = root.join(format!("trajectories/{trajectory}.toml"));
     let (path, _) = load(&path, &Options::default()).unwrap();
     let mut scenario = Scenario::default();
@@ -27,13 +29,24 @@ fn cell(model: &str, trajectory: &str, outages: &[Outage], reduction: Reduction)
     let computed = assessed(model, trajectory, outages, reduction);
     let ratios = || computed.outage_ends.iter().flat_map(|e| e.ratio());
     let nees = computed.reports.iter().map(|r| r.nees).sum::<f64>() / computed.reports.len() as f64;
-    [ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max), nees]
+    [
+        ratios().fold(f64::INFINITY, f64::min),
+        ratios().fold(0.0, f64::max),
+        nees,
+    ]
 }
 
 /// Two outages of a length.
 fn outages(seconds: f64) -> [Outage; 2] {
-    let starts: [f64; 2] = if seconds > 100.0 { [200.0, 550.0] } else { [300.0, 700.0] };
-    starts.map(|start_s| Outage { start_s, end_s: start_s + seconds })
+    let starts: [f64; 2] = if seconds > 100.0 {
+        [200.0, 550.0]
+    } else {
+        [300.0, 700.0]
+    };
+    starts.map(|start_s| Outage {
+        start_s,
+        end_s: start_s + seconds,
+    })
 }
 
 fn is_honest([low, high, nees]: [f64; 3]) -> bool {
@@ -48,9 +61,17 @@ fn the_default_filter_is_honest_and_that_by_wavelet_variance_is_not() {
         ("tactical", "figure_eight", 90.0),
     ] {
         let found = cell(model, trajectory, &outages(seconds), Reduction::Covariance);
-        assert!(is_honest(found), "{model} {trajectory} {seconds} s: {found:?}");
+        assert!(
+            is_honest(found),
+            "{model} {trajectory} {seconds} s: {found:?}"
+        );
     }
-    let wavelet = cell("consumer_mems", "land_vehicle", &outages(90.0), Reduction::Wavelet);
+    let wavelet = cell(
+        "consumer_mems",
+        "land_vehicle",
+        &outages(90.0),
+        Reduction::Wavelet,
+    );
     assert!(wavelet[1] > 1.4 && wavelet[2] > 10.0, "{wavelet:?}");
 }
 
@@ -65,7 +86,11 @@ fn a_model_of_fifteen_states_is_its_own_reduction() {
     };
     let model = Model::pooled(100.0, &axis(5.4e-5, 3.3e-11), &axis(1e-8, 1e-14));
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let (path, _) = load(&root.join("trajectories/land_vehicle.toml"), &Options::default()).unwrap();
+    let (path, _) = load(
+        &root.join("trajectories/land_vehicle.toml"),
+        &Options::default(),
+    )
+    .unwrap();
     let (scenario, outages) = (Scenario::default(), outages(90.0));
     let track = scenario.track(&path, &model, &outages).unwrap();
     let end = |scenario: &Scenario| {
@@ -74,7 +99,10 @@ fn a_model_of_fifteen_states_is_its_own_reduction() {
     };
     let (reduced, full) = (end(&scenario), end(&scenario.with_full_noise()));
     assert!((reduced.nees - 9.0).abs() < 1e-6, "{reduced:?}");
-    assert!((0..9).all(|i| (reduced.rmse[i] / full.rmse[i] - 1.0).abs() < 1e-12), "{reduced:?} {full:?}");
+    assert!(
+        (0..9).all(|i| (reduced.rmse[i] / full.rmse[i] - 1.0).abs() < 1e-12),
+        "{reduced:?} {full:?}"
+    );
 }
 
 /// One early outage: what is chosen for its end may not give the rest of the drive away. Root mean square of error over
@@ -86,13 +114,25 @@ fn one_early_outage_does_not_give_the_drive_away() {
         ("consumer_mems", "figure_eight", (60.0, 90.0)),
         ("tactical", "figure_eight", (120.0, 180.0)),
     ] {
-        let outages = [Outage { start_s: outage.0, end_s: outage.1 }];
+        let outages = [Outage {
+            start_s: outage.0,
+            end_s: outage.1,
+        }];
         let computed = assessed(model, trajectory, &outages, Reduction::Covariance);
-        let squares = |i: usize| computed.reports.iter().map(|r| r.ratio()[i].powi(2)).sum::<f64>();
+        let squares = |i: usize| {
+            computed
+                .reports
+                .iter()
+                .map(|r| r.ratio()[i].powi(2))
+                .sum::<f64>()
+        };
         let over_the_way = |i: usize| (squares(i) / computed.reports.len() as f64).sqrt();
         let farthest = (0..9).map(over_the_way).fold(0.0, f64::max);
         // a fifth: what one bias an axis leaves, see docs/limits.md
-        assert!(farthest < 1.2, "{model} {trajectory} {outage:?}: {farthest}");
+        assert!(
+            farthest < 1.2,
+            "{model} {trajectory} {outage:?}: {farthest}"
+        );
     }
 }
 
@@ -101,19 +141,26 @@ fn one_early_outage_does_not_give_the_drive_away() {
 #[ignore = "24 cells, a minute"]
 fn every_imu_trajectory_and_outage() {
     let mut dishonest = Vec::new();
-    println!("| IMU | trajectory | outages | RMSE / sigma at their ends | NEES |\n|---|---|---|---|---|");
+    println!(
+        "| IMU | trajectory | outages | RMSE / sigma at their ends | NEES |\n|---|---|---|---|---|"
+    );
     for model in ["consumer_mems", "tactical"] {
         for trajectory in ["land_vehicle", "figure_eight", "fixed_wing"] {
             for seconds in [10.0, 30.0, 90.0, 300.0] {
                 let found = cell(model, trajectory, &outages(seconds), Reduction::Covariance);
                 let [low, high, nees] = found;
-                println!("| {model} | {trajectory} | 2 of {seconds} s | {low:.3} to {high:.3} | {nees:.2} |");
+                println!(
+                    "| {model} | {trajectory} | 2 of {seconds} s | {low:.3} to {high:.3} | {nees:.2} |"
+                );
                 if !is_honest(found) {
                     dishonest.push((model, trajectory, seconds, found));
                 }
             }
         }
     }
-    println!("figure reduction: {} of 24 cells beyond 10 %", dishonest.len());
+    println!(
+        "figure reduction: {} of 24 cells beyond 10 %",
+        dishonest.len()
+    );
     assert!(dishonest.is_empty(), "{dishonest:?}");
 }

@@ -3,7 +3,8 @@
 use nav_sim::formats::datasheet::{Figure, catalogued};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::require::{
-    Answer, Course, Drift, IMU_PARAMETERS, Limit, Margins, Need, Part, PartMargin, Quantity, RequireError,
+    Answer, Course, Drift, IMU_PARAMETERS, Limit, Margins, Need, Part, PartMargin, Quantity,
+    RequireError,
 };
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
@@ -13,21 +14,58 @@ use nav_sim::navigation::trajectory::profile::{
     Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
 };
 use nav_sim::signal::imu::Sensor;
-use nav_sim::signal::noise::{Ar1, Composite, Drift as NoiseDrift, GaussMarkov, Model, Process, White};
+use nav_sim::signal::noise::{
+    Ar1, Composite, Drift as NoiseDrift, GaussMarkov, Model, Process, White,
+};
 use nav_sim_navigation::simulation::REPORTED;
 use nav_sim_navigation::simulation::lincov::{FilterPass, Track, TruthSide};
 
-const OUTAGE: Outage = Outage { start_s: 150.0, end_s: 190.0 };
+const OUTAGE: Outage = Outage {
+    start_s: 150.0,
+    end_s: 190.0,
+};
 
 /// Three minutes of town traffic.
 fn trajectory() -> Trajectory {
-    let faster = |to_speed: f64| Kind::Accelerate { to_speed, by: Acceleration::Duration(10.0) };
-    let turn = |deg: f64| Kind::Turn { angle: deg.to_radians(), by: Turning::Duration(9.0) };
-    let block = [faster(14.0), Kind::Straight(Length::Duration(14.0)), turn(90.0), faster(6.0), turn(-60.0)];
+    let faster = |to_speed: f64| Kind::Accelerate {
+        to_speed,
+        by: Acceleration::Duration(10.0),
+    };
+    let turn = |deg: f64| Kind::Turn {
+        angle: deg.to_radians(),
+        by: Turning::Duration(9.0),
+    };
+    let block = [
+        faster(14.0),
+        Kind::Straight(Length::Duration(14.0)),
+        turn(90.0),
+        faster(6.0),
+        turn(-60.0),
+    ];
     let segments = block.into_iter().cycle().take(20);
-    let segments = segments.map(|kind| Segment { kind, climb_m: 0.0, ramp_s: None }).collect();
-    let start = Start { t_s: 0.0, lat: 0.8, lon: 0.1, h: 0.0, heading: 0.7, speed: 0.0 };
-    Profile { start, bank: Bank::None, ramp_s: 1.0, segments }.build().unwrap()
+    let segments = segments
+        .map(|kind| Segment {
+            kind,
+            climb_m: 0.0,
+            ramp_s: None,
+        })
+        .collect();
+    let start = Start {
+        t_s: 0.0,
+        lat: 0.8,
+        lon: 0.1,
+        h: 0.0,
+        heading: 0.7,
+        speed: 0.0,
+    };
+    Profile {
+        start,
+        bank: Bank::None,
+        ramp_s: 1.0,
+        segments,
+    }
+    .build()
+    .unwrap()
 }
 
 fn limit(quantity: Quantity, most: f64) -> [Limit; 1] {
@@ -42,23 +80,52 @@ fn the_imu_that_is_named_meets_the_limit_in_sampled_runs() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
     let course = Course::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
     let limits = limit(Quantity::P95, 12.0);
-    let need = Need { course: &course, scenario: &scenario, limits: &limits, t_corr_s: 300.0 };
+    let need = Need {
+        course: &course,
+        scenario: &scenario,
+        limits: &limits,
+        t_corr_s: 300.0,
+    };
     let (imu, shares) = need.allocated().unwrap();
     let quarter = (1.0 - shares[IMU_PARAMETERS]) / 4.0;
-    assert!(shares[..IMU_PARAMETERS].iter().all(|share| (share / quarter - 1.0).abs() < 0.1), "{shares:?}");
+    assert!(
+        shares[..IMU_PARAMETERS]
+            .iter()
+            .all(|share| (share / quarter - 1.0).abs() < 0.1),
+        "{shares:?}"
+    );
     let model = imu.model(scenario.imu.rate_hz);
     let full = scenario.with_full_noise();
     let track = scenario.track(&trajectory, &model, &[OUTAGE]).unwrap();
     let beliefs = [full.belief(&model, &[OUTAGE], &track).unwrap()];
     let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &[OUTAGE], 5);
     let result = &monte_carlo::run(&experiment, 400, &|_| {}).unwrap()[0];
-    let within = result.runs.iter().filter(|r| r.outages[0].horizontal_error_end_m <= 12.0).count();
-    assert!((within as f64 / 400.0 - 0.95).abs() < 0.044, "{within} of 400, {imu:?}");
+    let within = result
+        .runs
+        .iter()
+        .filter(|r| r.outages[0].horizontal_error_end_m <= 12.0)
+        .count();
+    assert!(
+        (within as f64 / 400.0 - 0.95).abs() < 0.044,
+        "{within} of 400, {imu:?}"
+    );
     let margins = Margins::of(&course, &scenario, &model, &limits).unwrap();
-    assert!(margins.met() && margins.worst.value / 12.0 > 0.9975, "{margins:?}");
-    let of_imu: Vec<&PartMargin> = margins.parts.iter().filter(|p| p.part.is_of_imu()).collect();
+    assert!(
+        margins.met() && margins.worst.value / 12.0 > 0.9975,
+        "{margins:?}"
+    );
+    let of_imu: Vec<&PartMargin> = margins
+        .parts
+        .iter()
+        .filter(|p| p.part.is_of_imu())
+        .collect();
     assert!(of_imu.len() == 4 && margins.parts.len() == 6, "{margins:?}");
-    assert!(of_imu.iter().all(|p| p.factor.is_some_and(|f| (f - 1.0).abs() < 0.02)), "{margins:?}");
+    assert!(
+        of_imu
+            .iter()
+            .all(|p| p.factor.is_some_and(|f| (f - 1.0).abs() < 0.02)),
+        "{margins:?}"
+    );
 }
 
 /// A tighter limit needs a better IMU in every intensity; one intensity alone may be larger than beside others; on the
@@ -68,23 +135,44 @@ fn answers_are_monotone() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
     let course = Course::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
     let limits = [limit(Quantity::P95, 30.0), limit(Quantity::P95, 10.0)];
-    let need = |k: usize| Need { course: &course, scenario: &scenario, limits: &limits[k], t_corr_s: 300.0 };
+    let need = |k: usize| Need {
+        course: &course,
+        scenario: &scenario,
+        limits: &limits[k],
+        t_corr_s: 300.0,
+    };
     let [loose, tight] = [0, 1].map(|k| need(k).allocated().unwrap().0);
-    assert!(loose.values.iter().zip(tight.values).all(|(l, t)| *l > t), "{loose:?} {tight:?}");
+    assert!(
+        loose.values.iter().zip(tight.values).all(|(l, t)| *l > t),
+        "{loose:?} {tight:?}"
+    );
     for i in 0..IMU_PARAMETERS {
         let beside = need(0).alone(&loose, i, 0.1).unwrap();
         let alone = need(0).quite_alone(&loose, i).unwrap();
         let (Answer::AtMost(beside), Answer::AtMost(alone)) = (beside, alone) else {
             panic!("{beside:?} {alone:?}")
         };
-        assert!(loose.values[i] < beside && beside <= alone, "{i}: {} {beside} {alone}", loose.values[i]);
+        assert!(
+            loose.values[i] < beside && beside <= alone,
+            "{i}: {} {beside} {alone}",
+            loose.values[i]
+        );
     }
     let curve = need(0).iso_drift(&loose, 4).unwrap().points;
     let walks: Vec<f64> = curve
         .iter()
-        .map(|(_, walk)| if let Answer::AtMost(walk) = walk { *walk } else { panic!("{curve:?}") })
+        .map(|(_, walk)| {
+            if let Answer::AtMost(walk) = walk {
+                *walk
+            } else {
+                panic!("{curve:?}")
+            }
+        })
         .collect();
-    assert!(walks.windows(2).all(|w| w[1] < w[0]) && curve.windows(2).all(|c| c[1].0 > c[0].0), "{curve:?}");
+    assert!(
+        walks.windows(2).all(|w| w[1] < w[0]) && curve.windows(2).all(|c| c[1].0 > c[0].0),
+        "{curve:?}"
+    );
 }
 
 #[test]
@@ -92,8 +180,15 @@ fn what_gnss_alone_misses_is_refused() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
     let course = Course::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
     let limits = limit(Quantity::Rmse, 0.05);
-    let need = Need { course: &course, scenario: &scenario, limits: &limits, t_corr_s: 300.0 };
-    let Err(RequireError::Floor { value, .. }) = need.allocated() else { panic!("an IMU for 5 cm") };
+    let need = Need {
+        course: &course,
+        scenario: &scenario,
+        limits: &limits,
+        t_corr_s: 300.0,
+    };
+    let Err(RequireError::Floor { value, .. }) = need.allocated() else {
+        panic!("an IMU for 5 cm")
+    };
     assert!(value > 0.05);
 }
 
@@ -102,20 +197,35 @@ fn what_gnss_alone_misses_is_refused() {
 #[test]
 fn the_imu_that_is_named_keeps_the_limit_at_every_beginning() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
-    let begins = |start_s: u32| Outage { start_s: start_s.into(), end_s: f64::from(start_s) + 20.0 };
+    let begins = |start_s: u32| Outage {
+        start_s: start_s.into(),
+        end_s: f64::from(start_s) + 20.0,
+    };
     let outages: Vec<Outage> = (60..=160).map(begins).collect();
     let course = Course::new(&scenario, &trajectory, &outages).unwrap();
     for most in [3.0, 10.0] {
         let limits = limit(Quantity::P95, most);
-        let need = Need { course: &course, scenario: &scenario, limits: &limits, t_corr_s: 300.0 };
+        let need = Need {
+            course: &course,
+            scenario: &scenario,
+            limits: &limits,
+            t_corr_s: 300.0,
+        };
         let model = need.allocated().unwrap().0.model(scenario.imu.rate_hz);
         let drifts = course.drifts(&scenario, &model).unwrap();
         let (place, worst) = Drift::largest(&drifts, Quantity::P95).unwrap();
-        assert!((0.9975..=1.0).contains(&(worst / most)), "{worst} of {most} at {:?}", outages[place]);
+        assert!(
+            (0.9975..=1.0).contains(&(worst / most)),
+            "{worst} of {most} at {:?}",
+            outages[place]
+        );
         let values: Vec<f64> = drifts.iter().map(|d| d.value(Quantity::P95)).collect();
         assert_eq!(worst, values.iter().copied().fold(0.0, f64::max));
         let least = values.iter().copied().fold(f64::MAX, f64::min);
-        assert!(least < 0.95 * worst, "the beginnings must differ: {least} {worst}");
+        assert!(
+            least < 0.95 * worst,
+            "the beginnings must differ: {least} {worst}"
+        );
     }
 }
 
@@ -124,10 +234,18 @@ fn the_imu_that_is_named_keeps_the_limit_at_every_beginning() {
 fn the_imu_that_is_named_keeps_the_limit_in_the_steps_of_a_run() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
     for (start_s, length_s) in [(133.0, 5.0), (120.0, 10.0), (100.0, 20.0), (150.0, 40.0)] {
-        let outages = [Outage { start_s, end_s: start_s + length_s }];
+        let outages = [Outage {
+            start_s,
+            end_s: start_s + length_s,
+        }];
         let course = Course::new(&scenario, &trajectory, &outages).unwrap();
         let limits = limit(Quantity::Rmse, 1.0 + 0.005 * length_s * length_s);
-        let need = Need { course: &course, scenario: &scenario, limits: &limits, t_corr_s: 300.0 };
+        let need = Need {
+            course: &course,
+            scenario: &scenario,
+            limits: &limits,
+            t_corr_s: 300.0,
+        };
         let model = need.allocated().unwrap().0.model(scenario.imu.rate_hz);
         let track = scenario.track(&trajectory, &model, &outages).unwrap();
         let end = end_of_outage(&scenario, &trajectory, &model, &outages, &track);
@@ -142,7 +260,10 @@ fn white_noise_does_not_know_the_length_of_steps() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
     let white = |sigma2| Composite::new(vec![Process::White(White::new(sigma2).unwrap())]);
     let model = Model::pooled(scenario.imu.rate_hz, &white(1e-3), &white(1e-7));
-    let outages = [Outage { start_s: 133.0, end_s: 138.0 }];
+    let outages = [Outage {
+        start_s: 133.0,
+        end_s: 138.0,
+    }];
     let track = scenario.track(&trajectory, &model, &outages).unwrap();
     let at_end = |track: &Track| end_of_outage(&scenario, &trajectory, &model, &outages, track);
     for (fine, merged) in at_end(&track).into_iter().zip(at_end(&track.merged())) {
@@ -158,10 +279,15 @@ fn end_of_outage(
     outage: &[Outage],
     track: &Track,
 ) -> [f64; REPORTED] {
-    let belief = scenario.with_full_noise().belief(model, outage, track).unwrap();
+    let belief = scenario
+        .with_full_noise()
+        .belief(model, outage, track)
+        .unwrap();
     let experiment = scenario.experiment(trajectory, Truth::Model(model), &[], outage, 1);
     let truth = TruthSide::together(&TruthSide::sources(&experiment, model));
-    FilterPass::new(track, &belief).errors_at_ends(&truth)[0].errors.rmse()
+    FilterPass::new(track, &belief).errors_at_ends(&truth)[0]
+        .errors
+        .rmse()
 }
 
 /// What a pass along the trajectory with one outage alone finds: outages that overlap, that begin between fixes or within
@@ -177,17 +303,35 @@ fn outages_beside_one_another_are_as_each_alone() {
         ]);
         let model = Model::pooled(scenario.imu.rate_hz, &axis, &axis);
         let end_s = trajectory.end_s();
-        let outages = [(150.0, 190.0), (100.5, 130.25), (140.0, 170.0), (0.5, 30.0), (end_s - 20.0, end_s)];
+        let outages = [
+            (150.0, 190.0),
+            (100.5, 130.25),
+            (140.0, 170.0),
+            (0.5, 30.0),
+            (end_s - 20.0, end_s),
+        ];
         let outages = outages.map(|(start_s, end_s)| Outage { start_s, end_s });
-        let drifts =
-            Course::new(&scenario, &trajectory, &outages).unwrap().drifts(&scenario, &model).unwrap();
+        let drifts = Course::new(&scenario, &trajectory, &outages)
+            .unwrap()
+            .drifts(&scenario, &model)
+            .unwrap();
         for (outage, drift) in outages.iter().map(std::slice::from_ref).zip(drifts) {
-            let track = scenario.track(&trajectory, &model, outage).unwrap().merged();
+            let track = scenario
+                .track(&trajectory, &model, outage)
+                .unwrap()
+                .merged();
             let alone = end_of_outage(&scenario, &trajectory, &model, outage, &track);
-            let found = [drift.value(Quantity::Rmse), drift.angles_deg[0], drift.angles_deg[2]];
+            let found = [
+                drift.value(Quantity::Rmse),
+                drift.angles_deg[0],
+                drift.angles_deg[2],
+            ];
             let expected = [alone[0].hypot(alone[1]), alone[6], alone[8]];
             assert!(
-                found.iter().zip(expected).all(|(f, e)| (f / e - 1.0).abs() < 1e-9),
+                found
+                    .iter()
+                    .zip(expected)
+                    .all(|(f, e)| (f / e - 1.0).abs() < 1e-9),
                 "{outage:?} {drift:?}"
             );
         }
@@ -200,14 +344,23 @@ fn outages_beside_one_another_are_as_each_alone() {
 fn a_curve_holds_the_ends_of_all_shorter_outages() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
     let limits = limit(Quantity::P95, 20.0);
-    let course = |end_s: f64| Course::new(&scenario, &trajectory, &[Outage { end_s, ..OUTAGE }]).unwrap();
+    let course =
+        |end_s: f64| Course::new(&scenario, &trajectory, &[Outage { end_s, ..OUTAGE }]).unwrap();
     let at_end = course(170.0);
-    let need = Need { course: &at_end, scenario: &scenario, limits: &limits, t_corr_s: 300.0 };
+    let need = Need {
+        course: &at_end,
+        scenario: &scenario,
+        limits: &limits,
+        t_corr_s: 300.0,
+    };
     let model = need.allocated().unwrap().0.model(scenario.imu.rate_hz);
     let end = at_end.drifts(&scenario, &model).unwrap()[0].value(Quantity::P95);
     let curve = &course(190.0).curves(&scenario, &model).unwrap()[0];
     let short = curve.iter().find(|drift| drift.after_s == 20.0).unwrap();
-    assert!((short.value(Quantity::P95) / end - 1.0).abs() < 1e-9, "{short:?} {end}");
+    assert!(
+        (short.value(Quantity::P95) / end - 1.0).abs() < 1e-9,
+        "{short:?} {end}"
+    );
     assert!(curve.last().is_some_and(|drift| drift.after_s == 40.0) && curve.len() == 40);
 }
 
@@ -243,7 +396,13 @@ fn the_shares_of_an_imu_with_a_drift_sum_to_one() {
     ]);
     let model = Model::pooled(scenario.imu.rate_hz, &axis, &axis);
     let margins = Margins::of(&course, &scenario, &model, &limit(Quantity::Rmse, 50.0)).unwrap();
-    assert!(margins.parts.iter().any(|p| p.part == Part::Drift && p.share > 0.0), "{margins:?}");
+    assert!(
+        margins
+            .parts
+            .iter()
+            .any(|p| p.part == Part::Drift && p.share > 0.0),
+        "{margins:?}"
+    );
     let sum: f64 = margins.parts.iter().map(|p| p.share).sum();
     assert!((sum - 1.0).abs() < 1e-9, "{margins:?}");
 }
@@ -257,7 +416,10 @@ fn a_turn_on_bias_decides_where_it_is_the_largest_part() {
     let axis = |sigma2| Composite::new(vec![Process::White(White::new(sigma2).unwrap())]);
     let model = Model::pooled(scenario.imu.rate_hz, &axis(1e-8), &axis(1e-14));
     // before the first fix nothing is known of the bias: 0.1 m/s² moves by 20 m in 20 s on each axis
-    let start = [Outage { start_s: 0.0, end_s: 20.0 }];
+    let start = [Outage {
+        start_s: 0.0,
+        end_s: 20.0,
+    }];
     let margins = |scenario: &Scenario| {
         let course = Course::new(scenario, &trajectory, &start).unwrap();
         Margins::of(&course, scenario, &model, &limit(Quantity::Rmse, 6.0)).unwrap()
@@ -265,12 +427,21 @@ fn a_turn_on_bias_decides_where_it_is_the_largest_part() {
     scenario.initial.att_sigma_deg = [1e-3; 3];
     scenario.initial.vel_sigma_m_s = [1e-3; 3];
     scenario.initial.pos_sigma_m = [1e-2; 3];
-    (scenario.imu.turn_on_bias_accel_m_s2, scenario.initial.accel_bias_sigma_m_s2) = (Some(0.1), Some(0.1));
+    (
+        scenario.imu.turn_on_bias_accel_m_s2,
+        scenario.initial.accel_bias_sigma_m_s2,
+    ) = (Some(0.1), Some(0.1));
     let biased = margins(&scenario);
     let error = 0.1 * 20.0_f64.powi(2) / 2.0 * 2.0_f64.sqrt();
-    assert!((biased.worst.value / error - 1.0).abs() < 0.01, "{biased:?} {error}");
+    assert!(
+        (biased.worst.value / error - 1.0).abs() < 0.01,
+        "{biased:?} {error}"
+    );
     let binding = biased.binding().unwrap();
-    assert!(binding.part == Part::TurnOn(Sensor::Accel) && binding.share > 0.99, "{biased:?}");
+    assert!(
+        binding.part == Part::TurnOn(Sensor::Accel) && binding.share > 0.99,
+        "{biased:?}"
+    );
     assert!(
         (binding.factor.unwrap() * error / 6.0 - 1.0).abs() < 0.02 && biased.an_imu_helps(),
         "{biased:?}"
@@ -279,26 +450,40 @@ fn a_turn_on_bias_decides_where_it_is_the_largest_part() {
     scenario.initial.vel_sigma_m_s = [10.0; 3];
     let fast = margins(&scenario);
     assert_eq!(fast.binding().unwrap().part, Part::Start);
-    assert!((fast.without_imu.value / (200.0 * 2.0_f64.sqrt()) - 1.0).abs() < 0.01, "{fast:?}");
-    assert!(!fast.an_imu_helps() && fast.share_of_imu() < 0.05, "{fast:?}");
+    assert!(
+        (fast.without_imu.value / (200.0 * 2.0_f64.sqrt()) - 1.0).abs() < 0.01,
+        "{fast:?}"
+    );
+    assert!(
+        !fast.an_imu_helps() && fast.share_of_imu() < 0.05,
+        "{fast:?}"
+    );
 }
 
 /// White noise and flicker noise whose Allan deviation together is lowest at `floor`, up to 568 s: eight Gauss-Markov
 /// processes of one variance, a factor of four apart from 0.25 s on, are level to 4 % from 2 s to 568 s.
 fn flicker_noise(density: f64, floor: f64) -> Composite {
     let noise = |s2: f64| {
-        let process = |k: i32| Process::GaussMarkov(GaussMarkov::new(0.25_f64.powi(k), s2, 100.0).unwrap());
+        let process =
+            |k: i32| Process::GaussMarkov(GaussMarkov::new(0.25_f64.powi(k), s2, 100.0).unwrap());
         let white = Process::White(White::new(density * density * 100.0).unwrap());
         Composite::new(std::iter::once(white).chain((-1..7).map(process)).collect())
     };
     let lowest = |s2: f64| {
         let times = (8..74).map(|k| 100.0 * 2.0_f64.powf(f64::from(k) / 8.0));
-        times.map(|m| noise(s2).allan_variance(m as u32)).fold(f64::MAX, f64::min).sqrt()
+        times
+            .map(|m| noise(s2).allan_variance(m as u32))
+            .fold(f64::MAX, f64::min)
+            .sqrt()
     };
     let (mut low, mut high) = (0.0, 10.0 * floor * floor);
     for _ in 0..50 {
         let middle = 0.5 * (low + high);
-        if lowest(middle) < floor { low = middle } else { high = middle }
+        if lowest(middle) < floor {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     noise(high)
 }
@@ -314,12 +499,16 @@ fn a_datasheet_is_not_read_optimistically() {
     let p95 = |model: &Model| course.drifts(&scenario, model).unwrap()[0].value(Quantity::P95);
     for name in ["vn100", "adis16488"] {
         let sheet = catalogued(name).unwrap().unwrap();
-        let figures = |s| [Figure::Noise, Figure::Bias].map(|figure| sheet.value(s, figure).unwrap());
+        let figures =
+            |s| [Figure::Noise, Figure::Bias].map(|figure| sheet.value(s, figure).unwrap());
         let [[n_a, b_a], [n_g, b_g]] = Sensor::ALL.map(figures);
         let truth = Model::pooled(100.0, &flicker_noise(n_a, b_a), &flicker_noise(n_g, b_g));
         let model = sheet.model_file(100.0).unwrap().file.model;
         let above = [(n_a, b_a), (n_g, b_g)].map(|(n, b)| (1.0 + n * n / (567.8 * b * b)).sqrt());
         let ratio = p95(&model) / p95(&truth);
-        assert!(ratio > 1.0 / 1.04 && ratio < 1.075 * above[0].max(above[1]), "{name}: {ratio} {above:?}");
+        assert!(
+            ratio > 1.0 / 1.04 && ratio < 1.075 * above[0].max(above[1]),
+            "{name}: {ratio} {above:?}"
+        );
     }
 }

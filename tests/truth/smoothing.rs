@@ -19,10 +19,17 @@ use nav_sim::signal::noise::{Ar1, Composite, Model, Process, White};
 use nav_sim_navigation::earth::radii;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-const OUTAGE: Outage = Outage { start_s: 300.0, end_s: 390.0 };
+const OUTAGE: Outage = Outage {
+    start_s: 300.0,
+    end_s: 390.0,
+};
 
 fn smoothing() -> Settings {
-    Settings { smooth: true, outages: vec![OUTAGE], ..settings() }
+    Settings {
+        smooth: true,
+        outages: vec![OUTAGE],
+        ..settings()
+    }
 }
 
 fn rows(solution: &Solution) -> &[Row] {
@@ -45,11 +52,16 @@ fn at_rest_the_smoothed_position_is_the_closed_form_of_an_integrated_wiener_proc
          segment = [{ kind = \"straight\", duration_s = 60 }]",
         MODEL,
     );
-    let trajectory =
-        trajectory_file::load(&place.path().join("drive.toml"), &trajectory_file::Options::default())
-            .unwrap()
-            .0;
-    let free = Model { rate_hz: 100.0, axes: Default::default() };
+    let trajectory = trajectory_file::load(
+        &place.path().join("drive.toml"),
+        &trajectory_file::Options::default(),
+    )
+    .unwrap()
+    .0;
+    let free = Model {
+        rate_hz: 100.0,
+        axes: Default::default(),
+    };
     let white = Composite::new(vec![Process::White(White::new(SIGMA2).unwrap())]);
     let believed = Model::pooled(100.0, &white, &Composite::new(Vec::new()));
     let belief = Belief::new(&believed, FilterStates::Full, 1.0, 800.0).unwrap();
@@ -60,9 +72,17 @@ fn at_rest_the_smoothed_position_is_the_closed_form_of_an_integrated_wiener_proc
         att_sigma_deg: [1e-9; 3],
         ..InitialSettings::default()
     };
-    let start = Start { t_s: trajectory.start_s(), state: truth, sigma, found: None };
+    let start = Start {
+        t_s: trajectory.start_s(),
+        state: truth,
+        sigma,
+        found: None,
+    };
     // fixes between the samples too, without a pattern, north and east each its own
-    let times: Vec<f64> = (1..60).filter(|k| !(20..40).contains(k)).map(|k| f64::from(k) + 0.0037).collect();
+    let times: Vec<f64> = (1..60)
+        .filter(|k| !(20..40).contains(k))
+        .map(|k| f64::from(k) + 0.0037)
+        .collect();
     let offset = |k: usize, axis: usize| ((k * 7 + axis * 5 + k * k) % 11) as f64 * 0.4 - 2.0;
     let r = radii(truth.lat.sin());
     let fix = |(k, t_s): (usize, &f64)| GnssFix {
@@ -75,19 +95,34 @@ fn at_rest_the_smoothed_position_is_the_closed_form_of_an_integrated_wiener_proc
     };
     let gnss: Vec<GnssFix> = times.iter().enumerate().map(fix).collect();
     let reference = trajectory.clone().into();
-    let smooth = Settings { smooth: true, ..settings() };
+    let smooth = Settings {
+        smooth: true,
+        ..settings()
+    };
     let mut solution = Solution::default();
-    recorded(&trajectory, &free, &GnssSettings::default(), 1, |recording, _| {
-        let recorded = Recorded { imu: &recording.imu, gnss: &gnss, aids: &[] };
-        solution = fuse(&recorded, &belief, &start, &smooth, Some(&reference)).unwrap();
-    });
+    recorded(
+        &trajectory,
+        &free,
+        &GnssSettings::default(),
+        1,
+        |recording, _| {
+            let recorded = Recorded {
+                imu: &recording.imu,
+                gnss: &gnss,
+                aids: &[],
+            };
+            solution = fuse(&recorded, &belief, &start, &smooth, Some(&reference)).unwrap();
+        },
+    );
     // covariance of positions at two times: the start, and ∫∫ of white acceleration
     let prior = |a: f64, b: f64| {
         let (s, t) = (a.min(b), a.max(b));
         4.0 + 0.25 * a * b + Q * (s * s * t / 2.0 - s * s * s / 6.0)
     };
     let n = times.len();
-    let all = DMatrix::from_fn(n, n, |i, j| prior(times[i], times[j]) + if i == j { 2.25 } else { 0.0 });
+    let all = DMatrix::from_fn(n, n, |i, j| {
+        prior(times[i], times[j]) + if i == j { 2.25 } else { 0.0 }
+    });
     let inverse = all.try_inverse().unwrap();
     let mut worst = [0.0_f64; 2];
     for row in rows(&solution) {
@@ -100,7 +135,10 @@ fn at_rest_the_smoothed_position_is_the_closed_form_of_an_integrated_wiener_proc
             worst[1] = worst[1].max((row.error.unwrap().values[axis] - mean).abs() / sigma);
         }
     }
-    println!("closed form: deviation {:.1e}, mean {:.1e} of a deviation", worst[0], worst[1]);
+    println!(
+        "closed form: deviation {:.1e}, mean {:.1e} of a deviation",
+        worst[0], worst[1]
+    );
     assert!(worst.iter().all(|w| *w < ALLOWED), "{worst:?}");
 }
 
@@ -142,7 +180,9 @@ fn axis(white: f64, biases: impl Iterator<Item = (f64, f64)>) -> Composite {
         Process::Ar1(Ar1::new(phi, sigma * sigma * (1.0 - phi * phi)).unwrap())
     };
     Composite::new(
-        std::iter::once(Process::White(White::new(white).unwrap())).chain(biases.map(ar1)).collect(),
+        std::iter::once(Process::White(White::new(white).unwrap()))
+            .chain(biases.map(ar1))
+            .collect(),
     )
 }
 
@@ -153,17 +193,33 @@ impl Experiment {
         let model = Model::pooled(100.0, &axis(1e-5, of(0)), &axis(1e-8, of(1)));
         let scenario: Scenario = toml::from_str(self.scenario).unwrap();
         assert_eq!(scenario.validate(), Ok(()));
-        let belief = Belief::new(&model, self.states, 1.0, 800.0).unwrap().with_initial(&scenario.initial);
+        let belief = Belief::new(&model, self.states, 1.0, 800.0)
+            .unwrap()
+            .with_initial(&scenario.initial);
         let experiment = scenario.experiment(trajectory, Truth::Model(&model), &[], &[], 23);
         let plan = Plan::new(&experiment).unwrap();
-        let settings = Settings { lever_arm_b: scenario.gnss.lever_arm_m.into(), ..smoothing() };
+        let settings = Settings {
+            lever_arm_b: scenario.gnss.lever_arm_m.into(),
+            ..smoothing()
+        };
         let reference = trajectory.clone().into();
         let solution = |run: u64| {
-            let Recording { imu, gnss, start, .. } = record(&plan, run);
+            let Recording {
+                imu, gnss, start, ..
+            } = record(&plan, run);
             let sigma = scenario.initial.clone();
-            let start = Start { t_s: trajectory.start_s(), state: start, sigma, found: None };
+            let start = Start {
+                t_s: trajectory.start_s(),
+                state: start,
+                sigma,
+                found: None,
+            };
             fuse(
-                &Recorded { imu: &imu, gnss: &gnss, aids: &[] },
+                &Recorded {
+                    imu: &imu,
+                    gnss: &gnss,
+                    aids: &[],
+                },
                 &belief,
                 &start,
                 &settings,
@@ -195,7 +251,10 @@ fn smoothed_errors_are_as_large_as_stated_and_smaller_than_the_filter_s() {
             );
         };
         for look in looks {
-            let nees = solutions.iter().map(|s| rows(s)[look].error.unwrap().nees).sum::<f64>();
+            let nees = solutions
+                .iter()
+                .map(|s| rows(s)[look].error.unwrap().nees)
+                .sum::<f64>();
             inside(nees, 9.0 * RUNS as f64, &format!("NEES at {look} s"), 1e-4);
             for state in 0..9 {
                 let change = |s: &Solution| {
@@ -204,35 +263,66 @@ fn smoothed_errors_are_as_large_as_stated_and_smaller_than_the_filter_s() {
                     moved.powi(2) / (f.sigma[state].powi(2) - s.sigma[state].powi(2))
                 };
                 let sum = solutions.iter().map(change).sum::<f64>();
-                inside(sum, RUNS as f64, &format!("change of state {state} at {look} s"), 1e-5);
+                inside(
+                    sum,
+                    RUNS as f64,
+                    &format!("change of state {state} at {look} s"),
+                    1e-5,
+                );
             }
         }
         let mean_square = |rows: &dyn Fn(&Solution) -> Vec<Row>, of: &dyn Fn(&Row) -> f64| {
-            let all: Vec<f64> = solutions.iter().flat_map(rows).map(|row| of(&row).powi(2)).collect();
+            let all: Vec<f64> = solutions
+                .iter()
+                .flat_map(rows)
+                .map(|row| of(&row).powi(2))
+                .collect();
             all.iter().sum::<f64>() / all.len() as f64
         };
         let ratio = |within: &dyn Fn(&Row) -> bool, of: &dyn Fn(&Row) -> f64| {
-            let some = |all: &[Row]| all.iter().filter(|row| within(row)).cloned().collect::<Vec<_>>();
+            let some = |all: &[Row]| {
+                all.iter()
+                    .filter(|row| within(row))
+                    .cloned()
+                    .collect::<Vec<_>>()
+            };
             (mean_square(&|s| some(rows(s)), of) / mean_square(&|s| some(&s.rows), of)).sqrt()
         };
-        let ratios: Vec<f64> =
-            (0..9).map(|i| ratio(&|_| true, &|row| row.error.unwrap().values[i])).collect();
-        assert!(ratios.iter().all(|r| *r < 1.0), "{}: {ratios:?}", experiment.name);
-        let horizontal = |row: &Row| row.error.unwrap().values[0].hypot(row.error.unwrap().values[1]);
+        let ratios: Vec<f64> = (0..9)
+            .map(|i| ratio(&|_| true, &|row| row.error.unwrap().values[i]))
+            .collect();
+        assert!(
+            ratios.iter().all(|r| *r < 1.0),
+            "{}: {ratios:?}",
+            experiment.name
+        );
+        let horizontal =
+            |row: &Row| row.error.unwrap().values[0].hypot(row.error.unwrap().values[1]);
         let [within, outside] =
             [true, false].map(|is| ratio(&|row| OUTAGE.withholds(row.t_s) == is, &horizontal));
         assert!(within < outside, "{}: {within} {outside}", experiment.name);
         let farthest = |rows: &[Row]| {
             let rows = rows.iter().filter(|row| OUTAGE.withholds(row.t_s));
-            rows.max_by(|a, b| a.sigma[0].hypot(a.sigma[1]).total_cmp(&b.sigma[0].hypot(b.sigma[1])))
-                .unwrap()
-                .t_s
+            rows.max_by(|a, b| {
+                a.sigma[0]
+                    .hypot(a.sigma[1])
+                    .total_cmp(&b.sigma[0].hypot(b.sigma[1]))
+            })
+            .unwrap()
+            .t_s
         };
         for solution in &solutions {
             assert!((OUTAGE.end_s - farthest(&solution.rows)).abs() < 1.5);
-            assert!((345.0 - farthest(rows(solution))).abs() < 15.0, "{}", farthest(rows(solution)));
+            assert!(
+                (345.0 - farthest(rows(solution))).abs() < 15.0,
+                "{}",
+                farthest(rows(solution))
+            );
         }
-        println!("{}: RMSE smoothed over filter {ratios:.2?}; in the outage {within:.2}", experiment.name);
+        println!(
+            "{}: RMSE smoothed over filter {ratios:.2?}; in the outage {within:.2}",
+            experiment.name
+        );
     }
 }
 
@@ -242,22 +332,54 @@ fn smoothed_errors_are_as_large_as_stated_and_smaller_than_the_filter_s() {
 #[test]
 fn smoothing_changes_nothing_that_it_should_not() {
     let trajectory = shipped("figure_eight.toml");
-    let gnss = GnssSettings { lever_arm_m: [0.8, -0.3, -1.2], ..GnssSettings::default() };
+    let gnss = GnssSettings {
+        lever_arm_m: [0.8, -0.3, -1.2],
+        ..GnssSettings::default()
+    };
     recorded(&trajectory, &model(), &gnss, 1, |recording, start| {
         let imu = &recording.imu[..12_000];
-        let outages = vec![Outage { start_s: 60.0, end_s: 80.0 }];
+        let outages = vec![Outage {
+            start_s: 60.0,
+            end_s: 80.0,
+        }];
         let mut fixes = recording.gnss.clone();
         fixes[20].lat += 1e-3; // rejected
-        let plain =
-            Settings { outages, nis_gate: Some(0.999), lever_arm_b: gnss.lever_arm_m.into(), ..settings() };
+        let plain = Settings {
+            outages,
+            nis_gate: Some(0.999),
+            lever_arm_b: gnss.lever_arm_m.into(),
+            ..settings()
+        };
         let smooth = |rows_hz: f64, smooth: bool| {
-            run(imu, &fixes, start, &Settings { rows_hz, smooth, ..plain.clone() }, &trajectory)
+            run(
+                imu,
+                &fixes,
+                start,
+                &Settings {
+                    rows_hz,
+                    smooth,
+                    ..plain.clone()
+                },
+                &trajectory,
+            )
         };
         let (coarse, fine) = (smooth(1.0, true), smooth(5.0, true));
-        assert_eq!(Solution { smoothed: None, ..coarse.clone() }, smooth(1.0, false));
-        assert_eq!((rows(&coarse).last(), rows(&coarse).len()), (coarse.rows.last(), coarse.rows.len()));
+        assert_eq!(
+            Solution {
+                smoothed: None,
+                ..coarse.clone()
+            },
+            smooth(1.0, false)
+        );
+        assert_eq!(
+            (rows(&coarse).last(), rows(&coarse).len()),
+            (coarse.rows.last(), coarse.rows.len())
+        );
         let [used, withheld, rejected] = outcome(&coarse, &[]).fixes;
-        assert!(used > 70 && withheld == 20 && rejected > 0, "{used} {withheld} {rejected}");
+        assert!(
+            used > 70 && withheld == 20 && rejected > 0,
+            "{used} {withheld} {rejected}"
+        );
         for (filtered, smoothed) in coarse.rows.iter().zip(rows(&coarse)) {
             assert_eq!(filtered.t_s, smoothed.t_s);
             for i in 0..9 {
@@ -269,23 +391,40 @@ fn smoothing_changes_nothing_that_it_should_not() {
                     filtered.t_s
                 );
             }
-            let grown = [0, 1].map(|s| (smoothed.bias_sigma[s] / filtered.bias_sigma[s]).max_element());
+            let grown =
+                [0, 1].map(|s| (smoothed.bias_sigma[s] / filtered.bias_sigma[s]).max_element());
             assert!(grown.iter().all(|g| *g <= 1.0 + 1e-9), "{grown:?}");
         }
         // between marks the error is linear, so that more of them leave the rounding; at 5 Hz they are where the filter
         // applies the Earth's terms anyway
         for row in rows(&coarse) {
-            let same = rows(&fine).iter().find(|r| (r.t_s - row.t_s).abs() < 1e-6).unwrap();
+            let same = rows(&fine)
+                .iter()
+                .find(|r| (r.t_s - row.t_s).abs() < 1e-6)
+                .unwrap();
             for i in 0..9 {
-                let apart = (row.error.unwrap().values[i] - same.error.unwrap().values[i]) / row.sigma[i];
+                let apart =
+                    (row.error.unwrap().values[i] - same.error.unwrap().values[i]) / row.sigma[i];
                 assert!(apart.abs() < 1e-6, "{i} at {} s: {apart:e}", row.t_s);
                 assert!((same.sigma[i] / row.sigma[i] - 1.0).abs() < 1e-6);
             }
         }
         // without a fix there is nothing to smooth
-        let all = vec![Outage { start_s: 0.0, end_s: 1e4 }];
-        let free =
-            run(imu, &fixes, start, &Settings { smooth: true, outages: all, ..plain.clone() }, &trajectory);
+        let all = vec![Outage {
+            start_s: 0.0,
+            end_s: 1e4,
+        }];
+        let free = run(
+            imu,
+            &fixes,
+            start,
+            &Settings {
+                smooth: true,
+                outages: all,
+                ..plain.clone()
+            },
+            &trajectory,
+        );
         for (filtered, smoothed) in free.rows.iter().zip(rows(&free)) {
             let apart = |of: fn(&Row) -> [f64; 9]| {
                 (0..9)
@@ -302,16 +441,43 @@ fn smoothing_changes_nothing_that_it_should_not() {
 #[test]
 fn a_tape_that_is_too_long_is_refused() {
     let place = place_with(DRIVE, MODEL);
-    let trajectory =
-        trajectory_file::load(&place.path().join("drive.toml"), &trajectory_file::Options::default())
-            .unwrap()
-            .0;
-    recorded(&trajectory, &model(), &GnssSettings::default(), 1, |recording, start| {
-        let imu: Vec<_> = recording.imu.iter().cycle().take(1_000_000).copied().collect();
-        let recorded = Recorded { imu: &imu, gnss: &recording.gnss, aids: &[] };
-        let long = Settings { rows_hz: 30_000.0, smooth: true, ..settings() };
-        let refused = fuse(&recorded, &belief(&model()), start, &long, None).unwrap_err();
-        let FusionError::Memory { bytes, states: 15, .. } = refused else { panic!("{refused}") };
-        assert!((2.8e9..3.5e9).contains(&bytes), "{bytes}");
-    });
+    let trajectory = trajectory_file::load(
+        &place.path().join("drive.toml"),
+        &trajectory_file::Options::default(),
+    )
+    .unwrap()
+    .0;
+    recorded(
+        &trajectory,
+        &model(),
+        &GnssSettings::default(),
+        1,
+        |recording, start| {
+            let imu: Vec<_> = recording
+                .imu
+                .iter()
+                .cycle()
+                .take(1_000_000)
+                .copied()
+                .collect();
+            let recorded = Recorded {
+                imu: &imu,
+                gnss: &recording.gnss,
+                aids: &[],
+            };
+            let long = Settings {
+                rows_hz: 30_000.0,
+                smooth: true,
+                ..settings()
+            };
+            let refused = fuse(&recorded, &belief(&model()), start, &long, None).unwrap_err();
+            let FusionError::Memory {
+                bytes, states: 15, ..
+            } = refused
+            else {
+                panic!("{refused}")
+            };
+            assert!((2.8e9..3.5e9).contains(&bytes), "{bytes}");
+        },
+    );
 }

@@ -20,7 +20,12 @@ fn coning() -> Trajectory {
             lat: 0.8 + 15.0 * t_s / 6.37e6,
             lon: 0.1,
             h: 0.0,
-            q_b_n: RollPitchYaw { roll: angle * sin, pitch: angle * cos, yaw: 0.0 }.to_quat(),
+            q_b_n: RollPitchYaw {
+                roll: angle * sin,
+                pitch: angle * cos,
+                yaw: 0.0,
+            }
+            .to_quat(),
         }
     };
     Trajectory::from_samples(&(0..=30_000).map(sample).collect::<Vec<_>>()).unwrap()
@@ -36,7 +41,10 @@ fn coning_that_the_rate_does_not_resolve_is_in_the_verdict() {
             Process::RandomWalk(RandomWalk::new(walk).unwrap()),
         ])
     };
-    let outages = [Outage { start_s: 150.0, end_s: 210.0 }];
+    let outages = [Outage {
+        start_s: 150.0,
+        end_s: 210.0,
+    }];
     let mut scenario = Scenario::default().with_full_noise();
     (scenario.run.method, scenario.run.runs) = (Method::Both, 32);
     let found = |rate_hz: f64| {
@@ -44,21 +52,49 @@ fn coning_that_the_rate_does_not_resolve_is_in_the_verdict() {
         scenario.imu.rate_hz = rate_hz;
         // of the same density at any rate
         let white = rate_hz / 100.0;
-        let model =
-            Model::pooled(rate_hz, &axis(white * 5e-5, 3e-11 / white), &axis(white * 1e-7, 1e-13 / white));
+        let model = Model::pooled(
+            rate_hz,
+            &axis(white * 5e-5, 3e-11 / white),
+            &axis(white * 1e-7, 1e-13 / white),
+        );
         let inputs = NavigateInputs::new(coning(), model, TrueImu::AsBelieved);
-        navigate(&inputs, &scenario, &outages, 5, &()).unwrap().summary
+        navigate(&inputs, &scenario, &outages, 5, &())
+            .unwrap()
+            .summary
     };
     let slow = found(10.0);
     let expected = slow.lincov.as_ref().unwrap();
     let agreement = slow.agreement.as_ref().unwrap();
-    assert!(agreement.largest_z.abs() < agreement.bound_z, "{agreement:?}");
-    assert_eq!(expected.verdict.kind, VerdictKind::Overconfident, "{:?}", expected.verdict);
-    assert!(slow.strapdown_over_sigma > 1.0, "{}", slow.strapdown_over_sigma);
+    assert!(
+        agreement.largest_z.abs() < agreement.bound_z,
+        "{agreement:?}"
+    );
+    assert_eq!(
+        expected.verdict.kind,
+        VerdictKind::Overconfident,
+        "{:?}",
+        expected.verdict
+    );
+    assert!(
+        slow.strapdown_over_sigma > 1.0,
+        "{}",
+        slow.strapdown_over_sigma
+    );
     let budget = slow.outages[0].budget.as_ref().unwrap();
-    let (_, share) = budget.shares.iter().find(|(name, _)| name == "strapdown").unwrap();
+    let (_, share) = budget
+        .shares
+        .iter()
+        .find(|(name, _)| name == "strapdown")
+        .unwrap();
     assert!(share.0[8] > 0.5, "{share:?}");
     let fast = found(100.0);
-    assert!(fast.strapdown_over_sigma < 0.1, "{}", fast.strapdown_over_sigma);
-    assert_ne!(fast.lincov.as_ref().unwrap().verdict.kind, VerdictKind::Overconfident);
+    assert!(
+        fast.strapdown_over_sigma < 0.1,
+        "{}",
+        fast.strapdown_over_sigma
+    );
+    assert_ne!(
+        fast.lincov.as_ref().unwrap().verdict.kind,
+        VerdictKind::Overconfident
+    );
 }

@@ -18,14 +18,19 @@ use std::path::{Path, PathBuf};
 const SHIPPED: [&str; 3] = ["land_vehicle.toml", "figure_eight.toml", "fixed_wing.toml"];
 
 /// What the shipped trajectories must meet at 100 Hz.
-const BOUNDS: Bounds = Bounds { position_m: 0.01, velocity_m_s: 1e-3, attitude_rad: 1e-6 };
+const BOUNDS: Bounds = Bounds {
+    position_m: 0.01,
+    velocity_m_s: 1e-3,
+    attitude_rad: 1e-6,
+};
 
 fn root(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
 fn shipped(name: &str) -> Trajectory {
-    let (trajectory, warnings) = load(&root("trajectories").join(name), &Options::default()).unwrap();
+    let (trajectory, warnings) =
+        load(&root("trajectories").join(name), &Options::default()).unwrap();
     assert!(warnings.is_empty(), "{name}: {warnings:?}");
     trajectory
 }
@@ -50,12 +55,40 @@ fn closure(trajectory: &Trajectory, rate_hz: f64) -> Closure {
 fn shipped_trajectories_last_900_s_and_are_plausible() {
     // Speed (m/s), acceleration (m/s²), jerk (m/s³), rate (rad/s): drives stay comfortable, the aircraft banks by 33°.
     for (name, limits) in [
-        ("land_vehicle.toml", Limits { speed: 25.1, acceleration: 3.0, jerk: 5.0, rate: 0.3 }),
-        ("figure_eight.toml", Limits { speed: 12.1, acceleration: 2.2, jerk: 3.0, rate: 0.2 }),
-        ("fixed_wing.toml", Limits { speed: 70.1, acceleration: 7.0, jerk: 5.0, rate: 0.35 }),
+        (
+            "land_vehicle.toml",
+            Limits {
+                speed: 25.1,
+                acceleration: 3.0,
+                jerk: 5.0,
+                rate: 0.3,
+            },
+        ),
+        (
+            "figure_eight.toml",
+            Limits {
+                speed: 12.1,
+                acceleration: 2.2,
+                jerk: 3.0,
+                rate: 0.2,
+            },
+        ),
+        (
+            "fixed_wing.toml",
+            Limits {
+                speed: 70.1,
+                acceleration: 7.0,
+                jerk: 5.0,
+                rate: 0.35,
+            },
+        ),
     ] {
         let t = shipped(name);
-        assert!(t.start_s() == 0.0 && t.end_s() >= 900.0, "{name} lasts {} s", t.end_s());
+        assert!(
+            t.start_s() == 0.0 && t.end_s() >= 900.0,
+            "{name} lasts {} s",
+            t.end_s()
+        );
         let (largest, beyond) = examine(&t, &limits);
         assert!(beyond.is_empty(), "{name}: {largest:?}");
         assert!(largest[0] > limits.speed - 0.2, "{name}: {largest:?}");
@@ -67,10 +100,18 @@ fn shipped_trajectories_last_900_s_and_are_plausible() {
 fn the_drive_is_straight_in_one_outage_and_turns_in_the_other() {
     let t = shipped("land_vehicle.toml");
     let yaw_rate = |s: f64| t.kinematics(s).omega_eb_b.z.abs();
-    assert!((0..=900).map(|k| 300.0 + 0.1 * f64::from(k)).all(|s| yaw_rate(s) < 1e-5));
-    let turning = (0..900).filter(|k| yaw_rate(700.0 + 0.1 * f64::from(*k)) > 0.05).count();
+    assert!(
+        (0..=900)
+            .map(|k| 300.0 + 0.1 * f64::from(k))
+            .all(|s| yaw_rate(s) < 1e-5)
+    );
+    let turning = (0..900)
+        .filter(|k| yaw_rate(700.0 + 0.1 * f64::from(*k)) > 0.05)
+        .count();
     assert!(turning > 700, "turning for {} s of 90", turning / 10);
-    let standing = (0..900).filter(|s| t.state(f64::from(*s)).v_n.length() < 1e-3).count();
+    let standing = (0..900)
+        .filter(|s| t.state(f64::from(*s)).v_n.length() < 1e-3)
+        .count();
     assert!((100..200).contains(&standing), "standing for {standing} s");
 }
 
@@ -82,12 +123,16 @@ fn shipped_trajectories_close_and_the_error_falls_faster_than_dt_squared() {
         for c in [slow, nominal, fast] {
             assert!(c.within(&BOUNDS), "{name}: {c:?}");
         }
-        let falls = |f: fn(&Closure) -> f64| f(&slow) / f(&nominal) > 4.0 && f(&nominal) / f(&fast) > 4.0;
+        let falls =
+            |f: fn(&Closure) -> f64| f(&slow) / f(&nominal) > 4.0 && f(&nominal) / f(&fast) > 4.0;
         assert!(
             falls(|c| c.position_m) && falls(|c| c.velocity_m_s),
             "{name}: {slow:?} {nominal:?} {fast:?}"
         );
-        assert!(falls(|c| c.attitude_rad), "{name}: {slow:?} {nominal:?} {fast:?}");
+        assert!(
+            falls(|c| c.attitude_rad),
+            "{name}: {slow:?} {nominal:?} {fast:?}"
+        );
     }
 }
 
@@ -102,7 +147,10 @@ fn closure_holds_in_both_hemispheres_and_across_the_antimeridian() {
     ] {
         let t = moved(name, lat_deg, lon_deg);
         let lon: Vec<f64> = (0..900).map(|s| t.state(f64::from(s)).lon).collect();
-        assert!(lon.iter().any(|l| *l > 0.0) && lon.iter().any(|l| *l < 0.0), "{name} does not cross ±180°");
+        assert!(
+            lon.iter().any(|l| *l > 0.0) && lon.iter().any(|l| *l < 0.0),
+            "{name} does not cross ±180°"
+        );
         let c = closure(&t, 100.0);
         assert!(c.within(&BOUNDS), "{name} from {lat_deg}, {lon_deg}: {c:?}");
     }
@@ -111,9 +159,19 @@ fn closure_holds_in_both_hemispheres_and_across_the_antimeridian() {
 #[test]
 fn too_slow_a_rate_for_the_rotation_is_refused() {
     let t = shipped("figure_eight.toml");
-    let e = Closure::new(&t, 0.25, GravityModel::Wgs84).unwrap_err().to_string();
-    assert!(e.contains("within one sample at") && e.contains("too slow a rate for it"), "{e}");
-    assert!(Closure::new(&t, f64::NAN, GravityModel::Wgs84).unwrap_err().to_string().contains("NaN Hz"));
+    let e = Closure::new(&t, 0.25, GravityModel::Wgs84)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        e.contains("within one sample at") && e.contains("too slow a rate for it"),
+        "{e}"
+    );
+    assert!(
+        Closure::new(&t, f64::NAN, GravityModel::Wgs84)
+            .unwrap_err()
+            .to_string()
+            .contains("NaN Hz")
+    );
 }
 
 /// Independent truth.
@@ -130,12 +188,17 @@ fn truth() -> Truth {
     let path = root("tests/data/nav_40s_100hz.csv.gz");
     let (trajectory, warnings) = load(&path, &Options::default()).unwrap();
     assert!(
-        warnings.len() == 1 && warnings[0].message.starts_with("columns not used: dtheta_x_rad"),
+        warnings.len() == 1
+            && warnings[0]
+                .message
+                .starts_with("columns not used: dtheta_x_rad"),
         "{warnings:?}"
     );
     let mut text = String::new();
     let file = std::fs::File::open(&path).unwrap();
-    flate2::read::GzDecoder::new(file).read_to_string(&mut text).unwrap();
+    flate2::read::GzDecoder::new(file)
+        .read_to_string(&mut text)
+        .unwrap();
     let rows: Vec<Vec<f64>> = text
         .lines()
         .filter(|l| l.starts_with(|c: char| c.is_ascii_digit()))
@@ -143,8 +206,15 @@ fn truth() -> Truth {
         .collect();
     let vector = |row: &[f64], at: usize| DVec3::from_slice(&row[at..at + 3]);
     let v_n = [&rows[0], &rows[rows.len() - 1]].map(|row| vector(row, 4));
-    let increments = rows[1..].iter().map(|row| (vector(row, 10), vector(row, 13))).collect();
-    Truth { trajectory, v_n, increments }
+    let increments = rows[1..]
+        .iter()
+        .map(|row| (vector(row, 10), vector(row, 13)))
+        .collect();
+    Truth {
+        trajectory,
+        v_n,
+        increments,
+    }
 }
 
 /// The ideal samples are the increments, to the rounding of the states they are made from: angles to 1e-9°
@@ -152,11 +222,21 @@ fn truth() -> Truth {
 /// which the slopes of a cubic spline differ by 1.879 σ/dt between neighbouring knots.
 #[test]
 fn ideal_samples_are_the_increments_of_independent_truth() {
-    let Truth { trajectory, increments, .. } = truth();
+    let Truth {
+        trajectory,
+        increments,
+        ..
+    } = truth();
     let samples = ideal_imu(&trajectory, 100.0, GravityModel::FirstOrder).unwrap();
     assert_eq!((samples.len(), increments.len()), (4000, 4000));
     let (mut angle, mut horizontal, mut vertical, mut count) = (0.0, 0.0, 0.0, 0.0);
-    for (k, (s, (dtheta, dv))) in samples.iter().zip(&increments).enumerate().skip(50).take(3900) {
+    for (k, (s, (dtheta, dv))) in samples
+        .iter()
+        .zip(&increments)
+        .enumerate()
+        .skip(50)
+        .take(3900)
+    {
         let e = s.omega_ib_b * 0.01 - *dtheta;
         assert!(e.abs().max_element() < 3e-11, "row {k}: {e} rad");
         let q_b_n = trajectory.state(50.0 + 0.01 * (k as f64 + 0.5)).q_b_n;
@@ -172,20 +252,33 @@ fn ideal_samples_are_the_increments_of_independent_truth() {
     }
     // 5 % above: three standard deviations of an rms over 3900 rows are 3.4 %.
     let rms = [angle, horizontal, vertical].map(|sum: f64| (sum / count).sqrt());
-    assert!(rms[0] < 1.05 * 7.13e-12 && rms[1] < 1.05 * 5.19e-6 && rms[2] < 1.05 * 5.42e-5, "{rms:?}");
+    assert!(
+        rms[0] < 1.05 * 7.13e-12 && rms[1] < 1.05 * 5.19e-6 && rms[2] < 1.05 * 5.42e-5,
+        "{rms:?}"
+    );
 }
 
 /// Independent increments, mechanised, follow independent states. Sums of increments are increments of a
 /// lower rate, so that the order of the algorithm shows on them too.
 #[test]
 fn mechanising_independent_increments_follows_independent_states() {
-    let Truth { trajectory, v_n, increments } = truth();
-    let start = NavState { v_n: v_n[0], ..trajectory.state(50.0) };
+    let Truth {
+        trajectory,
+        v_n,
+        increments,
+    } = truth();
+    let start = NavState {
+        v_n: v_n[0],
+        ..trajectory.state(50.0)
+    };
     let end = |every: usize| {
         let mut ins = Strapdown::new(&start, GravityModel::FirstOrder);
         for chunk in increments.chunks_exact(every) {
-            let (dtheta, dv) =
-                chunk.iter().fold((DVec3::ZERO, DVec3::ZERO), |(a, b), (x, y)| (a + *x, b + *y));
+            let (dtheta, dv) = chunk
+                .iter()
+                .fold((DVec3::ZERO, DVec3::ZERO), |(a, b), (x, y)| {
+                    (a + *x, b + *y)
+                });
             ins.step(Vec3::splat(dtheta), Vec3::splat(dv), 0.01 * every as f64);
         }
         let (state, truth) = (ins.lane(0), trajectory.state(90.0));
@@ -198,5 +291,10 @@ fn mechanising_independent_increments_follows_independent_states() {
     assert!(p.length() < 1e-4 && v < 1e-6 && a < 1e-8, "{p} {v} {a}");
     // Third order from 50 Hz to 12.5 Hz is 64, second order 16.
     let ((_, v, a), (_, v_slow, a_slow)) = (end(2), end(8));
-    assert!(v_slow / v > 40.0 && a_slow / a > 40.0, "{} {}", v_slow / v, a_slow / a);
+    assert!(
+        v_slow / v > 40.0 && a_slow / a > 40.0,
+        "{} {}",
+        v_slow / v,
+        a_slow / a
+    );
 }

@@ -11,9 +11,14 @@ use nav_sim::navigation::trajectory::profile::{
     Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
 };
 use nav_sim::signal::noise::{Composite, Model, Process, RandomWalk, White};
-use nav_sim_navigation::simulation::lincov::{Aim, Factor, Filter, Per, Task, Track, TrueErrors, scaled};
+use nav_sim_navigation::simulation::lincov::{
+    Aim, Factor, Filter, Per, Task, Track, TrueErrors, scaled,
+};
 
-const OUTAGES: [Outage; 1] = [Outage { start_s: 200.0, end_s: 260.0 }];
+const OUTAGES: [Outage; 1] = [Outage {
+    start_s: 200.0,
+    end_s: 260.0,
+}];
 
 /// White noise and random walks of a consumer IMU, the random walks times `accel` and `gyro`.
 fn model(accel: f64, gyro: f64) -> Model {
@@ -28,13 +33,45 @@ fn model(accel: f64, gyro: f64) -> Model {
 
 /// Four minutes of town traffic.
 fn trajectory() -> Trajectory {
-    let faster = |to_speed: f64| Kind::Accelerate { to_speed, by: Acceleration::Duration(10.0) };
-    let turn = |deg: f64| Kind::Turn { angle: deg.to_radians(), by: Turning::Duration(9.0) };
-    let block = [faster(14.0), Kind::Straight(Length::Duration(14.0)), turn(90.0), faster(6.0), turn(-60.0)];
+    let faster = |to_speed: f64| Kind::Accelerate {
+        to_speed,
+        by: Acceleration::Duration(10.0),
+    };
+    let turn = |deg: f64| Kind::Turn {
+        angle: deg.to_radians(),
+        by: Turning::Duration(9.0),
+    };
+    let block = [
+        faster(14.0),
+        Kind::Straight(Length::Duration(14.0)),
+        turn(90.0),
+        faster(6.0),
+        turn(-60.0),
+    ];
     let segments = block.into_iter().cycle().take(26);
-    let segments = segments.map(|kind| Segment { kind, climb_m: 0.0, ramp_s: None }).collect();
-    let start = Start { t_s: 0.0, lat: 0.8, lon: 0.1, h: 0.0, heading: 0.7, speed: 0.0 };
-    Profile { start, bank: Bank::None, ramp_s: 1.0, segments }.build().unwrap()
+    let segments = segments
+        .map(|kind| Segment {
+            kind,
+            climb_m: 0.0,
+            ramp_s: None,
+        })
+        .collect();
+    let start = Start {
+        t_s: 0.0,
+        lat: 0.8,
+        lon: 0.1,
+        h: 0.0,
+        heading: 0.7,
+        speed: 0.0,
+    };
+    Profile {
+        start,
+        bank: Bank::None,
+        ramp_s: 1.0,
+        segments,
+    }
+    .build()
+    .unwrap()
 }
 
 struct Drive {
@@ -45,8 +82,14 @@ struct Drive {
 
 fn drive() -> Drive {
     let (scenario, trajectory) = (Scenario::default().with_full_noise(), trajectory());
-    let track = scenario.track(&trajectory, &model(1.0, 1.0), &OUTAGES).unwrap();
-    Drive { scenario, trajectory, track }
+    let track = scenario
+        .track(&trajectory, &model(1.0, 1.0), &OUTAGES)
+        .unwrap();
+    Drive {
+        scenario,
+        trajectory,
+        track,
+    }
 }
 
 impl Drive {
@@ -55,9 +98,14 @@ impl Drive {
     }
 
     fn factors(&self, truths: &[Model], per: Per, aim: Aim) -> Vec<Factor> {
-        let filter: &Filter<'_> = &|model: &Model| self.scenario.belief(model, &OUTAGES, &self.track);
+        let filter: &Filter<'_> =
+            &|model: &Model| self.scenario.belief(model, &OUTAGES, &self.track);
         let model = &model(1.0, 1.0);
-        let truths: &[TrueErrors] = &truths.iter().cloned().map(TrueErrors::from).collect::<Vec<_>>();
+        let truths: &[TrueErrors] = &truths
+            .iter()
+            .cloned()
+            .map(TrueErrors::from)
+            .collect::<Vec<_>>();
         let task = Task {
             model,
             truths,
@@ -72,8 +120,14 @@ impl Drive {
         let factors = task.factors().unwrap();
         let consistency = task.consistency(filter, &factors).unwrap();
         match aim {
-            Aim::Mean => assert!((consistency.nees / 9.0 - 1.0).abs() < 5e-3, "{consistency:?}"),
-            Aim::Worst => assert!((consistency.largest.ratio - 1.0).abs() < 5e-3, "{consistency:?}"),
+            Aim::Mean => assert!(
+                (consistency.nees / 9.0 - 1.0).abs() < 5e-3,
+                "{consistency:?}"
+            ),
+            Aim::Worst => assert!(
+                (consistency.largest.ratio - 1.0).abs() < 5e-3,
+                "{consistency:?}"
+            ),
         }
         factors
     }
@@ -81,8 +135,13 @@ impl Drive {
     /// NEES at the outage's end of a hundred runs.
     fn sampled_nees(&self, belief: Belief, truth: &Model) -> Estimate {
         let beliefs = [belief];
-        let experiment =
-            self.scenario.experiment(&self.trajectory, Truth::Model(truth), &beliefs, &OUTAGES, 11);
+        let experiment = self.scenario.experiment(
+            &self.trajectory,
+            Truth::Model(truth),
+            &beliefs,
+            &OUTAGES,
+            11,
+        );
         let result = &monte_carlo::run(&experiment, 100, &|_| {}).unwrap()[0];
         Estimate::mean_of(result.runs.iter().map(|r| r.outages[0].nees_end), None)
     }
@@ -96,9 +155,13 @@ fn four_times_the_random_walk_is_found_and_runs_agree() {
     let truth = model(1.0, 4.0);
     let factors = drive.factors(std::slice::from_ref(&truth), Per::Process, Aim::Mean);
     for factor in &factors {
-        let walk_of_gyro = factor.sensor.name() == "gyro" && factor.process.as_deref() == Some("RW");
+        let walk_of_gyro =
+            factor.sensor.name() == "gyro" && factor.process.as_deref() == Some("RW");
         let expected = if walk_of_gyro { 4.0 } else { 1.0 };
-        assert!((factor.on_variance / expected - 1.0).abs() < 0.05, "{factors:?}");
+        assert!(
+            (factor.on_variance / expected - 1.0).abs() < 0.05,
+            "{factors:?}"
+        );
     }
     let before = drive.sampled_nees(drive.belief(&model(1.0, 1.0)), &truth);
     let after = drive.sampled_nees(drive.belief(&scaled(&model(1.0, 1.0), &factors)), &truth);
@@ -112,7 +175,10 @@ fn a_model_that_is_true_needs_no_factor() {
     let drive = drive();
     for aim in [Aim::Mean, Aim::Worst] {
         let factors = drive.factors(&[model(1.0, 1.0)], Per::Process, aim);
-        assert!(factors.iter().all(|f| f.on_variance == 1.0) && factors.len() == 4, "{factors:?}");
+        assert!(
+            factors.iter().all(|f| f.on_variance == 1.0) && factors.len() == 4,
+            "{factors:?}"
+        );
     }
 }
 
@@ -130,9 +196,18 @@ fn a_tuned_filter_is_honest_over_the_run_as_a_verdict_judges_it() {
     let truth = Model::pooled(100.0, &axis(1e-4, 1e-10), &axis(1e-6, 1e-12));
     let factors = drive.factors(std::slice::from_ref(&truth), Per::Sensor, Aim::Worst);
     let belief = drive.belief(&scaled(&model(1.0, 1.0), &factors));
-    let experiment = drive.scenario.experiment(&drive.trajectory, Truth::Model(&truth), &[], &OUTAGES, 1);
-    let summary = Expected::along(&drive.track, &experiment, &belief, &truth).unwrap().summary();
-    assert!(summary.verdict.kind != VerdictKind::Overconfident, "{:?} {factors:?}", summary.verdict);
+    let experiment =
+        drive
+            .scenario
+            .experiment(&drive.trajectory, Truth::Model(&truth), &[], &OUTAGES, 1);
+    let summary = Expected::along(&drive.track, &experiment, &belief, &truth)
+        .unwrap()
+        .summary();
+    assert!(
+        summary.verdict.kind != VerdictKind::Overconfident,
+        "{:?} {factors:?}",
+        summary.verdict
+    );
     assert!(summary.verdict.ratio < 1.01, "{:?}", summary.verdict);
 }
 
@@ -142,7 +217,10 @@ fn the_worst_of_two_truths_is_covered() {
     let drive = drive();
     let truths = [model(4.0, 1.0), model(1.0, 4.0)];
     let factors = drive.factors(&truths, Per::Sensor, Aim::Worst);
-    assert!(factors.len() == 2 && factors.iter().all(|f| (2.0..6.0).contains(&f.on_variance)), "{factors:?}");
+    assert!(
+        factors.len() == 2 && factors.iter().all(|f| (2.0..6.0).contains(&f.on_variance)),
+        "{factors:?}"
+    );
 }
 
 /// The factors are the smallest to 2 %: with all of them less by that, or any one of them, some error exceeds its sigma.
@@ -153,11 +231,19 @@ fn no_factor_is_larger_than_it_must_be() {
     let factors = drive.factors(std::slice::from_ref(&truth), Per::Sensor, Aim::Worst);
     let largest = |factors: &[Factor]| {
         let belief = drive.belief(&scaled(&model(1.0, 1.0), factors));
-        let experiment = drive.scenario.experiment(&drive.trajectory, Truth::Model(&truth), &[], &OUTAGES, 1);
-        let record = Expected::along(&drive.track, &experiment, &belief, &truth).unwrap().record;
+        let experiment =
+            drive
+                .scenario
+                .experiment(&drive.trajectory, Truth::Model(&truth), &[], &OUTAGES, 1);
+        let record = Expected::along(&drive.track, &experiment, &belief, &truth)
+            .unwrap()
+            .record;
         let ends = &record.outages[0];
         let at_end = (0..9).map(|i| (ends.error_end[i] / ends.see_end[i]).powi(2));
-        at_end.chain(record.normalised_sq).fold(0.0, f64::max).sqrt()
+        at_end
+            .chain(record.normalised_sq)
+            .fold(0.0, f64::max)
+            .sqrt()
     };
     assert!(largest(&factors) < 1.0015, "{factors:?}");
     let smaller = |is_of: &dyn Fn(usize) -> bool| -> Vec<Factor> {
@@ -167,7 +253,15 @@ fn no_factor_is_larger_than_it_must_be() {
         };
         factors.iter().enumerate().map(less).collect()
     };
-    for factors in [smaller(&|_| true), smaller(&|i| i == 0), smaller(&|i| i == 1)] {
-        assert!(largest(&factors) > 1.001, "{} {factors:?}", largest(&factors));
+    for factors in [
+        smaller(&|_| true),
+        smaller(&|i| i == 0),
+        smaller(&|i| i == 1),
+    ] {
+        assert!(
+            largest(&factors) > 1.001,
+            "{} {factors:?}",
+            largest(&factors)
+        );
     }
 }

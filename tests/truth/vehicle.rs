@@ -16,23 +16,64 @@ fn the_constraint_finds_how_the_stated_mounting_is_turned() {
     let stated = DQuat::from_scaled_axis(DVec3::new(-0.3, 0.8, 2.0));
     let turned = DVec3::new(0.0, -0.6, 0.9) * DEG;
     let to_imu = (DQuat::from_scaled_axis(-turned) * stated).inverse();
-    let nhc = Some(NhcSettings { mounting_sigma_deg: 1.0, ..NhcSettings::default() });
-    let aiding = AidingSettings { nhc, ..AidingSettings::default() };
-    let belief = belief(&model()).with_vehicle(aiding.state_sigmas());
-    recorded(&trajectory, &model(), &GnssSettings::default(), 2, |recording, start| {
-        let askew = |s: &ImuIncrement| ImuIncrement { dtheta: to_imu * s.dtheta, dv: to_imu * s.dv, ..*s };
-        let imu: Vec<_> = recording.imu.iter().map(askew).collect();
-        let bare = Recorded { imu: &imu, gnss: &recording.gnss, aids: &[] };
-        let aids = vehicle_velocities(&bare, &[], &aiding, &[]);
-        let settings = Settings { q_s_b: stated, ..settings() };
-        let mut sigma = start.sigma.clone();
-        sigma.att_sigma_deg = sigma.att_sigma_deg.map(|s| s.hypot(1.0));
-        let start = Start { sigma, ..start.clone() };
-        let solution = fuse(&Recorded { aids: &aids, ..bare }, &belief, &start, &settings, None).unwrap();
-        let [found, sigma] = solution.vehicle.unwrap();
-        for i in [1, 2] {
-            assert!(sigma[i] < 0.2 * DEG, "{}", sigma / DEG);
-            assert!((found[i] - turned[i]).abs() < 4.0 * sigma[i], "{} ± {}", found / DEG, sigma / DEG);
-        }
+    let nhc = Some(NhcSettings {
+        mounting_sigma_deg: 1.0,
+        ..NhcSettings::default()
     });
+    let aiding = AidingSettings {
+        nhc,
+        ..AidingSettings::default()
+    };
+    let belief = belief(&model()).with_vehicle(aiding.state_sigmas());
+    recorded(
+        &trajectory,
+        &model(),
+        &GnssSettings::default(),
+        2,
+        |recording, start| {
+            let askew = |s: &ImuIncrement| ImuIncrement {
+                dtheta: to_imu * s.dtheta,
+                dv: to_imu * s.dv,
+                ..*s
+            };
+            let imu: Vec<_> = recording.imu.iter().map(askew).collect();
+            let bare = Recorded {
+                imu: &imu,
+                gnss: &recording.gnss,
+                aids: &[],
+            };
+            let aids = vehicle_velocities(&bare, &[], &aiding, &[]);
+            let settings = Settings {
+                q_s_b: stated,
+                ..settings()
+            };
+            let mut sigma = start.sigma.clone();
+            sigma.att_sigma_deg = sigma.att_sigma_deg.map(|s| s.hypot(1.0));
+            let start = Start {
+                sigma,
+                ..start.clone()
+            };
+            let solution = fuse(
+                &Recorded {
+                    aids: &aids,
+                    ..bare
+                },
+                &belief,
+                &start,
+                &settings,
+                None,
+            )
+            .unwrap();
+            let [found, sigma] = solution.vehicle.unwrap();
+            for i in [1, 2] {
+                assert!(sigma[i] < 0.2 * DEG, "{}", sigma / DEG);
+                assert!(
+                    (found[i] - turned[i]).abs() < 4.0 * sigma[i],
+                    "{} ± {}",
+                    found / DEG,
+                    sigma / DEG
+                );
+            }
+        },
+    );
 }

@@ -134,7 +134,11 @@ pub struct Replicate {
 impl Replicate {
     /// The wavelet variance that an estimator uses, at index level − 1.
     pub(crate) fn value(&self, estimator: Estimator, index: usize) -> f64 {
-        if self.is_robust(estimator, index) { self.robust[index].value } else { self.classical[index] }
+        if self.is_robust(estimator, index) {
+            self.robust[index].value
+        } else {
+            self.classical[index]
+        }
     }
 
     /// Whether that is the robust one: on coarse steps a robust estimator too takes the classical one.
@@ -145,7 +149,9 @@ impl Replicate {
     /// The wavelet variances that an estimator uses, from level 1 on (units²).
     #[must_use]
     pub fn values(&self, estimator: Estimator) -> Vec<f64> {
-        (0..self.levels()).map(|index| self.value(estimator, index)).collect()
+        (0..self.levels())
+            .map(|index| self.value(estimator, index))
+            .collect()
     }
 
     /// The part of the degrees of freedom of a whole signal that missing samples leave, at index level − 1.
@@ -216,21 +222,37 @@ pub fn average(
 ) -> Result<Curve, AverageError> {
     let count = replicates.len();
     if estimator.is_single() && count > 1 {
-        return Err(AverageError::Single { estimator: estimator.name(), replicates: count });
+        return Err(AverageError::Single {
+            estimator: estimator.name(),
+            replicates: count,
+        });
     }
     let levels = majority(replicates);
     if levels == 0 {
         return Err(AverageError::None);
     }
-    let dropped = |count: usize| if estimator == Estimator::DrAwv { trim.count(count) } else { 0 };
+    let dropped = |count: usize| {
+        if estimator == Estimator::DrAwv {
+            trim.count(count)
+        } else {
+            0
+        }
+    };
     let is_enough = |count: usize| count > 2 * dropped(count);
     if !is_enough(count) {
-        return Err(AverageError::Trim { trim: dropped(count), replicates: count });
+        return Err(AverageError::Trim {
+            trim: dropped(count),
+            replicates: count,
+        });
     }
     let quantization = estimator.is_robust().then(|| *tuning.quantization());
     let kept_of_all = (count - 2 * dropped(count)) as f64;
     let differing = between(replicates, estimator, tuning) / kept_of_all;
-    let mut curve = Curve { quantization, differing, ..Curve::default() };
+    let mut curve = Curve {
+        quantization,
+        differing,
+        ..Curve::default()
+    };
     for level in 1..=levels as u32 {
         let long_enough = replicates.iter().filter(|r| r.levels() >= level as usize);
         let replicates: Vec<&Replicate> = long_enough.collect();
@@ -240,7 +262,9 @@ pub fn average(
         }
         curve.levels.push(level);
         let kept_of = |estimator: Estimator| {
-            let terms = replicates.iter().map(|r| Term::new(r, level, estimator, tuning.efficiency()));
+            let terms = replicates
+                .iter()
+                .map(|r| Term::new(r, level, estimator, tuning.efficiency()));
             trimmed(terms.collect(), dropped(replicates.len()))
         };
         let mut kept = kept_of(estimator);
@@ -253,9 +277,14 @@ pub fn average(
             curve.classical.push(level);
         }
         let total: f64 = kept.iter().map(|t| t.samples).sum();
-        curve.wv.push(kept.iter().map(|t| t.samples / total * t.nu).sum());
+        curve
+            .wv
+            .push(kept.iter().map(|t| t.samples / total * t.nu).sum());
         // var(Σ w nu) = Σ w²·2 nu²/eta, the replicates' true nu taken equal.
-        let inverse: f64 = kept.iter().map(|t| (t.samples / total).powi(2) / t.edof).sum();
+        let inverse: f64 = kept
+            .iter()
+            .map(|t| (t.samples / total).powi(2) / t.edof)
+            .sum();
         curve.edof.push(1.0 / inverse);
     }
     Ok(curve)
@@ -290,7 +319,11 @@ impl Term {
         Self {
             samples: replicate.samples as f64,
             nu: replicate.value(estimator, i),
-            edof: if is_robust { interval::edof_robust(eta3, efficiency) } else { eta3 },
+            edof: if is_robust {
+                interval::edof_robust(eta3, efficiency)
+            } else {
+                eta3
+            },
             is_robust,
             is_without_root: is_robust && replicate.robust[i].status == Status::NoRoot,
         }

@@ -18,14 +18,29 @@ pub(super) fn between(replicates: &[Replicate], estimator: Estimator, tuning: &T
         let index = level as usize - 1;
         let present: Vec<&Replicate> = replicates.iter().filter(|r| r.levels() > index).collect();
         (present.len() >= LEAST).then(|| {
-            let logs: Vec<f64> = present.iter().map(|r| r.value(estimator, index).ln()).collect();
-            let noise = present.iter().map(|r| variance_of_log(degrees(r, estimator, level, tuning)));
-            (scatter(&logs, estimator), noise.sum::<f64>() / present.len() as f64)
+            let logs: Vec<f64> = present
+                .iter()
+                .map(|r| r.value(estimator, index).ln())
+                .collect();
+            let noise = present
+                .iter()
+                .map(|r| variance_of_log(degrees(r, estimator, level, tuning)));
+            (
+                scatter(&logs, estimator),
+                noise.sum::<f64>() / present.len() as f64,
+            )
         })
     };
-    let scales: Vec<(f64, f64)> =
-        (1..).map_while(at_level).filter(|(scatter, _)| scatter.is_finite()).collect();
-    let excess = |b2: f64| scales.iter().map(|(s2, noise)| s2 / (noise + b2) - 1.0).sum::<f64>();
+    let scales: Vec<(f64, f64)> = (1..)
+        .map_while(at_level)
+        .filter(|(scatter, _)| scatter.is_finite())
+        .collect();
+    let excess = |b2: f64| {
+        scales
+            .iter()
+            .map(|(s2, noise)| s2 / (noise + b2) - 1.0)
+            .sum::<f64>()
+    };
     // At the largest scatter no term is above 0.
     falling_root(excess, scales.iter().map(|(s2, _)| *s2).fold(0.0, f64::max))
 }
@@ -38,7 +53,11 @@ pub(crate) fn falling_root(function: impl Fn(f64) -> f64, high: f64) -> f64 {
     }
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if function(middle) > 0.0 { low = middle } else { high = middle }
+        if function(middle) > 0.0 {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     low
 }
@@ -46,7 +65,11 @@ pub(crate) fn falling_root(function: impl Fn(f64) -> f64, high: f64) -> f64 {
 fn degrees(replicate: &Replicate, estimator: Estimator, level: u32, tuning: &Tuning) -> f64 {
     let eta3 = replicate.edof_eta3(level);
     let is_robust = replicate.is_robust(estimator, level as usize - 1);
-    if is_robust { edof_robust(eta3, tuning.efficiency()) } else { eta3 }
+    if is_robust {
+        edof_robust(eta3, tuning.efficiency())
+    } else {
+        eta3
+    }
 }
 
 /// Variance of ln nu from replicate to replicate: for DR-AWV of those near the middle, as those that differ most are trimmed.
@@ -80,8 +103,14 @@ mod tests {
             let replicate = |_| {
                 let factor = (b * normal()).exp();
                 let noise = |level| (2.0 / edof_eta3(1 << 16, level)).sqrt();
-                let nu: Vec<f64> = (1..=10).map(|l| factor * (noise(l) * normal()).exp()).collect();
-                let robust = |value: &f64| RobustVariance { value: *value, status: Status::Ok, zeros: 0.0 };
+                let nu: Vec<f64> = (1..=10)
+                    .map(|l| factor * (noise(l) * normal()).exp())
+                    .collect();
+                let robust = |value: &f64| RobustVariance {
+                    value: *value,
+                    status: Status::Ok,
+                    zeros: 0.0,
+                };
                 Replicate {
                     name: String::new(),
                     axis: None,

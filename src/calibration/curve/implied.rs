@@ -17,8 +17,17 @@ pub(crate) fn drift_share(model: &Composite, level: u32) -> f64 {
 }
 
 fn share(model: &Composite, level: u32, is_counted: impl Fn(&Process) -> bool) -> f64 {
-    let counted: f64 = model.processes.iter().filter(|p| is_counted(p)).map(|p| p.haar_wv(level)).sum();
-    if counted > 0.0 { counted / model.haar_wv(level) } else { 0.0 }
+    let counted: f64 = model
+        .processes
+        .iter()
+        .filter(|p| is_counted(p))
+        .map(|p| p.haar_wv(level))
+        .sum();
+    if counted > 0.0 {
+        counted / model.haar_wv(level)
+    } else {
+        0.0
+    }
 }
 
 const fn is_quantization(process: &Process) -> bool {
@@ -41,11 +50,20 @@ pub fn implied(model: &Composite, curve: &Curve) -> Vec<f64> {
 /// Its derivatives with respect to all parameters of the model, level by level.
 pub(crate) fn implied_gradients(model: &Composite, curve: &Curve) -> Vec<Vec<f64>> {
     let at_level = |level: &u32| {
-        let Some(response) = curve.response(*level) else { return model.haar_wv_gradient(*level) };
+        let Some(response) = curve.response(*level) else {
+            return model.haar_wv_gradient(*level);
+        };
         let scale = Response::new(response, quantization_share(model, *level));
         let of_process = |process: &Process| {
-            let scale = if is_quantization(process) { scale.quantization } else { scale.others };
-            process.haar_wv_gradient(*level).into_iter().map(move |slope| slope * scale)
+            let scale = if is_quantization(process) {
+                scale.quantization
+            } else {
+                scale.others
+            };
+            process
+                .haar_wv_gradient(*level)
+                .into_iter()
+                .map(move |slope| slope * scale)
         };
         model.processes.iter().flat_map(of_process).collect()
     };
@@ -62,13 +80,19 @@ pub(crate) struct Response {
 
 impl Response {
     /// Response of a curve that reads quantization noise as it is.
-    pub(crate) const PLAIN: Self = Self { quantization: 1.0, others: 1.0 };
+    pub(crate) const PLAIN: Self = Self {
+        quantization: 1.0,
+        others: 1.0,
+    };
 
     pub(crate) fn new(response: &QuantizationResponse, share: f64) -> Self {
         // With s = q/nu: d(nu·b)/dq = b + (1 − s)·db/ds for quantization noise, which is in q and in nu;
         // b − s·db/ds for a process that is in nu only.
         let (b, slope) = response.factor(share);
-        Self { quantization: b + (1.0 - share) * slope, others: b - share * slope }
+        Self {
+            quantization: b + (1.0 - share) * slope,
+            others: b - share * slope,
+        }
     }
 }
 
@@ -94,7 +118,11 @@ mod tests {
         let levels: Vec<u32> = (1..=10).collect();
         let tuning = Tuning::new(0.6, Convention::Exact).unwrap();
         for quantization in [None, Some(*tuning.quantization())] {
-            let curve = Curve { levels: levels.clone(), quantization, ..Curve::default() };
+            let curve = Curve {
+                levels: levels.clone(),
+                quantization,
+                ..Curve::default()
+            };
             let gradients = implied_gradients(&model(values), &curve);
             for p in 0..5 {
                 let step = 1e-5 * values[p];
@@ -109,7 +137,8 @@ mod tests {
                     // Rounding of the values over the step, and the step's square.
                     let scale = implied(&model(values), &curve)[j] / values[p];
                     assert!(
-                        (gradients[j][p] - difference).abs() < 1e-8 * scale + 1e-6 * difference.abs(),
+                        (gradients[j][p] - difference).abs()
+                            < 1e-8 * scale + 1e-6 * difference.abs(),
                         "{j} {p}"
                     );
                 }

@@ -20,7 +20,11 @@ impl Scope {
     pub fn name(&self) -> String {
         match self.axis {
             None => self.sensor.name().to_owned(),
-            Some(axis) => Channel { sensor: self.sensor, axis }.to_string(),
+            Some(axis) => Channel {
+                sensor: self.sensor,
+                axis,
+            }
+            .to_string(),
         }
     }
 
@@ -28,7 +32,12 @@ impl Scope {
     #[must_use]
     pub fn channels(&self) -> Vec<Channel> {
         let axes = self.axis.map_or(Axis::ALL.to_vec(), |axis| vec![axis]);
-        axes.into_iter().map(|axis| Channel { sensor: self.sensor, axis }).collect()
+        axes.into_iter()
+            .map(|axis| Channel {
+                sensor: self.sensor,
+                axis,
+            })
+            .collect()
     }
 }
 
@@ -87,10 +96,17 @@ pub fn replicates(
     let replicate = |signal: &Signal| {
         let (channel, samples) = (signal.channel, signal.samples.len());
         let levels = levels.unwrap_or_else(|| default_levels(samples));
-        let error = |source| SignalError { recording: recording.name.clone(), channel, source };
+        let error = |source| SignalError {
+            recording: recording.name.clone(),
+            channel,
+            source,
+        };
         let (classical, robust, coverage) = if signal.samples.iter().any(|x| x.is_nan()) {
-            let Gappy { classical, robust, coverage } =
-                gappy(&signal.samples, levels, tuning).map_err(error)?;
+            let Gappy {
+                classical,
+                robust,
+                coverage,
+            } = gappy(&signal.samples, levels, tuning).map_err(error)?;
             (classical, robust, coverage)
         } else {
             let (classical, robust) = both(&signal.samples, levels, tuning).map_err(error)?;
@@ -100,7 +116,19 @@ pub fn replicates(
         let trend = trend(&signal.samples);
         // Of the samples themselves too: a warm-up may have been left out after the mean was taken.
         let mean = signal.mean + mean_about(0.0, &signal.samples);
-        Ok((channel, Replicate { name, axis, samples, classical, robust, coverage, trend, mean }))
+        Ok((
+            channel,
+            Replicate {
+                name,
+                axis,
+                samples,
+                classical,
+                robust,
+                coverage,
+                trend,
+                mean,
+            },
+        ))
     };
     recording.signals.par_iter().map(replicate).collect()
 }
@@ -129,10 +157,16 @@ pub fn grouped(replicates: Vec<(Channel, Replicate)>, pool: Pool) -> Vec<Group> 
     replicates.sort_by_key(|(channel, _)| channel.index());
     for (channel, replicate) in replicates {
         let axis = (pool == Pool::Axes).then_some(channel.axis);
-        let scope = Scope { sensor: channel.sensor, axis };
+        let scope = Scope {
+            sensor: channel.sensor,
+            axis,
+        };
         match groups.last_mut() {
             Some(group) if group.scope == scope => group.replicates.push(replicate),
-            _ => groups.push(Group { scope, replicates: vec![replicate] }),
+            _ => groups.push(Group {
+                scope,
+                replicates: vec![replicate],
+            }),
         }
     }
     groups

@@ -21,6 +21,9 @@ mod tests {
 
     #[test]
     fn by_hand() {
-        assert_eq!((median(&[3.0, 1.0, 2.0]), median(&[4.0, 1.0, 2.0, 3.0])), (2.0, 2.5));
+        assert_eq!(
+            (median(&[3.0, 1.0, 2.0]), median(&[4.0, 1.0, 2.0, 3.0])),
+            (2.0, 2.5)
+        );
     }
 }

@@ -48,26 +48,48 @@ impl SamplingLaw {
                 let plain = 0.5_f64.powi(i as i32 + 1);
                 // var nu_hat = 2/M ∫(|H|² S)² df, so 2 nu²/var over M is this quotient. A drift alone does
                 // not scatter and gets those of eta3, 1/tau.
-                if products[(i, i)] > 0.0 { nu * nu / products[(i, i)] } else { plain }
+                if products[(i, i)] > 0.0 {
+                    nu * nu / products[(i, i)]
+                } else {
+                    plain
+                }
             })
             .collect();
         let mut correlation = DMatrix::from_fn(levels, levels, |i, j| {
             let scale = (products[(i, i)] * products[(j, j)]).sqrt();
-            if scale > 0.0 { products[(i, j)] / scale } else { 0.0 }
+            if scale > 0.0 {
+                products[(i, j)] / scale
+            } else {
+                0.0
+            }
         });
         // Also for a level without noise, whose row is zero: the matrix must stay positive definite.
         correlation.fill_diagonal(1.0);
         let factor = factor(&correlation);
-        let quantization = (1..=levels as u32).map(|level| quantization_share(model, level)).collect();
+        let quantization = (1..=levels as u32)
+            .map(|level| quantization_share(model, level))
+            .collect();
         let autocorrelations = (1..=levels)
             .map(|level| match is_last(level, levels) {
                 true => squared_autocorrelations(model, level, 1 << levels),
                 false => Vec::new(),
             })
             .collect();
-        let fourth = (1..=levels).map(|level| fourth_powers(model, level)).collect();
-        let shapes = (1..=levels).map(|level| shape(model, level, levels)).collect();
-        Self { per_coefficient, quantization, autocorrelations, fourth, shapes, correlation, factor }
+        let fourth = (1..=levels)
+            .map(|level| fourth_powers(model, level))
+            .collect();
+        let shapes = (1..=levels)
+            .map(|level| shape(model, level, levels))
+            .collect();
+        Self {
+            per_coefficient,
+            quantization,
+            autocorrelations,
+            fourth,
+            shapes,
+            correlation,
+            factor,
+        }
     }
 
     /// The law of the first so many levels.
@@ -80,16 +102,30 @@ impl SamplingLaw {
         let autocorrelations = self.autocorrelations[..levels].to_vec();
         let fourth = self.fourth[..levels].to_vec();
         let shapes = self.shapes[..levels].to_vec();
-        Self { per_coefficient, quantization, autocorrelations, fourth, shapes, correlation, factor }
+        Self {
+            per_coefficient,
+            quantization,
+            autocorrelations,
+            fourth,
+            shapes,
+            correlation,
+            factor,
+        }
     }
 
     /// Degrees of freedom of the classical wavelet variance of a signal of so many samples.
     pub(crate) fn edof(&self, samples: usize) -> Vec<f64> {
         let count = |i: usize| crate::wavelet::coefficient_count(samples, i as u32 + 1) as f64;
         let of_level = |(i, e): (usize, &f64)| {
-            (e * count(i)).max(of_few(&self.autocorrelations[i], count(i), i as u32 + 1)).max(1.0)
+            (e * count(i))
+                .max(of_few(&self.autocorrelations[i], count(i), i as u32 + 1))
+                .max(1.0)
         };
-        self.per_coefficient.iter().enumerate().map(of_level).collect()
+        self.per_coefficient
+            .iter()
+            .enumerate()
+            .map(of_level)
+            .collect()
     }
 
     /// The same of the robust one, at least 1.
@@ -101,15 +137,25 @@ impl SamplingLaw {
             let efficiency = 1.0 / (1.0 + (1.0 / tuning.efficiency() - 1.0) * fourth);
             edof_robust(edof, efficiency * tuning.quantization().degrees(*share))
         };
-        self.edof(samples).into_iter().zip(&self.quantization).zip(&self.fourth).map(robust).collect()
+        self.edof(samples)
+            .into_iter()
+            .zip(&self.quantization)
+            .zip(&self.fourth)
+            .map(robust)
+            .collect()
     }
 
     /// Draws nu*/nu of every level, given the degrees of freedom.
     pub(crate) fn draw(&self, edof: &[f64], generator: &mut Generator) -> Vec<f64> {
-        let z = DVector::from_fn(edof.len(), |_, _| generator.sample::<f64, _>(StandardNormal));
+        let z = DVector::from_fn(edof.len(), |_, _| {
+            generator.sample::<f64, _>(StandardNormal)
+        });
         let correlated = &self.factor * z;
         let scores = self.shapes.iter().zip(&correlated);
-        scores.zip(edof).map(|((shape, z), edof)| shape.ratio(*z, *edof)).collect()
+        scores
+            .zip(edof)
+            .map(|((shape, z), edof)| shape.ratio(*z, *edof))
+            .collect()
     }
 }
 
@@ -142,7 +188,8 @@ fn squared_autocorrelations(model: &Composite, level: usize, half: usize) -> Vec
 /// Sum of the fourth powers of a level's autocorrelations over that of their squares; 1 of a process without noise.
 fn fourth_powers(model: &Composite, level: usize) -> f64 {
     let squared = squared_autocorrelations(model, level, 1 << level);
-    let over_lags = |power: i32| 1.0 + 2.0 * squared.iter().skip(1).map(|s| s.powi(power)).sum::<f64>();
+    let over_lags =
+        |power: i32| 1.0 + 2.0 * squared.iter().skip(1).map(|s| s.powi(power)).sum::<f64>();
     let ratio = over_lags(2) / over_lags(1);
     if ratio.is_finite() { ratio } else { 1.0 }
 }
@@ -168,7 +215,11 @@ const fn is_last(level: usize, levels: usize) -> bool {
 /// |H|² S of a frequency, with the Haar gain |H|² = sin⁴(πfm)/(m² sin²(πf)).
 fn gain(model: &Composite, f: f64, m: f64) -> f64 {
     let sin2 = (PI * f).sin().powi(2);
-    let density = model.processes.iter().map(|p| spectrum(p, sin2)).sum::<f64>();
+    let density = model
+        .processes
+        .iter()
+        .map(|p| spectrum(p, sin2))
+        .sum::<f64>();
     density * (PI * f * m).sin().powi(4) / (m * m * sin2)
 }
 
@@ -181,7 +232,11 @@ fn of_few(squared: &[f64], count: f64, level: u32) -> f64 {
         return 0.0;
     }
     let lags = squared.iter().enumerate().skip(1);
-    let sum = n * squared[0] + 2.0 * lags.map(|(lag, s)| (n - lag as f64).max(0.0) * s).sum::<f64>();
+    let sum = n * squared[0]
+        + 2.0
+            * lags
+                .map(|(lag, s)| (n - lag as f64).max(0.0) * s)
+                .sum::<f64>();
     // Of a process without noise (a drift) nothing is known.
     if sum > 0.0 { n * n / sum } else { 0.0 }
 }
@@ -189,7 +244,10 @@ fn of_few(squared: &[f64], count: f64, level: u32) -> f64 {
 /// The Cholesky factor; where rounding leaves no positive definite matrix, that of independent levels.
 fn factor(correlation: &DMatrix<f64>) -> DMatrix<f64> {
     let n = correlation.nrows();
-    correlation.clone().cholesky().map_or_else(|| DMatrix::identity(n, n), |c| c.l())
+    correlation
+        .clone()
+        .cholesky()
+        .map_or_else(|| DMatrix::identity(n, n), |c| c.l())
 }
 
 /// ∫ |H_j|² |H_k|² S² df over −½ … ½, for all pairs of levels (units⁴).
@@ -203,7 +261,11 @@ fn products(model: &Composite, levels: usize) -> DMatrix<f64> {
     for k in 0..half {
         // sin²(πf) of the midpoint; then sin²(2x) = 4 sin²x (1 − sin²x) from level to level.
         let base = (0.5 * PI * (k as f64 + 0.5) / half as f64).sin().powi(2);
-        let density = model.processes.iter().map(|p| spectrum(p, base)).sum::<f64>();
+        let density = model
+            .processes
+            .iter()
+            .map(|p| spectrum(p, base))
+            .sum::<f64>();
         let mut sin2 = base;
         for (i, gain) in gains.iter_mut().enumerate() {
             let m = f64::from(i as u32).exp2();

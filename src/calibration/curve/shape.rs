@@ -54,15 +54,26 @@ impl Shape {
                 k2 += 2.0 * (w / d).powi(2);
             }
             let w = (2.0 * (s * k1 - k)).max(0.0).sqrt().copysign(s);
-            Point { ln: k1.ln(), w, c: (s * k2.sqrt() / w).ln() / w }
+            Point {
+                ln: k1.ln(),
+                w,
+                c: (s * k2.sqrt() / w).ln() / w,
+            }
         };
         let points = below.chain(above).map(point).collect();
-        Self { points, degrees: 1.0 / weights.iter().map(|w| w * w).sum::<f64>() }
+        Self {
+            points,
+            degrees: 1.0 / weights.iter().map(|w| w * w).sum::<f64>(),
+        }
     }
 
     /// nu over its mean whose normal score is z.
     pub(crate) fn ratio(&self, z: f64, edof: f64) -> f64 {
-        if self.is_chi_square(edof) { chi_square_ratio(z, edof) } else { self.ln(z, edof).exp() }
+        if self.is_chi_square(edof) {
+            chi_square_ratio(z, edof)
+        } else {
+            self.ln(z, edof).exp()
+        }
     }
 
     /// Variance of ln nu.
@@ -94,7 +105,11 @@ impl Shape {
         // Halved to 1e-6, the interpolation being coarser.
         for _ in 0..24 {
             let middle = 0.5 * (low + high);
-            if self.variance_of_log(middle) > variance { low = middle } else { high = middle }
+            if self.variance_of_log(middle) > variance {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         0.5 * (low + high)
     }
@@ -107,7 +122,10 @@ impl Shape {
     fn ln(&self, z: f64, edof: f64) -> f64 {
         let root = (edof / self.degrees).sqrt();
         let score = |p: &Point| p.w * root + p.c / root;
-        let above = self.points.partition_point(|p| score(p) < z).clamp(1, self.points.len() - 1);
+        let above = self
+            .points
+            .partition_point(|p| score(p) < z)
+            .clamp(1, self.points.len() - 1);
         let (a, b) = (&self.points[above - 1], &self.points[above]);
         let (from, to) = (score(a), score(b));
         a.ln + (z - from) / (to - from) * (b.ln - a.ln)
@@ -168,13 +186,23 @@ mod tests {
     #[test]
     fn scores_become_chi_square() {
         use statrs::distribution::{ChiSquared, ContinuousCDF};
-        for (edof, error) in [(0.7, 0.05), (1.0, 0.04), (2.0, 0.03), (5.0, 0.06), (29.0, 0.01), (1e4, 1e-4)] {
+        for (edof, error) in [
+            (0.7, 0.05),
+            (1.0, 0.04),
+            (2.0, 0.03),
+            (5.0, 0.06),
+            (29.0, 0.01),
+            (1e4, 1e-4),
+        ] {
             let law = ChiSquared::new(edof).unwrap();
             for i in -30..=30 {
                 let z = 0.1 * f64::from(i);
                 let exact = law.inverse_cdf(0.5 * erfc(-z * FRAC_1_SQRT_2)) / edof;
                 let found = chi_square_ratio(z, edof);
-                assert!((found / exact).ln().abs() < error, "{edof} {z}: {found} {exact}");
+                assert!(
+                    (found / exact).ln().abs() < error,
+                    "{edof} {z}: {found} {exact}"
+                );
             }
         }
     }

@@ -58,7 +58,10 @@ impl Beginning {
     /// The signal that is furthest from its rest.
     #[must_use]
     pub fn surest(&self) -> Option<(Channel, WarmUp)> {
-        self.signals.iter().copied().max_by(|a, b| a.1.deviations.abs().total_cmp(&b.1.deviations.abs()))
+        self.signals
+            .iter()
+            .copied()
+            .max_by(|a, b| a.1.deviations.abs().total_cmp(&b.1.deviations.abs()))
     }
 }
 
@@ -81,11 +84,18 @@ pub fn warm_up(samples: &[f64]) -> Option<WarmUp> {
         match look(&samples[left..]) {
             Some(more) => left += more.samples,
             None => {
-                return Some(WarmUp { samples: left, change: change(samples, left), ..first });
+                return Some(WarmUp {
+                    samples: left,
+                    change: change(samples, left),
+                    ..first
+                });
             }
         }
     }
-    Some(WarmUp { samples: left, ..first })
+    Some(WarmUp {
+        samples: left,
+        ..first
+    })
 }
 
 /// The scale at which the wavelet variance without the first samples differs most from that with them, in standard
@@ -99,10 +109,15 @@ fn change(samples: &[f64], left: usize) -> Option<Change> {
         // The whole contains the part, so the variance of their difference is the difference of the
         // variances.
         let noise = 2.0 / edof_eta3(part.len(), level) - 2.0 / edof_eta3(samples.len(), level);
-        (ratio.ln().abs() / noise.max(f64::MIN_POSITIVE).sqrt(), Change { level, ratio })
+        (
+            ratio.ln().abs() / noise.max(f64::MIN_POSITIVE).sqrt(),
+            Change { level, ratio },
+        )
     };
     let surest = (1..=levels).map(of_level).filter(|(z, _)| z.is_finite());
-    surest.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, change)| change)
+    surest
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, change)| change)
 }
 
 fn variances(samples: &[f64], levels: u32) -> Option<Vec<f64>> {
@@ -124,18 +139,29 @@ fn look(samples: &[f64]) -> Option<WarmUp> {
     let steps: Vec<f64> = means.windows(2).map(|m| m[1] - m[0]).collect();
     // ln: a factor in the noise is then a shift, and the scatter of a variance does not depend on its size.
     let squares = |p: &&[f64]| {
-        let present = || p.windows(2).map(|x| (x[1] - x[0]).powi(2)).filter(|square| !square.is_nan());
+        let present = || {
+            p.windows(2)
+                .map(|x| (x[1] - x[0]).powi(2))
+                .filter(|square| !square.is_nan())
+        };
         (present().sum::<f64>() * (length - 1) as f64 / present().count() as f64).ln()
     };
     let noise: Vec<f64> = parts.iter().map(squares).collect();
     let mut found = None;
     // The parts that are compared with the last eight must not be among them; a step needs two parts.
     for first in 0..PARTS - LAST - 1 {
-        let out_of_place_in = |values: &Vec<f64>| out_of_place(values[first], &values[values.len() - LAST..]);
-        let Some(deviations) = out_of_place_in(&steps).or_else(|| out_of_place_in(&noise)) else { break };
+        let out_of_place_in =
+            |values: &Vec<f64>| out_of_place(values[first], &values[values.len() - LAST..]);
+        let Some(deviations) = out_of_place_in(&steps).or_else(|| out_of_place_in(&noise)) else {
+            break;
+        };
         // The first alarm is the one that is told; later ones only lengthen what is left out.
         let deviations = found.map_or(deviations, |f: WarmUp| f.deviations);
-        found = Some(WarmUp { samples: (first + 1) * length, deviations, change: None });
+        found = Some(WarmUp {
+            samples: (first + 1) * length,
+            deviations,
+            change: None,
+        });
     }
     found
 }
@@ -177,7 +203,9 @@ mod tests {
     #[test]
     fn what_begins_as_it_goes_on_raises_no_alarm() {
         let mut generator = Generator::seed_from_u64(3);
-        let alarms = (0..400).filter(|_| warm_up(&signal(&mut generator)).is_some()).count();
+        let alarms = (0..400)
+            .filter(|_| warm_up(&signal(&mut generator)).is_some())
+            .count();
         assert!(alarms <= 1, "{alarms}");
     }
 
@@ -193,7 +221,10 @@ mod tests {
             .map(|(t, x)| x + 200.0 * (-(t as f64) / length).exp())
             .collect();
         let found = warm_up(&signal).unwrap();
-        assert!((2 * SAMPLES / 16..=6 * SAMPLES / 16).contains(&found.samples), "{found:?}");
+        assert!(
+            (2 * SAMPLES / 16..=6 * SAMPLES / 16).contains(&found.samples),
+            "{found:?}"
+        );
     }
 
     #[test]
@@ -201,12 +232,17 @@ mod tests {
         let mut generator = Generator::seed_from_u64(5);
         let mut signal = signal(&mut generator);
         let mut normal = || generator.sample::<f64, _>(StandardNormal);
-        signal[..SAMPLES / 8].iter_mut().for_each(|x| *x += 2.0 * normal());
+        signal[..SAMPLES / 8]
+            .iter_mut()
+            .for_each(|x| *x += 2.0 * normal());
         let found = warm_up(&signal).unwrap();
         assert_eq!(found.samples, SAMPLES / 8, "{found:?}");
         // An eighth with five times the variance at the first scale: without it 1/(1 + 4/8) = 0.67.
         let change = found.change.unwrap();
-        assert!(change.level == 1 && (change.ratio - 0.67).abs() < 0.03, "{change:?}");
+        assert!(
+            change.level == 1 && (change.ratio - 0.67).abs() < 0.03,
+            "{change:?}"
+        );
     }
 
     /// What is advised is all there is to leave out.
@@ -217,9 +253,15 @@ mod tests {
             let mut signal = signal(&mut generator);
             let mut normal = || generator.sample::<f64, _>(StandardNormal);
             let fades = |t: usize| 3.0 * (-(t as f64) / (0.05 * SAMPLES as f64)).exp();
-            signal.iter_mut().enumerate().for_each(|(t, x)| *x += fades(t) * normal());
+            signal
+                .iter_mut()
+                .enumerate()
+                .for_each(|(t, x)| *x += fades(t) * normal());
             let found = warm_up(&signal).unwrap();
-            assert!(found.change.is_none() || warm_up(&signal[found.samples..]).is_none(), "{found:?}");
+            assert!(
+                found.change.is_none() || warm_up(&signal[found.samples..]).is_none(),
+                "{found:?}"
+            );
         }
     }
 

@@ -36,7 +36,9 @@ pub(super) fn alarms(table: &Table, noise: &[Noise], source: &str, process: &str
     let mut active = vec![true; files];
     let mut found = Vec::new();
     while active.iter().filter(|on| **on).count() >= FEWEST {
-        let Some(next) = most_abnormal(table, noise, &active, source, process) else { break };
+        let Some(next) = most_abnormal(table, noise, &active, source, process) else {
+            break;
+        };
         if next.p_value > FALSE_ALARM {
             break;
         }
@@ -70,7 +72,13 @@ fn most_abnormal(
         table.shared(noise, &table.between(noise, &others), &others)
     };
     let draw = |run: usize| {
-        let key = StreamKey { seed: SEED, scenario: "diagnosis", run: run as u64, source, process };
+        let key = StreamKey {
+            seed: SEED,
+            scenario: "diagnosis",
+            run: run as u64,
+            source,
+            process,
+        };
         let drawn = table.drawn(noise, &between, shared, &mut key.generator());
         // The whole search is repeated for each draw, so that looking at many windows and files is paid for.
         let all = furthest(&drawn, noise, active);
@@ -79,14 +87,24 @@ fn most_abnormal(
     let draws: Vec<[f64; 2]> = (0..DRAWS).into_par_iter().map(draw).collect();
     // Both kinds of F in units of what each exceeds with the probability of a false alarm.
     let limits = [0, 1].map(|kind| limit(draws.iter().map(|d| d[kind]).collect()));
-    let joint = |f: &[f64; 2]| f.iter().zip(&limits).map(|(f, limit)| f / limit).fold(0.0, f64::max);
+    let joint = |f: &[f64; 2]| {
+        f.iter()
+            .zip(&limits)
+            .map(|(f, limit)| f / limit)
+            .fold(0.0, f64::max)
+    };
     let file = (0..own.len()).max_by(|a, b| joint(&own[*a].f).total_cmp(&joint(&own[*b].f)))?;
     let Furthest { f, at } = own.swap_remove(file);
     let kind = usize::from(f[1] / limits[1] > f[0] / limits[0]);
     let larger = draws.iter().filter(|d| joint(d) >= joint(&f)).count();
     let [plain, passed] = at;
     let (window, distance) = if kind == 0 { plain } else { passed }?;
-    Some(Found { file, p_value: (1 + larger) as f64 / (1 + DRAWS) as f64, window, distance })
+    Some(Found {
+        file,
+        p_value: (1 + larger) as f64 / (1 + DRAWS) as f64,
+        window,
+        distance,
+    })
 }
 
 /// Value that a share [`FALSE_ALARM`] of the values exceeds; 1 where all are 0.
@@ -94,7 +112,11 @@ fn limit(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     // Of 799 values 19 lie above this one: 20/800 = 2.5 % with the observed one counted among them.
     let index = ((1.0 - FALSE_ALARM) * values.len() as f64) as usize;
-    values.get(index).copied().filter(|v| *v > 0.0).unwrap_or(1.0)
+    values
+        .get(index)
+        .copied()
+        .filter(|v| *v > 0.0)
+        .unwrap_or(1.0)
 }
 
 #[cfg(test)]
@@ -113,18 +135,26 @@ mod tests {
         let white = Composite::new(vec![Process::White(White::new(1.0).unwrap())]);
         let law = SamplingLaw::new(&white, 13);
         let edof = law.edof(1 << 16);
-        let noise: Vec<Noise> = (0..3).map(|_| Noise::new(law.first(13), vec![edof.clone(); 4])).collect();
+        let noise: Vec<Noise> = (0..3)
+            .map(|_| Noise::new(law.first(13), vec![edof.clone(); 4]))
+            .collect();
         let mut generator = Generator::seed_from_u64(1);
         let mut file = || -> [Vec<f64>; 3] {
             let common = 0.3 * generator.sample::<f64, _>(StandardNormal);
             std::array::from_fn(|_| {
-                law.draw(&edof, &mut generator).into_iter().map(|ratio| ratio.ln() + common).collect()
+                law.draw(&edof, &mut generator)
+                    .into_iter()
+                    .map(|ratio| ratio.ln() + common)
+                    .collect()
             })
         };
         let alarmed = |set: usize| {
             let files: Vec<[Vec<f64>; 3]> = (0..4).map(|_| file()).collect();
             let axis = |a: usize| files.iter().map(|file| Some(file[a].clone())).collect();
-            let table = Table { logs: (0..3).map(axis).collect(), above_only: false };
+            let table = Table {
+                logs: (0..3).map(axis).collect(),
+                above_only: false,
+            };
             usize::from(!alarms(&table, &noise, &set.to_string(), "noise").is_empty())
         };
         let alarms: usize = (0..100).map(alarmed).sum();

@@ -92,10 +92,18 @@ pub(super) fn common(pieces: &[Piece<'_>], settings: &Settings) -> Common {
     // Outliers raise the classical variance by anything; that they make up for the allowance, no more and no less, at every
     // scale is not to be expected.
     if !found.is_empty() && found.iter().all(|e| !e.alarms(e.gaussian.abs())) {
-        let read_low = found.iter().map(|e| (e.quantizer - e.gaussian).exp_m1()).fold(0.0, f64::max);
-        return Common { gaussian: Some(GaussianQuantization { tau_s, read_low }), ..Common::default() };
+        let read_low = found
+            .iter()
+            .map(|e| (e.quantizer - e.gaussian).exp_m1())
+            .fold(0.0, f64::max);
+        return Common {
+            gaussian: Some(GaussianQuantization { tau_s, read_low }),
+            ..Common::default()
+        };
     }
-    let most = found.iter().max_by(|a, b| a.quantizer.total_cmp(&b.quantizer));
+    let most = found
+        .iter()
+        .max_by(|a, b| a.quantizer.total_cmp(&b.quantizer));
     let outliers = most.map(|most| CommonOutliers {
         tau_s,
         most_tau_s: most.tau_s,
@@ -103,8 +111,16 @@ pub(super) fn common(pieces: &[Piece<'_>], settings: &Settings) -> Common {
         deviations: most.quantizer / most.sigma,
     });
     // Outliers of the finer scales explain what the coarser steps show.
-    let steps = if outliers.is_some() { None } else { coarse_steps(&stepped) };
-    Common { outliers, gaussian: None, steps }
+    let steps = if outliers.is_some() {
+        None
+    } else {
+        coarse_steps(&stepped)
+    };
+    Common {
+        outliers,
+        gaussian: None,
+        steps,
+    }
 }
 
 fn coarse_steps(stepped: &[Excess]) -> Option<CoarseSteps> {
@@ -116,11 +132,15 @@ fn coarse_steps(stepped: &[Excess]) -> Option<CoarseSteps> {
 
 fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
     let (test, tuning) = (Test::Outliers, &settings.tuning);
-    let (mut of_quantizer, mut of_gaussian, mut variance, mut stepped) = (Vec::new(), Vec::new(), 0.0, 0);
+    let (mut of_quantizer, mut of_gaussian, mut variance, mut stepped) =
+        (Vec::new(), Vec::new(), 0.0, 0);
     for piece in pieces.iter().filter(|p| !p.drifts(level)) {
         let long_enough = |r: &&&Replicate| test.levels(piece, r) > level;
         for replicate in piece.replicates.iter().flatten().filter(long_enough) {
-            let eta = test.edof(piece.law.edof(replicate.samples)[level], tuning.efficiency());
+            let eta = test.edof(
+                piece.law.edof(replicate.samples)[level],
+                tuning.efficiency(),
+            );
             let (read_high, _) = tuning.quantization().factor(piece.law.quantization[level]);
             // E ln(chi²/eta) ≈ −1/eta: lower for the robust variance, by (1/e − 1)/eta of the classical one,
             // which is 1/eta here. The bias of robust variances of few coefficients is left out.

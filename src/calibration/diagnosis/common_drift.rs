@@ -17,14 +17,22 @@ const FEWEST: usize = 3;
 
 /// The drift that the recordings of a sensor share; none where the model has one.
 pub(super) fn common_drift(pieces: &[Piece<'_>], rate_hz: f64) -> Option<CommonDrift> {
-    let has_drift = |p: &Piece<'_>| p.model.processes.iter().any(|p| matches!(p, Process::Drift(_)));
+    let has_drift = |p: &Piece<'_>| {
+        p.model
+            .processes
+            .iter()
+            .any(|p| matches!(p, Process::Drift(_)))
+    };
     if pieces.iter().any(has_drift) {
         return None;
     }
     let slopes = |p: &Piece<'_>| {
         // The two halves are half a record apart.
-        let all =
-            p.replicates.iter().flatten().map(|r| r.trend * rate_hz * 3600.0 / (0.5 * r.samples as f64));
+        let all = p
+            .replicates
+            .iter()
+            .flatten()
+            .map(|r| r.trend * rate_hz * 3600.0 / (0.5 * r.samples as f64));
         (p.axis, all.filter(|slope| slope.is_finite()).collect())
     };
     shared(&pieces.iter().map(slopes).collect::<Vec<_>>())
@@ -38,7 +46,11 @@ fn shared(slopes: &[(Axis, Vec<f64>)]) -> Option<CommonDrift> {
         .collect();
     // Bonferroni: any axis may be the one.
     let limit = FALSE_ALARM / tested.len() as f64;
-    let p_value = tested.iter().map(|(.., p)| *p).fold(f64::INFINITY, f64::min) * tested.len() as f64;
+    let p_value = tested
+        .iter()
+        .map(|(.., p)| *p)
+        .fold(f64::INFINITY, f64::min)
+        * tested.len() as f64;
     let seen = || tested.iter().filter(|(.., p)| *p <= limit);
     (seen().count() > 0).then(|| CommonDrift {
         p_value,
@@ -54,7 +66,9 @@ fn student(values: &[f64]) -> Option<(f64, f64, f64)> {
     let squares = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
     let t = mean / (squares / (count * (count - 1.0))).sqrt();
     let is_known = values.len() >= FEWEST && t.is_finite();
-    let law = StudentsT::new(0.0, 1.0, count - 1.0).ok().filter(|_| is_known)?;
+    let law = StudentsT::new(0.0, 1.0, count - 1.0)
+        .ok()
+        .filter(|_| is_known)?;
     Some((mean, t, 2.0 * law.sf(t.abs())))
 }
 
@@ -84,7 +98,9 @@ mod tests {
         for (count, widest) in [(3, 1.0), (6, 1.0), (3, 5.0), (6, 5.0)] {
             let mut slopes = || {
                 let deviation = |k: usize| if k == 0 { widest } else { 1.0 };
-                (0..count).map(|k| deviation(k) * generator.sample::<f64, _>(StandardNormal)).collect()
+                (0..count)
+                    .map(|k| deviation(k) * generator.sample::<f64, _>(StandardNormal))
+                    .collect()
             };
             let mut told = || shared(&Axis::ALL.map(|axis| (axis, slopes()))).is_some();
             let rate = (0..4000).filter(|_| told()).count() as f64 / 4000.0;

@@ -39,8 +39,12 @@ impl Table {
         generator: &mut Generator,
     ) -> Self {
         let files = self.logs.first().map_or(0, Vec::len);
-        let mut normals =
-            || -> Vec<f64> { between.iter().map(|_| generator.sample(StandardNormal)).collect() };
+        let mut normals = || -> Vec<f64> {
+            between
+                .iter()
+                .map(|_| generator.sample(StandardNormal))
+                .collect()
+        };
         let common: Vec<Vec<f64>> = (0..files).map(|_| normals()).collect();
         let mut file = |noise: &Noise, k: usize, own: &Option<Vec<f64>>| {
             own.as_ref().map(|own| {
@@ -51,13 +55,26 @@ impl Table {
                     let mask = if seen.is_finite() { 0.0 } else { f64::NAN };
                     mask + value + b * (shared.sqrt() * common + (1.0 - shared).sqrt() * own)
                 };
-                values.into_iter().zip(between).zip(&common[k]).zip(own).map(difference).collect()
+                values
+                    .into_iter()
+                    .zip(between)
+                    .zip(&common[k])
+                    .zip(own)
+                    .map(difference)
+                    .collect()
             })
         };
         let axis = |(files, noise): (&Files, &Noise)| {
-            files.iter().enumerate().map(|(k, own)| file(noise, k, own)).collect()
+            files
+                .iter()
+                .enumerate()
+                .map(|(k, own)| file(noise, k, own))
+                .collect()
         };
-        Self { logs: self.logs.iter().zip(noise).map(axis).collect(), above_only: self.above_only }
+        Self {
+            logs: self.logs.iter().zip(noise).map(axis).collect(),
+            above_only: self.above_only,
+        }
     }
 
     /// Share that the axes of a file have in common of the variance by which the active files differ beyond
@@ -70,20 +87,26 @@ impl Table {
             for (i, one) in contrasts.iter().enumerate() {
                 for other in &contrasts[..i] {
                     let pairs = one.values.iter().zip(&other.values);
-                    let products: Vec<f64> = pairs.filter_map(|(x, y)| Some((*x)? * (*y)?)).collect();
+                    let products: Vec<f64> =
+                        pairs.filter_map(|(x, y)| Some((*x)? * (*y)?)).collect();
                     let excess = between * between;
                     // Inverse variance of a product of two independent values about 0, both of the mean noise
                     // plus the excess.
                     let weight = (0.5 * (one.noise + other.noise) + excess).powi(-2);
                     // Signals have independent noise: what two axes have in common is what recordings differ
                     // by.
-                    covariance += weight * products.iter().sum::<f64>() / (products.len() as f64 - 1.0);
+                    covariance +=
+                        weight * products.iter().sum::<f64>() / (products.len() as f64 - 1.0);
                     variance += weight * excess;
                 }
             }
         }
         let share = covariance / variance;
-        if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 }
+        if share.is_finite() {
+            share.clamp(0.0, 1.0)
+        } else {
+            0.0
+        }
     }
 
     /// Standard deviation by which the active files differ at each level, beyond their noise.
@@ -100,20 +123,34 @@ impl Table {
                 own += axis.noise * (axis.count - 1.0);
             }
             let excess = (squares - own) / freedom;
-            if excess.is_finite() { excess.max(0.0).sqrt() } else { 0.0 }
+            if excess.is_finite() {
+                excess.max(0.0).sqrt()
+            } else {
+                0.0
+            }
         };
         (0..levels).map(level).collect()
     }
 
     /// The contrasts of a window, of each axis with enough active files.
-    fn contrasts(&self, noise: &[Noise], window: Window, index: usize, active: &[bool]) -> Vec<Contrast> {
+    fn contrasts(
+        &self,
+        noise: &[Noise],
+        window: Window,
+        index: usize,
+        active: &[bool],
+    ) -> Vec<Contrast> {
         let axis = |a: usize| {
             let (files, noise) = (self.logs.get(a)?, noise.get(a)?);
             // A short recording has no value at the longest scales.
-            let mean =
-                |logs: &Vec<f64>| Some(logs.get(window.range())?.iter().sum::<f64>() / window.width as f64);
-            let values: Vec<Option<f64>> =
-                files.iter().zip(active).map(|(f, on)| f.as_ref().filter(|_| *on).and_then(mean)).collect();
+            let mean = |logs: &Vec<f64>| {
+                Some(logs.get(window.range())?.iter().sum::<f64>() / window.width as f64)
+            };
+            let values: Vec<Option<f64>> = files
+                .iter()
+                .zip(active)
+                .map(|(f, on)| f.as_ref().filter(|_| *on).and_then(mean))
+                .collect();
             Contrast::new(a, values, &noise.variances[index])
         };
         (0..self.logs.len()).filter_map(axis).collect()
@@ -146,7 +183,13 @@ impl Contrast {
     fn new(axis: usize, mut values: Vec<Option<f64>>, variances: &[f64]) -> Option<Self> {
         let count = values.iter().flatten().count() as f64;
         let mean = values.iter().flatten().sum::<f64>() / count;
-        let present = || values.iter().zip(variances).filter(|(v, _)| v.is_some()).map(|(_, s)| s);
+        let present = || {
+            values
+                .iter()
+                .zip(variances)
+                .filter(|(v, _)| v.is_some())
+                .map(|(_, s)| s)
+        };
         let noise = present().sum::<f64>() / count;
         // A silent scale (coarse quantisation) has no logarithm, and says nothing, as one does that is no evidence.
         if count < FEWEST as f64 || !mean.is_finite() {
@@ -155,19 +198,37 @@ impl Contrast {
         // About the mean before squares are summed, so that `without` may subtract from them and keep its
         // digits.
         values.iter_mut().flatten().for_each(|v| *v -= mean);
-        let (sum, squares) = (values.iter().flatten().sum(), values.iter().flatten().map(|v| v * v).sum());
+        let (sum, squares) = (
+            values.iter().flatten().sum(),
+            values.iter().flatten().map(|v| v * v).sum(),
+        );
         let excess = variances.iter().map(|s| (s - noise).max(0.0)).collect();
-        Some(Self { axis, values, sum, squares, count, noise, excess })
+        Some(Self {
+            axis,
+            values,
+            sum,
+            squares,
+            count,
+            noise,
+            excess,
+        })
     }
 
     fn without(&self, one: usize, other: usize) -> Rest {
         let (mut sum, mut squares, mut count) = (self.sum, self.squares, self.count);
-        for value in [one, other].into_iter().filter_map(|k| *self.values.get(k)?) {
+        for value in [one, other]
+            .into_iter()
+            .filter_map(|k| *self.values.get(k)?)
+        {
             sum -= value;
             squares -= value * value;
             count -= 1.0;
         }
-        Rest { mean: sum / count, squares: (squares - sum * sum / count).max(0.0), count }
+        Rest {
+            mean: sum / count,
+            squares: (squares - sum * sum / count).max(0.0),
+            count,
+        }
     }
 }
 
@@ -182,8 +243,10 @@ pub(super) struct Distance {
 
 /// F of a file against the others, or all of them but the one without which they agree best.
 fn distance(contrasts: &[Contrast], file: usize, pass_over: bool) -> Option<Distance> {
-    let own: Vec<&Contrast> =
-        contrasts.iter().filter(|c| c.values.get(file).copied().flatten().is_some()).collect();
+    let own: Vec<&Contrast> = contrasts
+        .iter()
+        .filter(|c| c.values.get(file).copied().flatten().is_some())
+        .collect();
     let spread = |other: usize| {
         let rests = || own.iter().map(|c| c.without(file, other));
         rests().map(|r| r.squares).sum::<f64>() / rests().map(|r| r.count - 1.0).sum::<f64>()
@@ -193,7 +256,10 @@ fn distance(contrasts: &[Contrast], file: usize, pass_over: bool) -> Option<Dist
     // first stands out.
     let other = if pass_over {
         let candidates = (0..files).filter(|h| *h != file && own[0].values[*h].is_some());
-        candidates.map(|h| (spread(h), h)).min_by(|a, b| a.0.total_cmp(&b.0))?.1
+        candidates
+            .map(|h| (spread(h), h))
+            .min_by(|a, b| a.0.total_cmp(&b.0))?
+            .1
     } else {
         usize::MAX
     };
@@ -203,7 +269,10 @@ fn distance(contrasts: &[Contrast], file: usize, pass_over: bool) -> Option<Dist
     let of_axis = |c: &&Contrast| {
         let rest = c.without(file, other);
         let d = c.values[file].unwrap_or(rest.mean) - rest.mean;
-        (c.axis, d / (scale2 * (1.0 + 1.0 / rest.count) + c.excess[file]).sqrt())
+        (
+            c.axis,
+            d / (scale2 * (1.0 + 1.0 / rest.count) + c.excess[file]).sqrt(),
+        )
     };
     let deviations: Vec<(usize, f64)> = own.iter().map(of_axis).collect();
     let f = deviations.iter().map(|(_, z)| z * z).sum::<f64>() / deviations.len() as f64;
@@ -223,7 +292,13 @@ pub(super) struct Furthest {
 pub(super) fn furthest(table: &Table, noise: &[Noise], active: &[bool]) -> Vec<Furthest> {
     let levels = noise.first().map_or(0, Noise::levels);
     let count = active.iter().filter(|on| **on).count();
-    let mut all = vec![Furthest { f: [0.0; 2], at: [None, None] }; active.len()];
+    let mut all = vec![
+        Furthest {
+            f: [0.0; 2],
+            at: [None, None]
+        };
+        active.len()
+    ];
     for (index, window) in Window::all(levels).into_iter().enumerate() {
         let contrasts = table.contrasts(noise, window, index, active);
         for (file, furthest) in all.iter_mut().enumerate().filter(|(k, _)| active[*k]) {
@@ -231,7 +306,9 @@ pub(super) fn furthest(table: &Table, noise: &[Noise], active: &[bool]) -> Vec<F
                 if pass_over && count < FEWEST_TO_PASS_OVER {
                     continue;
                 }
-                let Some(distance) = distance(&contrasts, file, pass_over) else { continue };
+                let Some(distance) = distance(&contrasts, file, pass_over) else {
+                    continue;
+                };
                 let above = distance.deviations.iter().map(|(_, z)| z).sum::<f64>() > 0.0;
                 if table.above_only && !above {
                     continue;
@@ -248,7 +325,12 @@ pub(super) fn furthest(table: &Table, noise: &[Noise], active: &[bool]) -> Vec<F
 }
 
 /// Deviations of a file at every single scale, `[axis][level]`; 0 where nothing can be said.
-pub(super) fn scores(table: &Table, noise: &[Noise], active: &[bool], file: usize) -> Vec<Vec<f64>> {
+pub(super) fn scores(
+    table: &Table,
+    noise: &[Noise],
+    active: &[bool],
+    file: usize,
+) -> Vec<Vec<f64>> {
     let levels = noise.first().map_or(0, Noise::levels);
     let mut scores = vec![vec![0.0; levels]; table.logs.len()];
     for j in 0..levels {
@@ -270,7 +352,10 @@ mod tests {
 
     fn noise(files: usize, levels: usize, edof: f64) -> Noise {
         let white = Composite::new(vec![Process::White(White::new(1.0).unwrap())]);
-        Noise::new(SamplingLaw::new(&white, levels), vec![vec![edof; levels]; files])
+        Noise::new(
+            SamplingLaw::new(&white, levels),
+            vec![vec![edof; levels]; files],
+        )
     }
 
     /// Five files by hand, one axis: the others of the last are −1, −1, 1, 1 (mean 0, variance 4/3), itself
@@ -278,7 +363,10 @@ mod tests {
     #[test]
     fn a_distance_by_hand() {
         let values = [-1.0, -1.0, 1.0, 1.0, 6.0];
-        let table = Table { logs: vec![values.iter().map(|v| Some(vec![*v])).collect()], above_only: false };
+        let table = Table {
+            logs: vec![values.iter().map(|v| Some(vec![*v])).collect()],
+            above_only: false,
+        };
         let found = furthest(&table, &[noise(5, 1, 1e9)], &[true; 5]);
         approx::assert_relative_eq!(found[4].f[0], 21.6, max_relative = 1e-12);
         assert_eq!(found[4].f[1], 0.0, "five are too few to pass one over");
@@ -299,7 +387,10 @@ mod tests {
     #[test]
     fn distances_follow_fishers_law() {
         let mut generator = Generator::seed_from_u64(5);
-        let alike = Table { logs: vec![vec![Some(vec![0.0]); 8]; 3], above_only: false };
+        let alike = Table {
+            logs: vec![vec![Some(vec![0.0]); 8]; 3],
+            above_only: false,
+        };
         let noise = [noise(8, 1, 1e9), noise(8, 1, 1e9), noise(8, 1, 1e9)];
         let mut f = || {
             let table = alike.drawn(&noise, &[0.3], 0.0, &mut generator);
@@ -312,8 +403,15 @@ mod tests {
     #[test]
     fn one_of_the_others_is_passed_over() {
         let values = [0.0, 0.1, -0.1, 0.05, -0.05, 5.0, 5.0];
-        let table = Table { logs: vec![values.iter().map(|v| Some(vec![*v])).collect()], above_only: false };
+        let table = Table {
+            logs: vec![values.iter().map(|v| Some(vec![*v])).collect()],
+            above_only: false,
+        };
         let found = furthest(&table, &[noise(7, 1, 1e9)], &[true; 7]);
-        assert!(found[6].f[0] < 10.0 && found[6].f[1] > 1000.0, "{:?}", found[6]);
+        assert!(
+            found[6].f[0] < 10.0 && found[6].f[1] > 1000.0,
+            "{:?}",
+            found[6]
+        );
     }
 }

@@ -15,10 +15,18 @@ use rayon::prelude::*;
 /// Diagnoses every recording, sensor by sensor. Without two recordings there is nothing to compare.
 #[must_use]
 pub fn diagnose(groups: &[Group], outcomes: &[Outcome], settings: &Settings) -> Vec<Diagnosis> {
-    Sensor::ALL.into_iter().flat_map(|sensor| of_sensor(sensor, groups, outcomes, settings)).collect()
+    Sensor::ALL
+        .into_iter()
+        .flat_map(|sensor| of_sensor(sensor, groups, outcomes, settings))
+        .collect()
 }
 
-fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &Settings) -> Vec<Diagnosis> {
+fn of_sensor(
+    sensor: Sensor,
+    groups: &[Group],
+    outcomes: &[Outcome],
+    settings: &Settings,
+) -> Vec<Diagnosis> {
     let own: Vec<&Group> = groups.iter().filter(|g| g.scope.sensor == sensor).collect();
     let mut names: Vec<&str> = Vec::new();
     for replicate in own.iter().flat_map(|g| &g.replicates) {
@@ -32,19 +40,31 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
     let pieces = axes(&own, &names, outcomes);
     let common = common(&pieces, settings);
     let common_drift = common_drift(&pieces, settings.rate_hz);
-    let pieces = if names.len() < FEWEST { Vec::new() } else { pieces };
+    let pieces = if names.len() < FEWEST {
+        Vec::new()
+    } else {
+        pieces
+    };
     let [noise, outliers] = [Test::Noise, Test::Outliers]
         .map(|test| Comparison::new(&pieces, sensor, test, settings.tuning.efficiency()));
     let drift = Comparison::drift(&pieces, sensor, &noise);
     let without = |name: &str| {
         let fits: Vec<_> = own
             .iter()
-            .flat_map(|g| outcomes.iter().filter(|o| o.scope == g.scope).map(move |o| (*g, o)))
+            .flat_map(|g| {
+                outcomes
+                    .iter()
+                    .filter(|o| o.scope == g.scope)
+                    .map(move |o| (*g, o))
+            })
             .collect();
-        fits.into_par_iter().filter_map(|(g, o)| left_out(g, name, o, settings)).collect()
+        fits.into_par_iter()
+            .filter_map(|(g, o)| left_out(g, name, o, settings))
+            .collect()
     };
     let diagnosis = |(index, name): (usize, &&str)| {
-        let [of_noise, of_outliers] = [&noise, &outliers].map(|test| test.alarm(index, settings.rate_hz));
+        let [of_noise, of_outliers] =
+            [&noise, &outliers].map(|test| test.alarm(index, settings.rate_hz));
         let of_drift = drift.drift_alarm(index, &pieces);
         let verdict = match (&of_noise, &of_outliers, &of_drift) {
             (Some(_), _, _) => Verdict::Noise,
@@ -72,5 +92,10 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
 
 fn joined(pieces: &[Piece<'_>], noise: Vec<Vec<f64>>, outliers: Vec<Vec<f64>>) -> Vec<AxisScores> {
     let all = pieces.iter().zip(noise).zip(outliers);
-    all.map(|((piece, noise), outliers)| AxisScores { axis: piece.axis, noise, outliers }).collect()
+    all.map(|((piece, noise), outliers)| AxisScores {
+        axis: piece.axis,
+        noise,
+        outliers,
+    })
+    .collect()
 }

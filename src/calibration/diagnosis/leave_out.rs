@@ -36,8 +36,18 @@ pub struct Movement {
 }
 
 /// Movement of an outcome without the recording of that name; none if no curve is left.
-pub(super) fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &Settings) -> Option<LeftOut> {
-    let mut rest: Vec<Replicate> = group.replicates.iter().filter(|r| r.name != name).cloned().collect();
+pub(super) fn left_out(
+    group: &Group,
+    name: &str,
+    outcome: &Outcome,
+    settings: &Settings,
+) -> Option<LeftOut> {
+    let mut rest: Vec<Replicate> = group
+        .replicates
+        .iter()
+        .filter(|r| r.name != name)
+        .cloned()
+        .collect();
     // Without the shortest there would be more scales: another fit than this one.
     for replicate in &mut rest {
         replicate.classical.truncate(outcome.curve.levels.len());
@@ -49,12 +59,23 @@ pub(super) fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &
     without.ignored.clone_from(&with.ignored);
     without.classical.clone_from(&with.classical);
     without.differing = with.differing;
-    let moves = with.levels.iter().zip(&with.wv).zip(&with.edof).zip(&without.wv);
+    let moves = with
+        .levels
+        .iter()
+        .zip(&with.wv)
+        .zip(&with.edof)
+        .zip(&without.wv);
     let movement = |(((level, with), edof), without): (((&u32, &f64), &f64), &f64)| {
         let ratio = without / with;
-        (*level, ratio - 1.0, ratio.ln() / variance_of_log(*edof).sqrt())
+        (
+            *level,
+            ratio - 1.0,
+            ratio.ln() / variance_of_log(*edof).sqrt(),
+        )
     };
-    let (level, change, deviations) = moves.map(movement).max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))?;
+    let (level, change, deviations) = moves
+        .map(movement)
+        .max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))?;
     let parameters = outcome
         .estimate_again(&without, settings)
         .map_or(Vec::new(), |fit| movements(outcome, &fit.composite));
@@ -70,12 +91,24 @@ pub(super) fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &
 
 fn movements(outcome: &Outcome, without: &crate::noise::Composite) -> Vec<Movement> {
     let with = &outcome.fit.composite;
-    let of_process = |((a, b), label): ((&crate::noise::Process, &crate::noise::Process), String)| {
-        let pairs = a.parameters().into_iter().zip(b.parameters());
-        let movement = |((parameter, with), (_, without)): ((&'static str, f64), (&'static str, f64))| {
-            Movement { process: label.clone(), parameter, with, without }
+    let of_process =
+        |((a, b), label): ((&crate::noise::Process, &crate::noise::Process), String)| {
+            let pairs = a.parameters().into_iter().zip(b.parameters());
+            let movement =
+                |((parameter, with), (_, without)): ((&'static str, f64), (&'static str, f64))| {
+                    Movement {
+                        process: label.clone(),
+                        parameter,
+                        with,
+                        without,
+                    }
+                };
+            pairs.map(movement).collect::<Vec<_>>()
         };
-        pairs.map(movement).collect::<Vec<_>>()
-    };
-    with.processes.iter().zip(&without.processes).zip(with.labels()).flat_map(of_process).collect()
+    with.processes
+        .iter()
+        .zip(&without.processes)
+        .zip(with.labels())
+        .flat_map(of_process)
+        .collect()
 }

@@ -20,8 +20,9 @@ pub(super) struct Window {
 impl Window {
     /// All windows over so many scales.
     pub(super) fn all(levels: usize) -> Vec<Self> {
-        let of_width =
-            |width: usize| (0..(levels + 1).saturating_sub(width)).map(move |first| Self { first, width });
+        let of_width = |width: usize| {
+            (0..(levels + 1).saturating_sub(width)).map(move |first| Self { first, width })
+        };
         WIDTHS.into_iter().flat_map(of_width).collect()
     }
 
@@ -54,7 +55,11 @@ impl Noise {
     /// Noise of files of one Gaussian number each, whose standard deviation is log-normal about 1 with `log_deviation`.
     pub(super) fn normal(files: usize, log_deviation: f64) -> Self {
         let kind = NoiseKind::Normal(log_deviation);
-        Self { kind, edof: vec![vec![1.0]; files], variances: vec![vec![1.0; files]] }
+        Self {
+            kind,
+            edof: vec![vec![1.0]; files],
+            variances: vec![vec![1.0; files]],
+        }
     }
 
     /// Levels that its files have at most.
@@ -65,7 +70,11 @@ impl Noise {
     /// Draws the values of a file by noise alone, level by level.
     pub(super) fn draw(&self, file: usize, generator: &mut Generator) -> Vec<f64> {
         match &self.kind {
-            NoiseKind::Law(law) => law.draw(&self.edof[file], generator).into_iter().map(f64::ln).collect(),
+            NoiseKind::Law(law) => law
+                .draw(&self.edof[file], generator)
+                .into_iter()
+                .map(f64::ln)
+                .collect(),
             NoiseKind::Normal(log_deviation) => {
                 let mut normal = || generator.sample::<f64, _>(StandardNormal);
                 // A normal number whose standard deviation is itself log-normal: recordings differ in how far they move.
@@ -79,17 +88,30 @@ impl Noise {
         let levels = edof.first().map_or(0, Vec::len);
         let deviations: Vec<Vec<f64>> = edof
             .iter()
-            .map(|e| e.iter().zip(&law.shapes).map(|(e, shape)| shape.variance_of_log(*e).sqrt()).collect())
+            .map(|e| {
+                e.iter()
+                    .zip(&law.shapes)
+                    .map(|(e, shape)| shape.variance_of_log(*e).sqrt())
+                    .collect()
+            })
             .collect();
         let of_window = |window: Window| {
             let of_file = |s: &Vec<f64>| {
-                let pair =
-                    |i: usize| window.range().map(|j| law.correlation[(i, j)] * s[i] * s[j]).sum::<f64>();
+                let pair = |i: usize| {
+                    window
+                        .range()
+                        .map(|j| law.correlation[(i, j)] * s[i] * s[j])
+                        .sum::<f64>()
+                };
                 window.range().map(pair).sum::<f64>() / (window.width * window.width) as f64
             };
             deviations.iter().map(of_file).collect()
         };
         let variances = Window::all(levels).into_iter().map(of_window).collect();
-        Self { kind: NoiseKind::Law(law), edof, variances }
+        Self {
+            kind: NoiseKind::Law(law),
+            edof,
+            variances,
+        }
     }
 }

@@ -35,16 +35,40 @@ impl Piece<'_> {
 }
 
 /// The pieces of a sensor's groups.
-pub(super) fn axes<'a>(own: &[&'a Group], names: &[&str], outcomes: &'a [Outcome]) -> Vec<Piece<'a>> {
-    let levels = own.iter().flat_map(|g| &g.replicates).map(Replicate::levels).max().unwrap_or(0);
+pub(super) fn axes<'a>(
+    own: &[&'a Group],
+    names: &[&str],
+    outcomes: &'a [Outcome],
+) -> Vec<Piece<'a>> {
+    let levels = own
+        .iter()
+        .flat_map(|g| &g.replicates)
+        .map(Replicate::levels)
+        .max()
+        .unwrap_or(0);
     let piece = |axis: Axis| {
-        let group = own.iter().find(|g| g.replicates.iter().any(|r| r.axis == Some(axis)))?;
+        let group = own
+            .iter()
+            .find(|g| g.replicates.iter().any(|r| r.axis == Some(axis)))?;
         // The last estimator is the most robust.
-        let model = &outcomes.iter().rfind(|o| o.scope == group.scope)?.fit.composite;
-        let replicate_of =
-            |name: &&str| group.replicates.iter().find(|r| r.name == **name && r.axis == Some(axis));
+        let model = &outcomes
+            .iter()
+            .rfind(|o| o.scope == group.scope)?
+            .fit
+            .composite;
+        let replicate_of = |name: &&str| {
+            group
+                .replicates
+                .iter()
+                .find(|r| r.name == **name && r.axis == Some(axis))
+        };
         let law = SamplingLaw::new(model, levels);
-        Some(Piece { axis, model, law, replicates: names.iter().map(replicate_of).collect() })
+        Some(Piece {
+            axis,
+            model,
+            law,
+            replicates: names.iter().map(replicate_of).collect(),
+        })
     };
     Axis::ALL.into_iter().filter_map(piece).collect()
 }
@@ -86,13 +110,24 @@ impl Test {
 
     /// Number of levels at which a replicate can be compared with others.
     pub(super) fn levels(self, piece: &Piece<'_>, replicate: &Replicate) -> usize {
-        let edof = piece.law.edof(replicate.samples).into_iter().take(replicate.levels());
-        edof.take_while(|e| self == Self::Noise || *e >= LARGE_SAMPLE).count()
+        let edof = piece
+            .law
+            .edof(replicate.samples)
+            .into_iter()
+            .take(replicate.levels());
+        edof.take_while(|e| self == Self::Noise || *e >= LARGE_SAMPLE)
+            .count()
     }
 
     /// The most levels at which any can be.
     pub(super) fn most_levels(self, pieces: &[Piece<'_>]) -> usize {
-        let of_piece = |p: &Piece<'_>| p.replicates.iter().flatten().map(|r| self.levels(p, r)).max();
+        let of_piece = |p: &Piece<'_>| {
+            p.replicates
+                .iter()
+                .flatten()
+                .map(|r| self.levels(p, r))
+                .max()
+        };
         pieces.iter().filter_map(of_piece).max().unwrap_or(0)
     }
 

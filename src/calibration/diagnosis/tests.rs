@@ -34,7 +34,10 @@ struct Differences {
     shared: f64,
 }
 
-const NONE: Differences = Differences { deviation: 0.0, shared: 0.0 };
+const NONE: Differences = Differences {
+    deviation: 0.0,
+    shared: 0.0,
+};
 const LEVELS: u32 = 10;
 const SAMPLES: usize = 2048;
 
@@ -47,7 +50,14 @@ fn set(
 ) -> Vec<Diagnosis> {
     let recording = |file: usize| {
         let run = file as u64;
-        let mut generator = StreamKey { seed: set, scenario: "", run, source: "", process: "" }.generator();
+        let mut generator = StreamKey {
+            seed: set,
+            scenario: "",
+            run,
+            source: "",
+            process: "",
+        }
+        .generator();
         let common = normals(&mut generator);
         Axis::ALL.map(|axis| {
             let own = normals(&mut generator);
@@ -70,7 +80,10 @@ fn set(
 }
 
 /// Recordings of three axes of an accelerometer against one another.
-fn diagnosed(recordings: impl Iterator<Item = [Vec<f64>; 3]>, settings: &Settings) -> Vec<Diagnosis> {
+fn diagnosed(
+    recordings: impl Iterator<Item = [Vec<f64>; 3]>,
+    settings: &Settings,
+) -> Vec<Diagnosis> {
     let mut replicates = Vec::new();
     for (file, signals) in recordings.enumerate() {
         for (axis, signal) in Axis::ALL.into_iter().zip(signals) {
@@ -86,7 +99,13 @@ fn diagnosed(recordings: impl Iterator<Item = [Vec<f64>; 3]>, settings: &Setting
                 trend,
                 mean: f64::NAN,
             };
-            replicates.push((Channel { sensor: Sensor::Accel, axis }, replicate));
+            replicates.push((
+                Channel {
+                    sensor: Sensor::Accel,
+                    axis,
+                },
+                replicate,
+            ));
         }
     }
     let groups = grouped(replicates, Pool::Sensor);
@@ -115,7 +134,10 @@ fn alarmed(sets: u64, count: usize, differences: Differences) -> [u32; 3] {
 /// by a fifth, each axis by itself or all alike.
 #[test]
 fn alike_recordings_raise_no_more_alarms_than_said() {
-    let by_a_fifth = |shared| Differences { deviation: 0.2, shared };
+    let by_a_fifth = |shared| Differences {
+        deviation: 0.2,
+        shared,
+    };
     for differences in [NONE, by_a_fifth(0.0), by_a_fifth(1.0)] {
         let alarms = alarmed(24, 6, differences);
         assert!(alarms.iter().all(|n| *n <= 3), "{alarms:?} of 24");
@@ -140,10 +162,16 @@ fn false_alarm_rates() {
     ] {
         let alarms = alarmed(400, count, Differences { deviation, shared });
         println!("{count} recordings, deviation {deviation}, shared {shared}: {alarms:?} of 400");
-        assert!(alarms.iter().all(|n| *n <= 22), "{count} {deviation} {shared}: {alarms:?} of 400");
+        assert!(
+            alarms.iter().all(|n| *n <= 22),
+            "{count} {deviation} {shared}: {alarms:?} of 400"
+        );
         most = alarms.into_iter().fold(most, u32::max);
     }
-    println!("figure diagnosis: at most {most} of 400 in {} questions", 8 * 3);
+    println!(
+        "figure diagnosis: at most {most} of 400 in {} questions",
+        8 * 3
+    );
 }
 
 fn verdicts(all: &[Diagnosis]) -> Vec<Verdict> {
@@ -154,16 +182,29 @@ fn verdicts(all: &[Diagnosis]) -> Vec<Verdict> {
 /// 3 %.
 #[test]
 fn outliers_and_another_noise_are_told_apart() {
-    let all =
-        set(100, 7, Differences { deviation: 0.03, shared: 0.0 }, |file, axis, signal| match (file, axis) {
+    let all = set(
+        100,
+        7,
+        Differences {
+            deviation: 0.03,
+            shared: 0.0,
+        },
+        |file, axis, signal| match (file, axis) {
             (2, Axis::X | Axis::Y) => (0..3).for_each(|i| signal[100 + 600 * i] += 60.0),
             (5, _) => signal.iter_mut().for_each(|x| *x *= 1.15),
             _ => {}
-        });
+        },
+    );
     use Verdict::{Noise, Normal, Outliers};
-    assert_eq!(verdicts(&all), [Normal, Normal, Outliers, Normal, Normal, Noise, Normal]);
+    assert_eq!(
+        verdicts(&all),
+        [Normal, Normal, Outliers, Normal, Normal, Noise, Normal]
+    );
     let alarm = all[2].outliers.as_ref().unwrap();
-    assert!(alarm.deviations[0].1 > 5.0 && alarm.deviations[2].1 < 5.0, "{alarm:?}");
+    assert!(
+        alarm.deviations[0].1 > 5.0 && alarm.deviations[2].1 < 5.0,
+        "{alarm:?}"
+    );
 }
 
 /// What spikes do to the parameters: 3 of 60² on two of three axes of 2048 samples make the sigma2 of AWV 1 +
@@ -177,13 +218,26 @@ fn leaving_out_moves_what_it_should() {
         }
     });
     let change_without = |file: usize, estimator: Estimator| {
-        let left = all[file].left_out.iter().find(|l| l.estimator == estimator).unwrap();
-        let sigma2 = left.parameters.iter().find(|m| m.parameter == "sigma2").unwrap();
+        let left = all[file]
+            .left_out
+            .iter()
+            .find(|l| l.estimator == estimator)
+            .unwrap();
+        let sigma2 = left
+            .parameters
+            .iter()
+            .find(|m| m.parameter == "sigma2")
+            .unwrap();
         sigma2.without / sigma2.with - 1.0
     };
-    assert!((change_without(2, Estimator::Awv) + 0.33).abs() < 0.1, "{}", change_without(2, Estimator::Awv));
     assert!(
-        change_without(2, Estimator::SrAwv).abs() < 0.03 && change_without(2, Estimator::DrAwv).abs() < 0.03
+        (change_without(2, Estimator::Awv) + 0.33).abs() < 0.1,
+        "{}",
+        change_without(2, Estimator::Awv)
+    );
+    assert!(
+        change_without(2, Estimator::SrAwv).abs() < 0.03
+            && change_without(2, Estimator::DrAwv).abs() < 0.03
     );
     assert!(change_without(3, Estimator::SrAwv).abs() < 0.03);
 }
@@ -191,13 +245,25 @@ fn leaving_out_moves_what_it_should() {
 /// Two of eight with twice the variance at all scales.
 #[test]
 fn two_abnormal_recordings_do_not_hide_each_other() {
-    let all = set(7, 8, Differences { deviation: 0.03, shared: 0.0 }, |file, _, signal| {
-        if [1, 6].contains(&file) {
-            signal.iter_mut().for_each(|x| *x *= 2.0_f64.sqrt());
-        }
-    });
-    let noisy: Vec<usize> =
-        all.iter().enumerate().filter(|(_, d)| d.verdict == Verdict::Noise).map(|(i, _)| i).collect();
+    let all = set(
+        7,
+        8,
+        Differences {
+            deviation: 0.03,
+            shared: 0.0,
+        },
+        |file, _, signal| {
+            if [1, 6].contains(&file) {
+                signal.iter_mut().for_each(|x| *x *= 2.0_f64.sqrt());
+            }
+        },
+    );
+    let noisy: Vec<usize> = all
+        .iter()
+        .enumerate()
+        .filter(|(_, d)| d.verdict == Verdict::Noise)
+        .map(|(i, _)| i)
+        .collect();
     assert_eq!(noisy, [1, 6]);
 }
 
@@ -205,10 +271,15 @@ fn two_abnormal_recordings_do_not_hide_each_other() {
 /// None is abnormal, and yet the estimators describe different noise. Clean sets say nothing of the kind.
 #[test]
 fn outliers_in_all_recordings_are_told() {
-    let all = set(9, 6, NONE, |_, _, signal| (0..20).for_each(|i| signal[50 + 100 * i] += 8.0));
+    let all = set(9, 6, NONE, |_, _, signal| {
+        (0..20).for_each(|i| signal[50 + 100 * i] += 8.0)
+    });
     assert!(all.iter().all(|d| d.verdict == Verdict::Normal));
     let common = all[0].common.as_ref().unwrap();
-    assert!((common.excess / 0.64 - 1.0).abs() < 0.3 && common.tau_s.contains(&2.0), "{common:?}");
+    assert!(
+        (common.excess / 0.64 - 1.0).abs() < 0.3 && common.tau_s.contains(&2.0),
+        "{common:?}"
+    );
     for seed in 0..6 {
         assert_eq!(set(seed, 6, NONE, |_, _, _| ())[0].common, None);
     }
@@ -221,31 +292,60 @@ fn gaussian_quantization_noise_is_not_taken_for_outliers() {
     let found = |is_gaussian: bool, glitches: usize| {
         let signal = |file: usize, axis: Axis| {
             let run = file as u64;
-            let mut generator =
-                StreamKey { seed: 4, scenario: "", run, source: axis.name(), process: "" }.generator();
+            let mut generator = StreamKey {
+                seed: 4,
+                scenario: "",
+                run,
+                source: axis.name(),
+                process: "",
+            }
+            .generator();
             let mut number = || match is_gaussian {
                 true => generator.sample::<f64, _>(StandardNormal),
                 false => 12.0_f64.sqrt() * (generator.random::<f64>() - 0.5),
             };
             let mut numbers: Vec<f64> = (0..=16 * SAMPLES).map(|_| number()).collect();
-            numbers.iter_mut().skip(50).step_by(330).take(glitches).for_each(|x| *x += 5.0);
+            numbers
+                .iter_mut()
+                .skip(50)
+                .step_by(330)
+                .take(glitches)
+                .for_each(|x| *x += 5.0);
             let mut white = || 0.4 * generator.sample::<f64, _>(StandardNormal);
-            numbers.windows(2).map(|pair| pair[1] - pair[0] + white()).collect()
+            numbers
+                .windows(2)
+                .map(|pair| pair[1] - pair[0] + white())
+                .collect()
         };
         let recording = |file: usize| Axis::ALL.map(|axis| signal(file, axis));
         let model = ModelChoice::Given("WN+QN".parse().unwrap());
-        diagnosed((0..4).map(recording), &Settings { model, ..settings() })
+        diagnosed(
+            (0..4).map(recording),
+            &Settings {
+                model,
+                ..settings()
+            },
+        )
     };
     let all = found(true, 0);
     let gaussian = all[0].gaussian_quantization.as_ref().unwrap();
-    assert!(all[0].common.is_none() && gaussian.tau_s[0] == 2.0, "{gaussian:?}");
+    assert!(
+        all[0].common.is_none() && gaussian.tau_s[0] == 2.0,
+        "{gaussian:?}"
+    );
     assert!((0.08..0.154).contains(&gaussian.read_low), "{gaussian:?}");
     let quantizer = &found(false, 0)[0];
-    assert!(quantizer.common.is_none() && quantizer.gaussian_quantization.is_none(), "{quantizer:?}");
+    assert!(
+        quantizer.common.is_none() && quantizer.gaussian_quantization.is_none(),
+        "{quantizer:?}"
+    );
     // 0.3 % of 5 deviations in a quantizer's numbers add 7.5 % to the classical variance: outliers, though fewer than the
     // 15 % that would make the two variances equal
     let glitched = &found(false, 99)[0];
-    assert!(glitched.common.is_some() && glitched.gaussian_quantization.is_none(), "{glitched:?}");
+    assert!(
+        glitched.common.is_some() && glitched.gaussian_quantization.is_none(),
+        "{glitched:?}"
+    );
 }
 
 /// A slow drift of one of eight recordings over its whole length, on one axis of three. The level's change between the halves
@@ -256,7 +356,10 @@ fn a_slow_drift_is_found() {
     let found = |seed: u64| {
         let all = set(seed, 8, NONE, |file, axis, signal| {
             if file == 3 && axis == Axis::Y {
-                signal.iter_mut().enumerate().for_each(|(t, x)| *x += 3.0 * t as f64 / SAMPLES as f64);
+                signal
+                    .iter_mut()
+                    .enumerate()
+                    .for_each(|(t, x)| *x += 3.0 * t as f64 / SAMPLES as f64);
             }
         });
         all.iter().all(|d| d.drift.is_some() == (d.name == "run3"))
@@ -268,6 +371,9 @@ fn a_slow_drift_is_found() {
 #[test]
 fn three_recordings_cannot_say_which() {
     let all = set(7, 3, NONE, |_, _, _| ());
-    assert!(all.iter().all(|d| d.scores.is_empty() && d.verdict == Verdict::Normal));
+    assert!(
+        all.iter()
+            .all(|d| d.scores.is_empty() && d.verdict == Verdict::Normal)
+    );
     assert!(set(7, 1, NONE, |_, _, _| ()).is_empty());
 }

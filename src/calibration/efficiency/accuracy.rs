@@ -30,10 +30,19 @@ impl Accuracy {
     /// The ratio of this RMSE to another's on the same sets, and its standard error.
     #[must_use]
     pub fn ratio_to(&self, other: &Self) -> (f64, f64) {
-        let ratios: Vec<f64> = self.resampled.iter().zip(&other.resampled).map(|(a, b)| a / b).collect();
+        let ratios: Vec<f64> = self
+            .resampled
+            .iter()
+            .zip(&other.resampled)
+            .map(|(a, b)| a / b)
+            .collect();
         // The deviation of the ratios themselves: the errors of two estimators on one set are correlated, and
         // most of that cancels.
-        let error = if self.rmse_se.is_nan() { f64::NAN } else { standard_deviation(&ratios) };
+        let error = if self.rmse_se.is_nan() {
+            f64::NAN
+        } else {
+            standard_deviation(&ratios)
+        };
         (self.rmse / other.rmse, error)
     }
 }
@@ -52,9 +61,13 @@ pub fn mean_log_rmse(of_parameters: &[&Accuracy]) -> f64 {
 #[must_use]
 pub fn is_more_accurate(one: &[&Accuracy], other: &[&Accuracy], rivals: usize, sets: u64) -> bool {
     let score = |all: &[&Accuracy], n: usize| mean_log(all.iter().map(|a| a.resampled[n]));
-    let differences: Vec<f64> = (0..RESAMPLES).map(|n| score(one, n) - score(other, n)).collect();
+    let differences: Vec<f64> = (0..RESAMPLES)
+        .map(|n| score(one, n) - score(other, n))
+        .collect();
     let law = StudentsT::new(0.0, 1.0, sets as f64 - 1.0);
-    let t = law.map_or(f64::NAN, |law| law.inverse_cdf(1.0 - 0.025 / rivals.max(1) as f64));
+    let t = law.map_or(f64::NAN, |law| {
+        law.inverse_cdf(1.0 - 0.025 / rivals.max(1) as f64)
+    });
     mean_log_rmse(one) + t * standard_deviation(&differences) < mean_log_rmse(other)
 }
 
@@ -71,7 +84,13 @@ fn mean_log(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 pub fn accuracy(estimates: &[f64], target: f64, seed: u64) -> Accuracy {
     let errors: Vec<f64> = estimates.iter().map(|e| (e - target) / target).collect();
     let (bias, spread) = centre_and_spread(&mut errors.clone());
-    let key = StreamKey { seed, scenario: "accuracy", run: 0, source: "bootstrap", process: "" };
+    let key = StreamKey {
+        seed,
+        scenario: "accuracy",
+        run: 0,
+        source: "bootstrap",
+        process: "",
+    };
     let mut generator = key.generator();
     let mut resample = vec![0.0; errors.len()];
     let mut draw = || {
@@ -82,9 +101,18 @@ pub fn accuracy(estimates: &[f64], target: f64, seed: u64) -> Accuracy {
     };
     let resampled: Vec<(f64, f64)> = (0..RESAMPLES).map(|_| draw()).collect();
     let biases: Vec<f64> = resampled.iter().map(|(bias, _)| *bias).collect();
-    let rmses: Vec<f64> = resampled.iter().map(|(bias, spread)| bias.hypot(*spread)).collect();
+    let rmses: Vec<f64> = resampled
+        .iter()
+        .map(|(bias, spread)| bias.hypot(*spread))
+        .collect();
     // A single set says nothing of how sets differ.
-    let error = |x: &[f64]| if estimates.len() > 1 { standard_deviation(x) } else { f64::NAN };
+    let error = |x: &[f64]| {
+        if estimates.len() > 1 {
+            standard_deviation(x)
+        } else {
+            f64::NAN
+        }
+    };
     Accuracy {
         bias,
         spread,
@@ -114,7 +142,13 @@ mod tests {
     use rand_distr::StandardNormal;
 
     fn normals(run: u64, n: usize) -> Vec<f64> {
-        let key = StreamKey { seed: 1, scenario: "", run, source: "test", process: "" };
+        let key = StreamKey {
+            seed: 1,
+            scenario: "",
+            run,
+            source: "test",
+            process: "",
+        };
         let mut g = key.generator();
         (0..n).map(|_| g.sample(StandardNormal)).collect()
     }
@@ -141,13 +175,18 @@ mod tests {
                 accuracy(&estimates, 9.0, run)
             })
             .collect();
-        let scatter =
-            |f: fn(&Accuracy) -> f64| standard_deviation(&studies.iter().map(f).collect::<Vec<_>>());
+        let scatter = |f: fn(&Accuracy) -> f64| {
+            standard_deviation(&studies.iter().map(f).collect::<Vec<_>>())
+        };
         let mean = |f: fn(&Accuracy) -> f64| studies.iter().map(f).sum::<f64>() / 400.0;
-        for (said, seen) in
-            [(mean(|a| a.rmse_se), scatter(|a| a.rmse)), (mean(|a| a.bias_se), scatter(|a| a.bias))]
-        {
-            assert!((said / seen - 1.0).abs() < 5.0 * 0.035 + 0.05, "{said} {seen}");
+        for (said, seen) in [
+            (mean(|a| a.rmse_se), scatter(|a| a.rmse)),
+            (mean(|a| a.bias_se), scatter(|a| a.bias)),
+        ] {
+            assert!(
+                (said / seen - 1.0).abs() < 5.0 * 0.035 + 0.05,
+                "{said} {seen}"
+            );
         }
     }
 
@@ -168,8 +207,10 @@ mod tests {
             accuracy(&estimates, 1.0, 1)
         };
         let told = |n: usize, scale: f64| {
-            let ([a, b], [c, d]) =
-                ([of(n, 0.01, 1), of(n, 0.02, 2)], [of(n, 0.01 * scale, 3), of(n, 0.02 * scale, 4)]);
+            let ([a, b], [c, d]) = (
+                [of(n, 0.01, 1), of(n, 0.02, 2)],
+                [of(n, 0.01 * scale, 3), of(n, 0.02 * scale, 4)],
+            );
             is_more_accurate(&[&a, &b], &[&c, &d], 2, n as u64)
         };
         assert!(told(30, 30.0));

@@ -15,8 +15,15 @@ pub(super) fn nodes(law: Law, centre: f64, parameter: Parameter) -> Vec<(f64, f6
         Law::Normal { sd } if sd > 0.0 => normal(centre, sd, parameter.domain()),
         Law::Normal { .. } => vec![(centre, 1.0)],
         Law::Lognormal { median, sd, .. } if sd > 0.0 => {
-            let scaled = normal(parameter.scaled(median), sd, (f64::NEG_INFINITY, f64::INFINITY));
-            scaled.into_iter().map(|(x, w)| (parameter.unscaled(x), w)).collect()
+            let scaled = normal(
+                parameter.scaled(median),
+                sd,
+                (f64::NEG_INFINITY, f64::INFINITY),
+            );
+            scaled
+                .into_iter()
+                .map(|(x, w)| (parameter.unscaled(x), w))
+                .collect()
         }
         Law::Lognormal { median, .. } => vec![(median, 1.0)],
     }
@@ -64,7 +71,12 @@ fn beta(a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> {
     });
     let eigen = SymmetricEigen::new(matrix);
     // The law has mass 1, so the squared components are the weights as they are.
-    (0..NODES).map(move |i| (0.5 * (1.0 + eigen.eigenvalues[i]), eigen.eigenvectors[(0, i)].powi(2)))
+    (0..NODES).map(move |i| {
+        (
+            0.5 * (1.0 + eigen.eigenvalues[i]),
+            eigen.eigenvectors[(0, i)].powi(2),
+        )
+    })
 }
 
 #[cfg(test)]
@@ -72,18 +84,31 @@ mod tests {
     use super::*;
 
     fn mean(law: Law, centre: f64, parameter: Parameter, f: impl Fn(f64) -> f64) -> f64 {
-        nodes(law, centre, parameter).into_iter().map(|(x, w)| w * f(x)).sum()
+        nodes(law, centre, parameter)
+            .into_iter()
+            .map(|(x, w)| w * f(x))
+            .sum()
     }
 
     /// E B^k = Π (a + i)/(a + b + i).
     #[test]
     fn moments_of_beta_laws() {
         for (a, b) in [(6.0, 2.0), (2.2, 6.1), (1.0, 1.0), (0.5, 0.7), (1.8, 3.5)] {
-            let law = Law::Beta { a, b, low: 0.0, width: 1.0 };
+            let law = Law::Beta {
+                a,
+                b,
+                low: 0.0,
+                width: 1.0,
+            };
             for k in 0..12 {
-                let exact: f64 = (0..k).map(|i| (a + f64::from(i)) / (a + b + f64::from(i))).product();
+                let exact: f64 = (0..k)
+                    .map(|i| (a + f64::from(i)) / (a + b + f64::from(i)))
+                    .product();
                 let found = mean(law, 0.0, Parameter::Sigma2, |x| x.powi(k));
-                assert!((found - exact).abs() < 1e-13, "{a}, {b}, {k}: {found} {exact}");
+                assert!(
+                    (found - exact).abs() < 1e-13,
+                    "{a}, {b}, {k}: {found} {exact}"
+                );
             }
         }
     }
@@ -93,23 +118,40 @@ mod tests {
     fn moments_of_normal_laws() {
         let law = Law::Normal { sd: 2.0 };
         let half = mean(law, 0.0, Parameter::Sigma2, |x| x);
-        assert!((half - 2.0 * (2.0 / std::f64::consts::PI).sqrt()).abs() < 1e-11, "{half}");
+        assert!(
+            (half - 2.0 * (2.0 / std::f64::consts::PI).sqrt()).abs() < 1e-11,
+            "{half}"
+        );
         let whole = mean(law, 3.0, Parameter::Slope, |x| (0.5 * x).exp());
         assert!((whole / 2.0_f64.exp() - 1.0).abs() < 1e-11, "{whole}");
-        assert_eq!(nodes(Law::Normal { sd: 0.0 }, 3.0, Parameter::Sigma2), [(3.0, 1.0)]);
+        assert_eq!(
+            nodes(Law::Normal { sd: 0.0 }, 3.0, Parameter::Sigma2),
+            [(3.0, 1.0)]
+        );
     }
 
     /// E exp(k(mu + sd Z)) = median^k exp(k² sd²/2); of phi the logarithm of 1/κ is normal, so E κ likewise.
     #[test]
     fn moments_of_lognormal_laws() {
-        let law = Law::Lognormal { median: 3.0, sd: 0.5, ci95: None };
+        let law = Law::Lognormal {
+            median: 3.0,
+            sd: 0.5,
+            ci95: None,
+        };
         for k in 1..4 {
             let exact = (3.0_f64.ln() * f64::from(k) + 0.125 * f64::from(k * k)).exp();
             let found = mean(law, 1.0, Parameter::Sigma2, |x| x.powi(k));
             assert!((found / exact - 1.0).abs() < 1e-11, "{k}: {found} {exact}");
         }
-        let law = Law::Lognormal { median: 0.9, sd: 0.5, ci95: None };
+        let law = Law::Lognormal {
+            median: 0.9,
+            sd: 0.5,
+            ci95: None,
+        };
         let kappa = mean(law, 0.5, Parameter::Phi, |phi| -phi.ln());
-        assert!((kappa / (-0.9_f64.ln() * 0.125_f64.exp()) - 1.0).abs() < 1e-11, "{kappa}");
+        assert!(
+            (kappa / (-0.9_f64.ln() * 0.125_f64.exp()) - 1.0).abs() < 1e-11,
+            "{kappa}"
+        );
     }
 }

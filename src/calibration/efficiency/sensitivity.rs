@@ -27,7 +27,11 @@ pub struct Movement {
 ///
 /// # Errors
 /// As [`StudyError`].
-pub fn outlier_curve(design: &Design, unit: f64, sizes: &[f64]) -> Result<Vec<Movement>, StudyError> {
+pub fn outlier_curve(
+    design: &Design,
+    unit: f64,
+    sizes: &[f64],
+) -> Result<Vec<Movement>, StudyError> {
     // Set 0 is one realisation: a sensitivity curve is of a sample, the influence function of its limit.
     let mut samples = design.synthesized(0, 1, &design.drawn(0, 1)?);
     let middle = samples.len() / 2;
@@ -43,8 +47,13 @@ pub fn outlier_curve(design: &Design, unit: f64, sizes: &[f64]) -> Result<Vec<Mo
 ///
 /// # Errors
 /// As [`StudyError`]; when the model has no random walk.
-pub fn abnormal_curve(design: &Design, count: u64, factors: &[f64]) -> Result<Vec<Movement>, StudyError> {
-    let abnormal: Vec<u64> = (1 + design.replicates.saturating_sub(count)..=design.replicates).collect();
+pub fn abnormal_curve(
+    design: &Design,
+    count: u64,
+    factors: &[f64],
+) -> Result<Vec<Movement>, StudyError> {
+    let abnormal: Vec<u64> =
+        (1 + design.replicates.saturating_sub(count)..=design.replicates).collect();
     curve(design, &abnormal, factors, |replicate, factor| {
         let mut model = design.drawn(0, replicate)?;
         let rate_hz = model.rate_hz;
@@ -53,7 +62,9 @@ pub fn abnormal_curve(design: &Design, count: u64, factors: &[f64]) -> Result<Ve
             Process::RandomWalk(walk) => Some((walk.gamma2(), p)),
             _ => None,
         });
-        let none = StudyError::NoRandomWalk { channel: design.channel };
+        let none = StudyError::NoRandomWalk {
+            channel: design.channel,
+        };
         let (gamma2, walk) = walk.ok_or(none)?;
         if let Some(scaled) = walk.with_parameter("gamma2", factor * gamma2, rate_hz) {
             *walk = scaled.map_err(crate::noise::SpreadError::Reaches)?;
@@ -70,7 +81,9 @@ fn curve(
     mut disturbed: impl FnMut(u64, f64) -> Result<Replicate, StudyError>,
 ) -> Result<Vec<Movement>, StudyError> {
     let clean = |r| design.measure(&design.synthesized(0, r, &design.drawn(0, r)?));
-    let mut replicates = (1..=design.replicates).map(clean).collect::<Result<Vec<_>, _>>()?;
+    let mut replicates = (1..=design.replicates)
+        .map(clean)
+        .collect::<Result<Vec<_>, _>>()?;
     let reference = design.estimate_all(&replicates)?;
     let mut changes_at = |size: &f64| {
         // Overwritten at every size, so each starts from the clean ones and not from the size before.
@@ -78,14 +91,26 @@ fn curve(
             replicates[*replicate as usize - 1] = disturbed(*replicate, *size)?;
         }
         let moved = design.estimate_all(&replicates)?;
-        let changes = moved.iter().zip(&reference).map(|(m, r)| relative(m, r)).collect();
-        Ok(Movement { size: *size, changes })
+        let changes = moved
+            .iter()
+            .zip(&reference)
+            .map(|(m, r)| relative(m, r))
+            .collect();
+        Ok(Movement {
+            size: *size,
+            changes,
+        })
     };
     sizes.iter().map(&mut changes_at).collect()
 }
 
 fn relative(moved: &Estimate, reference: &Estimate) -> Vec<f64> {
-    moved.theta.iter().zip(&reference.theta).map(|(m, r)| (m - r) / r).collect()
+    moved
+        .theta
+        .iter()
+        .zip(&reference.theta)
+        .map(|(m, r)| (m - r) / r)
+        .collect()
 }
 
 #[cfg(test)]
@@ -113,7 +138,11 @@ mod tests {
         let moves = outlier_curve(&design, 1.0, &[1e2, 1e6, 1e7, 1e9]).unwrap();
         let awv = |i: usize| moves[i].changes[AWV][WHITE];
         let expected = 1e12 / (16_384.0 * 5.0);
-        assert!((awv(1) / expected - 1.0).abs() < 0.3, "{} {expected}", awv(1));
+        assert!(
+            (awv(1) / expected - 1.0).abs() < 0.3,
+            "{} {expected}",
+            awv(1)
+        );
         assert!((awv(2) / awv(1) - 100.0).abs() < 1.0, "{}", awv(2) / awv(1));
         for m in &moves {
             assert!(largest(&m.changes[SR]) < 1.0, "{m:?}");
@@ -151,8 +180,12 @@ mod tests {
     #[test]
     fn dr_awv_withstands_as_many_abnormal_replicates_as_it_trims() {
         for trim in [1, 2] {
-            let design = Design { trim: Trim::Count(trim), ..design(1 << 13) };
-            let change = |count| largest(&abnormal_curve(&design, count, &[1e8]).unwrap()[0].changes[DR]);
+            let design = Design {
+                trim: Trim::Count(trim),
+                ..design(1 << 13)
+            };
+            let change =
+                |count| largest(&abnormal_curve(&design, count, &[1e8]).unwrap()[0].changes[DR]);
             let borne = trim as u64;
             assert!(change(borne) < 5.0, "{trim}: {}", change(borne));
             assert!(change(borne + 1) > 1e4, "{trim}: {}", change(borne + 1));
@@ -164,6 +197,9 @@ mod tests {
         let mut design = design(1 << 12);
         design.model.axes[0].processes.pop();
         let e = abnormal_curve(&design, 1, &[2.0]).unwrap_err();
-        assert_eq!(e.to_string(), "accel.x has no random walk whose variance could be made abnormal");
+        assert_eq!(
+            e.to_string(),
+            "accel.x has no random walk whose variance could be made abnormal"
+        );
     }
 }

@@ -75,7 +75,12 @@ fn weighted<'a>(
     let mut all = vec![(*process, 1.0)];
     for law in laws {
         let name = law.parameter();
-        let own = process.kind().parameters().iter().zip(process.values()).find(|(p, _)| p.name() == name);
+        let own = process
+            .kind()
+            .parameters()
+            .iter()
+            .zip(process.values())
+            .find(|(p, _)| p.name() == name);
         let (parameter, centre) = own.ok_or_else(|| law.no_parameter(process))?;
         let nodes = nodes(law.law(), centre, *parameter);
         let mut next = Vec::with_capacity(all.len() * nodes.len());
@@ -106,7 +111,8 @@ mod tests {
     /// The mean over 20000 drawn models is within 5 of its standard errors of the quadrature.
     #[test]
     fn expectation_is_the_mean_over_drawn_models() {
-        let process = |code, values: &[f64]| Process::from_values(code, values, RATE).unwrap().unwrap();
+        let process =
+            |code, values: &[f64]| Process::from_values(code, values, RATE).unwrap().unwrap();
         let noise = Composite::new(vec![
             process("AR1", &[0.9, 1.0]),
             process("GM", &[2.0, 3.0]),
@@ -114,23 +120,49 @@ mod tests {
             process("WN", &[1.0]),
         ]);
         let laws = vec![
-            law(&noise, "AR1", "phi", Law::Beta { a: 0.8, b: 2.0, low: 0.5, width: 0.49 }),
+            law(
+                &noise,
+                "AR1",
+                "phi",
+                Law::Beta {
+                    a: 0.8,
+                    b: 2.0,
+                    low: 0.5,
+                    width: 0.49,
+                },
+            ),
             law(&noise, "AR1", "sigma2", Law::Normal { sd: 0.8 }),
-            law(&noise, "GM", "beta", Law::Beta { a: 2.0, b: 3.0, low: 1.0, width: 5.0 }),
+            law(
+                &noise,
+                "GM",
+                "beta",
+                Law::Beta {
+                    a: 2.0,
+                    b: 3.0,
+                    low: 1.0,
+                    width: 5.0,
+                },
+            ),
             law(&noise, "DR", "slope", Law::Normal { sd: 0.02 }),
         ];
         let exact = expected_wv(&noise, &laws, RATE, 12).unwrap();
         let model = Model::pooled(RATE, &noise, &noise);
-        let spread = Spread { axes: [laws, vec![], vec![], vec![], vec![], vec![]] };
+        let spread = Spread {
+            axes: [laws, vec![], vec![], vec![], vec![], vec![]],
+        };
         let n = 20_000_u32;
-        let drawn: Vec<Composite> =
-            (0..n).map(|i| spread.draw(&model, 3, i.into()).unwrap().axes[0].clone()).collect();
+        let drawn: Vec<Composite> = (0..n)
+            .map(|i| spread.draw(&model, 3, i.into()).unwrap().axes[0].clone())
+            .collect();
         for (j, exact) in (1..).zip(exact) {
             let nu: Vec<f64> = drawn.iter().map(|m| m.haar_wv(j)).collect();
             let mean = nu.iter().sum::<f64>() / f64::from(n);
             let variance = nu.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / f64::from(n);
             let bound = 5.0 * (variance / f64::from(n)).sqrt();
-            assert!((mean - exact).abs() < bound, "level {j}: {mean} {exact}, bound {bound}");
+            assert!(
+                (mean - exact).abs() < bound,
+                "level {j}: {mean} {exact}, bound {bound}"
+            );
         }
     }
 
@@ -145,7 +177,12 @@ mod tests {
         }
 
         fn laws(&self) -> Vec<Variation> {
-            let uniform = Law::Beta { a: 1.0, b: 1.0, low: 0.0, width: self.b };
+            let uniform = Law::Beta {
+                a: 1.0,
+                b: 1.0,
+                low: 0.0,
+                width: self.b,
+            };
             vec![law(&Self::noise(), "MA1", "theta", uniform)]
         }
 
@@ -159,7 +196,11 @@ mod tests {
             let (mut low, mut high) = (0.0, 0.5);
             for _ in 0..60 {
                 let middle = 0.5 * (low + high);
-                if Ma1::new(middle, 1.0).unwrap().haar_wv(1) > nu { low = middle } else { high = middle }
+                if Ma1::new(middle, 1.0).unwrap().haar_wv(1) > nu {
+                    low = middle
+                } else {
+                    high = middle
+                }
             }
             low
         }
@@ -174,7 +215,10 @@ mod tests {
             let theta_0 = Example1::nearest(nu_0);
             // nu_1 has slope ½ − theta there, at least 0.01: 1e-14 in nu are 1e-12 in theta.
             assert!((theta_0 - example.theta_0()).abs() < 1e-12, "{theta_0}");
-            assert!((theta_0 - 0.5 * b).abs() > 1e-4, "not the mean of the parameters");
+            assert!(
+                (theta_0 - 0.5 * b).abs() > 1e-4,
+                "not the mean of the parameters"
+            );
         }
     }
 
@@ -184,11 +228,19 @@ mod tests {
     fn the_average_wavelet_variance_leads_to_theta_0_not_to_the_mean_parameter() {
         let example = Example1 { b: 0.49 };
         let model = Model::pooled(RATE, &Example1::noise(), &Composite::default());
-        let spread = Spread { axes: [example.laws(), vec![], vec![], vec![], vec![], vec![]] };
+        let spread = Spread {
+            axes: [example.laws(), vec![], vec![], vec![], vec![], vec![]],
+        };
         let n = 8000_u32;
         let first_scale = |run: u32| {
             let drawn = spread.draw(&model, 1, run.into()).unwrap();
-            let key = StreamKey { seed: 1, scenario: "", run: run.into(), source: "accel.x", process: "" };
+            let key = StreamKey {
+                seed: 1,
+                scenario: "",
+                run: run.into(),
+                source: "accel.x",
+                process: "",
+            };
             let mut x = [0.0; 128];
             Synthesizer::new(&drawn.axes[0], key).fill(&mut x);
             crate::wavelet::classical(&x, 1).unwrap()[0]
@@ -198,7 +250,14 @@ mod tests {
         let variance = nu.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / f64::from(n);
         let sd = (variance / f64::from(n)).sqrt() / (0.5 - example.theta_0());
         let found = Example1::nearest(mean);
-        assert!((found - example.theta_0()).abs() < 5.0 * sd, "{found}, {} ± {sd}", example.theta_0());
-        assert!((found - 0.5 * example.b).abs() > 5.0 * sd, "{found} is not told from b/2: sd {sd}");
+        assert!(
+            (found - example.theta_0()).abs() < 5.0 * sd,
+            "{found}, {} ± {sd}",
+            example.theta_0()
+        );
+        assert!(
+            (found - 0.5 * example.b).abs() > 5.0 * sd,
+            "{found} is not told from b/2: sd {sd}"
+        );
     }
 }

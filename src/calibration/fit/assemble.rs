@@ -23,14 +23,20 @@ pub(super) fn assemble(
         term.limits = *limits;
     }
     let limited = |kind: Kind| {
-        spec.kinds().iter().zip(spec.limits()).any(|(k, limits)| *k == kind && *limits != Limits::NONE)
+        spec.kinds()
+            .iter()
+            .zip(spec.limits())
+            .any(|(k, limits)| *k == kind && *limits != Limits::NONE)
     };
     let by_time = |a: &Term, b: &Term| match limited(a.kind) {
         true => Ordering::Equal,
         false => b.coordinate.total_cmp(&a.coordinate),
     };
     terms.sort_by(|a, b| a.kind.cmp(&b.kind).then_with(|| by_time(a, b)));
-    let processes = terms.iter().map(|t| t.process(rate_hz)).collect::<Result<_, _>>()?;
+    let processes = terms
+        .iter()
+        .map(|t| t.process(rate_hz))
+        .collect::<Result<_, _>>()?;
     let composite = Composite::new(processes);
     let those = |test: fn(&Term) -> bool| (0..terms.len()).filter(|i| test(&terms[*i])).collect();
     // Local minima differ by far more than 1e-6 of the objective; the ε² is for a curve that the model meets
@@ -42,14 +48,26 @@ pub(super) fn assemble(
         combinations: found.combinations,
         starts: found.ends.len(),
         agreeing: found.ends.iter().filter(|e| agreeing(e.cost)).count(),
-        runner_up: found.ends.iter().find(|e| !agreeing(e.cost)).map(|e| e.cost * unit),
+        runner_up: found
+            .ends
+            .iter()
+            .find(|e| !agreeing(e.cost))
+            .map(|e| e.cost * unit),
         zero: those(|t| t.amplitude <= 0.0),
         at_end: those(|t| t.amplitude > 0.0 && t.at_end),
-        bounded: terms.iter().enumerate().flat_map(|(process, t)| t.bounded(process, rate_hz)).collect(),
+        bounded: terms
+            .iter()
+            .enumerate()
+            .flat_map(|(process, t)| t.bounded(process, rate_hz))
+            .collect(),
         minima: minima(found),
         weighted_for: Vec::new(),
         mixing: None,
-        residuals: solution.residuals.iter().map(|r| r * objective.length).collect(),
+        residuals: solution
+            .residuals
+            .iter()
+            .map(|r| r * objective.length)
+            .collect(),
         composite,
     })
 }
@@ -62,7 +80,11 @@ fn minima(found: &Found) -> Vec<Vec<f64>> {
     let mut minima: Vec<Vec<f64>> = Vec::new();
     for end in &found.ends {
         // A descent from a start 0.1 % off ends in the same minimum.
-        let same = |m: &Vec<f64>| m.iter().zip(&end.coordinates).all(|(a, b)| (a - b).abs() < 1e-3);
+        let same = |m: &Vec<f64>| {
+            m.iter()
+                .zip(&end.coordinates)
+                .all(|(a, b)| (a - b).abs() < 1e-3)
+        };
         if minima.len() < KEPT && !minima.iter().any(same) {
             minima.push(end.coordinates.clone());
         }
@@ -96,30 +118,57 @@ fn terms(objective: &Objective, coordinates: &[f64], amplitudes: &[f64]) -> Vec<
                 (u, high > low && (u - low < 1e-6 || high - u < 1e-6))
             }
         };
-        Term { kind: component.kind, amplitude: *amplitude, coordinate, at_end, limits: Limits::NONE }
+        Term {
+            kind: component.kind,
+            amplitude: *amplitude,
+            coordinate,
+            at_end,
+            limits: Limits::NONE,
+        }
     };
-    objective.components.iter().zip(amplitudes).map(term).collect()
+    objective
+        .components
+        .iter()
+        .zip(amplitudes)
+        .map(term)
+        .collect()
 }
 
 impl Term {
     fn process(&self, rate_hz: f64) -> Result<Process, ParameterError> {
         let (amplitude, shape) = self.values(rate_hz);
-        let values = if self.kind.shape().is_some() { vec![shape, amplitude] } else { vec![amplitude] };
-        self.kind.process(&values, rate_hz).expect("as many values as the kind has parameters")
+        let values = if self.kind.shape().is_some() {
+            vec![shape, amplitude]
+        } else {
+            vec![amplitude]
+        };
+        self.kind
+            .process(&values, rate_hz)
+            .expect("as many values as the kind has parameters")
     }
 
     /// Amplitude and shape in the units of the parameters; on a bound, the bound as it was given.
     fn values(&self, rate_hz: f64) -> (f64, f64) {
         let kappa = self.coordinate.exp();
-        let amplitude = if self.kind == Kind::Drift { self.amplitude.sqrt() } else { self.amplitude };
+        let amplitude = if self.kind == Kind::Drift {
+            self.amplitude.sqrt()
+        } else {
+            self.amplitude
+        };
         let (shape, scale) = match self.kind {
             // Near phi = 1 what counts is 1 − phi ≈ κ: a bound of 0.99999 is met to 1e-9 of that, not of 1.
             Kind::Ar1 => ((-kappa).exp(), kappa.min(1.0)),
             Kind::GaussMarkov => (kappa * rate_hz, kappa * rate_hz),
             _ => (self.coordinate, 1.0),
         };
-        let limits = self.limits.shape.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
-        (at_bound(amplitude, self.limits.amplitude, amplitude), at_bound(shape, limits, scale))
+        let limits = self
+            .limits
+            .shape
+            .unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+        (
+            at_bound(amplitude, self.limits.amplitude, amplitude),
+            at_bound(shape, limits, scale),
+        )
     }
 
     /// The parameters that lie on a bound given; those that are fixed have nowhere else to be.
@@ -132,7 +181,10 @@ impl Term {
         };
         let mut bounded = Vec::new();
         if is_at_end(amplitude, self.limits.amplitude) {
-            bounded.push(ParameterRef { process, parameter: self.kind.amplitude() });
+            bounded.push(ParameterRef {
+                process,
+                parameter: self.kind.amplitude(),
+            });
         }
         // What is not there has its shape anywhere.
         if let (Some(parameter), Some(limits)) = (self.kind.shape(), self.limits.shape)

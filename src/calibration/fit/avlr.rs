@@ -21,7 +21,9 @@
 use super::optimise::Termination;
 use super::result::{Fit, FitError};
 use crate::model::ModelSpec;
-use crate::noise::{Composite, Drift, FlickerNoise, Kind, Process, Quantization, RandomWalk, White};
+use crate::noise::{
+    Composite, Drift, FlickerNoise, Kind, Process, Quantization, RandomWalk, White,
+};
 use crate::wavelet::Curve;
 use std::f64::consts::{LN_2, PI};
 
@@ -38,21 +40,45 @@ pub(crate) fn avlr(curve: &Curve, spec: &ModelSpec) -> Result<Fit, FitError> {
         .iter()
         .zip(&curve.wv)
         // ln m with m = 2^(level − 1), and ln adev with adev² = 2 nu.
-        .map(|(level, nu)| ((f64::from(*level) - 1.0) * std::f64::consts::LN_2, 0.5 * (2.0 * nu).ln()))
+        .map(|(level, nu)| {
+            (
+                (f64::from(*level) - 1.0) * std::f64::consts::LN_2,
+                0.5 * (2.0 * nu).ln(),
+            )
+        })
         .collect();
     if points.len() < 2 {
         let (spec, parameters) = (spec.to_string(), spec.parameters());
-        return Err(FitError::TooFewScales { spec, parameters: parameters.max(2), scales: points.len() });
+        return Err(FitError::TooFewScales {
+            spec,
+            parameters: parameters.max(2),
+            scales: points.len(),
+        });
     }
-    let processes = spec.kinds().iter().map(|kind| term(*kind, &points)).collect::<Result<Vec<_>, _>>()?;
+    let processes = spec
+        .kinds()
+        .iter()
+        .map(|kind| term(*kind, &points))
+        .collect::<Result<Vec<_>, _>>()?;
     let composite = Composite::new(processes);
-    let not_found = |i: &usize| composite.processes[*i].values().iter().all(|value| *value <= 0.0);
+    let not_found = |i: &usize| {
+        composite.processes[*i]
+            .values()
+            .iter()
+            .all(|value| *value <= 0.0)
+    };
     let zero = (0..composite.processes.len()).filter(not_found).collect();
     let residual = |((level, nu), edof): ((&u32, &f64), &f64)| {
         // The distance with the weights `edof`, for comparison with other estimators; nothing minimised it.
         (0.5 * edof).sqrt() * (1.0 - composite.haar_wv(*level) / nu)
     };
-    let residuals: Vec<f64> = curve.levels.iter().zip(&curve.wv).zip(&curve.edof).map(residual).collect();
+    let residuals: Vec<f64> = curve
+        .levels
+        .iter()
+        .zip(&curve.wv)
+        .zip(&curve.edof)
+        .map(residual)
+        .collect();
     Ok(Fit {
         objective: residuals.iter().map(|r| r * r).sum(),
         residuals,
@@ -80,12 +106,20 @@ fn term(kind: Kind, points: &[(f64, f64)]) -> Result<Process, FitError> {
     };
     Ok(match kind {
         Kind::White => Process::White(White::new(at_one(-0.5).powi(2))?),
-        Kind::Quantization if !begins(points, -1.0) => Process::Quantization(Quantization::new(0.0)?),
+        Kind::Quantization if !begins(points, -1.0) => {
+            Process::Quantization(Quantization::new(0.0)?)
+        }
         Kind::Quantization => Process::Quantization(Quantization::new(at_one(-1.0).powi(2) / 3.0)?),
-        Kind::Flicker => Process::Flicker(FlickerNoise::new(at_one(0.0).powi(2) / (2.0 * LN_2 / PI))?),
+        Kind::Flicker => {
+            Process::Flicker(FlickerNoise::new(at_one(0.0).powi(2) / (2.0 * LN_2 / PI))?)
+        }
         Kind::RandomWalk => Process::RandomWalk(RandomWalk::new(3.0 * at_one(0.5).powi(2))?),
         Kind::Drift => Process::Drift(Drift::new(std::f64::consts::SQRT_2 * at_one(1.0))?),
-        Kind::Ar1 | Kind::GaussMarkov | Kind::Ma1 => return Err(FitError::NoSlope { process: kind.code() }),
+        Kind::Ar1 | Kind::GaussMarkov | Kind::Ma1 => {
+            return Err(FitError::NoSlope {
+                process: kind.code(),
+            });
+        }
     })
 }
 
@@ -102,9 +136,18 @@ fn stretch(points: &[(f64, f64)], slope: f64) -> std::ops::Range<usize> {
         ((y1 - y0) / (x1 - x0) - slope).abs()
     };
     let segments = points.len() - 1;
-    let best = (0..segments).min_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or(0);
-    let first = (0..best).rev().take_while(|i| off(*i) <= NEAR).last().unwrap_or(best);
-    let last = (best + 1..segments).take_while(|i| off(*i) <= NEAR).last().unwrap_or(best);
+    let best = (0..segments)
+        .min_by(|a, b| off(*a).total_cmp(&off(*b)))
+        .unwrap_or(0);
+    let first = (0..best)
+        .rev()
+        .take_while(|i| off(*i) <= NEAR)
+        .last()
+        .unwrap_or(best);
+    let last = (best + 1..segments)
+        .take_while(|i| off(*i) <= NEAR)
+        .last()
+        .unwrap_or(best);
     first..last + 2
 }
 
@@ -126,8 +169,16 @@ mod tests {
 
     fn read(processes: Vec<Process>) -> Vec<f64> {
         let spec: Vec<&str> = processes.iter().map(Process::code).collect();
-        let fit = avlr(&curve(&Composite::new(processes)), &spec.join("+").parse().unwrap()).unwrap();
-        fit.composite.processes.iter().map(|p| p.parameters()[0].1).collect()
+        let fit = avlr(
+            &curve(&Composite::new(processes)),
+            &spec.join("+").parse().unwrap(),
+        )
+        .unwrap();
+        fit.composite
+            .processes
+            .iter()
+            .map(|p| p.parameters()[0].1)
+            .collect()
     }
 
     /// Alone, every term is read exactly; but for RW, whose adev² = gamma2 (4m² + 2)/(12 m) lies 1/(2m²) above its
@@ -144,9 +195,15 @@ mod tests {
         assert_relative_eq!(read(vec![qn])[0], 2.0, max_relative = 1e-12);
         let flicker = Process::Flicker(FlickerNoise::new(4.0).unwrap());
         // The first scales lie above the line, of which nu = ln 2/π·B²; from m = 1 to 2 the slope is −0.16, too far off.
-        let above =
-            (2..=16).map(|level| (FlickerNoise::haar_shape(level) * PI / LN_2).ln()).sum::<f64>() / 15.0;
-        assert_relative_eq!(read(vec![flicker])[0], 4.0 * above.exp(), max_relative = 1e-12);
+        let above = (2..=16)
+            .map(|level| (FlickerNoise::haar_shape(level) * PI / LN_2).ln())
+            .sum::<f64>()
+            / 15.0;
+        assert_relative_eq!(
+            read(vec![flicker])[0],
+            4.0 * above.exp(),
+            max_relative = 1e-12
+        );
         assert!(above < 0.015);
         let drift = Process::Drift(Drift::new(0.1).unwrap());
         assert_relative_eq!(read(vec![drift])[0], 0.1, max_relative = 1e-12);
@@ -158,11 +215,21 @@ mod tests {
     /// of √(2/eta).
     #[test]
     fn residuals_are_in_standard_deviations() {
-        let mut off = curve(&Composite::new(vec![Process::White(White::new(3.0).unwrap())]));
+        let mut off = curve(&Composite::new(vec![Process::White(
+            White::new(3.0).unwrap(),
+        )]));
         off.wv[15] *= 2.0;
         let fit = avlr(&off, &"WN".parse().unwrap()).unwrap();
-        assert_relative_eq!(fit.residuals[15], 0.5 / (2.0 / off.edof[15]).sqrt(), max_relative = 1e-12);
-        assert!(fit.residuals[..15].iter().all(|r| r.abs() < 1e-9), "{:?}", fit.residuals);
+        assert_relative_eq!(
+            fit.residuals[15],
+            0.5 / (2.0 / off.edof[15]).sqrt(),
+            max_relative = 1e-12
+        );
+        assert!(
+            fit.residuals[..15].iter().all(|r| r.abs() < 1e-9),
+            "{:?}",
+            fit.residuals
+        );
     }
 
     /// White noise and a random walk that meet at m = 64 (sigma2/m = gamma2·m/3): where either has its slope
@@ -190,14 +257,22 @@ mod tests {
         dipped.wv[10] *= 0.5;
         let fit = avlr(&dipped, &"WN+QN".parse().unwrap()).unwrap();
         assert_eq!(fit.zero, [1]);
-        let led = read(vec![white(), Process::Quantization(Quantization::new(40.0).unwrap())]);
+        let led = read(vec![
+            white(),
+            Process::Quantization(Quantization::new(40.0).unwrap()),
+        ]);
         assert!((led[1] / 40.0 - 1.0).abs() < 0.15, "{led:?}");
     }
 
     #[test]
     fn correlated_noise_has_no_slope() {
-        let one = curve(&Composite::new(vec![Process::White(White::new(3.0).unwrap())]));
+        let one = curve(&Composite::new(vec![Process::White(
+            White::new(3.0).unwrap(),
+        )]));
         let error = avlr(&one, &"WN+AR1".parse().unwrap()).unwrap_err();
-        assert!(error.to_string().starts_with("AR1 has no slope of its own"), "{error}");
+        assert!(
+            error.to_string().starts_with("AR1 has no slope of its own"),
+            "{error}"
+        );
     }
 }

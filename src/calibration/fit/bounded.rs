@@ -39,7 +39,13 @@ impl Bounded {
     /// All zero: bounds 0 … ∞.
     pub(crate) const fn new(n: usize) -> Self {
         let zero = [0.0; MOST];
-        Self { n, gram: [zero; MOST], right: zero, lower: zero, upper: [f64::INFINITY; MOST] }
+        Self {
+            n,
+            gram: [zero; MOST],
+            right: zero,
+            lower: zero,
+            upper: [f64::INFINITY; MOST],
+        }
     }
 
     /// The minimiser. Lower bounds are finite.
@@ -50,7 +56,9 @@ impl Bounded {
         // Each pass lowers the objective strictly, so no set of free parameters comes twice; the limit
         // guards against rounding.
         for _ in 0..20 * self.n {
-            let Some(entering) = self.steepest(&x, &places, &refused) else { break };
+            let Some(entering) = self.steepest(&x, &places, &refused) else {
+                break;
+            };
             let before = places[entering];
             places[entering] = Place::Free;
             if self.descend(&mut x, &mut places, entering) {
@@ -71,7 +79,12 @@ impl Bounded {
     }
 
     /// The bound parameter that most wants to leave its bound.
-    fn steepest(&self, x: &Vector, places: &[Place; MOST], refused: &[bool; MOST]) -> Option<usize> {
+    fn steepest(
+        &self,
+        x: &Vector,
+        places: &[Place; MOST],
+        refused: &[bool; MOST],
+    ) -> Option<usize> {
         let mut best = (FLAT, None);
         for i in (0..self.n).filter(|i| !refused[*i]) {
             let w = self.downhill(x, i);
@@ -94,24 +107,40 @@ impl Bounded {
         loop {
             // Only the first solution can fail: afterwards the free columns get fewer, and those left are
             // independent.
-            let Some(goal) = self.solve_free(x, places) else { return false };
+            let Some(goal) = self.solve_free(x, places) else {
+                return false;
+            };
             let mut blocking = (1.0, None);
             for i in (0..self.n).filter(|i| places[*i] == Place::Free) {
                 let step = goal[i] - x[i];
-                let room = if step < 0.0 { self.lower[i] - x[i] } else { self.upper[i] - x[i] };
+                let room = if step < 0.0 {
+                    self.lower[i] - x[i]
+                } else {
+                    self.upper[i] - x[i]
+                };
                 // The part of the way to the minimum at which this parameter meets its bound; the nearest of
                 // all stops the step.
                 if step.abs() > room.abs() && room / step < blocking.0 {
-                    let place = if step < 0.0 { Place::Lower } else { Place::Upper };
+                    let place = if step < 0.0 {
+                        Place::Lower
+                    } else {
+                        Place::Upper
+                    };
                     blocking = ((room / step).max(0.0), Some((i, place)));
                 }
             }
             for i in (0..self.n).filter(|i| places[*i] == Place::Free) {
                 x[i] += blocking.0 * (goal[i] - x[i]);
             }
-            let Some((i, place)) = blocking.1 else { return true };
+            let Some((i, place)) = blocking.1 else {
+                return true;
+            };
             // The bound itself: the sum above meets it to rounding only.
-            x[i] = if place == Place::Lower { self.lower[i] } else { self.upper[i] };
+            x[i] = if place == Place::Lower {
+                self.lower[i]
+            } else {
+                self.upper[i]
+            };
             places[i] = place;
             if i == entering && (x[i] - start).abs() <= 0.0 {
                 return false;
@@ -143,7 +172,11 @@ impl Bounded {
 }
 
 /// Solves A·x = b, A symmetric of size n; none if it is not positive definite to working precision.
-pub(crate) fn cholesky_solve(a: impl Fn(usize, usize) -> f64, mut b: Vector, n: usize) -> Option<Vector> {
+pub(crate) fn cholesky_solve(
+    a: impl Fn(usize, usize) -> f64,
+    mut b: Vector,
+    n: usize,
+) -> Option<Vector> {
     let mut l = [[0.0; MOST]; MOST];
     for i in 0..n {
         for j in 0..=i {
@@ -191,8 +224,13 @@ mod tests {
         for case in 0..500 {
             let n = 1 + case % 7;
             let mut p = Bounded::new(n);
-            let columns: Vec<Vec<f64>> =
-                (0..n).map(|_| (0..n + 3).map(|_| generator.random_range(-0.2..1.0)).collect()).collect();
+            let columns: Vec<Vec<f64>> = (0..n)
+                .map(|_| {
+                    (0..n + 3)
+                        .map(|_| generator.random_range(-0.2..1.0))
+                        .collect()
+                })
+                .collect();
             let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
             for i in 0..n {
                 for j in 0..n {

@@ -21,16 +21,29 @@ use std::sync::Arc;
 ///
 /// # Errors
 /// When the curve has fewer scales than the model parameters, or numbers that are no wavelet variances.
-pub fn fit(curve: &Curve, spec: &ModelSpec, rate_hz: f64, weighting: Weighting) -> Result<Fit, FitError> {
-    let observed = Weights { weighting, nu: curve.wv.clone(), mixing: None };
+pub fn fit(
+    curve: &Curve,
+    spec: &ModelSpec,
+    rate_hz: f64,
+    weighting: Weighting,
+) -> Result<Fit, FitError> {
+    let observed = Weights {
+        weighting,
+        nu: curve.wv.clone(),
+        mixing: None,
+    };
     // The observed variances are the only ones there are before a model; what is low by chance weighs too
     // much in this round.
     let first = fit_near(curve, spec, rate_hz, observed, Effort::WHOLE, &[])?;
     match weighting {
         Weighting::Model => settled(curve, spec, rate_hz, first),
-        Weighting::Full => {
-            fit_with_covariance(curve, spec, rate_hz, &covariance(curve, &first), expected(curve, &first))
-        }
+        Weighting::Full => fit_with_covariance(
+            curve,
+            spec,
+            rate_hz,
+            &covariance(curve, &first),
+            expected(curve, &first),
+        ),
         Weighting::Edof | Weighting::Interval | Weighting::None => Ok(first),
     }
 }
@@ -45,7 +58,11 @@ const SETTLED: f64 = 1e-6;
 /// The curve that a fit implies, where it may be divided by.
 pub(crate) fn expected(curve: &Curve, fit: &Fit) -> Vec<f64> {
     // A model without any amplitude implies nothing.
-    implied(&fit.composite, curve).iter().zip(&curve.wv).map(|(nu, wv)| nu.max(1e-6 * wv)).collect()
+    implied(&fit.composite, curve)
+        .iter()
+        .zip(&curve.wv)
+        .map(|(nu, wv)| nu.max(1e-6 * wv))
+        .collect()
 }
 
 /// Fits with the weights of the last result until they are those of the result itself.
@@ -59,20 +76,41 @@ fn settled(curve: &Curve, spec: &ModelSpec, rate_hz: f64, first: Fit) -> Result<
     visited.push(last);
     let recent = visited.into_iter().rev().take(2);
     let within = recent.map(|fit| {
-        reweighted(curve, spec, rate_hz, fit.within_its_basin(), MOST_ROUNDS, Effort::WITHIN)
-            .map(|(_, fit)| fit)
+        reweighted(
+            curve,
+            spec,
+            rate_hz,
+            fit.within_its_basin(),
+            MOST_ROUNDS,
+            Effort::WITHIN,
+        )
+        .map(|(_, fit)| fit)
     });
-    let ended = within.collect::<Result<Vec<_>, _>>()?.into_iter().map(|fit| {
-        let termination = if is_settled(curve, &fit) { fit.termination } else { Termination::IterationLimit };
-        Fit { termination, ..fit.at_own_weights(curve) }
-    });
-    Ok(ended.min_by(|a, b| a.objective.total_cmp(&b.objective)).expect("two fits"))
+    let ended = within
+        .collect::<Result<Vec<_>, _>>()?
+        .into_iter()
+        .map(|fit| {
+            let termination = if is_settled(curve, &fit) {
+                fit.termination
+            } else {
+                Termination::IterationLimit
+            };
+            Fit {
+                termination,
+                ..fit.at_own_weights(curve)
+            }
+        });
+    Ok(ended
+        .min_by(|a, b| a.objective.total_cmp(&b.objective))
+        .expect("two fits"))
 }
 
 /// Whether the weights of a fit are those of its own result.
 fn is_settled(curve: &Curve, fit: &Fit) -> bool {
     let nu = expected(curve, fit);
-    nu.iter().zip(&fit.weighted_for).all(|(a, b)| (a / b - 1.0).abs() < SETTLED)
+    nu.iter()
+        .zip(&fit.weighted_for)
+        .all(|(a, b)| (a / b - 1.0).abs() < SETTLED)
 }
 
 /// Fits with the weights of the last result; those before the last, and the last.
@@ -86,7 +124,11 @@ fn reweighted(
 ) -> Result<(Vec<Fit>, Fit), FitError> {
     let (mut before, mut last) = (Vec::new(), first);
     while before.len() < rounds && !is_settled(curve, &last) {
-        let weights = Weights { weighting: Weighting::Model, nu: expected(curve, &last), mixing: None };
+        let weights = Weights {
+            weighting: Weighting::Model,
+            nu: expected(curve, &last),
+            mixing: None,
+        };
         let next = fit_near(curve, spec, rate_hz, weights, effort, &last.minima)?;
         before.push(std::mem::replace(&mut last, next));
     }
@@ -104,13 +146,23 @@ impl Fit {
     /// the fit a scale far above the model counts little, and a model would be the less rejected the more it misses.
     fn at_own_weights(self, curve: &Curve) -> Self {
         let nu = expected(curve, &self);
-        let pairs = inverse_deviations(curve, &nu).into_iter().zip(curve.wv.iter().zip(&nu));
+        let pairs = inverse_deviations(curve, &nu)
+            .into_iter()
+            .zip(curve.wv.iter().zip(&nu));
         let residuals: Vec<f64> = pairs.map(|(root, (wv, nu))| root * (wv - nu)).collect();
         let objective = residuals.iter().map(|r| r * r).sum();
         // Of other minima what is known is how far they are behind by the weights of the fit.
         let behind = |other: f64| objective * (other / self.objective).max(1.0);
-        let runner_up = self.runner_up.map(behind).filter(|other: &f64| other.is_finite());
-        Self { objective, residuals, runner_up, ..self }
+        let runner_up = self
+            .runner_up
+            .map(behind)
+            .filter(|other: &f64| other.is_finite());
+        Self {
+            objective,
+            residuals,
+            runner_up,
+            ..self
+        }
     }
 }
 
@@ -122,7 +174,9 @@ fn covariance(curve: &Curve, fit: &Fit) -> DMatrix<f64> {
     let index = |i: usize| curve.levels[i] as usize - 1;
     let deviation = |i: usize| (2.0 / curve.edof[i]).sqrt();
     let n = curve.levels.len();
-    DMatrix::from_fn(n, n, |i, j| law.correlation[(index(i), index(j))] * deviation(i) * deviation(j))
+    DMatrix::from_fn(n, n, |i, j| {
+        law.correlation[(index(i), index(j))] * deviation(i) * deviation(j)
+    })
 }
 
 /// The fit weighted by the inverse of a covariance of the curve relative to `nu`.
@@ -138,12 +192,25 @@ pub(crate) fn fit_with_covariance(
 ) -> Result<Fit, FitError> {
     // A scale that counts nothing must not come in through the errors it shares with others.
     let counts = |i: usize| !curve.ignored.contains(&curve.levels[i]);
-    let own = DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| match i == j {
-        _ if counts(i) && counts(j) => covariance[(i, j)],
-        diagonal => f64::from(u8::from(diagonal)),
+    let own = DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| {
+        match i == j {
+            _ if counts(i) && counts(j) => covariance[(i, j)],
+            diagonal => f64::from(u8::from(diagonal)),
+        }
     });
     let mixing = Some(Arc::new(whitening(&own)));
-    fit_near(curve, spec, rate_hz, Weights { weighting: Weighting::Full, nu, mixing }, Effort::WHOLE, &[])
+    fit_near(
+        curve,
+        spec,
+        rate_hz,
+        Weights {
+            weighting: Weighting::Full,
+            nu,
+            mixing,
+        },
+        Effort::WHOLE,
+        &[],
+    )
 }
 
 /// The same for a curve that resembles one already fitted: a coarser grid, and the minima of that one.
@@ -160,13 +227,23 @@ pub(crate) fn refit(
         Weighting::Model | Weighting::Full => expected(curve, like),
         Weighting::Edof | Weighting::Interval | Weighting::None => curve.wv.clone(),
     };
-    let weights = Weights { weighting, nu, mixing: like.mixing.clone() };
+    let weights = Weights {
+        weighting,
+        nu,
+        mixing: like.mixing.clone(),
+    };
     let first = fit_near(curve, spec, rate_hz, weights, Effort::AGAIN, &like.minima)?;
     match weighting {
         Weighting::Model => {
             // The weights change little: the basin of the first round is that of the others.
-            let (_, last) =
-                reweighted(curve, spec, rate_hz, first.within_its_basin(), FEW_ROUNDS, Effort::WITHIN)?;
+            let (_, last) = reweighted(
+                curve,
+                spec,
+                rate_hz,
+                first.within_its_basin(),
+                FEW_ROUNDS,
+                Effort::WITHIN,
+            )?;
             Ok(last.at_own_weights(curve))
         }
         _ => Ok(first),
@@ -191,25 +268,46 @@ fn fit_near(
 ) -> Result<Fit, FitError> {
     check(curve, spec)?;
     let limited = spec.kinds().iter().zip(spec.limits());
-    let components = limited.map(|(kind, limits)| component(*kind, *limits, curve, rate_hz)).collect();
-    let Weights { weighting, nu, mixing } = weights;
+    let components = limited
+        .map(|(kind, limits)| component(*kind, *limits, curve, rate_hz))
+        .collect();
+    let Weights {
+        weighting,
+        nu,
+        mixing,
+    } = weights;
     let objective = Objective::new(curve, weighting, &nu, mixing.clone(), components);
     let found = search(&objective, effort, known);
-    Ok(Fit { mixing, weighted_for: nu, ..assemble(&objective, &found, spec, rate_hz)? })
+    Ok(Fit {
+        mixing,
+        weighted_for: nu,
+        ..assemble(&objective, &found, spec, rate_hz)?
+    })
 }
 
 fn check(curve: &Curve, spec: &ModelSpec) -> Result<(), FitError> {
-    let bad =
-        |values: &[f64], (low, high): (f64, f64)| values.iter().position(|v| !(*v >= low && *v <= high));
+    let bad = |values: &[f64], (low, high): (f64, f64)| {
+        values.iter().position(|v| !(*v >= low && *v <= high))
+    };
     if let Some(i) = bad(&curve.wv, Curve::WV_RANGE) {
-        return Err(FitError::NotPositive { level: curve.levels[i], value: curve.wv[i] });
+        return Err(FitError::NotPositive {
+            level: curve.levels[i],
+            value: curve.wv[i],
+        });
     }
     if let Some(i) = bad(&curve.edof, Curve::EDOF_RANGE) {
-        return Err(FitError::NoWeight { level: curve.levels[i], value: curve.edof[i] });
+        return Err(FitError::NoWeight {
+            level: curve.levels[i],
+            value: curve.edof[i],
+        });
     }
     let (parameters, scales) = (spec.parameters(), curve.levels.len() - curve.ignored.len());
     if scales < parameters {
-        return Err(FitError::TooFewScales { spec: spec.to_string(), parameters, scales });
+        return Err(FitError::TooFewScales {
+            spec: spec.to_string(),
+            parameters,
+            scales,
+        });
     }
     Ok(())
 }
@@ -222,7 +320,10 @@ const SHORTEST: f64 = 1.0 / 6.0;
 /// ln κ of the correlation times that are sought, 1/κ in samples.
 pub(crate) fn correlated(curve: &Curve) -> Range {
     let longest = f64::from(curve.levels.iter().copied().max().unwrap_or(1)).exp2();
-    Range { low: -(LONGEST * longest).ln(), high: -SHORTEST.ln() }
+    Range {
+        low: -(LONGEST * longest).ln(),
+        high: -SHORTEST.ln(),
+    }
 }
 
 /// The widest ranges in which a curve can say anything, less what the limits leave out.
@@ -233,33 +334,54 @@ fn component(kind: Kind, limits: Limits, curve: &Curve, rate_hz: f64) -> Compone
     let coordinate = match (kind, limits.shape) {
         (Kind::Ar1, Some((low, high))) => {
             let kappa = |phi: f64| (-phi.ln()).ln();
-            Some(within(correlated, (low > 0.0).then(|| kappa(low)), (high < 1.0).then(|| kappa(high))))
+            Some(within(
+                correlated,
+                (low > 0.0).then(|| kappa(low)),
+                (high < 1.0).then(|| kappa(high)),
+            ))
         }
         (Kind::GaussMarkov, Some((low, high))) => {
             let kappa = |beta: f64| (beta / rate_hz).ln();
-            Some(within(correlated, high.is_finite().then(|| kappa(high)), (low > 0.0).then(|| kappa(low))))
+            Some(within(
+                correlated,
+                high.is_finite().then(|| kappa(high)),
+                (low > 0.0).then(|| kappa(low)),
+            ))
         }
         (Kind::Ar1 | Kind::GaussMarkov, None) => Some(correlated),
         (Kind::Ma1, shape) => {
             let (low, high) = shape.unwrap_or((-1.0, 1.0));
-            Some(Range { low: low.max(-1.0), high: high.min(1.0) })
+            Some(Range {
+                low: low.max(-1.0),
+                high: high.min(1.0),
+            })
         }
         _ => None,
     };
     let (low, high) = limits.amplitude;
     let amplitude = match kind {
         // The amplitude in which a drift is linear is the square of its slope.
-        Kind::Drift => Range { low: low * low, high: high * high },
+        Kind::Drift => Range {
+            low: low * low,
+            high: high * high,
+        },
         _ => Range { low, high },
     };
-    Component { kind, amplitude, coordinate }
+    Component {
+        kind,
+        amplitude,
+        coordinate,
+    }
 }
 
 /// A range with its ends replaced where they are limited; what is given counts, even beyond the range.
 fn within(range: Range, high: Option<f64>, low: Option<f64>) -> Range {
     let high = high.unwrap_or(range.high);
     let low = low.unwrap_or_else(|| range.low.min(high));
-    Range { low, high: high.max(low) }
+    Range {
+        low,
+        high: high.max(low),
+    }
 }
 
 #[cfg(test)]
@@ -282,7 +404,10 @@ mod tests {
             fit(&curve, &"WN".parse().unwrap(), 1.0, Weighting::Edof).unwrap_err()
         };
         for value in [-1.0, 0.0, 1e101] {
-            assert_eq!(refused(value, 50.0), FitError::NotPositive { level: 2, value });
+            assert_eq!(
+                refused(value, 50.0),
+                FitError::NotPositive { level: 2, value }
+            );
             assert_eq!(refused(0.5, value), FitError::NoWeight { level: 2, value });
         }
     }
@@ -296,14 +421,28 @@ mod tests {
         ]);
         let levels: Vec<u32> = (1..=12).collect();
         let wv = levels.iter().map(|level| model.haar_wv(*level)).collect();
-        let curve = Curve { wv, edof: vec![50.0; 12], levels, ..Curve::default() };
-        for (low, high, slope) in [(None, Some(5e-4), 5e-4), (Some(2e-3), None, 2e-3), (None, None, 1e-3)] {
+        let curve = Curve {
+            wv,
+            edof: vec![50.0; 12],
+            levels,
+            ..Curve::default()
+        };
+        for (low, high, slope) in [
+            (None, Some(5e-4), 5e-4),
+            (Some(2e-3), None, 2e-3),
+            (None, None, 1e-3),
+        ] {
             let mut spec: ModelSpec = "WN+DR".parse().unwrap();
             spec.limit("DR", "slope", low, high).unwrap();
             let fit = fit(&curve, &spec, 1.0, Weighting::Edof).unwrap();
             let found = fit.composite.processes[1].values()[0];
             assert!((found / slope - 1.0).abs() < 1e-9, "{found} {slope}");
-            assert_eq!(fit.bounded.len(), usize::from(slope != 1e-3), "{:?}", fit.bounded);
+            assert_eq!(
+                fit.bounded.len(),
+                usize::from(slope != 1e-3),
+                "{:?}",
+                fit.bounded
+            );
         }
     }
 
@@ -317,12 +456,22 @@ mod tests {
         let fitted = |processes: Vec<Process>| {
             let model = Composite::new(processes);
             let wv = levels.iter().map(|level| model.haar_wv(*level)).collect();
-            let curve = Curve { wv, edof: vec![50.0; 12], levels: levels.clone(), ..Curve::default() };
+            let curve = Curve {
+                wv,
+                edof: vec![50.0; 12],
+                levels: levels.clone(),
+                ..Curve::default()
+            };
             fit(&curve, &"WN+AR1".parse().unwrap(), 1.0, Weighting::Edof).unwrap()
         };
         let wandering = fitted(vec![white, walk]);
-        let Process::Ar1(ar1) = wandering.composite.processes[1] else { panic!("{:?}", wandering.composite) };
-        assert!((-ar1.phi().ln() * 20.0 * 4096.0 - 1.0).abs() < 1e-6, "{ar1:?}");
+        let Process::Ar1(ar1) = wandering.composite.processes[1] else {
+            panic!("{:?}", wandering.composite)
+        };
+        assert!(
+            (-ar1.phi().ln() * 20.0 * 4096.0 - 1.0).abs() < 1e-6,
+            "{ar1:?}"
+        );
         assert_eq!((wandering.at_end, wandering.zero), (vec![1], vec![]));
         let still = fitted(vec![white]);
         assert_eq!((still.at_end, still.zero), (vec![], vec![1]));
@@ -360,8 +509,17 @@ mod tests {
             let is_converged = fit.termination == Termination::Converged;
             unsettled += u32::from(!is_converged);
             assert_eq!(is_converged, is_settled(&curve, &fit), "curve {k}");
-            let phi = |process: &Process| if let Process::Ar1(p) = process { Some(p.phi()) } else { None };
-            assert!(fit.composite.processes.iter().filter_map(phi).is_sorted(), "curve {k}");
+            let phi = |process: &Process| {
+                if let Process::Ar1(p) = process {
+                    Some(p.phi())
+                } else {
+                    None
+                }
+            };
+            assert!(
+                fit.composite.processes.iter().filter_map(phi).is_sorted(),
+                "curve {k}"
+            );
             // the best agrees with itself; another minimum is behind it
             assert!(
                 (1..=fit.starts).contains(&fit.agreeing),

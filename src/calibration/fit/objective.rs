@@ -10,7 +10,9 @@
 use super::bounded::{Bounded, MOST, Matrix, Vector, cholesky_solve};
 use super::weighting::Weighting;
 use crate::curve::implied::Response;
-use crate::noise::{Ar1, Drift, FlickerNoise, GaussMarkov, Kind, Ma1, Quantization, RandomWalk, White};
+use crate::noise::{
+    Ar1, Drift, FlickerNoise, GaussMarkov, Kind, Ma1, Quantization, RandomWalk, White,
+};
 use crate::wavelet::{Curve, QuantizationResponse};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -156,9 +158,23 @@ impl Objective {
         let length = dot(&target, &target).sqrt();
         let target = target.iter().map(|b| b / length).collect();
         let has_quantization = components.iter().any(|c| c.kind == Kind::Quantization);
-        let responses = || curve.levels.iter().map(|level| curve.response(*level).copied()).collect();
+        let responses = || {
+            curve
+                .levels
+                .iter()
+                .map(|level| curve.response(*level).copied())
+                .collect()
+        };
         let quantization = (has_quantization && curve.quantization.is_some()).then(responses);
-        Self { levels: curve.levels.clone(), roots, mixing, quantization, target, length, components }
+        Self {
+            levels: curve.levels.clone(),
+            roots,
+            mixing,
+            quantization,
+            target,
+            length,
+            components,
+        }
     }
 
     /// Whether the model is linear in its amplitudes.
@@ -168,13 +184,24 @@ impl Objective {
 
     /// The components that have a coordinate.
     pub(crate) fn shaped(&self) -> impl Iterator<Item = (usize, Range)> + '_ {
-        self.components.iter().enumerate().filter_map(|(i, c)| Some((i, c.coordinate?)))
+        self.components
+            .iter()
+            .enumerate()
+            .filter_map(|(i, c)| Some((i, c.coordinate?)))
     }
 
     pub(crate) fn shape(&self, component: usize, u: f64) -> Shape {
         let process = &self.components[component];
-        let (values, slopes) = self.levels.iter().map(|level| process.shape(u, *level)).unzip();
-        Shape { component, values, slopes }
+        let (values, slopes) = self
+            .levels
+            .iter()
+            .map(|level| process.shape(u, *level))
+            .unzip();
+        Shape {
+            component,
+            values,
+            slopes,
+        }
     }
 
     /// The column of a shape where the curve responds so, level by level.
@@ -191,11 +218,19 @@ impl Objective {
     fn weighted(&self, component: usize, levels: &[f64], responses: &[Response]) -> Vec<f64> {
         let is_quantization = self.components[component].kind == Kind::Quantization;
         let weights = self.roots.iter().zip(responses).map(|(root, response)| {
-            root * if is_quantization { response.quantization } else { response.others }
+            root * if is_quantization {
+                response.quantization
+            } else {
+                response.others
+            }
         });
         mixed(
             self.mixing.as_deref(),
-            levels.iter().zip(weights).map(|(value, weight)| value * weight).collect(),
+            levels
+                .iter()
+                .zip(weights)
+                .map(|(value, weight)| value * weight)
+                .collect(),
         )
     }
 
@@ -207,7 +242,9 @@ impl Objective {
     /// Derivatives of the implied curve with respect to the wavelet variances of the components, level by
     /// level.
     fn responses(&self, shapes: &[&Shape], amplitudes: &[f64]) -> Vec<Response> {
-        let Some(quantization) = &self.quantization else { return self.plain_responses() };
+        let Some(quantization) = &self.quantization else {
+            return self.plain_responses();
+        };
         let at_level = |level: usize| {
             let (mut own, mut all) = (0.0, 0.0);
             for (shape, amplitude) in shapes.iter().zip(amplitudes) {
@@ -236,15 +273,30 @@ impl Objective {
     /// The best amplitudes for the coordinates given (one for each component that has one).
     pub(crate) fn solve(&self, coordinates: &[f64]) -> Solution {
         let mut next = coordinates.iter();
-        let mut coordinate_of =
-            |c: &Component| c.coordinate.and_then(|_| next.next()).copied().unwrap_or(0.0);
-        let shapes: Vec<Shape> =
-            self.components.iter().enumerate().map(|(i, c)| self.shape(i, coordinate_of(c))).collect();
+        let mut coordinate_of = |c: &Component| {
+            c.coordinate
+                .and_then(|_| next.next())
+                .copied()
+                .unwrap_or(0.0)
+        };
+        let shapes: Vec<Shape> = self
+            .components
+            .iter()
+            .enumerate()
+            .map(|(i, c)| self.shape(i, coordinate_of(c)))
+            .collect();
         let shapes: Vec<&Shape> = shapes.iter().collect();
         let best = self.best_amplitudes(&shapes, SETTLED);
-        let jacobian = self.shaped().map(|(i, _)| self.tangent(&best, shapes[i], i)).collect();
+        let jacobian = self
+            .shaped()
+            .map(|(i, _)| self.tangent(&best, shapes[i], i))
+            .collect();
         let amplitudes = self.amplitudes(&best.columns, &best.x);
-        Solution { amplitudes, residuals: best.residuals, jacobian }
+        Solution {
+            amplitudes,
+            residuals: best.residuals,
+            jacobian,
+        }
     }
 
     /// Σ residual² for shapes of all components, in their order; the shares of quantization noise are nearly settled.
@@ -259,9 +311,17 @@ impl Objective {
         for _ in 0..if self.is_linear() { 0 } else { rounds } {
             let next = self.responses(shapes, &self.amplitudes(&best.columns, &best.x));
             let change = |(a, b): (&Response, &Response)| {
-                (a.others - b.others).abs().max((a.quantization - b.quantization).abs())
+                (a.others - b.others)
+                    .abs()
+                    .max((a.quantization - b.quantization).abs())
             };
-            if next.iter().zip(&best.responses).map(change).fold(0.0, f64::max) < SETTLED_CHANGE {
+            if next
+                .iter()
+                .zip(&best.responses)
+                .map(change)
+                .fold(0.0, f64::max)
+                < SETTLED_CHANGE
+            {
                 break;
             }
             best = self.linear_best(shapes, next);
@@ -271,7 +331,10 @@ impl Objective {
 
     /// The best amplitudes where the curve responds so.
     fn linear_best(&self, shapes: &[&Shape], responses: Vec<Response>) -> LinearBest {
-        let columns: Vec<Column> = shapes.iter().map(|shape| self.column(shape, &responses)).collect();
+        let columns: Vec<Column> = shapes
+            .iter()
+            .map(|shape| self.column(shape, &responses))
+            .collect();
         let problem = self.linear_problem(&columns);
         let mut x = problem.minimise();
         // An amplitude on a bound does not follow the coordinates, so its column is left out of the
@@ -282,13 +345,23 @@ impl Objective {
         let mut residuals = self.residuals(&columns, &x);
         if let Some(change) = project(&columns, &active, &problem.gram, &residuals) {
             let mut refined = x;
-            active.iter().zip(change).for_each(|(i, d)| refined[*i] += d);
+            active
+                .iter()
+                .zip(change)
+                .for_each(|(i, d)| refined[*i] += d);
             if active.iter().all(|i| free(&refined, *i)) {
                 x = refined;
                 residuals = self.residuals(&columns, &x);
             }
         }
-        LinearBest { responses, columns, gram: problem.gram, x, active, residuals }
+        LinearBest {
+            responses,
+            columns,
+            gram: problem.gram,
+            x,
+            active,
+            residuals,
+        }
     }
 
     /// −amplitude × the part of the slope of the i-th column that the active columns cannot follow.
@@ -300,7 +373,10 @@ impl Objective {
         let mut tangent: Vec<f64> = slopes.iter().map(|s| -amplitude * (s / length)).collect();
         if let Some(part) = project(&best.columns, &best.active, &best.gram, &tangent) {
             for (&a, p) in best.active.iter().zip(part) {
-                tangent.iter_mut().zip(&best.columns[a].values).for_each(|(t, v)| *t -= p * v);
+                tangent
+                    .iter_mut()
+                    .zip(&best.columns[a].values)
+                    .for_each(|(t, v)| *t -= p * v);
             }
         }
         tangent
@@ -308,7 +384,10 @@ impl Objective {
 
     /// Amplitudes in the parameters' units.
     fn amplitudes(&self, columns: &[Column], x: &Vector) -> Vec<f64> {
-        x.iter().zip(columns).map(|(x, c)| x * self.length / c.length).collect()
+        x.iter()
+            .zip(columns)
+            .map(|(x, c)| x * self.length / c.length)
+            .collect()
     }
 
     fn linear_problem(&self, columns: &[Column]) -> Bounded {
@@ -327,14 +406,22 @@ impl Objective {
     fn residuals(&self, columns: &[Column], x: &Vector) -> Vec<f64> {
         let mut residuals = self.target.clone();
         for (column, amplitude) in columns.iter().zip(x) {
-            residuals.iter_mut().zip(&column.values).for_each(|(r, v)| *r -= amplitude * v);
+            residuals
+                .iter_mut()
+                .zip(&column.values)
+                .for_each(|(r, v)| *r -= amplitude * v);
         }
         residuals
     }
 }
 
 /// Coefficients of the projection of `vector` on the active columns; none if these depend on one another.
-fn project(columns: &[Column], active: &[usize], gram: &Matrix, vector: &[f64]) -> Option<Vec<f64>> {
+fn project(
+    columns: &[Column],
+    active: &[usize],
+    gram: &Matrix,
+    vector: &[f64],
+) -> Option<Vec<f64>> {
     let mut right = [0.0; MOST];
     for (r, &i) in right.iter_mut().zip(active) {
         *r = dot(&columns[i].values, vector);
@@ -346,16 +433,23 @@ fn project(columns: &[Column], active: &[usize], gram: &Matrix, vector: &[f64]) 
 
 fn mixed(mixing: Option<&DMatrix<f64>>, values: Vec<f64>) -> Vec<f64> {
     let Some(mixing) = mixing else { return values };
-    (0..values.len()).map(|i| (0..values.len()).map(|j| mixing[(i, j)] * values[j]).sum()).collect()
+    (0..values.len())
+        .map(|i| (0..values.len()).map(|j| mixing[(i, j)] * values[j]).sum())
+        .collect()
 }
 
 /// Matrix that makes errors of this covariance uncorrelated and of unit variance: the inverse of its Cholesky
 /// factor; where rounding leaves no positive definite matrix, of its diagonal alone.
 pub(crate) fn whitening(covariance: &DMatrix<f64>) -> DMatrix<f64> {
-    let inverse = covariance.clone().cholesky().and_then(|c| c.l().try_inverse());
+    let inverse = covariance
+        .clone()
+        .cholesky()
+        .and_then(|c| c.l().try_inverse());
     inverse.unwrap_or_else(|| {
         let root = |i: usize| 1.0 / covariance[(i, i)].max(f64::MIN_POSITIVE).sqrt();
-        DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| if i == j { root(i) } else { 0.0 })
+        DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| {
+            if i == j { root(i) } else { 0.0 }
+        })
     })
 }
 

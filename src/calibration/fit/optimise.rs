@@ -7,8 +7,8 @@
 use super::bounded::{Bounded, MOST, Matrix, cholesky_solve};
 use super::objective::{Objective, Range, Solution, dot};
 use argmin::core::{
-    CostFunction, Error, Executor, IterState, Jacobian, KV, Problem, Solver, State, TerminationReason,
-    TerminationStatus,
+    CostFunction, Error, Executor, IterState, Jacobian, KV, Problem, Solver, State,
+    TerminationReason, TerminationStatus,
 };
 
 /// End of the iterations.
@@ -47,7 +47,11 @@ const MOST_ITERATIONS: u64 = 300;
 /// Descends from a start to the local minimum.
 pub(crate) fn descend(objective: &Objective, start: &[f64]) -> End {
     let ranges: Vec<Range> = objective.shaped().map(|(_, range)| range).collect();
-    let solver = DampedNewton { ranges, damping: 1e-3, growth: 2.0 };
+    let solver = DampedNewton {
+        ranges,
+        damping: 1e-3,
+        growth: 2.0,
+    };
     let run = Executor::new(Reduced(objective), solver)
         .configure(|state| state.param(start.to_vec()).max_iters(MOST_ITERATIONS))
         .timer(false)
@@ -68,7 +72,11 @@ pub(crate) fn descend(objective: &Objective, start: &[f64]) -> End {
         Some(best) => End {
             coordinates: best.clone(),
             cost: state.get_best_cost(),
-            termination: if converged { Termination::Converged } else { Termination::IterationLimit },
+            termination: if converged {
+                Termination::Converged
+            } else {
+                Termination::IterationLimit
+            },
         },
     }
 }
@@ -151,7 +159,9 @@ impl DampedNewton {
         let n = u.len();
         let mut problem = Bounded::new(n);
         problem.gram = *curvature;
-        let largest = (0..n).map(|i| curvature[i][i]).fold(f64::MIN_POSITIVE, f64::max);
+        let largest = (0..n)
+            .map(|i| curvature[i][i])
+            .fold(f64::MIN_POSITIVE, f64::max);
         // Damped along the diagonal (Marquardt), so that the step does not depend on the units of the
         // coordinates.
         for i in 0..n {
@@ -198,9 +208,14 @@ impl Solver<Reduced<'_>, Iterate> for DampedNewton {
         mut state: Iterate,
     ) -> Result<(Iterate, Option<KV>), Error> {
         let (Some(u), Some(at)) = (state.take_param(), state.take_jacobian()) else {
-            return Ok((state.terminate_with(TerminationReason::SolverExit("no start".into())), None));
+            return Ok((
+                state.terminate_with(TerminationReason::SolverExit("no start".into())),
+                None,
+            ));
         };
-        let curvature = problem.problem("curvature_count", |reduced| Ok(curvature(reduced.0, &u, &at)))?;
+        let curvature = problem.problem("curvature_count", |reduced| {
+            Ok(curvature(reduced.0, &u, &at))
+        })?;
         let (step, expected) = self.step(&u, &at, &curvature);
         let there: Vec<f64> = u.iter().zip(&step).map(|(u, s)| u + s).collect();
         let next = problem.jacobian(&there)?;

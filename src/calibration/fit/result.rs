@@ -54,7 +54,9 @@ pub enum FitError {
         scales: usize,
     },
     /// A wavelet variance that is not positive has no logarithm, no weight, no meaning.
-    #[error("the wavelet variance at scale 2^{level} is {value}: it must be a number from 1e-100 to 1e100")]
+    #[error(
+        "the wavelet variance at scale 2^{level} is {value}: it must be a number from 1e-100 to 1e100"
+    )]
     NotPositive {
         /// Level.
         level: u32,

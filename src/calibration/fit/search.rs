@@ -24,11 +24,20 @@ pub(crate) struct Effort {
 
 impl Effort {
     /// For a curve of which nothing is known.
-    pub(crate) const WHOLE: Self = Self { combinations: 6000, starts: 16 };
+    pub(crate) const WHOLE: Self = Self {
+        combinations: 6000,
+        starts: 16,
+    };
     /// For a curve that resembles one already fitted: its minima are known, and another is seldom far from the grid's best.
-    pub(crate) const AGAIN: Self = Self { combinations: 300, starts: 2 };
+    pub(crate) const AGAIN: Self = Self {
+        combinations: 300,
+        starts: 2,
+    };
     /// Descents from the known minima only.
-    pub(crate) const WITHIN: Self = Self { combinations: 0, starts: 1 };
+    pub(crate) const WITHIN: Self = Self {
+        combinations: 0,
+        starts: 1,
+    };
 }
 
 /// Result of the search.
@@ -45,8 +54,15 @@ pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) 
     let dimensions: Vec<(usize, Range)> = objective.shaped().collect();
     if dimensions.is_empty() {
         let cost = objective.solve(&[]).cost();
-        let end = End { coordinates: Vec::new(), cost, termination: Termination::Linear };
-        return Found { ends: vec![end], combinations: 1 };
+        let end = End {
+            coordinates: Vec::new(),
+            cost,
+            termination: Termination::Linear,
+        };
+        return Found {
+            ends: vec![end],
+            combinations: 1,
+        };
     }
     let mut starts = known.to_vec();
     let mut tried = 0;
@@ -57,9 +73,15 @@ pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) 
         // The grid first: of ends with the same cost the sort keeps that order, whatever is known.
         starts.splice(0..0, grid.starts(&choices, effort.starts));
     }
-    let mut ends: Vec<End> = starts.par_iter().map(|start| descend(objective, start)).collect();
+    let mut ends: Vec<End> = starts
+        .par_iter()
+        .map(|start| descend(objective, start))
+        .collect();
     ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    Found { ends, combinations: tried }
+    Found {
+        ends,
+        combinations: tried,
+    }
 }
 
 /// The grid: for each dimension its points and their columns; the inner products of all columns.
@@ -84,10 +106,13 @@ impl<'a> Grid<'a> {
         let points: Vec<Vec<f64>> = dimensions.iter().map(|(_, r)| spread(*r, count)).collect();
         let repeats = (0..dimensions.len())
             .map(|d| {
-                d > 0 && objective.components[dimensions[d].0] == objective.components[dimensions[d - 1].0]
+                d > 0
+                    && objective.components[dimensions[d].0]
+                        == objective.components[dimensions[d - 1].0]
             })
             .collect();
-        let fixed = (0..objective.components.len()).filter(|i| objective.components[*i].coordinate.is_none());
+        let fixed = (0..objective.components.len())
+            .filter(|i| objective.components[*i].coordinate.is_none());
         let mut owners: Vec<usize> = fixed.collect();
         let mut shapes: Vec<Shape> = owners.iter().map(|i| objective.shape(*i, 0.0)).collect();
         for ((owner, _), points) in dimensions.iter().zip(&points) {
@@ -95,11 +120,28 @@ impl<'a> Grid<'a> {
             owners.extend(points.iter().map(|_| *owner));
         }
         let plain = objective.plain_responses();
-        let columns: Vec<Column> = shapes.iter().map(|shape| objective.column(shape, &plain)).collect();
+        let columns: Vec<Column> = shapes
+            .iter()
+            .map(|shape| objective.column(shape, &plain))
+            .collect();
         let n = columns.len();
-        let gram = (0..n * n).map(|k| dot(&columns[k / n].values, &columns[k % n].values)).collect();
-        let right = columns.iter().map(|c| dot(&c.values, &objective.target)).collect();
-        Self { objective, points, repeats, shapes, columns, owners, gram, right }
+        let gram = (0..n * n)
+            .map(|k| dot(&columns[k / n].values, &columns[k % n].values))
+            .collect();
+        let right = columns
+            .iter()
+            .map(|c| dot(&c.values, &objective.target))
+            .collect();
+        Self {
+            objective,
+            points,
+            repeats,
+            shapes,
+            columns,
+            owners,
+            gram,
+            right,
+        }
     }
 
     /// Least Σ residual² for a choice of points, one for each dimension.
@@ -127,31 +169,42 @@ impl<'a> Grid<'a> {
                 problem.gram[a][b] = self.gram[i * self.columns.len() + selected[b]];
             }
             problem.right[a] = self.right[i];
-            (problem.lower[a], problem.upper[a]) =
-                self.objective.scaled_bounds(self.owners[i], self.columns[i].length);
+            (problem.lower[a], problem.upper[a]) = self
+                .objective
+                .scaled_bounds(self.owners[i], self.columns[i].length);
         }
         let x = problem.minimise();
         let linear: f64 = (0..n).map(|i| problem.right[i] * x[i]).sum();
-        let quadratic: f64 =
-            (0..n).map(|i| x[i] * (0..n).map(|j| problem.gram[i][j] * x[j]).sum::<f64>()).sum();
+        let quadratic: f64 = (0..n)
+            .map(|i| x[i] * (0..n).map(|j| problem.gram[i][j] * x[j]).sum::<f64>())
+            .sum();
         // |b − Ax|² with |b| = 1, from inner products that are shared by all combinations.
         1.0 - 2.0 * linear + quadratic
     }
 
     /// The local minima of the grid, best first, so many at most.
     fn starts(&self, choices: &[Vec<usize>], most: usize) -> Vec<Vec<f64>> {
-        let costs: Vec<f64> = choices.par_iter().with_min_len(64).map(|c| self.cost(c)).collect();
+        let costs: Vec<f64> = choices
+            .par_iter()
+            .with_min_len(64)
+            .map(|c| self.cost(c))
+            .collect();
         // A choice as a number whose digits are its points from 1 on: ascending as the choices are, and its neighbours are the
         // numbers whose digits differ by at most one; those that are no choice are not found.
         let base = self.points.iter().map(Vec::len).max().unwrap_or(0) as i64 + 2;
         let key = |choice: &[usize]| choice.iter().fold(0, |key, i| key * base + *i as i64 + 1);
         let keys: Vec<i64> = choices.iter().map(|choice| key(choice)).collect();
-        let further =
-            |to: Vec<i64>| to.iter().flat_map(|key| [-1, 0, 1].map(|step| key * base + step)).collect();
+        let further = |to: Vec<i64>| {
+            to.iter()
+                .flat_map(|key| [-1, 0, 1].map(|step| key * base + step))
+                .collect()
+        };
         let neighbours: Vec<i64> = self.points.iter().fold(vec![0], |to, _| further(to));
         let lowest_at = |key: i64, cost: f64| {
             let cost_at = |key: i64| keys.binary_search(&key).ok().map(|i| costs[i]);
-            neighbours.iter().all(|to| cost_at(key + to).is_none_or(|other| cost <= other))
+            neighbours
+                .iter()
+                .all(|to| cost_at(key + to).is_none_or(|other| cost <= other))
         };
         let mut minima: Vec<(f64, &Vec<usize>)> = costs
             .iter()
@@ -163,8 +216,17 @@ impl<'a> Grid<'a> {
         // A flat stretch (a process without amplitude) is one minimum.
         minima.dedup_by(|b, a| (b.0 - a.0).abs() <= 1e-9 * a.0.abs());
         minima.truncate(most);
-        let point = |choice: &Vec<usize>| choice.iter().zip(&self.points).map(|(i, p)| p[*i]).collect();
-        minima.into_iter().map(|(_, choice)| point(choice)).collect()
+        let point = |choice: &Vec<usize>| {
+            choice
+                .iter()
+                .zip(&self.points)
+                .map(|(i, p)| p[*i])
+                .collect()
+        };
+        minima
+            .into_iter()
+            .map(|(_, choice)| point(choice))
+            .collect()
     }
 
     /// All choices of points, alike dimensions ascending.
@@ -176,7 +238,11 @@ impl<'a> Grid<'a> {
                 .flat_map(|choice: Vec<usize>| {
                     // Alike processes may be exchanged, and two at one point are one: strictly ascending
                     // choices are all there are.
-                    let first = if *repeats { choice.last().map_or(0, |i| i + 1) } else { 0 };
+                    let first = if *repeats {
+                        choice.last().map_or(0, |i| i + 1)
+                    } else {
+                        0
+                    };
                     (first..points.len()).map(move |i| [choice.as_slice(), &[i]].concat())
                 })
                 .collect();
@@ -190,7 +256,10 @@ impl<'a> Grid<'a> {
 fn points_per_dimension(dimensions: usize, most: usize) -> usize {
     // n·(n − 1)···/k! of k alike dimensions, of which ascending choices are all there are.
     let combinations = |n: usize| (0..dimensions).fold(1, |c, k| c * (n - k) / (k + 1));
-    (dimensions + 1..=POINTS).take_while(|n| combinations(*n) <= most).last().unwrap_or(dimensions + 1)
+    (dimensions + 1..=POINTS)
+        .take_while(|n| combinations(*n) <= most)
+        .last()
+        .unwrap_or(dimensions + 1)
 }
 
 fn spread(range: Range, count: usize) -> Vec<f64> {
@@ -219,7 +288,8 @@ mod tests {
             Process::Ar1(Ar1::new(0.999, 1e-5).unwrap()),
         ]);
         let levels: Vec<u32> = (1..=12).collect();
-        let off = |level: &u32| model.haar_wv(*level) * if level.is_multiple_of(2) { 1.1 } else { 0.9 };
+        let off =
+            |level: &u32| model.haar_wv(*level) * if level.is_multiple_of(2) { 1.1 } else { 0.9 };
         let curve = Curve {
             wv: levels.iter().map(off).collect(),
             edof: vec![50.0; 12],
@@ -228,8 +298,14 @@ mod tests {
         };
         let component = |process: &Process| Component {
             kind: process.kind(),
-            amplitude: Range { low: 0.0, high: f64::INFINITY },
-            coordinate: (process.kind() == Kind::Ar1).then_some(Range { low: -10.0, high: 1.0 }),
+            amplitude: Range {
+                low: 0.0,
+                high: f64::INFINITY,
+            },
+            coordinate: (process.kind() == Kind::Ar1).then_some(Range {
+                low: -10.0,
+                high: 1.0,
+            }),
         };
         let components = model.processes.iter().map(component).collect();
         Objective::new(&curve, Weighting::Edof, &curve.wv, None, components)
@@ -242,14 +318,28 @@ mod tests {
         let at = [-2.5, -6.5];
         let solution = objective.solve(&at);
         let plain = objective.plain_responses();
-        assert!(solution.amplitudes.iter().all(|a| *a > 0.0), "{:?}", solution.amplitudes);
+        assert!(
+            solution.amplitudes.iter().all(|a| *a > 0.0),
+            "{:?}",
+            solution.amplitudes
+        );
         for (component, u) in [(0, 0.0), (1, 0.0), (2, at[0]), (3, at[1])] {
-            let column = objective.column(&objective.shape(component, u), &plain).values;
+            let column = objective
+                .column(&objective.shape(component, u), &plain)
+                .values;
             // rounding of the twelve products of numbers below 1, and of derivatives that are projected once
             assert!(dot(&solution.residuals, &column).abs() < 1e-14);
-            assert!(solution.jacobian.iter().all(|tangent| dot(tangent, &column).abs() < 1e-12));
+            assert!(
+                solution
+                    .jacobian
+                    .iter()
+                    .all(|tangent| dot(tangent, &column).abs() < 1e-12)
+            );
         }
-        assert!(solution.cost() > 1e-4 && solution.jacobian.iter().all(|t| dot(t, t) > 1e-9), "{solution:?}");
+        assert!(
+            solution.cost() > 1e-4 && solution.jacobian.iter().all(|t| dot(t, t) > 1e-9),
+            "{solution:?}"
+        );
     }
 
     /// By inner products that are shared, and by the amplitudes of each point: the same cost.
@@ -262,20 +352,34 @@ mod tests {
         assert_eq!((grid.points[0].len(), choices.len()), (11, 55));
         let mut costs = Vec::new();
         for choice in &choices {
-            let at: Vec<f64> = choice.iter().zip(&grid.points).map(|(i, points)| points[*i]).collect();
+            let at: Vec<f64> = choice
+                .iter()
+                .zip(&grid.points)
+                .map(|(i, points)| points[*i])
+                .collect();
             costs.push(objective.solve(&at).cost());
             let (found, exact) = (grid.cost(choice), costs[costs.len() - 1]);
             // 1 − 2rᵀx + xᵀGx cancels
-            assert!((found - exact).abs() < 1e-10, "{choice:?}: {found:e} {exact:e}");
+            assert!(
+                (found - exact).abs() < 1e-10,
+                "{choice:?}: {found:e} {exact:e}"
+            );
         }
         // it starts where no neighbour is lower
         let is_near = |a: &[usize], b: &[usize]| a.iter().zip(b).all(|(a, b)| a.abs_diff(*b) <= 1);
-        let lowest =
-            |k: usize| (0..costs.len()).all(|n| !is_near(&choices[k], &choices[n]) || costs[k] <= costs[n]);
-        let mut minima: Vec<f64> = (0..costs.len()).filter(|k| lowest(*k)).map(|k| costs[k]).collect();
+        let lowest = |k: usize| {
+            (0..costs.len()).all(|n| !is_near(&choices[k], &choices[n]) || costs[k] <= costs[n])
+        };
+        let mut minima: Vec<f64> = (0..costs.len())
+            .filter(|k| lowest(*k))
+            .map(|k| costs[k])
+            .collect();
         minima.sort_by(f64::total_cmp);
-        let started: Vec<f64> =
-            grid.starts(&choices, 55).iter().map(|at| objective.solve(at).cost()).collect();
+        let started: Vec<f64> = grid
+            .starts(&choices, 55)
+            .iter()
+            .map(|at| objective.solve(at).cost())
+            .collect();
         assert_eq!(started, minima);
     }
 
@@ -289,15 +393,35 @@ mod tests {
             ]);
             let quantization = Some(*Tuning::default().quantization());
             let levels: Vec<u32> = (1..=12).collect();
-            let curve = Curve { edof: vec![50.0; 12], levels, quantization, ..Curve::default() };
-            let curve = Curve { wv: implied(&model, &curve), ..curve };
-            let free = Range { low: 0.0, high: f64::INFINITY };
-            let component = |p: &Process| Component { kind: p.kind(), amplitude: free, coordinate: None };
+            let curve = Curve {
+                edof: vec![50.0; 12],
+                levels,
+                quantization,
+                ..Curve::default()
+            };
+            let curve = Curve {
+                wv: implied(&model, &curve),
+                ..curve
+            };
+            let free = Range {
+                low: 0.0,
+                high: f64::INFINITY,
+            };
+            let component = |p: &Process| Component {
+                kind: p.kind(),
+                amplitude: free,
+                coordinate: None,
+            };
             let components = model.processes.iter().map(component).collect();
             let objective = Objective::new(&curve, Weighting::Edof, &curve.wv, None, components);
             let solution = objective.solve(&[]);
-            let [white, quantized] = solution.amplitudes[..] else { panic!("{solution:?}") };
-            assert!((white - 1.0).abs() < 1e-9 && (quantized / q2 - 1.0).abs() < 1e-9, "{q2}: {solution:?}");
+            let [white, quantized] = solution.amplitudes[..] else {
+                panic!("{solution:?}")
+            };
+            assert!(
+                (white - 1.0).abs() < 1e-9 && (quantized / q2 - 1.0).abs() < 1e-9,
+                "{q2}: {solution:?}"
+            );
         }
     }
 
@@ -307,7 +431,25 @@ mod tests {
         let points = [1, 2, 3, 4].map(|dimensions| points_per_dimension(dimensions, 6000));
         assert_eq!(points, [POINTS, 110, 34, 21]);
         assert_eq!(points_per_dimension(5, 2), 6);
-        assert_eq!(spread(Range { low: -1.0, high: 1.0 }, 5), [-1.0, -0.5, 0.0, 0.5, 1.0]);
-        assert_eq!(spread(Range { low: 2.0, high: 2.0 }, 5), [2.0]);
+        assert_eq!(
+            spread(
+                Range {
+                    low: -1.0,
+                    high: 1.0
+                },
+                5
+            ),
+            [-1.0, -0.5, 0.0, 0.5, 1.0]
+        );
+        assert_eq!(
+            spread(
+                Range {
+                    low: 2.0,
+                    high: 2.0
+                },
+                5
+            ),
+            [2.0]
+        );
     }
 }

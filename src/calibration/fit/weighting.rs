@@ -38,7 +38,10 @@ impl Weighting {
         if self == Self::Model && curve.quantization.is_some() {
             let plain = inverse_deviations(curve, nu).into_iter();
             let scales = curve.wv.iter().zip(nu).zip(&curve.edof);
-            return plain.zip(scales).map(|(root, ((wv, nu), edof))| root * trust(wv / nu, *edof)).collect();
+            return plain
+                .zip(scales)
+                .map(|(root, ((wv, nu), edof))| root * trust(wv / nu, *edof))
+                .collect();
         }
         let root = |((nu, edof), level): ((&f64, &f64), &u32)| match self {
             _ if curve.ignored.contains(level) => 0.0,
@@ -51,7 +54,11 @@ impl Weighting {
             }
             Self::None => 1.0,
         };
-        nu.iter().zip(&curve.edof).zip(&curve.levels).map(root).collect()
+        nu.iter()
+            .zip(&curve.edof)
+            .zip(&curve.levels)
+            .map(root)
+            .collect()
     }
 }
 
@@ -62,7 +69,11 @@ pub(crate) fn inverse_deviations(curve: &Curve, nu: &[f64]) -> Vec<f64> {
         // var nu_hat = 2 nu²/eta by its own noise; var ln nu by what recordings differ by.
         false => 1.0 / (nu * (2.0 / edof + curve.differing).sqrt()),
     };
-    nu.iter().zip(&curve.edof).zip(&curve.levels).map(root).collect()
+    nu.iter()
+        .zip(&curve.edof)
+        .zip(&curve.levels)
+        .map(root)
+        .collect()
 }
 
 /// Factor of √Omega where a variance is so many times that of the model: 1 up to one standard deviation above it, the inverse
@@ -131,19 +142,39 @@ mod tests {
         for (edof, begin) in [(50.0, 1.0), (3.0, 2.0)] {
             let plain = curve(edof);
             let quantization = Some(*Tuning::default().quantization());
-            let robust = Curve { quantization, ..plain.clone() };
-            for (beyond, power) in [(-3.0, 0.0), (-0.01, 0.0), (0.5, 1.0), (1.0, 2.0), (2.0, 2.0)] {
+            let robust = Curve {
+                quantization,
+                ..plain.clone()
+            };
+            for (beyond, power) in [
+                (-3.0, 0.0),
+                (-0.01, 0.0),
+                (0.5, 1.0),
+                (1.0, 2.0),
+                (2.0, 2.0),
+            ] {
                 let v: f64 = 2.0 / (9.0 * edof);
                 let ratio = (1.0 - v + (begin + beyond) * v.sqrt()).powi(3);
                 let nu = [6.0 / ratio, 3.0];
                 let expected = inverse_deviations(&plain, &nu)[0] / ratio.powf(power);
-                assert_relative_eq!(Weighting::Model.roots(&robust, &nu)[0], expected, max_relative = 1e-9);
+                assert_relative_eq!(
+                    Weighting::Model.roots(&robust, &nu)[0],
+                    expected,
+                    max_relative = 1e-9
+                );
             }
             let nu = [3.0, 3.0];
             let deviation = 3.0 * (2.0 / edof + 0.04).sqrt();
-            assert_relative_eq!(inverse_deviations(&plain, &nu)[0], 1.0 / deviation, max_relative = 1e-12);
+            assert_relative_eq!(
+                inverse_deviations(&plain, &nu)[0],
+                1.0 / deviation,
+                max_relative = 1e-12
+            );
             for curve in [&plain, &robust] {
-                assert_eq!(Weighting::Edof.roots(curve, &nu), Weighting::Edof.roots(&plain, &nu));
+                assert_eq!(
+                    Weighting::Edof.roots(curve, &nu),
+                    Weighting::Edof.roots(&plain, &nu)
+                );
             }
         }
     }

@@ -11,7 +11,10 @@ pub struct Limits {
 
 impl Limits {
     /// No limits: wherever the process exists.
-    pub(crate) const NONE: Self = Self { amplitude: (0.0, f64::INFINITY), shape: None };
+    pub(crate) const NONE: Self = Self {
+        amplitude: (0.0, f64::INFINITY),
+        shape: None,
+    };
 }
 
 /// A limit that means nothing.
@@ -71,7 +74,9 @@ impl LimitError {
             Self::Process { legal, .. } => format!("its processes: {}", legal.join(", ")),
             Self::Parameter { legal, .. } => format!("its parameters: {}", legal.join(", ")),
             Self::Empty { .. } => "lower ≤ upper; fix = … for a value that is known".to_owned(),
-            Self::Domain { .. } => "bounds are in the units of the parameter, as in model files".to_owned(),
+            Self::Domain { .. } => {
+                "bounds are in the units of the parameter, as in model files".to_owned()
+            }
         }
     }
 }

@@ -47,7 +47,9 @@ pub enum SpecError {
         count: String,
     },
     /// Several of a kind that adds up to one of itself.
-    #[error("model \"{spec}\": {count} {code} are one {code}: their wavelet variances are proportional")]
+    #[error(
+        "model \"{spec}\": {count} {code} are one {code}: their wavelet variances are proportional"
+    )]
     Repeated {
         /// The specification.
         spec: String,
@@ -57,7 +59,9 @@ pub enum SpecError {
         count: usize,
     },
     /// More AR1, GM and MA1 than can be searched.
-    #[error("model \"{spec}\": {count} AR1, GM and MA1 processes; at most {MOST_SHAPES} can be told apart")]
+    #[error(
+        "model \"{spec}\": {count} AR1, GM and MA1 processes; at most {MOST_SHAPES} can be told apart"
+    )]
     TooMany {
         /// The specification.
         spec: String,
@@ -79,7 +83,13 @@ impl ModelSpec {
     /// N2 = WN + QN + 2 AR1 + RW of the paper: the usual model.
     #[must_use]
     pub fn n2() -> Self {
-        Self::of([Kind::White, Kind::Quantization, Kind::Ar1, Kind::Ar1, Kind::RandomWalk])
+        Self::of([
+            Kind::White,
+            Kind::Quantization,
+            Kind::Ar1,
+            Kind::Ar1,
+            Kind::RandomWalk,
+        ])
     }
 
     /// A sum of processes that can be told apart.
@@ -99,7 +109,11 @@ impl ModelSpec {
     /// Names of the parameters of the process of that label; none of one that is not there.
     #[must_use]
     pub fn parameter_names(&self, label: &str) -> Vec<&'static str> {
-        let kind = self.labels().iter().position(|l| l == label).map(|i| self.kinds[i]);
+        let kind = self
+            .labels()
+            .iter()
+            .position(|l| l == label)
+            .map(|i| self.kinds[i]);
         kind.map_or(Vec::new(), names)
     }
 
@@ -118,19 +132,36 @@ impl ModelSpec {
         low: Option<f64>,
         high: Option<f64>,
     ) -> Result<(), LimitError> {
-        let ParameterRef { process: index, parameter: named } = self.parameter(process, parameter)?;
+        let ParameterRef {
+            process: index,
+            parameter: named,
+        } = self.parameter(process, parameter)?;
         let kind = self.kinds[index];
         for value in [low, high].into_iter().flatten() {
             let domain = BoundDomain::of(kind, named.is_shape());
             if !domain.contains(value) {
-                let (process, parameter, domain) = (process.to_owned(), parameter.to_owned(), domain.words);
-                return Err(LimitError::Domain { process, parameter, value, domain });
+                let (process, parameter, domain) =
+                    (process.to_owned(), parameter.to_owned(), domain.words);
+                return Err(LimitError::Domain {
+                    process,
+                    parameter,
+                    value,
+                    domain,
+                });
             }
         }
-        let (from, to) = (low.unwrap_or(f64::NEG_INFINITY), high.unwrap_or(f64::INFINITY));
+        let (from, to) = (
+            low.unwrap_or(f64::NEG_INFINITY),
+            high.unwrap_or(f64::INFINITY),
+        );
         if from > to {
             let (process, parameter) = (process.to_owned(), parameter.to_owned());
-            return Err(LimitError::Empty { process, parameter, low: from, high: to });
+            return Err(LimitError::Empty {
+                process,
+                parameter,
+                low: from,
+                high: to,
+            });
         }
         let limits = &mut self.limits[index];
         if named.is_shape() {
@@ -147,18 +178,33 @@ impl ModelSpec {
     ///
     /// # Errors
     /// When there is no such process or parameter.
-    pub(crate) fn parameter(&self, process: &str, parameter: &str) -> Result<ParameterRef, LimitError> {
+    pub(crate) fn parameter(
+        &self,
+        process: &str,
+        parameter: &str,
+    ) -> Result<ParameterRef, LimitError> {
         let labels = self.labels();
         let Some(index) = labels.iter().position(|l| l == process) else {
             let (spec, process) = (self.to_string(), process.to_owned());
-            return Err(LimitError::Process { spec, process, legal: labels });
+            return Err(LimitError::Process {
+                spec,
+                process,
+                legal: labels,
+            });
         };
         let kind = self.kinds[index];
         match kind.parameters().iter().find(|p| p.name() == parameter) {
-            Some(named) => Ok(ParameterRef { process: index, parameter: *named }),
+            Some(named) => Ok(ParameterRef {
+                process: index,
+                parameter: *named,
+            }),
             None => {
                 let (process, parameter) = (process.to_owned(), parameter.to_owned());
-                Err(LimitError::Parameter { process, parameter, legal: names(kind) })
+                Err(LimitError::Parameter {
+                    process,
+                    parameter,
+                    legal: names(kind),
+                })
             }
         }
     }
@@ -267,11 +313,21 @@ impl BoundDomain {
     /// That of the shape of a process (phi, beta or theta), or of another parameter.
     #[must_use]
     pub fn of(kind: Kind, is_shape: bool) -> Self {
-        let closed = |low: f64, high: f64, words| Self { low, high, is_open: false, words };
+        let closed = |low: f64, high: f64, words| Self {
+            low,
+            high,
+            is_open: false,
+            words,
+        };
         match kind {
             _ if !is_shape => closed(0.0, Curve::WV_RANGE.1, "a number from 0 to 1e100"),
             // The search is over positive correlations.
-            Kind::Ar1 => Self { low: 0.0, high: 1.0, is_open: true, words: "between 0 and 1" },
+            Kind::Ar1 => Self {
+                low: 0.0,
+                high: 1.0,
+                is_open: true,
+                words: "between 0 and 1",
+            },
             Kind::GaussMarkov => closed(1e-100, 1e100, "a number from 1e-100 to 1e100 (1/s)"),
             _ => closed(-1.0, 1.0, "between -1 and 1"),
         }
@@ -286,7 +342,10 @@ impl BoundDomain {
 fn parse_count(spec: &str, count: &str) -> Result<usize, SpecError> {
     match count.parse() {
         Ok(n) if (1..=99).contains(&n) => Ok(n),
-        _ => Err(SpecError::Count { spec: spec.into(), count: count.into() }),
+        _ => Err(SpecError::Count {
+            spec: spec.into(),
+            count: count.into(),
+        }),
     }
 }
 
@@ -298,7 +357,10 @@ fn named(spec: &str, name: &str) -> Result<Vec<Kind>, SpecError> {
         "N2" => Ok(ModelSpec::n2().kinds),
         code => match Kind::named(code) {
             Some(kind) => Ok(vec![kind]),
-            None => Err(SpecError::Unknown { spec: spec.into(), term: name.into() }),
+            None => Err(SpecError::Unknown {
+                spec: spec.into(),
+                term: name.into(),
+            }),
         },
     }
 }
@@ -307,12 +369,19 @@ fn check(spec: &str, kinds: &[Kind]) -> Result<(), SpecError> {
     for kind in Kind::ALL {
         let count = kinds.iter().filter(|k| **k == kind).count();
         if count > 1 && most(kind) == 1 {
-            return Err(SpecError::Repeated { spec: spec.into(), code: kind.code(), count });
+            return Err(SpecError::Repeated {
+                spec: spec.into(),
+                code: kind.code(),
+                count,
+            });
         }
     }
     let count = kinds.iter().filter(|k| k.shape().is_some()).count();
     if count > MOST_SHAPES {
-        return Err(SpecError::TooMany { spec: spec.into(), count });
+        return Err(SpecError::TooMany {
+            spec: spec.into(),
+            count,
+        });
     }
     Ok(())
 }

@@ -60,9 +60,15 @@ pub struct Departure {
 impl Departure {
     fn of(all: &[Miss], is_known: impl Fn(&&Miss) -> bool) -> Self {
         let (all, ignored): (Vec<Miss>, Vec<Miss>) = all.iter().copied().partition(|m| m.is_fitted);
-        let ignored: Vec<Miss> = ignored.into_iter().filter(|m| m.deviations.abs() > MISSED).collect();
+        let ignored: Vec<Miss> = ignored
+            .into_iter()
+            .filter(|m| m.deviations.abs() > MISSED)
+            .collect();
         let beyond = |deviations: f64| -> Vec<Miss> {
-            all.iter().copied().filter(|m| m.deviations.abs() > deviations).collect()
+            all.iter()
+                .copied()
+                .filter(|m| m.deviations.abs() > deviations)
+                .collect()
         };
         let known: Vec<Miss> = all.iter().filter(is_known).copied().collect();
         let longest = all.last().map(|m| m.level);
@@ -72,7 +78,10 @@ impl Departure {
             missed: beyond(MISSED),
             left_out: furthest(&ignored),
             furthest: furthest(if known.is_empty() { &all } else { &known }),
-            known_to: known.last().map(|m| m.level).filter(|level| Some(*level) != longest),
+            known_to: known
+                .last()
+                .map(|m| m.level)
+                .filter(|level| Some(*level) != longest),
             doubtful: furthest(&beyond(DOUBTFUL)),
             chance: ChiSquared::new(all.len().max(1) as f64).map_or(1.0, |law| law.sf(squares)),
         }
@@ -87,7 +96,9 @@ impl Departure {
 
 fn furthest(all: &[Miss]) -> Option<Miss> {
     // In the logarithm half is as far from 1 as twice.
-    all.iter().copied().max_by(|a, b| a.ratio.ln().abs().total_cmp(&b.ratio.ln().abs()))
+    all.iter()
+        .copied()
+        .max_by(|a, b| a.ratio.ln().abs().total_cmp(&b.ratio.ln().abs()))
 }
 
 impl Outcome {
@@ -100,10 +111,20 @@ impl Outcome {
             Some(goodness) => goodness.is_rejected(),
             None => departure.chance < IMPOSSIBLE && departure.doubtful.is_some(),
         };
-        let missed: Vec<Miss> = departure.missed.iter().chain(&departure.left_out).copied().collect();
-        let worst = furthest(&missed).or(departure.doubtful).or(departure.furthest);
+        let missed: Vec<Miss> = departure
+            .missed
+            .iter()
+            .chain(&departure.left_out)
+            .copied()
+            .collect();
+        let worst = furthest(&missed)
+            .or(departure.doubtful)
+            .or(departure.furthest);
         let is_missed = together || !departure.missed.is_empty();
-        worst.filter(|_| is_missed).map(|worst| Misfit { p_value: goodness.map(|g| g.p_value), worst })
+        worst.filter(|_| is_missed).map(|worst| Misfit {
+            p_value: goodness.map(|g| g.p_value),
+            worst,
+        })
     }
 
     /// The curve against the model.
@@ -119,18 +140,33 @@ impl Outcome {
     /// The scales that count.
     #[must_use]
     pub fn counted_levels(&self) -> Vec<u32> {
-        self.curve.levels.iter().copied().filter(|level| !self.curve.ignored.contains(level)).collect()
+        self.curve
+            .levels
+            .iter()
+            .copied()
+            .filter(|level| !self.curve.ignored.contains(level))
+            .collect()
     }
 
     fn misses(&self) -> Vec<Miss> {
         let curve = &self.curve;
         let implied = implied(&self.fit.composite, curve);
-        let scales = curve.levels.iter().zip(&curve.wv).zip(&curve.edof).zip(implied);
+        let scales = curve
+            .levels
+            .iter()
+            .zip(&curve.wv)
+            .zip(&curve.edof)
+            .zip(implied);
         scales
             .map(|(((level, nu), edof), implied)| {
                 let ratio = nu / implied;
                 let is_fitted = !curve.ignored.contains(level);
-                Miss { level: *level, ratio, deviations: score(ratio, *edof), is_fitted }
+                Miss {
+                    level: *level,
+                    ratio,
+                    deviations: score(ratio, *edof),
+                    is_fitted,
+                }
             })
             .collect()
     }
@@ -159,10 +195,19 @@ mod tests {
         };
         let departure = |deviations| Departure::of(&off(deviations), |m| m.level <= 8);
         let allowed = departure(-1.0);
-        assert!((allowed.chance - 0.4457).abs() < 5e-5 && allowed.doubtful.is_none(), "{allowed:?}");
-        assert_eq!((allowed.furthest.unwrap().level, allowed.known_to), (8, Some(8)));
+        assert!(
+            (allowed.chance - 0.4457).abs() < 5e-5 && allowed.doubtful.is_none(),
+            "{allowed:?}"
+        );
+        assert_eq!(
+            (allowed.furthest.unwrap().level, allowed.known_to),
+            (8, Some(8))
+        );
         let impossible = departure(-3.0);
-        assert!(impossible.missed.is_empty() && impossible.chance < 1e-15, "{impossible:?}");
+        assert!(
+            impossible.missed.is_empty() && impossible.chance < 1e-15,
+            "{impossible:?}"
+        );
         assert_eq!(impossible.doubtful.unwrap().level, 12);
         assert_eq!(Departure::of(&off(1.0), |_| true).known_to, None);
     }
@@ -181,7 +226,10 @@ mod tests {
                     -normal.inverse_cdf(law.sf(ratio * edof))
                 };
                 if exact.abs() < 5.0 {
-                    assert!((score(ratio, edof) - exact).abs() < 0.1, "{edof} {ratio}: {exact}");
+                    assert!(
+                        (score(ratio, edof) - exact).abs() < 0.1,
+                        "{edof} {ratio}: {exact}"
+                    );
                 }
             }
         }

@@ -21,7 +21,10 @@ impl Bootstrap {
 
 impl Default for Bootstrap {
     fn default() -> Self {
-        Self { draws: Self::DRAWS, seed: 1 }
+        Self {
+            draws: Self::DRAWS,
+            seed: 1,
+        }
     }
 }
 
@@ -78,7 +81,10 @@ impl Practical {
     #[must_use]
     pub fn walk_is_observed(&self) -> bool {
         let lasts = |from: f64| self.walk_until_s.is_none_or(|until| until >= 2.0 * from);
-        self.parameters.walk.crossover_s().is_some_and(|from| from <= self.range_s && lasts(from))
+        self.parameters
+            .walk
+            .crossover_s()
+            .is_some_and(|from| from <= self.range_s && lasts(from))
     }
 }
 

@@ -8,8 +8,8 @@ mod settings;
 
 pub use departure::{Departure, Misfit, Miss};
 pub use inference::{
-    AxesDiffer, Bootstrap, Goodness, Indistinct, Inference, LevelSpread, ParameterInterval, ParameterSpread,
-    Practical, PracticalIntervals, Undetermined,
+    AxesDiffer, Bootstrap, Goodness, Indistinct, Inference, LevelSpread, ParameterInterval,
+    ParameterSpread, Practical, PracticalIntervals, Undetermined,
 };
 pub use note::{Note, Share, shares};
 pub use ranking::{Candidate, Ranking, TooSimple};
@@ -23,8 +23,13 @@ use crate::wavelet::Curve;
 
 /// The noise model of outcomes, at a rate (Hz); axes of none have no noise.
 pub fn model_of<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>, rate_hz: f64) -> Model {
-    let mut model = Model { rate_hz, axes: Default::default() };
-    outcomes.into_iter().for_each(|outcome| outcome.put_into(&mut model));
+    let mut model = Model {
+        rate_hz,
+        axes: Default::default(),
+    };
+    outcomes
+        .into_iter()
+        .for_each(|outcome| outcome.put_into(&mut model));
     model
 }
 
@@ -80,10 +85,20 @@ impl Outcome {
     }
 
     /// The fit to a curve that resembles this one.
-    pub(crate) fn estimate_again(&self, curve: &Curve, settings: &Settings) -> Result<Fit, FitError> {
+    pub(crate) fn estimate_again(
+        &self,
+        curve: &Curve,
+        settings: &Settings,
+    ) -> Result<Fit, FitError> {
         match self.estimator {
             Estimator::Avlr => avlr(curve, &self.spec),
-            _ => refit(curve, &self.spec, settings.rate_hz, settings.weighting, &self.fit),
+            _ => refit(
+                curve,
+                &self.spec,
+                settings.rate_hz,
+                settings.weighting,
+                &self.fit,
+            ),
         }
     }
 }

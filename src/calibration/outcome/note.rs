@@ -38,24 +38,47 @@ impl Outcome {
         notes.extend(self.axes_differ.map(|_| Note::AxesDiffer));
         let ignored = &self.curve.ignored;
         // A range that was asked for is no news.
-        if let (Some(first), Some(last), None) = (ignored.first(), ignored.last(), settings.fit_range) {
-            notes.push(Note::LeftOut([*first, *last].map(|level| tau_s(level, rate_hz))));
+        if let (Some(first), Some(last), None) =
+            (ignored.first(), ignored.last(), settings.fit_range)
+        {
+            notes.push(Note::LeftOut(
+                [*first, *last].map(|level| tau_s(level, rate_hz)),
+            ));
         }
         if let Some(inference) = &self.inference {
             notes.extend(inference.indistinct.as_ref().map(|_| Note::Indistinct));
-            let amplitudes =
-                inference.intervals.iter().filter(|i| !i.of.parameter.is_shape() && i.absent.is_none());
+            let amplitudes = inference
+                .intervals
+                .iter()
+                .filter(|i| !i.of.parameter.is_shape() && i.absent.is_none());
             let wide = amplitudes.filter(|i| i.high > FACTOR * FACTOR * i.low);
-            notes.extend(wide.map(|i| Note::Wide(i.of, (i.low > 0.0).then_some((i.high / i.low).sqrt()))));
+            notes.extend(
+                wide.map(|i| Note::Wide(i.of, (i.low > 0.0).then_some((i.high / i.low).sqrt()))),
+            );
         }
         let fit = &self.fit;
         notes.extend(fit.zero.iter().map(|i| Note::Zero(*i)));
         let value = |of: &ParameterRef| fit.composite.parameters().find(|(p, _)| p == of);
-        notes.extend(fit.bounded.iter().filter_map(value).map(|(of, value)| Note::AtBound(of, value)));
-        let longest_s = self.counted_levels().last().map_or(0.0, |level| tau_s(*level, rate_hz));
-        for (i, process) in fit.composite.processes.iter().enumerate().filter(|(i, _)| !fit.zero.contains(i))
+        notes.extend(
+            fit.bounded
+                .iter()
+                .filter_map(value)
+                .map(|(of, value)| Note::AtBound(of, value)),
+        );
+        let longest_s = self
+            .counted_levels()
+            .last()
+            .map_or(0.0, |level| tau_s(*level, rate_hz));
+        for (i, process) in fit
+            .composite
+            .processes
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| !fit.zero.contains(i))
         {
-            let Some(time_s) = process.correlation_time_s(rate_hz) else { continue };
+            let Some(time_s) = process.correlation_time_s(rate_hz) else {
+                continue;
+            };
             if time_s * rate_hz < 1.0 {
                 notes.push(Note::LikeWhite(i, time_s));
             }
@@ -87,10 +110,17 @@ pub fn shares(model: &Composite, levels: &[u32]) -> Vec<Share> {
     };
     let leader = |level: u32| {
         let parts = model.processes.iter().map(|p| part(p, level));
-        parts.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+        parts
+            .enumerate()
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(i, _)| i)
     };
     let share = |(i, process): (usize, &Process)| Share {
-        leads: levels.iter().copied().filter(|level| leader(*level) == Some(i)).collect(),
+        leads: levels
+            .iter()
+            .copied()
+            .filter(|level| leader(*level) == Some(i))
+            .collect(),
         largest: levels
             .iter()
             .map(|level| (part(process, *level), *level))

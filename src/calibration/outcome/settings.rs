@@ -65,7 +65,11 @@ impl FromStr for ModelChoice {
 
     /// "auto", or a sum of processes.
     fn from_str(text: &str) -> Result<Self, SpecError> {
-        if text.eq_ignore_ascii_case("auto") { Ok(Self::Auto) } else { text.parse().map(Self::Given) }
+        if text.eq_ignore_ascii_case("auto") {
+            Ok(Self::Auto)
+        } else {
+            text.parse().map(Self::Given)
+        }
     }
 }
 
@@ -143,7 +147,11 @@ impl Settings {
     /// recordings pool nothing.
     #[must_use]
     pub fn pool(&self) -> Pool {
-        if self.estimators.iter().any(|e| e.is_single()) { Pool::Axes } else { Pool::Sensor }
+        if self.estimators.iter().any(|e| e.is_single()) {
+            Pool::Axes
+        } else {
+            Pool::Sensor
+        }
     }
 
     /// A model with the limits of what it is for.

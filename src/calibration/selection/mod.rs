@@ -38,11 +38,20 @@ const SEED: u64 = 1;
 
 /// All sums of WN, QN, RW, DR and up to two AR1 that so many scales can carry.
 fn sums(scales: usize) -> Vec<ModelSpec> {
-    let single = [Kind::White, Kind::Quantization, Kind::RandomWalk, Kind::Drift];
+    let single = [
+        Kind::White,
+        Kind::Quantization,
+        Kind::RandomWalk,
+        Kind::Drift,
+    ];
     let mut all = Vec::new();
     for bits in 0..1_u32 << single.len() {
         for correlated in 0..=2 {
-            let chosen = single.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, k)| *k);
+            let chosen = single
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| bits >> i & 1 == 1)
+                .map(|(_, k)| *k);
             let spec = ModelSpec::of(chosen.chain(std::iter::repeat_n(Kind::Ar1, correlated)));
             // At least one scale more than parameters, or the model meets the curve exactly and its distance
             // tells nothing.
@@ -73,7 +82,10 @@ pub(crate) fn choose(
         other => other,
     };
     let reported = settings;
-    let settings = &Settings { weighting, ..settings.clone() };
+    let settings = &Settings {
+        weighting,
+        ..settings.clone()
+    };
     let fitted = |spec: &ModelSpec| {
         fit(curve, spec, settings.rate_hz, settings.weighting).map(|fit| (spec.clone(), fit))
     };
@@ -81,16 +93,27 @@ pub(crate) fn choose(
     let all = sums(scales);
     let fits = all.par_iter().map(fitted).collect::<Result<Vec<_>, _>>()?;
     let tried = fits.len();
-    let fits: Vec<(ModelSpec, Fit)> =
-        fits.into_iter().filter(|(_, f)| f.zero.is_empty() && f.at_end.is_empty()).collect();
+    let fits: Vec<(ModelSpec, Fit)> = fits
+        .into_iter()
+        .filter(|(_, f)| f.zero.is_empty() && f.at_end.is_empty())
+        .collect();
     let not_identifiable = tried - fits.len();
     advance(stage);
-    let field = Field { group, estimator, curve, settings, reported, fits };
-    field.rank(not_identifiable, &|| advance(stage)).ok_or_else(|| FitError::TooFewScales {
-        spec: "auto".to_owned(),
-        parameters: 2,
-        scales,
-    })
+    let field = Field {
+        group,
+        estimator,
+        curve,
+        settings,
+        reported,
+        fits,
+    };
+    field
+        .rank(not_identifiable, &|| advance(stage))
+        .ok_or_else(|| FitError::TooFewScales {
+            spec: "auto".to_owned(),
+            parameters: 2,
+            scales,
+        })
 }
 
 /// Function that draws a curve.
@@ -132,17 +155,22 @@ struct Field<'a> {
 
 impl Field<'_> {
     fn rank(&self, not_identifiable: usize, stage_done: &dyn Fn()) -> Option<(ModelSpec, Ranking)> {
-        let nearest =
-            (0..self.fits.len()).min_by(|a, b| self.objective(*a).total_cmp(&self.objective(*b)))?;
+        let nearest = (0..self.fits.len())
+            .min_by(|a, b| self.objective(*a).total_cmp(&self.objective(*b)))?;
         // One set of curves for all candidates: their optimisms are then compared on the same noise.
         let curves = self.draws(nearest);
         // An optimism is not negative: whose distance alone exceeds the sum of the nearest is not the best.
         let bound = self.objective(nearest) + self.optimism(nearest, &curves);
-        let near: Vec<usize> = (0..self.fits.len()).filter(|i| self.objective(*i) <= bound).collect();
-        let mut ranked: Vec<(usize, f64)> =
-            near.into_par_iter().map(|i| (i, self.optimism(i, &curves))).collect();
+        let near: Vec<usize> = (0..self.fits.len())
+            .filter(|i| self.objective(*i) <= bound)
+            .collect();
+        let mut ranked: Vec<(usize, f64)> = near
+            .into_par_iter()
+            .map(|i| (i, self.optimism(i, &curves)))
+            .collect();
         let order = |ranked: &mut Vec<(usize, f64)>| {
-            ranked.sort_by(|a, b| (self.objective(a.0) + a.1).total_cmp(&(self.objective(b.0) + b.1)))
+            ranked
+                .sort_by(|a, b| (self.objective(a.0) + a.1).total_cmp(&(self.objective(b.0) + b.1)))
         };
         order(&mut ranked);
         let best = ranked.first()?.0;
@@ -168,7 +196,16 @@ impl Field<'_> {
         let too_simple = self.too_simple(chosen, &trials.simpler);
         let spec = self.fits[chosen].0.clone();
         let far = self.fits.len() - candidates.len();
-        Some((spec, Ranking { candidates, chosen: place, not_identifiable, far, too_simple }))
+        Some((
+            spec,
+            Ranking {
+                candidates,
+                chosen: place,
+                not_identifiable,
+                far,
+                too_simple,
+            },
+        ))
     }
 
     fn objective(&self, i: usize) -> f64 {
@@ -180,7 +217,9 @@ impl Field<'_> {
     fn take(&self, best: usize, ranked: &[(usize, f64)], trials: &mut Trials) -> usize {
         let mut simplest = None;
         // Ascending in their number of parameters.
-        for i in (0..self.fits.len()).filter(|i| self.fits[*i].0.is_special_case_of(&self.fits[best].0)) {
+        for i in
+            (0..self.fits.len()).filter(|i| self.fits[*i].0.is_special_case_of(&self.fits[best].0))
+        {
             if i != best {
                 let p = self.p_value(i, best);
                 trials.simpler.push((i, p));
@@ -193,7 +232,10 @@ impl Field<'_> {
                 return i;
             }
         }
-        let passing = ranked.iter().map(|(i, _)| *i).find(|i| self.passes(*i, trials));
+        let passing = ranked
+            .iter()
+            .map(|(i, _)| *i)
+            .find(|i| self.passes(*i, trials));
         passing.or(simplest).unwrap_or(best)
     }
 
@@ -209,23 +251,35 @@ impl Field<'_> {
 
     /// Probability of so large an objective if the candidate is true, of its fit as it would be reported.
     fn j_p_value(&self, i: usize) -> f64 {
-        let Self { curve, reported, .. } = *self;
+        let Self {
+            curve, reported, ..
+        } = *self;
         let spec = &self.fits[i].0;
         // Weights of the observed variances cannot reject a model that is far below them: a scale costs edof/2 at most.
-        let Ok(own) = fit(curve, spec, reported.rate_hz, reported.weighting) else { return 0.0 };
-        let curves = self
-            .curves(&own, "auto J-test", |sampler, key, settings| sampler.draw_as_recorded(key, settings));
+        let Ok(own) = fit(curve, spec, reported.rate_hz, reported.weighting) else {
+            return 0.0;
+        };
+        let curves = self.curves(&own, "auto J-test", |sampler, key, settings| {
+            sampler.draw_as_recorded(key, settings)
+        });
         let objective = |c: &Curve| {
-            refit(c, spec, reported.rate_hz, reported.weighting, &own).ok().map(|fit| fit.objective)
+            refit(c, spec, reported.rate_hz, reported.weighting, &own)
+                .ok()
+                .map(|fit| fit.objective)
         };
         let drawn: Vec<f64> = curves.par_iter().filter_map(objective).collect();
-        let larger = drawn.iter().filter(|objective| **objective >= own.objective).count();
+        let larger = drawn
+            .iter()
+            .filter(|objective| **objective >= own.objective)
+            .count();
         (1 + larger) as f64 / (1 + drawn.len()) as f64
     }
 
     /// New curves of a candidate.
     fn draws(&self, i: usize) -> Vec<Curve> {
-        self.curves(&self.fits[i].1, "auto", |sampler, key, settings| sampler.draw(key, settings))
+        self.curves(&self.fits[i].1, "auto", |sampler, key, settings| {
+            sampler.draw(key, settings)
+        })
     }
 
     fn curves(&self, fit: &Fit, scenario: &str, draw: Draw) -> Vec<Curve> {
@@ -238,7 +292,13 @@ impl Field<'_> {
         );
         let (name, process) = (self.group.scope.name(), self.estimator.name());
         let curve = |run: usize| {
-            let key = StreamKey { seed: SEED, scenario, run: run as u64, source: &name, process };
+            let key = StreamKey {
+                seed: SEED,
+                scenario,
+                run: run as u64,
+                source: &name,
+                process,
+            };
             draw(&sampler, &key, self.settings)
         };
         (0..DRAWS).filter_map(curve).collect()
@@ -246,7 +306,14 @@ impl Field<'_> {
 
     fn again(&self, i: usize, curve: &Curve) -> Option<Fit> {
         let (spec, fit) = &self.fits[i];
-        refit(curve, spec, self.settings.rate_hz, self.settings.weighting, fit).ok()
+        refit(
+            curve,
+            spec,
+            self.settings.rate_hz,
+            self.settings.weighting,
+            fit,
+        )
+        .ok()
     }
 
     /// 2 Σ Omega_j cov(nu_j, nu_j(theta)), Omega that of the curve itself.
@@ -266,7 +333,11 @@ impl Field<'_> {
             }
             2.0 * (ab - a * b / count) / (count - 1.0)
         };
-        if pairs.len() < 2 { f64::INFINITY } else { roots.iter().enumerate().map(term).sum() }
+        if pairs.len() < 2 {
+            f64::INFINITY
+        } else {
+            roots.iter().enumerate().map(term).sum()
+        }
     }
 
     /// Probability that the objectives differ by so much if the simpler is true (an upper bound where it is
@@ -274,7 +345,8 @@ impl Field<'_> {
     fn p_value(&self, simple: usize, best: usize) -> f64 {
         let observed = self.objective(simple) - self.objective(best);
         let curves = self.draws(simple);
-        let difference = |c: &Curve| Some(self.again(simple, c)?.objective - self.again(best, c)?.objective);
+        let difference =
+            |c: &Curve| Some(self.again(simple, c)?.objective - self.again(best, c)?.objective);
         let (some, rest) = curves.split_at(FIRST.min(curves.len()));
         let mut drawn: Vec<f64> = some.par_iter().filter_map(difference).collect();
         // With the 99 drawn and none as far off, p ≤ 1/100: the other hundred would only confirm it.
@@ -286,19 +358,33 @@ impl Field<'_> {
     }
 
     fn too_simple(&self, chosen: usize, tested: &[(usize, f64)]) -> Option<TooSimple> {
-        let (simpler, p_value) = *tested.iter().rev().find(|(i, p)| *p <= LEVEL && *i != chosen)?;
+        let (simpler, p_value) = *tested
+            .iter()
+            .rev()
+            .find(|(i, p)| *p <= LEVEL && *i != chosen)?;
         let (level, share) = self.deciding(simpler, chosen);
-        Some(TooSimple { spec: self.fits[simpler].0.clone(), p_value, level, share })
+        Some(TooSimple {
+            spec: self.fits[simpler].0.clone(),
+            p_value,
+            level,
+            share,
+        })
     }
 
     /// The scale that speaks loudest for one candidate against another, and its part of all that does.
     fn deciding(&self, against: usize, chosen: usize) -> (u32, f64) {
-        let (a, b) = (&self.fits[against].1.residuals, &self.fits[chosen].1.residuals);
+        let (a, b) = (
+            &self.fits[against].1.residuals,
+            &self.fits[chosen].1.residuals,
+        );
         // Contribution of each scale to the difference of the objectives; the share is of those in favour of
         // the chosen model.
         let gains: Vec<f64> = a.iter().zip(b).map(|(a, b)| a * a - b * b).collect();
         let total: f64 = gains.iter().filter(|g| **g > 0.0).sum();
-        let loudest = gains.iter().zip(&self.curve.levels).max_by(|x, y| x.0.total_cmp(y.0));
+        let loudest = gains
+            .iter()
+            .zip(&self.curve.levels)
+            .max_by(|x, y| x.0.total_cmp(y.0));
         loudest.map_or((0, 0.0), |(gain, level)| (*level, gain / total))
     }
 }

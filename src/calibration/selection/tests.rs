@@ -5,7 +5,8 @@ use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Ar1, Composite, Process, RandomWalk, Synthesizer, White};
 use crate::wavelet::{Convention, Tuning, both};
 use crate::{
-    Bootstrap, FitRange, ModelChoice, Outcome, Pool, Replicate, Trim, Weighting, calibrate, grouped, infer,
+    Bootstrap, FitRange, ModelChoice, Outcome, Pool, Replicate, Trim, Weighting, calibrate,
+    grouped, infer,
 };
 
 fn settings() -> Settings {
@@ -23,14 +24,25 @@ fn settings() -> Settings {
 
 fn outcome(set: u64, noise: &Composite) -> Outcome {
     let settings = settings();
-    calibrate(&[recordings(set, |_| noise.clone(), &settings)], &settings).unwrap().remove(0)
+    calibrate(&[recordings(set, |_| noise.clone(), &settings)], &settings)
+        .unwrap()
+        .remove(0)
 }
 
 /// Four recordings, each of its own noise.
 fn recordings(set: u64, noise: impl Fn(u64) -> Composite, settings: &Settings) -> Group {
-    let channel = Channel { sensor: Sensor::Gyro, axis: Axis::X };
+    let channel = Channel {
+        sensor: Sensor::Gyro,
+        axis: Axis::X,
+    };
     let replicate = |run: u64| {
-        let key = StreamKey { seed: set, scenario: "", run, source: "", process: "" };
+        let key = StreamKey {
+            seed: set,
+            scenario: "",
+            run,
+            source: "",
+            process: "",
+        };
         let mut signal = vec![0.0; 4096];
         Synthesizer::new(&noise(run), key).fill(&mut signal);
         let (classical, robust) = both(&signal, 9, &settings.tuning).unwrap();
@@ -73,8 +85,15 @@ fn chosen_as_often_as_said(sets: u64, least: usize) {
     let correlated = Process::Ar1(Ar1::new(0.95, 0.05).unwrap());
     for truth in [vec![white], vec![white, walk], vec![white, correlated]] {
         let noise = Composite::new(truth);
-        let name = noise.processes.iter().map(Process::code).collect::<Vec<_>>().join("+");
-        let chosen: Vec<String> = (0..sets).map(|set| outcome(set, &noise).spec.to_string()).collect();
+        let name = noise
+            .processes
+            .iter()
+            .map(Process::code)
+            .collect::<Vec<_>>()
+            .join("+");
+        let chosen: Vec<String> = (0..sets)
+            .map(|set| outcome(set, &noise).spec.to_string())
+            .collect();
         right += chosen.iter().filter(|c| **c == name).count();
         println!("{name}: {chosen:?}");
     }
@@ -88,9 +107,17 @@ fn candidates_are_ranked() {
         Process::RandomWalk(RandomWalk::new(1e-3).unwrap()),
     ]);
     let ranking = outcome(3, &noise).ranking.unwrap();
-    assert!(ranking.candidates.windows(2).all(|c| c[0].wvic() <= c[1].wvic()));
+    assert!(
+        ranking
+            .candidates
+            .windows(2)
+            .all(|c| c[0].wvic() <= c[1].wvic())
+    );
     let chosen = &ranking.candidates[ranking.chosen];
-    assert!(chosen.optimism > 0.0 && chosen.objective > 0.0, "{chosen:?}");
+    assert!(
+        chosen.optimism > 0.0 && chosen.objective > 0.0,
+        "{chosen:?}"
+    );
     assert!(ranking.not_identifiable > 0);
 }
 
@@ -108,13 +135,22 @@ fn a_rejected_model_is_not_preferred_to_one_that_passes() {
         let chosen = &ranking.candidates[ranking.chosen];
         assert!(chosen.j_p_value.is_some());
         let passes = |c: &Candidate| c.j_p_value.is_some_and(|p| p >= J_LEVEL);
-        assert!(passes(chosen) || !ranking.candidates.iter().any(passes), "{ranking:?}");
+        assert!(
+            passes(chosen) || !ranking.candidates.iter().any(passes),
+            "{ranking:?}"
+        );
         // What only chance speaks against gives no place to a worse criterion.
         let better = ranking.candidates[..ranking.chosen].iter();
         let is_larger = |c: &&Candidate| chosen.spec.is_special_case_of(&c.spec);
-        let refused =
-            |c: &Candidate| c.j_p_value.is_some_and(|p| p < J_LEVEL) || c.p_value.is_some_and(|p| p <= LEVEL);
-        assert!(better.filter(|c| !is_larger(c)).all(|c| refused(c) || c.j_p_value.is_none()), "{ranking:?}");
+        let refused = |c: &Candidate| {
+            c.j_p_value.is_some_and(|p| p < J_LEVEL) || c.p_value.is_some_and(|p| p <= LEVEL)
+        };
+        assert!(
+            better
+                .filter(|c| !is_larger(c))
+                .all(|c| refused(c) || c.j_p_value.is_none()),
+            "{ranking:?}"
+        );
     }
 }
 
@@ -130,27 +166,63 @@ fn the_chosen_model_passes_the_test_of_its_own_fit() {
             Process::RandomWalk(RandomWalk::new(gamma2).unwrap()),
         ])
     };
-    let settings = Settings { weighting: Weighting::Model, ..settings() };
+    let settings = Settings {
+        weighting: Weighting::Model,
+        ..settings()
+    };
     for set in 0..3 {
         let groups = [recordings(set, noise, &settings)];
         let mut outcomes = calibrate(&groups, &settings).unwrap();
-        infer(&groups, &mut outcomes, &settings, Bootstrap { draws: 199, seed: 7 });
+        infer(
+            &groups,
+            &mut outcomes,
+            &settings,
+            Bootstrap {
+                draws: 199,
+                seed: 7,
+            },
+        );
         let ranking = outcomes[0].ranking.as_ref().unwrap();
         if ranking.candidates[ranking.chosen].is_rejected() {
             continue;
         }
-        let goodness = outcomes[0].inference.as_ref().unwrap().goodness.as_ref().unwrap();
-        assert!(goodness.p_value > 0.0125, "set {set}: {} {goodness:?}", outcomes[0].spec);
+        let goodness = outcomes[0]
+            .inference
+            .as_ref()
+            .unwrap()
+            .goodness
+            .as_ref()
+            .unwrap();
+        assert!(
+            goodness.p_value > 0.0125,
+            "set {set}: {} {goodness:?}",
+            outcomes[0].spec
+        );
     }
 }
 
 /// Of nine scales six count: the largest sums have a parameter more, and are no candidates.
 #[test]
 fn candidates_are_sums_that_the_counted_scales_can_carry() {
-    let fit_range = Some(FitRange { from_s: 2.0, to_s: 64.0 });
-    let settings = Settings { fit_range, ..settings() };
+    let fit_range = Some(FitRange {
+        from_s: 2.0,
+        to_s: 64.0,
+    });
+    let settings = Settings {
+        fit_range,
+        ..settings()
+    };
     let white = Composite::new(vec![Process::White(White::new(1.0).unwrap())]);
-    let outcome = calibrate(&[recordings(1, |_| white.clone(), &settings)], &settings).unwrap().remove(0);
+    let outcome = calibrate(&[recordings(1, |_| white.clone(), &settings)], &settings)
+        .unwrap()
+        .remove(0);
     assert_eq!(outcome.counted_levels().len(), 6);
-    assert!(outcome.ranking.unwrap().candidates.iter().all(|c| c.spec.parameters() < 6));
+    assert!(
+        outcome
+            .ranking
+            .unwrap()
+            .candidates
+            .iter()
+            .all(|c| c.spec.parameters() < 6)
+    );
 }

@@ -23,13 +23,30 @@ fn white() -> Process {
 
 /// The gyroscopes of six recordings, their biases of a standard deviation; fitted with a sum of processes.
 fn laboratory(noise: &Model, bias: f64, spec: &str, seed: u64) -> TurnOnSpread {
-    let imu = VirtualImu { model: noise, spread: None, contamination: None, seed };
-    let gyros: Vec<Channel> = Channel::ALL.into_iter().filter(|c| c.sensor == Sensor::Gyro).collect();
-    let settings = Settings { model: ModelChoice::Given(spec.parse().unwrap()), ..Settings::default() };
+    let imu = VirtualImu {
+        model: noise,
+        spread: None,
+        contamination: None,
+        seed,
+    };
+    let gyros: Vec<Channel> = Channel::ALL
+        .into_iter()
+        .filter(|c| c.sensor == Sensor::Gyro)
+        .collect();
+    let settings = Settings {
+        model: ModelChoice::Given(spec.parse().unwrap()),
+        ..Settings::default()
+    };
     let mut signals = Vec::new();
     for replicate in 1..=RECORDINGS as u64 {
         let mut recording = imu.recording(replicate, &gyros, SAMPLES).unwrap();
-        let key = StreamKey { seed, scenario: "", run: replicate, source: "gyro", process: "turn_on" };
+        let key = StreamKey {
+            seed,
+            scenario: "",
+            run: replicate,
+            source: "gyro",
+            process: "turn_on",
+        };
         let mut generator = key.generator();
         for signal in &mut recording.signals {
             let normal: f64 = StandardNormal.sample(&mut generator);
@@ -45,7 +62,10 @@ fn laboratory(noise: &Model, bias: f64, spec: &str, seed: u64) -> TurnOnSpread {
 }
 
 fn laboratories(count: u64, noise: &Model, bias: f64, spec: &str) -> Vec<TurnOnSpread> {
-    (1..=count).into_par_iter().map(|seed| laboratory(noise, bias, spec, seed)).collect()
+    (1..=count)
+        .into_par_iter()
+        .map(|seed| laboratory(noise, bias, spec, seed))
+        .collect()
 }
 
 /// S² is unbiased for σ² and what the noise adds: 15 degrees of freedom a laboratory, relative standard error
@@ -58,10 +78,16 @@ fn the_spread_is_the_turn_on_bias_and_what_the_noise_adds() {
     let found = laboratories(200, &noise, bias, "WN+RW");
     let exact = bias * bias + noise.axes[3].mean_variance(SAMPLES);
     let mean = found.iter().map(|f| f.spread().powi(2)).sum::<f64>() / found.len() as f64;
-    assert!((mean / exact - 1.0).abs() < 4.0 * 0.026, "{mean} for {exact}");
+    assert!(
+        (mean / exact - 1.0).abs() < 4.0 * 0.026,
+        "{mean} for {exact}"
+    );
     // The F of a scatter 14 times that of the trends is below the bound (3.23 × 1.58) in 2.6 % of laboratories: 195 ± 2.3 are seen,
     // four deviations are allowed for.
-    let seen = found.iter().filter(|f| f.finding == TurnOnFinding::Seen && f.sigmas().is_some()).count();
+    let seen = found
+        .iter()
+        .filter(|f| f.finding == TurnOnFinding::Seen && f.sigmas().is_some())
+        .count();
     assert!(seen >= 185, "{seen}");
 }
 
@@ -79,7 +105,10 @@ fn noise_alone_is_no_turn_on_bias() {
     ];
     for (spec, processes) in cases {
         let found = laboratories(400, &model(processes), 0.0, spec);
-        let alarms = found.iter().filter(|f| f.finding == TurnOnFinding::Seen).count();
+        let alarms = found
+            .iter()
+            .filter(|f| f.finding == TurnOnFinding::Seen)
+            .count();
         assert!(alarms < 12, "{spec}: {alarms}");
     }
 }
@@ -87,10 +116,24 @@ fn noise_alone_is_no_turn_on_bias() {
 #[test]
 fn another_mounting_is_no_bias_and_means_removed_are_none() {
     let noise = model(vec![white()]);
-    assert_eq!(laboratory(&noise, 0.3, "WN", 1).finding, TurnOnFinding::Moved);
-    let (imu, settings) = (VirtualImu { model: &noise, spread: None, contamination: None, seed: 1 }, {
-        Settings { model: ModelChoice::Given("WN".parse().unwrap()), ..Settings::default() }
-    });
+    assert_eq!(
+        laboratory(&noise, 0.3, "WN", 1).finding,
+        TurnOnFinding::Moved
+    );
+    let (imu, settings) = (
+        VirtualImu {
+            model: &noise,
+            spread: None,
+            contamination: None,
+            seed: 1,
+        },
+        {
+            Settings {
+                model: ModelChoice::Given("WN".parse().unwrap()),
+                ..Settings::default()
+            }
+        },
+    );
     let mut signals = Vec::new();
     for replicate in 1..=3 {
         let mut recording = imu.recording(replicate, &Channel::ALL, SAMPLES).unwrap();
@@ -100,7 +143,10 @@ fn another_mounting_is_no_bias_and_means_removed_are_none() {
     let groups = grouped(signals, Pool::Axes);
     let outcomes = calibrate(&groups, &settings).unwrap();
     let found = turn_on(&groups, &outcomes.iter().collect::<Vec<_>>());
-    assert!(found.len() == 2 && found.iter().all(|f| f.finding == TurnOnFinding::Removed), "{found:?}");
+    assert!(
+        found.len() == 2 && found.iter().all(|f| f.finding == TurnOnFinding::Removed),
+        "{found:?}"
+    );
 }
 
 /// The exact law: the deviation of n Gaussian numbers has mean c₄σ and variance (1 − c₄²)σ², c₄ = √(2/(n − 1)) Γ(n/2)/Γ((n − 1)/2). Its
@@ -109,13 +155,29 @@ fn another_mounting_is_no_bias_and_means_removed_are_none() {
 fn the_error_of_a_spread_is_that_of_its_degrees_of_freedom() {
     use statrs::function::gamma::gamma;
     for recordings in [6_usize, 39] {
-        let axis = MeansOfAxis { axis: Axis::X, recordings, spread: 1.0, noise: 0.0, range: 1.0 };
+        let axis = MeansOfAxis {
+            axis: Axis::X,
+            recordings,
+            spread: 1.0,
+            noise: 0.0,
+            range: 1.0,
+        };
         let (sensor, estimator) = (Sensor::Gyro, Estimator::Awv);
         let finding = TurnOnFinding::Seen;
-        let found = TurnOnSpread { sensor, estimator, axes: vec![axis], p_noise: 0.0, p_drift: 0.0, finding };
+        let found = TurnOnSpread {
+            sensor,
+            estimator,
+            axes: vec![axis],
+            p_noise: 0.0,
+            p_drift: 0.0,
+            finding,
+        };
         let n = recordings as f64;
         let c4 = (2.0 / (n - 1.0)).sqrt() * gamma(0.5 * n) / gamma(0.5 * (n - 1.0));
         let exact = (1.0 / c4.powi(2) - 1.0).sqrt();
-        assert!((found.relative_error() / exact - 1.0).abs() < 0.15 / (n - 1.0), "{recordings}: {exact}");
+        assert!(
+            (found.relative_error() / exact - 1.0).abs() < 0.15 / (n - 1.0),
+            "{recordings}: {exact}"
+        );
     }
 }

@@ -42,18 +42,36 @@ pub(crate) fn p_value(
         return None;
     }
     let largest = |nu: &dyn Fn(usize, usize) -> f64| {
-        let squares = scales.iter().enumerate().map(|(j, scale)| scale.mean_square(&|i| nu(i, j), estimator));
-        squares.filter(|square| square.is_finite()).fold(0.0, f64::max)
+        let squares = scales
+            .iter()
+            .enumerate()
+            .map(|(j, scale)| scale.mean_square(&|i| nu(i, j), estimator));
+        squares
+            .filter(|square| square.is_finite())
+            .fold(0.0, f64::max)
     };
     let observed = largest(&|i, j| replicates[i].value(estimator, j));
     let draw = |run: usize| {
         let process = estimator.name();
-        let key = StreamKey { seed: SEED, scenario: "alike", run: run as u64, source: group, process };
+        let key = StreamKey {
+            seed: SEED,
+            scenario: "alike",
+            run: run as u64,
+            source: group,
+            process,
+        };
         let mut generator = key.generator();
-        let ratios: Vec<Vec<f64>> = spread.edof.iter().map(|e| law.draw(e, &mut generator)).collect();
+        let ratios: Vec<Vec<f64>> = spread
+            .edof
+            .iter()
+            .map(|e| law.draw(e, &mut generator))
+            .collect();
         largest(&|i, j| ratios[i][j])
     };
-    let larger = (0..DRAWS).into_par_iter().filter(|run| draw(*run) >= observed).count();
+    let larger = (0..DRAWS)
+        .into_par_iter()
+        .filter(|run| draw(*run) >= observed)
+        .count();
     // The observed set counts as one of the draws, all exchangeable if the fitted law holds: p is never 0,
     // and the level is kept (Davison and Hinkley 1997, chapter 4).
     Some((1 + larger) as f64 / (1 + DRAWS) as f64)
@@ -67,7 +85,10 @@ impl Outcome {
         let p_value = inference.alike.filter(|p| *p <= LEVEL)?;
         // Relative to the noise: at the last scales recordings scatter most for lack of coefficients, which is no difference.
         let ratio = |s: &LevelSpread| s.between / s.within;
-        let most = inference.spread.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b)))?;
+        let most = inference
+            .spread
+            .iter()
+            .max_by(|a, b| ratio(a).total_cmp(&ratio(b)))?;
         Some((p_value, *most))
     }
 }
@@ -85,12 +106,22 @@ impl Scale {
     /// recording is compared with nothing.
     fn new(j: usize, replicates: &[Replicate], spread: &Spread, shape: &Shape) -> Option<Self> {
         let is_long_enough = |i: &usize| replicates[*i].levels() > j && spread.edof[*i][j] >= LEAST;
-        let members: Vec<(usize, Option<Axis>)> =
-            (0..replicates.len()).filter(is_long_enough).map(|i| (i, replicates[i].axis)).collect();
-        let is_repeated =
-            |(k, (_, axis)): (usize, &(usize, Option<Axis>))| members[..k].iter().any(|(_, a)| a == axis);
-        let noise = members.iter().map(|(i, _)| shape.variance_of_log(spread.edof[*i][j])).collect();
-        members.iter().enumerate().any(is_repeated).then_some(Self { members, noise })
+        let members: Vec<(usize, Option<Axis>)> = (0..replicates.len())
+            .filter(is_long_enough)
+            .map(|i| (i, replicates[i].axis))
+            .collect();
+        let is_repeated = |(k, (_, axis)): (usize, &(usize, Option<Axis>))| {
+            members[..k].iter().any(|(_, a)| a == axis)
+        };
+        let noise = members
+            .iter()
+            .map(|(i, _)| shape.variance_of_log(spread.edof[*i][j]))
+            .collect();
+        members
+            .iter()
+            .enumerate()
+            .any(is_repeated)
+            .then_some(Self { members, noise })
     }
 
     /// Mean square of the residuals of ln nu less the mean of its axis: of drawn values in the same way as of observed ones,
@@ -98,11 +129,20 @@ impl Scale {
     fn mean_square(&self, nu: &dyn Fn(usize) -> f64, estimator: Estimator) -> f64 {
         let logs: Vec<f64> = self.members.iter().map(|(i, _)| nu(*i).ln()).collect();
         let mean = |axis: &Option<Axis>| {
-            let of_axis = || self.members.iter().zip(&logs).filter(|((_, other), _)| other == axis);
+            let of_axis = || {
+                self.members
+                    .iter()
+                    .zip(&logs)
+                    .filter(|((_, other), _)| other == axis)
+            };
             of_axis().map(|(_, log)| log).sum::<f64>() / of_axis().count() as f64
         };
-        let residuals: Vec<f64> =
-            self.members.iter().zip(&logs).map(|((_, axis), log)| log - mean(axis)).collect();
+        let residuals: Vec<f64> = self
+            .members
+            .iter()
+            .zip(&logs)
+            .map(|((_, axis), log)| log - mean(axis))
+            .collect();
         mean_square(&residuals, &self.noise, estimator)
     }
 }
@@ -126,7 +166,13 @@ mod tests {
     fn set(seed: u64, count: usize, spread: f64) -> Vec<Replicate> {
         let tuning = tuning();
         let recording = |run: usize| {
-            let key = StreamKey { seed, scenario: "", run: run as u64, source: "", process: "" };
+            let key = StreamKey {
+                seed,
+                scenario: "",
+                run: run as u64,
+                source: "",
+                process: "",
+            };
             let mut generator = key.generator();
             let mut normal = || generator.sample::<f64, _>(StandardNormal);
             let sigma = (0.5 * spread * normal()).exp();
@@ -177,7 +223,11 @@ mod tests {
             (8, Estimator::DrAwv),
         ] {
             let told_wrongly = told(200, count, 0.0, estimator);
-            assert!(told_wrongly <= 13, "{count} {}: {told_wrongly} of 200", estimator.name());
+            assert!(
+                told_wrongly <= 13,
+                "{count} {}: {told_wrongly} of 200",
+                estimator.name()
+            );
         }
         assert!(told(20, 8, 0.2, Estimator::Awv) >= 19 && told(20, 8, 0.2, Estimator::DrAwv) >= 18);
     }
@@ -192,11 +242,13 @@ mod tests {
         let differs = |seed: u64| {
             let of_axis = |axis: Axis| {
                 let variance = if axis == Axis::Z { 1.7 } else { 1.0 };
-                set(3 * seed + axis as u64, 4, 0.0).into_iter().map(move |replicate| Replicate {
-                    axis: Some(axis),
-                    classical: replicate.classical.iter().map(|nu| variance * nu).collect(),
-                    ..replicate
-                })
+                set(3 * seed + axis as u64, 4, 0.0)
+                    .into_iter()
+                    .map(move |replicate| Replicate {
+                        axis: Some(axis),
+                        classical: replicate.classical.iter().map(|nu| variance * nu).collect(),
+                        ..replicate
+                    })
             };
             let replicates: Vec<Replicate> = Axis::ALL.into_iter().flat_map(of_axis).collect();
             let own = Spread::new(&replicates, Estimator::Awv, &law, &tuning());
@@ -208,7 +260,10 @@ mod tests {
 
     #[test]
     fn one_signal_cannot_differ() {
-        let law = SamplingLaw::new(&Composite::new(vec![Process::White(White::new(1.0).unwrap())]), 10);
+        let law = SamplingLaw::new(
+            &Composite::new(vec![Process::White(White::new(1.0).unwrap())]),
+            10,
+        );
         let one = set(1, 1, 0.0);
         let own = Spread::new(&one, Estimator::Awv, &law, &tuning());
         assert_eq!(p_value(&one, Estimator::Awv, &own, &law, "accel"), None);

@@ -25,16 +25,24 @@ pub(crate) fn axes_differ(
     estimator: Estimator,
     tuning: &Tuning,
 ) -> Option<AxesDiffer> {
-    let axes: Vec<Axis> =
-        Axis::ALL.into_iter().filter(|axis| replicates.iter().any(|r| r.axis == Some(*axis))).collect();
+    let axes: Vec<Axis> = Axis::ALL
+        .into_iter()
+        .filter(|axis| replicates.iter().any(|r| r.axis == Some(*axis)))
+        .collect();
     let table = layout(replicates, &axes)?;
     let degrees = |r: &Replicate, level: u32| match r.edof_eta3(level) {
-        edof if r.is_robust(estimator, level as usize - 1) => edof_robust(edof, tuning.efficiency()),
+        edof if r.is_robust(estimator, level as usize - 1) => {
+            edof_robust(edof, tuning.efficiency())
+        }
         edof => edof,
     };
-    let is_usable = |r: &Replicate, level: u32| r.levels() >= level as usize && degrees(r, level) >= LEAST;
+    let is_usable =
+        |r: &Replicate, level: u32| r.levels() >= level as usize && degrees(r, level) >= LEAST;
     let long_enough = |level: u32| -> Vec<&Vec<&Replicate>> {
-        table.iter().filter(|row| row.iter().all(|r| is_usable(r, level))).collect()
+        table
+            .iter()
+            .filter(|row| row.iter().all(|r| is_usable(r, level)))
+            .collect()
     };
     // Up to the scale that more than half of the recordings have, as the average of them.
     let usable: Vec<(u32, Vec<&Vec<&Replicate>>)> = (1..)
@@ -45,16 +53,25 @@ pub(crate) fn axes_differ(
     let of_level = |(level, rows): &(u32, Vec<&Vec<&Replicate>>)| {
         let level = *level;
         let logs = |row: &&Vec<&Replicate>| -> Vec<f64> {
-            row.iter().map(|r| r.value(estimator, level as usize - 1).ln()).collect()
+            row.iter()
+                .map(|r| r.value(estimator, level as usize - 1).ln())
+                .collect()
         };
         // The largest, that of the shortest recording: too much noise makes the test cautious, too little
         // bold.
-        let variances = rows.iter().copied().flatten().map(|r| variance_of_log(degrees(r, level)));
+        let variances = rows
+            .iter()
+            .copied()
+            .flatten()
+            .map(|r| variance_of_log(degrees(r, level)));
         let noise = variances.fold(0.0, f64::max);
         let (p_value, means) = between_axes(&rows.iter().map(logs).collect::<Vec<_>>(), noise)?;
         let by_mean = |a: &(f64, Axis), b: &(f64, Axis)| a.0.total_cmp(&b.0);
         let means_of_axes = || means.iter().copied().zip(axes.iter().copied());
-        let (smallest, largest) = (means_of_axes().min_by(by_mean)?, means_of_axes().max_by(by_mean)?);
+        let (smallest, largest) = (
+            means_of_axes().min_by(by_mean)?,
+            means_of_axes().max_by(by_mean)?,
+        );
         Some(AxesDiffer {
             level,
             p_value: (p_value * count).min(1.0),
@@ -64,7 +81,9 @@ pub(crate) fn axes_differ(
         })
     };
     let all = usable.iter().filter_map(of_level);
-    let told: Vec<AxesDiffer> = all.filter(|d| d.p_value <= LEVEL && d.ratio >= NOTABLE).collect();
+    let told: Vec<AxesDiffer> = all
+        .filter(|d| d.p_value <= LEVEL && d.ratio >= NOTABLE)
+        .collect();
     told.into_iter().max_by(|a, b| a.ratio.total_cmp(&b.ratio))
 }
 
@@ -74,8 +93,14 @@ fn layout<'a>(replicates: &'a [Replicate], axes: &[Axis]) -> Option<Vec<Vec<&'a 
     names.sort_unstable();
     names.dedup();
     let whole = axes.len() >= 2 && names.len() * axes.len() == replicates.len();
-    let cell = |name: &str, axis: Axis| replicates.iter().find(|r| r.name == name && r.axis == Some(axis));
-    let rows = names.iter().map(|name| axes.iter().map(|axis| cell(name, *axis)).collect());
+    let cell = |name: &str, axis: Axis| {
+        replicates
+            .iter()
+            .find(|r| r.name == name && r.axis == Some(axis))
+    };
+    let rows = names
+        .iter()
+        .map(|name| axes.iter().map(|axis| cell(name, *axis)).collect());
     if whole { rows.collect() } else { None }
 }
 
@@ -83,8 +108,9 @@ fn layout<'a>(replicates: &'a [Replicate], axes: &[Axis]) -> Option<Vec<Vec<&'a 
 fn between_axes(rows: &[Vec<f64>], noise: f64) -> Option<(f64, Vec<f64>)> {
     let (count, axes) = (rows.len() as f64, rows[0].len() as f64);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let columns: Vec<f64> =
-        (0..rows[0].len()).map(|axis| mean(&rows.iter().map(|row| row[axis]).collect::<Vec<_>>())).collect();
+    let columns: Vec<f64> = (0..rows[0].len())
+        .map(|axis| mean(&rows.iter().map(|row| row[axis]).collect::<Vec<_>>()))
+        .collect();
     let all = mean(&columns);
     // Recordings differ as a whole too, but that is in every column alike and drops out of the means'
     // differences.
@@ -92,11 +118,17 @@ fn between_axes(rows: &[Vec<f64>], noise: f64) -> Option<(f64, Vec<f64>)> {
     // One recording leaves no remainder to compare with: the noise is taken as known, and F becomes a
     // chi-square.
     if rows.len() == 1 {
-        return Some((ChiSquared::new(axes - 1.0).ok()?.sf(between / noise), columns));
+        return Some((
+            ChiSquared::new(axes - 1.0).ok()?.sf(between / noise),
+            columns,
+        ));
     }
     let remains = |row: &Vec<f64>| -> f64 {
         let own = mean(row);
-        row.iter().zip(&columns).map(|(value, column)| (value - own - column + all).powi(2)).sum()
+        row.iter()
+            .zip(&columns)
+            .map(|(value, column)| (value - own - column + all).powi(2))
+            .sum()
     };
     let degrees = (count - 1.0) * (axes - 1.0);
     // By few recordings the remainder may come out small by chance, and F large; it cannot truly be less than
@@ -118,7 +150,13 @@ mod tests {
     fn set(seed: u64, recordings: usize, factor: f64) -> Vec<Replicate> {
         let recording = |k: usize| {
             let (run, axis) = (k as u64, Axis::ALL[k % 3]);
-            let key = StreamKey { seed, scenario: "", run, source: "", process: "" };
+            let key = StreamKey {
+                seed,
+                scenario: "",
+                run,
+                source: "",
+                process: "",
+            };
             let mut generator = key.generator();
             let sigma = if axis == Axis::Y { factor.sqrt() } else { 1.0 };
             let mut normal = || sigma * generator.sample::<f64, _>(StandardNormal);
@@ -144,7 +182,11 @@ mod tests {
     /// 1024 degrees: √(2·2/1024) = 0.0625 of 0.34) are told.
     #[test]
     fn axes_are_told_apart_where_they_differ() {
-        for (recordings, estimator) in [(1, Estimator::Awv), (2, Estimator::Awv), (6, Estimator::DrAwv)] {
+        for (recordings, estimator) in [
+            (1, Estimator::Awv),
+            (2, Estimator::Awv),
+            (6, Estimator::DrAwv),
+        ] {
             let told = |seed: &u64| {
                 axes_differ(&set(*seed, recordings, 1.0), estimator, &Tuning::default()).is_some()
             };
@@ -152,9 +194,12 @@ mod tests {
             assert!(alarms <= 8, "{recordings} {}: {alarms}", estimator.name());
         }
         for recordings in [1, 6] {
-            let found =
-                axes_differ(&set(1, recordings, 1.4), Estimator::Awv, &Tuning::default()).expect("told");
-            assert!((found.ratio - 1.4).abs() < 0.4 && found.largest == Axis::Y, "{found:?}");
+            let found = axes_differ(&set(1, recordings, 1.4), Estimator::Awv, &Tuning::default())
+                .expect("told");
+            assert!(
+                (found.ratio - 1.4).abs() < 0.4 && found.largest == Axis::Y,
+                "{found:?}"
+            );
         }
     }
 

@@ -58,20 +58,44 @@ impl<'a> CurveSampler<'a> {
     ) -> Self {
         let levels = curve.levels.iter().copied().max().unwrap_or(1) as usize;
         let law = SamplingLaw::new(model, levels);
-        let spread =
-            (!replicates.is_empty()).then(|| Spread::new(replicates, estimator, &law, &settings.tuning));
+        let spread = (!replicates.is_empty())
+            .then(|| Spread::new(replicates, estimator, &law, &settings.tuning));
         let centre = implied(model, curve);
-        Self { replicates, estimator, curve, law, spread, centre, bias_times_edof: settings.tuning.bias() }
+        Self {
+            replicates,
+            estimator,
+            curve,
+            law,
+            spread,
+            centre,
+            bias_times_edof: settings.tuning.bias(),
+        }
     }
 
     /// A sampler of the curves that the fit of an outcome would give.
     pub(crate) fn of_outcome(group: &'a Group, outcome: &'a Outcome, settings: &Settings) -> Self {
-        let Outcome { estimator, curve, fit, .. } = outcome;
-        Self::new(&group.replicates, *estimator, curve, &fit.composite, settings)
+        let Outcome {
+            estimator,
+            curve,
+            fit,
+            ..
+        } = outcome;
+        Self::new(
+            &group.replicates,
+            *estimator,
+            curve,
+            &fit.composite,
+            settings,
+        )
     }
 
     /// Covariance of curves by the law, relative to that of the model.
-    pub(crate) fn covariance(&self, draws: usize, group: &str, settings: &Settings) -> DMatrix<f64> {
+    pub(crate) fn covariance(
+        &self,
+        draws: usize,
+        group: &str,
+        settings: &Settings,
+    ) -> DMatrix<f64> {
         self.covariance_of(draws, group, |key| self.draw(key, settings))
     }
 
@@ -94,22 +118,45 @@ impl<'a> CurveSampler<'a> {
         let process = self.estimator.name();
         // Relative to the model: absolute values differ by powers of ten from level to level.
         let error = |run: usize| {
-            let key = StreamKey { seed: 1, scenario: "covariance", run: run as u64, source: group, process };
+            let key = StreamKey {
+                seed: 1,
+                scenario: "covariance",
+                run: run as u64,
+                source: group,
+                process,
+            };
             let curve = draw(&key)?;
-            Some(curve.wv.iter().zip(&self.centre).map(|(nu, centre)| nu / centre - 1.0).collect())
+            Some(
+                curve
+                    .wv
+                    .iter()
+                    .zip(&self.centre)
+                    .map(|(nu, centre)| nu / centre - 1.0)
+                    .collect(),
+            )
         };
         let errors: Vec<Vec<f64>> = (0..draws).filter_map(error).collect();
         let count = errors.len() as f64;
         let levels = self.centre.len();
-        let mean: Vec<f64> = (0..levels).map(|j| errors.iter().map(|e| e[j]).sum::<f64>() / count).collect();
+        let mean: Vec<f64> = (0..levels)
+            .map(|j| errors.iter().map(|e| e[j]).sum::<f64>() / count)
+            .collect();
         let product = |i: usize, j: usize| {
-            errors.iter().map(|e| (e[i] - mean[i]) * (e[j] - mean[j])).sum::<f64>() / (count - 1.0)
+            errors
+                .iter()
+                .map(|e| (e[i] - mean[i]) * (e[j] - mean[j]))
+                .sum::<f64>()
+                / (count - 1.0)
         };
         DMatrix::from_fn(levels, levels, product)
     }
 
     /// A new curve of the same estimator, of replicates that scatter as the recorded ones do.
-    pub(crate) fn draw_as_recorded(&self, key: &StreamKey<'_>, settings: &Settings) -> Option<Curve> {
+    pub(crate) fn draw_as_recorded(
+        &self,
+        key: &StreamKey<'_>,
+        settings: &Settings,
+    ) -> Option<Curve> {
         match &self.spread {
             Some(spread) if self.replicates.len() > 1 => {
                 self.curve(spread.draw(&mut key.generator()), settings)
@@ -140,11 +187,22 @@ impl<'a> CurveSampler<'a> {
         let ratios_of_recording = |(edof, between): (&Vec<f64>, &Vec<f64>)| match scattering {
             Scattering::All => {
                 let within = self.law.draw(edof, &mut generator);
-                within.into_iter().zip(between).map(|(ratio, b)| ratio * b).collect()
+                within
+                    .into_iter()
+                    .zip(between)
+                    .map(|(ratio, b)| ratio * b)
+                    .collect()
             }
             Scattering::BetweenRecordings => between.clone(),
         };
-        let ratios = self.spread.as_ref()?.edof.iter().zip(between).map(ratios_of_recording).collect();
+        let ratios = self
+            .spread
+            .as_ref()?
+            .edof
+            .iter()
+            .zip(between)
+            .map(ratios_of_recording)
+            .collect();
         self.curve(ratios, settings)
     }
 
@@ -153,32 +211,68 @@ impl<'a> CurveSampler<'a> {
         let between = spread.draw_between(generator);
         let ratios_of_recording = |(edof, between): (&Vec<f64>, Vec<f64>)| {
             let within = self.law.draw(edof, generator);
-            within.into_iter().zip(between).map(|(ratio, b)| ratio * b.exp()).collect()
+            within
+                .into_iter()
+                .zip(between)
+                .map(|(ratio, b)| ratio * b.exp())
+                .collect()
         };
-        spread.edof.iter().zip(between).map(ratios_of_recording).collect()
+        spread
+            .edof
+            .iter()
+            .zip(between)
+            .map(ratios_of_recording)
+            .collect()
     }
 
     /// The estimator's curve of replicates of which nu*/nu is given.
     fn curve(&self, ratios: Vec<Vec<f64>>, settings: &Settings) -> Option<Curve> {
         let edof = self.spread.iter().flat_map(|s| &s.edof);
         let drawn_replicate = |((replicate, ratios), edof): ((&Replicate, Vec<f64>), &Vec<f64>)| {
-            let levels = self.centre.iter().zip(ratios).zip(edof).take(replicate.levels()).enumerate();
+            let levels = self
+                .centre
+                .iter()
+                .zip(ratios)
+                .zip(edof)
+                .take(replicate.levels())
+                .enumerate();
             // The law gives ratios whose mean is 1; robust variances of few coefficients read high, and so
             // must those drawn.
             let bias = |j: usize, edof: f64| {
-                if replicate.is_robust(self.estimator, j) { self.bias(edof) } else { 0.0 }
+                if replicate.is_robust(self.estimator, j) {
+                    self.bias(edof)
+                } else {
+                    0.0
+                }
             };
             like(
                 replicate,
-                levels.map(|(j, ((nu, ratio), edof))| nu * ratio * (1.0 + bias(j, *edof))).collect(),
+                levels
+                    .map(|(j, ((nu, ratio), edof))| nu * ratio * (1.0 + bias(j, *edof)))
+                    .collect(),
             )
         };
-        let replicates: Vec<Replicate> =
-            self.replicates.iter().zip(ratios).zip(edof).map(drawn_replicate).collect();
+        let replicates: Vec<Replicate> = self
+            .replicates
+            .iter()
+            .zip(ratios)
+            .zip(edof)
+            .map(drawn_replicate)
+            .collect();
         let curve = average(&replicates, self.estimator, settings.trim, &settings.tuning).ok()?;
         // The draws have a root everywhere; what the fit left out, it leaves out of every draw.
-        let Curve { differing, classical, ignored, .. } = self.curve.clone();
-        Some(Curve { differing, classical, ignored, ..curve })
+        let Curve {
+            differing,
+            classical,
+            ignored,
+            ..
+        } = self.curve.clone();
+        Some(Curve {
+            differing,
+            classical,
+            ignored,
+            ..curve
+        })
     }
 
     /// Relative bias of a robust variance with so many degrees of freedom.
@@ -191,10 +285,21 @@ impl<'a> CurveSampler<'a> {
         let curve = self.curve;
         // The law knows all levels from 1; the curve may have some of them.
         let mut edof = vec![1.0; self.law.correlation.nrows()];
-        curve.levels.iter().zip(&curve.edof).for_each(|(l, e)| edof[*l as usize - 1] = *e);
+        curve
+            .levels
+            .iter()
+            .zip(&curve.edof)
+            .for_each(|(l, e)| edof[*l as usize - 1] = *e);
         let ratio = self.law.draw(&edof, generator);
-        let wv = curve.levels.iter().zip(&self.centre).map(|(l, nu)| nu * ratio[*l as usize - 1]);
-        Curve { wv: wv.collect(), ..curve.clone() }
+        let wv = curve
+            .levels
+            .iter()
+            .zip(&self.centre)
+            .map(|(l, nu)| nu * ratio[*l as usize - 1]);
+        Curve {
+            wv: wv.collect(),
+            ..curve.clone()
+        }
     }
 }
 
@@ -207,7 +312,11 @@ pub(crate) fn like(replicate: &Replicate, nu: Vec<f64>) -> Replicate {
     let robust = nu
         .iter()
         .enumerate()
-        .map(|(j, nu)| RobustVariance { value: *nu, status: status(j), zeros: 0.0 })
+        .map(|(j, nu)| RobustVariance {
+            value: *nu,
+            status: status(j),
+            zeros: 0.0,
+        })
         .collect();
     Replicate {
         name: String::new(),

@@ -11,7 +11,11 @@ pub(crate) fn goodness(outcome: &Outcome, draws: &[Fit]) -> Goodness {
     let objectives: Vec<f64> = draws.iter().map(|d| d.objective).collect();
     // A parameter of a process without amplitude took nothing from the curve.
     let free = |of: &ParameterRef| !fit.zero.contains(&of.process) && !spec.is_fixed(*of);
-    let parameters = fit.composite.parameters().filter(|(of, _)| free(of)).count();
+    let parameters = fit
+        .composite
+        .parameters()
+        .filter(|(of, _)| free(of))
+        .count();
     Goodness {
         statistic: fit.objective,
         dof: outcome.counted_levels().len().saturating_sub(parameters),

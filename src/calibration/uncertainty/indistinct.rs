@@ -34,18 +34,27 @@ pub(crate) fn simpler(
     }
     let spec = &outcome.spec;
     let of_kind = |kind: Kind| {
-        let own: Vec<usize> = (0..spec.kinds().len()).filter(|i| spec.kinds()[*i] == kind).collect();
+        let own: Vec<usize> = (0..spec.kinds().len())
+            .filter(|i| spec.kinds()[*i] == kind)
+            .collect();
         // Limits are knowledge from elsewhere that tells them apart.
         let free = own.iter().all(|i| spec.limits()[*i] == Limits::NONE);
         (own.len() > 1 && free).then_some(own)
     };
-    [Kind::Ar1, Kind::GaussMarkov].into_iter().filter_map(of_kind).find_map(|own| {
-        let less = spec.without(own[own.len() - 1]);
-        let fit = again(outcome, &less, &outcome.curve, settings, None)?;
-        let simple = Outcome { spec: less, fit, ..outcome.clone() };
-        let p_value = probability(group, outcome, &simple, settings);
-        (p_value > LEVEL).then_some((simple, own, p_value))
-    })
+    [Kind::Ar1, Kind::GaussMarkov]
+        .into_iter()
+        .filter_map(of_kind)
+        .find_map(|own| {
+            let less = spec.without(own[own.len() - 1]);
+            let fit = again(outcome, &less, &outcome.curve, settings, None)?;
+            let simple = Outcome {
+                spec: less,
+                fit,
+                ..outcome.clone()
+            };
+            let p_value = probability(group, outcome, &simple, settings);
+            (p_value > LEVEL).then_some((simple, own, p_value))
+        })
 }
 
 /// The fit of a model to a curve with the weights of an outcome, from the minima of a fit of the same model if there is one.
@@ -57,7 +66,10 @@ fn again(
     like: Option<&Fit>,
 ) -> Option<Fit> {
     let minima = like.map_or(Vec::new(), |fit| fit.minima.clone());
-    let like = Fit { minima, ..outcome.fit.clone() };
+    let like = Fit {
+        minima,
+        ..outcome.fit.clone()
+    };
     refit(curve, spec, settings.rate_hz, settings.weighting, &like).ok()
 }
 
@@ -67,16 +79,28 @@ fn probability(group: &Group, outcome: &Outcome, simple: &Outcome, settings: &Se
     let sampler = CurveSampler::of_outcome(group, simple, settings);
     let (name, process) = (group.scope.name(), outcome.estimator.name());
     let gain = |run: usize| {
-        let key = StreamKey { seed: SEED, scenario: "indistinct", run: run as u64, source: &name, process };
+        let key = StreamKey {
+            seed: SEED,
+            scenario: "indistinct",
+            run: run as u64,
+            source: &name,
+            process,
+        };
         let curve = sampler.draw(&key, settings)?;
-        let objective =
-            |o: &Outcome| again(outcome, &o.spec, &curve, settings, Some(&o.fit)).map(|f| f.objective);
+        let objective = |o: &Outcome| {
+            again(outcome, &o.spec, &curve, settings, Some(&o.fit)).map(|f| f.objective)
+        };
         Some(objective(simple)? - objective(outcome)?)
     };
     let mut gains: Vec<f64> = Vec::new();
     let mut done = 0;
     for stage in STAGES {
-        gains.extend((done..stage).into_par_iter().filter_map(gain).collect::<Vec<_>>());
+        gains.extend(
+            (done..stage)
+                .into_par_iter()
+                .filter_map(gain)
+                .collect::<Vec<_>>(),
+        );
         done = stage;
         let larger = gains.iter().filter(|g| **g >= observed).count();
         let largest = gains.iter().copied().fold(0.0, f64::max);
@@ -104,9 +128,14 @@ impl Indistinct {
                 continue;
             }
             // The simpler model is this one without the last of those that are alike.
-            let there = ParameterRef { process: process - usize::from(process > removed), parameter };
+            let there = ParameterRef {
+                process: process - usize::from(process > removed),
+                parameter,
+            };
             let mut values = outcome.fit.composite.parameters();
-            let value = values.find(|(of, _)| *of == interval.of).map(|(_, value)| value);
+            let value = values
+                .find(|(of, _)| *of == interval.of)
+                .map(|(_, value)| value);
             let found = self.intervals.iter().find(|i| i.of == there);
             if let (Some(found), Some(value)) = (found, value) {
                 interval.replace(found, value);
@@ -149,9 +178,18 @@ mod tests {
     /// The fit to signals of white noise and two AR1 of equal variance.
     fn fitted(seed: u64, count: u64, ratio: f64) -> Outcome {
         let phis = phis(ratio);
-        let channel = Channel { sensor: Sensor::Gyro, axis: Axis::X };
+        let channel = Channel {
+            sensor: Sensor::Gyro,
+            axis: Axis::X,
+        };
         let recording = |run: u64| {
-            let key = StreamKey { seed, scenario: "", run, source: "", process: "" };
+            let key = StreamKey {
+                seed,
+                scenario: "",
+                run,
+                source: "",
+                process: "",
+            };
             let mut generator = key.generator();
             let mut normal = || generator.sample::<f64, _>(StandardNormal);
             let mut state = [normal(), normal()];
@@ -177,7 +215,12 @@ mod tests {
         };
         let groups = [grouped((0..count).map(recording).collect(), Pool::Axes).remove(0)];
         let mut outcomes = calibrate(&groups, &settings("WN+2*AR1")).unwrap();
-        infer(&groups, &mut outcomes, &settings("WN+2*AR1"), Bootstrap { draws: 99, seed: 3 });
+        infer(
+            &groups,
+            &mut outcomes,
+            &settings("WN+2*AR1"),
+            Bootstrap { draws: 99, seed: 3 },
+        );
         outcomes.remove(0)
     }
 
@@ -192,10 +235,14 @@ mod tests {
             indistinct += u32::from(inference.indistinct.is_some());
             assert_eq!(
                 inference.indistinct.is_some(),
-                outcome.notes(&settings("WN+2*AR1")).contains(&Note::Indistinct)
+                outcome
+                    .notes(&settings("WN+2*AR1"))
+                    .contains(&Note::Indistinct)
             );
             for (process, phi) in [1, 2].into_iter().zip(phis) {
-                for (parameter, value) in [(Parameter::Phi, phi), (Parameter::Sigma2, 1.0 - phi * phi)] {
+                for (parameter, value) in
+                    [(Parameter::Phi, phi), (Parameter::Sigma2, 1.0 - phi * phi)]
+                {
                     let is_of_parameter =
                         |i: &&ParameterInterval| i.of == ParameterRef { process, parameter };
                     let interval = inference.intervals.iter().find(is_of_parameter).unwrap();
@@ -204,7 +251,13 @@ mod tests {
                     }
                     there += 1;
                     held += u32::from(interval.low < value && value < interval.high);
-                    let scale = |end: f64| if parameter == Parameter::Phi { -1.0 / end.ln() } else { end };
+                    let scale = |end: f64| {
+                        if parameter == Parameter::Phi {
+                            -1.0 / end.ln()
+                        } else {
+                            end
+                        }
+                    };
                     let (low, high) = (scale(interval.low), scale(interval.high));
                     widest = widest.max(high / low);
                 }
@@ -221,12 +274,20 @@ mod tests {
         let mut held = [0; 2];
         for seed in 0..12 {
             let inference = fitted(seed, 2 + seed % 5, 1.0).inference.unwrap();
-            let Some(one) = inference.indistinct else { continue };
+            let Some(one) = inference.indistinct else {
+                continue;
+            };
             assert_eq!(one.spec.to_string(), "WN+AR1");
-            for (held, (parameter, value)) in
-                held.iter_mut().zip([(Parameter::Phi, phi), (Parameter::Sigma2, 2.0 * (1.0 - phi * phi))])
-            {
-                let interval = one.intervals.iter().find(|i| i.of == ParameterRef { process: 1, parameter });
+            for (held, (parameter, value)) in held.iter_mut().zip([
+                (Parameter::Phi, phi),
+                (Parameter::Sigma2, 2.0 * (1.0 - phi * phi)),
+            ]) {
+                let interval = one.intervals.iter().find(|i| {
+                    i.of == ParameterRef {
+                        process: 1,
+                        parameter,
+                    }
+                });
                 *held += u32::from(interval.is_some_and(|i| i.low < value && value < i.high));
             }
         }
@@ -243,6 +304,9 @@ mod tests {
         assert!(close.3 >= 10, "{close:?}");
         assert!(far.3 <= 1 && far.1 >= 42, "{far:?}");
         assert!(6 * far.0 >= 5 * far.1, "{far:?}");
-        assert!([close, apart, far].iter().all(|c| c.2 <= 1e4), "{close:?} {apart:?} {far:?}");
+        assert!(
+            [close, apart, far].iter().all(|c| c.2 <= 1e4),
+            "{close:?} {apart:?} {far:?}"
+        );
     }
 }

@@ -16,7 +16,9 @@ use super::spread::Spread;
 use super::varying::parameter_spreads;
 use crate::curve::{Estimator, Group};
 use crate::fit::Fit;
-use crate::outcome::{Advance, Bootstrap, Indistinct, Inference, LevelSpread, Outcome, Settings, tau_s};
+use crate::outcome::{
+    Advance, Bootstrap, Indistinct, Inference, LevelSpread, Outcome, Settings, tau_s,
+};
 use crate::rng::StreamKey;
 use rayon::prelude::*;
 
@@ -35,8 +37,18 @@ pub(crate) fn inference(
     if let Some((simple, processes, p_value)) = simpler(group, outcome, settings) {
         // By recursion: the simpler model may itself have processes that are not told apart.
         let intervals = inference(group, &simple, settings, bootstrap, &|_| {}).intervals;
-        let Outcome { spec, fit: Fit { composite, .. }, .. } = simple;
-        let indistinct = Indistinct { processes, spec, composite, p_value, intervals };
+        let Outcome {
+            spec,
+            fit: Fit { composite, .. },
+            ..
+        } = simple;
+        let indistinct = Indistinct {
+            processes,
+            spec,
+            composite,
+            p_value,
+            intervals,
+        };
         indistinct.adopt(outcome, &mut own.intervals);
         own.indistinct = Some(indistinct);
     }
@@ -65,15 +77,24 @@ fn by_bootstrap(
         advance(1);
         fit
     };
-    let fits: Vec<Fit> = (0..bootstrap.draws).into_par_iter().filter_map(draw).collect();
-    let errors = standard_errors(outcome, settings, &sampler.covariance_as_recorded(CURVES, &name, settings));
+    let fits: Vec<Fit> = (0..bootstrap.draws)
+        .into_par_iter()
+        .filter_map(draw)
+        .collect();
+    let errors = standard_errors(
+        outcome,
+        settings,
+        &sampler.covariance_as_recorded(CURVES, &name, settings),
+    );
     let spread = sampler.spread.as_ref();
     let stretch = spread.map_or(1.0, Spread::student);
     let intervals = intervals(outcome, &fits, stretch, &errors);
-    let alike =
-        spread.and_then(|s| alike::p_value(&group.replicates, outcome.estimator, s, &sampler.law, &name));
+    let alike = spread
+        .and_then(|s| alike::p_value(&group.replicates, outcome.estimator, s, &sampler.law, &name));
     let varying = match alike {
-        Some(p) if p <= alike::LEVEL => parameter_spreads(group, outcome, &intervals, settings, bootstrap),
+        Some(p) if p <= alike::LEVEL => {
+            parameter_spreads(group, outcome, &intervals, settings, bootstrap)
+        }
         _ => Vec::new(),
     };
     Inference {
@@ -83,7 +104,9 @@ fn by_bootstrap(
         stretch,
         intervals,
         goodness: (outcome.estimator != Estimator::Avlr).then(|| goodness(outcome, &fits)),
-        spread: spread.map_or(Vec::new(), |s| level_spreads(s, &outcome.curve.levels, settings.rate_hz)),
+        spread: spread.map_or(Vec::new(), |s| {
+            level_spreads(s, &outcome.curve.levels, settings.rate_hz)
+        }),
         alike,
         varying,
         indistinct: None,
@@ -109,11 +132,16 @@ mod tests {
     use crate::noise::{Composite, Model, Process, RandomWalk, VirtualImu, White};
     use crate::uncertainty::bootstrap::like;
     use crate::wavelet::{Convention, Tuning, classical};
-    use crate::{ModelChoice, Pool, Replicate, Trim, Weighting, calibrate, grouped, infer, replicates};
+    use crate::{
+        ModelChoice, Pool, Replicate, Trim, Weighting, calibrate, grouped, infer, replicates,
+    };
     use rand::RngExt;
     use rand_distr::StandardNormal;
 
-    const CHANNEL: Channel = Channel { sensor: Sensor::Gyro, axis: Axis::X };
+    const CHANNEL: Channel = Channel {
+        sensor: Sensor::Gyro,
+        axis: Axis::X,
+    };
     const SAMPLES: usize = 1024;
 
     fn settings(spec: &str) -> Settings {
@@ -133,7 +161,13 @@ mod tests {
     fn group(set: u64, replicates: &[(f64, f64)]) -> Group {
         let recording = |(run, (sigma2, gamma2)): (usize, &(f64, f64))| {
             let run = run as u64;
-            let key = StreamKey { seed: set, scenario: "", run, source: "", process: "" };
+            let key = StreamKey {
+                seed: set,
+                scenario: "",
+                run,
+                source: "",
+                process: "",
+            };
             let mut generator = key.generator();
             let mut walk = 0.0;
             let mut next = || {
@@ -154,13 +188,22 @@ mod tests {
             };
             (CHANNEL, like(&template, nu))
         };
-        grouped(replicates.iter().enumerate().map(recording).collect(), Pool::Axes).remove(0)
+        grouped(
+            replicates.iter().enumerate().map(recording).collect(),
+            Pool::Axes,
+        )
+        .remove(0)
     }
 
     fn inferred(group: Group, settings: &Settings, draws: usize) -> Outcome {
         let groups = [group];
         let mut outcomes = calibrate(&groups, settings).unwrap();
-        infer(&groups, &mut outcomes, settings, Bootstrap { draws, seed: 3 });
+        infer(
+            &groups,
+            &mut outcomes,
+            settings,
+            Bootstrap { draws, seed: 3 },
+        );
         outcomes.remove(0)
     }
 
@@ -171,8 +214,10 @@ mod tests {
     fn intervals_cover_and_the_j_test_keeps_its_level() {
         const SETS: u64 = 150;
         let settings = settings("WN+RW");
-        let truth =
-            [Process::White(White::new(1.0).unwrap()), Process::RandomWalk(RandomWalk::new(1e-3).unwrap())];
+        let truth = [
+            Process::White(White::new(1.0).unwrap()),
+            Process::RandomWalk(RandomWalk::new(1e-3).unwrap()),
+        ];
         for replicates in [3, 4, 8] {
             let mut covered = [0_u32; 2];
             let mut rejected = 0_u32;
@@ -211,14 +256,28 @@ mod tests {
     fn differences_between_replicates_widen_the_intervals() {
         let variances: Vec<(f64, f64)> = (0..8).map(|i| (0.8 + 0.06 * f64::from(i), 0.0)).collect();
         let deviation = 0.06 * 6.0_f64.sqrt(); // of 0 … 7: √6
-        let half = |inference: &Inference| 0.5 * (inference.intervals[0].high - inference.intervals[0].low);
-        let spread = inferred(group(1, &variances), &settings("WN"), 300).inference.unwrap();
+        let half = |inference: &Inference| {
+            0.5 * (inference.intervals[0].high - inference.intervals[0].low)
+        };
+        let spread = inferred(group(1, &variances), &settings("WN"), 300)
+            .inference
+            .unwrap();
         let unit = half(&spread) / (deviation / 8.0_f64.sqrt());
         assert!(unit > 1.6 && unit < 3.4, "{unit}");
-        assert!(spread.spread[0].between > 2.0 * spread.spread[0].within, "{:?}", spread.spread);
-        let alike = inferred(group(1, &[(1.0, 0.0); 8]), &settings("WN"), 300).inference.unwrap();
+        assert!(
+            spread.spread[0].between > 2.0 * spread.spread[0].within,
+            "{:?}",
+            spread.spread
+        );
+        let alike = inferred(group(1, &[(1.0, 0.0); 8]), &settings("WN"), 300)
+            .inference
+            .unwrap();
         // Noise alone: at least 1.96·√(2/(8·1024)) = 0.031, which maximum likelihood would reach.
-        assert!(half(&alike) > 0.027 && half(&alike) < 0.06, "{}", half(&alike));
+        assert!(
+            half(&alike) > 0.027 && half(&alike) < 0.06,
+            "{}",
+            half(&alike)
+        );
     }
 
     #[test]
@@ -234,11 +293,20 @@ mod tests {
     fn flicker_noise_is_fitted_and_covered() {
         const SETS: u64 = 100;
         let process = |code, value| Process::from_values(code, &[value], 1.0).unwrap().unwrap();
-        let axis = Composite::new(vec![process("WN", 1.0), process("FN", 0.05), process("RW", 2e-5)]);
+        let axis = Composite::new(vec![
+            process("WN", 1.0),
+            process("FN", 0.05),
+            process("RW", 2e-5),
+        ]);
         let model = Model::pooled(1.0, &axis, &axis);
         let settings = settings("WN+FN+RW");
         let found = |seed: u64| {
-            let imu = VirtualImu { model: &model, spread: None, contamination: None, seed };
+            let imu = VirtualImu {
+                model: &model,
+                spread: None,
+                contamination: None,
+                seed,
+            };
             let signals = (1..=4).flat_map(|run| {
                 let recording = imu.recording(run, &[CHANNEL], 1 << 13).unwrap();
                 replicates(&recording, None, &settings.tuning).unwrap()
@@ -253,7 +321,11 @@ mod tests {
         let mean = all.iter().map(|(b2, _)| b2).sum::<f64>() / n;
         let sd = (all.iter().map(|(b2, _)| (b2 - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
         assert!((mean - 0.05).abs() < 4.0 * sd / n.sqrt(), "{mean} {sd}");
-        let held = all.iter().filter(|(_, i)| i.low < 0.05 && 0.05 < i.high).count() as f64 / n;
+        let held = all
+            .iter()
+            .filter(|(_, i)| i.low < 0.05 && 0.05 < i.high)
+            .count() as f64
+            / n;
         assert!((held - 0.95).abs() < 0.087, "{held}");
     }
 }

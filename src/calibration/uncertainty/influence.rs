@@ -50,10 +50,18 @@ impl CurveInfluence {
         };
         let units: Vec<f64> = moving.iter().map(unit).collect();
         let columns = moving.iter().map(|(i, _)| *i).collect();
-        let equation = Equation { columns, units: units.clone(), weighting: settings.weighting };
+        let equation = Equation {
+            columns,
+            units: units.clone(),
+            weighting: settings.weighting,
+        };
         let curve = &outcome.curve;
         let parameters: Vec<ParameterRef> = moving.iter().map(|(_, (of, _))| *of).collect();
-        let steps = Self { parameters, units, passed_on: DMatrix::zeros(0, 0) };
+        let steps = Self {
+            parameters,
+            units,
+            passed_on: DMatrix::zeros(0, 0),
+        };
         let Self { parameters, .. } = &steps;
         let moved = |m: usize, by: f64| steps.moved(&fit.composite, m, by, settings.rate_hz);
         let mut by_parameter = DMatrix::zeros(parameters.len(), parameters.len());
@@ -79,12 +87,20 @@ impl CurveInfluence {
 
     /// A composite whose `m`-th moving parameter is moved by so many of its natural steps; none outside its domain.
     #[must_use]
-    pub fn moved(&self, composite: &Composite, m: usize, by: f64, rate_hz: f64) -> Option<Composite> {
+    pub fn moved(
+        &self,
+        composite: &Composite,
+        m: usize,
+        by: f64,
+        rate_hz: f64,
+    ) -> Option<Composite> {
         let of = self.parameters[m];
         let (_, value) = composite.parameters().find(|(other, _)| *other == of)?;
         let mut changed = composite.clone();
         let process = &mut changed.processes[of.process];
-        *process = process.with_parameter(of.parameter.name(), value + by * self.units[m], rate_hz)?.ok()?;
+        *process = process
+            .with_parameter(of.parameter.name(), value + by * self.units[m], rate_hz)?
+            .ok()?;
         Some(changed)
     }
 }
@@ -101,14 +117,23 @@ impl Equation {
     fn value(&self, model: &Composite, curve: &Curve) -> DVector<f64> {
         let (nu, gradients) = (implied(model, curve), implied_gradients(model, curve));
         // the weights of a fit that has settled are those of its own curve
-        let weighted_for = if self.weighting == Weighting::Model { &nu } else { &curve.wv };
+        let weighted_for = if self.weighting == Weighting::Model {
+            &nu
+        } else {
+            &curve.wv
+        };
         let roots = self.weighting.roots(curve, weighted_for);
         let residual = |j: usize| roots[j] * roots[j] * (curve.wv[j] - nu[j]);
         let of_parameter = |m: usize| {
             let column = self.columns[m];
-            (0..nu.len()).map(|j| self.units[m] * gradients[j][column] * residual(j)).sum()
+            (0..nu.len())
+                .map(|j| self.units[m] * gradients[j][column] * residual(j))
+                .sum()
         };
-        DVector::from_iterator(self.columns.len(), (0..self.columns.len()).map(of_parameter))
+        DVector::from_iterator(
+            self.columns.len(),
+            (0..self.columns.len()).map(of_parameter),
+        )
     }
 }
 
@@ -132,19 +157,35 @@ mod tests {
         let levels: Vec<u32> = (1..=14).collect();
         let wobble = |level: u32| 1.0 + 0.02 * (f64::from(level * level % 7) - 3.0);
         let curve = Curve {
-            wv: levels.iter().map(|l| model.haar_wv(*l) * wobble(*l)).collect(),
+            wv: levels
+                .iter()
+                .map(|l| model.haar_wv(*l) * wobble(*l))
+                .collect(),
             edof: levels.iter().map(|l| f64::from(1 << (15 - l))).collect(),
             levels,
             ..Curve::default()
         };
-        let group = Group { scope: Scope { sensor: Sensor::Gyro, axis: None }, replicates: Vec::new() };
+        let group = Group {
+            scope: Scope {
+                sensor: Sensor::Gyro,
+                axis: None,
+            },
+            replicates: Vec::new(),
+        };
         // a Gauss-Markov process is an AR1 whose shape is an inverse time
-        for (weighting, spec) in
-            [(Weighting::Model, "N1"), (Weighting::Edof, "N1"), (Weighting::Model, "WN+GM+RW")]
-        {
+        for (weighting, spec) in [
+            (Weighting::Model, "N1"),
+            (Weighting::Edof, "N1"),
+            (Weighting::Model, "WN+GM+RW"),
+        ] {
             let model = ModelChoice::Given(spec.parse().unwrap());
-            let settings = Settings { model, weighting, ..Settings::default() };
-            let fitted = |curve: Curve| fit_curve(&group, Estimator::Awv, curve, &settings).unwrap();
+            let settings = Settings {
+                model,
+                weighting,
+                ..Settings::default()
+            };
+            let fitted =
+                |curve: Curve| fit_curve(&group, Estimator::Awv, curve, &settings).unwrap();
             let outcome = fitted(curve.clone());
             let influence = CurveInfluence::of(&outcome, &settings).unwrap();
             assert_eq!(influence.parameters.len(), 4);
@@ -152,7 +193,12 @@ mod tests {
                 let refitted = |by: f64| {
                     let mut moved = curve.clone();
                     moved.wv[j] *= 1.0 + by;
-                    fitted(moved).fit.composite.parameters().map(|(_, v)| v).collect::<Vec<f64>>()
+                    fitted(moved)
+                        .fit
+                        .composite
+                        .parameters()
+                        .map(|(_, v)| v)
+                        .collect::<Vec<f64>>()
                 };
                 let (up, down) = (refitted(1e-3), refitted(-1e-3));
                 for m in 0..4 {

@@ -31,28 +31,50 @@ pub(crate) fn intervals(
 ) -> Vec<ParameterInterval> {
     let (model, spec) = (&outcome.fit.composite, &outcome.spec);
     let searched = correlated(&outcome.curve);
-    let matched: Vec<Vec<Option<&Process>>> =
-        fits.iter().map(|fit| matched(&outcome.fit, spec, fit)).collect();
+    let matched: Vec<Vec<Option<&Process>>> = fits
+        .iter()
+        .map(|fit| matched(&outcome.fit, spec, fit))
+        .collect();
     let mut intervals = Vec::new();
     for (i, process) in model.processes.iter().enumerate() {
         let there: Vec<&Process> = matched.iter().filter_map(|m| m[i]).collect();
         let is_zero = outcome.fit.zero.contains(&i);
-        let lost = if is_zero { 1.0 } else { 1.0 - there.len() as f64 / fits.len() as f64 };
-        let drawn = DrawnProcess { spec, index: i, process, drawn: there, lost, stretch };
+        let lost = if is_zero {
+            1.0
+        } else {
+            1.0 - there.len() as f64 / fits.len() as f64
+        };
+        let drawn = DrawnProcess {
+            spec,
+            index: i,
+            process,
+            drawn: there,
+            lost,
+            stretch,
+        };
         let (mut own, quantiles) = drawn.intervals(&standard_errors[intervals.len()..]);
         // Only a correlation time that is free can leave the search; limits that are given are an answer of
         // their own.
-        if spec.limits()[i].shape.is_none() && own.iter().any(|i| leaves_search(searched, process, i)) {
-            own.iter_mut().for_each(|i| i.refuse(Undetermined::BeyondSearch));
+        if spec.limits()[i].shape.is_none()
+            && own.iter().any(|i| leaves_search(searched, process, i))
+        {
+            own.iter_mut()
+                .for_each(|i| i.refuse(Undetermined::BeyondSearch));
         }
         // With its amplitude the shape is lost too.
         let open = |i: &ParameterInterval| {
-            !i.of.parameter.is_shape() && i.absent.is_none() && i.high > i.low * WIDEST.powf(stretch.min(2.0))
+            !i.of.parameter.is_shape()
+                && i.absent.is_none()
+                && i.high > i.low * WIDEST.powf(stretch.min(2.0))
         };
         if own.iter().any(open) {
             own.iter_mut().for_each(|i| i.refuse(Undetermined::Open));
         }
-        for (interval, quantiles) in own.iter_mut().zip(quantiles).filter(|(i, _)| i.absent.is_none()) {
+        for (interval, quantiles) in own
+            .iter_mut()
+            .zip(quantiles)
+            .filter(|(i, _)| i.absent.is_none())
+        {
             [interval.low, interval.high] = hull([interval.low, interval.high], quantiles);
         }
         intervals.extend(own);
@@ -77,13 +99,25 @@ impl DrawnProcess<'_> {
     /// draws themselves. `standard_errors`: of the same parameters.
     fn intervals(&self, standard_errors: &[f64]) -> (Vec<ParameterInterval>, Vec<[f64; 2]>) {
         let (mut intervals, mut quantiles) = (Vec::new(), Vec::new());
-        let parameters = self.process.kind().parameters().iter().zip(self.process.values());
+        let parameters = self
+            .process
+            .kind()
+            .parameters()
+            .iter()
+            .zip(self.process.values());
         for (p, (&parameter, value)) in parameters.enumerate() {
-            let of = ParameterRef { process: self.index, parameter };
+            let of = ParameterRef {
+                process: self.index,
+                parameter,
+            };
             if self.spec.is_fixed(of) {
                 continue;
             }
-            let drawn = self.drawn.iter().map(|process| process.values()[p]).collect();
+            let drawn = self
+                .drawn
+                .iter()
+                .map(|process| process.values()[p])
+                .collect();
             let draws = Draws::new(parameter, drawn, self.stretch);
             let [low, high] = match self.lost {
                 // The quantile is that of what has vanished.
@@ -100,7 +134,14 @@ impl DrawnProcess<'_> {
                 _ => low.is_nan().then_some(Undetermined::OneSided),
             };
             let standard_error = standard_errors[intervals.len()];
-            intervals.push(ParameterInterval { of, low, high, lost: self.lost, absent, standard_error });
+            intervals.push(ParameterInterval {
+                of,
+                low,
+                high,
+                lost: self.lost,
+                absent,
+                standard_error,
+            });
         }
         (intervals, quantiles)
     }
@@ -119,36 +160,68 @@ fn leaves_search(searched: Range, process: &Process, interval: &ParameterInterva
     };
     // Ends beyond by rounding are not beyond.
     let beyond = |u: f64| u < searched.low - 1e-6 || u > searched.high + 1e-6;
-    [interval.low, interval.high].into_iter().filter_map(kappa).any(|kappa| beyond(kappa.ln()))
+    [interval.low, interval.high]
+        .into_iter()
+        .filter_map(kappa)
+        .any(|kappa| beyond(kappa.ln()))
 }
 
 /// An interval that holds its estimate; none where the estimator misses its own estimate 39 times in 40.
 fn holding(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
     let rounding = 1e-9 * value.abs();
-    if low <= value + rounding && value - rounding <= high { [low, high] } else { [f64::NAN; 2] }
+    if low <= value + rounding && value - rounding <= high {
+        [low, high]
+    } else {
+        [f64::NAN; 2]
+    }
 }
 
 /// The processes of a draw in the order of the model; none where one has vanished. Alike ones are told apart by
 /// their correlation times: those that are there, in the draw and in the model, keep their order, and so many of
 /// them are paired as can be, the nearest.
-pub(super) fn matched<'a>(estimate: &Fit, spec: &ModelSpec, fit: &'a Fit) -> Vec<Option<&'a Process>> {
+pub(super) fn matched<'a>(
+    estimate: &Fit,
+    spec: &ModelSpec,
+    fit: &'a Fit,
+) -> Vec<Option<&'a Process>> {
     let (drawn, model) = (&fit.composite.processes, &estimate.composite.processes);
     let is_present = |fit: &Fit, i: usize| !fit.zero.contains(&i) && !fit.at_end.contains(&i);
     let kinds = spec.kinds();
     let cost = |i: usize, d: usize| (log_time(&model[i]) - log_time(&drawn[d])).powi(2);
     let mut matched = vec![None; drawn.len()];
-    for (first, kind) in kinds.iter().enumerate().filter(|(i, kind)| !kinds[..*i].contains(kind)) {
-        let own: Vec<usize> = (first..kinds.len()).filter(|i| kinds[*i] == *kind).collect();
-        let items: Vec<usize> = own.iter().copied().filter(|i| is_present(fit, *i)).collect();
-        let places: Vec<usize> = own.iter().copied().filter(|i| is_present(estimate, *i)).collect();
+    for (first, kind) in kinds
+        .iter()
+        .enumerate()
+        .filter(|(i, kind)| !kinds[..*i].contains(kind))
+    {
+        let own: Vec<usize> = (first..kinds.len())
+            .filter(|i| kinds[*i] == *kind)
+            .collect();
+        let items: Vec<usize> = own
+            .iter()
+            .copied()
+            .filter(|i| is_present(fit, *i))
+            .collect();
+        let places: Vec<usize> = own
+            .iter()
+            .copied()
+            .filter(|i| is_present(estimate, *i))
+            .collect();
         // With limits the labels tell which is which; without, fits list alike processes by correlation time,
         // and only their number may differ.
         let pairs: Vec<(usize, usize)> = if own.iter().any(|i| spec.limits()[*i] != Limits::NONE) {
             items.iter().map(|i| (*i, *i)).collect()
         } else if items.len() <= places.len() {
-            nearest(&places, &items, cost).into_iter().zip(items).collect()
+            nearest(&places, &items, cost)
+                .into_iter()
+                .zip(items)
+                .collect()
         } else {
-            places.iter().copied().zip(nearest(&items, &places, |d, i| cost(i, d))).collect()
+            places
+                .iter()
+                .copied()
+                .zip(nearest(&items, &places, |d, i| cost(i, d)))
+                .collect()
         };
         for (place, d) in pairs {
             matched[place] = Some(&drawn[d]);
@@ -158,16 +231,28 @@ pub(super) fn matched<'a>(estimate: &Fit, spec: &ModelSpec, fit: &'a Fit) -> Vec
 }
 
 /// The choice, in their order, of as many places as there are items with the least sum of costs.
-fn nearest(places: &[usize], items: &[usize], cost: impl Fn(usize, usize) -> f64 + Copy) -> Vec<usize> {
-    fn best(places: &[usize], items: &[usize], cost: &dyn Fn(usize, usize) -> f64) -> (f64, Vec<usize>) {
-        let Some((item, others)) = items.split_first() else { return (0.0, Vec::new()) };
+fn nearest(
+    places: &[usize],
+    items: &[usize],
+    cost: impl Fn(usize, usize) -> f64 + Copy,
+) -> Vec<usize> {
+    fn best(
+        places: &[usize],
+        items: &[usize],
+        cost: &dyn Fn(usize, usize) -> f64,
+    ) -> (f64, Vec<usize>) {
+        let Some((item, others)) = items.split_first() else {
+            return (0.0, Vec::new());
+        };
         let choose = |at: usize| {
             let (rest, mut chosen) = best(&places[at + 1..], others, cost);
             chosen.insert(0, places[at]);
             (rest + cost(places[at], *item), chosen)
         };
         let candidates = (0..(places.len() + 1).saturating_sub(items.len())).map(choose);
-        candidates.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, Vec::new()))
+        candidates
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .unwrap_or((f64::INFINITY, Vec::new()))
     }
     best(places, items, &cost).1
 }
@@ -206,18 +291,31 @@ impl Draws {
     fn new(parameter: Parameter, mut drawn: Vec<f64>, stretch: f64) -> Self {
         drawn.sort_by(f64::total_cmp);
         let [low, median, high] = [TAIL, 0.5, 1.0 - TAIL].map(|p| quantile(&drawn, p));
-        Self { parameter, quantiles: [low, high], median, stretch }
+        Self {
+            parameter,
+            quantiles: [low, high],
+            median,
+            stretch,
+        }
     }
 
     /// Distances of the quantiles from the median on that scale, stretched.
     fn distances(&self) -> [f64; 2] {
-        self.quantiles.map(|q| self.stretch * (self.parameter.scaled(q) - self.parameter.scaled(self.median)))
+        self.quantiles
+            .map(|q| self.stretch * (self.parameter.scaled(q) - self.parameter.scaled(self.median)))
     }
 
     /// The quantiles, their distances stretched; as they are where one is at a bound.
     fn stretched(&self) -> [f64; 2] {
-        let ends = self.distances().map(|d| self.parameter.unscaled(self.parameter.scaled(self.median) + d));
-        if ends.iter().all(|e| e.is_finite()) { ends } else { self.quantiles }
+        let ends = self.distances().map(|d| {
+            self.parameter
+                .unscaled(self.parameter.scaled(self.median) + d)
+        });
+        if ends.iter().all(|e| e.is_finite()) {
+            ends
+        } else {
+            self.quantiles
+        }
     }
 
     /// The 95 % interval.
@@ -230,9 +328,12 @@ impl Draws {
         // 2·estimate − quantile is the mirror image; written with the median, whose distance from the
         // quantiles is what is stretched.
         let centre = 2.0 * self.parameter.scaled(estimate) - self.parameter.scaled(self.median);
-        let mut ends = self.distances().map(|d| self.parameter.unscaled(centre - d));
+        let mut ends = self
+            .distances()
+            .map(|d| self.parameter.unscaled(centre - d));
         ends.sort_by(f64::total_cmp);
-        (ends.iter().all(|e| e.is_finite()) && self.parameter.scaled(estimate).is_finite()).then_some(ends)
+        (ends.iter().all(|e| e.is_finite()) && self.parameter.scaled(estimate).is_finite())
+            .then_some(ends)
     }
 }
 
@@ -245,13 +346,20 @@ pub fn derived_interval(estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2
 
 /// The 95 % interval of a positive quantity that some of `draws` draws have; none where more of them lack it than the
 /// quantile leaves out, or its draws lie to one side of the estimate.
-pub(crate) fn scale_interval(estimate: f64, drawn: Vec<f64>, draws: usize, stretch: f64) -> Option<[f64; 2]> {
+pub(crate) fn scale_interval(
+    estimate: f64,
+    drawn: Vec<f64>,
+    draws: usize,
+    stretch: f64,
+) -> Option<[f64; 2]> {
     if (drawn.len() as f64) < (1.0 - TAIL) * draws as f64 || drawn.is_empty() {
         return None;
     }
     let draws = Draws::new(Parameter::Sigma2, drawn, stretch);
     let ends = holding(estimate, draws.around(estimate));
-    ends.iter().all(|end| end.is_finite()).then(|| hull(ends, draws.stretched()))
+    ends.iter()
+        .all(|end| end.is_finite())
+        .then(|| hull(ends, draws.stretched()))
 }
 
 /// Probability beyond either end of a 95 % interval.
@@ -260,7 +368,9 @@ pub(super) const TAIL: f64 = 0.025;
 /// Quantile of sorted draws, interpolated; NaN of none. The k-th of n is at k/(n + 1), so that one draw more is
 /// beyond it with that probability exactly ([Davison and Hinkley](crate::bibliography::DavisonHinkley97), Section 5.2).
 pub(super) fn quantile(sorted: &[f64], p: f64) -> f64 {
-    let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
+    let Some(last) = sorted.len().checked_sub(1) else {
+        return f64::NAN;
+    };
     let at = (p * (sorted.len() + 1) as f64 - 1.0).clamp(0.0, last as f64);
     let below = at.floor() as usize;
     let above = (below + 1).min(last);
@@ -283,17 +393,29 @@ mod tests {
     /// quantile leaves out, the first has no interval.
     #[test]
     fn a_component_that_vanishes_in_draws_takes_nothing_of_the_other() {
-        let ar1 = |time: f64, sigma2: f64| Process::Ar1(Ar1::new((-1.0 / time).exp(), sigma2).unwrap());
+        let ar1 =
+            |time: f64, sigma2: f64| Process::Ar1(Ar1::new((-1.0 / time).exp(), sigma2).unwrap());
         let fit_of = |processes: Vec<Process>| {
             let composite = Composite::new(processes);
             let levels: Vec<u32> = (1..=12).collect();
-            let wv = levels.iter().map(|l| composite.haar_wv(*l) + 1e-12).collect();
-            let curve = Curve { edof: vec![100.0; 12], levels, wv, ..Curve::default() };
+            let wv = levels
+                .iter()
+                .map(|l| composite.haar_wv(*l) + 1e-12)
+                .collect();
+            let curve = Curve {
+                edof: vec![100.0; 12],
+                levels,
+                wv,
+                ..Curve::default()
+            };
             let spec = "2*AR1".parse().unwrap();
             let mut fit = fit(&curve, &spec, 1.0, Weighting::Edof).unwrap();
             (fit.composite, fit.zero) = (composite, Vec::new());
             Outcome {
-                scope: Scope { sensor: Sensor::Accel, axis: None },
+                scope: Scope {
+                    sensor: Sensor::Accel,
+                    axis: None,
+                },
                 replicates: 0,
                 recordings: 0,
                 axes_differ: None,
@@ -319,7 +441,10 @@ mod tests {
         let all = intervals(&outcome, &draws(2), 1.0, &[f64::NAN; 4]);
         assert!(all.iter().all(|i| i.absent.is_none()), "{all:?}");
         let all = intervals(&outcome, &draws(10), 1.0, &[f64::NAN; 4]);
-        assert!(all[0].absent == Some(Undetermined::Vanishes) && (all[0].lost - 0.1).abs() < 1e-9, "{all:?}");
+        assert!(
+            all[0].absent == Some(Undetermined::Vanishes) && (all[0].lost - 0.1).abs() < 1e-9,
+            "{all:?}"
+        );
         assert!(
             all[0].low.is_nan() && all[2].lost == 0.0 && all[3].low < 1.0 && all[3].high > 1.0,
             "{all:?}"
@@ -337,24 +462,42 @@ mod tests {
     /// relative: 4·√(0.025·0.975/4000)/(q f(q)) with the densities 0.00876 and 0.0363, 6.4 and 12.5 %.
     #[test]
     fn the_interval_of_a_variance_is_the_textbooks() {
-        let mut generator = StreamKey { seed: 1, scenario: "", run: 0, source: "", process: "" }.generator();
+        let mut generator = StreamKey {
+            seed: 1,
+            scenario: "",
+            run: 0,
+            source: "",
+            process: "",
+        }
+        .generator();
         let law = ChiSquared::new(8.0).unwrap();
-        let drawn = (0..4000).map(|_| 3.0 * generator.sample(law) / 8.0).collect();
+        let drawn = (0..4000)
+            .map(|_| 3.0 * generator.sample(law) / 8.0)
+            .collect();
         let [low, high] = Draws::new(Parameter::Sigma2, drawn, 1.0).around(3.0);
         assert!(
-            (low / (24.0 / 17.53) - 1.0).abs() < 0.064 && (high / (24.0 / 2.18) - 1.0).abs() < 0.125,
+            (low / (24.0 / 17.53) - 1.0).abs() < 0.064
+                && (high / (24.0 / 2.18) - 1.0).abs() < 0.125,
             "{low} {high}"
         );
-        assert_eq!(Draws::new(Parameter::Sigma2, vec![0.0, 0.0, 1.0], 1.0).around(0.0), [0.0, 1.0]);
+        assert_eq!(
+            Draws::new(Parameter::Sigma2, vec![0.0, 0.0, 1.0], 1.0).around(0.0),
+            [0.0, 1.0]
+        );
         let [low, high] = Draws::new(Parameter::Phi, vec![0.85, 0.9, 0.93], 1.0).around(0.9);
-        assert!(0.0 < low && low < 0.9 && 0.9 < high && high < 1.0, "{low} {high}");
+        assert!(
+            0.0 < low && low < 0.9 && 0.9 < high && high < 1.0,
+            "{low} {high}"
+        );
     }
 
     /// Draws that are on the whole a quarter of the estimate, 0.5 to 2 times their median: mirrored at the
     /// estimate, 2 to 8 times it; as they are, 1/8 to 1/2 of it. All of that is in the interval.
     #[test]
     fn the_interval_of_a_parameter_holds_the_draws_and_their_mirror_image() {
-        let drawn: Vec<f64> = (-100..=100).map(|k| 0.25 * f64::from(k).mul_add(0.01, 0.0).exp2()).collect();
+        let drawn: Vec<f64> = (-100..=100)
+            .map(|k| 0.25 * f64::from(k).mul_add(0.01, 0.0).exp2())
+            .collect();
         let hull_of = |stretch| {
             let draws = Draws::new(Parameter::Sigma2, drawn.clone(), stretch);
             hull(draws.around(1.0), draws.stretched())

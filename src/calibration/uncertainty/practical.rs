@@ -21,21 +21,47 @@ impl Outcome {
         let range_s = observed_s(self, rate_hz)?;
         let model = &self.fit.composite;
         let parameters = AxisParameters::of(&[model], rate_hz, horizon, policy, range_s).ok()?;
-        let intervals = self.inference.as_ref().map_or(PracticalIntervals::default(), |i| i.practical);
-        let walk_until_s = parameters.walk.departs_s(model, rate_hz, range_s, Practical::BESIDE);
-        Some(Practical { parameters, intervals, range_s, walk_until_s })
+        let intervals = self
+            .inference
+            .as_ref()
+            .map_or(PracticalIntervals::default(), |i| i.practical);
+        let walk_until_s = parameters
+            .walk
+            .departs_s(model, rate_hz, range_s, Practical::BESIDE);
+        Some(Practical {
+            parameters,
+            intervals,
+            range_s,
+            walk_until_s,
+        })
     }
 }
 
 /// The 95 % intervals from the fits of the draws; `stretch` as in [`super::intervals::intervals`].
-pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64, rate_hz: f64) -> PracticalIntervals {
+pub(crate) fn intervals(
+    outcome: &Outcome,
+    fits: &[Fit],
+    stretch: f64,
+    rate_hz: f64,
+) -> PracticalIntervals {
     let none = PracticalIntervals::default();
-    let Some(range_s) = observed_s(outcome, rate_hz) else { return none };
+    let Some(range_s) = observed_s(outcome, rate_hz) else {
+        return none;
+    };
     let reading = |model: &Composite| Reading::of(model, rate_hz, range_s);
-    let Some(own) = reading(&outcome.fit.composite) else { return none };
-    let drawn: Vec<Reading> = fits.iter().filter_map(|fit| reading(&fit.composite)).collect();
+    let Some(own) = reading(&outcome.fit.composite) else {
+        return none;
+    };
+    let drawn: Vec<Reading> = fits
+        .iter()
+        .filter_map(|fit| reading(&fit.composite))
+        .collect();
     let interval = |value: &dyn Fn(&Reading) -> Option<f64>| {
-        let there: Vec<f64> = drawn.iter().filter_map(value).filter(|x| *x > 0.0).collect();
+        let there: Vec<f64> = drawn
+            .iter()
+            .filter_map(value)
+            .filter(|x| *x > 0.0)
+            .collect();
         scale_interval(value(&own)?, there, fits.len(), stretch)
     };
     PracticalIntervals {
@@ -72,11 +98,24 @@ mod tests {
 
     fn practical(processes: Vec<Process>) -> Practical {
         let (model, rate_hz, range_s) = (Composite::new(processes), 100.0, 1e4);
-        let parameters =
-            AxisParameters::of(&[&model], rate_hz, Horizon::default(), Policy::Matched, range_s).unwrap();
-        let walk_until_s = parameters.walk.departs_s(&model, rate_hz, range_s, Practical::BESIDE);
+        let parameters = AxisParameters::of(
+            &[&model],
+            rate_hz,
+            Horizon::default(),
+            Policy::Matched,
+            range_s,
+        )
+        .unwrap();
+        let walk_until_s = parameters
+            .walk
+            .departs_s(&model, rate_hz, range_s, Practical::BESIDE);
         let intervals = PracticalIntervals::default();
-        Practical { parameters, intervals, range_s, walk_until_s }
+        Practical {
+            parameters,
+            intervals,
+            range_s,
+            walk_until_s,
+        }
     }
 
     /// White noise of N = 1e-3 with a random walk that takes over at √3·1e-3/1e-5 = 173 s; with a Gauss-Markov process of 30 s,
@@ -87,13 +126,17 @@ mod tests {
     fn a_random_walk_is_observed_where_the_model_rises_as_it_does() {
         let white = Process::White(White::new(1e-4).unwrap());
         let walk = Process::RandomWalk(RandomWalk::new(1e-12).unwrap());
-        let markov =
-            |sigma: f64| Process::GaussMarkov(GaussMarkov::new(1.0 / 30.0, sigma * sigma, 100.0).unwrap());
+        let markov = |sigma: f64| {
+            Process::GaussMarkov(GaussMarkov::new(1.0 / 30.0, sigma * sigma, 100.0).unwrap())
+        };
         let with_walk = practical(vec![white, walk]);
         assert!(with_walk.walk_is_observed() && with_walk.walk_until_s.is_none());
         let hump = practical(vec![white, markov(3e-3)]);
         let until = hump.walk_until_s.unwrap();
-        assert!(hump.walk_is_observed() && (60.0..600.0).contains(&until), "{until}");
+        assert!(
+            hump.walk_is_observed() && (60.0..600.0).contains(&until),
+            "{until}"
+        );
         let trace = practical(vec![white, markov(5e-5)]);
         assert!(!trace.walk_is_observed(), "{trace:?}");
         assert!(trace.parameters.walk.crossover_s().unwrap() < trace.range_s);

@@ -11,7 +11,11 @@ use nalgebra::DMatrix;
 
 /// Standard errors of the parameters that are not fixed, in the order of the model and in their units; NaN where a
 /// parameter stands at a bound. `covariance` is that of curves, relative to the model.
-pub(crate) fn standard_errors(outcome: &Outcome, settings: &Settings, covariance: &DMatrix<f64>) -> Vec<f64> {
+pub(crate) fn standard_errors(
+    outcome: &Outcome,
+    settings: &Settings,
+    covariance: &DMatrix<f64>,
+) -> Vec<f64> {
     let (fit, spec, curve) = (&outcome.fit, &outcome.spec, &outcome.curve);
     let least_squares = outcome.estimator != Estimator::Avlr;
     // Of each parameter: whether it is fixed, whether it moves, and its value.
@@ -28,15 +32,21 @@ pub(crate) fn standard_errors(outcome: &Outcome, settings: &Settings, covariance
     let gradients = implied_gradients(&fit.composite, curve);
     let centre = implied(&fit.composite, curve);
     let weights = match &fit.mixing {
-        Some(mixing) => DMatrix::from_fn(levels, levels, |i, j| mixing[(i, j)] / fit.weighted_for[j]),
+        Some(mixing) => {
+            DMatrix::from_fn(levels, levels, |i, j| mixing[(i, j)] / fit.weighted_for[j])
+        }
         None => {
             let roots = settings.weighting.roots(curve, &fit.weighted_for);
             DMatrix::from_fn(levels, levels, |i, j| if i == j { roots[i] } else { 0.0 })
         }
     };
     // Relative to the parameters, which are of very different sizes.
-    let jacobian = DMatrix::from_fn(levels, moving.len(), |j, m| gradients[j][moving[m]] * all[moving[m]].2);
-    let scatter = DMatrix::from_fn(levels, levels, |i, j| covariance[(i, j)] * centre[i] * centre[j]);
+    let jacobian = DMatrix::from_fn(levels, moving.len(), |j, m| {
+        gradients[j][moving[m]] * all[moving[m]].2
+    });
+    let scatter = DMatrix::from_fn(levels, levels, |i, j| {
+        covariance[(i, j)] * centre[i] * centre[j]
+    });
     // (W J)⁺ W with WᵀW = Omega is (Jᵀ Omega J)⁻¹ Jᵀ Omega, without squaring the condition of J.
     let relative = (&weights * jacobian)
         .pseudo_inverse(f64::EPSILON)

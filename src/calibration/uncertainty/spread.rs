@@ -62,12 +62,30 @@ pub(super) fn origins(replicates: &[Replicate]) -> Vec<Origin> {
         let mut known = firsts.clone();
         known.sort_unstable();
         known.dedup();
-        firsts.iter().map(|of| known.partition_point(|other| other < of)).collect()
+        firsts
+            .iter()
+            .map(|of| known.partition_point(|other| other < of))
+            .collect()
     };
-    let recordings = ranked(replicates.iter().map(|r| first(&|other| other.name == r.name)).collect());
-    let positions = ranked(replicates.iter().map(|r| first(&|other| other.axis == r.axis)).collect());
+    let recordings = ranked(
+        replicates
+            .iter()
+            .map(|r| first(&|other| other.name == r.name))
+            .collect(),
+    );
+    let positions = ranked(
+        replicates
+            .iter()
+            .map(|r| first(&|other| other.axis == r.axis))
+            .collect(),
+    );
     let pairs = recordings.into_iter().zip(positions);
-    pairs.map(|(recording, position)| Origin { recording, position }).collect()
+    pairs
+        .map(|(recording, position)| Origin {
+            recording,
+            position,
+        })
+        .collect()
 }
 
 impl Spread {
@@ -78,7 +96,10 @@ impl Spread {
         tuning: &Tuning,
     ) -> Self {
         let levels = law.correlation.nrows();
-        let edof: Vec<Vec<f64>> = replicates.iter().map(|r| edof(r, estimator, law, tuning)).collect();
+        let edof: Vec<Vec<f64>> = replicates
+            .iter()
+            .map(|r| edof(r, estimator, law, tuning))
+            .collect();
         let count = replicates.len() as f64;
         let mut within = vec![0.0; levels];
         let mut units = vec![vec![0.0; levels]; replicates.len()];
@@ -86,10 +107,18 @@ impl Spread {
         let mut between = vec![0.0; levels];
         for j in 0..levels {
             // Short recordings lack the longest scales, and say nothing of them.
-            let present: Vec<usize> = (0..replicates.len()).filter(|i| replicates[*i].levels() > j).collect();
-            let logs: Vec<f64> = present.iter().map(|i| replicates[*i].value(estimator, j).ln()).collect();
+            let present: Vec<usize> = (0..replicates.len())
+                .filter(|i| replicates[*i].levels() > j)
+                .collect();
+            let logs: Vec<f64> = present
+                .iter()
+                .map(|i| replicates[*i].value(estimator, j).ln())
+                .collect();
             let shape = &law.shapes[j];
-            let noise: Vec<f64> = present.iter().map(|i| shape.variance_of_log(edof[*i][j])).collect();
+            let noise: Vec<f64> = present
+                .iter()
+                .map(|i| shape.variance_of_log(edof[*i][j]))
+                .collect();
             within[j] = (noise.iter().sum::<f64>() / present.len() as f64).sqrt();
             let scatter = Scatter::new(&logs, &noise, estimator);
             between[j] = scatter.between;
@@ -98,11 +127,21 @@ impl Spread {
             let fewer = ((count - 1.0).max(1.0) / freedom).sqrt();
             for ((i, unit), noise) in present.into_iter().zip(scatter.units).zip(&noise) {
                 units[i][j] = unit * fewer;
-                total[i][j] = shape.edof_of_log(scatter.factor.powi(2) * (noise + between[j].powi(2)));
+                total[i][j] =
+                    shape.edof_of_log(scatter.factor.powi(2) * (noise + between[j].powi(2)));
             }
         }
         let (origin, share_of_freedom) = (origins(replicates), share_of_freedom(estimator));
-        Self { within, between, edof, total, shapes: law.shapes.clone(), units, origin, share_of_freedom }
+        Self {
+            within,
+            between,
+            edof,
+            total,
+            shapes: law.shapes.clone(),
+            units,
+            origin,
+            share_of_freedom,
+        }
     }
 
     /// Draws nu*/nu of as many new replicates as there are, `[replicate][level]`: with the variances of ln nu that the
@@ -111,15 +150,28 @@ impl Spread {
         let of_replicate = |(scores, total): (Vec<f64>, &Vec<f64>)| {
             // The law whose logarithm has the observed variance: the skew of few degrees of freedom comes with it.
             let ratio = |((score, total), shape): ((f64, &f64), &Shape)| shape.ratio(score, *total);
-            scores.into_iter().zip(total).zip(&self.shapes).map(ratio).collect()
+            scores
+                .into_iter()
+                .zip(total)
+                .zip(&self.shapes)
+                .map(ratio)
+                .collect()
         };
         // The part of the variance of ln nu by which recordings differ, which the axes of a recording share.
         let part = |j: usize| {
             let (within, between) = (self.within[j].powi(2), self.between[j].powi(2));
-            if between > 0.0 { between / (within + between) } else { 0.0 }
+            if between > 0.0 {
+                between / (within + between)
+            } else {
+                0.0
+            }
         };
         let between: Vec<f64> = (0..self.between.len()).map(part).collect();
-        self.scores(&between, generator).into_iter().zip(&self.total).map(of_replicate).collect()
+        self.scores(&between, generator)
+            .into_iter()
+            .zip(&self.total)
+            .map(of_replicate)
+            .collect()
     }
 
     /// Ratio of the quantiles 0.975 of Student's law and the normal one, by which intervals are stretched
@@ -145,7 +197,8 @@ impl Spread {
             return 1.0;
         }
         let freedom = self.left_of(self.freedom(between));
-        let student = StudentsT::new(0.0, 1.0, freedom).map_or(NORMAL_975, |law| law.inverse_cdf(0.975));
+        let student =
+            StudentsT::new(0.0, 1.0, freedom).map_or(NORMAL_975, |law| law.inverse_cdf(0.975));
         student / NORMAL_975
     }
 
@@ -169,18 +222,38 @@ impl Spread {
             let scatter = own * own / (signals - 1.0) + common * common / (recordings - 1.0);
             (own + common).powi(2) / scatter
         };
-        median(&self.within.iter().zip(between).map(at_level).collect::<Vec<_>>())
+        median(
+            &self
+                .within
+                .iter()
+                .zip(between)
+                .map(at_level)
+                .collect::<Vec<_>>(),
+        )
     }
 
     fn recordings(&self) -> usize {
-        self.origin.iter().map(|origin| origin.recording + 1).max().unwrap_or(0)
+        self.origin
+            .iter()
+            .map(|origin| origin.recording + 1)
+            .max()
+            .unwrap_or(0)
     }
 
     /// Draws what ln nu of as many new replicates as there are differ by, beyond the scatter of each.
     pub(crate) fn draw_between(&self, generator: &mut Generator) -> Vec<Vec<f64>> {
         let all = vec![1.0; self.between.len()];
-        let scaled = |scores: Vec<f64>| scores.iter().zip(&self.between).map(|(z, b)| z * b).collect();
-        self.scores(&all, generator).into_iter().map(scaled).collect()
+        let scaled = |scores: Vec<f64>| {
+            scores
+                .iter()
+                .zip(&self.between)
+                .map(|(z, b)| z * b)
+                .collect()
+        };
+        self.scores(&all, generator)
+            .into_iter()
+            .map(scaled)
+            .collect()
     }
 
     /// Normal numbers of each new replicate with the replicates' correlations between levels. `between`: the part of
@@ -190,24 +263,39 @@ impl Spread {
         let mut normals = |count: usize| -> Vec<f64> {
             // Σ unit² is K − 1 over the replicates: weights of variance 1/(K − 1) make a sum of variance 1.
             let freedom = (count as f64 - 1.0).max(1.0);
-            (0..count).map(|_| generator.sample::<f64, _>(StandardNormal) / freedom.sqrt()).collect()
+            (0..count)
+                .map(|_| generator.sample::<f64, _>(StandardNormal) / freedom.sqrt())
+                .collect()
         };
         // One signal to a recording: what is the recording's and what is the signal's cannot be told apart,
         // and need not.
         let is_whole = recordings == signals || recordings < 2;
-        let of_recordings: Vec<Vec<f64>> =
-            (0..if is_whole { 0 } else { recordings }).map(|_| normals(recordings)).collect();
+        let of_recordings: Vec<Vec<f64>> = (0..if is_whole { 0 } else { recordings })
+            .map(|_| normals(recordings))
+            .collect();
         let of_replicate = |own: &Origin| {
             let weights = normals(signals);
-            let Some(common) = of_recordings.get(own.recording) else { return self.combined(&weights) };
+            let Some(common) = of_recordings.get(own.recording) else {
+                return self.combined(&weights);
+            };
             // the new axis takes the residuals of that axis, in the recordings that have it
             let weight = |origin: &Origin| {
-                if origin.position == own.position { common[origin.recording] } else { 0.0 }
+                if origin.position == own.position {
+                    common[origin.recording]
+                } else {
+                    0.0
+                }
             };
             let common: Vec<f64> = self.origin.iter().map(weight).collect();
-            let parts = self.combined(&weights).into_iter().zip(self.combined(&common)).zip(between);
+            let parts = self
+                .combined(&weights)
+                .into_iter()
+                .zip(self.combined(&common))
+                .zip(between);
             // Variances add up: the parts (1 − part) and part of a variance of 1.
-            parts.map(|((own, common), part)| (1.0 - part).sqrt() * own + part.sqrt() * common).collect()
+            parts
+                .map(|((own, common), part)| (1.0 - part).sqrt() * own + part.sqrt() * common)
+                .collect()
         };
         self.origin.iter().map(of_replicate).collect()
     }
@@ -216,26 +304,43 @@ impl Spread {
     fn combined(&self, weights: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; self.between.len()];
         for (weight, unit) in weights.iter().zip(&self.units) {
-            sum.iter_mut().zip(unit).for_each(|(sum, u)| *sum += weight * u);
+            sum.iter_mut()
+                .zip(unit)
+                .for_each(|(sum, u)| *sum += weight * u);
         }
         sum
     }
 }
 
-fn edof(replicate: &Replicate, estimator: Estimator, law: &SamplingLaw, tuning: &Tuning) -> Vec<f64> {
-    let (robust, classical) = (law.robust_edof(replicate.samples, tuning), law.edof(replicate.samples));
+fn edof(
+    replicate: &Replicate,
+    estimator: Estimator,
+    law: &SamplingLaw,
+    tuning: &Tuning,
+) -> Vec<f64> {
+    let (robust, classical) = (
+        law.robust_edof(replicate.samples, tuning),
+        law.edof(replicate.samples),
+    );
     // A short recording lacks the longest scales.
     let is_robust = |j: usize| j < replicate.levels() && replicate.is_robust(estimator, j);
     let pairs = robust.into_iter().zip(classical).enumerate();
     let whole = |(j, (robust, classical))| (j, if is_robust(j) { robust } else { classical });
-    pairs.map(whole).map(|(j, edof)| (edof * replicate.covered(j)).max(1.0)).collect()
+    pairs
+        .map(whole)
+        .map(|(j, edof)| (edof * replicate.covered(j)).max(1.0))
+        .collect()
 }
 
 /// The degrees of freedom of a variance over those of the plain one, K − 1. That of K Gaussian numbers of which the
 /// distant are clipped scatters as a chi-square of 0.87 (K − 1) degrees does (Satterthwaite's rule; 0.78 to 0.96 for K =
 /// 5 … 24).
 pub(super) const fn share_of_freedom(estimator: Estimator) -> f64 {
-    if matches!(estimator, Estimator::DrAwv) { 0.87 } else { 1.0 }
+    if matches!(estimator, Estimator::DrAwv) {
+        0.87
+    } else {
+        1.0
+    }
 }
 
 /// Factor that makes the clipped variance of K Gaussian numbers unbiased: 1.075 for K = 8.
@@ -248,8 +353,15 @@ pub(super) fn small_sample(count: usize) -> f64 {
 pub(crate) fn mean_square(logs: &[f64], noise: &[f64], estimator: Estimator) -> f64 {
     let weights: Vec<f64> = noise.iter().map(|n| 1.0 / n).collect();
     let clipped = estimator == Estimator::DrAwv;
-    let correction = if clipped { small_sample(logs.len()) } else { 1.0 };
-    let squares: f64 = residuals(logs, &weights, clipped).iter().map(|z| z * z).sum();
+    let correction = if clipped {
+        small_sample(logs.len())
+    } else {
+        1.0
+    };
+    let squares: f64 = residuals(logs, &weights, clipped)
+        .iter()
+        .map(|z| z * z)
+        .sum();
     correction * squares / (logs.len() as f64 - 1.0)
 }
 
@@ -273,41 +385,69 @@ impl Scatter {
         let lowest = logs.iter().copied().fold(f64::INFINITY, f64::min);
         let range = logs.iter().copied().fold(lowest, f64::max) - lowest;
         if freedom < 1.0 || !range.is_finite() {
-            return Self { between: 0.0, units: vec![0.0; logs.len()], factor: 0.0 };
+            return Self {
+                between: 0.0,
+                units: vec![0.0; logs.len()],
+                factor: 0.0,
+            };
         }
         let clipped = estimator == Estimator::DrAwv;
-        let correction = if clipped { small_sample(logs.len()) } else { 1.0 };
+        let correction = if clipped {
+            small_sample(logs.len())
+        } else {
+            1.0
+        };
         let weighted = |between: f64| {
-            let weights: Vec<f64> = noise.iter().map(|n| 1.0 / (n + between * between)).collect();
+            let weights: Vec<f64> = noise
+                .iter()
+                .map(|n| 1.0 / (n + between * between))
+                .collect();
             let residuals = residuals(logs, &weights, clipped);
             let length = (residuals.iter().map(|z| z * z).sum::<f64>() / freedom).sqrt();
             (residuals, length)
         };
         // At twice the range each residual is below ½, so their mean square is below 1: the root lies before
         // it.
-        let low = falling_root(|between| weighted(between).1 * correction.sqrt() - 1.0, 2.0 * range);
+        let low = falling_root(
+            |between| weighted(between).1 * correction.sqrt() - 1.0,
+            2.0 * range,
+        );
         let (mut units, length) = weighted(low);
         if length > 0.0 {
             units.iter_mut().for_each(|z| *z /= length);
         }
-        Self { between: low, units, factor: length * correction.sqrt() }
+        Self {
+            between: low,
+            units,
+            factor: length * correction.sqrt(),
+        }
     }
 }
 
 /// Residuals from the weighted mean in standard deviations (weights: 1/variance); clipped ones are those from the
 /// weighted median, within [`CLIP`] deviations by their median, about their own weighted mean.
 fn residuals(values: &[f64], weights: &[f64], is_clipped: bool) -> Vec<f64> {
-    let kept = if is_clipped { clipped(values, weights) } else { values.to_vec() };
+    let kept = if is_clipped {
+        clipped(values, weights)
+    } else {
+        values.to_vec()
+    };
     let sum: f64 = kept.iter().zip(weights).map(|(x, w)| x * w).sum();
     let mean = sum / weights.iter().sum::<f64>();
-    kept.iter().zip(weights).map(|(x, w)| (x - mean) * w.sqrt()).collect()
+    kept.iter()
+        .zip(weights)
+        .map(|(x, w)| (x - mean) * w.sqrt())
+        .collect()
 }
 
 /// The values within [`CLIP`] deviations of their weighted median, those beyond at the ends.
 pub(super) fn clipped(values: &[f64], weights: &[f64]) -> Vec<f64> {
     let centre = weighted_median(values, weights);
-    let distances: Vec<f64> =
-        values.iter().zip(weights).map(|(x, w)| (x - centre).abs() * w.sqrt()).collect();
+    let distances: Vec<f64> = values
+        .iter()
+        .zip(weights)
+        .map(|(x, w)| (x - centre).abs() * w.sqrt())
+        .collect();
     // Distances are in the standard deviations of each replicate: a short recording scatters more and is
     // not clipped for that.
     let most = CLIP * MAD_TO_DEVIATION * median(&distances);
@@ -320,7 +460,11 @@ pub(super) fn clipped(values: &[f64], weights: &[f64]) -> Vec<f64> {
 
 /// The value below which half of the weight lies; the mean of two where it lies between them.
 fn weighted_median(values: &[f64], weights: &[f64]) -> f64 {
-    let mut pairs: Vec<(f64, f64)> = values.iter().copied().zip(weights.iter().copied()).collect();
+    let mut pairs: Vec<(f64, f64)> = values
+        .iter()
+        .copied()
+        .zip(weights.iter().copied())
+        .collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
     let half = 0.5 * weights.iter().sum::<f64>();
     let mut below = 0.0;
@@ -330,7 +474,9 @@ fn weighted_median(values: &[f64], weights: &[f64]) -> f64 {
             return *value;
         }
         if below > half * (1.0 - 1e-9) {
-            return pairs.get(i + 1).map_or(*value, |next| 0.5 * (value + next.0));
+            return pairs
+                .get(i + 1)
+                .map_or(*value, |next| 0.5 * (value + next.0));
         }
     }
     pairs.last().map_or(f64::NAN, |last| last.0)

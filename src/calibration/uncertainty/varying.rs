@@ -36,14 +36,29 @@ pub(crate) fn parameter_spreads(
     if group.recordings() < LEAST {
         return Vec::new();
     }
-    let single = SingleFits { outcome, settings, bootstrap, group: &group.scope.name() };
-    let fits: Vec<Option<Fit>> = group.replicates.par_iter().map(|r| single.fitted(r)).collect();
-    let Some(fits) = fits.into_iter().collect::<Option<Vec<Fit>>>() else { return Vec::new() };
+    let single = SingleFits {
+        outcome,
+        settings,
+        bootstrap,
+        group: &group.scope.name(),
+    };
+    let fits: Vec<Option<Fit>> = group
+        .replicates
+        .par_iter()
+        .map(|r| single.fitted(r))
+        .collect();
+    let Some(fits) = fits.into_iter().collect::<Option<Vec<Fit>>>() else {
+        return Vec::new();
+    };
     let mut drawn = BTreeMap::new();
     for replicate in &group.replicates {
-        drawn.entry(replicate.samples).or_insert_with(|| single.drawn(replicate));
+        drawn
+            .entry(replicate.samples)
+            .or_insert_with(|| single.drawn(replicate));
     }
-    let told = intervals.iter().filter(|i| i.absent.is_none() && i.of.parameter != Parameter::Theta);
+    let told = intervals
+        .iter()
+        .filter(|i| i.absent.is_none() && i.of.parameter != Parameter::Theta);
     let spread = |interval: &ParameterInterval| {
         let of = interval.of;
         let values = single.scaled(&fits, of);
@@ -70,9 +85,13 @@ impl SingleFits<'_> {
     /// The model of a replicate alone.
     fn fitted(&self, replicate: &Replicate) -> Option<Fit> {
         let settings = self.settings;
-        let mut curve =
-            average(std::slice::from_ref(replicate), self.outcome.estimator, settings.trim, &settings.tuning)
-                .ok()?;
+        let mut curve = average(
+            std::slice::from_ref(replicate),
+            self.outcome.estimator,
+            settings.trim,
+            &settings.tuning,
+        )
+        .ok()?;
         // Scales that are no part of the fit to all are no part of it either.
         curve.classical.clone_from(&self.outcome.curve.classical);
         curve.ignored.clone_from(&self.outcome.curve.ignored);
@@ -81,7 +100,12 @@ impl SingleFits<'_> {
 
     /// The models of as many curves as the bootstrap draws, of replicates as long of the model fitted to all.
     fn drawn(&self, replicate: &Replicate) -> Vec<Fit> {
-        let Outcome { estimator, curve, fit, .. } = self.outcome;
+        let Outcome {
+            estimator,
+            curve,
+            fit,
+            ..
+        } = self.outcome;
         let alone = std::slice::from_ref(replicate);
         let sampler = CurveSampler::new(alone, *estimator, curve, &fit.composite, self.settings);
         let draw = |run: usize| {
@@ -96,7 +120,10 @@ impl SingleFits<'_> {
             curve.differing = 0.0;
             self.outcome.estimate_again(&curve, self.settings).ok()
         };
-        (0..self.bootstrap.draws).into_par_iter().filter_map(draw).collect()
+        (0..self.bootstrap.draws)
+            .into_par_iter()
+            .filter_map(draw)
+            .collect()
     }
 
     /// A parameter of fits, scaled; none where its process is not there.
@@ -104,7 +131,11 @@ impl SingleFits<'_> {
         let of_fit = |fit: &Fit| {
             let processes = matched(&self.outcome.fit, &self.outcome.spec, fit);
             let process: &Process = processes[of.process]?;
-            let at = process.kind().parameters().iter().position(|p| *p == of.parameter)?;
+            let at = process
+                .kind()
+                .parameters()
+                .iter()
+                .position(|p| *p == of.parameter)?;
             Some(of.parameter.scaled(process.values()[at])).filter(|scaled| scaled.is_finite())
         };
         fits.iter().map(of_fit).collect()
@@ -142,8 +173,16 @@ struct OfAxis {
 impl OfAxis {
     /// Values (clipped, if asked for) and weights where recordings differ by this variance.
     fn weighted(&self, between: f64, is_clipped: bool) -> (Vec<f64>, Vec<f64>) {
-        let weights: Vec<f64> = self.noise.iter().map(|noise| 1.0 / (noise + between)).collect();
-        let values = if is_clipped { clipped(&self.values, &weights) } else { self.values.clone() };
+        let weights: Vec<f64> = self
+            .noise
+            .iter()
+            .map(|noise| 1.0 / (noise + between))
+            .collect();
+        let values = if is_clipped {
+            clipped(&self.values, &weights)
+        } else {
+            self.values.clone()
+        };
         (values, weights)
     }
 
@@ -151,8 +190,16 @@ impl OfAxis {
     fn residuals(&self, between: f64, is_clipped: bool) -> Vec<f64> {
         let (values, weights) = self.weighted(between, is_clipped);
         let mean = weighted_mean(&values, &weights);
-        let correction = if is_clipped { small_sample(values.len()).sqrt() } else { 1.0 };
-        values.iter().zip(weights).map(|(x, w)| correction * (x - mean) * w.sqrt()).collect()
+        let correction = if is_clipped {
+            small_sample(values.len()).sqrt()
+        } else {
+            1.0
+        };
+        values
+            .iter()
+            .zip(weights)
+            .map(|(x, w)| correction * (x - mean) * w.sqrt())
+            .collect()
     }
 }
 
@@ -162,7 +209,12 @@ fn weighted_mean(values: &[f64], weights: &[f64]) -> f64 {
 }
 
 impl Differences {
-    fn new(replicates: &[Replicate], values: Vec<f64>, noise: Vec<f64>, estimator: Estimator) -> Self {
+    fn new(
+        replicates: &[Replicate],
+        values: Vec<f64>,
+        noise: Vec<f64>,
+        estimator: Estimator,
+    ) -> Self {
         let origins = origins(replicates);
         let count = origins.iter().map(|o| o.position + 1).max().unwrap_or(0);
         let mut axes: Vec<OfAxis> = (0..count).map(|_| OfAxis::default()).collect();
@@ -183,23 +235,34 @@ impl Differences {
     /// Q where recordings differ by this standard deviation.
     fn square(&self, between: f64) -> f64 {
         let of_axis = |axis: &OfAxis| -> f64 {
-            axis.residuals(between * between, self.is_clipped).iter().map(|z| z * z).sum()
+            axis.residuals(between * between, self.is_clipped)
+                .iter()
+                .map(|z| z * z)
+                .sum()
         };
         self.axes.iter().map(of_axis).sum()
     }
 
     /// The law of the parameter; none where it may be without spread.
     fn spread(&self, of: ParameterRef) -> Option<ParameterSpread> {
-        let residuals = self.axes.iter().map(|axis| axis.values.len() - 1).sum::<usize>() as f64;
+        let residuals = self
+            .axes
+            .iter()
+            .map(|axis| axis.values.len() - 1)
+            .sum::<usize>() as f64;
         if residuals < (LEAST - 1) as f64 {
             return None;
         }
-        let root = |target: f64| falling_root(|between| self.square(between) - target, self.range());
+        let root =
+            |target: f64| falling_root(|between| self.square(between) - target, self.range());
         let sd = root(residuals);
         let squared_correlation = self.squared_correlation(sd);
         let others = self.axes.len() as f64 - 1.0;
         let freedom = self.share_of_freedom * residuals / (1.0 + others * squared_correlation);
-        let (chi, student) = (ChiSquared::new(freedom).ok()?, StudentsT::new(0.0, 1.0, freedom).ok()?);
+        let (chi, student) = (
+            ChiSquared::new(freedom).ok()?,
+            StudentsT::new(0.0, 1.0, freedom).ok()?,
+        );
         let end = |p: f64| root(chi.inverse_cdf(p) * residuals / freedom);
         let sd_ci95 = [end(1.0 - TAIL), end(TAIL)];
         if sd_ci95[0] <= 0.0 {
@@ -216,30 +279,49 @@ impl Differences {
         let half = student.inverse_cdf(1.0 - TAIL) * (shared / weights.iter().sum::<f64>()).sqrt();
         let mut median_ci95 = [mean - half, mean + half].map(|end| of.parameter.unscaled(end));
         median_ci95.sort_by(f64::total_cmp);
-        Some(ParameterSpread { of, median: of.parameter.unscaled(mean), median_ci95, sd, sd_ci95 })
+        Some(ParameterSpread {
+            of,
+            median: of.parameter.unscaled(mean),
+            median_ci95,
+            sd,
+            sd_ci95,
+        })
     }
 
     /// A standard deviation that no root exceeds: with it Q is below the least quantile that is asked for.
     fn range(&self) -> f64 {
         let all = || self.axes.iter().flat_map(|axis| &axis.values);
-        let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+            (l.min(*x), h.max(*x))
+        });
         // Q ≤ n (range/between)²; the quantile 0.025 of one degree of freedom is 1e-3.
         (high - low) * (1e3 * all().count() as f64).sqrt()
     }
 
     /// Mean square of the correlations of the axes over the recordings.
     fn squared_correlation(&self, between: f64) -> f64 {
-        let residuals: Vec<Vec<f64>> =
-            self.axes.iter().map(|axis| axis.residuals(between * between, self.is_clipped)).collect();
+        let residuals: Vec<Vec<f64>> = self
+            .axes
+            .iter()
+            .map(|axis| axis.residuals(between * between, self.is_clipped))
+            .collect();
         let mut squares = Vec::new();
         for a in 0..self.axes.len() {
             for b in 0..a {
-                let pairs = self.axes[a].recordings.iter().zip(&residuals[a]).filter_map(|(recording, x)| {
-                    let at = self.axes[b].recordings.iter().position(|other| other == recording)?;
-                    Some((*x, residuals[b][at]))
+                let pairs = self.axes[a]
+                    .recordings
+                    .iter()
+                    .zip(&residuals[a])
+                    .filter_map(|(recording, x)| {
+                        let at = self.axes[b]
+                            .recordings
+                            .iter()
+                            .position(|other| other == recording)?;
+                        Some((*x, residuals[b][at]))
+                    });
+                let (xy, xx, yy) = pairs.fold((0.0, 0.0, 0.0), |(xy, xx, yy), (x, y)| {
+                    (xy + x * y, xx + x * x, yy + y * y)
                 });
-                let (xy, xx, yy) =
-                    pairs.fold((0.0, 0.0, 0.0), |(xy, xx, yy), (x, y)| (xy + x * y, xx + x * x, yy + y * y));
                 squares.push(if xy == 0.0 { 0.0 } else { xy * xy / (xx * yy) });
             }
         }

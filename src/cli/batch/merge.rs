@@ -32,18 +32,30 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let states = crate::compare::states(&args.states)?;
     let planned = args.place.planned(session.asked_seed())?;
-    let options = MergeOptions { states, threads: session.threads() };
-    let merged = study::merge(&planned, &options, &Watch::new(session, || true)).map_err(|e| match e {
-        StudyError::Incomplete { units, missing } => {
-            list_missing(&planned, units, &missing, session);
-            incomplete(&planned, units, &missing)
-        }
-        e => e.into(),
-    })?;
+    let options = MergeOptions {
+        states,
+        threads: session.threads(),
+    };
+    let merged =
+        study::merge(&planned, &options, &Watch::new(session, || true)).map_err(|e| match e {
+            StudyError::Incomplete { units, missing } => {
+                list_missing(&planned, units, &missing, session);
+                incomplete(&planned, units, &missing)
+            }
+            e => e.into(),
+        })?;
     let document = &merged.document;
-    let text = || if session.verbose() { document.verbose(WIDTH) } else { document.terminal(WIDTH) };
+    let text = || {
+        if session.verbose() {
+            document.verbose(WIDTH)
+        } else {
+            document.terminal(WIDTH)
+        }
+    };
     session.show(|| merged.summary.to_string(), text);
-    document.spoken(session.verbose()).for_each(|note| session.say(&note.text));
+    document
+        .spoken(session.verbose())
+        .for_each(|note| session.say(&note.text));
     session.wrote(&merged.results);
     if merged.diverged == 0 {
         return Ok(());
@@ -74,10 +86,16 @@ fn list_missing(planned: &Planned, units: usize, missing: &[NamedUnit], session:
 
 fn incomplete(planned: &Planned, units: usize, missing: &[NamedUnit]) -> Failure {
     const NAMED: usize = 6;
-    let mut cells: Vec<String> =
-        missing.iter().map(|(unit, _)| planned.grid.short_name(planned.grid.cell(unit.cell))).collect();
+    let mut cells: Vec<String> = missing
+        .iter()
+        .map(|(unit, _)| planned.grid.short_name(planned.grid.cell(unit.cell)))
+        .collect();
     cells.dedup();
-    let more = if cells.len() > NAMED { format!(" and {} more", cells.len() - NAMED) } else { String::new() };
+    let more = if cells.len() > NAMED {
+        format!(" and {} more", cells.len() - NAMED)
+    } else {
+        String::new()
+    };
     cells.truncate(NAMED);
     let message = format!(
         "{} of {units} units are missing or damaged, of the cells {}{more}",

@@ -34,9 +34,18 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         seed: &|of_study| session.seed(of_study),
         threads: session.threads(),
         clock: Some(&|| start.elapsed().as_secs_f64()),
-        writing: if args.dry_run { Writing::DryRun } else { Writing::Write },
+        writing: if args.dry_run {
+            Writing::DryRun
+        } else {
+            Writing::Write
+        },
     };
-    let made = study::plan(&args.place.study, &directory, &options, &Watch::new(session, || true))?;
+    let made = study::plan(
+        &args.place.study,
+        &directory,
+        &options,
+        &Watch::new(session, || true),
+    )?;
     report(&made.planned, session);
     if made.was_there {
         session.say(format!("{} was planned already", directory.display()));
@@ -51,7 +60,11 @@ fn report(planned: &Planned, session: &Session) {
     let units = plan.unit_count(grid);
     let total_s = planned.processor_s();
     let wall_s = total_s / plan.estimate.threads.max(1) as f64;
-    let runs = if plan.study.is_sampled() { plan.study.runs } else { 0 };
+    let runs = if plan.study.is_sampled() {
+        plan.study.runs
+    } else {
+        0
+    };
     if session.json() {
         let json = json!({
             "schema_version": 1, "plan": plan.id(), "seed": plan.seed, "cells": grid.len(),
@@ -64,7 +77,10 @@ fn report(planned: &Planned, session: &Session) {
     }
     let seed = plan.seed;
     let (work, cut) = match plan.study.is_sampled() {
-        true => (format!("× {runs} runs"), format!(" of {} runs", range(&plan.unit_runs))),
+        true => (
+            format!("× {runs} runs"),
+            format!(" of {} runs", range(&plan.unit_runs)),
+        ),
         false => ("by covariance analysis".to_owned(), String::new()),
     };
     session.result(format!(

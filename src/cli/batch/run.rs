@@ -47,8 +47,11 @@ pub(super) fn time(text: &str) -> Result<Duration, String> {
         Some((i, 'h')) => (&text[..i], 3600.0),
         _ => (text, 1.0),
     };
-    let seconds =
-        number.parse::<f64>().ok().map(|x| x * unit).and_then(|s| Duration::try_from_secs_f64(s).ok());
+    let seconds = number
+        .parse::<f64>()
+        .ok()
+        .map(|x| x * unit)
+        .and_then(|s| Duration::try_from_secs_f64(s).ok());
     seconds.ok_or_else(|| "expected a time such as 3000, 50m or 1.5h".to_owned())
 }
 
@@ -70,24 +73,32 @@ impl Stop {
             Ok(flag)
         };
         let deadline = limit.and_then(|limit| Instant::now().checked_add(limit));
-        Ok(Self { terminated: flag(SIGTERM)?, interrupted: flag(SIGINT)?, deadline })
+        Ok(Self {
+            terminated: flag(SIGTERM)?,
+            interrupted: flag(SIGINT)?,
+            deadline,
+        })
     }
 
     fn go_on(&self) -> bool {
-        let signal = self.terminated.load(Ordering::Relaxed) || self.interrupted.load(Ordering::Relaxed);
+        let signal =
+            self.terminated.load(Ordering::Relaxed) || self.interrupted.load(Ordering::Relaxed);
         !signal && self.deadline.is_none_or(|d| Instant::now() < d)
     }
 
     fn failure(&self, left: usize, finished: usize) -> Option<Failure> {
         let why = if self.interrupted.load(Ordering::Relaxed) {
-            return Some(Failure::interrupted(format!("interrupted; {left} units left")));
+            return Some(Failure::interrupted(format!(
+                "interrupted; {left} units left"
+            )));
         } else if self.terminated.load(Ordering::Relaxed) {
             "SIGTERM"
         } else if self.go_on() {
             return None;
         } else if finished == 0 {
             // the same command would end the same way: no code for "to be resumed"
-            let message = format!("the time limit is too short for a single unit; {left} units left");
+            let message =
+                format!("the time limit is too short for a single unit; {left} units left");
             let hint = "a longer --time-limit, or a study with fewer unit_runs";
             return Some(Failure::could_not(message).hint(hint));
         } else {
@@ -105,7 +116,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let (shard, from) = shard::find(args.shard, args.shards, &variable)?;
     let (index, count) = shard.parts();
     session.say(format!("shard {index}/{count} ({from})"));
-    let options = RunOptions { shard, threads: session.threads() };
+    let options = RunOptions {
+        shard,
+        threads: session.threads(),
+    };
     let ran = study::run(&planned, &options, &Watch::new(session, || stop.go_on()))?;
     match (ran.left, stop.failure(ran.left, ran.finished)) {
         (1.., Some(failure)) => Err(failure),
@@ -128,6 +142,10 @@ mod tests {
     fn times_are_understood() {
         let seconds = ["90", "90s", "1.5m", "2h"].map(|t| time(t).unwrap().as_secs());
         assert_eq!(seconds, [90, 90, 90, 7200]);
-        assert!(["", "m", "-1", "1d", "nan"].iter().all(|t| time(t).is_err()));
+        assert!(
+            ["", "m", "-1", "1d", "nan"]
+                .iter()
+                .all(|t| time(t).is_err())
+        );
     }
 }

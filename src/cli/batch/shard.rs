@@ -5,7 +5,9 @@ use crate::study::Shard;
 
 /// `i/n`, i from 0.
 pub(super) fn parse(text: &str) -> Result<Shard, String> {
-    let numbers = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+    let numbers = text
+        .split_once('/')
+        .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
     let shard = numbers.and_then(|(index, count)| Shard::new(index, count));
     shard.ok_or_else(|| "expected i/n with i from 0 to n − 1, such as 0/4".to_owned())
 }
@@ -15,7 +17,11 @@ const SCHEDULERS: [(&str, Option<[&str; 3]>); 4] = [
     ("HQ_TASK_ID", None),
     (
         "SLURM_ARRAY_TASK_ID",
-        Some(["SLURM_ARRAY_TASK_MIN", "SLURM_ARRAY_TASK_STEP", "SLURM_ARRAY_TASK_COUNT"]),
+        Some([
+            "SLURM_ARRAY_TASK_MIN",
+            "SLURM_ARRAY_TASK_STEP",
+            "SLURM_ARRAY_TASK_COUNT",
+        ]),
     ),
     ("PBS_ARRAY_INDEX", None),
     ("JOB_COMPLETION_INDEX", None),
@@ -31,19 +37,24 @@ pub(super) fn find(
     if let Some(shard) = flag {
         return Ok((shard, "--shard".to_owned()));
     }
-    let set = SCHEDULERS.iter().find_map(|(name, more)| Some((*name, *more, variable(name)?)));
+    let set = SCHEDULERS
+        .iter()
+        .find_map(|(name, more)| Some((*name, *more, variable(name)?)));
     let Some((name, more, text)) = set else {
         return match shards {
             None | Some(1) => Ok((Shard::ALL, "no scheduler".to_owned())),
             Some(n) => {
-                let failure =
-                    Failure::input(format!("--shards {n}: no scheduler says which of them this is"));
+                let failure = Failure::input(format!(
+                    "--shards {n}: no scheduler says which of them this is"
+                ));
                 Err(failure.hint("give --shard i/n"))
             }
         };
     };
     let number = |name: &str, text: &str| {
-        text.trim().parse::<u64>().map_err(|_| Failure::input(format!("{name}={text} is not a number")))
+        text.trim()
+            .parse::<u64>()
+            .map_err(|_| Failure::input(format!("{name}={text} is not a number")))
     };
     let number_of = |name: &str| variable(name).map(|text| number(name, &text)).transpose();
     // With --shards, tasks count from 0 whatever part of an array was submitted; without, the array says.
@@ -52,16 +63,23 @@ pub(super) fn find(
         None => [None; 3],
     };
     let id = number(name, &text)?;
-    let index = id.checked_sub(first.unwrap_or(0)).map(|i| i / step.unwrap_or(1).max(1));
+    let index = id
+        .checked_sub(first.unwrap_or(0))
+        .map(|i| i / step.unwrap_or(1).max(1));
     let Some(count) = shards.or(count) else {
-        let failure = Failure::input(format!("{name}={id} says which shard this is, but not of how many"));
+        let failure = Failure::input(format!(
+            "{name}={id} says which shard this is, but not of how many"
+        ));
         return Err(failure.hint("add --shards n (indices from 0 to n − 1)"));
     };
     match index.and_then(|index| Shard::new(index, count)) {
         Some(shard) => Ok((shard, format!("{name}={id}"))),
         None => {
             let failure = Failure::input(format!("{name}={id} is not one of {count} shards"));
-            Err(failure.hint(format!("number the tasks from 0 to {}", count.saturating_sub(1))))
+            Err(failure.hint(format!(
+                "number the tasks from 0 to {}",
+                count.saturating_sub(1)
+            )))
         }
     }
 }
@@ -88,18 +106,33 @@ mod tests {
     fn schedulers_are_understood() {
         let ok = |r: Result<(u64, u64, String), String>| r.unwrap();
         assert_eq!(ok(found(None, None, &[])), (0, 1, "no scheduler".into()));
-        assert_eq!(ok(found(Some("2/3"), None, &[("HQ_TASK_ID", "7")])), (2, 3, "--shard".into()));
-        assert_eq!(ok(found(None, Some(8), &[("HQ_TASK_ID", "7")])), (7, 8, "HQ_TASK_ID=7".into()));
+        assert_eq!(
+            ok(found(Some("2/3"), None, &[("HQ_TASK_ID", "7")])),
+            (2, 3, "--shard".into())
+        );
+        assert_eq!(
+            ok(found(None, Some(8), &[("HQ_TASK_ID", "7")])),
+            (7, 8, "HQ_TASK_ID=7".into())
+        );
         let slurm = [
             ("SLURM_ARRAY_TASK_ID", "14"),
             ("SLURM_ARRAY_TASK_MIN", "10"),
             ("SLURM_ARRAY_TASK_STEP", "2"),
             ("SLURM_ARRAY_TASK_COUNT", "4"),
         ];
-        assert_eq!(ok(found(None, None, &slurm)), (2, 4, "SLURM_ARRAY_TASK_ID=14".into()));
-        assert_eq!(ok(found(None, Some(20), &slurm)), (14, 20, "SLURM_ARRAY_TASK_ID=14".into()));
+        assert_eq!(
+            ok(found(None, None, &slurm)),
+            (2, 4, "SLURM_ARRAY_TASK_ID=14".into())
+        );
+        assert_eq!(
+            ok(found(None, Some(20), &slurm)),
+            (14, 20, "SLURM_ARRAY_TASK_ID=14".into())
+        );
         assert_eq!(ok(found(None, Some(5), &[("PBS_ARRAY_INDEX", "0")])).0, 0);
-        assert_eq!(ok(found(None, Some(5), &[("JOB_COMPLETION_INDEX", "4")])).0, 4);
+        assert_eq!(
+            ok(found(None, Some(5), &[("JOB_COMPLETION_INDEX", "4")])).0,
+            4
+        );
     }
 
     #[test]
@@ -107,7 +140,9 @@ mod tests {
         assert!(parse("3/3").is_err() && parse("1").is_err() && parse("-1/2").is_err());
         let error = |r: Result<(u64, u64, String), String>| r.unwrap_err();
         assert!(error(found(None, None, &[("HQ_TASK_ID", "7")])).contains("not of how many"));
-        assert!(error(found(None, Some(7), &[("HQ_TASK_ID", "7")])).contains("is not one of 7 shards"));
+        assert!(
+            error(found(None, Some(7), &[("HQ_TASK_ID", "7")])).contains("is not one of 7 shards")
+        );
         assert!(
             error(found(None, Some(7), &[("PBS_ARRAY_INDEX", "x")]))
                 .contains("PBS_ARRAY_INDEX=x is not a number")

@@ -36,8 +36,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Ok(());
     }
     if status.damaged > 0 {
-        session
-            .warn(format!("damaged unit files: {}; `nav-sim batch run` computes them again", status.damaged));
+        session.warn(format!(
+            "damaged unit files: {}; `nav-sim batch run` computes them again",
+            status.damaged
+        ));
     }
     session.result(format!(
         "{} of {} units done, {} of {} cells complete; about {} left on {} threads",

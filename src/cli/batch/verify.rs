@@ -29,7 +29,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     // --seed draws the units here
     let planned = args.place.planned(None)?;
     let units = usize::try_from(args.units).unwrap_or(usize::MAX);
-    let options = VerifyOptions { units, seed: session.seed(None) };
+    let options = VerifyOptions {
+        units,
+        seed: session.seed(None),
+    };
     let found = study::verify(&planned, &options, &Watch::new(session, || true))?;
     if session.json() {
         let json = json!({
@@ -51,7 +54,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         0 => None,
         n => Some(format!("{n} units {what}: {}", units.join("; "))),
     };
-    let lines = [listed("are damaged", &found.damaged), listed("differ", &found.different)];
+    let lines = [
+        listed("are damaged", &found.damaged),
+        listed("differ", &found.different),
+    ];
     let failure = Failure::bound(lines.into_iter().flatten().collect::<Vec<_>>().join("\n"));
     Err(failure.hint(if found.different.is_empty() {
         "`nav-sim batch run` computes them again"

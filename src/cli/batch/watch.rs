@@ -15,7 +15,11 @@ pub(super) struct Watch<'a, F: Fn() -> bool + Sync> {
 impl<'a, F: Fn() -> bool + Sync> Watch<'a, F> {
     /// Of work that goes on as long as `go_on` says so.
     pub(super) const fn new(session: &'a Session, go_on: F) -> Self {
-        Self { session, go_on, progress: OnceLock::new() }
+        Self {
+            session,
+            go_on,
+            progress: OnceLock::new(),
+        }
     }
 }
 

@@ -35,12 +35,17 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let words = Words::new(session);
-    let request = RunRequest { seed: session.asked_seed(), ..args.request.clone() };
+    let request = RunRequest {
+        seed: session.asked_seed(),
+        ..args.request.clone()
+    };
     let mut prepared = request.prepare(|| session.seed(None), &words)?;
     prepared.manifest.command = super::given();
     prepared.manifest.threads = session.threads();
     let _own = output::claim(&args.out, &prepared.manifest, session)?;
-    let _picture = args.plot.claim(prepared.manifest.inputs.iter().map(|i| &i.path), session)?;
+    let _picture = args
+        .plot
+        .claim(prepared.manifest.inputs.iter().map(|i| &i.path), session)?;
     let mut answer = prepared.navigate(&words)?;
     answer.took(words.runs_s());
     answer.write(&args.out)?;

@@ -12,8 +12,15 @@ pub(super) fn claim(path: &Path, manifest: &Manifest, session: &Session) -> Resu
     let inputs = manifest.inputs.iter().map(|i| Path::new(&i.path));
     let first_seed = Cell::new(None);
     let recognise = |text: &str| {
-        let Ok(present) = serde_json::from_str::<Manifest>(text) else { return Ok(Found::Foreign) };
-        first_seed.set(manifest.differs_in_seed(&present).then_some(present.seed).flatten());
+        let Ok(present) = serde_json::from_str::<Manifest>(text) else {
+            return Ok(Found::Foreign);
+        };
+        first_seed.set(
+            manifest
+                .differs_in_seed(&present)
+                .then_some(present.seed)
+                .flatten(),
+        );
         Ok(Found::result(manifest.is_same_run(&present)))
     };
     let claimed = claim_directory(path, &RUN_FILES, inputs, session.existing(), recognise);

@@ -15,7 +15,11 @@ pub(in crate::cli) struct Words<'a> {
 
 impl<'a> Words<'a> {
     pub(in crate::cli) const fn new(session: &'a Session) -> Self {
-        Self { session, runs: Mutex::new(None), runs_s: Mutex::new(0.0) }
+        Self {
+            session,
+            runs: Mutex::new(None),
+            runs_s: Mutex::new(0.0),
+        }
     }
 
     /// How long the runs took (s).
@@ -26,12 +30,15 @@ impl<'a> Words<'a> {
 
 impl Observer<Note> for Words<'_> {
     fn remark(&self, note: &Note) {
-        note.said().iter().for_each(|said| self.session.printer.note(said));
+        note.said()
+            .iter()
+            .for_each(|said| self.session.printer.note(said));
     }
 
     fn begin(&self, runs: u64) {
         let progress = self.session.progress("runs", runs);
-        *self.runs.lock().unwrap_or_else(PoisonError::into_inner) = Some((progress, Instant::now()));
+        *self.runs.lock().unwrap_or_else(PoisonError::into_inner) =
+            Some((progress, Instant::now()));
     }
 
     fn advance(&self, runs: u64) {
@@ -40,8 +47,14 @@ impl Observer<Note> for Words<'_> {
     }
 
     fn end(&self) {
-        if let Some((_, start)) = self.runs.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            *self.runs_s.lock().unwrap_or_else(PoisonError::into_inner) = start.elapsed().as_secs_f64();
+        if let Some((_, start)) = self
+            .runs
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take()
+        {
+            *self.runs_s.lock().unwrap_or_else(PoisonError::into_inner) =
+                start.elapsed().as_secs_f64();
         }
     }
 }

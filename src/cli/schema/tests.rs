@@ -3,7 +3,8 @@
 use super::{Kind, schema};
 use crate::efficiency;
 use crate::formats::{
-    FileError, contamination_file, fusion_files, model_file, parameters_file, scenario_file, trajectory_file,
+    FileError, contamination_file, fusion_files, model_file, parameters_file, scenario_file,
+    trajectory_file,
 };
 use crate::study;
 use serde_json::Value;
@@ -225,14 +226,31 @@ const SAMPLES: [Sample; 11] = [
             "profile_c.1.0",
         ],
     },
-    Sample { kind: Kind::Model, text: ANY_PROCESS, loose: &["rate_hz"] },
+    Sample {
+        kind: Kind::Model,
+        text: ANY_PROCESS,
+        loose: &["rate_hz"],
+    },
     Sample {
         kind: Kind::Study,
         text: STUDY,
-        loose: &["every_s", "periodic.duration_s", "sweep.start_s", "sweep.duration_s"],
+        loose: &[
+            "every_s",
+            "periodic.duration_s",
+            "sweep.start_s",
+            "sweep.duration_s",
+        ],
     },
-    Sample { kind: Kind::Efficiency, text: EFFICIENCY, loose: &["samples", "levels"] },
-    Sample { kind: Kind::Initial, text: INITIAL, loose: &[] },
+    Sample {
+        kind: Kind::Efficiency,
+        text: EFFICIENCY,
+        loose: &["samples", "levels"],
+    },
+    Sample {
+        kind: Kind::Initial,
+        text: INITIAL,
+        loose: &[],
+    },
     Sample {
         kind: Kind::Parameters,
         text: "[WN]\nsigma2 = { fix = 0.5 }\n[gyro.AR1_2]\nphi = { fix = 0.5 }\n",
@@ -248,9 +266,21 @@ const SAMPLES: [Sample; 11] = [
         text: "[MA1]\ntheta = { upper = 0.5 }\n[DR]\nslope = { lower = 0.5 }\n",
         loose: &[],
     },
-    Sample { kind: Kind::Profile, text: STANDING, loose: &["duration_s", "climb_m", "speed_m_s", "ramp_s"] },
-    Sample { kind: Kind::Profile, text: MOVING, loose: &["_m", "_deg", "_s", "_s2"] },
-    Sample { kind: Kind::Contamination, text: CONTAMINATION, loose: &[] },
+    Sample {
+        kind: Kind::Profile,
+        text: STANDING,
+        loose: &["duration_s", "climb_m", "speed_m_s", "ramp_s"],
+    },
+    Sample {
+        kind: Kind::Profile,
+        text: MOVING,
+        loose: &["_m", "_deg", "_s", "_s2"],
+    },
+    Sample {
+        kind: Kind::Contamination,
+        text: CONTAMINATION,
+        loose: &[],
+    },
 ];
 
 fn read(kind: Kind, path: &Path) -> Result<(), FileError> {
@@ -261,7 +291,9 @@ fn read(kind: Kind, path: &Path) -> Result<(), FileError> {
         Kind::Model => model_file::read(path).map(|_| ()),
         Kind::Parameters => parameters_file::check(path),
         Kind::Initial => fusion_files::read_initial(path).map(|_| ()),
-        Kind::Profile => trajectory_file::load(path, &trajectory_file::Options::default()).map(|_| ()),
+        Kind::Profile => {
+            trajectory_file::load(path, &trajectory_file::Options::default()).map(|_| ())
+        }
         Kind::Contamination => contamination_file::find(&path.to_string_lossy(), 100.0).map(|_| ()),
     }
 }
@@ -270,28 +302,46 @@ fn read(kind: Kind, path: &Path) -> Result<(), FileError> {
 fn meant<'a>(schema: &'a Value, root: &'a Value, value: &toml::Value) -> Vec<&'a Value> {
     let properties = schema["properties"].as_object().into_iter().flatten();
     let is_other = |(key, said): (&String, &Value)| {
-        said["const"].as_str().is_some_and(|word| value.get(key).and_then(toml::Value::as_str) != Some(word))
+        said["const"]
+            .as_str()
+            .is_some_and(|word| value.get(key).and_then(toml::Value::as_str) != Some(word))
     };
     if properties.into_iter().any(is_other) {
         return Vec::new();
     }
-    let referred = schema["$ref"].as_str().and_then(|name| root.pointer(&name[1..]));
-    let several =
-        ["oneOf", "anyOf", "allOf"].into_iter().filter_map(|word| schema[word].as_array()).flatten();
-    let parts = referred.into_iter().chain(several).flat_map(|part| meant(part, root, value));
+    let referred = schema["$ref"]
+        .as_str()
+        .and_then(|name| root.pointer(&name[1..]));
+    let several = ["oneOf", "anyOf", "allOf"]
+        .into_iter()
+        .filter_map(|word| schema[word].as_array())
+        .flatten();
+    let parts = referred
+        .into_iter()
+        .chain(several)
+        .flat_map(|part| meant(part, root, value));
     std::iter::once(schema).chain(parts).collect()
 }
 
 /// The schemas of a key of a table.
 fn of_key<'a>(schema: &'a Value, key: &str) -> Option<&'a Value> {
     let is_of = |pattern: &str| {
-        let code = pattern.trim_start_matches('^').trim_end_matches('$').trim_end_matches("(_[1-9])?");
+        let code = pattern
+            .trim_start_matches('^')
+            .trim_end_matches('$')
+            .trim_end_matches("(_[1-9])?");
         key.split('_').next() == Some(code)
     };
-    let patterns = schema["patternProperties"].as_object().into_iter().flatten();
-    schema["properties"]
-        .get(key)
-        .or_else(|| patterns.into_iter().find(|(p, _)| is_of(p)).map(|(_, said)| said))
+    let patterns = schema["patternProperties"]
+        .as_object()
+        .into_iter()
+        .flatten();
+    schema["properties"].get(key).or_else(|| {
+        patterns
+            .into_iter()
+            .find(|(p, _)| is_of(p))
+            .map(|(_, said)| said)
+    })
 }
 
 /// A number of a sample: its keys as a pointer, and what the schema says of it.
@@ -304,17 +354,25 @@ fn numbers<'a>(
     at: &str,
     into: &mut Vec<Number<'a>>,
 ) {
-    let schemas: Vec<&Value> = schemas.iter().flat_map(|schema| meant(schema, root, value)).collect();
+    let schemas: Vec<&Value> = schemas
+        .iter()
+        .flat_map(|schema| meant(schema, root, value))
+        .collect();
     match value {
         toml::Value::Table(table) => {
             for (key, inner) in table {
-                let described: Vec<&Value> =
-                    schemas.iter().filter_map(|schema| of_key(schema, key)).collect();
+                let described: Vec<&Value> = schemas
+                    .iter()
+                    .filter_map(|schema| of_key(schema, key))
+                    .collect();
                 numbers(inner, &described, root, &format!("{at}.{key}"), into);
             }
         }
         toml::Value::Array(list) => {
-            let items: Vec<&Value> = schemas.iter().filter_map(|schema| schema.get("items")).collect();
+            let items: Vec<&Value> = schemas
+                .iter()
+                .filter_map(|schema| schema.get("items"))
+                .collect();
             for (i, inner) in list.iter().enumerate() {
                 numbers(inner, &items, root, &format!("{at}.{i}"), into);
             }
@@ -325,7 +383,10 @@ fn numbers<'a>(
                 kind.contains("number") || kind.contains("integer") || said["const"].is_number()
             };
             let said = schemas.iter().find(is_number);
-            into.push((at.to_owned(), said.unwrap_or_else(|| panic!("{at} is not in the schema"))));
+            into.push((
+                at.to_owned(),
+                said.unwrap_or_else(|| panic!("{at} is not in the schema")),
+            ));
         }
         _ => {}
     }
@@ -334,10 +395,13 @@ fn numbers<'a>(
 /// The sample with another number in this place.
 fn with(sample: &toml::Value, path: &str, number: f64) -> String {
     let mut changed = sample.clone();
-    let place = path.split('.').skip(1).fold(&mut changed, |value, step| match value {
-        toml::Value::Array(list) => &mut list[step.parse::<usize>().unwrap()],
-        table => &mut table[step],
-    });
+    let place = path
+        .split('.')
+        .skip(1)
+        .fold(&mut changed, |value, step| match value {
+            toml::Value::Array(list) => &mut list[step.parse::<usize>().unwrap()],
+            table => &mut table[step],
+        });
     *place = match place {
         toml::Value::Integer(_) => toml::Value::Integer(number as i64),
         _ => toml::Value::Float(number),
@@ -365,7 +429,10 @@ fn schemas_have_the_bounds_of_their_readers() {
         let root = schema(kind);
         let mut all = Vec::new();
         numbers(&sample, &[&root], &root, "", &mut all);
-        for (at, said) in all.into_iter().filter(|(_, said)| !said["const"].is_number()) {
+        for (at, said) in all
+            .into_iter()
+            .filter(|(_, said)| !said["const"].is_number())
+        {
             let is_whole = said["type"].to_string().contains("integer");
             let is_loose = loose.iter().any(|key| at.ends_with(key));
             let mut expect = |number: f64, is_refused: bool| {
@@ -374,10 +441,18 @@ fn schemas_have_the_bounds_of_their_readers() {
                     wrong.push(format!("{kind:?}{at} = {number}: {refusal:?}, {said}"));
                 }
             };
-            for (closed, open, toward) in
-                [("minimum", "exclusiveMinimum", -1.0), ("maximum", "exclusiveMaximum", 1.0)]
-            {
-                let step = |bound: f64| toward * if is_whole { 1.0 } else { 1e-9 * bound.abs().max(1.0) };
+            for (closed, open, toward) in [
+                ("minimum", "exclusiveMinimum", -1.0),
+                ("maximum", "exclusiveMaximum", 1.0),
+            ] {
+                let step = |bound: f64| {
+                    toward
+                        * if is_whole {
+                            1.0
+                        } else {
+                            1e-9 * bound.abs().max(1.0)
+                        }
+                };
                 match (said[closed].as_f64(), said[open].as_f64()) {
                     (Some(bound), _) => {
                         expect(bound, false);

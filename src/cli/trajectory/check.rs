@@ -45,13 +45,25 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     if beyond.len() > SAID {
         let more = beyond.len() - SAID;
-        session.warn(format!("{name}: and {more} more stretches beyond limits (--format json lists all)"));
+        session.warn(format!(
+            "{name}: and {more} more stretches beyond limits (--format json lists all)"
+        ));
     }
     let closure = Closure::new(&trajectory, args.rate_hz, GravityModel::default())
         .map_err(|e| Failure::input(format!("{name}: {e}")).hint("give another --rate-hz"))?;
     let found = (args.source.name(), warnings);
-    let check = TrajectoryCheck::new(found, &trajectory, (largest, &beyond), (closure, args.bounds()));
-    let Limits { speed, acceleration, jerk, rate } = args.limits();
+    let check = TrajectoryCheck::new(
+        found,
+        &trajectory,
+        (largest, &beyond),
+        (closure, args.bounds()),
+    );
+    let Limits {
+        speed,
+        acceleration,
+        jerk,
+        rate,
+    } = args.limits();
     let limits = [speed, acceleration, jerk, rate / DEG];
     session.show(|| crate::report::json(&check), || check.text(limits));
     match check.missed() {
@@ -64,17 +76,27 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 fn hint(check: &TrajectoryCheck) -> String {
     let closure = (!check.is_closed())
         .then_some("a higher --rate-hz closes better; rough motion may deserve a wider bound");
-    let motion =
-        (!check.is_plausible()).then_some("a vehicle that does move so deserves a larger --limit-speed");
-    closure.into_iter().chain(motion).collect::<Vec<_>>().join("; ")
+    let motion = (!check.is_plausible())
+        .then_some("a vehicle that does move so deserves a larger --limit-speed");
+    closure
+        .into_iter()
+        .chain(motion)
+        .collect::<Vec<_>>()
+        .join("; ")
 }
 
 impl Args {
     fn limits(&self) -> Limits {
-        Limits { speed: self.limit_speed, ..Limits::default() }
+        Limits {
+            speed: self.limit_speed,
+            ..Limits::default()
+        }
     }
 
     fn bounds(&self) -> Bounds {
-        Bounds { position_m: self.max_position_m, ..Bounds::default() }
+        Bounds {
+            position_m: self.max_position_m,
+            ..Bounds::default()
+        }
     }
 }

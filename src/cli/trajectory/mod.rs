@@ -46,7 +46,9 @@ struct Source {
 impl Source {
     /// Reads it; what is doubtful about it is said and handed back.
     fn read(&self, session: &Session) -> Result<(Trajectory, Vec<String>), Failure> {
-        let options = Options { origin: self.origin.map(|o| o.0) };
+        let options = Options {
+            origin: self.origin.map(|o| o.0),
+        };
         let (trajectory, warnings) = load(&self.path, &options)?;
         let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
         session.warn_all(&warnings);

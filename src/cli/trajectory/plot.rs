@@ -29,7 +29,11 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let _own = claim_picture(&args.out, std::slice::from_ref(&args.source.path), session)?;
     let (trajectory, _) = args.source.read(session)?;
     let outages: Vec<_> = args.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
-    let name = args.source.path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let name = args
+        .source
+        .path
+        .file_name()
+        .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     let picture = trajectory_svg(&name, &TrajectorySeries::of(&trajectory), &outages);
     write_picture(&args.out, picture)?;
     wrote(&args.out, session);

@@ -45,7 +45,12 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut scenario = args.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
+    let mut scenario = args
+        .scenario
+        .as_deref()
+        .map(scenario_file::read)
+        .transpose()?
+        .unwrap_or_default();
     let (trajectory, _) = args.source.read(session)?;
     let shown = args.model.display();
     let file = read::model(&args.model, session)?;
@@ -54,7 +59,11 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     make_turn_on(&mut scenario.imu, &file, &args.model, &Words::new(session));
     let seed = session.seed(scenario.run.seed);
     // a recording is what IMU and receiver give: neither barometer nor wheel, no filter
-    let scenario = Scenario { baro: None, aiding: AidingSettings::default(), ..scenario };
+    let scenario = Scenario {
+        baro: None,
+        aiding: AidingSettings::default(),
+        ..scenario
+    };
     let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &[], &[], seed);
     let plan = Plan::new(&experiment).map_err(Failure::input)?;
     let recording = record(&plan, 0);
@@ -79,13 +88,30 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 /// Refuses to overwrite an input, what this command did not make, or a recording that is not this one.
 fn claim(args: &Args, contents: &[Vec<u8>; 4], session: &Session) -> Result<Claim, Failure> {
-    let inputs = [Some(&args.source.path), Some(&args.model), args.scenario.as_ref()];
+    let inputs = [
+        Some(&args.source.path),
+        Some(&args.model),
+        args.scenario.as_ref(),
+    ];
     let inputs = inputs.into_iter().flatten().map(|path| path.as_path());
     let recognise = |_: &str| {
         let present = FILES.map(|name| std::fs::read(args.out.join(name)).ok());
         let is_whole = present.iter().all(Option::is_some);
-        let is_same = present.iter().zip(contents).all(|(file, made)| file.as_ref() == Some(made));
-        Ok(if is_whole { Found::result(is_same) } else { Found::Foreign })
+        let is_same = present
+            .iter()
+            .zip(contents)
+            .all(|(file, made)| file.as_ref() == Some(made));
+        Ok(if is_whole {
+            Found::result(is_same)
+        } else {
+            Found::Foreign
+        })
     };
-    Ok(claim_directory(&args.out, &FILES, inputs, session.existing(), recognise)?)
+    Ok(claim_directory(
+        &args.out,
+        &FILES,
+        inputs,
+        session.existing(),
+        recognise,
+    )?)
 }

@@ -61,11 +61,21 @@ pub(super) fn generate(args: &GenerateArgs, session: &Session) -> Result<(), Fai
 }
 
 pub(super) fn convert(args: &ConvertArgs, session: &Session) -> Result<(), Failure> {
-    write(&args.source, &args.out, args.rate_hz.map_or(Rows::Knots, Rows::Rate), session)
+    write(
+        &args.source,
+        &args.out,
+        args.rate_hz.map_or(Rows::Knots, Rows::Rate),
+        session,
+    )
 }
 
 fn write(source: &Source, out: &Path, rows: Rows, session: &Session) -> Result<(), Failure> {
-    let _own = claim_result(out, [source.path.as_path()], Written::Trajectory, session.existing())?;
+    let _own = claim_result(
+        out,
+        [source.path.as_path()],
+        Written::Trajectory,
+        session.existing(),
+    )?;
     let (trajectory, _) = source.read(session)?;
     write_csv(out, &trajectory, rows)?;
     wrote(out, session);

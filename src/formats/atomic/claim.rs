@@ -30,26 +30,42 @@ static CLAIMED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 impl Claim {
     /// Claims outputs in the place that `shown` names.
     fn new(shown: &Path, marker: &Path, outputs: Vec<PathBuf>) -> Result<Self, FileError> {
-        let refused =
-            |path: &Path, why: &str| FileError::contents(path.display().to_string(), Place::Itself, why);
+        let refused = |path: &Path, why: &str| {
+            FileError::contents(path.display().to_string(), Place::Itself, why)
+        };
         let mut claimed = CLAIMED.lock().unwrap_or_else(PoisonError::into_inner);
         if outputs.iter().any(|output| claimed.contains(output)) {
-            return Err(refused(shown, "is another output of the same command").setting(Setting::Output));
+            return Err(
+                refused(shown, "is another output of the same command").setting(Setting::Output)
+            );
         }
         let marked = make_parent(marker).and_then(|()| Temporary::marker(marker));
         let Some(marked) = marked.map_err(|e| FileError::unwritable(shown, e))? else {
             let busy = refused(shown, "is being written by another nav-sim");
-            return Err(busy.setting(Setting::Output).advice("wait until that is done"));
+            return Err(busy
+                .setting(Setting::Output)
+                .advice("wait until that is done"));
         };
         claimed.extend(outputs.iter().cloned());
-        Ok(Self { outputs, _marker: Some(marked) })
+        Ok(Self {
+            outputs,
+            _marker: Some(marked),
+        })
     }
 
     fn of_directory(directory: &Path, files: &[impl AsRef<str>]) -> Result<Self, FileError> {
         loop {
-            let marker = if directory.is_dir() { directory.join(MARKER) } else { marker_beside(directory) };
+            let marker = if directory.is_dir() {
+                directory.join(MARKER)
+            } else {
+                marker_beside(directory)
+            };
             let inside = |name: &str| resolved(directory).join(name);
-            let outputs = files.iter().map(|name| inside(name.as_ref())).chain([inside("")]).collect();
+            let outputs = files
+                .iter()
+                .map(|name| inside(name.as_ref()))
+                .chain([inside("")])
+                .collect();
             let claim = Self::new(directory, &marker, outputs)?;
             // where the directory was made meanwhile, its writers hold the marker in it
             if directory.is_dir() == (marker.file_name() == Some(MARKER.as_ref())) {
@@ -62,7 +78,9 @@ impl Claim {
 impl Drop for Claim {
     fn drop(&mut self) {
         let mut claimed = CLAIMED.lock().unwrap_or_else(PoisonError::into_inner);
-        self.outputs.iter().for_each(|output| _ = claimed.remove(output));
+        self.outputs
+            .iter()
+            .for_each(|output| _ = claimed.remove(output));
     }
 }
 
@@ -70,15 +88,24 @@ impl Drop for Claim {
 const MARKER: &str = ".claim";
 
 fn marker_beside(path: &Path) -> PathBuf {
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = path
+        .file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default();
     path.with_file_name(format!(".{name}{MARKER}"))
 }
 
 /// A path by one name, whether anything is there or not.
 fn resolved(path: &Path) -> PathBuf {
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
+    let parent = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or_else(|| Path::new("."));
     let by_parent = || Some(parent.canonicalize().ok()?.join(path.file_name()?));
-    path.canonicalize().ok().or_else(by_parent).unwrap_or_else(|| path.to_owned())
+    path.canonicalize()
+        .ok()
+        .or_else(by_parent)
+        .unwrap_or_else(|| path.to_owned())
 }
 
 /// Claims a file that can be made and is none of the inputs. A device is everybody's.
@@ -92,7 +119,10 @@ pub(crate) fn claim_file<'a>(
     guard_inputs(output, inputs)?;
     AtomicFile::create(output)?; // dropped at once
     if fs::metadata(output).is_ok_and(|m| !m.is_file()) {
-        return Ok(Claim { outputs: Vec::new(), _marker: None });
+        return Ok(Claim {
+            outputs: Vec::new(),
+            _marker: None,
+        });
     }
     let output_at = resolved(output);
     Claim::new(output, &marker_beside(&output_at), vec![output_at])
@@ -117,10 +147,13 @@ fn replaceable(path: &Path, found: Found, existing: Existing) -> Result<(), File
     let refused = |why: &str| FileError::contents(path.display().to_string(), Place::Itself, why);
     match found {
         Found::Foreign => {
-            let error = refused("is not of this command: it is not replaced").setting(Setting::Output);
+            let error =
+                refused("is not of this command: it is not replaced").setting(Setting::Output);
             Err(error.advice("move it away"))
         }
-        Found::Other(why) if existing == Existing::Keep => Err(refused(why).setting(Setting::Force)),
+        Found::Other(why) if existing == Existing::Keep => {
+            Err(refused(why).setting(Setting::Force))
+        }
         Found::Other(_) | Found::Same => Ok(()),
     }
 }
@@ -133,12 +166,20 @@ pub(super) fn guard_inputs<'a>(
     output: &Path,
     inputs: impl IntoIterator<Item = &'a Path>,
 ) -> Result<(), FileError> {
-    let Ok(target) = output.canonicalize() else { return Ok(()) };
-    if !inputs.into_iter().any(|i| i.canonicalize().is_ok_and(|i| i == target)) {
+    let Ok(target) = output.canonicalize() else {
+        return Ok(());
+    };
+    if !inputs
+        .into_iter()
+        .any(|i| i.canonicalize().is_ok_and(|i| i == target))
+    {
         return Ok(());
     }
     let message = "is an input of this command and would be overwritten";
-    Err(FileError::contents(output.display().to_string(), Place::Itself, message).setting(Setting::Output))
+    Err(
+        FileError::contents(output.display().to_string(), Place::Itself, message)
+            .setting(Setting::Output),
+    )
 }
 
 /// What may become of a result that is there already.
@@ -183,5 +224,9 @@ pub(crate) fn claim_directory<'a>(
 fn empty_or_new(directory: &Path) -> Found {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     let is_visible = |name: OsString| !name.to_string_lossy().starts_with('.');
-    if entries.map(|entry| entry.file_name()).any(is_visible) { Found::Foreign } else { Found::Same }
+    if entries.map(|entry| entry.file_name()).any(is_visible) {
+        Found::Foreign
+    } else {
+        Found::Same
+    }
 }

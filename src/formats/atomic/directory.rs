@@ -36,11 +36,19 @@ impl AtomicDir {
         }
         recover(destination);
         let inside = inside(destination);
-        let path = if existing.is_some() { inside.as_path() } else { destination };
+        let path = if existing.is_some() {
+            inside.as_path()
+        } else {
+            destination
+        };
         make_parent(path).map_err(error)?;
         temporary::remove_abandoned(path);
         let staging = Temporary::directory(path).map_err(error)?;
-        Ok(Self { destination: destination.into(), staging, names: Vec::new() })
+        Ok(Self {
+            destination: destination.into(),
+            staging,
+            names: Vec::new(),
+        })
     }
 
     /// Declares a file and returns the path to write it at for now.
@@ -55,7 +63,11 @@ impl AtomicDir {
     ///
     /// # Errors
     /// When the system refuses.
-    pub(crate) fn write(&mut self, name: &str, contents: impl AsRef<[u8]>) -> Result<(), FileError> {
+    pub(crate) fn write(
+        &mut self,
+        name: &str,
+        contents: impl AsRef<[u8]>,
+    ) -> Result<(), FileError> {
         self.write_parts(name, [contents])
     }
 
@@ -71,7 +83,9 @@ impl AtomicDir {
         let path = self.path(name);
         let write = || {
             let mut file = std::io::BufWriter::new(File::create(&path)?);
-            parts.into_iter().try_for_each(|part| file.write_all(part.as_ref()))?;
+            parts
+                .into_iter()
+                .try_for_each(|part| file.write_all(part.as_ref()))?;
             file.flush()
         };
         write().map_err(|e| FileError::io(&self.destination.join(name), e))
@@ -86,8 +100,11 @@ impl AtomicDir {
             flush(&self.staging.path().join(name))
                 .map_err(|e| FileError::io(&self.destination.join(name), e))?;
         }
-        let moved =
-            if self.destination.is_dir() { self.replace() } else { self.staging.rename(&self.destination) };
+        let moved = if self.destination.is_dir() {
+            self.replace()
+        } else {
+            self.staging.rename(&self.destination)
+        };
         moved.map_err(|e| FileError::io(&self.destination, e))
     }
 
@@ -108,7 +125,11 @@ impl AtomicDir {
 
 /// Has the disk take a file that was written. Windows flushes through a handle for writing only.
 fn flush(path: &Path) -> io::Result<()> {
-    File::options().read(true).write(cfg!(windows)).open(path)?.sync_all()
+    File::options()
+        .read(true)
+        .write(cfg!(windows))
+        .open(path)?
+        .sync_all()
 }
 
 /// What temporary directories in `destination` are named after.
@@ -132,7 +153,10 @@ fn move_files(moving: &Path, destination: &Path) -> io::Result<()> {
         Err(e) if e.kind() == io::ErrorKind::NotFound => String::new(), // all moved, the rest being removed
         order => order?,
     };
-    let mut names = order.lines().filter(|name| moving.join(name).exists()).peekable();
+    let mut names = order
+        .lines()
+        .filter(|name| moving.join(name).exists())
+        .peekable();
     if let (Some(_), Some(last)) = (names.peek(), order.lines().last()) {
         match step(|| fs::remove_file(destination.join(last))) {
             Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),

@@ -31,15 +31,28 @@ impl AtomicFile {
             return Err(error(io::ErrorKind::IsADirectory.into()));
         }
         if metadata.is_some_and(|m| !m.is_file()) {
-            let file = File::options().write(true).open(destination).map_err(error)?;
+            let file = File::options()
+                .write(true)
+                .open(destination)
+                .map_err(error)?;
             let file = BufWriter::with_capacity(BUFFER, file);
-            return Ok(Self { destination: destination.into(), temporary: None, file });
+            return Ok(Self {
+                destination: destination.into(),
+                temporary: None,
+                file,
+            });
         }
-        let destination = destination.canonicalize().unwrap_or_else(|_| destination.into());
+        let destination = destination
+            .canonicalize()
+            .unwrap_or_else(|_| destination.into());
         make_parent(&destination).map_err(error)?;
         temporary::remove_abandoned(&destination);
         let (file, temporary) = Temporary::file(&destination).map_err(error)?;
-        Ok(Self { destination, temporary: Some(temporary), file: BufWriter::with_capacity(BUFFER, file) })
+        Ok(Self {
+            destination,
+            temporary: Some(temporary),
+            file: BufWriter::with_capacity(BUFFER, file),
+        })
     }
 
     /// Flushes to the disk and gives the file its name.
@@ -47,12 +60,15 @@ impl AtomicFile {
     /// # Errors
     /// When the disk is full or the rename is refused; nothing is left then.
     pub(crate) fn commit(mut self) -> Result<(), FileError> {
-        self.finish().map_err(|e| FileError::io(&self.destination, e))
+        self.finish()
+            .map_err(|e| FileError::io(&self.destination, e))
     }
 
     fn finish(&mut self) -> io::Result<()> {
         self.file.flush()?;
-        let Some(temporary) = &mut self.temporary else { return Ok(()) };
+        let Some(temporary) = &mut self.temporary else {
+            return Ok(());
+        };
         self.file.get_ref().sync_all()?;
         temporary.rename(&self.destination)
     }

@@ -28,7 +28,9 @@ pub(crate) fn write(destination: &Path, contents: impl AsRef<[u8]>) -> Result<()
 /// A file that is written but does not have its name yet.
 pub(crate) fn filled(destination: &Path, contents: &[u8]) -> Result<AtomicFile, FileError> {
     let mut file = AtomicFile::create(destination)?;
-    file.write_all(contents).and_then(|()| file.flush()).map_err(|e| FileError::io(destination, e))?;
+    file.write_all(contents)
+        .and_then(|()| file.flush())
+        .map_err(|e| FileError::io(destination, e))?;
     Ok(file)
 }
 

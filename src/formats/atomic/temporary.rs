@@ -33,7 +33,11 @@ pub(crate) fn remove_unfinished() {
 }
 
 fn remove(path: &Path) {
-    let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+    let _ = if path.is_dir() {
+        fs::remove_dir_all(path)
+    } else {
+        fs::remove_file(path)
+    };
 }
 
 /// A file or directory under a temporary name; removed when dropped, unless it was renamed.
@@ -61,7 +65,11 @@ impl Temporary {
     /// The marker of an output, of one name for all its writers; `None` while another holds it.
     pub(super) fn marker(path: &Path) -> io::Result<Option<Self>> {
         loop {
-            let file = File::options().create(true).truncate(false).write(true).open(path)?;
+            let file = File::options()
+                .create(true)
+                .truncate(false)
+                .write(true)
+                .open(path)?;
             let hold = match hold_open(file, path) {
                 Hold::Taken(file) => Some(file),
                 Hold::Unknown => None,
@@ -69,7 +77,10 @@ impl Temporary {
                 Hold::Stale => continue,
             };
             unfinished().insert(path.to_owned());
-            return Ok(Some(Self { path: path.to_owned(), _hold: hold }));
+            return Ok(Some(Self {
+                path: path.to_owned(),
+                _hold: hold,
+            }));
         }
     }
 
@@ -181,16 +192,30 @@ pub(super) const MOVING: &str = "moving";
 
 /// What killed writers of `path` left under a temporary name of that ending, each held.
 pub(super) fn abandoned(path: &Path, ending: &str) -> Vec<(PathBuf, File)> {
-    let (Some(parent), Some(name)) = (path.parent(), path.file_name()) else { return Vec::new() };
-    let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
-    let (start, end) = (format!(".{}.", name.to_string_lossy()), format!(".{ending}"));
+    let (Some(parent), Some(name)) = (path.parent(), path.file_name()) else {
+        return Vec::new();
+    };
+    let parent = if parent.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        parent
+    };
+    let (start, end) = (
+        format!(".{}.", name.to_string_lossy()),
+        format!(".{ending}"),
+    );
     let is_temporary = |file: &str| {
-        let middle = file.strip_prefix(&start).and_then(|rest| rest.strip_suffix(&end));
-        middle
-            .is_some_and(|m| m.split('-').count() == 2 && m.bytes().all(|b| b.is_ascii_digit() || b == b'-'))
+        let middle = file
+            .strip_prefix(&start)
+            .and_then(|rest| rest.strip_suffix(&end));
+        middle.is_some_and(|m| {
+            m.split('-').count() == 2 && m.bytes().all(|b| b.is_ascii_digit() || b == b'-')
+        })
     };
     let entries = fs::read_dir(parent).into_iter().flatten().flatten();
-    let left = entries.filter(|e| is_temporary(&e.file_name().to_string_lossy())).map(|e| e.path());
+    let left = entries
+        .filter(|e| is_temporary(&e.file_name().to_string_lossy()))
+        .map(|e| e.path());
     left.filter_map(|path| match hold(&path) {
         Hold::Taken(file) => Some((path, file)),
         Hold::Busy | Hold::Stale | Hold::Unknown => None,
@@ -202,7 +227,10 @@ pub(super) fn abandoned(path: &Path, ending: &str) -> Vec<(PathBuf, File)> {
 /// reader takes for data.
 fn temporary_name(path: &Path) -> PathBuf {
     static COUNT: AtomicU64 = AtomicU64::new(0);
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = path
+        .file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default();
     let count = COUNT.fetch_add(1, Ordering::Relaxed);
     path.with_file_name(format!(".{name}.{}-{count}.{PARTIAL}", std::process::id()))
 }

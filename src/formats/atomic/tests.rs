@@ -5,8 +5,10 @@ use crate::formats::atomic::claim::guard_inputs;
 use std::fs;
 
 fn listing(dir: &Path) -> Vec<String> {
-    let mut names: Vec<String> =
-        fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    let mut names: Vec<String> = fs::read_dir(dir)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
     names.sort();
     names
 }
@@ -62,7 +64,11 @@ fn what_a_killed_process_left_is_not_in_the_way() {
     let dir = tempfile::tempdir().unwrap();
     let pid = std::process::id();
     for count in 0..200 {
-        fs::write(dir.path().join(format!(".a.csv.{pid}-{count}.partial")), "left").unwrap();
+        fs::write(
+            dir.path().join(format!(".a.csv.{pid}-{count}.partial")),
+            "left",
+        )
+        .unwrap();
     }
     write(&dir.path().join("a.csv"), "new").unwrap();
     assert_eq!(fs::read(dir.path().join("a.csv")).unwrap(), b"new");
@@ -83,7 +89,10 @@ fn links_are_followed_and_devices_written_directly() {
 #[test]
 fn a_full_disk_is_an_error_that_names_the_output() {
     let e = write(Path::new("/dev/full"), vec![0; 1 << 20]).unwrap_err();
-    assert!(e.to_string().starts_with("/dev/full: no space is left"), "{e}");
+    assert!(
+        e.to_string().starts_with("/dev/full: no space is left"),
+        "{e}"
+    );
     assert!(e.is_system());
 }
 
@@ -102,9 +111,16 @@ fn inputs_are_not_overwritten_under_any_name() {
     let dir = tempfile::tempdir().unwrap();
     let input = dir.path().join("in.csv");
     write(&input, "data").unwrap();
-    let alias = dir.path().join("../").join(dir.path().file_name().unwrap()).join("in.csv");
+    let alias = dir
+        .path()
+        .join("../")
+        .join(dir.path().file_name().unwrap())
+        .join("in.csv");
     let e = guard_inputs(&alias, [input.as_path()]).unwrap_err();
-    assert!(e.to_string().ends_with("is an input of this command and would be overwritten"));
+    assert!(
+        e.to_string()
+            .ends_with("is an input of this command and would be overwritten")
+    );
     assert!(!e.is_system() && e.hint().is_some());
     guard_inputs(&dir.path().join("out.csv"), [input.as_path()]).unwrap();
 }
@@ -187,7 +203,10 @@ fn a_replacement_that_is_killed_is_finished_by_the_next_command() {
         recover(dir.path());
         directory::kill::after(usize::MAX);
         recover(dir.path());
-        assert_eq!(listing(dir.path()), ["a.csv", "b.csv", "manifest.json", "notes.txt"]);
+        assert_eq!(
+            listing(dir.path()),
+            ["a.csv", "b.csv", "manifest.json", "notes.txt"]
+        );
         let contents = |name: &str| fs::read_to_string(dir.path().join(name)).unwrap();
         assert_eq!(
             ["a.csv", "b.csv", "manifest.json", "notes.txt"].map(contents),
@@ -211,7 +230,10 @@ fn a_manifest_stands_beside_its_own_files_only() {
         directory::kill::after(usize::MAX);
         let contents = |name: &str| fs::read_to_string(dir.path().join(name)).ok();
         let manifest = contents("manifest.json");
-        assert!(manifest.is_none() || manifest == contents("a.csv"), "{steps}: {manifest:?}");
+        assert!(
+            manifest.is_none() || manifest == contents("a.csv"),
+            "{steps}: {manifest:?}"
+        );
     }
 }
 
@@ -223,7 +245,12 @@ fn a_claim_ends_with_its_holder() {
     fs::write(dir.path().join(".model.toml.claim"), "").unwrap();
     let claim = claim_file(&path, []).unwrap();
     let again = claim_file(&path, []).unwrap_err();
-    assert!(again.to_string().ends_with("model.toml is another output of the same command"), "{again}");
+    assert!(
+        again
+            .to_string()
+            .ends_with("model.toml is another output of the same command"),
+        "{again}"
+    );
     drop(claim);
     assert!(listing(dir.path()).is_empty());
     drop(claim_file(&path, []).unwrap());
@@ -234,9 +261,15 @@ fn a_claim_ends_with_its_holder() {
 #[test]
 fn where_nothing_can_be_made_another_path_is_the_remedy() {
     for path in ["/proc/no_such_place", "/proc/no_such_place/inside"].map(Path::new) {
-        for e in [AtomicFile::create(path).unwrap_err(), AtomicDir::create(path).unwrap_err()] {
+        for e in [
+            AtomicFile::create(path).unwrap_err(),
+            AtomicDir::create(path).unwrap_err(),
+        ] {
             let shown = path.display();
-            assert_eq!(e.to_string(), format!("{shown}: the system makes no file or directory there"));
+            assert_eq!(
+                e.to_string(),
+                format!("{shown}: the system makes no file or directory there")
+            );
             assert_eq!(e.hint().unwrap(), "name another path");
             assert!(e.is_system());
         }

@@ -59,17 +59,25 @@ impl Written {
             Self::Page => ["<meta name=\"generator\" content=\"nav-sim\">", ""],
             Self::Svg => ["<svg", "class=\"chart wide\""],
             Self::Png => ["PNG", "Software\0nav-sim"],
-            Self::Trajectory => {
-                ["t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n", ""]
-            }
+            Self::Trajectory => [
+                "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n",
+                "",
+            ],
         }
     }
 
     /// What stands at a path where a file of this kind is to be written.
     pub(super) fn found(self, path: &Path) -> Found {
-        let Some(text) = head(path) else { return if path.exists() { Found::Foreign } else { Found::Same } };
-        let is_of =
-            |kind: &Self| kind.marks().iter().all(|mark| text.contains(mark)) && kind.is_as_written(&text);
+        let Some(text) = head(path) else {
+            return if path.exists() {
+                Found::Foreign
+            } else {
+                Found::Same
+            };
+        };
+        let is_of = |kind: &Self| {
+            kind.marks().iter().all(|mark| text.contains(mark)) && kind.is_as_written(&text)
+        };
         match () {
             () if text.is_empty() || is_of(&self) => Found::Same,
             () if Self::ALL.iter().any(is_of) => Found::Other("holds another kind of result"),
@@ -88,12 +96,17 @@ impl Written {
 fn head(path: &Path) -> Option<String> {
     let file = source::open(path).ok()?;
     let mut bytes = Vec::new();
-    let is_packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+    let is_packed = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     let read = match is_packed {
-        true => flate2::read::GzDecoder::new(file).take(HEAD).read_to_end(&mut bytes),
+        true => flate2::read::GzDecoder::new(file)
+            .take(HEAD)
+            .read_to_end(&mut bytes),
         false => file.take(HEAD).read_to_end(&mut bytes),
     };
-    read.is_ok().then(|| String::from_utf8_lossy(&bytes).into_owned())
+    read.is_ok()
+        .then(|| String::from_utf8_lossy(&bytes).into_owned())
 }
 
 /// What stands where a result is to be written; in a directory told by its last file, which appears when the others are whole.
@@ -112,7 +125,9 @@ impl Found {
     pub(crate) const fn result(is_same: bool) -> Self {
         match is_same {
             true => Self::Same,
-            false => Self::Other("holds the result of another configuration, other inputs or another seed"),
+            false => Self::Other(
+                "holds the result of another configuration, other inputs or another seed",
+            ),
         }
     }
 }

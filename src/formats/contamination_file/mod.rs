@@ -36,11 +36,23 @@ pub(crate) use description::schema;
 /// Names and texts of the contaminations that come with the program.
 const PRESETS: [(&str, &str); 6] = [
     ("section4-I", "schema = 1\n"),
-    ("section4-II", include_str!("../../../calib_data/contamination/section4-II.toml")),
-    ("section4-III", include_str!("../../../calib_data/contamination/section4-III.toml")),
+    (
+        "section4-II",
+        include_str!("../../../calib_data/contamination/section4-II.toml"),
+    ),
+    (
+        "section4-III",
+        include_str!("../../../calib_data/contamination/section4-III.toml"),
+    ),
     ("section5-I", "schema = 1\n"),
-    ("section5-II", include_str!("../../../calib_data/contamination/section5-II.toml")),
-    ("section5-III", include_str!("../../../calib_data/contamination/section5-III.toml")),
+    (
+        "section5-II",
+        include_str!("../../../calib_data/contamination/section5-II.toml"),
+    ),
+    (
+        "section5-III",
+        include_str!("../../../calib_data/contamination/section5-III.toml"),
+    ),
 ];
 
 /// Names of the contaminations that come with the program: the scenarios of
@@ -75,7 +87,10 @@ fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, FileError> {
             read_rules(source, sensor, key, table, rate_hz, &mut rules)?;
         }
     }
-    Ok(Contamination { name: source.path().to_owned(), rules })
+    Ok(Contamination {
+        name: source.path().to_owned(),
+        rules,
+    })
 }
 
 fn read_rules(
@@ -86,26 +101,35 @@ fn read_rules(
     rate_hz: f64,
     into: &mut Vec<Rule>,
 ) -> Result<(), FileError> {
-    let RuleTable { replicates, operation } = table;
+    let RuleTable {
+        replicates,
+        operation,
+    } = table;
     if replicates.as_ref().is_some_and(Vec::is_empty) {
         return Err(source.refused(&format!("{key}.replicates"), "lists none"));
     }
     let place = format!("{}, line {}", source.path(), source.line_of(&key));
     let listed = replicates.as_ref().map_or(1, Vec::len);
-    let mut entry = Entry { source, key, i: 0, listed };
+    let mut entry = Entry {
+        source,
+        key,
+        i: 0,
+        listed,
+    };
     for i in 0..listed {
         entry.i = i;
         let operation = match operation {
             Described::Step(step) => entry.step(step, rate_hz)?,
-            Described::Drift(drift) => {
-                Operation::Drift { amplitude: entry.number("amplitude", &drift.amplitude)? }
-            }
+            Described::Drift(drift) => Operation::Drift {
+                amplitude: entry.number("amplitude", &drift.amplitude)?,
+            },
             Described::Replace(replace) => entry.replace(replace)?,
             Described::Bursts(bursts) => entry.bursts(bursts)?,
             Described::Ar1(process) => {
                 let phi = entry.number("phi", &process.phi)?;
                 let sigma2 = entry.number("sigma2", &process.sigma2)?;
-                let refused = |e: ParameterError| entry.refused(e.parameter, format!("is not {}", e.domain));
+                let refused =
+                    |e: ParameterError| entry.refused(e.parameter, format!("is not {}", e.domain));
                 Operation::Ar1(Ar1::new(phi, sigma2).map_err(refused)?)
             }
             Described::HeavyTails(tails) => Operation::HeavyTails {
@@ -119,7 +143,12 @@ fn read_rules(
             },
         };
         let replicate = replicates.as_ref().map(|r| r[i].get());
-        into.push(Rule { sensor, replicate, operation, place: place.clone() });
+        into.push(Rule {
+            sensor,
+            replicate,
+            operation,
+            place: place.clone(),
+        });
     }
     Ok(())
 }
@@ -138,7 +167,11 @@ impl Entry<'_> {
     }
 
     /// A number, or this replicate's of a list.
-    fn number<T: Copy + Into<f64>>(&self, key: &str, given: &OneOrEach<T>) -> Result<f64, FileError> {
+    fn number<T: Copy + Into<f64>>(
+        &self,
+        key: &str,
+        given: &OneOrEach<T>,
+    ) -> Result<f64, FileError> {
         match given {
             OneOrEach::One(value) => Ok((*value).into()),
             OneOrEach::Each(values) if values.len() == self.listed => Ok(values[self.i].into()),
@@ -154,7 +187,10 @@ impl Entry<'_> {
         key: &str,
         given: &Option<OneOrEach<T>>,
     ) -> Result<Option<f64>, FileError> {
-        given.as_ref().map(|given| self.number(key, given)).transpose()
+        given
+            .as_ref()
+            .map(|given| self.number(key, given))
+            .transpose()
     }
 
     /// Refuses more than one of several ways to say the same.
@@ -176,15 +212,22 @@ impl Entry<'_> {
             ("at_s", seconds.is_some()),
         ])?;
         let share = self.optional("at_share", share)?.unwrap_or(0.5);
-        let seconds = self.optional("at_s", seconds)?.map(|seconds| (seconds * rate_hz).round() as u64);
+        let seconds = self
+            .optional("at_s", seconds)?
+            .map(|seconds| (seconds * rate_hz).round() as u64);
         Ok(Operation::Step {
-            at: samples.or(seconds).map_or(Extent::Share(share), Extent::Samples),
+            at: samples
+                .or(seconds)
+                .map_or(Extent::Share(share), Extent::Samples),
             amplitude: self.number("amplitude", &step.amplitude)?,
         })
     }
 
     fn replace(&self, replace: &Replace) -> Result<Operation, FileError> {
-        self.at_most_one(&[("share", replace.share.is_some()), ("points", replace.points.is_some())])?;
+        self.at_most_one(&[
+            ("share", replace.share.is_some()),
+            ("points", replace.points.is_some()),
+        ])?;
         let points = match (replace.points, self.optional("share", &replace.share)?) {
             (Some(points), _) => Extent::Samples(points),
             (None, Some(share)) => Extent::Share(share),
@@ -195,7 +238,12 @@ impl Entry<'_> {
             Some(Mean::Own(mean)) => Some(self.number("mean", mean)?),
         };
         let block = Extent::Samples(replace.length_samples.map_or(1, NonZero::get));
-        Ok(Operation::Replace { points, block, mean, sigma: self.number("sigma", &replace.sigma)? })
+        Ok(Operation::Replace {
+            points,
+            block,
+            mean,
+            sigma: self.number("sigma", &replace.sigma)?,
+        })
     }
 
     fn bursts(&self, bursts: &Bursts) -> Result<Operation, FileError> {
@@ -209,7 +257,9 @@ impl Entry<'_> {
             length: extent(bursts.length_samples.unwrap_or(500)),
             spacing: extent(bursts.spacing_samples.unwrap_or(90_000)),
             amplitude: self.number("amplitude", &bursts.amplitude)?,
-            frequency_hz: self.optional("frequency_hz", &bursts.frequency_hz)?.unwrap_or(5.0),
+            frequency_hz: self
+                .optional("frequency_hz", &bursts.frequency_hz)?
+                .unwrap_or(5.0),
         })
     }
 }
@@ -220,8 +270,15 @@ mod tests {
     use nav_sim_signal::imu::{Axis, Channel};
 
     fn rules(name: &str, sensor: Sensor, replicate: u64) -> Vec<Operation> {
-        let applies = |r: &Rule| r.sensor == sensor && r.replicate.is_none_or(|only| only == replicate);
-        find(name, 100.0).unwrap().rules.into_iter().filter(applies).map(|r| r.operation).collect()
+        let applies =
+            |r: &Rule| r.sensor == sensor && r.replicate.is_none_or(|only| only == replicate);
+        find(name, 100.0)
+            .unwrap()
+            .rules
+            .into_iter()
+            .filter(applies)
+            .map(|r| r.operation)
+            .collect()
     }
 
     fn refusal(text: &str) -> String {
@@ -235,43 +292,83 @@ mod tests {
         assert!(rules("section5-I", Sensor::Accel, 1).is_empty());
         let half = Extent::Share(0.5);
         let (points, block) = (Extent::Share(0.01), Extent::Samples(1));
-        let replace = |sigma| Operation::Replace { points, block, mean: None, sigma };
+        let replace = |sigma| Operation::Replace {
+            points,
+            block,
+            mean: None,
+            sigma,
+        };
         let second = rules("section5-II", Sensor::Accel, 6);
-        assert_eq!(second[0], Operation::Step { at: half, amplitude: 0.0060 });
+        assert_eq!(
+            second[0],
+            Operation::Step {
+                at: half,
+                amplitude: 0.0060
+            }
+        );
         assert_eq!(second[1], replace(0.16));
         assert_eq!(second.len(), 3);
         assert_eq!(
             rules("section5-II", Sensor::Gyro, 7)[0],
-            Operation::Step { at: half, amplitude: 0.00055 }
+            Operation::Step {
+                at: half,
+                amplitude: 0.00055
+            }
         );
         assert_eq!(rules("section5-II", Sensor::Gyro, 7)[1], replace(0.026));
 
         let abnormal = rules("section5-III", Sensor::Accel, 8);
-        assert_eq!(abnormal[0], Operation::Step { at: half, amplitude: 0.0045 });
+        assert_eq!(
+            abnormal[0],
+            Operation::Step {
+                at: half,
+                amplitude: 0.0045
+            }
+        );
         assert_eq!(abnormal[1], replace(0.18));
-        assert_eq!(abnormal[3], Operation::Ar1(Ar1::new(0.975_761, 3.397_832e-7).unwrap()));
+        assert_eq!(
+            abnormal[3],
+            Operation::Ar1(Ar1::new(0.975_761, 3.397_832e-7).unwrap())
+        );
         let abnormal = rules("section5-III", Sensor::Gyro, 5);
         assert_eq!(abnormal[1], replace(0.026));
-        assert_eq!(abnormal[3], Operation::Ar1(Ar1::new(0.976_658_0, 5.313_189e-9).unwrap()));
+        assert_eq!(
+            abnormal[3],
+            Operation::Ar1(Ar1::new(0.976_658_0, 5.313_189e-9).unwrap())
+        );
         assert_eq!(rules("section5-III", Sensor::Gyro, 2)[1], replace(0.022));
         for replicate in [1, 2, 4, 5, 6, 7] {
             let rules_of = |name| rules(name, Sensor::Accel, replicate);
-            assert_eq!(rules_of("section5-III"), rules_of("section5-II"), "{replicate}");
+            assert_eq!(
+                rules_of("section5-III"),
+                rules_of("section5-II"),
+                "{replicate}"
+            );
         }
 
         let bursts = |replicate| rules("section4-III", Sensor::Accel, replicate).len();
         assert_eq!([1, 2, 3, 4, 8].map(bursts), [3, 3, 3, 2, 3]);
         let (process, parameter) = ("RW".to_owned(), "gamma2".to_owned());
-        let scale = Operation::Scale { process, parameter, factor: 4.0 };
+        let scale = Operation::Scale {
+            process,
+            parameter,
+            factor: 4.0,
+        };
         assert_eq!(rules("section4-III", Sensor::Accel, 8)[2], scale);
         for name in names() {
-            assert!(!find(name, 100.0).unwrap().touches(9), "{name}: the ninth replicate stays clean");
+            assert!(
+                !find(name, 100.0).unwrap().touches(9),
+                "{name}: the ninth replicate stays clean"
+            );
         }
     }
 
     #[test]
     fn presets_fit_the_papers_record_and_short_ones() {
-        let channel = Channel { sensor: Sensor::Gyro, axis: Axis::Z };
+        let channel = Channel {
+            sensor: Sensor::Gyro,
+            axis: Axis::Z,
+        };
         for n in [524_284, 4096] {
             let mut x = vec![0.0; n];
             let preset = find("section5-III", 100.0).unwrap();
@@ -284,10 +381,21 @@ mod tests {
     fn a_file_says_the_same_in_other_units() {
         let text = "[[gyro]]\noperation = \"step\"\nat_s = 2\namplitude = 1\n[[gyro]]\noperation = \"replace\"\npoints = 7\nsigma = 1\nmean = 3.0\n";
         let rules = parse(&Source::new("c.toml", text), 50.0).unwrap().rules;
-        assert_eq!(rules[0].operation, Operation::Step { at: Extent::Samples(100), amplitude: 1.0 });
+        assert_eq!(
+            rules[0].operation,
+            Operation::Step {
+                at: Extent::Samples(100),
+                amplitude: 1.0
+            }
+        );
         assert_eq!(rules[0].replicate, None);
         let (points, block) = (Extent::Samples(7), Extent::Samples(1));
-        let replace = Operation::Replace { points, block, mean: Some(3.0), sigma: 1.0 };
+        let replace = Operation::Replace {
+            points,
+            block,
+            mean: Some(3.0),
+            sigma: 1.0,
+        };
         assert_eq!(rules[1].operation, replace);
     }
 
@@ -335,7 +443,9 @@ mod tests {
             "c.toml, line 3: \"gyro[1].freedom\" = 2 is not a finite number > 2 | "
         );
         assert_eq!(
-            refusal("[[gyro]]\noperation = \"replace\"\npoints = 9\nsigma = 1\nlength_samples = 0\n"),
+            refusal(
+                "[[gyro]]\noperation = \"replace\"\npoints = 9\nsigma = 1\nlength_samples = 0\n"
+            ),
             "c.toml, line 5: \"gyro[1].length_samples\" = 0 is not a whole number ≥ 1 | "
         );
         assert_eq!(meant("section5-2"), Some("section5-I"));

@@ -84,7 +84,9 @@ pub fn read(path: &Path) -> Result<Datasheet, FileError> {
 /// The entry of that name, if the catalogue has it; capitals do not matter.
 #[must_use]
 pub fn catalogued(name: &str) -> Option<Result<Datasheet, FileError>> {
-    let (name, text) = CATALOGUE.iter().find(|(known, _)| known.eq_ignore_ascii_case(name))?;
+    let (name, text) = CATALOGUE
+        .iter()
+        .find(|(known, _)| known.eq_ignore_ascii_case(name))?;
     Some(parse(&Source::new(name, text)))
 }
 
@@ -97,7 +99,12 @@ pub(super) fn parse(source: &Source) -> Result<Datasheet, FileError> {
         }
     }
     let name = Some(format!("{} {}", file.unit.manufacturer, file.unit.name));
-    Ok(Datasheet { name, class: Some(file.unit.class), entries, assumptions: file.unit.assumptions })
+    Ok(Datasheet {
+        name,
+        class: Some(file.unit.class),
+        entries,
+        assumptions: file.unit.assumptions,
+    })
 }
 
 fn entry(source: &Source, sensor: Sensor, key: &str, given: Given) -> Result<Entry, FileError> {
@@ -107,5 +114,11 @@ fn entry(source: &Source, sensor: Sensor, key: &str, given: Given) -> Result<Ent
     };
     let quantity = Quantity::parse(&given.value, figure.units(sensor))
         .map_err(|e| source.refused(&format!("{path}.value"), e.to_string()))?;
-    Ok(Entry { sensor, figure, quantity, source: Some(given.source), quote: given.quote })
+    Ok(Entry {
+        sensor,
+        figure,
+        quantity,
+        source: Some(given.source),
+        quote: given.quote,
+    })
 }

@@ -42,9 +42,18 @@ const GYRO_NOISE: Units = &[
     ("rad/sqrt(s)", 1.0),
     ("rad/s/sqrt(Hz)", 1.0),
 ];
-const ACCELERATION: Units =
-    &[("ug", 1e-6 * STANDARD_GRAVITY), ("mg", 1e-3 * STANDARD_GRAVITY), ("mGal", 1e-5), ("m/s²", 1.0)];
-const RATE: Units = &[("deg/h", DEG_PER_HOUR), ("deg/s", DEG), ("mdeg/s", 1e-3 * DEG), ("rad/s", 1.0)];
+const ACCELERATION: Units = &[
+    ("ug", 1e-6 * STANDARD_GRAVITY),
+    ("mg", 1e-3 * STANDARD_GRAVITY),
+    ("mGal", 1e-5),
+    ("m/s²", 1.0),
+];
+const RATE: Units = &[
+    ("deg/h", DEG_PER_HOUR),
+    ("deg/s", DEG),
+    ("mdeg/s", 1e-3 * DEG),
+    ("rad/s", 1.0),
+];
 const ACCEL_WALK: Units = &[
     ("m/s²/sqrt(s)", 1.0),
     ("m/s²/sqrt(h)", 1.0 / 60.0),
@@ -64,8 +73,15 @@ const RATIO: Units = &[("ppm", 1.0), ("%", 1e4)];
 
 impl Figure {
     /// All of them.
-    pub(crate) const ALL: [Self; 7] =
-        [Self::Noise, Self::Bias, Self::CorrelationTime, Self::Walk, Self::TurnOn, Self::Offset, Self::Scale];
+    pub(crate) const ALL: [Self; 7] = [
+        Self::Noise,
+        Self::Bias,
+        Self::CorrelationTime,
+        Self::Walk,
+        Self::TurnOn,
+        Self::Offset,
+        Self::Scale,
+    ];
 
     /// The key in a catalogue entry.
     pub(crate) const fn key(self) -> &'static str {
@@ -143,20 +159,39 @@ impl Quantity {
     pub(crate) fn parse(text: &str, units: Units) -> Result<Self, QuantityError> {
         let given = text.trim();
         // of "0.5e-3 deg/h" the longest beginning that is a number; 'e' may begin no unit here
-        let end = given.find(|c: char| !(c.is_ascii_digit() || ".+-eE".contains(c))).unwrap_or(given.len());
+        let end = given
+            .find(|c: char| !(c.is_ascii_digit() || ".+-eE".contains(c)))
+            .unwrap_or(given.len());
         let (number, unit) = (&given[..end], given[end..].trim());
-        let fitting = || units.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-        let number = number.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
+        let fitting = || {
+            units
+                .iter()
+                .map(|(name, _)| *name)
+                .collect::<Vec<_>>()
+                .join(", ")
+        };
+        let number = number
+            .parse()
+            .ok()
+            .filter(|x: &f64| x.is_finite() && *x > 0.0);
         let Some(number) = number else {
-            return Err(QuantityError::Number { example: format!("0.1 {}", units[0].0) });
+            return Err(QuantityError::Number {
+                example: format!("0.1 {}", units[0].0),
+            });
         };
         if unit.is_empty() {
             return Err(QuantityError::NoUnit { fitting: fitting() });
         }
         match units.iter().find(|(name, _)| plain(name) == plain(unit)) {
             Some((_, factor)) if number * factor > MOST => Err(QuantityError::TooLarge),
-            Some((_, factor)) => Ok(Self { given: given.to_owned(), value: number * factor }),
-            None => Err(QuantityError::Unit { unit: unit.to_owned(), fitting: fitting() }),
+            Some((_, factor)) => Ok(Self {
+                given: given.to_owned(),
+                value: number * factor,
+            }),
+            None => Err(QuantityError::Unit {
+                unit: unit.to_owned(),
+                fitting: fitting(),
+            }),
         }
     }
 }
@@ -191,7 +226,9 @@ mod tests {
     use super::*;
 
     fn parse(sensor: Sensor, figure: Figure, text: &str) -> Result<f64, String> {
-        Quantity::parse(text, figure.units(sensor)).map(|q| q.value).map_err(|e| e.to_string())
+        Quantity::parse(text, figure.units(sensor))
+            .map(|q| q.value)
+            .map_err(|e| e.to_string())
     }
 
     /// Each unit against its definition, written out independently of the table.
@@ -205,9 +242,19 @@ mod tests {
             (Sensor::Gyro, Figure::Noise, "0.6 deg/rt(hr)", 0.01 * deg),
             (Sensor::Accel, Figure::Noise, "0.14mg/sqrt(Hz)", 0.14e-3 * g),
             (Sensor::Accel, Figure::Noise, "1e-3 (m/s²)/sqrt(Hz)", 1e-3),
-            (Sensor::Accel, Figure::Noise, "0.065 fps/sqrt(hr)", 0.065 * 0.3048 / 60.0),
+            (
+                Sensor::Accel,
+                Figure::Noise,
+                "0.065 fps/sqrt(hr)",
+                0.065 * 0.3048 / 60.0,
+            ),
             (Sensor::Gyro, Figure::Noise, "0.6 °/√hr", 0.01 * deg),
-            (Sensor::Gyro, Figure::Noise, "0.01 deg/s/sqrt(Hz)", 0.01 * deg),
+            (
+                Sensor::Gyro,
+                Figure::Noise,
+                "0.01 deg/s/sqrt(Hz)",
+                0.01 * deg,
+            ),
             (Sensor::Gyro, Figure::Noise, "10 mdps/√Hz", 0.01 * deg),
             (Sensor::Gyro, Figure::Noise, "2 dps/√Hz", 2.0 * deg),
             (Sensor::Gyro, Figure::Noise, "36 °/h/√Hz", 0.01 * deg),
@@ -218,7 +265,12 @@ mod tests {
             (Sensor::Accel, Figure::TurnOn, "0.1 m/s^2", 0.1),
             (Sensor::Gyro, Figure::Bias, "10 °/h", 10.0 * deg / 3600.0),
             (Sensor::Gyro, Figure::TurnOn, "0.2 deg/s", 0.2 * deg),
-            (Sensor::Gyro, Figure::Walk, "6 deg/h/sqrt(h)", 6.0 * deg / 3600.0 / 60.0),
+            (
+                Sensor::Gyro,
+                Figure::Walk,
+                "6 deg/h/sqrt(h)",
+                6.0 * deg / 3600.0 / 60.0,
+            ),
             (Sensor::Accel, Figure::Walk, "60 ug/sqrt(h)", 1e-6 * g),
             (Sensor::Gyro, Figure::CorrelationTime, "5 min", 300.0),
             (Sensor::Accel, Figure::CorrelationTime, "2 h", 7200.0),
@@ -226,7 +278,10 @@ mod tests {
         ];
         for (sensor, figure, text, expected) in cases {
             let value = parse(sensor, figure, text).unwrap();
-            assert!((value / expected - 1.0).abs() < 1e-14, "{text}: {value:e} {expected:e}");
+            assert!(
+                (value / expected - 1.0).abs() < 1e-14,
+                "{text}: {value:e} {expected:e}"
+            );
         }
     }
 
@@ -236,10 +291,13 @@ mod tests {
         for sensor in Sensor::ALL {
             for (figure, from, to) in Figure::ALL.into_iter().flat_map(|figure| {
                 let units = figure.units(sensor);
-                units.iter().flat_map(move |from| units.iter().map(move |to| (figure, from, to)))
+                units
+                    .iter()
+                    .flat_map(move |from| units.iter().map(move |to| (figure, from, to)))
             }) {
                 let converted = parse(sensor, figure, &format!("0.3 {}", from.0)).unwrap() / to.1;
-                let back = parse(sensor, figure, &format!("{converted:e} {}", to.0)).unwrap() / from.1;
+                let back =
+                    parse(sensor, figure, &format!("{converted:e} {}", to.0)).unwrap() / from.1;
                 assert!((back / 0.3 - 1.0).abs() < 1e-14, "{} {}", from.0, to.0);
             }
         }
@@ -250,10 +308,28 @@ mod tests {
         let fitting = "units that fit: deg/h, deg/s, mdeg/s, rad/s";
         let refused = |text| parse(Sensor::Gyro, Figure::Bias, text).unwrap_err();
         assert_eq!(refused("10"), format!("has no unit; {fitting}"));
-        assert_eq!(refused("10 ug"), format!("has the unit ug, which does not fit; {fitting}"));
-        assert_eq!(refused("1e300 deg/s"), "is more than 1e12 in SI units, which no sensor has");
-        for text in ["", "deg/h", "-1 deg/h", "0 deg/h", "1e999 deg/h", "nan deg/h", "1.2.3 deg/h"] {
-            assert_eq!(refused(text), "does not begin with a number > 0, such as 0.1 deg/h", "{text}");
+        assert_eq!(
+            refused("10 ug"),
+            format!("has the unit ug, which does not fit; {fitting}")
+        );
+        assert_eq!(
+            refused("1e300 deg/s"),
+            "is more than 1e12 in SI units, which no sensor has"
+        );
+        for text in [
+            "",
+            "deg/h",
+            "-1 deg/h",
+            "0 deg/h",
+            "1e999 deg/h",
+            "nan deg/h",
+            "1.2.3 deg/h",
+        ] {
+            assert_eq!(
+                refused(text),
+                "does not begin with a number > 0, such as 0.1 deg/h",
+                "{text}"
+            );
         }
     }
 }

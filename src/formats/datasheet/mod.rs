@@ -86,7 +86,10 @@ impl Datasheet {
     }
 
     fn quantity(&self, sensor: Sensor, figure: Figure) -> Option<&Quantity> {
-        self.entries.iter().find(|e| e.sensor == sensor && e.figure == figure).map(|e| &e.quantity)
+        self.entries
+            .iter()
+            .find(|e| e.sensor == sensor && e.figure == figure)
+            .map(|e| &e.quantity)
     }
 
     /// The figures that decide an outage and the datasheet does not state: the model has no such error.
@@ -95,12 +98,15 @@ impl Datasheet {
         let figures = [Figure::Noise, Figure::Bias, Figure::TurnOn].into_iter();
         let needed = figures.flat_map(|figure| Sensor::ALL.map(|sensor| (sensor, figure)));
         let lacking = needed.filter(|(sensor, figure)| self.value(*sensor, *figure).is_none());
-        lacking.map(|(sensor, figure)| format!("{} {}", sensor.name(), figure.key())).collect()
+        lacking
+            .map(|(sensor, figure)| format!("{} {}", sensor.name(), figure.key()))
+            .collect()
     }
 
     /// Puts a figure in the place of what was known of it.
     pub(crate) fn set(&mut self, entry: Entry) {
-        self.entries.retain(|e| (e.sensor, e.figure) != (entry.sensor, entry.figure));
+        self.entries
+            .retain(|e| (e.sensor, e.figure) != (entry.sensor, entry.figure));
         self.entries.push(entry);
     }
 
@@ -116,7 +122,10 @@ impl Datasheet {
         let silent = |channel: &Channel| file.model.axis(*channel).processes.is_empty();
         file.missing = Channel::ALL.into_iter().filter(silent).collect();
         let turn_on = |sensor| self.value(sensor, Figure::TurnOn).map(|sigma| [sigma; 3]);
-        let turn_on = TurnOn { accel_m_s2: turn_on(Sensor::Accel), gyro_rad_s: turn_on(Sensor::Gyro) };
+        let turn_on = TurnOn {
+            accel_m_s2: turn_on(Sensor::Accel),
+            gyro_rad_s: turn_on(Sensor::Gyro),
+        };
         file.turn_on = (turn_on != TurnOn::default()).then_some(turn_on);
         file.provenance = Some(self.provenance(&doubts));
         Ok(Made { file, doubts })
@@ -138,8 +147,18 @@ impl Datasheet {
         let t_corr_s = given_s.unwrap_or(ASSUMED_CORRELATION_TIME_S);
         if let Some(floor) = self.value(sensor, Figure::Bias) {
             let flicker = Flicker { floor, t_corr_s };
-            processes.extend(flicker.processes(rate_hz)?.into_iter().map(Process::GaussMarkov));
-            doubts.extend(doubt_floor(sensor, flicker, density.unwrap_or(0.0), given_s.is_some()));
+            processes.extend(
+                flicker
+                    .processes(rate_hz)?
+                    .into_iter()
+                    .map(Process::GaussMarkov),
+            );
+            doubts.extend(doubt_floor(
+                sensor,
+                flicker,
+                density.unwrap_or(0.0),
+                given_s.is_some(),
+            ));
         }
         if let Some(density) = self.value(sensor, Figure::Walk) {
             let gamma2 = continuous::walk_gamma2(density, rate_hz);
@@ -153,14 +172,22 @@ impl Datasheet {
         table.insert("program".into(), PROGRAM.into());
         table.insert("schema".into(), (SCHEMA as i64).into());
         table.insert("estimator".into(), "datasheet".into());
-        table.insert("label".into(), "an assumption: figures of a datasheet, not a calibration".into());
+        table.insert(
+            "label".into(),
+            "an assumption: figures of a datasheet, not a calibration".into(),
+        );
         if let Some(name) = &self.name {
             table.insert("unit".into(), name.as_str().into());
         }
-        let assumptions: Vec<toml::Value> =
-            self.assumptions.iter().chain(doubts).map(|text| text.as_str().into()).collect();
+        let assumptions: Vec<toml::Value> = self
+            .assumptions
+            .iter()
+            .chain(doubts)
+            .map(|text| text.as_str().into())
+            .collect();
         table.insert("assumptions".into(), assumptions.into());
-        let figures: Vec<toml::Value> = self.entries.iter().map(|e| e.provenance().into()).collect();
+        let figures: Vec<toml::Value> =
+            self.entries.iter().map(|e| e.provenance().into()).collect();
         table.insert("figures".into(), figures.into());
         let not_stated: Vec<toml::Value> = self.not_stated().into_iter().map(Into::into).collect();
         if !not_stated.is_empty() {
@@ -173,7 +200,10 @@ impl Datasheet {
 impl Entry {
     fn provenance(&self) -> Table {
         let mut table = Table::new();
-        table.insert("figure".into(), format!("{}.{}", self.sensor.name(), self.figure.key()).into());
+        table.insert(
+            "figure".into(),
+            format!("{}.{}", self.sensor.name(), self.figure.key()).into(),
+        );
         table.insert("given".into(), self.quantity.given.as_str().into());
         table.insert("became".into(), became(self.figure).into());
         for (key, text) in [("source", &self.source), ("quote", &self.quote)] {

@@ -10,7 +10,13 @@ fn sheet(entries: &[(Sensor, Figure, &str)]) -> Datasheet {
     let mut sheet = Datasheet::default();
     for (sensor, figure, text) in entries {
         let quantity = Quantity::parse(text, figure.units(*sensor)).unwrap();
-        sheet.set(Entry { sensor: *sensor, figure: *figure, quantity, source: None, quote: None });
+        sheet.set(Entry {
+            sensor: *sensor,
+            figure: *figure,
+            quantity,
+            source: None,
+            quote: None,
+        });
     }
     sheet
 }
@@ -47,24 +53,40 @@ fn no_model_of_a_datasheet_is_below_its_bias_instability() {
         let sheet = catalogued(name).unwrap().unwrap();
         let model = sheet.model_file(100.0).unwrap().file.model;
         for sensor in Sensor::ALL {
-            let [floor, density] = [Figure::Bias, Figure::Noise].map(|figure| sheet.value(sensor, figure));
-            let (Some(floor), Some(density)) = (floor, density) else { continue };
+            let [floor, density] =
+                [Figure::Bias, Figure::Noise].map(|figure| sheet.value(sensor, figure));
+            let (Some(floor), Some(density)) = (floor, density) else {
+                continue;
+            };
             let noise = &model.axes[3 * sensor as usize];
             let times = (0..=146).map(|k| 2.0_f64.powf(f64::from(k) / 16.0));
-            let deviation = |t: f64| noise.allan_variance((100.0 * t).round() as u32).sqrt() / floor;
-            let (at_s, lowest) = times.map(|t| (t, deviation(t))).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+            let deviation =
+                |t: f64| noise.allan_variance((100.0 * t).round() as u32).sqrt() / floor;
+            let (at_s, lowest) = times
+                .map(|t| (t, deviation(t)))
+                .min_by(|a, b| a.1.total_cmp(&b.1))
+                .unwrap();
             let at_most = 1.08 * (density / floor / 567.8_f64.sqrt()).hypot(1.0);
-            assert!((0.999..at_most).contains(&lowest), "{name} {sensor:?}: {lowest} at {at_s} s");
+            assert!(
+                (0.999..at_most).contains(&lowest),
+                "{name} {sensor:?}: {lowest} at {at_s} s"
+            );
         }
     }
 }
 
 #[test]
 fn what_is_assumed_is_said() {
-    let bias = [(Sensor::Gyro, Figure::Bias, "10 deg/h"), (Sensor::Gyro, Figure::Noise, "0.3 deg/sqrt(h)")];
+    let bias = [
+        (Sensor::Gyro, Figure::Bias, "10 deg/h"),
+        (Sensor::Gyro, Figure::Noise, "0.3 deg/sqrt(h)"),
+    ];
     let doubts_with = |extra: &[(Sensor, Figure, &str)]| {
         let mut sheet = sheet(&bias);
-        self::sheet(extra).entries.into_iter().for_each(|entry| sheet.set(entry));
+        self::sheet(extra)
+            .entries
+            .into_iter()
+            .for_each(|entry| sheet.set(entry));
         sheet.model_file(100.0).unwrap().doubts
     };
     let assumed = "gyro: no correlation time is given; 300 s is assumed for the bias instability";
@@ -72,16 +94,26 @@ fn what_is_assumed_is_said() {
     // 0.3 °/√h is above 10 °/h until (0.3·60/10)² = 3.24 s: a floor that ends at 1.89·1 s is below that
     let doubts = doubts_with(&[(Sensor::Gyro, Figure::CorrelationTime, "1 s")]);
     assert!(
-        doubts[0].starts_with("gyro: at 1.89 s the white noise alone is above the bias instability"),
+        doubts[0]
+            .starts_with("gyro: at 1.89 s the white noise alone is above the bias instability"),
         "{doubts:?}"
     );
     // 3.24 s / 1.8926
-    assert!(doubts[0].ends_with("a correlation time above 1.71 s would"), "{doubts:?}");
+    assert!(
+        doubts[0].ends_with("a correlation time above 1.71 s would"),
+        "{doubts:?}"
+    );
     let doubts = doubts_with(&[(Sensor::Gyro, Figure::CorrelationTime, "0.001 s")]);
-    assert!(doubts[0].starts_with("gyro: at 0.00189 s the white noise alone"), "{doubts:?}");
+    assert!(
+        doubts[0].starts_with("gyro: at 0.00189 s the white noise alone"),
+        "{doubts:?}"
+    );
     // one that ends at 1.8926·3 s: √(1 + 3.24/5.678) = 1.25
     let doubts = doubts_with(&[(Sensor::Gyro, Figure::CorrelationTime, "3 s")]);
-    assert!(doubts[0].contains("is 1.25 times the bias instability, at 5.68 s"), "{doubts:?}");
+    assert!(
+        doubts[0].contains("is 1.25 times the bias instability, at 5.68 s"),
+        "{doubts:?}"
+    );
 }
 
 #[test]
@@ -94,7 +126,10 @@ fn provenance_holds_every_figure_as_given() {
     let file = made.model_file(100.0).unwrap().file;
     let provenance = file.provenance.as_ref().unwrap();
     let figures = provenance["figures"].as_array().unwrap();
-    let given: Vec<&str> = figures.iter().map(|f| f["given"].as_str().unwrap()).collect();
+    let given: Vec<&str> = figures
+        .iter()
+        .map(|f| f["given"].as_str().unwrap())
+        .collect();
     assert_eq!(given, ["0.3 °/√h", "0.1 deg/s", "300 ppm"]);
     assert_eq!(provenance["estimator"].as_str(), Some("datasheet"));
     let sigma = 0.1 * std::f64::consts::PI / 180.0;
@@ -106,11 +141,18 @@ fn provenance_holds_every_figure_as_given() {
 #[test]
 fn the_catalogue_is_sound() {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("calib_data/catalogue");
-    let files = std::fs::read_dir(&directory).unwrap().map(|f| f.unwrap().path());
-    let mut names: Vec<String> = files.map(|f| f.file_stem().unwrap().to_str().unwrap().to_owned()).collect();
+    let files = std::fs::read_dir(&directory)
+        .unwrap()
+        .map(|f| f.unwrap().path());
+    let mut names: Vec<String> = files
+        .map(|f| f.file_stem().unwrap().to_str().unwrap().to_owned())
+        .collect();
     names.sort();
     assert!(names.len() >= 10, "{}", names.len());
-    assert_eq!(names, CATALOGUE.iter().map(|(name, _)| *name).collect::<Vec<_>>());
+    assert_eq!(
+        names,
+        CATALOGUE.iter().map(|(name, _)| *name).collect::<Vec<_>>()
+    );
     for name in &names {
         let sheet = read(&directory.join(format!("{name}.toml"))).unwrap();
         assert_eq!(catalogued(&name.to_uppercase()).unwrap().unwrap(), sheet);
@@ -125,14 +167,23 @@ fn the_catalogue_is_sound() {
             );
             // the figure as given stands in the line that was read, whatever the unit's spelling
             let number = entry.quantity.given.split(' ').next().unwrap();
-            assert!(entry.quote.as_ref().is_some_and(|q| q.contains(number)), "{place}: {number}");
+            assert!(
+                entry.quote.as_ref().is_some_and(|q| q.contains(number)),
+                "{place}: {number}"
+            );
         }
         for sensor in Sensor::ALL {
             assert!(sheet.value(sensor, Figure::Noise).is_some(), "{name}");
             // one rule for all: what is removed before use is no turn-on bias, and the entry says so
             if sheet.value(sensor, Figure::Offset).is_some() {
                 assert!(sheet.value(sensor, Figure::TurnOn).is_none(), "{name}");
-                assert!(sheet.assumptions.iter().any(|text| text.contains("removed before use")), "{name}");
+                assert!(
+                    sheet
+                        .assumptions
+                        .iter()
+                        .any(|text| text.contains("removed before use")),
+                    "{name}"
+                );
             }
         }
         let file = sheet.model_file(100.0).unwrap().file;
@@ -149,7 +200,9 @@ fn the_catalogue_is_sound() {
 fn entries_are_refused_with_line_key_and_value() {
     let refused = |text: &str| {
         let head = "[unit]\nmanufacturer = \"A\"\nname = \"B\"\nclass = \"consumer\"\n";
-        parse(&Source::new("u.toml", &format!("{head}{text}"))).unwrap_err().to_string()
+        parse(&Source::new("u.toml", &format!("{head}{text}")))
+            .unwrap_err()
+            .to_string()
     };
     assert_eq!(
         refused("[gyro]\nbias = { value = \"10\", source = \"s\" }\n"),
@@ -164,5 +217,7 @@ fn entries_are_refused_with_line_key_and_value() {
         refused("[gyro]\nnoises = { value = \"1 deg/sqrt(h)\", source = \"s\" }\n"),
         "u.toml, line 6: unknown key \"gyro.noises\""
     );
-    assert!(refused("[gyro]\nnoise = { value = \"1 deg/sqrt(h)\" }\n").contains("source\" is missing"));
+    assert!(
+        refused("[gyro]\nnoise = { value = \"1 deg/sqrt(h)\" }\n").contains("source\" is missing")
+    );
 }

@@ -21,36 +21,111 @@ const MAX_SPEED: f64 = 8000.0;
 
 /// Quantities of fixes, as a KF-GINS text has them; a deviation up is one down.
 static KNOWN: [Known; 20] = [
-    Known::new("t_s", &["t", "time", "timestamp", "tow", "sow"], Unit::Time, true),
+    Known::new(
+        "t_s",
+        &["t", "time", "timestamp", "tow", "sow"],
+        Unit::Time,
+        true,
+    ),
     Known::new("lat_deg", &["lat", "latitude"], Unit::Angle, true),
     Known::new("lon_deg", &["lon", "lng", "longitude"], Unit::Angle, true),
-    Known::new("h_m", &["h", "height", "alt", "altitude"], Unit::Length, true),
     Known::new(
-        "sd_n_m",
-        &["sd_n", "std_n", "sigma_n", "pos_std_n", "sd_north", "sd_lat"],
+        "h_m",
+        &["h", "height", "alt", "altitude"],
         Unit::Length,
         true,
     ),
-    Known::new("sd_e_m", &["sd_e", "std_e", "sigma_e", "pos_std_e", "sd_east", "sd_lon"], Unit::Length, true),
+    Known::new(
+        "sd_n_m",
+        &[
+            "sd_n",
+            "std_n",
+            "sigma_n",
+            "pos_std_n",
+            "sd_north",
+            "sd_lat",
+        ],
+        Unit::Length,
+        true,
+    ),
+    Known::new(
+        "sd_e_m",
+        &["sd_e", "std_e", "sigma_e", "pos_std_e", "sd_east", "sd_lon"],
+        Unit::Length,
+        true,
+    ),
     Known::new(
         "sd_d_m",
-        &["sd_d", "std_d", "sigma_d", "pos_std_d", "sd_u", "std_u", "sd_h"],
+        &[
+            "sd_d",
+            "std_d",
+            "sigma_d",
+            "pos_std_d",
+            "sd_u",
+            "std_u",
+            "sd_h",
+        ],
         Unit::Length,
         true,
     ),
     Known::new("v_n_m_s", &["v_n", "vn"], Unit::Speed, true),
     Known::new("v_e_m_s", &["v_e", "ve"], Unit::Speed, true),
     Known::new("v_d_m_s", &["v_d", "vd"], Unit::Speed, true),
-    Known::new("sd_vn_m_s", &["sd_vn", "sd_v_n", "vel_std_n"], Unit::Speed, true),
-    Known::new("sd_ve_m_s", &["sd_ve", "sd_v_e", "vel_std_e"], Unit::Speed, true),
-    Known::new("sd_vd_m_s", &["sd_vd", "sd_v_d", "vel_std_d"], Unit::Speed, true),
+    Known::new(
+        "sd_vn_m_s",
+        &["sd_vn", "sd_v_n", "vel_std_n"],
+        Unit::Speed,
+        true,
+    ),
+    Known::new(
+        "sd_ve_m_s",
+        &["sd_ve", "sd_v_e", "vel_std_e"],
+        Unit::Speed,
+        true,
+    ),
+    Known::new(
+        "sd_vd_m_s",
+        &["sd_vd", "sd_v_d", "vel_std_d"],
+        Unit::Speed,
+        true,
+    ),
     Known::new("week", &["week", "gps_week"], Unit::Count, true),
-    Known::new("x_m", &["x", "x_ecef", "ecef_x", "pos_x"], Unit::Length, true),
-    Known::new("y_m", &["y", "y_ecef", "ecef_y", "pos_y"], Unit::Length, true),
-    Known::new("z_m", &["z", "z_ecef", "ecef_z", "pos_z"], Unit::Length, true),
-    Known::new("sd_x_m", &["sd_x", "sdx", "std_x", "sigma_x"], Unit::Length, true),
-    Known::new("sd_y_m", &["sd_y", "sdy", "std_y", "sigma_y"], Unit::Length, true),
-    Known::new("sd_z_m", &["sd_z", "sdz", "std_z", "sigma_z"], Unit::Length, true),
+    Known::new(
+        "x_m",
+        &["x", "x_ecef", "ecef_x", "pos_x"],
+        Unit::Length,
+        true,
+    ),
+    Known::new(
+        "y_m",
+        &["y", "y_ecef", "ecef_y", "pos_y"],
+        Unit::Length,
+        true,
+    ),
+    Known::new(
+        "z_m",
+        &["z", "z_ecef", "ecef_z", "pos_z"],
+        Unit::Length,
+        true,
+    ),
+    Known::new(
+        "sd_x_m",
+        &["sd_x", "sdx", "std_x", "sigma_x"],
+        Unit::Length,
+        true,
+    ),
+    Known::new(
+        "sd_y_m",
+        &["sd_y", "sdy", "std_y", "sigma_y"],
+        Unit::Length,
+        true,
+    ),
+    Known::new(
+        "sd_z_m",
+        &["sd_z", "sdz", "std_z", "sigma_z"],
+        Unit::Length,
+        true,
+    ),
 ];
 const PLACE: [&str; 4] = ["t_s", "lat_deg", "lon_deg", "h_m"];
 const PLACE_SIGMA: [&str; 3] = ["sd_n_m", "sd_e_m", "sd_d_m"];
@@ -107,16 +182,29 @@ impl<'a> FixColumns<'a> {
         }
         if any(VELOCITY) || any(VELOCITY_SIGMA) {
             needed.extend(VELOCITY);
-            if !is_given(VELOCITY_SIGMA, unsaid.is_some_and(|sigma| sigma.vel_m_s.is_some())) {
+            if !is_given(
+                VELOCITY_SIGMA,
+                unsaid.is_some_and(|sigma| sigma.vel_m_s.is_some()),
+            ) {
                 needed.extend(VELOCITY_SIGMA);
             }
         }
         let is_sigma = |name: &&'static str| name.starts_with("sd_");
-        columns.require(table, needed.iter().copied().filter(|name| !is_sigma(name)), COLUMNS)?;
+        columns.require(
+            table,
+            needed.iter().copied().filter(|name| !is_sigma(name)),
+            COLUMNS,
+        )?;
         // a receiver's log that has all but these
-        columns.require(table, needed, COLUMNS).map_err(|e| e.setting(Setting::FixSigma))?;
+        columns
+            .require(table, needed, COLUMNS)
+            .map_err(|e| e.setting(Setting::FixSigma))?;
         let [Some(t), Some(a), Some(b), Some(c)] = place.map(|name| columns.get(name)) else {
-            return Err(Error::contents(table.path.as_str(), table.header_line, COLUMNS));
+            return Err(Error::contents(
+                table.path.as_str(),
+                table.header_line,
+                COLUMNS,
+            ));
         };
         let found = Self {
             place: ([t, a, b, c], axes),
@@ -136,7 +224,10 @@ impl<'a> FixColumns<'a> {
             remarks.push(Remark::note("standard deviations as given for all fixes"));
         }
         if !ignored.is_empty() {
-            remarks.push(Remark::note(format!("columns not used: {}", ignored.join(", "))));
+            remarks.push(Remark::note(format!(
+                "columns not used: {}",
+                ignored.join(", ")
+            )));
         }
         remarks
     }
@@ -144,7 +235,10 @@ impl<'a> FixColumns<'a> {
     fn fix(&self, row: &[f64]) -> GnssFix {
         let triad = |columns: [Column; 3]| DVec3::from(columns.map(|column| column.of(row)));
         let sigma = |columns: Option<[Column; 3]>, given: Option<[f64; 3]>| {
-            columns.map(triad).or(given.map(DVec3::from)).unwrap_or(DVec3::NAN)
+            columns
+                .map(triad)
+                .or(given.map(DVec3::from))
+                .unwrap_or(DVec3::NAN)
         };
         let [t_s, a, b, c] = self.place.0.map(|column| column.of(row));
         let (lat, lon, h) = match self.place.1 {
@@ -161,25 +255,39 @@ impl<'a> FixColumns<'a> {
             lat,
             lon,
             h,
-            pos_sigma_n: stated.or(self.unsaid.map(|s| s.pos_m.into())).unwrap_or(DVec3::NAN),
-            velocity: self.velocity.map(|columns| GnssVelocity::new(triad(columns), velocity_sigma())),
+            pos_sigma_n: stated
+                .or(self.unsaid.map(|s| s.pos_m.into()))
+                .unwrap_or(DVec3::NAN),
+            velocity: self
+                .velocity
+                .map(|columns| GnssVelocity::new(triad(columns), velocity_sigma())),
         }
     }
 
     fn check(&self, table: &Table, line: u64, row: &[f64]) -> Result<(), Error> {
         let refuse = |column: Column, reason, advice| {
             let name = &table.columns[column.index];
-            Err(Error::cell(&table.path, line, name, row[column.index].to_string(), reason).advice(advice))
+            Err(Error::cell(
+                &table.path,
+                line,
+                name,
+                row[column.index].to_string(),
+                reason,
+            )
+            .advice(advice))
         };
-        const DEGREES: &str =
-            "latitude within ±89.9, longitude in (−180, 180] or [0, 360), in degrees (or lat_rad, lon_rad)";
+        const DEGREES: &str = "latitude within ±89.9, longitude in (−180, 180] or [0, 360), in degrees (or lat_rad, lon_rad)";
         let ([_, first, second, third], axes) = self.place;
         let fix = self.fix(row);
         if axes == Axes::Earth {
             let r_e = DVec3::new(first.of(row), second.of(row), third.of(row));
             if (r_e.length() - A).abs() > BEYOND_EARTH_M {
                 let advice = "the Earth's x, y, z in metres, 6.4e6 from its centre";
-                return refuse(first, "is not a place near the surface of the Earth", advice);
+                return refuse(
+                    first,
+                    "is not a place near the surface of the Earth",
+                    advice,
+                );
             }
         } else if fix.lat.abs() > 90.0 * DEG {
             return refuse(first, "is not a latitude", DEGREES);
@@ -187,14 +295,25 @@ impl<'a> FixColumns<'a> {
             return refuse(second, "is not a longitude", DEGREES);
         }
         if fix.lat.abs() > MAX_LATITUDE {
-            return refuse(first, "is too near a pole to navigate in latitude and longitude", DEGREES);
+            return refuse(
+                first,
+                "is too near a pole to navigate in latitude and longitude",
+                DEGREES,
+            );
         }
         let of_place = self.place_sigma.map(|(columns, _)| columns);
-        let sigmas = [of_place, self.velocity_sigma].into_iter().flatten().flatten();
+        let sigmas = [of_place, self.velocity_sigma]
+            .into_iter()
+            .flatten()
+            .flatten();
         match sigmas.into_iter().find(|column| column.of(row) <= 0.0) {
             Some(column) => {
                 let advice = "a fix needs the standard deviations its receiver believes; remove rows without";
-                refuse(column, "is not a standard deviation: it must be above 0", advice)
+                refuse(
+                    column,
+                    "is not a standard deviation: it must be above 0",
+                    advice,
+                )
             }
             None => Ok(()),
         }
@@ -209,7 +328,11 @@ const BEYOND_EARTH_M: f64 = 1e5;
 fn sigma_of_earth(lat: f64, lon: f64, sigma_e: DVec3) -> DVec3 {
     let c_e_n = DMat3::from_quat(q_e_n(lat, lon));
     let squared = |v: DVec3| v * v;
-    let variance = DMat3::from_cols(squared(c_e_n.x_axis), squared(c_e_n.y_axis), squared(c_e_n.z_axis));
+    let variance = DMat3::from_cols(
+        squared(c_e_n.x_axis),
+        squared(c_e_n.y_axis),
+        squared(c_e_n.z_axis),
+    );
     (variance * squared(sigma_e)).powf(0.5)
 }
 
@@ -217,8 +340,9 @@ fn sigma_of_earth(lat: f64, lon: f64, sigma_e: DVec3) -> DVec3 {
 fn of_another_kind(path: &str, text: &str) -> Option<Error> {
     let text = text.trim_start();
     let error = || {
-        Error::contents(path, 1_u64, "XML, as GPX and KML are, not a table of fixes")
-            .advice("write its points as a table t_s, lat_deg, lon_deg, h_m on the clock of the IMU")
+        Error::contents(path, 1_u64, "XML, as GPX and KML are, not a table of fixes").advice(
+            "write its points as a table t_s, lat_deg, lon_deg, h_m on the clock of the IMU",
+        )
     };
     text.starts_with('<').then(error)
 }
@@ -245,7 +369,10 @@ pub(crate) fn read_gnss(
         check_step(&shown, pair[1].0, &pair[0].1, &pair[1].1)?;
     }
     let fixes = fixes.into_iter().map(|(_, fix)| fix).collect();
-    Ok((fixes, remarks.into_iter().map(|r| r.of_file(&shown)).collect()))
+    Ok((
+        fixes,
+        remarks.into_iter().map(|r| r.of_file(&shown)).collect(),
+    ))
 }
 
 /// The fixes of a text: sentences or a table.
@@ -283,8 +410,13 @@ fn of_table(
     let table = table(path, &text, names.as_deref())?;
     let (columns, ignored) = FixColumns::new(&table, unsaid)?;
     if bare.is_some() && !is_rtklib {
-        let velocity = if columns.velocity.is_some() { ", velocity" } else { "" };
-        let text = format!("no header: read as KF-GINS text, position{velocity} and standard deviations");
+        let velocity = if columns.velocity.is_some() {
+            ", velocity"
+        } else {
+            ""
+        };
+        let text =
+            format!("no header: read as KF-GINS text, position{velocity} and standard deviations");
         remarks.push(Remark::note(text));
     }
     remarks.extend(columns.remarks(&ignored));
@@ -293,7 +425,8 @@ fn of_table(
         columns.check(&table, *line, row)?;
         fixes.push((*line, columns.fix(row)));
     }
-    let small = |(_, f): &(u64, GnssFix)| f.lat.abs() <= 0.5 * PI * DEG && f.lon.abs() <= 2.0 * PI * DEG;
+    let small =
+        |(_, f): &(u64, GnssFix)| f.lat.abs() <= 0.5 * PI * DEG && f.lon.abs() <= 2.0 * PI * DEG;
     if fixes.iter().all(small) {
         let text = "latitude and longitude never exceed π: radians? Then name the columns lat_rad, lon_rad";
         remarks.push(Remark::doubt(text));
@@ -304,7 +437,11 @@ fn of_table(
 /// The columns of a KF-GINS text, which has no header.
 fn bare_names(path: &Path, columns: usize) -> Result<Vec<&'static str>, Error> {
     let velocity = if columns == 13 { &VELOCITY[..] } else { &[] };
-    let velocity_sigma = if columns == 13 { &VELOCITY_SIGMA[..] } else { &[] };
+    let velocity_sigma = if columns == 13 {
+        &VELOCITY_SIGMA[..]
+    } else {
+        &[]
+    };
     if columns == POSITION || columns == 13 {
         return Ok([&PLACE, velocity, &PLACE_SIGMA, velocity_sigma].concat());
     }
@@ -324,7 +461,10 @@ fn check_step(path: &str, line: u64, before: &GnssFix, fix: &GnssFix) -> Result<
     if metres <= MAX_SPEED * seconds {
         return Ok(());
     }
-    let message = format!("the fix is {metres:.0} m from the one {} s before", (1e6 * seconds).round() / 1e6);
+    let message = format!(
+        "the fix is {metres:.0} m from the one {} s before",
+        (1e6 * seconds).round() / 1e6
+    );
     Err(Error::contents(path, line, message)
         .advice("is a latitude swapped with a longitude, a sign lost, or a row damaged?"))
 }
@@ -340,7 +480,11 @@ mod tests {
         let text = "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m,altitude\n0,46,7,400,1,1,2,450\n";
         std::fs::write(&path, text).unwrap();
         let e = read_gnss(&path, None, None, None).unwrap_err();
-        assert!(e.to_string().ends_with("line 1: columns \"h_m\" and \"altitude\" both give h_m"), "{e}");
+        assert!(
+            e.to_string()
+                .ends_with("line 1: columns \"h_m\" and \"altitude\" both give h_m"),
+            "{e}"
+        );
         assert_eq!(e.hint().unwrap(), "remove one of them");
     }
 
@@ -356,12 +500,20 @@ mod tests {
         let r_e = geodetic_to_ecef(46.5 * DEG, 6.5 * DEG, 400.0);
         let place = format!("1,{},{},{},2,2,2\n", r_e.x, r_e.y, r_e.z);
         let [equator, alps] = ["0,6378237,0,0,3,2,1\n", &place].map(|row| read(row).unwrap()[0]);
-        assert!(equator.lat.abs() < 1e-15 && equator.lon == 0.0 && (equator.h - 100.0).abs() < 1e-8);
+        assert!(
+            equator.lat.abs() < 1e-15 && equator.lon == 0.0 && (equator.h - 100.0).abs() < 1e-8
+        );
         assert!((equator.pos_sigma_n - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12);
         // a nanometre of rounding in 6.4e6 m
         assert!((alps.lat - 46.5 * DEG).abs() < 1e-15 && (alps.lon - 6.5 * DEG).abs() < 1e-15);
-        assert!((alps.h - 400.0).abs() < 1e-8 && (alps.pos_sigma_n - DVec3::splat(2.0)).length() < 1e-12);
+        assert!(
+            (alps.h - 400.0).abs() < 1e-8
+                && (alps.pos_sigma_n - DVec3::splat(2.0)).length() < 1e-12
+        );
         let e = read("0,6378.2,0,0,3,2,1\n").unwrap_err().to_string();
-        assert!(e.contains("column \"X\": 6378.2 is not a place near the surface"), "{e}");
+        assert!(
+            e.contains("column \"X\": 6378.2 is not a place near the surface"),
+            "{e}"
+        );
     }
 }

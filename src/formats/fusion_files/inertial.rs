@@ -52,15 +52,32 @@ struct Columns {
 ///
 /// # Errors
 /// Whatever is wrong with it, with its line.
-pub(crate) fn read_imu(path: &Path, names: Option<&[String]>, topic: Option<&str>) -> Result<ImuFile, Error> {
-    let ends_in = |ending: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
-    let packed = ends_in("npy") || ends_in("parquet") || path.is_dir() || logs::kind_of(path).is_some();
-    let text = if packed || names.is_some() { None } else { Some(text(path)?) };
-    let columns = match text.as_ref().and_then(|text| Some((text, bare_columns(text)?))) {
+pub(crate) fn read_imu(
+    path: &Path,
+    names: Option<&[String]>,
+    topic: Option<&str>,
+) -> Result<ImuFile, Error> {
+    let ends_in = |ending: &str| {
+        path.extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case(ending))
+    };
+    let packed =
+        ends_in("npy") || ends_in("parquet") || path.is_dir() || logs::kind_of(path).is_some();
+    let text = if packed || names.is_some() {
+        None
+    } else {
+        Some(text(path)?)
+    };
+    let columns = match text
+        .as_ref()
+        .and_then(|text| Some((text, bare_columns(text)?)))
+    {
         Some((text, 7..=8)) => kf_gins(path, text)?,
         Some((_, columns)) => {
             let message = format!("{columns} columns without a header");
-            return Err(Error::contents(path.display().to_string(), Place::Within, message).advice(KF_GINS));
+            return Err(
+                Error::contents(path.display().to_string(), Place::Within, message).advice(KF_GINS),
+            );
         }
         None => headed(path, names, topic)?,
     };
@@ -83,11 +100,19 @@ fn kf_gins(path: &Path, text: &str) -> Result<Columns, Error> {
     ];
     let columns = bare_columns(text).unwrap_or(7);
     let table = table(path, text, Some(&NAMES[..columns]))?;
-    let odometer = if columns > 7 { "; the odometer's speed in column 8 is not used" } else { "" };
+    let odometer = if columns > 7 {
+        "; the odometer's speed in column 8 is not used"
+    } else {
+        ""
+    };
     Ok(Columns {
         path: table.path,
         t_s: table.rows.iter().map(|(_, r)| r[0]).collect(),
-        values: table.rows.iter().map(|(_, r)| [r[4], r[5], r[6], r[1], r[2], r[3]]).collect(),
+        values: table
+            .rows
+            .iter()
+            .map(|(_, r)| [r[4], r[5], r[6], r[1], r[2], r[3]])
+            .collect(),
         increments: [true; 2],
         lines: table.rows.iter().map(|(line, _)| *line).collect(),
         remarks: vec![Remark::note(format!(
@@ -98,21 +123,40 @@ fn kf_gins(path: &Path, text: &str) -> Result<Columns, Error> {
 
 fn headed(path: &Path, names: Option<&[String]>, topic: Option<&str>) -> Result<Columns, Error> {
     let columns = names.map(<[String]>::to_vec);
-    let log = LogOptions { topic: topic.map(str::to_owned), ..LogOptions::default() };
-    let options = ReadOptions { hold_bytes: usize::MAX, columns, log, ..ReadOptions::default() };
+    let log = LogOptions {
+        topic: topic.map(str::to_owned),
+        ..LogOptions::default()
+    };
+    let options = ReadOptions {
+        hold_bytes: usize::MAX,
+        columns,
+        log,
+        ..ReadOptions::default()
+    };
     let mut raw = recordings::load(path, &options)?;
     let shown = raw.path.clone();
     let from_gravity = gravity_factor(&raw)?;
     let mut signals = Vec::new();
     for channel in Channel::ALL {
-        let (role, values) =
-            take(&mut raw, |role| matches!(role, Role::Signal { channel: c, .. } if *c == channel))?
-                .ok_or_else(|| {
-                    lacking(&shown, &format!("channel {channel} is missing; all six are needed"))
-                })?;
+        let (role, values) = take(
+            &mut raw,
+            |role| matches!(role, Role::Signal { channel: c, .. } if *c == channel),
+        )?
+        .ok_or_else(|| {
+            lacking(
+                &shown,
+                &format!("channel {channel} is missing; all six are needed"),
+            )
+        })?;
         let (factor, increment) = match role {
-            Role::Signal { unit: Unit::Si(factor), .. } => (factor, false),
-            Role::Signal { unit: Unit::Increment(factor), .. } => (factor, true),
+            Role::Signal {
+                unit: Unit::Si(factor),
+                ..
+            } => (factor, false),
+            Role::Signal {
+                unit: Unit::Increment(factor),
+                ..
+            } => (factor, true),
             _ => (from_gravity, false),
         };
         signals.push((values, factor, increment));
@@ -120,7 +164,9 @@ fn headed(path: &Path, names: Option<&[String]>, topic: Option<&str>) -> Result<
     let t_s = times(&mut raw)?;
     let notes = std::mem::take(&mut raw.notes);
     let assumed = notes.assumptions.into_iter().map(Remark::note);
-    let remarks = assumed.chain(notes.warnings.into_iter().map(Remark::doubt)).collect();
+    let remarks = assumed
+        .chain(notes.warnings.into_iter().map(Remark::doubt))
+        .collect();
     let sample = |k: usize| std::array::from_fn(|i| signals[i].0[k] * signals[i].1);
     Ok(Columns {
         values: (0..t_s.len()).map(sample).collect(),
@@ -140,8 +186,13 @@ fn lacking(path: &str, message: &str) -> Error {
 }
 
 /// The first column of such a role, with its numbers.
-fn take(raw: &mut Raw, is_wanted: impl Fn(&Role) -> bool) -> Result<Option<(Role, Vec<f64>)>, Error> {
-    let Some(index) = raw.columns.iter().position(|c| is_wanted(&c.role)) else { return Ok(None) };
+fn take(
+    raw: &mut Raw,
+    is_wanted: impl Fn(&Role) -> bool,
+) -> Result<Option<(Role, Vec<f64>)>, Error> {
+    let Some(index) = raw.columns.iter().position(|c| is_wanted(&c.role)) else {
+        return Ok(None);
+    };
     let column = raw.columns.swap_remove(index);
     let values = column.values.into_vec();
     let values = values.map_err(storage(&raw.path))?;
@@ -165,7 +216,12 @@ impl Columns {
             return Err(Error::contents(self.path, Place::Within, message));
         }
         if let Some(k) = (1..self.t_s.len()).find(|k| self.t_s[*k] <= self.t_s[k - 1]) {
-            return Err(time_back(&self.path, self.lines[k], self.t_s[k - 1], self.t_s[k]));
+            return Err(time_back(
+                &self.path,
+                self.lines[k],
+                self.t_s[k - 1],
+                self.t_s[k],
+            ));
         }
         let step = median_step(&self.t_s);
         self.doubt_units(step)?;
@@ -177,19 +233,23 @@ impl Columns {
             // a sample after a hole lasts a step like any other
             let is_hole = since_s > GAP * step;
             let sample = self.sample(k, if is_hole { step } else { since_s }, t_s);
-            let refuse = |message: String| Error::contents(self.path.as_str(), self.lines[k], message);
+            let refuse =
+                |message: String| Error::contents(self.path.as_str(), self.lines[k], message);
             if is_hole && since_s - step > LONGEST_S + 0.5 * step {
                 let previous_s = self.t_s[k - 1];
-                let message =
-                    format!("no samples from {previous_s} s to {t_s} s: {LONGEST_S} s can be bridged");
-                return Err(refuse(message).advice("fuse the stretches before and after it one by one"));
+                let message = format!(
+                    "no samples from {previous_s} s to {t_s} s: {LONGEST_S} s can be bridged"
+                );
+                return Err(
+                    refuse(message).advice("fuse the stretches before and after it one by one")
+                );
             }
             let angle = sample.dtheta.length();
             if angle > MAX_ROTATION {
                 let [degrees, most] = [angle, MAX_ROTATION].map(|a| a / DEG);
-                let message = format!("a rotation of {degrees:.1}° in one sample, {most:.1}° at most");
-                let advice =
-                    "is the unit right? gyro_x_deg_s is in degrees, gyro_x_rad_s in radians a second";
+                let message =
+                    format!("a rotation of {degrees:.1}° in one sample, {most:.1}° at most");
+                let advice = "is the unit right? gyro_x_deg_s is in degrees, gyro_x_rad_s in radians a second";
                 return Err(refuse(message).advice(advice));
             }
             if is_hole {
@@ -198,12 +258,22 @@ impl Columns {
             samples.push(sample);
         }
         self.tell_of_holes(&holes);
-        let remarks = self.remarks.into_iter().map(|r| r.of_file(&self.path)).collect();
-        Ok(ImuFile { samples: bridged(&samples, step), rate_hz: 1.0 / step, remarks })
+        let remarks = self
+            .remarks
+            .into_iter()
+            .map(|r| r.of_file(&self.path))
+            .collect();
+        Ok(ImuFile {
+            samples: bridged(&samples, step),
+            rate_hz: 1.0 / step,
+            remarks,
+        })
     }
 
     fn tell_of_holes(&mut self, holes: &[(usize, f64)]) {
-        let Some((k, seconds)) = holes.first() else { return };
+        let Some((k, seconds)) = holes.first() else {
+            return;
+        };
         let (t_s, line, more) = (self.t_s[*k], self.lines[*k], holes.len() - 1);
         self.remarks.push(Remark::doubt(format!(
             "samples missing: {seconds:.2} s before {t_s:.2} s (line {line}) and {more} more gaps; bridged"
@@ -213,12 +283,27 @@ impl Columns {
     /// Sample k over `dt` seconds that end at `t_s`.
     fn sample(&self, k: usize, dt: f64, t_s: f64) -> ImuIncrement {
         let v = &self.values[k];
-        let seconds = |sensor: Sensor| if self.increments[sensor as usize] { 1.0 } else { dt };
+        let seconds = |sensor: Sensor| {
+            if self.increments[sensor as usize] {
+                1.0
+            } else {
+                dt
+            }
+        };
         let triad = |sensor: Sensor| {
-            let first = Channel { sensor, axis: Axis::X }.index();
+            let first = Channel {
+                sensor,
+                axis: Axis::X,
+            }
+            .index();
             DVec3::new(v[first], v[first + 1], v[first + 2]) * seconds(sensor)
         };
-        ImuIncrement { t_s, dt_s: dt, dtheta: triad(Sensor::Gyro), dv: triad(Sensor::Accel) }
+        ImuIncrement {
+            t_s,
+            dt_s: dt,
+            dtheta: triad(Sensor::Gyro),
+            dv: triad(Sensor::Accel),
+        }
     }
 
     /// Over a whole recording the specific force is gravity in the mean, and nothing turns all the time.
@@ -227,7 +312,13 @@ impl Columns {
         let mean = |sensor: Sensor| {
             let length = |k: usize| {
                 let s = self.sample(k, step, 0.0);
-                (if sensor == Sensor::Accel { s.dv } else { s.dtheta }).length() / step
+                (if sensor == Sensor::Accel {
+                    s.dv
+                } else {
+                    s.dtheta
+                })
+                .length()
+                    / step
             };
             (0..self.values.len()).map(length).sum::<f64>() / n
         };
@@ -237,7 +328,8 @@ impl Columns {
         }
         if rate > FAST {
             let degrees = rate / DEG;
-            let text = format!("mean angular rate {degrees:.0} deg/s: are these degrees named radians?");
+            let text =
+                format!("mean angular rate {degrees:.0} deg/s: are these degrees named radians?");
             self.remarks.push(Remark::doubt(text));
         }
         Ok(())

@@ -109,7 +109,12 @@ fn parse(source: &Source) -> Result<Start, FileError> {
         perfect: false,
     };
     sigma.validate().map_err(|e| source.setting(&e))?;
-    Ok(Start { t_s: d.t_s.0, state, sigma, found: None })
+    Ok(Start {
+        t_s: d.t_s.0,
+        state,
+        sigma,
+        found: None,
+    })
 }
 
 #[cfg(test)]
@@ -118,22 +123,36 @@ mod tests {
 
     #[test]
     fn refusals_name_line_key_and_value() {
-        let sound =
-            "t_s = 0\nlat_deg = 46\nlon_deg = 6\nh_m = 400\nroll_deg = 0\npitch_deg = 0\nyaw_deg = 40\n";
+        let sound = "t_s = 0\nlat_deg = 46\nlon_deg = 6\nh_m = 400\nroll_deg = 0\npitch_deg = 0\nyaw_deg = 40\n";
         let refused = |text: &str| {
             let e = parse(&Source::new("i.toml", text)).unwrap_err();
             format!("{e} | {}", e.hint().unwrap_or_default())
         };
-        assert_eq!(parse(&Source::new("i.toml", sound)).unwrap().sigma, InitialSettings::default());
+        assert_eq!(
+            parse(&Source::new("i.toml", sound)).unwrap().sigma,
+            InitialSettings::default()
+        );
         for (old, new, expected) in [
-            ("= 46", "= 91", "i.toml, line 2: \"lat_deg\" = 91 is not within ±89.9 | "),
-            ("= 46", "= 89.95", "i.toml, line 2: \"lat_deg\" = 89.95 is not within ±89.9 | "),
+            (
+                "= 46",
+                "= 91",
+                "i.toml, line 2: \"lat_deg\" = 91 is not within ±89.9 | ",
+            ),
+            (
+                "= 46",
+                "= 89.95",
+                "i.toml, line 2: \"lat_deg\" = 89.95 is not within ±89.9 | ",
+            ),
             (
                 "= 400",
                 "= inf",
                 "i.toml, line 4: \"h_m\" = inf is not a finite number | a number such as 1.5e-4; neither nan nor inf",
             ),
-            ("h_m = 400\n", "", "i.toml, line 1: \"h_m\" is missing | add the key \"h_m\""),
+            (
+                "h_m = 400\n",
+                "",
+                "i.toml, line 1: \"h_m\" is missing | add the key \"h_m\"",
+            ),
             (
                 "yaw_deg",
                 "heading_deg",

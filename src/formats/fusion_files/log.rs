@@ -29,15 +29,27 @@ pub(super) fn fixes(
     for (row, fix) in read.by_ref().enumerate() {
         let fix = of_log(&fix.map_err(refused)?, unsaid).ok_or_else(|| {
             let message = "the fixes have no standard deviations";
-            FileError::contents(path.display().to_string(), Place::Within, message).setting(Setting::FixSigma)
+            FileError::contents(path.display().to_string(), Place::Within, message)
+                .setting(Setting::FixSigma)
         })?;
         fixes.push((row as u64 + 1, fix));
     }
     let mut said = format!("fixes of {}", read.topic());
-    let is_dated = log.channels().iter().any(|c| c.topic == read.topic() && c.clock == Clock::Unix);
-    let span_s = fixes.first().zip(fixes.last()).map(|((_, first), (_, last))| (first.t_s, last.t_s));
-    if let Some(clock) = span_s.filter(|_| is_dated).and_then(|span_s| of_unix(span_s, imu_s)) {
-        fixes.iter_mut().for_each(|(_, fix)| fix.t_s -= clock.origin_s);
+    let is_dated = log
+        .channels()
+        .iter()
+        .any(|c| c.topic == read.topic() && c.clock == Clock::Unix);
+    let span_s = fixes
+        .first()
+        .zip(fixes.last())
+        .map(|((_, first), (_, last))| (first.t_s, last.t_s));
+    if let Some(clock) = span_s
+        .filter(|_| is_dated)
+        .and_then(|span_s| of_unix(span_s, imu_s))
+    {
+        fixes
+            .iter_mut()
+            .for_each(|(_, fix)| fix.t_s -= clock.origin_s);
         said = format!("{said}, in {}", clock.name);
     }
     Ok((fixes, vec![Remark::note(said)]))

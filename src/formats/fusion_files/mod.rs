@@ -51,7 +51,10 @@ impl Remark {
 pub(super) fn bare_row(text: &str) -> Option<Vec<f64>> {
     let mut lines = text.lines().map(str::trim);
     let first = lines.find(|l| !(l.is_empty() || l.starts_with(['#', '%', '/'])))?;
-    let row: Option<Vec<f64>> = first.split_whitespace().map(|cell| cell.parse().ok()).collect();
+    let row: Option<Vec<f64>> = first
+        .split_whitespace()
+        .map(|cell| cell.parse().ok())
+        .collect();
     row.filter(|row| row.len() > 1)
 }
 
@@ -62,7 +65,12 @@ fn bare_columns(text: &str) -> Option<usize> {
 
 /// The table of a file, its columns named when it has no header.
 fn table(path: &Path, text: &str, columns: Option<&[&str]>) -> Result<Table, FileError> {
-    let read = Table::read(&path.display().to_string(), text.as_bytes(), columns, Numbers::Finite);
+    let read = Table::read(
+        &path.display().to_string(),
+        text.as_bytes(),
+        columns,
+        Numbers::Finite,
+    );
     read.map_err(|e| match e.kind {
         Kind::Header(_) | Kind::Empty(_) => e.advice_instead(fixes::COLUMNS),
         Kind::Cell { .. } => e.advice_instead("remove the row: a fix that is not whole is no fix"),

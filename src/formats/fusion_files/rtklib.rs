@@ -28,13 +28,19 @@ pub(in crate::formats) fn is_rtklib(text: &str) -> bool {
 
 /// The line that names the columns.
 fn header(text: &str) -> Option<(usize, &str)> {
-    let comments = text.lines().enumerate().take_while(|(_, l)| l.starts_with('%') || l.trim().is_empty());
+    let comments = text
+        .lines()
+        .enumerate()
+        .take_while(|(_, l)| l.starts_with('%') || l.trim().is_empty());
     comments.filter(|(_, l)| l.contains("sdn(m)")).last()
 }
 
 /// Leap seconds between GPS time and UTC at a time (Unix s).
 pub(super) fn leap_s(unix_s: f64) -> f64 {
-    LEAPS.iter().find(|(from_s, _)| unix_s >= *from_s).map_or(0.0, |(_, leap)| *leap)
+    LEAPS
+        .iter()
+        .find(|(from_s, _)| unix_s >= *from_s)
+        .map_or(0.0, |(_, leap)| *leap)
 }
 
 /// Clock that an IMU may run in.
@@ -51,54 +57,90 @@ fn clocks(begin_s: f64) -> [ClockOfImu; 3] {
     let (week, epoch_s) = ((begin_s / WEEK_S).floor(), GPS_EPOCH_S as f64);
     let leap_s = leap_s(begin_s + epoch_s);
     [
-        ClockOfImu { origin_s: week * WEEK_S, name: format!("seconds of GPS week {week}") },
-        ClockOfImu { origin_s: leap_s - epoch_s, name: format!("Unix time, {leap_s} s behind GPS time") },
-        ClockOfImu { origin_s: 0.0, name: "seconds of GPS time".to_owned() },
+        ClockOfImu {
+            origin_s: week * WEEK_S,
+            name: format!("seconds of GPS week {week}"),
+        },
+        ClockOfImu {
+            origin_s: leap_s - epoch_s,
+            name: format!("Unix time, {leap_s} s behind GPS time"),
+        },
+        ClockOfImu {
+            origin_s: 0.0,
+            name: "seconds of GPS time".to_owned(),
+        },
     ]
 }
 
 /// Whether an IMU runs in a clock beside fixes of such times.
 fn runs(clock: &ClockOfImu, span_s: (f64, f64), imu_s: Option<(f64, f64)>) -> bool {
-    imu_s.is_some_and(|imu| imu.0 <= span_s.1 - clock.origin_s && span_s.0 - clock.origin_s <= imu.1)
+    imu_s
+        .is_some_and(|imu| imu.0 <= span_s.1 - clock.origin_s && span_s.0 - clock.origin_s <= imu.1)
 }
 
 /// The clock of an IMU beside fixes in GPS time (s): the first that it ran in, else the second of the GPS week.
 fn clock(span_s: (f64, f64), imu_s: Option<(f64, f64)>) -> ClockOfImu {
     let [of_week, unix, gps] = clocks(span_s.0);
     let others = [&of_week, &unix, &gps];
-    others.into_iter().find(|clock| runs(clock, span_s, imu_s)).unwrap_or(&of_week).clone()
+    others
+        .into_iter()
+        .find(|clock| runs(clock, span_s, imu_s))
+        .unwrap_or(&of_week)
+        .clone()
 }
 
 /// The same beside fixes in Unix time, where the IMU runs in another.
 pub(super) fn of_unix(span_s: (f64, f64), imu_s: Option<(f64, f64)>) -> Option<ClockOfImu> {
-    let unix = ClockOfImu { origin_s: 0.0, name: String::new() };
+    let unix = ClockOfImu {
+        origin_s: 0.0,
+        name: String::new(),
+    };
     // to GPS time
     let gps_s = leap_s(span_s.0) - GPS_EPOCH_S as f64;
-    let [of_week, _, gps] =
-        clocks(span_s.0 + gps_s).map(|c| ClockOfImu { origin_s: c.origin_s - gps_s, ..c });
-    let found = [unix, gps, of_week].into_iter().find(|clock| runs(clock, span_s, imu_s))?;
+    let [of_week, _, gps] = clocks(span_s.0 + gps_s).map(|c| ClockOfImu {
+        origin_s: c.origin_s - gps_s,
+        ..c
+    });
+    let found = [unix, gps, of_week]
+        .into_iter()
+        .find(|clock| runs(clock, span_s, imu_s))?;
     (found.origin_s != 0.0).then_some(found)
 }
 
 /// Columns of velocity north, east, up (m/s) and of their standard deviations, where they are in the header.
 fn velocity(names: &str) -> Option<[usize; 6]> {
     // the time is one name and two columns
-    let at =
-        |name: &str| names.trim_start_matches('%').split_whitespace().position(|n| n == name).map(|i| i + 1);
+    let at = |name: &str| {
+        names
+            .trim_start_matches('%')
+            .split_whitespace()
+            .position(|n| n == name)
+            .map(|i| i + 1)
+    };
     let found = ["vn(m/s)", "ve(m/s)", "vu(m/s)", "sdvn", "sdve", "sdvu"].map(at);
-    found.iter().all(Option::is_some).then(|| found.map(Option::unwrap_or_default))
+    found
+        .iter()
+        .all(Option::is_some)
+        .then(|| found.map(Option::unwrap_or_default))
 }
 
 /// Velocity north, east, down and its standard deviations of a row; none where one is missing or none.
 fn moving(cells: &[&str], columns: [usize; 6]) -> Option<([f64; 3], [f64; 3])> {
     let value = |i: usize| cells.get(columns[i])?.parse::<f64>().ok();
-    let (v, sigma) = ([value(0)?, value(1)?, -value(2)?], [value(3)?, value(4)?, value(5)?]);
+    let (v, sigma) = (
+        [value(0)?, value(1)?, -value(2)?],
+        [value(3)?, value(4)?, value(5)?],
+    );
     sigma.iter().all(|s| *s > 0.0).then_some((v, sigma))
 }
 
 /// The same as rows of time, position and standard deviations, or with velocities where all rows have them, line by line, and
 /// what is to be said of it. `imu_s` is when the IMU begins and ends.
-pub(super) fn rows(path: &str, text: &str, imu_s: Option<(f64, f64)>) -> Result<(String, String), Error> {
+pub(super) fn rows(
+    path: &str,
+    text: &str,
+    imu_s: Option<(f64, f64)>,
+) -> Result<(String, String), Error> {
     let (at, names) = header(text).unwrap_or_default();
     let refuse = |line: usize, message: &str, advice: &'static str| {
         Err(Error::contents(path, line + 1, message).advice(advice))
@@ -122,8 +164,15 @@ pub(super) fn rows(path: &str, text: &str, imu_s: Option<(f64, f64)>) -> Result<
         if line.starts_with('%') || line.trim().is_empty() {
             continue;
         }
-        let cells: Vec<&str> = line.split([' ', ',', '\t']).filter(|c| !c.is_empty()).collect();
-        let time = if cells.len() < COLUMNS { None } else { gps_time_s(cells[0], cells[1]) };
+        let cells: Vec<&str> = line
+            .split([' ', ',', '\t'])
+            .filter(|c| !c.is_empty())
+            .collect();
+        let time = if cells.len() < COLUMNS {
+            None
+        } else {
+            gps_time_s(cells[0], cells[1])
+        };
         let Some(t_s) = time else {
             return refuse(
                 i,
@@ -133,10 +182,18 @@ pub(super) fn rows(path: &str, text: &str, imu_s: Option<(f64, f64)>) -> Result<
         };
         read.push((i, t_s, cells));
     }
-    let columns =
-        velocity(names).filter(|columns| read.iter().all(|(.., cells)| moving(cells, *columns).is_some()));
-    let ends = read.first().zip(read.last()).map_or((0.0, 0.0), |(first, last)| (first.1, last.1));
-    let ClockOfImu { origin_s, name: clock } = clock(ends, imu_s);
+    let columns = velocity(names).filter(|columns| {
+        read.iter()
+            .all(|(.., cells)| moving(cells, *columns).is_some())
+    });
+    let ends = read
+        .first()
+        .zip(read.last())
+        .map_or((0.0, 0.0), |(first, last)| (first.1, last.1));
+    let ClockOfImu {
+        origin_s,
+        name: clock,
+    } = clock(ends, imu_s);
     let (mut table, mut lines) = (String::new(), 0);
     for (i, t_s, cells) in &read {
         let three = |v: [f64; 3]| v.map(|v| v.to_string()).join(" ");
@@ -155,15 +212,21 @@ pub(super) fn rows(path: &str, text: &str, imu_s: Option<(f64, f64)>) -> Result<
         table += &(parts.into_iter().flatten().collect::<Vec<_>>().join(" ") + "\n");
     }
     let velocity = if columns.is_some() { ", velocity" } else { "" };
-    Ok((table, format!("an RTKLIB solution: position{velocity} and standard deviations, in {clock}")))
+    Ok((
+        table,
+        format!("an RTKLIB solution: position{velocity} and standard deviations, in {clock}"),
+    ))
 }
 
 /// Seconds since GPS weeks are counted, of a date and a time of day or of a week and its second.
 fn gps_time_s(first: &str, second: &str) -> Option<f64> {
     if !first.contains('/') {
-        return Some(first.parse::<u32>().map(f64::from).ok()? * WEEK_S + second.parse::<f64>().ok()?);
+        return Some(
+            first.parse::<u32>().map(f64::from).ok()? * WEEK_S + second.parse::<f64>().ok()?,
+        );
     }
-    let time = NaiveDateTime::parse_from_str(&format!("{first} {second}"), "%Y/%m/%d %H:%M:%S%.f").ok()?;
+    let time =
+        NaiveDateTime::parse_from_str(&format!("{first} {second}"), "%Y/%m/%d %H:%M:%S%.f").ok()?;
     // GPST has no leap seconds, and neither has this count
     let since = time.and_utc() - DateTime::from_timestamp(GPS_EPOCH_S, 0)?;
     Some(since.num_seconds() as f64 + 1e-9 * f64::from(since.subsec_nanos()))
@@ -178,10 +241,14 @@ mod tests {
     /// 2021-03-01 was a Monday, the second day of GPS week 2147.
     #[test]
     fn dates_and_weeks_are_one_clock() {
-        let dated = format!("{HEAD}2021/03/01 00:00:01.250   46.5 6.5 400.8  5  8  2.0 2.1 4.0 0.1 0 0\n");
+        let dated =
+            format!("{HEAD}2021/03/01 00:00:01.250   46.5 6.5 400.8  5  8  2.0 2.1 4.0 0.1 0 0\n");
         let counted = format!("{HEAD}2147 86401.250   46.5 6.5 400.8  5  8  2.0 2.1 4.0 0.1 0 0\n");
         assert!(is_rtklib(&dated) && !is_rtklib("t_s,lat_deg\n") && !is_rtklib(""));
-        let expected = ("\n\n86401.250000 46.5 6.5 400.8 2.0 2.1 4.0\n", "seconds of GPS week 2147");
+        let expected = (
+            "\n\n86401.250000 46.5 6.5 400.8 2.0 2.1 4.0\n",
+            "seconds of GPS week 2147",
+        );
         for text in [dated, counted] {
             let (table, remark) = rows("a.pos", &text, None).unwrap();
             assert_eq!(table, expected.0);
@@ -204,15 +271,20 @@ mod tests {
         assert_eq!(read(None).0, format!("\n\n86401.250000 {rest}"));
         let gps_s = 2147.0 * WEEK_S + 86_401.25;
         let unix_s = 1_614_556_801.25 - 18.0;
-        for (start_s, words) in [(gps_s, "seconds of GPS time"), (unix_s, "Unix time, 18 s behind GPS time")]
-        {
+        for (start_s, words) in [
+            (gps_s, "seconds of GPS time"),
+            (unix_s, "Unix time, 18 s behind GPS time"),
+        ] {
             let (table, said) = read(Some((start_s - 5.0, start_s + 5.0)));
             assert_eq!(table, format!("\n\n{start_s:.6} {rest}"));
             assert!(said.ends_with(words), "{said}");
         }
         // what states no deviation of one velocity states none
         let (table, said) = rows("a.pos", &format!("{head}{row}0\n"), None).unwrap();
-        assert!(table.ends_with("400.8 2.0 2.1 4.0\n") && !said.contains("velocity"), "{table} {said}");
+        assert!(
+            table.ends_with("400.8 2.0 2.1 4.0\n") && !said.contains("velocity"),
+            "{table} {said}"
+        );
     }
 
     /// Fixes in Unix time beside IMUs in GPS time and in its weeks; an IMU of no known clock leaves them.
@@ -221,18 +293,31 @@ mod tests {
         let unix_s = (1_614_556_783.25, 1_614_556_883.25);
         let of = |start_s: f64| of_unix(unix_s, Some((start_s - 5.0, start_s + 5.0)));
         let gps_s = 2147.0 * WEEK_S + 86_401.25;
-        for (start_s, name) in [(gps_s, "seconds of GPS time"), (86_401.25, "seconds of GPS week 2147")] {
+        for (start_s, name) in [
+            (gps_s, "seconds of GPS time"),
+            (86_401.25, "seconds of GPS week 2147"),
+        ] {
             let clock = of(start_s).unwrap();
-            assert_eq!((unix_s.0 - clock.origin_s, clock.name.as_str()), (start_s, name));
+            assert_eq!(
+                (unix_s.0 - clock.origin_s, clock.name.as_str()),
+                (start_s, name)
+            );
         }
-        assert_eq!([of(unix_s.0), of(3_326.0), of_unix(unix_s, None)], [None, None, None]);
+        assert_eq!(
+            [of(unix_s.0), of(3_326.0), of_unix(unix_s, None)],
+            [None, None, None]
+        );
     }
 
     #[test]
     fn the_week_counts_on() {
-        let text = format!("{HEAD}2147 604799 46.5 6.5 400 5 8 2 2 4\n2148 0.5 46.5 6.5 400 5 8 2 2 4\n");
+        let text =
+            format!("{HEAD}2147 604799 46.5 6.5 400 5 8 2 2 4\n2148 0.5 46.5 6.5 400 5 8 2 2 4\n");
         let (table, _) = rows("a.pos", &text, None).unwrap();
-        assert!(table.contains("604799.000000 ") && table.contains("604800.500000 "), "{table}");
+        assert!(
+            table.contains("604799.000000 ") && table.contains("604800.500000 "),
+            "{table}"
+        );
     }
 
     #[test]
@@ -240,9 +325,13 @@ mod tests {
         let error = |text: &str| rows("a.pos", text, None).unwrap_err().to_string();
         let short = format!("{HEAD}2021/03/01 00:00:01 46.5 6.5\n");
         assert!(error(&short).starts_with("a.pos, line 3: not a row of time, position"));
-        assert!(error(&HEAD.replace("GPST", "UTC")).starts_with("a.pos, line 2: times that are not GPST"));
         assert!(
-            error(&HEAD.replace("latitude(deg)", "latitude(d'\")")).starts_with("a.pos, line 2: positions")
+            error(&HEAD.replace("GPST", "UTC"))
+                .starts_with("a.pos, line 2: times that are not GPST")
+        );
+        assert!(
+            error(&HEAD.replace("latitude(deg)", "latitude(d'\")"))
+                .starts_with("a.pos, line 2: positions")
         );
     }
 }

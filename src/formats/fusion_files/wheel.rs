@@ -14,10 +14,13 @@ const UNITS: &[(&[&str], f64)] = &[
     (&["mph", "mi_h"], 0.447_04),
 ];
 /// Words of a speed's name.
-const SPEED: &[&str] =
-    &["speed", "velocity", "vel", "v", "wheel", "wheels", "odometer", "odo", "forward", "rear"];
+const SPEED: &[&str] = &[
+    "speed", "velocity", "vel", "v", "wheel", "wheels", "odometer", "odo", "forward", "rear",
+];
 /// Words of what is no speed yet.
-const COUNTS: &[&str] = &["tick", "ticks", "count", "counts", "pulse", "pulses", "encoder", "rpm", "rad"];
+const COUNTS: &[&str] = &[
+    "tick", "ticks", "count", "counts", "pulse", "pulses", "encoder", "rpm", "rad",
+];
 const COLUMNS: &str = "columns: t_s and wheel_m_s (or wheel_km_h, wheel_mph), negative in reverse; or rear_left_m_s and rear_right_m_s";
 
 /// Reads speeds: a table with a time, and a speed or those of both rear wheels, whose mean is taken.
@@ -26,18 +29,32 @@ const COLUMNS: &str = "columns: t_s and wheel_m_s (or wheel_km_h, wheel_mph), ne
 /// Whatever is wrong with it, with its line.
 pub(crate) fn read_wheel(path: &Path) -> Result<Vec<WheelSpeed>, Error> {
     let shown = path.display().to_string();
-    let table = Table::read(&shown, open(path)?, None, Numbers::Finite).map_err(|e| match e.kind {
-        Kind::Header(_) | Kind::Empty(_) => e.advice_instead(COLUMNS),
-        _ => e,
-    })?;
+    let table =
+        Table::read(&shown, open(path)?, None, Numbers::Finite).map_err(|e| match e.kind {
+            Kind::Header(_) | Kind::Empty(_) => e.advice_instead(COLUMNS),
+            _ => e,
+        })?;
     let (time, unit_s) = time_column(&table)?;
     let speeds = speed_columns(&table)?;
-    let speed =
-        |row: &[f64]| speeds.iter().map(|(i, factor)| row[*i] * factor).sum::<f64>() / speeds.len() as f64;
-    let read = table.rows.iter().map(|(_, row)| WheelSpeed { t_s: row[time] * unit_s, m_s: speed(row) });
+    let speed = |row: &[f64]| {
+        speeds
+            .iter()
+            .map(|(i, factor)| row[*i] * factor)
+            .sum::<f64>()
+            / speeds.len() as f64
+    };
+    let read = table.rows.iter().map(|(_, row)| WheelSpeed {
+        t_s: row[time] * unit_s,
+        m_s: speed(row),
+    });
     let read: Vec<WheelSpeed> = read.collect();
     match read.windows(2).position(|w| w[1].t_s <= w[0].t_s) {
-        Some(k) => Err(time_back(&shown, table.rows[k + 1].0, read[k].t_s, read[k + 1].t_s)),
+        Some(k) => Err(time_back(
+            &shown,
+            table.rows[k + 1].0,
+            read[k].t_s,
+            read[k + 1].t_s,
+        )),
         None => Ok(read),
     }
 }
@@ -48,11 +65,18 @@ fn refuse(table: &Table, message: impl Into<Box<str>>) -> Error {
 
 /// The time, and the length of its unit (s).
 fn time_column(table: &Table) -> Result<(usize, f64), Error> {
-    let mut times = table.columns.iter().enumerate().filter_map(|(i, name)| match classify(name, false) {
-        Some(Ok(Role::Time { unit_s })) => Some((i, unit_s.unwrap_or(1.0))),
-        _ => None,
-    });
-    times.next().ok_or_else(|| refuse(table, "no time column").advice(COLUMNS))
+    let mut times =
+        table
+            .columns
+            .iter()
+            .enumerate()
+            .filter_map(|(i, name)| match classify(name, false) {
+                Some(Ok(Role::Time { unit_s })) => Some((i, unit_s.unwrap_or(1.0))),
+                _ => None,
+            });
+    times
+        .next()
+        .ok_or_else(|| refuse(table, "no time column").advice(COLUMNS))
 }
 
 /// A column that may be a speed.
@@ -68,12 +92,24 @@ fn speed_columns(table: &Table) -> Result<Vec<(usize, f64)>, Error> {
     let named = table.columns.iter().enumerate().map(|(index, name)| {
         let plain = normalise(name);
         let unit = split_unit(&plain, UNITS);
-        let words = unit.map_or(plain.as_str(), |(stem, _)| stem).split('_').map(str::to_owned).collect();
-        Candidate { index, name, words, factor: unit.map(|(_, factor)| factor) }
+        let words = unit
+            .map_or(plain.as_str(), |(stem, _)| stem)
+            .split('_')
+            .map(str::to_owned)
+            .collect();
+        Candidate {
+            index,
+            name,
+            words,
+            factor: unit.map(|(_, factor)| factor),
+        }
     });
-    let has = |c: &Candidate<'_>, words: &[&str]| c.words.iter().any(|w| words.contains(&w.as_str()));
-    let all: Vec<_> =
-        named.filter(|c| has(c, SPEED) || has(c, COUNTS)).filter(|c| !has(c, &["front"])).collect();
+    let has =
+        |c: &Candidate<'_>, words: &[&str]| c.words.iter().any(|w| words.contains(&w.as_str()));
+    let all: Vec<_> = named
+        .filter(|c| has(c, SPEED) || has(c, COUNTS))
+        .filter(|c| !has(c, &["front"]))
+        .collect();
     let rear = |side: &str| all.iter().find(|c| has(c, &["rear"]) && has(c, &[side]));
     let chosen: Vec<&Candidate<'_>> = match (rear("left"), rear("right"), &all[..]) {
         (Some(left), Some(right), _) => vec![left, right],
@@ -82,7 +118,8 @@ fn speed_columns(table: &Table) -> Result<Vec<(usize, f64)>, Error> {
         (_, _, many) => {
             let names: Vec<_> = many.iter().map(|c| format!("\"{}\"", c.name)).collect();
             return Err(
-                refuse(table, format!("several speeds: {}", names.join(", "))).advice("keep one of them")
+                refuse(table, format!("several speeds: {}", names.join(", ")))
+                    .advice("keep one of them"),
             );
         }
     };
@@ -130,25 +167,66 @@ mod tests {
     fn of_four_wheels_it_is_the_mean_of_the_rear() {
         let header = "t_ms,front_left_m_s,front_right_m_s,rear_left_m_s,rear_right_m_s";
         let speeds = read(&format!("{header}\n1000,9,9,7,8\n1010,9,9,8,9\n")).unwrap();
-        assert_eq!(speeds, [WheelSpeed { t_s: 1.0, m_s: 7.5 }, WheelSpeed { t_s: 1.01, m_s: 8.5 }]);
+        assert_eq!(
+            speeds,
+            [
+                WheelSpeed { t_s: 1.0, m_s: 7.5 },
+                WheelSpeed {
+                    t_s: 1.01,
+                    m_s: 8.5
+                }
+            ]
+        );
     }
 
     #[test]
     fn what_is_no_speed_is_refused_with_its_line_and_column() {
         for (text, said, hint) in [
-            ("# a\nt_s,wheel_ticks\n0,1\n", "line 2: column \"wheel_ticks\" counts turns", "circumference"),
-            ("t_s,wheel_rpm\n0,1\n", "line 1: column \"wheel_rpm\" counts turns", "circumference"),
-            ("t_s,wheel\n0,1\n", "line 1: column \"wheel\" has no unit", "_m_s, _km_h or _mph"),
-            ("t_s,speed_ft_s\n0,1\n", "line 1: column \"speed_ft_s\" has no unit", "_m_s, _km_h or _mph"),
-            ("t_s,wheel_m_s,speed_m_s\n0,1,1\n", "several speeds: \"wheel_m_s\", \"speed_m_s\"", "keep one"),
+            (
+                "# a\nt_s,wheel_ticks\n0,1\n",
+                "line 2: column \"wheel_ticks\" counts turns",
+                "circumference",
+            ),
+            (
+                "t_s,wheel_rpm\n0,1\n",
+                "line 1: column \"wheel_rpm\" counts turns",
+                "circumference",
+            ),
+            (
+                "t_s,wheel\n0,1\n",
+                "line 1: column \"wheel\" has no unit",
+                "_m_s, _km_h or _mph",
+            ),
+            (
+                "t_s,speed_ft_s\n0,1\n",
+                "line 1: column \"speed_ft_s\" has no unit",
+                "_m_s, _km_h or _mph",
+            ),
+            (
+                "t_s,wheel_m_s,speed_m_s\n0,1,1\n",
+                "several speeds: \"wheel_m_s\", \"speed_m_s\"",
+                "keep one",
+            ),
             ("t_s,gear\n0,1\n", "no speed of a wheel", "wheel_m_s"),
             ("wheel_m_s\n1\n", "no time column", "t_s"),
-            ("t_s,wheel_m_s\n1,2\n1,2\n", "line 3: time goes from 1 s to 1 s", "sort"),
-            ("t_s,wheel_m_s\n1,x\n", "line 2: column \"wheel_m_s\": \"x\" is not a number", ""),
+            (
+                "t_s,wheel_m_s\n1,2\n1,2\n",
+                "line 3: time goes from 1 s to 1 s",
+                "sort",
+            ),
+            (
+                "t_s,wheel_m_s\n1,x\n",
+                "line 2: column \"wheel_m_s\": \"x\" is not a number",
+                "",
+            ),
         ] {
             let e = read(text).unwrap_err();
             assert!(e.to_string().contains(said), "{e}");
-            assert!(e.hint().unwrap_or_default().contains(hint), "{text}: {:?}", e.hint());
+            assert!(
+                e.hint().unwrap_or_default().contains(hint),
+                "{text}: {:?}",
+                e.hint()
+            );
         }
     }
 }

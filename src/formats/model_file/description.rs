@@ -1,6 +1,8 @@
 //! What model files hold, for the reader and for editors.
 
-use crate::formats::toml_file::{Between, Finite, NonNegative, OneOrEach, Positive, Stationary, Version};
+use crate::formats::toml_file::{
+    Between, Finite, NonNegative, OneOrEach, Positive, Stationary, Version,
+};
 use nav_sim_signal::imu::MAX_RATE_HZ;
 use nav_sim_signal::noise::{Law, LognormalIntervals};
 use schemars::JsonSchema;
@@ -106,7 +108,10 @@ pub(super) enum ProcessTable {
         gamma2_ci95: Option<Ends>,
     },
     /// Drift (units a sample)
-    DR { slope: Finite, slope_ci95: Option<Ends> },
+    DR {
+        slope: Finite,
+        slope_ci95: Option<Ends>,
+    },
 }
 
 impl ProcessTable {
@@ -148,9 +153,20 @@ pub(super) struct LawAxes {
 #[serde(tag = "distribution", rename_all = "lowercase", deny_unknown_fields)]
 pub(super) enum LawTable {
     /// low + width × a beta law
-    Beta { process: String, parameter: String, a: Finite, b: Finite, low: Finite, width: Finite },
+    Beta {
+        process: String,
+        parameter: String,
+        a: Finite,
+        b: Finite,
+        low: Finite,
+        width: Finite,
+    },
     /// A normal law about the parameter
-    Normal { process: String, parameter: String, sd: Finite },
+    Normal {
+        process: String,
+        parameter: String,
+        sd: Finite,
+    },
     /// A normal law of the logarithm of the parameter, of phi and beta of that of the correlation time
     Lognormal {
         process: String,
@@ -166,13 +182,48 @@ impl LawTable {
     /// Process, parameter, law.
     pub(super) fn parts(&self) -> (&str, &str, Law) {
         match self {
-            Self::Beta { process, parameter, a, b, low, width } => {
-                (process, parameter, Law::Beta { a: a.0, b: b.0, low: low.0, width: width.0 })
-            }
-            Self::Normal { process, parameter, sd } => (process, parameter, Law::Normal { sd: sd.0 }),
-            Self::Lognormal { process, parameter, median, median_ci95, sd, sd_ci95 } => {
-                let ci95 = median_ci95.zip(*sd_ci95).map(|(median, sd)| LognormalIntervals { median, sd });
-                (process, parameter, Law::Lognormal { median: median.0, sd: sd.0, ci95 })
+            Self::Beta {
+                process,
+                parameter,
+                a,
+                b,
+                low,
+                width,
+            } => (
+                process,
+                parameter,
+                Law::Beta {
+                    a: a.0,
+                    b: b.0,
+                    low: low.0,
+                    width: width.0,
+                },
+            ),
+            Self::Normal {
+                process,
+                parameter,
+                sd,
+            } => (process, parameter, Law::Normal { sd: sd.0 }),
+            Self::Lognormal {
+                process,
+                parameter,
+                median,
+                median_ci95,
+                sd,
+                sd_ci95,
+            } => {
+                let ci95 = median_ci95
+                    .zip(*sd_ci95)
+                    .map(|(median, sd)| LognormalIntervals { median, sd });
+                (
+                    process,
+                    parameter,
+                    Law::Lognormal {
+                        median: median.0,
+                        sd: sd.0,
+                        ci95,
+                    },
+                )
             }
         }
     }

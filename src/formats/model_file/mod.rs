@@ -64,12 +64,18 @@ impl ModelFile {
             format!("{shown} has no noise model for {channel}; it is taken as free of noise")
         };
         let misfit = self.misfit().map(|misfit| format!("{shown} {misfit}"));
-        misfit.into_iter().chain(self.missing.iter().map(unsaid)).collect()
+        misfit
+            .into_iter()
+            .chain(self.missing.iter().map(unsaid))
+            .collect()
     }
 
     /// What counts as none in it because its data sheet does not state it: figures, or axes without noise.
     pub(crate) fn not_stated(&self) -> Vec<String> {
-        let figures = self.provenance.as_ref().and_then(|table| table.get(NOT_STATED)?.as_array());
+        let figures = self
+            .provenance
+            .as_ref()
+            .and_then(|table| table.get(NOT_STATED)?.as_array());
         let name = |figure: &toml::Value| figure.as_str().map(str::to_owned);
         match figures {
             Some(figures) => figures.iter().filter_map(name).collect(),
@@ -114,7 +120,11 @@ impl TurnOn {
         let [x, y, z] = self.axes(sensor)?;
         // like axes keep every bit
         let alike = x.to_bits() == y.to_bits() && y.to_bits() == z.to_bits();
-        Some(if alike { x } else { ((x * x + y * y + z * z) / 3.0).sqrt() })
+        Some(if alike {
+            x
+        } else {
+            ((x * x + y * y + z * z) / 3.0).sqrt()
+        })
     }
 
     /// The key of a sensor.

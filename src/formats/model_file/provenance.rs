@@ -19,8 +19,9 @@ impl fmt::Display for Misfit {
     /// `does not fit its recordings (p = 0.005, data/model 0.33 at 0.02 s)`
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let p = self.p_value.map(|p| format!("p = {p:.3}"));
-        let worst =
-            self.worst.map(|(ratio, tau_s)| format!("data/model {} at {}", readable(ratio), duration(tau_s)));
+        let worst = self
+            .worst
+            .map(|(ratio, tau_s)| format!("data/model {} at {}", readable(ratio), duration(tau_s)));
         let figures: Vec<String> = p.into_iter().chain(worst).collect();
         write!(f, "does not fit its recordings ({})", figures.join(", "))
     }
@@ -41,21 +42,30 @@ impl ModelFile {
             let number = |key| fit.get(key).and_then(Value::as_float);
             let (p_value, ratio) = (number("j_p_value"), number("worst_ratio"));
             let is_missed = ratio.is_some() || p_value.is_some_and(|p| p < 0.05);
-            is_missed.then(|| Misfit { p_value, worst: ratio.zip(number("worst_tau_s")) })
+            is_missed.then(|| Misfit {
+                p_value,
+                worst: ratio.zip(number("worst_tau_s")),
+            })
         };
         let size = |m: &Misfit| m.worst.map_or(0.0, |(ratio, _)| ratio.ln().abs());
-        fits.iter().filter_map(of_fit).max_by(|a, b| size(a).total_cmp(&size(b)))
+        fits.iter()
+            .filter_map(of_fit)
+            .max_by(|a, b| size(a).total_cmp(&size(b)))
     }
 
     /// The largest whole number of that name that the provenance has of a fit.
     pub(crate) fn most_of_fits(&self, key: &str) -> Option<i64> {
         let fits = self.provenance.as_ref()?.get("fits")?.as_array()?;
-        fits.iter().filter_map(|fit| fit.get(key)?.as_integer()).max()
+        fits.iter()
+            .filter_map(|fit| fit.get(key)?.as_integer())
+            .max()
     }
 
     /// The longest averaging time (s) that the calibration saw: half its longest scale.
     pub(crate) fn observed_s(&self) -> Option<f64> {
-        let scales = self.most_of_fits("scales").filter(|n| (1..63).contains(n))?;
+        let scales = self
+            .most_of_fits("scales")
+            .filter(|n| (1..63).contains(n))?;
         Some((scales as f64 - 1.0).exp2() / self.model.rate_hz)
     }
 }

@@ -25,8 +25,7 @@ pub fn read(path: &Path) -> Result<ModelFile, FileError> {
 }
 
 /// For a file of another kind in the place of a model.
-const NOT_A_MODEL: &str =
-    "a model is a TOML file, as calibrate and datasheet write them: are the arguments in another order?";
+const NOT_A_MODEL: &str = "a model is a TOML file, as calibrate and datasheet write them: are the arguments in another order?";
 
 /// A model file's text, at the path that messages show.
 ///
@@ -37,23 +36,37 @@ pub fn from_text(path: &Path, text: &str) -> Result<ModelFile, FileError> {
 }
 
 pub(super) fn parse(source: &Source) -> Result<ModelFile, FileError> {
-    let Description { rate_hz: Finite(rate_hz), accel, gyro, turn_on, spread, provenance, .. } =
-        source.get()?;
+    let Description {
+        rate_hz: Finite(rate_hz),
+        accel,
+        gyro,
+        turn_on,
+        spread,
+        provenance,
+        ..
+    } = source.get()?;
     if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
         let reason = format!("is not a rate: it must be > 0 and at most {MAX_RATE_HZ}");
         return Err(source.refused("rate_hz", reason));
     }
-    let mut file = ModelFile::new(Model { rate_hz, axes: Default::default() });
+    let mut file = ModelFile::new(Model {
+        rate_hz,
+        axes: Default::default(),
+    });
     for (sensor, table) in Sensor::ALL.into_iter().zip([accel, gyro]) {
         match table {
             Some(table) => read_sensor(source, sensor, table, &mut file)?,
-            None => file.missing.extend(Axis::ALL.map(|axis| Channel { sensor, axis })),
+            None => file
+                .missing
+                .extend(Axis::ALL.map(|axis| Channel { sensor, axis })),
         }
     }
     if file.missing.len() == Channel::ALL.len() {
         return Err(source.missing("", &Sensor::ALL.map(Sensor::name)));
     }
-    file.turn_on = turn_on.map(|table| read_turn_on(source, &table)).transpose()?;
+    file.turn_on = turn_on
+        .map(|table| read_turn_on(source, &table))
+        .transpose()?;
     if let Some(spread) = spread {
         let mut read = Spread::default();
         for (sensor, laws) in Sensor::ALL.into_iter().zip([spread.accel, spread.gyro]) {
@@ -103,7 +116,10 @@ fn read_turn_on(source: &Source, table: &TurnOnTable) -> Result<TurnOn, FileErro
         if axes.iter().all(|sigma| (0.0..=limit).contains(sigma)) {
             return Ok(Some(axes));
         }
-        let reason = format!("is not a standard deviation between 0 and {limit} {}", sensor.unit());
+        let reason = format!(
+            "is not a standard deviation between 0 and {limit} {}",
+            sensor.unit()
+        );
         Err(source.refused(&format!("turn_on.{}", TurnOn::key(sensor)), reason))
     };
     Ok(TurnOn {
@@ -120,20 +136,33 @@ fn read_processes(
     file: &mut ModelFile,
 ) -> Result<(), FileError> {
     let rate_hz = file.model.rate_hz;
-    let tables = (1..).zip(tables).map(|(i, table)| (format!("{key}.processes[{i}]"), table.values()));
+    let tables = (1..)
+        .zip(tables)
+        .map(|(i, table)| (format!("{key}.processes[{i}]"), table.values()));
     let tables: Vec<(String, toml::Table)> = tables.collect();
-    let processes = tables.iter().map(|(key, values)| read_process(source, key, values, rate_hz));
+    let processes = tables
+        .iter()
+        .map(|(key, values)| read_process(source, key, values, rate_hz));
     let noise = Composite::new(processes.collect::<Result<_, _>>()?);
-    for (((key, values), process), label) in tables.iter().zip(&noise.processes).zip(noise.labels()) {
+    for (((key, values), process), label) in tables.iter().zip(&noise.processes).zip(noise.labels())
+    {
         for (parameter, _) in process.parameters() {
             let name = format!("{parameter}{CI}");
-            let Some(ends) = values.get(&name).and_then(toml::Value::as_array) else { continue };
+            let Some(ends) = values.get(&name).and_then(toml::Value::as_array) else {
+                continue;
+            };
             let [low, high] = [0, 1].map(|end| ends[end].as_float().unwrap_or(f64::NAN));
             if low.is_nan() || high.is_nan() || low > high {
                 return Err(source.refused(&format!("{key}.{name}"), "is not a pair [low, high]"));
             }
             let (process, parameter) = (label.clone(), parameter.to_owned());
-            file.intervals.push(Interval { channel, process, parameter, low, high });
+            file.intervals.push(Interval {
+                channel,
+                process,
+                parameter,
+                low,
+                high,
+            });
         }
     }
     file.model.axes[channel.index()] = noise;
@@ -152,17 +181,25 @@ fn read_process(
     let code = values["type"].as_str().unwrap_or_default();
     let kind = Kind::named(code).expect("the description has the codes of the kinds");
     let names = kind.parameters().iter().map(|p| p.name());
-    let values: Vec<f64> = names.clone().filter_map(|name| values[name].as_float()).collect();
+    let values: Vec<f64> = names
+        .clone()
+        .filter_map(|name| values[name].as_float())
+        .collect();
     if let Some((name, _)) = names.zip(&values).find(|(_, value)| value.abs() > LARGEST) {
         let reason = format!("is more than {LARGEST:e}, which no sensor has");
         return Err(source.refused(&format!("{key}.{name}"), reason));
     }
-    let process = kind.process(&values, rate_hz).expect("as many values as the kind has parameters");
+    let process = kind
+        .process(&values, rate_hz)
+        .expect("as many values as the kind has parameters");
     process.map_err(|e| refuse_parameter(source, key, &e))
 }
 
 fn refuse_parameter(source: &Source, key: &str, e: &ParameterError) -> FileError {
-    let refusal = source.refused(&format!("{key}.{}", e.parameter), format!("is not {}", e.domain));
+    let refusal = source.refused(
+        &format!("{key}.{}", e.parameter),
+        format!("is not {}", e.domain),
+    );
     match e.parameter {
         "phi" => refusal.advice(
             "phi = exp(−1/(T·rate_hz)) for a correlation time of T seconds; phi = 1 is a random walk: RW",
@@ -185,16 +222,26 @@ fn read_laws(
         let channel = Channel { sensor, axis };
         let (key, laws) = match laws {
             OneOrEach::Each(all) => (format!("spread.{}", sensor.name()), all),
-            OneOrEach::One(LawAxes { x, y, z }) => (format!("spread.{channel}"), [x, y, z][axis as usize]),
+            OneOrEach::One(LawAxes { x, y, z }) => {
+                (format!("spread.{channel}"), [x, y, z][axis as usize])
+            }
         };
         let into = &mut into.axes[channel.index()];
         for (i, law) in (1..).zip(laws) {
             let key = format!("{key}[{i}]");
             let (process, parameter, law) = law.parts();
-            let variation =
-                Variation::new(file.model.axis(channel), file.model.rate_hz, process, parameter, law)
-                    .map_err(|e| refuse_law(source, &key, &e))?;
-            if into.iter().any(|v| v.process() == process && v.parameter() == parameter) {
+            let variation = Variation::new(
+                file.model.axis(channel),
+                file.model.rate_hz,
+                process,
+                parameter,
+                law,
+            )
+            .map_err(|e| refuse_law(source, &key, &e))?;
+            if into
+                .iter()
+                .any(|v| v.process() == process && v.parameter() == parameter)
+            {
                 let key = format!("{key}.parameter");
                 return Err(source.refused(&key, "of this process already has a law"));
             }
@@ -219,7 +266,10 @@ fn refuse_law(source: &Source, key: &str, e: &SpreadError) -> FileError {
         SpreadError::Lognormal => refused("distribution", "needs a parameter > 0".to_owned()),
         SpreadError::Reaches(e) => refused(
             "distribution",
-            format!("reaches {} = {}, which is not {}", e.parameter, e.value, e.domain),
+            format!(
+                "reaches {} = {}, which is not {}",
+                e.parameter, e.value, e.domain
+            ),
         ),
     }
 }

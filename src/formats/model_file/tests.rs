@@ -5,7 +5,10 @@ use crate::formats::toml_file::Source;
 use nav_sim_signal::imu::{Axis, Sensor};
 use nav_sim_signal::noise::{Composite, Law, LognormalIntervals, Process, Variation};
 
-const ACCEL_X: Channel = Channel { sensor: Sensor::Accel, axis: Axis::X };
+const ACCEL_X: Channel = Channel {
+    sensor: Sensor::Accel,
+    axis: Axis::X,
+};
 
 fn read_text(text: &str) -> Result<ModelFile, FileError> {
     parse(&Source::new("m.toml", text))
@@ -13,7 +16,9 @@ fn read_text(text: &str) -> Result<ModelFile, FileError> {
 
 /// One process of a file otherwise sound, on line 4.
 fn with_process(process: &str) -> Result<ModelFile, FileError> {
-    read_text(&format!("schema = 1\nrate_hz = 100.0\n[accel]\nprocesses = [{{ {process} }}]\n"))
+    read_text(&format!(
+        "schema = 1\nrate_hz = 100.0\n[accel]\nprocesses = [{{ {process} }}]\n"
+    ))
 }
 
 fn refusal(text: &str) -> String {
@@ -43,11 +48,16 @@ fn n2() -> Composite {
 #[test]
 fn what_is_written_reads_back_to_the_same_bits() {
     let mut gyro = n2();
-    gyro.processes.extend([process("DR", &[-1e-300]), process("GM", &[1.0 / 3.0, 0.1 + 0.2])]);
+    gyro.processes.extend([
+        process("DR", &[-1e-300]),
+        process("GM", &[1.0 / 3.0, 0.1 + 0.2]),
+    ]);
     gyro.processes.push(process("MA1", &[-0.5, 2e22]));
     let mut file = ModelFile::new(Model::pooled(100.0 / 3.0, &n2(), &gyro));
     // A GM belongs to its rate.
-    let gm = Process::from_values("GM", &[1.0 / 3.0, 0.1 + 0.2], 100.0 / 3.0).unwrap().unwrap();
+    let gm = Process::from_values("GM", &[1.0 / 3.0, 0.1 + 0.2], 100.0 / 3.0)
+        .unwrap()
+        .unwrap();
     for axis in &mut file.model.axes[3..] {
         axis.processes[6] = gm;
     }
@@ -59,21 +69,41 @@ fn what_is_written_reads_back_to_the_same_bits() {
         low: 0.999,
         high: f64::INFINITY,
     });
-    let beta = Law::Beta { a: 6.0, b: 2.0, low: 0.98, width: 1e-3 };
+    let beta = Law::Beta {
+        a: 6.0,
+        b: 2.0,
+        low: 0.98,
+        width: 1e-3,
+    };
     let pooled = Variation::new(&n2(), 100.0, "AR1_1", "phi", beta).unwrap();
     let normal = Variation::new(&n2(), 100.0, "WN", "sigma2", Law::Normal { sd: 1e-7 }).unwrap();
     let mut spread = Spread::default();
-    let intervals = LognormalIntervals { median: [0.9998, 0.99995], sd: [0.1 + 0.2, 0.7] };
-    let lognormal = Law::Lognormal { median: 0.9999, sd: 0.45, ci95: Some(intervals) };
+    let intervals = LognormalIntervals {
+        median: [0.9998, 0.99995],
+        sd: [0.1 + 0.2, 0.7],
+    };
+    let lognormal = Law::Lognormal {
+        median: 0.9999,
+        sd: 0.45,
+        ci95: Some(intervals),
+    };
     let lognormal = Variation::new(&n2(), 100.0, "AR1_2", "phi", lognormal).unwrap();
-    let plain = Law::Lognormal { median: 2e-11, sd: 0.0, ci95: None };
+    let plain = Law::Lognormal {
+        median: 2e-11,
+        sd: 0.0,
+        ci95: None,
+    };
     let plain = Variation::new(&n2(), 100.0, "RW", "gamma2", plain).unwrap();
     spread.axes[..3].fill(vec![pooled, normal.clone(), lognormal, plain]);
     spread.axes[5].push(normal);
     file.spread = Some(spread);
-    file.turn_on = Some(TurnOn { accel_m_s2: Some([0.02; 3]), gyro_rad_s: Some([1e-3, 0.1 + 0.2, 0.0]) });
-    file.provenance =
-        Some(toml::from_str("estimator = \"dr-awv\"\nobjective = 1.5e-9\n[inputs]\na = 1").unwrap());
+    file.turn_on = Some(TurnOn {
+        accel_m_s2: Some([0.02; 3]),
+        gyro_rad_s: Some([1e-3, 0.1 + 0.2, 0.0]),
+    });
+    file.provenance = Some(
+        toml::from_str("estimator = \"dr-awv\"\nobjective = 1.5e-9\n[inputs]\na = 1").unwrap(),
+    );
     let text = to_toml(&file);
     assert_eq!(read_text(&text).unwrap(), file, "{text}");
     assert_eq!(to_toml(&read_text(&text).unwrap()), text);
@@ -81,7 +111,11 @@ fn what_is_written_reads_back_to_the_same_bits() {
 
 #[test]
 fn the_layout_is_the_published_one() {
-    let text = to_toml(&ModelFile::new(Model::pooled(100.0, &n2(), &Composite::default())));
+    let text = to_toml(&ModelFile::new(Model::pooled(
+        100.0,
+        &n2(),
+        &Composite::default(),
+    )));
     let expected = "schema = 1
 rate_hz = 100.0
 
@@ -103,8 +137,7 @@ processes = [
 
 #[test]
 fn axes_may_differ_or_be_absent() {
-    let text =
-        "rate_hz = 200\n[gyro.x]\nprocesses = [{ type = \"WN\", sigma2 = 1 }]\n[gyro.z]\nprocesses = []\n";
+    let text = "rate_hz = 200\n[gyro.x]\nprocesses = [{ type = \"WN\", sigma2 = 1 }]\n[gyro.z]\nprocesses = []\n";
     let file = read_text(text).unwrap();
     let missing: Vec<String> = file.missing.iter().map(Channel::to_string).collect();
     assert_eq!(missing, ["accel.x", "accel.y", "accel.z", "gyro.y"]);
@@ -115,10 +148,18 @@ fn axes_may_differ_or_be_absent() {
 
 #[test]
 fn intervals_stand_beside_their_parameters() {
-    let file = with_process("type = \"AR1\", phi = 0.9, sigma2 = 1, phi_ci95 = [0.8, 0.95]").unwrap();
-    let of_x: Vec<_> = file.intervals.iter().filter(|i| i.channel == ACCEL_X).collect();
+    let file =
+        with_process("type = \"AR1\", phi = 0.9, sigma2 = 1, phi_ci95 = [0.8, 0.95]").unwrap();
+    let of_x: Vec<_> = file
+        .intervals
+        .iter()
+        .filter(|i| i.channel == ACCEL_X)
+        .collect();
     assert_eq!(of_x.len(), 1);
-    assert_eq!((of_x[0].process.as_str(), of_x[0].parameter.as_str()), ("AR1", "phi"));
+    assert_eq!(
+        (of_x[0].process.as_str(), of_x[0].parameter.as_str()),
+        ("AR1", "phi")
+    );
     assert_eq!((of_x[0].low, of_x[0].high), (0.8, 0.95));
 }
 
@@ -156,7 +197,10 @@ fn wrong_values_are_refused_with_line_key_and_value() {
     );
     assert!(refusal("rate_hz = 1e300\n").contains("\"rate_hz\" = 1e300 is not a rate"));
     let twice = refusal("rate_hz = 1\nrate_hz = 2\n");
-    assert_eq!(twice, "m.toml, line 2, column 1: the key \"rate_hz\" is there already | ");
+    assert_eq!(
+        twice,
+        "m.toml, line 2, column 1: the key \"rate_hz\" is there already | "
+    );
     assert_eq!(
         refusal("schema = 2\n"),
         "m.toml, line 1: \"schema\" = 2 is not a schema this version reads: it reads 1 | "
@@ -185,7 +229,10 @@ fn wrong_keys_are_refused_with_what_was_meant() {
         process_refusal("type = \"AR1\", phi = 0.5"),
         "m.toml, line 4: \"accel.processes[1].sigma2\" is missing | add the key \"accel.processes[1].sigma2\""
     );
-    assert_eq!(refusal("rate = 100\n"), "m.toml, line 1: unknown key \"rate\" | did you mean \"rate_hz\"?");
+    assert_eq!(
+        refusal("rate = 100\n"),
+        "m.toml, line 1: unknown key \"rate\" | did you mean \"rate_hz\"?"
+    );
     assert_eq!(
         refusal("[accel]\nprocesses = []\n"),
         "m.toml, line 1: \"rate_hz\" is missing | add rate_hz = 100.0, the sample rate (Hz)"
@@ -258,21 +305,46 @@ mod garbage {
 
 #[test]
 fn turn_on_biases_are_one_or_three_standard_deviations() {
-    let with =
-        |turn_on: &str| read_text(&format!("rate_hz = 100\n[turn_on]\n{turn_on}\n[gyro]\nprocesses = []\n"));
-    let turn_on = with("gyro_rad_s = [3e-3, 0, 4e-3]").unwrap().turn_on.unwrap();
-    assert_eq!((turn_on.sigma(Sensor::Accel), turn_on.axes(Sensor::Accel)), (None, None));
+    let with = |turn_on: &str| {
+        read_text(&format!(
+            "rate_hz = 100\n[turn_on]\n{turn_on}\n[gyro]\nprocesses = []\n"
+        ))
+    };
+    let turn_on = with("gyro_rad_s = [3e-3, 0, 4e-3]")
+        .unwrap()
+        .turn_on
+        .unwrap();
+    assert_eq!(
+        (turn_on.sigma(Sensor::Accel), turn_on.axes(Sensor::Accel)),
+        (None, None)
+    );
     // the variances 9, 0 and 16 (1e-6) have the mean 25/3
     assert!((turn_on.sigma(Sensor::Gyro).unwrap().powi(2) / 25e-6 - 1.0 / 3.0).abs() < 1e-15);
-    assert_eq!(with("accel_m_s2 = 0.1").unwrap().turn_on.unwrap().accel_m_s2, Some([0.1; 3]));
+    assert_eq!(
+        with("accel_m_s2 = 0.1")
+            .unwrap()
+            .turn_on
+            .unwrap()
+            .accel_m_s2,
+        Some([0.1; 3])
+    );
     for (text, reason) in [
-        ("accel_m_s2 = -1", "\"turn_on.accel_m_s2\" = -1 is not a standard deviation between 0 and 10 m/s²"),
-        ("gyro_rad_s = 2", "\"turn_on.gyro_rad_s\" = 2 is not a standard deviation between 0 and 1 rad/s"),
+        (
+            "accel_m_s2 = -1",
+            "\"turn_on.accel_m_s2\" = -1 is not a standard deviation between 0 and 10 m/s²",
+        ),
+        (
+            "gyro_rad_s = 2",
+            "\"turn_on.gyro_rad_s\" = 2 is not a standard deviation between 0 and 1 rad/s",
+        ),
         (
             "gyro_rad_s = [1.0, 2.0, 3.0, 4.0]",
             "\"turn_on.gyro_rad_s\" = [1.0, 2.0, 3.0, 4.0] is too long a list",
         ),
-        ("gyro_rad_s = [1e-3, 2e-3]", "\"turn_on.gyro_rad_s\" = [1e-3, 2e-3] is not an array of length 3"),
+        (
+            "gyro_rad_s = [1e-3, 2e-3]",
+            "\"turn_on.gyro_rad_s\" = [1e-3, 2e-3] is not an array of length 3",
+        ),
         ("gyro_deg_h = 1", "unknown key \"turn_on.gyro_deg_h\""),
     ] {
         let message = with(text).unwrap_err().to_string();
@@ -284,17 +356,28 @@ fn turn_on_biases_are_one_or_three_standard_deviations() {
 #[test]
 fn the_schema_has_the_bounds_of_the_reader() {
     let schema = schema();
-    let processes = schema.pointer("/properties/accel/properties/processes/items/oneOf").unwrap();
+    let processes = schema
+        .pointer("/properties/accel/properties/processes/items/oneOf")
+        .unwrap();
     let mut bounds = 0;
     for process in processes.as_array().unwrap() {
         let properties = process["properties"].as_object().unwrap();
-        let numbers: Vec<&String> =
-            properties.keys().filter(|key| properties[*key]["type"] == "number").collect();
+        let numbers: Vec<&String> = properties
+            .keys()
+            .filter(|key| properties[*key]["type"] == "number")
+            .collect();
         let reads = |key: &str, value: f64| {
             let value_of = |name: &str| if name == key { value } else { 0.5 };
-            let keys: Vec<String> =
-                numbers.iter().map(|name| format!("{name} = {:?}", value_of(name))).collect();
-            with_process(&format!("type = {}, {}", properties["type"]["const"], keys.join(", "))).is_ok()
+            let keys: Vec<String> = numbers
+                .iter()
+                .map(|name| format!("{name} = {:?}", value_of(name)))
+                .collect();
+            with_process(&format!(
+                "type = {}, {}",
+                properties["type"]["const"],
+                keys.join(", ")
+            ))
+            .is_ok()
         };
         for key in &numbers {
             for (name, outward, is_open) in [
@@ -303,9 +386,14 @@ fn the_schema_has_the_bounds_of_the_reader() {
                 ("maximum", 1e-9, false),
                 ("exclusiveMaximum", 1e-9, true),
             ] {
-                let Some(bound) = properties[*key][name].as_f64() else { continue };
+                let Some(bound) = properties[*key][name].as_f64() else {
+                    continue;
+                };
                 bounds += 1;
-                assert!(reads(key, bound) != is_open && !reads(key, bound + outward), "{key} {name} {bound}");
+                assert!(
+                    reads(key, bound) != is_open && !reads(key, bound + outward),
+                    "{key} {name} {bound}"
+                );
                 assert!(reads(key, bound - outward), "{key} {name} {bound}");
             }
         }

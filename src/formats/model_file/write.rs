@@ -21,13 +21,17 @@ pub fn to_toml(file: &ModelFile) -> String {
     let mut out = format!("schema = {SCHEMA}\nrate_hz = {:?}\n", file.model.rate_hz);
     for sensor in Sensor::ALL {
         let tables = Axis::ALL.map(|axis| processes(file, Channel { sensor, axis }));
-        write_axes(&mut out, sensor, &tables, |name, table| format!("\n[{name}]\n{table}"));
+        write_axes(&mut out, sensor, &tables, |name, table| {
+            format!("\n[{name}]\n{table}")
+        });
     }
     out.push_str(&turn_on(file));
     for sensor in Sensor::ALL {
         let tables = Axis::ALL.map(|axis| laws(file, Channel { sensor, axis }));
         write_axes(&mut out, sensor, &tables, |name, laws| {
-            laws.iter().map(|law| format!("\n[[spread.{name}]]\n{law}")).collect()
+            laws.iter()
+                .map(|law| format!("\n[[spread.{name}]]\n{law}"))
+                .collect()
         });
     }
     if let Some(provenance) = &file.provenance {
@@ -39,12 +43,20 @@ pub fn to_toml(file: &ModelFile) -> String {
 }
 
 fn turn_on(file: &ModelFile) -> String {
-    let Some(turn_on) = &file.turn_on else { return String::new() };
+    let Some(turn_on) = &file.turn_on else {
+        return String::new();
+    };
     let mut out = String::from("\n[turn_on]\n");
     for sensor in Sensor::ALL {
-        let Some(axes) = turn_on.axes(sensor) else { continue };
+        let Some(axes) = turn_on.axes(sensor) else {
+            continue;
+        };
         let alike = axes.iter().all(|sigma| *sigma == axes[0]);
-        let value = if alike { format!("{:?}", axes[0]) } else { format!("{axes:?}") };
+        let value = if alike {
+            format!("{:?}", axes[0])
+        } else {
+            format!("{axes:?}")
+        };
         let _ = writeln!(out, "{} = {value}", TurnOn::key(sensor));
     }
     out
@@ -109,16 +121,30 @@ fn laws(file: &ModelFile, channel: Channel) -> Option<Vec<String>> {
 fn law(v: &Variation) -> String {
     let constants = match v.law() {
         Law::Beta { a, b, low, width } => {
-            format!("distribution = \"beta\"\na = {a:?}\nb = {b:?}\nlow = {low:?}\nwidth = {width:?}")
+            format!(
+                "distribution = \"beta\"\na = {a:?}\nb = {b:?}\nlow = {low:?}\nwidth = {width:?}"
+            )
         }
         Law::Normal { sd } => format!("distribution = \"normal\"\nsd = {sd:?}"),
-        Law::Lognormal { median, sd, ci95: None } => {
+        Law::Lognormal {
+            median,
+            sd,
+            ci95: None,
+        } => {
             format!("distribution = \"lognormal\"\nmedian = {median:?}\nsd = {sd:?}")
         }
-        Law::Lognormal { median, sd, ci95: Some(ci95) } => format!(
+        Law::Lognormal {
+            median,
+            sd,
+            ci95: Some(ci95),
+        } => format!(
             "distribution = \"lognormal\"\nmedian = {median:?}\nmedian{CI} = {:?}\nsd = {sd:?}\nsd{CI} = {:?}",
             ci95.median, ci95.sd
         ),
     };
-    format!("process = \"{}\"\nparameter = \"{}\"\n{constants}\n", v.process(), v.parameter())
+    format!(
+        "process = \"{}\"\nparameter = \"{}\"\n{constants}\n",
+        v.process(),
+        v.parameter()
+    )
 }

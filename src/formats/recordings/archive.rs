@@ -23,11 +23,16 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError>
     for name in names {
         let array = match archive.read(&name) {
             // texts and the like are passed over
-            Err(Error::Encoding { .. }) => Array { shape: Vec::new(), values: Vec::new() },
+            Err(Error::Encoding { .. }) => Array {
+                shape: Vec::new(),
+                values: Vec::new(),
+            },
             read => read.map_err(refused)?,
         };
         match array.shape[..] {
-            [] | [1] if name == RATE => head_rate = array.values.first().map(|rate_hz| (*rate_hz, RATE)),
+            [] | [1] if name == RATE => {
+                head_rate = array.values.first().map(|rate_hz| (*rate_hz, RATE))
+            }
             [_] => columns.push((name, array.values)),
             [_, 3] => columns.extend((0..3).map(|k| {
                 let values = array.values.iter().skip(k).step_by(3);
@@ -37,35 +42,66 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError>
         }
     }
     let names: Vec<String> = columns.iter().map(|(name, _)| name.clone()).collect();
-    let place = HeaderPlace { path: &shown, line: 1 };
+    let place = HeaderPlace {
+        path: &shown,
+        line: 1,
+    };
     let layout = Layout::new(place, &names, false, options.channels.as_deref())?;
     let mut found = Vec::new();
     for kept in &layout.found {
         let mut filled = column(kept.name.clone(), kept.role);
         for (row, value) in columns[kept.index].1.iter().enumerate() {
             if !value.is_finite() || value.abs() > LARGEST {
-                let reason = if value.is_finite() { BEYOND } else { "is not finite" };
-                return Err(sample(&shown, row as u64 + 1, &kept.name, &value.to_string(), reason));
+                let reason = if value.is_finite() {
+                    BEYOND
+                } else {
+                    "is not finite"
+                };
+                return Err(sample(
+                    &shown,
+                    row as u64 + 1,
+                    &kept.name,
+                    &value.to_string(),
+                    reason,
+                ));
             }
             filled.values.push(*value);
         }
         found.push(filled);
     }
-    if let Some(other) = found.iter().find(|c| c.values.len() != found[0].values.len()) {
+    if let Some(other) = found
+        .iter()
+        .find(|c| c.values.len() != found[0].values.len())
+    {
         let (rows, name, first) = (other.values.len(), &other.name, &found[0]);
-        let message = format!("{name} has {rows} rows, {} has {}", first.name, first.values.len());
+        let message = format!(
+            "{name} has {rows} rows, {} has {}",
+            first.name,
+            first.values.len()
+        );
         return Err(FileError::contents(shown.as_str(), Place::Within, message));
     }
     settle(&mut found, options).map_err(storage(&shown))?;
     let (lines, notes, ignored) = (Lines::default(), Notes::default(), layout.ignored);
-    Ok(Raw { path: shown.clone(), columns: found, ignored, head_rate, lines, notes })
+    Ok(Raw {
+        path: shown.clone(),
+        columns: found,
+        ignored,
+        head_rate,
+        lines,
+        notes,
+    })
 }
 
 /// The name of one axis of a sensor's array: `accel_m_s2` has `accel_x_m_s2`.
 fn of_axis(name: &str, axis: usize) -> String {
     let axis = ["x", "y", "z"][axis];
     let sensor = name.find('_').unwrap_or(name.len());
-    let (stem, unit) = match name.find("_m_s2").or(name.find("_rad_s")).or(name.find("_deg_s")) {
+    let (stem, unit) = match name
+        .find("_m_s2")
+        .or(name.find("_rad_s"))
+        .or(name.find("_deg_s"))
+    {
         Some(unit) => name.split_at(unit),
         None => name.split_at(sensor),
     };

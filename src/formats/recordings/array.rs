@@ -17,24 +17,38 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError>
     let names = match &options.columns {
         Some(names) => names.clone(),
         None => {
-            let said = manifest.as_ref().and_then(|manifest| manifest.columns(expected));
-            said.or_else(|| npy_order(expected)).ok_or_else(|| unnamed(&name, expected))?
+            let said = manifest
+                .as_ref()
+                .and_then(|manifest| manifest.columns(expected));
+            said.or_else(|| npy_order(expected))
+                .ok_or_else(|| unnamed(&name, expected))?
         }
     };
     if names.len() != expected {
         return Err(FileError::row_length(&name, 1, expected, names.len()));
     }
-    let place = HeaderPlace { path: &name, line: 1 };
+    let place = HeaderPlace {
+        path: &name,
+        line: 1,
+    };
     let layout = Layout::new(place, &names, false, options.channels.as_deref())?;
     let (indices, mut columns) = empty_columns(&layout);
-    let place: Vec<Option<usize>> =
-        (0..expected).map(|index| indices.iter().position(|i| *i == index)).collect();
+    let place: Vec<Option<usize>> = (0..expected)
+        .map(|index| indices.iter().position(|i| *i == index))
+        .collect();
     let stored = storage(&name);
     let mut count = 0;
     array.each(|row, index, value| {
-        let Some(target) = place[index] else { return Ok(()) };
+        let Some(target) = place[index] else {
+            return Ok(());
+        };
         if !value.is_finite() || value.abs() > LARGEST {
-            return Err(not_a_measurement(&name, row as u64 + 1, &columns[target].name, value));
+            return Err(not_a_measurement(
+                &name,
+                row as u64 + 1,
+                &columns[target].name,
+                value,
+            ));
         }
         if count % BETWEEN == 0 {
             relieve(&mut columns, options).map_err(&stored)?;
@@ -57,7 +71,9 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError>
 /// An array whose columns are not known.
 fn unnamed(path: &str, columns: usize) -> FileError {
     let message = format!("an array of {columns} columns, which names are not known");
-    FileError::contents(path, Place::Within, message).advice(COLUMNS).setting(Setting::ColumnNames)
+    FileError::contents(path, Place::Within, message)
+        .advice(COLUMNS)
+        .setting(Setting::ColumnNames)
 }
 
 fn not_a_measurement(path: &str, line: u64, column: &str, value: f64) -> FileError {

@@ -19,12 +19,19 @@ const NO_GRAVITY: f64 = 0.3;
 pub(super) fn factors(raw: &Raw, rate_hz: f64) -> Result<Vec<f64>, FileError> {
     let from_gravity = gravity_factor(raw)?;
     let factor = |column: &Column| {
-        let Role::Signal { channel, unit } = column.role else { return Ok(1.0) };
+        let Role::Signal { channel, unit } = column.role else {
+            return Ok(1.0);
+        };
         if let Some(value) = only_value(&column.values).map_err(storage(&raw.path))? {
-            let message = format!("{channel} (column \"{}\") is dead: every sample is {value}", column.name);
-            return Err(FileError::contents(raw.path.as_str(), Place::Within, message)
-                .setting(Setting::Channels)
-                .advice("record again"));
+            let message = format!(
+                "{channel} (column \"{}\") is dead: every sample is {value}",
+                column.name
+            );
+            return Err(
+                FileError::contents(raw.path.as_str(), Place::Within, message)
+                    .setting(Setting::Channels)
+                    .advice("record again"),
+            );
         }
         Ok(match unit {
             Unit::Si(factor) => factor,
@@ -40,11 +47,23 @@ pub(in crate::formats) fn gravity_factor(raw: &Raw) -> Result<f64, FileError> {
     let unnamed: Vec<&Column> = raw
         .columns
         .iter()
-        .filter(|c| matches!(c.role, Role::Signal { unit: Unit::FromGravity, .. }))
+        .filter(|c| {
+            matches!(
+                c.role,
+                Role::Signal {
+                    unit: Unit::FromGravity,
+                    ..
+                }
+            )
+        })
         .collect();
-    let Some(first) = unnamed.first() else { return Ok(1.0) };
-    let means =
-        unnamed.iter().map(|c| mean(&c.values, 0..c.values.len(), 1.0)).collect::<Result<Vec<_>, _>>();
+    let Some(first) = unnamed.first() else {
+        return Ok(1.0);
+    };
+    let means = unnamed
+        .iter()
+        .map(|c| mean(&c.values, 0..c.values.len(), 1.0))
+        .collect::<Result<Vec<_>, _>>();
     let means = means.map_err(storage(&raw.path))?;
     let norm = norm(&means);
     let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
@@ -55,7 +74,11 @@ pub(in crate::formats) fn gravity_factor(raw: &Raw) -> Result<f64, FileError> {
             }
         }
     }
-    Err(no_unit(&raw.path, raw.lines.of(0).saturating_sub(1).max(1), &first.name))
+    Err(no_unit(
+        &raw.path,
+        raw.lines.of(0).saturating_sub(1).max(1),
+        &first.name,
+    ))
 }
 
 /// The value of all samples, if two or more have the same.
@@ -74,7 +97,9 @@ pub(super) fn clipped(raw: &Raw, report: &mut FileReport) -> Result<(), FileErro
     const SHARE: f64 = 0.01;
     const FEWEST: usize = 20;
     for column in &raw.columns {
-        let Some(channel) = column.channel() else { continue };
+        let Some(channel) = column.channel() else {
+            continue;
+        };
         let rows = column.values.len() as f64;
         let ends = [1.0, -1.0].map(|side| outermost(&column.values, side));
         let [high, low] = ends.map(|end| end.map_err(storage(&raw.path)));
@@ -124,27 +149,41 @@ fn norm(vector: &[f64]) -> f64 {
 }
 
 /// Static specific force is gravity, or nothing where the mean was removed before; rates are small.
-pub(super) fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), FileError> {
+pub(super) fn plausible(
+    means: &[(Channel, f64)],
+    report: &mut FileReport,
+) -> Result<(), FileError> {
     let means_of_sensor = |sensor| -> Vec<f64> {
-        means.iter().filter(|(channel, _)| channel.sensor == sensor).map(|(_, mean)| *mean).collect()
+        means
+            .iter()
+            .filter(|(channel, _)| channel.sensor == sensor)
+            .map(|(_, mean)| *mean)
+            .collect()
     };
-    let (accel, gyro) = (means_of_sensor(Sensor::Accel), means_of_sensor(Sensor::Gyro));
+    let (accel, gyro) = (
+        means_of_sensor(Sensor::Accel),
+        means_of_sensor(Sensor::Gyro),
+    );
     let is_gravity = |mean: &[f64]| (norm(mean) / STANDARD_GRAVITY - 1.0).abs() < 0.1;
     if accel.len() == 3 && gyro.len() == 3 && norm(&accel) < NO_GRAVITY && is_gravity(&gyro) {
         let (f, rate) = (norm(&accel), norm(&gyro));
         let message = format!(
             "accelerometers and gyroscopes are exchanged: |f| is {f:.4} m/s², the mean rate {rate:.4} rad/s"
         );
-        return Err(FileError::contents(report.file.as_str(), Place::Within, message)
-            .advice("without names the first three columns are the accelerometers")
-            .setting(Setting::ColumnNames));
+        return Err(
+            FileError::contents(report.file.as_str(), Place::Within, message)
+                .advice("without names the first three columns are the accelerometers")
+                .setting(Setting::ColumnNames),
+        );
     }
     if accel.len() == 3 {
         check_gravity(&report.file, norm(&accel))?;
     }
     if norm(&gyro) > 0.1 {
         let degrees = norm(&gyro).to_degrees();
-        report.warn(format!("mean angular rate {degrees:.1} deg/s: not static, or deg/s named rad/s?"));
+        report.warn(format!(
+            "mean angular rate {degrees:.1} deg/s: not static, or deg/s named rad/s?"
+        ));
     }
     Ok(())
 }
@@ -170,8 +209,13 @@ pub(in crate::formats) fn check_gravity(path: &str, norm: f64) -> Result<(), Fil
 
 /// Replicates of one sensor have one rate (0.5 % allows for clocks).
 pub(super) fn same_rate(files: &[FileReport]) -> Result<(), FileError> {
-    let Some(first) = files.first() else { return Ok(()) };
-    match files.iter().find(|f| (f.rate_hz / first.rate_hz - 1.0).abs() > 0.005) {
+    let Some(first) = files.first() else {
+        return Ok(());
+    };
+    match files
+        .iter()
+        .find(|f| (f.rate_hz / first.rate_hz - 1.0).abs() > 0.005)
+    {
         None => Ok(()),
         Some(other) => {
             let message = format!(
@@ -180,8 +224,10 @@ pub(super) fn same_rate(files: &[FileReport]) -> Result<(), FileError> {
                 first.file,
                 six_digits(first.rate_hz)
             );
-            Err(FileError::contents(other.file.as_str(), Place::Itself, message)
-                .advice("calibrate recordings of one rate at a time, or resample them"))
+            Err(
+                FileError::contents(other.file.as_str(), Place::Itself, message)
+                    .advice("calibrate recordings of one rate at a time, or resample them"),
+            )
         }
     }
 }

@@ -14,7 +14,9 @@ pub(super) struct File {
     pub(super) from_directory: bool,
 }
 
-const ENDINGS: [&str; 10] = ["csv", "tsv", "txt", "npy", "npz", "mcap", "bag", "ulg", "ubx", "parquet"];
+const ENDINGS: [&str; 10] = [
+    "csv", "tsv", "txt", "npy", "npz", "mcap", "bag", "ulg", "ubx", "parquet",
+];
 
 /// The files, in the order given, those of a directory in name order.
 pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, FileError> {
@@ -26,18 +28,32 @@ pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, FileError> {
             if inside.is_empty() {
                 return Err(no_files(path.display().to_string()));
             }
-            files.extend(inside.into_iter().map(|path| File { path, from_directory: true }));
+            files.extend(inside.into_iter().map(|path| File {
+                path,
+                from_directory: true,
+            }));
         } else {
-            files.push(File { path: path.clone(), from_directory: false });
+            files.push(File {
+                path: path.clone(),
+                from_directory: false,
+            });
         }
     }
     let mut seen = HashSet::new();
     for file in &files {
         // A pipe has no path of its own.
-        if !seen.insert(file.path.canonicalize().unwrap_or_else(|_| file.path.clone())) {
+        if !seen.insert(
+            file.path
+                .canonicalize()
+                .unwrap_or_else(|_| file.path.clone()),
+        ) {
             let message = "is given twice: it would count as two replicates";
-            return Err(FileError::contents(file.path.display().to_string(), Place::Itself, message)
-                .advice("name each file once; a directory stands for all its recordings"));
+            return Err(FileError::contents(
+                file.path.display().to_string(),
+                Place::Itself,
+                message,
+            )
+            .advice("name each file once; a directory stands for all its recordings"));
         }
     }
     Ok(files)
@@ -65,14 +81,18 @@ fn listing(directory: &Path) -> std::io::Result<Vec<PathBuf>> {
 }
 
 fn name_of(path: &Path) -> String {
-    path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
+    path.file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default()
 }
 
 /// Whether a name ends like a recording's.
 pub(crate) fn is_recording(name: &str) -> bool {
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
-    plain.rsplit_once('.').is_some_and(|(stem, ending)| !stem.is_empty() && ENDINGS.contains(&ending))
+    plain
+        .rsplit_once('.')
+        .is_some_and(|(stem, ending)| !stem.is_empty() && ENDINGS.contains(&ending))
 }
 
 /// Sort key: digits compare by value, so that `replicate_9` is before `replicate_10`.
@@ -80,9 +100,13 @@ fn natural(name: &str) -> (Vec<(String, u64)>, String) {
     let mut parts: Vec<(String, u64)> = Vec::new();
     let mut rest = name;
     while !rest.is_empty() {
-        let text = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
+        let text = rest
+            .find(|c: char| c.is_ascii_digit())
+            .unwrap_or(rest.len());
         let (word, after) = rest.split_at(text);
-        let digits = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
+        let digits = after
+            .find(|c: char| !c.is_ascii_digit())
+            .unwrap_or(after.len());
         let (number, tail) = after.split_at(digits);
         parts.push((word.to_owned(), number.parse().unwrap_or(u64::MAX)));
         rest = tail;
@@ -98,7 +122,10 @@ mod tests {
     fn name_order_counts() {
         let mut names = ["run10.csv", "run9.csv", "a.csv", "run1.csv", "run01.csv"];
         names.sort_by_key(|n| natural(n));
-        assert_eq!(names, ["a.csv", "run01.csv", "run1.csv", "run9.csv", "run10.csv"]);
+        assert_eq!(
+            names,
+            ["a.csv", "run01.csv", "run1.csv", "run9.csv", "run10.csv"]
+        );
     }
 
     #[test]
@@ -106,7 +133,14 @@ mod tests {
         for name in ["a.csv", "a.CSV.gz", "b.tsv", "mt.txt", "x.npy"] {
             assert!(is_recording(name), "{name}");
         }
-        for name in ["manifest.json", "model.toml", "csv", ".csv", "a.gz", "a.csv.partial"] {
+        for name in [
+            "manifest.json",
+            "model.toml",
+            "csv",
+            ".csv",
+            "a.gz",
+            "a.csv.partial",
+        ] {
             assert!(!is_recording(name), "{name}");
         }
     }

@@ -86,7 +86,12 @@ const TIME_UNITS: &[(&[&str], f64)] = &[
 ];
 /// Endings of accelerometer columns and their size in m/s².
 const ACCEL_UNITS: &[(&[&str], f64)] = &[
-    (&["m_s2", "m_s_2", "m_s_s", "mps2", "ms2", "ms_2", "m_sec2", "m_sec_2"], 1.0),
+    (
+        &[
+            "m_s2", "m_s_2", "m_s_s", "mps2", "ms2", "ms_2", "m_sec2", "m_sec_2",
+        ],
+        1.0,
+    ),
     (&["g"], STANDARD_GRAVITY),
     (&["mg"], 1e-3 * STANDARD_GRAVITY),
     (&["ug"], 1e-6 * STANDARD_GRAVITY),
@@ -100,13 +105,49 @@ const GYRO_UNITS: &[(&[&str], f64)] = &[
     (&["deg_h", "deg_h_1", "deg_hr", "dph"], DEG_PER_HOUR),
 ];
 /// Names before the axis letter.
-const ACCEL: &[&str] =
-    &["accel", "acc", "accelerometer", "acceleration", "specific_force", "lin_acc", "a", "f", "raw_acc"];
-const GYRO: &[&str] = &["gyro", "gyr", "gyroscope", "angular_rate", "ang_vel", "g", "w", "raw_gyro"];
+const ACCEL: &[&str] = &[
+    "accel",
+    "acc",
+    "accelerometer",
+    "acceleration",
+    "specific_force",
+    "lin_acc",
+    "a",
+    "f",
+    "raw_acc",
+];
+const GYRO: &[&str] = &[
+    "gyro",
+    "gyr",
+    "gyroscope",
+    "angular_rate",
+    "ang_vel",
+    "g",
+    "w",
+    "raw_gyro",
+];
 /// Names before the axis letter that mean SI by convention.
-const ACCEL_SI: &[&str] = &["linear_acceleration", "field_linear_acceleration", "a_rs_s", "alpha"];
-const GYRO_SI: &[&str] = &["angular_velocity", "field_angular_velocity", "w_rs_s", "omega"];
-const TIME: &[&str] = &["t", "time", "timestamp", "time_stamp", "elapsed", "elapsed_time", "epoch"];
+const ACCEL_SI: &[&str] = &[
+    "linear_acceleration",
+    "field_linear_acceleration",
+    "a_rs_s",
+    "alpha",
+];
+const GYRO_SI: &[&str] = &[
+    "angular_velocity",
+    "field_angular_velocity",
+    "w_rs_s",
+    "omega",
+];
+const TIME: &[&str] = &[
+    "t",
+    "time",
+    "timestamp",
+    "time_stamp",
+    "elapsed",
+    "elapsed_time",
+    "epoch",
+];
 /// Times whose names hold their unit, and the length of that (s).
 const TIME_IN: &[(&str, f64)] = &[("timeus", 1e-6), ("timems", 1e-3), ("itow", 1e-3)];
 /// Time of a receiver, of the week or not: the last to be taken, because it may be that of its last fix.
@@ -139,12 +180,18 @@ pub(in crate::formats) fn classify(name: &str, si: bool) -> Option<Result<Role, 
         "sampletimefine" => return Some(Ok(Role::Ticks)),
         _ => {}
     }
-    let is_time = |stem: &str| [TIME, STAMP, GPS_TIME].iter().any(|names| names.contains(&stem));
+    let is_time = |stem: &str| {
+        [TIME, STAMP, GPS_TIME]
+            .iter()
+            .any(|names| names.contains(&stem))
+    };
     if is_time(&name) {
         return Some(Ok(Role::Time { unit_s: None }));
     }
     if let Some((_, unit)) = TIME_IN.iter().find(|(own, _)| *own == name) {
-        return Some(Ok(Role::Time { unit_s: Some(*unit) }));
+        return Some(Ok(Role::Time {
+            unit_s: Some(*unit),
+        }));
     }
     if let Some((stem, unit)) = split_unit(&name, TIME_UNITS)
         && is_time(stem)
@@ -160,13 +207,22 @@ fn signal(name: &str, si: bool) -> Option<Result<Role, ()>> {
             && let Some((axis, _)) = stem_axis(stem, sensor)
         {
             let channel = Channel { sensor, axis };
-            return Some(Ok(Role::Signal { channel, unit: Unit::Si(factor) }));
+            return Some(Ok(Role::Signal {
+                channel,
+                unit: Unit::Si(factor),
+            }));
         }
         if let Some((axis, convention)) = stem_axis(name, sensor) {
             let channel = Channel { sensor, axis };
             return Some(match sensor {
-                _ if si || convention => Ok(Role::Signal { channel, unit: Unit::Si(1.0) }),
-                Sensor::Accel => Ok(Role::Signal { channel, unit: Unit::FromGravity }),
+                _ if si || convention => Ok(Role::Signal {
+                    channel,
+                    unit: Unit::Si(1.0),
+                }),
+                Sensor::Accel => Ok(Role::Signal {
+                    channel,
+                    unit: Unit::FromGravity,
+                }),
                 Sensor::Gyro => Err(()),
             });
         }
@@ -184,7 +240,10 @@ fn increment(name: &str) -> Option<Result<Role, ()>> {
         ] {
             if name == stem {
                 let channel = Channel { sensor, axis };
-                return Some(Ok(Role::Signal { channel, unit: Unit::Increment(factor) }));
+                return Some(Ok(Role::Signal {
+                    channel,
+                    unit: Unit::Increment(factor),
+                }));
             }
         }
     }
@@ -208,8 +267,13 @@ pub(in crate::formats) fn normalise(name: &str) -> String {
 }
 
 /// The name without its unit, and the unit; the longest ending wins.
-pub(in crate::formats) fn split_unit<'a>(name: &'a str, units: &[(&[&str], f64)]) -> Option<(&'a str, f64)> {
-    let endings = units.iter().flat_map(|(names, factor)| names.iter().map(move |n| (*n, *factor)));
+pub(in crate::formats) fn split_unit<'a>(
+    name: &'a str,
+    units: &[(&[&str], f64)],
+) -> Option<(&'a str, f64)> {
+    let endings = units
+        .iter()
+        .flat_map(|(names, factor)| names.iter().map(move |n| (*n, *factor)));
     let stem = |ending: &str| name.strip_suffix(ending)?.strip_suffix('_');
     let hits = endings.filter_map(|(ending, factor)| stem(ending).map(|s| (s, factor)));
     hits.min_by_key(|(stem, _)| stem.len())
@@ -226,7 +290,9 @@ fn in_unknown_unit(name: &str) -> Option<Channel> {
         (clear && !unit.is_empty()).then_some(Channel { sensor, axis })
     };
     let stems = [(Sensor::Accel, ACCEL), (Sensor::Gyro, GYRO)];
-    let mut all = stems.into_iter().flat_map(|(sensor, names)| names.iter().map(move |n| (sensor, *n)));
+    let mut all = stems
+        .into_iter()
+        .flat_map(|(sensor, names)| names.iter().map(move |n| (sensor, *n)));
     all.find_map(|(sensor, stem)| channel_of_stem(sensor, stem))
 }
 
@@ -255,7 +321,9 @@ impl Layout {
         for (index, name) in names.iter().enumerate() {
             let name = name.trim().to_owned();
             match classify(&name, si) {
-                Some(Ok(Role::Signal { channel, .. })) if wanted.is_some_and(|w| !w.contains(&channel)) => {
+                Some(Ok(Role::Signal { channel, .. }))
+                    if wanted.is_some_and(|w| !w.contains(&channel)) =>
+                {
                     ignored.push(name);
                 }
                 Some(Ok(role)) => found.push(Found { index, name, role }),
@@ -270,13 +338,25 @@ impl Layout {
         layout.one_time_column();
         layout.no_channel_twice(place)?;
         layout.no_unknown_unit(place, wanted)?;
-        if !layout.found.iter().any(|f| matches!(f.role, Role::Signal { .. })) {
-            let quoted: Vec<String> =
-                names.iter().take(20).map(|n| format!("\"{}\"", shown(n.trim(), 40))).collect();
-            let message = format!("no accelerometer or gyroscope column among {}", quoted.join(", "));
-            return Err(FileError::new(place.path, place.line, Kind::Columns(message.into()))
-                .advice(COLUMNS)
-                .setting(Setting::ColumnNames));
+        if !layout
+            .found
+            .iter()
+            .any(|f| matches!(f.role, Role::Signal { .. }))
+        {
+            let quoted: Vec<String> = names
+                .iter()
+                .take(20)
+                .map(|n| format!("\"{}\"", shown(n.trim(), 40)))
+                .collect();
+            let message = format!(
+                "no accelerometer or gyroscope column among {}",
+                quoted.join(", ")
+            );
+            return Err(
+                FileError::new(place.path, place.line, Kind::Columns(message.into()))
+                    .advice(COLUMNS)
+                    .setting(Setting::ColumnNames),
+            );
         }
         Ok(layout)
     }
@@ -285,12 +365,18 @@ impl Layout {
     fn one_time_column(&mut self) {
         let rank = |f: &Found| match f.role {
             Role::Time { .. } if STAMP.iter().any(|s| normalise(&f.name).starts_with(s)) => Some(0),
-            Role::Time { .. } if GPS_TIME.iter().any(|s| normalise(&f.name).starts_with(s)) => Some(3),
+            Role::Time { .. } if GPS_TIME.iter().any(|s| normalise(&f.name).starts_with(s)) => {
+                Some(3)
+            }
             Role::Time { unit_s: Some(_) } => Some(1),
             Role::Time { unit_s: None } => Some(2),
             _ => None,
         };
-        let best = self.found.iter().filter_map(|f| rank(f).map(|r| (r, f.index))).min();
+        let best = self
+            .found
+            .iter()
+            .filter_map(|f| rank(f).map(|r| (r, f.index)))
+            .min();
         let (kept, passed): (Vec<Found>, Vec<Found>) = std::mem::take(&mut self.found)
             .into_iter()
             .partition(|f| rank(f).is_none() || best.is_some_and(|(_, index)| f.index == index));
@@ -300,7 +386,11 @@ impl Layout {
 
     /// A column that is an axis by its name but in a unit that is not known must not be dropped in silence: unless
     /// another column is that axis, or it is not wanted.
-    fn no_unknown_unit(&self, place: HeaderPlace<'_>, wanted: Option<&[Channel]>) -> Result<(), FileError> {
+    fn no_unknown_unit(
+        &self,
+        place: HeaderPlace<'_>,
+        wanted: Option<&[Channel]>,
+    ) -> Result<(), FileError> {
         let refuse = |name: &str, endings: &str| {
             place
                 .refuse(format!("column \"{name}\" is in a unit that is not known"))
@@ -313,18 +403,26 @@ impl Layout {
         for name in &self.ignored {
             let plain = normalise(name);
             for (stem, endings) in [("dv_", "_m_s, _mps"), ("dtheta_", "_rad, _deg")] {
-                if ["x_", "y_", "z_"].iter().any(|axis| plain.starts_with(&format!("{stem}{axis}"))) {
+                if ["x_", "y_", "z_"]
+                    .iter()
+                    .any(|axis| plain.starts_with(&format!("{stem}{axis}")))
+                {
                     return Err(refuse(name, endings));
                 }
             }
-            let Some(channel) = in_unknown_unit(&plain) else { continue };
+            let Some(channel) = in_unknown_unit(&plain) else {
+                continue;
+            };
             let missed = wanted.is_none_or(|w| w.contains(&channel));
             if missed && !self.found.iter().any(|f| has_channel(f, channel)) {
                 let units = match channel.sensor {
                     Sensor::Accel => ACCEL_UNITS,
                     Sensor::Gyro => GYRO_UNITS,
                 };
-                let units: Vec<String> = units.iter().map(|(names, _)| format!("_{}", names[0])).collect();
+                let units: Vec<String> = units
+                    .iter()
+                    .map(|(names, _)| format!("_{}", names[0]))
+                    .collect();
                 return Err(refuse(name, &units.join(", ")));
             }
         }
@@ -333,7 +431,8 @@ impl Layout {
 
     fn no_channel_twice(&self, place: HeaderPlace<'_>) -> Result<(), FileError> {
         for channel in Channel::ALL {
-            let of_channel = |f: &&Found| matches!(f.role, Role::Signal { channel: c, .. } if c == channel);
+            let of_channel =
+                |f: &&Found| matches!(f.role, Role::Signal { channel: c, .. } if c == channel);
             let mut names = self.found.iter().filter(of_channel).map(|f| f.name.clone());
             if let (Some(first), Some(second)) = (names.next(), names.next()) {
                 let message = format!("columns \"{first}\" and \"{second}\" are both {channel}");

@@ -11,7 +11,10 @@ pub(super) struct Blanks<R> {
 
 impl<R> Blanks<R> {
     pub(super) const fn new(inner: R) -> Self {
-        Self { inner, inside: false }
+        Self {
+            inner,
+            inside: false,
+        }
     }
 }
 
@@ -50,7 +53,10 @@ mod tests {
     fn one_blank_for_several_wherever_the_bytes_are_cut() {
         let text: &[u8] = b"  a   b \r\n c  d\n\n";
         for cut in 0..text.len() {
-            assert_eq!(all(Blanks::new(text[..cut].chain(&text[cut..]))), "a b \r\nc d\n\n");
+            assert_eq!(
+                all(Blanks::new(text[..cut].chain(&text[cut..]))),
+                "a b \r\nc d\n\n"
+            );
         }
     }
 }

@@ -15,12 +15,25 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError>
     let name = path.display().to_string();
     let refused = |e| logs::refused(path, e);
     let log = logs::open(path, &options.log)?;
-    let mut samples = log.imu(options.log.topic.as_deref(), options.log.stamp).map_err(refused)?;
-    let wanted = |channel: &Channel| options.channels.as_ref().is_none_or(|all| all.contains(channel));
+    let mut samples = log
+        .imu(options.log.topic.as_deref(), options.log.stamp)
+        .map_err(refused)?;
+    let wanted = |channel: &Channel| {
+        options
+            .channels
+            .as_ref()
+            .is_none_or(|all| all.contains(channel))
+    };
     let signals: Vec<Channel> = Channel::ALL.into_iter().filter(wanted).collect();
     let mut columns = vec![column("t_s".to_owned(), Role::Time { unit_s: Some(1.0) })];
     columns.extend(signals.iter().map(|channel| {
-        column(column_name(*channel), Role::Signal { channel: *channel, unit: Unit::Si(1.0) })
+        column(
+            column_name(*channel),
+            Role::Signal {
+                channel: *channel,
+                unit: Unit::Si(1.0),
+            },
+        )
     }));
     let stored = storage(&name);
     for (row, read) in samples.by_ref().enumerate() {
@@ -34,8 +47,18 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError>
         for (column, channel) in columns[1..].iter_mut().zip(&signals) {
             let value = six[channel.index()];
             if !value.is_finite() || value.abs() > LARGEST {
-                let reason = if value.is_finite() { BEYOND } else { "is not finite" };
-                return Err(sample(&name, row as u64 + 1, &column.name, &value.to_string(), reason));
+                let reason = if value.is_finite() {
+                    BEYOND
+                } else {
+                    "is not finite"
+                };
+                return Err(sample(
+                    &name,
+                    row as u64 + 1,
+                    &column.name,
+                    &value.to_string(),
+                    reason,
+                ));
             }
             column.values.push(value);
         }
@@ -46,10 +69,26 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError>
     let damage = log.damage().or(samples.damage());
     notes.warnings.extend(damage.map(logs::recovered));
     let other = |c: &&nav_sim_logs::Channel| c.topic != samples.topic() && c.clock == Clock::Unix;
-    let ignored = log.channels().iter().filter(other).map(|c| c.topic.clone()).collect();
-    Ok(Raw { path: name.clone(), columns, ignored, head_rate: None, lines: Lines::default(), notes })
+    let ignored = log
+        .channels()
+        .iter()
+        .filter(other)
+        .map(|c| c.topic.clone())
+        .collect();
+    Ok(Raw {
+        path: name.clone(),
+        columns,
+        ignored,
+        head_rate: None,
+        lines: Lines::default(),
+        notes,
+    })
 }
 
 pub(super) fn column(name: String, role: Role) -> Column {
-    Column { name, role, values: Values::default() }
+    Column {
+        name,
+        role,
+        values: Values::default(),
+    }
 }

@@ -30,15 +30,19 @@ impl Manifest {
         let text = fs::read_to_string(path.with_file_name(MANIFEST)).ok()?;
         let manifest: Self = serde_json::from_str(&text).ok()?;
         let name = path.file_name()?.to_str()?;
-        let is_of_it =
-            manifest.command == "synthesize" && manifest.replicates.iter().any(|own| own.file == name);
+        let is_of_it = manifest.command == "synthesize"
+            && manifest.replicates.iter().any(|own| own.file == name);
         (is_of_it && manifest.rate_hz > 0.0).then_some(manifest)
     }
 
     /// The names of so many columns, if it has as many signals.
     pub(super) fn columns(&self, count: usize) -> Option<Vec<String>> {
         let named = |name: &String| Channel::ALL.into_iter().find(|c| c.to_string() == *name);
-        let names: Option<Vec<String>> = self.axes.iter().map(|name| named(name).map(column_name)).collect();
+        let names: Option<Vec<String>> = self
+            .axes
+            .iter()
+            .map(|name| named(name).map(column_name))
+            .collect();
         names.filter(|names| names.len() == count)
     }
 }

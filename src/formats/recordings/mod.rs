@@ -49,8 +49,14 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// When a file cannot be read, or holds what no sound recording can: [`FileError`].
-pub fn read(paths: &[PathBuf], options: &ReadOptions) -> Result<(Vec<Recording>, Report), FileError> {
-    let options = ReadOptions { hold_bytes: usize::MAX, ..options.clone() };
+pub fn read(
+    paths: &[PathBuf],
+    options: &ReadOptions,
+) -> Result<(Vec<Recording>, Report), FileError> {
+    let options = ReadOptions {
+        hold_bytes: usize::MAX,
+        ..options.clone()
+    };
     visit(paths, &options, &|recording| recording, &|_, _| {})
 }
 
@@ -75,15 +81,29 @@ pub(crate) fn visit<T: Send>(
     tell(0, files.len());
     let mut done = 0;
     for some in files.chunks(AT_ONCE) {
-        let outcomes: Vec<_> = some.par_iter().map(|file| held(&file.path, options, look)).collect();
+        let outcomes: Vec<_> = some
+            .par_iter()
+            .map(|file| held(&file.path, options, look))
+            .collect();
         for (file, outcome) in some.iter().zip(outcomes) {
             match outcome {
                 // The output of this very command, say, when it goes to a file in the directory.
-                Err(FileError { kind: Kind::Empty(_), .. }) if file.from_directory => {
-                    report.warnings.push(format!("{}: passed over, it is empty", file.path.display()));
+                Err(FileError {
+                    kind: Kind::Empty(_),
+                    ..
+                }) if file.from_directory => {
+                    report
+                        .warnings
+                        .push(format!("{}: passed over, it is empty", file.path.display()));
                 }
-                Err(FileError { kind: Kind::Columns(_), .. }) if file.from_directory => {
-                    let text = format!("{}: passed over, no column is a known one", file.path.display());
+                Err(FileError {
+                    kind: Kind::Columns(_),
+                    ..
+                }) if file.from_directory => {
+                    let text = format!(
+                        "{}: passed over, no column is a known one",
+                        file.path.display()
+                    );
                     report.warnings.push(text);
                 }
                 outcome => {
@@ -101,7 +121,10 @@ pub(crate) fn visit<T: Send>(
     }
     checks::same_rate(&report.files)?;
     if looks.is_empty() {
-        let path = paths.first().map(|p| p.display().to_string()).unwrap_or_default();
+        let path = paths
+            .first()
+            .map(|p| p.display().to_string())
+            .unwrap_or_default();
         return Err(no_files(path));
     }
     Ok((looks, report))
@@ -118,12 +141,19 @@ fn held<T>(
     if prepared.is_stored() {
         return Ok((report, Vec::new(), Some(prepared)));
     }
-    Ok((report, prepared.recordings()?.into_iter().map(look).collect(), None))
+    Ok((
+        report,
+        prepared.recordings()?.into_iter().map(look).collect(),
+        None,
+    ))
 }
 
 /// Reads a file's columns.
 pub(in crate::formats) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
-    let ends_in = |ending: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
+    let ends_in = |ending: &str| {
+        path.extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case(ending))
+    };
     match logs::kind_of(path) {
         #[cfg(feature = "npz")]
         Some(nav_sim_logs::Kind::Npz) => archive::load(path, options),
@@ -134,8 +164,10 @@ pub(in crate::formats) fn load(path: &Path, options: &ReadOptions) -> Result<Raw
         #[cfg(not(feature = "parquet"))]
         None if ends_in("parquet") => {
             let message = "is Apache Parquet, which this build does not read";
-            Err(FileError::contents(path.display().to_string(), Place::Itself, message)
-                .advice("build with --features parquet, or write CSV"))
+            Err(
+                FileError::contents(path.display().to_string(), Place::Itself, message)
+                    .advice("build with --features parquet, or write CSV"),
+            )
         }
         None if oxts::is_oxts(path) => oxts::load(path, options),
         None => text::load(path, options),

@@ -32,34 +32,65 @@ pub(super) fn is_oxts(directory: &Path) -> bool {
 pub(super) fn load(directory: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
     let name = directory.display().to_string();
     let times = times(&directory.join("timestamps.txt"))?;
-    let names: Vec<String> =
-        std::iter::once("t_s").chain(NAMES.map(|(name, _)| name)).map(str::to_owned).collect();
-    let layout =
-        Layout::new(HeaderPlace { path: &name, line: 1 }, &names, false, options.channels.as_deref())?;
+    let names: Vec<String> = std::iter::once("t_s")
+        .chain(NAMES.map(|(name, _)| name))
+        .map(str::to_owned)
+        .collect();
+    let layout = Layout::new(
+        HeaderPlace {
+            path: &name,
+            line: 1,
+        },
+        &names,
+        false,
+        options.channels.as_deref(),
+    )?;
     let (indices, mut columns) = empty_columns(&layout);
     let files = samples(&directory.join("data"))?;
     if files.is_empty() {
         return Err(empty(&name));
     }
     if files.len() != times.len() {
-        let message = format!("{} samples in data, {} times in timestamps.txt", files.len(), times.len());
-        return Err(FileError::contents(name, crate::formats::Place::Within, message));
+        let message = format!(
+            "{} samples in data, {} times in timestamps.txt",
+            files.len(),
+            times.len()
+        );
+        return Err(FileError::contents(
+            name,
+            crate::formats::Place::Within,
+            message,
+        ));
     }
     for (path, t_s) in files.iter().zip(times) {
         let row = row(path, t_s)?;
-        indices.iter().zip(&mut columns).for_each(|(index, column)| column.values.push(row[*index]));
+        indices
+            .iter()
+            .zip(&mut columns)
+            .for_each(|(index, column)| column.values.push(row[*index]));
     }
     settle(&mut columns, options).map_err(super::error::storage(&name))?;
     let (lines, mut notes) = (Lines::default(), Notes::default());
-    notes.assumptions.push("KITTI oxts, axes front, left, up".to_owned());
-    Ok(Raw { path: name, columns, ignored: Vec::new(), head_rate: None, lines, notes })
+    notes
+        .assumptions
+        .push("KITTI oxts, axes front, left, up".to_owned());
+    Ok(Raw {
+        path: name,
+        columns,
+        ignored: Vec::new(),
+        head_rate: None,
+        lines,
+        notes,
+    })
 }
 
 /// Files of the samples, in order.
 fn samples(data: &Path) -> Result<Vec<PathBuf>, FileError> {
     let io = |e| unreadable(data, e);
     let entries = std::fs::read_dir(data).map_err(io)?;
-    let mut files = entries.map(|entry| Ok(entry.map_err(io)?.path())).collect::<Result<Vec<_>, _>>()?;
+    let mut files = entries
+        .map(|entry| Ok(entry.map_err(io)?.path()))
+        .collect::<Result<Vec<_>, _>>()?;
     files.retain(|path| path.extension().is_some_and(|e| e == "txt"));
     files.sort();
     Ok(files)
@@ -78,7 +109,11 @@ fn times(path: &Path) -> Result<Vec<f64>, FileError> {
         let since = found.and_utc();
         Ok(since.timestamp() as f64 + 1e-9 * f64::from(since.timestamp_subsec_nanos()))
     };
-    text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()).map(time).collect()
+    text.lines()
+        .enumerate()
+        .filter(|(_, line)| !line.trim().is_empty())
+        .map(time)
+        .collect()
 }
 
 /// Time and quantities of a sample.

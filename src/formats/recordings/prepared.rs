@@ -34,10 +34,14 @@ struct Signals {
 }
 
 impl Prepared {
-    pub(super) fn new(mut raw: Raw, options: &ReadOptions) -> Result<(Self, FileReport), FileError> {
+    pub(super) fn new(
+        mut raw: Raw,
+        options: &ReadOptions,
+    ) -> Result<(Self, FileReport), FileError> {
         let mut report = FileReport::new(&raw);
         let timing = timing::timing(&mut raw, options, &mut report)?;
-        raw.columns.retain(|c| matches!(c.role, Role::Signal { .. }));
+        raw.columns
+            .retain(|c| matches!(c.role, Role::Signal { .. }));
         raw.columns.sort_by_key(|c| c.channel().map(Channel::index));
         let factors = checks::factors(&raw, timing.rate_hz)?;
         checks::clipped(&raw, &mut report)?;
@@ -46,21 +50,48 @@ impl Prepared {
         let stored = storage(&raw.path);
         let mut columns = Vec::new();
         for (column, factor) in raw.columns.into_iter().zip(factors) {
-            let Some(channel) = column.channel() else { continue };
+            let Some(channel) = column.channel() else {
+                continue;
+            };
             let mean = |piece: &Range<usize>| checks::mean(&column.values, piece.clone(), factor);
-            let means = pieces.iter().map(mean).collect::<Result<_, _>>().map_err(&stored)?;
-            columns.push(Signals { column, channel, factor, means });
+            let means = pieces
+                .iter()
+                .map(mean)
+                .collect::<Result<_, _>>()
+                .map_err(&stored)?;
+            columns.push(Signals {
+                column,
+                channel,
+                factor,
+                means,
+            });
         }
-        let means_of = |i| columns.iter().map(|c| (c.channel, c.means[i])).collect::<Vec<_>>();
+        let means_of = |i| {
+            columns
+                .iter()
+                .map(|c| (c.channel, c.means[i]))
+                .collect::<Vec<_>>()
+        };
         for i in 0..pieces.len() {
             checks::plausible(&means_of(i), &mut report)?;
         }
         let holes = timing.holes;
-        report.samples =
-            pieces.iter().map(|p| p.len() + missing(&holes, p).map(|(_, n)| n).sum::<usize>()).collect();
+        report.samples = pieces
+            .iter()
+            .map(|p| p.len() + missing(&holes, p).map(|(_, n)| n).sum::<usize>())
+            .collect();
         report.rate_hz = timing.rate_hz;
         report.means = means_of(0);
-        Ok((Self { path: raw.path.clone(), rate_hz: timing.rate_hz, columns, pieces, holes }, report))
+        Ok((
+            Self {
+                path: raw.path.clone(),
+                rate_hz: timing.rate_hz,
+                columns,
+                pieces,
+                holes,
+            },
+            report,
+        ))
     }
 
     pub(super) fn is_stored(&self) -> bool {
@@ -69,15 +100,27 @@ impl Prepared {
 
     /// All recordings of the file.
     pub(super) fn recordings(self) -> Result<Vec<Recording>, FileError> {
-        let mut recordings: Vec<Recording> = (0..self.pieces.len()).map(|i| self.recording(i)).collect();
+        let mut recordings: Vec<Recording> =
+            (0..self.pieces.len()).map(|i| self.recording(i)).collect();
         for signals in self.columns {
-            let Signals { column, channel, factor, means } = signals;
+            let Signals {
+                column,
+                channel,
+                factor,
+                means,
+            } = signals;
             let stretches = column.values.into_stretches(&self.pieces);
             let stretches = stretches.map_err(storage(&self.path))?;
-            let pieces = recordings.iter_mut().zip(&self.pieces).zip(stretches).zip(means);
+            let pieces = recordings
+                .iter_mut()
+                .zip(&self.pieces)
+                .zip(stretches)
+                .zip(means);
             for (((recording, piece), samples), mean) in pieces {
                 let samples = with_holes(samples, piece, &self.holes);
-                recording.signals.push(signal(channel, samples, factor, mean));
+                recording
+                    .signals
+                    .push(signal(channel, samples, factor, mean));
             }
         }
         Ok(recordings)
@@ -90,23 +133,36 @@ impl Prepared {
             let samples = samples.map_err(storage(&self.path))?;
             let samples = with_holes(samples, piece, &self.holes);
             let signal = signal(signals.channel, samples, signals.factor, signals.means[i]);
-            Ok(Recording { signals: vec![signal], ..self.recording(i) })
+            Ok(Recording {
+                signals: vec![signal],
+                ..self.recording(i)
+            })
         };
         let pieces = self.pieces.iter().enumerate();
-        pieces.flat_map(|(i, piece)| self.columns.iter().map(move |c| (i, piece, c))).map(recording_of_signal)
+        pieces
+            .flat_map(|(i, piece)| self.columns.iter().map(move |c| (i, piece, c)))
+            .map(recording_of_signal)
     }
 
     /// A recording without its signals.
     fn recording(&self, piece: usize) -> Recording {
         let name = name_of(&self.path, piece, self.pieces.len());
-        Recording { name, rate_hz: self.rate_hz, signals: Vec::new() }
+        Recording {
+            name,
+            rate_hz: self.rate_hz,
+            signals: Vec::new(),
+        }
     }
 }
 
 /// A signal in SI units without its mean.
 fn signal(channel: Channel, mut samples: Vec<f64>, factor: f64, mean: f64) -> Signal {
     samples.iter_mut().for_each(|v| *v = *v * factor - mean);
-    Signal { channel, mean, samples }
+    Signal {
+        channel,
+        mean,
+        samples,
+    }
 }
 
 /// The holes within a stretch.
@@ -114,7 +170,9 @@ fn missing<'a>(
     holes: &'a [(usize, usize)],
     piece: &'a Range<usize>,
 ) -> impl Iterator<Item = &'a (usize, usize)> {
-    holes.iter().filter(|(sample, _)| *sample > piece.start && *sample < piece.end)
+    holes
+        .iter()
+        .filter(|(sample, _)| *sample > piece.start && *sample < piece.end)
 }
 
 /// The samples of a stretch with NaN where some are missing.
@@ -122,7 +180,8 @@ fn with_holes(samples: Vec<f64>, piece: &Range<usize>, holes: &[(usize, usize)])
     if missing(holes, piece).next().is_none() {
         return samples;
     }
-    let mut whole = Vec::with_capacity(samples.len() + missing(holes, piece).map(|(_, n)| n).sum::<usize>());
+    let mut whole =
+        Vec::with_capacity(samples.len() + missing(holes, piece).map(|(_, n)| n).sum::<usize>());
     let mut done = 0;
     for (sample, lost) in missing(holes, piece) {
         let next = sample - piece.start;
@@ -147,12 +206,18 @@ fn pieces(
 ) -> Result<Vec<Range<usize>>, FileError> {
     let skip = ((options.skip_s.max(0.0) * timing.rate_hz).round() as usize).min(samples);
     let inner = timing.breaks.iter().copied().filter(|b| *b > skip);
-    let ends: Vec<usize> = std::iter::once(skip).chain(inner).chain([samples]).collect();
+    let ends: Vec<usize> = std::iter::once(skip)
+        .chain(inner)
+        .chain([samples])
+        .collect();
     let all = || ends.windows(2).map(|w| w[0]..w[1]);
     let longest = all().map(|p| p.len()).max().unwrap_or(0);
     let needed = options.min_samples.max(2);
     if longest < needed && options.skip_s > 0.0 {
-        let (skip_s, seconds) = (options.skip_s, crate::report::seconds(samples as f64 / timing.rate_hz));
+        let (skip_s, seconds) = (
+            options.skip_s,
+            crate::report::seconds(samples as f64 / timing.rate_hz),
+        );
         let message = format!(
             "leaving out the first {skip_s} s leaves {longest} samples of {seconds} s, but {needed} are needed"
         );
@@ -167,7 +232,9 @@ fn pieces(
     let needed = needed.max(longest / LONGEST_OVER_SHORTEST);
     let dropped = all().filter(|p| p.len() < needed).count();
     if dropped > 0 {
-        report.warn(format!("{dropped} stretches between gaps have fewer than {needed} samples: left out"));
+        report.warn(format!(
+            "{dropped} stretches between gaps have fewer than {needed} samples: left out"
+        ));
     }
     Ok(all().filter(|p| p.len() >= needed).collect())
 }

@@ -20,22 +20,41 @@ pub struct Report {
 impl Report {
     /// `8 recordings at 100 Hz, 655 s each`
     pub(crate) fn summary(&self) -> String {
-        let seconds = self.files.iter().map(|f| f.samples.iter().sum::<usize>() as f64 / f.rate_hz);
-        let (low, high) = seconds.fold((f64::INFINITY, 0.0_f64), |(low, high), s| (low.min(s), high.max(s)));
+        let seconds = self
+            .files
+            .iter()
+            .map(|f| f.samples.iter().sum::<usize>() as f64 / f.rate_hz);
+        let (low, high) = seconds.fold((f64::INFINITY, 0.0_f64), |(low, high), s| {
+            (low.min(s), high.max(s))
+        });
         let rate_hz = six_digits(self.files.first().map_or(f64::NAN, |f| f.rate_hz));
-        let length =
-            if high - low < 0.5 { format!("{high:.0} s each") } else { format!("{low:.0} to {high:.0} s") };
+        let length = if high - low < 0.5 {
+            format!("{high:.0} s each")
+        } else {
+            format!("{low:.0} to {high:.0} s")
+        };
         let assumed = self.files.iter().any(|f| !f.assumptions.is_empty());
         let assumed = if assumed { ", with assumptions" } else { "" };
-        format!("{} recordings at {rate_hz} Hz, {length}{assumed}", self.files.len())
+        format!(
+            "{} recordings at {rate_hz} Hz, {length}{assumed}",
+            self.files.len()
+        )
     }
 
     /// Every doubt, those about a file with its name.
     #[must_use]
     pub fn all_warnings(&self) -> Vec<String> {
-        let named =
-            |f: &FileReport| f.warnings.iter().map(|w| format!("{}: {w}", f.file)).collect::<Vec<_>>();
-        self.warnings.iter().cloned().chain(self.files.iter().flat_map(named)).collect()
+        let named = |f: &FileReport| {
+            f.warnings
+                .iter()
+                .map(|w| format!("{}: {w}", f.file))
+                .collect::<Vec<_>>()
+        };
+        self.warnings
+            .iter()
+            .cloned()
+            .chain(self.files.iter().flat_map(named))
+            .collect()
     }
 }
 
@@ -67,7 +86,11 @@ pub struct FileReport {
 
 /// The name of one of the recordings of a file.
 pub(super) fn name_of(file: &str, index: usize, count: usize) -> String {
-    if count > 1 { format!("{file}[{}]", index + 1) } else { file.to_owned() }
+    if count > 1 {
+        format!("{file}[{}]", index + 1)
+    } else {
+        file.to_owned()
+    }
 }
 
 impl FileReport {
@@ -85,9 +108,19 @@ impl FileReport {
             warnings: raw.notes.warnings.clone(),
             ..Self::default()
         };
-        let increments = |c: &Column| matches!(c.role, Role::Signal { unit: Unit::Increment(_), .. });
+        let increments = |c: &Column| {
+            matches!(
+                c.role,
+                Role::Signal {
+                    unit: Unit::Increment(_),
+                    ..
+                }
+            )
+        };
         if raw.columns.iter().any(increments) {
-            report.assumptions.push("increments divided by the sample interval".into());
+            report
+                .assumptions
+                .push("increments divided by the sample interval".into());
         }
         report
     }
@@ -95,7 +128,10 @@ impl FileReport {
     /// The names of its recordings, with their samples: of several, such as stretches between gaps, `a.csv[1]`, …
     pub(crate) fn recordings(&self) -> impl Iterator<Item = (String, usize)> + Clone {
         let count = self.samples.len();
-        self.samples.iter().enumerate().map(move |(i, samples)| (name_of(&self.file, i, count), *samples))
+        self.samples
+            .iter()
+            .enumerate()
+            .map(move |(i, samples)| (name_of(&self.file, i, count), *samples))
     }
 
     /// Samples of all its recordings.
@@ -109,8 +145,11 @@ impl FileReport {
 
     fn means_of(&self, sensor: Sensor) -> Option<String> {
         let of_sensor = self.means.iter().filter(|(c, _)| c.sensor == sensor);
-        let parts: Vec<String> = of_sensor.map(|(c, m)| format!("{} {m:.6}", c.axis.name())).collect();
-        (!parts.is_empty()).then(|| format!("{} {} {}", sensor.name(), parts.join(", "), sensor.unit()))
+        let parts: Vec<String> = of_sensor
+            .map(|(c, m)| format!("{} {m:.6}", c.axis.name()))
+            .collect();
+        (!parts.is_empty())
+            .then(|| format!("{} {} {}", sensor.name(), parts.join(", "), sensor.unit()))
     }
 }
 
@@ -118,13 +157,23 @@ impl fmt::Display for FileReport {
     /// `a.csv: 524284 samples at 100 Hz (time column), 5242.84 s; means removed: accel x 0.02, …`
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let total = self.count();
-        let (rate, from, seconds) =
-            (six_digits(self.rate_hz), &self.rate_from, crate::report::seconds(total as f64 / self.rate_hz));
-        write!(f, "{}: {total} samples at {rate} Hz ({from}), {seconds} s", self.file)?;
+        let (rate, from, seconds) = (
+            six_digits(self.rate_hz),
+            &self.rate_from,
+            crate::report::seconds(total as f64 / self.rate_hz),
+        );
+        write!(
+            f,
+            "{}: {total} samples at {rate} Hz ({from}), {seconds} s",
+            self.file
+        )?;
         if self.samples.len() > 1 {
             write!(f, ", in {} stretches", self.samples.len())?;
         }
-        let means: Vec<String> = Sensor::ALL.into_iter().filter_map(|s| self.means_of(s)).collect();
+        let means: Vec<String> = Sensor::ALL
+            .into_iter()
+            .filter_map(|s| self.means_of(s))
+            .collect();
         write!(f, "; means removed: {}", means.join("; "))?;
         self.assumptions.iter().try_for_each(|a| write!(f, "; {a}"))
     }

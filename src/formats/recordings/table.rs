@@ -46,7 +46,11 @@ impl Column {
 
 /// Where each column of a layout stands in a row, and the columns, empty.
 pub(super) fn empty_columns(layout: &Layout) -> (Vec<usize>, Vec<Column>) {
-    let empty = |f: &Found| Column { name: f.name.clone(), role: f.role, values: Values::default() };
+    let empty = |f: &Found| Column {
+        name: f.name.clone(),
+        role: f.role,
+        values: Values::default(),
+    };
     layout.found.iter().map(|f| (f.index, empty(f))).unzip()
 }
 
@@ -85,7 +89,10 @@ pub(super) const BETWEEN: usize = 1 << 16;
 
 /// Stores the columns of a file that are more than is to be held.
 pub(super) fn relieve(columns: &mut [Column], options: &ReadOptions) -> std::io::Result<()> {
-    let bytes: usize = columns.iter().map(|c| size_of::<f64>() * c.values.len()).sum();
+    let bytes: usize = columns
+        .iter()
+        .map(|c| size_of::<f64>() * c.values.len())
+        .sum();
     if bytes > options.hold_bytes {
         columns.iter_mut().try_for_each(|c| c.values.store())?;
     }

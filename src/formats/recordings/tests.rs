@@ -33,7 +33,11 @@ impl Files {
     }
 }
 
-fn read_one(name: &str, contents: impl AsRef<[u8]>, options: &ReadOptions) -> Result<Recording, FileError> {
+fn read_one(
+    name: &str,
+    contents: impl AsRef<[u8]>,
+    options: &ReadOptions,
+) -> Result<Recording, FileError> {
     let (_files, path) = Files::with(name, contents);
     read(&[path], options).map(|(mut r, _)| r.remove(0))
 }
@@ -43,7 +47,10 @@ fn refusal_with(name: &str, contents: impl AsRef<[u8]>, options: &ReadOptions) -
     let (files, path) = Files::with(name, contents);
     let e = read(&[path], options).unwrap_err();
     let directory = format!("{}/", files.path().display());
-    (e.to_string().replace(&directory, ""), e.hint().unwrap_or_default())
+    (
+        e.to_string().replace(&directory, ""),
+        e.hint().unwrap_or_default(),
+    )
 }
 
 fn refusal(contents: impl AsRef<[u8]>) -> String {
@@ -53,7 +60,9 @@ fn refusal(contents: impl AsRef<[u8]>) -> String {
 /// A sound file of `n` rows at 100 Hz: time and x-gyro.
 fn sound(n: usize) -> Vec<String> {
     let rows = (0..n).map(|k| format!("{},{}", k as f64 / 100.0, (k % 7) as f64 * 1e-3));
-    std::iter::once("t_s,gyro_x_rad_s".to_owned()).chain(rows).collect()
+    std::iter::once("t_s,gyro_x_rad_s".to_owned())
+        .chain(rows)
+        .collect()
 }
 
 fn changed(line: usize, to: &str) -> String {
@@ -63,7 +72,10 @@ fn changed(line: usize, to: &str) -> String {
 }
 
 fn at_100_hz() -> ReadOptions {
-    ReadOptions { rate_hz: Some(100.0), ..ReadOptions::default() }
+    ReadOptions {
+        rate_hz: Some(100.0),
+        ..ReadOptions::default()
+    }
 }
 
 fn samples_with_mean(signal: &Signal) -> Vec<f64> {
@@ -71,13 +83,20 @@ fn samples_with_mean(signal: &Signal) -> Vec<f64> {
 }
 
 fn channels(recording: &Recording) -> Vec<String> {
-    recording.signals.iter().map(|s| s.channel.to_string()).collect()
+    recording
+        .signals
+        .iter()
+        .map(|s| s.channel.to_string())
+        .collect()
 }
 
 fn assert_close(found: &[f64], expected: &[f64]) {
     assert_eq!(found.len(), expected.len());
     for (f, e) in found.iter().zip(expected) {
-        assert!((f - e).abs() <= 1e-13 * e.abs().max(1.0), "{found:?}, expected {expected:?}");
+        assert!(
+            (f - e).abs() <= 1e-13 * e.abs().max(1.0),
+            "{found:?}, expected {expected:?}"
+        );
     }
 }
 
@@ -89,9 +108,16 @@ fn our_columns_in_any_order_and_unit() {
     assert_close(&[r.rate_hz], &[100.0]);
     let accel: Vec<f64> = [0.5, 0.25, 0.5].map(|v| v * STANDARD_GRAVITY).to_vec();
     assert_close(&samples_with_mean(&r.signals[0]), &accel);
-    assert_close(&samples_with_mean(&r.signals[1]), &[DEG, 3.0 * DEG, 2.0 * DEG]);
+    assert_close(
+        &samples_with_mean(&r.signals[1]),
+        &[DEG, 3.0 * DEG, 2.0 * DEG],
+    );
     assert_close(&[r.signals[1].mean], &[2.0 * DEG]);
-    assert!(r.signals.iter().all(|s| s.samples.iter().sum::<f64>().abs() < 1e-12));
+    assert!(
+        r.signals
+            .iter()
+            .all(|s| s.samples.iter().sum::<f64>().abs() < 1e-12)
+    );
 }
 
 #[test]
@@ -120,7 +146,11 @@ fn gzip_is_read_also_in_members() {
     let bytes = [pack("t_s,gyro_x_rad_s\n0,1\n"), pack("0.01,2\n")].concat();
     let r = read_one("a.csv.gz", &bytes, &ReadOptions::default()).unwrap();
     assert_close(&samples_with_mean(&r.signals[0]), &[1.0, 2.0]);
-    let (message, _) = refusal_with("a.csv.gz", &bytes[..bytes.len() - 12], &ReadOptions::default());
+    let (message, _) = refusal_with(
+        "a.csv.gz",
+        &bytes[..bytes.len() - 12],
+        &ReadOptions::default(),
+    );
     assert!(message.starts_with("a.csv.gz: "), "{message}");
 }
 
@@ -155,9 +185,16 @@ fn files_of_other_tools() {
 }
 
 fn xsens(rate: &str, counters: impl Iterator<Item = u32>) -> String {
-    let head = format!("// Start Time: Unknown\n{rate}// Filter Profile: general\n// Option Flags: none\n");
+    let head = format!(
+        "// Start Time: Unknown\n{rate}// Filter Profile: general\n// Option Flags: none\n"
+    );
     let row = |c: u32| {
-        format!("{}\t{}\t{}\t\n", c % 65536, (4_294_967_000 + 100 * u64::from(c)) % (1 << 32), c % 5)
+        format!(
+            "{}\t{}\t{}\t\n",
+            c % 65536,
+            (4_294_967_000 + 100 * u64::from(c)) % (1 << 32),
+            c % 5
+        )
     };
     let rows: String = counters.map(row).collect();
     format!("{head}PacketCounter\tSampleTimeFine\tGyr_X\t\n{rows}")
@@ -172,10 +209,18 @@ fn xsens_counter_wraps_and_tells_what_was_lost() {
     assert_close(&[r.rate_hz], &[50.0]);
     let lost = xsens(RATE, (65530..65536).chain(65538..65542));
     let (message, hint) = refusal_with("mt.txt", &lost, &ReadOptions::default());
-    assert_eq!(message, "mt.txt, line 12: gap in time from 0.1 s to 0.16 s, the median step is 0.02 s");
+    assert_eq!(
+        message,
+        "mt.txt, line 12: gap in time from 0.1 s to 0.16 s, the median step is 0.02 s"
+    );
     assert!(hint.contains("split the recording at its gaps"));
     // Every second packet written: the rate is still the head's.
-    let r = read_one("mt.txt", xsens(RATE, (65530..65560).step_by(2)), &ReadOptions::default()).unwrap();
+    let r = read_one(
+        "mt.txt",
+        xsens(RATE, (65530..65560).step_by(2)),
+        &ReadOptions::default(),
+    )
+    .unwrap();
     assert_close(&[r.rate_hz], &[50.0]);
     // A fine clock that is not filled in is passed over.
     let empty = "// MT Manager version: 2022.2.0\nPacketCounter\tSampleTimeFine\tGyr_X\n51400\tNaN\t0.1\n51401\t\t0.2\n";
@@ -195,7 +240,10 @@ fn arrays() {
     };
     let r = read_one("a.npy", array(4, 6), &at_100_hz()).unwrap();
     assert_eq!(channels(&r).len(), 6);
-    assert_close(&samples_with_mean(&r.signals[5]), &[5e-3, 11e-3, 17e-3, 23e-3]);
+    assert_close(
+        &samples_with_mean(&r.signals[5]),
+        &[5e-3, 11e-3, 17e-3, 23e-3],
+    );
     assert_eq!(
         refusal_with("a.npy", array(4, 6), &ReadOptions::default()).0,
         "a.npy: no time column, and no rate is given"
@@ -204,10 +252,18 @@ fn arrays() {
         refusal_with("a.npy", array(4, 3), &at_100_hz()).0,
         "a.npy: an array of 3 columns, which names are not known"
     );
-    let names = ["gyro_x_deg_s", "gyro_y_deg_s", "temperature"].map(String::from).to_vec();
-    let named = ReadOptions { columns: Some(names), ..at_100_hz() };
+    let names = ["gyro_x_deg_s", "gyro_y_deg_s", "temperature"]
+        .map(String::from)
+        .to_vec();
+    let named = ReadOptions {
+        columns: Some(names),
+        ..at_100_hz()
+    };
     let r = read_one("a.npy", array(4, 3), &named).unwrap();
-    assert_close(&samples_with_mean(&r.signals[0]), &[0.0, 3e-3 * DEG, 6e-3 * DEG, 9e-3 * DEG]);
+    assert_close(
+        &samples_with_mean(&r.signals[0]),
+        &[0.0, 3e-3 * DEG, 6e-3 * DEG, 9e-3 * DEG],
+    );
     let mut nan = array(4, 6);
     let offset = nan.len() - 8 * 7;
     nan[offset..offset + 8].copy_from_slice(&f64::NAN.to_le_bytes());
@@ -223,20 +279,39 @@ fn bad_cells_are_named() {
         refusal(changed(7, "0.05,abc")),
         "a.csv, line 7: column \"gyro_x_rad_s\": \"abc\" is not a number"
     );
-    assert_eq!(refusal(changed(7, "0.05,")), "a.csv, line 7: column \"gyro_x_rad_s\": \"\" is not a number");
-    assert_eq!(refusal(changed(3, "nan,1")), "a.csv, line 3: column \"t_s\": \"nan\" is not finite");
+    assert_eq!(
+        refusal(changed(7, "0.05,")),
+        "a.csv, line 7: column \"gyro_x_rad_s\": \"\" is not a number"
+    );
+    assert_eq!(
+        refusal(changed(3, "nan,1")),
+        "a.csv, line 3: column \"t_s\": \"nan\" is not finite"
+    );
     assert_eq!(
         refusal(changed(3, "0.01,-inf")),
         "a.csv, line 3: column \"gyro_x_rad_s\": \"-inf\" is not finite"
     );
-    assert_eq!(refusal(changed(20, "0.18")), "a.csv, line 20: 1 values, but 2 columns");
-    assert_eq!(refusal(changed(4, "0.02,1,5")), "a.csv, line 4: 3 values, but 2 columns");
+    assert_eq!(
+        refusal(changed(20, "0.18")),
+        "a.csv, line 20: 1 values, but 2 columns"
+    );
+    assert_eq!(
+        refusal(changed(4, "0.02,1,5")),
+        "a.csv, line 4: 3 values, but 2 columns"
+    );
     assert_eq!(
         refusal(changed(4, "\n\n0.02,x")),
         "a.csv, line 6: column \"gyro_x_rad_s\": \"x\" is not a number"
     );
-    let (message, hint) = refusal_with("a.csv", "t_s;gyro_x_rad_s\n0,00;1\n", &ReadOptions::default());
-    assert_eq!(message, "a.csv, line 2: column \"t_s\": \"0,00\" is not a number");
+    let (message, hint) = refusal_with(
+        "a.csv",
+        "t_s;gyro_x_rad_s\n0,00;1\n",
+        &ReadOptions::default(),
+    );
+    assert_eq!(
+        message,
+        "a.csv, line 2: column \"t_s\": \"0,00\" is not a number"
+    );
     assert!(hint.contains("with a point"));
 }
 
@@ -250,17 +325,25 @@ fn headers_that_do_not_help() {
         refusal("time,lat_deg\n0,1\n"),
         "a.csv, line 1: no accelerometer or gyroscope column among \"time\", \"lat_deg\""
     );
-    assert_eq!(refusal("t_s,gx,gy\n0,1,2\n"), "a.csv, line 1: column \"gx\" has no unit in its name");
+    assert_eq!(
+        refusal("t_s,gx,gy\n0,1,2\n"),
+        "a.csv, line 1: column \"gx\" has no unit in its name"
+    );
     assert_eq!(
         refusal("t_s,accel_x_g,ax_mps2\n0,1,2\n"),
         "a.csv, line 1: columns \"accel_x_g\" and \"ax_mps2\" are both accel.x"
     );
     assert_eq!(refusal(""), "a.csv: no samples in it");
     assert_eq!(refusal("t_s,gyro_x_rad_s\n"), "a.csv: no samples in it");
-    let named =
-        ReadOptions { columns: Some(vec!["t_s".into(), "gyro_x_rad_s".into()]), ..Default::default() };
+    let named = ReadOptions {
+        columns: Some(vec!["t_s".into(), "gyro_x_rad_s".into()]),
+        ..Default::default()
+    };
     for text in ["0,1\n0.01,2\n", "time,speed\n0,1\n0.01,2\n"] {
-        assert_close(&samples_with_mean(&read_one("a.csv", text, &named).unwrap().signals[0]), &[1.0, 2.0]);
+        assert_close(
+            &samples_with_mean(&read_one("a.csv", text, &named).unwrap().signals[0]),
+            &[1.0, 2.0],
+        );
     }
 }
 
@@ -276,13 +359,19 @@ fn increments_become_rates() {
 fn a_directory_is_all_its_recordings_in_name_order() {
     let files = Files::new();
     for i in [10, 9, 1] {
-        files.add(&format!("replicate_{i}.csv"), sound(20 + i).join("\n") + "\n");
+        files.add(
+            &format!("replicate_{i}.csv"),
+            sound(20 + i).join("\n") + "\n",
+        );
     }
     files.add("manifest.json", "{}");
     files.add(".hidden.csv", "x");
     files.add("gps.csv", "t_s,lat_deg\n0,1\n");
     let (r, report) = read(&[files.path()], &ReadOptions::default()).unwrap();
-    assert_eq!(r.iter().map(Recording::len).collect::<Vec<_>>(), [21, 29, 30]);
+    assert_eq!(
+        r.iter().map(Recording::len).collect::<Vec<_>>(),
+        [21, 29, 30]
+    );
     assert_eq!(report.warnings.len(), 1);
     assert!(report.all_warnings()[0].ends_with("gps.csv: passed over, no column is a known one"));
     let line = report.files[0].to_string();
@@ -290,7 +379,10 @@ fn a_directory_is_all_its_recordings_in_name_order() {
 
     let again = files.path().join("replicate_1.csv");
     let e = read(&[files.path(), again], &ReadOptions::default()).unwrap_err();
-    assert!(e.to_string().ends_with("replicate_1.csv is given twice: it would count as two replicates"));
+    assert!(
+        e.to_string()
+            .ends_with("replicate_1.csv is given twice: it would count as two replicates")
+    );
     let empty = Files::new();
     let e = read(&[empty.path()], &ReadOptions::default()).unwrap_err();
     assert!(e.to_string().ends_with(": no recordings in it"));
@@ -305,10 +397,15 @@ fn absurd_numbers_are_refused_with_their_place() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.csv");
     std::fs::write(&path, "gyro_x_rad_s\n0.1\n1e308\n0.2\n").unwrap();
-    let options = ReadOptions { rate_hz: Some(1.0), ..ReadOptions::default() };
+    let options = ReadOptions {
+        rate_hz: Some(1.0),
+        ..ReadOptions::default()
+    };
     let message = read(&[path], &options).unwrap_err().to_string();
     assert!(
-        message.ends_with("a.csv, line 3: column \"gyro_x_rad_s\": 1e308 is beyond 1e100, no measurement"),
+        message.ends_with(
+            "a.csv, line 3: column \"gyro_x_rad_s\": 1e308 is beyond 1e100, no measurement"
+        ),
         "{message}"
     );
 }
@@ -320,25 +417,53 @@ fn what_is_not_held_reads_the_same() {
     let g = [0.1, -0.05, 0.99];
     let row = |k: usize, t: usize| {
         let noise = |i: usize| 1e-3 * ((k * (i + 3)) % 11) as f64;
-        let (f, w): (Vec<_>, Vec<_>) = (0..3).map(|i| (g[i] + noise(i), 1e-4 * noise(i + 5))).unzip();
-        format!("{},{},{},{},{},{},{}", 10 * t, f[0], f[1], f[2], w[0], w[1], w[2])
+        let (f, w): (Vec<_>, Vec<_>) = (0..3)
+            .map(|i| (g[i] + noise(i), 1e-4 * noise(i + 5)))
+            .unzip();
+        format!(
+            "{},{},{},{},{},{},{}",
+            10 * t,
+            f[0],
+            f[1],
+            f[2],
+            w[0],
+            w[1],
+            w[2]
+        )
     };
     let head = "t_ms,acc_x,acc_y,acc_z,dtheta_x_rad,dtheta_y_rad,dtheta_z_rad".to_owned();
     let table = |gaps: bool| {
         let rows = (0..20_000).map(|k| row(k, if gaps && k > 9000 { k + 40 } else { k }));
-        std::iter::once(head.clone()).chain(rows).collect::<Vec<_>>().join("\n") + "\n"
+        std::iter::once(head.clone())
+            .chain(rows)
+            .collect::<Vec<_>>()
+            .join("\n")
+            + "\n"
     };
     let mut array = Vec::new();
     npy::write_header(&mut array, 9000, 6).unwrap();
     (0..54_000).for_each(|i| array.extend((f64::from(i % 13) * 1e-3).to_le_bytes()));
     let files = Files::new();
-    let paths =
-        [files.add("a.csv", table(true)), files.add("b.csv", table(false)), files.add("c.npy", array)];
-    let options =
-        ReadOptions { gaps: Gaps::Split, skip_s: 1.5, rate_hz: Some(100.0), ..ReadOptions::default() };
+    let paths = [
+        files.add("a.csv", table(true)),
+        files.add("b.csv", table(false)),
+        files.add("c.npy", array),
+    ];
+    let options = ReadOptions {
+        gaps: Gaps::Split,
+        skip_s: 1.5,
+        rate_hz: Some(100.0),
+        ..ReadOptions::default()
+    };
     let (held, report) = read(&paths, &options).unwrap();
-    assert_eq!(held.iter().map(Recording::len).collect::<Vec<_>>(), [8851, 10_999, 19_850, 8850]);
-    let on_disk = ReadOptions { hold_bytes: 0, ..options };
+    assert_eq!(
+        held.iter().map(Recording::len).collect::<Vec<_>>(),
+        [8851, 10_999, 19_850, 8850]
+    );
+    let on_disk = ReadOptions {
+        hold_bytes: 0,
+        ..options
+    };
     let (mut shown, same) = visit(&paths, &on_disk, &|r| r, &|_, _| {}).unwrap();
     assert_eq!(same, report);
     assert!(shown.iter().all(|r| r.signals.len() == 1) && shown.len() == 4 * 6);

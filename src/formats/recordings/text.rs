@@ -4,7 +4,9 @@ use super::error::{COLUMNS, empty, sample, shown, storage, unreadable};
 use super::header::{HeaderPlace, Layout, Role, classify};
 use super::lines::Blanks;
 use super::options::ReadOptions;
-use super::table::{BETWEEN, BEYOND, Column, LARGEST, Lines, Notes, Raw, empty_columns, relieve, settle};
+use super::table::{
+    BETWEEN, BEYOND, Column, LARGEST, Lines, Notes, Raw, empty_columns, relieve, settle,
+};
 use super::values::Values;
 use crate::formats::error::decimal_comma;
 use crate::formats::{FileError, Kind, Place, Setting, source};
@@ -26,16 +28,33 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError>
 }
 
 /// Reads a text table from its bytes.
-pub(super) fn parse(name: &str, mut reader: Reader, options: &ReadOptions) -> Result<Raw, FileError> {
+pub(super) fn parse(
+    name: &str,
+    mut reader: Reader,
+    options: &ReadOptions,
+) -> Result<Raw, FileError> {
     let head = Head::read(name, &mut reader, options)?;
-    let place = HeaderPlace { path: name, line: head.line };
+    let place = HeaderPlace {
+        path: name,
+        line: head.line,
+    };
     let layout = Layout::new(place, &head.names, head.xsens, options.channels.as_deref())?;
     let (indices, mut columns) = empty_columns(&layout);
     let mut notes = Notes::default();
     if head.is_latin_1 && options.columns.is_none() {
-        notes.assumptions.push("header not in UTF-8, taken as ISO-8859-1".to_owned());
+        notes
+            .assumptions
+            .push("header not in UTF-8, taken as ISO-8859-1".to_owned());
     }
-    let lines = read_rows(name, reader, &head, &indices, &mut columns, options, &mut notes)?;
+    let lines = read_rows(
+        name,
+        reader,
+        &head,
+        &indices,
+        &mut columns,
+        options,
+        &mut notes,
+    )?;
     if lines.is_empty() {
         return Err(empty(name));
     }
@@ -49,7 +68,14 @@ pub(super) fn parse(name: &str, mut reader: Reader, options: &ReadOptions) -> Re
     }
     let head_rate = head.rate_hz.map(|rate_hz| (rate_hz, "head of the file"));
     let ignored = layout.ignored;
-    Ok(Raw { path: name.to_owned(), columns: kept, ignored, head_rate, lines, notes })
+    Ok(Raw {
+        path: name.to_owned(),
+        columns: kept,
+        ignored,
+        head_rate,
+        lines,
+        notes,
+    })
 }
 
 /// What stands before the rows.
@@ -76,7 +102,11 @@ impl Head {
         loop {
             let mut bytes = Vec::new();
             let io = |source| unreadable(Path::new(name), source);
-            reader.by_ref().take(LONGEST_HEADER).read_until(b'\n', &mut bytes).map_err(io)?;
+            reader
+                .by_ref()
+                .take(LONGEST_HEADER)
+                .read_until(b'\n', &mut bytes)
+                .map_err(io)?;
             if bytes.is_empty() {
                 return Err(empty(name));
             }
@@ -102,7 +132,13 @@ impl Head {
             let header = text.trim_start_matches(['#', '%']).trim_start();
             let delimiter = delimiter_of(header);
             let cells = match delimiter {
-                b' ' => split(&header.split_ascii_whitespace().collect::<Vec<_>>().join(" "), delimiter),
+                b' ' => split(
+                    &header
+                        .split_ascii_whitespace()
+                        .collect::<Vec<_>>()
+                        .join(" "),
+                    delimiter,
+                ),
                 _ => split(header, delimiter),
             };
             if text.starts_with(['#', '%'])
@@ -120,14 +156,25 @@ impl Head {
             };
             let first_row = if numeric { bytes } else { Vec::new() };
             let lines_before = if numeric { line - 1 } else { line };
-            return Ok(Self { names, delimiter, line, lines_before, first_row, xsens, rate_hz, is_latin_1 });
+            return Ok(Self {
+                names,
+                delimiter,
+                line,
+                lines_before,
+                first_row,
+                xsens,
+                rate_hz,
+                is_latin_1,
+            });
         }
     }
 }
 
 fn no_header(path: &str, line: u64, found: &str) -> FileError {
     let message = format!("a header that names the columns is missing, found \"{found}\"");
-    FileError::new(path, line, Kind::Header(message.into())).advice(COLUMNS).setting(Setting::ColumnNames)
+    FileError::new(path, line, Kind::Header(message.into()))
+        .advice(COLUMNS)
+        .setting(Setting::ColumnNames)
 }
 
 /// The rate in a comment such as `Update Rate: 100.0Hz`.
@@ -136,26 +183,37 @@ fn rate_in(comment: &str) -> Option<f64> {
     let words = ["update rate", "sample rate", "sampling rate", "output rate"];
     let after = words.iter().find_map(|w| lower.split_once(w))?.1;
     let value = after.trim_start_matches(|c: char| !c.is_ascii_digit());
-    let digits: String = value.chars().take_while(|c| c.is_ascii_digit() || *c == '.').collect();
+    let digits: String = value
+        .chars()
+        .take_while(|c| c.is_ascii_digit() || *c == '.')
+        .collect();
     digits.parse().ok().filter(|r: &f64| *r > 0.0)
 }
 
 fn delimiter_of(header: &str) -> u8 {
     let count = |d: u8| header.bytes().filter(|b| *b == d).count();
     // Of equals, the last. Spaces separate only where nothing else does and they are not inside one name.
-    let best = [b',', b';', b'\t'].into_iter().max_by_key(|d| count(*d)).filter(|d| count(*d) > 0);
+    let best = [b',', b';', b'\t']
+        .into_iter()
+        .max_by_key(|d| count(*d))
+        .filter(|d| count(*d) > 0);
     let spaced = count(b' ') > 0 && classify(header, true).is_none();
     best.unwrap_or(if spaced { b' ' } else { b',' })
 }
 
 /// The cells of a line, quotes removed, without empty ones at the end.
 fn split(text: &str, delimiter: u8) -> Vec<String> {
-    let mut reader =
-        csv::ReaderBuilder::new().has_headers(false).delimiter(delimiter).from_reader(text.as_bytes());
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .delimiter(delimiter)
+        .from_reader(text.as_bytes());
     let mut record = csv::ByteRecord::new();
     let read = reader.read_byte_record(&mut record);
     let mut cells: Vec<String> = match read {
-        Ok(true) => record.iter().map(|c| String::from_utf8_lossy(c).trim().to_owned()).collect(),
+        Ok(true) => record
+            .iter()
+            .map(|c| String::from_utf8_lossy(c).trim().to_owned())
+            .collect(),
         _ => Vec::new(),
     };
     while cells.last().is_some_and(String::is_empty) {
@@ -167,7 +225,9 @@ fn split(text: &str, delimiter: u8) -> Vec<String> {
 /// Whether there is no NaN in a column.
 fn all_finite(values: &Values) -> std::io::Result<bool> {
     let mut finite = true;
-    values.each_block(0..values.len(), |block| finite &= block.iter().all(|v| v.is_finite()))?;
+    values.each_block(0..values.len(), |block| {
+        finite &= block.iter().all(|v| v.is_finite())
+    })?;
     Ok(finite)
 }
 
@@ -182,8 +242,11 @@ fn read_rows(
     notes: &mut Notes,
 ) -> Result<Lines, FileError> {
     let rows = Cursor::new(head.first_row.clone()).chain(reader);
-    let rows: Box<dyn Read> =
-        if head.delimiter == b' ' { Box::new(Blanks::new(rows)) } else { Box::new(rows) };
+    let rows: Box<dyn Read> = if head.delimiter == b' ' {
+        Box::new(Blanks::new(rows))
+    } else {
+        Box::new(rows)
+    };
     let mut rows = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
@@ -199,18 +262,27 @@ fn read_rows(
         let found = record.len();
         if sample == 0 && !has_units && found == expected && is_words(&record) {
             has_units = true;
-            notes.assumptions.push(format!("line {line} has words and no numbers: passed over"));
+            notes
+                .assumptions
+                .push(format!("line {line} has words and no numbers: passed over"));
             continue;
         }
-        let trailing =
-            found == expected + 1 && record.get(expected).is_some_and(|c| c.trim_ascii().is_empty());
+        let trailing = found == expected + 1
+            && record
+                .get(expected)
+                .is_some_and(|c| c.trim_ascii().is_empty());
         if found != expected && !trailing {
             if record.iter().all(|c| c.trim_ascii().is_empty()) {
                 continue;
             }
             // a logger that lost its power within a row
-            if found < expected && sample > 0 && !rows.read_byte_record(&mut record).map_err(cannot)? {
-                notes.assumptions.push(format!("line {line}, the last, is cut off: left out"));
+            if found < expected
+                && sample > 0
+                && !rows.read_byte_record(&mut record).map_err(cannot)?
+            {
+                notes
+                    .assumptions
+                    .push(format!("line {line}, the last, is cut off: left out"));
                 break;
             }
             return Err(FileError::row_length(name, line, found, expected));
@@ -237,7 +309,8 @@ fn read_rows(
 fn is_words(record: &csv::ByteRecord) -> bool {
     let begins = |cell: &[u8]| cell.trim_ascii().first().copied();
     let is_word = |cell: &[u8]| {
-        number(cell).is_none() && begins(cell).is_none_or(|b| !b.is_ascii_digit() && !b"+-.".contains(&b))
+        number(cell).is_none()
+            && begins(cell).is_none_or(|b| !b.is_ascii_digit() && !b"+-.".contains(&b))
     };
     record.iter().all(is_word) && record.iter().any(|cell| begins(cell).is_some())
 }
@@ -255,11 +328,16 @@ fn no_text(bytes: &[u8]) -> Option<&'static str> {
     if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
         return Some("it is in UTF-16");
     }
-    let control = bytes.iter().filter(|b| b.is_ascii_control() && !b"\t\r\n".contains(b)).count();
+    let control = bytes
+        .iter()
+        .filter(|b| b.is_ascii_control() && !b"\t\r\n".contains(b))
+        .count();
     if bytes.contains(&0) || 20 * control > bytes.len() {
         return Some("it is binary");
     }
-    let lone = bytes.windows(2).any(|pair| pair[0] == b'\r' && !b"\r\n".contains(&pair[1]));
+    let lone = bytes
+        .windows(2)
+        .any(|pair| pair[0] == b'\r' && !b"\r\n".contains(&pair[1]));
     lone.then_some("its lines end in a carriage return only")
 }
 
@@ -284,7 +362,9 @@ fn bad_cell(path: &str, line: u64, column: &str, cell: &[u8], parsed: Option<f64
     let value = shown(&String::from_utf8_lossy(cell.trim_ascii()), 40);
     let quoted = format!("\"{value}\"");
     match parsed {
-        None if decimal_comma(&value) => FileError::cell(path, line, column, quoted, "is not a number"),
+        None if decimal_comma(&value) => {
+            FileError::cell(path, line, column, quoted, "is not a number")
+        }
         None => sample(path, line, column, &quoted, "is not a number"),
         Some(number) if number.is_finite() => sample(path, line, column, &value, BEYOND),
         Some(_) => sample(path, line, column, &quoted, "is not finite"),

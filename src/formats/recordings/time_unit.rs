@@ -38,27 +38,56 @@ impl Guess {
         if let Some(rate_hz) = known_hz.filter(|_| step > 0.0) {
             // The units are thousands apart: the nearest ratio is the one that is meant.
             let apart = |(unit_s, _): &(f64, &str)| (rate_hz * step * unit_s).ln().abs();
-            let nearest = UNITS.into_iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+            let nearest = UNITS
+                .into_iter()
+                .min_by(|a, b| apart(a).total_cmp(&apart(b)));
             let (unit_s, word) = nearest.unwrap_or(UNITS[0]);
-            return Self { unit_s, word, others: Vec::new() };
+            return Self {
+                unit_s,
+                word,
+                others: Vec::new(),
+            };
         }
-        if let Some(&(unit_s, word)) = plausible.iter().find(|(unit_s, _)| UNIX_S.contains(&(first * unit_s)))
+        if let Some(&(unit_s, word)) = plausible
+            .iter()
+            .find(|(unit_s, _)| UNIX_S.contains(&(first * unit_s)))
         {
-            return Self { unit_s, word, others: Vec::new() };
+            return Self {
+                unit_s,
+                word,
+                others: Vec::new(),
+            };
         }
         let (unit_s, word) = unit_of_step(step);
-        let others = plausible.into_iter().filter(|(_, other)| *other != word).collect();
-        Self { unit_s, word, others }
+        let others = plausible
+            .into_iter()
+            .filter(|(_, other)| *other != word)
+            .collect();
+        Self {
+            unit_s,
+            word,
+            others,
+        }
     }
 
     /// Tells what is assumed, and warns where it may as well be another unit.
     pub(super) fn tell(&self, column: &str, step: f64, report: &mut FileReport) {
-        let Self { unit_s, word, others } = self;
-        report.assumptions.push(format!("column \"{column}\" taken as {word}"));
+        let Self {
+            unit_s,
+            word,
+            others,
+        } = self;
+        report
+            .assumptions
+            .push(format!("column \"{column}\" taken as {word}"));
         if !others.is_empty() {
-            let rate =
-                |unit_s: &f64, word: &str| format!("{} Hz in {word}", six_digits(1.0 / (step * unit_s)));
-            let others: Vec<String> = others.iter().map(|(unit_s, word)| rate(unit_s, word)).collect();
+            let rate = |unit_s: &f64, word: &str| {
+                format!("{} Hz in {word}", six_digits(1.0 / (step * unit_s)))
+            };
+            let others: Vec<String> = others
+                .iter()
+                .map(|(unit_s, word)| rate(unit_s, word))
+                .collect();
             report.warn(format!(
                 "column \"{column}\" has no unit: taken as {}, but it would be {}; name it t_s, t_ms, t_us or t_ns",
                 rate(unit_s, word),

@@ -34,7 +34,8 @@ pub(super) fn timing(
     if let Some(rate_hz) = options.rate_hz.filter(|r| !(r.is_finite() && *r > 0.0)) {
         let message = format!("{rate_hz} Hz is not a sample rate");
         return Err(
-            FileError::contents(raw.path.as_str(), Place::Within, message).setting(Setting::WrongRate)
+            FileError::contents(raw.path.as_str(), Place::Within, message)
+                .setting(Setting::WrongRate),
         );
     }
     let take = |raw: &mut Raw, wanted: fn(&Role) -> bool| {
@@ -44,7 +45,10 @@ pub(super) fn timing(
     let time = take(raw, |r| matches!(r, Role::Time { .. }));
     let counter = take(raw, |r| *r == Role::Counter);
     let ticks = take(raw, |r| *r == Role::Ticks);
-    let known = options.rate_hz.map(|rate_hz| (rate_hz, "given")).or(raw.head_rate);
+    let known = options
+        .rate_hz
+        .map(|rate_hz| (rate_hz, "given"))
+        .or(raw.head_rate);
     if time.is_none() && ticks.is_none() {
         agree(raw, options, report)?;
     }
@@ -54,33 +58,57 @@ pub(super) fn timing(
             let mut clock = Clock::counting(counter, raw, 65536.0, 1.0)?;
             // The counter tells what was lost, not the rate: with a skip factor it counts by more than one.
             clock.unit_s = 1.0 / (rate_hz * median_step(&clock.since).max(1.0));
-            Clock { source: format!("{source}, packet counter"), ..clock }
+            Clock {
+                source: format!("{source}, packet counter"),
+                ..clock
+            }
         }
         (None, _, Some(ticks), _) => Clock::counting(ticks, raw, 4_294_967_296.0, 1e-4)?,
         (None, _, None, Some((rate_hz, source))) => {
             report.rate_from = source.into();
-            return Ok(Timing { rate_hz, breaks: Vec::new(), holes: Vec::new() });
+            return Ok(Timing {
+                rate_hz,
+                breaks: Vec::new(),
+                holes: Vec::new(),
+            });
         }
         (None, _, None, None) => {
             let message = "no time column, and no rate is given";
-            return Err(FileError::contents(raw.path.as_str(), Place::Within, message).setting(Setting::Rate));
+            return Err(
+                FileError::contents(raw.path.as_str(), Place::Within, message)
+                    .setting(Setting::Rate),
+            );
         }
     };
     let timing = clock.check(raw, options)?;
     report.rate_from = clock.source;
     doubt(&timing, &clock.name, raw, options, report);
-    let breaks = if options.gaps == Gaps::Split { timing.breaks } else { Vec::new() };
-    Ok(Timing { rate_hz: timing.rate_hz, breaks, holes: timing.holes })
+    let breaks = if options.gaps == Gaps::Split {
+        timing.breaks
+    } else {
+        Vec::new()
+    };
+    Ok(Timing {
+        rate_hz: timing.rate_hz,
+        breaks,
+        holes: timing.holes,
+    })
 }
 
 /// Refuses a rate that is given where the file, or the manifest beside it, states another.
 fn agree(raw: &Raw, options: &ReadOptions, report: &mut FileReport) -> Result<(), FileError> {
-    let Some((given, (stated, source))) = options.rate_hz.zip(raw.head_rate) else { return Ok(()) };
+    let Some((given, (stated, source))) = options.rate_hz.zip(raw.head_rate) else {
+        return Ok(());
+    };
     let difference = (stated / given - 1.0).abs();
-    let message = format!("the {source} says {} Hz, but {given} Hz is given", six_digits(stated));
+    let message = format!(
+        "the {source} says {} Hz, but {given} Hz is given",
+        six_digits(stated)
+    );
     if difference > DISAGREEING {
         return Err(
-            FileError::contents(raw.path.as_str(), Place::Within, message).setting(Setting::WrongRate)
+            FileError::contents(raw.path.as_str(), Place::Within, message)
+                .setting(Setting::WrongRate),
         );
     }
     if difference > ROUNDED {
@@ -90,15 +118,28 @@ fn agree(raw: &Raw, options: &ReadOptions, report: &mut FileReport) -> Result<()
 }
 
 /// Says what is doubtful about a clock.
-fn doubt(timing: &Checked, column: &str, raw: &Raw, options: &ReadOptions, report: &mut FileReport) {
-    if let Some(given) = options.rate_hz.filter(|given| (timing.found_hz / given - 1.0).abs() > ROUNDED) {
+fn doubt(
+    timing: &Checked,
+    column: &str,
+    raw: &Raw,
+    options: &ReadOptions,
+    report: &mut FileReport,
+) {
+    if let Some(given) = options
+        .rate_hz
+        .filter(|given| (timing.found_hz / given - 1.0).abs() > ROUNDED)
+    {
         let found = six_digits(timing.found_hz);
         report.rate_from = format!("given; the {} has {found} Hz", report.rate_from);
-        report.warn(format!("{given} Hz is given, but the file runs at {found} Hz: the rate given is taken"));
+        report.warn(format!(
+            "{given} Hz is given, but the file runs at {found} Hz: the rate given is taken"
+        ));
     }
     if !USUAL_RATES_HZ.contains(&timing.rate_hz) {
         let rate_hz = six_digits(timing.rate_hz);
-        report.warn(format!("{rate_hz} Hz is no usual rate of an IMU: is the unit of \"{column}\" right?"));
+        report.warn(format!(
+            "{rate_hz} Hz is no usual rate of an IMU: is the unit of \"{column}\" right?"
+        ));
     }
     if !timing.breaks.is_empty() {
         let first = raw.lines.of(timing.breaks[0]);
@@ -169,9 +210,9 @@ impl Clock {
         let (name, mut since) = (column.name, of_file(raw, column.values)?);
         let first = since.first().copied().unwrap_or(0.0);
         if let Some(week) = week_of(&since, column.role) {
-            report
-                .assumptions
-                .push(format!("column \"{name}\" taken as time of the week, which starts again"));
+            report.assumptions.push(format!(
+                "column \"{name}\" taken as time of the week, which starts again"
+            ));
             unwrap(&mut since, week);
         } else {
             since.iter_mut().for_each(|t| *t -= first);
@@ -180,7 +221,9 @@ impl Clock {
             Role::Time { unit_s: Some(unit) } => unit,
             _ => {
                 let step = step_of(&since, options.gaps);
-                let known = options.rate_hz.or(raw.head_rate.map(|(rate_hz, _)| rate_hz));
+                let known = options
+                    .rate_hz
+                    .or(raw.head_rate.map(|(rate_hz, _)| rate_hz));
                 let guess = Guess::new(step, first, known);
                 if since.len() > 1 {
                     guess.tell(&name, step, report);
@@ -188,7 +231,13 @@ impl Clock {
                 guess.unit_s
             }
         };
-        Ok(Self { name, start: first * unit_s, since, unit_s, source: "time column".into() })
+        Ok(Self {
+            name,
+            start: first * unit_s,
+            since,
+            unit_s,
+            source: "time column".into(),
+        })
     }
 
     /// A counter that starts again at 0 when it reaches `modulus`.
@@ -196,7 +245,13 @@ impl Clock {
         let mut since = of_file(raw, column.values)?;
         unwrap(&mut since, modulus);
         let source = format!("column \"{}\"", column.name);
-        Ok(Self { source, name: column.name, start: 0.0, since, unit_s })
+        Ok(Self {
+            source,
+            name: column.name,
+            start: 0.0,
+            since,
+            unit_s,
+        })
     }
 
     fn time_of(&self, sample: usize) -> f64 {
@@ -222,10 +277,18 @@ impl Clock {
             return Err(self.still(&raw.path));
         }
         let irregular = |s: f64| is_gap(s, median) || s < 0.5 * median;
-        let breaks: Vec<usize> =
-            steps().enumerate().filter(|(_, s)| irregular(*s)).map(|(i, _)| i + 1).collect();
-        let holes = if options.gaps == Gaps::Keep { self.holes(&breaks) } else { None };
-        let is_refused = options.gaps == Gaps::Refuse || options.gaps == Gaps::Keep && holes.is_none();
+        let breaks: Vec<usize> = steps()
+            .enumerate()
+            .filter(|(_, s)| irregular(*s))
+            .map(|(i, _)| i + 1)
+            .collect();
+        let holes = if options.gaps == Gaps::Keep {
+            self.holes(&breaks)
+        } else {
+            None
+        };
+        let is_refused =
+            options.gaps == Gaps::Refuse || options.gaps == Gaps::Keep && holes.is_none();
         if let (true, Some(first)) = (is_refused, breaks.first()) {
             let (line, from, to) = step_at(first - 1);
             let step = rounded(median * self.unit_s);
@@ -239,34 +302,52 @@ impl Clock {
                 n => format!(" ({n} such steps in all)"),
             };
             let message = format!("{what}, the median step is {step} s{more}");
-            return Err(FileError::contents(raw.path.as_str(), line, message).setting(Setting::Gaps));
+            return Err(
+                FileError::contents(raw.path.as_str(), line, message).setting(Setting::Gaps)
+            );
         }
         let rate = |step: f64| rounded(1.0 / (step * self.unit_s));
-        if let Some([first, last]) = drift(&self.since).map(|steps| steps.map(|s| six_digits(rate(s)))) {
-            let message =
-                format!("the rate changes from {first} Hz in the first tenth to {last} Hz in the last");
-            return Err(FileError::contents(raw.path.as_str(), Place::Within, message)
-                .advice("split the file where the rate changes: a wavelet variance is of one rate"));
+        if let Some([first, last]) =
+            drift(&self.since).map(|steps| steps.map(|s| six_digits(rate(s))))
+        {
+            let message = format!(
+                "the rate changes from {first} Hz in the first tenth to {last} Hz in the last"
+            );
+            return Err(
+                FileError::contents(raw.path.as_str(), Place::Within, message).advice(
+                    "split the file where the rate changes: a wavelet variance is of one rate",
+                ),
+            );
         }
         // The whole span averages the jitter.
         let found = rate(match &holes {
             Some(holes) => {
                 let lost: usize = holes.iter().map(|(_, lost)| lost).sum();
-                mean_step(&self.since) * (self.since.len() - 1) as f64 / (self.since.len() - 1 + lost) as f64
+                mean_step(&self.since) * (self.since.len() - 1) as f64
+                    / (self.since.len() - 1 + lost) as f64
             }
             None if breaks.is_empty() => mean_step(&self.since),
             None => step,
         });
         let given = options.rate_hz.unwrap_or(found);
         if options.gaps != Gaps::Ignore && (found / given - 1.0).abs() > DISAGREEING {
-            let message =
-                format!("the time column runs at {} Hz, but {given} Hz is given", six_digits(found));
+            let message = format!(
+                "the time column runs at {} Hz, but {given} Hz is given",
+                six_digits(found)
+            );
             return Err(
-                FileError::contents(raw.path.as_str(), Place::Within, message).setting(Setting::WrongRate)
+                FileError::contents(raw.path.as_str(), Place::Within, message)
+                    .setting(Setting::WrongRate),
             );
         }
         let holes = holes.unwrap_or_default();
-        Ok(Checked { rate_hz: given, found_hz: found, step_hz: rate(median), breaks, holes })
+        Ok(Checked {
+            rate_hz: given,
+            found_hz: found,
+            step_hz: rate(median),
+            breaks,
+            holes,
+        })
     }
 
     /// The samples after which time went on for longer than to the next one, and how many are missing before them; none where they
@@ -278,7 +359,8 @@ impl Clock {
             return None;
         }
         // Coarse stamps round single steps; their mean is that of the samples.
-        let regular = self.since[self.since.len() - 1] - breaks.iter().map(|i| step(*i)).sum::<f64>();
+        let regular =
+            self.since[self.since.len() - 1] - breaks.iter().map(|i| step(*i)).sum::<f64>();
         let regular = regular / (self.since.len() - 1 - breaks.len()) as f64;
         let lost = |i: &usize| (*i, ((step(*i) / regular).round() as usize).max(2) - 1);
         let holes: Vec<(usize, usize)> = breaks.iter().map(lost).collect();
@@ -288,9 +370,16 @@ impl Clock {
 
     /// A clock that does not advance, or by coarser steps than those of the samples.
     fn still(&self, path: &str) -> FileError {
-        let message = format!("column \"{}\" does not advance: its median step is 0", self.name);
+        let message = format!(
+            "column \"{}\" does not advance: its median step is 0",
+            self.name
+        );
         let error = FileError::contents(path, Place::Within, message);
-        if mean_step(&self.since) > 0.0 { error.setting(Setting::Gaps) } else { error }
+        if mean_step(&self.since) > 0.0 {
+            error.setting(Setting::Gaps)
+        } else {
+            error
+        }
     }
 }
 
@@ -301,7 +390,11 @@ fn unwrap(values: &mut [f64], modulus: f64) {
         let step = *value - last;
         last = *value;
         // A fall of more than half the range is the counter starting again.
-        total += if step < -0.5 * modulus { step + modulus } else { step };
+        total += if step < -0.5 * modulus {
+            step + modulus
+        } else {
+            step
+        };
         *value = total;
     }
 }
@@ -314,18 +407,25 @@ fn week_of(times: &[f64], role: Role) -> Option<f64> {
         Role::Time { unit_s } => unit_s,
         _ => None,
     };
-    let units =
-        UNITS.iter().map(|(unit_s, _)| *unit_s).filter(|unit_s| said.is_none_or(|own| own == *unit_s));
+    let units = UNITS
+        .iter()
+        .map(|(unit_s, _)| *unit_s)
+        .filter(|unit_s| said.is_none_or(|own| own == *unit_s));
     let mut weeks = units.map(|unit_s| WEEK_S / unit_s);
     weeks.find(|week| {
-        times.iter().all(|t| (0.0..=*week).contains(t)) && times.windows(2).any(|w| w[1] - w[0] < -0.5 * week)
+        times.iter().all(|t| (0.0..=*week).contains(t))
+            && times.windows(2).any(|w| w[1] - w[0] < -0.5 * week)
     })
 }
 
 /// Six significant digits where the value is that within 1e-7 (stamps are rounded), else as it is.
 fn rounded(value: f64) -> f64 {
     let short = six_digits(value);
-    if (short / value - 1.0).abs() < 1e-7 { short } else { value }
+    if (short / value - 1.0).abs() < 1e-7 {
+        short
+    } else {
+        value
+    }
 }
 
 pub(in crate::formats) fn median_step(times: &[f64]) -> f64 {
@@ -348,7 +448,11 @@ fn mean_step(times: &[f64]) -> f64 {
 /// The step of the samples: gaps do not change the median. Where the stamps are late (coarse, in bursts) and no sample is
 /// lost, no single step is that of the samples, but the span is theirs.
 fn step_of(times: &[f64], gaps: Gaps) -> f64 {
-    if gaps == Gaps::Ignore && !has_lost_samples(times) { mean_step(times) } else { median_step(times) }
+    if gaps == Gaps::Ignore && !has_lost_samples(times) {
+        mean_step(times)
+    } else {
+        median_step(times)
+    }
 }
 
 fn is_gap(step: f64, median: f64) -> bool {
@@ -377,7 +481,10 @@ fn drift(times: &[f64]) -> Option<[f64; 2]> {
     let (median, lost) = (median_step(times), has_lost_samples(times));
     let ends = [&times[..=tenth], &times[times.len() - tenth - 1..]];
     let regular = |part: &[f64]| -> Vec<f64> {
-        part.windows(2).map(|w| w[1] - w[0]).filter(|s| !(lost && is_gap(*s, median))).collect()
+        part.windows(2)
+            .map(|w| w[1] - w[0])
+            .filter(|s| !(lost && is_gap(*s, median)))
+            .collect()
     };
     let [first, last] = ends.map(regular);
     let mean = |steps: &[f64]| steps.iter().sum::<f64>() / steps.len() as f64;

@@ -39,7 +39,9 @@ impl Values {
         let mut bytes = Vec::with_capacity(BLOCK * WIDTH);
         for block in self.held.chunks(BLOCK) {
             bytes.clear();
-            block.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+            block
+                .iter()
+                .for_each(|value| bytes.extend(value.to_le_bytes()));
             file.write_all(&bytes)?;
         }
         *count += self.held.len();
@@ -53,7 +55,11 @@ impl Values {
     }
 
     /// Shows a stretch, block by block.
-    pub(super) fn each_block(&self, range: Range<usize>, mut show: impl FnMut(&[f64])) -> io::Result<()> {
+    pub(super) fn each_block(
+        &self,
+        range: Range<usize>,
+        mut show: impl FnMut(&[f64]),
+    ) -> io::Result<()> {
         let Some((mut file, _)) = self.stored.as_ref().map(|(file, count)| (file, count)) else {
             self.held[range].chunks(BLOCK).for_each(show);
             return Ok(());
@@ -80,7 +86,10 @@ impl Values {
     /// Some stretches.
     pub(super) fn into_stretches(self, ranges: &[Range<usize>]) -> io::Result<Vec<Vec<f64>>> {
         let [range] = ranges else {
-            return ranges.iter().map(|range| self.stretch(range.clone())).collect();
+            return ranges
+                .iter()
+                .map(|range| self.stretch(range.clone()))
+                .collect();
         };
         let mut values = self.into_vec()?;
         values.truncate(range.end);
@@ -90,7 +99,11 @@ impl Values {
 
     /// All of them.
     pub(crate) fn into_vec(self) -> io::Result<Vec<f64>> {
-        if self.is_stored() { self.stretch(0..self.len()) } else { Ok(self.held) }
+        if self.is_stored() {
+            self.stretch(0..self.len())
+        } else {
+            Ok(self.held)
+        }
     }
 }
 
@@ -110,10 +123,19 @@ mod tests {
         }
         stored.store().unwrap();
         assert!(stored.is_stored() && stored.held.is_empty() && stored.len() == held.len());
-        for range in [0..0, 0..1, 5..BLOCK + 5, BLOCK..3 * BLOCK, 0..held.len(), held.len()..held.len()] {
+        for range in [
+            0..0,
+            0..1,
+            5..BLOCK + 5,
+            BLOCK..3 * BLOCK,
+            0..held.len(),
+            held.len()..held.len(),
+        ] {
             let collect = |values: &Values| {
                 let mut blocks = Vec::new();
-                values.each_block(range.clone(), |b| blocks.push(b.to_vec())).unwrap();
+                values
+                    .each_block(range.clone(), |b| blocks.push(b.to_vec()))
+                    .unwrap();
                 blocks
             };
             assert_eq!(collect(&stored), collect(&held), "{range:?}");

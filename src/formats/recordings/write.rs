@@ -87,12 +87,19 @@ mod tests {
             (c, (0..100).map(x).collect::<Vec<f64>>())
         });
         let directory = tempfile::tempdir().unwrap();
-        for (format, digits) in
-            [(FileFormat::Csv, 1e-11), (FileFormat::CsvGz, 1e-11), (FileFormat::Npy, 1e-17)]
-        {
+        for (format, digits) in [
+            (FileFormat::Csv, 1e-11),
+            (FileFormat::CsvGz, 1e-11),
+            (FileFormat::Npy, 1e-17),
+        ] {
             let path = directory.path().join(format!("a.{}", format));
-            format.write(std::fs::File::create(&path).unwrap(), 128.0, &signals).unwrap();
-            let options = ReadOptions { rate_hz: Some(128.0), ..ReadOptions::default() };
+            format
+                .write(std::fs::File::create(&path).unwrap(), 128.0, &signals)
+                .unwrap();
+            let options = ReadOptions {
+                rate_hz: Some(128.0),
+                ..ReadOptions::default()
+            };
             let (recordings, _) = read(&[path], &options).unwrap();
             for (read, (channel, x)) in recordings[0].signals.iter().zip(&signals) {
                 assert_eq!(read.channel, *channel);

@@ -6,7 +6,9 @@ mod paths;
 mod values;
 
 pub(crate) use paths::dotted;
-pub(crate) use values::{Between, Finite, NonNegative, OneOrEach, Positive, Share, Stationary, Version};
+pub(crate) use values::{
+    Between, Finite, NonNegative, OneOrEach, Positive, Share, Stationary, Version,
+};
 
 use super::error::{FileError, Kind, Place, Setting};
 use super::source;
@@ -43,12 +45,18 @@ impl Source {
             }
         })?;
         super::hash::remember(path, text.as_bytes());
-        Ok(Self { path: path.display().to_string(), text })
+        Ok(Self {
+            path: path.display().to_string(),
+            text,
+        })
     }
 
     /// A text that is in no file.
     pub(crate) fn new(path: &str, text: &str) -> Self {
-        Self { path: path.into(), text: text.into() }
+        Self {
+            path: path.into(),
+            text: text.into(),
+        }
     }
 
     pub(crate) fn path(&self) -> &str {
@@ -82,12 +90,16 @@ impl Source {
 
     /// The line (from 1) a byte stands in.
     fn line(&self, offset: usize) -> usize {
-        1 + self.text.as_bytes()[..offset.min(self.text.len())].iter().filter(|b| **b == b'\n').count()
+        1 + self.text.as_bytes()[..offset.min(self.text.len())]
+            .iter()
+            .filter(|b| **b == b'\n')
+            .count()
     }
 
     /// Where the value of a key is written, and whether it is: if not, the innermost table around it.
     fn place(&self, key: &str) -> (Range<usize>, bool) {
-        self.table().map_or((0..0, false), |table| span_of(table.get_ref(), key))
+        self.table()
+            .map_or((0..0, false), |table| span_of(table.get_ref(), key))
     }
 
     /// Whether the file sets a key.
@@ -114,7 +126,11 @@ impl Source {
 
     fn refused_at(&self, span: Range<usize>, key: &str, reason: impl Into<Box<str>>) -> FileError {
         let value = shown(self.text.get(span.clone()).unwrap_or_default()).into();
-        let kind = Kind::Value { key: key.into(), value, reason: reason.into() };
+        let kind = Kind::Value {
+            key: key.into(),
+            value,
+            reason: reason.into(),
+        };
         FileError::new(self.path.as_str(), self.line(span.start), kind)
     }
 
@@ -122,9 +138,15 @@ impl Source {
     pub(crate) fn setting(&self, error: &SettingError) -> FileError {
         let reason = format!("is refused: {}", error.requirement);
         if self.place(&error.key).1 {
-            return self.refused(&error.key, reason).advice_if(error.advice.map(str::to_owned));
+            return self
+                .refused(&error.key, reason)
+                .advice_if(error.advice.map(str::to_owned));
         }
-        let (key, value, reason) = (error.key.as_str().into(), error.value.as_str().into(), reason.into());
+        let (key, value, reason) = (
+            error.key.as_str().into(),
+            error.value.as_str().into(),
+            reason.into(),
+        );
         let refusal = self.error(&error.key, Kind::Value { key, value, reason });
         refusal
             .advice_if(error.advice.map(str::to_owned))
@@ -132,7 +154,11 @@ impl Source {
     }
 
     /// A key that means nothing where it stands, with the nearest that does.
-    pub(crate) fn unknown<'a>(&self, key: &str, legal: impl Iterator<Item = &'a str> + Clone) -> FileError {
+    pub(crate) fn unknown<'a>(
+        &self,
+        key: &str,
+        legal: impl Iterator<Item = &'a str> + Clone,
+    ) -> FileError {
         let name = key.rsplit('.').next().unwrap_or_default();
         // what profiles call heading, tables and initial states call yaw
         let other_name = match name {
@@ -140,7 +166,10 @@ impl Source {
             "heading_deg" => "yaw_deg",
             _ => name,
         };
-        let meant = legal.clone().find(|word| *word == other_name).or_else(|| nearest(name, legal.clone()));
+        let meant = legal
+            .clone()
+            .find(|word| *word == other_name)
+            .or_else(|| nearest(name, legal.clone()));
         let hint = match meant {
             Some(meant) => format!("did you mean \"{meant}\"?"),
             None => format!("legal here: {}", legal.collect::<Vec<_>>().join(", ")),
@@ -150,13 +179,17 @@ impl Source {
 
     /// A table that lacks a key, one of several that would do.
     pub(crate) fn missing(&self, table: &str, keys: &[&str]) -> FileError {
-        let keys: Vec<String> = keys.iter().map(|key| format!("\"{}\"", dotted(table, key))).collect();
+        let keys: Vec<String> = keys
+            .iter()
+            .map(|key| format!("\"{}\"", dotted(table, key)))
+            .collect();
         let keys = keys.join(" or ");
         let advice = match keys.as_str() {
             "\"rate_hz\"" => "add rate_hz = 100.0, the sample rate (Hz)".to_owned(),
             _ => format!("add the key {keys}"),
         };
-        self.error(table, Kind::MissingKey(keys.into())).advice(advice)
+        self.error(table, Kind::MissingKey(keys.into()))
+            .advice(advice)
     }
 
     /// A refusal by serde of the value of a key.
@@ -165,16 +198,27 @@ impl Source {
         let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
         match quoted.split_first() {
             Some((field, legal)) if message.starts_with("unknown field") => {
-                let key =
-                    if key.rsplit('.').next() == Some(field) { key.to_owned() } else { dotted(key, field) };
+                let key = if key.rsplit('.').next() == Some(field) {
+                    key.to_owned()
+                } else {
+                    dotted(key, field)
+                };
                 return self.unknown(&key, legal.iter().copied());
             }
-            Some((field, _)) if message.starts_with("missing field") => return self.missing(key, &[field]),
+            Some((field, _)) if message.starts_with("missing field") => {
+                return self.missing(key, &[field]);
+            }
             _ => {}
         }
         let (own, told) = (self.place(key).0, error.span().unwrap_or_default());
-        let span = if own.start <= told.start && told.end <= own.end { told } else { own };
-        let meant = quoted.split_first().filter(|_| message.starts_with("unknown variant"));
+        let span = if own.start <= told.start && told.end <= own.end {
+            told
+        } else {
+            own
+        };
+        let meant = quoted
+            .split_first()
+            .filter(|_| message.starts_with("unknown variant"));
         let advice = match meant.and_then(|(word, legal)| nearest(word, legal.iter().copied())) {
             Some(meant) => Some(format!("did you mean \"{meant}\"?")),
             None if message == Finite::REFUSAL => {
@@ -182,26 +226,41 @@ impl Source {
             }
             None if message.starts_with("invalid type: map, expected a sequence") => {
                 let name = key.rsplit('.').next().unwrap_or_default();
-                Some(format!("there may be several: write [[{name}]], in double brackets"))
+                Some(format!(
+                    "there may be several: write [[{name}]], in double brackets"
+                ))
             }
             None => None,
         };
-        self.refused_at(span, key, reason(message, &quoted)).advice_if(advice)
+        self.refused_at(span, key, reason(message, &quoted))
+            .advice_if(advice)
     }
 }
 
 /// A value as it is shown: in one line, at most 60 characters of it.
 fn shown(written: &str) -> String {
-    written.split_whitespace().collect::<Vec<_>>().join(" ").chars().take(60).collect()
+    written
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
+        .chars()
+        .take(60)
+        .collect()
 }
 
 /// Why a value is refused, in words that follow it: serde's types in ours.
 fn reason(message: &str, quoted: &[&str]) -> String {
     if message.starts_with("unknown variant") {
-        let legal: Vec<String> = quoted.iter().skip(1).map(|word| format!("\"{word}\"")).collect();
+        let legal: Vec<String> = quoted
+            .iter()
+            .skip(1)
+            .map(|word| format!("\"{word}\""))
+            .collect();
         return format!("is not one of {}", legal.join(", "));
     }
-    let expected = message.strip_prefix("invalid ").and_then(|rest| rest.rsplit_once(", expected "));
+    let expected = message
+        .strip_prefix("invalid ")
+        .and_then(|rest| rest.rsplit_once(", expected "));
     match expected.map(|(_, expected)| expected) {
         Some("f64") => "is not a number".to_owned(),
         Some("u8" | "u16" | "u32" | "u64" | "usize") => "is not a whole number ≥ 0".to_owned(),
@@ -212,7 +271,10 @@ fn reason(message: &str, quoted: &[&str]) -> String {
         Some("path string") => "is not a path".to_owned(),
         Some(other) if other.starts_with("internally tagged enum") => "is not a table".to_owned(),
         Some(other) if !other.contains(' ') => format!("is refused: {message}"),
-        Some(other) => format!("is not {}", other.strip_prefix("struct").map_or(other, |_| "a table")),
+        Some(other) => format!(
+            "is not {}",
+            other.strip_prefix("struct").map_or(other, |_| "a table")
+        ),
         // a type of ours says it in words that follow the value
         None if message.starts_with("is ") => message.to_owned(),
         None if message.starts_with("not ") => format!("is {message}"),

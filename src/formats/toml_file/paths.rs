@@ -7,7 +7,11 @@ use toml::de::{DeTable, DeValue};
 
 /// A key with the path of its table before it.
 pub(crate) fn dotted(path: &str, key: &str) -> String {
-    if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
+    if path.is_empty() {
+        key.to_owned()
+    } else {
+        format!("{path}.{key}")
+    }
 }
 
 type Value<'a> = Spanned<DeValue<'a>>;
@@ -19,7 +23,11 @@ pub(super) fn within(table: &DeTable<'_>, path: &str, span: &Range<usize>) -> Op
     table.iter().find_map(|(key, value)| {
         let path = dotted(path, key.get_ref());
         let is_key = key.span() == *span;
-        if is_key { Some(path) } else { within_value(value, path, span) }
+        if is_key {
+            Some(path)
+        } else {
+            within_value(value, path, span)
+        }
     })
 }
 
@@ -28,7 +36,9 @@ fn within_value(value: &Value<'_>, path: String, span: &Range<usize>) -> Option<
         DeValue::Table(table) => within(table, &path, span),
         DeValue::Array(items) => items.iter().enumerate().find_map(|(i, item)| {
             let is_table = item.get_ref().is_table();
-            is_table.then(|| within_value(item, format!("{path}[{}]", i + 1), span)).flatten()
+            is_table
+                .then(|| within_value(item, format!("{path}[{}]", i + 1), span))
+                .flatten()
         }),
         _ => None,
     };
@@ -40,10 +50,21 @@ fn within_value(value: &Value<'_>, path: String, span: &Range<usize>) -> Option<
 pub(super) fn span_of(table: &DeTable<'_>, path: &str) -> (Range<usize>, bool) {
     let (mut table, mut span) = (Some(table), 0..0);
     for part in path.split('.') {
-        let (key, entry) = part.split_once('[').map_or((part, None), |(key, entry)| (key, Some(entry)));
-        let Some(value) = table.and_then(|table| table.get(key)) else { return (span, false) };
-        let entry = entry.and_then(|i| i.trim_end_matches(']').parse::<usize>().ok()?.checked_sub(1));
-        let value = entry.and_then(|i| value.get_ref().as_array()?.get(i)).unwrap_or(value);
+        let (key, entry) = part
+            .split_once('[')
+            .map_or((part, None), |(key, entry)| (key, Some(entry)));
+        let Some(value) = table.and_then(|table| table.get(key)) else {
+            return (span, false);
+        };
+        let entry = entry.and_then(|i| {
+            i.trim_end_matches(']')
+                .parse::<usize>()
+                .ok()?
+                .checked_sub(1)
+        });
+        let value = entry
+            .and_then(|i| value.get_ref().as_array()?.get(i))
+            .unwrap_or(value);
         (table, span) = (value.get_ref().as_table(), value.span());
     }
     (span, true)
@@ -56,11 +77,17 @@ const TAGS: [&str; 4] = ["type", "operation", "kind", "distribution"];
 ///
 /// Of tables that a word tells apart serde knows no places: there it is the entry that is refused alone, and the key without
 /// which something else is said.
-pub(super) fn culprit<T: DeserializeOwned>(table: &Spanned<DeTable<'_>>, error: &toml::de::Error) -> String {
+pub(super) fn culprit<T: DeserializeOwned>(
+    table: &Spanned<DeTable<'_>>,
+    error: &toml::de::Error,
+) -> String {
     let message = error.message();
     let span = error.span().unwrap_or_default();
     let is_same = |changed: DeTable<'_>| {
-        let said = T::deserialize(toml::de::Deserializer::from(Spanned::new(table.span(), changed)));
+        let said = T::deserialize(toml::de::Deserializer::from(Spanned::new(
+            table.span(),
+            changed,
+        )));
         said.err().is_some_and(|e| e.message() == message)
     };
     let mut path = match span == table.span() {
@@ -70,7 +97,9 @@ pub(super) fn culprit<T: DeserializeOwned>(table: &Spanned<DeTable<'_>>, error: 
     if path.ends_with(']') {
         path.truncate(path.rfind('[').unwrap_or_default()); // the head of a list is that of its first entry
     }
-    let unknown = message.strip_prefix("unknown field `").and_then(|rest| rest.split('`').next());
+    let unknown = message
+        .strip_prefix("unknown field `")
+        .and_then(|rest| rest.split('`').next());
     loop {
         // the unknown key itself may be a list: nothing inside it is to blame
         if unknown.is_some() && path.rsplit('.').next() == unknown {
@@ -84,8 +113,11 @@ pub(super) fn culprit<T: DeserializeOwned>(table: &Spanned<DeTable<'_>>, error: 
             _ if message.starts_with("missing field") => None,
             value => {
                 let own = value.map_or(Some(table.get_ref()), DeValue::as_table);
-                let is_tag = |key: &&str| TAGS.contains(key) == message.starts_with("unknown variant");
-                let keys = own.into_iter().flat_map(|own| own.keys().map(|key| key.get_ref().as_ref()));
+                let is_tag =
+                    |key: &&str| TAGS.contains(key) == message.starts_with("unknown variant");
+                let keys = own
+                    .into_iter()
+                    .flat_map(|own| own.keys().map(|key| key.get_ref().as_ref()));
                 let mut paths = keys.filter(is_tag).map(|key| dotted(&path, key));
                 paths.find(|path| !is_same(without(table.get_ref(), path)))
             }
@@ -97,19 +129,29 @@ pub(super) fn culprit<T: DeserializeOwned>(table: &Spanned<DeTable<'_>>, error: 
 
 /// The parts of a path: keys, and the place of an entry of a list.
 fn parts(path: &str) -> impl Iterator<Item = (&str, Option<usize>)> {
-    path.split('.').filter(|part| !part.is_empty()).map(|part| match part.split_once('[') {
-        None => (part, None),
-        Some((key, entry)) => {
-            (key, entry.trim_end_matches(']').parse::<usize>().ok().and_then(|i| i.checked_sub(1)))
-        }
-    })
+    path.split('.')
+        .filter(|part| !part.is_empty())
+        .map(|part| match part.split_once('[') {
+            None => (part, None),
+            Some((key, entry)) => (
+                key,
+                entry
+                    .trim_end_matches(']')
+                    .parse::<usize>()
+                    .ok()
+                    .and_then(|i| i.checked_sub(1)),
+            ),
+        })
 }
 
 /// The value of a path; none for the file itself.
 fn value_at<'a>(table: &'a DeTable<'a>, path: &str) -> Option<&'a DeValue<'a>> {
     let mut value: Option<&DeValue<'_>> = None;
     for (key, entry) in parts(path) {
-        let own = value.map_or(Some(table), DeValue::as_table)?.get(key)?.get_ref();
+        let own = value
+            .map_or(Some(table), DeValue::as_table)?
+            .get(key)?
+            .get_ref();
         value = Some(match entry {
             Some(i) => own.as_array()?.get(i)?.get_ref(),
             None => own,
@@ -119,17 +161,23 @@ fn value_at<'a>(table: &'a DeTable<'a>, path: &str) -> Option<&'a DeValue<'a>> {
 }
 
 /// The same file with another value of a path, or without it.
-fn changed<'a>(table: &DeTable<'a>, path: &str, change: &dyn Fn(&mut DeTable<'a>, &str)) -> DeTable<'a> {
+fn changed<'a>(
+    table: &DeTable<'a>,
+    path: &str,
+    change: &dyn Fn(&mut DeTable<'a>, &str),
+) -> DeTable<'a> {
     let mut all = table.clone();
     let (above, key) = path.rsplit_once('.').unwrap_or(("", path));
     let mut own = Some(&mut all);
     for (key, entry) in parts(above) {
         let inner = own.and_then(|own| own.get_mut(key)).map(Spanned::get_mut);
         own = match (inner, entry) {
-            (Some(DeValue::Array(items)), Some(i)) => match items.get_mut(i).map(Spanned::get_mut) {
-                Some(DeValue::Table(table)) => Some(table),
-                _ => None,
-            },
+            (Some(DeValue::Array(items)), Some(i)) => {
+                match items.get_mut(i).map(Spanned::get_mut) {
+                    Some(DeValue::Table(table)) => Some(table),
+                    _ => None,
+                }
+            }
             (Some(DeValue::Table(table)), None) => Some(table),
             _ => None,
         };

@@ -34,24 +34,54 @@ enum Word {
 #[test]
 fn refusals_name_file_line_key_and_value() {
     for (text, expected) in [
-        ("count = -1", "line 1: \"count\" = -1 is not a whole number ≥ 0 | "),
-        ("count = \"many\"", "line 1: \"count\" = \"many\" is not a whole number ≥ 0 | "),
-        ("\n[part]\nx = 1\n", "line 1: \"count\" is missing | add the key \"count\""),
-        ("count = 1\n[part]\n", "line 2: \"part.x\" is missing | add the key \"part.x\""),
-        ("count = 1\npart = {}\n", "line 2: \"part.x\" is missing | add the key \"part.x\""),
-        ("count = 1\n[part]\nx = \"a\"\n", "line 3: \"part.x\" = \"a\" is not a number | "),
+        (
+            "count = -1",
+            "line 1: \"count\" = -1 is not a whole number ≥ 0 | ",
+        ),
+        (
+            "count = \"many\"",
+            "line 1: \"count\" = \"many\" is not a whole number ≥ 0 | ",
+        ),
+        (
+            "\n[part]\nx = 1\n",
+            "line 1: \"count\" is missing | add the key \"count\"",
+        ),
+        (
+            "count = 1\n[part]\n",
+            "line 2: \"part.x\" is missing | add the key \"part.x\"",
+        ),
+        (
+            "count = 1\npart = {}\n",
+            "line 2: \"part.x\" is missing | add the key \"part.x\"",
+        ),
+        (
+            "count = 1\n[part]\nx = \"a\"\n",
+            "line 3: \"part.x\" = \"a\" is not a number | ",
+        ),
         (
             "count = 1\n[parts]\nx = 1\n",
             "line 2: \"parts\" = [parts] is not a list | there may be several: write [[parts]], in double brackets",
         ),
-        ("count = 1\npart = 3\n", "line 2: \"part\" = 3 is not a table | "),
-        ("count = 1\nkinds = [3]\n", "line 2: \"kinds\" = 3 is not a table | "),
-        ("count = 1\nplace = 3\n", "line 2: \"place\" = 3 is not a path | "),
+        (
+            "count = 1\npart = 3\n",
+            "line 2: \"part\" = 3 is not a table | ",
+        ),
+        (
+            "count = 1\nkinds = [3]\n",
+            "line 2: \"kinds\" = 3 is not a table | ",
+        ),
+        (
+            "count = 1\nplace = 3\n",
+            "line 2: \"place\" = 3 is not a path | ",
+        ),
         (
             "count = 1\n[part]\nx = 1\nxyz = [1, 2]\n",
             "line 4: \"part.xyz\" = [1, 2] is not an array of length 3 | ",
         ),
-        ("count = 1\nwords = \"north\"", "line 2: \"words\" = \"north\" is not a list | "),
+        (
+            "count = 1\nwords = \"north\"",
+            "line 2: \"words\" = \"north\" is not a list | ",
+        ),
         (
             "count = 1\nwords = [\"south\", \"nroth\"]",
             "line 2: \"words\" = \"nroth\" is not one of \"north\", \"south\" | did you mean \"north\"?",
@@ -68,12 +98,21 @@ fn refusals_name_file_line_key_and_value() {
             "count = 1\nparts = [{ x = 1 }, { xzy = 1 }]\n",
             "line 2: unknown key \"parts[2].xzy\" | did you mean \"xyz\"?",
         ),
-        ("count = 1\n[[parts]]\n", "line 2: \"parts[1].x\" is missing | add the key \"parts[1].x\""),
-        ("count = 1\nconut = 1", "line 2: unknown key \"conut\" | did you mean \"count\"?"),
+        (
+            "count = 1\n[[parts]]\n",
+            "line 2: \"parts[1].x\" is missing | add the key \"parts[1].x\"",
+        ),
+        (
+            "count = 1\nconut = 1",
+            "line 2: unknown key \"conut\" | did you mean \"count\"?",
+        ),
     ] {
         let source = Source::new("f.toml", text);
         let e = source.get::<File>().unwrap_err();
-        assert_eq!(format!("{e} | {}", e.hint().unwrap_or_default()), format!("f.toml, {expected}"));
+        assert_eq!(
+            format!("{e} | {}", e.hint().unwrap_or_default()),
+            format!("f.toml, {expected}")
+        );
     }
 }
 
@@ -103,9 +142,11 @@ fn path_and_span_are_inverse() {
 #[test]
 fn what_is_not_set_lies_in_the_innermost_table_that_is() {
     let table = DeTable::parse(TEXT).unwrap();
-    for (path, written) in
-        [("imu.rate_hz", ""), ("gnss.rate_hz", "[gnss]"), ("outage[2].start_s", "[[outage]]")]
-    {
+    for (path, written) in [
+        ("imu.rate_hz", ""),
+        ("gnss.rate_hz", "[gnss]"),
+        ("outage[2].start_s", "[[outage]]"),
+    ] {
         let (span, is_set) = span_of(table.get_ref(), path);
         assert_eq!((&TEXT[span], is_set), (written, false), "{path}");
     }
@@ -155,7 +196,9 @@ struct Step {
 /// Of tables that a word tells apart serde knows no places.
 #[test]
 fn keys_of_tagged_tables_are_found() {
-    let two = |second: &str| format!("[[rule]]\noperation = \"step\"\nheight = 0.5\n[[rule]]\n{second}\n");
+    let two = |second: &str| {
+        format!("[[rule]]\noperation = \"step\"\nheight = 0.5\n[[rule]]\n{second}\n")
+    };
     for (text, expected) in [
         (two("operation = \"step\"\nheight = 2"), "line 6: \"rule[2].height\" = 2 is not between 0 and 1 | "),
         (
@@ -200,8 +243,13 @@ fn keys_of_tagged_tables_are_found() {
 
 #[test]
 fn syntax_errors_have_line_and_column() {
-    let e = Source::new("f.toml", "a = 1\nb = = 2\n").get::<toml::Table>().unwrap_err();
-    assert!(e.to_string().starts_with("f.toml, line 2, column 5: "), "{e}");
+    let e = Source::new("f.toml", "a = 1\nb = = 2\n")
+        .get::<toml::Table>()
+        .unwrap_err();
+    assert!(
+        e.to_string().starts_with("f.toml, line 2, column 5: "),
+        "{e}"
+    );
 }
 
 #[test]

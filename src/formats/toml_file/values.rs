@@ -22,7 +22,11 @@ impl TryFrom<f64> for Finite {
     type Error = &'static str;
 
     fn try_from(value: f64) -> Result<Self, Self::Error> {
-        if value.is_finite() { Ok(Self(value)) } else { Err(Self::REFUSAL) }
+        if value.is_finite() {
+            Ok(Self(value))
+        } else {
+            Err(Self::REFUSAL)
+        }
     }
 }
 
@@ -48,13 +52,26 @@ impl<const LOW: i64, const HIGH: i64, const OPEN: bool> TryFrom<f64> for Between
     type Error = String;
 
     fn try_from(value: f64) -> Result<Self, Self::Error> {
-        let (low, high) = (LOW as f64, if HIGH == i64::MAX { f64::MAX } else { HIGH as f64 });
-        let is_inside = if OPEN { low < value && value < high } else { (low..=high).contains(&value) };
+        let (low, high) = (
+            LOW as f64,
+            if HIGH == i64::MAX {
+                f64::MAX
+            } else {
+                HIGH as f64
+            },
+        );
+        let is_inside = if OPEN {
+            low < value && value < high
+        } else {
+            (low..=high).contains(&value)
+        };
         match (HIGH, OPEN) {
             _ if is_inside => Ok(Self(value)),
             (i64::MAX, true) => Err(format!("is not a finite number > {LOW}")),
             (i64::MAX, false) => Err(format!("is not a finite number ≥ {LOW}")),
-            (_, true) => Err(format!("is not between {LOW} and {HIGH} (exclusive)").replace('-', "−")),
+            (_, true) => {
+                Err(format!("is not between {LOW} and {HIGH} (exclusive)").replace('-', "−"))
+            }
             (_, false) => Err(format!("is not between {LOW} and {HIGH}")),
         }
     }
@@ -76,8 +93,11 @@ impl<const LOW: i64, const HIGH: i64, const OPEN: bool> JsonSchema for Between<L
     }
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        let (least, most) =
-            if OPEN { ("exclusiveMinimum", "exclusiveMaximum") } else { ("minimum", "maximum") };
+        let (least, most) = if OPEN {
+            ("exclusiveMinimum", "exclusiveMaximum")
+        } else {
+            ("minimum", "maximum")
+        };
         let mut schema = json_schema!({ "type": "number" });
         schema.insert(least.to_owned(), LOW.into());
         if HIGH < i64::MAX {
@@ -97,7 +117,11 @@ impl TryFrom<u64> for Version {
     type Error = &'static str;
 
     fn try_from(version: u64) -> Result<Self, Self::Error> {
-        if version == 1 { Ok(Self) } else { Err("is not a schema this version reads: it reads 1") }
+        if version == 1 {
+            Ok(Self)
+        } else {
+            Err("is not a schema this version reads: it reads 1")
+        }
     }
 }
 

@@ -29,7 +29,11 @@ impl Unit {
 
     /// Factor of a name without a unit: seconds, degrees, metres, metres a second.
     const fn bare(self) -> f64 {
-        if matches!(self, Self::Angle) { DEG } else { 1.0 }
+        if matches!(self, Self::Angle) {
+            DEG
+        } else {
+            1.0
+        }
     }
 }
 
@@ -51,23 +55,38 @@ impl Known {
         unit: Unit,
         may_be_bare: bool,
     ) -> Self {
-        Self { name, stems, unit, may_be_bare, sign: 1.0 }
+        Self {
+            name,
+            stems,
+            unit,
+            may_be_bare,
+            sign: 1.0,
+        }
     }
 
     /// The factor of a column of this name; none of another quantity.
     fn factor(&self, name: &str) -> Option<f64> {
         let of_ending = |(ending, factor): &(&str, f64)| {
-            self.stems.contains(&name.strip_suffix(ending)?).then_some(*factor)
+            self.stems
+                .contains(&name.strip_suffix(ending)?)
+                .then_some(*factor)
         };
         let bare = || (self.may_be_bare && self.stems.contains(&name)).then(|| self.unit.bare());
-        self.unit.endings().iter().find_map(of_ending).or_else(bare).map(|factor| self.sign * factor)
+        self.unit
+            .endings()
+            .iter()
+            .find_map(of_ending)
+            .or_else(bare)
+            .map(|factor| self.sign * factor)
     }
 }
 
 /// Quantity of a name and the factor to SI.
 pub(super) fn classify(known: &'static [Known], name: &str) -> Option<(&'static str, f64)> {
     let name = name.to_lowercase().replace([' ', '-'], "_");
-    known.iter().find_map(|quantity| Some((quantity.name, quantity.factor(&name)?)))
+    known
+        .iter()
+        .find_map(|quantity| Some((quantity.name, quantity.factor(&name)?)))
 }
 
 /// A column of a quantity.
@@ -98,7 +117,10 @@ impl Columns {
     /// # Errors
     /// Two columns of one quantity.
     pub(in crate::formats) fn new(table: &Table, known: &'static [Known]) -> Result<Self, Error> {
-        let mut columns = Self { found: Vec::new(), ignored: Vec::new() };
+        let mut columns = Self {
+            found: Vec::new(),
+            ignored: Vec::new(),
+        };
         for (index, name) in table.columns.iter().enumerate() {
             let Some((quantity, factor)) = classify(known, name) else {
                 columns.ignored.push(name.clone());
@@ -107,8 +129,10 @@ impl Columns {
             if let Some(earlier) = columns.get(quantity) {
                 let first = &table.columns[earlier.index];
                 let message = format!("columns \"{first}\" and \"{name}\" both give {quantity}");
-                return Err(Error::contents(table.path.as_str(), table.header_line, message)
-                    .advice("remove one of them"));
+                return Err(
+                    Error::contents(table.path.as_str(), table.header_line, message)
+                        .advice("remove one of them"),
+                );
             }
             columns.found.push((quantity, Column { index, factor }));
         }
@@ -116,7 +140,10 @@ impl Columns {
     }
 
     pub(in crate::formats) fn get(&self, quantity: &str) -> Option<Column> {
-        self.found.iter().find(|(name, _)| *name == quantity).map(|(_, column)| *column)
+        self.found
+            .iter()
+            .find(|(name, _)| *name == quantity)
+            .map(|(_, column)| *column)
     }
 
     pub(in crate::formats) fn has(&self, quantity: &str) -> bool {
@@ -140,7 +167,10 @@ impl Columns {
         needed: impl IntoIterator<Item = &'static str>,
         advice: &'static str,
     ) -> Result<(), Error> {
-        let missing: Vec<_> = needed.into_iter().filter(|quantity| !self.has(quantity)).collect();
+        let missing: Vec<_> = needed
+            .into_iter()
+            .filter(|quantity| !self.has(quantity))
+            .collect();
         let refuse = |kind| Error::new(table.path.as_str(), table.header_line, kind);
         let slip = |name: &String| Some((name.clone(), nearest(name, missing.iter().copied())?));
         if let Some((name, meant)) = self.ignored.iter().find_map(slip) {

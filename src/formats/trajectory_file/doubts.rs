@@ -15,36 +15,58 @@ const LOOKS: usize = 2000;
 /// Long steps, where the curve between rows is a guess, and gaps.
 pub(super) fn steps(rows: &mut Rows) {
     let time = |i: usize| rows.samples[i].t_s;
-    let mut steps: Vec<(f64, usize)> = (1..rows.samples.len()).map(|i| (time(i) - time(i - 1), i)).collect();
+    let mut steps: Vec<(f64, usize)> = (1..rows.samples.len())
+        .map(|i| (time(i) - time(i - 1), i))
+        .collect();
     steps.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((&(median, _), &(longest, i))) = steps.get(steps.len() / 2).zip(steps.last()) else { return };
+    let Some((&(median, _), &(longest, i))) = steps.get(steps.len() / 2).zip(steps.last()) else {
+        return;
+    };
     if longest > LONG_STEP_S.max(1.5 * median) {
-        let message = format!("gap of {longest:.3} s before {} s: the path in it is a guess", time(i));
+        let message = format!(
+            "gap of {longest:.3} s before {} s: the path in it is a guess",
+            time(i)
+        );
         rows.doubt(Some(rows.lines[i]), message);
     }
     if median > LONG_STEP_S {
-        rows.doubt(None, format!("rows are {median} s apart: the path between is a guess"));
+        rows.doubt(
+            None,
+            format!("rows are {median} s apart: the path between is a guess"),
+        );
     }
 }
 
 /// The path against the other columns.
 pub(super) fn of_trajectory(rows: &mut Rows, trajectory: &Trajectory) {
     let small = |angle: f64| angle.abs() <= PI * DEG + 1e-8;
-    if rows.geodetic && rows.samples.iter().all(|s| small(s.lat) && small(0.5 * s.lon)) {
+    if rows.geodetic
+        && rows
+            .samples
+            .iter()
+            .all(|s| small(s.lat) && small(0.5 * s.lon))
+    {
         rows.doubt(
             None,
             "lat_deg and lon_deg never exceed π: radians? Then name the columns lat_rad, lon_rad",
         );
     }
     if rows.attitude == Attitude::Given {
-        heading(rows, trajectory).into_iter().for_each(|text| rows.doubt(None, text));
+        heading(rows, trajectory)
+            .into_iter()
+            .for_each(|text| rows.doubt(None, text));
     }
     let times = rows.samples.iter().map(|s| s.t_s);
     let given: Vec<_> = times.zip(rows.velocities.iter().copied()).collect();
     let misfit = VelocityMisfit::new(trajectory, &given).filter(VelocityMisfit::contradicts);
     if let Some(VelocityMisfit { rms, worst_s, .. }) = misfit {
-        let line = given.iter().position(|(t_s, _)| *t_s == worst_s).map(|i| rows.lines[i]);
-        let text = format!("velocity columns differ from the positions, which are used, by {rms:.3} m/s rms");
+        let line = given
+            .iter()
+            .position(|(t_s, _)| *t_s == worst_s)
+            .map(|i| rows.lines[i]);
+        let text = format!(
+            "velocity columns differ from the positions, which are used, by {rms:.3} m/s rms"
+        );
         rows.doubt(line, text);
     }
 }
@@ -56,7 +78,10 @@ fn heading(rows: &Rows, trajectory: &Trajectory) -> Option<String> {
     const CONVENTIONS: [Convention; 6] = [
         ("in radians (name the column yaw_rad)", |yaw| yaw / DEG),
         ("anticlockwise from north", |yaw| -yaw),
-        ("anticlockwise from east, or with latitude and longitude swapped", |yaw| FRAC_PI_2 - yaw),
+        (
+            "anticlockwise from east, or with latitude and longitude swapped",
+            |yaw| FRAC_PI_2 - yaw,
+        ),
         ("clockwise from east", |yaw| FRAC_PI_2 + yaw),
         ("clockwise from west", |yaw| yaw - FRAC_PI_2),
         ("backwards", |yaw| yaw + PI),
@@ -69,12 +94,18 @@ fn heading(rows: &Rows, trajectory: &Trajectory) -> Option<String> {
     let n = rows.samples.len();
     let looks: Vec<(f64, f64)> = (0..n).step_by(n.div_ceil(LOOKS)).filter_map(look).collect();
     let off = |meant: fn(f64) -> f64| {
-        let sum: f64 = looks.iter().map(|(course, yaw)| wrap_angle(course - meant(*yaw)).abs()).sum();
+        let sum: f64 = looks
+            .iter()
+            .map(|(course, yaw)| wrap_angle(course - meant(*yaw)).abs())
+            .sum();
         sum / looks.len() as f64 / DEG
     };
     let given = off(|yaw| yaw);
-    let tried = CONVENTIONS.iter().map(|(words, meant)| (off(*meant), words));
+    let tried = CONVENTIONS
+        .iter()
+        .map(|(words, meant)| (off(*meant), words));
     let (best, words) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (given > 20.0 && best < 0.25 * given)
-        .then(|| format!("yaw is {given:.0}° from the course in the mean, {best:.1}° when read {words}"))
+    (given > 20.0 && best < 0.25 * given).then(|| {
+        format!("yaw is {given:.0}° from the course in the mean, {best:.1}° when read {words}")
+    })
 }

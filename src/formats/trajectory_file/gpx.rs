@@ -23,10 +23,22 @@ pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
     let mut start = None;
     for Point { line, texts } in track_points(path, text)? {
         let absent = |column: usize| {
-            let error = table.cell(line, column, "the track point", "does not have it, or not as a number");
-            error.advice("every <trkpt> needs lat, lon, <ele> and <time>: export them with the track")
+            let error = table.cell(
+                line,
+                column,
+                "the track point",
+                "does not have it, or not as a number",
+            );
+            error.advice(
+                "every <trkpt> needs lat, lon, <ele> and <time>: export them with the track",
+            )
         };
-        let number = |column: usize| texts[column].trim().parse::<f64>().map_err(|_| absent(column));
+        let number = |column: usize| {
+            texts[column]
+                .trim()
+                .parse::<f64>()
+                .map_err(|_| absent(column))
+        };
         let time = instant(texts[0].trim()).ok_or_else(|| absent(0))?;
         let sample = TrajectorySample {
             t_s: seconds_between(*start.get_or_insert(time), time),
@@ -88,9 +100,15 @@ fn track_points(path: &str, text: &str) -> Result<Vec<Point>, Error> {
 }
 
 fn track_point(line: u64, tag: &BytesStart<'_>) -> Point {
-    let mut point = Point { line, ..Point::default() };
+    let mut point = Point {
+        line,
+        ..Point::default()
+    };
     for attribute in tag.attributes().flatten() {
-        if let Some(column) = COLUMNS.iter().position(|name| *name == attribute.key.local_name().as_ref()) {
+        if let Some(column) = COLUMNS
+            .iter()
+            .position(|name| *name == attribute.key.local_name().as_ref())
+        {
             point.texts[column] = attribute.value.into_owned();
         }
     }
@@ -99,7 +117,9 @@ fn track_point(line: u64, tag: &BytesStart<'_>) -> Point {
 
 /// Appends text to what the open element of the last track point holds.
 fn append(points: &mut [Point], within: &[String], text: &str) {
-    let ([_, name], Some(point)) = (within, points.last_mut()) else { return };
+    let ([_, name], Some(point)) = (within, points.last_mut()) else {
+        return;
+    };
     if let Some(column) = COLUMNS.iter().position(|column| column == name) {
         point.texts[column].push_str(text);
     }
@@ -107,13 +127,18 @@ fn append(points: &mut [Point], within: &[String], text: &str) {
 
 /// A time as GPX has it: 2024-05-01T10:20:30.5Z, with another offset, or without one (UTC).
 fn instant(text: &str) -> Option<DateTime<Utc>> {
-    let local = || NaiveDateTime::parse_from_str(text, "%Y-%m-%dT%H:%M:%S%.f").map(|time| time.and_utc());
-    DateTime::parse_from_rfc3339(text).map(|time| time.to_utc()).or_else(|_| local()).ok()
+    let local =
+        || NaiveDateTime::parse_from_str(text, "%Y-%m-%dT%H:%M:%S%.f").map(|time| time.and_utc());
+    DateTime::parse_from_rfc3339(text)
+        .map(|time| time.to_utc())
+        .or_else(|_| local())
+        .ok()
 }
 
 /// Exact to the nanosecond: seconds and nanoseconds are subtracted apart.
 fn seconds_between(start: DateTime<Utc>, end: DateTime<Utc>) -> f64 {
-    let nanoseconds = f64::from(end.timestamp_subsec_nanos()) - f64::from(start.timestamp_subsec_nanos());
+    let nanoseconds =
+        f64::from(end.timestamp_subsec_nanos()) - f64::from(start.timestamp_subsec_nanos());
     (end.timestamp() - start.timestamp()) as f64 + 1e-9 * nanoseconds
 }
 
@@ -139,8 +164,7 @@ mod tests {
                 52 + k
             )
         };
-        let last =
-            "<trkpt lat=\"46.0008\" lon=\"7\"><ele>508</ele><time>2024-03-01T02:00:00+02:00</time></trkpt>";
+        let last = "<trkpt lat=\"46.0008\" lon=\"7\"><ele>508</ele><time>2024-03-01T02:00:00+02:00</time></trkpt>";
         let points: String = (0..8).map(point).collect();
         format!("<gpx>\n<trk><trkseg>\n{points}{last}</trkseg></trk></gpx>")
     }
@@ -160,13 +184,26 @@ mod tests {
         let (t, warnings) = load("a.gpx", &text).unwrap();
         assert_eq!((t.start_s(), t.end_s(), warnings.len()), (0.0, 8.0, 1));
         let (state, rpy) = (t.state(4.0), RollPitchYaw::from_quat(t.state(4.0).q_b_n));
-        assert!((state.v_n - DVec3::new(11.117, 0.0, -1.0)).length() < 0.01, "{}", state.v_n);
-        assert!(rpy.yaw.abs() < 1e-6 && (rpy.pitch - (1.0_f64 / 11.117).atan()).abs() < 1e-3, "{rpy:?}");
+        assert!(
+            (state.v_n - DVec3::new(11.117, 0.0, -1.0)).length() < 0.01,
+            "{}",
+            state.v_n
+        );
+        assert!(
+            rpy.yaw.abs() < 1e-6 && (rpy.pitch - (1.0_f64 / 11.117).atan()).abs() < 1e-3,
+            "{rpy:?}"
+        );
         let e = load("a.gpx", &text.replacen("<ele>500</ele>", "", 1)).unwrap_err();
         assert!(e.hint().unwrap().contains("<ele> and <time>"), "{e:?}");
         let e = e.to_string();
-        assert_eq!(e, "a.gpx, line 3: column \"ele\": the track point does not have it, or not as a number");
-        assert_eq!(load("a.gpx", "<gpx></gpx>").unwrap_err().to_string(), "a.gpx: no rows in it");
+        assert_eq!(
+            e,
+            "a.gpx, line 3: column \"ele\": the track point does not have it, or not as a number"
+        );
+        assert_eq!(
+            load("a.gpx", "<gpx></gpx>").unwrap_err().to_string(),
+            "a.gpx: no rows in it"
+        );
     }
 
     #[test]
@@ -176,20 +213,28 @@ mod tests {
             .replace("</trk", "</g:trk")
             .replace("<ele>", "<g:ele><!-- metres --><![CDATA[")
             .replace("</ele>", "]]></g:ele>")
-            .replace("<time>", "<g:extensions><ele>9</ele><x:time/></g:extensions><g:time>\n  ")
+            .replace(
+                "<time>",
+                "<g:extensions><ele>9</ele><x:time/></g:extensions><g:time>\n  ",
+            )
             .replace("</time>", "\n</g:time>")
             .replace(
                 "<gpx>",
                 "<?xml version=\"1.0\"?>\n<gpx xmlns:g='u' xmlns:x='v'><!-- <trkpt lat='1'> -->",
             );
-        let (plain, other) = (gpx("a.gpx", &track()).unwrap(), gpx("a.gpx", &written).unwrap());
+        let (plain, other) = (
+            gpx("a.gpx", &track()).unwrap(),
+            gpx("a.gpx", &written).unwrap(),
+        );
         assert_eq!(plain.samples, other.samples);
         assert_eq!((plain.lines[0], other.lines[0]), (3, 4));
     }
 
     #[test]
     fn what_is_not_xml_is_refused_with_its_line() {
-        let e = load("a.gpx", &track().replacen("</trkpt>", "</trkseg>", 1)).unwrap_err().to_string();
+        let e = load("a.gpx", &track().replacen("</trkpt>", "</trkseg>", 1))
+            .unwrap_err()
+            .to_string();
         assert!(e.starts_with("a.gpx, line 4: not well-formed XML: "), "{e}");
     }
 
@@ -202,10 +247,16 @@ mod tests {
             ("2017-01-01T00:00:01.125", 1.375),
             ("2017-01-01T01:30:00+01:30", 0.25),
         ] {
-            assert_eq!(seconds_between(start, instant(text).unwrap()), seconds, "{text}");
+            assert_eq!(
+                seconds_between(start, instant(text).unwrap()),
+                seconds,
+                "{text}"
+            );
         }
         assert!(
-            ["", "2017-02-29T00:00:00Z", "2017-01-01", "noon"].iter().all(|text| instant(text).is_none())
+            ["", "2017-02-29T00:00:00Z", "2017-01-01", "noon"]
+                .iter()
+                .all(|text| instant(text).is_none())
         );
     }
 }

@@ -19,7 +19,12 @@ const DAY_S: f64 = 86_400.0;
 /// A KF-GINS navigation result or truth: week, seconds of week, latitude, longitude (deg), height (m), velocity
 /// north, east, down (m/s), roll, pitch, yaw (deg), between blanks. Read as our own table, time counted on
 /// from the first week.
-pub(super) fn kf_gins(path: &str, text: &str, options: &Options, numbers: Numbers) -> Result<Rows, Error> {
+pub(super) fn kf_gins(
+    path: &str,
+    text: &str,
+    options: &Options,
+    numbers: Numbers,
+) -> Result<Rows, Error> {
     let names = [
         "week",
         "t_s",
@@ -45,10 +50,17 @@ pub(super) fn kf_gins(path: &str, text: &str, options: &Options, numbers: Number
 
 /// A TUM file: time, x, y, z (m), quaternion x, y, z, w, between blanks. The axes are taken as ROS has them
 /// (REP 103): position east, north, up of the origin; body forward, left, up.
-pub(super) fn tum(path: &str, text: &str, options: &Options, numbers: Numbers) -> Result<Rows, Error> {
+pub(super) fn tum(
+    path: &str,
+    text: &str,
+    options: &Options,
+    numbers: Numbers,
+) -> Result<Rows, Error> {
     let names = ["t_s", "x", "y", "z", "qx", "qy", "qz", "qw"];
     let mut table = Table::read(path, text.as_bytes(), Some(&names), numbers)?;
-    table.rows.retain(|(_, row)| row.iter().all(|x| x.is_finite()));
+    table
+        .rows
+        .retain(|(_, row)| row.iter().all(|x| x.is_finite()));
     let origin = super::samples::origin(&table, options)?;
     // East-north-up to north-east-down, front-right-down to front-left-up: half turns.
     let q_enu_ned = DQuat::from_xyzw(FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0, 0.0);
@@ -65,11 +77,19 @@ pub(super) fn tum(path: &str, text: &str, options: &Options, numbers: Numbers) -
             ));
         }
         let r_ned = q_enu_ned * DVec3::new(row[1], row[2], row[3]);
-        samples.push(local(row[0], origin, r_ned, q_enu_ned * q_flu_enu * q_frd_flu));
+        samples.push(local(
+            row[0],
+            origin,
+            r_ned,
+            q_enu_ned * q_flu_enu * q_frd_flu,
+        ));
     }
     let lines = table.rows.iter().map(|(line, _)| *line).collect();
     let mut rows = Rows::new(path, lines, samples, Attitude::Given);
-    rows.doubt(None, "axes taken as ROS has them: position east, north, up; body forward, left, up");
+    rows.doubt(
+        None,
+        "axes taken as ROS has them: position east, north, up; body forward, left, up",
+    );
     Ok(rows)
 }
 
@@ -103,7 +123,10 @@ pub(super) fn motion_definition(path: &str, text: &str) -> Result<Rows, Error> {
     let lines = command_lines(&samples, &motion, start.0, rest);
     let mut rows = Rows::new(path, lines, samples, Attitude::Given);
     if !timed {
-        rows.doubt(None, "commands of type 2 to 5 take all of their time, not only what a vehicle needs");
+        rows.doubt(
+            None,
+            "commands of type 2 to 5 take all of their time, not only what a vehicle needs",
+        );
     }
     Ok(rows)
 }
@@ -114,8 +137,10 @@ fn command_all(motion: &mut BodyMotion, path: &str, lines: &[(u64, &str)]) -> Re
     for &(line, text) in lines {
         let cells = numbers(path, line, text, 8)?;
         let duration_s = cells[7];
-        let (angles, speeds) =
-            (DVec3::new(cells[3], cells[2], cells[1]) * DEG, DVec3::from_slice(&cells[4..7]));
+        let (angles, speeds) = (
+            DVec3::new(cells[3], cells[2], cells[1]) * DEG,
+            DVec3::from_slice(&cells[4..7]),
+        );
         let change = match cells[0] as i64 {
             1 => (angles * duration_s, speeds * duration_s),
             2 => (angles - rpy, speeds - v_b),
@@ -132,12 +157,17 @@ fn command_all(motion: &mut BodyMotion, path: &str, lines: &[(u64, &str)]) -> Re
         };
         total_s += duration_s;
         if duration_s <= 0.0 || total_s > DAY_S {
-            let message = format!("command duration {duration_s} s is not > 0, or makes more than a day");
+            let message =
+                format!("command duration {duration_s} s is not > 0, or makes more than a day");
             return Err(Error::contents(path, line, message));
         }
         timed &= cells[0] as i64 == 1;
         (rpy, v_b) = (rpy + change.0, v_b + change.1);
-        motion.commands.push(Command { duration_s, rpy: change.0, v_b: change.1 });
+        motion.commands.push(Command {
+            duration_s,
+            rpy: change.0,
+            v_b: change.1,
+        });
     }
     Ok(timed)
 }
@@ -152,7 +182,10 @@ fn command_lines(
     let (mut lines, mut end_s) = (vec![start], 0.0);
     for (command, (line, _)) in motion.commands.iter().zip(commands) {
         end_s += command.duration_s;
-        let within = samples[lines.len()..].iter().take_while(|s| s.t_s <= end_s + 1e-6).count();
+        let within = samples[lines.len()..]
+            .iter()
+            .take_while(|s| s.t_s <= end_s + 1e-6)
+            .count();
         lines.extend(std::iter::repeat_n(*line, within));
     }
     lines.resize(samples.len(), lines.last().copied().unwrap_or(start));
@@ -162,7 +195,11 @@ fn command_lines(
 fn numbers(path: &str, line: u64, text: &str, least: usize) -> Result<Vec<f64>, Error> {
     let number = |cell: &str| match cell.trim().parse::<f64>() {
         Ok(x) if x.is_finite() => Ok(x),
-        _ => Err(Error::contents(path, line, format!("\"{}\" is not a number", cell.trim()))),
+        _ => Err(Error::contents(
+            path,
+            line,
+            format!("\"{}\" is not a number", cell.trim()),
+        )),
     };
     let cells = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
     if cells.len() < least {
@@ -196,7 +233,11 @@ mod tests {
     fn kf_gins_results_run_on_across_the_week() {
         let row = |k: i32| {
             let sow = 604_798.5 + 0.5 * f64::from(k);
-            let (week, sow) = if sow >= WEEK_S { (2017, sow - WEEK_S) } else { (2016, sow) };
+            let (week, sow) = if sow >= WEEK_S {
+                (2017, sow - WEEK_S)
+            } else {
+                (2016, sow)
+            };
             let lon = 114.0 + 1e-4 * f64::from(k);
             format!("{week}  {sow:.3} 30.5 {lon:.6} 20.0 0.0 19.2 0.0 0.1 0.2 90.0\n")
         };
@@ -204,7 +245,11 @@ mod tests {
         let (t, warnings) = nav(&text).unwrap();
         assert!(warnings.is_empty(), "{warnings:?}");
         assert_eq!((t.start_s(), t.end_s()), (604_798.5, 604_802.5));
-        assert!((t.state(604_800.0).v_n.y - 19.2).abs() < 0.02, "{}", t.state(604_800.0).v_n);
+        assert!(
+            (t.state(604_800.0).v_n.y - 19.2).abs() < 0.02,
+            "{}",
+            t.state(604_800.0).v_n
+        );
         let e = nav("2016 1 2 3\n").unwrap_err();
         assert_eq!(e.to_string(), "truth.nav, line 1: 4 values, but 11 columns");
     }
@@ -212,21 +257,37 @@ mod tests {
     /// East along x at 3 m/s, facing east (ROS: no rotation): heading 90°, level.
     #[test]
     fn tum_files_are_read_with_the_axes_of_ros() {
-        let text: String = (0..6).map(|k| format!("{k}.5 {} 0 0 0 0 0 1\n", 3 * k)).collect();
-        let options = Options { origin: Some([0.8, 0.1, 50.0]) };
+        let text: String = (0..6)
+            .map(|k| format!("{k}.5 {} 0 0 0 0 0 1\n", 3 * k))
+            .collect();
+        let options = Options {
+            origin: Some([0.8, 0.1, 50.0]),
+        };
         let (t, warnings) = tum("a.tum", &text, &options).unwrap();
         assert!(warnings[0].message.contains("ROS"));
         let state = t.state(2.0);
         let rpy = RollPitchYaw::from_quat(state.q_b_n);
-        assert!((state.v_n - DVec3::Y * 3.0).length() < 1e-4, "{}", state.v_n);
+        assert!(
+            (state.v_n - DVec3::Y * 3.0).length() < 1e-4,
+            "{}",
+            state.v_n
+        );
         assert!(
             (rpy.yaw - 0.5 * PI).abs() < 1e-5 && rpy.roll.abs() < 1e-5 && rpy.pitch.abs() < 1e-5,
             "{rpy:?}"
         );
         let e = tum("a.tum", &text, &Options::default()).unwrap_err();
-        assert!(e.to_string().contains("needs an origin on the Earth"), "{e}");
-        let e = tum("a.tum", "0 0 0 0 0 0 0 2\n", &options).unwrap_err().to_string();
-        assert_eq!(e, "a.tum, line 1: column \"qw\": 2 does not make a unit quaternion with the others");
+        assert!(
+            e.to_string().contains("needs an origin on the Earth"),
+            "{e}"
+        );
+        let e = tum("a.tum", "0 0 0 0 0 0 0 2\n", &options)
+            .unwrap_err()
+            .to_string();
+        assert_eq!(
+            e,
+            "a.tum, line 1: column \"qw\": 2 does not make a unit quaternion with the others"
+        );
     }
 
     const HEAD: &str = "ini lat (deg),ini lon (deg),ini alt (m),ini vx_body (m/s),ini vy_body (m/s),ini vz_body \
@@ -243,14 +304,27 @@ mod tests {
         assert_eq!(t.end_s(), 15.0);
         // Facing east, then turned left by 90°: north; slowed down to 4 m/s.
         assert!((t.state(1.0).v_n - DVec3::Y * 10.0).length() < 1e-4);
-        assert!((t.state(15.0).v_n - DVec3::X * 4.0).length() < 1e-4, "{}", t.state(15.0).v_n);
-        let refused =
-            |line: &str| motion_definition("m.csv", &format!("{HEAD}{line}\n")).unwrap_err().to_string();
-        assert_eq!(refused("7,0,0,0,0,0,0,1,0"), "m.csv, line 4: command type 7 is none of 1 to 5");
+        assert!(
+            (t.state(15.0).v_n - DVec3::X * 4.0).length() < 1e-4,
+            "{}",
+            t.state(15.0).v_n
+        );
+        let refused = |line: &str| {
+            motion_definition("m.csv", &format!("{HEAD}{line}\n"))
+                .unwrap_err()
+                .to_string()
+        };
+        assert_eq!(
+            refused("7,0,0,0,0,0,0,1,0"),
+            "m.csv, line 4: command type 7 is none of 1 to 5"
+        );
         assert_eq!(
             refused("1,0,0,0,0,0,0,0,0"),
             "m.csv, line 4: command duration 0 s is not > 0, or makes more than a day"
         );
-        assert_eq!(refused("1,0,x,0,0,0,0,1,0"), "m.csv, line 4: \"x\" is not a number");
+        assert_eq!(
+            refused("1,0,x,0,0,0,0,1,0"),
+            "m.csv, line 4: \"x\" is not a number"
+        );
     }
 }

@@ -51,7 +51,8 @@ impl fmt::Display for Warning {
     }
 }
 
-const KNOWN: &str = ".toml (motion profile), .csv, .tsv, .txt, .nav (KF-GINS), .tum or .gpx (also .gz)";
+const KNOWN: &str =
+    ".toml (motion profile), .csv, .tsv, .txt, .nav (KF-GINS), .tum or .gpx (also .gz)";
 
 /// Reads a trajectory: a motion profile (`.toml`), or a table with a header (`.csv`, `.tsv`, `.txt`) whose columns
 /// are `t_s`, `lat_deg`, `lon_deg`, `h_m` or `n_m`, `e_m`, `d_m` (in the plane that touches the Earth at the
@@ -76,7 +77,10 @@ pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<Warning>)
 ///
 /// # Errors
 /// What cannot be read at all, with its line; rows of which no stretch is usable.
-pub(crate) fn load_reference(path: &Path, options: &Options) -> Result<(Reference, Vec<Warning>), FileError> {
+pub(crate) fn load_reference(
+    path: &Path,
+    options: &Options,
+) -> Result<(Reference, Vec<Warning>), FileError> {
     match parse(path, options, Numbers::Any)? {
         Parsed::Profile(trajectory) => Ok((trajectory.into(), Vec::new())),
         Parsed::Rows(rows) => rows.reference(),
@@ -99,7 +103,11 @@ fn parse(path: &Path, options: &Options, numbers: Numbers) -> Result<Parsed, Fil
         "tum" => imports::tum(&name, &text()?, options, numbers),
         "gpx" => gpx::gpx(&name, &text()?),
         "csv" | "tsv" | "txt" => parse_table(&name, &text()?, options, numbers),
-        _ => Err(FileError::contents(name, Place::Within, format!("a trajectory file ends in {KNOWN}"))),
+        _ => Err(FileError::contents(
+            name,
+            Place::Within,
+            format!("a trajectory file ends in {KNOWN}"),
+        )),
     };
     rows.map(Parsed::Rows)
 }
@@ -113,7 +121,11 @@ fn parse_table(
     if imports::is_motion_definition(text) {
         return imports::motion_definition(name, text);
     }
-    samples::rows(Table::read(name, text.as_bytes(), None, numbers)?, options, numbers)
+    samples::rows(
+        Table::read(name, text.as_bytes(), None, numbers)?,
+        options,
+        numbers,
+    )
 }
 
 #[cfg(test)]

@@ -31,12 +31,24 @@ pub(super) fn load(path: &Path) -> Result<Trajectory, FileError> {
 }
 
 pub(super) fn build(source: &Source) -> Result<Trajectory, FileError> {
-    let Description { start, vehicle, segment } = source.get()?;
+    let Description {
+        start,
+        vehicle,
+        segment,
+    } = source.get()?;
     let ramp_s = vehicle.ramp_s.map_or(RAMP_S, |ramp| ramp.0);
     if ramp_s <= 0.0 {
         return Err(source.refused("vehicle.ramp_s", "is not a number > 0"));
     }
-    let read = |(i, table): (usize, &SegmentTable)| read_segment(&Keys { source, path: path_of(i) }, table);
+    let read = |(i, table): (usize, &SegmentTable)| {
+        read_segment(
+            &Keys {
+                source,
+                path: path_of(i),
+            },
+            table,
+        )
+    };
     let profile = Profile {
         start: Start {
             t_s: start.t_s.0,
@@ -51,7 +63,11 @@ pub(super) fn build(source: &Source) -> Result<Trajectory, FileError> {
             Roll::Coordinated => Bank::Coordinated,
         },
         ramp_s,
-        segments: segment.iter().enumerate().map(read).collect::<Result<_, _>>()?,
+        segments: segment
+            .iter()
+            .enumerate()
+            .map(read)
+            .collect::<Result<_, _>>()?,
     };
     profile.build().map_err(|e| blame(source, &segment, &e))
 }
@@ -71,7 +87,9 @@ fn blame(source: &Source, segments: &[SegmentTable], e: &profile::Error) -> File
         None if key == "segment" => key.to_owned(),
         None => format!("start.{key}"),
     };
-    source.refused(&path, e.problem.to_string()).advice_if(e.problem.hint().map(str::to_owned))
+    source
+        .refused(&path, e.problem.to_string())
+        .advice_if(e.problem.hint().map(str::to_owned))
 }
 
 /// A height at which the gravity model means something.
@@ -98,22 +116,32 @@ impl Keys<'_> {
         &self,
         keys: [(&'static str, Option<Finite>); N],
     ) -> Result<(&'static str, f64), FileError> {
-        let mut given = keys.iter().filter_map(|(key, value)| value.map(|value| (*key, value.0)));
+        let mut given = keys
+            .iter()
+            .filter_map(|(key, value)| value.map(|value| (*key, value.0)));
         match (given.next(), given.next()) {
             (None, _) => Err(self.source.missing(&self.path, &keys.map(|(key, _)| key))),
             (Some(only), None) => Ok(only),
             (Some((first, _)), Some((second, _))) => {
-                let refusal = self.source.refused(&self.path(second), format!("stands beside {first}"));
+                let refusal = self
+                    .source
+                    .refused(&self.path(second), format!("stands beside {first}"));
                 Err(refusal.advice("give one of them"))
             }
         }
     }
 
-    fn length(&self, duration: Option<Finite>, distance: Option<Finite>) -> Result<Kind, FileError> {
-        Ok(Kind::Straight(match self.one_of([("duration_s", duration), ("distance_m", distance)])? {
-            ("duration_s", s) => Length::Duration(s),
-            (_, m) => Length::Distance(m),
-        }))
+    fn length(
+        &self,
+        duration: Option<Finite>,
+        distance: Option<Finite>,
+    ) -> Result<Kind, FileError> {
+        Ok(Kind::Straight(
+            match self.one_of([("duration_s", duration), ("distance_m", distance)])? {
+                ("duration_s", s) => Length::Duration(s),
+                (_, m) => Length::Distance(m),
+            },
+        ))
     }
 
     fn turning<const N: usize>(
@@ -134,11 +162,20 @@ fn read_segment(keys: &Keys<'_>, table: &SegmentTable) -> Result<Segment, FileEr
         Described::Straight(own) => (keys.length(own.duration_s, own.distance_m)?, own.climb_m),
         Described::Climb(own) => (keys.length(own.duration_s, own.distance_m)?, own.height_m),
         Described::Accelerate(own) => {
-            let by = match keys.one_of([("duration_s", own.duration_s), ("accel_m_s2", own.accel_m_s2)])? {
+            let by = match keys.one_of([
+                ("duration_s", own.duration_s),
+                ("accel_m_s2", own.accel_m_s2),
+            ])? {
                 ("duration_s", s) => Acceleration::Duration(s),
                 (_, a) => Acceleration::Peak(a),
             };
-            (Kind::Accelerate { to_speed: own.to_speed_m_s.0, by }, own.climb_m)
+            (
+                Kind::Accelerate {
+                    to_speed: own.to_speed_m_s.0,
+                    by,
+                },
+                own.climb_m,
+            )
         }
         Described::Turn(own) => {
             let by = keys.turning([
@@ -147,11 +184,23 @@ fn read_segment(keys: &Keys<'_>, table: &SegmentTable) -> Result<Segment, FileEr
                 ("radius_m", own.radius_m),
                 ("lateral_accel_m_s2", own.lateral_accel_m_s2),
             ])?;
-            (Kind::Turn { angle: own.angle_deg.0 * DEG, by }, own.climb_m)
+            (
+                Kind::Turn {
+                    angle: own.angle_deg.0 * DEG,
+                    by,
+                },
+                own.climb_m,
+            )
         }
         Described::Stop(own) => {
             let decel = own.decel_m_s2.map_or(DECEL, |decel| decel.0);
-            (Kind::Stop { duration: own.duration_s.0, decel }, own.climb_m)
+            (
+                Kind::Stop {
+                    duration: own.duration_s.0,
+                    decel,
+                },
+                own.climb_m,
+            )
         }
         Described::Waypoints(own) => {
             let by = keys.turning([
@@ -161,13 +210,26 @@ fn read_segment(keys: &Keys<'_>, table: &SegmentTable) -> Result<Segment, FileEr
             ])?;
             let point = |(i, point)| {
                 let path = keys.path(&format!("points[{i}]"));
-                waypoint(&Keys { source: keys.source, path }, point)
+                waypoint(
+                    &Keys {
+                        source: keys.source,
+                        path,
+                    },
+                    point,
+                )
             };
-            let points = (1..).zip(&own.points).map(point).collect::<Result<_, _>>()?;
+            let points = (1..)
+                .zip(&own.points)
+                .map(point)
+                .collect::<Result<_, _>>()?;
             (Kind::Waypoints { points, by }, own.climb_m)
         }
     };
-    Ok(Segment { kind, climb_m: climb.0, ramp_s: table.ramp_s.map(|ramp| ramp.0) })
+    Ok(Segment {
+        kind,
+        climb_m: climb.0,
+        ramp_s: table.ramp_s.map(|ramp| ramp.0),
+    })
 }
 
 fn waypoint(keys: &Keys<'_>, point: &Point) -> Result<Waypoint, FileError> {
@@ -179,15 +241,23 @@ fn waypoint(keys: &Keys<'_>, point: &Point) -> Result<Waypoint, FileError> {
     let place = if point.n_m.or(point.e_m).is_some() {
         let geodetic = [("lat_deg", point.lat_deg), ("lon_deg", point.lon_deg)];
         if let Some((extra, _)) = geodetic.into_iter().find(|(_, value)| value.is_some()) {
-            let refusal = keys.source.refused(&keys.path(extra), "stands beside n_m, e_m");
+            let refusal = keys
+                .source
+                .refused(&keys.path(extra), "stands beside n_m, e_m");
             return Err(refusal.advice("give one pair of them"));
         }
         let (north, east) = pair(["n_m", "e_m"], [point.n_m, point.e_m])?;
         Place::Local { north, east }
     } else {
         let (lat, lon) = pair(["lat_deg", "lon_deg"], [point.lat_deg, point.lon_deg])?;
-        Place::Geodetic { lat: lat * DEG, lon: lon * DEG }
+        Place::Geodetic {
+            lat: lat * DEG,
+            lon: lon * DEG,
+        }
     };
-    let h = point.h_m.map(|h| height(keys.source, &keys.path("h_m"), h)).transpose()?;
+    let h = point
+        .h_m
+        .map(|h| height(keys.source, &keys.path("h_m"), h))
+        .transpose()?;
     Ok(Waypoint { place, h })
 }

@@ -27,18 +27,29 @@ static KNOWN: [Known; 15] = [
     Known::new("t_s", &["t", "time", "timestamp"], Unit::Time, true),
     Known::new("lat_deg", &["lat", "latitude"], Unit::Angle, true),
     Known::new("lon_deg", &["lon", "lng", "longitude"], Unit::Angle, true),
-    Known::new("h_m", &["h", "alt", "height", "altitude"], Unit::Length, true),
+    Known::new(
+        "h_m",
+        &["h", "alt", "height", "altitude"],
+        Unit::Length,
+        true,
+    ),
     Known::new("n_m", &["n", "north"], Unit::Length, false),
     Known::new("e_m", &["e", "east"], Unit::Length, false),
     Known::new("d_m", &["d", "down"], Unit::Length, false),
-    Known { sign: -1.0, ..Known::new("d_m", &["u", "up"], Unit::Length, false) },
+    Known {
+        sign: -1.0,
+        ..Known::new("d_m", &["u", "up"], Unit::Length, false)
+    },
     Known::new("roll_deg", &["roll"], Unit::Angle, true),
     Known::new("pitch_deg", &["pitch"], Unit::Angle, true),
     Known::new("yaw_deg", &["yaw", "heading", "azimuth"], Unit::Angle, true),
     Known::new("v_n_m_s", &["v_n", "vn", "v_north"], Unit::Speed, false),
     Known::new("v_e_m_s", &["v_e", "ve", "v_east"], Unit::Speed, false),
     Known::new("v_d_m_s", &["v_d", "vd", "v_down"], Unit::Speed, false),
-    Known { sign: -1.0, ..Known::new("v_d_m_s", &["v_u", "v_up"], Unit::Speed, false) },
+    Known {
+        sign: -1.0,
+        ..Known::new("v_d_m_s", &["v_u", "v_up"], Unit::Speed, false)
+    },
 ];
 const GEODETIC: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
 const LOCAL: [&str; 3] = ["n_m", "e_m", "d_m"];
@@ -78,11 +89,23 @@ impl Rows {
         attitude: Attitude,
     ) -> Self {
         let (velocities, doubts) = (Vec::new(), Vec::new());
-        Self { path: path.to_owned(), lines, samples, attitude, velocities, geodetic: false, doubts }
+        Self {
+            path: path.to_owned(),
+            lines,
+            samples,
+            attitude,
+            velocities,
+            geodetic: false,
+            doubts,
+        }
     }
 
     pub(super) fn doubt(&mut self, line: Option<u64>, message: impl Into<String>) {
-        self.doubts.push(Warning { path: self.path.clone(), line, message: message.into() });
+        self.doubts.push(Warning {
+            path: self.path.clone(),
+            line,
+            message: message.into(),
+        });
     }
 
     /// The trajectory through all rows, and what is doubtful about it. Every format comes through here, so that
@@ -112,9 +135,18 @@ impl Rows {
     /// Heights below the deepest trench and beyond a low orbit are no heights in metres; neither is what is
     /// not finite.
     fn check_heights(&self) -> Result<(), Error> {
-        let Some(bad) = self.samples.iter().position(|s| !HEIGHT.contains(&s.h)) else { return Ok(()) };
-        let message = format!("height {:?} m is not within −12 to 1000 km", self.samples[bad].h);
-        Err(self.refuse(bad, message, "is a value in the wrong column, or the row damaged?"))
+        let Some(bad) = self.samples.iter().position(|s| !HEIGHT.contains(&s.h)) else {
+            return Ok(());
+        };
+        let message = format!(
+            "height {:?} m is not within −12 to 1000 km",
+            self.samples[bad].h
+        );
+        Err(self.refuse(
+            bad,
+            message,
+            "is a value in the wrong column, or the row damaged?",
+        ))
     }
 
     /// Rows a minute apart are no trajectory of a vehicle, their time is in milliseconds; and one time stamp
@@ -139,7 +171,8 @@ impl Rows {
             return Ok(());
         }
         let (previous_s, t_s) = (self.samples[longest - 1].t_s, self.samples[longest].t_s);
-        let message = format!("time goes from {previous_s} s to {t_s} s, and may span a day at most");
+        let message =
+            format!("time goes from {previous_s} s to {t_s} s, and may span a day at most");
         Err(self.refuse(
             longest,
             message,
@@ -154,11 +187,17 @@ impl Rows {
     fn check_jumps(&self) -> Result<(), Error> {
         let place = |s: &TrajectorySample| geodetic_to_ecef(s.lat, s.lon, s.h);
         for (i, pair) in self.samples.windows(2).enumerate() {
-            let (metres, seconds) = (place(&pair[1]).distance(place(&pair[0])), pair[1].t_s - pair[0].t_s);
+            let (metres, seconds) = (
+                place(&pair[1]).distance(place(&pair[0])),
+                pair[1].t_s - pair[0].t_s,
+            );
             if seconds > 0.0 && metres > MAX_SPEED * seconds {
-                let message =
-                    format!("position jumps by {metres:.0} m in {} s", (seconds * 1e6).round() / 1e6);
-                let advice = "is a latitude swapped with a longitude, a sign lost, or a row damaged?";
+                let message = format!(
+                    "position jumps by {metres:.0} m in {} s",
+                    (seconds * 1e6).round() / 1e6
+                );
+                let advice =
+                    "is a latitude swapped with a longitude, a sign lost, or a row damaged?";
                 return Err(self.refuse(i + 1, message, advice));
             }
         }
@@ -177,7 +216,9 @@ pub(super) fn no_trajectory(path: &str, line: u64, source: &trajectory::Error) -
             "is an angle in the wrong column or unit? A vehicle that turns so fast needs more rows"
         }
         E::TooFew { .. } => "give at least four rows, one a second or more",
-        E::Latitude { .. } => "latitude and longitude cannot navigate at the poles; is a column swapped?",
+        E::Latitude { .. } => {
+            "latitude and longitude cannot navigate at the poles; is a column swapped?"
+        }
         E::NotFinite { .. } => return Error::contents(path, line, source.to_string()),
     };
     Error::contents(path, line, source.to_string()).advice(advice)
@@ -188,33 +229,62 @@ pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Res
     let columns = Columns::new(&table, &KNOWN)?;
     let any = |names: [&str; 3]| names.into_iter().any(|name| columns.has(name));
     let is_local = any(LOCAL) && !columns.has("lat_deg");
-    let optional = [ATTITUDE, VELOCITY].into_iter().filter(|names| any(*names)).flatten();
+    let optional = [ATTITUDE, VELOCITY]
+        .into_iter()
+        .filter(|names| any(*names))
+        .flatten();
     let position = if is_local { LOCAL } else { GEODETIC };
-    columns.require(&table, ["t_s"].into_iter().chain(position).chain(optional), COLUMNS)?;
+    columns.require(
+        &table,
+        ["t_s"].into_iter().chain(position).chain(optional),
+        COLUMNS,
+    )?;
     check_units(&table, &columns)?;
     let all = table.rows.len();
     match numbers {
         Numbers::Finite => check_ranges(&table, &columns)?,
-        Numbers::Any | Numbers::UpTo(_) => table
-            .rows
-            .retain(|row| row.1.iter().all(|x| x.is_finite()) && out_of_range(row, &columns).is_none()),
+        Numbers::Any | Numbers::UpTo(_) => table.rows.retain(|row| {
+            row.1.iter().all(|x| x.is_finite()) && out_of_range(row, &columns).is_none()
+        }),
     }
-    let attitude = if any(ATTITUDE) { Attitude::Given } else { Attitude::OfPath };
+    let attitude = if any(ATTITUDE) {
+        Attitude::Given
+    } else {
+        Attitude::OfPath
+    };
     let lines = table.rows.iter().map(|(line, _)| *line).collect();
-    let mut rows = Rows::new(&table.path, lines, samples(&table, &columns, options)?, attitude);
+    let mut rows = Rows::new(
+        &table.path,
+        lines,
+        samples(&table, &columns, options)?,
+        attitude,
+    );
     rows.geodetic = !is_local;
-    rows.velocities = columns
-        .three(VELOCITY)
-        .map_or_else(Vec::new, |velocity| table.rows.iter().map(|(_, row)| triad(velocity, row)).collect());
+    rows.velocities = columns.three(VELOCITY).map_or_else(Vec::new, |velocity| {
+        table
+            .rows
+            .iter()
+            .map(|(_, row)| triad(velocity, row))
+            .collect()
+    });
     if all > rows.lines.len() {
         let left_out = all - rows.lines.len();
-        rows.doubt(None, format!("{left_out} rows left out: values not finite, or out of range"));
+        rows.doubt(
+            None,
+            format!("{left_out} rows left out: values not finite, or out of range"),
+        );
     }
     if !columns.ignored.is_empty() {
-        rows.doubt(None, format!("columns not used: {}", columns.ignored.join(", ")));
+        rows.doubt(
+            None,
+            format!("columns not used: {}", columns.ignored.join(", ")),
+        );
     }
     if rows.attitude == Attitude::OfPath {
-        rows.doubt(None, "no attitude columns: heading and pitch follow the path, roll is 0");
+        rows.doubt(
+            None,
+            "no attitude columns: heading and pitch follow the path, roll is 0",
+        );
     }
     Ok(rows)
 }
@@ -222,36 +292,63 @@ pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Res
 /// Refuses angles of the attitude without a unit in their names, of which none is too large for radians.
 fn check_units(table: &Table, columns: &Columns) -> Result<(), Error> {
     let name = |column: Column| table.columns[column.index].to_lowercase();
-    let bare: Vec<Column> = (ATTITUDE.into_iter().filter_map(|quantity| columns.get(quantity)))
-        .filter(|column| !name(*column).ends_with("deg") && !name(*column).ends_with("rad"))
-        .collect();
-    let values = || bare.iter().flat_map(|column| table.rows.iter().map(|(_, row)| row[column.index].abs()));
+    let bare: Vec<Column> = (ATTITUDE
+        .into_iter()
+        .filter_map(|quantity| columns.get(quantity)))
+    .filter(|column| !name(*column).ends_with("deg") && !name(*column).ends_with("rad"))
+    .collect();
+    let values = || {
+        bare.iter()
+            .flat_map(|column| table.rows.iter().map(|(_, row)| row[column.index].abs()))
+    };
     let largest = values().filter(|x| x.is_finite()).fold(0.0, f64::max);
     if largest == 0.0 || largest > TAU {
         return Ok(()); // alike in both units, or degrees
     }
     let names: Vec<String> = bare.into_iter().map(name).collect();
-    let message = format!("the unit of {} is not in the name, and no value exceeds 2π", names.join(", "));
-    Err(Error::new(table.path.as_str(), table.header_line, Kind::Columns(message.into()))
-        .advice("end the names in _deg or _rad"))
+    let message = format!(
+        "the unit of {} is not in the name, and no value exceeds 2π",
+        names.join(", ")
+    );
+    Err(Error::new(
+        table.path.as_str(),
+        table.header_line,
+        Kind::Columns(message.into()),
+    )
+    .advice("end the names in _deg or _rad"))
 }
 
 fn triad(columns: [Column; 3], row: &[f64]) -> DVec3 {
     columns.map(|column| column.of(row)).into()
 }
 
-fn samples(table: &Table, columns: &Columns, options: &Options) -> Result<Vec<TrajectorySample>, Error> {
+fn samples(
+    table: &Table,
+    columns: &Columns,
+    options: &Options,
+) -> Result<Vec<TrajectorySample>, Error> {
     let (time, attitude) = (columns.get("t_s"), columns.three(ATTITUDE));
     let geodetic = columns.three(GEODETIC);
     let place = geodetic.or(columns.three(LOCAL));
-    let origin = if geodetic.is_some() { None } else { Some(origin(table, options)?) };
+    let origin = if geodetic.is_some() {
+        None
+    } else {
+        Some(origin(table, options)?)
+    };
     let sample = |(_, row): &(u64, Vec<f64>)| {
         let t_s = time.map_or(f64::NAN, |time| time.of(row));
-        let [roll, pitch, yaw] = attitude.map_or([0.0; 3], |columns| columns.map(|column| column.of(row)));
+        let [roll, pitch, yaw] =
+            attitude.map_or([0.0; 3], |columns| columns.map(|column| column.of(row)));
         let q_b_n = RollPitchYaw { roll, pitch, yaw }.to_quat();
         let place = place.map_or(DVec3::NAN, |columns| triad(columns, row));
         match origin {
-            None => TrajectorySample { t_s, lat: place.x, lon: place.y, h: place.z, q_b_n },
+            None => TrajectorySample {
+                t_s,
+                lat: place.x,
+                lon: place.y,
+                h: place.z,
+                q_b_n,
+            },
             Some(origin) => local(t_s, origin, place, q_b_n),
         }
     };
@@ -259,10 +356,21 @@ fn samples(table: &Table, columns: &Columns, options: &Options) -> Result<Vec<Tr
 }
 
 /// A sample given in the axes north, east, down of the origin.
-pub(super) fn local(t_s: f64, [lat0, lon0, h0]: [f64; 3], r_n0: DVec3, q_b_n0: DQuat) -> TrajectorySample {
+pub(super) fn local(
+    t_s: f64,
+    [lat0, lon0, h0]: [f64; 3],
+    r_n0: DVec3,
+    q_b_n0: DQuat,
+) -> TrajectorySample {
     let q_n0_e = q_e_n(lat0, lon0).inverse();
     let (lat, lon, h) = ecef_to_geodetic(geodetic_to_ecef(lat0, lon0, h0) + q_n0_e * r_n0);
-    TrajectorySample { t_s, lat, lon, h, q_b_n: q_e_n(lat, lon) * q_n0_e * q_b_n0 }
+    TrajectorySample {
+        t_s,
+        lat,
+        lon,
+        h,
+        q_b_n: q_e_n(lat, lon) * q_n0_e * q_b_n0,
+    }
 }
 
 /// The origin of local coordinates: the option, or the file's `# origin: lat, lon, h` line.
@@ -271,12 +379,13 @@ pub(super) fn origin(table: &Table, options: &Options) -> Result<[f64; 3], Error
         return Ok(origin);
     }
     let line = table.comments.iter().find_map(|c| c.strip_prefix("origin"));
-    line.and_then(|line| parse_origin(line.trim_start_matches([':', '=', ' ']))).ok_or_else(|| {
-        let message = "a trajectory in local coordinates needs an origin on the Earth";
-        Error::contents(table.path.as_str(), Place::Within, message)
-            .setting(Setting::Origin)
-            .advice("a first line \"# origin: LAT_DEG, LON_DEG, H_M\"")
-    })
+    line.and_then(|line| parse_origin(line.trim_start_matches([':', '=', ' '])))
+        .ok_or_else(|| {
+            let message = "a trajectory in local coordinates needs an origin on the Earth";
+            Error::contents(table.path.as_str(), Place::Within, message)
+                .setting(Setting::Origin)
+                .advice("a first line \"# origin: LAT_DEG, LON_DEG, H_M\"")
+        })
 }
 
 /// An origin as it is written, `LAT_DEG,LON_DEG,H_M`: latitude, longitude (rad), height (m).
@@ -308,19 +417,31 @@ fn out_of_range((_, row): &(u64, Vec<f64>), columns: &Columns) -> Option<(usize,
 }
 
 fn check_ranges(table: &Table, columns: &Columns) -> Result<(), Error> {
-    let found = table.rows.iter().find_map(|row| Some((row, out_of_range(row, columns)?)));
-    let Some(((line, row), (index, reason))) = found else { return Ok(()) };
+    let found = table
+        .rows
+        .iter()
+        .find_map(|row| Some((row, out_of_range(row, columns)?)));
+    let Some(((line, row), (index, reason))) = found else {
+        return Ok(());
+    };
     Err(table.cell(*line, index, &row[index].to_string(), reason))
 }
 
 /// Heading and pitch along the path; at rest between those before and after.
 pub(super) fn follow_path(samples: &mut [TrajectorySample]) {
-    let directions: Vec<Option<(f64, f64)>> = (0..samples.len()).map(|i| direction(samples, i)).collect();
-    let moving: Vec<usize> = (0..samples.len()).filter(|&i| directions[i].is_some()).collect();
+    let directions: Vec<Option<(f64, f64)>> =
+        (0..samples.len()).map(|i| direction(samples, i)).collect();
+    let moving: Vec<usize> = (0..samples.len())
+        .filter(|&i| directions[i].is_some())
+        .collect();
     for i in 0..samples.len() {
         let next = moving.partition_point(|&k| k < i);
         let after = moving.get(next).copied();
-        let before = if after == Some(i) { after } else { next.checked_sub(1).map(|k| moving[k]) };
+        let before = if after == Some(i) {
+            after
+        } else {
+            next.checked_sub(1).map(|k| moving[k])
+        };
         let share = match (before, after) {
             (Some(a), Some(b)) if b > a => {
                 (samples[i].t_s - samples[a].t_s) / (samples[b].t_s - samples[a].t_s)
@@ -328,11 +449,18 @@ pub(super) fn follow_path(samples: &mut [TrajectorySample]) {
             _ => 0.0,
         };
         let direction_of = |k: Option<usize>| k.and_then(|k| directions[k]);
-        let from = direction_of(before).or(direction_of(after)).unwrap_or_default();
+        let from = direction_of(before)
+            .or(direction_of(after))
+            .unwrap_or_default();
         let to = direction_of(after).unwrap_or(from);
         let yaw = from.0 + share * wrap_angle(to.0 - from.0);
         let pitch = from.1 + share * (to.1 - from.1);
-        samples[i].q_b_n = RollPitchYaw { roll: 0.0, pitch, yaw }.to_quat();
+        samples[i].q_b_n = RollPitchYaw {
+            roll: 0.0,
+            pitch,
+            yaw,
+        }
+        .to_quat();
     }
 }
 
@@ -341,7 +469,8 @@ pub(super) fn follow_path(samples: &mut [TrajectorySample]) {
 /// that at the row where the steps are unequal.
 fn direction(samples: &[TrajectorySample], i: usize) -> Option<(f64, f64)> {
     let position = |k: usize| geodetic_to_ecef(samples[k].lat, samples[k].lon, samples[k].h);
-    let slope = |a: usize, b: usize| (position(b) - position(a)) / (samples[b].t_s - samples[a].t_s);
+    let slope =
+        |a: usize, b: usize| (position(b) - position(a)) / (samples[b].t_s - samples[a].t_s);
     let velocity = if samples.len() < 3 {
         slope(0, samples.len() - 1)
     } else {
@@ -383,10 +512,20 @@ mod tests {
         ] {
             assert_eq!(classify(&KNOWN, name), Some((quantity, factor)), "{name}");
         }
-        for name in ["sd_roll_deg", "gnss", "e", "n", "roll_m", "lat_m", "t_deg", "v_n_deg"] {
+        for name in [
+            "sd_roll_deg",
+            "gnss",
+            "e",
+            "n",
+            "roll_m",
+            "lat_m",
+            "t_deg",
+            "v_n_deg",
+        ] {
             assert_eq!(classify(&KNOWN, name), None, "{name}");
         }
-        let own = |known: &Known| classify(&KNOWN, known.name).map(|(name, _)| name) == Some(known.name);
+        let own =
+            |known: &Known| classify(&KNOWN, known.name).map(|(name, _)| name) == Some(known.name);
         assert!(KNOWN.iter().all(own));
     }
 }

@@ -27,7 +27,9 @@ pub(in crate::formats) fn text(path: &Path) -> Result<String, Error> {
     let mut bytes = Vec::new();
     let io = |source| Error::io(path, source);
     open(path)?.read_to_end(&mut bytes).map_err(io)?;
-    Ok(source::without_mark(String::from_utf8_lossy(&bytes).into_owned()))
+    Ok(source::without_mark(
+        String::from_utf8_lossy(&bytes).into_owned(),
+    ))
 }
 
 /// Which numbers a table may hold.
@@ -58,7 +60,10 @@ impl Table {
         let (mut number, mut bytes) = (0, Vec::new());
         loop {
             bytes.clear();
-            let read = reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut bytes);
+            let read = reader
+                .by_ref()
+                .take(LONGEST_LINE)
+                .read_until(b'\n', &mut bytes);
             number += 1;
             match read.map_err(|source| Error::io(Path::new(path), source))? {
                 0 => break,
@@ -80,20 +85,32 @@ impl Table {
                 table.row(number, &cells(text, separator), numbers)?;
             }
         }
-        if table.rows.is_empty() { Err(no_rows(path)) } else { Ok(table) }
+        if table.rows.is_empty() {
+            Err(no_rows(path))
+        } else {
+            Ok(table)
+        }
     }
 
     /// A table of these columns, without rows yet.
     pub(in crate::formats) fn of_columns(path: &str, columns: &[&str]) -> Self {
         let columns = columns.iter().map(|&name| name.to_owned()).collect();
-        Self { path: path.to_owned(), header_line: 0, columns, comments: Vec::new(), rows: Vec::new() }
+        Self {
+            path: path.to_owned(),
+            header_line: 0,
+            columns,
+            comments: Vec::new(),
+            rows: Vec::new(),
+        }
     }
 
     fn header(&mut self, line: u64, cells: &[&str]) -> Result<(), Error> {
         if cells.iter().all(|c| c.parse::<f64>().is_ok()) {
             let found: String = cells.join(",").chars().take(60).collect();
             let message = format!("a header that names the columns is missing, found \"{found}\"");
-            return Err(Error::new(self.path.as_str(), line, Kind::Header(message.into())).advice(COLUMNS));
+            return Err(
+                Error::new(self.path.as_str(), line, Kind::Header(message.into())).advice(COLUMNS),
+            );
         }
         self.header_line = line;
         self.columns = cells.iter().map(|&c| c.to_owned()).collect();
@@ -114,8 +131,14 @@ impl Table {
             Numbers::UpTo(name) => self.columns.iter().position(|c| c == name),
             _ => None,
         };
-        let end = end.filter(|end| cells[*end..].iter().all(|cell| cell.is_empty())).unwrap_or(expected);
-        let mut values = cells[..end].iter().enumerate().map(number).collect::<Result<Vec<f64>, _>>()?;
+        let end = end
+            .filter(|end| cells[*end..].iter().all(|cell| cell.is_empty()))
+            .unwrap_or(expected);
+        let mut values = cells[..end]
+            .iter()
+            .enumerate()
+            .map(number)
+            .collect::<Result<Vec<f64>, _>>()?;
         values.resize(expected, f64::NAN);
         self.rows.push((line, values));
         Ok(())
@@ -125,13 +148,23 @@ impl Table {
     ///
     /// # Errors
     /// A name that is missing, or that two columns have.
-    pub(in crate::formats) fn named<const N: usize>(&self, names: [&str; N]) -> Result<[usize; N], Error> {
-        let refused =
-            |message: String| Error::new(self.path.as_str(), self.header_line, Kind::Columns(message.into()));
+    pub(in crate::formats) fn named<const N: usize>(
+        &self,
+        names: [&str; N],
+    ) -> Result<[usize; N], Error> {
+        let refused = |message: String| {
+            Error::new(
+                self.path.as_str(),
+                self.header_line,
+                Kind::Columns(message.into()),
+            )
+        };
         let mut found = [0; N];
         for (at, name) in found.iter_mut().zip(names) {
             let mut places = (0..self.columns.len()).filter(|i| self.columns[*i] == name);
-            *at = places.next().ok_or_else(|| refused(format!("no column is named \"{name}\"")))?;
+            *at = places
+                .next()
+                .ok_or_else(|| refused(format!("no column is named \"{name}\"")))?;
             if places.next().is_some() {
                 return Err(refused(format!("two columns are named \"{name}\"")));
             }
@@ -147,16 +180,22 @@ impl Table {
         value: &str,
         reason: &'static str,
     ) -> Error {
-        let (column, value) = (&self.columns[column], value.chars().take(40).collect::<String>());
+        let (column, value) = (
+            &self.columns[column],
+            value.chars().take(40).collect::<String>(),
+        );
         let error = Error::cell(&self.path, line, column, value, reason);
-        if column.contains("_deg") { error.advice(DEGREES) } else { error }
+        if column.contains("_deg") {
+            error.advice(DEGREES)
+        } else {
+            error
+        }
     }
 }
 
 /// Columns of a trajectory.
 pub(super) const COLUMNS: &str = "a trajectory has the columns t_s, lat_deg, lon_deg, h_m (or n_m, e_m, d_m) and may have roll_deg, pitch_deg, yaw_deg";
-const DEGREES: &str =
-    "degrees: latitude within ±89.9, longitude and yaw in (−180, 180] or [0, 360), pitch within ±90";
+const DEGREES: &str = "degrees: latitude within ±89.9, longitude and yaw in (−180, 180] or [0, 360), pitch within ±90";
 
 /// A file without rows.
 pub(super) fn no_rows(path: &str) -> Error {
@@ -164,12 +203,17 @@ pub(super) fn no_rows(path: &str) -> Error {
 }
 
 fn separator_of(header: &str) -> char {
-    [',', ';', '\t'].into_iter().find(|&s| header.contains(s)).unwrap_or(' ')
+    [',', ';', '\t']
+        .into_iter()
+        .find(|&s| header.contains(s))
+        .unwrap_or(' ')
 }
 
 fn cells(line: &str, separator: char) -> Vec<&str> {
     if separator == ' ' {
         return line.split_whitespace().collect();
     }
-    line.split(separator).map(|c| c.trim().trim_matches('"')).collect()
+    line.split(separator)
+        .map(|c| c.trim().trim_matches('"'))
+        .collect()
 }

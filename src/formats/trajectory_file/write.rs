@@ -40,7 +40,10 @@ impl Rows {
 pub(crate) fn write_csv(path: &Path, trajectory: &Trajectory, rows: Rows) -> Result<(), FileError> {
     let mut file = AtomicFile::create(path)?;
     let io = |e| FileError::io(path, e);
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
+    if path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("gz"))
+    {
         let mut packed = GzEncoder::new(&mut file, Compression::default());
         write_rows(&mut packed, trajectory, rows).map_err(io)?;
         packed.finish().map_err(io)?;
@@ -54,8 +57,15 @@ pub(crate) fn write_csv(path: &Path, trajectory: &Trajectory, rows: Rows) -> Res
 ///
 /// # Errors
 /// What the system says.
-pub(crate) fn write_rows(out: &mut impl Write, trajectory: &Trajectory, rows: Rows) -> io::Result<()> {
-    writeln!(out, "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg")?;
+pub(crate) fn write_rows(
+    out: &mut impl Write,
+    trajectory: &Trajectory,
+    rows: Rows,
+) -> io::Result<()> {
+    writeln!(
+        out,
+        "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg"
+    )?;
     for t_s in rows.times(trajectory) {
         let state = trajectory.state(t_s);
         let (v, rpy) = (state.v_n, RollPitchYaw::from_quat(state.q_b_n));
@@ -90,7 +100,8 @@ mod tests {
 
     #[test]
     fn numbers_are_tidy() {
-        let shown = [-0.0, 0.1 + 0.2, -1e-14, 45.000_000_000_000_01].map(|x| tidy(x, 9).to_string());
+        let shown =
+            [-0.0, 0.1 + 0.2, -1e-14, 45.000_000_000_000_01].map(|x| tidy(x, 9).to_string());
         assert_eq!(shown, ["0", "0.3", "0", "45"]);
     }
 }

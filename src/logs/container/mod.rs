@@ -65,7 +65,11 @@ impl Message {
     fn read(input: &mut Input, head: Head) -> Result<Self, Error> {
         let offset = input.offset();
         let data = input.bytes(head.size, LARGEST_MESSAGE)?;
-        Ok(Self { log_ns: head.log_ns, offset, data })
+        Ok(Self {
+            log_ns: head.log_ns,
+            offset,
+            data,
+        })
     }
 }
 

@@ -27,7 +27,11 @@ pub(crate) struct Reader<D> {
 
 impl<D: Dialect> Reader<D> {
     pub(crate) fn new(origin: &Origin, survey: &Survey, channel: u32) -> Result<Self, Error> {
-        let mut earliest_ns: Vec<i64> = survey.chunks.iter().map(|place| place.earliest_ns).collect();
+        let mut earliest_ns: Vec<i64> = survey
+            .chunks
+            .iter()
+            .map(|place| place.earliest_ns)
+            .collect();
         for k in (1..earliest_ns.len()).rev() {
             earliest_ns[k - 1] = earliest_ns[k - 1].min(earliest_ns[k]);
         }
@@ -50,8 +54,11 @@ impl<D: Dialect> Reader<D> {
 
     /// Reads a record, or a chunk of them.
     fn step(&mut self) -> Result<(), Error> {
-        let record =
-            if self.input.position() < self.end { self.dialect.record(&mut self.input)? } else { None };
+        let record = if self.input.position() < self.end {
+            self.dialect.record(&mut self.input)?
+        } else {
+            None
+        };
         match record {
             None => {
                 self.is_done = true;
@@ -65,7 +72,8 @@ impl<D: Dialect> Reader<D> {
             }
             Some(Record::Message(head)) => {
                 if self.keep(head) {
-                    self.waiting.push_back(Message::read(&mut self.input, head)?);
+                    self.waiting
+                        .push_back(Message::read(&mut self.input, head)?);
                     if !self.is_unordered {
                         self.release(self.earliest_to_come());
                     }
@@ -86,7 +94,10 @@ impl<D: Dialect> Reader<D> {
         if self.is_unordered {
             return i64::MIN;
         }
-        self.earliest_ns.get(self.chunks_read).copied().unwrap_or(i64::MAX)
+        self.earliest_ns
+            .get(self.chunks_read)
+            .copied()
+            .unwrap_or(i64::MAX)
     }
 
     fn unpack(&mut self, chunk: &Chunk) -> Result<(), Error> {
@@ -97,7 +108,9 @@ impl<D: Dialect> Reader<D> {
                     self.waiting.push_back(Message::read(&mut inside, head)?);
                 }
                 Record::Message(head) => inside.skip(head.size)?,
-                Record::Chunk(_) => return Err(Error::malformed(chunk.offset, "a chunk within a chunk")),
+                Record::Chunk(_) => {
+                    return Err(Error::malformed(chunk.offset, "a chunk within a chunk"));
+                }
                 _ => {}
             }
         }

@@ -33,7 +33,9 @@ pub(crate) struct Place {
 pub(crate) fn survey<D: Dialect>(origin: &Origin, on_damage: OnDamage) -> Result<Survey, Error> {
     let mut input = origin.open()?;
     let (mut dialect, mut survey) = (D::default(), Survey::default());
-    let outcome = survey.walk(&mut dialect, &mut input).and_then(|()| dialect.finish(&input));
+    let outcome = survey
+        .walk(&mut dialect, &mut input)
+        .and_then(|()| dialect.finish(&input));
     survey.settle(outcome, on_damage, &input)?;
     if survey.is_blind() {
         let outcome = survey.look_inside(&mut dialect, &mut input);
@@ -52,7 +54,11 @@ impl Survey {
         match outcome {
             Err(error) if on_damage == OnDamage::Recover && error.place().is_some() => {
                 let (read_bytes, file_bytes) = (self.end, input.length());
-                self.damage = Some(Damage { error, read_bytes, file_bytes });
+                self.damage = Some(Damage {
+                    error,
+                    read_bytes,
+                    file_bytes,
+                });
                 Ok(())
             }
             outcome => outcome,
@@ -67,7 +73,11 @@ impl Survey {
                 None => return Ok(()),
                 Some(Record::Chunk(chunk)) => {
                     input.skip(chunk.packed)?;
-                    self.chunks.push(Place { chunk, is_indexed: false, earliest_ns: i64::MAX });
+                    self.chunks.push(Place {
+                        chunk,
+                        is_indexed: false,
+                        earliest_ns: i64::MAX,
+                    });
                 }
                 Some(Record::Index(tally)) => {
                     if let Some(place) = self.chunks.last_mut() {
@@ -79,7 +89,11 @@ impl Survey {
                 Some(Record::Message(head)) => {
                     input.skip(head.size)?;
                     let tally = Tally::one(head.channel, head.log_ns);
-                    if self.tallies.get(&head.channel).is_some_and(|before| head.log_ns < before.last_ns) {
+                    if self
+                        .tallies
+                        .get(&head.channel)
+                        .is_some_and(|before| head.log_ns < before.last_ns)
+                    {
                         self.unordered.insert(head.channel);
                     }
                     self.count(tally);
@@ -91,7 +105,10 @@ impl Survey {
     }
 
     fn count(&mut self, more: Tally) {
-        let all = self.tallies.entry(more.channel).or_insert(Tally { messages: 0, ..more });
+        let all = self.tallies.entry(more.channel).or_insert(Tally {
+            messages: 0,
+            ..more
+        });
         all.messages = all.messages.saturating_add(more.messages);
         all.first_ns = all.first_ns.min(more.first_ns);
         all.last_ns = all.last_ns.max(more.last_ns);
@@ -109,7 +126,9 @@ impl Survey {
     /// Unpacks all chunks: counts the messages of those that have no index, and finds definitions.
     fn look_inside(&mut self, dialect: &mut impl Dialect, input: &mut Input) -> Result<(), Error> {
         for k in 0..self.chunks.len() {
-            let Place { chunk, is_indexed, .. } = &self.chunks[k];
+            let Place {
+                chunk, is_indexed, ..
+            } = &self.chunks[k];
             let (chunk, is_indexed) = (chunk.clone(), *is_indexed);
             if let Err(error) = self.look_inside_one(k, &chunk, is_indexed, dialect, input) {
                 // what comes behind a damaged chunk is not read
@@ -141,7 +160,9 @@ impl Survey {
                         place.earliest_ns = place.earliest_ns.min(head.log_ns);
                     }
                 }
-                Record::Chunk(_) => return Err(Error::malformed(chunk.offset, "a chunk within a chunk")),
+                Record::Chunk(_) => {
+                    return Err(Error::malformed(chunk.offset, "a chunk within a chunk"));
+                }
                 Record::Index(_) | Record::Other => {}
             }
         }
@@ -151,6 +172,11 @@ impl Survey {
 
 impl Tally {
     const fn one(channel: u32, log_ns: i64) -> Self {
-        Self { channel, messages: 1, first_ns: log_ns, last_ns: log_ns }
+        Self {
+            channel,
+            messages: 1,
+            first_ns: log_ns,
+            last_ns: log_ns,
+        }
     }
 }

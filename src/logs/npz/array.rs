@@ -58,13 +58,19 @@ impl Number {
 
 /// Reads an array that has so many bytes with its header.
 pub(super) fn read(from: &mut impl Read, size: u64, offset: u64) -> Result<Array, Error> {
-    let fault = |error: io::Error| Error::malformed(offset, format!("an array cannot be unpacked: {error}"));
+    let fault = |error: io::Error| {
+        Error::malformed(offset, format!("an array cannot be unpacked: {error}"))
+    };
     let (text, header_bytes) = header_text(from).map_err(fault)?;
     let header = Header::parse(&text, offset)?;
-    let count = header.shape.iter().try_fold(1_usize, |count, n| count.checked_mul(*n));
+    let count = header
+        .shape
+        .iter()
+        .try_fold(1_usize, |count, n| count.checked_mul(*n));
     let bytes = count.and_then(|count| count.checked_mul(header.number.size()));
-    let Some((count, bytes)) =
-        count.zip(bytes).filter(|(_, bytes)| *bytes as u64 == size.saturating_sub(header_bytes))
+    let Some((count, bytes)) = count
+        .zip(bytes)
+        .filter(|(_, bytes)| *bytes as u64 == size.saturating_sub(header_bytes))
     else {
         return Err(Error::malformed(
             offset,
@@ -85,7 +91,10 @@ pub(super) fn read(from: &mut impl Read, size: u64, offset: u64) -> Result<Array
     if header.is_fortran {
         values = transposed(&values, &header.shape);
     }
-    Ok(Array { shape: header.shape, values })
+    Ok(Array {
+        shape: header.shape,
+        values,
+    })
 }
 
 /// The header's text, and the bytes up to its end.
@@ -115,15 +124,32 @@ impl Header {
     /// The dictionary `{'descr': '<f8', 'fortran_order': False, 'shape': (40, 3), }`.
     fn parse(text: &str, offset: u64) -> Result<Self, Error> {
         let value = |key: &str| Some(text.split_once(key)?.1.trim_start_matches([' ', ':']));
-        let fault =
-            || Error::malformed(offset, format!("the header of an array does not parse: {}", text.trim()));
+        let fault = || {
+            Error::malformed(
+                offset,
+                format!("the header of an array does not parse: {}", text.trim()),
+            )
+        };
         let kind = value("'descr'").ok_or_else(fault)?;
-        let (order, number) = number(kind).ok_or_else(|| Error::encoding(offset, kind.as_bytes()))?;
-        let shape = value("'shape'").and_then(|v| v.strip_prefix('(')?.split_once(')')).ok_or_else(fault)?.0;
+        let (order, number) =
+            number(kind).ok_or_else(|| Error::encoding(offset, kind.as_bytes()))?;
+        let shape = value("'shape'")
+            .and_then(|v| v.strip_prefix('(')?.split_once(')'))
+            .ok_or_else(fault)?
+            .0;
         let lengths = shape.split(',').map(str::trim).filter(|n| !n.is_empty());
-        let shape = lengths.map(|n| n.parse().map_err(|_| fault())).collect::<Result<_, _>>()?;
-        let is_fortran = value("'fortran_order'").ok_or_else(fault)?.starts_with("True");
-        Ok(Self { number, order, shape, is_fortran })
+        let shape = lengths
+            .map(|n| n.parse().map_err(|_| fault()))
+            .collect::<Result<_, _>>()?;
+        let is_fortran = value("'fortran_order'")
+            .ok_or_else(fault)?
+            .starts_with("True");
+        Ok(Self {
+            number,
+            order,
+            shape,
+            is_fortran,
+        })
     }
 }
 
@@ -131,7 +157,11 @@ impl Header {
 fn number(text: &str) -> Option<(Order, Number)> {
     let code = text.strip_prefix('\'')?.split_once('\'')?.0;
     let mut characters = code.chars();
-    let order = if characters.next()? == '>' { Order::Big } else { Order::Little };
+    let order = if characters.next()? == '>' {
+        Order::Big
+    } else {
+        Order::Little
+    };
     let kind = characters.next()?;
     let size = characters.as_str().parse().ok()?;
     let number = match (kind, size) {

@@ -29,12 +29,18 @@ impl Entry {
     /// Byte of its data, behind a header of its own; the input stands there.
     pub(super) fn data_offset(&self, input: &mut Input) -> Result<u64, Error> {
         if self.offset > input.length() {
-            return Err(Error::malformed(self.offset, "an entry lies beyond the end of the archive"));
+            return Err(Error::malformed(
+                self.offset,
+                "an entry lies beyond the end of the archive",
+            ));
         }
         input.seek(self.offset)?;
         let header: [u8; 30] = input.array()?;
         if !header.starts_with(b"PK\x03\x04") {
-            return Err(Error::malformed(self.offset, "no entry where the directory has one"));
+            return Err(Error::malformed(
+                self.offset,
+                "no entry where the directory has one",
+            ));
         }
         let length = |at: usize| u64::from(u16::from_le_bytes([header[at], header[at + 1]]));
         input.skip(length(26) + length(28))?;
@@ -69,8 +75,13 @@ fn directory(input: &mut Input) -> Result<(u64, u64), Error> {
     let start = length.saturating_sub(END + LONGEST_COMMENT);
     input.seek(start)?;
     let tail = input.bytes(length - start, END + LONGEST_COMMENT)?;
-    let missing = || Error::StillWritten { place: Place::byte(length) };
-    let at = tail.windows(4).rposition(|w| w == b"PK\x05\x06").ok_or_else(missing)?;
+    let missing = || Error::StillWritten {
+        place: Place::byte(length),
+    };
+    let at = tail
+        .windows(4)
+        .rposition(|w| w == b"PK\x05\x06")
+        .ok_or_else(missing)?;
     let mut bytes = Bytes::little(&tail[at + 4..]);
     let mut parse = || {
         bytes.take(8)?;
@@ -81,8 +92,13 @@ fn directory(input: &mut Input) -> Result<(u64, u64), Error> {
         return Ok((offset.into(), size.into()));
     }
     // the locator of the longer record stands before this one
-    let locator = at.checked_sub(20).map(|from| &tail[from..at]).filter(|l| l.starts_with(b"PK\x06\x07"));
-    let place = locator.and_then(|l| Bytes::little(&l[8..]).u64()).ok_or_else(missing)?;
+    let locator = at
+        .checked_sub(20)
+        .map(|from| &tail[from..at])
+        .filter(|l| l.starts_with(b"PK\x06\x07"));
+    let place = locator
+        .and_then(|l| Bytes::little(&l[8..]).u64())
+        .ok_or_else(missing)?;
     input.seek(place.min(length))?;
     let long: [u8; 56] = input.array()?;
     let mut bytes = Bytes::little(&long[40..]);
@@ -106,10 +122,21 @@ fn entry(bytes: &mut Bytes<'_>) -> Option<Entry> {
     // what does not fit 32 bits stands in the extra field, in this order
     let mut long = long_sizes(extra);
     let mut size = |short: u32| {
-        if short == u32::MAX { long.as_mut().and_then(Bytes::u64).unwrap_or(u64::MAX) } else { short.into() }
+        if short == u32::MAX {
+            long.as_mut().and_then(Bytes::u64).unwrap_or(u64::MAX)
+        } else {
+            short.into()
+        }
     };
     let (unpacked, packed, offset) = (size(unpacked), size(packed), size(offset));
-    Some(Entry { name, method, crc, packed, unpacked, offset })
+    Some(Entry {
+        name,
+        method,
+        crc,
+        packed,
+        unpacked,
+        offset,
+    })
 }
 
 /// The extra field of sizes of 64 bits.

@@ -68,17 +68,25 @@ impl Archive {
     /// # Errors
     /// When there is none of that name, or it is damaged or not of numbers.
     pub fn read(&self, name: &str) -> Result<Array, Error> {
-        let entry = self.entries.iter().find(|entry| entry.name == name).ok_or_else(|| Error::NoTopic {
-            what: format!("the name {name}"),
-            topics: self.names().map(str::to_owned).collect(),
-        })?;
+        let entry = self
+            .entries
+            .iter()
+            .find(|entry| entry.name == name)
+            .ok_or_else(|| Error::NoTopic {
+                what: format!("the name {name}"),
+                topics: self.names().map(str::to_owned).collect(),
+            })?;
         self.array(entry).map_err(|error| error.of_topic(name))
     }
 
     fn array(&self, entry: &Entry) -> Result<Array, Error> {
         if entry.unpacked > LARGEST_ARRAY {
             let (bytes, limit) = (entry.unpacked, LARGEST_ARRAY);
-            return Err(Error::TooLarge { place: Place::byte(entry.offset), bytes, limit });
+            return Err(Error::TooLarge {
+                place: Place::byte(entry.offset),
+                bytes,
+                limit,
+            });
         }
         let mut input = self.origin.open()?;
         let offset = entry.data_offset(&mut input)?;
@@ -87,20 +95,30 @@ impl Archive {
         match entry.method {
             directory::STORED => checked(packed, entry, offset),
             directory::DEFLATED => checked(DeflateDecoder::new(packed), entry, offset),
-            other => Err(Error::encoding(offset, format!("zip method {other}").as_bytes())),
+            other => Err(Error::encoding(
+                offset,
+                format!("zip method {other}").as_bytes(),
+            )),
         }
     }
 }
 
 /// Reads an array, and checks the CRC of all its bytes.
 fn checked(unpacked: impl Read, entry: &Entry, offset: u64) -> Result<Array, Error> {
-    let mut summed = Summed { inner: unpacked.take(entry.unpacked), crc: crc32fast::Hasher::new() };
+    let mut summed = Summed {
+        inner: unpacked.take(entry.unpacked),
+        crc: crc32fast::Hasher::new(),
+    };
     let array = array::read(&mut summed, entry.unpacked, offset)?;
     let (stored, computed) = (entry.crc, summed.crc.finalize());
     if stored == computed {
         Ok(array)
     } else {
-        Err(Error::Crc { place: Place::byte(offset), stored, computed })
+        Err(Error::Crc {
+            place: Place::byte(offset),
+            stored,
+            computed,
+        })
     }
 }
 

@@ -37,37 +37,65 @@ fn body<'a>(encoding: &str, message: &'a Message, stamp: Stamp) -> Result<Body<'
         Some(header_ns)
     };
     let header_ns = header().ok_or_else(|| short(message))?;
-    Ok(Body { bytes, stamp_ns: if stamp == Stamp::Log { message.log_ns } else { header_ns } })
+    Ok(Body {
+        bytes,
+        stamp_ns: if stamp == Stamp::Log {
+            message.log_ns
+        } else {
+            header_ns
+        },
+    })
 }
 
 /// Common Data Representation (OMG DDSI-RTPS 2.3, 10.2): the order of bytes, then numbers that are aligned from there
 /// on; in its second version to 4 bytes at most.
 fn cdr(message: &Message) -> Result<Bytes<'_>, Error> {
-    let (head, rest) = message.data.split_at_checked(4).ok_or_else(|| short(message))?;
+    let (head, rest) = message
+        .data
+        .split_at_checked(4)
+        .ok_or_else(|| short(message))?;
     let (order, most) = match head[..2] {
         [0, 0] => (Order::Big, 8),
         [0, 1] => (Order::Little, 8),
         [0, 6] => (Order::Big, 4),
         [0, 7] => (Order::Little, 4),
-        _ => return Err(Error::encoding(message.offset, format!("CDR {:02x?}", &head[..2]).as_bytes())),
+        _ => {
+            return Err(Error::encoding(
+                message.offset,
+                format!("CDR {:02x?}", &head[..2]).as_bytes(),
+            ));
+        }
     };
     Ok(Bytes::new(rest, order, Alignment::UpTo(most)))
 }
 
 fn short(message: &Message) -> Error {
-    Error::malformed(message.offset, format!("a message of {} bytes is too short", message.data.len()))
+    Error::malformed(
+        message.offset,
+        format!("a message of {} bytes is too short", message.data.len()),
+    )
 }
 
 /// A sample of `sensor_msgs/Imu`: the orientation and the covariances are passed over.
-pub(crate) fn imu(encoding: &str, message: &Message, stamp: Stamp) -> Result<Option<ImuSample>, Error> {
-    let Body { mut bytes, stamp_ns } = body(encoding, message, stamp)?;
+pub(crate) fn imu(
+    encoding: &str,
+    message: &Message,
+    stamp: Stamp,
+) -> Result<Option<ImuSample>, Error> {
+    let Body {
+        mut bytes,
+        stamp_ns,
+    } = body(encoding, message, stamp)?;
     let mut motion = || {
         bytes.skip_f64s(4 + 9)?;
         let gyro_rad_s = bytes.f64s()?;
         bytes.skip_f64s(9)?;
         let accel_m_s2 = bytes.f64s()?;
         bytes.skip_f64s(9)?;
-        Some(Motion::Rates { accel_m_s2, gyro_rad_s })
+        Some(Motion::Rates {
+            accel_m_s2,
+            gyro_rad_s,
+        })
     };
     let motion = motion().ok_or_else(|| short(message))?;
     Ok(Some(ImuSample { stamp_ns, motion }))
@@ -75,7 +103,10 @@ pub(crate) fn imu(encoding: &str, message: &Message, stamp: Stamp) -> Result<Opt
 
 /// A fix of `sensor_msgs/NavSatFix`; none where its status is below 0.
 pub(crate) fn fix(encoding: &str, message: &Message, stamp: Stamp) -> Result<Option<Fix>, Error> {
-    let Body { mut bytes, stamp_ns } = body(encoding, message, stamp)?;
+    let Body {
+        mut bytes,
+        stamp_ns,
+    } = body(encoding, message, stamp)?;
     let mut rest = || {
         let status = bytes.u8()?.cast_signed();
         bytes.u16()?;
@@ -85,9 +116,22 @@ pub(crate) fn fix(encoding: &str, message: &Message, stamp: Stamp) -> Result<Opt
         rest().ok_or_else(|| short(message))?;
     // the covariance is that of east, north, up (m²); type 0 is unknown
     let sd = [covariance[4], covariance[0], covariance[8]].map(f64::sqrt);
-    let sd_ned_m = if covariance_type == 0 { None } else { stated(sd) };
+    let sd_ned_m = if covariance_type == 0 {
+        None
+    } else {
+        stated(sd)
+    };
     let (gps_tow_ms, v_ned_m_s, sd_v_ned_m_s) = (None, None, None);
-    let fix = Fix { stamp_ns, gps_tow_ms, lat_deg, lon_deg, h_m, sd_ned_m, v_ned_m_s, sd_v_ned_m_s };
+    let fix = Fix {
+        stamp_ns,
+        gps_tow_ms,
+        lat_deg,
+        lon_deg,
+        h_m,
+        sd_ned_m,
+        v_ned_m_s,
+        sd_v_ned_m_s,
+    };
     let is_place = [lat_deg, lon_deg, h_m].iter().all(|v| v.is_finite());
     Ok((status >= 0 && is_place).then_some(fix))
 }

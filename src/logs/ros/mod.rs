@@ -12,7 +12,10 @@ use crate::stream::{OnDamage, Stream};
 use std::marker::PhantomData;
 
 /// Opens a container.
-pub(crate) fn open<D: Dialect + Sync>(origin: Origin, on_damage: OnDamage) -> Result<Opened, Error> {
+pub(crate) fn open<D: Dialect + Sync>(
+    origin: Origin,
+    on_damage: OnDamage,
+) -> Result<Opened, Error> {
     let mut survey = survey::<D>(&origin, on_damage)?;
     let channel = |(id, definition): (&u32, &crate::container::Definition)| {
         let content = messages::content(&definition.type_name);
@@ -26,7 +29,15 @@ pub(crate) fn open<D: Dialect + Sync>(origin: Origin, on_damage: OnDamage) -> Re
     let mut channels: Vec<Channel> = survey.definitions.iter().map(channel).collect();
     channels.sort_by(|a, b| a.topic.cmp(&b.topic));
     let damage = survey.damage.take();
-    Ok(Opened { channels, damage, format: Box::new(Ros::<D> { origin, survey, dialect: PhantomData }) })
+    Ok(Opened {
+        channels,
+        damage,
+        format: Box::new(Ros::<D> {
+            origin,
+            survey,
+            dialect: PhantomData,
+        }),
+    })
 }
 
 /// A container that was surveyed.
@@ -50,8 +61,8 @@ impl<D: Dialect> Ros<D> {
         let encoding = definition.map(|d| d.encoding.clone()).unwrap_or_default();
         let reader = Reader::<D>::new(&self.origin, &self.survey, channel.id)?;
         Ok(Box::new(reader.filter_map(move |message| {
-            let decoded =
-                message.and_then(|m| Ok(decode(&encoding, &m, stamp)?.map(|sample| (m.offset, sample))));
+            let decoded = message
+                .and_then(|m| Ok(decode(&encoding, &m, stamp)?.map(|sample| (m.offset, sample))));
             decoded.transpose()
         })))
     }

@@ -1,19 +1,34 @@
 //! Damaged logs: an error with its place, or what stands before the damage, and never a panic.
 
 #![allow(clippy::unwrap_used, reason = "a test")]
-#![cfg(all(feature = "mcap", feature = "bag", feature = "ulog", feature = "ubx", feature = "npz"))]
+#![cfg(all(
+    feature = "mcap",
+    feature = "bag",
+    feature = "ulog",
+    feature = "ubx",
+    feature = "npz"
+))]
 
 use nav_sim_logs::{Error, Log, OnDamage, Stamp, fuzz};
 use std::path::PathBuf;
 
 fn bytes(name: &str) -> Vec<u8> {
-    std::fs::read([env!("CARGO_MANIFEST_DIR"), "tests", "data", name].iter().collect::<PathBuf>()).unwrap()
+    std::fs::read(
+        [env!("CARGO_MANIFEST_DIR"), "tests", "data", name]
+            .iter()
+            .collect::<PathBuf>(),
+    )
+    .unwrap()
 }
 
 fn refused(bytes: &[u8]) -> Error {
     match Log::from_bytes(bytes, OnDamage::Refuse) {
         Err(error) => error,
-        Ok(log) => log.imu(None, Stamp::Header).unwrap().find_map(Result::err).unwrap(),
+        Ok(log) => log
+            .imu(None, Stamp::Header)
+            .unwrap()
+            .find_map(Result::err)
+            .unwrap(),
     }
 }
 
@@ -85,7 +100,10 @@ fn a_truncated_file_is_refused_or_read_up_to_there() {
         let most_of_it = all.len() * 3 / 4;
         for end in [most_of_it, most_of_it + 1, all.len() - 1] {
             let error = refused(&all[..end]);
-            assert!(matches!(error, Error::Truncated { .. } | Error::StillWritten { .. }), "{file}: {error}");
+            assert!(
+                matches!(error, Error::Truncated { .. } | Error::StillWritten { .. }),
+                "{file}: {error}"
+            );
             assert!(error.place().unwrap().offset <= end as u64 && error.hint().is_some());
             let (count, read) = recovered(&all[..end]);
             assert!(
@@ -102,12 +120,18 @@ fn a_file_without_its_end_is_still_being_written() {
     let all = bytes("ros2_unchunked.mcap");
     // records: a kind, a length, a body; the magic bytes come before the first
     let mut ends = vec![8];
-    while let Some(head) = all.get(ends[ends.len() - 1] + 1..).and_then(|rest| rest.first_chunk()) {
+    while let Some(head) = all
+        .get(ends[ends.len() - 1] + 1..)
+        .and_then(|rest| rest.first_chunk())
+    {
         ends.push(ends[ends.len() - 1] + 9 + u64::from_le_bytes(*head) as usize);
     }
     for end in &ends[4..8] {
         let error = refused(&all[..*end]);
-        assert!(matches!(&error, Error::StillWritten { place } if place.offset == *end as u64), "{error}");
+        assert!(
+            matches!(&error, Error::StillWritten { place } if place.offset == *end as u64),
+            "{error}"
+        );
     }
     // a bag whose writer has not gone back to its start
     let mut bag = bytes("ros1_none.bag");
@@ -122,49 +146,77 @@ fn a_changed_chunk_fails_its_crc_and_what_stands_before_it_is_read() {
     // not packed: the change is in a message, where nothing but the CRC can tell
     let mut all = bytes("ros2_indexless.mcap");
     let frame = b"imu_link";
-    let places: Vec<usize> = (0..all.len() - 8).filter(|k| &all[*k..k + 8] == frame).collect();
+    let places: Vec<usize> = (0..all.len() - 8)
+        .filter(|k| &all[*k..k + 8] == frame)
+        .collect();
     all[places[11] + 60] ^= 1;
     assert!(matches!(refused(&all), Error::Crc { .. }));
     let (count, read) = recovered(&all);
-    assert!((1..12).contains(&count) && read < places[11] as u64, "{count} samples, {read} bytes");
+    assert!(
+        (1..12).contains(&count) && read < places[11] as u64,
+        "{count} samples, {read} bytes"
+    );
 }
 
 #[test]
 fn time_that_goes_back_is_refused() {
     // the seconds of the header of the eighth sample
     let mut all = bytes("ros2_unchunked.mcap");
-    let places: Vec<usize> = (0..all.len() - 8).filter(|k| &all[*k..k + 8] == b"imu_link").collect();
+    let places: Vec<usize> = (0..all.len() - 8)
+        .filter(|k| &all[*k..k + 8] == b"imu_link")
+        .collect();
     let seconds = places[7] - 12;
     assert_eq!(all[seconds..seconds + 4], 1_764_000_000_u32.to_le_bytes());
     all[seconds..seconds + 4].copy_from_slice(&1_763_999_999_u32.to_le_bytes());
     let error = refused(&all);
     let text = error.to_string();
     assert!(
-        text.ends_with("topic /imu: time goes back from 1764000000.310000000 s to 1763999999.320000000 s"),
+        text.ends_with(
+            "topic /imu: time goes back from 1764000000.310000000 s to 1763999999.320000000 s"
+        ),
         "{text}"
     );
     assert_eq!(recovered(&all).0, 7);
     // the arrivals are in order
     let log = Log::from_bytes(all, OnDamage::Refuse).unwrap();
-    assert_eq!(log.imu(None, Stamp::Log).unwrap().filter(Result::is_ok).count(), 12);
+    assert_eq!(
+        log.imu(None, Stamp::Log)
+            .unwrap()
+            .filter(Result::is_ok)
+            .count(),
+        12
+    );
 }
 
 #[test]
 fn lengths_and_encodings_are_checked_before_anything_is_unpacked() {
     let all = bytes("ros2_zstd.mcap");
     // the chunk: kind, length, two times, then the length it unpacks to
-    let at = all.windows(8).position(|w| w == [4, 0, 0, 0, b'z', b's', b't', b'd']).unwrap();
+    let at = all
+        .windows(8)
+        .position(|w| w == [4, 0, 0, 0, b'z', b's', b't', b'd'])
+        .unwrap();
     let mut large = all.clone();
     large[at - 12..at - 4].copy_from_slice(&(2_u64 << 30).to_le_bytes());
     let error = refused(&large);
-    assert!(matches!(error, Error::TooLarge { bytes, .. } if bytes == 2 << 30), "{error}");
+    assert!(
+        matches!(error, Error::TooLarge { bytes, .. } if bytes == 2 << 30),
+        "{error}"
+    );
     let mut unknown = all;
     unknown[at + 7] = b'x';
-    assert!(refused(&unknown).to_string().ends_with("topic /imu: unknown encoding \"zstx\""));
+    assert!(
+        refused(&unknown)
+            .to_string()
+            .ends_with("topic /imu: unknown encoding \"zstx\"")
+    );
     assert!(matches!(refused(b"#ROSBAG V1.2\n"), Error::Encoding { .. }));
     // a message of 2 GB in a file that is that long is refused, in a shorter one it is cut off
     let mut bag = bytes("ros1_none.bag");
-    let at = bag.windows(16).position(|w| w == b"compression=none").unwrap();
+    let at = bag
+        .windows(16)
+        .position(|w| w == b"compression=none")
+        .unwrap();
     let size = bag[at..].windows(5).position(|w| w == b"size=").unwrap() + at + 9;
     bag[size..size + 4].copy_from_slice(&(2_u32 << 30).to_le_bytes());
     assert!(matches!(refused(&bag), Error::Truncated { needed, .. } if needed == 2 << 30));
@@ -175,17 +227,32 @@ fn what_is_no_message_of_a_receiver_is_passed_over() {
     let all = bytes("ublox.ubx");
     let count = |bytes: &[u8]| {
         let log = Log::from_bytes(bytes, OnDamage::Refuse).unwrap();
-        let fixes = log.fixes(None, Stamp::Header).unwrap().map(Result::unwrap).count();
-        let failed =
-            log.channels().iter().find(|c| c.type_name == "checksum failed").map_or(0, |c| c.messages);
+        let fixes = log
+            .fixes(None, Stamp::Header)
+            .unwrap()
+            .map(Result::unwrap)
+            .count();
+        let failed = log
+            .channels()
+            .iter()
+            .find(|c| c.type_name == "checksum failed")
+            .map_or(0, |c| c.messages);
         (fixes, failed)
     };
     assert_eq!(count(&all), (8, 0));
     // a start of a message that is none, just before one; a message that is cut off
-    let noise = [b"\xb5\x62\xb5\x62\x01", all.as_slice(), b"\xb5\x62\x01\x07\x5c\0\x01"].concat();
+    let noise = [
+        b"\xb5\x62\xb5\x62\x01",
+        all.as_slice(),
+        b"\xb5\x62\x01\x07\x5c\0\x01",
+    ]
+    .concat();
     assert_eq!(count(&noise).0, 8);
     let mut changed = all;
-    let first = changed.windows(4).position(|w| w == [0xb5, 0x62, 1, 7]).unwrap();
+    let first = changed
+        .windows(4)
+        .position(|w| w == [0xb5, 0x62, 1, 7])
+        .unwrap();
     changed[first + 40] ^= 1;
     assert_eq!(count(&changed), (7, 1));
 }

@@ -88,7 +88,9 @@ impl Layout {
         for (type_name, count, field) in fields(formats.get(name)?) {
             let size = match Number::new(type_name) {
                 Some(number) => {
-                    layout.fields.insert(field.to_owned(), Field { at, number, count });
+                    layout
+                        .fields
+                        .insert(field.to_owned(), Field { at, number, count });
                     number.size()
                 }
                 None => size_of_format(type_name, formats, 0)?,
@@ -100,12 +102,18 @@ impl Layout {
 
     /// A field of one number.
     pub(super) fn one(&self, name: &str) -> Option<Field> {
-        self.fields.get(name).filter(|field| field.count == 1).copied()
+        self.fields
+            .get(name)
+            .filter(|field| field.count == 1)
+            .copied()
     }
 
     /// A field of three numbers.
     pub(super) fn three(&self, name: &str) -> Option<Field> {
-        self.fields.get(name).filter(|field| field.count == 3).copied()
+        self.fields
+            .get(name)
+            .filter(|field| field.count == 3)
+            .copied()
     }
 
     /// Time of a message (µs in it) (ns).
@@ -160,7 +168,9 @@ impl Field {
 
     /// Time (µs in the message) (ns); none beyond what can be a time.
     pub(super) fn time_ns(self, message: &[u8]) -> Option<i64> {
-        let Number::U64 = self.number else { return None };
+        let Number::U64 = self.number else {
+            return None;
+        };
         let us = Bytes::little(message.get(self.at..)?).u64()?;
         i64::try_from(us).ok()?.checked_mul(1000)
     }

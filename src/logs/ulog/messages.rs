@@ -37,7 +37,13 @@ impl Messages {
         // version and time of the start
         input.skip(9)?;
         let end = input.position();
-        Ok(Self { input, formats: Formats::new(), subscriptions: HashMap::new(), appended: Vec::new(), end })
+        Ok(Self {
+            input,
+            formats: Formats::new(),
+            subscriptions: HashMap::new(),
+            appended: Vec::new(),
+            end,
+        })
     }
 
     pub(super) const fn end(&self) -> u64 {
@@ -73,7 +79,10 @@ impl Messages {
             }
             let size = u64::from(size);
             let Some(rest) = size.checked_sub(2) else {
-                return Err(Error::malformed(offset, "a message of a topic without a number"));
+                return Err(Error::malformed(
+                    offset,
+                    "a message of a topic without a number",
+                ));
             };
             let id = u32::from(self.input.u16()?);
             if only.is_none_or(|only| only == id) {
@@ -86,7 +95,9 @@ impl Messages {
 
     /// The last message before appended data may be cut off: goes on at that data.
     fn is_cut_at_appended(&mut self, offset: u64) -> Result<bool, Error> {
-        let Some(next) = self.appended.last().copied() else { return Ok(false) };
+        let Some(next) = self.appended.last().copied() else {
+            return Ok(false);
+        };
         if offset >= next {
             self.appended.pop();
             return Ok(false);
@@ -108,7 +119,12 @@ impl Messages {
             return self.input.skip(size.into());
         }
         let body = self.input.bytes(size.into(), size.into())?;
-        let fault = || Error::malformed(offset, format!("message {:?} does not parse", char::from(kind)));
+        let fault = || {
+            Error::malformed(
+                offset,
+                format!("message {:?} does not parse", char::from(kind)),
+            )
+        };
         match kind {
             b'F' => {
                 let format = text(&body);
@@ -117,7 +133,10 @@ impl Messages {
             }
             b'A' => {
                 let mut bytes = Bytes::little(&body);
-                let (instance, id) = (bytes.u8().ok_or_else(fault)?, bytes.u16().ok_or_else(fault)?);
+                let (instance, id) = (
+                    bytes.u8().ok_or_else(fault)?,
+                    bytes.u16().ok_or_else(fault)?,
+                );
                 self.subscriptions.insert(id, (text(&body[3..]), instance));
             }
             _ => self.flags(&body, offset).ok_or_else(fault)??,
@@ -131,7 +150,10 @@ impl Messages {
         bytes.take(8)?;
         let incompatible = bytes.take(8)?;
         if incompatible[0] & !APPENDED != 0 || incompatible[1..].iter().any(|flags| *flags != 0) {
-            return Some(Err(Error::encoding(offset, format!("ULog flags {incompatible:02x?}").as_bytes())));
+            return Some(Err(Error::encoding(
+                offset,
+                format!("ULog flags {incompatible:02x?}").as_bytes(),
+            )));
         }
         if incompatible[0] & APPENDED != 0 {
             let offsets = [bytes.u64()?, bytes.u64()?, bytes.u64()?];

@@ -28,15 +28,27 @@ pub(crate) fn open(origin: Origin, on_damage: OnDamage) -> Result<Opened, Error>
     let outcome = survey(&mut messages, &mut topics);
     let damage = match outcome {
         Ok(()) => None,
-        Err(error) if on_damage == OnDamage::Recover && error.place().is_some() => {
-            Some(Damage { error, read_bytes: messages.end(), file_bytes: messages.length() })
-        }
+        Err(error) if on_damage == OnDamage::Recover && error.place().is_some() => Some(Damage {
+            error,
+            read_bytes: messages.end(),
+            file_bytes: messages.length(),
+        }),
         Err(error) => return Err(error),
     };
-    let mut channels: Vec<Channel> = topics.values().map(|topic: &Topic| topic.channel.clone()).collect();
+    let mut channels: Vec<Channel> = topics
+        .values()
+        .map(|topic: &Topic| topic.channel.clone())
+        .collect();
     channels.sort_by(|a, b| a.topic.cmp(&b.topic));
-    let layouts = topics.into_iter().map(|(id, topic)| (id, topic.layout)).collect();
-    Ok(Opened { channels, damage, format: Box::new(Ulog { origin, layouts }) })
+    let layouts = topics
+        .into_iter()
+        .map(|(id, topic)| (id, topic.layout))
+        .collect();
+    Ok(Opened {
+        channels,
+        damage,
+        format: Box::new(Ulog { origin, layouts }),
+    })
 }
 
 /// Counts the messages of each topic.
@@ -45,11 +57,21 @@ fn survey(messages: &mut Messages, topics: &mut BTreeMap<u32, Topic>) -> Result<
         let topic = match topics.entry(data.id) {
             std::collections::btree_map::Entry::Occupied(there) => there.into_mut(),
             std::collections::btree_map::Entry::Vacant(free) => {
-                let Some((name, instance, layout)) = messages.subscription(data.id) else { continue };
-                let topic = if instance == 0 { name.to_owned() } else { format!("{name}.{instance}") };
+                let Some((name, instance, layout)) = messages.subscription(data.id) else {
+                    continue;
+                };
+                let topic = if instance == 0 {
+                    name.to_owned()
+                } else {
+                    format!("{name}.{instance}")
+                };
                 let (content, rank) = topics::content(name, &layout);
-                let channel =
-                    Channel { clock: Clock::Boot, id: data.id, rank, ..Channel::new(topic, name, content) };
+                let channel = Channel {
+                    clock: Clock::Boot,
+                    id: data.id,
+                    rank,
+                    ..Channel::new(topic, name, content)
+                };
                 free.insert(Topic { channel, layout })
             }
         };
@@ -103,13 +125,15 @@ impl Ulog {
 impl Format for Ulog {
     fn imu(&self, channel: &Channel, stamp: Stamp) -> Result<Stream<ImuSample>, Error> {
         let fields = ImuFields::new(&channel.type_name, self.layout(channel), stamp);
-        let fields = fields.ok_or_else(|| Error::malformed(0, "the format of the messages lacks fields"))?;
+        let fields =
+            fields.ok_or_else(|| Error::malformed(0, "the format of the messages lacks fields"))?;
         self.stream(channel, move |data| fields.sample(&data.bytes).map(Some))
     }
 
     fn fixes(&self, channel: &Channel, stamp: Stamp) -> Result<Stream<Fix>, Error> {
         let fields = FixFields::new(self.layout(channel), stamp);
-        let fields = fields.ok_or_else(|| Error::malformed(0, "the format of the messages lacks fields"))?;
+        let fields =
+            fields.ok_or_else(|| Error::malformed(0, "the format of the messages lacks fields"))?;
         self.stream(channel, move |data| fields.fix(&data.bytes))
     }
 }

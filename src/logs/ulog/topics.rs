@@ -28,13 +28,23 @@ struct Time {
 
 impl Time {
     fn new(layout: &Layout, stamp: Stamp) -> Option<Self> {
-        let sample = if stamp == Stamp::Header { layout.one("timestamp_sample") } else { None };
-        Some(Self { sample, published: layout.one("timestamp")? })
+        let sample = if stamp == Stamp::Header {
+            layout.one("timestamp_sample")
+        } else {
+            None
+        };
+        Some(Self {
+            sample,
+            published: layout.one("timestamp")?,
+        })
     }
 
     fn ns(self, message: &[u8]) -> Option<i64> {
         // 0 is a time that was not set
-        let sample = self.sample.and_then(|field| field.time_ns(message)).filter(|ns| *ns > 0);
+        let sample = self
+            .sample
+            .and_then(|field| field.time_ns(message))
+            .filter(|ns| *ns > 0);
         sample.or_else(|| self.published.time_ns(message))
     }
 }
@@ -54,28 +64,55 @@ impl ImuFields {
     pub(super) fn new(topic: &str, layout: &Layout, stamp: Stamp) -> Option<Self> {
         let time = Time::new(layout, stamp)?;
         if topic == "sensor_combined" {
-            let (accel, gyro) = (layout.three("accelerometer_m_s2")?, layout.three("gyro_rad")?);
-            return Some(Self { time, accel, gyro, intervals: None });
+            let (accel, gyro) = (
+                layout.three("accelerometer_m_s2")?,
+                layout.three("gyro_rad")?,
+            );
+            return Some(Self {
+                time,
+                accel,
+                gyro,
+                intervals: None,
+            });
         }
-        let (accel, gyro) = (layout.three("delta_velocity")?, layout.three("delta_angle")?);
+        let (accel, gyro) = (
+            layout.three("delta_velocity")?,
+            layout.three("delta_angle")?,
+        );
         // before PX4 1.12 there was one interval
         let interval = |name: &str| layout.one(name).or_else(|| layout.one("dt"));
         let intervals = Some([interval("delta_velocity_dt")?, interval("delta_angle_dt")?]);
-        Some(Self { time, accel, gyro, intervals })
+        Some(Self {
+            time,
+            accel,
+            gyro,
+            intervals,
+        })
     }
 
     /// A sample; none where the message is too short.
     pub(super) fn sample(&self, message: &[u8]) -> Option<ImuSample> {
         let (accel, gyro) = (self.accel.triad(message)?, self.gyro.triad(message)?);
         let motion = match self.intervals {
-            None => Motion::Rates { accel_m_s2: accel, gyro_rad_s: gyro },
+            None => Motion::Rates {
+                accel_m_s2: accel,
+                gyro_rad_s: gyro,
+            },
             Some(intervals) => {
                 let [dv_dt, dtheta_dt] = intervals.map(|field| field.value(message));
                 let (dv_dt_s, dtheta_dt_s) = (dv_dt? / 1e6, dtheta_dt? / 1e6);
-                Motion::Increments { dv_m_s: accel, dtheta_rad: gyro, dv_dt_s, dtheta_dt_s }
+                Motion::Increments {
+                    dv_m_s: accel,
+                    dtheta_rad: gyro,
+                    dv_dt_s,
+                    dtheta_dt_s,
+                }
             }
         };
-        Some(ImuSample { stamp_ns: self.time.ns(message)?, motion })
+        Some(ImuSample {
+            stamp_ns: self.time.ns(message)?,
+            motion,
+        })
     }
 }
 
@@ -89,7 +126,10 @@ struct Scaled {
 impl Scaled {
     /// A field of `double`, since PX4 1.14, or the integer that was there before.
     fn new(layout: &Layout, name: &str, integer: &str, per_unit: f64) -> Option<Self> {
-        let new = layout.one(name).map(|field| Self { field, per_unit: 1.0 });
+        let new = layout.one(name).map(|field| Self {
+            field,
+            per_unit: 1.0,
+        });
         new.or_else(|| layout.one(integer).map(|field| Self { field, per_unit }))
     }
 

@@ -55,7 +55,14 @@ pub(crate) fn update_yaw(ekf: &mut Ekf, yaw: &Lanes, variance: f64) -> Innovatio
     for lane in 0..LANES {
         z[lane] = wrap_angle(c.0[1][0][lane].atan2(c.0[0][0][lane]) - yaw[lane]);
     }
-    dispatch(ekf.level, UpdateYaw { ekf, z: &z, variance })
+    dispatch(
+        ekf.level,
+        UpdateYaw {
+            ekf,
+            z: &z,
+            variance,
+        },
+    )
 }
 
 struct UpdateYaw<'a> {
@@ -101,8 +108,9 @@ impl Ekf {
         self.scratch.error.fill(Lanes::ZERO);
         let point = Antenna::new(&ins, self.omega_ib_b.load(), measured.lever_arm_b);
         let states = self.vehicle();
-        let estimates =
-            states.map_or(Vec3::splat(DVec3::ZERO), |first| self.estimates[first / 3 - BIAS].load::<W>());
+        let estimates = states.map_or(Vec3::splat(DVec3::ZERO), |first| {
+            self.estimates[first / 3 - BIAS].load::<W>()
+        });
         let rows = BodyRows::new(&point, &ins);
         let [forward, right, down] = measured.vehicle_b.map(Vec3::<W>::splat);
         let in_b = |v: Vec3<W>| forward * v[0] + right * v[1] + down * v[2];
@@ -160,14 +168,23 @@ impl<L: Real> BodyRows<L> {
         let c_b_n = ins.q_b_n.to_matrix();
         let u = ins.v_n + point.swing_n;
         let of_psi = point.of_psi - Mat3::skew(-u);
-        Self { c_b_n, v_b: times_transposed(&c_b_n, u), of_psi, of_gyro: point.of_bias }
+        Self {
+            c_b_n,
+            v_b: times_transposed(&c_b_n, u),
+            of_psi,
+            of_gyro: point.of_bias,
+        }
     }
 
     /// Coefficients of V, PSI and the error of the gyroscope's bias in the velocity along an axis given in b.
     #[inline(always)]
     fn along(&self, axis_b: Vec3<L>) -> [Vec3<L>; 3] {
         let axis_n = self.c_b_n * axis_b;
-        [axis_n, times_transposed(&self.of_psi, axis_n), times_transposed(&self.of_gyro, axis_n)]
+        [
+            axis_n,
+            times_transposed(&self.of_psi, axis_n),
+            times_transposed(&self.of_gyro, axis_n),
+        ]
     }
 }
 

@@ -32,7 +32,9 @@ pub(super) const MAX_BLOCKS: usize = MAX_GROUPS + 1 + KINDS;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BeliefError {
     /// More bias states than the filter carries.
-    #[error("{channel}: more than {MAX_GROUPS} correlated processes; use the reduced filter (15 states)")]
+    #[error(
+        "{channel}: more than {MAX_GROUPS} correlated processes; use the reduced filter (15 states)"
+    )]
     TooManyStates {
         /// The axis that carries them.
         channel: Channel,
@@ -65,7 +67,11 @@ impl BiasGroup {
     /// A constant that is not known: the same for all time, with this standard deviation on each axis.
     #[must_use]
     pub(crate) const fn constant(sigma: f64) -> Self {
-        Self { phi: DVec3::ONE, innovation: DVec3::ZERO, initial: DVec3::splat(sigma * sigma) }
+        Self {
+            phi: DVec3::ONE,
+            innovation: DVec3::ZERO,
+            initial: DVec3::splat(sigma * sigma),
+        }
     }
 
     /// Whether it is zero for all time.
@@ -96,7 +102,11 @@ impl BiasGroup {
             phi => (phi, self.innovation[i]),
         };
         let [x, y, z] = [0, 1, 2].map(axis);
-        Self { phi: DVec3::new(x.0, y.0, z.0), innovation: DVec3::new(x.1, y.1, z.1), ..*self }
+        Self {
+            phi: DVec3::new(x.0, y.0, z.0),
+            innovation: DVec3::new(x.1, y.1, z.1),
+            ..*self
+        }
     }
 }
 
@@ -163,7 +173,11 @@ impl Belief {
             // A drift is deterministic in the truth. Believed as an unknown slope, its sign need not be known
             // to the filter.
             belief.set_unknown(sensor, UnknownKind::Drift, drift(model, sensor));
-            belief.set_unknown(sensor, UnknownKind::ScaleFactor, DVec3::splat(states.scale_sigma()));
+            belief.set_unknown(
+                sensor,
+                UnknownKind::ScaleFactor,
+                DVec3::splat(states.scale_sigma()),
+            );
         }
         Ok(belief)
     }
@@ -186,7 +200,12 @@ impl Belief {
     #[must_use]
     pub fn with_vehicle(mut self, sigmas: DVec3) -> Self {
         self.vehicle = sigmas;
-        self.states += self.vehicle.to_array().iter().filter(|sigma| **sigma > 0.0).count();
+        self.states += self
+            .vehicle
+            .to_array()
+            .iter()
+            .filter(|sigma| **sigma > 0.0)
+            .count();
         self
     }
 
@@ -199,7 +218,8 @@ impl Belief {
                 self.groups[sensor].push(BiasGroup::default());
             }
             let group = &mut self.groups[sensor][g];
-            (group.phi[i], group.innovation[i], group.initial[i]) = (bias.phi, bias.innovation, bias.initial);
+            (group.phi[i], group.innovation[i], group.initial[i]) =
+                (bias.phi, bias.innovation, bias.initial);
         }
     }
 
@@ -243,7 +263,11 @@ impl Belief {
     pub(crate) fn set_unknown(&mut self, sensor: Sensor, kind: UnknownKind, sigma: DVec3) {
         let unknowns = &mut self.unknowns[sensor as usize];
         let axes = |sigma: DVec3| sigma.to_array().iter().filter(|s| **s > 0.0).count();
-        self.states -= unknowns.iter().filter(|u| u.kind == kind).map(|u| axes(u.sigma)).sum::<usize>();
+        self.states -= unknowns
+            .iter()
+            .filter(|u| u.kind == kind)
+            .map(|u| axes(u.sigma))
+            .sum::<usize>();
         unknowns.retain(|u| u.kind != kind);
         if sigma != DVec3::ZERO {
             self.states += axes(sigma);
@@ -266,14 +290,32 @@ impl Belief {
 
     fn deviation(&self, sensor: Sensor, counts: impl Fn(&BiasGroup) -> bool) -> f64 {
         let groups = self.groups[sensor as usize].iter().filter(|g| counts(g));
-        groups.map(|g| g.initial).sum::<DVec3>().max_element().sqrt()
+        groups
+            .map(|g| g.initial)
+            .sum::<DVec3>()
+            .max_element()
+            .sqrt()
     }
 }
 
 /// Magnitudes of the drifts of a sensor's axes (units per sample).
 fn drift(model: &Model, sensor: Sensor) -> DVec3 {
-    let slope = |p: &Process| if let Process::Drift(p) = p { p.slope() } else { 0.0 };
-    let of_axis = |axis| model.axis(Channel { sensor, axis }).processes.iter().map(slope).sum::<f64>().abs();
+    let slope = |p: &Process| {
+        if let Process::Drift(p) = p {
+            p.slope()
+        } else {
+            0.0
+        }
+    };
+    let of_axis = |axis| {
+        model
+            .axis(Channel { sensor, axis })
+            .processes
+            .iter()
+            .map(slope)
+            .sum::<f64>()
+            .abs()
+    };
     DVec3::from_array(Axis::ALL.map(of_axis))
 }
 
@@ -290,7 +332,10 @@ struct AxisBelief {
 
 impl AxisBelief {
     fn full(noise: &Composite) -> Self {
-        let mut axis = Self { white: 0.0, biases: vec![] };
+        let mut axis = Self {
+            white: 0.0,
+            biases: vec![],
+        };
         for process in &noise.processes {
             match process {
                 // the parts have none of their own
@@ -320,7 +365,12 @@ impl AxisBelief {
     }
 
     /// White noise and one bias: those of the model where it has no more, else its reduction.
-    fn reduced(model: &Model, channel: Channel, interval_s: f64, window_s: f64) -> Result<Self, BeliefError> {
+    fn reduced(
+        model: &Model,
+        channel: Channel,
+        interval_s: f64,
+        window_s: f64,
+    ) -> Result<Self, BeliefError> {
         let noise = model.axis(channel);
         if reduction::is_exact(noise) {
             let mut axis = Self::full(noise);
@@ -331,13 +381,24 @@ impl AxisBelief {
         }
         let reduced = reduction::reduce(noise, model.rate_hz, interval_s, window_s)
             .map_err(|source| BeliefError::Reduction { channel, source })?;
-        let mut axis = Self { white: reduced.white.sigma2(), biases: vec![] };
-        axis.push(reduced.bias.phi(), reduced.bias.sigma2(), reduced.initial_variance);
+        let mut axis = Self {
+            white: reduced.white.sigma2(),
+            biases: vec![],
+        };
+        axis.push(
+            reduced.bias.phi(),
+            reduced.bias.sigma2(),
+            reduced.initial_variance,
+        );
         Ok(axis)
     }
 
     fn push(&mut self, phi: f64, innovation: f64, initial: f64) {
-        self.biases.push(BiasState { phi, innovation, initial });
+        self.biases.push(BiasState {
+            phi,
+            innovation,
+            initial,
+        });
     }
 }
 
@@ -371,12 +432,25 @@ mod tests {
     #[test]
     fn parts_of_a_sample_compose() {
         let phi = DVec3::new(0.9, 1.0, 0.0);
-        let group = BiasGroup { phi, innovation: DVec3::new(0.2, 0.3, 0.4), initial: DVec3::ONE };
+        let group = BiasGroup {
+            phi,
+            innovation: DVec3::new(0.2, 0.3, 0.4),
+            initial: DVec3::ONE,
+        };
         let (a, b) = (group.over(0.5), group.over(1.5));
         for i in 0..2 {
-            let (phi, q) = (a.phi[i] * b.phi[i], b.phi[i].powi(2) * a.innovation[i] + b.innovation[i]);
-            let whole = (phi_squared(group.phi[i]), (1.0 + phi_squared(group.phi[i])) * group.innovation[i]);
-            assert!((phi - whole.0).abs() < 1e-14 && (q - whole.1).abs() < 1e-14, "axis {i}");
+            let (phi, q) = (
+                a.phi[i] * b.phi[i],
+                b.phi[i].powi(2) * a.innovation[i] + b.innovation[i],
+            );
+            let whole = (
+                phi_squared(group.phi[i]),
+                (1.0 + phi_squared(group.phi[i])) * group.innovation[i],
+            );
+            assert!(
+                (phi - whole.0).abs() < 1e-14 && (q - whole.1).abs() < 1e-14,
+                "axis {i}"
+            );
         }
         assert_eq!((a.phi.z, a.innovation.z), (0.0, 0.4));
     }

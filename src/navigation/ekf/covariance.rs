@@ -37,7 +37,8 @@ pub struct Covariance {
 }
 
 /// Steps of biases that stay as they are: phi = 1, no innovation.
-const CONSTANT_BIASES: [BiasGroup; 2 * MAX_BLOCKS + 1] = [BiasGroup::constant(0.0); 2 * MAX_BLOCKS + 1];
+const CONSTANT_BIASES: [BiasGroup; 2 * MAX_BLOCKS + 1] =
+    [BiasGroup::constant(0.0); 2 * MAX_BLOCKS + 1];
 
 /// The blocks behind the navigation's: what makes the errors of a sample.
 #[derive(Debug, Clone, Copy)]
@@ -53,21 +54,36 @@ pub(super) struct Sources<'a> {
 
 impl<'a> Sources<'a> {
     #[inline(always)]
-    pub(super) fn new(belief: &Belief, steps: &'a [BiasGroup], regressors: &'a [Vec<Regressor>; 2]) -> Self {
+    pub(super) fn new(
+        belief: &Belief,
+        steps: &'a [BiasGroup],
+        regressors: &'a [Vec<Regressor>; 2],
+    ) -> Self {
         let [accel, gyro] = &belief.groups;
-        Self { steps, biases: [accel.len(), gyro.len()], regressors: [&regressors[0], &regressors[1]] }
+        Self {
+            steps,
+            biases: [accel.len(), gyro.len()],
+            regressors: [&regressors[0], &regressors[1]],
+        }
     }
 
     /// The first unknown of a sensor among the blocks.
     #[inline(always)]
     pub(super) fn unknowns(&self, sensor: Sensor) -> usize {
-        let before = if sensor == Sensor::Accel { 0 } else { self.regressors[0].len() };
+        let before = if sensor == Sensor::Accel {
+            0
+        } else {
+            self.regressors[0].len()
+        };
         self.biases[0] + self.biases[1] + before
     }
 
     /// The same blocks with transition 1 and no noise: for a map between samples, which moves no bias.
     pub(super) fn still(self) -> Self {
-        Self { steps: &CONSTANT_BIASES[..self.steps.len()], ..self }
+        Self {
+            steps: &CONSTANT_BIASES[..self.steps.len()],
+            ..self
+        }
     }
 
     /// First states of: accelerometer biases, gyroscope biases, accelerometer unknowns, gyroscope unknowns.
@@ -83,7 +99,11 @@ impl Covariance {
     /// Zero covariance of `dim` states.
     #[must_use]
     pub(crate) fn zeros(dim: usize) -> Self {
-        Self { dim, p: vec![Lanes::ZERO; dim * dim], columns: [[Lanes::ZERO; NAV]; NAV] }
+        Self {
+            dim,
+            p: vec![Lanes::ZERO; dim * dim],
+            columns: [[Lanes::ZERO; NAV]; NAV],
+        }
     }
 
     /// States: rows of the matrix.
@@ -130,7 +150,10 @@ impl Covariance {
 
     /// Sets the matrix of one lane to a symmetric one.
     pub(super) fn set_lane(&mut self, lane: usize, matrix: &nalgebra::DMatrix<f64>) {
-        self.p.iter_mut().zip(matrix.iter()).for_each(|(to, from)| to[lane] = *from);
+        self.p
+            .iter_mut()
+            .zip(matrix.iter())
+            .for_each(|(to, from)| to[lane] = *from);
     }
 
     /// P⁺ = A P Aᵀ + Q for a map A of the navigation error and the transition of the biases; the biases
@@ -218,7 +241,9 @@ impl Covariance {
     #[inline(always)]
     fn step_biases<W: Wide>(&mut self, biases: &[BiasGroup]) {
         for i in NAV..self.dim {
-            let BiasGroup { phi, innovation, .. } = biases[i / 3 - BIAS];
+            let BiasGroup {
+                phi, innovation, ..
+            } = biases[i / 3 - BIAS];
             let row = &mut self.p[i * self.dim..(i + 1) * self.dim];
             for (g, triple) in row[NAV..].as_chunks_mut::<3>().0.iter_mut().enumerate() {
                 let factor = biases[g].phi * phi[i % 3];
@@ -293,7 +318,11 @@ impl Covariance {
     /// xᵀ P⁻¹ x over the states listed, by Cholesky; NaN where the covariance is not positive definite.
     #[inline(always)]
     #[must_use]
-    pub(crate) fn normalised_square<const N: usize>(&self, states: [usize; N], x: [Lanes; N]) -> Lanes {
+    pub(crate) fn normalised_square<const N: usize>(
+        &self,
+        states: [usize; N],
+        x: [Lanes; N],
+    ) -> Lanes {
         self.whitened(states, x).0
     }
 
@@ -346,7 +375,11 @@ impl Covariance {
 #[inline(always)]
 pub(super) fn load_error<W: Wide>(row: &[Lanes]) -> NavError<W> {
     let row = &row[..NAV];
-    [load_triple(&row[..3]), load_triple(&row[3..6]), load_triple(&row[6..])]
+    [
+        load_triple(&row[..3]),
+        load_triple(&row[3..6]),
+        load_triple(&row[6..]),
+    ]
 }
 
 #[inline(always)]
@@ -359,7 +392,11 @@ pub(super) fn store_error<W: Wide>(row: &mut [Lanes], x: &NavError<W>) {
 
 #[inline(always)]
 fn load_triple<W: Wide>(triple: &[Lanes]) -> Vec3<W> {
-    Vec3([W::load(&triple[0]), W::load(&triple[1]), W::load(&triple[2])])
+    Vec3([
+        W::load(&triple[0]),
+        W::load(&triple[1]),
+        W::load(&triple[2]),
+    ])
 }
 
 /// The sum of the triples of a row.

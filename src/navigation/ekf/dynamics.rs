@@ -67,7 +67,11 @@ impl<L: Real> Sample<L> {
         }
         for i in 0..3 {
             let row = self.c_dt.0[i];
-            let scaled = Vec3([row[0] * variances.x, row[1] * variances.y, row[2] * variances.z]);
+            let scaled = Vec3([
+                row[0] * variances.x,
+                row[1] * variances.y,
+                row[2] * variances.z,
+            ]);
             for j in 0..3 {
                 noise.0[i][j] = scaled.dot(Vec3(self.c_dt.0[j]));
             }
@@ -136,14 +140,19 @@ impl<L: Real> EarthTerms<L> {
 
         // d/dt of (R_N + h) δlat: the slope of R_N cancels between the factor and δlat. East, the slope of
         // (R_E + h) cos lat by latitude is −(R_N + h) sin lat: hence no derivative of a radius in this block.
-        let rr = Mat3([[-(vd / rn), z, wn], [we * tan, -(wn * tan * rn / re) - vd / re, we], [z, z, z]]);
+        let rr = Mat3([
+            [-(vd / rn), z, wn],
+            [we * tan, -(wn * tan * rn / re) - vd / re, we],
+            [z, z, z],
+        ]);
         // For r in metres: ∂/∂lat · 1/rn per metre north, −∂/∂h per metre down.
         let omega_ie = Vec3([c * OMEGA_IE, z, s * -OMEGA_IE]);
         let omega_en = Vec3([we, -wn, -(we * tan)]);
         // omega_ie_n is (cos, 0, −sin)·omega_ie; its derivative by latitude, per metre north.
         let d_ie_north = Vec3([s * -OMEGA_IE, z, c * -OMEGA_IE]) * (one / rn);
         let east = -(we * dre / re);
-        let d_en_north = Vec3([east, wn * drn / rn, -(east * tan) - we * (tan * tan + 1.0)]) * (one / rn);
+        let d_en_north =
+            Vec3([east, wn * drn / rn, -(east * tan) - we * (tan * tan + 1.0)]) * (one / rn);
         let d_en_down = Vec3([we / re, -(wn / rn), -(we * tan / re)]);
         // omega_en_n is linear in the velocity: this is the matrix itself.
         let d_en_v = Mat3([[z, one / re, z], [-(one / rn), z, z], [z, -(tan / re), z]]);
@@ -197,7 +206,11 @@ impl<L: Real> ErrorMap<L> for EarthStep<L> {
 #[inline(always)]
 fn columns<L: Real>(north: Vec3<L>, down: Vec3<L>) -> Mat3<L> {
     let z = L::from(0.0);
-    Mat3([[north[0], z, down[0]], [north[1], z, down[1]], [north[2], z, down[2]]])
+    Mat3([
+        [north[0], z, down[0]],
+        [north[1], z, down[1]],
+        [north[2], z, down[2]],
+    ])
 }
 
 /// (∂g/∂lat, ∂g/∂(down)) of the down component, by differences of the model itself: the step is exact

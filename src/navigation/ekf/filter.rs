@@ -59,7 +59,11 @@ impl Scratch {
     #[inline(always)]
     pub(super) fn of<W: Wide>(&self, block: usize) -> Vec3<W> {
         let triple = &self.error[3 * block..];
-        Vec3([W::load(&triple[0]), W::load(&triple[1]), W::load(&triple[2])])
+        Vec3([
+            W::load(&triple[0]),
+            W::load(&triple[1]),
+            W::load(&triple[2]),
+        ])
     }
 }
 
@@ -68,22 +72,46 @@ impl Ekf {
     /// of the belief. The attitude standard deviations, given for roll, pitch and yaw, are brought to psi_n at
     /// the attitude of `about`, the same in all lanes.
     #[must_use]
-    pub fn new(nominal: Strapdown, belief: &Belief, about: &NavState, initial: &InitialSettings) -> Self {
+    pub fn new(
+        nominal: Strapdown,
+        belief: &Belief,
+        about: &NavState,
+        initial: &InitialSettings,
+    ) -> Self {
         let unknowns = belief.unknowns.iter().flatten();
-        let constant = unknowns.map(|u| BiasGroup { initial: u.sigma * u.sigma, ..BiasGroup::constant(0.0) });
-        let vehicle = (belief.vehicle != DVec3::ZERO)
-            .then(|| BiasGroup { initial: belief.vehicle * belief.vehicle, ..BiasGroup::constant(0.0) });
-        let steps: Vec<BiasGroup> =
-            belief.groups.iter().flatten().copied().chain(constant).chain(vehicle).collect();
+        let constant = unknowns.map(|u| BiasGroup {
+            initial: u.sigma * u.sigma,
+            ..BiasGroup::constant(0.0)
+        });
+        let vehicle = (belief.vehicle != DVec3::ZERO).then(|| BiasGroup {
+            initial: belief.vehicle * belief.vehicle,
+            ..BiasGroup::constant(0.0)
+        });
+        let steps: Vec<BiasGroup> = belief
+            .groups
+            .iter()
+            .flatten()
+            .copied()
+            .chain(constant)
+            .chain(vehicle)
+            .collect();
         let mut p = Covariance::zeros(3 * belief.blocks());
         let square = |sigma: [f64; 3]| Matrix3::from_diagonal(&sigma.map(|s| s * s).into());
         add_block(&mut p, R, &square(initial.pos_sigma_m));
         add_block(&mut p, V, &square(initial.vel_sigma_m_s));
         // Rows and columns of psi_n are correlated where pitch or roll are not zero: a full block, not a
         // diagonal.
-        add_block(&mut p, PSI, &attitude_covariance(about, initial.att_sigma_deg));
+        add_block(
+            &mut p,
+            PSI,
+            &attitude_covariance(about, initial.att_sigma_deg),
+        );
         for (g, step) in steps.iter().enumerate() {
-            add_block(&mut p, BIAS + g, &Matrix3::from_diagonal(&step.initial.to_array().into()));
+            add_block(
+                &mut p,
+                BIAS + g,
+                &Matrix3::from_diagonal(&step.initial.to_array().into()),
+            );
         }
         let dim = p.dim();
         let zeros = || vec![Lanes::ZERO; dim];
@@ -93,14 +121,21 @@ impl Ekf {
             p,
             steps,
             white: belief.white,
-            regressors: belief.unknowns.each_ref().map(|u| u.iter().map(Regressor::of).collect()),
+            regressors: belief
+                .unknowns
+                .each_ref()
+                .map(|u| u.iter().map(Regressor::of).collect()),
             dt: 1.0 / belief.rate_hz,
             age: 0.0,
             belief: belief.clone(),
             earth_age: 0.0,
             omega_ib_b: Vec3::ZERO,
             transition: None,
-            scratch: Scratch { ph: zeros(), gain: zeros(), error: zeros() },
+            scratch: Scratch {
+                ph: zeros(),
+                gain: zeros(),
+                error: zeros(),
+            },
             level: Level::best(),
             fix_update: FixUpdate::default(),
         }
@@ -125,7 +160,11 @@ impl Ekf {
         let ratio = dt * self.belief.rate_hz;
         // The zip ends with the bias groups: the unknown constants behind them have no step that depends on
         // dt.
-        for (step, believed) in self.steps.iter_mut().zip(self.belief.groups.iter().flatten()) {
+        for (step, believed) in self
+            .steps
+            .iter_mut()
+            .zip(self.belief.groups.iter().flatten())
+        {
             *step = believed.over(ratio);
         }
         // A mean over `ratio` samples: the variance of white noise falls as the interval grows, its density
@@ -155,7 +194,9 @@ impl Ekf {
         sample = sample - self.bias_sum(sensor);
         let first = self.sources().unknowns(sensor);
         // in the order of their kinds: drifts, which add to the sample as biases do, before scale factors
-        for (regressor, estimate) in self.regressors[sensor as usize].iter_mut().zip(&self.estimates[first..])
+        for (regressor, estimate) in self.regressors[sensor as usize]
+            .iter_mut()
+            .zip(&self.estimates[first..])
         {
             let estimate = estimate.load();
             if regressor.kind == UnknownKind::Drift {
@@ -178,7 +219,11 @@ impl Ekf {
     #[inline(always)]
     pub(super) fn bias_sum<W: Wide>(&self, sensor: Sensor) -> Vec3<W> {
         let [accel, gyro] = self.belief.groups.each_ref().map(Vec::len);
-        let of_sensor = if sensor == Sensor::Accel { 0..accel } else { accel..accel + gyro };
+        let of_sensor = if sensor == Sensor::Accel {
+            0..accel
+        } else {
+            accel..accel + gyro
+        };
         let mut sum = Vec3::splat(DVec3::ZERO);
         for bias in &self.estimates[of_sensor] {
             sum = sum + bias.load();
@@ -226,7 +271,10 @@ impl Ekf {
     #[inline(always)]
     pub(super) fn apply_earth_terms<W: Wide>(&mut self, ins: &Strapdown<W>) {
         if self.earth_age > 0.0 {
-            let step = EarthStep { terms: EarthTerms::at(ins), dt: self.earth_age };
+            let step = EarthStep {
+                terms: EarthTerms::at(ins),
+                dt: self.earth_age,
+            };
             self.earth_age = 0.0;
             let sources = Sources::new(&self.belief, &self.steps, &self.regressors).still();
             self.p.step(&step, &sources);
@@ -242,7 +290,10 @@ impl Ekf {
     fn add_white_noise<W: Wide>(&mut self, sample: &Sample<W>) {
         // The gyroscope's own part in V × V, (g dt/2)² sigma_g² dt², is left out: 2.5e-3 sigma_g² at 100 Hz,
         // far below sigma_a² of any IMU (both in SI).
-        let (accel, gyro) = (sample.rotated_noise(self.white[0]), sample.rotated_noise(self.white[1]));
+        let (accel, gyro) = (
+            sample.rotated_noise(self.white[0]),
+            sample.rotated_noise(self.white[1]),
+        );
         let half = W::from(0.5 * self.dt);
         let to_position = accel.scaled(half);
         self.p.add_diagonal_block(V, &accel);
@@ -266,7 +317,10 @@ fn times<W: Wide>(a: Vec3<W>, b: Vec3<W>) -> Vec3<W> {
 
 /// Adds the same block to the diagonal of all lanes.
 fn add_block(p: &mut Covariance, block: usize, m: &Matrix3<f64>) {
-    p.add_diagonal_block(block, &Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| Lanes::splat(m[(i, j)])))));
+    p.add_diagonal_block(
+        block,
+        &Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| Lanes::splat(m[(i, j)])))),
+    );
 }
 
 /// Covariance of psi_n for standard deviations of roll, pitch and yaw (degrees).
@@ -300,7 +354,14 @@ impl Kernel for Settle<'_> {
 /// When samples and errors are not equally many.
 pub fn advance(ekf: &mut Ekf, samples: &[ImuSample], errors: &[[Vec3; 2]]) {
     assert_eq!(samples.len(), errors.len(), "one error for each sample");
-    dispatch(ekf.level, Advance { ekf, samples, errors });
+    dispatch(
+        ekf.level,
+        Advance {
+            ekf,
+            samples,
+            errors,
+        },
+    );
 }
 
 struct Advance<'a> {

@@ -32,7 +32,11 @@ impl Ekf {
     /// Takes state, biases and covariance of one run from another filter of the same form.
     fn copy_lane(&mut self, other: &Self, lane: usize) {
         let (to, from) = (&mut self.nominal, &other.nominal);
-        for (to, from) in [(&mut to.lat, &from.lat), (&mut to.lon, &from.lon), (&mut to.h, &from.h)] {
+        for (to, from) in [
+            (&mut to.lat, &from.lat),
+            (&mut to.lon, &from.lon),
+            (&mut to.h, &from.h),
+        ] {
             to[lane] = from[lane];
         }
         to.v_n.set_lane(lane, from.v_n.lane(lane));
@@ -56,8 +60,17 @@ mod tests {
 
     #[test]
     fn the_run_that_refuses_stays_as_it_was_and_the_others_are_updated() {
-        let state = NavState { lat: 0.8, lon: 0.1, h: 300.0, v_n: DVec3::ZERO, q_b_n: DQuat::IDENTITY };
-        let model = Model { rate_hz: 100.0, axes: Default::default() };
+        let state = NavState {
+            lat: 0.8,
+            lon: 0.1,
+            h: 300.0,
+            v_n: DVec3::ZERO,
+            q_b_n: DQuat::IDENTITY,
+        };
+        let model = Model {
+            rate_hz: 100.0,
+            axes: Default::default(),
+        };
         let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
         let start = Strapdown::new(&state, GravityModel::Wgs84);
         let before = Ekf::new(start, &belief, &state, &InitialSettings::default());
@@ -78,7 +91,11 @@ mod tests {
         let _ = update(&mut plain, &fix);
         for lane in 0..LANES {
             let expected = if lane == 5 { &before } else { &plain };
-            assert_eq!(gated.nominal.lane(lane), expected.nominal.lane(lane), "lane {lane}");
+            assert_eq!(
+                gated.nominal.lane(lane),
+                expected.nominal.lane(lane),
+                "lane {lane}"
+            );
             assert_eq!(gated.p.lane(lane), expected.p.lane(lane), "lane {lane}");
         }
     }
@@ -86,6 +103,9 @@ mod tests {
     /// 95 % and 99.9 % of chi-square with 3 and 6 degrees of freedom, as tables have them.
     #[test]
     fn limits_are_chi_square_quantiles() {
-        assert!((nis_limit(0.95, 3) - 7.8147).abs() < 1e-4 && (nis_limit(0.999, 6) - 22.4577).abs() < 1e-4);
+        assert!(
+            (nis_limit(0.95, 3) - 7.8147).abs() < 1e-4
+                && (nis_limit(0.999, 6) - 22.4577).abs() < 1e-4
+        );
     }
 }

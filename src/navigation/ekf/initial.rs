@@ -2,7 +2,9 @@
 
 use crate::frames::RollPitchYaw;
 use crate::imu::Sensor;
-use crate::units::{NonNegative, Positive, SettingError, exactly, require_non_negative, require_positive};
+use crate::units::{
+    NonNegative, Positive, SettingError, exactly, require_non_negative, require_positive,
+};
 use glam::DQuat;
 use nalgebra::Matrix3;
 use schemars::JsonSchema;
@@ -150,7 +152,9 @@ fn at_most(key: &str, sigmas: &[f64], limit: f64, unit: &str) -> Result<(), Sett
 pub(crate) fn psi_of_angles(q_b_n: DQuat) -> Matrix3<f64> {
     // Inverted numerically: one formula for the Jacobian, in one place.
     let j = RollPitchYaw::from_quat(q_b_n).jacobian_of_psi_n();
-    Matrix3::from_fn(|row, column| j[row][column]).try_inverse().unwrap_or_else(Matrix3::identity)
+    Matrix3::from_fn(|row, column| j[row][column])
+        .try_inverse()
+        .unwrap_or_else(Matrix3::identity)
 }
 
 #[cfg(test)]
@@ -161,12 +165,48 @@ mod tests {
     fn impossible_values_are_refused_by_key() {
         let d = InitialSettings::default();
         let cases = [
-            (InitialSettings { pos_sigma_m: [0.0, 1.0, 1.0], ..d.clone() }, "pos_sigma_m"),
-            (InitialSettings { vel_sigma_m_s: [1.0, -1.0, 1.0], ..d.clone() }, "vel_sigma_m_s"),
-            (InitialSettings { att_sigma_deg: [1.0, 1.0, 90.0], ..d.clone() }, "att_sigma_deg"),
-            (InitialSettings { gyro_bias_sigma_rad_s: Some(-1.0), ..d.clone() }, "gyro_bias_sigma_rad_s"),
-            (InitialSettings { gyro_scale_sigma_ppm: Some(2e5), ..d.clone() }, "gyro_scale_sigma_ppm"),
-            (InitialSettings { accel_scale_sigma_ppm: Some(-1.0), ..d.clone() }, "accel_scale_sigma_ppm"),
+            (
+                InitialSettings {
+                    pos_sigma_m: [0.0, 1.0, 1.0],
+                    ..d.clone()
+                },
+                "pos_sigma_m",
+            ),
+            (
+                InitialSettings {
+                    vel_sigma_m_s: [1.0, -1.0, 1.0],
+                    ..d.clone()
+                },
+                "vel_sigma_m_s",
+            ),
+            (
+                InitialSettings {
+                    att_sigma_deg: [1.0, 1.0, 90.0],
+                    ..d.clone()
+                },
+                "att_sigma_deg",
+            ),
+            (
+                InitialSettings {
+                    gyro_bias_sigma_rad_s: Some(-1.0),
+                    ..d.clone()
+                },
+                "gyro_bias_sigma_rad_s",
+            ),
+            (
+                InitialSettings {
+                    gyro_scale_sigma_ppm: Some(2e5),
+                    ..d.clone()
+                },
+                "gyro_scale_sigma_ppm",
+            ),
+            (
+                InitialSettings {
+                    accel_scale_sigma_ppm: Some(-1.0),
+                    ..d.clone()
+                },
+                "accel_scale_sigma_ppm",
+            ),
         ];
         for (settings, key) in cases {
             assert_eq!(settings.validate().unwrap_err().key, key);

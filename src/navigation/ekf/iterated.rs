@@ -25,13 +25,22 @@ pub(super) fn update(ekf: &mut Ekf, fix: &Fix) -> Lanes {
     settle(ekf);
     let before = ekf.clone();
     let variances = variances(fix);
-    let mut lanes: Vec<Lane> = (0..LANES).map(|lane| Lane::new(before.p.lane(lane))).collect();
+    let mut lanes: Vec<Lane> = (0..LANES)
+        .map(|lane| Lane::new(before.p.lane(lane)))
+        .collect();
     let mut nis = Lanes::ZERO;
     for step in 0..STEPS {
         let innovation = ekf.innovation(fix);
         for (lane, run) in lanes.iter_mut().enumerate() {
-            let z = innovation.iter().flat_map(|v| v.lane(lane).to_array()).take(variances.len());
-            let square = run.step(&rows(ekf, lane, fix, variances.len()), &z.collect::<Vec<_>>(), &variances);
+            let z = innovation
+                .iter()
+                .flat_map(|v| v.lane(lane).to_array())
+                .take(variances.len());
+            let square = run.step(
+                &rows(ekf, lane, fix, variances.len()),
+                &z.collect::<Vec<_>>(),
+                &variances,
+            );
             if step == 0 {
                 nis[lane] = square;
             }
@@ -49,7 +58,11 @@ pub(super) fn update(ekf: &mut Ekf, fix: &Fix) -> Lanes {
 
 fn variances(fix: &Fix) -> Vec<f64> {
     let velocity = fix.v_n.map(|_| fix.vel_sigma_m_s.to_array());
-    let sigmas = fix.pos_sigma_m.to_array().into_iter().chain(velocity.into_iter().flatten());
+    let sigmas = fix
+        .pos_sigma_m
+        .to_array()
+        .into_iter()
+        .chain(velocity.into_iter().flatten());
     sigmas.map(|sigma| sigma * sigma).collect()
 }
 
@@ -86,7 +99,12 @@ impl Lane {
     fn new(prior: DMatrix<f64>) -> Self {
         let n = prior.nrows();
         let none = DMatrix::zeros(0, 0);
-        Self { prior, xi: DVector::zeros(n), h: none.clone(), gain: none }
+        Self {
+            prior,
+            xi: DVector::zeros(n),
+            h: none.clone(),
+            gain: none,
+        }
     }
 
     /// From rows and innovation at ξ to the next ξ; returns zᵀ S⁻¹ z, NaN where S is not positive definite.
@@ -125,7 +143,9 @@ impl Lane {
         let mut errors = self.xi.clone();
         let j = left_jacobian(&-triple(&self.xi, PSI));
         for block in [R, V] {
-            errors.fixed_rows_mut::<3>(3 * block).copy_from(&(j * triple(&self.xi, block)));
+            errors
+                .fixed_rows_mut::<3>(3 * block)
+                .copy_from(&(j * triple(&self.xi, block)));
         }
         errors
     }
@@ -140,13 +160,19 @@ impl Ekf {
         let [_, gyro, unknown, gyro_unknown] = self.sources().starts();
         for (lane, run) in lanes.iter().enumerate() {
             let errors = run.errors();
-            self.scratch.error.iter_mut().zip(&errors).for_each(|(to, from)| to[lane] = *from);
+            self.scratch
+                .error
+                .iter_mut()
+                .zip(&errors)
+                .for_each(|(to, from)| to[lane] = *from);
             let at = |first: usize| DVec3::new(errors[first], errors[first + 1], errors[first + 2]);
             let biases: DVec3 = (gyro..unknown).step_by(3).map(at).sum();
             let regressors = self.regressors[Sensor::Gyro as usize].iter().enumerate();
-            let unknowns: DVec3 =
-                regressors.map(|(u, r)| at(gyro_unknown + 3 * u) * r.value.lane(lane)).sum();
-            self.omega_ib_b.set_lane(lane, before.omega_ib_b.lane(lane) + biases + unknowns);
+            let unknowns: DVec3 = regressors
+                .map(|(u, r)| at(gyro_unknown + 3 * u) * r.value.lane(lane))
+                .sum();
+            self.omega_ib_b
+                .set_lane(lane, before.omega_ib_b.lane(lane) + biases + unknowns);
         }
         apply_correction(self);
     }
@@ -165,7 +191,8 @@ fn carried(xi: &DVector<f64>) -> DMatrix<f64> {
     for block in [R, V] {
         g.fixed_view_mut::<3, 3>(3 * block, 3 * block).copy_from(&j);
         // By the chain rule: J is of −ψ.
-        g.fixed_view_mut::<3, 3>(3 * block, 3 * PSI).copy_from(&-by_psi(&back, &triple(xi, block)));
+        g.fixed_view_mut::<3, 3>(3 * block, 3 * PSI)
+            .copy_from(&-by_psi(&back, &triple(xi, block)));
     }
     g.fixed_view_mut::<3, 3>(3 * PSI, 3 * PSI).copy_from(&j);
     g
@@ -201,8 +228,8 @@ fn left_jacobian(psi: &Vector3<f64>) -> Matrix3<f64> {
 fn by_psi(psi: &Vector3<f64>, rho: &Vector3<f64>) -> Matrix3<f64> {
     let [a, b, of_a, of_b] = coefficients(psi.norm());
     let (once, twice) = (psi.cross(rho), psi.cross(&psi.cross(rho)));
-    let products =
-        rho.cross_matrix() * -a - (once.cross_matrix() + psi.cross_matrix() * rho.cross_matrix()) * b;
+    let products = rho.cross_matrix() * -a
+        - (once.cross_matrix() + psi.cross_matrix() * rho.cross_matrix()) * b;
     products + (once * of_a + twice * of_b) * psi.transpose()
 }
 

@@ -19,7 +19,9 @@ mod transition;
 pub mod unknowns;
 pub mod update;
 
-pub(crate) use aiding::{BodyVelocity, body_velocity_rows, dense_yaw_row, update_body_velocity, update_yaw};
+pub(crate) use aiding::{
+    BodyVelocity, body_velocity_rows, dense_yaw_row, update_body_velocity, update_yaw,
+};
 pub use belief::{Belief, BeliefError};
 pub use covariance::Covariance;
 pub use filter::{Ekf, advance, settle};

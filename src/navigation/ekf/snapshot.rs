@@ -20,8 +20,16 @@ impl Ekf {
         // The regressors too: the bias of a drift is slope times the age of the sample, and that is of the
         // past here.
         let regressors = self.regressors.iter().flatten().map(|r| &r.value);
-        let triples = self.estimates.iter().chain(regressors).map(|triple| triple.lane(0)).collect();
-        Snapshot { nominal: self.nominal.lane(0), triples }
+        let triples = self
+            .estimates
+            .iter()
+            .chain(regressors)
+            .map(|triple| triple.lane(0))
+            .collect();
+        Snapshot {
+            nominal: self.nominal.lane(0),
+            triples,
+        }
     }
 
     /// Sets the first lane to a snapshot less an estimated error, whose covariance is `p`. The other lanes, and what the
@@ -30,7 +38,9 @@ impl Ekf {
         self.nominal.set_lane(0, &snapshot.nominal);
         let regressors = self.regressors.iter_mut().flatten().map(|r| &mut r.value);
         let triples = self.estimates.iter_mut().chain(regressors);
-        triples.zip(&snapshot.triples).for_each(|(to, from)| to.set_lane(0, *from));
+        triples
+            .zip(&snapshot.triples)
+            .for_each(|(to, from)| to.set_lane(0, *from));
         self.p.set_lane(0, p);
         // `p` is that of the snapshot's instant: an age left over would add the Earth terms of another
         // interval.
@@ -45,7 +55,10 @@ impl Ekf {
 
     /// What the last update took out of the state of the first lane.
     pub(crate) fn correction(&self) -> DVector<f64> {
-        DVector::from_iterator(self.p.dim(), self.scratch.error.iter().map(|error| error[0]))
+        DVector::from_iterator(
+            self.p.dim(),
+            self.scratch.error.iter().map(|error| error[0]),
+        )
     }
 }
 

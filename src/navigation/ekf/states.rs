@@ -71,7 +71,10 @@ impl FromStr for FilterStates {
     type Err = UnknownStates;
 
     fn from_str(text: &str) -> Result<Self, UnknownStates> {
-        Self::ALL.into_iter().find(|states| states.name() == text).ok_or(UnknownStates)
+        Self::ALL
+            .into_iter()
+            .find(|states| states.name() == text)
+            .ok_or(UnknownStates)
     }
 }
 
@@ -103,9 +106,18 @@ mod tests {
         for states in FilterStates::ALL {
             assert_eq!(states.to_string().parse(), Ok(states));
             assert_eq!(serde_json::to_value(states).unwrap(), states.name());
-            assert_eq!(serde_json::from_value::<FilterStates>(states.name().into()).unwrap(), states);
+            assert_eq!(
+                serde_json::from_value::<FilterStates>(states.name().into()).unwrap(),
+                states
+            );
         }
-        assert_eq!(serde_json::from_str::<FilterStates>("21").unwrap(), FilterStates::Reduced21);
-        assert!("16".parse::<FilterStates>().is_err() && serde_json::from_str::<FilterStates>("27").is_err());
+        assert_eq!(
+            serde_json::from_str::<FilterStates>("21").unwrap(),
+            FilterStates::Reduced21
+        );
+        assert!(
+            "16".parse::<FilterStates>().is_err()
+                && serde_json::from_str::<FilterStates>("27").is_err()
+        );
     }
 }

@@ -20,7 +20,14 @@ use rand::RngExt;
 pub(super) type Matrix15 = SMatrix<f64, 15, 15>;
 
 pub(super) fn generator(process: &str) -> Generator {
-    StreamKey { seed: 11, scenario: "", run: 0, source: "test", process }.generator()
+    StreamKey {
+        seed: 11,
+        scenario: "",
+        run: 0,
+        source: "test",
+        process,
+    }
+    .generator()
 }
 
 /// A fast vehicle anywhere, in any attitude, with what its IMU measures.
@@ -30,7 +37,13 @@ pub(super) fn random_case(g: &mut Generator) -> (NavState, DVec3, DVec3) {
     let (v_n, axis, omega, f) = (vector(250.0), vector(3.0), vector(1.0), vector(20.0));
     let place = vector(1.0);
     let q_b_n = DQuat::from_scaled_axis(axis);
-    let state = NavState { lat: place.x * 1.3, lon: place.y * 3.0, h: 6000.0 * (1.0 + place.z), v_n, q_b_n };
+    let state = NavState {
+        lat: place.x * 1.3,
+        lon: place.y * 3.0,
+        h: 6000.0 * (1.0 + place.z),
+        v_n,
+        q_b_n,
+    };
     (state, omega, f)
 }
 
@@ -54,8 +67,14 @@ pub(super) fn perturbed(state: &NavState, block: usize, axis: usize, size: f64) 
             h: state.h - d.z,
             ..*state
         },
-        V => NavState { v_n: state.v_n + d, ..*state },
-        PSI => NavState { q_b_n: DQuat::from_scaled_axis(d) * state.q_b_n, ..*state },
+        V => NavState {
+            v_n: state.v_n + d,
+            ..*state
+        },
+        PSI => NavState {
+            q_b_n: DQuat::from_scaled_axis(d) * state.q_b_n,
+            ..*state
+        },
         _ => *state,
     }
 }
@@ -83,7 +102,10 @@ fn numeric_transition(state: &NavState, omega: DVec3, f: DVec3, dt: f64) -> SMat
         }
         ins.step(dtheta, dv, dt);
         let nominal = ins.lane(0);
-        let (plus, minus) = (error_of(&ins.lane(1), &nominal), error_of(&ins.lane(2), &nominal));
+        let (plus, minus) = (
+            error_of(&ins.lane(1), &nominal),
+            error_of(&ins.lane(2), &nominal),
+        );
         for row in 0..9 {
             result[(row, column)] = (plus[row] - minus[row]) / (2.0 * PERTURBATION[block]);
         }
@@ -100,10 +122,15 @@ fn filter_transition(state: &NavState, omega: DVec3, f: DVec3, dt: f64) -> SMatr
     let mut result = SMatrix::<f64, 9, 15>::zeros();
     for column in 0..15 {
         let unit = |block: usize| {
-            Vec3::splat(if column / 3 == block { DVec3::AXES[column % 3] } else { DVec3::ZERO })
+            Vec3::splat(if column / 3 == block {
+                DVec3::AXES[column % 3]
+            } else {
+                DVec3::ZERO
+            })
         };
         let x = [unit(R), unit(V), unit(PSI)];
-        let after = EarthStep { terms, dt }.apply(sample.apply(x, unit(3), unit(4)), unit(3), unit(4));
+        let after =
+            EarthStep { terms, dt }.apply(sample.apply(x, unit(3), unit(4)), unit(3), unit(4));
         for row in 0..9 {
             result[(row, column)] = after[row / 3][row % 3][0];
         }
@@ -120,11 +147,17 @@ fn every_block_of_f_agrees_with_central_differences() {
     let dt = 1e-3;
     for _ in 0..100_000 {
         let (state, omega, f) = random_case(&mut g);
-        let (numeric, filter) =
-            (numeric_transition(&state, omega, f, dt), filter_transition(&state, omega, f, dt));
+        let (numeric, filter) = (
+            numeric_transition(&state, omega, f, dt),
+            filter_transition(&state, omega, f, dt),
+        );
         for (row, column) in (0..15).map(|k| (k / 5, k % 5)) {
             let block = |m: &SMatrix<f64, 9, 15>| -> Matrix3<f64> {
-                let identity = if row == column { Matrix3::identity() } else { Matrix3::zeros() };
+                let identity = if row == column {
+                    Matrix3::identity()
+                } else {
+                    Matrix3::zeros()
+                };
                 (m.fixed_view::<3, 3>(3 * row, 3 * column) - identity) / dt
             };
             let (numeric, filter) = (block(&numeric), block(&filter));
@@ -135,13 +168,20 @@ fn every_block_of_f_agrees_with_central_differences() {
             // of (V, R) what changes with latitude is 1/400 of what changes with height
             let relative = if (row, column) == (V, R) { 3e-5 } else { 2e-3 };
             let bound = relative * numeric.amax() + rounding;
-            assert!(worst <= bound, "block ({row}, {column}): {worst:e} > {bound:e}\n{numeric}{filter}");
+            assert!(
+                worst <= bound,
+                "block ({row}, {column}): {worst:e} > {bound:e}\n{numeric}{filter}"
+            );
         }
     }
 }
 
 fn model(accel: [Process; 2], gyro: [Process; 2]) -> Model {
-    Model::pooled(100.0, &Composite::new(accel.to_vec()), &Composite::new(gyro.to_vec()))
+    Model::pooled(
+        100.0,
+        &Composite::new(accel.to_vec()),
+        &Composite::new(gyro.to_vec()),
+    )
 }
 
 pub(super) fn gauss_markov_model() -> Model {
@@ -160,8 +200,16 @@ pub(super) fn gauss_markov_model() -> Model {
 
 /// A vehicle that circles while it climbs and brakes: what its IMU measures at time t.
 pub(super) fn manoeuvre(t: f64) -> (DVec3, DVec3) {
-    let omega = DVec3::new(0.05 * (0.9 * t).sin(), 0.03 * (0.7 * t).cos(), 0.2 * (0.05 * t).sin());
-    let f = DVec3::new(1.5 * (0.11 * t).sin(), 2.0 * (0.05 * t).sin(), -9.81 + 0.5 * (0.8 * t).cos());
+    let omega = DVec3::new(
+        0.05 * (0.9 * t).sin(),
+        0.03 * (0.7 * t).cos(),
+        0.2 * (0.05 * t).sin(),
+    );
+    let f = DVec3::new(
+        1.5 * (0.11 * t).sin(),
+        2.0 * (0.05 * t).sin(),
+        -9.81 + 0.5 * (0.8 * t).cos(),
+    );
     (omega, f)
 }
 
@@ -174,7 +222,12 @@ fn ekf(model: &Model, states: FilterStates) -> Ekf {
         v_n: DVec3::new(15.0, -5.0, 0.5),
         q_b_n: DQuat::from_scaled_axis(DVec3::new(0.05, -0.1, 1.0)),
     };
-    Ekf::new(Strapdown::new(&start, GravityModel::Wgs84), &belief, &start, &InitialSettings::default())
+    Ekf::new(
+        Strapdown::new(&start, GravityModel::Wgs84),
+        &belief,
+        &start,
+        &InitialSettings::default(),
+    )
 }
 
 /// One IMU sample, the same in all lanes.
@@ -213,7 +266,13 @@ fn bias_step(p: &Matrix15) -> Matrix15 {
     let phi: [f64; 2] = [(-0.01_f64 / 200.0).exp(), (-0.01_f64 / 500.0).exp()];
     let variance = [9e-4, 1e-8];
     let decay = |i: usize| if i < 9 { 1.0 } else { phi[i / 3 - 3] };
-    let q = |i: usize| if i < 9 { 0.0 } else { variance[i / 3 - 3] * (1.0 - phi[i / 3 - 3].powi(2)) };
+    let q = |i: usize| {
+        if i < 9 {
+            0.0
+        } else {
+            variance[i / 3 - 3] * (1.0 - phi[i / 3 - 3].powi(2))
+        }
+    };
     Matrix15::from_fn(|i, j| decay(i) * p[(i, j)] * decay(j) + if i == j { q(i) } else { 0.0 })
 }
 
@@ -247,7 +306,10 @@ fn covariance_agrees_with_the_matrix_exponential_over_a_run() {
             settle(&mut ekf);
             for i in 0..15 {
                 let ratio = (ekf.p.get::<Lanes>(i, i)[0] / p[(i, i)]).sqrt();
-                assert!((ratio - 1.0).abs() < 1e-4, "state {i} at {second} s: ratio {ratio}");
+                assert!(
+                    (ratio - 1.0).abs() < 1e-4,
+                    "state {i} at {second} s: ratio {ratio}"
+                );
             }
         }
     }
@@ -310,7 +372,10 @@ fn extreme_measurements(epochs: u32) {
         let scale = DMatrix::from_diagonal(&p.diagonal().map(|v| 1.0 / v.sqrt()));
         let correlation = &scale * &p * &scale;
         assert!(p == p.transpose(), "exactly symmetric");
-        assert!(correlation.cholesky().is_some(), "variance {variance:e}: not positive definite");
+        assert!(
+            correlation.cholesky().is_some(),
+            "variance {variance:e}: not positive definite"
+        );
     }
 }
 
@@ -321,12 +386,17 @@ fn splitting_a_bias_into_two_states_changes_nothing_outside() {
     let one = gauss_markov_model();
     let mut two = one.clone();
     for axis in &mut two.axes {
-        let Process::Ar1(bias) = axis.processes[1] else { unreachable!("the model's second process") };
+        let Process::Ar1(bias) = axis.processes[1] else {
+            unreachable!("the model's second process")
+        };
         let part = |share: f64| Process::Ar1(Ar1::new(bias.phi(), bias.sigma2() * share).unwrap());
         axis.processes.splice(1.., [part(0.3), part(0.7)]);
     }
-    let mut filters =
-        [ekf(&one, FilterStates::Reduced15), ekf(&one, FilterStates::Full), ekf(&two, FilterStates::Full)];
+    let mut filters = [
+        ekf(&one, FilterStates::Reduced15),
+        ekf(&one, FilterStates::Full),
+        ekf(&two, FilterStates::Full),
+    ];
     for filter in &mut filters {
         for k in 0..3000 {
             let (omega, f) = manoeuvre(k as f64 * 0.01);
@@ -373,7 +443,12 @@ fn every_vector_unit_computes_the_same() {
     let (p, q) = (portable.p.lane(3), avx2.p.lane(3));
     for (i, j) in (0..15).flat_map(|i| (0..15).map(move |j| (i, j))) {
         let scale = (p[(i, i)] * p[(j, j)]).sqrt();
-        assert!((p[(i, j)] - q[(i, j)]).abs() <= 1e-9 * scale, "({i}, {j}): {} {}", p[(i, j)], q[(i, j)]);
+        assert!(
+            (p[(i, j)] - q[(i, j)]).abs() <= 1e-9 * scale,
+            "({i}, {j}): {} {}",
+            p[(i, j)],
+            q[(i, j)]
+        );
     }
     let (a, b) = (portable.nominal.lane(3), avx2.nominal.lane(3));
     let difference = error_of(&a, &b);

@@ -40,7 +40,9 @@ impl Transition {
     }
 
     fn matrix(&self) -> DMatrix<f64> {
-        DMatrix::from_fn(self.dim, self.dim, |i, j| self.columns[j / LANES * self.dim + i][j % LANES])
+        DMatrix::from_fn(self.dim, self.dim, |i, j| {
+            self.columns[j / LANES * self.dim + i][j % LANES]
+        })
     }
 }
 
@@ -55,7 +57,10 @@ impl Ekf {
     /// when the filter is settled; the identity where none is kept.
     pub(crate) fn take_transition(&mut self) -> DMatrix<f64> {
         let fresh = Transition::identity(self.p.dim());
-        self.transition.replace(fresh).unwrap_or_else(|| Transition::identity(self.p.dim())).matrix()
+        self.transition
+            .replace(fresh)
+            .unwrap_or_else(|| Transition::identity(self.p.dim()))
+            .matrix()
     }
 }
 
@@ -82,11 +87,18 @@ mod tests {
     /// in every block, with turn-on biases, drifts and scale factors.
     #[test]
     fn the_transition_is_that_of_the_covariance() {
-        let turn_on = InitialSettings { gyro_bias_sigma_rad_s: Some(1e-3), ..InitialSettings::default() };
+        let turn_on = InitialSettings {
+            gyro_bias_sigma_rad_s: Some(1e-3),
+            ..InitialSettings::default()
+        };
         let mut belief = Belief::new(&gauss_markov_model(), FilterStates::Reduced21, 1.0, 800.0)
             .unwrap()
             .with_initial(&turn_on);
-        belief.set_unknown(Sensor::Accel, UnknownKind::Drift, DVec3::new(1e-6, 2e-6, 3e-6));
+        belief.set_unknown(
+            Sensor::Accel,
+            UnknownKind::Drift,
+            DVec3::new(1e-6, 2e-6, 3e-6),
+        );
         let start = NavState {
             lat: 0.8,
             lon: 0.1,
@@ -95,7 +107,8 @@ mod tests {
             q_b_n: DQuat::from_scaled_axis(DVec3::new(0.05, -0.1, 1.0)),
         };
         let nominal = Strapdown::new(&start, GravityModel::Wgs84);
-        let mut filters = [0, 1].map(|_| Ekf::new(nominal, &belief, &start, &InitialSettings::default()));
+        let mut filters =
+            [0, 1].map(|_| Ekf::new(nominal, &belief, &start, &InitialSettings::default()));
         let correlated = correlated(&filters[0].p.lane(0));
         filters[0].p.set_lane(0, &correlated);
         filters.iter_mut().for_each(Ekf::keep_transition);
@@ -114,7 +127,10 @@ mod tests {
         assert_eq!(found.nrows(), 27);
         for (i, j) in (0..27).flat_map(|i| (0..27).map(move |j| (i, j))) {
             let scale = ((p[(i, i)] + q[(i, i)]) * (p[(j, j)] + q[(j, j)])).sqrt();
-            assert!((found[(i, j)] - expected[(i, j)]).abs() <= 1e-12 * scale, "({i}, {j})");
+            assert!(
+                (found[(i, j)] - expected[(i, j)]).abs() <= 1e-12 * scale,
+                "({i}, {j})"
+            );
         }
         assert_eq!(filters[0].take_transition(), DMatrix::identity(27, 27));
     }

@@ -36,7 +36,10 @@ pub(super) struct Regressor {
 impl Regressor {
     /// The regressor of an unknown before the first sample: zero.
     pub(super) const fn of(unknown: &Unknown) -> Self {
-        Self { kind: unknown.kind, value: Vec3::ZERO }
+        Self {
+            kind: unknown.kind,
+            value: Vec3::ZERO,
+        }
     }
 }
 
@@ -66,7 +69,11 @@ impl Ekf {
     pub(crate) fn bias_sigma(&self, sensor: Sensor) -> Vec3 {
         let sources = self.sources();
         let [accel, gyro] = sources.biases;
-        let blocks = if sensor == Sensor::Accel { 0..accel } else { accel..accel + gyro };
+        let blocks = if sensor == Sensor::Accel {
+            0..accel
+        } else {
+            accel..accel + gyro
+        };
         let one = Vec3::splat(DVec3::ONE);
         let groups = blocks.map(move |g| (BIAS + g, one));
         self.deviation(groups.chain(self.drift_term(sensor)))
@@ -88,14 +95,17 @@ impl Ekf {
     /// The block of an unknown of a sensor, if there is one.
     fn unknown_block(&self, sensor: Sensor, kind: UnknownKind) -> Option<usize> {
         let sources = self.sources();
-        let u = sources.regressors[sensor as usize].iter().position(|r| r.kind == kind)?;
+        let u = sources.regressors[sensor as usize]
+            .iter()
+            .position(|r| r.kind == kind)?;
         Some(BIAS + sources.unknowns(sensor) + u)
     }
 
     /// The slope of a sensor's drift and the age of the last sample.
     fn drift_term(&self, sensor: Sensor) -> Option<Term> {
-        let drift =
-            self.sources().regressors[sensor as usize].iter().find(|r| r.kind == UnknownKind::Drift)?;
+        let drift = self.sources().regressors[sensor as usize]
+            .iter()
+            .find(|r| r.kind == UnknownKind::Drift)?;
         Some((self.unknown_block(sensor, UnknownKind::Drift)?, drift.value))
     }
 
@@ -105,7 +115,9 @@ impl Ekf {
             // Var(Σ c_a x_a) with all covariances: after some fixes the groups of an axis are strongly
             // anti-correlated (the sum is observed, not its parts), and a sum of variances would be too large
             // many times over.
-            let pairs = terms.clone().flat_map(|a| terms.clone().map(move |b| (a, b)));
+            let pairs = terms
+                .clone()
+                .flat_map(|a| terms.clone().map(move |b| (a, b)));
             pairs.fold(Lanes::ZERO, |sum, ((a, of_a), (b, of_b))| {
                 sum + self.p.get::<Lanes>(3 * a + axis, 3 * b + axis) * of_a[axis] * of_b[axis]
             })

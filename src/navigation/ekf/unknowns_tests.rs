@@ -5,8 +5,8 @@ use super::belief::BiasGroup;
 use super::covariance::{PSI, V};
 use super::dynamics::EarthTerms;
 use super::tests::{
-    Matrix15, continuous_f, continuous_q, error_of, fix_at_nominal, gauss_markov_model, generator, manoeuvre,
-    predict, random_case,
+    Matrix15, continuous_f, continuous_q, error_of, fix_at_nominal, gauss_markov_model, generator,
+    manoeuvre, predict, random_case,
 };
 use super::{Belief, Ekf, FilterStates, InitialSettings, UnknownKind, settle, update};
 use crate::earth::{self, GravityModel};
@@ -24,7 +24,8 @@ const DIM: usize = 27;
 
 /// The 15-state filter with drifts and scale factors of both sensors, each axis with its own.
 fn belief() -> Belief {
-    let mut belief = Belief::new(&gauss_markov_model(), FilterStates::Reduced15, 1.0, 800.0).unwrap();
+    let mut belief =
+        Belief::new(&gauss_markov_model(), FilterStates::Reduced15, 1.0, 800.0).unwrap();
     for (sensor, unit) in [(Sensor::Accel, 1.0), (Sensor::Gyro, 1e-2)] {
         let axes = DVec3::new(1.0, 2.0, 3.0);
         belief.set_unknown(sensor, UnknownKind::Drift, axes * unit * 1e-6);
@@ -36,17 +37,31 @@ fn belief() -> Belief {
 
 fn start() -> NavState {
     let q_b_n = DQuat::from_scaled_axis(DVec3::new(0.05, -0.1, 1.0));
-    NavState { lat: 0.8, lon: 0.1, h: 400.0, v_n: DVec3::new(15.0, -5.0, 0.5), q_b_n }
+    NavState {
+        lat: 0.8,
+        lon: 0.1,
+        h: 400.0,
+        v_n: DVec3::new(15.0, -5.0, 0.5),
+        q_b_n,
+    }
 }
 
 fn ekf(belief: &Belief, state: &NavState, initial: &InitialSettings) -> Ekf {
-    Ekf::new(Strapdown::new(state, GravityModel::Wgs84), belief, state, initial)
+    Ekf::new(
+        Strapdown::new(state, GravityModel::Wgs84),
+        belief,
+        state,
+        initial,
+    )
 }
 
 /// Squares of the deviations, of attitude those of roll, pitch and yaw of a level vehicle.
 #[test]
 fn the_covariance_at_the_start_is_what_is_believed() {
-    let level = NavState { q_b_n: DQuat::IDENTITY, ..start() };
+    let level = NavState {
+        q_b_n: DQuat::IDENTITY,
+        ..start()
+    };
     let initial = InitialSettings {
         pos_sigma_m: [2.0, 3.0, 4.0],
         vel_sigma_m_s: [0.1, 0.2, 0.3],
@@ -57,7 +72,11 @@ fn the_covariance_at_the_start_is_what_is_believed() {
     let angles = initial.att_sigma_deg.map(f64::to_radians);
     let sigmas = [initial.pos_sigma_m, initial.vel_sigma_m_s, angles].concat();
     for (i, sigma) in sigmas.iter().enumerate() {
-        assert!((p[(i, i)] - sigma * sigma).abs() < 1e-15 * (1.0 + p[(i, i)]), "{i}: {}", p[(i, i)]);
+        assert!(
+            (p[(i, i)] - sigma * sigma).abs() < 1e-15 * (1.0 + p[(i, i)]),
+            "{i}: {}",
+            p[(i, i)]
+        );
     }
 }
 
@@ -66,9 +85,18 @@ fn the_covariance_at_the_start_is_what_is_believed() {
 fn flicker_noise_starts_with_its_variance() {
     let noise = FlickerNoise::new(1e-8).unwrap();
     let axis = Composite::new(vec![Process::Flicker(noise)]);
-    let belief = Belief::new(&Model::pooled(100.0, &axis, &axis), FilterStates::Full, 1.0, 800.0).unwrap();
+    let belief = Belief::new(
+        &Model::pooled(100.0, &axis, &axis),
+        FilterStates::Full,
+        1.0,
+        800.0,
+    )
+    .unwrap();
     let variance: f64 = belief.groups[0].iter().map(|group| group.initial.x).sum();
-    assert!((variance / noise.initial_variance() - 1.0).abs() < 1e-12, "{variance}");
+    assert!(
+        (variance / noise.initial_variance() - 1.0).abs() < 1e-12,
+        "{variance}"
+    );
 }
 
 /// A turn-on bias has a state beside the processes of the model, which stay; a second one adds its variance to the first, and
@@ -81,24 +109,51 @@ fn a_turn_on_bias_is_beside_what_wanders() {
         let axis = Composite::new(processes);
         let model = Model::pooled(100.0, &axis, &axis);
         let mut belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
-        [0.03, 0.04].iter().for_each(|sigma| belief.add_constant(Sensor::Accel, *sigma));
+        [0.03, 0.04]
+            .iter()
+            .for_each(|sigma| belief.add_constant(Sensor::Accel, *sigma));
         let groups = &belief.groups[0];
-        assert_eq!((groups.len(), belief.states), (others + 1, 9 + 6 * others + 3));
-        assert!(groups[..others].iter().all(|walk| walk.innovation.x == 1e-10 && walk.initial.x == 0.0));
+        assert_eq!(
+            (groups.len(), belief.states),
+            (others + 1, 9 + 6 * others + 3)
+        );
+        assert!(
+            groups[..others]
+                .iter()
+                .all(|walk| walk.innovation.x == 1e-10 && walk.initial.x == 0.0)
+        );
         let constant = groups[others];
-        assert!(constant.phi.x == 1.0 && constant.innovation.x == 0.0, "{constant:?}");
-        assert!((constant.initial.x - 0.05 * 0.05).abs() < 1e-15, "{constant:?}");
+        assert!(
+            constant.phi.x == 1.0 && constant.innovation.x == 0.0,
+            "{constant:?}"
+        );
+        assert!(
+            (constant.initial.x - 0.05 * 0.05).abs() < 1e-15,
+            "{constant:?}"
+        );
     }
 }
 
 /// What a filter that integrates feels of several white processes: the sum over all time of their covariance with one sample.
 #[test]
 fn white_noises_add_up_to_their_long_run_variance() {
-    let parts = [Process::White(White::new(3.0).unwrap()), Process::Ma1(Ma1::new(-0.5, 8.0).unwrap())];
+    let parts = [
+        Process::White(White::new(3.0).unwrap()),
+        Process::Ma1(Ma1::new(-0.5, 8.0).unwrap()),
+    ];
     let axis = Composite::new(parts.to_vec());
-    let belief = Belief::new(&Model::pooled(100.0, &axis, &axis), FilterStates::Full, 1.0, 800.0).unwrap();
+    let belief = Belief::new(
+        &Model::pooled(100.0, &axis, &axis),
+        FilterStates::Full,
+        1.0,
+        800.0,
+    )
+    .unwrap();
     // MA1: (1 + theta²) sigma² of the sample itself, theta sigma² with each neighbour
-    assert_eq!(belief.white, [DVec3::splat(3.0 + 8.0 * (1.25 - 2.0 * 0.5)); 2]);
+    assert_eq!(
+        belief.white,
+        [DVec3::splat(3.0 + 8.0 * (1.25 - 2.0 * 0.5)); 2]
+    );
 }
 
 /// Column of one unknown in the transition of a sample, by central differences of the strapdown: an estimate
@@ -116,13 +171,19 @@ fn numeric_column(
     let mut increments = sample.map(|s| Vec3::splat(s * dt));
     for (lane, sign) in [(1, 1.0), (2, -1.0)] {
         let mut changed = sample[sensor];
-        changed[axis] =
-            if is_scale { changed[axis] / (1.0 + sign * size) } else { changed[axis] - sign * size * age };
+        changed[axis] = if is_scale {
+            changed[axis] / (1.0 + sign * size)
+        } else {
+            changed[axis] - sign * size * age
+        };
         increments[sensor].set_lane(lane, changed * dt);
     }
     ins.step(increments[1], increments[0], dt);
     let nominal = ins.lane(0);
-    let (plus, minus) = (error_of(&ins.lane(1), &nominal), error_of(&ins.lane(2), &nominal));
+    let (plus, minus) = (
+        error_of(&ins.lane(1), &nominal),
+        error_of(&ins.lane(2), &nominal),
+    );
     std::array::from_fn(|i| (plus[i] - minus[i]) / (2.0 * size))
 }
 
@@ -146,8 +207,10 @@ fn columns_of_unknowns_agree_with_central_differences() {
     for k in 0..3000 {
         let (state, omega, f) = random_case(&mut g);
         let unknown = k % 12;
-        let (sensor, kind) =
-            (Sensor::ALL[unknown / 6], [UnknownKind::Drift, UnknownKind::ScaleFactor][unknown / 3 % 2]);
+        let (sensor, kind) = (
+            Sensor::ALL[unknown / 6],
+            [UnknownKind::Drift, UnknownKind::ScaleFactor][unknown / 3 % 2],
+        );
         let mut one = silent.clone();
         for other in Sensor::ALL {
             for kind in [UnknownKind::Drift, UnknownKind::ScaleFactor] {
@@ -162,15 +225,23 @@ fn columns_of_unknowns_agree_with_central_differences() {
         predict(&mut filter, omega, f);
         let size = 1e-3;
         let numeric = numeric_column(&state, [f, omega], unknown, size, age, dt);
-        let column: Vec<f64> = (0..9).map(|i| filter.p.get::<Lanes>(i, UNKNOWNS + unknown)[0]).collect();
+        let column: Vec<f64> = (0..9)
+            .map(|i| filter.p.get::<Lanes>(i, UNKNOWNS + unknown)[0])
+            .collect();
         let scale = |of: &[f64], block: usize| {
-            of[3 * block..3 * block + 3].iter().fold(0.0_f64, |m, x| m.max(x.abs()))
+            of[3 * block..3 * block + 3]
+                .iter()
+                .fold(0.0_f64, |m, x| m.max(x.abs()))
         };
         for i in 0..9 {
             // rounding of a difference of latitudes, velocities, quaternions
             let rounding = [4e-9, 1e-12, 4e-15][i / 3] / size;
             // the transport rate of a velocity error, (1 + tan lat)/R, is among the Earth's terms, which lag
-            let transport = if i / 3 == PSI { 7e-7 * dt * scale(&numeric, V) } else { 0.0 };
+            let transport = if i / 3 == PSI {
+                7e-7 * dt * scale(&numeric, V)
+            } else {
+                0.0
+            };
             // where the tilt is nearly along f, what is left of ½ psi × f dt is small beside its second order in ω dt
             let second_order = match i / 3 {
                 V => 0.5 * scale(&numeric, PSI) * f.length() * dt * omega.length() * dt,
@@ -185,7 +256,10 @@ fn columns_of_unknowns_agree_with_central_differences() {
                 let (p, product) = (filter.p.get::<Lanes>(i, j)[0], column[i] * column[j]);
                 // where the column is zero, the other unknowns' deviations of 1e-30 are left
                 let bound = 1e-12 * scale(&column, i / 3) * scale(&column, j / 3) + 1e-50;
-                assert!((p - product).abs() <= bound, "({i}, {j}): {p:e} {product:e}");
+                assert!(
+                    (p - product).abs() <= bound,
+                    "({i}, {j}): {p:e} {product:e}"
+                );
             }
         }
     }
@@ -194,19 +268,30 @@ fn columns_of_unknowns_agree_with_central_differences() {
 /// A sample spoilt by exactly what the filter estimates is navigated as the clean one.
 #[test]
 fn samples_are_corrected_by_what_is_estimated() {
-    let (scale, slope, bias) =
-        (DVec3::new(1e-2, -2e-2, 3e-2), DVec3::new(3e-4, -1e-4, 2e-4), DVec3::splat(0.01));
+    let (scale, slope, bias) = (
+        DVec3::new(1e-2, -2e-2, 3e-2),
+        DVec3::new(3e-4, -1e-4, 2e-4),
+        DVec3::splat(0.01),
+    );
     let mut filter = ekf(&belief(), &start(), &InitialSettings::default());
     let mut clean = Strapdown::new(&start(), GravityModel::Wgs84);
     let spoilt = |truth: DVec3, k: u32| truth * (DVec3::ONE + scale) + bias + slope * f64::from(k);
     for sensor in Sensor::ALL {
         let first = filter.sources().unknowns(sensor);
         let groups = filter.belief.groups.clone();
-        filter.estimates[if sensor == Sensor::Accel { 0 } else { groups[0].len() }] = Vec3::splat(bias);
-        (filter.estimates[first], filter.estimates[first + 1]) = (Vec3::splat(slope), Vec3::splat(scale));
+        filter.estimates[if sensor == Sensor::Accel {
+            0
+        } else {
+            groups[0].len()
+        }] = Vec3::splat(bias);
+        (filter.estimates[first], filter.estimates[first + 1]) =
+            (Vec3::splat(slope), Vec3::splat(scale));
     }
     // biases that do not fade
-    filter.steps.iter_mut().for_each(|step| step.phi = DVec3::ONE);
+    filter
+        .steps
+        .iter_mut()
+        .for_each(|step| step.phi = DVec3::ONE);
     for k in 1..=500 {
         let (omega, f) = manoeuvre(f64::from(k) * 0.01);
         predict(&mut filter, spoilt(omega, k), spoilt(f, k));
@@ -215,7 +300,10 @@ fn samples_are_corrected_by_what_is_estimated() {
     let error = error_of(&filter.nominal.lane(0), &clean.lane(0));
     assert!(error.iter().all(|e| e.abs() < 1e-9), "{error:?}");
     let bias_of = filter.bias_of::<Lanes>(Sensor::Gyro).lane(4);
-    assert!((bias_of - bias - slope * 500.0).length() < 1e-15, "{bias_of}");
+    assert!(
+        (bias_of - bias - slope * 500.0).length() < 1e-15,
+        "{bias_of}"
+    );
     assert_eq!(filter.scale_of(Sensor::Accel).unwrap().lane(2), scale);
 }
 
@@ -273,10 +361,17 @@ fn covariance_agrees_with_dense_matrices_over_a_run() {
         let (omega, f) = manoeuvre((f64::from(k) + 0.5) * 0.01);
         let terms = EarthTerms::at(&filters[0].nominal);
         let before = filters[0].nominal.q_b_n.to_matrix().lane(0);
-        filters.iter_mut().for_each(|filter| predict(filter, omega, f));
+        filters
+            .iter_mut()
+            .for_each(|filter| predict(filter, omega, f));
         let c = (before + filters[0].nominal.q_b_n.to_matrix().lane(0)) * 0.5;
         let age = DVec3::splat(f64::from(k + 1));
-        p = dense_step(&p, &dense_f(&continuous_f(&terms, &c, f), [age, f, age, omega]), &filters[0], 0.01);
+        p = dense_step(
+            &p,
+            &dense_f(&continuous_f(&terms, &c, f), [age, f, age, omega]),
+            &filters[0],
+            0.01,
+        );
         if (k + 1) % 100 != 0 {
             continue;
         }
@@ -292,13 +387,18 @@ fn covariance_agrees_with_dense_matrices_over_a_run() {
             // where the antenna would be seen without error: the estimates stay zero
             let shift = filters[0].innovation(&fix);
             fix = fix_without_innovation(&filters[0], fix, shift);
-            filters.iter_mut().for_each(|filter| _ = update(filter, &fix));
+            filters
+                .iter_mut()
+                .for_each(|filter| _ = update(filter, &fix));
         }
         for filter in &mut filters {
             settle(filter);
             for i in 0..DIM {
                 let ratio = (filter.p.get::<Lanes>(i, i)[0] / p[(i, i)]).sqrt();
-                assert!((ratio - 1.0).abs() < 1e-4, "state {i} at sample {k}: ratio {ratio}");
+                assert!(
+                    (ratio - 1.0).abs() < 1e-4,
+                    "state {i} at sample {k}: ratio {ratio}"
+                );
             }
         }
     }
@@ -310,14 +410,26 @@ fn covariance_agrees_with_dense_matrices_over_a_run() {
         let (bias, drift) = (9 + 3 * sensor as usize, first - 3);
         let sum = p[(bias, bias)] + 2.0 * 6000.0 * p[(bias, drift)] + 3.6e7 * p[(drift, drift)];
         let got = filters[0].bias_sigma(sensor).lane(0).x;
-        assert!((got / sum.sqrt() - 1.0).abs() < 2e-3, "{got} {}", sum.sqrt());
+        assert!(
+            (got / sum.sqrt() - 1.0).abs() < 2e-3,
+            "{got} {}",
+            sum.sqrt()
+        );
     }
 }
 
 /// The fix whose innovation is zero.
-fn fix_without_innovation(filter: &Ekf, mut fix: super::Fix, [position, velocity]: [Vec3; 2]) -> super::Fix {
+fn fix_without_innovation(
+    filter: &Ekf,
+    mut fix: super::Fix,
+    [position, velocity]: [Vec3; 2],
+) -> super::Fix {
     let at = filter.nominal.lane(0);
-    let (r, z, v) = (earth::radii(at.lat.sin()), position.lane(0), velocity.lane(0));
+    let (r, z, v) = (
+        earth::radii(at.lat.sin()),
+        position.lane(0),
+        velocity.lane(0),
+    );
     fix.lat = Lanes::splat(fix.lat[0] + z.x / (r.meridian + at.h));
     fix.lon = Lanes::splat(fix.lon[0] + z.y / ((r.transverse + at.h) * at.lat.cos()));
     fix.h = Lanes::splat(fix.h[0] - z.z);

@@ -54,7 +54,11 @@ impl Ekf {
         if fix.v_n.is_some() {
             for axis in 0..3 {
                 let row = antenna.velocity_row(axis, &self.sources());
-                nis += self.scalar(row.entries(), velocity[axis], fix.vel_sigma_m_s[axis].powi(2));
+                nis += self.scalar(
+                    row.entries(),
+                    velocity[axis],
+                    fix.vel_sigma_m_s[axis].powi(2),
+                );
             }
         }
         self.correct(ins);
@@ -107,7 +111,9 @@ impl Ekf {
             innovation -= *c * W::load(&scratch.error[*i]);
         }
         for (error, gain) in scratch.error.iter_mut().zip(&scratch.gain) {
-            W::load(gain).mul_add(innovation, W::load(error)).store(error);
+            W::load(gain)
+                .mul_add(innovation, W::load(error))
+                .store(error);
         }
         (innovation, s)
     }
@@ -115,7 +121,11 @@ impl Ekf {
     /// Takes the estimated error out of the nominal state and the biases.
     #[inline(always)]
     pub(super) fn correct<W: Wide>(&mut self, mut ins: Strapdown<W>) {
-        let (dr, dv, psi) = (self.scratch.of::<W>(R), self.scratch.of(V), self.scratch.of(PSI));
+        let (dr, dv, psi) = (
+            self.scratch.of::<W>(R),
+            self.scratch.of(V),
+            self.scratch.of(PSI),
+        );
         let (s, c) = ins.lat.sin_cos();
         let radii = radii(s);
         // The order matters: longitude and latitude take the metres back with the radii, height and latitude
@@ -185,7 +195,9 @@ impl Kernel for UpdateHeight<'_> {
     #[inline(always)]
     fn run<W: Wide>(self) -> Lanes {
         let mut nis = Lanes::ZERO;
-        self.ekf.use_height(W::load(self.h), self.sigma_m).store(&mut nis);
+        self.ekf
+            .use_height(W::load(self.h), self.sigma_m)
+            .store(&mut nis);
         nis
     }
 }
@@ -256,25 +268,41 @@ impl<W: Wide> Antenna<W> {
         // longitudes may differ by whole turns
         let dlon = ins.lon - lon;
         let dlon = dlon - rounded(dlon * (1.0 / TAU)) * TAU;
-        let (north, east) = ((ins.lat - lat) * (r.meridian + ins.h), dlon * (r.transverse + ins.h) * c);
+        let (north, east) = (
+            (ins.lat - lat) * (r.meridian + ins.h),
+            dlon * (r.transverse + ins.h) * c,
+        );
         let velocity = fix.v_n.map(|v_n| ins.v_n + self.swing_n - v_n.load());
-        [Vec3([north, east, h - ins.h]) + self.arm_n, velocity.unwrap_or(Vec3::splat(DVec3::ZERO))]
+        [
+            Vec3([north, east, h - ins.h]) + self.arm_n,
+            velocity.unwrap_or(Vec3::splat(DVec3::ZERO)),
+        ]
     }
 }
 
 /// The measurement rows of a fix about a nominal state: position north, east, down, then velocity. Twelve
 /// coefficients each: R, V, PSI, and the error of the gyroscope's bias.
 #[must_use]
-pub(crate) fn fix_rows(ins: &Strapdown<f64>, omega_ib_b: DVec3, lever_arm_b: DVec3) -> [[f64; 12]; 6] {
+pub(crate) fn fix_rows(
+    ins: &Strapdown<f64>,
+    omega_ib_b: DVec3,
+    lever_arm_b: DVec3,
+) -> [[f64; 12]; 6] {
     let antenna = Antenna::new(ins, Vec3::splat(omega_ib_b), lever_arm_b);
     std::array::from_fn(|i| {
-        let mut row = if i < 3 { antenna.position_row(i) } else { Row::new(3 * V + i - 3) };
+        let mut row = if i < 3 {
+            antenna.position_row(i)
+        } else {
+            Row::new(3 * V + i - 3)
+        };
         if i >= 3 {
             row.push3(3 * PSI, antenna.of_psi.0[i - 3]);
             row.push3(3 * BIAS, antenna.of_bias.0[i - 3]);
         }
         let mut dense = [0.0; 12];
-        row.entries().iter().for_each(|(state, coefficient)| dense[*state] += coefficient);
+        row.entries()
+            .iter()
+            .for_each(|(state, coefficient)| dense[*state] += coefficient);
         dense
     })
 }
@@ -288,7 +316,10 @@ pub(super) struct Row<L> {
 impl<L: Real> Default for Row<L> {
     #[inline(always)]
     fn default() -> Self {
-        Self { entries: [(0, L::from(0.0)); MAX_ROW], len: 0 }
+        Self {
+            entries: [(0, L::from(0.0)); MAX_ROW],
+            len: 0,
+        }
     }
 }
 
@@ -308,7 +339,10 @@ impl<L: Real> Row<L> {
 
     #[inline(always)]
     pub(super) fn push3(&mut self, first: usize, coefficients: [L; 3]) {
-        coefficients.into_iter().enumerate().for_each(|(i, c)| self.push(first + i, c));
+        coefficients
+            .into_iter()
+            .enumerate()
+            .for_each(|(i, c)| self.push(first + i, c));
     }
 
     #[inline(always)]
@@ -329,7 +363,10 @@ impl<W: Wide> Row<W> {
         }
         for (u, regressor) in sources.regressors[Sensor::Gyro as usize].iter().enumerate() {
             let Vec3([x, y, z]) = regressor.value.load::<W>();
-            self.push3(gyro_unknown + 3 * u, [of_bias[0] * x, of_bias[1] * y, of_bias[2] * z]);
+            self.push3(
+                gyro_unknown + 3 * u,
+                [of_bias[0] * x, of_bias[1] * y, of_bias[2] * z],
+            );
         }
     }
 }

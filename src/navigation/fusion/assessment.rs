@@ -2,7 +2,8 @@
 
 use super::outcome::nis_per_component;
 use super::{
-    AidInnovations, Ends, FixRecord, FromReference, Outcome, Solution, Use, Weighed, aid_innovations,
+    AidInnovations, Ends, FixRecord, FromReference, Outcome, Solution, Use, Weighed,
+    aid_innovations,
 };
 use crate::metrics::VerdictKind;
 use crate::simulation::REPORTED_NAMES;
@@ -126,11 +127,19 @@ impl FromReference {
         let (verdict, worst) = if all > ALL_STATES.1 || largest.1 > ONE_STATE {
             (VerdictKind::Overconfident, largest)
         } else if all < ALL_STATES.0 && largest.1 < 1.0 {
-            (VerdictKind::Underconfident, states().min_by(by_size).unwrap_or_default())
+            (
+                VerdictKind::Underconfident,
+                states().min_by(by_size).unwrap_or_default(),
+            )
         } else {
             (VerdictKind::Consistent, largest)
         };
-        Confidence { verdict, error_over_sigma: all, worst_state: worst.0, worst_error_over_sigma: worst.1 }
+        Confidence {
+            verdict,
+            error_over_sigma: all,
+            worst_state: worst.0,
+            worst_error_over_sigma: worst.1,
+        }
     }
 }
 
@@ -148,7 +157,11 @@ pub(super) fn nis_bound(components: usize) -> f64 {
 /// Judges a solution: its fixes with standard deviations as stated, its errors as believed. `of_start` is what speaks
 /// against the start, as the alignment found it.
 #[must_use]
-pub fn assess(weighed: &Weighed, outcome: &Outcome, of_start: &[(VerdictKind, Finding)]) -> Assessment {
+pub fn assess(
+    weighed: &Weighed,
+    outcome: &Outcome,
+    of_start: &[(VerdictKind, Finding)],
+) -> Assessment {
     let mut findings = of_start.to_vec();
     let of_fixes = weighed.judged();
     let correlated = correlated(weighed);
@@ -165,27 +178,46 @@ pub fn assess(weighed: &Weighed, outcome: &Outcome, of_start: &[(VerdictKind, Fi
     if let Some(reference) = outcome.reference {
         // the reference tells what fixes do not
         let is_told = |finding: &Finding| matches!(finding, Finding::Correlated { .. });
-        findings.retain(|(verdict, finding)| *verdict != VerdictKind::Undecided && !is_told(finding));
+        findings
+            .retain(|(verdict, finding)| *verdict != VerdictKind::Undecided && !is_told(finding));
         let confidence = reference.confidence();
         findings.push((confidence.verdict, Finding::Reference(confidence)));
     }
     findings.sort_by_key(|(verdict, _)| std::cmp::Reverse(*verdict));
-    let verdict = findings.first().map_or(VerdictKind::Consistent, |(verdict, _)| *verdict);
+    let verdict = findings
+        .first()
+        .map_or(VerdictKind::Consistent, |(verdict, _)| *verdict);
     Assessment { verdict, findings }
 }
 
 /// Whether the fixes contradict a solution.
 pub(super) fn is_contradicted(solution: &Solution, of_start: &[(VerdictKind, Finding)]) -> bool {
     let found = [Some(nis(solution)), stretches(solution)];
-    of_start.iter().chain(found.iter().flatten()).any(|(verdict, _)| *verdict == VerdictKind::Overconfident)
+    of_start
+        .iter()
+        .chain(found.iter().flatten())
+        .any(|(verdict, _)| *verdict == VerdictKind::Overconfident)
 }
 
 /// Errors that last: with standard deviations as stated, those of the position are too small.
 fn correlated(weighed: &Weighed) -> Option<(VerdictKind, Finding)> {
-    let lag_1 = weighed.whiteness.filter(super::Whiteness::is_correlated)?.lag_1;
+    let lag_1 = weighed
+        .whiteness
+        .filter(super::Whiteness::is_correlated)?
+        .lag_1;
     let pos_sigma_factor = weighed.pos_sigma_factor;
-    let verdict = if pos_sigma_factor > 1.0 { VerdictKind::Undecided } else { VerdictKind::Doubtful };
-    Some((verdict, Finding::Correlated { lag_1, pos_sigma_factor }))
+    let verdict = if pos_sigma_factor > 1.0 {
+        VerdictKind::Undecided
+    } else {
+        VerdictKind::Doubtful
+    };
+    Some((
+        verdict,
+        Finding::Correlated {
+            lag_1,
+            pos_sigma_factor,
+        },
+    ))
 }
 
 fn used(solution: &Solution) -> impl Iterator<Item = &FixRecord> {
@@ -208,11 +240,24 @@ fn nis(solution: &Solution) -> (VerdictKind, Finding) {
 /// Aids that are farther from the solution than stated.
 fn aids(solution: &Solution) -> impl Iterator<Item = (VerdictKind, Finding)> {
     let is_far = |w: &AidInnovations| w.nis_per_component > NIS_LIMITS.0.max(w.nis_band.upper);
-    aid_innovations(&solution.aids).into_iter().filter(is_far).map(
-        |AidInnovations { aid, nis_per_component, .. }| {
-            (VerdictKind::Doubtful, Finding::Aid { aid, nis_per_component })
-        },
-    )
+    aid_innovations(&solution.aids)
+        .into_iter()
+        .filter(is_far)
+        .map(
+            |AidInnovations {
+                 aid,
+                 nis_per_component,
+                 ..
+             }| {
+                (
+                    VerdictKind::Doubtful,
+                    Finding::Aid {
+                        aid,
+                        nis_per_component,
+                    },
+                )
+            },
+        )
 }
 
 /// Minutes in which most fixes are far from what is stated. The farthest tenth of them is left out: single
@@ -226,13 +271,28 @@ fn stretches(solution: &Solution) -> Option<(VerdictKind, Finding)> {
         minutes[minute].push(fix);
     }
     let of = minutes.iter().filter(|m| !m.is_empty()).count();
-    let bad: Vec<(usize, f64)> =
-        minutes.iter().enumerate().filter_map(|(k, fixes)| Some((k, far(fixes)?))).collect();
+    let bad: Vec<(usize, f64)> = minutes
+        .iter()
+        .enumerate()
+        .filter_map(|(k, fixes)| Some((k, far(fixes)?)))
+        .collect();
     let (worst, nis_per_component) = *bad.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     let is_much = bad.len() as f64 > BAD_STRETCHES * of as f64;
-    let verdict = if is_much { VerdictKind::Overconfident } else { VerdictKind::Doubtful };
+    let verdict = if is_much {
+        VerdictKind::Overconfident
+    } else {
+        VerdictKind::Doubtful
+    };
     let worst_s = begin_s + STRETCH_S * worst as f64;
-    Some((verdict, Finding::Minutes { bad: bad.len(), of, worst_s, nis_per_component }))
+    Some((
+        verdict,
+        Finding::Minutes {
+            bad: bad.len(),
+            of,
+            worst_s,
+            nis_per_component,
+        },
+    ))
 }
 
 /// Mean NIS per component of the nearest nine tenths of these fixes, where it is too large.
@@ -262,7 +322,11 @@ fn rejected(outcome: &Outcome) -> Option<(VerdictKind, Finding)> {
 fn ends(outcome: &Outcome) -> Option<(VerdictKind, Finding)> {
     let ends = outcome.ends.filter(|ends| ends.p_value < ENDS.0)?;
     let is_much = ends.error_over_sigma > ENDS.1;
-    let verdict = if is_much { VerdictKind::Overconfident } else { VerdictKind::Doubtful };
+    let verdict = if is_much {
+        VerdictKind::Overconfident
+    } else {
+        VerdictKind::Doubtful
+    };
     Some((verdict, Finding::Ends(ends)))
 }
 
@@ -285,7 +349,10 @@ mod tests {
             horizontal_sigma_m: 1.0,
             error: None,
         };
-        Solution { fixes: (0..seconds).map(fix).collect(), ..Solution::default() }
+        Solution {
+            fixes: (0..seconds).map(fix).collect(),
+            ..Solution::default()
+        }
     }
 
     fn judged(solution: &Solution) -> Assessment {
@@ -308,17 +375,36 @@ mod tests {
         assert_eq!([0.6, 1.0, 1.6].map(verdict), [VerdictKind::Consistent; 3]);
         assert_eq!(
             [0.3, 2.5, 5.0].map(verdict),
-            [VerdictKind::Undecided, VerdictKind::Doubtful, VerdictKind::Overconfident]
+            [
+                VerdictKind::Undecided,
+                VerdictKind::Doubtful,
+                VerdictKind::Overconfident
+            ]
         );
-        assert_eq!(judged(&solution(|_| 1.0, 10)).verdict, VerdictKind::Undecided);
+        assert_eq!(
+            judged(&solution(|_| 1.0, 10)).verdict,
+            VerdictKind::Undecided
+        );
     }
 
     /// Bad minutes count although the mean over the drive hides them; one wild fix is no bad minute.
     #[test]
     fn bad_minutes_count_and_wild_fixes_do_not() {
-        let bad = |minutes: usize| judged(&solution(move |k| if k < 60 * minutes { 9.0 } else { 0.3 }, 1800));
+        let bad = |minutes: usize| {
+            judged(&solution(
+                move |k| if k < 60 * minutes { 9.0 } else { 0.3 },
+                1800,
+            ))
+        };
         assert_eq!(bad(1).verdict, VerdictKind::Doubtful);
-        assert!(matches!(bad(1).findings[0].1, Finding::Minutes { bad: 1, of: 30, .. }), "{:?}", bad(1));
+        assert!(
+            matches!(
+                bad(1).findings[0].1,
+                Finding::Minutes { bad: 1, of: 30, .. }
+            ),
+            "{:?}",
+            bad(1)
+        );
         assert_eq!(bad(4).verdict, VerdictKind::Overconfident);
         assert_eq!(
             judged(&solution(|k| if k == 77 { 200.0 } else { 0.5 }, 600)).verdict,
@@ -329,9 +415,13 @@ mod tests {
     #[test]
     fn a_solution_that_rejects_its_fixes_is_not_believed() {
         let mut all = solution(|_| 1.0, 600);
-        all.fixes[..90].iter_mut().for_each(|f| f.used = Use::Rejected);
+        all.fixes[..90]
+            .iter_mut()
+            .for_each(|f| f.used = Use::Rejected);
         assert_eq!(judged(&all).verdict, VerdictKind::Doubtful);
-        all.fixes[..400].iter_mut().for_each(|f| f.used = Use::Rejected);
+        all.fixes[..400]
+            .iter_mut()
+            .for_each(|f| f.used = Use::Rejected);
         assert_eq!(judged(&all).verdict, VerdictKind::Overconfident);
     }
 
@@ -341,7 +431,8 @@ mod tests {
     fn ends_of_outages_count() {
         let verdict = |ratio: f64| {
             let mut all = solution(|k| if k % 60 == 59 { ratio * ratio } else { 0.9 }, 600);
-            all.fixes.retain(|f| f.t_s % 60.0 >= 59.0 || f.t_s % 60.0 < 30.0);
+            all.fixes
+                .retain(|f| f.t_s % 60.0 >= 59.0 || f.t_s % 60.0 < 30.0);
             let outcome = outcome(&all, &[]);
             assert_eq!(outcome.ends.unwrap().count, 10);
             assert!((outcome.ends.unwrap().error_over_sigma / ratio - 1.0).abs() < 1e-12);
@@ -352,7 +443,11 @@ mod tests {
         };
         assert_eq!(
             [1.3, 1.8, 2.5].map(|ratio| verdict(ratio).map(|(kind, _)| kind)),
-            [None, Some(VerdictKind::Doubtful), Some(VerdictKind::Overconfident)]
+            [
+                None,
+                Some(VerdictKind::Doubtful),
+                Some(VerdictKind::Overconfident)
+            ]
         );
     }
 
@@ -365,14 +460,30 @@ mod tests {
             fix.innovation = vec![if k % 40 < 20 { 0.5 } else { -0.5 }; 3];
         }
         let found = judged(&all);
-        let Finding::Correlated { lag_1, pos_sigma_factor } = found.findings[0].1 else {
+        let Finding::Correlated {
+            lag_1,
+            pos_sigma_factor,
+        } = found.findings[0].1
+        else {
             panic!("{found:?}")
         };
         // of 599 pairs 29 are of either sign
-        assert!((lag_1 - (1.0 - 2.0 * 29.0 / 599.0)).abs() < 1e-12 && pos_sigma_factor == 1.0, "{found:?}");
+        assert!(
+            (lag_1 - (1.0 - 2.0 * 29.0 / 599.0)).abs() < 1e-12 && pos_sigma_factor == 1.0,
+            "{found:?}"
+        );
         assert_eq!(found.verdict, VerdictKind::Doubtful);
-        assert!(!found.findings.iter().any(|(kind, _)| *kind == VerdictKind::Undecided), "{found:?}");
-        let answered = Weighed { pos_sigma_factor: 4.3, ..weighed(&all) };
+        assert!(
+            !found
+                .findings
+                .iter()
+                .any(|(kind, _)| *kind == VerdictKind::Undecided),
+            "{found:?}"
+        );
+        let answered = Weighed {
+            pos_sigma_factor: 4.3,
+            ..weighed(&all)
+        };
         let found = assess(&answered, &outcome(&all, &[]), &[]);
         assert_eq!(found.verdict, VerdictKind::Undecided);
     }
@@ -391,17 +502,39 @@ mod tests {
                 nees_dof: 9,
                 velocity_sigma_m_s: 0.0,
             };
-            let assessment =
-                assess(&weighed(&all), &Outcome { reference: Some(reference), ..outcome(&all, &[]) }, &[]);
-            let Finding::Reference(confidence) = assessment.findings[0].1 else { panic!("{assessment:?}") };
+            let assessment = assess(
+                &weighed(&all),
+                &Outcome {
+                    reference: Some(reference),
+                    ..outcome(&all, &[])
+                },
+                &[],
+            );
+            let Finding::Reference(confidence) = assessment.findings[0].1 else {
+                panic!("{assessment:?}")
+            };
             (assessment.verdict, confidence.worst_state)
         };
-        let with = |state: usize, value: f64| std::array::from_fn(|i| if i == state { value } else { 1.0 });
-        assert_eq!(judged(with(8, 1.4), 9.0), (VerdictKind::Consistent, "yaw_deg"));
-        assert_eq!(judged(with(8, 1.4), 9.0 * 1.6 * 1.6), (VerdictKind::Overconfident, "yaw_deg"));
-        assert_eq!(judged(with(2, 3.1), 9.0), (VerdictKind::Overconfident, "pos_d_m"));
+        let with = |state: usize, value: f64| {
+            std::array::from_fn(|i| if i == state { value } else { 1.0 })
+        };
+        assert_eq!(
+            judged(with(8, 1.4), 9.0),
+            (VerdictKind::Consistent, "yaw_deg")
+        );
+        assert_eq!(
+            judged(with(8, 1.4), 9.0 * 1.6 * 1.6),
+            (VerdictKind::Overconfident, "yaw_deg")
+        );
+        assert_eq!(
+            judged(with(2, 3.1), 9.0),
+            (VerdictKind::Overconfident, "pos_d_m")
+        );
         let all_small = |state: usize| std::array::from_fn(|i| if i == state { 0.1 } else { 0.4 });
-        assert_eq!(judged(all_small(6), 9.0 * 0.16), (VerdictKind::Underconfident, "roll_deg"));
+        assert_eq!(
+            judged(all_small(6), 9.0 * 0.16),
+            (VerdictKind::Underconfident, "roll_deg")
+        );
         // of one state that is not small the word would be wrong
         assert_eq!(judged(with(6, 0.1), 9.0 * 0.16).0, VerdictKind::Consistent);
     }
@@ -411,10 +544,19 @@ mod tests {
     #[test]
     fn chance_is_no_verdict_by_a_reference() {
         let (nine, one) = (ChiSquared::new(9.0).unwrap(), ChiSquared::new(1.0).unwrap());
-        let (below, above) = (nine.cdf(9.0 * ALL_STATES.0.powi(2)), nine.sf(9.0 * ALL_STATES.1.powi(2)));
+        let (below, above) = (
+            nine.cdf(9.0 * ALL_STATES.0.powi(2)),
+            nine.sf(9.0 * ALL_STATES.1.powi(2)),
+        );
         let in_one = 9.0 * one.sf(ONE_STATE.powi(2));
-        assert!((1.0 / below).round() == 76.0 && (1.0 / above).round() == 61.0, "{below} {above}");
-        assert!((1.0 / in_one).round() == 41.0 && below + above + in_one < 1.0 / 18.0, "{in_one}");
+        assert!(
+            (1.0 / below).round() == 76.0 && (1.0 / above).round() == 61.0,
+            "{below} {above}"
+        );
+        assert!(
+            (1.0 / in_one).round() == 41.0 && below + above + in_one < 1.0 / 18.0,
+            "{in_one}"
+        );
     }
 
     /// What is as believed is doubted once in 500 at most, however few its fixes.
@@ -422,7 +564,9 @@ mod tests {
     fn chance_is_no_doubt() {
         for components in [3, 6, 12, 30, 100, 1000] {
             let n = f64::from(components);
-            let p = ChiSquared::new(n).unwrap().sf(n * bound(NIS_LIMITS.0, components as usize));
+            let p = ChiSquared::new(n)
+                .unwrap()
+                .sf(n * bound(NIS_LIMITS.0, components as usize));
             assert!(p < 2e-3, "{components}: {p}");
         }
     }

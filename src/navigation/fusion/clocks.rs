@@ -85,8 +85,10 @@ struct Turn {
 /// The turns between fixes that move fast enough for a course, one after the other.
 fn turns(recorded: &Recorded<'_>) -> Vec<Turn> {
     let courses = courses(recorded.gnss, recorded.imu);
-    let all: Vec<Turn> =
-        steps(&courses, APART_S.0).into_iter().filter_map(|[from, to]| turn(from, to)).collect();
+    let all: Vec<Turn> = steps(&courses, APART_S.0)
+        .into_iter()
+        .filter_map(|[from, to]| turn(from, to))
+        .collect();
     let every = all.len().div_ceil(MOST).max(1);
     all.into_iter().step_by(every).collect()
 }
@@ -118,9 +120,17 @@ fn correlation(turns: &[Turn], turned: &Turned, lag_s: f64) -> Option<f64> {
     let count = pairs.len() as f64;
     let mean_x = pairs.iter().map(|p| p.0).sum::<f64>() / count;
     let mean_y = pairs.iter().map(|p| p.1).sum::<f64>() / count;
-    let product =
-        |f: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|(x, y)| f(x - mean_x, y - mean_y)).sum::<f64>();
-    let (xx, yy, xy) = (product(&|x, _| x * x), product(&|_, y| y * y), product(&|x, y| x * y));
+    let product = |f: &dyn Fn(f64, f64) -> f64| {
+        pairs
+            .iter()
+            .map(|(x, y)| f(x - mean_x, y - mean_y))
+            .sum::<f64>()
+    };
+    let (xx, yy, xy) = (
+        product(&|x, _| x * x),
+        product(&|_, y| y * y),
+        product(&|x, y| x * y),
+    );
     Some(xy / (xx * yy).sqrt()).filter(|r| r.is_finite())
 }
 
@@ -137,7 +147,10 @@ impl Turned {
             angle += sample.dtheta;
             angle
         };
-        Self { times: imu.iter().map(|s| s.t_s).collect(), angles: imu.iter().map(add).collect() }
+        Self {
+            times: imu.iter().map(|s| s.t_s).collect(),
+            angles: imu.iter().map(add).collect(),
+        }
     }
 
     /// Up to a time, between samples in proportion; none outside the recording.
@@ -161,16 +174,29 @@ mod tests {
     }
 
     /// The same with so many fixes a second, whose velocities are 0.05 m/s off to either side.
-    fn drive_at(fixes: usize, late_s: f64, rate: impl Fn(f64) -> f64) -> (Vec<ImuIncrement>, Vec<GnssFix>) {
+    fn drive_at(
+        fixes: usize,
+        late_s: f64,
+        rate: impl Fn(f64) -> f64,
+    ) -> (Vec<ImuIncrement>, Vec<GnssFix>) {
         let axis = DVec3::new(0.6, 0.0, 0.8);
         let (mut imu, mut gnss, mut course) = (Vec::new(), Vec::new(), 0.0_f64);
         for k in 1..=30_000 {
             let t_s = f64::from(k) * 0.02;
             let turn = rate(t_s) * 0.02;
             course += turn;
-            imu.push(ImuIncrement { t_s, dt_s: 0.02, dtheta: axis * turn, dv: DVec3::ZERO });
+            imu.push(ImuIncrement {
+                t_s,
+                dt_s: 0.02,
+                dtheta: axis * turn,
+                dv: DVec3::ZERO,
+            });
             if (k as usize).is_multiple_of(50 / fixes) {
-                let off = if fixes > 1 && (k as usize).is_multiple_of(100 / fixes) { 0.005 } else { 0.0 };
+                let off = if fixes > 1 && (k as usize).is_multiple_of(100 / fixes) {
+                    0.005
+                } else {
+                    0.0
+                };
                 let v_n = 10.0 * DVec3::new((course + off).cos(), (course + off).sin(), 0.0);
                 gnss.push(GnssFix {
                     t_s: t_s + late_s,
@@ -194,23 +220,54 @@ mod tests {
     fn the_difference_of_the_clocks_is_found_with_its_sign() {
         for late_s in [18.0, -18.0, 2.0, -0.7] {
             let (imu, gnss) = drive(late_s, winding);
-            let apart = clocks_apart(&Recorded { imu: &imu, gnss: &gnss, aids: &[] }).unwrap();
+            let apart = clocks_apart(&Recorded {
+                imu: &imu,
+                gnss: &gnss,
+                aids: &[],
+            })
+            .unwrap();
             assert!((apart.delay_s - late_s).abs() < 0.5 * STEP_S, "{apart:?}");
         }
         let (imu, gnss) = drive_at(10, 2.0, winding);
-        let apart = clocks_apart(&Recorded { imu: &imu, gnss: &gnss, aids: &[] }).unwrap();
+        let apart = clocks_apart(&Recorded {
+            imu: &imu,
+            gnss: &gnss,
+            aids: &[],
+        })
+        .unwrap();
         assert!((apart.delay_s - 2.0).abs() < 0.5 * STEP_S, "{apart:?}");
     }
 
     #[test]
     fn nothing_is_said_of_one_clock_nor_of_straight_roads_nor_of_turns_that_repeat() {
         let (imu, gnss) = drive(0.0, winding);
-        assert_eq!(clocks_apart(&Recorded { imu: &imu, gnss: &gnss, aids: &[] }), None);
+        assert_eq!(
+            clocks_apart(&Recorded {
+                imu: &imu,
+                gnss: &gnss,
+                aids: &[]
+            }),
+            None
+        );
         let (imu, gnss) = drive(18.0, |_| 0.0);
-        assert_eq!(clocks_apart(&Recorded { imu: &imu, gnss: &gnss, aids: &[] }), None);
+        assert_eq!(
+            clocks_apart(&Recorded {
+                imu: &imu,
+                gnss: &gnss,
+                aids: &[]
+            }),
+            None
+        );
         // a round of 20 s: as good as they are as 20 s later
         let round = |t: f64| 0.3 * (std::f64::consts::PI * t / 10.0).sin();
         let (imu, gnss) = drive(0.0, round);
-        assert_eq!(clocks_apart(&Recorded { imu: &imu, gnss: &gnss, aids: &[] }), None);
+        assert_eq!(
+            clocks_apart(&Recorded {
+                imu: &imu,
+                gnss: &gnss,
+                aids: &[]
+            }),
+            None
+        );
     }
 }

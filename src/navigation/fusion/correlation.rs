@@ -57,7 +57,9 @@ impl Whiteness {
     /// Of times and normalised innovations.
     pub(super) fn of_series(series: &[(f64, impl AsRef<[f64]>)]) -> Option<Self> {
         let interval_s = middle(series.windows(2).map(|w| w[1].0 - w[0].0).collect())?;
-        let neighbours = series.windows(2).filter(|w| w[1].0 - w[0].0 < APART * interval_s);
+        let neighbours = series
+            .windows(2)
+            .filter(|w| w[1].0 - w[0].0 < APART * interval_s);
         let (mut product, mut square, mut pairs) = (0.0, 0.0, 0);
         for pair in neighbours {
             let [a, b] = [0, 1].map(|k: usize| pair[k].1.as_ref());
@@ -67,7 +69,10 @@ impl Whiteness {
         }
         // The estimate of n independent pairs is normal about 0 with variance 1/n (Mehra, sec. III).
         let limit = LEAST.max(QUANTILE / (pairs as f64).sqrt());
-        (pairs >= FEWEST && square > 0.0).then(|| Self { lag_1: product / square, limit })
+        (pairs >= FEWEST && square > 0.0).then(|| Self {
+            lag_1: product / square,
+            limit,
+        })
     }
 
     /// Whether the innovations are correlated.
@@ -117,17 +122,43 @@ pub fn fuse_correlated(
         Correlation::Auto => whiteness.filter(Whiteness::is_correlated).map(|w| w.lag_1),
         Correlation::None => None,
         // a Gauss-Markov process from one fix to the next
-        Correlation::Seconds(seconds) => interval_s(recorded.gnss).map(|step_s| (-step_s / seconds).exp()),
+        Correlation::Seconds(seconds) => {
+            interval_s(recorded.gnss).map(|step_s| (-step_s / seconds).exp())
+        }
     };
     let Some(lag_1) = lag_1 else {
         let gnss = recorded.gnss.to_vec();
-        return Ok(Weighed { solution: stated, as_stated: None, whiteness, pos_sigma_factor: 1.0, gnss });
+        return Ok(Weighed {
+            solution: stated,
+            as_stated: None,
+            whiteness,
+            pos_sigma_factor: 1.0,
+            gnss,
+        });
     };
     let pos_sigma_factor = sigma_factor(lag_1);
-    let gnss: Vec<GnssFix> =
-        recorded.gnss.iter().map(|f| f.with_sigmas_times(pos_sigma_factor, 1.0)).collect();
-    let solution = fuse(&Recorded { gnss: &gnss, ..*recorded }, belief, start, settings, reference)?;
-    Ok(Weighed { solution, as_stated: Some(stated), whiteness, pos_sigma_factor, gnss })
+    let gnss: Vec<GnssFix> = recorded
+        .gnss
+        .iter()
+        .map(|f| f.with_sigmas_times(pos_sigma_factor, 1.0))
+        .collect();
+    let solution = fuse(
+        &Recorded {
+            gnss: &gnss,
+            ..*recorded
+        },
+        belief,
+        start,
+        settings,
+        reference,
+    )?;
+    Ok(Weighed {
+        solution,
+        as_stated: Some(stated),
+        whiteness,
+        pos_sigma_factor,
+        gnss,
+    })
 }
 
 /// Standard deviation of white noise that counts as much as one of 1 whose autocorrelation is ρᵏ.

@@ -55,7 +55,16 @@ pub fn displaced(
     let to_s = start.t_s + MOST_S;
     let imu = &recorded.imu[..recorded.imu.partition_point(|s| s.t_s <= to_s)];
     let gnss = &recorded.gnss[..recorded.gnss.partition_point(|f| f.t_s <= to_s)];
-    let scene = Scene { recorded: Recorded { imu, gnss, ..*recorded }, belief, start, settings };
+    let scene = Scene {
+        recorded: Recorded {
+            imu,
+            gnss,
+            ..*recorded
+        },
+        belief,
+        start,
+        settings,
+    };
     let now = scene.innovations(&Vector4::zeros())?;
     let (mut x, mut normal) = (Vector4::zeros(), scene.normal(&Vector4::zeros(), &now)?);
     let mut best = scene.step(&mut x, &normal)?;
@@ -82,9 +91,12 @@ pub fn displaced(
     }
     let sigma = covariance.diagonal().map(|v| (v * scale).sqrt());
     Some(Displaced {
-        lever_arm_b: kept
-            .contains(&ANTENNA)
-            .then(|| [settings.lever_arm_b + antenna_b, DVec3::new(sigma[0], sigma[1], sigma[2])]),
+        lever_arm_b: kept.contains(&ANTENNA).then(|| {
+            [
+                settings.lever_arm_b + antenna_b,
+                DVec3::new(sigma[0], sigma[1], sigma[2]),
+            ]
+        }),
         delay_s: kept.contains(&DELAY).then(|| [x[3], sigma[3]]),
         nis,
     })
@@ -101,7 +113,10 @@ struct Scene<'a> {
 impl Scene<'_> {
     /// The innovations with the antenna and the delay off by `x`.
     fn innovations(&self, x: &Vector4<f64>) -> Option<Innovations> {
-        let earlier = |fix: &GnssFix| GnssFix { t_s: fix.t_s - x[3], ..*fix };
+        let earlier = |fix: &GnssFix| GnssFix {
+            t_s: fix.t_s - x[3],
+            ..*fix
+        };
         let gnss: Vec<GnssFix> = self.recorded.gnss.iter().map(earlier).collect();
         let settings = Settings {
             lever_arm_b: self.settings.lever_arm_b + DVec3::new(x[0], x[1], x[2]),
@@ -110,11 +125,19 @@ impl Scene<'_> {
             smooth: false,
             ..self.settings.clone()
         };
-        let recorded = Recorded { gnss: &gnss, ..self.recorded };
+        let recorded = Recorded {
+            gnss: &gnss,
+            ..self.recorded
+        };
         let solution = fuse(&recorded, self.belief, self.start, &settings, None).ok()?;
         let first = gnss.partition_point(|f| f.t_s <= self.start.t_s);
         let mut of_fix = vec![None; gnss.len()];
-        for (k, fix) in solution.fixes.into_iter().enumerate().filter(|(_, f)| f.used == Use::Used) {
+        for (k, fix) in solution
+            .fixes
+            .into_iter()
+            .enumerate()
+            .filter(|(_, f)| f.used == Use::Used)
+        {
             of_fix[first + k] = Some(fix);
         }
         Some(Innovations { of_fix })
@@ -129,19 +152,27 @@ impl Scene<'_> {
     /// The normal equations about `x`, where the innovations are `there`.
     fn normal(&self, x: &Vector4<f64>, there: &Innovations) -> Option<Normal> {
         let off = |k: usize| self.innovations(&(x + Vector4::ith(k, OFF[k])));
-        let aside = (0..4).into_par_iter().map(off).collect::<Option<Vec<_>>>()?;
+        let aside = (0..4)
+            .into_par_iter()
+            .map(off)
+            .collect::<Option<Vec<_>>>()?;
         let (mut information, mut gradient) = (Matrix4::zeros(), Vector4::zeros());
         for (i, fix) in there.of_fix.iter().enumerate() {
             let Some(fix) = fix else { continue };
-            let moved: Option<Vec<&FixRecord>> = aside.iter().map(|a| a.of_fix[i].as_ref()).collect();
+            let moved: Option<Vec<&FixRecord>> =
+                aside.iter().map(|a| a.of_fix[i].as_ref()).collect();
             let Some(moved) = moved else { continue };
             for (c, (z, sigma)) in fix.innovation.iter().zip(&fix.sigma).enumerate() {
-                let slope = Vector4::from_fn(|k, _| (moved[k].innovation[c] - z) / (OFF[k] * sigma));
+                let slope =
+                    Vector4::from_fn(|k, _| (moved[k].innovation[c] - z) / (OFF[k] * sigma));
                 information += slope * slope.transpose();
                 gradient -= slope * (z / sigma);
             }
         }
-        Some(Normal { inverse: information.try_inverse()?, gradient })
+        Some(Normal {
+            inverse: information.try_inverse()?,
+            gradient,
+        })
     }
 }
 
@@ -154,7 +185,8 @@ impl Innovations {
     /// Mean NIS per component.
     fn nis(&self) -> f64 {
         let used = || self.of_fix.iter().flatten();
-        used().map(|f| f.nis).sum::<f64>() / used().map(|f| f.innovation.len()).sum::<usize>().max(1) as f64
+        used().map(|f| f.nis).sum::<f64>()
+            / used().map(|f| f.innovation.len()).sum::<usize>().max(1) as f64
     }
 }
 
@@ -177,7 +209,10 @@ impl Normal {
     /// What the absence of a part costs in −2 ln(likelihood), the others as good as they can be.
     fn cost(&self, x: &Vector4<f64>, part: Range<usize>) -> Option<f64> {
         let n = part.len();
-        let block = self.inverse.view((part.start, part.start), (n, n)).into_owned();
+        let block = self
+            .inverse
+            .view((part.start, part.start), (n, n))
+            .into_owned();
         let of: DVector<f64> = x.rows(part.start, n).into_owned();
         Some(of.dot(&(DMatrix::try_inverse(block)? * &of)))
     }
@@ -200,7 +235,9 @@ impl Normal {
         x: &Vector4<f64>,
         kept: &[Range<usize>],
     ) -> Option<(Vector4<f64>, Matrix4<f64>)> {
-        let dropped: Vec<usize> = (0..4).filter(|k| !kept.iter().any(|part| part.contains(k))).collect();
+        let dropped: Vec<usize> = (0..4)
+            .filter(|k| !kept.iter().any(|part| part.contains(k)))
+            .collect();
         let (mut x, mut p) = (*x, self.inverse);
         // as if each of them had been measured to be zero
         for k in dropped {
@@ -208,6 +245,9 @@ impl Normal {
             x -= gain * x[k];
             p -= gain * p.row(k);
         }
-        x.iter().chain(p.iter()).all(|v| v.is_finite()).then_some((x, p))
+        x.iter()
+            .chain(p.iter())
+            .all(|v| v.is_finite())
+            .then_some((x, p))
     }
 }

@@ -65,9 +65,14 @@ impl FusionError {
     /// recordings begin in the same second.
     #[must_use]
     pub fn delay_s(&self) -> Option<f64> {
-        let Self::Clocks { imu, gnss } = self else { return None };
+        let Self::Clocks { imu, gnss } = self else {
+            return None;
+        };
         let apart_s = gnss.0 - imu.0;
         let overlap = |delay_s: &f64| gnss.0 - delay_s <= imu.1 && imu.0 <= gnss.1 - delay_s;
-        [WEEK_S, 1.0].map(|step| (apart_s / step).round() * step).into_iter().find(overlap)
+        [WEEK_S, 1.0]
+            .map(|step| (apart_s / step).round() * step)
+            .into_iter()
+            .find(overlap)
     }
 }

@@ -31,7 +31,9 @@ pub type Spread = [DVec3; 2];
 #[must_use]
 pub fn bridged(samples: &[ImuIncrement], step_s: f64) -> Vec<ImuIncrement> {
     let hole = |k: usize| samples[k].t_s - samples[k].dt_s - samples[k - 1].t_s;
-    let holes: Vec<usize> = (1..samples.len()).filter(|k| hole(*k) > (LONG - 1.0) * step_s).collect();
+    let holes: Vec<usize> = (1..samples.len())
+        .filter(|k| hole(*k) > (LONG - 1.0) * step_s)
+        .collect();
     let mut filled = Vec::with_capacity(samples.len() + holes.len());
     let mut done = 0;
     for (i, &k) in holes.iter().enumerate() {
@@ -43,7 +45,12 @@ pub fn bridged(samples: &[ImuIncrement], step_s: f64) -> Vec<ImuIncrement> {
         let after = rates(&samples[k..(k + BESIDE).min(end)]);
         let dt_s = hole(k);
         let [dv, dtheta] = [0, 1].map(|i| 0.5 * (before[i] + after[i]) * dt_s);
-        filled.push(ImuIncrement { t_s: samples[k].t_s - samples[k].dt_s, dt_s, dtheta, dv });
+        filled.push(ImuIncrement {
+            t_s: samples[k].t_s - samples[k].dt_s,
+            dt_s,
+            dtheta,
+            dv,
+        });
         done = k;
     }
     filled.extend_from_slice(&samples[done..]);
@@ -72,7 +79,11 @@ impl<'a> Bridges<'a> {
         let mut lengths: Vec<f64> = imu.iter().map(|s| s.dt_s).collect();
         lengths.sort_by(f64::total_cmp);
         let step_s = lengths.get(lengths.len() / 2).copied().unwrap_or(1.0);
-        Self { imu, step_s, known: Vec::new() }
+        Self {
+            imu,
+            step_s,
+            known: Vec::new(),
+        }
     }
 
     /// The spread of a sample that is a bridge; none of any other.
@@ -116,7 +127,10 @@ impl<'a> Bridges<'a> {
         }
         let at = ((off[0].len() - 1) as f64 * SHARE) as usize;
         let sigma = off.map(|mut errors| *errors.select_nth_unstable_by(at, f64::total_cmp).1);
-        [DVec3::new(sigma[0], sigma[1], sigma[2]), DVec3::new(sigma[3], sigma[4], sigma[5])]
+        [
+            DVec3::new(sigma[0], sigma[1], sigma[2]),
+            DVec3::new(sigma[3], sigma[4], sigma[5]),
+        ]
     }
 }
 
@@ -126,12 +140,19 @@ mod tests {
 
     fn sample(k: usize, rate: f64) -> ImuIncrement {
         let dt_s = 0.01;
-        ImuIncrement { t_s: (k + 1) as f64 * dt_s, dt_s, dtheta: DVec3::Z * rate * dt_s, dv: DVec3::X * dt_s }
+        ImuIncrement {
+            t_s: (k + 1) as f64 * dt_s,
+            dt_s,
+            dtheta: DVec3::Z * rate * dt_s,
+            dv: DVec3::X * dt_s,
+        }
     }
 
     #[test]
     fn a_bridge_lasts_from_the_sample_before_to_the_one_after() {
-        let mut imu: Vec<_> = (0..100).map(|k| sample(k, if k < 50 { 0.1 } else { 0.3 })).collect();
+        let mut imu: Vec<_> = (0..100)
+            .map(|k| sample(k, if k < 50 { 0.1 } else { 0.3 }))
+            .collect();
         imu.drain(40..60);
         let filled = bridged(&imu, 0.01);
         assert_eq!(filled.len(), 81);
@@ -145,17 +166,29 @@ mod tests {
     /// 2/π, and a window of the recording's own motion says so.
     #[test]
     fn the_spread_is_that_of_the_recording() {
-        let imu: Vec<_> =
-            (0..60_000).map(|k| sample(k, (std::f64::consts::TAU * k as f64 / 1000.0).sin())).collect();
+        let imu: Vec<_> = (0..60_000)
+            .map(|k| sample(k, (std::f64::consts::TAU * k as f64 / 1000.0).sin()))
+            .collect();
         let mut bridges = Bridges::new(&imu);
         assert!(bridges.spread(&imu[7]).is_none());
-        let [accel, gyro] = bridges.spread(&ImuIncrement { dt_s: 5.0, ..imu[7] }).unwrap();
+        let [accel, gyro] = bridges
+            .spread(&ImuIncrement {
+                dt_s: 5.0,
+                ..imu[7]
+            })
+            .unwrap();
         // mean of sin over half a period, 2/π at its extremes, less the samples beside it, 252.5 from its middle;
         // windows a quarter of a period apart meet the extremes
         let beside = (std::f64::consts::TAU * 0.2525).cos();
-        assert!((gyro.z - (std::f64::consts::FRAC_2_PI - beside)).abs() < 1e-3, "{gyro}");
+        assert!(
+            (gyro.z - (std::f64::consts::FRAC_2_PI - beside)).abs() < 1e-3,
+            "{gyro}"
+        );
         assert!(accel.length() < 1e-9 && gyro.x == 0.0);
-        let short = Bridges::new(&imu[..1000]).spread(&ImuIncrement { dt_s: 5.0, ..imu[7] });
+        let short = Bridges::new(&imu[..1000]).spread(&ImuIncrement {
+            dt_s: 5.0,
+            ..imu[7]
+        });
         assert_eq!(short, Some(UNKNOWN.map(DVec3::splat)));
     }
 }

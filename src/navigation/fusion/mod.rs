@@ -74,7 +74,8 @@ pub use outcome::{
 };
 pub use run::fuse;
 pub use vehicle::{
-    AidInnovations, AidRecord, VehicleVelocity, WheelSpeed, aid_innovations, vehicle_velocities, wheel_ratio,
+    AidInnovations, AidRecord, VehicleVelocity, WheelSpeed, aid_innovations, vehicle_velocities,
+    wheel_ratio,
 };
 
 use crate::earth::GravityModel;
@@ -259,7 +260,11 @@ pub struct Solution {
 /// [`FusionError::Clocks`].
 pub fn check_clocks(recorded: &Recorded<'_>) -> Result<(), FusionError> {
     let (imu, gnss) = spans(recorded);
-    if imu.0 <= gnss.1 && gnss.0 <= imu.1 { Ok(()) } else { Err(FusionError::Clocks { imu, gnss }) }
+    if imu.0 <= gnss.1 && gnss.0 <= imu.1 {
+        Ok(())
+    } else {
+        Err(FusionError::Clocks { imu, gnss })
+    }
 }
 
 fn spans(recorded: &Recorded<'_>) -> ((f64, f64), (f64, f64)) {
@@ -268,7 +273,10 @@ fn spans(recorded: &Recorded<'_>) -> ((f64, f64), (f64, f64)) {
     let ends = |first: Option<f64>, last: Option<f64>| (rounded(first), rounded(last));
     let (imu, gnss) = (recorded.imu, recorded.gnss);
     (
-        ends(imu.first().map(|s| s.t_s - s.dt_s), imu.last().map(|s| s.t_s)),
+        ends(
+            imu.first().map(|s| s.t_s - s.dt_s),
+            imu.last().map(|s| s.t_s),
+        ),
         ends(gnss.first().map(|f| f.t_s), gnss.last().map(|f| f.t_s)),
     )
 }

@@ -127,7 +127,10 @@ pub fn outcome(solution: &Solution, outages: &[Outage]) -> Outcome {
         outages: outages.iter().map(|o| drift(solution, *o)).collect(),
         ends: ends(solution),
         reference: from_reference(&solution.rows),
-        smoothed: solution.smoothed.as_ref().map(|rows| smoothed(&solution.rows, rows, outages)),
+        smoothed: solution
+            .smoothed
+            .as_ref()
+            .map(|rows| smoothed(&solution.rows, rows, outages)),
     }
 }
 
@@ -137,15 +140,26 @@ const APART: (f64, f64) = (10.0, 5.0);
 /// The fixes that nothing was used before for so long. Their horizontal innovations are two normal numbers each, and the
 /// sum of m of their squares, normalised, is chi-square of 2m degrees.
 fn ends(solution: &Solution) -> Option<Ends> {
-    let known: Vec<&FixRecord> = solution.fixes.iter().filter(|f| f.used != Use::Withheld).collect();
+    let known: Vec<&FixRecord> = solution
+        .fixes
+        .iter()
+        .filter(|f| f.used != Use::Withheld)
+        .collect();
     let steps: Vec<f64> = known.windows(2).map(|w| w[1].t_s - w[0].t_s).collect();
     let apart_s = APART.0.max(APART.1 * middle(steps)?);
-    let of_ends: Vec<f64> =
-        known.windows(2).filter(|w| w[1].t_s - w[0].t_s > apart_s).map(|w| w[1].horizontal_nis).collect();
+    let of_ends: Vec<f64> = known
+        .windows(2)
+        .filter(|w| w[1].t_s - w[0].t_s > apart_s)
+        .map(|w| w[1].horizontal_nis)
+        .collect();
     let (count, sum) = (of_ends.len(), of_ends.iter().sum::<f64>());
     let degrees = 2.0 * count as f64;
     let p_value = ChiSquared::new(degrees).ok()?.sf(sum);
-    Some(Ends { count, error_over_sigma: (sum / degrees).sqrt(), p_value })
+    Some(Ends {
+        count,
+        error_over_sigma: (sum / degrees).sqrt(),
+        p_value,
+    })
 }
 
 /// Mean NIS of the fixes used, divided by their number of components.
@@ -157,14 +171,22 @@ pub(super) fn nis_per_component(solution: &Solution) -> f64 {
 fn from_reference(rows: &[Row]) -> Option<FromReference> {
     let errors: Vec<RowError> = rows.iter().filter_map(|row| row.error).collect();
     let n = errors.len() as f64;
-    let rms = |of: &dyn Fn(&RowError) -> f64| (errors.iter().map(|e| of(e).powi(2)).sum::<f64>() / n).sqrt();
-    let per_state = |of: &dyn Fn(&RowError, usize) -> f64| std::array::from_fn(|i| rms(&|e| of(e, i)));
+    let rms = |of: &dyn Fn(&RowError) -> f64| {
+        (errors.iter().map(|e| of(e).powi(2)).sum::<f64>() / n).sqrt()
+    };
+    let per_state =
+        |of: &dyn Fn(&RowError, usize) -> f64| std::array::from_fn(|i| rms(&|e| of(e, i)));
     let rmse: Nine = per_state(&|e, i| e.values[i]);
     (!errors.is_empty()).then(|| FromReference {
         rmse: PerState(rmse),
         horizontal_rmse_m: horizontal(&rmse),
-        horizontal_max_m: errors.iter().map(|e| horizontal(&e.values)).fold(0.0, f64::max),
-        error_over_sigma: PerState(per_state(&|e, i| e.values[i] / e.sigma[i].max(f64::MIN_POSITIVE))),
+        horizontal_max_m: errors
+            .iter()
+            .map(|e| horizontal(&e.values))
+            .fold(0.0, f64::max),
+        error_over_sigma: PerState(per_state(&|e, i| {
+            e.values[i] / e.sigma[i].max(f64::MIN_POSITIVE)
+        })),
         nees_mean: errors.iter().map(|e| e.nees).sum::<f64>() / n,
         nees_dof: rmse.len(),
         velocity_sigma_m_s: rms(&|e| e.velocity_sigma),
@@ -177,11 +199,18 @@ fn horizontal(values: &Nine) -> f64 {
 
 fn smoothed(filtered: &[Row], smoothed: &[Row], outages: &[Outage]) -> SmoothedOutcome {
     let sigma_rms = |rows: &[Row]| {
-        (rows.iter().map(|row| horizontal(&row.sigma).powi(2)).sum::<f64>() / rows.len() as f64).sqrt()
+        (rows
+            .iter()
+            .map(|row| horizontal(&row.sigma).powi(2))
+            .sum::<f64>()
+            / rows.len() as f64)
+            .sqrt()
     };
     let of_outage = |outage: &Outage| {
-        let [(sigma_max_filter_m, horizontal_max_filter_m), (sigma_max_m, horizontal_max_m)] =
-            [largest(filtered, outage)?, largest(smoothed, outage)?];
+        let [
+            (sigma_max_filter_m, horizontal_max_filter_m),
+            (sigma_max_m, horizontal_max_m),
+        ] = [largest(filtered, outage)?, largest(smoothed, outage)?];
         let outage = *outage;
         Some(SmoothedOutage {
             outage,
@@ -204,8 +233,15 @@ fn smoothed(filtered: &[Row], smoothed: &[Row], outages: &[Outage]) -> SmoothedO
 /// Largest horizontal standard deviation of the rows in an outage and distance from the reference; none without rows.
 fn largest(rows: &[Row], outage: &Outage) -> Option<(f64, Option<f64>)> {
     let within = || rows.iter().filter(|row| outage.withholds(row.t_s));
-    let error = within().filter_map(|row| Some(horizontal(&row.error?.values))).reduce(f64::max);
-    Some((within().map(|row| horizontal(&row.sigma)).reduce(f64::max)?, error))
+    let error = within()
+        .filter_map(|row| Some(horizontal(&row.error?.values)))
+        .reduce(f64::max);
+    Some((
+        within()
+            .map(|row| horizontal(&row.sigma))
+            .reduce(f64::max)?,
+        error,
+    ))
 }
 
 fn drift(solution: &Solution, outage: Outage) -> OutageDrift {
@@ -220,7 +256,11 @@ fn drift(solution: &Solution, outage: Outage) -> OutageDrift {
     let end_from_reference = last.and_then(|f| {
         let error = f.error?;
         let (horizontal_m, expected_sigma_m) = (horizontal(&error), f.horizontal_sigma_m);
-        Some(Drift { horizontal_m, down_m: error[2], expected_sigma_m })
+        Some(Drift {
+            horizontal_m,
+            down_m: error[2],
+            expected_sigma_m,
+        })
     });
     OutageDrift {
         outage,

@@ -30,12 +30,19 @@ pub fn fuse(
     check_clocks(recorded)?;
     let imu = spans(recorded).0;
     if !(imu.0 - 1e-6..imu.1).contains(&start.t_s) {
-        return Err(FusionError::Start { t_s: start.t_s, imu });
+        return Err(FusionError::Start {
+            t_s: start.t_s,
+            imu,
+        });
     }
     check_place(recorded, start, settings)?;
     let mut filter = Filter::new(belief, start, settings);
     let tape = match settings.smooth {
-        true => Some(Tape::new(&mut filter, start.t_s, most_marks(recorded, start, settings))?),
+        true => Some(Tape::new(
+            &mut filter,
+            start.t_s,
+            most_marks(recorded, start, settings),
+        )?),
         false => None,
     };
     let mut run = Run {
@@ -48,8 +55,16 @@ pub fn fuse(
         solution: Solution::default(),
     };
     let mut bridges = Bridges::new(recorded.imu);
-    let mut fixes = recorded.gnss.iter().skip_while(|f| f.t_s <= start.t_s).peekable();
-    let mut aids = recorded.aids.iter().skip_while(|a| a.t_s <= start.t_s).peekable();
+    let mut fixes = recorded
+        .gnss
+        .iter()
+        .skip_while(|f| f.t_s <= start.t_s)
+        .peekable();
+    let mut aids = recorded
+        .aids
+        .iter()
+        .skip_while(|a| a.t_s <= start.t_s)
+        .peekable();
     run.row()?;
     for sample in recorded.imu.iter().skip_while(|s| s.t_s <= start.t_s) {
         let spread = bridges.spread(sample);
@@ -86,9 +101,15 @@ fn most_marks(recorded: &Recorded<'_>, start: &Start, settings: &Settings) -> f6
 
 /// Refuses a start that its own and the receiver's deviations cannot explain: 10 km or 50 of both, beside
 /// the way to the first fix.
-fn check_place(recorded: &Recorded<'_>, start: &Start, settings: &Settings) -> Result<(), FusionError> {
+fn check_place(
+    recorded: &Recorded<'_>,
+    start: &Start,
+    settings: &Settings,
+) -> Result<(), FusionError> {
     const FAR: (f64, f64) = (10_000.0, 50.0);
-    let Some(fix) = recorded.gnss.iter().find(|f| f.t_s >= start.t_s) else { return Ok(()) };
+    let Some(fix) = recorded.gnss.iter().find(|f| f.t_s >= start.t_s) else {
+        return Ok(());
+    };
     let seconds = fix.t_s - start.t_s;
     let place = geodetic_to_ecef(start.state.lat, start.state.lon, fix.h);
     let metres = geodetic_to_ecef(fix.lat, fix.lon, fix.h).distance(place);
@@ -97,7 +118,15 @@ fn check_place(recorded: &Recorded<'_>, start: &Start, settings: &Settings) -> R
     // at twice the speed, accelerating with a gravity
     let way = 2.0 * start.state.v_n.length() * seconds + 5.0 * seconds * seconds;
     let allowed = FAR.0.min(FAR.1 * sigma_m) + way + settings.lever_arm_b.length();
-    if metres > allowed { Err(FusionError::Place { t_s: fix.t_s, metres, sigma_m }) } else { Ok(()) }
+    if metres > allowed {
+        Err(FusionError::Place {
+            t_s: fix.t_s,
+            metres,
+            sigma_m,
+        })
+    } else {
+        Ok(())
+    }
 }
 
 /// The state of a run through the data.
@@ -115,7 +144,11 @@ impl Run<'_> {
     /// Through the sample as far as `to`, which is taken as the sample's end when it is nearly that.
     /// Where it bridges a gap, with the gap's uncertainty.
     fn advance(&mut self, sample: &ImuIncrement, spread: Option<Spread>, to: f64, slack: f64) {
-        let to = if to + slack >= sample.t_s { sample.t_s } else { to };
+        let to = if to + slack >= sample.t_s {
+            sample.t_s
+        } else {
+            to
+        };
         if to > self.now + slack {
             match spread {
                 None => self.filter.advance(sample, to - self.now),
@@ -129,7 +162,10 @@ impl Run<'_> {
         let mut record = self.filter.look_at(fix);
         record.error = self.error().map(|e| e.values);
         let withheld = self.settings.outages.iter().any(|o| o.withholds(fix.t_s));
-        let limit = self.settings.nis_gate.map(|p| nis_limit(p, record.innovation.len()));
+        let limit = self
+            .settings
+            .nis_gate
+            .map(|p| nis_limit(p, record.innovation.len()));
         record.used = match limit {
             _ if withheld => Use::Withheld,
             Some(limit) if record.nis > limit => Use::Rejected,
@@ -142,13 +178,21 @@ impl Run<'_> {
         }
         let finite = record.nis.is_finite();
         self.solution.fixes.push(record);
-        if finite { Ok(()) } else { Err(FusionError::Diverged { t_s: self.now }) }
+        if finite {
+            Ok(())
+        } else {
+            Err(FusionError::Diverged { t_s: self.now })
+        }
     }
 
     /// Uses what the vehicle knows of its velocity.
     fn aid(&mut self, aid: &VehicleVelocity) -> Result<(), FusionError> {
         self.filter.settle();
-        let mut record = AidRecord { t_s: aid.t_s, aid: aid.aid, normalised: Vec::new() };
+        let mut record = AidRecord {
+            t_s: aid.t_s,
+            aid: aid.aid,
+            normalised: Vec::new(),
+        };
         let mut update = |filter: &mut Filter| record = filter.aid(aid);
         match &mut self.tape {
             Some(tape) => tape.fix(&mut self.filter, self.now, update),
@@ -156,7 +200,11 @@ impl Run<'_> {
         }
         let finite = record.nis().is_finite();
         self.solution.aids.push(record);
-        if finite { Ok(()) } else { Err(FusionError::Diverged { t_s: self.now }) }
+        if finite {
+            Ok(())
+        } else {
+            Err(FusionError::Diverged { t_s: self.now })
+        }
     }
 
     fn row(&mut self) -> Result<(), FusionError> {
@@ -166,7 +214,10 @@ impl Run<'_> {
             return Err(FusionError::Diverged { t_s: self.now });
         }
         if row.state.lat.abs() > MAX_LATITUDE {
-            return Err(FusionError::Pole { t_s: self.now, lat_deg: row.state.lat / DEG });
+            return Err(FusionError::Pole {
+                t_s: self.now,
+                lat_deg: row.state.lat / DEG,
+            });
         }
         row.error = self.error();
         self.solution.rows.push(row);
@@ -178,7 +229,13 @@ impl Run<'_> {
 
     /// What came out; smoothed where a tape ran along.
     fn end(self) -> Solution {
-        let Self { mut filter, tape, mut solution, reference, .. } = self;
+        let Self {
+            mut filter,
+            tape,
+            mut solution,
+            reference,
+            ..
+        } = self;
         solution.vehicle = filter.ekf.vehicle_estimates();
         solution.smoothed = tape.map(|tape| tape.smoothed(&mut filter, &solution.rows, reference));
         solution

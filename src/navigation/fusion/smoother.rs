@@ -41,7 +41,12 @@ struct Mark {
 
 impl Mark {
     fn of(ekf: &Ekf, t_s: f64) -> Self {
-        Self { t_s, after: ekf.snapshot(), correction: None, link: None }
+        Self {
+            t_s,
+            after: ekf.snapshot(),
+            correction: None,
+            link: None,
+        }
     }
 }
 
@@ -54,16 +59,26 @@ impl Tape {
         let states = filter.ekf.p.lane(0).nrows();
         let bytes = marks * bytes_of_mark(states as f64);
         if bytes > MOST_BYTES {
-            return Err(FusionError::Memory { bytes, marks, states });
+            return Err(FusionError::Memory {
+                bytes,
+                marks,
+                states,
+            });
         }
         filter.ekf.keep_transition();
         let covariance = filter.ekf.p.lane(0);
-        Ok(Self { marks: vec![Mark::of(&filter.ekf, t_s)], covariance, rows: Vec::new() })
+        Ok(Self {
+            marks: vec![Mark::of(&filter.ekf, t_s)],
+            covariance,
+            rows: Vec::new(),
+        })
     }
 
     /// Marks where a settled filter is, before a fix or for a row; once for each instant.
     fn mark(&mut self, filter: &mut Filter, t_s: f64) {
-        let Some(last) = self.marks.last_mut().filter(|last| last.t_s < t_s) else { return };
+        let Some(last) = self.marks.last_mut().filter(|last| last.t_s < t_s) else {
+            return;
+        };
         let transition = filter.ekf.take_transition();
         let predicted = filter.ekf.p.lane(0);
         last.link = Some(Link::new(&self.covariance, &transition, &predicted));
@@ -81,7 +96,9 @@ impl Tape {
     pub(super) fn fix(&mut self, filter: &mut Filter, t_s: f64, update: impl FnOnce(&mut Filter)) {
         self.mark(filter, t_s);
         update(filter);
-        let Some(last) = self.marks.last_mut() else { return };
+        let Some(last) = self.marks.last_mut() else {
+            return;
+        };
         let mut correction = filter.ekf.correction();
         if let Some(earlier) = &last.correction {
             put_back(earlier, &mut correction);
@@ -144,7 +161,10 @@ mod tests {
     /// A rotation after another is that of their product; the rest adds. What is left is of third order: 0.03³.
     #[test]
     fn a_correction_is_put_back_before_the_error_after_it() {
-        let (first, then) = (DVec3::new(0.02, -0.01, 0.03), DVec3::new(-0.015, 0.025, 0.01));
+        let (first, then) = (
+            DVec3::new(0.02, -0.01, 0.03),
+            DVec3::new(-0.015, 0.025, 0.01),
+        );
         let state = |psi: DVec3, rest: f64| {
             let mut x = DVector::repeat(15, rest);
             (0..3).for_each(|i| x[3 * PSI + i] = psi[i]);
@@ -152,10 +172,14 @@ mod tests {
         };
         let mut error = state(then, 2.0);
         put_back(&state(first, 0.5), &mut error);
-        let product = (DQuat::from_scaled_axis(first) * DQuat::from_scaled_axis(then)).to_scaled_axis();
+        let product =
+            (DQuat::from_scaled_axis(first) * DQuat::from_scaled_axis(then)).to_scaled_axis();
         for i in 0..15 {
             match (3 * PSI..3 * PSI + 3).contains(&i) {
-                true => assert!((error[i] - product[i - 3 * PSI]).abs() < 2.7e-5, "{error} {product}"),
+                true => assert!(
+                    (error[i] - product[i - 3 * PSI]).abs() < 2.7e-5,
+                    "{error} {product}"
+                ),
                 false => assert_eq!(error[i], 2.5),
             }
         }

@@ -61,11 +61,17 @@ fn moments(window: &[ImuIncrement]) -> Moments {
     let n = window.len() as f64;
     let of = |value: fn(&ImuIncrement) -> DVec3| {
         let mean = window.iter().map(value).sum::<DVec3>() / n;
-        let squares: f64 = window.iter().map(|s| (value(s) - mean).length_squared()).sum();
+        let squares: f64 = window
+            .iter()
+            .map(|s| (value(s) - mean).length_squared())
+            .sum();
         (mean, squares / (3.0 * (n - 1.0)))
     };
     let [(f, var_f), (w, var_w)] = [of(force), of(rate)];
-    Moments { mean: [f, w], variance: [var_f, var_w] }
+    Moments {
+        mean: [f, w],
+        variance: [var_f, var_w],
+    }
 }
 
 fn force(sample: &ImuIncrement) -> DVec3 {
@@ -85,14 +91,19 @@ impl Standstill {
     /// Learns it from windows of one length; none where too few stand.
     #[must_use]
     pub fn learn(windows: &[(&[ImuIncrement], Motion)]) -> Option<Self> {
-        let of =
-            |motion: Motion| windows.iter().filter(move |(_, m)| *m == motion).map(|(window, _)| *window);
+        let of = |motion: Motion| {
+            windows
+                .iter()
+                .filter(move |(_, m)| *m == motion)
+                .map(|(window, _)| *window)
+        };
         let still: Vec<Moments> = of(Motion::Still).map(moments).collect();
         let samples = of(Motion::Still).next()?.len();
         if still.len() < FEWEST {
             return None;
         }
-        let median = |value: &dyn Fn(&Moments) -> f64| quantile(still.iter().map(value).collect(), 0.5);
+        let median =
+            |value: &dyn Fn(&Moments) -> f64| quantile(still.iter().map(value).collect(), 0.5);
         // the median of chi-square of k degrees is k (1 − 2/9k)³ (Wilson and Hilferty)
         let of_median = (1.0 - 2.0 / (27.0 * (samples as f64 - 1.0))).powi(3);
         let mut found = Self {
@@ -101,10 +112,20 @@ impl Standstill {
             rate: DVec3::from_array([0, 1, 2].map(|i| median(&|m| m.mean[1][i]))),
             thresholds: [0.0; 2],
         };
-        let of_white = ChiSquared::new(degrees(samples)).ok()?.inverse_cdf(1.0 - MISSES) / degrees(samples);
-        let of_still = quantile(of(Motion::Still).map(|w| found.statistic(w)).collect(), KEPT);
+        let of_white = ChiSquared::new(degrees(samples))
+            .ok()?
+            .inverse_cdf(1.0 - MISSES)
+            / degrees(samples);
+        let of_still = quantile(
+            of(Motion::Still).map(|w| found.statistic(w)).collect(),
+            KEPT,
+        );
         let moving: Vec<f64> = of(Motion::Moving).map(|w| found.statistic(w)).collect();
-        let of_moving = if moving.is_empty() { f64::INFINITY } else { quantile(moving, FALSE_ALARMS) };
+        let of_moving = if moving.is_empty() {
+            f64::INFINITY
+        } else {
+            quantile(moving, FALSE_ALARMS)
+        };
         let of_rest = of_white.max(of_still);
         found.thresholds = [of_rest, of_rest.min(of_moving)];
         Some(found)
@@ -115,7 +136,8 @@ impl Standstill {
         let mean = window.iter().map(force).sum::<DVec3>().normalize_or_zero() * self.force;
         let [var_f, var_w] = self.sigma.map(|sigma| sigma * sigma);
         let of_sample = |s: &ImuIncrement| {
-            (force(s) - mean).length_squared() / var_f + (rate(s) - self.rate).length_squared() / var_w
+            (force(s) - mean).length_squared() / var_f
+                + (rate(s) - self.rate).length_squared() / var_w
         };
         window.iter().map(of_sample).sum::<f64>() / degrees(window.len())
     }
@@ -148,7 +170,11 @@ mod tests {
     const N: usize = 50;
 
     /// White noise at rest with a bias, plus a motion of so much specific force (m/s²) and rate (rad/s) at a time (s).
-    fn recording(windows: usize, seed: u64, motion: impl Fn(f64) -> [DVec3; 2]) -> Vec<ImuIncrement> {
+    fn recording(
+        windows: usize,
+        seed: u64,
+        motion: impl Fn(f64) -> [DVec3; 2],
+    ) -> Vec<ImuIncrement> {
         let mut source = StdRng::seed_from_u64(seed);
         let mut noise = |sigma: f64| {
             DVec3::from_array(std::array::from_fn(|_| {
@@ -162,7 +188,12 @@ mod tests {
             let [f, w] = motion(t_s);
             let dv = (DVec3::new(0.3, -0.1, -9.79) + f + noise(0.05)) * dt_s;
             let dtheta = (DVec3::new(2e-3, -1e-3, 4e-3) + w + noise(3e-3)) * dt_s;
-            ImuIncrement { t_s, dt_s, dtheta, dv }
+            ImuIncrement {
+                t_s,
+                dt_s,
+                dtheta,
+                dv,
+            }
         };
         (0..windows * N).map(sample).collect()
     }
@@ -182,9 +213,15 @@ mod tests {
     fn white_noise_is_missed_as_rarely_as_stated() {
         let learnt = at_rest(4000, 1);
         let found = Standstill::learn(&as_moving(&learnt, Motion::Still)).unwrap();
-        assert!((found.sigma[0] / 0.05 - 1.0).abs() < 5e-3 && (found.sigma[1] / 3e-3 - 1.0).abs() < 5e-3);
+        assert!(
+            (found.sigma[0] / 0.05 - 1.0).abs() < 5e-3
+                && (found.sigma[1] / 3e-3 - 1.0).abs() < 5e-3
+        );
         let fresh = at_rest(4000, 2);
-        let missed = fresh.chunks(N).filter(|window| !found.stands(window, Motion::Unknown)).count();
+        let missed = fresh
+            .chunks(N)
+            .filter(|window| !found.stands(window, Motion::Unknown))
+            .count();
         assert!((missed as f64 - 40.0).abs() < 28.0, "{missed}");
     }
 
@@ -192,13 +229,29 @@ mod tests {
     #[test]
     fn motion_is_no_standstill() {
         let rest = at_rest(200, 3);
-        let sway = |t: f64| [DVec3::Y * 0.3 * (6.0 * t).sin(), DVec3::Z * 0.035 * (0.7 * t).cos().signum()];
+        let sway = |t: f64| {
+            [
+                DVec3::Y * 0.3 * (6.0 * t).sin(),
+                DVec3::Z * 0.035 * (0.7 * t).cos().signum(),
+            ]
+        };
         let moves = recording(2000, 4, sway);
         let mut windows = as_moving(&rest, Motion::Still);
         windows.extend(as_moving(&moves, Motion::Moving));
         let found = Standstill::learn(&windows).unwrap();
-        assert_eq!(moves.chunks(N).filter(|window| found.stands(window, Motion::Unknown)).count(), 0);
-        assert!(rest.chunks(N).filter(|window| found.stands(window, Motion::Unknown)).count() > 190);
+        assert_eq!(
+            moves
+                .chunks(N)
+                .filter(|window| found.stands(window, Motion::Unknown))
+                .count(),
+            0
+        );
+        assert!(
+            rest.chunks(N)
+                .filter(|window| found.stands(window, Motion::Unknown))
+                .count()
+                > 190
+        );
     }
 
     /// On a road as smooth as standstill the IMU cannot tell: of windows of the same kind that were not learnt from, no
@@ -210,7 +263,10 @@ mod tests {
         let mut windows = as_moving(&rest, Motion::Still);
         windows.extend(as_moving(&smooth, Motion::Moving));
         let found = Standstill::learn(&windows).unwrap();
-        let alarms = fresh.chunks(N).filter(|window| found.stands(window, Motion::Unknown)).count();
+        let alarms = fresh
+            .chunks(N)
+            .filter(|window| found.stands(window, Motion::Unknown))
+            .count();
         assert!((alarms as f64) < 4.0 + 4.0 * 8.0_f64.sqrt(), "{alarms}");
     }
 

@@ -85,12 +85,18 @@ pub fn aid_innovations(records: &[AidRecord]) -> Vec<AidInnovations> {
         let components = (count * axes) as f64;
         let band = chi_square_band(axes, count as f64);
         let per_component = |nis: f64| nis / axes as f64;
-        let series: Vec<(f64, &[f64])> = own.iter().map(|r| (r.t_s, r.normalised.as_slice())).collect();
+        let series: Vec<(f64, &[f64])> = own
+            .iter()
+            .map(|r| (r.t_s, r.normalised.as_slice()))
+            .collect();
         (count > 0).then(|| AidInnovations {
             aid: aid.name(),
             count,
             nis_per_component: own.iter().map(|r| r.nis()).sum::<f64>() / components,
-            nis_band: Band { lower: per_component(band.lower), upper: per_component(band.upper) },
+            nis_band: Band {
+                lower: per_component(band.lower),
+                upper: per_component(band.upper),
+            },
             whiteness: Whiteness::of_series(&series),
         })
     };
@@ -112,7 +118,11 @@ pub fn vehicle_velocities(
     } else {
         wheel.iter().map(|w| (w.t_s, w.m_s.abs())).collect()
     };
-    let scene = Scene { imu, speeds, step_s: middle(imu.iter().map(|s| s.dt_s).collect()).unwrap_or(1.0) };
+    let scene = Scene {
+        imu,
+        speeds,
+        step_s: middle(imu.iter().map(|s| s.dt_s).collect()).unwrap_or(1.0),
+    };
     let test = settings.zupt.as_ref().and_then(|_| scene.test());
     let stands = |k: usize| test.is_some_and(|test| scene.stands(&test, k));
     let mut all = Vec::new();
@@ -126,8 +136,16 @@ pub fn vehicle_velocities(
         };
         let samples = || every(imu, |s| s.t_s, rate_hz);
         match aid {
-            Aid::Nhc => all.extend(samples().filter(|k| !stands(*k)).map(|k| measured(imu[k].t_s, 0.0))),
-            Aid::Zupt => all.extend(samples().filter(|k| stands(*k)).map(|k| measured(imu[k].t_s, 0.0))),
+            Aid::Nhc => all.extend(
+                samples()
+                    .filter(|k| !stands(*k))
+                    .map(|k| measured(imu[k].t_s, 0.0)),
+            ),
+            Aid::Zupt => all.extend(
+                samples()
+                    .filter(|k| stands(*k))
+                    .map(|k| measured(imu[k].t_s, 0.0)),
+            ),
             Aid::Odometer => {
                 let turned = every(wheel, |w| w.t_s, rate_hz);
                 all.extend(turned.map(|k| measured(wheel[k].t_s, wheel[k].m_s)));
@@ -142,13 +160,22 @@ pub fn vehicle_velocities(
 
 /// How many times the speed of the fixes a wheel reads where both move: the median; none where they never do.
 #[must_use]
-pub fn wheel_ratio(recorded: &Recorded<'_>, wheel: &[WheelSpeed], outages: &[Outage]) -> Option<f64> {
+pub fn wheel_ratio(
+    recorded: &Recorded<'_>,
+    wheel: &[WheelSpeed],
+    outages: &[Outage],
+) -> Option<f64> {
     let ratio = |(t_s, speed): (f64, f64)| {
         let turned = wheel.get(wheel.partition_point(|w| w.t_s < t_s))?;
         let is_near = turned.t_s - t_s < 0.5 * REACH_S && speed > 3.0 * SPEEDS.1;
         is_near.then(|| turned.m_s.abs() / speed)
     };
-    middle(speeds(recorded, outages).into_iter().filter_map(ratio).collect())
+    middle(
+        speeds(recorded, outages)
+            .into_iter()
+            .filter_map(ratio)
+            .collect(),
+    )
 }
 
 /// The first element of each interval of 1/`rate_hz`.
@@ -163,17 +190,25 @@ fn every<T>(all: &[T], t_s: impl Fn(&T) -> f64, rate_hz: f64) -> impl Iterator<I
         due
     };
     let mut is_due = is_due;
-    all.iter().enumerate().filter_map(move |(k, element)| is_due(element).then_some(k))
+    all.iter()
+        .enumerate()
+        .filter_map(move |(k, element)| is_due(element).then_some(k))
 }
 
 /// Horizontal speeds of the fixes: their own, or by positions a second apart.
 fn speeds(recorded: &Recorded<'_>, outages: &[Outage]) -> Vec<(f64, f64)> {
-    let known: Vec<_> =
-        recorded.gnss.iter().filter(|f| !outages.iter().any(|o| o.withholds(f.t_s))).collect();
+    let known: Vec<_> = recorded
+        .gnss
+        .iter()
+        .filter(|f| !outages.iter().any(|o| o.withholds(f.t_s)))
+        .collect();
     let of_velocity = |k: usize| known[k].velocity.map(|v| v.v_n().truncate().length());
     let of_positions = |k: usize| {
         let now = known[k];
-        let before = known[..k].iter().rev().find(|f| now.t_s - f.t_s >= REACH_S - 0.01)?;
+        let before = known[..k]
+            .iter()
+            .rev()
+            .find(|f| now.t_s - f.t_s >= REACH_S - 0.01)?;
         let place = NavState {
             lat: before.lat,
             lon: before.lon,
@@ -181,7 +216,9 @@ fn speeds(recorded: &Recorded<'_>, outages: &[Outage]) -> Vec<(f64, f64)> {
             v_n: DVec3::ZERO,
             q_b_n: DQuat::IDENTITY,
         };
-        let metres = ned_difference(&place, now.lat, now.lon, now.h).truncate().length();
+        let metres = ned_difference(&place, now.lat, now.lon, now.h)
+            .truncate()
+            .length();
         let seconds = now.t_s - before.t_s;
         (seconds < 2.0 * REACH_S).then(|| metres / seconds)
     };
@@ -203,7 +240,10 @@ impl Scene<'_> {
     fn window(&self, k: usize) -> Option<&[ImuIncrement]> {
         let samples = (WINDOW_S / self.step_s).round().max(2.0) as usize;
         let window = &self.imu[(k + 1).checked_sub(samples)?..=k];
-        window.iter().all(|s| s.dt_s <= LONG * self.step_s).then_some(window)
+        window
+            .iter()
+            .all(|s| s.dt_s <= LONG * self.step_s)
+            .then_some(window)
     }
 
     fn motion(&self, t_s: f64) -> Motion {
@@ -224,6 +264,7 @@ impl Scene<'_> {
     }
 
     fn stands(&self, test: &Standstill, k: usize) -> bool {
-        self.window(k).is_some_and(|window| test.stands(window, self.motion(self.imu[k].t_s)))
+        self.window(k)
+            .is_some_and(|window| test.stands(window, self.motion(self.imu[k].t_s)))
     }
 }

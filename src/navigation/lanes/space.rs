@@ -27,7 +27,11 @@ impl Vec3 {
     /// Into registers.
     #[inline(always)]
     pub(crate) fn load<W: Wide>(&self) -> Vec3<W> {
-        Vec3([W::load(&self.0[0]), W::load(&self.0[1]), W::load(&self.0[2])])
+        Vec3([
+            W::load(&self.0[0]),
+            W::load(&self.0[1]),
+            W::load(&self.0[2]),
+        ])
     }
 
     /// From registers.
@@ -65,7 +69,11 @@ impl<L: Real> Vec3<L> {
     #[inline(always)]
     pub(crate) fn mul_add(self, s: L, term: Self) -> Self {
         let (a, t) = (self.0, term.0);
-        Self([a[0].mul_add(s, t[0]), a[1].mul_add(s, t[1]), a[2].mul_add(s, t[2])])
+        Self([
+            a[0].mul_add(s, t[0]),
+            a[1].mul_add(s, t[1]),
+            a[2].mul_add(s, t[2]),
+        ])
     }
 }
 
@@ -167,7 +175,11 @@ impl<L: Real> Mul<Vec3<L>> for Mat3<L> {
     type Output = Vec3<L>;
     #[inline(always)]
     fn mul(self, v: Vec3<L>) -> Vec3<L> {
-        Vec3([dot3(&self.0[0], &v), dot3(&self.0[1], &v), dot3(&self.0[2], &v)])
+        Vec3([
+            dot3(&self.0[0], &v),
+            dot3(&self.0[1], &v),
+            dot3(&self.0[2], &v),
+        ])
     }
 }
 
@@ -209,7 +221,10 @@ impl Quat {
     /// Into registers.
     #[inline(always)]
     pub(crate) fn load<W: Wide>(&self) -> Quat<W> {
-        Quat { w: W::load(&self.w), v: self.v.load() }
+        Quat {
+            w: W::load(&self.w),
+            v: self.v.load(),
+        }
     }
 
     /// From registers.
@@ -224,7 +239,10 @@ impl<L: Real> Quat<L> {
     /// The same rotation in every lane.
     #[inline(always)]
     pub(crate) fn splat(q: glam::DQuat) -> Self {
-        Self { w: L::from(q.w), v: Vec3::splat(q.xyz()) }
+        Self {
+            w: L::from(q.w),
+            v: Vec3::splat(q.xyz()),
+        }
     }
 
     /// The rotation by a rotation vector of at most π/2 radians.
@@ -233,7 +251,10 @@ impl<L: Real> Quat<L> {
         let half = phi * L::from(0.5);
         // sin(θ/2)/(θ/2) as a series in θ²: no division by θ, and so no branch for a rotation of zero.
         let (sinc, cos) = sinc_cos_of_square(half.dot(half));
-        Self { w: cos, v: half * sinc }
+        Self {
+            w: cos,
+            v: half * sinc,
+        }
     }
 
     /// One Newton step towards unit length: enough after each product of unit quaternions.
@@ -241,7 +262,10 @@ impl<L: Real> Quat<L> {
     pub(crate) fn renormalised(self) -> Self {
         // 1/√x ≈ (3 − x)/2 near 1: an error ε of the norm becomes 3ε²/2.
         let scale = (self.w * self.w + self.v.dot(self.v)) * -0.5 + 1.5;
-        Self { w: self.w * scale, v: self.v * scale }
+        Self {
+            w: self.w * scale,
+            v: self.v * scale,
+        }
     }
 
     /// The direction cosine matrix.
@@ -269,6 +293,9 @@ impl<L: Real> Mul for Quat<L> {
     fn mul(self, b: Self) -> Self {
         // w_a v_b + w_b v_a + v_a × v_b.
         let v = b.v.mul_add(self.w, self.v.mul_add(b.w, self.v.cross(b.v)));
-        Self { w: self.w.mul_add(b.w, -self.v.dot(b.v)), v }
+        Self {
+            w: self.w.mul_add(b.w, -self.v.dot(b.v)),
+            v,
+        }
     }
 }

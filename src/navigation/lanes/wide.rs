@@ -1,5 +1,8 @@
 //! Eight lanes in the registers of the machine, chosen at run time.
-#![allow(unsafe_code, reason = "vector instructions, used only after the processor was asked for them")]
+#![allow(
+    unsafe_code,
+    reason = "vector instructions, used only after the processor was asked for them"
+)]
 
 use super::{Lanes, Real};
 

@@ -34,15 +34,25 @@ impl Agreement {
         let v = &runs.verdict;
         let nees_z = distance(v.nees, v.nees_std_error, expected.nees.mean);
         let coverage_z = distance(v.coverage, v.coverage_std_error, expected.coverage.mean);
-        let mut all = vec![(nees_z, "NEES".to_owned()), (coverage_z, "coverage".to_owned())];
+        let mut all = vec![
+            (nees_z, "NEES".to_owned()),
+            (coverage_z, "coverage".to_owned()),
+        ];
         let (a, e) = (&runs.accuracy, &expected.accuracy);
         for (i, name) in REPORTED_NAMES.iter().enumerate() {
-            let z = distance(a.rmse_mean.0[i], a.rmse_mean_std_error.0[i], e.rmse_mean.0[i]);
+            let z = distance(
+                a.rmse_mean.0[i],
+                a.rmse_mean_std_error.0[i],
+                e.rmse_mean.0[i],
+            );
             all.push((z, format!("RMSE of {name} over the run")));
         }
         for (k, (o, e)) in runs.outages.iter().zip(&expected.outages).enumerate() {
             let place = format!("at the end of outage {}", k + 1);
-            all.push((distance(o.nees_end, o.nees_end_std_error, e.nees_end), format!("NEES {place}")));
+            all.push((
+                distance(o.nees_end, o.nees_end_std_error, e.nees_end),
+                format!("NEES {place}"),
+            ));
             for (i, name) in REPORTED_NAMES.iter().enumerate() {
                 let z = distance(o.rmse_end.0[i], o.rmse_end_std_error.0[i], e.rmse_end.0[i]);
                 all.push((z, format!("RMSE of {name} {place}")));
@@ -50,7 +60,10 @@ impl Agreement {
         }
         // coverage that is 1 in every run has no error of its own, and tells nothing
         all.retain(|(z, _)| z.is_finite());
-        let largest = all.iter().max_by(|a, b| a.0.abs().total_cmp(&b.0.abs())).cloned();
+        let largest = all
+            .iter()
+            .max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
+            .cloned();
         let (largest_z, largest) = largest.unwrap_or((f64::NAN, String::new()));
         // Two sides, and Bonferroni over all figures: they are correlated, so that the true level is below
         // LEVEL.
@@ -58,7 +71,14 @@ impl Agreement {
         // The standard errors are estimated from the same runs: Student's t, not the normal law.
         let t = StudentsT::new(0.0, 1.0, runs.independent_runs - 1.0);
         let bound_z = t.map_or(f64::NAN, |t| t.inverse_cdf(1.0 - tail));
-        Self { figures: all.len(), largest_z, largest, bound_z, nees_z, coverage_z }
+        Self {
+            figures: all.len(),
+            largest_z,
+            largest,
+            bound_z,
+            nees_z,
+            coverage_z,
+        }
     }
 
     /// Whether the runs contradict the analysis: where errors are no longer small it does not hold.

@@ -23,23 +23,40 @@ impl Budget {
         let squares = |source: &NamedSource| -> Vec<[f64; REPORTED]> {
             // Mean squares, not variances: a deterministic source (drift) has a mean and no variance.
             let squares = |end: &Judged| end.errors.variances(&end.errors.moments());
-            filter.errors_at_ends(&source.side).iter().map(squares).collect()
+            filter
+                .errors_at_ends(&source.side)
+                .iter()
+                .map(squares)
+                .collect()
         };
         let of_source: Vec<Vec<[f64; REPORTED]>> = sources.par_iter().map(squares).collect();
-        let is_there = |ends: &[[f64; REPORTED]]| ends.iter().flatten().any(|square| *square != 0.0);
-        let (sources, of_source): (Vec<&NamedSource>, Vec<_>) =
-            sources.iter().zip(of_source).filter(|(_, ends)| is_there(ends)).unzip();
+        let is_there =
+            |ends: &[[f64; REPORTED]]| ends.iter().flatten().any(|square| *square != 0.0);
+        let (sources, of_source): (Vec<&NamedSource>, Vec<_>) = sources
+            .iter()
+            .zip(of_source)
+            .filter(|(_, ends)| is_there(ends))
+            .unzip();
         let outages = of_source.first().map_or(0, Vec::len);
         let budget = |k: usize| {
             let mut total = [0.0; REPORTED];
             for ends in &of_source {
-                total.iter_mut().zip(&ends[k]).for_each(|(sum, square)| *sum += square);
+                total
+                    .iter_mut()
+                    .zip(&ends[k])
+                    .for_each(|(sum, square)| *sum += square);
             }
-            let share =
-                |ends: &Vec<[f64; REPORTED]>| PerState(std::array::from_fn(|i| ends[k][i] / total[i]));
-            let shares =
-                sources.iter().zip(&of_source).map(|(source, ends)| (source.name.clone(), share(ends)));
-            Self { shares: shares.collect(), total }
+            let share = |ends: &Vec<[f64; REPORTED]>| {
+                PerState(std::array::from_fn(|i| ends[k][i] / total[i]))
+            };
+            let shares = sources
+                .iter()
+                .zip(&of_source)
+                .map(|(source, ends)| (source.name.clone(), share(ends)));
+            Self {
+                shares: shares.collect(),
+                total,
+            }
         };
         (0..outages).map(budget).collect()
     }
@@ -48,10 +65,18 @@ impl Budget {
     #[must_use]
     pub fn ranked(&self, states: &[usize]) -> Vec<(&str, f64)> {
         let whole: f64 = states.iter().map(|i| self.total[*i]).sum();
-        let share =
-            |of: &PerState<f64>| states.iter().map(|i| of.0[*i] * self.total[*i]).sum::<f64>() / whole;
-        let mut all: Vec<(&str, f64)> =
-            self.shares.iter().map(|(name, of)| (name.as_str(), share(of))).collect();
+        let share = |of: &PerState<f64>| {
+            states
+                .iter()
+                .map(|i| of.0[*i] * self.total[*i])
+                .sum::<f64>()
+                / whole
+        };
+        let mut all: Vec<(&str, f64)> = self
+            .shares
+            .iter()
+            .map(|(name, of)| (name.as_str(), share(of)))
+            .collect();
         all.sort_by(|a, b| b.1.total_cmp(&a.1));
         all
     }

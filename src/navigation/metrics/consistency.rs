@@ -13,7 +13,10 @@ pub struct Band {
 }
 
 impl Band {
-    const NONE: Self = Self { lower: f64::NAN, upper: f64::NAN };
+    const NONE: Self = Self {
+        lower: f64::NAN,
+        upper: f64::NAN,
+    };
 
     /// Whether a value lies in the band, its ends included.
     pub(crate) fn contains(&self, value: f64) -> bool {
@@ -37,7 +40,10 @@ pub(crate) fn chi_square_interval(dof: usize, count: f64, tail: f64) -> Band {
     // The sum of independent chi-square variables is one of the sum of their degrees of freedom.
     let total = dof as f64 * count;
     let mean_at = |p: f64| chi_square_quantile(total, p) / count;
-    Band { lower: mean_at(tail), upper: mean_at(1.0 - tail) }
+    Band {
+        lower: mean_at(tail),
+        upper: mean_at(1.0 - tail),
+    }
 }
 
 /// Exact to rounding up to 10⁵ degrees of freedom; above, by Wilson and Hilferty's cube root of a normal,
@@ -60,7 +66,10 @@ pub(crate) fn coverage_band(level: f64, count: f64) -> Band {
             // The binomial law is discrete: the smallest count that reaches p, so that the band holds 95 % or
             // more.
             let quantile = |p: f64| binomial.inverse_cdf(p) as f64 / whole as f64;
-            Band { lower: quantile(0.025), upper: quantile(0.975) }
+            Band {
+                lower: quantile(0.025),
+                upper: quantile(0.975),
+            }
         }
         _ => Band::NONE,
     }
@@ -74,10 +83,16 @@ mod tests {
     #[test]
     fn chi_square_bands_agree_with_tables() {
         let one = chi_square_band(9, 1.0);
-        assert!((one.lower - 2.700_39).abs() < 1e-5 && (one.upper - 19.022_77).abs() < 1e-5, "{one:?}");
+        assert!(
+            (one.lower - 2.700_39).abs() < 1e-5 && (one.upper - 19.022_77).abs() < 1e-5,
+            "{one:?}"
+        );
         let hundred = chi_square_band(9, 100.0);
         let (lower, upper) = (8.187_56, 9.850_32);
-        assert!((hundred.lower - lower).abs() < 1e-4 && (hundred.upper - upper).abs() < 1e-4, "{hundred:?}");
+        assert!(
+            (hundred.lower - lower).abs() < 1e-4 && (hundred.upper - upper).abs() < 1e-4,
+            "{hundred:?}"
+        );
     }
 
     #[test]
@@ -92,7 +107,13 @@ mod tests {
     /// Binomial(100, 0.95): P(X ≤ 89) = 1.1 %, P(X ≤ 90) = 2.8 %, P(X ≤ 98) = 96.3 %, P(X ≤ 99) = 99.4 %.
     #[test]
     fn coverage_band_agrees_with_binomial_tables() {
-        assert_eq!(coverage_band(0.95, 100.0), Band { lower: 0.90, upper: 0.99 });
+        assert_eq!(
+            coverage_band(0.95, 100.0),
+            Band {
+                lower: 0.90,
+                upper: 0.99
+            }
+        );
         assert!(coverage_band(0.95, 0.0).lower.is_nan());
     }
 }

@@ -56,7 +56,11 @@ impl EpochMetrics {
 /// Statistics of every epoch.
 #[must_use]
 pub fn epochs(result: &RunResult) -> Vec<EpochMetrics> {
-    result.epochs.iter().map(|sums| EpochMetrics::of(sums, result.independent_windows)).collect()
+    result
+        .epochs
+        .iter()
+        .map(|sums| EpochMetrics::of(sums, result.independent_windows))
+        .collect()
 }
 
 /// ASEE and RMSE as means over epochs, the one beside the other.
@@ -111,12 +115,22 @@ mod tests {
     #[test]
     fn an_epoch_of_two_runs_in_closed_form() {
         let e = EpochMetrics::of(&two_runs(), None);
-        assert_eq!((e.asee.0[3].value, e.rmse.0[3].value, e.bias.0[3].value), (2.0, 5.0, -3.0));
+        assert_eq!(
+            (e.asee.0[3].value, e.rmse.0[3].value, e.bias.0[3].value),
+            (2.0, 5.0, -3.0)
+        );
         assert!((e.asee.0[3].std_error - 1.0).abs() < 1e-15);
         assert_eq!(e.bias_asee, [0.25; BIASES]);
         // squares 1 and 49: standard deviation 24 √2, of their mean 24, of its root 24/(2·5)
-        assert!((e.rmse.0[3].std_error - 2.4).abs() < 1e-14, "{:?}", e.rmse.0[3]);
-        assert_eq!((e.nees.value, e.nees.std_error, e.coverage), (10.0, 2.0, 0.5));
+        assert!(
+            (e.rmse.0[3].std_error - 2.4).abs() < 1e-14,
+            "{:?}",
+            e.rmse.0[3]
+        );
+        assert_eq!(
+            (e.nees.value, e.nees.std_error, e.coverage),
+            (10.0, 2.0, 0.5)
+        );
     }
 
     #[test]
@@ -124,8 +138,14 @@ mod tests {
         let mut later = two_runs();
         later.see = [12.0; REPORTED];
         later.error_sq = [2.0 * 81.0; REPORTED];
-        let all = [EpochMetrics::of(&two_runs(), None), EpochMetrics::of(&later, None)];
+        let all = [
+            EpochMetrics::of(&two_runs(), None),
+            EpochMetrics::of(&later, None),
+        ];
         let accuracy = Accuracy::over(all.iter());
-        assert_eq!((accuracy.asee_mean.0[0].value, accuracy.rmse_mean.0[8].value), (4.0, 7.0));
+        assert_eq!(
+            (accuracy.asee_mean.0[0].value, accuracy.rmse_mean.0[8].value),
+            (4.0, 7.0)
+        );
     }
 }

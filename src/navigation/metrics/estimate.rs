@@ -33,7 +33,14 @@ impl Estimate {
         // scatter is the sum of squares over n; over m independent values its expectation is σ²(1 − 1/m), and
         // the variance of the mean σ²/m: hence scatter/(m − 1).
         let freedom = size.independent - 1.0;
-        Self { value, std_error: if freedom > 0.0 { (scatter / freedom).sqrt() } else { f64::NAN } }
+        Self {
+            value,
+            std_error: if freedom > 0.0 {
+                (scatter / freedom).sqrt()
+            } else {
+                f64::NAN
+            },
+        }
     }
 
     /// The root mean square of a sample from its sums of squares and of fourth powers.
@@ -46,7 +53,11 @@ impl Estimate {
     #[must_use]
     pub fn root(self) -> Self {
         let value = self.value.sqrt();
-        let std_error = if value > 0.0 { self.std_error / (2.0 * value) } else { self.std_error };
+        let std_error = if value > 0.0 {
+            self.std_error / (2.0 * value)
+        } else {
+            self.std_error
+        };
         Self { value, std_error }
     }
 
@@ -57,7 +68,11 @@ impl Estimate {
         let n = size.values as f64;
         let value = sample.clone().sum::<f64>() / n;
         // about the mean in a second pass: values of little scatter would lose it in their squares
-        Self::scattered(size, value, sample.map(|x| (x - value).powi(2)).sum::<f64>() / n)
+        Self::scattered(
+            size,
+            value,
+            sample.map(|x| (x - value).powi(2)).sum::<f64>() / n,
+        )
     }
 }
 
@@ -75,7 +90,10 @@ impl SampleSize {
     /// have).
     #[must_use]
     pub fn of(values: u64, windows: Option<f64>) -> Self {
-        Self { values, independent: windows.unwrap_or(f64::INFINITY).min(values as f64) }
+        Self {
+            values,
+            independent: windows.unwrap_or(f64::INFINITY).min(values as f64),
+        }
     }
 }
 
@@ -114,9 +132,16 @@ impl<'de, T: Deserialize<'de> + Copy> Deserialize<'de> for PerState<T> {
             return Deserialize::deserialize(deserializer).map(Self);
         }
         let by_name = HashMap::<String, T>::deserialize(deserializer)?;
-        let value =
-            |name: &&'static str| by_name.get(*name).copied().ok_or_else(|| D::Error::missing_field(name));
-        let values = REPORTED_NAMES.iter().map(value).collect::<Result<Vec<T>, _>>()?;
+        let value = |name: &&'static str| {
+            by_name
+                .get(*name)
+                .copied()
+                .ok_or_else(|| D::Error::missing_field(name))
+        };
+        let values = REPORTED_NAMES
+            .iter()
+            .map(value)
+            .collect::<Result<Vec<T>, _>>()?;
         Ok(Self(std::array::from_fn(|i| values[i])))
     }
 }
@@ -135,12 +160,17 @@ pub struct Quantile {
 /// values are independent, it runs between the order statistics at the same shares of the sample.
 #[must_use]
 pub fn quantile(sorted: &[f64], p: f64, windows: Option<f64>) -> Quantile {
-    Quantile { value: sample_quantile(sorted, p), ci95: order_statistic_interval(sorted, p, windows) }
+    Quantile {
+        value: sample_quantile(sorted, p),
+        ci95: order_statistic_interval(sorted, p, windows),
+    }
 }
 
 /// The quantile alone; NaN of no value.
 pub(super) fn sample_quantile(sorted: &[f64], p: f64) -> f64 {
-    let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
+    let Some(last) = sorted.len().checked_sub(1) else {
+        return f64::NAN;
+    };
     // From the first value (p = 0) to the last (p = 1): Hyndman and Fan's type 7, the default of R and NumPy.
     let position = p * last as f64;
     let below = position.floor() as usize;
@@ -149,17 +179,30 @@ pub(super) fn sample_quantile(sorted: &[f64], p: f64) -> f64 {
 }
 
 /// x_(l) and x_(u), counted from 1, with P(B < l) ≤ 2.5 % and P(B ≥ u) ≤ 2.5 %, B binomial.
-fn order_statistic_interval(sorted: &[f64], p: f64, windows: Option<f64>) -> (Option<f64>, Option<f64>) {
+fn order_statistic_interval(
+    sorted: &[f64],
+    p: f64,
+    windows: Option<f64>,
+) -> (Option<f64>, Option<f64>) {
     // Rounded down: fewer independent values make a wider interval.
-    let n = SampleSize::of(sorted.len() as u64, windows).independent.floor() as u64;
-    let Ok(binomial) = Binomial::new(p, n) else { return (None, None) };
+    let n = SampleSize::of(sorted.len() as u64, windows)
+        .independent
+        .floor() as u64;
+    let Ok(binomial) = Binomial::new(p, n) else {
+        return (None, None);
+    };
     let l = (0..n).take_while(|l| binomial.cdf(*l) <= 0.025).count(); // B ≤ l − 1 has at most 2.5 %
     let u = (0..=n).find(|u| *u > 0 && 1.0 - binomial.cdf(u - 1) <= 0.025);
     // one independent value stands for so many; the bounds are the outermost of theirs
     let each = sorted.len() as f64 / n as f64;
-    let lower = l.checked_sub(1).map(|before| (before as f64 * each).floor() as usize);
+    let lower = l
+        .checked_sub(1)
+        .map(|before| (before as f64 * each).floor() as usize);
     let upper = u.map(|u| (u as f64 * each).ceil() as usize - 1);
-    (lower.and_then(|i| sorted.get(i)).copied(), upper.and_then(|i| sorted.get(i)).copied())
+    (
+        lower.and_then(|i| sorted.get(i)).copied(),
+        upper.and_then(|i| sorted.get(i)).copied(),
+    )
 }
 
 #[cfg(test)]
@@ -173,15 +216,24 @@ mod tests {
         assert_eq!(mean.value, 3.0);
         assert!((mean.std_error - (14.0_f64 / 12.0).sqrt()).abs() < 1e-15);
         // squares 1, 4, 9, 36: mean 12.5, sample variance 769/3
-        let rms = Estimate::mean_of([1.0_f64, -2.0, 3.0, -6.0].into_iter().map(|x| x * x), None).root();
+        let rms =
+            Estimate::mean_of([1.0_f64, -2.0, 3.0, -6.0].into_iter().map(|x| x * x), None).root();
         assert!((rms.value - 12.5_f64.sqrt()).abs() < 1e-15);
         let expected = (769.0_f64 / 12.0).sqrt() / (2.0 * 12.5_f64.sqrt());
-        assert!((rms.std_error - expected).abs() < 1e-14, "{} {expected}", rms.std_error);
+        assert!(
+            (rms.std_error - expected).abs() < 1e-14,
+            "{} {expected}",
+            rms.std_error
+        );
     }
 
     #[test]
     fn one_run_has_no_standard_error() {
-        assert!(Estimate::mean_of([2.0].into_iter(), None).std_error.is_nan());
+        assert!(
+            Estimate::mean_of([2.0].into_iter(), None)
+                .std_error
+                .is_nan()
+        );
     }
 
     /// Every value twice: the mean of half as many independent ones, its standard error theirs.
@@ -189,11 +241,21 @@ mod tests {
     fn values_that_repeat_each_other_count_once() {
         let once = [1.0, 2.0, 3.0, 6.0];
         let twice = once.iter().flat_map(|x| [*x, *x]);
-        assert_eq!(Estimate::mean_of(twice, Some(4.0)), Estimate::mean_of(once.into_iter(), None));
+        assert_eq!(
+            Estimate::mean_of(twice, Some(4.0)),
+            Estimate::mean_of(once.into_iter(), None)
+        );
         let sorted: Vec<f64> = (1..=100).map(f64::from).collect();
         let doubled: Vec<f64> = sorted.iter().flat_map(|x| [*x, *x]).collect();
-        assert_eq!(quantile(&doubled, 0.5, Some(100.0)).ci95, quantile(&sorted, 0.5, None).ci95);
-        assert!(Estimate::mean_of(once.into_iter(), Some(1.0)).std_error.is_nan());
+        assert_eq!(
+            quantile(&doubled, 0.5, Some(100.0)).ci95,
+            quantile(&sorted, 0.5, None).ci95
+        );
+        assert!(
+            Estimate::mean_of(once.into_iter(), Some(1.0))
+                .std_error
+                .is_nan()
+        );
     }
 
     /// The interval's bounds for n = 100: for the median the 40th and 61st values (96.5 % together), for
@@ -202,7 +264,10 @@ mod tests {
     fn quantiles_lie_between_order_statistics() {
         let sorted: Vec<f64> = (1..=100).map(f64::from).collect();
         let median = quantile(&sorted, 0.5, None);
-        assert_eq!((median.value, median.ci95), (50.5, (Some(40.0), Some(61.0))));
+        assert_eq!(
+            (median.value, median.ci95),
+            (50.5, (Some(40.0), Some(61.0)))
+        );
         let high = quantile(&sorted, 0.95, None);
         assert!((high.value - 95.05).abs() < 1e-12);
         assert_eq!(high.ci95, (Some(90.0), Some(100.0)));
@@ -211,14 +276,18 @@ mod tests {
     #[test]
     fn small_samples_have_open_intervals() {
         // P(B ≤ 1) = 0.7 %, P(B ≤ 2) = 14 %, P(B = 3) = 86 %
-        assert_eq!(quantile(&[1.0, 2.0, 3.0], 0.95, None).ci95, (Some(2.0), None));
+        assert_eq!(
+            quantile(&[1.0, 2.0, 3.0], 0.95, None).ci95,
+            (Some(2.0), None)
+        );
         assert_eq!(quantile(&[1.0, 2.0, 3.0], 0.5, None).ci95, (None, None));
         assert!(quantile(&[], 0.5, None).value.is_nan());
     }
 
     #[test]
     fn states_are_named_in_files() {
-        let text = serde_json::to_string(&PerState(std::array::from_fn::<_, REPORTED, _>(|i| i))).unwrap();
+        let text =
+            serde_json::to_string(&PerState(std::array::from_fn::<_, REPORTED, _>(|i| i))).unwrap();
         assert!(text.starts_with(r#"{"pos_n_m":0,"pos_e_m":1,"#), "{text}");
     }
 }

@@ -4,12 +4,16 @@ use super::epoch::{Accuracy, EpochMetrics};
 use super::estimate::{Estimate, PerState, Quantile};
 use super::outage::{OutageMetrics, Reconvergence, is_beyond_linear, within};
 use super::quadratic_form::QuadraticForm;
-use super::summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, SCHEMA_VERSION, Summary};
+use super::summary::{
+    AccuracySummary, Consistency, Coverage, Nis, OutageSummary, SCHEMA_VERSION, Summary,
+};
 use super::verdict::{OutageVerdict, Verdict};
 use crate::ekf::Belief;
 use crate::noise::Model;
 use crate::simulation::lincov::{ErrorLaw, FilterPass, Instant, Judged, Track, TruthSide};
-use crate::simulation::{BIASES, COVERAGE_DOF, Experiment, NEES_DOF, OutageRecord, REPORTED, RunRecord};
+use crate::simulation::{
+    BIASES, COVERAGE_DOF, Experiment, NEES_DOF, OutageRecord, REPORTED, RunRecord,
+};
 use crate::units::DEG;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -45,7 +49,12 @@ impl Expected {
     /// The figures of a filter in an experiment whose inertial errors `truth` makes, along the experiment's track; none
     /// where a covariance did not stay finite and positive.
     #[must_use]
-    pub fn along(track: &Track, experiment: &Experiment<'_>, belief: &Belief, truth: &Model) -> Option<Self> {
+    pub fn along(
+        track: &Track,
+        experiment: &Experiment<'_>,
+        belief: &Belief,
+        truth: &Model,
+    ) -> Option<Self> {
         let truth = TruthSide::together(&TruthSide::sources(experiment, truth));
         let filter = FilterPass::new(track, belief);
         let law = filter.errors(&truth);
@@ -53,17 +62,23 @@ impl Expected {
         // The limit that the filter itself would take for this level: it believes in a chi-square law.
         let limit = chi2.inverse_cdf(experiment.coverage_level);
         let reports = law.reports.iter().zip(filter.bias_sigmas());
-        let epochs: Vec<EpochMetrics> =
-            reports.map(|(instant, bias)| epoch(instant, *bias, limit)).collect::<Option<_>>()?;
+        let epochs: Vec<EpochMetrics> = reports
+            .map(|(instant, bias)| epoch(instant, *bias, limit))
+            .collect::<Option<_>>()?;
         let ends = experiment.outages.iter().zip(&law.outage_ends);
-        let mut outages: Vec<OutageMetrics> =
-            ends.map(|(window, end)| outage((window.start_s, window.end_s), end, &epochs)).collect();
+        let mut outages: Vec<OutageMetrics> = ends
+            .map(|(window, end)| outage((window.start_s, window.end_s), end, &epochs))
+            .collect();
         for outage in &mut outages {
             let window = (outage.start_s, outage.end_s);
             // A barometer or a vehicle that measures in the outage corrects what grows upwards.
             let lasts = |rate_hz: f64| (window.1 - window.0) * rate_hz >= 1.0;
             let sees_height = experiment.baro.is_some_and(|b| lasts(b.rate_hz))
-                || experiment.aiding.nhc.as_ref().is_some_and(|nhc| lasts(nhc.rate_hz));
+                || experiment
+                    .aiding
+                    .nhc
+                    .as_ref()
+                    .is_some_and(|nhc| lasts(nhc.rate_hz));
             let sigma_m_s = outage.asee_end.0[VELOCITY_DOWN].value;
             outage.beyond_linear = !sees_height && is_beyond_linear(window, &epochs, sigma_m_s);
         }
@@ -112,7 +127,11 @@ impl Expected {
             },
             nis: Nis {
                 dof: self.fix_components,
-                mean: if self.record.nis.1 > 0 { self.record.nis.0 } else { unknown },
+                mean: if self.record.nis.1 > 0 {
+                    self.record.nis.0
+                } else {
+                    unknown
+                },
                 lower95: unknown,
                 upper95: unknown,
                 fixes: self.record.nis.1,
@@ -136,7 +155,10 @@ impl Expected {
 }
 
 fn exact(value: f64) -> Estimate {
-    Estimate { value, std_error: 0.0 }
+    Estimate {
+        value,
+        std_error: 0.0,
+    }
 }
 
 fn exactly(values: [f64; REPORTED]) -> PerState<Estimate> {
@@ -155,7 +177,10 @@ fn mean_size(instant: &Instant, states: &[usize]) -> f64 {
 
 /// Quantiles of the horizontal error (m).
 #[must_use]
-pub fn horizontal_quantiles<const N: usize>(instant: &Instant, probabilities: [f64; N]) -> [f64; N] {
+pub fn horizontal_quantiles<const N: usize>(
+    instant: &Instant,
+    probabilities: [f64; N],
+) -> [f64; N] {
     let horizontal = square(instant, &[0, 1]);
     probabilities.map(|p| horizontal.quantile(p).sqrt())
 }
@@ -171,7 +196,8 @@ fn epoch(judged: &Judged, bias_asee: [f64; BIASES], limit: f64) -> Option<EpochM
     let mean = COVERED.map(|s| instant.mean[s]);
     // eᵀ P_f⁻¹ e is not chi-square where P_f is not the covariance of e: a weighted sum of such, whose law is
     // exact.
-    let inside = QuadraticForm::of_normalised(&believed, &block(&instant.covariance, &COVERED), &mean)?;
+    let inside =
+        QuadraticForm::of_normalised(&believed, &block(&instant.covariance, &COVERED), &mean)?;
     Some(EpochMetrics {
         t_s: instant.t_s,
         gnss: instant.fix,
@@ -191,7 +217,10 @@ fn outage((start_s, end_s): (f64, f64), end: &Judged, epochs: &[EpochMetrics]) -
     let mean = Accuracy::over(within((start_s, end_s), epochs));
     let without_error = |all: &PerState<Estimate>| PerState(all.0.map(|e| exact(e.value)));
     let [p50, p95, p999] = horizontal_quantiles(&end.errors, [0.5, 0.95, NEARLY_ALL]);
-    let quantile = |value: f64| Quantile { value, ci95: (None, None) };
+    let quantile = |value: f64| Quantile {
+        value,
+        ci95: (None, None),
+    };
     OutageMetrics {
         start_s,
         end_s,
@@ -206,14 +235,19 @@ fn outage((start_s, end_s): (f64, f64), end: &Judged, epochs: &[EpochMetrics]) -
         horizontal_p999_m: Some(p999),
         horizontal_max_m: f64::NAN,
         beyond_linear: false,
-        reconvergence: Reconvergence { p50_s: quantile(f64::NAN), p95_s: quantile(f64::NAN), never: None },
+        reconvergence: Reconvergence {
+            p50_s: quantile(f64::NAN),
+            p95_s: quantile(f64::NAN),
+            never: None,
+        },
     }
 }
 
 /// The run whose squares are the expected ones.
 fn record(epochs: &[EpochMetrics], law: &ErrorLaw, outages: &[OutageMetrics]) -> RunRecord {
-    let mean =
-        |value: &dyn Fn(&EpochMetrics) -> f64| epochs.iter().map(value).sum::<f64>() / epochs.len() as f64;
+    let mean = |value: &dyn Fn(&EpochMetrics) -> f64| {
+        epochs.iter().map(value).sum::<f64>() / epochs.len() as f64
+    };
     let of_outage = |o: &OutageMetrics| OutageRecord {
         see_mean: o.asee_mean.0.map(|e| e.value),
         see_end: o.asee_end.0.map(|e| e.value),
@@ -233,7 +267,9 @@ fn record(epochs: &[EpochMetrics], law: &ErrorLaw, outages: &[OutageMetrics]) ->
         nees_mean: mean(&|e| e.nees.value),
         covered: mean(&|e| e.coverage),
         // The mean of squares over the epochs, as runs have it; the root is taken by the verdict.
-        normalised_sq: std::array::from_fn(|i| mean(&|e| (e.rmse.0[i].value / e.asee.0[i].value).powi(2))),
+        normalised_sq: std::array::from_fn(|i| {
+            mean(&|e| (e.rmse.0[i].value / e.asee.0[i].value).powi(2))
+        }),
         horizontal_m: Vec::new(),
     }
 }

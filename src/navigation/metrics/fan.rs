@@ -27,31 +27,57 @@ pub struct FanEpoch {
 pub fn fan(result: &RunResult) -> Vec<FanEpoch> {
     // Runs after the hundred thousandth have no errors over time: they are left out at the ends as well, so
     // that the band is of one set of runs.
-    let kept: Vec<&RunRecord> =
-        result.runs.iter().filter(|run| !run.diverged && !run.horizontal_m.is_empty()).collect();
+    let kept: Vec<&RunRecord> = result
+        .runs
+        .iter()
+        .filter(|run| !run.diverged && !run.horizontal_m.is_empty())
+        .collect();
     let epoch = |t_s: f64, error: &dyn Fn(&RunRecord) -> f64| {
         let mut errors: Vec<f64> = kept.iter().map(|run| error(run)).collect();
         errors.sort_unstable_by(f64::total_cmp);
         let quantiles_m = FAN_LEVELS.map(|p| sample_quantile(&errors, p));
-        FanEpoch { t_s, quantiles_m, lincov_m: None }
+        FanEpoch {
+            t_s,
+            quantiles_m,
+            lincov_m: None,
+        }
     };
     let over_time = result.fan_t_s.par_iter().enumerate();
-    let over_time = over_time.map(|(k, t_s)| epoch(*t_s, &|run| f64::from(run.horizontal_m[k]))).collect();
+    let over_time = over_time
+        .map(|(k, t_s)| epoch(*t_s, &|run| f64::from(run.horizontal_m[k])))
+        .collect();
     let ends = result.outage_fix_t_s.iter().enumerate();
-    with_ends(over_time, ends.map(|(k, t_s)| epoch(*t_s, &|run| run.outages[k].horizontal_error_end_m)))
+    with_ends(
+        over_time,
+        ends.map(|(k, t_s)| epoch(*t_s, &|run| run.outages[k].horizontal_error_end_m)),
+    )
 }
 
 /// The quantiles of a filter's errors by covariance analysis, at the same times.
 #[must_use]
-pub fn expected_fan(filter: &FilterPass<'_>, truth: &TruthSide, outages: &[Outage]) -> Vec<FanEpoch> {
+pub fn expected_fan(
+    filter: &FilterPass<'_>,
+    truth: &TruthSide,
+    outages: &[Outage],
+) -> Vec<FanEpoch> {
     let law = filter.errors(truth);
     let times: Vec<f64> = law.reports.iter().map(|report| report.errors.t_s).collect();
     let epoch = |instant: &Instant| {
         let quantiles_m = horizontal_quantiles(instant, FAN_LEVELS);
-        FanEpoch { t_s: instant.t_s, quantiles_m, lincov_m: None }
+        FanEpoch {
+            t_s: instant.t_s,
+            quantiles_m,
+            lincov_m: None,
+        }
     };
-    let over_time = fan_epochs(&times, outages).par_iter().map(|i| epoch(&law.reports[*i].errors)).collect();
-    with_ends(over_time, law.outage_ends.iter().map(|end| epoch(&end.errors)))
+    let over_time = fan_epochs(&times, outages)
+        .par_iter()
+        .map(|i| epoch(&law.reports[*i].errors))
+        .collect();
+    with_ends(
+        over_time,
+        law.outage_ends.iter().map(|end| epoch(&end.errors)),
+    )
 }
 
 /// Puts the ends of outages into their places in time, before what comes after the fix.
@@ -82,18 +108,34 @@ mod tests {
             horizontal_m: vec![f32::from(run), 2.0 * f32::from(20 - run.min(20))],
             ..RunRecord::default()
         };
-        let runs = (0..=20).map(|k| run(k, false)).chain([run(21, true)]).collect();
-        let result =
-            RunResult { runs, fan_t_s: vec![3.0, 4.0], outage_fix_t_s: vec![4.0], ..RunResult::default() };
+        let runs = (0..=20)
+            .map(|k| run(k, false))
+            .chain([run(21, true)])
+            .collect();
+        let result = RunResult {
+            runs,
+            fan_t_s: vec![3.0, 4.0],
+            outage_fix_t_s: vec![4.0],
+            ..RunResult::default()
+        };
         let fan = fan(&result);
         assert_eq!(fan[0].quantiles_m, [1.0, 5.0, 10.0, 15.0, 19.0]);
-        assert_eq!((fan[1].t_s, fan[1].quantiles_m), (4.0, [10.0, 50.0, 100.0, 150.0, 190.0]));
-        assert_eq!((fan[2].t_s, fan[2].quantiles_m), (4.0, [2.0, 10.0, 20.0, 30.0, 38.0]));
+        assert_eq!(
+            (fan[1].t_s, fan[1].quantiles_m),
+            (4.0, [10.0, 50.0, 100.0, 150.0, 190.0])
+        );
+        assert_eq!(
+            (fan[2].t_s, fan[2].quantiles_m),
+            (4.0, [2.0, 10.0, 20.0, 30.0, 38.0])
+        );
     }
 
     #[test]
     fn no_run_left_is_no_number() {
-        let result = RunResult { fan_t_s: vec![0.0], ..RunResult::default() };
+        let result = RunResult {
+            fan_t_s: vec![0.0],
+            ..RunResult::default()
+        };
         assert!(fan(&result)[0].quantiles_m.iter().all(|q| q.is_nan()));
     }
 
@@ -101,10 +143,18 @@ mod tests {
     #[test]
     fn epochs_are_few_and_hold_the_ends_of_outages() {
         let times: Vec<f64> = (0..=900).map(f64::from).collect();
-        let outage = Outage { start_s: 301.0, end_s: 389.5 };
+        let outage = Outage {
+            start_s: 301.0,
+            end_s: 389.5,
+        };
         let kept = fan_epochs(&times, &[outage]);
         assert!((301..=305).contains(&kept.len()), "{}", kept.len());
-        assert!([0, 300, 301, 389, 390, 900].iter().all(|t| kept.contains(t)) && !kept.contains(&302));
+        assert!(
+            [0, 300, 301, 389, 390, 900]
+                .iter()
+                .all(|t| kept.contains(t))
+                && !kept.contains(&302)
+        );
         assert!(kept.is_sorted_by(|a, b| a < b));
         assert_eq!(fan_epochs(&times[..400], &[]), (0..400).collect::<Vec<_>>());
         assert!(fan_epochs(&[], &[]).is_empty());

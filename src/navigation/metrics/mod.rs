@@ -38,9 +38,13 @@ pub use expected::{Expected, horizontal_quantiles};
 pub use fan::{FAN_LEVELS, FanEpoch, expected_fan, fan};
 pub use outage::{OutageMetrics, Reconvergence, outages};
 pub use quadratic_form::QuadraticForm;
-pub use ratio::{ComparisonError, EpochRow, Measured, OutageComparison, RatioError, StateRatio, compare};
+pub use ratio::{
+    ComparisonError, EpochRow, Measured, OutageComparison, RatioError, StateRatio, compare,
+};
 pub use reduction::{AxisReduction, ReductionQuality, ReductionSummary, TOLERANCE};
 pub use requirement::{Met, Requirement, UnknownRequirement};
 pub use sensitivity::Sensitivities;
-pub use summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, Recovery, Spread, Summary};
+pub use summary::{
+    AccuracySummary, Consistency, Coverage, Nis, OutageSummary, Recovery, Spread, Summary,
+};
 pub use verdict::{ALL_STATES, OutageVerdict, StateName, Verdict, VerdictKind};

@@ -63,7 +63,12 @@ pub fn outages(result: &RunResult) -> Vec<OutageMetrics> {
         metrics.rmse_mean = Accuracy::over(within(*window, &epochs)).rmse_mean;
         metrics
     };
-    result.outages.iter().enumerate().map(metrics_of_outage).collect()
+    result
+        .outages
+        .iter()
+        .enumerate()
+        .map(metrics_of_outage)
+        .collect()
 }
 
 /// The epochs without a fix of an outage.
@@ -80,10 +85,18 @@ pub(super) fn within(
 ///
 /// A tilt ψ shortens what is left upright of the specific force to g cos ψ: the vehicle seems to accelerate downwards with
 /// gψ²/2, whatever the sign of ψ, which no linear analysis contains. Below 0.3, runs were as it expects them to 10 %.
-pub(super) fn is_beyond_linear(window: (f64, f64), epochs: &[EpochMetrics], sigma_m_s: f64) -> bool {
-    let tilts =
-        |epoch: &EpochMetrics| TILT.map(|i| (epoch.rmse.0[i].value * DEG).powi(2)).iter().sum::<f64>();
-    let (sum, count) = within(window, epochs).fold((0.0, 0), |(sum, count), e| (sum + tilts(e), count + 1));
+pub(super) fn is_beyond_linear(
+    window: (f64, f64),
+    epochs: &[EpochMetrics],
+    sigma_m_s: f64,
+) -> bool {
+    let tilts = |epoch: &EpochMetrics| {
+        TILT.map(|i| (epoch.rmse.0[i].value * DEG).powi(2))
+            .iter()
+            .sum::<f64>()
+    };
+    let (sum, count) =
+        within(window, epochs).fold((0.0, 0), |(sum, count), e| (sum + tilts(e), count + 1));
     let shift_m_s = STANDARD_GRAVITY / 2.0 * sum / f64::from(count) * (window.1 - window.0);
     shift_m_s > 0.3 * sigma_m_s
 }
@@ -92,18 +105,33 @@ pub(super) fn is_beyond_linear(window: (f64, f64), epochs: &[EpochMetrics], sigm
 const TILT: [usize; 2] = [6, 7];
 
 /// Statistics of an outage from the records of the runs; what needs the epochs is NaN.
-fn outage((start_s, end_s): (f64, f64), records: &[&OutageRecord], windows: Option<f64>) -> OutageMetrics {
+fn outage(
+    (start_s, end_s): (f64, f64),
+    records: &[&OutageRecord],
+    windows: Option<f64>,
+) -> OutageMetrics {
     let horizontal = sorted(records.iter().map(|r| r.horizontal_error_end_m));
     // Runs that never recover have NaN here. They are counted apart: no finite time stands for them.
-    let recovery = sorted(records.iter().map(|r| r.reconvergence_s).filter(|s| s.is_finite()));
-    let mean =
-        |value: &dyn Fn(&OutageRecord) -> f64| Estimate::mean_of(records.iter().map(|r| value(r)), windows);
+    let recovery = sorted(
+        records
+            .iter()
+            .map(|r| r.reconvergence_s)
+            .filter(|s| s.is_finite()),
+    );
+    let mean = |value: &dyn Fn(&OutageRecord) -> f64| {
+        Estimate::mean_of(records.iter().map(|r| value(r)), windows)
+    };
     let per_state = |f: &dyn Fn(usize) -> Estimate| PerState(std::array::from_fn(f));
     OutageMetrics {
         start_s,
         end_s,
         asee_mean: per_state(&|i| mean(&|r| r.see_mean[i])),
-        rmse_mean: PerState([Estimate { value: f64::NAN, std_error: f64::NAN }; REPORTED]),
+        rmse_mean: PerState(
+            [Estimate {
+                value: f64::NAN,
+                std_error: f64::NAN,
+            }; REPORTED],
+        ),
         asee_end: per_state(&|i| mean(&|r| r.see_end[i])),
         nees_end: mean(&|r| r.nees_end),
         log_density_end: mean(&|r| r.log_density_end),
@@ -143,30 +171,69 @@ mod tests {
             nees_end: 9.0 * value,
             log_density_end: -value,
         };
-        RunRecord { run, diverged, outages: vec![record], nis: (6.0, 1), ..RunRecord::default() }
+        RunRecord {
+            run,
+            diverged,
+            outages: vec![record],
+            nis: (6.0, 1),
+            ..RunRecord::default()
+        }
     }
 
     #[test]
     fn diverged_runs_are_left_out_and_lost_ones_counted() {
-        let runs = vec![run(0, 1.0, false), run(1, 1e9, true), run(2, 5.0, false), run(3, 3.0, false)];
-        let result = RunResult { runs, outages: vec![(300.0, 390.0)], ..RunResult::default() };
+        let runs = vec![
+            run(0, 1.0, false),
+            run(1, 1e9, true),
+            run(2, 5.0, false),
+            run(3, 3.0, false),
+        ];
+        let result = RunResult {
+            runs,
+            outages: vec![(300.0, 390.0)],
+            ..RunResult::default()
+        };
         let metrics = &outages(&result)[0];
         assert_eq!(metrics.asee_mean.0[1].value, 3.0);
         assert!((metrics.rmse_end.0[4].value - (35.0_f64 / 3.0).sqrt()).abs() < 1e-15);
-        assert_eq!((metrics.asee_end.0[1].value, metrics.nees_end.value), (6.0, 27.0));
+        assert_eq!(
+            (metrics.asee_end.0[1].value, metrics.nees_end.value),
+            (6.0, 27.0)
+        );
         assert_eq!(metrics.log_density_end.value, -3.0);
-        assert_eq!((metrics.horizontal_p50_m.value, metrics.horizontal_max_m), (3.0, 5.0));
-        assert_eq!((metrics.reconvergence.p50_s.value, metrics.reconvergence.never), (2.0, Some(1)));
+        assert_eq!(
+            (metrics.horizontal_p50_m.value, metrics.horizontal_max_m),
+            (3.0, 5.0)
+        );
+        assert_eq!(
+            (
+                metrics.reconvergence.p50_s.value,
+                metrics.reconvergence.never
+            ),
+            (2.0, Some(1))
+        );
     }
 
     /// Two tilts of 1° that stand still for 100 s: g·(1°)²·100 s = 0.2987 m/s, against 0.3 of a standard deviation.
     #[test]
     fn tilts_beyond_linear_theory_in_closed_form() {
-        let sums = |t: u32| EpochSums { t_s: f64::from(t), count: 1, ..EpochSums::default() };
-        let result = RunResult { epochs: (0..=100).map(sums).collect(), ..RunResult::default() };
+        let sums = |t: u32| EpochSums {
+            t_s: f64::from(t),
+            count: 1,
+            ..EpochSums::default()
+        };
+        let result = RunResult {
+            epochs: (0..=100).map(sums).collect(),
+            ..RunResult::default()
+        };
         let mut epochs = epochs(&result);
         for epoch in &mut epochs {
-            TILT.iter().for_each(|i| epoch.rmse.0[*i] = Estimate { value: 1.0, std_error: 0.0 });
+            TILT.iter().for_each(|i| {
+                epoch.rmse.0[*i] = Estimate {
+                    value: 1.0,
+                    std_error: 0.0,
+                }
+            });
         }
         let is_beyond = |sigma_m_s: f64| is_beyond_linear((0.0, 100.0), &epochs, sigma_m_s);
         assert!(is_beyond(0.298 / 0.3) && !is_beyond(0.299 / 0.3));
@@ -175,8 +242,11 @@ mod tests {
 
     #[test]
     fn no_run_left_is_no_number() {
-        let result =
-            RunResult { runs: vec![run(0, 1.0, true)], outages: vec![(0.0, 1.0)], ..RunResult::default() };
+        let result = RunResult {
+            runs: vec![run(0, 1.0, true)],
+            outages: vec![(0.0, 1.0)],
+            ..RunResult::default()
+        };
         let metrics = &outages(&result)[0];
         assert!(metrics.asee_mean.0[0].value.is_nan() && metrics.horizontal_max_m.is_nan());
     }

@@ -34,8 +34,14 @@ impl QuadraticForm {
     pub fn new(terms: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let terms: Vec<(f64, f64)> = terms.into_iter().collect();
         let largest = terms.iter().map(|t| t.0).fold(0.0, f64::max);
-        let terms = terms.into_iter().filter(|(w, _)| *w > ROUNDING * largest).collect();
-        Self { certain: 0.0, terms }
+        let terms = terms
+            .into_iter()
+            .filter(|(w, _)| *w > ROUNDING * largest)
+            .collect();
+        Self {
+            certain: 0.0,
+            terms,
+        }
     }
 
     /// eᵀ e for an error e of this covariance and mean.
@@ -43,7 +49,11 @@ impl QuadraticForm {
         let eigen = covariance.clone().symmetric_eigen();
         let largest = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
         let (mut certain, mut terms) = (0.0, Vec::new());
-        for (w, axis) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+        for (w, axis) in eigen
+            .eigenvalues
+            .iter()
+            .zip(eigen.eigenvectors.column_iter())
+        {
             // In the axes of the covariance the components are independent: w (z + d)² with d = mean/√w.
             let along: f64 = axis.iter().zip(mean).map(|(a, m)| a * m).sum();
             if *w > ROUNDING * largest {
@@ -57,7 +67,11 @@ impl QuadraticForm {
     }
 
     /// eᵀ P⁻¹ e for an error e of this covariance and mean; none where `p` is not positive definite.
-    pub(crate) fn of_normalised(p: &DMatrix<f64>, covariance: &DMatrix<f64>, mean: &[f64]) -> Option<Self> {
+    pub(crate) fn of_normalised(
+        p: &DMatrix<f64>,
+        covariance: &DMatrix<f64>,
+        mean: &[f64],
+    ) -> Option<Self> {
         let factor = p.clone().cholesky()?.l();
         let whiten = |m: &DMatrix<f64>| factor.solve_lower_triangular(m);
         // L⁻¹ C L⁻ᵀ with P = L Lᵀ has the eigenvalues of P⁻¹ C and is symmetric.
@@ -69,7 +83,12 @@ impl QuadraticForm {
 
     /// Expectation, c + Σ w (1 + d²).
     pub(crate) fn mean(&self) -> f64 {
-        self.certain + self.terms.iter().map(|(w, d)| w * (1.0 + d * d)).sum::<f64>()
+        self.certain
+            + self
+                .terms
+                .iter()
+                .map(|(w, d)| w * (1.0 + d * d))
+                .sum::<f64>()
     }
 
     /// P(Q ≤ x): the inversion of [Imhof](crate::bibliography::Imhof61).
@@ -79,7 +98,11 @@ impl QuadraticForm {
             return f64::from(u8::from(x >= 0.0 && self.terms.is_empty()));
         }
         let far = self.terms.iter().map(|(_, d)| d * d).sum::<f64>() > FAR;
-        let probability = if far { self.along_line(x) } else { self.along_parabola(x) };
+        let probability = if far {
+            self.along_line(x)
+        } else {
+            self.along_parabola(x)
+        };
         probability.clamp(0.0, 1.0)
     }
 
@@ -96,7 +119,11 @@ impl QuadraticForm {
             let p = Complex(0.1309 - 0.1194 * theta * theta, 0.25 * theta).scaled(n);
             let slope = Complex(-0.2388 * theta, 0.25).scaled(n);
             // twice the imaginary part of half the contour
-            p.exp().times(self.transform(p.scaled(1.0 / x))).times(slope).over(p).1
+            p.exp()
+                .times(self.transform(p.scaled(1.0 / x)))
+                .times(slope)
+                .over(p)
+                .1
         };
         2.0 / n * (0..NODES / 2).map(node).sum::<f64>()
     }
@@ -144,14 +171,23 @@ impl QuadraticForm {
         // Bisection of a monotone slope; the place of the line need not be exact, only its neighbourhood.
         for _ in 0..100 {
             let middle = 0.5 * (low + high);
-            if slope(middle) < 0.0 { low = middle } else { high = middle }
+            if slope(middle) < 0.0 {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         let p = 0.5 * (low + high);
         let term = |(w, d): &(f64, f64)| {
             let base = 1.0 + 2.0 * w * p;
             2.0 * w * w / (base * base) + 4.0 * w * w * d * d / (base * base * base)
         };
-        (p, (1.0 / (p * p) + self.terms.iter().map(term).sum::<f64>()).sqrt().recip())
+        (
+            p,
+            (1.0 / (p * p) + self.terms.iter().map(term).sum::<f64>())
+                .sqrt()
+                .recip(),
+        )
     }
 
     /// The x with P(Q ≤ x) = `probability`, to 1e-12 of itself.
@@ -171,7 +207,11 @@ impl QuadraticForm {
             if middle <= low || middle >= high {
                 break;
             }
-            if self.cdf(middle) < probability { low = middle } else { high = middle }
+            if self.cdf(middle) < probability {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         0.5 * (low + high)
     }
@@ -241,7 +281,10 @@ impl Complex {
     }
 
     const fn times(self, other: Self) -> Self {
-        Self(self.0 * other.0 - self.1 * other.1, self.0 * other.1 + self.1 * other.0)
+        Self(
+            self.0 * other.0 - self.1 * other.1,
+            self.0 * other.1 + self.1 * other.0,
+        )
     }
 
     const fn over(self, other: Self) -> Self {
@@ -278,7 +321,10 @@ mod tests {
             for p in [1e-4, 0.05, 0.5, 0.95, 0.999] {
                 let x = law.inverse_cdf(p);
                 assert!((form.cdf(2.5 * x) - law.cdf(x)).abs() < 1e-11, "{dof} {p}");
-                assert!((law.cdf(form.quantile(p) / 2.5) - p).abs() < 1e-11, "{dof} {p}");
+                assert!(
+                    (law.cdf(form.quantile(p) / 2.5) - p).abs() < 1e-11,
+                    "{dof} {p}"
+                );
             }
             // E √χ²(n) = √2 Γ((n + 1)/2)/Γ(n/2)
             let gamma = statrs::function::gamma::gamma;
@@ -296,7 +342,11 @@ mod tests {
         for x in [1e-3, 0.1, 1.0, 10.0, 60.0] {
             let beyond = |w: f64| w * (-0.5 * x / w).exp();
             let expected = 1.0 - (beyond(a) - beyond(b)) / (a - b);
-            assert!((form.cdf(x) - expected).abs() < 1e-12, "{x}: {} {expected}", form.cdf(x));
+            assert!(
+                (form.cdf(x) - expected).abs() < 1e-12,
+                "{x}: {} {expected}",
+                form.cdf(x)
+            );
         }
     }
 
@@ -305,12 +355,22 @@ mod tests {
     fn a_shift_is_that_of_a_normal_variable() {
         let normal = Normal::new(0.0, 1.0).unwrap();
         for d in [0.3, 2.0, 7.9, 8.1, 50.0, -50.0, 1e4] {
-            for x in [0.5, 4.0, 80.0, 0.9 * d * d, d * d + 1.0, (d + 1.0) * (d + 1.0)] {
+            for x in [
+                0.5,
+                4.0,
+                80.0,
+                0.9 * d * d,
+                d * d + 1.0,
+                (d + 1.0) * (d + 1.0),
+            ] {
                 let root = f64::sqrt(x);
                 let expected = normal.cdf(root - d) - normal.cdf(-root - d);
                 for w in [1.0, 1e-3] {
                     let found = QuadraticForm::new([(w, d)]).cdf(w * x);
-                    assert!((found - expected).abs() < 1e-10, "{w} {d} {x}: {found} {expected}");
+                    assert!(
+                        (found - expected).abs() < 1e-10,
+                        "{w} {d} {x}: {found} {expected}"
+                    );
                 }
             }
         }
@@ -320,9 +380,23 @@ mod tests {
     /// standard deviations, and the mean root within five standard errors.
     #[test]
     fn draws_lie_where_they_are_computed() {
-        let terms = [(1.0, 0.5), (0.3, 0.0), (0.05, -2.0), (0.01, 0.0), (2.0, 0.0), (0.004, 0.0)];
+        let terms = [
+            (1.0, 0.5),
+            (0.3, 0.0),
+            (0.05, -2.0),
+            (0.01, 0.0),
+            (2.0, 0.0),
+            (0.004, 0.0),
+        ];
         let form = QuadraticForm::new(terms);
-        let mut rng = StreamKey { seed: 3, scenario: "", run: 0, source: "form", process: "t" }.generator();
+        let mut rng = StreamKey {
+            seed: 3,
+            scenario: "",
+            run: 0,
+            source: "form",
+            process: "t",
+        }
+        .generator();
         let mut draw = || -> f64 {
             terms
                 .iter()
@@ -340,21 +414,38 @@ mod tests {
         for p in [0.01, 0.1, 0.5, 0.9, 0.95, 0.999] {
             let x = form.quantile(p);
             let share = draws.iter().filter(|q| **q <= x).count() as f64 / f64::from(n);
-            assert!((share - p).abs() < 5.0 * (p * (1.0 - p) / f64::from(n)).sqrt(), "{p}: {share}");
+            assert!(
+                (share - p).abs() < 5.0 * (p * (1.0 - p) / f64::from(n)).sqrt(),
+                "{p}: {share}"
+            );
         }
         let root = draws.iter().map(|q| q.sqrt()).sum::<f64>() / f64::from(n);
         let error = ((form.mean() - root * root) / f64::from(n)).sqrt();
-        assert!((root - form.mean_root()).abs() < 5.0 * error, "{root} {}", form.mean_root());
+        assert!(
+            (root - form.mean_root()).abs() < 5.0 * error,
+            "{root} {}",
+            form.mean_root()
+        );
     }
 
     #[test]
     fn what_is_certain_has_no_spread() {
         let none = QuadraticForm::new([]);
-        assert_eq!((none.cdf(1.0), none.quantile(0.5), none.mean_root()), (1.0, 0.0, 0.0));
+        assert_eq!(
+            (none.cdf(1.0), none.quantile(0.5), none.mean_root()),
+            (1.0, 0.0, 0.0)
+        );
         let p = DMatrix::identity(2, 2);
         let sure = QuadraticForm::of_normalised(&p, &DMatrix::zeros(2, 2), &[3.0, 4.0]).unwrap();
-        assert_eq!((sure.cdf(24.9), sure.cdf(25.1), sure.quantile(0.5)), (0.0, 1.0, 25.0));
-        assert!((sure.mean_root() / 5.0 - 1.0).abs() < 1e-8, "{}", sure.mean_root());
+        assert_eq!(
+            (sure.cdf(24.9), sure.cdf(25.1), sure.quantile(0.5)),
+            (0.0, 1.0, 25.0)
+        );
+        assert!(
+            (sure.mean_root() / 5.0 - 1.0).abs() < 1e-8,
+            "{}",
+            sure.mean_root()
+        );
         // z² beside a certain 4: χ² of one degree of freedom from there on
         let mut half = DMatrix::zeros(2, 2);
         half[(0, 0)] = 1.0;

@@ -71,7 +71,11 @@ impl From<&Expected> for Measured {
         Self {
             epochs: expected.epochs.iter().map(EpochRow::from).collect(),
             runs: vec![expected.record.clone()],
-            outages: expected.outages.iter().map(|o| (o.start_s, o.end_s)).collect(),
+            outages: expected
+                .outages
+                .iter()
+                .map(|o| (o.start_s, o.end_s))
+                .collect(),
             independent_windows: None,
             is_expected: true,
             beyond_linear: expected.beyond_linear(),
@@ -181,28 +185,50 @@ pub fn compare(
     }
     let ratio_of_outage =
         |(i, window): (usize, &(f64, f64))| outage(candidate, reference, i, *window, paired);
-    Ok(reference.outages.iter().enumerate().map(ratio_of_outage).collect())
+    Ok(reference
+        .outages
+        .iter()
+        .enumerate()
+        .map(ratio_of_outage)
+        .collect())
 }
 
 fn comparable(candidate: &Measured, reference: &Measured) -> Result<(), ComparisonError> {
     if candidate.outages != reference.outages {
         let words = |e: &Measured| match e.outages.as_slice() {
             [] => "none".to_owned(),
-            all => all.iter().map(|(a, b)| format!("{a}:{b}")).collect::<Vec<_>>().join(", "),
+            all => all
+                .iter()
+                .map(|(a, b)| format!("{a}:{b}"))
+                .collect::<Vec<_>>()
+                .join(", "),
         };
         let (candidate, reference) = (words(candidate), words(reference));
-        return Err(ComparisonError::Outages { candidate, reference });
+        return Err(ComparisonError::Outages {
+            candidate,
+            reference,
+        });
     }
     // To the last bit: epochs of the same schedule are equal, and ratios of unequal epochs would mean
     // nothing.
-    let times = |e: &Measured| e.epochs.iter().map(|row| row.t_s.to_bits()).collect::<Vec<_>>();
+    let times = |e: &Measured| {
+        e.epochs
+            .iter()
+            .map(|row| row.t_s.to_bits())
+            .collect::<Vec<_>>()
+    };
     if times(candidate) != times(reference) {
         let words = |e: &Measured| match (e.epochs.first(), e.epochs.last()) {
-            (Some(first), Some(last)) => format!("{} from {} to {} s", e.epochs.len(), first.t_s, last.t_s),
+            (Some(first), Some(last)) => {
+                format!("{} from {} to {} s", e.epochs.len(), first.t_s, last.t_s)
+            }
             _ => "none".to_owned(),
         };
         let (candidate, reference) = (words(candidate), words(reference));
-        return Err(ComparisonError::Epochs { candidate, reference });
+        return Err(ComparisonError::Epochs {
+            candidate,
+            reference,
+        });
     }
     Ok(())
 }
@@ -216,30 +242,59 @@ fn outage(
 ) -> OutageComparison {
     let outage = Outage { start_s, end_s };
     let pick = |e: &Measured| {
-        e.epochs.iter().filter(|row| outage.withholds(row.t_s)).cloned().collect::<Vec<EpochRow>>()
+        e.epochs
+            .iter()
+            .filter(|row| outage.withholds(row.t_s))
+            .cloned()
+            .collect::<Vec<EpochRow>>()
     };
     let (c, r) = (pick(candidate), pick(reference));
     let records = records(candidate, reference, index, paired);
-    let windows = [candidate.independent_windows, reference.independent_windows].into_iter().flatten();
+    let windows = [candidate.independent_windows, reference.independent_windows]
+        .into_iter()
+        .flatten();
     let is_expected = [candidate.is_expected, reference.is_expected];
-    let pairing = Pairing { paired, windows: windows.reduce(f64::min), is_expected };
+    let pairing = Pairing {
+        paired,
+        windows: windows.reduce(f64::min),
+        is_expected,
+    };
     let state = |i: usize| {
-        let ratios: Vec<f64> = c.iter().zip(&r).map(|(c, r)| (c.asee[i] / r.asee[i] - 1.0) * 100.0).collect();
+        let ratios: Vec<f64> = c
+            .iter()
+            .zip(&r)
+            .map(|(c, r)| (c.asee[i] / r.asee[i] - 1.0) * 100.0)
+            .collect();
         let see = |side: &[&OutageRecord]| side.iter().map(|o| o.see_mean[i]).collect::<Vec<_>>();
-        let square = |side: &[&OutageRecord]| side.iter().map(|o| o.error_end[i].powi(2)).collect::<Vec<_>>();
+        let square = |side: &[&OutageRecord]| {
+            side.iter()
+                .map(|o| o.error_end[i].powi(2))
+                .collect::<Vec<_>>()
+        };
         let pct = mean(ratios.iter().copied());
         let asee = pairing.mean_ratio(&see(&records.0), &see(&records.1));
         StateRatio {
-            asee: RatioError { pct, ci95_pct: asee.half_width_pct.map(|half| [pct - half, pct + half]) },
+            asee: RatioError {
+                pct,
+                ci95_pct: asee.half_width_pct.map(|half| [pct - half, pct + half]),
+            },
             asee_abs_pct: mean(ratios.iter().map(|e| e.abs())),
             calibration_half_pct: None,
-            rmse_end: pairing.mean_ratio(&square(&records.0), &square(&records.1)).root(),
+            rmse_end: pairing
+                .mean_ratio(&square(&records.0), &square(&records.1))
+                .root(),
         }
     };
     OutageComparison {
         states: std::array::from_fn(state),
-        nees: [mean(c.iter().map(|row| row.nees)), mean(r.iter().map(|row| row.nees))],
-        coverage: [mean(c.iter().map(|row| row.coverage)), mean(r.iter().map(|row| row.coverage))],
+        nees: [
+            mean(c.iter().map(|row| row.nees)),
+            mean(r.iter().map(|row| row.nees)),
+        ],
+        coverage: [
+            mean(c.iter().map(|row| row.coverage)),
+            mean(r.iter().map(|row| row.coverage)),
+        ],
     }
 }
 
@@ -249,13 +304,19 @@ impl OutageComparison {
     /// whose errors hang together, the interval is too wide rather than too narrow.
     pub fn widen(&mut self, candidate: &PerState<(f64, f64)>, reference: &PerState<(f64, f64)>) {
         let half_of_log = |(low, high): (f64, f64)| 0.5 * (high / low).ln();
-        for (state, (c, r)) in self.states.iter_mut().zip(candidate.0.iter().zip(&reference.0)) {
+        for (state, (c, r)) in self
+            .states
+            .iter_mut()
+            .zip(candidate.0.iter().zip(&reference.0))
+        {
             let RatioError { pct, ci95_pct } = state.asee;
             // In logarithms, where the intervals of scale parameters are nearly symmetric; independent, so
             // squares add.
             let calibration = (100.0 + pct) * half_of_log(*c).hypot(half_of_log(*r));
             // Where nothing was drawn, what the calibrations leave open is all.
-            let half = ci95_pct.map_or(0.0, |[low, high]| 0.5 * (high - low)).hypot(calibration);
+            let half = ci95_pct
+                .map_or(0.0, |[low, high]| 0.5 * (high - low))
+                .hypot(calibration);
             state.asee.ci95_pct = Some([pct - half, pct + half]);
             state.calibration_half_pct = Some(calibration);
         }
@@ -271,13 +332,23 @@ fn records<'a>(
     outage: usize,
     paired: bool,
 ) -> (Records<'a>, Records<'a>) {
-    let kept = |e: &'a Measured| e.runs.iter().filter(|r| !r.diverged && r.outages.len() > outage);
+    let kept = |e: &'a Measured| {
+        e.runs
+            .iter()
+            .filter(|r| !r.diverged && r.outages.len() > outage)
+    };
     let record = |r: &'a RunRecord| &r.outages[outage];
     if !paired {
-        return (kept(candidate).map(record).collect(), kept(reference).map(record).collect());
+        return (
+            kept(candidate).map(record).collect(),
+            kept(reference).map(record).collect(),
+        );
     }
-    let of_run: std::collections::HashMap<u64, &RunRecord> = kept(reference).map(|r| (r.run, r)).collect();
-    kept(candidate).filter_map(|c| Some((record(c), record(of_run.get(&c.run)?)))).unzip()
+    let of_run: std::collections::HashMap<u64, &RunRecord> =
+        kept(reference).map(|r| (r.run, r)).collect();
+    kept(candidate)
+        .filter_map(|c| Some((record(c), record(of_run.get(&c.run)?))))
+        .unzip()
 }
 
 /// A ratio of means and half the width of its 95 % interval (%); none where no side was sampled.
@@ -292,10 +363,15 @@ impl MeanRatio {
     fn root(&self) -> RatioError {
         let root = self.ratio.sqrt();
         // d ln √R = dR/(2R).
-        let half = self.half_width_pct.map(|half| half / 100.0 / (2.0 * self.ratio));
+        let half = self
+            .half_width_pct
+            .map(|half| half / 100.0 / (2.0 * self.ratio));
         let pct = |root: f64| (root - 1.0) * 100.0;
         let interval = |half: f64| [-half, half].map(|x| pct(root * x.exp()));
-        RatioError { pct: pct(root), ci95_pct: half.map(interval) }
+        RatioError {
+            pct: pct(root),
+            ci95_pct: half.map(interval),
+        }
     }
 }
 
@@ -319,11 +395,18 @@ impl Pairing {
             .filter_map(|(side, exact)| (!exact).then_some(side))
             .collect();
         let Some(fewest) = sampled.iter().map(|side| side.len()).min() else {
-            return MeanRatio { ratio, half_width_pct: None };
+            return MeanRatio {
+                ratio,
+                half_width_pct: None,
+            };
         };
         let variance = if sampled.len() == 1 {
             // Var(a/b̄) is Var(ā)/b̄² with b certain, and ρ² Var(b̄)/b̄² with a certain.
-            let scale = if self.is_expected[0] { ratio * ratio } else { 1.0 };
+            let scale = if self.is_expected[0] {
+                ratio * ratio
+            } else {
+                1.0
+            };
             scale * self.variance_of_mean(sampled[0])
         } else if self.paired {
             // What both runs of a pair have in common cancels here: the reason for drawing the same noise
@@ -336,11 +419,16 @@ impl Pairing {
         // The smaller sample decides: fewer degrees of freedom make a wider interval, never a narrower one.
         let freedom = SampleSize::of(fewest as u64, self.windows).independent - 1.0;
         let t = StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |t| t.inverse_cdf(0.975));
-        MeanRatio { ratio, half_width_pct: Some(t * variance.sqrt() / mean_b * 100.0) }
+        MeanRatio {
+            ratio,
+            half_width_pct: Some(t * variance.sqrt() / mean_b * 100.0),
+        }
     }
 
     fn variance_of_mean(&self, values: &[f64]) -> f64 {
-        Estimate::mean_of(values.iter().copied(), self.windows).std_error.powi(2)
+        Estimate::mean_of(values.iter().copied(), self.windows)
+            .std_error
+            .powi(2)
     }
 }
 

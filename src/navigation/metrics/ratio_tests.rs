@@ -3,19 +3,37 @@ use crate::rng::StreamKey;
 use rand_distr::{Distribution, StandardNormal};
 
 fn row(t_s: f64, asee: f64) -> EpochRow {
-    EpochRow { t_s, asee: [asee; REPORTED], rmse: [1.0; REPORTED], nees: 9.0, coverage: 0.95 }
+    EpochRow {
+        t_s,
+        asee: [asee; REPORTED],
+        rmse: [1.0; REPORTED],
+        nees: 9.0,
+        coverage: 0.95,
+    }
 }
 
 fn record(see: f64, error: f64) -> OutageRecord {
-    OutageRecord { see_mean: [see; REPORTED], error_end: [error; REPORTED], ..OutageRecord::default() }
+    OutageRecord {
+        see_mean: [see; REPORTED],
+        error_end: [error; REPORTED],
+        ..OutageRecord::default()
+    }
 }
 
 fn run(run: u64, see: f64, error: f64) -> RunRecord {
-    RunRecord { run, outages: vec![record(see, error)], ..RunRecord::default() }
+    RunRecord {
+        run,
+        outages: vec![record(see, error)],
+        ..RunRecord::default()
+    }
 }
 
 fn experiment(asee: &[f64], runs: Vec<RunRecord>) -> Measured {
-    let epochs = asee.iter().enumerate().map(|(i, a)| row(i as f64, *a)).collect();
+    let epochs = asee
+        .iter()
+        .enumerate()
+        .map(|(i, a)| row(i as f64, *a))
+        .collect();
     Measured {
         epochs,
         runs,
@@ -29,8 +47,14 @@ fn experiment(asee: &[f64], runs: Vec<RunRecord>) -> Measured {
 #[test]
 fn ratio_errors_are_means_over_the_outage_signed_and_absolute() {
     // Epochs 1 and 2 are in the outage (3 is not): ratios 1.2 and 0.9.
-    let candidate = experiment(&[9.0, 1.2, 1.8, 9.0], vec![run(0, 1.5, 1.0), run(1, 1.5, 1.0)]);
-    let reference = experiment(&[1.0, 1.0, 2.0, 1.0], vec![run(0, 1.5, 0.5), run(1, 1.5, 0.5)]);
+    let candidate = experiment(
+        &[9.0, 1.2, 1.8, 9.0],
+        vec![run(0, 1.5, 1.0), run(1, 1.5, 1.0)],
+    );
+    let reference = experiment(
+        &[1.0, 1.0, 2.0, 1.0],
+        vec![run(0, 1.5, 0.5), run(1, 1.5, 0.5)],
+    );
     let result = compare(&candidate, &reference, true).unwrap();
     let state = result[0].states[4];
     assert!((state.asee.pct - 5.0).abs() < 1e-12, "{state:?}");
@@ -46,21 +70,38 @@ fn an_epoch_at_a_typed_time_is_on_the_side_of_its_fix() {
         let shifted = |asee: &[f64]| {
             let mut made = experiment(asee, vec![run(0, 1.5, 1.0), run(1, 1.5, 1.0)]);
             made.epochs.iter_mut().for_each(|epoch| epoch.t_s += 0.36);
-            Measured { outages: vec![outage], ..made }
+            Measured {
+                outages: vec![outage],
+                ..made
+            }
         };
-        let (candidate, reference) = (shifted(&[1.2, 1.2, 1.8, 9.0]), shifted(&[1.0, 1.0, 2.0, 1.0]));
-        let found = compare(&candidate, &reference, true).unwrap()[0].states[0].asee.pct;
+        let (candidate, reference) = (
+            shifted(&[1.2, 1.2, 1.8, 9.0]),
+            shifted(&[1.0, 1.0, 2.0, 1.0]),
+        );
+        let found = compare(&candidate, &reference, true).unwrap()[0].states[0]
+            .asee
+            .pct;
         assert!((found - expected).abs() < 1e-12, "{outage:?}: {found}");
     }
 }
 
 #[test]
 fn proportional_runs_leave_no_doubt_when_paired_and_some_when_not() {
-    let scaled = |factor: f64| (0..10).map(|k| run(k, factor * (1.0 + 0.1 * k as f64), 1.0)).collect();
-    let (candidate, reference) =
-        (experiment(&[1.0, 1.3, 1.3], scaled(1.3)), experiment(&[1.0; 3], scaled(1.0)));
+    let scaled = |factor: f64| {
+        (0..10)
+            .map(|k| run(k, factor * (1.0 + 0.1 * k as f64), 1.0))
+            .collect()
+    };
+    let (candidate, reference) = (
+        experiment(&[1.0, 1.3, 1.3], scaled(1.3)),
+        experiment(&[1.0; 3], scaled(1.0)),
+    );
     let width = |paired| {
-        let ci = compare(&candidate, &reference, paired).unwrap()[0].states[0].asee.ci95_pct.unwrap();
+        let ci = compare(&candidate, &reference, paired).unwrap()[0].states[0]
+            .asee
+            .ci95_pct
+            .unwrap();
         ci[1] - ci[0]
     };
     assert!(width(true) < 1e-9, "{}", width(true));
@@ -71,7 +112,14 @@ fn proportional_runs_leave_no_doubt_when_paired_and_some_when_not() {
 /// binomial share (0.0172).
 #[test]
 fn paired_intervals_cover_at_their_level() {
-    let mut rng = StreamKey { seed: 5, scenario: "", run: 0, source: "ratio", process: "test" }.generator();
+    let mut rng = StreamKey {
+        seed: 5,
+        scenario: "",
+        run: 0,
+        source: "ratio",
+        process: "test",
+    }
+    .generator();
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
     let repetitions = 4000;
     let mut covered = 0;
@@ -82,18 +130,30 @@ fn paired_intervals_cover_at_their_level() {
             a.push(1.2 * (10.0 + common) + 0.3 * normal());
             b.push(10.0 + common);
         }
-        let ratio = Pairing { paired: true, windows: None, is_expected: [false; 2] }.mean_ratio(&a, &b);
+        let ratio = Pairing {
+            paired: true,
+            windows: None,
+            is_expected: [false; 2],
+        }
+        .mean_ratio(&a, &b);
         covered += u32::from(((ratio.ratio - 1.2) * 100.0).abs() <= ratio.half_width_pct.unwrap());
     }
     let share = f64::from(covered) / f64::from(repetitions);
-    assert!((share - 0.95).abs() < 5.0 * (0.95_f64 * 0.05 / 4000.0).sqrt(), "{share}");
+    assert!(
+        (share - 0.95).abs() < 5.0 * (0.95_f64 * 0.05 / 4000.0).sqrt(),
+        "{share}"
+    );
 }
 
 /// a = 1, 2, 3, 6: mean 3, variance of the mean 14/12; b = 1, 2, 3: mean 2, variance of the mean 1/3; ratio
 /// 3/2 with variance (14/12 + (3/2)²/3)/2² = 23/48. Student's t of 2 degrees of freedom (tables): 4.302653.
 #[test]
 fn an_unpaired_interval_in_closed_form() {
-    let unpaired = Pairing { paired: false, windows: None, is_expected: [false; 2] };
+    let unpaired = Pairing {
+        paired: false,
+        windows: None,
+        is_expected: [false; 2],
+    };
     let found = unpaired.mean_ratio(&[1.0, 2.0, 3.0, 6.0], &[1.0, 2.0, 3.0]);
     let expected = 100.0 * 4.302_653 * (23.0_f64 / 48.0).sqrt();
     assert_eq!(found.ratio, 1.5);
@@ -104,17 +164,28 @@ fn an_unpaired_interval_in_closed_form() {
     );
     // the same from every value twice, of which as many are independent as before
     let twice = |values: &[f64]| values.iter().flat_map(|x| [*x, *x]).collect::<Vec<_>>();
-    let shared = Pairing { paired: false, windows: Some(3.0), is_expected: [false; 2] };
+    let shared = Pairing {
+        paired: false,
+        windows: Some(3.0),
+        is_expected: [false; 2],
+    };
     let (a, b) = ([1.0, 2.0, 6.0], [1.0, 2.0, 3.0]);
-    let (once, doubled) = (unpaired.mean_ratio(&a, &b), shared.mean_ratio(&twice(&a), &twice(&b)));
+    let (once, doubled) = (
+        unpaired.mean_ratio(&a, &b),
+        shared.mean_ratio(&twice(&a), &twice(&b)),
+    );
     assert!((doubled.half_width_pct.unwrap() / once.half_width_pct.unwrap() - 1.0).abs() < 1e-12);
 }
 
 /// Differences a − ρ b = −1, 0, 1 with ρ = 1, b̄ = 2: standard error 1/√3 of a mean of 2; t of 2: 4.302653.
 #[test]
 fn a_paired_interval_in_closed_form() {
-    let found = Pairing { paired: true, windows: None, is_expected: [false; 2] }
-        .mean_ratio(&[0.0, 2.0, 4.0], &[1.0, 2.0, 3.0]);
+    let found = Pairing {
+        paired: true,
+        windows: None,
+        is_expected: [false; 2],
+    }
+    .mean_ratio(&[0.0, 2.0, 4.0], &[1.0, 2.0, 3.0]);
     let expected = 100.0 * 4.302_653 / 3.0_f64.sqrt() / 2.0;
     assert!(
         (found.half_width_pct.unwrap() / expected - 1.0).abs() < 1e-6,
@@ -134,20 +205,32 @@ fn the_interval_of_an_rmse_ratio_is_positive() {
     let reference = experiment(&[1.0; 3], runs([1.0; 2]));
     let rmse = compare(&candidate, &reference, true).unwrap()[0].states[0].rmse_end;
     let half: f64 = 12.706_205 * 0.98 / 2.0;
-    for (found, expected) in
-        rmse.ci95_pct.unwrap().into_iter().zip([-half, half].map(|x| (x.exp() - 1.0) * 100.0))
+    for (found, expected) in rmse
+        .ci95_pct
+        .unwrap()
+        .into_iter()
+        .zip([-half, half].map(|x| (x.exp() - 1.0) * 100.0))
     {
         assert!((found / expected - 1.0).abs() < 1e-6, "{rmse:?}");
     }
-    assert!(rmse.ci95_pct.unwrap()[0] > -100.0 && rmse.pct.abs() < 1e-12, "{rmse:?}");
+    assert!(
+        rmse.ci95_pct.unwrap()[0] > -100.0 && rmse.pct.abs() < 1e-12,
+        "{rmse:?}"
+    );
 }
 
 #[test]
 fn runs_that_either_side_lost_are_not_paired() {
     let mut candidate = experiment(&[1.0; 3], (0..4).map(|k| run(k, 2.0, 1.0)).collect());
     let mut reference = experiment(&[1.0; 3], (0..4).map(|k| run(k, 1.0, 1.0)).collect());
-    candidate.runs[1] = RunRecord { diverged: true, ..run(1, 1e30, 1e30) };
-    reference.runs[2] = RunRecord { diverged: true, ..run(2, 1e30, 1e30) };
+    candidate.runs[1] = RunRecord {
+        diverged: true,
+        ..run(1, 1e30, 1e30)
+    };
+    reference.runs[2] = RunRecord {
+        diverged: true,
+        ..run(2, 1e30, 1e30)
+    };
     let (c, r) = records(&candidate, &reference, 0, true);
     assert_eq!((c.len(), r.len()), (2, 2));
     let rmse = compare(&candidate, &reference, true).unwrap()[0].states[0].rmse_end;
@@ -157,9 +240,15 @@ fn runs_that_either_side_lost_are_not_paired() {
 #[test]
 fn other_outages_or_epochs_are_refused_in_words() {
     let reference = experiment(&[1.0; 3], vec![]);
-    let other = Measured { outages: vec![(5.0, 7.5)], ..reference.clone() };
+    let other = Measured {
+        outages: vec![(5.0, 7.5)],
+        ..reference.clone()
+    };
     let error = compare(&other, &reference, true).unwrap_err();
-    assert_eq!(error.to_string(), "the outages differ: 5:7.5 against 1:3 of the reference");
+    assert_eq!(
+        error.to_string(),
+        "the outages differ: 5:7.5 against 1:3 of the reference"
+    );
     let error = compare(&experiment(&[1.0; 4], vec![]), &reference, true).unwrap_err();
     assert_eq!(
         error.to_string(),
@@ -172,23 +261,43 @@ fn other_outages_or_epochs_are_refused_in_words() {
 #[test]
 fn what_calibrations_leave_open_widens_the_interval() {
     let runs = || vec![run(0, 1.0, 1.0), run(1, 1.0, 1.0)];
-    let (candidate, reference) = (experiment(&[1.05; 4], runs()), experiment(&[1.0; 4], runs()));
+    let (candidate, reference) = (
+        experiment(&[1.05; 4], runs()),
+        experiment(&[1.0; 4], runs()),
+    );
     let mut outage = compare(&candidate, &reference, true).unwrap().remove(0);
     let [low, high] = outage.states[3].asee.ci95_pct.unwrap();
     let half = 0.5 * (high - low);
     let open = |half: f64| PerState([((-half).exp(), half.exp()); REPORTED]);
     outage.widen(&open(0.3), &open(0.4));
     let state = outage.states[3];
-    assert!(half < 1e-9 && (state.calibration_half_pct.unwrap() - 52.5).abs() < 1e-9, "{state:?}");
+    assert!(
+        half < 1e-9 && (state.calibration_half_pct.unwrap() - 52.5).abs() < 1e-9,
+        "{state:?}"
+    );
     let [low, high] = state.asee.ci95_pct.unwrap();
-    assert!((low + 47.5).abs() < 1e-9 && (high - 57.5).abs() < 1e-9, "{state:?}");
+    assert!(
+        (low + 47.5).abs() < 1e-9 && (high - 57.5).abs() < 1e-9,
+        "{state:?}"
+    );
     // of two covariance analyses, which draw nothing, they are the only interval there is
-    let expected = |made: Measured| Measured { is_expected: true, ..made };
+    let expected = |made: Measured| Measured {
+        is_expected: true,
+        ..made
+    };
     let (candidate, reference) = (expected(candidate), expected(reference));
     let mut outage = compare(&candidate, &reference, true).unwrap().remove(0);
-    assert!(outage.states.iter().all(|s| s.asee.ci95_pct.is_none() && s.rmse_end.ci95_pct.is_none()));
+    assert!(
+        outage
+            .states
+            .iter()
+            .all(|s| s.asee.ci95_pct.is_none() && s.rmse_end.ci95_pct.is_none())
+    );
     outage.widen(&open(0.3), &open(0.4));
     let [low, high] = outage.states[3].asee.ci95_pct.unwrap();
-    assert!((low + 47.5).abs() < 1e-9 && (high - 57.5).abs() < 1e-9, "{outage:?}");
+    assert!(
+        (low + 47.5).abs() < 1e-9 && (high - 57.5).abs() < 1e-9,
+        "{outage:?}"
+    );
     assert!(outage.states[3].rmse_end.ci95_pct.is_none());
 }

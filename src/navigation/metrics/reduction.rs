@@ -86,7 +86,10 @@ impl ReductionSummary {
         let axis = |channel| AxisReduction::new(channel, model, belief, [interval_s, window_s]);
         Ok(Self {
             window_s,
-            axes: Channel::ALL.map(axis).into_iter().collect::<Result<_, _>>()?,
+            axes: Channel::ALL
+                .map(axis)
+                .into_iter()
+                .collect::<Result<_, _>>()?,
             quality: None,
         })
     }
@@ -108,8 +111,14 @@ impl AxisReduction {
         let noise = model.axis(channel);
         let (sensor, i) = (channel.sensor as usize, channel.axis as usize);
         // white noise alone has no bias: the first group, if any, is then what the filter expects beside the model
-        let none = BiasGroup { phi: DVec3::ZERO, ..BiasGroup::constant(0.0) };
-        let group = belief.groups[sensor].first().filter(|group| !group.is_constant()).unwrap_or(&none);
+        let none = BiasGroup {
+            phi: DVec3::ZERO,
+            ..BiasGroup::constant(0.0)
+        };
+        let group = belief.groups[sensor]
+            .first()
+            .filter(|group| !group.is_constant())
+            .unwrap_or(&none);
         let white = White::new(belief.white[sensor][i])?;
         let (phi, innovation) = (group.phi[i], group.innovation[i]);
         // Of a random walk correlation time and variance have no bound; they are null in JSON.
@@ -117,14 +126,18 @@ impl AxisReduction {
             let bias = Ar1::new(phi, innovation)?;
             (Process::Ar1(bias), bias.variance().sqrt())
         } else {
-            (Process::RandomWalk(RandomWalk::new(innovation)?), f64::INFINITY)
+            (
+                Process::RandomWalk(RandomWalk::new(innovation)?),
+                f64::INFINITY,
+            )
         };
         let is_quantization = |p: &&Process| matches!(p, Process::Quantization(_));
         // Compared with the model as a filter can carry it: quantization noise is left out on both sides.
         let kept = reduction::carried(noise);
         let pair = Composite::new(vec![Process::White(white), bias]);
         // Haar scales are 2, 4, 8 … samples: the nearest in the logarithm. 2^40 samples is beyond any record.
-        let level = |seconds: f64| (seconds * model.rate_hz).max(2.0).log2().round().min(40.0) as u32;
+        let level =
+            |seconds: f64| (seconds * model.rate_hz).max(2.0).log2().round().min(40.0) as u32;
         let [first, last] = scales_s.map(level);
         let distance = |l: u32| (pair.haar_wv(l) / kept.haar_wv(l)).ln().abs();
         let exact = reduction::is_exact(noise);
@@ -137,9 +150,16 @@ impl AxisReduction {
             bias_t_corr_s: continuous::correlation_time_s(phi, model.rate_hz),
             bias_sigma,
             initial_sigma: group.initial[i].sqrt(),
-            misfit: if exact { 0.0 } else { (first..=last).map(distance).fold(0.0, f64::max) },
+            misfit: if exact {
+                0.0
+            } else {
+                (first..=last).map(distance).fold(0.0, f64::max)
+            },
             quantization_left_out: noise.processes.iter().any(|p| is_quantization(&p)),
-            tau_s: levels.iter().map(|l| f64::from(*l).exp2() / model.rate_hz).collect(),
+            tau_s: levels
+                .iter()
+                .map(|l| f64::from(*l).exp2() / model.rate_hz)
+                .collect(),
             model_wv: levels.iter().map(|l| kept.haar_wv(*l)).collect(),
             reduced_wv: levels.iter().map(|l| pair.haar_wv(*l)).collect(),
         })
@@ -155,13 +175,25 @@ impl ReductionQuality {
         let n = later.len() as f64;
         let ratios: Vec<[f64; REPORTED]> = later.iter().map(|r| r.ratio()).collect();
         let mean = |i: usize| ratios.iter().map(|r| r[i]).sum::<f64>() / n;
-        let over =
-            |(a, b): (&Consistency, &Consistency)| PerState(std::array::from_fn(|i| a.rmse[i] / b.rmse[i]));
+        let over = |(a, b): (&Consistency, &Consistency)| {
+            PerState(std::array::from_fn(|i| a.rmse[i] / b.rmse[i]))
+        };
         Self {
-            outage_end: reduced.outage_ends.iter().map(|e| PerState(e.ratio())).collect(),
+            outage_end: reduced
+                .outage_ends
+                .iter()
+                .map(|e| PerState(e.ratio()))
+                .collect(),
             mean: PerState(std::array::from_fn(mean)),
             nees: later.iter().map(|r| r.nees).sum::<f64>() / n,
-            rmse_over_full: full.map(|f| reduced.outage_ends.iter().zip(&f.outage_ends).map(over).collect()),
+            rmse_over_full: full.map(|f| {
+                reduced
+                    .outage_ends
+                    .iter()
+                    .zip(&f.outage_ends)
+                    .map(over)
+                    .collect()
+            }),
         }
     }
 
@@ -169,7 +201,8 @@ impl ReductionQuality {
     #[must_use]
     pub fn worst(&self) -> Option<(usize, usize, f64)> {
         let ends = self.outage_end.iter().enumerate();
-        let all = ends.flat_map(|(outage, end)| end.0.iter().enumerate().map(move |(s, r)| (s, outage, *r)));
+        let all = ends
+            .flat_map(|(outage, end)| end.0.iter().enumerate().map(move |(s, r)| (s, outage, *r)));
         // By the logarithm: half and twice are equally far off.
         let worst = all.max_by(|a, b| a.2.ln().abs().total_cmp(&b.2.ln().abs()))?;
         (worst.2.ln().abs() > TOLERANCE.ln_1p()).then_some(worst)
@@ -215,7 +248,10 @@ mod tests {
         let summary = summary(&model(0.0));
         assert!(summary.is_exact() && summary.axes.iter().all(|a| a.quantization_left_out));
         let a = &summary.axes[3];
-        assert_eq!((a.axis.as_str(), a.model_wv == a.reduced_wv), ("gyro.x", true));
+        assert_eq!(
+            (a.axis.as_str(), a.model_wv == a.reduced_wv),
+            ("gyro.x", true)
+        );
         assert!((a.bias_t_corr_s - 0.01 / 0.9995_f64.ln().abs()).abs() < 1e-6);
     }
 
@@ -229,10 +265,16 @@ mod tests {
             gyro_bias_sigma_rad_s: Some(1e-3),
             ..InitialSettings::default()
         };
-        let belief = Belief::new(&model, FilterStates::Reduced15, 1.0, 800.0).unwrap().with_initial(&initial);
+        let belief = Belief::new(&model, FilterStates::Reduced15, 1.0, 800.0)
+            .unwrap()
+            .with_initial(&initial);
         let summary = ReductionSummary::of(&model, &belief, 1.0, 800.0).unwrap();
         assert!(
-            summary.is_exact() && summary.axes.iter().all(|a| a.bias_sigma == 0.0 && a.initial_sigma == 0.0)
+            summary.is_exact()
+                && summary
+                    .axes
+                    .iter()
+                    .all(|a| a.bias_sigma == 0.0 && a.initial_sigma == 0.0)
         );
     }
 
@@ -242,9 +284,19 @@ mod tests {
         let summary = summary(&model(1e-8));
         let a = &summary.axes[0];
         assert!(!summary.is_exact() && a.misfit > 0.01);
-        let fitted = a.tau_s.iter().zip(a.model_wv.iter().zip(&a.reduced_wv)).filter(|(tau, _)| **tau > 1.0);
-        let worst = fitted.map(|(_, (m, r))| (r / m).ln().abs()).fold(0.0, f64::max);
-        assert!((worst / a.misfit - 1.0).abs() < 1e-9, "{worst} {}", a.misfit);
+        let fitted = a
+            .tau_s
+            .iter()
+            .zip(a.model_wv.iter().zip(&a.reduced_wv))
+            .filter(|(tau, _)| **tau > 1.0);
+        let worst = fitted
+            .map(|(_, (m, r))| (r / m).ln().abs())
+            .fold(0.0, f64::max);
+        assert!(
+            (worst / a.misfit - 1.0).abs() < 1e-9,
+            "{worst} {}",
+            a.misfit
+        );
     }
 
     /// At the start the errors are drawn from the filter's own belief (or are none): its ratio is 1 (or 0), whatever
@@ -260,8 +312,18 @@ mod tests {
             divergence: 0.0,
             log_density: 0.0,
         };
-        let reports = vec![report(0.0, 1.0, 9.0), report(1.0, 2.0, 36.0), report(2.0, 4.0, 144.0)];
-        let quality = ReductionQuality::of(&Assessment { reports, outage_ends: vec![] }, None);
+        let reports = vec![
+            report(0.0, 1.0, 9.0),
+            report(1.0, 2.0, 36.0),
+            report(2.0, 4.0, 144.0),
+        ];
+        let quality = ReductionQuality::of(
+            &Assessment {
+                reports,
+                outage_ends: vec![],
+            },
+            None,
+        );
         assert_eq!((quality.mean.0, quality.nees), ([3.0; REPORTED], 90.0));
     }
 

@@ -62,20 +62,32 @@ impl FromStr for Requirement {
 
     fn from_str(text: &str) -> Result<Self, UnknownRequirement> {
         if text.trim() == "consistent" {
-            return Ok(Self { figure: Figure::Consistent, limit: 1.0 + TOLERANCE });
+            return Ok(Self {
+                figure: Figure::Consistent,
+                limit: 1.0 + TOLERANCE,
+            });
         }
-        let (name, limit) =
-            text.split_once("<=").or_else(|| text.split_once('<')).ok_or(UnknownRequirement)?;
+        let (name, limit) = text
+            .split_once("<=")
+            .or_else(|| text.split_once('<'))
+            .ok_or(UnknownRequirement)?;
         let limit: f64 = limit.trim().parse().map_err(|_| UnknownRequirement)?;
         let name = name.trim();
-        let state =
-            || REPORTED_NAMES.iter().position(|known| *known == name.strip_prefix("rmse_").unwrap_or(name));
+        let state = || {
+            REPORTED_NAMES
+                .iter()
+                .position(|known| *known == name.strip_prefix("rmse_").unwrap_or(name))
+        };
         let figure = match name {
             "p50_m" => Figure::P50,
             "p95_m" => Figure::P95,
             _ => Figure::Rmse(state().ok_or(UnknownRequirement)?),
         };
-        if limit > 0.0 && limit.is_finite() { Ok(Self { figure, limit }) } else { Err(UnknownRequirement) }
+        if limit > 0.0 && limit.is_finite() {
+            Ok(Self { figure, limit })
+        } else {
+            Err(UnknownRequirement)
+        }
     }
 }
 
@@ -103,9 +115,22 @@ impl Requirement {
     #[must_use]
     pub fn check(&self, summary: &Summary) -> Met {
         if self.figure == Figure::Consistent {
-            let Verdict { kind, ratio, worst_outage, beyond_linear, .. } = summary.verdict;
+            let Verdict {
+                kind,
+                ratio,
+                worst_outage,
+                beyond_linear,
+                ..
+            } = summary.verdict;
             let (name, met) = (self.name(), kind == VerdictKind::Consistent);
-            return Met { name, limit: self.limit, value: ratio, outage: worst_outage, met, beyond_linear };
+            return Met {
+                name,
+                limit: self.limit,
+                value: ratio,
+                outage: worst_outage,
+                met,
+                beyond_linear,
+            };
         }
         // Free of chance: a limit is then not kept or missed by the luck of the runs.
         let expected = summary.lincov.as_deref().unwrap_or(summary);
@@ -117,11 +142,15 @@ impl Requirement {
         };
         let is_down = matches!(self.figure, Figure::Rmse(state) if DOWN.contains(&state));
         let is_shifted = |o: &OutageSummary| o.beyond_linear;
-        let shifted = expected.outages.iter().position(is_shifted).filter(|_| is_down && expected.runs == 0);
+        let shifted = expected
+            .outages
+            .iter()
+            .position(is_shifted)
+            .filter(|_| is_down && expected.runs == 0);
         let is_beyond = |outage: usize| shifted.is_some_and(|shifted| outage >= shifted);
         let outages = summary.outages.iter().zip(&expected.outages).enumerate();
-        let ends =
-            outages.map(|(k, (own, expected))| (k, of_outage(if is_beyond(k) { own } else { expected })));
+        let ends = outages
+            .map(|(k, (own, expected))| (k, of_outage(if is_beyond(k) { own } else { expected })));
         // a figure that is not a number is the worst of all
         let worst = ends.max_by(|a, b| (a.1.is_nan().cmp(&b.1.is_nan())).then(a.1.total_cmp(&b.1)));
         let (outage, value) = match (worst, self.figure) {
@@ -137,7 +166,14 @@ impl Requirement {
         };
         let beyond_linear = shifted.filter(|_| decides);
         let met = is_kept && (is_sampled || beyond_linear.is_none());
-        Met { name: self.name(), limit: self.limit, value, outage, met, beyond_linear }
+        Met {
+            name: self.name(),
+            limit: self.limit,
+            value,
+            outage,
+            met,
+            beyond_linear,
+        }
     }
 }
 
@@ -179,8 +215,20 @@ mod tests {
         ] {
             assert_eq!(text.parse::<Requirement>().unwrap().to_string(), shown);
         }
-        for wrong in ["p95_m", "p95_m>=5", "p95<=5", "p95_m<=-1", "p95_m<=nan", "p95_m<=", "rmse_p95_m<=1"] {
-            assert_eq!(wrong.parse::<Requirement>(), Err(UnknownRequirement), "{wrong}");
+        for wrong in [
+            "p95_m",
+            "p95_m>=5",
+            "p95<=5",
+            "p95_m<=-1",
+            "p95_m<=nan",
+            "p95_m<=",
+            "rmse_p95_m<=1",
+        ] {
+            assert_eq!(
+                wrong.parse::<Requirement>(),
+                Err(UnknownRequirement),
+                "{wrong}"
+            );
         }
     }
 }

@@ -31,10 +31,18 @@ struct Varied {
 impl Sensitivities {
     /// Just before the first fix after each outage, of the noise that `truth` is.
     #[must_use]
-    pub fn at_outage_ends(filter: &FilterPass<'_>, experiment: &Experiment<'_>, truth: &Model) -> Vec<Self> {
+    pub fn at_outage_ends(
+        filter: &FilterPass<'_>,
+        experiment: &Experiment<'_>,
+        truth: &Model,
+    ) -> Vec<Self> {
         let ln_rmse = |model: &Model| -> Vec<[f64; REPORTED]> {
             let side = TruthSide::together(&TruthSide::sources(experiment, model));
-            filter.errors_at_ends(&side).iter().map(|end| end.errors.rmse().map(f64::ln)).collect()
+            filter
+                .errors_at_ends(&side)
+                .iter()
+                .map(|end| end.errors.rmse().map(f64::ln))
+                .collect()
         };
         let varied = Varied::all(truth);
         let slopes: Vec<Vec<[f64; REPORTED]>> = varied
@@ -46,7 +54,11 @@ impl Sensitivities {
                 let ends: Vec<_> = terms.iter().map(moved).collect();
                 let slope = |end: usize| {
                     let sum = |i: usize| {
-                        terms.iter().zip(&ends).map(|((_, c), ends)| c * ends[end][i]).sum::<f64>()
+                        terms
+                            .iter()
+                            .zip(&ends)
+                            .map(|((_, c), ends)| c * ends[end][i])
+                            .sum::<f64>()
                     };
                     std::array::from_fn(|i| sum(i) / (2.0 * step))
                 };
@@ -55,7 +67,10 @@ impl Sensitivities {
             .collect();
         let outages = slopes.first().map_or(0, Vec::len);
         let of_outage = |k: usize| {
-            let named = varied.iter().zip(&slopes).map(|(varied, ends)| (varied.name(), PerState(ends[k])));
+            let named = varied
+                .iter()
+                .zip(&slopes)
+                .map(|(varied, ends)| (varied.name(), PerState(ends[k])));
             Self(named.collect())
         };
         (0..outages).map(of_outage).collect()
@@ -86,17 +101,24 @@ impl Varied {
         for channel in Channel::ALL {
             let (sensor, axis) = (channel.sensor, model.axis(channel));
             for (process, label) in axis.processes.iter().zip(axis.labels()) {
-                for (&parameter, value) in process.kind().parameters().iter().zip(process.values()) {
+                for (&parameter, value) in process.kind().parameters().iter().zip(process.values())
+                {
                     // Zero has no logarithm to move along.
                     if value == 0.0 {
                         continue;
                     }
                     let (quantity, room) = quantity(parameter, value);
-                    let known =
-                        |v: &&mut Self| v.sensor == sensor && v.label == label && v.quantity == quantity;
+                    let known = |v: &&mut Self| {
+                        v.sensor == sensor && v.label == label && v.quantity == quantity
+                    };
                     match all.iter_mut().find(known) {
                         Some(varied) => varied.room = varied.room.min(room),
-                        None => all.push(Self { sensor, label: label.clone(), quantity, room }),
+                        None => all.push(Self {
+                            sensor,
+                            label: label.clone(),
+                            quantity,
+                            room,
+                        }),
                     }
                 }
             }
@@ -128,7 +150,11 @@ impl Varied {
         for channel in Channel::ALL.into_iter().filter(|c| c.sensor == self.sensor) {
             let labels = model.axis(channel).labels();
             let processes = &mut moved.axes[channel.index()].processes;
-            for process in processes.iter_mut().zip(labels).filter(|(_, l)| *l == self.label).map(|(p, _)| p)
+            for process in processes
+                .iter_mut()
+                .zip(labels)
+                .filter(|(_, l)| *l == self.label)
+                .map(|(p, _)| p)
             {
                 *process = self.moved(process, ln, model.rate_hz);
             }
@@ -145,10 +171,24 @@ impl Varied {
         };
         let moved = |(&parameter, value): (&Parameter, f64)| {
             let moves = quantity(parameter, value).0 == self.quantity;
-            if moves { change(parameter, value) } else { value }
+            if moves {
+                change(parameter, value)
+            } else {
+                value
+            }
         };
-        let values: Vec<f64> = process.kind().parameters().iter().zip(process.values()).map(moved).collect();
-        process.kind().process(&values, rate_hz).and_then(Result::ok).unwrap_or(*process)
+        let values: Vec<f64> = process
+            .kind()
+            .parameters()
+            .iter()
+            .zip(process.values())
+            .map(moved)
+            .collect();
+        process
+            .kind()
+            .process(&values, rate_hz)
+            .and_then(Result::ok)
+            .unwrap_or(*process)
     }
 }
 

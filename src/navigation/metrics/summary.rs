@@ -238,7 +238,12 @@ impl Summary {
         let windows = result.independent_windows;
         let verdict = Verdict::of(&result.runs, result.outages.len(), windows);
         let verdicts = OutageVerdict::of(&result.runs, result.outages.len(), windows);
-        let diverged_runs: Vec<u64> = result.runs.iter().filter(|r| r.diverged).map(|r| r.run).collect();
+        let diverged_runs: Vec<u64> = result
+            .runs
+            .iter()
+            .filter(|r| r.diverged)
+            .map(|r| r.run)
+            .collect();
         Self {
             schema_version: SCHEMA_VERSION,
             method: "monte-carlo",
@@ -285,7 +290,11 @@ impl From<&Accuracy> for AccuracySummary {
 impl OutageSummary {
     /// All outages with their verdicts.
     pub(super) fn all(outages: &[OutageMetrics], verdicts: Vec<OutageVerdict>) -> Vec<Self> {
-        outages.iter().zip(verdicts).map(|(o, verdict)| Self::new(o, verdict)).collect()
+        outages
+            .iter()
+            .zip(verdicts)
+            .map(|(o, verdict)| Self::new(o, verdict))
+            .collect()
     }
 
     fn new(o: &OutageMetrics, verdict: OutageVerdict) -> Self {
@@ -327,7 +336,14 @@ impl OutageSummary {
 
 impl Spread {
     const fn new(p50: Quantile, p95: Quantile, max: f64) -> Self {
-        Self { p50: p50.value, p95: p95.value, p999: None, max, p50_ci95: p50.ci95, p95_ci95: p95.ci95 }
+        Self {
+            p50: p50.value,
+            p95: p95.value,
+            p999: None,
+            max,
+            p50_ci95: p50.ci95,
+            p95_ci95: p95.ci95,
+        }
     }
 }
 
@@ -339,23 +355,46 @@ fn count(epochs: &[EpochMetrics], windows: Option<f64>) -> f64 {
 fn nees(epochs: &[EpochMetrics], windows: Option<f64>) -> Consistency {
     let band = chi_square_band(NEES_DOF, count(epochs, windows));
     let (mean, fraction_inside) = mean_and_inside(epochs, band, |e| e.nees.value);
-    Consistency { dof: NEES_DOF, mean, lower95: band.lower, upper95: band.upper, fraction_inside }
+    Consistency {
+        dof: NEES_DOF,
+        mean,
+        lower95: band.lower,
+        upper95: band.upper,
+        fraction_inside,
+    }
 }
 
 fn coverage(epochs: &[EpochMetrics], level: f64, windows: Option<f64>) -> Coverage {
     let band = coverage_band(level, count(epochs, windows));
     let (mean, fraction_inside) = mean_and_inside(epochs, band, |e| e.coverage);
-    Coverage { level, mean, lower95: band.lower, upper95: band.upper, fraction_inside }
+    Coverage {
+        level,
+        mean,
+        lower95: band.lower,
+        upper95: band.upper,
+        fraction_inside,
+    }
 }
 
-fn mean_and_inside(epochs: &[EpochMetrics], band: Band, value: impl Fn(&EpochMetrics) -> f64) -> (f64, f64) {
+fn mean_and_inside(
+    epochs: &[EpochMetrics],
+    band: Band,
+    value: impl Fn(&EpochMetrics) -> f64,
+) -> (f64, f64) {
     let n = epochs.len() as f64;
     let inside = epochs.iter().filter(|e| band.contains(value(e))).count();
     (epochs.iter().map(value).sum::<f64>() / n, inside as f64 / n)
 }
 
 fn nis(result: &RunResult) -> Nis {
-    let kept = || result.runs.iter().filter(|r| !r.diverged).map(|r| r.nis).filter(|(_, fixes)| *fixes > 0);
+    let kept = || {
+        result
+            .runs
+            .iter()
+            .filter(|r| !r.diverged)
+            .map(|r| r.nis)
+            .filter(|(_, fixes)| *fixes > 0)
+    };
     let fixes: u64 = kept().map(|(_, fixes)| fixes).sum();
     let sum: f64 = kept().map(|(mean, fixes)| mean * fixes as f64).sum();
     let runs = SampleSize::of(kept().count() as u64, result.independent_windows);
@@ -369,7 +408,12 @@ fn nis(result: &RunResult) -> Nis {
         lower95: band.lower,
         upper95: band.upper,
         fixes,
-        rejected: result.runs.iter().filter(|r| !r.diverged).map(|r| r.rejected).sum(),
+        rejected: result
+            .runs
+            .iter()
+            .filter(|r| !r.diverged)
+            .map(|r| r.rejected)
+            .sum(),
     }
 }
 

@@ -6,11 +6,23 @@ use rand_distr::{Distribution, StandardNormal};
 
 /// Runs of a filter that is right by construction: errors drawn from its own covariance (identity).
 fn matched(runs: u64, epochs: usize) -> RunResult {
-    let mut rng = StreamKey { seed: 11, scenario: "", run: 0, source: "summary", process: "t" }.generator();
+    let mut rng = StreamKey {
+        seed: 11,
+        scenario: "",
+        run: 0,
+        source: "summary",
+        process: "t",
+    }
+    .generator();
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
     let mut sums = Vec::new();
     for t in 0..epochs {
-        let mut s = EpochSums { t_s: t as f64, gnss: true, count: runs, ..EpochSums::default() };
+        let mut s = EpochSums {
+            t_s: t as f64,
+            gnss: true,
+            count: runs,
+            ..EpochSums::default()
+        };
         for _ in 0..runs {
             let e: [f64; 9] = std::array::from_fn(|_| normal());
             for i in 0..9 {
@@ -31,7 +43,11 @@ fn matched(runs: u64, epochs: usize) -> RunResult {
     let record = |run| RunRecord {
         run,
         diverged: false,
-        outages: vec![OutageRecord { see_mean: [1.0; 9], see_end: [1.0; 9], ..OutageRecord::default() }],
+        outages: vec![OutageRecord {
+            see_mean: [1.0; 9],
+            see_end: [1.0; 9],
+            ..OutageRecord::default()
+        }],
         nis: (6.0, 10),
         ..RunRecord::default()
     };
@@ -55,13 +71,32 @@ fn a_correct_filter_is_found_correct() {
     let result = matched(50, 2000);
     let epochs = super::super::epochs(&result);
     let summary = Summary::of(&result, &epochs, 7);
-    assert!((summary.nees.fraction_inside - 0.95).abs() < 0.0244, "{:?}", summary.nees);
-    assert!((summary.nees.mean - 9.0).abs() < 5.0 * (18.0_f64 / 1e5).sqrt(), "{:?}", summary.nees);
-    assert!(summary.coverage.fraction_inside > 0.95, "{:?}", summary.coverage);
-    assert!((summary.coverage.mean - 0.95).abs() < 5.0 * (0.0475_f64 / 1e5).sqrt(), "{:?}", summary.coverage);
+    assert!(
+        (summary.nees.fraction_inside - 0.95).abs() < 0.0244,
+        "{:?}",
+        summary.nees
+    );
+    assert!(
+        (summary.nees.mean - 9.0).abs() < 5.0 * (18.0_f64 / 1e5).sqrt(),
+        "{:?}",
+        summary.nees
+    );
+    assert!(
+        summary.coverage.fraction_inside > 0.95,
+        "{:?}",
+        summary.coverage
+    );
+    assert!(
+        (summary.coverage.mean - 0.95).abs() < 5.0 * (0.0475_f64 / 1e5).sqrt(),
+        "{:?}",
+        summary.coverage
+    );
     let rmse = epochs[0].rmse.0[0];
     // sd of a mean square of 50 standard normals: √(2/50); of its root half of that
-    assert!((rmse.std_error - 0.1).abs() < 0.05 && (rmse.value - 1.0).abs() < 0.5, "{rmse:?}");
+    assert!(
+        (rmse.std_error - 0.1).abs() < 0.05 && (rmse.value - 1.0).abs() < 0.5,
+        "{rmse:?}"
+    );
 }
 
 #[test]
@@ -95,7 +130,10 @@ fn the_file_has_the_keys_of_the_interface() {
         "/nees/fraction_inside",
         "/coverage/level",
     ] {
-        assert!(json.pointer(pointer).is_some_and(|v| v.is_number()), "{pointer} in {json}");
+        assert!(
+            json.pointer(pointer).is_some_and(|v| v.is_number()),
+            "{pointer} in {json}"
+        );
     }
     assert_eq!(json["schema_version"], 1);
     assert_eq!(json["method"], "monte-carlo");
@@ -113,8 +151,14 @@ fn nothing_left_is_null_not_a_crash() {
     for run in &mut result.runs {
         run.diverged = true;
     }
-    result.epochs.iter_mut().for_each(|s| *s = EpochSums { t_s: s.t_s, ..EpochSums::default() });
-    let json = serde_json::to_value(Summary::of(&result, &super::super::epochs(&result), 7)).unwrap();
+    result.epochs.iter_mut().for_each(|s| {
+        *s = EpochSums {
+            t_s: s.t_s,
+            ..EpochSums::default()
+        }
+    });
+    let json =
+        serde_json::to_value(Summary::of(&result, &super::super::epochs(&result), 7)).unwrap();
     assert!(json["nees"]["mean"].is_null() && json["nees"]["lower95"].is_null());
 }
 
@@ -125,11 +169,20 @@ fn runs_that_share_their_noise_count_once_in_every_band() {
     copies.independent_windows = Some(4.0);
     let summary = Summary::of(&copies, &super::super::epochs(&copies), 7);
     let four = chi_square_band(9, 4.0);
-    assert_eq!((summary.nees.lower95, summary.nees.upper95), (four.lower, four.upper));
+    assert_eq!(
+        (summary.nees.lower95, summary.nees.upper95),
+        (four.lower, four.upper)
+    );
     let four = coverage_band(0.95, 4.0);
-    assert_eq!((summary.coverage.lower95, summary.coverage.upper95), (four.lower, four.upper));
+    assert_eq!(
+        (summary.coverage.lower95, summary.coverage.upper95),
+        (four.lower, four.upper)
+    );
     let four = chi_square_band(6, 40.0);
-    assert_eq!((summary.nis.lower95, summary.nis.upper95), (four.lower, four.upper));
+    assert_eq!(
+        (summary.nis.lower95, summary.nis.upper95),
+        (four.lower, four.upper)
+    );
     assert_eq!(summary.independent_runs, 4.0);
 }
 
@@ -154,11 +207,21 @@ fn distances_are_counted_in_standard_errors_and_the_bound_is_students() {
     runs.independent_runs = 2.0;
     let agreement = Agreement::of(&runs, &expected);
     let near = |value: f64, truth: f64| (value - truth).abs() < 1e-9 * truth.abs();
-    assert!(near(agreement.nees_z, 1.0) && near(agreement.coverage_z, 1.0), "{agreement:?}");
+    assert!(
+        near(agreement.nees_z, 1.0) && near(agreement.coverage_z, 1.0),
+        "{agreement:?}"
+    );
     assert!(near(agreement.largest_z, -3.0), "{agreement:?}");
-    assert_eq!((agreement.figures, &*agreement.largest), (21, "RMSE of vel_e_m_s at the end of outage 1"));
+    assert_eq!(
+        (agreement.figures, &*agreement.largest),
+        (21, "RMSE of vel_e_m_s at the end of outage 1")
+    );
     let bound = 1.0 / (std::f64::consts::PI * 1e-3 / 42.0).tan();
-    assert!((agreement.bound_z / bound - 1.0).abs() < 1e-6, "{} {bound}", agreement.bound_z);
+    assert!(
+        (agreement.bound_z / bound - 1.0).abs() < 1e-6,
+        "{} {bound}",
+        agreement.bound_z
+    );
     assert!(!agreement.is_broken());
     runs.outages[0].rmse_end.0[4] -= 0.25 * bound;
     assert!(Agreement::of(&runs, &expected).is_broken());
@@ -170,13 +233,20 @@ fn a_limit_downwards_beyond_linear_theory_is_left_to_the_runs() {
     let result = matched(4, 6);
     let mut summary = Summary::of(&result, &super::super::epochs(&result), 7);
     let outage = &mut summary.outages[0];
-    (outage.beyond_linear, outage.rmse_end, outage.horizontal_error_end_m.p95) =
-        (true, PerState([1.0; 9]), 1.0);
-    let met = |text: &str, summary: &Summary| text.parse::<Requirement>().unwrap().check(summary).met;
+    (
+        outage.beyond_linear,
+        outage.rmse_end,
+        outage.horizontal_error_end_m.p95,
+    ) = (true, PerState([1.0; 9]), 1.0);
+    let met =
+        |text: &str, summary: &Summary| text.parse::<Requirement>().unwrap().check(summary).met;
     let down = ["pos_d_m<=2", "vel_d_m_s<=2"];
     let level = ["p95_m<=2", "pos_n_m<=2", "vel_e_m_s<=2", "yaw_deg<=2"];
     assert!(down.iter().chain(&level).all(|text| met(text, &summary)));
     summary.runs = 0;
-    assert!(!down.iter().any(|text| met(text, &summary)) && level.iter().all(|text| met(text, &summary)));
+    assert!(
+        !down.iter().any(|text| met(text, &summary))
+            && level.iter().all(|text| met(text, &summary))
+    );
     assert!(!met("p95_m<=0.9", &summary) && !met("pos_d_m<=0.9", &summary));
 }

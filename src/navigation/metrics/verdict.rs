@@ -119,7 +119,10 @@ fn count<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
 
 fn state<'de, D: Deserializer<'de>>(value: D) -> Result<&'static str, D::Error> {
     let name = String::deserialize(value)?;
-    let known = REPORTED_NAMES.into_iter().chain([ALL_STATES]).find(|known| *known == name);
+    let known = REPORTED_NAMES
+        .into_iter()
+        .chain([ALL_STATES])
+        .find(|known| *known == name);
     known.ok_or_else(|| serde::de::Error::custom(format!("{name:?} is no state")))
 }
 
@@ -139,9 +142,16 @@ pub struct OutageVerdict {
 impl OutageVerdict {
     /// From the records of the runs, as [`Verdict::of`]: with the same limits, so that no outage is called wrong
     /// where the filter is not. A run that diverged did so in every outage, since nobody knows when.
-    pub(crate) fn of(runs: &[RunRecord], outages: usize, independent_windows: Option<f64>) -> Vec<Self> {
+    pub(crate) fn of(
+        runs: &[RunRecord],
+        outages: usize,
+        independent_windows: Option<f64>,
+    ) -> Vec<Self> {
         let kept: Vec<&RunRecord> = runs.iter().filter(|r| !r.diverged).collect();
-        let evidence = Evidence { runs: &kept, windows: independent_windows };
+        let evidence = Evidence {
+            runs: &kept,
+            windows: independent_windows,
+        };
         let statistics = evidence.statistics(outages);
         let judge = Judge::new(evidence.independent_runs(), statistics.len());
         judge.outages(&statistics, outages, kept.len() < runs.len())
@@ -149,7 +159,11 @@ impl OutageVerdict {
 
     /// From the run whose squares are the expected ones, as [`Verdict::expected`].
     pub(crate) fn expected(record: &RunRecord) -> Vec<Self> {
-        let statistics = Evidence { runs: &[record], windows: None }.statistics(record.outages.len());
+        let statistics = Evidence {
+            runs: &[record],
+            windows: None,
+        }
+        .statistics(record.outages.len());
         Judge::EXACT.outages(&statistics, record.outages.len(), false)
     }
 }
@@ -160,25 +174,38 @@ impl Verdict {
     #[must_use]
     pub fn of(runs: &[RunRecord], outages: usize, independent_windows: Option<f64>) -> Self {
         let kept: Vec<&RunRecord> = runs.iter().filter(|r| !r.diverged).collect();
-        let evidence = Evidence { runs: &kept, windows: independent_windows };
+        let evidence = Evidence {
+            runs: &kept,
+            windows: independent_windows,
+        };
         let statistics = evidence.statistics(outages);
         let independent_runs = evidence.independent_runs();
         let judge = Judge::new(independent_runs, statistics.len());
-        let kind = if kept.len() < runs.len() { VerdictKind::Diverged } else { judge.kind(&statistics) };
+        let kind = if kept.len() < runs.len() {
+            VerdictKind::Diverged
+        } else {
+            judge.kind(&statistics)
+        };
         Self::by(&judge, kind, &evidence, &statistics, independent_runs)
     }
 
     /// From the run whose squares are the expected ones: nothing is left to chance, and what is off by more than
     /// the tolerance is wrong. Where errors are beyond linear theory, finding no fault is no proof.
     pub(crate) fn expected(record: &RunRecord, beyond_linear: Option<usize>) -> Self {
-        let evidence = Evidence { runs: &[record], windows: None };
+        let evidence = Evidence {
+            runs: &[record],
+            windows: None,
+        };
         let statistics = evidence.statistics(record.outages.len());
         let kind = match Judge::EXACT.kind(&statistics) {
             VerdictKind::Consistent if beyond_linear.is_some() => VerdictKind::Doubtful,
             kind => kind,
         };
         let verdict = Self::by(&Judge::EXACT, kind, &evidence, &statistics, f64::INFINITY);
-        Self { beyond_linear, ..verdict }
+        Self {
+            beyond_linear,
+            ..verdict
+        }
     }
 
     fn by(
@@ -252,7 +279,9 @@ struct Evidence<'a> {
 
 impl Evidence<'_> {
     fn independent_runs(&self) -> f64 {
-        self.windows.unwrap_or(f64::INFINITY).min(self.runs.len() as f64)
+        self.windows
+            .unwrap_or(f64::INFINITY)
+            .min(self.runs.len() as f64)
     }
 
     fn mean(&self, value: &dyn Fn(&RunRecord) -> f64) -> Estimate {
@@ -263,9 +292,17 @@ impl Evidence<'_> {
         let ratio = |value: &dyn Fn(&RunRecord) -> f64| self.mean(value).root();
         let mut all = Vec::new();
         let all_states = |r: &RunRecord| r.nees_mean / NEES_DOF as f64;
-        all.push(Statistic { state: None, outage: None, ratio: ratio(&all_states) });
+        all.push(Statistic {
+            state: None,
+            outage: None,
+            ratio: ratio(&all_states),
+        });
         for i in 0..REPORTED {
-            all.push(Statistic { state: Some(i), outage: None, ratio: ratio(&|r| r.normalised_sq[i]) });
+            all.push(Statistic {
+                state: Some(i),
+                outage: None,
+                ratio: ratio(&|r| r.normalised_sq[i]),
+            });
         }
         for k in 0..outages {
             let end = |value: &dyn Fn(&OutageRecord) -> f64| {
@@ -273,12 +310,20 @@ impl Evidence<'_> {
                 ratio(&|r: &RunRecord| r.outages.get(k).map_or(f64::NAN, value))
             };
             let nees = end(&|o| o.nees_end / NEES_DOF as f64);
-            all.push(Statistic { state: None, outage: Some(k), ratio: nees });
+            all.push(Statistic {
+                state: None,
+                outage: Some(k),
+                ratio: nees,
+            });
             for i in 0..REPORTED {
                 // Normalised run by run with the run's own deviation: to first order it is the same in all of
                 // them.
                 let one = end(&|o| (o.error_end[i] / o.see_end[i]).powi(2));
-                all.push(Statistic { state: Some(i), outage: Some(k), ratio: one });
+                all.push(Statistic {
+                    state: Some(i),
+                    outage: Some(k),
+                    ratio: one,
+                });
             }
         }
         all
@@ -293,7 +338,9 @@ struct Judge {
 
 impl Judge {
     /// Nothing is left to chance: the limits of significance close on 1, and the tolerance alone decides.
-    const EXACT: Self = Self { limits: [(1.0, 1.0); 2] };
+    const EXACT: Self = Self {
+        limits: [(1.0, 1.0); 2],
+    };
 
     /// Of so many independent runs and so many statistics on both sides.
     fn new(independent_runs: f64, statistics: usize) -> Self {
@@ -314,7 +361,10 @@ impl Judge {
 
     /// Whether it finds errors that matter.
     fn is_decisive(&self) -> bool {
-        self.limits.iter().zip(DECISIVE).all(|((_, upper), limit)| *upper <= limit)
+        self.limits
+            .iter()
+            .zip(DECISIVE)
+            .all(|((_, upper), limit)| *upper <= limit)
     }
 
     /// The fewest independent runs that decide, by bisection: the limits close on 1 as runs are added.
@@ -326,7 +376,11 @@ impl Judge {
         }
         while enough - few > 1 {
             let middle = few.midpoint(enough);
-            if decides(middle) { enough = middle } else { few = middle }
+            if decides(middle) {
+                enough = middle
+            } else {
+                few = middle
+            }
         }
         enough
     }
@@ -348,15 +402,30 @@ impl Judge {
 
     /// Too much confidence anywhere is the graver fault.
     fn kind(&self, all: &[Statistic]) -> VerdictKind {
-        let without_fault = if self.is_decisive() { VerdictKind::Consistent } else { VerdictKind::Undecided };
-        all.iter().filter_map(|s| self.fault(s)).max().unwrap_or(without_fault)
+        let without_fault = if self.is_decisive() {
+            VerdictKind::Consistent
+        } else {
+            VerdictKind::Undecided
+        };
+        all.iter()
+            .filter_map(|s| self.fault(s))
+            .max()
+            .unwrap_or(without_fault)
     }
 
     /// The verdicts on outages, from the statistics at their ends.
     fn outages(&self, all: &[Statistic], outages: usize, diverged: bool) -> Vec<OutageVerdict> {
         let verdict_of_outage = |outage: usize| {
-            let own: Vec<Statistic> = all.iter().filter(|s| s.outage == Some(outage)).copied().collect();
-            let kind = if diverged { VerdictKind::Diverged } else { self.kind(&own) };
+            let own: Vec<Statistic> = all
+                .iter()
+                .filter(|s| s.outage == Some(outage))
+                .copied()
+                .collect();
+            let kind = if diverged {
+                VerdictKind::Diverged
+            } else {
+                self.kind(&own)
+            };
             let worst = self.worst(&own, kind);
             OutageVerdict {
                 kind,

@@ -5,14 +5,22 @@ use rand_distr::{Distribution, StandardNormal};
 /// Runs of one outage whose errors are `scale` times what the filter believes in each state; `epochs`
 /// independent ones a run.
 fn runs(count: u64, epochs: usize, seed: u64, scale: [f64; REPORTED]) -> Vec<RunRecord> {
-    let mut rng = StreamKey { seed, scenario: "", run: 0, source: "verdict", process: "t" }.generator();
+    let mut rng = StreamKey {
+        seed,
+        scenario: "",
+        run: 0,
+        source: "verdict",
+        process: "t",
+    }
+    .generator();
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
     let mut errors = || -> [f64; REPORTED] { std::array::from_fn(|i| scale[i] * normal()) };
     let nees = |e: &[f64; REPORTED]| e.iter().map(|x| x * x).sum::<f64>();
     let mut record = |run| {
         let all: Vec<[f64; REPORTED]> = (0..epochs).map(|_| errors()).collect();
-        let mean =
-            |value: &dyn Fn(&[f64; REPORTED]) -> f64| all.iter().map(value).sum::<f64>() / epochs as f64;
+        let mean = |value: &dyn Fn(&[f64; REPORTED]) -> f64| {
+            all.iter().map(value).sum::<f64>() / epochs as f64
+        };
         let end = errors();
         let see = [2.0; REPORTED];
         let outage = OutageRecord {
@@ -38,8 +46,9 @@ fn runs(count: u64, epochs: usize, seed: u64, scale: [f64; REPORTED]) -> Vec<Run
 #[test]
 fn a_right_filter_is_rarely_called_wrong() {
     for count in [8, 30] {
-        let wrong =
-            |seed: &u64| Verdict::of(&runs(count, 1, *seed, [1.0; 9]), 1, None).kind > VerdictKind::Undecided;
+        let wrong = |seed: &u64| {
+            Verdict::of(&runs(count, 1, *seed, [1.0; 9]), 1, None).kind > VerdictKind::Undecided
+        };
         let alarms = (0..1500).filter(wrong).count();
         assert!(alarms <= 27, "{alarms} of 1500 with {count} runs");
     }
@@ -52,8 +61,14 @@ fn an_overconfident_state_is_named() {
     let mut scale = [1.0; 9];
     scale[6] = 1.5;
     let verdict = Verdict::of(&runs(200, 20, 3, scale), 1, None);
-    assert_eq!((verdict.kind, verdict.worst_state), (VerdictKind::Overconfident, "roll_deg"));
-    assert!((verdict.ratio - 1.5).abs() < 5.0 * 1.5 / 20.0, "{verdict:?}");
+    assert_eq!(
+        (verdict.kind, verdict.worst_state),
+        (VerdictKind::Overconfident, "roll_deg")
+    );
+    assert!(
+        (verdict.ratio - 1.5).abs() < 5.0 * 1.5 / 20.0,
+        "{verdict:?}"
+    );
 }
 
 /// Errors that hang together as the filter does not believe: each state is as far off as it should be, all together are
@@ -61,16 +76,23 @@ fn an_overconfident_state_is_named() {
 #[test]
 fn states_that_are_wrong_together_only_are_named_together() {
     let mut all = runs(200, 20, 3, [1.0; 9]);
-    all.iter_mut().for_each(|run| run.outages[0].nees_end *= 1.7);
+    all.iter_mut()
+        .for_each(|run| run.outages[0].nees_end *= 1.7);
     let verdict = Verdict::of(&all, 1, None);
-    assert_eq!((verdict.kind, verdict.worst_state), (VerdictKind::Overconfident, ALL_STATES));
+    assert_eq!(
+        (verdict.kind, verdict.worst_state),
+        (VerdictKind::Overconfident, ALL_STATES)
+    );
     assert_eq!(verdict.worst_outage, Some(0));
     assert!(
         (verdict.ratio / 1.7_f64.sqrt() - 1.0).abs() < 5.0 * 0.5 * (2.0_f64 / 1800.0).sqrt(),
         "{verdict:?}"
     );
     let text = serde_json::to_string(&verdict).unwrap();
-    assert_eq!(serde_json::from_str::<Verdict>(&text).unwrap().worst_state, ALL_STATES);
+    assert_eq!(
+        serde_json::from_str::<Verdict>(&text).unwrap().worst_state,
+        ALL_STATES
+    );
 }
 
 #[test]
@@ -81,7 +103,10 @@ fn too_little_confidence_is_told_and_too_much_comes_first() {
     let mut scale = [0.7; 9];
     scale[8] = 2.0;
     let both = Verdict::of(&runs(200, 20, 3, scale), 1, None);
-    assert_eq!((both.kind, both.worst_state), (VerdictKind::Overconfident, "yaw_deg"));
+    assert_eq!(
+        (both.kind, both.worst_state),
+        (VerdictKind::Overconfident, "yaw_deg")
+    );
 }
 
 /// Each outage has its own: a filter that is right at the end of the one and wrong by 1.5 at that of the other.
@@ -91,14 +116,23 @@ fn each_outage_has_a_verdict_of_its_own() {
     scale[6] = 1.5;
     let mut all = runs(200, 20, 3, [1.0; 9]);
     let wrong = runs(200, 20, 4, scale);
-    all.iter_mut().zip(wrong).for_each(|(run, wrong)| run.outages.extend(wrong.outages));
+    all.iter_mut()
+        .zip(wrong)
+        .for_each(|(run, wrong)| run.outages.extend(wrong.outages));
     let found = OutageVerdict::of(&all, 2, None);
     assert_eq!(found[0].kind, VerdictKind::Consistent);
-    assert_eq!((found[1].kind, found[1].worst_state), (VerdictKind::Overconfident, "roll_deg"));
+    assert_eq!(
+        (found[1].kind, found[1].worst_state),
+        (VerdictKind::Overconfident, "roll_deg")
+    );
     assert!((found[1].ratio - 1.5).abs() < 5.0 * 1.5 / 20.0, "{found:?}");
     assert_eq!(Verdict::of(&all, 2, None).worst_outage, Some(1));
     all[7].diverged = true;
-    assert!(OutageVerdict::of(&all, 2, None).iter().all(|v| v.kind == VerdictKind::Diverged));
+    assert!(
+        OutageVerdict::of(&all, 2, None)
+            .iter()
+            .all(|v| v.kind == VerdictKind::Diverged)
+    );
 }
 
 /// What is significant and small is let pass: 5 % with 20 000 runs.
@@ -106,25 +140,43 @@ fn each_outage_has_a_verdict_of_its_own() {
 fn a_small_difference_is_no_verdict() {
     let verdict = Verdict::of(&runs(20_000, 1, 3, [1.05; 9]), 1, None);
     assert_eq!(verdict.kind, VerdictKind::Consistent);
-    assert!((verdict.nees / 9.0 - 1.05 * 1.05).abs() < 0.02, "{verdict:?}");
+    assert!(
+        (verdict.nees / 9.0 - 1.05 * 1.05).abs() < 0.02,
+        "{verdict:?}"
+    );
 }
 
 /// The same hundred runs, worth 3 of them: nothing can be told any more from a state 1.5 times off.
 #[test]
 fn runs_that_share_their_noise_tell_less() {
     let records = runs(100, 1, 3, [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.5, 1.0, 1.0]);
-    assert_eq!(Verdict::of(&records, 1, None).kind, VerdictKind::Overconfident);
+    assert_eq!(
+        Verdict::of(&records, 1, None).kind,
+        VerdictKind::Overconfident
+    );
     let shared = Verdict::of(&records, 1, Some(3.0));
-    assert_eq!((shared.kind, shared.independent_runs), (VerdictKind::Undecided, 3.0));
-    assert!(shared.detectable_state_ratio > 2.0 && shared.ratio_std_error > 0.2, "{shared:?}");
+    assert_eq!(
+        (shared.kind, shared.independent_runs),
+        (VerdictKind::Undecided, 3.0)
+    );
+    assert!(
+        shared.detectable_state_ratio > 2.0 && shared.ratio_std_error > 0.2,
+        "{shared:?}"
+    );
 }
 
 #[test]
 fn a_lost_filter_and_a_diverged_run_are_told() {
     let far = Verdict::of(&runs(1, 20, 3, [11.0; 9]), 1, None);
-    assert!(far.is_far_off() && far.kind == VerdictKind::Overconfident && far.nees_std_error.is_nan());
+    assert!(
+        far.is_far_off() && far.kind == VerdictKind::Overconfident && far.nees_std_error.is_nan()
+    );
     let mut records = runs(8, 20, 3, [1.0; 9]);
-    records[3] = RunRecord { diverged: true, nees_mean: f64::NAN, ..records[3].clone() };
+    records[3] = RunRecord {
+        diverged: true,
+        nees_mean: f64::NAN,
+        ..records[3].clone()
+    };
     let verdict = Verdict::of(&records, 1, None);
     assert!(verdict.kind == VerdictKind::Diverged && verdict.nees.is_finite());
     records.iter_mut().for_each(|r| r.diverged = true);
@@ -142,8 +194,14 @@ fn too_few_runs_leave_a_right_filter_undecided() {
     assert!(few.detectable_state_ratio > 1.5, "{few:?}");
     let enough = few.runs_to_decide.unwrap();
     let [one_less, decided] = [enough - 1, enough].map(|count| verdict(count, 1.0));
-    assert_eq!((one_less.kind, decided.kind), (VerdictKind::Undecided, VerdictKind::Consistent));
-    assert!(decided.detectable_state_ratio <= 1.5 && decided.detectable_ratio <= 1.25, "{decided:?}");
+    assert_eq!(
+        (one_less.kind, decided.kind),
+        (VerdictKind::Undecided, VerdictKind::Consistent)
+    );
+    assert!(
+        decided.detectable_state_ratio <= 1.5 && decided.detectable_ratio <= 1.25,
+        "{decided:?}"
+    );
     assert!(one_less.detectable_state_ratio > 1.5 && decided.runs_to_decide.is_none());
     assert!(OutageVerdict::of(&runs(8, 1, 3, [1.0; 9]), 1, None)[0].kind == VerdictKind::Undecided);
     assert_eq!(verdict(8, 2.5).kind, VerdictKind::Overconfident);

@@ -67,8 +67,16 @@ pub fn run_range(
     progress: &(dyn Fn(u64) + Sync),
 ) -> Option<Vec<RunResult>> {
     let experiment = plan.experiment();
-    let results = experiment.beliefs.iter().map(|b| empty(plan, b.states)).collect();
-    let sums = Mutex::new(InOrder { results, next: 0, waiting: BTreeMap::new() });
+    let results = experiment
+        .beliefs
+        .iter()
+        .map(|b| empty(plan, b.states))
+        .collect();
+    let sums = Mutex::new(InOrder {
+        results,
+        next: 0,
+        waiting: BTreeMap::new(),
+    });
     let batches = runs.div_ceil(LANES as u64);
     // A bridge hands batches out one by one and in order, where splitting the range would have one thread
     // begin in the middle: few results wait for their turn.
@@ -80,7 +88,9 @@ pub fn run_range(
         let live = (runs - done).min(LANES as u64);
         let computed = run_batch(plan, first + done, live as usize);
         progress(live);
-        sums.lock().unwrap_or_else(PoisonError::into_inner).take(batch, computed, plan.samples());
+        sums.lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take(batch, computed, plan.samples());
     });
     let sums = sums.into_inner().unwrap_or_else(PoisonError::into_inner);
     // A batch that was not run leaves all later ones waiting: the result is whole or none.
@@ -112,7 +122,11 @@ impl InOrder {
 fn empty(plan: &Plan<'_>, filter_states: usize) -> RunResult {
     let experiment = plan.experiment();
     RunResult {
-        outages: experiment.outages.iter().map(|o| (o.start_s, o.end_s)).collect(),
+        outages: experiment
+            .outages
+            .iter()
+            .map(|o| (o.start_s, o.end_s))
+            .collect(),
         outage_fix_t_s: plan.outage_fix_t_s(),
         fan_t_s: plan.fan_t_s(),
         filter_states,
@@ -128,7 +142,10 @@ impl RunResult {
         if self.epochs.is_empty() {
             self.epochs = epochs;
         } else {
-            self.epochs.iter_mut().zip(&epochs).for_each(|(sum, epoch)| sum.add(epoch));
+            self.epochs
+                .iter_mut()
+                .zip(&epochs)
+                .for_each(|(sum, epoch)| sum.add(epoch));
         }
         self.runs.extend(runs);
     }

@@ -25,7 +25,11 @@ fn trajectory(duration_s: f64) -> Trajectory {
         let t_s = 0.5 * f64::from(k);
         let (north, east) = (12.0 * t_s, 150.0 * (0.05 * t_s).sin());
         let yaw = (7.5 * (0.05 * t_s).cos()).atan2(12.0);
-        let attitude = RollPitchYaw { roll: 0.02 * (0.3 * t_s).sin(), pitch: 0.03 * (0.1 * t_s).cos(), yaw };
+        let attitude = RollPitchYaw {
+            roll: 0.02 * (0.3 * t_s).sin(),
+            pitch: 0.03 * (0.1 * t_s).cos(),
+            yaw,
+        };
         TrajectorySample {
             t_s,
             lat: lat + north / 6.37e6,
@@ -34,7 +38,12 @@ fn trajectory(duration_s: f64) -> Trajectory {
             q_b_n: attitude.to_quat(),
         }
     };
-    Trajectory::from_samples(&(0..=(2.0 * duration_s) as u32).map(sample).collect::<Vec<_>>()).unwrap()
+    Trajectory::from_samples(
+        &(0..=(2.0 * duration_s) as u32)
+            .map(sample)
+            .collect::<Vec<_>>(),
+    )
+    .unwrap()
 }
 
 /// White noise and one Gauss-Markov bias an axis: the 15-state filter's own model.
@@ -42,7 +51,10 @@ fn model(scale: f64) -> Model {
     let axis = |white: f64, deviation: f64, t_corr_s: f64| {
         let phi = (-0.01 / t_corr_s).exp();
         let bias = Ar1::new(phi, scale * deviation * deviation * (1.0 - phi * phi)).unwrap();
-        Composite::new(vec![Process::White(White::new(white).unwrap()), Process::Ar1(bias)])
+        Composite::new(vec![
+            Process::White(White::new(white).unwrap()),
+            Process::Ar1(bias),
+        ])
     };
     Model::pooled(100.0, &axis(4e-5, 0.02, 200.0), &axis(1e-6, 2e-4, 300.0))
 }
@@ -64,14 +76,18 @@ struct Setting {
 
 impl Setting {
     fn new(duration_s: f64, belief_scales: &[f64]) -> Self {
-        let belief = |scale: &f64| Belief::new(&model(*scale), FilterStates::Reduced15, 1.0, 800.0).unwrap();
+        let belief =
+            |scale: &f64| Belief::new(&model(*scale), FilterStates::Reduced15, 1.0, 800.0).unwrap();
         Self {
             trajectory: trajectory(duration_s),
             model: model(1.0),
             beliefs: belief_scales.iter().map(belief).collect(),
             gnss: GnssSettings::default(),
             initial: InitialSettings::default(),
-            outages: vec![Outage { start_s: 20.0, end_s: 40.0 }],
+            outages: vec![Outage {
+                start_s: 20.0,
+                end_s: 40.0,
+            }],
             seed: 3,
             defects: ImuSettings::default(),
             baro: None,
@@ -116,7 +132,10 @@ fn bits<T: std::fmt::Debug + ?Sized>(value: &T) -> String {
 fn the_same_seed_gives_the_same_bits_on_any_number_of_threads() {
     let setting = Setting::new(30.0, &[1.0]);
     let result_on = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
         pool.install(|| setting.run(20))
     };
     let one = result_on(1);
@@ -143,18 +162,31 @@ fn the_iterated_update_is_more_consistent_after_a_long_outage() {
     const PAIRS: u64 = 384;
     let mut setting = Setting::new(460.0, &[1.0]);
     setting.seed = 5;
-    setting.outages = vec![Outage { start_s: 60.0, end_s: 360.0 }];
+    setting.outages = vec![Outage {
+        start_s: 60.0,
+        end_s: 360.0,
+    }];
     let once = setting.run(PAIRS);
     setting.update = FixUpdate::Iterated;
     let iterated = setting.run(PAIRS);
-    let gain: Vec<f64> =
-        once[0].runs.iter().zip(&iterated[0].runs).map(|(a, b)| a.nees_mean - b.nees_mean).collect();
+    let gain: Vec<f64> = once[0]
+        .runs
+        .iter()
+        .zip(&iterated[0].runs)
+        .map(|(a, b)| a.nees_mean - b.nees_mean)
+        .collect();
     let pairs = PAIRS as f64;
     let mean = gain.iter().sum::<f64>() / pairs;
     let variance = gain.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (pairs - 1.0);
     assert!(mean > 3.0 * (variance / pairs).sqrt(), "{mean} {variance}");
     // Until the first fix after it nothing differs but by the fixes before, where errors are small.
-    let end = |r: &RunResult| r.runs.iter().map(|run| run.outages[0].nees_end).sum::<f64>() / pairs;
+    let end = |r: &RunResult| {
+        r.runs
+            .iter()
+            .map(|run| run.outages[0].nees_end)
+            .sum::<f64>()
+            / pairs
+    };
     assert!((end(&once[0]) / end(&iterated[0]) - 1.0).abs() < 0.01);
 }
 
@@ -183,38 +215,78 @@ fn matched_models_are_consistent_and_mismatched_ones_are_not() {
     let looks = [41_usize, 100, 200, 300, 400];
     let chi2 = ChiSquared::new((NEES_DOF as u64 * runs) as f64).unwrap();
     let alpha = 1e-3 / (2.0 * looks.len() as f64);
-    let (low, high) = (chi2.inverse_cdf(alpha / 2.0), chi2.inverse_cdf(1.0 - alpha / 2.0));
+    let (low, high) = (
+        chi2.inverse_cdf(alpha / 2.0),
+        chi2.inverse_cdf(1.0 - alpha / 2.0),
+    );
     for look in looks {
         let epoch = &results[0].epochs[look];
         assert_eq!(epoch.count, runs);
         let nees = epoch.nees[0];
-        assert!((low..high).contains(&nees), "NEES {nees} at {} s not in {low}..{high}", epoch.t_s);
+        assert!(
+            (low..high).contains(&nees),
+            "NEES {nees} at {} s not in {low}..{high}",
+            epoch.t_s
+        );
         // binomial(200, 0.05) misses: P(> 24) = 3.0e-5 and P(< 1) = 3.5e-5, both below alpha/2 = 5e-5
         let missed = runs - epoch.covered;
-        assert!((1..=24).contains(&missed), "{missed} of {runs} outside the 95 % ellipsoid");
+        assert!(
+            (1..=24).contains(&missed),
+            "{missed} of {runs} outside the 95 % ellipsoid"
+        );
     }
-    let nis: f64 = results[0].runs.iter().map(|r| r.nis.0 * r.nis.1 as f64).sum();
+    let nis: f64 = results[0]
+        .runs
+        .iter()
+        .map(|r| r.nis.0 * r.nis.1 as f64)
+        .sum();
     let fixes: u64 = results[0].runs.iter().map(|r| r.nis.1).sum();
     // Σ NIS is chi-square with 6·fixes degrees of freedom (innovations are white): ±4.4 deviations
     let deviations = (nis - 6.0 * fixes as f64) / (12.0 * fixes as f64).sqrt();
-    assert!(deviations.abs() < 4.4, "NIS off by {deviations} standard deviations");
+    assert!(
+        deviations.abs() < 4.4,
+        "NIS off by {deviations} standard deviations"
+    );
     let end_of_outage = results[1].epochs[39].nees[0];
-    assert!(end_of_outage > high, "a wrong model must show: NEES {end_of_outage}, bound {high}");
+    assert!(
+        end_of_outage > high,
+        "a wrong model must show: NEES {end_of_outage}, bound {high}"
+    );
 }
 
 /// An acceleration (m/s²) along x and east for 20 s without a fix, of an IMU without noise.
 fn dragster(a: f64, defects: ImuSettings) -> Setting {
     let straight = |k: u32| {
         let t_s = 0.25 * f64::from(k);
-        let q_b_n = RollPitchYaw { roll: 0.0, pitch: 0.0, yaw: 90.0 * DEG }.to_quat();
-        TrajectorySample { t_s, lat: 0.0, lon: 0.5 * a * t_s * t_s / crate::earth::A, h: 0.0, q_b_n }
+        let q_b_n = RollPitchYaw {
+            roll: 0.0,
+            pitch: 0.0,
+            yaw: 90.0 * DEG,
+        }
+        .to_quat();
+        TrajectorySample {
+            t_s,
+            lat: 0.0,
+            lon: 0.5 * a * t_s * t_s / crate::earth::A,
+            h: 0.0,
+            q_b_n,
+        }
     };
     let samples: Vec<_> = (0..=80).map(straight).collect();
     Setting {
         trajectory: Trajectory::from_samples(&samples).unwrap(),
-        model: Model { rate_hz: 100.0, axes: Default::default() },
-        initial: InitialSettings { perfect: true, ..InitialSettings::default() },
-        outages: vec![Outage { start_s: 0.0, end_s: 100.0 }],
+        model: Model {
+            rate_hz: 100.0,
+            axes: Default::default(),
+        },
+        initial: InitialSettings {
+            perfect: true,
+            ..InitialSettings::default()
+        },
+        outages: vec![Outage {
+            start_s: 0.0,
+            end_s: 100.0,
+        }],
         defects,
         ..Setting::new(30.0, &[1.0])
     }
@@ -224,15 +296,30 @@ fn dragster(a: f64, defects: ImuSettings) -> Setting {
 /// to the error in east as in the next test.
 #[test]
 fn samples_beyond_the_range_and_between_steps_err_as_in_closed_form() {
-    let ranged = Output { range_accel_m_s2: Some(10.0), ..Output::default() };
-    let stepped = Output { resolution_accel_m_s2: 0.5, ..Output::default() };
+    let ranged = Output {
+        range_accel_m_s2: Some(10.0),
+        ..Output::default()
+    };
+    let stepped = Output {
+        resolution_accel_m_s2: 0.5,
+        ..Output::default()
+    };
     let gravity_step = crate::earth::GRAVITY_EQUATOR - 10.0;
     for (a, output, east, down) in [(12.0, ranged, -2.0, 0.0), (2.3, stepped, 0.2, gravity_step)] {
-        let defects = ImuSettings { output: Some(output), ..ImuSettings::default() };
+        let defects = ImuSettings {
+            output: Some(output),
+            ..ImuSettings::default()
+        };
         let found = dragster(a, defects).run(1)[0].runs[0].outages[0].error_end[4];
         let coriolis = crate::earth::OMEGA_IE * down * 400.0;
-        let (expected, bound) = (20.0 * east + coriolis, 3e-4 * 20.0 * a + 0.1 * coriolis.abs());
-        assert!((found - expected).abs() < bound, "{found} m/s, {expected} m/s");
+        let (expected, bound) = (
+            20.0 * east + coriolis,
+            3e-4 * 20.0 * a + 0.1 * coriolis.abs(),
+        );
+        assert!(
+            (found - expected).abs() < bound,
+            "{found} m/s, {expected} m/s"
+        );
     }
 }
 
@@ -249,14 +336,27 @@ fn bias_and_scale_factor_of_the_true_imu_act_as_in_closed_form() {
         ..ImuSettings::default()
     };
     for run in &dragster(a, defects.clone()).run(20)[0].runs {
-        let key = StreamKey { seed: 3, scenario: "", run: run.run, source: "", process: "" };
+        let key = StreamKey {
+            seed: 3,
+            scenario: "",
+            run: run.run,
+            source: "",
+            process: "",
+        };
         let drawn = Defects::draw(&defects, key);
         let along = (drawn.bias[0].x + drawn.matrix[0].x_axis.x * a) * seconds;
         let down = drawn.bias[0].z - drawn.matrix[0].z_axis.z * crate::earth::GRAVITY_EQUATOR;
         let coriolis = crate::earth::OMEGA_IE * down * seconds * seconds;
-        let (found, bound) = (run.outages[0].error_end[4], 3e-4 * along.abs() + 0.1 * coriolis.abs());
+        let (found, bound) = (
+            run.outages[0].error_end[4],
+            3e-4 * along.abs() + 0.1 * coriolis.abs(),
+        );
         let expected = along + coriolis;
-        assert!((found - expected).abs() < bound, "run {}: {found} m/s, {expected} m/s", run.run);
+        assert!(
+            (found - expected).abs() < bound,
+            "run {}: {found} m/s, {expected} m/s",
+            run.run
+        );
     }
 }
 
@@ -264,10 +364,16 @@ fn bias_and_scale_factor_of_the_true_imu_act_as_in_closed_form() {
 fn assert_consistent(result: &RunResult, runs: u64, looks: &[usize]) {
     let chi2 = ChiSquared::new((NEES_DOF as u64 * runs) as f64).unwrap();
     let alpha = 1e-3 / looks.len() as f64;
-    let (low, high) = (chi2.inverse_cdf(alpha / 2.0), chi2.inverse_cdf(1.0 - alpha / 2.0));
+    let (low, high) = (
+        chi2.inverse_cdf(alpha / 2.0),
+        chi2.inverse_cdf(1.0 - alpha / 2.0),
+    );
     for look in looks {
         let nees = result.epochs[*look].nees[0];
-        assert!((low..high).contains(&nees), "NEES {nees} at {look} s not in {low}..{high}");
+        assert!(
+            (low..high).contains(&nees),
+            "NEES {nees} at {look} s not in {low}..{high}"
+        );
     }
 }
 
@@ -277,9 +383,15 @@ fn assert_consistent(result: &RunResult, runs: u64, looks: &[usize]) {
 fn a_barometer_holds_the_height() {
     let runs = 104;
     let mut setting = Setting::new(80.0, &[1.0]);
-    setting.outages = vec![Outage { start_s: 20.0, end_s: 60.0 }];
+    setting.outages = vec![Outage {
+        start_s: 20.0,
+        end_s: 60.0,
+    }];
     let without = setting.run(8);
-    setting.baro = Some(BaroSettings { rate_hz: 2.0, sigma_m: 0.5 });
+    setting.baro = Some(BaroSettings {
+        rate_hz: 2.0,
+        sigma_m: 0.5,
+    });
     let with = setting.run(runs);
     let down = |r: &RunResult, runs: u64| r.epochs[59].see[2] / runs as f64;
     assert!(down(&with[0], runs) < 0.4 && down(&without[0], 8) > 2.0);
@@ -295,12 +407,25 @@ fn the_gate_refuses_as_many_fixes_as_its_probability_says() {
     setting.nis_gate = Some(0.999);
     let rejected = |r: &RunResult| r.runs.iter().map(|run| run.rejected).sum::<u64>();
     let matched = setting.run(80);
-    assert!(rejected(&matched[0]) <= 24, "{} of 8000", rejected(&matched[0]));
-    assert!(matched[0].runs.iter().all(|run| run.nis.1 + run.rejected == 100));
+    assert!(
+        rejected(&matched[0]) <= 24,
+        "{} of 8000",
+        rejected(&matched[0])
+    );
+    assert!(
+        matched[0]
+            .runs
+            .iter()
+            .all(|run| run.nis.1 + run.rejected == 100)
+    );
     setting.gnss.correlated_pos_sigma_m = [6.0, 6.0, 6.0];
     setting.gnss.correlation_time_s = 5.0;
     let coloured = setting.run(80);
-    assert!(rejected(&coloured[0]) > 200, "{} of 8000", rejected(&coloured[0]));
+    assert!(
+        rejected(&coloured[0]) > 200,
+        "{} of 8000",
+        rejected(&coloured[0])
+    );
 }
 
 /// Sums over runs are those of the runs one by one, in every field: 11 runs are two batches.
@@ -309,14 +434,21 @@ fn sums_of_batches_are_sums_of_runs() {
     let setting = Setting::new(30.0, &[1.0]);
     let experiment = setting.experiment();
     let plan = Plan::new(&experiment).unwrap();
-    let runs_from = |first, runs| run_range(&plan, first, runs, &|| true, &|_| {}).unwrap().swap_remove(0);
+    let runs_from = |first, runs| {
+        run_range(&plan, first, runs, &|| true, &|_| {})
+            .unwrap()
+            .swap_remove(0)
+    };
     let together = runs_from(0, 11);
     let mut appended = runs_from(0, 5);
     appended.append(runs_from(5, 6));
     let single: Vec<RunResult> = (0..11).map(|k| runs_from(k, 1)).collect();
     let agree = |sum: f64, parts: &dyn Fn(&EpochSums) -> f64, epoch: usize| {
         let expected: f64 = single.iter().map(|r| parts(&r.epochs[epoch])).sum();
-        assert!((sum - expected).abs() <= 1e-9 * expected.abs() + 1e-12, "epoch {epoch}: {sum}, {expected}");
+        assert!(
+            (sum - expected).abs() <= 1e-9 * expected.abs() + 1e-12,
+            "epoch {epoch}: {sum}, {expected}"
+        );
     };
     for (k, sums) in together.epochs.iter().chain(&appended.epochs).enumerate() {
         let k = k % together.epochs.len();
@@ -329,7 +461,10 @@ fn sums_of_batches_are_sums_of_runs() {
         agree(sums.nees[1], &|e| e.nees[0].powi(2), k);
         agree(sums.pos_error[1], &|e| e.pos_error[0].powi(2), k);
         agree(sums.att_error[1], &|e| e.att_error[0].powi(2), k);
-        assert_eq!(sums.covered, single.iter().map(|r| r.epochs[k].covered).sum::<u64>());
+        assert_eq!(
+            sums.covered,
+            single.iter().map(|r| r.epochs[k].covered).sum::<u64>()
+        );
     }
     assert_eq!((together.run_epochs, appended.run_epochs), (33_000, 33_000));
 }
@@ -344,7 +479,9 @@ fn records_agree_with_the_epochs_of_their_run() {
     let plan = Plan::new(&experiment).unwrap();
     let mut late = 0;
     for k in 0..24 {
-        let result = run_range(&plan, k, 1, &|| true, &|_| {}).unwrap().swap_remove(0);
+        let result = run_range(&plan, k, 1, &|| true, &|_| {})
+            .unwrap()
+            .swap_remove(0);
         let (record, epochs) = (&result.runs[0], &result.epochs);
         let mean = |value: &dyn Fn(&EpochSums) -> f64, of: &[EpochSums]| {
             of.iter().map(value).sum::<f64>() / of.len() as f64
@@ -354,16 +491,31 @@ fn records_agree_with_the_epochs_of_their_run() {
         near(record.nees_mean, mean(&|e| e.nees[0], epochs));
         near(record.covered, mean(&|e| e.covered as f64, epochs));
         for i in 0..REPORTED {
-            near(record.normalised_sq[i], mean(&|e| (e.error[i] / e.see[i]).powi(2), epochs));
+            near(
+                record.normalised_sq[i],
+                mean(&|e| (e.error[i] / e.see[i]).powi(2), epochs),
+            );
             near(outage.see_mean[i], mean(&|e| e.see[i], &epochs[20..40]));
         }
         let horizontal = |e: &EpochSums| e.error[0].hypot(e.error[1]);
-        let back = epochs[40..].iter().position(|e| horizontal(e) <= 8.0_f64.sqrt());
-        near(1.0 + outage.reconvergence_s, back.map_or(f64::NAN, |s| 1.0 + s as f64));
-        late += u32::from(back.is_some_and(|s| s > 0 && horizontal(&epochs[40]) <= 2.0 * 8.0_f64.sqrt()));
+        let back = epochs[40..]
+            .iter()
+            .position(|e| horizontal(e) <= 8.0_f64.sqrt());
+        near(
+            1.0 + outage.reconvergence_s,
+            back.map_or(f64::NAN, |s| 1.0 + s as f64),
+        );
+        late += u32::from(
+            back.is_some_and(|s| s > 0 && horizontal(&epochs[40]) <= 2.0 * 8.0_f64.sqrt()),
+        );
         // at 40 s, before the fix there: a second of growth after 39 s, and far above what the fix leaves
-        assert!(outage.see_end[0] > epochs[39].see[0] && outage.see_end[0] > 1.5 * epochs[40].see[0]);
-        near(outage.horizontal_error_end_m, outage.error_end[0].hypot(outage.error_end[1]));
+        assert!(
+            outage.see_end[0] > epochs[39].see[0] && outage.see_end[0] > 1.5 * epochs[40].see[0]
+        );
+        near(
+            outage.horizontal_error_end_m,
+            outage.error_end[0].hypot(outage.error_end[1]),
+        );
     }
     assert!(
         late > 0,
@@ -375,10 +527,16 @@ fn records_agree_with_the_epochs_of_their_run() {
 #[test]
 fn an_outage_that_outlasts_the_trajectory_ends_with_it() {
     let mut setting = Setting::new(30.0, &[1.0]);
-    setting.outages = vec![Outage { start_s: 20.0, end_s: 31.0 }];
+    setting.outages = vec![Outage {
+        start_s: 20.0,
+        end_s: 31.0,
+    }];
     let result = &setting.run(1)[0];
     let (last, outage) = (&result.epochs[30], &result.runs[0].outages[0]);
-    assert_eq!((outage.see_end, outage.error_end, outage.nees_end), (last.see, last.error, last.nees[0]));
+    assert_eq!(
+        (outage.see_end, outage.error_end, outage.nees_end),
+        (last.see, last.error, last.nees[0])
+    );
 }
 
 /// Errors from windows of static recordings that have a random walk, in a full filter of the same model: with
@@ -391,19 +549,35 @@ fn windows_of_recordings_leave_the_matched_filter_consistent() {
         Composite::new(vec![Process::White(White::new(white).unwrap()), walk])
     };
     let model = Model::pooled(100.0, &axis(4e-5, 3e-9), &axis(1e-6, 1e-12));
-    let imu = VirtualImu { model: &model, spread: None, contamination: None, seed: 8 };
-    let recordings: Vec<_> = (1..=8).map(|k| imu.recording(k, &Channel::ALL, 60_000).unwrap()).collect();
+    let imu = VirtualImu {
+        model: &model,
+        spread: None,
+        contamination: None,
+        seed: 8,
+    };
+    let recordings: Vec<_> = (1..=8)
+        .map(|k| imu.recording(k, &Channel::ALL, 60_000).unwrap())
+        .collect();
     let mut setting = Setting::new(60.0, &[]);
     setting.beliefs = vec![Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap()];
-    let experiment = Experiment { truth: Truth::Static(&recordings), ..setting.experiment() };
+    let experiment = Experiment {
+        truth: Truth::Static(&recordings),
+        ..setting.experiment()
+    };
     let result = &run(&experiment, 160, &|_| {}).unwrap()[0];
     assert_eq!(result.independent_windows, Some(80.0));
     let looks = [5, 20, 39, 60];
     let chi2 = ChiSquared::new(NEES_DOF as f64 * 80.0).unwrap();
     let alpha = 1e-3 / looks.len() as f64;
-    let (low, high) = (chi2.inverse_cdf(alpha / 2.0) / 80.0, chi2.inverse_cdf(1.0 - alpha / 2.0) / 80.0);
+    let (low, high) = (
+        chi2.inverse_cdf(alpha / 2.0) / 80.0,
+        chi2.inverse_cdf(1.0 - alpha / 2.0) / 80.0,
+    );
     for look in looks {
         let nees = result.epochs[look].nees[0] / 160.0;
-        assert!((low..high).contains(&nees), "NEES {nees} at {look} s not in {low}..{high}");
+        assert!(
+            (low..high).contains(&nees),
+            "NEES {nees} at {look} s not in {low}..{high}"
+        );
     }
 }

@@ -57,7 +57,9 @@ impl Drift {
             Quantity::Angle(i) => self.angles_deg[i].powi(2),
             // The quantiles have no sum over sources: shares are of the mean square whatever quantile is
             // limited.
-            _ => (0..2).map(|i| self.covariance_m2[i][i] + self.mean_m[i].powi(2)).sum(),
+            _ => (0..2)
+                .map(|i| self.covariance_m2[i][i] + self.mean_m[i].powi(2))
+                .sum(),
         }
     }
 
@@ -87,8 +89,11 @@ impl Drift {
     /// The largest value of a quantity and where it is; what is not a number is the largest.
     #[must_use]
     pub fn largest(drifts: &[Self], quantity: Quantity) -> Option<(usize, f64)> {
-        let bound =
-            |drift: &Self| Some(drift.bound(quantity)).filter(|b| !b.is_nan()).unwrap_or(f64::INFINITY);
+        let bound = |drift: &Self| {
+            Some(drift.bound(quantity))
+                .filter(|b| !b.is_nan())
+                .unwrap_or(f64::INFINITY)
+        };
         let mut bounds: Vec<(usize, f64)> = drifts.iter().map(bound).enumerate().collect();
         bounds.sort_by(|a, b| b.1.total_cmp(&a.1));
         let mut largest: Option<(usize, f64)> = None;
@@ -109,7 +114,9 @@ impl Drift {
         let covariance = DMatrix::from_fn(2, 2, |i, j| self.covariance_m2[j][i]);
         // North and east have unequal variances and are correlated: the horizontal error is neither Rayleigh
         // nor normal.
-        QuadraticForm::of_square(&covariance, &self.mean_m).quantile(probability).sqrt()
+        QuadraticForm::of_square(&covariance, &self.mean_m)
+            .quantile(probability)
+            .sqrt()
     }
 }
 
@@ -132,9 +139,16 @@ impl<'a> Course<'a> {
     ) -> Result<Self, ExperimentError> {
         // The track is of the reference alone; the noise that is sought comes later, a hundred times over the
         // same track.
-        let silent = Model { rate_hz: scenario.imu.rate_hz, axes: Default::default() };
+        let silent = Model {
+            rate_hz: scenario.imu.rate_hz,
+            axes: Default::default(),
+        };
         let track = scenario.track(trajectory, &silent, &[])?.merged();
-        Ok(Self { trajectory, track, outages: outages.to_vec() })
+        Ok(Self {
+            trajectory,
+            track,
+            outages: outages.to_vec(),
+        })
     }
 
     /// Errors at the outage's end, at each place, of the filter that knows the model.
@@ -149,14 +163,22 @@ impl<'a> Course<'a> {
     ///
     /// # Errors
     /// When the model has no such filter.
-    pub fn curves(&self, scenario: &Scenario, model: &Model) -> Result<Vec<Vec<Drift>>, BeliefError> {
+    pub fn curves(
+        &self,
+        scenario: &Scenario,
+        model: &Model,
+    ) -> Result<Vec<Vec<Drift>>, BeliefError> {
         let belief = self.belief(scenario, model)?;
         let all = TruthSide::together(&self.sources(scenario, model));
         let laws = errors_in_outages(&self.track, &belief, &all, &self.outages, Moments::Reports);
         let curve = |(instants, outage): (Vec<Instant>, &Outage)| {
             // A report within the outage is what an outage would leave that ended there.
             let drift = |instant: &Instant| Drift::of(instant, instant.t_s - outage.start_s);
-            let mut curve: Vec<Drift> = instants.iter().map(drift).filter(|d| d.after_s > 0.0).collect();
+            let mut curve: Vec<Drift> = instants
+                .iter()
+                .map(drift)
+                .filter(|d| d.after_s > 0.0)
+                .collect();
             if let Some(end) = curve.last_mut() {
                 end.after_s = outage.end_s - outage.start_s;
             }
@@ -170,9 +192,20 @@ impl<'a> Course<'a> {
     ///
     /// # Errors
     /// When the model has no such filter.
-    pub fn with_all_fixes(&self, scenario: &Scenario, model: &Model) -> Result<Vec<Drift>, BeliefError> {
+    pub fn with_all_fixes(
+        &self,
+        scenario: &Scenario,
+        model: &Model,
+    ) -> Result<Vec<Drift>, BeliefError> {
         // What ends where it begins withholds no fix, and is looked at before the first fix from there on.
-        let empty: Vec<Outage> = self.outages.iter().map(|o| Outage { end_s: o.start_s, ..*o }).collect();
+        let empty: Vec<Outage> = self
+            .outages
+            .iter()
+            .map(|o| Outage {
+                end_s: o.start_s,
+                ..*o
+            })
+            .collect();
         self.drifts_in(&empty, scenario, model)
     }
 
@@ -188,8 +221,16 @@ impl<'a> Course<'a> {
         let belief = self.belief(scenario, model)?;
         let sources = self.sources(scenario, model);
         let part = |g: usize| {
-            let own: Vec<NamedSource> = sources.iter().filter(|source| group(source) == g).cloned().collect();
-            self.ends(&self.outages[place..=place], &belief, &TruthSide::together(&own))[0]
+            let own: Vec<NamedSource> = sources
+                .iter()
+                .filter(|source| group(source) == g)
+                .cloned()
+                .collect();
+            self.ends(
+                &self.outages[place..=place],
+                &belief,
+                &TruthSide::together(&own),
+            )[0]
         };
         Ok((0..groups).into_par_iter().map(part).collect())
     }
@@ -227,7 +268,9 @@ impl<'a> Course<'a> {
             let margin_there = |ln: f64| {
                 let (scenario, model) = imu_at(ln);
                 let worst = Worst::of(limits, &self.drifts_in(&outages, &scenario, &model)?);
-                Ok::<_, BeliefError>(worst.expect("at least one limit and one place").margin() - reserve)
+                Ok::<_, BeliefError>(
+                    worst.expect("at least one limit and one place").margin() - reserve,
+                )
             };
             let (ln, there) = crossing.from(start, margin_there)?;
             let worst = worst_at(ln)?;
@@ -253,19 +296,27 @@ impl<'a> Course<'a> {
     fn ends(&self, outages: &[Outage], belief: &Belief, truth: &TruthSide) -> Vec<Drift> {
         let ends = errors_in_outages(&self.track, belief, truth, outages, Moments::End);
         let drift = |(instants, outage): (Vec<Instant>, &Outage)| {
-            Drift::of(instants.last().expect("every outage has an end"), outage.end_s - outage.start_s)
+            Drift::of(
+                instants.last().expect("every outage has an end"),
+                outage.end_s - outage.start_s,
+            )
         };
         ends.into_iter().zip(outages).map(drift).collect()
     }
 
     /// The filter that knows every process: the best that this IMU allows, whatever reduction is chosen later.
     fn belief(&self, scenario: &Scenario, model: &Model) -> Result<Belief, BeliefError> {
-        scenario.with_full_noise().belief(model, &self.outages, &self.track)
+        scenario
+            .with_full_noise()
+            .belief(model, &self.outages, &self.track)
     }
 
     fn sources(&self, scenario: &Scenario, model: &Model) -> Vec<NamedSource> {
         let truth = Truth::Model(model);
-        TruthSide::sources(&scenario.experiment(self.trajectory, truth, &[], &self.outages, 0), model)
+        TruthSide::sources(
+            &scenario.experiment(self.trajectory, truth, &[], &self.outages, 0),
+            model,
+        )
     }
 }
 
@@ -273,12 +324,19 @@ impl<'a> Course<'a> {
 #[must_use]
 pub fn evenly(first_s: f64, end_s: f64, length_s: f64, places: u32) -> Vec<Outage> {
     let last_s = end_s - length_s;
-    let step = if places > 1 { (last_s - first_s).max(0.0) / f64::from(places - 1) } else { 0.0 };
+    let step = if places > 1 {
+        (last_s - first_s).max(0.0) / f64::from(places - 1)
+    } else {
+        0.0
+    };
     let mut outages: Vec<Outage> = (0..places)
         // Reports come at whole seconds: only from such a start are the errors within the outage those after
         // 1, 2, 3 … s.
         .map(|k| (first_s + f64::from(k) * step).floor())
-        .map(|start_s| Outage { start_s, end_s: start_s + length_s })
+        .map(|start_s| Outage {
+            start_s,
+            end_s: start_s + length_s,
+        })
         .collect();
     outages.dedup();
     outages

@@ -58,18 +58,34 @@ impl ImuParameters {
         let [accel_white, accel_bias, gyro_white, gyro_bias] = self.values;
         let axis = |density: f64, bias: f64| {
             let white = White::new(continuous::white_sigma2(density, rate_hz));
-            let bias = Flicker { floor: bias, t_corr_s: self.t_corr_s }.processes(rate_hz);
+            let bias = Flicker {
+                floor: bias,
+                t_corr_s: self.t_corr_s,
+            }
+            .processes(rate_hz);
             let mut processes = vec![Process::White(white.expect("a finite variance"))];
-            processes.extend(bias.expect("finite variances").into_iter().map(Process::GaussMarkov));
+            processes.extend(
+                bias.expect("finite variances")
+                    .into_iter()
+                    .map(Process::GaussMarkov),
+            );
             Composite::new(processes)
         };
-        Model::pooled(rate_hz, &axis(accel_white, accel_bias), &axis(gyro_white, gyro_bias))
+        Model::pooled(
+            rate_hz,
+            &axis(accel_white, accel_bias),
+            &axis(gyro_white, gyro_bias),
+        )
     }
 
     /// Between which averaging times the Allan deviation of a bias is nowhere below its bias instability (s).
     #[must_use]
     pub fn floor_s(&self) -> (f64, f64) {
-        Flicker { floor: 1.0, t_corr_s: self.t_corr_s }.range_s()
+        Flicker {
+            floor: 1.0,
+            t_corr_s: self.t_corr_s,
+        }
+        .range_s()
     }
 
     /// An intensity in the unit of datasheets.
@@ -99,17 +115,27 @@ impl ImuParameters {
             let decimals = (2.0 - value.log10().floor()).max(0.0) as usize;
             format!("{} {value:.decimals$}", Self::NAMES[i])
         };
-        (0..IMU_PARAMETERS).map(figure).collect::<Vec<_>>().join(", ")
+        (0..IMU_PARAMETERS)
+            .map(figure)
+            .collect::<Vec<_>>()
+            .join(", ")
     }
 
     /// As good as without noise.
     pub(super) fn perfect(t_corr_s: f64) -> Self {
         // 1e-5 of a consumer IMU, not zero: intensities are sought as logarithms.
-        Self { values: START, t_corr_s }.times([NONE; IMU_PARAMETERS])
+        Self {
+            values: START,
+            t_corr_s,
+        }
+        .times([NONE; IMU_PARAMETERS])
     }
 
     fn times(&self, factors: [f64; IMU_PARAMETERS]) -> Self {
-        Self { values: std::array::from_fn(|i| self.values[i] * factors[i]), ..*self }
+        Self {
+            values: std::array::from_fn(|i| self.values[i] * factors[i]),
+            ..*self
+        }
     }
 }
 
@@ -150,15 +176,25 @@ impl Need<'_> {
     /// # Errors
     /// When not even a perfect IMU meets them, or the poorest that is sought does.
     pub fn allocated(&self) -> Result<(ImuParameters, [f64; IMU_PARAMETERS + 1]), RequireError> {
-        let start = ImuParameters { values: START, t_corr_s: self.t_corr_s };
+        let start = ImuParameters {
+            values: START,
+            t_corr_s: self.t_corr_s,
+        };
         let perfect = self.worst(&ImuParameters::perfect(self.t_corr_s))?;
         if perfect.margin() <= RESERVE {
-            return Err(RequireError::Floor { limit: perfect.limit, value: perfect.value });
+            return Err(RequireError::Floor {
+                limit: perfect.limit,
+                value: perfect.value,
+            });
         }
         let poorest = start.times([POOREST; IMU_PARAMETERS]);
         let worst = self.worst(&poorest)?;
         if worst.margin() >= RESERVE {
-            return Err(RequireError::Loose { limit: worst.limit, value: worst.value, poorest });
+            return Err(RequireError::Loose {
+                limit: worst.limit,
+                value: worst.value,
+                poorest,
+            });
         }
         let mut imu = self.at_limit(&start, [1.0; IMU_PARAMETERS])?.1;
         for _ in 0..ROUNDS {
@@ -166,7 +202,8 @@ impl Need<'_> {
             let total: f64 = squares.iter().sum();
             // what the limit leaves when GNSS and start have taken their part
             // The margin is ln(limit/error): squared, exp(2 margin) is what the mean square may grow by.
-            let allowed = total * (2.0 * (worst.margin() - RESERVE)).exp() - squares[IMU_PARAMETERS];
+            let allowed =
+                total * (2.0 * (worst.margin() - RESERVE)).exp() - squares[IMU_PARAMETERS];
             // Where GNSS and start alone exceed the limit at this iterate the rest is negative: five per cent
             // keep the logarithm finite until it is not.
             let quarter = allowed.max(0.05 * total) / IMU_PARAMETERS as f64;
@@ -190,8 +227,15 @@ impl Need<'_> {
     ///
     /// # Errors
     /// When the model has no filter.
-    pub fn alone(&self, imu: &ImuParameters, which: usize, others: f64) -> Result<Answer, BeliefError> {
-        let base = imu.times(std::array::from_fn(|i| if i == which { 1.0 } else { others }));
+    pub fn alone(
+        &self,
+        imu: &ImuParameters,
+        which: usize,
+        others: f64,
+    ) -> Result<Answer, BeliefError> {
+        let base = imu.times(std::array::from_fn(
+            |i| if i == which { 1.0 } else { others },
+        ));
         let mut varied = [0.0; IMU_PARAMETERS];
         varied[which] = 1.0;
         let (margin, found) = self.at_limit(&base, varied)?;
@@ -225,15 +269,22 @@ impl Need<'_> {
         };
         let smallest = 0.1 * imu.values[3];
         let point = |k: u32| {
-            let bias = smallest * (largest / smallest).powf(f64::from(k) / f64::from(count.max(2) - 1));
+            let bias =
+                smallest * (largest / smallest).powf(f64::from(k) / f64::from(count.max(2) - 1));
             let beside = imu.times([1.0, 1.0, 1.0, bias / imu.values[3]]);
             Ok((bias, self.alone(&beside, 0, 1.0)?))
         };
-        Ok(IsoDrift { points: (0..count).map(point).collect::<Result<_, BeliefError>>()? })
+        Ok(IsoDrift {
+            points: (0..count).map(point).collect::<Result<_, BeliefError>>()?,
+        })
     }
 
     fn worst(&self, imu: &ImuParameters) -> Result<Worst, BeliefError> {
-        self.course.worst(self.scenario, &imu.model(self.scenario.imu.rate_hz), self.limits)
+        self.course.worst(
+            self.scenario,
+            &imu.model(self.scenario.imu.rate_hz),
+            self.limits,
+        )
     }
 
     /// The IMU whose intensities with a weight are multiplied until the hardest limit is met with its reserve, and the
@@ -244,21 +295,46 @@ impl Need<'_> {
         weights: [f64; IMU_PARAMETERS],
     ) -> Result<(f64, ImuParameters), BeliefError> {
         let scaled = |ln: f64| imu.times(weights.map(|w| (w * ln).exp()));
-        let crossing = Crossing { bounds: (-RANGE, RANGE), step: 0.7, exact: EXACT };
-        let imu_at = |ln: f64| (self.scenario.clone(), scaled(ln).model(self.scenario.imu.rate_hz));
-        let (ln, margin) = self.course.crossing(self.limits, (&crossing, RESERVE), imu_at)?;
+        let crossing = Crossing {
+            bounds: (-RANGE, RANGE),
+            step: 0.7,
+            exact: EXACT,
+        };
+        let imu_at = |ln: f64| {
+            (
+                self.scenario.clone(),
+                scaled(ln).model(self.scenario.imu.rate_hz),
+            )
+        };
+        let (ln, margin) = self
+            .course
+            .crossing(self.limits, (&crossing, RESERVE), imu_at)?;
         Ok((margin, scaled(ln)))
     }
 
     /// Mean squares of the four sources and of everything else in what is limited the hardest.
-    fn squares(&self, imu: &ImuParameters) -> Result<(Worst, [f64; IMU_PARAMETERS + 1]), BeliefError> {
+    fn squares(
+        &self,
+        imu: &ImuParameters,
+    ) -> Result<(Worst, [f64; IMU_PARAMETERS + 1]), BeliefError> {
         let worst = self.worst(imu)?;
         let model = imu.model(self.scenario.imu.rate_hz);
         let group = |source: &NamedSource| {
-            let own = ImuParameters::PROCESSES.iter().position(|process| source.process == Some(*process));
+            let own = ImuParameters::PROCESSES
+                .iter()
+                .position(|process| source.process == Some(*process));
             own.unwrap_or(IMU_PARAMETERS)
         };
-        let parts = self.course.parts(worst.place, self.scenario, &model, &group, IMU_PARAMETERS + 1)?;
-        Ok((worst, std::array::from_fn(|i| parts[i].square(worst.limit.quantity))))
+        let parts = self.course.parts(
+            worst.place,
+            self.scenario,
+            &model,
+            &group,
+            IMU_PARAMETERS + 1,
+        )?;
+        Ok((
+            worst,
+            std::array::from_fn(|i| parts[i].square(worst.limit.quantity)),
+        ))
     }
 }

@@ -76,13 +76,18 @@ impl Part {
             "initial" => Self::Start,
             fixes if fixes.starts_with("gnss.") || fixes == "baro" => Self::Fixes,
             aiding if aiding.starts_with("aiding.") => Self::Aiding,
-            _ => Sensor::ALL.into_iter().find(turn_on).map_or(Self::Scale, Self::TurnOn),
+            _ => Sensor::ALL
+                .into_iter()
+                .find(turn_on)
+                .map_or(Self::Scale, Self::TurnOn),
         }
     }
 
     const fn of_process(sensor: Sensor, kind: Kind) -> Self {
         match kind {
-            Kind::Ar1 | Kind::GaussMarkov | Kind::Flicker | Kind::RandomWalk => Self::Correlated(sensor),
+            Kind::Ar1 | Kind::GaussMarkov | Kind::Flicker | Kind::RandomWalk => {
+                Self::Correlated(sensor)
+            }
             Kind::White | Kind::Quantization | Kind::Ma1 => Self::White(sensor),
             Kind::Drift => Self::Drift,
         }
@@ -107,7 +112,9 @@ impl Part {
                 imu.scale_ppm_gyro *= factor;
                 imu.misalignment_rad *= factor;
                 imu.g_sensitivity_rad_s_per_m_s2 *= factor;
-                imu.vibration.iter_mut().for_each(|v| v.rectification_s2_m *= factor);
+                imu.vibration
+                    .iter_mut()
+                    .for_each(|v| v.rectification_s2_m *= factor);
                 imu.temperature.iter_mut().for_each(|t| t.multiply(factor));
                 scaled(&mut initial.accel_scale_sigma_ppm);
                 scaled(&mut initial.gyro_scale_sigma_ppm);
@@ -169,30 +176,56 @@ impl Margins {
     ) -> Result<Self, BeliefError> {
         let worst = course.worst(scenario, model, limits)?;
         let part_of = |source: &NamedSource| {
-            Part::ALL.iter().position(|part| *part == Part::of(source)).expect("one of all")
+            Part::ALL
+                .iter()
+                .position(|part| *part == Part::of(source))
+                .expect("one of all")
         };
         let alone = course.parts(worst.place, scenario, model, &part_of, Part::ALL.len())?;
-        let squares: Vec<f64> = alone.iter().map(|drift| drift.square(worst.limit.quantity)).collect();
+        let squares: Vec<f64> = alone
+            .iter()
+            .map(|drift| drift.square(worst.limit.quantity))
+            .collect();
         let total: f64 = squares.iter().sum();
         let given = (scenario.clone(), model.clone());
         let mut parts = Vec::new();
-        for (part, square) in Part::ALL.into_iter().zip(&squares).filter(|(_, square)| **square > 0.0) {
+        for (part, square) in Part::ALL
+            .into_iter()
+            .zip(&squares)
+            .filter(|(_, square)| **square > 0.0)
+        {
             let mut factor = None;
             if part.is_of_imu() {
-                let crossing = Crossing { bounds: (-RANGE, RANGE), step: 0.7, exact: 1e-3 };
+                let crossing = Crossing {
+                    bounds: (-RANGE, RANGE),
+                    step: 0.7,
+                    exact: 1e-3,
+                };
                 let imu_at = |ln: f64| part.multiplied(&given, ln.exp());
                 let (ln, left) = course.crossing(limits, (&crossing, 0.0), imu_at)?;
                 // A value left at a bound is no crossing: with this part without noise, or with any, the limit
                 // stays where it is.
                 factor = (left.abs() <= 1e-2).then(|| ln.exp());
             }
-            parts.push(PartMargin { part, share: square / total, factor });
+            parts.push(PartMargin {
+                part,
+                share: square / total,
+                factor,
+            });
         }
         let without = |imu, part: Part| part.multiplied(&imu, 0.0);
-        let beside_noise = [Part::TurnOn(Sensor::Accel), Part::TurnOn(Sensor::Gyro), Part::Scale];
+        let beside_noise = [
+            Part::TurnOn(Sensor::Accel),
+            Part::TurnOn(Sensor::Gyro),
+            Part::Scale,
+        ];
         let (scenario, _) = beside_noise.into_iter().fold(given, without);
         let perfect = ImuParameters::perfect(SLOW_S).model(model.rate_hz);
-        Ok(Self { worst, without_imu: course.worst(&scenario, &perfect, limits)?, parts })
+        Ok(Self {
+            worst,
+            without_imu: course.worst(&scenario, &perfect, limits)?,
+            parts,
+        })
     }
 
     /// Whether the limits are kept.
@@ -216,6 +249,10 @@ impl Margins {
     /// The share of all that a better IMU makes smaller.
     #[must_use]
     pub fn share_of_imu(&self) -> f64 {
-        self.parts.iter().filter(|p| p.part.is_of_imu()).map(|p| p.share).sum()
+        self.parts
+            .iter()
+            .filter(|p| p.part.is_of_imu())
+            .map(|p| p.share)
+            .sum()
     }
 }

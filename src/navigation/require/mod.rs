@@ -38,8 +38,14 @@ pub enum Quantity {
 
 impl Quantity {
     /// All quantities.
-    pub const ALL: [Self; 6] =
-        [Self::P95, Self::P50, Self::Rmse, Self::Angle(0), Self::Angle(1), Self::Angle(2)];
+    pub const ALL: [Self; 6] = [
+        Self::P95,
+        Self::P50,
+        Self::Rmse,
+        Self::Angle(0),
+        Self::Angle(1),
+        Self::Angle(2),
+    ];
 
     /// Its name, unit included.
     #[must_use]
@@ -109,7 +115,11 @@ impl Worst {
     pub fn of(limits: &[Limit], drifts: &[Drift]) -> Option<Self> {
         let worst_of_limit = |limit: &Limit| {
             let (place, value) = Drift::largest(drifts, limit.quantity)?;
-            Some(Self { limit: *limit, value, place })
+            Some(Self {
+                limit: *limit,
+                value,
+                place,
+            })
         };
         let margins = |worst: &Self| (worst.margin(), worst.margin().is_nan());
         limits.iter().filter_map(worst_of_limit).min_by(|a, b| {

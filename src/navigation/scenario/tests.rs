@@ -10,11 +10,24 @@ use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
 fn an_empty_file_is_the_papers_setting() {
     let scenario: Scenario = toml::from_str("").unwrap();
     assert_eq!(scenario.validate(), Ok(()));
-    assert_eq!((scenario.run.runs, scenario.imu.rate_hz, scenario.gnss.rate_hz), (100, 100.0, 1.0));
+    assert_eq!(
+        (
+            scenario.run.runs,
+            scenario.imu.rate_hz,
+            scenario.gnss.rate_hz
+        ),
+        (100, 100.0, 1.0)
+    );
     let variance = |sigma: [f64; 3]| sigma.map(|s| (s * s * 1e6).round() / 1e6);
     assert_eq!(variance(scenario.gnss.pos_sigma_m), [4.0, 4.0, 16.0]);
-    assert_eq!(variance(scenario.gnss.vel_sigma_m_s.unwrap()), [0.0016, 0.0016, 0.0036]);
-    assert_eq!(scenario.outages_on((0.0, 900.0), 1).unwrap().windows, Outage::PAPER);
+    assert_eq!(
+        variance(scenario.gnss.vel_sigma_m_s.unwrap()),
+        [0.0016, 0.0016, 0.0036]
+    );
+    assert_eq!(
+        scenario.outages_on((0.0, 900.0), 1).unwrap().windows,
+        Outage::PAPER
+    );
 }
 
 #[test]
@@ -56,20 +69,48 @@ fn what_the_filter_does_not_expect_is_found_of_each_sensor() {
     let found = |text: &str| toml::from_str::<Scenario>(text).unwrap().unexpected();
     assert!(found("").is_empty());
     let bias = found("imu = { turn_on_bias_gyro_rad_s = 1e-4, turn_on_bias_accel_m_s2 = 0.02 }");
-    let accel = Unexpected::TurnOnBias { sensor: Sensor::Accel, sigma: 0.02, expected: 0.0 };
+    let accel = Unexpected::TurnOnBias {
+        sensor: Sensor::Accel,
+        sigma: 0.02,
+        expected: 0.0,
+    };
     assert!(bias.len() == 2 && bias[0] == accel, "{bias:?}");
     let expected = "imu.turn_on_bias_gyro_rad_s = 1e-4\ninitial.gyro_bias_sigma_rad_s = ";
-    assert_eq!((found(&format!("{expected}1e-4")).len(), found(&format!("{expected}4e-5")).len()), (0, 1));
-    let scale = [Unexpected::Scale { sensor: Sensor::Accel, ppm: 300.0, expected_ppm: 0.0 }];
+    assert_eq!(
+        (
+            found(&format!("{expected}1e-4")).len(),
+            found(&format!("{expected}4e-5")).len()
+        ),
+        (0, 1)
+    );
+    let scale = [Unexpected::Scale {
+        sensor: Sensor::Accel,
+        ppm: 300.0,
+        expected_ppm: 0.0,
+    }];
     assert_eq!(found("imu.scale_ppm_accel = 300"), scale);
     assert!(found("imu.scale_ppm_accel = 300\nfilter.states = 21").is_empty());
     for (setting, sources) in [
-        ("imu.misalignment_rad = 1e-3", vec!["accel.misalignment", "gyro.misalignment"]),
-        ("imu.g_sensitivity_rad_s_per_m_s2 = 1e-4", vec!["gyro.g_sensitivity"]),
-        ("imu.vibration = { rms_m_s2 = 5, rectification_s2_m = 1e-4 }", vec!["accel.rectification"]),
-        ("imu.temperature = { profile_c = [[0, 20]], gyro_rad_s_k = 1e-6 }", vec!["gyro.temperature"]),
+        (
+            "imu.misalignment_rad = 1e-3",
+            vec!["accel.misalignment", "gyro.misalignment"],
+        ),
+        (
+            "imu.g_sensitivity_rad_s_per_m_s2 = 1e-4",
+            vec!["gyro.g_sensitivity"],
+        ),
+        (
+            "imu.vibration = { rms_m_s2 = 5, rectification_s2_m = 1e-4 }",
+            vec!["accel.rectification"],
+        ),
+        (
+            "imu.temperature = { profile_c = [[0, 20]], gyro_rad_s_k = 1e-6 }",
+            vec!["gyro.temperature"],
+        ),
     ] {
-        let [found] = &found(setting)[..] else { panic!("{setting}") };
+        let [found] = &found(setting)[..] else {
+            panic!("{setting}")
+        };
         assert_eq!(found.sources(), sources);
     }
     // white noise of 2 m is known to 0.2 m from the hundred fixes of the default correlation time
@@ -79,10 +120,28 @@ fn what_the_filter_does_not_expect_is_found_of_each_sensor() {
 
 /// Ten seconds at rest.
 fn standing() -> Trajectory {
-    let start = Start { t_s: 0.0, lat: 0.8, lon: 0.1, h: 0.0, heading: 0.0, speed: 0.0 };
+    let start = Start {
+        t_s: 0.0,
+        lat: 0.8,
+        lon: 0.1,
+        h: 0.0,
+        heading: 0.0,
+        speed: 0.0,
+    };
     let kind = Kind::Straight(Length::Duration(10.0));
-    let segments = vec![Segment { kind, climb_m: 0.0, ramp_s: None }];
-    Profile { start, bank: Bank::None, ramp_s: 1.0, segments }.build().unwrap()
+    let segments = vec![Segment {
+        kind,
+        climb_m: 0.0,
+        ramp_s: None,
+    }];
+    Profile {
+        start,
+        bank: Bank::None,
+        ramp_s: 1.0,
+        segments,
+    }
+    .build()
+    .unwrap()
 }
 
 /// With N1 an axis has two bias states: 9 + 12, scale factors 6, turn-on biases of the gyroscope 3.
@@ -97,13 +156,23 @@ fn what_is_expected_beside_the_model_adds_states_to_any_filter() {
         let scenario: Scenario = toml::from_str(text).unwrap();
         assert_eq!(scenario.validate(), Ok(()));
         let track = scenario.track(&standing(), &model, &[]).unwrap();
-        let full = scenario.with_full_noise().belief(&model, &[], &track).unwrap().states;
+        let full = scenario
+            .with_full_noise()
+            .belief(&model, &[], &track)
+            .unwrap()
+            .states;
         (scenario.belief(&model, &[], &track).unwrap().states, full)
     };
     assert_eq!(states(""), (15, 21));
     assert_eq!(states("filter.states = 21"), (21, 27));
-    assert_eq!(states("initial.gyro_bias_sigma_rad_s = 1e-4\nfilter.states = 21"), (24, 30));
-    assert_eq!(states("initial.gyro_scale_sigma_ppm = 0\nfilter.states = 21"), (18, 24));
+    assert_eq!(
+        states("initial.gyro_bias_sigma_rad_s = 1e-4\nfilter.states = 21"),
+        (24, 30)
+    );
+    assert_eq!(
+        states("initial.gyro_scale_sigma_ppm = 0\nfilter.states = 21"),
+        (18, 24)
+    );
     assert_eq!(states("initial.accel_scale_sigma_ppm = 100"), (18, 24));
 }
 
@@ -111,11 +180,20 @@ fn what_is_expected_beside_the_model_adds_states_to_any_filter() {
 #[test]
 fn a_rate_is_accepted_where_it_is_simulated() {
     let model = Model::pooled(100.0, &Composite::default(), &Composite::default());
-    for (rate, accepted) in [("33.33333", true), ("33.333333333", true), ("33.333", false), ("200", false)] {
+    for (rate, accepted) in [
+        ("33.33333", true),
+        ("33.333333333", true),
+        ("33.333", false),
+        ("200", false),
+    ] {
         for sensor in ["gnss", "baro.sigma_m = 1\nbaro"] {
             let scenario: Scenario = toml::from_str(&format!("{sensor}.rate_hz = {rate}")).unwrap();
             let simulated = scenario.track(&standing(), &model, &[]).is_ok();
-            assert_eq!((scenario.validate().is_ok(), simulated), (accepted, accepted), "{sensor} {rate}");
+            assert_eq!(
+                (scenario.validate().is_ok(), simulated),
+                (accepted, accepted),
+                "{sensor} {rate}"
+            );
         }
     }
 }
@@ -134,26 +212,44 @@ fn a_drift_that_a_filter_knows_grows_with_time() {
     let text = "filter.states = 'full'\n[initial]\npos_sigma_m = [1e-6, 1e-6, 1e-6]\n\
                 vel_sigma_m_s = [1e-9, 1e-9, 1e-9]\natt_sigma_deg = [1e-9, 1e-9, 1e-9]";
     let scenario: Scenario = toml::from_str(text).unwrap();
-    let outages = [Outage { start_s: 0.5, end_s: t_s }];
+    let outages = [Outage {
+        start_s: 0.5,
+        end_s: t_s,
+    }];
     let track = scenario.track(&standing(), &model, &outages).unwrap();
     let belief = scenario.belief(&model, &outages, &track).unwrap();
     let sigma = FilterPass::new(&track, &belief).sigma_at_ends()[0];
     let n = rate_hz * t_s;
     let expected = slope * n * (n + 1.0) * (2.0 * n + 1.0) / (12.0 * rate_hz * rate_hz);
     for (i, sigma) in sigma.into_iter().enumerate().take(3) {
-        assert!((sigma / expected - 1.0).abs() < 1e-3, "axis {i}: {sigma} m, {expected} m");
+        assert!(
+            (sigma / expected - 1.0).abs() < 1e-3,
+            "axis {i}: {sigma} m, {expected} m"
+        );
     }
 }
 
 #[test]
 fn no_outage_may_be_asked_for() {
     let scenario: Scenario = toml::from_str("outage = []").unwrap();
-    assert!(scenario.outages_on((0.0, 900.0), 1).unwrap().windows.is_empty());
+    assert!(
+        scenario
+            .outages_on((0.0, 900.0), 1)
+            .unwrap()
+            .windows
+            .is_empty()
+    );
 }
 
 #[test]
 fn refusals_name_section_and_key() {
-    let refused = |text: &str| toml::from_str::<Scenario>(text).unwrap().validate().unwrap_err().key;
+    let refused = |text: &str| {
+        toml::from_str::<Scenario>(text)
+            .unwrap()
+            .validate()
+            .unwrap_err()
+            .key
+    };
     assert_eq!(refused("run.runs = 0"), "run.runs");
     assert_eq!(refused("run.runs = 99999999999"), "run.runs");
     assert_eq!(refused("imu.rate_hz = 1e9"), "imu.rate_hz");
@@ -161,19 +257,58 @@ fn refusals_name_section_and_key() {
     assert_eq!(refused("gnss.rate_hz = 3"), "gnss.rate_hz");
     assert_eq!(refused("gnss.rate_hz = 200"), "gnss.rate_hz");
     assert_eq!(refused("gnss.pos_sigma_m = [0, 1, 1]"), "gnss.pos_sigma_m");
-    assert_eq!(refused("gnss.lever_arm_m = [0, 120, 0]"), "gnss.lever_arm_m");
-    assert_eq!(refused("imu.turn_on_bias_gyro_rad_s = 100"), "imu.turn_on_bias_gyro_rad_s");
-    assert_eq!(refused("imu.turn_on_bias_accel_m_s2 = 100"), "imu.turn_on_bias_accel_m_s2");
-    assert_eq!(refused("initial.gyro_bias_sigma_rad_s = 5"), "initial.gyro_bias_sigma_rad_s");
-    assert_eq!(refused("initial.accel_bias_sigma_m_s2 = 50"), "initial.accel_bias_sigma_m_s2");
-    assert_eq!(refused("initial.pos_sigma_m = [1e7, 1, 1]"), "initial.pos_sigma_m");
-    assert_eq!(refused("initial.vel_sigma_m_s = [1, 1, 5000]"), "initial.vel_sigma_m_s");
+    assert_eq!(
+        refused("gnss.lever_arm_m = [0, 120, 0]"),
+        "gnss.lever_arm_m"
+    );
+    assert_eq!(
+        refused("imu.turn_on_bias_gyro_rad_s = 100"),
+        "imu.turn_on_bias_gyro_rad_s"
+    );
+    assert_eq!(
+        refused("imu.turn_on_bias_accel_m_s2 = 100"),
+        "imu.turn_on_bias_accel_m_s2"
+    );
+    assert_eq!(
+        refused("initial.gyro_bias_sigma_rad_s = 5"),
+        "initial.gyro_bias_sigma_rad_s"
+    );
+    assert_eq!(
+        refused("initial.accel_bias_sigma_m_s2 = 50"),
+        "initial.accel_bias_sigma_m_s2"
+    );
+    assert_eq!(
+        refused("initial.pos_sigma_m = [1e7, 1, 1]"),
+        "initial.pos_sigma_m"
+    );
+    assert_eq!(
+        refused("initial.vel_sigma_m_s = [1, 1, 5000]"),
+        "initial.vel_sigma_m_s"
+    );
     assert_eq!(refused("imu.rate_hz = -1"), "imu.rate_hz");
-    assert_eq!(refused("imu.misalignment_rad = 0.5"), "imu.misalignment_rad");
+    assert_eq!(
+        refused("imu.misalignment_rad = 0.5"),
+        "imu.misalignment_rad"
+    );
     assert_eq!(refused("filter.nis_gate = 1"), "filter.nis_gate");
-    assert_eq!(refused("gnss.correlation_time_s = 0"), "gnss.correlation_time_s");
-    assert_eq!(refused("baro = { rate_hz = 1, sigma_m = 0 }"), "baro.sigma_m");
-    assert_eq!(refused("initial.att_sigma_deg = [1, 1, 180]"), "initial.att_sigma_deg");
-    assert_eq!(refused("baro = { rate_hz = 3, sigma_m = 1 }"), "baro.rate_hz");
-    assert_eq!(refused("outage = [{ start_s = 9, end_s = 3 }]"), "outage[1].end_s");
+    assert_eq!(
+        refused("gnss.correlation_time_s = 0"),
+        "gnss.correlation_time_s"
+    );
+    assert_eq!(
+        refused("baro = { rate_hz = 1, sigma_m = 0 }"),
+        "baro.sigma_m"
+    );
+    assert_eq!(
+        refused("initial.att_sigma_deg = [1, 1, 180]"),
+        "initial.att_sigma_deg"
+    );
+    assert_eq!(
+        refused("baro = { rate_hz = 3, sigma_m = 1 }"),
+        "baro.rate_hz"
+    );
+    assert_eq!(
+        refused("outage = [{ start_s = 9, end_s = 3 }]"),
+        "outage[1].end_s"
+    );
 }

@@ -22,25 +22,44 @@ impl Scenario {
             // of half of what is there, errors may be twice as large as stated
             let expected = self.initial.bias_sigma(sensor).unwrap_or(0.0);
             if expected < 0.5 * bias {
-                found.push(Unexpected::TurnOnBias { sensor, sigma: bias, expected });
+                found.push(Unexpected::TurnOnBias {
+                    sensor,
+                    sigma: bias,
+                    expected,
+                });
             }
             let by_default = self.filter.states.scale_sigma() * 1e6;
             let expected_ppm = self.initial.scale_sigma_ppm(sensor).unwrap_or(by_default);
             if expected_ppm < 0.5 * ppm {
-                found.push(Unexpected::Scale { sensor, ppm, expected_ppm });
+                found.push(Unexpected::Scale {
+                    sensor,
+                    ppm,
+                    expected_ppm,
+                });
             }
         }
         found.extend(self.imu.without_states().map(Unexpected::Defect));
         let GnssSettings {
-            rate_hz, pos_sigma_m, correlated_pos_sigma_m: sigma_m, correlation_time_s, ..
+            rate_hz,
+            pos_sigma_m,
+            correlated_pos_sigma_m: sigma_m,
+            correlation_time_s,
+            ..
         } = self.gnss;
         // A filter averages the white noise of so many fixes while the correlated error stays: that is felt when it is no
         // longer small beside their mean.
         let fixes = (rate_hz * correlation_time_s).max(1.0);
         if (0..3).any(|i| sigma_m[i] > 0.5 * pos_sigma_m[i] / fixes.sqrt()) {
-            found.push(Unexpected::CorrelatedPositions { sigma_m, correlation_time_s });
+            found.push(Unexpected::CorrelatedPositions {
+                sigma_m,
+                correlation_time_s,
+            });
         }
-        found.extend(self.aiding.unexpected().map(|(source, key)| Unexpected::Aiding { source, key }));
+        found.extend(
+            self.aiding
+                .unexpected()
+                .map(|(source, key)| Unexpected::Aiding { source, key }),
+        );
         found
     }
 
@@ -48,7 +67,10 @@ impl Scenario {
     #[must_use]
     pub fn unexpected_integration(&self, over_sigma: f64) -> Option<Unexpected> {
         let rate_hz = self.imu.rate_hz;
-        (over_sigma > 0.1).then_some(Unexpected::Integration { rate_hz, over_sigma })
+        (over_sigma > 0.1).then_some(Unexpected::Integration {
+            rate_hz,
+            over_sigma,
+        })
     }
 }
 
@@ -105,9 +127,11 @@ impl Unexpected {
         match self {
             Self::TurnOnBias { sensor, .. } => vec![format!("{}.turn_on_bias", sensor.name())],
             Self::Scale { sensor, .. } => vec![format!("{}.scale", sensor.name())],
-            Self::Defect(defect) => {
-                defect.sensors.iter().map(|s| format!("{}.{}", s.name(), defect.source)).collect()
-            }
+            Self::Defect(defect) => defect
+                .sensors
+                .iter()
+                .map(|s| format!("{}.{}", s.name(), defect.source))
+                .collect(),
             Self::CorrelatedPositions { .. } => vec!["gnss.correlated".to_owned()],
             Self::Aiding { source, .. } => vec![(*source).to_owned()],
             Self::Integration { .. } => vec![STRAPDOWN.to_owned()],

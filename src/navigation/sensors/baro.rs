@@ -39,8 +39,16 @@ pub(crate) struct BaroNoise {
 impl BaroNoise {
     /// The noise of run `key.run`.
     pub(crate) fn new(settings: &BaroSettings, key: StreamKey<'_>) -> Self {
-        let stream = StreamKey { source: "baro", process: "height", ..key }.generator();
-        Self { stream, sigma_m: settings.sigma_m }
+        let stream = StreamKey {
+            source: "baro",
+            process: "height",
+            ..key
+        }
+        .generator();
+        Self {
+            stream,
+            sigma_m: settings.sigma_m,
+        }
     }
 
     /// The error of the next height (m).

@@ -2,7 +2,8 @@
 
 use crate::rng::{Generator, StreamKey};
 use crate::units::{
-    NonNegative, Positive, SettingError, exactly, require_finite, require_non_negative, require_positive,
+    NonNegative, Positive, SettingError, exactly, require_finite, require_non_negative,
+    require_positive,
 };
 use glam::DVec3;
 use rand_distr::{Distribution, StandardNormal};
@@ -27,7 +28,10 @@ pub struct GnssSettings {
     #[serde(deserialize_with = "exactly")]
     pub pos_sigma_m: [f64; 3],
     /// Velocity standard deviations north, east, down (m/s); `None` ("none" in files): no velocity.
-    #[serde(serialize_with = "sigmas_or_none", deserialize_with = "parse_sigmas_or_none")]
+    #[serde(
+        serialize_with = "sigmas_or_none",
+        deserialize_with = "parse_sigmas_or_none"
+    )]
     #[schemars(with = "SigmasOrNoneText")]
     pub vel_sigma_m_s: Option<[f64; 3]>,
     /// Antenna position with respect to the IMU, in b: front, right, down (m).
@@ -65,7 +69,10 @@ impl GnssSettings {
     pub fn validate(&self) -> Result<(), SettingError> {
         require_positive("rate_hz", &[self.rate_hz])?;
         require_positive("pos_sigma_m", &self.pos_sigma_m)?;
-        require_positive("vel_sigma_m_s", self.vel_sigma_m_s.as_ref().map_or(&[], |v| v.as_slice()))?;
+        require_positive(
+            "vel_sigma_m_s",
+            self.vel_sigma_m_s.as_ref().map_or(&[], |v| v.as_slice()),
+        )?;
         require_lever_arm(&self.lever_arm_m)?;
         require_non_negative("correlated_pos_sigma_m", &self.correlated_pos_sigma_m)?;
         require_positive("correlation_time_s", &[self.correlation_time_s])
@@ -119,7 +126,9 @@ impl Correlated {
         // The first value has the stationary deviation; later ones phi e + √(1 − phi²) σ w, which keeps it.
         let fresh = self.sigma * normal(&mut self.stream);
         let innovation = (1.0 - self.phi * self.phi).sqrt();
-        let value = self.value.map_or(fresh, |before| self.phi * before + innovation * fresh);
+        let value = self
+            .value
+            .map_or(fresh, |before| self.phi * before + innovation * fresh);
         self.value = Some(value);
         value
     }
@@ -129,17 +138,44 @@ impl GnssNoise {
     /// The noise of run `key.run`.
     pub(crate) fn new(settings: &GnssSettings, key: StreamKey<'_>) -> Self {
         const COMPONENTS: [&str; 6] = ["pos_n", "pos_e", "pos_d", "vel_n", "vel_e", "vel_d"];
-        let streams = COMPONENTS.map(|process| StreamKey { source: "gnss", process, ..key }.generator());
+        let streams = COMPONENTS.map(|process| {
+            StreamKey {
+                source: "gnss",
+                process,
+                ..key
+            }
+            .generator()
+        });
         let velocity = settings.vel_sigma_m_s.unwrap_or([0.0; 3]);
-        let sigma = std::array::from_fn(|i| if i < 3 { settings.pos_sigma_m[i] } else { velocity[i - 3] });
+        let sigma = std::array::from_fn(|i| {
+            if i < 3 {
+                settings.pos_sigma_m[i]
+            } else {
+                velocity[i - 3]
+            }
+        });
         // From one epoch of the receiver to the next, whatever the rate of the IMU.
         let phi = (-1.0 / (settings.rate_hz * settings.correlation_time_s)).exp();
         let correlated = std::array::from_fn(|i| {
             let process = ["correlated_n", "correlated_e", "correlated_d"][i];
-            let stream = StreamKey { source: "gnss", process, ..key }.generator();
-            Correlated { stream, phi, sigma: settings.correlated_pos_sigma_m[i], value: None }
+            let stream = StreamKey {
+                source: "gnss",
+                process,
+                ..key
+            }
+            .generator();
+            Correlated {
+                stream,
+                phi,
+                sigma: settings.correlated_pos_sigma_m[i],
+                value: None,
+            }
         });
-        Self { streams, sigma, correlated }
+        Self {
+            streams,
+            sigma,
+            correlated,
+        }
     }
 
     /// Position error (m) and velocity error (m/s) of the next fix, n.
@@ -147,7 +183,10 @@ impl GnssNoise {
         // All six, also without a velocity: each has a stream of its own, and its deviation is then zero.
         let e: [f64; 6] = std::array::from_fn(|i| self.sigma[i] * normal(&mut self.streams[i]));
         let slow = DVec3::from_array(std::array::from_fn(|i| self.correlated[i].next()));
-        (DVec3::new(e[0], e[1], e[2]) + slow, DVec3::new(e[3], e[4], e[5]))
+        (
+            DVec3::new(e[0], e[1], e[2]) + slow,
+            DVec3::new(e[3], e[4], e[5]),
+        )
     }
 }
 
@@ -155,14 +194,19 @@ fn normal(generator: &mut Generator) -> f64 {
     StandardNormal.sample(generator)
 }
 
-fn sigmas_or_none<S: Serializer>(sigmas: &Option<[f64; 3]>, serializer: S) -> Result<S::Ok, S::Error> {
+fn sigmas_or_none<S: Serializer>(
+    sigmas: &Option<[f64; 3]>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
     match sigmas {
         Some(sigmas) => sigmas.serialize(serializer),
         None => serializer.serialize_str("none"),
     }
 }
 
-fn parse_sigmas_or_none<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[f64; 3]>, D::Error> {
+fn parse_sigmas_or_none<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<[f64; 3]>, D::Error> {
     deserializer.deserialize_any(SigmasOrNone)
 }
 
@@ -192,7 +236,11 @@ impl<'de> Visitor<'de> for SigmasOrNone {
     }
 
     fn visit_str<E: de::Error>(self, text: &str) -> Result<Self::Value, E> {
-        if text == "none" { Ok(None) } else { Err(E::invalid_value(de::Unexpected::Str(text), &self)) }
+        if text == "none" {
+            Ok(None)
+        } else {
+            Err(E::invalid_value(de::Unexpected::Str(text), &self))
+        }
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
@@ -214,7 +262,10 @@ mod tests {
             assert_eq!(toml::from_str::<GnssSettings>(&text).unwrap(), settings);
         }
         let error = toml::from_str::<GnssSettings>("vel_sigma_m_s = \"nil\"").unwrap_err();
-        assert!(error.message().contains("three numbers or \"none\""), "{error}");
+        assert!(
+            error.message().contains("three numbers or \"none\""),
+            "{error}"
+        );
     }
 
     /// White and correlated error together: variance sigma² + s², covariance at lag k s² phi^k. Over n
@@ -227,7 +278,13 @@ mod tests {
             correlation_time_s: 20.0,
             ..GnssSettings::default()
         };
-        let key = StreamKey { seed: 4, scenario: "", run: 0, source: "", process: "" };
+        let key = StreamKey {
+            seed: 4,
+            scenario: "",
+            run: 0,
+            source: "",
+            process: "",
+        };
         let mut noise = GnssNoise::new(&settings, key);
         let n = 400_000;
         let errors: Vec<DVec3> = (0..n).map(|_| noise.draw().0).collect();
@@ -250,10 +307,22 @@ mod tests {
     #[test]
     fn impossible_values_are_refused_by_key() {
         let cases = [
-            GnssSettings { rate_hz: 0.0, ..GnssSettings::default() },
-            GnssSettings { pos_sigma_m: [2.0, f64::NAN, 4.0], ..GnssSettings::default() },
-            GnssSettings { vel_sigma_m_s: Some([0.1, 0.0, 0.1]), ..GnssSettings::default() },
-            GnssSettings { lever_arm_m: [0.0, f64::INFINITY, 0.0], ..GnssSettings::default() },
+            GnssSettings {
+                rate_hz: 0.0,
+                ..GnssSettings::default()
+            },
+            GnssSettings {
+                pos_sigma_m: [2.0, f64::NAN, 4.0],
+                ..GnssSettings::default()
+            },
+            GnssSettings {
+                vel_sigma_m_s: Some([0.1, 0.0, 0.1]),
+                ..GnssSettings::default()
+            },
+            GnssSettings {
+                lever_arm_m: [0.0, f64::INFINITY, 0.0],
+                ..GnssSettings::default()
+            },
         ];
         let keys = ["rate_hz", "pos_sigma_m", "vel_sigma_m_s", "lever_arm_m"];
         for (settings, key) in cases.iter().zip(keys) {

@@ -63,15 +63,26 @@ pub fn ideal_imu(
     // A duration of 900 s at 100 Hz is 90000 samples, also when it was written 899.9999999 s.
     let n = (duration_s * rate_hz + 1e-6).floor() as usize;
     if n == 0 {
-        return Err(Error::TooShort { duration_s, rate_hz });
+        return Err(Error::TooShort {
+            duration_s,
+            rate_hz,
+        });
     }
     let instant = |k: usize| start_s + k as f64 / rate_hz;
     let mut knots = trajectory.knots();
-    Ok((0..n).map(|k| mean(trajectory, instant(k), instant(k + 1), &mut knots, gravity)).collect())
+    Ok((0..n)
+        .map(|k| mean(trajectory, instant(k), instant(k + 1), &mut knots, gravity))
+        .collect())
 }
 
 /// Mean over (from, to]; `knots` loses those before `to`.
-fn mean(trajectory: &Trajectory, from: f64, to: f64, knots: &mut &[f64], gravity: GravityModel) -> ImuSample {
+fn mean(
+    trajectory: &Trajectory,
+    from: f64,
+    to: f64,
+    knots: &mut &[f64],
+    gravity: GravityModel,
+) -> ImuSample {
     let mut sum = ImuSample::default();
     let mut left = from;
     // A cubic spline has a jump of its third derivative at a knot: quadrature across it would lose its order.
@@ -84,10 +95,19 @@ fn mean(trajectory: &Trajectory, from: f64, to: f64, knots: &mut &[f64], gravity
     }
     add_integral(&mut sum, trajectory, left, to, gravity);
     let dt = to - from;
-    ImuSample { omega_ib_b: sum.omega_ib_b / dt, f_ib_b: sum.f_ib_b / dt }
+    ImuSample {
+        omega_ib_b: sum.omega_ib_b / dt,
+        f_ib_b: sum.f_ib_b / dt,
+    }
 }
 
-fn add_integral(sum: &mut ImuSample, trajectory: &Trajectory, from: f64, to: f64, gravity: GravityModel) {
+fn add_integral(
+    sum: &mut ImuSample,
+    trajectory: &Trajectory,
+    from: f64,
+    to: f64,
+    gravity: GravityModel,
+) {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     // Three points are exact for polynomials of degree five within the piece.
     let node = 0.6_f64.sqrt();
@@ -114,7 +134,13 @@ mod tests {
             .map(|k| {
                 let t_s = f64::from(k) * dt;
                 let (lat, lon, h, q_b_n) = at(t_s);
-                TrajectorySample { t_s, lat, lon, h, q_b_n }
+                TrajectorySample {
+                    t_s,
+                    lat,
+                    lon,
+                    h,
+                    q_b_n,
+                }
             })
             .collect();
         Trajectory::from_samples(&samples).unwrap()
@@ -123,7 +149,15 @@ mod tests {
     #[test]
     fn at_rest_it_measures_earth_rate_and_minus_gravity() {
         for (lat_deg, h) in [(-70.0, 0.0), (0.0, 3000.0), (46.5, 400.0)] {
-            let (lat, q_b_n) = (lat_deg * DEG, RollPitchYaw { roll: 0.1, pitch: 0.3, yaw: 2.0 }.to_quat());
+            let (lat, q_b_n) = (
+                lat_deg * DEG,
+                RollPitchYaw {
+                    roll: 0.1,
+                    pitch: 0.3,
+                    yaw: 2.0,
+                }
+                .to_quat(),
+            );
             let trajectory = through(4, 1.0, |_| (lat, 3.0, h, q_b_n));
             let g_n = DVec3::Z * gravity_down(WGS84, lat.sin(), h);
             let samples = ideal_imu(&trajectory, 50.0, WGS84).unwrap();
@@ -141,12 +175,17 @@ mod tests {
     fn flight_along_parallel_and_meridian_obeys_the_navigation_equation() {
         for (lat_rate, lon_rate) in [(0.0, 6e-5), (4e-5, 0.0)] {
             let (lat0, lon0, h) = (-40.0 * DEG, 179.9 * DEG, 10_000.0);
-            let trajectory =
-                through(100, 1.0, |t| (lat0 + lat_rate * t, lon0 + lon_rate * t, h, DQuat::IDENTITY));
+            let trajectory = through(100, 1.0, |t| {
+                (lat0 + lat_rate * t, lon0 + lon_rate * t, h, DQuat::IDENTITY)
+            });
             let s = ideal_imu_at(&trajectory, 50.25, WGS84);
             let lat = lat0 + lat_rate * 50.25;
             let r = radii(lat.sin());
-            let v_n = DVec3::new((r.meridian + h) * lat_rate, (r.transverse + h) * lat.cos() * lon_rate, 0.0);
+            let v_n = DVec3::new(
+                (r.meridian + h) * lat_rate,
+                (r.transverse + h) * lat.cos() * lon_rate,
+                0.0,
+            );
             let w2 = 1.0 - crate::earth::E2 * lat.sin().powi(2);
             let curvature = 3.0 * crate::earth::E2 * lat.sin() * lat.cos() * r.meridian / w2;
             let a_n = DVec3::X * curvature * lat_rate * lat_rate;
@@ -164,12 +203,18 @@ mod tests {
     #[test]
     fn samples_are_means_in_the_turning_axes() {
         let omega = 2.0;
-        let trajectory = through(400, 0.01, |t| (0.0, 0.0, 0.0, DQuat::from_rotation_x(omega * t)));
+        let trajectory = through(400, 0.01, |t| {
+            (0.0, 0.0, 0.0, DQuat::from_rotation_x(omega * t))
+        });
         let g = gravity_down(WGS84, 0.0, 0.0);
         for (rate_hz, spline_error) in [(20.0, 1e-7), (33.0, 1e-7), (100.0, 1e-7)] {
             let dt = 1.0 / rate_hz;
             let sinc = (omega * dt / 2.0).sin() / (omega * dt / 2.0);
-            for (k, s) in ideal_imu(&trajectory, rate_hz, WGS84).unwrap().iter().enumerate() {
+            for (k, s) in ideal_imu(&trajectory, rate_hz, WGS84)
+                .unwrap()
+                .iter()
+                .enumerate()
+            {
                 let angle = omega * (k as f64 + 0.5) * dt;
                 let expected = DVec3::new(0.0, -angle.sin(), -angle.cos()) * g * sinc;
                 assert!((s.f_ib_b - expected).length() < spline_error * g);
@@ -183,7 +228,14 @@ mod tests {
     /// of jerk (50 m/s³) would show as 1e-2 m/s. Quadrature: (7 rad/s · 0.1 s)⁶/2016000 · 4 s · 10 m/s².
     #[test]
     fn the_integral_does_not_depend_on_the_rate() {
-        let jerky = |t: f64| (0.8, 0.1, (t * 7.0).sin() * 0.2, DQuat::from_rotation_y((t * 5.0).sin() * 0.1));
+        let jerky = |t: f64| {
+            (
+                0.8,
+                0.1,
+                (t * 7.0).sin() * 0.2,
+                DQuat::from_rotation_y((t * 5.0).sin() * 0.1),
+            )
+        };
         let trajectory = through(40, 0.1, jerky);
         let integral = |rate_hz: f64| {
             let samples = ideal_imu(&trajectory, rate_hz, WGS84).unwrap();
@@ -191,17 +243,37 @@ mod tests {
         };
         let fine = integral(1000.0);
         for rate_hz in [7.0, 13.0, 100.0] {
-            assert!((integral(rate_hz) - fine).length() < 2e-6, "{rate_hz} Hz: {}", integral(rate_hz) - fine);
+            assert!(
+                (integral(rate_hz) - fine).length() < 2e-6,
+                "{rate_hz} Hz: {}",
+                integral(rate_hz) - fine
+            );
         }
     }
 
     #[test]
     fn impossible_rates_are_refused() {
         let trajectory = through(4, 1.0, |_| (0.8, 0.1, 0.0, DQuat::IDENTITY));
-        let refused = |rate_hz| ideal_imu(&trajectory, rate_hz, WGS84).unwrap_err().to_string();
-        assert_eq!(refused(0.0), "IMU rate 0 Hz is not a number > 0 and ≤ 100000");
-        assert_eq!(refused(f64::NAN), "IMU rate NaN Hz is not a number > 0 and ≤ 100000");
-        assert_eq!(refused(1e9), "IMU rate 1000000000 Hz is not a number > 0 and ≤ 100000");
-        assert_eq!(refused(0.1), "the trajectory lasts 4 s: less than one sample at 0.1 Hz");
+        let refused = |rate_hz| {
+            ideal_imu(&trajectory, rate_hz, WGS84)
+                .unwrap_err()
+                .to_string()
+        };
+        assert_eq!(
+            refused(0.0),
+            "IMU rate 0 Hz is not a number > 0 and ≤ 100000"
+        );
+        assert_eq!(
+            refused(f64::NAN),
+            "IMU rate NaN Hz is not a number > 0 and ≤ 100000"
+        );
+        assert_eq!(
+            refused(1e9),
+            "IMU rate 1000000000 Hz is not a number > 0 and ≤ 100000"
+        );
+        assert_eq!(
+            refused(0.1),
+            "the trajectory lasts 4 s: less than one sample at 0.1 Hz"
+        );
     }
 }

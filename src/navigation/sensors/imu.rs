@@ -57,7 +57,9 @@ pub enum TruthError {
         needs_s: f64,
     },
     /// The model belongs to another rate than the IMU's.
-    #[error("the model of the truth belongs to {model_hz} Hz, the simulated IMU runs at {imu_hz} Hz")]
+    #[error(
+        "the model of the truth belongs to {model_hz} Hz, the simulated IMU runs at {imu_hz} Hz"
+    )]
     ModelRate {
         /// Rate of the model (Hz).
         model_hz: f64,
@@ -82,7 +84,11 @@ impl<'a> Truth<'a> {
     ///
     /// # Errors
     /// As [`check`](Self::check).
-    pub(crate) fn source(&self, imu_hz: f64, samples: usize) -> Result<ErrorSource<'a>, TruthError> {
+    pub(crate) fn source(
+        &self,
+        imu_hz: f64,
+        samples: usize,
+    ) -> Result<ErrorSource<'a>, TruthError> {
         self.check(imu_hz, samples)?;
         Ok(match self {
             Self::Model(model) => ErrorSource::Model(model),
@@ -100,16 +106,19 @@ impl Truth<'_> {
     pub(crate) fn check(&self, imu_hz: f64, samples: usize) -> Result<(), TruthError> {
         let check_model = |model: &Model| match same_rate(model.rate_hz, imu_hz) {
             true => Ok(()),
-            false => Err(TruthError::ModelRate { model_hz: model.rate_hz, imu_hz }),
+            false => Err(TruthError::ModelRate {
+                model_hz: model.rate_hz,
+                imu_hz,
+            }),
         };
         match self {
             Self::Model(model) => check_model(model),
             Self::Drawn([]) => Err(TruthError::NoModel),
             Self::Drawn(models) => models.iter().try_for_each(check_model),
             Self::Static([]) => Err(TruthError::None),
-            Self::Static(recordings) => {
-                recordings.iter().try_for_each(|r| check_recording(r, imu_hz, samples))
-            }
+            Self::Static(recordings) => recordings
+                .iter()
+                .try_for_each(|r| check_recording(r, imu_hz, samples)),
         }
     }
 }
@@ -131,16 +140,30 @@ impl Truth<'_> {
 
 fn check_recording(recording: &Recording, imu_hz: f64, needs: usize) -> Result<(), TruthError> {
     let name = || recording.name.clone();
-    if let Some(channel) = Channel::ALL.into_iter().find(|c| recording.signal(*c).is_none()) {
-        return Err(TruthError::Missing { recording: name(), channel });
+    if let Some(channel) = Channel::ALL
+        .into_iter()
+        .find(|c| recording.signal(*c).is_none())
+    {
+        return Err(TruthError::Missing {
+            recording: name(),
+            channel,
+        });
     }
     if !same_rate(recording.rate_hz, imu_hz) {
-        return Err(TruthError::Rate { recording: name(), rate_hz: recording.rate_hz, imu_hz });
+        return Err(TruthError::Rate {
+            recording: name(),
+            rate_hz: recording.rate_hz,
+            imu_hz,
+        });
     }
     let has = recording.len();
     if has < needs {
         let seconds = |samples: usize| samples as f64 / imu_hz;
-        return Err(TruthError::TooShort { recording: name(), has_s: seconds(has), needs_s: seconds(needs) });
+        return Err(TruthError::TooShort {
+            recording: name(),
+            has_s: seconds(has),
+            needs_s: seconds(needs),
+        });
     }
     Ok(())
 }
@@ -164,19 +187,29 @@ impl<'a> ImuErrors<'a> {
         let synthesised = |model: &Model| {
             Channel::ALL.map(|channel| {
                 let source = channel.to_string();
-                let synthesizer = Synthesizer::new(model.axis(channel), StreamKey { source: &source, ..key });
+                let synthesizer = Synthesizer::new(
+                    model.axis(channel),
+                    StreamKey {
+                        source: &source,
+                        ..key
+                    },
+                );
                 ChannelErrors::Synthesised(Box::new(synthesizer))
             })
         };
         let channels = match errors {
             ErrorSource::Model(model) => synthesised(model),
             // Of fewer models than runs each is taken again.
-            ErrorSource::Drawn(models) => synthesised(&models[(key.run % models.len() as u64) as usize]),
-            ErrorSource::Windows(windows) => {
-                windows.of_run(key, samples).map(|(window, level)| ChannelErrors::Recorded(window, level))
+            ErrorSource::Drawn(models) => {
+                synthesised(&models[(key.run % models.len() as u64) as usize])
             }
+            ErrorSource::Windows(windows) => windows
+                .of_run(key, samples)
+                .map(|(window, level)| ChannelErrors::Recorded(window, level)),
         };
-        Self { channels: channels.into() }
+        Self {
+            channels: channels.into(),
+        }
     }
 
     /// Overwrites `out` with the next samples of a channel (m/s² or rad/s).
@@ -187,7 +220,9 @@ impl<'a> ImuErrors<'a> {
                 let (now, later) = left.split_at(out.len());
                 // The level of the window's start, not its mean: a mean over the window would know the
                 // future, and hold the random walk down at both ends.
-                out.iter_mut().zip(now).for_each(|(error, sample)| *error = sample - *level);
+                out.iter_mut()
+                    .zip(now)
+                    .for_each(|(error, sample)| *error = sample - *level);
                 *left = later;
             }
         }
@@ -206,7 +241,11 @@ pub(crate) struct LaneErrors<'a> {
 impl<'a> LaneErrors<'a> {
     /// The errors of at most eight runs; lanes beyond them are without error.
     pub(crate) const fn new(runs: Vec<ImuErrors<'a>>) -> Self {
-        Self { runs, block: Vec::new(), channel: Vec::new() }
+        Self {
+            runs,
+            block: Vec::new(),
+            channel: Vec::new(),
+        }
     }
 
     /// Draws the errors of the next `n` samples: accelerometer (m/s²) and gyroscope (rad/s).
@@ -242,12 +281,24 @@ mod tests {
         let signal = |channel: Channel| Signal {
             channel,
             mean: 0.0,
-            samples: (0..samples).map(|k| k as f64 + 1000.0 * channel.index() as f64).collect(),
+            samples: (0..samples)
+                .map(|k| k as f64 + 1000.0 * channel.index() as f64)
+                .collect(),
         };
-        Recording { name: "r.csv".into(), rate_hz, signals: Channel::ALL.map(signal).into() }
+        Recording {
+            name: "r.csv".into(),
+            rate_hz,
+            signals: Channel::ALL.map(signal).into(),
+        }
     }
 
-    const KEY: StreamKey<'_> = StreamKey { seed: 5, scenario: "", run: 0, source: "", process: "" };
+    const KEY: StreamKey<'_> = StreamKey {
+        seed: 5,
+        scenario: "",
+        run: 0,
+        source: "",
+        process: "",
+    };
 
     #[test]
     fn windows_keep_the_axes_together_and_reach_both_ends() {
@@ -262,7 +313,10 @@ mod tests {
             }
             let start = first[0][0];
             for (c, block) in first.iter().enumerate() {
-                assert_eq!(*block, std::array::from_fn(|k| start + (k + 1000 * c) as f64));
+                assert_eq!(
+                    *block,
+                    std::array::from_fn(|k| start + (k + 1000 * c) as f64)
+                );
             }
             starts.insert(start as u64);
         }
@@ -271,15 +325,26 @@ mod tests {
 
     #[test]
     fn unusable_recordings_are_refused_with_their_name_and_by_how_much() {
-        let refused = |r: Recording| Truth::Static(&[r]).check(100.0, 500).unwrap_err().to_string();
-        assert_eq!(refused(recording(100.0, 300)), "r.csv lasts 3 s, the trajectory 5 s: 2 s too short");
+        let refused = |r: Recording| {
+            Truth::Static(&[r])
+                .check(100.0, 500)
+                .unwrap_err()
+                .to_string()
+        };
+        assert_eq!(
+            refused(recording(100.0, 300)),
+            "r.csv lasts 3 s, the trajectory 5 s: 2 s too short"
+        );
         assert_eq!(
             refused(recording(50.0, 600)),
             "r.csv was sampled at 50 Hz, the simulated IMU runs at 100 Hz"
         );
         let mut partial = recording(100.0, 600);
         partial.signals.remove(4);
-        assert_eq!(refused(partial), "r.csv: channel gyro.y is missing; all six are needed");
+        assert_eq!(
+            refused(partial),
+            "r.csv: channel gyro.y is missing; all six are needed"
+        );
         assert_eq!(Truth::Static(&[]).check(100.0, 1), Err(TruthError::None));
     }
 }

@@ -23,9 +23,16 @@ impl<'a> Windows<'a> {
     /// The windows of recordings that have all six channels.
     pub(super) fn new(recordings: &'a [Recording]) -> Self {
         let spans_of = |recording: &Recording| {
-            Channel::ALL.map(|channel| recording.signal(channel).map_or(0, |s| best_span(&s.samples)))
+            Channel::ALL.map(|channel| {
+                recording
+                    .signal(channel)
+                    .map_or(0, |s| best_span(&s.samples))
+            })
         };
-        Self { recordings, spans: recordings.iter().map(spans_of).collect() }
+        Self {
+            recordings,
+            spans: recordings.iter().map(spans_of).collect(),
+        }
     }
 
     /// The window of a run: for each channel its samples and the level they start from.
@@ -44,7 +51,14 @@ impl<'a> Windows<'a> {
     /// of them depends on how many there are.
     fn place(&self, key: StreamKey<'_>, samples: usize) -> (usize, usize) {
         const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15; // (√5 − 1)/2 in units of 2⁻⁶⁴
-        let shift: u64 = StreamKey { run: 0, source: "imu", process: "window", ..key }.generator().random();
+        let shift: u64 = StreamKey {
+            run: 0,
+            source: "imu",
+            process: "window",
+            ..key
+        }
+        .generator()
+        .random();
         // Integers wrap as fractions do modulo 1, without the rounding that k·(√5 − 1)/2 has for large k.
         let point = shift.wrapping_add(key.run.wrapping_mul(GOLDEN));
         let total: f64 = self.recordings.iter().map(|r| r.len() as f64).sum();
@@ -59,7 +73,10 @@ impl<'a> Windows<'a> {
         }
         // Scaled to the possible starts rather than refused: a window never runs over the end of its recording.
         let starts = length(index) - samples + 1;
-        (index, ((at / length(index) as f64 * starts as f64) as usize).min(starts - 1))
+        (
+            index,
+            ((at / length(index) as f64 * starts as f64) as usize).min(starts - 1),
+        )
     }
 }
 
@@ -68,7 +85,9 @@ impl<'a> Windows<'a> {
 /// longer one is chance.
 fn best_span(signal: &[f64]) -> usize {
     let levels = (signal.len() / 8).checked_ilog2().unwrap_or(0);
-    let Ok(variances) = haar::classical(signal, levels) else { return 0 };
+    let Ok(variances) = haar::classical(signal, levels) else {
+        return 0;
+    };
     let least = (0..variances.len()).min_by(|a, b| variances[*a].total_cmp(&variances[*b]));
     // level j compares neighbouring means over 2^(j − 1) samples
     least.map_or(0, |index| 1 << index)
@@ -91,16 +110,34 @@ mod tests {
     use crate::imu::Signal;
     use rand_distr::{Distribution, StandardNormal};
 
-    const KEY: StreamKey<'_> = StreamKey { seed: 5, scenario: "", run: 0, source: "", process: "" };
+    const KEY: StreamKey<'_> = StreamKey {
+        seed: 5,
+        scenario: "",
+        run: 0,
+        source: "",
+        process: "",
+    };
 
     fn recording(signal: &[f64]) -> Recording {
-        let channel = |channel| Signal { channel, mean: 0.0, samples: signal.to_vec() };
-        Recording { name: "r.csv".into(), rate_hz: 100.0, signals: Channel::ALL.map(channel).into() }
+        let channel = |channel| Signal {
+            channel,
+            mean: 0.0,
+            samples: signal.to_vec(),
+        };
+        Recording {
+            name: "r.csv".into(),
+            rate_hz: 100.0,
+            signals: Channel::ALL.map(channel).into(),
+        }
     }
 
     /// White noise of standard deviation `sigma` and a random walk of steps 1.
     fn walk(sigma: f64, samples: usize) -> Vec<f64> {
-        let mut rng = StreamKey { source: "walk", ..KEY }.generator();
+        let mut rng = StreamKey {
+            source: "walk",
+            ..KEY
+        }
+        .generator();
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
         let mut level = 0.0;
         (0..samples)
@@ -124,7 +161,10 @@ mod tests {
                 let share = start as f64 / (recordings[index].len() - 999) as f64;
                 held[12 * index + (share * [12.0, 8.0][index]) as usize] += 1;
             }
-            assert!(held.iter().all(|n| (4..=6).contains(n)), "seed {seed}: {held:?}");
+            assert!(
+                held.iter().all(|n| (4..=6).contains(n)),
+                "seed {seed}: {held:?}"
+            );
         }
     }
 

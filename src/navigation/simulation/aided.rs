@@ -36,7 +36,10 @@ pub(super) fn aided<'a>(
     if aids.peek().is_none() {
         return Vec::new();
     }
-    let in_outage = experiment.outages.iter().any(|outage| outage.withholds(t_s));
+    let in_outage = experiment
+        .outages
+        .iter()
+        .any(|outage| outage.withholds(t_s));
     let k = experiment.trajectory.kinematics(t_s);
     let to_b = k.q_b_e.inverse();
     let (v_b, a_b) = (to_b * k.v_e, to_b * k.a_e);
@@ -48,14 +51,24 @@ pub(super) fn aided<'a>(
         .map(|(aid, _)| {
             let swing = k.omega_eb_b.cross(experiment.aiding.lever_arm_b(*aid));
             let withheld = in_outage && experiment.aiding.is_of_gnss(*aid);
-            Aided { aid: *aid, v_b: v_b + swing, a_b, withheld }
+            Aided {
+                aid: *aid,
+                v_b: v_b + swing,
+                a_b,
+                withheld,
+            }
         })
         .collect()
 }
 
 /// A constraint that the reference itself does not keep tells of another vehicle, or of another point of it.
-pub(super) fn check_sideslip(experiment: &Experiment<'_>, events: &[Event]) -> Result<(), ExperimentError> {
-    let Some(nhc) = &experiment.aiding.nhc else { return Ok(()) };
+pub(super) fn check_sideslip(
+    experiment: &Experiment<'_>,
+    events: &[Event],
+) -> Result<(), ExperimentError> {
+    let Some(nhc) = &experiment.aiding.nhc else {
+        return Ok(());
+    };
     let squares: Vec<f64> = events
         .iter()
         .flat_map(|event| event.aids.iter().filter(|a| a.aid == Aid::Nhc))
@@ -65,5 +78,8 @@ pub(super) fn check_sideslip(experiment: &Experiment<'_>, events: &[Event]) -> R
     if rms_m_s <= FORGIVEN * nhc.sigma_m_s {
         return Ok(());
     }
-    Err(ExperimentError::Sideslip { rms_m_s, sigma_m_s: nhc.sigma_m_s })
+    Err(ExperimentError::Sideslip {
+        rms_m_s,
+        sigma_m_s: nhc.sigma_m_s,
+    })
 }

@@ -29,7 +29,8 @@ pub(super) struct Assessment {
 impl Assessment {
     /// Logarithm of the density of the errors under the filter's belief.
     pub(super) fn log_density(&self, ekf: &Ekf) -> Lanes {
-        ekf.p.log_density(std::array::from_fn(|i| i), self.navigation)
+        ekf.p
+            .log_density(std::array::from_fn(|i| i), self.navigation)
     }
 
     /// The assessment of the first `live` lanes against the reference; the other lanes are zero.
@@ -57,7 +58,9 @@ impl Assessment {
         }
         // With psi_n (rad), not with roll, pitch, yaw: NEES is invariant under the Jacobian, which is
         // singular at pitch ±90°.
-        found.nees = ekf.p.normalised_square(std::array::from_fn(|i| i), found.navigation);
+        found.nees = ekf
+            .p
+            .normalised_square(std::array::from_fn(|i| i), found.navigation);
         found
     }
 }
@@ -81,7 +84,9 @@ impl EpochLanes {
         let found = Assessment::of(ekf, live, &event.reference);
         let states: [usize; COVERAGE_DOF] =
             std::array::from_fn(|i| if i < 3 { 3 * R + i } else { 3 * PSI + i - 3 });
-        let coverage = ekf.p.normalised_square(states, states.map(|s| found.navigation[s]));
+        let coverage = ekf
+            .p
+            .normalised_square(states, states.map(|s| found.navigation[s]));
         let [accel, gyro] = Sensor::ALL.map(|sensor| ekf.bias_sigma(sensor).0);
         let bias_see = std::array::from_fn(|i| if i < 3 { accel[i] } else { gyro[i - 3] });
         Self {
@@ -99,7 +104,11 @@ impl EpochLanes {
     }
 
     pub(super) fn sum(&self, kept: &[usize]) -> EpochSums {
-        let mut sums = EpochSums { t_s: self.t_s, gnss: self.gnss, ..EpochSums::default() };
+        let mut sums = EpochSums {
+            t_s: self.t_s,
+            gnss: self.gnss,
+            ..EpochSums::default()
+        };
         for &lane in kept {
             sums.count += 1;
             for i in 0..REPORTED {
@@ -113,7 +122,12 @@ impl EpochLanes {
             for (sum, see) in sums.bias_see.iter_mut().zip(&self.bias_see) {
                 *sum += see[lane];
             }
-            let position = DVec3::new(self.error[0][lane], self.error[1][lane], self.error[2][lane]).length();
+            let position = DVec3::new(
+                self.error[0][lane],
+                self.error[1][lane],
+                self.error[2][lane],
+            )
+            .length();
             for (sum, value) in [
                 (&mut sums.pos_error, position),
                 (&mut sums.att_error, self.att_error_deg[lane]),
@@ -144,14 +158,27 @@ fn reported_error(estimate: &NavState, truth: &NavState) -> ReportedError {
     // Through the Jacobian, not as a difference of Euler angles: linear as the filter's own deviation is, and
     // no angle wraps at ±180°.
     let angles = jacobian.map(|row| row.dot(psi_n) / DEG);
-    ReportedError { values: [r.x, r.y, r.z, v.x, v.y, v.z, angles[0], angles[1], angles[2]], psi_n }
+    ReportedError {
+        values: [
+            r.x, r.y, r.z, v.x, v.y, v.z, angles[0], angles[1], angles[2],
+        ],
+        psi_n,
+    }
 }
 
 /// The rotation vector of a rotation (rad), the logarithm, exact for small ones too.
 fn rotation_vector(q: DQuat) -> DVec3 {
     // q and −q are the same rotation: the one with w ≥ 0 is the shorter way.
-    let (v, w) = if q.w < 0.0 { (-q.xyz(), -q.w) } else { (q.xyz(), q.w) };
+    let (v, w) = if q.w < 0.0 {
+        (-q.xyz(), -q.w)
+    } else {
+        (q.xyz(), q.w)
+    };
     let sine = v.length();
     // Below it atan2(s, w)/s is 1 to rounding, and 0/0 is avoided.
-    if sine < 1e-12 { v * 2.0 } else { v * (2.0 * sine.atan2(w) / sine) }
+    if sine < 1e-12 {
+        v * 2.0
+    } else {
+        v * (2.0 * sine.atan2(w) / sine)
+    }
 }

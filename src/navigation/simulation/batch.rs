@@ -5,7 +5,9 @@ use super::plan::{Event, Plan};
 use super::source::{Measured, Source};
 use super::{EpochSums, OutageRecord, REPORTED, RunRecord};
 use crate::ekf::covariance::{PSI, R, V};
-use crate::ekf::{BodyVelocity, Ekf, Fix, advance, nis_limit, settle, update, update_body_velocity};
+use crate::ekf::{
+    BodyVelocity, Ekf, Fix, advance, nis_limit, settle, update, update_body_velocity,
+};
 use crate::ekf::{update_height, update_within, update_yaw};
 use crate::frames::NavState;
 use crate::lanes::{LANES, Lanes, Real, Vec3};
@@ -29,8 +31,11 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
     let experiment = plan.experiment;
     let mut source = Source::new(plan, first, live);
     let starts = source.starts(plan);
-    let mut candidates: Vec<Candidate> =
-        experiment.beliefs.iter().map(|b| Candidate::new(plan, b, &starts, live)).collect();
+    let mut candidates: Vec<Candidate> = experiment
+        .beliefs
+        .iter()
+        .map(|b| Candidate::new(plan, b, &starts, live))
+        .collect();
     let mut done = 0;
     for (index, event) in plan.events.iter().enumerate() {
         let samples = &plan.ideal[done..event.sample];
@@ -51,7 +56,10 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
         }
         done = event.sample;
     }
-    candidates.into_iter().map(|c| c.finish(first, &plan.fan)).collect()
+    candidates
+        .into_iter()
+        .map(|c| c.finish(first, &plan.fan))
+        .collect()
 }
 
 /// Runs whose horizontal error is kept over time: those after them would no longer move a quantile to be seen, and memory
@@ -77,8 +85,12 @@ impl Candidate {
         for (lane, start) in starts.iter().enumerate() {
             nominal.set_lane(lane, start);
         }
-        let outage =
-            || std::array::from_fn(|_| OutageRecord { reconvergence_s: f64::NAN, ..Default::default() });
+        let outage = || {
+            std::array::from_fn(|_| OutageRecord {
+                reconvergence_s: f64::NAN,
+                ..Default::default()
+            })
+        };
         Self {
             ekf: Ekf::new(nominal, belief, &plan.start, plan.experiment.initial)
                 .with_update(plan.experiment.update),
@@ -86,7 +98,10 @@ impl Candidate {
             trace: Vec::with_capacity(plan.events.len()),
             outages: plan.experiment.outages.iter().map(|_| outage()).collect(),
             nis: [(0.0, 0, 0); LANES],
-            limit: plan.experiment.nis_gate.map(|p| nis_limit(p, plan.experiment.gnss.components())),
+            limit: plan
+                .experiment
+                .nis_gate
+                .map(|p| nis_limit(p, plan.experiment.gnss.components())),
         }
     }
 
@@ -119,8 +134,13 @@ impl Candidate {
             return;
         }
         let lever_arm_b = aiding.lever_arm_b(aid);
-        let velocity =
-            BodyVelocity { value: *value, axes: aid.axes(), variance, lever_arm_b, vehicle_b: DVec3::AXES };
+        let velocity = BodyVelocity {
+            value: *value,
+            axes: aid.axes(),
+            variance,
+            lever_arm_b,
+            vehicle_b: DVec3::AXES,
+        };
         let _ = update_body_velocity(&mut self.ekf, &velocity);
     }
 
@@ -147,7 +167,12 @@ impl Candidate {
         settle(&mut self.ekf);
         let found = Assessment::of(&self.ekf, self.live, &event.reference);
         let log_density = found.log_density(&self.ekf);
-        for (_, records) in plan.outages.iter().zip(&mut self.outages).filter(|((_, end), _)| *end == index) {
+        for (_, records) in plan
+            .outages
+            .iter()
+            .zip(&mut self.outages)
+            .filter(|((_, end), _)| *end == index)
+        {
             for (lane, record) in records.iter_mut().enumerate().take(self.live) {
                 record.see_end = found.see.map(|s| s[lane]);
                 record.error_end = found.error.map(|e| e[lane]);
@@ -189,32 +214,56 @@ impl Candidate {
         // reports is seen at the next.
         let diverged: [bool; LANES] = std::array::from_fn(|lane| {
             let finite = |e: &EpochLanes| {
-                e.nees[lane].is_finite() && e.see.iter().chain(&e.error).all(|value| value[lane].is_finite())
+                e.nees[lane].is_finite()
+                    && e.see
+                        .iter()
+                        .chain(&e.error)
+                        .all(|value| value[lane].is_finite())
             };
             !self.trace.iter().all(finite)
         });
         let kept: Vec<usize> = (0..self.live).filter(|lane| !diverged[*lane]).collect();
         let epochs = self.trace.iter().map(|e| e.sum(&kept)).collect();
         let reports = self.trace.len() as f64;
-        let mean = |value: &dyn Fn(&EpochLanes) -> f64| self.trace.iter().map(value).sum::<f64>() / reports;
+        let mean = |value: &dyn Fn(&EpochLanes) -> f64| {
+            self.trace.iter().map(value).sum::<f64>() / reports
+        };
         let horizontal = |lane: usize| {
-            let fan = if first + (lane as u64) < FAN_RUNS { fan } else { &[] };
+            let fan = if first + (lane as u64) < FAN_RUNS {
+                fan
+            } else {
+                &[]
+            };
             let errors = fan.iter().map(|report| &self.trace[*report].error);
             // f32: seven digits for a quantile plot, at half of the memory of 100 000 runs.
-            errors.map(|error| error[0][lane].hypot(error[1][lane]) as f32).collect()
+            errors
+                .map(|error| error[0][lane].hypot(error[1][lane]) as f32)
+                .collect()
         };
         let record = |lane: usize| RunRecord {
             run: first + lane as u64,
             diverged: diverged[lane],
-            outages: self.outages.iter().map(|records| records[lane].clone()).collect(),
-            nis: (self.nis[lane].0 / self.nis[lane].1.max(1) as f64, self.nis[lane].1),
+            outages: self
+                .outages
+                .iter()
+                .map(|records| records[lane].clone())
+                .collect(),
+            nis: (
+                self.nis[lane].0 / self.nis[lane].1.max(1) as f64,
+                self.nis[lane].1,
+            ),
             rejected: self.nis[lane].2,
             nees_mean: mean(&|e| e.nees[lane]),
             covered: mean(&|e| f64::from(u8::from(e.covered[lane]))),
-            normalised_sq: std::array::from_fn(|i| mean(&|e| (e.error[i][lane] / e.see[i][lane]).powi(2))),
+            normalised_sq: std::array::from_fn(|i| {
+                mean(&|e| (e.error[i][lane] / e.see[i][lane]).powi(2))
+            }),
             horizontal_m: horizontal(lane),
         };
-        Batch { epochs, runs: (0..self.live).map(record).collect() }
+        Batch {
+            epochs,
+            runs: (0..self.live).map(record).collect(),
+        }
     }
 }
 

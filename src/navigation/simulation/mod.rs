@@ -36,8 +36,14 @@ pub const REPORTED_NAMES: [&str; REPORTED] = [
 pub const BIASES: usize = 6;
 
 /// Column names of the biases, units included.
-pub const BIAS_NAMES: [&str; BIASES] =
-    ["b_ax_m_s2", "b_ay_m_s2", "b_az_m_s2", "b_gx_rad_s", "b_gy_rad_s", "b_gz_rad_s"];
+pub const BIAS_NAMES: [&str; BIASES] = [
+    "b_ax_m_s2",
+    "b_ay_m_s2",
+    "b_az_m_s2",
+    "b_gx_rad_s",
+    "b_gy_rad_s",
+    "b_gz_rad_s",
+];
 
 /// Errors that differ by less than this share from a filter's standard deviations are let pass.
 pub const TOLERANCE: f64 = 0.1;

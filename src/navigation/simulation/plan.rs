@@ -170,10 +170,15 @@ impl<'a> Plan<'a> {
         let rate_hz = experiment.rate_hz;
         for belief in experiment.beliefs {
             if !same_rate(belief.rate_hz, rate_hz) {
-                return Err(ExperimentError::BeliefRate { model_hz: belief.rate_hz, imu_hz: rate_hz });
+                return Err(ExperimentError::BeliefRate {
+                    model_hz: belief.rate_hz,
+                    imu_hz: rate_hz,
+                });
             }
         }
-        Self::with_source(experiment, |samples| experiment.truth.source(rate_hz, samples))
+        Self::with_source(experiment, |samples| {
+            experiment.truth.source(rate_hz, samples)
+        })
     }
 
     /// The same for a covariance analysis, which draws no error: a model that is the truth may belong to another
@@ -184,7 +189,9 @@ impl<'a> Plan<'a> {
     pub(super) fn reference(experiment: &'a Experiment<'a>) -> Result<Self, ExperimentError> {
         Self::with_source(experiment, |samples| match experiment.truth {
             Truth::Model(model) => Ok(ErrorSource::Model(model)),
-            Truth::Drawn(_) | Truth::Static(_) => experiment.truth.source(experiment.rate_hz, samples),
+            Truth::Drawn(_) | Truth::Static(_) => {
+                experiment.truth.source(experiment.rate_hz, samples)
+            }
         })
     }
 
@@ -192,16 +199,35 @@ impl<'a> Plan<'a> {
         experiment: &'a Experiment<'a>,
         source: impl FnOnce(usize) -> Result<ErrorSource<'a>, TruthError>,
     ) -> Result<Self, ExperimentError> {
-        let Experiment { trajectory, rate_hz, gravity, .. } = *experiment;
+        let Experiment {
+            trajectory,
+            rate_hz,
+            gravity,
+            ..
+        } = *experiment;
         let ideal = ideal_imu(trajectory, rate_hz, gravity)?;
         let errors = source(ideal.len())?;
         check_rotation(&ideal, trajectory.start_s(), rate_hz)?;
         let events = schedule(experiment, ideal.len())?;
-        let chi2 = ChiSquared::new(super::COVERAGE_DOF as f64).expect("degrees of freedom are positive");
+        let chi2 =
+            ChiSquared::new(super::COVERAGE_DOF as f64).expect("degrees of freedom are positive");
         let coverage_quantile = chi2.inverse_cdf(experiment.coverage_level);
         let start = trajectory.state(trajectory.start_s());
-        let outages = experiment.outages.iter().map(|o| effects(o, &events)).collect();
-        Ok(Self { experiment, ideal, errors, start, events, outages, coverage_quantile, fan: Vec::new() })
+        let outages = experiment
+            .outages
+            .iter()
+            .map(|o| effects(o, &events))
+            .collect();
+        Ok(Self {
+            experiment,
+            ideal,
+            errors,
+            start,
+            events,
+            outages,
+            coverage_quantile,
+            fan: Vec::new(),
+        })
     }
 
     /// The same with the horizontal error of every run kept over time, at `fan_epochs`.
@@ -226,7 +252,10 @@ impl<'a> Plan<'a> {
     /// Times of the first fix after each outage, or of the end of the trajectory (s).
     #[must_use]
     pub(crate) fn outage_fix_t_s(&self) -> Vec<f64> {
-        self.outages.iter().map(|(_, end)| self.events[*end].t_s).collect()
+        self.outages
+            .iter()
+            .map(|(_, end)| self.events[*end].t_s)
+            .collect()
     }
 
     /// What was planned.
@@ -237,8 +266,14 @@ impl<'a> Plan<'a> {
 
     /// What the IMU feels over a sample, as it is in its middle.
     pub(super) fn felt(&self, sample: usize) -> Surroundings {
-        let t_s = self.experiment.trajectory.start_s() + (sample as f64 + 0.5) / self.experiment.rate_hz;
-        Surroundings::at(self.experiment.defects, &self.ideal[sample], t_s, &self.ideal[0])
+        let t_s =
+            self.experiment.trajectory.start_s() + (sample as f64 + 0.5) / self.experiment.rate_hz;
+        Surroundings::at(
+            self.experiment.defects,
+            &self.ideal[sample],
+            t_s,
+            &self.ideal[0],
+        )
     }
 
     /// IMU samples of one run.
@@ -257,20 +292,34 @@ const FAN_EPOCHS: usize = 400;
 #[must_use]
 pub(crate) fn fan_epochs(t_s: &[f64], outages: &[Outage]) -> Vec<usize> {
     let step = t_s.len().div_ceil(FAN_EPOCHS).max(1);
-    let withheld: Vec<bool> = t_s.iter().map(|t| outages.iter().any(|o| o.withholds(*t))).collect();
-    let changes = |i: usize| withheld.get(i).zip(withheld.get(i + 1)).is_some_and(|(a, b)| a != b);
-    let is_kept = |i: &usize| i.is_multiple_of(step) || changes(*i) || i.checked_sub(1).is_some_and(changes);
+    let withheld: Vec<bool> = t_s
+        .iter()
+        .map(|t| outages.iter().any(|o| o.withholds(*t)))
+        .collect();
+    let changes = |i: usize| {
+        withheld
+            .get(i)
+            .zip(withheld.get(i + 1))
+            .is_some_and(|(a, b)| a != b)
+    };
+    let is_kept =
+        |i: &usize| i.is_multiple_of(step) || changes(*i) || i.checked_sub(1).is_some_and(changes);
     (0..t_s.len()).filter(is_kept).collect()
 }
 
 fn effects(outage: &Outage, events: &[Event]) -> (f64, usize) {
-    let reports = events.iter().filter(|e| e.report && outage.withholds(e.t_s)).count();
+    let reports = events
+        .iter()
+        .filter(|e| e.report && outage.withholds(e.t_s))
+        .count();
     let first_fix = events.iter().position(|e| e.fix && outage.is_over(e.t_s));
     (reports as f64, first_fix.unwrap_or(events.len() - 1))
 }
 
 fn check_rotation(ideal: &[ImuSample], start_s: f64, rate_hz: f64) -> Result<(), ExperimentError> {
-    let too_fast = ideal.iter().position(|s| s.omega_ib_b.length() / rate_hz > MAX_ROTATION);
+    let too_fast = ideal
+        .iter()
+        .position(|s| s.omega_ib_b.length() / rate_hz > MAX_ROTATION);
     too_fast.map_or(Ok(()), |k| {
         Err(ExperimentError::TurnsTooFast {
             t_s: start_s + k as f64 / rate_hz,
@@ -283,7 +332,12 @@ fn check_rotation(ideal: &[ImuSample], start_s: f64, rate_hz: f64) -> Result<(),
 
 /// Reports at every second from the start, fixes at every GNSS epoch after it, in time order.
 fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, ExperimentError> {
-    let Experiment { trajectory, rate_hz, gnss, .. } = *experiment;
+    let Experiment {
+        trajectory,
+        rate_hz,
+        gnss,
+        ..
+    } = *experiment;
     let step = |fix_hz: f64, what| {
         samples_per(rate_hz, fix_hz).ok_or(ExperimentError::FixBetweenSamples {
             imu_hz: rate_hz,
@@ -292,7 +346,10 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
         })
     };
     let per_fix = step(gnss.rate_hz, "GNSS")?;
-    let baro = experiment.baro.map(|b| step(b.rate_hz, "the barometer")).transpose()?;
+    let baro = experiment
+        .baro
+        .map(|b| step(b.rate_hz, "the barometer"))
+        .transpose()?;
     let aids: Vec<(Aid, usize)> = experiment
         .aiding
         .rates()
@@ -303,8 +360,14 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
     let reports: Vec<usize> = reports.take_while(|k| *k <= samples).collect();
     let mut all = reports.clone();
     all.extend((per_fix..=samples).step_by(per_fix));
-    all.extend(baro.iter().flat_map(|step| (*step..=samples).step_by(*step)));
-    all.extend(aids.iter().flat_map(|(_, step)| (*step..=samples).step_by(*step)));
+    all.extend(
+        baro.iter()
+            .flat_map(|step| (*step..=samples).step_by(*step)),
+    );
+    all.extend(
+        aids.iter()
+            .flat_map(|(_, step)| (*step..=samples).step_by(*step)),
+    );
     // The last sample is an event, so that an outage that lasts to the end has an end.
     all.push(samples);
     all.sort_unstable();
@@ -313,7 +376,10 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
         let t_s = trajectory.start_s() + sample as f64 / rate_hz;
         let reference = trajectory.state(t_s);
         if reference.lat.abs() > MAX_LATITUDE {
-            return Err(ExperimentError::Pole { t_s, lat_deg: reference.lat / DEG });
+            return Err(ExperimentError::Pole {
+                t_s,
+                lat_deg: reference.lat / DEG,
+            });
         }
         // None at the very start: the initial deviations are those of a vehicle that GNSS has helped to align
         // already.
@@ -330,7 +396,8 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
             aids: aided(
                 experiment,
                 t_s,
-                aids.iter().filter(|(_, step)| sample > 0 && sample.is_multiple_of(*step)),
+                aids.iter()
+                    .filter(|(_, step)| sample > 0 && sample.is_multiple_of(*step)),
             ),
             report: reports.binary_search(&sample).is_ok(),
         })

@@ -52,21 +52,44 @@ impl<'a> Source<'a> {
             process: "",
         };
         let keys: Vec<_> = (first..first + live as u64).map(key).collect();
-        let imu = keys.iter().map(|k| ImuErrors::new(&plan.errors, *k, plan.samples()));
-        let gnss = keys.iter().map(|k| GnssNoise::new(experiment.gnss, *k)).collect();
-        let baro = experiment.baro.iter().flat_map(|b| keys.iter().map(|k| BaroNoise::new(b, *k))).collect();
-        let aiding = keys.iter().map(|k| AidNoise::new(experiment.aiding, *k)).collect();
+        let imu = keys
+            .iter()
+            .map(|k| ImuErrors::new(&plan.errors, *k, plan.samples()));
+        let gnss = keys
+            .iter()
+            .map(|k| GnssNoise::new(experiment.gnss, *k))
+            .collect();
+        let baro = experiment
+            .baro
+            .iter()
+            .flat_map(|b| keys.iter().map(|k| BaroNoise::new(b, *k)))
+            .collect();
+        let aiding = keys
+            .iter()
+            .map(|k| AidNoise::new(experiment.aiding, *k))
+            .collect();
         let defects = match experiment.defects {
             settings if settings.is_ideal() => Vec::new(),
             settings => keys.iter().map(|k| Defects::draw(settings, *k)).collect(),
         };
         let rate_hz = experiment.rate_hz;
-        Self { rate_hz, imu: LaneErrors::new(imu.collect()), gnss, baro, aiding, defects, keys }
+        Self {
+            rate_hz,
+            imu: LaneErrors::new(imu.collect()),
+            gnss,
+            baro,
+            aiding,
+            defects,
+            keys,
+        }
     }
 
     /// The nominal starts: the truth and an error drawn from the initial standard deviations.
     pub(super) fn starts(&self, plan: &Plan<'_>) -> Vec<NavState> {
-        self.keys.iter().map(|key| nominal_start(plan, *key)).collect()
+        self.keys
+            .iter()
+            .map(|key| nominal_start(plan, *key))
+            .collect()
     }
 
     /// The inertial errors of the next samples; idle lanes repeat the ideal.
@@ -85,7 +108,8 @@ impl<'a> Source<'a> {
         }
         if let Some(output) = &settings.output {
             for (sample, truth) in block.iter_mut().zip(&plan.ideal[samples]) {
-                for (lane, sensor) in (0..self.keys.len()).flat_map(|l| Sensor::ALL.map(|s| (l, s))) {
+                for (lane, sensor) in (0..self.keys.len()).flat_map(|l| Sensor::ALL.map(|s| (l, s)))
+                {
                     let (error, exact) = (&mut sample[sensor as usize], truth.of(sensor));
                     error.set_lane(lane, output.put(sensor, exact + error.lane(lane)) - exact);
                 }
@@ -109,7 +133,11 @@ impl<'a> Source<'a> {
         let yaw = || RollPitchYaw::from_quat(event.reference.q_b_n).yaw;
         let mut measure = |aided: &Aided| {
             let is_heading = aided.aid == Aid::Heading;
-            let exact = if is_heading { DVec3::X * yaw() } else { aided.v_b };
+            let exact = if is_heading {
+                DVec3::X * yaw()
+            } else {
+                aided.v_b
+            };
             let axes = if is_heading { &[0] } else { aided.aid.axes() };
             let mut value: Vec3 = Vec3::splat(exact);
             for (lane, noise) in self.aiding.iter_mut().enumerate() {
@@ -164,9 +192,18 @@ pub(super) fn nominal_start(plan: &Plan<'_>, key: StreamKey<'_>) -> NavState {
         return truth;
     }
     let draw = |process: &'static str, sigma: [f64; 3]| {
-        let mut generator = StreamKey { source: "initial", process, ..key }.generator();
+        let mut generator = StreamKey {
+            source: "initial",
+            process,
+            ..key
+        }
+        .generator();
         let mut normal = || -> f64 { StandardNormal.sample(&mut generator) };
-        DVec3::new(sigma[0] * normal(), sigma[1] * normal(), sigma[2] * normal())
+        DVec3::new(
+            sigma[0] * normal(),
+            sigma[1] * normal(),
+            sigma[2] * normal(),
+        )
     };
     let dr = draw("position", initial.pos_sigma_m);
     let dv = draw("velocity", initial.vel_sigma_m_s);

@@ -59,10 +59,15 @@ impl BodyMotion {
                 let k2 = rates(moved(place, k1, 0.5 * dt), x(0.5));
                 let k3 = rates(moved(place, k2, 0.5 * dt), x(0.5));
                 let k4 = rates(moved(place, k3, dt), x(1.0));
-                let mean: [f64; 3] = std::array::from_fn(|i| (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]) / 6.0);
+                let mean: [f64; 3] =
+                    std::array::from_fn(|i| (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]) / 6.0);
                 place = moved(place, mean, dt);
                 let share = shape.value(x(1.0));
-                samples.push(sample(t_s + command.duration_s * x(1.0), place, rpy + command.rpy * share));
+                samples.push(sample(
+                    t_s + command.duration_s * x(1.0),
+                    place,
+                    rpy + command.rpy * share,
+                ));
             }
             // Rounded to a nanosecond: the sum of many decimal durations stays the decimal that a user would
             // type.
@@ -75,11 +80,21 @@ impl BodyMotion {
 }
 
 fn sample(t_s: f64, [lat, lon, h]: [f64; 3], rpy: DVec3) -> TrajectorySample {
-    TrajectorySample { t_s, lat, lon, h, q_b_n: attitude(rpy).to_quat() }
+    TrajectorySample {
+        t_s,
+        lat,
+        lon,
+        h,
+        q_b_n: attitude(rpy).to_quat(),
+    }
 }
 
 fn attitude(rpy: DVec3) -> RollPitchYaw {
-    RollPitchYaw { roll: rpy.x, pitch: rpy.y, yaw: rpy.z }
+    RollPitchYaw {
+        roll: rpy.x,
+        pitch: rpy.y,
+        yaw: rpy.z,
+    }
 }
 
 /// Rates of latitude, longitude (rad/s) and height (m/s), [Groves](crate::bibliography::Groves13) eq. 2.111.
@@ -87,7 +102,11 @@ fn rates([lat, _, h]: [f64; 3], rpy: DVec3, v_b: DVec3) -> [f64; 3] {
     let v_n = attitude(rpy).to_quat() * v_b;
     let (sin_lat, cos_lat) = lat.sin_cos();
     let r = radii(sin_lat);
-    [v_n.x / (r.meridian + h), v_n.y / ((r.transverse + h) * cos_lat), -v_n.z]
+    [
+        v_n.x / (r.meridian + h),
+        v_n.y / ((r.transverse + h) * cos_lat),
+        -v_n.z,
+    ]
 }
 
 fn moved(place: [f64; 3], rates: [f64; 3], dt: f64) -> [f64; 3] {
@@ -103,8 +122,11 @@ mod tests {
     /// 10 s speeding up to 10 m/s, 9 s turning right by 90°, 5 s climbing (negative down) at 2 m/s.
     #[test]
     fn commands_reach_their_ends_in_their_time() {
-        let command =
-            |duration_s, yaw_deg: f64, v_b| Command { duration_s, rpy: DVec3::Z * yaw_deg * DEG, v_b };
+        let command = |duration_s, yaw_deg: f64, v_b| Command {
+            duration_s,
+            rpy: DVec3::Z * yaw_deg * DEG,
+            v_b,
+        };
         let motion = BodyMotion {
             start: [-0.5, 2.0, 100.0],
             rpy: DVec3::ZERO,
@@ -122,7 +144,11 @@ mod tests {
         assert!((t.state(19.0).v_n - DVec3::Y * 10.0).length() < 1e-5);
         assert!((t.state(25.0).v_n - DVec3::new(0.0, 10.0, -2.0)).length() < 1e-5);
         // 4 s of a change that is symmetric in time: half its speed in the mean; then 5 s of all of it.
-        assert!((t.state(28.0).h - (100.0 + 4.0 + 10.0)).abs() < 1e-6, "{}", t.state(28.0).h);
+        assert!(
+            (t.state(28.0).h - (100.0 + 4.0 + 10.0)).abs() < 1e-6,
+            "{}",
+            t.state(28.0).h
+        );
         assert!((RollPitchYaw::from_quat(t.state(19.0).q_b_n).yaw - 90.0 * DEG).abs() < 1e-9);
     }
 }

@@ -153,7 +153,10 @@ impl Trajectory {
             values.push([r.x, r.y, r.z, q.x, q.y, q.z, q.w]);
         }
         let t_s = samples.iter().map(|s| s.t_s).collect();
-        Ok(Self { origin_e, curve: Spline::not_a_knot(t_s, values) })
+        Ok(Self {
+            origin_e,
+            curve: Spline::not_a_knot(t_s, values),
+        })
     }
 
     /// Time of the first sample (s).
@@ -177,7 +180,10 @@ impl Trajectory {
     /// The same motion as far as its first sample at or after `t_s`.
     #[must_use]
     pub fn until(&self, t_s: f64) -> Self {
-        Self { origin_e: self.origin_e, curve: self.curve.until(t_s) }
+        Self {
+            origin_e: self.origin_e,
+            curve: self.curve.until(t_s),
+        }
     }
 
     /// The motion with respect to the Earth. Outside start and end the first and last pieces continue.
@@ -205,13 +211,21 @@ impl Trajectory {
         let k = self.kinematics(t_s);
         let (lat, lon, h) = ecef_to_geodetic(k.r_e);
         let q_b_n = q_e_n(lat, lon) * k.q_b_e;
-        NavState { lat, lon, h, v_n: e_to_n(lat, lon, k.v_e), q_b_n: q_b_n.normalize() }
+        NavState {
+            lat,
+            lon,
+            h,
+            v_n: e_to_n(lat, lon, k.v_e),
+            q_b_n: q_b_n.normalize(),
+        }
     }
 }
 
 fn check(samples: &[TrajectorySample]) -> Result<(), Error> {
     if samples.len() < 4 {
-        return Err(Error::TooFew { found: samples.len() });
+        return Err(Error::TooFew {
+            found: samples.len(),
+        });
     }
     let mut previous_s = f64::NEG_INFINITY;
     for (index, s) in samples.iter().enumerate() {
@@ -222,26 +236,48 @@ fn check(samples: &[TrajectorySample]) -> Result<(), Error> {
         let norm = s.q_b_n.length();
         // Zero, NaN and infinity alike: none can be made a unit quaternion.
         if !norm.is_normal() {
-            return Err(Error::NotFinite { index, what: "attitude", value: norm });
+            return Err(Error::NotFinite {
+                index,
+                what: "attitude",
+                value: norm,
+            });
         }
         if s.t_s <= previous_s {
-            return Err(Error::Time { index, t_s: s.t_s, previous_s });
+            return Err(Error::Time {
+                index,
+                t_s: s.t_s,
+                previous_s,
+            });
         }
         if s.lat.abs() > MAX_LATITUDE {
-            return Err(Error::Latitude { index, t_s: s.t_s, lat_deg: s.lat / DEG });
+            return Err(Error::Latitude {
+                index,
+                t_s: s.t_s,
+                lat_deg: s.lat / DEG,
+            });
         }
         previous_s = s.t_s;
     }
     Ok(())
 }
 
-fn check_rotation(samples: &[TrajectorySample], index: usize, from: DQuat, to: DQuat) -> Result<(), Error> {
+fn check_rotation(
+    samples: &[TrajectorySample],
+    index: usize,
+    from: DQuat,
+    to: DQuat,
+) -> Result<(), Error> {
     let angle = (from.conjugate() * to).to_scaled_axis().length();
     if angle <= MAX_ROTATION {
         return Ok(());
     }
     let (t_s, previous_s) = (samples[index].t_s, samples[index - 1].t_s);
-    Err(Error::Rotation { index, t_s, previous_s, angle_deg: angle / DEG })
+    Err(Error::Rotation {
+        index,
+        t_s,
+        previous_s,
+        angle_deg: angle / DEG,
+    })
 }
 
 #[cfg(test)]

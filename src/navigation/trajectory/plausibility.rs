@@ -29,7 +29,12 @@ impl Default for Limits {
     /// A land vehicle or an aircraft that is not aerobatic: 350 m/s, 30 m/s², 35 m/s³, 200 deg/s. Recorded
     /// drives stay below 25 m/s³ but for glitches of the recording.
     fn default() -> Self {
-        Self { speed: 350.0, acceleration: 30.0, jerk: 35.0, rate: 200.0 * DEG }
+        Self {
+            speed: 350.0,
+            acceleration: 30.0,
+            jerk: 35.0,
+            rate: 200.0 * DEG,
+        }
     }
 }
 
@@ -93,9 +98,17 @@ impl fmt::Display for Excess {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (name, unit, factor) = self.quantity.display();
         let (worst, limit) = (self.worst * factor, self.limit * factor);
-        write!(f, "{name} {worst:.1} {unit} at {:.2} s, beyond {limit:.1} {unit}", self.worst_s)?;
+        write!(
+            f,
+            "{name} {worst:.1} {unit} at {:.2} s, beyond {limit:.1} {unit}",
+            self.worst_s
+        )?;
         if self.end_s > self.start_s {
-            write!(f, " (between {:.2} s and {:.2} s)", self.start_s, self.end_s)?;
+            write!(
+                f,
+                " (between {:.2} s and {:.2} s)",
+                self.start_s, self.end_s
+            )?;
         }
         Ok(())
     }
@@ -147,11 +160,18 @@ fn magnitudes(trajectory: &Trajectory, t_s: f64) -> [f64; 4] {
     let clamped = |t: f64| t.clamp(trajectory.start_s(), trajectory.end_s());
     // A window rather than the third derivative: that of a cubic spline is a constant between samples, and
     // mostly the noise of them. At the ends the window is cut, and a steady jerk counts half there.
-    let (before, after) =
-        (trajectory.kinematics(clamped(t_s - half)), trajectory.kinematics(clamped(t_s + half)));
+    let (before, after) = (
+        trajectory.kinematics(clamped(t_s - half)),
+        trajectory.kinematics(clamped(t_s + half)),
+    );
     let now = trajectory.kinematics(t_s);
     let jerk = (after.a_e - before.a_e).length() / JERK_WINDOW_S;
-    [now.v_e.length(), now.a_e.length(), jerk, now.omega_eb_b.length()]
+    [
+        now.v_e.length(),
+        now.a_e.length(),
+        jerk,
+        now.omega_eb_b.length(),
+    ]
 }
 
 /// Difference of given velocities from those of the positions.
@@ -172,13 +192,23 @@ impl VelocityMisfit {
     #[must_use]
     pub fn new(trajectory: &Trajectory, velocities: &[(f64, DVec3)]) -> Option<Self> {
         let found = |t_s: f64| trajectory.state(t_s).v_n;
-        let off: Vec<(f64, f64)> =
-            velocities.iter().map(|(t_s, v)| (*t_s, (*v - found(*t_s)).length())).collect();
+        let off: Vec<(f64, f64)> = velocities
+            .iter()
+            .map(|(t_s, v)| (*t_s, (*v - found(*t_s)).length()))
+            .collect();
         let (worst_s, worst) = off.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1))?;
         let rms = |squares: f64| (squares / off.len() as f64).sqrt();
-        let speed = velocities.iter().map(|(t_s, _)| found(*t_s).length_squared()).sum();
+        let speed = velocities
+            .iter()
+            .map(|(t_s, _)| found(*t_s).length_squared())
+            .sum();
         let square = off.iter().map(|(_, metres)| metres * metres).sum();
-        Some(Self { rms: rms(square), worst, worst_s, rms_speed: rms(speed) })
+        Some(Self {
+            rms: rms(square),
+            worst,
+            worst_s,
+            rms_speed: rms(speed),
+        })
     }
 
     /// Whether they contradict the positions: 0.1 m/s + 2 % of the speed in the mean, or 1 m/s + 10 % once.
@@ -213,7 +243,8 @@ mod tests {
 
     #[test]
     fn a_smooth_motion_is_plausible() {
-        let ([speed, acceleration, jerk, rate], found) = examine(&north(|_| 0.0), &Limits::default());
+        let ([speed, acceleration, jerk, rate], found) =
+            examine(&north(|_| 0.0), &Limits::default());
         assert!(found.is_empty(), "{found:?}");
         assert!((speed - 10.0).abs() < 0.1 && acceleration < 1e-3 && jerk < 1e-3 && rate < 1e-4);
     }
@@ -222,13 +253,29 @@ mod tests {
     #[test]
     fn a_jump_is_found_where_it_is() {
         let t = north(|t| if t > 4.02 { 0.5 } else { 0.0 });
-        let (_, found) = examine(&t, &Limits { speed: 15.0, ..Limits::default() });
+        let (_, found) = examine(
+            &t,
+            &Limits {
+                speed: 15.0,
+                ..Limits::default()
+            },
+        );
         let kinds: Vec<_> = found.iter().map(|e| e.quantity).collect();
         assert_eq!(kinds.len(), 2, "{found:?}");
-        assert!(kinds.contains(&Quantity::Acceleration) && kinds.contains(&Quantity::Jerk), "{found:?}");
-        assert!(found.iter().all(|e| (e.worst_s - 4.02).abs() < 0.1 && e.end_s - e.start_s < 1.0));
+        assert!(
+            kinds.contains(&Quantity::Acceleration) && kinds.contains(&Quantity::Jerk),
+            "{found:?}"
+        );
+        assert!(
+            found
+                .iter()
+                .all(|e| (e.worst_s - 4.02).abs() < 0.1 && e.end_s - e.start_s < 1.0)
+        );
         let text = found[0].to_string();
-        assert!(text.contains("beyond") && text.contains("(between 3."), "{text}");
+        assert!(
+            text.contains("beyond") && text.contains("(between 3."),
+            "{text}"
+        );
     }
 
     #[test]
@@ -236,9 +283,16 @@ mod tests {
         let t = north(|_| 0.0);
         let given = |v: DVec3| (0..=10).map(|k| (f64::from(k), v)).collect::<Vec<_>>();
         let right = t.state(5.0).v_n;
-        assert!(!VelocityMisfit::new(&t, &given(right)).unwrap().contradicts());
+        assert!(
+            !VelocityMisfit::new(&t, &given(right))
+                .unwrap()
+                .contradicts()
+        );
         let wrong = VelocityMisfit::new(&t, &given(-right)).unwrap();
-        assert!(wrong.contradicts() && (wrong.rms - 19.9).abs() < 0.1, "{wrong:?}");
+        assert!(
+            wrong.contradicts() && (wrong.rms - 19.9).abs() < 0.1,
+            "{wrong:?}"
+        );
         assert!(VelocityMisfit::new(&t, &[]).is_none());
     }
 }

@@ -45,14 +45,19 @@ struct Stretch {
 
 impl From<Trajectory> for Reference {
     fn from(whole: Trajectory) -> Self {
-        Self { stretches: vec![whole.into()] }
+        Self {
+            stretches: vec![whole.into()],
+        }
     }
 }
 
 impl From<Trajectory> for Stretch {
     fn from(curve: Trajectory) -> Self {
         let velocity_sigma = velocity_sigma(&curve);
-        Self { curve, velocity_sigma }
+        Self {
+            curve,
+            velocity_sigma,
+        }
     }
 }
 
@@ -117,7 +122,9 @@ impl Reference {
 
     fn stretch(&self, t_s: f64) -> Option<&Stretch> {
         let next = self.stretches.partition_point(|s| s.curve.end_s() < t_s);
-        self.stretches.get(next).filter(|s| s.curve.start_s() <= t_s)
+        self.stretches
+            .get(next)
+            .filter(|s| s.curve.start_s() <= t_s)
     }
 }
 
@@ -127,12 +134,22 @@ fn velocity_sigma(curve: &Trajectory) -> Vec<f64> {
     let knots = curve.knots();
     let places: Vec<DVec3> = knots.iter().map(|t_s| curve.kinematics(*t_s).r_e).collect();
     let seconds: Vec<f64> = knots.windows(2).map(|w| w[1] - w[0]).collect();
-    let v: Vec<DVec3> = places.windows(2).zip(&seconds).map(|(w, s)| (w[1] - w[0]) / *s).collect();
+    let v: Vec<DVec3> = places
+        .windows(2)
+        .zip(&seconds)
+        .map(|(w, s)| (w[1] - w[0]) / *s)
+        .collect();
     // the second difference of the velocities of steps: of a smooth motion the jerk times a step squared
     let uneven: Vec<f64> = v
         .windows(3)
         .zip(seconds.windows(3))
-        .map(|(v, s)| if s.iter().all(|s| *s <= FINE_S) { (v[2] - 2.0 * v[1] + v[0]).length() } else { 0.0 })
+        .map(|(v, s)| {
+            if s.iter().all(|s| *s <= FINE_S) {
+                (v[2] - 2.0 * v[1] + v[0]).length()
+            } else {
+                0.0
+            }
+        })
         .collect();
     let mut sorted = uneven.clone();
     sorted.sort_by(f64::total_cmp);
@@ -152,7 +169,9 @@ fn velocity_sigma(curve: &Trajectory) -> Vec<f64> {
         });
         faded.fold(0.0, f64::max)
     };
-    (0..knots.len()).map(|knot| white.hypot(near(knot))).collect()
+    (0..knots.len())
+        .map(|knot| white.hypot(near(knot)))
+        .collect()
 }
 
 /// Where samples do not follow one another as a vehicle moves.
@@ -166,25 +185,34 @@ pub fn breaks(samples: &[TrajectorySample]) -> Vec<Break> {
 /// Samples that can be compared with: those between breaks, without what is near a jump.
 #[must_use]
 pub fn usable(samples: &[TrajectorySample], breaks: &[Break]) -> Vec<Range<usize>> {
-    let jump =
-        |b: Option<&Break>| b.is_some_and(|b| matches!(b.fault, Fault::Position(_) | Fault::Attitude(_)));
-    let edges: Vec<usize> =
-        std::iter::once(0).chain(breaks.iter().map(|b| b.index)).chain([samples.len()]).collect();
+    let jump = |b: Option<&Break>| {
+        b.is_some_and(|b| matches!(b.fault, Fault::Position(_) | Fault::Attitude(_)))
+    };
+    let edges: Vec<usize> = std::iter::once(0)
+        .chain(breaks.iter().map(|b| b.index))
+        .chain([samples.len()])
+        .collect();
     let mut found: Vec<Range<usize>> = Vec::new();
     for (k, edge) in edges.windows(2).enumerate() {
         let (before, after) = (k.checked_sub(1).and_then(|k| breaks.get(k)), breaks.get(k));
         let part = &samples[edge[0]..edge[1]];
-        let Some((first, last)) = part.first().zip(part.last()) else { continue };
+        let Some((first, last)) = part.first().zip(part.last()) else {
+            continue;
+        };
         let trimmed = |is: bool| if is { AROUND_JUMP_S } else { 0.0 };
-        let (from, to) = (first.t_s + trimmed(jump(before)), last.t_s - trimmed(jump(after)));
+        let (from, to) = (
+            first.t_s + trimmed(jump(before)),
+            last.t_s - trimmed(jump(after)),
+        );
         if (jump(before) || jump(after)) && last.t_s - first.t_s < SHORTEST_S {
             continue;
         }
         let range = edge[0] + part.partition_point(|s| s.t_s < from - 1e-6)
             ..edge[0] + part.partition_point(|s| s.t_s <= to + 1e-6);
         // a clock that was set back: what is behind is not gone through twice
-        let later =
-            found.last().is_none_or(|r| samples[r.end - 1].t_s < samples[range.start.min(edge[1] - 1)].t_s);
+        let later = found
+            .last()
+            .is_none_or(|r| samples[r.end - 1].t_s < samples[range.start.min(edge[1] - 1)].t_s);
         // Four samples are what a spline needs.
         if range.len() >= 4 && later {
             found.push(range);
@@ -208,7 +236,10 @@ impl<'a> Steps<'a> {
         seconds.sort_by(f64::total_cmp);
         Self {
             samples,
-            moved_e: samples.windows(2).map(|w| place(&w[1]) - place(&w[0])).collect(),
+            moved_e: samples
+                .windows(2)
+                .map(|w| place(&w[1]) - place(&w[0]))
+                .collect(),
             // The median is not moved by gaps, however long.
             median_s: seconds.get(seconds.len() / 2).copied().unwrap_or(0.0),
         }
@@ -238,7 +269,8 @@ impl<'a> Steps<'a> {
         // The velocity of the neighbours may differ by acceleration × their distance in time, and so the step
         // by that times its own length.
         let metres = (self.moved_e[index - 1] - expected * seconds).length();
-        (metres > POSITION_JUMP.0 + POSITION_JUMP.1 * seconds * reach_s).then_some(Fault::Position(metres))
+        (metres > POSITION_JUMP.0 + POSITION_JUMP.1 * seconds * reach_s)
+            .then_some(Fault::Position(metres))
     }
 
     /// The median velocity of the steps about one (m/s, in e), each axis by itself, and how far in time they
@@ -249,7 +281,9 @@ impl<'a> Steps<'a> {
         let last = (index + NEIGHBOURS).min(self.samples.len() - 1);
         let near = || (first..=last).filter(|i| self.seconds(*i) > 0.0);
         let axis = |a: usize| {
-            let mut velocities: Vec<f64> = near().map(|i| self.moved_e[i - 1][a] / self.seconds(i)).collect();
+            let mut velocities: Vec<f64> = near()
+                .map(|i| self.moved_e[i - 1][a] / self.seconds(i))
+                .collect();
             velocities.sort_by(f64::total_cmp);
             velocities[velocities.len() / 2]
         };
@@ -268,8 +302,19 @@ mod tests {
     fn drive(fault: impl Fn(f64, &mut TrajectorySample)) -> Vec<TrajectorySample> {
         let sample = |k: u32| {
             let t_s = 0.05 * f64::from(k);
-            let q_b_n = RollPitchYaw { roll: 0.0, pitch: 0.0, yaw: 0.3 }.to_quat();
-            let mut s = TrajectorySample { t_s, lat: 0.8 + 15.0 * t_s / 6.38e6, lon: 0.1, h: 400.0, q_b_n };
+            let q_b_n = RollPitchYaw {
+                roll: 0.0,
+                pitch: 0.0,
+                yaw: 0.3,
+            }
+            .to_quat();
+            let mut s = TrajectorySample {
+                t_s,
+                lat: 0.8 + 15.0 * t_s / 6.38e6,
+                lon: 0.1,
+                h: 400.0,
+                q_b_n,
+            };
             fault(t_s, &mut s);
             s
         };
@@ -278,14 +323,28 @@ mod tests {
 
     fn spans(samples: &[TrajectorySample]) -> Vec<(f64, f64)> {
         let rounded = |t: f64| (t * 1e3).round() / 1e3;
-        let span = |r: Range<usize>| (rounded(samples[r.start].t_s), rounded(samples[r.end - 1].t_s));
-        usable(samples, &breaks(samples)).into_iter().map(span).collect()
+        let span = |r: Range<usize>| {
+            (
+                rounded(samples[r.start].t_s),
+                rounded(samples[r.end - 1].t_s),
+            )
+        };
+        usable(samples, &breaks(samples))
+            .into_iter()
+            .map(span)
+            .collect()
     }
 
     #[test]
     fn a_sound_recording_is_one_stretch() {
         // corrections of 1 m twice a second, as references with GNSS updates have them
-        let corrected = drive(|t, s| s.h += if (2.0 * t).floor() % 2.0 == 0.0 { 1.0 } else { 0.0 });
+        let corrected = drive(|t, s| {
+            s.h += if (2.0 * t).floor() % 2.0 == 0.0 {
+                1.0
+            } else {
+                0.0
+            }
+        });
         assert_eq!(spans(&drive(|_, _| {})), [(0.0, 60.0)]);
         assert_eq!(spans(&corrected), [(0.0, 60.0)]);
     }
@@ -293,13 +352,27 @@ mod tests {
     /// 2.4 km away for a third of a second; an attitude that starts with another heading; 20 m for good.
     #[test]
     fn what_is_near_a_jump_is_left_out_and_nothing_else() {
-        let away = drive(|t, s| s.lon += if (30.02..30.33).contains(&t) { 5.5e-4 } else { 0.0 });
+        let away = drive(|t, s| {
+            s.lon += if (30.02..30.33).contains(&t) {
+                5.5e-4
+            } else {
+                0.0
+            }
+        });
         assert_eq!(spans(&away), [(0.0, 29.0), (31.35, 60.0)]);
         let found = breaks(&away);
-        assert!(matches!(found[0].fault, Fault::Position(m) if (2300.0..2600.0).contains(&m)), "{found:?}");
+        assert!(
+            matches!(found[0].fault, Fault::Position(m) if (2300.0..2600.0).contains(&m)),
+            "{found:?}"
+        );
         let started = drive(|t, s| {
             if t < 3.02 {
-                s.q_b_n = RollPitchYaw { roll: 0.0, pitch: 0.0, yaw: 2.9 }.to_quat();
+                s.q_b_n = RollPitchYaw {
+                    roll: 0.0,
+                    pitch: 0.0,
+                    yaw: 2.9,
+                }
+                .to_quat();
             }
         });
         assert_eq!(spans(&started), [(4.05, 60.0)]);
@@ -324,11 +397,28 @@ mod tests {
         let rms = |of: &dyn Fn(&(f64, f64)) -> f64, all: &[(f64, f64)]| {
             (all.iter().map(|x| of(x).powi(2)).sum::<f64>() / all.len() as f64).sqrt()
         };
-        assert!(known(&drive(|_, _| {})).iter().all(|(_, sigma)| *sigma < 1e-3));
-        let corrected = known(&drive(|t, s| s.h += if (t + 0.02).rem_euclid(2.0) < 1.0 { 1.0 } else { 0.0 }));
-        assert!(corrected.iter().all(|(off, sigma)| *off < 2.0 * sigma + 0.01), "{corrected:?}");
+        assert!(
+            known(&drive(|_, _| {}))
+                .iter()
+                .all(|(_, sigma)| *sigma < 1e-3)
+        );
+        let corrected = known(&drive(|t, s| {
+            s.h += if (t + 0.02).rem_euclid(2.0) < 1.0 {
+                1.0
+            } else {
+                0.0
+            }
+        }));
+        assert!(
+            corrected
+                .iter()
+                .all(|(off, sigma)| *off < 2.0 * sigma + 0.01),
+            "{corrected:?}"
+        );
         assert!(corrected.iter().filter(|(_, sigma)| *sigma < 0.01).count() > corrected.len() / 8);
-        let rounded = known(&drive(|_, s| s.h = ((s.h + 1e3 * s.lat) * 1e3).round() / 1e3));
+        let rounded = known(&drive(|_, s| {
+            s.h = ((s.h + 1e3 * s.lat) * 1e3).round() / 1e3
+        }));
         // the rounding is white where the slope is that of 1e3 rad⁻¹: 0.29 mm each
         let (off, sigma) = (rms(&|x| x.0, &rounded), rms(&|x| x.1, &rounded));
         assert!(off < 2.0 * sigma && sigma < 0.1, "{off} {sigma}");
@@ -339,7 +429,13 @@ mod tests {
         let mut gap = drive(|_, _| {});
         gap.retain(|s| !(20.02..25.02).contains(&s.t_s));
         assert_eq!(spans(&gap), [(0.0, 20.0), (25.05, 60.0)]);
-        let far = drive(|t, s| s.t_s += if (30.02..30.06).contains(&t) { 1.7e9 } else { 0.0 });
+        let far = drive(|t, s| {
+            s.t_s += if (30.02..30.06).contains(&t) {
+                1.7e9
+            } else {
+                0.0
+            }
+        });
         assert_eq!(spans(&far), [(0.0, 30.0), (30.1, 60.0)]);
         let back = drive(|t, s| s.t_s -= if t > 40.02 { 10.0 } else { 0.0 });
         assert_eq!(spans(&back), [(0.0, 40.0)]);

@@ -49,7 +49,8 @@ impl<const N: usize> Spline<N> {
         }
         for k in 0..N {
             m[0][k] = m[1][k] + (m[1][k] - m[2][k]) * h[0] / h[1];
-            m[last][k] = m[last - 1][k] + (m[last - 1][k] - m[last - 2][k]) * h[last - 1] / h[last - 2];
+            m[last][k] =
+                m[last - 1][k] + (m[last - 1][k] - m[last - 2][k]) * h[last - 1] / h[last - 2];
         }
         Self { t, y, m }
     }
@@ -63,12 +64,20 @@ impl<const N: usize> Spline<N> {
         // The second derivatives are kept, not solved for anew: the curve before the cut is the same to the
         // last bit.
         let kept = (self.t.partition_point(|&knot| knot < t) + 1).clamp(2, self.t.len());
-        Self { t: self.t[..kept].to_vec(), y: self.y[..kept].to_vec(), m: self.m[..kept].to_vec() }
+        Self {
+            t: self.t[..kept].to_vec(),
+            y: self.y[..kept].to_vec(),
+            m: self.m[..kept].to_vec(),
+        }
     }
 
     /// Value, first and second derivative. Outside the knots the first and last pieces continue.
     pub(super) fn at(&self, t: f64) -> ([f64; N], [f64; N], [f64; N]) {
-        let i = self.t.partition_point(|&knot| knot <= t).clamp(1, self.t.len() - 1) - 1;
+        let i = self
+            .t
+            .partition_point(|&knot| knot <= t)
+            .clamp(1, self.t.len() - 1)
+            - 1;
         let h = self.t[i + 1] - self.t[i];
         let dt = t - self.t[i];
         let (mut value, mut first, mut second) = ([0.0; N], [0.0; N], [0.0; N]);
@@ -134,6 +143,9 @@ mod tests {
                 .fold(0.0, f64::max)
         };
         let (coarse, fine) = (worst(20), worst(40));
-        assert!(fine < 5.0 / 384.0 * 0.05_f64.powi(4) * 20.0 && coarse / fine > 12.0, "{coarse} {fine}");
+        assert!(
+            fine < 5.0 / 384.0 * 0.05_f64.powi(4) * 20.0 && coarse / fine > 12.0,
+            "{coarse} {fine}"
+        );
     }
 }

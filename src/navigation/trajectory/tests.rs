@@ -5,11 +5,19 @@ use crate::frames::RollPitchYaw;
 fn sample(t_s: f64, lat_deg: f64, lon_deg: f64, h: f64, rpy_deg: [f64; 3]) -> TrajectorySample {
     let [roll, pitch, yaw] = rpy_deg.map(|a| a * DEG);
     let q_b_n = RollPitchYaw { roll, pitch, yaw }.to_quat();
-    TrajectorySample { t_s, lat: lat_deg * DEG, lon: lon_deg * DEG, h, q_b_n }
+    TrajectorySample {
+        t_s,
+        lat: lat_deg * DEG,
+        lon: lon_deg * DEG,
+        h,
+        q_b_n,
+    }
 }
 
 fn resting(n: i32) -> Vec<TrajectorySample> {
-    (0..n).map(|k| sample(f64::from(k), 46.0, 7.0, 400.0, [1.0, -2.0, 200.0])).collect()
+    (0..n)
+        .map(|k| sample(f64::from(k), 46.0, 7.0, 400.0, [1.0, -2.0, 200.0]))
+        .collect()
 }
 
 #[test]
@@ -30,7 +38,13 @@ fn east_along_a_parallel_across_the_antimeridian() {
         let rate_deg_s = 1e-3;
         let samples: Vec<_> = (0..=60)
             .map(|k| {
-                sample(f64::from(k), lat_deg, 179.97 + rate_deg_s * f64::from(k), 1000.0, [0.0, 0.0, 90.0])
+                sample(
+                    f64::from(k),
+                    lat_deg,
+                    179.97 + rate_deg_s * f64::from(k),
+                    1000.0,
+                    [0.0, 0.0, 90.0],
+                )
             })
             .collect();
         let trajectory = Trajectory::from_samples(&samples).unwrap();
@@ -39,7 +53,11 @@ fn east_along_a_parallel_across_the_antimeridian() {
         for t_s in [0.0, 10.3, 29.95, 30.0, 44.4, 60.0] {
             let state = trajectory.state(t_s);
             let lon_deg = 179.97 + rate_deg_s * t_s;
-            let wrapped = if lon_deg > 180.0 { lon_deg - 360.0 } else { lon_deg };
+            let wrapped = if lon_deg > 180.0 {
+                lon_deg - 360.0
+            } else {
+                lon_deg
+            };
             assert!((state.lon / DEG - wrapped).abs() < 1e-11 || (lon_deg - 180.0).abs() < 1e-12);
             assert!((state.v_n - DVec3::Y * rho * rate_deg_s * DEG).length() < 1e-8);
             assert!((state.lat / DEG - lat_deg).abs() < 1e-13 && (state.h - 1000.0).abs() < 1e-8);
@@ -56,15 +74,25 @@ fn east_along_a_parallel_across_the_antimeridian() {
 #[test]
 fn north_along_a_meridian() {
     let rate = 2e-3 * DEG;
-    let samples: Vec<_> =
-        (0..=60).map(|k| sample(f64::from(k), 45.0 + 2e-3 * f64::from(k), -120.0, 0.0, [0.0; 3])).collect();
+    let samples: Vec<_> = (0..=60)
+        .map(|k| {
+            sample(
+                f64::from(k),
+                45.0 + 2e-3 * f64::from(k),
+                -120.0,
+                0.0,
+                [0.0; 3],
+            )
+        })
+        .collect();
     let trajectory = Trajectory::from_samples(&samples).unwrap();
     let (t_s, lat) = (31.7, (45.0 + 2e-3 * 31.7) * DEG);
     let meridian = radii(lat.sin()).meridian;
     let state = trajectory.state(t_s);
     assert!((state.v_n - DVec3::X * meridian * rate).length() < 1e-7);
     let a_n = e_to_n(state.lat, state.lon, trajectory.kinematics(t_s).a_e);
-    let along = 3.0 * E2 * lat.sin() * lat.cos() * meridian / (1.0 - E2 * lat.sin().powi(2)) * rate * rate;
+    let along =
+        3.0 * E2 * lat.sin() * lat.cos() * meridian / (1.0 - E2 * lat.sin().powi(2)) * rate * rate;
     let expected = DVec3::new(along, 0.0, meridian * rate * rate);
     assert!((a_n - expected).length() < 1e-8, "{a_n} {expected}");
 }
@@ -117,37 +145,73 @@ fn kinematics_agree_with_central_differences() {
         assert!((now.v_e - (after.r_e - before.r_e) / (2.0 * step)).length() < 2e-6);
         assert!((now.a_e - (after.v_e - before.v_e) / (2.0 * step)).length() < 1e-9);
         let turn = (before.q_b_e.conjugate() * after.q_b_e).to_scaled_axis() / (2.0 * step);
-        assert!((now.omega_eb_b - turn).length() < 1e-6, "{} {turn}", now.omega_eb_b);
+        assert!(
+            (now.omega_eb_b - turn).length() < 1e-6,
+            "{} {turn}",
+            now.omega_eb_b
+        );
     }
 }
 
 #[test]
 fn unusable_samples_are_refused_by_name() {
     let refused = |samples: &[TrajectorySample]| Trajectory::from_samples(samples).unwrap_err();
-    assert_eq!(refused(&resting(3)).to_string(), "3 samples: a trajectory needs at least 4");
+    assert_eq!(
+        refused(&resting(3)).to_string(),
+        "3 samples: a trajectory needs at least 4"
+    );
     let mut s = resting(6);
     s[4].t_s = 2.5;
-    assert_eq!(refused(&s).to_string(), "time goes from 3 s to 2.5 s: it must increase");
+    assert_eq!(
+        refused(&s).to_string(),
+        "time goes from 3 s to 2.5 s: it must increase"
+    );
     s[4].t_s = 3.0;
-    assert_eq!(refused(&s), Error::Time { index: 4, t_s: 3.0, previous_s: 3.0 });
+    assert_eq!(
+        refused(&s),
+        Error::Time {
+            index: 4,
+            t_s: 3.0,
+            previous_s: 3.0
+        }
+    );
     let mut s = resting(6);
     s[2].h = f64::NAN;
     assert_eq!(refused(&s).to_string(), "h = NaN is not a finite number");
     let mut s = resting(6);
     s[5].lat = 89.95 * DEG;
-    assert_eq!(refused(&s).to_string(), "latitude 89.95° at 5 s is beyond ±89.9°");
+    assert_eq!(
+        refused(&s).to_string(),
+        "latitude 89.95° at 5 s is beyond ±89.9°"
+    );
     let mut s = resting(6);
     s[3].q_b_n = DQuat::from_rotation_z(61.0 * DEG) * s[3].q_b_n;
-    assert_eq!(refused(&s).to_string(), "attitude turns 61.0° between 2 s and 3 s: more than 60°");
+    assert_eq!(
+        refused(&s).to_string(),
+        "attitude turns 61.0° between 2 s and 3 s: more than 60°"
+    );
     s[3].q_b_n = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
-    assert!(matches!(refused(&s), Error::NotFinite { index: 3, what: "attitude", .. }));
+    assert!(matches!(
+        refused(&s),
+        Error::NotFinite {
+            index: 3,
+            what: "attitude",
+            ..
+        }
+    ));
 }
 
 #[test]
 fn what_is_left_of_a_trajectory_is_the_same_motion() {
     let turning = |i: i32| {
         let t_s = f64::from(i);
-        sample(t_s, 45.0 + 1e-4 * t_s, 7.0 + 1e-6 * t_s * t_s, 100.0, [0.0, 1.0, 3.0 * t_s])
+        sample(
+            t_s,
+            45.0 + 1e-4 * t_s,
+            7.0 + 1e-6 * t_s * t_s,
+            100.0,
+            [0.0, 1.0, 3.0 * t_s],
+        )
     };
     let whole = Trajectory::from_samples(&(0..40).map(turning).collect::<Vec<_>>()).unwrap();
     let part = whole.until(20.5);

@@ -5,7 +5,13 @@ use super::*;
 
 fn column_result(measured: &Measured) -> ColumnResult<'_> {
     let cell = ["land", "m", "s", "g", "o"];
-    ColumnResult { cell, candidate: "I/awv", filter: "15", reference: "I/awv", measured }
+    ColumnResult {
+        cell,
+        candidate: "I/awv",
+        filter: "15",
+        reference: "I/awv",
+        measured,
+    }
 }
 
 #[test]
@@ -15,14 +21,24 @@ fn rows_fit_their_columns_and_names_carry_units() {
     let experiment = Measured::from(&result);
     let comparison = metrics::compare(&experiment, &experiment, true).unwrap();
     let tables = [
-        (outage_columns(), outage_rows(&column_result(&experiment), &outages, Some(&comparison))),
-        (outage_columns(), outage_rows(&column_result(&experiment), &outages, None)),
-        (epoch_columns(), epoch_rows(&column_result(&experiment), &epochs)),
+        (
+            outage_columns(),
+            outage_rows(&column_result(&experiment), &outages, Some(&comparison)),
+        ),
+        (
+            outage_columns(),
+            outage_rows(&column_result(&experiment), &outages, None),
+        ),
+        (
+            epoch_columns(),
+            epoch_rows(&column_result(&experiment), &epochs),
+        ),
         (run_columns(), run_rows(&column_result(&experiment))),
     ];
     for (columns, rows) in tables {
         assert!(!rows.is_empty());
-        let names: std::collections::HashSet<&str> = columns.iter().map(|(n, _)| n.as_str()).collect();
+        let names: std::collections::HashSet<&str> =
+            columns.iter().map(|(n, _)| n.as_str()).collect();
         assert_eq!(names.len(), columns.len());
         for row in &rows {
             assert_eq!(row.len(), columns.len());
@@ -53,8 +69,15 @@ fn rows_fit_their_columns_and_names_carry_units() {
         "log_density_end_std_error",
         "_ratio",
     ];
-    for (name, kind) in outage_columns().iter().chain(&epoch_columns()).chain(&run_columns()) {
-        assert!(*kind != ValueKind::Float || units.iter().any(|u| name.ends_with(u)), "{name}");
+    for (name, kind) in outage_columns()
+        .iter()
+        .chain(&epoch_columns())
+        .chain(&run_columns())
+    {
+        assert!(
+            *kind != ValueKind::Float || units.iter().any(|u| name.ends_with(u)),
+            "{name}"
+        );
     }
 }
 
@@ -64,14 +87,26 @@ fn values_stand_under_their_names() {
     let (outages, experiment) = (metrics::outages(&result), Measured::from(&result));
     let rows = outage_rows(&column_result(&experiment), &outages, None);
     let value_of = |name: &str| {
-        let i = outage_columns().iter().position(|(n, _)| n == name).unwrap();
+        let i = outage_columns()
+            .iter()
+            .position(|(n, _)| n == name)
+            .unwrap();
         rows[0][i].clone()
     };
     let o = &outages[0];
     assert_eq!(value_of("candidate"), Value::Text("I/awv".into()));
     assert_eq!(value_of("duration_s"), Value::Float(o.end_s - o.start_s));
-    assert_eq!(value_of("asee_mean_std_error_pos_n_m"), Value::Float(o.asee_mean.0[0].std_error));
-    assert_eq!(value_of("rmse_end_yaw_deg"), Value::Float(o.rmse_end.0[8].value));
-    assert_eq!(value_of("horizontal_error_end_max_m"), Value::Float(o.horizontal_max_m));
+    assert_eq!(
+        value_of("asee_mean_std_error_pos_n_m"),
+        Value::Float(o.asee_mean.0[0].std_error)
+    );
+    assert_eq!(
+        value_of("rmse_end_yaw_deg"),
+        Value::Float(o.rmse_end.0[8].value)
+    );
+    assert_eq!(
+        value_of("horizontal_error_end_max_m"),
+        Value::Float(o.horizontal_max_m)
+    );
     assert!(matches!(value_of("coverage_mean"), Value::Float(x) if x.is_nan()));
 }

@@ -14,20 +14,34 @@ fn at_rest(lasts_s: f64, ask: Ask, first_s: Option<f64>) -> Result<Requirements,
         q_b_n: glam::DQuat::IDENTITY,
     };
     let trajectory = Trajectory::from_samples(&(0..=8).map(sample).collect::<Vec<_>>()).unwrap();
-    let limits = vec![Limit { quantity: Quantity::P95, most: 5.0 }];
+    let limits = vec![Limit {
+        quantity: Quantity::P95,
+        most: 5.0,
+    }];
     Requirements::new(Scenario::default(), trajectory, limits, ask, first_s)
 }
 
 /// After five minutes, or in the middle of what is left of a short drive; every second from there on that the outage fits in.
 #[test]
 fn outages_of_a_length_begin_where_the_filter_has_settled() {
-    for (lasts_s, first_s, count) in [(900.0, 1300.0, 541), (180.0, 1060.0, 61), (60.0, 1000.0, 1)] {
+    for (lasts_s, first_s, count) in [(900.0, 1300.0, 541), (180.0, 1060.0, 61), (60.0, 1000.0, 1)]
+    {
         let asked = at_rest(lasts_s, Ask::Length(60.0), None).unwrap();
         let outages = asked.outages();
-        assert_eq!((outages[0].start_s, outages.len()), (first_s, count), "{lasts_s}");
-        assert!(outages.iter().all(|o| o.end_s - o.start_s == 60.0 && o.end_s <= 1000.0 + lasts_s));
+        assert_eq!(
+            (outages[0].start_s, outages.len()),
+            (first_s, count),
+            "{lasts_s}"
+        );
+        assert!(
+            outages
+                .iter()
+                .all(|o| o.end_s - o.start_s == 60.0 && o.end_s <= 1000.0 + lasts_s)
+        );
     }
-    let said = at_rest(59.0, Ask::Length(60.0), None).unwrap_err().to_string();
+    let said = at_rest(59.0, Ask::Length(60.0), None)
+        .unwrap_err()
+        .to_string();
     assert!(said.contains("which lasts from 1000 to 1059 s"), "{said}");
     assert!(at_rest(180.0, Ask::Length(60.0), Some(999.0)).is_err());
     assert!(at_rest(180.0, Ask::Length(60.0), Some(1121.0)).is_err());
@@ -42,7 +56,10 @@ fn outages_last_in_the_mean_as_long_as_the_drive_lets_them() {
         let steps = (10.0 * left_s) as u32;
         let length_s = |k: u32| LONGEST_S.min(left_s - (f64::from(k) + 0.5) / 10.0);
         let mean_s = (0..steps).map(length_s).sum::<f64>() / f64::from(steps);
-        assert!((asked.mean_length_s() / mean_s - 1.0).abs() < 1e-6, "{mean_s}");
+        assert!(
+            (asked.mean_length_s() / mean_s - 1.0).abs() < 1e-6,
+            "{mean_s}"
+        );
     }
 }
 
@@ -53,6 +70,9 @@ fn a_question_says_how_many_starts_were_tried() {
         asked.question(asked.outages()).in_words()
     };
     let words = "p95_m ≤ 5.00 after an outage of 60 s";
-    assert_eq!(question(180.0), format!("{words} (the worst of 61 starts tried, 1060 to 1120 s)"));
+    assert_eq!(
+        question(180.0),
+        format!("{words} (the worst of 61 starts tried, 1060 to 1120 s)")
+    );
     assert_eq!(question(60.0), format!("{words} (from 1000 s on)"));
 }

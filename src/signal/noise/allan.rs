@@ -33,7 +33,10 @@ impl Composite {
     /// Theoretical Allan variance (units²) of averages over m ≥ 1 samples: the sum over the processes.
     #[must_use]
     pub fn allan_variance(&self, samples: u32) -> f64 {
-        self.processes.iter().map(|p| p.allan_variance(samples)).sum()
+        self.processes
+            .iter()
+            .map(|p| p.allan_variance(samples))
+            .sum()
     }
 }
 
@@ -63,9 +66,14 @@ fn of_ar1(p: &Ar1, samples: u32) -> f64 {
     // does not apply.
     // 1 − u by the logarithm of −phi = 1 − (1 + phi): as phi → −1 it vanishes for an even m as m (1 + phi) does.
     let log_power = m * (-(1.0 + phi)).ln_1p();
-    let rest = if samples.is_multiple_of(2) { -log_power.exp_m1() } else { 1.0 + log_power.exp() };
+    let rest = if samples.is_multiple_of(2) {
+        -log_power.exp_m1()
+    } else {
+        1.0 + log_power.exp()
+    };
     let bump = rest * (2.0 + rest);
-    p.sigma2() * (m * (1.0 - phi) * (1.0 + phi) - phi * bump) / (m * m * (1.0 - phi).powi(3) * (1.0 + phi))
+    p.sigma2() * (m * (1.0 - phi) * (1.0 + phi) - phi * bump)
+        / (m * m * (1.0 - phi).powi(3) * (1.0 + phi))
 }
 
 #[cfg(test)]
@@ -96,8 +104,14 @@ mod tests {
     fn on_octaves_it_is_twice_the_wavelet_variance() {
         for process in processes() {
             for level in 1..20 {
-                let (a, b) = (process.allan_variance(1 << (level - 1)), 2.0 * process.haar_wv(level));
-                assert!((a / b - 1.0).abs() < 1e-12, "{process:?} level {level}: {a:e} {b:e}");
+                let (a, b) = (
+                    process.allan_variance(1 << (level - 1)),
+                    2.0 * process.haar_wv(level),
+                );
+                assert!(
+                    (a / b - 1.0).abs() < 1e-12,
+                    "{process:?} level {level}: {a:e} {b:e}"
+                );
             }
         }
     }
@@ -118,7 +132,10 @@ mod tests {
                 }
                 let definition = 0.5 * sum / f64::from(m * m);
                 let value = Process::Ar1(ar1).allan_variance(m as u32);
-                assert!((value / definition - 1.0).abs() < 1e-11, "{phi} {m}: {value:e} {definition:e}");
+                assert!(
+                    (value / definition - 1.0).abs() < 1e-11,
+                    "{phi} {m}: {value:e} {definition:e}"
+                );
             }
         }
     }

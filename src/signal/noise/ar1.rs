@@ -28,7 +28,10 @@ impl Ar1 {
                 domain: "between −1 and 1 (exclusive)",
             });
         }
-        Ok(Self { phi, sigma2: non_negative(Self::CODE, "sigma2", sigma2)? })
+        Ok(Self {
+            phi,
+            sigma2: non_negative(Self::CODE, "sigma2", sigma2)?,
+        })
     }
 
     /// Coefficient.
@@ -97,7 +100,10 @@ fn slow_shape(kappa: f64, m: f64) -> (f64, f64) {
     // nu = s2·2κB for the stationary variance s2, and sigma2 = s2 (1 − e^(−2κ)) = s2·2κ e^(−κ) s(κ).
     let (s, s_log_derivative) = sinhc(kappa);
     let value = bracket.value * kappa.exp() / s;
-    (value, value * (1.0 + bracket.log_derivative - s_log_derivative))
+    (
+        value,
+        value * (1.0 + bracket.log_derivative - s_log_derivative),
+    )
 }
 
 /// 0 ≤ phi ≤ ½: [m(1 − phi²) − phi(1 − u)(3 − u)]/[2m²(1 − phi)³(1 + phi)], u = phi^m.
@@ -110,7 +116,10 @@ pub(super) fn fast_shape(phi: f64, m: f64) -> (f64, f64) {
     // 0.
     let derivative = -2.0 * m * phi - bump + (4.0 - 2.0 * u) * m * u;
     let value = numerator / (2.0 * m * m * minus * minus * minus * plus);
-    (value, value * (derivative / numerator + 3.0 / minus - 1.0 / plus))
+    (
+        value,
+        value * (derivative / numerator + 3.0 / minus - 1.0 / plus),
+    )
 }
 
 /// phi = −r < 0, level ≥ 2: [m(1 + r) + r·G(3 − u)]/[2m²(1 + r)³] with u = r^m and G = Σ_{k<m} r^k, a
@@ -153,7 +162,9 @@ mod tests {
         pairs.map(|(s, t)| h(s) * h(t) * covariance(s - t)).sum()
     }
 
-    const PHIS: [f64; 12] = [-0.99, -0.9, -0.6, -0.1, 0.0, 0.1, 0.3, 0.499, 0.5, 0.501, 0.9, 0.99];
+    const PHIS: [f64; 12] = [
+        -0.99, -0.9, -0.6, -0.1, 0.0, 0.1, 0.3, 0.499, 0.5, 0.501, 0.9, 0.99,
+    ];
 
     #[test]
     fn haar_shape_is_the_variance_of_the_filtered_process() {
@@ -170,10 +181,15 @@ mod tests {
         for phi in PHIS {
             for level in 1..=20 {
                 let h = 1e-6;
-                let difference = Ar1::haar_shape(phi + h, level).0 - Ar1::haar_shape(phi - h, level).0;
+                let difference =
+                    Ar1::haar_shape(phi + h, level).0 - Ar1::haar_shape(phi - h, level).0;
                 let (value, derivative) = Ar1::haar_shape(phi, level);
                 let scale = derivative.abs() + value;
-                assert_relative_eq!(derivative / scale, difference / (2.0 * h) / scale, epsilon = 3e-7);
+                assert_relative_eq!(
+                    derivative / scale,
+                    difference / (2.0 * h) / scale,
+                    epsilon = 3e-7
+                );
             }
         }
     }
@@ -200,8 +216,10 @@ mod tests {
                 let tolerance = 1e-14 + 2e-16 / kappa;
                 assert_relative_eq!(value, ar1.haar_wv(level), max_relative = tolerance);
                 let h = 1e-5 * kappa;
-                let (high, low) =
-                    (GaussMarkov::haar_shape(kappa + h, level), GaussMarkov::haar_shape(kappa - h, level));
+                let (high, low) = (
+                    GaussMarkov::haar_shape(kappa + h, level),
+                    GaussMarkov::haar_shape(kappa - h, level),
+                );
                 let scale = value / kappa;
                 let difference = (high.0 - low.0) / (2.0 * h);
                 assert_relative_eq!(derivative / scale, difference / scale, epsilon = 1e-8);

@@ -27,7 +27,10 @@ impl Composite {
     /// [`Process::haar_wv_gradient`]).
     #[must_use]
     pub fn haar_wv_gradient(&self, level: u32) -> Vec<f64> {
-        self.processes.iter().flat_map(|p| p.haar_wv_gradient(level)).collect()
+        self.processes
+            .iter()
+            .flat_map(|p| p.haar_wv_gradient(level))
+            .collect()
     }
 
     /// A label for each summand, unique within the sum (see [`labels`]).
@@ -52,7 +55,10 @@ impl Composite {
                 .kind()
                 .parameters()
                 .iter()
-                .map(move |parameter| ParameterRef { process, parameter: *parameter });
+                .map(move |parameter| ParameterRef {
+                    process,
+                    parameter: *parameter,
+                });
             refs.zip(p.values())
         })
     }

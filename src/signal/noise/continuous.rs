@@ -4,7 +4,9 @@
 //! a Gauss-Markov process its correlation time and variance. Quantization noise belongs to the
 //! quantiser's own rate and cannot be converted.
 
-use super::{Ar1, Composite, Drift, GaussMarkov, Model, ParameterError, Process, RandomWalk, White};
+use super::{
+    Ar1, Composite, Drift, GaussMarkov, Model, ParameterError, Process, RandomWalk, White,
+};
 
 /// White noise density N = sigma √dt (units/√Hz).
 pub(crate) fn white_density(sigma2: f64, rate_hz: f64) -> f64 {
@@ -77,8 +79,11 @@ pub fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, RateError> {
         return Ok(model.clone());
     }
     for axis in &mut axes {
-        let converted: Result<Vec<_>, _> =
-            axis.processes.iter().map(|p| process_at_rate(p, model.rate_hz, rate_hz)).collect();
+        let converted: Result<Vec<_>, _> = axis
+            .processes
+            .iter()
+            .map(|p| process_at_rate(p, model.rate_hz, rate_hz))
+            .collect();
         *axis = Composite::new(converted?);
     }
     Ok(Model { rate_hz, axes })
@@ -92,7 +97,12 @@ pub fn same_rate(a_hz: f64, b_hz: f64) -> bool {
 
 fn process_at_rate(process: &Process, from_hz: f64, to_hz: f64) -> Result<Process, RateError> {
     let ratio = to_hz / from_hz;
-    let tied = |why| RateError::Tied { code: process.code(), from_hz, to_hz, why };
+    let tied = |why| RateError::Tied {
+        code: process.code(),
+        from_hz,
+        to_hz,
+        why,
+    };
     Ok(match process {
         // What is kept: N² = sigma2/f, K² = gamma2·f, and the slope per second.
         Process::White(p) => Process::White(White::new(p.sigma2() * ratio)?),
@@ -105,11 +115,16 @@ fn process_at_rate(process: &Process, from_hz: f64, to_hz: f64) -> Result<Proces
             // T and the stationary variance are kept: kappa = dt/T goes with dt, and sigma2 = variance·(1 −
             // phi²).
             let kappa = -(p.phi() - 1.0).ln_1p() / ratio;
-            Process::Ar1(Ar1::new((-kappa).exp(), p.variance() * -(-2.0 * kappa).exp_m1())?)
+            Process::Ar1(Ar1::new(
+                (-kappa).exp(),
+                p.variance() * -(-2.0 * kappa).exp_m1(),
+            )?)
         }
         Process::Ar1(_) => return Err(tied("phi ≤ 0 has no continuous counterpart")),
         Process::Ma1(_) => return Err(tied("it has no continuous counterpart")),
-        Process::Quantization(_) => return Err(tied("quantization belongs to the quantiser's own rate")),
+        Process::Quantization(_) => {
+            return Err(tied("quantization belongs to the quantiser's own rate"));
+        }
     })
 }
 
@@ -134,7 +149,11 @@ mod tests {
         let back = at_rate(&at_rate(&model, 37.0).unwrap(), 100.0).unwrap();
         for (a, b) in model.axes[0].processes.iter().zip(&back.axes[0].processes) {
             for ((name, x), (_, y)) in a.parameters().into_iter().zip(b.parameters()) {
-                assert!((x / y - 1.0).abs() < 1e-10, "{} {name}: {x:e} {y:e}", a.code());
+                assert!(
+                    (x / y - 1.0).abs() < 1e-10,
+                    "{} {name}: {x:e} {y:e}",
+                    a.code()
+                );
             }
         }
     }
@@ -146,7 +165,10 @@ mod tests {
         let model = n2_without_qn();
         let fast = at_rate(&model, 400.0).unwrap();
         for level in 7..16 {
-            let (a, b) = (model.axes[0].haar_wv(level), fast.axes[0].haar_wv(level + 2));
+            let (a, b) = (
+                model.axes[0].haar_wv(level),
+                fast.axes[0].haar_wv(level + 2),
+            );
             assert!((a / b - 1.0).abs() < 1e-3, "level {level}: {a:e} {b:e}");
         }
     }
@@ -167,7 +189,11 @@ mod tests {
         let qn = Process::Quantization(crate::noise::Quantization::new(1e-7).unwrap());
         let model = Model::pooled(100.0, &Composite::new(vec![qn]), &Composite::default());
         let error = at_rate(&model, 50.0).unwrap_err();
-        assert!(error.to_string().contains("QN at 100 Hz cannot be converted to 50 Hz"));
+        assert!(
+            error
+                .to_string()
+                .contains("QN at 100 Hz cannot be converted to 50 Hz")
+        );
         assert!(at_rate(&model, 100.0).is_ok());
     }
 }

@@ -17,8 +17,11 @@ const APART: f64 = 16.0;
 /// The shortest correlation time, unless the longest is shorter (s): what is faster is hidden by white noise.
 const SHORTEST_S: f64 = 1.0;
 /// Lowest Allan variance between the peaks of one, two, three processes of variance 1; more change it by less than 1e-3.
-const LOWEST: [f64; 3] =
-    [GaussMarkov::ALLAN_PEAK * GaussMarkov::ALLAN_PEAK, 0.436_065_855_9, 0.448_028_281_7];
+const LOWEST: [f64; 3] = [
+    GaussMarkov::ALLAN_PEAK * GaussMarkov::ALLAN_PEAK,
+    0.436_065_855_9,
+    0.448_028_281_7,
+];
 
 /// A bias whose Allan deviation has a floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +38,10 @@ impl Flicker {
     #[must_use]
     pub fn range_s(&self) -> (f64, f64) {
         let shortest_s = self.t_corr_s * APART.powi(1 - self.count());
-        (GaussMarkov::ALLAN_PEAK_AT * shortest_s, GaussMarkov::ALLAN_PEAK_AT * self.t_corr_s)
+        (
+            GaussMarkov::ALLAN_PEAK_AT * shortest_s,
+            GaussMarkov::ALLAN_PEAK_AT * self.t_corr_s,
+        )
     }
 
     /// The Gauss-Markov processes whose sum has this floor, the slowest first.
@@ -64,27 +70,54 @@ mod tests {
     /// (dt/T)²/12 = 6e-6.
     #[test]
     fn between_the_peaks_the_floor_is_kept_and_nearly_reached() {
-        for (t_corr_s, count, highest) in
-            [(10.0, 1, 1.0), (100.0, 2, 1.033), (300.0, 3, 1.075), (9000.0, 4, 1.08)]
-        {
-            let flicker = Flicker { floor: 3e-5, t_corr_s };
+        for (t_corr_s, count, highest) in [
+            (10.0, 1, 1.0),
+            (100.0, 2, 1.033),
+            (300.0, 3, 1.075),
+            (9000.0, 4, 1.08),
+        ] {
+            let flicker = Flicker {
+                floor: 3e-5,
+                t_corr_s,
+            };
             let noise = Composite::new(
-                flicker.processes(100.0).unwrap().into_iter().map(Process::GaussMarkov).collect(),
+                flicker
+                    .processes(100.0)
+                    .unwrap()
+                    .into_iter()
+                    .map(Process::GaussMarkov)
+                    .collect(),
             );
             assert_eq!(noise.processes.len(), count);
             let (from_s, to_s) = flicker.range_s();
             let steps = ((to_s / from_s).log2() * 64.0).ceil().max(1.0);
-            let times = (0..=steps as u32).map(|k| from_s * (to_s / from_s).powf(f64::from(k) / steps));
-            let ratios: Vec<f64> =
-                times.map(|t| noise.allan_variance((100.0 * t).round() as u32).sqrt() / 3e-5).collect();
-            let (low, high) = ratios.iter().fold((f64::MAX, 0.0_f64), |(l, h), r| (l.min(*r), h.max(*r)));
-            assert!((1.0 - 1e-4..1.001).contains(&low) && high < highest + 1e-3, "{t_corr_s}: {low} {high}");
+            let times =
+                (0..=steps as u32).map(|k| from_s * (to_s / from_s).powf(f64::from(k) / steps));
+            let ratios: Vec<f64> = times
+                .map(|t| noise.allan_variance((100.0 * t).round() as u32).sqrt() / 3e-5)
+                .collect();
+            let (low, high) = ratios
+                .iter()
+                .fold((f64::MAX, 0.0_f64), |(l, h), r| (l.min(*r), h.max(*r)));
+            assert!(
+                (1.0 - 1e-4..1.001).contains(&low) && high < highest + 1e-3,
+                "{t_corr_s}: {low} {high}"
+            );
         }
     }
 
     #[test]
     fn what_is_no_floor_is_refused() {
-        for flicker in [Flicker { floor: f64::NAN, t_corr_s: 300.0 }, Flicker { floor: 1.0, t_corr_s: 0.0 }] {
+        for flicker in [
+            Flicker {
+                floor: f64::NAN,
+                t_corr_s: 300.0,
+            },
+            Flicker {
+                floor: 1.0,
+                t_corr_s: 0.0,
+            },
+        ] {
             assert!(flicker.processes(100.0).is_err(), "{flicker:?}");
         }
     }

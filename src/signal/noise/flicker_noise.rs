@@ -39,9 +39,17 @@ pub struct Ladder {
 
 impl Ladder {
     /// For synthesis and the truth of an analysis: off by 5e-4 in all records of up to 10⁸ samples.
-    pub const FINE: Self = Self { ratio: 3.0, shortest: 0.12, longest: 1e11 };
+    pub const FINE: Self = Self {
+        ratio: 3.0,
+        shortest: 0.12,
+        longest: 1e11,
+    };
     /// For filters: within 3.5 % from 512 samples to 10⁵, with five states.
-    pub const FILTER: Self = Self { ratio: 8.0, shortest: 64.0, longest: 2.7e5 };
+    pub const FILTER: Self = Self {
+        ratio: 8.0,
+        shortest: 64.0,
+        longest: 2.7e5,
+    };
 }
 
 impl FlickerNoise {
@@ -58,7 +66,9 @@ impl FlickerNoise {
     /// # Errors
     /// When it is negative or not finite.
     pub fn new(b2: f64) -> Result<Self, ParameterError> {
-        Ok(Self { b2: non_negative(Self::CODE, "b2", b2)? })
+        Ok(Self {
+            b2: non_negative(Self::CODE, "b2", b2)?,
+        })
     }
 
     /// B² (units²).
@@ -71,8 +81,8 @@ impl FlickerNoise {
     #[must_use]
     pub fn haar_shape(level: u32) -> f64 {
         static SHAPES: OnceLock<[f64; 40]> = OnceLock::new();
-        let shapes =
-            SHAPES.get_or_init(|| std::array::from_fn(|j| 0.5 * Self::allan_shape(1.0, 1 << j.min(31))));
+        let shapes = SHAPES
+            .get_or_init(|| std::array::from_fn(|j| 0.5 * Self::allan_shape(1.0, 1 << j.min(31))));
         shapes[(level as usize).clamp(1, shapes.len()) - 1]
     }
 
@@ -84,7 +94,8 @@ impl FlickerNoise {
     pub(super) fn allan_shape(b2: f64, samples: u32) -> f64 {
         if samples > Self::SUMMED {
             let nearest = Self::summed(Self::SUMMED) - Self::FLOOR;
-            return b2 * (Self::FLOOR + nearest * (f64::from(Self::SUMMED) / f64::from(samples)).powi(2));
+            return b2
+                * (Self::FLOOR + nearest * (f64::from(Self::SUMMED) / f64::from(samples)).powi(2));
         }
         b2 * Self::summed(samples.max(1))
     }
@@ -106,7 +117,11 @@ impl FlickerNoise {
     /// White noise and the AR1 whose sum stands for it, the fastest first.
     #[must_use]
     pub fn parts(&self, ladder: Ladder) -> Vec<Process> {
-        let Ladder { ratio, shortest, longest } = ladder;
+        let Ladder {
+            ratio,
+            shortest,
+            longest,
+        } = ladder;
         let step = ratio.ln();
         // A correlation time of T samples is 1/(2 asinh u).
         let of_time = |samples: f64| (0.5 / samples).sinh();
@@ -120,7 +135,10 @@ impl FlickerNoise {
             Ar1::new(phi, self.b2 * step / PI * 4.0 * phi * u).map(Process::Ar1)
         };
         let white = White::new(white).map(Process::White);
-        std::iter::once(white).chain((0..count).map(ar1)).filter_map(Result::ok).collect()
+        std::iter::once(white)
+            .chain((0..count).map(ar1))
+            .filter_map(Result::ok)
+            .collect()
     }
 
     /// Variance at the beginning of what is slower than the fastest AR1 of a filter: of all that is synthesised, however slow.
@@ -159,10 +177,16 @@ mod tests {
                 })
                 .sum();
             let integral = sum / f64::from(n);
-            assert!((FlickerNoise::haar_shape(level) / integral - 1.0).abs() < 1e-6, "{level}: {integral}");
+            assert!(
+                (FlickerNoise::haar_shape(level) / integral - 1.0).abs() < 1e-6,
+                "{level}: {integral}"
+            );
         }
         // where the sum ends and the limit begins
-        let (summed, beyond) = (FlickerNoise::summed(4096), FlickerNoise::allan_shape(1.0, 4096));
+        let (summed, beyond) = (
+            FlickerNoise::summed(4096),
+            FlickerNoise::allan_shape(1.0, 4096),
+        );
         assert!((summed / beyond - 1.0).abs() < 2e-8, "{summed} {beyond}");
     }
 
@@ -171,7 +195,10 @@ mod tests {
     #[test]
     fn the_sums_are_off_by_what_is_said() {
         let noise = FlickerNoise::new(4.0).unwrap();
-        for (ladder, levels, error) in [(Ladder::FINE, 1..=24, 6e-4), (Ladder::FILTER, 9..=17, 0.035)] {
+        for (ladder, levels, error) in [
+            (Ladder::FINE, 1..=24, 6e-4),
+            (Ladder::FILTER, 9..=17, 0.035),
+        ] {
             let sum = Composite::new(noise.parts(ladder));
             for level in levels {
                 let ratio = sum.haar_wv(level) / noise.haar_wv(level);
@@ -187,7 +214,13 @@ mod tests {
         let axis = Composite::new(vec![Process::Flicker(FlickerNoise::new(1.0).unwrap())]);
         let model = Model::pooled(100.0, &axis, &axis);
         let measured = |run| {
-            let key = StreamKey { seed: 1, scenario: "", run, source: "", process: "" };
+            let key = StreamKey {
+                seed: 1,
+                scenario: "",
+                run,
+                source: "",
+                process: "",
+            };
             let mut x = vec![0.0; 1 << 12];
             Synthesizer::new(&model.axes[0], key).fill(&mut x);
             classical(&x, 9).unwrap()
@@ -197,7 +230,10 @@ mod tests {
             let mean = all.iter().map(|nu| nu[j]).sum::<f64>() / 100.0;
             let variance = all.iter().map(|nu| (nu[j] - mean).powi(2)).sum::<f64>() / 99.0;
             let expected = FlickerNoise::haar_shape(j as u32 + 1);
-            assert!((mean - expected).abs() < 4.0 * (variance / 100.0).sqrt(), "{j}: {mean} {expected}");
+            assert!(
+                (mean - expected).abs() < 4.0 * (variance / 100.0).sqrt(),
+                "{j}: {mean} {expected}"
+            );
         }
     }
 }

@@ -33,7 +33,12 @@ impl GaussMarkov {
             if value.is_finite() && value > 0.0 {
                 Ok(value)
             } else {
-                Err(ParameterError { process: Self::CODE, parameter, value, domain: "a finite number > 0" })
+                Err(ParameterError {
+                    process: Self::CODE,
+                    parameter,
+                    value,
+                    domain: "a finite number > 0",
+                })
             }
         };
         let x = positive("beta", beta)? / positive("rate_hz", rate_hz)?;
@@ -41,7 +46,12 @@ impl GaussMarkov {
         // sigma2 = s2 (1 − phi²) by expm1: of a slow process phi² is next to 1 and the difference would lose
         // its digits.
         let ar1 = Ar1::new((-x).exp(), s2 * -(-2.0 * x).exp_m1())?;
-        Ok(Self { beta, s2, rate_hz, ar1 })
+        Ok(Self {
+            beta,
+            s2,
+            rate_hz,
+            ar1,
+        })
     }
 
     /// Inverse correlation time (1/s).
@@ -87,7 +97,10 @@ impl GaussMarkov {
             // phi ≤ ½: nothing cancels in the form of phi. d/dκ = −phi d/dphi, and 1 − phi² is sigma2/s2.
             let variance = (1.0 - phi) * (1.0 + phi);
             let (value, derivative) = fast_shape(phi, m);
-            (value * variance, -phi * (derivative * variance - 2.0 * phi * value))
+            (
+                value * variance,
+                -phi * (derivative * variance - 2.0 * phi * value),
+            )
         }
     }
 }

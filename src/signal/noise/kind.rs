@@ -1,7 +1,8 @@
 //! The kinds of process and their parameters: what files, specifications and fits call them, in one table.
 
 use super::{
-    Ar1, Drift, FlickerNoise, GaussMarkov, Ma1, ParameterError, Process, Quantization, RandomWalk, White,
+    Ar1, Drift, FlickerNoise, GaussMarkov, Ma1, ParameterError, Process, Quantization, RandomWalk,
+    White,
 };
 
 /// A kind of process.
@@ -68,26 +69,46 @@ struct Row {
 
 /// One row a kind, in the order of [`Kind::ALL`].
 const TABLE: [Row; 8] = [
-    Row { code: White::CODE, parameters: &[Parameter::Sigma2], units: "({u})², per sample" },
-    Row { code: Quantization::CODE, parameters: &[Parameter::Q2], units: "({u})²" },
+    Row {
+        code: White::CODE,
+        parameters: &[Parameter::Sigma2],
+        units: "({u})², per sample",
+    },
+    Row {
+        code: Quantization::CODE,
+        parameters: &[Parameter::Q2],
+        units: "({u})²",
+    },
     Row {
         code: Ar1::CODE,
         parameters: &[Parameter::Phi, Parameter::Sigma2],
         units: "({u})², innovation variance per sample",
     },
-    Row { code: GaussMarkov::CODE, parameters: &[Parameter::Beta, Parameter::S2], units: "1/s, ({u})²" },
+    Row {
+        code: GaussMarkov::CODE,
+        parameters: &[Parameter::Beta, Parameter::S2],
+        units: "1/s, ({u})²",
+    },
     Row {
         code: Ma1::CODE,
         parameters: &[Parameter::Theta, Parameter::Sigma2],
         units: "({u})², innovation variance per sample",
     },
-    Row { code: FlickerNoise::CODE, parameters: &[Parameter::B2], units: "({u})²" },
+    Row {
+        code: FlickerNoise::CODE,
+        parameters: &[Parameter::B2],
+        units: "({u})²",
+    },
     Row {
         code: RandomWalk::CODE,
         parameters: &[Parameter::Gamma2],
         units: "({u})², increment variance per sample",
     },
-    Row { code: Drift::CODE, parameters: &[Parameter::Slope], units: "{u} per sample" },
+    Row {
+        code: Drift::CODE,
+        parameters: &[Parameter::Slope],
+        units: "{u} per sample",
+    },
 ];
 
 impl Kind {
@@ -158,7 +179,9 @@ impl Kind {
             (Self::White, &[sigma2]) => White::new(sigma2).map(Process::White),
             (Self::Quantization, &[q2]) => Quantization::new(q2).map(Process::Quantization),
             (Self::Ar1, &[phi, sigma2]) => Ar1::new(phi, sigma2).map(Process::Ar1),
-            (Self::GaussMarkov, &[beta, s2]) => GaussMarkov::new(beta, s2, rate_hz).map(Process::GaussMarkov),
+            (Self::GaussMarkov, &[beta, s2]) => {
+                GaussMarkov::new(beta, s2, rate_hz).map(Process::GaussMarkov)
+            }
             (Self::Ma1, &[theta, sigma2]) => Ma1::new(theta, sigma2).map(Process::Ma1),
             (Self::Flicker, &[b2]) => FlickerNoise::new(b2).map(Process::Flicker),
             (Self::RandomWalk, &[gamma2]) => RandomWalk::new(gamma2).map(Process::RandomWalk),
@@ -218,7 +241,9 @@ impl Parameter {
         match self {
             Self::Phi | Self::Theta => (-1.0, 1.0),
             Self::Slope => (f64::NEG_INFINITY, f64::INFINITY),
-            Self::Beta | Self::Sigma2 | Self::S2 | Self::Q2 | Self::B2 | Self::Gamma2 => (0.0, f64::INFINITY),
+            Self::Beta | Self::Sigma2 | Self::S2 | Self::Q2 | Self::B2 | Self::Gamma2 => {
+                (0.0, f64::INFINITY)
+            }
         }
     }
 }
@@ -230,7 +255,11 @@ impl Process {
     /// # Errors
     /// When a value is outside its domain.
     #[must_use]
-    pub fn from_values(code: &str, values: &[f64], rate_hz: f64) -> Option<Result<Self, ParameterError>> {
+    pub fn from_values(
+        code: &str,
+        values: &[f64],
+        rate_hz: f64,
+    ) -> Option<Result<Self, ParameterError>> {
         Kind::named(code)?.process(values, rate_hz)
     }
 
@@ -243,7 +272,12 @@ impl Process {
     /// The parameters as (name in model files, value).
     #[must_use]
     pub fn parameters(&self) -> Vec<(&'static str, f64)> {
-        self.kind().parameters().iter().map(|p| p.name()).zip(self.values()).collect()
+        self.kind()
+            .parameters()
+            .iter()
+            .map(|p| p.name())
+            .zip(self.values())
+            .collect()
     }
 
     /// The same process with one parameter changed; none if it has no parameter of that name.
@@ -258,7 +292,11 @@ impl Process {
         rate_hz: f64,
     ) -> Option<Result<Self, ParameterError>> {
         let mut values = self.values();
-        values[self.kind().parameters().iter().position(|p| p.name() == name)?] = value;
+        values[self
+            .kind()
+            .parameters()
+            .iter()
+            .position(|p| p.name() == name)?] = value;
         self.kind().process(&values, rate_hz)
     }
 }
@@ -284,7 +322,9 @@ mod tests {
         for kind in Kind::ALL {
             let names: Vec<&str> = kind.parameters().iter().map(|p| p.name()).collect();
             let values: Vec<f64> = (1..=names.len()).map(|i| 0.25 * i as f64).collect();
-            let process = Process::from_values(kind.code(), &values, 100.0).unwrap().unwrap();
+            let process = Process::from_values(kind.code(), &values, 100.0)
+                .unwrap()
+                .unwrap();
             assert_eq!((process.code(), process.kind()), (kind.code(), kind));
             let expected: Vec<(&str, f64)> = names.into_iter().zip(values).collect();
             assert_eq!(process.parameters(), expected);
@@ -296,7 +336,9 @@ mod tests {
 
     #[test]
     fn one_parameter_changes() {
-        let ar1 = Process::from_values("AR1", &[0.5, 2.0], 100.0).unwrap().unwrap();
+        let ar1 = Process::from_values("AR1", &[0.5, 2.0], 100.0)
+            .unwrap()
+            .unwrap();
         let changed = ar1.with_parameter("phi", 0.75, 100.0).unwrap().unwrap();
         assert_eq!(changed.parameters(), [("phi", 0.75), ("sigma2", 2.0)]);
         assert!(ar1.with_parameter("gamma2", 1.0, 100.0).is_none());

@@ -27,7 +27,10 @@ impl Ma1 {
                 domain: "between −1 and 1",
             });
         }
-        Ok(Self { theta, sigma2: non_negative(Self::CODE, "sigma2", sigma2)? })
+        Ok(Self {
+            theta,
+            sigma2: non_negative(Self::CODE, "sigma2", sigma2)?,
+        })
     }
 
     /// Coefficient.
@@ -53,6 +56,9 @@ impl Ma1 {
     pub fn haar_shape(theta: f64, level: u32) -> (f64, f64) {
         let m = half_scale(level);
         let sum = 1.0 + theta;
-        ((m * sum * sum - 3.0 * theta) / (2.0 * m * m), (2.0 * m * sum - 3.0) / (2.0 * m * m))
+        (
+            (m * sum * sum - 3.0 * theta) / (2.0 * m * m),
+            (2.0 * m * sum - 3.0) / (2.0 * m * m),
+        )
     }
 }

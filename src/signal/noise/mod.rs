@@ -72,11 +72,20 @@ pub struct ParameterError {
 }
 
 /// Accepts a finite, non-negative value.
-fn non_negative(process: &'static str, parameter: &'static str, value: f64) -> Result<f64, ParameterError> {
+fn non_negative(
+    process: &'static str,
+    parameter: &'static str,
+    value: f64,
+) -> Result<f64, ParameterError> {
     if value.is_finite() && value >= 0.0 {
         Ok(value)
     } else {
-        Err(ParameterError { process, parameter, value, domain: "a finite number ≥ 0" })
+        Err(ParameterError {
+            process,
+            parameter,
+            value,
+            domain: "a finite number ≥ 0",
+        })
     }
 }
 
@@ -107,7 +116,9 @@ impl Serialize for Process {
         let parameters = self.parameters();
         let mut map = to.serialize_map(Some(1 + parameters.len()))?;
         map.serialize_entry("type", self.code())?;
-        parameters.iter().try_for_each(|(name, value)| map.serialize_entry(name, value))?;
+        parameters
+            .iter()
+            .try_for_each(|(name, value)| map.serialize_entry(name, value))?;
         map.end()
     }
 }
@@ -199,7 +210,13 @@ impl Model {
     /// A model with the same noise on the three axes of each sensor.
     #[must_use]
     pub fn pooled(rate_hz: f64, accel: &Composite, gyro: &Composite) -> Self {
-        let axes = Channel::ALL.map(|c| if c.sensor == Sensor::Accel { accel.clone() } else { gyro.clone() });
+        let axes = Channel::ALL.map(|c| {
+            if c.sensor == Sensor::Accel {
+                accel.clone()
+            } else {
+                gyro.clone()
+            }
+        });
         Self { rate_hz, axes }
     }
 

@@ -43,7 +43,10 @@ impl Ziggurat {
         for i in 2..LAYERS {
             x[i] = (-2.0 * (AREA / x[i - 1] + density(x[i - 1])).ln()).sqrt();
         }
-        Self { x, f: x.map(density) }
+        Self {
+            x,
+            f: x.map(density),
+        }
     }
 
     /// A standard normal number.
@@ -119,7 +122,11 @@ mod tests {
         let top = AREA / z.x[LAYERS - 1] + z.f[LAYERS - 1];
         assert!((top - 1.0).abs() < 1e-12, "{top}");
         let beyond = Normal::new(0.0, 1.0).unwrap().sf(R) * std::f64::consts::TAU.sqrt();
-        assert!((R * density(R) + beyond - AREA).abs() < 1e-12, "{}", R * density(R) + beyond);
+        assert!(
+            (R * density(R) + beyond - AREA).abs() < 1e-12,
+            "{}",
+            R * density(R) + beyond
+        );
     }
 
     /// Counts in bins of equal probability, chi-square with 255 degrees of freedom: sd √(2·255).
@@ -134,7 +141,10 @@ mod tests {
             counts[(law.cdf(Ziggurat::get().draw(&mut g)) * BINS as f64) as usize] += 1.0;
         }
         let expected = f64::from(n) / BINS as f64;
-        let chi2: f64 = counts.iter().map(|c: &f64| (c - expected).powi(2) / expected).sum();
+        let chi2: f64 = counts
+            .iter()
+            .map(|c: &f64| (c - expected).powi(2) / expected)
+            .sum();
         assert!((chi2 - 255.0).abs() < 5.0 * 510.0_f64.sqrt(), "{chi2}");
     }
 
@@ -159,10 +169,17 @@ mod tests {
             let expected = f64::from(n) * law.sf(*b);
             for count in [above[i], below[i]] {
                 let off: f64 = count - expected;
-                assert!(off.abs() < 5.0 * expected.sqrt(), "beyond {b}: {count}, {expected}");
+                assert!(
+                    off.abs() < 5.0 * expected.sqrt(),
+                    "beyond {b}: {count}, {expected}"
+                );
             }
         }
         let n = f64::from(n);
-        assert!((fourth / n - 3.0).abs() < 5.0 * (96.0 / n).sqrt(), "{}", fourth / n);
+        assert!(
+            (fourth / n - 3.0).abs() < 5.0 * (96.0 / n).sqrt(),
+            "{}",
+            fourth / n
+        );
     }
 }

@@ -18,7 +18,9 @@ impl Quantization {
     /// # Errors
     /// When it is negative or not finite.
     pub fn new(q2: f64) -> Result<Self, ParameterError> {
-        Ok(Self { q2: non_negative(Self::CODE, "q2", q2)? })
+        Ok(Self {
+            q2: non_negative(Self::CODE, "q2", q2)?,
+        })
     }
 
     /// Q² (units²).

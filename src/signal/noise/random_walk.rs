@@ -18,7 +18,9 @@ impl RandomWalk {
     /// # Errors
     /// When it is negative or not finite.
     pub fn new(gamma2: f64) -> Result<Self, ParameterError> {
-        Ok(Self { gamma2: non_negative(Self::CODE, "gamma2", gamma2)? })
+        Ok(Self {
+            gamma2: non_negative(Self::CODE, "gamma2", gamma2)?,
+        })
     }
 
     /// Variance of an increment (units²).

@@ -68,7 +68,11 @@ pub fn reduce(
     if levels.len() < 3 {
         // the first of three levels is the last less two, to which half a level more is rounded
         let longest_interval_s = (level(window_s).min(40.0) - 1.5).exp2() / rate_hz;
-        return Err(ReductionError::TooFewScales { interval_s, window_s, longest_interval_s });
+        return Err(ReductionError::TooFewScales {
+            interval_s,
+            window_s,
+            longest_interval_s,
+        });
     }
     let target: Vec<f64> = levels.iter().map(|l| kept.haar_wv(*l)).collect();
     let fit = Fit { levels, target };
@@ -80,15 +84,22 @@ pub fn reduce(
         white: White::new(ln_white.exp())?,
         bias: Ar1::new((-kappa).exp(), variance * -(-2.0 * kappa).exp_m1())?,
         initial_variance: stationary_variance(&kept),
-        misfit: fit.residuals(&[ln_white, ln_variance, ln_kappa]).iter().fold(0.0, |m, r| r.abs().max(m)),
+        misfit: fit
+            .residuals(&[ln_white, ln_variance, ln_kappa])
+            .iter()
+            .fold(0.0, |m, r| r.abs().max(m)),
     })
 }
 
 /// Whether a filter with one bias an axis carries the noise as it is: at most one of its processes is a bias.
 #[must_use]
 pub fn is_exact(noise: &Composite) -> bool {
-    let is_bias =
-        |p: &&Process| matches!(p, Process::Ar1(_) | Process::GaussMarkov(_) | Process::RandomWalk(_));
+    let is_bias = |p: &&Process| {
+        matches!(
+            p,
+            Process::Ar1(_) | Process::GaussMarkov(_) | Process::RandomWalk(_)
+        )
+    };
     let is_flicker = |p: &Process| matches!(p, Process::Flicker(_));
     noise.processes.iter().filter(is_bias).count() <= 1 && !noise.processes.iter().any(is_flicker)
 }
@@ -97,7 +108,14 @@ pub fn is_exact(noise: &Composite) -> bool {
 #[must_use]
 pub fn carried(noise: &Composite) -> Composite {
     let apart = |p: &&Process| matches!(p, Process::Quantization(_) | Process::Drift(_));
-    Composite::new(noise.processes.iter().filter(|p| !apart(p)).copied().collect())
+    Composite::new(
+        noise
+            .processes
+            .iter()
+            .filter(|p| !apart(p))
+            .copied()
+            .collect(),
+    )
 }
 
 fn stationary_variance(noise: &Composite) -> f64 {
@@ -119,7 +137,10 @@ struct Fit {
 impl Fit {
     /// Best start of a grid over the correlation time, then Levenberg-Marquardt.
     fn solve(&self) -> [f64; 3] {
-        let (first, last) = (f64::from(self.levels[0]), f64::from(self.levels[self.levels.len() - 1]));
+        let (first, last) = (
+            f64::from(self.levels[0]),
+            f64::from(self.levels[self.levels.len() - 1]),
+        );
         let starts = (0..60).map(|i| {
             // From a quarter of the shortest scale, where the bias looks white, to sixteen times the longest,
             // where it looks like a random walk.
@@ -144,7 +165,10 @@ impl Fit {
         // a·x + b·y ≈ 1 at every scale, in the mean square: to first order that is the logarithm of the
         // ratio.
         let determinant = aa * bb - ab * ab;
-        let (mut x, mut y) = ((a1 * bb - b1 * ab) / determinant, (b1 * aa - a1 * ab) / determinant);
+        let (mut x, mut y) = (
+            (a1 * bb - b1 * ab) / determinant,
+            (b1 * aa - a1 * ab) / determinant,
+        );
         // Where one amplitude would be negative it is 0, and the other is fitted alone; NaN comes from
         // parallel columns.
         if x.is_nan() || x <= 0.0 {
@@ -157,8 +181,13 @@ impl Fit {
 
     fn residuals(&self, x: &[f64; 3]) -> Vec<f64> {
         let (white, variance, kappa) = (x[0].exp(), x[1].exp(), x[2].exp());
-        let model = |l| white * White::haar_shape(l) + variance * GaussMarkov::haar_shape(kappa, l).0;
-        self.levels.iter().zip(&self.target).map(|(l, t)| (model(*l) / t).ln()).collect()
+        let model =
+            |l| white * White::haar_shape(l) + variance * GaussMarkov::haar_shape(kappa, l).0;
+        self.levels
+            .iter()
+            .zip(&self.target)
+            .map(|(l, t)| (model(*l) / t).ln())
+            .collect()
     }
 
     fn cost(&self, x: &[f64; 3]) -> f64 {
@@ -172,8 +201,11 @@ impl Fit {
             let (normal, gradient) = self.normal_equations(&x);
             // Marquardt's scaling by the diagonal; the 1e-12 keeps the matrix regular where an amplitude has
             // vanished and its row with it.
-            let damped = normal + Matrix3::from_diagonal(&normal.diagonal().add_scalar(1e-12)) * damping;
-            let Some(step) = damped.lu().solve(&-gradient) else { break };
+            let damped =
+                normal + Matrix3::from_diagonal(&normal.diagonal().add_scalar(1e-12)) * damping;
+            let Some(step) = damped.lu().solve(&-gradient) else {
+                break;
+            };
             // a parameter that the fit does not feel may wander: at most e² a step
             let trial = std::array::from_fn(|i| x[i] + step[i].clamp(-2.0, 2.0));
             let trial_cost = self.cost(&trial);
@@ -248,8 +280,14 @@ mod tests {
         let fit = Fit { levels, target };
         let found = fit.cost(&fit.solve());
         for i in 0..4000 {
-            let log10 = |k: i32, low: f64, high: f64| (low + (high - low) * f64::from(k) / 15.0) * 10f64.ln();
-            let x = [log10(i % 16, -6.0, -3.0), log10(i / 16 % 16, -12.0, -5.0), log10(i / 256, -7.0, -1.0)];
+            let log10 = |k: i32, low: f64, high: f64| {
+                (low + (high - low) * f64::from(k) / 15.0) * 10f64.ln()
+            };
+            let x = [
+                log10(i % 16, -6.0, -3.0),
+                log10(i / 16 % 16, -12.0, -5.0),
+                log10(i / 256, -7.0, -1.0),
+            ];
             assert!(found <= fit.cost(&fit.polish(x)) * (1.0 + 1e-6) + 1e-12);
         }
     }
@@ -266,12 +304,21 @@ mod tests {
     /// is 2621 s at 100 Hz), no worse than it follows it anywhere; a pair that ends with the outage is off there by a factor of 2.4.
     #[test]
     fn the_pair_holds_to_eight_times_the_outage() {
-        assert_eq!([0.0, 90.0, 100.0, 300.0].map(window_s), [800.0, 800.0, 800.0, 2400.0]);
+        assert_eq!(
+            [0.0, 90.0, 100.0, 300.0].map(window_s),
+            [800.0, 800.0, 800.0, 2400.0]
+        );
         let model = Composite::new(vec![n2()[0], ar1(0.9999, 1e-11), n2()[3]]);
         let off_at_the_end = |window_s: f64| {
             let reduced = reduce(&model, 100.0, 1.0, window_s).unwrap();
-            let pair = Composite::new(vec![Process::White(reduced.white), Process::Ar1(reduced.bias)]);
-            ((pair.haar_wv(18) / model.haar_wv(18)).ln().abs(), reduced.misfit)
+            let pair = Composite::new(vec![
+                Process::White(reduced.white),
+                Process::Ar1(reduced.bias),
+            ]);
+            (
+                (pair.haar_wv(18) / model.haar_wv(18)).ln().abs(),
+                reduced.misfit,
+            )
         };
         let (off, misfit) = off_at_the_end(window_s(300.0));
         assert!(off <= misfit * (1.0 + 1e-9), "{off} {misfit}");
@@ -284,7 +331,9 @@ mod tests {
         let walk = Composite::new(vec![n2()[3]]);
         for (rate_hz, window_s) in [(100.0, 2.0), (100.0, 800.0), (400.0, 1234.0), (1.0, 800.0)] {
             let longest = match reduce(&walk, rate_hz, 1e4, window_s) {
-                Err(ReductionError::TooFewScales { longest_interval_s, .. }) => longest_interval_s,
+                Err(ReductionError::TooFewScales {
+                    longest_interval_s, ..
+                }) => longest_interval_s,
                 other => panic!("{other:?}"),
             };
             assert!(reduce(&walk, rate_hz, 0.999 * longest, window_s).is_ok());

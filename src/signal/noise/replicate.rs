@@ -45,7 +45,9 @@ impl VirtualImu<'_> {
             None => self.model.clone(),
         };
         for channel in Channel::ALL {
-            let Some(contamination) = self.contamination else { break };
+            let Some(contamination) = self.contamination else {
+                break;
+            };
             let (noise, rate_hz) = (&mut model.axes[channel.index()], model.rate_hz);
             contamination
                 .scale(noise, channel, replicate, rate_hz)
@@ -68,7 +70,13 @@ impl VirtualImu<'_> {
     ) -> Result<Vec<f64>, ReplicateError> {
         let source = channel.to_string();
         let run = replicate.wrapping_sub(1);
-        let key = StreamKey { seed: self.seed, scenario: "", run, source: &source, process: "" };
+        let key = StreamKey {
+            seed: self.seed,
+            scenario: "",
+            run,
+            source: &source,
+            process: "",
+        };
         let mut out = vec![0.0; samples];
         Synthesizer::new(model.axis(channel), key).fill(&mut out);
         if let Some(contamination) = self.contamination {
@@ -94,10 +102,21 @@ impl VirtualImu<'_> {
             let mut x = self.signal(&model, replicate, *channel, samples)?;
             let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
             x.iter_mut().for_each(|v| *v -= mean);
-            Ok(Signal { channel: *channel, mean, samples: x })
+            Ok(Signal {
+                channel: *channel,
+                mean,
+                samples: x,
+            })
         };
-        let signals = channels.iter().map(signal).collect::<Result<_, ReplicateError>>()?;
-        Ok(Recording { name: format!("replicate_{replicate}"), rate_hz: model.rate_hz, signals })
+        let signals = channels
+            .iter()
+            .map(signal)
+            .collect::<Result<_, ReplicateError>>()?;
+        Ok(Recording {
+            name: format!("replicate_{replicate}"),
+            rate_hz: model.rate_hz,
+            signals,
+        })
     }
 }
 
@@ -108,10 +127,14 @@ mod tests {
     use crate::noise::contamination::{Operation, Rule};
     use crate::noise::{Composite, Law, Process, Variation};
 
-    const X: Channel = Channel { sensor: Sensor::Accel, axis: Axis::X };
+    const X: Channel = Channel {
+        sensor: Sensor::Accel,
+        axis: Axis::X,
+    };
 
     fn model() -> Model {
-        let process = |code, values: &[f64]| Process::from_values(code, values, 100.0).unwrap().unwrap();
+        let process =
+            |code, values: &[f64]| Process::from_values(code, values, 100.0).unwrap().unwrap();
         let noise = Composite::new(vec![process("WN", &[1.0]), process("RW", &[0.01])]);
         Model::pooled(100.0, &noise, &noise)
     }
@@ -119,33 +142,81 @@ mod tests {
     #[test]
     fn replicates_differ_and_repeat_and_contamination_leaves_the_noise_alone() {
         let model = model();
-        let clean = VirtualImu { model: &model, spread: None, contamination: None, seed: 3 };
+        let clean = VirtualImu {
+            model: &model,
+            spread: None,
+            contamination: None,
+            seed: 3,
+        };
         let first = clean.signal(&model, 1, X, 100).unwrap();
         assert_ne!(first, clean.signal(&model, 2, X, 100).unwrap());
         assert_eq!(first, clean.signal(&model, 1, X, 100).unwrap());
 
-        let operation =
-            Operation::Step { at: crate::noise::contamination::Extent::Share(0.5), amplitude: 1000.0 };
-        let rule = Rule { sensor: Sensor::Accel, replicate: Some(1), operation, place: String::new() };
-        let contamination = Contamination { name: "step".into(), rules: vec![rule] };
-        let dirty = VirtualImu { contamination: Some(&contamination), ..clean };
+        let operation = Operation::Step {
+            at: crate::noise::contamination::Extent::Share(0.5),
+            amplitude: 1000.0,
+        };
+        let rule = Rule {
+            sensor: Sensor::Accel,
+            replicate: Some(1),
+            operation,
+            place: String::new(),
+        };
+        let contamination = Contamination {
+            name: "step".into(),
+            rules: vec![rule],
+        };
+        let dirty = VirtualImu {
+            contamination: Some(&contamination),
+            ..clean
+        };
         let stepped = dirty.signal(&model, 1, X, 100).unwrap();
         assert_eq!(stepped[..50], first[..50]);
-        assert!(stepped[50..].iter().zip(&first[50..]).all(|(a, b)| (a - b - 1000.0).abs() < 1e-9));
+        assert!(
+            stepped[50..]
+                .iter()
+                .zip(&first[50..])
+                .all(|(a, b)| (a - b - 1000.0).abs() < 1e-9)
+        );
     }
 
     #[test]
     fn parameters_are_drawn_then_scaled() {
         let model = model();
-        let law = Law::Beta { a: 2.0, b: 2.0, low: 1.0, width: 1.0 };
+        let law = Law::Beta {
+            a: 2.0,
+            b: 2.0,
+            low: 1.0,
+            width: 1.0,
+        };
         let variation = Variation::new(&model.axes[0], 100.0, "RW", "gamma2", law).unwrap();
         let mut spread = Spread::default();
         spread.axes[0].push(variation);
-        let operation = Operation::Scale { process: "RW".into(), parameter: "gamma2".into(), factor: 4.0 };
-        let rule = Rule { sensor: Sensor::Accel, replicate: Some(1), operation, place: String::new() };
-        let contamination = Contamination { name: "scale".into(), rules: vec![rule] };
-        let drawn = VirtualImu { model: &model, spread: Some(&spread), contamination: None, seed: 3 };
-        let scaled = VirtualImu { contamination: Some(&contamination), ..drawn };
+        let operation = Operation::Scale {
+            process: "RW".into(),
+            parameter: "gamma2".into(),
+            factor: 4.0,
+        };
+        let rule = Rule {
+            sensor: Sensor::Accel,
+            replicate: Some(1),
+            operation,
+            place: String::new(),
+        };
+        let contamination = Contamination {
+            name: "scale".into(),
+            rules: vec![rule],
+        };
+        let drawn = VirtualImu {
+            model: &model,
+            spread: Some(&spread),
+            contamination: None,
+            seed: 3,
+        };
+        let scaled = VirtualImu {
+            contamination: Some(&contamination),
+            ..drawn
+        };
         let gamma2 = |imu: &VirtualImu<'_>, replicate| {
             imu.model_of(replicate).unwrap().axes[0].processes[1].parameters()[0].1
         };

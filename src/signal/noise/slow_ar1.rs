@@ -31,7 +31,11 @@ impl Slow {
     pub(super) fn new(kappa: f64) -> Self {
         let (s, ds) = sinh_series::<1>(0.5 * kappa);
         let (excess, excess_derivative) = sinh_series::<3>(kappa);
-        Self { kappa, excess: (2.0 * excess, 2.0 * excess_derivative), sinhc_half: (s, ds / s) }
+        Self {
+            kappa,
+            excess: (2.0 * excess, 2.0 * excess_derivative),
+            sinhc_half: (s, ds / s),
+        }
     }
 
     pub(super) fn bracket(&self, m: f64) -> Bracket {
@@ -39,7 +43,10 @@ impl Slow {
         let sum = m.mul_add(m * f, self.excess.0);
         let derivative = self.excess.1 + m * m * m * df;
         let (s, half_log_derivative) = self.sinhc_half;
-        Bracket { value: sum / (4.0 * m * s * s), log_derivative: derivative / sum - half_log_derivative }
+        Bracket {
+            value: sum / (4.0 * m * s * s),
+            log_derivative: derivative / sum - half_log_derivative,
+        }
     }
 }
 

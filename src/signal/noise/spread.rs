@@ -141,9 +141,16 @@ impl Variation {
     ) -> Result<Self, SpreadError> {
         let labels = noise.labels();
         let Some(at) = labels.iter().position(|l| l == process) else {
-            return Err(SpreadError::NoProcess { label: process.to_owned(), known: labels });
+            return Err(SpreadError::NoProcess {
+                label: process.to_owned(),
+                known: labels,
+            });
         };
-        let variation = Self { process: process.to_owned(), parameter: parameter.to_owned(), law };
+        let variation = Self {
+            process: process.to_owned(),
+            parameter: parameter.to_owned(),
+            law,
+        };
         variation.check_constants()?;
         // The domains are intervals: a beta law stays inside if its two ends do. A normal law is drawn again
         // until inside, so only its centre must be there.
@@ -181,7 +188,15 @@ impl Variation {
 
     fn check_constants(&self) -> Result<(), SpreadError> {
         let check = |name, value: f64, ok: bool, domain| {
-            if value.is_finite() && ok { Ok(()) } else { Err(SpreadError::Constant { name, value, domain }) }
+            if value.is_finite() && ok {
+                Ok(())
+            } else {
+                Err(SpreadError::Constant {
+                    name,
+                    value,
+                    domain,
+                })
+            }
         };
         match self.law {
             Law::Beta { a, b, low, width } => {
@@ -195,11 +210,18 @@ impl Variation {
                 check("sd", sd, (0.0..=1.0).contains(&sd), "between 0 and 1")
             }
             Law::Normal { sd } => check("sd", sd, sd >= 0.0, "a finite number ≥ 0"),
-            Law::Lognormal { .. } if self.parameter == Parameter::Theta.name() => Err(SpreadError::Lognormal),
+            Law::Lognormal { .. } if self.parameter == Parameter::Theta.name() => {
+                Err(SpreadError::Lognormal)
+            }
             Law::Lognormal { median, sd, .. } => {
                 check("median", median, median > 0.0, "a finite number > 0")?;
                 // ±8 standard deviations of 10 are 1e±35: more is a slip, and would leave the range of numbers.
-                check("sd", sd, (0.0..=LARGEST_SD).contains(&sd), "between 0 and 10")
+                check(
+                    "sd",
+                    sd,
+                    (0.0..=LARGEST_SD).contains(&sd),
+                    "between 0 and 10",
+                )
             }
         }
     }
@@ -207,7 +229,11 @@ impl Variation {
     /// The error of a law for a parameter that the process does not have.
     pub fn no_parameter(&self, process: &Process) -> SpreadError {
         let known = process.parameters().into_iter().map(|(n, _)| n).collect();
-        SpreadError::NoParameter { process: process.code(), parameter: self.parameter.clone(), known }
+        SpreadError::NoParameter {
+            process: process.code(),
+            parameter: self.parameter.clone(),
+            known,
+        }
     }
 
     fn centre(&self, process: &Process) -> Result<f64, SpreadError> {
@@ -218,32 +244,51 @@ impl Variation {
     fn found(&self, process: &Process) -> Result<(Parameter, f64), SpreadError> {
         let mut parameters = process.kind().parameters().iter().zip(process.values());
         let found = parameters.find(|(p, _)| p.name() == self.parameter);
-        found.map(|(p, value)| (*p, value)).ok_or_else(|| self.no_parameter(process))
+        found
+            .map(|(p, value)| (*p, value))
+            .ok_or_else(|| self.no_parameter(process))
     }
 
     fn applied(&self, process: &Process, value: f64, rate_hz: f64) -> Result<Process, SpreadError> {
         let changed = process.with_parameter(&self.parameter, value, rate_hz);
-        changed.ok_or_else(|| self.no_parameter(process))?.map_err(SpreadError::Reaches)
+        changed
+            .ok_or_else(|| self.no_parameter(process))?
+            .map_err(SpreadError::Reaches)
     }
 
     /// The process with this parameter drawn.
-    fn draw(&self, process: &Process, rate_hz: f64, g: &mut Generator) -> Result<Process, SpreadError> {
+    fn draw(
+        &self,
+        process: &Process,
+        rate_hz: f64,
+        g: &mut Generator,
+    ) -> Result<Process, SpreadError> {
         match self.law {
             Law::Beta { a, b, low, width } => {
-                let error = |_| SpreadError::Constant { name: "a", value: a, domain: "usable with b" };
+                let error = |_| SpreadError::Constant {
+                    name: "a",
+                    value: a,
+                    domain: "usable with b",
+                };
                 let share: f64 = g.sample(Beta::new(a, b).map_err(error)?);
                 self.applied(process, low + width * share, rate_hz)
             }
             Law::Normal { sd } => {
                 let centre = self.centre(process)?;
                 loop {
-                    match self.applied(process, centre + sd * g.sample::<f64, _>(StandardNormal), rate_hz) {
+                    match self.applied(
+                        process,
+                        centre + sd * g.sample::<f64, _>(StandardNormal),
+                        rate_hz,
+                    ) {
                         Err(SpreadError::Reaches(_)) => {}
                         done => return done,
                     }
                 }
             }
-            Law::Lognormal { median, sd: 0.0, .. } => self.applied(process, median, rate_hz),
+            Law::Lognormal {
+                median, sd: 0.0, ..
+            } => self.applied(process, median, rate_hz),
             Law::Lognormal { median, sd, .. } => {
                 let (parameter, _) = self.found(process)?;
                 let scaled = parameter.scaled(median) + sd * g.sample::<f64, _>(StandardNormal);
@@ -273,12 +318,20 @@ impl Spread {
             let labels = noise.labels();
             for variation in &self.axes[channel.index()] {
                 let Some(at) = labels.iter().position(|l| *l == variation.process) else {
-                    return Err(SpreadError::NoProcess { label: variation.process.clone(), known: labels });
+                    return Err(SpreadError::NoProcess {
+                        label: variation.process.clone(),
+                        known: labels,
+                    });
                 };
                 let process = format!("spread.{}.{}", variation.process, variation.parameter);
                 // A stream for each law: to let one more parameter vary changes no other's draws.
-                let key =
-                    StreamKey { seed, scenario: "", run: replicate, source: &source, process: &process };
+                let key = StreamKey {
+                    seed,
+                    scenario: "",
+                    run: replicate,
+                    source: &source,
+                    process: &process,
+                };
                 noise.processes[at] =
                     variation.draw(&noise.processes[at], model.rate_hz, &mut key.generator())?;
             }
@@ -305,9 +358,12 @@ impl Spread {
         for (axis, laws) in self.axes.iter().enumerate() {
             let labels = drawn.axes[axis].labels();
             for variation in laws {
-                let Some(at) = labels.iter().position(|l| *l == variation.process) else { continue };
+                let Some(at) = labels.iter().position(|l| *l == variation.process) else {
+                    continue;
+                };
                 let value = |model: &Model| variation.found(&model.axes[axis].processes[at]);
-                let ((parameter, own), (_, from), (_, to)) = (value(&drawn)?, value(model)?, value(centre)?);
+                let ((parameter, own), (_, from), (_, to)) =
+                    (value(&drawn)?, value(model)?, value(centre)?);
                 let scaled = parameter.scaled(own) + parameter.scaled(to) - parameter.scaled(from);
                 let process = &mut moved.axes[axis].processes[at];
                 // An amplitude of 0 has no logarithm: what was drawn stands.

@@ -29,16 +29,33 @@ impl Synthesizer {
     /// axis; its `process` is replaced by the label of each summand ([`Composite::labels`]).
     #[must_use]
     pub fn new(noise: &Composite, key: StreamKey<'_>) -> Self {
-        let mut synthesizer = Self { direct: Vec::new(), recursive: Vec::new() };
+        let mut synthesizer = Self {
+            direct: Vec::new(),
+            recursive: Vec::new(),
+        };
         for (process, label) in noise.processes.iter().zip(noise.labels()) {
             match process {
                 Process::Flicker(flicker) => {
                     for (i, part) in flicker.parts(Ladder::FINE).iter().enumerate() {
                         let label = format!("{label}.{i}");
-                        synthesizer.add(part, StreamKey { process: &label, ..key }.generator());
+                        synthesizer.add(
+                            part,
+                            StreamKey {
+                                process: &label,
+                                ..key
+                            }
+                            .generator(),
+                        );
                     }
                 }
-                _ => synthesizer.add(process, StreamKey { process: &label, ..key }.generator()),
+                _ => synthesizer.add(
+                    process,
+                    StreamKey {
+                        process: &label,
+                        ..key
+                    }
+                    .generator(),
+                ),
             }
         }
         synthesizer
@@ -48,27 +65,49 @@ impl Synthesizer {
     fn add(&mut self, process: &Process, mut g: Generator) {
         let draw = |g: &mut Generator| Ziggurat::get().draw(g);
         let (kind, last) = match process {
-            Process::White(p) if p.sigma2() > 0.0 => (Kind::White { sigma: p.sigma2().sqrt() }, 0.0),
+            Process::White(p) if p.sigma2() > 0.0 => (
+                Kind::White {
+                    sigma: p.sigma2().sqrt(),
+                },
+                0.0,
+            ),
             // The value before the first one is drawn too, so that the first sample has the variance 2 Q² of
             // all others.
-            Process::Quantization(p) if p.q2() > 0.0 => {
-                (Kind::Quantization { scale: (12.0 * p.q2()).sqrt() }, g.random())
-            }
+            Process::Quantization(p) if p.q2() > 0.0 => (
+                Kind::Quantization {
+                    scale: (12.0 * p.q2()).sqrt(),
+                },
+                g.random(),
+            ),
             Process::Drift(p) if p.slope() != 0.0 => (Kind::Drift { slope: p.slope() }, 0.0),
             Process::Ma1(p) if p.sigma2() > 0.0 => {
                 let sigma = p.sigma2().sqrt();
-                (Kind::Ma1 { theta: p.theta(), sigma }, sigma * draw(&mut g))
+                (
+                    Kind::Ma1 {
+                        theta: p.theta(),
+                        sigma,
+                    },
+                    sigma * draw(&mut g),
+                )
             }
-            Process::Ar1(p) if p.sigma2() > 0.0 => return self.recursive.push(Recursive::ar1(p, g)),
+            Process::Ar1(p) if p.sigma2() > 0.0 => {
+                return self.recursive.push(Recursive::ar1(p, g));
+            }
             Process::GaussMarkov(p) if p.s2() > 0.0 => {
                 return self.recursive.push(Recursive::ar1(&p.ar1(), g));
             }
             Process::RandomWalk(p) if p.gamma2() > 0.0 => {
-                return self.recursive.push(Recursive::new(1.0, p.gamma2().sqrt(), 0.0, g));
+                return self
+                    .recursive
+                    .push(Recursive::new(1.0, p.gamma2().sqrt(), 0.0, g));
             }
             _ => return,
         };
-        self.direct.push(Direct { kind, last, generator: g });
+        self.direct.push(Direct {
+            kind,
+            last,
+            generator: g,
+        });
     }
 
     /// Overwrites `out` with the next samples.
@@ -77,8 +116,11 @@ impl Synthesizer {
             block.fill(0.0);
             self.direct.iter_mut().for_each(|d| d.add_to(block));
             let (groups, rest) = self.recursive.as_chunks_mut::<TOGETHER>();
-            groups.iter_mut().for_each(|group| add_recursive(group, block));
-            rest.iter_mut().for_each(|one| add_recursive(std::array::from_mut(one), block));
+            groups
+                .iter_mut()
+                .for_each(|group| add_recursive(group, block));
+            rest.iter_mut()
+                .for_each(|one| add_recursive(std::array::from_mut(one), block));
         }
     }
 }
@@ -140,7 +182,13 @@ struct Recursive {
 
 impl Recursive {
     const fn new(phi: f64, sigma: f64, last: f64, generator: Generator) -> Self {
-        Self { phi, sigma, last, generator, block: [0.0; BLOCK] }
+        Self {
+            phi,
+            sigma,
+            last,
+            generator,
+            block: [0.0; BLOCK],
+        }
     }
 
     /// A stationary AR1: X_0 from the stationary law, so that X_1 has it too.
@@ -160,7 +208,10 @@ fn add_recursive<const N: usize>(group: &mut [Recursive; N], out: &mut [f64]) {
         r.block[..n].iter_mut().for_each(|w| *w = z.draw(&mut g));
         r.generator = g;
     }
-    let (phi, sigma) = (group.each_ref().map(|r| r.phi), group.each_ref().map(|r| r.sigma));
+    let (phi, sigma) = (
+        group.each_ref().map(|r| r.phi),
+        group.each_ref().map(|r| r.sigma),
+    );
     let mut last = group.each_ref().map(|r| r.last);
     for (k, x) in out.iter_mut().enumerate().take(n) {
         for i in 0..N {
@@ -180,7 +231,13 @@ mod tests {
     use super::*;
     use crate::noise::{Drift, GaussMarkov, Ma1, Quantization, RandomWalk, White};
 
-    const KEY: StreamKey<'_> = StreamKey { seed: 7, scenario: "", run: 0, source: "accel.x", process: "" };
+    const KEY: StreamKey<'_> = StreamKey {
+        seed: 7,
+        scenario: "",
+        run: 0,
+        source: "accel.x",
+        process: "",
+    };
     /// How many standard deviations a statistic may be off: 2·Φ(−5) = 6e-7 a comparison.
     const SIGMAS: f64 = 5.0;
 
@@ -218,24 +275,35 @@ mod tests {
     fn assert_autocovariance(process: Process, gamma: impl Fn(i64) -> f64) {
         let x = draw(vec![process], KEY, 1 << 20);
         for k in [0_i64, 1, 2, 5, 20] {
-            let spread: f64 = (-2000..=2000).map(|m| gamma(m).powi(2) + gamma(m + k) * gamma(m - k)).sum();
+            let spread: f64 = (-2000..=2000)
+                .map(|m| gamma(m).powi(2) + gamma(m + k) * gamma(m - k))
+                .sum();
             let bound = SIGMAS * (spread / x.len() as f64).sqrt();
             let error = autocovariance(&x, k as usize) - gamma(k);
-            assert!(error.abs() < bound, "{process:?}, lag {k}: off by {error}, bound {bound}");
+            assert!(
+                error.abs() < bound,
+                "{process:?}, lag {k}: off by {error}, bound {bound}"
+            );
         }
     }
 
     #[test]
     fn autocovariances_are_those_of_the_processes() {
         assert_autocovariance(white(), |k| if k == 0 { 4.0 } else { 0.0 });
-        assert_autocovariance(quantization(), |k| [1.0, -0.5, 0.0][k.unsigned_abs().min(2) as usize]);
+        assert_autocovariance(quantization(), |k| {
+            [1.0, -0.5, 0.0][k.unsigned_abs().min(2) as usize]
+        });
         for phi in [0.98, 0.3, -0.7] {
-            assert_autocovariance(ar1(phi), |k| phi.powi(k.unsigned_abs() as i32) * 2.0 / (1.0 - phi * phi));
+            assert_autocovariance(ar1(phi), |k| {
+                phi.powi(k.unsigned_abs() as i32) * 2.0 / (1.0 - phi * phi)
+            });
         }
         let gamma_ma = [1.5 * 1.36, 1.5 * 0.6, 0.0];
         assert_autocovariance(ma1(), |k| gamma_ma[k.unsigned_abs().min(2) as usize]);
         let gm = GaussMarkov::new(2.0, 3.0, 100.0).unwrap();
-        assert_autocovariance(Process::GaussMarkov(gm), |k| 3.0 * (-2.0 * k.abs() as f64 / 100.0).exp());
+        assert_autocovariance(Process::GaussMarkov(gm), |k| {
+            3.0 * (-2.0 * k.abs() as f64 / 100.0).exp()
+        });
     }
 
     /// Variance over many runs of the sample at a given time; its standard deviation is σ²√(2/R).
@@ -244,7 +312,10 @@ mod tests {
         let last_value = |run| draw(vec![process], StreamKey { run, ..KEY }, t)[t - 1];
         let variance = (0..RUNS).map(|run| last_value(run).powi(2)).sum::<f64>() / RUNS as f64;
         let bound = SIGMAS * expected * (2.0 / RUNS as f64).sqrt();
-        assert!((variance - expected).abs() < bound, "{process:?} at {t}: {variance}, expected {expected}");
+        assert!(
+            (variance - expected).abs() < bound,
+            "{process:?} at {t}: {variance}, expected {expected}"
+        );
     }
 
     #[test]
@@ -305,7 +376,14 @@ mod tests {
         let base = draw(vec![white()], KEY, n);
         let twins = [
             draw(vec![white()], StreamKey { run: 1, ..KEY }, n),
-            draw(vec![white()], StreamKey { source: "accel.y", ..KEY }, n),
+            draw(
+                vec![white()],
+                StreamKey {
+                    source: "accel.y",
+                    ..KEY
+                },
+                n,
+            ),
             draw(vec![white()], StreamKey { seed: 8, ..KEY }, n),
             // White because phi = 0, but another process with another label.
             draw(vec![ar1(0.0)], KEY, n),
@@ -325,7 +403,14 @@ mod tests {
         const LEVELS: u32 = 9;
         let gm = Process::GaussMarkov(GaussMarkov::new(2.0, 3.0, 100.0).unwrap());
         let n2 = vec![white(), quantization(), ar1(0.9), ar1(0.999), walk()];
-        for processes in [vec![quantization()], vec![walk()], vec![ma1()], vec![gm], vec![ar1(-0.7)], n2] {
+        for processes in [
+            vec![quantization()],
+            vec![walk()],
+            vec![ma1()],
+            vec![gm],
+            vec![ar1(-0.7)],
+            n2,
+        ] {
             let theory = Composite::new(processes.clone());
             let measured: Vec<Vec<f64>> = (0..RUNS)
                 .map(|run| draw(processes.clone(), StreamKey { run, ..KEY }, 1 << 13))
@@ -334,10 +419,14 @@ mod tests {
             for level in 1..=LEVELS {
                 let nu: Vec<f64> = measured.iter().map(|m| m[level as usize - 1]).collect();
                 let mean = nu.iter().sum::<f64>() / RUNS as f64;
-                let scatter = nu.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (RUNS - 1) as f64;
+                let scatter =
+                    nu.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (RUNS - 1) as f64;
                 let error = mean - theory.haar_wv(level);
                 let bound = SIGMAS * (scatter / RUNS as f64).sqrt();
-                assert!(error.abs() < bound, "{processes:?}, level {level}: off by {error}, bound {bound}");
+                assert!(
+                    error.abs() < bound,
+                    "{processes:?}, level {level}: off by {error}, bound {bound}"
+                );
             }
         }
     }
@@ -348,7 +437,10 @@ mod tests {
         let sum = draw(parts.clone(), KEY, 1000);
         let mut expected = vec![0.0; 1000];
         for part in parts {
-            expected.iter_mut().zip(draw(vec![part], KEY, 1000)).for_each(|(e, x)| *e += x);
+            expected
+                .iter_mut()
+                .zip(draw(vec![part], KEY, 1000))
+                .for_each(|(e, x)| *e += x);
         }
         // Summed in another order: a few roundings of numbers below 100.
         for (s, e) in sum.iter().zip(expected) {
@@ -359,7 +451,15 @@ mod tests {
     #[test]
     fn block_sizes_do_not_matter() {
         let drift = Process::Drift(Drift::new(1e-3).unwrap());
-        let noise = Composite::new(vec![white(), ar1(0.9), ar1(0.5), quantization(), walk(), ma1(), drift]);
+        let noise = Composite::new(vec![
+            white(),
+            ar1(0.9),
+            ar1(0.5),
+            quantization(),
+            walk(),
+            ma1(),
+            drift,
+        ]);
         let mut whole = vec![0.0; 5000];
         Synthesizer::new(&noise, KEY).fill(&mut whole);
         let mut pieces = vec![0.0; 5000];
@@ -376,6 +476,9 @@ mod tests {
     #[test]
     fn nothing_is_zero() {
         assert_eq!(draw(vec![], KEY, 3), [0.0; 3]);
-        assert_eq!(draw(vec![Process::White(White::new(0.0).unwrap())], KEY, 3), [0.0; 3]);
+        assert_eq!(
+            draw(vec![Process::White(White::new(0.0).unwrap())], KEY, 3),
+            [0.0; 3]
+        );
     }
 }

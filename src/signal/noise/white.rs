@@ -18,7 +18,9 @@ impl White {
     /// # Errors
     /// When it is negative or not finite.
     pub fn new(sigma2: f64) -> Result<Self, ParameterError> {
-        Ok(Self { sigma2: non_negative(Self::CODE, "sigma2", sigma2)? })
+        Ok(Self {
+            sigma2: non_negative(Self::CODE, "sigma2", sigma2)?,
+        })
     }
 
     /// Variance of a sample (units²).

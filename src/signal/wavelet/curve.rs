@@ -31,6 +31,8 @@ impl Curve {
     /// Response to quantization noise at a level; none where it is read as it is.
     #[must_use]
     pub fn response(&self, level: u32) -> Option<&QuantizationResponse> {
-        self.quantization.as_ref().filter(|_| !self.classical.contains(&level))
+        self.quantization
+            .as_ref()
+            .filter(|_| !self.classical.contains(&level))
     }
 }

@@ -44,16 +44,31 @@ pub fn gappy(signal: &[f64], levels: u32, tuning: &Tuning) -> Result<Gappy, Wave
     let present: Vec<f64> = signal.iter().copied().filter(|x| !x.is_nan()).collect();
     check_levels(&present, 1)?;
     if coefficient_count(signal.len(), levels) == 0 {
-        return Err(WaveletError::TooShort { samples: signal.len(), levels });
+        return Err(WaveletError::TooShort {
+            samples: signal.len(),
+            levels,
+        });
     }
     let first = present[0];
     let mean = first + present.iter().map(|x| x - first).sum::<f64>() / present.len() as f64;
-    let samples: Vec<f64> = signal.iter().map(|x| if x.is_nan() { 0.0 } else { x - mean }).collect();
-    let there: Vec<f64> = signal.iter().map(|x| f64::from(u8::from(!x.is_nan()))).collect();
-    let mut windows = Windows { sums: samples.clone(), counts: there.clone(), half: 1 };
+    let samples: Vec<f64> = signal
+        .iter()
+        .map(|x| if x.is_nan() { 0.0 } else { x - mean })
+        .collect();
+    let there: Vec<f64> = signal
+        .iter()
+        .map(|x| f64::from(u8::from(!x.is_nan())))
+        .collect();
+    let mut windows = Windows {
+        sums: samples.clone(),
+        counts: there.clone(),
+        half: 1,
+    };
     let mut found = Gappy::default();
     for level in 1..=levels {
-        let Some(coefficients) = windows.coefficients() else { break };
+        let Some(coefficients) = windows.coefficients() else {
+            break;
+        };
         let excess = Blocks::new(&samples, &there, windows.half).excess(&windows);
         let nu = (coefficients.mean_square() - excess).max(0.0);
         let mut robust = coefficients.robust(nu, excess, tuning);
@@ -103,17 +118,23 @@ impl Windows {
         let count = self.sums.len() - self.half;
         let mut total = 0.0;
         let next = |u: usize| {
-            total += self.halves(u).map_or(0.0, |halves| made(self.weight(halves), halves));
+            total += self
+                .halves(u)
+                .map_or(0.0, |halves| made(self.weight(halves), halves));
             total
         };
-        std::iter::once(0.0).chain((0..count).step_by(step).map(next)).collect()
+        std::iter::once(0.0)
+            .chain((0..count).step_by(step).map(next))
+            .collect()
     }
 
     fn coefficients(&self) -> Option<Coefficients> {
         let count = self.sums.len() - self.half;
         let (mut squares, mut weights, mut losses) = (Vec::new(), Vec::new(), Vec::new());
         for u in 0..count {
-            let Some(halves) = self.halves(u) else { continue };
+            let Some(halves) = self.halves(u) else {
+                continue;
+            };
             let [early, late] = halves;
             let difference = 0.5 * (self.sums[u + self.half] / late - self.sums[u] / early);
             squares.push(difference * difference);
@@ -122,7 +143,12 @@ impl Windows {
             losses.push(1.0 / self.weight(halves) - 1.0);
         }
         let total = weights.iter().sum::<f64>();
-        (total > 0.0).then(|| Coefficients { squares, weights, losses, coverage: total / count as f64 })
+        (total > 0.0).then(|| Coefficients {
+            squares,
+            weights,
+            losses,
+            coverage: total / count as f64,
+        })
     }
 }
 
@@ -152,9 +178,16 @@ impl Coefficients {
 
     fn robust(&self, nu: f64, excess: f64, tuning: &Tuning) -> RobustVariance {
         let loss = self.mean(&self.losses);
-        let lambda = if loss > 0.0 && nu > 0.0 { (excess / nu / loss).clamp(-0.5, 1.0) } else { 0.0 };
-        let squares =
-            self.squares.iter().zip(&self.losses).map(|(square, loss)| square / (1.0 + lambda * loss));
+        let lambda = if loss > 0.0 && nu > 0.0 {
+            (excess / nu / loss).clamp(-0.5, 1.0)
+        } else {
+            0.0
+        };
+        let squares = self
+            .squares
+            .iter()
+            .zip(&self.losses)
+            .map(|(square, loss)| square / (1.0 + lambda * loss));
         m_scale(&squares.collect::<Vec<_>>(), tuning)
     }
 }
@@ -179,7 +212,10 @@ impl Blocks {
         let half = m / length;
         let of_blocks = |values: &mut dyn Iterator<Item = f64>| -> Vec<f64> {
             let values: Vec<f64> = values.collect();
-            values.chunks_exact(length).map(|block| block.iter().sum()).collect()
+            values
+                .chunks_exact(length)
+                .map(|block| block.iter().sum())
+                .collect()
         };
         let counts = of_blocks(&mut there.iter().copied());
         let sums = of_blocks(&mut samples.iter().copied());
@@ -191,10 +227,19 @@ impl Blocks {
                 - 2.0 * dot(&sums, &sums[late.clone()]);
             let same = if k == 0 { counts.iter().sum() } else { 0.0 };
             let pairs = dot(&counts, &counts[late]) - same;
-            if pairs > 0.0 { (cross / pairs).max(0.0) } else { 0.0 }
+            if pairs > 0.0 {
+                (cross / pairs).max(0.0)
+            } else {
+                0.0
+            }
         };
         let differences = (0..(2 * half).min(counts.len())).map(at_lag).collect();
-        Self { length, half, counts, differences }
+        Self {
+            length,
+            half,
+            counts,
+            differences,
+        }
     }
 
     /// By how much the mean of w W² over the windows, at the blocks' beginnings, exceeds that of whole windows.
@@ -211,7 +256,11 @@ impl Blocks {
         // Σ over the windows of blocks before the one at `i`.
         let up_to = |sums: &[f64], i: isize| sums[i.clamp(0, sums.len() as isize - 1) as usize];
         let weighted = |made: &dyn Fn(isize) -> f64| -> Vec<f64> {
-            self.counts.iter().enumerate().map(|(i, n)| n * made(i as isize)).collect()
+            self.counts
+                .iter()
+                .enumerate()
+                .map(|(i, n)| n * made(i as isize))
+                .collect()
         };
         // A pair (i, i + k) is in the early half of the windows from i + k − h + 1 to i, in the late half of those from
         // i + k − 2h + 1 to i − h, and across where i is in the early and i + k in the late half: a sum over windows is one that
@@ -222,14 +271,19 @@ impl Blocks {
             weighted(&|i| -within(i) - up_to(&cross, i - h + 1)),
             weighted(&|i| before(i) + up_to(&cross, i - h + 1)),
         ];
-        let far = [weighted(&|i| up_to(&cross, i + 1)), weighted(&|i| -up_to(&cross, i - 2 * h + 1))];
+        let far = [
+            weighted(&|i| up_to(&cross, i + 1)),
+            weighted(&|i| -up_to(&cross, i - 2 * h + 1)),
+        ];
         let mut four = 0.0;
         for (k, difference) in self.differences.iter().enumerate().skip(1) {
             let [of_first, of_second] = if k < self.half { &near } else { &far };
-            four += difference * (dot(of_first, &self.counts[k..]) + dot(&self.counts, &of_second[k..]));
+            four += difference
+                * (dot(of_first, &self.counts[k..]) + dot(&self.counts, &of_second[k..]));
         }
-        let same =
-            |i: usize| self.counts[i] * (self.counts[i] - 1.0) * (within(i as isize) - before(i as isize));
+        let same = |i: usize| {
+            self.counts[i] * (self.counts[i] - 1.0) * (within(i as isize) - before(i as isize))
+        };
         four -= 0.5 * self.differences[0] * (0..self.counts.len()).map(same).sum::<f64>();
         0.25 * (four / total - self.whole())
     }
@@ -243,7 +297,13 @@ impl Blocks {
             let halves = 2.0 * (h - k).max(0.0) / (h * h);
             difference * (cross - halves)
         };
-        let all: f64 = self.differences.iter().enumerate().skip(1).map(of_lag).sum();
+        let all: f64 = self
+            .differences
+            .iter()
+            .enumerate()
+            .skip(1)
+            .map(of_lag)
+            .sum();
         all - self.differences[0] * (1.0 - 1.0 / length) / h
     }
 }
@@ -252,7 +312,12 @@ impl Blocks {
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
     let (a, b) = (a[..n].chunks_exact(16), b[..n].chunks_exact(16));
-    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(x, y)| x * y).sum();
+    let rest: f64 = a
+        .remainder()
+        .iter()
+        .zip(b.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
     let mut lanes = [0.0; 16];
     for (x, y) in a.zip(b) {
         for i in 0..16 {

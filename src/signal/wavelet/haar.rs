@@ -53,7 +53,10 @@ impl Pyramid {
         // The coefficients do not see a constant. The first sample does as well as the mean, and needs no
         // pass over the record.
         let first = signal[0];
-        Ok(Self { sums: signal.iter().map(|x| x - first).collect(), half: 1 })
+        Ok(Self {
+            sums: signal.iter().map(|x| x - first).collect(),
+            half: 1,
+        })
     }
 
     /// The classical variance of the next level.
@@ -90,7 +93,9 @@ fn step(sums: &mut [f64], half: usize) -> f64 {
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn step_keeping(sums: &mut [f64], half: usize, squares: &mut [f64]) -> f64 {
-    butterflies(sums, half, |t, values| squares[t..t + values.len()].copy_from_slice(values))
+    butterflies(sums, half, |t, values| {
+        squares[t..t + values.len()].copy_from_slice(values)
+    })
 }
 
 /// Replaces each a = sums\[t\] by a + b, b = sums\[t + half\], and returns Σ (b − a)²; `keep` sees the squares.
@@ -165,7 +170,11 @@ impl Compensated {
         let sum = self.sum + x;
         // The part of the smaller operand that rounding cut off, exactly (Neumaier; Kahan's form fails when a
         // term exceeds the sum).
-        self.lost += if self.sum.abs() >= x.abs() { (self.sum - sum) + x } else { (x - sum) + self.sum };
+        self.lost += if self.sum.abs() >= x.abs() {
+            (self.sum - sum) + x
+        } else {
+            (x - sum) + self.sum
+        };
         self.sum = sum;
     }
 
@@ -200,7 +209,9 @@ mod tests {
     fn digits_survive_offsets_and_random_walks() {
         let mut generator = Generator::seed_from_u64(1);
         let n = 150_001;
-        let noise: Vec<i64> = (0..n).map(|_| generator.random_range(-1000..=1000)).collect();
+        let noise: Vec<i64> = (0..n)
+            .map(|_| generator.random_range(-1000..=1000))
+            .collect();
         let offset: Vec<i64> = noise.iter().map(|x| 9_810_000_000_000 + x).collect();
         let mut position = 0;
         let walk: Vec<i64> = noise
@@ -226,10 +237,31 @@ mod tests {
             [(1.0 + 4.0 + 16.0) / 12.0, (4.5_f64 / 2.0).powi(2)]
         );
         assert_eq!(coefficients(&[1.0, 2.0, 4.0, 8.0], 2).unwrap(), [2.25]);
-        assert_eq!(classical(&[1.0, 2.0, 3.0], 2), Err(WaveletError::TooShort { samples: 3, levels: 2 }));
-        assert_eq!(classical(&[], 1), Err(WaveletError::TooShort { samples: 0, levels: 1 }));
+        assert_eq!(
+            classical(&[1.0, 2.0, 3.0], 2),
+            Err(WaveletError::TooShort {
+                samples: 3,
+                levels: 2
+            })
+        );
+        assert_eq!(
+            classical(&[], 1),
+            Err(WaveletError::TooShort {
+                samples: 0,
+                levels: 1
+            })
+        );
         assert_eq!(classical(&[1.0], 0), Err(WaveletError::NoLevels));
-        assert_eq!(classical(&[1.0; 8], 64), Err(WaveletError::TooShort { samples: 8, levels: 64 }));
-        assert!(matches!(classical(&[1.0, f64::NAN], 1), Err(WaveletError::NotFinite { index: 1, .. })));
+        assert_eq!(
+            classical(&[1.0; 8], 64),
+            Err(WaveletError::TooShort {
+                samples: 8,
+                levels: 64
+            })
+        );
+        assert!(matches!(
+            classical(&[1.0, f64::NAN], 1),
+            Err(WaveletError::NotFinite { index: 1, .. })
+        ));
     }
 }

@@ -39,7 +39,12 @@ pub fn edof_large_sample(coefficients: &[f64], level: u32) -> f64 {
     }
     let thinned: Vec<f64> = coefficients.iter().step_by(step).copied().collect();
     let autocovariance = |lag: usize| {
-        thinned.iter().zip(&thinned[lag..]).map(|(a, b)| a * b).sum::<f64>() / thinned.len() as f64
+        thinned
+            .iter()
+            .zip(&thinned[lag..])
+            .map(|(a, b)| a * b)
+            .sum::<f64>()
+            / thinned.len() as f64
     };
     let s0 = autocovariance(0);
     let tail: f64 = (1..=lags).map(|lag| autocovariance(lag).powi(2)).sum();
@@ -81,7 +86,9 @@ mod tests {
         let (count, records) = (1000, 2000);
         let mut generator = Generator::seed_from_u64(11);
         let mut inverse = || {
-            let w: Vec<f64> = (0..count).map(|_| generator.sample(StandardNormal)).collect();
+            let w: Vec<f64> = (0..count)
+                .map(|_| generator.sample(StandardNormal))
+                .collect();
             count as f64 / edof_large_sample(&w, 1)
         };
         let mean = (0..records).map(|_| inverse()).sum::<f64>() / f64::from(records);
@@ -94,8 +101,9 @@ mod tests {
     #[test]
     fn large_sample_degrees_of_freedom_have_lags_to_two_scales() {
         let (level, count) = (6_u32, 1 << 18);
-        let w: Vec<f64> =
-            (0..count).map(|k| (std::f64::consts::TAU * f64::from(k % 64) / 64.0).cos()).collect();
+        let w: Vec<f64> = (0..count)
+            .map(|k| (std::f64::consts::TAU * f64::from(k % 64) / 64.0).cos())
+            .collect();
         let expected = f64::from(count) / (4.0 * 33.0);
         assert!((edof_large_sample(&w, level) / expected - 1.0).abs() < 5e-3);
     }
@@ -109,7 +117,9 @@ mod tests {
         for level in [1, 3, 5] {
             let (mut large, mut conservative) = (0, 0);
             for _ in 0..SIGNALS {
-                let signal: Vec<f64> = (0..1024).map(|_| generator.sample(StandardNormal)).collect();
+                let signal: Vec<f64> = (0..1024)
+                    .map(|_| generator.sample(StandardNormal))
+                    .collect();
                 let w = haar::coefficients(&signal, level).unwrap();
                 let nu = w.iter().map(|w| w * w).sum::<f64>() / w.len() as f64;
                 let truth = 1.0 / f64::from(level).exp2();
@@ -121,8 +131,14 @@ mod tests {
                 conservative += covers(edof_eta3(1024, level));
             }
             let frequency = f64::from(large) / f64::from(SIGNALS);
-            assert!((frequency - 0.95).abs() < 0.044, "level {level}: {frequency}");
-            assert!(f64::from(conservative) / f64::from(SIGNALS) > 0.95, "level {level}");
+            assert!(
+                (frequency - 0.95).abs() < 0.044,
+                "level {level}: {frequency}"
+            );
+            assert!(
+                f64::from(conservative) / f64::from(SIGNALS) > 0.95,
+                "level {level}"
+            );
         }
     }
 }

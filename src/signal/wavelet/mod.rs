@@ -72,7 +72,9 @@ pub fn default_levels(samples: usize) -> u32 {
 /// M_j = T − 2^j + 1, the number of coefficients of a level (0 when the signal is too short).
 #[must_use]
 pub fn coefficient_count(samples: usize, level: u32) -> usize {
-    1_usize.checked_shl(level).map_or(0, |tau| (samples + 1).saturating_sub(tau))
+    1_usize
+        .checked_shl(level)
+        .map_or(0, |tau| (samples + 1).saturating_sub(tau))
 }
 
 fn check_levels(signal: &[f64], levels: u32) -> Result<(), WaveletError> {
@@ -80,10 +82,16 @@ fn check_levels(signal: &[f64], levels: u32) -> Result<(), WaveletError> {
         return Err(WaveletError::NoLevels);
     }
     if coefficient_count(signal.len(), levels) == 0 {
-        return Err(WaveletError::TooShort { samples: signal.len(), levels });
+        return Err(WaveletError::TooShort {
+            samples: signal.len(),
+            levels,
+        });
     }
     match signal.iter().position(|x| !x.is_finite()) {
         None => Ok(()),
-        Some(index) => Err(WaveletError::NotFinite { index, value: signal[index] }),
+        Some(index) => Err(WaveletError::NotFinite {
+            index,
+            value: signal[index],
+        }),
     }
 }

@@ -28,14 +28,18 @@ impl QuantizationResponse {
     pub(super) fn new(c: f64, a: f64) -> Self {
         let law = Law::new();
         let gaussian = law.solve(0.0, c, a).1;
-        let mut response = Self { factor: [0.0; NODES], efficiency: [0.0; NODES] };
+        let mut response = Self {
+            factor: [0.0; NODES],
+            efficiency: [0.0; NODES],
+        };
         for node in 0..NODES {
             let angle = PI * (node as f64 + 0.5) / NODES as f64;
             // Chebyshev's nodes leave out share = 0, where the quotient by share² would be 0/0.
             let share = 0.5 * (1.0 + angle.cos());
             let (factor, efficiency) = law.solve(share, c, a);
             for k in 0..NODES {
-                let weight = if k == 0 { 1.0 } else { 2.0 } * (k as f64 * angle).cos() / NODES as f64;
+                let weight =
+                    if k == 0 { 1.0 } else { 2.0 } * (k as f64 * angle).cos() / NODES as f64;
                 response.factor[k] += weight * (factor - 1.0) / (share * share);
                 response.efficiency[k] += weight * (efficiency / gaussian - 1.0) / (share * share);
             }
@@ -69,7 +73,10 @@ fn departure(series: &[f64; NODES], share: f64) -> (f64, f64) {
         let (next, d_next) = (2.0 * x * t - before, 2.0 * t + 2.0 * x * dt - d_before);
         (before, d_before, t, dt) = (t, dt, next, d_next);
     }
-    (1.0 + share * share * p, 2.0 * share * p + 2.0 * share * share * dp)
+    (
+        1.0 + share * share * p,
+        2.0 * share * p + 2.0 * share * share * dp,
+    )
 }
 
 /// Law of √(1 − share)·Z + √share·Y: nodes and weights of the quadratures over Z and Y.
@@ -85,7 +92,10 @@ impl Law {
             let z = 0.125 * f64::from(i);
             (z, 0.125 * (-0.5 * z * z).exp() / (2.0 * PI).sqrt())
         });
-        Self { normal: normal.collect(), second_difference: second_difference() }
+        Self {
+            normal: normal.collect(),
+            second_difference: second_difference(),
+        }
     }
 
     /// E chi(W/√b), E dchi/dln b and E chi² over the law of W.
@@ -141,7 +151,11 @@ fn second_difference() -> Vec<(f64, f64)> {
     for from in [0.0, 1.0] {
         for i in 0..=INTERVALS {
             let v = from + i as f64 / INTERVALS as f64;
-            let density = if from < 1.0 { 0.5 - 0.25 * v * v } else { 0.25 * (2.0 - v).powi(2) };
+            let density = if from < 1.0 {
+                0.5 - 0.25 * v * v
+            } else {
+                0.25 * (2.0 - v).powi(2)
+            };
             let simpson = match i {
                 0 | INTERVALS => 1.0,
                 i if i % 2 == 1 => 4.0,
@@ -171,12 +185,24 @@ mod tests {
     fn the_factor_is_what_was_simulated_elsewhere() {
         let t = tuning();
         assert_eq!(t.quantization().factor(0.0), (1.0, 0.0));
-        for (share, expected) in [(0.25, 1.00805), (0.5, 1.03641), (0.75, 1.08431), (1.0, 1.15287)] {
+        for (share, expected) in [
+            (0.25, 1.00805),
+            (0.5, 1.03641),
+            (0.75, 1.08431),
+            (1.0, 1.15287),
+        ] {
             let (factor, slope) = t.quantization().factor(share);
-            assert!((factor - expected).abs() < 4.0 * 4.1e-4, "{share}: {factor}");
-            let difference =
-                (t.quantization().factor(share + 1e-5).0 - t.quantization().factor(share - 1e-5).0) / 2e-5;
-            assert!((slope - difference).abs() < 1e-8, "{share}: {slope} {difference}");
+            assert!(
+                (factor - expected).abs() < 4.0 * 4.1e-4,
+                "{share}: {factor}"
+            );
+            let difference = (t.quantization().factor(share + 1e-5).0
+                - t.quantization().factor(share - 1e-5).0)
+                / 2e-5;
+            assert!(
+                (slope - difference).abs() < 1e-8,
+                "{share}: {slope} {difference}"
+            );
         }
     }
 
@@ -195,17 +221,22 @@ mod tests {
                 let z = generator.sample::<f64, _>(StandardNormal);
                 ((1.0_f64 - share).sqrt() * z + f64::sqrt(share) * y).powi(2)
             };
-            let mut estimate = || m_scale(&(0..1000).map(|_| square()).collect::<Vec<_>>(), &t).value;
+            let mut estimate =
+                || m_scale(&(0..1000).map(|_| square()).collect::<Vec<_>>(), &t).value;
             let all: Vec<f64> = (0..SAMPLES).map(|_| estimate()).collect();
             let mean = all.iter().sum::<f64>() / SAMPLES as f64;
-            let scatter = all.iter().map(|v| (v / mean - 1.0).powi(2)).sum::<f64>() / SAMPLES as f64;
+            let scatter =
+                all.iter().map(|v| (v / mean - 1.0).powi(2)).sum::<f64>() / SAMPLES as f64;
             let expected = 2.0 / (1000.0 * efficiency * t.quantization().degrees(share));
             let (factor, _) = t.quantization().factor(share);
             assert!(
                 (mean / factor - 1.0).abs() < 4.0 * (expected / 800.0).sqrt() + 5e-4,
                 "{share}: {mean} {factor}"
             );
-            assert!((scatter / expected - 1.0).abs() < 0.2, "{share}: {scatter:e} {expected:e}");
+            assert!(
+                (scatter / expected - 1.0).abs() < 0.2,
+                "{share}: {scatter:e} {expected:e}"
+            );
         }
     }
 }

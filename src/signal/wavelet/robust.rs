@@ -86,8 +86,15 @@ pub fn both(
         let scale = 0.5 / pyramid.half as f64;
         let classical = pyramid.next_squares(&mut squares);
         let found = m_scale(&squares, tuning);
-        let mut robust = RobustVariance { value: found.value * scale * scale, ..found };
-        if robust.is_moved_by_steps(classical, edof_eta3(signal.len(), level), tuning.efficiency()) {
+        let mut robust = RobustVariance {
+            value: found.value * scale * scale,
+            ..found
+        };
+        if robust.is_moved_by_steps(
+            classical,
+            edof_eta3(signal.len(), level),
+            tuning.efficiency(),
+        ) {
             robust.status = Status::Coarse;
         }
         (classical, robust)
@@ -102,11 +109,19 @@ pub(crate) fn m_scale(squares: &[f64], tuning: &Tuning) -> RobustVariance {
     // known to 4 %. Anything unusual goes to the search, which takes all of them.
     let sample = sample(squares);
     let start = squared_mad(&sample);
-    let near = if start > 0.0 { equation.newton_near(start) } else { None };
+    let near = if start > 0.0 {
+        equation.newton_near(start)
+    } else {
+        None
+    };
     let (value, status) = near.map_or_else(|| equation.search(), |value| (value, Status::Ok));
     // Of 4096 a share of a tenth is known to 0.5 %.
     let zero = sample.iter().filter(|y| **y <= ZERO * ZERO * value).count();
-    RobustVariance { value, status, zeros: zero as f64 / sample.len() as f64 }
+    RobustVariance {
+        value,
+        status,
+        zeros: zero as f64 / sample.len() as f64,
+    }
 }
 
 /// Normal quantile of ¾: the median of |Z|.
@@ -160,7 +175,11 @@ impl Equation<'_> {
     /// coefficients are many times as large as the others).
     fn search(&self) -> (f64, Status) {
         let mad = squared_mad(self.squares);
-        let status = if mad > 0.0 { Status::Ok } else { Status::Coarse };
+        let status = if mad > 0.0 {
+            Status::Ok
+        } else {
+            Status::Coarse
+        };
         let mean = self.squares.iter().sum::<f64>() / self.squares.len() as f64;
         // More than half of the coefficients are exactly zero: the MAD says nothing, and the mean is positive
         // unless all are zero.
@@ -298,7 +317,11 @@ fn biweight_sums(squares: &[f64], k: f64) -> (f64, f64) {
 /// At most 4096 evenly spaced elements, from which the start is taken; all of a short vector.
 fn sample(squares: &[f64]) -> Vec<f64> {
     const SIZE: usize = 4096;
-    squares.iter().step_by(squares.len().div_ceil(SIZE).max(1)).copied().collect()
+    squares
+        .iter()
+        .step_by(squares.len().div_ceil(SIZE).max(1))
+        .copied()
+        .collect()
 }
 
 /// (median |W|/0.6745)².

@@ -71,7 +71,12 @@ impl Tuning {
         // The true efficiency, also under the convention of R: the degrees of freedom follow from it, not
         // from the label.
         let (efficiency, a) = (moments.efficiency(Convention::Exact), moments.chi());
-        Ok(Self { efficiency, c: high, a, quantization: QuantizationResponse::new(high, a) })
+        Ok(Self {
+            efficiency,
+            c: high,
+            a,
+            quantization: QuantizationResponse::new(high, a),
+        })
     }
 
     /// Rejection point: coefficients beyond c standard deviations have no influence.
@@ -95,7 +100,11 @@ impl Tuning {
         let (mut low, mut high) = (0.01_f64, 1.0_f64);
         for _ in 0..100 {
             let (left, right) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-            if mean_chi(left) < mean_chi(right) { low = left } else { high = right }
+            if mean_chi(left) < mean_chi(right) {
+                low = left
+            } else {
+                high = right
+            }
         }
         // Rejected coefficients have chi = 0, so with a share ε of them the equation reads (1 − ε) E
         // chi(Z/√s) = a.
@@ -193,7 +202,10 @@ mod tests {
     /// far better than its place.
     #[test]
     fn breakdown_points_are_those_of_the_truth() {
-        for (efficiency, expected) in [(0.5, 0.201_838_947_965_474_2), (0.6, 0.259_458_671_321_522_56)] {
+        for (efficiency, expected) in [
+            (0.5, 0.201_838_947_965_474_2),
+            (0.6, 0.259_458_671_321_522_56),
+        ] {
             let t = Tuning::new(efficiency, Convention::Exact).unwrap();
             assert_relative_eq!(t.breakdown(), expected, max_relative = 1e-9);
         }
@@ -211,7 +223,10 @@ mod tests {
     #[test]
     fn efficiencies_without_a_constant_are_refused() {
         for efficiency in [f64::NAN, 0.0, 0.29, 0.995, 1.0, 60.0] {
-            assert!(Tuning::new(efficiency, Convention::Exact).is_err(), "{efficiency}");
+            assert!(
+                Tuning::new(efficiency, Convention::Exact).is_err(),
+                "{efficiency}"
+            );
         }
         for efficiency in [0.3, 0.99] {
             let t = Tuning::new(efficiency, Convention::Exact).unwrap();

@@ -5,16 +5,24 @@ use super::*;
 #[test]
 fn files_that_are_no_tables_are_refused_as_such() {
     let dir = tempfile::tempdir().unwrap();
-    let rows: String = (0..64).map(|t| format!("{},{}\n", 0.01 * f64::from(t), t % 7)).collect();
+    let rows: String = (0..64)
+        .map(|t| format!("{},{}\n", 0.01 * f64::from(t), t % 7))
+        .collect();
     let table = format!("t_s,gyro_x_rad_s\n{rows}");
-    let utf16: Vec<u8> =
-        [0xfeff].into_iter().chain(table.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    let utf16: Vec<u8> = [0xfeff]
+        .into_iter()
+        .chain(table.encode_utf16())
+        .flat_map(u16::to_le_bytes)
+        .collect();
     let write = |name: &str, bytes: &[u8]| std::fs::write(dir.path().join(name), bytes).unwrap();
     write("utf16.csv", &utf16);
     write("mac.csv", table.replace('\n', "\r").as_bytes());
     write("binary.csv", &[7, 0, 200, 10, 0, 3]);
     write("plain.csv.gz", table.as_bytes());
-    write("feet.csv", table.replace("gyro_x_rad_s", "accel_x_ft_s2").as_bytes());
+    write(
+        "feet.csv",
+        table.replace("gyro_x_rad_s", "accel_x_ft_s2").as_bytes(),
+    );
     write("ok.csv", table.as_bytes());
     for (arguments, what, hint) in [
         (&["utf16.csv"][..], "it is in UTF-16", "UTF-8"),
@@ -34,7 +42,11 @@ fn files_that_are_no_tables_are_refused_as_such() {
     ] {
         let stderr = refusal(dir.path(), &[&["wv", "-q"], arguments].concat(), 2);
         assert!(
-            stderr.contains(what) && stderr.split("hint: ").nth(1).is_some_and(|h| h.contains(hint)),
+            stderr.contains(what)
+                && stderr
+                    .split("hint: ")
+                    .nth(1)
+                    .is_some_and(|h| h.contains(hint)),
             "{stderr}"
         );
     }
@@ -46,8 +58,13 @@ fn files_that_are_no_tables_are_refused_as_such() {
 fn bad_requests_are_refused_with_a_hint() {
     let dir = tempfile::tempdir().unwrap();
     recordings(dir.path(), 2);
-    let calibrate =
-        |more: &[&str], code| refusal(dir.path(), &[&["calibrate", "runs", "-q"], more].concat(), code);
+    let calibrate = |more: &[&str], code| {
+        refusal(
+            dir.path(),
+            &[&["calibrate", "runs", "-q"], more].concat(),
+            code,
+        )
+    };
     let check = |stderr: String, parts: &[&str]| {
         for part in parts {
             assert!(stderr.contains(part), "{part:?} is not in {stderr}");
@@ -55,7 +72,10 @@ fn bad_requests_are_refused_with_a_hint() {
     };
     check(
         calibrate(&["--model", "2*AR+RW"], 2),
-        &["error: --model: model \"2*AR+RW\": \"AR\" is no process", "hint: did you mean \"AR1\"?"],
+        &[
+            "error: --model: model \"2*AR+RW\": \"AR\" is no process",
+            "hint: did you mean \"AR1\"?",
+        ],
     );
     check(calibrate(&["--model", "2*WN"], 2), &["2 WN are one WN"]);
     check(
@@ -65,39 +85,107 @@ fn bad_requests_are_refused_with_a_hint() {
             "hint:",
         ],
     );
-    check(calibrate(&["--trim", "60%"], 2), &["--trim", "a percentage under 50"]);
-    check(calibrate(&["--efficiency", "1.5"], 2), &["--efficiency: efficiency 1.5 is out of range"]);
-    check(calibrate(&["--scales", "20"], 2), &["run0.csv", "16384", "hint:"]);
+    check(
+        calibrate(&["--trim", "60%"], 2),
+        &["--trim", "a percentage under 50"],
+    );
+    check(
+        calibrate(&["--efficiency", "1.5"], 2),
+        &["--efficiency: efficiency 1.5 is out of range"],
+    );
+    check(
+        calibrate(&["--scales", "20"], 2),
+        &["run0.csv", "16384", "hint:"],
+    );
     check(
         calibrate(&["--scales", "5"], 2),
-        &["WN+QN+2*AR1+RW has 7 parameters, the curve 5 scales", "hint: record for longer"],
+        &[
+            "WN+QN+2*AR1+RW has 7 parameters, the curve 5 scales",
+            "hint: record for longer",
+        ],
     );
-    check(calibrate(&["--estimator", "gmwm"], 2), &["gmwm takes one recording at a time; there are 2"]);
+    check(
+        calibrate(&["--estimator", "gmwm"], 2),
+        &["gmwm takes one recording at a time; there are 2"],
+    );
     let before = std::fs::read(dir.path().join("runs/run0.csv")).unwrap();
-    check(calibrate(&["-o", "runs/run0.csv"], 2), &["is an input of this command and would be overwritten"]);
-    std::fs::write(dir.path().join("known.toml"), "[WN]\nsigma2 = { upper = 1.0 }\n").unwrap();
-    let onto_parameters = calibrate(&["--model", "WN", "--parameters", "known.toml", "-o", "known.toml"], 2);
+    check(
+        calibrate(&["-o", "runs/run0.csv"], 2),
+        &["is an input of this command and would be overwritten"],
+    );
+    std::fs::write(
+        dir.path().join("known.toml"),
+        "[WN]\nsigma2 = { upper = 1.0 }\n",
+    )
+    .unwrap();
+    let onto_parameters = calibrate(
+        &[
+            "--model",
+            "WN",
+            "--parameters",
+            "known.toml",
+            "-o",
+            "known.toml",
+        ],
+        2,
+    );
     check(
         refusal(dir.path(), &["wv", "runs", "-o", "runs/run0.csv"], 2),
         &["run0.csv is an input of this command"],
     );
-    check(onto_parameters, &["known.toml is an input of this command and would be overwritten"]);
-    assert_eq!(std::fs::read(dir.path().join("runs/run0.csv")).unwrap(), before);
+    check(
+        onto_parameters,
+        &["known.toml is an input of this command and would be overwritten"],
+    );
+    assert_eq!(
+        std::fs::read(dir.path().join("runs/run0.csv")).unwrap(),
+        before
+    );
     std::fs::create_dir(dir.path().join("taken.toml")).unwrap();
-    check(calibrate(&["-o", "taken.toml"], 2), &["taken.toml is not a file", "hint:"]);
-    check(calibrate(&["-o", "/dev/full"], 2), &["/dev/full is not a file"]);
+    check(
+        calibrate(&["-o", "taken.toml"], 2),
+        &["taken.toml is not a file", "hint:"],
+    );
+    check(
+        calibrate(&["-o", "/dev/full"], 2),
+        &["/dev/full is not a file"],
+    );
     check(refusal(dir.path(), &["calibrate"], 2), &["required"]);
-    check(refusal(dir.path(), &["calibrate", "nowhere.csv"], 1), &["nowhere.csv: No such file"]);
-    check(refusal(dir.path(), &["wv", "runs", "--axes", "gyro.w"], 2), &["gyro.w", "accel.x"]);
-    std::fs::write(dir.path().join("curve.csv"), "tau_samples,wv,edof\n2,1e-5,10\n4,0,5\n").unwrap();
+    check(
+        refusal(dir.path(), &["calibrate", "nowhere.csv"], 1),
+        &["nowhere.csv: No such file"],
+    );
+    check(
+        refusal(dir.path(), &["wv", "runs", "--axes", "gyro.w"], 2),
+        &["gyro.w", "accel.x"],
+    );
+    std::fs::write(
+        dir.path().join("curve.csv"),
+        "tau_samples,wv,edof\n2,1e-5,10\n4,0,5\n",
+    )
+    .unwrap();
     check(
         refusal(dir.path(), &["calibrate", "--curve", "curve.csv"], 2),
-        &["curve.csv, line 3: wv = 0 is not a number from 1e-100 to 1e100", "hint: a curve is a CSV"],
+        &[
+            "curve.csv, line 3: wv = 0 is not a number from 1e-100 to 1e100",
+            "hint: a curve is a CSV",
+        ],
     );
-    std::fs::write(dir.path().join("curve.csv"), "tau_samples,wv,edof\n2,1e-5,10\n4,1e-5,5\n").unwrap();
+    std::fs::write(
+        dir.path().join("curve.csv"),
+        "tau_samples,wv,edof\n2,1e-5,10\n4,1e-5,5\n",
+    )
+    .unwrap();
     for flag in [["--trim", "1"], ["--skip-s", "0"], ["--estimator", "awv"]] {
-        let arguments = [&["calibrate", "--curve", "curve.csv", "--rate-hz", "1"][..], &flag].concat();
-        check(refusal(dir.path(), &arguments, 2), &["cannot be used with", "--curve"]);
+        let arguments = [
+            &["calibrate", "--curve", "curve.csv", "--rate-hz", "1"][..],
+            &flag,
+        ]
+        .concat();
+        check(
+            refusal(dir.path(), &arguments, 2),
+            &["cannot be used with", "--curve"],
+        );
     }
     assert!(!dir.path().join("model.toml").exists() && !dir.path().join("model.wv.json").exists());
 }
@@ -108,15 +196,38 @@ fn bad_requests_are_refused_with_a_hint() {
 fn what_was_drawn_is_recorded_and_copies_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     recordings(dir.path(), 2);
-    let calibrate = ["calibrate", "runs", "--model", "N1", "--bootstrap", "19", "-o", "imu"];
+    let calibrate = [
+        "calibrate",
+        "runs",
+        "--model",
+        "N1",
+        "--bootstrap",
+        "19",
+        "-o",
+        "imu",
+    ];
     let output = nav_sim(dir.path()).args(calibrate).assert().success();
     let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
-    let seed =
-        said.split("(drawn; repeat with --seed ").nth(1).unwrap().split(')').next().unwrap().to_owned();
+    let seed = said
+        .split("(drawn; repeat with --seed ")
+        .nth(1)
+        .unwrap()
+        .split(')')
+        .next()
+        .unwrap()
+        .to_owned();
     let text = std::fs::read_to_string(dir.path().join("imu")).unwrap();
     assert!(text.contains(&format!("seed = {seed}\n")), "{text}");
     assert!(dir.path().join("imu.wv.json").exists() && !dir.path().join("imu.toml").exists());
-    let curve = ["calibrate", "--curve", "imu.wv.json", "--model", "N1", "--rate-hz", "50"];
+    let curve = [
+        "calibrate",
+        "--curve",
+        "imu.wv.json",
+        "--model",
+        "N1",
+        "--rate-hz",
+        "50",
+    ];
     assert!(refusal(dir.path(), &curve, 2).contains("the curve says its rate, 50 Hz"));
 
     let copy = dir.path().join("runs/run2.csv");
@@ -124,12 +235,24 @@ fn what_was_drawn_is_recorded_and_copies_are_refused() {
     let text = std::fs::read_to_string(dir.path().join("runs/run0.csv")).unwrap();
     std::fs::write(&copy, text.replace('\n', "\r\n")).unwrap();
     let stderr = refusal(dir.path(), &calibrate, 2);
-    assert!(stderr.contains("run2.csv is a copy of runs/run0.csv"), "{stderr}");
+    assert!(
+        stderr.contains("run2.csv is a copy of runs/run0.csv"),
+        "{stderr}"
+    );
     // Of three recordings a short one lacks the longest scales, of two it limits both.
     let rows = std::fs::read_to_string(&copy).unwrap();
     let first: Vec<&str> = rows.lines().take(600).collect();
     std::fs::write(&copy, first.join("\n") + "\n").unwrap();
-    let short = ["calibrate", "runs", "--model", "WN+RW", "--bootstrap", "0", "-o", "short.toml"];
+    let short = [
+        "calibrate",
+        "runs",
+        "--model",
+        "WN+RW",
+        "--bootstrap",
+        "0",
+        "-o",
+        "short.toml",
+    ];
     let said_and_scales = || {
         let output = nav_sim(dir.path()).args(short).assert().success();
         let curves = std::fs::read_to_string(dir.path().join("short.wv.json")).unwrap();
@@ -138,11 +261,17 @@ fn what_was_drawn_is_recorded_and_copies_are_refused() {
         (said, curves["curves"][0]["tau_s"].as_array().unwrap().len())
     };
     let (said, scales) = said_and_scales();
-    assert!(said.contains("run2.csv: its 599 samples have 8 scales; the longer ones, up to 13"), "{said}");
+    assert!(
+        said.contains("run2.csv: its 599 samples have 8 scales; the longer ones, up to 13"),
+        "{said}"
+    );
     assert_eq!(scales, 13);
     std::fs::remove_file(dir.path().join("runs/run1.csv")).unwrap();
     let (said, scales) = said_and_scales();
-    assert!(said.contains("run2.csv: its 599 samples limit all recordings to 8 scales"), "{said}");
+    assert!(
+        said.contains("run2.csv: its 599 samples limit all recordings to 8 scales"),
+        "{said}"
+    );
     assert_eq!(scales, 8);
 }
 
@@ -153,18 +282,37 @@ fn what_is_skipped_counts_in_the_advice() {
     let dir = tempfile::tempdir().unwrap();
     let mut text = "t_s,gyro_x_rad_s\n".to_owned();
     for (t, x) in signal(0, "gyro.x").iter().enumerate() {
-        let level = if t < 3000 { 1e-4 * (3000 - t) as f64 } else { 0.0 };
+        let level = if t < 3000 {
+            1e-4 * (3000 - t) as f64
+        } else {
+            0.0
+        };
         writeln!(text, "{:.2},{:e}", 0.02 * t as f64, x + level).unwrap();
     }
     std::fs::write(dir.path().join("warm.csv"), text).unwrap();
     let said_with = |skip: &str| {
-        let arguments =
-            ["calibrate", "warm.csv", "--estimator", "gmwm", "--model", "WN+RW", "--bootstrap", "0"];
-        let output = nav_sim(dir.path()).args(arguments).args(["--skip-s", skip]).assert().success();
+        let arguments = [
+            "calibrate",
+            "warm.csv",
+            "--estimator",
+            "gmwm",
+            "--model",
+            "WN+RW",
+            "--bootstrap",
+            "0",
+        ];
+        let output = nav_sim(dir.path())
+            .args(arguments)
+            .args(["--skip-s", skip])
+            .assert()
+            .success();
         String::from_utf8(output.get_output().stderr.clone()).unwrap()
     };
     let seconds = |said: &str, before: &str| {
-        let rest = said.split(before).nth(1).unwrap_or_else(|| panic!("{said}"));
+        let rest = said
+            .split(before)
+            .nth(1)
+            .unwrap_or_else(|| panic!("{said}"));
         rest.split(' ').next().unwrap().parse::<f64>().unwrap()
     };
     for skip in ["0", "20"] {
@@ -189,12 +337,22 @@ fn a_model_says_what_it_was_made_with() {
              gyro --scales 9 --pool sensor --force -o m.toml",
             env!("CARGO_BIN_EXE_nav-sim")
         );
-        let shell =
-            std::process::Command::new("bash").arg("-c").arg(command).current_dir(dir.path()).output();
+        let shell = std::process::Command::new("bash")
+            .arg("-c")
+            .arg(command)
+            .current_dir(dir.path())
+            .output();
         let shell = shell.unwrap();
-        assert!(shell.status.success(), "{}", String::from_utf8_lossy(&shell.stderr));
+        assert!(
+            shell.status.success(),
+            "{}",
+            String::from_utf8_lossy(&shell.stderr)
+        );
         let text = std::fs::read_to_string(dir.path().join("m.toml")).unwrap();
-        text.parse::<toml::Table>().unwrap()["provenance"].as_table().unwrap().clone()
+        text.parse::<toml::Table>().unwrap()["provenance"]
+            .as_table()
+            .unwrap()
+            .clone()
     };
     for parameters in ["known.toml", "<(cat known.toml)"] {
         let provenance = model(parameters);
@@ -204,21 +362,36 @@ fn a_model_says_what_it_was_made_with() {
             (Some("ignore"), Some("sensor"))
         );
         assert_eq!(
-            (provenance["scales"].as_integer(), provenance["weighting"].as_str()),
+            (
+                provenance["scales"].as_integer(),
+                provenance["weighting"].as_str()
+            ),
             (Some(9), Some("model"))
         );
         assert_eq!(provenance["axes"].as_array().unwrap().len(), 3);
         let limits = provenance["limits"].as_array().unwrap();
-        assert_eq!((limits[0]["signals"].as_str(), limits[0]["fix"].as_float()), (Some("all"), Some(1e-4)));
+        assert_eq!(
+            (limits[0]["signals"].as_str(), limits[0]["fix"].as_float()),
+            (Some("all"), Some(1e-4))
+        );
         assert_eq!(
             (limits[1]["signals"].as_str(), limits[1]["upper"].as_float()),
             (Some("gyro"), Some(0.99))
         );
         let inputs = provenance["inputs"].as_array().unwrap();
-        let own = inputs.iter().find(|i| i["role"].as_str() == Some("parameters")).unwrap();
-        assert_eq!(own["blake3"].as_str(), Some(blake3::hash(known.as_bytes()).to_hex().as_str()));
+        let own = inputs
+            .iter()
+            .find(|i| i["role"].as_str() == Some("parameters"))
+            .unwrap();
+        assert_eq!(
+            own["blake3"].as_str(),
+            Some(blake3::hash(known.as_bytes()).to_hex().as_str())
+        );
         let curves = std::fs::read(dir.path().join("m.wv.json")).unwrap();
-        assert_eq!(provenance["curves_blake3"].as_str(), Some(blake3::hash(&curves).to_hex().as_str()));
+        assert_eq!(
+            provenance["curves_blake3"].as_str(),
+            Some(blake3::hash(&curves).to_hex().as_str())
+        );
     }
 }
 
@@ -229,7 +402,11 @@ fn a_model_of_the_default_name_replaces_only_its_own_kind() {
     recordings(dir.path(), 1);
     let calibrate = ["calibrate", "runs", "--bootstrap", "0"];
     for model in ["WN+RW", "WN"] {
-        nav_sim(dir.path()).args(calibrate).args(["--model", model]).assert().success();
+        nav_sim(dir.path())
+            .args(calibrate)
+            .args(["--model", model])
+            .assert()
+            .success();
         let text = std::fs::read_to_string(dir.path().join("model.toml")).unwrap();
         assert!(text.contains(&format!("model = \"{model}\"")), "{text}");
     }
@@ -237,7 +414,10 @@ fn a_model_of_the_default_name_replaces_only_its_own_kind() {
     std::fs::write(dir.path().join("model.toml"), own).unwrap();
     let said = refusal(dir.path(), &calibrate, 2);
     assert!(said.contains("model.toml is not of this command"), "{said}");
-    assert_eq!(std::fs::read_to_string(dir.path().join("model.toml")).unwrap(), own);
+    assert_eq!(
+        std::fs::read_to_string(dir.path().join("model.toml")).unwrap(),
+        own
+    );
 }
 
 /// Scales outside count nothing and are recorded: of a fit with a range that holds two scales for two parameters nothing is left
@@ -246,15 +426,40 @@ fn a_model_of_the_default_name_replaces_only_its_own_kind() {
 fn a_range_of_scales_is_recorded() {
     let dir = tempfile::tempdir().unwrap();
     recordings(dir.path(), 2);
-    let fit = ["calibrate", "runs", "--model", "WN+RW", "--bootstrap", "0", "--scales", "0.04s:20.48s"];
+    let fit = [
+        "calibrate",
+        "runs",
+        "--model",
+        "WN+RW",
+        "--bootstrap",
+        "0",
+        "--scales",
+        "0.04s:20.48s",
+    ];
     let out = json(dir.path(), &[&fit[..], &["-o", "m.toml"]].concat());
     assert_eq!(out["fits"][0]["scales"], 13, "all are in the file");
     let text = std::fs::read_to_string(dir.path().join("m.toml")).unwrap();
     let provenance = &text.parse::<toml::Table>().unwrap()["provenance"];
-    let range: Vec<f64> =
-        provenance["fit_range_s"].as_array().unwrap().iter().filter_map(toml::Value::as_float).collect();
+    let range: Vec<f64> = provenance["fit_range_s"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(toml::Value::as_float)
+        .collect();
     assert_eq!(range, [0.04, 20.48]);
-    let short = ["calibrate", "runs", "--model", "N1", "--scales", "1s:2s", "-o", "n.toml"];
+    let short = [
+        "calibrate",
+        "runs",
+        "--model",
+        "N1",
+        "--scales",
+        "1s:2s",
+        "-o",
+        "n.toml",
+    ];
     assert!(refusal(dir.path(), &short, 2).contains("scales"));
-    assert!(refusal(dir.path(), &["calibrate", "runs", "--scales", "2s:1s"], 2).contains("shorter scale"));
+    assert!(
+        refusal(dir.path(), &["calibrate", "runs", "--scales", "2s:1s"], 2)
+            .contains("shorter scale")
+    );
 }

@@ -19,9 +19,18 @@ fn late_fixes_are_told_and_their_delay_is_an_option() {
     fs::write(place.path().join("late.csv"), late).unwrap();
     let command = "fuse rec/imu.csv late.csv imu.toml --initial rec/initial.toml -o";
     let told = nav_sim(place.path(), &format!("{command} late"));
-    assert!(told.stdout.contains("the fixes agree with --gnss-delay=0.4"), "{}", told.stdout);
+    assert!(
+        told.stdout
+            .contains("the fixes agree with --gnss-delay=0.4"),
+        "{}",
+        told.stdout
+    );
     let sound = done(place.path(), &format!("{command} sound --gnss-delay 0.4"));
-    assert!(sound.stdout.starts_with("consistent: NIS"), "{}", sound.stdout);
+    assert!(
+        sound.stdout.starts_with("consistent: NIS"),
+        "{}",
+        sound.stdout
+    );
 }
 
 /// A flight whose mean specific force is not gravity is no static recording, and `fuse` reads it: `check` says so. At rest
@@ -31,18 +40,32 @@ fn check_knows_recordings_that_move() {
     let place = tempfile::tempdir().unwrap();
     let write = |name: &str, amplitude: f64| {
         let mut text =
-            "t_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s\n".to_owned();
+            "t_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s\n"
+                .to_owned();
         for k in 0..1000 {
             let f = amplitude * f64::from(k % 100) / 100.0 + 1e-3 * f64::from(k % 7);
             let g = 1e-4 * f64::from(k % 5);
-            writeln!(text, "{},{f},{g},-11.4{k},{g},{f},{g}1", f64::from(k) / 50.0).unwrap();
+            writeln!(
+                text,
+                "{},{f},{g},-11.4{k},{g},{f},{g}1",
+                f64::from(k) / 50.0
+            )
+            .unwrap();
         }
         fs::write(place.path().join(name), text).unwrap();
     };
     write("flight.csv", 5.0);
     write("rest.csv", 0.0);
     let flight = done(place.path(), "check flight.csv");
-    assert!(flight.stdout.contains("that moves, for fuse"), "{}", flight.stdout);
+    assert!(
+        flight.stdout.contains("that moves, for fuse"),
+        "{}",
+        flight.stdout
+    );
     let rest = nav_sim(place.path(), "check rest.csv");
-    assert!(rest.code == 2 && rest.stderr.contains("far from 9.81"), "{}", rest.stderr);
+    assert!(
+        rest.code == 2 && rest.stderr.contains("far from 9.81"),
+        "{}",
+        rest.stderr
+    );
 }

@@ -11,16 +11,28 @@ fn errors_of_second_order_are_not_to_be_tuned_away() {
     let still = DRIVE.lines().nth(1).unwrap();
     let still = format!("{still}\nsegment = [{{ kind = \"straight\", duration_s = 200 }}]\n");
     fs::write(place.path().join("still.toml"), still).unwrap();
-    fs::write(place.path().join("wide.toml"), "initial.att_sigma_deg = [3, 3, 20]\n").unwrap();
+    fs::write(
+        place.path().join("wide.toml"),
+        "initial.att_sigma_deg = [3, 3, 20]\n",
+    )
+    .unwrap();
     let command = "run still.toml imu.toml --runs 60 --outage 60:150 --seed 3 --scenario wide.toml";
     for method in ["both", "monte-carlo"] {
-        let ran = nav_sim(place.path(), &format!("{command} --method {method} -o {method}"));
+        let ran = nav_sim(
+            place.path(),
+            &format!("{command} --method {method} -o {method}"),
+        );
         assert!(
-            ran.stdout.starts_with("verdict: overconfident in the runs, consistent by"),
+            ran.stdout
+                .starts_with("verdict: overconfident in the runs, consistent by"),
             "{}",
             ran.stdout
         );
-        let warning = ran.stderr.lines().find(|line| line.contains("the filter is overconfident")).unwrap();
+        let warning = ran
+            .stderr
+            .lines()
+            .find(|line| line.contains("the filter is overconfident"))
+            .unwrap();
         assert!(
             warning.contains("too large for a linear filter; another MODEL or nav-sim tune"),
             "{warning}"
@@ -48,18 +60,33 @@ fn an_outage_at_the_start_is_beyond_linear() {
     let place = place();
     standing(place.path());
     let told = |trajectory: &str, outage: &str| {
-        let command = format!("run {trajectory} quiet.toml --method lincov --outage {outage} -o out");
-        let verdict = done(place.path(), &command).stdout.lines().next().unwrap().to_owned();
-        (verdict, json(&place.path().join("out/summary.json"))["outages"][0]["beyond_linear"].clone())
+        let command =
+            format!("run {trajectory} quiet.toml --method lincov --outage {outage} -o out");
+        let verdict = done(place.path(), &command)
+            .stdout
+            .lines()
+            .next()
+            .unwrap()
+            .to_owned();
+        (
+            verdict,
+            json(&place.path().join("out/summary.json"))["outages"][0]["beyond_linear"].clone(),
+        )
     };
     let (verdict, is_beyond) = told("still.toml", "0:120");
-    assert!(verdict.starts_with("verdict: doubtful: ") && is_beyond == true, "{verdict}");
+    assert!(
+        verdict.starts_with("verdict: doubtful: ") && is_beyond == true,
+        "{verdict}"
+    );
     assert!(
         verdict.ends_with("beyond linear theory in outage 0–120 s: confirm with --method both"),
         "{verdict}"
     );
     let (verdict, is_beyond) = told("drive.toml", "50:59");
-    assert!(verdict.starts_with("verdict: consistent: ") && is_beyond == false, "{verdict}");
+    assert!(
+        verdict.starts_with("verdict: consistent: ") && is_beyond == false,
+        "{verdict}"
+    );
 }
 
 /// After five minutes with a consumer IMU linear theory finds no fault in a filter whose NEES in runs is 16 in place of 9: a verdict of
@@ -72,33 +99,64 @@ fn a_verdict_of_linear_theory_says_until_where_it_holds() {
         let command = format!(
             "run {root}/trajectories/land_vehicle.toml {root}/calib_data/consumer_mems.toml {options} -o {out}"
         );
-        (nav_sim(place.path(), &command), json(&place.path().join(out).join("summary.json")))
+        (
+            nav_sim(place.path(), &command),
+            json(&place.path().join(out).join("summary.json")),
+        )
     };
     let page = |out: &str| fs::read_to_string(place.path().join(out).join("report.html")).unwrap();
     let (long, summary) = run("--method lincov --outage 300:600", "long");
     let verdict = long.stdout.lines().next().unwrap();
-    assert!(verdict.starts_with("verdict: doubtful: NEES 8.9"), "{verdict}");
-    assert!(verdict.contains(" beyond linear theory in outage 300–600 s"), "{verdict}");
-    assert!(verdict.ends_with(": confirm with --method both"), "{verdict}");
+    assert!(
+        verdict.starts_with("verdict: doubtful: NEES 8.9"),
+        "{verdict}"
+    );
+    assert!(
+        verdict.contains(" beyond linear theory in outage 300–600 s"),
+        "{verdict}"
+    );
+    assert!(
+        verdict.ends_with(": confirm with --method both"),
+        "{verdict}"
+    );
     assert_eq!(
-        (&summary["verdict"]["kind"], &summary["verdict"]["beyond_linear"]),
+        (
+            &summary["verdict"]["kind"],
+            &summary["verdict"]["beyond_linear"]
+        ),
         (&"doubtful".into(), &0.into())
     );
     assert!(page("long").contains("verdict: doubtful: NEES 8.9"));
 
     let (short, summary) = run("--method lincov --outage 300:360", "short");
-    assert!(short.stdout.starts_with("verdict: consistent: NEES "), "{}", short.stdout);
-    assert!(summary["verdict"]["beyond_linear"].is_null() && !short.stdout.contains("linear theory"));
+    assert!(
+        short.stdout.starts_with("verdict: consistent: NEES "),
+        "{}",
+        short.stdout
+    );
+    assert!(
+        summary["verdict"]["beyond_linear"].is_null() && !short.stdout.contains("linear theory")
+    );
 
     let (both, summary) = run("--method both --outage 300:600 --runs 40 --seed 1", "both");
     let agreement = &summary["agreement"];
     let z = |key: &str| agreement[key].as_f64().unwrap();
     assert!(z("largest_z").abs() < z("bound_z"), "{agreement}");
     let verdict = both.stdout.lines().next().unwrap();
-    assert!(verdict.starts_with("verdict: overconfident: errors 1."), "{verdict}");
-    assert!(both.stdout.contains("by covariance analysis doubtful"), "{}", both.stdout);
+    assert!(
+        verdict.starts_with("verdict: overconfident: errors 1."),
+        "{verdict}"
+    );
+    assert!(
+        both.stdout.contains("by covariance analysis doubtful"),
+        "{}",
+        both.stdout
+    );
     assert_eq!(
-        (&summary["verdict"]["beyond_linear"], &summary["lincov"]["verdict"]["kind"]),
+        (
+            &summary["verdict"]["beyond_linear"],
+            &summary["lincov"]["verdict"]["kind"]
+        ),
         (&0.into(), &"doubtful".into())
     );
 }
@@ -110,17 +168,31 @@ fn the_iterated_update_is_named_where_it_helps() {
     let place = place();
     let root = env!("CARGO_MANIFEST_DIR");
     let consumer = fs::read_to_string(format!("{root}/calib_data/consumer_mems.toml")).unwrap();
-    let loud = consumer.replace("sigma2 = 1.5e-06", "sigma2 = 6e-06").replace("1.610566e-13", "6.4e-13");
-    fs::write(place.path().join("loud.toml"), loud.replace("2.724096e-10", "1.1e-9")).unwrap();
+    let loud = consumer
+        .replace("sigma2 = 1.5e-06", "sigma2 = 6e-06")
+        .replace("1.610566e-13", "6.4e-13");
+    fs::write(
+        place.path().join("loud.toml"),
+        loud.replace("2.724096e-10", "1.1e-9"),
+    )
+    .unwrap();
     let warning = |update: &str| {
-        fs::write(place.path().join("update.toml"), format!("filter.update = \"{update}\"\n")).unwrap();
+        fs::write(
+            place.path().join("update.toml"),
+            format!("filter.update = \"{update}\"\n"),
+        )
+        .unwrap();
         let command = format!(
             "run {root}/trajectories/land_vehicle.toml loud.toml --filter full --outage 300:600 --runs 40 --seed 1 \
              --scenario update.toml -o out"
         );
         let ran = nav_sim(place.path(), &command);
-        let is_over_run = json(&place.path().join("out/summary.json"))["verdict"]["worst_outage"].is_null();
-        (is_over_run, ran.stderr.contains("; filter.update = \"iterated\" does\n"))
+        let is_over_run =
+            json(&place.path().join("out/summary.json"))["verdict"]["worst_outage"].is_null();
+        (
+            is_over_run,
+            ran.stderr.contains("; filter.update = \"iterated\" does\n"),
+        )
     };
     assert_eq!(warning("ekf"), (true, true));
     assert_eq!(warning("iterated"), (false, false));
@@ -131,9 +203,16 @@ fn the_iterated_update_is_named_where_it_helps() {
 fn a_comparison_names_the_runs_beyond_linear_theory() {
     let place = place();
     standing(place.path());
-    fs::write(place.path().join("level.toml"), "initial.att_sigma_deg = [0.01, 0.01, 0.1]\n").unwrap();
+    fs::write(
+        place.path().join("level.toml"),
+        "initial.att_sigma_deg = [0.01, 0.01, 0.1]\n",
+    )
+    .unwrap();
     let run = |options: &str| {
-        drop(nav_sim(place.path(), &format!("run still.toml quiet.toml --outage 0:120 {options}")))
+        drop(nav_sim(
+            place.path(),
+            &format!("run still.toml quiet.toml --outage 0:120 {options}"),
+        ))
     };
     run("--method lincov -o tilted");
     run("--method lincov --scenario level.toml -o level");
@@ -143,14 +222,25 @@ fn a_comparison_names_the_runs_beyond_linear_theory() {
     assert_eq!(json(&place.path().join("comparison.json"))["paired"], false);
     let same = done(place.path(), "compare level --reference level");
     let page = fs::read_to_string(place.path().join("comparison.html")).unwrap();
-    assert!(!page.contains("the runs saw the same noise") && same.code == 0, "{page}");
-    let compared = done(place.path(), "compare tilted sampled level --reference level");
     assert!(
-        compared.stderr.contains("sampled: the method is not that of the reference; the runs are not paired")
+        !page.contains("the runs saw the same noise") && same.code == 0,
+        "{page}"
+    );
+    let compared = done(
+        place.path(),
+        "compare tilted sampled level --reference level",
+    );
+    assert!(
+        compared
+            .stderr
+            .contains("sampled: the method is not that of the reference; the runs are not paired")
     );
     let told = compared.stdout;
     assert!(told.starts_with("against level: tilted "), "{told}");
-    assert!(told.contains("\n1 of 3 filters doubtful (beyond linear theory"), "{told}");
+    assert!(
+        told.contains("\n1 of 3 filters doubtful (beyond linear theory"),
+        "{told}"
+    );
 }
 
 /// The first fixes after an outage of five minutes make of the shift of the velocity down what no covariance analysis contains: at the end
@@ -167,14 +257,29 @@ fn a_limit_is_not_met_by_a_figure_beyond_linear_theory() {
     let told = |limit: &str, options: &str| {
         let ran = nav_sim(place.path(), &format!("{command}{limit} {options} -o out"));
         assert_eq!(ran.code, 3, "{}{}", ran.stdout, ran.stderr);
-        let line =
-            ran.stdout.lines().find(|line| line.starts_with("required rmse_pos_d_m<=")).unwrap().to_owned();
-        assert!(ran.stderr.contains(&format!("error: {line}")), "{}", ran.stderr);
-        assert!(ran.stdout.contains("required p95_m<=20000: met, "), "{}", ran.stdout);
+        let line = ran
+            .stdout
+            .lines()
+            .find(|line| line.starts_with("required rmse_pos_d_m<="))
+            .unwrap()
+            .to_owned();
+        assert!(
+            ran.stderr.contains(&format!("error: {line}")),
+            "{}",
+            ran.stderr
+        );
+        assert!(
+            ran.stdout.contains("required p95_m<=20000: met, "),
+            "{}",
+            ran.stdout
+        );
         (line, json(&place.path().join("out/summary.json")))
     };
     let (line, summary) = told("60", "--method lincov");
-    assert!(line.starts_with("required rmse_pos_d_m<=60: NOT SHOWN, "), "{line}");
+    assert!(
+        line.starts_with("required rmse_pos_d_m<=60: NOT SHOWN, "),
+        "{line}"
+    );
     assert!(
         line.ends_with(
             " m at the end of the outage 550–850 s beyond linear theory from the outage 200–500 s on: confirm with --method both"
@@ -182,8 +287,14 @@ fn a_limit_is_not_met_by_a_figure_beyond_linear_theory() {
         "{line}"
     );
     let of = |summary: &Value, k: usize, key: &str| summary["require"][k][key].clone();
-    assert_eq!((of(&summary, 1, "met"), of(&summary, 1, "beyond_linear")), (false.into(), 0.into()));
-    assert_eq!((of(&summary, 0, "met"), of(&summary, 0, "beyond_linear")), (true.into(), Value::Null));
+    assert_eq!(
+        (of(&summary, 1, "met"), of(&summary, 1, "beyond_linear")),
+        (false.into(), 0.into())
+    );
+    assert_eq!(
+        (of(&summary, 0, "met"), of(&summary, 0, "beyond_linear")),
+        (true.into(), Value::Null)
+    );
     let (line, _) = told("1", "--method lincov");
     assert!(
         line.contains(": NOT MET, ") && line.ends_with(" m at the end of the outage 550–850 s"),
@@ -198,6 +309,12 @@ fn a_limit_is_not_met_by_a_figure_beyond_linear_theory() {
         ),
         "{line}"
     );
-    assert_eq!(of(&summary, 1, "value"), summary["outages"][1]["rmse_end"]["pos_d_m"]);
-    assert_eq!(of(&summary, 0, "value"), summary["lincov"]["outages"][0]["horizontal_error_end_m"]["p95"]);
+    assert_eq!(
+        of(&summary, 1, "value"),
+        summary["outages"][1]["rmse_end"]["pos_d_m"]
+    );
+    assert_eq!(
+        of(&summary, 0, "value"),
+        summary["lincov"]["outages"][0]["horizontal_error_end_m"]["p95"]
+    );
 }

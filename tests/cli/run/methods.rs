@@ -6,12 +6,22 @@ use super::*;
 #[test]
 fn covariance_analysis_is_a_method_of_run() {
     let place = place();
-    let ran = done(place.path(), "run drive.toml imu.toml --method lincov --outage 30:45 -o expected");
-    assert!(ran.stdout.starts_with("verdict: consistent: NEES 9.0"), "{}", ran.stdout);
+    let ran = done(
+        place.path(),
+        "run drive.toml imu.toml --method lincov --outage 30:45 -o expected",
+    );
+    assert!(
+        ran.stdout.starts_with("verdict: consistent: NEES 9.0"),
+        "{}",
+        ran.stdout
+    );
     assert!(!ran.stderr.contains("seed"), "{}", ran.stderr);
     let out = place.path().join("expected");
     let summary = json(&out.join("summary.json"));
-    assert_eq!((&summary["method"], &summary["runs"]), (&"lincov".into(), &0.into()));
+    assert_eq!(
+        (&summary["method"], &summary["runs"]),
+        (&"lincov".into(), &0.into())
+    );
     let outage = &summary["outages"][0];
     for key in ["asee_mean", "asee_end", "rmse_mean", "rmse_end"] {
         assert!(outage[key]["pos_e_m"].as_f64().unwrap() > 0.1, "{key}");
@@ -22,50 +32,119 @@ fn covariance_analysis_is_a_method_of_run() {
     assert!(horizontal["max"].is_null() && !out.join("runs.csv").exists());
     // the error grows to the end of the outage, at 45 s, where the summary has it: at most as t^2.5, (14/15)^2.5 = 0.84
     let fan = fs::read_to_string(out.join("fan.csv")).unwrap();
-    assert!(fan.starts_with("t_s,p05_m,p25_m,p50_m,p75_m,p95_m\n"), "{fan}");
-    let at_44_s = fan.lines().find_map(|line| line.strip_prefix("44,")).unwrap();
-    let at_44_s: Vec<f64> = at_44_s.split(',').map(|cell| cell.parse().unwrap()).collect();
+    assert!(
+        fan.starts_with("t_s,p05_m,p25_m,p50_m,p75_m,p95_m\n"),
+        "{fan}"
+    );
+    let at_44_s = fan
+        .lines()
+        .find_map(|line| line.strip_prefix("44,"))
+        .unwrap();
+    let at_44_s: Vec<f64> = at_44_s
+        .split(',')
+        .map(|cell| cell.parse().unwrap())
+        .collect();
     assert!(
         at_44_s.is_sorted() && 0.8 * quantile("p50") < at_44_s[2] && at_44_s[2] < quantile("p50"),
         "{fan}"
     );
-    assert!(0.8 * quantile("p95") < at_44_s[4] && at_44_s[4] < quantile("p95"), "{fan}");
+    assert!(
+        0.8 * quantile("p95") < at_44_s[4] && at_44_s[4] < quantile("p95"),
+        "{fan}"
+    );
     // just before the fix at 45 s what the summary has, to single precision; after it less
-    let at_45_s: Vec<&str> = fan.lines().filter_map(|line| line.strip_prefix("45,")).collect();
+    let at_45_s: Vec<&str> = fan
+        .lines()
+        .filter_map(|line| line.strip_prefix("45,"))
+        .collect();
     let p95 = |line: &str| line.rsplit(',').next().unwrap().parse::<f64>().unwrap();
-    assert!(at_45_s.len() == 2 && p95(at_45_s[1]) < 0.9 * p95(at_45_s[0]), "{fan}");
-    assert!((p95(at_45_s[0]) / quantile("p95") - 1.0).abs() < 1e-6, "{fan}");
+    assert!(
+        at_45_s.len() == 2 && p95(at_45_s[1]) < 0.9 * p95(at_45_s[0]),
+        "{fan}"
+    );
+    assert!(
+        (p95(at_45_s[0]) / quantile("p95") - 1.0).abs() < 1e-6,
+        "{fan}"
+    );
     assert!((summary["coverage"]["mean"].as_f64().unwrap() - 0.95).abs() < 0.01);
     // nothing is drawn: no seed, no runs, no interval, no band, and no column for any of them
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("INS/GNSS covariance analysis"));
-    let page = page.split("<body>").nth(1).unwrap().split("Provenance").next().unwrap();
-    for words in ["seed", "runs", "interval", "95 % band", "re-convergence", "epochs inside", ">–<", "[–"]
-    {
+    let page = page
+        .split("<body>")
+        .nth(1)
+        .unwrap()
+        .split("Provenance")
+        .next()
+        .unwrap();
+    for words in [
+        "seed",
+        "runs",
+        "interval",
+        "95 % band",
+        "re-convergence",
+        "epochs inside",
+        ">–<",
+        "[–",
+    ] {
         assert!(!page.contains(words), "{words}: {page}");
     }
     let manifest = json(&out.join("manifest.json"));
-    let seeds = [&summary["seed"], &manifest["seed"], &manifest["configuration"]["run"]["seed"]];
+    let seeds = [
+        &summary["seed"],
+        &manifest["seed"],
+        &manifest["configuration"]["run"]["seed"],
+    ];
     assert!(seeds.iter().all(|seed| seed.is_null()), "{seeds:?}");
     // one that is given is on record
-    done(place.path(), "run drive.toml imu.toml --method lincov --outage 30:45 --seed 7 -o given");
+    done(
+        place.path(),
+        "run drive.toml imu.toml --method lincov --outage 30:45 --seed 7 -o given",
+    );
     let given = fs::read_to_string(place.path().join("given/summary.json")).unwrap();
     assert_eq!(serde_json::from_str::<Value>(&given).unwrap()["seed"], 7);
 
-    done(place.path(), "run drive.toml imu.toml --runs 16 --outage 30:45 --seed 2 -o sampled");
+    done(
+        place.path(),
+        "run drive.toml imu.toml --runs 16 --outage 30:45 --seed 2 -o sampled",
+    );
     let ran = done(place.path(), "compare sampled --reference expected");
-    assert!(ran.stderr.contains("the method is not that of the reference"), "{}", ran.stderr);
+    assert!(
+        ran.stderr
+            .contains("the method is not that of the reference"),
+        "{}",
+        ran.stderr
+    );
     let row = json(&place.path().join("comparison.json"))["rows"][0].clone();
-    assert!(row["ratio_error_pct"].as_f64().unwrap().abs() < 1.0, "{row}");
-    done(place.path(), "run drive.toml imu.toml --method lincov --filter full --outage 30:45 -o full");
+    assert!(
+        row["ratio_error_pct"].as_f64().unwrap().abs() < 1.0,
+        "{row}"
+    );
+    done(
+        place.path(),
+        "run drive.toml imu.toml --method lincov --filter full --outage 30:45 -o full",
+    );
     // nothing is drawn on either side: no interval, which one of no width would hide
-    let ran = done(place.path(), "compare full --reference expected -o exact.json");
+    let ran = done(
+        place.path(),
+        "compare full --reference expected -o exact.json",
+    );
     assert!(!ran.stdout.contains('±'), "{}", ran.stdout);
     let row = json(&place.path().join("exact.json"))["rows"][0].clone();
-    assert!(row["ci95_pct"].is_null() && row["rmse_end_ci95_pct"].is_null(), "{row}");
-    let csv = done(place.path(), "compare full --reference expected --table csv -o exact.json").stdout;
+    assert!(
+        row["ci95_pct"].is_null() && row["rmse_end_ci95_pct"].is_null(),
+        "{row}"
+    );
+    let csv = done(
+        place.path(),
+        "compare full --reference expected --table csv -o exact.json",
+    )
+    .stdout;
     let cells: Vec<&str> = csv.lines().nth(1).unwrap().split(',').collect();
-    assert!(cells[7].parse::<f64>().is_ok() && cells[8..11] == ["", "", ""], "{csv}");
+    assert!(
+        cells[7].parse::<f64>().is_ok() && cells[8..11] == ["", "", ""],
+        "{csv}"
+    );
 }
 
 /// Fixes too rare for a reduction are the fault of the receiver's rate, not of the model: the full filter takes both.
@@ -74,22 +153,41 @@ fn fixes_too_rare_for_the_reduction_are_blamed_on_their_rate() {
     let place = place();
     fs::write(place.path().join("rare.toml"), "[gnss]\nrate_hz = 0.001\n").unwrap();
     // two biases an axis: one alone is its own filter
-    let walk = MODEL.replace("{ type = \"AR1\"", "{ type = \"RW\", gamma2 = 1e-14 }, { type = \"AR1\"");
+    let walk = MODEL.replace(
+        "{ type = \"AR1\"",
+        "{ type = \"RW\", gamma2 = 1e-14 }, { type = \"AR1\"",
+    );
     fs::write(place.path().join("walk.toml"), walk).unwrap();
     let full = "hint: raise it, or take the full filter (--filter full)";
     for (command, hint) in [
-        ("run drive.toml walk.toml --runs 2 --scenario rare.toml -o out", full),
-        ("run drive.toml walk.toml --method lincov --gnss rare.toml -o out", full),
-        ("tune walk.toml --truth walk.toml --scenario rare.toml", "hint: raise it: the verdict is of"),
+        (
+            "run drive.toml walk.toml --runs 2 --scenario rare.toml -o out",
+            full,
+        ),
+        (
+            "run drive.toml walk.toml --method lincov --gnss rare.toml -o out",
+            full,
+        ),
+        (
+            "tune walk.toml --truth walk.toml --scenario rare.toml",
+            "hint: raise it: the verdict is of",
+        ),
     ] {
         let ran = nav_sim(place.path(), command);
         assert_eq!(ran.code, 2, "{}", ran.stderr);
-        for words in ["error: rare.toml: gnss.rate_hz = 0.001 is refused", "at most 231.7 s apart", hint] {
+        for words in [
+            "error: rare.toml: gnss.rate_hz = 0.001 is refused",
+            "at most 231.7 s apart",
+            hint,
+        ] {
             assert!(ran.stderr.contains(words), "{command}: {}", ran.stderr);
         }
         assert!(!ran.stderr.contains("walk.toml:"), "{}", ran.stderr);
     }
-    done(place.path(), "run drive.toml walk.toml --method lincov --filter full --scenario rare.toml -o out");
+    done(
+        place.path(),
+        "run drive.toml walk.toml --method lincov --filter full --scenario rare.toml -o out",
+    );
 }
 
 #[test]
@@ -98,25 +196,47 @@ fn runs_stand_beside_what_is_expected_of_them() {
     let command = "run drive.toml imu.toml --method both --runs 40 --outage 30:45 --seed 2 -o out";
     let ran = done(place.path(), command);
     assert!(
-        ran.stdout.lines().next().unwrap().ends_with("by covariance analysis consistent"),
+        ran.stdout
+            .lines()
+            .next()
+            .unwrap()
+            .ends_with("by covariance analysis consistent"),
         "{}",
         ran.stdout
     );
     let summary = json(&place.path().join("out/summary.json"));
-    assert_eq!((&summary["method"], &summary["lincov"]["method"]), (&"both".into(), &"lincov".into()));
-    let verdicts = [&summary["verdict"], &summary["lincov"]["verdict"]].map(|verdict| &verdict["kind"]);
+    assert_eq!(
+        (&summary["method"], &summary["lincov"]["method"]),
+        (&"both".into(), &"lincov".into())
+    );
+    let verdicts =
+        [&summary["verdict"], &summary["lincov"]["verdict"]].map(|verdict| &verdict["kind"]);
     assert_eq!(verdicts, ["consistent", "consistent"]);
     assert_eq!(summary["verdict"]["by_covariance_analysis"], "consistent");
     let agreement = &summary["agreement"];
     assert_eq!(agreement["figures"], 2 + 9 + 10);
     let fan = fs::read_to_string(place.path().join("out/fan.csv")).unwrap();
     let names = "p05_m,p25_m,p50_m,p75_m,p95_m";
-    assert!(fan.starts_with(&format!("t_s,{names},lincov_{}\n", names.replace(',', ",lincov_"))), "{fan}");
+    assert!(
+        fan.starts_with(&format!(
+            "t_s,{names},lincov_{}\n",
+            names.replace(',', ",lincov_")
+        )),
+        "{fan}"
+    );
     assert_eq!(fan.lines().count(), 1 + 61 + 1);
-    assert!(fan.lines().all(|line| line.split(',').count() == 11), "{fan}");
+    assert!(
+        fan.lines().all(|line| line.split(',').count() == 11),
+        "{fan}"
+    );
     let page = fs::read_to_string(place.path().join("out/report.html")).unwrap();
-    assert!(page.contains("Dashed: 5, 50 and 95 % by covariance analysis."), "{page}");
-    assert!(agreement["largest_z"].as_f64().unwrap().abs() < agreement["bound_z"].as_f64().unwrap());
+    assert!(
+        page.contains("Dashed: 5, 50 and 95 % by covariance analysis."),
+        "{page}"
+    );
+    assert!(
+        agreement["largest_z"].as_f64().unwrap().abs() < agreement["bound_z"].as_f64().unwrap()
+    );
     assert!(place.path().join("out/runs.csv").exists());
 }
 
@@ -125,34 +245,68 @@ fn runs_stand_beside_what_is_expected_of_them() {
 #[test]
 fn few_runs_do_not_hide_a_filter_that_is_wrong() {
     let place = place();
-    fs::write(place.path().join("rough.toml"), MODEL.replace("1e-9", "4e-9")).unwrap();
+    fs::write(
+        place.path().join("rough.toml"),
+        MODEL.replace("1e-9", "4e-9"),
+    )
+    .unwrap();
     let command = "run drive.toml imu.toml --truth rough.toml --outage 20:50 --seed 2";
     let sampled = done(place.path(), &format!("{command} --runs 2 -o out"));
     let verdict = sampled.stdout.lines().next().unwrap();
-    assert!(verdict.starts_with("verdict: undecided: 2 runs miss errors below "), "{verdict}");
-    assert!(verdict.ends_with("; by covariance analysis overconfident"), "{verdict}");
-    assert!(sampled.stderr.contains("warning: the filter is overconfident: "), "{}", sampled.stderr);
-    done(place.path(), &format!("{command} --method lincov -o expected"));
+    assert!(
+        verdict.starts_with("verdict: undecided: 2 runs miss errors below "),
+        "{verdict}"
+    );
+    assert!(
+        verdict.ends_with("; by covariance analysis overconfident"),
+        "{verdict}"
+    );
+    assert!(
+        sampled
+            .stderr
+            .contains("warning: the filter is overconfident: "),
+        "{}",
+        sampled.stderr
+    );
+    done(
+        place.path(),
+        &format!("{command} --method lincov -o expected"),
+    );
     let summary = |run: &str| json(&place.path().join(run).join("summary.json"));
     let (sampled, expected) = (summary("out"), summary("expected"));
     assert_eq!(sampled["verdict"]["kind"], "undecided");
     assert_eq!(sampled["outages"][0]["verdict"]["kind"], "undecided");
-    assert_eq!(sampled["verdict"]["by_covariance_analysis"], expected["verdict"]["kind"]);
+    assert_eq!(
+        sampled["verdict"]["by_covariance_analysis"],
+        expected["verdict"]["kind"]
+    );
     assert_eq!(expected["verdict"]["kind"], "overconfident");
-    assert_eq!((&sampled["method"], &sampled["lincov"]), (&"monte-carlo".into(), &Value::Null));
+    assert_eq!(
+        (&sampled["method"], &sampled["lincov"]),
+        (&"monte-carlo".into(), &Value::Null)
+    );
 }
 
 #[test]
 fn what_covariance_analysis_cannot_do_is_refused() {
     let place = place();
     let drawn = [
-        ("gate.toml", "filter.nis_gate = 0.99\n", "filter.nis_gate = 0.99"),
-        ("put.toml", "imu.output.resolution_accel_m_s2 = 0.01\n", "imu.output = {…}"),
+        (
+            "gate.toml",
+            "filter.nis_gate = 0.99\n",
+            "filter.nis_gate = 0.99",
+        ),
+        (
+            "put.toml",
+            "imu.output.resolution_accel_m_s2 = 0.01\n",
+            "imu.output = {…}",
+        ),
     ];
     for (name, text, said) in drawn {
         fs::write(place.path().join(name), text).unwrap();
-        let command =
-            format!("run drive.toml imu.toml --method lincov --outage none --scenario {name} -o out");
+        let command = format!(
+            "run drive.toml imu.toml --method lincov --outage none --scenario {name} -o out"
+        );
         let ran = nav_sim(place.path(), &command);
         assert!(ran.code == 2 && ran.stderr.contains(said), "{}", ran.stderr);
     }
@@ -160,17 +314,30 @@ fn what_covariance_analysis_cannot_do_is_refused() {
     let command = "run drive.toml imu.toml --runs 2 --outage 30:45 --scenario gate.toml -o gated";
     let told = done(place.path(), command);
     let summary: Value =
-        serde_json::from_str(&fs::read_to_string(place.path().join("gated/summary.json")).unwrap()).unwrap();
+        serde_json::from_str(&fs::read_to_string(place.path().join("gated/summary.json")).unwrap())
+            .unwrap();
     assert!(
         summary["outages"][0]["budget"].is_null() && !told.stderr.contains("sources of"),
         "{}",
         told.stderr
     );
-    done(place.path(), "synthesize imu.toml --replicates 1 --samples 7000 --seed 1 -o made");
-    let command = "run drive.toml imu.toml --method both --outage none --static made/replicate_1.csv -o out";
+    done(
+        place.path(),
+        "synthesize imu.toml --replicates 1 --samples 7000 --seed 1 -o made",
+    );
+    let command =
+        "run drive.toml imu.toml --method both --outage none --static made/replicate_1.csv -o out";
     let ran = nav_sim(place.path(), command);
-    assert!(ran.code == 2 && ran.stderr.contains("covariance analysis needs a model"), "{}", ran.stderr);
-    assert!(ran.stderr.contains("hint: calibrate the recordings"), "{}", ran.stderr);
+    assert!(
+        ran.code == 2 && ran.stderr.contains("covariance analysis needs a model"),
+        "{}",
+        ran.stderr
+    );
+    assert!(
+        ran.stderr.contains("hint: calibrate the recordings"),
+        "{}",
+        ran.stderr
+    );
 }
 
 /// Three requirements: one that is met, two that are not; told after the verdict, kept, and exit code 3.
@@ -178,23 +345,57 @@ fn what_covariance_analysis_cannot_do_is_refused() {
 fn requirements_decide_the_exit_code() {
     let place = place();
     let command = "run drive.toml imu.toml --method lincov --outage 30:45 -o out";
-    let ran = nav_sim(place.path(), &format!("{command} --require p95_m<=1000 --require rmse_yaw_deg<=90"));
+    let ran = nav_sim(
+        place.path(),
+        &format!("{command} --require p95_m<=1000 --require rmse_yaw_deg<=90"),
+    );
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    assert!(ran.stdout.lines().nth(1).unwrap().starts_with("required p95_m<=1000: met, "), "{}", ran.stdout);
+    assert!(
+        ran.stdout
+            .lines()
+            .nth(1)
+            .unwrap()
+            .starts_with("required p95_m<=1000: met, "),
+        "{}",
+        ran.stdout
+    );
     let ran = nav_sim(place.path(), &format!("{command} --require consistent"));
-    assert!(ran.code == 0 && ran.stdout.contains("required consistent: met"), "{}{}", ran.stdout, ran.stderr);
-    let ran = nav_sim(place.path(), &format!("{command} --require p95_m<=0.1 --require yaw_deg<=90"));
+    assert!(
+        ran.code == 0 && ran.stdout.contains("required consistent: met"),
+        "{}{}",
+        ran.stdout,
+        ran.stderr
+    );
+    let ran = nav_sim(
+        place.path(),
+        &format!("{command} --require p95_m<=0.1 --require yaw_deg<=90"),
+    );
     assert_eq!(ran.code, 3, "{}", ran.stderr);
-    assert!(ran.stdout.starts_with("required p95_m<=0.1: NOT MET, "), "{}", ran.stdout);
-    assert!(ran.stderr.contains("error: required p95_m<=0.1: NOT MET, "), "{}", ran.stderr);
+    assert!(
+        ran.stdout.starts_with("required p95_m<=0.1: NOT MET, "),
+        "{}",
+        ran.stdout
+    );
+    assert!(
+        ran.stderr.contains("error: required p95_m<=0.1: NOT MET, "),
+        "{}",
+        ran.stderr
+    );
     let kept = &json(&place.path().join("out/summary.json"))["require"];
-    assert_eq!((&kept[0]["met"], &kept[1]["met"]), (&false.into(), &true.into()));
+    assert_eq!(
+        (&kept[0]["met"], &kept[1]["met"]),
+        (&false.into(), &true.into())
+    );
     refused(
         "run drive.toml imu.toml --outage none --seed 1 --require p95_m<=5 -o out",
         2,
         "--require p95_m<=5: p95_m is of",
     );
-    refused("run drive.toml imu.toml --require p95<=5 -o out", 2, "invalid value 'p95<=5'");
+    refused(
+        "run drive.toml imu.toml --require p95<=5 -o out",
+        2,
+        "invalid value 'p95<=5'",
+    );
 }
 
 /// What errors are made of is in the summary, in the page and, the largest sources, on the screen, with runs and
@@ -203,27 +404,36 @@ fn requirements_decide_the_exit_code() {
 fn the_sources_of_errors_are_told() {
     let place = place();
     for method in ["lincov", "monte-carlo"] {
-        let command =
-            format!("run drive.toml imu.toml --method {method} --runs 2 --seed 1 --outage 30:45 -o out");
+        let command = format!(
+            "run drive.toml imu.toml --method {method} --runs 2 --seed 1 --outage 30:45 -o out"
+        );
         let ran = done(place.path(), &command);
         assert!(
-            ran.stderr.contains("note: sources of the horizontal error at the end of 30–45 s: "),
+            ran.stderr
+                .contains("note: sources of the horizontal error at the end of 30–45 s: "),
             "{}",
             ran.stderr
         );
         assert!(ran.stdout.lines().count() <= 20, "{}", ran.stdout);
         let outage = json(&place.path().join("out/summary.json"))["outages"][0].clone();
         let sum = |budget: &Value| -> f64 {
-            budget.as_object().unwrap().values().map(|shares| shares["yaw_deg"].as_f64().unwrap()).sum()
+            budget
+                .as_object()
+                .unwrap()
+                .values()
+                .map(|shares| shares["yaw_deg"].as_f64().unwrap())
+                .sum()
         };
         assert!((sum(&outage["budget"]) - 1.0).abs() < 1e-9);
         assert!((sum(&outage["believed_budget"]) - 1.0).abs() < 1e-9);
         let page = fs::read_to_string(place.path().join("out/report.html")).unwrap();
         assert!(page.contains("Sources of errors at the end of 30–45 s: true errors"));
     }
-    done(place.path(), "synthesize imu.toml --replicates 1 --samples 7000 --seed 1 -o made");
-    let command =
-        "run drive.toml imu.toml --runs 2 --seed 1 --outage 30:45 --static made/replicate_1.csv -o out";
+    done(
+        place.path(),
+        "synthesize imu.toml --replicates 1 --samples 7000 --seed 1 -o made",
+    );
+    let command = "run drive.toml imu.toml --runs 2 --seed 1 --outage 30:45 --static made/replicate_1.csv -o out";
     let ran = done(place.path(), command);
     assert!(!ran.stderr.contains("sources of"), "{}", ran.stderr);
     let outage = json(&place.path().join("out/summary.json"))["outages"][0].clone();
@@ -236,9 +446,18 @@ fn the_sources_of_errors_are_told() {
 fn a_motion_that_nothing_makes_is_doubted() {
     let place = place();
     let dir = place.path();
-    done(dir, "trajectory convert drive.toml --rate-hz 10 -o rough.csv");
+    done(
+        dir,
+        "trajectory convert drive.toml --rate-hz 10 -o rough.csv",
+    );
     let text = fs::read_to_string(dir.join("rough.csv")).unwrap();
-    let column = text.lines().next().unwrap().split(',').position(|name| name == "h_m").unwrap();
+    let column = text
+        .lines()
+        .next()
+        .unwrap()
+        .split(',')
+        .position(|name| name == "h_m")
+        .unwrap();
     let rough = |(i, line): (usize, &str)| {
         let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
         if i > 0 && i % 20 == 0 {
@@ -246,13 +465,29 @@ fn a_motion_that_nothing_makes_is_doubted() {
         }
         cells.join(",") + "\n"
     };
-    fs::write(dir.join("rough.csv"), text.lines().enumerate().map(rough).collect::<String>()).unwrap();
+    fs::write(
+        dir.join("rough.csv"),
+        text.lines().enumerate().map(rough).collect::<String>(),
+    )
+    .unwrap();
     let run = |drive: &str| {
-        done(dir, &format!("run {drive} imu.toml --runs 1 --outage none --seed 1 -o out")).stderr
+        done(
+            dir,
+            &format!("run {drive} imu.toml --runs 1 --outage none --seed 1 -o out"),
+        )
+        .stderr
     };
     let said = run("rough.csv");
-    assert_eq!(said.matches("nav-sim trajectory check rough.csv lists them").count(), 1, "{said}");
-    assert!(said.contains(", beyond ") && said.contains("more such stretches"), "{said}");
+    assert_eq!(
+        said.matches("nav-sim trajectory check rough.csv lists them")
+            .count(),
+        1,
+        "{said}"
+    );
+    assert!(
+        said.contains(", beyond ") && said.contains("more such stretches"),
+        "{said}"
+    );
     assert!(!run("drive.toml").contains("trajectory check"));
 }
 
@@ -262,8 +497,14 @@ fn a_motion_that_nothing_makes_is_doubted() {
 fn the_remedy_is_for_what_the_filter_does_not_expect() {
     let place = place();
     let put = |name: &str, text: &str| fs::write(place.path().join(name), text).unwrap();
-    put("turned_on.toml", &format!("{MODEL}[turn_on]\naccel_m_s2 = 0.5\ngyro_rad_s = 1e-6\n"));
-    put("coloured.toml", "gnss.correlated_pos_sigma_m = [9, 9, 9]\ngnss.correlation_time_s = 60\n");
+    put(
+        "turned_on.toml",
+        &format!("{MODEL}[turn_on]\naccel_m_s2 = 0.5\ngyro_rad_s = 1e-6\n"),
+    );
+    put(
+        "coloured.toml",
+        "gnss.correlated_pos_sigma_m = [9, 9, 9]\ngnss.correlation_time_s = 60\n",
+    );
     put("scaled.toml", "imu.scale_ppm_gyro = 50000\n");
     put("crossed.toml", "imu.misalignment_rad = 0.03\n");
     let cases = [
@@ -298,9 +539,15 @@ fn the_remedy_is_for_what_the_filter_does_not_expect() {
                 "run drive.toml imu.toml {arguments} --outage 30:40 --seed 1 --method {method} -o out"
             );
             let ran = nav_sim(place.path(), &command);
-            let warning =
-                ran.stderr.lines().find(|line| line.starts_with("warning: the filter is ")).unwrap();
-            assert!(warning.contains(cause) && warning.contains(helps), "{warning}");
+            let warning = ran
+                .stderr
+                .lines()
+                .find(|line| line.starts_with("warning: the filter is "))
+                .unwrap();
+            assert!(
+                warning.contains(cause) && warning.contains(helps),
+                "{warning}"
+            );
             assert!(!warning.contains("nav-sim tune"), "{warning}");
             // by its share of what the budget in summary.json has for the state that the warning names
             let (said, rest) = warning.split_once(" % of the mean square of ").unwrap();
@@ -310,7 +557,10 @@ fn the_remedy_is_for_what_the_filter_does_not_expect() {
             if source == "gyro.misalignment" {
                 share += budget["accel.misalignment"][state].as_f64().unwrap();
             }
-            assert!(said.ends_with(&format!(" ({:.0}", 100.0 * share)), "{warning} {share}");
+            assert!(
+                said.ends_with(&format!(" ({:.0}", 100.0 * share)),
+                "{warning} {share}"
+            );
         }
     }
     nav_sim(
@@ -330,7 +580,9 @@ fn the_remedy_is_for_what_the_filter_does_not_expect() {
 fn no_cause_is_named_that_is_not_there() {
     let place = place();
     let walk = |white: &str, walk: &str| {
-        format!("processes = [{{ type = \"WN\", sigma2 = {white} }}, {{ type = \"RW\", gamma2 = {walk} }}]")
+        format!(
+            "processes = [{{ type = \"WN\", sigma2 = {white} }}, {{ type = \"RW\", gamma2 = {walk} }}]"
+        )
     };
     let model = format!(
         "rate_hz = 100.0\n[accel]\n{}\n[gyro]\n{}\n",
@@ -339,40 +591,76 @@ fn no_cause_is_named_that_is_not_there() {
     );
     let put = |name: &str, text: &str| fs::write(place.path().join(name), text).unwrap();
     put("walk.toml", &model);
-    put("scaled.toml", "imu.scale_ppm_accel = 500\nimu.scale_ppm_gyro = 500\n");
-    put("biased.toml", "imu.turn_on_bias_accel_m_s2 = 0.01\ninitial.accel_bias_sigma_m_s2 = 0.0053\n");
-    let drive = format!("{}/trajectories/land_vehicle.toml", env!("CARGO_MANIFEST_DIR"));
+    put(
+        "scaled.toml",
+        "imu.scale_ppm_accel = 500\nimu.scale_ppm_gyro = 500\n",
+    );
+    put(
+        "biased.toml",
+        "imu.turn_on_bias_accel_m_s2 = 0.01\ninitial.accel_bias_sigma_m_s2 = 0.0053\n",
+    );
+    let drive = format!(
+        "{}/trajectories/land_vehicle.toml",
+        env!("CARGO_MANIFEST_DIR")
+    );
     let warning = |options: &str| {
-        let ran = nav_sim(place.path(), &format!("run {drive} walk.toml --seed 1 {options} -o out"));
+        let ran = nav_sim(
+            place.path(),
+            &format!("run {drive} walk.toml --seed 1 {options} -o out"),
+        );
         let of_filter = |line: &&str| line.starts_with("warning: the filter is overconfident");
         ran.stderr.lines().find(of_filter).unwrap().to_owned()
     };
     for method in ["lincov", "monte-carlo --runs 40"] {
         let said = warning(&format!("--scenario scaled.toml --method {method}"));
-        assert!(said.contains("a scale-factor error of 500 ppm") && said.contains("--scale-ppm"), "{said}");
+        assert!(
+            said.contains("a scale-factor error of 500 ppm") && said.contains("--scale-ppm"),
+            "{said}"
+        );
     }
     let said = warning("--scenario biased.toml --filter full --outage 20:60 --method lincov");
-    assert!(said.contains("nav-sim tune --scenario") && !said.contains("noise"), "{said}");
+    assert!(
+        said.contains("nav-sim tune --scenario") && !said.contains("noise"),
+        "{said}"
+    );
 }
 
 /// Of eight outages the table has the six with the largest errors, in time order, and says so: what is printed stays on a screen.
 #[test]
 fn of_many_outages_the_largest_errors_are_shown() {
     let place = place();
-    let outages: String = (0..8).map(|k| format!(" --outage {}:{}", 10 + 6 * k, 12 + 6 * k)).collect();
-    let ran = done(place.path(), &format!("run drive.toml imu.toml --method lincov{outages} -o out"));
+    let outages: String = (0..8)
+        .map(|k| format!(" --outage {}:{}", 10 + 6 * k, 12 + 6 * k))
+        .collect();
+    let ran = done(
+        place.path(),
+        &format!("run drive.toml imu.toml --method lincov{outages} -o out"),
+    );
     let summary = json(&place.path().join("out/summary.json"));
     let mut errors: Vec<(f64, String)> = summary["outages"]
         .as_array()
         .unwrap()
         .iter()
-        .map(|o| (o["horizontal_error_end_m"]["p95"].as_f64().unwrap(), o["start_s"].to_string()))
+        .map(|o| {
+            (
+                o["horizontal_error_end_m"]["p95"].as_f64().unwrap(),
+                o["start_s"].to_string(),
+            )
+        })
         .collect();
     errors.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let is_shown = |start: &str| ran.stdout.contains(&format!("\n  {}–", start.trim_end_matches(".0")));
-    assert!(errors[2..].iter().all(|(_, start)| is_shown(start)), "{}", ran.stdout);
+    let is_shown = |start: &str| {
+        ran.stdout
+            .contains(&format!("\n  {}–", start.trim_end_matches(".0")))
+    };
     assert!(
-        ran.stderr.contains("the table has the 6 of 8 outages with the largest errors, the page all"),
+        errors[2..].iter().all(|(_, start)| is_shown(start)),
+        "{}",
+        ran.stdout
+    );
+    assert!(
+        ran.stderr
+            .contains("the table has the 6 of 8 outages with the largest errors, the page all"),
         "{}",
         ran.stderr
     );
@@ -389,7 +677,13 @@ fn each_run_has_a_truth_of_its_own() {
     };
     let place = place();
     let put = |name: &str, text: String| fs::write(place.path().join(name), text).unwrap();
-    let white = MODEL.split("[gyro]").nth(1).unwrap().split("sigma2 = ").nth(1).unwrap();
+    let white = MODEL
+        .split("[gyro]")
+        .nth(1)
+        .unwrap()
+        .split("sigma2 = ")
+        .nth(1)
+        .unwrap();
     let white = white.split([',', ' ', '}']).next().unwrap();
     let (accel, gyro) = MODEL.split_once("[gyro]").unwrap();
     let truth = format!("{accel}[gyro]{}", gyro.replacen(white, "4e-8", 1));
@@ -397,7 +691,10 @@ fn each_run_has_a_truth_of_its_own() {
     put("drawn.toml", format!("{MODEL}{}", law("0.5")));
     put("truth.toml", truth);
     let runs = |arguments: &str, out: &str| {
-        done(place.path(), &format!("run drive.toml {arguments} --runs 9 --outage 30:40 --seed 5 -o {out}"));
+        done(
+            place.path(),
+            &format!("run drive.toml {arguments} --runs 9 --outage 30:40 --seed 5 -o {out}"),
+        );
         fs::read_to_string(place.path().join(out).join("runs.csv")).unwrap()
     };
     let fixed = runs("fixed.toml --spread", "fixed");
@@ -410,5 +707,9 @@ fn each_run_has_a_truth_of_its_own() {
 
 #[test]
 fn a_spread_that_is_not_there_or_cannot_be_analysed_is_refused() {
-    refused("run drive.toml imu.toml --spread --seed 1", 2, "imu.toml: no [spread] to draw parameters from");
+    refused(
+        "run drive.toml imu.toml --spread --seed 1",
+        2,
+        "imu.toml: no [spread] to draw parameters from",
+    );
 }

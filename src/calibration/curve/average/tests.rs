@@ -9,7 +9,14 @@ fn tuning() -> Tuning {
 }
 
 fn replicate(samples: usize, classical: f64, robust: f64) -> Replicate {
-    let robust = vec![RobustVariance { value: robust, status: Status::Ok, zeros: 0.0 }; 2];
+    let robust = vec![
+        RobustVariance {
+            value: robust,
+            status: Status::Ok,
+            zeros: 0.0
+        };
+        2
+    ];
     let (name, classical) = (String::new(), vec![classical; 2]);
     Replicate {
         name,
@@ -24,7 +31,9 @@ fn replicate(samples: usize, classical: f64, robust: f64) -> Replicate {
 }
 
 fn eight() -> Vec<Replicate> {
-    (1..=8).map(|k| replicate(1000, f64::from(k), 10.0 * f64::from(k))).collect()
+    (1..=8)
+        .map(|k| replicate(1000, f64::from(k), 10.0 * f64::from(k)))
+        .collect()
 }
 
 fn first(replicates: &[Replicate], estimator: Estimator, trim: Trim) -> f64 {
@@ -36,7 +45,15 @@ fn thirty_per_cent_of_eight_is_two_at_each_end() {
     let trim = Trim::Fraction(0.3);
     assert_relative_eq!(first(&eight(), Estimator::Awv, trim), 4.5);
     assert_relative_eq!(first(&eight(), Estimator::SrAwv, trim), 45.0);
-    assert_eq!((trim.count(8), trim.count(10), trim.count(3), Trim::Count(2).count(8)), (2, 3, 0, 2));
+    assert_eq!(
+        (
+            trim.count(8),
+            trim.count(10),
+            trim.count(3),
+            Trim::Count(2).count(8)
+        ),
+        (2, 3, 0, 2)
+    );
     let mut abnormal = eight();
     abnormal[0] = replicate(1000, 0.0, 1e9);
     abnormal[1] = replicate(1000, 0.0, 1e-9);
@@ -47,12 +64,19 @@ fn thirty_per_cent_of_eight_is_two_at_each_end() {
 
 #[test]
 fn longer_replicates_weigh_more_and_the_kept_weights_sum_to_one() {
-    let replicates = [replicate(1000, 1.0, 1.0), replicate(3000, 5.0, 5.0), replicate(1000, 9.0, 100.0)];
+    let replicates = [
+        replicate(1000, 1.0, 1.0),
+        replicate(3000, 5.0, 5.0),
+        replicate(1000, 9.0, 100.0),
+    ];
     assert_relative_eq!(first(&replicates, Estimator::Awv, Trim::Count(0)), 5.0);
     assert_relative_eq!(first(&replicates, Estimator::DrAwv, Trim::Count(1)), 5.0);
     let curve = average(&replicates[..2], Estimator::Awv, Trim::Count(0), &tuning()).unwrap();
     let eta = |samples: f64| (samples - 1.0) / 2.0;
-    assert_relative_eq!(curve.edof[0], 1.0 / (0.0625 / eta(1000.0) + 0.5625 / eta(3000.0)));
+    assert_relative_eq!(
+        curve.edof[0],
+        1.0 / (0.0625 / eta(1000.0) + 0.5625 / eta(3000.0))
+    );
     assert_relative_eq!(curve.wv[0], 4.0);
 }
 
@@ -67,7 +91,11 @@ fn a_level_is_averaged_over_the_replicates_that_have_it() {
     let curve = |estimator, trim| average(&replicates, estimator, trim, &tuning()).unwrap();
     let awv = curve(Estimator::Awv, Trim::Count(0));
     assert_eq!(awv.levels, [1, 2]);
-    assert_relative_eq!(awv.wv[0], (10.0 * 1000.0 + 10.0 * 500.0) / 4010.0, max_relative = 1e-14);
+    assert_relative_eq!(
+        awv.wv[0],
+        (10.0 * 1000.0 + 10.0 * 500.0) / 4010.0,
+        max_relative = 1e-14
+    );
     assert_relative_eq!(awv.wv[1], 2.5);
     // floor(0.3·5) = floor(0.3·4) = 1: of 10, 20, 30, 40, 500 and of 10, 20, 30, 40.
     let trimmed = curve(Estimator::DrAwv, Trim::Fraction(0.3));
@@ -75,8 +103,12 @@ fn a_level_is_averaged_over_the_replicates_that_have_it() {
     assert_relative_eq!(trimmed.wv[1], 25.0);
     // Two at each end leave one of five and none of four.
     assert_eq!(curve(Estimator::DrAwv, Trim::Count(2)).levels, [1]);
-    let levels =
-        |kept: &[Replicate]| average(kept, Estimator::Awv, Trim::Count(0), &tuning()).unwrap().levels.len();
+    let levels = |kept: &[Replicate]| {
+        average(kept, Estimator::Awv, Trim::Count(0), &tuning())
+            .unwrap()
+            .levels
+            .len()
+    };
     assert_eq!((levels(&replicates[3..]), levels(&replicates[2..])), (1, 2));
 }
 
@@ -97,12 +129,27 @@ fn scales_that_coarse_steps_move_are_classical() {
     let mut number = || (0.3 * generator.sample::<f64, _>(rand_distr::StandardNormal)).round();
     let signal: Vec<f64> = (0..1 << 17).map(|_| number()).collect();
     let (classical, robust) = both(&signal, 9, &tuning()).unwrap();
-    let one = Replicate { samples: signal.len(), classical, robust, ..replicate(1, 0.0, 0.0) };
-    let curve =
-        |estimator| average(std::slice::from_ref(&one), estimator, Trim::Count(0), &tuning()).unwrap();
+    let one = Replicate {
+        samples: signal.len(),
+        classical,
+        robust,
+        ..replicate(1, 0.0, 0.0)
+    };
+    let curve = |estimator| {
+        average(
+            std::slice::from_ref(&one),
+            estimator,
+            Trim::Count(0),
+            &tuning(),
+        )
+        .unwrap()
+    };
     assert_eq!(curve(Estimator::Gmwm).ignored, [0; 0]);
     let curve = curve(Estimator::Rgmwm);
-    assert!(curve.ignored.is_empty() && curve.classical.contains(&1), "{curve:?}");
+    assert!(
+        curve.ignored.is_empty() && curve.classical.contains(&1),
+        "{curve:?}"
+    );
     assert_relative_eq!(curve.edof[0], interval::edof_eta3(1 << 17, 1));
     for ((level, nu), edof) in curve.levels.iter().zip(&curve.wv).zip(&curve.edof) {
         let off = (nu / (0.0956 / f64::from(*level).exp2()) - 1.0).abs();
@@ -115,7 +162,9 @@ fn scales_that_coarse_steps_move_are_classical() {
 #[test]
 fn a_scale_without_a_root_is_bounded_by_the_classical_average() {
     let mut replicates = eight()[..3].to_vec();
-    replicates[..2].iter_mut().for_each(|r| r.robust[0].status = Status::NoRoot);
+    replicates[..2]
+        .iter_mut()
+        .for_each(|r| r.robust[0].status = Status::NoRoot);
     let curve = average(&replicates, Estimator::SrAwv, Trim::Count(0), &tuning()).unwrap();
     assert_eq!((curve.ignored, curve.classical), (vec![1], vec![1]));
     assert_relative_eq!(curve.wv[0], 2.0);

@@ -51,8 +51,10 @@ fn spectra_integrate_to_the_wavelet_variance() {
 fn few_coefficients_scatter_as_said() {
     const RECORDS: usize = 2000;
     let mut generator = Generator::seed_from_u64(4);
-    let processes =
-        [Process::White(White::new(1.0).unwrap()), Process::RandomWalk(RandomWalk::new(1.0).unwrap())];
+    let processes = [
+        Process::White(White::new(1.0).unwrap()),
+        Process::RandomWalk(RandomWalk::new(1.0).unwrap()),
+    ];
     for process in processes {
         let law = SamplingLaw::new(&Composite::new(vec![process]), 8);
         let mut nu = vec![Vec::new(); 2];
@@ -67,14 +69,21 @@ fn few_coefficients_scatter_as_said() {
                 })
                 .collect();
             let all = classical(&signal, 8).unwrap();
-            nu.iter_mut().zip([all[7], all[6]]).for_each(|(list, value)| list.push(value));
+            nu.iter_mut()
+                .zip([all[7], all[6]])
+                .for_each(|(list, value)| list.push(value));
         }
         for (list, level) in nu.iter().zip([8, 7]) {
             let mean = list.iter().sum::<f64>() / RECORDS as f64;
-            let variance = list.iter().map(|v| (v / mean - 1.0).powi(2)).sum::<f64>() / RECORDS as f64;
+            let variance =
+                list.iter().map(|v| (v / mean - 1.0).powi(2)).sum::<f64>() / RECORDS as f64;
             let (found, said) = (2.0 / variance, law.edof(512)[level - 1]);
             let allowed = 4.0 * ((2.0 + 12.0 / said) / RECORDS as f64).sqrt() + 0.05;
-            assert!((found / said - 1.0).abs() < allowed, "{} level {level}: {found} {said}", process.code());
+            assert!(
+                (found / said - 1.0).abs() < allowed,
+                "{} level {level}: {found} {said}",
+                process.code()
+            );
             let logs: Vec<f64> = list.iter().map(|nu| nu.ln()).collect();
             let centre = logs.iter().sum::<f64>() / RECORDS as f64;
             let found = logs.iter().map(|ln| (ln - centre).powi(2)).sum::<f64>() / RECORDS as f64;
@@ -97,19 +106,30 @@ fn robust_variances_scatter_as_said() {
     use crate::wavelet::{Convention, both};
     const SIGNALS: usize = 1000;
     let tuning = Tuning::new(0.6, Convention::Exact).unwrap();
-    let law = SamplingLaw::new(&Composite::new(vec![Process::White(White::new(1.0).unwrap())]), 6);
+    let law = SamplingLaw::new(
+        &Composite::new(vec![Process::White(White::new(1.0).unwrap())]),
+        6,
+    );
     let mut generator = Generator::seed_from_u64(8);
     let mut logs = vec![Vec::new(); 6];
     for _ in 0..SIGNALS {
-        let signal: Vec<f64> = (0..2048).map(|_| generator.sample::<f64, _>(StandardNormal)).collect();
+        let signal: Vec<f64> = (0..2048)
+            .map(|_| generator.sample::<f64, _>(StandardNormal))
+            .collect();
         let (_, robust) = both(&signal, 6, &tuning).unwrap();
-        logs.iter_mut().zip(robust).for_each(|(list, nu)| list.push(nu.value.ln()));
+        logs.iter_mut()
+            .zip(robust)
+            .for_each(|(list, nu)| list.push(nu.value.ln()));
     }
     for (i, (logs, edof)) in logs.iter().zip(law.robust_edof(2048, &tuning)).enumerate() {
         let mean = logs.iter().sum::<f64>() / SIGNALS as f64;
         let variance = logs.iter().map(|ln| (ln - mean).powi(2)).sum::<f64>() / SIGNALS as f64;
         let ratio = variance / law.shapes[i].variance_of_log(edof);
-        assert!((ratio - 1.0).abs() < 4.0 * 0.045 + 0.05, "level {}: {ratio}", i + 1);
+        assert!(
+            (ratio - 1.0).abs() < 4.0 * 0.045 + 0.05,
+            "level {}: {ratio}",
+            i + 1
+        );
     }
 }
 
@@ -140,21 +160,36 @@ fn simulated_signals_scatter_so() {
         let nu = classical(&signal, 5).unwrap();
         nu.iter().zip(&mut logs).for_each(|(nu, l)| l.push(nu.ln()));
         let ratios = law.draw(&edof, &mut generator);
-        ratios.iter().zip(&mut drawn).for_each(|(r, l)| l.push(r.ln()));
+        ratios
+            .iter()
+            .zip(&mut drawn)
+            .for_each(|(r, l)| l.push(r.ln()));
     }
     let covariance = |a: &[f64], b: &[f64]| {
         let mean = |x: &[f64]| x.iter().sum::<f64>() / SIGNALS as f64;
         let (ma, mb) = (mean(a), mean(b));
-        a.iter().zip(b).map(|(x, y)| (x - ma) * (y - mb)).sum::<f64>() / (SIGNALS - 1) as f64
+        a.iter()
+            .zip(b)
+            .map(|(x, y)| (x - ma) * (y - mb))
+            .sum::<f64>()
+            / (SIGNALS - 1) as f64
     };
     for logs in [&logs, &drawn] {
         for i in 0..5 {
             let ratio = covariance(&logs[i], &logs[i]) * edof[i] / 2.0;
-            assert!((ratio - 1.0).abs() < 4.0 * 0.058 + 0.03, "level {}: {ratio}", i + 1);
+            assert!(
+                (ratio - 1.0).abs() < 4.0 * 0.058 + 0.03,
+                "level {}: {ratio}",
+                i + 1
+            );
             for j in 0..i {
-                let scale = (covariance(&logs[i], &logs[i]) * covariance(&logs[j], &logs[j])).sqrt();
+                let scale =
+                    (covariance(&logs[i], &logs[i]) * covariance(&logs[j], &logs[j])).sqrt();
                 let r = covariance(&logs[i], &logs[j]) / scale;
-                assert!((r - law.correlation[(i, j)]).abs() < 4.0 * 0.041, "{i} {j}: {r}");
+                assert!(
+                    (r - law.correlation[(i, j)]).abs() < 4.0 * 0.041,
+                    "{i} {j}: {r}"
+                );
             }
         }
     }

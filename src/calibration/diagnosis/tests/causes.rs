@@ -9,17 +9,34 @@ use rand::SeedableRng;
 fn rounded(deviation: f64, glitches: usize) -> Vec<Diagnosis> {
     let signal = |file: usize, axis: Axis| {
         let run = file as u64;
-        let mut generator =
-            StreamKey { seed: 6, scenario: "", run, source: axis.name(), process: "" }.generator();
+        let mut generator = StreamKey {
+            seed: 6,
+            scenario: "",
+            run,
+            source: axis.name(),
+            process: "",
+        }
+        .generator();
         let bias = 0.3 * file as f64;
         let mut number = || (bias + deviation * generator.sample::<f64, _>(StandardNormal)).round();
         let mut signal: Vec<f64> = (0..32 * SAMPLES).map(|_| number()).collect();
-        signal.iter_mut().skip(50).step_by(600).take(glitches).for_each(|x| *x += 30.0);
+        signal
+            .iter_mut()
+            .skip(50)
+            .step_by(600)
+            .take(glitches)
+            .for_each(|x| *x += 30.0);
         signal
     };
     let recording = |file: usize| Axis::ALL.map(|axis| signal(file, axis));
     let model = ModelChoice::Given("WN".parse().unwrap());
-    diagnosed((0..4).map(recording), &Settings { model, ..settings() })
+    diagnosed(
+        (0..4).map(recording),
+        &Settings {
+            model,
+            ..settings()
+        },
+    )
 }
 
 /// Rounding without an outlier: none is told, in all recordings or in one whose bias lies elsewhere between the steps. At half a
@@ -29,18 +46,29 @@ fn coarse_steps_are_not_taken_for_outliers() {
     for deviation in [0.25, 0.3, 0.4] {
         let all = rounded(deviation, 0);
         assert!(
-            all.iter().all(|d| d.common.is_none() && d.outliers.is_none()),
+            all.iter()
+                .all(|d| d.common.is_none() && d.outliers.is_none()),
             "{deviation}: {:?}",
             all[0].common
         );
         let steps = all[0].coarse_steps.as_ref().unwrap();
-        assert!(steps.excess.abs() > 0.02 && steps.tau_s.iter().all(|tau| *tau <= 256.0), "{steps:?}");
+        assert!(
+            steps.excess.abs() > 0.02 && steps.tau_s.iter().all(|tau| *tau <= 256.0),
+            "{steps:?}"
+        );
     }
     let half = &rounded(0.6, 0)[0];
-    assert!(half.common.is_none() && half.coarse_steps.is_none(), "{:?}", half.coarse_steps);
+    assert!(
+        half.common.is_none() && half.coarse_steps.is_none(),
+        "{:?}",
+        half.coarse_steps
+    );
     for deviation in [0.3, 1.0] {
         let glitched = &rounded(deviation, 100)[0];
-        assert!(glitched.common.is_some() && glitched.coarse_steps.is_none(), "{deviation}: {glitched:?}");
+        assert!(
+            glitched.common.is_some() && glitched.coarse_steps.is_none(),
+            "{deviation}: {glitched:?}"
+        );
     }
 }
 
@@ -49,8 +77,9 @@ fn coarse_steps_are_not_taken_for_outliers() {
 #[test]
 fn coarse_steps_take_no_scale_from_one_recording() {
     let mut generator = Generator::seed_from_u64(5);
-    let signal: Vec<f64> =
-        (0..32 * SAMPLES).map(|_| (0.3 * generator.sample::<f64, _>(StandardNormal)).round()).collect();
+    let signal: Vec<f64> = (0..32 * SAMPLES)
+        .map(|_| (0.3 * generator.sample::<f64, _>(StandardNormal)).round())
+        .collect();
     let (classical, robust) = both(&signal, LEVELS, &settings().tuning).unwrap();
     let (name, axis, samples) = ("run".to_owned(), Some(Axis::X), signal.len());
     let one = Replicate {
@@ -63,15 +92,41 @@ fn coarse_steps_take_no_scale_from_one_recording() {
         trend: f64::NAN,
         mean: f64::NAN,
     };
-    let groups = grouped(vec![(Channel { sensor: Sensor::Accel, axis: Axis::X }, one)], Pool::Axes);
+    let groups = grouped(
+        vec![(
+            Channel {
+                sensor: Sensor::Accel,
+                axis: Axis::X,
+            },
+            one,
+        )],
+        Pool::Axes,
+    );
     let estimators = vec![Estimator::Gmwm, Estimator::Rgmwm, Estimator::SrAwv];
     let model = ModelChoice::Given("WN".parse().unwrap());
-    let outcomes = calibrate(&groups, &Settings { model, estimators, ..settings() }).unwrap();
+    let outcomes = calibrate(
+        &groups,
+        &Settings {
+            model,
+            estimators,
+            ..settings()
+        },
+    )
+    .unwrap();
     for outcome in outcomes {
-        assert!(!outcome.notes(&settings()).iter().any(|note| matches!(note, Note::LeftOut(_))));
+        assert!(
+            !outcome
+                .notes(&settings())
+                .iter()
+                .any(|note| matches!(note, Note::LeftOut(_)))
+        );
         let (_, sigma2) = outcome.fit.composite.parameters().next().unwrap();
         let allowed = 0.013 + 4.0 * (2.0 / signal.len() as f64).sqrt();
-        assert!((sigma2 / 0.0956 - 1.0).abs() < allowed, "{}: {sigma2}", outcome.estimator.name());
+        assert!(
+            (sigma2 / 0.0956 - 1.0).abs() < allowed,
+            "{}: {sigma2}",
+            outcome.estimator.name()
+        );
     }
 }
 
@@ -79,16 +134,27 @@ fn coarse_steps_take_no_scale_from_one_recording() {
 /// whose slopes differ by a part, under the model that has it.
 fn alarmed_under_a_drift(differ: f64, sets: u64) -> [u32; 2] {
     let model = ModelChoice::Given("WN+DR".parse().unwrap());
-    let settings = Settings { model, ..settings() };
+    let settings = Settings {
+        model,
+        ..settings()
+    };
     let mut alarms = [0; 2];
     for seed in 0..sets {
         let recording = |file: usize| {
             let run = file as u64;
-            let mut generator = StreamKey { seed, scenario: "", run, source: "", process: "" }.generator();
+            let mut generator = StreamKey {
+                seed,
+                scenario: "",
+                run,
+                source: "",
+                process: "",
+            }
+            .generator();
             let slope = 30.0 * (1.0 + differ * normals(&mut generator)[0]) / (4 * SAMPLES) as f64;
             [1.0, -0.7, 0.4].map(|part| {
                 let ramp = (0..4 * SAMPLES).map(|t| part * slope * t as f64);
-                ramp.map(|level| level + generator.sample::<f64, _>(StandardNormal)).collect()
+                ramp.map(|level| level + generator.sample::<f64, _>(StandardNormal))
+                    .collect()
             })
         };
         let all = diagnosed((0..5).map(recording), &settings);
@@ -115,22 +181,46 @@ fn a_drift_that_all_share_is_told() {
     let drifting = |count: usize, model: &str| {
         let recording = |file: usize| {
             let run = file as u64;
-            let mut generator = StreamKey { seed: 3, scenario: "", run, source: "", process: "" }.generator();
+            let mut generator = StreamKey {
+                seed: 3,
+                scenario: "",
+                run,
+                source: "",
+                process: "",
+            }
+            .generator();
             [3.0, 0.0, 0.0].map(|drift| {
                 let ramp = (0..SAMPLES).map(|t| drift * t as f64 / SAMPLES as f64);
-                ramp.map(|level| level + generator.sample::<f64, _>(StandardNormal)).collect()
+                ramp.map(|level| level + generator.sample::<f64, _>(StandardNormal))
+                    .collect()
             })
         };
         let model = ModelChoice::Given(model.parse().unwrap());
-        diagnosed((0..count).map(recording), &Settings { model, ..settings() })
+        diagnosed(
+            (0..count).map(recording),
+            &Settings {
+                model,
+                ..settings()
+            },
+        )
     };
     for count in [3, 5] {
         let all = drifting(count, "WN+RW");
-        let CommonDrift { p_value, per_hour, .. } = all[0].common_drift.as_ref().unwrap();
-        assert!(*p_value < 0.025 && per_hour.len() == 1 && per_hour[0].0 == Axis::X, "{per_hour:?}");
+        let CommonDrift {
+            p_value, per_hour, ..
+        } = all[0].common_drift.as_ref().unwrap();
+        assert!(
+            *p_value < 0.025 && per_hour.len() == 1 && per_hour[0].0 == Axis::X,
+            "{per_hour:?}"
+        );
         assert!((per_hour[0].1 - 5.27).abs() < 4.0 * 0.09, "{per_hour:?}");
     }
-    assert!(drifting(2, "WN+RW").iter().chain(&drifting(5, "WN+DR")).all(|d| d.common_drift.is_none()));
+    assert!(
+        drifting(2, "WN+RW")
+            .iter()
+            .chain(&drifting(5, "WN+DR"))
+            .all(|d| d.common_drift.is_none())
+    );
 }
 
 /// Many alike sets under the model that has their drift: each question is alarmed in 2.5 % of 400 at most, known to √(400·0.025·0.975)
@@ -140,6 +230,9 @@ fn a_drift_that_all_share_is_told() {
 fn alarms_under_a_drift() {
     for differ in [0.0, 0.05] {
         let alarms = alarmed_under_a_drift(differ, 400);
-        assert!(alarms.iter().all(|count| *count <= 22), "slopes that differ by {differ}: {alarms:?} of 400");
+        assert!(
+            alarms.iter().all(|count| *count <= 22),
+            "slopes that differ by {differ}: {alarms:?} of 400"
+        );
     }
 }

@@ -17,7 +17,11 @@ fn one_abnormal_value_moves_the_plain_residuals_and_hardly_the_clipped() {
     assert!(noiseless(&logs, Estimator::SrAwv).between > 3.0);
     assert!(noiseless(&logs, Estimator::DrAwv).between < 3.0 * clean);
     let units = noiseless(&logs, Estimator::SrAwv).units;
-    assert_relative_eq!(units.iter().map(|u| u * u).sum::<f64>(), 5.0, max_relative = 1e-9);
+    assert_relative_eq!(
+        units.iter().map(|u| u * u).sum::<f64>(),
+        5.0,
+        max_relative = 1e-9
+    );
 }
 
 /// Paule and Mandel's equation by hand, two values: (x − y)²/(n₁ + n₂ + 2b²) = 1. Four within their noise: no
@@ -44,7 +48,9 @@ fn a_clipped_variance_scatters_as_said() {
     let mut generator = Generator::seed_from_u64(2);
     for count in [5, 6, 8, 12, 24] {
         let variance = |generator: &mut Generator| {
-            let x: Vec<f64> = (0..count).map(|_| generator.sample(StandardNormal)).collect();
+            let x: Vec<f64> = (0..count)
+                .map(|_| generator.sample(StandardNormal))
+                .collect();
             noiseless(&x, Estimator::DrAwv).between.powi(2)
         };
         let drawn: Vec<f64> = (0..4000).map(|_| variance(&mut generator)).collect();
@@ -66,7 +72,10 @@ fn coverage(between: f64, is_shared: bool) -> f64 {
     const SETS: u32 = 1000;
     const SAMPLES: usize = 1 << 14;
     let tuning = Tuning::default();
-    let law = SamplingLaw::new(&Composite::new(vec![Process::White(White::new(1.0).unwrap())]), 1);
+    let law = SamplingLaw::new(
+        &Composite::new(vec![Process::White(White::new(1.0).unwrap())]),
+        1,
+    );
     let mut generator = Generator::seed_from_u64(7);
     let mut held = 0;
     for _ in 0..SETS {
@@ -92,8 +101,9 @@ fn coverage(between: f64, is_shared: bool) -> f64 {
         let spread = Spread::new(&replicates, Estimator::Awv, &law, &tuning);
         let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / 12.0;
         let estimate = mean(&mut replicates.iter().map(|r| r.classical[0].ln()));
-        let squares: f64 =
-            (0..300).map(|_| mean(&mut spread.draw(&mut generator).iter().map(|r| r[0].ln())).powi(2)).sum();
+        let squares: f64 = (0..300)
+            .map(|_| mean(&mut spread.draw(&mut generator).iter().map(|r| r[0].ln())).powi(2))
+            .sum();
         let half = (squares / 300.0).sqrt() * NORMAL_975 * spread.student();
         held += u32::from(estimate.abs() < half);
     }
@@ -121,7 +131,10 @@ fn intervals_hold_the_truth_whatever_axes_share() {
 fn a_level_that_a_short_recording_lacks_scatters_as_the_others_show() {
     use crate::noise::{Composite, Process, White};
     use rand::SeedableRng;
-    let law = SamplingLaw::new(&Composite::new(vec![Process::White(White::new(1.0).unwrap())]), 2);
+    let law = SamplingLaw::new(
+        &Composite::new(vec![Process::White(White::new(1.0).unwrap())]),
+        2,
+    );
     let replicate = |(name, logs): (usize, &[f64])| Replicate {
         name: name.to_string(),
         axis: None,
@@ -137,8 +150,13 @@ fn a_level_that_a_short_recording_lacks_scatters_as_the_others_show() {
     let spread = Spread::new(&replicates, Estimator::Awv, &law, &Tuning::default());
     assert_relative_eq!(spread.between[1], 0.3, max_relative = 1e-4);
     let mut generator = Generator::seed_from_u64(3);
-    let drawn: Vec<f64> = (0..4000).map(|_| spread.draw(&mut generator)[0][1].ln()).collect();
+    let drawn: Vec<f64> = (0..4000)
+        .map(|_| spread.draw(&mut generator)[0][1].ln())
+        .collect();
     let mean = drawn.iter().sum::<f64>() / 4000.0;
     let variance = drawn.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 3999.0;
-    assert!((variance / 0.09 - 1.0).abs() < 4.0 * 0.022 + 0.02, "{variance}");
+    assert!(
+        (variance / 0.09 - 1.0).abs() < 4.0 * 0.022 + 0.02,
+        "{variance}"
+    );
 }

@@ -20,7 +20,10 @@ impl Dates {
 
     /// The one that most sentences state: before a receiver has found the time, it states any.
     fn most(&self) -> Option<f64> {
-        self.0.iter().max_by_key(|(_, count)| **count).map(|(s, _)| *s as f64)
+        self.0
+            .iter()
+            .max_by_key(|(_, count)| **count)
+            .map(|(s, _)| *s as f64)
     }
 }
 
@@ -40,23 +43,47 @@ impl Log {
     /// counter has rolled over is known by dates that are the IMU's after 1024 weeks, or twice that.
     pub(super) fn clock(&self, imu_s: Option<(f64, f64)>) -> Clock {
         let time_of_epoch = |e: &super::Epoch| DAY_S * e.day + e.time_s;
-        let span = self.epochs.first().map(time_of_epoch).zip(self.epochs.last().map(time_of_epoch));
+        let span = self
+            .epochs
+            .first()
+            .map(time_of_epoch)
+            .zip(self.epochs.last().map(time_of_epoch));
         let overlaps = |origin_s: f64| {
             let both = imu_s.zip(span);
             both.is_some_and(|(imu, gnss)| imu.0 <= origin_s + gnss.1 && origin_s + gnss.0 <= imu.1)
         };
         let midnight_s = self.dates.most();
-        let origins = midnight_s.map(|midnight_s| [0.0, 1.0, 2.0].map(|n| midnight_s + n * ROLLOVER_S));
+        let origins =
+            midnight_s.map(|midnight_s| [0.0, 1.0, 2.0].map(|n| midnight_s + n * ROLLOVER_S));
         if let Some((n, origin_s)) =
             origins.and_then(|all| all.into_iter().enumerate().find(|(_, s)| overlaps(*s)))
         {
-            return Clock { origin_s, words: "Unix time", is_rolled: n > 0 };
+            return Clock {
+                origin_s,
+                words: "Unix time",
+                is_rolled: n > 0,
+            };
         }
-        let day = Clock { words: "seconds of the day (UTC)", ..Clock::default() };
-        let gps_s = midnight_s.map(|s| s - GPS_EPOCH_S as f64 + leap_s(s)).unwrap_or(f64::NAN);
-        let of_gps = [(gps_s, "seconds of GPS time"), (gps_s.rem_euclid(WEEK_S), "seconds of the GPS week")];
-        match of_gps.into_iter().find(|(origin_s, _)| !overlaps(0.0) && overlaps(*origin_s)) {
-            Some((origin_s, words)) => Clock { origin_s, words, is_rolled: false },
+        let day = Clock {
+            words: "seconds of the day (UTC)",
+            ..Clock::default()
+        };
+        let gps_s = midnight_s
+            .map(|s| s - GPS_EPOCH_S as f64 + leap_s(s))
+            .unwrap_or(f64::NAN);
+        let of_gps = [
+            (gps_s, "seconds of GPS time"),
+            (gps_s.rem_euclid(WEEK_S), "seconds of the GPS week"),
+        ];
+        match of_gps
+            .into_iter()
+            .find(|(origin_s, _)| !overlaps(0.0) && overlaps(*origin_s))
+        {
+            Some((origin_s, words)) => Clock {
+                origin_s,
+                words,
+                is_rolled: false,
+            },
             None => day,
         }
     }

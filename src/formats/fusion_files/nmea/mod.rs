@@ -13,7 +13,9 @@ use crate::formats::{FileError as Error, Setting};
 use clock::{Clock, Dates};
 use glam::{DVec2, DVec3};
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
-use sentence::{address, angle, date_of_rmc, fields, horizontal, midnight, time_of_day, unchecked_fields};
+use sentence::{
+    address, angle, date_of_rmc, fields, horizontal, midnight, time_of_day, unchecked_fields,
+};
 
 /// Seconds of a day.
 const DAY_S: f64 = 86_400.0;
@@ -48,7 +50,9 @@ pub(super) struct Log {
 
 /// Whether a text is such a log: one of its first lines has a sentence of a receiver in it.
 pub(in crate::formats) fn is_nmea(text: &str) -> bool {
-    text.lines().take(20).any(|line| address(line.trim_end()).is_some())
+    text.lines()
+        .take(20)
+        .any(|line| address(line.trim_end()).is_some())
 }
 
 impl Log {
@@ -59,18 +63,29 @@ impl Log {
         let has_checksums = text.contains('*');
         let ended = || text.rsplit_once('\n').map_or(text, |(whole, _)| whole);
         let kept = if has_checksums { text } else { ended() };
-        let split = |line| if has_checksums { fields(line) } else { unchecked_fields(line) };
+        let split = |line| {
+            if has_checksums {
+                fields(line)
+            } else {
+                unchecked_fields(line)
+            }
+        };
         let lines = kept.lines().map(str::trim).enumerate();
         let lines: Vec<(usize, &str)> = lines.filter(|(_, line)| !line.is_empty()).collect();
         let ends = [lines.first().map(|l| l.0), lines.last().map(|l| l.0)];
-        let mut log = Self { has_checksums, ..Self::default() };
+        let mut log = Self {
+            has_checksums,
+            ..Self::default()
+        };
         for (i, line) in lines {
             let said = split(line).and_then(|fields| log.sentence(i + 1, &fields));
             match said {
                 Err(message) if !ends.contains(&Some(i)) => {
                     let found: String = line.chars().take(60).collect();
                     let advice = "remove the line, if no more than it is damaged";
-                    return Err(Error::contents(path, i + 1, format!("{message}: {found}")).advice(advice));
+                    return Err(
+                        Error::contents(path, i + 1, format!("{message}: {found}")).advice(advice)
+                    );
                 }
                 _ => {}
             }
@@ -99,7 +114,10 @@ impl Log {
         match kind {
             "GGA" if epoch.position.is_none() => return self.position(line, fields),
             "GST" => {
-                epoch.sigma = number(6).zip(number(7)).zip(number(8)).map(|((n, e), d)| DVec3::new(n, e, d))
+                epoch.sigma = number(6)
+                    .zip(number(7))
+                    .zip(number(8))
+                    .map(|((n, e), d)| DVec3::new(n, e, d))
             }
             "VTG" if epoch.velocity.is_none() => {
                 let knots = number(5).or(number(7).map(|km_h| km_h / 1.852));
@@ -125,8 +143,15 @@ impl Log {
     fn at(&mut self, line: usize, time_s: f64) -> &mut Epoch {
         let last = self.epochs.last().map(|e| (e.time_s, e.day));
         if last.is_none_or(|(last_s, _)| last_s != time_s) {
-            let day = last.map_or(0.0, |(last_s, day)| day + f64::from(last_s - time_s > DAY_S / 2.0));
-            self.epochs.push(Epoch { line, time_s, day, ..Epoch::default() });
+            let day = last.map_or(0.0, |(last_s, day)| {
+                day + f64::from(last_s - time_s > DAY_S / 2.0)
+            });
+            self.epochs.push(Epoch {
+                line,
+                time_s,
+                day,
+                ..Epoch::default()
+            });
         }
         let newest = self.epochs.len() - 1;
         &mut self.epochs[newest]
@@ -145,7 +170,10 @@ impl Log {
         let lon = angle(field(4), field(5), 180.0).ok_or("not a longitude dddmm.mmmm,E or W")?;
         let altitude = number(9).ok_or("not an altitude")?;
         self.has_separation |= number(11).is_some();
-        let newest = self.epochs.last_mut().ok_or("not a time of day hhmmss.ss")?;
+        let newest = self
+            .epochs
+            .last_mut()
+            .ok_or("not a time of day hhmmss.ss")?;
         newest.line = line;
         newest.hdop = number(8).filter(|hdop| *hdop > 0.0);
         newest.position = Some([lat, lon, altitude + number(11).unwrap_or(0.0)]);
@@ -169,25 +197,51 @@ pub(super) fn fixes(
     let hdop = log.middle_hdop();
     let mut fixes = Vec::new();
     for epoch in &log.epochs {
-        let Some([lat, lon, h]) = epoch.position else { continue };
+        let Some([lat, lon, h]) = epoch.position else {
+            continue;
+        };
         // a receiver's deviations as given are those of its middle HDOP
-        let worse = epoch.hdop.zip(hdop).map_or(1.0, |(epoch_hdop, middle)| epoch_hdop / middle);
+        let worse = epoch
+            .hdop
+            .zip(hdop)
+            .map_or(1.0, |(epoch_hdop, middle)| epoch_hdop / middle);
         let given = unsaid.map(|s| DVec3::from(s.pos_m) * worse);
         let stated = epoch.sigma.filter(|sigma| sigma.min_element() > 0.0);
         let Some(pos_sigma_n) = stated.or(given) else {
-            let message = "a fix without standard deviations: no GST sentence of its time states them";
+            let message =
+                "a fix without standard deviations: no GST sentence of its time states them";
             return Err(Error::contents(path, epoch.line, message).setting(Setting::FixSigma));
         };
-        let velocity = epoch.velocity.zip(unsaid.and_then(|s| s.vel_m_s)).map(|((v, course), [n, e, _])| {
-            let horizontal_sigma = DVec2::new(n.hypot(course), e.hypot(course));
-            GnssVelocity { horizontal: v, horizontal_sigma, down: None }
-        });
+        let velocity =
+            epoch
+                .velocity
+                .zip(unsaid.and_then(|s| s.vel_m_s))
+                .map(|((v, course), [n, e, _])| {
+                    let horizontal_sigma = DVec2::new(n.hypot(course), e.hypot(course));
+                    GnssVelocity {
+                        horizontal: v,
+                        horizontal_sigma,
+                        down: None,
+                    }
+                });
         let t_s = clock.origin_s + DAY_S * epoch.day + epoch.time_s;
-        fixes.push((epoch.line as u64, GnssFix { t_s, lat, lon, h, pos_sigma_n, velocity }));
+        fixes.push((
+            epoch.line as u64,
+            GnssFix {
+                t_s,
+                lat,
+                lon,
+                h,
+                pos_sigma_n,
+                velocity,
+            },
+        ));
     }
     if fixes.is_empty() {
         let message = "NMEA sentences without a position: no GGA with a fix";
-        return Err(Error::contents(path, 1_u64, message).advice("let the receiver write GGA, RMC and GST"));
+        return Err(
+            Error::contents(path, 1_u64, message).advice("let the receiver write GGA, RMC and GST")
+        );
     }
     let remarks = log.remarks(&fixes, unsaid, clock);
     Ok((fixes, remarks))
@@ -200,8 +254,16 @@ impl Log {
         all.get(all.len() / 2).copied()
     }
 
-    fn remarks(&self, fixes: &[(u64, GnssFix)], unsaid: Option<&FixSigma>, clock: Clock) -> Vec<Remark> {
-        let moving = fixes.iter().filter(|(_, fix)| fix.velocity.is_some()).count();
+    fn remarks(
+        &self,
+        fixes: &[(u64, GnssFix)],
+        unsaid: Option<&FixSigma>,
+        clock: Clock,
+    ) -> Vec<Remark> {
+        let moving = fixes
+            .iter()
+            .filter(|(_, fix)| fix.velocity.is_some())
+            .count();
         let count = fixes.len();
         let mut remarks = vec![Remark::note(format!(
             "NMEA sentences: {count} fixes, {moving} with a horizontal velocity, {} left out, times are {}",
@@ -209,7 +271,9 @@ impl Log {
         ))];
         let is_unsaid = |e: &Epoch| e.position.is_some() && e.sigma.is_none();
         if self.epochs.iter().any(is_unsaid) {
-            remarks.push(Remark::note("standard deviations without GST as given, in proportion to HDOP"));
+            remarks.push(Remark::note(
+                "standard deviations without GST as given, in proportion to HDOP",
+            ));
         }
         let is_unused = moving == 0 && self.epochs.iter().any(|e| e.velocity.is_some());
         let doubts = [
@@ -217,7 +281,10 @@ impl Log {
                 clock.is_rolled,
                 "the dates are 1024 weeks or more before the IMU's: a week counter has rolled over",
             ),
-            (!self.has_checksums, "no sentence has a checksum: damaged digits go unseen"),
+            (
+                !self.has_checksums,
+                "no sentence has a checksum: damaged digits go unseen",
+            ),
             (
                 is_unused && unsaid.is_none_or(|s| s.vel_m_s.is_none()),
                 "speed and course are not used without standard deviations: --gnss-sigma 2,2,4:0.1",
@@ -227,7 +294,12 @@ impl Log {
                 "GGA states no geoid separation: heights are above the sea, up to 100 m off",
             ),
         ];
-        remarks.extend(doubts.into_iter().filter(|(is, _)| *is).map(|(_, text)| Remark::doubt(text)));
+        remarks.extend(
+            doubts
+                .into_iter()
+                .filter(|(is, _)| *is)
+                .map(|(_, text)| Remark::doubt(text)),
+        );
         remarks
     }
 }

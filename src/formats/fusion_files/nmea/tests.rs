@@ -4,15 +4,26 @@ use super::sentence::{KNOT, fields};
 use super::*;
 use nav_sim_signal::units::DEG;
 
-const SIGMA: FixSigma = FixSigma { pos_m: [2.0, 2.0, 4.0], vel_m_s: Some([0.1, 0.1, 0.2]) };
+const SIGMA: FixSigma = FixSigma {
+    pos_m: [2.0, 2.0, 4.0],
+    vel_m_s: Some([0.1, 0.1, 0.2]),
+};
 
 /// A sentence with its checksum.
 fn sentence(body: &str) -> String {
-    format!("${body}*{:02X}\n", body.bytes().fold(0, |all, byte| all ^ byte))
+    format!(
+        "${body}*{:02X}\n",
+        body.bytes().fold(0, |all, byte| all ^ byte)
+    )
 }
 
 fn read(text: &str) -> Vec<GnssFix> {
-    fixes("a.nmea", text, Some(&SIGMA), None).unwrap().0.into_iter().map(|(_, fix)| fix).collect()
+    fixes("a.nmea", text, Some(&SIGMA), None)
+        .unwrap()
+        .0
+        .into_iter()
+        .map(|(_, fix)| fix)
+        .collect()
 }
 
 /// The fixes of a log, and what is said of it.
@@ -22,7 +33,10 @@ fn said(text: &str, imu_s: Option<(f64, f64)>) -> (Vec<GnssFix>, Vec<String>) {
         Remark::Note(text) => format!("note: {text}"),
         Remark::Doubt(text) => format!("doubt: {text}"),
     };
-    (all.into_iter().map(|(_, fix)| fix).collect(), remarks.into_iter().map(words).collect())
+    (
+        all.into_iter().map(|(_, fix)| fix).collect(),
+        remarks.into_iter().map(words).collect(),
+    )
 }
 
 /// A second of a receiver that knows date, position and its deviations.
@@ -43,11 +57,26 @@ fn sentences_of_the_manuals() {
     let text = "$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n\
                 $GPRMC,123519,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W*6A\r\n";
     let [fix] = read(text)[..] else { panic!() };
-    assert!((fix.lat / DEG - 48.1173).abs() < 1e-9 && (fix.lon / DEG - 11.0 - 31.0 / 60.0).abs() < 1e-9);
-    assert!((fix.h - 592.3).abs() < 1e-9 && fix.t_s == 45_319.0, "{fix:?}");
-    let GnssVelocity { horizontal: v, horizontal_sigma: sigma, down } = fix.velocity.unwrap();
-    assert!((v.length() - 22.4 * 0.514_444_444).abs() < 1e-6 && (v.y.atan2(v.x) / DEG - 84.4).abs() < 1e-9);
-    assert_eq!((sigma, down, fix.pos_sigma_n), (DVec2::splat(0.1), None, DVec3::new(2.0, 2.0, 4.0)));
+    assert!(
+        (fix.lat / DEG - 48.1173).abs() < 1e-9 && (fix.lon / DEG - 11.0 - 31.0 / 60.0).abs() < 1e-9
+    );
+    assert!(
+        (fix.h - 592.3).abs() < 1e-9 && fix.t_s == 45_319.0,
+        "{fix:?}"
+    );
+    let GnssVelocity {
+        horizontal: v,
+        horizontal_sigma: sigma,
+        down,
+    } = fix.velocity.unwrap();
+    assert!(
+        (v.length() - 22.4 * 0.514_444_444).abs() < 1e-6
+            && (v.y.atan2(v.x) / DEG - 84.4).abs() < 1e-9
+    );
+    assert_eq!(
+        (sigma, down, fix.pos_sigma_n),
+        (DVec2::splat(0.1), None, DVec3::new(2.0, 2.0, 4.0))
+    );
     // Trimble's, and u-blox's
     assert!(fields("$GPGST,172814.0,0.006,0.023,0.020,273.6,0.023,0.020,0.031*6A").is_ok());
     assert!(fields("$GPGST,082356.00,1.8,,,,1.7,1.3,2.2*7E").is_ok());
@@ -69,21 +98,46 @@ fn what_has_one_time_is_one_fix_from_any_talker() {
     ]
     .concat();
     let all = read(&text);
-    assert_eq!(all.iter().map(|f| f.t_s).collect::<Vec<_>>(), [86_399.5, 86_400.0]);
-    assert_eq!((all[0].pos_sigma_n, all[0].h), (DVec3::new(1.7, 1.3, 2.2), 369.5));
+    assert_eq!(
+        all.iter().map(|f| f.t_s).collect::<Vec<_>>(),
+        [86_399.5, 86_400.0]
+    );
+    assert_eq!(
+        (all[0].pos_sigma_n, all[0].h),
+        (DVec3::new(1.7, 1.3, 2.2), 369.5)
+    );
     assert!((all[0].lat / DEG + 46.5).abs() < 1e-9 && (all[0].lon / DEG + 6.5).abs() < 1e-9);
-    assert!(all[0].velocity.unwrap().horizontal.distance(DVec2::new(0.0, 10.0)) < 1e-9);
+    assert!(
+        all[0]
+            .velocity
+            .unwrap()
+            .horizontal
+            .distance(DVec2::new(0.0, 10.0))
+            < 1e-9
+    );
     // at rest there is no course
-    let GnssVelocity { horizontal: v, horizontal_sigma: sigma, .. } = all[1].velocity.unwrap();
-    assert!(v == DVec2::ZERO && (sigma.x - 0.1_f64.hypot(0.02 * KNOT)).abs() < 1e-12, "{sigma}");
+    let GnssVelocity {
+        horizontal: v,
+        horizontal_sigma: sigma,
+        ..
+    } = all[1].velocity.unwrap();
+    assert!(
+        v == DVec2::ZERO && (sigma.x - 0.1_f64.hypot(0.02 * KNOT)).abs() < 1e-12,
+        "{sigma}"
+    );
     // HDOP 1.4 where 0.7 and 1.4 have the middle 1.4
     assert_eq!(all[1].pos_sigma_n, DVec3::new(2.0, 2.0, 4.0));
     // 2024-02-01 00:00 UTC is 1 706 745 600 s: the IMU's clock tells which of the two is meant
     let unix = (1_706_745_599.0, 1_706_745_700.0);
     let (unix, said) = said(&text, Some(unix));
-    assert!(unix[1].t_s == 1_706_745_600.0 && said[0].ends_with("Unix time"), "{said:?}");
-    let zda = text.replace(&text[text.find("$GNRMC").unwrap()..text.find("$GLGGA").unwrap()], "")
-        + &sentence("GNZDA,000000.50,01,02,2024,00,00");
+    assert!(
+        unix[1].t_s == 1_706_745_600.0 && said[0].ends_with("Unix time"),
+        "{said:?}"
+    );
+    let zda = text.replace(
+        &text[text.find("$GNRMC").unwrap()..text.find("$GLGGA").unwrap()],
+        "",
+    ) + &sentence("GNZDA,000000.50,01,02,2024,00,00");
     let (dated, _) = self::said(&zda, Some((1_706_745_599.0, 1_706_745_700.0)));
     assert_eq!(dated[1].t_s, 1_706_745_600.0);
     assert!(said[0].contains(" 1 left out"), "{said:?}");
@@ -98,7 +152,9 @@ fn damaged_sentences_are_refused_with_their_line() {
     assert_eq!(read(&cut).len(), 1);
     let refused = |bad: &str| {
         let text = format!("{gga}{bad}\n{later}");
-        fixes("a.nmea", &text, Some(&SIGMA), None).unwrap_err().to_string()
+        fixes("a.nmea", &text, Some(&SIGMA), None)
+            .unwrap_err()
+            .to_string()
     };
     assert!(
         refused(&gga.trim().replace("48", "49"))
@@ -111,8 +167,16 @@ fn damaged_sentences_are_refused_with_their_line() {
     let bad = sentence("GPGGA,253519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,");
     assert!(refused(bad.trim()).contains("line 2: not a time of day"));
     let unstated = fixes("a.nmea", &gga, None, None).unwrap_err().to_string();
-    assert!(unstated.starts_with("a.nmea, line 1: a fix without standard deviations"), "{unstated}");
-    let none = fixes("a.nmea", &sentence("GPRMC,1,V,,,,,,,,,"), Some(&SIGMA), None);
+    assert!(
+        unstated.starts_with("a.nmea, line 1: a fix without standard deviations"),
+        "{unstated}"
+    );
+    let none = fixes(
+        "a.nmea",
+        &sentence("GPRMC,1,V,,,,,,,,,"),
+        Some(&SIGMA),
+        None,
+    );
     assert!(none.unwrap_err().to_string().contains("without a position"));
 }
 
@@ -121,7 +185,11 @@ fn damaged_sentences_are_refused_with_their_line() {
 fn what_a_logger_writes_before_a_sentence_is_ignored() {
     let log = second("123519", "230394") + &second("123520", "230394");
     let plain = said(&log, None);
-    for stamp in ["2026-11-23T10:00:00.123 ", "1699999999.123,", "[  12.5] RX: "] {
+    for stamp in [
+        "2026-11-23T10:00:00.123 ",
+        "1699999999.123,",
+        "[  12.5] RX: ",
+    ] {
         let stamped: String = log.lines().map(|line| format!("{stamp}{line}\n")).collect();
         assert!(is_nmea(&stamped), "{stamp}");
         assert_eq!(said(&stamped, None), plain, "{stamp}");
@@ -134,25 +202,45 @@ fn what_a_logger_writes_before_a_sentence_is_ignored() {
 #[test]
 fn a_log_without_any_checksum_is_read_with_a_doubt() {
     let log = second("123519", "230394") + &second("123520", "230394");
-    let bare: String = log.lines().map(|line| line.split('*').next().unwrap().to_owned() + "\n").collect();
+    let bare: String = log
+        .lines()
+        .map(|line| line.split('*').next().unwrap().to_owned() + "\n")
+        .collect();
     let (with, without) = (said(&log, None), said(&bare, None));
     assert_eq!(with.0, without.0);
-    assert!(without.1[1].starts_with("doubt: no sentence has a checksum"), "{without:?}");
+    assert!(
+        without.1[1].starts_with("doubt: no sentence has a checksum"),
+        "{without:?}"
+    );
     assert!(
         without.1.iter().filter(|r| r.starts_with("doubt")).count() == 1
             && with.1.len() + 1 == without.1.len()
     );
-    let refused = |text: &str| fixes("a.nmea", text, Some(&SIGMA), None).unwrap_err().to_string();
+    let refused = |text: &str| {
+        fixes("a.nmea", text, Some(&SIGMA), None)
+            .unwrap_err()
+            .to_string()
+    };
     let lines: Vec<&str> = bare.lines().collect();
     let cut = bare.replacen(lines[1], &lines[1][..50], 1);
-    assert!(refused(&cut).starts_with("a.nmea, line 2: a sentence that is cut: $GPGGA"), "{}", refused(&cut));
+    assert!(
+        refused(&cut).starts_with("a.nmea, line 2: a sentence that is cut: $GPGGA"),
+        "{}",
+        refused(&cut)
+    );
     let run_together = bare.replacen(&format!("{}\n", lines[1]), &lines[1][..50], 1);
     assert!(refused(&run_together).starts_with("a.nmea, line 2: a sentence within a sentence"));
     let some = bare.replacen(lines[0], log.lines().next().unwrap(), 1);
     assert!(refused(&some).starts_with("a.nmea, line 2: a sentence without its checksum"));
     // a last line without an end, cut within the last of its numbers
-    let unfinished =
-        format!("{bare}{}", &second("123521", "230394").lines().nth(1).unwrap().replace(",,*", ",1"));
+    let unfinished = format!(
+        "{bare}{}",
+        &second("123521", "230394")
+            .lines()
+            .nth(1)
+            .unwrap()
+            .replace(",,*", ",1")
+    );
     assert_eq!(said(&unfinished, None).0.len(), 2);
 }
 
@@ -164,13 +252,18 @@ fn dates_of_a_week_counter_that_has_rolled_over_are_told() {
     let imu = Some((day_s + 35_990.0, day_s + 36_100.0));
     let (rolled, words) = said(&log, imu);
     assert_eq!(rolled[0].t_s, day_s + 36_000.0);
-    assert!(words[0].ends_with("times are Unix time") && words[1].contains("rolled over"), "{words:?}");
+    assert!(
+        words[0].ends_with("times are Unix time") && words[1].contains("rolled over"),
+        "{words:?}"
+    );
     // another day than the IMU's, or an IMU that counts from its start: seconds of the day
     let other = second("100000", "080407") + &second("100001", "080407");
     assert_eq!(said(&other, imu).0[0].t_s, 36_000.0);
     assert_eq!(said(&log, Some((0.0, 100.0))).1.len(), 1);
     // before it has found the time, a receiver states any date
-    let (found, _) =
-        said(&(second("095959", "060180") + &second("100000", "231126") + &second("100001", "231126")), imu);
+    let (found, _) = said(
+        &(second("095959", "060180") + &second("100000", "231126") + &second("100001", "231126")),
+        imu,
+    );
     assert_eq!(found[1].t_s, day_s + 36_000.0);
 }

@@ -4,32 +4,52 @@ use super::*;
 
 #[test]
 fn time_is_checked() {
-    assert_eq!(refusal(changed(7, "0.03,1")), "a.csv, line 7: time goes back from 0.04 s to 0.03 s");
+    assert_eq!(
+        refusal(changed(7, "0.03,1")),
+        "a.csv, line 7: time goes back from 0.04 s to 0.03 s"
+    );
     assert_eq!(
         refusal(changed(7, "0.04,1")),
         "a.csv, line 7: duplicate in time: 0.04 s to 0.04 s, the median step is 0.01 s (2 such steps in all)"
     );
-    let gap: String =
-        sound(20).into_iter().enumerate().filter(|(i, _)| *i != 10).map(|(_, l)| l + "\n").collect();
-    assert_eq!(refusal(&gap), "a.csv, line 11: gap in time from 0.08 s to 0.1 s, the median step is 0.01 s");
+    let gap: String = sound(20)
+        .into_iter()
+        .enumerate()
+        .filter(|(i, _)| *i != 10)
+        .map(|(_, l)| l + "\n")
+        .collect();
+    assert_eq!(
+        refusal(&gap),
+        "a.csv, line 11: gap in time from 0.08 s to 0.1 s, the median step is 0.01 s"
+    );
     assert_eq!(
         refusal("t_s,gyro_x_rad_s\n1,1\n1,2\n1,3\n"),
         "a.csv: column \"t_s\" does not advance: its median step is 0"
     );
 
-    let with = |gaps| ReadOptions { gaps, ..ReadOptions::default() };
+    let with = |gaps| ReadOptions {
+        gaps,
+        ..ReadOptions::default()
+    };
     let (_files, path) = Files::with("a.csv", &gap);
     let (split, report) = read(std::slice::from_ref(&path), &with(Gaps::Split)).unwrap();
-    assert_eq!(split.iter().map(Recording::len).collect::<Vec<_>>(), [9, 10]);
+    assert_eq!(
+        split.iter().map(Recording::len).collect::<Vec<_>>(),
+        [9, 10]
+    );
     assert!(
-        report.files[0].warnings[0].contains("split at 1 gaps or duplicates in time, the first in line 11")
+        report.files[0].warnings[0]
+            .contains("split at 1 gaps or duplicates in time, the first in line 11")
     );
     // Ignored, a lost sample leaves the rate of the others.
     let (whole, report) = read(&[path], &with(Gaps::Ignore)).unwrap();
     assert_eq!((whole.len(), whole[0].len()), (1, 19));
     assert_close(&[whole[0].rate_hz], &[100.0]);
     let warning = &report.files[0].warnings[0];
-    assert!(warning.contains("1 gaps or duplicates in time ignored, the first in line 11"), "{warning}");
+    assert!(
+        warning.contains("1 gaps or duplicates in time ignored, the first in line 11"),
+        "{warning}"
+    );
 }
 
 /// 2000 rows at 100 Hz before as many at 149 Hz, and 7000 of 10 ms before 8000 of 20 ms (half the median step is no gap); of a
@@ -47,15 +67,21 @@ fn a_rate_that_changes_is_refused() {
     };
     let faster = times(&|k| if k < 2000 { 0.01 } else { 1.0 / 149.0 }, 4000);
     let (message, hint) = refusal_with("a.csv", &faster, &ReadOptions::default());
-    assert_eq!(message, "a.csv: the rate changes from 100 Hz in the first tenth to 149 Hz in the last");
+    assert_eq!(
+        message,
+        "a.csv: the rate changes from 100 Hz in the first tenth to 149 Hz in the last"
+    );
     assert!(hint.contains("split the file"), "{hint}");
     let slower = times(&|k| if k < 7000 { 0.01 } else { 0.02 }, 15_000);
-    assert!(refusal_with("a.csv", &slower, &ReadOptions::default()).0.contains("from 100 Hz"));
-    for steps in
-        [&(|k: usize| 0.01 * (1.0 - 0.005 * k as f64 / 4000.0)) as &dyn Fn(usize) -> f64, &|k: usize| {
-            0.01 * (1.0 + 0.4 * (k as f64 * 2.4).sin())
-        }]
-    {
+    assert!(
+        refusal_with("a.csv", &slower, &ReadOptions::default())
+            .0
+            .contains("from 100 Hz")
+    );
+    for steps in [
+        &(|k: usize| 0.01 * (1.0 - 0.005 * k as f64 / 4000.0)) as &dyn Fn(usize) -> f64,
+        &|k: usize| 0.01 * (1.0 + 0.4 * (k as f64 * 2.4).sin()),
+    ] {
         assert!(read_one("a.csv", times(steps, 4000), &ReadOptions::default()).is_ok());
     }
 }
@@ -64,15 +90,28 @@ fn a_rate_that_changes_is_refused() {
 #[test]
 fn lost_samples_do_not_change_the_rate() {
     let kept: Vec<usize> = (0..2000).filter(|k| k % 50 != 25).collect();
-    let text = stamped("t_s", kept.len(), |i| format!("{:.2}", 0.01 * kept[i] as f64));
-    let r = read_one("a.csv", &text, &ReadOptions { gaps: Gaps::Ignore, ..ReadOptions::default() }).unwrap();
+    let text = stamped("t_s", kept.len(), |i| {
+        format!("{:.2}", 0.01 * kept[i] as f64)
+    });
+    let r = read_one(
+        "a.csv",
+        &text,
+        &ReadOptions {
+            gaps: Gaps::Ignore,
+            ..ReadOptions::default()
+        },
+    )
+    .unwrap();
     assert!((r.rate_hz / 100.0 - 1.0).abs() < 1e-6, "{}", r.rate_hz);
 }
 
 #[test]
 fn rates() {
     let text = sound(20).join("\n");
-    let given = |rate_hz| ReadOptions { rate_hz: Some(rate_hz), ..ReadOptions::default() };
+    let given = |rate_hz| ReadOptions {
+        rate_hz: Some(rate_hz),
+        ..ReadOptions::default()
+    };
     assert_eq!(
         refusal_with("a.csv", &text, &given(200.0)).0,
         "a.csv: the time column runs at 100 Hz, but 200 Hz is given"
@@ -86,20 +125,41 @@ fn rates() {
     let (rounded, report) = read(&[path], &given(50.2)).unwrap();
     assert_close(&[rounded[0].rate_hz], &[50.2]);
     let warning = &report.files[0].warnings[0];
-    assert_eq!(warning, "the head of the file says 50 Hz, but 50.2 Hz is given: the rate given is taken");
-    assert_eq!(refusal_with("a.csv", &text, &given(-1.0)).0, "a.csv: -1 Hz is not a sample rate");
-    assert_eq!(refusal("gyro_x_rad_s\n1\n2\n"), "a.csv: no time column, and no rate is given");
+    assert_eq!(
+        warning,
+        "the head of the file says 50 Hz, but 50.2 Hz is given: the rate given is taken"
+    );
+    assert_eq!(
+        refusal_with("a.csv", &text, &given(-1.0)).0,
+        "a.csv: -1 Hz is not a sample rate"
+    );
+    assert_eq!(
+        refusal("gyro_x_rad_s\n1\n2\n"),
+        "a.csv: no time column, and no rate is given"
+    );
     // Stamps rounded to 1 ms at 128 Hz: the span knows the rate, no single step does.
-    let rounded: String = (0..1000).map(|k| format!("{:.3},{}\n", k as f64 / 128.0, k % 3)).collect();
-    let r = read_one("a.csv", format!("t_s,gyro_x_rad_s\n{rounded}"), &ReadOptions::default()).unwrap();
+    let rounded: String = (0..1000)
+        .map(|k| format!("{:.3},{}\n", k as f64 / 128.0, k % 3))
+        .collect();
+    let r = read_one(
+        "a.csv",
+        format!("t_s,gyro_x_rad_s\n{rounded}"),
+        &ReadOptions::default(),
+    )
+    .unwrap();
     assert!((r.rate_hz - 128.0).abs() < 0.01, "{}", r.rate_hz);
 
     let files = Files::new();
     files.add("a.csv", &text);
     files.add("b.csv", text.replace("t_s", "t_ms"));
-    let message = read(&[files.path()], &ReadOptions::default()).unwrap_err().to_string();
+    let message = read(&[files.path()], &ReadOptions::default())
+        .unwrap_err()
+        .to_string();
     assert!(
-        message.ends_with(&format!("b.csv has 100000 Hz, but {}/a.csv has 100 Hz", files.path().display())),
+        message.ends_with(&format!(
+            "b.csv has 100000 Hz, but {}/a.csv has 100 Hz",
+            files.path().display()
+        )),
         "{message}"
     );
 }
@@ -114,17 +174,45 @@ fn stamped(name: &str, n: usize, stamp: impl Fn(usize) -> String) -> String {
 #[test]
 fn coarse_and_bursting_stamps_keep_the_rate_of_the_whole() {
     const N: usize = 3001;
-    let ignore = |rate_hz| ReadOptions { gaps: Gaps::Ignore, rate_hz, ..ReadOptions::default() };
+    let ignore = |rate_hz| ReadOptions {
+        gaps: Gaps::Ignore,
+        rate_hz,
+        ..ReadOptions::default()
+    };
     let cases: [(f64, f64, String); 4] = [
-        (200.0, 0.01, stamped("t_s", N, |k| format!("{:.2}", k as f64 / 200.0))),
-        (1000.0 / 1.2, 1e-3, stamped("t_ms", N, |k| format!("{}", (1.2 * k as f64).floor()))),
-        (100.0, 0.03, stamped("t_s", N, |k| format!("{:.4}", 0.03 * (k / 3) as f64 + 1e-4 * (k % 3) as f64))),
-        (200.0, 1.0 / 64.0, stamped("t_s", N, |k| format!("{}", (k as f64 / 200.0 * 64.0).floor() / 64.0))),
+        (
+            200.0,
+            0.01,
+            stamped("t_s", N, |k| format!("{:.2}", k as f64 / 200.0)),
+        ),
+        (
+            1000.0 / 1.2,
+            1e-3,
+            stamped("t_ms", N, |k| format!("{}", (1.2 * k as f64).floor())),
+        ),
+        (
+            100.0,
+            0.03,
+            stamped("t_s", N, |k| {
+                format!("{:.4}", 0.03 * (k / 3) as f64 + 1e-4 * (k % 3) as f64)
+            }),
+        ),
+        (
+            200.0,
+            1.0 / 64.0,
+            stamped("t_s", N, |k| {
+                format!("{}", (k as f64 / 200.0 * 64.0).floor() / 64.0)
+            }),
+        ),
     ];
     for (rate_hz, late_s, text) in cases {
         let bound = late_s * rate_hz / (N - 1) as f64;
         let r = read_one("a.csv", &text, &ignore(None)).unwrap();
-        assert!((r.rate_hz / rate_hz - 1.0).abs() <= bound, "{} Hz, expected {rate_hz} Hz", r.rate_hz);
+        assert!(
+            (r.rate_hz / rate_hz - 1.0).abs() <= bound,
+            "{} Hz, expected {rate_hz} Hz",
+            r.rate_hz
+        );
         let r = read_one("a.csv", &text, &ignore(Some(rate_hz))).unwrap();
         assert_close(&[r.rate_hz], &[rate_hz]);
         let (_, hint) = refusal_with("a.csv", &text, &ReadOptions::default());
@@ -137,16 +225,29 @@ fn a_unit_that_is_not_said_is_told_by_the_rate_or_doubted() {
     let outcome = |name: &str, step: f64, first: f64, rate_hz: Option<f64>| {
         let text = stamped(name, 100, |k| format!("{}", first + step * k as f64));
         let (_files, path) = Files::with("a.csv", text);
-        let options = ReadOptions { rate_hz, ..ReadOptions::default() };
+        let options = ReadOptions {
+            rate_hz,
+            ..ReadOptions::default()
+        };
         let (recordings, report) = read(&[path], &options).unwrap();
         (recordings[0].rate_hz, report.files[0].warnings.join("\n"))
     };
     // step, guess and what it may be as well, the rates
-    for (step, guessed, other) in [(1.0, 1000.0, 1.0), (50.0, 20.0, 20_000.0), (200.0, 5000.0, 5.0)] {
+    for (step, guessed, other) in [
+        (1.0, 1000.0, 1.0),
+        (50.0, 20.0, 20_000.0),
+        (200.0, 5000.0, 5.0),
+    ] {
         let (rate_hz, warning) = outcome("time", step, 0.0, None);
         assert_close(&[rate_hz], &[guessed]);
-        assert!(warning.contains("name it t_s, t_ms, t_us or t_ns"), "{warning}");
-        assert!(warning.contains(&format!("it would be {other} Hz in ")), "{warning}");
+        assert!(
+            warning.contains("name it t_s, t_ms, t_us or t_ns"),
+            "{warning}"
+        );
+        assert!(
+            warning.contains(&format!("it would be {other} Hz in ")),
+            "{warning}"
+        );
         for given in [guessed, other] {
             let (rate_hz, warning) = outcome("time", step, 0.0, Some(given));
             assert_close(&[rate_hz], &[given]);
@@ -155,11 +256,17 @@ fn a_unit_that_is_not_said_is_told_by_the_rate_or_doubted() {
     }
     let (rate_hz, warning) = outcome("time", 99.0, 0.0, None);
     assert_close(&[rate_hz], &[1e3 / 99.0]);
-    assert!(warning.contains("taken as 10.101 Hz in ms, but it would be 10101 Hz in µs"), "{warning}");
+    assert!(
+        warning.contains("taken as 10.101 Hz in ms, but it would be 10101 Hz in µs"),
+        "{warning}"
+    );
     // No doubt: a rate that only one unit makes plausible, a unit that is said, Unix time in µs.
     assert_eq!(outcome("time", 10.0, 0.0, None), (100.0, String::new()));
     assert_eq!(outcome("t_s", 1.0, 0.0, None), (1.0, String::new()));
-    assert_eq!(outcome("timestamp", 1000.0, 1.7e15, None), (1000.0, String::new()));
+    assert_eq!(
+        outcome("timestamp", 1000.0, 1.7e15, None),
+        (1000.0, String::new())
+    );
 }
 
 /// A gap is seen in the time of a receiver, in a unit's own time, and over the end of a GPS week; a column that runs like
@@ -181,18 +288,31 @@ fn clocks_of_receivers_and_loggers_are_known() {
         // 345 600 s is held to 6e-11 s, a span of 0.99 s to 1e-10
         assert!((r.rate_hz - 100.0).abs() < 1e-6, "{name}: {}", r.rate_hz);
         let gap = stamped(name, 100, |k| at(if k < 50 { k } else { k + 6000 }));
-        assert!(refusal(&gap).contains("gap in time"), "{name}: {}", refusal(&gap));
+        assert!(
+            refusal(&gap).contains("gap in time"),
+            "{name}: {}",
+            refusal(&gap)
+        );
     }
     // The time of the unit itself is preferred.
-    let both = stamped("gps_time,t_s", 100, |k| format!("{},{}", 5 * (k / 10), k as f64 / 50.0));
-    assert_close(&[read_one("a.csv", both, &ReadOptions::default()).unwrap().rate_hz], &[50.0]);
+    let both = stamped("gps_time,t_s", 100, |k| {
+        format!("{},{}", 5 * (k / 10), k as f64 / 50.0)
+    });
+    assert_close(
+        &[read_one("a.csv", both, &ReadOptions::default())
+            .unwrap()
+            .rate_hz],
+        &[50.0],
+    );
 }
 
 #[test]
 fn the_end_of_a_gps_week_is_no_step_back() {
     let week = |lost: usize| {
         let at = move |k: usize| 604_799.5 + 0.01 * (if k < 80 { k } else { k + lost }) as f64;
-        stamped("gps_week,tow_s", 100, |k| format!("{},{:.2}", 2300, at(k) % 604_800.0))
+        stamped("gps_week,tow_s", 100, |k| {
+            format!("{},{:.2}", 2300, at(k) % 604_800.0)
+        })
     };
     let r = read_one("a.csv", week(0), &ReadOptions::default()).unwrap();
     assert!((r.rate_hz - 100.0).abs() < 1e-6, "{}", r.rate_hz);
@@ -202,8 +322,12 @@ fn the_end_of_a_gps_week_is_no_step_back() {
         refusal(week(500))
     );
     // An hour back is one, in a week or not.
-    let back =
-        stamped("t_s", 100, |k| format!("{}", 7200.0 + 0.01 * k as f64 - if k < 50 { 0.0 } else { 3600.0 }));
+    let back = stamped("t_s", 100, |k| {
+        format!(
+            "{}",
+            7200.0 + 0.01 * k as f64 - if k < 50 { 0.0 } else { 3600.0 }
+        )
+    });
     assert!(refusal(back).contains("time goes back"));
 }
 
@@ -211,10 +335,15 @@ fn the_end_of_a_gps_week_is_no_step_back() {
 /// samples. A tenth lost, or time that stands still, is refused as ever.
 #[test]
 fn lost_samples_keep_their_places() {
-    let keep = ReadOptions { gaps: Gaps::Keep, ..ReadOptions::default() };
+    let keep = ReadOptions {
+        gaps: Gaps::Keep,
+        ..ReadOptions::default()
+    };
     let stamps = |is_lost: &dyn Fn(usize) -> bool| {
         let kept: Vec<usize> = (0..2000).filter(|k| !is_lost(*k)).collect();
-        stamped("t_s", kept.len(), |i| format!("{:.2}", 0.01 * kept[i] as f64))
+        stamped("t_s", kept.len(), |i| {
+            format!("{:.2}", 0.01 * kept[i] as f64)
+        })
     };
     let is_lost = |k: usize| k % 50 == 25 || (1001..1061).contains(&k);
     let lost = (0..2000).filter(|k| is_lost(*k)).count();
@@ -223,12 +352,28 @@ fn lost_samples_keep_their_places() {
     let samples = &recordings[0].signals[0].samples;
     assert_eq!((samples.len(), report.files[0].samples[0]), (2000, 2000));
     assert!((0..2000).all(|k| samples[k].is_nan() == is_lost(k)));
-    assert!((recordings[0].rate_hz / 100.0 - 1.0).abs() < 1e-6, "{}", recordings[0].rate_hz);
+    assert!(
+        (recordings[0].rate_hz / 100.0 - 1.0).abs() < 1e-6,
+        "{}",
+        recordings[0].rate_hz
+    );
     let warning = &report.files[0].warnings[0];
     let share = lost as f64 / 20.0;
-    assert!(warning.contains(&format!("{lost} samples ({share:.2} %) are missing in 40 gaps")), "{warning}");
+    assert!(
+        warning.contains(&format!(
+            "{lost} samples ({share:.2} %) are missing in 40 gaps"
+        )),
+        "{warning}"
+    );
     let often = stamps(&|k| k % 9 == 5);
-    assert!(refusal_with("a.csv", &often, &keep).0.contains("gap in time"));
-    let twice = format!("{}1,1\n", stamped("t_s", 20, |i| format!("{:.2}", 0.05 * (i.min(18)) as f64)));
+    assert!(
+        refusal_with("a.csv", &often, &keep)
+            .0
+            .contains("gap in time")
+    );
+    let twice = format!(
+        "{}1,1\n",
+        stamped("t_s", 20, |i| format!("{:.2}", 0.05 * (i.min(18)) as f64))
+    );
     assert!(refusal_with("a.csv", &twice, &keep).0.contains("in time"));
 }

@@ -47,9 +47,18 @@ fn exchanged_sensors_are_refused() {
         "{message}"
     );
     assert!(hint.contains("give the names of the columns"), "{hint}");
-    let named = |sensor: &str, unit: &str| ["x", "y", "z"].map(|axis| format!("{sensor}_{axis}_{unit}"));
+    let named =
+        |sensor: &str, unit: &str| ["x", "y", "z"].map(|axis| format!("{sensor}_{axis}_{unit}"));
     let columns = [named("gyro", "rad_s"), named("accel", "m_s2")].concat();
-    read_one("a.npy", bytes, &ReadOptions { columns: Some(columns), ..at_100_hz() }).unwrap();
+    read_one(
+        "a.npy",
+        bytes,
+        &ReadOptions {
+            columns: Some(columns),
+            ..at_100_hz()
+        },
+    )
+    .unwrap();
 }
 
 #[test]
@@ -68,18 +77,41 @@ fn gravity_tells_units_that_are_not_said() {
 fn dead_axes_and_short_recordings() {
     let dead = "gyro_x_rad_s,gyro_y_rad_s\n1,0.5\n2,0.5\n3,0.5\n";
     let (message, hint) = refusal_with("a.csv", dead, &at_100_hz());
-    assert_eq!(message, "a.csv: gyro.y (column \"gyro_y_rad_s\") is dead: every sample is 0.5");
+    assert_eq!(
+        message,
+        "a.csv: gyro.y (column \"gyro_y_rad_s\") is dead: every sample is 0.5"
+    );
     assert!(hint.contains("leave the channel out"));
-    let x = Channel { sensor: nav_sim_signal::imu::Sensor::Gyro, axis: nav_sim_signal::imu::Axis::X };
-    let only_x = ReadOptions { channels: Some(vec![x]), ..at_100_hz() };
+    let x = Channel {
+        sensor: nav_sim_signal::imu::Sensor::Gyro,
+        axis: nav_sim_signal::imu::Axis::X,
+    };
+    let only_x = ReadOptions {
+        channels: Some(vec![x]),
+        ..at_100_hz()
+    };
     assert_eq!(read_one("a.csv", dead, &only_x).unwrap().signals.len(), 1);
 
-    let needed = ReadOptions { min_samples: 64, ..ReadOptions::default() };
+    let needed = ReadOptions {
+        min_samples: 64,
+        ..ReadOptions::default()
+    };
     assert_eq!(
         refusal_with("a.csv", sound(20).join("\n"), &needed).0,
         "a.csv: 20 samples, but 64 are needed"
     );
-    assert_eq!(refusal(sound(1).join("\n")), "a.csv: 1 samples, but 2 are needed");
-    let skip = ReadOptions { skip_s: 0.05, ..ReadOptions::default() };
-    assert_eq!(read_one("a.csv", sound(20).join("\n"), &skip).unwrap().len(), 15);
+    assert_eq!(
+        refusal(sound(1).join("\n")),
+        "a.csv: 1 samples, but 2 are needed"
+    );
+    let skip = ReadOptions {
+        skip_s: 0.05,
+        ..ReadOptions::default()
+    };
+    assert_eq!(
+        read_one("a.csv", sound(20).join("\n"), &skip)
+            .unwrap()
+            .len(),
+        15
+    );
 }

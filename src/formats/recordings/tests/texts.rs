@@ -12,11 +12,20 @@ fn outcome(contents: impl AsRef<[u8]>) -> (Recording, FileReport) {
 #[test]
 fn a_last_line_with_too_few_columns_is_left_out() {
     const WHOLE: &str = "t_s,gyro_x_rad_s\n0.00,1.1e-04\n0.01,-2.2e-04\n0.02,-5.1e-04";
-    assert_eq!((outcome(WHOLE).0.len(), outcome(WHOLE).1.assumptions.len()), (3, 0));
+    assert_eq!(
+        (outcome(WHOLE).0.len(), outcome(WHOLE).1.assumptions.len()),
+        (3, 0)
+    );
     for end in ["", "\n"] {
         let (recording, report) = outcome(format!("{}{end}", &WHOLE[..WHOLE.len() - 9]));
-        assert_close(&samples_with_mean(&recording.signals[0]), &[1.1e-4, -2.2e-4]);
-        assert_eq!(report.assumptions, ["line 4, the last, is cut off: left out"]);
+        assert_close(
+            &samples_with_mean(&recording.signals[0]),
+            &[1.1e-4, -2.2e-4],
+        );
+        assert_eq!(
+            report.assumptions,
+            ["line 4, the last, is cut off: left out"]
+        );
     }
     let within = WHOLE.replace(",-2.2e-04", "");
     assert_eq!(refusal(within), "a.csv, line 3: 1 values, but 2 columns");
@@ -35,13 +44,22 @@ fn columns_that_blanks_align_are_read() {
 fn units_below_the_names_are_passed_over_and_numbers_are_not() {
     let (recording, report) = outcome("t_s,gx_dps\ns,deg/s\n0,1\n0.01,2\n");
     assert_close(&samples_with_mean(&recording.signals[0]), &[DEG, 2.0 * DEG]);
-    assert_eq!(report.assumptions, ["line 2 has words and no numbers: passed over"]);
+    assert_eq!(
+        report.assumptions,
+        ["line 2 has words and no numbers: passed over"]
+    );
     assert_eq!(
         refusal("t_s,gx_dps\ns,deg/s\ns,deg/s\n0,1\n"),
         "a.csv, line 3: column \"t_s\": \"s\" is not a number"
     );
-    assert_eq!(refusal("t_s,gx_dps\n0,abc\n"), "a.csv, line 2: column \"gx_dps\": \"abc\" is not a number");
-    assert_eq!(refusal("t_s;gx_dps\n0,00;0,5\n"), "a.csv, line 2: column \"t_s\": \"0,00\" is not a number");
+    assert_eq!(
+        refusal("t_s,gx_dps\n0,abc\n"),
+        "a.csv, line 2: column \"gx_dps\": \"abc\" is not a number"
+    );
+    assert_eq!(
+        refusal("t_s;gx_dps\n0,00;0,5\n"),
+        "a.csv, line 2: column \"t_s\": \"0,00\" is not a number"
+    );
 }
 
 #[test]
@@ -50,14 +68,19 @@ fn a_header_in_iso_8859_1_has_its_units() {
     let (recording, report) = outcome([header, b"0;9.8;1\n0.01;9.7;2\n".to_vec()].concat());
     assert_close(&samples_with_mean(&recording.signals[0]), &[9.8, 9.7]);
     assert_close(&samples_with_mean(&recording.signals[1]), &[DEG, 2.0 * DEG]);
-    assert_eq!(report.assumptions, ["header not in UTF-8, taken as ISO-8859-1"]);
+    assert_eq!(
+        report.assumptions,
+        ["header not in UTF-8, taken as ISO-8859-1"]
+    );
 }
 
 #[test]
 fn an_array_is_read_as_the_manifest_beside_it_says() {
     let files = Files::new();
-    let signals: [(Channel, Vec<f64>); 2] =
-        [(Channel::ALL[3], vec![1.0, 2.0, 4.0]), (Channel::ALL[5], vec![3.0, 5.0, 8.0])];
+    let signals: [(Channel, Vec<f64>); 2] = [
+        (Channel::ALL[3], vec![1.0, 2.0, 4.0]),
+        (Channel::ALL[5], vec![3.0, 5.0, 8.0]),
+    ];
     let mut bytes = Vec::new();
     FileFormat::Npy.write(&mut bytes, 50.0, &signals).unwrap();
     let path = files.add("replicate_1.npy", &bytes);
@@ -70,10 +93,16 @@ fn an_array_is_read_as_the_manifest_beside_it_says() {
     let (recordings, report) = read(std::slice::from_ref(&path), &ReadOptions::default()).unwrap();
     assert_eq!(channels(&recordings[0]), ["gyro.x", "gyro.z"]);
     assert_close(&[recordings[0].rate_hz], &[50.0]);
-    assert_close(&samples_with_mean(&recordings[0].signals[1]), &[3.0, 5.0, 8.0]);
+    assert_close(
+        &samples_with_mean(&recordings[0].signals[1]),
+        &[3.0, 5.0, 8.0],
+    );
     assert_eq!(report.files[0].rate_from, "manifest.json");
     let e = read(&[path], &at_100_hz()).unwrap_err().to_string();
-    assert!(e.ends_with("replicate_1.npy: the manifest.json says 50 Hz, but 100 Hz is given"), "{e}");
+    assert!(
+        e.ends_with("replicate_1.npy: the manifest.json says 50 Hz, but 100 Hz is given"),
+        "{e}"
+    );
     // It says nothing of a file that it does not name.
     assert!(read(&[other], &at_100_hz()).is_err());
 }

@@ -24,9 +24,17 @@ fn a_profile_of_every_kind_of_segment() {
     let end = t.state(t.end_s());
     // Braking from 15 m/s at 1.5 m/s² takes 11 s and 82.5 m past the last point, 410 m high.
     let (lat, lon) = (46.512 * DEG, 6.6 * DEG);
-    let last = nav_sim_navigation::frames::NavState { lat, lon, h: 410.0, ..end };
+    let last = nav_sim_navigation::frames::NavState {
+        lat,
+        lon,
+        h: 410.0,
+        ..end
+    };
     let past = nav_sim_navigation::earth::ned_difference(&last, end.lat, end.lon, end.h);
-    assert!((past.length() - 82.5).abs() < 0.01 && past.z.abs() < 1e-6, "{past}");
+    assert!(
+        (past.length() - 82.5).abs() < 0.01 && past.z.abs() < 1e-6,
+        "{past}"
+    );
     assert!(end.v_n.length() < 1e-6);
 }
 
@@ -39,12 +47,18 @@ fn profiles_are_refused_with_line_key_and_hint() {
     let segment = |keys: &str| refused(&format!("[[segment]]\n{keys}\n"));
     assert_eq!(
         segment("kind = \"straight\"\nduration_s = -3"),
-        ("p.toml, line 8: \"segment[1].duration_s\" = -3 is not a finite number > 0".into(), String::new())
+        (
+            "p.toml, line 8: \"segment[1].duration_s\" = -3 is not a finite number > 0".into(),
+            String::new()
+        )
     );
     assert_eq!(segment("kind = \"strait\"").1, "did you mean \"straight\"?");
     assert_eq!(
         segment("kind = \"turn\"\nangle_deg = 90\nradius = 3"),
-        ("p.toml, line 9: unknown key \"segment[1].radius\"".into(), "did you mean \"radius_m\"?".into())
+        (
+            "p.toml, line 9: unknown key \"segment[1].radius\"".into(),
+            "did you mean \"radius_m\"?".into()
+        )
     );
     assert_eq!(
         segment("kind = \"turn\"\nangle_deg = 90\nradius_m = 30").1,

@@ -37,7 +37,10 @@ fn normalised_square_agrees_with_the_inverse() {
     let v = DVector::from_fn(9, |i, _| 0.1 * i as f64 - 0.3);
     let expected = (v.transpose() * m.try_inverse().unwrap() * v)[0];
     let got = p.normalised_square(std::array::from_fn(|i| i), x)[6];
-    assert!((got / expected - 1.0).abs() < 1e-10, "{got} against {expected}");
+    assert!(
+        (got / expected - 1.0).abs() < 1e-10,
+        "{got} against {expected}"
+    );
 }
 
 /// ln N(x; 0, P) = −½ (xᵀ P⁻¹ x + ln det 2πP).
@@ -50,5 +53,8 @@ fn log_density_agrees_with_the_determinant() {
     let square = (v.transpose() * block.clone().try_inverse().unwrap() * v)[0];
     let expected = -0.5 * (square + (block * std::f64::consts::TAU).determinant().ln());
     let got = p.log_density(std::array::from_fn(|i| i), x)[6];
-    assert!((got / expected - 1.0).abs() < 1e-10, "{got} against {expected}");
+    assert!(
+        (got / expected - 1.0).abs() < 1e-10,
+        "{got} against {expected}"
+    );
 }

@@ -24,8 +24,13 @@ fn what_is_carried_is_the_derivative_of_the_retraction() {
         let mut xi = DVector::from_fn(NAV, |_, _| g.random_range(-1.0..1.0));
         xi.rows_mut(3 * PSI, 3).scale_mut(size);
         let analytic = carried(&xi);
-        let errors =
-            |x: &DVector<f64>| Lane { xi: x.clone(), ..Lane::new(DMatrix::zeros(NAV, NAV)) }.errors();
+        let errors = |x: &DVector<f64>| {
+            Lane {
+                xi: x.clone(),
+                ..Lane::new(DMatrix::zeros(NAV, NAV))
+            }
+            .errors()
+        };
         for column in 0..NAV {
             let moved = |step: f64| {
                 let mut x = xi.clone();
@@ -39,7 +44,10 @@ fn what_is_carried_is_the_derivative_of_the_retraction() {
             };
             let numeric = (moved(1e-5) - moved(-1e-5)) / 2e-5;
             // Central differences: step² of the third derivative, of order 1, and rounding 1e-16/1e-5.
-            assert!((numeric - analytic.column(column)).amax() < 1e-9, "{size} {column}");
+            assert!(
+                (numeric - analytic.column(column)).amax() < 1e-9,
+                "{size} {column}"
+            );
         }
     }
 }
@@ -50,7 +58,12 @@ fn what_is_carried_is_the_derivative_of_the_retraction() {
 fn coefficients_of_small_angles_go_on_into_those_of_large_ones() {
     let [below, above] = [SMALL * (1.0 - 1e-12), SMALL].map(coefficients);
     for (k, bound) in [1e-12, 1e-12, 2e-9, 3e-10].into_iter().enumerate() {
-        assert!((below[k] - above[k]).abs() < bound, "{k}: {} {}", below[k], above[k]);
+        assert!(
+            (below[k] - above[k]).abs() < bound,
+            "{k}: {} {}",
+            below[k],
+            above[k]
+        );
     }
 }
 
@@ -71,7 +84,10 @@ fn the_posterior_is_that_of_the_kalman_update() {
 }
 
 fn filter(state: &NavState, fix_update: FixUpdate) -> Ekf {
-    let model = Model { rate_hz: 100.0, axes: Default::default() };
+    let model = Model {
+        rate_hz: 100.0,
+        axes: Default::default(),
+    };
     let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
     let start = Strapdown::new(state, GravityModel::Wgs84);
     Ekf::new(start, &belief, state, &InitialSettings::default()).with_update(fix_update)
@@ -81,18 +97,44 @@ fn filter(state: &NavState, fix_update: FixUpdate) -> Ekf {
 #[test]
 fn rows_are_those_of_the_update_that_linearises_once() {
     let (state, omega_ib_b, f_ib_b) = random_case(&mut generator("rows"));
-    let model = Model { rate_hz: 100.0, axes: Default::default() };
-    let initial = InitialSettings { gyro_scale_sigma_ppm: Some(300.0), ..InitialSettings::default() };
-    let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap().with_initial(&initial);
+    let model = Model {
+        rate_hz: 100.0,
+        axes: Default::default(),
+    };
+    let initial = InitialSettings {
+        gyro_scale_sigma_ppm: Some(300.0),
+        ..InitialSettings::default()
+    };
+    let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0)
+        .unwrap()
+        .with_initial(&initial);
     let start = Strapdown::new(&state, GravityModel::Wgs84);
     let mut ekf = Ekf::new(start, &belief, &state, &initial);
-    advance(&mut ekf, &[ImuSample { omega_ib_b, f_ib_b }], &[[Vec3::ZERO; 2]]);
+    advance(
+        &mut ekf,
+        &[ImuSample { omega_ib_b, f_ib_b }],
+        &[[Vec3::ZERO; 2]],
+    );
     let zero = Lanes::ZERO;
-    let (pos_sigma_m, vel_sigma_m_s, lever_arm_b) = (DVec3::ONE, DVec3::ONE, DVec3::new(0.5, -0.3, 0.2));
-    let fix = Fix { lat: zero, lon: zero, h: zero, v_n: None, pos_sigma_m, vel_sigma_m_s, lever_arm_b };
+    let (pos_sigma_m, vel_sigma_m_s, lever_arm_b) =
+        (DVec3::ONE, DVec3::ONE, DVec3::new(0.5, -0.3, 0.2));
+    let fix = Fix {
+        lat: zero,
+        lon: zero,
+        h: zero,
+        v_n: None,
+        pos_sigma_m,
+        vel_sigma_m_s,
+        lever_arm_b,
+    };
     let (own, others) = (rows(&ekf, 0, &fix, 6), ekf.measurement_rows(lever_arm_b));
     for (i, row) in others.iter().enumerate() {
-        assert!(row.iter().enumerate().all(|(k, h)| (h - own[(i, k)]).abs() < 1e-12), "{i} {row:?}");
+        assert!(
+            row.iter()
+                .enumerate()
+                .all(|(k, h)| (h - own[(i, k)]).abs() < 1e-12),
+            "{i} {row:?}"
+        );
     }
     assert!(own.columns(NAV, own.ncols() - NAV).amax() > 0.1);
 }
@@ -104,8 +146,10 @@ fn small_innovations_are_used_alike() {
     let mut g = generator("small");
     let (mut state, ..) = random_case(&mut g);
     state.v_n *= 0.1;
-    let sample =
-        ImuSample { omega_ib_b: DVec3::ZERO, f_ib_b: state.q_b_n.inverse() * DVec3::new(0.3, 0.2, -9.8) };
+    let sample = ImuSample {
+        omega_ib_b: DVec3::ZERO,
+        f_ib_b: state.q_b_n.inverse() * DVec3::new(0.3, 0.2, -9.8),
+    };
     let difference = |scale: f64| {
         let [one, other] = [FixUpdate::Ekf, FixUpdate::Iterated].map(|kind| {
             let mut ekf = filter(&state, kind);

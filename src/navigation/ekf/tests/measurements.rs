@@ -27,15 +27,31 @@ fn lever_arm_rows_agree_with_central_differences() {
         for column in 0..15 {
             let (block, axis) = (column / 3, column % 3);
             let size = [1.0, 1.0, 1e-5, 1.0, 1e-4][block];
-            let bias = |sign: f64| if block == 4 { DVec3::AXES[axis] * (sign * size) } else { DVec3::ZERO };
+            let bias = |sign: f64| {
+                if block == 4 {
+                    DVec3::AXES[axis] * (sign * size)
+                } else {
+                    DVec3::ZERO
+                }
+            };
             let plus = antenna(&perturbed(&state, block, axis, size), bias(1.0));
             let minus = antenna(&perturbed(&state, block, axis, -size), bias(-1.0));
-            let numeric = ((plus.0 - minus.0) / (2.0 * size), (plus.1 - minus.1) / (2.0 * size));
+            let numeric = (
+                (plus.0 - minus.0) / (2.0 * size),
+                (plus.1 - minus.1) / (2.0 * size),
+            );
             for (component, row) in rows.iter().enumerate() {
-                let expected = if component < 3 { numeric.0[component] } else { numeric.1[component - 3] };
+                let expected = if component < 3 {
+                    numeric.0[component]
+                } else {
+                    numeric.1[component - 3]
+                };
                 let got = row[column];
                 // position in metres is exact to 1e-3 of its curvature; velocity differences round at 1e-9
-                assert!((got - expected).abs() < 2e-6, "row {component}, column {column}: {got} {expected}");
+                assert!(
+                    (got - expected).abs() < 2e-6,
+                    "row {component}, column {column}: {got} {expected}"
+                );
             }
         }
     }
@@ -48,7 +64,10 @@ fn a_fix_of_the_antenna_where_it_is_moves_nothing() {
     let arm = DVec3::new(1.3, -0.7, -2.1);
     for turns in [-1.0, 0.0, 1.0].into_iter().cycle().take(300) {
         let (case, omega, _) = random_case(&mut g);
-        let state = NavState { lon: std::f64::consts::PI - 1e-7, ..case };
+        let state = NavState {
+            lon: std::f64::consts::PI - 1e-7,
+            ..case
+        };
         let mut filter = ekf(&gauss_markov_model(), FilterStates::Reduced15);
         (0..8).for_each(|lane| filter.nominal.set_lane(lane, &state));
         filter.omega_ib_b = Vec3::splat(omega);
@@ -66,7 +85,10 @@ fn a_fix_of_the_antenna_where_it_is_moves_nothing() {
         let nis = update(&mut filter, &fix);
         // rounding of a longitude plus a turn, 1e-15 · 6.4e6 m, of the metres of a fix
         let moved = error_of(&filter.nominal.lane(0), &state);
-        assert!(moved.iter().all(|moved| moved.abs() < 1e-7) && nis[0] < 1e-14, "{moved:?} {nis:?}");
+        assert!(
+            moved.iter().all(|moved| moved.abs() < 1e-7) && nis[0] < 1e-14,
+            "{moved:?} {nis:?}"
+        );
     }
 }
 
@@ -78,7 +100,10 @@ fn a_height_is_worth_its_variance() {
     let height = filter.nominal.h;
     update_height(&mut filter, &height, 0.5);
     let after = filter.p.get::<Lanes>(2, 2)[0];
-    assert!((after * (1.0 / before + 1.0 / 0.25) - 1.0).abs() < 1e-12, "{before} {after}");
+    assert!(
+        (after * (1.0 / before + 1.0 / 0.25) - 1.0).abs() < 1e-12,
+        "{before} {after}"
+    );
 }
 
 /// Rows of the velocity along the body's axes and of yaw, against central differences of both.
@@ -99,7 +124,13 @@ fn rows_of_body_velocity_and_yaw_agree_with_central_differences() {
         for column in 0..12 {
             let (block, axis) = (column / 3, column % 3);
             let size = [1.0, 1.0, 1e-5, 1e-4][block];
-            let bias = |sign: f64| if block == 3 { DVec3::AXES[axis] * (sign * size) } else { DVec3::ZERO };
+            let bias = |sign: f64| {
+                if block == 3 {
+                    DVec3::AXES[axis] * (sign * size)
+                } else {
+                    DVec3::ZERO
+                }
+            };
             let plus = measured(&perturbed(&state, block, axis, size), bias(1.0));
             let minus = measured(&perturbed(&state, block, axis, -size), bias(-1.0));
             for (component, row) in rows.iter().enumerate() {
@@ -135,15 +166,25 @@ fn certain(accel: f64, gyro: f64) -> Ekf {
     let axis = |sigma2: f64| Composite::new(vec![Process::White(White::new(sigma2).unwrap())]);
     let model = Model::pooled(100.0, &axis(accel), &axis(gyro));
     let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
-    let start =
-        NavState { lat: 0.8, lon: 0.1, h: 400.0, v_n: DVec3::ZERO, q_b_n: DQuat::from_rotation_z(0.7) };
+    let start = NavState {
+        lat: 0.8,
+        lon: 0.1,
+        h: 400.0,
+        v_n: DVec3::ZERO,
+        q_b_n: DQuat::from_rotation_z(0.7),
+    };
     let settings = InitialSettings {
         pos_sigma_m: [0.0; 3],
         vel_sigma_m_s: [0.0; 3],
         att_sigma_deg: [0.0; 3],
         ..InitialSettings::default()
     };
-    Ekf::new(Strapdown::new(&start, GravityModel::Wgs84), &belief, &start, &settings)
+    Ekf::new(
+        Strapdown::new(&start, GravityModel::Wgs84),
+        &belief,
+        &start,
+        &settings,
+    )
 }
 
 /// One sample of white rates tilts and, while it lasts, lets the specific force drive the velocity:
@@ -159,7 +200,10 @@ fn noise_of_one_sample_correlates_velocity_and_attitude() {
     for i in 0..3 {
         for j in 0..3 {
             let (found, expected) = (filter.p.get::<Lanes>(3 + i, 6 + j)[0], -skew[i][j] * half);
-            assert!((found - expected).abs() < 1e-3 * 9.8 * half, "({i}, {j}): {found:e} {expected:e}");
+            assert!(
+                (found - expected).abs() < 1e-3 * 9.8 * half,
+                "({i}, {j}): {found:e} {expected:e}"
+            );
         }
     }
 }
@@ -172,7 +216,10 @@ fn one_sample_of_white_noise_moves_the_position_by_half_a_step() {
     for axis in 0..3 {
         let of = |i: usize, j: usize| filter.p.get::<Lanes>(3 * i + axis, 3 * j + axis)[0];
         for (found, expected) in [(of(V, V), 1e-4), (of(R, V), 0.5e-6), (of(R, R), 0.25e-8)] {
-            assert!((found / expected - 1.0).abs() < 1e-12, "axis {axis}: {found:e} for {expected:e}");
+            assert!(
+                (found / expected - 1.0).abs() < 1e-12,
+                "axis {axis}: {found:e} for {expected:e}"
+            );
         }
     }
 }
@@ -189,10 +236,18 @@ fn white_noise_does_not_depend_on_how_time_is_cut() {
         }
         settle(&mut filter);
         for i in 0..3 {
-            let (velocity, attitude) =
-                (filter.p.get::<Lanes>(3 + i, 3 + i)[0], filter.p.get::<Lanes>(6 + i, 6 + i)[0]);
-            assert!((velocity / (4e-5 * 0.01) - 1.0).abs() < 1e-3, "{velocity:e}");
-            assert!((attitude / (1e-6 * 0.01) - 1.0).abs() < 1e-3, "{attitude:e}");
+            let (velocity, attitude) = (
+                filter.p.get::<Lanes>(3 + i, 3 + i)[0],
+                filter.p.get::<Lanes>(6 + i, 6 + i)[0],
+            );
+            assert!(
+                (velocity / (4e-5 * 0.01) - 1.0).abs() < 1e-3,
+                "{velocity:e}"
+            );
+            assert!(
+                (attitude / (1e-6 * 0.01) - 1.0).abs() < 1e-3,
+                "{attitude:e}"
+            );
         }
     }
 }

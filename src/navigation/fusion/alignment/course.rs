@@ -39,7 +39,11 @@ impl Pace {
 
     /// How far the axis is from the course at such a speed (rad).
     pub(in crate::fusion) fn slip(self, speed: f64) -> f64 {
-        if self == Self::Fast { SLIP } else { SLIP.hypot(SWAY / speed) }
+        if self == Self::Fast {
+            SLIP
+        } else {
+            SLIP.hypot(SWAY / speed)
+        }
     }
 }
 
@@ -75,15 +79,23 @@ impl Moving {
 
     /// Standard deviation of the vehicle's axis about the course (rad).
     pub(super) fn heading_sigma(&self, imu: &[ImuIncrement]) -> f64 {
-        let sum = |samples: &[ImuIncrement]| samples.iter().map(|s| s.dtheta).sum::<DVec3>().length();
+        let sum =
+            |samples: &[ImuIncrement]| samples.iter().map(|s| s.dtheta).sum::<DVec3>().length();
         let turned = sum(between(imu, self.fix.t_s - self.lag_s, self.fix.t_s));
         // the angular rate over a second around the fix
         let around = between(imu, self.fix.t_s - 0.5, self.fix.t_s + 0.5);
         let seconds: f64 = around.iter().map(|s| s.dt_s).sum();
-        let rate = if seconds > 0.0 { sum(around) / seconds } else { 0.0 };
+        let rate = if seconds > 0.0 {
+            sum(around) / seconds
+        } else {
+            0.0
+        };
         // the first fast fix is one whose error makes it fast: the vehicle moves more slowly than it says
         let speed = self.speed() - 1.5 * self.sigma();
-        (self.sigma() / speed).hypot(self.pace.slip(speed)).hypot(turned).hypot(rate * AXLE_M / speed)
+        (self.sigma() / speed)
+            .hypot(self.pace.slip(speed))
+            .hypot(turned)
+            .hypot(rate * AXLE_M / speed)
     }
 }
 
@@ -105,7 +117,12 @@ pub(in crate::fusion) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<
             derived(&gnss[earlier.checked_sub(1)?], fix)
         }
     };
-    let mut all: Vec<Moving> = gnss.iter().enumerate().filter_map(velocity).filter(inside).collect();
+    let mut all: Vec<Moving> = gnss
+        .iter()
+        .enumerate()
+        .filter_map(velocity)
+        .filter(inside)
+        .collect();
     if first_fast(&all, f64::NEG_INFINITY).is_none() {
         all.iter_mut().for_each(|moving| moving.pace = Pace::Slow);
     }
@@ -132,7 +149,9 @@ pub(in crate::fusion) fn steps(courses: &[Moving], apart_s: f64) -> Vec<[(&Movin
 /// thousands at rest one is five standard deviations off: the next must move as well.
 pub(super) fn first_fast(courses: &[Moving], from_s: f64) -> Option<usize> {
     let fast = |i: usize| {
-        let supported = courses.get(i + 1).is_none_or(|next| next.speed() >= 0.6 * next.needed());
+        let supported = courses
+            .get(i + 1)
+            .is_none_or(|next| next.speed() >= 0.6 * next.needed());
         courses[i].fix.t_s >= from_s && courses[i].speed() >= courses[i].needed() && supported
     };
     (0..courses.len()).find(|i| fast(*i))
@@ -141,7 +160,9 @@ pub(super) fn first_fast(courses: &[Moving], from_s: f64) -> Option<usize> {
 /// The fix that comes nearest to moving fast enough: when (s), its speed and standard deviation (m/s).
 pub(super) fn nearest_to_fast(courses: &[Moving]) -> Option<(f64, f64, f64)> {
     let share = |m: &Moving| m.speed() / m.needed();
-    let nearest = courses.iter().max_by(|a, b| share(a).total_cmp(&share(b)))?;
+    let nearest = courses
+        .iter()
+        .max_by(|a, b| share(a).total_cmp(&share(b)))?;
     Some((nearest.fix.t_s, nearest.speed(), nearest.sigma()))
 }
 
@@ -157,5 +178,11 @@ fn derived(before: &GnssFix, fix: &GnssFix) -> Option<Moving> {
     let lag_s = 0.5 * dt;
     let variance = (fix.pos_sigma_n.powf(2.0) + before.pos_sigma_n.powf(2.0)) / (dt * dt);
     let sigma_n = (variance + DVec3::splat((ACCELERATION * lag_s).powi(2))).powf(0.5);
-    Some(Moving { fix: *fix, v_n, sigma_n, lag_s, pace: Pace::Fast })
+    Some(Moving {
+        fix: *fix,
+        v_n,
+        sigma_n,
+        lag_s,
+        pace: Pace::Fast,
+    })
 }

@@ -58,11 +58,23 @@ fn window(samples: &[ImuIncrement], q_s_b: DQuat) -> Window {
     let f = samples.iter().map(|s| s.dv).sum::<DVec3>() / seconds;
     let omega = samples.iter().map(|s| s.dtheta).sum::<DVec3>() / seconds;
     let n = samples.len() as f64;
-    let force = samples.iter().map(|s| (s.dv / s.dt_s - f).length_squared()).sum::<f64>();
-    let rate = samples.iter().map(|s| (s.dtheta / s.dt_s - omega).length_squared()).sum::<f64>();
+    let force = samples
+        .iter()
+        .map(|s| (s.dv / s.dt_s - f).length_squared())
+        .sum::<f64>();
+    let rate = samples
+        .iter()
+        .map(|s| (s.dtheta / s.dt_s - omega).length_squared())
+        .sum::<f64>();
     let end_s = samples.last().map_or(f64::NAN, |s| s.t_s);
     let spread = ((force / n).sqrt(), (rate / n).sqrt());
-    Window { end_s, seconds, f: q_s_b * f, omega: q_s_b * omega, spread }
+    Window {
+        end_s,
+        seconds,
+        f: q_s_b * f,
+        omega: q_s_b * omega,
+        spread,
+    }
 }
 
 /// True where the specific force is spread too much for anything that stands: vibrations at rest are less.
@@ -80,13 +92,24 @@ impl<'a> Scene<'a> {
         fix: &GnssFix,
     ) -> Self {
         let sigma = |sensor| belief.initial_bias_sigma(sensor);
-        let bias = BiasSigma { accel: sigma(Sensor::Accel), gyro: sigma(Sensor::Gyro) };
-        Self { recorded: *recorded, settings, bias, g: gravity_down(settings.gravity, fix.lat.sin(), fix.h) }
+        let bias = BiasSigma {
+            accel: sigma(Sensor::Accel),
+            gyro: sigma(Sensor::Gyro),
+        };
+        Self {
+            recorded: *recorded,
+            settings,
+            bias,
+            g: gravity_down(settings.gravity, fix.lat.sin(), fix.h),
+        }
     }
 
     /// The tilt's standard deviation with the biases and a levelling of age `age_s` (rad).
     fn tilt_sigma(&self, age_s: f64, own: f64) -> f64 {
-        (self.bias.accel / self.g).hypot(self.bias.gyro * age_s).hypot(own).hypot(0.3 * crate::units::DEG)
+        (self.bias.accel / self.g)
+            .hypot(self.bias.gyro * age_s)
+            .hypot(own)
+            .hypot(0.3 * crate::units::DEG)
     }
 
     /// Levelling in the static window that says most of the attitude at the fix, carried on by the gyroscopes.
@@ -95,10 +118,17 @@ impl<'a> Scene<'a> {
     /// its length, the drift of the gyroscopes grows with its age.
     pub(super) fn at_rest(&self, before: &[Moving], moving: &Moving) -> Option<Level> {
         let to_s = moving.fix.t_s;
-        let ends = (0..).map(|k| to_s - 0.25 * f64::from(k)).take_while(|end| to_s - end <= MAX_AGE_S);
-        let windows: Vec<Window> =
-            ends.flat_map(|end| STILL_S.map(|length| self.calm(end, length))).flatten().collect();
-        let quietest = windows.iter().map(|w| w.spread.0).fold(f64::INFINITY, f64::min);
+        let ends = (0..)
+            .map(|k| to_s - 0.25 * f64::from(k))
+            .take_while(|end| to_s - end <= MAX_AGE_S);
+        let windows: Vec<Window> = ends
+            .flat_map(|end| STILL_S.map(|length| self.calm(end, length)))
+            .flatten()
+            .collect();
+        let quietest = windows
+            .iter()
+            .map(|w| w.spread.0)
+            .fold(f64::INFINITY, f64::min);
         windows
             .iter()
             .filter(|w| w.spread.0 <= QUIET * quietest)
@@ -111,14 +141,19 @@ impl<'a> Scene<'a> {
         let samples = between(self.recorded.imu, end_s - length_s, end_s);
         let q_s_b = self.settings.q_s_b;
         let (first, second) = samples.split_at(samples.len() / 2);
-        let (whole, first, second) = (window(samples, q_s_b), window(first, q_s_b), window(second, q_s_b));
+        let (whole, first, second) = (
+            window(samples, q_s_b),
+            window(first, q_s_b),
+            window(second, q_s_b),
+        );
         let (force, rate) = whole.spread;
         // constant, as gravity and biases are; the spread's share is for vibrations, which average out slowly
         let constant = first.f.distance(second.f) < 0.1 + force / 4.0
             && first.omega.distance(second.omega) < 0.01 + rate / 4.0;
         let gravity = (whole.f.length() - self.g).abs() < 0.5_f64.max(4.0 * self.bias.accel);
         let turning = whole.omega.length() > STILL.1.max(4.0 * self.bias.gyro);
-        let calm = whole.seconds > 0.8 * length_s && force < STILL.0 && constant && gravity && !turning;
+        let calm =
+            whole.seconds > 0.8 * length_s && force < STILL.0 && constant && gravity && !turning;
         calm.then_some(whole)
     }
 
@@ -128,9 +163,12 @@ impl<'a> Scene<'a> {
         let age_s = moving.fix.t_s - w.end_s;
         let (q, gained) = self.carry(w, moving.fix.t_s);
         let unseen = if moving.fix.velocity.is_some() {
-            let seen: Vec<&Moving> =
-                before.iter().filter(|m| (from..=departed).contains(&m.fix.t_s)).collect();
-            slow(&seen).then(|| std::f64::consts::SQRT_2 * seen[0].sigma() / (w.seconds * self.g))?
+            let seen: Vec<&Moving> = before
+                .iter()
+                .filter(|m| (from..=departed).contains(&m.fix.t_s))
+                .collect();
+            slow(&seen)
+                .then(|| std::f64::consts::SQRT_2 * seen[0].sigma() / (w.seconds * self.g))?
         } else {
             // positions alone are slow to tell rest from acceleration: what the IMU gained on the way must be
             // the speed that GNSS then shows
@@ -140,14 +178,27 @@ impl<'a> Scene<'a> {
         let now = RollPitchYaw::from_quat(q);
         let own = (w.spread.0 / self.g / 10.0).hypot(unseen);
         let from = Levelling::AtRest(w.end_s);
-        Some(Level { roll: now.roll, pitch: now.pitch, sigma: self.tilt_sigma(age_s, own), from })
+        Some(Level {
+            roll: now.roll,
+            pitch: now.pitch,
+            sigma: self.tilt_sigma(age_s, own),
+            from,
+        })
     }
 
     /// A levelling at rest carried on with the gyroscopes: the attitude from level axes whose first is the
     /// heading of the body then, and the velocity gained in them.
     fn carry(&self, w: &Window, to_s: f64) -> (DQuat, DVec3) {
         let (roll, pitch) = level(w.f, DVec3::Z * -self.g);
-        let (mut q, mut gained) = (RollPitchYaw { roll, pitch, yaw: 0.0 }.to_quat(), DVec3::ZERO);
+        let (mut q, mut gained) = (
+            RollPitchYaw {
+                roll,
+                pitch,
+                yaw: 0.0,
+            }
+            .to_quat(),
+            DVec3::ZERO,
+        );
         for s in between(self.recorded.imu, w.end_s, to_s) {
             gained += q * (self.settings.q_s_b * s.dv) + DVec3::Z * self.g * s.dt_s;
             q = (q * DQuat::from_scaled_axis(self.settings.q_s_b * s.dtheta)).normalize();
@@ -157,9 +208,17 @@ impl<'a> Scene<'a> {
 
     /// Levelling while it moves: the mean specific force after the fix is the change of the GNSS velocity
     /// less gravity, in the axes of this heading.
-    pub(super) fn in_motion(&self, after: &[Moving], heading: f64, heading_sigma: f64) -> Option<Level> {
+    pub(super) fn in_motion(
+        &self,
+        after: &[Moving],
+        heading: f64,
+        heading_sigma: f64,
+    ) -> Option<Level> {
         let from = after.first()?;
-        let near = after.iter().take_while(|m| m.fix.t_s <= from.fix.t_s + MOVING_S).count();
+        let near = after
+            .iter()
+            .take_while(|m| m.fix.t_s <= from.fix.t_s + MOVING_S)
+            .count();
         // with fixes far apart, the next one
         let to = after.get(near.max(2) - 1)?;
         let (from_s, to_s) = (from.fix.t_s - from.lag_s, to.fix.t_s - to.lag_s);
@@ -169,18 +228,31 @@ impl<'a> Scene<'a> {
         }
         let dv = self.settings.q_s_b * carried(samples).1;
         let a_n = (to.v_n - from.v_n) / seconds;
-        let (roll, pitch) = level(dv / seconds, DQuat::from_rotation_z(-heading) * (a_n - DVec3::Z * self.g));
+        let (roll, pitch) = level(
+            dv / seconds,
+            DQuat::from_rotation_z(-heading) * (a_n - DVec3::Z * self.g),
+        );
         let velocities = from.sigma().hypot(to.sigma()) / (seconds * self.g);
         let own = velocities.hypot(heading_sigma * a_n.truncate().length() / self.g);
         let sigma = self.tilt_sigma(0.5 * seconds, own);
-        Some(Level { roll, pitch, sigma, from: Levelling::InMotion(seconds) })
+        Some(Level {
+            roll,
+            pitch,
+            sigma,
+            from: Levelling::InMotion(seconds),
+        })
     }
 }
 
 /// Whether velocities are those of rest, each and on average, as far as they are good to.
 fn slow(seen: &[&Moving]) -> bool {
     let n = seen.len() as f64;
-    let mean = seen.iter().map(|m| m.v_n.truncate()).sum::<glam::DVec2>().length() / n;
+    let mean = seen
+        .iter()
+        .map(|m| m.v_n.truncate())
+        .sum::<glam::DVec2>()
+        .length()
+        / n;
     let sigma = (seen.iter().map(|m| m.sigma().powi(2)).sum::<f64>()).sqrt() / n;
     let each = |m: &&Moving| m.speed() < 0.3_f64.max(4.0 * m.sigma());
     !seen.is_empty() && seen.iter().all(each) && mean < 0.2_f64.max(4.0 * sigma)
@@ -189,14 +261,23 @@ fn slow(seen: &[&Moving]) -> bool {
 /// Whether the fixes in a stretch of time stay in one place, as far as they are good to: within four
 /// standard deviations of the first.
 fn stays(fixes: &[Moving], from: f64, to: f64) -> bool {
-    let within: Vec<&GnssFix> =
-        fixes.iter().map(|m| &m.fix).filter(|f| (from..=to).contains(&f.t_s)).collect();
-    let Some((first, rest)) = within.split_first() else { return false };
+    let within: Vec<&GnssFix> = fixes
+        .iter()
+        .map(|m| &m.fix)
+        .filter(|f| (from..=to).contains(&f.t_s))
+        .collect();
+    let Some((first, rest)) = within.split_first() else {
+        return false;
+    };
     let r = radii(first.lat.sin());
     let near = |f: &&GnssFix| {
         let north = (f.lat - first.lat) * (r.meridian + first.h);
         let east = wrap_angle(f.lon - first.lon) * (r.transverse + first.h) * first.lat.cos();
-        let sigma = f.pos_sigma_n.truncate().length().hypot(first.pos_sigma_n.truncate().length());
+        let sigma = f
+            .pos_sigma_n
+            .truncate()
+            .length()
+            .hypot(first.pos_sigma_n.truncate().length());
         north.hypot(east) < 0.5_f64.max(4.0 / std::f64::consts::SQRT_2 * sigma)
     };
     rest.len() >= 2 && rest.iter().all(near)
@@ -223,9 +304,19 @@ mod tests {
         for (roll, pitch) in [(0.0, 0.0), (0.3, -0.4), (-1.0, 0.7)] {
             for a_h in [DVec3::ZERO, DVec3::new(2.0, -3.0, 0.5)] {
                 let f_h = a_h - DVec3::Z * 9.81;
-                let f_b = RollPitchYaw { roll, pitch, yaw: 0.0 }.to_quat().inverse() * f_h;
+                let f_b = RollPitchYaw {
+                    roll,
+                    pitch,
+                    yaw: 0.0,
+                }
+                .to_quat()
+                .inverse()
+                    * f_h;
                 let (r, p) = level(f_b, f_h);
-                assert!((r - roll).abs() < 1e-12 && (p - pitch).abs() < 1e-12, "{roll} {pitch}: {r} {p}");
+                assert!(
+                    (r - roll).abs() < 1e-12 && (p - pitch).abs() < 1e-12,
+                    "{roll} {pitch}: {r} {p}"
+                );
             }
         }
     }

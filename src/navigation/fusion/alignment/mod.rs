@@ -83,13 +83,20 @@ pub fn coarse(
     belief: &Belief,
 ) -> Result<Alignment, AlignmentError> {
     let gnss = kept(recorded, settings);
-    let recorded = Recorded { gnss: &gnss, ..*recorded };
+    let recorded = Recorded {
+        gnss: &gnss,
+        ..*recorded
+    };
     let courses = courses(&gnss, recorded.imu);
     let Some(first) = first_fast(&courses, f64::NEG_INFINITY) else {
-        return Err(AlignmentError::NoCourse { nearest: nearest_to_fast(&courses) });
+        return Err(AlignmentError::NoCourse {
+            nearest: nearest_to_fast(&courses),
+        });
     };
     let first_s = courses[first].fix.t_s;
-    let later = LATER_S.iter().filter_map(|s| first_fast(&courses, first_s + s));
+    let later = LATER_S
+        .iter()
+        .filter_map(|s| first_fast(&courses, first_s + s));
     let finished = |mut candidate: Candidate| {
         trial::widen(&recorded, belief, settings, &mut candidate.start);
         candidate.alignment()
@@ -109,13 +116,19 @@ pub fn coarse(
             best.get_or_insert(candidate);
         }
     }
-    best.map(finished).ok_or(AlignmentError::NoSamples { t_s: first_s })
+    best.map(finished)
+        .ok_or(AlignmentError::NoSamples { t_s: first_s })
 }
 
 /// The fixes that are not withheld.
 fn kept(recorded: &Recorded<'_>, settings: &Settings) -> Vec<GnssFix> {
     let withheld = |f: &&GnssFix| settings.outages.iter().any(|o| o.withholds(f.t_s));
-    recorded.gnss.iter().filter(|f| !withheld(f)).copied().collect()
+    recorded
+        .gnss
+        .iter()
+        .filter(|f| !withheld(f))
+        .copied()
+        .collect()
 }
 
 /// The start at the first fix where the IMU can be levelled, its heading given: it need not move.
@@ -129,16 +142,27 @@ pub fn towards(
     heading: Heading,
 ) -> Result<Alignment, AlignmentError> {
     let gnss = kept(recorded, settings);
-    let recorded = Recorded { gnss: &gnss, ..*recorded };
+    let recorded = Recorded {
+        gnss: &gnss,
+        ..*recorded
+    };
     let courses = courses(&gnss, recorded.imu);
     let sigma = heading.sigma.hypot(settings.mounting_sigma_b.z);
     let start_at = |at: usize| {
         let scene = Scene::new(&recorded, settings, belief, &courses[at].fix);
         let rest = scene.at_rest(&courses[..at], &courses[at]);
         let level = rest.or_else(|| scene.in_motion(&courses[at..], heading.yaw, sigma))?;
-        Some(start(&courses[at], &level, Along::Given, (heading.yaw, sigma), settings))
+        Some(start(
+            &courses[at],
+            &level,
+            Along::Given,
+            (heading.yaw, sigma),
+            settings,
+        ))
     };
-    let mut start = (0..courses.len()).find_map(start_at).ok_or(AlignmentError::NoLevel)?;
+    let mut start = (0..courses.len())
+        .find_map(start_at)
+        .ok_or(AlignmentError::NoLevel)?;
     let trial = trial::alone(&recorded, belief, settings, &start);
     trial::widen(&recorded, belief, settings, &mut start);
     Ok(Candidate { start, trial }.alignment())
@@ -168,7 +192,10 @@ impl Candidate {
         let mut doubts = Vec::new();
         if !self.agrees() {
             let nis_per_component = self.trial.agreements[0].nis;
-            doubts.push((VerdictKind::Overconfident, Finding::Start { nis_per_component }));
+            doubts.push((
+                VerdictKind::Overconfident,
+                Finding::Start { nis_per_component },
+            ));
         }
         if !self.trial.decided {
             doubts.push((VerdictKind::Doubtful, Finding::Direction));
@@ -177,9 +204,18 @@ impl Candidate {
         let RollPitchYaw { roll, pitch, .. } = RollPitchYaw::from_quat(self.start.state.q_b_n);
         if (roll.cos() * pitch.cos()).acos() > UPRIGHT {
             let (roll_deg, pitch_deg) = (roll / DEG, pitch / DEG);
-            doubts.push((VerdictKind::Doubtful, Finding::NotLevel { roll_deg, pitch_deg }));
+            doubts.push((
+                VerdictKind::Doubtful,
+                Finding::NotLevel {
+                    roll_deg,
+                    pitch_deg,
+                },
+            ));
         }
-        Alignment { start: self.start, doubts }
+        Alignment {
+            start: self.start,
+            doubts,
+        }
     }
 }
 
@@ -195,20 +231,32 @@ fn candidates(
     let moving = &courses[at];
     let scene = Scene::new(recorded, settings, belief, &moving.fix);
     // the course is the heading of the vehicle; how the IMU sits in it is not better known than the mounting
-    let heading_sigma = moving.heading_sigma(recorded.imu).hypot(settings.mounting_sigma_b.z);
+    let heading_sigma = moving
+        .heading_sigma(recorded.imu)
+        .hypot(settings.mounting_sigma_b.z);
     let in_motion = |heading| scene.in_motion(&courses[at..], heading, heading_sigma);
     let forwards = moving.course();
     let backwards = wrap_angle(forwards + PI);
-    let rest = scene.at_rest(&courses[..at], moving).map(|level| [level; 2]);
-    let motion = in_motion(forwards).zip(in_motion(backwards)).map(|(f, b)| [f, b]);
+    let rest = scene
+        .at_rest(&courses[..at], moving)
+        .map(|level| [level; 2]);
+    let motion = in_motion(forwards)
+        .zip(in_motion(backwards))
+        .map(|(f, b)| [f, b]);
     let mut levels: Vec<[Level; 2]> = [rest, motion].into_iter().flatten().collect();
     levels.sort_by(|a, b| a[0].sigma.total_cmp(&b[0].sigma));
     let tried = |[f, b]: [Level; 2]| {
-        let starts = [(f, Along::Forwards, forwards), (b, Along::Backwards, backwards)]
-            .map(|(level, along, yaw)| start(moving, &level, along, (yaw, heading_sigma), settings));
+        let starts = [
+            (f, Along::Forwards, forwards),
+            (b, Along::Backwards, backwards),
+        ]
+        .map(|(level, along, yaw)| start(moving, &level, along, (yaw, heading_sigma), settings));
         let trial = trial::opposite(recorded, belief, settings, starts.each_ref());
         let [f, b] = starts;
-        Candidate { start: if trial.better == 0 { f } else { b }, trial }
+        Candidate {
+            start: if trial.better == 0 { f } else { b },
+            trial,
+        }
     };
     levels.into_iter().map(tried).collect()
 }
@@ -221,7 +269,12 @@ fn start(
     settings: &Settings,
 ) -> Start {
     let fix = moving.fix;
-    let q_b_n = RollPitchYaw { roll: level.roll, pitch: level.pitch, yaw }.to_quat();
+    let q_b_n = RollPitchYaw {
+        roll: level.roll,
+        pitch: level.pitch,
+        yaw,
+    }
+    .to_quat();
     let arm_n = q_b_n * settings.lever_arm_b;
     let r = radii(fix.lat.sin());
     let state = NavState {
@@ -246,7 +299,12 @@ fn start(
         is_reversing: along == Along::Backwards,
         moved_deg: None,
     };
-    Start { t_s: fix.t_s, state, sigma, found: Some(found) }
+    Start {
+        t_s: fix.t_s,
+        state,
+        sigma,
+        found: Some(found),
+    }
 }
 
 /// Samples whose interval ends in (from, to].

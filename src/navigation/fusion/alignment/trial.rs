@@ -51,8 +51,23 @@ fn until(
 ) -> Option<Solution> {
     let imu = &recorded.imu[..recorded.imu.partition_point(|s| s.t_s <= to_s)];
     let gnss = &recorded.gnss[..recorded.gnss.partition_point(|f| f.t_s <= to_s)];
-    let settings = Settings { nis_gate: None, rows_hz: 1e-3, ..settings.clone() };
-    fuse(&Recorded { imu, gnss, ..*recorded }, belief, start, &settings, None).ok()
+    let settings = Settings {
+        nis_gate: None,
+        rows_hz: 1e-3,
+        ..settings.clone()
+    };
+    fuse(
+        &Recorded {
+            imu,
+            gnss,
+            ..*recorded
+        },
+        belief,
+        start,
+        &settings,
+        None,
+    )
+    .ok()
 }
 
 fn agreement(
@@ -62,17 +77,34 @@ fn agreement(
     start: &Start,
     to_s: f64,
 ) -> Agreement {
-    let failed = Agreement { cost: f64::INFINITY, nis: f64::INFINITY, components: 0 };
-    let settings = Settings { smooth: false, ..settings.clone() };
-    let Some(solution) = until(recorded, belief, &settings, start, to_s) else { return failed };
-    let mut sum = Agreement { cost: 0.0, nis: 0.0, components: 0 };
+    let failed = Agreement {
+        cost: f64::INFINITY,
+        nis: f64::INFINITY,
+        components: 0,
+    };
+    let settings = Settings {
+        smooth: false,
+        ..settings.clone()
+    };
+    let Some(solution) = until(recorded, belief, &settings, start, to_s) else {
+        return failed;
+    };
+    let mut sum = Agreement {
+        cost: 0.0,
+        nis: 0.0,
+        components: 0,
+    };
     for fix in solution.fixes.iter().filter(|f| f.used == Use::Used) {
         // the sum of the logarithms stands for the determinant: the correlations of both starts are alike
         sum.cost += fix.nis + 2.0 * fix.sigma.iter().map(|s| s.ln()).sum::<f64>();
         sum.nis += fix.nis;
         sum.components += fix.innovation.len();
     }
-    sum.nis = if sum.components > 0 { sum.nis / sum.components as f64 } else { 0.0 };
+    sum.nis = if sum.components > 0 {
+        sum.nis / sum.components as f64
+    } else {
+        0.0
+    };
     sum
 }
 
@@ -98,29 +130,56 @@ pub(super) fn opposite(
         if decided || to_s >= end_s {
             // forwards unless that is refuted
             let better = usize::from(decided && gain > 0.0);
-            return Trial { better, decided, agreements: [first[better], both[better]] };
+            return Trial {
+                better,
+                decided,
+                agreements: [first[better], both[better]],
+            };
         }
         window_s *= 2.0;
     }
 }
 
 /// Runs the filter from a start that has no other beside it, over the first minute.
-pub(super) fn alone(recorded: &Recorded<'_>, belief: &Belief, settings: &Settings, start: &Start) -> Trial {
+pub(super) fn alone(
+    recorded: &Recorded<'_>,
+    belief: &Belief,
+    settings: &Settings,
+    start: &Start,
+) -> Trial {
     let agreement = agreement(recorded, belief, settings, start, start.t_s + TRIAL_S);
-    Trial { better: 0, decided: true, agreements: [agreement; 2] }
+    Trial {
+        better: 0,
+        decided: true,
+        agreements: [agreement; 2],
+    }
 }
 
 /// Widens the standard deviation of a heading that is not the course: wind sets an aircraft off, currents a boat. The
 /// smoother, from all fixes of the first minute, says how far.
-pub(super) fn widen(recorded: &Recorded<'_>, belief: &Belief, settings: &Settings, start: &mut Start) {
-    let settings = Settings { smooth: true, ..settings.clone() };
+pub(super) fn widen(
+    recorded: &Recorded<'_>,
+    belief: &Belief,
+    settings: &Settings,
+    start: &mut Start,
+) {
+    let settings = Settings {
+        smooth: true,
+        ..settings.clone()
+    };
     let solution = until(recorded, belief, &settings, start, start.t_s + TRIAL_S);
-    let Some([first, ..]) = solution.as_ref().and_then(|s| s.smoothed.as_deref()) else { return };
-    let [course, heading] = [start.state.q_b_n, first.state.q_b_n].map(|q| RollPitchYaw::from_quat(q).yaw);
+    let Some([first, ..]) = solution.as_ref().and_then(|s| s.smoothed.as_deref()) else {
+        return;
+    };
+    let [course, heading] =
+        [start.state.q_b_n, first.state.q_b_n].map(|q| RollPitchYaw::from_quat(q).yaw);
     let moved_deg = wrap_angle(heading - course) / DEG;
     let sigma_deg = &mut start.sigma.att_sigma_deg[2];
     if moved_deg.abs() > MOVED * *sigma_deg {
         *sigma_deg = sigma_deg.hypot(moved_deg).min(WIDEST_DEG);
-        start.found.iter_mut().for_each(|found| found.moved_deg = Some(moved_deg));
+        start
+            .found
+            .iter_mut()
+            .for_each(|found| found.moved_deg = Some(moved_deg));
     }
 }

@@ -58,15 +58,26 @@ mod tests {
         let mut blocks = Blocks::default();
         for k in 0..400 {
             let value = if k % 4 < 2 { 1.0 } else { -1.0 };
-            (0..10).for_each(|i| blocks.add(BLOCK_S * (f64::from(k) + 0.1 * f64::from(i)), value, 2.0));
+            (0..10).for_each(|i| {
+                blocks.add(BLOCK_S * (f64::from(k) + 0.1 * f64::from(i)), value, 2.0)
+            });
         }
         assert!(blocks.mean().abs() < 1e-12 && blocks.count() == 400);
         // 1 % for the few
-        assert!((blocks.sigma() * 20.0 - 1.0).abs() < 0.01, "{}", blocks.sigma());
+        assert!(
+            (blocks.sigma() * 20.0 - 1.0).abs() < 0.01,
+            "{}",
+            blocks.sigma()
+        );
         // neighbours that are all alike in pairs: half as many values
         let mut pairs = Blocks::default();
-        (0..400)
-            .for_each(|k| pairs.add(BLOCK_S * f64::from(k), if (k / 2) % 2 == 0 { 1.0 } else { -1.0 }, 1.0));
+        (0..400).for_each(|k| {
+            pairs.add(
+                BLOCK_S * f64::from(k),
+                if (k / 2) % 2 == 0 { 1.0 } else { -1.0 },
+                1.0,
+            )
+        });
         assert!(pairs.sigma() >= blocks.sigma());
     }
 }

@@ -66,7 +66,9 @@ impl Mounting {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MountingError {
     /// Hardly any of it is fast enough to have a course.
-    #[error("the mounting is not found: {seconds:.0} s of the drive have a course, {needed:.0} s are needed")]
+    #[error(
+        "the mounting is not found: {seconds:.0} s of the drive have a course, {needed:.0} s are needed"
+    )]
     TooSlow {
         /// Time with a course (s).
         seconds: f64,
@@ -88,7 +90,9 @@ pub enum MountingError {
         bank_deg: f64,
     },
     /// The angles scatter too much.
-    #[error("the mounting is not found: {axis} is known to ±{sigma_deg:.1}°, ±{limit_deg:.0}° is needed")]
+    #[error(
+        "the mounting is not found: {axis} is known to ±{sigma_deg:.1}°, ±{limit_deg:.0}° is needed"
+    )]
     NotDetermined {
         /// `roll`, `pitch` or `yaw`.
         axis: &'static str,
@@ -134,19 +138,41 @@ pub fn find(
     belief: &Belief,
 ) -> Result<Mounting, MountingError> {
     let withheld = |f: &GnssFix| settings.outages.iter().any(|o| o.withholds(f.t_s));
-    let gnss: Vec<GnssFix> = recorded.gnss.iter().filter(|f| !withheld(f)).copied().collect();
-    let recorded = Recorded { gnss: &gnss, ..*recorded };
+    let gnss: Vec<GnssFix> = recorded
+        .gnss
+        .iter()
+        .filter(|f| !withheld(f))
+        .copied()
+        .collect();
+    let recorded = Recorded {
+        gnss: &gnss,
+        ..*recorded
+    };
     let rough = track::along(&recorded, settings)?;
     let (fine, sigma_factor) = refined(&recorded, settings, belief, &rough)?;
-    let named = ["roll", "pitch", "yaw"].into_iter().zip(fine.sigma_b.to_array());
+    let named = ["roll", "pitch", "yaw"]
+        .into_iter()
+        .zip(fine.sigma_b.to_array());
     // NaN is not determined either
-    let worst = named.into_iter().find(|(_, sigma)| sigma.is_nan() || *sigma > DETERMINED);
+    let worst = named
+        .into_iter()
+        .find(|(_, sigma)| sigma.is_nan() || *sigma > DETERMINED);
     if let Some((axis, sigma)) = worst {
         let (sigma_deg, limit_deg) = (sigma / DEG, DETERMINED / DEG);
-        return Err(MountingError::NotDetermined { axis, sigma_deg, limit_deg });
+        return Err(MountingError::NotDetermined {
+            axis,
+            sigma_deg,
+            limit_deg,
+        });
     }
     let angles = RollPitchYaw::from_quat(fine.q_s_b * settings.q_s_b.inverse());
-    Ok(Mounting { q_s_b: fine.q_s_b, angles, sigma_b: fine.sigma_b, way_m: fine.way_m, sigma_factor })
+    Ok(Mounting {
+        q_s_b: fine.q_s_b,
+        angles,
+        sigma_b: fine.sigma_b,
+        way_m: fine.way_m,
+        sigma_factor,
+    })
 }
 
 /// Most that the standard deviations of fixes are widened by: what contradicts more is not the receiver's word.
@@ -161,12 +187,24 @@ fn refined(
 ) -> Result<(refined::Refined, f64), MountingError> {
     let (mut gnss, mut factor) = (recorded.gnss.to_vec(), 1.0);
     loop {
-        match refined::through(&Recorded { gnss: &gnss, ..*recorded }, settings, belief, rough) {
-            Err(MountingError::Contradicted { nis_per_component: nis })
-                if nis > 1.0 && factor * nis.sqrt() <= MOST_WIDENED =>
-            {
+        match refined::through(
+            &Recorded {
+                gnss: &gnss,
+                ..*recorded
+            },
+            settings,
+            belief,
+            rough,
+        ) {
+            Err(MountingError::Contradicted {
+                nis_per_component: nis,
+            }) if nis > 1.0 && factor * nis.sqrt() <= MOST_WIDENED => {
                 factor *= nis.sqrt();
-                gnss = recorded.gnss.iter().map(|fix| fix.with_sigmas_times(factor, factor)).collect();
+                gnss = recorded
+                    .gnss
+                    .iter()
+                    .map(|fix| fix.with_sigmas_times(factor, factor))
+                    .collect();
             }
             found => return Ok((found?, factor)),
         }

@@ -42,9 +42,19 @@ pub(super) struct Refined {
 
 /// The filter's yaw must be that of the accelerations: biases, which a filter may not expect, do not touch the latter.
 fn agreeing(mean: DQuat, sigma: f64) -> Result<(), MountingError> {
-    let turn = (if mean.w < 0.0 { -mean } else { mean }).to_scaled_axis().z.abs();
-    let disagree = || MountingError::Disagree { yaw_deg: turn / DEG, sigma_deg: sigma / DEG };
-    if turn <= APART * sigma { Ok(()) } else { Err(disagree()) }
+    let turn = (if mean.w < 0.0 { -mean } else { mean })
+        .to_scaled_axis()
+        .z
+        .abs();
+    let disagree = || MountingError::Disagree {
+        yaw_deg: turn / DEG,
+        sigma_deg: sigma / DEG,
+    };
+    if turn <= APART * sigma {
+        Ok(())
+    } else {
+        Err(disagree())
+    }
 }
 
 /// An instant in motion.
@@ -65,26 +75,43 @@ pub(super) fn through(
     rough: &Rough,
 ) -> Result<Refined, MountingError> {
     let loose = DVec3::Z * (LOOSE * rough.yaw_sigma);
-    let settings =
-        Settings { q_s_b: rough.q_s_b, mounting_sigma_b: loose, rows_hz: ROWS_HZ, ..settings.clone() };
+    let settings = Settings {
+        q_s_b: rough.q_s_b,
+        mounting_sigma_b: loose,
+        rows_hz: ROWS_HZ,
+        ..settings.clone()
+    };
     let Alignment { start, doubts } = coarse(recorded, &settings, belief)?;
     // what the rows state is then of the IMU's attitude
-    let settings = Settings { mounting_sigma_b: DVec3::ZERO, ..settings };
+    let settings = Settings {
+        mounting_sigma_b: DVec3::ZERO,
+        ..settings
+    };
     let solution = fuse(recorded, belief, &start, &settings, None)?;
     // attitudes of a filter that the fixes contradict are no worse than it states only by chance
     if is_contradicted(&solution, &doubts) {
-        return Err(MountingError::Contradicted { nis_per_component: nis_per_component(&solution) });
+        return Err(MountingError::Contradicted {
+            nis_per_component: nis_per_component(&solution),
+        });
     }
-    let pace = courses(recorded.gnss, recorded.imu).first().map_or(Pace::Fast, |moving| moving.pace);
-    let mut moments: Vec<Moment> =
-        solution.rows.windows(3).filter_map(|w| moment([&w[0], &w[1], &w[2]], pace)).collect();
+    let pace = courses(recorded.gnss, recorded.imu)
+        .first()
+        .map_or(Pace::Fast, |moving| moving.pace);
+    let mut moments: Vec<Moment> = solution
+        .rows
+        .windows(3)
+        .filter_map(|w| moment([&w[0], &w[1], &w[2]], pace))
+        .collect();
     turn_to_front(&mut moments)?;
     let mean = mean(&moments);
     upright(&moments, mean)?;
     let blocks = deviations(&moments, mean);
     if blocks[0].count() < FEWEST {
         let seconds = moments.len() as f64 / ROWS_HZ;
-        return Err(MountingError::TooSlow { seconds, needed: FEWEST as f64 * BLOCK_S });
+        return Err(MountingError::TooSlow {
+            seconds,
+            needed: FEWEST as f64 * BLOCK_S,
+        });
     }
     // Three parts: what scatters over the drive, what the filter itself is wrong by all along, and what no
     // drive shows.
@@ -92,7 +119,11 @@ pub(super) fn through(
     let sigma_b = (scatter.powf(2.0) + of_filter(&moments).powf(2.0) + UNSEEN.powf(2.0)).powf(0.5);
     agreeing(mean, rough.yaw_sigma.hypot(sigma_b.z))?;
     let way_m = moments.iter().map(|m| m.way_m).sum();
-    Ok(Refined { q_s_b: (mean * rough.q_s_b).normalize(), sigma_b, way_m })
+    Ok(Refined {
+        q_s_b: (mean * rough.q_s_b).normalize(),
+        sigma_b,
+        way_m,
+    })
 }
 
 /// The vehicle beside its track at a row that moves fast enough for a course.
@@ -108,20 +139,29 @@ fn moment([before, row, after]: [&Row; 3], pace: Pace) -> Option<Moment> {
     let rate = turned.to_scaled_axis().length() / seconds;
     let lean = LEAN * acceleration.length();
     // ω · lever/speed is the angle between the course at the IMU and the axis of the body in a turn.
-    let slip = (rate * AXLE_M / speed).hypot(of_velocity / speed).hypot(pace.slip(speed));
+    let slip = (rate * AXLE_M / speed)
+        .hypot(of_velocity / speed)
+        .hypot(pace.slip(speed));
     let of_filter = DVec3::new(row.sigma[6], row.sigma[7], row.sigma[8]) * DEG;
     // About the front axis lean in turns; about the right axis nod, and the error of the slope by that of the
     // vertical velocity; about down slip.
     let others = DVec3::new(lean, lean.hypot(row.sigma[5] / speed), slip);
     let q = track_attitude(v_n, row.sigma[5]).inverse() * row.state.q_b_n;
     let sigma = (of_filter.powf(2.0) + AT_A_TIME.powf(2.0) + others.powf(2.0)).powf(0.5);
-    Some(Moment { t_s: row.t_s, q, sigma, of_filter, way_m: speed / ROWS_HZ })
+    Some(Moment {
+        t_s: row.t_s,
+        q,
+        sigma,
+        of_filter,
+        way_m: speed / ROWS_HZ,
+    })
 }
 
 /// Where the vehicle goes backwards its front is behind the track's. More of the way is forwards.
 fn turn_to_front(moments: &mut [Moment]) -> Result<(), MountingError> {
     let is_against = |m: &Moment| (m.q * DVec3::X).x < 0.0;
-    let way = |of: &dyn Fn(&&Moment) -> bool| moments.iter().filter(of).map(|m| m.way_m).sum::<f64>();
+    let way =
+        |of: &dyn Fn(&&Moment) -> bool| moments.iter().filter(of).map(|m| m.way_m).sum::<f64>();
     let (against, all) = (way(&|m| is_against(m)), way(&|_| true));
     let share = against.min(all - against) / all;
     if share > UNDECIDED {
@@ -149,10 +189,19 @@ fn mean(moments: &[Moment]) -> DQuat {
 
 /// What banks into its turns is an aircraft, whose way says little of its attitude.
 fn upright(moments: &[Moment], mean: DQuat) -> Result<(), MountingError> {
-    let square =
-        moments.iter().map(|m| deviation(m, mean).x.powi(2)).sum::<f64>() / moments.len().max(1) as f64;
+    let square = moments
+        .iter()
+        .map(|m| deviation(m, mean).x.powi(2))
+        .sum::<f64>()
+        / moments.len().max(1) as f64;
     let bank = square.sqrt();
-    if bank > BANKED { Err(MountingError::Banks { bank_deg: bank / DEG }) } else { Ok(()) }
+    if bank > BANKED {
+        Err(MountingError::Banks {
+            bank_deg: bank / DEG,
+        })
+    } else {
+        Ok(())
+    }
 }
 
 /// The deviation of a moment from a rotation, about the track's axes (rad).
@@ -176,7 +225,10 @@ fn deviations(moments: &[Moment], mean: DQuat) -> [Blocks; 3] {
 /// The filter's own standard deviations on average: its errors last, and are not less for being looked at often.
 fn of_filter(moments: &[Moment]) -> DVec3 {
     let weights: DVec3 = moments.iter().map(|m| m.sigma.powf(-2.0)).sum();
-    let sums: DVec3 = moments.iter().map(|m| m.of_filter.powf(2.0) * m.sigma.powf(-2.0)).sum();
+    let sums: DVec3 = moments
+        .iter()
+        .map(|m| m.of_filter.powf(2.0) * m.sigma.powf(-2.0))
+        .sum();
     // Not divided by the number of moments: an attitude error lasts for minutes, so that averaging does not
     // reduce it.
     (sums / weights).powf(0.5)

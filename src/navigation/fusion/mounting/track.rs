@@ -52,13 +52,19 @@ pub(super) fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<Roug
     stretches.iter().for_each(|s| seen.add(s.t_s, 0.0, 1.0));
     if seen.count() < FEWEST {
         // the sum of nothing is -0
-        let seconds =
-            stretches.windows(2).map(|w| (w[1].t_s - w[0].t_s).min(APART_S.1)).fold(0.0, |a, b| a + b);
-        return Err(MountingError::TooSlow { seconds, needed: FEWEST as f64 * BLOCK_S });
+        let seconds = stretches
+            .windows(2)
+            .map(|w| (w[1].t_s - w[0].t_s).min(APART_S.1))
+            .fold(0.0, |a, b| a + b);
+        return Err(MountingError::TooSlow {
+            seconds,
+            needed: FEWEST as f64 * BLOCK_S,
+        });
     }
     let weights: f64 = stretches.iter().map(|s| s.weight).sum();
-    let mean =
-        |of: fn(&Stretch) -> DVec3| stretches.iter().map(|s| of(s) * s.weight).sum::<DVec3>() / weights;
+    let mean = |of: fn(&Stretch) -> DVec3| {
+        stretches.iter().map(|s| of(s) * s.weight).sum::<DVec3>() / weights
+    };
     let (mean_s, mean_track) = (mean(|s| s.f_s), mean(|s| s.f_track));
     // level first: then what is left is a turn about the mean of the specific force
     let level = DQuat::from_rotation_arc(mean_s.normalize(), mean_track.normalize());
@@ -82,9 +88,18 @@ pub(super) fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<Roug
         up,
     );
     if yaw_sigma <= ROUGH {
-        Ok(Rough { q_s_b: (turn * level).normalize(), yaw_sigma })
+        Ok(Rough {
+            q_s_b: (turn * level).normalize(),
+            yaw_sigma,
+        })
     } else {
-        let degrees = |angle: f64| if angle.is_finite() { (angle / DEG).min(180.0) } else { 180.0 };
+        let degrees = |angle: f64| {
+            if angle.is_finite() {
+                (angle / DEG).min(180.0)
+            } else {
+                180.0
+            }
+        };
         Err(MountingError::NotDetermined {
             axis: "yaw",
             sigma_deg: degrees(yaw_sigma),
@@ -95,7 +110,11 @@ pub(super) fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<Roug
 
 /// Standard deviation of the turn about `up` (rad): of the sum of the torques of what it leaves, over that of the
 /// products that hold it.
-fn turn_sigma(stretches: &[Stretch], turned: impl Fn(&Stretch) -> (DVec3, DVec3), up: DVec3) -> f64 {
+fn turn_sigma(
+    stretches: &[Stretch],
+    turned: impl Fn(&Stretch) -> (DVec3, DVec3),
+    up: DVec3,
+) -> f64 {
     let mut torques = Blocks::default();
     let mut stiffness = 0.0;
     for s in stretches {
@@ -112,10 +131,15 @@ fn turn_sigma(stretches: &[Stretch], turned: impl Fn(&Stretch) -> (DVec3, DVec3)
 
 /// The stretches between fixes that have a course.
 fn stretches(recorded: &Recorded<'_>, settings: &Settings) -> Vec<Stretch> {
-    let courses: Vec<Moving> =
-        courses(recorded.gnss, recorded.imu).into_iter().filter(|m| m.speed() >= m.needed()).collect();
+    let courses: Vec<Moving> = courses(recorded.gnss, recorded.imu)
+        .into_iter()
+        .filter(|m| m.speed() >= m.needed())
+        .collect();
     let steps = steps(&courses, APART_S.0);
-    steps.into_iter().filter_map(|[from, to]| stretch(recorded, settings, from, to)).collect()
+    steps
+        .into_iter()
+        .filter_map(|[from, to]| stretch(recorded, settings, from, to))
+        .collect()
 }
 
 fn stretch(

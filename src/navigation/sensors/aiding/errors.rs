@@ -24,7 +24,11 @@ impl AidingSettings {
         let slips = |slip: f64, sigma: f64| slip * BRISK > 0.5 * sigma;
         let all = [
             (
-                nhc.is_some_and(|s| s.truth.noise_sigma_m_s.is_some_and(|noise| noise > s.sigma_m_s)),
+                nhc.is_some_and(|s| {
+                    s.truth
+                        .noise_sigma_m_s
+                        .is_some_and(|noise| noise > s.sigma_m_s)
+                }),
                 ("aiding.nhc", "aiding.nhc.sigma_m_s"),
             ),
             (
@@ -32,7 +36,11 @@ impl AidingSettings {
                 ("aiding.nhc.slip", "aiding.nhc.sigma_m_s"),
             ),
             (
-                odometer.is_some_and(|s| s.truth.noise_sigma_m_s.is_some_and(|noise| noise > s.sigma_m_s)),
+                odometer.is_some_and(|s| {
+                    s.truth
+                        .noise_sigma_m_s
+                        .is_some_and(|noise| noise > s.sigma_m_s)
+                }),
                 ("aiding.odometer", "aiding.odometer.sigma_m_s"),
             ),
             (
@@ -45,7 +53,12 @@ impl AidingSettings {
             ),
             (
                 nhc.is_some_and(|s| {
-                    felt(s.truth.walk_sigma_m_s, s.truth.correlation_time_s, s.rate_hz, s.sigma_m_s)
+                    felt(
+                        s.truth.walk_sigma_m_s,
+                        s.truth.correlation_time_s,
+                        s.rate_hz,
+                        s.sigma_m_s,
+                    )
                 }),
                 ("aiding.nhc.suspension", "aiding.nhc.sigma_m_s"),
             ),
@@ -55,50 +68,84 @@ impl AidingSettings {
             ),
             (
                 zupt.is_some_and(|s| {
-                    felt(s.truth.walk_sigma_m_s, s.truth.correlation_time_s, s.rate_hz, s.sigma_m_s)
+                    felt(
+                        s.truth.walk_sigma_m_s,
+                        s.truth.correlation_time_s,
+                        s.rate_hz,
+                        s.sigma_m_s,
+                    )
                 }),
                 ("aiding.zupt.creep", "aiding.zupt.sigma_m_s"),
             ),
             (
-                heading.is_some_and(|s| s.truth.offset_sigma_deg > 0.5 * s.sigma_deg / LASTING_FIXES),
+                heading
+                    .is_some_and(|s| s.truth.offset_sigma_deg > 0.5 * s.sigma_deg / LASTING_FIXES),
                 ("aiding.heading.offset", "aiding.heading.sigma_deg"),
             ),
             (
                 heading.is_some_and(|s| {
-                    felt(s.truth.walk_sigma_deg, s.truth.correlation_time_s, s.rate_hz, s.sigma_deg)
+                    felt(
+                        s.truth.walk_sigma_deg,
+                        s.truth.correlation_time_s,
+                        s.rate_hz,
+                        s.sigma_deg,
+                    )
                 }),
                 ("aiding.heading.correlated", "aiding.heading.sigma_deg"),
             ),
         ];
-        all.into_iter().filter_map(|(is_there, found)| is_there.then_some(found))
+        all.into_iter()
+            .filter_map(|(is_there, found)| is_there.then_some(found))
     }
 
     /// What is truly wrong with them beside white noise (m/s, rad, 1).
     pub(crate) fn errors(&self) -> Vec<AidError> {
         let mut all = Vec::new();
-        let mut push =
-            |aid, part, law: Law| all.extend((law.size() > 0.0).then_some(AidError { aid, part, law }));
+        let mut push = |aid, part, law: Law| {
+            all.extend((law.size() > 0.0).then_some(AidError { aid, part, law }))
+        };
         if let Some(NhcSettings { truth, .. }) = &self.nhc {
             let mounting = Law::Constant(truth.mounting_sigma_deg * DEG);
             push(Aid::Nhc, AidPart::MountingPitch, mounting);
             push(Aid::Nhc, AidPart::MountingYaw, mounting);
             push(Aid::Nhc, AidPart::Slip, Law::Known(truth.sideslip_s2_m));
-            let moving = Law::GaussMarkov { sigma: truth.walk_sigma_m_s, time_s: truth.correlation_time_s };
+            let moving = Law::GaussMarkov {
+                sigma: truth.walk_sigma_m_s,
+                time_s: truth.correlation_time_s,
+            };
             push(Aid::Nhc, AidPart::SuspensionLateral, moving);
             push(Aid::Nhc, AidPart::SuspensionVertical, moving);
         }
         if let Some(OdometerSettings { truth, .. }) = &self.odometer {
-            push(Aid::Odometer, AidPart::WheelScale, Law::Constant(truth.scale_sigma));
-            push(Aid::Odometer, AidPart::WheelSlip, Law::Known(truth.slip_s2_m));
+            push(
+                Aid::Odometer,
+                AidPart::WheelScale,
+                Law::Constant(truth.scale_sigma),
+            );
+            push(
+                Aid::Odometer,
+                AidPart::WheelSlip,
+                Law::Known(truth.slip_s2_m),
+            );
         }
         if let Some(ZuptSettings { truth, .. }) = &self.zupt {
-            let creeping = Law::GaussMarkov { sigma: truth.walk_sigma_m_s, time_s: truth.correlation_time_s };
+            let creeping = Law::GaussMarkov {
+                sigma: truth.walk_sigma_m_s,
+                time_s: truth.correlation_time_s,
+            };
             push(Aid::Zupt, AidPart::Creep, creeping);
         }
         if let Some(HeadingSettings { truth, .. }) = &self.heading {
-            push(Aid::Heading, AidPart::HeadingOffset, Law::Constant(truth.offset_sigma_deg * DEG));
+            push(
+                Aid::Heading,
+                AidPart::HeadingOffset,
+                Law::Constant(truth.offset_sigma_deg * DEG),
+            );
             let sigma = truth.walk_sigma_deg * DEG;
-            let lasting = Law::GaussMarkov { sigma, time_s: truth.correlation_time_s };
+            let lasting = Law::GaussMarkov {
+                sigma,
+                time_s: truth.correlation_time_s,
+            };
             push(Aid::Heading, AidPart::HeadingCorrelated, lasting);
         }
         all
@@ -200,7 +247,9 @@ pub(crate) enum Law {
 impl Law {
     pub(crate) const fn size(self) -> f64 {
         match self {
-            Self::Known(size) | Self::Constant(size) | Self::GaussMarkov { sigma: size, .. } => size,
+            Self::Known(size) | Self::Constant(size) | Self::GaussMarkov { sigma: size, .. } => {
+                size
+            }
         }
     }
 }
@@ -227,26 +276,64 @@ impl AidNoise {
     pub(crate) fn new(settings: &AidingSettings, key: StreamKey<'_>) -> Self {
         let walk = |error: AidError| {
             let process = error.part.stream();
-            let mut stream = StreamKey { source: error.aid.name(), process, ..key }.generator();
+            let mut stream = StreamKey {
+                source: error.aid.name(),
+                process,
+                ..key
+            }
+            .generator();
             let value = match error.law {
                 Law::Known(value) => value,
                 // a Gauss-Markov process is stationary from the start
-                Law::Constant(sigma) | Law::GaussMarkov { sigma, .. } => sigma * normal(&mut stream),
+                Law::Constant(sigma) | Law::GaussMarkov { sigma, .. } => {
+                    sigma * normal(&mut stream)
+                }
             };
-            (error, Walk { stream, value, at_s: 0.0 })
+            (
+                error,
+                Walk {
+                    stream,
+                    value,
+                    at_s: 0.0,
+                },
+            )
         };
         let white = Aid::ALL.map(|aid| {
-            let stream = |process| StreamKey { source: aid.name(), process, ..key }.generator();
-            (settings.sigmas(aid)[1], ["white_x", "white_y", "white_z"].map(stream))
+            let stream = |process| {
+                StreamKey {
+                    source: aid.name(),
+                    process,
+                    ..key
+                }
+                .generator()
+            };
+            (
+                settings.sigmas(aid)[1],
+                ["white_x", "white_y", "white_z"].map(stream),
+            )
         });
-        Self { lasting: settings.errors().into_iter().map(walk).collect(), white }
+        Self {
+            lasting: settings.errors().into_iter().map(walk).collect(),
+            white,
+        }
     }
 
     /// The error of a measurement along an axis, `after_s` seconds from the start, where the vehicle moves so.
-    pub(crate) fn draw(&mut self, aid: Aid, axis: usize, after_s: f64, v_b: DVec3, a_b: DVec3) -> f64 {
+    pub(crate) fn draw(
+        &mut self,
+        aid: Aid,
+        axis: usize,
+        after_s: f64,
+        v_b: DVec3,
+        a_b: DVec3,
+    ) -> f64 {
         let (sigma, streams) = &mut self.white[aid as usize];
         let mut sum = *sigma * normal(&mut streams[axis]);
-        for (error, walk) in self.lasting.iter_mut().filter(|(error, _)| error.aid == aid) {
+        for (error, walk) in self
+            .lasting
+            .iter_mut()
+            .filter(|(error, _)| error.aid == aid)
+        {
             let coefficient = error.part.coefficient(axis, v_b, a_b);
             if coefficient != 0.0 {
                 sum += coefficient * walk.at(error.law, after_s);

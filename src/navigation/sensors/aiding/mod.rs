@@ -11,8 +11,8 @@ mod settings;
 
 pub(crate) use errors::{AidError, AidNoise, AidPart, Law};
 pub use settings::{
-    HeadingErrors, HeadingSettings, HeadingSource, NhcErrors, NhcSettings, OdometerErrors, OdometerSettings,
-    ZuptErrors, ZuptSettings,
+    HeadingErrors, HeadingSettings, HeadingSource, NhcErrors, NhcSettings, OdometerErrors,
+    OdometerSettings, ZuptErrors, ZuptSettings,
 };
 
 use crate::units::{DEG, SettingError};
@@ -70,7 +70,10 @@ impl AidingSettings {
             self.zupt.as_ref().map(|s| s.rate_hz),
             self.heading.as_ref().map(|s| s.rate_hz),
         ];
-        Aid::ALL.into_iter().zip(rates).filter_map(|(aid, rate)| rate.map(|rate| (aid, rate)))
+        Aid::ALL
+            .into_iter()
+            .zip(rates)
+            .filter_map(|(aid, rate)| rate.map(|rate| (aid, rate)))
     }
 
     /// Whether an aid is part of the receiver: it measures nothing in outages.
@@ -93,12 +96,22 @@ impl AidingSettings {
     #[must_use]
     pub fn sigmas(&self, aid: Aid) -> [f64; 2] {
         let (sigma, noise) = match aid {
-            Aid::Nhc => self.nhc.as_ref().map(|s| (s.sigma_m_s, s.truth.noise_sigma_m_s)),
-            Aid::Odometer => self.odometer.as_ref().map(|s| (s.sigma_m_s, s.truth.noise_sigma_m_s)),
-            Aid::Zupt => self.zupt.as_ref().map(|s| (s.sigma_m_s, s.truth.noise_sigma_m_s)),
+            Aid::Nhc => self
+                .nhc
+                .as_ref()
+                .map(|s| (s.sigma_m_s, s.truth.noise_sigma_m_s)),
+            Aid::Odometer => self
+                .odometer
+                .as_ref()
+                .map(|s| (s.sigma_m_s, s.truth.noise_sigma_m_s)),
+            Aid::Zupt => self
+                .zupt
+                .as_ref()
+                .map(|s| (s.sigma_m_s, s.truth.noise_sigma_m_s)),
             Aid::Heading => {
-                let radians =
-                    |s: &HeadingSettings| (s.sigma_deg * DEG, s.truth.noise_sigma_deg.map(|n| n * DEG));
+                let radians = |s: &HeadingSettings| {
+                    (s.sigma_deg * DEG, s.truth.noise_sigma_deg.map(|n| n * DEG))
+                };
                 self.heading.as_ref().map(radians)
             }
         }
@@ -111,7 +124,10 @@ impl AidingSettings {
     #[must_use]
     pub fn state_sigmas(&self) -> DVec3 {
         let scale = self.odometer.as_ref().map_or(0.0, |s| s.scale_sigma);
-        let mounting = self.nhc.as_ref().map_or(0.0, |s| s.mounting_sigma_deg * DEG);
+        let mounting = self
+            .nhc
+            .as_ref()
+            .map_or(0.0, |s| s.mounting_sigma_deg * DEG);
         DVec3::new(scale, mounting, mounting)
     }
 
@@ -126,17 +142,35 @@ impl AidingSettings {
             walk_sigma_m_s: 0.05,
             correlation_time_s: 1.0,
         };
-        let nhc = NhcSettings { mounting_sigma_deg: 0.5, truth, ..NhcSettings::default() };
-        Self { nhc: Some(nhc), ..Self::default() }
+        let nhc = NhcSettings {
+            mounting_sigma_deg: 0.5,
+            truth,
+            ..NhcSettings::default()
+        };
+        Self {
+            nhc: Some(nhc),
+            ..Self::default()
+        }
     }
 
     /// The same with a wheel whose scale is off by one per cent, of which the filter has a state.
     #[must_use]
     pub fn car_with_odometer() -> Self {
-        let truth = OdometerErrors { scale_sigma: 0.01, noise_sigma_m_s: None, slip_s2_m: 0.002 };
-        let odometer =
-            OdometerSettings { sigma_m_s: 0.1, scale_sigma: 0.01, truth, ..OdometerSettings::default() };
-        Self { odometer: Some(odometer), ..Self::car() }
+        let truth = OdometerErrors {
+            scale_sigma: 0.01,
+            noise_sigma_m_s: None,
+            slip_s2_m: 0.002,
+        };
+        let odometer = OdometerSettings {
+            sigma_m_s: 0.1,
+            scale_sigma: 0.01,
+            truth,
+            ..OdometerSettings::default()
+        };
+        Self {
+            odometer: Some(odometer),
+            ..Self::car()
+        }
     }
 }
 

@@ -202,13 +202,21 @@ impl Default for OdometerSettings {
 
 impl Default for ZuptSettings {
     fn default() -> Self {
-        Self { rate_hz: 1.0, sigma_m_s: 0.02, truth: ZuptErrors::default() }
+        Self {
+            rate_hz: 1.0,
+            sigma_m_s: 0.02,
+            truth: ZuptErrors::default(),
+        }
     }
 }
 
 impl Default for ZuptErrors {
     fn default() -> Self {
-        Self { noise_sigma_m_s: None, walk_sigma_m_s: 0.0, correlation_time_s: 10.0 }
+        Self {
+            noise_sigma_m_s: None,
+            walk_sigma_m_s: 0.0,
+            correlation_time_s: 10.0,
+        }
     }
 }
 
@@ -225,13 +233,19 @@ impl Default for HeadingSettings {
 
 impl Default for HeadingErrors {
     fn default() -> Self {
-        Self { noise_sigma_deg: None, offset_sigma_deg: 0.0, walk_sigma_deg: 0.0, correlation_time_s: 60.0 }
+        Self {
+            noise_sigma_deg: None,
+            offset_sigma_deg: 0.0,
+            walk_sigma_deg: 0.0,
+            correlation_time_s: 60.0,
+        }
     }
 }
 
 /// Standard deviations that are 0 or more, by their keys.
 fn deviations(all: &[(&str, f64)]) -> Result<(), SettingError> {
-    all.iter().try_for_each(|(key, sigma)| require_non_negative(key, &[*sigma]))
+    all.iter()
+        .try_for_each(|(key, sigma)| require_non_negative(key, &[*sigma]))
 }
 
 impl NhcSettings {
@@ -265,7 +279,11 @@ impl OdometerSettings {
         require_positive("sigma_m_s", &[self.sigma_m_s])?;
         require_lever_arm(&self.lever_arm_m)?;
         deviations(&[("scale_sigma", self.scale_sigma)])?;
-        let OdometerErrors { noise_sigma_m_s, scale_sigma, slip_s2_m } = self.truth;
+        let OdometerErrors {
+            noise_sigma_m_s,
+            scale_sigma,
+            slip_s2_m,
+        } = self.truth;
         let all = [
             ("noise_sigma_m_s", noise_sigma_m_s.unwrap_or(0.0)),
             ("scale_sigma", scale_sigma),
@@ -279,10 +297,17 @@ impl ZuptSettings {
     pub(super) fn validate(&self) -> Result<(), SettingError> {
         require_positive("rate_hz", &[self.rate_hz])?;
         require_positive("sigma_m_s", &[self.sigma_m_s])?;
-        let ZuptErrors { noise_sigma_m_s, walk_sigma_m_s, correlation_time_s } = self.truth;
-        deviations(&[("noise_sigma_m_s", noise_sigma_m_s.unwrap_or(0.0)), ("walk_sigma_m_s", walk_sigma_m_s)])
-            .and_then(|()| require_positive("correlation_time_s", &[correlation_time_s]))
-            .map_err(|e| e.in_section("truth"))
+        let ZuptErrors {
+            noise_sigma_m_s,
+            walk_sigma_m_s,
+            correlation_time_s,
+        } = self.truth;
+        deviations(&[
+            ("noise_sigma_m_s", noise_sigma_m_s.unwrap_or(0.0)),
+            ("walk_sigma_m_s", walk_sigma_m_s),
+        ])
+        .and_then(|()| require_positive("correlation_time_s", &[correlation_time_s]))
+        .map_err(|e| e.in_section("truth"))
     }
 }
 
@@ -290,8 +315,12 @@ impl HeadingSettings {
     pub(super) fn validate(&self) -> Result<(), SettingError> {
         require_positive("rate_hz", &[self.rate_hz])?;
         require_positive("sigma_deg", &[self.sigma_deg])?;
-        let HeadingErrors { noise_sigma_deg, offset_sigma_deg, walk_sigma_deg, correlation_time_s } =
-            self.truth;
+        let HeadingErrors {
+            noise_sigma_deg,
+            offset_sigma_deg,
+            walk_sigma_deg,
+            correlation_time_s,
+        } = self.truth;
         let noise = noise_sigma_deg.unwrap_or(0.0);
         deviations(&[
             ("noise_sigma_deg", noise),

@@ -27,8 +27,15 @@ impl Defects {
         // A stream for each defect, drawn whether its deviation is zero or not: one setting changes no other number.
         let normals = |sensor: Sensor, process: &'static str, n: usize| -> Vec<f64> {
             let source = format!("{}.defects", sensor.name());
-            let mut generator = StreamKey { source: &source, process, ..key }.generator();
-            (0..n).map(|_| StandardNormal.sample(&mut generator)).collect()
+            let mut generator = StreamKey {
+                source: &source,
+                process,
+                ..key
+            }
+            .generator();
+            (0..n)
+                .map(|_| StandardNormal.sample(&mut generator))
+                .collect()
         };
         let triad = |sensor: Sensor, process| DVec3::from_slice(&normals(sensor, process, 3));
         let matrix = |sensor: Sensor| {
@@ -43,8 +50,16 @@ impl Defects {
             }
             matrix
         };
-        let rectification = settings.vibration.as_ref().map_or(0.0, |v| v.rectification_s2_m);
-        let per_kelvin = |sensor| settings.temperature.as_ref().map_or(0.0, |t| t.sigma(sensor));
+        let rectification = settings
+            .vibration
+            .as_ref()
+            .map_or(0.0, |v| v.rectification_s2_m);
+        let per_kelvin = |sensor| {
+            settings
+                .temperature
+                .as_ref()
+                .map_or(0.0, |t| t.sigma(sensor))
+        };
         let sensitivity = DMat3::from_cols_slice(&normals(Sensor::Gyro, "g_sensitivity", 9));
         Self {
             bias: Sensor::ALL.map(|s| triad(s, "turn_on_bias") * settings.deviations(s).0),
@@ -71,7 +86,13 @@ mod tests {
     use super::super::{Temperature, Vibration};
     use super::*;
 
-    const KEY: StreamKey<'_> = StreamKey { seed: 9, scenario: "", run: 0, source: "", process: "" };
+    const KEY: StreamKey<'_> = StreamKey {
+        seed: 9,
+        scenario: "",
+        run: 0,
+        source: "",
+        process: "",
+    };
 
     /// Mean and variance of each element over runs: n draws of a normal deviation s have mean 0 ± s/√n and
     /// mean square s² (1 ± √(2/n)); 48 elements, 5 deviations.
@@ -84,7 +105,10 @@ mod tests {
             scale_ppm_gyro: 200.0,
             misalignment_rad: 1e-3,
             g_sensitivity_rad_s_per_m_s2: 2e-4,
-            vibration: Some(Vibration { rms_m_s2: 0.0, rectification_s2_m: 3e-4 }),
+            vibration: Some(Vibration {
+                rms_m_s2: 0.0,
+                rectification_s2_m: 3e-4,
+            }),
             temperature: Some(Temperature {
                 profile_c: vec![[0.0, 20.0]],
                 accel_m_s2_k: 1e-3,
@@ -93,28 +117,49 @@ mod tests {
             ..ImuSettings::default()
         };
         let n = 4000_u32;
-        let runs: Vec<Defects> =
-            (0..n).map(|run| Defects::draw(&settings, StreamKey { run: run.into(), ..KEY })).collect();
+        let runs: Vec<Defects> = (0..n)
+            .map(|run| {
+                Defects::draw(
+                    &settings,
+                    StreamKey {
+                        run: run.into(),
+                        ..KEY
+                    },
+                )
+            })
+            .collect();
         let check = |what: String, deviation: f64, of: &dyn Fn(&Defects) -> f64| {
             let mean = runs.iter().map(of).sum::<f64>() / f64::from(n);
             let square = runs.iter().map(|d| of(d).powi(2)).sum::<f64>() / f64::from(n);
-            assert!(mean.abs() < 5.0 * deviation / f64::from(n).sqrt(), "{what}: mean {mean}");
+            assert!(
+                mean.abs() < 5.0 * deviation / f64::from(n).sqrt(),
+                "{what}: mean {mean}"
+            );
             let relative = square / deviation.powi(2) - 1.0;
-            assert!(relative.abs() < 5.0 * (2.0 / f64::from(n)).sqrt(), "{what}: {relative}");
+            assert!(
+                relative.abs() < 5.0 * (2.0 / f64::from(n)).sqrt(),
+                "{what}: {relative}"
+            );
         };
         for i in 0..3 {
             check(format!("rectification {i}"), 3e-4, &|d| d.rectification[i]);
             for j in 0..3 {
-                check(format!("g-sensitivity {i} {j}"), 2e-4, &|d| d.g_sensitivity.col(j)[i]);
+                check(format!("g-sensitivity {i} {j}"), 2e-4, &|d| {
+                    d.g_sensitivity.col(j)[i]
+                });
             }
         }
         for (s, bias, scale, kelvin) in [(0, 0.1, 500e-6, 1e-3), (1, 0.01, 200e-6, 1e-5)] {
             for i in 0..3 {
-                check(format!("temperature {s} {i}"), kelvin, &|d| d.per_kelvin[s][i]);
+                check(format!("temperature {s} {i}"), kelvin, &|d| {
+                    d.per_kelvin[s][i]
+                });
                 check(format!("bias {s} {i}"), bias, &|d| d.bias[s][i]);
                 for j in 0..3 {
                     let deviation = if i == j { scale } else { 1e-3 };
-                    check(format!("matrix {s} {i} {j}"), deviation, &|d| d.matrix[s].col(j)[i]);
+                    check(format!("matrix {s} {i} {j}"), deviation, &|d| {
+                        d.matrix[s].col(j)[i]
+                    });
                 }
             }
         }

@@ -51,28 +51,58 @@ pub struct Temperature {
 fn pairs<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 2]>, D::Error> {
     #[derive(Deserialize)]
     struct Pair(#[serde(deserialize_with = "exactly")] [f64; 2]);
-    Ok(Vec::<Pair>::deserialize(deserializer)?.into_iter().map(|Pair(pair)| pair).collect())
+    Ok(Vec::<Pair>::deserialize(deserializer)?
+        .into_iter()
+        .map(|Pair(pair)| pair)
+        .collect())
 }
 
 impl Vibration {
     pub(super) fn validate(&self) -> Result<(), SettingError> {
         at_most("rms_m_s2", self.rms_m_s2, MAX_VIBRATION, "mg named m/s²?")?;
-        at_most("rectification_s2_m", self.rectification_s2_m, MAX_RECTIFICATION, "mg per g² named s²/m?")
+        at_most(
+            "rectification_s2_m",
+            self.rectification_s2_m,
+            MAX_RECTIFICATION,
+            "mg per g² named s²/m?",
+        )
     }
 }
 
 impl Temperature {
     pub(super) fn validate(&self) -> Result<(), SettingError> {
-        at_most("accel_m_s2_k", self.accel_m_s2_k, MAX_PER_KELVIN[0], "mg named m/s²?")?;
-        at_most("gyro_rad_s_k", self.gyro_rad_s_k, MAX_PER_KELVIN[1], "degrees named radians?")?;
+        at_most(
+            "accel_m_s2_k",
+            self.accel_m_s2_k,
+            MAX_PER_KELVIN[0],
+            "mg named m/s²?",
+        )?;
+        at_most(
+            "gyro_rad_s_k",
+            self.gyro_rad_s_k,
+            MAX_PER_KELVIN[1],
+            "degrees named radians?",
+        )?;
         let key = "profile_c";
         require_finite(key, self.profile_c.as_flattened())?;
         if self.profile_c.len() < 2 {
             let requirement = "it must be two pairs of time (s) and temperature (°C), or more";
-            return Err(SettingError::new(key, format!("{:?}", self.profile_c), requirement));
+            return Err(SettingError::new(
+                key,
+                format!("{:?}", self.profile_c),
+                requirement,
+            ));
         }
-        match self.profile_c.windows(2).find(|pair| pair[1][0] <= pair[0][0]) {
-            Some(pair) => Err(SettingError::new(key, format!("{pair:?}"), "its times must increase")),
+        match self
+            .profile_c
+            .windows(2)
+            .find(|pair| pair[1][0] <= pair[0][0])
+        {
+            Some(pair) => Err(SettingError::new(
+                key,
+                format!("{pair:?}"),
+                "its times must increase",
+            )),
             None => Ok(()),
         }
     }
@@ -95,7 +125,10 @@ impl Temperature {
     fn warming_k(&self, t_s: f64) -> f64 {
         let profile = &self.profile_c;
         let after = profile.partition_point(|[t, _]| *t <= t_s);
-        let c = match (after.checked_sub(1).map(|before| profile[before]), profile.get(after)) {
+        let c = match (
+            after.checked_sub(1).map(|before| profile[before]),
+            profile.get(after),
+        ) {
             (Some([t0, c0]), Some([t1, c1])) => c0 + (c1 - c0) * (t_s - t0) / (t1 - t0),
             (Some([_, c]), None) => c,
             (None, _) => profile[0][1],
@@ -130,13 +163,21 @@ pub(crate) struct Surroundings {
 
 impl Surroundings {
     /// Of a true sample at a time on the trajectory that begins with the sample `first`.
-    pub(crate) fn at(settings: &ImuSettings, sample: &ImuSample, t_s: f64, first: &ImuSample) -> Self {
+    pub(crate) fn at(
+        settings: &ImuSettings,
+        sample: &ImuSample,
+        t_s: f64,
+        first: &ImuSample,
+    ) -> Self {
         let (f, f_0) = (sample.f_ib_b, first.f_ib_b);
         let vibration = settings.vibration.as_ref().map_or(0.0, |v| v.rms_m_s2);
         Self {
             sample: Sensor::ALL.map(|sensor| sample.of(sensor)),
             square: f * f - f_0 * f_0 + DVec3::splat(vibration * vibration),
-            warming_k: settings.temperature.as_ref().map_or(0.0, |t| t.warming_k(t_s)),
+            warming_k: settings
+                .temperature
+                .as_ref()
+                .map_or(0.0, |t| t.warming_k(t_s)),
         }
     }
 
@@ -159,8 +200,13 @@ mod tests {
     #[test]
     fn a_profile_is_straight_between_its_points_and_constant_outside() {
         let profile_c = vec![[100.0, 20.0], [200.0, 45.0], [300.0, 45.0], [301.0, 10.0]];
-        let temperature = Temperature { profile_c, accel_m_s2_k: 0.0, gyro_rad_s_k: 0.0 };
-        let warming = [0.0, 100.0, 150.0, 200.0, 250.0, 300.5, 1e9].map(|t_s| temperature.warming_k(t_s));
+        let temperature = Temperature {
+            profile_c,
+            accel_m_s2_k: 0.0,
+            gyro_rad_s_k: 0.0,
+        };
+        let warming =
+            [0.0, 100.0, 150.0, 200.0, 250.0, 300.5, 1e9].map(|t_s| temperature.warming_k(t_s));
         assert_eq!(warming, [0.0, 0.0, 12.5, 25.0, 25.0, 7.5, -10.0]);
     }
 }

@@ -87,7 +87,11 @@ fn at_most(key: &str, value: f64, most: f64, mistake: &str) -> Result<(), Settin
     if value <= most {
         return Ok(());
     }
-    Err(SettingError::new(key, value, format!("at most {most} ({mistake})")))
+    Err(SettingError::new(
+        key,
+        value,
+        format!("at most {most} ({mistake})"),
+    ))
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
@@ -125,20 +129,51 @@ impl ImuSettings {
         }
         let [(accel, _), (gyro, _)] = Sensor::ALL.map(|sensor| self.deviations(sensor));
         let sensitivity = self.g_sensitivity_rad_s_per_m_s2;
-        at_most("turn_on_bias_accel_m_s2", accel, MAX_BIAS_M_S2, "mg named m/s²?")?;
-        at_most("turn_on_bias_gyro_rad_s", gyro, MAX_BIAS_RAD_S, "degrees an hour named rad/s?")?;
-        at_most("scale_ppm_accel", self.scale_ppm_accel, MAX_SCALE_PPM, "a tenth")?;
-        at_most("scale_ppm_gyro", self.scale_ppm_gyro, MAX_SCALE_PPM, "a tenth")?;
-        at_most("misalignment_rad", self.misalignment_rad, MAX_ANGLE_RAD, "degrees named radians?")?;
+        at_most(
+            "turn_on_bias_accel_m_s2",
+            accel,
+            MAX_BIAS_M_S2,
+            "mg named m/s²?",
+        )?;
+        at_most(
+            "turn_on_bias_gyro_rad_s",
+            gyro,
+            MAX_BIAS_RAD_S,
+            "degrees an hour named rad/s?",
+        )?;
+        at_most(
+            "scale_ppm_accel",
+            self.scale_ppm_accel,
+            MAX_SCALE_PPM,
+            "a tenth",
+        )?;
+        at_most(
+            "scale_ppm_gyro",
+            self.scale_ppm_gyro,
+            MAX_SCALE_PPM,
+            "a tenth",
+        )?;
+        at_most(
+            "misalignment_rad",
+            self.misalignment_rad,
+            MAX_ANGLE_RAD,
+            "degrees named radians?",
+        )?;
         at_most(
             "g_sensitivity_rad_s_per_m_s2",
             sensitivity,
             MAX_G_SENSITIVITY,
             "°/s per g named rad/s per m/s²?",
         )?;
-        self.vibration.iter().try_for_each(|v| v.validate().map_err(|e| e.in_section("vibration")))?;
-        self.temperature.iter().try_for_each(|t| t.validate().map_err(|e| e.in_section("temperature")))?;
-        self.output.iter().try_for_each(|o| o.validate().map_err(|e| e.in_section("output")))
+        self.vibration
+            .iter()
+            .try_for_each(|v| v.validate().map_err(|e| e.in_section("vibration")))?;
+        self.temperature
+            .iter()
+            .try_for_each(|t| t.validate().map_err(|e| e.in_section("temperature")))?;
+        self.output
+            .iter()
+            .try_for_each(|o| o.validate().map_err(|e| e.in_section("output")))
     }
 
     /// Standard deviations of turn-on bias (m/s² or rad/s) and scale factor (parts per million) of a sensor.
@@ -162,31 +197,73 @@ impl ImuSettings {
 
     /// Its errors of which no filter has states.
     pub fn without_states(&self) -> impl Iterator<Item = Defect> + use<> {
-        let rectification = self.vibration.as_ref().map_or(0.0, |v| v.rectification_s2_m);
-        let [accel_k, gyro_k] = Sensor::ALL.map(|s| self.temperature.as_ref().map_or(0.0, |t| t.sigma(s)));
-        let defect = |source, sensors, key, sigma, unit| Defect { source, sensors, key, sigma, unit };
+        let rectification = self
+            .vibration
+            .as_ref()
+            .map_or(0.0, |v| v.rectification_s2_m);
+        let [accel_k, gyro_k] =
+            Sensor::ALL.map(|s| self.temperature.as_ref().map_or(0.0, |t| t.sigma(s)));
+        let defect = |source, sensors, key, sigma, unit| Defect {
+            source,
+            sensors,
+            key,
+            sigma,
+            unit,
+        };
         let (both, accel, gyro): (&[Sensor], &[Sensor], &[Sensor]) =
             (&Sensor::ALL, &[Sensor::Accel], &[Sensor::Gyro]);
         let sensitivity = self.g_sensitivity_rad_s_per_m_s2;
         let all = [
-            defect("misalignment", both, "imu.misalignment_rad", self.misalignment_rad, "rad"),
-            defect("g_sensitivity", gyro, "imu.g_sensitivity_rad_s_per_m_s2", sensitivity, "rad/s per m/s²"),
-            defect("rectification", accel, "imu.vibration.rectification_s2_m", rectification, "s²/m"),
-            defect("temperature", accel, "imu.temperature.accel_m_s2_k", accel_k, "m/s² per K"),
-            defect("temperature", gyro, "imu.temperature.gyro_rad_s_k", gyro_k, "rad/s per K"),
+            defect(
+                "misalignment",
+                both,
+                "imu.misalignment_rad",
+                self.misalignment_rad,
+                "rad",
+            ),
+            defect(
+                "g_sensitivity",
+                gyro,
+                "imu.g_sensitivity_rad_s_per_m_s2",
+                sensitivity,
+                "rad/s per m/s²",
+            ),
+            defect(
+                "rectification",
+                accel,
+                "imu.vibration.rectification_s2_m",
+                rectification,
+                "s²/m",
+            ),
+            defect(
+                "temperature",
+                accel,
+                "imu.temperature.accel_m_s2_k",
+                accel_k,
+                "m/s² per K",
+            ),
+            defect(
+                "temperature",
+                gyro,
+                "imu.temperature.gyro_rad_s_k",
+                gyro_k,
+                "rad/s per K",
+            ),
         ];
         all.into_iter().filter(|defect| defect.sigma > 0.0)
     }
 
     /// Whether the true IMU has no error beside its noise, before its samples are put out.
     pub(crate) fn is_ideal(&self) -> bool {
-        Self { rate_hz: self.rate_hz, ..Self::default() }
-            == Self {
-                turn_on_bias_accel_m_s2: self.turn_on_bias_accel_m_s2.filter(|sigma| *sigma > 0.0),
-                turn_on_bias_gyro_rad_s: self.turn_on_bias_gyro_rad_s.filter(|sigma| *sigma > 0.0),
-                output: None,
-                ..self.clone()
-            }
+        Self {
+            rate_hz: self.rate_hz,
+            ..Self::default()
+        } == Self {
+            turn_on_bias_accel_m_s2: self.turn_on_bias_accel_m_s2.filter(|sigma| *sigma > 0.0),
+            turn_on_bias_gyro_rad_s: self.turn_on_bias_gyro_rad_s.filter(|sigma| *sigma > 0.0),
+            output: None,
+            ..self.clone()
+        }
     }
 }
 
@@ -198,32 +275,84 @@ mod tests {
     fn values_that_are_no_small_errors_are_refused_by_key() {
         let d = ImuSettings::default();
         assert_eq!((d.validate(), d.is_ideal()), (Ok(()), true));
-        let of_bias = ImuSettings { turn_on_bias_accel_m_s2: Some(0.0), ..d.clone() };
+        let of_bias = ImuSettings {
+            turn_on_bias_accel_m_s2: Some(0.0),
+            ..d.clone()
+        };
         assert!(of_bias.is_ideal());
         let temperature = |profile_c: &[[f64; 2]]| {
-            Some(Temperature { profile_c: profile_c.into(), accel_m_s2_k: 1e-3, gyro_rad_s_k: 0.0 })
+            Some(Temperature {
+                profile_c: profile_c.into(),
+                accel_m_s2_k: 1e-3,
+                gyro_rad_s_k: 0.0,
+            })
         };
         let refused = [
-            (ImuSettings { scale_ppm_gyro: -1.0, ..d.clone() }, "scale_ppm_gyro"),
-            (ImuSettings { scale_ppm_accel: 2e5, ..d.clone() }, "scale_ppm_accel"),
-            (ImuSettings { misalignment_rad: 1.0, ..d.clone() }, "misalignment_rad"),
-            (ImuSettings { turn_on_bias_gyro_rad_s: Some(f64::NAN), ..d.clone() }, "turn_on_bias_gyro_rad_s"),
-            (ImuSettings { g_sensitivity_rad_s_per_m_s2: 2.0, ..d.clone() }, "g_sensitivity_rad_s_per_m_s2"),
             (
                 ImuSettings {
-                    vibration: Some(Vibration { rms_m_s2: -1.0, rectification_s2_m: 1e-4 }),
+                    scale_ppm_gyro: -1.0,
+                    ..d.clone()
+                },
+                "scale_ppm_gyro",
+            ),
+            (
+                ImuSettings {
+                    scale_ppm_accel: 2e5,
+                    ..d.clone()
+                },
+                "scale_ppm_accel",
+            ),
+            (
+                ImuSettings {
+                    misalignment_rad: 1.0,
+                    ..d.clone()
+                },
+                "misalignment_rad",
+            ),
+            (
+                ImuSettings {
+                    turn_on_bias_gyro_rad_s: Some(f64::NAN),
+                    ..d.clone()
+                },
+                "turn_on_bias_gyro_rad_s",
+            ),
+            (
+                ImuSettings {
+                    g_sensitivity_rad_s_per_m_s2: 2.0,
+                    ..d.clone()
+                },
+                "g_sensitivity_rad_s_per_m_s2",
+            ),
+            (
+                ImuSettings {
+                    vibration: Some(Vibration {
+                        rms_m_s2: -1.0,
+                        rectification_s2_m: 1e-4,
+                    }),
                     ..d.clone()
                 },
                 "vibration.rms_m_s2",
             ),
-            (ImuSettings { temperature: temperature(&[]), ..d.clone() }, "temperature.profile_c"),
             (
-                ImuSettings { temperature: temperature(&[[5.0, 20.0], [5.0, 30.0]]), ..d.clone() },
+                ImuSettings {
+                    temperature: temperature(&[]),
+                    ..d.clone()
+                },
                 "temperature.profile_c",
             ),
             (
                 ImuSettings {
-                    output: Some(Output { range_accel_m_s2: Some(8.0), ..Output::default() }),
+                    temperature: temperature(&[[5.0, 20.0], [5.0, 30.0]]),
+                    ..d.clone()
+                },
+                "temperature.profile_c",
+            ),
+            (
+                ImuSettings {
+                    output: Some(Output {
+                        range_accel_m_s2: Some(8.0),
+                        ..Output::default()
+                    }),
                     ..d.clone()
                 },
                 "output.range_accel_m_s2",

@@ -34,16 +34,34 @@ pub struct Output {
 
 impl Output {
     pub(super) fn validate(&self) -> Result<(), SettingError> {
-        let ranges =
-            [("range_accel_m_s2", self.range_accel_m_s2), ("range_gyro_rad_s", self.range_gyro_rad_s)];
-        ranges.iter().try_for_each(|(key, range)| require_positive(key, range.as_slice()))?;
-        if let Some(range) = self.range_accel_m_s2.filter(|range| *range < LEAST_RANGE_M_S2) {
-            let requirement =
-                format!("at least {LEAST_RANGE_M_S2} m/s²: gravity is in every sample (g named m/s²?)");
+        let ranges = [
+            ("range_accel_m_s2", self.range_accel_m_s2),
+            ("range_gyro_rad_s", self.range_gyro_rad_s),
+        ];
+        ranges
+            .iter()
+            .try_for_each(|(key, range)| require_positive(key, range.as_slice()))?;
+        if let Some(range) = self
+            .range_accel_m_s2
+            .filter(|range| *range < LEAST_RANGE_M_S2)
+        {
+            let requirement = format!(
+                "at least {LEAST_RANGE_M_S2} m/s²: gravity is in every sample (g named m/s²?)"
+            );
             return Err(SettingError::new("range_accel_m_s2", range, requirement));
         }
-        at_most("resolution_accel_m_s2", self.resolution_accel_m_s2, MAX_STEPS[0], "mg named m/s²?")?;
-        at_most("resolution_gyro_rad_s", self.resolution_gyro_rad_s, MAX_STEPS[1], "degrees named radians?")
+        at_most(
+            "resolution_accel_m_s2",
+            self.resolution_accel_m_s2,
+            MAX_STEPS[0],
+            "mg named m/s²?",
+        )?;
+        at_most(
+            "resolution_gyro_rad_s",
+            self.resolution_gyro_rad_s,
+            MAX_STEPS[1],
+            "degrees named radians?",
+        )
     }
 
     /// Range and resolution of a sensor (m/s² or rad/s).
@@ -57,10 +75,16 @@ impl Output {
     /// What a sensor puts out for what it measures (m/s² or rad/s).
     pub(crate) fn put(&self, sensor: Sensor, value: DVec3) -> DVec3 {
         let (range, step) = self.of(sensor);
-        let within = range.map_or(value, |range| value.clamp(DVec3::splat(-range), DVec3::splat(range)));
+        let within = range.map_or(value, |range| {
+            value.clamp(DVec3::splat(-range), DVec3::splat(range))
+        });
         // A step too small for the division leaves the sample as it is.
         let steps = within / step;
-        if steps.is_finite() { steps.round() * step } else { within }
+        if steps.is_finite() {
+            steps.round() * step
+        } else {
+            within
+        }
     }
 }
 
@@ -77,8 +101,14 @@ mod tests {
             ..Output::default()
         };
         let put = |value| output.put(Sensor::Accel, value);
-        assert_eq!(put(DVec3::new(-7.0, -0.8, 0.2)), DVec3::new(-2.0, -1.0, 0.0));
+        assert_eq!(
+            put(DVec3::new(-7.0, -0.8, 0.2)),
+            DVec3::new(-2.0, -1.0, 0.0)
+        );
         assert_eq!(put(DVec3::new(0.3, 3.0, 1.1)), DVec3::new(0.5, 2.0, 1.0));
-        assert_eq!(output.put(Sensor::Gyro, DVec3::splat(300.0)), DVec3::splat(300.0));
+        assert_eq!(
+            output.put(Sensor::Gyro, DVec3::splat(300.0)),
+            DVec3::splat(300.0)
+        );
     }
 }

@@ -30,8 +30,14 @@ impl<'a> FixedData<'a> {
     #[must_use]
     pub fn recorded(times_s: &'a [f64]) -> Self {
         let interval_s = times_s.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
-        let (first, last) = times_s.first().zip(times_s.last()).map_or((0.0, 0.0), |(f, l)| (*f, *l));
-        Self { span_s: (first - interval_s, last + interval_s), fixes: Fixes::At(times_s) }
+        let (first, last) = times_s
+            .first()
+            .zip(times_s.last())
+            .map_or((0.0, 0.0), |(f, l)| (*f, *l));
+        Self {
+            span_s: (first - interval_s, last + interval_s),
+            fixes: Fixes::At(times_s),
+        }
     }
 
     fn has_fix_in(&self, outage: &Outage) -> bool {
@@ -39,8 +45,12 @@ impl<'a> FixedData<'a> {
             Fixes::Every { interval_s } => {
                 // The last fix before the outage and the first after its start, which rounding may exchange; at the
                 // earliest one interval after the start of the data: there is no fix at the start itself.
-                let last = ((outage.start_s - self.span_s.0) / interval_s).floor().max(1.0);
-                [last, last + 1.0].iter().any(|k| outage.withholds(self.span_s.0 + k * interval_s))
+                let last = ((outage.start_s - self.span_s.0) / interval_s)
+                    .floor()
+                    .max(1.0);
+                [last, last + 1.0]
+                    .iter()
+                    .any(|k| outage.withholds(self.span_s.0 + k * interval_s))
             }
             Fixes::At(times_s) => times_s.iter().any(|t_s| outage.withholds(*t_s)),
         }
@@ -64,13 +74,23 @@ impl<'a> FixedData<'a> {
         // clocks and people round to a microsecond
         if asked.start_s < start_s - 1e-6 || asked.start_s >= end_s {
             let span_s = self.span_s;
-            return Err(OutageError::Outside { asked, span_s, fixes: self.described() });
+            return Err(OutageError::Outside {
+                asked,
+                span_s,
+                fixes: self.described(),
+            });
         }
-        let placed = Outage { end_s: asked.end_s.min(end_s), ..asked };
+        let placed = Outage {
+            end_s: asked.end_s.min(end_s),
+            ..asked
+        };
         if self.has_fix_in(&placed) {
             return Ok(placed);
         }
-        Err(OutageError::NoFix { asked, fixes: self.described() })
+        Err(OutageError::NoFix {
+            asked,
+            fixes: self.described(),
+        })
     }
 }
 

@@ -40,16 +40,25 @@ impl PeriodicOutages {
             return Ok(());
         }
         let requirement = format!("it must be shorter than every_s = {}", self.every_s);
-        Err(SettingError::new("duration_s", self.duration_s, requirement))
+        Err(SettingError::new(
+            "duration_s",
+            self.duration_s,
+            requirement,
+        ))
     }
 
     pub(super) fn windows(&self, (from_s, end_s): (f64, f64)) -> Vec<Outage> {
         // those that end before the span begins are not counted through: there may be as many as there is time
-        let skipped = ((from_s - self.duration_s - self.first_s) / self.every_s).floor().max(0.0);
+        let skipped = ((from_s - self.duration_s - self.first_s) / self.every_s)
+            .floor()
+            .max(0.0);
         (0_u32..)
             .map(|k| self.first_s + (skipped + f64::from(k)) * self.every_s)
             .take_while(|start| *start < end_s)
-            .map(|start_s| Outage { start_s, end_s: start_s + self.duration_s })
+            .map(|start_s| Outage {
+                start_s,
+                end_s: start_s + self.duration_s,
+            })
             .collect()
     }
 }
@@ -79,7 +88,11 @@ impl RandomOutages {
         require_positive("rate_per_hour", &[self.rate_per_hour])?;
         if self.rate_per_hour > Self::MOST_PER_HOUR {
             let requirement = format!("it must be at most {}", Self::MOST_PER_HOUR);
-            return Err(SettingError::new("rate_per_hour", self.rate_per_hour, requirement));
+            return Err(SettingError::new(
+                "rate_per_hour",
+                self.rate_per_hour,
+                requirement,
+            ));
         }
         require_positive("duration_s", &[self.duration_s])
     }
@@ -89,14 +102,29 @@ impl RandomOutages {
         (start_s, end_s): (f64, f64),
         seed: u64,
     ) -> Result<Vec<Outage>, SettingError> {
-        let refused = |_| SettingError::new("rate_per_hour", self.rate_per_hour, "it must be a number > 0");
+        let refused = |_| {
+            SettingError::new(
+                "rate_per_hour",
+                self.rate_per_hour,
+                "it must be a number > 0",
+            )
+        };
         let waiting = Exp::new(self.rate_per_hour / 3600.0).map_err(refused)?;
-        let key = StreamKey { seed, scenario: "", run: 0, source: "gnss.outage", process: "waiting" };
+        let key = StreamKey {
+            seed,
+            scenario: "",
+            run: 0,
+            source: "gnss.outage",
+            process: "waiting",
+        };
         let mut generator = key.generator();
         let mut windows = Vec::new();
         let mut t = start_s + waiting.sample(&mut generator);
         while t < end_s {
-            windows.push(Outage { start_s: t, end_s: t + self.duration_s });
+            windows.push(Outage {
+                start_s: t,
+                end_s: t + self.duration_s,
+            });
             // Waiting begins when fixes are back: the rate is that of outages per hour with fixes, and none
             // overlap.
             t += self.duration_s + waiting.sample(&mut generator);

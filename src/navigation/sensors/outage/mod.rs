@@ -32,8 +32,16 @@ const SLACK_S: f64 = 1e-9;
 impl Outage {
     /// The two outages of [Minaretzis et al.](crate::bibliography::Minaretzis24), Section V: one on a
     /// straight stretch, one with turns.
-    pub const PAPER: [Self; 2] =
-        [Self { start_s: 300.0, end_s: 390.0 }, Self { start_s: 700.0, end_s: 790.0 }];
+    pub const PAPER: [Self; 2] = [
+        Self {
+            start_s: 300.0,
+            end_s: 390.0,
+        },
+        Self {
+            start_s: 700.0,
+            end_s: 790.0,
+        },
+    ];
 
     /// Whether a fix at `t_s` is missing.
     #[must_use]
@@ -57,7 +65,11 @@ impl Outage {
         if self.end_s > self.start_s {
             return Ok(());
         }
-        Err(SettingError::new("end_s", self.end_s, format!("it must come after start_s = {}", self.start_s)))
+        Err(SettingError::new(
+            "end_s",
+            self.end_s,
+            format!("it must come after start_s = {}", self.start_s),
+        ))
     }
 }
 
@@ -79,7 +91,10 @@ impl FromStr for Outage {
     fn from_str(text: &str) -> Result<Self, NotAnOutage> {
         let time = |text: &str| text.trim().parse().map_err(|_| NotAnOutage::Form);
         let (start, end) = text.split_once(':').ok_or(NotAnOutage::Form)?;
-        let outage = Self { start_s: time(start)?, end_s: time(end)? };
+        let outage = Self {
+            start_s: time(start)?,
+            end_s: time(end)?,
+        };
         outage.validate()?;
         Ok(outage)
     }

@@ -1,7 +1,8 @@
 //! What outages are asked for, and the one rule of runs, studies and fusions that places them on data.
 
 use super::{
-    FixedData, Fixes, Outage, OutageError, OutageRemark, PeriodicOutages, PlacedOutages, RandomOutages,
+    FixedData, Fixes, Outage, OutageError, OutageRemark, PeriodicOutages, PlacedOutages,
+    RandomOutages,
 };
 use crate::units::SettingError;
 
@@ -25,13 +26,19 @@ impl OutagePlan {
     /// The key whose value is refused.
     pub fn validate(&self) -> Result<(), SettingError> {
         for (i, outage) in self.fixed.iter().enumerate() {
-            outage.validate().map_err(|e| e.in_section(&format!("outage[{}]", i + 1)))?;
+            outage
+                .validate()
+                .map_err(|e| e.in_section(&format!("outage[{}]", i + 1)))?;
         }
         if let Some(periodic) = &self.periodic {
-            periodic.validate().map_err(|e| e.in_section("outage_periodic"))?;
+            periodic
+                .validate()
+                .map_err(|e| e.in_section("outage_periodic"))?;
         }
         if let Some(random) = &self.random {
-            random.validate().map_err(|e| e.in_section("outage_random"))?;
+            random
+                .validate()
+                .map_err(|e| e.in_section("outage_random"))?;
         }
         Ok(())
     }
@@ -63,10 +70,15 @@ impl OutagePlan {
         for asked in &self.fixed {
             if data.place(*asked)? != *asked {
                 remarks.push(match data.fixes {
-                    Fixes::At([.., last_s]) => {
-                        OutageRemark::CutAfterFixes { asked: *asked, end_s, last_s: *last_s }
-                    }
-                    _ => OutageRemark::Cut { asked: *asked, end_s },
+                    Fixes::At([.., last_s]) => OutageRemark::CutAfterFixes {
+                        asked: *asked,
+                        end_s,
+                        last_s: *last_s,
+                    },
+                    _ => OutageRemark::Cut {
+                        asked: *asked,
+                        end_s,
+                    },
                 });
             }
         }
@@ -76,14 +88,24 @@ impl OutagePlan {
         if self.fixed.len() > windows.len() {
             remarks.push(OutageRemark::United);
         }
-        if let Some(first_s) = self.periodic.map(|p| p.first_s).filter(|first_s| *first_s >= end_s) {
+        if let Some(first_s) = self
+            .periodic
+            .map(|p| p.first_s)
+            .filter(|first_s| *first_s >= end_s)
+        {
             remarks.push(OutageRemark::PeriodicTooLate { first_s, end_s });
         }
         for default in self.default.iter().copied() {
             if default.end_s <= start_s || default.start_s >= end_s {
-                remarks.push(OutageRemark::DefaultLeftOut { default, span_s: data.span_s });
+                remarks.push(OutageRemark::DefaultLeftOut {
+                    default,
+                    span_s: data.span_s,
+                });
             } else if default.start_s < start_s || default.end_s > end_s {
-                remarks.push(OutageRemark::DefaultCut { default, span_s: data.span_s });
+                remarks.push(OutageRemark::DefaultCut {
+                    default,
+                    span_s: data.span_s,
+                });
             }
         }
         Ok(PlacedOutages { windows, remarks })
@@ -91,11 +113,23 @@ impl OutagePlan {
 
     /// The windows on data that last from `span_s.0` to `span_s.1`: in time order, those that overlap or touch
     /// made one, cut at the ends, those outside left out.
-    pub(super) fn windows(&self, span_s: (f64, f64), seed: u64) -> Result<Vec<Outage>, SettingError> {
+    pub(super) fn windows(
+        &self,
+        span_s: (f64, f64),
+        seed: u64,
+    ) -> Result<Vec<Outage>, SettingError> {
         let mut all: Vec<Outage> = self.fixed.iter().chain(&self.default).copied().collect();
-        all.extend(self.periodic.iter().flat_map(|periodic| periodic.windows(span_s)));
+        all.extend(
+            self.periodic
+                .iter()
+                .flat_map(|periodic| periodic.windows(span_s)),
+        );
         if let Some(random) = &self.random {
-            all.extend(random.windows(span_s, seed).map_err(|e| e.in_section("outage_random"))?);
+            all.extend(
+                random
+                    .windows(span_s, seed)
+                    .map_err(|e| e.in_section("outage_random"))?,
+            );
         }
         Ok(united(all, span_s))
     }
@@ -105,7 +139,10 @@ fn united(mut windows: Vec<Outage>, (start_s, end_s): (f64, f64)) -> Vec<Outage>
     windows.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
     let mut united: Vec<Outage> = Vec::new();
     for window in windows {
-        let cut = Outage { start_s: window.start_s.max(start_s), end_s: window.end_s.min(end_s) };
+        let cut = Outage {
+            start_s: window.start_s.max(start_s),
+            end_s: window.end_s.min(end_s),
+        };
         match united.last_mut() {
             _ if cut.start_s >= cut.end_s => {}
             // Touching counts as overlapping: the first fix after the one is the first that the other

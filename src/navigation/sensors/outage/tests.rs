@@ -17,7 +17,11 @@ fn a_fix_at_the_start_is_missing_and_at_the_end_is_not() {
 fn kinds_are_united_in_time_order() {
     let plan = OutagePlan {
         fixed: vec![outage(50.0, 70.0), outage(10.0, 20.0), outage(95.0, 300.0)],
-        periodic: Some(PeriodicOutages { first_s: 15.0, every_s: 40.0, duration_s: 10.0 }),
+        periodic: Some(PeriodicOutages {
+            first_s: 15.0,
+            every_s: 40.0,
+            duration_s: 10.0,
+        }),
         ..OutagePlan::default()
     };
     let expected = vec![outage(10.0, 25.0), outage(50.0, 70.0), outage(95.0, 100.0)];
@@ -28,12 +32,19 @@ fn kinds_are_united_in_time_order() {
 #[test]
 fn periodic_outages_begin_where_the_span_does() {
     let plan = |first_s| OutagePlan {
-        periodic: Some(PeriodicOutages { first_s, every_s: 100.0, duration_s: 20.0 }),
+        periodic: Some(PeriodicOutages {
+            first_s,
+            every_s: 100.0,
+            duration_s: 20.0,
+        }),
         ..OutagePlan::default()
     };
     let expected = vec![outage(0.0, 10.0), outage(90.0, 110.0), outage(190.0, 200.0)];
     assert_eq!(plan(-10.0).windows((0.0, 200.0), 1).unwrap(), expected);
-    assert_eq!(plan(-1e12 - 10.0).windows((0.0, 200.0), 1).unwrap(), expected);
+    assert_eq!(
+        plan(-1e12 - 10.0).windows((0.0, 200.0), 1).unwrap(),
+        expected
+    );
     let epoch = plan(0.0).windows((1.7e9 - 10.0, 1.7e9 + 30.0), 1).unwrap();
     assert_eq!(epoch, [outage(1.7e9, 1.7e9 + 20.0)]);
 }
@@ -43,58 +54,124 @@ fn an_outage_lies_on_the_data_and_withholds_a_fix() {
     let fixes = [1.0, 2.0, 3.0, 4.0];
     let recorded = FixedData::recorded(&fixes);
     assert_eq!(recorded.span_s, (0.0, 5.0));
-    let regular = FixedData { span_s: (0.0, 5.0), fixes: Fixes::Every { interval_s: 1.0 } };
+    let regular = FixedData {
+        span_s: (0.0, 5.0),
+        fixes: Fixes::Every { interval_s: 1.0 },
+    };
     for data in [recorded, regular] {
         let place = |a, b| data.place(outage(a, b));
         assert_eq!(place(2.0, 3.0), Ok(outage(2.0, 3.0)));
         assert_eq!(place(3.5, 9.0), Ok(outage(3.5, 5.0)));
         assert_eq!(place(0.0, 1.5), Ok(outage(0.0, 1.5)));
         for (a, b) in [(2.1, 2.9), (0.0, 1.0), (2.0 + 1e-8, 3.0)] {
-            assert!(matches!(place(a, b), Err(OutageError::NoFix { .. })), "{a}:{b}");
+            assert!(
+                matches!(place(a, b), Err(OutageError::NoFix { .. })),
+                "{a}:{b}"
+            );
         }
         assert!(matches!(place(-1.0, 3.0), Err(OutageError::Outside { .. })));
         let e = place(5.0, 9.0).unwrap_err();
-        assert_eq!(e.to_string(), "outage 5:9 does not lie on the data, which last from 0 to 5 s");
+        assert_eq!(
+            e.to_string(),
+            "outage 5:9 does not lie on the data, which last from 0 to 5 s"
+        );
     }
-    let hints = [recorded, regular].map(|d| d.place(outage(5.0, 9.0)).unwrap_err().hint().map(str::to_owned));
-    let expected = ["the fixes run from 1 to 4 s", "fixes come every 1 s from 0 s"];
+    let hints = [recorded, regular].map(|d| {
+        d.place(outage(5.0, 9.0))
+            .unwrap_err()
+            .hint()
+            .map(str::to_owned)
+    });
+    let expected = [
+        "the fixes run from 1 to 4 s",
+        "fixes come every 1 s from 0 s",
+    ];
     assert_eq!(hints, expected.map(|hint| Some(hint.to_owned())));
 }
 
 /// What was asked for is refused where what is there by default is cut or left out.
 #[test]
 fn default_outages_are_cut_and_that_is_said() {
-    let data = FixedData { span_s: (0.0, 720.0), fixes: Fixes::Every { interval_s: 1.0 } };
+    let data = FixedData {
+        span_s: (0.0, 720.0),
+        fixes: Fixes::Every { interval_s: 1.0 },
+    };
     let late = outage(800.0, 810.0);
     let default = [Outage::PAPER.to_vec(), vec![late]].concat();
-    let placed = OutagePlan { default, ..OutagePlan::default() }.on(&data, 1).unwrap();
+    let placed = OutagePlan {
+        default,
+        ..OutagePlan::default()
+    }
+    .on(&data, 1)
+    .unwrap();
     assert_eq!(placed.windows, [outage(300.0, 390.0), outage(700.0, 720.0)]);
     let span_s = data.span_s;
     let expected = [
-        OutageRemark::DefaultCut { default: Outage::PAPER[1], span_s },
-        OutageRemark::DefaultLeftOut { default: late, span_s },
+        OutageRemark::DefaultCut {
+            default: Outage::PAPER[1],
+            span_s,
+        },
+        OutageRemark::DefaultLeftOut {
+            default: late,
+            span_s,
+        },
     ];
     assert_eq!(placed.remarks, expected);
-    let asked = OutagePlan { fixed: vec![late], ..OutagePlan::default() };
+    let asked = OutagePlan {
+        fixed: vec![late],
+        ..OutagePlan::default()
+    };
     assert!(asked.on(&data, 1).is_err());
 }
 
 #[test]
 fn outages_that_are_not_as_asked_for_are_remarked() {
-    let remarks =
-        |plan: OutagePlan, fixes| plan.on(&FixedData { span_s: (0.0, 100.0), fixes }, 1).unwrap().remarks;
+    let remarks = |plan: OutagePlan, fixes| {
+        plan.on(
+            &FixedData {
+                span_s: (0.0, 100.0),
+                fixes,
+            },
+            1,
+        )
+        .unwrap()
+        .remarks
+    };
     let plan = OutagePlan {
         fixed: vec![outage(10.0, 20.0), outage(20.0, 30.0), outage(90.0, 300.0)],
-        periodic: Some(PeriodicOutages { first_s: 100.0, every_s: 40.0, duration_s: 10.0 }),
+        periodic: Some(PeriodicOutages {
+            first_s: 100.0,
+            every_s: 40.0,
+            duration_s: 10.0,
+        }),
         ..OutagePlan::default()
     };
-    let common = [OutageRemark::United, OutageRemark::PeriodicTooLate { first_s: 100.0, end_s: 100.0 }];
+    let common = [
+        OutageRemark::United,
+        OutageRemark::PeriodicTooLate {
+            first_s: 100.0,
+            end_s: 100.0,
+        },
+    ];
     let asked = outage(90.0, 300.0);
     let found = remarks(plan.clone(), Fixes::Every { interval_s: 1.0 });
-    assert_eq!(found[0], OutageRemark::Cut { asked, end_s: 100.0 });
+    assert_eq!(
+        found[0],
+        OutageRemark::Cut {
+            asked,
+            end_s: 100.0
+        }
+    );
     assert_eq!(found[1..], common);
     let found = remarks(plan, Fixes::At(&[10.0, 20.0, 95.0]));
-    assert_eq!(found[0], OutageRemark::CutAfterFixes { asked, end_s: 100.0, last_s: 95.0 });
+    assert_eq!(
+        found[0],
+        OutageRemark::CutAfterFixes {
+            asked,
+            end_s: 100.0,
+            last_s: 95.0
+        }
+    );
     assert_eq!(found[1..], common);
 }
 
@@ -103,7 +180,10 @@ fn outages_that_are_not_as_asked_for_are_remarked() {
 #[test]
 fn random_outages_occur_at_the_stated_rate_and_repeat_with_the_seed() {
     let plan = OutagePlan {
-        random: Some(RandomOutages { rate_per_hour: 6.0, duration_s: 30.0 }),
+        random: Some(RandomOutages {
+            rate_per_hour: 6.0,
+            duration_s: 30.0,
+        }),
         ..OutagePlan::default()
     };
     let span = (0.0, 36_000.0);
@@ -116,33 +196,68 @@ fn random_outages_occur_at_the_stated_rate_and_repeat_with_the_seed() {
     // E N(T) = T/m + (s² + m²)/(2m²) − E[first]/m, m = 630 s, s = E[first] = 600 s.
     let (m, s, t) = (630.0, 600.0, span.1);
     let expected = t / m + (s * s + m * m) / (2.0 * m * m) - s / m;
-    assert!((mean - expected).abs() < 5.0 * (variance / seeds as f64).sqrt(), "{mean} {expected}");
-    assert_eq!(plan.windows(span, 7).unwrap(), plan.windows(span, 7).unwrap());
-    assert_ne!(plan.windows(span, 7).unwrap(), plan.windows(span, 8).unwrap());
+    assert!(
+        (mean - expected).abs() < 5.0 * (variance / seeds as f64).sqrt(),
+        "{mean} {expected}"
+    );
+    assert_eq!(
+        plan.windows(span, 7).unwrap(),
+        plan.windows(span, 7).unwrap()
+    );
+    assert_ne!(
+        plan.windows(span, 7).unwrap(),
+        plan.windows(span, 8).unwrap()
+    );
 }
 
 #[test]
 fn impossible_windows_are_refused_by_key() {
     let refused = |plan: &OutagePlan| plan.validate().unwrap_err().key;
-    let fixed = OutagePlan { fixed: vec![outage(9.0, 9.0)], ..OutagePlan::default() };
+    let fixed = OutagePlan {
+        fixed: vec![outage(9.0, 9.0)],
+        ..OutagePlan::default()
+    };
     assert_eq!(refused(&fixed), "outage[1].end_s");
-    let periodic = PeriodicOutages { first_s: 0.0, every_s: 10.0, duration_s: 10.0 };
-    let periodic = OutagePlan { periodic: Some(periodic), ..OutagePlan::default() };
+    let periodic = PeriodicOutages {
+        first_s: 0.0,
+        every_s: 10.0,
+        duration_s: 10.0,
+    };
+    let periodic = OutagePlan {
+        periodic: Some(periodic),
+        ..OutagePlan::default()
+    };
     assert_eq!(refused(&periodic), "outage_periodic.duration_s");
-    let random = RandomOutages { rate_per_hour: f64::NAN, duration_s: 10.0 };
-    let random = OutagePlan { random: Some(random), ..OutagePlan::default() };
+    let random = RandomOutages {
+        rate_per_hour: f64::NAN,
+        duration_s: 10.0,
+    };
+    let random = OutagePlan {
+        random: Some(random),
+        ..OutagePlan::default()
+    };
     assert_eq!(refused(&random), "outage_random.rate_per_hour");
 }
 
 #[test]
 fn an_outage_is_read_from_its_times() {
     for text in ["60:90", "60: 90", " 60 :90.0"] {
-        assert_eq!(text.parse(), Ok(Outage { start_s: 60.0, end_s: 90.0 }), "{text}");
+        assert_eq!(
+            text.parse(),
+            Ok(Outage {
+                start_s: 60.0,
+                end_s: 90.0
+            }),
+            "{text}"
+        );
     }
     for text in ["", "60", "60:", "60:90:100", "a:b"] {
         assert_eq!(text.parse::<Outage>(), Err(NotAnOutage::Form), "{text}");
     }
     for text in ["90:60", "60:60", "60:inf", "nan:60"] {
-        assert!(matches!(text.parse::<Outage>(), Err(NotAnOutage::Times(_))), "{text}");
+        assert!(
+            matches!(text.parse::<Outage>(), Err(NotAnOutage::Times(_))),
+            "{text}"
+        );
     }
 }

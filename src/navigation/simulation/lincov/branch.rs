@@ -36,7 +36,10 @@ pub(crate) fn errors_in_outages(
     outages: &[Outage],
     moments: Moments,
 ) -> Vec<Vec<Instant>> {
-    let ways: Vec<Range<usize>> = outages.iter().map(|outage| track.without_fixes(outage)).collect();
+    let ways: Vec<Range<usize>> = outages
+        .iter()
+        .map(|outage| track.without_fixes(outage))
+        .collect();
     let mut order: Vec<usize> = (0..ways.len()).collect();
     order.sort_by_key(|place| ways[*place].start);
     let believed = Sources::of_belief(belief);
@@ -60,7 +63,10 @@ pub(crate) fn errors_in_outages(
         let branch = |(place, mut pass): (usize, Pass<'_>)| {
             let (way, mut instants) = (&ways[place], Vec::new());
             // Without a measurement nobody asks for a gain: of the filter's own covariance nothing is needed then.
-            let is_blind = !track.marks[way.clone()].iter().flat_map(|mark| &mark.rows).any(goes_on);
+            let is_blind = !track.marks[way.clone()]
+                .iter()
+                .flat_map(|mark| &mark.rows)
+                .any(goes_on);
             for (index, (steps, mark)) in way.clone().zip(track.legs(way.clone())) {
                 if is_blind {
                     pass.errors.follow(steps, mark);
@@ -88,7 +94,9 @@ impl Track {
     /// The marks from the first whose fix an outage withholds to that of its end.
     fn without_fixes(&self, outage: &Outage) -> Range<usize> {
         let fix_where = |is_wanted: &dyn Fn(f64) -> bool| {
-            self.marks.iter().position(|mark| mark.fix && is_wanted(mark.t_s))
+            self.marks
+                .iter()
+                .position(|mark| mark.fix && is_wanted(mark.t_s))
         };
         let end = fix_where(&|t_s| outage.is_over(t_s)).unwrap_or(self.marks.len() - 1);
         // An outage between two fixes withholds none.
@@ -105,8 +113,16 @@ pub(super) struct Pass<'a> {
 
 impl<'a> Pass<'a> {
     /// At the start of a track, of a filter's own states and those of its true errors.
-    pub(super) fn new(track: &Track, own: &'a Sides, sides: &'a Sides, truth: &'a TruthSide) -> Self {
-        Self { filter: Joint::new(track.start, own), errors: Errors::at_start(track, sides, truth) }
+    pub(super) fn new(
+        track: &Track,
+        own: &'a Sides,
+        sides: &'a Sides,
+        truth: &'a TruthSide,
+    ) -> Self {
+        Self {
+            filter: Joint::new(track.start, own),
+            errors: Errors::at_start(track, sides, truth),
+        }
     }
 
     /// Over the steps that lead to a mark.

@@ -16,10 +16,18 @@ pub(super) struct Column {
 impl Column {
     /// What a row measures, as a linear form after `elapsed` samples.
     pub(super) fn measured(row: &Row, sides: &Sides, elapsed: f64) -> Self {
-        let coefficients =
-            |sources: &[Source]| sources.iter().map(|source| row.coefficient(source, elapsed)).collect();
+        let coefficients = |sources: &[Source]| {
+            sources
+                .iter()
+                .map(|source| row.coefficient(source, elapsed))
+                .collect()
+        };
         let x = std::array::from_fn(|i| row.h[i]);
-        Self { x, b: coefficients(&sides.b.states), t: coefficients(&sides.t.states) }
+        Self {
+            x,
+            b: coefficients(&sides.b.states),
+            t: coefficients(&sides.t.states),
+        }
     }
 
     /// The value of a linear form.

@@ -48,27 +48,52 @@ impl FilterConsistency {
     /// Of one filter under several truths.
     pub(super) fn of(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> Self {
         let count = assessments.len() as f64;
-        let mean = |a: &Assessment| a.reports.iter().map(|r| r.nees).sum::<f64>() / a.reports.len() as f64;
-        let end_s: Vec<f64> = assessments[0].outage_ends.iter().map(|end| end.after_s).collect();
+        let mean =
+            |a: &Assessment| a.reports.iter().map(|r| r.nees).sum::<f64>() / a.reports.len() as f64;
+        let end_s: Vec<f64> = assessments[0]
+            .outage_ends
+            .iter()
+            .map(|end| end.after_s)
+            .collect();
         let mut rmse_end = vec![[0.0; REPORTED]; end_s.len()];
         for assessment in assessments {
             for (sum, end) in rmse_end.iter_mut().zip(&assessment.outage_ends) {
-                sum.iter_mut().zip(&end.rmse).for_each(|(sum, rmse)| *sum += rmse * rmse / count);
+                sum.iter_mut()
+                    .zip(&end.rmse)
+                    .for_each(|(sum, rmse)| *sum += rmse * rmse / count);
             }
         }
         rmse_end.iter_mut().flatten().for_each(|x| *x = x.sqrt());
         let largest = Departure::largest(&departures(assessments, drawn));
         let nees = assessments.iter().map(mean).sum::<f64>() / count;
-        let first = if drawn.is_some() { &assessments[..1] } else { assessments };
+        let first = if drawn.is_some() {
+            &assessments[..1]
+        } else {
+            assessments
+        };
         let nees_over_run = first.iter().map(mean).sum::<f64>() / first.len() as f64;
-        let at_ends = first.iter().flat_map(|a| a.outage_ends.iter().map(|end| end.nees));
-        let together =
-            std::iter::once(nees_over_run).chain(at_ends).map(|nees| (nees / NEES_DOF as f64).sqrt());
-        let places =
-            if end_s.is_empty() { over_run_of(first, None).to_vec() } else { departures(first, None) };
+        let at_ends = first
+            .iter()
+            .flat_map(|a| a.outage_ends.iter().map(|end| end.nees));
+        let together = std::iter::once(nees_over_run)
+            .chain(at_ends)
+            .map(|nees| (nees / NEES_DOF as f64).sqrt());
+        let places = if end_s.is_empty() {
+            over_run_of(first, None).to_vec()
+        } else {
+            departures(first, None)
+        };
         let ratios = places.into_iter().map(|d| d.ratio).chain(together);
-        let range = ratios.fold([f64::INFINITY, 0.0], |[low, high], r| [r.min(low), r.max(high)]);
-        Self { nees, largest, range, end_s, rmse_end }
+        let range = ratios.fold([f64::INFINITY, 0.0], |[low, high], r| {
+            [r.min(low), r.max(high)]
+        });
+        Self {
+            nees,
+            largest,
+            range,
+            end_s,
+            rmse_end,
+        }
     }
 
     /// Horizontal RMSE at the end of each outage (m).
@@ -79,8 +104,14 @@ impl FilterConsistency {
 
 impl Departure {
     fn largest(all: &[Self]) -> Self {
-        let none = Self { ratio: 0.0, state: 0, outage: None, truth: 0 };
-        all.iter().fold(none, |a, b| if b.ratio > a.ratio { *b } else { a })
+        let none = Self {
+            ratio: 0.0,
+            state: 0,
+            outage: None,
+            truth: 0,
+        };
+        all.iter()
+            .fold(none, |a, b| if b.ratio > a.ratio { *b } else { a })
     }
 }
 
@@ -105,15 +136,23 @@ impl DrawFactors {
         consistency: &FilterConsistency,
     ) -> Self {
         let first = &assessments[..1];
-        let (all, alone) = (departures(assessments, Some(drawn)), departures(first, None));
+        let (all, alone) = (
+            departures(assessments, Some(drawn)),
+            departures(first, None),
+        );
         let over_run = over_run_of(assessments, Some(drawn)).map(|d| d.ratio);
         let alone_over_run = over_run_of(first, None).map(|d| d.ratio);
         let alone_consistency = FilterConsistency::of(first, None);
-        let over =
-            |all: &[f64; REPORTED], alone: &[f64; REPORTED]| std::array::from_fn(|i| all[i] / alone[i]);
+        let over = |all: &[f64; REPORTED], alone: &[f64; REPORTED]| {
+            std::array::from_fn(|i| all[i] / alone[i])
+        };
         let rmse_end = consistency.rmse_end.iter().zip(&alone_consistency.rmse_end);
         Self {
-            ratios: all.iter().zip(&alone).map(|(all, alone)| all.ratio / alone.ratio).collect(),
+            ratios: all
+                .iter()
+                .zip(&alone)
+                .map(|(all, alone)| all.ratio / alone.ratio)
+                .collect(),
             over_run: over(&over_run, &alone_over_run),
             nees: consistency.nees / alone_consistency.nees,
             rmse_end: rmse_end.map(|(all, alone)| over(all, alone)).collect(),
@@ -124,20 +163,29 @@ impl DrawFactors {
     pub(super) fn consistency(&self, first: &[Assessment]) -> FilterConsistency {
         let mut consistency = FilterConsistency::of(first, None);
         let mut departures = departures(first, None);
-        departures.iter_mut().zip(&self.ratios).for_each(|(d, margin)| d.ratio *= margin);
+        departures
+            .iter_mut()
+            .zip(&self.ratios)
+            .for_each(|(d, margin)| d.ratio *= margin);
         consistency.largest = Departure::largest(&departures);
         consistency.nees *= self.nees;
         let ends = consistency.rmse_end.iter_mut().flatten();
-        ends.zip(self.rmse_end.iter().flatten()).for_each(|(rmse, margin)| *rmse *= margin);
+        ends.zip(self.rmse_end.iter().flatten())
+            .for_each(|(rmse, margin)| *rmse *= margin);
         consistency
     }
 
     /// Takes the errors of the first truth to the upper ends of their intervals.
     pub(super) fn enlarge(&self, first: &mut Assessment) {
         let ends = first.outage_ends.iter_mut().flat_map(|end| &mut end.rmse);
-        ends.zip(&self.ratios).for_each(|(rmse, margin)| *rmse *= margin);
+        ends.zip(&self.ratios)
+            .for_each(|(rmse, margin)| *rmse *= margin);
         for report in &mut first.reports {
-            report.rmse.iter_mut().zip(&self.over_run).for_each(|(rmse, margin)| *rmse *= margin);
+            report
+                .rmse
+                .iter_mut()
+                .zip(&self.over_run)
+                .for_each(|(rmse, margin)| *rmse *= margin);
         }
     }
 }
@@ -149,7 +197,9 @@ fn departures(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> Vec<D
         states(assessments, drawn, outage, &|a| instants(a)[k].ratio())
     };
     match assessments[0].outage_ends.len() {
-        0 => (0..assessments[0].reports.len()).flat_map(|k| at(None, |a| &a.reports, k)).collect(),
+        0 => (0..assessments[0].reports.len())
+            .flat_map(|k| at(None, |a| &a.reports, k))
+            .collect(),
         ends => {
             let at_ends = (0..ends).flat_map(|k| at(Some(k), |a| &a.outage_ends, k));
             at_ends.chain(over_run_of(assessments, drawn)).collect()
@@ -174,6 +224,11 @@ fn states(
         let ratio = counted(&ratios, drawn);
         let distance = |truth: &usize| (ratios[*truth] - ratio).abs();
         let truth = (0..ratios.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        Departure { ratio, state, outage, truth: truth.unwrap_or(0) }
+        Departure {
+            ratio,
+            state,
+            outage,
+            truth: truth.unwrap_or(0),
+        }
     })
 }

@@ -52,7 +52,9 @@ impl Damped<'_> {
         }
         for _ in 0..self.iterations {
             let model = self.quadratic(&x, &value);
-            let Some((next, next_value)) = self.descend(&x, &value, &model, &mut damping) else { break };
+            let Some((next, next_value)) = self.descend(&x, &value, &model, &mut damping) else {
+                break;
+            };
             let gain = value.cost - next_value.cost;
             (x, value) = (next, next_value);
             if gain < self.enough {
@@ -126,7 +128,8 @@ impl Quadratic {
             let damped = &self.hessian + DMatrix::identity(n, n) * *damping;
             let step = -damped.cholesky()?.solve(&self.gradient);
             if step.amax() <= MAX_STEP {
-                let expected = -(self.gradient.dot(&step) + 0.5 * step.dot(&(&self.hessian * &step)));
+                let expected =
+                    -(self.gradient.dot(&step) + 0.5 * step.dot(&(&self.hessian * &step)));
                 return Some((step, expected));
             }
             *damping *= MORE;
@@ -146,16 +149,40 @@ mod tests {
             let parts = [10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
             Value {
                 cost: parts.iter().map(|f| f * f).sum(),
-                parts: parts.map(|value| Part { value, curvature: 2.0 }).into(),
+                parts: parts
+                    .map(|value| Part {
+                        value,
+                        curvature: 2.0,
+                    })
+                    .into(),
             }
         };
-        let damped = |bounds| Damped { value: &valley, bounds, iterations: 60, enough: 1e-9 };
+        let damped = |bounds| Damped {
+            value: &valley,
+            bounds,
+            iterations: 60,
+            enough: 1e-9,
+        };
         let found = damped((-3.0, 3.0)).minimum(vec![-1.0, 0.0]).unwrap();
-        assert!((found[0] - 1.0).abs() < 0.02 && (found[1] - 1.0).abs() < 0.04, "{found:?}");
+        assert!(
+            (found[0] - 1.0).abs() < 0.02 && (found[1] - 1.0).abs() < 0.04,
+            "{found:?}"
+        );
         let found = damped((1.5, 3.0)).minimum(vec![2.0, 2.0]).unwrap();
-        assert!((found[0] - 1.5).abs() < 1e-9 && (found[1] - 2.25).abs() < 0.02, "{found:?}");
-        let nan = |_: &[f64]| Value { cost: f64::NAN, parts: Vec::new() };
-        let nowhere = Damped { value: &nan, bounds: (0.0, 1.0), iterations: 1, enough: 0.0 };
+        assert!(
+            (found[0] - 1.5).abs() < 1e-9 && (found[1] - 2.25).abs() < 0.02,
+            "{found:?}"
+        );
+        let nan = |_: &[f64]| Value {
+            cost: f64::NAN,
+            parts: Vec::new(),
+        };
+        let nowhere = Damped {
+            value: &nan,
+            bounds: (0.0, 1.0),
+            iterations: 1,
+            enough: 0.0,
+        };
         assert_eq!(nowhere.minimum(vec![0.5]), None);
     }
 }

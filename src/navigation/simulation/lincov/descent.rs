@@ -36,9 +36,16 @@ impl Descent<'_> {
         let mut inverse = diagonal(x.len(), 2.0);
         for _ in 0..self.iterations {
             let step = self.direction(&x, &gradient, &inverse);
-            let Some((next, next_cost)) = self.descend(&x, cost, &step, dot(&gradient, &step)) else { break };
+            let Some((next, next_cost)) = self.descend(&x, cost, &step, dot(&gradient, &step))
+            else {
+                break;
+            };
             let next_gradient = self.gradient(&next, next_cost);
-            update(&mut inverse, &difference(&next, &x), &difference(&next_gradient, &gradient));
+            update(
+                &mut inverse,
+                &difference(&next, &x),
+                &difference(&next_gradient, &gradient),
+            );
             let gain = cost - next_cost;
             (x, cost, gradient) = (next, next_cost, next_gradient);
             if gain < self.enough {
@@ -70,7 +77,10 @@ impl Descent<'_> {
             .map(|(x, g)| (*x <= low && *g > 0.0) || (*x >= high && *g < 0.0))
             .collect();
         let free = |v: &[f64]| -> Vec<f64> {
-            v.iter().zip(&held).map(|(v, held)| if *held { 0.0 } else { *v }).collect()
+            v.iter()
+                .zip(&held)
+                .map(|(v, held)| if *held { 0.0 } else { *v })
+                .collect()
         };
         let g = free(gradient);
         let downhill: Vec<f64> = inverse.iter().map(|row| -dot(row, &g)).collect();
@@ -114,8 +124,10 @@ fn update(inverse: &mut Square, s: &[f64], y: &[f64]) {
     for (row, s) in left.iter_mut().zip(s) {
         row.iter_mut().zip(y).for_each(|(l, y)| *l -= s * y * rho);
     }
-    let half: Square =
-        left.iter().map(|row| (0..s.len()).map(|j| column(inverse, j, row)).collect()).collect();
+    let half: Square = left
+        .iter()
+        .map(|row| (0..s.len()).map(|j| column(inverse, j, row)).collect())
+        .collect();
     for (i, row) in inverse.iter_mut().enumerate() {
         for (j, entry) in row.iter_mut().enumerate() {
             *entry = dot(&half[i], &left[j]) + s[i] * s[j] * rho;
@@ -124,7 +136,9 @@ fn update(inverse: &mut Square, s: &[f64], y: &[f64]) {
 }
 
 fn diagonal(n: usize, value: f64) -> Square {
-    (0..n).map(|i| (0..n).map(|j| if i == j { value } else { 0.0 }).collect()).collect()
+    (0..n)
+        .map(|i| (0..n).map(|j| if i == j { value } else { 0.0 }).collect())
+        .collect()
 }
 
 /// A row times a column of a matrix.
@@ -150,12 +164,28 @@ mod tests {
     #[test]
     fn a_curved_valley_is_followed_to_its_end_or_to_a_bound() {
         let valley = |x: &[f64]| 0.5 * (x[1] - x[0] * x[0]).powi(2) + (1.0 - x[0]).powi(2);
-        let descent = |bounds| Descent { cost: &valley, bounds, iterations: 60, enough: 1e-9 };
+        let descent = |bounds| Descent {
+            cost: &valley,
+            bounds,
+            iterations: 60,
+            enough: 1e-9,
+        };
         let found = descent((-3.0, 3.0)).minimum(vec![-1.0, 0.0]).unwrap();
-        assert!((found[0] - 0.96).abs() < 0.01 && (found[1] - 0.91).abs() < 0.01, "{found:?}");
+        assert!(
+            (found[0] - 0.96).abs() < 0.01 && (found[1] - 0.91).abs() < 0.01,
+            "{found:?}"
+        );
         let found = descent((1.5, 3.0)).minimum(vec![2.0, 2.0]).unwrap();
-        assert!((found[0] - 1.5).abs() < 1e-9 && (found[1] - 2.24).abs() < 0.01, "{found:?}");
-        let nowhere = Descent { cost: &|_| f64::NAN, bounds: (0.0, 1.0), iterations: 1, enough: 0.0 };
+        assert!(
+            (found[0] - 1.5).abs() < 1e-9 && (found[1] - 2.24).abs() < 0.01,
+            "{found:?}"
+        );
+        let nowhere = Descent {
+            cost: &|_| f64::NAN,
+            bounds: (0.0, 1.0),
+            iterations: 1,
+            enough: 0.0,
+        };
         assert_eq!(nowhere.minimum(vec![0.5]), None);
     }
 }

@@ -18,12 +18,20 @@ pub(super) struct Errors<'a> {
 impl<'a> Errors<'a> {
     /// Those of the start.
     pub(super) fn at_start(track: &Track, sides: &'a Sides, truth: &'a TruthSide) -> Self {
-        let begin = if truth.starts_off { track.start } else { [[0.0; NAV]; NAV] };
+        let begin = if truth.starts_off {
+            track.start
+        } else {
+            [[0.0; NAV]; NAV]
+        };
         // A mean is rare (drifts, a strapdown too slow for the motion): without one its propagation is spared.
         let drifts = sides.t.states.iter().any(|s| s.level != 0.0);
         let is_off = truth.integrates && !track.is_closed();
         let mean = (drifts || is_off).then(|| Mean::new(sides));
-        Self { truth, joint: Joint::new(begin, sides), mean }
+        Self {
+            truth,
+            joint: Joint::new(begin, sides),
+            mean,
+        }
     }
 
     /// Over the steps that lead to a mark.
@@ -33,7 +41,9 @@ impl<'a> Errors<'a> {
             self.mean.iter_mut().for_each(|mean| mean.step(step));
         }
         if self.truth.integrates {
-            self.mean.iter_mut().for_each(|mean| add_scaled(&mut mean.values.x, 1.0, &mark.closure));
+            self.mean
+                .iter_mut()
+                .for_each(|mean| add_scaled(&mut mean.values.x, 1.0, &mark.closure));
         }
     }
 
@@ -42,16 +52,28 @@ impl<'a> Errors<'a> {
         // Without its noise where the source under study is another one: covariances of independent sources
         // add.
         let measured = self.joint.measured(row);
-        let y =
-            self.joint.innovation(&measured, if self.truth.has_noise(row.what) { row.noise } else { 0.0 });
-        let mean = self.mean.as_ref().map_or(0.0, |mean| measured.dot(&mean.values));
+        let y = self.joint.innovation(
+            &measured,
+            if self.truth.has_noise(row.what) {
+                row.noise
+            } else {
+                0.0
+            },
+        );
+        let mean = self
+            .mean
+            .as_ref()
+            .map_or(0.0, |mean| measured.dot(&mean.values));
         self.joint.correct(&y, gain);
         self.mean.iter_mut().for_each(|m| m.correct(mean, gain));
         y.s + mean * mean
     }
 
     pub(super) fn judged(&self, mark: &Mark, believed: &[Nav; NAV]) -> Judged {
-        Judged { errors: self.instant(mark), believed: *believed }
+        Judged {
+            errors: self.instant(mark),
+            believed: *believed,
+        }
     }
 
     pub(super) fn instant(&self, mark: &Mark) -> Instant {

@@ -32,10 +32,22 @@ pub(super) fn multiplied(model: &Model, per: Per) -> Vec<Factor> {
     let mut factors: Vec<Factor> = Vec::new();
     for channel in Channel::ALL {
         let axis = model.axis(channel);
-        for (_, label) in axis.processes.iter().zip(axis.labels()).filter(|(p, _)| is_felt(p)) {
+        for (_, label) in axis
+            .processes
+            .iter()
+            .zip(axis.labels())
+            .filter(|(p, _)| is_felt(p))
+        {
             let process = (per == Per::Process).then_some(label);
-            if !factors.iter().any(|f| f.sensor == channel.sensor && f.process == process) {
-                factors.push(Factor { sensor: channel.sensor, process, on_variance: 1.0 });
+            if !factors
+                .iter()
+                .any(|f| f.sensor == channel.sensor && f.process == process)
+            {
+                factors.push(Factor {
+                    sensor: channel.sensor,
+                    process,
+                    on_variance: 1.0,
+                });
             }
         }
     }
@@ -63,7 +75,14 @@ fn amplitude(process: &Process) -> (&'static str, f64) {
 }
 
 pub(super) fn set(factors: &[Factor], ln: &[f64]) -> Vec<Factor> {
-    factors.iter().zip(ln).map(|(f, ln)| Factor { on_variance: ln.exp(), ..f.clone() }).collect()
+    factors
+        .iter()
+        .zip(ln)
+        .map(|(f, ln)| Factor {
+            on_variance: ln.exp(),
+            ..f.clone()
+        })
+        .collect()
 }
 
 /// A model whose processes are multiplied; the factors are the same at any sample rate.
@@ -73,8 +92,9 @@ pub fn scaled(model: &Model, factors: &[Factor]) -> Model {
     for channel in Channel::ALL {
         let axis = &mut scaled.axes[channel.index()];
         for (process, label) in axis.processes.iter_mut().zip(model.axis(channel).labels()) {
-            let own =
-                |f: &&Factor| f.sensor == channel.sensor && f.process.as_ref().is_none_or(|p| *p == label);
+            let own = |f: &&Factor| {
+                f.sensor == channel.sensor && f.process.as_ref().is_none_or(|p| *p == label)
+            };
             if let Some(factor) = factors.iter().find(own).filter(|_| is_felt(process)) {
                 *process = times(process, factor.on_variance, model.rate_hz);
             }
@@ -87,8 +107,14 @@ pub fn scaled(model: &Model, factors: &[Factor]) -> Model {
 pub(crate) fn times(process: &Process, on_variance: f64, rate_hz: f64) -> Process {
     let (name, value) = amplitude(process);
     // a drift has an amplitude, the others a variance
-    let factor = if matches!(process, Process::Drift(_)) { on_variance.sqrt() } else { on_variance };
-    let changed = process.with_parameter(name, value * factor, rate_hz).and_then(Result::ok);
+    let factor = if matches!(process, Process::Drift(_)) {
+        on_variance.sqrt()
+    } else {
+        on_variance
+    };
+    let changed = process
+        .with_parameter(name, value * factor, rate_hz)
+        .and_then(Result::ok);
     // beyond the largest number nothing is left to enlarge
     changed.unwrap_or(*process)
 }

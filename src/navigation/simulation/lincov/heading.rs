@@ -20,8 +20,11 @@ pub struct HeadingDoubt {
 impl fmt::Display for HeadingDoubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         // beyond half a turn a linear deviation is only a large number
-        let sigma =
-            if self.sigma_deg < 180.0 { format!("{:.0}°", self.sigma_deg) } else { "over 180°".to_owned() };
+        let sigma = if self.sigma_deg < 180.0 {
+            format!("{:.0}°", self.sigma_deg)
+        } else {
+            "over 180°".to_owned()
+        };
         write!(
             f,
             "the heading is hardly observable: its standard deviation is {sigma} after {:.0} s although there are \
@@ -50,6 +53,12 @@ mod tests {
     fn the_largest_deviation_after_the_alignment_decides() {
         assert_eq!(weak_heading([(10.0, 20.0), (200.0, 4.0)].into_iter()), None);
         let doubt = weak_heading([(10.0, 20.0), (200.0, 7.0), (300.0, 6.0)].into_iter());
-        assert_eq!(doubt, Some(HeadingDoubt { sigma_deg: 7.0, after_s: 200.0 }));
+        assert_eq!(
+            doubt,
+            Some(HeadingDoubt {
+                sigma_deg: 7.0,
+                after_s: 200.0
+            })
+        );
     }
 }

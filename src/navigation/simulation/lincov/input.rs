@@ -27,17 +27,33 @@ pub(super) const fn place(signal: usize) -> (usize, usize, Felt) {
         0..SCALED => (signal / 3, signal % 3, Felt::Unit),
         SCALED..CROSSED => {
             let sensor = signal % SCALED / 3;
-            (sensor, signal % 3, Felt::Sample(Sensor::ALL[sensor], signal % 3))
+            (
+                sensor,
+                signal % 3,
+                Felt::Sample(Sensor::ALL[sensor], signal % 3),
+            )
         }
         CROSSED..PUSHED => {
             let (sensor, pair) = ((signal - CROSSED) / 6, (signal - CROSSED) % 6);
-            (sensor, pair / 2, Felt::Sample(Sensor::ALL[sensor], (pair / 2 + 1 + pair % 2) % 3))
+            (
+                sensor,
+                pair / 2,
+                Felt::Sample(Sensor::ALL[sensor], (pair / 2 + 1 + pair % 2) % 3),
+            )
         }
         PUSHED..RECTIFIED => {
             let pair = signal - PUSHED;
-            (Sensor::Gyro as usize, pair / 3, Felt::Sample(Sensor::Accel, pair % 3))
+            (
+                Sensor::Gyro as usize,
+                pair / 3,
+                Felt::Sample(Sensor::Accel, pair % 3),
+            )
         }
-        RECTIFIED..WARMED => (Sensor::Accel as usize, signal - RECTIFIED, Felt::Square(signal - RECTIFIED)),
+        RECTIFIED..WARMED => (
+            Sensor::Accel as usize,
+            signal - RECTIFIED,
+            Felt::Square(signal - RECTIFIED),
+        ),
         _ => ((signal - WARMED) / 3, (signal - WARMED) % 3, Felt::Warming),
     }
 }
@@ -108,7 +124,14 @@ pub(super) struct StepOfSource {
 
 impl Source {
     fn bias(signal: usize, phi: f64, innovation: f64, initial: f64) -> Self {
-        Self { signal, after: 1.0, decay: phi, drive: innovation.sqrt(), initial, ..NONE }
+        Self {
+            signal,
+            after: 1.0,
+            decay: phi,
+            drive: innovation.sqrt(),
+            initial,
+            ..NONE
+        }
     }
 
     /// An unknown constant of a standard deviation.
@@ -121,25 +144,48 @@ impl Source {
     fn memory(signal: usize, sigma: f64, fresh: f64, before: f64) -> Self {
         // `before` multiplies the state, which carries sigma itself; `fresh` multiplies w of variance 1.
         let (before, fresh) = (before, fresh * sigma);
-        Self { signal, before, fresh, decay: 0.0, drive: sigma, initial: sigma * sigma, ..NONE }
+        Self {
+            signal,
+            before,
+            fresh,
+            decay: 0.0,
+            drive: sigma,
+            initial: sigma * sigma,
+            ..NONE
+        }
     }
 
     /// A constant slope, known to nobody: its mean square is what second moments see of it.
     const fn ramp(signal: usize, slope: f64) -> Self {
-        Self { signal, ramp: 1.0, initial: slope * slope, ..NONE }
+        Self {
+            signal,
+            ramp: 1.0,
+            initial: slope * slope,
+            ..NONE
+        }
     }
 
     /// A slope that is the same in every run. The states of the truth are negated, and so is its mean.
     pub(super) fn drift(signal: usize, slope: f64) -> Self {
         // No variance: a deterministic slope enters the mean alone.
-        Self { initial: 0.0, level: -slope, ..Self::ramp(signal, slope) }
+        Self {
+            initial: 0.0,
+            level: -slope,
+            ..Self::ramp(signal, slope)
+        }
     }
 
     /// A correlated error of a component of a fix's position: stationary, of standard deviation `sigma`, with
     /// the coefficient `phi` from sample to sample.
     pub(super) fn of_position(component: usize, phi: f64, sigma: f64) -> Self {
         let drive = sigma * (1.0 - phi * phi).sqrt();
-        Self { decay: phi, drive, initial: sigma * sigma, outer: Some(Outer::Position(component)), ..NONE }
+        Self {
+            decay: phi,
+            drive,
+            initial: sigma * sigma,
+            outer: Some(Outer::Position(component)),
+            ..NONE
+        }
     }
 
     /// An error of what a vehicle measures of itself, at an IMU of this rate.
@@ -147,11 +193,22 @@ impl Source {
         let outer = Some(Outer::Vehicle(part));
         match law {
             // The states of the truth are negated, and so is a mean.
-            Law::Known(value) => Self { level: -value, outer, ..NONE },
-            Law::Constant(sigma) => Self { initial: sigma * sigma, outer, ..NONE },
+            Law::Known(value) => Self {
+                level: -value,
+                outer,
+                ..NONE
+            },
+            Law::Constant(sigma) => Self {
+                initial: sigma * sigma,
+                outer,
+                ..NONE
+            },
             Law::GaussMarkov { sigma, time_s } => {
                 let phi = (-1.0 / (imu_hz * time_s)).exp();
-                Self { outer, ..Self::of_position(0, phi, sigma) }
+                Self {
+                    outer,
+                    ..Self::of_position(0, phi, sigma)
+                }
             }
         }
     }
@@ -195,7 +252,12 @@ impl Source {
 
     /// Without what drives it: a filter's estimate of the state, which starts at zero.
     const fn estimate(&self) -> Self {
-        Self { drive: 0.0, fresh: 0.0, initial: 0.0, ..*self }
+        Self {
+            drive: 0.0,
+            fresh: 0.0,
+            initial: 0.0,
+            ..*self
+        }
     }
 }
 
@@ -208,7 +270,10 @@ pub(super) struct Sources {
 
 impl Default for Sources {
     fn default() -> Self {
-        Self { states: Vec::new(), white: [0.0; BIASES] }
+        Self {
+            states: Vec::new(),
+            white: [0.0; BIASES],
+        }
     }
 }
 
@@ -216,19 +281,29 @@ impl Sources {
     /// Adds those of another, independent.
     pub(super) fn extend(&mut self, other: &Self) {
         self.states.extend_from_slice(&other.states);
-        self.white.iter_mut().zip(&other.white).for_each(|(white, more)| *white += more);
+        self.white
+            .iter_mut()
+            .zip(&other.white)
+            .for_each(|(white, more)| *white += more);
     }
 
     /// What a filter estimates of them: nothing at the start, and nothing drives its estimates but corrections.
     pub(super) fn estimates(&self) -> Self {
-        Self { states: self.states.iter().map(Source::estimate).collect(), ..Self::default() }
+        Self {
+            states: self.states.iter().map(Source::estimate).collect(),
+            ..Self::default()
+        }
     }
 
     /// Those a filter believes in: one for each bias state.
     pub(super) fn of_belief(belief: &Belief) -> Self {
         let mut states = Vec::new();
         for sensor in Sensor::ALL {
-            states.extend(belief.groups[sensor as usize].iter().flat_map(|g| Self::of_group(sensor, g)));
+            states.extend(
+                belief.groups[sensor as usize]
+                    .iter()
+                    .flat_map(|g| Self::of_group(sensor, g)),
+            );
         }
         let [accel, gyro] = belief.white.map(|w| w.to_array());
         let mut white = [0.0; BIASES];
@@ -243,7 +318,8 @@ impl Sources {
     pub(super) fn of_group(sensor: Sensor, group: &BiasGroup) -> Vec<Source> {
         let state = |axis: usize| {
             let (phi, q, initial) = (group.phi[axis], group.innovation[axis], group.initial[axis]);
-            (initial != 0.0 || q != 0.0).then(|| Source::bias(3 * sensor as usize + axis, phi, q, initial))
+            (initial != 0.0 || q != 0.0)
+                .then(|| Source::bias(3 * sensor as usize + axis, phi, q, initial))
         };
         (0..3).filter_map(state).collect()
     }
@@ -251,9 +327,16 @@ impl Sources {
     /// Unknown constants of a belief that are multiplied.
     pub(super) fn multiplied(belief: &Belief, kinds: &[UnknownKind]) -> Vec<Source> {
         let mut states = Vec::new();
-        for (sensor, axis) in Sensor::ALL.into_iter().flat_map(|s| (0..3).map(move |i| (s, i))) {
+        for (sensor, axis) in Sensor::ALL
+            .into_iter()
+            .flat_map(|s| (0..3).map(move |i| (s, i)))
+        {
             let signal = 3 * sensor as usize + axis;
-            for unknown in belief.unknowns(sensor).iter().filter(|u| kinds.contains(&u.kind)) {
+            for unknown in belief
+                .unknowns(sensor)
+                .iter()
+                .filter(|u| kinds.contains(&u.kind))
+            {
                 let sigma = unknown.sigma[axis];
                 states.extend((sigma > 0.0).then(|| match unknown.kind {
                     UnknownKind::Drift => Source::ramp(signal, sigma),
@@ -266,9 +349,18 @@ impl Sources {
 
     /// Wheel scale and mounting of a vehicle, as a filter believes in them.
     pub(super) fn of_vehicle(belief: &Belief) -> Vec<Source> {
-        let parts = [AidPart::WheelScale, AidPart::MountingPitch, AidPart::MountingYaw];
-        let states = parts.into_iter().zip(belief.vehicle.to_array()).filter(|(_, sigma)| *sigma > 0.0);
-        states.map(|(part, sigma)| Source::of_vehicle(part, Law::Constant(sigma), belief.rate_hz)).collect()
+        let parts = [
+            AidPart::WheelScale,
+            AidPart::MountingPitch,
+            AidPart::MountingYaw,
+        ];
+        let states = parts
+            .into_iter()
+            .zip(belief.vehicle.to_array())
+            .filter(|(_, sigma)| *sigma > 0.0);
+        states
+            .map(|(part, sigma)| Source::of_vehicle(part, Law::Constant(sigma), belief.rate_hz))
+            .collect()
     }
 
     /// What a belief expects beside its noise model, as it expects it: turn-on biases and scale factors.
@@ -276,8 +368,12 @@ impl Sources {
         let mut states = Self::multiplied(belief, &[UnknownKind::ScaleFactor]);
         states.extend(Self::of_vehicle(belief));
         for sensor in Sensor::ALL {
-            for group in belief.groups[sensor as usize].iter().filter(|g| g.is_constant()) {
-                let constant = |axis| Source::bias(3 * sensor as usize + axis, 1.0, 0.0, group.initial[axis]);
+            for group in belief.groups[sensor as usize]
+                .iter()
+                .filter(|g| g.is_constant())
+            {
+                let constant =
+                    |axis| Source::bias(3 * sensor as usize + axis, 1.0, 0.0, group.initial[axis]);
                 states.extend((0..3).map(constant).filter(|s| s.initial > 0.0));
             }
         }
@@ -298,7 +394,9 @@ impl Sources {
     pub(super) fn add(&mut self, signal: usize, process: &Process) {
         let state = match process {
             Process::Flicker(p) => {
-                p.parts(Ladder::FINE).iter().for_each(|part| self.add(signal, part));
+                p.parts(Ladder::FINE)
+                    .iter()
+                    .for_each(|part| self.add(signal, part));
                 return;
             }
             Process::White(p) => {
@@ -310,7 +408,9 @@ impl Sources {
             Process::Quantization(p) => Source::memory(signal, p.q2().sqrt(), 1.0, -1.0),
             Process::Ma1(p) => Source::memory(signal, p.sigma2().sqrt(), 1.0, p.theta()),
             Process::Ar1(p) => Source::bias(signal, p.phi(), p.sigma2(), p.variance()),
-            Process::GaussMarkov(p) => Source::bias(signal, p.ar1().phi(), p.ar1().sigma2(), p.s2()),
+            Process::GaussMarkov(p) => {
+                Source::bias(signal, p.ar1().phi(), p.ar1().sigma2(), p.s2())
+            }
             Process::RandomWalk(p) => Source::bias(signal, 1.0, p.gamma2(), 0.0),
             Process::Drift(p) => Source::ramp(signal, p.slope()),
         };

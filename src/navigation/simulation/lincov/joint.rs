@@ -54,9 +54,13 @@ impl<'a> Joint<'a> {
         let factors: Vec<f64> = states.iter().map(|s| s.share(self.elapsed)).collect();
         let (nb, mut variances) = (factors.len(), [0.0; BIASES]);
         for (i, a) in states.iter().enumerate().filter(|(_, a)| a.signal < BIASES) {
-            let of_signal = states.iter().enumerate().filter(|(_, b)| b.signal == a.signal);
-            variances[a.signal] +=
-                of_signal.map(|(j, _)| factors[i] * factors[j] * self.bb[i * nb + j]).sum::<f64>();
+            let of_signal = states
+                .iter()
+                .enumerate()
+                .filter(|(_, b)| b.signal == a.signal);
+            variances[a.signal] += of_signal
+                .map(|(j, _)| factors[i] * factors[j] * self.bb[i * nb + j])
+                .sum::<f64>();
         }
         variances
     }
@@ -102,20 +106,40 @@ impl<'a> Joint<'a> {
         let mut gx = [[0.0; NAV]; NAV];
         for j in 0..NAV {
             let mut u = [0.0; SIGNALS];
-            inputs.b.iter().zip(&self.xb).for_each(|(s, x)| u[s.signal] += mean(s) * x[j]);
-            inputs.t.iter().zip(&self.xt).for_each(|(s, x)| u[s.signal] += mean(s) * x[j]);
+            inputs
+                .b
+                .iter()
+                .zip(&self.xb)
+                .for_each(|(s, x)| u[s.signal] += mean(s) * x[j]);
+            inputs
+                .t
+                .iter()
+                .zip(&self.xt)
+                .for_each(|(s, x)| u[s.signal] += mean(s) * x[j]);
             // Into a copy: the cross terms below still need P before the step.
             gx[j] = step.map(&self.xx[j], &u[..signals]);
         }
         for j in 0..nb {
             let mut u = [0.0; SIGNALS];
-            inputs.b.iter().zip(&self.bb[j * nb..]).for_each(|(s, p)| u[s.signal] += mean(s) * p);
-            inputs.t.iter().zip(&self.bt[j * nt..]).for_each(|(s, p)| u[s.signal] += mean(s) * p);
+            inputs
+                .b
+                .iter()
+                .zip(&self.bb[j * nb..])
+                .for_each(|(s, p)| u[s.signal] += mean(s) * p);
+            inputs
+                .t
+                .iter()
+                .zip(&self.bt[j * nt..])
+                .for_each(|(s, p)| u[s.signal] += mean(s) * p);
             self.xb[j] = step.map(&self.xb[j], &u[..signals]);
         }
         for j in 0..nt {
             let mut u = [0.0; SIGNALS];
-            inputs.b.iter().enumerate().for_each(|(i, s)| u[s.signal] += mean(s) * self.bt[i * nt + j]);
+            inputs
+                .b
+                .iter()
+                .enumerate()
+                .for_each(|(i, s)| u[s.signal] += mean(s) * self.bt[i * nt + j]);
             // The states t are independent: of column j only its own variance feeds its signal.
             u[inputs.t[j].signal] += mean(&inputs.t[j]) * self.tt[j];
             self.xt[j] = step.map(&self.xt[j], &u[..signals]);
@@ -124,15 +148,26 @@ impl<'a> Joint<'a> {
         for i in 0..NAV {
             let row: Nav = std::array::from_fn(|j| gx[j][i]);
             let mut u = [0.0; SIGNALS];
-            inputs.b.iter().zip(&self.xb).for_each(|(s, x)| u[s.signal] += mean(s) * x[i]);
-            inputs.t.iter().zip(&self.xt).for_each(|(s, x)| u[s.signal] += mean(s) * x[i]);
+            inputs
+                .b
+                .iter()
+                .zip(&self.xb)
+                .for_each(|(s, x)| u[s.signal] += mean(s) * x[i]);
+            inputs
+                .t
+                .iter()
+                .zip(&self.xt)
+                .for_each(|(s, x)| u[s.signal] += mean(s) * x[i]);
             self.xx[i] = step.map(&row, &u[..signals]);
         }
         // The states themselves last: the maps above are of their values at the beginning of the step.
         self.step_biases(step, inputs);
         self.elapsed += f64::from(step.samples);
         for (white, unit) in inputs.white.iter().zip(&step.white) {
-            self.xx.iter_mut().zip(unit).for_each(|(column, unit)| add_scaled(column, *white, unit));
+            self.xx
+                .iter_mut()
+                .zip(unit)
+                .for_each(|(column, unit)| add_scaled(column, *white, unit));
         }
         let q_mean = &inputs.q_mean[usize::from(!step.white.is_empty())];
         // What is new in the mean input of a signal acts through one column of B: Q = Σ q b bᵀ.
@@ -149,14 +184,30 @@ impl<'a> Joint<'a> {
         let decay = |x: &mut Nav, s: &StepOfSource| {
             x.iter_mut().for_each(|v| *v *= s.decay);
             // The w of the step moves the mean input and the state together: cov(x, s) = b q_cross.
-            step.b.get(s.signal).into_iter().for_each(|b| add_scaled(x, s.q_cross, b));
+            step.b
+                .get(s.signal)
+                .into_iter()
+                .for_each(|b| add_scaled(x, s.q_cross, b));
         };
-        self.xb.iter_mut().zip(&inputs.b).for_each(|(x, s)| decay(x, s));
-        self.xt.iter_mut().zip(&inputs.t).for_each(|(x, s)| decay(x, s));
+        self.xb
+            .iter_mut()
+            .zip(&inputs.b)
+            .for_each(|(x, s)| decay(x, s));
+        self.xt
+            .iter_mut()
+            .zip(&inputs.t)
+            .for_each(|(x, s)| decay(x, s));
         for (i, s) in inputs.b.iter().enumerate() {
-            let (bb, bt) = (&mut self.bb[i * nb..(i + 1) * nb], &mut self.bt[i * nt..(i + 1) * nt]);
-            bb.iter_mut().zip(&inputs.b).for_each(|(p, other)| *p *= s.decay * other.decay);
-            bt.iter_mut().zip(&inputs.t).for_each(|(p, other)| *p *= s.decay * other.decay);
+            let (bb, bt) = (
+                &mut self.bb[i * nb..(i + 1) * nb],
+                &mut self.bt[i * nt..(i + 1) * nt],
+            );
+            bb.iter_mut()
+                .zip(&inputs.b)
+                .for_each(|(p, other)| *p *= s.decay * other.decay);
+            bt.iter_mut()
+                .zip(&inputs.t)
+                .for_each(|(p, other)| *p *= s.decay * other.decay);
             bb[i] += s.q_state;
         }
         for (p, s) in self.tt.iter_mut().zip(&inputs.t) {
@@ -202,7 +253,10 @@ impl<'a> Joint<'a> {
             add_scaled(&mut self.xx[j], gain.x[j], &rest_x);
             add_scaled(&mut self.xx[j], -with.x[j], &gain.x);
         }
-        let (mut bb, mut bt) = (self.bb.chunks_exact_mut(nb.max(1)), self.bt.chunks_exact_mut(nt.max(1)));
+        let (mut bb, mut bt) = (
+            self.bb.chunks_exact_mut(nb.max(1)),
+            self.bt.chunks_exact_mut(nt.max(1)),
+        );
         for (xb, (k, c)) in self.xb.iter_mut().zip(gain.b.iter().zip(&with.b)) {
             add_scaled(xb, *k, &rest_x);
             add_scaled(xb, -c, &gain.x);
@@ -253,7 +307,10 @@ pub(super) struct Innovation {
 impl Innovation {
     /// The gain that is best where the covariance is right.
     fn gain(&self) -> Gain {
-        Gain { x: self.with.x.map(|c| c / self.s), b: self.with.b.iter().map(|c| c / self.s).collect() }
+        Gain {
+            x: self.with.x.map(|c| c / self.s),
+            b: self.with.b.iter().map(|c| c / self.s).collect(),
+        }
     }
 }
 

@@ -24,7 +24,11 @@ impl<'a> Mean<'a> {
             b: vec![0.0; b.states.len()],
             t: t.states.iter().map(|s| s.level).collect(),
         };
-        Self { sides, values, elapsed: 0.0 }
+        Self {
+            sides,
+            values,
+            elapsed: 0.0,
+        }
     }
 
     /// Over one step.
@@ -46,7 +50,15 @@ impl<'a> Mean<'a> {
 
     /// z ← z − k y for an innovation whose mean is y.
     pub(super) fn correct(&mut self, y: f64, gain: &Gain) {
-        self.values.x.iter_mut().zip(&gain.x).for_each(|(x, k)| *x -= k * y);
-        self.values.b.iter_mut().zip(&gain.b).for_each(|(b, k)| *b -= k * y);
+        self.values
+            .x
+            .iter_mut()
+            .zip(&gain.x)
+            .for_each(|(x, k)| *x -= k * y);
+        self.values
+            .b
+            .iter_mut()
+            .zip(&gain.b)
+            .for_each(|(b, k)| *b -= k * y);
     }
 }

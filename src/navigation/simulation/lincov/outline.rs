@@ -39,11 +39,20 @@ impl Track {
             // Between marks alone: no step may reach over a measurement.
             let leg = &self.steps[done..mark.steps];
             if let Some((first, rest)) = leg.split_first() {
-                steps.push(rest.iter().fold(first.clone(), |step, next| joined(&step, next)));
+                steps.push(
+                    rest.iter()
+                        .fold(first.clone(), |step, next| joined(&step, next)),
+                );
             }
             (done, mark.steps) = (mark.steps, steps.len());
         }
-        Self { steps, marks, outages: self.outages, start: self.start, perfect: self.perfect }
+        Self {
+            steps,
+            marks,
+            outages: self.outages,
+            start: self.start,
+            perfect: self.perfect,
+        }
     }
 
     /// The drive in half of the steps or fewer: what the search for a reduction passes along. Several fixes are one of their
@@ -54,7 +63,12 @@ impl Track {
         let (mut steps, mut marks, mut block) = (Vec::new(), Vec::new(), Block::default());
         let mut report_s = f64::NEG_INFINITY;
         for (i, (leg, mark)) in self.legs(0..self.marks.len()).enumerate() {
-            block.add(leg, mark, i.checked_sub(1).map_or(0.0, |before| self.marks[before].after_s));
+            block.add(
+                leg,
+                mark,
+                i.checked_sub(1)
+                    .map_or(0.0, |before| self.marks[before].after_s),
+            );
             let next = self.marks.get(i + 1).filter(|next| next.outages.is_empty());
             // An outage begins with its first missing fix and ends with the first fix after it, no step later.
             let is_bound = !mark.outages.is_empty() || last_fixes.contains(&i);
@@ -66,17 +80,34 @@ impl Track {
             let report = mark.after_s - report_s >= REPORT_S - SLACK_S;
             report_s = if report { mark.after_s } else { report_s };
             let rows = measured.into_iter().flat_map(Together::mean).collect();
-            marks.push(Mark { steps: steps.len(), rows, report, ..mark.clone() });
+            marks.push(Mark {
+                steps: steps.len(),
+                rows,
+                report,
+                ..mark.clone()
+            });
         }
-        Self { steps, marks, outages: self.outages, start: self.start, perfect: self.perfect }
+        Self {
+            steps,
+            marks,
+            outages: self.outages,
+            start: self.start,
+            perfect: self.perfect,
+        }
     }
 
     /// Marks whose fix is followed by a gap.
     fn last_fixes(&self) -> Vec<usize> {
-        let fixes: Vec<usize> = (0..self.marks.len()).filter(|i| self.marks[*i].fix).collect();
+        let fixes: Vec<usize> = (0..self.marks.len())
+            .filter(|i| self.marks[*i].fix)
+            .collect();
         let gap_s = |pair: &[usize]| self.marks[pair[1]].after_s - self.marks[pair[0]].after_s;
         let interval_s = fixes.windows(2).map(gap_s).fold(f64::INFINITY, f64::min);
-        fixes.windows(2).filter(|pair| gap_s(pair) > 1.5 * interval_s).map(|pair| pair[0]).collect()
+        fixes
+            .windows(2)
+            .filter(|pair| gap_s(pair) > 1.5 * interval_s)
+            .map(|pair| pair[0])
+            .collect()
     }
 }
 
@@ -98,9 +129,20 @@ impl Block {
         if self.step.is_none() {
             self.begin_s = before_s;
         }
-        self.step = self.step.take().into_iter().chain(leg.iter().cloned()).reduce(|a, b| a.of_means(&b));
+        self.step = self
+            .step
+            .take()
+            .into_iter()
+            .chain(leg.iter().cloned())
+            .reduce(|a, b| a.of_means(&b));
         for (kind, together) in self.measured.iter_mut().enumerate() {
-            together.add(mark.rows.iter().filter(|row| row.what.kind() == kind).copied().collect());
+            together.add(
+                mark.rows
+                    .iter()
+                    .filter(|row| row.what.kind() == kind)
+                    .copied()
+                    .collect(),
+            );
         }
     }
 
@@ -126,7 +168,11 @@ impl Together {
     /// One measurement of the mean of their noise.
     fn mean(self) -> impl Iterator<Item = Row> {
         let count = f64::from(self.count);
-        self.rows.into_iter().map(move |row| Row { r: row.r / count, noise: row.noise / count, ..row })
+        self.rows.into_iter().map(move |row| Row {
+            r: row.r / count,
+            noise: row.noise / count,
+            ..row
+        })
     }
 }
 
@@ -145,7 +191,10 @@ impl Step {
                 add_scaled(&mut sum[i], 1.0, more);
             }
         }
-        Self { white, ..self.of_means(next) }
+        Self {
+            white,
+            ..self.of_means(next)
+        }
     }
 
     /// Its `white`, whether it is there or follows from the mean over the step.
@@ -161,14 +210,23 @@ impl Step {
     /// The same with white noise through its mean over the step, as that of a bias.
     fn of_means(&self, next: &Self) -> Self {
         let none = [0.0; SIGNALS];
-        let mut b: Vec<Nav> = self.b.iter().map(|column| next.map(column, &none)).collect();
+        let mut b: Vec<Nav> = self
+            .b
+            .iter()
+            .map(|column| next.map(column, &none))
+            .collect();
         for (sum, column) in b.iter_mut().flatten().zip(next.b.iter().flatten()) {
             // The response to a constant input: that of the first part, carried through the second, and that
             // of the second.
             *sum += column;
         }
         let m = self.m.map(|column| next.map(&column, &none));
-        Self { samples: self.samples + next.samples, m, b, white: Vec::new() }
+        Self {
+            samples: self.samples + next.samples,
+            m,
+            b,
+            white: Vec::new(),
+        }
     }
 }
 
@@ -183,17 +241,43 @@ mod tests {
     #[test]
     fn an_outline_is_half_of_the_drive() {
         let outline = |duration_s: f64| {
-            let north =
-                Segment { kind: Kind::Straight(Length::Duration(duration_s)), climb_m: 0.0, ramp_s: None };
-            let start = Start { t_s: 0.0, lat: 0.9, lon: 0.2, h: 0.0, heading: 0.0, speed: 20.0 };
-            let drive =
-                Profile { start, bank: Bank::None, ramp_s: 2.0, segments: vec![north] }.build().unwrap();
+            let north = Segment {
+                kind: Kind::Straight(Length::Duration(duration_s)),
+                climb_m: 0.0,
+                ramp_s: None,
+            };
+            let start = Start {
+                t_s: 0.0,
+                lat: 0.9,
+                lon: 0.2,
+                h: 0.0,
+                heading: 0.0,
+                speed: 20.0,
+            };
+            let drive = Profile {
+                start,
+                bank: Bank::None,
+                ramp_s: 2.0,
+                segments: vec![north],
+            }
+            .build()
+            .unwrap();
             let mut scenario = Scenario::default();
             scenario.imu.rate_hz = 10.0;
-            let silent = Model { rate_hz: 10.0, axes: Default::default() };
-            let outages = [Outage { start_s: 600.0, end_s: 663.0 }];
+            let silent = Model {
+                rate_hz: 10.0,
+                axes: Default::default(),
+            };
+            let outages = [Outage {
+                start_s: 600.0,
+                end_s: 663.0,
+            }];
             let track = scenario.track(&drive, &silent, &outages).unwrap().outline();
-            let end = track.marks.iter().position(|mark| !mark.outages.is_empty()).unwrap();
+            let end = track
+                .marks
+                .iter()
+                .position(|mark| !mark.outages.is_empty())
+                .unwrap();
             let [.., last_fix, _] = track.marks[..end]
                 .iter()
                 .filter(|m| !m.rows.is_empty() || m.after_s > 600.0)
@@ -203,7 +287,12 @@ mod tests {
             };
             assert_eq!(track.marks[end].after_s, 663.0);
             assert!(last_fix.after_s > 600.0 && last_fix.rows.is_empty());
-            assert!(track.marks.iter().any(|mark| mark.after_s == 599.0 && !mark.rows.is_empty()));
+            assert!(
+                track
+                    .marks
+                    .iter()
+                    .any(|mark| mark.after_s == 599.0 && !mark.rows.is_empty())
+            );
             track.steps.len()
         };
         assert!(outline(1200.0) < 620 && outline(3600.0) < 1820);

@@ -72,7 +72,9 @@ impl Assessment {
 /// the same drift is in every run, [`super::TruthSide`] adds the errors instead of their variances.
 #[must_use]
 pub fn assess(track: &Track, belief: &Belief, truth: &Model) -> Assessment {
-    FilterPass::new(track, belief).errors_as_expected(belief, truth).assessment()
+    FilterPass::new(track, belief)
+        .errors_as_expected(belief, truth)
+        .assessment()
 }
 
 /// Largest error of any reported state that the strapdown alone makes at the IMU's rate, over the standard deviation that the
@@ -86,7 +88,9 @@ pub fn strapdown_over_sigma(track: &Track, belief: &Belief) -> f64 {
     // At the start there is no error yet, and perhaps no standard deviation.
     let instants = law.reports.iter().skip(1).chain(&law.outage_ends);
     let ratios = instants.flat_map(|judged| std::iter::zip(judged.errors.rmse(), judged.sigma()));
-    ratios.map(|(error, sigma)| error / sigma).fold(0.0, f64::max)
+    ratios
+        .map(|(error, sigma)| error / sigma)
+        .fold(0.0, f64::max)
 }
 
 /// The law of a filter's true errors at one instant: normal, with this mean and covariance, in the filter's navigation states
@@ -154,14 +158,23 @@ impl<'a> FilterPass<'a> {
         for (steps, mark) in track.legs(0..track.marks.len()) {
             steps.iter().for_each(|step| filter.step(step));
             // Before the measurements of the same instant, as the runs have it.
-            mark.outages.iter().for_each(|outage| ends[*outage] = filter.xx);
+            mark.outages
+                .iter()
+                .for_each(|outage| ends[*outage] = filter.xx);
             gains.extend(mark.rows.iter().map(|row| filter.measure(row)));
             if mark.report {
                 reports.push(filter.xx);
                 biases.push(filter.bias_variances().map(f64::sqrt));
             }
         }
-        Self { track, gains, reports, biases, ends, believed: own.b }
+        Self {
+            track,
+            gains,
+            reports,
+            biases,
+            ends,
+            believed: own.b,
+        }
     }
 
     /// Standard deviations that the filter states of the sensors' biases (m/s², rad/s), at every report.
@@ -173,11 +186,18 @@ impl<'a> FilterPass<'a> {
     /// Times from the start (s) of the reports at which something is measured, and the standard deviations of yaw there (degrees).
     #[must_use]
     pub fn yaw_while_measured(&self) -> Vec<(f64, f64)> {
-        let reports = self.track.marks.iter().filter(|mark| mark.report).zip(&self.reports);
+        let reports = self
+            .track
+            .marks
+            .iter()
+            .filter(|mark| mark.report)
+            .zip(&self.reports);
         // Near the vertical roll and yaw are no separate angles: yaw is uncertain there however well the attitude is known.
         let is_separate = |mark: &Mark| mark.jacobian[2].length() < STEEP;
         let measured = reports.filter(|(mark, _)| !mark.rows.is_empty() && is_separate(mark));
-        measured.map(|(mark, p)| (mark.after_s, deviations(&mark.jacobian, p)[REPORTED - 1])).collect()
+        measured
+            .map(|(mark, p)| (mark.after_s, deviations(&mark.jacobian, p)[REPORTED - 1]))
+            .collect()
     }
 
     /// Standard deviations that the filter states of the reported states (m, m/s, degrees), just before the first fix
@@ -186,7 +206,9 @@ impl<'a> FilterPass<'a> {
     pub fn sigma_at_ends(&self) -> Vec<[f64; REPORTED]> {
         let mut sigmas = vec![[0.0; REPORTED]; self.track.outages];
         for mark in &self.track.marks {
-            mark.outages.iter().for_each(|o| sigmas[*o] = deviations(&mark.jacobian, &self.ends[*o]));
+            mark.outages
+                .iter()
+                .for_each(|o| sigmas[*o] = deviations(&mark.jacobian, &self.ends[*o]));
         }
         sigmas
     }
@@ -194,9 +216,15 @@ impl<'a> FilterPass<'a> {
     /// Their means over the reports within each of some outages.
     #[must_use]
     pub fn sigma_means(&self, outages: &[Outage]) -> Vec<[f64; REPORTED]> {
-        let reports = self.track.marks.iter().filter(|mark| mark.report).zip(&self.reports);
-        let sigmas: Vec<(f64, [f64; REPORTED])> =
-            reports.map(|(mark, believed)| (mark.t_s, deviations(&mark.jacobian, believed))).collect();
+        let reports = self
+            .track
+            .marks
+            .iter()
+            .filter(|mark| mark.report)
+            .zip(&self.reports);
+        let sigmas: Vec<(f64, [f64; REPORTED])> = reports
+            .map(|(mark, believed)| (mark.t_s, deviations(&mark.jacobian, believed)))
+            .collect();
         let mean = |outage: &Outage| {
             let within = || sigmas.iter().filter(|(t_s, _)| outage.withholds(*t_s));
             let count = within().count() as f64;
@@ -207,7 +235,8 @@ impl<'a> FilterPass<'a> {
 
     /// As [`assess`], of the filter's own belief, where settings state more of the true errors than a noise model.
     pub(super) fn assess_stated(&self, belief: &Belief, truth: &TrueErrors) -> Assessment {
-        self.errors(&TruthSide::as_stated(belief, truth, !self.track.perfect)).assessment()
+        self.errors(&TruthSide::as_stated(belief, truth, !self.track.perfect))
+            .assessment()
     }
 
     /// The errors of which [`assess`] tells.
@@ -224,7 +253,12 @@ impl<'a> FilterPass<'a> {
     /// The same at the ends of outages alone: what comes after the last is not computed.
     #[must_use]
     pub fn errors_at_ends(&self, truth: &TruthSide) -> Vec<Judged> {
-        let last = self.track.marks.iter().rposition(|m| !m.outages.is_empty()).map_or(0, |at| at + 1);
+        let last = self
+            .track
+            .marks
+            .iter()
+            .rposition(|m| !m.outages.is_empty())
+            .map_or(0, |at| at + 1);
         self.errors_until(last, truth).outage_ends
     }
 
@@ -236,7 +270,9 @@ impl<'a> FilterPass<'a> {
         let (mut law, mut ends) = (ErrorLaw::default(), vec![None; self.track.outages]);
         for (steps, mark) in self.track.legs(0..marks) {
             errors.follow(steps, mark);
-            mark.outages.iter().for_each(|o| ends[*o] = Some(errors.judged(mark, &self.ends[*o])));
+            mark.outages
+                .iter()
+                .for_each(|o| ends[*o] = Some(errors.judged(mark, &self.ends[*o])));
             law.nis.1 += u64::from(mark.fix);
             for (row, (gain, believed)) in mark.rows.iter().zip(&mut gains) {
                 let square = errors.measure(row, gain);
@@ -246,7 +282,8 @@ impl<'a> FilterPass<'a> {
                 }
             }
             if mark.report {
-                law.reports.extend(reports.next().map(|believed| errors.judged(mark, believed)));
+                law.reports
+                    .extend(reports.next().map(|believed| errors.judged(mark, believed)));
             }
         }
         law.outage_ends = ends.into_iter().flatten().collect();
@@ -257,7 +294,10 @@ impl<'a> FilterPass<'a> {
 impl ErrorLaw {
     pub(super) fn assessment(&self) -> Assessment {
         let consistency = |all: &[Judged]| all.iter().map(Judged::consistency).collect();
-        Assessment { reports: consistency(&self.reports), outage_ends: consistency(&self.outage_ends) }
+        Assessment {
+            reports: consistency(&self.reports),
+            outage_ends: consistency(&self.outage_ends),
+        }
     }
 }
 
@@ -273,14 +313,26 @@ impl Instant {
     #[must_use]
     pub(crate) fn reported(&self, x: &Nav) -> [f64; REPORTED] {
         let psi = DVec3::new(x[3 * PSI], x[3 * PSI + 1], x[3 * PSI + 2]);
-        std::array::from_fn(|i| if i < 6 { x[i] } else { self.jacobian[i - 6].dot(psi) / DEG })
+        std::array::from_fn(|i| {
+            if i < 6 {
+                x[i]
+            } else {
+                self.jacobian[i - 6].dot(psi) / DEG
+            }
+        })
     }
 
     /// Variances of the reported states (m², (m/s)², degrees²) of a covariance of the filter's states.
     #[must_use]
     pub(crate) fn variances(&self, p: &[Nav; NAV]) -> [f64; REPORTED] {
         let squares = squares(&self.jacobian, p);
-        std::array::from_fn(|i| if i < 6 { squares[i] } else { squares[i] / (DEG * DEG) })
+        std::array::from_fn(|i| {
+            if i < 6 {
+                squares[i]
+            } else {
+                squares[i] / (DEG * DEG)
+            }
+        })
     }
 
     /// Root mean squares of the true errors of the reported states.
@@ -302,7 +354,9 @@ impl Judged {
         let moments = self.errors.moments();
         let p = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| self.believed[j][i]);
         let mut m = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| moments[j][i]);
-        let Some(l) = p.cholesky().map(|p| p.l()) else { return SMatrix::repeat(f64::NAN) };
+        let Some(l) = p.cholesky().map(|p| p.l()) else {
+            return SMatrix::repeat(f64::NAN);
+        };
         for _ in 0..2 {
             l.solve_lower_triangular_mut(&mut m);
             m.transpose_mut();
@@ -320,7 +374,9 @@ impl Judged {
         // One source alone need not move all nine states: P_true is then singular, its NEES finite, the
         // divergence infinite.
         let (nees, believed, real) = match (p.cholesky(), t.cholesky()) {
-            (Some(p), Some(t_factor)) => (p.solve(&t).trace(), log_det(p.l()), log_det(t_factor.l())),
+            (Some(p), Some(t_factor)) => {
+                (p.solve(&t).trace(), log_det(p.l()), log_det(t_factor.l()))
+            }
             (Some(p), None) => (p.solve(&t).trace(), log_det(p.l()), f64::NEG_INFINITY),
             _ => (f64::NAN, f64::NAN, f64::NAN),
         };

@@ -21,7 +21,9 @@ use crate::sensors::outage::Outage;
 use crate::simulation::plan::Experiment;
 use crate::simulation::{NEES_DOF, REPORTED};
 use crate::trajectory::Trajectory;
-use crate::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
+use crate::trajectory::profile::{
+    Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
+};
 use crate::units::DEG;
 
 /// White noise, drive, correlation time: of the accelerometers front and right, down, of the gyroscopes front and right,
@@ -36,8 +38,11 @@ type Factors = [f64; FACTORS];
 #[must_use]
 pub fn reduced_belief(model: &Model, wavelet: Belief, track: &Track, alike: Alike) -> Belief {
     let exact = Channel::ALL.map(|c| reduction::is_exact(model.axis(c)));
-    let is_free =
-        |i: &usize| Channel::ALL.into_iter().any(|c| !exact[c.index()] && alike.first_factor(c) == i / 3 * 3);
+    let is_free = |i: &usize| {
+        Channel::ALL
+            .into_iter()
+            .any(|c| !exact[c.index()] && alike.first_factor(c) == i / 3 * 3)
+    };
     let free: Vec<usize> = (0..FACTORS).filter(is_free).collect();
     if free.is_empty() {
         return wavelet;
@@ -45,8 +50,18 @@ pub fn reduced_belief(model: &Model, wavelet: Belief, track: &Track, alike: Alik
     let track = track.outline();
     // The interval of fixes and the window matter to a reduction alone; here each process has a state.
     let full = Belief::new(model, FilterStates::Full, 1.0, 1.0);
-    let best = full.map_or(Vec::new(), |full| horizontal_m(&assess(&track, &full, model)).collect());
-    let search = Search { model, base: wavelet, track, best, exact, alike, free };
+    let best = full.map_or(Vec::new(), |full| {
+        horizontal_m(&assess(&track, &full, model)).collect()
+    });
+    let search = Search {
+        model,
+        base: wavelet,
+        track,
+        best,
+        exact,
+        alike,
+        free,
+    };
     search.belief(&search.minimise())
 }
 
@@ -105,18 +120,32 @@ impl Search<'_> {
         let belief = self.belief(ln);
         let law = FilterPass::new(&self.track, &belief).errors_as_expected(&belief, self.model);
         let assessment = law.assessment();
-        let steep: Vec<Steep> = steep(&assessment).into_iter().chain(self.lost(&assessment)).collect();
+        let steep: Vec<Steep> = steep(&assessment)
+            .into_iter()
+            .chain(self.lost(&assessment))
+            .collect();
         let ridge = RIDGE * ln.iter().map(|x| x * x).sum::<f64>();
-        let cost = divergence(&assessment, |_| 0.0) + steep.iter().map(Steep::cost).sum::<f64>() + ridge;
-        let bent = |x: &f64| Part { value: *x, curvature: 2.0 * RIDGE };
-        let parts = shape(&law).chain(steep.iter().map(Steep::part)).chain(ln.iter().map(bent)).collect();
+        let cost =
+            divergence(&assessment, |_| 0.0) + steep.iter().map(Steep::cost).sum::<f64>() + ridge;
+        let bent = |x: &f64| Part {
+            value: *x,
+            curvature: 2.0 * RIDGE,
+        };
+        let parts = shape(&law)
+            .chain(steep.iter().map(Steep::part))
+            .chain(ln.iter().map(bent))
+            .collect();
         Value { cost, parts }
     }
 
     /// What the horizontal position at the outage ends loses to the filter with all states counts where it is a fiftieth, steeply.
     fn lost(&self, assessment: &Assessment) -> Vec<Steep> {
         let weight = ENDS * LOST_WEIGHT / self.best.len().max(1) as f64;
-        let lost = |(own, best): (f64, &f64)| Steep { x: (own / best).ln().max(0.0), scale: LOST, weight };
+        let lost = |(own, best): (f64, &f64)| Steep {
+            x: (own / best).ln().max(0.0),
+            scale: LOST,
+            weight,
+        };
         horizontal_m(assessment).zip(&self.best).map(lost).collect()
     }
 
@@ -128,10 +157,16 @@ impl Search<'_> {
             ln
         };
         let value = |free: &[f64]| self.value(&factors(free));
-        let descent =
-            Damped { value: &value, bounds: (-MAX_LN, MAX_LN), iterations: ITERATIONS, enough: ENOUGH };
+        let descent = Damped {
+            value: &value,
+            bounds: (-MAX_LN, MAX_LN),
+            iterations: ITERATIONS,
+            enough: ENOUGH,
+        };
         let start = self.free.iter().map(|i| START[*i]).collect();
-        descent.minimum(start).map_or([0.0; FACTORS], |found| factors(&found))
+        descent
+            .minimum(start)
+            .map_or([0.0; FACTORS], |found| factors(&found))
     }
 }
 
@@ -160,7 +195,10 @@ const NEES_WEIGHT: f64 = 0.1;
 
 /// Horizontal RMSE at the outage ends (m).
 fn horizontal_m(assessment: &Assessment) -> impl Iterator<Item = f64> {
-    assessment.outage_ends.iter().map(|end| end.rmse[0].hypot(end.rmse[1]))
+    assessment
+        .outage_ends
+        .iter()
+        .map(|end| end.rmse[0].hypot(end.rmse[1]))
 }
 
 /// A logarithm that costs its fourth power: `scale` off costs `weight`, half of that a sixteenth, twice as much sixteen times;
@@ -179,7 +217,10 @@ impl Steep {
 
     fn part(&self) -> Part {
         // The square of (x/scale)², whose slope is 2 x/scale²: as Gauss and Newton have it, so that a step halves x.
-        Part { value: self.x, curvature: 8.0 * self.weight * self.x.powi(2) / self.scale.powi(4) }
+        Part {
+            value: self.x,
+            curvature: 8.0 * self.weight * self.x.powi(2) / self.scale.powi(4),
+        }
     }
 }
 
@@ -190,17 +231,33 @@ fn steep(assessment: &Assessment) -> Vec<Steep> {
     let ends = &assessment.outage_ends;
     let of_end = ENDS * OFF_WEIGHT / ends.len() as f64;
     let at_ends = ends.iter().flat_map(|end| end.ratio());
-    let mut all: Vec<Steep> = at_ends.map(|r| Steep { x: r.ln(), scale: OFF, weight: of_end }).collect();
+    let mut all: Vec<Steep> = at_ends
+        .map(|r| Steep {
+            x: r.ln(),
+            scale: OFF,
+            weight: of_end,
+        })
+        .collect();
     let reports = assessment.reports.get(1..).unwrap_or_default();
     if reports.is_empty() {
         return all;
     }
-    let mean = |of: &dyn Fn(&Consistency) -> f64| reports.iter().map(of).sum::<f64>() / reports.len() as f64;
+    let mean = |of: &dyn Fn(&Consistency) -> f64| {
+        reports.iter().map(of).sum::<f64>() / reports.len() as f64
+    };
     // Root mean square over the way, so that one bad minute is not hidden by an hour that is good.
     let over_way = |i: usize| 0.5 * mean(&|c| c.ratio()[i].powi(2)).ln();
-    all.extend((0..REPORTED).map(|i| Steep { x: over_way(i), scale: OFF, weight: WAY * OFF_WEIGHT }));
+    all.extend((0..REPORTED).map(|i| Steep {
+        x: over_way(i),
+        scale: OFF,
+        weight: WAY * OFF_WEIGHT,
+    }));
     let nees = (mean(&|c| c.nees) / NEES_DOF as f64).ln();
-    all.push(Steep { x: nees, scale: NEES_OFF, weight: WAY * NEES_WEIGHT });
+    all.push(Steep {
+        x: nees,
+        scale: NEES_OFF,
+        weight: WAY * NEES_WEIGHT,
+    });
     all
 }
 
@@ -208,29 +265,42 @@ fn steep(assessment: &Assessment) -> Vec<Steep> {
 /// the squares of what its elements are off, and so its second derivative with respect to each of them is the weight of the instant.
 fn shape(law: &ErrorLaw) -> impl Iterator<Item = Part> {
     let reports = law.reports.get(1..).unwrap_or_default();
-    let of_ends = if law.outage_ends.is_empty() { 0.0 } else { ENDS };
+    let of_ends = if law.outage_ends.is_empty() {
+        0.0
+    } else {
+        ENDS
+    };
     let weighted = |all: &[Judged], weight: f64| {
         let weight = weight / all.len().max(1) as f64;
-        all.iter().map(|judged| (judged.whitened(), weight)).collect::<Vec<_>>()
+        all.iter()
+            .map(|judged| (judged.whitened(), weight))
+            .collect::<Vec<_>>()
     };
-    let all = weighted(&law.outage_ends, of_ends).into_iter().chain(weighted(reports, 1.0 - of_ends));
+    let all = weighted(&law.outage_ends, of_ends)
+        .into_iter()
+        .chain(weighted(reports, 1.0 - of_ends));
     all.flat_map(|(m, weight)| {
         // An element off the diagonal is there twice.
         let part = move |(i, j): (usize, usize)| Part {
             value: m[(i, j)],
             curvature: if i == j { weight } else { 2.0 * weight },
         };
-        (0..NAV).flat_map(|i| (0..=i).map(move |j| (i, j))).map(part)
+        (0..NAV)
+            .flat_map(|i| (0..=i).map(move |j| (i, j)))
+            .map(part)
     })
 }
 
 /// The divergence on the average and at the outage ends, where `beside` is added to it.
 pub(super) fn divergence(assessment: &Assessment, beside: impl Fn(&Consistency) -> f64) -> f64 {
-    let mean =
-        |c: &[Consistency], f: &dyn Fn(&Consistency) -> f64| c.iter().map(f).sum::<f64>() / c.len() as f64;
+    let mean = |c: &[Consistency], f: &dyn Fn(&Consistency) -> f64| {
+        c.iter().map(f).sum::<f64>() / c.len() as f64
+    };
     // The first instant is the initial state, which no belief about the IMU changes. A trajectory of a few
     // seconds has no other: the mean of none is NaN, and a search ends where it starts.
-    let all = mean(assessment.reports.get(1..).unwrap_or_default(), &|c| c.divergence);
+    let all = mean(assessment.reports.get(1..).unwrap_or_default(), &|c| {
+        c.divergence
+    });
     if assessment.outage_ends.is_empty() {
         return all;
     }
@@ -258,7 +328,12 @@ const DRIVE_HZ: f64 = 10.0;
 /// A built-in drive with a receiver and two outages, as long as the shortest and the longest of `outages_s` (s):
 /// for data whose reference is not known. None where the receiver's rate does not allow it.
 #[must_use]
-pub fn drive(model: &Model, defects: &ImuSettings, gnss: &GnssSettings, outages_s: &[f64]) -> Option<Track> {
+pub fn drive(
+    model: &Model,
+    defects: &ImuSettings,
+    gnss: &GnssSettings,
+    outages_s: &[f64],
+) -> Option<Track> {
     let longest = outages_s.iter().copied().fold(0.0, f64::max).min(LONGEST_S);
     let shortest = outages_s.iter().copied().fold(longest, f64::min);
     let first = LEAD_S[0] + shortest;
@@ -304,8 +379,14 @@ pub fn drive(model: &Model, defects: &ImuSettings, gnss: &GnssSettings, outages_
 /// A drive of at least that long: what a car meets in town and out of it, over and over.
 fn path(duration_s: f64) -> Option<Trajectory> {
     let straight = |s: f64| Kind::Straight(Length::Duration(s));
-    let accelerate = |to_speed: f64, s: f64| Kind::Accelerate { to_speed, by: Acceleration::Duration(s) };
-    let turn = |deg: f64, s: f64| Kind::Turn { angle: deg * DEG, by: Turning::Duration(s) };
+    let accelerate = |to_speed: f64, s: f64| Kind::Accelerate {
+        to_speed,
+        by: Acceleration::Duration(s),
+    };
+    let turn = |deg: f64, s: f64| Kind::Turn {
+        angle: deg * DEG,
+        by: Turning::Duration(s),
+    };
     let cycle = [
         accelerate(14.0, 11.0),
         straight(12.0),
@@ -323,9 +404,32 @@ fn path(duration_s: f64) -> Option<Trajectory> {
     ];
     // The sum of the durations above.
     let cycle_s = 158.0;
-    let segment = |kind: &Kind| Segment { kind: kind.clone(), climb_m: 0.0, ramp_s: None };
+    let segment = |kind: &Kind| Segment {
+        kind: kind.clone(),
+        climb_m: 0.0,
+        ramp_s: None,
+    };
     let cycles = (duration_s / cycle_s).ceil() as usize;
-    let segments = cycle.iter().cycle().take(cycles * cycle.len()).map(segment).collect();
-    let start = Start { t_s: 0.0, lat: 45.0 * DEG, lon: 0.0, h: 0.0, heading: 40.0 * DEG, speed: 0.0 };
-    Profile { start, bank: Bank::None, ramp_s: 1.5, segments }.build().ok()
+    let segments = cycle
+        .iter()
+        .cycle()
+        .take(cycles * cycle.len())
+        .map(segment)
+        .collect();
+    let start = Start {
+        t_s: 0.0,
+        lat: 45.0 * DEG,
+        lon: 0.0,
+        h: 0.0,
+        heading: 40.0 * DEG,
+        speed: 0.0,
+    };
+    Profile {
+        start,
+        bank: Bank::None,
+        ramp_s: 1.5,
+        segments,
+    }
+    .build()
+    .ok()
 }

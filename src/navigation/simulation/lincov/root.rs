@@ -50,7 +50,11 @@ impl Crossing {
             let found = (middle, value(middle)?);
             // Illinois: the end that stays is given half of its value, since plain regula falsi keeps one end
             // for ever where the function is convex.
-            near = if found.1 * far.1 < 0.0 { far } else { (near.0, 0.5 * near.1) };
+            near = if found.1 * far.1 < 0.0 {
+                far
+            } else {
+                (near.0, 0.5 * near.1)
+            };
             far = found;
         }
         Ok(far)
@@ -63,7 +67,11 @@ mod tests {
     use std::convert::Infallible;
 
     fn found(start: f64, f: impl Fn(f64) -> f64) -> f64 {
-        let crossing = Crossing { bounds: (-5.0, 5.0), step: 0.1, exact: 1e-9 };
+        let crossing = Crossing {
+            bounds: (-5.0, 5.0),
+            step: 0.1,
+            exact: 1e-9,
+        };
         let Ok((x, _)) = crossing.from::<Infallible>(start, |x| Ok(f(x)));
         x
     }
@@ -74,7 +82,10 @@ mod tests {
         for start in [-4.0, 0.0, 4.0] {
             assert!((found(start, falling) + std::f64::consts::LN_2).abs() < 1e-8);
         }
-        assert_eq!((found(0.0, |x| 9.0 - x), found(0.0, |x| -9.0 - x)), (5.0, -5.0));
+        assert_eq!(
+            (found(0.0, |x| 9.0 - x), found(0.0, |x| -9.0 - x)),
+            (5.0, -5.0)
+        );
         // it comes close to zero from above and never crosses
         assert!(found(0.0, |x| (-20.0 * x).exp()) < 2.0);
         // a step: the bracket closes on it

@@ -33,15 +33,29 @@ impl Sides {
                 inputs.push((step.samples, Inputs::new(&b, &t, step.samples)));
             }
         }
-        let signals = b.states.iter().chain(&t.states).map(|s| s.signal + 1).max().unwrap_or(0);
+        let signals = b
+            .states
+            .iter()
+            .chain(&t.states)
+            .map(|s| s.signal + 1)
+            .max()
+            .unwrap_or(0);
         // What a track does not follow would be left out in silence.
         debug_assert!(track.steps.iter().all(|step| signals <= step.b.len()));
-        Self { b, t, signals, inputs }
+        Self {
+            b,
+            t,
+            signals,
+            inputs,
+        }
     }
 
     /// What they do over a step of the track.
     pub(super) fn over(&self, step: &Step) -> &Inputs {
-        let found = self.inputs.iter().find(|(samples, _)| *samples == step.samples);
+        let found = self
+            .inputs
+            .iter()
+            .find(|(samples, _)| *samples == step.samples);
         &found.expect("every length of the track is there").1
     }
 }
@@ -62,15 +76,26 @@ impl Inputs {
     /// The steps of the filter's states `b` and of the states `t` of the truth; white noise belongs to the side that
     /// makes the errors.
     fn new(b: &Sources, t: &Sources, samples: u32) -> Self {
-        let steps_of =
-            |s: &Sources| -> Vec<StepOfSource> { s.states.iter().map(|x| x.over(samples)).collect() };
+        let steps_of = |s: &Sources| -> Vec<StepOfSource> {
+            s.states.iter().map(|x| x.over(samples)).collect()
+        };
         let (bs, ts) = (steps_of(b), steps_of(t));
         let white: [f64; BIASES] = std::array::from_fn(|i| b.white[i] + t.white[i]);
         let mut q_mean = [[0.0; SIGNALS]; 2];
-        q_mean[0].iter_mut().zip(white).for_each(|(q, white)| *q = white / f64::from(samples));
+        q_mean[0]
+            .iter_mut()
+            .zip(white)
+            .for_each(|(q, white)| *q = white / f64::from(samples));
         for source in bs.iter().chain(&ts) {
-            q_mean.iter_mut().for_each(|q| q[source.signal] += source.q_mean);
+            q_mean
+                .iter_mut()
+                .for_each(|q| q[source.signal] += source.q_mean);
         }
-        Self { b: bs, t: ts, white, q_mean }
+        Self {
+            b: bs,
+            t: ts,
+            white,
+            q_mean,
+        }
     }
 }

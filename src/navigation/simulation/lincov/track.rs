@@ -89,7 +89,15 @@ impl Row {
     /// A measurement whose true noise is as the filter believes.
     fn new(h: [f64; NAV + 3], felt: Surroundings, r: f64, what: Measured) -> Self {
         let of_gnss = matches!(what, Measured::Position(_) | Measured::Velocity);
-        Self { h, felt, r, noise: r, what, motion: [DVec3::ZERO; 2], of_gnss }
+        Self {
+            h,
+            felt,
+            r,
+            noise: r,
+            what,
+            motion: [DVec3::ZERO; 2],
+            of_gnss,
+        }
     }
 
     /// The coefficient of a source's state in the measurement after `elapsed` samples, beside its part through the
@@ -97,7 +105,9 @@ impl Row {
     pub(super) fn coefficient(&self, source: &Source, elapsed: f64) -> f64 {
         match (source.outer, self.what) {
             (None, _) => {}
-            (Some(Outer::Position(of)), Measured::Position(here)) => return f64::from(u8::from(of == here)),
+            (Some(Outer::Position(of)), Measured::Position(here)) => {
+                return f64::from(u8::from(of == here));
+            }
             (Some(Outer::Vehicle(part)), Measured::Aid(aid, axis)) if part.aid() == aid => {
                 return part.coefficient(axis, self.motion[0], self.motion[1]);
             }
@@ -157,11 +167,15 @@ impl Track {
     }
 
     /// For models of another rate than that at which the motion is sampled (Hz).
-    pub(super) fn of_noise_at(noise_hz: f64, experiment: &Experiment<'_>) -> Result<Self, ExperimentError> {
+    pub(super) fn of_noise_at(
+        noise_hz: f64,
+        experiment: &Experiment<'_>,
+    ) -> Result<Self, ExperimentError> {
         let plan = &Plan::reference(experiment)?;
         let mut line = Linearisation::new(plan, noise_hz);
         let longest = ((STEP_S * experiment.rate_hz).round() as usize).max(1);
-        let (mut steps, mut marks, mut done) = (Vec::new(), Vec::with_capacity(plan.events.len()), 0);
+        let (mut steps, mut marks, mut done) =
+            (Vec::new(), Vec::with_capacity(plan.events.len()), 0);
         for (index, event) in plan.events.iter().enumerate() {
             let samples = event.sample - done;
             // Parts of equal length: what the noise processes do over a step is computed once for each length
@@ -179,14 +193,26 @@ impl Track {
                 fix: event.fix,
                 rows: line.rows(plan, event),
                 report: event.report,
-                outages: plan.outages.iter().enumerate().filter(ends).map(|(i, _)| i).collect(),
+                outages: plan
+                    .outages
+                    .iter()
+                    .enumerate()
+                    .filter(ends)
+                    .map(|(i, _)| i)
+                    .collect(),
                 jacobian: RollPitchYaw::from_quat(event.reference.q_b_n).jacobian_of_psi_n(),
                 closure: line.close(&event.reference),
             });
         }
         drop_closed(&mut marks);
         let (outages, perfect) = (plan.outages.len(), experiment.initial.perfect);
-        Ok(Self { steps, marks, outages, start: start(plan), perfect })
+        Ok(Self {
+            steps,
+            marks,
+            outages,
+            start: start(plan),
+            perfect,
+        })
     }
 
     /// The same where a filter believes the vehicle's own measurements to be so much worse; in truth they are as they were.
@@ -206,8 +232,16 @@ impl Track {
 
     /// Some marks, each with the steps that lead to it.
     pub(super) fn legs(&self, marks: Range<usize>) -> impl Iterator<Item = (&[Step], &Mark)> {
-        let begin = |mark: usize| mark.checked_sub(1).map_or(0, |before| self.marks[before].steps);
-        marks.map(move |mark| (&self.steps[begin(mark)..self.marks[mark].steps], &self.marks[mark]))
+        let begin = |mark: usize| {
+            mark.checked_sub(1)
+                .map_or(0, |before| self.marks[before].steps)
+        };
+        marks.map(move |mark| {
+            (
+                &self.steps[begin(mark)..self.marks[mark].steps],
+                &self.marks[mark],
+            )
+        })
     }
 }
 
@@ -226,10 +260,20 @@ impl Linearisation {
     fn new(plan: &Plan<'_>, noise_hz: f64) -> Self {
         let experiment = plan.experiment;
         let ins = Strapdown::single(&plan.start, experiment.gravity);
-        let defects = Sensor::ALL.into_iter().flat_map(|sensor| defects(experiment.defects, sensor));
-        let signals =
-            defects.flat_map(|s| s.side.inertial.states).map(|s| s.signal + 1).fold(CROSSED, usize::max);
-        Self { ins, felt: Surroundings::default(), dt: 1.0 / experiment.rate_hz, noise_hz, signals }
+        let defects = Sensor::ALL
+            .into_iter()
+            .flat_map(|sensor| defects(experiment.defects, sensor));
+        let signals = defects
+            .flat_map(|s| s.side.inertial.states)
+            .map(|s| s.signal + 1)
+            .fold(CROSSED, usize::max);
+        Self {
+            ins,
+            felt: Surroundings::default(),
+            dt: 1.0 / experiment.rate_hz,
+            noise_hz,
+            signals,
+        }
     }
 
     /// The maps of the samples one after the other, the Earth's as the filter applies them.
@@ -237,7 +281,9 @@ impl Linearisation {
         let unit = |i: usize| std::array::from_fn(|k| if i == k { 1.0 } else { 0.0 });
         let mut step = Step {
             // Samples of the noise model's rate, which need not be the rate at which the motion is sampled.
-            samples: (samples.len() as f64 * self.dt * self.noise_hz).round().max(1.0) as u32,
+            samples: (samples.len() as f64 * self.dt * self.noise_hz)
+                .round()
+                .max(1.0) as u32,
             m: std::array::from_fn(unit),
             b: vec![[0.0; NAV]; self.signals],
             white: Vec::new(),
@@ -251,14 +297,26 @@ impl Linearisation {
             step.apply(&Sample::new(&trace, self.dt), &self.felt);
             age += self.dt;
             if age + 0.5 * self.dt > EARTH_STEP_S {
-                step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, &self.felt);
+                step.apply(
+                    &EarthStep {
+                        terms: EarthTerms::at(&self.ins),
+                        dt: age,
+                    },
+                    &self.felt,
+                );
                 age = 0.0;
             }
         }
         // A measurement meets a covariance that has all of the Earth's terms, as `settle` gives it in the
         // filter.
         if age > 0.0 {
-            step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, &self.felt);
+            step.apply(
+                &EarthStep {
+                    terms: EarthTerms::at(&self.ins),
+                    dt: age,
+                },
+                &self.felt,
+            );
         }
         step
     }
@@ -285,9 +343,16 @@ impl Linearisation {
         if event.fix {
             let gnss = experiment.gnss;
             let h = fix_rows(&self.ins, omega_ib_b, gnss.lever_arm_m.into());
-            let sigmas = gnss.pos_sigma_m.into_iter().chain(gnss.vel_sigma_m_s.into_iter().flatten());
+            let sigmas = gnss
+                .pos_sigma_m
+                .into_iter()
+                .chain(gnss.vel_sigma_m_s.into_iter().flatten());
             for (i, (h, sigma)) in h.into_iter().zip(sigmas).enumerate() {
-                let what = if i < 3 { Measured::Position(i) } else { Measured::Velocity };
+                let what = if i < 3 {
+                    Measured::Position(i)
+                } else {
+                    Measured::Velocity
+                };
                 rows.push(Row::new(h, self.felt, sigma * sigma, what));
             }
         }
@@ -330,8 +395,16 @@ impl Linearisation {
 fn drop_closed(marks: &mut [Mark]) {
     let bounds = Bounds::default();
     let mut sum = [0.0; NAV];
-    marks.iter().for_each(|mark| add_scaled(&mut sum, 1.0, &mark.closure));
-    let length = |block: usize| sum[3 * block..3 * block + 3].iter().map(|x| x * x).sum::<f64>().sqrt();
+    marks
+        .iter()
+        .for_each(|mark| add_scaled(&mut sum, 1.0, &mark.closure));
+    let length = |block: usize| {
+        sum[3 * block..3 * block + 3]
+            .iter()
+            .map(|x| x * x)
+            .sum::<f64>()
+            .sqrt()
+    };
     let is_closed = length(R) <= bounds.position_m
         && length(V) <= bounds.velocity_m_s
         && length(PSI) <= bounds.attitude_rad;
@@ -374,7 +447,8 @@ fn start(plan: &Plan<'_>) -> [Nav; NAV] {
         p[3 * V + i][3 * V + i] = initial.vel_sigma_m_s[i].powi(2);
         for j in 0..3 {
             // J diag(σ²) Jᵀ with J from roll, pitch, yaw to psi_n.
-            let angle = |k: usize| psi[(i, k)] * psi[(j, k)] * (initial.att_sigma_deg[k] * DEG).powi(2);
+            let angle =
+                |k: usize| psi[(i, k)] * psi[(j, k)] * (initial.att_sigma_deg[k] * DEG).powi(2);
             p[3 * PSI + i][3 * PSI + j] = (0..3).map(angle).sum();
         }
     }

@@ -43,8 +43,16 @@ pub struct TrueErrors {
 impl From<Model> for TrueErrors {
     /// Nothing beside the model but what the filter expects.
     fn from(model: Model) -> Self {
-        let imu = ImuSettings { rate_hz: model.rate_hz, ..ImuSettings::default() };
-        Self { model, imu, gnss: GnssSettings::default(), aiding: AidingSettings::default() }
+        let imu = ImuSettings {
+            rate_hz: model.rate_hz,
+            ..ImuSettings::default()
+        };
+        Self {
+            model,
+            imu,
+            gnss: GnssSettings::default(),
+            aiding: AidingSettings::default(),
+        }
     }
 }
 
@@ -62,7 +70,11 @@ pub struct NamedSource {
 
 impl NamedSource {
     fn new(name: impl Into<String>, side: TruthSide) -> Self {
-        Self { name: name.into(), process: None, side }
+        Self {
+            name: name.into(),
+            process: None,
+            side,
+        }
     }
 }
 
@@ -80,7 +92,10 @@ impl TruthSide {
             all.inertial.extend(&part.inertial);
             all.starts_off |= part.starts_off;
             all.integrates |= part.integrates;
-            all.noise.iter_mut().zip(part.noise).for_each(|(there, more)| *there |= more);
+            all.noise
+                .iter_mut()
+                .zip(part.noise)
+                .for_each(|(there, more)| *there |= more);
         }
         all
     }
@@ -105,7 +120,10 @@ impl TruthSide {
 
     /// The integration error of the strapdown alone.
     pub(super) fn of_strapdown() -> Self {
-        Self { integrates: true, ..Self::default() }
+        Self {
+            integrates: true,
+            ..Self::default()
+        }
     }
 
     /// The sources that a filter believes in: its bias states instead of a model's processes.
@@ -125,27 +143,45 @@ impl TruthSide {
     pub(super) fn as_expected(belief: &Belief, model: &Model, starts_off: bool) -> Self {
         let mut inertial = Sources::of_model(model);
         inertial.states.extend(Sources::beside_model(belief));
-        Self { inertial, starts_off, noise: [true; NOISES], integrates: false }
+        Self {
+            inertial,
+            starts_off,
+            noise: [true; NOISES],
+            integrates: false,
+        }
     }
 
     /// The same, with what the settings of the true IMU and of the receiver state in the place of what the filter
     /// expects: turn-on biases (a 0 too), scale factors and other errors of the IMU, correlated errors of positions. The strapdown errs.
     pub(super) fn as_stated(belief: &Belief, errors: &TrueErrors, starts_off: bool) -> Self {
-        let TrueErrors { model, imu, gnss, aiding } = errors;
-        let mut all = Self { integrates: true, ..Self::as_expected(belief, model, starts_off) };
+        let TrueErrors {
+            model,
+            imu,
+            gnss,
+            aiding,
+        } = errors;
+        let mut all = Self {
+            integrates: true,
+            ..Self::as_expected(belief, model, starts_off)
+        };
         let mut stated: Vec<NamedSource> = correlated(gnss, imu.rate_hz).into_iter().collect();
         // the processes of the model come first and stay; an expectation has its place in the list after them
         let own = Sources::of_model(model).states.len();
         let mut expected = all.inertial.states.split_off(own);
-        let parts: Vec<Outer> = aiding.errors().into_iter().map(|error| Outer::Vehicle(error.part)).collect();
+        let parts: Vec<Outer> = aiding
+            .errors()
+            .into_iter()
+            .map(|error| Outer::Vehicle(error.part))
+            .collect();
         expected.retain(|source| source.outer.is_none_or(|outer| !parts.contains(&outer)));
         stated.extend(lasting(aiding, imu.rate_hz));
         for sensor in Sensor::ALL {
             let first = 3 * sensor as usize;
             let (bias, (_, ppm)) = (imu.turn_on_bias(sensor), imu.deviations(sensor));
             expected.retain(|source| {
-                let is_of =
-                    |signal: usize| source.outer.is_none() && (signal..signal + 3).contains(&source.signal);
+                let is_of = |signal: usize| {
+                    source.outer.is_none() && (signal..signal + 3).contains(&source.signal)
+                };
                 !(bias.is_some() && is_of(first) || ppm > 0.0 && is_of(SCALED + first))
             });
             stated.extend(defects(imu, sensor));
@@ -169,16 +205,32 @@ impl TruthSide {
 /// Start, receiver, barometer and what the vehicle measures of itself.
 fn beside_the_imu(experiment: &Experiment<'_>, starts_off: bool) -> Vec<NamedSource> {
     // One kind of white noise at a time: a budget asks for the share of each.
-    let noise = |at: usize| TruthSide { noise: std::array::from_fn(|i| i == at), ..TruthSide::default() };
-    let start = TruthSide { starts_off: true, ..TruthSide::default() };
+    let noise = |at: usize| TruthSide {
+        noise: std::array::from_fn(|i| i == at),
+        ..TruthSide::default()
+    };
+    let start = TruthSide {
+        starts_off: true,
+        ..TruthSide::default()
+    };
     let all = [
         ("initial".to_owned(), start, starts_off),
         ("gnss.position".to_owned(), noise(0), true),
-        ("gnss.velocity".to_owned(), noise(1), experiment.gnss.vel_sigma_m_s.is_some()),
+        (
+            "gnss.velocity".to_owned(),
+            noise(1),
+            experiment.gnss.vel_sigma_m_s.is_some(),
+        ),
         ("baro".to_owned(), noise(2), experiment.baro.is_some()),
     ];
     let aids = experiment.aiding.rates();
-    let aids = aids.map(|(aid, _)| (format!("aiding.{}", aid.name()), noise(3 + aid as usize), true));
+    let aids = aids.map(|(aid, _)| {
+        (
+            format!("aiding.{}", aid.name()),
+            noise(3 + aid as usize),
+            true,
+        )
+    });
     all.into_iter()
         .chain(aids)
         .filter(|(_, _, is_there)| *is_there)
@@ -188,8 +240,14 @@ fn beside_the_imu(experiment: &Experiment<'_>, starts_off: bool) -> Vec<NamedSou
 
 /// A source of states alone; none where there are none.
 fn inertial(name: String, states: Vec<Source>) -> Option<NamedSource> {
-    let inertial = Sources { states, ..Sources::default() };
-    let side = TruthSide { inertial, ..TruthSide::default() };
+    let inertial = Sources {
+        states,
+        ..Sources::default()
+    };
+    let side = TruthSide {
+        inertial,
+        ..TruthSide::default()
+    };
     (!side.inertial.states.is_empty()).then(|| NamedSource::new(name, side))
 }
 
@@ -204,11 +262,17 @@ fn processes(model: &Model, sensor: Sensor, drifts: &mut Vec<Source>) -> Vec<Nam
                 continue;
             }
             let name = format!("{}.{label}", sensor.name());
-            let at = found.iter().position(|known| known.name == name).unwrap_or_else(|| {
-                let process = Some((sensor, process.kind()));
-                found.push(NamedSource { process, ..NamedSource::new(name, TruthSide::default()) });
-                found.len() - 1
-            });
+            let at = found
+                .iter()
+                .position(|known| known.name == name)
+                .unwrap_or_else(|| {
+                    let process = Some((sensor, process.kind()));
+                    found.push(NamedSource {
+                        process,
+                        ..NamedSource::new(name, TruthSide::default())
+                    });
+                    found.len() - 1
+                });
             // The axes are independent: one source with three states has the sum of their covariances.
             found[at].side.inertial.add(channel.index(), process);
         }
@@ -227,18 +291,29 @@ pub(super) fn defects(imu: &ImuSettings, sensor: Sensor) -> Vec<NamedSource> {
             let sigma = imu.vibration.as_ref().map_or(0.0, |v| v.rectification_s2_m);
             ("rectification", sigma, RECTIFIED..WARMED)
         }
-        Sensor::Gyro => ("g_sensitivity", imu.g_sensitivity_rad_s_per_m_s2, PUSHED..RECTIFIED),
+        Sensor::Gyro => (
+            "g_sensitivity",
+            imu.g_sensitivity_rad_s_per_m_s2,
+            PUSHED..RECTIFIED,
+        ),
     };
     let all = [
         ("turn_on_bias", bias, first..first + 3),
         ("scale", ppm * 1e-6, SCALED + first..SCALED + first + 3),
         ("misalignment", imu.misalignment_rad, crossed..crossed + 6),
         of_force,
-        ("temperature", of_temperature, WARMED + first..WARMED + first + 3),
+        (
+            "temperature",
+            of_temperature,
+            WARMED + first..WARMED + first + 3,
+        ),
     ];
     let source = |(name, sigma, signals): (&str, f64, Range<usize>)| {
         let states = signals.map(|signal| Source::constant(signal, sigma));
-        inertial(format!("{}.{name}", sensor.name()), states.filter(|s| s.initial > 0.0).collect())
+        inertial(
+            format!("{}.{name}", sensor.name()),
+            states.filter(|s| s.initial > 0.0).collect(),
+        )
     };
     all.into_iter().filter_map(source).collect()
 }
@@ -248,7 +323,11 @@ pub(super) fn defects(imu: &ImuSettings, sensor: Sensor) -> Vec<NamedSource> {
 fn correlated(gnss: &GnssSettings, imu_hz: f64) -> Option<NamedSource> {
     let phi = (-1.0 / (imu_hz * gnss.correlation_time_s)).exp();
     let state = |(component, sigma): (usize, f64)| Source::of_position(component, phi, sigma);
-    let sigmas = gnss.correlated_pos_sigma_m.into_iter().enumerate().filter(|(_, sigma)| *sigma > 0.0);
+    let sigmas = gnss
+        .correlated_pos_sigma_m
+        .into_iter()
+        .enumerate()
+        .filter(|(_, sigma)| *sigma > 0.0);
     inertial("gnss.correlated".to_owned(), sigmas.map(state).collect())
 }
 
@@ -263,7 +342,10 @@ fn lasting(aiding: &AidingSettings, imu_hz: f64) -> Vec<NamedSource> {
             None => found.push((name, vec![source])),
         }
     }
-    found.into_iter().filter_map(|(name, states)| inertial(name, states)).collect()
+    found
+        .into_iter()
+        .filter_map(|(name, states)| inertial(name, states))
+        .collect()
 }
 
 /// What a filter believes of a sensor.
@@ -273,7 +355,10 @@ fn believed_of(belief: &Belief, sensor: Sensor) -> Vec<NamedSource> {
     white.white[first..first + 3].copy_from_slice(&belief.white[sensor as usize].to_array());
     let mut all = Vec::new();
     if white.white.iter().any(|w| *w > 0.0) {
-        let side = TruthSide { inertial: white, ..TruthSide::default() };
+        let side = TruthSide {
+            inertial: white,
+            ..TruthSide::default()
+        };
         all.push(NamedSource::new(format!("{}.WN", sensor.name()), side));
     }
     let groups = &belief.groups[sensor as usize];
@@ -284,13 +369,26 @@ fn believed_of(belief: &Belief, sensor: Sensor) -> Vec<NamedSource> {
             "turn_on_bias".to_owned()
         } else {
             number += 1;
-            if biases == 1 { "bias".to_owned() } else { format!("bias_{number}") }
+            if biases == 1 {
+                "bias".to_owned()
+            } else {
+                format!("bias_{number}")
+            }
         };
-        all.extend(inertial(format!("{}.{name}", sensor.name()), Sources::of_group(sensor, group)));
+        all.extend(inertial(
+            format!("{}.{name}", sensor.name()),
+            Sources::of_group(sensor, group),
+        ));
     }
-    for (kind, name) in [(UnknownKind::Drift, "drift"), (UnknownKind::ScaleFactor, "scale")] {
+    for (kind, name) in [
+        (UnknownKind::Drift, "drift"),
+        (UnknownKind::ScaleFactor, "scale"),
+    ] {
         let states = Sources::multiplied(belief, &[kind]);
-        let of_sensor = states.into_iter().filter(|s| place(s.signal).0 == sensor as usize).collect();
+        let of_sensor = states
+            .into_iter()
+            .filter(|s| place(s.signal).0 == sensor as usize)
+            .collect();
         all.extend(inertial(format!("{}.{name}", sensor.name()), of_sensor));
     }
     all

@@ -120,10 +120,13 @@ impl Task<'_> {
     #[must_use]
     pub fn without_factor(&self) -> Vec<Sensor> {
         let has_factor = |model: &Model, sensor: &Sensor| {
-            multiplied(model, Per::Sensor).iter().any(|factor| factor.sensor == *sensor)
+            multiplied(model, Per::Sensor)
+                .iter()
+                .any(|factor| factor.sensor == *sensor)
         };
         let is_without = |sensor: &Sensor| {
-            !has_factor(self.model, sensor) && self.truths.iter().any(|t| has_factor(&t.model, sensor))
+            !has_factor(self.model, sensor)
+                && self.truths.iter().any(|t| has_factor(&t.model, sensor))
         };
         Sensor::ALL.into_iter().filter(is_without).collect()
     }
@@ -140,7 +143,12 @@ impl Task<'_> {
             self.cost(&set(factors, ln), &track, draw_factors) + ridge
         };
         let low = if self.allow_smaller { -MAX_LN } else { 0.0 };
-        let descent = Descent { cost: &cost, bounds: (low, MAX_LN), iterations: ITERATIONS, enough: ENOUGH };
+        let descent = Descent {
+            cost: &cost,
+            bounds: (low, MAX_LN),
+            iterations: ITERATIONS,
+            enough: ENOUGH,
+        };
         // From the model as it is, which keeps factors small; and from one factor on all that makes it consistent, since between
         // the two the valley may be flat. The second counts where it is better by what can be seen.
         let unchanged = vec![0.0; factors.len()];
@@ -200,7 +208,9 @@ impl Task<'_> {
         let belief = filter(&scaled(self.model, factors))?;
         let assessments = self.assessments(&belief, self.track, None);
         let consistency = FilterConsistency::of(&assessments, self.drawn);
-        let draw_factors = self.drawn.map(|drawn| DrawFactors::of(&assessments, drawn, &consistency));
+        let draw_factors = self
+            .drawn
+            .map(|drawn| DrawFactors::of(&assessments, drawn, &consistency));
         Ok((consistency, draw_factors))
     }
 
@@ -214,7 +224,9 @@ impl Task<'_> {
         factors: &[Factor],
         draw_factors: Option<&DrawFactors>,
     ) -> Result<FilterConsistency, BeliefError> {
-        let Some(draw_factors) = draw_factors else { return self.consistency(filter, factors) };
+        let Some(draw_factors) = draw_factors else {
+            return self.consistency(filter, factors);
+        };
         let belief = filter(&scaled(self.model, factors))?;
         Ok(draw_factors.consistency(&self.assessments(&belief, self.track, Some(draw_factors))))
     }
@@ -245,19 +257,31 @@ impl Task<'_> {
     ) -> Vec<Assessment> {
         // No truth changes the filter: its gains are found once.
         let pass = FilterPass::new(track, belief);
-        let count = if draw_factors.is_some() { 1 } else { self.truths.len() };
-        self.truths[..count].par_iter().map(|truth| pass.assess_stated(belief, truth)).collect()
+        let count = if draw_factors.is_some() {
+            1
+        } else {
+            self.truths.len()
+        };
+        self.truths[..count]
+            .par_iter()
+            .map(|truth| pass.assess_stated(belief, truth))
+            .collect()
     }
 
     /// Mean divergence over the truths, and what no error may be.
     fn cost(&self, factors: &[Factor], track: &Track, draw_factors: Option<&DrawFactors>) -> f64 {
-        let Ok(belief) = (self.full)(&scaled(self.model, factors)) else { return f64::INFINITY };
+        let Ok(belief) = (self.full)(&scaled(self.model, factors)) else {
+            return f64::INFINITY;
+        };
         let overconfidence = |ratios: [f64; REPORTED]| -> f64 {
             match self.aim {
                 Aim::Mean => 0.0,
                 // One-sided: an error smaller than stated costs nothing here, the divergence alone speaks of
                 // caution.
-                Aim::Worst => ratios.iter().map(|r| OVERCONFIDENT * r.ln().max(0.0).powi(2)).sum(),
+                Aim::Worst => ratios
+                    .iter()
+                    .map(|r| OVERCONFIDENT * r.ln().max(0.0).powi(2))
+                    .sum(),
             }
         };
         let cost_of_truth = |a: &Assessment| {
@@ -282,13 +306,20 @@ impl Task<'_> {
     /// The logarithms with one number added to all, none below the lowest: the filter is consistent in the mean, or the least
     /// cautious that covers the worst.
     fn exact(&self, ln: &[f64], low: f64, at: &At<'_>) -> Result<Vec<f64>, BeliefError> {
-        let moved = |by: f64| -> Vec<f64> { ln.iter().map(|x| (x + by).clamp(low, MAX_LN)).collect() };
+        let moved =
+            |by: f64| -> Vec<f64> { ln.iter().map(|x| (x + by).clamp(low, MAX_LN)).collect() };
         // Down to where the largest factor meets the lowest bound: below that nothing changes any more.
         let highest = ln.iter().copied().fold(low, f64::max);
         let bounds = (low - highest, MAX_LN);
         if self.aim == Aim::Mean {
-            let crossing = Crossing { bounds, step: 0.1, exact: EXACT };
-            let (by, _) = crossing.from(0.0, |by| Ok::<_, BeliefError>(self.excess(&at(&moved(by))?)))?;
+            let crossing = Crossing {
+                bounds,
+                step: 0.1,
+                exact: EXACT,
+            };
+            let (by, _) = crossing.from(0.0, |by| {
+                Ok::<_, BeliefError>(self.excess(&at(&moved(by))?))
+            })?;
             return Ok(moved(by));
         }
         let covering = smallest(bounds, |by| Ok(self.excess(&at(&moved(by))?) <= EXACT))?;
@@ -342,7 +373,11 @@ fn smallest(
     }
     while fits - fails > RESOLUTION {
         let middle = 0.5 * (fails + fits);
-        if holds(middle)? { fits = middle } else { fails = middle }
+        if holds(middle)? {
+            fits = middle
+        } else {
+            fails = middle
+        }
     }
     Ok(fits)
 }

@@ -91,7 +91,9 @@ impl Problem {
     #[must_use]
     pub const fn hint(&self) -> Option<&'static str> {
         Some(match self {
-            Self::AtRest { .. } => "put an accelerate segment before it, or give the start a speed_m_s",
+            Self::AtRest { .. } => {
+                "put an accelerate segment before it, or give the start a speed_m_s"
+            }
             Self::TooSteep { .. } => "climb over a longer path, or for longer",
             Self::TooNear { .. } | Self::Unreachable { .. } => {
                 "turn tighter, go slower, or move the point away"

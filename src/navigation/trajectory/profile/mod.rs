@@ -154,24 +154,47 @@ impl Profile {
     /// # Errors
     /// The first value outside its domain, or segment that cannot be followed.
     pub fn build(&self) -> Result<Trajectory, Error> {
-        let at_start = |problem| Error { segment: None, problem };
+        let at_start = |problem| Error {
+            segment: None,
+            problem,
+        };
         self.check_start().map_err(at_start)?;
         let mut path = Path::new(self);
         for (index, segment) in self.segments.iter().enumerate() {
-            path.follow(segment).map_err(|problem| Error { segment: Some(index), problem })?;
+            path.follow(segment).map_err(|problem| Error {
+                segment: Some(index),
+                problem,
+            })?;
         }
         Trajectory::from_samples(&path.samples).map_err(|e| at_start(Problem::Samples(e)))
     }
 
     fn check_start(&self) -> Result<(), Problem> {
         let s = &self.start;
-        for (key, value) in [("t_s", s.t_s), ("lon_deg", s.lon), ("h_m", s.h), ("heading_deg", s.heading)] {
+        for (key, value) in [
+            ("t_s", s.t_s),
+            ("lon_deg", s.lon),
+            ("h_m", s.h),
+            ("heading_deg", s.heading),
+        ] {
             domain(key, "a finite number", value.is_finite())?;
         }
-        domain("lat_deg", "a latitude within ±89.9°", s.lat.abs() <= crate::earth::MAX_LATITUDE)?;
-        domain("speed_m_s", "a speed ≥ 0", s.speed.is_finite() && s.speed >= 0.0)?;
+        domain(
+            "lat_deg",
+            "a latitude within ±89.9°",
+            s.lat.abs() <= crate::earth::MAX_LATITUDE,
+        )?;
+        domain(
+            "speed_m_s",
+            "a speed ≥ 0",
+            s.speed.is_finite() && s.speed >= 0.0,
+        )?;
         positive("ramp_s", self.ramp_s)?;
-        domain("segment", "a list of at least one segment", !self.segments.is_empty())
+        domain(
+            "segment",
+            "a list of at least one segment",
+            !self.segments.is_empty(),
+        )
     }
 }
 

@@ -15,7 +15,11 @@ pub(super) const MAX_SLOPE: f64 = 60.0 * DEG;
 const MAX_DURATION_S: f64 = 86_400.0;
 
 pub(super) fn domain(key: &'static str, domain: &'static str, holds: bool) -> Result<(), Problem> {
-    if holds { Ok(()) } else { Err(Problem::Domain { key, domain }) }
+    if holds {
+        Ok(())
+    } else {
+        Err(Problem::Domain { key, domain })
+    }
 }
 
 pub(super) fn positive(key: &'static str, value: f64) -> Result<(), Problem> {
@@ -36,9 +40,31 @@ pub(super) struct Path<'a> {
 
 impl<'a> Path<'a> {
     pub(super) fn new(profile: &'a Profile) -> Self {
-        let Start { t_s, lat, lon, h, heading, speed } = profile.start;
-        let mut path = Self { profile, t_s, lat, lon, h, heading, speed, samples: Vec::new() };
-        let still = Motion { horizontal: speed, heading, heading_rate: 0.0, slope: 0.0, h };
+        let Start {
+            t_s,
+            lat,
+            lon,
+            h,
+            heading,
+            speed,
+        } = profile.start;
+        let mut path = Self {
+            profile,
+            t_s,
+            lat,
+            lon,
+            h,
+            heading,
+            speed,
+            samples: Vec::new(),
+        };
+        let still = Motion {
+            horizontal: speed,
+            heading,
+            heading_rate: 0.0,
+            slope: 0.0,
+            h,
+        };
         path.sample(t_s, &still);
         path
     }
@@ -67,7 +93,12 @@ impl<'a> Path<'a> {
         }
     }
 
-    pub(super) fn straight(&mut self, length: Length, climb: f64, ramp_s: f64) -> Result<(), Problem> {
+    pub(super) fn straight(
+        &mut self,
+        length: Length,
+        climb: f64,
+        ramp_s: f64,
+    ) -> Result<(), Problem> {
         let duration = match length {
             Length::Duration(s) => {
                 positive("duration_s", s)?;
@@ -81,7 +112,13 @@ impl<'a> Path<'a> {
         self.push([duration, ramp_s], 0.0, 0.0, climb)
     }
 
-    fn accelerate(&mut self, to: f64, by: Acceleration, climb: f64, ramp_s: f64) -> Result<(), Problem> {
+    fn accelerate(
+        &mut self,
+        to: f64,
+        by: Acceleration,
+        climb: f64,
+        ramp_s: f64,
+    ) -> Result<(), Problem> {
         domain("to_speed_m_s", "a speed ≥ 0", to.is_finite() && to >= 0.0)?;
         let change = to - self.speed;
         let duration = match by {
@@ -101,7 +138,12 @@ impl<'a> Path<'a> {
     }
 
     /// Duration of a turn at the present speed (s).
-    pub(super) fn turn_duration(&self, angle: f64, by: Turning, ramp_s: f64) -> Result<f64, Problem> {
+    pub(super) fn turn_duration(
+        &self,
+        angle: f64,
+        by: Turning,
+        ramp_s: f64,
+    ) -> Result<f64, Problem> {
         domain("angle_deg", "an angle other than 0", angle != 0.0)?;
         let rate = match by {
             Turning::Duration(s) => {
@@ -125,14 +167,30 @@ impl<'a> Path<'a> {
     }
 
     pub(super) fn moving(&self, key: &'static str) -> Result<f64, Problem> {
-        if self.speed > 0.0 { Ok(self.speed) } else { Err(Problem::AtRest { key }) }
+        if self.speed > 0.0 {
+            Ok(self.speed)
+        } else {
+            Err(Problem::AtRest { key })
+        }
     }
 
     /// The piece that continues the path for a duration with a ramp (s).
-    pub(super) fn piece(&self, [duration, ramp_s]: [f64; 2], speed: f64, heading: f64, climb: f64) -> Piece {
+    pub(super) fn piece(
+        &self,
+        [duration, ramp_s]: [f64; 2],
+        speed: f64,
+        heading: f64,
+        climb: f64,
+    ) -> Piece {
         let shape = Shape::new(ramp_s / duration);
         let (speed, heading) = ([self.speed, speed], [self.heading, heading]);
-        Piece { duration, shape, speed, heading, height: [self.h, climb] }
+        Piece {
+            duration,
+            shape,
+            speed,
+            heading,
+            height: [self.h, climb],
+        }
     }
 
     /// Adds a piece of the given duration and ramp (s), changing speed, heading and height.
@@ -148,7 +206,10 @@ impl<'a> Path<'a> {
             return Err(Problem::AtRest { key: "climb_m" });
         }
         if piece.steepest() > MAX_SLOPE.sin() {
-            return Err(Problem::TooSteep { climb_m: climb, length_m: piece.length() });
+            return Err(Problem::TooSteep {
+                climb_m: climb,
+                length_m: piece.length(),
+            });
         }
         let total_s = self.t_s + duration - self.profile.start.t_s;
         if total_s > MAX_DURATION_S {
@@ -188,10 +249,23 @@ impl<'a> Path<'a> {
             Bank::None => 0.0,
             // Level turn: the lateral specific force v·ψ̇ and gravity combine along the down axis of the
             // body.
-            Bank::Coordinated => (motion.horizontal * motion.heading_rate / STANDARD_GRAVITY).atan(),
+            Bank::Coordinated => {
+                (motion.horizontal * motion.heading_rate / STANDARD_GRAVITY).atan()
+            }
         };
-        let q_b_n = RollPitchYaw { roll, pitch: motion.slope, yaw: motion.heading }.to_quat();
-        self.samples.push(TrajectorySample { t_s, lat: self.lat, lon: self.lon, h: motion.h, q_b_n });
+        let q_b_n = RollPitchYaw {
+            roll,
+            pitch: motion.slope,
+            yaw: motion.heading,
+        }
+        .to_quat();
+        self.samples.push(TrajectorySample {
+            t_s,
+            lat: self.lat,
+            lon: self.lon,
+            h: motion.h,
+            q_b_n,
+        });
     }
 }
 
@@ -208,5 +282,8 @@ fn rates(lat: f64, motion: &Motion) -> [f64; 2] {
     let ((sin_lat, cos_lat), (sin_psi, cos_psi)) = (lat.sin_cos(), motion.heading.sin_cos());
     let r = radii(sin_lat);
     let (north, east) = (motion.horizontal * cos_psi, motion.horizontal * sin_psi);
-    [north / (r.meridian + motion.h), east / ((r.transverse + motion.h) * cos_lat)]
+    [
+        north / (r.meridian + motion.h),
+        east / ((r.transverse + motion.h) * cos_lat),
+    ]
 }

@@ -12,7 +12,9 @@ pub(in crate::trajectory) struct Shape {
 
 impl Shape {
     pub(in crate::trajectory) fn new(ramp: f64) -> Self {
-        Self { ramp: ramp.min(0.5) }
+        Self {
+            ramp: ramp.min(0.5),
+        }
     }
 
     /// Largest rate; reached in the middle.
@@ -87,7 +89,11 @@ impl Piece {
     /// Sine of the steepest slope; the height changes with the path, not with time, so that a vehicle that
     /// starts or stops on a hill follows the road.
     pub(super) fn steepest(&self) -> f64 {
-        if self.height[1] == 0.0 { 0.0 } else { (self.height[1] / self.length()).abs() * self.shape.peak() }
+        if self.height[1] == 0.0 {
+            0.0
+        } else {
+            (self.height[1] / self.length()).abs() * self.shape.peak()
+        }
     }
 
     pub(super) fn at(&self, x: f64) -> Motion {
@@ -118,13 +124,24 @@ mod tests {
     fn rate_value_and_integral_are_derivatives_of_one_another() {
         for ramp in [0.05, 0.3, 0.5] {
             let s = Shape::new(ramp);
-            assert_eq!((s.value(0.0), s.value(1.0), s.integral(0.0)), (0.0, 1.0, 0.0));
-            assert!((s.integral(1.0) - 0.5).abs() < 1e-15 && (s.rate(0.5) - s.peak()).abs() < 1e-15);
+            assert_eq!(
+                (s.value(0.0), s.value(1.0), s.integral(0.0)),
+                (0.0, 1.0, 0.0)
+            );
+            assert!(
+                (s.integral(1.0) - 0.5).abs() < 1e-15 && (s.rate(0.5) - s.peak()).abs() < 1e-15
+            );
             for k in 1..200 {
                 let (x, step) = (f64::from(k) / 200.0, 1e-5);
                 let slope = |f: &dyn Fn(f64) -> f64| (f(x + step) - f(x - step)) / (2.0 * step);
-                assert!((slope(&|x| s.value(x)) - s.rate(x)).abs() < 1e-6, "{ramp} {x}");
-                assert!((slope(&|x| s.integral(x)) - s.value(x)).abs() < 1e-9, "{ramp} {x}");
+                assert!(
+                    (slope(&|x| s.value(x)) - s.rate(x)).abs() < 1e-6,
+                    "{ramp} {x}"
+                );
+                assert!(
+                    (slope(&|x| s.integral(x)) - s.value(x)).abs() < 1e-9,
+                    "{ramp} {x}"
+                );
             }
         }
     }
@@ -132,8 +149,13 @@ mod tests {
     #[test]
     fn height_follows_the_path_also_from_rest() {
         let shape = Shape::new(0.25);
-        let piece =
-            Piece { duration: 10.0, shape, speed: [0.0, 8.0], heading: [0.0; 2], height: [100.0, 3.0] };
+        let piece = Piece {
+            duration: 10.0,
+            shape,
+            speed: [0.0, 8.0],
+            heading: [0.0; 2],
+            height: [100.0, 3.0],
+        };
         let step = 1e-4;
         for k in 1..100 {
             let x = f64::from(k) / 100.0;

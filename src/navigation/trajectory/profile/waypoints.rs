@@ -54,9 +54,16 @@ impl Path<'_> {
         ramp_s: f64,
     ) -> Result<(), Problem> {
         domain("points", "a list of at least one point", !points.is_empty())?;
-        domain("climb_m", "for waypoints: give the points \"h_m\"", climb == 0.0)?;
+        domain(
+            "climb_m",
+            "for waypoints: give the points \"h_m\"",
+            climb == 0.0,
+        )?;
         self.moving("points")?;
-        let targets = points.iter().map(|p| self.target(p)).collect::<Result<Vec<_>, _>>()?;
+        let targets = points
+            .iter()
+            .map(|p| self.target(p))
+            .collect::<Result<Vec<_>, _>>()?;
         for (i, &target) in targets.iter().enumerate() {
             let number = i + 1;
             self.turn_towards(target, by, ramp_s, number)?;
@@ -66,7 +73,11 @@ impl Path<'_> {
                 None => 0.0,
             };
             if distance <= lead {
-                return Err(Problem::TooNear { number, leg_m: distance, needed_m: lead });
+                return Err(Problem::TooNear {
+                    number,
+                    leg_m: distance,
+                    needed_m: lead,
+                });
             }
             let climb = points[i].h.map_or(0.0, |h| h - self.h);
             let length = self.path_length(distance - lead, climb, ramp_s);
@@ -133,7 +144,10 @@ impl Path<'_> {
         // velocity along it counts.
         let chord = self.speed * duration * mean(|x| (piece.at(x).heading - half).cos());
         // Chord and both leads are an isosceles triangle with the angle of the turn outside at the corner.
-        Ok(Corner { chord, lead: 0.5 * chord / (0.5 * angle).cos() })
+        Ok(Corner {
+            chord,
+            lead: 0.5 * chord / (0.5 * angle).cos(),
+        })
     }
 
     /// Distance before the corner at `target` at which the turn to `next` begins (m).
@@ -147,9 +161,16 @@ impl Path<'_> {
     ) -> Result<f64, Problem> {
         let angle = wrap_angle(self.course(target, next).0 - self.heading);
         if angle.abs() > MAX_CORNER {
-            return Err(Problem::TurnsBack { number, angle_deg: angle.abs() / DEG });
+            return Err(Problem::TurnsBack {
+                number,
+                angle_deg: angle.abs() / DEG,
+            });
         }
-        if angle.abs() < 1e-9 { Ok(0.0) } else { Ok(self.corner(angle, by, ramp_s)?.lead) }
+        if angle.abs() < 1e-9 {
+            Ok(0.0)
+        } else {
+            Ok(self.corner(angle, by, ramp_s)?.lead)
+        }
     }
 
     /// Turns so that the heading after the turn points from there to the target: secant steps on the angle.
@@ -192,13 +213,24 @@ impl Path<'_> {
             self.lat + corner.chord * cos_psi / (r.meridian + self.h),
             self.lon + corner.chord * sin_psi / ((r.transverse + self.h) * self.lat.cos()),
         ];
-        Ok(wrap_angle(self.course(after, target).0 - self.heading - angle))
+        Ok(wrap_angle(
+            self.course(after, target).0 - self.heading - angle,
+        ))
     }
 }
 
 /// The mean of a smooth function over [0, 1], by Simpson's rule.
 fn mean(f: impl Fn(f64) -> f64) -> f64 {
     let n = 200;
-    let weight = |k: usize| if k == 0 || k == n { 1.0 } else { 2.0 + 2.0 * (k % 2) as f64 };
-    (0..=n).map(|k| weight(k) * f(k as f64 / n as f64)).sum::<f64>() / (3.0 * n as f64)
+    let weight = |k: usize| {
+        if k == 0 || k == n {
+            1.0
+        } else {
+            2.0 + 2.0 * (k % 2) as f64
+        }
+    };
+    (0..=n)
+        .map(|k| weight(k) * f(k as f64 / n as f64))
+        .sum::<f64>()
+        / (3.0 * n as f64)
 }

@@ -161,12 +161,16 @@ impl Contamination {
     /// Operations on a signal of a replicate (counted from 1), in the order of application.
     #[must_use]
     pub fn operations_for(&self, channel: Channel, replicate: u64) -> Vec<&Operation> {
-        self.rules_for(channel, replicate).into_iter().map(|r| &r.operation).collect()
+        self.rules_for(channel, replicate)
+            .into_iter()
+            .map(|r| &r.operation)
+            .collect()
     }
 
     fn rules_for(&self, channel: Channel, replicate: u64) -> Vec<&Rule> {
-        let applies =
-            |r: &&Rule| r.sensor == channel.sensor && r.replicate.is_none_or(|only| only == replicate);
+        let applies = |r: &&Rule| {
+            r.sensor == channel.sensor && r.replicate.is_none_or(|only| only == replicate)
+        };
         let mut rules: Vec<&Rule> = self.rules.iter().filter(applies).collect();
         rules.sort_by_key(|r| r.operation.stage());
         rules
@@ -175,7 +179,9 @@ impl Contamination {
     /// Whether anything is done to a replicate (counted from 1).
     #[must_use]
     pub fn touches(&self, replicate: u64) -> bool {
-        self.rules.iter().any(|r| r.replicate.is_none_or(|only| only == replicate))
+        self.rules
+            .iter()
+            .any(|r| r.replicate.is_none_or(|only| only == replicate))
     }
 
     /// Scales the parameters of a replicate's (counted from 1) axis, before synthesis.
@@ -190,8 +196,14 @@ impl Contamination {
         rate_hz: f64,
     ) -> Result<(), RefusedRule> {
         for rule in self.rules_for(channel, replicate) {
-            if let Operation::Scale { process, parameter, factor } = &rule.operation {
-                scale(noise, channel, (process, parameter), *factor, rate_hz).map_err(|e| rule.refused(e))?;
+            if let Operation::Scale {
+                process,
+                parameter,
+                factor,
+            } = &rule.operation
+            {
+                scale(noise, channel, (process, parameter), *factor, rate_hz)
+                    .map_err(|e| rule.refused(e))?;
             }
         }
         Ok(())
@@ -215,11 +227,22 @@ impl Contamination {
         for (i, rule) in rules.iter().enumerate() {
             let operation = &rule.operation;
             // A second operation of a kind draws from another stream.
-            let same = rules[..i].iter().filter(|r| r.operation.stage() == operation.stage()).count();
+            let same = rules[..i]
+                .iter()
+                .filter(|r| r.operation.stage() == operation.stage())
+                .count();
             let process = format!("{}_{}", operation.name(), same + 1);
             let run = replicate.wrapping_sub(1);
-            let key = StreamKey { seed, scenario: "contamination", run, source: &source, process: &process };
-            operation.apply(samples, rate_hz, key).map_err(|e| rule.refused(e))?;
+            let key = StreamKey {
+                seed,
+                scenario: "contamination",
+                run,
+                source: &source,
+                process: &process,
+            };
+            operation
+                .apply(samples, rate_hz, key)
+                .map_err(|e| rule.refused(e))?;
         }
         Ok(())
     }
@@ -227,7 +250,10 @@ impl Contamination {
 
 impl Rule {
     fn refused(&self, source: ContaminationError) -> RefusedRule {
-        RefusedRule { place: self.place.clone(), source }
+        RefusedRule {
+            place: self.place.clone(),
+            source,
+        }
     }
 }
 
@@ -257,16 +283,26 @@ impl Operation {
         }
     }
 
-    fn apply(&self, x: &mut [f64], rate_hz: f64, key: StreamKey<'_>) -> Result<(), ContaminationError> {
+    fn apply(
+        &self,
+        x: &mut [f64],
+        rate_hz: f64,
+        key: StreamKey<'_>,
+    ) -> Result<(), ContaminationError> {
         let fits = |what, needed| match needed <= x.len() {
             true => Ok(()),
-            false => Err(ContaminationError::TooShort { what, needed, samples: x.len() }),
+            false => Err(ContaminationError::TooShort {
+                what,
+                needed,
+                samples: x.len(),
+            }),
         };
         match self {
             Self::Scale { .. } => {}
             Self::Ar1(ar1) => add_ar1(x, *ar1, key),
             Self::HeavyTails { freedom, sigma } => {
-                let law = StudentT::new(*freedom).map_err(|_| ContaminationError::Freedom(*freedom))?;
+                let law =
+                    StudentT::new(*freedom).map_err(|_| ContaminationError::Freedom(*freedom))?;
                 let mut g = key.generator();
                 x.iter_mut().for_each(|v| *v += sigma * law.sample(&mut g));
             }
@@ -274,25 +310,41 @@ impl Operation {
             // last.
             Self::Drift { amplitude } => {
                 let last = x.len().saturating_sub(1).max(1) as f64;
-                x.iter_mut().enumerate().for_each(|(k, v)| *v += amplitude * k as f64 / last);
+                x.iter_mut()
+                    .enumerate()
+                    .for_each(|(k, v)| *v += amplitude * k as f64 / last);
             }
             Self::Step { at, amplitude } => {
                 let at = at.of(x.len());
                 fits("a step", at)?;
                 x[at..].iter_mut().for_each(|v| *v += amplitude);
             }
-            Self::Replace { points, block, mean, sigma } => {
+            Self::Replace {
+                points,
+                block,
+                mean,
+                sigma,
+            } => {
                 let (points, block) = (points.of(x.len()), block.of(x.len()).max(1));
                 fits("the replacement of points", points)?;
                 // Before anything is replaced, so that the mean is of the signal.
                 let mean = mean.unwrap_or_else(|| x.iter().sum::<f64>() / x.len().max(1) as f64);
                 replace(x, (points, block), mean, *sigma, key);
             }
-            Self::Bursts { count, length, spacing, amplitude, frequency_hz } => {
+            Self::Bursts {
+                count,
+                length,
+                spacing,
+                amplitude,
+                frequency_hz,
+            } => {
                 let (length, spacing) = (length.of(x.len()), spacing.of(x.len()));
                 let count = usize::try_from(*count).unwrap_or(usize::MAX);
                 // The first burst begins after one spacing, so the last one ends at count·spacing + length.
-                fits("a train of bursts", count.saturating_mul(spacing).saturating_add(length))?;
+                fits(
+                    "a train of bursts",
+                    count.saturating_mul(spacing).saturating_add(length),
+                )?;
                 let step = std::f64::consts::TAU * frequency_hz / rate_hz;
                 for start in (1..=count).map(|i| i * spacing) {
                     for (k, v) in x[start..start + length].iter_mut().enumerate() {
@@ -315,8 +367,15 @@ fn scale(
     let labels = noise.labels();
     let scaled = labels.iter().position(|l| l == label).and_then(|at| {
         let process = &noise.processes[at];
-        let value = process.parameters().into_iter().find(|(n, _)| *n == parameter)?.1;
-        Some((at, process.with_parameter(parameter, factor * value, rate_hz)?))
+        let value = process
+            .parameters()
+            .into_iter()
+            .find(|(n, _)| *n == parameter)?
+            .1;
+        Some((
+            at,
+            process.with_parameter(parameter, factor * value, rate_hz)?,
+        ))
     });
     match scaled {
         Some((at, process)) => {
@@ -325,11 +384,24 @@ fn scale(
         }
         None => {
             let names = |(p, l): (&Process, &String)| {
-                p.parameters().into_iter().map(|(n, _)| format!("{l} {n}")).collect::<Vec<_>>()
+                p.parameters()
+                    .into_iter()
+                    .map(|(n, _)| format!("{l} {n}"))
+                    .collect::<Vec<_>>()
             };
-            let known = noise.processes.iter().zip(&labels).flat_map(names).collect();
+            let known = noise
+                .processes
+                .iter()
+                .zip(&labels)
+                .flat_map(names)
+                .collect();
             let (process, parameter) = (label.to_owned(), parameter.to_owned());
-            Err(ContaminationError::NothingToScale { channel, process, parameter, known })
+            Err(ContaminationError::NothingToScale {
+                channel,
+                process,
+                parameter,
+                known,
+            })
         }
     }
 }
@@ -349,7 +421,13 @@ fn add_ar1(x: &mut [f64], ar1: Ar1, key: StreamKey<'_>) {
 /// Replaces `points` distinct samples in blocks that do not overlap, every choice equally likely: the starts are drawn
 /// among as many places as there are with each block taken for one (selection sampling, Knuth's algorithm S: the
 /// numbers drawn do not depend on a library's method).
-fn replace(x: &mut [f64], (points, block): (usize, usize), mean: f64, sigma: f64, key: StreamKey<'_>) {
+fn replace(
+    x: &mut [f64],
+    (points, block): (usize, usize),
+    mean: f64,
+    sigma: f64,
+    key: StreamKey<'_>,
+) {
     let mut g = key.generator();
     let (mut wanted, mut left) = (points.div_ceil(block), points);
     // Each sample that stays is a place, and each block is one.

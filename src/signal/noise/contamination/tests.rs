@@ -2,11 +2,22 @@ use super::*;
 use crate::imu::Axis;
 use crate::noise::{RandomWalk, White};
 
-const X: Channel = Channel { sensor: Sensor::Accel, axis: Axis::X };
+const X: Channel = Channel {
+    sensor: Sensor::Accel,
+    axis: Axis::X,
+};
 
 fn one(operation: Operation) -> Contamination {
-    let rules = vec![Rule { sensor: Sensor::Accel, replicate: Some(2), operation, place: String::new() }];
-    Contamination { name: "test".into(), rules }
+    let rules = vec![Rule {
+        sensor: Sensor::Accel,
+        replicate: Some(2),
+        operation,
+        place: String::new(),
+    }];
+    Contamination {
+        name: "test".into(),
+        rules,
+    }
 }
 
 fn applied(operation: Operation, n: usize) -> Vec<f64> {
@@ -18,14 +29,23 @@ fn applied(operation: Operation, n: usize) -> Vec<f64> {
 #[test]
 fn shares_of_the_papers_records() {
     let samples = |share: f64| Extent::Share(share).of(524_284);
-    assert_eq!((samples(0.00025), samples(0.01), samples(0.5)), (131, 5242, 262_142));
-    assert_eq!((samples(90_000.0 / 524_284.0), samples(500.0 / 524_284.0)), (90_000, 500));
+    assert_eq!(
+        (samples(0.00025), samples(0.01), samples(0.5)),
+        (131, 5242, 262_142)
+    );
+    assert_eq!(
+        (samples(90_000.0 / 524_284.0), samples(500.0 / 524_284.0)),
+        (90_000, 500)
+    );
     assert_eq!(Extent::Samples(7).of(3), 7);
 }
 
 #[test]
 fn a_step_is_from_the_middle_on() {
-    let step = Operation::Step { at: Extent::Share(0.5), amplitude: 2.0 };
+    let step = Operation::Step {
+        at: Extent::Share(0.5),
+        amplitude: 2.0,
+    };
     assert_eq!(applied(step, 5), [0.0, 0.0, 2.0, 2.0, 2.0]);
 }
 
@@ -79,15 +99,27 @@ fn bursts_are_sines_at_multiples_of_the_spacing() {
     // 5 Hz at 100 Hz: 20 samples a period.
     for (k, v) in x.iter().enumerate() {
         let inside = (100..140).contains(&k) || (200..240).contains(&k);
-        let expected =
-            if inside { 0.02 * (std::f64::consts::TAU * (k % 20) as f64 / 20.0).sin() } else { 0.0 };
+        let expected = if inside {
+            0.02 * (std::f64::consts::TAU * (k % 20) as f64 / 20.0).sin()
+        } else {
+            0.0
+        };
         assert!((v - expected).abs() < 1e-15, "{k}");
     }
     let mut short = vec![0.0; 239];
     let e = one(bursts).apply(&mut short, X, 2, 100.0, 1).unwrap_err();
-    assert_eq!(e.to_string(), "a train of bursts needs 240 samples, the record has 239");
-    let e = RefusedRule { place: "a.toml, line 3".into(), ..e };
-    assert_eq!(e.to_string(), "a.toml, line 3: a train of bursts needs 240 samples, the record has 239");
+    assert_eq!(
+        e.to_string(),
+        "a train of bursts needs 240 samples, the record has 239"
+    );
+    let e = RefusedRule {
+        place: "a.toml, line 3".into(),
+        ..e
+    };
+    assert_eq!(
+        e.to_string(),
+        "a.toml, line 3: a train of bursts needs 240 samples, the record has 239"
+    );
 }
 
 #[test]
@@ -108,14 +140,27 @@ fn the_order_is_fixed_and_other_signals_are_untouched() {
         mean: Some(0.0),
         sigma: 0.0,
     };
-    let step = Operation::Step { at: Extent::Samples(0), amplitude: 1.0 };
-    let rule =
-        |operation| Rule { sensor: Sensor::Accel, replicate: Some(2), operation, place: String::new() };
-    let both = Contamination { name: String::new(), rules: vec![rule(replace), rule(step)] };
+    let step = Operation::Step {
+        at: Extent::Samples(0),
+        amplitude: 1.0,
+    };
+    let rule = |operation| Rule {
+        sensor: Sensor::Accel,
+        replicate: Some(2),
+        operation,
+        place: String::new(),
+    };
+    let both = Contamination {
+        name: String::new(),
+        rules: vec![rule(replace), rule(step)],
+    };
     let mut x = vec![5.0; 4];
     both.apply(&mut x, X, 2, 100.0, 1).unwrap();
     assert_eq!(x, [0.0; 4], "the step comes before the replacement");
-    let gyro = Channel { sensor: Sensor::Gyro, axis: Axis::X };
+    let gyro = Channel {
+        sensor: Sensor::Gyro,
+        axis: Axis::X,
+    };
     for (channel, replicate) in [(X, 1), (gyro, 2)] {
         let mut x = vec![5.0; 4];
         both.apply(&mut x, channel, replicate, 100.0, 1).unwrap();
@@ -132,7 +177,11 @@ fn parameters_are_scaled_for_their_replicate_only() {
     };
     let scale = |process: &str| {
         let (process, parameter) = (process.to_owned(), "gamma2".to_owned());
-        one(Operation::Scale { process, parameter, factor: 4.0 })
+        one(Operation::Scale {
+            process,
+            parameter,
+            factor: 4.0,
+        })
     };
     let (mut second, mut third) = (noise(), noise());
     scale("RW").scale(&mut second, X, 2, 100.0).unwrap();
@@ -140,7 +189,10 @@ fn parameters_are_scaled_for_their_replicate_only() {
     assert_eq!(second.processes[1].parameters(), [("gamma2", 12.0)]);
     assert_eq!(third, noise());
     let e = scale("RW_2").scale(&mut second, X, 2, 100.0).unwrap_err();
-    assert_eq!(e.to_string(), "accel.x has no RW_2 gamma2 to scale, only WN sigma2, RW gamma2");
+    assert_eq!(
+        e.to_string(),
+        "accel.x has no RW_2 gamma2 to scale, only WN sigma2, RW gamma2"
+    );
 }
 
 #[test]
@@ -154,10 +206,22 @@ fn the_same_points_are_replaced_whatever_else_is_done() {
     let alone = applied(replace.clone(), 1000);
     let mut with_bursts = one(replace);
     let (length, spacing) = (Extent::Samples(1), Extent::Samples(999));
-    let bursts = Operation::Bursts { count: 1, length, spacing, amplitude: 0.0, frequency_hz: 1.0 };
-    with_bursts
-        .rules
-        .insert(0, Rule { sensor: Sensor::Accel, replicate: None, operation: bursts, place: String::new() });
+    let bursts = Operation::Bursts {
+        count: 1,
+        length,
+        spacing,
+        amplitude: 0.0,
+        frequency_hz: 1.0,
+    };
+    with_bursts.rules.insert(
+        0,
+        Rule {
+            sensor: Sensor::Accel,
+            replicate: None,
+            operation: bursts,
+            place: String::new(),
+        },
+    );
     let mut x = vec![0.0; 1000];
     with_bursts.apply(&mut x, X, 2, 100.0, 1).unwrap();
     assert_eq!(x, alone);
@@ -172,23 +236,43 @@ fn blocks_are_whole_and_anywhere() {
     for seed in 0..40 {
         let mut x = vec![1.0; n];
         let (points, block) = (Extent::Samples(1000), Extent::Samples(64));
-        one(Operation::Replace { points, block, mean: Some(0.0), sigma: 0.0 })
-            .apply(&mut x, X, 2, 100.0, seed)
-            .unwrap();
+        one(Operation::Replace {
+            points,
+            block,
+            mean: Some(0.0),
+            sigma: 0.0,
+        })
+        .apply(&mut x, X, 2, 100.0, seed)
+        .unwrap();
         let replaced: Vec<usize> = (0..n).filter(|k| x[*k] == 0.0).collect();
         assert_eq!(replaced.len(), 1000);
-        let lengths: Vec<usize> =
-            x.chunk_by(|a, b| a == b).filter(|run| run[0] == 0.0).map(<[f64]>::len).collect();
-        assert!(lengths.iter().filter(|l| **l % 64 != 0).all(|l| *l % 64 == 40), "{lengths:?}");
+        let lengths: Vec<usize> = x
+            .chunk_by(|a, b| a == b)
+            .filter(|run| run[0] == 0.0)
+            .map(<[f64]>::len)
+            .collect();
+        assert!(
+            lengths
+                .iter()
+                .filter(|l| **l % 64 != 0)
+                .all(|l| *l % 64 == 40),
+            "{lengths:?}"
+        );
         centre += replaced.iter().map(|k| *k as f64).sum::<f64>() / 1000.0 / 40.0;
     }
     let deviation = n as f64 / (12.0_f64 * 16.0 * 40.0).sqrt();
-    assert!((centre - 0.5 * n as f64).abs() < 5.0 * deviation, "{centre}");
+    assert!(
+        (centre - 0.5 * n as f64).abs() < 5.0 * deviation,
+        "{centre}"
+    );
 }
 
 #[test]
 fn a_drift_goes_from_nothing_to_its_amplitude() {
-    assert_eq!(applied(Operation::Drift { amplitude: 2.0 }, 5), [0.0, 0.5, 1.0, 1.5, 2.0]);
+    assert_eq!(
+        applied(Operation::Drift { amplitude: 2.0 }, 5),
+        [0.0, 0.5, 1.0, 1.5, 2.0]
+    );
     assert_eq!(applied(Operation::Drift { amplitude: 2.0 }, 1), [0.0]);
 }
 
@@ -197,9 +281,18 @@ fn a_drift_goes_from_nothing_to_its_amplitude() {
 #[test]
 fn heavy_tails_are_students() {
     let n = 200_000;
-    let x = applied(Operation::HeavyTails { freedom: 10.0, sigma: 3.0 }, n);
+    let x = applied(
+        Operation::HeavyTails {
+            freedom: 10.0,
+            sigma: 3.0,
+        },
+        n,
+    );
     let variance = x.iter().map(|v| v * v).sum::<f64>() / n as f64;
-    assert!((variance / (9.0 * 1.25) - 1.0).abs() < 5.0 * (3.0 / n as f64).sqrt(), "{variance}");
+    assert!(
+        (variance / (9.0 * 1.25) - 1.0).abs() < 5.0 * (3.0 / n as f64).sqrt(),
+        "{variance}"
+    );
     let beyond = x.iter().filter(|v| v.abs() > 3.0 * 4.587).count() as f64;
     // P(|t| > 4.587) = 0.001 with ten degrees of freedom
     assert!((beyond - 200.0).abs() < 5.0 * 200.0_f64.sqrt(), "{beyond}");

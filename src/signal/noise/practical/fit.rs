@@ -14,7 +14,9 @@ pub(super) fn white(samples: u32, rate_hz: f64) -> f64 {
 pub(super) fn bias(t_corr_s: Option<f64>, samples: u32, rate_hz: f64) -> f64 {
     let m = f64::from(samples);
     // K²τ/3 with the term of the sampling: twice the wavelet variance gamma2 (4m² + 2)/(24m), gamma2 = K²/f.
-    let Some(t_corr_s) = t_corr_s else { return (2.0 * m * m + 1.0) / (6.0 * m * rate_hz) };
+    let Some(t_corr_s) = t_corr_s else {
+        return (2.0 * m * m + 1.0) / (6.0 * m * rate_hz);
+    };
     let kappa = 1.0 / (t_corr_s * rate_hz);
     super::super::allan::unit_markov(kappa, samples)
 }
@@ -29,8 +31,19 @@ pub(super) fn pair(curve: &Curve, policy: Policy, kind: Bias) -> Pair {
     let found = Problem::new(curve, policy, t_corr_s).solve();
     let (density, amplitude) = (found.white.sqrt(), found.bias.sqrt());
     match t_corr_s {
-        None => Pair { density, walk: amplitude, markov: None },
-        Some(t_corr_s) => Pair { density, walk: 0.0, markov: Some(Markov { sigma: amplitude, t_corr_s }) },
+        None => Pair {
+            density,
+            walk: amplitude,
+            markov: None,
+        },
+        Some(t_corr_s) => Pair {
+            density,
+            walk: 0.0,
+            markov: Some(Markov {
+                sigma: amplitude,
+                t_corr_s,
+            }),
+        },
     }
 }
 
@@ -41,7 +54,10 @@ pub(super) fn correlation_time_s(curves: &[&Curve], policy: Policy) -> f64 {
     let horizon = curves[0].horizon;
     let (low, high) = (horizon.from_s / 4.0, horizon.to_s * 30.0);
     let misfit = |ln_t: f64| -> f64 {
-        curves.iter().map(|curve| Problem::new(curve, policy, Some(ln_t.exp())).solve().misfit).sum()
+        curves
+            .iter()
+            .map(|curve| Problem::new(curve, policy, Some(ln_t.exp())).solve().misfit)
+            .sum()
     };
     least(low.ln(), high.ln(), 60, misfit).0.exp()
 }
@@ -64,17 +80,33 @@ struct Problem {
 impl Problem {
     fn new(curve: &Curve, policy: Policy, t_corr_s: Option<f64>) -> Self {
         let row = |p: &super::Point| {
-            let target = if policy == Policy::Envelope { p.whole } else { p.carried };
-            [white(p.samples, curve.rate_hz), bias(t_corr_s, p.samples, curve.rate_hz), target]
+            let target = if policy == Policy::Envelope {
+                p.whole
+            } else {
+                p.carried
+            };
+            [
+                white(p.samples, curve.rate_hz),
+                bias(t_corr_s, p.samples, curve.rate_hz),
+                target,
+            ]
         };
-        Self { rows: curve.points.iter().map(row).collect(), reference: row(&curve.reference), policy }
+        Self {
+            rows: curve.points.iter().map(row).collect(),
+            reference: row(&curve.reference),
+            policy,
+        }
     }
 
     /// Searches the white variance: the bias follows from it in both policies.
     fn solve(&self) -> Solution {
         let [w, _, target] = self.reference;
         let most = match self.policy {
-            Policy::Envelope => self.rows.iter().map(|[w, _, target]| target / w).fold(0.0, f64::max),
+            Policy::Envelope => self
+                .rows
+                .iter()
+                .map(|[w, _, target]| target / w)
+                .fold(0.0, f64::max),
             // White noise alone may not exceed the Allan variance at the reference, through which the pair
             // goes.
             _ => target / w,
@@ -83,12 +115,19 @@ impl Problem {
         let ends = [self.with_white(0.0), self.with_white(most)];
         // The best may lie close to either end: one search is logarithmic in what white noise leaves to the
         // bias, the other in the white noise.
-        let (ln_rest, _) =
-            least(LEAST_SHARE.ln(), -LEAST_SHARE, 80, |x| self.with_white(most * -x.exp_m1()).misfit);
-        let (ln_white, _) = least(LEAST_SHARE.ln(), 0.0, 80, |x| self.with_white(most * x.exp()).misfit);
-        let inner = [self.with_white(most * -ln_rest.exp_m1()), self.with_white(most * ln_white.exp())];
+        let (ln_rest, _) = least(LEAST_SHARE.ln(), -LEAST_SHARE, 80, |x| {
+            self.with_white(most * -x.exp_m1()).misfit
+        });
+        let (ln_white, _) = least(LEAST_SHARE.ln(), 0.0, 80, |x| {
+            self.with_white(most * x.exp()).misfit
+        });
+        let inner = [
+            self.with_white(most * -ln_rest.exp_m1()),
+            self.with_white(most * ln_white.exp()),
+        ];
         let all = ends.into_iter().chain(inner);
-        all.min_by(|a, b| a.misfit.total_cmp(&b.misfit)).unwrap_or(ends[1])
+        all.min_by(|a, b| a.misfit.total_cmp(&b.misfit))
+            .unwrap_or(ends[1])
     }
 
     /// The bias that goes with a white variance: through the model's Allan variance at the reference, or over it
@@ -102,7 +141,11 @@ impl Problem {
         // Half: the logarithm is of the deviation, the rows are variances.
         let log_ratio = |[w, b, target]: &[f64; 3]| 0.5 * ((white * w + bias * b) / target).ln();
         let misfit = self.rows.iter().map(log_ratio).map(|r| r * r).sum();
-        Solution { white, bias, misfit }
+        Solution {
+            white,
+            bias,
+            misfit,
+        }
     }
 }
 
@@ -110,12 +153,19 @@ impl Problem {
 /// golden sections between its neighbours.
 fn least(low: f64, high: f64, steps: u32, f: impl Fn(f64) -> f64) -> (f64, f64) {
     let grid = |i: u32| low + (high - low) * f64::from(i) / f64::from(steps);
-    let best = (0..=steps).map(|i| (i, f(grid(i)))).min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(i, _)| i);
+    let best = (0..=steps)
+        .map(|i| (i, f(grid(i))))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map_or(0, |(i, _)| i);
     let (mut a, mut b) = (grid(best.saturating_sub(1)), grid((best + 1).min(steps)));
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     while b - a > 1e-9 * (1.0 + a.abs()) {
         let (left, right) = (b - golden * (b - a), a + golden * (b - a));
-        if f(left) <= f(right) { b = right } else { a = left }
+        if f(left) <= f(right) {
+            b = right
+        } else {
+            a = left
+        }
     }
     let middle = 0.5 * (a + b);
     // The end of the interval may be the best and golden sections only come near it.

@@ -50,7 +50,10 @@ pub struct Horizon {
 impl Default for Horizon {
     /// 1 s to 100 s: from one GNSS or camera interval to an outage.
     fn default() -> Self {
-        Self { from_s: 1.0, to_s: 100.0 }
+        Self {
+            from_s: 1.0,
+            to_s: 100.0,
+        }
     }
 }
 
@@ -129,12 +132,20 @@ impl Pair {
     /// times that of a model: from there on the model's deviation does not rise as the random walk's does. None where it is
     /// nowhere, or without a random walk.
     #[must_use]
-    pub fn departs_s(&self, model: &Composite, rate_hz: f64, to_s: f64, factor: f64) -> Option<f64> {
+    pub fn departs_s(
+        &self,
+        model: &Composite,
+        rate_hz: f64,
+        to_s: f64,
+        factor: f64,
+    ) -> Option<f64> {
         let longest = (to_s * rate_hz).min(f64::from(1_u32 << 30));
         let from = (self.crossover_s()? * rate_hz).max(1.0);
         let is_above =
             |m: &u32| self.allan_variance(*m, rate_hz) > factor * factor * model.allan_variance(*m);
-        let departs = averages(from, longest.max(from)).into_iter().find(is_above)?;
+        let departs = averages(from, longest.max(from))
+            .into_iter()
+            .find(is_above)?;
         Some(f64::from(departs) / rate_hz)
     }
 
@@ -227,22 +238,44 @@ impl Curve {
     ///
     /// # Errors
     /// When the horizon is too short or too long for the rate, or the axes have no noise there.
-    pub fn largest(axes: &[&Composite], rate_hz: f64, horizon: Horizon) -> Result<Self, CurveError> {
+    pub fn largest(
+        axes: &[&Composite],
+        rate_hz: f64,
+        horizon: Horizon,
+    ) -> Result<Self, CurveError> {
         let Horizon { from_s, to_s } = horizon;
         let (shortest_s, longest_s) = (1.0 / rate_hz, f64::from(1_u32 << 30) / rate_hz);
-        let usable = from_s >= shortest_s * (1.0 - 1e-9) && to_s >= 4.0 * from_s && to_s <= longest_s;
+        let usable =
+            from_s >= shortest_s * (1.0 - 1e-9) && to_s >= 4.0 * from_s && to_s <= longest_s;
         if !usable {
-            return Err(CurveError::Horizon { from_s, to_s, rate_hz, shortest_s, longest_s });
+            return Err(CurveError::Horizon {
+                from_s,
+                to_s,
+                rate_hz,
+                shortest_s,
+                longest_s,
+            });
         }
         let point = |samples| point(axes, samples);
-        let points: Vec<Point> = averages(from_s * rate_hz, to_s * rate_hz).into_iter().map(point).collect();
+        let points: Vec<Point> = averages(from_s * rate_hz, to_s * rate_hz)
+            .into_iter()
+            .map(point)
+            .collect();
         if let Some(p) = points.iter().find(|p| p.whole <= 0.0) {
-            return Err(CurveError::NoNoise { tau_s: f64::from(p.samples) / rate_hz });
+            return Err(CurveError::NoNoise {
+                tau_s: f64::from(p.samples) / rate_hz,
+            });
         }
         // N is read at 1 s, where N²/τ is N².
         let reference = point((rate_hz.round() as u32).max(1));
         let axes = axes.iter().map(|a| (*a).clone()).collect();
-        Ok(Self { axes, rate_hz, points, reference, horizon })
+        Ok(Self {
+            axes,
+            rate_hz,
+            points,
+            reference,
+            horizon,
+        })
     }
 
     /// The pair that stands for the model.
@@ -266,7 +299,9 @@ impl Curve {
     /// Whether all axes are the same white noise and random walk, so that the largest is one of them.
     fn is_white_and_walk(&self) -> bool {
         let pair = |p: &Process| matches!(p, Process::White(_) | Process::RandomWalk(_));
-        self.axes.iter().all(|a| *a == self.axes[0] && a.processes.iter().all(pair))
+        self.axes
+            .iter()
+            .all(|a| *a == self.axes[0] && a.processes.iter().all(pair))
     }
 
     fn strict(&self, walk: bool) -> Pair {
@@ -276,12 +311,19 @@ impl Curve {
         let k = largest(&|axis| walk_density(walk_gamma2(axis), self.rate_hz));
         let slowest = self.axes.iter().filter_map(|axis| {
             let of_axis = reading::correlated(axis, self.rate_hz);
-            of_axis.into_iter().map(|c| c.markov).max_by(|a, b| a.t_corr_s.total_cmp(&b.t_corr_s))
+            of_axis
+                .into_iter()
+                .map(|c| c.markov)
+                .max_by(|a, b| a.t_corr_s.total_cmp(&b.t_corr_s))
         });
         // Of each axis the slowest, of these the largest: a filter has one bias state an axis, and one figure
         // for all three.
         let markov = slowest.max_by(|a, b| a.sigma.total_cmp(&b.sigma));
-        Pair { density, walk: if walk { k } else { 0.0 }, markov: markov.filter(|_| !walk) }
+        Pair {
+            density,
+            walk: if walk { k } else { 0.0 },
+            markov: markov.filter(|_| !walk),
+        }
     }
 
     /// Largest share that quantization noise and drift have of the Allan variance over the horizon, and where (s): what
@@ -292,26 +334,44 @@ impl Curve {
             ratio: 1.0 - p.carried / p.whole,
             tau_s: f64::from(p.samples) / self.rate_hz,
         };
-        let none = Ratio { ratio: 0.0, tau_s: self.horizon.from_s };
-        self.points.iter().map(share).fold(none, |a, b| if b.ratio > a.ratio { b } else { a })
+        let none = Ratio {
+            ratio: 0.0,
+            tau_s: self.horizon.from_s,
+        };
+        self.points
+            .iter()
+            .map(share)
+            .fold(none, |a, b| if b.ratio > a.ratio { b } else { a })
     }
 }
 
 fn point(axes: &[&Composite], samples: u32) -> Point {
     let largest = |f: &dyn Fn(&Process) -> bool| {
         let of_axis = |axis: &&Composite| -> f64 {
-            axis.processes.iter().filter(|p| f(p)).map(|p| p.allan_variance(samples)).sum()
+            axis.processes
+                .iter()
+                .filter(|p| f(p))
+                .map(|p| p.allan_variance(samples))
+                .sum()
         };
         axes.iter().map(of_axis).fold(0.0, f64::max)
     };
     let carried = |p: &Process| !matches!(p, Process::Quantization(_) | Process::Drift(_));
-    Point { samples, whole: largest(&|_| true), carried: largest(&carried) }
+    Point {
+        samples,
+        whole: largest(&|_| true),
+        carried: largest(&carried),
+    }
 }
 
 /// Whole numbers of samples from one to another, evenly in the logarithm.
 fn averages(from: f64, to: f64) -> Vec<u32> {
     let steps = ((to / from).log2() * PER_OCTAVE).ceil();
-    let factor = |i: u32| (from * (to / from).powf(f64::from(i) / steps)).round().max(1.0) as u32;
+    let factor = |i: u32| {
+        (from * (to / from).powf(f64::from(i) / steps))
+            .round()
+            .max(1.0) as u32
+    };
     let mut all: Vec<u32> = (0..=steps as u32).map(factor).collect();
     // Of few samples neighbouring times round to the same number, which would count twice.
     all.dedup();
@@ -319,12 +379,24 @@ fn averages(from: f64, to: f64) -> Vec<u32> {
 }
 
 fn white_sigma2(axis: &Composite) -> f64 {
-    let sigma2 = |p: &Process| if let Process::White(p) = p { p.sigma2() } else { 0.0 };
+    let sigma2 = |p: &Process| {
+        if let Process::White(p) = p {
+            p.sigma2()
+        } else {
+            0.0
+        }
+    };
     axis.processes.iter().map(sigma2).sum()
 }
 
 fn walk_gamma2(axis: &Composite) -> f64 {
-    let gamma2 = |p: &Process| if let Process::RandomWalk(p) = p { p.gamma2() } else { 0.0 };
+    let gamma2 = |p: &Process| {
+        if let Process::RandomWalk(p) = p {
+            p.gamma2()
+        } else {
+            0.0
+        }
+    };
     axis.processes.iter().map(gamma2).sum()
 }
 
@@ -335,8 +407,13 @@ fn markov_of(process: &Process, rate_hz: f64) -> Option<Markov> {
         Process::GaussMarkov(p) => p.s2(),
         _ => return None,
     };
-    let t_corr_s = process.correlation_time_s(rate_hz).filter(|_| variance > 0.0)?;
-    Some(Markov { sigma: variance.sqrt(), t_corr_s })
+    let t_corr_s = process
+        .correlation_time_s(rate_hz)
+        .filter(|_| variance > 0.0)?;
+    Some(Markov {
+        sigma: variance.sqrt(),
+        t_corr_s,
+    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,8 @@
 //! The parameters of one axis, each with the averaging times that it governs.
 
-use super::{Bias, Curve, CurveError, FLICKER_FLOOR, Horizon, Markov, Pair, Policy, averages, markov_of};
+use super::{
+    Bias, Curve, CurveError, FLICKER_FLOOR, Horizon, Markov, Pair, Policy, averages, markov_of,
+};
 use crate::noise::Composite;
 
 /// A minimum of the Allan deviation.
@@ -20,13 +22,20 @@ impl Minimum {
         // The grid of 1/16 octave is fine enough: around its minimum N²/τ + K²τ/3 is proportional to cosh x with
         // x = ln(τ/τ₀), and √cosh(ln 2/32) exceeds 1 by 1e-4.
         let samples = averages(1.0, (range_s * rate_hz).clamp(2.0, f64::from(1_u32 << 30)));
-        let variance = |m: &u32| axes.iter().map(|a| a.allan_variance(*m)).fold(0.0, f64::max);
+        let variance = |m: &u32| {
+            axes.iter()
+                .map(|a| a.allan_variance(*m))
+                .fold(0.0, f64::max)
+        };
         let variances: Vec<f64> = samples.iter().map(variance).collect();
         // An end of the range is no minimum: the deviation may go on falling beyond it.
         let inner = (1..samples.len().saturating_sub(1))
             .filter(|i| variances[*i] < variances[i - 1] && variances[*i] <= variances[i + 1]);
         let lowest = inner.min_by(|a, b| variances[*a].total_cmp(&variances[*b]))?;
-        Some(Self { tau_s: f64::from(samples[lowest]) / rate_hz, deviation: variances[lowest].sqrt() })
+        Some(Self {
+            tau_s: f64::from(samples[lowest]) / rate_hz,
+            deviation: variances[lowest].sqrt(),
+        })
     }
 
     /// Bias instability B = Allan deviation/0.664 (units).
@@ -75,7 +84,11 @@ impl AxisParameters {
             walk: curve.pair(policy, Bias::Walk),
             markov: curve.pair(policy, Bias::Markov),
             minimum: Minimum::of(axes, rate_hz, range_s),
-            correlated: axes.iter().take(1).flat_map(|axis| correlated(axis, rate_hz)).collect(),
+            correlated: axes
+                .iter()
+                .take(1)
+                .flat_map(|axis| correlated(axis, rate_hz))
+                .collect(),
         })
     }
 }
@@ -84,6 +97,11 @@ impl AxisParameters {
 pub(super) fn correlated(axis: &Composite, rate_hz: f64) -> Vec<CorrelatedProcess> {
     let labelled = axis.labels().into_iter().zip(&axis.processes);
     labelled
-        .filter_map(|(label, p)| Some(CorrelatedProcess { label, markov: markov_of(p, rate_hz)? }))
+        .filter_map(|(label, p)| {
+            Some(CorrelatedProcess {
+                label,
+                markov: markov_of(p, rate_hz)?,
+            })
+        })
         .collect()
 }

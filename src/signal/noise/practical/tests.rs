@@ -23,7 +23,12 @@ fn curve(processes: Vec<Process>) -> Curve {
 /// No WN, a fast AR1 and slow biases: what calibrations of real recordings look like.
 fn without_wn() -> Vec<Process> {
     let fast = Process::Ar1(Ar1::new(0.6, 4e-5).unwrap());
-    vec![fast, gm(3e-4, 20.0), rw(5e-6), Process::Quantization(Quantization::new(1e-8).unwrap())]
+    vec![
+        fast,
+        gm(3e-4, 20.0),
+        rw(5e-6),
+        Process::Quantization(Quantization::new(1e-8).unwrap()),
+    ]
 }
 
 #[test]
@@ -31,7 +36,10 @@ fn a_pair_comes_back_from_every_policy() {
     let (n, k) = (0.15 * DEG / 60.0, 2e-7);
     for policy in [Policy::Strict, Policy::Matched, Policy::Envelope] {
         let pair = curve(vec![wn(n), rw(k)]).pair(policy, Bias::Walk);
-        assert!((pair.density / n - 1.0).abs() < 1e-12 && (pair.walk / k - 1.0).abs() < 1e-12, "{pair:?}");
+        assert!(
+            (pair.density / n - 1.0).abs() < 1e-12 && (pair.walk / k - 1.0).abs() < 1e-12,
+            "{pair:?}"
+        );
     }
 }
 
@@ -44,7 +52,10 @@ fn the_search_finds_a_pair_by_another_name() {
     let slow = gm(k * (0.5 * t).sqrt(), t);
     for policy in [Policy::Matched, Policy::Envelope] {
         let pair = curve(vec![white, slow]).pair(policy, Bias::Walk);
-        assert!((pair.density / n - 1.0).abs() < 1e-4 && (pair.walk / k - 1.0).abs() < 1e-4, "{pair:?}");
+        assert!(
+            (pair.density / n - 1.0).abs() < 1e-4 && (pair.walk / k - 1.0).abs() < 1e-4,
+            "{pair:?}"
+        );
     }
 }
 
@@ -55,7 +66,10 @@ fn a_gauss_markov_bias_comes_back() {
         let pair = curve(vec![wn(n), gm(sigma, t)]).pair(policy, Bias::Markov);
         let markov = pair.markov.unwrap();
         let worst = [pair.density / n, markov.sigma / sigma, markov.t_corr_s / t];
-        assert!(worst.iter().all(|r| (r - 1.0).abs() < 1e-3), "{policy:?} {worst:?}");
+        assert!(
+            worst.iter().all(|r| (r - 1.0).abs() < 1e-3),
+            "{policy:?} {worst:?}"
+        );
         assert!((markov.drive() / (sigma * (2.0 / t).sqrt()) - 1.0).abs() < 1e-3);
     }
 }
@@ -67,7 +81,11 @@ fn a_fast_ar1_is_the_white_noise() {
     let axis = vec![Process::Ar1(Ar1::new(0.6, 4e-5).unwrap())];
     let pair = curve(axis).pair(Policy::Matched, Bias::Walk);
     let n = (4e-5_f64 / RATE).sqrt() / (1.0 - 0.6);
-    assert!((pair.density / n - 1.0).abs() < 0.03, "{:e} {n:e}", pair.density);
+    assert!(
+        (pair.density / n - 1.0).abs() < 0.03,
+        "{:e} {n:e}",
+        pair.density
+    );
 }
 
 #[test]
@@ -94,10 +112,23 @@ fn matched_is_the_least_squares_pair() {
     let target = curve.reference.carried;
     for i in 0..=2000 {
         let density2 = target * f64::from(i) / 2000.0;
-        let unit = Pair { density: 0.0, walk: 1.0, markov: None }.allan_variance(100, RATE);
+        let unit = Pair {
+            density: 0.0,
+            walk: 1.0,
+            markov: None,
+        }
+        .allan_variance(100, RATE);
         let walk = ((target - density2) / unit).max(0.0).sqrt();
-        let other = Pair { density: density2.sqrt(), walk, markov: None };
-        assert!(found <= misfit(&other) * (1.0 + 1e-9), "{i}: {found} {}", misfit(&other));
+        let other = Pair {
+            density: density2.sqrt(),
+            walk,
+            markov: None,
+        };
+        assert!(
+            found <= misfit(&other) * (1.0 + 1e-9),
+            "{i}: {found} {}",
+            misfit(&other)
+        );
     }
 }
 
@@ -106,7 +137,12 @@ fn matched_is_the_least_squares_pair() {
 #[test]
 fn the_envelope_is_nowhere_below() {
     let drift = Process::Drift(Drift::new(2e-9).unwrap());
-    for model in [without_wn(), vec![wn(1e-4), gm(1e-3, 5.0), drift], vec![rw(1e-5)], vec![wn(1e-3)]] {
+    for model in [
+        without_wn(),
+        vec![wn(1e-4), gm(1e-3, 5.0), drift],
+        vec![rw(1e-5)],
+        vec![wn(1e-3)],
+    ] {
         let composite = Composite::new(model.clone());
         for kind in [Bias::Walk, Bias::Markov, Bias::MarkovOf(50.0)] {
             let pair = curve(model.clone()).pair(Policy::Envelope, kind);
@@ -114,8 +150,13 @@ fn the_envelope_is_nowhere_below() {
                 let ratio = (pair.allan_variance(m, RATE) / composite.allan_variance(m)).sqrt();
                 assert!(ratio > 1.0 - 4e-4, "{kind:?} {m}: {ratio}");
             }
-            let closure = curve(model.clone()).pair(Policy::Envelope, kind).closure(&curve(model.clone()));
-            assert!((closure.lowest.ratio - 1.0).abs() < 1e-6, "not the smallest: {closure:?}");
+            let closure = curve(model.clone())
+                .pair(Policy::Envelope, kind)
+                .closure(&curve(model.clone()));
+            assert!(
+                (closure.lowest.ratio - 1.0).abs() < 1e-6,
+                "not the smallest: {closure:?}"
+            );
         }
     }
 }
@@ -126,19 +167,28 @@ fn what_a_pair_cannot_carry_is_told() {
     let drift = Process::Drift(Drift::new(1e-7).unwrap());
     let with_drift = curve(vec![wn(1e-4), drift]);
     let pair = with_drift.pair(Policy::Matched, Bias::Walk);
-    let expected = (1e-8 / 100.0_f64).sqrt() / (1e-8 / 100.0 + 0.5 * (1e-5_f64 * 100.0).powi(2)).sqrt();
+    let expected =
+        (1e-8 / 100.0_f64).sqrt() / (1e-8 / 100.0 + 0.5 * (1e-5_f64 * 100.0).powi(2)).sqrt();
     let closure = pair.closure(&with_drift);
-    assert!((closure.lowest.ratio / expected - 1.0).abs() < 1e-6, "{closure:?} {expected}");
+    assert!(
+        (closure.lowest.ratio / expected - 1.0).abs() < 1e-6,
+        "{closure:?} {expected}"
+    );
     assert!((closure.lowest.tau_s - 100.0).abs() < 1e-9 && with_drift.left_out().ratio > 0.99);
     assert_eq!(curve(vec![wn(1e-4)]).left_out().ratio, 0.0);
 }
 
 #[test]
 fn the_largest_axis_rules() {
-    let (small, large) = (Composite::new(vec![wn(1e-3), rw(4e-5)]), Composite::new(vec![wn(2e-3), rw(1e-5)]));
+    let (small, large) = (
+        Composite::new(vec![wn(1e-3), rw(4e-5)]),
+        Composite::new(vec![wn(2e-3), rw(1e-5)]),
+    );
     let both = Curve::largest(&[&small, &large], RATE, Horizon::default()).unwrap();
     let strict = both.pair(Policy::Strict, Bias::Walk);
-    assert!((strict.density / 2e-3 - 1.0).abs() < 1e-12 && (strict.walk / 4e-5 - 1.0).abs() < 1e-12);
+    assert!(
+        (strict.density / 2e-3 - 1.0).abs() < 1e-12 && (strict.walk / 4e-5 - 1.0).abs() < 1e-12
+    );
     let pair = both.pair(Policy::Envelope, Bias::Walk);
     for m in (100..=10_000).step_by(50) {
         for axis in [&small, &large] {
@@ -160,7 +210,9 @@ fn the_bias_instability_is_the_minimum_over_its_floor() {
     let floor = (2.0 * n * k / 3.0_f64.sqrt()).sqrt();
     assert!((minimum.deviation / floor - 1.0).abs() < 1e-3);
     assert!(
-        (minimum.bias_instability() * (2.0 * 2.0_f64.ln() / std::f64::consts::PI).sqrt() / floor - 1.0).abs()
+        (minimum.bias_instability() * (2.0 * 2.0_f64.ln() / std::f64::consts::PI).sqrt() / floor
+            - 1.0)
+            .abs()
             < 1e-3
     );
     assert_eq!(parameters(vec![wn(n)]).minimum, None);
@@ -173,11 +225,23 @@ fn the_bias_instability_is_the_minimum_over_its_floor() {
 #[test]
 fn horizons_that_cannot_be_are_refused() {
     let axis = Composite::new(vec![wn(1e-3)]);
-    for (from_s, to_s) in [(0.001, 10.0), (10.0, 20.0), (1.0, 1e9), (f64::NAN, 10.0), (100.0, 1.0)] {
-        assert!(Curve::largest(&[&axis], RATE, Horizon { from_s, to_s }).is_err(), "{from_s} {to_s}");
+    for (from_s, to_s) in [
+        (0.001, 10.0),
+        (10.0, 20.0),
+        (1.0, 1e9),
+        (f64::NAN, 10.0),
+        (100.0, 1.0),
+    ] {
+        assert!(
+            Curve::largest(&[&axis], RATE, Horizon { from_s, to_s }).is_err(),
+            "{from_s} {to_s}"
+        );
     }
     let silent = Curve::largest(&[&Composite::default()], RATE, Horizon::default()).unwrap_err();
-    assert_eq!(silent.to_string(), "the model has no noise at an averaging time of 1 s");
+    assert_eq!(
+        silent.to_string(),
+        "the model has no noise at an averaging time of 1 s"
+    );
 }
 
 /// Beside white noise of the same N the pair has 1 + (Kτ/N)²/3 times the Allan variance: 4 at τ = 3 N/K, found on a grid of
@@ -185,25 +249,43 @@ fn horizons_that_cannot_be_are_refused() {
 #[test]
 fn a_pair_departs_from_a_model_without_its_random_walk() {
     let (n, k) = (1e-3, 1e-5);
-    let pair = Pair { density: n, walk: k, markov: None };
+    let pair = Pair {
+        density: n,
+        walk: k,
+        markov: None,
+    };
     let departs = |processes, to_s| pair.departs_s(&Composite::new(processes), RATE, to_s, 2.0);
     let found = departs(vec![wn(n)], 1e4).unwrap() / (3.0 * n / k);
     assert!((1.0..1.045).contains(&found), "{found}");
     assert_eq!(departs(vec![wn(n)], 250.0), None);
     assert_eq!(departs(vec![wn(n), rw(k)], 1e4), None);
     let white = Pair { walk: 0.0, ..pair };
-    assert_eq!(white.departs_s(&Composite::new(vec![wn(0.1 * n)]), RATE, 1e4, 2.0), None);
+    assert_eq!(
+        white.departs_s(&Composite::new(vec![wn(0.1 * n)]), RATE, 1e4, 2.0),
+        None
+    );
 }
 
 /// N²/τ = K²τ/3 at τ = √3 N/K: 173.2 s for N = 1e-3 and K = 1e-5.
 #[test]
 fn white_noise_and_random_walk_are_equal_at_the_crossover() {
     let (n, k) = (1e-3, 1e-5);
-    let pair = Pair { density: n, walk: k, markov: None };
+    let pair = Pair {
+        density: n,
+        walk: k,
+        markov: None,
+    };
     let tau_s = pair.crossover_s().unwrap();
-    assert!((tau_s / 173.205_080_756_887_7 - 1.0).abs() < 1e-12, "{tau_s}");
+    assert!(
+        (tau_s / 173.205_080_756_887_7 - 1.0).abs() < 1e-12,
+        "{tau_s}"
+    );
     let samples = (tau_s * RATE).round() as u32;
-    let [white, walk] = [(n, 0.0), (0.0, k)].map(|(density, walk)| Pair { density, walk, markov: None });
+    let [white, walk] = [(n, 0.0), (0.0, k)].map(|(density, walk)| Pair {
+        density,
+        walk,
+        markov: None,
+    });
     let ratio = white.allan_variance(samples, RATE) / walk.allan_variance(samples, RATE);
     // half a sample of 17 320, and what the sampling adds to a walk: 1/(2m²)
     assert!((ratio - 1.0).abs() < 1e-4, "{ratio}");

@@ -6,17 +6,24 @@ const RATE: f64 = 100.0;
 
 fn n1() -> Composite {
     let process = |code, values: &[f64]| Process::from_values(code, values, RATE).unwrap().unwrap();
-    Composite::new(vec![process("WN", &[5e-5]), process("AR1", &[0.985, 1.5e-8]), process("RW", &[3e-11])])
+    Composite::new(vec![
+        process("WN", &[5e-5]),
+        process("AR1", &[0.985, 1.5e-8]),
+        process("RW", &[3e-11]),
+    ])
 }
 
 fn spread(process: &str, parameter: &str, law: Law) -> Spread {
     let variation = Variation::new(&n1(), RATE, process, parameter, law).unwrap();
-    Spread { axes: std::array::from_fn(|_| vec![variation.clone()]) }
+    Spread {
+        axes: std::array::from_fn(|_| vec![variation.clone()]),
+    }
 }
 
 fn drawn(spread: &Spread, replicates: u64, axis: usize, at: (usize, usize)) -> Vec<f64> {
     let model = Model::pooled(RATE, &n1(), &n1());
-    let value = |r| spread.draw(&model, 1, r).unwrap().axes[axis].processes[at.0].parameters()[at.1].1;
+    let value =
+        |r| spread.draw(&model, 1, r).unwrap().axes[axis].processes[at.0].parameters()[at.1].1;
     (0..replicates).map(value).collect()
 }
 
@@ -25,7 +32,12 @@ fn drawn(spread: &Spread, replicates: u64, axis: usize, at: (usize, usize)) -> V
 #[test]
 fn beta_has_its_range_and_moments() {
     let (a, b, low, width) = (6.0, 2.0, 0.983_548_9, 3.447_648_9e-3);
-    let x = drawn(&spread("AR1", "phi", Law::Beta { a, b, low, width }), 4000, 0, (1, 0));
+    let x = drawn(
+        &spread("AR1", "phi", Law::Beta { a, b, low, width }),
+        4000,
+        0,
+        (1, 0),
+    );
     assert!(x.iter().all(|v| (low..=low + width).contains(v)));
     let n = x.len() as f64;
     let mean = x.iter().sum::<f64>() / n;
@@ -60,24 +72,41 @@ fn normal_is_truncated_to_the_domain() {
 /// its standard deviations, their deviation within five of 1/√8000.
 #[test]
 fn lognormal_is_of_variances_and_of_correlation_times() {
-    let law = |median| Law::Lognormal { median, sd: 0.3, ci95: None };
+    let law = |median| Law::Lognormal {
+        median,
+        sd: 0.3,
+        ci95: None,
+    };
     let time = |phi: f64| -1.0 / phi.ln();
-    for (process, parameter, at, median, of) in
-        [("WN", "sigma2", (0, 0), 5e-5, (|x| x) as fn(f64) -> f64), ("AR1", "phi", (1, 0), 0.98, time)]
-    {
+    for (process, parameter, at, median, of) in [
+        ("WN", "sigma2", (0, 0), 5e-5, (|x| x) as fn(f64) -> f64),
+        ("AR1", "phi", (1, 0), 0.98, time),
+    ] {
         let x = drawn(&spread(process, parameter, law(median)), 4000, 0, at);
         let logs: Vec<f64> = x.iter().map(|x| (of(*x) / of(median)).ln()).collect();
         let n = logs.len() as f64;
         let mean = logs.iter().sum::<f64>() / n;
         let sd = (logs.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
         assert!(mean.abs() < 5.0 * 0.3 / n.sqrt(), "{process}: {mean}");
-        assert!((sd / 0.3 - 1.0).abs() < 5.0 / (2.0 * n).sqrt(), "{process}: {sd}");
+        assert!(
+            (sd / 0.3 - 1.0).abs() < 5.0 / (2.0 * n).sqrt(),
+            "{process}: {sd}"
+        );
     }
 }
 
 #[test]
 fn axes_and_replicates_draw_for_themselves_and_repeat() {
-    let s = spread("WN", "sigma2", Law::Beta { a: 3.0, b: 4.0, low: 5e-5, width: 5e-6 });
+    let s = spread(
+        "WN",
+        "sigma2",
+        Law::Beta {
+            a: 3.0,
+            b: 4.0,
+            low: 5e-5,
+            width: 5e-6,
+        },
+    );
     let (x, y) = (drawn(&s, 3, 0, (0, 0)), drawn(&s, 3, 1, (0, 0)));
     assert_ne!(x[..1], x[1..2]);
     assert_ne!(x, y);
@@ -87,15 +116,32 @@ fn axes_and_replicates_draw_for_themselves_and_repeat() {
 /// About a centre of twice the variance and half the correlation time the same draws are twice and half as large.
 #[test]
 fn draws_move_with_their_centre() {
-    let mut s = spread("WN", "sigma2", Law::Beta { a: 3.0, b: 4.0, low: 5e-5, width: 5e-6 });
-    let phi = Law::Lognormal { median: 0.98, sd: 0.3, ci95: None };
+    let mut s = spread(
+        "WN",
+        "sigma2",
+        Law::Beta {
+            a: 3.0,
+            b: 4.0,
+            low: 5e-5,
+            width: 5e-6,
+        },
+    );
+    let phi = Law::Lognormal {
+        median: 0.98,
+        sd: 0.3,
+        ci95: None,
+    };
     s.axes[0].push(Variation::new(&n1(), RATE, "AR1", "phi", phi).unwrap());
     let model = Model::pooled(RATE, &n1(), &n1());
     let mut centre = model.clone();
     centre.axes[0].processes[0] = Process::from_values("WN", &[1e-4], RATE).unwrap().unwrap();
-    centre.axes[0].processes[1] =
-        Process::from_values("AR1", &[0.985_f64.powi(2), 3e-8], RATE).unwrap().unwrap();
-    let (own, moved) = (s.draw(&model, 1, 5).unwrap(), s.draw_about(&centre, &model, 1, 5).unwrap());
+    centre.axes[0].processes[1] = Process::from_values("AR1", &[0.985_f64.powi(2), 3e-8], RATE)
+        .unwrap()
+        .unwrap();
+    let (own, moved) = (
+        s.draw(&model, 1, 5).unwrap(),
+        s.draw_about(&centre, &model, 1, 5).unwrap(),
+    );
     let value = |m: &Model, p: usize, v: usize| m.axes[0].processes[p].values()[v];
     assert!((value(&moved, 0, 0) / value(&own, 0, 0) - 2.0).abs() < 1e-12);
     assert!((value(&moved, 1, 0).ln() / value(&own, 1, 0).ln() - 2.0).abs() < 1e-12);
@@ -111,21 +157,50 @@ fn what_is_not_drawn_keeps_its_value() {
 #[test]
 fn impossible_laws_are_refused_in_words() {
     let refusal = |process, parameter, law| {
-        Variation::new(&n1(), RATE, process, parameter, law).unwrap_err().to_string()
+        Variation::new(&n1(), RATE, process, parameter, law)
+            .unwrap_err()
+            .to_string()
     };
-    let beta = |a, low, width| Law::Beta { a, b: 1.0, low, width };
+    let beta = |a, low, width| Law::Beta {
+        a,
+        b: 1.0,
+        low,
+        width,
+    };
     let normal = |sd| Law::Normal { sd };
     assert_eq!(
         refusal("AR1_2", "phi", normal(0.1)),
         "the model has no process \"AR1_2\" there, only WN, AR1, RW"
     );
-    assert_eq!(refusal("AR1", "ph", normal(0.1)), "AR1 has no parameter \"ph\", only phi, sigma2");
-    assert_eq!(refusal("WN", "sigma2", beta(0.0, 0.0, 1.0)), "a = 0 is not a finite number > 0");
-    assert_eq!(refusal("AR1", "phi", normal(2.0)), "sd = 2 is not between 0 and 1");
-    assert_eq!(refusal("WN", "sigma2", normal(f64::NAN)), "sd = NaN is not a finite number ≥ 0");
-    let lognormal = |median, sd| Law::Lognormal { median, sd, ci95: None };
-    assert_eq!(refusal("WN", "sigma2", lognormal(0.0, 0.1)), "median = 0 is not a finite number > 0");
-    assert_eq!(refusal("WN", "sigma2", lognormal(1.0, 11.0)), "sd = 11 is not between 0 and 10");
+    assert_eq!(
+        refusal("AR1", "ph", normal(0.1)),
+        "AR1 has no parameter \"ph\", only phi, sigma2"
+    );
+    assert_eq!(
+        refusal("WN", "sigma2", beta(0.0, 0.0, 1.0)),
+        "a = 0 is not a finite number > 0"
+    );
+    assert_eq!(
+        refusal("AR1", "phi", normal(2.0)),
+        "sd = 2 is not between 0 and 1"
+    );
+    assert_eq!(
+        refusal("WN", "sigma2", normal(f64::NAN)),
+        "sd = NaN is not a finite number ≥ 0"
+    );
+    let lognormal = |median, sd| Law::Lognormal {
+        median,
+        sd,
+        ci95: None,
+    };
+    assert_eq!(
+        refusal("WN", "sigma2", lognormal(0.0, 0.1)),
+        "median = 0 is not a finite number > 0"
+    );
+    assert_eq!(
+        refusal("WN", "sigma2", lognormal(1.0, 11.0)),
+        "sd = 11 is not between 0 and 10"
+    );
     assert!(refusal("AR1", "phi", lognormal(1.5, 0.1)).contains("phi = 1.5 is not between"));
     assert_eq!(
         refusal("AR1", "phi", beta(1.0, 0.5, 0.5)),

@@ -26,8 +26,16 @@ fn lose(signal: &mut [f64], share: f64, burst: usize, generator: &mut Generator)
 fn form(samples: &[f64], there: &[f64], level: u32) -> f64 {
     let observed: f64 = there.iter().sum();
     let mean = samples.iter().zip(there).map(|(x, d)| x * d).sum::<f64>() / observed;
-    let samples: Vec<f64> = samples.iter().zip(there).map(|(x, d)| (x - mean) * d).collect();
-    let mut windows = Windows { sums: samples.clone(), counts: there.to_vec(), half: 1 };
+    let samples: Vec<f64> = samples
+        .iter()
+        .zip(there)
+        .map(|(x, d)| (x - mean) * d)
+        .collect();
+    let mut windows = Windows {
+        sums: samples.clone(),
+        counts: there.to_vec(),
+        half: 1,
+    };
     (1..level).for_each(|_| windows.double());
     let blocks = Blocks::new(&samples, there, windows.half);
     windows.coefficients().unwrap().mean_square() - blocks.excess(&windows)
@@ -38,19 +46,36 @@ fn form(samples: &[f64], there: &[f64], level: u32) -> f64 {
 #[test]
 fn the_expectation_is_exact_whatever_the_holes() {
     const N: usize = 96;
-    let pulse = |i: usize| (0..N).map(|t| f64::from(u8::from(t == i))).collect::<Vec<f64>>();
-    let step = |i: usize| (0..N).map(|t| f64::from(u8::from(t >= i))).collect::<Vec<f64>>();
+    let pulse = |i: usize| {
+        (0..N)
+            .map(|t| f64::from(u8::from(t == i)))
+            .collect::<Vec<f64>>()
+    };
+    let step = |i: usize| {
+        (0..N)
+            .map(|t| f64::from(u8::from(t >= i)))
+            .collect::<Vec<f64>>()
+    };
     for (seed, burst) in [(1, 1), (2, 5), (3, 9)] {
         let mut holes = vec![1.0; N];
         lose(&mut holes, 0.15, burst, &mut Generator::seed_from_u64(seed));
-        let there: Vec<f64> = holes.iter().map(|x| f64::from(u8::from(!x.is_nan()))).collect();
+        let there: Vec<f64> = holes
+            .iter()
+            .map(|x| f64::from(u8::from(!x.is_nan())))
+            .collect();
         for level in 1..=5 {
             let tau = f64::from(level).exp2();
             let white: f64 = (0..N).map(|i| form(&pulse(i), &there, level)).sum();
             let walk: f64 = (1..N).map(|i| form(&step(i), &there, level)).sum();
-            assert!((white * tau - 1.0).abs() < 1e-11, "{burst}, {level}: {white}");
+            assert!(
+                (white * tau - 1.0).abs() < 1e-11,
+                "{burst}, {level}: {white}"
+            );
             let expected = (tau * tau + 2.0) / (12.0 * tau);
-            assert!((walk / expected - 1.0).abs() < 1e-11, "{burst}, {level}: {walk} {expected}");
+            assert!(
+                (walk / expected - 1.0).abs() < 1e-11,
+                "{burst}, {level}: {walk} {expected}"
+            );
         }
     }
 }
@@ -65,7 +90,13 @@ fn noise() -> Composite {
 }
 
 fn signal(seed: u64, samples: usize) -> Vec<f64> {
-    let key = StreamKey { seed, scenario: "", run: 0, source: "", process: "" };
+    let key = StreamKey {
+        seed,
+        scenario: "",
+        run: 0,
+        source: "",
+        process: "",
+    };
     let mut signal = vec![0.0; samples];
     Synthesizer::new(&noise(), key).fill(&mut signal);
     signal
@@ -78,8 +109,14 @@ fn without_holes_it_is_the_plain_one() {
     let found = gappy(&signal, 10, &tuning()).unwrap();
     assert_eq!(found.coverage, [1.0; 10]);
     for j in 0..10 {
-        assert!((found.classical[j] / classical[j] - 1.0).abs() < 1e-9, "{j}");
-        assert!((found.robust[j].value / robust[j].value - 1.0).abs() < 1e-6, "{j}");
+        assert!(
+            (found.classical[j] / classical[j] - 1.0).abs() < 1e-9,
+            "{j}"
+        );
+        assert!(
+            (found.robust[j].value / robust[j].value - 1.0).abs() < 1e-6,
+            "{j}"
+        );
     }
 }
 
@@ -101,16 +138,25 @@ fn holes_leave_no_bias_and_cost_what_coverage_says() {
         let moments = |values: Vec<f64>| {
             let n = values.len() as f64;
             let mean = values.iter().sum::<f64>() / n;
-            (mean, values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0))
+            (
+                mean,
+                values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0),
+            )
         };
         for j in 0..10 {
             let nu = noise().haar_wv(j as u32 + 1);
             let (_, whole) = moments(all.iter().map(|(w, _)| w.0[j]).collect());
             let (mean, variance) = moments(all.iter().map(|(_, g)| g.classical[j]).collect());
             let bound = 4.0 * (variance / RECORDS as f64).sqrt();
-            assert!((mean - nu).abs() < bound, "{burst}, {j}: {mean} {nu} {bound}");
-            let (difference, scatter) =
-                moments(all.iter().map(|(w, g)| g.robust[j].value / w.1[j].value - 1.0).collect());
+            assert!(
+                (mean - nu).abs() < bound,
+                "{burst}, {j}: {mean} {nu} {bound}"
+            );
+            let (difference, scatter) = moments(
+                all.iter()
+                    .map(|(w, g)| g.robust[j].value / w.1[j].value - 1.0)
+                    .collect(),
+            );
             let (coverage, _) = moments(all.iter().map(|(_, g)| g.coverage[j]).collect());
             assert!(
                 difference.abs() < 0.01 + 4.0 * (scatter / RECORDS as f64).sqrt(),
@@ -127,10 +173,21 @@ fn holes_leave_no_bias_and_cost_what_coverage_says() {
 
 #[test]
 fn what_has_too_few_samples_is_refused_or_ends() {
-    assert!(matches!(gappy(&[f64::NAN, 1.0], 1, &tuning()), Err(WaveletError::TooShort { .. })));
-    assert!(matches!(gappy(&[1.0, f64::INFINITY, 2.0], 1, &tuning()), Err(WaveletError::NotFinite { .. })));
-    assert!(matches!(gappy(&[1.0; 8], 4, &tuning()), Err(WaveletError::TooShort { .. })));
+    assert!(matches!(
+        gappy(&[f64::NAN, 1.0], 1, &tuning()),
+        Err(WaveletError::TooShort { .. })
+    ));
+    assert!(matches!(
+        gappy(&[1.0, f64::INFINITY, 2.0], 1, &tuning()),
+        Err(WaveletError::NotFinite { .. })
+    ));
+    assert!(matches!(
+        gappy(&[1.0; 8], 4, &tuning()),
+        Err(WaveletError::TooShort { .. })
+    ));
     // No two neighbours: no first scale, and none after it.
-    let alternate: Vec<f64> = (0..64).map(|t| if t % 2 == 0 { f64::from(t) } else { f64::NAN }).collect();
+    let alternate: Vec<f64> = (0..64)
+        .map(|t| if t % 2 == 0 { f64::from(t) } else { f64::NAN })
+        .collect();
     assert_eq!(gappy(&alternate, 3, &tuning()).unwrap(), Gappy::default());
 }

@@ -26,7 +26,11 @@ fn assert_falls_through_zero(w: &[f64], nu: f64) {
     let g = |s: f64| {
         let chi = |w: &f64| {
             let r = w / s.sqrt();
-            if r.abs() <= c { r.powi(2) * (1.0 - (r / c).powi(2)).powi(4) } else { 0.0 }
+            if r.abs() <= c {
+                r.powi(2) * (1.0 - (r / c).powi(2)).powi(4)
+            } else {
+                0.0
+            }
         };
         w.iter().map(chi).sum::<f64>() / w.len() as f64 - a
     };
@@ -61,7 +65,11 @@ fn gross_outliers_move_the_root_little_and_never_to_infinity() {
     let clean = m_scale(&squares(&w), &tuning());
     assert_eq!(clean.status, Status::Ok);
     // Standard error of an estimate of variance at efficiency 0.6: √(2/(0.6·n)); four of them.
-    assert_relative_eq!(clean.value, 1.0, epsilon = 4.0 * (2.0 / (0.6 * 20_001.0_f64)).sqrt());
+    assert_relative_eq!(
+        clean.value,
+        1.0,
+        epsilon = 4.0 * (2.0 / (0.6 * 20_001.0_f64)).sqrt()
+    );
     assert_falls_through_zero(&w, clean.value);
     for (fraction, bound) in [(0.01, 1.05), (0.1, 1.5), (0.2, 3.0)] {
         for size in [1e2, 1e9, 1e120] {
@@ -70,7 +78,10 @@ fn gross_outliers_move_the_root_little_and_never_to_infinity() {
             let contaminated = m_scale(&squares(&w), &tuning());
             assert_eq!(contaminated.status, Status::Ok);
             let ratio = contaminated.value / clean.value;
-            assert!((1.0 / bound..bound).contains(&ratio), "{fraction} of {size:e}: {ratio}");
+            assert!(
+                (1.0 / bound..bound).contains(&ratio),
+                "{fraction} of {size:e}: {ratio}"
+            );
             assert_falls_through_zero(&w, contaminated.value);
         }
     }
@@ -94,7 +105,9 @@ fn without_a_root_the_closest_value_is_flagged() {
 fn a_root_above_is_found() {
     use statrs::distribution::{ContinuousCDF, Normal};
     let normal = Normal::new(0.0, 1.0).unwrap();
-    let mut w: Vec<f64> = (0..5500).map(|i| normal.inverse_cdf((f64::from(i) + 0.5) / 5500.0)).collect();
+    let mut w: Vec<f64> = (0..5500)
+        .map(|i| normal.inverse_cdf((f64::from(i) + 0.5) / 5500.0))
+        .collect();
     w.extend((0..4500).map(|i| if i % 2 == 0 { 8.0 } else { -8.0 }));
     let found = m_scale(&squares(&w), &tuning());
     assert_eq!(found.status, Status::Ok);
@@ -142,7 +155,10 @@ fn steps_that_move_the_variance_are_seen() {
     let (mut fine, mut apart) = (0, 0);
     for deviation in [0.2, 0.3, 0.4, 0.6, 1.0, 3.0] {
         for bias in [0.0, 0.2, 0.3, 0.5] {
-            let signal: Vec<f64> = normals.iter().map(|z| 0.05 * (bias + deviation * z).round()).collect();
+            let signal: Vec<f64> = normals
+                .iter()
+                .map(|z| 0.05 * (bias + deviation * z).round())
+                .collect();
             let (classical, robust) = both(&signal, 9, &tuning).unwrap();
             for (level, (classical, robust)) in classical.iter().zip(&robust).enumerate() {
                 let off = (classical / robust.value).ln().abs();
@@ -153,7 +169,11 @@ fn steps_that_move_the_variance_are_seen() {
                 fine += 1;
                 let eta = samples as f64 / f64::from(level as u32 + 1).exp2();
                 let allowed = 0.013 + 4.0 * (2.0 / eta * (1.0 / 0.6 - 1.0)).sqrt();
-                assert!(off < allowed, "{deviation} + {bias}, level {}: {off}", level + 1);
+                assert!(
+                    off < allowed,
+                    "{deviation} + {bias}, level {}: {off}",
+                    level + 1
+                );
             }
         }
     }
