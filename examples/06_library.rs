@@ -10,7 +10,7 @@ pub(crate) fn drift(recordings: &Path, drive: &Path) -> Result<f64, Box<dyn std:
         ..CalibrationOptions::default()
     };
     let model =
-        calibrate(&[recordings.to_owned()], &options, &mut Silence)?.model(Estimator::DrAwv);
+        calibrate(&[recordings.to_owned()], &options, &Context::default())?.model(Estimator::DrAwv);
     let (trajectory, _) = load_trajectory(drive, &TrajectoryOptions::default())?;
     let inputs = NavigateInputs::new(trajectory, model, TrueImu::AsBelieved);
     let mut scenario = Scenario::default();
@@ -19,7 +19,7 @@ pub(crate) fn drift(recordings: &Path, drive: &Path) -> Result<f64, Box<dyn std:
         start_s: 300.0,
         end_s: 390.0,
     };
-    let found = navigate(&inputs, &scenario, &[outage], 1, &())?;
+    let found = navigate(&inputs, &scenario, &[outage], 1, &Context::default())?;
     let end = found.summary.outages[0].horizontal_error_end_m;
     println!(
         "after 90 s without GNSS: {:.0} m (median), {:.0} m (95 %)",

@@ -12,7 +12,7 @@
 //! let mut scenario = Scenario::default();
 //! scenario.run.method = Method::Lincov;
 //! let outage = Outage { start_s: 60.0, end_s: 90.0 };
-//! let found = navigate(&inputs, &scenario, &[outage], 1, &())?;
+//! let found = navigate(&inputs, &scenario, &[outage], 1, &Context::default())?;
 //! println!("p95 after 30 s: {:.1} m", found.summary.outages[0].horizontal_error_end_m.p95);
 //! // The filter has the model of the true IMU: the squared error of nine states is nine times what it believes of one.
 //! assert!((found.summary.nees.mean - 9.0).abs() < 0.4);
@@ -54,8 +54,8 @@ pub use export::export;
 
 // Values of arguments.
 mod parse;
-// What follows a job.
-pub mod observer;
+// What every command does: notes, progress, outputs.
+pub mod app;
 // Words and shapes that several results share.
 pub mod report;
 // Files.

@@ -4,17 +4,16 @@ use crate::answer::Answer;
 use crate::error;
 use crate::work::{Meter, work};
 use nav_sim::answered::{Answered, request};
+use nav_sim::app::{Context, Front};
 use nav_sim::calibrate::CalibrationRequest;
 use nav_sim::choose::ChoiceRequest;
 use nav_sim::compare::CompareRequest;
 use nav_sim::design::DesignRequest;
-use nav_sim::document::{Importance, Note as Said};
+use nav_sim::document::{Importance, Note};
 use nav_sim::failure::Failure;
 use nav_sim::fuse::FuseRequest;
-use nav_sim::jobs::{Remark, Remarks};
-use nav_sim::observer::Observer;
 use nav_sim::require::RequireRequest;
-use nav_sim::run::{Note, RunRequest};
+use nav_sim::run::RunRequest;
 use nav_sim::tune::TuneRequest;
 use nav_sim::wv::WaveletRequest;
 use pyo3::prelude::*;
@@ -45,13 +44,6 @@ impl<'a> Clerk<'a> {
             .push(doubt);
     }
 
-    fn warn(&self, said: Vec<Said>) {
-        let doubts = said
-            .into_iter()
-            .filter(|said| said.importance == Importance::Warning);
-        doubts.for_each(|said| self.warn_of(said.text));
-    }
-
     pub(crate) fn warnings(self) -> Vec<String> {
         self.warnings
             .into_inner()
@@ -59,37 +51,23 @@ impl<'a> Clerk<'a> {
     }
 }
 
-impl Observer<Note> for Clerk<'_> {
-    fn remark(&self, note: &Note) {
-        self.warn(note.said());
+impl Front for Clerk<'_> {
+    fn note(&self, note: Note) {
+        if note.importance == Importance::Warning {
+            self.warn_of(note.text);
+        }
     }
 
-    fn begin(&self, runs: u64) {
-        self.meter.begin(runs);
+    fn begin(&self, _: &str, steps: u64) {
+        self.meter.begin(steps);
     }
 
-    fn advance(&self, runs: u64) {
-        self.meter.advance(runs);
+    fn advance(&self, steps: u64) {
+        self.meter.advance(steps);
     }
 
     fn go_on(&self) -> bool {
         self.meter.goes_on()
-    }
-}
-
-/// The same for jobs that read recordings.
-struct Reader<'a>(&'a Clerk<'a>);
-
-impl Remarks for Reader<'_> {
-    fn progress(&mut self, done: usize, all: usize) {
-        match done {
-            0 => self.0.meter.begin(all as u64),
-            _ => self.0.meter.advance(1),
-        }
-    }
-
-    fn remark(&mut self, remark: Remark<'_>) {
-        self.0.warn(remark.said());
     }
 }
 
@@ -121,19 +99,19 @@ pub(crate) fn answer(
 
 /// The answer, or the failure; no failure where there is no such command.
 fn answered(command: &str, text: &str, clerk: &Clerk<'_>) -> Result<Answered, Option<Failure>> {
-    let mut reader = Reader(clerk);
+    let context = &Context::new(clerk, None);
     Ok(match command {
-        "wv" => request::<WaveletRequest>(text)?.answer(&mut reader)?,
+        "wv" => request::<WaveletRequest>(text)?.answer(context)?,
         "calibrate" => {
             let advance = |steps| clerk.meter.advance(steps);
-            request::<CalibrationRequest>(text)?.answer(&mut reader, &advance)?
+            request::<CalibrationRequest>(text)?.answer(context, &advance)?
         }
-        "run" => request::<RunRequest>(text)?.answer(|| SEED, clerk)?,
+        "run" => request::<RunRequest>(text)?.answer(|| SEED, context)?,
         "fuse" => request::<FuseRequest>(text)?.answer()?,
-        "tune" => request::<TuneRequest>(text)?.answer(clerk)?,
-        "require" => request::<RequireRequest>(text)?.answer(clerk)?,
-        "design" => request::<DesignRequest>(text)?.answer(clerk)?,
-        "choose" => request::<ChoiceRequest>(text)?.answer(|| SEED, &mut reader, clerk)?,
+        "tune" => request::<TuneRequest>(text)?.answer(context)?,
+        "require" => request::<RequireRequest>(text)?.answer(context)?,
+        "design" => request::<DesignRequest>(text)?.answer(context)?,
+        "choose" => request::<ChoiceRequest>(text)?.answer(|| SEED, context)?,
         "compare" => request::<CompareRequest>(text)?.answer()?,
         _ => return Err(None),
     })

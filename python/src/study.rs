@@ -4,36 +4,15 @@ use crate::answer::Answer;
 use crate::error;
 use crate::request::{Clerk, SEED};
 use crate::work::work;
+use nav_sim::app::Context;
 use nav_sim::failure::Failure;
 use nav_sim::navigation::simulation::REPORTED_NAMES;
-use nav_sim::observer::Observer;
 use nav_sim::study::{
-    self, Importance, MergeOptions, PlanOptions, Planned, Remark, RunOptions, Shard, StudyError,
-    Writing,
+    self, MergeOptions, PlanOptions, Planned, RunOptions, Shard, StudyError, Writing,
 };
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::thread::available_parallelism;
-
-impl Observer<Remark> for Clerk<'_> {
-    fn remark(&self, remark: &Remark) {
-        if remark.importance == Importance::Warning {
-            self.warn_of(remark.text.clone());
-        }
-    }
-
-    fn begin(&self, runs: u64) {
-        self.meter.begin(runs);
-    }
-
-    fn advance(&self, runs: u64) {
-        self.meter.advance(runs);
-    }
-
-    fn go_on(&self) -> bool {
-        self.meter.goes_on()
-    }
-}
 
 fn threads() -> usize {
     available_parallelism().map_or(1, Into::into)
@@ -43,11 +22,11 @@ fn threads() -> usize {
 fn watched<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
-    part: impl FnOnce(&Clerk<'_>) -> Result<T, StudyError> + Send + 'static,
+    part: impl FnOnce(&Context<'_>) -> Result<T, StudyError> + Send + 'static,
 ) -> PyResult<(T, Vec<String>)> {
     let (done, warnings) = work(py, progress, move |meter| {
         let clerk = Clerk::new(meter);
-        let done = part(&clerk);
+        let done = part(&Context::new(&clerk, None));
         (done, clerk.warnings())
     })?;
     Ok((

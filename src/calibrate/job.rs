@@ -1,9 +1,10 @@
 //! Calibration: from static recordings, or directories of them, to a noise model for each sensor or axis.
 
 use super::{CalibrationAnswer, FitsFile, ShownCalibration};
+use crate::app::Context;
 use crate::formats::recordings::{FileReport, ReadOptions, Report};
 use crate::formats::{hash, recordings};
-use crate::jobs::{JobError, Remark, Remarks};
+use crate::jobs::{JobError, note_report};
 use crate::report::CurvesFile;
 use nav_sim_calibration::{
     self, Advance, Beginning, Beginnings, Bootstrap, Diagnosis, Estimator, Group, Outcome, Pool,
@@ -15,7 +16,6 @@ use nav_sim_signal::names::UnknownName;
 use nav_sim_signal::noise::Model;
 use nav_sim_signal::wavelet::{Tuning, default_levels};
 use rayon::prelude::*;
-use std::cell::RefCell;
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -168,9 +168,9 @@ pub struct Calibration {
 pub fn calibrate(
     paths: &[PathBuf],
     options: &CalibrationOptions,
-    remarks: &mut dyn Remarks,
+    context: &Context<'_>,
 ) -> Result<Calibration, JobError> {
-    measure(paths, options, remarks)?.calibrate(&|_| {})
+    measure(paths, options, context)?.calibrate(&|_| {})
 }
 
 /// The first half of [`calibrate()`], which reads the files: errors in them are known before the long half begins.
@@ -180,7 +180,7 @@ pub fn calibrate(
 pub fn measure(
     paths: &[PathBuf],
     options: &CalibrationOptions,
-    remarks: &mut dyn Remarks,
+    context: &Context<'_>,
 ) -> Result<Measured, JobError> {
     let CalibrationOptions {
         reading,
@@ -201,12 +201,12 @@ pub fn measure(
     let look = |recording: Recording| {
         MeasuredRecording::new(recording, *skip_warm_up, *scales, &settings.tuning)
     };
-    let (looks, report) = visit(paths, &reading, &look, remarks)?;
+    let (looks, report) = visit(paths, &reading, &look, context)?;
     let looks = looks.into_iter().collect::<Result<Vec<_>, _>>()?;
     distinct(&looks)?;
     let rate_hz = report.files[0].rate_hz;
     let beginnings = beginnings(&looks, (reading.skip_s, *skip_warm_up), rate_hz);
-    shortest(&report, *scales, remarks);
+    shortest(&report, *scales, context);
     let estimators = estimators.estimators(report.files.iter().map(|f| f.samples.len()).sum())?;
     let settings = Settings {
         estimators,
@@ -356,12 +356,15 @@ pub(crate) fn visit<T: Send>(
     paths: &[PathBuf],
     reading: &ReadOptions,
     look: &(dyn Fn(Recording) -> T + Sync),
-    remarks: &mut dyn Remarks,
+    context: &Context<'_>,
 ) -> Result<(Vec<T>, Report), JobError> {
-    let listener = RefCell::new(&mut *remarks);
-    let tell = |done, all| listener.borrow_mut().progress(done, all);
+    let tell = |done, all| match done {
+        0 => context.begin("recordings", all as u64),
+        _ => context.advance(1),
+    };
     let (looks, report) = recordings::visit(paths, reading, look, &tell)?;
-    remarks.remark(Remark::Read(&report));
+    context.end();
+    note_report(&report, context);
     Ok((looks, report))
 }
 
@@ -476,7 +479,7 @@ pub(crate) fn without_warm_up(
 }
 
 /// Remarks which recording is so much shorter than the others that it lacks scales, or costs all of them scales.
-fn shortest(report: &Report, scales: Option<u32>, remarks: &mut dyn Remarks) {
+fn shortest(report: &Report, scales: Option<u32>, context: &Context<'_>) {
     let levels = |samples: usize| scales.unwrap_or(u32::MAX).min(default_levels(samples));
     let recordings = report.files.iter().flat_map(FileReport::recordings);
     let Some((recording, samples)) = recordings
@@ -495,13 +498,21 @@ fn shortest(report: &Report, scales: Option<u32>, remarks: &mut dyn Remarks) {
     );
     let short = found.iter().filter(|own| **own < used).count();
     if scales < usual {
-        remarks.remark(Remark::Shortest {
-            recording: &recording,
-            samples,
-            scales,
-            short,
-            used,
-            usual,
+        context.warn(match short {
+            0 => format!(
+                "{recording}: its {samples} samples limit all recordings to {scales} scales; without it there \
+                 would be more (half of them have {usual}): leave it out for those"
+            ),
+            short => {
+                let others = match short {
+                    1 => String::new(),
+                    _ => format!(" ({} more are short)", short - 1),
+                };
+                format!(
+                    "{recording}: its {samples} samples have {scales} scales{others}; the longer ones, up to {used} \
+                     scales, are averaged over the longer recordings alone"
+                )
+            }
         });
     }
 }

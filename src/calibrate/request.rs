@@ -3,9 +3,10 @@
 use super::curve::{Curves, read_curves};
 use super::{CalibrationNote, CalibrationOptions, EstimatorChoice, Measured, ModelFiles, measure};
 use crate::answered::Answered;
+use crate::app::Context;
 use crate::failure::Failure;
 use crate::formats::{input, parameters_file};
-use crate::jobs::{JobError, RecordingRequest, Remarks, VarianceRequest, unknown_model};
+use crate::jobs::{JobError, RecordingRequest, VarianceRequest, unknown_model};
 use crate::parse;
 use nav_sim_calibration::{
     Advance, Bootstrap, Estimator, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, Trim,
@@ -167,7 +168,7 @@ impl CalibrationRequest {
     pub(crate) fn measure(
         &self,
         settings: Settings,
-        remarks: &mut dyn Remarks,
+        context: &Context<'_>,
     ) -> Result<Measured, Failure> {
         let options = CalibrationOptions {
             reading: self.recordings.options(),
@@ -179,7 +180,7 @@ impl CalibrationRequest {
             bootstrap: self.draws(),
             turn_on: true,
         };
-        Ok(measure(&self.inputs, &options, remarks)?)
+        Ok(measure(&self.inputs, &options, context)?)
     }
 
     /// The curves in the place of recordings, and whether they do not say of which sensor: then as of an accelerometer.
@@ -233,11 +234,7 @@ impl CalibrationRequest {
     ///
     /// # Errors
     /// What is wrong with a file or a setting, or that there is no fit.
-    pub fn answer(
-        &self,
-        remarks: &mut dyn Remarks,
-        advance: Advance<'_>,
-    ) -> Result<Answered, Failure> {
+    pub fn answer(&self, context: &Context<'_>, advance: Advance<'_>) -> Result<Answered, Failure> {
         let settings = self.settings()?;
         let (calibration, files) = match &self.curve {
             Some(path) => (
@@ -245,7 +242,7 @@ impl CalibrationRequest {
                 vec![path.clone()],
             ),
             None => {
-                let measured = self.measure(settings, remarks)?;
+                let measured = self.measure(settings, context)?;
                 let files = measured
                     .report
                     .files

@@ -1,14 +1,14 @@
 //! Static recordings and a trajectory → the noise model that a filter is best made of.
 
 use super::{Candidate, ChoiceError, Contender, Drive, Fold, Influence, Laboratory, Ranking, Unit};
+use crate::app::Context;
 use crate::calibrate::{
     Calibration, CalibrationOptions, EstimatorChoice, Measured, measure, without_warm_up,
 };
 use crate::formats::recordings;
 use crate::formats::recordings::{FileReport, ReadOptions};
-use crate::jobs::{JobError, Remark, Remarks};
-use crate::observer::Observer;
-use crate::run::Note;
+use crate::jobs::JobError;
+use crate::report::six_digits;
 use nav_sim_calibration::{Estimator, model_of};
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::outage::Outage;
@@ -67,8 +67,7 @@ pub fn choose(
     options: &CalibrationOptions,
     candidates: &[Candidate],
     drive: ChoiceDrive,
-    remarks: &mut dyn Remarks,
-    observer: &dyn Observer<Note>,
+    context: &Context<'_>,
 ) -> Result<Chosen, ChoiceError> {
     let options = CalibrationOptions {
         estimators: EstimatorChoice::One(Estimator::Awv),
@@ -81,15 +80,15 @@ pub fn choose(
             pool: None,
             ..options.clone()
         },
-        remarks,
+        context,
     )?;
     let found_hz = measured.settings.rate_hz;
     let rate_hz = nominal_hz(found_hz, drive.scenario.gnss.rate_hz);
     if rate_hz != found_hz {
-        remarks.remark(Remark::Rate {
-            found_hz,
-            taken_hz: rate_hz,
-        });
+        context.remark(format!(
+            "the recordings run at {} Hz: taken as {rate_hz} Hz, so that fixes meet samples",
+            six_digits(found_hz)
+        ));
         measured.settings.rate_hz = rate_hz;
     }
     // The clocks of the files are not quite alike: one rate is that of all.
@@ -121,16 +120,16 @@ pub fn choose(
         .map(|count| runs.unwrap_or_else(|| runs_on(&drive, *count)))
         .collect();
     let judges = laboratory.judges().map_err(JobError::from)?;
-    observer.begin(judges.iter().map(|k| runs[*k]).sum());
+    context.begin("runs", judges.iter().map(|k| runs[*k]).sum());
     let mut folds: Vec<(String, Fold)> = Vec::new();
     for &k in &judges {
         let file = &files[k];
         let read = samples_of(file, &options)?;
-        let advance = |n| observer.advance(n);
+        let advance = |n| context.advance(n);
         let fold = drive.leave_out(&laboratory, k, &read, candidates, runs[k], &advance)?;
         folds.push((file.file.clone(), fold));
     }
-    observer.end();
+    context.end();
     let contenders: Vec<Contender> = candidates.iter().map(Contender::from).collect();
     let ranking = Ranking::new(&contenders, &folds);
     let winner = candidates[ranking.winner().index].clone();

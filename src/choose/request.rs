@@ -4,13 +4,13 @@ use super::document::ChoiceReport;
 use super::job::{ChoiceDrive, Chosen, choose};
 use super::{Candidate, Inflation};
 use crate::answered::Answered;
+use crate::app::Context;
 use crate::calibrate::{CalibrationNote, CalibrationOptions, ESTIMATORS};
 use crate::failure::Failure;
 use crate::formats::recordings::Gaps;
-use crate::jobs::{ReadingRequest, Remarks, WHOLE, unknown_model};
-use crate::observer::Observer;
+use crate::jobs::{ReadingRequest, WHOLE, unknown_model};
 use crate::parse;
-use crate::run::{Note, OutageFlag, checked_scenario, read};
+use crate::run::{OutageFlag, checked_scenario, read};
 use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::sensors::outage::Outage;
@@ -96,14 +96,13 @@ impl ChoiceRequest {
     pub(crate) fn made(
         &self,
         draw: impl FnOnce() -> u64,
-        remarks: &mut dyn Remarks,
-        notes: &dyn Observer<Note>,
+        context: &Context<'_>,
     ) -> Result<ChoiceMade, Failure> {
         let candidates = self.candidates()?;
         let scenario = checked_scenario(self.scenario.as_deref(), &self.outages)?;
-        let trajectory = read::trajectory(&self.trajectory, notes)?;
+        let trajectory = read::trajectory(&self.trajectory, context)?;
         let seed = self.seed.or(scenario.run.seed).unwrap_or_else(draw);
-        let outages = read::placed(&scenario, &trajectory, seed, notes)?;
+        let outages = read::placed(&scenario, &trajectory, seed, context)?;
         if outages.is_empty() {
             return Err(Failure::input(
                 "there is no outage, and candidates are judged at the ends of outages",
@@ -131,7 +130,7 @@ impl ChoiceRequest {
             seed,
             runs: self.runs,
         };
-        let chosen = choose(&self.inputs, &options, &candidates, drive, remarks, notes)?;
+        let chosen = choose(&self.inputs, &options, &candidates, drive, context)?;
         Ok(ChoiceMade {
             chosen,
             outages,
@@ -147,10 +146,9 @@ impl ChoiceRequest {
     pub fn answer(
         &self,
         draw: impl FnOnce() -> u64,
-        remarks: &mut dyn Remarks,
-        notes: &dyn Observer<Note>,
+        context: &Context<'_>,
     ) -> Result<Answered, Failure> {
-        let made = self.made(draw, remarks, notes)?;
+        let made = self.made(draw, context)?;
         let files = made.chosen.model_files("model.toml".as_ref());
         let texts = made
             .chosen

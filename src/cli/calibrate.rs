@@ -1,6 +1,5 @@
 //! `nav-sim calibrate`: replicate static recordings → noise model.
 
-use super::recordings::Said;
 use super::{Failure, Session, read};
 use crate::calibrate::{Calibration, CalibrationNote, CalibrationRequest, ModelFiles};
 use crate::jobs::JobError;
@@ -58,7 +57,7 @@ fn recordings(
         session.existing(),
     )?;
     draw(request, session);
-    let measured = request.measure(settings, &mut Said::new(session))?;
+    let measured = request.measure(settings, &session.context())?;
     let files: Vec<PathBuf> = measured
         .report
         .files

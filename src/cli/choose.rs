@@ -1,8 +1,6 @@
 //! `nav-sim choose`: which noise model, on the user's own recordings.
 
 use super::pictures::PlotArgs;
-use super::recordings::Said;
-use super::run::Words;
 use super::{Failure, Session};
 use crate::choose::{self, ChoiceRequest};
 use std::path::PathBuf;
@@ -42,11 +40,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let guarded = read.clone().chain(&request.scenario).map(PathBuf::as_path);
     let _own = choose::claim_choice(&args.out, guarded, session.existing())?;
     let _picture = args.plot.claim(read, session)?;
-    let made = request.made(
-        || session.seed(None),
-        &mut Said::new(session),
-        &Words::new(session),
-    )?;
+    let made = request.made(|| session.seed(None), &session.context())?;
     let report = made.report();
     made.chosen
         .write(&args.out, &request.trajectory, request.note(&made), &report)?;

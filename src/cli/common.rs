@@ -1,12 +1,13 @@
 //! Flags that mean the same in every command, and what follows from them.
 
 use super::{Failure, Printer, Progress};
+use crate::app::{Context, Front};
 use crate::formats::atomic::{self, Existing};
 use crate::report::{Answer, WIDTH, json};
-use nav_sim_document::{Document, Importance};
+use nav_sim_document::{Document, Importance, Note};
 use std::fmt::Display;
 use std::path::Path;
-use std::sync::OnceLock;
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// Flags that mean the same in every command.
 #[derive(clap::Args, Clone, Debug)]
@@ -64,6 +65,7 @@ pub(crate) enum Format {
 #[derive(Debug)]
 pub(crate) struct Session {
     common: Common,
+    progress: Mutex<Option<Progress>>,
     /// Where results and remarks go.
     pub(crate) printer: Printer,
     drawn: OnceLock<u64>,
@@ -80,6 +82,7 @@ impl Session {
         Ok(Self {
             printer: Printer::new(&common),
             common,
+            progress: Mutex::default(),
             drawn: OnceLock::new(),
         })
     }
@@ -101,6 +104,7 @@ impl Session {
         Self {
             printer,
             common,
+            progress: Mutex::default(),
             drawn: OnceLock::new(),
         }
     }
@@ -209,6 +213,11 @@ impl Session {
             .unwrap_or_else(|| *self.drawn.get_or_init(draw))
     }
 
+    /// Notes and progress of a job on this terminal, and the seed.
+    pub(crate) fn context(&self) -> Context<'_> {
+        Context::new(self, self.common.seed)
+    }
+
     /// The seed of the command line, if there is one.
     pub(crate) const fn asked_seed(&self) -> Option<u64> {
         self.common.seed
@@ -220,5 +229,29 @@ impl Session {
             return Progress::silent();
         }
         Progress::new(unit, total)
+    }
+}
+
+impl Session {
+    fn running(&self) -> MutexGuard<'_, Option<Progress>> {
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Front for Session {
+    fn note(&self, note: Note) {
+        self.printer.note(&note);
+    }
+
+    fn begin(&self, unit: &str, steps: u64) {
+        *self.running() = Some(self.progress(unit, steps));
+    }
+
+    fn advance(&self, steps: u64) {
+        self.running().iter().for_each(|running| running.add(steps));
+    }
+
+    fn end(&self) {
+        *self.running() = None;
     }
 }

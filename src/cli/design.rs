@@ -1,7 +1,6 @@
 //! `nav-sim design`: how many recordings, and how long.
 
 use super::pictures::PlotArgs;
-use super::run::Words;
 use super::{Failure, Session};
 use crate::design::DesignRequest;
 
@@ -36,7 +35,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         std::iter::once(&request.model).chain(&request.trajectory),
         session,
     )?;
-    let designs = request.made(&Words::new(session))?;
+    let designs = request.made(&session.context())?;
     let document = session.answer(&designs);
     args.plot.draw(&document, session)
 }

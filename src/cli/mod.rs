@@ -22,7 +22,6 @@ mod pictures;
 mod printer;
 mod progress;
 mod read;
-mod recordings;
 mod require;
 mod run;
 mod schema;

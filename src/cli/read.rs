@@ -1,6 +1,5 @@
 //! Reading inputs for commands: doubts are said, refusals become failures.
 
-use super::run::Words;
 use super::{Failure, Session};
 use crate::failure::option_elsewhere;
 use crate::formats::input;
@@ -29,12 +28,12 @@ pub(super) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 
 /// A trajectory.
 pub(super) fn trajectory(path: &Path, session: &Session) -> Result<Trajectory, Failure> {
-    Ok(read::trajectory(path, &Words::new(session))?)
+    Ok(read::trajectory(path, &session.context())?)
 }
 
 /// A model; axes that it does not name are said.
 pub(super) fn model(path: &Path, session: &Session) -> Result<ModelFile, Failure> {
-    Ok(read::model(path, &Words::new(session))?)
+    Ok(read::model(path, &session.context())?)
 }
 
 /// Static recordings, every channel of them; files without a time column at a rate that is given.
@@ -43,5 +42,5 @@ pub(super) fn recordings_at(
     rate_hz: Option<f64>,
     session: &Session,
 ) -> Result<Vec<Recording>, Failure> {
-    Ok(read::recordings(paths, rate_hz, &Words::new(session))?)
+    Ok(read::recordings(paths, rate_hz, &session.context())?)
 }

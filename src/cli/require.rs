@@ -1,7 +1,6 @@
 //! `nav-sim require`: which IMU a limit needs, and what a given one makes of it.
 
 use super::pictures::{PlotArgs, claim_output};
-use super::run::Words;
 use super::{Failure, Session};
 use crate::formats::atomic::Written;
 use crate::formats::model_file;
@@ -46,7 +45,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Written::Required,
         session,
     )?;
-    let (found, needed) = request.found(&Words::new(session))?;
+    let (found, needed) = request.found(&session.context())?;
     let drawn = args.plot.draw(&session.answer(&found), session);
     if let (Some(out), Some(file)) = (&args.out, needed) {
         model_file::write(out, &file)?;

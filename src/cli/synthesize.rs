@@ -1,6 +1,5 @@
 //! `nav-sim synthesize`: replicate recordings from a noise model.
 
-use super::run::Words;
 use super::{Failure, Session};
 use crate::synthesize::SynthesisRequest;
 use nav_sim_signal::imu::Channel;
@@ -31,7 +30,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         seed: session.asked_seed(),
         ..args.request.clone()
     };
-    let job = request.synthesis(|| session.seed(None), &Words::new(session))?;
+    let job = request.synthesis(|| session.seed(None), &session.context())?;
     let contamination = request.contaminate.as_deref().map(Path::new);
     let inputs = contamination.into_iter().chain([request.model.as_path()]);
     let _own = job.claim(&args.out, inputs, session.existing())?;

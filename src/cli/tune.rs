@@ -1,7 +1,6 @@
 //! `nav-sim tune`: factors on a noise model that make its filter consistent.
 
 use super::pictures::{PlotArgs, claim_output};
-use super::run::Words;
 use super::{Failure, Session};
 use crate::formats::atomic::Written;
 use crate::formats::model_file;
@@ -45,7 +44,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Written::Tuned,
         session,
     )?;
-    let Tuned { result, model } = request.tuned(&Words::new(session))?;
+    let Tuned { result, model } = request.tuned(&session.context())?;
     args.plot.draw(&session.answer(&result), session)?;
     if let Some(unmet) = request.failure(&result) {
         return Err(unmet);

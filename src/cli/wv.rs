@@ -1,7 +1,6 @@
 //! `nav-sim wv`: wavelet variance of static recordings.
 
 use super::pictures::{PlotArgs, claim_output};
-use super::recordings::Said;
 use super::{Failure, Session, read};
 use crate::formats::atomic::Written;
 use crate::report::{self, Answer};
@@ -33,7 +32,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let inputs = read::listed(&args.request.files)?;
     let _own = claim_output(args.out.as_deref(), &inputs, Written::Signals, session)?;
     let _pictures = args.plot.claim(&inputs, session)?;
-    let file = args.request.curves(&mut Said::new(session))?;
+    let file = args.request.curves(&session.context())?;
     let written = args
         .out
         .iter()

@@ -1,6 +1,7 @@
 //! What a calibration that is not made yet would tell: so many recordings of an IMU, so long each.
 
 use super::{Design, DesignedParameter, DesignedQuantile};
+use crate::app::Context;
 use crate::formats::draws_file::DrawsFile;
 use crate::formats::model_file::ModelFile;
 use crate::jobs::JobError;
@@ -151,7 +152,7 @@ fn quantiles(
         destination.scenario,
         destination.outages,
         0,
-        &(),
+        &Context::default(),
     )?;
     let quantile = |o: &OutageSummary| {
         let h = &o.horizontal_error_end_m;

@@ -2,13 +2,13 @@
 
 use super::{Design, DesignInputs, Designs, Destination, design};
 use crate::answered::Answered;
+use crate::app::Context;
 use crate::calibrate::ESTIMATORS;
 use crate::failure::Failure;
 use crate::formats::model_file::ModelFile;
-use crate::observer::Observer;
 use crate::parse;
-use crate::run::read::{self, Notes};
-use crate::run::{NavigateInputs, Note, OutageFlag, TrueImu, windows_of};
+use crate::run::read;
+use crate::run::{NavigateInputs, OutageFlag, TrueImu, windows_of};
 use nav_sim_calibration::{Bootstrap, Estimator, Settings};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::{Method, Scenario};
@@ -68,15 +68,15 @@ const LONGEST_H: f64 = 8766.0;
 
 impl DesignRequest {
     /// The designs.
-    pub(crate) fn made(&self, notes: Notes<'_>) -> Result<Designs, Failure> {
+    pub(crate) fn made(&self, context: &Context<'_>) -> Result<Designs, Failure> {
         if self.hours.is_some_and(|hours| hours > LONGEST_H) {
             return Err(Failure::input("--hours: longer than a year"));
         }
-        let file = read::model(&self.model, notes)?;
+        let file = read::model(&self.model, context)?;
         let mut scenario = self.scenario()?;
         let mut navigation = None;
         if let Some(path) = &self.trajectory {
-            let trajectory = read::trajectory(path, notes)?;
+            let trajectory = read::trajectory(path, context)?;
             let span = (trajectory.start_s(), trajectory.end_s());
             let outages = scenario.outages_on(span, 0)?.windows;
             scenario.imu.rate_hz = file.model.rate_hz;
@@ -99,8 +99,8 @@ impl DesignRequest {
     ///
     /// # Errors
     /// What is wrong with a file or a setting, or that the recordings are too few or too short.
-    pub fn answer(&self, notes: &dyn Observer<Note>) -> Result<Answered, Failure> {
-        Ok(Answered::of(&self.made(notes)?))
+    pub fn answer(&self, context: &Context<'_>) -> Result<Answered, Failure> {
+        Ok(Answered::of(&self.made(context)?))
     }
 
     /// Drives are analysed, with a state for every process.

@@ -1,6 +1,7 @@
 //! The filter of a fusion: made for a recording whose trajectory is not known.
 
 use super::FuseError;
+use crate::app::Context;
 use crate::run::Reduced;
 use nav_sim_navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim_navigation::gnss::GnssFix;
@@ -53,7 +54,7 @@ pub(super) fn belief(
         interval_s,
         window_s,
     };
-    let summary = reduced.summary(&())?;
+    let summary = reduced.summary(&Context::default())?;
     Ok((belief, Some(summary)))
 }
 

@@ -11,4 +11,4 @@ pub(crate) use reading::WHOLE;
 pub use reading::{
     ChannelSet, LogRequest, ReadingRequest, RecordingRequest, Scales, Skip, Stamps, VarianceRequest,
 };
-pub use remarks::{Remark, Remarks, Silence};
+pub(crate) use remarks::note_report;

@@ -5,17 +5,16 @@ use super::needed::NeededImu;
 use super::ranking::{Ranking, stated_in_words};
 use super::{Ask, CatalogueUnit, Misplaced, Requirements};
 use crate::answered::Answered;
+use crate::app::Context;
 use crate::failure::Failure;
 use crate::formats::datasheet::{self, CATALOGUE, Datasheet};
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::input::listed;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::scenario_file;
-use crate::observer::Observer;
 use crate::parse;
 use crate::report::Answer;
-use crate::run::Note;
-use crate::run::read::{self, Notes};
+use crate::run::read;
 use nav_sim_document::Document;
 use nav_sim_navigation::require::{Limit, Quantity, RequireError, Worst};
 use nav_sim_navigation::sensors::aiding::AidingSettings;
@@ -251,15 +250,19 @@ impl Found {
 
 impl RequireRequest {
     /// What is found, and the model of the IMU that is needed.
-    pub(crate) fn found(&self, notes: Notes<'_>) -> Result<(Found, Option<ModelFile>), Failure> {
+    pub(crate) fn found(
+        &self,
+        context: &Context<'_>,
+    ) -> Result<(Found, Option<ModelFile>), Failure> {
         self.possible()?;
-        let asked = self.requirements(notes)?;
+        let asked = self.requirements(context)?;
         match (&self.model, &self.catalogue) {
-            (Some(path), _) => Ok((given(path, &asked, self.vehicle, notes)?, None)),
+            (Some(path), _) => Ok((given(path, &asked, self.vehicle, context)?, None)),
             (None, Some(Catalogue::BuiltIn)) => Ok((ranked(&catalogue(&asked)?, &asked)?, None)),
-            (None, Some(Catalogue::Directory(directory))) => {
-                Ok((ranked(&units_of(directory, &asked, notes)?, &asked)?, None))
-            }
+            (None, Some(Catalogue::Directory(directory))) => Ok((
+                ranked(&units_of(directory, &asked, context)?, &asked)?,
+                None,
+            )),
             (None, None) => {
                 let needed = sought(self.iso_drift, &asked)?;
                 let file = asked.model_file(&needed);
@@ -272,8 +275,8 @@ impl RequireRequest {
     ///
     /// # Errors
     /// What is wrong with a file or a setting, or that no IMU keeps the limits.
-    pub fn answer(&self, notes: &dyn Observer<Note>) -> Result<Answered, Failure> {
-        let (found, needed) = self.found(notes)?;
+    pub fn answer(&self, context: &Context<'_>) -> Result<Answered, Failure> {
+        let (found, needed) = self.found(context)?;
         let files = needed
             .map(|file| ("needed.toml".to_owned(), model_file::to_toml(&file)))
             .into_iter()
@@ -331,7 +334,7 @@ impl RequireRequest {
     }
 
     /// What is asked, with the files read.
-    fn requirements(&self, notes: Notes<'_>) -> Result<Requirements, Failure> {
+    fn requirements(&self, context: &Context<'_>) -> Result<Requirements, Failure> {
         let limits = self.limits()?;
         let mut scenario = self
             .scenario
@@ -352,7 +355,7 @@ impl RequireRequest {
             scenario.aiding = AidingSettings::car();
         }
         scenario.validate().map_err(Failure::input)?;
-        let trajectory = read::trajectory(&self.trajectory, notes)?;
+        let trajectory = read::trajectory(&self.trajectory, context)?;
         Requirements::new(scenario, trajectory, limits, self.outage, self.start).map_err(
             |e: Misplaced| {
                 let earlier = if self.start.is_some() {
@@ -382,22 +385,22 @@ fn given(
     path: &Path,
     requirements: &Requirements,
     vehicle: Option<Vehicle>,
-    notes: Notes<'_>,
+    context: &Context<'_>,
 ) -> Result<Found, Failure> {
     let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
-    let file = read::model(path, notes)?;
+    let file = read::model(path, context)?;
     let mut scenario = requirements.scenario.clone();
-    read::expect_turn_on(&mut scenario.initial, &file, path, notes);
-    read::make_turn_on(&mut scenario.imu, &file, path, notes);
+    read::expect_turn_on(&mut scenario.initial, &file, path, context);
+    read::make_turn_on(&mut scenario.imu, &file, path, context);
     let not_stated = stated_in_words(&file.not_stated());
     if !not_stated.is_empty() {
         let text = format!(
             "{}: what is not stated counts as none: {not_stated}",
             path.display()
         );
-        notes.remark(&Note::Warning(text));
+        context.warn(text);
     }
-    let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, notes)?;
+    let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
     let mut judged = requirements.judged(&scenario, &model).map_err(unusable)?;
     if vehicle.is_some() {
         judged.aidings = requirements.aidings(&scenario, &model).map_err(unusable)?;
@@ -425,7 +428,7 @@ fn catalogue(requirements: &Requirements) -> Result<Vec<CatalogueUnit>, Failure>
 fn units_of(
     directory: &Path,
     asked: &Requirements,
-    notes: Notes<'_>,
+    context: &Context<'_>,
 ) -> Result<Vec<CatalogueUnit>, Failure> {
     if !directory.exists() {
         let message = format!(
@@ -449,8 +452,8 @@ fn units_of(
         if file_kind::of(path)? == FileKind::CatalogueEntry {
             return of_sheet(name, &datasheet::read(path)?, asked);
         }
-        let file = read::model(path, notes)?;
-        let model = read::at_rate(path, &file.model, asked.scenario.imu.rate_hz, notes)?;
+        let file = read::model(path, context)?;
+        let model = read::at_rate(path, &file.model, asked.scenario.imu.rate_hz, context)?;
         Ok(asked.unit(name, &file, model))
     };
     paths.iter().map(unit).collect()

@@ -3,17 +3,18 @@
 
 use super::reduction::Reduced;
 use super::uncertainty::Analysed;
+use crate::app::Context;
 use crate::formats::draws_file::Draws;
-use crate::observer::Observer;
+use crate::report::unexpected_line;
 use nav_sim_navigation::ekf::{Belief, BeliefError};
 use nav_sim_navigation::metrics::{
-    Agreement, Budget, EpochMetrics, Expected, FanEpoch, ReductionQuality, ReductionSummary,
-    Sensitivities, Summary, epochs, expected_fan, fan,
+    Agreement, Budget, EpochMetrics, Expected, FanEpoch, ReductionSummary, Sensitivities, Summary,
+    epochs, expected_fan, fan,
 };
 use nav_sim_navigation::monte_carlo;
-use nav_sim_navigation::scenario::{Method, Scenario, Unexpected};
+use nav_sim_navigation::scenario::{Method, Scenario};
 use nav_sim_navigation::sensors::imu::Truth;
-use nav_sim_navigation::sensors::outage::{Outage, OutageRemark};
+use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
     FilterPass, HeadingDoubt, NamedSource, Track, TruthSide, strapdown_over_sigma, weak_heading,
 };
@@ -66,28 +67,6 @@ pub struct Navigation {
     pub summary: Summary,
 }
 
-/// A remark while the job runs.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum Note {
-    /// A doubt about a file or a setting.
-    Warning(String),
-    /// What was made of a file or a setting.
-    Remark(String),
-    /// The same, for those who ask for more.
-    Detail(String),
-    /// The filter starts with a bias of this standard deviation (m/s² or rad/s), too large to be meant.
-    LargeBias(Sensor, f64),
-    /// The true IMU or receiver has an error that the filter does not expect.
-    Unexpected(Unexpected),
-    /// How consistent the reduced filter is, and what it costs.
-    Reduction(ReductionQuality),
-    /// The motion hardly makes the heading observable.
-    Heading(HeadingDoubt),
-    /// A window without fixes is not as it was asked for.
-    Outage(OutageRemark),
-}
-
 /// Error of [`navigate()`].
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -126,7 +105,7 @@ pub fn navigate(
     scenario: &Scenario,
     outages: &[Outage],
     seed: u64,
-    observer: &dyn Observer<Note>,
+    context: &Context<'_>,
 ) -> Result<Navigation, NavigateError> {
     let method = scenario.run.method;
     if method != Method::MonteCarlo {
@@ -134,13 +113,13 @@ pub fn navigate(
     }
     let track = scenario.track(&inputs.trajectory, &inputs.model, outages)?;
     let belief = scenario.belief(&inputs.model, outages, &track)?;
-    doubt(inputs, &belief, scenario, observer);
+    doubt(inputs, &belief, scenario, context);
     // Within 1e-3 the same in a quarter of the time: for what stands beside the figures.
     let merged = track.merged();
-    let reduction = reduction(inputs, scenario, outages, &belief, &merged, observer)?;
+    let reduction = reduction(inputs, scenario, outages, &belief, &merged, context)?;
     heading(&FilterPass::new(&merged, &belief))
         .iter()
-        .for_each(|doubt| observer.remark(&Note::Heading(*doubt)));
+        .for_each(|doubt| context.warn(doubt));
     let experiment = scenario.experiment(
         &inputs.trajectory,
         inputs.truth(),
@@ -170,7 +149,7 @@ pub fn navigate(
             }
         }
         (method, expected) => {
-            let mut sampled = sampled(&experiment, scenario.run.runs, seed, observer)?;
+            let mut sampled = sampled(&experiment, scenario.run.runs, seed, context)?;
             match expected {
                 Some((_, expected)) if method == Method::Both => {
                     sampled = sampled.beside(expected, &analysis.fan(&belief));
@@ -190,7 +169,7 @@ pub fn navigate(
     scenario
         .unexpected_integration(over_sigma)
         .iter()
-        .for_each(|found| observer.remark(&Note::Unexpected(*found)));
+        .for_each(|found| context.warn(unexpected_line(found)));
     // Which fixes a gate refuses is drawn with the errors: the gains of such a filter are not those of the analysis.
     if scenario.analysable().is_ok() {
         Analysis {
@@ -223,30 +202,28 @@ fn possible(inputs: &NavigateInputs, scenario: &Scenario) -> Result<(), Navigate
 }
 
 /// What speaks against the filter before anything was computed.
-fn doubt(
-    inputs: &NavigateInputs,
-    belief: &Belief,
-    scenario: &Scenario,
-    observer: &dyn Observer<Note>,
-) {
+fn doubt(inputs: &NavigateInputs, belief: &Belief, scenario: &Scenario, context: &Context<'_>) {
     if let TrueImu::Recordings(recordings) = &inputs.truth {
         recordings
             .iter()
             .filter_map(motion)
-            .for_each(|doubt| observer.remark(&Note::Warning(doubt)));
+            .for_each(|doubt| context.warn(doubt));
     }
     // A Gauss-Markov process of phi ≈ 1 may have any stationary variance: a filter that starts with it believes
     // nothing of its first sensor readings.
     for (sensor, limit) in [(Sensor::Accel, 1.0), (Sensor::Gyro, 0.1)] {
         let sigma = belief.process_sigma(sensor);
         if sigma > limit {
-            observer.remark(&Note::LargeBias(sensor, sigma));
+            context.warn(format!(
+                "the filter starts with a bias of {sigma:.3} {} ({sensor}): an AR1 of phi near 1?",
+                sensor.unit()
+            ));
         }
     }
     scenario
         .unexpected()
         .into_iter()
-        .for_each(|found| observer.remark(&Note::Unexpected(found)));
+        .for_each(|found| context.warn(unexpected_line(&found)));
 }
 
 /// Means over a second that differ so much are motion, not noise: m/s², rad/s.
@@ -279,7 +256,7 @@ fn reduction(
     outages: &[Outage],
     belief: &Belief,
     track: &Track,
-    observer: &dyn Observer<Note>,
+    context: &Context<'_>,
 ) -> Result<Option<ReductionSummary>, NavigateError> {
     if !scenario.filter.states.is_reduced() {
         return Ok(None);
@@ -301,7 +278,7 @@ fn reduction(
         interval_s,
         window_s,
     };
-    Ok(Some(reduced.summary(observer)?))
+    Ok(Some(reduced.summary(context)?))
 }
 
 /// Where the motion hardly shows the heading, no filter of this kind is to be believed.
@@ -314,12 +291,12 @@ fn sampled(
     experiment: &Experiment<'_>,
     runs: u64,
     seed: u64,
-    observer: &dyn Observer<Note>,
+    context: &Context<'_>,
 ) -> Result<Navigation, NavigateError> {
-    observer.begin(runs);
+    context.begin("runs", runs);
     let plan = Plan::new(experiment)?.with_fan();
-    let mut results = monte_carlo::run_plan(&plan, runs, &|n| observer.advance(n));
-    observer.end();
+    let mut results = monte_carlo::run_plan(&plan, runs, &|n| context.advance(n));
+    context.end();
     let result = results.swap_remove(0);
     Ok(Navigation::of_runs(result, seed))
 }

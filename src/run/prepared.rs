@@ -3,12 +3,12 @@
 use super::answer::RunAnswer;
 use super::error::RunError;
 use super::request::RunRequest;
-use super::{NavigateInputs, Note, TrueImu, navigate, read};
+use super::{NavigateInputs, TrueImu, navigate, read};
 use crate::answered::{Answered, contents};
+use crate::app::Context;
 use crate::failure::Failure;
 use crate::formats::model_file::ModelFile;
 use crate::formats::{FileError, draws_file, input};
-use crate::observer::Observer;
 use crate::report::{Input, Manifest, ModelNote, TrajectorySeries};
 use nav_sim_navigation::metrics::Requirement;
 use nav_sim_navigation::scenario::{Method, Scenario};
@@ -40,11 +40,11 @@ impl RunRequest {
     pub fn prepare(
         &self,
         draw: impl FnOnce() -> u64,
-        observer: &dyn Observer<Note>,
+        context: &Context<'_>,
     ) -> Result<PreparedRun, RunError> {
         let mut scenario = self.settings()?;
         let files = self.files()?;
-        let (mut inputs, model, made_by) = self.inputs(&mut scenario, observer)?;
+        let (mut inputs, model, made_by) = self.inputs(&mut scenario, context)?;
         let is_drawn = scenario.run.method != Method::Lincov || scenario.outage_random.is_some();
         scenario.run.seed = self
             .seed
@@ -62,7 +62,7 @@ impl RunRequest {
         placed
             .remarks
             .into_iter()
-            .for_each(|remark| observer.remark(&Note::Outage(remark)));
+            .for_each(|remark| context.warn(remark));
         let outages = placed.windows;
         if let Some(wanting) = self
             .require
@@ -74,7 +74,7 @@ impl RunRequest {
         if scenario.run.method == Method::Lincov && self.runs.is_some() {
             let text =
                 "--runs is ignored with --method lincov; --method both adds Monte-Carlo runs";
-            observer.remark(&Note::Warning(text.to_owned()));
+            context.warn(text.to_owned());
         }
         let mut configuration = scenario.clone();
         configuration.outage = Some(outages.clone());
@@ -142,29 +142,29 @@ impl RunRequest {
     fn inputs(
         &self,
         scenario: &mut Scenario,
-        observer: &dyn Observer<Note>,
+        context: &Context<'_>,
     ) -> Result<(NavigateInputs, ModelFile, ModelFile), RunError> {
         let imu_hz = scenario.imu.rate_hz;
         let read_model = |path: &Path| {
-            let file = read::model(path, observer)?;
-            Ok::<_, RunError>((read::at_rate(path, &file.model, imu_hz, observer)?, file))
+            let file = read::model(path, context)?;
+            Ok::<_, RunError>((read::at_rate(path, &file.model, imu_hz, context)?, file))
         };
-        let trajectory = read::trajectory(&self.trajectory, observer)?;
+        let trajectory = read::trajectory(&self.trajectory, context)?;
         let (model, file) = read_model(&self.model)?;
-        read::expect_turn_on(&mut scenario.initial, &file, &self.model, observer);
+        read::expect_turn_on(&mut scenario.initial, &file, &self.model, context);
         let truth = self.truth.as_deref().map(read_model).transpose()?;
         // recordings are their own truth: what they had of a constant bias is taken from them
         if self.recordings.is_empty() {
             let made_by = truth.as_ref().map_or(&file, |(_, file)| file);
             let path = self.truth.as_ref().unwrap_or(&self.model);
-            read::make_turn_on(&mut scenario.imu, made_by, path, observer);
+            read::make_turn_on(&mut scenario.imu, made_by, path, context);
         }
         let analysed = scenario.run.method == Method::Lincov;
         let draws = |path: &Path, file: &ModelFile| {
             let found = analysed.then(|| draws_file::usable(path, &file.model, imu_hz))?;
             found.unwrap_or_else(|doubt| {
                 let text = format!("{doubt}: no intervals from the calibration");
-                observer.remark(&Note::Warning(text));
+                context.warn(text);
                 None
             })
         };
@@ -177,7 +177,7 @@ impl RunRequest {
             }
             (None, []) => (TrueImu::AsBelieved, None),
             (_, paths) => (
-                TrueImu::Recordings(read::recordings(paths, self.rate_hz, observer)?),
+                TrueImu::Recordings(read::recordings(paths, self.rate_hz, context)?),
                 None,
             ),
         };
@@ -228,9 +228,9 @@ impl RunRequest {
     pub fn answer(
         &self,
         draw: impl FnOnce() -> u64,
-        observer: &dyn Observer<Note>,
+        context: &Context<'_>,
     ) -> Result<Answered, Failure> {
-        let answer = self.prepare(draw, observer)?.navigate(observer)?;
+        let answer = self.prepare(draw, context)?.navigate(context)?;
         Ok(Answered {
             files: contents(answer.files()),
             unmet: answer.unmet(),
@@ -244,7 +244,7 @@ impl PreparedRun {
     ///
     /// # Errors
     /// What does not fit together, what the method cannot do, or a covariance that runs away.
-    pub fn navigate(self, observer: &dyn Observer<Note>) -> Result<RunAnswer, RunError> {
+    pub fn navigate(self, context: &Context<'_>) -> Result<RunAnswer, RunError> {
         let Self {
             mut manifest,
             inputs,
@@ -255,7 +255,7 @@ impl PreparedRun {
             model,
             settings,
         } = self;
-        let found = navigate(&inputs, &scenario, &outages, seed, observer);
+        let found = navigate(&inputs, &scenario, &outages, seed, context);
         let mut navigation = found.map_err(|e| RunError::Navigate {
             model,
             settings,

@@ -1,11 +1,11 @@
 //! Inputs read; what is doubtful about them is remarked.
 
 use super::error::RunError;
-use super::{Note, turn_on};
+use super::turn_on;
+use crate::app::Context;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::recordings::{self, ReadOptions};
 use crate::formats::trajectory_file;
-use crate::observer::Observer;
 use crate::report::readable;
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::scenario::Scenario;
@@ -17,18 +17,10 @@ use nav_sim_signal::imu::{Recording, Sensor};
 use nav_sim_signal::noise::{Model, continuous};
 use std::path::{Path, PathBuf};
 
-pub(crate) type Notes<'a> = &'a dyn Observer<Note>;
-
-fn warn(notes: Notes<'_>, texts: impl IntoIterator<Item = impl ToString>) {
-    texts
-        .into_iter()
-        .for_each(|text| notes.remark(&Note::Warning(text.to_string())));
-}
-
 /// A trajectory; where no vehicle moves so.
-pub(crate) fn trajectory(path: &Path, notes: Notes<'_>) -> Result<Trajectory, RunError> {
+pub(crate) fn trajectory(path: &Path, context: &Context<'_>) -> Result<Trajectory, RunError> {
     let (trajectory, warnings) = trajectory_file::load(path, &trajectory_file::Options::default())?;
-    warn(notes, warnings);
+    warnings.iter().for_each(|doubt| context.warn(doubt));
     let (_, beyond) = examine(&trajectory, &Limits::default());
     let farthest = |e: &&Excess| e.worst / e.limit;
     if let Some(worst) = beyond
@@ -40,20 +32,19 @@ pub(crate) fn trajectory(path: &Path, notes: Notes<'_>) -> Result<Trajectory, Ru
             0 => String::new(),
             n => format!(", and {n} more such stretches"),
         };
-        warn(
-            notes,
-            [format!(
-                "{shown}: {worst}{more} (nav-sim trajectory check {shown} lists them)"
-            )],
-        );
+        context.warn(format!(
+            "{shown}: {worst}{more} (nav-sim trajectory check {shown} lists them)"
+        ));
     }
     Ok(trajectory)
 }
 
 /// A model; the axes that it does not name.
-pub(crate) fn model(path: &Path, notes: Notes<'_>) -> Result<ModelFile, RunError> {
+pub(crate) fn model(path: &Path, context: &Context<'_>) -> Result<ModelFile, RunError> {
     let file = model_file::read(path)?;
-    warn(notes, file.doubts(path));
+    file.doubts(path)
+        .iter()
+        .for_each(|doubt| context.warn(doubt));
     Ok(file)
 }
 
@@ -62,7 +53,7 @@ pub(crate) fn at_rate(
     path: &Path,
     model: &Model,
     imu_hz: f64,
-    notes: Notes<'_>,
+    context: &Context<'_>,
 ) -> Result<Model, RunError> {
     let from_hz = model.rate_hz;
     let converted = continuous::at_rate(model, imu_hz);
@@ -76,7 +67,7 @@ pub(crate) fn at_rate(
             "{}: converted from {from_hz} Hz to {imu_hz} Hz",
             path.display()
         );
-        notes.remark(&Note::Remark(text));
+        context.remark(text);
     }
     Ok(converted)
 }
@@ -85,18 +76,21 @@ pub(crate) fn at_rate(
 pub(crate) fn recordings(
     paths: &[PathBuf],
     rate_hz: Option<f64>,
-    notes: Notes<'_>,
+    context: &Context<'_>,
 ) -> Result<Vec<Recording>, RunError> {
     let options = ReadOptions {
         rate_hz,
         ..ReadOptions::default()
     };
     let (recordings, report) = recordings::read(paths, &options)?;
-    warn(notes, report.all_warnings());
+    report
+        .all_warnings()
+        .iter()
+        .for_each(|doubt| context.warn(doubt));
     report
         .files
         .iter()
-        .for_each(|file| notes.remark(&Note::Detail(file.to_string())));
+        .for_each(|file| context.detail(file.to_string()));
     Ok(recordings)
 }
 
@@ -105,13 +99,13 @@ pub(crate) fn placed(
     scenario: &Scenario,
     trajectory: &Trajectory,
     seed: u64,
-    notes: Notes<'_>,
+    context: &Context<'_>,
 ) -> Result<Vec<Outage>, OutageError> {
     let placed = scenario.outages_on((trajectory.start_s(), trajectory.end_s()), seed)?;
     placed
         .remarks
         .into_iter()
-        .for_each(|remark| notes.remark(&Note::Outage(remark)));
+        .for_each(|remark| context.warn(remark));
     Ok(placed.windows)
 }
 
@@ -120,24 +114,29 @@ pub(crate) fn expect_turn_on(
     initial: &mut InitialSettings,
     file: &ModelFile,
     path: &Path,
-    notes: Notes<'_>,
+    context: &Context<'_>,
 ) {
     let set = turn_on::expect(initial, &file.turn_on.unwrap_or_default());
-    tell_turn_on("the filter expects", &set, path, notes);
+    tell_turn_on("the filter expects", &set, path, context);
 }
 
 /// Gives the true IMU the turn-on bias that the model of its errors states, where settings are silent; a 0 is a setting.
-pub(crate) fn make_turn_on(imu: &mut ImuSettings, file: &ModelFile, path: &Path, notes: Notes<'_>) {
+pub(crate) fn make_turn_on(
+    imu: &mut ImuSettings,
+    file: &ModelFile,
+    path: &Path,
+    context: &Context<'_>,
+) {
     let set = turn_on::make(imu, &file.turn_on.unwrap_or_default());
-    tell_turn_on("the true IMU has", &set, path, notes);
+    tell_turn_on("the true IMU has", &set, path, context);
 }
 
-fn tell_turn_on(who: &str, set: &[(Sensor, f64)], path: &Path, notes: Notes<'_>) {
+fn tell_turn_on(who: &str, set: &[(Sensor, f64)], path: &Path, context: &Context<'_>) {
     for (sensor, sigma) in set {
         let (shown, sigma, unit) = (path.display(), readable(*sigma), sensor.unit());
         let text = format!(
             "{shown}: {who} a turn-on bias of {sigma} {unit} ({sensor}, standard deviation)"
         );
-        notes.remark(&Note::Remark(text));
+        context.remark(text);
     }
 }

@@ -1,7 +1,7 @@
 //! What the reduction of a model to 15 states does.
 
-use super::navigate::Note;
-use crate::observer::Observer;
+use crate::app::Context;
+use crate::report::{reduction_doubt, reduction_line};
 use nav_sim_navigation::ekf::Belief;
 use nav_sim_navigation::metrics::{ReductionQuality, ReductionSummary};
 use nav_sim_navigation::simulation::lincov::{Track, assess};
@@ -33,7 +33,7 @@ impl Reduced<'_> {
     /// When a parameter of the belief is outside its domain.
     pub(crate) fn summary(
         &self,
-        observer: &dyn Observer<Note>,
+        context: &Context<'_>,
     ) -> Result<ReductionSummary, ParameterError> {
         let Self {
             model,
@@ -49,7 +49,10 @@ impl Reduced<'_> {
         }
         let full = self.full.as_ref().map(|full| assess(track, full, model));
         let quality = ReductionQuality::of(&assess(track, belief, model), full.as_ref());
-        observer.remark(&Note::Reduction(quality.clone()));
+        context.remark(reduction_line(&quality));
+        reduction_doubt(&quality)
+            .iter()
+            .for_each(|doubt| context.warn(doubt));
         summary.quality = Some(quality);
         Ok(summary)
     }

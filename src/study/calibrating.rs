@@ -4,7 +4,6 @@ use super::description::{CalibrateStep, Study, TruthEntry};
 use super::failure::StudyError;
 use super::plan::CALIBRATED;
 use super::reader::{CANDIDATE_SEED, Reader};
-use super::remark::Remark;
 use crate::calibrate::CalibrationNote;
 use crate::formats::{hash, input, model_file};
 use crate::report::Input;
@@ -33,11 +32,11 @@ pub(super) fn models(
             continue;
         };
         let estimators: Vec<&str> = step.estimators.iter().map(|e| e.name()).collect();
-        reader.observer.remark(&Remark::note(format!(
+        reader.context.remark(format!(
             "calibrating {} ({})",
             entry.name,
             estimators.join(", ")
-        )));
+        ));
         let folds: Vec<Option<&TruthEntry>> = if step.leave_out {
             study.truth.iter().map(Some).collect()
         } else {

@@ -6,10 +6,9 @@ use super::grid::{Cell, Column};
 use super::plan::{CALIBRATED, Unit};
 use super::planned::Planned;
 use super::reader::{Reader, TruthSource, unchanged};
-use super::remark::Remark;
 use super::unit::{Finding, UnitResult};
+use crate::app::Context;
 use crate::formats::{hash, model_file};
-use crate::observer::Observer;
 use crate::report::Input;
 use nav_sim_navigation::ekf::{Belief, BeliefError};
 use nav_sim_navigation::metrics::Expected;
@@ -39,17 +38,17 @@ pub(super) enum Work<'a> {
 }
 
 impl Work<'_> {
-    /// The result of a unit; `None` if the observer stopped on the way.
+    /// The result of a unit; `None` if the context stopped on the way.
     pub(super) fn unit(
         &self,
         planned: &Planned,
         (unit, id): (Unit, &str),
-        observer: &dyn Observer<Remark>,
+        context: &Context<'_>,
     ) -> Result<Option<UnitResult>, StudyError> {
-        let progress = |runs| observer.advance(runs);
+        let progress = |runs| context.advance(runs);
         let mut columns: Vec<Finding> = match self {
             Self::Sampling(plan) => {
-                let go_on = || observer.go_on();
+                let go_on = || context.go_on();
                 match monte_carlo::run_range(plan, unit.first, unit.runs, &go_on, &progress) {
                     Some(results) => results.into_iter().map(Finding::Sampled).collect(),
                     None => return Ok(None),
@@ -108,11 +107,11 @@ impl<'a> Inputs<'a> {
     pub(super) fn new(
         planned: &'a Planned,
         made: &'a [(String, String)],
-        observer: &'a dyn Observer<Remark>,
+        context: &'a Context<'a>,
     ) -> Self {
         let reader = Reader {
             study: &planned.study,
-            observer,
+            context,
         };
         Self {
             planned,

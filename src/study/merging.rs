@@ -8,11 +8,10 @@ use super::file::beside;
 use super::leave_one_out::Folds;
 use super::plan::NamedUnit;
 use super::planned::Planned;
-use super::remark::Remark;
 use super::tables::Tables;
+use crate::app::Context;
 use crate::formats::FileError;
 use crate::formats::atomic::{AtomicDir, Claim, Existing, Found, claim_directory};
-use crate::observer::Observer;
 use crate::report;
 use nav_sim_document::Document;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
@@ -51,10 +50,10 @@ pub struct MergeReport {
 pub fn merge(
     planned: &Planned,
     options: &MergeOptions,
-    observer: &dyn Observer<Remark>,
+    context: &Context<'_>,
 ) -> Result<MergeReport, StudyError> {
     planned.inputs_unchanged()?;
-    planned.remark_foreign(observer)?;
+    planned.remark_foreign(context)?;
     let units = planned.plan.named_units(&planned.grid);
     let missing = planned.missing()?;
     if !missing.is_empty() {

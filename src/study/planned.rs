@@ -8,12 +8,11 @@ use super::fingerprint::fingerprint;
 use super::grid::Grid;
 use super::plan::{NamedUnit, Plan, Shard, Unit};
 use super::reader::unchanged;
-use super::remark::Remark;
 use super::rules::MAX_UNITS;
 use super::unit_file::{self, UnitFileError};
+use crate::app::Context;
 use crate::formats::difference::{self, Difference};
 use crate::formats::{FileError, atomic, source};
-use crate::observer::Observer;
 use crate::report::Input;
 use std::collections::BTreeSet;
 use std::fs;
@@ -296,14 +295,14 @@ impl Planned {
     ///
     /// # Errors
     /// When the directory cannot be read.
-    pub(crate) fn remark_foreign(&self, observer: &dyn Observer<Remark>) -> Result<(), StudyError> {
+    pub(crate) fn remark_foreign(&self, context: &Context<'_>) -> Result<(), StudyError> {
         let foreign = self.foreign()?;
         if let Some(first) = foreign.first() {
             let example = unit_file::path(&self.directory, first);
             let (units, example) = (foreign.len(), example.display());
             let text =
                 format!("unit files of another plan are left out: {units}, such as {example}");
-            observer.remark(&Remark::warning(text));
+            context.warn(text);
         }
         Ok(())
     }

@@ -10,10 +10,9 @@ use super::named_files;
 use super::plan::{CALIBRATED, Estimate, Kept, Plan, Unit};
 use super::planned::{Planned, plan_in};
 use super::reader::{Reader, unchanged};
-use super::remark::Remark;
 use super::unit_file;
+use crate::app::Context;
 use crate::formats::{FileError, atomic, hash, input};
-use crate::observer::Observer;
 use crate::report::Input;
 use nav_sim_navigation::lanes::LANES;
 use std::collections::HashSet;
@@ -64,10 +63,10 @@ pub fn plan(
     study: &Path,
     directory: &Path,
     options: &PlanOptions<'_>,
-    observer: &dyn Observer<Remark>,
+    context: &Context<'_>,
 ) -> Result<PlanReport, StudyError> {
     let file = named_files::read(study)?;
-    let reader = Reader { study, observer };
+    let reader = Reader { study, context };
     if options.writing == Writing::Write
         && let Some(plan) = plan_in(directory)?
     {
@@ -75,7 +74,7 @@ pub fn plan(
         let planned = Planned::new(study, directory, plan)?;
         planned.must_be_of(&file.study, Some(seed))?;
         restore(&planned, reader)?;
-        planned.remark_foreign(observer)?;
+        planned.remark_foreign(context)?;
         return Ok(PlanReport {
             planned,
             was_there: true,
@@ -84,10 +83,10 @@ pub fn plan(
     let seed = (options.seed)(file.study.seed);
     let (plan, texts) = prepared(file, seed, reader)?;
     let mut planned = Planned::new(study, directory, plan)?;
-    validate(&planned, &texts, observer)?;
-    probe(&mut planned, &texts, options, observer)?;
+    validate(&planned, &texts, context)?;
+    probe(&mut planned, &texts, options, context)?;
     planned.check_units()?;
-    planned.remark_foreign(observer)?;
+    planned.remark_foreign(context)?;
     if options.writing == Writing::Write {
         for (path, text) in &texts {
             atomic::write(&directory.join(path), text)?;
@@ -138,8 +137,8 @@ fn restore(planned: &Planned, reader: Reader<'_>) -> Result<(), StudyError> {
         };
         atomic::write(&path, text)?;
         reader
-            .observer
-            .remark(&Remark::note(format!("wrote {} again", path.display())));
+            .context
+            .remark(format!("wrote {} again", path.display()));
     }
     Ok(())
 }
@@ -233,10 +232,10 @@ fn input_of(inputs: &[Input], path: &Path) -> Input {
 fn validate(
     planned: &Planned,
     texts: &ModelTexts,
-    observer: &dyn Observer<Remark>,
+    context: &Context<'_>,
 ) -> Result<(), StudyError> {
     let grid = &planned.grid;
-    let mut inputs = Inputs::new(planned, texts, observer);
+    let mut inputs = Inputs::new(planned, texts, context);
     let (mut set_up, mut placed) = (HashSet::new(), HashSet::new());
     let mut without = Vec::new();
     for index in 0..grid.len() {
@@ -248,7 +247,7 @@ fn validate(
             let outages = inputs.outages(cell)?;
             for remark in outages.remarks {
                 let text = format!("{}: {remark}", grid.names(cell).join(", "));
-                observer.remark(&Remark::warning(text));
+                context.warn(text);
             }
             if outages.windows.is_empty() {
                 without.push(grid.short_name(cell));
@@ -258,21 +257,21 @@ fn validate(
     match without.as_slice() {
         [] => {}
         [cell] => {
-            observer.remark(&Remark::warning(format!(
+            context.warn(format!(
                 "cell \"{cell}\" has no outages: its table is empty"
-            )));
+            ));
         }
         [cell, ..] => {
             let text = format!(
                 "{} cells have no outages, such as \"{cell}\": their tables are empty",
                 without.len()
             );
-            observer.remark(&Remark::warning(text));
+            context.warn(text);
         }
     }
     grid.doubts()
         .into_iter()
-        .for_each(|doubt| observer.remark(&Remark::warning(doubt)));
+        .for_each(|doubt| context.warn(doubt));
     Ok(())
 }
 
@@ -281,12 +280,12 @@ fn probe(
     planned: &mut Planned,
     texts: &ModelTexts,
     options: &PlanOptions<'_>,
-    observer: &dyn Observer<Remark>,
+    context: &Context<'_>,
 ) -> Result<(), StudyError> {
     let Some(clock) = options.clock else {
         return Ok(());
     };
-    let mut inputs = Inputs::new(planned, texts, observer);
+    let mut inputs = Inputs::new(planned, texts, context);
     let (grid, plan) = (&planned.grid, &planned.plan);
     let first = Unit {
         index: 0,
@@ -298,7 +297,7 @@ fn probe(
     let (run_s, unit) = inputs.with_cell(grid.cell(0), |work| {
         let start_s = clock();
         let unit = work
-            .unit(planned, (first, ""), &())?
+            .unit(planned, (first, ""), &Context::default())?
             .expect("nothing stops it");
         let run_s = match work {
             // Eight runs take as long as one: the lanes of the processor.

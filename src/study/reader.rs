@@ -3,16 +3,16 @@
 use super::description::{Synthesis, TruthEntry};
 use super::failure::StudyError;
 use super::file::beside;
-use super::remark::Remark;
+use crate::app::Context;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::recordings::{self, ReadOptions};
 use crate::formats::{FileError, contamination_file, hash, input, trajectory_file};
-use crate::observer::Observer;
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::{Channel, Recording};
 use nav_sim_signal::noise::contamination::Contamination;
 use nav_sim_signal::noise::{Model, ReplicateError, VirtualImu};
 use rayon::prelude::*;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 /// What is added to the study's seed for virtual recordings of truths, and of candidates.
@@ -29,7 +29,7 @@ pub(super) enum TruthSource {
 #[derive(Clone, Copy)]
 pub(super) struct Reader<'a> {
     pub(super) study: &'a Path,
-    pub(super) observer: &'a dyn Observer<Remark>,
+    pub(super) context: &'a Context<'a>,
 }
 
 impl Reader<'_> {
@@ -63,14 +63,14 @@ impl Reader<'_> {
         report
             .files
             .iter()
-            .for_each(|file| self.observer.remark(&Remark::detail(file)));
+            .for_each(|file| self.context.detail(file));
         Ok(recordings)
     }
 
-    pub(super) fn doubt(&self, doubts: impl IntoIterator<Item = impl ToString>) {
+    pub(super) fn doubt(&self, doubts: impl IntoIterator<Item = impl Display>) {
         doubts
             .into_iter()
-            .for_each(|doubt| self.observer.remark(&Remark::warning(doubt)));
+            .for_each(|doubt| self.context.warn(doubt));
     }
 
     /// What paths of the study mean.

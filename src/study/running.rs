@@ -4,9 +4,8 @@ use super::failure::StudyError;
 use super::inputs::{Inputs, Work};
 use super::plan::{NamedUnit, Shard};
 use super::planned::{Planned, UnitState};
-use super::remark::Remark;
 use super::unit_file;
-use crate::observer::Observer;
+use crate::app::Context;
 use nav_sim_navigation::lanes::LANES;
 use nav_sim_signal::rng::StreamKey;
 use rand::seq::IndexedRandom;
@@ -27,11 +26,11 @@ pub struct RunOptions {
 pub struct RunReport {
     /// Units computed and written.
     pub finished: usize,
-    /// Units of the shard that are left: the observer stopped.
+    /// Units of the shard that are left: the context stopped.
     pub left: usize,
 }
 
-/// Computes the units of a shard that are not there, or damaged. Each appears whole, by rename; when the observer
+/// Computes the units of a shard that are not there, or damaged. Each appears whole, by rename; when the context
 /// says stop, those at work are dropped (a covariance analysis, which is short, is finished), and the same call goes on
 /// later. Any number of processes may work at once.
 ///
@@ -40,37 +39,37 @@ pub struct RunReport {
 pub fn run(
     planned: &Planned,
     options: &RunOptions,
-    observer: &dyn Observer<Remark>,
+    context: &Context<'_>,
 ) -> Result<RunReport, StudyError> {
     planned.same_numbers()?;
     planned.inputs_unchanged()?;
-    planned.remark_foreign(observer)?;
+    planned.remark_foreign(context)?;
     let (mut pending, mut done) = (Vec::new(), 0_usize);
     for (unit, id, state) in planned.survey(options.shard)? {
         match state {
             UnitState::Whole => done += 1,
             UnitState::Missing => pending.push((unit, id)),
             UnitState::Damaged(what) => {
-                observer.remark(&Remark::warning(format!("{what}; it is computed again")));
+                context.warn(format!("{what}; it is computed again"));
                 pending.push((unit, id));
             }
         }
     }
     if done > 0 {
         let text = format!("{done} units are done already, {} to do", pending.len());
-        observer.remark(&Remark::note(text));
+        context.remark(text);
     }
-    let mut inputs = Inputs::new(planned, &[], observer);
-    observer.begin(pending.iter().map(|(unit, _)| unit.runs).sum());
+    let mut inputs = Inputs::new(planned, &[], context);
+    context.begin("runs", pending.iter().map(|(unit, _)| unit.runs).sum());
     let mut finished = 0;
     for of_cell in pending.chunk_by(|a, b| a.0.cell == b.0.cell) {
-        if !observer.go_on() {
+        if !context.go_on() {
             break;
         }
         let cell = planned.grid.cell(of_cell[0].0.cell);
         inputs.with_cell(cell, |work| {
             for together in of_cell.chunks(at_once(of_cell, options.threads)) {
-                finished += run_units(planned, work, together, observer)?;
+                finished += run_units(planned, work, together, context)?;
             }
             Ok(())
         })?;
@@ -92,10 +91,10 @@ fn run_units(
     planned: &Planned,
     work: &Work<'_>,
     units: &[NamedUnit],
-    observer: &dyn Observer<Remark>,
+    context: &Context<'_>,
 ) -> Result<usize, StudyError> {
     let run_one = |(unit, id): &NamedUnit| -> Result<usize, StudyError> {
-        match work.unit(planned, (*unit, id), observer)? {
+        match work.unit(planned, (*unit, id), context)? {
             Some(result) => Ok(unit_file::write(&planned.directory, &result).map(|()| 1)?),
             None => Ok(0),
         }
@@ -134,7 +133,7 @@ pub struct VerifyReport {
 pub fn verify(
     planned: &Planned,
     options: &VerifyOptions,
-    observer: &dyn Observer<Remark>,
+    context: &Context<'_>,
 ) -> Result<VerifyReport, StudyError> {
     planned.same_numbers()?;
     planned.inputs_unchanged()?;
@@ -158,13 +157,13 @@ pub fn verify(
     };
     let mut chosen: Vec<&NamedUnit> = whole.sample(&mut key.generator(), options.units).collect();
     chosen.sort_by_key(|(unit, _)| unit.index);
-    observer.begin(chosen.iter().map(|(unit, _)| unit.runs).sum());
-    let mut inputs = Inputs::new(planned, &[], observer);
+    context.begin("runs", chosen.iter().map(|(unit, _)| unit.runs).sum());
+    let mut inputs = Inputs::new(planned, &[], context);
     let mut different = Vec::new();
     for (unit, id) in &chosen {
         let found = unit_file::read(&planned.directory, id)?;
         let cell = planned.grid.cell(unit.cell);
-        let again = inputs.with_cell(cell, |work| work.unit(planned, (*unit, id), observer))?;
+        let again = inputs.with_cell(cell, |work| work.unit(planned, (*unit, id), context))?;
         let Some(again) = again else { break };
         if unit_file::encode(&again) != unit_file::encode(&found) {
             different.push(format!("{id} ({})", planned.grid.names(cell).join(", ")));

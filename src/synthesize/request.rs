@@ -1,14 +1,13 @@
 //! The request of a synthesis: the arguments of `nav-sim synthesize`.
 
 use super::Synthesis;
+use crate::app::Context;
 use crate::failure::Failure;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::recordings::FileFormat;
 use crate::formats::{contamination_file, input};
 use crate::jobs::ChannelSet;
-use crate::observer::Observer;
 use crate::parse;
-use crate::run::Note;
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::contamination::{Contamination, Rule};
 use serde::{Deserialize, Serialize};
@@ -69,7 +68,7 @@ impl SynthesisRequest {
     pub(crate) fn synthesis(
         &self,
         draw: impl FnOnce() -> u64,
-        notes: &dyn Observer<Note>,
+        context: &Context<'_>,
     ) -> Result<Synthesis, Failure> {
         let file = model_file::read(&self.model)?;
         let shown = self.model.display();
@@ -80,17 +79,17 @@ impl SynthesisRequest {
             );
         }
         if file.turn_on.is_some() {
-            notes.remark(&Note::Remark(format!(
+            context.remark(format!(
                 "{shown}: its turn-on biases are not drawn: recordings are of noise about their mean"
-            )));
+            ));
         }
         let contamination = self
             .contaminate
             .as_deref()
             .map(|c| contamination(c, file.model.rate_hz));
         let contamination = contamination.transpose()?;
-        let channels = self.wanted(&file, notes)?;
-        reaches(contamination.as_ref(), self.replicates, &channels, notes)?;
+        let channels = self.wanted(&file, context)?;
+        reaches(contamination.as_ref(), self.replicates, &channels, context)?;
         let samples = match self.duration {
             Some(s) => (s * file.model.rate_hz).round(),
             None => self.samples.unwrap_or(524_284) as f64,
@@ -122,11 +121,7 @@ impl SynthesisRequest {
     }
 
     /// The channels to make: those asked for that the model has.
-    fn wanted(
-        &self,
-        file: &ModelFile,
-        notes: &dyn Observer<Note>,
-    ) -> Result<Vec<Channel>, Failure> {
+    fn wanted(&self, file: &ModelFile, context: &Context<'_>) -> Result<Vec<Channel>, Failure> {
         let asked = |c: &Channel| self.axes.iter().any(|set| set.channels.contains(c));
         let (missing, present): (Vec<Channel>, Vec<Channel>) = Channel::ALL
             .into_iter()
@@ -139,9 +134,9 @@ impl SynthesisRequest {
             )));
         }
         for channel in missing {
-            notes.remark(&Note::Warning(format!(
+            context.warn(format!(
                 "{shown} has no noise model for {channel}; no signal is written for that axis"
-            )));
+            ));
         }
         Ok(present)
     }
@@ -153,7 +148,7 @@ fn reaches(
     contamination: Option<&Contamination>,
     replicates: u64,
     channels: &[Channel],
-    notes: &dyn Observer<Note>,
+    context: &Context<'_>,
 ) -> Result<(), Failure> {
     let Some(contamination) = contamination else {
         return Ok(());
@@ -171,7 +166,7 @@ fn reaches(
     };
     let message = format!("{place}: corrupts the {}, which is not made", sensor.name());
     if rules.iter().any(made) {
-        notes.remark(&Note::Detail(message));
+        context.detail(message);
         return Ok(());
     }
     Err(Failure::input(message).hint("another contamination, or --axes with that sensor"))

@@ -3,15 +3,15 @@
 use super::job::{Truths, TuneInputs, tune, tuned};
 use super::result::TuneResult;
 use crate::answered::Answered;
+use crate::app::Context;
 use crate::failure::Failure;
 use crate::formats::draws_file::{self, Draws};
 use crate::formats::input;
 use crate::formats::model_file::{self, ModelFile};
-use crate::observer::Observer;
 use crate::parse;
-use crate::report::Input;
-use crate::run::read::{self, Notes};
-use crate::run::{Note, OutageFlag, checked_scenario, no_filter};
+use crate::report::{Input, unexpected_line};
+use crate::run::read;
+use crate::run::{OutageFlag, checked_scenario, no_filter};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::outage::Outage;
@@ -94,18 +94,18 @@ pub(crate) struct Tuned {
 
 impl TuneRequest {
     /// The factors.
-    pub(crate) fn tuned(&self, notes: Notes<'_>) -> Result<Tuned, Failure> {
+    pub(crate) fn tuned(&self, context: &Context<'_>) -> Result<Tuned, Failure> {
         let files = self.inputs()?;
         let mut scenario = checked_scenario(self.scenario.as_deref(), &self.outages)?;
         if self.truths.is_empty() && !self.intervals && scenario.has_no_errors() {
             return Err(Failure::input("no truth to be consistent with: neither --truth nor --intervals is given")
                 .hint("give models (--truth OTHER.toml, one a recording), --intervals for a MODEL of `nav-sim calibrate`, or a scenario with errors"));
         }
-        let file = read::model(&self.model, notes)?;
-        let model = read::at_rate(&self.model, &file.model, scenario.imu.rate_hz, notes)?;
-        read::expect_turn_on(&mut scenario.initial, &file, &self.model, notes);
-        let truths = self.truths((&file, &model), &scenario, notes)?;
-        let (track, outages) = self.track(&scenario, &model, notes)?;
+        let file = read::model(&self.model, context)?;
+        let model = read::at_rate(&self.model, &file.model, scenario.imu.rate_hz, context)?;
+        read::expect_turn_on(&mut scenario.initial, &file, &self.model, context);
+        let truths = self.truths((&file, &model), &scenario, context)?;
+        let (track, outages) = self.track(&scenario, &model, context)?;
         let result = tune(&TuneInputs {
             scenario: &scenario,
             model: &model,
@@ -138,8 +138,8 @@ impl TuneRequest {
     ///
     /// # Errors
     /// What is wrong with a file or a setting.
-    pub fn answer(&self, notes: &dyn Observer<Note>) -> Result<Answered, Failure> {
-        let tuned = self.tuned(notes)?;
+    pub fn answer(&self, context: &Context<'_>) -> Result<Answered, Failure> {
+        let tuned = self.tuned(context)?;
         let model = tuned
             .model
             .as_ref()
@@ -199,11 +199,11 @@ impl TuneRequest {
         &self,
         (file, model): (&ModelFile, &Model),
         scenario: &Scenario,
-        notes: Notes<'_>,
+        context: &Context<'_>,
     ) -> Result<Truths, Failure> {
         let true_errors = |path: &Path, model: Model, turned_on: &ModelFile| {
             let (mut imu, gnss) = (scenario.imu.clone(), scenario.gnss.clone());
-            read::make_turn_on(&mut imu, turned_on, path, notes);
+            read::make_turn_on(&mut imu, turned_on, path, context);
             TrueErrors {
                 model,
                 imu,
@@ -236,8 +236,8 @@ impl TuneRequest {
             }
         } else {
             let truth = |path: &PathBuf| {
-                let file = read::model(path, notes)?;
-                let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, notes)?;
+                let file = read::model(path, context)?;
+                let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
                 Ok::<_, Failure>((path.display().to_string(), true_errors(path, model, &file)))
             };
             // Without another, MODEL with what the scenario says is wrong beside it.
@@ -270,7 +270,7 @@ impl TuneRequest {
         }
         doubts
             .into_iter()
-            .for_each(|doubt| notes.remark(&Note::Unexpected(doubt)));
+            .for_each(|doubt| context.warn(unexpected_line(&doubt)));
         Ok(truths)
     }
 
@@ -279,7 +279,7 @@ impl TuneRequest {
         &self,
         scenario: &Scenario,
         model: &Model,
-        notes: Notes<'_>,
+        context: &Context<'_>,
     ) -> Result<(Track, Vec<Outage>), Failure> {
         let seed = self.seed.or(scenario.run.seed).unwrap_or(0);
         let Some(path) = &self.trajectory else {
@@ -299,11 +299,11 @@ impl TuneRequest {
                     .hint("give a trajectory with --trajectory")
             })?;
             let text = "along a built-in drive with outages as long; --trajectory takes another";
-            notes.remark(&Note::Remark(text.to_owned()));
+            context.remark(text.to_owned());
             return Ok((track, outages));
         };
-        let trajectory = read::trajectory(path, notes)?;
-        let outages = read::placed(scenario, &trajectory, seed, notes)?;
+        let trajectory = read::trajectory(path, context)?;
+        let outages = read::placed(scenario, &trajectory, seed, context)?;
         let track = scenario
             .track(&trajectory, model, &outages)
             .map_err(Failure::input)?;

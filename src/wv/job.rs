@@ -1,8 +1,9 @@
 //! Static recordings → their wavelet variances.
 
+use crate::app::Context;
 use crate::calibrate::{visit, without_warm_up};
 use crate::formats::recordings::ReadOptions;
-use crate::jobs::{JobError, Remarks};
+use crate::jobs::JobError;
 use crate::report::{SignalCurves, SignalsFile};
 use nav_sim_calibration::{Replicate, replicates};
 use nav_sim_signal::imu::{Channel, Recording};
@@ -45,7 +46,7 @@ pub(crate) struct WaveletOptions {
 pub(crate) fn wavelet_variances(
     paths: &[PathBuf],
     options: &WaveletOptions,
-    remarks: &mut dyn Remarks,
+    context: &Context<'_>,
 ) -> Result<SignalsFile, JobError> {
     let WaveletOptions {
         reading,
@@ -81,7 +82,7 @@ pub(crate) fn wavelet_variances(
             .map(curves)
             .collect::<Result<_, WaveletError>>()?)
     };
-    let (looks, report) = visit(paths, &reading, &look, remarks)?;
+    let (looks, report) = visit(paths, &reading, &look, context)?;
     let signals = looks
         .into_iter()
         .collect::<Result<Vec<_>, _>>()?

@@ -2,8 +2,9 @@
 
 use super::job::{Intervals, WaveletOptions, wavelet_variances};
 use crate::answered::Answered;
+use crate::app::Context;
 use crate::failure::Failure;
-use crate::jobs::{RecordingRequest, Remarks, VarianceRequest};
+use crate::jobs::{RecordingRequest, VarianceRequest};
 use crate::parse;
 use crate::report::SignalsFile;
 use serde::{Deserialize, Serialize};
@@ -40,7 +41,7 @@ const INTERVALS: [(&str, &str); 2] = [
 
 impl WaveletRequest {
     /// The curves.
-    pub(crate) fn curves(&self, remarks: &mut dyn Remarks) -> Result<SignalsFile, Failure> {
+    pub(crate) fn curves(&self, context: &Context<'_>) -> Result<SignalsFile, Failure> {
         let options = WaveletOptions {
             reading: self.recordings.options(),
             skip_warm_up: self.recordings.reading.skips_warm_up(),
@@ -48,14 +49,14 @@ impl WaveletRequest {
             tuning: self.tuning.tuning()?,
             intervals: self.intervals,
         };
-        Ok(wavelet_variances(&self.files, &options, remarks)?)
+        Ok(wavelet_variances(&self.files, &options, context)?)
     }
 
     /// As `nav-sim wv` prints it.
     ///
     /// # Errors
     /// When a recording cannot be read, or is too short for the scales.
-    pub fn answer(&self, remarks: &mut dyn Remarks) -> Result<Answered, Failure> {
-        Ok(Answered::of(&self.curves(remarks)?))
+    pub fn answer(&self, context: &Context<'_>) -> Result<Answered, Failure> {
+        Ok(Answered::of(&self.curves(context)?))
     }
 }

@@ -1,10 +1,10 @@
 //! A study planned, run and merged by library calls only.
 
 use crate::common::batch::*;
-use nav_sim::observer::Observer;
+use nav_sim::app::{Context, Front};
+use nav_sim::document::Note;
 use nav_sim::study::{
-    self, MergeOptions, PlanOptions, Planned, Remark, RunOptions, Shard, StudyError, VerifyOptions,
-    Writing,
+    self, MergeOptions, PlanOptions, Planned, RunOptions, Shard, StudyError, VerifyOptions, Writing,
 };
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -22,7 +22,7 @@ fn options(writing: Writing) -> PlanOptions<'static> {
 
 /// Keeps what it is told, and stops after so many runs.
 struct Watch {
-    remarks: Mutex<Vec<Remark>>,
+    remarks: Mutex<Vec<Note>>,
     done: AtomicU64,
     stop_after: u64,
 }
@@ -37,9 +37,9 @@ impl Watch {
     }
 }
 
-impl Observer<Remark> for Watch {
-    fn remark(&self, remark: &Remark) {
-        self.remarks.lock().unwrap().push(remark.clone());
+impl Front for Watch {
+    fn note(&self, note: Note) {
+        self.remarks.lock().unwrap().push(note);
     }
 
     fn advance(&self, runs: u64) {
@@ -64,25 +64,36 @@ fn the_library_makes_the_bytes_of_the_command() {
         done(dir, arguments);
     }
     let (file, directory) = (dir.join("study.toml"), dir.join("library"));
-    let made = study::plan(&file, &directory, &options(Writing::Write), &()).unwrap();
+    let made = study::plan(
+        &file,
+        &directory,
+        &options(Writing::Write),
+        &Context::default(),
+    )
+    .unwrap();
     assert!(
         !made.was_there
-            && study::plan(&file, &directory, &options(Writing::Write), &())
-                .unwrap()
-                .was_there
+            && study::plan(
+                &file,
+                &directory,
+                &options(Writing::Write),
+                &Context::default()
+            )
+            .unwrap()
+            .was_there
     );
     let planned = Planned::open(&file, &directory, Some(5)).unwrap();
-    let run = |index, observer: &dyn Observer<Remark>| {
+    let run = |index, context: &Context<'_>| {
         let shard = Shard::new(index, 2).unwrap();
-        study::run(&planned, &RunOptions { shard, threads: 1 }, observer).unwrap()
+        study::run(&planned, &RunOptions { shard, threads: 1 }, context).unwrap()
     };
-    let first = run(0, &Watch::until(100));
+    let first = run(0, &Context::new(&Watch::until(100), None));
     assert!(
         first.left > 0 && first.finished + first.left == UNITS / 2,
         "{first:?}"
     );
     let watch = Watch::until(u64::MAX);
-    let rest = run(0, &watch);
+    let rest = run(0, &Context::new(&watch, None));
     assert_eq!((rest.finished, rest.left), (first.left, 0));
     let already = format!(
         "{} units are done already, {} to do",
@@ -103,7 +114,7 @@ fn the_library_makes_the_bytes_of_the_command() {
                 states: vec![1, 6],
                 threads: 2,
             },
-            &(),
+            &Context::default(),
         )
     };
     match merge() {
@@ -116,13 +127,21 @@ fn the_library_makes_the_bytes_of_the_command() {
         other => panic!("{other:?}"),
     }
     assert_eq!(
-        (planned.status().unwrap().done, run(1, &()).finished),
+        (
+            planned.status().unwrap().done,
+            run(1, &Context::default()).finished
+        ),
         (UNITS / 2, UNITS / 2)
     );
     let merged = merge().unwrap();
     assert_eq!(merged.diverged, 0);
     assert_eq!(results(&directory), results(&dir.join("command")));
-    let verified = study::verify(&planned, &VerifyOptions { units: 3, seed: 1 }, &()).unwrap();
+    let verified = study::verify(
+        &planned,
+        &VerifyOptions { units: 3, seed: 1 },
+        &Context::default(),
+    )
+    .unwrap();
     assert_eq!(
         (verified.whole, verified.compared, verified.different.len()),
         (UNITS, 3, 0)
@@ -133,7 +152,13 @@ fn the_library_makes_the_bytes_of_the_command() {
 fn a_dry_run_writes_nothing() {
     let place = place();
     let (file, directory) = (place.path().join("study.toml"), place.path().join("dry"));
-    let made = study::plan(&file, &directory, &options(Writing::DryRun), &()).unwrap();
+    let made = study::plan(
+        &file,
+        &directory,
+        &options(Writing::DryRun),
+        &Context::default(),
+    )
+    .unwrap();
     assert_eq!(made.planned.plan.unit_count(&made.planned.grid), UNITS);
     assert!(!directory.exists());
     assert!(matches!(

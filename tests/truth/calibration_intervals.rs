@@ -2,6 +2,7 @@
 //! it anew, calibrates, and states intervals; those hold what the filter of the true model states, and the errors that
 //! the laboratory's own filter truly has.
 
+use nav_sim::app::Context;
 use nav_sim::calibration::{
     Bootstrap, Estimator, ModelChoice, Outcome, Pool, Settings, calibrate, grouped, infer,
     replicates,
@@ -82,7 +83,7 @@ impl World {
         inputs.model_draws = draws;
         let span = (self.trajectory.start_s(), self.trajectory.end_s());
         let outages = self.scenario.outages_on(span, 0).unwrap().windows;
-        navigate(&inputs, &self.scenario, &outages, 0, &())
+        navigate(&inputs, &self.scenario, &outages, 0, &Context::default())
             .unwrap()
             .summary
     }

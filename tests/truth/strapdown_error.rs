@@ -1,5 +1,6 @@
 //! Integration error of the strapdown: covariance analysis has it as the runs do.
 
+use nav_sim::app::Context;
 use nav_sim::navigation::frames::RollPitchYaw;
 use nav_sim::navigation::metrics::VerdictKind;
 use nav_sim::navigation::scenario::{Method, Scenario};
@@ -58,7 +59,7 @@ fn coning_that_the_rate_does_not_resolve_is_in_the_verdict() {
             &axis(white * 1e-7, 1e-13 / white),
         );
         let inputs = NavigateInputs::new(coning(), model, TrueImu::AsBelieved);
-        navigate(&inputs, &scenario, &outages, 5, &())
+        navigate(&inputs, &scenario, &outages, 5, &Context::default())
             .unwrap()
             .summary
     };

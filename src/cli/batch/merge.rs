@@ -1,7 +1,6 @@
 //! `nav-sim batch merge`: units to tables.
 
 use super::Place;
-use super::watch::Watch;
 use crate::cli::{Failure, Session};
 use crate::report::WIDTH;
 use crate::study::{self, MergeOptions, NamedUnit, Planned, StudyError, Unit};
@@ -36,14 +35,13 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         states,
         threads: session.threads(),
     };
-    let merged =
-        study::merge(&planned, &options, &Watch::new(session, || true)).map_err(|e| match e {
-            StudyError::Incomplete { units, missing } => {
-                list_missing(&planned, units, &missing, session);
-                incomplete(&planned, units, &missing)
-            }
-            e => e.into(),
-        })?;
+    let merged = study::merge(&planned, &options, &session.context()).map_err(|e| match e {
+        StudyError::Incomplete { units, missing } => {
+            list_missing(&planned, units, &missing, session);
+            incomplete(&planned, units, &missing)
+        }
+        e => e.into(),
+    })?;
     let document = &merged.document;
     let text = || {
         if session.verbose() {

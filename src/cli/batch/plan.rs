@@ -1,6 +1,5 @@
 //! `nav-sim batch plan`: inputs checked and hashed, candidates calibrated, units cut.
 
-use super::watch::Watch;
 use super::{Place, duration};
 use crate::cli::{Failure, Session};
 use crate::study::{self, PlanOptions, Planned, Writing};
@@ -40,12 +39,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             Writing::Write
         },
     };
-    let made = study::plan(
-        &args.place.study,
-        &directory,
-        &options,
-        &Watch::new(session, || true),
-    )?;
+    let made = study::plan(&args.place.study, &directory, &options, &session.context())?;
     report(&made.planned, session);
     if made.was_there {
         session.say(format!("{} was planned already", directory.display()));

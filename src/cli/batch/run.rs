@@ -3,6 +3,7 @@
 use super::Place;
 use super::shard;
 use super::watch::Watch;
+use crate::app::Context;
 use crate::cli::{Failure, Session};
 use crate::study::{self, RunOptions, Shard};
 use serde_json::json;
@@ -120,7 +121,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         shard,
         threads: session.threads(),
     };
-    let ran = study::run(&planned, &options, &Watch::new(session, || stop.go_on()))?;
+    let ran = study::run(
+        &planned,
+        &options,
+        &Context::new(&Watch(session, || stop.go_on()), None),
+    )?;
     match (ran.left, stop.failure(ran.left, ran.finished)) {
         (1.., Some(failure)) => Err(failure),
         _ => {

@@ -1,6 +1,5 @@
 //! `nav-sim batch status`: what is done and what is left.
 
-use super::watch::Watch;
 use super::{Place, duration};
 use crate::cli::{Failure, Session};
 use serde_json::json;
@@ -50,5 +49,5 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         duration(status.left_s / plan.estimate.threads.max(1) as f64),
         plan.estimate.threads
     ));
-    Ok(planned.remark_foreign(&Watch::new(session, || true))?)
+    Ok(planned.remark_foreign(&session.context())?)
 }

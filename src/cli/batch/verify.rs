@@ -1,7 +1,6 @@
 //! `nav-sim batch verify`: finished units computed again and compared.
 
 use super::Place;
-use super::watch::Watch;
 use crate::cli::{Failure, Session};
 use crate::study::{self, VerifyOptions};
 use serde_json::json;
@@ -33,7 +32,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         units,
         seed: session.seed(None),
     };
-    let found = study::verify(&planned, &options, &Watch::new(session, || true))?;
+    let found = study::verify(&planned, &options, &session.context())?;
     if session.json() {
         let json = json!({
             "schema_version": 1, "plan": planned.plan.id(), "whole": found.whole, "compared": found.compared,

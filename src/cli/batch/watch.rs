@@ -1,48 +1,30 @@
-//! What the engine of studies says, on the terminal.
+//! A session that can be stopped.
 
-use crate::cli::{Progress, Session};
-use crate::observer::Observer;
-use crate::study::{Importance, Remark};
-use std::sync::OnceLock;
+use crate::app::Front;
+use crate::cli::Session;
+use nav_sim_document::Note;
 
-/// Prints remarks and shows progress.
-pub(super) struct Watch<'a, F: Fn() -> bool + Sync> {
-    session: &'a Session,
-    go_on: F,
-    progress: OnceLock<Progress>,
-}
+/// Goes on as long as `go_on` says so.
+pub(super) struct Watch<'a, F>(pub(super) &'a Session, pub(super) F);
 
-impl<'a, F: Fn() -> bool + Sync> Watch<'a, F> {
-    /// Of work that goes on as long as `go_on` says so.
-    pub(super) const fn new(session: &'a Session, go_on: F) -> Self {
-        Self {
-            session,
-            go_on,
-            progress: OnceLock::new(),
-        }
-    }
-}
-
-impl<F: Fn() -> bool + Sync> Observer<Remark> for Watch<'_, F> {
-    fn remark(&self, remark: &Remark) {
-        match remark.importance {
-            Importance::Detail => self.session.detail(&remark.text),
-            Importance::Note => self.session.say(&remark.text),
-            Importance::Warning => self.session.warn(&remark.text),
-        }
+impl<F: Fn() -> bool + Sync> Front for Watch<'_, F> {
+    fn note(&self, note: Note) {
+        self.0.note(note);
     }
 
-    fn begin(&self, runs: u64) {
-        let _ = self.progress.set(self.session.progress("runs", runs));
+    fn begin(&self, unit: &str, steps: u64) {
+        self.0.begin(unit, steps);
     }
 
-    fn advance(&self, runs: u64) {
-        if let Some(progress) = self.progress.get() {
-            progress.add(runs);
-        }
+    fn advance(&self, steps: u64) {
+        self.0.advance(steps);
+    }
+
+    fn end(&self) {
+        self.0.end();
     }
 
     fn go_on(&self) -> bool {
-        (self.go_on)()
+        (self.1)()
     }
 }

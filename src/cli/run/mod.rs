@@ -1,14 +1,11 @@
 //! `nav-sim run`: the main job.
 
 mod output;
-mod words;
 
 use super::pictures::PlotArgs;
 use super::{Failure, Session};
 use crate::run::RunRequest;
 use std::path::PathBuf;
-
-pub(super) use words::Words;
 
 /// Navigate by INS/GNSS along TRAJECTORY with MODEL in the filter: Monte Carlo or covariance analysis
 ///
@@ -34,20 +31,20 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let words = Words::new(session);
+    let context = session.context();
     let request = RunRequest {
         seed: session.asked_seed(),
         ..args.request.clone()
     };
-    let mut prepared = request.prepare(|| session.seed(None), &words)?;
+    let mut prepared = request.prepare(|| session.seed(None), &context)?;
     prepared.manifest.command = super::given();
     prepared.manifest.threads = session.threads();
     let _own = output::claim(&args.out, &prepared.manifest, session)?;
     let _picture = args
         .plot
         .claim(prepared.manifest.inputs.iter().map(|i| &i.path), session)?;
-    let mut answer = prepared.navigate(&words)?;
-    answer.took(words.runs_s());
+    let mut answer = prepared.navigate(&context)?;
+    answer.took(context.runs_s());
     answer.write(&args.out)?;
     let document = session.answer(&answer);
     args.plot.write(&document, || answer.svg(), session)?;

@@ -1,7 +1,6 @@
 //! `nav-sim trajectory record`.
 
 use super::{Source, wrote};
-use crate::cli::run::Words;
 use crate::cli::{Failure, Session, read};
 use crate::formats::atomic::{AtomicDir, Claim, Found, claim_directory};
 use crate::formats::scenario_file;
@@ -56,7 +55,7 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let file = read::model(&args.model, session)?;
     let model = continuous::at_rate(&file.model, scenario.imu.rate_hz)
         .map_err(|e| Failure::input(format!("{shown}: {e}")))?;
-    make_turn_on(&mut scenario.imu, &file, &args.model, &Words::new(session));
+    make_turn_on(&mut scenario.imu, &file, &args.model, &session.context());
     let seed = session.seed(scenario.run.seed);
     // a recording is what IMU and receiver give: neither barometer nor wheel, no filter
     let scenario = Scenario {
