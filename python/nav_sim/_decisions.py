@@ -77,15 +77,13 @@ def require(
     gnss: Settings | None = None,
     scenario: Settings | None = None,
     vehicle: str | None = None,
-    iso_drift: bool = False,
     catalogue: StrPath | bool | None = None,
     progress: Progress = None,
 ) -> Choice:
     """The IMU that keeps the errors at the end of an outage of a trajectory within limits: `nav-sim require`.
 
     With a `model` it is judged, without one `.model` is what is needed. `outage` is a length (s), a pair of start and
-    end, or "longest", `start` where a length begins (s); `limits` such as "p95_m<=5"; `iso_drift=True` adds a
-    curve of sensors of equal drift; `catalogue=True` ranks the catalogued IMUs, a path those of a directory. `vehicle="car"`
+    end, or "longest", `start` where a length begins (s); `limits` such as "p95_m<=5"; `catalogue=True` ranks the catalogued IMUs, a path those of a directory. `vehicle="car"`
     has it know that it moves neither sideways nor up. `gnss`, `scenario` and
     `progress` as of `run`.
     """
@@ -104,7 +102,6 @@ def require(
             gnss=None if gnss is None else staging.settings(gnss, "gnss"),
             scenario=None if scenario is None else staging.settings(scenario, "scenario"),
             vehicle=vehicle,
-            iso_drift=iso_drift,
             catalogue=_catalogue(catalogue),
         )
 

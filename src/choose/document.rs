@@ -1,8 +1,7 @@
 //! The ranking of candidates: `ranking.json`, and what is said and drawn of it.
 
-use super::{FoldScore, Influence, Mean, Placed, Ranking, ScaleInfluence};
+use super::{FoldScore, Mean, Placed, Ranking};
 use crate::report::Answer;
-use crate::report::comparison_table::in_order;
 use crate::report::dots::{Dots, dot_chart};
 use nav_sim_document::{
     Axis, Cell, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, Tone,
@@ -12,8 +11,6 @@ use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::NEES_DOF;
 use serde::{Serialize, Serializer};
 
-/// Share of the largest influence from which on a scale decides.
-const DECISIVE: f64 = 0.25;
 /// Version of the layout of `ranking.json`.
 const SCHEMA_VERSION: u32 = 1;
 
@@ -22,8 +19,6 @@ const SCHEMA_VERSION: u32 = 1;
 pub(crate) struct ChoiceReport<'a> {
     /// The candidates.
     pub ranking: &'a Ranking,
-    /// What decides the error, where it was asked.
-    pub influence: Option<&'a Influence>,
     /// The recordings that judge no candidate.
     pub abnormal: &'a [String],
     /// The outages at whose ends they are judged.
@@ -60,8 +55,6 @@ struct RankingFile<'a> {
     seed: u64,
     #[serde(flatten)]
     ranking: &'a Ranking,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    influence: Option<&'a Influence>,
 }
 
 impl ChoiceReport<'_> {
@@ -168,9 +161,6 @@ impl ChoiceReport<'_> {
         };
         of_kind("overconfident", &|p| p.nees.ci95.0 > right);
         of_kind("underconfident", &|p| p.nees.ci95.1 < right);
-        for line in self.decisive_scales() {
-            document.note(Importance::Detail, line);
-        }
     }
 
     /// A row for each candidate.
@@ -258,80 +248,6 @@ impl ChoiceReport<'_> {
         )
     }
 
-    /// Which scales of which sensors decide: a line each, those of a quarter of the largest influence or more.
-    pub(crate) fn decisive_scales(&self) -> Vec<String> {
-        let scales = self
-            .influence
-            .map_or(&[][..], |influence| &influence.scales);
-        let largest = scales.iter().map(|s| s.on_error.abs()).fold(0.0, f64::max);
-        let mut lines: Vec<String> = Vec::new();
-        for (i, first) in scales.iter().enumerate() {
-            if scales[..i].iter().any(|s| s.signals == first.signals) {
-                continue;
-            }
-            let of_signals: Vec<_> = scales
-                .iter()
-                .filter(|s| s.signals == first.signals)
-                .collect();
-            // the scales around the one that counts most
-            let decides = |s: &&ScaleInfluence| s.on_error >= DECISIVE * largest;
-            let peak = (0..of_signals.len())
-                .max_by(|a, b| of_signals[*a].on_error.total_cmp(&of_signals[*b].on_error))
-                .unwrap_or(0);
-            let before = of_signals[..peak]
-                .iter()
-                .rev()
-                .take_while(|s| decides(s))
-                .count();
-            let felt: Vec<_> = of_signals[peak - before..]
-                .iter()
-                .take_while(|s| decides(s))
-                .collect();
-            let sum: f64 = of_signals.iter().map(|s| s.on_error).sum();
-            let range = match (felt.first(), felt.last()) {
-                (Some(from), Some(to)) => {
-                    format!(
-                        "mostly from {} to {} s",
-                        readable(from.tau_s),
-                        readable(to.tau_s)
-                    )
-                }
-                _ => "and no scale decides".to_owned(),
-            };
-            lines.push(format!(
-                "{}: 1 % more wavelet variance at all scales is {} % more horizontal error, {range}",
-                first.signals,
-                signed(sum)
-            ));
-        }
-        lines
-    }
-
-    /// What decides: scales and recordings.
-    fn decides(&self, document: &mut Document) {
-        let Some(influence) = self.influence else {
-            return;
-        };
-        document.section("What decides");
-        if !influence.scales.is_empty() {
-            document.chart(&over_scales(&influence.scales), INFLUENCE);
-        }
-        document.text("What each recording adds to the expected horizontal error, to first order, with each way of averaging.");
-        let mut table = Table::new(["recording", "awv (%)", "sr-awv (%)", "dr-awv (%)"]);
-        for (i, r) in influence.recordings.iter().enumerate() {
-            let cell = |value: f64, key: &str| {
-                Cell::number(value, &format!("/influence/recordings/{i}/{key}"))
-            };
-            table.row([
-                r.recording.clone().into(),
-                cell(r.awv_pct, "awv_pct"),
-                cell(r.sr_awv_pct, "sr_awv_pct"),
-                cell(r.dr_awv_pct, "dr_awv_pct"),
-            ]);
-        }
-        document.table(&table);
-    }
-
     /// Log scores, NEES, and errors beside what is believed of them.
     fn charts(&self) -> Vec<Chart> {
         let placed = &self.ranking.candidates;
@@ -416,7 +332,6 @@ impl Serialize for ChoiceReport<'_> {
             outages: self.outages,
             seed: self.seed,
             ranking: self.ranking,
-            influence: self.influence,
         };
         file.serialize(serializer)
     }
@@ -454,13 +369,11 @@ impl Answer for ChoiceReport<'_> {
             "A recording whose points all stand high is described by no candidate.",
         );
         document.table(&self.folds());
-        self.decides(&mut document);
         document
     }
 }
 
 const SCORE: &str = "Log score: the mean log density of the true errors under the filter's covariance, less that of the best. NEES above 9: overconfident. Bars: 95 % intervals over recordings.";
-const INFLUENCE: &str = "Growth of the horizontal error at the ends of outages with the wavelet variance of each scale (% for 1 %).";
 
 /// NEES of each candidate on each recording.
 fn fold_chart(placed: &[Placed], recordings: Vec<String>) -> Chart {
@@ -495,23 +408,6 @@ fn fold_chart(placed: &[Placed], recordings: Vec<String>) -> Chart {
     )
 }
 
-/// Influence over scales, a line a sensor or axis.
-fn over_scales(scales: &[ScaleInfluence]) -> Chart {
-    let signals = in_order(scales.iter().map(|s| s.signals.as_str()));
-    let mut series = vec![Series::new("", Colour::Soft, Mark::Level(0.0))];
-    series.extend(signals.iter().enumerate().map(|(hue, name)| {
-        let of_signals = scales.iter().filter(|s| s.signals == **name);
-        let line = of_signals.map(|s| (s.tau_s, s.on_error)).collect();
-        Series::line(name, Colour::Hue(hue), line)
-    }));
-    let panel = Panel::new(Axis::linear("% of error for 1 %"), series);
-    Chart::new(
-        "Influence of the wavelet variance",
-        Axis::log("scale (s)"),
-        vec![panel],
-    )
-}
-
 /// A number in a table that is wide enough already: two decimals at most.
 fn few(x: f64) -> String {
     let decimals = match x.abs() {
@@ -531,14 +427,4 @@ fn signed_few(x: f64) -> String {
 /// `9.1 [8.0, 10.2]`
 fn interval(value: f64, (low, high): (f64, f64), shown: &dyn Fn(f64) -> String) -> String {
     format!("{} [{}, {}]", shown(value), shown(low), shown(high))
-}
-
-/// A number with its sign.
-fn signed(x: f64) -> String {
-    let shown = readable(x);
-    if x > 0.0 && x.is_finite() {
-        format!("+{shown}")
-    } else {
-        shown
-    }
 }

@@ -128,20 +128,6 @@ impl Drive {
         })
     }
 
-    pub(super) const fn track(&self) -> &Track {
-        &self.track
-    }
-
-    /// What the filter of all states believes of a model.
-    pub(super) fn full_belief(&self, model: &Model) -> Result<Belief, ChoiceError> {
-        let full = self.scenario.with_full_noise();
-        full.belief(model, &self.outages, &self.track)
-            .map_err(|source| ChoiceError::Belief {
-                candidate: "all states".to_owned(),
-                source,
-            })
-    }
-
     /// How many windows as long as the trajectory lie side by side in so many samples.
     pub(crate) fn independent_windows(&self, samples: usize) -> f64 {
         let lasts_s = self.trajectory.end_s() - self.trajectory.start_s();
@@ -284,25 +270,6 @@ impl Drive {
                 .map_err(|source| unfit(candidate, source))
         };
         pairs.par_iter().map(belief).collect()
-    }
-
-    /// Scores of the candidates' models on windows of recordings; none where these are shorter than the trajectory.
-    ///
-    /// # Errors
-    /// When a model has no such filter, or rates do not fit together.
-    pub fn scores(
-        &self,
-        candidates: &[Candidate],
-        models: &[Model],
-        recordings: &[Recording],
-        runs: u64,
-    ) -> Result<Option<Vec<Score>>, ChoiceError> {
-        Ok(self.sampled(
-            &self.beliefs(candidates, models)?,
-            recordings,
-            runs,
-            &|_| (),
-        )?)
     }
 
     /// Every filter on the same windows; none where the recordings are shorter than the trajectory.

@@ -30,7 +30,7 @@ pub(crate) fn claim_choice<'a>(
 ) -> Result<Claim, FileError> {
     let recognise = |text: &str| {
         let present = serde_json::from_str::<serde_json::Value>(text).unwrap_or_default();
-        let is_ours = present["candidates"].is_array() && present["influence"].is_object();
+        let is_ours = present["candidates"].is_array() && present["winner"].is_string();
         Ok(if is_ours {
             Found::Other("holds the result of an earlier choose")
         } else {

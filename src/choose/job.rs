@@ -1,6 +1,6 @@
 //! Static recordings and a trajectory → the noise model that a filter is best made of.
 
-use super::{Candidate, ChoiceError, Contender, Drive, Fold, Influence, Laboratory, Ranking, Unit};
+use super::{Candidate, ChoiceError, Contender, Drive, Fold, Laboratory, Ranking, Unit};
 use crate::app::Context;
 use crate::calibrate::{
     Calibration, CalibrationOptions, EstimatorChoice, Measured, measure, without_warm_up,
@@ -42,8 +42,6 @@ pub struct Chosen {
     pub winner: Candidate,
     /// The winner's calibration of all recordings, before any inflation.
     pub calibration: Calibration,
-    /// What decides the error: scales of its curves, and recordings.
-    pub influence: Influence,
     /// Its noise model.
     pub model: Model,
     /// The recordings that are calibrated on but judge no candidate.
@@ -139,7 +137,6 @@ pub fn choose(
         .map_err(JobError::from)?;
     let calibrated = model_of(&outcomes, settings.rate_hz);
     let model = drive.inflated(&laboratory, None, &winner, &calibrated)?;
-    let influence = drive.influence(&laboratory, &groups, &outcomes, &settings)?;
     let calibration = Calibration {
         groups,
         outcomes,
@@ -160,7 +157,6 @@ pub fn choose(
         ranking,
         winner,
         calibration,
-        influence,
         model,
         abnormal,
         files,

@@ -82,7 +82,6 @@ impl ChoiceMade {
     pub(crate) fn report(&self) -> ChoiceReport<'_> {
         ChoiceReport {
             ranking: &self.chosen.ranking,
-            influence: Some(&self.chosen.influence),
             abnormal: &self.chosen.abnormal,
             outages: &self.outages,
             trajectory: &self.trajectory,

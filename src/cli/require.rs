@@ -11,8 +11,7 @@ use std::path::PathBuf;
 ///
 /// Uses linear covariance analysis along TRAJECTORY of a filter that knows its IMU. Without MODEL it finds the white noise
 /// and bias instability that each sensor may have beside the turn-on biases of [imu] in --scenario. With MODEL it says
-/// whether the limits are kept (exit code 3: they are not), which part of the IMU decides, and the longest outage that it
-/// bridges.
+/// whether the limits are kept (exit code 3: they are not), and the longest outage that it bridges.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:

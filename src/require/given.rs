@@ -5,10 +5,8 @@ use super::question::{
     points_json, quantity_in_words, value,
 };
 use crate::report::Answer;
-use nav_sim_document::{
-    Cell, Colour, Document, Mark, Series, Table, Tone, percent, readable, seconds,
-};
-use nav_sim_navigation::require::{Limit, Margins, PartMargin, Worst};
+use nav_sim_document::{Cell, Colour, Document, Mark, Series, Table, Tone, readable, seconds};
+use nav_sim_navigation::require::{Limit, Margins, Worst};
 use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
 
@@ -154,52 +152,18 @@ impl GivenImu {
             format!("asked: {}", question.in_words()),
             format!("longest outage within the limits, from the same starts: {longest}"),
         ];
-        lines.extend(self.what_decides(margins));
+        lines.push(Self::what_an_imu_may_do(margins));
         lines
     }
 
-    /// The part that decides, and whether a better IMU helps.
-    fn what_decides(&self, margins: &Margins) -> Option<String> {
-        let binding = margins.binding()?;
+    /// Whether a better IMU helps.
+    fn what_an_imu_may_do(margins: &Margins) -> String {
         let without = readable(margins.without_imu.value);
         let name = margins.without_imu.limit.quantity.name();
-        let better = match margins.an_imu_helps() {
+        match margins.an_imu_helps() {
             true => format!("an IMU without errors would leave {name} {without}"),
             false => format!("no IMU keeps the limit: GNSS and start alone leave {name} {without}"),
-        };
-        Some(format!(
-            "{} decides ({}); {better}",
-            binding.part.name(),
-            percent(binding.share)
-        ))
-    }
-
-    fn parts(margins: &Margins) -> Table {
-        let mut table = Table::new([
-            "part of the error",
-            "share",
-            "factor on its sigma that alone meets the limit",
-        ]);
-        let binding = margins.binding().map(|binding| binding.part);
-        for (i, p) in margins.parts.iter().enumerate() {
-            let mark = if Some(p.part) == binding {
-                " (binding)"
-            } else {
-                ""
-            };
-            let factor = match p.factor {
-                Some(factor) => Cell::number(factor, &format!("/parts/{i}/factor")),
-                None if !p.part.is_of_imu() => Cell::figures(""),
-                None if margins.met() => Cell::figures("any value"),
-                None => Cell::figures("none: the rest is too large"),
-            };
-            table.row([
-                (p.part.name() + mark).into(),
-                Cell::share(p.share, &format!("/parts/{i}/share")),
-                factor,
-            ]);
         }
-        table
     }
 
     fn drift_table(&self) -> Table {
@@ -235,10 +199,6 @@ impl Answer for GivenImu {
         if !self.aidings.is_empty() {
             document.section("What the car knows of its own motion");
             document.lead(self.aiding_table());
-        }
-        if let Some(margins) = &self.margins {
-            document.section("Parts of the error");
-            document.lead(Self::parts(margins));
         }
         document.section("Error against the length of an outage");
         for (limit, curve) in self.question.limits.iter().zip(&self.curves) {
@@ -278,16 +238,12 @@ impl Serialize for GivenImu {
             file["aidings"] = self.aidings.iter().map(aided).collect();
         }
         if let Some(margins) = &self.margins {
-            let part = |p: &PartMargin| json!({ "part": p.part.name(), "share": p.share, "factor": p.factor });
             let without = &margins.without_imu;
             file["met"] = json!(margins.met());
             file["quantity"] = json!(margins.worst.limit.quantity.name());
             file["value"] = json!(margins.worst.value);
             file["limit"] = json!(margins.worst.limit.most);
             file["place"] = json!(margins.worst.place);
-            file["parts"] = margins.parts.iter().map(part).collect();
-            file["binding"] = json!(margins.binding().map(|p| p.part.name()));
-            file["share_of_imu"] = json!(margins.share_of_imu());
             file["without_imu_errors"] =
                 json!({ "quantity": without.limit.quantity.name(), "value": without.value });
         }

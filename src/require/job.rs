@@ -54,8 +54,6 @@ const SETTLED_S: f64 = 300.0;
 const TOGETHER_S: f64 = 60_000.0;
 /// Beginnings at least.
 const BEGINNINGS: f64 = 16.0;
-/// Points of a curve of equal drift.
-const POINTS: u32 = 8;
 
 /// An outage that does not lie on the trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -120,11 +118,11 @@ impl Requirements {
         })
     }
 
-    /// The IMU that is needed, and a curve of equal drift if wished.
+    /// The IMU that is needed.
     ///
     /// # Errors
     /// When no IMU keeps the limits, or trajectory and rates do not fit together.
-    pub(crate) fn needed(&self, iso_drift: bool) -> Result<NeededImu, RequireError> {
+    pub(crate) fn needed(&self) -> Result<NeededImu, RequireError> {
         let outages = self.outages();
         let course = self.course(&outages)?;
         let scenario = &self.with_stated_turn_on();
@@ -134,27 +132,22 @@ impl Requirements {
             limits: &self.limits,
             t_corr_s: CORRELATION_TIME_S,
         };
-        let (imu, shares) = need.allocated()?;
+        let imu = need.allocated()?;
         let model = imu.model(self.scenario.imu.rate_hz);
         let ends = course.drifts(scenario, &model)?;
         let worst = Worst::of(&self.limits, &ends).expect("at least one limit and one place");
         let mut needed = NeededImu {
             question: self.question(outages.clone()),
             imu,
-            shares,
             worst,
             alone: [Answer::Any; IMU_PARAMETERS],
             others_better: [Answer::Any; IMU_PARAMETERS],
-            iso_drift: None,
             turn_on: Sensor::ALL.map(|sensor| scenario.imu.turn_on_bias(sensor).unwrap_or(0.0)),
             beyond_linear: self.beyond_linear(scenario, &model, outages[worst.place])?,
         };
         for i in 0..IMU_PARAMETERS {
             needed.alone[i] = need.quite_alone(&imu, i)?;
             needed.others_better[i] = need.alone(&imu, i, 0.1)?;
-        }
-        if iso_drift {
-            needed.iso_drift = Some(need.iso_drift(&imu, POINTS)?);
         }
         Ok(needed)
     }

@@ -2,12 +2,8 @@
 
 use super::question::{BeyondLinear, CHECKED, Question};
 use crate::report::Answer;
-use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Panel, Series, Table, Tone, percent, readable,
-};
-use nav_sim_navigation::require::{
-    Answer as Bound, IMU_PARAMETERS, ImuParameters, IsoDrift, Worst,
-};
+use nav_sim_document::{Cell, Document, Importance, Table, Tone, readable};
+use nav_sim_navigation::require::{Answer as Bound, IMU_PARAMETERS, ImuParameters, Worst};
 use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
 
@@ -18,16 +14,12 @@ pub(crate) struct NeededImu {
     pub question: Question,
     /// With equal shares.
     pub imu: ImuParameters,
-    /// The shares at the limit, and that of GNSS and start.
-    pub shares: [f64; IMU_PARAMETERS + 1],
     /// The hardest limit, and where.
     pub worst: Worst,
     /// What each intensity may be if there were no other.
     pub alone: [Bound; IMU_PARAMETERS],
     /// What each may be if the others are ten times better.
     pub others_better: [Bound; IMU_PARAMETERS],
-    /// The curve of equal drift.
-    pub iso_drift: Option<IsoDrift>,
     /// Turn-on biases that it has: accelerometer (m/s²), gyroscope (rad/s).
     pub turn_on: [f64; 2],
     /// Where the answer is beyond linear theory.
@@ -48,7 +40,6 @@ impl NeededImu {
         let mut table = Table::new([
             "figure",
             "at most, equal shares",
-            "share",
             "if alone",
             "others 10 × better",
         ]);
@@ -57,7 +48,6 @@ impl NeededImu {
             table.row([
                 ImuParameters::NAMES[i].into(),
                 bound(i, &Bound::AtMost(self.imu.values[i]), &pointer("allocated")),
-                Cell::share(self.shares[i], &pointer("share")),
                 bound(i, &self.alone[i], &pointer("alone")),
                 bound(
                     i,
@@ -66,60 +56,16 @@ impl NeededImu {
                 ),
             ]);
         }
-        let of_gnss = Cell::share(self.shares[IMU_PARAMETERS], "/share_of_gnss_and_start");
-        table.row([
-            "GNSS and start".into(),
-            Cell::figures(""),
-            of_gnss,
-            Cell::figures(""),
-            Cell::figures(""),
-        ]);
         table
-    }
-
-    fn iso_drift_section(&self, curve: &IsoDrift, document: &mut Document) {
-        let beside = |i: usize| {
-            let value = readable(ImuParameters::in_datasheets(i, self.imu.values[i]));
-            format!("{} {value}", ImuParameters::NAMES[i])
-        };
-        let held = format!("Beside {} and {}.", beside(1), beside(2));
-        let mut table = Table::new([ImuParameters::NAMES[3], ImuParameters::NAMES[0]]);
-        let mut line = Vec::new();
-        for (k, (bias, walk)) in curve.points.iter().enumerate() {
-            let bias = ImuParameters::in_datasheets(3, *bias);
-            let pointer = |i: usize| format!("/iso_drift/{k}/{i}");
-            table.row([Cell::number(bias, &pointer(0)), bound(0, walk, &pointer(1))]);
-            if let Bound::AtMost(walk) = walk {
-                line.push((bias, ImuParameters::in_datasheets(0, *walk)));
-            }
-        }
-        let series = Series::dotted_line("limit kept exactly", Colour::REAL, line).into();
-        let panel = Panel::new(Axis::log(ImuParameters::NAMES[0]), series);
-        let chart = Chart::new(
-            "IMUs of equal drift",
-            Axis::log(ImuParameters::NAMES[3]),
-            vec![panel],
-        );
-        document.section("Equal drift");
-        document.text(&held);
-        document.table(&table);
-        document.chart(
-            &chart,
-            "Every point of the curve keeps the limit exactly; below and left of it there is room.",
-        );
     }
 }
 
 impl Answer for NeededImu {
     fn document(&self) -> Document {
-        let gnss = percent(self.shares[IMU_PARAMETERS]);
         let lines = [
             format!("needed for {}", self.question.in_words()),
             format!("an IMU {}", self.turn_on_in_words()),
-            format!(
-                "hardest: {}, where GNSS and start take {gnss}",
-                self.question.worst(&self.worst)
-            ),
+            format!("hardest: {}", self.question.worst(&self.worst)),
         ];
         let mut document = Document::new("The IMU that a limit needs", Tone::Good, lines);
         BeyondLinear::note(self.beyond_linear.as_ref(), &mut document);
@@ -133,9 +79,6 @@ impl Answer for NeededImu {
         document.section("Figures, at most");
         document.text("If alone: without any other error of the IMU. Others 10 × better: every other figure ten times smaller.");
         document.lead(self.figures());
-        if let Some(curve) = &self.iso_drift {
-            self.iso_drift_section(curve, &mut document);
-        }
         document.checked(CHECKED);
         document
     }
@@ -147,13 +90,9 @@ impl Serialize for NeededImu {
             json!({
                 "figure": ImuParameters::NAMES[i],
                 "allocated": ImuParameters::in_datasheets(i, self.imu.values[i]),
-                "share": self.shares[i],
                 "alone": bound_json(i, &self.alone[i]),
                 "others_10_times_better": bound_json(i, &self.others_better[i]),
             })
-        };
-        let point = |(bias, walk): &(f64, Bound)| {
-            json!([ImuParameters::in_datasheets(3, *bias), bound_json(0, walk)])
         };
         let file = json!({
             "schema_version": 1,
@@ -161,10 +100,8 @@ impl Serialize for NeededImu {
             "t_corr_s": self.imu.t_corr_s,
             "turn_on_bias": { "accel_m_s2": self.turn_on[0], "gyro_rad_s": self.turn_on[1] },
             "figures": (0..IMU_PARAMETERS).map(figure).collect::<Vec<_>>(),
-            "share_of_gnss_and_start": self.shares[IMU_PARAMETERS],
             "place": self.worst.place,
             "beyond_linear": self.beyond_linear,
-            "iso_drift": self.iso_drift.as_ref().map(|c| c.points.iter().map(point).collect::<Vec<_>>()),
         });
         file.serialize(serializer)
     }

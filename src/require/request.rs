@@ -55,12 +55,9 @@ pub struct RequireRequest {
     /// What the vehicle knows of its own motion: a car moves neither sideways nor up; with MODEL, a table with and without
     #[arg(long, value_name = "KIND", value_parser = parse::one_of::<Vehicle>(&Vehicle::NAMES))]
     pub vehicle: Option<Vehicle>,
-    /// Also print a curve of equal drift: eight gyroscope biases, and the velocity random walk that each allows
-    #[arg(long, conflicts_with = "model")]
-    pub iso_drift: bool,
     /// Rank the catalogued IMUs (`nav-sim datasheet --list`), or those of a directory of entries and model files
     #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = Catalogue::BUILT_IN,
-        conflicts_with_all = ["model", "iso_drift"])]
+        conflicts_with = "model")]
     pub catalogue: Option<Catalogue>,
 }
 
@@ -76,7 +73,6 @@ impl Default for RequireRequest {
             gnss: None,
             scenario: None,
             vehicle: None,
-            iso_drift: false,
             catalogue: None,
         }
     }
@@ -264,7 +260,7 @@ impl RequireRequest {
                 None,
             )),
             (None, None) => {
-                let needed = sought(self.iso_drift, &asked)?;
+                let needed = sought(&asked)?;
                 let file = asked.model_file(&needed);
                 Ok((Found::Needed(Box::new(needed)), Some(file)))
             }
@@ -370,8 +366,8 @@ impl RequireRequest {
 }
 
 /// The IMU that is needed.
-fn sought(iso_drift: bool, requirements: &Requirements) -> Result<NeededImu, Failure> {
-    requirements.needed(iso_drift).map_err(|e| {
+fn sought(requirements: &Requirements) -> Result<NeededImu, Failure> {
+    requirements.needed().map_err(|e| {
         let hint = match e {
             RequireError::Loose { .. } => "a smaller limit, or a longer outage",
             _ => "a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)",

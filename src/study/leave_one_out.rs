@@ -86,7 +86,6 @@ fn ranked(grid: &Grid, place: &Place, seed: u64) -> RankedPlace {
     let [trajectory, _, scenario, gnss, outages] = grid.names(place.cell);
     let report = ChoiceReport {
         ranking: &ranking,
-        influence: None,
         abnormal: &[],
         outages: &place.outages,
         trajectory,

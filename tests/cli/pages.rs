@@ -198,14 +198,8 @@ fn tune_require_and_design_write_a_page_with_the_numbers_they_print() {
             "tune imu.toml --truth worse.toml --trajectory drive.toml --outage 30:40",
             4 * 3 + 2,
         ),
-        (
-            "require drive.toml --outage 10 --p95-m 50 --iso-drift",
-            4 * 3 + 1 + 8,
-        ),
-        (
-            "require drive.toml imu.toml --outage 30:40 --p95-m 50",
-            4 + 2 + 2,
-        ),
+        ("require drive.toml --outage 10 --p95-m 50", 4 * 3),
+        ("require drive.toml imu.toml --outage 30:40 --p95-m 50", 2),
         ("require drive.toml imu.toml --outage longest --p95-m 50", 2),
         (
             "require drive.toml --outage 10 --p95-m 50 --catalogue",

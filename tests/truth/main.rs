@@ -16,7 +16,6 @@ mod alignment;
 mod calibration_intervals;
 mod calibration_truth;
 mod case_study;
-mod choose;
 mod consistency;
 mod correlated;
 mod covariance_truth;

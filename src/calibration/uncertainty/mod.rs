@@ -6,7 +6,6 @@ pub(crate) mod bootstrap;
 mod goodness;
 mod indistinct;
 pub(crate) mod inference;
-mod influence;
 pub(crate) mod intervals;
 pub(crate) mod practical;
 mod sandwich;
@@ -15,5 +14,4 @@ mod varying;
 
 pub use alike::LEVEL as ALIKE_LEVEL;
 pub use bootstrap::Scattering;
-pub use influence::CurveInfluence;
 pub use intervals::{WIDEST, derived_interval};

@@ -162,20 +162,13 @@ pub struct Need<'a> {
     pub t_corr_s: f64,
 }
 
-/// Velocity random walks that keep the limits beside a gyroscope's bias, the other two as allocated.
-#[derive(Debug, Clone, PartialEq)]
-pub struct IsoDrift {
-    /// Bias instability of the gyroscope (rad/s), and what is left for the accelerometer (m/s/√s).
-    pub points: Vec<(f64, Answer)>,
-}
-
 impl Need<'_> {
     /// The IMU that meets the limits with 1.5 thousandths in reserve, its four intensities with equal shares in the
-    /// variance that GNSS and start leave, and these shares with that of GNSS and start at the end.
+    /// variance that GNSS and start leave.
     ///
     /// # Errors
     /// When not even a perfect IMU meets them, or the poorest that is sought does.
-    pub fn allocated(&self) -> Result<(ImuParameters, [f64; IMU_PARAMETERS + 1]), RequireError> {
+    pub fn allocated(&self) -> Result<ImuParameters, RequireError> {
         let start = ImuParameters {
             values: START,
             t_corr_s: self.t_corr_s,
@@ -217,10 +210,7 @@ impl Need<'_> {
         }
         // The rounds end near the limit; one factor common to all then meets it exactly and leaves the shares
         // as they are.
-        imu = self.at_limit(&imu, [1.0; IMU_PARAMETERS])?.1;
-        let (_, squares) = self.squares(&imu)?;
-        let total: f64 = squares.iter().sum();
-        Ok((imu, squares.map(|s| s / total)))
+        Ok(self.at_limit(&imu, [1.0; IMU_PARAMETERS])?.1)
     }
 
     /// What an intensity may be where the others are multiplied by `others`.
@@ -254,29 +244,6 @@ impl Need<'_> {
     /// When the model has no filter.
     pub fn quite_alone(&self, imu: &ImuParameters, which: usize) -> Result<Answer, BeliefError> {
         self.alone(imu, which, NONE)
-    }
-
-    /// For `count` biases of the gyroscope, from a tenth of the allocated to the largest that leaves anything.
-    ///
-    /// # Errors
-    /// When the model has no filter.
-    pub fn iso_drift(&self, imu: &ImuParameters, count: u32) -> Result<IsoDrift, BeliefError> {
-        let largest = match self.alone(&imu.times([NONE, 1.0, 1.0, 1.0]), 3, 1.0)? {
-            // At the largest itself nothing is left for the other intensity: the end of the curve would be
-            // zero.
-            Answer::AtMost(bias) => 0.99 * bias,
-            Answer::Any | Answer::Never => imu.values[3],
-        };
-        let smallest = 0.1 * imu.values[3];
-        let point = |k: u32| {
-            let bias =
-                smallest * (largest / smallest).powf(f64::from(k) / f64::from(count.max(2) - 1));
-            let beside = imu.times([1.0, 1.0, 1.0, bias / imu.values[3]]);
-            Ok((bias, self.alone(&beside, 0, 1.0)?))
-        };
-        Ok(IsoDrift {
-            points: (0..count).map(point).collect::<Result<_, BeliefError>>()?,
-        })
     }
 
     fn worst(&self, imu: &ImuParameters) -> Result<Worst, BeliefError> {

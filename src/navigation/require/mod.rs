@@ -17,8 +17,8 @@ mod imu;
 mod margins;
 
 pub use course::{Course, Drift, evenly};
-pub use imu::{Answer, IMU_PARAMETERS, ImuParameters, IsoDrift, Need};
-pub use margins::{Margins, Part, PartMargin};
+pub use imu::{Answer, IMU_PARAMETERS, ImuParameters, Need};
+pub use margins::Margins;
 
 use crate::ekf::BeliefError;
 use crate::simulation::ExperimentError;

@@ -104,7 +104,7 @@ pub fn scaled(model: &Model, factors: &[Factor]) -> Model {
 }
 
 /// A process whose variance is multiplied.
-pub(crate) fn times(process: &Process, on_variance: f64, rate_hz: f64) -> Process {
+fn times(process: &Process, on_variance: f64, rate_hz: f64) -> Process {
     let (name, value) = amplitude(process);
     // a drift has an amplitude, the others a variance
     let factor = if matches!(process, Process::Drift(_)) {

@@ -51,7 +51,6 @@ mod tune;
 
 pub(crate) use branch::{Moments, errors_in_outages};
 pub use consistency::{Departure, DrawFactors, FilterConsistency, UpperEnd};
-pub(crate) use factor::times;
 pub use factor::{Factor, scaled};
 pub use heading::{HeadingDoubt, weak_heading};
 pub use pass::{
