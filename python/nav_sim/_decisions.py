@@ -34,7 +34,6 @@ def tune(
     trajectory: AnyTrajectory | None = None,
     outages: Outages = None,
     aim: str | None = None,
-    per: str | None = None,
     filter: str | int | None = None,
     scenario: Settings | None = None,
     seed: int | None = None,
@@ -44,7 +43,7 @@ def tune(
 
     `truth` are models that may make the errors, such as those of single recordings, by default the model with the
     errors in the scenario; `intervals=True` takes the draws of its own calibration instead. `aim` is "worst" or "mean"
-    (the option --for), `per` "sensor" or "process". Without a `trajectory` it is a drive of the program's own;
+    (the option --for). Without a `trajectory` it is a drive of the program's own;
     `outages`, `filter`, `scenario`, `seed` and `progress` as of `run`. `.model` is the tuned one.
     """
     truths = truth or [] if isinstance(truth, (list, tuple, type(None))) else [truth]
@@ -59,7 +58,6 @@ def tune(
             intervals=intervals,
             trajectory=None if trajectory is None else _trajectory.staged(trajectory, staging),
             outage=windows(outages),
-            per=per,
             filter=states(filter),
             scenario=None if scenario is None else staging.settings(scenario, "scenario"),
             seed=seed,

@@ -12,7 +12,7 @@ use nav_sim_navigation::sensors::imu::{Truth, TruthError};
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::ExperimentError;
 use nav_sim_navigation::simulation::lincov::{
-    Aim, Factor, FilterPass, Per, Task, Track, TrueErrors, TruthSide, scaled,
+    Aim, Factor, FilterPass, Task, Track, TrueErrors, TruthSide, scaled,
 };
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::{Recording, Sensor};
@@ -247,7 +247,6 @@ impl Drive {
             full: &full,
             // a reduced filter is made so that it is as honest as the full one
             filter: &full,
-            per: Per::Sensor,
             aim: Aim::Mean,
             allow_smaller: true,
         };
@@ -332,7 +331,6 @@ fn uncalibrated(candidate: &Candidate, source: CalibrationError) -> ChoiceError 
 fn tenfold(model: &Model) -> Model {
     let factors = Sensor::ALL.map(|sensor| Factor {
         sensor,
-        process: None,
         on_variance: 100.0,
     });
     scaled(model, &factors)

@@ -312,7 +312,7 @@ mod tests {
              recordings = { gaps = 'split', reading = { skip_s = 'auto', rate_hz = 100.0 } }",
         );
         is_a_file_too::<crate::tune::TuneRequest>(
-            "x m --truth a b --for mean --per process --outage none",
+            "x m --truth a b --for mean --outage none",
             "model = 'm'\ntruth = ['a', 'b']\nfor = 'mean'\nper = 'process'\noutage = ['none']",
         );
         is_a_file_too::<crate::tune::TuneRequest>("x m", "model = 'm'");

@@ -19,7 +19,7 @@ Examples:
   nav-sim tune calib_data/tactical.toml --for mean \\
       --truth calib_data/tactical.toml calib_data/consumer_mems.toml \\
       --trajectory trajectories/figure_eight.toml --outage 60:90
-  nav-sim tune calib_data/tactical.toml --per process --format json \\
+  nav-sim tune calib_data/tactical.toml --filter 15 --format json \\
       --truth calib_data/consumer_mems.toml")]
 pub(crate) struct Args {
     #[command(flatten)]

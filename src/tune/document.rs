@@ -1,16 +1,11 @@
-//! Document of a tuning: factors and their cost, the filters beside one another, how sharp the answer is.
+//! Document of a tuning: factors and their cost, the filters beside one another.
 
 use super::result::{TuneResult, kind};
 use crate::report::Answer;
-use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone, readable,
-    seconds, short_names,
-};
+use nav_sim_document::{Cell, Document, Importance, Table, Tone, readable, seconds, short_names};
 use nav_sim_navigation::metrics::VerdictKind;
 use nav_sim_navigation::simulation::lincov::{Aim, FilterConsistency};
 use nav_sim_navigation::simulation::{NEES_DOF, REPORTED_NAMES};
-
-const SWEEP: &str = "The tuned filter with all its variances times a factor (1: as tuned). Cost: horizontal RMSE at the ends of outages against a filter that knows the truth.";
 
 impl Answer for TuneResult {
     fn document(&self) -> Document {
@@ -47,8 +42,6 @@ impl Answer for TuneResult {
         document.text("RMSE/sigma: largest error over what the filter states. RMSE: horizontal, at the end of an outage.");
         document.section("Factors");
         document.table(&self.factor_table());
-        document.section("How sharp the answer is");
-        document.chart(&self.sweep_chart(), SWEEP);
         document.checked("covariance analysis against 2000 Monte-Carlo runs: docs/validation.md.");
         document
     }
@@ -102,47 +95,16 @@ impl TuneResult {
     fn factor_table(&self) -> Table {
         let mut table = Table::new([
             "sensor",
-            "process",
             "factor on the variance",
             "on the standard deviation",
         ]);
         for (i, f) in self.factors.iter().enumerate() {
             table.row([
                 f.sensor.name().into(),
-                f.process.clone().unwrap_or_else(|| "all".to_owned()).into(),
                 Cell::number(f.on_variance, &format!("/factors/{i}/on_variance")),
                 Cell::figures(readable(f.on_variance.sqrt())),
             ]);
         }
         table
-    }
-
-    fn sweep_chart(&self) -> Chart {
-        let curve = |value: &dyn Fn(&FilterConsistency) -> f64| {
-            let points = self
-                .sweep
-                .iter()
-                .map(|(factor, found)| (*factor, value(found)));
-            Series::line("tuned × factor", Colour::REAL, points.collect())
-        };
-        let right = |y: f64| Series::new("right", Colour::RIGHT, Mark::Level(y));
-        let nees = Axis::log(&format!("NEES ({NEES_DOF} if right)"));
-        let mut panels = vec![
-            Panel::new(nees, vec![right(NEES_DOF as f64), curve(&|h| h.nees)]),
-            Panel::new(
-                Axis::log("largest RMSE/sigma"),
-                vec![right(1.0), curve(&|h| h.largest.ratio)],
-            ),
-        ];
-        if !self.after.end_s.is_empty() {
-            let cost = vec![curve(&|h| 100.0 * self.cost(h))];
-            panels.push(Panel::new(Axis::linear("cost (%)").with_zero(), cost));
-        }
-        panels.iter_mut().for_each(|panel| panel.height = 0.7);
-        Chart::new(
-            "Consistency and cost against the variances",
-            Axis::log("factor on all variances"),
-            panels,
-        )
     }
 }

@@ -9,8 +9,7 @@ use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
-    Aim, DrawFactors, Factor, FilterConsistency, Per, Task, Track, TrueErrors, UpperEnd,
-    aiding_factor, scaled,
+    Aim, Factor, Task, Track, TrueErrors, UpperEnd, aiding_factor, scaled,
 };
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Model;
@@ -29,8 +28,6 @@ pub(crate) struct TuneInputs<'a> {
     pub outages: &'a [Outage],
     /// The filter that is made consistent.
     pub states: FilterStates,
-    /// What has a factor of its own.
-    pub per: Per,
     /// Condition under which the filter is consistent.
     pub aim: Aim,
 }
@@ -56,7 +53,6 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
         track,
         outages,
         states,
-        per,
         aim,
         ..
     } = inputs;
@@ -102,7 +98,6 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
         track: analysed,
         full: &full,
         filter: &tuned,
-        per: *per,
         aim: *aim,
         allow_smaller: false,
     };
@@ -111,10 +106,10 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
         .iter()
         .map(|f| Factor {
             on_variance: 1.0,
-            ..f.clone()
+            ..*f
         })
         .collect();
-    let (after, draw_factors) = task.consistency_and_draws(task.filter, &factors)?;
+    let after = task.consistency(task.filter, &factors)?;
     Ok(TuneResult {
         filter: *states,
         filter_of_run,
@@ -138,7 +133,6 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
                 })
             })
             .transpose()?,
-        sweep: sweep(&task, &factors, draw_factors.as_ref())?,
         factors,
         truths: truths.names.clone(),
         is_drawn: truths.stretch.is_some(),
@@ -167,27 +161,6 @@ fn knowing(scenario: &Scenario, imu: &ImuSettings) -> Scenario {
         (*bias, *scale) = (known.0.or(*bias), known.1.or(*scale));
     }
     knowing
-}
-
-/// The tuned filter with all its variances times 1/16, 1/8, … 16; what draws add is as for the tuned one.
-fn sweep(
-    task: &Task<'_>,
-    factors: &[Factor],
-    draw_factors: Option<&DrawFactors>,
-) -> Result<Vec<(f64, FilterConsistency)>, BeliefError> {
-    let times = |power: i32| {
-        let on_variances = f64::from(power).exp2();
-        let scaled = |f: &Factor| Factor {
-            on_variance: f.on_variance * on_variances,
-            ..f.clone()
-        };
-        let factors: Vec<Factor> = factors.iter().map(scaled).collect();
-        Ok((
-            on_variances,
-            task.consistency_with(task.filter, &factors, draw_factors)?,
-        ))
-    };
-    (-4..=4).map(times).collect()
 }
 
 /// The tuned model, and where it came from; `goal`: the aim and what was taken for true.

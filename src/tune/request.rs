@@ -15,7 +15,7 @@ use crate::run::{OutageFlag, checked_scenario, no_filter};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_navigation::simulation::lincov::{Aim, Per, Track, TrueErrors, drive};
+use nav_sim_navigation::simulation::lincov::{Aim, Track, TrueErrors, drive};
 use nav_sim_signal::noise::Model;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -45,10 +45,6 @@ pub struct TuneRequest {
     #[arg(long = "for", value_name = "AIM", value_parser = parse::one_of::<Aim>(&Aim::NAMES), default_value_t)]
     #[serde(rename = "for", with = "parse::text")]
     pub aim: Aim,
-    /// Whether each sensor or each process has a factor of its own
-    #[arg(long, value_name = "WHAT", value_parser = parse::one_of::<Per>(&Per::NAMES), default_value_t)]
-    #[serde(with = "parse::text")]
-    pub per: Per,
     /// Filter to tune: full, 15 or 21 (these take longer); the filter that `run` makes by default is assessed too
     #[arg(long, value_name = "STATES", default_value = "full")]
     pub filter: FilterStates,
@@ -69,7 +65,6 @@ impl Default for TuneRequest {
             trajectory: None,
             outages: Vec::new(),
             aim: Aim::default(),
-            per: Per::default(),
             filter: FilterStates::Full,
             scenario: None,
             seed: None,
@@ -113,7 +108,6 @@ impl TuneRequest {
             track: &track,
             outages: &outages,
             states: self.filter,
-            per: self.per,
             aim: self.aim,
         });
         let result =

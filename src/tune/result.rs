@@ -33,8 +33,6 @@ pub(crate) struct TuneResult {
     pub of_run: Option<FilterConsistency>,
     /// A filter that knows the truth, each truth its own; none where there are errors of which no filter has states.
     pub informed: Option<FilterConsistency>,
-    /// The tuned filter with all its variances times a factor: how sharp the answer is.
-    pub sweep: Vec<(f64, FilterConsistency)>,
     /// Names of the truths; of draws one for all.
     pub truths: Vec<String>,
     /// Condition under which the filter counts as consistent.
@@ -194,12 +192,6 @@ impl Serialize for TuneResult {
             truth: self.worst_truth(found).to_owned(),
             outage_end: found.end_s.iter().zip(&found.rmse_end).map(end).collect(),
         };
-        let swept = |(on_variances, found): &(f64, FilterConsistency)| SweepEntry {
-            on_variances: *on_variances,
-            nees: found.nees,
-            largest_ratio: found.largest.ratio,
-            horizontal_rmse_cost: self.cost(found),
-        };
         let file = TuneFile {
             schema_version: 1,
             verdict: self.verdict().join("; "),
@@ -208,7 +200,6 @@ impl Serialize for TuneResult {
             truths: &self.truths,
             horizontal_rmse_cost: self.cost(&self.after),
             filters: self.filters().map(filter).collect(),
-            sweep: self.sweep.iter().map(swept).collect(),
         };
         file.serialize(serializer)
     }
@@ -236,22 +227,10 @@ fn filter_name(states: FilterStates) -> String {
     }
 }
 
-/// `gyro RW × 4.02, accel × 1.59`; of many the largest.
+/// `gyro × 4.02, accel × 1.59`
 fn factors_in_words(changed: &[&Factor]) -> String {
-    let word = |f: &&Factor| {
-        let process = f
-            .process
-            .as_ref()
-            .map_or(String::new(), |p| format!(" {p}"));
-        format!("{}{process} × {}", f.sensor.name(), readable(f.on_variance))
-    };
-    let larger = |a: &&&Factor, b: &&&Factor| a.on_variance.total_cmp(&b.on_variance);
-    match changed.iter().max_by(larger) {
-        Some(largest) if changed.len() > 3 => {
-            format!("{} factors up to {}", changed.len(), word(largest))
-        }
-        _ => changed.iter().map(word).collect::<Vec<_>>().join(", "),
-    }
+    let word = |f: &&Factor| format!("{} × {}", f.sensor.name(), readable(f.on_variance));
+    changed.iter().map(word).collect::<Vec<_>>().join(", ")
 }
 
 #[derive(Serialize)]
@@ -265,16 +244,6 @@ struct TuneFile<'a> {
     truths: &'a [String],
     horizontal_rmse_cost: f64,
     filters: Vec<FilterEntry>,
-    sweep: Vec<SweepEntry>,
-}
-
-/// The tuned filter with all its variances times a factor.
-#[derive(Serialize)]
-struct SweepEntry {
-    on_variances: f64,
-    nees: f64,
-    largest_ratio: f64,
-    horizontal_rmse_cost: f64,
 }
 
 /// A factor in files.
@@ -282,23 +251,14 @@ struct SweepEntry {
 pub(super) struct FactorEntry {
     /// `accel` or `gyro`.
     sensor: &'static str,
-    /// Label of the process; none: all of the sensor's.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    process: Option<String>,
     on_variance: f64,
 }
 
 impl FactorEntry {
     pub(super) fn of(factor: &Factor) -> Self {
-        let Factor {
-            sensor,
-            process,
-            on_variance,
-        } = factor.clone();
         Self {
-            sensor: sensor.name(),
-            process,
-            on_variance,
+            sensor: factor.sensor.name(),
+            on_variance: factor.on_variance,
         }
     }
 }

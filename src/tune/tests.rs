@@ -28,7 +28,6 @@ fn result(filter: FilterStates, of_run: FilterConsistency) -> TuneResult {
         filter_of_run: FilterStates::Reduced15,
         factors: vec![Factor {
             sensor: Sensor::Gyro,
-            process: None,
             on_variance: 4.0,
         }],
         before: consistency(2.0, 30.0),
@@ -39,7 +38,6 @@ fn result(filter: FilterStates, of_run: FilterConsistency) -> TuneResult {
         is_drawn: false,
         aim: Aim::Worst,
         without_factor: Vec::new(),
-        sweep: Vec::new(),
     }
 }
 

@@ -10,9 +10,10 @@ use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::navigation::trajectory::profile::{
     Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
 };
+use nav_sim::signal::imu::Sensor;
 use nav_sim::signal::noise::{Composite, Model, Process, RandomWalk, White};
 use nav_sim_navigation::simulation::lincov::{
-    Aim, Factor, Filter, Per, Task, Track, TrueErrors, scaled,
+    Aim, Factor, Filter, Task, Track, TrueErrors, scaled,
 };
 
 const OUTAGES: [Outage; 1] = [Outage {
@@ -97,7 +98,7 @@ impl Drive {
         self.scenario.belief(model, &OUTAGES, &self.track).unwrap()
     }
 
-    fn factors(&self, truths: &[Model], per: Per, aim: Aim) -> Vec<Factor> {
+    fn factors(&self, truths: &[Model], aim: Aim) -> Vec<Factor> {
         let filter: &Filter<'_> =
             &|model: &Model| self.scenario.belief(model, &OUTAGES, &self.track);
         let model = &model(1.0, 1.0);
@@ -113,7 +114,6 @@ impl Drive {
             track: &self.track,
             full: filter,
             filter,
-            per,
             aim,
             allow_smaller: false,
         };
@@ -147,17 +147,23 @@ impl Drive {
     }
 }
 
-/// The process that is four times as large is multiplied by four, the others are left alone. The sum of the NEES of
+/// The sensor whose variances are four times as large is multiplied by four, the other is left alone. The sum of the NEES of
 /// 100 runs is chi-square of 900 degrees: 9 ± 0.42 for one, where four deviations are passed by chance with p = 1e-4.
 #[test]
-fn four_times_the_random_walk_is_found_and_runs_agree() {
+fn a_sensor_four_times_as_noisy_is_found_and_runs_agree() {
     let drive = drive();
-    let truth = model(1.0, 4.0);
-    let factors = drive.factors(std::slice::from_ref(&truth), Per::Process, Aim::Mean);
+    let four = Factor {
+        sensor: Sensor::Gyro,
+        on_variance: 4.0,
+    };
+    let truth = scaled(&model(1.0, 1.0), &[four]);
+    let factors = drive.factors(std::slice::from_ref(&truth), Aim::Mean);
     for factor in &factors {
-        let walk_of_gyro =
-            factor.sensor.name() == "gyro" && factor.process.as_deref() == Some("RW");
-        let expected = if walk_of_gyro { 4.0 } else { 1.0 };
+        let expected = if factor.sensor == Sensor::Gyro {
+            4.0
+        } else {
+            1.0
+        };
         assert!(
             (factor.on_variance / expected - 1.0).abs() < 0.05,
             "{factors:?}"
@@ -174,9 +180,9 @@ fn four_times_the_random_walk_is_found_and_runs_agree() {
 fn a_model_that_is_true_needs_no_factor() {
     let drive = drive();
     for aim in [Aim::Mean, Aim::Worst] {
-        let factors = drive.factors(&[model(1.0, 1.0)], Per::Process, aim);
+        let factors = drive.factors(&[model(1.0, 1.0)], aim);
         assert!(
-            factors.iter().all(|f| f.on_variance == 1.0) && factors.len() == 4,
+            factors.iter().all(|f| f.on_variance == 1.0) && factors.len() == 2,
             "{factors:?}"
         );
     }
@@ -194,7 +200,7 @@ fn a_tuned_filter_is_honest_over_the_run_as_a_verdict_judges_it() {
         ])
     };
     let truth = Model::pooled(100.0, &axis(1e-4, 1e-10), &axis(1e-6, 1e-12));
-    let factors = drive.factors(std::slice::from_ref(&truth), Per::Sensor, Aim::Worst);
+    let factors = drive.factors(std::slice::from_ref(&truth), Aim::Worst);
     let belief = drive.belief(&scaled(&model(1.0, 1.0), &factors));
     let experiment =
         drive
@@ -216,7 +222,7 @@ fn a_tuned_filter_is_honest_over_the_run_as_a_verdict_judges_it() {
 fn the_worst_of_two_truths_is_covered() {
     let drive = drive();
     let truths = [model(4.0, 1.0), model(1.0, 4.0)];
-    let factors = drive.factors(&truths, Per::Sensor, Aim::Worst);
+    let factors = drive.factors(&truths, Aim::Worst);
     assert!(
         factors.len() == 2 && factors.iter().all(|f| (2.0..6.0).contains(&f.on_variance)),
         "{factors:?}"
@@ -228,7 +234,7 @@ fn the_worst_of_two_truths_is_covered() {
 fn no_factor_is_larger_than_it_must_be() {
     let drive = drive();
     let truth = model(9.0, 4.0);
-    let factors = drive.factors(std::slice::from_ref(&truth), Per::Sensor, Aim::Worst);
+    let factors = drive.factors(std::slice::from_ref(&truth), Aim::Worst);
     let largest = |factors: &[Factor]| {
         let belief = drive.belief(&scaled(&model(1.0, 1.0), factors));
         let experiment =

@@ -117,7 +117,7 @@ impl Departure {
 
 /// What draws add to the first truth under a filter, as factors; they hardly depend on the filter.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DrawFactors {
+pub(super) struct DrawFactors {
     /// The upper end of each ratio, in the order of [`departures`].
     ratios: Vec<f64>,
     /// The same of the ratios over the whole run.

@@ -51,7 +51,9 @@ impl Damped<'_> {
             return None;
         }
         for _ in 0..self.iterations {
-            let model = self.quadratic(&x, &value);
+            let Some(model) = self.quadratic(&x, &value) else {
+                break;
+            };
             let Some((next, next_value)) = self.descend(&x, &value, &model, &mut damping) else {
                 break;
             };
@@ -64,7 +66,7 @@ impl Damped<'_> {
         Some(x.as_slice().to_vec())
     }
 
-    fn quadratic(&self, x: &DVector<f64>, here: &Value) -> Quadratic {
+    fn quadratic(&self, x: &DVector<f64>, here: &Value) -> Option<Quadratic> {
         let beside = |i: usize| {
             let mut beside = x.clone();
             beside[i] += DIFFERENCE;
@@ -73,6 +75,9 @@ impl Damped<'_> {
         // One-sided: half the evaluations of central differences, each of which is a pass along the whole
         // track.
         let beside: Vec<Value> = (0..x.len()).into_par_iter().map(beside).collect();
+        if beside.iter().any(|value| !value.cost.is_finite()) {
+            return None;
+        }
         let slope = |i: usize, k: usize| {
             let (here, there) = (here.parts[i], beside[k].parts[i]);
             here.curvature.sqrt() * (there.value - here.value) / DIFFERENCE
@@ -83,7 +88,7 @@ impl Damped<'_> {
         let gradient = DVector::from_fn(x.len(), |i, _| {
             (beside[i].cost - here.cost) / DIFFERENCE - 0.5 * DIFFERENCE * hessian[(i, i)]
         });
-        Quadratic { gradient, hessian }
+        Some(Quadratic { gradient, hessian })
     }
 
     /// The step that gains, damped until it does; none where it has nothing to gain.

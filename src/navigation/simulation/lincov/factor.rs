@@ -1,17 +1,14 @@
 //! Factors on the variances of a noise model.
 
-use super::tune::Per;
 use crate::imu::{Channel, Sensor};
 use crate::noise::{Model, Process};
 
 /// What is multiplied, and by what.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Factor {
     /// The sensor.
     pub sensor: Sensor,
-    /// Label of the process, as [`crate::noise::Composite::labels`]; none: all of the sensor's.
-    pub process: Option<String>,
-    /// The factor on its variance.
+    /// The factor on the variances of all its processes.
     pub on_variance: f64,
 }
 
@@ -26,32 +23,19 @@ impl Factor {
 /// Largest logarithm of a factor.
 pub(super) const MAX_LN: f64 = 12.0;
 
-/// The factors of a model, all 1. Processes without amplitude have none, nor has quantization noise, which no
-/// filter contains.
-pub(super) fn multiplied(model: &Model, per: Per) -> Vec<Factor> {
-    let mut factors: Vec<Factor> = Vec::new();
-    for channel in Channel::ALL {
-        let axis = model.axis(channel);
-        for (_, label) in axis
-            .processes
-            .iter()
-            .zip(axis.labels())
-            .filter(|(p, _)| is_felt(p))
-        {
-            let process = (per == Per::Process).then_some(label);
-            if !factors
-                .iter()
-                .any(|f| f.sensor == channel.sensor && f.process == process)
-            {
-                factors.push(Factor {
-                    sensor: channel.sensor,
-                    process,
-                    on_variance: 1.0,
-                });
-            }
-        }
-    }
-    factors
+/// The factors of a model, all 1: of the sensors with noise that a filter models.
+pub(super) fn multiplied(model: &Model) -> Vec<Factor> {
+    let has_noise = |sensor: &Sensor| {
+        Channel::ALL
+            .into_iter()
+            .filter(|channel| channel.sensor == *sensor)
+            .any(|channel| model.axis(channel).processes.iter().any(is_felt))
+    };
+    let one = |sensor| Factor {
+        sensor,
+        on_variance: 1.0,
+    };
+    Sensor::ALL.into_iter().filter(has_noise).map(one).collect()
 }
 
 /// Whether a filter models the process and its amplitude is not zero.
@@ -80,7 +64,7 @@ pub(super) fn set(factors: &[Factor], ln: &[f64]) -> Vec<Factor> {
         .zip(ln)
         .map(|(f, ln)| Factor {
             on_variance: ln.exp(),
-            ..f.clone()
+            ..*f
         })
         .collect()
 }
@@ -90,12 +74,11 @@ pub(super) fn set(factors: &[Factor], ln: &[f64]) -> Vec<Factor> {
 pub fn scaled(model: &Model, factors: &[Factor]) -> Model {
     let mut scaled = model.clone();
     for channel in Channel::ALL {
-        let axis = &mut scaled.axes[channel.index()];
-        for (process, label) in axis.processes.iter_mut().zip(model.axis(channel).labels()) {
-            let own = |f: &&Factor| {
-                f.sensor == channel.sensor && f.process.as_ref().is_none_or(|p| *p == label)
-            };
-            if let Some(factor) = factors.iter().find(own).filter(|_| is_felt(process)) {
+        let Some(factor) = factors.iter().find(|f| f.sensor == channel.sensor) else {
+            continue;
+        };
+        for process in &mut scaled.axes[channel.index()].processes {
+            if is_felt(process) {
                 *process = times(process, factor.on_variance, model.rate_hz);
             }
         }

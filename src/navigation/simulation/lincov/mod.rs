@@ -33,7 +33,6 @@ mod branch;
 mod column;
 mod consistency;
 mod damped;
-mod descent;
 mod errors;
 mod factor;
 mod heading;
@@ -50,7 +49,7 @@ mod truth;
 mod tune;
 
 pub(crate) use branch::{Moments, errors_in_outages};
-pub use consistency::{Departure, DrawFactors, FilterConsistency, UpperEnd};
+pub use consistency::{Departure, FilterConsistency, UpperEnd};
 pub use factor::{Factor, scaled};
 pub use heading::{HeadingDoubt, weak_heading};
 pub use pass::{
@@ -60,4 +59,4 @@ pub use reduce::{Alike, drive, reduced_belief};
 pub(crate) use root::Crossing;
 pub use track::Track;
 pub use truth::{DRIFT, NamedSource, STRAPDOWN, TrueErrors, TruthSide};
-pub use tune::{Aim, Filter, Per, Task, aiding_factor};
+pub use tune::{Aim, Filter, Task, aiding_factor};

@@ -180,7 +180,7 @@ const MAX_LN: f64 = 6.0;
 /// A step that gains less is the last: 2e-3 of divergence is 1 % in each of nine standard deviations.
 const ENOUGH: f64 = 2e-3;
 /// Share of the outage ends in the cost.
-const ENDS: f64 = 0.3;
+pub(super) const ENDS: f64 = 0.3;
 /// A ratio whose logarithm is this far from 0 begins to count for itself, with this weight.
 const OFF: f64 = 0.08;
 const OFF_WEIGHT: f64 = 0.4;

@@ -6,10 +6,10 @@
 //! on all of them makes the filter exactly consistent.
 
 use super::consistency::{DrawFactors, FilterConsistency, UpperEnd};
-use super::descent::Descent;
+use super::damped::{Damped, Part, Value};
 use super::factor::{Factor, MAX_LN, multiplied, scaled, set};
 use super::pass::{Assessment, FilterPass};
-use super::reduce::divergence;
+use super::reduce::{ENDS, divergence};
 use super::root::Crossing;
 use super::track::Track;
 use super::truth::TrueErrors;
@@ -21,18 +21,6 @@ use rayon::prelude::*;
 
 /// How a model becomes a filter.
 pub type Filter<'a> = dyn Fn(&Model) -> Result<Belief, BeliefError> + Sync + 'a;
-
-/// What has a factor of its own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Per {
-    /// Each sensor: all its processes share one.
-    #[default]
-    Sensor,
-    /// Each process of each sensor, its axes together.
-    Process,
-}
-
-nav_sim_signal::named!(Per { Sensor = "sensor", Process = "process" });
 
 /// Condition under which a filter counts as consistent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -61,8 +49,6 @@ pub struct Task<'a> {
     pub full: &'a Filter<'a>,
     /// The filter that is made consistent in the end.
     pub filter: &'a Filter<'a>,
-    /// What has a factor.
-    pub per: Per,
     /// Condition under which it is consistent.
     pub aim: Aim,
     /// Whether a factor may be below 1.
@@ -93,7 +79,7 @@ impl Task<'_> {
     /// # Errors
     /// When the model has no such filter.
     pub fn factors(&self) -> Result<Vec<Factor>, BeliefError> {
-        let mut factors = multiplied(self.model, self.per);
+        let mut factors = multiplied(self.model);
         // Asked for its error alone: inside the search a model without a filter is only an infinite cost.
         (self.full)(self.model)?;
         let (consistency, mut draw_factors) = self.consistency_and_draws(self.filter, &factors)?;
@@ -120,7 +106,7 @@ impl Task<'_> {
     #[must_use]
     pub fn without_factor(&self) -> Vec<Sensor> {
         let has_factor = |model: &Model, sensor: &Sensor| {
-            multiplied(model, Per::Sensor)
+            multiplied(model)
                 .iter()
                 .any(|factor| factor.sensor == *sensor)
         };
@@ -138,13 +124,19 @@ impl Task<'_> {
         draw_factors: Option<&DrawFactors>,
     ) -> Result<Vec<Factor>, BeliefError> {
         let track = self.track.coarse();
-        let cost = |ln: &[f64]| {
-            let ridge = RIDGE * ln.iter().map(|x| x * x).sum::<f64>();
-            self.cost(&set(factors, ln), &track, draw_factors) + ridge
+        let value = |ln: &[f64]| {
+            let bent = |x: &f64| Part {
+                value: *x,
+                curvature: 2.0 * RIDGE,
+            };
+            let mut value = self.value(&set(factors, ln), &track, draw_factors);
+            value.cost += RIDGE * ln.iter().map(|x| x * x).sum::<f64>();
+            value.parts.extend(ln.iter().map(bent));
+            value
         };
         let low = if self.allow_smaller { -MAX_LN } else { 0.0 };
-        let descent = Descent {
-            cost: &cost,
+        let descent = Damped {
+            value: &value,
             bounds: (low, MAX_LN),
             iterations: ITERATIONS,
             enough: ENOUGH,
@@ -157,7 +149,7 @@ impl Task<'_> {
         let alike = exact(&unchanged)?;
         let near = descent.minimum(unchanged.clone()).unwrap_or(unchanged);
         let best = match descent.minimum(alike) {
-            Some(far) if cost(&far) < cost(&near) - VISIBLE => far,
+            Some(far) if value(&far).cost < value(&near).cost - VISIBLE => far,
             _ => near,
         };
         let mut best = exact(&best)?;
@@ -200,7 +192,7 @@ impl Task<'_> {
     ///
     /// # Errors
     /// When the model has no such filter.
-    pub fn consistency_and_draws(
+    pub(super) fn consistency_and_draws(
         &self,
         filter: &Filter<'_>,
         factors: &[Factor],
@@ -218,7 +210,7 @@ impl Task<'_> {
     ///
     /// # Errors
     /// When the model has no such filter.
-    pub fn consistency_with(
+    pub(super) fn consistency_with(
         &self,
         filter: &Filter<'_>,
         factors: &[Factor],
@@ -268,31 +260,55 @@ impl Task<'_> {
             .collect()
     }
 
-    /// Mean divergence over the truths, and what no error may be.
-    fn cost(&self, factors: &[Factor], track: &Track, draw_factors: Option<&DrawFactors>) -> f64 {
+    /// Mean divergence over the truths and the cost of errors that are larger than stated; infinite where the model has no
+    /// filter.
+    fn value(
+        &self,
+        factors: &[Factor],
+        track: &Track,
+        draw_factors: Option<&DrawFactors>,
+    ) -> Value {
         let Ok(belief) = (self.full)(&scaled(self.model, factors)) else {
-            return f64::INFINITY;
+            return Value {
+                cost: f64::INFINITY,
+                parts: Vec::new(),
+            };
         };
+        let overconfident = match self.aim {
+            Aim::Mean => 0.0,
+            Aim::Worst => OVERCONFIDENT,
+        };
+        // One-sided: an error smaller than stated costs nothing here, the divergence alone speaks of caution.
         let overconfidence = |ratios: [f64; REPORTED]| -> f64 {
-            match self.aim {
-                Aim::Mean => 0.0,
-                // One-sided: an error smaller than stated costs nothing here, the divergence alone speaks of
-                // caution.
-                Aim::Worst => ratios
-                    .iter()
-                    .map(|r| OVERCONFIDENT * r.ln().max(0.0).powi(2))
-                    .sum(),
-            }
-        };
-        let cost_of_truth = |a: &Assessment| {
-            divergence(a, |end| overconfidence(end.ratio())) + overconfidence(a.ratio_over_run())
+            ratios
+                .iter()
+                .map(|r| overconfident * r.ln().max(0.0).powi(2))
+                .sum()
         };
         let mut assessments = self.assessments(&belief, track, draw_factors);
         draw_factors
             .into_iter()
             .for_each(|draw_factors| assessments.iter_mut().for_each(|a| draw_factors.enlarge(a)));
-        let costs: Vec<f64> = assessments.iter().map(cost_of_truth).collect();
-        costs.iter().sum::<f64>() / costs.len() as f64
+        let share = 1.0 / assessments.len() as f64;
+        let (mut cost, mut parts) = (0.0, Vec::new());
+        for assessment in &assessments {
+            let of_run = assessment.ratio_over_run();
+            cost += share
+                * (divergence(assessment, |end| overconfidence(end.ratio()))
+                    + overconfidence(of_run));
+            // The divergence of one state, (r² − 1)/2 − ln r, has the second derivative 2r² with respect to ln r.
+            let part = |weight: f64, of_divergence: f64, r: f64| Part {
+                value: r.ln(),
+                curvature: share
+                    * (2.0 * of_divergence * r * r
+                        + 2.0 * weight * if r > 1.0 { overconfident } else { 0.0 }),
+            };
+            let of_end = ENDS / assessment.outage_ends.len().max(1) as f64;
+            let at_ends = assessment.outage_ends.iter().flat_map(|end| end.ratio());
+            parts.extend(at_ends.map(|r| part(of_end, of_end, r)));
+            parts.extend(of_run.map(|r| part(1.0, 1.0 - ENDS, r)));
+        }
+        Value { cost, parts }
     }
 
     /// Logarithm of what should be 1: above 0 the filter is overconfident.
