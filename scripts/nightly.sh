@@ -53,5 +53,6 @@ part tests cargo test --locked --no-fail-fast -- --include-ignored --show-output
 part kills kills
 part disks full_disk
 part fuzz fuzz
+part section4 cargo run --locked --release --example paper_section4 -- --sensitivity -o "$night/section4"
 python3 scripts/ledger.py "$night" docs/validation.md || failed=$((failed + 1))
 exit $((failed > 0))

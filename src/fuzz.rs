@@ -1,13 +1,13 @@
 //! Entries for fuzzing: each reads what a file holds as its command does, and must not panic. `tests/fuzz` runs them from a
 //! small corpus with a fixed seed, `fuzz/` at length.
 
+use crate::formats::recordings::ReadOptions;
 use crate::formats::trajectory_file::{self, Options};
 use crate::formats::{
     contamination_file, curve_file, datasheet, draws_file, fusion_files, model_file,
 };
 use crate::formats::{parameters_file, recordings, run_directory, scenario_file};
 use crate::study::{Planned, file, plan_in, unit_file};
-use crate::{efficiency, formats::recordings::ReadOptions};
 use nav_sim_navigation::gnss::FixSigma;
 use std::cell::OnceCell;
 use std::fs;
@@ -18,7 +18,7 @@ use tempfile::TempDir;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All readers: recordings, drives, trajectories, then the program's own files.
-pub const TARGETS: [Target; 32] = [
+pub const TARGETS: [Target; 31] = [
     ("recording_csv", |bytes| {
         recording("recording_csv", "a.csv", bytes)
     }),
@@ -70,9 +70,6 @@ pub const TARGETS: [Target; 32] = [
     }),
     ("study", |bytes| {
         _ = file::read(&written("study", "a.toml", bytes))
-    }),
-    ("estimator_study", |bytes| {
-        _ = efficiency::file::read(&written("estimator_study", "a.toml", bytes))
     }),
     ("plan", plan),
     ("unit", unit),

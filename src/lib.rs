@@ -88,8 +88,6 @@ pub mod design;
 pub mod choose;
 // Ratios between runs.
 pub mod compare;
-// The estimators themselves.
-pub mod efficiency;
 // Scenarios, candidates and outages, in parts.
 pub mod study;
 // Factors on a model.

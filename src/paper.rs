@@ -111,7 +111,7 @@ const AVERAGES: &str = "The wavelet variances that AWV, SR-AWV and DR-AWV are fi
 /// The page of all of them.
 pub(crate) fn paper_page(figures: &[PaperFigure]) -> String {
     let verdict = "The figures of Minaretzis et al. 2024 from this study, beside what the paper's show; Figure 2 is of a study of the \
-                   estimators (nav-sim efficiency).";
+                   estimators (examples/paper_section4.rs).";
     let mut page = Page::new("The paper's figures", Tone::Good, [verdict]);
     for figure in figures {
         page.section(&format!("Figure {}", figure.number));

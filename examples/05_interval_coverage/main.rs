@@ -7,20 +7,21 @@
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 mod cases;
+#[path = "../paper_section4.rs"]
+#[allow(dead_code, reason = "the design alone is used")]
+mod paper_section4;
 
 use cases::case;
 use nav_sim::calibration::efficiency::{Design, target};
 use nav_sim::calibration::{
     Bootstrap, ModelChoice, Outcome, Pool, Settings, calibrate, grouped, infer, replicates,
 };
-use nav_sim::efficiency::file as efficiency_file;
 use nav_sim::signal::imu::{Recording, Signal};
 use nav_sim::signal::noise::Synthesizer;
 use nav_sim::signal::rng::{Generator, StreamKey};
 use rand::RngExt;
 use rayon::prelude::*;
 use std::error::Error;
-use std::path::Path;
 
 type Failure = Box<dyn Error + Send + Sync>;
 
@@ -109,11 +110,7 @@ fn main() -> Result<(), Failure> {
         burst: number(5, 1)?,
     };
     let name = arguments.get(3).map_or("paper", String::as_str);
-    let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/paper_fig2.toml");
-    let design = case(
-        name,
-        efficiency_file::read(&study)?.design.with_samples(samples),
-    )?;
+    let design = case(name, paper_section4::section4(samples)?)?;
     let aim = target(&design)?;
     let (names, truth) = (
         Design::parameters(&aim.fit.composite),

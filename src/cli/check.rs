@@ -1,7 +1,6 @@
 //! `nav-sim check`: whether a file is what it should be.
 
 use super::{Failure, Session, parse, read};
-use crate::efficiency;
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
 use crate::formats::logs::LogOptions;
@@ -19,8 +18,7 @@ use std::path::{Path, PathBuf};
 /// Check scenario, study, model, trajectory and recording files without running anything
 ///
 /// What a file is follows from its contents. A TOML file with [accel] or [gyro] is a noise model; with segments or
-/// waypoints a motion profile; with candidates a study of `batch`; with sets of replicates a study of
-/// `efficiency`; with bounds of parameters (lower, upper, fix) a file for `calibrate --parameters`; with operations
+/// waypoints a motion profile; with candidates a study of `batch`; with bounds of parameters (lower, upper, fix) a file for `calibrate --parameters`; with operations
 /// one for `synthesize --contaminate`; with lat_deg and yaw_deg an initial state of `fuse`; with [unit] an entry of
 /// the catalogue of IMUs; any other is a scenario. A table with lat_deg or n_m is a trajectory, as are .nav, .tum
 /// and .gpx; with standard deviations it is GNSS fixes; with tau_samples (or a .wv.json) a curve; any other table or
@@ -138,13 +136,6 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             Ok(format!(
                 "a study of {candidates} candidates, {sets} outage sets, {} runs each",
                 study.runs
-            ))
-        }
-        FileKind::Efficiency => {
-            let study = efficiency::file::read(path)?;
-            Ok(format!(
-                "a study of estimators on {} sets of recordings",
-                study.sets
             ))
         }
         FileKind::Model => model(path, session),

@@ -250,7 +250,7 @@ fn index(found: Comparison, out: &str) -> Result<(), Failure> {
     )?)
 }
 
-/// Writes the paper's figures and a page of them; Figure 2 is of `nav-sim efficiency`.
+/// Writes the paper's figures and a page of them; Figure 2 is of `examples/paper_section4.rs`.
 fn figures(found: &Comparison, out: &str, session: &Session) -> Result<(), Failure> {
     let mut curves = Vec::new();
     for (scenario, estimator) in SCENARIOS.iter().flat_map(|scenario| {

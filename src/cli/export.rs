@@ -3,11 +3,10 @@
 use super::parse::one_of;
 use super::pictures::claim_output;
 use super::{Failure, Session};
-use crate::export::{self, Export, ExportError, Recorded, Target};
+use crate::export::{self, ExportError, Target};
 use crate::formats::atomic::{self, Written};
-use crate::formats::model_file::{self, ModelFile};
+use crate::formats::model_file;
 use crate::report;
-use nav_sim_calibration::duration;
 use nav_sim_signal::noise::practical::{Horizon, Policy};
 use std::path::PathBuf;
 
@@ -35,10 +34,6 @@ pub(crate) struct Args {
     /// Averaging times over which the pair stands for the model
     #[arg(long, value_name = "FROM:TO", value_parser = horizon, default_value = "1s:100s")]
     horizon: Horizon,
-    /// Synthesise recordings of the exported pair, as many and as long as were calibrated, and say where the model lies
-    /// outside the band of their wavelet variance
-    #[arg(long)]
-    certify: bool,
     /// File to write to (default: stdout)
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -65,38 +60,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     for doubt in export.doubts() {
         session.warn(&doubt);
     }
-    if args.certify {
-        certificate(&export, &file, session)?;
-    }
     match &args.out {
         _ if session.json() => session.result(report::json(&export.json(&shown)).trim_end()),
         Some(out) => session.result(format!("{}: {}", out.display(), args.target.name())),
         None => session.result(&text),
-    }
-    Ok(())
-}
-
-/// Says where the model lies outside the band of recordings of the exported pair.
-fn certificate(export: &Export, file: &ModelFile, session: &Session) -> Result<(), Failure> {
-    let recorded = Recorded::like(file, session.seed(None), export.settings.horizon.to_s);
-    let certificates = export::certify(export, &file.model, &file.missing, recorded)
-        .map_err(Failure::could_not)?;
-    let made = format!(
-        "{} recordings of {:.0} s",
-        recorded.recordings,
-        recorded.samples as f64 / file.model.rate_hz
-    );
-    for certificate in certificates {
-        let (name, all) = (certificate.sensor.name(), certificate.scales.len());
-        let outside = certificate.scales.iter().filter(|s| !s.inside).count();
-        match certificate.worst() {
-            None => session.say(format!("{name}: certified: within the 95 % band of {made} at all {all} scales")),
-            Some(worst) => session.warn(format!(
-                "{name}: not certified: outside the 95 % band of {made} at {outside} of {all} scales, most at {}: {:.2} times",
-                duration(worst.average_s),
-                worst.ratio
-            )),
-        }
     }
     Ok(())
 }

@@ -1,7 +1,6 @@
 //! The command line: one file per subcommand, each its `Args` and a `run(args, &Session)`.
 
 mod batch;
-mod bench;
 mod calibrate;
 mod check;
 mod choose;
@@ -11,7 +10,6 @@ mod completions;
 mod datasheet;
 mod demo;
 mod design;
-mod efficiency;
 mod export;
 mod fuse;
 mod init;
@@ -73,15 +71,12 @@ enum Command {
     Inspect(inspect::Args),
     Export(export::Args),
     Batch(batch::Args),
-    Efficiency(efficiency::Args),
     Demo(demo::Args),
     Check(check::Args),
     Init(init::Args),
     Schema(schema::Args),
     Completions(completions::Args),
     Man(man::Args),
-    #[command(hide = true)]
-    Bench(bench::Args),
 }
 
 impl Command {
@@ -118,14 +113,12 @@ impl Command {
             Self::Inspect(args) => inspect::run(&args, session),
             Self::Export(args) => export::run(&args, session),
             Self::Batch(args) => batch::run(&args, session),
-            Self::Efficiency(args) => efficiency::run(&args, session),
             Self::Demo(args) => demo::run(&args, session),
             Self::Check(args) => check::run(&args, session),
             Self::Init(args) => init::run(&args, session),
             Self::Schema(args) => schema::run(&args, session),
             Self::Completions(args) => completions::run(&args, session),
             Self::Man(args) => man::run(&args, session),
-            Self::Bench(args) => bench::run(&args, session),
         }
     }
 }
@@ -142,7 +135,7 @@ models        datasheet, export   from a data sheet; to Kalibr, PX4, GTSAM and o
 navigation    trajectory          make, check, convert and draw reference trajectories
               run, compare        INS/GNSS by Monte Carlo or covariance analysis; ratios between runs
               fuse                recorded IMU and GNSS data
-studies       batch, efficiency   grids of runs on any machines; accuracy of the estimators
+studies       batch               grids of runs on any machines
 to start      demo, init          the case study of the paper; a directory with files of every kind
               check, schema       check files; their JSON schemas
               completions, man    for shells and manuals

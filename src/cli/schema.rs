@@ -1,7 +1,6 @@
 //! `nav-sim schema`: JSON schemas of the files people write.
 
 use super::{Failure, Session};
-use crate::efficiency;
 use crate::formats::{
     contamination_file, fusion_files, model_file, parameters_file, trajectory_file,
 };
@@ -27,8 +26,6 @@ enum Kind {
     Scenario,
     /// A grid of experiments (`nav-sim batch`)
     Study,
-    /// A study of the estimators (`nav-sim efficiency`)
-    Efficiency,
     /// A noise model (what `nav-sim calibrate` writes)
     Model,
     /// Bounds and fixed values of parameters (`nav-sim calibrate --parameters`)
@@ -50,7 +47,6 @@ fn schema(of: Kind) -> serde_json::Value {
     match of {
         Kind::Scenario => schemars::schema_for!(Scenario).to_value(),
         Kind::Study => schemars::schema_for!(Study).to_value(),
-        Kind::Efficiency => efficiency::file::schema(),
         Kind::Model => model_file::schema(),
         Kind::Parameters => parameters_file::schema(),
         Kind::Initial => fusion_files::initial_schema(),

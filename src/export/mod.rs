@@ -20,7 +20,6 @@
 //! ```
 
 mod autopilots;
-mod certify;
 mod filters;
 mod gazebo;
 mod job;
@@ -33,7 +32,6 @@ mod target;
 mod vision;
 mod words;
 
-pub(crate) use certify::{Recorded, certify};
 pub use job::{export, exported};
 pub(crate) use json::parameters as parameters_json;
 pub(crate) use sheet::Quantity;

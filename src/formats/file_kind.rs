@@ -13,8 +13,6 @@ pub(crate) enum FileKind {
     Scenario,
     /// A study of `batch`.
     Study,
-    /// A study of `efficiency`.
-    Efficiency,
     /// A noise model.
     Model,
     /// An entry of the catalogue of IMUs.
@@ -122,8 +120,6 @@ fn toml_kind(table: &toml::Table) -> FileKind {
         FileKind::Trajectory
     } else if has(&["candidate", "trajectory", "truth"]) {
         FileKind::Study
-    } else if has(&["sets", "replicates", "estimators"]) {
-        FileKind::Efficiency
     } else {
         FileKind::Scenario
     }
@@ -199,10 +195,6 @@ mod tests {
         );
         assert_eq!(of_toml("start = {}\nsegment = []"), FileKind::Trajectory);
         assert_eq!(of_toml("runs = 3\n[[candidate]]"), FileKind::Study);
-        assert_eq!(
-            of_toml("sets = 500\nmodel = 'n1.toml'"),
-            FileKind::Efficiency
-        );
         assert_eq!(of_toml("[run]\nruns = 3"), FileKind::Scenario);
         assert_eq!(
             of_toml("[gyro.AR1_1]\nphi = { fix = 0.98 }"),

@@ -2,10 +2,9 @@
 
 use crate::formats::FileError;
 use crate::run::NavigateError;
-use nav_sim_calibration::efficiency::StudyError;
 use nav_sim_calibration::{AnticipationError, CalibrationError, Estimator, SignalError};
 use nav_sim_navigation::metrics::ComparisonError;
-use nav_sim_signal::noise::{ParameterError, ReplicateError};
+use nav_sim_signal::noise::ReplicateError;
 use nav_sim_signal::wavelet::WaveletError;
 
 /// Why a job has no result.
@@ -41,12 +40,6 @@ pub enum JobError {
     /// No such navigation.
     #[error(transparent)]
     Navigate(#[from] NavigateError),
-    /// A set of an estimator study without estimates.
-    #[error(transparent)]
-    EstimatorStudy(#[from] StudyError),
-    /// An exported pair that is no noise model.
-    #[error("the exported pair is no noise model: {0}")]
-    Pair(ParameterError),
     /// Runs along another trajectory than that of the reference: a ratio means nothing.
     #[error("{run}: not the trajectory of the reference")]
     OtherTrajectory {

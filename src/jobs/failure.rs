@@ -27,8 +27,6 @@ impl From<JobError> for Failure {
             JobError::Replicate(_)
             | JobError::Anticipation(_)
             | JobError::Navigate(_)
-            | JobError::EstimatorStudy(_)
-            | JobError::Pair(_)
             | JobError::Ratio { .. } => Self::input(e),
             JobError::Pooled => Self::input(format!("--pool sensor: {e}")).hint("--pool axes"),
             JobError::TwoRates {

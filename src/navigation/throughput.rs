@@ -1,4 +1,4 @@
-//! A standard load, part by part: what the benches and `nav-sim bench` time.
+//! A standard load, part by part: what the benches time.
 //!
 //! Eight runs of a consumer-grade IMU (N2 noise on six axes, 100 Hz) at rest, one second at a time: noise,
 //! prediction, one fix. What a second costs does not depend on what the vehicle does.

@@ -43,9 +43,6 @@ pub struct RequireRequest {
     #[arg(long = "require", value_name = "NAME<=LIMIT")]
     #[serde(rename = "require")]
     pub limits: Vec<LimitFlag>,
-    #[command(flatten)]
-    #[serde(skip)]
-    pub(crate) old: OldLimits,
     /// Scenario file whose section gnss is used
     #[arg(long, value_name = "FILE")]
     pub gnss: Option<PathBuf>,
@@ -69,7 +66,6 @@ impl Default for RequireRequest {
             outage: Ask::Length(60.0),
             start: None,
             limits: Vec::new(),
-            old: OldLimits::default(),
             gnss: None,
             scenario: None,
             vehicle: None,
@@ -86,23 +82,6 @@ pub enum Vehicle {
 }
 
 nav_sim_signal::named!(Vehicle { Car = "car" }, in files);
-
-/// Limits of the release before, by a name each.
-#[derive(clap::Args, Debug, Clone, Default, PartialEq)]
-pub(crate) struct OldLimits {
-    #[arg(long, hide = true, value_parser = parse::positive)]
-    p95_m: Option<f64>,
-    #[arg(long, hide = true, value_parser = parse::positive)]
-    p50_m: Option<f64>,
-    #[arg(long, hide = true, value_parser = parse::positive)]
-    rmse_m: Option<f64>,
-    #[arg(long, hide = true, value_parser = parse::positive)]
-    roll_deg: Option<f64>,
-    #[arg(long, hide = true, value_parser = parse::positive)]
-    pitch_deg: Option<f64>,
-    #[arg(long, hide = true, value_parser = parse::positive)]
-    yaw_deg: Option<f64>,
-}
 
 /// A value of `--require`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -304,24 +283,7 @@ impl RequireRequest {
 
     /// The limits that are given; at least one.
     fn limits(&self) -> Result<Vec<Limit>, Failure> {
-        let OldLimits {
-            p95_m,
-            p50_m,
-            rmse_m,
-            roll_deg,
-            pitch_deg,
-            yaw_deg,
-        } = self.old;
-        let old = Quantity::ALL
-            .into_iter()
-            .zip([p95_m, p50_m, rmse_m, roll_deg, pitch_deg, yaw_deg]);
-        let old = old.filter_map(|(quantity, most)| {
-            Some(Limit {
-                quantity,
-                most: most?,
-            })
-        });
-        let limits: Vec<Limit> = self.limits.iter().map(|limit| limit.0).chain(old).collect();
+        let limits: Vec<Limit> = self.limits.iter().map(|limit| limit.0).collect();
         if limits.is_empty() {
             let hint = "give one, such as --require 'p95_m<=5' or --require 'yaw_deg<=1'";
             return Err(Failure::input("no limit is given").hint(hint));

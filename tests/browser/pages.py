@@ -199,7 +199,6 @@ def make(nav_sim, place):
     run("trajectory record trajectories/land_vehicle.toml calib_data/tactical.toml --seed 3 -o drive")
     run("fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml --reference drive/reference.csv --outage 300:360 "
         "-o fused", codes=(0, 3))
-    run("efficiency examples/paper_fig2.toml --sets 2 --samples 4096 --seed 1 -o efficiency")
     run("choose static --trajectory trajectories/figure_eight.toml --outage 60:90 --estimator awv --model WN+RW --filter 15 "
         "--inflate none,x10 --seed 1 -o choice")
     run("batch plan examples/quick_study.toml --seed 1 -o study")
@@ -208,10 +207,10 @@ def make(nav_sim, place):
     tuned = "tune calib_data/tactical.toml --truth calib_data/consumer_mems.toml --outage 60:90"
     run(f"{tuned} --plot tuned.html --format json", keep="tuned.json")
     asked = "require trajectories/figure_eight.toml"
-    run(f"{asked} --outage 60 --p95-m 50 --iso-drift --plot needed.html --format json", keep="needed.json")
-    run(f"{asked} calib_data/tactical.toml --outage 60:120 --rmse-m 100 --plot given.html --format json",
+    run(f"{asked} --outage 60 --require p95_m<=50 --iso-drift --plot needed.html --format json", keep="needed.json")
+    run(f"{asked} calib_data/tactical.toml --outage 60:120 --require rmse_m<=100 --plot given.html --format json",
         keep="given.json", codes=(0, 3))
-    run(f"{asked} --outage 60 --p95-m 50 --catalogue --plot ranked.html --format json", keep="ranked.json",
+    run(f"{asked} --outage 60 --require p95_m<=50 --catalogue --plot ranked.html --format json", keep="ranked.json",
         codes=(0, 3))
     run("design calib_data/consumer_mems.toml --draws 40 --estimator awv --plot designs.html --format json",
         keep="designs.json")
@@ -219,7 +218,7 @@ def make(nav_sim, place):
         "--outage 300:360 --plot design.html --format json", keep="design.json")
     pages = [("wv.html", None), ("model.html", "fits.json"), ("runs/I_awv/report.html", "runs/I_awv/summary.json"),
              ("runs/lincov/report.html", "runs/lincov/summary.json"), ("comparison.html", "comparison.json"),
-             ("fused/report.html", "fused/summary.json"), ("efficiency/report.html", "efficiency/results.json"),
+             ("fused/report.html", "fused/summary.json"), 
              ("choice/report.html", "choice/ranking.json"), ("study/results/report.html", None), ("tuned.html", "tuned.json"), ("needed.html", "needed.json"),
              ("given.html", "given.json"), ("ranked.html", "ranked.json"), ("designs.html", "designs.json"),
              ("design.html", "design.json")]

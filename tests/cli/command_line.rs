@@ -291,10 +291,6 @@ fn negative_values_are_refused_in_the_words_of_their_option() {
             "not a finite number > 0",
         ),
         (
-            "require a.toml --outage 60 --p95-m -3",
-            "not a finite number > 0",
-        ),
-        (
             "run a.toml b.toml --turn-on-bias -0.3,0.01",
             "expected two numbers ≥ 0",
         ),

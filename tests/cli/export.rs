@@ -219,28 +219,3 @@ fn what_cannot_be_exported_is_refused() {
     let said = refused(&["model.toml", "--target", "px4", "-o", "model.toml"]);
     assert!(said.contains("is an input of this command"), "{said}");
 }
-
-/// White noise and random walk are within the band of their own recordings; white noise that is left out is missed.
-#[test]
-fn an_export_is_certified_or_not() {
-    let place = place();
-    let flags = [
-        "export",
-        "model.toml",
-        "--target",
-        "kalibr",
-        "--policy",
-        "strict",
-        "--certify",
-        "--seed",
-        "1",
-    ];
-    let output = nav_sim(place.path(), &flags);
-    let said = text(&output.stderr);
-    assert!(output.status.success(), "{said}");
-    assert!(
-        said.contains("gyro: certified: within the 95 % band of 4 recordings"),
-        "{said}"
-    );
-    assert!(said.contains("accel: not certified: outside"), "{said}");
-}

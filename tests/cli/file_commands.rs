@@ -211,7 +211,6 @@ fn init_makes_every_file_that_the_help_names() {
         "run",
         "fuse",
         "compare",
-        "efficiency",
         "demo",
         "check",
         "batch",

@@ -23,7 +23,6 @@ mod compare;
 mod datasheet;
 mod demo;
 mod design;
-mod efficiency;
 mod examples;
 mod existing;
 mod export;

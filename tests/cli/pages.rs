@@ -198,11 +198,17 @@ fn tune_require_and_design_write_a_page_with_the_numbers_they_print() {
             "tune imu.toml --truth worse.toml --trajectory drive.toml --outage 30:40",
             4 * 3 + 2,
         ),
-        ("require drive.toml --outage 10 --p95-m 50", 4 * 3),
-        ("require drive.toml imu.toml --outage 30:40 --p95-m 50", 2),
-        ("require drive.toml imu.toml --outage longest --p95-m 50", 2),
+        ("require drive.toml --outage 10 --require p95_m<=50", 4 * 3),
         (
-            "require drive.toml --outage 10 --p95-m 50 --catalogue",
+            "require drive.toml imu.toml --outage 30:40 --require p95_m<=50",
+            2,
+        ),
+        (
+            "require drive.toml imu.toml --outage longest --require p95_m<=50",
+            2,
+        ),
+        (
+            "require drive.toml --outage 10 --require p95_m<=50 --catalogue",
             17 * 2,
         ),
         ("design imu.toml --recordings 3 --hours 0.2 --draws 40", 2),

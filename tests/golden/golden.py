@@ -42,7 +42,7 @@ COMMENT = re.compile(r"\s*(#|//|%|<!--)")
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 ROWS_KEPT = 300
 # Commands after a minimiser: another machine may end the search elsewhere on the same floor of the objective.
-FITTED = re.compile(r"(dr_awv|sr_awv|awv|rgmwm|avlr|auto|curve|run_static|exported|efficiency|choice|needed|require|tuned)\b")
+FITTED = re.compile(r"(dr_awv|sr_awv|awv|rgmwm|avlr|auto|curve|run_static|exported|choice|needed|require|tuned)\b")
 
 SCENARIO = """
 run = { runs = 8, seed = 5 }
@@ -51,20 +51,6 @@ imu = { rate_hz = 100.0, scale_ppm_accel = 300.0, scale_ppm_gyro = 300.0, misali
 gnss = { rate_hz = 1.0, pos_sigma_m = [1, 1, 2], vel_sigma_m_s = "none", lever_arm_m = [1, 0, -1] }
 baro = { rate_hz = 1.0, sigma_m = 0.5 }
 outage_periodic = { first_s = 30, duration_s = 5, every_s = 15 }
-"""
-EFFICIENCY = """
-schema = 1
-model = "examples/accelerometer_n1.toml"
-axis = "accel.x"
-fit = "N1"
-replicates = 4
-samples = 4096
-sets = 3
-seed = 1
-scenarios = ["section4-I", "section4-II"]
-estimators = ["awv", "sr-awv", "dr-awv"]
-trim = 1
-efficiency = 0.6
 """
 LINCOV_STUDY = """
 method = "lincov"
@@ -131,7 +117,6 @@ COMMANDS = [
     ("study/results", "batch merge examples/quick_study.toml --state all --format json -o study"),
     ("lincov_study/results", "batch plan lincov_study.toml --seed 1 -o lincov_study"
      " && batch run lincov_study.toml -o lincov_study && batch merge lincov_study.toml --format json -o lincov_study"),
-    ("efficiency", "efficiency efficiency.toml --format json -o @"),
     ("choice", f"choose recordings --trajectory {QUICK} --outage 30:40 --estimator awv,dr-awv --model N1 --filter 15"
      " --inflate none,x10 --runs 8 --seed 1 --format json -o @"),
     ("design.json", f"design {TACTICAL} --recordings 4 --hours 1 --draws 40 --trajectory {QUICK} --outage 30:50 --seed 1"
@@ -195,7 +180,6 @@ def prepare(place):
     for folder in ["calib_data", "trajectories", "examples"]:
         shutil.copytree(ROOT / folder, place / folder)
     (place / "scenario.toml").write_text(SCENARIO)
-    (place / "efficiency.toml").write_text(EFFICIENCY)
     (place / "lincov_study.toml").write_text(LINCOV_STUDY)
 
 

@@ -3,7 +3,6 @@
 use crate::curve::robust_scale::{MAD_TO_DEVIATION, median};
 use crate::rng::StreamKey;
 use rand::RngExt;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Resamples of the bootstrap: a standard error is then known to 1/√(2·1000) = 2 %.
 const RESAMPLES: usize = 1000;
@@ -45,35 +44,6 @@ impl Accuracy {
         };
         (self.rmse / other.rmse, error)
     }
-}
-
-/// Mean over parameters of the logarithm of the RMSE: an estimator's accuracy in all of them.
-#[must_use]
-pub fn mean_log_rmse(of_parameters: &[&Accuracy]) -> f64 {
-    mean_log(of_parameters.iter().map(|a| a.rmse))
-}
-
-/// Whether the data tell that an estimator is more accurate than another over all parameters ([`mean_log_rmse`]), at 95 %
-/// for so many `rivals` together (Bonferroni).
-///
-/// The difference is paired by the bootstrap of the sets, with Student's t of as many sets. Of estimators that are alike the
-/// best of two or three is called better in at most 2 % of simulated studies of 4 to 50 sets.
-#[must_use]
-pub fn is_more_accurate(one: &[&Accuracy], other: &[&Accuracy], rivals: usize, sets: u64) -> bool {
-    let score = |all: &[&Accuracy], n: usize| mean_log(all.iter().map(|a| a.resampled[n]));
-    let differences: Vec<f64> = (0..RESAMPLES)
-        .map(|n| score(one, n) - score(other, n))
-        .collect();
-    let law = StudentsT::new(0.0, 1.0, sets as f64 - 1.0);
-    let t = law.map_or(f64::NAN, |law| {
-        law.inverse_cdf(1.0 - 0.025 / rivals.max(1) as f64)
-    });
-    mean_log_rmse(one) + t * standard_deviation(&differences) < mean_log_rmse(other)
-}
-
-fn mean_log(values: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let count = values.len() as f64;
-    values.map(f64::ln).sum::<f64>() / count
 }
 
 /// The accuracy of estimates of a parameter whose target is `target`; NaN without estimates.
@@ -197,24 +167,6 @@ mod tests {
         let once: Vec<f64> = x.iter().map(|z| z + 1.0).collect();
         let (ratio, se) = accuracy(&twice, 1.0, 3).ratio_to(&accuracy(&once, 1.0, 3));
         assert!((ratio - 2.0).abs() < 1e-12 && se < 1e-12);
-    }
-
-    /// Thirty times the error is told from 30 sets; the same error, and any error of one set, is not.
-    #[test]
-    fn the_more_accurate_estimator_is_told_where_the_sets_tell_it() {
-        let of = |n: usize, scale: f64, run: u64| {
-            let estimates: Vec<f64> = normals(run, n).iter().map(|z| 1.0 + scale * z).collect();
-            accuracy(&estimates, 1.0, 1)
-        };
-        let told = |n: usize, scale: f64| {
-            let ([a, b], [c, d]) = (
-                [of(n, 0.01, 1), of(n, 0.02, 2)],
-                [of(n, 0.01 * scale, 3), of(n, 0.02 * scale, 4)],
-            );
-            is_more_accurate(&[&a, &b], &[&c, &d], 2, n as u64)
-        };
-        assert!(told(30, 30.0));
-        assert!(!told(30, 1.0) && !told(30, 1.0 / 30.0) && !told(1, 30.0));
     }
 
     #[test]

@@ -11,7 +11,7 @@ mod quadrature;
 mod sensitivity;
 mod target;
 
-pub use accuracy::{Accuracy, accuracy, is_more_accurate, mean_log_rmse};
+pub use accuracy::{Accuracy, accuracy};
 pub use design::{Design, Estimate, StudyError};
 pub use sensitivity::{Movement, abnormal_curve, outlier_curve};
 pub use target::{Target, target};

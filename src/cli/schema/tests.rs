@@ -1,7 +1,6 @@
 //! The ranges of schemas are those of the readers.
 
 use super::{Kind, schema};
-use crate::efficiency;
 use crate::formats::{
     FileError, contamination_file, fusion_files, model_file, parameters_file, scenario_file,
     trajectory_file,
@@ -98,21 +97,6 @@ outages = [
 ]
 [[trajectory]]
 file = \"drive.toml\"
-";
-
-const EFFICIENCY: &str = "
-schema = 1
-model = \"m.toml\"
-fit = \"WN\"
-replicates = 5
-samples = 64
-levels = 1
-sets = 3
-seed = 1
-trim = 0
-efficiency = 0.6
-estimators = [\"awv\"]
-scenarios = [\"section4-I\"]
 ";
 
 const INITIAL: &str = "
@@ -212,7 +196,7 @@ parameter = \"gamma2\"
 factor = 4.0
 ";
 
-const SAMPLES: [Sample; 11] = [
+const SAMPLES: [Sample; 10] = [
     Sample {
         kind: Kind::Scenario,
         text: SCENARIO,
@@ -240,11 +224,6 @@ const SAMPLES: [Sample; 11] = [
             "sweep.start_s",
             "sweep.duration_s",
         ],
-    },
-    Sample {
-        kind: Kind::Efficiency,
-        text: EFFICIENCY,
-        loose: &["samples", "levels"],
     },
     Sample {
         kind: Kind::Initial,
@@ -287,7 +266,6 @@ fn read(kind: Kind, path: &Path) -> Result<(), FileError> {
     match kind {
         Kind::Scenario => scenario_file::read(path).map(|_| ()),
         Kind::Study => study::file::read(path).map(|_| ()),
-        Kind::Efficiency => efficiency::file::read(path).map(|_| ()),
         Kind::Model => model_file::read(path).map(|_| ()),
         Kind::Parameters => parameters_file::check(path),
         Kind::Initial => fusion_files::read_initial(path).map(|_| ()),
