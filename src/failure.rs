@@ -144,7 +144,6 @@ pub(crate) const fn option_for(setting: Setting) -> &'static str {
         Setting::FixSigma => "give them for all fixes with --gnss-sigma POS[:VEL]",
         Setting::Topic => "--topic NAME names one (nav-sim inspect lists them)",
         Setting::Stamp => "--stamp log takes the times of arrival",
-        Setting::Recover => "--recover reads what stands before the damage",
         Setting::StartFiles => "start from the files that nav-sim init makes",
     }
 }

@@ -20,7 +20,7 @@ pub struct Inspection {
     pub format: &'static str,
     /// Its channels, in order of their topics.
     pub channels: Vec<InspectedChannel>,
-    /// Damage before which the reading ended.
+    /// Cut at which the reading ended.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<String>,
 }
@@ -63,9 +63,9 @@ pub struct InspectedChannel {
 /// ```
 ///
 /// # Errors
-/// When the file is not a log that is read, or is damaged and not to be recovered.
+/// When the file is not a log that is read, or is damaged before its end.
 pub fn inspect(path: &Path, options: &LogOptions) -> Result<Inspection, FileError> {
-    let log = logs::open(path, options)?;
+    let log = logs::open(path)?;
     let channels = log
         .channels()
         .iter()
@@ -76,7 +76,7 @@ pub fn inspect(path: &Path, options: &LogOptions) -> Result<Inspection, FileErro
         channels: channels
             .collect::<Result<_, _>>()
             .map_err(|e| logs::refused(path, e))?,
-        damage: log.damage().map(logs::recovered),
+        damage: log.damage().map(logs::cut_off),
     })
 }
 

@@ -132,7 +132,7 @@ recordings    wv, calibrate       noise and a model of it from static recordings
               synthesize          recordings from a model
 models        datasheet, export   from a data sheet; to Kalibr, PX4, GTSAM and others
               tune, require       factors that make a filter consistent; the IMU that an outage needs
-navigation    trajectory          make, check, convert and draw reference trajectories
+navigation    trajectory          make, check and convert reference trajectories
               run, compare        INS/GNSS by Monte Carlo or covariance analysis; ratios between runs
               fuse                recorded IMU and GNSS data
 studies       batch               grids of runs on any machines

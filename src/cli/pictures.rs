@@ -56,7 +56,7 @@ fn is_page(path: &Path) -> bool {
 }
 
 /// Claims a page or a picture before the work; refuses one of another form.
-pub(super) fn claim_picture(
+fn claim_picture(
     path: &Path,
     inputs: impl IntoIterator<Item: AsRef<Path>>,
     session: &Session,
@@ -115,7 +115,7 @@ fn form(path: &Path) -> Result<Form, Failure> {
 }
 
 /// Writes a picture in the form that its name says.
-pub(super) fn write_picture(path: &Path, svg: String) -> Result<(), Failure> {
+fn write_picture(path: &Path, svg: String) -> Result<(), Failure> {
     let picture = page::encode(svg, form(path)?).map_err(Failure::could_not)?;
     Ok(atomic::write(path, picture)?)
 }

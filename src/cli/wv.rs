@@ -17,9 +17,6 @@ Examples:
 pub(crate) struct Args {
     #[command(flatten)]
     request: WaveletRequest,
-    /// Print one table for each sensor and axis, with the recordings side by side
-    #[arg(long, conflicts_with = "verbose")]
-    per_file: bool,
     /// Write the curves as JSON
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -40,19 +37,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let drawn = args.plot.draw(&file.document(), session);
     match () {
         () if session.csv() => session.result(wv::signals_csv(&file).trim_end()),
-        () if args.per_file && !session.json() => session.result(side_by_side(&file)),
         () => {
             session.answer(&file);
         }
     }
     written.and(drawn)
-}
-
-/// A table for each sensor and axis.
-fn side_by_side(file: &report::SignalsFile) -> String {
-    let tables = wv::side_by_side(file).into_iter();
-    tables
-        .map(|(title, table)| format!("{title}\n{}", table.columns(report::WIDTH)))
-        .collect::<Vec<_>>()
-        .join("\n")
 }

@@ -345,7 +345,6 @@ pub(crate) enum Setting {
     RemoveLine,
     Topic,
     Stamp,
-    Recover,
 }
 
 impl Setting {
@@ -369,7 +368,6 @@ impl Setting {
             Self::FixSigma => "give standard deviations for all fixes",
             Self::Topic => "name the topic",
             Self::Stamp => "take the stamps of arrival",
-            Self::Recover => "read what stands before the damage",
         }
     }
 }

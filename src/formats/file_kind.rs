@@ -161,8 +161,6 @@ fn table_kind(text: &str) -> FileKind {
         kind
     } else if is_nmea(text) || is_rtklib(text) {
         FileKind::Gnss
-    } else if text.trim_start().starts_with("ini lat") {
-        FileKind::Trajectory
     } else if text
         .lines()
         .take(20)
@@ -223,10 +221,6 @@ mod tests {
         );
         assert_eq!(
             table_kind("t_s,lat_deg,lon_deg,h_m,yaw_deg,sd_yaw_deg"),
-            FileKind::Trajectory
-        );
-        assert_eq!(
-            table_kind("ini lat (deg),ini lon (deg)"),
             FileKind::Trajectory
         );
         assert_eq!(table_kind("1 30.5 114.2 20 1 1 2\n"), FileKind::Gnss);

@@ -1,7 +1,7 @@
 //! Logs of robots, flight controllers and receivers ([`nav_sim_logs`]), among the files that are read.
 
 use super::{FileError, Place, Setting};
-use nav_sim_logs::{Damage, Error, HEAD, Kind, Log, OnDamage, Stamp, recognise};
+use nav_sim_logs::{Damage, Error, HEAD, Kind, Log, Stamp, recognise};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -13,8 +13,6 @@ pub struct LogOptions {
     pub topic: Option<String>,
     /// Stamps: of the measurement, or of its arrival.
     pub stamp: Stamp,
-    /// Whether a damaged file is read up to the damage.
-    pub on_damage: OnDamage,
 }
 
 /// The kind of log that a file is by its first bytes; none for tables and arrays. What cannot be opened is for its reader
@@ -32,9 +30,9 @@ pub(crate) fn kind_of(path: &Path) -> Option<Kind> {
 /// Opens a log.
 ///
 /// # Errors
-/// When it is not of a format that is read, or is damaged and not to be recovered.
-pub(crate) fn open(path: &Path, options: &LogOptions) -> Result<Log, FileError> {
-    Log::open(path, options.on_damage).map_err(|e| refused(path, e))
+/// When it is not of a format that is read, or is damaged before its end.
+pub(crate) fn open(path: &Path) -> Result<Log, FileError> {
+    Log::open(path).map_err(|e| refused(path, e))
 }
 
 /// The refusal of a log, with what helps.
@@ -49,12 +47,6 @@ pub(crate) fn refused(path: &Path, error: Error) -> FileError {
         Error::TimeBack { .. } => {
             FileError::contents(shown, Place::Within, error.to_string()).setting(Setting::Stamp)
         }
-        Error::Truncated { .. }
-        | Error::StillWritten { .. }
-        | Error::Crc { .. }
-        | Error::Malformed { .. } => {
-            FileError::contents(shown, Place::Within, error.to_string()).setting(Setting::Recover)
-        }
         Error::NotRead(_) => {
             let refusal = FileError::contents(shown, Place::Itself, format!("is {error}"));
             refusal.advice_if(hint.map(|command| format!("convert it: {command}")))
@@ -64,8 +56,8 @@ pub(crate) fn refused(path: &Path, error: Error) -> FileError {
     }
 }
 
-/// Words on damage before which the reading ended.
-pub(crate) fn recovered(damage: &Damage) -> String {
+/// Warning of a cut at which the reading ended.
+pub(crate) fn cut_off(damage: &Damage) -> String {
     let Damage {
         error,
         read_bytes,

@@ -182,6 +182,11 @@ fn element_type(code: &str) -> Option<(bool, u8, usize)> {
 }
 
 impl<R: Read> Array<R> {
+    /// Its rows.
+    pub(crate) const fn rows(&self) -> usize {
+        self.header.rows
+    }
+
     /// Its columns.
     pub(crate) const fn columns(&self) -> usize {
         self.header.columns

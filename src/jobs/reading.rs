@@ -5,7 +5,7 @@ use crate::formats::logs::LogOptions;
 use crate::formats::recordings::{Gaps, ReadOptions};
 use crate::parse;
 use nav_sim_calibration::FitRange;
-use nav_sim_logs::{OnDamage, Stamp};
+use nav_sim_logs::Stamp;
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::wavelet::{Convention, Tuning};
 use serde::{Deserialize, Serialize};
@@ -38,9 +38,6 @@ pub struct LogRequest {
     /// Stamps of a log: header, of the measurement; log, of its arrival
     #[arg(long, value_name = "WHICH", value_parser = parse::words::<Stamps>(STAMPS), default_value_t)]
     pub stamp: Stamps,
-    /// Read a damaged log up to the damage
-    #[arg(long)]
-    pub recover: bool,
 }
 
 impl LogRequest {
@@ -52,11 +49,6 @@ impl LogRequest {
                 Stamp::Log
             } else {
                 Stamp::Header
-            },
-            on_damage: if self.recover {
-                OnDamage::Recover
-            } else {
-                OnDamage::Refuse
             },
         }
     }

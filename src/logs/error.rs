@@ -131,6 +131,14 @@ impl Error {
         }
     }
 
+    /// Byte at which a file ends that its writer did not end.
+    pub(crate) const fn cut(&self) -> Option<u64> {
+        match self {
+            Self::Truncated { place, .. } | Self::StillWritten { place } => Some(place.offset),
+            _ => None,
+        }
+    }
+
     /// The same, said of a topic.
     pub(crate) fn of_topic(mut self, name: &str) -> Self {
         if let Self::Truncated { place, .. }
@@ -153,7 +161,7 @@ impl Error {
             Self::Truncated { .. }
             | Self::StillWritten { .. }
             | Self::Crc { .. }
-            | Self::Malformed { .. } => Some("what stands before that byte can be recovered"),
+            | Self::Malformed { .. } => Some("the file is damaged: copy it again"),
             Self::TimeBack { .. } => {
                 Some("the stamps of the log may be in order where those of the header are not")
             }

@@ -67,4 +67,4 @@ pub use error::{Error, Place};
 pub use log::Log;
 pub use recognise::{HEAD, Kind, recognise};
 pub use sample::{Clock, Fix, ImuSample, Motion, Stamp};
-pub use stream::{Damage, OnDamage, Samples};
+pub use stream::{Damage, Samples};

@@ -6,18 +6,18 @@ use crate::format::{Format, Opened};
 use crate::input::Origin;
 use crate::recognise::{HEAD, Kind, recognise};
 use crate::sample::{Fix, ImuSample, Stamp};
-use crate::stream::{Damage, OnDamage, Samples};
+use crate::stream::{Damage, Samples};
 use std::path::Path;
 use std::sync::Arc;
 
 /// Log whose channels are known.
 ///
 /// ```
-/// use nav_sim_logs::{Content, Error, Log, OnDamage, Stamp};
+/// use nav_sim_logs::{Content, Error, Log, Stamp};
 ///
 /// # fn main() -> Result<(), Error> {
 /// let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/ros2_zstd.mcap");
-/// let log = Log::open(path.as_ref(), OnDamage::Refuse)?;
+/// let log = Log::open(path.as_ref())?;
 /// let imu = log.channels().iter().find(|c| c.content == Content::Imu).expect("one is there");
 /// assert_eq!((imu.topic.as_str(), imu.messages), ("/imu", 40));
 ///
@@ -34,7 +34,6 @@ pub struct Log {
     kind: Kind,
     channels: Vec<Channel>,
     damage: Option<Damage>,
-    on_damage: OnDamage,
     file_bytes: u64,
     format: Box<dyn Format>,
 }
@@ -43,34 +42,34 @@ impl Log {
     /// Opens a file and finds its channels.
     ///
     /// # Errors
-    /// When the format is not one that is read, or the file is damaged and not to be recovered.
-    pub fn open(path: &Path, on_damage: OnDamage) -> Result<Self, Error> {
-        Self::new(Origin::File(path.to_owned()), on_damage)
+    /// When the format is not one that is read, or the file is damaged before its end.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        Self::new(Origin::File(path.to_owned()))
     }
 
     /// Finds the channels of a file that is held.
     ///
     /// # Errors
     /// Those of [`Self::open`].
-    pub fn from_bytes(bytes: impl Into<Arc<[u8]>>, on_damage: OnDamage) -> Result<Self, Error> {
-        Self::new(Origin::Bytes(bytes.into()), on_damage)
+    pub fn from_bytes(bytes: impl Into<Arc<[u8]>>) -> Result<Self, Error> {
+        Self::new(Origin::Bytes(bytes.into()))
     }
 
-    fn new(origin: Origin, on_damage: OnDamage) -> Result<Self, Error> {
+    fn new(origin: Origin) -> Result<Self, Error> {
         let kind = recognise(&origin.head(HEAD as u64)?).ok_or(Error::Unknown)?;
-        Self::of_kind(kind, origin, on_damage)
+        Self::of_kind(kind, origin)
     }
 
     /// Finds the channels of a file of such a format.
-    pub(crate) fn of_kind(kind: Kind, origin: Origin, on_damage: OnDamage) -> Result<Self, Error> {
+    pub(crate) fn of_kind(kind: Kind, origin: Origin) -> Result<Self, Error> {
         let file_bytes = origin.open()?.length();
         let opened = match kind {
             #[cfg(feature = "mcap")]
-            Kind::Mcap => crate::ros::open::<crate::mcap::Mcap>(origin, on_damage),
+            Kind::Mcap => crate::ros::open::<crate::mcap::Mcap>(origin),
             #[cfg(feature = "bag")]
-            Kind::Bag => crate::ros::open::<crate::bag::Bag>(origin, on_damage),
+            Kind::Bag => crate::ros::open::<crate::bag::Bag>(origin),
             #[cfg(feature = "ulog")]
-            Kind::Ulog => crate::ulog::open(origin, on_damage),
+            Kind::Ulog => crate::ulog::open(origin),
             #[cfg(feature = "ubx")]
             Kind::Ubx => crate::ubx::open(origin),
             _ => Err(Error::NotRead(kind)),
@@ -84,7 +83,6 @@ impl Log {
             kind,
             channels,
             damage,
-            on_damage,
             file_bytes,
             format,
         })
@@ -102,8 +100,7 @@ impl Log {
         &self.channels
     }
 
-    /// Damage before which the file is taken to end; a chunk whose bytes are damaged is found only when it
-    /// is read ([`Samples::damage`]).
+    /// Cut at which the file is taken to end.
     #[must_use]
     pub const fn damage(&self) -> Option<&Damage> {
         self.damage.as_ref()
@@ -118,7 +115,6 @@ impl Log {
         Ok(Samples::new(
             self.format.imu(channel, stamp)?,
             channel,
-            self.on_damage,
             self.file_bytes,
         ))
     }
@@ -132,7 +128,6 @@ impl Log {
         Ok(Samples::new(
             self.format.fixes(channel, stamp)?,
             channel,
-            self.on_damage,
             self.file_bytes,
         ))
     }

@@ -4,17 +4,7 @@ use crate::channel::Channel;
 use crate::error::{Error, Place};
 use crate::sample::Stamped;
 
-/// Handling of a damaged file.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum OnDamage {
-    /// An error.
-    #[default]
-    Refuse,
-    /// The file is taken to end before the damage, and [`Damage`] says where that is.
-    Recover,
-}
-
-/// Damage that ended the reading.
+/// End of a file that was cut off, at which the reading ended.
 #[derive(Debug)]
 pub struct Damage {
     /// The error that it would have been.
@@ -35,25 +25,18 @@ pub struct Samples<T> {
     stream: Stream<T>,
     topic: String,
     last_ns: Option<i64>,
-    on_damage: OnDamage,
     file_bytes: u64,
     damage: Option<Damage>,
     is_done: bool,
 }
 
 impl<T> Samples<T> {
-    pub(crate) fn new(
-        stream: Stream<T>,
-        channel: &Channel,
-        on_damage: OnDamage,
-        file_bytes: u64,
-    ) -> Self {
+    pub(crate) fn new(stream: Stream<T>, channel: &Channel, file_bytes: u64) -> Self {
         let topic = channel.topic.clone();
         Self {
             stream,
             topic,
             last_ns: None,
-            on_damage,
             file_bytes,
             damage: None,
             is_done: false,
@@ -66,8 +49,7 @@ impl<T> Samples<T> {
         &self.topic
     }
 
-    /// Damage that ended the samples, in a file that is recovered; that of the file as a whole is
-    /// [`Log::damage`](crate::Log::damage).
+    /// Cut that ended the samples; that of the file as a whole is [`Log::damage`](crate::Log::damage).
     #[must_use]
     pub const fn damage(&self) -> Option<&Damage> {
         self.damage.as_ref()
@@ -76,18 +58,15 @@ impl<T> Samples<T> {
     fn end(&mut self, error: Error) -> Option<Error> {
         self.is_done = true;
         let error = error.of_topic(&self.topic);
-        match (self.on_damage, error.place()) {
-            (OnDamage::Recover, Some(place)) => {
-                let (read_bytes, file_bytes) = (place.offset, self.file_bytes);
-                self.damage = Some(Damage {
-                    error,
-                    read_bytes,
-                    file_bytes,
-                });
-                None
-            }
-            _ => Some(error),
-        }
+        let Some(read_bytes) = error.cut() else {
+            return Some(error);
+        };
+        self.damage = Some(Damage {
+            error,
+            read_bytes,
+            file_bytes: self.file_bytes,
+        });
+        None
     }
 }
 

@@ -45,7 +45,6 @@ pub(crate) use study::{
     outage_rows, run_columns, run_rows,
 };
 pub use trajectory::TrajectorySeries;
-pub(crate) use trajectory::trajectory_svg;
 pub(crate) use unexpected::{
     reduction_doubt, reduction_line, unexpected_in_words, unexpected_line,
 };

@@ -1,6 +1,6 @@
 //! A trajectory in pictures: map, height, speed, attitude, outages marked.
 
-use super::page::{Axis, Chart, Colour, Mark, Panel, Series, svg};
+use super::page::{Axis, Chart, Colour, Mark, Panel, Series};
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::frames::RollPitchYaw;
 use nav_sim_navigation::trajectory::Trajectory;
@@ -119,18 +119,6 @@ impl TrajectorySeries {
     }
 }
 
-/// The picture; `outages` are (start, end) in seconds.
-pub(crate) fn trajectory_svg(
-    title: &str,
-    series: &TrajectorySeries,
-    outages: &[(f64, f64)],
-) -> String {
-    svg(
-        title,
-        &[series.map(title, outages), series.over_time(outages)],
-    )
-}
-
 /// The line is broken where the heading passes ±180°.
 fn broken(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut pieces = Vec::new();
@@ -144,6 +132,7 @@ fn broken(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::page::svg;
 
     fn series() -> TrajectorySeries {
         let n = 11;
@@ -160,7 +149,11 @@ mod tests {
 
     #[test]
     fn one_picture_with_everything_inside() {
-        let svg = trajectory_svg("a<b", &series(), &[(3.0, 6.0)]);
+        let (series, outages) = (series(), [(3.0, 6.0)]);
+        let svg = svg(
+            "a<b",
+            &[series.map("a<b", &outages), series.over_time(&outages)],
+        );
         assert!(svg.starts_with("<svg xmlns=") && svg.ends_with("</svg>\n"));
         assert_eq!(svg.matches("class=\"outage\" x").count(), 5); // a stripe in each panel, and the legend
         assert_eq!(svg.matches("data-name=\"outage\"").count(), 1); // on the map

@@ -159,7 +159,7 @@ fn digest(file: &SignalsFile) -> Table {
 }
 
 /// For each sensor and axis a title and a table: a row a scale, a column a recording.
-pub(crate) fn side_by_side(file: &SignalsFile) -> Vec<(String, Table)> {
+fn side_by_side(file: &SignalsFile) -> Vec<(String, Table)> {
     let table = |(sensor, axis): (&str, &str)| {
         let signals = signals_of(file, sensor, axis);
         let names = short_names(&signals.iter().map(|s| s.file.as_str()).collect::<Vec<_>>());

@@ -4,6 +4,6 @@ mod document;
 mod job;
 mod request;
 
-pub(crate) use document::{side_by_side, signals_csv};
+pub(crate) use document::signals_csv;
 pub use job::Intervals;
 pub use request::WaveletRequest;

@@ -242,11 +242,6 @@ fn what_nav_sim_did_not_write_is_never_replaced() {
             "own.csv",
             own_table.as_str(),
         ),
-        (
-            "trajectory plot drive.toml -o drive.svg".to_owned(),
-            "drive.svg",
-            "<svg></svg>",
-        ),
     ] {
         fs::write(at(file), own).unwrap();
         for force in ["", " --force"] {

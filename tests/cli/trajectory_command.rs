@@ -171,31 +171,6 @@ fn convert_places_local_coordinates_and_never_overwrites_its_input() {
 }
 
 #[test]
-fn plot_draws_one_self_contained_picture() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("drive.svg");
-    let args = [
-        "plot",
-        DRIVE,
-        "--outage",
-        "300:390",
-        "--outage",
-        "700:790",
-        "-o",
-        path.to_str().unwrap(),
-    ];
-    assert_eq!(trajectory(&args).0, 0);
-    let svg = std::fs::read_to_string(path).unwrap();
-    assert!(svg.starts_with("<svg xmlns=") && svg.contains("<title>land_vehicle.toml</title>"));
-    assert_eq!(svg.matches("class=\"outage\"").count(), 9); // two stripes in four panels, and the legend
-    let (code, _, err) = trajectory(&["plot", DRIVE, "--outage", "390:300", "-o", "x.svg"]);
-    assert!(
-        code == 2 && err.contains("it must come after start_s = 390"),
-        "{err}"
-    );
-}
-
-#[test]
 fn bad_files_exit_with_2_and_missing_ones_with_1() {
     let dir = tempfile::tempdir().unwrap();
     let bad = file(

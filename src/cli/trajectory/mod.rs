@@ -1,7 +1,6 @@
 //! `nav-sim trajectory`: reference trajectories.
 
 mod check;
-mod plot;
 mod record;
 mod write;
 
@@ -11,13 +10,13 @@ use nav_sim_navigation::trajectory::Trajectory;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Make, check, convert and draw reference trajectories
+/// Make, check and convert reference trajectories
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
   nav-sim trajectory check trajectories/land_vehicle.toml
   nav-sim trajectory generate trajectories/fixed_wing.toml --rate-hz 10 -o flight.csv
-  nav-sim trajectory plot trajectories/land_vehicle.toml --outage 300:390 -o tunnel.svg")]
+  nav-sim trajectory convert trajectories/land_vehicle.toml --rate-hz 1 -o drive.csv")]
 pub(crate) struct Args {
     #[command(subcommand)]
     command: Command,
@@ -28,7 +27,6 @@ enum Command {
     Generate(write::GenerateArgs),
     Check(check::Args),
     Convert(write::ConvertArgs),
-    Plot(plot::Args),
     Record(record::Args),
 }
 
@@ -75,7 +73,6 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Command::Generate(args) => write::generate(args, session),
         Command::Check(args) => check::run(args, session),
         Command::Convert(args) => write::convert(args, session),
-        Command::Plot(args) => plot::run(args, session),
         Command::Record(args) => record::run(args, session),
     }
 }

@@ -3,7 +3,6 @@
 use super::{Remark, bare_columns, table, time_back};
 use crate::formats::logs::LogOptions;
 use crate::formats::recordings::checks::{check_gravity, gravity_factor};
-use crate::formats::recordings::error::storage;
 use crate::formats::recordings::header::{Role, Unit};
 use crate::formats::recordings::time_unit::unit_of_step;
 use crate::formats::recordings::timing::median_step;
@@ -128,7 +127,6 @@ fn headed(path: &Path, names: Option<&[String]>, topic: Option<&str>) -> Result<
         ..LogOptions::default()
     };
     let options = ReadOptions {
-        hold_bytes: usize::MAX,
         columns,
         log,
         ..ReadOptions::default()
@@ -141,7 +139,7 @@ fn headed(path: &Path, names: Option<&[String]>, topic: Option<&str>) -> Result<
         let (role, values) = take(
             &mut raw,
             |role| matches!(role, Role::Signal { channel: c, .. } if *c == channel),
-        )?
+        )
         .ok_or_else(|| {
             lacking(
                 &shown,
@@ -186,21 +184,14 @@ fn lacking(path: &str, message: &str) -> Error {
 }
 
 /// The first column of such a role, with its numbers.
-fn take(
-    raw: &mut Raw,
-    is_wanted: impl Fn(&Role) -> bool,
-) -> Result<Option<(Role, Vec<f64>)>, Error> {
-    let Some(index) = raw.columns.iter().position(|c| is_wanted(&c.role)) else {
-        return Ok(None);
-    };
+fn take(raw: &mut Raw, is_wanted: impl Fn(&Role) -> bool) -> Option<(Role, Vec<f64>)> {
+    let index = raw.columns.iter().position(|c| is_wanted(&c.role))?;
     let column = raw.columns.swap_remove(index);
-    let values = column.values.into_vec();
-    let values = values.map_err(storage(&raw.path))?;
-    Ok(Some((column.role, values)))
+    Some((column.role, column.values))
 }
 
 fn times(raw: &mut Raw) -> Result<Vec<f64>, Error> {
-    let found = take(raw, |role| matches!(role, Role::Time { .. }))?;
+    let found = take(raw, |role| matches!(role, Role::Time { .. }));
     let (role, values) = found.ok_or_else(|| lacking(&raw.path, "no time column"))?;
     let unit = match role {
         Role::Time { unit_s: Some(unit) } => unit,

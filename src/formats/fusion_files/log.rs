@@ -3,10 +3,9 @@
 use super::Remark;
 use super::fixes::Fixes;
 use super::rtklib::of_unix;
-use crate::formats::logs::{self, LogOptions};
-use crate::formats::{FileError, Place, Setting};
+use crate::formats::{FileError, Place, Setting, logs};
 use glam::DVec3;
-use nav_sim_logs::{Clock, Fix};
+use nav_sim_logs::{Clock, Fix, Stamp};
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
 use nav_sim_signal::units::DEG;
 use std::path::Path;
@@ -22,9 +21,8 @@ pub(super) fn fixes(
     imu_s: Option<(f64, f64)>,
 ) -> Result<Fixes, FileError> {
     let refused = |e| logs::refused(path, e);
-    let options = LogOptions::default();
-    let log = logs::open(path, &options)?;
-    let mut read = log.fixes(topic, options.stamp).map_err(refused)?;
+    let log = logs::open(path)?;
+    let mut read = log.fixes(topic, Stamp::default()).map_err(refused)?;
     let mut fixes = Vec::new();
     for (row, fix) in read.by_ref().enumerate() {
         let fix = of_log(&fix.map_err(refused)?, unsaid).ok_or_else(|| {
@@ -52,7 +50,9 @@ pub(super) fn fixes(
             .for_each(|(_, fix)| fix.t_s -= clock.origin_s);
         said = format!("{said}, in {}", clock.name);
     }
-    Ok((fixes, vec![Remark::note(said)]))
+    let cut = read.damage().or(log.damage()).map(logs::cut_off);
+    let remarks = cut.map(Remark::doubt).into_iter();
+    Ok((fixes, remarks.chain([Remark::note(said)]).collect()))
 }
 
 /// The same fix with angles in radians; none without standard deviations.

@@ -1,10 +1,10 @@
 //! Recordings in `.npz`: arrays by name.
 
-use super::error::{sample, storage};
+use super::error::sample;
 use super::header::{HeaderPlace, Layout};
 use super::log::column;
 use super::options::ReadOptions;
-use super::table::{BEYOND, LARGEST, Lines, Notes, Raw, settle};
+use super::table::{BEYOND, LARGEST, Lines, Notes, Raw};
 use crate::formats::{FileError, Place, logs};
 use nav_sim_logs::Error;
 use nav_sim_logs::npz::{self, Array};
@@ -81,7 +81,6 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError>
         );
         return Err(FileError::contents(shown.as_str(), Place::Within, message));
     }
-    settle(&mut found, options).map_err(storage(&shown))?;
     let (lines, notes, ignored) = (Lines::default(), Notes::default(), layout.ignored);
     Ok(Raw {
         path: shown.clone(),

@@ -1,10 +1,10 @@
 //! Recordings in `.npy`: columns named by the manifest of their synthesis, by the caller, or by their number.
 
-use super::error::{COLUMNS, sample, storage};
+use super::error::{COLUMNS, sample};
 use super::header::{HeaderPlace, Layout, npy_order};
 use super::manifest::{MANIFEST, Manifest};
 use super::options::ReadOptions;
-use super::table::{BETWEEN, BEYOND, LARGEST, Lines, Notes, Raw, empty_columns, relieve, settle};
+use super::table::{BEYOND, LARGEST, Lines, Notes, Raw, empty_columns, fits};
 use crate::formats::{FileError, Place, Setting, npy};
 use std::path::Path;
 
@@ -36,8 +36,7 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError>
     let place: Vec<Option<usize>> = (0..expected)
         .map(|index| indices.iter().position(|i| *i == index))
         .collect();
-    let stored = storage(&name);
-    let mut count = 0;
+    fits(&name, &columns, array.rows() as u64)?;
     array.each(|row, index, value| {
         let Some(target) = place[index] else {
             return Ok(());
@@ -50,14 +49,9 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError>
                 value,
             ));
         }
-        if count % BETWEEN == 0 {
-            relieve(&mut columns, options).map_err(&stored)?;
-        }
-        count += 1;
         columns[target].values.push(value);
         Ok(())
     })?;
-    settle(&mut columns, options).map_err(&stored)?;
     Ok(Raw {
         path: name.clone(),
         columns,

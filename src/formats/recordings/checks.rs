@@ -1,16 +1,13 @@
 //! Units and plausibility of the signals.
 
-use super::error::{no_unit, storage};
+use super::error::no_unit;
 use super::header::{Role, Unit};
 use super::report::FileReport;
 use super::table::{Column, Raw};
-use super::values::Values;
 use crate::formats::{FileError, Place, Setting};
 use crate::report::six_digits;
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::units::STANDARD_GRAVITY;
-use std::io;
-use std::ops::Range;
 
 /// Below this (m/s²) the mean was removed before: nothing to be learnt from it.
 const NO_GRAVITY: f64 = 0.3;
@@ -22,7 +19,7 @@ pub(super) fn factors(raw: &Raw, rate_hz: f64) -> Result<Vec<f64>, FileError> {
         let Role::Signal { channel, unit } = column.role else {
             return Ok(1.0);
         };
-        if let Some(value) = only_value(&column.values).map_err(storage(&raw.path))? {
+        if let Some(value) = only_value(&column.values) {
             let message = format!(
                 "{channel} (column \"{}\") is dead: every sample is {value}",
                 column.name
@@ -62,9 +59,8 @@ pub(in crate::formats) fn gravity_factor(raw: &Raw) -> Result<f64, FileError> {
     };
     let means = unnamed
         .iter()
-        .map(|c| mean(&c.values, 0..c.values.len(), 1.0))
-        .collect::<Result<Vec<_>, _>>();
-    let means = means.map_err(storage(&raw.path))?;
+        .map(|c| mean(&c.values, 1.0))
+        .collect::<Vec<_>>();
     let norm = norm(&means);
     let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
     if unnamed.len() == 3 {
@@ -82,18 +78,15 @@ pub(in crate::formats) fn gravity_factor(raw: &Raw) -> Result<f64, FileError> {
 }
 
 /// The value of all samples, if two or more have the same.
-fn only_value(values: &Values) -> io::Result<Option<f64>> {
-    let (mut first, mut is_same) = (None, values.len() > 1);
-    values.each_block(0..values.len(), |block| {
-        let first = first.get_or_insert(block[0]).to_bits();
-        is_same &= block.iter().all(|value| value.to_bits() == first);
-    })?;
-    Ok(first.filter(|_| is_same))
+fn only_value(values: &[f64]) -> Option<f64> {
+    let (first, rest) = values.split_first()?;
+    let is_same = |value: &f64| value.to_bits() == first.to_bits();
+    (!rest.is_empty() && rest.iter().all(is_same)).then_some(*first)
 }
 
 /// Warns of axes whose samples pile up at an end of their range. Noise that is quantized, however coarsely, has fewer
 /// values at its ends than next to them.
-pub(super) fn clipped(raw: &Raw, report: &mut FileReport) -> Result<(), FileError> {
+pub(super) fn clipped(raw: &Raw, report: &mut FileReport) {
     const SHARE: f64 = 0.01;
     const FEWEST: usize = 20;
     for column in &raw.columns {
@@ -101,9 +94,7 @@ pub(super) fn clipped(raw: &Raw, report: &mut FileReport) -> Result<(), FileErro
             continue;
         };
         let rows = column.values.len() as f64;
-        let ends = [1.0, -1.0].map(|side| outermost(&column.values, side));
-        let [high, low] = ends.map(|end| end.map_err(storage(&raw.path)));
-        let (high, low) = (high?, low?);
+        let [high, low] = [1.0, -1.0].map(|side| outermost(&column.values, side));
         let has_four_values = -low[1].0 < high[1].0;
         for (side, [end, next]) in [(1.0, high), (-1.0, low)] {
             let share = end.1 as f64 / rows;
@@ -115,33 +106,31 @@ pub(super) fn clipped(raw: &Raw, report: &mut FileReport) -> Result<(), FileErro
             }
         }
     }
-    Ok(())
 }
 
 /// The two outermost values on a side (times ±1), and how often each comes.
-fn outermost(values: &Values, side: f64) -> io::Result<[(f64, usize); 2]> {
+fn outermost(values: &[f64], side: f64) -> [(f64, usize); 2] {
     let mut ends = [(f64::NEG_INFINITY, 0); 2];
-    values.each_block(0..values.len(), |block| {
-        for value in block.iter().map(|value| value * side) {
-            match ends.iter().position(|end| end.0 == value) {
-                Some(known) => ends[known].1 += 1,
-                None if value > ends[0].0 => ends = [(value, 1), ends[0]],
-                None if value > ends[1].0 => ends[1] = (value, 1),
-                None => {}
-            }
+    for value in values.iter().map(|value| value * side) {
+        match ends.iter().position(|end| end.0 == value) {
+            Some(known) => ends[known].1 += 1,
+            None if value > ends[0].0 => ends = [(value, 1), ends[0]],
+            None if value > ends[1].0 => ends[1] = (value, 1),
+            None => {}
         }
-    })?;
-    Ok(ends)
+    }
+    ends
 }
 
-/// The mean of a stretch times a factor, summed about the first of them so that a large offset costs no digits.
-pub(super) fn mean(values: &Values, range: Range<usize>, factor: f64) -> io::Result<f64> {
-    let (mut first, mut sum, count) = (None, 0.0, range.len() as f64);
-    values.each_block(range, |block| {
-        let first = *first.get_or_insert(block[0] * factor);
-        sum += block.iter().map(|v| v * factor - first).sum::<f64>();
-    })?;
-    Ok(first.map_or(0.0, |first| first + sum / count))
+/// Mean of values times a factor, summed about the first of them so that a large offset costs no digits.
+pub(super) fn mean(values: &[f64], factor: f64) -> f64 {
+    /// Values whose sum is taken before it is added: rounding grows with their number.
+    const BLOCK: usize = 4096;
+    let Some(first) = values.first().map(|first| first * factor) else {
+        return 0.0;
+    };
+    let sum_of = |block: &[f64]| block.iter().map(|v| v * factor - first).sum::<f64>();
+    first + values.chunks(BLOCK).map(sum_of).sum::<f64>() / values.len() as f64
 }
 
 fn norm(vector: &[f64]) -> f64 {

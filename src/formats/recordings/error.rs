@@ -22,17 +22,11 @@ pub(super) fn unreadable(path: &Path, source: io::Error) -> FileError {
     }
 }
 
-/// For a file whose samples cannot be kept, or taken back.
-pub(in crate::formats) fn storage(path: &str) -> impl Fn(io::Error) -> FileError {
-    move |source| {
-        let message = format!(
-            "too long to be held in memory, and its samples cannot be kept in a temporary file: {source}"
-        );
-        FileError::io(Path::new(path), io::Error::other(message))
-            .advice("make room there")
-            .advice("name another directory in TMPDIR")
-            .setting(Setting::FewerChannels)
-    }
+/// A file whose samples are more than the memory that is free.
+pub(super) fn too_large(path: &str, needed: u64, free: u64) -> FileError {
+    let [needed, free] = [needed, free].map(|bytes| bytes.div_ceil(1 << 20));
+    let message = format!("its samples need {needed} MiB of memory, and {free} MiB are free");
+    FileError::contents(path, Place::Within, message).setting(Setting::FewerChannels)
 }
 
 /// A sample that is no measurement.

@@ -1,10 +1,9 @@
 //! Recordings in logs: the samples of one IMU.
 
-use super::error::{sample, storage};
+use super::error::sample;
 use super::header::{Role, Unit, column_name};
 use super::options::ReadOptions;
-use super::table::{BETWEEN, BEYOND, Column, LARGEST, Lines, Notes, Raw, relieve, settle};
-use super::values::Values;
+use super::table::{BETWEEN, BEYOND, Column, LARGEST, Lines, Notes, Raw, fits};
 use crate::formats::{FileError, logs};
 use nav_sim_logs::{Clock, ImuSample};
 use nav_sim_signal::imu::Channel;
@@ -14,7 +13,7 @@ use std::path::Path;
 pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
     let name = path.display().to_string();
     let refused = |e| logs::refused(path, e);
-    let log = logs::open(path, &options.log)?;
+    let log = logs::open(path)?;
     let mut samples = log
         .imu(options.log.topic.as_deref(), options.log.stamp)
         .map_err(refused)?;
@@ -35,11 +34,10 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError>
             },
         )
     }));
-    let stored = storage(&name);
     for (row, read) in samples.by_ref().enumerate() {
         let read: ImuSample = read.map_err(refused)?;
         if row % BETWEEN == 0 {
-            relieve(&mut columns, options).map_err(&stored)?;
+            fits(&name, &columns, (row + BETWEEN) as u64)?;
         }
         columns[0].values.push(read.t_s());
         let (accel, gyro) = read.motion.rates();
@@ -63,11 +61,10 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError>
             column.values.push(value);
         }
     }
-    settle(&mut columns, options).map_err(&stored)?;
     let mut notes = Notes::default();
     notes.assumptions.push(format!("topic {}", samples.topic()));
     let damage = log.damage().or(samples.damage());
-    notes.warnings.extend(damage.map(logs::recovered));
+    notes.warnings.extend(damage.map(logs::cut_off));
     let other = |c: &&nav_sim_logs::Channel| c.topic != samples.topic() && c.clock == Clock::Unix;
     let ignored = log
         .channels()
@@ -89,6 +86,6 @@ pub(super) fn column(name: String, role: Role) -> Column {
     Column {
         name,
         role,
-        values: Values::default(),
+        values: Vec::new(),
     }
 }

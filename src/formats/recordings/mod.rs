@@ -26,7 +26,6 @@ mod table;
 mod text;
 pub(in crate::formats) mod time_unit;
 pub(in crate::formats) mod timing;
-mod values;
 mod write;
 
 pub(crate) use files::{is_recording, listed};
@@ -53,20 +52,14 @@ pub fn read(
     paths: &[PathBuf],
     options: &ReadOptions,
 ) -> Result<(Vec<Recording>, Report), FileError> {
-    let options = ReadOptions {
-        hold_bytes: usize::MAX,
-        ..options.clone()
-    };
-    visit(paths, &options, &|recording| recording, &|_, _| {})
+    visit(paths, options, &|recording| recording, &|_, _| {})
 }
 
 /// Files that are read side by side.
 const AT_ONCE: usize = 8;
 
 /// Reads recordings and shows each to `look`, from any thread, then lets it go: no more than eight files are held at a
-/// time. The signals of a file longer than is to be held
-/// ([`ReadOptions::hold_bytes`]) are shown one by one, as recordings of the same name, no two at a time. What
-/// `look` returned is in the order of the files. `tell` is told how many files are done, and of how many, from 0 on.
+/// time. What `look` returned is in the order of the files. `tell` is told how many files are done, and of how many, from 0 on.
 ///
 /// # Errors
 /// When a file cannot be read, or holds what no sound recording can: [`FileError`].
@@ -107,11 +100,8 @@ pub(crate) fn visit<T: Send>(
                     report.warnings.push(text);
                 }
                 outcome => {
-                    let (of_file, held, stored) = outcome?;
+                    let (of_file, held) = outcome?;
                     looks.extend(held);
-                    for recording in stored.iter().flat_map(Prepared::signals) {
-                        looks.push(look(recording?));
-                    }
                     report.files.push(of_file);
                 }
             }
@@ -130,21 +120,17 @@ pub(crate) fn visit<T: Send>(
     Ok((looks, report))
 }
 
-/// What `look` made of a file that is held; or the file, if it is stored.
+/// Results of `look` for the recordings of a file.
 fn held<T>(
     path: &Path,
     options: &ReadOptions,
     look: &(dyn Fn(Recording) -> T + Sync),
-) -> Result<(FileReport, Vec<T>, Option<Prepared>), FileError> {
+) -> Result<(FileReport, Vec<T>), FileError> {
     let (prepared, mut report) = Prepared::new(load(path, options)?, options)?;
     path.clone_into(&mut report.path);
-    if prepared.is_stored() {
-        return Ok((report, Vec::new(), Some(prepared)));
-    }
     Ok((
         report,
-        prepared.recordings()?.into_iter().map(look).collect(),
-        None,
+        prepared.recordings().into_iter().map(look).collect(),
     ))
 }
 

@@ -21,8 +21,6 @@ pub struct ReadOptions {
     pub log: LogOptions,
     /// Fewest samples a recording must have (at least 2).
     pub min_samples: usize,
-    /// Bytes of one file's samples that are held in memory (512 MiB); those of a longer one wait in a temporary file.
-    pub hold_bytes: usize,
 }
 
 impl Default for ReadOptions {
@@ -35,7 +33,6 @@ impl Default for ReadOptions {
             columns: None,
             log: LogOptions::default(),
             min_samples: 2,
-            hold_bytes: 512 << 20,
         }
     }
 }

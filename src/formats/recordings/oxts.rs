@@ -7,7 +7,7 @@
 use super::error::{empty, unreadable};
 use super::header::{HeaderPlace, Layout};
 use super::options::ReadOptions;
-use super::table::{Lines, Notes, Raw, empty_columns, settle};
+use super::table::{Lines, Notes, Raw, empty_columns};
 use super::text::number;
 use crate::formats::{FileError, source};
 use chrono::NaiveDateTime;
@@ -69,7 +69,6 @@ pub(super) fn load(directory: &Path, options: &ReadOptions) -> Result<Raw, FileE
             .zip(&mut columns)
             .for_each(|(index, column)| column.values.push(row[*index]));
     }
-    settle(&mut columns, options).map_err(super::error::storage(&name))?;
     let (lines, mut notes) = (Lines::default(), Notes::default());
     notes
         .assumptions

@@ -1,11 +1,9 @@
 //! Recordings in Apache Parquet: columns by their names, read one after the other.
 
-use super::error::{sample, storage, unreadable};
+use super::error::{sample, unreadable};
 use super::header::{HeaderPlace, Layout};
 use super::options::ReadOptions;
-use super::table::{
-    BETWEEN, BEYOND, Column, LARGEST, Lines, Notes, Raw, empty_columns, relieve, settle,
-};
+use super::table::{BETWEEN, BEYOND, Column, LARGEST, Lines, Notes, Raw, empty_columns, fits};
 use crate::formats::{FileError, Place};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
@@ -44,6 +42,8 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError>
     };
     let layout = Layout::new(place, &names, false, options.channels.as_deref())?;
     let (indices, mut columns) = empty_columns(&layout);
+    let rows = reader.metadata().file_metadata().num_rows();
+    fits(&name, &columns, rows.cast_unsigned())?;
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group).map_err(damaged)?;
         for (k, index) in indices.iter().enumerate() {
@@ -62,10 +62,8 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError>
                     return Err(FileError::contents(name, Place::Within, message));
                 }
             }
-            relieve(&mut columns, options).map_err(storage(&name))?;
         }
     }
-    settle(&mut columns, options).map_err(storage(&name))?;
     let (lines, notes) = (Lines::default(), Notes::default());
     Ok(Raw {
         path: name,

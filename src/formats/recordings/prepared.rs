@@ -1,7 +1,7 @@
 //! A file whose time, units and stretches are decided: what is left is to take its samples.
 
 use super::checks;
-use super::error::{storage, too_short};
+use super::error::too_short;
 use super::header::Role;
 use super::options::ReadOptions;
 use super::report::{FileReport, name_of};
@@ -44,21 +44,16 @@ impl Prepared {
             .retain(|c| matches!(c.role, Role::Signal { .. }));
         raw.columns.sort_by_key(|c| c.channel().map(Channel::index));
         let factors = checks::factors(&raw, timing.rate_hz)?;
-        checks::clipped(&raw, &mut report)?;
+        checks::clipped(&raw, &mut report);
         let samples = raw.columns.first().map_or(0, |c| c.values.len());
         let pieces = pieces(&raw.path, samples, &timing, options, &mut report)?;
-        let stored = storage(&raw.path);
         let mut columns = Vec::new();
         for (column, factor) in raw.columns.into_iter().zip(factors) {
             let Some(channel) = column.channel() else {
                 continue;
             };
-            let mean = |piece: &Range<usize>| checks::mean(&column.values, piece.clone(), factor);
-            let means = pieces
-                .iter()
-                .map(mean)
-                .collect::<Result<_, _>>()
-                .map_err(&stored)?;
+            let mean = |piece: &Range<usize>| checks::mean(&column.values[piece.clone()], factor);
+            let means = pieces.iter().map(mean).collect();
             columns.push(Signals {
                 column,
                 channel,
@@ -94,64 +89,26 @@ impl Prepared {
         ))
     }
 
-    pub(super) fn is_stored(&self) -> bool {
-        self.columns.iter().any(|c| c.column.values.is_stored())
-    }
-
     /// All recordings of the file.
-    pub(super) fn recordings(self) -> Result<Vec<Recording>, FileError> {
-        let mut recordings: Vec<Recording> =
-            (0..self.pieces.len()).map(|i| self.recording(i)).collect();
-        for signals in self.columns {
-            let Signals {
-                column,
-                channel,
-                factor,
-                means,
-            } = signals;
-            let stretches = column.values.into_stretches(&self.pieces);
-            let stretches = stretches.map_err(storage(&self.path))?;
-            let pieces = recordings
-                .iter_mut()
-                .zip(&self.pieces)
-                .zip(stretches)
-                .zip(means);
-            for (((recording, piece), samples), mean) in pieces {
-                let samples = with_holes(samples, piece, &self.holes);
-                recording
-                    .signals
-                    .push(signal(channel, samples, factor, mean));
-            }
-        }
-        Ok(recordings)
-    }
-
-    /// One signal at a time, as recordings: those of the first stretch, those of the next.
-    pub(super) fn signals(&self) -> impl Iterator<Item = Result<Recording, FileError>> {
-        let recording_of_signal = |(i, piece, signals): (usize, &Range<usize>, &Signals)| {
-            let samples = signals.column.values.stretch(piece.clone());
-            let samples = samples.map_err(storage(&self.path))?;
-            let samples = with_holes(samples, piece, &self.holes);
-            let signal = signal(signals.channel, samples, signals.factor, signals.means[i]);
-            Ok(Recording {
-                signals: vec![signal],
-                ..self.recording(i)
-            })
-        };
-        let pieces = self.pieces.iter().enumerate();
-        pieces
-            .flat_map(|(i, piece)| self.columns.iter().map(move |c| (i, piece, c)))
-            .map(recording_of_signal)
-    }
-
-    /// A recording without its signals.
-    fn recording(&self, piece: usize) -> Recording {
-        let name = name_of(&self.path, piece, self.pieces.len());
-        Recording {
-            name,
+    pub(super) fn recordings(self) -> Vec<Recording> {
+        let empty = |i| Recording {
+            name: name_of(&self.path, i, self.pieces.len()),
             rate_hz: self.rate_hz,
             signals: Vec::new(),
+        };
+        let mut recordings: Vec<Recording> = (0..self.pieces.len()).map(empty).collect();
+        // column by column, so that each is let go when it is copied
+        for of_file in self.columns {
+            for ((recording, piece), mean) in
+                recordings.iter_mut().zip(&self.pieces).zip(of_file.means)
+            {
+                let samples = with_holes(&of_file.column.values[piece.clone()], piece, &self.holes);
+                recording
+                    .signals
+                    .push(signal(of_file.channel, samples, of_file.factor, mean));
+            }
         }
+        recordings
     }
 }
 
@@ -176,10 +133,7 @@ fn missing<'a>(
 }
 
 /// The samples of a stretch with NaN where some are missing.
-fn with_holes(samples: Vec<f64>, piece: &Range<usize>, holes: &[(usize, usize)]) -> Vec<f64> {
-    if missing(holes, piece).next().is_none() {
-        return samples;
-    }
+fn with_holes(samples: &[f64], piece: &Range<usize>, holes: &[(usize, usize)]) -> Vec<f64> {
     let mut whole =
         Vec::with_capacity(samples.len() + missing(holes, piece).map(|(_, n)| n).sum::<usize>());
     let mut done = 0;

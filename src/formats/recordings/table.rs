@@ -1,8 +1,8 @@
 //! A file as columns of numbers, before anything is decided about time and units.
 
+use super::error::too_large;
 use super::header::{Found, Layout, Role};
-use super::options::ReadOptions;
-use super::values::Values;
+use crate::formats::FileError;
 use nav_sim_signal::imu::Channel;
 
 /// A file's columns as found, before anything is decided about time and units.
@@ -32,7 +32,7 @@ pub(crate) struct Notes {
 pub(crate) struct Column {
     pub(crate) name: String,
     pub(crate) role: Role,
-    pub(crate) values: Values,
+    pub(crate) values: Vec<f64>,
 }
 
 impl Column {
@@ -49,7 +49,7 @@ pub(super) fn empty_columns(layout: &Layout) -> (Vec<usize>, Vec<Column>) {
     let empty = |f: &Found| Column {
         name: f.name.clone(),
         role: f.role,
-        values: Values::default(),
+        values: Vec::new(),
     };
     layout.found.iter().map(|f| (f.index, empty(f))).unzip()
 }
@@ -84,30 +84,23 @@ impl Lines {
 pub(super) const LARGEST: f64 = 1e100;
 pub(super) const BEYOND: &str = "is beyond 1e100, no measurement";
 
-/// So many rows, or elements, come between one look at what is held and the next.
+/// Rows from one look at the memory to the next.
 pub(super) const BETWEEN: usize = 1 << 16;
 
-/// Stores the columns of a file that are more than is to be held.
-pub(super) fn relieve(columns: &mut [Column], options: &ReadOptions) -> std::io::Result<()> {
-    let bytes: usize = columns
-        .iter()
-        .map(|c| size_of::<f64>() * c.values.len())
-        .sum();
-    if bytes > options.hold_bytes {
-        columns.iter_mut().try_for_each(|c| c.values.store())?;
+/// Refuses columns whose rows, so many or more, do not fit into the memory that is free.
+pub(super) fn fits(path: &str, columns: &[Column], rows: u64) -> Result<(), FileError> {
+    let bytes = |rows: u64| rows.saturating_mul((size_of::<f64>() * columns.len()) as u64);
+    let held = bytes(columns.first().map_or(0, |c| c.values.len() as u64));
+    let free = free_memory().map_or(u64::MAX, |free| free.saturating_add(held));
+    if bytes(rows) > free {
+        return Err(too_large(path, bytes(rows), free));
     }
     Ok(())
 }
 
-/// Once all is read: all columns of the file are stored, or none.
-pub(super) fn settle(columns: &mut [Column], options: &ReadOptions) -> std::io::Result<()> {
-    relieve(columns, options)?;
-    let any = columns.iter().any(|c| c.values.is_stored());
-    for column in columns {
-        if any {
-            column.values.store()?;
-        }
-        column.values.fit();
-    }
-    Ok(())
+/// Memory that is free (bytes), where the system says it.
+fn free_memory() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let (_, rest) = text.split_once("MemAvailable:")?;
+    Some(rest.split_whitespace().next()?.parse::<u64>().ok()? << 10)
 }

@@ -413,7 +413,7 @@ fn absurd_numbers_are_refused_with_their_place() {
 /// Files that wait on disk show the same signals as files that are held, one by one: a time column in ms, increments,
 /// units told from gravity, stretches between gaps, a warm-up; a gzipped table and arrays.
 #[test]
-fn what_is_not_held_reads_the_same() {
+fn warm_up_and_gaps_are_left_out_of_every_kind_of_file() {
     let g = [0.1, -0.05, 0.99];
     let row = |k: usize, t: usize| {
         let noise = |i: usize| 1e-3 * ((k * (i + 3)) % 11) as f64;
@@ -455,20 +455,21 @@ fn what_is_not_held_reads_the_same() {
         rate_hz: Some(100.0),
         ..ReadOptions::default()
     };
-    let (held, report) = read(&paths, &options).unwrap();
+    let (held, _) = read(&paths, &options).unwrap();
     assert_eq!(
         held.iter().map(Recording::len).collect::<Vec<_>>(),
         [8851, 10_999, 19_850, 8850]
     );
-    let on_disk = ReadOptions {
-        hold_bytes: 0,
-        ..options
-    };
-    let (mut shown, same) = visit(&paths, &on_disk, &|r| r, &|_, _| {}).unwrap();
-    assert_eq!(same, report);
-    assert!(shown.iter().all(|r| r.signals.len() == 1) && shown.len() == 4 * 6);
-    for whole in &held {
-        let signals: Vec<Signal> = shown.drain(..6).flat_map(|r| r.signals).collect();
-        assert_eq!(signals, whole.signals);
-    }
+}
+
+#[test]
+fn samples_beyond_the_memory_are_refused_with_both_figures() {
+    let column = super::log::column("t_s".to_owned(), super::header::Role::Counter);
+    let e = super::table::fits("a.csv", &[column], u64::MAX / 16).unwrap_err();
+    let text = e.to_string();
+    assert!(
+        text.starts_with("a.csv: its samples need 8796093022208 MiB of memory, and ")
+            && text.ends_with(" MiB are free"),
+        "{text}"
+    );
 }

@@ -1,13 +1,10 @@
 //! Text tables: comment head, header, rows.
 
-use super::error::{COLUMNS, empty, sample, shown, storage, unreadable};
+use super::error::{COLUMNS, empty, sample, shown, unreadable};
 use super::header::{HeaderPlace, Layout, Role, classify};
 use super::lines::Blanks;
 use super::options::ReadOptions;
-use super::table::{
-    BETWEEN, BEYOND, Column, LARGEST, Lines, Notes, Raw, empty_columns, relieve, settle,
-};
-use super::values::Values;
+use super::table::{BETWEEN, BEYOND, Column, LARGEST, Lines, Notes, Raw, empty_columns, fits};
 use crate::formats::error::decimal_comma;
 use crate::formats::{FileError, Kind, Place, Setting, source};
 use std::io::{BufRead, Cursor, Read};
@@ -46,31 +43,16 @@ pub(super) fn parse(
             .assumptions
             .push("header not in UTF-8, taken as ISO-8859-1".to_owned());
     }
-    let lines = read_rows(
-        name,
-        reader,
-        &head,
-        &indices,
-        &mut columns,
-        options,
-        &mut notes,
-    )?;
+    let lines = read_rows(name, reader, &head, &indices, &mut columns, &mut notes)?;
     if lines.is_empty() {
         return Err(empty(name));
     }
-    let stored = storage(name);
-    settle(&mut columns, options).map_err(&stored)?;
-    let mut kept = Vec::new();
-    for column in columns {
-        if column.role != Role::Ticks || all_finite(&column.values).map_err(&stored)? {
-            kept.push(column);
-        }
-    }
+    columns.retain(|c| c.role != Role::Ticks || c.values.iter().all(|v| v.is_finite()));
     let head_rate = head.rate_hz.map(|rate_hz| (rate_hz, "head of the file"));
     let ignored = layout.ignored;
     Ok(Raw {
         path: name.to_owned(),
-        columns: kept,
+        columns,
         ignored,
         head_rate,
         lines,
@@ -222,15 +204,6 @@ fn split(text: &str, delimiter: u8) -> Vec<String> {
     cells
 }
 
-/// Whether there is no NaN in a column.
-fn all_finite(values: &Values) -> std::io::Result<bool> {
-    let mut finite = true;
-    values.each_block(0..values.len(), |block| {
-        finite &= block.iter().all(|v| v.is_finite())
-    })?;
-    Ok(finite)
-}
-
 /// Appends every row's values to their columns; what is passed over becomes a note.
 fn read_rows(
     name: &str,
@@ -238,7 +211,6 @@ fn read_rows(
     head: &Head,
     indices: &[usize],
     columns: &mut [Column],
-    options: &ReadOptions,
     notes: &mut Notes,
 ) -> Result<Lines, FileError> {
     let rows = Cursor::new(head.first_row.clone()).chain(reader);
@@ -256,6 +228,8 @@ fn read_rows(
     let (mut lines, mut record, mut sample) = (Lines::default(), csv::ByteRecord::new(), 0);
     let mut has_units = false;
     let expected = head.names.len();
+    // of a packed file no more than what is read is known
+    let length = std::fs::metadata(name).map_or(0, |m| m.len());
     let cannot = |e| unreadable(Path::new(name), of_csv(e));
     while rows.read_byte_record(&mut record).map_err(cannot)? {
         let line = head.lines_before + line_of(&record, rows.position().line());
@@ -288,7 +262,8 @@ fn read_rows(
             return Err(FileError::row_length(name, line, found, expected));
         }
         if sample % BETWEEN == 0 {
-            relieve(columns, options).map_err(storage(name))?;
+            let expected = (sample as u64).saturating_mul(length) / rows.position().byte().max(1);
+            fits(name, columns, expected.max((sample + BETWEEN) as u64))?;
         }
         for (index, column) in indices.iter().zip(columns.iter_mut()) {
             let cell = record.get(*index).unwrap_or_default();

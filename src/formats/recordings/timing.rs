@@ -1,19 +1,13 @@
 //! Sample rate, gaps and duplicates, from the time column or the packet counter.
 
-use super::error::{storage, too_short};
+use super::error::too_short;
 use super::header::Role;
 use super::options::{Gaps, ReadOptions};
 use super::report::FileReport;
 use super::table::{Column, Raw};
 use super::time_unit::{Guess, UNITS, USUAL_RATES_HZ};
-use super::values::Values;
 use crate::formats::{FileError, Place, Setting};
 use crate::report::six_digits;
-
-/// All numbers of a column.
-fn of_file(raw: &Raw, values: Values) -> Result<Vec<f64>, FileError> {
-    values.into_vec().map_err(storage(&raw.path))
-}
 
 /// When the samples were taken.
 #[derive(Debug)]
@@ -53,9 +47,9 @@ pub(super) fn timing(
         agree(raw, options, report)?;
     }
     let clock = match (time, counter, ticks, known) {
-        (Some(time), ..) => Clock::of_time(time, raw, options, report)?,
+        (Some(time), ..) => Clock::of_time(time, raw, options, report),
         (None, Some(counter), _, Some((rate_hz, source))) => {
-            let mut clock = Clock::counting(counter, raw, 65536.0, 1.0)?;
+            let mut clock = Clock::counting(counter, 65536.0, 1.0);
             // The counter tells what was lost, not the rate: with a skip factor it counts by more than one.
             clock.unit_s = 1.0 / (rate_hz * median_step(&clock.since).max(1.0));
             Clock {
@@ -63,7 +57,7 @@ pub(super) fn timing(
                 ..clock
             }
         }
-        (None, _, Some(ticks), _) => Clock::counting(ticks, raw, 4_294_967_296.0, 1e-4)?,
+        (None, _, Some(ticks), _) => Clock::counting(ticks, 4_294_967_296.0, 1e-4),
         (None, _, None, Some((rate_hz, source))) => {
             report.rate_from = source.into();
             return Ok(Timing {
@@ -201,13 +195,8 @@ struct Clock {
 }
 
 impl Clock {
-    fn of_time(
-        column: Column,
-        raw: &Raw,
-        options: &ReadOptions,
-        report: &mut FileReport,
-    ) -> Result<Self, FileError> {
-        let (name, mut since) = (column.name, of_file(raw, column.values)?);
+    fn of_time(column: Column, raw: &Raw, options: &ReadOptions, report: &mut FileReport) -> Self {
+        let (name, mut since) = (column.name, column.values);
         let first = since.first().copied().unwrap_or(0.0);
         if let Some(week) = week_of(&since, column.role) {
             report.assumptions.push(format!(
@@ -231,27 +220,27 @@ impl Clock {
                 guess.unit_s
             }
         };
-        Ok(Self {
+        Self {
             name,
             start: first * unit_s,
             since,
             unit_s,
             source: "time column".into(),
-        })
+        }
     }
 
     /// A counter that starts again at 0 when it reaches `modulus`.
-    fn counting(column: Column, raw: &Raw, modulus: f64, unit_s: f64) -> Result<Self, FileError> {
-        let mut since = of_file(raw, column.values)?;
+    fn counting(column: Column, modulus: f64, unit_s: f64) -> Self {
+        let mut since = column.values;
         unwrap(&mut since, modulus);
         let source = format!("column \"{}\"", column.name);
-        Ok(Self {
+        Self {
             source,
             name: column.name,
             start: 0.0,
             since,
             unit_s,
-        })
+        }
     }
 
     fn time_of(&self, sample: usize) -> f64 {

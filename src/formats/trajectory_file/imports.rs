@@ -1,20 +1,14 @@
-//! Trajectories of other tools: KF-GINS results, TUM, motion definitions of gnss-ins-sim.
+//! Trajectories of other tools: KF-GINS results, TUM.
 
 use super::Options;
 use super::samples::{Attitude, Rows, local};
-use super::table::{Numbers, Table, no_rows};
+use super::table::{Numbers, Table};
 use crate::formats::FileError as Error;
 use glam::{DQuat, DVec3};
-use nav_sim_navigation::trajectory::TrajectorySample;
-use nav_sim_navigation::trajectory::import::{BodyMotion, Command};
-use nav_sim_signal::units::DEG;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 /// Seconds of a GNSS week.
 const WEEK_S: f64 = 604_800.0;
-
-/// Longest motion definition (s).
-const DAY_S: f64 = 86_400.0;
 
 /// A KF-GINS navigation result or truth: week, seconds of week, latitude, longitude (deg), height (m), velocity
 /// north, east, down (m/s), roll, pitch, yaw (deg), between blanks. Read as our own table, time counted on
@@ -93,121 +87,6 @@ pub(super) fn tum(
     Ok(rows)
 }
 
-/// Whether a text is a motion definition of gnss-ins-sim.
-pub(super) fn is_motion_definition(text: &str) -> bool {
-    text.trim_start().starts_with("ini lat")
-}
-
-/// A motion definition of gnss-ins-sim: a start (latitude, longitude, height, body velocity, yaw, pitch, roll),
-/// then commands (type, yaw, pitch, roll, body velocity, duration): 1 rates of change; 2 values to reach;
-/// 3 changes; 4 attitude to reach, change of velocity; 5 change of attitude, velocity to reach.
-pub(super) fn motion_definition(path: &str, text: &str) -> Result<Rows, Error> {
-    let lines: Vec<(u64, &str)> = text
-        .lines()
-        .enumerate()
-        .map(|(i, l)| (i as u64 + 1, l.trim()))
-        .filter(|(_, l)| !l.is_empty())
-        .collect();
-    let Some((&start, rest)) = lines.get(1).zip(lines.get(3..)) else {
-        return Err(no_rows(path));
-    };
-    let ini = numbers(path, start.0, start.1, 9)?;
-    let mut motion = BodyMotion {
-        start: [ini[0] * DEG, ini[1] * DEG, ini[2]],
-        v_b: DVec3::new(ini[3], ini[4], ini[5]),
-        rpy: DVec3::new(ini[8], ini[7], ini[6]) * DEG,
-        commands: Vec::new(),
-    };
-    let timed = command_all(&mut motion, path, rest)?;
-    let samples = motion.samples();
-    let lines = command_lines(&samples, &motion, start.0, rest);
-    let mut rows = Rows::new(path, lines, samples, Attitude::Given);
-    if !timed {
-        rows.doubt(
-            None,
-            "commands of type 2 to 5 take all of their time, not only what a vehicle needs",
-        );
-    }
-    Ok(rows)
-}
-
-/// Reads the commands of a motion; whether all of them are rates of change, which take the time they say.
-fn command_all(motion: &mut BodyMotion, path: &str, lines: &[(u64, &str)]) -> Result<bool, Error> {
-    let (mut rpy, mut v_b, mut timed, mut total_s) = (motion.rpy, motion.v_b, true, 0.0);
-    for &(line, text) in lines {
-        let cells = numbers(path, line, text, 8)?;
-        let duration_s = cells[7];
-        let (angles, speeds) = (
-            DVec3::new(cells[3], cells[2], cells[1]) * DEG,
-            DVec3::from_slice(&cells[4..7]),
-        );
-        let change = match cells[0] as i64 {
-            1 => (angles * duration_s, speeds * duration_s),
-            2 => (angles - rpy, speeds - v_b),
-            3 => (angles, speeds),
-            4 => (angles - rpy, speeds),
-            5 => (angles, speeds - v_b),
-            _ => {
-                return Err(Error::contents(
-                    path,
-                    line,
-                    format!("command type {} is none of 1 to 5", cells[0]),
-                ));
-            }
-        };
-        total_s += duration_s;
-        if duration_s <= 0.0 || total_s > DAY_S {
-            let message =
-                format!("command duration {duration_s} s is not > 0, or makes more than a day");
-            return Err(Error::contents(path, line, message));
-        }
-        timed &= cells[0] as i64 == 1;
-        (rpy, v_b) = (rpy + change.0, v_b + change.1);
-        motion.commands.push(Command {
-            duration_s,
-            rpy: change.0,
-            v_b: change.1,
-        });
-    }
-    Ok(timed)
-}
-
-/// The line of the command that leads to each sample; that of the start for the first.
-fn command_lines(
-    samples: &[TrajectorySample],
-    motion: &BodyMotion,
-    start: u64,
-    commands: &[(u64, &str)],
-) -> Vec<u64> {
-    let (mut lines, mut end_s) = (vec![start], 0.0);
-    for (command, (line, _)) in motion.commands.iter().zip(commands) {
-        end_s += command.duration_s;
-        let within = samples[lines.len()..]
-            .iter()
-            .take_while(|s| s.t_s <= end_s + 1e-6)
-            .count();
-        lines.extend(std::iter::repeat_n(*line, within));
-    }
-    lines.resize(samples.len(), lines.last().copied().unwrap_or(start));
-    lines
-}
-
-fn numbers(path: &str, line: u64, text: &str, least: usize) -> Result<Vec<f64>, Error> {
-    let number = |cell: &str| match cell.trim().parse::<f64>() {
-        Ok(x) if x.is_finite() => Ok(x),
-        _ => Err(Error::contents(
-            path,
-            line,
-            format!("\"{}\" is not a number", cell.trim()),
-        )),
-    };
-    let cells = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
-    if cells.len() < least {
-        return Err(Error::row_length(path, line, cells.len(), least));
-    }
-    Ok(cells)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -223,10 +102,6 @@ mod tests {
 
     fn tum(path: &str, text: &str, options: &Options) -> Loaded {
         super::tum(path, text, options, Numbers::Finite)?.trajectory()
-    }
-
-    fn motion_definition(path: &str, text: &str) -> Loaded {
-        super::motion_definition(path, text)?.trajectory()
     }
 
     #[test]
@@ -287,44 +162,6 @@ mod tests {
         assert_eq!(
             e,
             "a.tum, line 1: column \"qw\": 2 does not make a unit quaternion with the others"
-        );
-    }
-
-    const HEAD: &str = "ini lat (deg),ini lon (deg),ini alt (m),ini vx_body (m/s),ini vy_body (m/s),ini vz_body \
-                        (m/s),ini yaw (deg),ini pitch (deg),ini roll (deg)\n32,120,5,10,0,0,90,0,0\ncommand type,yaw \
-                        (deg),pitch (deg),roll (deg),vx_body (m/s),vy_body (m/s),vz_body (m/s),command duration (s),GPS \
-                        visibility\n";
-
-    #[test]
-    fn motion_definitions_of_gnss_ins_sim() {
-        let text = format!("{HEAD}1,0,0,0,0,0,0,1,0\n1,-15,0,0,0,0,0,6,0\n5,0,0,0,4,0,0,8,1\n");
-        assert!(is_motion_definition(&text));
-        let (t, warnings) = motion_definition("m.csv", &text).unwrap();
-        assert!(warnings[0].message.contains("type 2 to 5"));
-        assert_eq!(t.end_s(), 15.0);
-        // Facing east, then turned left by 90°: north; slowed down to 4 m/s.
-        assert!((t.state(1.0).v_n - DVec3::Y * 10.0).length() < 1e-4);
-        assert!(
-            (t.state(15.0).v_n - DVec3::X * 4.0).length() < 1e-4,
-            "{}",
-            t.state(15.0).v_n
-        );
-        let refused = |line: &str| {
-            motion_definition("m.csv", &format!("{HEAD}{line}\n"))
-                .unwrap_err()
-                .to_string()
-        };
-        assert_eq!(
-            refused("7,0,0,0,0,0,0,1,0"),
-            "m.csv, line 4: command type 7 is none of 1 to 5"
-        );
-        assert_eq!(
-            refused("1,0,0,0,0,0,0,0,0"),
-            "m.csv, line 4: command duration 0 s is not > 0, or makes more than a day"
-        );
-        assert_eq!(
-            refused("1,0,x,0,0,0,0,1,0"),
-            "m.csv, line 4: \"x\" is not a number"
         );
     }
 }

@@ -59,8 +59,7 @@ const KNOWN: &str =
 /// origin), `roll_deg`, `pitch_deg`, `yaw_deg`. Columns `v_n_m_s`, `v_e_m_s`, `v_d_m_s` are compared with the
 /// positions. Without attitude, heading and pitch follow the path.
 ///
-/// Of other tools: KF-GINS results (`.nav`), TUM (`.tum`), GPX (`.gpx`), motion definitions of gnss-ins-sim
-/// (`.csv`, known by their first line). All but profiles may be packed (`.gz`).
+/// Of other tools: KF-GINS results (`.nav`), TUM (`.tum`), GPX (`.gpx`). All but profiles may be packed (`.gz`).
 ///
 /// # Errors
 /// Whatever is wrong with the file, with its line.
@@ -118,9 +117,6 @@ fn parse_table(
     options: &Options,
     numbers: Numbers,
 ) -> Result<samples::Rows, FileError> {
-    if imports::is_motion_definition(text) {
-        return imports::motion_definition(name, text);
-    }
     samples::rows(
         Table::read(name, text.as_bytes(), None, numbers)?,
         options,

@@ -470,14 +470,6 @@ fn jumps_and_heights_of_other_formats_are_refused_as_those_of_tables() {
         e,
         "a.gpx, line 4: height 40000000.0 m is not within −12 to 1000 km"
     );
-    let head = "ini lat (deg),…\n32,120,5,10,0,0,90,0,0\ncommand type,…\n";
-    let text = format!("{head}1,0,0,0,0,0,0,5,0\n1,0,0,0,0,0,-1e6,5,0\n");
-    let e = imports::motion_definition("m.csv", &text)
-        .unwrap()
-        .trajectory()
-        .unwrap_err()
-        .to_string();
-    assert!(e.starts_with("m.csv, line 5: height "), "{e}");
 }
 
 /// A curved drive in hills: course, climb and attitude agree, until columns are changed.

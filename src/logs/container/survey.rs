@@ -3,7 +3,7 @@
 use super::{Definition, Dialect, Record, Tally};
 use crate::error::Error;
 use crate::input::{Input, Origin};
-use crate::stream::{Damage, OnDamage};
+use crate::stream::Damage;
 use crate::unpack::Chunk;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -30,29 +30,24 @@ pub(crate) struct Place {
 
 /// Surveys a container. Chunks stay packed where an index counts their messages and all channels are defined outside
 /// of them.
-pub(crate) fn survey<D: Dialect>(origin: &Origin, on_damage: OnDamage) -> Result<Survey, Error> {
+pub(crate) fn survey<D: Dialect>(origin: &Origin) -> Result<Survey, Error> {
     let mut input = origin.open()?;
     let (mut dialect, mut survey) = (D::default(), Survey::default());
     let outcome = survey
         .walk(&mut dialect, &mut input)
         .and_then(|()| dialect.finish(&input));
-    survey.settle(outcome, on_damage, &input)?;
+    survey.settle(outcome, &input)?;
     if survey.is_blind() {
         let outcome = survey.look_inside(&mut dialect, &mut input);
-        survey.settle(outcome, on_damage, &input)?;
+        survey.settle(outcome, &input)?;
     }
     Ok(survey)
 }
 
 impl Survey {
-    fn settle(
-        &mut self,
-        outcome: Result<(), Error>,
-        on_damage: OnDamage,
-        input: &Input,
-    ) -> Result<(), Error> {
+    fn settle(&mut self, outcome: Result<(), Error>, input: &Input) -> Result<(), Error> {
         match outcome {
-            Err(error) if on_damage == OnDamage::Recover && error.place().is_some() => {
+            Err(error) if error.cut().is_some() => {
                 let (read_bytes, file_bytes) = (self.end, input.length());
                 self.damage = Some(Damage {
                     error,

@@ -8,15 +8,12 @@ use crate::error::Error;
 use crate::format::{Format, Opened};
 use crate::input::Origin;
 use crate::sample::{Fix, ImuSample, Stamp};
-use crate::stream::{OnDamage, Stream};
+use crate::stream::Stream;
 use std::marker::PhantomData;
 
 /// Opens a container.
-pub(crate) fn open<D: Dialect + Sync>(
-    origin: Origin,
-    on_damage: OnDamage,
-) -> Result<Opened, Error> {
-    let mut survey = survey::<D>(&origin, on_damage)?;
+pub(crate) fn open<D: Dialect + Sync>(origin: Origin) -> Result<Opened, Error> {
+    let mut survey = survey::<D>(&origin)?;
     let channel = |(id, definition): (&u32, &crate::container::Definition)| {
         let content = messages::content(&definition.type_name);
         let mut channel = Channel::new(&definition.topic, &definition.type_name, content);

@@ -9,9 +9,7 @@
     feature = "npz"
 ))]
 
-use nav_sim_logs::{
-    Clock, Content, Error, Fix, ImuSample, Kind, Log, OnDamage, Stamp, npz, recognise,
-};
+use nav_sim_logs::{Clock, Content, Error, Fix, ImuSample, Kind, Log, Stamp, npz, recognise};
 use std::path::PathBuf;
 
 fn path(name: &str) -> PathBuf {
@@ -25,7 +23,7 @@ fn bytes(name: &str) -> Vec<u8> {
 }
 
 fn open(name: &str) -> Log {
-    Log::open(&path(name), OnDamage::Refuse).unwrap()
+    Log::open(&path(name)).unwrap()
 }
 
 /// Stamps and values of a topic.
@@ -236,7 +234,7 @@ fn formats_are_told_by_their_first_bytes() {
     ];
     for (head, kind) in not_read {
         assert_eq!(recognise(head), Some(kind));
-        let error = Log::from_bytes(head, OnDamage::Refuse).unwrap_err();
+        let error = Log::from_bytes(head).unwrap_err();
         assert!(matches!(error, Error::NotRead(k) if k == kind));
         assert_eq!(error.hint(), kind.conversion());
         assert!(error.hint().is_some());

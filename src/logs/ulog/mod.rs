@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::format::{Format, Opened};
 use crate::input::Origin;
 use crate::sample::{Clock, Fix, ImuSample, Stamp};
-use crate::stream::{Damage, OnDamage, Stream};
+use crate::stream::{Damage, Stream};
 use layout::Layout;
 use messages::{Data, Messages};
 use std::collections::BTreeMap;
@@ -22,13 +22,13 @@ struct Topic {
 }
 
 /// Opens a log.
-pub(crate) fn open(origin: Origin, on_damage: OnDamage) -> Result<Opened, Error> {
+pub(crate) fn open(origin: Origin) -> Result<Opened, Error> {
     let mut messages = Messages::new(&origin)?;
     let mut topics = BTreeMap::new();
     let outcome = survey(&mut messages, &mut topics);
     let damage = match outcome {
         Ok(()) => None,
-        Err(error) if on_damage == OnDamage::Recover && error.place().is_some() => Some(Damage {
+        Err(error) if error.cut().is_some() => Some(Damage {
             error,
             read_bytes: messages.end(),
             file_bytes: messages.length(),

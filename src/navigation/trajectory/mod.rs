@@ -4,7 +4,6 @@
 //! Everything a sensor could measure follows from it by differentiation, so the ideal IMU and the
 //! reference agree to rounding, whatever the samples were.
 
-pub mod import;
 pub mod plausibility;
 pub mod profile;
 pub mod reference;

@@ -8,7 +8,7 @@ use std::io::Cursor;
 fn parse(bytes: Vec<u8>) {
     let options = ReadOptions::default();
     if let Ok(raw) = text::parse("a.csv", Box::new(Cursor::new(bytes)), &options) {
-        let _ = Prepared::new(raw, &options).and_then(|(prepared, _)| prepared.recordings());
+        let _ = Prepared::new(raw, &options).map(|(prepared, _)| prepared.recordings());
     }
 }
 

@@ -26,7 +26,6 @@ use super::Trajectory;
 use path::{Path, domain, positive};
 
 pub use error::{Error, Problem};
-pub(super) use piece::Shape;
 pub use waypoints::{Place, Waypoint};
 
 /// A motion profile.
