@@ -6,7 +6,7 @@ use crate::formats::trajectory_file::{self, Options};
 use crate::formats::{
     contamination_file, curve_file, datasheet, draws_file, fusion_files, model_file,
 };
-use crate::formats::{parameters_file, recordings, run_directory, scenario_file};
+use crate::formats::{recordings, run_directory, scenario_file};
 use crate::study::{Planned, file, plan_in, unit_file};
 use nav_sim_navigation::gnss::FixSigma;
 use std::cell::OnceCell;
@@ -62,9 +62,6 @@ pub const TARGETS: [Target; 31] = [
         _ = datasheet::read(&written("datasheet", "a.toml", bytes))
     }),
     ("contamination", contamination),
-    ("parameters", |bytes| {
-        _ = parameters_file::check(&written("parameters", "a.toml", bytes))
-    }),
     ("scenario", |bytes| {
         _ = scenario_file::read(&written("scenario", "a.toml", bytes))
     }),

@@ -13,7 +13,6 @@ macro_rules! repository_files {
 const FILES: &[(&str, &[u8])] = repository_files![
     "examples/scenario.toml" => "scenario.toml",
     "examples/model.toml" => "imu.toml",
-    "examples/parameters.toml" => "parameters.toml",
     "examples/contamination.toml" => "contamination.toml",
     "examples/initial.toml" => "initial.toml",
     "examples/motion.toml" => "motion.toml",

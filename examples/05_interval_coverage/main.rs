@@ -81,7 +81,6 @@ fn set(design: &Design, set: u64, draws: usize, holes: Holes) -> Result<Vec<Outc
     let settings = Settings {
         estimators: design.estimators.clone(),
         model: ModelChoice::Given(design.spec.clone()),
-        limits: Vec::new(),
         trim: design.trim,
         tuning: design.tuning,
         weighting: design.weighting,

@@ -128,7 +128,6 @@ def calibrate(
     pool: str | None = None,
     trim: int | str | None = None,
     weighting: str | None = None,
-    parameters: StrPath | Mapping[str, Any] | None = None,
     efficiency: float = 0.6,
     scales: int | str | None = None,
     skip_s: float | str | None = None,
@@ -159,9 +158,7 @@ def calibrate(
     trim
         Replicates that dr-awv drops at each end of each scale: a number, or a share such as "30%".
     weighting
-        Weight of a scale in the fit: "model" (inverse variance by the fitted model), "edof", "interval", "none", "full".
-    parameters
-        What is known beforehand: a file, or its tables as a dict.
+        Weight of a scale in the fit: "model" (inverse variance by the fitted model) or "edof".
     efficiency
         That of the robust variances at the Gaussian model, 0.3 to 0.99.
     scales
@@ -183,7 +180,6 @@ def calibrate(
     """
     with Staging() as staging:
         files = staging.recordings(recordings, "recordings", axes if isinstance(axes, str) else None)
-        limits = None if parameters is None else staging.settings(parameters, "parameters")
         return ask(
             Calibration,
             "calibrate",
@@ -192,7 +188,6 @@ def calibrate(
             inputs=files,
             estimator=estimator,
             model=model,
-            parameters=limits,
             trim=None if trim is None else str(trim),
             weighting=weighting,
             pool=pool,

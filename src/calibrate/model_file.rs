@@ -3,9 +3,7 @@
 use super::{notes, turn_on_remark};
 use crate::formats::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn};
 use crate::report::Input;
-use nav_sim_calibration::{
-    Estimator, Outcome, ParameterLimit, ParameterSpread, Settings, TurnOnSpread, tau_s,
-};
+use nav_sim_calibration::{Estimator, Outcome, ParameterSpread, Settings, TurnOnSpread, tau_s};
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::{Law, LognormalIntervals, Model, Spread, Variation};
 use nav_sim_signal::wavelet::Convention;
@@ -82,12 +80,6 @@ impl CalibrationNote {
         }
         for (key, value) in &self.reading {
             put(key, value.clone());
-        }
-        if !settings.limits.is_empty() {
-            put(
-                "limits",
-                settings.limits.iter().map(limit).collect::<Vec<_>>().into(),
-            );
         }
         put(
             "fits",
@@ -223,43 +215,6 @@ fn fit(outcome: &Outcome, settings: &Settings) -> Table {
         );
     }
     put("notes", notes(outcome, settings).into());
-    table
-}
-
-/// A parameter that was fixed or bounded beforehand.
-fn limit(limit: &ParameterLimit) -> Table {
-    let ParameterLimit {
-        sensor,
-        axis,
-        process,
-        parameter,
-        low,
-        high,
-    } = limit;
-    let signals = match (sensor, axis) {
-        (None, _) => "all".to_owned(),
-        (Some(sensor), None) => sensor.name().to_owned(),
-        (Some(sensor), Some(axis)) => Channel {
-            sensor: *sensor,
-            axis: *axis,
-        }
-        .to_string(),
-    };
-    let mut table = Table::new();
-    let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);
-    put("signals", signals.into());
-    put("process", process.as_str().into());
-    put("parameter", parameter.as_str().into());
-    match (low, high) {
-        (Some(low), Some(high)) if low.to_bits() == high.to_bits() => {
-            put("fix", (*low).into());
-        }
-        _ => {
-            for (key, bound) in [("lower", low), ("upper", high)] {
-                bound.map(|value| put(key, value.into()));
-            }
-        }
-    }
     table
 }
 

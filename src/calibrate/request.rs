@@ -5,12 +5,12 @@ use super::{CalibrationNote, CalibrationOptions, EstimatorChoice, Measured, Mode
 use crate::answered::Answered;
 use crate::app::Context;
 use crate::failure::Failure;
-use crate::formats::{input, parameters_file};
+use crate::formats::input;
 use crate::jobs::{JobError, RecordingRequest, VarianceRequest, unknown_model};
 use crate::parse;
 use nav_sim_calibration::{
-    Advance, Bootstrap, Estimator, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, Trim,
-    Weighting, diagnose,
+    Advance, Bootstrap, Estimator, ModelChoice, ModelSpec, Pool, Settings, Trim, Weighting,
+    diagnose,
 };
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::wavelet::Convention;
@@ -40,9 +40,6 @@ pub struct CalibrationRequest {
     /// simplest sum of WN QN RW DR and up to two AR1 that fits as well as the best one, with the reasons
     #[arg(long, value_name = "SUM", default_value = ModelSpec::USUAL)]
     pub model: String,
-    /// TOML file that fixes or bounds parameters known beforehand (nav-sim schema parameters)
-    #[arg(long, value_name = "FILE")]
-    pub parameters: Option<PathBuf>,
     /// Replicates that dr-awv drops at each end of each scale: a number, or a percentage of all
     #[arg(long, value_name = "A", default_value_t)]
     #[serde(with = "parse::text")]
@@ -74,7 +71,6 @@ impl Default for CalibrationRequest {
             curve: None,
             estimator: EstimatorChoice::default(),
             model: ModelSpec::USUAL.to_owned(),
-            parameters: None,
             trim: Trim::default(),
             weighting: Weighting::default(),
             pool: None,
@@ -121,7 +117,7 @@ pub(crate) const ESTIMATORS: [(&str, &str); 7] = [
     ),
 ];
 
-const WEIGHTINGS: [(&str, &str); 5] = [
+const WEIGHTINGS: [(&str, &str); 2] = [
     (
         Weighting::Model.name(),
         "Inverse variance by the fitted model; a scale far above it weighs less",
@@ -129,15 +125,6 @@ const WEIGHTINGS: [(&str, &str); 5] = [
     (
         Weighting::Edof.name(),
         "The same with the observed wv: the convention of the literature, low where wv is low by chance",
-    ),
-    (
-        Weighting::Interval.name(),
-        "1 / (width of the 95 % interval)²",
-    ),
-    (Weighting::None.name(), "1"),
-    (
-        Weighting::Full.name(),
-        "The inverse of the covariance between scales, by bootstrap",
     ),
 ];
 
@@ -150,12 +137,10 @@ const POOLS: [(&str, &str); 2] = [
 ];
 
 impl CalibrationRequest {
-    /// How models are fitted, checked before any file but that of the parameters is read.
+    /// How models are fitted, checked before any file is read.
     pub(crate) fn settings(&self) -> Result<Settings, Failure> {
-        let model = self.structure()?;
         Ok(Settings {
-            limits: self.limits(&model)?,
-            model,
+            model: self.structure()?,
             trim: self.trim,
             tuning: self.tuning.tuning()?,
             weighting: self.weighting,
@@ -216,16 +201,13 @@ impl CalibrationRequest {
         } else {
             "recording"
         };
-        let fitted = files
-            .iter()
-            .map(|path| (role, path))
-            .chain(self.parameters.iter().map(|path| ("parameters", path)));
         Ok(CalibrationNote {
             efficiency_convention: Convention::Exact,
             reading: self.reading(settings),
             seed: self.draws().map(|draws| draws.seed),
-            inputs: fitted
-                .map(|(role, path)| input::input(role, path))
+            inputs: files
+                .iter()
+                .map(|path| input::input(role, path))
                 .collect::<Result<_, _>>()?,
         })
     }
@@ -316,40 +298,6 @@ impl CalibrationRequest {
                 );
                 Err(Failure::input(message)
                 .hint("--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope); or --estimator gmwm"))
-            }
-        }
-    }
-
-    fn limits(&self, model: &ModelChoice) -> Result<Vec<ParameterLimit>, Failure> {
-        let Some(path) = &self.parameters else {
-            return Ok(Vec::new());
-        };
-        let conflict = |message: &str, hint: &str| Err(Failure::input(message).hint(hint));
-        match model {
-            ModelChoice::Auto => conflict(
-                "--parameters with --model auto: whose parameters?",
-                "name the --model, such as N2",
-            ),
-            ModelChoice::Given(_) if self.estimator == EstimatorChoice::One(Estimator::Avlr) => {
-                conflict(
-                    "--parameters: avlr reads slopes, it cannot be bounded",
-                    "--estimator gmwm",
-                )
-            }
-            ModelChoice::Given(spec) => {
-                let limits = parameters_file::read(path, spec)?;
-                let of_axis = limits.iter().find(|l| l.axis.is_some());
-                match of_axis {
-                    Some(l) if self.pool != Some(Pool::Axes) && !self.estimator.is_single() => {
-                        let axis = l.axis.map_or("x", |a| a.name());
-                        let message = format!(
-                            "{}: the axis {axis} is named, but the axes are pooled",
-                            path.display()
-                        );
-                        conflict(&message, "--pool axes")
-                    }
-                    _ => Ok(limits),
-                }
             }
         }
     }

@@ -278,7 +278,6 @@ fn note_line(note: &Note, outcome: &Outcome) -> String {
         Note::Wide(of, Some(factor)) => format!("{} is known to a factor of {} only", named(*of), readable(*factor)),
         Note::Wide(of, None) => format!("{} may be zero", named(*of)),
         Note::Zero(process) => format!("{} is zero: not seen in these data", labels[*process]),
-        Note::AtBound(of, value) => format!("{} = {value} is at the bound given; the data favour a value beyond it", named(*of)),
         Note::LikeWhite(process, time_s) => {
             format!("{}: correlation time {} is below a sample, as of white noise", labels[*process], duration(*time_s))
         }

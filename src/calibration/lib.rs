@@ -63,12 +63,12 @@ pub use diagnosis::{
 };
 pub use fit::{Fit, FitError, Termination, Weighting, estimate, fit};
 pub use format::{duration, percent};
-pub use model::{BoundDomain, LimitError, Limits, ModelSpec, SpecError};
+pub use model::{ModelSpec, SpecError};
 pub use outcome::{
     Advance, AxesDiffer, Bootstrap, Candidate, Departure, FitRange, Goodness, Indistinct,
     Inference, LevelSpread, Misfit, Miss, ModelChoice, Note, Outcome, ParameterInterval,
-    ParameterLimit, ParameterSpread, Practical, PracticalIntervals, Ranking, Settings, Share,
-    TooSimple, Undetermined, model_of, put, shares, tau_s,
+    ParameterSpread, Practical, PracticalIntervals, Ranking, Settings, Share, TooSimple,
+    Undetermined, model_of, put, shares, tau_s,
 };
 pub use pipeline::{
     CalibrationError, Cause, calibrate, calibrate_telling, fit_curve, infer, infer_telling,

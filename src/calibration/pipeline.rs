@@ -1,12 +1,10 @@
 //! The whole of a calibration: groups of replicates × estimators → fits, and how sure they are.
 
 use crate::curve::{AverageError, Estimator, Group, average, implied};
-use crate::fit::{Fit, FitError, Weighting, estimate, expected, fit_with_covariance};
-use crate::model::LimitError;
+use crate::fit::{Fit, FitError, estimate};
 use crate::outcome::{Advance, Bootstrap, ModelChoice, Outcome, Settings};
 use crate::selection::choose;
 use crate::uncertainty::axes::axes_differ;
-use crate::uncertainty::bootstrap::CurveSampler;
 use crate::uncertainty::inference::inference;
 use crate::wavelet::Curve;
 use rayon::prelude::*;
@@ -47,9 +45,6 @@ pub enum Cause {
     /// No fit.
     #[error(transparent)]
     Fit(#[from] FitError),
-    /// Limits that do not fit the model.
-    #[error(transparent)]
-    Limit(#[from] LimitError),
 }
 
 /// Fits every group with every estimator, in that order.
@@ -113,12 +108,7 @@ fn fit_telling(
     let (spec, ranking) = match &settings.model {
         ModelChoice::Given(spec) => {
             advance(settings.model.steps());
-            (
-                settings
-                    .limited(spec, group.scope)
-                    .map_err(|e| error(e.into()))?,
-                None,
-            )
+            (spec.clone(), None)
         }
         ModelChoice::Auto => {
             let (spec, ranking) =
@@ -144,7 +134,7 @@ fn fit_telling(
         )
         .map_err(|e| error(e.into()))?;
     }
-    let mut outcome = Outcome {
+    Ok(Outcome {
         scope: group.scope,
         replicates: group.replicates.len(),
         recordings: group.recordings(),
@@ -155,11 +145,7 @@ fn fit_telling(
         fit,
         axes_differ: axes_differ(&group.replicates, estimator, &settings.tuning),
         inference: None,
-    };
-    if settings.weighting == Weighting::Full && estimator != Estimator::Avlr {
-        weigh_fully(group, &mut outcome, settings).map_err(|e| error(e.into()))?;
-    }
-    Ok(outcome)
+    })
 }
 
 /// Gives no weight to the scales outside the range of a fit.
@@ -191,29 +177,6 @@ fn count_exceeded(curve: &mut Curve, without_root: &[u32], fit: &Fit, settings: 
     let before = curve.ignored.len();
     curve.ignored.retain(|level| !exceeded.contains(level));
     curve.ignored.len() < before
-}
-
-/// Number of draws behind the covariance of a curve: deviations are then known to 1/√4000 = 1.6 %.
-const DRAWS: usize = 2000;
-
-/// The fit again, weighted by the covariance of curves drawn from it: the scatter within recordings and the
-/// differences between them.
-fn weigh_fully(group: &Group, outcome: &mut Outcome, settings: &Settings) -> Result<(), FitError> {
-    // Of a curve from elsewhere nothing more is known; a model that is fixed is not fitted.
-    if group.replicates.is_empty() || outcome.spec.parameters() == 0 {
-        return Ok(());
-    }
-    // The covariance depends on the model, which the fit made so far provides.
-    let sampler = CurveSampler::of_outcome(group, outcome, settings);
-    let covariance = sampler.covariance(DRAWS, &group.scope.name(), settings);
-    outcome.fit = fit_with_covariance(
-        &outcome.curve,
-        &outcome.spec,
-        settings.rate_hz,
-        &covariance,
-        expected(&outcome.curve, &outcome.fit),
-    )?;
-    Ok(())
 }
 
 /// Fills in the inference of every outcome from its group. The same seed gives the same numbers on any number of
@@ -337,49 +300,39 @@ mod tests {
             from_s: 0.04,
             to_s: 81.92,
         };
-        for weighting in [Weighting::Model, Weighting::Full] {
-            let settings = |fit_range| Settings {
-                model: ModelChoice::Given("WN+AR1+RW".parse().unwrap()),
-                rate_hz: 100.0,
-                weighting,
-                fit_range,
-                ..Settings::default()
-            };
-            let fit = |curve: &Curve, range| {
-                fit_curve(&group, Estimator::Given, curve.clone(), &settings(range)).unwrap()
-            };
-            let (ranged, shortened, all) = (
-                fit(&whole, Some(range)),
-                fit(&short, None),
-                fit(&whole, None),
-            );
-            assert_eq!(
-                (ranged.counted_levels().len(), ranged.departure().scales),
-                (12, 12)
-            );
-            // The covariance of the second is that of a first fit, known to 1e-8 or so; at a minimum parameters are known to the
-            // square root of what the objective is known to.
-            let (known, near) = if weighting == Weighting::Full {
-                (1e-7, 3e-4)
-            } else {
-                (1e-9, 1e-6)
-            };
-            assert_relative_eq!(
-                ranged.fit.objective,
-                shortened.fit.objective,
-                max_relative = known
-            );
-            let values = |o: &Outcome| {
-                o.fit
-                    .composite
-                    .parameters()
-                    .map(|(_, x)| x)
-                    .collect::<Vec<_>>()
-            };
-            for (a, b) in values(&ranged).into_iter().zip(values(&shortened)) {
-                assert_relative_eq!(a, b, max_relative = near);
-            }
-            assert!(all.fit.objective > 10.0 * ranged.fit.objective);
+        let settings = |fit_range| Settings {
+            model: ModelChoice::Given("WN+AR1+RW".parse().unwrap()),
+            rate_hz: 100.0,
+            fit_range,
+            ..Settings::default()
+        };
+        let fit = |curve: &Curve, range| {
+            fit_curve(&group, Estimator::Given, curve.clone(), &settings(range)).unwrap()
+        };
+        let (ranged, shortened, all) = (
+            fit(&whole, Some(range)),
+            fit(&short, None),
+            fit(&whole, None),
+        );
+        assert_eq!(
+            (ranged.counted_levels().len(), ranged.departure().scales),
+            (12, 12)
+        );
+        assert_relative_eq!(
+            ranged.fit.objective,
+            shortened.fit.objective,
+            max_relative = 1e-9
+        );
+        let values = |o: &Outcome| {
+            o.fit
+                .composite
+                .parameters()
+                .map(|(_, x)| x)
+                .collect::<Vec<_>>()
+        };
+        for (a, b) in values(&ranged).into_iter().zip(values(&shortened)) {
+            assert_relative_eq!(a, b, max_relative = 1e-6);
         }
+        assert!(all.fit.objective > 10.0 * ranged.fit.objective);
     }
 }

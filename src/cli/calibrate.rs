@@ -49,11 +49,10 @@ fn recordings(
 ) -> Result<(), Failure> {
     let out = out.unwrap_or(Path::new("model.toml"));
     let listed = read::listed(&request.inputs)?;
-    let guarded: Vec<PathBuf> = listed.iter().chain(&request.parameters).cloned().collect();
     let (mut outputs, _claims) = ModelFiles::claim(
         out,
         &request.estimator.possible(),
-        &guarded,
+        &listed,
         session.existing(),
     )?;
     draw(request, session);
@@ -96,16 +95,11 @@ fn curves(
         }
         _ => (),
     }
-    let inputs: Vec<PathBuf> = [path]
-        .into_iter()
-        .map(Path::to_owned)
-        .chain(request.parameters.clone())
-        .collect();
     let (outputs, _claims) = match out {
         Some(out) => ModelFiles::claim(
             out,
             &curves.settings.estimators,
-            &inputs,
+            &[path.to_owned()],
             session.existing(),
         )?,
         None => Default::default(),

@@ -4,9 +4,7 @@ use super::{Failure, Session, parse, read};
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
 use crate::formats::logs::LogOptions;
-use crate::formats::{
-    contamination_file, curve_file, datasheet, model_file, parameters_file, scenario_file,
-};
+use crate::formats::{contamination_file, curve_file, datasheet, model_file, scenario_file};
 use crate::fuse::FuseError;
 use crate::inspect::inspect;
 use crate::report::six_digits;
@@ -18,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Check scenario, study, model, trajectory and recording files without running anything
 ///
 /// What a file is follows from its contents. A TOML file with [accel] or [gyro] is a noise model; with segments or
-/// waypoints a motion profile; with candidates a study of `batch`; with bounds of parameters (lower, upper, fix) a file for `calibrate --parameters`; with operations
+/// waypoints a motion profile; with candidates a study of `batch`; with operations
 /// one for `synthesize --contaminate`; with lat_deg and yaw_deg an initial state of `fuse`; with [unit] an entry of
 /// the catalogue of IMUs; any other is a scenario. A table with lat_deg or n_m is a trajectory, as are .nav, .tum
 /// and .gpx; with standard deviations it is GNSS fixes; with tau_samples (or a .wv.json) a curve; any other table or
@@ -154,10 +152,6 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
                 "a catalogue entry, {name}, of {} figures",
                 sheet.entries.len()
             ))
-        }
-        FileKind::Parameters => {
-            parameters_file::check(path)?;
-            Ok("bounds of parameters; whether a model has those, calibrate says".to_owned())
         }
         FileKind::Contamination => {
             // The rate only turns seconds into samples.

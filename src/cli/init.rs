@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 /// Make a directory with everything to start from: a commented file of every kind, trajectories, virtual IMUs
 ///
-/// scenario.toml, imu.toml, motion.toml, parameters.toml, contamination.toml, initial.toml and examples/quick_study.toml say
+/// scenario.toml, imu.toml, motion.toml, contamination.toml, initial.toml and examples/quick_study.toml say
 /// what each key means. The others are those of the repository; the examples of every --help work inside the directory. Files
 /// that exist already are left alone.
 #[derive(clap::Args, Debug)]

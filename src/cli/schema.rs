@@ -1,9 +1,7 @@
 //! `nav-sim schema`: JSON schemas of the files people write.
 
 use super::{Failure, Session};
-use crate::formats::{
-    contamination_file, fusion_files, model_file, parameters_file, trajectory_file,
-};
+use crate::formats::{contamination_file, fusion_files, model_file, trajectory_file};
 use crate::study::Study;
 use nav_sim_navigation::scenario::Scenario;
 
@@ -12,7 +10,7 @@ use nav_sim_navigation::scenario::Scenario;
 #[command(before_help = "\
 Examples:
   nav-sim schema scenario > scenario.schema.json
-  nav-sim schema parameters | grep -c AR1
+  nav-sim schema model | grep -c AR1
   nav-sim schema study | grep -c description")]
 pub(crate) struct Args {
     /// Which file
@@ -28,8 +26,6 @@ enum Kind {
     Study,
     /// A noise model (what `nav-sim calibrate` writes)
     Model,
-    /// Bounds and fixed values of parameters (`nav-sim calibrate --parameters`)
-    Parameters,
     /// Where and how a drive begins (`nav-sim fuse --initial`)
     Initial,
     /// A trajectory by what the vehicle does (`nav-sim run`)
@@ -48,7 +44,6 @@ fn schema(of: Kind) -> serde_json::Value {
         Kind::Scenario => schemars::schema_for!(Scenario).to_value(),
         Kind::Study => schemars::schema_for!(Study).to_value(),
         Kind::Model => model_file::schema(),
-        Kind::Parameters => parameters_file::schema(),
         Kind::Initial => fusion_files::initial_schema(),
         Kind::Profile => trajectory_file::profile_schema(),
         Kind::Contamination => contamination_file::schema(),

@@ -17,8 +17,6 @@ pub(crate) enum FileKind {
     Model,
     /// An entry of the catalogue of IMUs.
     CatalogueEntry,
-    /// Bounds of parameters.
-    Parameters,
     /// A contamination of recordings.
     Contamination,
     /// Wavelet-variance curves.
@@ -110,8 +108,6 @@ fn toml_kind(table: &toml::Table) -> FileKind {
         FileKind::CatalogueEntry
     } else if sensors().any(toml::Value::is_array) {
         FileKind::Contamination
-    } else if table.values().any(bounds) {
-        FileKind::Parameters
     } else if has(&["accel", "gyro"]) {
         FileKind::Model
     } else if has(&["lat_deg", "yaw_deg"]) {
@@ -123,20 +119,6 @@ fn toml_kind(table: &toml::Table) -> FileKind {
     } else {
         FileKind::Scenario
     }
-}
-
-/// Whether there is a bound of a parameter in it.
-fn bounds(value: &toml::Value) -> bool {
-    let Some(table) = value.as_table() else {
-        return false;
-    };
-    let of_parameter = ["lower", "upper", "fix"]
-        .iter()
-        .any(|key| table.get(*key).is_some_and(|v| !v.is_table()));
-    of_parameter
-        || table
-            .iter()
-            .any(|(key, value)| key != "spread" && bounds(value))
 }
 
 /// The texts of KF-GINS, numbers between blanks without a header: increments are small, latitudes are not.
@@ -194,14 +176,6 @@ mod tests {
         assert_eq!(of_toml("start = {}\nsegment = []"), FileKind::Trajectory);
         assert_eq!(of_toml("runs = 3\n[[candidate]]"), FileKind::Study);
         assert_eq!(of_toml("[run]\nruns = 3"), FileKind::Scenario);
-        assert_eq!(
-            of_toml("[gyro.AR1_1]\nphi = { fix = 0.98 }"),
-            FileKind::Parameters
-        );
-        assert_eq!(
-            of_toml("[WN]\nsigma2 = { lower = 0.1 }"),
-            FileKind::Parameters
-        );
         assert_eq!(
             of_toml("[[accel]]\noperation = 'ar1'"),
             FileKind::Contamination

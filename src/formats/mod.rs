@@ -14,7 +14,6 @@ pub(crate) mod input;
 pub mod logs;
 pub mod model_file;
 pub(crate) mod npy;
-pub(crate) mod parameters_file;
 #[cfg(feature = "parquet")]
 mod parquet_file;
 #[cfg(test)]

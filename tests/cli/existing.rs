@@ -54,7 +54,7 @@ fn files_take_the_place_of_their_kind_and_directories_that_of_the_same_run() {
             "again/imu.csv",
         ),
         (calibrate, "--weighting edof", "out.toml"),
-        (calibrate, "--weighting ci", "out.svg"),
+        (calibrate, "--scales 5", "out.svg"),
         (
             "export imu.toml --target kalibr -o imu.yaml",
             "--policy envelope",

@@ -83,7 +83,6 @@ fn the_files_of_init_are_what_they_should_be() {
         ("scenario.toml", "a scenario"),
         ("imu.toml", "a noise model"),
         ("motion.toml", "a trajectory"),
-        ("parameters.toml", "bounds of parameters"),
         ("contamination.toml", "a contamination"),
         ("initial.toml", "an initial state"),
         ("examples/quick_study.toml", "a study"),

@@ -22,7 +22,6 @@ mod covariance_truth;
 mod displaced;
 mod estimator_bias;
 mod formats;
-mod full_weighting;
 mod fusion;
 mod global_minimum;
 mod imu_unknowns;

@@ -17,7 +17,6 @@ fn settings() -> Settings {
     Settings {
         estimators: vec![Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv],
         model: ModelChoice::Given("WN+RW".parse().unwrap()),
-        limits: Vec::new(),
         trim: Trim::Count(1),
         tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
         weighting: Weighting::Edof,

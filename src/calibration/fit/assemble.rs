@@ -3,35 +3,19 @@
 use super::objective::{Component, Objective, Range};
 use super::result::{Fit, FitError};
 use super::search::Found;
-use crate::model::{Limits, ModelSpec};
-use crate::noise::{Composite, Kind, ParameterError, ParameterRef, Process};
-use std::cmp::Ordering;
+use crate::noise::{Composite, Kind, ParameterError, Process};
 
 /// The fit that a search has found, but for its weights.
 pub(super) fn assemble(
     objective: &Objective,
     found: &Found,
-    spec: &ModelSpec,
     rate_hz: f64,
 ) -> Result<Fit, FitError> {
     let unit = objective.length * objective.length;
     let best = &found.ends[0];
     let solution = objective.solve(&best.coordinates);
     let mut terms = terms(objective, &best.coordinates, &solution.amplitudes);
-    for (term, limits) in terms.iter_mut().zip(spec.limits()) {
-        term.at_end &= limits.shape.is_none();
-        term.limits = *limits;
-    }
-    let limited = |kind: Kind| {
-        spec.kinds()
-            .iter()
-            .zip(spec.limits())
-            .any(|(k, limits)| *k == kind && *limits != Limits::NONE)
-    };
-    let by_time = |a: &Term, b: &Term| match limited(a.kind) {
-        true => Ordering::Equal,
-        false => b.coordinate.total_cmp(&a.coordinate),
-    };
+    let by_time = |a: &Term, b: &Term| b.coordinate.total_cmp(&a.coordinate);
     terms.sort_by(|a, b| a.kind.cmp(&b.kind).then_with(|| by_time(a, b)));
     let processes = terms
         .iter()
@@ -55,14 +39,8 @@ pub(super) fn assemble(
             .map(|e| e.cost * unit),
         zero: those(|t| t.amplitude <= 0.0),
         at_end: those(|t| t.amplitude > 0.0 && t.at_end),
-        bounded: terms
-            .iter()
-            .enumerate()
-            .flat_map(|(process, t)| t.bounded(process, rate_hz))
-            .collect(),
         minima: minima(found),
         weighted_for: Vec::new(),
-        mixing: None,
         residuals: solution
             .residuals
             .iter()
@@ -92,19 +70,12 @@ fn minima(found: &Found) -> Vec<Vec<f64>> {
     minima
 }
 
-/// A value, or the bound that it is but for rounding.
-fn at_bound(value: f64, (low, high): (f64, f64), scale: f64) -> f64 {
-    let near = |bound: &f64| (value - bound).abs() <= 1e-9 * scale;
-    [low, high].into_iter().find(near).unwrap_or(value)
-}
-
 /// One process of the result.
 struct Term {
     kind: Kind,
     amplitude: f64,
     coordinate: f64,
     at_end: bool,
-    limits: Limits,
 }
 
 fn terms(objective: &Objective, coordinates: &[f64], amplitudes: &[f64]) -> Vec<Term> {
@@ -123,7 +94,6 @@ fn terms(objective: &Objective, coordinates: &[f64], amplitudes: &[f64]) -> Vec<
             amplitude: *amplitude,
             coordinate,
             at_end,
-            limits: Limits::NONE,
         }
     };
     objective
@@ -136,7 +106,17 @@ fn terms(objective: &Objective, coordinates: &[f64], amplitudes: &[f64]) -> Vec<
 
 impl Term {
     fn process(&self, rate_hz: f64) -> Result<Process, ParameterError> {
-        let (amplitude, shape) = self.values(rate_hz);
+        let kappa = self.coordinate.exp();
+        let amplitude = if self.kind == Kind::Drift {
+            self.amplitude.sqrt()
+        } else {
+            self.amplitude
+        };
+        let shape = match self.kind {
+            Kind::Ar1 => (-kappa).exp(),
+            Kind::GaussMarkov => kappa * rate_hz,
+            _ => self.coordinate,
+        };
         let values = if self.kind.shape().is_some() {
             vec![shape, amplitude]
         } else {
@@ -145,54 +125,5 @@ impl Term {
         self.kind
             .process(&values, rate_hz)
             .expect("as many values as the kind has parameters")
-    }
-
-    /// Amplitude and shape in the units of the parameters; on a bound, the bound as it was given.
-    fn values(&self, rate_hz: f64) -> (f64, f64) {
-        let kappa = self.coordinate.exp();
-        let amplitude = if self.kind == Kind::Drift {
-            self.amplitude.sqrt()
-        } else {
-            self.amplitude
-        };
-        let (shape, scale) = match self.kind {
-            // Near phi = 1 what counts is 1 − phi ≈ κ: a bound of 0.99999 is met to 1e-9 of that, not of 1.
-            Kind::Ar1 => ((-kappa).exp(), kappa.min(1.0)),
-            Kind::GaussMarkov => (kappa * rate_hz, kappa * rate_hz),
-            _ => (self.coordinate, 1.0),
-        };
-        let limits = self
-            .limits
-            .shape
-            .unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
-        (
-            at_bound(amplitude, self.limits.amplitude, amplitude),
-            at_bound(shape, limits, scale),
-        )
-    }
-
-    /// The parameters that lie on a bound given; those that are fixed have nowhere else to be.
-    fn bounded(&self, process: usize, rate_hz: f64) -> Vec<ParameterRef> {
-        let (amplitude, shape) = self.values(rate_hz);
-        let is_at_end = |value: f64, (low, high): (f64, f64)| {
-            low < high
-                && value.abs() > 0.0
-                && (value.to_bits() == low.to_bits() || value.to_bits() == high.to_bits())
-        };
-        let mut bounded = Vec::new();
-        if is_at_end(amplitude, self.limits.amplitude) {
-            bounded.push(ParameterRef {
-                process,
-                parameter: self.kind.amplitude(),
-            });
-        }
-        // What is not there has its shape anywhere.
-        if let (Some(parameter), Some(limits)) = (self.kind.shape(), self.limits.shape)
-            && amplitude > 0.0
-            && is_at_end(shape, limits)
-        {
-            bounded.push(ParameterRef { process, parameter });
-        }
-        bounded
     }
 }

@@ -89,10 +89,8 @@ pub(crate) fn avlr(curve: &Curve, spec: &ModelSpec) -> Result<Fit, FitError> {
         runner_up: None,
         zero,
         at_end: Vec::new(),
-        bounded: Vec::new(),
         minima: Vec::new(),
         weighted_for: Vec::new(),
-        mixing: None,
         composite,
     })
 }

@@ -1,23 +1,20 @@
 //! Least squares: theta = argmin Σ Omega_j (nu_j − nu_j(theta))².
 
 use super::assemble::assemble;
-use super::objective::{Component, Objective, Range, whitening};
+use super::objective::{Component, Objective, Range};
 use super::optimise::Termination;
 use super::result::{Fit, FitError};
 use super::search::{Effort, search};
 use super::weighting::{Weighting, inverse_deviations};
 use crate::curve::implied;
-use crate::curve::sampling::SamplingLaw;
-use crate::model::{Limits, ModelSpec};
+use crate::model::ModelSpec;
 use crate::noise::Kind;
 use crate::wavelet::Curve;
-use nalgebra::DMatrix;
-use std::sync::Arc;
 
 /// Fits a model to a curve. The rate (Hz) is what a GM is sampled at.
 ///
 /// AR1 and GM processes are sought with correlation times between a sixth of a sample (phi = e^−6) and twenty times the
-/// longest scale; phi is positive. A fit that ends there is told ([`Fit::at_end`]); limits that are given reach further.
+/// longest scale; phi is positive. A fit that ends there is told ([`Fit::at_end`]).
 ///
 /// # Errors
 /// When the curve has fewer scales than the model parameters, or numbers that are no wavelet variances.
@@ -30,21 +27,13 @@ pub fn fit(
     let observed = Weights {
         weighting,
         nu: curve.wv.clone(),
-        mixing: None,
     };
     // The observed variances are the only ones there are before a model; what is low by chance weighs too
     // much in this round.
     let first = fit_near(curve, spec, rate_hz, observed, Effort::WHOLE, &[])?;
     match weighting {
         Weighting::Model => settled(curve, spec, rate_hz, first),
-        Weighting::Full => fit_with_covariance(
-            curve,
-            spec,
-            rate_hz,
-            &covariance(curve, &first),
-            expected(curve, &first),
-        ),
-        Weighting::Edof | Weighting::Interval | Weighting::None => Ok(first),
+        Weighting::Edof => Ok(first),
     }
 }
 
@@ -56,7 +45,7 @@ const FEW_ROUNDS: usize = 3;
 const SETTLED: f64 = 1e-6;
 
 /// The curve that a fit implies, where it may be divided by.
-pub(crate) fn expected(curve: &Curve, fit: &Fit) -> Vec<f64> {
+fn expected(curve: &Curve, fit: &Fit) -> Vec<f64> {
     // A model without any amplitude implies nothing.
     implied(&fit.composite, curve)
         .iter()
@@ -127,7 +116,6 @@ fn reweighted(
         let weights = Weights {
             weighting: Weighting::Model,
             nu: expected(curve, &last),
-            mixing: None,
         };
         let next = fit_near(curve, spec, rate_hz, weights, effort, &last.minima)?;
         before.push(std::mem::replace(&mut last, next));
@@ -166,53 +154,6 @@ impl Fit {
     }
 }
 
-/// Relative covariance of a curve of independent degrees of freedom, by the large-sample law of a model
-/// ([`SamplingLaw`]).
-fn covariance(curve: &Curve, fit: &Fit) -> DMatrix<f64> {
-    let levels = curve.levels.iter().copied().max().unwrap_or(1) as usize;
-    let law = SamplingLaw::new(&fit.composite, levels);
-    let index = |i: usize| curve.levels[i] as usize - 1;
-    let deviation = |i: usize| (2.0 / curve.edof[i]).sqrt();
-    let n = curve.levels.len();
-    DMatrix::from_fn(n, n, |i, j| {
-        law.correlation[(index(i), index(j))] * deviation(i) * deviation(j)
-    })
-}
-
-/// The fit weighted by the inverse of a covariance of the curve relative to `nu`.
-///
-/// # Errors
-/// As [`fit`].
-pub(crate) fn fit_with_covariance(
-    curve: &Curve,
-    spec: &ModelSpec,
-    rate_hz: f64,
-    covariance: &DMatrix<f64>,
-    nu: Vec<f64>,
-) -> Result<Fit, FitError> {
-    // A scale that counts nothing must not come in through the errors it shares with others.
-    let counts = |i: usize| !curve.ignored.contains(&curve.levels[i]);
-    let own = DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| {
-        match i == j {
-            _ if counts(i) && counts(j) => covariance[(i, j)],
-            diagonal => f64::from(u8::from(diagonal)),
-        }
-    });
-    let mixing = Some(Arc::new(whitening(&own)));
-    fit_near(
-        curve,
-        spec,
-        rate_hz,
-        Weights {
-            weighting: Weighting::Full,
-            nu,
-            mixing,
-        },
-        Effort::WHOLE,
-        &[],
-    )
-}
-
 /// The same for a curve that resembles one already fitted: a coarser grid, and the minima of that one.
 pub(crate) fn refit(
     curve: &Curve,
@@ -221,17 +162,12 @@ pub(crate) fn refit(
     weighting: Weighting,
     like: &Fit,
 ) -> Result<Fit, FitError> {
-    // Model and Full begin with the model of the curve that this one resembles, which is known better than
-    // one draw knows itself.
+    // The model of the curve that this one resembles is known better than one draw knows itself.
     let nu = match weighting {
-        Weighting::Model | Weighting::Full => expected(curve, like),
-        Weighting::Edof | Weighting::Interval | Weighting::None => curve.wv.clone(),
+        Weighting::Model => expected(curve, like),
+        Weighting::Edof => curve.wv.clone(),
     };
-    let weights = Weights {
-        weighting,
-        nu,
-        mixing: like.mixing.clone(),
-    };
+    let weights = Weights { weighting, nu };
     let first = fit_near(curve, spec, rate_hz, weights, Effort::AGAIN, &like.minima)?;
     match weighting {
         Weighting::Model => {
@@ -246,7 +182,7 @@ pub(crate) fn refit(
             )?;
             Ok(last.at_own_weights(curve))
         }
-        _ => Ok(first),
+        Weighting::Edof => Ok(first),
     }
 }
 
@@ -255,7 +191,6 @@ struct Weights {
     weighting: Weighting,
     /// Wavelet variances at which the weights are evaluated (units²).
     nu: Vec<f64>,
-    mixing: Option<Arc<DMatrix<f64>>>,
 }
 
 fn fit_near(
@@ -267,21 +202,17 @@ fn fit_near(
     known: &[Vec<f64>],
 ) -> Result<Fit, FitError> {
     check(curve, spec)?;
-    let limited = spec.kinds().iter().zip(spec.limits());
-    let components = limited
-        .map(|(kind, limits)| component(*kind, *limits, curve, rate_hz))
+    let components = spec
+        .kinds()
+        .iter()
+        .map(|kind| component(*kind, curve))
         .collect();
-    let Weights {
-        weighting,
-        nu,
-        mixing,
-    } = weights;
-    let objective = Objective::new(curve, weighting, &nu, mixing.clone(), components);
+    let Weights { weighting, nu } = weights;
+    let objective = Objective::new(curve, weighting, &nu, components);
     let found = search(&objective, effort, known);
     Ok(Fit {
-        mixing,
         weighted_for: nu,
-        ..assemble(&objective, &found, spec, rate_hz)?
+        ..assemble(&objective, &found, rate_hz)?
     })
 }
 
@@ -326,62 +257,18 @@ pub(crate) fn correlated(curve: &Curve) -> Range {
     }
 }
 
-/// The widest ranges in which a curve can say anything, less what the limits leave out.
-fn component(kind: Kind, limits: Limits, curve: &Curve, rate_hz: f64) -> Component {
-    // Correlation times in logarithms: equal steps of ln κ change the curve about equally.
-    let correlated = correlated(curve);
-    // Coordinates of the limits: ln κ, which falls as phi rises.
-    let coordinate = match (kind, limits.shape) {
-        (Kind::Ar1, Some((low, high))) => {
-            let kappa = |phi: f64| (-phi.ln()).ln();
-            Some(within(
-                correlated,
-                (low > 0.0).then(|| kappa(low)),
-                (high < 1.0).then(|| kappa(high)),
-            ))
-        }
-        (Kind::GaussMarkov, Some((low, high))) => {
-            let kappa = |beta: f64| (beta / rate_hz).ln();
-            Some(within(
-                correlated,
-                high.is_finite().then(|| kappa(high)),
-                (low > 0.0).then(|| kappa(low)),
-            ))
-        }
-        (Kind::Ar1 | Kind::GaussMarkov, None) => Some(correlated),
-        (Kind::Ma1, shape) => {
-            let (low, high) = shape.unwrap_or((-1.0, 1.0));
-            Some(Range {
-                low: low.max(-1.0),
-                high: high.min(1.0),
-            })
-        }
+/// A process with the widest range in which a curve can say anything of its shape.
+fn component(kind: Kind, curve: &Curve) -> Component {
+    let coordinate = match kind {
+        // Correlation times in logarithms: equal steps of ln κ change the curve about equally.
+        Kind::Ar1 | Kind::GaussMarkov => Some(correlated(curve)),
+        Kind::Ma1 => Some(Range {
+            low: -1.0,
+            high: 1.0,
+        }),
         _ => None,
     };
-    let (low, high) = limits.amplitude;
-    let amplitude = match kind {
-        // The amplitude in which a drift is linear is the square of its slope.
-        Kind::Drift => Range {
-            low: low * low,
-            high: high * high,
-        },
-        _ => Range { low, high },
-    };
-    Component {
-        kind,
-        amplitude,
-        coordinate,
-    }
-}
-
-/// A range with its ends replaced where they are limited; what is given counts, even beyond the range.
-fn within(range: Range, high: Option<f64>, low: Option<f64>) -> Range {
-    let high = high.unwrap_or(range.high);
-    let low = low.unwrap_or_else(|| range.low.min(high));
-    Range {
-        low,
-        high: high.max(low),
-    }
+    Component { kind, coordinate }
 }
 
 #[cfg(test)]
@@ -409,40 +296,6 @@ mod tests {
                 FitError::NotPositive { level: 2, value }
             );
             assert_eq!(refused(0.5, value), FitError::NoWeight { level: 2, value });
-        }
-    }
-
-    /// A slope of 1e-3 that may be at most half, or at least twice that: the bound itself, which is told.
-    #[test]
-    fn a_limit_holds_the_fit() {
-        let model = Composite::new(vec![
-            Process::White(White::new(1.0).unwrap()),
-            Process::Drift(crate::noise::Drift::new(1e-3).unwrap()),
-        ]);
-        let levels: Vec<u32> = (1..=12).collect();
-        let wv = levels.iter().map(|level| model.haar_wv(*level)).collect();
-        let curve = Curve {
-            wv,
-            edof: vec![50.0; 12],
-            levels,
-            ..Curve::default()
-        };
-        for (low, high, slope) in [
-            (None, Some(5e-4), 5e-4),
-            (Some(2e-3), None, 2e-3),
-            (None, None, 1e-3),
-        ] {
-            let mut spec: ModelSpec = "WN+DR".parse().unwrap();
-            spec.limit("DR", "slope", low, high).unwrap();
-            let fit = fit(&curve, &spec, 1.0, Weighting::Edof).unwrap();
-            let found = fit.composite.processes[1].values()[0];
-            assert!((found / slope - 1.0).abs() < 1e-9, "{found} {slope}");
-            assert_eq!(
-                fit.bounded.len(),
-                usize::from(slope != 1e-3),
-                "{:?}",
-                fit.bounded
-            );
         }
     }
 

@@ -12,7 +12,7 @@ mod weighting;
 
 pub(crate) use avlr::avlr;
 pub use least_squares::fit;
-pub(crate) use least_squares::{correlated, expected, fit_with_covariance, refit};
+pub(crate) use least_squares::{correlated, refit};
 pub(crate) use objective::Range;
 pub use optimise::Termination;
 pub use result::{Fit, FitError};

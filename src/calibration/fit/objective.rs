@@ -14,8 +14,6 @@ use crate::noise::{
     Ar1, Drift, FlickerNoise, GaussMarkov, Kind, Ma1, Quantization, RandomWalk, White,
 };
 use crate::wavelet::{Curve, QuantizationResponse};
-use nalgebra::DMatrix;
-use std::sync::Arc;
 
 /// Range of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,7 +28,6 @@ pub(crate) struct Range {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Component {
     pub(crate) kind: Kind,
-    pub(crate) amplitude: Range,
     pub(crate) coordinate: Option<Range>,
 }
 
@@ -97,8 +94,6 @@ const NEARLY_SETTLED: usize = 3;
 pub(crate) struct Objective {
     levels: Vec<u32>,
     roots: Vec<f64>,
-    /// Matrix that mixes the scales so that their relative errors are uncorrelated ([`whitening`]).
-    mixing: Option<Arc<DMatrix<f64>>>,
     /// Response of a robust curve to quantization noise, level by level, where the model has some; none: as it is.
     quantization: Option<Vec<Option<QuantizationResponse>>>,
     pub(crate) target: Vec<f64>,
@@ -132,28 +127,15 @@ impl Solution {
 }
 
 impl Objective {
-    /// Weights where the variances are taken to be `nu`. With a mixing matrix it is applied to nu_j(theta)/nu_j, and the
-    /// weighting does not matter.
+    /// Weights where the variances are taken to be `nu`.
     pub(crate) fn new(
         curve: &Curve,
         weighting: Weighting,
         nu: &[f64],
-        mixing: Option<Arc<DMatrix<f64>>>,
         components: Vec<Component>,
     ) -> Self {
-        let roots = match mixing {
-            // The covariance behind the mixing is relative to nu, so the curve must be too.
-            Some(_) => {
-                let relative = |(nu, level): (&f64, &u32)| match curve.ignored.contains(level) {
-                    true => 0.0,
-                    false => 1.0 / nu,
-                };
-                nu.iter().zip(&curve.levels).map(relative).collect()
-            }
-            None => weighting.roots(curve, nu),
-        };
+        let roots = weighting.roots(curve, nu);
         let target: Vec<f64> = roots.iter().zip(&curve.wv).map(|(w, nu)| w * nu).collect();
-        let target = mixed(mixing.as_deref(), target);
         // The unit of the objective depends on the weighting; at unit length every tolerance is relative.
         let length = dot(&target, &target).sqrt();
         let target = target.iter().map(|b| b / length).collect();
@@ -169,7 +151,6 @@ impl Objective {
         Self {
             levels: curve.levels.clone(),
             roots,
-            mixing,
             quantization,
             target,
             length,
@@ -224,14 +205,11 @@ impl Objective {
                 response.others
             }
         });
-        mixed(
-            self.mixing.as_deref(),
-            levels
-                .iter()
-                .zip(weights)
-                .map(|(value, weight)| value * weight)
-                .collect(),
-        )
+        levels
+            .iter()
+            .zip(weights)
+            .map(|(value, weight)| value * weight)
+            .collect()
     }
 
     /// Responses of a curve that reads quantization noise as it is: 1 at every level.
@@ -261,13 +239,6 @@ impl Objective {
             }
         };
         (0..self.levels.len()).map(at_level).collect()
-    }
-
-    /// The bounds of an amplitude in units in which its column has unit length.
-    pub(crate) fn scaled_bounds(&self, component: usize, length: f64) -> (f64, f64) {
-        let Range { low, high } = self.components[component].amplitude;
-        // x = amplitude·(length of its column)/(length of the target).
-        (low * length / self.length, high * length / self.length)
     }
 
     /// The best amplitudes for the coordinates given (one for each component that has one).
@@ -398,7 +369,6 @@ impl Objective {
                 problem.gram[j][i] = problem.gram[i][j];
             }
             problem.right[i] = dot(&a.values, &self.target);
-            (problem.lower[i], problem.upper[i]) = self.scaled_bounds(i, a.length);
         }
         problem
     }
@@ -429,28 +399,6 @@ fn project(
     let n = active.len();
     let solution = cholesky_solve(|a, b| gram[active[a]][active[b]], right, n)?;
     Some(solution[..n].to_vec())
-}
-
-fn mixed(mixing: Option<&DMatrix<f64>>, values: Vec<f64>) -> Vec<f64> {
-    let Some(mixing) = mixing else { return values };
-    (0..values.len())
-        .map(|i| (0..values.len()).map(|j| mixing[(i, j)] * values[j]).sum())
-        .collect()
-}
-
-/// Matrix that makes errors of this covariance uncorrelated and of unit variance: the inverse of its Cholesky
-/// factor; where rounding leaves no positive definite matrix, of its diagonal alone.
-pub(crate) fn whitening(covariance: &DMatrix<f64>) -> DMatrix<f64> {
-    let inverse = covariance
-        .clone()
-        .cholesky()
-        .and_then(|c| c.l().try_inverse());
-    inverse.unwrap_or_else(|| {
-        let root = |i: usize| 1.0 / covariance[(i, i)].max(f64::MIN_POSITIVE).sqrt();
-        DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| {
-            if i == j { root(i) } else { 0.0 }
-        })
-    })
 }
 
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -1,15 +1,12 @@
 //! A model fitted to a curve.
 
 use super::optimise::Termination;
-use crate::noise::{Composite, ParameterError, ParameterRef};
-use nalgebra::DMatrix;
-use std::sync::Arc;
+use crate::noise::{Composite, ParameterError};
 
 /// A fitted model. That the iterations did not converge is told, not an error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
-    /// The model: processes in the order of [`Kind::ALL`](crate::noise::Kind::ALL), alike ones by ascending correlation time (or in the
-    /// order of their limits, if they have any).
+    /// The model: processes in the order of [`Kind::ALL`](crate::noise::Kind::ALL), alike ones by ascending correlation time.
     pub composite: Composite,
     /// Σ Omega_j (nu_j − nu_j(theta))² at theta.
     pub objective: f64,
@@ -27,17 +24,12 @@ pub struct Fit {
     pub zero: Vec<usize>,
     /// The processes whose shape lies at the end of its range: not identifiable either.
     pub at_end: Vec<usize>,
-    /// Parameters on a bound that was given (not fixed).
-    pub bounded: Vec<ParameterRef>,
-    /// √Omega_j (nu_j − nu_j(theta)) of each scale; in standard deviations when weighted by edof. With the full
-    /// covariance the scales are mixed so that these are uncorrelated.
+    /// √Omega_j (nu_j − nu_j(theta)) of each scale; in standard deviations when weighted by edof.
     pub residuals: Vec<f64>,
     /// Coordinates of the minima found, best first: where the search of a similar curve begins.
     pub(crate) minima: Vec<Vec<f64>>,
     /// The variances that the weights were made for.
     pub(crate) weighted_for: Vec<f64>,
-    /// Matrix by which the scales were mixed, with weights by the full covariance.
-    pub(crate) mixing: Option<Arc<DMatrix<f64>>>,
 }
 
 /// Why a curve has no fit.

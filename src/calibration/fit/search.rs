@@ -94,8 +94,6 @@ struct Grid<'a> {
     shapes: Vec<Shape>,
     /// Their columns.
     columns: Vec<Column>,
-    /// Component of each column.
-    owners: Vec<usize>,
     gram: Vec<f64>,
     right: Vec<f64>,
 }
@@ -113,11 +111,9 @@ impl<'a> Grid<'a> {
             .collect();
         let fixed = (0..objective.components.len())
             .filter(|i| objective.components[*i].coordinate.is_none());
-        let mut owners: Vec<usize> = fixed.collect();
-        let mut shapes: Vec<Shape> = owners.iter().map(|i| objective.shape(*i, 0.0)).collect();
+        let mut shapes: Vec<Shape> = fixed.map(|i| objective.shape(i, 0.0)).collect();
         for ((owner, _), points) in dimensions.iter().zip(&points) {
             shapes.extend(points.iter().map(|u| objective.shape(*owner, *u)));
-            owners.extend(points.iter().map(|_| *owner));
         }
         let plain = objective.plain_responses();
         let columns: Vec<Column> = shapes
@@ -138,7 +134,6 @@ impl<'a> Grid<'a> {
             repeats,
             shapes,
             columns,
-            owners,
             gram,
             right,
         }
@@ -169,9 +164,6 @@ impl<'a> Grid<'a> {
                 problem.gram[a][b] = self.gram[i * self.columns.len() + selected[b]];
             }
             problem.right[a] = self.right[i];
-            (problem.lower[a], problem.upper[a]) = self
-                .objective
-                .scaled_bounds(self.owners[i], self.columns[i].length);
         }
         let x = problem.minimise();
         let linear: f64 = (0..n).map(|i| problem.right[i] * x[i]).sum();
@@ -298,17 +290,13 @@ mod tests {
         };
         let component = |process: &Process| Component {
             kind: process.kind(),
-            amplitude: Range {
-                low: 0.0,
-                high: f64::INFINITY,
-            },
             coordinate: (process.kind() == Kind::Ar1).then_some(Range {
                 low: -10.0,
                 high: 1.0,
             }),
         };
         let components = model.processes.iter().map(component).collect();
-        Objective::new(&curve, Weighting::Edof, &curve.wv, None, components)
+        Objective::new(&curve, Weighting::Edof, &curve.wv, components)
     }
 
     /// What the best amplitudes leave, and how that changes with a correlation time, has no part that an amplitude could take.
@@ -403,17 +391,12 @@ mod tests {
                 wv: implied(&model, &curve),
                 ..curve
             };
-            let free = Range {
-                low: 0.0,
-                high: f64::INFINITY,
-            };
             let component = |p: &Process| Component {
                 kind: p.kind(),
-                amplitude: free,
                 coordinate: None,
             };
             let components = model.processes.iter().map(component).collect();
-            let objective = Objective::new(&curve, Weighting::Edof, &curve.wv, None, components);
+            let objective = Objective::new(&curve, Weighting::Edof, &curve.wv, components);
             let solution = objective.solve(&[]);
             let [white, quantized] = solution.amplitudes[..] else {
                 panic!("{solution:?}")

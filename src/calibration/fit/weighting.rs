@@ -1,6 +1,6 @@
 //! Weights of the scales in a fit.
 
-use crate::wavelet::{Curve, interval};
+use crate::wavelet::Curve;
 
 /// Omega: the weights of the scales.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -13,21 +13,12 @@ pub enum Weighting {
     Model,
     /// edof/(2 nu_hat²), the convention of the literature: what is low by chance weighs most.
     Edof,
-    /// 1/(width of the 95 % interval)².
-    Interval,
-    /// 1 for every scale.
-    None,
-    /// The inverse of the covariance of nu_hat over all scales.
-    Full,
 }
 
 nav_sim_signal::named!(
     Weighting {
         Model = "model",
         Edof = "edof",
-        Interval = "ci",
-        None = "none",
-        Full = "full",
     }, in files
 );
 
@@ -47,12 +38,7 @@ impl Weighting {
             _ if curve.ignored.contains(level) => 0.0,
             // var nu_hat = 2 nu²/eta.
             Self::Model => 1.0 / (nu * (2.0 / edof + curve.differing).sqrt()),
-            Self::Edof | Self::Full => (0.5 * edof).sqrt() / nu,
-            Self::Interval => {
-                let (low, high) = interval::interval(*nu, *edof, 0.95);
-                1.0 / (high - low)
-            }
-            Self::None => 1.0,
+            Self::Edof => (0.5 * edof).sqrt() / nu,
         };
         nu.iter()
             .zip(&curve.edof)
@@ -103,7 +89,6 @@ mod tests {
     use super::*;
     use crate::wavelet::Tuning;
     use approx::assert_relative_eq;
-    use statrs::distribution::{ChiSquared, ContinuousCDF};
 
     /// Variances twice the model's but for the last scale, which does not count.
     fn curve(edof: f64) -> Curve {
@@ -121,13 +106,9 @@ mod tests {
     #[test]
     fn weights_are_inverse_deviations_of_the_model() {
         let curve = curve(50.0);
-        let chi2 = ChiSquared::new(50.0).unwrap();
-        let width = 3.0 * 50.0 * (1.0 / chi2.inverse_cdf(0.025) - 1.0 / chi2.inverse_cdf(0.975));
         for (weighting, root) in [
             (Weighting::Model, 1.0 / (3.0 * (0.04_f64 + 0.04).sqrt())),
             (Weighting::Edof, 1.0 / (3.0 * 0.2)),
-            (Weighting::Interval, 1.0 / width),
-            (Weighting::None, 1.0),
         ] {
             let roots = weighting.roots(&curve, &[3.0, 3.0]);
             assert_relative_eq!(roots[0], root, max_relative = 1e-9);

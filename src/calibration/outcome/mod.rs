@@ -13,7 +13,7 @@ pub use inference::{
 };
 pub use note::{Note, Share, shares};
 pub use ranking::{Candidate, Ranking, TooSimple};
-pub use settings::{Advance, FitRange, ModelChoice, ParameterLimit, Settings};
+pub use settings::{Advance, FitRange, ModelChoice, Settings};
 
 use crate::curve::{Estimator, Scope};
 use crate::fit::{Fit, FitError, avlr, refit};
@@ -77,11 +77,10 @@ impl Outcome {
         put(&self.fit.composite, self.scope, model);
     }
 
-    /// Whether a parameter follows the curve: it is not fixed, stands at no bound, and its process has an amplitude.
+    /// Whether a parameter follows the curve: its process has an amplitude, and it is not at the end of the search.
     pub(crate) fn moves(&self, of: ParameterRef) -> bool {
-        let at_bound = self.fit.bounded.contains(&of)
-            || (self.fit.at_end.contains(&of.process) && of.parameter.is_shape());
-        !(self.spec.is_fixed(of) || self.fit.zero.contains(&of.process) || at_bound)
+        let at_end = self.fit.at_end.contains(&of.process) && of.parameter.is_shape();
+        !(self.fit.zero.contains(&of.process) || at_end)
     }
 
     /// The fit to a curve that resembles this one.

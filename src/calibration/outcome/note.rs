@@ -17,8 +17,6 @@ pub enum Note {
     Wide(ParameterRef, Option<f64>),
     /// Process without an amplitude.
     Zero(usize),
-    /// Parameter on a bound that was given, with that value.
-    AtBound(ParameterRef, f64),
     /// Process whose correlation time (s) is shorter than a sample: white noise by another name.
     LikeWhite(usize, f64),
     /// Process whose correlation time (s) has its peak beyond the longest scale (s): a random walk by another name.
@@ -58,13 +56,6 @@ impl Outcome {
         }
         let fit = &self.fit;
         notes.extend(fit.zero.iter().map(|i| Note::Zero(*i)));
-        let value = |of: &ParameterRef| fit.composite.parameters().find(|(p, _)| p == of);
-        notes.extend(
-            fit.bounded
-                .iter()
-                .filter_map(value)
-                .map(|(of, value)| Note::AtBound(of, value)),
-        );
         let longest_s = self
             .counted_levels()
             .last()

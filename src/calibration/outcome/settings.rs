@@ -1,9 +1,8 @@
 //! Settings of a calibration.
 
-use crate::curve::{Estimator, Pool, Scope, Trim};
+use crate::curve::{Estimator, Pool, Trim};
 use crate::fit::Weighting;
-use crate::imu::{Axis, Sensor};
-use crate::model::{LimitError, ModelSpec, SpecError};
+use crate::model::{ModelSpec, SpecError};
 use crate::wavelet::Tuning;
 use std::str::FromStr;
 
@@ -14,8 +13,6 @@ pub struct Settings {
     pub estimators: Vec<Estimator>,
     /// Choice of the model.
     pub model: ModelChoice,
-    /// Limits of its parameters, the more special after the more general.
-    pub limits: Vec<ParameterLimit>,
     /// Replicates that DR-AWV drops.
     pub trim: Trim,
     /// The tuning the robust wavelet variances were made with.
@@ -109,30 +106,12 @@ impl std::fmt::Display for ModelChoice {
     }
 }
 
-/// Bounds of one parameter.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ParameterLimit {
-    /// The sensor, or both.
-    pub sensor: Option<Sensor>,
-    /// The axis, or all.
-    pub axis: Option<Axis>,
-    /// Label of the process.
-    pub process: String,
-    /// Name of the parameter.
-    pub parameter: String,
-    /// Lower bound (units of the parameter).
-    pub low: Option<f64>,
-    /// Upper bound (units of the parameter).
-    pub high: Option<f64>,
-}
-
 impl Default for Settings {
     /// Settings that suit most recordings: DR-AWV, N2. At 1 Hz, until a rate is known.
     fn default() -> Self {
         Self {
             estimators: vec![Estimator::default()],
             model: ModelChoice::default(),
-            limits: Vec::new(),
             trim: Trim::default(),
             tuning: Tuning::default(),
             weighting: Weighting::default(),
@@ -152,18 +131,5 @@ impl Settings {
         } else {
             Pool::Sensor
         }
-    }
-
-    /// A model with the limits of what it is for.
-    pub(crate) fn limited(&self, spec: &ModelSpec, scope: Scope) -> Result<ModelSpec, LimitError> {
-        let mut spec = spec.clone();
-        for l in &self.limits {
-            let meant = l.sensor.is_none_or(|s| s == scope.sensor)
-                && l.axis.is_none_or(|axis| scope.axis == Some(axis));
-            if meant {
-                spec.limit(&l.process, &l.parameter, l.low, l.high)?;
-            }
-        }
-        Ok(spec)
     }
 }

@@ -77,13 +77,9 @@ pub(crate) fn choose(
 ) -> Result<(ModelSpec, Ranking), FitError> {
     let stage = ModelChoice::Auto.steps() / ModelChoice::STAGES;
     // One weighting for all candidates, whatever their models expect.
-    let weighting = match settings.weighting {
-        Weighting::Full | Weighting::Model => Weighting::Edof,
-        other => other,
-    };
     let reported = settings;
     let settings = &Settings {
-        weighting,
+        weighting: Weighting::Edof,
         ..settings.clone()
     };
     let fitted = |spec: &ModelSpec| {

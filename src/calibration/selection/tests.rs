@@ -13,7 +13,6 @@ fn settings() -> Settings {
     Settings {
         estimators: vec![Estimator::Awv],
         model: ModelChoice::Auto,
-        limits: Vec::new(),
         trim: Trim::Count(0),
         tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
         weighting: Weighting::Edof,

@@ -89,31 +89,12 @@ impl<'a> CurveSampler<'a> {
         )
     }
 
-    /// Covariance of curves by the law, relative to that of the model.
-    pub(crate) fn covariance(
-        &self,
-        draws: usize,
-        group: &str,
-        settings: &Settings,
-    ) -> DMatrix<f64> {
-        self.covariance_of(draws, group, |key| self.draw(key, settings))
-    }
-
-    /// The same of curves as recorded: of no greater rank than replicates give.
+    /// Covariance of curves as recorded, relative to the model: of no greater rank than replicates give.
     pub(crate) fn covariance_as_recorded(
         &self,
         draws: usize,
         group: &str,
         settings: &Settings,
-    ) -> DMatrix<f64> {
-        self.covariance_of(draws, group, |key| self.draw_as_recorded(key, settings))
-    }
-
-    fn covariance_of(
-        &self,
-        draws: usize,
-        group: &str,
-        draw: impl Fn(&StreamKey<'_>) -> Option<Curve>,
     ) -> DMatrix<f64> {
         let process = self.estimator.name();
         // Relative to the model: absolute values differ by powers of ten from level to level.
@@ -125,7 +106,7 @@ impl<'a> CurveSampler<'a> {
                 source: group,
                 process,
             };
-            let curve = draw(&key)?;
+            let curve = self.draw_as_recorded(&key, settings)?;
             Some(
                 curve
                     .wv

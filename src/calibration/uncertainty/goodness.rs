@@ -7,10 +7,10 @@ use crate::outcome::{Goodness, Outcome};
 
 /// The test of a fit, given the fits of the draws.
 pub(crate) fn goodness(outcome: &Outcome, draws: &[Fit]) -> Goodness {
-    let Outcome { fit, spec, .. } = outcome;
+    let Outcome { fit, .. } = outcome;
     let objectives: Vec<f64> = draws.iter().map(|d| d.objective).collect();
     // A parameter of a process without amplitude took nothing from the curve.
-    let free = |of: &ParameterRef| !fit.zero.contains(&of.process) && !spec.is_fixed(*of);
+    let free = |of: &ParameterRef| !fit.zero.contains(&of.process);
     let parameters = fit
         .composite
         .parameters()

@@ -8,7 +8,7 @@
 use super::bootstrap::CurveSampler;
 use crate::curve::{Estimator, Group};
 use crate::fit::{Fit, refit};
-use crate::model::{Limits, ModelSpec};
+use crate::model::ModelSpec;
 use crate::noise::{Kind, ParameterRef};
 use crate::outcome::{Indistinct, Outcome, ParameterInterval, Settings, Undetermined};
 use crate::rng::StreamKey;
@@ -37,9 +37,7 @@ pub(crate) fn simpler(
         let own: Vec<usize> = (0..spec.kinds().len())
             .filter(|i| spec.kinds()[*i] == kind)
             .collect();
-        // Limits are knowledge from elsewhere that tells them apart.
-        let free = own.iter().all(|i| spec.limits()[*i] == Limits::NONE);
-        (own.len() > 1 && free).then_some(own)
+        (own.len() > 1).then_some(own)
     };
     [Kind::Ar1, Kind::GaussMarkov]
         .into_iter()
@@ -161,7 +159,6 @@ mod tests {
         Settings {
             estimators: vec![Estimator::Awv],
             model: ModelChoice::Given(model.parse().unwrap()),
-            limits: Vec::new(),
             trim: Trim::Count(0),
             tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
             weighting: Weighting::Edof,

@@ -148,7 +148,6 @@ mod tests {
         Settings {
             estimators: vec![Estimator::Awv],
             model: ModelChoice::Given(spec.parse().unwrap()),
-            limits: Vec::new(),
             trim: Trim::Count(0),
             tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
             weighting: Weighting::Edof,

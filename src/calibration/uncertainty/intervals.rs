@@ -1,8 +1,7 @@
 //! Intervals of parameters from draws around their estimates.
 
 use crate::fit::{Fit, Range, correlated};
-use crate::model::{Limits, ModelSpec};
-use crate::noise::{Parameter, ParameterRef, Process};
+use crate::noise::{Kind, Parameter, ParameterRef, Process};
 use crate::outcome::{Outcome, ParameterInterval, Undetermined};
 
 impl ParameterInterval {
@@ -21,7 +20,7 @@ impl ParameterInterval {
     }
 }
 
-/// The intervals of all parameters that are not fixed, in the order of the model. `stretch`: Student's quantile over
+/// The intervals of all parameters, in the order of the model. `stretch`: Student's quantile over
 /// the normal one, where the draws' own spread is known from few replicates. `standard_errors`: of the same parameters.
 pub(crate) fn intervals(
     outcome: &Outcome,
@@ -29,12 +28,10 @@ pub(crate) fn intervals(
     stretch: f64,
     standard_errors: &[f64],
 ) -> Vec<ParameterInterval> {
-    let (model, spec) = (&outcome.fit.composite, &outcome.spec);
+    let model = &outcome.fit.composite;
     let searched = correlated(&outcome.curve);
-    let matched: Vec<Vec<Option<&Process>>> = fits
-        .iter()
-        .map(|fit| matched(&outcome.fit, spec, fit))
-        .collect();
+    let matched: Vec<Vec<Option<&Process>>> =
+        fits.iter().map(|fit| matched(&outcome.fit, fit)).collect();
     let mut intervals = Vec::new();
     for (i, process) in model.processes.iter().enumerate() {
         let there: Vec<&Process> = matched.iter().filter_map(|m| m[i]).collect();
@@ -45,7 +42,6 @@ pub(crate) fn intervals(
             1.0 - there.len() as f64 / fits.len() as f64
         };
         let drawn = DrawnProcess {
-            spec,
             index: i,
             process,
             drawn: there,
@@ -53,11 +49,7 @@ pub(crate) fn intervals(
             stretch,
         };
         let (mut own, quantiles) = drawn.intervals(&standard_errors[intervals.len()..]);
-        // Only a correlation time that is free can leave the search; limits that are given are an answer of
-        // their own.
-        if spec.limits()[i].shape.is_none()
-            && own.iter().any(|i| leaves_search(searched, process, i))
-        {
+        if own.iter().any(|i| leaves_search(searched, process, i)) {
             own.iter_mut()
                 .for_each(|i| i.refuse(Undetermined::BeyondSearch));
         }
@@ -84,7 +76,6 @@ pub(crate) fn intervals(
 
 /// A process of a model, and what it is in the draws that have it.
 struct DrawnProcess<'a> {
-    spec: &'a ModelSpec,
     /// Its position in the model.
     index: usize,
     process: &'a Process,
@@ -95,7 +86,7 @@ struct DrawnProcess<'a> {
 }
 
 impl DrawnProcess<'_> {
-    /// The intervals of its parameters that are not fixed, by draws mirrored at the estimates, and the quantiles of the
+    /// The intervals of its parameters, by draws mirrored at the estimates, and the quantiles of the
     /// draws themselves. `standard_errors`: of the same parameters.
     fn intervals(&self, standard_errors: &[f64]) -> (Vec<ParameterInterval>, Vec<[f64; 2]>) {
         let (mut intervals, mut quantiles) = (Vec::new(), Vec::new());
@@ -110,9 +101,6 @@ impl DrawnProcess<'_> {
                 process: self.index,
                 parameter,
             };
-            if self.spec.is_fixed(of) {
-                continue;
-            }
             let drawn = self
                 .drawn
                 .iter()
@@ -124,10 +112,15 @@ impl DrawnProcess<'_> {
                 lost if lost > TAIL => [f64::NAN; 2],
                 _ => holding(value, draws.around(value)),
             };
-            // The intervals of a parameter that is bounded end there.
-            let (from, to) = self.spec.range(of);
-            let [low, high] = [low, high].map(|end: f64| end.clamp(from, to));
-            quantiles.push(draws.stretched().map(|end| end.clamp(from, to)));
+            // Amplitudes are not negative.
+            let least = if parameter.is_shape() {
+                f64::NEG_INFINITY
+            } else {
+                0.0
+            };
+            let at_least = |end: f64| end.clamp(least, f64::INFINITY);
+            let [low, high] = [low, high].map(at_least);
+            quantiles.push(draws.stretched().map(at_least));
             let absent = match self.lost {
                 1.0.. => Some(Undetermined::Zero),
                 lost if lost > TAIL => Some(Undetermined::Vanishes),
@@ -179,14 +172,10 @@ fn holding(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
 /// The processes of a draw in the order of the model; none where one has vanished. Alike ones are told apart by
 /// their correlation times: those that are there, in the draw and in the model, keep their order, and so many of
 /// them are paired as can be, the nearest.
-pub(super) fn matched<'a>(
-    estimate: &Fit,
-    spec: &ModelSpec,
-    fit: &'a Fit,
-) -> Vec<Option<&'a Process>> {
+pub(super) fn matched<'a>(estimate: &Fit, fit: &'a Fit) -> Vec<Option<&'a Process>> {
     let (drawn, model) = (&fit.composite.processes, &estimate.composite.processes);
     let is_present = |fit: &Fit, i: usize| !fit.zero.contains(&i) && !fit.at_end.contains(&i);
-    let kinds = spec.kinds();
+    let kinds: Vec<Kind> = model.iter().map(Process::kind).collect();
     let cost = |i: usize, d: usize| (log_time(&model[i]) - log_time(&drawn[d])).powi(2);
     let mut matched = vec![None; drawn.len()];
     for (first, kind) in kinds
@@ -207,11 +196,8 @@ pub(super) fn matched<'a>(
             .copied()
             .filter(|i| is_present(estimate, *i))
             .collect();
-        // With limits the labels tell which is which; without, fits list alike processes by correlation time,
-        // and only their number may differ.
-        let pairs: Vec<(usize, usize)> = if own.iter().any(|i| spec.limits()[*i] != Limits::NONE) {
-            items.iter().map(|i| (*i, *i)).collect()
-        } else if items.len() <= places.len() {
+        // Fits list alike processes by correlation time, and only their number may differ.
+        let pairs: Vec<(usize, usize)> = if items.len() <= places.len() {
             nearest(&places, &items, cost)
                 .into_iter()
                 .zip(items)
@@ -432,7 +418,7 @@ mod tests {
         // The one that is not there has a time beyond the other's: by order it is the second.
         let mut lost = fit_of(vec![ar1(700.0, 1.1), ar1(5000.0, 0.0)]).fit;
         lost.zero = vec![1];
-        let matched = matched(&outcome.fit, &outcome.spec, &lost);
+        let matched = matched(&outcome.fit, &lost);
         assert!(matched[0].is_none() && matched[1].unwrap() == &lost.composite.processes[0]);
         let draws = |lost_ones: usize| -> Vec<Fit> {
             let whole = (0..100 - lost_ones).map(|i| whole(0.8 + 0.4 * i as f64 / 99.0));

@@ -9,40 +9,33 @@ use crate::curve::implied::{implied, implied_gradients};
 use crate::outcome::{Outcome, Settings};
 use nalgebra::DMatrix;
 
-/// Standard errors of the parameters that are not fixed, in the order of the model and in their units; NaN where a
+/// Standard errors of the parameters, in the order of the model and in their units; NaN where a
 /// parameter stands at a bound. `covariance` is that of curves, relative to the model.
 pub(crate) fn standard_errors(
     outcome: &Outcome,
     settings: &Settings,
     covariance: &DMatrix<f64>,
 ) -> Vec<f64> {
-    let (fit, spec, curve) = (&outcome.fit, &outcome.spec, &outcome.curve);
+    let (fit, curve) = (&outcome.fit, &outcome.curve);
     let least_squares = outcome.estimator != Estimator::Avlr;
-    // Of each parameter: whether it is fixed, whether it moves, and its value.
-    let all: Vec<(bool, bool, f64)> = fit
+    // Of each parameter: whether it moves, and its value.
+    let all: Vec<(bool, f64)> = fit
         .composite
         .parameters()
-        .map(|(of, value)| (spec.is_fixed(of), least_squares && outcome.moves(of), value))
+        .map(|(of, value)| (least_squares && outcome.moves(of), value))
         .collect();
-    let moving: Vec<usize> = (0..all.len()).filter(|p| all[*p].1).collect();
+    let moving: Vec<usize> = (0..all.len()).filter(|p| all[*p].0).collect();
     if moving.is_empty() {
-        return vec![f64::NAN; all.iter().filter(|p| !p.0).count()];
+        return vec![f64::NAN; all.len()];
     }
     let levels = curve.levels.len();
     let gradients = implied_gradients(&fit.composite, curve);
     let centre = implied(&fit.composite, curve);
-    let weights = match &fit.mixing {
-        Some(mixing) => {
-            DMatrix::from_fn(levels, levels, |i, j| mixing[(i, j)] / fit.weighted_for[j])
-        }
-        None => {
-            let roots = settings.weighting.roots(curve, &fit.weighted_for);
-            DMatrix::from_fn(levels, levels, |i, j| if i == j { roots[i] } else { 0.0 })
-        }
-    };
+    let roots = settings.weighting.roots(curve, &fit.weighted_for);
+    let weights = DMatrix::from_fn(levels, levels, |i, j| if i == j { roots[i] } else { 0.0 });
     // Relative to the parameters, which are of very different sizes.
     let jacobian = DMatrix::from_fn(levels, moving.len(), |j, m| {
-        gradients[j][moving[m]] * all[moving[m]].2
+        gradients[j][moving[m]] * all[moving[m]].1
     });
     let scatter = DMatrix::from_fn(levels, levels, |i, j| {
         covariance[(i, j)] * centre[i] * centre[j]
@@ -53,8 +46,8 @@ pub(crate) fn standard_errors(
         .map(|inverse| inverse * weights)
         .map(|passed_on| (&passed_on * scatter * passed_on.transpose()).diagonal());
     let error = |p: usize| match (&relative, moving.iter().position(|m| *m == p)) {
-        (Ok(variances), Some(m)) => all[p].2.abs() * variances[m].max(0.0).sqrt(),
+        (Ok(variances), Some(m)) => all[p].1.abs() * variances[m].max(0.0).sqrt(),
         _ => f64::NAN,
     };
-    (0..all.len()).filter(|p| !all[*p].0).map(error).collect()
+    (0..all.len()).map(error).collect()
 }

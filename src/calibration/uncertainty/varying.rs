@@ -129,7 +129,7 @@ impl SingleFits<'_> {
     /// A parameter of fits, scaled; none where its process is not there.
     fn scaled(&self, fits: &[Fit], of: ParameterRef) -> Vec<Option<f64>> {
         let of_fit = |fit: &Fit| {
-            let processes = matched(&self.outcome.fit, &self.outcome.spec, fit);
+            let processes = matched(&self.outcome.fit, fit);
             let process: &Process = processes[of.process]?;
             let at = process
                 .kind()

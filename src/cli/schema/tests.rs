@@ -2,8 +2,7 @@
 
 use super::{Kind, schema};
 use crate::formats::{
-    FileError, contamination_file, fusion_files, model_file, parameters_file, scenario_file,
-    trajectory_file,
+    FileError, contamination_file, fusion_files, model_file, scenario_file, trajectory_file,
 };
 use crate::study;
 use serde_json::Value;
@@ -196,7 +195,7 @@ parameter = \"gamma2\"
 factor = 4.0
 ";
 
-const SAMPLES: [Sample; 10] = [
+const SAMPLES: [Sample; 7] = [
     Sample {
         kind: Kind::Scenario,
         text: SCENARIO,
@@ -231,21 +230,6 @@ const SAMPLES: [Sample; 10] = [
         loose: &[],
     },
     Sample {
-        kind: Kind::Parameters,
-        text: "[WN]\nsigma2 = { fix = 0.5 }\n[gyro.AR1_2]\nphi = { fix = 0.5 }\n",
-        loose: &[],
-    },
-    Sample {
-        kind: Kind::Parameters,
-        text: "[accel.x.GM]\nbeta = { lower = 0.5 }\ns2 = { upper = 0.5 }\n",
-        loose: &[],
-    },
-    Sample {
-        kind: Kind::Parameters,
-        text: "[MA1]\ntheta = { upper = 0.5 }\n[DR]\nslope = { lower = 0.5 }\n",
-        loose: &[],
-    },
-    Sample {
         kind: Kind::Profile,
         text: STANDING,
         loose: &["duration_s", "climb_m", "speed_m_s", "ramp_s"],
@@ -267,7 +251,6 @@ fn read(kind: Kind, path: &Path) -> Result<(), FileError> {
         Kind::Scenario => scenario_file::read(path).map(|_| ()),
         Kind::Study => study::file::read(path).map(|_| ()),
         Kind::Model => model_file::read(path).map(|_| ()),
-        Kind::Parameters => parameters_file::check(path),
         Kind::Initial => fusion_files::read_initial(path).map(|_| ()),
         Kind::Profile => {
             trajectory_file::load(path, &trajectory_file::Options::default()).map(|_| ())

@@ -1,8 +1,6 @@
 //! Specification of a model, the kinds of its processes: "2*AR1+RW+WN+QN".
 
-use super::limits::{LimitError, Limits};
-use crate::noise::{Kind, ParameterRef, labels};
-use crate::wavelet::Curve;
+use crate::noise::{Kind, labels};
 use std::fmt;
 use std::str::FromStr;
 
@@ -17,11 +15,10 @@ const fn most(kind: Kind) -> usize {
 /// Processes with a shape parameter that one model may have: the search is over all their combinations.
 const MOST_SHAPES: usize = 5;
 
-/// The kinds of process of a model, in the order of [`Kind::ALL`], and where their parameters may be.
+/// The kinds of process of a model, in the order of [`Kind::ALL`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelSpec {
     kinds: Vec<Kind>,
-    limits: Vec<Limits>,
 }
 
 /// Why a specification means no model.
@@ -96,137 +93,13 @@ impl ModelSpec {
     pub(crate) fn of(kinds: impl IntoIterator<Item = Kind>) -> Self {
         let mut kinds: Vec<Kind> = kinds.into_iter().collect();
         kinds.sort_unstable();
-        let limits = vec![Limits::NONE; kinds.len()];
-        Self { kinds, limits }
+        Self { kinds }
     }
 
     /// Labels of the processes, as those of a fitted model: `WN`, `AR1_1`, `AR1_2`, …
     #[must_use]
     pub fn labels(&self) -> Vec<String> {
         labels(&self.kinds)
-    }
-
-    /// Names of the parameters of the process of that label; none of one that is not there.
-    #[must_use]
-    pub fn parameter_names(&self, label: &str) -> Vec<&'static str> {
-        let kind = self
-            .labels()
-            .iter()
-            .position(|l| l == label)
-            .map(|i| self.kinds[i]);
-        kind.map_or(Vec::new(), names)
-    }
-
-    /// Restricts a parameter of the process of that label (`WN`, `AR1`, or `AR1_2` of several) to `low` … `high`;
-    /// without one of them it is not restricted on that side.
-    ///
-    /// Processes of a kind of which one has limits keep the order of their labels; others are
-    /// ordered by correlation time.
-    ///
-    /// # Errors
-    /// When there is no such process or parameter, or no value is allowed.
-    pub fn limit(
-        &mut self,
-        process: &str,
-        parameter: &str,
-        low: Option<f64>,
-        high: Option<f64>,
-    ) -> Result<(), LimitError> {
-        let ParameterRef {
-            process: index,
-            parameter: named,
-        } = self.parameter(process, parameter)?;
-        let kind = self.kinds[index];
-        for value in [low, high].into_iter().flatten() {
-            let domain = BoundDomain::of(kind, named.is_shape());
-            if !domain.contains(value) {
-                let (process, parameter, domain) =
-                    (process.to_owned(), parameter.to_owned(), domain.words);
-                return Err(LimitError::Domain {
-                    process,
-                    parameter,
-                    value,
-                    domain,
-                });
-            }
-        }
-        let (from, to) = (
-            low.unwrap_or(f64::NEG_INFINITY),
-            high.unwrap_or(f64::INFINITY),
-        );
-        if from > to {
-            let (process, parameter) = (process.to_owned(), parameter.to_owned());
-            return Err(LimitError::Empty {
-                process,
-                parameter,
-                low: from,
-                high: to,
-            });
-        }
-        let limits = &mut self.limits[index];
-        if named.is_shape() {
-            limits.shape = Some((from, to));
-        } else {
-            // Amplitudes are not negative: variances, and the slope of a drift, whose sign a wavelet variance
-            // does not show.
-            limits.amplitude = (from.max(0.0), to);
-        }
-        Ok(())
-    }
-
-    /// The parameter of that name of the process of that label.
-    ///
-    /// # Errors
-    /// When there is no such process or parameter.
-    pub(crate) fn parameter(
-        &self,
-        process: &str,
-        parameter: &str,
-    ) -> Result<ParameterRef, LimitError> {
-        let labels = self.labels();
-        let Some(index) = labels.iter().position(|l| l == process) else {
-            let (spec, process) = (self.to_string(), process.to_owned());
-            return Err(LimitError::Process {
-                spec,
-                process,
-                legal: labels,
-            });
-        };
-        let kind = self.kinds[index];
-        match kind.parameters().iter().find(|p| p.name() == parameter) {
-            Some(named) => Ok(ParameterRef {
-                process: index,
-                parameter: *named,
-            }),
-            None => {
-                let (process, parameter) = (process.to_owned(), parameter.to_owned());
-                Err(LimitError::Parameter {
-                    process,
-                    parameter,
-                    legal: names(kind),
-                })
-            }
-        }
-    }
-
-    /// Range of a parameter by the limits given.
-    pub(crate) fn range(&self, of: ParameterRef) -> (f64, f64) {
-        let limits = self.limits[of.process];
-        if of.parameter.is_shape() {
-            limits.shape.unwrap_or((f64::NEG_INFINITY, f64::INFINITY))
-        } else {
-            limits.amplitude
-        }
-    }
-
-    /// Whether a parameter has one value only.
-    pub(crate) fn is_fixed(&self, of: ParameterRef) -> bool {
-        let (low, high) = self.range(of);
-        low >= high
-    }
-
-    pub(crate) fn limits(&self) -> &[Limits] {
-        &self.limits
     }
 
     /// Whether another model, with some amplitudes zero and some AR1 at the ends of their range, is this one: an AR1
@@ -245,7 +118,6 @@ impl ModelSpec {
     pub(crate) fn without(&self, index: usize) -> Self {
         let mut less = self.clone();
         less.kinds.remove(index);
-        less.limits.remove(index);
         less
     }
 
@@ -255,15 +127,10 @@ impl ModelSpec {
         &self.kinds
     }
 
-    /// Number of parameters that are not fixed.
+    /// Number of parameters.
     #[must_use]
     pub fn parameters(&self) -> usize {
-        // Equal bounds leave nothing to estimate: such a parameter costs no degree of freedom.
-        let fixed = |(low, high): (f64, f64)| usize::from(low >= high);
-        let free = |(kind, limits): (&Kind, &Limits)| {
-            kind.parameters().len() - fixed(limits.amplitude) - limits.shape.map_or(0, fixed)
-        };
-        self.kinds.iter().zip(&self.limits).map(free).sum()
+        self.kinds.iter().map(|kind| kind.parameters().len()).sum()
     }
 
     /// Words that may stand between plus signs.
@@ -289,53 +156,6 @@ impl FromStr for ModelSpec {
         kinds.sort_unstable();
         check(spec, &kinds)?;
         Ok(Self::of(kinds))
-    }
-}
-
-fn names(kind: Kind) -> Vec<&'static str> {
-    kind.parameters().iter().map(|p| p.name()).collect()
-}
-
-/// Where bounds of a parameter may be.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BoundDomain {
-    /// From.
-    pub low: f64,
-    /// To.
-    pub high: f64,
-    /// Whether these two are left out.
-    pub is_open: bool,
-    /// The same in words.
-    pub words: &'static str,
-}
-
-impl BoundDomain {
-    /// That of the shape of a process (phi, beta or theta), or of another parameter.
-    #[must_use]
-    pub fn of(kind: Kind, is_shape: bool) -> Self {
-        let closed = |low: f64, high: f64, words| Self {
-            low,
-            high,
-            is_open: false,
-            words,
-        };
-        match kind {
-            _ if !is_shape => closed(0.0, Curve::WV_RANGE.1, "a number from 0 to 1e100"),
-            // The search is over positive correlations.
-            Kind::Ar1 => Self {
-                low: 0.0,
-                high: 1.0,
-                is_open: true,
-                words: "between 0 and 1",
-            },
-            Kind::GaussMarkov => closed(1e-100, 1e100, "a number from 1e-100 to 1e100 (1/s)"),
-            _ => closed(-1.0, 1.0, "between -1 and 1"),
-        }
-    }
-
-    fn contains(&self, value: f64) -> bool {
-        let is_end = value == self.low || value == self.high;
-        (self.low..=self.high).contains(&value) && !(self.is_open && is_end)
     }
 }
 
@@ -404,4 +224,71 @@ impl fmt::Display for ModelSpec {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_are_read_in_any_order() {
+        for text in ["2*AR1+RW+WN+QN", " qn + AR1+ rw+wn +ar1", "N2", "n2"] {
+            assert_eq!(
+                text.parse::<ModelSpec>().unwrap(),
+                ModelSpec::n2(),
+                "{text}"
+            );
+        }
+        assert_eq!("AR1+RW+WN".parse::<ModelSpec>().unwrap(), ModelSpec::n1());
+        let spec: ModelSpec = "MA1+N1+DR+3*GM".parse().unwrap();
+        assert_eq!(spec.to_string(), "WN+AR1+3*GM+MA1+RW+DR");
+        assert_eq!(spec.to_string().parse::<ModelSpec>().unwrap(), spec);
+        assert_eq!((spec.parameters(), ModelSpec::n2().parameters()), (13, 7));
+    }
+
+    #[test]
+    fn special_cases() {
+        let special = |a: &str, b: &str| {
+            a.parse::<ModelSpec>()
+                .unwrap()
+                .is_special_case_of(&b.parse::<ModelSpec>().unwrap())
+        };
+        for (a, b) in [
+            ("WN", "N1"),
+            ("N1", "N1"),
+            ("WN", "AR1"),
+            ("RW", "AR1"),
+            ("WN+RW", "2*AR1"),
+            ("WN+AR1", "2*AR1"),
+        ] {
+            assert!(special(a, b), "{a} of {b}");
+        }
+        for (a, b) in [
+            ("WN+RW", "AR1"),
+            ("N1", "2*AR1"),
+            ("QN", "AR1"),
+            ("AR1", "WN+RW"),
+            ("DR", "N2"),
+        ] {
+            assert!(!special(a, b), "{a} of {b}");
+        }
+    }
+
+    #[test]
+    fn what_means_no_model_is_refused() {
+        let message = |text: &str| text.parse::<ModelSpec>().unwrap_err().to_string();
+        assert_eq!(message("AR1+WM"), "model \"AR1+WM\": \"WM\" is no process");
+        assert_eq!(message(""), "model \"\": a process is missing");
+        assert_eq!(message("WN++RW"), "model \"WN++RW\": a process is missing");
+        assert_eq!(
+            message("0*AR1"),
+            "model \"0*AR1\": \"0\" is not a number of processes"
+        );
+        assert_eq!(
+            message("-1*AR1"),
+            "model \"-1*AR1\": \"-1\" is not a number of processes"
+        );
+        assert!(
+            message("2*WN").ends_with("2 WN are one WN: their wavelet variances are proportional")
+        );
+        assert!(message("4*AR1+2*GM").contains("6 AR1, GM and MA1 processes; at most 5"));
+        assert!(message("99*N2").contains("99 WN"));
+    }
+}
