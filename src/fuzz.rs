@@ -18,7 +18,7 @@ use tempfile::TempDir;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All readers: recordings, drives, trajectories, then the program's own files.
-pub const TARGETS: [Target; 31] = [
+pub const TARGETS: [Target; 30] = [
     ("recording_csv", |bytes| {
         recording("recording_csv", "a.csv", bytes)
     }),
