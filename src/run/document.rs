@@ -13,7 +13,7 @@ use crate::report::verdict::verdict_lines;
 use crate::report::{Manifest, STATES, reduction_doubt, reduction_line, tone, unexpected_line};
 use nav_sim_document::{Cell, Document, Importance, Table, Tone, readable, window};
 use nav_sim_navigation::metrics::{
-    Agreement, EpochMetrics, FanEpoch, Met, OutageSummary, PerState, Summary, VerdictKind,
+    EpochMetrics, FanEpoch, Met, OutageSummary, PerState, Summary, VerdictKind,
 };
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 
@@ -69,7 +69,6 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
     page.charts(&states(epochs, &windows), rmse_and_asee(summary));
     consistency(epochs, summary, &mut page);
     budgets(summary, &largest(summary, OUTAGES), &mut page);
-    sensitivity(summary, &mut page);
     provenance(manifest, &mut page);
     page.checked(
         "The filter's standard deviations agree to 2e-4 with an independent implementation; the NEES of filters whose model is right \
@@ -122,10 +121,6 @@ fn notes(summary: &Summary, manifest: &Manifest, page: &mut Document) {
         );
         page.note(Importance::Remark, text);
     }
-    let agreement = summary.agreement.as_ref().map(agreement_line);
-    agreement
-        .into_iter()
-        .for_each(|line| page.note(Importance::Detail, line));
 }
 
 /// `sources of the horizontal error at the end of 300–390 s: gyro.AR1 78 %, gyro.WN 11 %, gnss.velocity 10 %`
@@ -176,17 +171,6 @@ fn by_calibration(outage: &OutageSummary) -> Option<String> {
             all.join(", ")
         )
     })
-}
-
-/// `runs against covariance analysis: largest z -2.31 (RMSE of yaw_deg at the end of outage 1) of 22, up to 4.4 by chance; …`
-fn agreement_line(a: &Agreement) -> String {
-    if a.figures == 0 {
-        return "runs against covariance analysis: a scatter takes two runs".to_owned();
-    }
-    format!(
-        "runs against covariance analysis: largest z {:+.2} ({}) of {}, up to {:.1} by chance; NEES {:+.2}, coverage {:+.2}",
-        a.largest_z, a.largest, a.figures, a.bound_z, a.nees_z, a.coverage_z
-    )
 }
 
 /// A table of figures, of which a covariance analysis does not have all: no draw, hence no interval.
@@ -492,27 +476,4 @@ fn lead(summary: &Summary) -> Table {
         ]);
     }
     table
-}
-
-/// How horizontal position (east), roll and yaw at the end of the outage with the largest errors follow from each parameter.
-fn sensitivity(summary: &Summary, page: &mut Document) {
-    let known = summary
-        .outages
-        .iter()
-        .filter_map(|o| Some((o, o.sensitivity.as_ref()?)));
-    let east = |o: &OutageSummary| o.rmse_end.0[1];
-    let Some((outage, slopes)) = known.max_by(|a, b| east(a.0).total_cmp(&east(b.0))) else {
-        return;
-    };
-    let states = [1, 6, 8];
-    let mut table = Table::new(["parameter"]).and(states.map(|i| REPORTED_NAMES[i].to_owned()));
-    for (name, of_state) in &slopes.0 {
-        let slopes = states.map(|i| Cell::figures(format!("{:+.3}", of_state.0[i])));
-        table.row(std::iter::once(Cell::from(name.clone())).chain(slopes));
-    }
-    let title = format!(
-        "d ln RMSE / d ln parameter at the end of {}",
-        window(outage.start_s, outage.end_s)
-    );
-    page.folded(&title, |page| page.table(&table));
 }

@@ -8,8 +8,7 @@ use crate::formats::draws_file::Draws;
 use crate::report::unexpected_line;
 use nav_sim_navigation::ekf::{Belief, BeliefError};
 use nav_sim_navigation::metrics::{
-    Agreement, Budget, EpochMetrics, Expected, FanEpoch, ReductionSummary, Sensitivities, Summary,
-    epochs, expected_fan, fan,
+    Budget, EpochMetrics, Expected, FanEpoch, ReductionSummary, Summary, epochs, expected_fan, fan,
 };
 use nav_sim_navigation::monte_carlo;
 use nav_sim_navigation::scenario::{Method, Scenario};
@@ -155,8 +154,7 @@ pub fn navigate(
                     sampled = sampled.beside(expected, &analysis.fan(&belief));
                 }
                 Some((_, expected)) => {
-                    let agreement = Agreement::of(&sampled.summary, &expected);
-                    sampled.summary.compare_with(&expected, &agreement);
+                    sampled.summary.compare_with(&expected);
                 }
                 None => {}
             }
@@ -179,7 +177,6 @@ pub fn navigate(
         .add_budgets(&mut navigation.summary, &belief);
     }
     if method == Method::Lincov {
-        analysis.add_sensitivities(&mut navigation.summary, &belief);
         let full = |model: &Model| {
             scenario
                 .with_full_noise()
@@ -339,18 +336,6 @@ impl<'a> Analysis<'a> {
         )
     }
 
-    /// How the errors at the ends of outages follow from the parameters of what makes them.
-    fn add_sensitivities(&self, summary: &mut Summary, belief: &Belief) {
-        let (Some(model), track) = (self.model, self.track.coarse()) else {
-            return;
-        };
-        let ends =
-            Sensitivities::at_outage_ends(&FilterPass::new(&track, belief), self.experiment, model);
-        for (outage, sensitivity) in summary.outages.iter_mut().zip(ends) {
-            outage.sensitivity = Some(sensitivity);
-        }
-    }
-
     /// What the calibrations leave open in the figures at the ends of outages.
     fn add_intervals(
         &self,
@@ -408,8 +393,7 @@ impl Navigation {
 
     /// Runs beside what was expected of them.
     fn beside(mut self, expected: Summary, fan: &[FanEpoch]) -> Self {
-        let agreement = Agreement::of(&self.summary, &expected);
-        self.summary.expect(expected, agreement);
+        self.summary.expect(expected);
         for (own, expected) in self.fan.iter_mut().zip(fan) {
             own.lincov_m = Some(expected.quantiles_m);
         }

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
-use nav_sim::navigation::metrics::{Estimate, SampleSize, Sensitivities};
+use nav_sim::navigation::metrics::{Estimate, SampleSize};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
@@ -141,82 +141,6 @@ fn a_vehicle_that_stands_has_the_closed_forms_of_each_process() {
         v,
         2.0 * variance * time * time * (t / time - 1.0 + (-t / time).exp()),
     );
-}
-
-/// d ln RMSE of the velocity down after 20 s without a fix, by the logarithm of a quantity of the accelerometer's noise.
-fn slope_of_standing(process: Process, quantity: &str) -> f64 {
-    let noise = Composite::new(vec![process]);
-    let truth = Model::pooled(RATE_HZ, &noise, &Composite::default());
-    let path = trajectory(vec![still(20.0)]);
-    let initial = InitialSettings {
-        perfect: true,
-        ..InitialSettings::default()
-    };
-    let scenario = Scenario {
-        initial,
-        ..Scenario::default()
-    };
-    let outages = [Outage {
-        start_s: 0.0,
-        end_s: 20.0,
-    }];
-    let track = scenario.track(&path, &truth, &outages).unwrap();
-    let white = Composite::new(vec![Process::White(White::new(1e-4).unwrap())]);
-    let beliefs = [Belief::new(
-        &Model::pooled(RATE_HZ, &white, &white),
-        FilterStates::Reduced15,
-        1.0,
-        800.0,
-    )
-    .unwrap()];
-    let experiment = scenario.experiment(&path, Truth::Model(&truth), &beliefs, &outages, 1);
-    let all =
-        &Sensitivities::at_outage_ends(&FilterPass::new(&track, &beliefs[0]), &experiment, &truth)
-            [0]
-        .0;
-    all.iter()
-        .find(|(name, _)| name == quantity)
-        .unwrap_or_else(|| panic!("{quantity}: {all:?}"))
-        .1
-        .0[5]
-}
-
-/// The sum of n samples of an AR1 has the variance n/(1 − phi)² − 2 phi (1 − phiⁿ)/((1 − phi)³ (1 + phi)) times sigma2,
-/// also where phi is negative. Of an MA1 it is (1 + theta)² (n − 1) + theta² + 1, whose derivative is steep near
-/// theta = −1 and is there at theta = ±1, the ends of the domain. The differences are right to 1e-3, and the gravity
-/// gradient adds 2e-4.
-#[test]
-fn the_sensitivity_to_a_parameter_is_the_derivative_up_to_the_end_of_its_domain() {
-    let n = 2000.0;
-    let near = |what: &str, found: f64, expected: f64| {
-        assert!(
-            (found / expected - 1.0).abs() < 2e-3,
-            "{what}: {found} {expected}"
-        );
-    };
-    for phi in [-0.3, -0.9, -0.995_f64] {
-        let found = slope_of_standing(Process::Ar1(Ar1::new(phi, 1e-4).unwrap()), "accel.AR1.phi");
-        let (less, more, power) = (1.0 - phi, 1.0 + phi, phi.powf(n));
-        let (sum, ends) = (
-            n / (less * less),
-            2.0 * phi * (1.0 - power) / (less.powi(3) * more),
-        );
-        let of_ends = 1.0 - n * power / (1.0 - power) + 3.0 * phi / less - phi / more;
-        near(
-            "phi",
-            found,
-            0.5 * (2.0 * phi / less * sum - of_ends * ends) / (sum - ends),
-        );
-    }
-    for theta in [0.5, 0.995, 1.0, -0.9, -0.995, -1.0_f64] {
-        let found = slope_of_standing(
-            Process::Ma1(Ma1::new(theta, 1e-4).unwrap()),
-            "accel.MA1.theta",
-        );
-        let variance = (1.0 + theta).powi(2) * (n - 1.0) + theta * theta + 1.0;
-        let expected = theta * ((1.0 + theta) * (n - 1.0) + theta) / variance;
-        near("theta", found, expected);
-    }
 }
 
 /// A drift of the gyroscope moves the velocity that the filter works out for its antenna: one that knows nothing of its

@@ -65,11 +65,14 @@ fn coning_that_the_rate_does_not_resolve_is_in_the_verdict() {
     };
     let slow = found(10.0);
     let expected = slow.lincov.as_ref().unwrap();
-    let agreement = slow.agreement.as_ref().unwrap();
-    assert!(
-        agreement.largest_z.abs() < agreement.bound_z,
-        "{agreement:?}"
-    );
+    let (sampled, analysed) = (&slow.outages[0], &expected.outages[0]);
+    for i in 0..9 {
+        let off = sampled.rmse_end.0[i] - analysed.rmse_end.0[i];
+        assert!(
+            off.abs() < 5.0 * sampled.rmse_end_std_error.0[i],
+            "state {i}: {off}"
+        );
+    }
     assert_eq!(
         expected.verdict.kind,
         VerdictKind::Overconfident,

@@ -146,7 +146,6 @@ impl Expected {
             },
             reduction: None,
             lincov: None,
-            agreement: None,
             is_contradicted: false,
             strapdown_over_sigma: 0.0,
             require: Vec::new(),

@@ -25,11 +25,9 @@ mod quadratic_form;
 mod ratio;
 mod reduction;
 mod requirement;
-mod sensitivity;
 mod summary;
 mod verdict;
 
-pub use agreement::Agreement;
 pub use budget::Budget;
 pub use consistency::{Band, chi_square_band};
 pub use epoch::{Accuracy, EpochMetrics, epochs};
@@ -43,7 +41,6 @@ pub use ratio::{
 };
 pub use reduction::{AxisReduction, ReductionQuality, ReductionSummary, TOLERANCE};
 pub use requirement::{Met, Requirement, UnknownRequirement};
-pub use sensitivity::Sensitivities;
 pub use summary::{
     AccuracySummary, Consistency, Coverage, Nis, OutageSummary, Recovery, Spread, Summary,
 };

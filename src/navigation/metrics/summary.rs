@@ -1,6 +1,5 @@
 //! The summary of an experiment: what `summary.json` holds.
 
-use super::agreement::Agreement;
 use super::budget::Budget;
 use super::consistency::{Band, chi_square_band, coverage_band};
 use super::epoch::{Accuracy, EpochMetrics};
@@ -8,7 +7,6 @@ use super::estimate::{Estimate, PerState, Quantile, SampleSize};
 use super::outage::{self, OutageMetrics};
 use super::reduction::ReductionSummary;
 use super::requirement::Met;
-use super::sensitivity::Sensitivities;
 use super::verdict::{OutageVerdict, Verdict};
 use crate::simulation::{NEES_DOF, RunResult};
 use serde::Serialize;
@@ -58,9 +56,6 @@ pub struct Summary {
     /// What covariance analysis expects, where it stands beside runs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lincov: Option<Box<Summary>>,
-    /// How far the runs are from it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub agreement: Option<Agreement>,
     /// Whether covariance analysis has another verdict, and figures that the runs contradict: errors are no longer small.
     #[serde(skip)]
     pub is_contradicted: bool,
@@ -142,10 +137,6 @@ pub struct OutageSummary {
     /// The same of what the filter believes in.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub believed_budget: Option<Budget>,
-    /// How the RMSE just before the first fix after the outage follows from the parameters of the true noise; of a
-    /// covariance analysis.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sensitivity: Option<Sensitivities>,
 }
 
 /// Quantiles of a distribution over runs, with distribution-free 95 % intervals (null: too few runs); of a covariance
@@ -261,7 +252,6 @@ impl Summary {
             coverage: coverage(epochs, result.coverage_level, windows),
             reduction: None,
             lincov: None,
-            agreement: None,
             is_contradicted: false,
             strapdown_over_sigma: 0.0,
             require: Vec::new(),
@@ -328,7 +318,6 @@ impl OutageSummary {
                 never: o.reconvergence.never,
             },
             budget: None,
-            sensitivity: None,
             believed_budget: None,
         }
     }

@@ -213,8 +213,6 @@ fn runs_stand_beside_what_is_expected_of_them() {
         [&summary["verdict"], &summary["lincov"]["verdict"]].map(|verdict| &verdict["kind"]);
     assert_eq!(verdicts, ["consistent", "consistent"]);
     assert_eq!(summary["verdict"]["by_covariance_analysis"], "consistent");
-    let agreement = &summary["agreement"];
-    assert_eq!(agreement["figures"], 2 + 9 + 10);
     let fan = fs::read_to_string(place.path().join("out/fan.csv")).unwrap();
     let names = "p05_m,p25_m,p50_m,p75_m,p95_m";
     assert!(
@@ -233,9 +231,6 @@ fn runs_stand_beside_what_is_expected_of_them() {
     assert!(
         page.contains("Dashed: 5, 50 and 95 % by covariance analysis."),
         "{page}"
-    );
-    assert!(
-        agreement["largest_z"].as_f64().unwrap().abs() < agreement["bound_z"].as_f64().unwrap()
     );
     assert!(place.path().join("out/runs.csv").exists());
 }
