@@ -2,9 +2,9 @@
 
 use crate::report::comparison_table::in_order;
 use nav_sim_calibration::{
-    Beginning, Beginnings, Candidate, Diagnosis, Estimator, Misfit, Miss, Note, Outcome,
-    ParameterInterval, Ranking, Settings, TurnOnFinding, TurnOnSpread, Undetermined, Verdict,
-    WIDEST, WarmUp, duration, percent, tau_s,
+    Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, Misfit, Miss, Note,
+    Outcome, ParameterInterval, Ranking, Settings, TurnOnFinding, TurnOnSpread, Undetermined,
+    Verdict, WIDEST, WarmUp, duration, percent, tau_s,
 };
 use nav_sim_document::{readable, short_names};
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
@@ -340,32 +340,29 @@ pub(super) fn recording_notes(
             duration(tau_s[tau_s.len() - 1])
         )
     };
-    if let Some(common) = &first.common {
-        let (most, at) = (percent(common.excess), duration(common.most_tau_s));
-        notes.push(format!("outliers in most recordings: they add up to {most} to the wavelet variance, at {at}; awv has them"));
-    }
-    if let Some(found) = &first.gaussian_quantization {
-        let low = percent(found.read_low);
-        notes.push(format!(
-            "QN is Gaussian from {}: robust estimators read it up to {low} too low; use awv",
-            ends(&found.tau_s)
-        ));
-    }
-    if let Some(found) = &first.coarse_steps {
-        notes.push(format!(
-            "quantisation steps are as large as the noise from {}: without outliers use awv",
-            ends(&found.tau_s)
-        ));
-    }
-    if let Some(drift) = &first.common_drift {
-        let slope = |(axis, slope): &(Axis, f64)| {
-            format!("{} {slope:+.2e} {}/h", axis.name(), sensor.unit())
-        };
-        let axes: Vec<String> = drift.per_hour.iter().map(slope).collect();
-        notes.push(format!(
-            "all recordings drift alike ({}): add DR, or warm up longer",
-            axes.join(", ")
-        ));
+    for found in &first.common {
+        let from_to = || ends(&found.tau_s);
+        let size = percent(found.size);
+        notes.push(match found.cause {
+            CommonCause::Outliers => format!(
+                "outliers in most recordings: they add up to {size} to the wavelet variance, from {}; awv has them",
+                from_to()
+            ),
+            CommonCause::GaussianQuantization => format!(
+                "QN is Gaussian from {}: robust estimators read it up to {size} too low; use awv",
+                from_to()
+            ),
+            CommonCause::CoarseSteps => format!(
+                "quantisation steps are as large as the noise from {}: without outliers use awv",
+                from_to()
+            ),
+            CommonCause::Drift => format!(
+                "all recordings drift alike ({} {:+.2e} {}/h): add DR, or warm up longer",
+                found.axis.map_or("", Axis::name),
+                found.size,
+                sensor.unit()
+            ),
+        });
     }
     notes
 }

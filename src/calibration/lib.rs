@@ -58,8 +58,8 @@ pub use curve::{
     warm_up,
 };
 pub use diagnosis::{
-    Alarm, AxisScores, CoarseSteps, CommonDrift, CommonOutliers, Diagnosis, DriftAlarm,
-    GaussianQuantization, LeftOut, Movement, Verdict, diagnose,
+    Alarm, AxisScores, CommonCause, CommonFinding, Diagnosis, DriftAlarm, LeftOut, Movement,
+    Verdict, diagnose,
 };
 pub use fit::{Fit, FitError, Termination, Weighting, estimate, fit};
 pub use format::{duration, percent};

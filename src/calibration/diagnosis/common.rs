@@ -1,4 +1,5 @@
-//! Outliers in all recordings, which comparing one recording with the others does not show.
+//! What all recordings have in common, which comparing one recording with the others does not show: outliers, steps of a
+//! quantizer, a drift.
 //!
 //! ln (classical / robust) of every signal has, when the noise is Gaussian, the mean (1/e − 1)/eta and the variance
 //! (1/e − 1)·2/eta (see [`super`]); quantization noise, which the robust variance reads high, is allowed for. Looked at is
@@ -11,9 +12,13 @@
 //! Where the steps of a quantiser are comparable with the noise the two variances differ without an outlier: there nothing is said
 //! of outliers.
 
+use super::alarm::FALSE_ALARM;
 use super::piece::{Piece, Test, excess_of_classical};
 use crate::curve::Replicate;
+use crate::imu::Axis;
+use crate::noise::Process;
 use crate::outcome::{Settings, tau_s};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Standard deviations of the median: by chance 3 in 10⁷, of a normal law, at each of some ten scales.
 const ALARM: f64 = 5.0;
@@ -23,44 +28,43 @@ const LEAST: f64 = 0.02;
 /// 1.16 of three), and the alarm the rarer.
 const MEDIAN: f64 = 1.2533;
 
-/// Outliers in most of the signals of a sensor.
+/// Cause of what most signals of a sensor have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CommonCause {
+    /// Outliers: the classical wavelet variance is above the robust one.
+    Outliers,
+    /// Quantization noise whose numbers are Gaussian, not a quantizer's: robust fits read it low.
+    GaussianQuantization,
+    /// Steps of a quantiser that are comparable with the noise, by which the two variances differ.
+    CoarseSteps,
+    /// A drift that the model has not.
+    Drift,
+}
+
+nav_sim_signal::named!(
+    CommonCause {
+        Outliers = "outliers",
+        GaussianQuantization = "gaussian_quantization",
+        CoarseSteps = "coarse_steps",
+        Drift = "drift",
+    }, in files
+);
+
+/// Finding that most signals of a sensor have in common.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct CommonOutliers {
-    /// The scales (s) at which there are.
+pub struct CommonFinding {
+    /// Cause.
+    pub cause: CommonCause,
+    /// The scales (s) at which it is seen; none of a drift.
     pub tau_s: Vec<f64>,
-    /// The one where they weigh most.
-    pub most_tau_s: f64,
-    /// Median of classical over robust wavelet variance, less one, there.
-    pub excess: f64,
-    /// The same (in the logarithm) in standard deviations.
+    /// The axis of a drift.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis: Option<Axis>,
+    /// Median of classical over robust wavelet variance, less one, where it is largest; of Gaussian quantization by how much
+    /// robust fits read it low; of a drift its mean slope (units per hour).
+    pub size: f64,
+    /// The statistic in its standard deviations, where it is largest; of a drift Student's t.
     pub deviations: f64,
-}
-
-/// Quantization noise whose numbers are Gaussian, not a quantizer's.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct GaussianQuantization {
-    /// The scales (s) at which classical and robust wavelet variance agree where a quantizer's would not.
-    pub tau_s: Vec<f64>,
-    /// By how much the robust wavelet variance of a quantizer's noise, which robust fits expect, would be above the classical
-    /// one at most: they read the noise there as much too low.
-    pub read_low: f64,
-}
-
-/// Steps of a quantiser that are comparable with the noise, by which the classical and the robust wavelet variance differ.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct CoarseSteps {
-    /// The scales (s) at which they differ so.
-    pub tau_s: Vec<f64>,
-    /// Median of classical over robust wavelet variance, less one, where it is furthest from 0.
-    pub excess: f64,
-}
-
-/// Findings that most signals of a sensor have in common.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Common {
-    pub(super) outliers: Option<CommonOutliers>,
-    pub(super) gaussian: Option<GaussianQuantization>,
-    pub(super) steps: Option<CoarseSteps>,
 }
 
 /// The median over the signals of ln (classical / robust) at a scale, less what is expected.
@@ -82,52 +86,106 @@ impl Excess {
     }
 }
 
-/// Looks at all signals of a sensor together.
-pub(super) fn common(pieces: &[Piece<'_>], settings: &Settings) -> Common {
-    let test = Test::Outliers;
-    let all = (0..test.most_levels(pieces)).map(|level| excess(pieces, level, settings));
+/// The findings of all signals of a sensor together.
+pub(super) fn common(pieces: &[Piece<'_>], settings: &Settings) -> Vec<CommonFinding> {
+    let all = (0..Test::Outliers.most_levels(pieces)).map(|level| excess(pieces, level, settings));
     let (stepped, fine): (Vec<Excess>, Vec<Excess>) = all.partition(|e| e.is_stepped);
     let found: Vec<Excess> = fine.into_iter().filter(|e| e.alarms(e.quantizer)).collect();
-    let tau_s: Vec<f64> = found.iter().map(|e| e.tau_s).collect();
-    // Outliers raise the classical variance by anything; that they make up for the allowance, no more and no less, at every
-    // scale is not to be expected.
-    if !found.is_empty() && found.iter().all(|e| !e.alarms(e.gaussian.abs())) {
-        let read_low = found
-            .iter()
-            .map(|e| (e.quantizer - e.gaussian).exp_m1())
-            .fold(0.0, f64::max);
-        return Common {
-            gaussian: Some(GaussianQuantization { tau_s, read_low }),
-            ..Common::default()
-        };
-    }
-    let most = found
-        .iter()
-        .max_by(|a, b| a.quantizer.total_cmp(&b.quantizer));
-    let outliers = most.map(|most| CommonOutliers {
-        tau_s,
-        most_tau_s: most.tau_s,
-        excess: most.quantizer.exp_m1(),
-        deviations: most.quantizer / most.sigma,
-    });
-    // Outliers of the finer scales explain what the coarser steps show.
-    let steps = if outliers.is_some() {
-        None
+    let mut findings = Vec::new();
+    if found.is_empty() {
+        let differ = stepped
+            .into_iter()
+            .filter(|e| e.alarms(e.gaussian.abs()))
+            .collect::<Vec<_>>();
+        findings.extend(seen(CommonCause::CoarseSteps, &differ, |e| e.gaussian));
+    } else if found.iter().all(|e| !e.alarms(e.gaussian.abs())) {
+        // Outliers raise the classical variance by anything; that they make up for the allowance, no more and no less, at
+        // every scale is not to be expected.
+        findings.extend(seen(CommonCause::GaussianQuantization, &found, |e| {
+            e.quantizer - e.gaussian
+        }));
     } else {
-        coarse_steps(&stepped)
-    };
-    Common {
-        outliers,
-        gaussian: None,
-        steps,
+        // Outliers of the finer scales explain what coarser steps show.
+        findings.extend(seen(CommonCause::Outliers, &found, |e| e.quantizer));
     }
+    findings.extend(drifts(pieces, settings.rate_hz));
+    findings
 }
 
-fn coarse_steps(stepped: &[Excess]) -> Option<CoarseSteps> {
-    let differ = stepped.iter().filter(|e| e.alarms(e.gaussian.abs()));
-    let (tau_s, all): (Vec<f64>, Vec<f64>) = differ.map(|e| (e.tau_s, e.gaussian.exp_m1())).unzip();
-    let excess = all.into_iter().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
-    Some(CoarseSteps { tau_s, excess })
+/// The finding of scales at which a logarithm is far from 0.
+fn seen(
+    cause: CommonCause,
+    scales: &[Excess],
+    log: impl Fn(&Excess) -> f64,
+) -> Option<CommonFinding> {
+    let most = scales
+        .iter()
+        .max_by(|a, b| log(a).abs().total_cmp(&log(b).abs()))?;
+    Some(CommonFinding {
+        cause,
+        tau_s: scales.iter().map(|e| e.tau_s).collect(),
+        axis: None,
+        size: log(most).exp_m1(),
+        deviations: log(most) / most.sigma,
+    })
+}
+
+/// The drifts that the recordings share, axis by axis; none where the model has one.
+///
+/// The mean slope of the recordings on an axis, over its standard deviation by their scatter, is Student's t with K − 1 degrees of
+/// freedom if recordings drift by chance. The fitted model is not asked: a random walk fitted to the drift would explain it.
+/// Where recordings scatter unequally (one is shorter), t exceeds its limit for 2.5 % the more rarely
+/// ([Ibragimov and Müller](crate::bibliography::IbragimovMuller10)).
+fn drifts(pieces: &[Piece<'_>], rate_hz: f64) -> Vec<CommonFinding> {
+    let is_drift = |p: &Process| matches!(p, Process::Drift(_));
+    if pieces
+        .iter()
+        .any(|p| p.model.processes.iter().any(is_drift))
+    {
+        return Vec::new();
+    }
+    let tested: Vec<(CommonFinding, f64)> = pieces
+        .iter()
+        .filter_map(|piece| {
+            // The two halves are half a record apart.
+            let slopes = piece
+                .replicates
+                .iter()
+                .flatten()
+                .map(|r| r.trend * rate_hz * 3600.0 / (0.5 * r.samples as f64))
+                .filter(|slope| slope.is_finite())
+                .collect::<Vec<_>>();
+            let (size, deviations, p_value) = student(&slopes)?;
+            let finding = CommonFinding {
+                cause: CommonCause::Drift,
+                tau_s: Vec::new(),
+                axis: Some(piece.axis),
+                size,
+                deviations,
+            };
+            Some((finding, p_value))
+        })
+        .collect();
+    // Bonferroni: any axis may be the one.
+    let limit = FALSE_ALARM / tested.len() as f64;
+    let is_seen = |(finding, p_value)| (p_value <= limit).then_some(finding);
+    tested.into_iter().filter_map(is_seen).collect()
+}
+
+/// Fewest recordings that say what they have in common: of two, t exceeds 25 in one set of 40 by chance.
+const FEWEST: usize = 3;
+
+/// Mean, Student's t and the probability of one as far from 0 on either side; none of too few, or of equal numbers.
+fn student(values: &[f64]) -> Option<(f64, f64, f64)> {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+    let t = mean / (squares / (count * (count - 1.0))).sqrt();
+    let is_known = values.len() >= FEWEST && t.is_finite();
+    let law = StudentsT::new(0.0, 1.0, count - 1.0)
+        .ok()
+        .filter(|_| is_known)?;
+    Some((mean, t, 2.0 * law.sf(t.abs())))
 }
 
 fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
@@ -159,5 +217,21 @@ fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
         gaussian: crate::curve::robust_scale::median(&of_gaussian),
         sigma: MEDIAN * variance.sqrt() / of_gaussian.len() as f64,
         is_stepped: 2 * stepped >= of_gaussian.len(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand: 1, 2, 3 have the mean 2 and the standard error √(1/3), t = 2√3; for two degrees of freedom P(|T| > t) =
+    /// 1 − t/√(2 + t²) = 1 − √12/√14.
+    #[test]
+    fn student_by_hand() {
+        let (mean, t, p) = student(&[1.0, 2.0, 3.0]).unwrap();
+        approx::assert_relative_eq!(mean, 2.0);
+        approx::assert_relative_eq!(t, 12.0_f64.sqrt(), max_relative = 1e-14);
+        approx::assert_relative_eq!(p, 1.0 - (12.0_f64 / 14.0).sqrt(), max_relative = 1e-9);
+        assert_eq!((student(&[1.0, 2.0]), student(&[2.0; 3])), (None, None));
     }
 }

@@ -1,7 +1,6 @@
 //! Each recording against the others, sensor by sensor.
 
 use super::common::common;
-use super::common_drift::common_drift;
 use super::comparison::Comparison;
 use super::contrasts::FEWEST;
 use super::leave_out::left_out;
@@ -39,7 +38,6 @@ fn of_sensor(
     }
     let pieces = axes(&own, &names, outcomes);
     let common = common(&pieces, settings);
-    let common_drift = common_drift(&pieces, settings.rate_hz);
     let pieces = if names.len() < FEWEST {
         Vec::new()
     } else {
@@ -80,10 +78,7 @@ fn of_sensor(
             outliers: of_outliers,
             drift: of_drift,
             scores: joined(&pieces, noise.scores(index), outliers.scores(index)),
-            common: common.outliers.clone(),
-            gaussian_quantization: common.gaussian.clone(),
-            coarse_steps: common.steps.clone(),
-            common_drift: common_drift.clone(),
+            common: common.clone(),
             left_out: without(name),
         }
     };

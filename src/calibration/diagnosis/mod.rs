@@ -10,7 +10,6 @@
 
 mod alarm;
 mod common;
-mod common_drift;
 mod comparison;
 mod contrasts;
 mod diagnose;
@@ -19,10 +18,10 @@ mod noise;
 mod piece;
 mod result;
 
-pub use common::{CoarseSteps, CommonOutliers, GaussianQuantization};
+pub use common::{CommonCause, CommonFinding};
 pub use diagnose::diagnose;
 pub use leave_out::{LeftOut, Movement};
-pub use result::{Alarm, AxisScores, CommonDrift, Diagnosis, DriftAlarm, Verdict};
+pub use result::{Alarm, AxisScores, Diagnosis, DriftAlarm, Verdict};
 
 #[cfg(test)]
 mod tests;

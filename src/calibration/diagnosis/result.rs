@@ -1,6 +1,6 @@
 //! Results of the diagnosis of each recording.
 
-use super::common::{CoarseSteps, CommonOutliers, GaussianQuantization};
+use super::common::CommonFinding;
 use super::leave_out::LeftOut;
 use crate::imu::{Axis, Sensor};
 use serde::{Serialize, Serializer};
@@ -46,19 +46,6 @@ pub struct DriftAlarm {
     /// The same against the others, in standard deviations.
     #[serde(serialize_with = "by_axis")]
     pub deviations: Vec<(Axis, f64)>,
-}
-
-/// A drift that the recordings share, on the axes where it is seen.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CommonDrift {
-    /// Probability that recordings which drift by chance seem to share as much on any axis.
-    pub p_value: f64,
-    /// Mean slope of the level (units per hour).
-    #[serde(serialize_with = "by_axis")]
-    pub per_hour: Vec<(Axis, f64)>,
-    /// The same over its standard deviation by the scatter among the recordings: Student's t.
-    #[serde(serialize_with = "by_axis")]
-    pub t: Vec<(Axis, f64)>,
 }
 
 /// Why a recording is abnormal.
@@ -107,18 +94,9 @@ pub struct Diagnosis {
     pub outliers: Option<Alarm>,
     /// Why its level is said to drift.
     pub drift: Option<DriftAlarm>,
-    /// Outliers that most signals of this sensor hold, in all recordings alike.
-    #[serde(rename = "common_outliers")]
-    pub common: Option<CommonOutliers>,
-    /// Quantization noise of this sensor that robust fits read low, in most signals.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub gaussian_quantization: Option<GaussianQuantization>,
-    /// Steps of a quantiser in most signals of this sensor that are comparable with its noise.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub coarse_steps: Option<CoarseSteps>,
-    /// Drift of this sensor that the recordings share and the model has not.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub common_drift: Option<CommonDrift>,
+    /// Findings that most signals of this sensor have in common.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub common: Vec<CommonFinding>,
     /// Scores; empty when there are fewer than four recordings.
     #[serde(serialize_with = "scores_by_axis")]
     pub scores: Vec<AxisScores>,
