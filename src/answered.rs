@@ -1,25 +1,10 @@
 //! What a request comes to.
 
-use crate::failure::Failure;
+use crate::app::{Answered, Failure};
 use crate::formats::Kind;
 use crate::formats::toml_file::Source;
 use crate::report::{Answer, OutputFile, json};
-use nav_sim_document::Document;
 use serde::de::DeserializeOwned;
-
-/// What a request comes to, as its command prints and writes it.
-#[derive(Debug)]
-#[non_exhaustive]
-pub struct Answered {
-    /// As JSON.
-    pub json: String,
-    /// In words, tables and charts.
-    pub document: Document,
-    /// The files that it makes: name and contents.
-    pub files: Vec<(String, String)>,
-    /// The bound that is not met, where one was asked for.
-    pub unmet: Option<Failure>,
-}
 
 impl Answered {
     /// An answer without files and bounds.

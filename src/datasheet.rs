@@ -1,6 +1,6 @@
 //! Models from data sheets, and the catalogue of IMUs.
 
-use crate::failure::Failure;
+use crate::app::Failure;
 use crate::formats::FileError;
 use crate::formats::datasheet::{CATALOGUE, Datasheet, Entry, Figure, Quantity, catalogued, read};
 use crate::formats::model_file::ModelFile;

@@ -56,16 +56,15 @@ pub use export::export;
 mod parse;
 // What every command does: notes, progress, outputs.
 pub mod app;
+pub use app as failure;
 // Words and shapes that several results share.
 pub mod report;
 // Files.
 pub mod formats;
-// What went wrong.
-pub mod failure;
 // What a request comes to.
 pub mod answered;
 // From here on a room for each command: request, job, result, document. The main job.
-pub mod run;
+pub mod commands;
 // Recorded drives.
 pub mod fuse;
 // Errors and remarks of the jobs that read recordings.

@@ -87,6 +87,15 @@ def texts(values: Any, name: str) -> list[str]:
     return [str(one) for one in given]
 
 
+def settings(value: Any, name: str) -> Any:
+    """Settings: a path, or tables by name."""
+    if value is None or isinstance(value, Mapping):
+        return value
+    if is_path(value):
+        return os.fspath(value)
+    raise NavSimError(f"{name}: a {type(value).__name__} is neither a path nor a dict")
+
+
 def is_table(value: object) -> bool:
     """Whether a value has columns by name."""
     if isinstance(value, np.ndarray):

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from nav_sim import _model, _trajectory
 from nav_sim._answer import Answer, Columns, Progress, ask, axes_or_new, flattened, windows
 from nav_sim._errors import NavSimError
-from nav_sim._inputs import Staging, StrPath, Table, number, numbers, texts
+from nav_sim._inputs import Staging, StrPath, Table, number, numbers, settings, texts
 from nav_sim._model import Model
 from nav_sim._trajectory import Trajectory
 
@@ -156,11 +156,13 @@ def run(
             rate_hz=rate_hz,
             outage=windows(outages),
             runs=runs,
-            filter={"states": states(filter), "turn_on_bias": turn_on_bias, "scale_ppm": scale_ppm},
+            filter=states(filter),
+            turn_on_bias=turn_on_bias,
+            scale_ppm=scale_ppm,
             method=method,
             require=None if require is None else texts(require, "require"),
-            gnss=None if gnss is None else staging.settings(gnss, "gnss"),
-            scenario=None if scenario is None else staging.settings(scenario, "scenario"),
+            gnss=settings(gnss, "gnss"),
+            scenario=settings(scenario, "scenario"),
             seed=seed,
         )
 

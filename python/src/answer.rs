@@ -1,7 +1,7 @@
 //! What a request comes to.
 
 use crate::{error, table};
-use nav_sim::answered::Answered;
+use nav_sim::app::Answered;
 use nav_sim::document::{Document, Importance};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

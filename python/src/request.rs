@@ -3,20 +3,21 @@
 use crate::answer::Answer;
 use crate::error;
 use crate::work::{Meter, work};
-use nav_sim::answered::{Answered, request};
-use nav_sim::app::{Context, Front};
+use nav_sim::answered::request;
+use nav_sim::app::{self, Answered, Context, Front};
 use nav_sim::calibrate::CalibrationRequest;
 use nav_sim::choose::ChoiceRequest;
+use nav_sim::commands::run::Run;
 use nav_sim::compare::CompareRequest;
 use nav_sim::design::DesignRequest;
 use nav_sim::document::{Importance, Note};
 use nav_sim::failure::Failure;
 use nav_sim::fuse::FuseRequest;
 use nav_sim::require::RequireRequest;
-use nav_sim::run::RunRequest;
 use nav_sim::tune::TuneRequest;
 use nav_sim::wv::WaveletRequest;
 use pyo3::prelude::*;
+use serde_json::{Map, Value};
 use std::ffi::OsString;
 use std::sync::{Mutex, PoisonError};
 
@@ -99,14 +100,22 @@ pub(crate) fn answer(
 
 /// The answer, or the failure; no failure where there is no such command.
 fn answered(command: &str, text: &str, clerk: &Clerk<'_>) -> Result<Answered, Option<Failure>> {
-    let context = &Context::new(clerk, None);
+    let mut options: Map<String, Value> =
+        serde_json::from_str(text).map_err(|e| Failure::input(e))?;
+    let seed = options.get("seed").and_then(Value::as_u64);
+    let context = Context::new(clerk, seed);
+    if command == "run" {
+        options.remove("seed");
+        return Ok(app::answered::<Run>(&options, context)?);
+    }
+    let context = &context;
+    let text = &toml::to_string(&options).map_err(|e| Failure::input(e))?;
     Ok(match command {
         "wv" => request::<WaveletRequest>(text)?.answer(context)?,
         "calibrate" => {
             let advance = |steps| clerk.meter.advance(steps);
             request::<CalibrationRequest>(text)?.answer(context, &advance)?
         }
-        "run" => request::<RunRequest>(text)?.answer(|| SEED, context)?,
         "fuse" => request::<FuseRequest>(text)?.answer()?,
         "tune" => request::<TuneRequest>(text)?.answer(context)?,
         "require" => request::<RequireRequest>(text)?.answer(context)?,

@@ -1,5 +1,6 @@
 //! The surroundings of a command: where its notes and its progress go, and the seed.
 
+use super::Input;
 use nav_sim_document::{Importance, Note};
 use std::fmt::Display;
 use std::sync::{Mutex, PoisonError};
@@ -35,6 +36,8 @@ pub struct Context<'a> {
     seed: Option<u64>,
     started: Mutex<Option<Instant>>,
     runs_s: Mutex<f64>,
+    used_seed: Mutex<Option<u64>>,
+    inputs: Vec<Input>,
 }
 
 /// Seed where none is given: the same command gives the same result.
@@ -48,7 +51,20 @@ impl<'a> Context<'a> {
             seed,
             started: Mutex::default(),
             runs_s: Mutex::default(),
+            used_seed: Mutex::default(),
+            inputs: Vec::new(),
         }
+    }
+
+    /// The same, with the files that the command reads.
+    #[must_use]
+    pub fn reading(self, inputs: Vec<Input>) -> Self {
+        Self { inputs, ..self }
+    }
+
+    /// The files that the command reads.
+    pub fn inputs(&self) -> &[Input] {
+        &self.inputs
     }
 
     /// Warns of what changes the conclusion.
@@ -108,9 +124,15 @@ impl<'a> Context<'a> {
     }
 
     /// The seed: that of `--seed`, else the one of a file, else 1.
-    #[must_use]
     pub fn seed_or(&self, of_file: Option<u64>) -> u64 {
-        self.seed.or(of_file).unwrap_or(DEFAULT_SEED)
+        let seed = self.seed.or(of_file).unwrap_or(DEFAULT_SEED);
+        *lock(&self.used_seed) = Some(seed);
+        seed
+    }
+
+    /// The seed that [`Self::seed_or`] gave, for the manifest; none where nothing was drawn.
+    pub(crate) fn used_seed(&self) -> Option<u64> {
+        *lock(&self.used_seed)
     }
 }
 

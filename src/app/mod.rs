@@ -1,5 +1,15 @@
-//! Jobs that all commands share.
+//! Jobs that all commands share: options and requests by name, notes and progress, inputs, outputs and failures.
 
+mod command;
 mod context;
+mod failure;
+pub(crate) mod inputs;
+mod manifest;
+mod outputs;
 
+pub use command::{Answer, Answered, Asked, Command, Out, OutputFile, answered};
 pub use context::{Context, DEFAULT_SEED, Front};
+pub use failure::{Failure, Result};
+pub(crate) use failure::{OrHelp, Refuse, option_elsewhere};
+pub(crate) use manifest::contents;
+pub use manifest::{Input, Manifest};

@@ -1,8 +1,8 @@
 //! The model file of a calibration.
 
 use super::{notes, turn_on_remark};
+use crate::app::Input;
 use crate::formats::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn};
-use crate::report::Input;
 use nav_sim_calibration::{Estimator, Outcome, ParameterSpread, Settings, TurnOnSpread, tau_s};
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::{Law, LognormalIntervals, Model, Spread, Variation};

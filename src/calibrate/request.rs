@@ -2,9 +2,9 @@
 
 use super::curve::{Curves, read_curves};
 use super::{CalibrationNote, CalibrationOptions, EstimatorChoice, Measured, ModelFiles, measure};
-use crate::answered::Answered;
+use crate::app::Answered;
 use crate::app::Context;
-use crate::failure::Failure;
+use crate::app::Failure;
 use crate::formats::input;
 use crate::jobs::{JobError, RecordingRequest, VarianceRequest, unknown_model};
 use crate::parse;

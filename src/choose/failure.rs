@@ -1,7 +1,7 @@
 //! Why there is no choice: which flag helps.
 
 use super::ChoiceError;
-use crate::failure::Failure;
+use crate::app::Failure;
 use crate::jobs::of_calibration;
 use nav_sim_navigation::simulation::ExperimentError;
 

@@ -3,14 +3,14 @@
 use super::document::ChoiceReport;
 use super::job::{ChoiceDrive, Chosen, choose};
 use super::{Candidate, Inflation};
-use crate::answered::Answered;
+use crate::app::Answered;
 use crate::app::Context;
+use crate::app::Failure;
+use crate::app::inputs::{self as read, OutageFlag};
 use crate::calibrate::{CalibrationNote, CalibrationOptions, ESTIMATORS};
-use crate::failure::Failure;
 use crate::formats::recordings::Gaps;
 use crate::jobs::{ReadingRequest, WHOLE, unknown_model};
 use crate::parse;
-use crate::run::{OutageFlag, checked_scenario, read};
 use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::sensors::outage::Outage;
@@ -98,7 +98,8 @@ impl ChoiceRequest {
         context: &Context<'_>,
     ) -> Result<ChoiceMade, Failure> {
         let candidates = self.candidates()?;
-        let scenario = checked_scenario(self.scenario.as_deref(), &self.outages)?;
+        let scenario =
+            crate::app::inputs::checked_scenario(self.scenario.as_deref(), &self.outages)?;
         let trajectory = read::trajectory(&self.trajectory, context)?;
         let seed = self.seed.or(scenario.run.seed).unwrap_or_else(draw);
         let outages = read::placed(&scenario, &trajectory, seed, context)?;

@@ -10,6 +10,7 @@ mod completions;
 mod datasheet;
 mod demo;
 mod design;
+mod drive;
 mod export;
 mod fuse;
 mod init;
@@ -21,7 +22,6 @@ mod printer;
 mod progress;
 mod read;
 mod require;
-mod run;
 mod schema;
 mod synthesize;
 mod trajectory;
@@ -29,9 +29,12 @@ mod tune;
 mod version;
 mod wv;
 
+use crate::app::Asked;
+use crate::commands::run::Run;
 use crate::parse;
 use clap::error::{ContextKind, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use drive::drive;
 use std::error::Error;
 use std::ffi::{OsStr, OsString};
 use std::io::Write;
@@ -39,7 +42,7 @@ use std::num::ParseIntError;
 use std::process::ExitCode;
 use std::sync::OnceLock;
 
-pub(crate) use crate::failure::Failure;
+pub(crate) use crate::app::Failure;
 pub(crate) use common::{Common, Session};
 pub(crate) use printer::Printer;
 pub(crate) use progress::Progress;
@@ -61,7 +64,7 @@ enum Command {
     Datasheet(datasheet::Args),
     Synthesize(synthesize::Args),
     Trajectory(trajectory::Args),
-    Run(run::Args),
+    Run(Asked<Run>),
     Tune(tune::Args),
     Require(require::Args),
     Choose(choose::Args),
@@ -103,7 +106,7 @@ impl Command {
             Self::Datasheet(args) => datasheet::run(&args, session),
             Self::Synthesize(args) => synthesize::run(&args, session),
             Self::Trajectory(args) => trajectory::run(&args, session),
-            Self::Run(args) => run::run(&args, session),
+            Self::Run(asked) => drive(&asked, session).map(drop),
             Self::Require(args) => require::run(&args, session),
             Self::Choose(args) => choose::run(&args, session),
             Self::Design(args) => design::run(&args, session),
@@ -327,7 +330,6 @@ mod tests {
             "runs = ['a']\nreference = 'r'",
         );
         is_a_file_too::<crate::synthesize::SynthesisRequest>("x m", "model = 'm'");
-        is_a_file_too::<crate::run::RunRequest>("x t m", "trajectory = 't'\nmodel = 'm'");
         is_a_file_too::<crate::fuse::FuseRequest>("x i g m", "imu = 'i'\ngnss = 'g'\nmodel = 'm'");
     }
 

@@ -1,11 +1,11 @@
 //! Reading inputs for commands: doubts are said, refusals become failures.
 
 use super::{Failure, Session};
-use crate::failure::option_elsewhere;
+use crate::app::inputs as read;
+use crate::app::option_elsewhere;
 use crate::formats::input;
 use crate::formats::model_file::ModelFile;
 use crate::formats::{FileError, Setting};
-use crate::run::read;
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::Recording;
 use std::path::{Path, PathBuf};

@@ -1,10 +1,11 @@
 //! Run directories → ratios between runs.
 
 use super::{Comparison, RatioCurves};
+use crate::app::Manifest;
 use crate::formats::run_directory;
 use crate::formats::run_directory::RunDirectory;
 use crate::jobs::JobError;
-use crate::report::{CandidateResult, Label, Manifest};
+use crate::report::{CandidateResult, Label};
 use nav_sim_navigation::metrics;
 use nav_sim_navigation::scenario::Method;
 use std::path::{Path, PathBuf};
@@ -24,7 +25,7 @@ pub(crate) fn compare(
     for path in runs {
         let run = path.display().to_string();
         let candidate = run_directory::read(path)?;
-        let differences = differences(&candidate.manifest, &directory.manifest);
+        let differences = differences(&candidate, &directory);
         let doubt = |what: &&str| {
             format!("{run}: {what} not that of the reference; the runs are not paired")
         };
@@ -82,7 +83,7 @@ fn compared(
             }
         }
     }
-    let label = Label::of(&run, candidate.manifest.model.estimator.as_deref());
+    let label = Label::of(&run, candidate.origin.model.estimator.as_deref());
     Ok(CandidateResult {
         run,
         label,
@@ -94,8 +95,12 @@ fn compared(
 }
 
 /// What makes two runs differ beside the model in the filter; then run k did not see the same noise.
-fn differences(candidate: &Manifest, reference: &Manifest) -> Vec<&'static str> {
-    let (c, r) = (&candidate.configuration, &reference.configuration);
+fn differences(candidate: &RunDirectory, reference: &RunDirectory) -> Vec<&'static str> {
+    let (c, r) = (
+        &candidate.origin.configuration,
+        &reference.origin.configuration,
+    );
+    let (candidate, reference) = (&candidate.manifest, &reference.manifest);
     let is_expected = [c, r].map(|manifest| manifest.run.method == Method::Lincov);
     let all = [
         ("the method is", is_expected[0] != is_expected[1]),

@@ -1,8 +1,8 @@
 //! The request of a comparison: the arguments of `nav-sim compare`.
 
 use super::{Comparison, compare};
-use crate::answered::Answered;
-use crate::failure::Failure;
+use crate::app::Answered;
+use crate::app::Failure;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;

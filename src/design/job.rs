@@ -2,10 +2,10 @@
 
 use super::{Design, DesignedParameter, DesignedQuantile};
 use crate::app::Context;
+use crate::commands::run::{NavigateInputs, navigate};
 use crate::formats::draws_file::DrawsFile;
 use crate::formats::model_file::ModelFile;
 use crate::jobs::JobError;
-use crate::run::{NavigateInputs, navigate};
 use nav_sim_calibration::{
     Anticipated, Bootstrap, Estimator, Outcome, ParameterInterval, Scattering, Settings,
 };

@@ -1,14 +1,15 @@
 //! The request of a design: the arguments of `nav-sim design`.
 
 use super::{Design, DesignInputs, Designs, Destination, design};
-use crate::answered::Answered;
+use crate::app::Answered;
 use crate::app::Context;
+use crate::app::Failure;
+use crate::app::inputs as read;
+use crate::app::inputs::OutageFlag;
 use crate::calibrate::ESTIMATORS;
-use crate::failure::Failure;
+use crate::commands::run::{NavigateInputs, TrueImu};
 use crate::formats::model_file::ModelFile;
 use crate::parse;
-use crate::run::read;
-use crate::run::{NavigateInputs, OutageFlag, TrueImu, windows_of};
 use nav_sim_calibration::{Bootstrap, Estimator, Settings};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::{Method, Scenario};
@@ -109,7 +110,7 @@ impl DesignRequest {
         scenario.run.method = Method::Lincov;
         scenario.filter.states = FilterStates::Full;
         if !self.outages.is_empty() {
-            scenario.outage = Some(windows_of(&self.outages)?);
+            scenario.outage = Some(crate::app::inputs::windows_of(&self.outages)?);
         }
         Ok(scenario)
     }

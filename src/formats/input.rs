@@ -1,7 +1,7 @@
 //! Files as inputs: which ones are meant, and their fingerprints.
 
 use super::{FileError, hash};
-use crate::report::Input;
+use crate::app::Input;
 use std::path::{Path, PathBuf};
 
 /// An input with its fingerprint, of the bytes that were read.

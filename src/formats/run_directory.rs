@@ -2,7 +2,8 @@
 
 use super::run_tables::{REPEAT, parse_epochs, parse_runs};
 use super::{FileError, Place, atomic, hash, source};
-use crate::report::Manifest;
+use crate::app::Manifest;
+use crate::commands::run::RunOrigin;
 use nav_sim_navigation::metrics::{EpochRow, Measured, PerState, Verdict};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::{OutageRecord, RunRecord};
@@ -16,6 +17,8 @@ pub(crate) type OpenEnds = Option<PerState<(f64, f64)>>;
 pub(crate) struct RunDirectory {
     /// Where it came from.
     pub manifest: Manifest,
+    /// Its configuration.
+    pub origin: RunOrigin,
     /// What was found.
     pub experiment: Measured,
     /// Whether the filter is as good as it believes: as its own command found it, covariance analysis included.
@@ -30,11 +33,11 @@ pub(crate) struct RunDirectory {
 /// The file, and what is wrong with it.
 pub(crate) fn read(directory: &Path) -> Result<RunDirectory, FileError> {
     atomic::recover(directory);
-    let manifest = manifest(directory)?;
+    let (manifest, origin) = manifest(directory)?;
     let (path, epochs_text) = text(directory, "epochs.csv")?;
     let epochs = parse_epochs(&path, &epochs_text)?;
     as_written(directory, &manifest, "epochs.csv", &epochs_text)?;
-    let is_expected = manifest.configuration.run.method == Method::Lincov;
+    let is_expected = origin.configuration.run.method == Method::Lincov;
     let runs = if is_expected {
         let (path, summary) = text(directory, "summary.json")?;
         let run = expected_run(&path, &summary, &epochs)?;
@@ -47,14 +50,14 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, FileError> {
         runs
     };
     let (verdict, asee_mean_ci95) = found(directory, &manifest)?;
-    let outages = manifest
+    let outages = origin
         .configuration
         .outage
         .iter()
         .flatten()
         .map(|o| (o.start_s, o.end_s))
         .collect();
-    let independent_windows = manifest.independent_windows;
+    let independent_windows = origin.independent_windows;
     let experiment = Measured {
         epochs,
         runs,
@@ -65,6 +68,7 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, FileError> {
     };
     Ok(RunDirectory {
         manifest,
+        origin,
         experiment,
         verdict,
         asee_mean_ci95,
@@ -146,12 +150,16 @@ fn expected_run(path: &str, summary: &str, epochs: &[EpochRow]) -> Result<RunRec
     })
 }
 
-fn manifest(directory: &Path) -> Result<Manifest, FileError> {
+fn manifest(directory: &Path) -> Result<(Manifest, RunOrigin), FileError> {
     let (path, json) = text(directory, "manifest.json")?;
     let manifest: Manifest = serde_json::from_str(&json).map_err(|e| not_json(&path, &e))?;
     let (found, expected) = (manifest.schema_version, Manifest::SCHEMA_VERSION);
     if found == expected {
-        return Ok(manifest);
+        let origin = serde_json::from_value(manifest.record.clone().into());
+        return match origin {
+            Ok(origin) => Ok((manifest, origin)),
+            Err(e) => Err(not_json(&path, &e)),
+        };
     }
     let message = format!("\"schema_version\" is {found}; this nav-sim reads {expected}");
     Err(FileError::contents(path, Place::Within, message)

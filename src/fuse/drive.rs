@@ -4,11 +4,11 @@ use super::manifest::{Configuration, FuseManifest, Kind};
 use super::summary::{Cause, FixCorrelation, Fixes, FuseSummary, FuseVerdict, Initial};
 use super::vehicle::VehicleSummary;
 use super::{FuseError, FuseRequest, filter};
+use crate::app::inputs;
 use crate::formats::fusion_files::{self, read_gnss, read_imu, read_initial, read_wheel};
 use crate::formats::input;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::trajectory_file::{self, load_reference};
-use crate::run::turn_on;
 use nav_sim_navigation::ekf::{Belief, InitialSettings};
 use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
 use nav_sim_navigation::fusion::mounting::{self, Mounted, Mounting, MountingError};
@@ -62,7 +62,7 @@ pub struct FuseAnswer {
     /// Remarks on the files and the drive.
     pub notes: Vec<FuseNote>,
     /// Files by their roles.
-    pub(super) inputs: Vec<crate::report::Input>,
+    pub(super) inputs: Vec<crate::app::Input>,
 }
 
 impl Serialize for FuseAnswer {
@@ -151,7 +151,7 @@ impl Drive {
             .map(|start| start.sigma.clone())
             .unwrap_or_default();
         let mut expected = request.expected(of_file);
-        let stated = turn_on::expect(&mut expected, &model.turn_on.unwrap_or_default());
+        let stated = inputs::expected_turn_on(&mut expected, &model.turn_on.unwrap_or_default());
         notes.extend(
             stated
                 .into_iter()

@@ -1,7 +1,7 @@
 //! Why there is no solution: what helps.
 
 use super::{FuseAnswer, FuseError};
-use crate::failure::{Failure, option_elsewhere};
+use crate::app::{Failure, option_elsewhere};
 use crate::formats::Setting;
 use nav_sim_navigation::metrics::VerdictKind;
 

@@ -2,7 +2,7 @@
 
 use super::FuseError;
 use crate::app::Context;
-use crate::run::Reduced;
+use crate::commands::run::Reduced;
 use nav_sim_navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim_navigation::gnss::GnssFix;
 use nav_sim_navigation::metrics::ReductionSummary;

@@ -1,6 +1,6 @@
 //! `manifest.json` of a fusion: its configuration and inputs, to make it again.
 
-use crate::report::{Input, contents};
+use crate::app::{Input, contents};
 use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
 use nav_sim_navigation::fusion::mounting::Mounted;
 use nav_sim_navigation::fusion::{Correlation, Heading, Settings};

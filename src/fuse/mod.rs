@@ -26,8 +26,9 @@ mod start;
 mod summary;
 mod vehicle;
 
-use crate::answered::{Answered, contents};
-use crate::failure::Failure;
+use crate::answered::contents;
+use crate::app::Answered;
+use crate::app::Failure;
 
 pub(crate) use drive::Drive;
 pub use drive::{FuseAnswer, FuseNote};

@@ -1,7 +1,7 @@
 //! Why a job has no result.
 
+use crate::commands::run::NavigateError;
 use crate::formats::FileError;
-use crate::run::NavigateError;
 use nav_sim_calibration::{AnticipationError, CalibrationError, Estimator, SignalError};
 use nav_sim_navigation::metrics::ComparisonError;
 use nav_sim_signal::noise::ReplicateError;

@@ -1,7 +1,7 @@
 //! Why a job has no result: which flag helps.
 
 use super::JobError;
-use crate::failure::Failure;
+use crate::app::Failure;
 use crate::formats::suggest;
 use nav_sim_calibration::{AverageError, CalibrationError, Cause, FitError, ModelSpec, SpecError};
 use nav_sim_navigation::metrics::ComparisonError;

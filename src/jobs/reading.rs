@@ -1,6 +1,6 @@
 //! How recordings are read and their wavelet variances taken: arguments that several commands share.
 
-use crate::failure::Failure;
+use crate::app::Failure;
 use crate::formats::logs::LogOptions;
 use crate::formats::recordings::{Gaps, ReadOptions};
 use crate::parse;

@@ -6,7 +6,6 @@ pub(crate) mod comparison_table;
 pub(crate) mod curve_chart;
 pub(crate) mod curves;
 pub(crate) mod dots;
-mod manifest;
 mod output;
 mod recording;
 pub(crate) mod requirement;
@@ -25,8 +24,6 @@ use serde::Serialize;
 pub(crate) use closure::TrajectoryCheck;
 pub(crate) use comparison_table::{CandidateResult, Label};
 pub(crate) use curves::{CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile};
-pub(crate) use manifest::contents;
-pub use manifest::{Input, Manifest, ModelNote};
 /// A result: what is printed, drawn or saved of it is it itself as JSON, or its document.
 pub trait Answer: Serialize {
     /// What it says, in words, tables and charts.

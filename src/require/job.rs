@@ -4,8 +4,8 @@ use super::given::{Aided, GivenImu, Longest};
 use super::needed::NeededImu;
 use super::question::{BeyondLinear, CURVE_S, LONGEST_S, Question};
 use super::ranking::{RankedUnit, Ranking};
+use crate::app::inputs;
 use crate::formats::model_file::{ModelFile, PROGRAM, TurnOn};
-use crate::run::turn_on;
 use nav_sim_navigation::ekf::BeliefError;
 use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{
@@ -155,7 +155,7 @@ impl Requirements {
     /// The scenario with a filter that expects the turn-on biases that `[imu]` states, as it expects those of a model file.
     fn with_stated_turn_on(&self) -> Scenario {
         let mut scenario = self.scenario.clone();
-        turn_on::expect(&mut scenario.initial, &self.stated_turn_on());
+        inputs::expected_turn_on(&mut scenario.initial, &self.stated_turn_on());
         scenario
     }
 
@@ -349,8 +349,8 @@ impl Requirements {
     pub(crate) fn unit(&self, name: String, file: &ModelFile, model: Model) -> CatalogueUnit {
         let mut scenario = self.scenario.clone();
         let stated = file.turn_on.unwrap_or_default();
-        turn_on::expect(&mut scenario.initial, &stated);
-        turn_on::make(&mut scenario.imu, &stated);
+        inputs::expected_turn_on(&mut scenario.initial, &stated);
+        inputs::made_turn_on(&mut scenario.imu, &stated);
         CatalogueUnit {
             name,
             model,

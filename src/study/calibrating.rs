@@ -4,9 +4,9 @@ use super::description::{CalibrateStep, Study, TruthEntry};
 use super::failure::StudyError;
 use super::plan::CALIBRATED;
 use super::reader::{CANDIDATE_SEED, Reader};
+use crate::app::Input;
 use crate::calibrate::CalibrationNote;
 use crate::formats::{hash, input, model_file};
-use crate::report::Input;
 use nav_sim_calibration::{
     Estimator, Outcome, Pool, Settings, Trim, calibrate, grouped, replicates,
 };

@@ -2,7 +2,7 @@
 
 use super::description::{Metric, Study};
 use super::grid::{Cell, Column, Grid};
-use crate::report::Input;
+use crate::app::Input;
 use nav_sim_navigation::lanes::LANES;
 use nav_sim_navigation::scenario::{Method, Scenario};
 use nav_sim_navigation::sensors::gnss::GnssSettings;

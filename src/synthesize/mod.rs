@@ -4,12 +4,13 @@ mod request;
 
 pub use request::SynthesisRequest;
 
+use crate::app::Input;
 use crate::formats::atomic::{AtomicDir, Claim, Existing, Found, claim_directory};
 use crate::formats::model_file::ModelFile;
 use crate::formats::recordings::{FileFormat, is_recording};
 use crate::formats::{FileError, Place, Setting};
 use crate::jobs::JobError;
-use crate::report::{self, Input};
+use crate::report;
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::contamination::Contamination;
 use nav_sim_signal::noise::{Model, ReplicateError, VirtualImu};

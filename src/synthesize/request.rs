@@ -2,7 +2,7 @@
 
 use super::Synthesis;
 use crate::app::Context;
-use crate::failure::Failure;
+use crate::app::Failure;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::recordings::FileFormat;
 use crate::formats::{contamination_file, input};

@@ -1,8 +1,8 @@
 //! Smallest factors on a model that make its filter consistent with another truth.
 
 use super::result::{FactorEntry, TuneResult};
+use crate::app::Input;
 use crate::formats::model_file::{ModelFile, PROGRAM};
-use crate::report::Input;
 use nav_sim_calibration::derived_interval;
 use nav_sim_navigation::ekf::{BeliefError, FilterStates};
 use nav_sim_navigation::scenario::Scenario;

@@ -2,16 +2,17 @@
 
 use super::job::{Truths, TuneInputs, tune, tuned};
 use super::result::TuneResult;
-use crate::answered::Answered;
+use crate::app::Answered;
 use crate::app::Context;
-use crate::failure::Failure;
+use crate::app::Failure;
+use crate::app::Input;
+use crate::app::inputs as read;
+use crate::app::inputs::{OutageFlag, no_filter};
 use crate::formats::draws_file::{self, Draws};
 use crate::formats::input;
 use crate::formats::model_file::{self, ModelFile};
 use crate::parse;
-use crate::report::{Input, unexpected_line};
-use crate::run::read;
-use crate::run::{OutageFlag, checked_scenario, no_filter};
+use crate::report::unexpected_line;
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::outage::Outage;
@@ -91,7 +92,8 @@ impl TuneRequest {
     /// The factors.
     pub(crate) fn tuned(&self, context: &Context<'_>) -> Result<Tuned, Failure> {
         let files = self.inputs()?;
-        let mut scenario = checked_scenario(self.scenario.as_deref(), &self.outages)?;
+        let mut scenario =
+            crate::app::inputs::checked_scenario(self.scenario.as_deref(), &self.outages)?;
         if self.truths.is_empty() && !self.intervals && scenario.has_no_errors() {
             return Err(Failure::input("no truth to be consistent with: neither --truth nor --intervals is given")
                 .hint("give models (--truth OTHER.toml, one a recording), --intervals for a MODEL of `nav-sim calibrate`, or a scenario with errors"));

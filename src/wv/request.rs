@@ -1,9 +1,9 @@
 //! The request of wavelet variances: the arguments of `nav-sim wv`.
 
 use super::job::{Intervals, WaveletOptions, wavelet_variances};
-use crate::answered::Answered;
+use crate::app::Answered;
 use crate::app::Context;
-use crate::failure::Failure;
+use crate::app::Failure;
 use crate::jobs::{RecordingRequest, VarianceRequest};
 use crate::parse;
 use crate::report::SignalsFile;

@@ -1,12 +1,12 @@
 //! `nav-sim compare` on made-up run directories whose ratios are known.
 
 use assert_cmd::Command;
+use nav_sim::app::{Answer, Input, Manifest};
+use nav_sim::commands::run::{ModelNote, Navigation, RunAnswer, RunOrigin};
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::simulation::{EpochSums, OutageRecord, RunRecord, RunResult};
-use nav_sim::report::{Input, Manifest, ModelNote, TrajectorySeries};
-use nav_sim::run::Navigation;
-use nav_sim::run::RunAnswer;
+use nav_sim::report::TrajectorySeries;
 use std::path::Path;
 
 const RUNS: u32 = 20;
@@ -64,40 +64,45 @@ fn result(factor: f64) -> RunResult {
     }
 }
 
-fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest)) {
-    let result = result(factor);
+/// Writes the directory of a made-up run; `change` has its manifest and origin.
+fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest, &mut RunOrigin)) {
     let outage = Some(vec![Outage {
         start_s: 4.0,
         end_s: 8.0,
     }]);
-    let mut manifest = Manifest {
-        schema_version: Manifest::SCHEMA_VERSION,
-        version: "0".into(),
-        command: vec![],
-        seed: Some(7),
+    let mut origin = RunOrigin {
         configuration: Scenario {
             outage,
             ..Scenario::default()
         },
         spread: false,
-        inputs: vec![
-            input("trajectory", "t.csv", b"t"),
-            input("truth", "m.toml", b"m"),
-        ],
-        outputs: Default::default(),
         model: ModelNote::default(),
-        threads: 1,
         independent_windows: None,
-        wall_s: 1.0,
         throughput_epochs_per_s: 1.0,
     };
-    change(&mut manifest);
-    let answer = RunAnswer::new(
-        Navigation::of_runs(result, 7),
-        manifest,
-        TrajectorySeries::default(),
-    );
-    answer.write(directory).unwrap();
+    let inputs = vec![
+        input("trajectory", "t.csv", b"t"),
+        input("truth", "m.toml", b"m"),
+    ];
+    let mut manifest = Manifest::new("run", Default::default(), inputs.clone());
+    manifest.seed = Some(7);
+    change(&mut manifest, &mut origin);
+    let answer = RunAnswer {
+        navigation: Navigation::of_runs(result(factor), 7),
+        origin,
+        inputs,
+        track: TrajectorySeries::default(),
+    };
+    std::fs::create_dir_all(directory).unwrap();
+    for file in answer.files() {
+        let text: String = file.parts.collect();
+        let blake3 = blake3::hash(text.as_bytes()).to_hex().to_string();
+        std::fs::write(directory.join(&*file.name), text).unwrap();
+        manifest.outputs.insert(file.name.into_owned(), blake3);
+    }
+    manifest.record = answer.record().as_object().unwrap().clone();
+    let text = serde_json::to_string(&manifest).unwrap();
+    std::fs::write(directory.join("manifest.json"), text).unwrap();
 }
 
 struct Ran {
@@ -124,9 +129,9 @@ fn compare(directory: &Path, arguments: &[&str]) -> Ran {
 #[test]
 fn ratios_are_those_that_were_made() {
     let directory = tempfile::tempdir().unwrap();
-    write(&directory.path().join("I_awv"), 1.0, |_| {});
-    write(&directory.path().join("II_awv"), 1.75, |_| {});
-    write(&directory.path().join("II_sr-awv"), 0.9, |_| {});
+    write(&directory.path().join("I_awv"), 1.0, |_, _| {});
+    write(&directory.path().join("II_awv"), 1.75, |_, _| {});
+    write(&directory.path().join("II_sr-awv"), 0.9, |_, _| {});
     let ran = compare(
         directory.path(),
         &["I_awv", "II_awv", "II_sr-awv", "--reference", "I_awv"],
@@ -244,8 +249,8 @@ fn ratios_are_those_that_were_made() {
 #[test]
 fn verdicts_are_those_of_the_directories() {
     let directory = tempfile::tempdir().unwrap();
-    write(&directory.path().join("a"), 1.0, |_| {});
-    write(&directory.path().join("b"), 1.0, |_| {});
+    write(&directory.path().join("a"), 1.0, |_, _| {});
+    write(&directory.path().join("b"), 1.0, |_, _| {});
     let summary = directory.path().join("b/summary.json");
     let text = std::fs::read_to_string(&summary).unwrap();
     let doubted = text.replacen("\"kind\": \"undecided\"", "\"kind\": \"overconfident\"", 1);
@@ -278,7 +283,7 @@ fn verdicts_are_those_of_the_directories() {
 #[test]
 fn a_file_that_is_no_comparison_is_left_alone() {
     let directory = tempfile::tempdir().unwrap();
-    write(&directory.path().join("a"), 1.0, |_| {});
+    write(&directory.path().join("a"), 1.0, |_, _| {});
     let path = directory.path().join("comparison.json");
     std::fs::write(&path, "{\"mine\": 1}").unwrap();
     let ran = compare(directory.path(), &["a", "--reference", "a"]);
@@ -312,7 +317,7 @@ fn many_runs_in_deep_directories_are_readable() {
         write(
             &directory.path().join(name),
             1.0 + 0.01 * f64::from(k),
-            |_| {},
+            |_, _| {},
         );
     }
     let all: Vec<&str> = names
@@ -344,7 +349,7 @@ fn many_runs_in_deep_directories_are_readable() {
     );
     let (a, b) = (format!("{deep}/x/drive"), format!("{deep}/y/drive"));
     for (name, factor) in [(&a, 1.0), (&b, 1.1)] {
-        write(&directory.path().join(name), factor, |_| {});
+        write(&directory.path().join(name), factor, |_, _| {});
     }
     let ran = compare(
         directory.path(),
@@ -361,12 +366,12 @@ fn many_runs_in_deep_directories_are_readable() {
 #[test]
 fn another_trajectory_or_other_outages_are_refused() {
     let directory = tempfile::tempdir().unwrap();
-    write(&directory.path().join("a"), 1.0, |_| {});
-    write(&directory.path().join("b"), 1.0, |m| {
-        m.inputs[0] = input("trajectory", "u.csv", b"u")
+    write(&directory.path().join("a"), 1.0, |_, _| {});
+    write(&directory.path().join("b"), 1.0, |manifest, _| {
+        manifest.inputs[0] = input("trajectory", "u.csv", b"u")
     });
-    write(&directory.path().join("c"), 1.0, |m| {
-        m.configuration.outage = Some(vec![])
+    write(&directory.path().join("c"), 1.0, |_, origin| {
+        origin.configuration.outage = Some(vec![])
     });
     let ran = compare(directory.path(), &["b", "--reference", "a"]);
     assert_eq!(ran.code, 2);
@@ -386,12 +391,12 @@ fn another_trajectory_or_other_outages_are_refused() {
 #[test]
 fn another_seed_or_truth_is_said_and_unpaired() {
     let directory = tempfile::tempdir().unwrap();
-    write(&directory.path().join("a"), 1.0, |_| {});
-    write(&directory.path().join("b"), 1.2, |m| {
-        m.seed = Some(8);
-        m.inputs.truncate(1);
+    write(&directory.path().join("a"), 1.0, |_, _| {});
+    write(&directory.path().join("b"), 1.2, |manifest, _| {
+        manifest.seed = Some(8);
+        manifest.inputs.truncate(1);
     });
-    write(&directory.path().join("c"), 1.2, |_| {});
+    write(&directory.path().join("c"), 1.2, |_, _| {});
     let ran = compare(
         directory.path(),
         &["b", "c", "--reference", "a", "--format", "json"],
@@ -425,7 +430,7 @@ fn another_seed_or_truth_is_said_and_unpaired() {
 #[test]
 fn a_damaged_table_is_refused_by_file_line_and_column() {
     let directory = tempfile::tempdir().unwrap();
-    write(&directory.path().join("a"), 1.0, |_| {});
+    write(&directory.path().join("a"), 1.0, |_, _| {});
     let path = directory.path().join("a/epochs.csv");
     let text = std::fs::read_to_string(&path)
         .unwrap()
@@ -441,7 +446,7 @@ fn a_damaged_table_is_refused_by_file_line_and_column() {
 #[test]
 fn a_table_that_was_changed_is_refused() {
     let directory = tempfile::tempdir().unwrap();
-    write(&directory.path().join("a"), 1.0, |_| {});
+    write(&directory.path().join("a"), 1.0, |_, _| {});
     let (epochs, manifest) = (
         directory.path().join("a/epochs.csv"),
         directory.path().join("a/manifest.json"),

@@ -7,12 +7,12 @@ use nav_sim::calibration::{
     Bootstrap, Estimator, ModelChoice, Outcome, Pool, Settings, calibrate, grouped, infer,
     replicates,
 };
+use nav_sim::commands::run::{NavigateInputs, TrueImu, navigate};
 use nav_sim::formats::draws_file::{Draws, DrawsFile};
 use nav_sim::navigation::metrics::Summary;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::simulation::REPORTED_NAMES;
 use nav_sim::navigation::trajectory::Trajectory;
-use nav_sim::run::{NavigateInputs, TrueImu, navigate};
 use nav_sim::signal::imu::Channel;
 use nav_sim::signal::noise::{Ar1, Composite, Model, Process, VirtualImu, White};
 

@@ -1,12 +1,12 @@
 //! Integration error of the strapdown: covariance analysis has it as the runs do.
 
 use nav_sim::app::Context;
+use nav_sim::commands::run::{NavigateInputs, TrueImu, navigate};
 use nav_sim::navigation::frames::RollPitchYaw;
 use nav_sim::navigation::metrics::VerdictKind;
 use nav_sim::navigation::scenario::{Method, Scenario};
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::trajectory::{Trajectory, TrajectorySample};
-use nav_sim::run::{NavigateInputs, TrueImu, navigate};
 use nav_sim::signal::noise::{Composite, Model, Process, RandomWalk, White};
 
 /// 300 s northwards at 15 m/s, roll and pitch of 3° at 1.5 Hz, a quarter of a period apart: coning, of which ten samples a

@@ -1,12 +1,12 @@
 //! `nav-sim trajectory record`.
 
 use super::{Source, wrote};
+use crate::app::inputs::make_turn_on;
 use crate::cli::{Failure, Session, read};
 use crate::formats::atomic::{AtomicDir, Claim, Found, claim_directory};
 use crate::formats::scenario_file;
 use crate::formats::trajectory_file::{Rows, write_rows};
 use crate::report::{gnss_csv, imu_csv, initial_toml};
-use crate::run::read::make_turn_on;
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::aiding::AidingSettings;
 use nav_sim_navigation::sensors::imu::Truth;

@@ -11,7 +11,9 @@ pub(crate) use claim::{Claim, Existing, claim_directory, claim_file, claim_resul
 pub(crate) use directory::{AtomicDir, recover};
 pub(crate) use file::AtomicFile;
 pub(crate) use temporary::remove_unfinished;
-pub(crate) use written::{Found, Written};
+pub(crate) use written::Found;
+#[allow(unreachable_pub, reason = "named by a public trait")]
+pub use written::Written;
 
 use super::FileError;
 use std::io::Write;

@@ -6,7 +6,7 @@ use std::path::Path;
 
 /// A kind of file that nav-sim writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Written {
+pub enum Written {
     Calibrated,
     Datasheet,
     Required,

@@ -1,6 +1,7 @@
 //! What helps a filter that is overconfident.
 
-use crate::report::{Manifest, unexpected_in_words, unexpected_line};
+use super::RunAnswer;
+use crate::report::{unexpected_in_words, unexpected_line};
 use nav_sim_document::window;
 use nav_sim_navigation::ekf::FixUpdate;
 use nav_sim_navigation::metrics::{Summary, VerdictKind};
@@ -11,13 +12,13 @@ const TOO_LARGE: &str =
     "errors too large for a linear filter; another MODEL or nav-sim tune does not help";
 
 /// The same, with the update that helps: where errors are too large after fixes that follow an outage, not before them.
-fn too_large(summary: &Summary, manifest: &Manifest) -> String {
+fn too_large(summary: &Summary, answer: &RunAnswer) -> String {
     let verdict = &summary.verdict;
     let is_after = |first: usize| {
         let is_met_again = summary.outages[first].reconvergence_s.p50.is_finite();
         is_met_again && verdict.worst_outage.is_none_or(|outage| outage > first)
     };
-    let is_linear = manifest.configuration.filter.update == FixUpdate::Ekf;
+    let is_linear = answer.origin.configuration.filter.update == FixUpdate::Ekf;
     match is_linear && verdict.beyond_linear.is_some_and(is_after) {
         true => format!("{TOO_LARGE}; filter.update = \"iterated\" does"),
         false => TOO_LARGE.to_owned(),
@@ -26,7 +27,7 @@ fn too_large(summary: &Summary, manifest: &Manifest) -> String {
 
 /// What helps: by what the belief lacks, where linear analysis finds the filter wrong already; errors that are large are then
 /// its consequence.
-pub(super) fn remedy(summary: &Summary, unexpected: &[Unexpected], manifest: &Manifest) -> String {
+pub(super) fn remedy(summary: &Summary, unexpected: &[Unexpected], answer: &RunAnswer) -> String {
     let quality = summary
         .reduction
         .as_ref()
@@ -38,17 +39,16 @@ pub(super) fn remedy(summary: &Summary, unexpected: &[Unexpected], manifest: &Ma
             .flat_map(|state| state.0)
     });
     if summary.is_contradicted {
-        return too_large(summary, manifest);
+        return too_large(summary, answer);
     }
     if let Some(largest) = largest_unexpected(summary, unexpected) {
         return largest;
     }
     let is_too_large = summary.verdict.beyond_linear.is_some();
-    let [is_recorded, is_modelled] =
-        ["static", "truth"].map(|role| !manifest.hashes(role).is_empty());
+    let [is_recorded, is_modelled] = ["static", "truth"].map(|role| answer.has_input(role));
     // what recordings contain is unknown, and so is whether linear analysis would find the filter wrong
     if is_recorded && is_too_large {
-        return too_large(summary, manifest);
+        return too_large(summary, answer);
     }
     // where the reduced filter is right about the errors of its own model, the errors are of something else
     if ratios.fold(0.0, f64::max) > 1.0 + summary.verdict.tolerance {
@@ -65,7 +65,7 @@ pub(super) fn remedy(summary: &Summary, unexpected: &[Unexpected], manifest: &Ma
     match unexpected.first() {
         Some(found) if is_analysed => unexpected_line(found),
         None if is_expected && !is_too_large => beside_the_states(summary).to_owned(),
-        _ => too_large(summary, manifest),
+        _ => too_large(summary, answer),
     }
 }
 

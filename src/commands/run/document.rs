@@ -1,7 +1,7 @@
 //! The document of a run: verdict, outages, notes, charts and tables.
 
 use super::Navigation;
-use super::answer::RunAnswer;
+use super::RunAnswer;
 use super::assumptions::assumptions;
 use super::budgets::budgets;
 use super::charts::{
@@ -10,7 +10,7 @@ use super::charts::{
 use super::remedy::remedy;
 use crate::report::requirement::requirement_line;
 use crate::report::verdict::verdict_lines;
-use crate::report::{Manifest, STATES, reduction_doubt, reduction_line, tone, unexpected_line};
+use crate::report::{STATES, reduction_doubt, reduction_line, tone, unexpected_line};
 use nav_sim_document::{Cell, Document, Importance, Table, Tone, readable, window};
 use nav_sim_navigation::metrics::{
     EpochMetrics, FanEpoch, Met, OutageSummary, PerState, Summary, VerdictKind,
@@ -34,8 +34,8 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
                 summary,
                 ..
             },
-        manifest,
         track,
+        ..
     } = answer;
     let windows = windows(summary);
     let title = if summary.runs > 0 {
@@ -59,8 +59,8 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
     lines.extend(verdict);
     lines.extend(kept.iter().map(|met| requirement_line(met, summary)));
     let mut page = Document::new(title, tone, lines);
-    notes(summary, manifest, &mut page);
-    page.facts(&assumptions(summary, manifest));
+    notes(summary, answer, &mut page);
+    page.facts(&assumptions(summary, answer));
     page.chart(&track.map("Reference trajectory", &windows), "");
     page.chart(&horizontal(epochs, summary), horizontal_caption(summary));
     page.chart(&fan_chart(fan, summary), &fan_caption(fan, summary));
@@ -69,7 +69,7 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
     page.charts(&states(epochs, &windows), rmse_and_asee(summary));
     consistency(epochs, summary, &mut page);
     budgets(summary, &largest(summary, OUTAGES), &mut page);
-    provenance(manifest, &mut page);
+    provenance(answer, &mut page);
     page.checked(
         "The filter's standard deviations agree to 2e-4 with an independent implementation; the NEES of filters whose model is right \
          with chi-square at p = 0.001.",
@@ -78,15 +78,15 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
 }
 
 /// Sentences beside the verdict: what helps a filter that is overconfident, where errors come from, what is left to know.
-fn notes(summary: &Summary, manifest: &Manifest, page: &mut Document) {
-    let scenario = &manifest.configuration;
+fn notes(summary: &Summary, answer: &RunAnswer, page: &mut Document) {
+    let scenario = &answer.origin.configuration;
     let mut unexpected = scenario.unexpected();
     unexpected.extend(scenario.unexpected_integration(summary.strapdown_over_sigma));
     let (own, analysed) = (summary.verdict.kind, summary.verdict.by_covariance_analysis);
     let is_undecided =
         own == VerdictKind::Undecided && analysed == Some(VerdictKind::Overconfident);
     if own == VerdictKind::Overconfident || is_undecided {
-        let remedy = remedy(summary, &unexpected, manifest);
+        let remedy = remedy(summary, &unexpected, answer);
         page.note(
             Importance::Warning,
             format!("the filter is overconfident: {remedy}"),
@@ -415,19 +415,19 @@ fn consistency(epochs: &[EpochMetrics], summary: &Summary, page: &mut Document) 
     page.table(&known(table, summary));
 }
 
-fn provenance(manifest: &Manifest, page: &mut Document) {
+fn provenance(answer: &RunAnswer, page: &mut Document) {
     page.section("Provenance");
     // the command, the threads and the time taken are in manifest.json: this page is the same for the same seed
     page.text(&format!(
         "nav-sim {}; the command is in manifest.json.",
-        manifest.version
+        env!("CARGO_PKG_VERSION")
     ));
     let mut table = Table::new(["input", "file", "BLAKE3"]);
-    for i in &manifest.inputs {
+    for i in &answer.inputs {
         table.row([i.role.clone(), i.path.clone(), i.blake3.clone()].map(Cell::from));
     }
     page.table(&table);
-    let configuration = toml::to_string_pretty(&manifest.configuration).unwrap_or_default();
+    let configuration = toml::to_string_pretty(&answer.origin.configuration).unwrap_or_default();
     page.folded("Configuration", |page| page.code(&configuration));
 }
 

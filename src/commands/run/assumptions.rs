@@ -1,6 +1,6 @@
 //! What the results of a run rest on: models, true IMU, receiver, start.
 
-use crate::report::Manifest;
+use super::RunAnswer;
 use nav_sim_document::readable;
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::metrics::Summary;
@@ -11,9 +11,9 @@ use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::units::DEG;
 
 /// What the results rest on.
-pub(super) fn assumptions(summary: &Summary, manifest: &Manifest) -> Vec<(&'static str, String)> {
+pub(super) fn assumptions(summary: &Summary, answer: &RunAnswer) -> Vec<(&'static str, String)> {
     let input = |role: &str| {
-        manifest
+        answer
             .inputs
             .iter()
             .find(|i| i.role == role)
@@ -24,7 +24,7 @@ pub(super) fn assumptions(summary: &Summary, manifest: &Manifest) -> Vec<(&'stat
         ("", model) => model.to_owned(),
         (recording, _) => format!("windows of {recording}"),
     };
-    let scenario = &manifest.configuration;
+    let scenario = &answer.origin.configuration;
     let mut facts = vec![
         ("trajectory", input("trajectory").to_owned()),
         (

@@ -5,15 +5,25 @@ use nav_sim_calibration::SignalError;
 use nav_sim_navigation::sensors::outage::OutageError;
 use std::fmt;
 
-/// A request without an answer: exit code, message and hint. 1 could not (I/O, numerics); 2 usage or configuration;
+/// A command without a result: exit code, message, place and help. 1 could not (I/O, numerics); 2 usage or input;
 /// 3 a stated bound was not met; 75 stopped early, resume; 130 interrupted (143 by SIGTERM, 129 by SIGHUP).
-#[derive(Debug)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Failure {
     code: u8,
     message: String,
-    hint: Option<String>,
+    help: Vec<Help>,
     place: Option<(String, Option<u64>)>,
 }
+
+/// Advice; with an option, it is for commands that have that option.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Help {
+    option: Option<&'static str>,
+    text: String,
+}
+
+/// The result of a command or of a part of it.
+pub type Result<T> = std::result::Result<T, Failure>;
 
 impl std::error::Error for Failure {}
 
@@ -22,18 +32,18 @@ impl Failure {
         Self {
             code,
             message: message.to_string(),
-            hint: None,
+            help: Vec::new(),
             place: None,
         }
     }
 
     /// Wrong input: usage, configuration, data (exit code 2).
-    pub(crate) fn input(message: impl ToString) -> Self {
+    pub fn input(message: impl ToString) -> Self {
         Self::new(2, &message)
     }
 
     /// Could not: I/O, numerics (exit code 1).
-    pub(crate) fn could_not(message: impl ToString) -> Self {
+    pub fn could_not(message: impl ToString) -> Self {
         Self::new(1, &message)
     }
 
@@ -50,6 +60,17 @@ impl Failure {
     /// Interrupted by the user (exit code 130).
     pub(crate) fn interrupted(message: impl ToString) -> Self {
         Self::new(130, &message)
+    }
+
+    /// Words that clap refuses: its first paragraph, the rest as advice.
+    pub(crate) fn usage(e: &clap::Error) -> Self {
+        let text = e.to_string();
+        let text = text.strip_prefix("error: ").unwrap_or(&text);
+        let mut paragraphs = text.split("\n\n").map(str::trim);
+        let message = paragraphs.next().unwrap_or_default();
+        let tip = paragraphs.find_map(|p| p.strip_prefix("tip: "));
+        Self::input(message.split_whitespace().collect::<Vec<_>>().join(" "))
+            .maybe_hint(tip.map(str::to_owned))
     }
 
     /// What is wrong with a file, for a command whose options `option` knows.
@@ -74,15 +95,28 @@ impl Failure {
         }
     }
 
-    /// With advice.
-    pub(crate) fn hint(mut self, hint: impl Into<String>) -> Self {
-        self.hint = Some(hint.into());
-        self
+    /// With advice, in the place of other advice.
+    pub fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.help.clear();
+        self.or_option(None, hint)
     }
 
     /// With advice, if there is any.
-    pub(crate) fn maybe_hint(mut self, hint: Option<String>) -> Self {
-        self.hint = hint.or(self.hint);
+    pub(crate) fn maybe_hint(self, hint: Option<String>) -> Self {
+        match hint {
+            Some(hint) => self.hint(hint),
+            None => self,
+        }
+    }
+
+    /// With further advice, for commands that have an option.
+    pub(crate) fn or_option(
+        mut self,
+        option: Option<&'static str>,
+        text: impl Into<String>,
+    ) -> Self {
+        let text = text.into();
+        self.help.push(Help { option, text });
         self
     }
 
@@ -92,10 +126,16 @@ impl Failure {
         self.code
     }
 
-    /// What helps.
+    /// The first advice.
     #[must_use]
     pub fn advice(&self) -> Option<&str> {
-        self.hint.as_deref()
+        self.advice_with(&|_| true)
+    }
+
+    /// The first advice for a command that has these options.
+    pub(crate) fn advice_with(&self, has: &dyn Fn(&str) -> bool) -> Option<&str> {
+        let fits = |help: &&Help| help.option.is_none_or(has);
+        self.help.iter().find(fits).map(|help| help.text.as_str())
     }
 
     /// The file that is at fault.
@@ -108,6 +148,37 @@ impl Failure {
     #[must_use]
     pub fn line(&self) -> Option<u64> {
         self.place.as_ref().and_then(|(_, line)| *line)
+    }
+}
+
+/// Failures made of any error where it is known what it means.
+pub(crate) trait Refuse<T> {
+    /// Exit code 2: the input is at fault.
+    fn refuse(self) -> Result<T>;
+
+    /// The same, of an option or a file.
+    fn refuse_within(self, part: impl fmt::Display) -> Result<T>;
+}
+
+impl<T, E: fmt::Display> Refuse<T> for std::result::Result<T, E> {
+    fn refuse(self) -> Result<T> {
+        self.map_err(|e| Failure::input(e))
+    }
+
+    fn refuse_within(self, part: impl fmt::Display) -> Result<T> {
+        self.map_err(|e| Failure::input(format!("{part}: {e}")))
+    }
+}
+
+/// Advice on a result.
+pub(crate) trait OrHelp<T> {
+    /// With advice.
+    fn or_help(self, text: impl Into<String>) -> Result<T>;
+}
+
+impl<T, E: Into<Failure>> OrHelp<T> for std::result::Result<T, E> {
+    fn or_help(self, text: impl Into<String>) -> Result<T> {
+        self.map_err(|e| e.into().hint(text))
     }
 }
 

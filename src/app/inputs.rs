@@ -1,0 +1,372 @@
+//! Inputs that several commands share: files, settings, outages.
+
+use super::{Context, Failure, OrHelp, Refuse, Result};
+use crate::formats::model_file::{self, ModelFile, TurnOn};
+use crate::formats::recordings::{self, ReadOptions};
+use crate::formats::{input, scenario_file, trajectory_file};
+use crate::parse;
+use crate::report::readable;
+use nav_sim_navigation::ekf::{BeliefError, FilterStates, InitialSettings};
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::defects::ImuSettings;
+use nav_sim_navigation::sensors::outage::{NotAnOutage, Outage};
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_navigation::trajectory::plausibility::{Excess, Limits, examine};
+use nav_sim_signal::imu::{Recording, Sensor};
+use nav_sim_signal::noise::{Model, continuous};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// A trajectory; where no vehicle moves so.
+pub(crate) fn trajectory(path: &Path, context: &Context<'_>) -> Result<Trajectory> {
+    let (trajectory, warnings) = trajectory_file::load(path, &trajectory_file::Options::default())?;
+    warnings.iter().for_each(|doubt| context.warn(doubt));
+    let (_, beyond) = examine(&trajectory, &Limits::default());
+    let farthest = |e: &&Excess| e.worst / e.limit;
+    if let Some(worst) = beyond
+        .iter()
+        .max_by(|a, b| farthest(a).total_cmp(&farthest(b)))
+    {
+        let shown = path.display();
+        let more = match beyond.len() - 1 {
+            0 => String::new(),
+            n => format!(", and {n} more such stretches"),
+        };
+        context.warn(format!(
+            "{shown}: {worst}{more} (nav-sim trajectory check {shown} lists them)"
+        ));
+    }
+    Ok(trajectory)
+}
+
+/// A model; the axes that it does not name.
+pub(crate) fn model(path: &Path, context: &Context<'_>) -> Result<ModelFile> {
+    let file = model_file::read(path)?;
+    file.doubts(path)
+        .iter()
+        .for_each(|doubt| context.warn(doubt));
+    Ok(file)
+}
+
+/// A noise model at the rate of the IMU.
+pub(crate) fn at_rate(
+    path: &Path,
+    model: &Model,
+    imu_hz: f64,
+    context: &Context<'_>,
+) -> Result<Model> {
+    let from_hz = model.rate_hz;
+    let converted = continuous::at_rate(model, imu_hz);
+    let converted = converted.refuse_within(path.display()).or_help(format!(
+        "set rate_hz = {from_hz} in the [imu] section of a --scenario file"
+    ))?;
+    if !continuous::same_rate(from_hz, imu_hz) {
+        let text = format!(
+            "{}: converted from {from_hz} Hz to {imu_hz} Hz",
+            path.display()
+        );
+        context.remark(text);
+    }
+    Ok(converted)
+}
+
+/// Static recordings, every channel of them; files without a time column at a rate that is given.
+pub(crate) fn recordings(
+    paths: &[PathBuf],
+    rate_hz: Option<f64>,
+    context: &Context<'_>,
+) -> Result<Vec<Recording>> {
+    let options = ReadOptions {
+        rate_hz,
+        ..ReadOptions::default()
+    };
+    let (recordings, report) = recordings::read(paths, &options)?;
+    report
+        .all_warnings()
+        .iter()
+        .for_each(|doubt| context.warn(doubt));
+    report
+        .files
+        .iter()
+        .for_each(|file| context.detail(file.to_string()));
+    Ok(recordings)
+}
+
+/// The outages on a trajectory; what is doubtful about them.
+pub(crate) fn placed(
+    scenario: &Scenario,
+    trajectory: &Trajectory,
+    seed: u64,
+    context: &Context<'_>,
+) -> Result<Vec<Outage>> {
+    let placed = scenario.outages_on((trajectory.start_s(), trajectory.end_s()), seed)?;
+    placed
+        .remarks
+        .into_iter()
+        .for_each(|remark| context.warn(remark));
+    Ok(placed.windows)
+}
+
+/// Lets the filter expect the turn-on bias that its model states, where settings are silent.
+pub(crate) fn expect_turn_on(
+    initial: &mut InitialSettings,
+    file: &ModelFile,
+    path: &Path,
+    context: &Context<'_>,
+) {
+    let set = expected_turn_on(initial, &file.turn_on.unwrap_or_default());
+    tell_turn_on("the filter expects", &set, path, context);
+}
+
+/// Gives the true IMU the turn-on bias that the model of its errors states, where settings are silent; a 0 is a setting.
+pub(crate) fn make_turn_on(
+    imu: &mut ImuSettings,
+    file: &ModelFile,
+    path: &Path,
+    context: &Context<'_>,
+) {
+    let set = made_turn_on(imu, &file.turn_on.unwrap_or_default());
+    tell_turn_on("the true IMU has", &set, path, context);
+}
+
+fn tell_turn_on(who: &str, set: &[(Sensor, f64)], path: &Path, context: &Context<'_>) {
+    for (sensor, sigma) in set {
+        let (shown, sigma, unit) = (path.display(), readable(*sigma), sensor.unit());
+        let text = format!(
+            "{shown}: {who} a turn-on bias of {sigma} {unit} ({sensor}, standard deviation)"
+        );
+        context.remark(text);
+    }
+}
+
+/// States of the filter.
+#[derive(clap::Args, Debug, Clone)]
+pub struct FilterArgs {
+    /// States of the filter: 15 (one bias per axis, to which the model is reduced), 21 (and a scale factor per axis)
+    /// or full (a bias state for each process) [default: 15]
+    #[arg(long = "filter", value_name = "STATES")]
+    pub states: Option<FilterStates>,
+    /// Constant biases that the filter expects in addition to the model (a calibration would remove them): standard
+    /// deviations, accelerometer in m/s², gyroscope in rad/s; 3 states each
+    #[arg(long, value_name = "ACCEL,GYRO", value_parser = parse::pair)]
+    pub turn_on_bias: Option<[f64; 2]>,
+    /// Scale-factor errors that the filter expects: standard deviations in parts per million; 3 states each
+    /// [default: 300,300 with --filter 21, else none]
+    #[arg(long, value_name = "ACCEL,GYRO", value_parser = parse::pair)]
+    pub scale_ppm: Option<[f64; 2]>,
+}
+
+impl FilterArgs {
+    /// Puts what is given over the settings of a file.
+    pub(crate) fn over(&self, states: &mut FilterStates, initial: &mut InitialSettings) {
+        *states = self.states.unwrap_or(*states);
+        if let Some([accel, gyro]) = self.turn_on_bias {
+            (initial.accel_bias_sigma_m_s2, initial.gyro_bias_sigma_rad_s) =
+                (Some(accel), Some(gyro));
+        }
+        if let Some([accel, gyro]) = self.scale_ppm {
+            (initial.accel_scale_sigma_ppm, initial.gyro_scale_sigma_ppm) =
+                (Some(accel), Some(gyro));
+        }
+    }
+}
+
+/// A value of `--outage`: a window, or that there is none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum OutageFlag {
+    /// Not even the default ones.
+    None,
+    /// A window without fixes.
+    Window(Outage),
+}
+
+impl FromStr for OutageFlag {
+    type Err = NotAnOutage;
+
+    fn from_str(text: &str) -> std::result::Result<Self, NotAnOutage> {
+        if text == "none" {
+            Ok(Self::None)
+        } else {
+            text.parse().map(Self::Window)
+        }
+    }
+}
+
+parse::textual!(OutageFlag);
+
+impl std::fmt::Display for OutageFlag {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::None => f.write_str("none"),
+            Self::Window(Outage { start_s, end_s }) => write!(f, "{start_s}:{end_s}"),
+        }
+    }
+}
+
+/// The windows among the values of `--outage`, of which "none" stands alone.
+pub(crate) fn windows_of(outages: &[OutageFlag]) -> Result<Vec<Outage>> {
+    let (scenario, set) = (None, Vec::new());
+    let outages = outages.to_vec();
+    SettingsArgs {
+        outages,
+        scenario,
+        set,
+    }
+    .windows()
+}
+
+/// A scenario file, the default without one, with outages in the place of its own.
+pub(crate) fn checked_scenario(path: Option<&Path>, outages: &[OutageFlag]) -> Result<Scenario> {
+    let (scenario, set) = (path.map(Path::to_owned), Vec::new());
+    let outages = outages.to_vec();
+    SettingsArgs {
+        outages,
+        scenario,
+        set,
+    }
+    .checked()
+}
+
+/// Settings in a TOML file, by key, and outages in the place of those of the file.
+#[derive(clap::Args, Debug, Clone)]
+pub struct SettingsArgs {
+    /// Window without fixes, in seconds (repeatable), or "none" (default: 300:390 and 700:790)
+    #[arg(long = "outage", value_name = "START:END")]
+    pub outages: Vec<OutageFlag>,
+    /// Settings in one TOML file; flags override it (see `nav-sim schema scenario`)
+    #[arg(long, value_name = "FILE")]
+    pub scenario: Option<PathBuf>,
+    /// A setting of the scenario, such as gnss.rate_hz=5 (repeatable)
+    #[arg(long, value_name = "KEY=VALUE", hide = true)]
+    pub set: Vec<String>,
+}
+
+impl SettingsArgs {
+    /// The windows of `--outage`, of which "none" stands alone.
+    fn windows(&self) -> Result<Vec<Outage>> {
+        if self.outages.len() > 1 && self.outages.contains(&OutageFlag::None) {
+            return Err(Failure::input("--outage none stands beside other outages")
+                .hint("give the windows, or none alone"));
+        }
+        let window = |flag: &OutageFlag| match flag {
+            OutageFlag::None => None,
+            OutageFlag::Window(outage) => Some(*outage),
+        };
+        Ok(self.outages.iter().filter_map(window).collect())
+    }
+
+    /// The scenario with settings and outages over its file; not yet checked.
+    pub(crate) fn scenario(&self) -> Result<Scenario> {
+        let file = self.scenario.as_deref();
+        let mut scenario = file
+            .map(scenario_file::read)
+            .transpose()?
+            .unwrap_or_default();
+        if !self.set.is_empty() {
+            let over: toml::Table = self.set.join("\n").parse().refuse_within("--set")?;
+            let mut table = toml::Table::try_from(&scenario).refuse()?;
+            merge(&mut table, over);
+            scenario = table.try_into().refuse_within("--set")?;
+        }
+        if !self.outages.is_empty() {
+            scenario.outage = Some(self.windows()?);
+            (scenario.outage_periodic, scenario.outage_random) = (None, None);
+        }
+        Ok(scenario)
+    }
+
+    /// The same, checked.
+    pub(crate) fn checked(&self) -> Result<Scenario> {
+        let scenario = self.scenario()?;
+        scenario.validate().refuse()?;
+        Ok(scenario)
+    }
+}
+
+fn merge(into: &mut toml::Table, over: toml::Table) {
+    for (key, value) in over {
+        match (into.get_mut(&key), value) {
+            (Some(toml::Value::Table(inner)), toml::Value::Table(over)) => merge(inner, over),
+            (_, value) => _ = into.insert(key, value),
+        }
+    }
+}
+
+/// Files of a list with their role.
+pub(crate) fn files<'a>(
+    role: &'static str,
+    paths: impl IntoIterator<Item = &'a PathBuf>,
+) -> impl Iterator<Item = (&'static str, PathBuf)> {
+    paths.into_iter().map(move |path| (role, path.clone()))
+}
+
+/// Recordings, those of directories in name order, with their role.
+pub(crate) fn listed(
+    role: &'static str,
+    paths: &[PathBuf],
+) -> Result<Vec<(&'static str, PathBuf)>> {
+    let found = input::listed(paths)?;
+    Ok(found.into_iter().map(|path| (role, path)).collect())
+}
+
+/// Why a model has no filter: by the file that is at fault, of the model and the one with the settings; `advice` is on settings.
+pub(crate) fn no_filter(
+    e: &BeliefError,
+    model: &Path,
+    settings: Option<&Path>,
+    advice: &str,
+) -> Failure {
+    let within = |failure: Failure, file: &Path| failure.within(&file.display().to_string());
+    match e {
+        BeliefError::Setting(_) => {
+            let failure = Failure::input(e).hint(advice);
+            settings.into_iter().fold(failure, within)
+        }
+        _ => within(Failure::input(e), model),
+    }
+}
+
+/// Lets the filter expect the turn-on bias of its model; settings win. What was set.
+pub(crate) fn expected_turn_on(
+    initial: &mut InitialSettings,
+    stated: &TurnOn,
+) -> Vec<(Sensor, f64)> {
+    set_turn_on(
+        [
+            &mut initial.accel_bias_sigma_m_s2,
+            &mut initial.gyro_bias_sigma_rad_s,
+        ],
+        stated,
+    )
+}
+
+/// Gives the true IMU the turn-on bias of the model that makes its errors; settings win, a 0 too. What was set.
+pub(crate) fn made_turn_on(imu: &mut ImuSettings, stated: &TurnOn) -> Vec<(Sensor, f64)> {
+    set_turn_on(
+        [
+            &mut imu.turn_on_bias_accel_m_s2,
+            &mut imu.turn_on_bias_gyro_rad_s,
+        ],
+        stated,
+    )
+}
+
+/// Fills in the settings of both sensors that are not given.
+fn set_turn_on(settings: [&mut Option<f64>; 2], stated: &TurnOn) -> Vec<(Sensor, f64)> {
+    let sigmas = Sensor::ALL
+        .into_iter()
+        .filter_map(|sensor| Some((sensor, stated.sigma(sensor)?)));
+    let mut set: Vec<(Sensor, f64)> = sigmas.collect();
+    let [accel, gyro] = settings;
+    set.retain(|(sensor, sigma)| {
+        let setting = if *sensor == Sensor::Accel {
+            &mut *accel
+        } else {
+            &mut *gyro
+        };
+        let is_open = setting.is_none();
+        setting.get_or_insert(*sigma);
+        is_open
+    });
+    set
+}

@@ -1,0 +1,104 @@
+//! `manifest.json`: where a result directory came from, and whether another command makes the same.
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::collections::BTreeMap;
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Input {
+    /// What for: "trajectory", "model", "truth", "static", "scenario".
+    pub role: String,
+    /// Path as given.
+    pub path: String,
+    /// BLAKE3 of its bytes, in hexadecimal.
+    pub blake3: String,
+}
+
+/// Where a result directory came from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Layout version.
+    pub schema_version: u32,
+    /// The command, such as "run".
+    pub name: String,
+    /// Version of nav-sim.
+    pub version: String,
+    /// The command line as given.
+    pub command: Vec<String>,
+    /// Options that decide the result, without files: their contents are among the inputs.
+    pub options: BTreeMap<String, Vec<String>>,
+    /// Seed of all random numbers; none where there are none.
+    pub seed: Option<u64>,
+    /// Every file that is read.
+    pub inputs: Vec<Input>,
+    /// BLAKE3 of every file that is written beside the page and this file.
+    pub outputs: BTreeMap<String, String>,
+    /// BLAKE3 of what decides the result: command, options, contents of inputs, numerics.
+    pub key: String,
+    /// Worker threads.
+    pub threads: usize,
+    /// Time of the runs (s).
+    pub wall_s: f64,
+    /// What the command records of itself, such as the resolved configuration of a run.
+    #[serde(flatten)]
+    pub record: Map<String, Value>,
+}
+
+/// Version of the figures: it rises when a golden number moves by more than 1e-9.
+const NUMERICS: u32 = 1;
+
+impl Manifest {
+    /// Version of the layout.
+    pub const SCHEMA_VERSION: u32 = 3;
+
+    /// The manifest of a command before it runs.
+    pub fn new(name: &str, options: BTreeMap<String, Vec<String>>, inputs: Vec<Input>) -> Self {
+        let mut manifest = Self {
+            schema_version: Self::SCHEMA_VERSION,
+            name: name.to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            command: Vec::new(),
+            options,
+            seed: None,
+            inputs,
+            outputs: BTreeMap::new(),
+            key: String::new(),
+            threads: rayon::current_num_threads(),
+            wall_s: 0.0,
+            record: Map::new(),
+        };
+        manifest.key = manifest.key_with(manifest.options.get("seed"));
+        manifest
+    }
+
+    /// The key of the same command with another seed.
+    fn key_with(&self, seed: Option<&Vec<String>>) -> String {
+        let mut options = self.options.clone();
+        options.remove("seed");
+        let decides = (&self.name, options, seed, contents(&self.inputs), NUMERICS);
+        let text = serde_json::to_string(&decides).expect("texts and numbers are always JSON");
+        blake3::hash(text.as_bytes()).to_hex().to_string()
+    }
+
+    /// The seed of another result that is the same but for it.
+    pub(crate) fn other_seed(&self, present: &Self) -> Option<u64> {
+        let same = self.key_with(present.options.get("seed")) == present.key;
+        present.seed.filter(|_| same && self.key != present.key)
+    }
+
+    /// The hashes of the inputs of a role, in the order given.
+    pub(crate) fn hashes(&self, role: &str) -> Vec<&str> {
+        let of_role = self.inputs.iter().filter(|input| input.role == role);
+        of_role.map(|input| input.blake3.as_str()).collect()
+    }
+}
+
+/// What files hold and what for, wherever they are.
+pub(crate) fn contents(inputs: &[Input]) -> Vec<(&str, &str)> {
+    let content = |input| {
+        let Input { role, blake3, .. }: &Input = input;
+        (role.as_str(), blake3.as_str())
+    };
+    inputs.iter().map(content).collect()
+}

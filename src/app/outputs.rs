@@ -1,0 +1,176 @@
+//! Outputs of a command: claimed before its work, written whole after it.
+
+use super::command::{Answer, Asked, Command, Out, OutputFile, beside};
+use super::{Context, Failure, Input, Manifest, Result};
+use crate::formats::atomic::{
+    self, AtomicDir, Claim, Existing, Found, Written, claim_directory, claim_result,
+};
+use crate::formats::input;
+use crate::report::json;
+use nav_sim_document::{Document, Form, encode};
+use std::path::{Path, PathBuf};
+
+const PAGE: &str = "report.html";
+const MANIFEST: &str = "manifest.json";
+
+impl<C: Command> Asked<C> {
+    /// The manifest before the run: options, seed, contents of inputs.
+    pub(crate) fn manifest(&self, seed: Option<u64>) -> Result<Manifest> {
+        let fingerprint = |(role, path): &(&'static str, PathBuf)| input::input(role, path);
+        let inputs = self.request.inputs()?;
+        let inputs: std::result::Result<Vec<Input>, _> = inputs.iter().map(fingerprint).collect();
+        let mut options = self.options.clone();
+        options.extend(seed.map(|seed| ("seed".to_owned(), vec![seed.to_string()])));
+        Ok(Manifest::new(C::NAME, options, inputs?))
+    }
+
+    /// Claims all outputs: none is an input, nothing is replaced that is not of this command, and nobody else writes
+    /// there.
+    pub(crate) fn claim(&self, manifest: &Manifest, existing: Existing) -> Result<Vec<Claim>> {
+        let inputs = || manifest.inputs.iter().map(|input| Path::new(&input.path));
+        let mut claims = Vec::new();
+        match (C::OUT, &self.out) {
+            (Out::Directory { files, .. }, Some(out)) => {
+                let names: Vec<&str> = files.iter().copied().chain([PAGE, MANIFEST]).collect();
+                let present = |text: &str| serde_json::from_str::<Manifest>(text).ok();
+                let recognise = |text: &str| {
+                    Ok(present(text)
+                        .map_or(Found::Foreign, |m| Found::result(m.key == manifest.key)))
+                };
+                let claimed = claim_directory(out, &names, inputs(), existing, recognise);
+                claims.push(claimed.map_err(|e| {
+                    let there = std::fs::read_to_string(out.join(MANIFEST)).unwrap_or_default();
+                    match present(&there).and_then(|there| manifest.other_seed(&there)) {
+                        Some(seed) => Failure::from(e).hint(format!(
+                            "make that {} again with --seed {seed}, name another directory with -o, or replace it with \
+                             --force",
+                            C::NAME
+                        )),
+                        None => e.into(),
+                    }
+                })?);
+            }
+            (Out::File { .. }, Some(out)) => {
+                for (ending, kind) in self.request.endings() {
+                    claims.push(claim_result(
+                        &beside(out, &ending),
+                        inputs(),
+                        kind,
+                        existing,
+                    )?);
+                }
+            }
+            _ => {}
+        }
+        for path in &self.plots {
+            claims.push(claim_result(path, inputs(), kind_of_plot(path)?, existing)?);
+        }
+        Ok(claims)
+    }
+
+    /// Writes files, pages and pictures; the manifest last. Returns what was written.
+    pub(crate) fn write(
+        &self,
+        answer: &C::Answer,
+        document: &Document,
+        mut manifest: Manifest,
+        context: &Context<'_>,
+    ) -> Result<Vec<PathBuf>> {
+        let mut written = Vec::new();
+        match (C::OUT, &self.out) {
+            (Out::Directory { files, .. }, Some(out)) => {
+                let mut directory = AtomicDir::create(out)?;
+                for file in answer.files() {
+                    let blake3 = write_hashed(&mut directory, file)?;
+                    manifest.outputs.extend([blake3]);
+                }
+                manifest.seed = context.used_seed();
+                manifest.wall_s = context.runs_s();
+                if let serde_json::Value::Object(record) = answer.record() {
+                    manifest.record = record;
+                }
+                directory.write(PAGE, document.html())?;
+                directory.write(MANIFEST, json(&manifest))?;
+                directory.commit()?;
+                // files of an earlier result that this one does not have
+                for old in files
+                    .iter()
+                    .filter(|name| !manifest.outputs.contains_key(**name))
+                {
+                    drop(std::fs::remove_file(out.join(old)));
+                }
+                written.push(out.clone());
+            }
+            (Out::File { .. }, Some(out)) => {
+                // All are on the disk before any has its name.
+                let filled = answer.files().into_iter().map(|file| {
+                    let path = beside(out, &file.name);
+                    let text: String = file.parts.collect();
+                    Ok((atomic::filled(&path, text.as_bytes())?, path))
+                });
+                for (file, path) in filled.collect::<Result<Vec<_>>>()? {
+                    file.commit()?;
+                    written.push(path);
+                }
+            }
+            _ => {}
+        }
+        for path in &self.plots {
+            write_plot(path, document, answer.svg(document))?;
+            written.push(path.clone());
+        }
+        Ok(written)
+    }
+}
+
+fn write_hashed(directory: &mut AtomicDir, file: OutputFile<'_>) -> Result<(String, String)> {
+    let mut hasher = blake3::Hasher::new();
+    let parts = file
+        .parts
+        .inspect(|part| _ = hasher.update(part.as_bytes()));
+    directory.write_parts(&file.name, parts)?;
+    Ok((
+        file.name.into_owned(),
+        hasher.finalize().to_hex().to_string(),
+    ))
+}
+
+fn is_page(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("html"))
+}
+
+fn kind_of_plot(path: &Path) -> Result<Written> {
+    Ok(match is_page(path) {
+        true => Written::Page,
+        false if form(path)? == Form::Svg => Written::Svg,
+        false => Written::Png,
+    })
+}
+
+/// The form of a picture, by its name.
+fn form(path: &Path) -> Result<Form> {
+    let (forms, hint) = match cfg!(feature = "pictures") {
+        true => ("SVG or PNG", "name a file that ends in .svg or .png"),
+        false => (
+            "SVG",
+            "name a file that ends in .svg; PNG needs a build with --features pictures",
+        ),
+    };
+    let refused = || {
+        Failure::input(format!(
+            "{}: a picture is written as {forms}",
+            path.display()
+        ))
+    };
+    Form::of(path).ok_or_else(|| refused().hint(hint))
+}
+
+/// Writes a page, or figures in the form that the name says.
+fn write_plot(path: &Path, document: &Document, svg: String) -> Result<()> {
+    if is_page(path) {
+        return Ok(atomic::write(path, document.html())?);
+    }
+    let picture = encode(svg, form(path)?).map_err(Failure::could_not)?;
+    Ok(atomic::write(path, picture)?)
+}

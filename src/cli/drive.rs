@@ -1,0 +1,40 @@
+//! What every command does on a terminal: claim outputs, run, show, write.
+
+use super::Session;
+use crate::app::{Answer, Asked, Command, Result};
+use crate::report::{WIDTH, json};
+use nav_sim_document::{Document, Importance};
+
+/// Does a command; its answer, if no stated bound is missed.
+pub(super) fn drive<C: Command>(asked: &Asked<C>, session: &Session) -> Result<C::Answer> {
+    let mut manifest = asked.manifest(session.asked_seed())?;
+    manifest.command = super::given();
+    let _claims = asked.claim(&manifest, session.existing())?;
+    let context = session.context().reading(manifest.inputs.clone());
+    let answer = asked.request.run(&context)?;
+    let document = show(&answer, session);
+    for path in asked.write(&answer, &document, manifest, &context)? {
+        session.wrote(&path);
+    }
+    answer.unmet().map_or(Ok(answer), Err)
+}
+
+/// Puts an answer to stdout, as JSON or in words, and its notes to stderr; its document, for page and picture.
+fn show(answer: &impl Answer, session: &Session) -> Document {
+    let document = answer.document();
+    let shown = match answer.text() {
+        _ if session.json() => json(answer),
+        Some(text) => text,
+        None if session.csv() => answer.csv().unwrap_or_default(),
+        None if session.verbose() => document.verbose(WIDTH),
+        None => document.terminal(WIDTH),
+    };
+    session.result(shown.trim_end());
+    for note in document.spoken(session.verbose()) {
+        match note.importance {
+            Importance::Warning => session.warn(&note.text),
+            _ => session.say(format!("note: {}", note.text)),
+        }
+    }
+    document
+}
