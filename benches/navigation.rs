@@ -22,10 +22,11 @@ use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim_navigation::lanes::Level;
 use nav_sim_navigation::metrics::Budget;
 use nav_sim_navigation::simulation::lincov::{FilterPass, TruthSide};
-use nav_sim_navigation::throughput::{Load, RUN_EPOCHS, SAMPLES, model};
+mod throughput;
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Duration;
+use throughput::{Load, RUN_EPOCHS, SAMPLES, model};
 
 const VALID: &str = "the parameters are in their domains";
 

@@ -10,7 +10,10 @@ use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::simulation::Plan;
 use nav_sim_navigation::simulation::run_batch;
-use nav_sim_navigation::throughput;
+#[path = "../benches/throughput/mod.rs"]
+#[allow(dead_code, reason = "its model alone is used")]
+mod throughput;
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -1,8 +1,8 @@
 //! What is calibrated: the paper's replicates, or noise of one's own.
 
 use crate::Failure;
+use crate::paper_section4::study::Design;
 use nav_sim::calibration::Estimator;
-use nav_sim::calibration::efficiency::Design;
 use nav_sim::signal::noise::{Composite, Model, Process, Spread};
 
 /// A case by its name.

@@ -7,18 +7,18 @@
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 mod cases;
-#[path = "../paper_section4.rs"]
+#[path = "../paper_section4/main.rs"]
 #[allow(dead_code, reason = "the design alone is used")]
 mod paper_section4;
 
 use cases::case;
-use nav_sim::calibration::efficiency::{Design, target};
 use nav_sim::calibration::{
     Bootstrap, ModelChoice, Outcome, Pool, Settings, calibrate, grouped, infer, replicates,
 };
 use nav_sim::signal::imu::{Recording, Signal};
 use nav_sim::signal::noise::Synthesizer;
 use nav_sim::signal::rng::{Generator, StreamKey};
+use paper_section4::study::{Design, target};
 use rand::RngExt;
 use rayon::prelude::*;
 use std::error::Error;

@@ -23,8 +23,7 @@
 //! ```
 
 #[allow(unused_imports, reason = "sources are named in the documentation")]
-pub(crate) use nav_sim_signal::bibliography;
-pub(crate) use nav_sim_signal::{imu, noise, rng, wavelet};
+pub(crate) use nav_sim_signal::{bibliography, imu, noise, rng, wavelet};
 
 // Wavelet variances: of replicates, averaged, as a model implies them, and how they scatter.
 mod curve;
@@ -49,7 +48,6 @@ mod turn_on;
 // Intervals to be expected of a calibration that is planned.
 mod anticipated;
 // Studies of estimators.
-pub mod efficiency;
 
 pub use anticipated::{Anticipated, AnticipationError};
 pub use curve::{

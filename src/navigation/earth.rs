@@ -26,11 +26,11 @@ pub(crate) const E2: f64 = F * (2.0 - F);
 /// Rotation rate of the Earth (rad/s).
 pub(crate) const OMEGA_IE: f64 = 7.292_115e-5;
 /// Gravitational constant times the mass of the Earth (m³/s²).
-pub(crate) const MU: f64 = 3.986_004_418e14;
+const MU: f64 = 3.986_004_418e14;
 /// Normal gravity at the equator (m/s²).
 pub(crate) const GRAVITY_EQUATOR: f64 = 9.780_325_335_9;
 /// Somigliana's constant.
-pub(crate) const SOMIGLIANA_K: f64 = 0.001_931_852_652_41;
+const SOMIGLIANA_K: f64 = 0.001_931_852_652_41;
 /// Navigation in latitude and longitude is refused beyond this latitude (rad): 89.9°.
 pub const MAX_LATITUDE: f64 = MAX_LATITUDE_DEG * crate::units::DEG;
 /// The same in degrees.

@@ -5,8 +5,7 @@
 //! order: one names only what stands above it.
 
 #[allow(unused_imports, reason = "sources are named in the documentation")]
-pub(crate) use nav_sim_signal::bibliography;
-pub(crate) use nav_sim_signal::{imu, noise, rng, units, wavelet};
+pub(crate) use nav_sim_signal::{bibliography, imu, noise, rng, units, wavelet};
 
 // L0
 pub mod lanes;
@@ -26,7 +25,6 @@ pub mod ekf;
 // L6
 pub mod closure;
 pub mod simulation;
-pub mod throughput;
 // L7
 pub mod monte_carlo;
 pub mod scenario;

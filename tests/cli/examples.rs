@@ -20,7 +20,7 @@ mod monte_carlo;
 #[allow(dead_code, reason = "its command line is not called")]
 mod library;
 
-#[path = "../../examples/paper_section4.rs"]
+#[path = "../../examples/paper_section4/main.rs"]
 #[allow(dead_code, reason = "its command line is not called")]
 mod paper_section4;
 

@@ -29,6 +29,7 @@ mod lincov;
 mod lincov_sampled;
 mod long_records;
 mod mounting;
+mod paper_section4;
 mod reduction;
 mod require;
 mod smoothing;

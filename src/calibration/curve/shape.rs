@@ -135,7 +135,7 @@ impl Shape {
 /// A chi-square variable over its degrees of freedom whose normal score is z: Wilson and Hilferty's cube, and where
 /// that ends, far below, the series P(x) = (x/2)^(nu/2) e^(−x/2)/Γ(nu/2 + 1)·(1 + x/(nu + 2) + …)
 /// ([Best and Roberts](crate::bibliography::BestRoberts75)).
-pub(crate) fn chi_square_ratio(z: f64, edof: f64) -> f64 {
+fn chi_square_ratio(z: f64, edof: f64) -> f64 {
     // No score is so far below that the series is needed for more.
     const MOST: f64 = 30.0;
     if edof < MOST && z < 1.0 {

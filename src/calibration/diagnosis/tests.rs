@@ -2,8 +2,7 @@
 
 use super::*;
 use crate::curve::{Estimator, Replicate};
-use crate::imu::Channel;
-use crate::imu::{Axis, Sensor};
+use crate::imu::{Axis, Channel, Sensor};
 use crate::outcome::Settings;
 use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Convention, Tuning, both};

@@ -5,15 +5,14 @@
 //! Intervals of two replicates, known to one degree of freedom at every scale, cover less than they say (87 and 93 % of
 //! 300 sets, white noise and random walk); of three and more 93 to 96 %.
 
-use super::alike;
 use super::bootstrap::CurveSampler;
 use super::goodness::goodness;
 use super::indistinct::simpler;
 use super::intervals::intervals;
-use super::practical;
 use super::sandwich::standard_errors;
 use super::spread::Spread;
 use super::varying::parameter_spreads;
+use super::{alike, practical};
 use crate::curve::{Estimator, Group};
 use crate::fit::Fit;
 use crate::outcome::{

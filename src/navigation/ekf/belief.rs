@@ -24,7 +24,7 @@ use crate::units::SettingError;
 use glam::DVec3;
 
 /// Most bias states an axis.
-pub(crate) const MAX_GROUPS: usize = 8;
+const MAX_GROUPS: usize = 8;
 /// Most blocks of a sensor: bias groups of the model, an unknown constant, and what is multiplied.
 pub(super) const MAX_BLOCKS: usize = MAX_GROUPS + 1 + KINDS;
 

@@ -149,7 +149,7 @@ impl Ekf {
 
     /// The same filter with other vector units, for comparison; portable where the machine lacks them.
     #[must_use]
-    pub(crate) fn at_level(self, level: Level) -> Self {
+    pub fn at_level(self, level: Level) -> Self {
         Self { level, ..self }
     }
 

@@ -25,15 +25,13 @@ pub(crate) use aiding::{
 pub use belief::{Belief, BeliefError};
 pub use covariance::Covariance;
 pub use filter::{Ekf, advance, settle};
-pub(crate) use gate::nis_limit;
-pub(crate) use gate::update_within;
+pub(crate) use gate::{nis_limit, update_within};
 pub use initial::InitialSettings;
 pub(crate) use snapshot::Snapshot;
 pub use states::FilterStates;
 pub use unknowns::{Unknown, UnknownKind};
-pub(crate) use update::fix_rows;
-pub(crate) use update::update_height;
 pub use update::{Fix, FixUpdate, update};
+pub(crate) use update::{fix_rows, update_height};
 
 #[cfg(test)]
 mod tests;

@@ -79,13 +79,7 @@ impl Ekf {
         self.deviation(groups.chain(self.drift_term(sensor)))
     }
 
-    /// The estimated scale-factor error of a sensor (1); none where the filter has no state for it.
-    #[must_use]
-    pub fn scale_of(&self, sensor: Sensor) -> Option<Vec3> {
-        Some(self.estimates[self.unknown_block(sensor, UnknownKind::ScaleFactor)? - BIAS])
-    }
-
-    /// Standard deviations of that estimate (1).
+    /// Standard deviations of the estimated scale-factor error of a sensor (1); none where the filter has no state for it.
     #[must_use]
     pub fn scale_sigma(&self, sensor: Sensor) -> Option<Vec3> {
         let block = self.unknown_block(sensor, UnknownKind::ScaleFactor)?;

@@ -304,7 +304,6 @@ fn samples_are_corrected_by_what_is_estimated() {
         (bias_of - bias - slope * 500.0).length() < 1e-15,
         "{bias_of}"
     );
-    assert_eq!(filter.scale_of(Sensor::Accel).unwrap().lane(2), scale);
 }
 
 /// exp(F dt) by its series: F dt is below 0.2, the seventh power 1e-9 of it.

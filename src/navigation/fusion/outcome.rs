@@ -13,7 +13,7 @@ pub struct Drift {
     /// Horizontal distance (m).
     pub horizontal_m: f64,
     /// Difference down (m).
-    pub down_m: f64,
+    down_m: f64,
     /// Horizontal standard deviation that the filter states (m).
     pub expected_sigma_m: f64,
 }
@@ -27,7 +27,7 @@ pub struct OutageDrift {
     /// Fixes that were withheld.
     pub fixes_withheld: usize,
     /// Whether a fix follows it.
-    pub followed_by_fix: bool,
+    followed_by_fix: bool,
     /// Against the first fix after it (the last withheld one, when none follows).
     pub end_from_fix: Option<Drift>,
     /// Against the reference at that time.
@@ -88,7 +88,7 @@ pub struct SmoothedOutcome {
     /// Root mean square of the smoothed horizontal standard deviation (m).
     pub horizontal_sigma_rms_m: f64,
     /// The same of the filter's (m).
-    pub horizontal_sigma_rms_filter_m: f64,
+    horizontal_sigma_rms_filter_m: f64,
     /// Differences of the smoothed rows from the reference.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reference: Option<FromReference>,

@@ -35,25 +35,25 @@ pub struct AxisReduction {
     /// White variance of a sample (units²).
     pub white_sigma2: f64,
     /// Coefficient of the bias.
-    pub bias_phi: f64,
+    bias_phi: f64,
     /// Its innovation variance (units²).
-    pub bias_sigma2: f64,
+    bias_sigma2: f64,
     /// Its correlation time (s); infinite of a random walk.
-    pub bias_t_corr_s: f64,
+    bias_t_corr_s: f64,
     /// Its stationary standard deviation (units); infinite of a random walk.
     pub bias_sigma: f64,
     /// Standard deviation at the start (units).
-    pub initial_sigma: f64,
+    initial_sigma: f64,
     /// Largest |ln(reduced/model)| of the wavelet variance over the scales fitted.
     pub misfit: f64,
     /// Whether quantization noise was left out.
-    pub quantization_left_out: bool,
+    quantization_left_out: bool,
     /// Scales (s).
     pub tau_s: Vec<f64>,
     /// Haar wavelet variance of the model without quantization noise (units²).
-    pub model_wv: Vec<f64>,
+    model_wv: Vec<f64>,
     /// That of the pair.
-    pub reduced_wv: Vec<f64>,
+    reduced_wv: Vec<f64>,
 }
 
 /// What the covariance analysis says of the reduced filter where the model is true.

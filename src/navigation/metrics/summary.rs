@@ -92,7 +92,7 @@ pub struct OutageSummary {
     /// Mean over the outage's epochs of the ASEE.
     pub asee_mean: PerState<f64>,
     /// Its Monte-Carlo standard error.
-    pub asee_mean_std_error: PerState<f64>,
+    asee_mean_std_error: PerState<f64>,
     /// Mean over the outage's epochs of the RMSE.
     pub rmse_mean: PerState<f64>,
     /// Its Monte-Carlo standard error (an upper bound: as if all epochs erred together).
@@ -100,7 +100,7 @@ pub struct OutageSummary {
     /// ASEE just before the first fix after the outage.
     pub asee_end: PerState<f64>,
     /// Its Monte-Carlo standard error.
-    pub asee_end_std_error: PerState<f64>,
+    asee_end_std_error: PerState<f64>,
     /// RMSE just before the first fix after the outage.
     pub rmse_end: PerState<f64>,
     /// Its Monte-Carlo standard error.

@@ -25,7 +25,7 @@ pub enum Error {
 /// ([Groves](crate::bibliography::Groves13), eqs. 2.26, 2.125 and 2.147 without inertial frame):
 ///
 /// f_ib_b = C_e_b (a_e + 2 omega_ie_e × v_e − g_e), omega_ib_b = omega_eb_b + C_e_b omega_ie_e.
-pub(crate) fn ideal_imu_at(trajectory: &Trajectory, t_s: f64, gravity: GravityModel) -> ImuSample {
+fn ideal_imu_at(trajectory: &Trajectory, t_s: f64, gravity: GravityModel) -> ImuSample {
     let k = trajectory.kinematics(t_s);
     let omega_ie_e = DVec3::new(0.0, 0.0, OMEGA_IE);
     let (lat, lon, h) = ecef_to_geodetic(k.r_e);

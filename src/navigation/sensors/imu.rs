@@ -70,7 +70,7 @@ pub enum TruthError {
 
 /// What makes the errors, ready to be drawn from.
 #[derive(Debug, Clone)]
-pub(crate) enum ErrorSource<'a> {
+pub enum ErrorSource<'a> {
     /// Synthesised from a model.
     Model(&'a Model),
     /// Synthesised from a model of each run's own.
@@ -170,7 +170,7 @@ fn check_recording(recording: &Recording, imu_hz: f64, needs: usize) -> Result<(
 
 /// The errors of the six channels of one run, as streams of samples.
 #[derive(Debug, Clone)]
-pub(crate) struct ImuErrors<'a> {
+pub struct ImuErrors<'a> {
     channels: Vec<ChannelErrors<'a>>,
 }
 
@@ -183,7 +183,7 @@ enum ChannelErrors<'a> {
 
 impl<'a> ImuErrors<'a> {
     /// The errors of run `key.run` over `samples` samples, as many as the source was made for.
-    pub(crate) fn new(errors: &ErrorSource<'a>, key: StreamKey<'_>, samples: usize) -> Self {
+    pub fn new(errors: &ErrorSource<'a>, key: StreamKey<'_>, samples: usize) -> Self {
         let synthesised = |model: &Model| {
             Channel::ALL.map(|channel| {
                 let source = channel.to_string();
@@ -231,7 +231,7 @@ impl<'a> ImuErrors<'a> {
 
 /// The errors of up to eight runs, side by side.
 #[derive(Debug, Clone)]
-pub(crate) struct LaneErrors<'a> {
+pub struct LaneErrors<'a> {
     runs: Vec<ImuErrors<'a>>,
     /// For each sample, accelerometer (m/s²) and gyroscope (rad/s).
     block: Vec<[Vec3; 2]>,
@@ -240,7 +240,7 @@ pub(crate) struct LaneErrors<'a> {
 
 impl<'a> LaneErrors<'a> {
     /// The errors of at most eight runs; lanes beyond them are without error.
-    pub(crate) const fn new(runs: Vec<ImuErrors<'a>>) -> Self {
+    pub fn new(runs: Vec<ImuErrors<'a>>) -> Self {
         Self {
             runs,
             block: Vec::new(),
@@ -249,7 +249,7 @@ impl<'a> LaneErrors<'a> {
     }
 
     /// Draws the errors of the next `n` samples: accelerometer (m/s²) and gyroscope (rad/s).
-    pub(crate) fn next(&mut self, n: usize) -> &mut [[Vec3; 2]] {
+    pub fn next(&mut self, n: usize) -> &mut [[Vec3; 2]] {
         self.block.resize(n, [Vec3::ZERO; 2]);
         self.channel.resize(n, 0.0);
         for (lane, errors) in self.runs.iter_mut().enumerate() {
@@ -267,7 +267,7 @@ impl<'a> LaneErrors<'a> {
     }
 
     /// What was drawn last.
-    pub(crate) fn drawn(&self) -> &[[Vec3; 2]] {
+    pub fn drawn(&self) -> &[[Vec3; 2]] {
         &self.block
     }
 }

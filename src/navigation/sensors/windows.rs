@@ -12,7 +12,7 @@ use rand::RngExt;
 
 /// Recordings, and the averaging times that tell their levels best.
 #[derive(Debug, Clone)]
-pub(crate) struct Windows<'a> {
+pub struct Windows<'a> {
     recordings: &'a [Recording],
     /// For each recording and channel: samples over which a mean knows the level best; 0 where the record is
     /// too short to tell.

@@ -7,8 +7,8 @@ use super::{EpochSums, OutageRecord, REPORTED, RunRecord};
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::{
     BodyVelocity, Ekf, Fix, advance, nis_limit, settle, update, update_body_velocity,
+    update_height, update_within, update_yaw,
 };
-use crate::ekf::{update_height, update_within, update_yaw};
 use crate::frames::NavState;
 use crate::lanes::{LANES, Lanes, Real, Vec3};
 use crate::sensors::aiding::Aid;

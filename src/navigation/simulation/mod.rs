@@ -9,9 +9,8 @@ mod recording;
 mod source;
 
 pub use batch::{Batch, run_batch};
-pub(crate) use plan::fan_epochs;
-pub(crate) use plan::samples_per;
 pub use plan::{Experiment, ExperimentError, Plan};
+pub(crate) use plan::{fan_epochs, samples_per};
 pub use recording::{Recording, record};
 
 use serde::{Deserialize, Serialize};

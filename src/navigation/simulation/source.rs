@@ -172,7 +172,7 @@ impl<'a> Source<'a> {
 }
 
 /// The fix of a receiver without noise, with the standard deviations of the one that is simulated.
-pub(super) fn exact_fix(plan: &Plan<'_>, event: &Event) -> Fix {
+fn exact_fix(plan: &Plan<'_>, event: &Event) -> Fix {
     let gnss = plan.experiment.gnss;
     let (antenna, velocity) = event.antenna;
     Fix {

@@ -184,7 +184,7 @@ pub struct VelocityMisfit {
     /// When (s).
     pub worst_s: f64,
     /// Root mean square of the speed (m/s).
-    pub rms_speed: f64,
+    rms_speed: f64,
 }
 
 impl VelocityMisfit {

@@ -60,7 +60,7 @@ impl Pyramid {
     }
 
     /// The classical variance of the next level.
-    pub(super) fn next_variance(&mut self) -> f64 {
+    fn next_variance(&mut self) -> f64 {
         self.advance(None)
     }
 

@@ -58,7 +58,7 @@ pub enum WaveletError {
 
 /// The most levels that have a coefficient: floor(log2 T).
 #[must_use]
-pub fn max_levels(samples: usize) -> u32 {
+fn max_levels(samples: usize) -> u32 {
     samples.checked_ilog2().unwrap_or(0)
 }
 

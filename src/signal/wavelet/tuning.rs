@@ -40,7 +40,7 @@ impl Default for Tuning {
 
 impl Tuning {
     /// The usual efficiency: for the same scatter a record must be 1/0.6 times as long as with the classical variance, and
-    /// up to 26 % of gross outliers leave the equation a root ([`Self::breakdown`]).
+    /// up to 26 % of gross outliers leave the equation a root.
     pub const DEFAULT_EFFICIENCY: f64 = 0.6;
     /// Efficiencies that are taken, of c = 3.5 to 11.8. Below, more than two thirds of a record would be given away; above,
     /// hardly an outlier would be rejected.
@@ -89,26 +89,6 @@ impl Tuning {
     #[must_use]
     pub const fn a(&self) -> f64 {
         self.a
-    }
-
-    /// Share of gross outliers among the coefficients from which on the equation of the robust wavelet
-    /// variance has no root: 1 − a/max_s E chi(Z/√s).
-    #[must_use]
-    pub fn breakdown(&self) -> f64 {
-        // E chi(Z/√s) is the a of the constant c√s, over s; it has one maximum, below s = 1.
-        let mean_chi = |s: f64| Moments::new(self.c * s.sqrt()).chi() / s;
-        let (mut low, mut high) = (0.01_f64, 1.0_f64);
-        for _ in 0..100 {
-            let (left, right) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-            if mean_chi(left) < mean_chi(right) {
-                low = left
-            } else {
-                high = right
-            }
-        }
-        // Rejected coefficients have chi = 0, so with a share ε of them the equation reads (1 − ε) E
-        // chi(Z/√s) = a.
-        1.0 - self.a / mean_chi(low)
     }
 
     /// Relative bias of the variance of few Gaussian coefficients times its degrees of freedom (it reads
@@ -197,19 +177,6 @@ impl Moments {
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
-
-    /// `gross_outlier_fraction_without_root` of the truth (50 digits); near a maximum the value is known
-    /// far better than its place.
-    #[test]
-    fn breakdown_points_are_those_of_the_truth() {
-        for (efficiency, expected) in [
-            (0.5, 0.201_838_947_965_474_2),
-            (0.6, 0.259_458_671_321_522_56),
-        ] {
-            let t = Tuning::new(efficiency, Convention::Exact).unwrap();
-            assert_relative_eq!(t.breakdown(), expected, max_relative = 1e-9);
-        }
-    }
 
     /// Published by the R package wv, as its source computes them.
     #[test]

@@ -1,8 +1,9 @@
 //! The settings of each kind of aiding: what a filter believes, and what is true.
 
 use crate::sensors::gnss::{MAX_LEVER_ARM_M, require_lever_arm};
-use crate::units::{NonNegative, Positive, SettingError, exactly};
-use crate::units::{require_non_negative, require_positive};
+use crate::units::{
+    NonNegative, Positive, SettingError, exactly, require_non_negative, require_positive,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -18,7 +18,7 @@ pub(crate) struct Defects {
     /// Error of the accelerometers per square of specific force (s²/m).
     pub rectification: DVec3,
     /// Change of the biases with temperature (m/s², rad/s per K).
-    pub per_kelvin: [DVec3; 2],
+    per_kelvin: [DVec3; 2],
 }
 
 impl Defects {

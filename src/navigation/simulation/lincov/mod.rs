@@ -29,34 +29,20 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod branch;
-mod column;
-mod consistency;
-mod damped;
-mod errors;
-mod factor;
-mod heading;
-mod input;
-mod joint;
-mod mean;
-mod outline;
 mod pass;
 mod reduce;
-mod root;
-mod sides;
 mod track;
 mod truth;
 mod tune;
 
-pub(crate) use branch::{Moments, errors_in_outages};
-pub use consistency::{Departure, FilterConsistency, UpperEnd};
-pub use factor::{Factor, scaled};
-pub use heading::{HeadingDoubt, weak_heading};
 pub use pass::{
     Assessment, Consistency, ErrorLaw, FilterPass, Instant, Judged, assess, strapdown_over_sigma,
 };
+pub(crate) use pass::{Moments, errors_in_outages};
 pub use reduce::{Alike, drive, reduced_belief};
-pub(crate) use root::Crossing;
 pub use track::Track;
-pub use truth::{DRIFT, NamedSource, STRAPDOWN, TrueErrors, TruthSide};
-pub use tune::{Aim, Filter, Task, aiding_factor};
+pub use truth::{DRIFT, HeadingDoubt, NamedSource, STRAPDOWN, TrueErrors, TruthSide, weak_heading};
+pub(crate) use tune::Crossing;
+pub use tune::{
+    Aim, Departure, Factor, Filter, FilterConsistency, Task, UpperEnd, aiding_factor, scaled,
+};

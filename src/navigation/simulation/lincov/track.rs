@@ -1,21 +1,23 @@
 //! A trajectory as a linear filter sees it: maps of the navigation error, and when it is measured.
 
-use super::super::aided::Aided;
-use super::super::plan::{Event, Experiment, ExperimentError, Plan};
-use super::input::{CROSSED, Outer, Source, place};
-use super::joint::add_scaled;
+use super::pass::add_scaled;
 use super::truth::defects;
 use crate::closure::Bounds;
 use crate::earth::ned_difference;
+use crate::ekf::belief::BiasGroup;
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, ErrorMap, NavError, Sample};
 use crate::ekf::initial::psi_of_angles;
-use crate::ekf::{body_velocity_rows, dense_yaw_row, fix_rows};
+use crate::ekf::{Belief, UnknownKind, body_velocity_rows, dense_yaw_row, fix_rows};
 use crate::frames::{NavState, RollPitchYaw};
-use crate::imu::Sensor;
+use crate::imu::{Channel, Sensor};
 use crate::lanes::{Quat, Vec3};
-use crate::sensors::aiding::Aid;
-use crate::sensors::defects::Surroundings;
+use crate::noise::{Ladder, Model, Process};
+use crate::sensors::aiding::{Aid, AidPart, Law};
+use crate::sensors::defects::{Felt, Surroundings};
+use crate::simulation::BIASES;
+use crate::simulation::aided::Aided;
+use crate::simulation::plan::{Event, Experiment, ExperimentError, Plan};
 use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
@@ -453,4 +455,810 @@ fn start(plan: &Plan<'_>) -> [Nav; NAV] {
         }
     }
     p
+}
+
+// Tracks of fewer and longer steps, for the many passes of a search.
+
+/// Longest step of an outline (s): with fixes, and without.
+const OUTLINE_STEP_S: [f64; 2] = [2.0, 5.0];
+/// Time between two reports of an outline (s).
+const REPORT_S: f64 = 10.0;
+
+impl Track {
+    /// As [`Self::merged`], with a report every ten, and white noise through its mean over a step as well: a tenth faster
+    /// for the hundreds of passes of a search, and within 1e-3 in every ratio.
+    #[must_use]
+    pub fn coarse(&self) -> Self {
+        let mut track = self.with_legs(Step::of_means);
+        let mut reports = 0;
+        for mark in &mut track.marks {
+            reports += usize::from(mark.report);
+            // One report in ten: reports enter the cost of a search as an average, and errors change slowly.
+            mark.report &= reports % 10 == 0;
+        }
+        track
+    }
+
+    /// The same with one step from mark to mark, at most a second: a few times faster. White noise is exact; a bias is
+    /// its mean over the step, which leaves up to 1e-4 of an error after ten seconds without fixes, 1.2e-3 after five.
+    #[must_use]
+    pub fn merged(&self) -> Self {
+        self.with_legs(Step::then)
+    }
+
+    /// One step from mark to mark, of which each follows another by `joined`.
+    fn with_legs(&self, joined: impl Fn(&Step, &Step) -> Step) -> Self {
+        let (mut steps, mut marks, mut done) = (Vec::new(), self.marks.clone(), 0);
+        for mark in &mut marks {
+            // Between marks alone: no step may reach over a measurement.
+            let leg = &self.steps[done..mark.steps];
+            if let Some((first, rest)) = leg.split_first() {
+                steps.push(
+                    rest.iter()
+                        .fold(first.clone(), |step, next| joined(&step, next)),
+                );
+            }
+            (done, mark.steps) = (mark.steps, steps.len());
+        }
+        Self {
+            steps,
+            marks,
+            outages: self.outages,
+            start: self.start,
+            perfect: self.perfect,
+        }
+    }
+
+    /// The drive in half of the steps or fewer: what the search for a reduction passes along. Several fixes are one of their
+    /// mean at the last of them.
+    #[must_use]
+    pub(super) fn outline(&self) -> Self {
+        let last_fixes = self.last_fixes();
+        let (mut steps, mut marks, mut block) = (Vec::new(), Vec::new(), Block::default());
+        let mut report_s = f64::NEG_INFINITY;
+        for (i, (leg, mark)) in self.legs(0..self.marks.len()).enumerate() {
+            block.add(
+                leg,
+                mark,
+                i.checked_sub(1)
+                    .map_or(0.0, |before| self.marks[before].after_s),
+            );
+            let next = self.marks.get(i + 1).filter(|next| next.outages.is_empty());
+            // An outage begins with its first missing fix and ends with the first fix after it, no step later.
+            let is_bound = !mark.outages.is_empty() || last_fixes.contains(&i);
+            if !is_bound && next.is_some_and(|next| block.has_room_until(next.after_s)) {
+                continue;
+            }
+            let Block { step, measured, .. } = std::mem::take(&mut block);
+            steps.extend(step);
+            let report = mark.after_s - report_s >= REPORT_S - SLACK_S;
+            report_s = if report { mark.after_s } else { report_s };
+            let rows = measured.into_iter().flat_map(Together::mean).collect();
+            marks.push(Mark {
+                steps: steps.len(),
+                rows,
+                report,
+                ..mark.clone()
+            });
+        }
+        Self {
+            steps,
+            marks,
+            outages: self.outages,
+            start: self.start,
+            perfect: self.perfect,
+        }
+    }
+
+    /// Marks whose fix is followed by a gap.
+    fn last_fixes(&self) -> Vec<usize> {
+        let fixes: Vec<usize> = (0..self.marks.len())
+            .filter(|i| self.marks[*i].fix)
+            .collect();
+        let gap_s = |pair: &[usize]| self.marks[pair[1]].after_s - self.marks[pair[0]].after_s;
+        let interval_s = fixes.windows(2).map(gap_s).fold(f64::INFINITY, f64::min);
+        fixes
+            .windows(2)
+            .filter(|pair| gap_s(pair) > 1.5 * interval_s)
+            .map(|pair| pair[0])
+            .collect()
+    }
+}
+
+/// Times of marks are sums of samples: this much apart they are the same (s).
+const SLACK_S: f64 = 1e-6;
+
+/// Steps and measurements that become one of each.
+#[derive(Default)]
+struct Block {
+    begin_s: f64,
+    step: Option<Step>,
+    /// By kind, fixes first.
+    measured: [Together; Measured::KINDS],
+}
+
+impl Block {
+    /// Adds a mark with the steps that lead to it from `before_s`.
+    fn add(&mut self, leg: &[Step], mark: &Mark, before_s: f64) {
+        if self.step.is_none() {
+            self.begin_s = before_s;
+        }
+        self.step = self
+            .step
+            .take()
+            .into_iter()
+            .chain(leg.iter().cloned())
+            .reduce(|a, b| a.of_means(&b));
+        for (kind, together) in self.measured.iter_mut().enumerate() {
+            together.add(
+                mark.rows
+                    .iter()
+                    .filter(|row| row.what.kind() == kind)
+                    .copied()
+                    .collect(),
+            );
+        }
+    }
+
+    fn has_room_until(&self, after_s: f64) -> bool {
+        after_s - self.begin_s <= OUTLINE_STEP_S[usize::from(self.measured[0].count == 0)] + SLACK_S
+    }
+}
+
+/// Measurements of one kind, taken at the last of them.
+#[derive(Default)]
+struct Together {
+    rows: Vec<Row>,
+    count: u32,
+}
+
+impl Together {
+    fn add(&mut self, rows: Vec<Row>) {
+        if !rows.is_empty() {
+            (self.rows, self.count) = (rows, self.count + 1);
+        }
+    }
+
+    /// One measurement of the mean of their noise.
+    fn mean(self) -> impl Iterator<Item = Row> {
+        let count = f64::from(self.count);
+        self.rows.into_iter().map(move |row| Row {
+            r: row.r / count,
+            noise: row.noise / count,
+            ..row
+        })
+    }
+}
+
+impl Step {
+    /// This step and then another, as one.
+    fn then(&self, next: &Self) -> Self {
+        let none = [0.0; SIGNALS];
+        // White noise of the two parts is independent: through the mean of a second it would move a position by
+        // a quarter of T³ where it is a third.
+        let mut white = self.white_noise();
+        for (sum, more) in white.iter_mut().zip(next.white_noise()) {
+            let carried = sum.map(|column| next.map(&column, &none));
+            for (i, more) in more.iter().enumerate() {
+                // Symmetric: the rows of a carried covariance are its columns.
+                sum[i] = next.map(&carried.map(|column| column[i]), &none);
+                add_scaled(&mut sum[i], 1.0, more);
+            }
+        }
+        Self {
+            white,
+            ..self.of_means(next)
+        }
+    }
+
+    /// Its `white`, whether it is there or follows from the mean over the step.
+    fn white_noise(&self) -> Vec<[Nav; NAV]> {
+        let of_mean = |b: &Nav| b.map(|factor| b.map(|b| b * factor / f64::from(self.samples)));
+        if self.white.is_empty() {
+            self.b[..BIASES].iter().map(of_mean).collect()
+        } else {
+            self.white.clone()
+        }
+    }
+
+    /// The same with white noise through its mean over the step, as that of a bias.
+    fn of_means(&self, next: &Self) -> Self {
+        let none = [0.0; SIGNALS];
+        let mut b: Vec<Nav> = self
+            .b
+            .iter()
+            .map(|column| next.map(column, &none))
+            .collect();
+        for (sum, column) in b.iter_mut().flatten().zip(next.b.iter().flatten()) {
+            // The response to a constant input: that of the first part, carried through the second, and that
+            // of the second.
+            *sum += column;
+        }
+        let m = self.m.map(|column| next.map(&column, &none));
+        Self {
+            samples: self.samples + next.samples,
+            m,
+            b,
+            white: Vec::new(),
+        }
+    }
+}
+
+// The states that make inertial errors, and what they do over a step of many samples.
+
+/// Signals: errors of an axis in proportion to what the IMU feels. Most filters and IMUs have the first of them alone.
+pub(super) const SIGNALS: usize = 42;
+/// The first that is multiplied by its own sample, what a scale factor adds.
+pub(super) const SCALED: usize = 6;
+/// The first that is multiplied by the sample of another axis, what a misalignment adds.
+pub(super) const CROSSED: usize = 12;
+/// The first of a gyroscope that is multiplied by a specific force.
+pub(super) const PUSHED: usize = 24;
+/// The first of an accelerometer that is multiplied by its own square.
+pub(super) const RECTIFIED: usize = 33;
+/// The first that is multiplied by the warming.
+pub(super) const WARMED: usize = 36;
+
+/// Where a signal acts: sensor, axis, and what it is multiplied by.
+pub(super) const fn place(signal: usize) -> (usize, usize, Felt) {
+    match signal {
+        0..SCALED => (signal / 3, signal % 3, Felt::Unit),
+        SCALED..CROSSED => {
+            let sensor = signal % SCALED / 3;
+            (
+                sensor,
+                signal % 3,
+                Felt::Sample(Sensor::ALL[sensor], signal % 3),
+            )
+        }
+        CROSSED..PUSHED => {
+            let (sensor, pair) = ((signal - CROSSED) / 6, (signal - CROSSED) % 6);
+            (
+                sensor,
+                pair / 2,
+                Felt::Sample(Sensor::ALL[sensor], (pair / 2 + 1 + pair % 2) % 3),
+            )
+        }
+        PUSHED..RECTIFIED => {
+            let pair = signal - PUSHED;
+            (
+                Sensor::Gyro as usize,
+                pair / 3,
+                Felt::Sample(Sensor::Accel, pair % 3),
+            )
+        }
+        RECTIFIED..WARMED => (
+            Sensor::Accel as usize,
+            signal - RECTIFIED,
+            Felt::Square(signal - RECTIFIED),
+        ),
+        _ => ((signal - WARMED) / 3, (signal - WARMED) % 3, Felt::Warming),
+    }
+}
+
+/// All kinds of unknowns.
+const UNKNOWNS: [UnknownKind; 2] = [UnknownKind::Drift, UnknownKind::ScaleFactor];
+
+/// A state behind one signal, in the form that every process of the catalogue has at the sample rate:
+/// the error of a sample is `before`·s + `after`·s⁺ + `fresh`·w, and s⁺ = `decay`·s + `drive`·w with w white
+/// of variance 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Source {
+    /// Which signal it is part of.
+    pub(super) signal: usize,
+    before: f64,
+    after: f64,
+    fresh: f64,
+    decay: f64,
+    drive: f64,
+    /// Growth of `after` with every sample: a ramp is its slope times the samples so far.
+    ramp: f64,
+    /// Variance of s at the start.
+    pub(super) initial: f64,
+    /// Mean of s at the start.
+    pub(super) level: f64,
+    /// The measurement that it is part of; such a source is no inertial error.
+    pub(super) outer: Option<Outer>,
+}
+
+/// An error of measurements that lasts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Outer {
+    /// Of a component of a fix's position.
+    Position(usize),
+    /// Of what a vehicle measures of itself.
+    Vehicle(AidPart),
+}
+
+/// A source that makes no error.
+const NONE: Source = Source {
+    signal: 0,
+    before: 0.0,
+    after: 0.0,
+    fresh: 0.0,
+    decay: 1.0,
+    drive: 0.0,
+    ramp: 0.0,
+    initial: 0.0,
+    level: 0.0,
+    outer: None,
+};
+
+/// What a source does over a step: the mean of its samples' errors is `mean`·s + w₁, and s⁺ = `decay`·s + w₂.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct StepOfSource {
+    pub(super) signal: usize,
+    pub(super) mean: f64,
+    /// Growth of `mean` with every sample before the step.
+    pub(super) ramp: f64,
+    pub(super) decay: f64,
+    /// Variance of w₁.
+    pub(super) q_mean: f64,
+    /// Covariance of w₁ and w₂.
+    pub(super) q_cross: f64,
+    /// Variance of w₂.
+    pub(super) q_state: f64,
+}
+
+impl Source {
+    fn bias(signal: usize, phi: f64, innovation: f64, initial: f64) -> Self {
+        Self {
+            signal,
+            after: 1.0,
+            decay: phi,
+            drive: innovation.sqrt(),
+            initial,
+            ..NONE
+        }
+    }
+
+    /// An unknown constant of a standard deviation.
+    pub(super) fn constant(signal: usize, sigma: f64) -> Self {
+        Self::bias(signal, 1.0, 0.0, sigma * sigma)
+    }
+
+    /// A state that is nothing but the last innovation of standard deviation `sigma`: the error of a sample
+    /// is `fresh`·w + `before`·(the w of the sample before).
+    fn memory(signal: usize, sigma: f64, fresh: f64, before: f64) -> Self {
+        // `before` multiplies the state, which carries sigma itself; `fresh` multiplies w of variance 1.
+        let (before, fresh) = (before, fresh * sigma);
+        Self {
+            signal,
+            before,
+            fresh,
+            decay: 0.0,
+            drive: sigma,
+            initial: sigma * sigma,
+            ..NONE
+        }
+    }
+
+    /// A constant slope, known to nobody: its mean square is what second moments see of it.
+    const fn ramp(signal: usize, slope: f64) -> Self {
+        Self {
+            signal,
+            ramp: 1.0,
+            initial: slope * slope,
+            ..NONE
+        }
+    }
+
+    /// A slope that is the same in every run. The states of the truth are negated, and so is its mean.
+    pub(super) fn drift(signal: usize, slope: f64) -> Self {
+        // No variance: a deterministic slope enters the mean alone.
+        Self {
+            initial: 0.0,
+            level: -slope,
+            ..Self::ramp(signal, slope)
+        }
+    }
+
+    /// A correlated error of a component of a fix's position: stationary, of standard deviation `sigma`, with
+    /// the coefficient `phi` from sample to sample.
+    pub(super) fn of_position(component: usize, phi: f64, sigma: f64) -> Self {
+        let drive = sigma * (1.0 - phi * phi).sqrt();
+        Self {
+            decay: phi,
+            drive,
+            initial: sigma * sigma,
+            outer: Some(Outer::Position(component)),
+            ..NONE
+        }
+    }
+
+    /// An error of what a vehicle measures of itself, at an IMU of this rate.
+    pub(super) fn of_vehicle(part: AidPart, law: Law, imu_hz: f64) -> Self {
+        let outer = Some(Outer::Vehicle(part));
+        match law {
+            // The states of the truth are negated, and so is a mean.
+            Law::Known(value) => Self {
+                level: -value,
+                outer,
+                ..NONE
+            },
+            Law::Constant(sigma) => Self {
+                initial: sigma * sigma,
+                outer,
+                ..NONE
+            },
+            Law::GaussMarkov { sigma, time_s } => {
+                let phi = (-1.0 / (imu_hz * time_s)).exp();
+                Self {
+                    outer,
+                    ..Self::of_position(0, phi, sigma)
+                }
+            }
+        }
+    }
+
+    /// Error that is there after `samples` samples per unit of the state: biases count and drifts at their age, noise
+    /// of single samples does not.
+    pub(super) fn share(&self, samples: f64) -> f64 {
+        self.after + self.ramp * samples
+    }
+
+    /// What the source does over a step of `samples` samples, exactly.
+    pub(super) fn over(&self, samples: u32) -> StepOfSource {
+        let n = f64::from(samples);
+        let mut step = StepOfSource {
+            signal: self.signal,
+            mean: 0.0,
+            ramp: self.ramp,
+            decay: 1.0,
+            q_mean: 0.0,
+            q_cross: 0.0,
+            q_state: 0.0,
+        };
+        // backwards: what a unit of s before the remaining samples adds to their sum, and leaves of itself
+        for _ in 0..samples {
+            // The w of this sample: in its own error by `fresh` and `after`·`drive`, in all later ones
+            // through the state.
+            let in_sum = self.fresh + self.drive * (self.after + step.mean);
+            let in_state = self.drive * step.decay;
+            step.q_mean += in_sum * in_sum;
+            step.q_cross += in_sum * in_state;
+            step.q_state += in_state * in_state;
+            step.mean = self.before + self.decay * (self.after + step.mean);
+            step.decay *= self.decay;
+        }
+        // The ramp counts samples 1 … n of the step, whose mean is (n + 1)/2.
+        step.mean = step.mean / n + self.ramp * 0.5 * (n + 1.0);
+        step.q_mean /= n * n;
+        step.q_cross /= n;
+        step
+    }
+
+    /// Without what drives it: a filter's estimate of the state, which starts at zero.
+    const fn estimate(&self) -> Self {
+        Self {
+            drive: 0.0,
+            fresh: 0.0,
+            initial: 0.0,
+            ..*self
+        }
+    }
+}
+
+/// The errors of an IMU: sources, and white noise of a sample on each signal.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Sources {
+    pub(super) states: Vec<Source>,
+    pub(super) white: [f64; BIASES],
+}
+
+impl Default for Sources {
+    fn default() -> Self {
+        Self {
+            states: Vec::new(),
+            white: [0.0; BIASES],
+        }
+    }
+}
+
+impl Sources {
+    /// Adds those of another, independent.
+    pub(super) fn extend(&mut self, other: &Self) {
+        self.states.extend_from_slice(&other.states);
+        self.white
+            .iter_mut()
+            .zip(&other.white)
+            .for_each(|(white, more)| *white += more);
+    }
+
+    /// What a filter estimates of them: nothing at the start, and nothing drives its estimates but corrections.
+    pub(super) fn estimates(&self) -> Self {
+        Self {
+            states: self.states.iter().map(Source::estimate).collect(),
+            ..Self::default()
+        }
+    }
+
+    /// Those a filter believes in: one for each bias state.
+    pub(super) fn of_belief(belief: &Belief) -> Self {
+        let mut states = Vec::new();
+        for sensor in Sensor::ALL {
+            states.extend(
+                belief.groups[sensor as usize]
+                    .iter()
+                    .flat_map(|g| Self::of_group(sensor, g)),
+            );
+        }
+        let [accel, gyro] = belief.white.map(|w| w.to_array());
+        let mut white = [0.0; BIASES];
+        white[..3].copy_from_slice(&accel);
+        white[3..].copy_from_slice(&gyro);
+        states.extend(Self::multiplied(belief, &UNKNOWNS));
+        states.extend(Self::of_vehicle(belief));
+        Self { states, white }
+    }
+
+    /// The bias states of a group.
+    pub(super) fn of_group(sensor: Sensor, group: &BiasGroup) -> Vec<Source> {
+        let state = |axis: usize| {
+            let (phi, q, initial) = (group.phi[axis], group.innovation[axis], group.initial[axis]);
+            (initial != 0.0 || q != 0.0)
+                .then(|| Source::bias(3 * sensor as usize + axis, phi, q, initial))
+        };
+        (0..3).filter_map(state).collect()
+    }
+
+    /// Unknown constants of a belief that are multiplied.
+    pub(super) fn multiplied(belief: &Belief, kinds: &[UnknownKind]) -> Vec<Source> {
+        let mut states = Vec::new();
+        for (sensor, axis) in Sensor::ALL
+            .into_iter()
+            .flat_map(|s| (0..3).map(move |i| (s, i)))
+        {
+            let signal = 3 * sensor as usize + axis;
+            for unknown in belief
+                .unknowns(sensor)
+                .iter()
+                .filter(|u| kinds.contains(&u.kind))
+            {
+                let sigma = unknown.sigma[axis];
+                states.extend((sigma > 0.0).then(|| match unknown.kind {
+                    UnknownKind::Drift => Source::ramp(signal, sigma),
+                    UnknownKind::ScaleFactor => Source::constant(SCALED + signal, sigma),
+                }));
+            }
+        }
+        states
+    }
+
+    /// Wheel scale and mounting of a vehicle, as a filter believes in them.
+    pub(super) fn of_vehicle(belief: &Belief) -> Vec<Source> {
+        let parts = [
+            AidPart::WheelScale,
+            AidPart::MountingPitch,
+            AidPart::MountingYaw,
+        ];
+        let states = parts
+            .into_iter()
+            .zip(belief.vehicle.to_array())
+            .filter(|(_, sigma)| *sigma > 0.0);
+        states
+            .map(|(part, sigma)| Source::of_vehicle(part, Law::Constant(sigma), belief.rate_hz))
+            .collect()
+    }
+
+    /// What a belief expects beside its noise model, as it expects it: turn-on biases and scale factors.
+    pub(super) fn beside_model(belief: &Belief) -> Vec<Source> {
+        let mut states = Self::multiplied(belief, &[UnknownKind::ScaleFactor]);
+        states.extend(Self::of_vehicle(belief));
+        for sensor in Sensor::ALL {
+            for group in belief.groups[sensor as usize]
+                .iter()
+                .filter(|g| g.is_constant())
+            {
+                let constant =
+                    |axis| Source::bias(3 * sensor as usize + axis, 1.0, 0.0, group.initial[axis]);
+                states.extend((0..3).map(constant).filter(|s| s.initial > 0.0));
+            }
+        }
+        states
+    }
+
+    /// The sources of a noise model, each process exactly.
+    pub(super) fn of_model(model: &Model) -> Self {
+        let mut sources = Self::default();
+        for channel in Channel::ALL {
+            for process in &model.axis(channel).processes {
+                sources.add(channel.index(), process);
+            }
+        }
+        sources
+    }
+
+    pub(super) fn add(&mut self, signal: usize, process: &Process) {
+        let state = match process {
+            Process::Flicker(p) => {
+                p.parts(Ladder::FINE)
+                    .iter()
+                    .for_each(|part| self.add(signal, part));
+                return;
+            }
+            Process::White(p) => {
+                self.white[signal] += p.sigma2();
+                return;
+            }
+            // U_k − U_{k−1}: the last U is a state, because the sum over a step telescopes. As white noise it
+            // would grow.
+            Process::Quantization(p) => Source::memory(signal, p.q2().sqrt(), 1.0, -1.0),
+            Process::Ma1(p) => Source::memory(signal, p.sigma2().sqrt(), 1.0, p.theta()),
+            Process::Ar1(p) => Source::bias(signal, p.phi(), p.sigma2(), p.variance()),
+            Process::GaussMarkov(p) => {
+                Source::bias(signal, p.ar1().phi(), p.ar1().sigma2(), p.s2())
+            }
+            Process::RandomWalk(p) => Source::bias(signal, 1.0, p.gamma2(), 0.0),
+            Process::Drift(p) => Source::ramp(signal, p.slope()),
+        };
+        self.states.push(state);
+    }
+}
+
+// The states beside the navigation error, and what they do over the steps of a track.
+
+/// The states `b` of a filter and `t` of the truth, as [`Joint`](super::pass::Joint) has them.
+#[derive(Debug)]
+pub(super) struct Sides {
+    pub(super) b: Sources,
+    pub(super) t: Sources,
+    /// Signals that they reach: most have neither scale factors nor what comes after them.
+    pub(super) signals: usize,
+    /// By the number of samples of a step; few numbers occur.
+    inputs: Vec<(u32, Inputs)>,
+}
+
+impl Sides {
+    /// A filter as it sees itself along a track: its biases are what makes its errors.
+    pub(super) fn of_filter(believed: Sources, track: &Track) -> Self {
+        Self::new(believed, Sources::default(), track)
+    }
+
+    /// The estimates of a filter, and what truly makes its errors.
+    pub(super) fn of_errors(believed: &Sources, truth: &Sources, track: &Track) -> Self {
+        Self::new(believed.estimates(), truth.clone(), track)
+    }
+
+    fn new(b: Sources, t: Sources, track: &Track) -> Self {
+        let mut inputs: Vec<(u32, Inputs)> = Vec::new();
+        for step in &track.steps {
+            if inputs.iter().all(|(samples, _)| *samples != step.samples) {
+                inputs.push((step.samples, Inputs::new(&b, &t, step.samples)));
+            }
+        }
+        let signals = b
+            .states
+            .iter()
+            .chain(&t.states)
+            .map(|s| s.signal + 1)
+            .max()
+            .unwrap_or(0);
+        // What a track does not follow would be left out in silence.
+        debug_assert!(track.steps.iter().all(|step| signals <= step.b.len()));
+        Self {
+            b,
+            t,
+            signals,
+            inputs,
+        }
+    }
+
+    /// What they do over a step of the track.
+    pub(super) fn over(&self, step: &Step) -> &Inputs {
+        let found = self
+            .inputs
+            .iter()
+            .find(|(samples, _)| *samples == step.samples);
+        &found.expect("every length of the track is there").1
+    }
+}
+
+/// What sources do over steps of one length.
+#[derive(Debug, Clone)]
+pub(super) struct Inputs {
+    pub(super) b: Vec<StepOfSource>,
+    pub(super) t: Vec<StepOfSource>,
+    /// Variance of the white noise of a sample (units²).
+    pub(super) white: [f64; BIASES],
+    /// Variance of the part of a signal's mean over the step that is new in it: of white noise and states, of states
+    /// alone (units²).
+    pub(super) q_mean: [[f64; SIGNALS]; 2],
+}
+
+impl Inputs {
+    /// The steps of the filter's states `b` and of the states `t` of the truth; white noise belongs to the side that
+    /// makes the errors.
+    fn new(b: &Sources, t: &Sources, samples: u32) -> Self {
+        let steps_of = |s: &Sources| -> Vec<StepOfSource> {
+            s.states.iter().map(|x| x.over(samples)).collect()
+        };
+        let (bs, ts) = (steps_of(b), steps_of(t));
+        let white: [f64; BIASES] = std::array::from_fn(|i| b.white[i] + t.white[i]);
+        let mut q_mean = [[0.0; SIGNALS]; 2];
+        q_mean[0]
+            .iter_mut()
+            .zip(white)
+            .for_each(|(q, white)| *q = white / f64::from(samples));
+        for source in bs.iter().chain(&ts) {
+            q_mean
+                .iter_mut()
+                .for_each(|q| q[source.signal] += source.q_mean);
+        }
+        Self {
+            b: bs,
+            t: ts,
+            white,
+            q_mean,
+        }
+    }
+}
+
+#[cfg(test)]
+mod outline_tests {
+    use crate::noise::Model;
+    use crate::scenario::Scenario;
+    use crate::sensors::outage::Outage;
+    use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
+
+    /// A step covers two seconds or five, and every outage begins and ends where it did.
+    #[test]
+    fn an_outline_is_half_of_the_drive() {
+        let outline = |duration_s: f64| {
+            let north = Segment {
+                kind: Kind::Straight(Length::Duration(duration_s)),
+                climb_m: 0.0,
+                ramp_s: None,
+            };
+            let start = Start {
+                t_s: 0.0,
+                lat: 0.9,
+                lon: 0.2,
+                h: 0.0,
+                heading: 0.0,
+                speed: 20.0,
+            };
+            let drive = Profile {
+                start,
+                bank: Bank::None,
+                ramp_s: 2.0,
+                segments: vec![north],
+            }
+            .build()
+            .unwrap();
+            let mut scenario = Scenario::default();
+            scenario.imu.rate_hz = 10.0;
+            let silent = Model {
+                rate_hz: 10.0,
+                axes: Default::default(),
+            };
+            let outages = [Outage {
+                start_s: 600.0,
+                end_s: 663.0,
+            }];
+            let track = scenario.track(&drive, &silent, &outages).unwrap().outline();
+            let end = track
+                .marks
+                .iter()
+                .position(|mark| !mark.outages.is_empty())
+                .unwrap();
+            let [.., last_fix, _] = track.marks[..end]
+                .iter()
+                .filter(|m| !m.rows.is_empty() || m.after_s > 600.0)
+                .collect::<Vec<_>>()[..]
+            else {
+                panic!()
+            };
+            assert_eq!(track.marks[end].after_s, 663.0);
+            assert!(last_fix.after_s > 600.0 && last_fix.rows.is_empty());
+            assert!(
+                track
+                    .marks
+                    .iter()
+                    .any(|mark| mark.after_s == 599.0 && !mark.rows.is_empty())
+            );
+            track.steps.len()
+        };
+        assert!(outline(1200.0) < 620 && outline(3600.0) < 1820);
+    }
 }

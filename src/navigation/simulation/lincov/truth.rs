@@ -1,7 +1,8 @@
 //! What makes the true errors: independent sources, alone or together.
 
-use super::input::{CROSSED, Outer, PUSHED, RECTIFIED, SCALED, Source, Sources, WARMED, place};
-use super::track::Measured;
+use super::track::{
+    CROSSED, Measured, Outer, PUSHED, RECTIFIED, SCALED, Source, Sources, WARMED, place,
+};
 use crate::ekf::{Belief, UnknownKind};
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Kind, Model, Process};
@@ -9,6 +10,7 @@ use crate::sensors::aiding::{AidError, AidingSettings};
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::simulation::plan::Experiment;
+use std::fmt;
 use std::ops::Range;
 
 /// Kinds of white noise of measurements: positions and velocities of fixes apart.
@@ -392,4 +394,67 @@ fn believed_of(belief: &Belief, sensor: Sensor) -> Vec<NamedSource> {
         all.extend(inertial(format!("{}.{name}", sensor.name()), of_sensor));
     }
     all
+}
+
+// Whether the motion shows the heading.
+
+/// Standard deviation of the heading from which an error-state filter is not to be believed (degrees): the sine
+/// of the error is no longer the error, and noise is taken for information about the heading.
+const LARGE_DEG: f64 = 5.0;
+/// Time that an alignment may take (s).
+const SETTLED_S: f64 = 120.0;
+
+/// A heading that is hardly observable.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeadingDoubt {
+    /// Its largest standard deviation while there are fixes (degrees).
+    pub sigma_deg: f64,
+    /// When (s from the start).
+    pub after_s: f64,
+}
+
+impl fmt::Display for HeadingDoubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // beyond half a turn a linear deviation is only a large number
+        let sigma = if self.sigma_deg < 180.0 {
+            format!("{:.0}°", self.sigma_deg)
+        } else {
+            "over 180°".to_owned()
+        };
+        write!(
+            f,
+            "the heading is hardly observable: its standard deviation is {sigma} after {:.0} s although there are \
+             fixes (horizontal accelerations are too small to show it); there the filter's sigma of yaw may be \
+             several times too small, with any number of states",
+            self.after_s
+        )
+    }
+}
+
+/// Where the heading is hardly observable: `while_fixed` are the times from the start (s) at which fixes are used,
+/// and the standard deviations of yaw there (degrees). The first two minutes belong to the alignment.
+#[must_use]
+pub fn weak_heading(while_fixed: impl Iterator<Item = (f64, f64)>) -> Option<HeadingDoubt> {
+    let settled = while_fixed.filter(|(after_s, _)| *after_s >= SETTLED_S);
+    let worst = settled.max_by(|a, b| a.1.total_cmp(&b.1));
+    let (after_s, sigma_deg) = worst.filter(|(_, sigma_deg)| *sigma_deg > LARGE_DEG)?;
+    Some(HeadingDoubt { sigma_deg, after_s })
+}
+
+#[cfg(test)]
+mod heading_tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_deviation_after_the_alignment_decides() {
+        assert_eq!(weak_heading([(10.0, 20.0), (200.0, 4.0)].into_iter()), None);
+        let doubt = weak_heading([(10.0, 20.0), (200.0, 7.0), (300.0, 6.0)].into_iter());
+        assert_eq!(
+            doubt,
+            Some(HeadingDoubt {
+                sigma_deg: 7.0,
+                after_s: 200.0
+            })
+        );
+    }
 }

@@ -5,17 +5,13 @@
 //! covariance that the filter states and that of its errors ([`super::Consistency::divergence`]), then one factor
 //! on all of them makes the filter exactly consistent.
 
-use super::consistency::{DrawFactors, FilterConsistency, UpperEnd};
-use super::damped::{Damped, Part, Value};
-use super::factor::{Factor, MAX_LN, multiplied, scaled, set};
-use super::pass::{Assessment, FilterPass};
-use super::reduce::{ENDS, divergence};
-use super::root::Crossing;
+use super::pass::{Assessment, Consistency, FilterPass};
+use super::reduce::{Damped, ENDS, Part, Value, divergence};
 use super::track::Track;
 use super::truth::TrueErrors;
 use crate::ekf::{Belief, BeliefError};
-use crate::imu::Sensor;
-use crate::noise::Model;
+use crate::imu::{Channel, Sensor};
+use crate::noise::{Model, Process};
 use crate::simulation::{NEES_DOF, REPORTED};
 use rayon::prelude::*;
 
@@ -192,7 +188,7 @@ impl Task<'_> {
     ///
     /// # Errors
     /// When the model has no such filter.
-    pub(super) fn consistency_and_draws(
+    fn consistency_and_draws(
         &self,
         filter: &Filter<'_>,
         factors: &[Factor],
@@ -210,7 +206,7 @@ impl Task<'_> {
     ///
     /// # Errors
     /// When the model has no such filter.
-    pub(super) fn consistency_with(
+    fn consistency_with(
         &self,
         filter: &Filter<'_>,
         factors: &[Factor],
@@ -396,4 +392,432 @@ fn smallest(
         }
     }
     Ok(fits)
+}
+
+// Consistency of a filter with several truths.
+
+/// The upper end of the interval of a figure, from the figure itself and those of the draws around it.
+pub type UpperEnd<'a> = dyn Fn(f64, Vec<f64>) -> f64 + Sync + 'a;
+
+/// What counts of the ratios that the truths have of one error: the largest, or the upper end around the first, below which
+/// that itself is not.
+fn counted(ratios: &[f64], drawn: Option<&UpperEnd<'_>>) -> f64 {
+    match (drawn, ratios) {
+        (Some(upper_end), [first, draws @ ..]) => upper_end(*first, draws.to_vec()).max(*first),
+        _ => ratios.iter().copied().fold(0.0, f64::max),
+    }
+}
+
+/// Consistency of a filter with several truths.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FilterConsistency {
+    /// Expected NEES, mean over time and truths; 9 is right.
+    pub nees: f64,
+    /// Where errors are largest against what is stated, at an outage's end or over the whole run (without outages: at any time).
+    pub largest: Departure,
+    /// Smallest and largest ratio of any state and of all together, in the first truth where the others are its draws: what
+    /// `run` calls the filter by.
+    pub range: [f64; 2],
+    /// When the outages end (s from the start).
+    pub end_s: Vec<f64>,
+    /// True RMSE of the reported states at these ends, root mean square over the truths.
+    pub rmse_end: Vec<[f64; REPORTED]>,
+}
+
+/// An error over what the filter states of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Departure {
+    /// What counts of true RMSE over stated standard deviation in the truths.
+    pub ratio: f64,
+    /// The reported state.
+    pub state: usize,
+    /// The outage at whose end it is, counted from 0; none: over the whole run.
+    pub outage: Option<usize>,
+    /// The truth whose ratio is nearest to what counts, counted from 0.
+    pub truth: usize,
+}
+
+impl FilterConsistency {
+    /// Of one filter under several truths.
+    pub(super) fn of(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> Self {
+        let count = assessments.len() as f64;
+        let mean =
+            |a: &Assessment| a.reports.iter().map(|r| r.nees).sum::<f64>() / a.reports.len() as f64;
+        let end_s: Vec<f64> = assessments[0]
+            .outage_ends
+            .iter()
+            .map(|end| end.after_s)
+            .collect();
+        let mut rmse_end = vec![[0.0; REPORTED]; end_s.len()];
+        for assessment in assessments {
+            for (sum, end) in rmse_end.iter_mut().zip(&assessment.outage_ends) {
+                sum.iter_mut()
+                    .zip(&end.rmse)
+                    .for_each(|(sum, rmse)| *sum += rmse * rmse / count);
+            }
+        }
+        rmse_end.iter_mut().flatten().for_each(|x| *x = x.sqrt());
+        let largest = Departure::largest(&departures(assessments, drawn));
+        let nees = assessments.iter().map(mean).sum::<f64>() / count;
+        let first = if drawn.is_some() {
+            &assessments[..1]
+        } else {
+            assessments
+        };
+        let nees_over_run = first.iter().map(mean).sum::<f64>() / first.len() as f64;
+        let at_ends = first
+            .iter()
+            .flat_map(|a| a.outage_ends.iter().map(|end| end.nees));
+        let together = std::iter::once(nees_over_run)
+            .chain(at_ends)
+            .map(|nees| (nees / NEES_DOF as f64).sqrt());
+        let places = if end_s.is_empty() {
+            over_run_of(first, None).to_vec()
+        } else {
+            departures(first, None)
+        };
+        let ratios = places.into_iter().map(|d| d.ratio).chain(together);
+        let range = ratios.fold([f64::INFINITY, 0.0], |[low, high], r| {
+            [r.min(low), r.max(high)]
+        });
+        Self {
+            nees,
+            largest,
+            range,
+            end_s,
+            rmse_end,
+        }
+    }
+
+    /// Horizontal RMSE at the end of each outage (m).
+    pub fn horizontal_m(&self) -> impl Iterator<Item = f64> {
+        self.rmse_end.iter().map(|rmse| rmse[0].hypot(rmse[1]))
+    }
+}
+
+impl Departure {
+    fn largest(all: &[Self]) -> Self {
+        let none = Self {
+            ratio: 0.0,
+            state: 0,
+            outage: None,
+            truth: 0,
+        };
+        all.iter()
+            .fold(none, |a, b| if b.ratio > a.ratio { *b } else { a })
+    }
+}
+
+/// What draws add to the first truth under a filter, as factors; they hardly depend on the filter.
+#[derive(Debug, Clone, PartialEq)]
+struct DrawFactors {
+    /// The upper end of each ratio, in the order of [`departures`].
+    ratios: Vec<f64>,
+    /// The same of the ratios over the whole run.
+    over_run: [f64; REPORTED],
+    /// The mean NEES of all.
+    nees: f64,
+    /// The root mean square of all at the ends of outages.
+    rmse_end: Vec<[f64; REPORTED]>,
+}
+
+impl DrawFactors {
+    /// Of a filter under the first truth and its draws, whose consistency is known.
+    pub(super) fn of(
+        assessments: &[Assessment],
+        drawn: &UpperEnd<'_>,
+        consistency: &FilterConsistency,
+    ) -> Self {
+        let first = &assessments[..1];
+        let (all, alone) = (
+            departures(assessments, Some(drawn)),
+            departures(first, None),
+        );
+        let over_run = over_run_of(assessments, Some(drawn)).map(|d| d.ratio);
+        let alone_over_run = over_run_of(first, None).map(|d| d.ratio);
+        let alone_consistency = FilterConsistency::of(first, None);
+        let over = |all: &[f64; REPORTED], alone: &[f64; REPORTED]| {
+            std::array::from_fn(|i| all[i] / alone[i])
+        };
+        let rmse_end = consistency.rmse_end.iter().zip(&alone_consistency.rmse_end);
+        Self {
+            ratios: all
+                .iter()
+                .zip(&alone)
+                .map(|(all, alone)| all.ratio / alone.ratio)
+                .collect(),
+            over_run: over(&over_run, &alone_over_run),
+            nees: consistency.nees / alone_consistency.nees,
+            rmse_end: rmse_end.map(|(all, alone)| over(all, alone)).collect(),
+        }
+    }
+
+    /// The consistency of another filter, by the first truth.
+    pub(super) fn consistency(&self, first: &[Assessment]) -> FilterConsistency {
+        let mut consistency = FilterConsistency::of(first, None);
+        let mut departures = departures(first, None);
+        departures
+            .iter_mut()
+            .zip(&self.ratios)
+            .for_each(|(d, margin)| d.ratio *= margin);
+        consistency.largest = Departure::largest(&departures);
+        consistency.nees *= self.nees;
+        let ends = consistency.rmse_end.iter_mut().flatten();
+        ends.zip(self.rmse_end.iter().flatten())
+            .for_each(|(rmse, margin)| *rmse *= margin);
+        consistency
+    }
+
+    /// Takes the errors of the first truth to the upper ends of their intervals.
+    fn enlarge(&self, first: &mut Assessment) {
+        let ends = first.outage_ends.iter_mut().flat_map(|end| &mut end.rmse);
+        ends.zip(&self.ratios)
+            .for_each(|(rmse, margin)| *rmse *= margin);
+        for report in &mut first.reports {
+            report
+                .rmse
+                .iter_mut()
+                .zip(&self.over_run)
+                .for_each(|(rmse, margin)| *rmse *= margin);
+        }
+    }
+}
+
+/// Every state at every place where a filter is judged: at the ends of outages and then over the whole run; without outages
+/// wherever it reports.
+fn departures(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> Vec<Departure> {
+    let at = |outage: Option<usize>, instants: fn(&Assessment) -> &[Consistency], k: usize| {
+        states(assessments, drawn, outage, &|a| instants(a)[k].ratio())
+    };
+    match assessments[0].outage_ends.len() {
+        0 => (0..assessments[0].reports.len())
+            .flat_map(|k| at(None, |a| &a.reports, k))
+            .collect(),
+        ends => {
+            let at_ends = (0..ends).flat_map(|k| at(Some(k), |a| &a.outage_ends, k));
+            at_ends.chain(over_run_of(assessments, drawn)).collect()
+        }
+    }
+}
+
+fn over_run_of(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> [Departure; REPORTED] {
+    states(assessments, drawn, None, &Assessment::ratio_over_run)
+}
+
+/// Every state at one place.
+fn states(
+    assessments: &[Assessment],
+    drawn: Option<&UpperEnd<'_>>,
+    outage: Option<usize>,
+    ratios: &dyn Fn(&Assessment) -> [f64; REPORTED],
+) -> [Departure; REPORTED] {
+    let of_truths: Vec<[f64; REPORTED]> = assessments.iter().map(ratios).collect();
+    std::array::from_fn(|state| {
+        let ratios: Vec<f64> = of_truths.iter().map(|of_truth| of_truth[state]).collect();
+        let ratio = counted(&ratios, drawn);
+        let distance = |truth: &usize| (ratios[*truth] - ratio).abs();
+        let truth = (0..ratios.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        Departure {
+            ratio,
+            state,
+            outage,
+            truth: truth.unwrap_or(0),
+        }
+    })
+}
+
+// Factors on the variances of a noise model.
+
+/// What is multiplied, and by what.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Factor {
+    /// The sensor.
+    pub sensor: Sensor,
+    /// The factor on the variances of all its processes.
+    pub on_variance: f64,
+}
+
+impl Factor {
+    /// Whether the search ended at the largest factor that it tries, e^12: the factor says nothing then.
+    #[must_use]
+    pub fn is_at_limit(&self) -> bool {
+        self.on_variance.ln().abs() > MAX_LN - 1e-6
+    }
+}
+
+/// Largest logarithm of a factor.
+pub(super) const MAX_LN: f64 = 12.0;
+
+/// The factors of a model, all 1: of the sensors with noise that a filter models.
+pub(super) fn multiplied(model: &Model) -> Vec<Factor> {
+    let has_noise = |sensor: &Sensor| {
+        Channel::ALL
+            .into_iter()
+            .filter(|channel| channel.sensor == *sensor)
+            .any(|channel| model.axis(channel).processes.iter().any(is_felt))
+    };
+    let one = |sensor| Factor {
+        sensor,
+        on_variance: 1.0,
+    };
+    Sensor::ALL.into_iter().filter(has_noise).map(one).collect()
+}
+
+/// Whether a filter models the process and its amplitude is not zero.
+fn is_felt(process: &Process) -> bool {
+    let (_, amplitude) = amplitude(process);
+    amplitude != 0.0 && !matches!(process, Process::Quantization(_))
+}
+
+/// The parameter that a process is proportional to.
+fn amplitude(process: &Process) -> (&'static str, f64) {
+    match process {
+        Process::White(p) => ("sigma2", p.sigma2()),
+        Process::Quantization(p) => ("q2", p.q2()),
+        Process::Ar1(p) => ("sigma2", p.sigma2()),
+        Process::Flicker(p) => ("b2", p.b2()),
+        Process::RandomWalk(p) => ("gamma2", p.gamma2()),
+        Process::Drift(p) => ("slope", p.slope()),
+        Process::GaussMarkov(p) => ("s2", p.s2()),
+        Process::Ma1(p) => ("sigma2", p.sigma2()),
+    }
+}
+
+pub(super) fn set(factors: &[Factor], ln: &[f64]) -> Vec<Factor> {
+    factors
+        .iter()
+        .zip(ln)
+        .map(|(f, ln)| Factor {
+            on_variance: ln.exp(),
+            ..*f
+        })
+        .collect()
+}
+
+/// A model whose processes are multiplied; the factors are the same at any sample rate.
+#[must_use]
+pub fn scaled(model: &Model, factors: &[Factor]) -> Model {
+    let mut scaled = model.clone();
+    for channel in Channel::ALL {
+        let Some(factor) = factors.iter().find(|f| f.sensor == channel.sensor) else {
+            continue;
+        };
+        for process in &mut scaled.axes[channel.index()].processes {
+            if is_felt(process) {
+                *process = times(process, factor.on_variance, model.rate_hz);
+            }
+        }
+    }
+    scaled
+}
+
+/// A process whose variance is multiplied.
+fn times(process: &Process, on_variance: f64, rate_hz: f64) -> Process {
+    let (name, value) = amplitude(process);
+    // a drift has an amplitude, the others a variance
+    let factor = if matches!(process, Process::Drift(_)) {
+        on_variance.sqrt()
+    } else {
+        on_variance
+    };
+    let changed = process
+        .with_parameter(name, value * factor, rate_hz)
+        .and_then(Result::ok);
+    // beyond the largest number nothing is left to enlarge
+    changed.unwrap_or(*process)
+}
+
+// Where a function that falls crosses zero.
+
+/// How a crossing is sought.
+pub(crate) struct Crossing {
+    /// Where the variable may go.
+    pub(crate) bounds: (f64, f64),
+    /// First step away from the start; it doubles until there is a bracket.
+    pub(crate) step: f64,
+    /// A value this close to zero is zero.
+    pub(crate) exact: f64,
+}
+
+/// Evaluations within a bracket. The Illinois rule gains a digit in two of them.
+const TRIALS: usize = 40;
+
+impl Crossing {
+    /// The variable and its value: within `exact` of zero, or at a bound where there is no crossing. From a value
+    /// above zero the variable goes up. A bracket first, then regula falsi with the Illinois rule, which
+    /// keeps it.
+    pub(crate) fn from<E>(
+        &self,
+        start: f64,
+        mut value: impl FnMut(f64) -> Result<f64, E>,
+    ) -> Result<(f64, f64), E> {
+        let mut near = (start, value(start)?);
+        if near.1.abs() <= self.exact {
+            return Ok(near);
+        }
+        // The function falls: a value above zero means that the crossing lies above.
+        let mut step = self.step.copysign(near.1);
+        let mut far = near;
+        while far.1 * near.1 > 0.0 {
+            near = far;
+            let next = (near.0 + step).clamp(self.bounds.0, self.bounds.1);
+            if next == near.0 {
+                return Ok(near);
+            }
+            far = (next, value(next)?);
+            // Zero may be where the function ends and not where it crosses.
+            if far.1.abs() <= self.exact {
+                return Ok(far);
+            }
+            step *= 2.0;
+        }
+        for _ in 0..TRIALS {
+            if far.1.abs() <= self.exact || !far.1.is_finite() {
+                break;
+            }
+            let middle = (near.0 * far.1 - far.0 * near.1) / (far.1 - near.1);
+            let found = (middle, value(middle)?);
+            // Illinois: the end that stays is given half of its value, since plain regula falsi keeps one end
+            // for ever where the function is convex.
+            near = if found.1 * far.1 < 0.0 {
+                far
+            } else {
+                (near.0, 0.5 * near.1)
+            };
+            far = found;
+        }
+        Ok(far)
+    }
+}
+
+#[cfg(test)]
+mod root_tests {
+    use super::*;
+    use std::convert::Infallible;
+
+    fn found(start: f64, f: impl Fn(f64) -> f64) -> f64 {
+        let crossing = Crossing {
+            bounds: (-5.0, 5.0),
+            step: 0.1,
+            exact: 1e-9,
+        };
+        let Ok((x, _)) = crossing.from::<Infallible>(start, |x| Ok(f(x)));
+        x
+    }
+
+    #[test]
+    fn a_crossing_is_found_from_either_side_and_a_bound_where_there_is_none() {
+        let falling = |x: f64| (-x).exp() - 2.0;
+        for start in [-4.0, 0.0, 4.0] {
+            assert!((found(start, falling) + std::f64::consts::LN_2).abs() < 1e-8);
+        }
+        assert_eq!(
+            (found(0.0, |x| 9.0 - x), found(0.0, |x| -9.0 - x)),
+            (5.0, -5.0)
+        );
+        // it comes close to zero from above and never crosses
+        assert!(found(0.0, |x| (-20.0 * x).exp()) < 2.0);
+        // a step: the bracket closes on it
+        assert!((found(0.0, |x| if x < 1.25 { 1.0 } else { -1.0 }) - 1.25).abs() < 0.1);
+    }
 }

@@ -18,7 +18,7 @@ impl Shape {
     }
 
     /// Largest rate; reached in the middle.
-    pub(super) fn peak(self) -> f64 {
+    fn peak(self) -> f64 {
         1.0 / (1.0 - self.ramp)
     }
 

@@ -1,8 +1,6 @@
 use super::*;
-use crate::earth::radii;
-use crate::earth::{GravityModel, e_to_n, gravity_down, ned_difference};
-use crate::frames::RollPitchYaw;
-use crate::frames::wrap_angle;
+use crate::earth::{GravityModel, e_to_n, gravity_down, ned_difference, radii};
+use crate::frames::{RollPitchYaw, wrap_angle};
 use crate::units::{DEG, STANDARD_GRAVITY};
 use glam::DVec3;
 

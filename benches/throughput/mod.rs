@@ -3,29 +3,31 @@
 //! Eight runs of a consumer-grade IMU (N2 noise on six axes, 100 Hz) at rest, one second at a time: noise,
 //! prediction, one fix. What a second costs does not depend on what the vehicle does.
 
-use crate::earth::{GravityModel, gravity_down};
-use crate::ekf::{Belief, BeliefError, Ekf, FilterStates, Fix, InitialSettings, advance, update};
-use crate::frames::NavState;
-use crate::imu::ImuSample;
-use crate::lanes::{LANES, Lanes, Level, Vec3};
-use crate::noise::{
+use glam::{DQuat, DVec3};
+use nav_sim_navigation::earth::{GravityModel, gravity_down};
+use nav_sim_navigation::ekf::{
+    Belief, BeliefError, Ekf, FilterStates, Fix, InitialSettings, advance, update,
+};
+use nav_sim_navigation::frames::NavState;
+use nav_sim_navigation::lanes::{LANES, Lanes, Level, Vec3};
+use nav_sim_navigation::sensors::imu::{ErrorSource, ImuErrors, LaneErrors};
+use nav_sim_navigation::strapdown::Strapdown;
+use nav_sim_signal::imu::ImuSample;
+use nav_sim_signal::noise::{
     Ar1, Composite, Model, ParameterError, Process, Quantization, RandomWalk, White,
 };
-use crate::rng::StreamKey;
-use crate::sensors::imu::{ErrorSource, ImuErrors, LaneErrors};
-use crate::strapdown::Strapdown;
-use glam::{DQuat, DVec3};
+use nav_sim_signal::rng::StreamKey;
 
 /// IMU samples of one round.
-pub const SAMPLES: usize = 100;
+pub(crate) const SAMPLES: usize = 100;
 /// Run-epochs of one round: one IMU sample of one run each.
-pub const RUN_EPOCHS: usize = SAMPLES * LANES;
+pub(crate) const RUN_EPOCHS: usize = SAMPLES * LANES;
 
 /// The noise model of the load: N2, two AR1 + RW + WN + QN, at 100 Hz.
 ///
 /// # Errors
 /// None for these parameters.
-pub fn model() -> Result<Model, ParameterError> {
+pub(crate) fn model() -> Result<Model, ParameterError> {
     let axis = |scale: f64| -> Result<Composite, ParameterError> {
         Ok(Composite::new(vec![
             Process::White(White::new(scale * 5e-5)?),
@@ -40,7 +42,7 @@ pub fn model() -> Result<Model, ParameterError> {
 
 /// One batch of eight runs, a second at a time.
 #[derive(Debug, Clone)]
-pub struct Load<'a> {
+pub(crate) struct Load<'a> {
     ekf: Ekf,
     samples: [ImuSample; SAMPLES],
     errors: LaneErrors<'a>,
@@ -52,7 +54,11 @@ impl<'a> Load<'a> {
     ///
     /// # Errors
     /// When the model cannot be made into filter states.
-    pub fn new(model: &'a Model, states: FilterStates, level: Level) -> Result<Self, BeliefError> {
+    pub(crate) fn new(
+        model: &'a Model,
+        states: FilterStates,
+        level: Level,
+    ) -> Result<Self, BeliefError> {
         // Fixes at 1 Hz and the shortest window of the reduction, as in a default run.
         let belief = Belief::new(model, states, 1.0, 800.0)?;
         let start = NavState {
@@ -96,17 +102,17 @@ impl<'a> Load<'a> {
     }
 
     /// Draws the inertial errors of a second.
-    pub fn noise(&mut self) {
+    pub(crate) fn noise(&mut self) {
         self.errors.next(SAMPLES);
     }
 
     /// Predicts through a second: strapdown and covariance at the full rate.
-    pub fn filter(&mut self) {
+    pub(crate) fn filter(&mut self) {
         advance(&mut self.ekf, &self.samples, self.errors.drawn());
     }
 
     /// Uses a fix, position and velocity.
-    pub fn fix(&mut self) {
+    pub(crate) fn fix(&mut self) {
         update(&mut self.ekf, &self.fix);
     }
 }

@@ -8,9 +8,6 @@
 //! and random walk off the slopes of the Allan deviation instead (Guerrier, Molinari, Stebler 2016).
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
-use nav_sim::calibration::efficiency::{
-    Accuracy, Design, Estimate, Movement, Target, abnormal_curve, accuracy, outlier_curve, target,
-};
 use nav_sim::calibration::{Estimator, Trim, Weighting};
 use nav_sim::document::{Axis, Chart, Colour, Interval, Mark, Panel, Series, svg};
 use nav_sim::formats::contamination_file;
@@ -21,6 +18,12 @@ use rayon::prelude::*;
 use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
+use study::{
+    Accuracy, Design, Estimate, Movement, Target, abnormal_curve, accuracy, outlier_curve, target,
+};
+
+#[allow(unreachable_pub, reason = "shared with the tests")]
+pub(crate) mod study;
 
 type Failure = Box<dyn Error + Send + Sync>;
 
