@@ -1,7 +1,7 @@
 //! Wavelet-variance curves to fit: CSV with columns `tau_samples,wv,edof`, or the JSON that `calibrate` or `wv`
 //! writes (the classical curve of a signal is GMWM's, the robust one RGMWM's).
 
-use super::trajectory_file::table::{Numbers, Table};
+use super::table::{Asked, Dictionary, Numbers, Quantity, parse as parse_table};
 use super::{FileError, Kind, Place, source};
 use crate::report::{CurvesFile, FittedCurve, SignalsFile};
 use nav_sim_signal::imu::{Axis, Sensor};
@@ -71,17 +71,31 @@ fn parse(path: &str, text: &str) -> Result<Vec<NamedCurve>, FileError> {
     Ok(curves)
 }
 
+/// Columns of a curve.
+static QUANTITIES: [Quantity; 3] = [
+    Quantity::number("tau_samples", &["tau_samples"]),
+    Quantity::number("wv", &["wv"]),
+    Quantity::number("edof", &["edof"]),
+];
+const DICTIONARY: Dictionary = Dictionary {
+    quantities: &QUANTITIES,
+    bare: &[],
+    array: &[],
+    numbers: Numbers::Finite,
+    advice: LAYOUT,
+    empty: "no rows in it",
+    bad_cell: |error, _| error,
+};
+
 fn csv(path: &str, text: &str) -> Result<NamedCurve, FileError> {
-    let table = Table::read(path, text.as_bytes(), None, Numbers::Finite)?;
-    let columns = table.named(["tau_samples", "wv", "edof"])?;
+    let table = parse_table(path, text, &DICTIONARY, &Asked::default())?;
+    let names = QUANTITIES.each_ref().map(|quantity| quantity.name);
+    table.require(names, &DICTIONARY)?;
     let mut curve = Curve::default();
-    for (line, row) in &table.rows {
-        push(
-            &mut curve,
-            path,
-            &Place::Line(*line),
-            columns.map(|column| row[column]),
-        )?;
+    for row in 0..table.rows() {
+        let place = Place::Line(table.lines.of(row));
+        let point = names.map(|name| table.get(name).map_or(f64::NAN, |column| column.si(row)));
+        push(&mut curve, path, &place, point)?;
     }
     Ok(NamedCurve {
         sensor: None,
@@ -298,7 +312,7 @@ mod tests {
         let head = "tau_samples,wv,edof\n";
         assert_eq!(
             message("tau,wv,edof\n2,1,1\n"),
-            "c.csv, line 1: no column is named \"tau_samples\""
+            "c.csv, line 1: unknown column \"tau\""
         );
         assert_eq!(
             message(&format!("{head}2,x,1\n")),

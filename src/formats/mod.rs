@@ -13,17 +13,17 @@ pub(crate) mod hash;
 pub(crate) mod input;
 pub mod logs;
 pub mod model_file;
-pub(crate) mod npy;
 #[cfg(feature = "parquet")]
 mod parquet_file;
 #[cfg(test)]
-mod properties;
+mod property_tests;
 pub mod recordings;
 pub(crate) mod run_directory;
 mod run_tables;
 pub(crate) mod scenario_file;
 pub(crate) mod source;
 pub(crate) mod suggest;
+pub(crate) mod table;
 pub(crate) mod table_files;
 pub(crate) mod toml_file;
 pub mod trajectory_file;

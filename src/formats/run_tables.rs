@@ -1,9 +1,60 @@
 //! `epochs.csv` and `runs.csv` of a run directory, read back.
 
 use super::FileError;
-use super::trajectory_file::table::{Numbers, Table};
+use super::table::{Asked, Column, Dictionary, Numbers, Quantity, Table, parse};
 use nav_sim_navigation::metrics::EpochRow;
 use nav_sim_navigation::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, RunRecord};
+use std::sync::LazyLock;
+
+/// Columns that are one number each.
+const SINGLE: [&str; 13] = [
+    "t_s",
+    "nees",
+    "coverage",
+    "run",
+    "diverged",
+    "nis_mean",
+    "fixes",
+    "nees_mean",
+    "outage",
+    "nees_end",
+    "log_density_end",
+    "horizontal_error_end_m",
+    "reconvergence_s",
+];
+/// Columns that are one number for each state.
+const OF_STATES: [&str; 6] = [
+    "asee_",
+    "rmse_",
+    "normalised_sq_",
+    "see_mean_",
+    "see_end_",
+    "error_end_",
+];
+
+static QUANTITIES: LazyLock<Vec<Quantity>> = LazyLock::new(|| {
+    let of_states = OF_STATES
+        .iter()
+        .flat_map(|prefix| REPORTED_NAMES.map(|name| format!("{prefix}{name}")));
+    let names = SINGLE.map(str::to_owned).into_iter().chain(of_states);
+    let named = |name: String| {
+        let stems: &[&str] = vec![&*name.leak()].leak();
+        Quantity::number(stems[0], stems)
+    };
+    names.map(named).collect()
+});
+
+fn dictionary() -> Dictionary {
+    Dictionary {
+        quantities: &QUANTITIES,
+        bare: &[],
+        array: &[],
+        numbers: Numbers::Missing,
+        advice: REPEAT,
+        empty: "no rows in it",
+        bad_cell: |error, _| error,
+    }
+}
 
 /// What to do about a damaged table.
 pub(super) const REPEAT: &str = "repeat the run, or put back its files";
@@ -13,9 +64,25 @@ pub(super) const REPEAT: &str = "repeat the run, or put back its files";
 /// # Errors
 /// A missing or doubled column, or a value that is not a finite number (unless no run is left at the epoch).
 pub(super) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, FileError> {
-    Table::read(path, text.as_bytes(), None, Numbers::Any)
-        .and_then(|t| epochs(&t))
-        .map_err(damaged)
+    let read = || -> Result<Vec<EpochRow>, FileError> {
+        let table = parse(path, text, &dictionary(), &Asked::default())?;
+        let [asee, rmse] = [states(&table, "asee_")?, states(&table, "rmse_")?];
+        let [t_s, nees, coverage] = named(&table, ["t_s", "nees", "coverage"])?;
+        let columns = [&asee[..], &rmse[..], &[nees, coverage]].concat();
+        let epoch = |row: usize| {
+            finite_or_lost(&table, row, &columns)?;
+            let [asee, rmse] = [asee, rmse].map(|columns| columns.map(|c| c.si(row)));
+            Ok(EpochRow {
+                t_s: t_s.si(row),
+                asee,
+                rmse,
+                nees: nees.si(row),
+                coverage: coverage.si(row),
+            })
+        };
+        (0..table.rows()).map(epoch).collect()
+    };
+    read().map_err(damaged)
 }
 
 /// Reads `runs.csv` back: a row for each outage of a run, or one that ends where outages begin.
@@ -23,32 +90,8 @@ pub(super) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, File
 /// # Errors
 /// A missing column or a value that is not a number.
 pub(super) fn parse_runs(path: &str, text: &str) -> Result<Vec<RunRecord>, FileError> {
-    Table::read(path, text.as_bytes(), None, Numbers::UpTo("outage"))
-        .and_then(|t| runs(&t))
-        .map_err(damaged)
-}
-
-fn epochs(table: &Table) -> Result<Vec<EpochRow>, FileError> {
-    let (asee, rmse) = (states(table, "asee_")?, states(table, "rmse_")?);
-    let [t_s, nees, coverage] = table.named(["t_s", "nees", "coverage"])?;
-    let columns: Vec<usize> = asee
-        .iter()
-        .chain(&rmse)
-        .copied()
-        .chain([nees, coverage])
-        .collect();
-    let epoch = |(line, row): &(u64, Vec<f64>)| {
-        finite_or_lost(table, *line, row, &columns)?;
-        let [asee, rmse] = [asee, rmse].map(|columns| columns.map(|column| row[column]));
-        Ok(EpochRow {
-            t_s: row[t_s],
-            asee,
-            rmse,
-            nees: row[nees],
-            coverage: row[coverage],
-        })
-    };
-    table.rows.iter().map(epoch).collect()
+    let table = parse(path, text, &dictionary(), &Asked::default());
+    table.and_then(|table| runs(&table)).map_err(damaged)
 }
 
 fn runs(table: &Table) -> Result<Vec<RunRecord>, FileError> {
@@ -67,67 +110,77 @@ fn runs(table: &Table) -> Result<Vec<RunRecord>, FileError> {
         "horizontal_error_end_m",
         "reconvergence_s",
     ];
-    let [run, diverged, nis, fixes, nees, coverage] = table.named(of_run)?;
-    let [outage, nees_end, log_density, horizontal, reconvergence] = table.named(of_outage)?;
+    let (of_run, of_outage) = (named(table, of_run)?, named(table, of_outage)?);
     let normalised = states(table, "normalised_sq_")?;
-    let ends = [
-        states(table, "see_mean_")?,
-        states(table, "see_end_")?,
-        states(table, "error_end_")?,
-    ];
+    let ends = ["see_mean_", "see_end_", "error_end_"].map(|prefix| states(table, prefix));
+    let [see_mean, see_end, error_end] = ends;
+    let ends = [see_mean?, see_end?, error_end?];
     let mut runs: Vec<RunRecord> = Vec::new();
-    for (_, row) in &table.rows {
-        let number = row[run] as u64;
-        if runs.last().is_none_or(|r| r.run != number) {
+    for row in 0..table.rows() {
+        let [run, diverged, nis, fixes, nees_mean, covered] = of_run.map(|c| c.si(row));
+        if runs.last().is_none_or(|r| r.run != run as u64) {
             runs.push(RunRecord {
-                run: number,
-                diverged: row[diverged] > 0.0,
+                run: run as u64,
+                diverged: diverged > 0.0,
                 outages: Vec::new(),
-                nis: (row[nis], row[fixes] as u64),
+                nis: (nis, fixes as u64),
                 rejected: 0, // known to the summary only
-                nees_mean: row[nees],
-                covered: row[coverage],
-                normalised_sq: normalised.map(|column| row[column]),
+                nees_mean,
+                covered,
+                normalised_sq: normalised.map(|column| column.si(row)),
                 horizontal_m: Vec::new(), // its quantiles are in fan.csv
             });
         }
-        let Some(last) = runs.last_mut().filter(|_| !row[outage].is_nan()) else {
+        let [
+            outage,
+            nees_end,
+            log_density_end,
+            horizontal_error_end_m,
+            reconvergence_s,
+        ] = of_outage.map(|c| c.si(row));
+        let Some(last) = runs.last_mut().filter(|_| !outage.is_nan()) else {
             continue;
         };
-        let [see_mean, see_end, error_end] = ends.map(|columns| columns.map(|column| row[column]));
+        let [see_mean, see_end, error_end] = ends.map(|columns| columns.map(|c| c.si(row)));
         last.outages.push(OutageRecord {
             see_mean,
             see_end,
-            nees_end: row[nees_end],
-            log_density_end: row[log_density],
+            nees_end,
+            log_density_end,
             error_end,
-            horizontal_error_end_m: row[horizontal],
-            reconvergence_s: row[reconvergence],
+            horizontal_error_end_m,
+            reconvergence_s,
         });
     }
     Ok(runs)
 }
 
-fn states(table: &Table, prefix: &str) -> Result<[usize; REPORTED], FileError> {
-    table.named(
-        REPORTED_NAMES
-            .map(|n| format!("{prefix}{n}"))
-            .each_ref()
-            .map(String::as_str),
-    )
+fn named<'a, const N: usize>(
+    table: &'a Table,
+    names: [&str; N],
+) -> Result<[&'a Column; N], FileError> {
+    table.require(names, &dictionary())?;
+    table.all(names).ok_or_else(|| table.refused(REPEAT))
+}
+
+fn states<'a>(table: &'a Table, prefix: &str) -> Result<[&'a Column; REPORTED], FileError> {
+    let names = REPORTED_NAMES.map(|name| format!("{prefix}{name}"));
+    named(table, names.each_ref().map(String::as_str))
 }
 
 /// Refuses a row of an epoch in which some values are finite and others not. Where no run is left, all are NaN.
-fn finite_or_lost(
-    table: &Table,
-    line: u64,
-    row: &[f64],
-    columns: &[usize],
-) -> Result<(), FileError> {
-    let is_lost = columns.iter().all(|column| row[*column].is_nan());
-    match columns.iter().find(|column| !row[**column].is_finite()) {
+fn finite_or_lost(table: &Table, row: usize, columns: &[&Column]) -> Result<(), FileError> {
+    let is_lost = columns.iter().all(|column| column.si(row).is_nan());
+    match columns.iter().find(|column| !column.si(row).is_finite()) {
         Some(column) if !is_lost => {
-            Err(table.cell(line, *column, &row[*column].to_string(), "is not finite"))
+            let (line, value) = (table.lines.of(row), column.si(row).to_string());
+            Err(FileError::cell(
+                &table.path,
+                line,
+                &column.name,
+                value,
+                "is not finite",
+            ))
         }
         _ => Ok(()),
     }
@@ -190,7 +243,7 @@ mod tests {
             parse_epochs("e.csv", &text.replacen("rmse_yaw_deg", "rmse_yow_deg", 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "e.csv, line 1: no column is named \"rmse_yaw_deg\""
+            "e.csv, line 1: unknown column \"rmse_yow_deg\""
         );
         let broken: String = text
             .lines()

@@ -1,5 +1,6 @@
 //! Where inputs are opened: what can be read once only is kept, what has no end is refused.
 
+use super::FileError;
 use flate2::read::MultiGzDecoder;
 use std::collections::HashMap;
 use std::fs::File;
@@ -143,6 +144,19 @@ impl<R: BufRead> Read for Unpacked<R> {
         }
         Ok(filled)
     }
+}
+
+/// The whole text of a table, unpacked when its name ends in `.gz`; what is not UTF-8 in it (a degree sign of another
+/// encoding) is replaced.
+///
+/// # Errors
+/// When the system refuses.
+pub(crate) fn table_text(path: &Path) -> Result<String, FileError> {
+    let mut bytes = Vec::new();
+    table(path)
+        .and_then(|mut reader| reader.read_to_end(&mut bytes))
+        .map_err(|e| FileError::io(path, e))?;
+    Ok(without_mark(String::from_utf8_lossy(&bytes).into_owned()))
 }
 
 /// A text of at most 64 MiB.

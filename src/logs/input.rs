@@ -183,7 +183,6 @@ impl Input {
     }
 
     /// The bytes from here on, as many as there are or so many.
-    #[cfg(feature = "npz")]
     pub(crate) fn take(self, bytes: u64) -> impl Read {
         self.source.take(bytes)
     }

@@ -37,6 +37,7 @@ mod error;
 mod channel;
 mod input;
 // L3
+pub mod npy;
 #[cfg(feature = "npz")]
 pub mod npz;
 mod stream;

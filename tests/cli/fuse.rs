@@ -319,7 +319,7 @@ fn bad_fixes_are_refused_by_line_and_value() {
         gnss,
         cell(9, 3, "NaN"),
         "",
-        &["line 9: column \"h_m\": NaN is not finite"],
+        &["line 9: column \"h_m\": \"NaN\" is not finite"],
     );
     refused(
         gnss,

@@ -1,12 +1,12 @@
 //! Recorded GNSS fixes.
 
 use super::nmea::{self, is_nmea};
-use super::rtklib::{self, is_rtklib};
-use super::{Remark, bare_columns, log, table, time_back};
-use crate::formats::trajectory_file::columns::{Column, Columns, Known, Unit};
-use crate::formats::trajectory_file::table::{Table, text};
-use crate::formats::{FileError as Error, Place, Setting, logs};
+use super::rtklib::{self, is_rtklib, of_unix};
+use super::{Remark, time_back};
+use crate::formats::table::{self, Asked, Column, Dictionary, Numbers, Quantity, Table};
+use crate::formats::{FileError as Error, Place, Setting, logs, source};
 use glam::{DMat3, DVec3};
+use nav_sim_logs::{Clock, Fix, Stamp};
 use nav_sim_navigation::earth::{A, MAX_LATITUDE, ecef_to_geodetic, geodetic_to_ecef};
 use nav_sim_navigation::frames::q_e_n;
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
@@ -15,27 +15,17 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 /// Seconds of a GNSS week.
-pub(super) const WEEK_S: f64 = 604_800.0;
+pub(in crate::formats) const WEEK_S: f64 = 604_800.0;
 /// Faster than this from one fix to the next is no motion (m/s).
 const MAX_SPEED: f64 = 8000.0;
 
-/// Quantities of fixes, as a KF-GINS text has them; a deviation up is one down.
-static KNOWN: [Known; 20] = [
-    Known::new(
-        "t_s",
-        &["t", "time", "timestamp", "tow", "sow"],
-        Unit::Time,
-        true,
-    ),
-    Known::new("lat_deg", &["lat", "latitude"], Unit::Angle, true),
-    Known::new("lon_deg", &["lon", "lng", "longitude"], Unit::Angle, true),
-    Known::new(
-        "h_m",
-        &["h", "height", "alt", "altitude"],
-        Unit::Length,
-        true,
-    ),
-    Known::new(
+/// Quantities of fixes; a deviation up is one down.
+static QUANTITIES: [Quantity; 20] = [
+    Quantity::time(&["t", "time", "timestamp", "tow", "sow"]),
+    Quantity::angle("lat_deg", &["lat", "latitude"]),
+    Quantity::angle("lon_deg", &["lon", "lng", "longitude"]),
+    Quantity::length("h_m", &["h", "height", "alt", "altitude"]),
+    Quantity::length(
         "sd_n_m",
         &[
             "sd_n",
@@ -45,16 +35,12 @@ static KNOWN: [Known; 20] = [
             "sd_north",
             "sd_lat",
         ],
-        Unit::Length,
-        true,
     ),
-    Known::new(
+    Quantity::length(
         "sd_e_m",
         &["sd_e", "std_e", "sigma_e", "pos_std_e", "sd_east", "sd_lon"],
-        Unit::Length,
-        true,
     ),
-    Known::new(
+    Quantity::length(
         "sd_d_m",
         &[
             "sd_d",
@@ -65,229 +51,173 @@ static KNOWN: [Known; 20] = [
             "std_u",
             "sd_h",
         ],
-        Unit::Length,
-        true,
     ),
-    Known::new("v_n_m_s", &["v_n", "vn"], Unit::Speed, true),
-    Known::new("v_e_m_s", &["v_e", "ve"], Unit::Speed, true),
-    Known::new("v_d_m_s", &["v_d", "vd"], Unit::Speed, true),
-    Known::new(
-        "sd_vn_m_s",
-        &["sd_vn", "sd_v_n", "vel_std_n"],
-        Unit::Speed,
-        true,
-    ),
-    Known::new(
-        "sd_ve_m_s",
-        &["sd_ve", "sd_v_e", "vel_std_e"],
-        Unit::Speed,
-        true,
-    ),
-    Known::new(
-        "sd_vd_m_s",
-        &["sd_vd", "sd_v_d", "vel_std_d"],
-        Unit::Speed,
-        true,
-    ),
-    Known::new("week", &["week", "gps_week"], Unit::Count, true),
-    Known::new(
-        "x_m",
-        &["x", "x_ecef", "ecef_x", "pos_x"],
-        Unit::Length,
-        true,
-    ),
-    Known::new(
-        "y_m",
-        &["y", "y_ecef", "ecef_y", "pos_y"],
-        Unit::Length,
-        true,
-    ),
-    Known::new(
-        "z_m",
-        &["z", "z_ecef", "ecef_z", "pos_z"],
-        Unit::Length,
-        true,
-    ),
-    Known::new(
-        "sd_x_m",
-        &["sd_x", "sdx", "std_x", "sigma_x"],
-        Unit::Length,
-        true,
-    ),
-    Known::new(
-        "sd_y_m",
-        &["sd_y", "sdy", "std_y", "sigma_y"],
-        Unit::Length,
-        true,
-    ),
-    Known::new(
-        "sd_z_m",
-        &["sd_z", "sdz", "std_z", "sigma_z"],
-        Unit::Length,
-        true,
-    ),
+    Quantity::speed("v_n_m_s", &["v_n", "vn"]),
+    Quantity::speed("v_e_m_s", &["v_e", "ve"]),
+    Quantity::speed("v_d_m_s", &["v_d", "vd"]),
+    Quantity::speed("sd_vn_m_s", &["sd_vn", "sd_v_n", "vel_std_n"]),
+    Quantity::speed("sd_ve_m_s", &["sd_ve", "sd_v_e", "vel_std_e"]),
+    Quantity::speed("sd_vd_m_s", &["sd_vd", "sd_v_d", "vel_std_d"]),
+    Quantity::number("week", &["week", "gps_week"]),
+    Quantity::length("x_m", &["x", "x_ecef", "ecef_x", "pos_x"]),
+    Quantity::length("y_m", &["y", "y_ecef", "ecef_y", "pos_y"]),
+    Quantity::length("z_m", &["z", "z_ecef", "ecef_z", "pos_z"]),
+    Quantity::length("sd_x_m", &["sd_x", "sdx", "std_x", "sigma_x"]),
+    Quantity::length("sd_y_m", &["sd_y", "sdy", "std_y", "sigma_y"]),
+    Quantity::length("sd_z_m", &["sd_z", "sdz", "std_z", "sigma_z"]),
 ];
-const PLACE: [&str; 4] = ["t_s", "lat_deg", "lon_deg", "h_m"];
+const PLACE: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
 const PLACE_SIGMA: [&str; 3] = ["sd_n_m", "sd_e_m", "sd_d_m"];
 /// The same in the Earth's axes.
-const PLACE_E: [&str; 4] = ["t_s", "x_m", "y_m", "z_m"];
+const PLACE_E: [&str; 3] = ["x_m", "y_m", "z_m"];
 const PLACE_SIGMA_E: [&str; 3] = ["sd_x_m", "sd_y_m", "sd_z_m"];
 const VELOCITY: [&str; 3] = ["v_n_m_s", "v_e_m_s", "v_d_m_s"];
 const VELOCITY_SIGMA: [&str; 3] = ["sd_vn_m_s", "sd_ve_m_s", "sd_vd_m_s"];
-/// Columns of a text without a header, with positions alone.
-pub(super) const POSITION: usize = 7;
 
-/// Columns of such files.
-pub(super) const COLUMNS: &str = "columns: t_s, lat_deg, lon_deg, h_m (or x_m, y_m, z_m), sd_n_m, sd_e_m, sd_d_m; with velocity v_n_m_s … and sd_vn_m_s …";
-
-/// Axes of three columns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Axes {
-    /// Latitude, longitude, height; north, east, down.
-    Local,
-    /// The Earth's x, y, z.
-    Earth,
-}
+/// Dictionary of fixes. Texts without a header are those of KF-GINS.
+const DICTIONARY: Dictionary = Dictionary {
+    quantities: &QUANTITIES,
+    bare: &[
+        &[
+            "t_s", "lat_deg", "lon_deg", "h_m", "sd_n_m", "sd_e_m", "sd_d_m",
+        ],
+        &[
+            "t_s",
+            "lat_deg",
+            "lon_deg",
+            "h_m",
+            "v_n_m_s",
+            "v_e_m_s",
+            "v_d_m_s",
+            "sd_n_m",
+            "sd_e_m",
+            "sd_d_m",
+            "sd_vn_m_s",
+            "sd_ve_m_s",
+            "sd_vd_m_s",
+        ],
+    ],
+    array: &[],
+    numbers: Numbers::Finite,
+    advice: "columns: t_s, lat_deg, lon_deg, h_m (or x_m, y_m, z_m), sd_n_m, sd_e_m, sd_d_m; with velocity v_n_m_s … and \
+             sd_vn_m_s …; without a header, as KF-GINS has it, 7 of them (t_s, latitude, longitude, height, three deviations) \
+             or 13 (velocity behind the height)",
+    empty: "no rows in it",
+    bad_cell: |error, _| error.advice_instead("remove the row: a fix that is not whole is no fix"),
+};
 
 /// Columns of each quantity; standard deviations may be given for the whole file.
 struct FixColumns<'a> {
-    place: ([Column; 4], Axes),
-    place_sigma: Option<([Column; 3], Axes)>,
-    velocity: Option<[Column; 3]>,
-    velocity_sigma: Option<[Column; 3]>,
-    week: Option<Column>,
+    table: &'a Table,
+    time: &'a Column,
+    place: [&'a Column; 3],
+    /// Whether the place, and its deviations, are in the Earth's axes.
+    is_earth: [bool; 2],
+    place_sigma: Option<[&'a Column; 3]>,
+    velocity: Option<[&'a Column; 3]>,
+    velocity_sigma: Option<[&'a Column; 3]>,
     unsaid: Option<&'a FixSigma>,
 }
 
 impl<'a> FixColumns<'a> {
-    /// Finds them; also the names of those that are not used. Position and its deviations are needed; velocity and its
-    /// deviations come together or not at all.
-    fn new(table: &Table, unsaid: Option<&'a FixSigma>) -> Result<(Self, Vec<String>), Error> {
-        let columns = Columns::new(table, &KNOWN)?;
-        let any = |names: [&str; 3]| names.into_iter().any(|name| columns.has(name));
+    /// Finds them. Position and its deviations are needed; velocity and its deviations come together or not at all.
+    fn new(table: &'a Table, unsaid: Option<&'a FixSigma>) -> Result<Self, Error> {
+        let any = |names: [&str; 3]| names.into_iter().any(|name| table.has(name));
         // what is missing in all of a position or velocity may be given for the whole file
         let is_given = |names: [&str; 3], given: bool| given && !any(names);
-        let in_earth = |names: [&str; 3], local: &str| any(names) && !columns.has(local);
-        let (place, axes) = match in_earth(["x_m", "y_m", "z_m"], "lat_deg") {
-            true => (PLACE_E, Axes::Earth),
-            false => (PLACE, Axes::Local),
+        let is_earth = [
+            any(PLACE_E) && !table.has(PLACE[0]),
+            any(PLACE_SIGMA_E) && !table.has(PLACE_SIGMA[0]),
+        ];
+        let place = if is_earth[0] { PLACE_E } else { PLACE };
+        let place_sigma = if is_earth[1] {
+            PLACE_SIGMA_E
+        } else {
+            PLACE_SIGMA
         };
-        let (place_sigma, sigma_axes) = match in_earth(PLACE_SIGMA_E, "sd_n_m") {
-            true => (PLACE_SIGMA_E, Axes::Earth),
-            false => (PLACE_SIGMA, Axes::Local),
-        };
-        let mut needed = place.to_vec();
+        let has_velocity = any(VELOCITY) || any(VELOCITY_SIGMA);
+        let own = ["t_s"].into_iter().chain(place);
+        let own = own.chain(VELOCITY.into_iter().filter(|_| has_velocity));
+        table.require(own, &DICTIONARY)?;
+        let mut sigmas = Vec::new();
         if !is_given(place_sigma, unsaid.is_some()) {
-            needed.extend(place_sigma);
+            sigmas.extend(place_sigma);
         }
-        if any(VELOCITY) || any(VELOCITY_SIGMA) {
-            needed.extend(VELOCITY);
-            if !is_given(
-                VELOCITY_SIGMA,
-                unsaid.is_some_and(|sigma| sigma.vel_m_s.is_some()),
-            ) {
-                needed.extend(VELOCITY_SIGMA);
-            }
+        let is_velocity_given = unsaid.is_some_and(|sigma| sigma.vel_m_s.is_some());
+        if has_velocity && !is_given(VELOCITY_SIGMA, is_velocity_given) {
+            sigmas.extend(VELOCITY_SIGMA);
         }
-        let is_sigma = |name: &&'static str| name.starts_with("sd_");
-        columns.require(
-            table,
-            needed.iter().copied().filter(|name| !is_sigma(name)),
-            COLUMNS,
-        )?;
         // a receiver's log that has all but these
-        columns
-            .require(table, needed, COLUMNS)
-            .map_err(|e| e.setting(Setting::FixSigma))?;
-        let [Some(t), Some(a), Some(b), Some(c)] = place.map(|name| columns.get(name)) else {
-            return Err(Error::contents(
-                table.path.as_str(),
-                table.header_line,
-                COLUMNS,
-            ));
-        };
-        let found = Self {
-            place: ([t, a, b, c], axes),
-            place_sigma: columns.three(place_sigma).map(|three| (three, sigma_axes)),
-            velocity: columns.three(VELOCITY),
-            velocity_sigma: columns.three(VELOCITY_SIGMA),
-            week: columns.get("week"),
+        let found = table.require(sigmas, &DICTIONARY);
+        found.map_err(|e| e.setting(Setting::FixSigma))?;
+        let lost = || table.refused(DICTIONARY.advice);
+        Ok(Self {
+            table,
+            time: table.get("t_s").ok_or_else(lost)?,
+            place: table.all(place).ok_or_else(lost)?,
+            is_earth,
+            place_sigma: table.all(place_sigma),
+            velocity: table.all(VELOCITY),
+            velocity_sigma: table.all(VELOCITY_SIGMA),
             unsaid,
-        };
-        Ok((found, columns.ignored))
+        })
     }
 
     /// Standard deviations that are not of the file, and columns that are not used.
-    fn remarks(&self, ignored: &[String]) -> Vec<Remark> {
+    fn remarks(&self) -> Vec<Remark> {
         let mut remarks = Vec::new();
         if self.place_sigma.is_none() || self.velocity.is_some() && self.velocity_sigma.is_none() {
             remarks.push(Remark::note("standard deviations as given for all fixes"));
         }
+        let ignored = &self.table.ignored;
         if !ignored.is_empty() {
-            remarks.push(Remark::note(format!(
-                "columns not used: {}",
-                ignored.join(", ")
-            )));
+            let text = format!("columns not used: {}", ignored.join(", "));
+            remarks.push(Remark::note(text));
         }
         remarks
     }
 
-    fn fix(&self, row: &[f64]) -> GnssFix {
-        let triad = |columns: [Column; 3]| DVec3::from(columns.map(|column| column.of(row)));
-        let sigma = |columns: Option<[Column; 3]>, given: Option<[f64; 3]>| {
-            columns
-                .map(triad)
-                .or(given.map(DVec3::from))
-                .unwrap_or(DVec3::NAN)
+    fn fix(&self, row: usize) -> GnssFix {
+        let triad = |columns: [&Column; 3]| DVec3::from(columns.map(|column| column.si(row)));
+        let place = triad(self.place);
+        let (lat, lon, h) = match self.is_earth[0] {
+            false => (place.x, place.y, place.z),
+            true => ecef_to_geodetic(place),
         };
-        let [t_s, a, b, c] = self.place.0.map(|column| column.of(row));
-        let (lat, lon, h) = match self.place.1 {
-            Axes::Local => (a, b, c),
-            Axes::Earth => ecef_to_geodetic(DVec3::new(a, b, c)),
-        };
-        let stated = self.place_sigma.map(|(columns, axes)| match axes {
-            Axes::Local => triad(columns),
-            Axes::Earth => sigma_of_earth(lat, lon, triad(columns)),
+        let stated = self.place_sigma.map(|columns| match self.is_earth[1] {
+            false => triad(columns),
+            true => sigma_of_earth(lat, lon, triad(columns)),
         });
-        let velocity_sigma = || sigma(self.velocity_sigma, self.unsaid.and_then(|s| s.vel_m_s));
+        let given = self.unsaid.map(|s| DVec3::from(s.pos_m));
+        let velocity = |columns| {
+            let given = self.unsaid.and_then(|s| s.vel_m_s).map(DVec3::from);
+            let sigma = self.velocity_sigma.map(triad).or(given);
+            GnssVelocity::new(triad(columns), sigma.unwrap_or(DVec3::NAN))
+        };
+        let weeks = self.table.get("week").map_or(0.0, |week| week.si(row));
         GnssFix {
-            t_s: t_s + self.week.map_or(0.0, |week| week.of(row)) * WEEK_S,
+            t_s: self.time.si(row) + weeks * WEEK_S,
             lat,
             lon,
             h,
-            pos_sigma_n: stated
-                .or(self.unsaid.map(|s| s.pos_m.into()))
-                .unwrap_or(DVec3::NAN),
-            velocity: self
-                .velocity
-                .map(|columns| GnssVelocity::new(triad(columns), velocity_sigma())),
+            pos_sigma_n: stated.or(given).unwrap_or(DVec3::NAN),
+            velocity: self.velocity.map(velocity),
         }
     }
 
-    fn check(&self, table: &Table, line: u64, row: &[f64]) -> Result<(), Error> {
-        let refuse = |column: Column, reason, advice| {
-            let name = &table.columns[column.index];
-            Err(Error::cell(
-                &table.path,
-                line,
-                name,
-                row[column.index].to_string(),
-                reason,
-            )
-            .advice(advice))
+    fn check(&self, row: usize, fix: &GnssFix) -> Result<(), Error> {
+        let refuse = |column: &Column, reason, advice| {
+            let (line, value) = (self.table.lines.of(row), column.values[row].to_string());
+            Err(Error::cell(&self.table.path, line, &column.name, value, reason).advice(advice))
         };
         const DEGREES: &str = "latitude within ±89.9, longitude in (−180, 180] or [0, 360), in degrees (or lat_rad, lon_rad)";
-        let ([_, first, second, third], axes) = self.place;
-        let fix = self.fix(row);
-        if axes == Axes::Earth {
-            let r_e = DVec3::new(first.of(row), second.of(row), third.of(row));
+        let [first, second, _] = self.place;
+        if self.is_earth[0] {
+            let r_e = DVec3::from(self.place.map(|column| column.si(row)));
             if (r_e.length() - A).abs() > BEYOND_EARTH_M {
+                let reason = "is not a place near the surface of the Earth";
                 let advice = "the Earth's x, y, z in metres, 6.4e6 from its centre";
-                return refuse(
-                    first,
-                    "is not a place near the surface of the Earth",
-                    advice,
-                );
+                return refuse(first, reason, advice);
             }
         } else if fix.lat.abs() > 90.0 * DEG {
             return refuse(first, "is not a latitude", DEGREES);
@@ -295,28 +225,16 @@ impl<'a> FixColumns<'a> {
             return refuse(second, "is not a longitude", DEGREES);
         }
         if fix.lat.abs() > MAX_LATITUDE {
-            return refuse(
-                first,
-                "is too near a pole to navigate in latitude and longitude",
-                DEGREES,
-            );
+            let reason = "is too near a pole to navigate in latitude and longitude";
+            return refuse(first, reason, DEGREES);
         }
-        let of_place = self.place_sigma.map(|(columns, _)| columns);
-        let sigmas = [of_place, self.velocity_sigma]
-            .into_iter()
-            .flatten()
-            .flatten();
-        match sigmas.into_iter().find(|column| column.of(row) <= 0.0) {
-            Some(column) => {
-                let advice = "a fix needs the standard deviations its receiver believes; remove rows without";
-                refuse(
-                    column,
-                    "is not a standard deviation: it must be above 0",
-                    advice,
-                )
-            }
-            None => Ok(()),
-        }
+        let sigmas = [self.place_sigma, self.velocity_sigma].into_iter();
+        let is_none = |column: &&Column| column.si(row) <= 0.0;
+        sigmas.flatten().flatten().find(is_none).map_or(Ok(()), |column| {
+            let reason = "is not a standard deviation: it must be above 0";
+            let advice = "a fix needs the standard deviations its receiver believes; remove rows without";
+            refuse(column, reason, advice)
+        })
     }
 }
 
@@ -336,17 +254,6 @@ fn sigma_of_earth(lat: f64, lon: f64, sigma_e: DVec3) -> DVec3 {
     (variance * squared(sigma_e)).powf(0.5)
 }
 
-/// A file of fixes that is not read, told by its first characters.
-fn of_another_kind(path: &str, text: &str) -> Option<Error> {
-    let text = text.trim_start();
-    let error = || {
-        Error::contents(path, 1_u64, "XML, as GPX and KML are, not a table of fixes").advice(
-            "write its points as a table t_s, lat_deg, lon_deg, h_m on the clock of the IMU",
-        )
-    };
-    text.starts_with('<').then(error)
-}
-
 /// Reads fixes: a table with a header, or the text of KF-GINS (time, latitude, longitude (deg), height (m),
 /// standard deviations north, east, down (m); or with velocity behind the height and its deviations behind
 /// those), a solution of RTKLIB, NMEA sentences, a log (of several topics, `topic`). `unsaid` are the standard deviations where the file states none, `clock_s` when
@@ -362,32 +269,27 @@ pub(crate) fn read_gnss(
 ) -> Result<(Vec<GnssFix>, Vec<Remark>), Error> {
     let shown = path.display().to_string();
     let (fixes, remarks) = match logs::kind_of(path) {
-        Some(_) => log::fixes(path, (unsaid, topic), clock_s)?,
-        None => of_text(path, text(path)?, unsaid, clock_s)?,
+        Some(_) => of_log(path, (unsaid, topic), clock_s)?,
+        None => {
+            let text = source::table_text(path)?;
+            if text.trim_start().starts_with('<') {
+                let message = "XML, as GPX and KML are, not a table of fixes";
+                return Err(Error::contents(shown, 1_u64, message).advice(
+                    "write its points as a table t_s, lat_deg, lon_deg, h_m on the clock of the IMU",
+                ));
+            }
+            match is_nmea(&text) {
+                true => nmea::fixes(&shown, &text, unsaid, clock_s)?,
+                false => of_table(&shown, text, unsaid, clock_s)?,
+            }
+        }
     };
     for pair in fixes.windows(2) {
         check_step(&shown, pair[1].0, &pair[0].1, &pair[1].1)?;
     }
     let fixes = fixes.into_iter().map(|(_, fix)| fix).collect();
-    Ok((
-        fixes,
-        remarks.into_iter().map(|r| r.of_file(&shown)).collect(),
-    ))
-}
-
-/// The fixes of a text: sentences or a table.
-fn of_text(
-    path: &Path,
-    text: String,
-    unsaid: Option<&FixSigma>,
-    clock_s: Option<(f64, f64)>,
-) -> Result<Fixes, Error> {
-    let shown = path.display().to_string();
-    match of_another_kind(&shown, &text) {
-        Some(error) => Err(error),
-        None if is_nmea(&text) => nmea::fixes(&shown, &text, unsaid, clock_s),
-        None => of_table(path, text, (unsaid, clock_s)),
-    }
+    let remarks = remarks.into_iter().map(|r| r.of_file(&shown));
+    Ok((fixes, remarks.collect()))
 }
 
 /// Fixes with their lines, and remarks.
@@ -395,22 +297,21 @@ pub(super) type Fixes = (Vec<(u64, GnssFix)>, Vec<Remark>);
 
 /// The fixes of a table, of KF-GINS or of RTKLIB.
 fn of_table(
-    path: &Path,
+    shown: &str,
     mut text: String,
-    (unsaid, clock_s): (Option<&FixSigma>, Option<(f64, f64)>),
+    unsaid: Option<&FixSigma>,
+    clock_s: Option<(f64, f64)>,
 ) -> Result<Fixes, Error> {
     let mut remarks = Vec::new();
     let is_rtklib = is_rtklib(&text);
     if is_rtklib {
-        let (table, remark) = rtklib::rows(&path.display().to_string(), &text, clock_s)?;
+        let (table, remark) = rtklib::rows(shown, &text, clock_s)?;
         (text, remarks) = (table, vec![Remark::note(remark)]);
     }
-    let bare = bare_columns(&text);
-    let names = bare.map(|columns| bare_names(path, columns)).transpose()?;
-    let table = table(path, &text, names.as_deref())?;
-    let (columns, ignored) = FixColumns::new(&table, unsaid)?;
-    if bare.is_some() && !is_rtklib {
-        let velocity = if columns.velocity.is_some() {
+    let table = table::parse(shown, &text, &DICTIONARY, &Asked::default())?;
+    let columns = FixColumns::new(&table, unsaid)?;
+    if table.is_bare && !is_rtklib {
+        let velocity = if table.has(VELOCITY[0]) {
             ", velocity"
         } else {
             ""
@@ -419,11 +320,13 @@ fn of_table(
             format!("no header: read as KF-GINS text, position{velocity} and standard deviations");
         remarks.push(Remark::note(text));
     }
-    remarks.extend(columns.remarks(&ignored));
-    let mut fixes = Vec::with_capacity(table.rows.len());
-    for (line, row) in &table.rows {
-        columns.check(&table, *line, row)?;
-        fixes.push((*line, columns.fix(row)));
+    remarks.extend(columns.remarks());
+    remarks.extend(table.assumptions.iter().map(Remark::note));
+    let mut fixes = Vec::with_capacity(table.rows());
+    for row in 0..table.rows() {
+        let fix = columns.fix(row);
+        columns.check(row, &fix)?;
+        fixes.push((table.lines.of(row), fix));
     }
     let small =
         |(_, f): &(u64, GnssFix)| f.lat.abs() <= 0.5 * PI * DEG && f.lon.abs() <= 2.0 * PI * DEG;
@@ -434,21 +337,64 @@ fn of_table(
     Ok((fixes, remarks))
 }
 
-/// The columns of a KF-GINS text, which has no header.
-fn bare_names(path: &Path, columns: usize) -> Result<Vec<&'static str>, Error> {
-    let velocity = if columns == 13 { &VELOCITY[..] } else { &[] };
-    let velocity_sigma = if columns == 13 {
-        &VELOCITY_SIGMA[..]
-    } else {
-        &[]
-    };
-    if columns == POSITION || columns == 13 {
-        return Ok([&PLACE, velocity, &PLACE_SIGMA, velocity_sigma].concat());
+/// Reads fixes of a topic, of several; `unsaid` are the standard deviations where the log states none, `imu_s` is when the IMU
+/// begins and ends.
+///
+/// # Errors
+/// When the log is damaged, has no fixes, or states no standard deviations where none are given.
+fn of_log(
+    path: &Path,
+    (unsaid, topic): (Option<&FixSigma>, Option<&str>),
+    imu_s: Option<(f64, f64)>,
+) -> Result<Fixes, Error> {
+    let refused = |e| logs::refused(path, e);
+    let log = logs::open(path)?;
+    let mut read = log.fixes(topic, Stamp::default()).map_err(refused)?;
+    let mut fixes = Vec::new();
+    for (row, fix) in read.by_ref().enumerate() {
+        let fix = in_radians(&fix.map_err(refused)?, unsaid).ok_or_else(|| {
+            let message = "the fixes have no standard deviations";
+            Error::contents(path.display().to_string(), Place::Within, message)
+                .setting(Setting::FixSigma)
+        })?;
+        fixes.push((row as u64 + 1, fix));
     }
-    let message = format!("{columns} columns without a header");
-    Err(Error::contents(path.display().to_string(), Place::Within, message).advice(
-        "KF-GINS: 7 columns (t_s, latitude, longitude, height, three deviations), or 13 (with velocity behind the height)",
-    ))
+    let mut said = format!("fixes of {}", read.topic());
+    let is_dated = log
+        .channels()
+        .iter()
+        .any(|c| c.topic == read.topic() && c.clock == Clock::Unix);
+    let span_s = fixes
+        .first()
+        .zip(fixes.last())
+        .map(|((_, first), (_, last))| (first.t_s, last.t_s));
+    if let Some(clock) = span_s
+        .filter(|_| is_dated)
+        .and_then(|span_s| of_unix(span_s, imu_s))
+    {
+        fixes
+            .iter_mut()
+            .for_each(|(_, fix)| fix.t_s -= clock.origin_s);
+        said = format!("{said}, in {}", clock.name);
+    }
+    let cut = read.damage().or(log.damage()).map(logs::cut_off);
+    let remarks = cut.map(Remark::doubt).into_iter();
+    Ok((fixes, remarks.chain([Remark::note(said)]).collect()))
+}
+
+/// The same fix with angles in radians; none without standard deviations.
+fn in_radians(fix: &Fix, unsaid: Option<&FixSigma>) -> Option<GnssFix> {
+    let pos_sigma_n = fix.sd_ned_m.or(unsaid.map(|sigma| sigma.pos_m))?;
+    let velocity_sigma = fix.sd_v_ned_m_s.or(unsaid.and_then(|sigma| sigma.vel_m_s));
+    let velocity = fix.v_ned_m_s.zip(velocity_sigma);
+    Some(GnssFix {
+        t_s: fix.t_s(),
+        lat: fix.lat_deg * DEG,
+        lon: fix.lon_deg * DEG,
+        h: fix.h_m,
+        pos_sigma_n: DVec3::from(pos_sigma_n),
+        velocity: velocity.map(|(v, sigma)| GnssVelocity::new(v.into(), sigma.into())),
+    })
 }
 
 fn check_step(path: &str, line: u64, before: &GnssFix, fix: &GnssFix) -> Result<(), Error> {
@@ -515,5 +461,18 @@ mod tests {
             e.contains("column \"X\": 6378.2 is not a place near the surface"),
             "{e}"
         );
+    }
+
+    /// The sums are those of the independent writer of the file (`src/logs/tests/data/expected.csv`), in degrees and metres.
+    #[test]
+    fn fixes_of_a_log_are_those_of_its_writer() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/logs/tests/data/ros2_zstd.mcap");
+        let (fixes, _) = of_log(&path, (None, None), None).unwrap();
+        let sum = |of: fn(&GnssFix) -> f64| fixes.iter().map(|(_, fix)| of(fix)).sum::<f64>();
+        assert_eq!(fixes.len(), 4);
+        assert!((sum(|f| f.lat) / DEG - 186.000_007_999_999_98).abs() < 1e-11);
+        assert!((sum(|f| f.lon) / DEG - 26.399_984).abs() < 1e-11);
+        assert!((sum(|f| f.h) - 1_601.022_578_849_756).abs() < 1e-9);
+        assert!((sum(|f| f.pos_sigma_n.z) - 4.8).abs() < 1e-12);
     }
 }

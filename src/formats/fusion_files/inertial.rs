@@ -1,14 +1,11 @@
 //! Recorded IMU data.
 
-use super::{Remark, bare_columns, table, time_back};
+use super::{Remark, time_back};
 use crate::formats::logs::LogOptions;
-use crate::formats::recordings::checks::{check_gravity, gravity_factor};
-use crate::formats::recordings::header::{Role, Unit};
-use crate::formats::recordings::time_unit::unit_of_step;
-use crate::formats::recordings::timing::median_step;
-use crate::formats::recordings::{self, Raw, ReadOptions};
-use crate::formats::trajectory_file::table::text;
-use crate::formats::{FileError as Error, Place, logs};
+use crate::formats::recordings::timing::{median_step, unit_of_step};
+use crate::formats::recordings::{self, ReadOptions, check_gravity, gravity_factor};
+use crate::formats::table::{Column, Dictionary};
+use crate::formats::{FileError as Error, Place};
 use glam::DVec3;
 use nav_sim_navigation::fusion::gap::{LONGEST_S, bridged};
 use nav_sim_navigation::strapdown::MAX_ROTATION;
@@ -44,6 +41,35 @@ struct Columns {
     remarks: Vec<Remark>,
 }
 
+/// Dictionary of recordings under way. Texts without a header are those of KF-GINS, with or without an odometer.
+const DICTIONARY: Dictionary = Dictionary {
+    bare: &[
+        &[
+            "t_s",
+            "dtheta_x_rad",
+            "dtheta_y_rad",
+            "dtheta_z_rad",
+            "dv_x_m_s",
+            "dv_y_m_s",
+            "dv_z_m_s",
+        ],
+        &[
+            "t_s",
+            "dtheta_x_rad",
+            "dtheta_y_rad",
+            "dtheta_z_rad",
+            "dv_x_m_s",
+            "dv_y_m_s",
+            "dv_z_m_s",
+            "odometer_m_s",
+        ],
+    ],
+    advice: "columns: t_s, gyro_x_rad_s … accel_z_m_s2 (rates) or t_s, dtheta_x_rad … dv_z_m_s (increments); without a header, \
+             as KF-GINS has it, 7 of them (t_s, dtheta_x, dtheta_y, dtheta_z in rad, dv_x, dv_y, dv_z in m/s), or 8 with an \
+             odometer",
+    ..recordings::DICTIONARY
+};
+
 /// Reads a recording: a table whose headers are those of static recordings (rates, or increments over the
 /// interval that ends at the time given), or the text of KF-GINS: time, three angle increments (rad), three
 /// velocity increments (m/s), and perhaps an odometer's speed, which is left. `names` are those of the columns of a file
@@ -56,148 +82,55 @@ pub(crate) fn read_imu(
     names: Option<&[String]>,
     topic: Option<&str>,
 ) -> Result<ImuFile, Error> {
-    let ends_in = |ending: &str| {
-        path.extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case(ending))
-    };
-    let packed =
-        ends_in("npy") || ends_in("parquet") || path.is_dir() || logs::kind_of(path).is_some();
-    let text = if packed || names.is_some() {
-        None
-    } else {
-        Some(text(path)?)
-    };
-    let columns = match text
-        .as_ref()
-        .and_then(|text| Some((text, bare_columns(text)?)))
-    {
-        Some((text, 7..=8)) => kf_gins(path, text)?,
-        Some((_, columns)) => {
-            let message = format!("{columns} columns without a header");
-            return Err(
-                Error::contents(path.display().to_string(), Place::Within, message).advice(KF_GINS),
-            );
-        }
-        None => headed(path, names, topic)?,
-    };
-    columns.increments()
-}
-
-/// A text without a header.
-const KF_GINS: &str = "KF-GINS: 7 columns (t_s, dtheta_x, dtheta_y, dtheta_z in rad, dv_x, dv_y, dv_z in m/s), or 8 with an odometer";
-
-fn kf_gins(path: &Path, text: &str) -> Result<Columns, Error> {
-    const NAMES: [&str; 8] = [
-        "t_s",
-        "dtheta_x_rad",
-        "dtheta_y_rad",
-        "dtheta_z_rad",
-        "dv_x_m_s",
-        "dv_y_m_s",
-        "dv_z_m_s",
-        "odometer_m_s",
-    ];
-    let columns = bare_columns(text).unwrap_or(7);
-    let table = table(path, text, Some(&NAMES[..columns]))?;
-    let odometer = if columns > 7 {
-        "; the odometer's speed in column 8 is not used"
-    } else {
-        ""
-    };
-    Ok(Columns {
-        path: table.path,
-        t_s: table.rows.iter().map(|(_, r)| r[0]).collect(),
-        values: table
-            .rows
-            .iter()
-            .map(|(_, r)| [r[4], r[5], r[6], r[1], r[2], r[3]])
-            .collect(),
-        increments: [true; 2],
-        lines: table.rows.iter().map(|(line, _)| *line).collect(),
-        remarks: vec![Remark::note(format!(
-            "no header: read as KF-GINS text, angle then velocity increments{odometer}"
-        ))],
-    })
-}
-
-fn headed(path: &Path, names: Option<&[String]>, topic: Option<&str>) -> Result<Columns, Error> {
-    let columns = names.map(<[String]>::to_vec);
-    let log = LogOptions {
-        topic: topic.map(str::to_owned),
-        ..LogOptions::default()
-    };
     let options = ReadOptions {
-        columns,
-        log,
+        columns: names.map(<[String]>::to_vec),
+        log: LogOptions {
+            topic: topic.map(str::to_owned),
+            ..LogOptions::default()
+        },
         ..ReadOptions::default()
     };
-    let mut raw = recordings::load(path, &options)?;
-    let shown = raw.path.clone();
-    let from_gravity = gravity_factor(&raw)?;
-    let mut signals = Vec::new();
-    for channel in Channel::ALL {
-        let (role, values) = take(
-            &mut raw,
-            |role| matches!(role, Role::Signal { channel: c, .. } if *c == channel),
-        )
-        .ok_or_else(|| {
-            lacking(
-                &shown,
-                &format!("channel {channel} is missing; all six are needed"),
-            )
-        })?;
-        let (factor, increment) = match role {
-            Role::Signal {
-                unit: Unit::Si(factor),
-                ..
-            } => (factor, false),
-            Role::Signal {
-                unit: Unit::Increment(factor),
-                ..
-            } => (factor, true),
-            _ => (from_gravity, false),
-        };
-        signals.push((values, factor, increment));
-    }
-    let t_s = times(&mut raw)?;
-    let notes = std::mem::take(&mut raw.notes);
-    let assumed = notes.assumptions.into_iter().map(Remark::note);
-    let remarks = assumed
-        .chain(notes.warnings.into_iter().map(Remark::doubt))
-        .collect();
-    let sample = |k: usize| std::array::from_fn(|i| signals[i].0[k] * signals[i].1);
-    Ok(Columns {
-        values: (0..t_s.len()).map(sample).collect(),
-        increments: [signals[0].2, signals[3].2],
-        lines: (0..t_s.len()).map(|k| raw.lines.of(k)).collect(),
-        remarks,
-        path: shown,
-        t_s,
-    })
-}
-
-/// A recording without a signal or a clock that is needed.
-fn lacking(path: &str, message: &str) -> Error {
-    Error::contents(path, Place::Within, message).advice(
-        "columns: t_s, gyro_x_rad_s … accel_z_m_s2 (rates) or t_s, dtheta_x_rad … dv_z_m_s (increments)",
-    )
-}
-
-/// The first column of such a role, with its numbers.
-fn take(raw: &mut Raw, is_wanted: impl Fn(&Role) -> bool) -> Option<(Role, Vec<f64>)> {
-    let index = raw.columns.iter().position(|c| is_wanted(&c.role))?;
-    let column = raw.columns.swap_remove(index);
-    Some((column.role, column.values))
-}
-
-fn times(raw: &mut Raw) -> Result<Vec<f64>, Error> {
-    let found = take(raw, |role| matches!(role, Role::Time { .. }));
-    let (role, values) = found.ok_or_else(|| lacking(&raw.path, "no time column"))?;
-    let unit = match role {
-        Role::Time { unit_s: Some(unit) } => unit,
-        _ => unit_of_step(median_step(&values)).0,
+    let table = recordings::load(path, &options, &DICTIONARY)?;
+    let lacking = |message: String| {
+        Error::contents(table.path.as_str(), Place::Within, message).advice(DICTIONARY.advice)
     };
-    Ok(values.iter().map(|t| t * unit).collect())
+    let signals = Channel::ALL.map(|channel| channel.to_string());
+    if let Some(missing) = signals.iter().find(|name| !table.has(name)) {
+        let message = format!("channel {missing} is missing; all six are needed");
+        return Err(lacking(message));
+    }
+    let signals: Vec<&Column> = signals.iter().filter_map(|name| table.get(name)).collect();
+    let time = table
+        .get("t_s")
+        .ok_or_else(|| lacking("no time column".to_owned()))?;
+    let unit_s = |values| unit_of_step(median_step(values)).0;
+    let unit_s = time.factor.unwrap_or_else(|| unit_s(&time.values));
+    let from_gravity = gravity_factor(&table)?;
+    let value =
+        |column: &Column, k: usize| column.values[k] * column.factor.unwrap_or(from_gravity);
+    let rows = 0..table.rows();
+    let mut remarks: Vec<Remark> = table.assumptions.iter().map(Remark::note).collect();
+    remarks.extend(table.warnings.iter().map(Remark::doubt));
+    if table.is_bare {
+        let odometer = match table.ignored.is_empty() {
+            true => "",
+            false => "; the odometer's speed in column 8 is not used",
+        };
+        let text = "no header: read as KF-GINS text, angle then velocity increments";
+        remarks.push(Remark::note(format!("{text}{odometer}")));
+    }
+    let columns = Columns {
+        t_s: time.values.iter().map(|t| t * unit_s).collect(),
+        values: rows
+            .clone()
+            .map(|k| std::array::from_fn(|i| value(signals[i], k)))
+            .collect(),
+        increments: [0, 3].map(|i| signals[i].quantity.per_sample),
+        lines: rows.map(|k| table.lines.of(k)).collect(),
+        remarks,
+        path: table.path.clone(),
+    };
+    columns.increments()
 }
 
 impl Columns {

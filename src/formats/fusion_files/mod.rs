@@ -4,11 +4,11 @@
 mod fixes;
 mod inertial;
 mod initial;
-mod log;
 mod nmea;
 mod rtklib;
 mod wheel;
 
+pub(in crate::formats) use fixes::WEEK_S;
 pub(crate) use fixes::read_gnss;
 pub(crate) use inertial::read_imu;
 pub(crate) use initial::{initial_schema, read_initial};
@@ -16,9 +16,7 @@ pub(in crate::formats) use nmea::is_nmea;
 pub(in crate::formats) use rtklib::is_rtklib;
 pub(crate) use wheel::read_wheel;
 
-use crate::formats::trajectory_file::table::{self, Numbers, Table};
-use crate::formats::{FileError, Kind};
-use std::path::Path;
+use crate::formats::FileError;
 
 /// What is said of a file that was read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -56,26 +54,6 @@ pub(super) fn bare_row(text: &str) -> Option<Vec<f64>> {
         .map(|cell| cell.parse().ok())
         .collect();
     row.filter(|row| row.len() > 1)
-}
-
-/// How many columns such a table has.
-fn bare_columns(text: &str) -> Option<usize> {
-    bare_row(text).map(|row| row.len())
-}
-
-/// The table of a file, its columns named when it has no header.
-fn table(path: &Path, text: &str, columns: Option<&[&str]>) -> Result<Table, FileError> {
-    let read = Table::read(
-        &path.display().to_string(),
-        text.as_bytes(),
-        columns,
-        Numbers::Finite,
-    );
-    read.map_err(|e| match e.kind {
-        Kind::Header(_) | Kind::Empty(_) => e.advice_instead(fixes::COLUMNS),
-        Kind::Cell { .. } => e.advice_instead("remove the row: a fix that is not whole is no fix"),
-        _ => e,
-    })
 }
 
 /// Time that stands still or goes back.

@@ -1,138 +1,112 @@
 //! Recorded speeds of a wheel.
 
 use super::time_back;
-use crate::formats::recordings::header::{Role, classify, normalise, split_unit};
-use crate::formats::trajectory_file::table::{Numbers, Table, open};
-use crate::formats::{FileError as Error, Kind};
+use crate::formats::FileError as Error;
+use crate::formats::recordings::{OF_CLOCK, OF_RECEIVER, STAMP};
+use crate::formats::table::{
+    self, Asked, Bare, Column, Dictionary, NONE, Numbers, Quantity, SPEED, Table, normalised,
+};
 use nav_sim_navigation::fusion::WheelSpeed;
 use std::path::Path;
 
-/// Endings of columns and their size in m/s.
-const UNITS: &[(&[&str], f64)] = &[
-    (&["m_s", "mps", "m_s_1", "m_sec"], 1.0),
-    (&["km_h", "kmh", "kph", "kmph", "km_hr"], 1.0 / 3.6),
-    (&["mph", "mi_h"], 0.447_04),
+const fn of_words(name: &'static str, stems: &'static [&'static str]) -> Quantity {
+    Quantity {
+        of_words: true,
+        ..Quantity::new(name, stems, SPEED, Bare::Unknown)
+    }
+}
+
+/// Speeds by the words of their names, and what is no speed yet.
+static QUANTITIES: [Quantity; 6] = [
+    Quantity::time(OF_CLOCK),
+    Quantity::time(STAMP),
+    Quantity::time(OF_RECEIVER),
+    Quantity::new("t_s", &["timeus"], NONE, Bare::Is(1e-6)),
+    of_words(
+        COUNTS,
+        &[
+            "tick", "ticks", "count", "counts", "pulse", "pulses", "encoder", "rpm", "rad",
+        ],
+    ),
+    of_words(
+        "speed",
+        &[
+            "speed", "velocity", "vel", "v", "wheel", "wheels", "odometer", "odo", "forward",
+            "rear",
+        ],
+    ),
 ];
-/// Words of a speed's name.
-const SPEED: &[&str] = &[
-    "speed", "velocity", "vel", "v", "wheel", "wheels", "odometer", "odo", "forward", "rear",
-];
-/// Words of what is no speed yet.
-const COUNTS: &[&str] = &[
-    "tick", "ticks", "count", "counts", "pulse", "pulses", "encoder", "rpm", "rad",
-];
-const COLUMNS: &str = "columns: t_s and wheel_m_s (or wheel_km_h, wheel_mph), negative in reverse; or rear_left_m_s and rear_right_m_s";
+const COUNTS: &str = "counts";
+
+const DICTIONARY: Dictionary = Dictionary {
+    quantities: &QUANTITIES,
+    bare: &[],
+    array: &[],
+    numbers: Numbers::Finite,
+    advice: "columns: t_s and wheel_m_s (or wheel_km_h, wheel_mph), negative in reverse; or rear_left_m_s and rear_right_m_s",
+    empty: "no rows in it",
+    bad_cell: |error, _| error,
+};
 
 /// Reads speeds: a table with a time, and a speed or those of both rear wheels, whose mean is taken.
 ///
 /// # Errors
 /// Whatever is wrong with it, with its line.
 pub(crate) fn read_wheel(path: &Path) -> Result<Vec<WheelSpeed>, Error> {
-    let shown = path.display().to_string();
-    let table =
-        Table::read(&shown, open(path)?, None, Numbers::Finite).map_err(|e| match e.kind {
-            Kind::Header(_) | Kind::Empty(_) => e.advice_instead(COLUMNS),
-            _ => e,
-        })?;
-    let (time, unit_s) = time_column(&table)?;
+    let table = table::read(path, &DICTIONARY, &Asked::default())?;
+    let no_time = || table.refused("no time column").advice(DICTIONARY.advice);
+    let time = table.get("t_s").ok_or_else(no_time)?;
     let speeds = speed_columns(&table)?;
-    let speed = |row: &[f64]| {
-        speeds
-            .iter()
-            .map(|(i, factor)| row[*i] * factor)
-            .sum::<f64>()
-            / speeds.len() as f64
-    };
-    let read = table.rows.iter().map(|(_, row)| WheelSpeed {
-        t_s: row[time] * unit_s,
+    let speed = |row| speeds.iter().map(|c| c.si(row)).sum::<f64>() / speeds.len() as f64;
+    let rows = (0..table.rows()).map(|row| WheelSpeed {
+        t_s: time.si(row),
         m_s: speed(row),
     });
-    let read: Vec<WheelSpeed> = read.collect();
+    let read: Vec<WheelSpeed> = rows.collect();
     match read.windows(2).position(|w| w[1].t_s <= w[0].t_s) {
-        Some(k) => Err(time_back(
-            &shown,
-            table.rows[k + 1].0,
-            read[k].t_s,
-            read[k + 1].t_s,
-        )),
+        Some(k) => {
+            let line = table.lines.of(k + 1);
+            Err(time_back(&table.path, line, read[k].t_s, read[k + 1].t_s))
+        }
         None => Ok(read),
     }
 }
 
-fn refuse(table: &Table, message: impl Into<Box<str>>) -> Error {
-    Error::contents(table.path.as_str(), table.header_line, message)
-}
-
-/// The time, and the length of its unit (s).
-fn time_column(table: &Table) -> Result<(usize, f64), Error> {
-    let mut times =
-        table
-            .columns
-            .iter()
-            .enumerate()
-            .filter_map(|(i, name)| match classify(name, false) {
-                Some(Ok(Role::Time { unit_s })) => Some((i, unit_s.unwrap_or(1.0))),
-                _ => None,
-            });
-    times
-        .next()
-        .ok_or_else(|| refuse(table, "no time column").advice(COLUMNS))
-}
-
-/// A column that may be a speed.
-struct Candidate<'a> {
-    index: usize,
-    name: &'a str,
-    words: Vec<String>,
-    factor: Option<f64>,
-}
-
-/// The speed, or those of both rear wheels, with their factors to m/s.
-fn speed_columns(table: &Table) -> Result<Vec<(usize, f64)>, Error> {
-    let named = table.columns.iter().enumerate().map(|(index, name)| {
-        let plain = normalise(name);
-        let unit = split_unit(&plain, UNITS);
-        let words = unit
-            .map_or(plain.as_str(), |(stem, _)| stem)
-            .split('_')
-            .map(str::to_owned)
-            .collect();
-        Candidate {
-            index,
-            name,
-            words,
-            factor: unit.map(|(_, factor)| factor),
+/// The speed, or those of both rear wheels.
+fn speed_columns(table: &Table) -> Result<Vec<&Column>, Error> {
+    let has = |c: &Column, word: &str| normalised(&c.name).split('_').any(|w| w == word);
+    let is_candidate = |c: &&Column| c.quantity.of_words && !has(c, "front");
+    let all: Vec<&Column> = table.columns.iter().filter(is_candidate).collect();
+    let rear = |side: &str| all.iter().find(|c| has(c, "rear") && has(c, side));
+    let chosen = match (rear("left"), rear("right"), &all[..]) {
+        (Some(left), Some(right), _) => vec![*left, *right],
+        (_, _, []) => {
+            let refusal = table.refused("no speed of a wheel");
+            return Err(refusal.advice(DICTIONARY.advice));
         }
-    });
-    let has =
-        |c: &Candidate<'_>, words: &[&str]| c.words.iter().any(|w| words.contains(&w.as_str()));
-    let all: Vec<_> = named
-        .filter(|c| has(c, SPEED) || has(c, COUNTS))
-        .filter(|c| !has(c, &["front"]))
-        .collect();
-    let rear = |side: &str| all.iter().find(|c| has(c, &["rear"]) && has(c, &[side]));
-    let chosen: Vec<&Candidate<'_>> = match (rear("left"), rear("right"), &all[..]) {
-        (Some(left), Some(right), _) => vec![left, right],
-        (_, _, []) => return Err(refuse(table, "no speed of a wheel").advice(COLUMNS)),
-        (_, _, [one]) => vec![one],
+        (_, _, [one]) => vec![*one],
         (_, _, many) => {
             let names: Vec<_> = many.iter().map(|c| format!("\"{}\"", c.name)).collect();
-            return Err(
-                refuse(table, format!("several speeds: {}", names.join(", ")))
-                    .advice("keep one of them"),
-            );
+            let message = format!("several speeds: {}", names.join(", "));
+            return Err(table.refused(message).advice("keep one of them"));
         }
     };
-    let factor = |c: &&Candidate<'_>| {
-        let (name, is_counted) = (c.name, has(c, COUNTS));
-        c.factor.filter(|_| !is_counted).map(|factor| (c.index, factor)).ok_or_else(|| match is_counted {
-            true => refuse(table, format!("column \"{name}\" counts turns: a speed is needed"))
-                .advice("ticks over ticks a turn, over seconds, times the wheel's circumference: wheel_m_s"),
-            false => refuse(table, format!("column \"{name}\" has no unit of speed in its name"))
-                .advice("end its name in _m_s, _km_h or _mph"),
-        })
-    };
-    chosen.iter().map(factor).collect()
+    for column in &chosen {
+        let name = &column.name;
+        if column.quantity.name == COUNTS {
+            let message = format!("column \"{name}\" counts turns: a speed is needed");
+            return Err(table.refused(message).advice(
+                "ticks over ticks a turn, over seconds, times the wheel's circumference: wheel_m_s",
+            ));
+        }
+        if column.factor.is_none() {
+            let message = format!("column \"{name}\" has no unit of speed in its name");
+            return Err(table
+                .refused(message)
+                .advice("end its name in _m_s, _km_h or _mph"));
+        }
+    }
+    Ok(chosen)
 }
 
 #[cfg(test)]

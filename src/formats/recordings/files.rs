@@ -1,7 +1,6 @@
 //! Which files are meant: directories stand for the recordings in them.
 
-use super::error::{no_files, unreadable};
-use super::oxts::is_oxts;
+use crate::formats::table::{is_oxts, unreadable};
 use crate::formats::{FileError, Place};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -22,7 +21,11 @@ const ENDINGS: [&str; 10] = [
 pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, FileError> {
     let mut files = Vec::new();
     for path in paths {
-        let io = |source| unreadable(path, source);
+        let io = |e: std::io::Error| {
+            let is_missing = e.kind() == std::io::ErrorKind::NotFound;
+            let advice = "check the path; a directory stands for all its recordings";
+            unreadable(path, e).advice_if(is_missing.then(|| advice.to_owned()))
+        };
         if std::fs::metadata(path).map_err(io)?.is_dir() && !is_oxts(path) {
             let inside = listing(path).map_err(io)?;
             if inside.is_empty() {
@@ -65,6 +68,13 @@ pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, FileError> {
 /// When a path cannot be read, or one is given twice.
 pub(crate) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
     Ok(expand(paths)?.into_iter().map(|file| file.path).collect())
+}
+
+/// A directory without recordings.
+pub(super) fn no_files(path: String) -> FileError {
+    FileError::contents(path, Place::Within, "no recordings in it").advice(
+        "recordings end in .csv, .tsv, .txt (also .gz), .npy, .npz, .mcap, .bag, .ulg or .ubx",
+    )
 }
 
 fn listing(directory: &Path) -> std::io::Result<Vec<PathBuf>> {

@@ -1,7 +1,7 @@
 //! What was found in the files, for the user to check.
 
-use super::header::{Role, Unit};
-use super::table::{Column, Raw};
+use super::channel_of;
+use crate::formats::table::{Column, Table};
 use crate::report::six_digits;
 use nav_sim_signal::imu::{Channel, Sensor};
 use std::fmt;
@@ -94,35 +94,20 @@ pub(super) fn name_of(file: &str, index: usize, count: usize) -> String {
 }
 
 impl FileReport {
-    pub(super) fn new(raw: &Raw) -> Self {
-        let signal = |c: &Column| match c.role {
-            Role::Signal { channel, .. } => Some((c.name.clone(), channel)),
-            _ => None,
-        };
-        let columns = raw.columns.iter().filter_map(signal).collect();
-        let mut report = Self {
-            file: raw.path.clone(),
-            columns,
-            ignored: raw.ignored.clone(),
-            assumptions: raw.notes.assumptions.clone(),
-            warnings: raw.notes.warnings.clone(),
-            ..Self::default()
-        };
-        let increments = |c: &Column| {
-            matches!(
-                c.role,
-                Role::Signal {
-                    unit: Unit::Increment(_),
-                    ..
-                }
-            )
-        };
-        if raw.columns.iter().any(increments) {
-            report
-                .assumptions
-                .push("increments divided by the sample interval".into());
+    pub(super) fn new(raw: &Table) -> Self {
+        let signal = |c: &Column| Some((c.name.clone(), channel_of(c)?));
+        let mut assumptions = raw.assumptions.clone();
+        if raw.columns.iter().any(|c| c.quantity.per_sample) {
+            assumptions.push("increments divided by the sample interval".into());
         }
-        report
+        Self {
+            file: raw.path.clone(),
+            columns: raw.columns.iter().filter_map(signal).collect(),
+            ignored: raw.ignored.clone(),
+            assumptions,
+            warnings: raw.warnings.clone(),
+            ..Self::default()
+        }
     }
 
     /// The names of its recordings, with their samples: of several, such as stretches between gaps, `a.csv[1]`, …

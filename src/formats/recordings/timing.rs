@@ -1,11 +1,8 @@
-//! Sample rate, gaps and duplicates, from the time column or the packet counter.
+//! Sample rate, unit of time, gaps and duplicates, from the time column or the packet counter.
 
-use super::error::too_short;
-use super::header::Role;
-use super::options::{Gaps, ReadOptions};
 use super::report::FileReport;
-use super::table::{Column, Raw};
-use super::time_unit::{Guess, UNITS, USUAL_RATES_HZ};
+use super::{Gaps, ReadOptions, too_short};
+use crate::formats::table::{Column, Table};
 use crate::formats::{FileError, Place, Setting};
 use crate::report::six_digits;
 
@@ -21,7 +18,7 @@ pub(super) struct Timing {
 
 /// Finds the rate and checks the steps; frees the time column.
 pub(super) fn timing(
-    raw: &mut Raw,
+    raw: &mut Table,
     options: &ReadOptions,
     report: &mut FileReport,
 ) -> Result<Timing, FileError> {
@@ -32,17 +29,11 @@ pub(super) fn timing(
                 .setting(Setting::WrongRate),
         );
     }
-    let take = |raw: &mut Raw, wanted: fn(&Role) -> bool| {
-        let column = raw.columns.iter().position(|c| wanted(&c.role))?;
-        Some(raw.columns.swap_remove(column))
-    };
-    let time = take(raw, |r| matches!(r, Role::Time { .. }));
-    let counter = take(raw, |r| *r == Role::Counter);
-    let ticks = take(raw, |r| *r == Role::Ticks);
+    let [time, counter, ticks] = ["t_s", "counter", "ticks"].map(|clock| raw.take(clock));
     let known = options
         .rate_hz
         .map(|rate_hz| (rate_hz, "given"))
-        .or(raw.head_rate);
+        .or(raw.rate_hz);
     if time.is_none() && ticks.is_none() {
         agree(raw, options, report)?;
     }
@@ -90,8 +81,8 @@ pub(super) fn timing(
 }
 
 /// Refuses a rate that is given where the file, or the manifest beside it, states another.
-fn agree(raw: &Raw, options: &ReadOptions, report: &mut FileReport) -> Result<(), FileError> {
-    let Some((given, (stated, source))) = options.rate_hz.zip(raw.head_rate) else {
+fn agree(raw: &Table, options: &ReadOptions, report: &mut FileReport) -> Result<(), FileError> {
+    let Some((given, (stated, source))) = options.rate_hz.zip(raw.rate_hz) else {
         return Ok(());
     };
     let difference = (stated / given - 1.0).abs();
@@ -115,7 +106,7 @@ fn agree(raw: &Raw, options: &ReadOptions, report: &mut FileReport) -> Result<()
 fn doubt(
     timing: &Checked,
     column: &str,
-    raw: &Raw,
+    raw: &Table,
     options: &ReadOptions,
     report: &mut FileReport,
 ) {
@@ -195,10 +186,15 @@ struct Clock {
 }
 
 impl Clock {
-    fn of_time(column: Column, raw: &Raw, options: &ReadOptions, report: &mut FileReport) -> Self {
+    fn of_time(
+        column: Column,
+        raw: &Table,
+        options: &ReadOptions,
+        report: &mut FileReport,
+    ) -> Self {
         let (name, mut since) = (column.name, column.values);
         let first = since.first().copied().unwrap_or(0.0);
-        if let Some(week) = week_of(&since, column.role) {
+        if let Some(week) = week_of(&since, column.factor) {
             report.assumptions.push(format!(
                 "column \"{name}\" taken as time of the week, which starts again"
             ));
@@ -206,13 +202,11 @@ impl Clock {
         } else {
             since.iter_mut().for_each(|t| *t -= first);
         }
-        let unit_s = match column.role {
-            Role::Time { unit_s: Some(unit) } => unit,
-            _ => {
+        let unit_s = match column.factor {
+            Some(unit_s) => unit_s,
+            None => {
                 let step = step_of(&since, options.gaps);
-                let known = options
-                    .rate_hz
-                    .or(raw.head_rate.map(|(rate_hz, _)| rate_hz));
+                let known = options.rate_hz.or(raw.rate_hz.map(|(rate_hz, _)| rate_hz));
                 let guess = Guess::new(step, first, known);
                 if since.len() > 1 {
                     guess.tell(&name, step, report);
@@ -248,7 +242,7 @@ impl Clock {
         ((self.start + self.since[sample] * self.unit_s) * 1e9).round() / 1e9
     }
 
-    fn check(&self, raw: &Raw, options: &ReadOptions) -> Result<Checked, FileError> {
+    fn check(&self, raw: &Table, options: &ReadOptions) -> Result<Checked, FileError> {
         let steps = || self.since.windows(2).map(|w| w[1] - w[0]);
         let step_at = |i: usize| (raw.lines.of(i + 1), self.time_of(i), self.time_of(i + 1));
         if let Some(i) = steps().position(|s| s < 0.0) {
@@ -390,12 +384,8 @@ fn unwrap(values: &mut [f64], modulus: f64) {
 
 /// The length of a week, if that is where times start again: they lie in one, and fall by more than half of it. No two
 /// units have both.
-fn week_of(times: &[f64], role: Role) -> Option<f64> {
+fn week_of(times: &[f64], said: Option<f64>) -> Option<f64> {
     const WEEK_S: f64 = 604_800.0;
-    let said = match role {
-        Role::Time { unit_s } => unit_s,
-        _ => None,
-    };
     let units = UNITS
         .iter()
         .map(|(unit_s, _)| *unit_s)
@@ -482,4 +472,98 @@ fn drift(times: &[f64]) -> Option<[f64; 2]> {
     // A stamp at either end of a tenth may be late by as much as the longest step.
     let allowed = DISAGREEING + 2.0 * longest / (means[0].min(means[1]) * tenth as f64);
     ((means[1] / means[0]).ln().abs() > allowed).then_some(means)
+}
+
+/// Rates beyond these are looked at twice (Hz).
+const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 0.5..=20_000.0;
+
+/// The units of time and their length (s).
+const UNITS: [(f64, &str); 4] = [(1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")];
+
+/// Unix time of the years 2000 to 2100 (s): in no two units of a thousand are the numbers of these the same.
+const UNIX_S: std::ops::Range<f64> = 9.4e8..4.2e9;
+
+/// The unit in which a step is that of 10 Hz … 10 kHz: the four ranges do not overlap.
+pub(in crate::formats) fn unit_of_step(step: f64) -> (f64, &'static str) {
+    UNITS[match step {
+        s if s >= 1e5 => 3,
+        s if s >= 100.0 => 2,
+        s if s > 0.1 => 1,
+        _ => 0,
+    }]
+}
+
+/// The unit that is assumed.
+struct Guess {
+    unit_s: f64,
+    word: &'static str,
+    /// Other units in which the step would be that of an IMU too.
+    others: Vec<(f64, &'static str)>,
+}
+
+impl Guess {
+    /// From the step, the first time and a rate that is known otherwise (Hz).
+    fn new(step: f64, first: f64, known_hz: Option<f64>) -> Self {
+        let usual = |(unit_s, _): &(f64, &str)| USUAL_RATES_HZ.contains(&(1.0 / (step * unit_s)));
+        let plausible: Vec<(f64, &str)> = UNITS.into_iter().filter(usual).collect();
+        if let Some(rate_hz) = known_hz.filter(|_| step > 0.0) {
+            // The units are thousands apart: the nearest ratio is the one that is meant.
+            let apart = |(unit_s, _): &(f64, &str)| (rate_hz * step * unit_s).ln().abs();
+            let nearest = UNITS
+                .into_iter()
+                .min_by(|a, b| apart(a).total_cmp(&apart(b)));
+            let (unit_s, word) = nearest.unwrap_or(UNITS[0]);
+            return Self {
+                unit_s,
+                word,
+                others: Vec::new(),
+            };
+        }
+        if let Some(&(unit_s, word)) = plausible
+            .iter()
+            .find(|(unit_s, _)| UNIX_S.contains(&(first * unit_s)))
+        {
+            return Self {
+                unit_s,
+                word,
+                others: Vec::new(),
+            };
+        }
+        let (unit_s, word) = unit_of_step(step);
+        let others = plausible
+            .into_iter()
+            .filter(|(_, other)| *other != word)
+            .collect();
+        Self {
+            unit_s,
+            word,
+            others,
+        }
+    }
+
+    /// Tells what is assumed, and warns where it may as well be another unit.
+    fn tell(&self, column: &str, step: f64, report: &mut FileReport) {
+        let Self {
+            unit_s,
+            word,
+            others,
+        } = self;
+        report
+            .assumptions
+            .push(format!("column \"{column}\" taken as {word}"));
+        if !others.is_empty() {
+            let rate = |unit_s: &f64, word: &str| {
+                format!("{} Hz in {word}", six_digits(1.0 / (step * unit_s)))
+            };
+            let others: Vec<String> = others
+                .iter()
+                .map(|(unit_s, word)| rate(unit_s, word))
+                .collect();
+            report.warn(format!(
+                "column \"{column}\" has no unit: taken as {}, but it would be {}; name it t_s, t_ms, t_us or t_ns",
+                rate(unit_s, word),
+                others.join(", ")
+            ));
+        }
+    }
 }

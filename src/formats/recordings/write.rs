@@ -1,7 +1,7 @@
 //! Writing recordings.
 
-use super::header::column_name;
-use crate::formats::npy;
+use super::column_name;
+use crate::formats::table::write_npy_header;
 use flate2::{Compression, write::GzEncoder};
 use nav_sim_signal::imu::Channel;
 use std::io::{self, BufWriter, Write};
@@ -50,7 +50,7 @@ fn rows(signals: &[(Channel, Vec<f64>)]) -> usize {
 }
 
 fn write_csv(to: &mut impl Write, rate_hz: f64, signals: &[(Channel, Vec<f64>)]) -> io::Result<()> {
-    let names: Vec<String> = signals.iter().map(|(c, _)| column_name(*c)).collect();
+    let names: Vec<&str> = signals.iter().map(|(c, _)| column_name(*c)).collect();
     writeln!(to, "t_s,{}", names.join(","))?;
     let mut line = Vec::new();
     for k in 0..rows(signals) {
@@ -66,7 +66,7 @@ fn write_csv(to: &mut impl Write, rate_hz: f64, signals: &[(Channel, Vec<f64>)])
 }
 
 fn write_npy(to: &mut impl Write, signals: &[(Channel, Vec<f64>)]) -> io::Result<()> {
-    npy::write_header(to, rows(signals), signals.len())?;
+    write_npy_header(to, rows(signals), signals.len())?;
     for k in 0..rows(signals) {
         for (_, x) in signals {
             to.write_all(&x[k].to_le_bytes())?;

@@ -4,8 +4,7 @@
 //! namespace; comments, extensions and everything outside track points are passed over.
 
 use super::samples::{Attitude, Rows};
-use super::table::{Table, no_rows};
-use crate::formats::FileError as Error;
+use crate::formats::{FileError as Error, Kind, Place};
 use chrono::{DateTime, NaiveDateTime, Utc};
 use glam::DQuat;
 use nav_sim_navigation::trajectory::TrajectorySample;
@@ -18,17 +17,12 @@ const COLUMNS: [&str; 4] = ["time", "lat", "lon", "ele"];
 
 /// A GPX track; heading and pitch follow the path.
 pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
-    let table = Table::of_columns(path, &COLUMNS);
     let mut rows = Rows::new(path, Vec::new(), Vec::new(), Attitude::OfPath);
     let mut start = None;
     for Point { line, texts } in track_points(path, text)? {
         let absent = |column: usize| {
-            let error = table.cell(
-                line,
-                column,
-                "the track point",
-                "does not have it, or not as a number",
-            );
+            let reason = "does not have it, or not as a number";
+            let error = Error::cell(path, line, COLUMNS[column], "the track point", reason);
             error.advice(
                 "every <trkpt> needs lat, lon, <ele> and <time>: export them with the track",
             )
@@ -51,7 +45,11 @@ pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
         rows.samples.push(sample);
     }
     if rows.samples.is_empty() {
-        return Err(no_rows(path));
+        return Err(Error::new(
+            path,
+            Place::Within,
+            Kind::Empty("no rows in it"),
+        ));
     }
     rows.doubt(
         None,

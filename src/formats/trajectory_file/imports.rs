@@ -1,18 +1,24 @@
 //! Trajectories of other tools: KF-GINS results, TUM.
 
 use super::Options;
-use super::samples::{Attitude, Rows, local};
-use super::table::{Numbers, Table};
+use super::samples::{Attitude, Rows, dictionary, local, origin, rows};
 use crate::formats::FileError as Error;
+use crate::formats::table::{Asked, Column, Dictionary, Numbers, Quantity, Table, parse};
 use glam::{DQuat, DVec3};
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-/// Seconds of a GNSS week.
-const WEEK_S: f64 = 604_800.0;
+/// The table of a text without a header.
+fn bare(path: &str, text: &str, names: &[&str], dictionary: &Dictionary) -> Result<Table, Error> {
+    let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+    let asked = Asked {
+        names: Some(&names),
+        ..Asked::default()
+    };
+    parse(path, text, dictionary, &asked)
+}
 
 /// A KF-GINS navigation result or truth: week, seconds of week, latitude, longitude (deg), height (m), velocity
-/// north, east, down (m/s), roll, pitch, yaw (deg), between blanks. Read as our own table, time counted on
-/// from the first week.
+/// north, east, down (m/s), roll, pitch, yaw (deg), between blanks. Time is counted on from the first week.
 pub(super) fn kf_gins(
     path: &str,
     text: &str,
@@ -32,15 +38,24 @@ pub(super) fn kf_gins(
         "pitch_deg",
         "yaw_deg",
     ];
-    let mut table = Table::read(path, text.as_bytes(), Some(&names), numbers)?;
-    let first = table.rows[0].1[0];
-    for (_, row) in &mut table.rows {
-        let week = row.remove(0);
-        row[0] += (week - first) * WEEK_S;
-    }
-    table.columns.remove(0);
-    super::samples::rows(table, options, numbers)
+    rows(
+        bare(path, text, &names, &dictionary(numbers))?,
+        options,
+        numbers,
+    )
 }
+
+/// Quantities of a TUM file.
+static TUM: [Quantity; 8] = [
+    Quantity::time(&["t"]),
+    Quantity::number("x", &["x"]),
+    Quantity::number("y", &["y"]),
+    Quantity::number("z", &["z"]),
+    Quantity::number("qx", &["qx"]),
+    Quantity::number("qy", &["qy"]),
+    Quantity::number("qz", &["qz"]),
+    Quantity::number("qw", &["qw"]),
+];
 
 /// A TUM file: time, x, y, z (m), quaternion x, y, z, w, between blanks. The axes are taken as ROS has them
 /// (REP 103): position east, north, up of the origin; body forward, left, up.
@@ -50,35 +65,36 @@ pub(super) fn tum(
     options: &Options,
     numbers: Numbers,
 ) -> Result<Rows, Error> {
+    let dictionary = Dictionary {
+        quantities: &TUM,
+        ..dictionary(numbers)
+    };
     let names = ["t_s", "x", "y", "z", "qx", "qy", "qz", "qw"];
-    let mut table = Table::read(path, text.as_bytes(), Some(&names), numbers)?;
-    table
-        .rows
-        .retain(|(_, row)| row.iter().all(|x| x.is_finite()));
-    let origin = super::samples::origin(&table, options)?;
+    let mut table = bare(path, text, &names, &dictionary)?;
+    table.retain(|table, row| table.columns.iter().all(|c| c.values[row].is_finite()));
+    let origin = origin(&table, options)?;
     // East-north-up to north-east-down, front-right-down to front-left-up: half turns.
     let q_enu_ned = DQuat::from_xyzw(FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0, 0.0);
     let q_frd_flu = DQuat::from_rotation_x(PI);
-    let mut samples = Vec::with_capacity(table.rows.len());
-    for (line, row) in &table.rows {
-        let q_flu_enu = DQuat::from_xyzw(row[4], row[5], row[6], row[7]);
+    let mut samples = Vec::with_capacity(table.rows());
+    for row in 0..table.rows() {
+        let value = |column: &Column| column.si(row);
+        let all: Vec<f64> = table.columns.iter().map(value).collect();
+        let q_flu_enu = DQuat::from_slice(&all[4..]);
         if (q_flu_enu.length() - 1.0).abs() > 0.01 {
-            return Err(table.cell(
-                *line,
-                7,
-                &row[7].to_string(),
-                "does not make a unit quaternion with the others",
-            ));
+            let reason = "does not make a unit quaternion with the others";
+            let line = table.lines.of(row);
+            return Err(Error::cell(path, line, "qw", all[7].to_string(), reason));
         }
-        let r_ned = q_enu_ned * DVec3::new(row[1], row[2], row[3]);
+        let r_ned = q_enu_ned * DVec3::from_slice(&all[1..4]);
         samples.push(local(
-            row[0],
+            all[0],
             origin,
             r_ned,
             q_enu_ned * q_flu_enu * q_frd_flu,
         ));
     }
-    let lines = table.rows.iter().map(|(line, _)| *line).collect();
+    let lines = (0..table.rows()).map(|row| table.lines.of(row)).collect();
     let mut rows = Rows::new(path, lines, samples, Attitude::Given);
     rows.doubt(
         None,
@@ -90,6 +106,7 @@ pub(super) fn tum(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::formats::fusion_files::WEEK_S;
     use crate::formats::trajectory_file::Warning;
     use nav_sim_navigation::frames::RollPitchYaw;
     use nav_sim_navigation::trajectory::Trajectory;

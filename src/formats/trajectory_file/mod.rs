@@ -1,13 +1,11 @@
 //! Trajectory files: CSV, motion profiles (TOML), imports.
 
-pub(in crate::formats) mod columns;
 mod doubts;
 mod gpx;
 mod imports;
 mod profile;
 mod reference;
 mod samples;
-pub(in crate::formats) mod table;
 mod write;
 
 pub(crate) use profile::schema as profile_schema;
@@ -16,12 +14,12 @@ pub(crate) use write::Rows;
 pub(crate) use write::write_csv;
 pub(crate) use write::write_rows;
 
-use super::{FileError, Place};
+use super::table::{Asked, Numbers, parse as parse_text};
+use super::{FileError, Place, source};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_navigation::trajectory::reference::Reference;
 use std::fmt;
 use std::path::Path;
-use table::{Numbers, Table};
 
 /// How to read a trajectory file.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -95,7 +93,7 @@ fn parse(path: &Path, options: &Options, numbers: Numbers) -> Result<Parsed, Fil
     let name = path.display().to_string();
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
-    let text = || table::text(path);
+    let text = || source::table_text(path);
     let rows = match plain.rsplit_once('.').map_or("", |(_, ending)| ending) {
         "toml" => return Ok(Parsed::Profile(profile::load(path)?)),
         "nav" => imports::kf_gins(&name, &text()?, options, numbers),
@@ -117,11 +115,8 @@ fn parse_table(
     options: &Options,
     numbers: Numbers,
 ) -> Result<samples::Rows, FileError> {
-    samples::rows(
-        Table::read(name, text.as_bytes(), None, numbers)?,
-        options,
-        numbers,
-    )
+    let table = parse_text(name, text, &samples::dictionary(numbers), &Asked::default())?;
+    samples::rows(table, options, numbers)
 }
 
 #[cfg(test)]

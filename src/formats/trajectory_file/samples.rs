@@ -1,10 +1,10 @@
 //! From rows to a trajectory.
 
-use super::columns::{Column, Columns, Known, Unit};
 use super::doubts;
-use super::table::{COLUMNS, Numbers, Table};
 use super::{Options, Warning};
-use crate::formats::{FileError as Error, Kind, Place, Setting};
+use crate::formats::fusion_files::WEEK_S;
+use crate::formats::table::{Column, Dictionary, Numbers, Quantity, Table, normalised};
+use crate::formats::{FileError as Error, Place, Setting};
 use glam::{DQuat, DVec3};
 use nav_sim_navigation::earth::{e_to_n, ecef_to_geodetic, geodetic_to_ecef};
 use nav_sim_navigation::frames::{RollPitchYaw, q_e_n, wrap_angle};
@@ -23,34 +23,43 @@ pub(super) const MOVING: f64 = 0.5;
 const MAX_DURATION_S: f64 = 86_400.0;
 
 /// Quantities of a trajectory.
-static KNOWN: [Known; 15] = [
-    Known::new("t_s", &["t", "time", "timestamp"], Unit::Time, true),
-    Known::new("lat_deg", &["lat", "latitude"], Unit::Angle, true),
-    Known::new("lon_deg", &["lon", "lng", "longitude"], Unit::Angle, true),
-    Known::new(
-        "h_m",
-        &["h", "alt", "height", "altitude"],
-        Unit::Length,
-        true,
-    ),
-    Known::new("n_m", &["n", "north"], Unit::Length, false),
-    Known::new("e_m", &["e", "east"], Unit::Length, false),
-    Known::new("d_m", &["d", "down"], Unit::Length, false),
-    Known {
-        sign: -1.0,
-        ..Known::new("d_m", &["u", "up"], Unit::Length, false)
-    },
-    Known::new("roll_deg", &["roll"], Unit::Angle, true),
-    Known::new("pitch_deg", &["pitch"], Unit::Angle, true),
-    Known::new("yaw_deg", &["yaw", "heading", "azimuth"], Unit::Angle, true),
-    Known::new("v_n_m_s", &["v_n", "vn", "v_north"], Unit::Speed, false),
-    Known::new("v_e_m_s", &["v_e", "ve", "v_east"], Unit::Speed, false),
-    Known::new("v_d_m_s", &["v_d", "vd", "v_down"], Unit::Speed, false),
-    Known {
-        sign: -1.0,
-        ..Known::new("v_d_m_s", &["v_u", "v_up"], Unit::Speed, false)
-    },
+static QUANTITIES: [Quantity; 16] = [
+    Quantity::time(&["t", "time", "timestamp"]),
+    Quantity::number("week", &["week", "gps_week"]),
+    Quantity::angle("lat_deg", &["lat", "latitude"]),
+    Quantity::angle("lon_deg", &["lon", "lng", "longitude"]),
+    Quantity::length("h_m", &["h", "alt", "height", "altitude"]),
+    N,
+    E,
+    D,
+    D.reversed(&["u", "up"]),
+    Quantity::angle("roll_deg", &["roll"]),
+    Quantity::angle("pitch_deg", &["pitch"]),
+    Quantity::angle("yaw_deg", &["yaw", "heading", "azimuth"]),
+    Quantity::speed("v_n_m_s", &["v_n", "vn", "v_north"]).with_unit(),
+    Quantity::speed("v_e_m_s", &["v_e", "ve", "v_east"]).with_unit(),
+    V_D,
+    V_D.reversed(&["v_u", "v_up"]),
 ];
+const N: Quantity = Quantity::length("n_m", &["n", "north"]).with_unit();
+const E: Quantity = Quantity::length("e_m", &["e", "east"]).with_unit();
+const D: Quantity = Quantity::length("d_m", &["d", "down"]).with_unit();
+const V_D: Quantity = Quantity::speed("v_d_m_s", &["v_d", "vd", "v_down"]).with_unit();
+
+/// Dictionary of trajectories with such numbers.
+pub(super) const fn dictionary(numbers: Numbers) -> Dictionary {
+    Dictionary {
+        quantities: &QUANTITIES,
+        bare: &[],
+        array: &[],
+        numbers,
+        advice: "a trajectory has the columns t_s, lat_deg, lon_deg, h_m (or n_m, e_m, d_m) and may have roll_deg, pitch_deg, yaw_deg",
+        empty: "no rows in it",
+        bad_cell: |error, _| error,
+    }
+}
+const DEGREES: &str = "degrees: latitude within ±89.9, longitude and yaw in (−180, 180] or [0, 360), pitch within ±90";
+
 const GEODETIC: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
 const LOCAL: [&str; 3] = ["n_m", "e_m", "d_m"];
 const ATTITUDE: [&str; 3] = ["roll_deg", "pitch_deg", "yaw_deg"];
@@ -226,121 +235,106 @@ pub(super) fn no_trajectory(path: &str, line: u64, source: &trajectory::Error) -
 
 /// The rows of a table. Cells out of range are refused, or their rows left out where not every row is needed.
 pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Result<Rows, Error> {
-    let columns = Columns::new(&table, &KNOWN)?;
-    let any = |names: [&str; 3]| names.into_iter().any(|name| columns.has(name));
-    let is_local = any(LOCAL) && !columns.has("lat_deg");
+    let has_any = |names: [&str; 3]| names.into_iter().any(|name| table.has(name));
+    let is_local = has_any(LOCAL) && !table.has("lat_deg");
     let optional = [ATTITUDE, VELOCITY]
         .into_iter()
-        .filter(|names| any(*names))
-        .flatten();
+        .filter(|names| has_any(*names));
     let position = if is_local { LOCAL } else { GEODETIC };
-    columns.require(
-        &table,
-        ["t_s"].into_iter().chain(position).chain(optional),
-        COLUMNS,
-    )?;
-    check_units(&table, &columns)?;
-    let all = table.rows.len();
+    let needed = ["t_s"]
+        .into_iter()
+        .chain(position)
+        .chain(optional.flatten());
+    table.require(needed, &dictionary(numbers))?;
+    check_units(&table)?;
+    let all = table.rows();
     match numbers {
-        Numbers::Finite => check_ranges(&table, &columns)?,
-        Numbers::Any | Numbers::UpTo(_) => table.rows.retain(|row| {
-            row.1.iter().all(|x| x.is_finite()) && out_of_range(row, &columns).is_none()
+        Numbers::Finite => check_ranges(&table)?,
+        _ => table.retain(|table, row| {
+            table.columns.iter().all(|c| c.values[row].is_finite())
+                && out_of_range(table, row).is_none()
         }),
     }
-    let attitude = if any(ATTITUDE) {
-        Attitude::Given
-    } else {
-        Attitude::OfPath
+    let attitude = match table.has(ATTITUDE[0]) {
+        true => Attitude::Given,
+        false => Attitude::OfPath,
     };
-    let lines = table.rows.iter().map(|(line, _)| *line).collect();
-    let mut rows = Rows::new(
-        &table.path,
-        lines,
-        samples(&table, &columns, options)?,
-        attitude,
-    );
+    let lines = (0..table.rows()).map(|row| table.lines.of(row)).collect();
+    let samples = samples(&table, options)?;
+    let mut rows = Rows::new(&table.path, lines, samples, attitude);
     rows.geodetic = !is_local;
-    rows.velocities = columns.three(VELOCITY).map_or_else(Vec::new, |velocity| {
-        table
-            .rows
-            .iter()
-            .map(|(_, row)| triad(velocity, row))
-            .collect()
-    });
+    if let Some(velocity) = table.all(VELOCITY) {
+        rows.velocities = (0..table.rows()).map(|row| triad(velocity, row)).collect();
+    }
     if all > rows.lines.len() {
         let left_out = all - rows.lines.len();
+        let text = format!("{left_out} rows left out: values not finite, or out of range");
+        rows.doubt(None, text);
+    }
+    if !table.ignored.is_empty() {
         rows.doubt(
             None,
-            format!("{left_out} rows left out: values not finite, or out of range"),
+            format!("columns not used: {}", table.ignored.join(", ")),
         );
     }
-    if !columns.ignored.is_empty() {
-        rows.doubt(
-            None,
-            format!("columns not used: {}", columns.ignored.join(", ")),
-        );
+    for text in &table.assumptions {
+        rows.doubt(None, text);
     }
     if rows.attitude == Attitude::OfPath {
-        rows.doubt(
-            None,
-            "no attitude columns: heading and pitch follow the path, roll is 0",
-        );
+        let text = "no attitude columns: heading and pitch follow the path, roll is 0";
+        rows.doubt(None, text);
     }
     Ok(rows)
 }
 
 /// Refuses angles of the attitude without a unit in their names, of which none is too large for radians.
-fn check_units(table: &Table, columns: &Columns) -> Result<(), Error> {
-    let name = |column: Column| table.columns[column.index].to_lowercase();
-    let bare: Vec<Column> = (ATTITUDE
-        .into_iter()
-        .filter_map(|quantity| columns.get(quantity)))
-    .filter(|column| !name(*column).ends_with("deg") && !name(*column).ends_with("rad"))
-    .collect();
-    let values = || {
-        bare.iter()
-            .flat_map(|column| table.rows.iter().map(|(_, row)| row[column.index].abs()))
+fn check_units(table: &Table) -> Result<(), Error> {
+    let is_bare = |column: &&Column| {
+        let name = normalised(&column.name);
+        !name.ends_with("deg") && !name.ends_with("rad")
     };
-    let largest = values().filter(|x| x.is_finite()).fold(0.0, f64::max);
+    let attitude = ATTITUDE.into_iter().filter_map(|name| table.get(name));
+    let bare: Vec<&Column> = attitude.filter(is_bare).collect();
+    let values = bare.iter().flat_map(|column| &column.values);
+    let largest = values
+        .filter(|x| x.is_finite())
+        .fold(0.0, |most: f64, x| most.max(x.abs()));
     if largest == 0.0 || largest > TAU {
         return Ok(()); // alike in both units, or degrees
     }
-    let names: Vec<String> = bare.into_iter().map(name).collect();
-    let message = format!(
-        "the unit of {} is not in the name, and no value exceeds 2π",
-        names.join(", ")
-    );
-    Err(Error::new(
-        table.path.as_str(),
-        table.header_line,
-        Kind::Columns(message.into()),
-    )
-    .advice("end the names in _deg or _rad"))
+    let names: Vec<String> = bare
+        .iter()
+        .map(|column| column.name.to_lowercase())
+        .collect();
+    let names = names.join(", ");
+    let message = format!("the unit of {names} is not in the name, and no value exceeds 2π");
+    Err(table
+        .refused(message)
+        .advice("end the names in _deg or _rad"))
 }
 
-fn triad(columns: [Column; 3], row: &[f64]) -> DVec3 {
-    columns.map(|column| column.of(row)).into()
+fn triad(columns: [&Column; 3], row: usize) -> DVec3 {
+    columns.map(|column| column.si(row)).into()
 }
 
-fn samples(
-    table: &Table,
-    columns: &Columns,
-    options: &Options,
-) -> Result<Vec<TrajectorySample>, Error> {
-    let (time, attitude) = (columns.get("t_s"), columns.three(ATTITUDE));
-    let geodetic = columns.three(GEODETIC);
-    let place = geodetic.or(columns.three(LOCAL));
-    let origin = if geodetic.is_some() {
-        None
-    } else {
-        Some(origin(table, options)?)
+fn samples(table: &Table, options: &Options) -> Result<Vec<TrajectorySample>, Error> {
+    let (attitude, geodetic) = (table.all(ATTITUDE), table.all(GEODETIC));
+    let origin = match geodetic {
+        Some(_) => None,
+        None => Some(origin(table, options)?),
     };
-    let sample = |(_, row): &(u64, Vec<f64>)| {
-        let t_s = time.map_or(f64::NAN, |time| time.of(row));
-        let [roll, pitch, yaw] =
-            attitude.map_or([0.0; 3], |columns| columns.map(|column| column.of(row)));
+    let (Some(time), Some(place)) = (table.get("t_s"), geodetic.or(table.all(LOCAL))) else {
+        return Ok(Vec::new());
+    };
+    let week_s = |row| {
+        let week = table.get("week");
+        week.map_or(0.0, |week| (week.si(row) - week.si(0)) * WEEK_S)
+    };
+    let sample = |row| {
+        let t_s = time.si(row) + week_s(row);
+        let [roll, pitch, yaw] = attitude.map_or([0.0; 3], |all| all.map(|c| c.si(row)));
         let q_b_n = RollPitchYaw { roll, pitch, yaw }.to_quat();
-        let place = place.map_or(DVec3::NAN, |columns| triad(columns, row));
+        let place = triad(place, row);
         match origin {
             None => TrajectorySample {
                 t_s,
@@ -352,7 +346,7 @@ fn samples(
             Some(origin) => local(t_s, origin, place, q_b_n),
         }
     };
-    Ok(table.rows.iter().map(sample).collect())
+    Ok((0..table.rows()).map(sample).collect())
 }
 
 /// A sample given in the axes north, east, down of the origin.
@@ -400,7 +394,7 @@ pub(crate) fn parse_origin(text: &str) -> Option<[f64; 3]> {
 }
 
 /// The first value of a row that is out of its range: of which column, and why.
-fn out_of_range((_, row): &(u64, Vec<f64>), columns: &Columns) -> Option<(usize, &'static str)> {
+fn out_of_range(table: &Table, row: usize) -> Option<(&Column, &'static str)> {
     // a heading that was unwrapped goes on below −180 and above 180: the same angle
     let ranges = [
         ("lat_deg", 90.0, 90.0, "is not a latitude"),
@@ -410,21 +404,18 @@ fn out_of_range((_, row): &(u64, Vec<f64>), columns: &Columns) -> Option<(usize,
         ("yaw_deg", 360.0, 360.0, "is not a heading"),
     ];
     ranges.into_iter().find_map(|(name, below, above, reason)| {
-        let column = columns.get(name)?;
-        let is_within = (-below - 1e-9..=above + 1e-9).contains(&(column.of(row) / DEG));
-        (!is_within).then_some((column.index, reason))
+        let column = table.get(name)?;
+        let is_within = (-below - 1e-9..=above + 1e-9).contains(&(column.si(row) / DEG));
+        (!is_within).then_some((column, reason))
     })
 }
 
-fn check_ranges(table: &Table, columns: &Columns) -> Result<(), Error> {
-    let found = table
-        .rows
-        .iter()
-        .find_map(|row| Some((row, out_of_range(row, columns)?)));
-    let Some(((line, row), (index, reason))) = found else {
-        return Ok(());
-    };
-    Err(table.cell(*line, index, &row[index].to_string(), reason))
+fn check_ranges(table: &Table) -> Result<(), Error> {
+    let mut found = (0..table.rows()).filter_map(|row| Some((row, out_of_range(table, row)?)));
+    found.next().map_or(Ok(()), |(row, (column, reason))| {
+        let (line, value) = (table.lines.of(row), column.values[row].to_string());
+        Err(Error::cell(&table.path, line, &column.name, value, reason).advice(DEGREES))
+    })
 }
 
 /// Heading and pitch along the path; at rest between those before and after.
@@ -487,8 +478,8 @@ fn direction(samples: &[TrajectorySample], i: usize) -> Option<(f64, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::columns::classify;
     use super::*;
+    use crate::formats::table::find;
 
     #[test]
     fn names_of_many_tools() {
@@ -510,7 +501,8 @@ mod tests {
             ("up_m", "d_m", -1.0),
             ("e_m", "e_m", 1.0),
         ] {
-            assert_eq!(classify(&KNOWN, name), Some((quantity, factor)), "{name}");
+            let found = find(&QUANTITIES, name).map(|(own, factor)| (own.name, factor));
+            assert_eq!(found, Some((quantity, Some(factor))), "{name}");
         }
         for name in [
             "sd_roll_deg",
@@ -522,10 +514,15 @@ mod tests {
             "t_deg",
             "v_n_deg",
         ] {
-            assert_eq!(classify(&KNOWN, name), None, "{name}");
+            assert!(find(&QUANTITIES, name).is_none(), "{name}");
         }
-        let own =
-            |known: &Known| classify(&KNOWN, known.name).map(|(name, _)| name) == Some(known.name);
-        assert!(KNOWN.iter().all(own));
+        let is_own =
+            |own: &Quantity| find(&QUANTITIES, own.name).is_some_and(|q| q.0.name == own.name);
+        assert!(
+            QUANTITIES
+                .iter()
+                .filter(|own| own.name != "week")
+                .all(is_own)
+        );
     }
 }

@@ -108,7 +108,7 @@ fn bad_cells_rows_and_headers_are_refused_with_their_line() {
     );
     assert_eq!(
         message(5, "2.5,46.5,nan,400,0,0,45"),
-        "a.csv, line 7: column \"lon_deg\": nan is not finite"
+        "a.csv, line 7: column \"lon_deg\": \"nan\" is not finite"
     );
     assert_eq!(
         message(5, "2.5,46.5,6.6,400,0,0"),
@@ -222,13 +222,13 @@ fn doubtful_files_are_read_with_a_warning() {
         doubted(&(HEADER.to_owned() + &slow)),
         ["a.csv: rows are 5 s apart: the path between is a guess"]
     );
-    let gap = drive(None)
-        .replace("\n4,", "\n#")
-        .replace("\n4.5,", "\n#")
-        .replace("\n5,", "\n#");
+    let lines = drive(None);
+    let is_kept = |line: &&str| !["4,", "4.5,", "5,"].iter().any(|t| line.starts_with(t));
+    let gap: Vec<&str> = lines.lines().filter(is_kept).collect();
+    let gap = gap.join("\n");
     assert_eq!(
         doubted(&gap),
-        ["a.csv, line 13: gap of 2.000 s before 5.5 s: the path in it is a guess"]
+        ["a.csv, line 10: gap of 2.000 s before 5.5 s: the path in it is a guess"]
     );
     let extra: String = drive(None)
         .lines()
@@ -446,9 +446,9 @@ fn jumps_and_heights_of_other_formats_are_refused_as_those_of_tables() {
         rows.trajectory().unwrap_err().to_string()
     };
     assert!(
-        tum(-1e308).starts_with("a.tum, line 7: height "),
+        tum(-1e90).starts_with("a.tum, line 7: height "),
         "{}",
-        tum(-1e308)
+        tum(-1e90)
     );
     assert_eq!(
         tum(111_000.0),

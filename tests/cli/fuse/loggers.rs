@@ -51,8 +51,8 @@ fn inputs_as_loggers_and_receivers_have_them() {
         );
         assert_eq!(ran.code, 2);
         for text in [
-            &format!("{name}: {columns} columns without a header"),
-            "7 columns (t_s, latitude",
+            &format!("{name}, line 1: {columns} columns without a header"),
+            "7 of them (t_s, latitude",
         ] {
             assert!(ran.stderr.contains(text), "{}", ran.stderr);
         }

@@ -3,21 +3,16 @@
 use super::*;
 
 use proptest::prelude::*;
-use std::io::Cursor;
 
-fn parse(bytes: Vec<u8>) {
+fn parse(bytes: &[u8]) {
     let options = ReadOptions::default();
-    if let Ok(raw) = text::parse("a.csv", Box::new(Cursor::new(bytes)), &options) {
+    let text = String::from_utf8_lossy(bytes);
+    if let Ok(raw) = table::parse("a.csv", &text, &DICTIONARY, &Asked::default()) {
         let _ = Prepared::new(raw, &options).map(|(prepared, _)| prepared.recordings());
     }
 }
 
 proptest! {
-    #[test]
-    fn never_panics_on_bytes(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
-        parse(bytes);
-    }
-
     /// Sound files with some bytes overwritten, among them the dangerous ones.
     #[test]
     fn never_panics_on_damage(
@@ -28,6 +23,6 @@ proptest! {
         for (at, byte) in damage {
             bytes[at % n] = byte;
         }
-        parse(bytes);
+        parse(&bytes);
     }
 }

@@ -34,7 +34,7 @@ fn gravity_tells_wrong_units() {
 #[test]
 fn exchanged_sensors_are_refused() {
     let mut bytes = Vec::new();
-    npy::write_header(&mut bytes, 200, 6).unwrap();
+    write_npy_header(&mut bytes, 200, 6).unwrap();
     for i in 0..200 {
         let small = f64::from(i % 7) * 1e-4;
         for x in [small, -small, small, small, -small, 9.8 + small] {

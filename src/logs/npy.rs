@@ -1,8 +1,10 @@
-//! An array in NumPy's own format (`numpy.lib.format`).
+//! Arrays in NumPy's own format, `.npy` (`numpy.lib.format`).
 
 use crate::bytes::{Alignment, Bytes, Order};
-use crate::error::Error;
+use crate::error::{Error, Place};
+use crate::input::Origin;
 use std::io::{self, Read};
+use std::path::Path;
 
 /// Longest header (bytes).
 const LONGEST_HEADER: usize = 1 << 16;
@@ -56,10 +58,25 @@ impl Number {
     }
 }
 
+/// Reads the array of a file.
+///
+/// # Errors
+/// When it is cut off, or no array of real numbers.
+pub fn read(path: &Path) -> Result<Array, Error> {
+    let input = Origin::File(path.to_owned()).open()?;
+    let size = input.length();
+    read_from(&mut input.take(size), size, 0)
+}
+
 /// Reads an array that has so many bytes with its header.
-pub(super) fn read(from: &mut impl Read, size: u64, offset: u64) -> Result<Array, Error> {
-    let fault = |error: io::Error| {
-        Error::malformed(offset, format!("an array cannot be unpacked: {error}"))
+pub(crate) fn read_from(from: &mut impl Read, size: u64, offset: u64) -> Result<Array, Error> {
+    let fault = |error: io::Error| match error.kind() {
+        io::ErrorKind::UnexpectedEof => Error::Truncated {
+            place: Place::byte(offset),
+            needed: size + 1,
+            left: size,
+        },
+        _ => Error::malformed(offset, format!("not a NumPy array: {error}")),
     };
     let (text, header_bytes) = header_text(from).map_err(fault)?;
     let header = Header::parse(&text, offset)?;
@@ -68,14 +85,15 @@ pub(super) fn read(from: &mut impl Read, size: u64, offset: u64) -> Result<Array
         .iter()
         .try_fold(1_usize, |count, n| count.checked_mul(*n));
     let bytes = count.and_then(|count| count.checked_mul(header.number.size()));
-    let Some((count, bytes)) = count
-        .zip(bytes)
-        .filter(|(_, bytes)| *bytes as u64 == size.saturating_sub(header_bytes))
-    else {
-        return Err(Error::malformed(
-            offset,
-            format!("an array of shape {:?} in {size} bytes", header.shape),
-        ));
+    let left = size.saturating_sub(header_bytes);
+    let needed = bytes.map_or(u64::MAX, |bytes| bytes as u64);
+    let Some(bytes) = bytes.filter(|_| needed <= left) else {
+        let place = Place::byte(offset + header_bytes);
+        return Err(Error::Truncated {
+            place,
+            needed,
+            left,
+        });
     };
     let mut values = Vec::new();
     let mut block = vec![0; BLOCK * header.number.size()];
@@ -87,7 +105,6 @@ pub(super) fn read(from: &mut impl Read, size: u64, offset: u64) -> Result<Array
         let mut numbers = Bytes::new(part, header.order, Alignment::Packed);
         values.extend(std::iter::from_fn(|| header.number.read(&mut numbers)));
     }
-    debug_assert_eq!(values.len(), count);
     if header.is_fortran {
         values = transposed(&values, &header.shape);
     }
@@ -102,7 +119,7 @@ fn header_text(from: &mut impl Read) -> io::Result<(String, u64)> {
     let mut start = [0; 10];
     from.read_exact(&mut start)?;
     if !start.starts_with(b"\x93NUMPY") {
-        return Err(io::Error::other("not an array"));
+        return Err(io::Error::other("it does not begin with \\x93NUMPY"));
     }
     let mut length = usize::from(u16::from_le_bytes([start[8], start[9]]));
     let mut before = 10;

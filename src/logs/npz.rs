@@ -1,12 +1,140 @@
-//! Directory of a zip archive (PKWARE APPNOTE 6.3.10, 4.3).
+//! Arrays of NumPy in a zip archive (PKWARE APPNOTE 6.3.10, 4.3), as `numpy.savez` and `numpy.savez_compressed` write them.
+//!
+//! ```
+//! # fn main() -> Result<(), nav_sim_logs::Error> {
+//! # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/arrays.npz");
+//! let archive = nav_sim_logs::npz::Archive::open(path.as_ref())?;
+//! assert!(archive.names().any(|name| name == "gyro"));
+//! let gyro = archive.read("gyro")?;
+//! assert_eq!(gyro.shape, [40, 3]);
+//! let second_row = &gyro.values[3..6];
+//! # assert_eq!(second_row.len(), 3);
+//! # Ok(())
+//! # }
+//! ```
 
 use crate::bytes::{Bytes, text};
 use crate::error::{Error, Place};
-use crate::input::Input;
+use crate::input::{Input, Origin};
+use crate::npy::{self, Array};
+use flate2::read::DeflateDecoder;
+use std::io::{self, Read};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Largest array that is read (bytes).
+const LARGEST_ARRAY: u64 = 8 << 30;
+
+/// Archive whose arrays are known by name.
+#[derive(Debug)]
+pub struct Archive {
+    origin: Origin,
+    entries: Vec<Entry>,
+}
+
+impl Archive {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// When it is no zip archive, or its directory is damaged.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        Self::new(Origin::File(path.to_owned()))
+    }
+
+    /// Opens a file that is held.
+    ///
+    /// # Errors
+    /// Those of [`Self::open`].
+    pub fn from_bytes(bytes: impl Into<Arc<[u8]>>) -> Result<Self, Error> {
+        Self::new(Origin::Bytes(bytes.into()))
+    }
+
+    fn new(origin: Origin) -> Result<Self, Error> {
+        let entries = entries(&mut origin.open()?)?;
+        Ok(Self { origin, entries })
+    }
+
+    /// Names of the arrays, in the order of the archive.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.entries.iter().map(|entry| entry.name.as_str())
+    }
+
+    /// Reads an array of numbers.
+    ///
+    /// # Errors
+    /// When there is none of that name, or it is damaged or not of numbers.
+    pub fn read(&self, name: &str) -> Result<Array, Error> {
+        let entry = self
+            .entries
+            .iter()
+            .find(|entry| entry.name == name)
+            .ok_or_else(|| Error::NoTopic {
+                what: format!("the name {name}"),
+                topics: self.names().map(str::to_owned).collect(),
+            })?;
+        self.array(entry).map_err(|error| error.of_topic(name))
+    }
+
+    fn array(&self, entry: &Entry) -> Result<Array, Error> {
+        if entry.unpacked > LARGEST_ARRAY {
+            let (bytes, limit) = (entry.unpacked, LARGEST_ARRAY);
+            return Err(Error::TooLarge {
+                place: Place::byte(entry.offset),
+                bytes,
+                limit,
+            });
+        }
+        let mut input = self.origin.open()?;
+        let offset = entry.data_offset(&mut input)?;
+        input.expect(entry.packed)?;
+        let packed = input.take(entry.packed);
+        match entry.method {
+            STORED => checked(packed, entry, offset),
+            DEFLATED => checked(DeflateDecoder::new(packed), entry, offset),
+            other => Err(Error::encoding(
+                offset,
+                format!("zip method {other}").as_bytes(),
+            )),
+        }
+    }
+}
+
+/// Reads an array, and checks the CRC of all its bytes.
+fn checked(unpacked: impl Read, entry: &Entry, offset: u64) -> Result<Array, Error> {
+    let mut summed = Summed {
+        inner: unpacked.take(entry.unpacked),
+        crc: crc32fast::Hasher::new(),
+    };
+    let array = npy::read_from(&mut summed, entry.unpacked, offset)?;
+    let (stored, computed) = (entry.crc, summed.crc.finalize());
+    if stored == computed {
+        Ok(array)
+    } else {
+        Err(Error::Crc {
+            place: Place::byte(offset),
+            stored,
+            computed,
+        })
+    }
+}
+
+/// Bytes whose CRC is computed as they are read.
+struct Summed<R> {
+    inner: R,
+    crc: crc32fast::Hasher,
+}
+
+impl<R: Read> Read for Summed<R> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let count = self.inner.read(into)?;
+        self.crc.update(&into[..count]);
+        Ok(count)
+    }
+}
 
 /// Methods of compression.
-pub(super) const STORED: u16 = 0;
-pub(super) const DEFLATED: u16 = 8;
+const STORED: u16 = 0;
+const DEFLATED: u16 = 8;
 
 /// Bytes of the record at the end, and of the longest comment behind it.
 const END: u64 = 22;
@@ -16,18 +144,18 @@ const LARGEST_DIRECTORY: u64 = 16 << 20;
 
 /// File of an archive.
 #[derive(Debug)]
-pub(super) struct Entry {
-    pub(super) name: String,
-    pub(super) method: u16,
-    pub(super) crc: u32,
-    pub(super) packed: u64,
-    pub(super) unpacked: u64,
-    pub(super) offset: u64,
+struct Entry {
+    name: String,
+    method: u16,
+    crc: u32,
+    packed: u64,
+    unpacked: u64,
+    offset: u64,
 }
 
 impl Entry {
     /// Byte of its data, behind a header of its own; the input stands there.
-    pub(super) fn data_offset(&self, input: &mut Input) -> Result<u64, Error> {
+    fn data_offset(&self, input: &mut Input) -> Result<u64, Error> {
         if self.offset > input.length() {
             return Err(Error::malformed(
                 self.offset,
@@ -49,7 +177,7 @@ impl Entry {
 }
 
 /// Arrays of an archive, by their names without `.npy`.
-pub(super) fn entries(input: &mut Input) -> Result<Vec<Entry>, Error> {
+fn entries(input: &mut Input) -> Result<Vec<Entry>, Error> {
     let (offset, size) = directory(input)?;
     input.seek(offset.min(input.length()))?;
     let all = input.bytes(size, LARGEST_DIRECTORY)?;
