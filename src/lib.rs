@@ -61,40 +61,24 @@ pub use app as failure;
 pub mod report;
 // Files.
 pub mod formats;
-// What a request comes to.
-pub mod answered;
 // From here on a room for each command: request, job, result, document. The main job.
 pub mod commands;
 // Recorded drives.
 pub mod fuse;
-// Errors and remarks of the jobs that read recordings.
-pub mod jobs;
 // Parameters for other programs.
 pub mod export;
-// Contents of a log.
-pub mod inspect;
 // Recordings to models.
 pub mod calibrate;
 // Figures of the paper.
 mod paper;
-// Wavelet variances.
-pub mod wv;
 // Models to recordings.
 pub mod synthesize;
-// Calibrations that are not made yet.
-pub mod design;
 // Which model, on the user's own recordings.
 pub mod choose;
-// Ratios between runs.
-pub mod compare;
 // Scenarios, candidates and outages, in parts.
 pub mod study;
-// Factors on a model.
-pub mod tune;
 // The IMU that is needed.
 pub mod require;
-// Models from data sheets, catalogued IMUs.
-pub mod datasheet;
 // A directory to start from.
 mod init;
 // All that most programs need.

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from nav_sim import _model, _trajectory
 from nav_sim._answer import Answer, Progress, ask, window, windows
-from nav_sim._inputs import Staging, StrPath, Table, number, path, texts
+from nav_sim._inputs import Staging, StrPath, Table, number, path, settings, texts
 from nav_sim._model import Model
 from nav_sim._navigation import AnyModel, AnyTrajectory, Outages, Settings, states
 from nav_sim._wavelet import reading
@@ -59,7 +59,7 @@ def tune(
             trajectory=None if trajectory is None else _trajectory.staged(trajectory, staging),
             outage=windows(outages),
             filter=states(filter),
-            scenario=None if scenario is None else staging.settings(scenario, "scenario"),
+            scenario=settings(scenario, "scenario"),
             seed=seed,
             **{"for": aim},
         )
@@ -97,8 +97,8 @@ def require(
             outage=asked,
             require=texts(limits, "limits"),
             start=start,
-            gnss=None if gnss is None else staging.settings(gnss, "gnss"),
-            scenario=None if scenario is None else staging.settings(scenario, "scenario"),
+            gnss=settings(gnss, "gnss"),
+            scenario=settings(scenario, "scenario"),
             vehicle=vehicle,
             catalogue=_catalogue(catalogue),
         )
@@ -186,10 +186,9 @@ def choose(
             filter=texts(filter, "filter"),
             inflate=texts(inflate, "inflate"),
             runs=runs,
-            trim=None if trim is None else str(trim),
-            scenario=None if scenario is None else staging.settings(scenario, "scenario"),
-            recordings=reading(rate_hz, skip_s, None, None)["reading"],
-            gaps=gaps,
+            trim=trim,
+            scenario=settings(scenario, "scenario"),
+            **reading(rate_hz, skip_s, gaps, None),
             seed=seed,
         )
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Union
 import numpy as np
 
 from nav_sim import _native, _toml
-from nav_sim._answer import Columns, axes_or_new, flattened
-from nav_sim._errors import NavSimError, warn
+from nav_sim._answer import Answer, Columns, ask, axes_or_new, flattened
+from nav_sim._errors import NavSimError
 from nav_sim._inputs import FloatArray, Staging, StrPath, number, numbers, path, whole, word
 from nav_sim._wavelet import Curve, scales_s
 
@@ -102,10 +102,8 @@ class Model:
         figures |= {"accel_turn_on": accel_turn_on, "gyro_turn_on": gyro_turn_on}
         with Staging() as staging:
             own = None if entry is None else staging.settings(entry, "entry")
-            request = {"entry": own, "unit": unit, "rate_hz": rate_hz, "figures": figures}
-            text, doubts = _native.datasheet(_toml.dumps(request), staging.hidden)
-        warn(doubts)
-        return cls._of(text, None)
+            made = ask(Answer, "datasheet", staging, entry=own, unit=unit, rate_hz=rate_hz, **figures)
+        return cls._of(made.text("model.toml"), None)
 
     def write(self, path: StrPath) -> Path:
         """Writes it as a model file; of a calibration the draws behind its intervals too (`….draws.json`)."""

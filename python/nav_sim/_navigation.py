@@ -348,9 +348,6 @@ def fuse(
         if heading_deg is not None:
             deg, sigma_deg = numbers(heading_deg, "heading_deg", 2)
             initial = f"{deg!r}:{sigma_deg!r}"
-        lasts: Any = gnss_correlation
-        if not isinstance(gnss_correlation, str):
-            lasts = {"seconds": number(gnss_correlation, "gnss_correlation")}
         return ask(
             Fusion,
             "fuse",
@@ -363,12 +360,12 @@ def fuse(
             lever_arm_m=numbers(lever_arm_m, "lever_arm_m", 3),
             mounting=_mounting(mounting),
             reference=None if reference is None else _reference(reference, staging),
-            outages=_withheld(outages),
-            filter=str(filter),
+            outage=_withheld(outages),
+            filter=filter,
             turn_on_bias=turn_on_bias,
             gnss_sigma=_sigma(gnss_sigma),
             gnss_delay_s=gnss_delay_s,
-            gnss_correlation=lasts,
+            gnss_correlation=gnss_correlation,
             nhc=nhc,
             zupt=zupt,
             odometer=None if odometer is None else staging.table(odometer, "odometer"),
@@ -378,10 +375,14 @@ def fuse(
         )
 
 
-def _withheld(outages: Sequence[tuple[float, float]]) -> list[dict[str, float]]:
+def _withheld(outages: Sequence[tuple[float, float]]) -> list[str]:
     if not isinstance(outages, (list, tuple)):
         raise NavSimError(f"outages={outages!r}: not pairs of start and end (s)", hint="such as outages=[(300, 390)]")
-    return [dict(zip(("start_s", "end_s"), numbers(pair, "outages", 2))) for pair in outages]
+    return [_joined(numbers(pair, "outages", 2), ":") for pair in outages]
+
+
+def _joined(values: Any, by: str = ",") -> str:
+    return by.join(repr(float(value)) for value in values)
 
 
 def _topics(topic: tuple[str | None, str | None] | None) -> Any:
@@ -389,7 +390,7 @@ def _topics(topic: tuple[str | None, str | None] | None) -> Any:
         return None
     if not isinstance(topic, (list, tuple)) or len(topic) != 2:
         raise NavSimError(f"topic={topic!r}: not a pair of names, of the IMU and of the fixes")
-    return {"imu": topic[0], "fixes": topic[1]}
+    return ",".join(name or "" for name in topic)
 
 
 def _reference(reference: AnyTrajectory, staging: Staging) -> str:
@@ -399,10 +400,8 @@ def _reference(reference: AnyTrajectory, staging: Staging) -> str:
 
 
 def _mounting(mounting: Mounting | None) -> Any:
-    if mounting is None or mounting == "auto":
+    if mounting is None or isinstance(mounting, str):
         return mounting
-    if isinstance(mounting, str):
-        return {"axes": mounting}
     try:
         angles: Any = np.asarray(mounting, dtype=np.float64)
     except (TypeError, ValueError):
@@ -410,7 +409,7 @@ def _mounting(mounting: Mounting | None) -> Any:
     if angles.shape not in ((3,), (2, 3)):
         raise NavSimError("mounting: roll, pitch, yaw (°) are needed, and where known three standard deviations")
     both: npt.NDArray[np.float64] = angles if angles.ndim == 2 else np.stack([angles, np.ones(3)])
-    return {"angles": {"deg": both[0].tolist(), "sigma_deg": both[1].tolist()}}
+    return f"{_joined(both[0])}:{_joined(both[1])}"
 
 
 def _sigma(sigma: float | Mapping[str, Any] | None) -> Any:
@@ -418,5 +417,5 @@ def _sigma(sigma: float | Mapping[str, Any] | None) -> Any:
         return None
     if isinstance(sigma, Mapping):
         each = {key: np.broadcast_to(np.asarray(value, dtype=np.float64), 3) for key, value in sigma.items()}
-        return {"unsaid": {key: value.tolist() for key, value in each.items()}}
-    return {"times": [number(sigma, "gnss_sigma")] * 2}
+        return ":".join(_joined(each[key]) for key in ("pos_m", "vel_m_s") if key in each)
+    return f"x{number(sigma, 'gnss_sigma')!r}"

@@ -136,7 +136,7 @@ def reading(
     """How recordings are read, as a request has it."""
     words = axes.split(",") if isinstance(axes, str) else axes
     skip = None if skip_s is None else str(skip_s)
-    return {"reading": {"rate_hz": rate_hz, "skip_s": skip}, "gaps": gaps, "axes": words}
+    return {"rate_hz": rate_hz, "skip_s": skip, "gaps": gaps, "axes": words}
 
 
 def wv(
@@ -165,7 +165,8 @@ def wv(
             staging,
             progress,
             files=files,
-            recordings=reading(rate_hz, skip_s, gaps, axes),
-            tuning={"efficiency": efficiency, "scales": scales},
+            **reading(rate_hz, skip_s, gaps, axes),
+            efficiency=efficiency,
+            scales=scales,
             intervals=intervals,
         )

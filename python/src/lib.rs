@@ -16,8 +16,7 @@ mod native {
     use crate::answer::Answer;
     #[pymodule_export]
     use crate::model::{
-        catalogue, datasheet, model_contents, model_export, model_practical, model_recording,
-        model_wavelet,
+        catalogue, model_contents, model_export, model_practical, model_recording, model_wavelet,
     };
     #[pymodule_export]
     use crate::request::{answer, main};

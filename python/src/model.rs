@@ -2,8 +2,7 @@
 
 use crate::error;
 use crate::work::work;
-use nav_sim::answered;
-use nav_sim::datasheet::{DatasheetRequest, catalogue_json};
+use nav_sim::commands::datasheet::catalogue_json;
 use nav_sim::export::exported;
 use nav_sim::failure::Failure;
 use nav_sim::formats::contamination_file;
@@ -43,23 +42,11 @@ pub(crate) fn model_contents(py: Python<'_>, text: &str, path: Option<&str>) -> 
     Ok(json!({ "rate_hz": file.model.rate_hz, "channels": channels }).to_string())
 }
 
-/// The model file of a data sheet, and what is doubtful about it; the request is TOML.
-#[pyfunction]
-#[pyo3(signature = (request, hidden))]
-pub(crate) fn datasheet(
-    py: Python<'_>,
-    request: &str,
-    hidden: &str,
-) -> PyResult<(String, Vec<String>)> {
-    let made = answered::request::<DatasheetRequest>(request).and_then(|request| request.model());
-    let made = made.map_err(|failure| error::of_failure(py, &failure, hidden))?;
-    Ok((model_file::to_toml(&made.file), made.doubts))
-}
-
 /// The catalogue of data sheets, as JSON.
 #[pyfunction]
 pub(crate) fn catalogue(py: Python<'_>) -> PyResult<String> {
-    catalogue_json().map_err(|e| error::of_failure(py, &Failure::from(e), ""))
+    let catalogue = catalogue_json().map_err(|e| error::of_failure(py, &Failure::from(e), ""))?;
+    Ok(catalogue.to_string())
 }
 
 /// One recording of a model, counted from 1: a column a channel.

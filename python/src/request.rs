@@ -1,21 +1,10 @@
-//! Requests in: TOML with the keys of the commands' options.
+//! Requests in: JSON with the names of the commands' options.
 
 use crate::answer::Answer;
 use crate::error;
 use crate::work::{Meter, work};
-use nav_sim::answered::request;
-use nav_sim::app::{self, Answered, Context, Front};
-use nav_sim::calibrate::CalibrationRequest;
-use nav_sim::choose::ChoiceRequest;
-use nav_sim::commands::run::Run;
-use nav_sim::compare::CompareRequest;
-use nav_sim::design::DesignRequest;
+use nav_sim::app::{Context, Failure, Front};
 use nav_sim::document::{Importance, Note};
-use nav_sim::failure::Failure;
-use nav_sim::fuse::FuseRequest;
-use nav_sim::require::RequireRequest;
-use nav_sim::tune::TuneRequest;
-use nav_sim::wv::WaveletRequest;
 use pyo3::prelude::*;
 use serde_json::{Map, Value};
 use std::ffi::OsString;
@@ -84,13 +73,13 @@ pub(crate) fn answer(
 ) -> PyResult<Answer> {
     let (answered, warnings) = work(py, progress, move |meter| {
         let clerk = Clerk::new(meter);
-        let answered = answered(&command, &request, &clerk);
+        let answered = options(&request).and_then(|mut options| {
+            let seed = options.remove("seed").and_then(|seed| seed.as_u64());
+            nav_sim::commands::answer(&command, &options, Context::new(&clerk, seed))
+        });
         (answered, clerk.warnings())
     })?;
-    let answered = answered.map_err(|e| match e {
-        Some(failure) => error::of_failure(py, &failure, &hidden),
-        None => error::refused(py, "there is no such command"),
-    })?;
+    let answered = answered.map_err(|failure| error::of_failure(py, &failure, &hidden))?;
     let warnings = warnings
         .iter()
         .map(|doubt| error::shown(doubt, &hidden))
@@ -98,32 +87,9 @@ pub(crate) fn answer(
     Ok(Answer::new(answered, hidden, warnings))
 }
 
-/// The answer, or the failure; no failure where there is no such command.
-fn answered(command: &str, text: &str, clerk: &Clerk<'_>) -> Result<Answered, Option<Failure>> {
-    let mut options: Map<String, Value> =
-        serde_json::from_str(text).map_err(|e| Failure::input(e))?;
-    let seed = options.get("seed").and_then(Value::as_u64);
-    let context = Context::new(clerk, seed);
-    if command == "run" {
-        options.remove("seed");
-        return Ok(app::answered::<Run>(&options, context)?);
-    }
-    let context = &context;
-    let text = &toml::to_string(&options).map_err(|e| Failure::input(e))?;
-    Ok(match command {
-        "wv" => request::<WaveletRequest>(text)?.answer(context)?,
-        "calibrate" => {
-            let advance = |steps| clerk.meter.advance(steps);
-            request::<CalibrationRequest>(text)?.answer(context, &advance)?
-        }
-        "fuse" => request::<FuseRequest>(text)?.answer()?,
-        "tune" => request::<TuneRequest>(text)?.answer(context)?,
-        "require" => request::<RequireRequest>(text)?.answer(context)?,
-        "design" => request::<DesignRequest>(text)?.answer(context)?,
-        "choose" => request::<ChoiceRequest>(text)?.answer(|| SEED, context)?,
-        "compare" => request::<CompareRequest>(text)?.answer()?,
-        _ => return Err(None),
-    })
+/// The options of a request, from JSON.
+fn options(request: &str) -> Result<Map<String, Value>, Failure> {
+    serde_json::from_str(request).map_err(Failure::input)
 }
 
 /// The command line: does what its words, the program first, ask for, and returns the exit code.

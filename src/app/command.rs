@@ -48,6 +48,8 @@ pub trait Command: clap::Args + Send + Sync + 'static {
     const OUT: Out = Out::Nothing;
     /// Whether its document can be written as a page or a picture.
     const PLOT: bool = true;
+    /// Whether the file goes to stdout where `--out` is not given.
+    const PRINTS_FILE: bool = false;
     /// Options that do not change the result, such as `--require`.
     const JUDGES: &'static [&'static str] = &[];
 
@@ -276,6 +278,7 @@ impl<C: Command> Asked<C> {
                     suggest::nearest(key, known).map(|name| format!("did you mean {name}?")),
                 ));
             };
+            let option = arg.get_long().unwrap_or(key);
             if let Value::Object(settings) = value {
                 words.extend(set(settings, "")?);
                 continue;
@@ -361,7 +364,8 @@ pub fn answered<C: Command>(
         Out::File { name, .. } => beside(Path::new(name), ending).display().to_string(),
         _ => ending.to_owned(),
     };
-    let files = answer.files().into_iter();
+    let table = answer.csv().map(|text| OutputFile::whole(".csv", text));
+    let files = answer.files().into_iter().chain(table);
     Ok(Answered {
         json: crate::report::json(&answer),
         document: answer.document(),

@@ -1,8 +1,15 @@
 //! What went wrong with a request, as the user reads it, and the exit code that it means.
 
+use crate::commands::run::NavigateError;
 use crate::formats::{FileError, Setting};
-use nav_sim_calibration::SignalError;
+use nav_sim_calibration::{
+    AnticipationError, AverageError, CalibrationError, Cause, FitError, SignalError,
+};
 use nav_sim_navigation::sensors::outage::OutageError;
+use nav_sim_navigation::simulation::ExperimentError;
+use nav_sim_signal::noise::ReplicateError;
+use nav_sim_signal::noise::continuous::RateError;
+use nav_sim_signal::wavelet::WaveletError;
 use std::fmt;
 
 /// A command without a result: exit code, message, place and help. 1 could not (I/O, numerics); 2 usage or input;
@@ -235,8 +242,59 @@ impl From<OutageError> for Failure {
     }
 }
 
+impl From<ExperimentError> for Failure {
+    fn from(e: ExperimentError) -> Self {
+        let is_rate = matches!(e, ExperimentError::FixBetweenSamples { .. });
+        let hint = "the IMU has the rate of the recordings: another [gnss] rate_hz in --scenario";
+        Self::input(e).maybe_hint(is_rate.then(|| hint.to_owned()))
+    }
+}
+
 impl From<SignalError> for Failure {
     fn from(e: SignalError) -> Self {
         Self::input(e).hint("fewer --scales, or record for longer")
     }
+}
+
+impl From<&CalibrationError> for Failure {
+    fn from(e: &CalibrationError) -> Self {
+        let hint = match &e.source {
+            Cause::Fit(FitError::TooFewScales { .. }) => {
+                Some("record for longer, or a --model with fewer processes")
+            }
+            Cause::Fit(FitError::NoSlope { .. }) => Some(
+                "--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope)",
+            ),
+            Cause::Fit(FitError::NotPositive { .. }) => Some(
+                "the signal is quantised so coarsely that scales are silent: --estimator awv, or another range",
+            ),
+            Cause::Average(AverageError::Trim { .. }) => {
+                Some("a smaller --trim, or --estimator sr-awv")
+            }
+            _ => None,
+        };
+        Self::input(e).maybe_hint(hint.map(str::to_owned))
+    }
+}
+
+impl From<CalibrationError> for Failure {
+    fn from(e: CalibrationError) -> Self {
+        (&e).into()
+    }
+}
+
+/// Errors of the numeric crates that need no advice, by the exit code that they mean.
+macro_rules! failures {
+    ($($make:ident: $($error:ty),*;)*) => {
+        $($(impl From<$error> for Failure {
+            fn from(e: $error) -> Self {
+                Self::$make(e)
+            }
+        })*)*
+    };
+}
+
+failures! {
+    input: AnticipationError, NavigateError, ReplicateError, RateError;
+    could_not: WaveletError;
 }

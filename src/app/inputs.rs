@@ -192,47 +192,22 @@ impl FromStr for OutageFlag {
     }
 }
 
-parse::textual!(OutageFlag);
-
-impl std::fmt::Display for OutageFlag {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::None => f.write_str("none"),
-            Self::Window(Outage { start_s, end_s }) => write!(f, "{start_s}:{end_s}"),
-        }
-    }
-}
-
 /// The windows among the values of `--outage`, of which "none" stands alone.
 pub(crate) fn windows_of(outages: &[OutageFlag]) -> Result<Vec<Outage>> {
-    let (scenario, set) = (None, Vec::new());
-    let outages = outages.to_vec();
-    SettingsArgs {
-        outages,
-        scenario,
-        set,
+    if outages.len() > 1 && outages.contains(&OutageFlag::None) {
+        return Err(Failure::input("--outage none stands beside other outages")
+            .hint("give the windows, or none alone"));
     }
-    .windows()
+    let window = |flag: &OutageFlag| match flag {
+        OutageFlag::None => None,
+        OutageFlag::Window(outage) => Some(*outage),
+    };
+    Ok(outages.iter().filter_map(window).collect())
 }
 
-/// A scenario file, the default without one, with outages in the place of its own.
-pub(crate) fn checked_scenario(path: Option<&Path>, outages: &[OutageFlag]) -> Result<Scenario> {
-    let (scenario, set) = (path.map(Path::to_owned), Vec::new());
-    let outages = outages.to_vec();
-    SettingsArgs {
-        outages,
-        scenario,
-        set,
-    }
-    .checked()
-}
-
-/// Settings in a TOML file, by key, and outages in the place of those of the file.
+/// Settings in a TOML file and by key.
 #[derive(clap::Args, Debug, Clone)]
-pub struct SettingsArgs {
-    /// Window without fixes, in seconds (repeatable), or "none" (default: 300:390 and 700:790)
-    #[arg(long = "outage", value_name = "START:END")]
-    pub outages: Vec<OutageFlag>,
+pub struct ScenarioArgs {
     /// Settings in one TOML file; flags override it (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     pub scenario: Option<PathBuf>,
@@ -241,35 +216,41 @@ pub struct SettingsArgs {
     pub set: Vec<String>,
 }
 
-impl SettingsArgs {
-    /// The windows of `--outage`, of which "none" stands alone.
-    fn windows(&self) -> Result<Vec<Outage>> {
-        if self.outages.len() > 1 && self.outages.contains(&OutageFlag::None) {
-            return Err(Failure::input("--outage none stands beside other outages")
-                .hint("give the windows, or none alone"));
-        }
-        let window = |flag: &OutageFlag| match flag {
-            OutageFlag::None => None,
-            OutageFlag::Window(outage) => Some(*outage),
-        };
-        Ok(self.outages.iter().filter_map(window).collect())
-    }
-
-    /// The scenario with settings and outages over its file; not yet checked.
-    pub(crate) fn scenario(&self) -> Result<Scenario> {
+impl ScenarioArgs {
+    /// The file with the settings over it; not yet checked.
+    pub(crate) fn read(&self) -> Result<Scenario> {
         let file = self.scenario.as_deref();
-        let mut scenario = file
+        let scenario = file
             .map(scenario_file::read)
             .transpose()?
             .unwrap_or_default();
-        if !self.set.is_empty() {
-            let over: toml::Table = self.set.join("\n").parse().refuse_within("--set")?;
-            let mut table = toml::Table::try_from(&scenario).refuse()?;
-            merge(&mut table, over);
-            scenario = table.try_into().refuse_within("--set")?;
+        if self.set.is_empty() {
+            return Ok(scenario);
         }
+        let over: toml::Table = self.set.join("\n").parse().refuse_within("--set")?;
+        let mut table = toml::Table::try_from(&scenario).refuse()?;
+        merge(&mut table, over);
+        table.try_into().refuse_within("--set")
+    }
+}
+
+/// The same, with outages in the place of those of the file.
+#[derive(clap::Args, Debug, Clone)]
+pub struct SettingsArgs {
+    /// Window without fixes, in seconds (repeatable), or "none" (default: 300:390 and 700:790)
+    #[arg(id = "outage", long = "outage", value_name = "START:END")]
+    pub outages: Vec<OutageFlag>,
+    /// Other settings.
+    #[command(flatten)]
+    pub file: ScenarioArgs,
+}
+
+impl SettingsArgs {
+    /// The scenario with these outages; not yet checked.
+    pub(crate) fn scenario(&self) -> Result<Scenario> {
+        let mut scenario = self.file.read()?;
         if !self.outages.is_empty() {
-            scenario.outage = Some(self.windows()?);
+            scenario.outage = Some(windows_of(&self.outages)?);
             (scenario.outage_periodic, scenario.outage_random) = (None, None);
         }
         Ok(scenario)

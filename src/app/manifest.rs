@@ -95,7 +95,7 @@ impl Manifest {
 }
 
 /// What files hold and what for, wherever they are.
-pub(crate) fn contents(inputs: &[Input]) -> Vec<(&str, &str)> {
+fn contents(inputs: &[Input]) -> Vec<(&str, &str)> {
     let content = |input| {
         let Input { role, blake3, .. }: &Input = input;
         (role.as_str(), blake3.as_str())

@@ -6,10 +6,11 @@ mod failure;
 pub(crate) mod inputs;
 mod manifest;
 mod outputs;
+pub mod reading;
 
 pub use command::{Answer, Answered, Asked, Command, Out, OutputFile, answered};
 pub use context::{Context, DEFAULT_SEED, Front};
 pub use failure::{Failure, Result};
 pub(crate) use failure::{OrHelp, Refuse, option_elsewhere};
-pub(crate) use manifest::contents;
+
 pub use manifest::{Input, Manifest};

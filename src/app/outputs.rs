@@ -10,6 +10,33 @@ use crate::report::json;
 use nav_sim_document::{Document, Form, encode};
 use std::path::{Path, PathBuf};
 
+/// Claims on all outputs of a command. Directories that were made for them and are empty go when this is dropped.
+#[derive(Default)]
+#[must_use = "another command may write there as soon as this is dropped"]
+pub(crate) struct Claims {
+    own: Vec<Claim>,
+    missing: Vec<PathBuf>,
+}
+
+impl Claims {
+    /// Notes directories of outputs that are not there yet, the outer ones first.
+    fn note_missing<'a>(&mut self, outputs: impl Iterator<Item = &'a PathBuf>) {
+        let above = |output: &'a PathBuf| output.ancestors().skip(1);
+        let missing = outputs.flat_map(above).filter(|path| !path.exists());
+        self.missing.extend(missing.map(Path::to_owned));
+        self.missing.sort();
+    }
+}
+
+impl Drop for Claims {
+    fn drop(&mut self) {
+        self.own.clear();
+        // those with results in them stay
+        let inner_first = self.missing.iter().rev();
+        inner_first.for_each(|path| drop(std::fs::remove_dir(path)));
+    }
+}
+
 const PAGE: &str = "report.html";
 const MANIFEST: &str = "manifest.json";
 
@@ -26,9 +53,10 @@ impl<C: Command> Asked<C> {
 
     /// Claims all outputs: none is an input, nothing is replaced that is not of this command, and nobody else writes
     /// there.
-    pub(crate) fn claim(&self, manifest: &Manifest, existing: Existing) -> Result<Vec<Claim>> {
+    pub(crate) fn claim(&self, manifest: &Manifest, existing: Existing) -> Result<Claims> {
         let inputs = || manifest.inputs.iter().map(|input| Path::new(&input.path));
-        let mut claims = Vec::new();
+        let mut claims = Claims::default();
+        claims.note_missing(self.out.iter().chain(&self.plots));
         match (C::OUT, &self.out) {
             (Out::Directory { files, .. }, Some(out)) => {
                 let names: Vec<&str> = files.iter().copied().chain([PAGE, MANIFEST]).collect();
@@ -38,7 +66,7 @@ impl<C: Command> Asked<C> {
                         .map_or(Found::Foreign, |m| Found::result(m.key == manifest.key)))
                 };
                 let claimed = claim_directory(out, &names, inputs(), existing, recognise);
-                claims.push(claimed.map_err(|e| {
+                claims.own.push(claimed.map_err(|e| {
                     let there = std::fs::read_to_string(out.join(MANIFEST)).unwrap_or_default();
                     match present(&there).and_then(|there| manifest.other_seed(&there)) {
                         Some(seed) => Failure::from(e).hint(format!(
@@ -52,7 +80,7 @@ impl<C: Command> Asked<C> {
             }
             (Out::File { .. }, Some(out)) => {
                 for (ending, kind) in self.request.endings() {
-                    claims.push(claim_result(
+                    claims.own.push(claim_result(
                         &beside(out, &ending),
                         inputs(),
                         kind,
@@ -63,7 +91,9 @@ impl<C: Command> Asked<C> {
             _ => {}
         }
         for path in &self.plots {
-            claims.push(claim_result(path, inputs(), kind_of_plot(path)?, existing)?);
+            claims
+                .own
+                .push(claim_result(path, inputs(), kind_of_plot(path)?, existing)?);
         }
         Ok(claims)
     }

@@ -1,8 +1,8 @@
 //! Wavelet-variance curves that come from elsewhere → models.
 
 use super::Calibration;
+use crate::app::Failure;
 use crate::formats::curve_file;
-use crate::jobs::JobError;
 use nav_sim_calibration::{Bootstrap, Estimator, Group, Outcome, Scope, Settings, fit_curve};
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::wavelet::Curve;
@@ -26,29 +26,32 @@ pub(crate) fn read_curves(
     rate_hz: Option<f64>,
     sensor: Option<Sensor>,
     settings: &Settings,
-) -> Result<Curves, JobError> {
+) -> Result<(Curves, bool), Failure> {
     let named = curve_file::read(path)?;
     let path = || path.display().to_string();
     let rate_hz = match (named[0].rate_hz, rate_hz) {
         (Some(stated), Some(given)) => {
-            return Err(JobError::TwoRates {
-                path: path(),
-                stated,
-                given,
-            });
+            let message = format!(
+                "{}: the curve says its rate, {stated} Hz; --rate-hz {given} is another",
+                path()
+            );
+            return Err(Failure::input(message).hint("leave --rate-hz out: it is for a CSV curve"));
         }
-        (stated, given) => stated
-            .or(given)
-            .ok_or_else(|| JobError::NoRate { path: path() })?,
+        (stated, given) => stated.or(given).ok_or_else(|| {
+            Failure::input(format!(
+                "{}: the curve does not say its sample rate",
+                path()
+            ))
+            .hint("give the rate with --rate-hz: correlation times and the model file need it")
+        })?,
     };
+    let mut is_unsaid = false;
     let mut curves: Vec<(Scope, Estimator, Curve)> = Vec::new();
     for named in named {
         let estimator = named.estimator.and_then(|name| name.parse().ok());
         let estimator = estimator.unwrap_or(Estimator::Given);
-        let sensor = named
-            .sensor
-            .or(sensor)
-            .ok_or_else(|| JobError::NoSensor { path: path() })?;
+        is_unsaid |= named.sensor.or(sensor).is_none();
+        let sensor = named.sensor.or(sensor).unwrap_or(Sensor::Accel);
         let scope = Scope {
             sensor,
             axis: named.axis,
@@ -57,24 +60,27 @@ pub(crate) fn read_curves(
             .iter()
             .any(|(s, e, _)| (*s, *e) == (scope, estimator))
         {
-            return Err(JobError::TwoCurves {
-                path: path(),
-                name: scope.name(),
-                estimator,
-            });
+            let message = format!(
+                "{}: there are two curves of {} for {estimator}",
+                path(),
+                scope.name()
+            );
+            return Err(Failure::input(message)
+                .hint("calibrate the recordings themselves: it averages them"));
         }
         curves.push((scope, estimator, named.curve));
     }
     let has = |e: &Estimator| curves.iter().any(|(_, estimator, _)| estimator == e);
     let estimators = Estimator::ALL.into_iter().filter(has).collect();
-    Ok(Curves {
+    let curves = Curves {
         curves,
         settings: Settings {
             estimators,
             rate_hz,
             ..settings.clone()
         },
-    })
+    };
+    Ok((curves, is_unsaid))
 }
 
 impl Curves {
@@ -82,7 +88,7 @@ impl Curves {
     ///
     /// # Errors
     /// When a curve is too short for the model.
-    pub(crate) fn calibrate(self, bootstrap: Option<Bootstrap>) -> Result<Calibration, JobError> {
+    pub(crate) fn calibrate(self, bootstrap: Option<Bootstrap>) -> Result<Calibration, Failure> {
         let Self { curves, settings } = self;
         let mut groups: Vec<Group> = Vec::new();
         let mut outcomes: Vec<Outcome> = Vec::new();

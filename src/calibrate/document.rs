@@ -2,9 +2,8 @@
 
 use super::charts;
 use super::figures::{averages, figures, policy};
-use super::fits::{FitsFile, interval_of};
+use super::fits::interval_of;
 use super::words::{self, reasons, turn_on_remark};
-use crate::report::Answer;
 use crate::report::comparison_table::in_order;
 use crate::report::curves::{CurvesFile, FittedCurve};
 use nav_sim_calibration::{
@@ -13,7 +12,6 @@ use nav_sim_calibration::{
 };
 use nav_sim_document::{Cell, Document, Importance, Table, Tone, readable, short_names};
 use nav_sim_signal::imu::{Axis, Sensor};
-use serde::Serialize;
 
 /// The fits of a calibration, all of them or those of one estimator, and what was found of the recordings.
 pub(crate) struct ShownCalibration<'a> {
@@ -29,23 +27,6 @@ pub(crate) struct ShownCalibration<'a> {
     pub beginnings: &'a Beginnings,
     /// How all was fitted.
     pub settings: &'a Settings,
-}
-
-/// What `calibrate` answers.
-#[derive(Serialize)]
-pub(crate) struct CalibrationAnswer<'a> {
-    /// As JSON.
-    #[serde(flatten)]
-    pub file: FitsFile<'a>,
-    /// As a document.
-    #[serde(skip)]
-    pub shown: ShownCalibration<'a>,
-}
-
-impl Answer for CalibrationAnswer<'_> {
-    fn document(&self) -> Document {
-        self.shown.document()
-    }
 }
 
 impl ShownCalibration<'_> {

@@ -26,8 +26,6 @@ pub(crate) struct FitsFile<'a> {
     pub replicates: &'a [Diagnosis],
     /// One entry a sensor and estimator: what the recordings' means say of a turn-on bias.
     pub turn_on: Vec<TurnOnEntry>,
-    /// Files written.
-    pub files: Vec<String>,
 }
 
 /// One fit.
@@ -259,7 +257,6 @@ impl<'a> FitsFile<'a> {
         diagnoses: &'a [Diagnosis],
         turn_on: &[TurnOnSpread],
         settings: &Settings,
-        files: Vec<String>,
     ) -> Self {
         let rate_hz = settings.rate_hz;
         Self {
@@ -272,7 +269,6 @@ impl<'a> FitsFile<'a> {
                 .collect(),
             replicates: diagnoses,
             turn_on: turn_on.iter().map(TurnOnEntry::new).collect(),
-            files,
         }
     }
 }

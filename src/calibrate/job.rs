@@ -1,10 +1,11 @@
 //! Calibration: from static recordings, or directories of them, to a noise model for each sensor or axis.
 
-use super::{CalibrationAnswer, FitsFile, ShownCalibration};
+use super::ShownCalibration;
 use crate::app::Context;
+use crate::app::Failure;
+use crate::app::reading::note_report;
 use crate::formats::recordings::{FileReport, ReadOptions, Report};
 use crate::formats::{hash, recordings};
-use crate::jobs::{JobError, note_report};
 use crate::report::CurvesFile;
 use nav_sim_calibration::{
     self, Advance, Beginning, Beginnings, Bootstrap, Diagnosis, Estimator, Group, Outcome, Pool,
@@ -76,13 +77,13 @@ impl EstimatorChoice {
     }
 
     /// The estimators for so many recordings.
-    fn estimators(self, recordings: usize) -> Result<Vec<Estimator>, JobError> {
+    fn estimators(self, recordings: usize) -> Result<Vec<Estimator>, Failure> {
         match self {
             Self::One(estimator) if estimator.is_single() && recordings > 1 => {
-                Err(JobError::Single {
-                    estimator,
-                    recordings,
-                })
+                let message = format!(
+                    "--estimator {estimator} takes one recording at a time; there are {recordings}"
+                );
+                Err(Failure::input(message).hint("awv, sr-awv and dr-awv take several"))
             }
             Self::One(estimator) => Ok(vec![estimator]),
             Self::All if recordings == 1 => Ok(vec![Estimator::Gmwm, Estimator::Rgmwm]),
@@ -169,7 +170,7 @@ pub fn calibrate(
     paths: &[PathBuf],
     options: &CalibrationOptions,
     context: &Context<'_>,
-) -> Result<Calibration, JobError> {
+) -> Result<Calibration, Failure> {
     measure(paths, options, context)?.calibrate(&|_| {})
 }
 
@@ -181,7 +182,7 @@ pub fn measure(
     paths: &[PathBuf],
     options: &CalibrationOptions,
     context: &Context<'_>,
-) -> Result<Measured, JobError> {
+) -> Result<Measured, Failure> {
     let CalibrationOptions {
         reading,
         skip_warm_up,
@@ -214,7 +215,8 @@ pub fn measure(
         ..settings.clone()
     };
     if *pool == Some(Pool::Sensor) && settings.pool() == Pool::Axes {
-        return Err(JobError::Pooled);
+        let message = "--pool sensor: gmwm, rgmwm and avlr take one signal at a time";
+        return Err(Failure::input(message).hint("--pool axes"));
     }
     let mut measured: Vec<_> = looks.into_iter().flat_map(|look| look.replicates).collect();
     one_switching_on(&report, &mut measured);
@@ -242,7 +244,7 @@ impl Measured {
     ///
     /// # Errors
     /// When a trim leaves no replicate, or a curve is too short for the model.
-    pub fn calibrate(self, advance: Advance<'_>) -> Result<Calibration, JobError> {
+    pub fn calibrate(self, advance: Advance<'_>) -> Result<Calibration, Failure> {
         let Self {
             groups,
             beginnings,
@@ -274,24 +276,6 @@ impl Calibration {
     pub fn model(&self, estimator: Estimator) -> Model {
         let own = self.outcomes.iter().filter(|o| o.estimator == estimator);
         nav_sim_calibration::model_of(own, self.settings.rate_hz)
-    }
-
-    /// What `calibrate` answers of it. `files`: those that were written.
-    pub(crate) fn answer<'a>(
-        &'a self,
-        diagnoses: &'a [Diagnosis],
-        files: Vec<String>,
-    ) -> CalibrationAnswer<'a> {
-        CalibrationAnswer {
-            file: FitsFile::new(
-                &self.outcomes,
-                diagnoses,
-                &self.turn_on,
-                &self.settings,
-                files,
-            ),
-            shown: self.shown(diagnoses, |_| true),
-        }
     }
 
     /// The fits that are chosen, to be shown.
@@ -357,7 +341,7 @@ pub(crate) fn visit<T: Send>(
     reading: &ReadOptions,
     look: &(dyn Fn(Recording) -> T + Sync),
     context: &Context<'_>,
-) -> Result<(Vec<T>, Report), JobError> {
+) -> Result<(Vec<T>, Report), Failure> {
     let tell = |done, all| match done {
         0 => context.begin("recordings", all as u64),
         _ => context.advance(1),
@@ -415,17 +399,16 @@ fn one_switching_on(report: &Report, measured: &mut [(Channel, Replicate)]) {
 }
 
 /// Refuses copies of a recording.
-fn distinct(looks: &[MeasuredRecording]) -> Result<(), JobError> {
+fn distinct(looks: &[MeasuredRecording]) -> Result<(), Failure> {
     for (i, look) in looks.iter().enumerate() {
         let copy = |other: &&MeasuredRecording| {
             other.recording != look.recording
                 && other.signals.iter().any(|s| look.signals.contains(s))
         };
         if let Some(first) = looks[..i].iter().find(copy) {
-            return Err(JobError::Copy {
-                copy: look.recording.clone(),
-                first: first.recording.clone(),
-            });
+            let (copy, first) = (&look.recording, &first.recording);
+            let message = format!("{copy} is a copy of {first}: it would count as two replicates");
+            return Err(Failure::input(message).hint("leave one of them out"));
         }
     }
     Ok(())

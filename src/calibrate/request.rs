@@ -1,26 +1,39 @@
-//! The request of a calibration: the arguments of `nav-sim calibrate`.
+//! `nav-sim calibrate`: replicate static recordings → noise model.
 
 use super::curve::{Curves, read_curves};
-use super::{CalibrationNote, CalibrationOptions, EstimatorChoice, Measured, ModelFiles, measure};
-use crate::app::Answered;
-use crate::app::Context;
-use crate::app::Failure;
-use crate::formats::input;
-use crate::jobs::{JobError, RecordingRequest, VarianceRequest, unknown_model};
+use super::files::endings;
+use super::{
+    Calibration, CalibrationNote, CalibrationOptions, EstimatorChoice, FitsFile, Measured, measure,
+};
+use crate::app::inputs::{files, listed};
+use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::formats::atomic::Written;
 use crate::parse;
 use nav_sim_calibration::{
-    Advance, Bootstrap, Estimator, ModelChoice, ModelSpec, Pool, Settings, Trim, Weighting,
+    Bootstrap, Diagnosis, Estimator, ModelChoice, ModelSpec, Pool, Settings, Trim, Weighting,
     diagnose,
 };
-use nav_sim_signal::imu::Sensor;
+use nav_sim_document::Document;
 use nav_sim_signal::wavelet::Convention;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// Recordings or a curve, and how a model is fitted to them.
-#[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct CalibrationRequest {
+/// Fit a noise model to static recordings
+///
+/// Each recording is one replicate. By default the three axes of a sensor are pooled: there is one model per
+/// sensor, and the signals of its axes are replicates of one another. The model goes to a TOML file. Beside it,
+/// <model>.wv.json holds the curves, <model>.draws.json the draws behind the intervals, <model>.html a page and
+/// <model>.svg its figures. With `--estimator all` there is such a set for each estimator, <model>_<estimator>.toml and so on.
+#[derive(clap::Args, Debug, Clone)]
+#[command(before_help = "\
+Examples:
+  nav-sim synthesize calib_data/consumer_mems.toml \\
+      --replicates 5 --samples 65536 --spread --seed 1 -o static
+  nav-sim calibrate static -o model.toml
+  nav-sim calibrate static --estimator all --model \"AR1+RW+WN\" --pool axes -o imu.toml")]
+pub struct Calibrate {
     /// Recordings, or directories of recordings
     #[arg(
         value_name = "INPUT",
@@ -34,7 +47,6 @@ pub struct CalibrationRequest {
     /// Which curve is fitted: an average over the replicates (awv; sr-awv, robust to outliers; dr-awv, robust to
     /// abnormal replicates too), or the curve of a single recording (gmwm, rgmwm; avlr: slopes of its Allan deviation)
     #[arg(long, value_parser = parse::words::<EstimatorChoice>(&ESTIMATORS), default_value_t)]
-    #[serde(with = "parse::text")]
     pub estimator: EstimatorChoice,
     /// Sum of WN QN AR1 GM MA1 FN RW DR such as 2*AR1+RW+WN+QN, N1 = AR1+RW+WN, N2 = 2*AR1+RW+WN+QN, or auto: the
     /// simplest sum of WN QN RW DR and up to two AR1 that fits as well as the best one, with the reasons
@@ -42,7 +54,6 @@ pub struct CalibrationRequest {
     pub model: String,
     /// Replicates that dr-awv drops at each end of each scale: a number, or a percentage of all
     #[arg(long, value_name = "A", default_value_t)]
-    #[serde(with = "parse::text")]
     pub trim: Trim,
     /// Weight of a scale in the fit
     #[arg(long, value_parser = parse::words::<Weighting>(&WEIGHTINGS), default_value_t)]
@@ -59,27 +70,6 @@ pub struct CalibrationRequest {
     /// Scales and robustness.
     #[command(flatten)]
     pub tuning: VarianceRequest,
-    /// Seed of the draws.
-    #[arg(skip)]
-    pub seed: u64,
-}
-
-impl Default for CalibrationRequest {
-    fn default() -> Self {
-        Self {
-            inputs: Vec::new(),
-            curve: None,
-            estimator: EstimatorChoice::default(),
-            model: ModelSpec::USUAL.to_owned(),
-            trim: Trim::default(),
-            weighting: Weighting::default(),
-            pool: None,
-            bootstrap: Bootstrap::DRAWS as u32,
-            recordings: RecordingRequest::default(),
-            tuning: VarianceRequest::default(),
-            seed: 0,
-        }
-    }
 }
 
 /// Flags about recordings and their averages, which a curve has behind it.
@@ -136,9 +126,98 @@ const POOLS: [(&str, &str); 2] = [
     ),
 ];
 
-impl CalibrationRequest {
+/// A calibration, and what is recorded of it.
+pub struct CalibrationAnswer {
+    calibration: Calibration,
+    note: CalibrationNote,
+    diagnoses: Vec<Diagnosis>,
+}
+
+impl Command for Calibrate {
+    type Answer = CalibrationAnswer;
+    const NAME: &'static str = "calibrate";
+    const OUT: Out = Out::File {
+        kind: Written::Calibrated,
+        name: "model.toml",
+        help: "The model file (default: model.toml; none for --curve)",
+    };
+
+    fn writes_by_default(&self) -> bool {
+        self.curve.is_none()
+    }
+
+    fn endings(&self) -> Vec<(Cow<'static, str>, Written)> {
+        endings(&self.estimator.possible())
+    }
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        let curve = files("curve", &self.curve);
+        Ok(curve.chain(listed("recording", &self.inputs)?).collect())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<CalibrationAnswer> {
+        let settings = self.settings()?;
+        let calibration = match &self.curve {
+            Some(path) => {
+                let (curves, is_unsaid) = self.curves(path, &settings)?;
+                if is_unsaid {
+                    context.remark(format!(
+                        "{}: taken as of an accelerometer (--axes gyro: of a gyroscope)",
+                        path.display()
+                    ));
+                }
+                curves.calibrate(self.draws(context))?
+            }
+            None => {
+                let measured = self.measure(settings, context)?;
+                context.begin("steps of the fits", measured.steps());
+                let calibration = measured.calibrate(&|steps| context.advance(steps))?;
+                context.end();
+                calibration
+            }
+        };
+        let Calibration {
+            groups,
+            outcomes,
+            settings,
+            ..
+        } = &calibration;
+        Ok(CalibrationAnswer {
+            diagnoses: diagnose(groups, outcomes, settings),
+            note: self.note(settings, context),
+            calibration,
+        })
+    }
+}
+
+impl Serialize for CalibrationAnswer {
+    fn serialize<S: serde::Serializer>(
+        &self,
+        serializer: S,
+    ) -> std::result::Result<S::Ok, S::Error> {
+        let Calibration {
+            outcomes,
+            turn_on,
+            settings,
+            ..
+        } = &self.calibration;
+        FitsFile::new(outcomes, &self.diagnoses, turn_on, settings).serialize(serializer)
+    }
+}
+
+impl Answer for CalibrationAnswer {
+    fn document(&self) -> Document {
+        self.calibration.shown(&self.diagnoses, |_| true).document()
+    }
+
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        self.calibration.files(&self.note, &self.diagnoses)
+    }
+}
+
+impl Calibrate {
     /// How models are fitted, checked before any file is read.
-    pub(crate) fn settings(&self) -> Result<Settings, Failure> {
+    pub(crate) fn settings(&self) -> Result<Settings> {
         Ok(Settings {
             model: self.structure()?,
             trim: self.trim,
@@ -150,11 +229,7 @@ impl CalibrationRequest {
     }
 
     /// The recordings, read and measured.
-    pub(crate) fn measure(
-        &self,
-        settings: Settings,
-        context: &Context<'_>,
-    ) -> Result<Measured, Failure> {
+    pub(crate) fn measure(&self, settings: Settings, context: &Context<'_>) -> Result<Measured> {
         let options = CalibrationOptions {
             reading: self.recordings.options(),
             skip_warm_up: self.recordings.reading.skips_warm_up(),
@@ -162,95 +237,34 @@ impl CalibrationRequest {
             estimators: self.estimator,
             pool: self.pool,
             settings,
-            bootstrap: self.draws(),
+            bootstrap: self.draws(context),
             turn_on: true,
         };
         Ok(measure(&self.inputs, &options, context)?)
     }
 
     /// The curves in the place of recordings, and whether they do not say of which sensor: then as of an accelerometer.
-    pub(crate) fn curves(
-        &self,
-        path: &Path,
-        settings: &Settings,
-    ) -> Result<(Curves, bool), Failure> {
-        let curves_of =
-            |sensor| read_curves(path, self.recordings.reading.rate_hz, sensor, settings);
-        match curves_of(self.recordings.sensor()) {
-            Err(JobError::NoSensor { .. }) => Ok((curves_of(Some(Sensor::Accel))?, true)),
-            read => Ok((read?, false)),
-        }
+    pub(crate) fn curves(&self, path: &Path, settings: &Settings) -> Result<(Curves, bool)> {
+        let rate_hz = self.recordings.reading.rate_hz;
+        read_curves(path, rate_hz, self.recordings.sensor(), settings)
     }
 
     /// The draws behind intervals.
-    pub(crate) fn draws(&self) -> Option<Bootstrap> {
-        (self.bootstrap > 0).then_some(Bootstrap {
+    fn draws(&self, context: &Context<'_>) -> Option<Bootstrap> {
+        (self.bootstrap > 0).then(|| Bootstrap {
             draws: self.bootstrap as usize,
-            seed: self.seed,
+            seed: context.seed_or(None),
         })
     }
 
-    /// What is recorded of a calibration of these files.
-    pub(crate) fn note(
-        &self,
-        files: &[PathBuf],
-        settings: &Settings,
-    ) -> Result<CalibrationNote, Failure> {
-        let role = if self.curve.is_some() {
-            "curve"
-        } else {
-            "recording"
-        };
-        Ok(CalibrationNote {
+    /// What is recorded of the calibration.
+    fn note(&self, settings: &Settings, context: &Context<'_>) -> CalibrationNote {
+        CalibrationNote {
             efficiency_convention: Convention::Exact,
             reading: self.reading(settings),
-            seed: self.draws().map(|draws| draws.seed),
-            inputs: files
-                .iter()
-                .map(|path| input::input(role, path))
-                .collect::<Result<_, _>>()?,
-        })
-    }
-
-    /// As `nav-sim calibrate` prints it; its files are those of `model.toml`.
-    ///
-    /// # Errors
-    /// What is wrong with a file or a setting, or that there is no fit.
-    pub fn answer(&self, context: &Context<'_>, advance: Advance<'_>) -> Result<Answered, Failure> {
-        let settings = self.settings()?;
-        let (calibration, files) = match &self.curve {
-            Some(path) => (
-                self.curves(path, &settings)?.0.calibrate(self.draws())?,
-                vec![path.clone()],
-            ),
-            None => {
-                let measured = self.measure(settings, context)?;
-                let files = measured
-                    .report
-                    .files
-                    .iter()
-                    .map(|f| f.path.clone())
-                    .collect();
-                (measured.calibrate(advance)?, files)
-            }
-        };
-        let note = self.note(&files, &calibration.settings)?;
-        let diagnoses = diagnose(
-            &calibration.groups,
-            &calibration.outcomes,
-            &calibration.settings,
-        );
-        let made = ModelFiles::of(Path::new("model.toml"), &calibration.settings.estimators);
-        let files = made
-            .iter()
-            .flat_map(|files| files.texts(&calibration, &note, None));
-        let files = files
-            .map(|(path, text)| (path.display().to_string(), text))
-            .collect();
-        Ok(Answered {
-            files,
-            ..Answered::of(&calibration.answer(&diagnoses, Vec::new()))
-        })
+            seed: self.draws(context).map(|draws| draws.seed),
+            inputs: context.inputs().to_vec(),
+        }
     }
 
     /// How the recordings were read and grouped; of a curve nothing is known.
@@ -269,7 +283,7 @@ impl CalibrationRequest {
         table
     }
 
-    fn structure(&self) -> Result<ModelChoice, Failure> {
+    fn structure(&self) -> Result<ModelChoice> {
         let chosen: ModelChoice = self.model.parse().map_err(unknown_model)?;
         if self.estimator == EstimatorChoice::One(Estimator::Avlr) && self.tuning.fitted().is_some()
         {

@@ -1,7 +1,6 @@
 //! The ranking of candidates: `ranking.json`, and what is said and drawn of it.
 
 use super::{FoldScore, Mean, Placed, Ranking};
-use crate::report::Answer;
 use crate::report::dots::{Dots, dot_chart};
 use nav_sim_document::{
     Axis, Cell, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, Tone,
@@ -337,8 +336,9 @@ impl Serialize for ChoiceReport<'_> {
     }
 }
 
-impl Answer for ChoiceReport<'_> {
-    fn document(&self) -> Document {
+impl ChoiceReport<'_> {
+    /// Ranking, verdict and charts.
+    pub(super) fn document(&self) -> Document {
         let tone = if self.ranking.tells {
             Tone::Good
         } else {

@@ -3,7 +3,7 @@
 use super::candidate::{Candidate, Inflation};
 use super::laboratory::Laboratory;
 use super::score::Score;
-use crate::jobs::JobError;
+use crate::app::Failure;
 use nav_sim_calibration::{CalibrationError, model_of};
 use nav_sim_navigation::ekf::{Belief, BeliefError};
 use nav_sim_navigation::monte_carlo;
@@ -29,55 +29,6 @@ pub struct Drive {
     outages: Vec<Outage>,
     seed: u64,
     track: Track,
-}
-
-/// Why candidates cannot be compared.
-#[derive(Debug, thiserror::Error)]
-pub enum ChoiceError {
-    /// Recordings that cannot be measured.
-    #[error(transparent)]
-    Job(Box<JobError>),
-    /// Too few recordings to leave one out.
-    #[error("{recordings} recordings are too few to leave one out: {needed} or more are needed")]
-    TooFew {
-        /// How many there are.
-        recordings: usize,
-        /// How many are needed.
-        needed: usize,
-    },
-    /// Trajectory, rates, fixes and recordings do not fit together.
-    #[error(transparent)]
-    Experiment(#[from] ExperimentError),
-    /// A model cannot be made.
-    #[error("{candidate}: {source}")]
-    Calibration {
-        /// The candidate.
-        candidate: String,
-        /// Why.
-        source: Box<CalibrationError>,
-    },
-    /// The noise of one recording cannot be described.
-    #[error("the noise of {recording} alone: {source}")]
-    Own {
-        /// The recording.
-        recording: String,
-        /// Why.
-        source: Box<CalibrationError>,
-    },
-    /// A model has no such filter.
-    #[error("{candidate}: {source}")]
-    Belief {
-        /// The candidate.
-        candidate: String,
-        /// Why.
-        source: BeliefError,
-    },
-}
-
-impl From<JobError> for ChoiceError {
-    fn from(e: JobError) -> Self {
-        Self::Job(Box::new(e))
-    }
 }
 
 /// One recording left out.
@@ -147,7 +98,7 @@ impl Drive {
         candidates: &[Candidate],
         runs: u64,
         progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<Fold, ChoiceError> {
+    ) -> Result<Fold, Failure> {
         let models = self.models(laboratory, Some(k), candidates)?;
         let beliefs = self.beliefs(candidates, &models)?;
         let left_out_model = own_model(laboratory, k)?;
@@ -183,7 +134,7 @@ impl Drive {
         laboratory: &Laboratory,
         without: Option<usize>,
         candidates: &[Candidate],
-    ) -> Result<Vec<Model>, ChoiceError> {
+    ) -> Result<Vec<Model>, Failure> {
         let mut made: Vec<(&Candidate, Model)> = Vec::new();
         for candidate in candidates {
             if !made
@@ -216,7 +167,7 @@ impl Drive {
         without: Option<usize>,
         candidate: &Candidate,
         model: &Model,
-    ) -> Result<Model, ChoiceError> {
+    ) -> Result<Model, Failure> {
         match candidate.inflation {
             Inflation::None => Ok(model.clone()),
             Inflation::Tenfold => Ok(tenfold(model)),
@@ -235,7 +186,7 @@ impl Drive {
         candidate: &Candidate,
         model: &Model,
         truths: &[Model],
-    ) -> Result<Model, ChoiceError> {
+    ) -> Result<Model, Failure> {
         let full = self.scenario.with_full_noise();
         let full = |model: &Model| full.belief(model, &self.outages, &self.track);
         let truths: Vec<TrueErrors> = truths.iter().cloned().map(TrueErrors::from).collect();
@@ -255,11 +206,7 @@ impl Drive {
     }
 
     /// What each candidate's filter believes.
-    fn beliefs(
-        &self,
-        candidates: &[Candidate],
-        models: &[Model],
-    ) -> Result<Vec<Belief>, ChoiceError> {
+    fn beliefs(&self, candidates: &[Candidate], models: &[Model]) -> Result<Vec<Belief>, Failure> {
         let pairs: Vec<(&Candidate, &Model)> = candidates.iter().zip(models).collect();
         let belief = |(candidate, model): &(&Candidate, &Model)| {
             let mut scenario = self.scenario.clone();
@@ -313,18 +260,14 @@ impl Drive {
     }
 }
 
-fn own_model(laboratory: &Laboratory, k: usize) -> Result<&Model, ChoiceError> {
-    laboratory.own_model(k).map_err(|source| ChoiceError::Own {
-        recording: laboratory.units()[k].name.clone(),
-        source: Box::new(source),
-    })
+fn own_model(laboratory: &Laboratory, k: usize) -> Result<&Model, Failure> {
+    let recording = &laboratory.units()[k].name;
+    let told = |e| Failure::from(e).within(&format!("the noise of {recording} alone"));
+    laboratory.own_model(k).map_err(told)
 }
 
-fn uncalibrated(candidate: &Candidate, source: CalibrationError) -> ChoiceError {
-    ChoiceError::Calibration {
-        candidate: candidate.to_string(),
-        source: Box::new(source),
-    }
+fn uncalibrated(candidate: &Candidate, e: CalibrationError) -> Failure {
+    Failure::from(e).within(&candidate.to_string())
 }
 
 /// Ten times every standard deviation.
@@ -336,9 +279,6 @@ fn tenfold(model: &Model) -> Model {
     scaled(model, &factors)
 }
 
-fn unfit(candidate: &Candidate, source: BeliefError) -> ChoiceError {
-    ChoiceError::Belief {
-        candidate: candidate.to_string(),
-        source,
-    }
+fn unfit(candidate: &Candidate, e: BeliefError) -> Failure {
+    Failure::input(e).within(&candidate.to_string())
 }

@@ -1,13 +1,13 @@
 //! Static recordings and a trajectory → the noise model that a filter is best made of.
 
-use super::{Candidate, ChoiceError, Contender, Drive, Fold, Laboratory, Ranking, Unit};
+use super::{Candidate, Contender, Drive, Fold, Laboratory, Ranking, Unit};
 use crate::app::Context;
+use crate::app::Failure;
 use crate::calibrate::{
     Calibration, CalibrationOptions, EstimatorChoice, Measured, measure, without_warm_up,
 };
 use crate::formats::recordings;
 use crate::formats::recordings::{FileReport, ReadOptions};
-use crate::jobs::JobError;
 use crate::report::six_digits;
 use nav_sim_calibration::{Estimator, model_of};
 use nav_sim_navigation::scenario::Scenario;
@@ -66,7 +66,7 @@ pub fn choose(
     candidates: &[Candidate],
     drive: ChoiceDrive,
     context: &Context<'_>,
-) -> Result<Chosen, ChoiceError> {
+) -> Result<Chosen, Failure> {
     let options = CalibrationOptions {
         estimators: EstimatorChoice::One(Estimator::Awv),
         ..options.clone()
@@ -97,10 +97,13 @@ pub fn choose(
     let options = CalibrationOptions { reading, ..options };
     let files = measured.report.files.clone();
     if files.len() < FEWEST {
-        return Err(ChoiceError::TooFew {
-            recordings: files.len(),
-            needed: FEWEST,
-        });
+        let message = format!(
+            "{} recordings are too few to leave one out: {FEWEST} or more are needed",
+            files.len()
+        );
+        return Err(
+            Failure::input(message).hint("each recording is a file; nav-sim calibrate takes fewer")
+        );
     }
     let units = units(&measured);
     let samples: Vec<usize> = units.iter().map(samples_in).collect();
@@ -117,7 +120,7 @@ pub fn choose(
         .iter()
         .map(|count| runs.unwrap_or_else(|| runs_on(&drive, *count)))
         .collect();
-    let judges = laboratory.judges().map_err(JobError::from)?;
+    let judges = laboratory.judges().map_err(Failure::from)?;
     context.begin("runs", judges.iter().map(|k| runs[*k]).sum());
     let mut folds: Vec<(String, Fold)> = Vec::new();
     for &k in &judges {
@@ -132,9 +135,8 @@ pub fn choose(
     let ranking = Ranking::new(&contenders, &folds);
     let winner = candidates[ranking.winner().index].clone();
     // an estimator of single recordings never wins: this is of all of them
-    let (groups, outcomes, settings) = laboratory
-        .calibrate(&winner, None)
-        .map_err(JobError::from)?;
+    let (groups, outcomes, settings) =
+        laboratory.calibrate(&winner, None).map_err(Failure::from)?;
     let calibrated = model_of(&outcomes, settings.rate_hz);
     let model = drive.inflated(&laboratory, None, &winner, &calibrated)?;
     let calibration = Calibration {
@@ -222,7 +224,7 @@ fn runs_on(drive: &Drive, samples: usize) -> u64 {
 }
 
 /// The samples that were measured: a warm-up that was left out of the curves is no stretch to navigate on either.
-fn samples_of(file: &FileReport, options: &CalibrationOptions) -> Result<Vec<Recording>, JobError> {
+fn samples_of(file: &FileReport, options: &CalibrationOptions) -> Result<Vec<Recording>, Failure> {
     let (read, _) = recordings::read(std::slice::from_ref(&file.path), &options.reading)?;
     let measured = |recording| without_warm_up(recording, options.skip_warm_up).0;
     Ok(read.into_iter().map(measured).collect())

@@ -10,8 +10,6 @@
 mod candidate;
 mod document;
 mod drive;
-mod failure;
-mod files;
 mod job;
 mod laboratory;
 mod ranking;
@@ -20,10 +18,9 @@ mod score;
 
 pub use candidate::{Candidate, Inflation};
 pub(crate) use document::{ChoiceReport, RankedPlace};
-pub use drive::{ChoiceError, Drive, Fold};
-pub(crate) use files::claim_choice;
+pub use drive::{Drive, Fold};
 pub use job::{ChoiceDrive, Chosen, choose};
 pub use laboratory::{Laboratory, Unit};
 pub use ranking::{Contender, Difference, FoldScore, Mean, Placed, Ranking};
-pub use request::ChoiceRequest;
+pub use request::{ChoiceMade, Choose};
 pub use score::{EndScore, Score};

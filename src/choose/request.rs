@@ -1,37 +1,48 @@
-//! The request of a choice: the arguments of `nav-sim choose`.
+//! `nav-sim choose`: the noise model for a filter, by the recordings themselves.
 
 use super::document::ChoiceReport;
 use super::job::{ChoiceDrive, Chosen, choose};
 use super::{Candidate, Inflation};
-use crate::app::Answered;
-use crate::app::Context;
-use crate::app::Failure;
-use crate::app::inputs::{self as read, OutageFlag};
-use crate::calibrate::{CalibrationNote, CalibrationOptions, ESTIMATORS};
+use crate::app::inputs::{self, SettingsArgs, files, listed};
+use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::calibrate::{Calibration, CalibrationNote, CalibrationOptions, ESTIMATORS};
 use crate::formats::recordings::Gaps;
-use crate::jobs::{ReadingRequest, WHOLE, unknown_model};
 use crate::parse;
-use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim};
+use crate::report::json;
+use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, diagnose};
+use nav_sim_document::Document;
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_signal::wavelet::Convention;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::path::PathBuf;
 
-/// Recordings, candidates, and the drive that judges them.
-#[derive(clap::Args, Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ChoiceRequest {
+/// Choose the noise model for a filter by navigating on recordings left out of its calibration
+///
+/// Leaves out one recording at a time, calibrates every candidate on the others and navigates along TRAJECTORY with
+/// windows of the one left out; abnormal recordings are not left out, and judge nothing. Ranks the candidates by the mean log density of the true errors at the ends of outages
+/// under the filter's covariance, which rewards accuracy and consistency together. Also prints RMSE, NEES and coverage,
+/// with intervals over recordings. Writes report.html, ranking.json and model.toml, the winner calibrated on all
+/// recordings.
+#[derive(clap::Args, Debug, Clone)]
+#[command(before_help = "\
+Examples:
+  nav-sim synthesize calib_data/consumer_mems.toml --replicates 4 --samples 16384 -o recordings
+  nav-sim choose recordings --trajectory trajectories/figure_eight.toml --outage 60:90 \\
+      --estimator awv,dr-awv --inflate none,x10
+  nav-sim choose recordings --trajectory trajectories/figure_eight.toml --outage 60:90 \\
+      --estimator awv --model N1,WN+RW --filter 15,full -o out/models --format json")]
+pub struct Choose {
     /// Static recordings, three or more files, or directories of them
     #[arg(required = true, value_name = "RECORDINGS")]
     pub inputs: Vec<PathBuf>,
     /// Trajectory: motion profile (.toml) or table (.csv)
     #[arg(long, value_name = "FILE")]
     pub trajectory: PathBuf,
-    /// Window without fixes, in seconds (repeatable) (default: 300:390 and 700:790)
-    #[arg(long = "outage", value_name = "START:END")]
-    #[serde(rename = "outage")]
-    pub outages: Vec<OutageFlag>,
+    /// Outages, receiver, start, what filters expect.
+    #[command(flatten)]
+    pub settings: SettingsArgs,
     /// Estimators to compare [default: awv, sr-awv, dr-awv and, for comparison, gmwm and avlr of single recordings]
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = parse::words::<Estimator>(EACH))]
     pub estimator: Vec<Estimator>,
@@ -50,36 +61,29 @@ pub struct ChoiceRequest {
     pub runs: Option<u64>,
     /// What DR-AWV drops at each end of each scale: a number, or a share such as 30%
     #[arg(long, value_name = "A", default_value_t)]
-    #[serde(with = "parse::text")]
     pub trim: Trim,
-    /// Scenario file: receiver, start, what filters expect (see `nav-sim schema scenario`)
-    #[arg(long, value_name = "FILE")]
-    pub scenario: Option<PathBuf>,
     /// What to do where the time jumps or stands still
     #[arg(long, value_parser = parse::words::<Gaps>(WHOLE), default_value_t)]
-    #[serde(with = "parse::text")]
     pub gaps: Gaps,
     /// How recordings are read.
     #[command(flatten)]
     pub recordings: ReadingRequest,
-    /// Seed of all random numbers; that of the scenario without it, or one that is drawn.
-    #[arg(skip)]
-    pub seed: Option<u64>,
 }
 
 /// The estimators that are one.
 const EACH: &[(&str, &str)] = ESTIMATORS.split_at(6).0;
 
 /// What was chosen, and where.
-pub(crate) struct ChoiceMade {
-    pub chosen: Chosen,
+pub struct ChoiceMade {
+    chosen: Chosen,
+    note: CalibrationNote,
     outages: Vec<Outage>,
     trajectory: String,
     seed: u64,
 }
 
 impl ChoiceMade {
-    pub(crate) fn report(&self) -> ChoiceReport<'_> {
+    fn report(&self) -> ChoiceReport<'_> {
         ChoiceReport {
             ranking: &self.chosen.ranking,
             abnormal: &self.chosen.abnormal,
@@ -90,24 +94,77 @@ impl ChoiceMade {
     }
 }
 
-impl ChoiceRequest {
-    /// What the recordings say. `draw` is asked for a seed where neither the request nor the scenario has one.
-    pub(crate) fn made(
+impl Serialize for ChoiceMade {
+    fn serialize<S: serde::Serializer>(
         &self,
-        draw: impl FnOnce() -> u64,
-        context: &Context<'_>,
-    ) -> Result<ChoiceMade, Failure> {
+        serializer: S,
+    ) -> std::result::Result<S::Ok, S::Error> {
+        self.report().serialize(serializer)
+    }
+}
+
+impl Answer for ChoiceMade {
+    fn document(&self) -> Document {
+        self.report().document()
+    }
+
+    /// The winner's model with its curves and draws, and the ranking.
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        let Chosen {
+            winner,
+            calibration,
+            model,
+            ..
+        } = &self.chosen;
+        let Calibration {
+            groups,
+            outcomes,
+            settings,
+            ..
+        } = calibration;
+        let diagnoses = diagnose(groups, outcomes, settings);
+        let names = ("model.toml".to_owned(), "model".to_owned());
+        let how = winner.inflation;
+        let inflated = (how != Inflation::None).then(|| (model, how.name()));
+        let made = (&self.note, diagnoses.as_slice());
+        let mut files = calibration.files_of(winner.estimator, names, made, inflated);
+        files.push(OutputFile::whole("ranking.json", json(self)));
+        files
+    }
+}
+
+impl Command for Choose {
+    type Answer = ChoiceMade;
+    const NAME: &'static str = "choose";
+    const OUT: Out = Out::Directory {
+        path: "out/choice",
+        files: &[
+            "model.toml",
+            "model.wv.json",
+            "model.html",
+            "model.svg",
+            "model.draws.json",
+            "ranking.json",
+        ],
+    };
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        self.candidates()?;
+        let trajectory = files("trajectory", [&self.trajectory]);
+        let scenario = files("scenario", &self.settings.file.scenario);
+        let recordings = listed("recording", &self.inputs)?;
+        Ok(trajectory.chain(recordings).chain(scenario).collect())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<ChoiceMade> {
         let candidates = self.candidates()?;
-        let scenario =
-            crate::app::inputs::checked_scenario(self.scenario.as_deref(), &self.outages)?;
-        let trajectory = read::trajectory(&self.trajectory, context)?;
-        let seed = self.seed.or(scenario.run.seed).unwrap_or_else(draw);
-        let outages = read::placed(&scenario, &trajectory, seed, context)?;
+        let scenario = self.settings.checked()?;
+        let trajectory = inputs::trajectory(&self.trajectory, context)?;
+        let seed = context.seed_or(scenario.run.seed);
+        let outages = inputs::placed(&scenario, &trajectory, seed, context)?;
         if outages.is_empty() {
-            return Err(Failure::input(
-                "there is no outage, and candidates are judged at the ends of outages",
-            )
-            .hint("give one with --outage START:END"));
+            let message = "there is no outage, and candidates are judged at the ends of outages";
+            return Err(Failure::input(message).hint("give one with --outage START:END"));
         }
         let options = CalibrationOptions {
             reading: self.recordings.options(self.gaps),
@@ -131,50 +188,25 @@ impl ChoiceRequest {
             runs: self.runs,
         };
         let chosen = choose(&self.inputs, &options, &candidates, drive, context)?;
+        let note = CalibrationNote {
+            efficiency_convention: Convention::Exact,
+            reading: self.recordings.provenance(self.gaps),
+            seed: Some(seed),
+            inputs: context.inputs().to_vec(),
+        };
         Ok(ChoiceMade {
             chosen,
+            note,
             outages,
             trajectory: self.trajectory.display().to_string(),
             seed,
         })
     }
+}
 
-    /// As `nav-sim choose` prints it; the winner is the file `model.toml`.
-    ///
-    /// # Errors
-    /// What is wrong with a file or a setting, or that there is nothing to choose by.
-    pub fn answer(
-        &self,
-        draw: impl FnOnce() -> u64,
-        context: &Context<'_>,
-    ) -> Result<Answered, Failure> {
-        let made = self.made(draw, context)?;
-        let files = made.chosen.model_files("model.toml".as_ref());
-        let texts = made
-            .chosen
-            .texts(&files, &self.trajectory, self.note(&made))?;
-        let files = texts
-            .into_iter()
-            .map(|(path, text)| (path.display().to_string(), text))
-            .collect();
-        Ok(Answered {
-            files,
-            ..Answered::of(&made.report())
-        })
-    }
-
-    /// What is recorded of the winner's calibration.
-    pub(crate) fn note(&self, made: &ChoiceMade) -> CalibrationNote {
-        CalibrationNote {
-            efficiency_convention: Convention::Exact,
-            reading: self.recordings.provenance(self.gaps),
-            seed: Some(made.seed),
-            inputs: Vec::new(),
-        }
-    }
-
+impl Choose {
     /// Those that are usual, or all combinations of what is given.
-    pub(crate) fn candidates(&self) -> Result<Vec<Candidate>, Failure> {
+    fn candidates(&self) -> Result<Vec<Candidate>> {
         let Self {
             estimator,
             model,
@@ -188,7 +220,7 @@ impl ChoiceRequest {
         let mut models = model
             .iter()
             .map(|m| m.parse().map_err(unknown_model))
-            .collect::<Result<Vec<ModelChoice>, Failure>>()?;
+            .collect::<Result<Vec<ModelChoice>>>()?;
         if models.is_empty() {
             models.push(ModelChoice::default());
         }

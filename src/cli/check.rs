@@ -1,12 +1,12 @@
 //! `nav-sim check`: whether a file is what it should be.
 
 use super::{Failure, Session, parse, read};
+use crate::commands::inspect::inspect;
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
 use crate::formats::logs::LogOptions;
 use crate::formats::{contamination_file, curve_file, datasheet, model_file, scenario_file};
 use crate::fuse::FuseError;
-use crate::inspect::inspect;
 use crate::report::six_digits;
 use nav_sim_document::seconds;
 use nav_sim_navigation::fusion::alignment::moves;

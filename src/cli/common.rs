@@ -2,9 +2,8 @@
 
 use super::{Failure, Printer, Progress};
 use crate::app::{Context, Front};
-use crate::formats::atomic::{self, Existing};
-use crate::report::{Answer, WIDTH, json};
-use nav_sim_document::{Document, Importance, Note};
+use crate::formats::atomic::Existing;
+use nav_sim_document::Note;
 use std::fmt::Display;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
@@ -115,24 +114,6 @@ impl Session {
         self.printer.result(shown.trim_end());
     }
 
-    /// Puts a result to stdout, as JSON or in words, and its notes to stderr; returns its document, for page and picture.
-    pub(crate) fn answer(&self, answer: &impl Answer) -> Document {
-        let document = answer.document();
-        let shown = match (self.json(), self.verbose()) {
-            (true, _) => json(answer),
-            (false, true) => document.verbose(WIDTH),
-            (false, false) => document.terminal(WIDTH),
-        };
-        self.result(shown.trim_end());
-        for note in document.spoken(self.verbose()) {
-            match note.importance {
-                Importance::Warning => self.warn(&note.text),
-                _ => self.say(format!("note: {}", note.text)),
-            }
-        }
-        document
-    }
-
     /// Puts a result to stdout.
     pub(crate) fn result(&self, text: impl Display) {
         self.printer.result(&text.to_string());
@@ -156,13 +137,6 @@ impl Session {
     /// Warns of each.
     pub(crate) fn warn_all<T: Display>(&self, texts: impl IntoIterator<Item = T>) {
         texts.into_iter().for_each(|text| self.warn(text));
-    }
-
-    /// Writes a result as a file, and says so.
-    pub(crate) fn write(&self, path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
-        atomic::write(path, contents)?;
-        self.wrote(path);
-        Ok(())
     }
 
     /// Says that a file or a directory was written.

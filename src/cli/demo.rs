@@ -1,13 +1,13 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
-use super::compare::compare;
 use super::pictures::claim_output;
-use super::{Cli, Command, Failure, Session, read};
-use crate::compare::Comparison;
+use super::{Cli, Command, Failure, Session, drive, read};
+use crate::app::Answer;
+use crate::commands::compare::Comparison;
 use crate::formats::atomic::{Existing, Written};
 use crate::formats::{FileError, atomic, model_file};
 use crate::paper::{StudyCurves, paper_figures, paper_page};
-use crate::report::{self, Answer, TrajectorySeries};
+use crate::report::{self, TrajectorySeries};
 use clap::Parser;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -158,8 +158,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let cli = Cli::try_parse_from(words).map_err(Failure::input)?;
         let inner = session.within(&cli.common, i < last);
         match cli.command {
-            Command::Compare(compared) => {
-                let found = compare(&compared, "contamination costs", &inner)?;
+            Command::Compare(mut compared) => {
+                compared.request.cause = "contamination costs".to_owned();
+                let found = drive(&compared, &inner)?;
                 figures(&found, &args.out, session)?;
                 index(found, &args.out)?;
             }

@@ -12,7 +12,7 @@ pub(super) fn drive<C: Command>(asked: &Asked<C>, session: &Session) -> Result<C
     let _claims = asked.claim(&manifest, session.existing())?;
     let context = session.context().reading(manifest.inputs.clone());
     let answer = asked.request.run(&context)?;
-    let document = show(&answer, session);
+    let document = show(asked, &answer, session);
     for path in asked.write(&answer, &document, manifest, &context)? {
         session.wrote(&path);
     }
@@ -20,16 +20,23 @@ pub(super) fn drive<C: Command>(asked: &Asked<C>, session: &Session) -> Result<C
 }
 
 /// Puts an answer to stdout, as JSON or in words, and its notes to stderr; its document, for page and picture.
-fn show(answer: &impl Answer, session: &Session) -> Document {
+fn show<C: Command>(asked: &Asked<C>, answer: &C::Answer, session: &Session) -> Document {
     let document = answer.document();
     let shown = match answer.text() {
         _ if session.json() => json(answer),
         Some(text) => text,
+        None if C::PRINTS_FILE && asked.out.is_some() => String::new(),
+        None if C::PRINTS_FILE => {
+            let file = answer.files().into_iter().next();
+            file.map_or_else(String::new, |file| file.parts.collect())
+        }
         None if session.csv() => answer.csv().unwrap_or_default(),
         None if session.verbose() => document.verbose(WIDTH),
         None => document.terminal(WIDTH),
     };
-    session.result(shown.trim_end());
+    if !shown.is_empty() {
+        session.result(shown.trim_end());
+    }
     for note in document.spoken(session.verbose()) {
         match note.importance {
             Importance::Warning => session.warn(&note.text),

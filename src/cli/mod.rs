@@ -1,37 +1,37 @@
 //! The command line: one file per subcommand, each its `Args` and a `run(args, &Session)`.
 
 mod batch;
-mod calibrate;
 mod check;
-mod choose;
 mod common;
-mod compare;
 mod completions;
-mod datasheet;
 mod demo;
-mod design;
 mod drive;
 mod export;
-mod fuse;
 mod init;
-mod inspect;
 mod interrupt;
 mod man;
 mod pictures;
 mod printer;
 mod progress;
 mod read;
-mod require;
 mod schema;
 mod synthesize;
 mod trajectory;
-mod tune;
 mod version;
-mod wv;
 
 use crate::app::Asked;
+use crate::calibrate::Calibrate;
+use crate::choose::Choose;
+use crate::commands::compare::Compare;
+use crate::commands::datasheet::DatasheetArgs;
+use crate::commands::design::Design;
+use crate::commands::inspect::Inspect;
 use crate::commands::run::Run;
+use crate::commands::tune::Tune;
+use crate::commands::wv::Wv;
+use crate::fuse::Fuse;
 use crate::parse;
+use crate::require::Require;
 use clap::error::{ContextKind, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use drive::drive;
@@ -59,19 +59,19 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    Wv(wv::Args),
-    Calibrate(calibrate::Args),
-    Datasheet(datasheet::Args),
+    Wv(Asked<Wv>),
+    Calibrate(Asked<Calibrate>),
+    Datasheet(Asked<DatasheetArgs>),
     Synthesize(synthesize::Args),
     Trajectory(trajectory::Args),
     Run(Asked<Run>),
-    Tune(tune::Args),
-    Require(require::Args),
-    Choose(choose::Args),
-    Design(design::Args),
-    Fuse(fuse::Args),
-    Compare(compare::Args),
-    Inspect(inspect::Args),
+    Tune(Asked<Tune>),
+    Require(Asked<Require>),
+    Choose(Asked<Choose>),
+    Design(Asked<Design>),
+    Fuse(Asked<Fuse>),
+    Compare(Asked<Compare>),
+    Inspect(Asked<Inspect>),
     Export(export::Args),
     Batch(batch::Args),
     Demo(demo::Args),
@@ -101,19 +101,19 @@ impl Command {
             );
         }
         match self {
-            Self::Wv(args) => wv::run(&args, session),
-            Self::Calibrate(args) => calibrate::run(&args, session),
-            Self::Datasheet(args) => datasheet::run(&args, session),
+            Self::Wv(asked) => drive(&asked, session).map(drop),
+            Self::Calibrate(asked) => drive(&asked, session).map(drop),
+            Self::Datasheet(asked) => drive(&asked, session).map(drop),
             Self::Synthesize(args) => synthesize::run(&args, session),
             Self::Trajectory(args) => trajectory::run(&args, session),
             Self::Run(asked) => drive(&asked, session).map(drop),
-            Self::Require(args) => require::run(&args, session),
-            Self::Choose(args) => choose::run(&args, session),
-            Self::Design(args) => design::run(&args, session),
-            Self::Tune(args) => tune::run(&args, session),
-            Self::Fuse(args) => fuse::run(&args, session),
-            Self::Compare(args) => compare::run(&args, session),
-            Self::Inspect(args) => inspect::run(&args, session),
+            Self::Require(asked) => drive(&asked, session).map(drop),
+            Self::Choose(asked) => drive(&asked, session).map(drop),
+            Self::Design(asked) => drive(&asked, session).map(drop),
+            Self::Tune(asked) => drive(&asked, session).map(drop),
+            Self::Fuse(asked) => drive(&asked, session).map(drop),
+            Self::Compare(asked) => drive(&asked, session).map(drop),
+            Self::Inspect(asked) => drive(&asked, session).map(drop),
             Self::Export(args) => export::run(&args, session),
             Self::Batch(args) => batch::run(&args, session),
             Self::Demo(args) => demo::run(&args, session),
@@ -274,65 +274,6 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
 
 #[cfg(test)]
 mod tests {
-    use serde::{Serialize, de::DeserializeOwned};
-    use std::fmt::Debug;
-
-    /// A request has the defaults of the flags, is a file with their names, and comes back from one as it was.
-    fn is_a_file_too<R>(words: &str, table: &str)
-    where
-        R: clap::Args + Debug + PartialEq + Serialize + DeserializeOwned,
-    {
-        let flags = R::augment_args(clap::Command::new("x"))
-            .try_get_matches_from(words.split(' '))
-            .unwrap();
-        let of_flags = R::from_arg_matches(&flags).unwrap();
-        let of_table: R = toml::from_str(table).unwrap();
-        assert_eq!(of_flags, of_table);
-        let again: R = serde_json::from_str(&serde_json::to_string(&of_flags).unwrap()).unwrap();
-        assert_eq!(again, of_flags);
-        assert!(toml::from_str::<R>("no_such_key = 1").is_err());
-    }
-
-    #[test]
-    fn requests_are_files_with_the_names_and_defaults_of_flags() {
-        is_a_file_too::<crate::wv::WaveletRequest>("x a.csv", "files = ['a.csv']");
-        is_a_file_too::<crate::wv::WaveletRequest>(
-            "x a.csv --skip-s 60 --axes gyro,accel.x --scales 1s:100s --intervals large-sample",
-            "files = ['a.csv']\nintervals = 'large-sample'\ntuning.scales = '1s:100s'\n\
-             recordings = { axes = ['gyro', 'accel.x'], reading = { skip_s = 60.0 } }",
-        );
-        is_a_file_too::<crate::calibrate::CalibrationRequest>("x a b", "inputs = ['a', 'b']");
-        is_a_file_too::<crate::calibrate::CalibrationRequest>(
-            "x a --estimator all --trim 30% --weighting edof --pool axes --skip-s auto --gaps split --rate-hz 100",
-            "inputs = ['a']\nestimator = 'all'\ntrim = '30%'\nweighting = 'edof'\npool = 'axes'\n\
-             recordings = { gaps = 'split', reading = { skip_s = 'auto', rate_hz = 100.0 } }",
-        );
-        is_a_file_too::<crate::tune::TuneRequest>(
-            "x m --truth a b --for mean --outage none",
-            "model = 'm'\ntruth = ['a', 'b']\nfor = 'mean'\nper = 'process'\noutage = ['none']",
-        );
-        is_a_file_too::<crate::tune::TuneRequest>("x m", "model = 'm'");
-        is_a_file_too::<crate::require::RequireRequest>(
-            "x t --outage 60 --require p95_m<=5 --catalogue",
-            "trajectory = 't'\noutage = 60\nrequire = ['p95_m<=5']\ncatalogue = 'built-in'",
-        );
-        is_a_file_too::<crate::design::DesignRequest>("x m", "model = 'm'");
-        is_a_file_too::<crate::choose::ChoiceRequest>(
-            "x a --trajectory t --model N1,auto --filter 21,full --inflate x10",
-            "inputs = ['a']\ntrajectory = 't'\nmodel = ['N1', 'auto']\nfilter = [21, 'full']\ninflate = ['x10']",
-        );
-        is_a_file_too::<crate::choose::ChoiceRequest>(
-            "x a --trajectory t",
-            "inputs = ['a']\ntrajectory = 't'",
-        );
-        is_a_file_too::<crate::compare::CompareRequest>(
-            "x a --reference r",
-            "runs = ['a']\nreference = 'r'",
-        );
-        is_a_file_too::<crate::synthesize::SynthesisRequest>("x m", "model = 'm'");
-        is_a_file_too::<crate::fuse::FuseRequest>("x i g m", "imu = 'i'\ngnss = 'g'\nmodel = 'm'");
-    }
-
     #[test]
     fn the_command_line_is_consistent() {
         super::command().debug_assert();

@@ -3,7 +3,6 @@
 use super::{Failure, Session};
 use crate::app::inputs as read;
 use crate::app::option_elsewhere;
-use crate::formats::input;
 use crate::formats::model_file::ModelFile;
 use crate::formats::{FileError, Setting};
 use nav_sim_navigation::trajectory::Trajectory;
@@ -19,11 +18,6 @@ pub(super) fn of_study(e: &FileError) -> Failure {
             other => option_elsewhere(other),
         })
     })
-}
-
-/// The files themselves and those of directories, in name order.
-pub(super) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
-    Ok(input::listed(paths)?)
 }
 
 /// A trajectory.

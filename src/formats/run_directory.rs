@@ -152,9 +152,10 @@ fn expected_run(path: &str, summary: &str, epochs: &[EpochRow]) -> Result<RunRec
 
 fn manifest(directory: &Path) -> Result<(Manifest, RunOrigin), FileError> {
     let (path, json) = text(directory, "manifest.json")?;
-    let manifest: Manifest = serde_json::from_str(&json).map_err(|e| not_json(&path, &e))?;
-    let (found, expected) = (manifest.schema_version, Manifest::SCHEMA_VERSION);
-    if found == expected {
+    let value: serde_json::Value = serde_json::from_str(&json).map_err(|e| not_json(&path, &e))?;
+    let (found, expected) = (&value["schema_version"], Manifest::SCHEMA_VERSION);
+    if *found == expected {
+        let manifest: Manifest = serde_json::from_str(&json).map_err(|e| not_json(&path, &e))?;
         let origin = serde_json::from_value(manifest.record.clone().into());
         return match origin {
             Ok(origin) => Ok((manifest, origin)),

@@ -1,9 +1,9 @@
 //! A fusion as a document: verdict, figures, track, errors, innovations.
 
+use super::FuseAnswer;
 use super::charts::{self, STATES};
 use super::summary::{Cause, Fixes};
-use super::{FuseAnswer, FuseNote};
-use crate::report::{Answer, reduction_doubt, reduction_line};
+use crate::report::{reduction_doubt, reduction_line};
 use glam::DVec3;
 use nav_sim_document::{Cell, Document, Importance, Table, Tone, readable, seconds, window};
 use nav_sim_navigation::fusion::{ClocksApart, Drift, Finding, FromReference, Row, SmoothedOutage};
@@ -13,8 +13,9 @@ use std::path::Path;
 const CHECKED: &str =
     "solutions of simulated recordings are consistent with their covariance, smoothed ones too.";
 
-impl Answer for FuseAnswer {
-    fn document(&self) -> Document {
+impl FuseAnswer {
+    /// Verdict, figures, charts and notes.
+    pub(super) fn page(&self) -> Document {
         let (solution, summary) = (&self.solution, &self.summary);
         let tone = match summary.verdict.kind {
             VerdictKind::Consistent => Tone::Good,
@@ -58,7 +59,9 @@ impl Answer for FuseAnswer {
         document.chart(&charts::innovations(solution, &outages), charts::FIXES);
         document.chart(&charts::nis(&solution.fixes, &outages), charts::FIXES);
         document.checked(CHECKED);
-        self.notes.iter().for_each(|note| add(&mut document, note));
+        self.notes
+            .iter()
+            .for_each(|note| document.note(note.importance, &note.text));
         if let Some(quality) = self
             .reduction
             .as_ref()
@@ -398,39 +401,4 @@ fn cause(cause: &Cause) -> String {
             )
         }
     }
-}
-
-fn add(document: &mut Document, note: &FuseNote) {
-    let (importance, text) = match note {
-        FuseNote::Read(text) => (Importance::Remark, text.clone()),
-        FuseNote::Doubt(text) => (Importance::Warning, text.clone()),
-        FuseNote::Rate([from, to]) => (
-            Importance::Detail,
-            format!("the model was converted from {from} Hz to {to:.3} Hz"),
-        ),
-        FuseNote::TurnOn(sensor, sigma) => (
-            Importance::Remark,
-            format!(
-                "the model states a turn-on bias: {} {} ({sensor})",
-                readable(*sigma),
-                sensor.unit()
-            ),
-        ),
-        FuseNote::Outage(remark) => (Importance::Warning, remark.to_string()),
-        FuseNote::EarlyOutage(outage) => {
-            let span = window(outage.start_s, outage.end_s);
-            (
-                Importance::Warning,
-                format!("outage {span} ends before the start of the solution: it is left out"),
-            )
-        }
-        FuseNote::Origin(delay_s) => (
-            Importance::Warning,
-            format!(
-                "the clocks had nothing in common: fused with --gnss-delay={delay_s:.2}, from turns and innovations"
-            ),
-        ),
-        FuseNote::Heading(doubt) => (Importance::Warning, doubt.to_string()),
-    };
-    document.note(importance, text);
 }

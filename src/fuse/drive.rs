@@ -1,14 +1,14 @@
 //! From the files of a request to a solution and its figures.
 
-use super::manifest::{Configuration, FuseManifest, Kind};
+use super::manifest::Configuration;
 use super::summary::{Cause, FixCorrelation, Fixes, FuseSummary, FuseVerdict, Initial};
 use super::vehicle::VehicleSummary;
-use super::{FuseError, FuseRequest, filter};
-use crate::app::inputs;
+use super::{Fuse, FuseError, filter};
+use crate::app::{Input, inputs};
 use crate::formats::fusion_files::{self, read_gnss, read_imu, read_initial, read_wheel};
-use crate::formats::input;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::trajectory_file::{self, load_reference};
+use nav_sim_document::{Importance, Note, readable, window};
 use nav_sim_navigation::ekf::{Belief, InitialSettings};
 use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
 use nav_sim_navigation::fusion::mounting::{self, Mounted, Mounting, MountingError};
@@ -19,35 +19,13 @@ use nav_sim_navigation::fusion::{
 };
 use nav_sim_navigation::gnss::GnssFix;
 use nav_sim_navigation::metrics::{ReductionSummary, VerdictKind};
-use nav_sim_navigation::sensors::outage::{FixedData, Outage, OutagePlan, OutageRemark};
+use nav_sim_navigation::sensors::outage::{FixedData, Outage, OutagePlan};
 use nav_sim_navigation::simulation::lincov::{HeadingDoubt, weak_heading};
 use nav_sim_navigation::trajectory::reference::Reference;
-use nav_sim_signal::imu::{ImuIncrement, Sensor};
+use nav_sim_signal::imu::ImuIncrement;
 use nav_sim_signal::units::DEG;
 use serde::{Serialize, Serializer};
 use std::ops::Range;
-
-/// Remark on the files or the drive.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum FuseNote {
-    /// How a file was read.
-    Read(String),
-    /// A doubt about a file.
-    Doubt(String),
-    /// The model was converted from one rate to another (Hz).
-    Rate([f64; 2]),
-    /// The filter expects the turn-on bias that the model states (m/s² or rad/s).
-    TurnOn(Sensor, f64),
-    /// An outage was moved or cut.
-    Outage(OutageRemark),
-    /// An outage ends before the start of the solution.
-    EarlyOutage(Outage),
-    /// Clocks of IMU and fixes had nothing in common: the delay with which they have (s).
-    Origin(f64),
-    /// The motion hardly shows the heading.
-    Heading(HeadingDoubt),
-}
 
 /// Solution of a recorded drive.
 #[derive(Debug)]
@@ -60,9 +38,11 @@ pub struct FuseAnswer {
     /// Reduction of the model to the filter's states, where it loses something.
     pub reduction: Option<ReductionSummary>,
     /// Remarks on the files and the drive.
-    pub notes: Vec<FuseNote>,
+    pub notes: Vec<Note>,
     /// Files by their roles.
-    pub(super) inputs: Vec<crate::app::Input>,
+    pub(super) inputs: Vec<Input>,
+    /// Settings, for the manifest.
+    pub(super) configuration: Configuration,
 }
 
 impl Serialize for FuseAnswer {
@@ -73,7 +53,7 @@ impl Serialize for FuseAnswer {
 
 /// A drive that was read.
 pub(crate) struct Drive {
-    request: FuseRequest,
+    request: Fuse,
     settings: Settings,
     imu: Vec<ImuIncrement>,
     imu_rate_hz: f64,
@@ -83,9 +63,8 @@ pub(crate) struct Drive {
     expected: InitialSettings,
     initial: Option<Start>,
     reference: Option<Reference>,
-    notes: Vec<FuseNote>,
-    /// Its manifest, but for the command and the time.
-    pub(crate) manifest: FuseManifest,
+    notes: Vec<Note>,
+    configuration: Configuration,
 }
 
 impl Drive {
@@ -93,12 +72,8 @@ impl Drive {
     ///
     /// # Errors
     /// A setting out of range, a file that cannot be used.
-    pub(crate) fn read(request: &FuseRequest) -> Result<Self, FuseError> {
+    pub(crate) fn read(request: &Fuse) -> Result<Self, FuseError> {
         let settings = request.settings()?;
-        let inputs = request
-            .files()
-            .map(|(role, path)| input::input(role, path))
-            .collect::<Result<_, _>>()?;
         let (unsaid, gnss_sigma_factor) = request.fix_sigma();
         let [position, velocity] = gnss_sigma_factor;
         let topic = request.topic.clone().unwrap_or_default();
@@ -122,11 +97,11 @@ impl Drive {
             *fix = fix.with_sigmas_times(position, velocity);
             fix.t_s -= request.gnss_delay_s;
         }
-        let mut notes: Vec<FuseNote> = imu
+        let mut notes: Vec<Note> = imu
             .remarks
             .into_iter()
             .chain(remarks)
-            .map(FuseNote::from)
+            .map(note_of)
             .collect();
         let wheel = request
             .odometer
@@ -137,14 +112,11 @@ impl Drive {
             .map(|path| read_initial(path))
             .transpose()?;
         let model = model_file::read(&request.model)?;
-        notes.extend(
-            model
-                .doubts(&request.model)
-                .into_iter()
-                .map(FuseNote::Doubt),
-        );
+        notes.extend(model.doubts(&request.model).into_iter().map(warning));
         if (model.model.rate_hz / imu.rate_hz - 1.0).abs() > 0.01 {
-            notes.push(FuseNote::Rate([model.model.rate_hz, imu.rate_hz]));
+            let (from, to) = (model.model.rate_hz, imu.rate_hz);
+            let text = format!("the model was converted from {from} Hz to {to:.3} Hz");
+            notes.push(note(Importance::Detail, text));
         }
         let of_file = initial
             .as_ref()
@@ -152,11 +124,11 @@ impl Drive {
             .unwrap_or_default();
         let mut expected = request.expected(of_file);
         let stated = inputs::expected_turn_on(&mut expected, &model.turn_on.unwrap_or_default());
-        notes.extend(
-            stated
-                .into_iter()
-                .map(|(sensor, sigma)| FuseNote::TurnOn(sensor, sigma)),
-        );
+        for (sensor, sigma) in stated {
+            let (sigma, unit) = (readable(sigma), sensor.unit());
+            let text = format!("the model states a turn-on bias: {sigma} {unit} ({sensor})");
+            notes.push(note(Importance::Remark, text));
+        }
         expected
             .validate()
             .map_err(|e| FuseError::Setting(e.to_string()))?;
@@ -167,11 +139,7 @@ impl Drive {
             .map(|path| load_reference(path, &options))
             .transpose()?;
         let reference = reference.map(|(reference, warnings)| {
-            notes.extend(
-                warnings
-                    .iter()
-                    .map(|warning| FuseNote::Doubt(warning.to_string())),
-            );
+            notes.extend(warnings.iter().map(warning));
             reference
         });
         let configuration = Configuration {
@@ -186,15 +154,6 @@ impl Drive {
             aiding: request.aiding(),
             gnss_delay_s: request.gnss_delay_s,
         };
-        let manifest = FuseManifest {
-            schema_version: 2,
-            kind: Kind::Fusion,
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            command: Vec::new(),
-            configuration,
-            inputs,
-            wall_s: 0.0,
-        };
         Ok(Self {
             request: request.clone(),
             settings,
@@ -207,7 +166,7 @@ impl Drive {
             initial,
             reference,
             notes,
-            manifest,
+            configuration,
         })
     }
 
@@ -215,7 +174,7 @@ impl Drive {
     ///
     /// # Errors
     /// Data and settings that do not fit together, or a filter that diverges.
-    pub(crate) fn fuse(mut self) -> Result<FuseAnswer, FuseError> {
+    pub(crate) fn fuse(mut self, inputs: Vec<Input>) -> Result<FuseAnswer, FuseError> {
         let origin_s = self.common_origin()?;
         let mut recorded = Recorded {
             imu: &self.imu,
@@ -232,8 +191,7 @@ impl Drive {
         };
         let times_s: Vec<f64> = self.gnss.iter().map(|fix| fix.t_s).collect();
         let placed = plan.on(&FixedData::recorded(&times_s), 0)?;
-        self.notes
-            .extend(placed.remarks.into_iter().map(FuseNote::Outage));
+        self.notes.extend(placed.remarks.into_iter().map(warning));
         settings.outages = placed.windows;
         let mounting = match self.request.mounted() {
             Mounted::AsGiven => None,
@@ -249,8 +207,11 @@ impl Drive {
         let gnss = earlier(recorded.gnss, rest_s);
         recorded.gnss = &gnss;
         let delay_s = self.request.gnss_delay_s + origin_s.unwrap_or(0.0) + rest_s;
-        self.notes
-            .extend(origin_s.map(|_| FuseNote::Origin(delay_s)));
+        self.notes.extend(origin_s.map(|_| {
+            warning(format!(
+                "the clocks had nothing in common: fused with --gnss-delay={delay_s:.2}, from turns and innovations"
+            ))
+        }));
         let Alignment { start, doubts } = match (&self.initial, self.request.given_heading()) {
             (Some(start), _) => Alignment {
                 start: beside_mounting(start.clone(), &settings),
@@ -265,7 +226,12 @@ impl Drive {
             .iter()
             .copied()
             .filter(is_early)
-            .map(FuseNote::EarlyOutage);
+            .map(|outage| {
+                let span = window(outage.start_s, outage.end_s);
+                warning(format!(
+                    "outage {span} ends before the start of the solution: it is left out"
+                ))
+            });
         self.notes.extend(early.collect::<Vec<_>>());
         settings.outages.retain(|outage| !is_early(outage));
         // the start and the mounting are found without: they are what the vehicle's axes come from
@@ -280,7 +246,7 @@ impl Drive {
             return Err(FuseError::NothingInCommon);
         }
         self.notes
-            .extend(doubt_heading(&weighed.solution, &settings.outages).map(FuseNote::Heading));
+            .extend(doubt_heading(&weighed.solution, &settings.outages).map(warning));
         let outcome = outcome(&weighed.solution, &settings.outages);
         let Assessment { verdict, findings } = assess(&weighed, &outcome, &doubts);
         let is_correlated = weighed
@@ -359,7 +325,8 @@ impl Drive {
             summary,
             reduction,
             notes: self.notes,
-            inputs: self.manifest.inputs,
+            inputs,
+            configuration: self.configuration,
         })
     }
 }
@@ -434,12 +401,19 @@ impl Drive {
     }
 }
 
-impl From<fusion_files::Remark> for FuseNote {
-    fn from(remark: fusion_files::Remark) -> Self {
-        match remark {
-            fusion_files::Remark::Note(text) => Self::Read(text),
-            fusion_files::Remark::Doubt(text) => Self::Doubt(text),
-        }
+fn note(importance: Importance, text: impl ToString) -> Note {
+    let text = text.to_string();
+    Note { importance, text }
+}
+
+fn warning(text: impl ToString) -> Note {
+    note(Importance::Warning, text)
+}
+
+fn note_of(remark: fusion_files::Remark) -> Note {
+    match remark {
+        fusion_files::Remark::Note(text) => note(Importance::Remark, text),
+        fusion_files::Remark::Doubt(text) => warning(text),
     }
 }
 

@@ -1,9 +1,8 @@
 //! Why there is no solution: what helps.
 
-use super::{FuseAnswer, FuseError};
+use super::FuseError;
 use crate::app::{Failure, option_elsewhere};
 use crate::formats::Setting;
-use nav_sim_navigation::metrics::VerdictKind;
 
 impl From<FuseError> for Failure {
     fn from(e: FuseError) -> Self {
@@ -18,15 +17,5 @@ impl From<FuseError> for Failure {
             e if e.is_input() => Self::input(&e).maybe_hint(e.hint()),
             e => Self::could_not(&e).maybe_hint(e.hint()),
         }
-    }
-}
-
-impl FuseAnswer {
-    /// What is not met: a filter that is not overconfident.
-    #[must_use]
-    pub fn unmet(&self) -> Option<Failure> {
-        let is_overconfident = self.summary.verdict.kind == VerdictKind::Overconfident;
-        is_overconfident
-            .then(|| Failure::bound("the solution is overconfident").hint(self.advice()))
     }
 }

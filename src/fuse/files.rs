@@ -1,9 +1,9 @@
 //! Files of a fusion directory: tables, track for maps, summary, page.
 
 use super::FuseAnswer;
-use super::manifest::FuseManifest;
 use super::summary::{STATE, values};
-use crate::report::{Answer, OutputFile, json};
+use crate::app::OutputFile;
+use crate::report::json;
 use nav_sim_document::shortest;
 use nav_sim_navigation::earth::radii;
 use nav_sim_navigation::frames::wrap_angle;
@@ -12,8 +12,8 @@ use nav_sim_navigation::simulation::{BIAS_NAMES, REPORTED_NAMES};
 use nav_sim_signal::units::DEG;
 use std::fmt::Write as _;
 
-/// Names of the files of a fusion directory, the manifest last. The smoothed ones are there where that was asked for.
-pub(crate) const FILES: [&str; 10] = [
+/// Names of the files of a fusion directory. The smoothed ones are there where that was asked for.
+pub(super) const FILES: [&str; 8] = [
     "solution.csv",
     "innovations.csv",
     "errors.csv",
@@ -22,8 +22,6 @@ pub(crate) const FILES: [&str; 10] = [
     "errors_smoothed.csv",
     "smoothed.kml",
     "summary.json",
-    "report.html",
-    "manifest.json",
 ];
 
 const COMPONENTS: [&str; 6] = [
@@ -35,13 +33,13 @@ const COMPONENTS: [&str; 6] = [
     "vel_d_m_s",
 ];
 
-/// The files of a fusion directory, the manifest last; `errors.csv` is empty but for its header without a
+/// The files of a fusion directory; `errors.csv` is empty but for its header without a
 /// reference.
-pub(crate) fn directory(answer: &FuseAnswer, manifest: &FuseManifest) -> Vec<OutputFile<'static>> {
+pub(super) fn directory(answer: &FuseAnswer) -> Vec<OutputFile<'static>> {
     let FuseAnswer {
         solution, summary, ..
     } = answer;
-    let title = manifest
+    let title = answer
         .inputs
         .first()
         .map_or("solution", |imu| imu.path.as_str());
@@ -55,8 +53,6 @@ pub(crate) fn directory(answer: &FuseAnswer, manifest: &FuseManifest) -> Vec<Out
         smoothed.map(errors_csv),
         smoothed.map(|rows| kml(rows, "smoothed solution", title)),
         Some(json(summary)),
-        Some(answer.document().html()),
-        Some(json(manifest)),
     ];
     let files = FILES.into_iter().zip(contents);
     files

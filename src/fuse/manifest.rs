@@ -1,38 +1,11 @@
-//! `manifest.json` of a fusion: its configuration and inputs, to make it again.
+//! The configuration of a fusion in its manifest.
 
-use crate::app::{Input, contents};
 use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
 use nav_sim_navigation::fusion::mounting::Mounted;
 use nav_sim_navigation::fusion::{Correlation, Heading, Settings};
 use nav_sim_navigation::gnss::FixSigma;
 use nav_sim_navigation::sensors::aiding::AidingSettings;
 use serde::{Deserialize, Serialize};
-
-/// Source of a fusion directory.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct FuseManifest {
-    /// Layout version.
-    pub(crate) schema_version: u32,
-    /// `fusion`.
-    pub(crate) kind: Kind,
-    /// Version of nav-sim.
-    pub(crate) version: String,
-    /// The command as given.
-    pub(crate) command: Vec<String>,
-    /// All that decides the result beside the files.
-    pub(crate) configuration: Configuration,
-    /// Every file that was read.
-    pub(crate) inputs: Vec<Input>,
-    /// Time from start to results (s).
-    pub(crate) wall_s: f64,
-}
-
-/// Tells the directory of a fusion from that of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum Kind {
-    Fusion,
-}
 
 /// Settings of a fusion beside its files.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -60,12 +33,4 @@ pub(crate) struct Configuration {
     pub(crate) aiding: AidingSettings,
     /// How much earlier than its time a fix is taken to be (s).
     pub(crate) gnss_delay_s: f64,
-}
-
-impl FuseManifest {
-    /// Whether a fusion of the one is a fusion of the other: all that decides the results is the same.
-    pub(crate) fn is_same_fusion(&self, other: &Self) -> bool {
-        (&self.version, &self.configuration) == (&other.version, &other.configuration)
-            && contents(&self.inputs) == contents(&other.inputs)
-    }
 }

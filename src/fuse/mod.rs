@@ -1,17 +1,4 @@
-//! Fusion of recorded IMU and GNSS: request, solution, document.
-//!
-//! ```
-//! use nav_sim::fuse::FuseRequest;
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let files = ["imu.csv", "gnss.csv", "model.toml"];
-//! let request = FuseRequest { turn_on_bias: Some([0.3, 0.01]), ..FuseRequest::new(files[0], files[1], files[2]) };
-//! match request.answer() {
-//!     Ok(answer) => println!("{}", answer.document.verdict.lines[0]),
-//!     Err(e) => println!("{e}"),
-//! }
-//! # Ok(())
-//! # }
-//! ```
+//! `nav-sim fuse`: the filter on recorded data.
 
 mod charts;
 mod document;
@@ -26,42 +13,59 @@ mod start;
 mod summary;
 mod vehicle;
 
-use crate::answered::contents;
-use crate::app::Answered;
-use crate::app::Failure;
-
-pub(crate) use drive::Drive;
-pub use drive::{FuseAnswer, FuseNote};
+pub use drive::FuseAnswer;
 pub use error::FuseError;
-pub(crate) use files::{FILES, directory};
-pub(crate) use manifest::FuseManifest;
-pub use request::{FuseRequest, GnssSigma, LoggerAxes, MountingChoice};
+pub use request::{Fuse, GnssSigma, LoggerAxes, MountingChoice};
 pub use start::{StartChoice, TopicChoice};
 pub use summary::{Cause, FuseSummary};
 pub use vehicle::VehicleSummary;
 
-/// Reads the files of a request and fuses them.
-///
-/// # Errors
-/// A setting out of range, a file that cannot be used, data and settings that do not fit together.
-pub fn fuse(request: &FuseRequest) -> Result<FuseAnswer, FuseError> {
-    Drive::read(request)?.fuse()
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use drive::Drive;
+use nav_sim_document::Document;
+use nav_sim_navigation::metrics::VerdictKind;
+use serde_json::json;
+use std::path::PathBuf;
+
+impl Command for Fuse {
+    type Answer = FuseAnswer;
+    const NAME: &'static str = "fuse";
+    const OUT: Out = Out::Directory {
+        path: "out/fuse",
+        files: &files::FILES,
+    };
+    const PLOT: bool = false;
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        Ok(self
+            .files()
+            .map(|(role, path)| (role, path.clone()))
+            .collect())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<FuseAnswer> {
+        let inputs = context.inputs().to_vec();
+        Ok(Drive::read(self)?.fuse(inputs)?)
+    }
 }
 
-impl FuseRequest {
-    /// As `nav-sim fuse` prints and writes it.
-    ///
-    /// # Errors
-    /// As [`fuse()`].
-    pub fn answer(&self) -> Result<Answered, Failure> {
-        let drive = Drive::read(self)?;
-        let manifest = drive.manifest.clone();
-        let answer = drive.fuse()?;
-        let files = contents(directory(&answer, &manifest));
-        Ok(Answered {
-            files,
-            unmet: answer.unmet(),
-            ..Answered::of(&answer)
-        })
+impl Answer for FuseAnswer {
+    fn document(&self) -> Document {
+        self.page()
+    }
+
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        files::directory(self)
+    }
+
+    fn record(&self) -> serde_json::Value {
+        json!({ "kind": "fusion", "configuration": self.configuration })
+    }
+
+    /// A filter that is not overconfident.
+    fn unmet(&self) -> Option<Failure> {
+        let is_overconfident = self.summary.verdict.kind == VerdictKind::Overconfident;
+        is_overconfident
+            .then(|| Failure::bound("the solution is overconfident").hint(self.advice()))
     }
 }

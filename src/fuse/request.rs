@@ -19,10 +19,25 @@ use std::str::FromStr;
 /// Rows of the solution per second.
 const ROWS_HZ: f64 = 10.0;
 
-/// Files and settings of a fusion: the arguments of `nav-sim fuse`.
-#[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct FuseRequest {
+/// Fuse recorded IMU and GNSS data with the filter of `run` and the noise model MODEL
+///
+/// IMU: rates (t_s, gyro_x_rad_s … accel_z_m_s2; other units and loggers' names as for `wv`) or increments
+/// (dtheta_x_rad … dv_z_m_s, time = end of the interval). GNSS: t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m,
+/// sd_d_m, and v_n_m_s … sd_vd_m_s where velocity is measured. Either may be a text file of KF-GINS (7 or 8
+/// columns of increments; 7 of position, 13 with velocity). GNSS may also be a solution of RTKLIB (.pos, GPST)
+/// or NMEA sentences (GGA; RMC or VTG, GST), in seconds of the day or in Unix time, as the IMU is. A log (MCAP, bag,
+/// ULog, UBX) may be either, or both. Gaps of up to 5 s are bridged, with the uncertainty that the recording shows over such times elsewhere. Writes solution.csv,
+/// innovations.csv, errors.csv (with a reference), solution.kml, summary.json, report.html, manifest.json; with
+/// --smooth also smoothed.csv, errors_smoothed.csv, smoothed.kml. Exit code 3: the solution is overconfident.
+#[derive(clap::Args, Debug, Clone)]
+#[command(before_help = "\
+Examples:
+  nav-sim trajectory record trajectories/land_vehicle.toml calib_data/tactical.toml -o drive
+  nav-sim fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml \\
+      --reference drive/reference.csv --outage 300:360 --smooth -o out/fused
+  nav-sim fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml \\
+      --initial drive/initial.toml -o out/given")]
+pub struct Fuse {
     /// IMU recording (.csv, .tsv, .txt, .npy, also .gz)
     #[arg(value_name = "IMU")]
     pub imu: PathBuf,
@@ -103,48 +118,7 @@ pub struct FuseRequest {
     pub smooth: bool,
 }
 
-impl Default for FuseRequest {
-    fn default() -> Self {
-        Self {
-            imu: PathBuf::new(),
-            gnss: PathBuf::new(),
-            model: PathBuf::new(),
-            initial: StartChoice::Auto,
-            lever_arm_m: [0.0; 3],
-            mounting: None,
-            reference: None,
-            outages: Vec::new(),
-            filter: FilterStates::default(),
-            turn_on_bias: None,
-            gnss_sigma: None,
-            gnss_delay_s: 0.0,
-            gnss_correlation: Correlation::Auto,
-            nhc: false,
-            zupt: false,
-            odometer: None,
-            rear_axle_m: [0.0; 3],
-            columns: None,
-            topic: None,
-            smooth: false,
-        }
-    }
-}
-
-impl FuseRequest {
-    /// A fusion of these files with default settings.
-    pub fn new(
-        imu: impl Into<PathBuf>,
-        gnss: impl Into<PathBuf>,
-        model: impl Into<PathBuf>,
-    ) -> Self {
-        Self {
-            imu: imu.into(),
-            gnss: gnss.into(),
-            model: model.into(),
-            ..Self::default()
-        }
-    }
-
+impl Fuse {
     /// The file of the initial state; none where it is found in the data.
     pub(super) fn initial_file(&self) -> Option<&PathBuf> {
         if let StartChoice::File(path) = &self.initial {
@@ -418,10 +392,9 @@ mod tests {
             (to(LoggerAxes::Rfu, DVec3::X), to(LoggerAxes::Rfu, DVec3::Y)),
             (DVec3::Y, DVec3::X)
         );
-        assert_eq!(
-            FuseRequest::default().settings().unwrap().q_s_b,
-            DQuat::IDENTITY
-        );
+        let asked = crate::app::Asked::<Fuse>::of(["imu.csv", "gnss.csv", "m.toml"]).unwrap();
+        let settings = asked.request.settings().unwrap();
+        assert_eq!(settings.q_s_b, DQuat::IDENTITY);
     }
 
     #[test]
@@ -436,19 +409,5 @@ mod tests {
         for bad in ["", "0", "1,2", "nan", "1:", "1:2:3", "1,2,-3"] {
             assert!(sigma(bad).is_err(), "{bad}");
         }
-    }
-
-    #[test]
-    fn a_request_is_a_file_too() {
-        let text =
-            r#"{ "imu": "a", "gnss": "b", "model": "c", "mounting": "auto", "filter": "full" }"#;
-        let request: FuseRequest = serde_json::from_str(text).unwrap();
-        let expected = FuseRequest {
-            mounting: Some(MountingChoice::Auto),
-            filter: FilterStates::Full,
-            ..FuseRequest::new("a", "b", "c")
-        };
-        assert_eq!(request, expected);
-        assert!(serde_json::from_str::<FuseRequest>(r#"{ "imu": "a", "delay": 1 }"#).is_err());
     }
 }

@@ -1,6 +1,6 @@
 //! What the vehicle knows of its own motion: settings, figures, table.
 
-use super::FuseRequest;
+use super::Fuse;
 use nav_sim_document::{Cell, Table, readable};
 use nav_sim_navigation::fusion::{AidInnovations, Solution, aid_innovations};
 use nav_sim_navigation::sensors::aiding::{
@@ -13,7 +13,7 @@ use serde::Serialize;
 const MOUNTING_SIGMA_DEG: f64 = 1.0;
 const SCALE_SIGMA: f64 = 0.03;
 
-impl FuseRequest {
+impl Fuse {
     /// What is believed of the vehicle: nothing that was not asked for.
     pub(super) fn aiding(&self) -> AidingSettings {
         let lever_arm_m = self.rear_axle_m;

@@ -13,7 +13,7 @@ pub(crate) const CONFIDENCE: f64 = 0.95;
 
 /// A wavelet variance with its intervals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Band {
+pub struct Band {
     /// Wavelet variance (units²).
     pub wv: Vec<f64>,
     /// Lower ends of its 95 % intervals.
@@ -40,7 +40,7 @@ impl Band {
 
 /// The wavelet variances of one signal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct SignalCurves {
+pub struct SignalCurves {
     /// Recording.
     pub file: String,
     /// `accel` or `gyro`.
@@ -92,7 +92,7 @@ impl SignalCurves {
 
 /// What `wv` prints.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct SignalsFile {
+pub struct SignalsFile {
     /// Layout version.
     pub schema_version: u32,
     /// Sample rate (Hz).

@@ -18,21 +18,12 @@ pub(crate) mod trajectory;
 mod unexpected;
 pub(crate) mod verdict;
 
-use nav_sim_document::Document;
-use serde::Serialize;
-
 pub(crate) use closure::TrajectoryCheck;
-pub(crate) use comparison_table::{CandidateResult, Label};
-pub(crate) use curves::{CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile};
-/// A result: what is printed, drawn or saved of it is it itself as JSON, or its document.
-pub trait Answer: Serialize {
-    /// What it says, in words, tables and charts.
-    fn document(&self) -> Document;
-}
-
+pub(crate) use comparison_table::Label;
+pub(crate) use curves::{CurvesFile, FittedCurve, ReplicateCurve, SignalsFile};
 pub use nav_sim_document::readable;
 pub(crate) use nav_sim_document::{seconds, six_digits};
-pub(crate) use output::{OutputFile, json};
+pub(crate) use output::json;
 pub(crate) use recording::{gnss_csv, imu_csv, initial_toml};
 pub(crate) use states::{STATES, error_of, tone};
 #[cfg(any(test, feature = "parquet"))]
@@ -49,7 +40,7 @@ pub(crate) use unexpected::{
 /// Names of `nav_sim_document` for files that have not moved to documents yet.
 pub(crate) mod page {
     pub(crate) use nav_sim_document::{
-        Axis, Chart, Colour, Document as Page, Form, Mark, Panel, Series, Stroke, Tone, encode, svg,
+        Axis, Chart, Colour, Document as Page, Mark, Panel, Series, Stroke, Tone, svg,
     };
 }
 

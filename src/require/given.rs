@@ -4,7 +4,6 @@ use super::question::{
     BeyondLinear, CHECKED, CURVE_S, DRIFT, DriftCurve, LONGEST_S, Question, drift_chart, points,
     points_json, quantity_in_words, value,
 };
-use crate::report::Answer;
 use nav_sim_document::{Cell, Colour, Document, Mark, Series, Table, Tone, readable, seconds};
 use nav_sim_navigation::require::{Limit, Margins, Worst};
 use serde::{Serialize, Serializer};
@@ -184,8 +183,9 @@ impl GivenImu {
     }
 }
 
-impl Answer for GivenImu {
-    fn document(&self) -> Document {
+impl GivenImu {
+    /// Verdict, tables and charts.
+    pub(super) fn document(&self) -> Document {
         let is_good = match &self.margins {
             Some(margins) => margins.met(),
             None => self.longest.length_s() > 0.0,

@@ -9,4 +9,4 @@ mod request;
 
 pub use job::Ask;
 pub(crate) use job::{CatalogueUnit, Misplaced, Requirements};
-pub use request::{Catalogue, LimitFlag, RequireRequest};
+pub use request::{Catalogue, LimitFlag, Require};

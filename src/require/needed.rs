@@ -1,7 +1,6 @@
 //! The IMU that a limit needs.
 
 use super::question::{BeyondLinear, CHECKED, Question};
-use crate::report::Answer;
 use nav_sim_document::{Cell, Document, Importance, Table, Tone, readable};
 use nav_sim_navigation::require::{Answer as Bound, IMU_PARAMETERS, ImuParameters, Worst};
 use serde::{Serialize, Serializer};
@@ -60,8 +59,9 @@ impl NeededImu {
     }
 }
 
-impl Answer for NeededImu {
-    fn document(&self) -> Document {
+impl NeededImu {
+    /// Verdict, tables and charts.
+    pub(super) fn document(&self) -> Document {
         let lines = [
             format!("needed for {}", self.question.in_words()),
             format!("an IMU {}", self.turn_on_in_words()),

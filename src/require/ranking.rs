@@ -5,7 +5,6 @@ use super::question::{
     BeyondLinear, CHECKED, CURVE_S, DRIFT, DriftCurve, Question, drift_chart, points, points_json,
     quantity_in_words, value, warn_of_units,
 };
-use crate::report::Answer;
 use nav_sim_document::{Cell, Colour, Document, Importance, Mark, Series, Table, Tone};
 use nav_sim_navigation::require::Worst;
 use serde::{Serialize, Serializer};
@@ -145,8 +144,9 @@ impl Ranking {
     }
 }
 
-impl Answer for Ranking {
-    fn document(&self) -> Document {
+impl Ranking {
+    /// Verdict, tables and charts.
+    pub(super) fn document(&self) -> Document {
         let mut document = Document::new(
             "IMUs against a limit",
             Tone::from(self.is_met()),

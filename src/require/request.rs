@@ -1,33 +1,41 @@
-//! The request of a search for an IMU: the arguments of `nav-sim require`.
+//! `nav-sim require`: which IMU a limit needs, and what a given one makes of it.
 
 use super::given::GivenImu;
 use super::needed::NeededImu;
 use super::ranking::{Ranking, stated_in_words};
 use super::{Ask, CatalogueUnit, Misplaced, Requirements};
-use crate::app::Answered;
-use crate::app::Context;
-use crate::app::Failure;
-use crate::app::inputs as read;
+use crate::app::inputs::{self, ScenarioArgs, files};
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::formats::atomic::Written;
 use crate::formats::datasheet::{self, CATALOGUE, Datasheet};
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::input::listed;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::scenario_file;
 use crate::parse;
-use crate::report::Answer;
 use nav_sim_document::Document;
 use nav_sim_navigation::require::{Limit, Quantity, RequireError, Worst};
 use nav_sim_navigation::sensors::aiding::AidingSettings;
 use nav_sim_navigation::sensors::outage::NotAnOutage;
-use serde::{Deserialize, Serialize};
-use std::fmt;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Limits on the errors after an outage, and where they hold.
-#[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RequireRequest {
+/// Find the IMU that keeps the errors at the end of an outage within limits, or judge MODEL by them
+///
+/// Uses linear covariance analysis along TRAJECTORY of a filter that knows its IMU. Without MODEL it finds the white noise
+/// and bias instability that each sensor may have beside the turn-on biases of [imu] in --scenario. With MODEL it says
+/// whether the limits are kept (exit code 3: they are not), and the longest outage that it bridges.
+#[derive(clap::Args, Debug, Clone)]
+#[command(before_help = "\
+Examples:
+  nav-sim require trajectories/figure_eight.toml --outage 60 \\
+      --require 'p95_m<=50' -o needed.toml
+  nav-sim require trajectories/figure_eight.toml calib_data/tactical.toml \\
+      --outage 60:120 --require 'rmse_m<=100'
+  nav-sim require trajectories/figure_eight.toml calib_data/tactical.toml \\
+      --outage longest --require 'p95_m<=20'")]
+pub struct Require {
     /// Trajectory: motion profile (.toml) or table (.csv)
     pub trajectory: PathBuf,
     /// Noise model of an IMU
@@ -40,15 +48,14 @@ pub struct RequireRequest {
     pub start: Option<f64>,
     /// Limit at the end of the outage, as NAME<=LIMIT (repeatable): p50_m, p95_m, rmse_m (horizontal), roll_deg, pitch_deg,
     /// yaw_deg
-    #[arg(long = "require", value_name = "NAME<=LIMIT")]
-    #[serde(rename = "require")]
+    #[arg(id = "require", long = "require", value_name = "NAME<=LIMIT")]
     pub limits: Vec<LimitFlag>,
     /// Scenario file whose section gnss is used
     #[arg(long, value_name = "FILE")]
     pub gnss: Option<PathBuf>,
-    /// Scenario file: receiver, start, IMU rate, aiding (see `nav-sim schema scenario`)
-    #[arg(long, value_name = "FILE")]
-    pub scenario: Option<PathBuf>,
+    /// Receiver, start, IMU rate, aiding.
+    #[command(flatten)]
+    pub settings: ScenarioArgs,
     /// What the vehicle knows of its own motion: a car moves neither sideways nor up; with MODEL, a table with and without
     #[arg(long, value_name = "KIND", value_parser = parse::one_of::<Vehicle>(&Vehicle::NAMES))]
     pub vehicle: Option<Vehicle>,
@@ -56,22 +63,6 @@ pub struct RequireRequest {
     #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = Catalogue::BUILT_IN,
         conflicts_with = "model")]
     pub catalogue: Option<Catalogue>,
-}
-
-impl Default for RequireRequest {
-    fn default() -> Self {
-        Self {
-            trajectory: PathBuf::new(),
-            model: None,
-            outage: Ask::Length(60.0),
-            start: None,
-            limits: Vec::new(),
-            gnss: None,
-            scenario: None,
-            vehicle: None,
-            catalogue: None,
-        }
-    }
 }
 
 /// A vehicle that knows something of its own motion.
@@ -87,18 +78,10 @@ nav_sim_signal::named!(Vehicle { Car = "car" }, in files);
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LimitFlag(pub Limit);
 
-parse::textual!(LimitFlag);
-
-impl fmt::Display for LimitFlag {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}<={}", self.0.quantity.name(), self.0.most)
-    }
-}
-
 impl FromStr for LimitFlag {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
         let limit = || {
             let (name, most) = text.split_once("<=").or_else(|| text.split_once('<'))?;
             let quantity = Quantity::ALL
@@ -116,22 +99,10 @@ impl FromStr for LimitFlag {
     }
 }
 
-parse::textual!(Ask);
-
-impl fmt::Display for Ask {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Length(length_s) => length_s.fmt(f),
-            Self::Window(outage) => write!(f, "{}:{}", outage.start_s, outage.end_s),
-            Self::Longest => f.write_str("longest"),
-        }
-    }
-}
-
 impl FromStr for Ask {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
         match text {
             "longest" => Ok(Self::Longest),
             window if window.contains(':') => window
@@ -158,21 +129,10 @@ impl Catalogue {
     const BUILT_IN: &str = "built-in";
 }
 
-parse::textual!(Catalogue);
-
-impl fmt::Display for Catalogue {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::BuiltIn => f.write_str(Self::BUILT_IN),
-            Self::Directory(path) => path.display().fmt(f),
-        }
-    }
-}
-
 impl FromStr for Catalogue {
     type Err = std::convert::Infallible;
 
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
+    fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
         Ok(if text == Self::BUILT_IN {
             Self::BuiltIn
         } else {
@@ -184,7 +144,7 @@ impl FromStr for Catalogue {
 /// What is found.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
-pub(crate) enum Found {
+enum Found {
     /// The IMU that is needed.
     Needed(Box<NeededImu>),
     /// What a given one makes of the limits.
@@ -193,19 +153,76 @@ pub(crate) enum Found {
     Ranked(Ranking),
 }
 
-impl Answer for Found {
-    fn document(&self) -> Document {
-        match self {
-            Self::Needed(needed) => needed.document(),
-            Self::Given(given) => given.document(),
-            Self::Ranked(ranking) => ranking.document(),
+/// What a limit needs, or what one or several IMUs make of it.
+#[derive(Debug, Serialize)]
+#[serde(transparent)]
+pub struct RequireAnswer {
+    found: Found,
+    #[serde(skip)]
+    file: Option<ModelFile>,
+}
+
+impl Command for Require {
+    type Answer = RequireAnswer;
+    const NAME: &'static str = "require";
+    const OUT: Out = Out::File {
+        kind: Written::Required,
+        name: "needed.toml",
+        help: "Model file to write, of the required IMU",
+    };
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        self.possible()?;
+        Ok(files("trajectory", [&self.trajectory])
+            .chain(files("model", &self.model))
+            .chain(files("scenario", &self.settings.scenario))
+            .chain(files("gnss", &self.gnss))
+            .collect())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<RequireAnswer> {
+        let asked = self.requirements(context)?;
+        let of_others = |found| RequireAnswer { found, file: None };
+        match (&self.model, &self.catalogue) {
+            (Some(path), _) => given(path, &asked, self.vehicle, context).map(of_others),
+            (None, Some(Catalogue::BuiltIn)) => ranked(&catalogue(&asked)?, &asked).map(of_others),
+            (None, Some(Catalogue::Directory(directory))) => {
+                ranked(&units_of(directory, &asked, context)?, &asked).map(of_others)
+            }
+            (None, None) => {
+                let needed = sought(&asked)?;
+                let file = Some(asked.model_file(&needed));
+                let found = Found::Needed(Box::new(needed));
+                Ok(RequireAnswer { found, file })
+            }
         }
+    }
+}
+
+impl Answer for RequireAnswer {
+    fn document(&self) -> Document {
+        match &self.found {
+            Found::Needed(needed) => needed.document(),
+            Found::Given(given) => given.document(),
+            Found::Ranked(ranking) => ranking.document(),
+        }
+    }
+
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        let file = self.file.as_ref().map(model_file::to_toml);
+        file.map(|text| OutputFile::whole("", text))
+            .into_iter()
+            .collect()
+    }
+
+    fn unmet(&self) -> Option<Failure> {
+        self.found.unmet()
     }
 }
 
 impl Found {
     /// The limits that are not kept.
-    pub(crate) fn unmet(&self) -> Option<Failure> {
+    fn unmet(&self) -> Option<Failure> {
         match self {
             Self::Needed(_) => None,
             Self::Given(judged) => {
@@ -223,48 +240,9 @@ impl Found {
     }
 }
 
-impl RequireRequest {
-    /// What is found, and the model of the IMU that is needed.
-    pub(crate) fn found(
-        &self,
-        context: &Context<'_>,
-    ) -> Result<(Found, Option<ModelFile>), Failure> {
-        self.possible()?;
-        let asked = self.requirements(context)?;
-        match (&self.model, &self.catalogue) {
-            (Some(path), _) => Ok((given(path, &asked, self.vehicle, context)?, None)),
-            (None, Some(Catalogue::BuiltIn)) => Ok((ranked(&catalogue(&asked)?, &asked)?, None)),
-            (None, Some(Catalogue::Directory(directory))) => Ok((
-                ranked(&units_of(directory, &asked, context)?, &asked)?,
-                None,
-            )),
-            (None, None) => {
-                let needed = sought(&asked)?;
-                let file = asked.model_file(&needed);
-                Ok((Found::Needed(Box::new(needed)), Some(file)))
-            }
-        }
-    }
-
-    /// As `nav-sim require` prints it; the IMU that is needed is the file `needed.toml`.
-    ///
-    /// # Errors
-    /// What is wrong with a file or a setting, or that no IMU keeps the limits.
-    pub fn answer(&self, context: &Context<'_>) -> Result<Answered, Failure> {
-        let (found, needed) = self.found(context)?;
-        let files = needed
-            .map(|file| ("needed.toml".to_owned(), model_file::to_toml(&file)))
-            .into_iter()
-            .collect();
-        Ok(Answered {
-            files,
-            unmet: found.unmet(),
-            ..Answered::of(&found)
-        })
-    }
-
+impl Require {
     /// Refuses what contradicts itself.
-    pub(crate) fn possible(&self) -> Result<(), Failure> {
+    fn possible(&self) -> Result<()> {
         if let (Ask::Window(outage), Some(start_s)) = (self.outage, self.start) {
             let message = format!(
                 "--start {start_s} beside --outage {}:{}",
@@ -282,7 +260,7 @@ impl RequireRequest {
     }
 
     /// The limits that are given; at least one.
-    fn limits(&self) -> Result<Vec<Limit>, Failure> {
+    fn limits(&self) -> Result<Vec<Limit>> {
         let limits: Vec<Limit> = self.limits.iter().map(|limit| limit.0).collect();
         if limits.is_empty() {
             let hint = "give one, such as --require 'p95_m<=5' or --require 'yaw_deg<=1'";
@@ -292,14 +270,9 @@ impl RequireRequest {
     }
 
     /// What is asked, with the files read.
-    fn requirements(&self, context: &Context<'_>) -> Result<Requirements, Failure> {
+    fn requirements(&self, context: &Context<'_>) -> Result<Requirements> {
         let limits = self.limits()?;
-        let mut scenario = self
-            .scenario
-            .as_deref()
-            .map(scenario_file::read)
-            .transpose()?
-            .unwrap_or_default();
+        let mut scenario = self.settings.read()?;
         if let Some(path) = &self.gnss {
             scenario.gnss = scenario_file::read(path)?.gnss;
         }
@@ -313,7 +286,7 @@ impl RequireRequest {
             scenario.aiding = AidingSettings::car();
         }
         scenario.validate().map_err(Failure::input)?;
-        let trajectory = read::trajectory(&self.trajectory, context)?;
+        let trajectory = inputs::trajectory(&self.trajectory, context)?;
         Requirements::new(scenario, trajectory, limits, self.outage, self.start).map_err(
             |e: Misplaced| {
                 let earlier = if self.start.is_some() {
@@ -328,7 +301,7 @@ impl RequireRequest {
 }
 
 /// The IMU that is needed.
-fn sought(requirements: &Requirements) -> Result<NeededImu, Failure> {
+fn sought(requirements: &Requirements) -> Result<NeededImu> {
     requirements.needed().map_err(|e| {
         let hint = match e {
             RequireError::Loose { .. } => "a smaller limit, or a longer outage",
@@ -344,12 +317,12 @@ fn given(
     requirements: &Requirements,
     vehicle: Option<Vehicle>,
     context: &Context<'_>,
-) -> Result<Found, Failure> {
+) -> Result<Found> {
     let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
-    let file = read::model(path, context)?;
+    let file = inputs::model(path, context)?;
     let mut scenario = requirements.scenario.clone();
-    read::expect_turn_on(&mut scenario.initial, &file, path, context);
-    read::make_turn_on(&mut scenario.imu, &file, path, context);
+    inputs::expect_turn_on(&mut scenario.initial, &file, path, context);
+    inputs::make_turn_on(&mut scenario.imu, &file, path, context);
     let not_stated = stated_in_words(&file.not_stated());
     if !not_stated.is_empty() {
         let text = format!(
@@ -358,7 +331,7 @@ fn given(
         );
         context.warn(text);
     }
-    let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
+    let model = inputs::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
     let mut judged = requirements.judged(&scenario, &model).map_err(unusable)?;
     if vehicle.is_some() {
         judged.aidings = requirements.aidings(&scenario, &model).map_err(unusable)?;
@@ -367,14 +340,14 @@ fn given(
 }
 
 /// The units, the best first.
-fn ranked(units: &[CatalogueUnit], requirements: &Requirements) -> Result<Found, Failure> {
+fn ranked(units: &[CatalogueUnit], requirements: &Requirements) -> Result<Found> {
     Ok(Found::Ranked(
         requirements.ranked(units).map_err(Failure::input)?,
     ))
 }
 
 /// The units that are known by name.
-fn catalogue(requirements: &Requirements) -> Result<Vec<CatalogueUnit>, Failure> {
+fn catalogue(requirements: &Requirements) -> Result<Vec<CatalogueUnit>> {
     let unit = |(name, _): &(&str, &str)| {
         let sheet = datasheet::catalogued(name).expect("a name of the catalogue")?;
         of_sheet((*name).to_owned(), &sheet, requirements)
@@ -387,7 +360,7 @@ fn units_of(
     directory: &Path,
     asked: &Requirements,
     context: &Context<'_>,
-) -> Result<Vec<CatalogueUnit>, Failure> {
+) -> Result<Vec<CatalogueUnit>> {
     if !directory.exists() {
         let message = format!(
             "--catalogue {}: there is no such directory",
@@ -410,18 +383,14 @@ fn units_of(
         if file_kind::of(path)? == FileKind::CatalogueEntry {
             return of_sheet(name, &datasheet::read(path)?, asked);
         }
-        let file = read::model(path, context)?;
-        let model = read::at_rate(path, &file.model, asked.scenario.imu.rate_hz, context)?;
+        let file = inputs::model(path, context)?;
+        let model = inputs::at_rate(path, &file.model, asked.scenario.imu.rate_hz, context)?;
         Ok(asked.unit(name, &file, model))
     };
     paths.iter().map(unit).collect()
 }
 
-fn of_sheet(
-    name: String,
-    sheet: &Datasheet,
-    requirements: &Requirements,
-) -> Result<CatalogueUnit, Failure> {
+fn of_sheet(name: String, sheet: &Datasheet, requirements: &Requirements) -> Result<CatalogueUnit> {
     let made = sheet.model_file(requirements.scenario.imu.rate_hz);
     let file = made
         .map_err(|e| Failure::input(format!("{name}: {e}")))?

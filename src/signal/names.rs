@@ -42,7 +42,7 @@ macro_rules! named {
         impl std::str::FromStr for $type {
             type Err = $crate::names::UnknownName;
 
-            fn from_str(word: &str) -> Result<Self, Self::Err> {
+            fn from_str(word: &str) -> std::result::Result<Self, Self::Err> {
                 let found = Self::ALL.into_iter().find(|member| member.name() == word);
                 found.ok_or_else(|| Self::Err { word: word.to_owned(), legal: &Self::NAMES })
             }
@@ -52,13 +52,13 @@ macro_rules! named {
         $crate::named!($type { $($members)+ });
 
         impl $crate::names::serde::Serialize for $type {
-            fn serialize<S: $crate::names::serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+            fn serialize<S: $crate::names::serde::Serializer>(&self, to: S) -> std::result::Result<S::Ok, S::Error> {
                 to.serialize_str(self.name())
             }
         }
 
         impl<'de> $crate::names::serde::Deserialize<'de> for $type {
-            fn deserialize<D: $crate::names::serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+            fn deserialize<D: $crate::names::serde::Deserializer<'de>>(from: D) -> std::result::Result<Self, D::Error> {
                 let word = <String as $crate::names::serde::Deserialize>::deserialize(from)?;
                 let unknown = |_| $crate::names::serde::de::Error::unknown_variant(&word, &Self::NAMES);
                 word.parse().map_err(unknown)

@@ -4,12 +4,12 @@ mod request;
 
 pub use request::SynthesisRequest;
 
+use crate::app::Failure;
 use crate::app::Input;
 use crate::formats::atomic::{AtomicDir, Claim, Existing, Found, claim_directory};
 use crate::formats::model_file::ModelFile;
 use crate::formats::recordings::{FileFormat, is_recording};
 use crate::formats::{FileError, Place, Setting};
-use crate::jobs::JobError;
 use crate::report;
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::contamination::Contamination;
@@ -79,7 +79,7 @@ impl Synthesis {
     ///
     /// # Errors
     /// Of the first recording that cannot be made or written; then none is.
-    pub fn write(&self, out: &Path, made: impl Fn() + Sync) -> Result<String, JobError> {
+    pub fn write(&self, out: &Path, made: impl Fn() + Sync) -> Result<String, Failure> {
         let mut directory = AtomicDir::create(out)?;
         let names = self.names();
         let paths: Vec<PathBuf> = names.iter().map(|n| directory.path(n)).collect();
@@ -89,11 +89,11 @@ impl Synthesis {
             Ok(model)
         };
         // Collected before the first failure is looked for, so that it is the same at any number of threads.
-        let outcomes: Vec<Result<Model, JobError>> =
+        let outcomes: Vec<Result<Model, Failure>> =
             (0..names.len()).into_par_iter().map(write).collect();
         let models = outcomes
             .into_iter()
-            .collect::<Result<Vec<Model>, JobError>>()?;
+            .collect::<Result<Vec<Model>, Failure>>()?;
         let text = report::json(&self.manifest(&names, &models));
         directory.write("manifest.json", &text)?;
         directory.commit()?;
@@ -107,12 +107,7 @@ impl Synthesis {
     }
 
     /// Writes a replicate and returns the model it was made from; `shown`: where the file will be.
-    fn write_replicate(
-        &self,
-        replicate: u64,
-        path: &Path,
-        shown: &Path,
-    ) -> Result<Model, JobError> {
+    fn write_replicate(&self, replicate: u64, path: &Path, shown: &Path) -> Result<Model, Failure> {
         let spread = self.file.spread.as_ref().filter(|_| self.spread);
         let contamination = self.contamination.as_ref();
         let imu = VirtualImu {

@@ -3,10 +3,10 @@
 use super::Synthesis;
 use crate::app::Context;
 use crate::app::Failure;
+use crate::app::reading::ChannelSet;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::recordings::FileFormat;
 use crate::formats::{contamination_file, input};
-use crate::jobs::ChannelSet;
 use crate::parse;
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::contamination::{Contamination, Rule};

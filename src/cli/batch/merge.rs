@@ -29,7 +29,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let states = crate::compare::states(&args.states)?;
+    let states = crate::commands::compare::states(&args.states)?;
     let planned = args.place.planned(session.asked_seed())?;
     let options = MergeOptions {
         states,

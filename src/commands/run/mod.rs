@@ -138,7 +138,7 @@ impl Command for Run {
             .chain(files("model", [&self.model]))
             .chain(files("truth", &self.truth))
             .chain(inputs::listed("static", &self.recordings)?)
-            .chain(files("scenario", &self.settings.scenario))
+            .chain(files("scenario", &self.settings.file.scenario))
             .chain(files("gnss", &self.gnss))
             .collect())
     }
@@ -178,7 +178,7 @@ impl Run {
             inputs.truth = TrueImu::Drawn(self.drawn(&made_by, &scenario, seed)?);
         }
         let outages = inputs::placed(&scenario, &inputs.trajectory, seed, context);
-        let outages = outages.map_err(|e| match &self.settings.scenario {
+        let outages = outages.map_err(|e| match &self.settings.file.scenario {
             Some(file) if self.settings.outages.is_empty() => e.within(&file.display().to_string()),
             _ => e,
         })?;
@@ -318,7 +318,7 @@ impl Run {
             )),
             NavigateError::Experiment(_) => failure,
             NavigateError::Belief(e) => {
-                let settings = self.gnss.as_deref().or(self.settings.scenario.as_deref());
+                let settings = self.gnss.as_deref().or(self.settings.file.scenario.as_deref());
                 let advice =
                     "raise it, or take the full filter (--filter full), which reduces nothing";
                 inputs::no_filter(&e, &self.model, settings, advice)

@@ -1,10 +1,12 @@
 //! How recordings are read and their wavelet variances taken: arguments that several commands share.
 
-use crate::app::Failure;
+use crate::app::{Context, Failure};
 use crate::formats::logs::LogOptions;
-use crate::formats::recordings::{Gaps, ReadOptions};
+use crate::formats::recordings::{Gaps, ReadOptions, Report};
+use crate::formats::suggest;
 use crate::parse;
-use nav_sim_calibration::FitRange;
+use nav_sim_calibration::{FitRange, ModelSpec, SpecError};
+use nav_sim_document::Importance;
 use nav_sim_logs::Stamp;
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::wavelet::{Convention, Tuning};
@@ -357,4 +359,34 @@ impl VarianceRequest {
             None
         }
     }
+}
+
+/// Not a `--model`.
+pub(crate) fn unknown_model(e: SpecError) -> Failure {
+    let hint = suggest::model(&e, ModelSpec::legal().chain(["auto"]));
+    Failure::input(format!("--model: {e}")).hint(hint)
+}
+
+/// Files of more than this number are told in one line, unless all is to be said.
+const FEW: usize = 2;
+
+/// Notes what was found in the recordings, and what is doubtful about them.
+pub(crate) fn note_report(report: &Report, context: &Context<'_>) {
+    let is_many = report.files.len() > FEW;
+    if is_many {
+        context.remark(format!("{} (--verbose: each of them)", report.summary()));
+    }
+    let each = match is_many {
+        true => Importance::Detail,
+        false => Importance::Remark,
+    };
+    for file in &report.files {
+        context.note(each, file);
+        if !file.ignored.is_empty() {
+            let ignored = file.ignored.join(", ");
+            context.detail(format!("{}: passed over: {ignored}", file.file));
+        }
+    }
+    let doubts = report.all_warnings();
+    doubts.iter().for_each(|doubt| context.warn(doubt));
 }

@@ -1,25 +1,323 @@
-//! What a calibration that is not made yet would tell.
+//! `nav-sim design`: the interval that recordings not made yet would give.
 
-use crate::report::Answer;
+use crate::app::inputs::{self, OutageFlag, files};
+use crate::app::{Answer, Command, Context, Failure, Result};
+use crate::calibrate::ESTIMATORS;
+use crate::commands::run::{NavigateInputs, TrueImu, navigate};
+use crate::formats::draws_file::DrawsFile;
+use crate::formats::model_file::ModelFile;
+use crate::parse;
 use crate::report::dots::{Dots, dot_chart};
+use nav_sim_calibration::{
+    Anticipated, Bootstrap, Estimator, Outcome, ParameterInterval, Scattering, Settings,
+};
 use nav_sim_document::{
     Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone, readable,
     window,
 };
+use nav_sim_navigation::ekf::FilterStates;
+use nav_sim_navigation::metrics::OutageSummary;
+use nav_sim_navigation::scenario::{Method, Scenario};
+use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_signal::noise::Parameter;
 use serde::Serialize;
+use std::path::PathBuf;
+
+/// Predict how well a number of recordings of given length would determine an IMU like MODEL
+///
+/// Draws the wavelet variances of recordings from their sampling distribution, with the [spread] of MODEL between
+/// recordings, and calibrates them as `nav-sim calibrate` would. The expected interval is made of the scatter of these
+/// estimates about MODEL. What one calibration states is made of the scatter of its own recordings, half of them more and half
+/// less; where a parameter is known to ± 100 %, rather less. 200 draws know such an interval to about 20 %. With --trajectory there is also the
+/// interval on the horizontal error (95 % quantile) at the end of each outage, for a filter that knows the IMU.
+/// Without --recordings or --hours a table of several is printed.
+#[derive(clap::Args, Debug, Clone)]
+#[command(before_help = "\
+Examples:
+  nav-sim design calib_data/tactical.toml --recordings 6 --hours 2
+  nav-sim design calib_data/consumer_mems.toml --recordings 6 --hours 1 --draws 50 --estimator awv
+  nav-sim design calib_data/tactical.toml --recordings 4 --hours 1 --draws 50 \\
+      --trajectory trajectories/figure_eight.toml --outage 300:360")]
+pub struct Design {
+    /// Noise model of the IMU, as far as it is known
+    pub model: PathBuf,
+    /// Number of recordings [default: a table of 3, 6 and 12]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..=1000))]
+    pub recordings: Option<u32>,
+    /// Length of each in hours [default: a table of 1, 3 and 10]
+    #[arg(long, value_name = "HOURS", value_parser = parse::positive)]
+    pub hours: Option<f64>,
+    /// How they will be calibrated
+    #[arg(long, value_name = "ESTIMATOR", value_parser = parse::words::<Estimator>(AVERAGES), default_value_t)]
+    pub estimator: Estimator,
+    /// Draws of the bootstrap
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(40..=10_000))]
+    pub draws: u32,
+    /// Trajectory: motion profile (.toml) or table (.csv)
+    #[arg(long, value_name = "FILE")]
+    pub trajectory: Option<PathBuf>,
+    /// Window without fixes, in seconds (repeatable; default: 300:390 and 700:790)
+    #[arg(
+        id = "outage",
+        long = "outage",
+        value_name = "START:END",
+        requires = "trajectory"
+    )]
+    pub outages: Vec<OutageFlag>,
+}
+
+/// The estimators of several recordings.
+const AVERAGES: &[(&str, &str)] = ESTIMATORS.split_at(3).0;
+
+/// Longest recording that is planned (h): a year.
+const LONGEST_H: f64 = 8766.0;
+
+impl Command for Design {
+    type Answer = Designs;
+    const NAME: &'static str = "design";
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        let model = files("model", [&self.model]);
+        Ok(model.chain(files("trajectory", &self.trajectory)).collect())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<Designs> {
+        if self.hours.is_some_and(|hours| hours > LONGEST_H) {
+            return Err(Failure::input("--hours: longer than a year"));
+        }
+        let file = inputs::model(&self.model, context)?;
+        let mut scenario = self.scenario()?;
+        let mut navigation = None;
+        if let Some(path) = &self.trajectory {
+            let trajectory = inputs::trajectory(path, context)?;
+            let span = (trajectory.start_s(), trajectory.end_s());
+            let outages = scenario.outages_on(span, 0)?.windows;
+            scenario.imu.rate_hz = file.model.rate_hz;
+            scenario.validate().map_err(Failure::input)?;
+            let inputs = NavigateInputs::new(trajectory, file.model.clone(), TrueImu::AsBelieved);
+            navigation = Some((inputs, outages));
+        }
+        let destination = navigation.as_mut().map(|(inputs, outages)| Destination {
+            inputs,
+            scenario: &scenario,
+            outages,
+        });
+        Ok(Designs {
+            schema_version: 1,
+            designs: self.designs(&file, destination, context.seed_or(None))?,
+        })
+    }
+}
+
+impl Design {
+    /// Drives are analysed, with a state for every process.
+    fn scenario(&self) -> Result<Scenario> {
+        let mut scenario = Scenario::default();
+        scenario.run.method = Method::Lincov;
+        scenario.filter.states = FilterStates::Full;
+        if !self.outages.is_empty() {
+            scenario.outage = Some(crate::app::inputs::windows_of(&self.outages)?);
+        }
+        Ok(scenario)
+    }
+
+    /// One design for each number of recordings and length.
+    fn designs(
+        &self,
+        file: &ModelFile,
+        navigation: Option<Destination<'_>>,
+        seed: u64,
+    ) -> Result<Vec<DesignOutcome>> {
+        let settings = Settings::default();
+        let bootstrap = Bootstrap {
+            draws: self.draws as usize,
+            seed: seed,
+        };
+        let mut inputs = DesignInputs {
+            file,
+            estimator: self.estimator,
+            settings: &settings,
+            bootstrap,
+            navigation,
+        };
+        let recordings = self.recordings.map_or(vec![3, 6, 12], |k| vec![k as usize]);
+        let hours = self.hours.map_or(vec![1.0, 3.0, 10.0], |h| vec![h]);
+        let mut designs = Vec::new();
+        for k in recordings {
+            for h in &hours {
+                let design = design(&mut inputs, k, *h);
+                designs.push(
+                    design.map_err(|e| Failure::input(e).hint("more, or longer recordings"))?,
+                );
+            }
+        }
+        Ok(designs)
+    }
+}
+
+/// What is planned with.
+struct DesignInputs<'a> {
+    /// The IMU as it is believed to be, with its spread where recordings differ.
+    pub file: &'a ModelFile,
+    /// How it will be calibrated.
+    pub estimator: Estimator,
+    /// Trim, tuning and weighting of it.
+    pub settings: &'a Settings,
+    /// Draws and their seed.
+    pub bootstrap: Bootstrap,
+    /// A navigation to which the calibration leads, if there is one.
+    pub navigation: Option<Destination<'a>>,
+}
+
+/// A navigation with the model that will be calibrated.
+struct Destination<'a> {
+    /// Trajectory and model.
+    pub inputs: &'a mut NavigateInputs,
+    /// Filter and receiver; the method is covariance analysis.
+    pub scenario: &'a Scenario,
+    /// The outages.
+    pub outages: &'a [Outage],
+}
+
+/// What `recordings` of `hours` each would tell.
+///
+/// # Errors
+/// When the recordings are too few or too short, or the navigation cannot be analysed.
+fn design(inputs: &mut DesignInputs<'_>, recordings: usize, hours: f64) -> Result<DesignOutcome> {
+    let model = &inputs.file.model;
+    let samples = (hours * 3600.0 * model.rate_hz).round() as usize;
+    let anticipated = Anticipated {
+        model,
+        spread: inputs.file.spread.as_ref(),
+        recordings,
+        samples,
+    };
+    let outcomes = |scattering| {
+        anticipated.outcomes(
+            inputs.estimator,
+            inputs.settings,
+            scattering,
+            inputs.bootstrap,
+        )
+    };
+    let all = outcomes(Scattering::All)?;
+    let mut parameters: Vec<DesignedParameter> = all
+        .iter()
+        .flat_map(|o| designed(o, model.rate_hz))
+        .collect();
+    if inputs.file.spread.is_some() {
+        let endless = outcomes(Scattering::BetweenRecordings)?;
+        for (parameter, endless) in parameters
+            .iter_mut()
+            .zip(endless.iter().flat_map(|o| designed(o, model.rate_hz)))
+        {
+            parameter.endless_half_width_pct = endless.half_width_pct;
+        }
+    }
+    let horizontal_p95 = match &mut inputs.navigation {
+        Some(destination) => destination_quantiles(destination, &all, model.rate_hz)?,
+        None => Vec::new(),
+    };
+    Ok(DesignOutcome {
+        recordings,
+        hours,
+        parameters,
+        horizontal_p95,
+    })
+}
+
+/// The parameters of an outcome; correlation times in the place of phi and beta, of which a per cent says nothing.
+fn designed(outcome: &Outcome, rate_hz: f64) -> Vec<DesignedParameter> {
+    let composite = &outcome.fit.composite;
+    let values: Vec<_> = composite.parameters().collect();
+    let parameter_of_interval = |interval: &ParameterInterval| {
+        let (_, value) = *values
+            .iter()
+            .find(|(parameter, _)| *parameter == interval.of)?;
+        let (name, label) = (
+            composite.name_of(interval.of),
+            &composite.labels()[interval.of.process],
+        );
+        let (parameter, shown): (String, &dyn Fn(f64) -> f64) = match interval.of.parameter {
+            Parameter::Phi => (format!("{label} correlation_time_s"), &|phi| {
+                -1.0 / (rate_hz * phi.ln())
+            }),
+            Parameter::Beta => (format!("{label} correlation_time_s"), &|beta| 1.0 / beta),
+            _ => (name, &|value| value),
+        };
+        let value = shown(value);
+        let ci95 = interval.absent.is_none().then(|| {
+            let (a, b) = (shown(interval.low), shown(interval.high));
+            [a.min(b), a.max(b)]
+        });
+        Some(DesignedParameter {
+            signals: outcome.scope.name(),
+            parameter,
+            value,
+            ci95,
+            half_width_pct: ci95.map(|ends| half_width_pct(value, ends)),
+            endless_half_width_pct: None,
+        })
+    };
+    outcome
+        .inference
+        .iter()
+        .flat_map(|i| &i.intervals)
+        .filter_map(parameter_of_interval)
+        .collect()
+}
+
+fn half_width_pct(value: f64, [low, high]: [f64; 2]) -> f64 {
+    50.0 * (high - low) / value.abs()
+}
+
+/// The draws of the calibration, taken through the analysis.
+fn destination_quantiles(
+    destination: &mut Destination<'_>,
+    outcomes: &[Outcome],
+    rate_hz: f64,
+) -> Result<Vec<DesignedQuantile>> {
+    let mut model = destination.inputs.model.clone();
+    outcomes
+        .iter()
+        .for_each(|outcome| outcome.put_into(&mut model));
+    let draws = DrawsFile::of(&outcomes.iter().collect::<Vec<_>>(), rate_hz);
+    destination.inputs.model_draws = draws.and_then(|draws| draws.draws(&model));
+    destination.inputs.model = model;
+    let found = navigate(
+        destination.inputs,
+        destination.scenario,
+        destination.outages,
+        0,
+        &Context::default(),
+    )?;
+    let quantile = |o: &OutageSummary| {
+        let h = &o.horizontal_error_end_m;
+        let ci95: [f64; 2] = h.p95_ci95.0.zip(h.p95_ci95.1)?.into();
+        let half_width_pct = half_width_pct(h.p95, ci95);
+        Some(DesignedQuantile {
+            start_s: o.start_s,
+            end_s: o.end_s,
+            p95_m: h.p95,
+            ci95,
+            half_width_pct,
+        })
+    };
+    Ok(found.summary.outages.iter().filter_map(quantile).collect())
+}
 
 /// Several designs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Designs {
+pub struct Designs {
     /// Layout version.
-    pub schema_version: u32,
+    pub(crate) schema_version: u32,
     /// One for each number of recordings and length, the largest last.
-    pub designs: Vec<Design>,
+    pub(crate) designs: Vec<DesignOutcome>,
 }
 
 /// What so many recordings, so long each, would tell.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Design {
+pub(crate) struct DesignOutcome {
     /// Recordings.
     pub recordings: usize,
     /// Length of each (h).
@@ -80,7 +378,7 @@ const STATED: &str = "where ± 100 % are expected, half of the calibrations stat
 /// A part of an interval this large is nearly all of it.
 const NEARLY_ALL: f64 = 0.8;
 
-impl Design {
+impl DesignOutcome {
     fn undetermined(&self) -> usize {
         self.parameters
             .iter()
@@ -185,7 +483,7 @@ impl Answer for Designs {
         let designs = &self.designs;
         let (tone, lines) = self.verdict();
         let mut document = Document::new("What recordings would tell", tone, lines);
-        let floor = designs.last().map_or(0, Design::lengths_do_not_help);
+        let floor = designs.last().map_or(0, DesignOutcome::lengths_do_not_help);
         if floor > 0 {
             let text = format!(
                 "more hours will not help {floor} parameters: recordings differ among themselves; more recordings will"
@@ -225,7 +523,7 @@ const BESIDE: &str = "Half of the 95 % interval to expect (% of the value).";
 const AGAINST: &str = "Half of the 95 % interval to expect (% of the value) against the length of each recording; dashed: however long they are.";
 
 /// Every parameter of one design.
-fn parameters(design: &Design) -> Table {
+fn parameters(design: &DesignOutcome) -> Table {
     let floors = design
         .parameters
         .iter()
@@ -251,7 +549,7 @@ fn parameters(design: &Design) -> Table {
 }
 
 /// The parameters of one design beside one another.
-fn beside(design: &Design) -> Chart {
+fn beside(design: &DesignOutcome) -> Chart {
     let points = |value: &dyn Fn(&DesignedParameter) -> Option<f64>| {
         let point = |p: &DesignedParameter| [value(p).unwrap_or(f64::NAN), f64::NAN, f64::NAN];
         design.parameters.iter().map(point).collect::<Vec<_>>()
@@ -284,9 +582,9 @@ fn beside(design: &Design) -> Chart {
 }
 
 /// One parameter of several designs: a curve for each number of recordings.
-fn against_hours(designs: &[Design], k: usize) -> Option<Chart> {
+fn against_hours(designs: &[DesignOutcome], k: usize) -> Option<Chart> {
     let name = designs.first()?.parameters[k].name();
-    let value = |d: &Design| {
+    let value = |d: &DesignOutcome| {
         d.parameters
             .get(k)
             .and_then(|p| p.half_width_pct)
@@ -311,14 +609,14 @@ fn against_hours(designs: &[Design], k: usize) -> Option<Chart> {
     Some(Chart::new(&name, Axis::log("hours"), vec![panel]).small())
 }
 
-fn counts(designs: &[Design]) -> Vec<usize> {
+fn counts(designs: &[DesignOutcome]) -> Vec<usize> {
     let mut counts: Vec<usize> = designs.iter().map(|d| d.recordings).collect();
     counts.dedup();
     counts
 }
 
 /// A curve over hours for each number of recordings.
-fn curves(designs: &[Design], value: impl Fn(&Design) -> f64) -> Vec<Series> {
+fn curves(designs: &[DesignOutcome], value: impl Fn(&DesignOutcome) -> f64) -> Vec<Series> {
     let curve = |(hue, count): (usize, usize)| {
         let designs_of_count = || designs.iter().filter(|d| d.recordings == count);
         let points: Vec<(f64, f64)> = designs_of_count().map(|d| (d.hours, value(d))).collect();
@@ -333,11 +631,11 @@ fn curves(designs: &[Design], value: impl Fn(&Design) -> f64) -> Vec<Series> {
 }
 
 /// The horizontal error: a panel an outage.
-fn navigation(designs: &[Design]) -> Chart {
+fn navigation(designs: &[DesignOutcome]) -> Chart {
     let outages = designs.first().map_or(0, |d| d.horizontal_p95.len());
     let panel = |k: usize| {
         let q = &designs[0].horizontal_p95[k];
-        let value = |d: &Design| {
+        let value = |d: &DesignOutcome| {
             d.horizontal_p95
                 .get(k)
                 .map_or(f64::NAN, |q| q.half_width_pct)
@@ -357,7 +655,7 @@ fn navigation(designs: &[Design]) -> Chart {
     )
 }
 
-fn quantiles(designs: &[Design]) -> Table {
+fn quantiles(designs: &[DesignOutcome]) -> Table {
     let mut table = Table::new([
         "recordings",
         "hours",
@@ -385,7 +683,7 @@ fn quantiles(designs: &[Design]) -> Table {
 }
 
 /// Half widths: a row a parameter, a column a design.
-fn all_parameters(designs: &[Design]) -> Table {
+fn all_parameters(designs: &[DesignOutcome]) -> Table {
     let plans = designs
         .iter()
         .map(|d| format!("{} × {} h (± %)", d.recordings, d.hours));
@@ -396,13 +694,16 @@ fn all_parameters(designs: &[Design]) -> Table {
         .flat_map(|d| &d.parameters)
         .enumerate()
     {
-        let cell =
-            |(i, d): (usize, &Design)| match d.parameters.get(k).and_then(|p| p.half_width_pct) {
-                Some(half) => {
-                    Cell::number(half, &format!("/designs/{i}/parameters/{k}/half_width_pct"))
-                }
-                None => Cell::figures("not determined"),
-            };
+        let cell = |(i, d): (usize, &DesignOutcome)| match d
+            .parameters
+            .get(k)
+            .and_then(|p| p.half_width_pct)
+        {
+            Some(half) => {
+                Cell::number(half, &format!("/designs/{i}/parameters/{k}/half_width_pct"))
+            }
+            None => Cell::figures("not determined"),
+        };
         let value = Cell::number(p.value, &format!("/designs/0/parameters/{k}/value"));
         let first = [Cell::from(p.name()), value];
         table.row(
@@ -418,7 +719,12 @@ fn all_parameters(designs: &[Design]) -> Table {
 mod tests {
     use super::*;
 
-    fn designed(recordings: usize, hours: f64, half_width_pct: f64, floor: Option<f64>) -> Design {
+    fn designed(
+        recordings: usize,
+        hours: f64,
+        half_width_pct: f64,
+        floor: Option<f64>,
+    ) -> DesignOutcome {
         let parameter = DesignedParameter {
             signals: "gyro".to_owned(),
             parameter: "WN sigma2".to_owned(),
@@ -427,7 +733,7 @@ mod tests {
             half_width_pct: Some(half_width_pct),
             endless_half_width_pct: floor,
         };
-        Design {
+        DesignOutcome {
             recordings,
             hours,
             parameters: vec![parameter],

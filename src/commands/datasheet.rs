@@ -1,20 +1,31 @@
-//! Models from data sheets, and the catalogue of IMUs.
+//! `nav-sim datasheet`: models from data sheets, and the catalogue of IMUs.
 
-use crate::app::Failure;
+use crate::app::inputs::files;
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
 use crate::formats::FileError;
+use crate::formats::atomic::Written;
 use crate::formats::datasheet::{CATALOGUE, Datasheet, Entry, Figure, Quantity, catalogued, read};
-use crate::formats::model_file::ModelFile;
+use crate::formats::model_file::{self, ModelFile};
 use crate::formats::suggest::nearest;
-use crate::{parse, report};
+use crate::parse;
+use nav_sim_document::{Document, Tone};
 use nav_sim_signal::imu::Sensor;
-use serde::Deserialize;
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// The arguments of `nav-sim datasheet`: an entry of the catalogue, and figures over it.
-#[derive(clap::Args, Debug, Clone, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct DatasheetRequest {
+/// Make a noise model from the figures of a data sheet, in their own units: an assumption, not a calibration
+///
+/// The model has white noise of the given density, Gauss-Markov processes whose Allan deviation has the bias
+/// instability as its minimum, and a random walk. [provenance] of the model file holds every figure as given and the
+/// parameters that follow from it. Flags override the entry of the catalogue.
+#[derive(clap::Args, Debug, Clone)]
+#[command(before_help = "\
+Examples:
+  nav-sim datasheet --unit stim300 --rate-hz 100 -o stim300.toml
+  nav-sim datasheet calib_data/catalogue/adis16470.toml --corr-time 100s -o adis16470.toml
+  nav-sim datasheet --list")]
+pub struct DatasheetArgs {
     /// Catalogue entry (TOML)
     #[arg(value_name = "ENTRY", conflicts_with = "unit")]
     pub entry: Option<PathBuf>,
@@ -24,26 +35,88 @@ pub struct DatasheetRequest {
     /// Figures in the place of the entry's.
     #[command(flatten)]
     pub figures: Figures,
+    /// List the catalogue
+    #[arg(long)]
+    pub list: bool,
     /// Sample rate of the model
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz, default_value = "100")]
     pub rate_hz: f64,
 }
 
-impl Default for DatasheetRequest {
-    fn default() -> Self {
-        Self {
-            entry: None,
-            unit: None,
-            figures: Figures::default(),
-            rate_hz: 100.0,
+/// A model of a data sheet, or the catalogue.
+pub enum DatasheetAnswer {
+    /// The model.
+    Model(Box<ModelFile>),
+    /// The catalogue, as text and as JSON.
+    Catalogue(String, Value),
+}
+
+impl Command for DatasheetArgs {
+    type Answer = DatasheetAnswer;
+    const NAME: &'static str = "datasheet";
+    const OUT: Out = Out::File {
+        kind: Written::Datasheet,
+        name: "model.toml",
+        help: "Model file to write (default: to stdout)",
+    };
+    const PLOT: bool = false;
+    const PRINTS_FILE: bool = true;
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        Ok(files("entry", &self.entry).collect())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<DatasheetAnswer> {
+        if self.list {
+            return Ok(DatasheetAnswer::Catalogue(
+                catalogue_text()?,
+                catalogue_json()?,
+            ));
+        }
+        let made = self.model()?;
+        made.doubts.iter().for_each(|doubt| context.warn(doubt));
+        made.notes.iter().for_each(|note| context.remark(note));
+        context.remark("an assumption, not a calibration");
+        Ok(DatasheetAnswer::Model(Box::new(made.file)))
+    }
+}
+
+impl Serialize for DatasheetAnswer {
+    /// A model file with the same keys as JSON.
+    fn serialize<S: serde::Serializer>(&self, to: S) -> std::result::Result<S::Ok, S::Error> {
+        match self {
+            Self::Model(file) => {
+                let table: std::result::Result<toml::Table, _> = model_file::to_toml(file).parse();
+                table.map_err(serde::ser::Error::custom)?.serialize(to)
+            }
+            Self::Catalogue(_, json) => json.serialize(to),
+        }
+    }
+}
+
+impl Answer for DatasheetAnswer {
+    fn document(&self) -> Document {
+        Document::new("Data sheet", Tone::Good, [""; 0])
+    }
+
+    fn text(&self) -> Option<String> {
+        match self {
+            Self::Model(_) => None,
+            Self::Catalogue(text, _) => Some(text.clone()),
+        }
+    }
+
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        match self {
+            Self::Model(file) => vec![OutputFile::whole("", model_file::to_toml(file))],
+            Self::Catalogue(..) => Vec::new(),
         }
     }
 }
 
 /// Figures: a number and its unit, such as '0.15 deg/sqrt(h)'; others in a catalogue entry.
-#[derive(clap::Args, Debug, Clone, Default, PartialEq, Deserialize)]
+#[derive(clap::Args, Debug, Clone, Default, PartialEq)]
 #[command(next_help_heading = "Figures, a number and its unit ('0.15 deg/sqrt(h)')")]
-#[serde(default, deny_unknown_fields)]
 pub struct Figures {
     /// Velocity random walk or noise density of the accelerometers: m/s/sqrt(h), ug/sqrt(Hz), …
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Noise))]
@@ -69,7 +142,10 @@ pub struct Figures {
 }
 
 /// Checks a figure of a sensor.
-fn figure(sensor: Sensor, figure: Figure) -> impl Fn(&str) -> Result<String, String> + Clone {
+fn figure(
+    sensor: Sensor,
+    figure: Figure,
+) -> impl Fn(&str) -> std::result::Result<String, String> + Clone {
     let parsed =
         move |text: &str| Quantity::parse(text, figure.units(sensor)).map(|_| text.to_owned());
     move |text| parsed(text).map_err(|e| e.to_string())
@@ -77,7 +153,7 @@ fn figure(sensor: Sensor, figure: Figure) -> impl Fn(&str) -> Result<String, Str
 
 impl Figures {
     /// Puts those that are given in the place of those of an entry.
-    fn over(&self, sheet: &mut Datasheet) -> Result<(), Failure> {
+    fn over(&self, sheet: &mut Datasheet) -> Result<()> {
         let given = [
             ("vrw", Sensor::Accel, Figure::Noise, &self.vrw),
             ("arw", Sensor::Gyro, Figure::Noise, &self.arw),
@@ -136,12 +212,12 @@ pub struct DatasheetModel {
     pub notes: Vec<String>,
 }
 
-impl DatasheetRequest {
+impl DatasheetArgs {
     /// The model that the figures are assumed to mean.
     ///
     /// # Errors
     /// An entry that cannot be read or does not exist, a figure that cannot be read, no figure at all.
-    pub fn model(&self) -> Result<DatasheetModel, Failure> {
+    pub fn model(&self) -> Result<DatasheetModel> {
         let mut sheet = match (&self.entry, &self.unit) {
             (Some(path), _) => read(path)?,
             (None, Some(name)) => named(name)?,
@@ -170,7 +246,7 @@ impl DatasheetRequest {
     }
 }
 
-fn named(name: &str) -> Result<Datasheet, Failure> {
+fn named(name: &str) -> Result<Datasheet> {
     if let Some(sheet) = catalogued(name) {
         return Ok(sheet?);
     }
@@ -223,7 +299,7 @@ fn left_out(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
     offset.into_iter().chain(scale).collect()
 }
 
-fn units() -> Result<Vec<(&'static str, Datasheet)>, FileError> {
+fn units() -> std::result::Result<Vec<(&'static str, Datasheet)>, FileError> {
     let units = CATALOGUE
         .iter()
         .filter_map(|(name, _)| Some((*name, catalogued(name)?)));
@@ -234,7 +310,7 @@ fn units() -> Result<Vec<(&'static str, Datasheet)>, FileError> {
 ///
 /// # Errors
 /// An entry that cannot be read.
-pub(crate) fn catalogue_text() -> Result<String, FileError> {
+fn catalogue_text() -> std::result::Result<String, FileError> {
     let mut lines = Vec::new();
     for (unit, sheet) in units()? {
         let (class, name) = (sheet.class.as_deref(), sheet.name.as_deref());
@@ -258,14 +334,12 @@ pub(crate) fn catalogue_text() -> Result<String, FileError> {
 ///
 /// # Errors
 /// An entry that cannot be read.
-pub fn catalogue_json() -> Result<String, FileError> {
+pub fn catalogue_json() -> std::result::Result<Value, FileError> {
     let figure = |e: &Entry| json!({ "sensor": e.sensor.name(), "figure": e.figure.key(), "given": e.quantity.given, "source": e.source });
     let unit = |(unit, sheet): (&str, Datasheet)| {
         let figures: Vec<Value> = sheet.entries.iter().map(figure).collect();
         json!({ "unit": unit, "name": sheet.name, "class": sheet.class, "figures": figures })
     };
     let units: Vec<Value> = units()?.into_iter().map(unit).collect();
-    Ok(report::json(
-        &json!({ "schema_version": 1, "units": units }),
-    ))
+    Ok(json!({ "schema_version": 1, "units": units }))
 }

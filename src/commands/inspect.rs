@@ -1,15 +1,50 @@
-//! Contents of a log: channels with their rates, gaps and spans.
+//! `nav-sim inspect`: the channels of a log with their rates, gaps and spans.
 
+use crate::app::inputs::files;
+use crate::app::reading::LogRequest;
+use crate::app::{Answer, Command, Context, Result};
 use crate::formats::FileError;
 use crate::formats::logs::{self, LogOptions};
-use crate::report::Answer;
 use nav_sim_document::{Cell, Document, Importance, Table, Tone, shortest, six_digits};
 use nav_sim_logs::{Channel, Content, Error, Log};
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A step of this many times the median one is a gap.
 const GAP: f64 = 1.5;
+
+/// List the channels of a log: MCAP, ROS 1 bag, PX4 ULog, u-blox UBX
+///
+/// Samples of an IMU and fixes of a receiver are read through: rate by the median step, gaps (steps beyond 1.5 times it),
+/// jitter (95 % of the steps are as near to the median one).
+#[derive(clap::Args, Debug, Clone)]
+#[command(before_help = "\
+Examples:
+  nav-sim inspect calib_data/formats/log.mcap
+  nav-sim inspect calib_data/formats/receiver.ubx --format json
+  nav-sim inspect calib_data/formats/log.mcap --stamp log")]
+pub struct Inspect {
+    /// Log
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// How it is read.
+    #[command(flatten)]
+    pub log: LogRequest,
+}
+
+impl Command for Inspect {
+    type Answer = Inspection;
+    const NAME: &'static str = "inspect";
+    const PLOT: bool = false;
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        Ok(files("log", [&self.file]).collect())
+    }
+
+    fn run(&self, _: &Context<'_>) -> Result<Inspection> {
+        Ok(inspect(&self.file, &self.log.options(None))?)
+    }
+}
 
 /// Contents of a log.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -64,7 +99,7 @@ pub struct InspectedChannel {
 ///
 /// # Errors
 /// When the file is not a log that is read, or is damaged before its end.
-pub fn inspect(path: &Path, options: &LogOptions) -> Result<Inspection, FileError> {
+pub fn inspect(path: &Path, options: &LogOptions) -> std::result::Result<Inspection, FileError> {
     let log = logs::open(path)?;
     let channels = log
         .channels()
@@ -74,7 +109,7 @@ pub fn inspect(path: &Path, options: &LogOptions) -> Result<Inspection, FileErro
         file: path.display().to_string(),
         format: log.kind().name(),
         channels: channels
-            .collect::<Result<_, _>>()
+            .collect::<std::result::Result<_, _>>()
             .map_err(|e| logs::refused(path, e))?,
         damage: log.damage().map(logs::cut_off),
     })
@@ -84,7 +119,7 @@ fn inspected(
     log: &Log,
     channel: &Channel,
     options: &LogOptions,
-) -> Result<InspectedChannel, Error> {
+) -> std::result::Result<InspectedChannel, Error> {
     let topic = Some(channel.topic.as_str());
     let (content, units, stamps) = match channel.content {
         _ if channel.messages == 0 => ("other", None, Vec::new()),
@@ -92,14 +127,14 @@ fn inspected(
             let samples = log.imu(topic, options.stamp)?;
             let stamps = samples
                 .map(|sample| Ok(sample?.stamp_ns))
-                .collect::<Result<Vec<i64>, Error>>()?;
+                .collect::<std::result::Result<Vec<i64>, Error>>()?;
             ("imu", Some("m/s², rad/s"), stamps)
         }
         Content::Fix => {
             let fixes = log.fixes(topic, options.stamp)?;
             let stamps = fixes
                 .map(|fix| Ok(fix?.stamp_ns))
-                .collect::<Result<Vec<i64>, Error>>()?;
+                .collect::<std::result::Result<Vec<i64>, Error>>()?;
             ("fix", Some("deg, m"), stamps)
         }
         Content::Other => ("other", None, Vec::new()),

@@ -1,14 +1,191 @@
-//! The document of `wv`: Allan deviations of recordings, as a digest and side by side.
+//! `nav-sim wv`: wavelet variances and Allan deviations of static recordings.
 
+use crate::app::inputs::listed;
+use crate::app::reading::{RecordingRequest, VarianceRequest};
+use crate::app::{Answer, Command, Context, Out, OutputFile, Result};
 use crate::calibrate::stem;
-use crate::report::Answer;
+use crate::calibrate::{visit, without_warm_up};
+use crate::formats::atomic::Written;
+use crate::formats::recordings::ReadOptions;
+use crate::parse;
 use crate::report::comparison_table::in_order;
 use crate::report::curve_chart::{band, curve, scale_axis, sensor_name, unit, variance_axis};
 use crate::report::curves::{Band, SignalCurves, SignalsFile};
+use crate::report::json;
+use nav_sim_calibration::{Replicate, replicates};
 use nav_sim_calibration::{duration, median};
 use nav_sim_document::{
     Cell, Chart, Colour, Document, Panel, Series, Table, Tone, short_names, shortest,
 };
+use nav_sim_signal::imu::{Channel, Recording};
+use nav_sim_signal::wavelet::{Tuning, WaveletError, haar, interval};
+use rayon::prelude::*;
+use std::path::PathBuf;
+
+/// Compute wavelet variances (classical, robust) and Allan deviations of static recordings
+#[derive(clap::Args, Debug, Clone)]
+#[command(before_help = "\
+Examples:
+  nav-sim wv calib_data/formats/own.csv
+  nav-sim wv calib_data/formats/euroc.csv --axes gyro --intervals large-sample
+  nav-sim wv calib_data/formats/compressed.csv.gz --format json -o static.wv.json")]
+pub struct Wv {
+    /// Recordings, or directories of recordings
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// How they are read.
+    #[command(flatten)]
+    pub recordings: RecordingRequest,
+    /// Scales and robustness.
+    #[command(flatten)]
+    pub tuning: VarianceRequest,
+    /// Where the degrees of freedom of the intervals come from
+    #[arg(long, value_parser = parse::words::<Intervals>(&INTERVALS), default_value_t, help_heading = "Wavelet variance")]
+    pub intervals: Intervals,
+}
+
+const INTERVALS: [(&str, &str); 2] = [
+    (
+        Intervals::Eta3.name(),
+        "The field's usual ones, conservative beyond the first scale",
+    ),
+    (
+        Intervals::LargeSample.name(),
+        "From the autocovariance of the coefficients: with the stated coverage",
+    ),
+];
+
+impl Command for Wv {
+    type Answer = SignalsFile;
+    const NAME: &'static str = "wv";
+    const OUT: Out = Out::File {
+        kind: Written::Signals,
+        name: "curves.json",
+        help: "Write the curves as JSON",
+    };
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        listed("recording", &self.files)
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<SignalsFile> {
+        let options = WaveletOptions {
+            reading: self.recordings.options(),
+            skip_warm_up: self.recordings.reading.skips_warm_up(),
+            scales: self.tuning.levels(),
+            tuning: self.tuning.tuning()?,
+            intervals: self.intervals,
+        };
+        wavelet_variances(&self.files, &options, context)
+    }
+}
+
+/// Where the degrees of freedom of intervals are from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Intervals {
+    /// The field's usual ones, conservative beyond the first scale.
+    #[default]
+    Eta3,
+    /// From the autocovariance of the coefficients: cover at their level.
+    LargeSample,
+}
+
+nav_sim_signal::named!(Intervals { Eta3 = "eta3", LargeSample = "large-sample" });
+crate::parse::textual!(Intervals);
+
+/// How wavelet variances are taken.
+#[derive(Debug, Clone, Default)]
+struct WaveletOptions {
+    /// How the recordings are read.
+    pub reading: ReadOptions,
+    /// Whether each recording's warm-up, as it is found, is left out.
+    pub skip_warm_up: bool,
+    /// Number of scales; none: one less than each signal allows.
+    pub scales: Option<u32>,
+    /// Tuning of the robust ones.
+    pub tuning: Tuning,
+    /// Where the intervals' degrees of freedom are from.
+    pub intervals: Intervals,
+}
+
+/// The wavelet variances of all signals of recordings, or directories of them.
+///
+/// # Errors
+/// When a recording cannot be read, or is too short for the scales.
+fn wavelet_variances(
+    paths: &[PathBuf],
+    options: &WaveletOptions,
+    context: &Context<'_>,
+) -> Result<SignalsFile> {
+    let WaveletOptions {
+        reading,
+        skip_warm_up,
+        scales,
+        tuning,
+        intervals,
+    } = options;
+    // Four samples have a scale.
+    let reading = ReadOptions {
+        min_samples: scales.map_or(4, |j| 1 << j),
+        ..reading.clone()
+    };
+    let look = |recording: Recording| -> Result<Vec<SignalCurves>> {
+        let recording = if *skip_warm_up {
+            without_warm_up(recording, true).0
+        } else {
+            recording
+        };
+        let measured = replicates(&recording, *scales, tuning)?;
+        let curves = |(channel, replicate): &(Channel, Replicate)| {
+            let edof = degrees_of_freedom(*intervals, &recording, *channel, replicate)?;
+            Ok(SignalCurves::new(
+                *channel,
+                replicate,
+                recording.rate_hz,
+                edof,
+                tuning.efficiency(),
+            ))
+        };
+        Ok(measured
+            .par_iter()
+            .map(curves)
+            .collect::<std::result::Result<_, WaveletError>>()?)
+    };
+    let (looks, report) = visit(paths, &reading, &look, context)?;
+    let signals = looks
+        .into_iter()
+        .collect::<Result<Vec<_>>>()?
+        .into_iter()
+        .flatten()
+        .collect();
+    Ok(SignalsFile::new(
+        report.files[0].rate_hz,
+        tuning.efficiency(),
+        intervals.name(),
+        signals,
+    ))
+}
+
+fn degrees_of_freedom(
+    intervals: Intervals,
+    recording: &Recording,
+    channel: Channel,
+    replicate: &Replicate,
+) -> std::result::Result<Vec<f64>, WaveletError> {
+    let levels = 1..=replicate.classical.len() as u32;
+    match (intervals, recording.signal(channel)) {
+        // Of a signal with holes eta3 of what is there.
+        (Intervals::LargeSample, Some(signal)) if replicate.coverage.is_empty() => levels
+            .map(|level| {
+                Ok(interval::edof_large_sample(
+                    &haar::coefficients(&signal.samples, level)?,
+                    level,
+                ))
+            })
+            .collect(),
+        _ => Ok(levels.map(|level| replicate.edof_eta3(level)).collect()),
+    }
+}
 
 /// Degrees of freedom from which on robust over classical tells of outliers rather than of chance.
 const LEAST: f64 = 100.0;
@@ -16,6 +193,14 @@ const LEAST: f64 = 100.0;
 const OUTLIERS: f64 = 1.5;
 
 impl Answer for SignalsFile {
+    fn csv(&self) -> Option<String> {
+        Some(signals_csv(self))
+    }
+
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        vec![OutputFile::whole("", json(self))]
+    }
+
     fn document(&self) -> Document {
         let worst = self.signals.iter().filter_map(|s| Some((excess(s)?, s)));
         let worst = worst.max_by(|a, b| a.0.1.total_cmp(&b.0.1));
@@ -185,7 +370,7 @@ fn side_by_side(file: &SignalsFile) -> Vec<(String, Table)> {
 }
 
 /// All scales of all signals as CSV.
-pub(crate) fn signals_csv(file: &SignalsFile) -> String {
+fn signals_csv(file: &SignalsFile) -> String {
     let mut text = "file,sensor,axis,tau_s,edof,classical_wv,classical_ci_low,classical_ci_high,robust_wv,robust_ci_low,\
                     robust_ci_high,robust_status,allan_tau_s,allan_deviation\n"
         .to_owned();

@@ -1,17 +1,251 @@
-//! A comparison of runs: `comparison.json`, and what is said and drawn of it.
+//! `nav-sim compare`: run directories → ratios between runs.
 
+use crate::app::{Answer, Command, Context, Failure, Manifest, Out, OutputFile, Result};
+use crate::commands::run::RUN_FILES;
+use crate::formats::atomic::Written;
+use crate::formats::run_directory::{self, RunDirectory};
 use crate::paper::PaperFigure;
-use crate::report::Answer;
-use crate::report::comparison_table::{CandidateResult, Layout, ratio_rows, ratio_table};
+use crate::report::comparison_table::{CandidateResult, Label, Layout, ratio_rows, ratio_table};
+use crate::report::json;
 use crate::report::states::{SPOKEN, axis_of, tone};
 use crate::report::verdict::{gravest, verdict_in_short};
 use nav_sim_document::{
     Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
     window,
 };
-use nav_sim_navigation::metrics::{Measured, OutageComparison, Verdict, VerdictKind};
+use nav_sim_navigation::metrics::{
+    self, ComparisonError, Measured, OutageComparison, Verdict, VerdictKind,
+};
+use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 use serde::Serialize;
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+/// Compare runs: verdicts, and ratios of ASEE and RMSE per outage and state
+///
+/// ASEE, the averaged standard estimation error, is what a filter believes of its error. A cell holds the mean over the
+/// outage of (ASEE ratio − 1)·100 ± half its 95 % interval: that of Monte Carlo, and of the calibrations if both runs
+/// used --method lincov or both with models of calibrate. Scenario and estimator are those of the directories' names
+/// (II_sr-awv, or II/sr-awv); --table prints the layout of the paper's Table I. All states are in the JSON file; a page
+/// with NEES, coverage and RMSE is written beside it.
+#[derive(clap::Args, Debug, Clone)]
+#[command(before_help = "\
+Examples:
+  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
+      --filter full --runs 8 --seed 1 -o out/with_all
+  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
+      --runs 8 --seed 1 -o out/with_15
+  nav-sim compare out/with_15 --reference out/with_all --state all")]
+pub struct Compare {
+    /// Run directories
+    #[arg(required = true, value_name = "DIR")]
+    pub runs: Vec<PathBuf>,
+    /// Run directory to compare with
+    #[arg(long, value_name = "DIR")]
+    pub reference: PathBuf,
+    /// States in the table (repeatable), or "all"
+    #[arg(id = "state", long = "state", value_name = "STATE", default_values = ["pos_e_m", "roll_deg"])]
+    pub states: Vec<String>,
+    /// Print the table alone in this form
+    #[arg(long, value_name = "FORM", value_enum)]
+    pub table: Option<TableForm>,
+    /// Beginning of the verdict, such as "contamination costs"; empty: the name of the reference.
+    #[arg(skip)]
+    pub(crate) cause: String,
+}
+
+/// How a table is written.
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TableForm {
+    /// A table of Markdown
+    Markdown,
+    /// Numbers for other programs: one row a run, outage and state, percentages in columns of their own
+    Csv,
+    /// A `tabular` with the rules of booktabs
+    Latex,
+}
+
+impl Command for Compare {
+    type Answer = Comparison;
+    const NAME: &'static str = "compare";
+    const OUT: Out = Out::File {
+        kind: Written::Comparison,
+        name: "comparison.json",
+        help: "File to write, with a page (.html) beside it [default: comparison.json]",
+    };
+
+    fn writes_by_default(&self) -> bool {
+        true
+    }
+
+    fn endings(&self) -> Vec<(Cow<'static, str>, Written)> {
+        vec![
+            ("".into(), Written::Comparison),
+            (".html".into(), Written::Page),
+        ]
+    }
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        let files = |run: &PathBuf| RUN_FILES.map(|name| run.join(name));
+        let all = self.runs.iter().chain([&self.reference]).flat_map(files);
+        Ok(all
+            .filter(|path| path.exists())
+            .map(|path| ("run", path))
+            .collect())
+    }
+
+    fn run(&self, _: &Context<'_>) -> Result<Comparison> {
+        Ok(Comparison {
+            cause: self.cause.clone(),
+            form: self.table,
+            ..compare(&self.runs, &self.reference, states(&self.states)?)?
+        })
+    }
+}
+
+/// Compares runs with a reference; `states` are shown.
+///
+/// # Errors
+/// When a directory cannot be read, or is of something else.
+fn compare(runs: &[PathBuf], reference: &Path, states: Vec<usize>) -> Result<Comparison> {
+    let name = reference.display().to_string();
+    let directory = run_directory::read(reference)?;
+    let (mut candidates, mut curves, mut doubts) = (Vec::new(), Vec::new(), Vec::new());
+    for path in runs {
+        let run = path.display().to_string();
+        let candidate = run_directory::read(path)?;
+        let differences = differences(&candidate, &directory);
+        let doubt = |what: &&str| {
+            format!("{run}: {what} not that of the reference; the runs are not paired")
+        };
+        // two covariance analyses have no runs that could be paired, and nothing by chance that pairing would take away
+        if !(candidate.experiment.is_expected && directory.experiment.is_expected) {
+            doubts.extend(differences.iter().map(doubt));
+        }
+        let is_reference = is_same_place(path, reference);
+        curves.push(RatioCurves::of(
+            &candidate.experiment,
+            &directory.experiment,
+        ));
+        candidates.push(compared(
+            run,
+            &candidate,
+            &directory,
+            differences.is_empty(),
+            is_reference,
+        )?);
+    }
+    let outages = directory.experiment.outages;
+    let comparison = Comparison::new((&name, &directory.verdict), candidates, curves, outages);
+    Ok(Comparison {
+        doubts,
+        states,
+        ..comparison
+    })
+}
+
+/// One run.
+fn compared(
+    run: String,
+    candidate: &RunDirectory,
+    reference: &RunDirectory,
+    is_paired: bool,
+    is_reference: bool,
+) -> Result<CandidateResult> {
+    if candidate.manifest.hashes("trajectory") != reference.manifest.hashes("trajectory") {
+        return Err(
+            Failure::input(format!("{run}: not the trajectory of the reference"))
+                .hint("compare runs along one and the same trajectory file"),
+        );
+    }
+    let outages = metrics::compare(&candidate.experiment, &reference.experiment, is_paired);
+    let mut outages = outages.map_err(|e| {
+        let failure = Failure::input(format!("{run}: {e}"));
+        match e {
+            ComparisonError::Runs { .. } => failure.hint("make both with one number of --runs"),
+            _ => failure,
+        }
+    })?;
+    // the reference is itself, whatever its calibration leaves open
+    if !is_reference {
+        let open = candidate
+            .asee_mean_ci95
+            .iter()
+            .zip(&reference.asee_mean_ci95);
+        for (outage, ends) in outages.iter_mut().zip(open) {
+            if let (Some(interval), Some(of_reference)) = ends {
+                outage.widen(interval, of_reference);
+            }
+        }
+    }
+    let label = Label::of(&run, candidate.origin.model.estimator.as_deref());
+    Ok(CandidateResult {
+        run,
+        label,
+        is_reference,
+        is_paired,
+        verdict: candidate.verdict,
+        outages,
+    })
+}
+
+/// What makes two runs differ beside the model in the filter; then run k did not see the same noise.
+fn differences(candidate: &RunDirectory, reference: &RunDirectory) -> Vec<&'static str> {
+    let (c, r) = (
+        &candidate.origin.configuration,
+        &reference.origin.configuration,
+    );
+    let (candidate, reference) = (&candidate.manifest, &reference.manifest);
+    let is_expected = [c, r].map(|manifest| manifest.run.method == Method::Lincov);
+    let all = [
+        ("the method is", is_expected[0] != is_expected[1]),
+        // covariance analysis draws nothing, and so differs in nothing by its seed
+        (
+            "the seed is",
+            is_expected == [false, false] && candidate.seed != reference.seed,
+        ),
+        (
+            "what makes the errors is",
+            truth(candidate) != truth(reference),
+        ),
+        ("[imu] is", c.imu != r.imu),
+        ("[gnss] is", c.gnss != r.gnss),
+        ("[initial] is", c.initial != r.initial),
+    ];
+    all.into_iter()
+        .filter_map(|(what, differs)| differs.then_some(what))
+        .collect()
+}
+
+/// What made the INS errors: a recording, a model, or the filter's own.
+fn truth(manifest: &Manifest) -> Vec<&str> {
+    let given = ["static", "truth", "model"].map(|role| manifest.hashes(role));
+    given
+        .into_iter()
+        .find(|hashes| !hashes.is_empty())
+        .unwrap_or_default()
+}
+
+fn is_same_place(a: &Path, b: &Path) -> bool {
+    a.canonicalize()
+        .ok()
+        .zip(b.canonicalize().ok())
+        .is_some_and(|(a, b)| a == b)
+}
+
+/// States by their names; `all` of them.
+pub(crate) fn states(names: &[String]) -> Result<Vec<usize>> {
+    if names.iter().any(|n| n == "all") {
+        return Ok((0..REPORTED_NAMES.len()).collect());
+    }
+    let index = |name: &String| {
+        let found = REPORTED_NAMES.iter().position(|n| n == name);
+        let known = || format!("one of {}, or all", REPORTED_NAMES.join(", "));
+        found.ok_or_else(|| Failure::input(format!("--state {name} is no state")).hint(known()))
+    };
+    names.iter().map(index).collect()
+}
 
 /// How the ASEE of a run departs from that of the reference over time.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,40 +272,43 @@ impl RatioCurves {
 
 /// Runs against a reference: as JSON, `comparison.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Comparison {
+pub struct Comparison {
     /// Layout version.
-    pub schema_version: u32,
+    pub(crate) schema_version: u32,
     /// Run directory of the reference.
-    pub reference: String,
+    pub(crate) reference: String,
     /// Whether run k saw the same noise everywhere, so that intervals are those of paired differences.
-    pub paired: bool,
+    pub(crate) paired: bool,
     /// One row a run, the reference first.
-    pub verdicts: Vec<VerdictRow>,
+    pub(crate) verdicts: Vec<VerdictRow>,
     /// One row a run, outage and state.
-    pub rows: Vec<Row>,
+    pub(crate) rows: Vec<Row>,
     /// One row a run and outage.
-    pub consistency: Vec<ConsistencyRow>,
+    pub(crate) consistency: Vec<ConsistencyRow>,
     /// The runs.
     #[serde(skip)]
-    pub candidates: Vec<CandidateResult>,
+    pub(crate) candidates: Vec<CandidateResult>,
     /// How their ratios go with time, one a run.
     #[serde(skip)]
-    pub curves: Vec<RatioCurves>,
+    pub(crate) curves: Vec<RatioCurves>,
     /// Start and end of each outage (s).
     #[serde(skip)]
-    pub outages: Vec<(f64, f64)>,
+    pub(crate) outages: Vec<(f64, f64)>,
     /// Why runs are not paired with the reference.
     #[serde(skip)]
-    pub doubts: Vec<String>,
+    pub(crate) doubts: Vec<String>,
     /// The states that are shown.
     #[serde(skip)]
-    pub states: Vec<usize>,
+    pub(crate) states: Vec<usize>,
     /// Beginning of the verdict, such as "contamination costs"; empty: the name of the reference.
     #[serde(skip)]
-    pub cause: String,
+    pub(crate) cause: String,
+    /// Form in which the table alone is printed.
+    #[serde(skip)]
+    pub(crate) form: Option<TableForm>,
     /// Pages of the single results, path and name.
     #[serde(skip)]
-    pub links: Vec<(String, String)>,
+    pub(crate) links: Vec<(String, String)>,
 }
 
 /// Whether the filter of a run is as good as it believes.
@@ -172,6 +409,7 @@ impl Comparison {
             doubts: Vec::new(),
             states: vec![1, 6],
             cause: String::new(),
+            form: None,
             links: Vec::new(),
         }
     }
@@ -182,7 +420,7 @@ impl Comparison {
     }
 
     /// The same for other programs.
-    pub(crate) fn csv(&self) -> String {
+    fn rows_csv(&self) -> String {
         ratio_rows(
             &self.candidates,
             &self.states,
@@ -387,6 +625,25 @@ impl Comparison {
 }
 
 impl Answer for Comparison {
+    fn text(&self) -> Option<String> {
+        Some(match self.form? {
+            TableForm::Markdown => self.table().markdown(),
+            TableForm::Csv => self.rows_csv(),
+            TableForm::Latex => self.table().latex(),
+        })
+    }
+
+    fn csv(&self) -> Option<String> {
+        Some(self.rows_csv())
+    }
+
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        vec![
+            OutputFile::whole("", json(self)),
+            OutputFile::whole(".html", self.document().html()),
+        ]
+    }
+
     fn document(&self) -> Document {
         let kind = gravest(self.verdicts.iter().map(|row| &row.verdict));
         let lines = self.cost().into_iter().chain(verdict_lines(&self.verdicts));

@@ -1,0 +1,1012 @@
+//! `nav-sim tune`: the smallest factors on the variances of a noise model that make its filter consistent with other truths.
+
+use crate::app::inputs::{self, SettingsArgs, files};
+use crate::app::{Answer, Command, Context, Failure, Input, Out, OutputFile, Result};
+use crate::formats::atomic::Written;
+use crate::formats::draws_file::{self, Draws};
+use crate::formats::model_file::{self, ModelFile, PROGRAM};
+use crate::parse;
+use crate::report::unexpected_line;
+use nav_sim_calibration::derived_interval;
+use nav_sim_document::{Cell, Document, Importance, Table, Tone, readable, seconds, short_names};
+use nav_sim_navigation::ekf::{BeliefError, FilterStates};
+use nav_sim_navigation::metrics::{PerState, VerdictKind};
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::defects::ImuSettings;
+use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_navigation::simulation::lincov::{
+    Aim, Factor, FilterConsistency, Task, Track, TrueErrors, UpperEnd, aiding_factor, drive, scaled,
+};
+use nav_sim_navigation::simulation::{NEES_DOF, REPORTED_NAMES, TOLERANCE};
+use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::noise::Model;
+use serde::{Serialize, Serializer};
+use std::path::{Path, PathBuf};
+
+/// Find the smallest factors on MODEL that make its filter consistent for another truth
+///
+/// Factors multiply variances of all processes but quantization noise, which is in no filter. They are found by linear
+/// covariance analysis along the trajectory. Where no factor makes the filter consistent, the exit code is 3 and no model
+/// is written.
+#[derive(clap::Args, Debug, Clone)]
+#[command(before_help = "\
+Examples:
+  nav-sim tune calib_data/tactical.toml --truth calib_data/consumer_mems.toml -o tuned.toml
+  nav-sim tune calib_data/tactical.toml --for mean \\
+      --truth calib_data/tactical.toml calib_data/consumer_mems.toml \\
+      --trajectory trajectories/figure_eight.toml --outage 60:90
+  nav-sim tune calib_data/tactical.toml --filter 15 --format json \\
+      --truth calib_data/consumer_mems.toml")]
+pub struct Tune {
+    /// Noise model to be tuned
+    pub model: PathBuf,
+    /// Noise models that may make the errors, such as those of single recordings [default: MODEL, with the errors in SCENARIO]
+    #[arg(id = "truth", long = "truth", value_name = "MODEL2", num_args = 1..)]
+    pub truths: Vec<PathBuf>,
+    /// Truths are MODEL itself and the draws of its calibration (MODEL.draws.json, which `calibrate` writes), each with the
+    /// parameters of a recording of its own where MODEL states a spread: errors count up to the upper end of their 95 % interval
+    #[arg(long, conflicts_with = "truth")]
+    pub intervals: bool,
+    /// Trajectory: motion profile (.toml) or table (.csv) [default: a built-in drive with outages of that length]
+    #[arg(long, value_name = "FILE")]
+    pub trajectory: Option<PathBuf>,
+    /// Outages, receiver, start, IMU rate.
+    #[command(flatten)]
+    pub settings: SettingsArgs,
+    /// Meaning of consistent: worst, no error of any truth exceeds what the filter states; mean, the NEES is right on average
+    #[arg(id = "for", long = "for", value_name = "AIM", value_parser = parse::one_of::<Aim>(&Aim::NAMES), default_value_t)]
+    pub aim: Aim,
+    /// Filter to tune: full, 15 or 21 (these take longer); the filter that `run` makes by default is assessed too
+    #[arg(long, value_name = "STATES", default_value = "full")]
+    pub filter: FilterStates,
+}
+
+/// Help where fixes are too rare to reduce a model.
+const RARE_FIXES: &str =
+    "raise it: the verdict is of the filter of 15 states too, whatever --filter tunes";
+
+/// Longest schedule of outages that is looked at where no trajectory says how long (s).
+const DAY_S: f64 = 86_400.0;
+
+impl Command for Tune {
+    type Answer = TuneAnswer;
+    const NAME: &'static str = "tune";
+    const OUT: Out = Out::File {
+        kind: Written::Tuned,
+        name: "tuned.toml",
+        help: "Model file to write",
+    };
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        self.refuse_recordings()?;
+        let draws = draws_file::beside(&self.model);
+        let draws = (self.intervals && draws.exists()).then_some(draws);
+        Ok(files("model", [&self.model])
+            .chain(files("draws", &draws))
+            .chain(files("truth", &self.truths))
+            .chain(files("trajectory", &self.trajectory))
+            .chain(files("scenario", &self.settings.file.scenario))
+            .collect())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<TuneAnswer> {
+        let mut scenario = self.settings.checked()?;
+        if self.truths.is_empty() && !self.intervals && scenario.has_no_errors() {
+            return Err(Failure::input("no truth to be consistent with: neither --truth nor --intervals is given")
+                .hint("give models (--truth OTHER.toml, one a recording), --intervals for a MODEL of `nav-sim calibrate`, or a scenario with errors"));
+        }
+        let file = inputs::model(&self.model, context)?;
+        let model = inputs::at_rate(&self.model, &file.model, scenario.imu.rate_hz, context)?;
+        inputs::expect_turn_on(&mut scenario.initial, &file, &self.model, context);
+        let truths = self.truths((&file, &model), &scenario, context)?;
+        let (track, outages) = self.track(&scenario, &model, context)?;
+        let found = tune(&TuneInputs {
+            scenario: &scenario,
+            model: &model,
+            truths,
+            track: &track,
+            outages: &outages,
+            states: self.filter,
+            aim: self.aim,
+        });
+        let settings = self.settings.file.scenario.as_deref();
+        let mut answer =
+            found.map_err(|e| inputs::no_filter(&e, &self.model, settings, RARE_FIXES))?;
+        answer.model = self.model.display().to_string();
+        let of = if self.intervals {
+            "intervals"
+        } else {
+            "truths"
+        };
+        let goal = format!("{} of {of}", self.aim);
+        let is_met = answer.fault().is_none();
+        answer.tuned = is_met.then(|| tuned(&file, &answer.factors, &goal, context.inputs()));
+        Ok(answer)
+    }
+}
+
+impl Tune {
+    /// A directory or a table holds samples: a truth is a model.
+    fn refuse_recordings(&self) -> Result<()> {
+        let is_samples = |p: &&PathBuf| {
+            p.is_dir()
+                || p.extension()
+                    .is_some_and(|e| e == "csv" || e == "npy" || e == "gz")
+        };
+        match self.truths.iter().find(is_samples) {
+            None => Ok(()),
+            Some(path) => Err(Failure::input(format!(
+                "--truth {}: recordings, not a model",
+                path.display()
+            ))
+            .hint("make a model of each: nav-sim calibrate FILE --estimator gmwm -o FILE.toml")),
+        }
+    }
+
+    /// What may be true, at the rate of the IMU: noise, turn-on bias, and what the scenario states of the true IMU and
+    /// receiver.
+    fn truths(
+        &self,
+        (file, model): (&ModelFile, &Model),
+        scenario: &Scenario,
+        context: &Context<'_>,
+    ) -> Result<Truths> {
+        let true_errors = |path: &Path, model: Model, turned_on: &ModelFile| {
+            let (mut imu, gnss) = (scenario.imu.clone(), scenario.gnss.clone());
+            inputs::make_turn_on(&mut imu, turned_on, path, context);
+            TrueErrors {
+                model,
+                imu,
+                gnss,
+                aiding: scenario.aiding.clone(),
+            }
+        };
+        let truths = if self.intervals {
+            let draws = draws(
+                &self.model,
+                file,
+                scenario.imu.rate_hz,
+                context.seed_or(None),
+            )?;
+            let estimate = true_errors(&self.model, model.clone(), file);
+            let names = vec![format!(
+                "{} and the {} draws beside it",
+                self.model.display(),
+                draws.models.len()
+            )];
+            let drawn = draws.models.into_iter().map(|model| TrueErrors {
+                model,
+                ..estimate.clone()
+            });
+            let errors = std::iter::once(estimate.clone()).chain(drawn).collect();
+            Truths {
+                names,
+                errors,
+                stretch: Some(draws.stretch),
+            }
+        } else {
+            let truth = |path: &PathBuf| {
+                let file = inputs::model(path, context)?;
+                let model = inputs::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
+                Ok::<_, Failure>((path.display().to_string(), true_errors(path, model, &file)))
+            };
+            // Without another, MODEL with what the scenario says is wrong beside it.
+            let own = std::slice::from_ref(&self.model);
+            let paths = if self.truths.is_empty() {
+                own
+            } else {
+                &self.truths
+            };
+            let named = paths.iter().map(truth).collect::<Result<Vec<_>>>()?;
+            let (names, errors) = named.into_iter().unzip();
+            Truths {
+                names,
+                errors,
+                stretch: None,
+            }
+        };
+        let mut doubts = Vec::new();
+        for truth in &truths.errors {
+            for doubt in (Scenario {
+                imu: truth.imu.clone(),
+                ..scenario.clone()
+            })
+            .unexpected()
+            {
+                if !doubts.contains(&doubt) {
+                    doubts.push(doubt);
+                }
+            }
+        }
+        doubts
+            .into_iter()
+            .for_each(|doubt| context.warn(unexpected_line(&doubt)));
+        Ok(truths)
+    }
+
+    /// The way of the analysis with its outages.
+    fn track(
+        &self,
+        scenario: &Scenario,
+        model: &Model,
+        context: &Context<'_>,
+    ) -> Result<(Track, Vec<Outage>)> {
+        let seed = context.seed_or(scenario.run.seed);
+        let Some(path) = &self.trajectory else {
+            if !scenario.aiding.is_none()
+                || scenario.baro.is_some()
+                || scenario.imu.temperature.is_some()
+            {
+                return Err(Failure::input(
+                    "aiding, a barometer and a temperature profile belong to a trajectory",
+                )
+                .hint("give it with --trajectory"));
+            }
+            let outages = scenario.outages_on((0.0, DAY_S), seed)?.windows;
+            let lengths: Vec<f64> = outages.iter().map(|o| o.end_s - o.start_s).collect();
+            let track = drive(model, &scenario.imu, &scenario.gnss, &lengths).ok_or_else(|| {
+                Failure::input("no built-in drive for this receiver")
+                    .hint("give a trajectory with --trajectory")
+            })?;
+            let text = "along a built-in drive with outages as long; --trajectory takes another";
+            context.remark(text.to_owned());
+            return Ok((track, outages));
+        };
+        let trajectory = inputs::trajectory(path, context)?;
+        let outages = inputs::placed(scenario, &trajectory, seed, context)?;
+        let track = scenario
+            .track(&trajectory, model, &outages)
+            .map_err(Failure::input)?;
+        Ok((track, outages))
+    }
+}
+
+/// The draws beside a model file; what the intervals in the file itself leave out is how its parameters hang together.
+fn draws(path: &Path, file: &ModelFile, rate_hz: f64, seed: u64) -> Result<Draws> {
+    let missing = || {
+        format!(
+            "{}: the draws of its calibration are missing",
+            draws_file::beside(path).display()
+        )
+    };
+    let found = draws_file::of_recordings(path, file, rate_hz, seed)
+        .and_then(|draws| draws.ok_or_else(missing));
+    found.map_err(|doubt| {
+        Failure::input(doubt)
+            .hint("calibrate again: the draws are written beside MODEL, unless with --bootstrap 0")
+    })
+}
+
+/// What is tuned, for what, and where. Models are at the rate of the IMU.
+struct TuneInputs<'a> {
+    /// Receiver, start, and the filter that `run` would have.
+    pub scenario: &'a Scenario,
+    /// The model to be tuned.
+    pub model: &'a Model,
+    /// What may be true.
+    pub truths: Truths,
+    /// The way of the analysis.
+    pub track: &'a Track,
+    /// Its outages.
+    pub outages: &'a [Outage],
+    /// The filter that is made consistent.
+    pub states: FilterStates,
+    /// Condition under which the filter is consistent.
+    pub aim: Aim,
+}
+
+/// What may be true of an IMU: some models, or one and the draws of its calibration.
+struct Truths {
+    /// The names of the models; of draws one for all.
+    pub names: Vec<String>,
+    /// What they are; the model first, where the others are its draws.
+    pub errors: Vec<TrueErrors>,
+    /// Of draws, what distances from their median are multiplied by.
+    pub stretch: Option<f64>,
+}
+
+/// The factors, and the filter before and after them.
+///
+/// # Errors
+/// When a model has no filter.
+fn tune(inputs: &TuneInputs<'_>) -> std::result::Result<TuneAnswer, BeliefError> {
+    let TuneInputs {
+        model,
+        truths,
+        track,
+        outages,
+        states,
+        aim,
+        ..
+    } = inputs;
+    // Draws are many: within 1.2e-3 the analysis is the same with one step from fix to fix, which `run` takes for them too.
+    let merged = truths.stretch.map(|_| track.merged());
+    let analysed = merged.as_ref().unwrap_or(track);
+    // The interval that `run` states for an error: the filter and its standard deviation are the same in all draws.
+    let upper_end = |stretch| {
+        move |estimate: f64, draws: Vec<f64>| derived_interval(estimate, draws, stretch)[1]
+    };
+    let upper_end = truths.stretch.map(upper_end);
+    let mut scenario = inputs.scenario.clone();
+    match states {
+        // what goes with the filter of 21 states beside the model stays
+        FilterStates::Full => scenario = scenario.with_full_noise(),
+        reduced => scenario.filter.states = *reduced,
+    }
+    let filter_of_run = inputs.scenario.filter.states;
+    // What is wrong with the vehicle's own measurements no noise of the IMU stands for: their sigmas come first.
+    let aiding = &inputs.scenario.aiding;
+    let belief = scenario
+        .with_full_noise()
+        .belief(model, outages, analysed)?;
+    let known = TrueErrors {
+        aiding: aiding.clone(),
+        ..TrueErrors::from((*model).clone())
+    };
+    let aiding_sigmas =
+        (!aiding.is_none()).then(|| aiding_factor(analysed, &belief, &known).unwrap_or(f64::NAN));
+    let widened = aiding_sigmas
+        .filter(|factor| *factor > 1.0)
+        .map(|factor| analysed.with_aiding_sigmas(factor));
+    let believed = analysed;
+    let analysed = widened.as_ref().unwrap_or(analysed);
+    let full = scenario.with_full_noise();
+    let full = |model: &Model| full.belief(model, outages, analysed);
+    let tuned = |model: &Model| scenario.belief(model, outages, analysed);
+    let of_run = |model: &Model| inputs.scenario.belief(model, outages, analysed);
+    let task = Task {
+        model,
+        truths: &truths.errors,
+        drawn: upper_end.as_ref().map(|end| end as &UpperEnd<'_>),
+        track: analysed,
+        full: &full,
+        filter: &tuned,
+        aim: *aim,
+        allow_smaller: false,
+    };
+    let factors = task.factors()?;
+    let ones: Vec<Factor> = factors
+        .iter()
+        .map(|f| Factor {
+            on_variance: 1.0,
+            ..*f
+        })
+        .collect();
+    let after = task.consistency(task.filter, &factors)?;
+    Ok(TuneAnswer {
+        model: String::new(),
+        tuned: None,
+        filter: *states,
+        filter_of_run,
+        before: Task {
+            track: believed,
+            ..task
+        }
+        .consistency(task.filter, &ones)?,
+        aiding_sigmas,
+        after,
+        of_run: (*states != filter_of_run)
+            .then(|| task.consistency(&of_run, &factors))
+            .transpose()?,
+        informed: truths
+            .errors
+            .iter()
+            .all(|truth| truth.imu.without_states().next().is_none())
+            .then(|| {
+                task.informed(|truth| {
+                    knowing(&scenario, &truth.imu).belief(&truth.model, outages, analysed)
+                })
+            })
+            .transpose()?,
+        factors,
+        truths: truths.names.clone(),
+        is_drawn: truths.stretch.is_some(),
+        aim: *aim,
+        without_factor: task.without_factor(),
+    })
+}
+
+/// The scenario with the filter that has states for what the true IMU is stated to have beside its noise.
+fn knowing(scenario: &Scenario, imu: &ImuSettings) -> Scenario {
+    let mut knowing = scenario.with_full_noise();
+    for sensor in Sensor::ALL {
+        let (_, ppm) = imu.deviations(sensor);
+        let known = (imu.turn_on_bias(sensor), Some(ppm).filter(|ppm| *ppm > 0.0));
+        let initial = &mut knowing.initial;
+        let (bias, scale) = match sensor {
+            Sensor::Accel => (
+                &mut initial.accel_bias_sigma_m_s2,
+                &mut initial.accel_scale_sigma_ppm,
+            ),
+            Sensor::Gyro => (
+                &mut initial.gyro_bias_sigma_rad_s,
+                &mut initial.gyro_scale_sigma_ppm,
+            ),
+        };
+        (*bias, *scale) = (known.0.or(*bias), known.1.or(*scale));
+    }
+    knowing
+}
+
+/// The tuned model, and where it came from; `goal`: the aim and what was taken for true.
+fn tuned(file: &ModelFile, factors: &[Factor], goal: &str, inputs: &[Input]) -> ModelFile {
+    let mut provenance = toml::Table::new();
+    let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
+    put("program", PROGRAM.into());
+    put("made_by", "tune".into());
+    put("honest_for", goal.into());
+    let entries: Vec<FactorEntry> = factors.iter().map(FactorEntry::of).collect();
+    let value = "texts and numbers are always TOML";
+    put("factors", toml::Value::try_from(entries).expect(value));
+    put("inputs", toml::Value::try_from(inputs).expect(value));
+    let (missing, turn_on) = (file.missing.clone(), file.turn_on);
+    ModelFile {
+        missing,
+        turn_on,
+        provenance: Some(provenance),
+        ..ModelFile::new(scaled(&file.model, factors))
+    }
+}
+
+/// Horizontal RMSE over that of a filter that knows the truth, less 1, where the noise of one sensor was made to stand for
+/// that of the other.
+const ABSURD: f64 = 1.0;
+/// Deviation of a factor from 1 that is not worth a word.
+const UNCHANGED: f64 = 0.01;
+
+/// Factors, and the filter before and after them.
+#[derive(Debug, Clone)]
+pub struct TuneAnswer {
+    model: String,
+    tuned: Option<ModelFile>,
+    /// The filter that was tuned.
+    filter: FilterStates,
+    /// The filter that `run` makes of the model unless told otherwise.
+    filter_of_run: FilterStates,
+    /// The factors.
+    factors: Vec<Factor>,
+    /// The factor on the sigmas of the vehicle's own measurements, where there are any; NaN where none helps.
+    aiding_sigmas: Option<f64>,
+    /// The filter as it was.
+    before: FilterConsistency,
+    /// The tuned one.
+    after: FilterConsistency,
+    /// The tuned model in the filter that `run` makes of it, where that is another.
+    of_run: Option<FilterConsistency>,
+    /// A filter that knows the truth, each truth its own; none where there are errors of which no filter has states.
+    informed: Option<FilterConsistency>,
+    /// Names of the truths; of draws one for all.
+    truths: Vec<String>,
+    /// Condition under which the filter counts as consistent.
+    aim: Aim,
+    /// Sensors without noise that a factor could multiply, where a truth has some.
+    without_factor: Vec<Sensor>,
+    /// Whether the truths are the draws of a calibration, and what counts is the upper end of an interval.
+    is_drawn: bool,
+}
+
+/// Verdict of `run` on a filter, by its covariance analysis.
+fn kind(found: &FilterConsistency) -> VerdictKind {
+    match found.range {
+        [_, largest] if largest > 1.0 + TOLERANCE => VerdictKind::Overconfident,
+        [smallest, _] if smallest < 1.0 / (1.0 + TOLERANCE) => VerdictKind::Underconfident,
+        _ => VerdictKind::Consistent,
+    }
+}
+
+impl TuneAnswer {
+    /// The factors and their cost, then the filters that they make.
+    fn verdict(&self) -> Vec<String> {
+        let name = filter_name(self.filter);
+        let changed: Vec<&Factor> = self.factors.iter().filter(|f| is_changed(f)).collect();
+        if let Some(unmet) = self.fault() {
+            return vec![unmet, format!("at best, {}", described(&name, &self.after))];
+        }
+        let mut lines = match changed.as_slice() {
+            [] => vec![format!(
+                "no factor is needed: {}",
+                described(&name, &self.after)
+            )],
+            changed => {
+                let cost = self.cost(&self.after);
+                let cost = match cost.is_finite() {
+                    true => format!("; cost {:.1} % of horizontal RMSE", 100.0 * cost),
+                    false => String::new(),
+                };
+                let [before, after] = [&self.before, &self.after].map(|found| readable(found.nees));
+                let factors = factors_in_words(changed);
+                let nees = format!("NEES {before} → {after} ({NEES_DOF} if right)");
+                vec![
+                    format!("{factors} (variance){cost}; {nees}"),
+                    format!("tuned, {}", described(&name, &self.after)),
+                ]
+            }
+        };
+        self.of_aiding()
+            .into_iter()
+            .for_each(|line| lines.insert(0, line));
+        if let Some(of_run) = &self.of_run {
+            let name = format!("{}, the default of run,", filter_name(self.filter_of_run));
+            lines.push(format!("tuned, {}", described(&name, of_run)));
+        }
+        lines
+    }
+
+    /// What covers the errors of the vehicle's own measurements.
+    fn of_aiding(&self) -> Option<String> {
+        let factor = self.aiding_sigmas.filter(|factor| *factor != 1.0)?;
+        Some(match factor.is_nan() {
+            true => "no sigma of the aiding covers its errors: give the filter states of them"
+                .to_owned(),
+            false => format!(
+                "every sigma of [aiding] × {}, and then of the model:",
+                readable(factor)
+            ),
+        })
+    }
+
+    /// Whether no factor was needed.
+    fn is_unchanged(&self) -> bool {
+        !self.factors.iter().any(is_changed)
+    }
+
+    /// Why the factors are of no use, if they are not.
+    fn fault(&self) -> Option<String> {
+        let is_overconfident = match self.aim {
+            // of draws the first counts: what `run` judges
+            Aim::Worst if self.is_drawn => kind(&self.after) == VerdictKind::Overconfident,
+            Aim::Worst => self.after.largest.ratio > 1.0 + TOLERANCE,
+            Aim::Mean => self.after.nees / NEES_DOF as f64 > (1.0 + TOLERANCE).powi(2),
+        };
+        let is_at_limit = self.factors.iter().any(Factor::is_at_limit);
+        let names: Vec<&str> = self
+            .without_factor
+            .iter()
+            .map(|sensor| sensor.name())
+            .collect();
+        if !names.is_empty() && (is_overconfident || is_at_limit || self.cost(&self.after) > ABSURD)
+        {
+            let names = names.join(" and ");
+            return Some(format!(
+                "the model has no {names} noise to multiply, where the truth has some"
+            ));
+        }
+        let limit = if is_at_limit {
+            ": a factor is the largest that is tried"
+        } else {
+            ""
+        };
+        let unmet = || format!("larger noise alone does not make this filter consistent{limit}");
+        (is_overconfident || is_at_limit).then(unmet)
+    }
+
+    /// What helps there.
+    fn remedy(&self) -> &'static str {
+        match self.aim {
+            _ if !self.without_factor.is_empty() => {
+                "give it the noise of its data sheet (nav-sim datasheet) or of the truth, and tune again"
+            }
+            Aim::Mean => {
+                "--for worst, other processes, or the turn-on bias and scale factors that the truth has"
+            }
+            Aim::Worst => {
+                "a model of other processes, or with the turn-on bias and scale factors that the truth has"
+            }
+        }
+    }
+
+    /// Horizontal RMSE at the outages' ends over that of a filter that knows the truth, less 1; NaN without one.
+    fn cost(&self, found: &FilterConsistency) -> f64 {
+        let square = |h: &FilterConsistency| h.horizontal_m().map(|x| x * x).sum::<f64>();
+        (square(found) / self.informed.as_ref().map_or(f64::NAN, square)).sqrt() - 1.0
+    }
+
+    fn filters(&self) -> impl Iterator<Item = (&'static str, &FilterConsistency)> {
+        let tuned = [("untuned", &self.before), ("tuned", &self.after)].into_iter();
+        let of_run = self.of_run.iter().map(|h| ("tuned, default of run", h));
+        tuned
+            .chain(of_run)
+            .chain(self.informed.iter().map(|h| ("knows the truth", h)))
+    }
+
+    /// The truth in which an error is largest.
+    fn worst_truth(&self, found: &FilterConsistency) -> &str {
+        &self.truths[if self.is_drawn {
+            0
+        } else {
+            found.largest.truth
+        }]
+    }
+}
+
+impl Serialize for TuneAnswer {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        let end = |(after_s, rmse): (&f64, &[f64; REPORTED_NAMES.len()])| EndEntry {
+            after_s: *after_s,
+            rmse: PerState(*rmse),
+            horizontal_rmse_m: rmse[0].hypot(rmse[1]),
+        };
+        let filter = |(filter, found): (&'static str, &FilterConsistency)| FilterEntry {
+            filter,
+            nees: found.nees,
+            largest_ratio: found.largest.ratio,
+            state: REPORTED_NAMES[found.largest.state],
+            truth: self.worst_truth(found).to_owned(),
+            outage_end: found.end_s.iter().zip(&found.rmse_end).map(end).collect(),
+        };
+        let file = TuneFile {
+            schema_version: 1,
+            verdict: self.verdict().join("; "),
+            factors: self.factors.iter().map(FactorEntry::of).collect(),
+            aiding_sigma_factor: self.aiding_sigmas,
+            truths: &self.truths,
+            horizontal_rmse_cost: self.cost(&self.after),
+            filters: self.filters().map(filter).collect(),
+        };
+        file.serialize(serializer)
+    }
+}
+
+fn is_changed(factor: &Factor) -> bool {
+    (factor.on_variance - 1.0).abs() >= UNCHANGED
+}
+
+/// `the full filter is overconfident: errors 0.95 to 1.31 × sigma`
+fn described(name: &str, found: &FilterConsistency) -> String {
+    let [smallest, largest] = found.range.map(readable);
+    format!(
+        "the {name} is {}: errors {smallest} to {largest} × sigma",
+        kind(found)
+    )
+}
+
+/// `filter of 15 states`
+fn filter_name(states: FilterStates) -> String {
+    if states == FilterStates::Full {
+        "full filter".to_owned()
+    } else {
+        format!("filter of {states} states")
+    }
+}
+
+/// `gyro × 4.02, accel × 1.59`
+fn factors_in_words(changed: &[&Factor]) -> String {
+    let word = |f: &&Factor| format!("{} × {}", f.sensor.name(), readable(f.on_variance));
+    changed.iter().map(word).collect::<Vec<_>>().join(", ")
+}
+
+#[derive(Serialize)]
+struct TuneFile<'a> {
+    schema_version: u32,
+    verdict: String,
+    factors: Vec<FactorEntry>,
+    /// On the sigmas of the vehicle's own measurements.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    aiding_sigma_factor: Option<f64>,
+    truths: &'a [String],
+    horizontal_rmse_cost: f64,
+    filters: Vec<FilterEntry>,
+}
+
+/// A factor in files.
+#[derive(Debug, Clone, Serialize)]
+struct FactorEntry {
+    /// `accel` or `gyro`.
+    sensor: &'static str,
+    on_variance: f64,
+}
+
+impl FactorEntry {
+    fn of(factor: &Factor) -> Self {
+        Self {
+            sensor: factor.sensor.name(),
+            on_variance: factor.on_variance,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct FilterEntry {
+    filter: &'static str,
+    nees: f64,
+    largest_ratio: f64,
+    state: &'static str,
+    truth: String,
+    outage_end: Vec<EndEntry>,
+}
+
+#[derive(Serialize)]
+struct EndEntry {
+    after_s: f64,
+    horizontal_rmse_m: f64,
+    rmse: PerState<f64>,
+}
+
+impl Answer for TuneAnswer {
+    fn document(&self) -> Document {
+        let found = kind(&self.after);
+        let tone = match self.fault() {
+            Some(_) => Tone::Bad,
+            None if self.is_unchanged() && found == VerdictKind::Consistent => Tone::Good,
+            None => Tone::Doubtful,
+        };
+        let mut document = Document::new("Factors on a noise model", tone, self.verdict());
+        if found == VerdictKind::Underconfident && self.aim == Aim::Worst {
+            let why = "no error exceeds its sigma in any truth; --for mean aims at the right NEES in the mean";
+            document.note(Importance::Remark, why);
+        }
+        if self
+            .of_run
+            .as_ref()
+            .is_some_and(|of_run| kind(of_run) == VerdictKind::Overconfident)
+        {
+            let states = self.filter_of_run;
+            document.note(
+                Importance::Remark,
+                format!("--filter {states} tunes the default of run"),
+            );
+        }
+        if self.is_drawn {
+            let counted = "errors count up to the upper end of the 95 % interval that run states";
+            document.note(Importance::Remark, counted);
+        }
+        let truths: Vec<&str> = self.truths.iter().map(String::as_str).collect();
+        document.facts(&[("truths", short_names(&truths).join(", "))]);
+        document.section("Filters");
+        document.lead(self.table());
+        document.text("RMSE/sigma: largest error over what the filter states. RMSE: horizontal, at the end of an outage.");
+        document.section("Factors");
+        document.table(&self.factor_table());
+        document.checked("covariance analysis against 2000 Monte-Carlo runs: docs/validation.md.");
+        document
+    }
+
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        let tuned = self.tuned.as_ref().map(model_file::to_toml);
+        tuned
+            .map(|text| OutputFile::whole("", text))
+            .into_iter()
+            .collect()
+    }
+
+    fn unmet(&self) -> Option<Failure> {
+        let message = format!(
+            "{}: {}; no tuned model is written",
+            self.model,
+            self.fault()?
+        );
+        Some(Failure::bound(message).hint(self.remedy()))
+    }
+}
+
+impl TuneAnswer {
+    fn table(&self) -> Table {
+        let ends = self
+            .before
+            .end_s
+            .iter()
+            .map(|t| format!("RMSE {} s (m)", seconds(*t)));
+        let nees = format!("NEES ({NEES_DOF})");
+        let mut table = Table::new(["filter", "verdict", &nees, "RMSE/sigma", "in"]).and(ends);
+        for (i, (name, found)) in self.filters().enumerate() {
+            let number =
+                |value: f64, key: String| Cell::number(value, &format!("/filters/{i}/{key}"));
+            let mut row = vec![
+                name.into(),
+                kind(found).to_string().into(),
+                number(found.nees, "nees".to_owned()),
+                number(found.largest.ratio, "largest_ratio".to_owned()),
+                self.place(found).into(),
+            ];
+            let ends = found.horizontal_m().enumerate();
+            row.extend(
+                ends.map(|(k, rmse)| number(rmse, format!("outage_end/{k}/horizontal_rmse_m"))),
+            );
+            table.row(row);
+        }
+        table
+    }
+
+    /// State, time and truth of the largest error.
+    fn place(&self, found: &FilterConsistency) -> String {
+        let mut place = REPORTED_NAMES[found.largest.state].to_owned();
+        match found.largest.outage {
+            Some(outage) if found.end_s.len() > 1 => {
+                place += &format!(" at {} s", seconds(found.end_s[outage]))
+            }
+            None if !found.end_s.is_empty() => place += " over the run",
+            _ => {}
+        }
+        if self.truths.len() > 1 {
+            format!("{place}, {}", self.worst_truth(found))
+        } else {
+            place
+        }
+    }
+
+    fn factor_table(&self) -> Table {
+        let mut table = Table::new([
+            "sensor",
+            "factor on the variance",
+            "on the standard deviation",
+        ]);
+        for (i, f) in self.factors.iter().enumerate() {
+            table.row([
+                f.sensor.name().into(),
+                Cell::number(f.on_variance, &format!("/factors/{i}/on_variance")),
+                Cell::figures(readable(f.on_variance.sqrt())),
+            ]);
+        }
+        table
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nav_sim_navigation::simulation::lincov::Departure;
+
+    fn consistency(ratio: f64, nees: f64) -> FilterConsistency {
+        let (end_s, rmse_end) = (vec![90.0], vec![[1.0; 9]]);
+        FilterConsistency {
+            nees,
+            largest: Departure {
+                ratio,
+                state: 8,
+                outage: Some(0),
+                truth: 0,
+            },
+            range: [0.95, ratio],
+            end_s,
+            rmse_end,
+        }
+    }
+
+    fn result(filter: FilterStates, of_run: FilterConsistency) -> TuneAnswer {
+        TuneAnswer {
+            model: String::new(),
+            tuned: None,
+            aiding_sigmas: None,
+            filter,
+            filter_of_run: FilterStates::Reduced15,
+            factors: vec![Factor {
+                sensor: Sensor::Gyro,
+                on_variance: 4.0,
+            }],
+            before: consistency(2.0, 30.0),
+            after: consistency(1.0, 8.8),
+            of_run: (filter != FilterStates::Reduced15).then_some(of_run),
+            informed: Some(consistency(1.0, 9.0)),
+            truths: vec!["truth.toml".to_owned()],
+            is_drawn: false,
+            aim: Aim::Worst,
+            without_factor: Vec::new(),
+        }
+    }
+
+    /// The filter that was tuned is named, and what `run` makes by default beside it: a verdict on the full filter is not one on
+    /// that of 15 states.
+    #[test]
+    fn the_verdict_has_factors_cost_and_both_filters() {
+        let lines = result(FilterStates::Full, consistency(1.19, 9.51)).verdict();
+        assert_eq!(
+            lines[0],
+            "gyro × 4.00 (variance); cost 0.0 % of horizontal RMSE; NEES 30.0 → 8.80 (9 if right)"
+        );
+        assert_eq!(
+            lines[1],
+            "tuned, the full filter is consistent: errors 0.950 to 1.00 × sigma"
+        );
+        assert!(
+            lines[2].contains("the default of run, is overconfident: errors 0.950 to 1.19"),
+            "{lines:?}"
+        );
+        assert_eq!(
+            result(FilterStates::Reduced15, consistency(1.0, 8.8))
+                .verdict()
+                .len(),
+            2
+        );
+    }
+
+    /// Never green where a filter is over- or underconfident; what `run` calls underconfident is called so.
+    #[test]
+    fn the_colour_is_that_of_the_worst_word() {
+        let mut tuned = result(FilterStates::Reduced15, consistency(1.0, 8.8));
+        assert_eq!(tuned.document().verdict.tone, Tone::Doubtful);
+        tuned.after.range[0] = 0.756;
+        let document = tuned.document();
+        assert!(
+            document.verdict.lines[1].contains("is underconfident: errors 0.756 to"),
+            "{document:?}"
+        );
+        assert!(
+            document.notes()[0].text.contains("--for mean"),
+            "{document:?}"
+        );
+        tuned.factors[0].on_variance = 1.0;
+        (tuned.before, tuned.after) = (consistency(1.0, 9.0), consistency(1.0, 9.0));
+        assert_eq!(tuned.document().verdict.tone, Tone::Good);
+        (tuned.before.range, tuned.after.range) = ([0.8, 0.9], [0.8, 0.9]);
+        let document = tuned.document();
+        assert!(
+            document.verdict.tone == Tone::Doubtful
+                && document.verdict.lines[0].starts_with("no factor is needed")
+        );
+    }
+
+    /// Where an error is largest: the outage where there are several, the truth where there are several.
+    #[test]
+    fn the_largest_error_has_a_place() {
+        let mut tuned = result(FilterStates::Reduced15, consistency(1.0, 8.8));
+        let mut found = consistency(1.0, 8.8);
+        assert_eq!(tuned.place(&found), "yaw_deg");
+        found.end_s.push(300.0);
+        assert_eq!(tuned.place(&found), "yaw_deg at 90 s");
+        tuned.truths.push("other.toml".to_owned());
+        (found.largest.truth, found.largest.outage) = (1, None);
+        assert_eq!(tuned.place(&found), "yaw_deg over the run, other.toml");
+    }
+
+    /// Errors of 3 and 4 times what a filter has that knows the truth: √((9 + 16)/2) − 1 of cost.
+    #[test]
+    fn the_cost_is_the_root_mean_square_over_outages() {
+        let mut tuned = result(FilterStates::Reduced15, consistency(1.0, 8.8));
+        let ends = |scales: [f64; 2]| FilterConsistency {
+            end_s: vec![90.0, 300.0],
+            rmse_end: scales.map(|scale| [scale * 5.0; 9]).to_vec(),
+            ..consistency(1.0, 9.0)
+        };
+        tuned.informed = Some(ends([1.0, 1.0]));
+        assert!((tuned.cost(&ends([3.0, 4.0])) - (12.5_f64.sqrt() - 1.0)).abs() < 1e-12);
+    }
+
+    /// On average a filter is overconfident whose NEES is beyond the square of what the errors of one state may be; a sensor without
+    /// noise is the reason where the filter is overconfident, or the cost is absurd, and none otherwise.
+    #[test]
+    fn what_is_not_met_has_its_reason() {
+        let mut tuned = result(FilterStates::Reduced15, consistency(1.0, 8.8));
+        tuned.aim = Aim::Mean;
+        let bound = 9.0 * (1.0 + TOLERANCE).powi(2);
+        for (nees, is_met) in [(0.999 * bound, true), (1.001 * bound, false)] {
+            tuned.after.nees = nees;
+            assert_eq!(tuned.fault().is_none(), is_met, "{nees}");
+        }
+        tuned.without_factor.push(Sensor::Accel);
+        assert!(
+            tuned
+                .fault()
+                .unwrap()
+                .starts_with("the model has no accel noise to multiply")
+        );
+        tuned.after.nees = 9.0;
+        assert_eq!(tuned.fault(), None);
+        tuned.after.rmse_end = vec![[2.1; 9]];
+        assert!(
+            tuned
+                .fault()
+                .unwrap()
+                .starts_with("the model has no accel noise to multiply")
+        );
+    }
+
+    #[test]
+    fn a_factor_on_the_aiding_is_told_where_there_is_one() {
+        let mut tuned = result(FilterStates::Reduced15, consistency(1.0, 8.8));
+        for (factor, told) in [
+            (None, None),
+            (Some(1.0), None),
+            (
+                Some(2.5),
+                Some("every sigma of [aiding] × 2.50, and then of the model:"),
+            ),
+            (
+                Some(f64::NAN),
+                Some("no sigma of the aiding covers its errors: give the filter states of them"),
+            ),
+        ] {
+            tuned.aiding_sigmas = factor;
+            assert_eq!(tuned.of_aiding().as_deref(), told);
+        }
+    }
+}
