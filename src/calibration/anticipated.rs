@@ -17,8 +17,7 @@ use crate::outcome::{Bootstrap, Inference, ModelChoice, Outcome, Settings};
 use crate::pipeline::{CalibrationError, fit_curve};
 use crate::rng::StreamKey;
 use crate::uncertainty::bootstrap::{CurveSampler, Scattering, like};
-use crate::uncertainty::intervals::intervals;
-use crate::uncertainty::practical;
+use crate::uncertainty::intervals::{intervals, practical_intervals};
 use crate::wavelet::default_levels;
 use rayon::prelude::*;
 
@@ -150,7 +149,7 @@ impl Anticipated<'_> {
             drawn: fits.iter().map(|fit| fit.composite.clone()).collect(),
             stretch,
             intervals: intervals(&outcome, &fits, stretch, &unknown),
-            practical: practical::intervals(&outcome, &fits, stretch, settings.rate_hz),
+            practical: practical_intervals(&outcome, &fits, stretch, settings.rate_hz),
             goodness: None,
             spread: Vec::new(),
             alike: None,

@@ -4,8 +4,8 @@ use crate::curve::{AverageError, Estimator, Group, average, implied};
 use crate::fit::{Fit, FitError, estimate};
 use crate::outcome::{Advance, Bootstrap, ModelChoice, Outcome, Settings};
 use crate::selection::choose;
-use crate::uncertainty::axes::axes_differ;
-use crate::uncertainty::inference::inference;
+use crate::uncertainty::bootstrap::inference;
+use crate::uncertainty::spread::axes_differ;
 use crate::wavelet::Curve;
 use rayon::prelude::*;
 

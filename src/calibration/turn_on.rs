@@ -275,4 +275,5 @@ impl<'a> Means<'a> {
 }
 
 #[cfg(test)]
+#[path = "turn_on_tests.rs"]
 mod tests;

@@ -6,7 +6,7 @@ use nav_sim::navigation::ekf::{Belief, FilterStates};
 use nav_sim::navigation::metrics::{EpochMetrics, Expected};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::scenario::Scenario;
-use nav_sim::navigation::sensors::baro::BaroSettings;
+use nav_sim::navigation::sensors::gnss::BaroSettings;
 use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::simulation::{NEES_DOF, RunResult};

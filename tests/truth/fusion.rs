@@ -17,7 +17,7 @@ use nav_sim::navigation::simulation::{Plan, Recording, record};
 use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::signal::imu::{ImuIncrement, Sensor};
 use nav_sim::signal::noise::Model;
-use nav_sim_navigation::fusion::gap::bridged;
+use nav_sim_navigation::fusion::bridged;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::path::Path;
 

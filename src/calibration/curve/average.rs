@@ -1,9 +1,14 @@
 //! From the wavelet variances of K replicates to one curve
 //! ([Minaretzis](crate::bibliography::Minaretzis24), eqs. 4–8).
 
-use super::differing::between;
-use crate::imu::Axis;
-use crate::wavelet::{Curve, RobustVariance, Status, Tuning, interval};
+use super::sampling::variance_of_log;
+use crate::imu::{Axis, Channel, Recording, Sensor, Signal};
+use crate::wavelet::interval::edof_robust;
+use crate::wavelet::{
+    Curve, Gappy, RobustVariance, Status, Tuning, WaveletError, both, default_levels, gappy,
+    interval,
+};
+use rayon::prelude::*;
 use std::fmt;
 use std::str::FromStr;
 
@@ -330,5 +335,335 @@ impl Term {
     }
 }
 
+// Differences of replicates beyond their noise, one number for all scales: what limits the weight of scales that are known
+// far better than recordings agree.
+
+/// Replicates from which on a scatter is told.
+const LEAST: usize = 3;
+
+/// Variance b² of ln nu between replicates: the mean over the scales of s²/(noise + b²) is 1, s² the variance from replicate
+/// to replicate ([Paule and Mandel](crate::bibliography::PauleMandel82)), noise that of eta3. A single scale would tell b with
+/// few degrees of freedom, and weights would follow chance.
+pub(super) fn between(replicates: &[Replicate], estimator: Estimator, tuning: &Tuning) -> f64 {
+    let at_level = |level: u32| {
+        let index = level as usize - 1;
+        let present: Vec<&Replicate> = replicates.iter().filter(|r| r.levels() > index).collect();
+        (present.len() >= LEAST).then(|| {
+            let logs: Vec<f64> = present
+                .iter()
+                .map(|r| r.value(estimator, index).ln())
+                .collect();
+            let noise = present
+                .iter()
+                .map(|r| variance_of_log(degrees(r, estimator, level, tuning)));
+            (
+                scatter(&logs, estimator),
+                noise.sum::<f64>() / present.len() as f64,
+            )
+        })
+    };
+    let scales: Vec<(f64, f64)> = (1..)
+        .map_while(at_level)
+        .filter(|(scatter, _)| scatter.is_finite())
+        .collect();
+    let excess = |b2: f64| {
+        scales
+            .iter()
+            .map(|(s2, noise)| s2 / (noise + b2) - 1.0)
+            .sum::<f64>()
+    };
+    // At the largest scatter no term is above 0.
+    falling_root(excess, scales.iter().map(|(s2, _)| *s2).fold(0.0, f64::max))
+}
+
+/// The root of a falling function between 0 and `high`, halved to rounding; 0 where it is not positive there.
+pub(crate) fn falling_root(function: impl Fn(f64) -> f64, high: f64) -> f64 {
+    let (mut low, mut high) = (0.0, high);
+    if function(low) <= 0.0 {
+        return 0.0;
+    }
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if function(middle) > 0.0 {
+            low = middle
+        } else {
+            high = middle
+        }
+    }
+    low
+}
+
+fn degrees(replicate: &Replicate, estimator: Estimator, level: u32, tuning: &Tuning) -> f64 {
+    let eta3 = replicate.edof_eta3(level);
+    let is_robust = replicate.is_robust(estimator, level as usize - 1);
+    if is_robust {
+        edof_robust(eta3, tuning.efficiency())
+    } else {
+        eta3
+    }
+}
+
+/// Variance of ln nu from replicate to replicate: for DR-AWV of those near the middle, as those that differ most are trimmed.
+fn scatter(logs: &[f64], estimator: Estimator) -> f64 {
+    if estimator == Estimator::DrAwv {
+        let middle = median(logs);
+        let distances: Vec<f64> = logs.iter().map(|x| (x - middle).abs()).collect();
+        return (MAD_TO_DEVIATION * median(&distances)).powi(2);
+    }
+    let mean = logs.iter().sum::<f64>() / logs.len() as f64;
+    logs.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (logs.len() - 1) as f64
+}
+
+// From recordings to groups of replicates: the wavelet variances of every signal.
+
+/// Sensor, and axis if not all, that one model is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Scope {
+    /// The sensor.
+    pub sensor: Sensor,
+    /// The axis; none if the axes are pooled.
+    pub axis: Option<Axis>,
+}
+
+impl Scope {
+    /// `accel.x`, or `accel` if the axes are pooled.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self.axis {
+            None => self.sensor.name().to_owned(),
+            Some(axis) => Channel {
+                sensor: self.sensor,
+                axis,
+            }
+            .to_string(),
+        }
+    }
+
+    /// The channels it covers.
+    #[must_use]
+    pub fn channels(&self) -> Vec<Channel> {
+        let axes = self.axis.map_or(Axis::ALL.to_vec(), |axis| vec![axis]);
+        axes.into_iter()
+            .map(|axis| Channel {
+                sensor: self.sensor,
+                axis,
+            })
+            .collect()
+    }
+}
+
+/// Signals to which one model is fitted: replicates of one axis, or of all axes of a sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Group {
+    /// Scope of the model.
+    pub scope: Scope,
+    /// The replicates, each with the axis it is of.
+    pub replicates: Vec<Replicate>,
+}
+
+impl Group {
+    /// Recordings that the replicates are of.
+    pub(crate) fn recordings(&self) -> usize {
+        let mut names: Vec<&str> = self.replicates.iter().map(|r| r.name.as_str()).collect();
+        names.sort_unstable();
+        names.dedup();
+        names.len()
+    }
+}
+
+/// Rule by which signals are replicates of one another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pool {
+    /// Those of one axis: a model an axis.
+    Axes,
+    /// Those of all axes of a sensor: one model a sensor.
+    Sensor,
+}
+
+nav_sim_signal::named!(Pool { Axes = "axes", Sensor = "sensor" }, in files);
+
+/// A signal without a wavelet variance.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{recording}, {channel}: {source}")]
+pub struct SignalError {
+    /// The recording.
+    pub recording: String,
+    /// The signal.
+    pub channel: Channel,
+    /// Why.
+    pub source: WaveletError,
+}
+
+/// The wavelet variances of all signals of a recording, in their order; missing samples are NaN. Without a number of levels there are as
+/// many as usual for its length.
+///
+/// # Errors
+/// When it is too short for the levels.
+pub fn replicates(
+    recording: &Recording,
+    levels: Option<u32>,
+    tuning: &Tuning,
+) -> Result<Vec<(Channel, Replicate)>, SignalError> {
+    let replicate = |signal: &Signal| {
+        let (channel, samples) = (signal.channel, signal.samples.len());
+        let levels = levels.unwrap_or_else(|| default_levels(samples));
+        let error = |source| SignalError {
+            recording: recording.name.clone(),
+            channel,
+            source,
+        };
+        let (classical, robust, coverage) = if signal.samples.iter().any(|x| x.is_nan()) {
+            let Gappy {
+                classical,
+                robust,
+                coverage,
+            } = gappy(&signal.samples, levels, tuning).map_err(error)?;
+            (classical, robust, coverage)
+        } else {
+            let (classical, robust) = both(&signal.samples, levels, tuning).map_err(error)?;
+            (classical, robust, Vec::new())
+        };
+        let (name, axis) = (recording.name.clone(), Some(channel.axis));
+        let trend = trend(&signal.samples);
+        // Of the samples themselves too: a warm-up may have been left out after the mean was taken.
+        let mean = signal.mean + mean_about(0.0, &signal.samples);
+        Ok((
+            channel,
+            Replicate {
+                name,
+                axis,
+                samples,
+                classical,
+                robust,
+                coverage,
+                trend,
+                mean,
+            },
+        ))
+    };
+    recording.signals.par_iter().map(replicate).collect()
+}
+
+/// Mean of the later half of a signal less that of its earlier half; the middle one of an odd number is left out.
+#[must_use]
+pub fn trend(samples: &[f64]) -> f64 {
+    let half = samples.len() / 2;
+    // Half by half about their first value, so that no digits of a small change are lost.
+    let first = samples.iter().copied().find(|x| !x.is_nan()).unwrap_or(0.0);
+    mean_about(first, &samples[samples.len() - half..]) - mean_about(first, &samples[..half])
+}
+
+/// Mean distance from a value of the samples that are there; missing ones are NaN.
+pub(super) fn mean_about(value: f64, samples: &[f64]) -> f64 {
+    let present = || samples.iter().filter(|x| !x.is_nan());
+    present().map(|x| x - value).sum::<f64>() / present().count() as f64
+}
+
+/// The groups, in the order of [`Channel::ALL`].
+#[must_use]
+pub fn grouped(replicates: Vec<(Channel, Replicate)>, pool: Pool) -> Vec<Group> {
+    let mut groups: Vec<Group> = Vec::new();
+    let mut replicates = replicates;
+    // A stable sort: within a channel the recordings keep the order in which they were given.
+    replicates.sort_by_key(|(channel, _)| channel.index());
+    for (channel, replicate) in replicates {
+        let axis = (pool == Pool::Axes).then_some(channel.axis);
+        let scope = Scope {
+            sensor: channel.sensor,
+            axis,
+        };
+        match groups.last_mut() {
+            Some(group) if group.scope == scope => group.replicates.push(replicate),
+            _ => groups.push(Group {
+                scope,
+                replicates: vec![replicate],
+            }),
+        }
+    }
+    groups
+}
+
+// The median, and the factor from a median absolute deviation to a standard deviation.
+
+/// 1 / normal quantile of ¾: the median absolute deviation of Gaussian numbers times this is their standard deviation.
+pub(crate) const MAD_TO_DEVIATION: f64 = 1.482_602_218_505_602;
+
+/// The median; NaN of nothing.
+#[must_use]
+pub fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    match sorted.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => sorted[n / 2],
+        n => 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]),
+    }
+}
+
 #[cfg(test)]
-mod tests;
+#[path = "average_tests.rs"]
+mod average_tests;
+
+#[cfg(test)]
+mod differing_tests {
+    use super::*;
+    use crate::rng::Generator;
+    use crate::wavelet::interval::edof_eta3;
+    use crate::wavelet::{RobustVariance, Status};
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+
+    /// 24 replicates whose variances differ by a common factor of deviation b, and by their noise √(2/eta3): b² is known to
+    /// √(2/23) = 30 % of 24 (36 % of a median absolute deviation, four times within 2.5), and is far below b² where there is none.
+    #[test]
+    fn a_common_factor_is_found() {
+        let tuning = Tuning::default();
+        let mut generator = Generator::seed_from_u64(4);
+        let mut normal = || generator.sample::<f64, _>(StandardNormal);
+        let mut set = |b: f64| -> Vec<Replicate> {
+            let replicate = |_| {
+                let factor = (b * normal()).exp();
+                let noise = |level| (2.0 / edof_eta3(1 << 16, level)).sqrt();
+                let nu: Vec<f64> = (1..=10)
+                    .map(|l| factor * (noise(l) * normal()).exp())
+                    .collect();
+                let robust = |value: &f64| RobustVariance {
+                    value: *value,
+                    status: Status::Ok,
+                    zeros: 0.0,
+                };
+                Replicate {
+                    name: String::new(),
+                    axis: None,
+                    samples: 1 << 16,
+                    robust: nu.iter().map(robust).collect(),
+                    classical: nu,
+                    coverage: Vec::new(),
+                    trend: f64::NAN,
+                    mean: f64::NAN,
+                }
+            };
+            (0..24).map(replicate).collect()
+        };
+        let (alike, different) = (set(0.0), set(0.1));
+        for estimator in [Estimator::Awv, Estimator::DrAwv] {
+            let found = between(&different, estimator, &tuning);
+            assert!((0.004..0.025).contains(&found), "{estimator:?}: {found}");
+            assert!(between(&alike, estimator, &tuning) < 0.001, "{estimator:?}");
+        }
+        assert_eq!(between(&different[..2], Estimator::Awv, &tuning), 0.0);
+    }
+}
+
+#[cfg(test)]
+mod robust_scale_tests {
+    use super::*;
+
+    #[test]
+    fn by_hand() {
+        assert_eq!(
+            (median(&[3.0, 1.0, 2.0]), median(&[4.0, 1.0, 2.0, 3.0])),
+            (2.0, 2.5)
+        );
+    }
+}

@@ -7,7 +7,7 @@
 //! first is out of place at 1 in 10⁴, the first part is given up and the next looked at. What remains is cut into sixteen
 //! again, until nothing is out of place: whoever leaves out what is said is not told of more.
 
-use super::replicates::mean_about;
+use super::average::mean_about;
 use crate::imu::Channel;
 use crate::wavelet::interval::edof_eta3;
 use crate::wavelet::{Tuning, classical, default_levels, gappy};

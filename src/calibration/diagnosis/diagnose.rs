@@ -1,15 +1,15 @@
 //! Each recording against the others, sensor by sensor.
 
-use super::common::common;
-use super::comparison::Comparison;
-use super::contrasts::FEWEST;
-use super::leave_out::left_out;
-use super::piece::{Piece, Test, axes};
-use super::result::{AxisScores, Diagnosis, Verdict};
-use crate::curve::Group;
-use crate::imu::Sensor;
-use crate::outcome::{Outcome, Settings};
+use super::comparison::{Comparison, Piece, Test, axes, excess_of_classical};
+use super::contrasts::{FALSE_ALARM, FEWEST};
+use crate::curve::sampling::variance_of_log;
+use crate::curve::{Estimator, Group, Replicate, average};
+use crate::imu::{Axis, Sensor};
+use crate::noise::Process;
+use crate::outcome::{Outcome, Settings, tau_s};
 use rayon::prelude::*;
+use serde::{Serialize, Serializer};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Diagnoses every recording, sensor by sensor. Without two recordings there is nothing to compare.
 #[must_use]
@@ -93,4 +93,446 @@ fn joined(pieces: &[Piece<'_>], noise: Vec<Vec<f64>>, outliers: Vec<Vec<f64>>) -
         outliers,
     })
     .collect()
+}
+
+// What all recordings have in common, which comparing one recording with the others does not show: outliers, steps of a
+// quantizer, a drift.
+//
+// ln (classical / robust) of every signal has, when the noise is Gaussian, the mean (1/e − 1)/eta and the variance
+// (1/e − 1)·2/eta (see [`super`]); quantization noise, which the robust variance reads high, is allowed for. Looked at is
+// the median over the signals, so that a minority makes no alarm.
+//
+// What is allowed for is the noise of a quantizer, of uniform numbers. Where the same spectrum is of Gaussian numbers (a
+// dithered output of velocity or angle increments, the difference of white noise), the robust variance reads it as it is, and
+// the classical one seems too high by what was allowed. That is told apart: the two variances then agree.
+//
+// Where the steps of a quantiser are comparable with the noise the two variances differ without an outlier: there nothing is said
+// of outliers.
+
+/// Standard deviations of the median: by chance 3 in 10⁷, of a normal law, at each of some ten scales.
+const ALARM: f64 = 5.0;
+/// Classical over robust, less one, from which it is told: less than that hardly moves a fit.
+const LEAST: f64 = 0.02;
+/// Standard deviation of a median of many Gaussian numbers, times the root of how many: √(π/2). Of few it is less (1 of one,
+/// 1.16 of three), and the alarm the rarer.
+const MEDIAN: f64 = 1.2533;
+
+/// Cause of what most signals of a sensor have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CommonCause {
+    /// Outliers: the classical wavelet variance is above the robust one.
+    Outliers,
+    /// Quantization noise whose numbers are Gaussian, not a quantizer's: robust fits read it low.
+    GaussianQuantization,
+    /// Steps of a quantiser that are comparable with the noise, by which the two variances differ.
+    CoarseSteps,
+    /// A drift that the model has not.
+    Drift,
+}
+
+nav_sim_signal::named!(
+    CommonCause {
+        Outliers = "outliers",
+        GaussianQuantization = "gaussian_quantization",
+        CoarseSteps = "coarse_steps",
+        Drift = "drift",
+    }, in files
+);
+
+/// Finding that most signals of a sensor have in common.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct CommonFinding {
+    /// Cause.
+    pub cause: CommonCause,
+    /// The scales (s) at which it is seen; none of a drift.
+    pub tau_s: Vec<f64>,
+    /// The axis of a drift.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis: Option<Axis>,
+    /// Median of classical over robust wavelet variance, less one, where it is largest; of Gaussian quantization by how much
+    /// robust fits read it low; of a drift its mean slope (units per hour).
+    pub size: f64,
+    /// The statistic in its standard deviations, where it is largest; of a drift Student's t.
+    pub deviations: f64,
+}
+
+/// The median over the signals of ln (classical / robust) at a scale, less what is expected.
+struct Excess {
+    tau_s: f64,
+    /// Excess with the allowance for the noise of a quantizer.
+    quantizer: f64,
+    /// Excess as if all noise were Gaussian.
+    gaussian: f64,
+    /// Standard deviation of either.
+    sigma: f64,
+    /// Whether half of the signals or more have coarse steps there.
+    is_stepped: bool,
+}
+
+impl Excess {
+    fn alarms(&self, excess: f64) -> bool {
+        excess.is_finite() && excess > ALARM * self.sigma && excess.exp_m1() > LEAST
+    }
+}
+
+/// The findings of all signals of a sensor together.
+pub(super) fn common(pieces: &[Piece<'_>], settings: &Settings) -> Vec<CommonFinding> {
+    let all = (0..Test::Outliers.most_levels(pieces)).map(|level| excess(pieces, level, settings));
+    let (stepped, fine): (Vec<Excess>, Vec<Excess>) = all.partition(|e| e.is_stepped);
+    let found: Vec<Excess> = fine.into_iter().filter(|e| e.alarms(e.quantizer)).collect();
+    let mut findings = Vec::new();
+    if found.is_empty() {
+        let differ = stepped
+            .into_iter()
+            .filter(|e| e.alarms(e.gaussian.abs()))
+            .collect::<Vec<_>>();
+        findings.extend(seen(CommonCause::CoarseSteps, &differ, |e| e.gaussian));
+    } else if found.iter().all(|e| !e.alarms(e.gaussian.abs())) {
+        // Outliers raise the classical variance by anything; that they make up for the allowance, no more and no less, at
+        // every scale is not to be expected.
+        findings.extend(seen(CommonCause::GaussianQuantization, &found, |e| {
+            e.quantizer - e.gaussian
+        }));
+    } else {
+        // Outliers of the finer scales explain what coarser steps show.
+        findings.extend(seen(CommonCause::Outliers, &found, |e| e.quantizer));
+    }
+    findings.extend(drifts(pieces, settings.rate_hz));
+    findings
+}
+
+/// The finding of scales at which a logarithm is far from 0.
+fn seen(
+    cause: CommonCause,
+    scales: &[Excess],
+    log: impl Fn(&Excess) -> f64,
+) -> Option<CommonFinding> {
+    let most = scales
+        .iter()
+        .max_by(|a, b| log(a).abs().total_cmp(&log(b).abs()))?;
+    Some(CommonFinding {
+        cause,
+        tau_s: scales.iter().map(|e| e.tau_s).collect(),
+        axis: None,
+        size: log(most).exp_m1(),
+        deviations: log(most) / most.sigma,
+    })
+}
+
+/// The drifts that the recordings share, axis by axis; none where the model has one.
+///
+/// The mean slope of the recordings on an axis, over its standard deviation by their scatter, is Student's t with K − 1 degrees of
+/// freedom if recordings drift by chance. The fitted model is not asked: a random walk fitted to the drift would explain it.
+/// Where recordings scatter unequally (one is shorter), t exceeds its limit for 2.5 % the more rarely
+/// ([Ibragimov and Müller](crate::bibliography::IbragimovMuller10)).
+fn drifts(pieces: &[Piece<'_>], rate_hz: f64) -> Vec<CommonFinding> {
+    let is_drift = |p: &Process| matches!(p, Process::Drift(_));
+    if pieces
+        .iter()
+        .any(|p| p.model.processes.iter().any(is_drift))
+    {
+        return Vec::new();
+    }
+    let tested: Vec<(CommonFinding, f64)> = pieces
+        .iter()
+        .filter_map(|piece| {
+            // The two halves are half a record apart.
+            let slopes = piece
+                .replicates
+                .iter()
+                .flatten()
+                .map(|r| r.trend * rate_hz * 3600.0 / (0.5 * r.samples as f64))
+                .filter(|slope| slope.is_finite())
+                .collect::<Vec<_>>();
+            let (size, deviations, p_value) = student(&slopes)?;
+            let finding = CommonFinding {
+                cause: CommonCause::Drift,
+                tau_s: Vec::new(),
+                axis: Some(piece.axis),
+                size,
+                deviations,
+            };
+            Some((finding, p_value))
+        })
+        .collect();
+    // Bonferroni: any axis may be the one.
+    let limit = FALSE_ALARM / tested.len() as f64;
+    let is_seen = |(finding, p_value)| (p_value <= limit).then_some(finding);
+    tested.into_iter().filter_map(is_seen).collect()
+}
+
+/// Fewest recordings that say what they have in common: of two, t exceeds 25 in one set of 40 by chance.
+const FEWEST_TO_SHARE: usize = 3;
+
+/// Mean, Student's t and the probability of one as far from 0 on either side; none of too few, or of equal numbers.
+fn student(values: &[f64]) -> Option<(f64, f64, f64)> {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+    let t = mean / (squares / (count * (count - 1.0))).sqrt();
+    let is_known = values.len() >= FEWEST_TO_SHARE && t.is_finite();
+    let law = StudentsT::new(0.0, 1.0, count - 1.0)
+        .ok()
+        .filter(|_| is_known)?;
+    Some((mean, t, 2.0 * law.sf(t.abs())))
+}
+
+fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
+    let (test, tuning) = (Test::Outliers, &settings.tuning);
+    let (mut of_quantizer, mut of_gaussian, mut variance, mut stepped) =
+        (Vec::new(), Vec::new(), 0.0, 0);
+    for piece in pieces.iter().filter(|p| !p.drifts(level)) {
+        let long_enough = |r: &&&Replicate| test.levels(piece, r) > level;
+        for replicate in piece.replicates.iter().flatten().filter(long_enough) {
+            let eta = test.edof(
+                piece.law.edof(replicate.samples)[level],
+                tuning.efficiency(),
+            );
+            let (read_high, _) = tuning.quantization().factor(piece.law.quantization[level]);
+            // E ln(chi²/eta) ≈ −1/eta: lower for the robust variance, by (1/e − 1)/eta of the classical one,
+            // which is 1/eta here. The bias of robust variances of few coefficients is left out.
+            let gaussian = excess_of_classical(replicate, level) - 1.0 / eta;
+            stepped += usize::from(replicate.robust[level].is_stepped());
+            of_gaussian.push(gaussian);
+            of_quantizer.push(gaussian + read_high.ln());
+            // The standard deviation of a mean of n is √(Σ variances)/n, that of the median √(π/2) times it where the
+            // variances are alike, as those of recordings of one length are.
+            variance += 2.0 / eta;
+        }
+    }
+    Excess {
+        tau_s: tau_s(level as u32 + 1, settings.rate_hz),
+        quantizer: crate::curve::median(&of_quantizer),
+        gaussian: crate::curve::median(&of_gaussian),
+        sigma: MEDIAN * variance.sqrt() / of_gaussian.len() as f64,
+        is_stepped: 2 * stepped >= of_gaussian.len(),
+    }
+}
+
+// Effect of leaving a recording out on each estimator: its curve, and every parameter.
+
+/// Movement of an estimator when one recording is left out.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct LeftOut {
+    /// The group, `accel` or `accel.x`.
+    #[serde(rename = "signals")]
+    pub group: String,
+    /// The estimator.
+    pub estimator: Estimator,
+    /// Scale (s) at which the curve moves most, in standard deviations of its own.
+    pub tau_s: f64,
+    /// nu without it over nu with it, less one, there.
+    pub change: f64,
+    /// The same in standard deviations of ln nu of the curve.
+    pub deviations: f64,
+    /// Movement of every parameter; empty where there is no fit without it.
+    pub parameters: Vec<Movement>,
+}
+
+/// Movement of one parameter.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Movement {
+    /// Label of the process.
+    pub process: String,
+    /// Name of the parameter.
+    pub parameter: &'static str,
+    /// With all recordings (units of the parameter).
+    pub with: f64,
+    /// Without this recording (units of the parameter).
+    pub without: f64,
+}
+
+/// Movement of an outcome without the recording of that name; none if no curve is left.
+pub(super) fn left_out(
+    group: &Group,
+    name: &str,
+    outcome: &Outcome,
+    settings: &Settings,
+) -> Option<LeftOut> {
+    let mut rest: Vec<Replicate> = group
+        .replicates
+        .iter()
+        .filter(|r| r.name != name)
+        .cloned()
+        .collect();
+    // Without the shortest there would be more scales: another fit than this one.
+    for replicate in &mut rest {
+        replicate.classical.truncate(outcome.curve.levels.len());
+        replicate.robust.truncate(outcome.curve.levels.len());
+    }
+    let mut without = average(&rest, outcome.estimator, settings.trim, &settings.tuning).ok()?;
+    let with = &outcome.curve;
+    // The same scales in both fits: else the change of a parameter would be one of scales.
+    without.ignored.clone_from(&with.ignored);
+    without.classical.clone_from(&with.classical);
+    without.differing = with.differing;
+    let moves = with
+        .levels
+        .iter()
+        .zip(&with.wv)
+        .zip(&with.edof)
+        .zip(&without.wv);
+    let movement = |(((level, with), edof), without): (((&u32, &f64), &f64), &f64)| {
+        let ratio = without / with;
+        (
+            *level,
+            ratio - 1.0,
+            ratio.ln() / variance_of_log(*edof).sqrt(),
+        )
+    };
+    let (level, change, deviations) = moves
+        .map(movement)
+        .max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))?;
+    let parameters = outcome
+        .estimate_again(&without, settings)
+        .map_or(Vec::new(), |fit| movements(outcome, &fit.composite));
+    Some(LeftOut {
+        group: group.scope.name(),
+        estimator: outcome.estimator,
+        tau_s: tau_s(level, settings.rate_hz),
+        change,
+        deviations,
+        parameters,
+    })
+}
+
+fn movements(outcome: &Outcome, without: &crate::noise::Composite) -> Vec<Movement> {
+    let with = &outcome.fit.composite;
+    let of_process =
+        |((a, b), label): ((&crate::noise::Process, &crate::noise::Process), String)| {
+            let pairs = a.parameters().into_iter().zip(b.parameters());
+            let movement =
+                |((parameter, with), (_, without)): ((&'static str, f64), (&'static str, f64))| {
+                    Movement {
+                        process: label.clone(),
+                        parameter,
+                        with,
+                        without,
+                    }
+                };
+            pairs.map(movement).collect::<Vec<_>>()
+        };
+    with.processes
+        .iter()
+        .zip(&without.processes)
+        .zip(with.labels())
+        .flat_map(of_process)
+        .collect()
+}
+
+// Results of the diagnosis of each recording.
+
+/// Verdict on a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// Nothing.
+    Normal,
+    /// Its classical wavelet variance is above its robust one, more than in the others: outliers within it.
+    Outliers,
+    /// Its level drifts as that of no other does.
+    Drift,
+    /// Its robust wavelet variance is not that of the others: its noise is another.
+    Noise,
+}
+
+nav_sim_signal::named!(
+    Verdict {
+        Normal = "normal",
+        Outliers = "outliers",
+        Drift = "drift",
+        Noise = "abnormal",
+    }, in files
+);
+
+fn by_axis<S: Serializer>(values: &[(Axis, f64)], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_map(values.iter().copied())
+}
+
+fn scores_by_axis<S: Serializer>(scores: &[AxisScores], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_map(scores.iter().map(|of_axis| (of_axis.axis, of_axis)))
+}
+
+/// A drift that no other recording has.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DriftAlarm {
+    /// Probability that the most unusual of recordings that are alike is as unusual.
+    pub p_value: f64,
+    /// Mean of the later half less that of the earlier one, of each axis (units).
+    #[serde(serialize_with = "by_axis")]
+    pub change: Vec<(Axis, f64)>,
+    /// The same against the others, in standard deviations.
+    #[serde(serialize_with = "by_axis")]
+    pub deviations: Vec<(Axis, f64)>,
+}
+
+/// Why a recording is abnormal.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Alarm {
+    /// Probability that the most unusual of recordings that are alike is as unusual.
+    pub p_value: f64,
+    /// First and last of the neighbouring scales (s) at which it is most unusual.
+    pub tau_s: [f64; 2],
+    /// Deviations from the others there, axis by axis, in standard deviations.
+    #[serde(serialize_with = "by_axis")]
+    pub deviations: Vec<(Axis, f64)>,
+}
+
+/// The scores of a recording at every scale, on one axis: against the mean of the others that are not abnormal, in
+/// standard deviations (those of the others, pooled over the axes, but no less than noise alone makes).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AxisScores {
+    /// Axis.
+    #[serde(skip)]
+    pub axis: Axis,
+    /// Of ln robust wavelet variance, level 1 first.
+    pub noise: Vec<f64>,
+    /// Of ln (classical / robust), of as many levels as have 30 degrees of freedom.
+    pub outliers: Vec<f64>,
+}
+
+/// One sensor of one recording against the others.
+///
+/// Alarms are rare in sets of alike recordings: with a probability of 2.5 % there is one of their noise, and as
+/// often one of outliers, and one of drift, however much alike recordings differ, if ln nu does so by Gaussian numbers
+/// independent from axis to axis. Two recordings that are abnormal alike hide behind each
+/// other unless there are six or more; three do in any case.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// Recording.
+    #[serde(rename = "file")]
+    pub name: String,
+    /// Sensor.
+    pub sensor: Sensor,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Why its noise is not that of the others.
+    pub noise: Option<Alarm>,
+    /// Why there are outliers within it.
+    pub outliers: Option<Alarm>,
+    /// Why its level is said to drift.
+    pub drift: Option<DriftAlarm>,
+    /// Findings that most signals of this sensor have in common.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub common: Vec<CommonFinding>,
+    /// Scores; empty when there are fewer than four recordings.
+    #[serde(serialize_with = "scores_by_axis")]
+    pub scores: Vec<AxisScores>,
+    /// Effect of leaving it out on each fit.
+    pub left_out: Vec<LeftOut>,
+}
+
+#[cfg(test)]
+mod common_tests {
+    use super::*;
+
+    /// By hand: 1, 2, 3 have the mean 2 and the standard error √(1/3), t = 2√3; for two degrees of freedom P(|T| > t) =
+    /// 1 − t/√(2 + t²) = 1 − √12/√14.
+    #[test]
+    fn student_by_hand() {
+        let (mean, t, p) = student(&[1.0, 2.0, 3.0]).unwrap();
+        approx::assert_relative_eq!(mean, 2.0);
+        approx::assert_relative_eq!(t, 12.0_f64.sqrt(), max_relative = 1e-14);
+        approx::assert_relative_eq!(p, 1.0 - (12.0_f64 / 14.0).sqrt(), max_relative = 1e-9);
+        assert_eq!((student(&[1.0, 2.0]), student(&[2.0; 3])), (None, None));
+    }
 }

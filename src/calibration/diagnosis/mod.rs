@@ -8,20 +8,14 @@
 //! efficient, its covariance with a robust one of efficiency e is its variance, so that of the ratio is
 //! (1/e − 1) times it. Scales of which a drift of the fitted model makes more than 2 % are no evidence: there these laws do not hold.
 
-mod alarm;
-mod common;
 mod comparison;
 mod contrasts;
 mod diagnose;
-mod leave_out;
-mod noise;
-mod piece;
-mod result;
 
-pub use common::{CommonCause, CommonFinding};
-pub use diagnose::diagnose;
-pub use leave_out::{LeftOut, Movement};
-pub use result::{Alarm, AxisScores, Diagnosis, DriftAlarm, Verdict};
+pub use diagnose::{
+    Alarm, AxisScores, CommonCause, CommonFinding, Diagnosis, DriftAlarm, LeftOut, Movement,
+    Verdict, diagnose,
+};
 
 #[cfg(test)]
 mod tests;

@@ -18,8 +18,8 @@
 //! one where the local slope is nearest to the term's in which the slope is within 0.15 of it; the line of that slope
 //! through them, by least squares, is the term. AR1 and GM have no slope of their own.
 
-use super::optimise::Termination;
-use super::result::{Fit, FitError};
+use super::least_squares::{Fit, FitError};
+use super::search::Termination;
 use crate::model::ModelSpec;
 use crate::noise::{
     Composite, Drift, FlickerNoise, Kind, Process, Quantization, RandomWalk, White,

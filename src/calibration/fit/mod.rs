@@ -1,23 +1,14 @@
 //! A model fitted to a curve: theta = argmin Σ Omega_j (nu_j − nu_j(theta))².
 
-mod assemble;
 mod avlr;
-mod bounded;
 mod least_squares;
-mod objective;
-mod optimise;
-mod result;
 mod search;
-mod weighting;
 
 pub(crate) use avlr::avlr;
-pub use least_squares::fit;
-pub(crate) use least_squares::{correlated, refit};
-pub(crate) use objective::Range;
-pub use optimise::Termination;
-pub use result::{Fit, FitError};
-pub use weighting::Weighting;
-pub(crate) use weighting::score;
+pub use least_squares::{Fit, FitError, Weighting, fit};
+pub(crate) use least_squares::{correlated, refit, score};
+pub(crate) use search::Range;
+pub use search::Termination;
 
 use crate::curve::Estimator;
 use crate::model::ModelSpec;

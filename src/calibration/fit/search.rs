@@ -5,9 +5,16 @@
 //! between grid points, and the objective is smooth there: over the correlation times of 15 scales neighbours differ by 10 %
 //! with one of them in the model, by 15 % with two, by 60 % with three and by a factor of 2 with four.
 
-use super::bounded::{Bounded, MOST};
-use super::objective::{Column, Objective, Range, Shape, dot};
-use super::optimise::{End, Termination, descend};
+use super::least_squares::Weighting;
+use crate::curve::sampling::Response;
+use crate::noise::{
+    Ar1, Drift, FlickerNoise, GaussMarkov, Kind, Ma1, Quantization, RandomWalk, White,
+};
+use crate::wavelet::{Curve, QuantizationResponse};
+use argmin::core::{
+    CostFunction, Error, Executor, IterState, Jacobian, KV, Problem, Solver, State,
+    TerminationReason, TerminationStatus,
+};
 use rayon::prelude::*;
 
 /// Largest number of points in one dimension.
@@ -262,11 +269,855 @@ fn spread(range: Range, count: usize) -> Vec<f64> {
     (0..count).map(|i| range.low + step * i as f64).collect()
 }
 
+// The distance between a curve and a model: Σ Omega_j (nu_j − nu_j(theta))²
+// ([Guerrier](crate::bibliography::Guerrier13), eq. 6).
+//
+// Every process contributes an amplitude times a shape, so with the shapes fixed the model is linear. Not quite so for
+// robust variances, which read quantization noise high by a factor of its share ([`crate::curve::implied()`]): there the linear
+// problem is solved for the derivatives at the last solution until the shares settle. The implied curve is homogeneous in
+// the amplitudes, so that its linear expansion at a solution has no constant, and where the shares have settled the
+// conditions of the linear problem are those of the true one.
+
+/// Range of a parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Range {
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+}
+
+/// One process of the model that is fitted. Its amplitude is the parameter in which its wavelet variance is
+/// linear: sigma2, q2, gamma2, s2 or slope². Its coordinate says its shape: ln κ (κ = −ln phi or beta/f)
+/// for AR1 and GM, theta for MA1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Component {
+    pub(crate) kind: Kind,
+    pub(crate) coordinate: Option<Range>,
+}
+
+impl Component {
+    /// Wavelet variance per unit of amplitude and its derivative with respect to the coordinate.
+    pub(crate) fn shape(&self, u: f64, level: u32) -> (f64, f64) {
+        match self.kind {
+            Kind::White => (White::haar_shape(level), 0.0),
+            Kind::Quantization => (Quantization::haar_shape(level), 0.0),
+            Kind::Flicker => (FlickerNoise::haar_shape(level), 0.0),
+            Kind::RandomWalk => (RandomWalk::haar_shape(level), 0.0),
+            Kind::Drift => (Drift::haar_shape(level), 0.0),
+            Kind::Ar1 => of_log(u, |kappa| Ar1::haar_shape_of_kappa(kappa, level)),
+            Kind::GaussMarkov => of_log(u, |kappa| GaussMarkov::haar_shape(kappa, level)),
+            Kind::Ma1 => Ma1::haar_shape(u, level),
+        }
+    }
+}
+
+fn of_log(u: f64, shape: impl Fn(f64) -> (f64, f64)) -> (f64, f64) {
+    let kappa = u.exp();
+    let (value, derivative) = shape(kappa);
+    (value, derivative * kappa)
+}
+
+/// Wavelet variance of a component per unit of its amplitude, at all levels.
+#[derive(Debug, Clone)]
+pub(crate) struct Shape {
+    pub(crate) component: usize,
+    values: Vec<f64>,
+    /// Derivative with respect to the coordinate.
+    slopes: Vec<f64>,
+}
+
+/// A column of the linear problem, at unit length.
+#[derive(Debug, Clone)]
+pub(crate) struct Column {
+    pub(crate) values: Vec<f64>,
+    /// The length taken out.
+    pub(crate) length: f64,
+}
+
+/// Solution of the linear problem: amplitudes where the shapes are given.
+struct LinearBest {
+    responses: Vec<Response>,
+    columns: Vec<Column>,
+    gram: Matrix,
+    /// Amplitudes, in units of their columns' lengths.
+    x: Vector,
+    /// Those on no bound.
+    active: Vec<usize>,
+    residuals: Vec<f64>,
+}
+
+/// Rounds at most until the shares of quantization noise have settled; each takes off two digits or so.
+const SETTLED: usize = 16;
+/// Changes of the response that are rounding.
+const SETTLED_CHANGE: f64 = 1e-13;
+/// Rounds that tell which of the grid's combinations are near.
+const NEARLY_SETTLED: usize = 3;
+
+/// The least-squares problem: weighted curve, in units of its length.
+#[derive(Debug, Clone)]
+pub(crate) struct Objective {
+    levels: Vec<u32>,
+    roots: Vec<f64>,
+    /// Response of a robust curve to quantization noise, level by level, where the model has some; none: as it is.
+    quantization: Option<Vec<Option<QuantizationResponse>>>,
+    pub(crate) target: Vec<f64>,
+    pub(crate) length: f64,
+    pub(crate) components: Vec<Component>,
+}
+
+/// The best amplitudes for given coordinates.
+#[derive(Debug, Clone)]
+pub(crate) struct Solution {
+    /// Amplitudes, in the parameters' units.
+    pub(crate) amplitudes: Vec<f64>,
+    /// target − model, in units of the target's length.
+    pub(crate) residuals: Vec<f64>,
+    /// Derivative of the residuals with respect to each coordinate, the amplitudes following: Kaufman's
+    /// approximation. In the order of the components that have a coordinate.
+    pub(crate) jacobian: Vec<Vec<f64>>,
+}
+
+impl Solution {
+    /// Σ residual².
+    pub(crate) fn cost(&self) -> f64 {
+        dot(&self.residuals, &self.residuals)
+    }
+
+    /// Half its derivative with respect to a coordinate. Exact: at the best amplitudes their own
+    /// derivatives do not matter.
+    pub(crate) fn gradient(&self, coordinate: usize) -> f64 {
+        dot(&self.jacobian[coordinate], &self.residuals)
+    }
+}
+
+impl Objective {
+    /// Weights where the variances are taken to be `nu`.
+    pub(crate) fn new(
+        curve: &Curve,
+        weighting: Weighting,
+        nu: &[f64],
+        components: Vec<Component>,
+    ) -> Self {
+        let roots = weighting.roots(curve, nu);
+        let target: Vec<f64> = roots.iter().zip(&curve.wv).map(|(w, nu)| w * nu).collect();
+        // The unit of the objective depends on the weighting; at unit length every tolerance is relative.
+        let length = dot(&target, &target).sqrt();
+        let target = target.iter().map(|b| b / length).collect();
+        let has_quantization = components.iter().any(|c| c.kind == Kind::Quantization);
+        let responses = || {
+            curve
+                .levels
+                .iter()
+                .map(|level| curve.response(*level).copied())
+                .collect()
+        };
+        let quantization = (has_quantization && curve.quantization.is_some()).then(responses);
+        Self {
+            levels: curve.levels.clone(),
+            roots,
+            quantization,
+            target,
+            length,
+            components,
+        }
+    }
+
+    /// Whether the model is linear in its amplitudes.
+    pub(crate) const fn is_linear(&self) -> bool {
+        self.quantization.is_none()
+    }
+
+    /// The components that have a coordinate.
+    fn shaped(&self) -> impl Iterator<Item = (usize, Range)> + '_ {
+        self.components
+            .iter()
+            .enumerate()
+            .filter_map(|(i, c)| Some((i, c.coordinate?)))
+    }
+
+    pub(crate) fn shape(&self, component: usize, u: f64) -> Shape {
+        let process = &self.components[component];
+        let (values, slopes) = self
+            .levels
+            .iter()
+            .map(|level| process.shape(u, *level))
+            .unzip();
+        Shape {
+            component,
+            values,
+            slopes,
+        }
+    }
+
+    /// The column of a shape where the curve responds so, level by level.
+    pub(crate) fn column(&self, shape: &Shape, responses: &[Response]) -> Column {
+        let mut values = self.weighted(shape.component, &shape.values, responses);
+        // Unit columns: the Gram matrix has a unit diagonal, and its condition is that of the shapes, not of
+        // the units.
+        let length = dot(&values, &values).sqrt();
+        values.iter_mut().for_each(|v| *v /= length);
+        Column { values, length }
+    }
+
+    /// What a component has at each level, in the weights of the curve.
+    fn weighted(&self, component: usize, levels: &[f64], responses: &[Response]) -> Vec<f64> {
+        let is_quantization = self.components[component].kind == Kind::Quantization;
+        let weights = self.roots.iter().zip(responses).map(|(root, response)| {
+            root * if is_quantization {
+                response.quantization
+            } else {
+                response.others
+            }
+        });
+        levels
+            .iter()
+            .zip(weights)
+            .map(|(value, weight)| value * weight)
+            .collect()
+    }
+
+    /// Responses of a curve that reads quantization noise as it is: 1 at every level.
+    fn plain_responses(&self) -> Vec<Response> {
+        vec![Response::PLAIN; self.levels.len()]
+    }
+
+    /// Derivatives of the implied curve with respect to the wavelet variances of the components, level by
+    /// level.
+    fn responses(&self, shapes: &[&Shape], amplitudes: &[f64]) -> Vec<Response> {
+        let Some(quantization) = &self.quantization else {
+            return self.plain_responses();
+        };
+        let at_level = |level: usize| {
+            let (mut own, mut all) = (0.0, 0.0);
+            for (shape, amplitude) in shapes.iter().zip(amplitudes) {
+                let nu = amplitude * shape.values[level];
+                all += nu;
+                if self.components[shape.component].kind == Kind::Quantization {
+                    own += nu;
+                }
+            }
+            match &quantization[level] {
+                Some(response) if all > 0.0 => Response::new(response, (own / all).clamp(0.0, 1.0)),
+                // Of nothing nothing is a part.
+                _ => Response::PLAIN,
+            }
+        };
+        (0..self.levels.len()).map(at_level).collect()
+    }
+
+    /// The best amplitudes for the coordinates given (one for each component that has one).
+    pub(crate) fn solve(&self, coordinates: &[f64]) -> Solution {
+        let mut next = coordinates.iter();
+        let mut coordinate_of = |c: &Component| {
+            c.coordinate
+                .and_then(|_| next.next())
+                .copied()
+                .unwrap_or(0.0)
+        };
+        let shapes: Vec<Shape> = self
+            .components
+            .iter()
+            .enumerate()
+            .map(|(i, c)| self.shape(i, coordinate_of(c)))
+            .collect();
+        let shapes: Vec<&Shape> = shapes.iter().collect();
+        let best = self.best_amplitudes(&shapes, SETTLED);
+        let jacobian = self
+            .shaped()
+            .map(|(i, _)| self.tangent(&best, shapes[i], i))
+            .collect();
+        let amplitudes = self.amplitudes(&best.columns, &best.x);
+        Solution {
+            amplitudes,
+            residuals: best.residuals,
+            jacobian,
+        }
+    }
+
+    /// Σ residual² for shapes of all components, in their order; the shares of quantization noise are nearly settled.
+    fn cost_near(&self, shapes: &[&Shape]) -> f64 {
+        let residuals = self.best_amplitudes(shapes, NEARLY_SETTLED).residuals;
+        dot(&residuals, &residuals)
+    }
+
+    /// The best amplitudes for shapes of all components, in their order, after so many rounds at most.
+    fn best_amplitudes(&self, shapes: &[&Shape], rounds: usize) -> LinearBest {
+        let mut best = self.linear_best(shapes, self.plain_responses());
+        for _ in 0..if self.is_linear() { 0 } else { rounds } {
+            let next = self.responses(shapes, &self.amplitudes(&best.columns, &best.x));
+            let change = |(a, b): (&Response, &Response)| {
+                (a.others - b.others)
+                    .abs()
+                    .max((a.quantization - b.quantization).abs())
+            };
+            if next
+                .iter()
+                .zip(&best.responses)
+                .map(change)
+                .fold(0.0, f64::max)
+                < SETTLED_CHANGE
+            {
+                break;
+            }
+            best = self.linear_best(shapes, next);
+        }
+        best
+    }
+
+    /// The best amplitudes where the curve responds so.
+    fn linear_best(&self, shapes: &[&Shape], responses: Vec<Response>) -> LinearBest {
+        let columns: Vec<Column> = shapes
+            .iter()
+            .map(|shape| self.column(shape, &responses))
+            .collect();
+        let problem = self.linear_problem(&columns);
+        let mut x = problem.minimise();
+        // An amplitude on a bound does not follow the coordinates, so its column is left out of the
+        // projection.
+        let free = |x: &Vector, i: usize| x[i] > problem.lower[i] && x[i] < problem.upper[i];
+        let active: Vec<usize> = (0..columns.len()).filter(|i| free(&x, *i)).collect();
+        // One refinement with the residuals themselves: the normal equations know only half the digits.
+        let mut residuals = self.residuals(&columns, &x);
+        if let Some(change) = project(&columns, &active, &problem.gram, &residuals) {
+            let mut refined = x;
+            active
+                .iter()
+                .zip(change)
+                .for_each(|(i, d)| refined[*i] += d);
+            if active.iter().all(|i| free(&refined, *i)) {
+                x = refined;
+                residuals = self.residuals(&columns, &x);
+            }
+        }
+        LinearBest {
+            responses,
+            columns,
+            gram: problem.gram,
+            x,
+            active,
+            residuals,
+        }
+    }
+
+    /// −amplitude × the part of the slope of the i-th column that the active columns cannot follow.
+    fn tangent(&self, best: &LinearBest, shape: &Shape, i: usize) -> Vec<f64> {
+        let slopes = self.weighted(i, &shape.slopes, &best.responses);
+        // d(residual)/du with the amplitudes fixed, less its part within the columns, which the amplitudes take
+        // up.
+        let (amplitude, length) = (best.x[i], best.columns[i].length);
+        let mut tangent: Vec<f64> = slopes.iter().map(|s| -amplitude * (s / length)).collect();
+        if let Some(part) = project(&best.columns, &best.active, &best.gram, &tangent) {
+            for (&a, p) in best.active.iter().zip(part) {
+                tangent
+                    .iter_mut()
+                    .zip(&best.columns[a].values)
+                    .for_each(|(t, v)| *t -= p * v);
+            }
+        }
+        tangent
+    }
+
+    /// Amplitudes in the parameters' units.
+    fn amplitudes(&self, columns: &[Column], x: &Vector) -> Vec<f64> {
+        x.iter()
+            .zip(columns)
+            .map(|(x, c)| x * self.length / c.length)
+            .collect()
+    }
+
+    fn linear_problem(&self, columns: &[Column]) -> Bounded {
+        let mut problem = Bounded::new(columns.len());
+        for (i, a) in columns.iter().enumerate() {
+            for (j, b) in columns.iter().enumerate().take(i + 1) {
+                problem.gram[i][j] = dot(&a.values, &b.values);
+                problem.gram[j][i] = problem.gram[i][j];
+            }
+            problem.right[i] = dot(&a.values, &self.target);
+        }
+        problem
+    }
+
+    fn residuals(&self, columns: &[Column], x: &Vector) -> Vec<f64> {
+        let mut residuals = self.target.clone();
+        for (column, amplitude) in columns.iter().zip(x) {
+            residuals
+                .iter_mut()
+                .zip(&column.values)
+                .for_each(|(r, v)| *r -= amplitude * v);
+        }
+        residuals
+    }
+}
+
+/// Coefficients of the projection of `vector` on the active columns; none if these depend on one another.
+fn project(
+    columns: &[Column],
+    active: &[usize],
+    gram: &Matrix,
+    vector: &[f64],
+) -> Option<Vec<f64>> {
+    let mut right = [0.0; MOST];
+    for (r, &i) in right.iter_mut().zip(active) {
+        *r = dot(&columns[i].values, vector);
+    }
+    let n = active.len();
+    let solution = cholesky_solve(|a, b| gram[active[a]][active[b]], right, n)?;
+    Some(solution[..n].to_vec())
+}
+
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+// Iterations, driven by argmin: damped Newton steps on the coordinates, the amplitudes following (variable
+// projection). The only file that names argmin.
+//
+// The gradient is analytic. The curvature is the difference of gradients where that is positive definite,
+// else Gauss and Newton's approximation, which alone would creep where no model fits well.
+
+/// End of the iterations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Termination {
+    /// The model is linear in its parameters: no iteration needed.
+    Linear,
+    /// A step no longer changes anything.
+    Converged,
+    /// The limit of iterations was reached first.
+    IterationLimit,
+    /// Nothing was minimised: lines were read off.
+    Regression,
+}
+
+nav_sim_signal::named!(
+    Termination {
+        Linear = "linear",
+        Converged = "converged",
+        IterationLimit = "iteration_limit",
+        Regression = "regression",
+    }
+);
+
+/// Local minimum to which a start led.
+#[derive(Debug, Clone)]
+pub(crate) struct End {
+    pub(crate) coordinates: Vec<f64>,
+    /// Σ residual², in units of the target's length.
+    pub(crate) cost: f64,
+    pub(crate) termination: Termination,
+}
+
+const MOST_ITERATIONS: u64 = 300;
+
+/// Descends from a start to the local minimum.
+pub(crate) fn descend(objective: &Objective, start: &[f64]) -> End {
+    let ranges: Vec<Range> = objective.shaped().map(|(_, range)| range).collect();
+    let solver = DampedNewton {
+        ranges,
+        damping: 1e-3,
+        growth: 2.0,
+    };
+    let run = Executor::new(Reduced(objective), solver)
+        .configure(|state| state.param(start.to_vec()).max_iters(MOST_ITERATIONS))
+        .timer(false)
+        .run();
+    let stuck = End {
+        coordinates: start.to_vec(),
+        cost: objective.solve(start).cost(),
+        termination: Termination::IterationLimit,
+    };
+    let Ok(run) = run else { return stuck };
+    let state = run.state();
+    let converged = matches!(
+        state.get_termination_reason(),
+        Some(TerminationReason::SolverConverged | TerminationReason::TargetCostReached)
+    );
+    match state.get_best_param() {
+        None => stuck,
+        Some(best) => End {
+            coordinates: best.clone(),
+            cost: state.get_best_cost(),
+            termination: if converged {
+                Termination::Converged
+            } else {
+                Termination::IterationLimit
+            },
+        },
+    }
+}
+
+/// The objective as a function of the coordinates alone.
+struct Reduced<'a>(&'a Objective);
+
+impl CostFunction for Reduced<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, coordinates: &Vec<f64>) -> Result<f64, Error> {
+        Ok(self.0.solve(coordinates).cost())
+    }
+}
+
+impl Jacobian for Reduced<'_> {
+    type Param = Vec<f64>;
+    type Jacobian = Solution;
+
+    fn jacobian(&self, coordinates: &Vec<f64>) -> Result<Solution, Error> {
+        Ok(self.0.solve(coordinates))
+    }
+}
+
+/// A step this small (natural logarithms of a correlation time, or theta) is the last.
+const SMALL_STEP: f64 = 1e-11;
+/// No coordinate moves further in one step.
+const LARGE_STEP: f64 = 2.0;
+/// A damping at which no step helps.
+const HOPELESS: f64 = 1e12;
+
+struct DampedNewton {
+    ranges: Vec<Range>,
+    damping: f64,
+    growth: f64,
+}
+
+/// Step h of the central differences (natural logarithms of a correlation time, or theta): their error h² and
+/// the rounding of the gradients over h are both of the order 1e-10.
+const DIFFERENCE: f64 = 1e-5;
+
+/// Half the second derivatives of the cost.
+fn curvature(objective: &Objective, u: &[f64], at: &Solution) -> Matrix {
+    let n = u.len();
+    let mut hessian = [[0.0; MOST]; MOST];
+    for j in 0..n {
+        let gradients = |sign: f64| {
+            let mut there = u.to_vec();
+            there[j] += sign * DIFFERENCE;
+            let solution = objective.solve(&there);
+            (0..n).map(|i| solution.gradient(i)).collect::<Vec<_>>()
+        };
+        let (up, down) = (gradients(1.0), gradients(-1.0));
+        for i in 0..n {
+            // `gradient` is half a derivative, so (up − down)/2h is half a second one; half of it in either
+            // place makes the matrix symmetric.
+            let half = 0.25 * (up[i] - down[i]) / DIFFERENCE;
+            hessian[i][j] += half;
+            hessian[j][i] += half;
+        }
+    }
+    // Away from a minimum the curvature may be indefinite and point uphill; Gauss and Newton's is never.
+    if cholesky_solve(|i, j| hessian[i][j], [0.0; MOST], n).is_some() {
+        return hessian;
+    }
+    for i in 0..n {
+        for j in 0..n {
+            hessian[i][j] = dot(&at.jacobian[i], &at.jacobian[j]);
+        }
+    }
+    hessian
+}
+
+type Iterate = IterState<Vec<f64>, (), Solution, (), (), f64>;
+
+impl DampedNewton {
+    /// The damped step within the ranges, and the decrease the quadratic model expects of it.
+    fn step(&self, u: &[f64], at: &Solution, curvature: &Matrix) -> (Vec<f64>, f64) {
+        let n = u.len();
+        let mut problem = Bounded::new(n);
+        problem.gram = *curvature;
+        let largest = (0..n)
+            .map(|i| curvature[i][i])
+            .fold(f64::MIN_POSITIVE, f64::max);
+        // Damped along the diagonal (Marquardt), so that the step does not depend on the units of the
+        // coordinates.
+        for i in 0..n {
+            // A component without amplitude has no slope: it stays where it is.
+            problem.gram[i][i] += self.damping * (curvature[i][i] + 1e-12 * largest);
+        }
+        // Shifted so that the start is 0, and scaled to a unit diagonal.
+        let scale: Vec<f64> = (0..n).map(|i| problem.gram[i][i].sqrt()).collect();
+        for i in 0..n {
+            for j in 0..n {
+                problem.gram[i][j] /= scale[i] * scale[j];
+            }
+            problem.right[i] = -at.gradient(i) / scale[i];
+            problem.lower[i] = (self.ranges[i].low - u[i]).max(-LARGE_STEP) * scale[i];
+            problem.upper[i] = (self.ranges[i].high - u[i]).min(LARGE_STEP) * scale[i];
+        }
+        // The bounds are part of the quadratic problem: cut off afterwards, the step of the other coordinates
+        // would be wrong.
+        let scaled = problem.minimise();
+        let step: Vec<f64> = (0..n).map(|i| scaled[i] / scale[i]).collect();
+        // Gradient and curvature are halves: the cost falls by 2g·s − s·Hs, which is g·s where Hs = g, g
+        // downhill.
+        (step, (0..n).map(|i| scaled[i] * problem.right[i]).sum())
+    }
+}
+
+impl Solver<Reduced<'_>, Iterate> for DampedNewton {
+    fn name(&self) -> &str {
+        "damped Newton with variable projection"
+    }
+
+    fn init(
+        &mut self,
+        problem: &mut Problem<Reduced<'_>>,
+        state: Iterate,
+    ) -> Result<(Iterate, Option<KV>), Error> {
+        let solution = problem.jacobian(state.get_param().unwrap_or(&Vec::new()))?;
+        Ok((state.cost(solution.cost()).jacobian(solution), None))
+    }
+
+    fn next_iter(
+        &mut self,
+        problem: &mut Problem<Reduced<'_>>,
+        mut state: Iterate,
+    ) -> Result<(Iterate, Option<KV>), Error> {
+        let (Some(u), Some(at)) = (state.take_param(), state.take_jacobian()) else {
+            return Ok((
+                state.terminate_with(TerminationReason::SolverExit("no start".into())),
+                None,
+            ));
+        };
+        let curvature = problem.problem("curvature_count", |reduced| {
+            Ok(curvature(reduced.0, &u, &at))
+        })?;
+        let (step, expected) = self.step(&u, &at, &curvature);
+        let there: Vec<f64> = u.iter().zip(&step).map(|(u, s)| u + s).collect();
+        let next = problem.jacobian(&there)?;
+        let (before, after) = (at.cost(), next.cost());
+        let small = step.iter().all(|s| s.abs() < SMALL_STEP);
+        if after < before {
+            self.damping = (self.damping * 0.2).max(1e-12);
+            self.growth = 2.0;
+            state = state.param(there).cost(after).jacobian(next);
+        } else {
+            // Doubling the factor with each refusal: a start far off needs few tries to become cautious
+            // enough.
+            self.damping *= self.growth;
+            self.growth *= 2.0;
+            state = state.param(u).cost(before).jacobian(at);
+        }
+        // No decrease that the cost could show.
+        let flat = expected <= 1e-16 * before;
+        if small || flat || self.damping > HOPELESS {
+            state = state.terminate_with(TerminationReason::SolverConverged);
+        }
+        Ok((state, None))
+    }
+
+    fn terminate(&mut self, state: &Iterate) -> TerminationStatus {
+        match state.get_cost() {
+            cost if cost <= f64::MIN_POSITIVE => {
+                TerminationStatus::Terminated(TerminationReason::TargetCostReached)
+            }
+            _ => TerminationStatus::NotTerminated,
+        }
+    }
+}
+
+// Least squares with bounds, from the normal equations: minimises ½·xᵀGx − rᵀx over lower ≤ x ≤ upper.
+//
+// The active-set method of [Lawson and Hanson](crate::bibliography::LawsonHanson74) (NNLS, chapter 23),
+// with upper bounds treated like lower ones. Columns are expected at unit length, so that G has a unit
+// diagonal and tolerances mean the same for every parameter.
+
+/// Largest number of parameters.
+pub(crate) const MOST: usize = 12;
+
+/// A small symmetric matrix; rows and columns beyond the problem's size are not read.
+type Matrix = [[f64; MOST]; MOST];
+/// A small vector.
+type Vector = [f64; MOST];
+
+/// A bounded quadratic problem of size `n`.
+#[derive(Debug, Clone, Copy)]
+struct Bounded {
+    pub(crate) n: usize,
+    gram: Matrix,
+    pub(crate) right: Vector,
+    pub(crate) lower: Vector,
+    pub(crate) upper: Vector,
+}
+
+/// Place of a parameter: between its bounds, or on one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    Free,
+    Lower,
+    Upper,
+}
+
+/// A gradient component below this is rounding (target and columns have unit length).
+const FLAT: f64 = 1e-15;
+/// A pivot below this share of the diagonal element means that the column depends on those before it.
+const DEPENDENT: f64 = 1e-13;
+
+impl Bounded {
+    /// All zero: bounds 0 … ∞.
+    pub(crate) const fn new(n: usize) -> Self {
+        let zero = [0.0; MOST];
+        Self {
+            n,
+            gram: [zero; MOST],
+            right: zero,
+            lower: zero,
+            upper: [f64::INFINITY; MOST],
+        }
+    }
+
+    /// The minimiser. Lower bounds are finite.
+    pub(crate) fn minimise(&self) -> Vector {
+        let mut x = self.lower;
+        let mut places = [Place::Lower; MOST];
+        let mut refused = [false; MOST];
+        // Each pass lowers the objective strictly, so no set of free parameters comes twice; the limit
+        // guards against rounding.
+        for _ in 0..20 * self.n {
+            let Some(entering) = self.steepest(&x, &places, &refused) else {
+                break;
+            };
+            let before = places[entering];
+            places[entering] = Place::Free;
+            if self.descend(&mut x, &mut places, entering) {
+                refused = [false; MOST];
+            } else {
+                // The column depends on the free ones or cannot leave its bound: it is tried again only after
+                // another step.
+                places[entering] = before;
+                refused[entering] = true;
+            }
+        }
+        x
+    }
+
+    /// −gradient.
+    fn downhill(&self, x: &Vector, i: usize) -> f64 {
+        self.right[i] - (0..self.n).map(|j| self.gram[i][j] * x[j]).sum::<f64>()
+    }
+
+    /// The bound parameter that most wants to leave its bound.
+    fn steepest(
+        &self,
+        x: &Vector,
+        places: &[Place; MOST],
+        refused: &[bool; MOST],
+    ) -> Option<usize> {
+        let mut best = (FLAT, None);
+        for i in (0..self.n).filter(|i| !refused[*i]) {
+            let w = self.downhill(x, i);
+            let pull = match places[i] {
+                Place::Lower if self.upper[i] > self.lower[i] => w,
+                Place::Upper => -w,
+                _ => continue,
+            };
+            if pull > best.0 {
+                best = (pull, Some(i));
+            }
+        }
+        best.1
+    }
+
+    /// Moves to the minimum over the free parameters, binding those that meet a bound on the way; false if
+    /// the one that enters cannot move.
+    fn descend(&self, x: &mut Vector, places: &mut [Place; MOST], entering: usize) -> bool {
+        let start = x[entering];
+        loop {
+            // Only the first solution can fail: afterwards the free columns get fewer, and those left are
+            // independent.
+            let Some(goal) = self.solve_free(x, places) else {
+                return false;
+            };
+            let mut blocking = (1.0, None);
+            for i in (0..self.n).filter(|i| places[*i] == Place::Free) {
+                let step = goal[i] - x[i];
+                let room = if step < 0.0 {
+                    self.lower[i] - x[i]
+                } else {
+                    self.upper[i] - x[i]
+                };
+                // The part of the way to the minimum at which this parameter meets its bound; the nearest of
+                // all stops the step.
+                if step.abs() > room.abs() && room / step < blocking.0 {
+                    let place = if step < 0.0 {
+                        Place::Lower
+                    } else {
+                        Place::Upper
+                    };
+                    blocking = ((room / step).max(0.0), Some((i, place)));
+                }
+            }
+            for i in (0..self.n).filter(|i| places[*i] == Place::Free) {
+                x[i] += blocking.0 * (goal[i] - x[i]);
+            }
+            let Some((i, place)) = blocking.1 else {
+                return true;
+            };
+            // The bound itself: the sum above meets it to rounding only.
+            x[i] = if place == Place::Lower {
+                self.lower[i]
+            } else {
+                self.upper[i]
+            };
+            places[i] = place;
+            if i == entering && (x[i] - start).abs() <= 0.0 {
+                return false;
+            }
+        }
+    }
+
+    /// The unconstrained minimum over the free parameters, the others kept; none if G is singular there.
+    fn solve_free(&self, x: &Vector, places: &[Place; MOST]) -> Option<Vector> {
+        let mut free = [0; MOST];
+        let mut count = 0;
+        for i in (0..self.n).filter(|i| places[*i] == Place::Free) {
+            free[count] = i;
+            count += 1;
+        }
+        let free = &free[..count];
+        let mut right = [0.0; MOST];
+        for (a, &i) in free.iter().enumerate() {
+            let bound = (0..self.n).filter(|j| places[*j] != Place::Free);
+            right[a] = self.right[i] - bound.map(|j| self.gram[i][j] * x[j]).sum::<f64>();
+        }
+        let solution = cholesky_solve(|a, b| self.gram[free[a]][free[b]], right, count)?;
+        let mut goal = *x;
+        for (a, &i) in free.iter().enumerate() {
+            goal[i] = solution[a];
+        }
+        Some(goal)
+    }
+}
+
+/// Solves A·x = b, A symmetric of size n; none if it is not positive definite to working precision.
+fn cholesky_solve(a: impl Fn(usize, usize) -> f64, mut b: Vector, n: usize) -> Option<Vector> {
+    let mut l = [[0.0; MOST]; MOST];
+    for i in 0..n {
+        for j in 0..=i {
+            let dot: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+            if i == j {
+                // The squared part of the column that is independent of those before it. Its rounding error
+                // is 1e-16 of the whole.
+                let pivot = a(i, i) - dot;
+                if pivot <= DEPENDENT * a(i, i) {
+                    return None;
+                }
+                l[i][i] = pivot.sqrt();
+            } else {
+                l[i][j] = (a(i, j) - dot) / l[j][j];
+            }
+        }
+    }
+    for i in 0..n {
+        b[i] = (b[i] - (0..i).map(|k| l[i][k] * b[k]).sum::<f64>()) / l[i][i];
+    }
+    for i in (0..n).rev() {
+        b[i] = (b[i] - (i + 1..n).map(|k| l[k][i] * b[k]).sum::<f64>()) / l[i][i];
+    }
+    Some(b)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::objective::Component;
-    use super::super::weighting::Weighting;
     use super::*;
+    use crate::Weighting;
     use crate::curve::implied;
     use crate::noise::{Ar1, Composite, Kind, Process, Quantization, RandomWalk, White};
     use crate::wavelet::{Curve, Tuning};
@@ -434,5 +1285,71 @@ mod tests {
             ),
             [2.0]
         );
+    }
+}
+
+#[cfg(test)]
+mod bounded_tests {
+    use super::*;
+    use crate::rng::Generator;
+    use rand::{RngExt, SeedableRng};
+
+    fn objective(p: &Bounded, x: &Vector) -> f64 {
+        let quadratic: f64 = (0..p.n)
+            .flat_map(|i| (0..p.n).map(move |j| (i, j)))
+            .map(|(i, j)| x[i] * p.gram[i][j] * x[j])
+            .sum();
+        0.5 * quadratic - (0..p.n).map(|i| p.right[i] * x[i]).sum::<f64>()
+    }
+
+    /// Random problems against the conditions that characterise the minimum (Karush-Kuhn-Tucker).
+    #[test]
+    fn the_minimum_satisfies_its_conditions() {
+        let mut generator = Generator::seed_from_u64(11);
+        for case in 0..500 {
+            let n = 1 + case % 7;
+            let mut p = Bounded::new(n);
+            let columns: Vec<Vec<f64>> = (0..n)
+                .map(|_| {
+                    (0..n + 3)
+                        .map(|_| generator.random_range(-0.2..1.0))
+                        .collect()
+                })
+                .collect();
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+            for i in 0..n {
+                for j in 0..n {
+                    p.gram[i][j] = dot(&columns[i], &columns[j]);
+                }
+                p.right[i] = generator.random_range(-1.0..1.0);
+                p.lower[i] = generator.random_range(-0.3..0.1);
+                if case % 2 == 0 {
+                    p.upper[i] = p.lower[i] + generator.random_range(0.0..0.5);
+                }
+            }
+            let x = p.minimise();
+            for i in 0..n {
+                let w = p.downhill(&x, i);
+                assert!(x[i] >= p.lower[i] && x[i] <= p.upper[i]);
+                if x[i] > p.lower[i] + 1e-12 {
+                    assert!(w > -1e-9, "case {case}: {w}");
+                }
+                if x[i] < p.upper[i] - 1e-12 {
+                    assert!(w < 1e-9, "case {case}: {w}");
+                }
+            }
+            let mut corner = p.lower;
+            corner[0] = 0.5 * (p.lower[0] + p.upper[0].min(1.0));
+            assert!(objective(&p, &x) <= objective(&p, &corner) + 1e-12);
+        }
+    }
+
+    #[test]
+    fn equal_columns_do_not_hang_and_do_not_blow_up() {
+        let mut p = Bounded::new(3);
+        p.gram = [[1.0; MOST]; MOST];
+        p.right = [1.0; MOST];
+        let x = p.minimise();
+        assert!((x[0] + x[1] + x[2] - 1.0).abs() < 1e-12, "{x:?}");
     }
 }

@@ -9,15 +9,17 @@
 //! one and the same other. That is right whatever they share, from nothing to all, and says what it knows: as many degrees of
 //! freedom as there are recordings, less one, where `between` rules, and as there are signals, less one, where it does not.
 
-use crate::curve::robust_scale::{MAD_TO_DEVIATION, median};
-use crate::curve::sampling::SamplingLaw;
-use crate::curve::shape::Shape;
-use crate::curve::{Estimator, Replicate, falling_root};
-use crate::rng::Generator;
+use crate::curve::sampling::{SamplingLaw, Shape, variance_of_log};
+use crate::curve::{Estimator, MAD_TO_DEVIATION, Replicate, falling_root, median};
+use crate::imu::Axis;
+use crate::outcome::{AxesDiffer, LevelSpread, Outcome};
+use crate::rng::{Generator, StreamKey};
 use crate::wavelet::Tuning;
+use crate::wavelet::interval::edof_robust;
 use rand::RngExt;
 use rand_distr::StandardNormal;
-use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use rayon::prelude::*;
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 
 /// Quantile 0.975 of the normal law.
 const NORMAL_975: f64 = 1.959_963_984_540_054;
@@ -482,5 +484,474 @@ fn weighted_median(values: &[f64], weights: &[f64]) -> f64 {
     pairs.last().map_or(f64::NAN, |last| last.0)
 }
 
+// Whether replicates differ beyond their noise: a test with a level.
+//
+// At each scale the mean square of the residuals of ln nu, each over the deviation that noise alone gives it; of all
+// scales together the largest. What that is for replicates of one noise is drawn from the large-sample law of the fitted
+// model ([`SamplingLaw`]), the correlations between scales included, so that looking at many scales costs nothing.
+// Axes that are pooled may differ from one another in every recording alike: recordings are compared axis by axis.
+
+/// Probability with which replicates of one noise are said to differ.
+pub const LEVEL: f64 = 0.025;
+/// Sets drawn: a probability of 2.5 % is known to 0.7 %.
+const DRAWS: usize = 499;
+/// Seed of the draws: a test is an answer, the same each time.
+const SEED: u64 = 1;
+/// A scale with fewer degrees of freedom in a replicate is left out: a robust variance of so few coefficients does not
+/// follow the large-sample law.
+const LEAST: f64 = 4.0;
+
+/// Probability that replicates of one noise differ at some scale as much as these do; none of a single one.
+pub(crate) fn p_value(
+    replicates: &[Replicate],
+    estimator: Estimator,
+    spread: &Spread,
+    law: &SamplingLaw,
+    group: &str,
+) -> Option<f64> {
+    let scales: Vec<Scale> = law
+        .shapes
+        .iter()
+        .enumerate()
+        .map_while(|(j, shape)| Scale::new(j, replicates, spread, shape))
+        .collect();
+    if scales.is_empty() {
+        return None;
+    }
+    let largest = |nu: &dyn Fn(usize, usize) -> f64| {
+        let squares = scales
+            .iter()
+            .enumerate()
+            .map(|(j, scale)| scale.mean_square(&|i| nu(i, j), estimator));
+        squares
+            .filter(|square| square.is_finite())
+            .fold(0.0, f64::max)
+    };
+    let observed = largest(&|i, j| replicates[i].value(estimator, j));
+    let draw = |run: usize| {
+        let process = estimator.name();
+        let key = StreamKey {
+            seed: SEED,
+            scenario: "alike",
+            run: run as u64,
+            source: group,
+            process,
+        };
+        let mut generator = key.generator();
+        let ratios: Vec<Vec<f64>> = spread
+            .edof
+            .iter()
+            .map(|e| law.draw(e, &mut generator))
+            .collect();
+        largest(&|i, j| ratios[i][j])
+    };
+    let larger = (0..DRAWS)
+        .into_par_iter()
+        .filter(|run| draw(*run) >= observed)
+        .count();
+    // The observed set counts as one of the draws, all exchangeable if the fitted law holds: p is never 0,
+    // and the level is kept (Davison and Hinkley 1997, chapter 4).
+    Some((1 + larger) as f64 / (1 + DRAWS) as f64)
+}
+
+impl Outcome {
+    /// Probability of such differences of the replicates and the scale where they are largest, where they differ beyond their noise.
+    #[must_use]
+    pub fn differing(&self) -> Option<(f64, LevelSpread)> {
+        let inference = self.inference.as_ref()?;
+        let p_value = inference.alike.filter(|p| *p <= LEVEL)?;
+        // Relative to the noise: at the last scales recordings scatter most for lack of coefficients, which is no difference.
+        let ratio = |s: &LevelSpread| s.between / s.within;
+        let most = inference
+            .spread
+            .iter()
+            .max_by(|a, b| ratio(a).total_cmp(&ratio(b)))?;
+        Some((p_value, *most))
+    }
+}
+
+/// The replicates that are compared at one scale.
+struct Scale {
+    /// Which replicates, and the axis of each.
+    members: Vec<(usize, Option<Axis>)>,
+    /// Variance of ln nu of each by its noise.
+    noise: Vec<f64>,
+}
+
+impl Scale {
+    /// Those that are long enough for the level of index `j`; none where no axis is there twice: each axis alone in its
+    /// recording is compared with nothing.
+    fn new(j: usize, replicates: &[Replicate], spread: &Spread, shape: &Shape) -> Option<Self> {
+        let is_long_enough = |i: &usize| replicates[*i].levels() > j && spread.edof[*i][j] >= LEAST;
+        let members: Vec<(usize, Option<Axis>)> = (0..replicates.len())
+            .filter(is_long_enough)
+            .map(|i| (i, replicates[i].axis))
+            .collect();
+        let is_repeated = |(k, (_, axis)): (usize, &(usize, Option<Axis>))| {
+            members[..k].iter().any(|(_, a)| a == axis)
+        };
+        let noise = members
+            .iter()
+            .map(|(i, _)| shape.variance_of_log(spread.edof[*i][j]))
+            .collect();
+        members
+            .iter()
+            .enumerate()
+            .any(is_repeated)
+            .then_some(Self { members, noise })
+    }
+
+    /// Mean square of the residuals of ln nu less the mean of its axis: of drawn values in the same way as of observed ones,
+    /// so that the degrees of freedom of the means are allowed for.
+    fn mean_square(&self, nu: &dyn Fn(usize) -> f64, estimator: Estimator) -> f64 {
+        let logs: Vec<f64> = self.members.iter().map(|(i, _)| nu(*i).ln()).collect();
+        let mean = |axis: &Option<Axis>| {
+            let of_axis = || {
+                self.members
+                    .iter()
+                    .zip(&logs)
+                    .filter(|((_, other), _)| other == axis)
+            };
+            of_axis().map(|(_, log)| log).sum::<f64>() / of_axis().count() as f64
+        };
+        let residuals: Vec<f64> = self
+            .members
+            .iter()
+            .zip(&logs)
+            .map(|((_, axis), log)| log - mean(axis))
+            .collect();
+        mean_square(&residuals, &self.noise, estimator)
+    }
+}
+
+// Whether the axes of a sensor that is pooled differ: one model is then none of theirs.
+//
+// At each scale ln nu of all recordings and axes as a two-way layout: the mean square between axes over that of what
+// neither axis nor recording explains, F with A − 1 and (K − 1)(A − 1) degrees of freedom; what remains is taken to be at
+// least the noise of the wavelet variance. Of one recording the noise alone is known, and the sum of squares between
+// axes is a chi-square. The least probability of all scales, times their number (Bonferroni), is the answer.
+
+/// Degrees of freedom from which on ln nu is near enough to Gaussian.
+const NEARLY_GAUSSIAN: f64 = 30.0;
+/// Largest over smallest axis, in wavelet variance, from which on a model an axis is worth while.
+const NOTABLE: f64 = 1.1;
+
+/// Difference of the axes of pooled replicates; none where they agree, or where a recording lacks an axis.
+pub(crate) fn axes_differ(
+    replicates: &[Replicate],
+    estimator: Estimator,
+    tuning: &Tuning,
+) -> Option<AxesDiffer> {
+    let axes: Vec<Axis> = Axis::ALL
+        .into_iter()
+        .filter(|axis| replicates.iter().any(|r| r.axis == Some(*axis)))
+        .collect();
+    let table = layout(replicates, &axes)?;
+    let degrees = |r: &Replicate, level: u32| match r.edof_eta3(level) {
+        edof if r.is_robust(estimator, level as usize - 1) => {
+            edof_robust(edof, tuning.efficiency())
+        }
+        edof => edof,
+    };
+    let is_usable = |r: &Replicate, level: u32| {
+        r.levels() >= level as usize && degrees(r, level) >= NEARLY_GAUSSIAN
+    };
+    let long_enough = |level: u32| -> Vec<&Vec<&Replicate>> {
+        table
+            .iter()
+            .filter(|row| row.iter().all(|r| is_usable(r, level)))
+            .collect()
+    };
+    // Up to the scale that more than half of the recordings have, as the average of them.
+    let usable: Vec<(u32, Vec<&Vec<&Replicate>>)> = (1..)
+        .map(|level| (level, long_enough(level)))
+        .take_while(|(_, rows)| 2 * rows.len() > table.len())
+        .collect();
+    let count = usable.len() as f64;
+    let of_level = |(level, rows): &(u32, Vec<&Vec<&Replicate>>)| {
+        let level = *level;
+        let logs = |row: &&Vec<&Replicate>| -> Vec<f64> {
+            row.iter()
+                .map(|r| r.value(estimator, level as usize - 1).ln())
+                .collect()
+        };
+        // The largest, that of the shortest recording: too much noise makes the test cautious, too little
+        // bold.
+        let variances = rows
+            .iter()
+            .copied()
+            .flatten()
+            .map(|r| variance_of_log(degrees(r, level)));
+        let noise = variances.fold(0.0, f64::max);
+        let (p_value, means) = between_axes(&rows.iter().map(logs).collect::<Vec<_>>(), noise)?;
+        let by_mean = |a: &(f64, Axis), b: &(f64, Axis)| a.0.total_cmp(&b.0);
+        let means_of_axes = || means.iter().copied().zip(axes.iter().copied());
+        let (smallest, largest) = (
+            means_of_axes().min_by(by_mean)?,
+            means_of_axes().max_by(by_mean)?,
+        );
+        Some(AxesDiffer {
+            level,
+            p_value: (p_value * count).min(1.0),
+            largest: largest.1,
+            smallest: smallest.1,
+            ratio: (largest.0 - smallest.0).exp(),
+        })
+    };
+    let all = usable.iter().filter_map(of_level);
+    let told: Vec<AxesDiffer> = all
+        .filter(|d| d.p_value <= LEVEL && d.ratio >= NOTABLE)
+        .collect();
+    told.into_iter().max_by(|a, b| a.ratio.total_cmp(&b.ratio))
+}
+
+/// One row a recording, one column an axis.
+fn layout<'a>(replicates: &'a [Replicate], axes: &[Axis]) -> Option<Vec<Vec<&'a Replicate>>> {
+    let mut names: Vec<&str> = replicates.iter().map(|r| r.name.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let whole = axes.len() >= 2 && names.len() * axes.len() == replicates.len();
+    let cell = |name: &str, axis: Axis| {
+        replicates
+            .iter()
+            .find(|r| r.name == name && r.axis == Some(axis))
+    };
+    let rows = names
+        .iter()
+        .map(|name| axes.iter().map(|axis| cell(name, *axis)).collect());
+    if whole { rows.collect() } else { None }
+}
+
+/// Probability of such means of the columns where they are equal, and the means. `noise`: variance of a value.
+fn between_axes(rows: &[Vec<f64>], noise: f64) -> Option<(f64, Vec<f64>)> {
+    let (count, axes) = (rows.len() as f64, rows[0].len() as f64);
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let columns: Vec<f64> = (0..rows[0].len())
+        .map(|axis| mean(&rows.iter().map(|row| row[axis]).collect::<Vec<_>>()))
+        .collect();
+    let all = mean(&columns);
+    // Recordings differ as a whole too, but that is in every column alike and drops out of the means'
+    // differences.
+    let between = count * columns.iter().map(|m| (m - all).powi(2)).sum::<f64>();
+    // One recording leaves no remainder to compare with: the noise is taken as known, and F becomes a
+    // chi-square.
+    if rows.len() == 1 {
+        return Some((
+            ChiSquared::new(axes - 1.0).ok()?.sf(between / noise),
+            columns,
+        ));
+    }
+    let remains = |row: &Vec<f64>| -> f64 {
+        let own = mean(row);
+        row.iter()
+            .zip(&columns)
+            .map(|(value, column)| (value - own - column + all).powi(2))
+            .sum()
+    };
+    let degrees = (count - 1.0) * (axes - 1.0);
+    // By few recordings the remainder may come out small by chance, and F large; it cannot truly be less than
+    // the noise.
+    let remaining = (rows.iter().map(remains).sum::<f64>() / degrees).max(noise);
+    let law = FisherSnedecor::new(axes - 1.0, degrees).ok()?;
+    Some((law.sf(between / (axes - 1.0) / remaining), columns))
+}
+
 #[cfg(test)]
-mod tests;
+#[path = "spread_tests.rs"]
+mod spread_tests;
+
+#[cfg(test)]
+mod alike_tests {
+    use super::*;
+    use crate::noise::{Composite, Process, RandomWalk, White};
+    use crate::wavelet::{Convention, Tuning, both};
+    use rand::RngExt;
+    use rand_distr::StandardNormal;
+
+    const SAMPLES: usize = 2048;
+    const GAMMA2: f64 = 1e-4;
+
+    fn tuning() -> Tuning {
+        Tuning::new(0.6, Convention::Exact).unwrap()
+    }
+
+    /// Signals of white noise and random walk, their white noise of standard deviation e^(spread/2 · N(0, 1)).
+    fn set(seed: u64, count: usize, spread: f64) -> Vec<Replicate> {
+        let tuning = tuning();
+        let recording = |run: usize| {
+            let key = StreamKey {
+                seed,
+                scenario: "",
+                run: run as u64,
+                source: "",
+                process: "",
+            };
+            let mut generator = key.generator();
+            let mut normal = || generator.sample::<f64, _>(StandardNormal);
+            let sigma = (0.5 * spread * normal()).exp();
+            let mut walk = 0.0;
+            let signal: Vec<f64> = (0..SAMPLES)
+                .map(|_| {
+                    walk += GAMMA2.sqrt() * normal();
+                    walk + sigma * normal()
+                })
+                .collect();
+            let (classical, robust) = both(&signal, 10, &tuning).unwrap();
+            Replicate {
+                name: format!("run{run}"),
+                axis: None,
+                samples: SAMPLES,
+                classical,
+                robust,
+                coverage: Vec::new(),
+                trend: f64::NAN,
+                mean: f64::NAN,
+            }
+        };
+        (0..count).map(recording).collect()
+    }
+
+    /// Sets, of so many, that are said to differ.
+    fn told(sets: u64, count: usize, spread: f64, estimator: Estimator) -> u32 {
+        let white = Process::White(White::new(1.0).unwrap());
+        let walk = Process::RandomWalk(RandomWalk::new(GAMMA2).unwrap());
+        let law = SamplingLaw::new(&Composite::new(vec![white, walk]), 10);
+        let differs = |seed: u64| {
+            let replicates = set(seed, count, spread);
+            let own = Spread::new(&replicates, estimator, &law, &tuning());
+            u32::from(p_value(&replicates, estimator, &own, &law, "accel").unwrap() <= LEVEL)
+        };
+        (0..sets).into_par_iter().map(differs).sum()
+    }
+
+    /// The level is 2.5 %: of 200 sets of alike replicates 5 ± 2.2, so no more than 13 (four deviations). A spread of 20 % in
+    /// sigma2, of which noise makes 4.4 % at the first scale (1024 degrees of freedom or fewer), is told in nearly all.
+    #[test]
+    fn alike_replicates_are_said_to_differ_as_rarely_as_promised() {
+        for (count, estimator) in [
+            (2, Estimator::Awv),
+            (3, Estimator::Awv),
+            (8, Estimator::Awv),
+            (3, Estimator::SrAwv),
+            (8, Estimator::DrAwv),
+        ] {
+            let told_wrongly = told(200, count, 0.0, estimator);
+            assert!(
+                told_wrongly <= 13,
+                "{count} {}: {told_wrongly} of 200",
+                estimator.name()
+            );
+        }
+        assert!(told(20, 8, 0.2, Estimator::Awv) >= 19 && told(20, 8, 0.2, Estimator::DrAwv) >= 18);
+    }
+
+    /// Four recordings of three axes, of which the last has 1.7 times the variance in each of them: of 40 sets 1 ± 1 is said to
+    /// differ, so no more than 5.
+    #[test]
+    fn axes_that_differ_are_not_recordings_that_differ() {
+        let white = Process::White(White::new(1.0).unwrap());
+        let walk = Process::RandomWalk(RandomWalk::new(GAMMA2).unwrap());
+        let law = SamplingLaw::new(&Composite::new(vec![white, walk]), 10);
+        let differs = |seed: u64| {
+            let of_axis = |axis: Axis| {
+                let variance = if axis == Axis::Z { 1.7 } else { 1.0 };
+                set(3 * seed + axis as u64, 4, 0.0)
+                    .into_iter()
+                    .map(move |replicate| Replicate {
+                        axis: Some(axis),
+                        classical: replicate.classical.iter().map(|nu| variance * nu).collect(),
+                        ..replicate
+                    })
+            };
+            let replicates: Vec<Replicate> = Axis::ALL.into_iter().flat_map(of_axis).collect();
+            let own = Spread::new(&replicates, Estimator::Awv, &law, &tuning());
+            u32::from(p_value(&replicates, Estimator::Awv, &own, &law, "accel").unwrap() <= LEVEL)
+        };
+        let told: u32 = (0..40).into_par_iter().map(differs).sum();
+        assert!(told <= 5, "{told} of 40");
+    }
+
+    #[test]
+    fn one_signal_cannot_differ() {
+        let law = SamplingLaw::new(
+            &Composite::new(vec![Process::White(White::new(1.0).unwrap())]),
+            10,
+        );
+        let one = set(1, 1, 0.0);
+        let own = Spread::new(&one, Estimator::Awv, &law, &tuning());
+        assert_eq!(p_value(&one, Estimator::Awv, &own, &law, "accel"), None);
+    }
+}
+
+#[cfg(test)]
+mod axes_tests {
+    use super::*;
+    use crate::rng::StreamKey;
+    use crate::wavelet::both;
+    use rand::RngExt;
+    use rand_distr::StandardNormal;
+
+    /// White noise of three axes, the second with so many times the variance of the others.
+    fn set(seed: u64, recordings: usize, factor: f64) -> Vec<Replicate> {
+        let recording = |k: usize| {
+            let (run, axis) = (k as u64, Axis::ALL[k % 3]);
+            let key = StreamKey {
+                seed,
+                scenario: "",
+                run,
+                source: "",
+                process: "",
+            };
+            let mut generator = key.generator();
+            let sigma = if axis == Axis::Y { factor.sqrt() } else { 1.0 };
+            let mut normal = || sigma * generator.sample::<f64, _>(StandardNormal);
+            let signal: Vec<f64> = (0..2048).map(|_| normal()).collect();
+            let (classical, robust) = both(&signal, 8, &Tuning::default()).unwrap();
+            let (name, trend) = (format!("run{}", k / 3), f64::NAN);
+            Replicate {
+                name,
+                axis: Some(axis),
+                samples: 2048,
+                classical,
+                robust,
+                coverage: Vec::new(),
+                trend,
+                mean: f64::NAN,
+            }
+        };
+        (0..3 * recordings).map(recording).collect()
+    }
+
+    /// By Bonferroni at most 2.5 % of sets of alike axes: of 100 at most 8 (2.5 and four standard deviations of 1.6), whatever the
+    /// number of recordings. Axes of which one has 1.4 times the variance (7 deviations of one recording's first scale, of
+    /// 1024 degrees: √(2·2/1024) = 0.0625 of 0.34) are told.
+    #[test]
+    fn axes_are_told_apart_where_they_differ() {
+        for (recordings, estimator) in [
+            (1, Estimator::Awv),
+            (2, Estimator::Awv),
+            (6, Estimator::DrAwv),
+        ] {
+            let told = |seed: &u64| {
+                axes_differ(&set(*seed, recordings, 1.0), estimator, &Tuning::default()).is_some()
+            };
+            let alarms = (0..100).filter(told).count();
+            assert!(alarms <= 8, "{recordings} {}: {alarms}", estimator.name());
+        }
+        for recordings in [1, 6] {
+            let found = axes_differ(&set(1, recordings, 1.4), Estimator::Awv, &Tuning::default())
+                .expect("told");
+            assert!(
+                (found.ratio - 1.4).abs() < 0.4 && found.largest == Axis::Y,
+                "{found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_incomplete_layout_says_nothing() {
+        let mut some = set(1, 2, 4.0);
+        some.pop();
+        assert_eq!(axes_differ(&some, Estimator::Awv, &Tuning::default()), None);
+    }
+}

@@ -7,7 +7,7 @@ use crate::formats::recordings::{self, ReadOptions, check_gravity, gravity_facto
 use crate::formats::table::{Column, Dictionary};
 use crate::formats::{FileError as Error, Place};
 use glam::DVec3;
-use nav_sim_navigation::fusion::gap::{LONGEST_S, bridged};
+use nav_sim_navigation::fusion::{LONGEST_GAP_S, bridged};
 use nav_sim_navigation::strapdown::MAX_ROTATION;
 use nav_sim_signal::imu::{Axis, Channel, ImuIncrement, Sensor};
 use nav_sim_signal::units::DEG;
@@ -159,10 +159,10 @@ impl Columns {
             let sample = self.sample(k, if is_hole { step } else { since_s }, t_s);
             let refuse =
                 |message: String| Error::contents(self.path.as_str(), self.lines[k], message);
-            if is_hole && since_s - step > LONGEST_S + 0.5 * step {
+            if is_hole && since_s - step > LONGEST_GAP_S + 0.5 * step {
                 let previous_s = self.t_s[k - 1];
                 let message = format!(
-                    "no samples from {previous_s} s to {t_s} s: {LONGEST_S} s can be bridged"
+                    "no samples from {previous_s} s to {t_s} s: {LONGEST_GAP_S} s can be bridged"
                 );
                 return Err(
                     refuse(message).advice("fuse the stretches before and after it one by one")

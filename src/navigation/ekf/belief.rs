@@ -15,13 +15,19 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use super::initial::InitialSettings;
-use super::states::FilterStates;
-use super::unknowns::{KINDS, Unknown, UnknownKind};
+use super::filter::{KINDS, Unknown, UnknownKind};
+use crate::frames::RollPitchYaw;
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Composite, Ladder, Model, Process, reduction};
-use crate::units::SettingError;
-use glam::DVec3;
+use crate::units::{
+    NonNegative, Positive, SettingError, exactly, require_non_negative, require_positive,
+};
+use glam::{DQuat, DVec3};
+use nalgebra::Matrix3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
 
 /// Most bias states an axis.
 const MAX_GROUPS: usize = 8;
@@ -402,6 +408,249 @@ impl AxisBelief {
     }
 }
 
+// How a noise model becomes states of the filter, and how people write that.
+
+/// Scale-factor error that the filter of 21 states expects (1): 300 ppm, that of KF-GINS's demonstration.
+const SCALE_SIGMA: f64 = 300e-6;
+
+/// How the noise model becomes states of the filter. Unknown constants (turn-on bias, scale factors) that are
+/// asked for beside it, and drifts (DR) of the model, add three states each to any of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "WrittenStates")]
+#[schemars(!try_from)]
+pub enum FilterStates {
+    /// 15 states: one first-order Gauss-Markov bias an axis, the reduction of the model.
+    #[default]
+    #[serde(rename = "15")]
+    Reduced15,
+    /// 21 states: those 15 and a constant scale factor of each axis of both sensors (300 ppm unless said).
+    #[serde(rename = "21")]
+    Reduced21,
+    /// One state for each AR1 and random walk of each axis.
+    #[serde(rename = "full")]
+    Full,
+}
+
+/// A word that is none of the filters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("expected \"15\", \"21\" or \"full\"")]
+pub struct UnknownStates;
+
+impl FilterStates {
+    /// All, the smallest first.
+    pub const ALL: [Self; 3] = [Self::Reduced15, Self::Reduced21, Self::Full];
+
+    /// As it is written: `15`, `21` or `full`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Reduced15 => "15",
+            Self::Reduced21 => "21",
+            Self::Full => "full",
+        }
+    }
+
+    /// Scale-factor error that the filter expects of both sensors where nothing else is said (1).
+    #[must_use]
+    pub const fn scale_sigma(self) -> f64 {
+        match self {
+            Self::Reduced21 => SCALE_SIGMA,
+            Self::Reduced15 | Self::Full => 0.0,
+        }
+    }
+
+    /// Whether the model's processes are reduced to one bias an axis.
+    #[must_use]
+    pub const fn is_reduced(self) -> bool {
+        !matches!(self, Self::Full)
+    }
+}
+
+impl fmt::Display for FilterStates {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for FilterStates {
+    type Err = UnknownStates;
+
+    fn from_str(text: &str) -> Result<Self, UnknownStates> {
+        Self::ALL
+            .into_iter()
+            .find(|states| states.name() == text)
+            .ok_or(UnknownStates)
+    }
+}
+
+/// In a file: a word, or a number for those that are one.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "\"15\", \"21\" or \"full\"")]
+enum WrittenStates {
+    Number(u64),
+    Word(String),
+}
+
+impl TryFrom<WrittenStates> for FilterStates {
+    type Error = UnknownStates;
+
+    fn try_from(written: WrittenStates) -> Result<Self, UnknownStates> {
+        match written {
+            WrittenStates::Number(number) => number.to_string().parse(),
+            WrittenStates::Word(word) => word.parse(),
+        }
+    }
+}
+
+// What the filter knows at the start, and how far the nominal start is drawn from the truth.
+
+/// Standard deviations of the initial state. The nominal start is drawn from them, so that the filter's
+/// own covariance is true at the first epoch. The defaults are a vehicle that has just been aligned with
+/// the help of GNSS: position and velocity as good as one fix of the paper's receiver, half a degree of
+/// roll and pitch (a consumer accelerometer's bias of 0.09 m/s² tilts a levelling by as much), two
+/// degrees of heading. Biases and scale factors are not drawn from here: those of the true IMU are its own.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct InitialSettings {
+    /// Position north, east, down (m).
+    #[schemars(with = "[Positive; 3]", inner(range(max = 1e5)))]
+    #[serde(deserialize_with = "exactly")]
+    pub pos_sigma_m: [f64; 3],
+    /// Velocity north, east, down (m/s).
+    #[schemars(with = "[Positive; 3]", inner(range(max = 1000.0)))]
+    #[serde(deserialize_with = "exactly")]
+    pub vel_sigma_m_s: [f64; 3],
+    /// Roll, pitch, yaw (degrees).
+    #[schemars(with = "[Positive; 3]", inner(range(max = 30.0)))]
+    #[serde(deserialize_with = "exactly")]
+    pub att_sigma_deg: [f64; 3],
+    /// Turn-on bias of the accelerometers that the filter expects beside the model's processes (m/s²): an
+    /// unknown constant, one state an axis; without it, none.
+    #[schemars(with = "Option<NonNegative>", range(max = 10.0))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accel_bias_sigma_m_s2: Option<f64>,
+    /// Turn-on bias of the gyroscopes that the filter expects beside the model's processes (rad/s): an unknown
+    /// constant, one state an axis; without it, none.
+    #[schemars(with = "Option<NonNegative>", range(max = 1.0))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gyro_bias_sigma_rad_s: Option<f64>,
+    /// Scale-factor error of the accelerometers that the filter expects (parts per million): an unknown
+    /// constant, one state an axis; without it, 300 in the filter of 21 states and none in the others.
+    #[schemars(with = "Option<NonNegative>", range(max = 1e5))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accel_scale_sigma_ppm: Option<f64>,
+    /// Scale-factor error of the gyroscopes that the filter expects (parts per million), as that of the
+    /// accelerometers.
+    #[schemars(with = "Option<NonNegative>", range(max = 1e5))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gyro_scale_sigma_ppm: Option<f64>,
+    /// Start exactly at the truth; the filter's covariance stays as given above.
+    pub perfect: bool,
+}
+
+impl Default for InitialSettings {
+    fn default() -> Self {
+        Self {
+            pos_sigma_m: [2.0, 2.0, 4.0],
+            vel_sigma_m_s: [0.04, 0.04, 0.06],
+            att_sigma_deg: [0.5, 0.5, 2.0],
+            accel_bias_sigma_m_s2: None,
+            gyro_bias_sigma_rad_s: None,
+            accel_scale_sigma_ppm: None,
+            gyro_scale_sigma_ppm: None,
+            perfect: false,
+        }
+    }
+}
+
+impl InitialSettings {
+    /// The turn-on bias that the filter expects of a sensor (m/s² or rad/s).
+    #[must_use]
+    pub const fn bias_sigma(&self, sensor: Sensor) -> Option<f64> {
+        match sensor {
+            Sensor::Accel => self.accel_bias_sigma_m_s2,
+            Sensor::Gyro => self.gyro_bias_sigma_rad_s,
+        }
+    }
+
+    /// The scale-factor error that the filter expects of a sensor (parts per million).
+    #[must_use]
+    pub const fn scale_sigma_ppm(&self, sensor: Sensor) -> Option<f64> {
+        match sensor {
+            Sensor::Accel => self.accel_scale_sigma_ppm,
+            Sensor::Gyro => self.gyro_scale_sigma_ppm,
+        }
+    }
+
+    /// The key of [`Self::bias_sigma`].
+    #[must_use]
+    pub const fn bias_key(sensor: Sensor) -> &'static str {
+        match sensor {
+            Sensor::Accel => "accel_bias_sigma_m_s2",
+            Sensor::Gyro => "gyro_bias_sigma_rad_s",
+        }
+    }
+
+    /// The key of [`Self::scale_sigma_ppm`].
+    #[must_use]
+    pub const fn scale_key(sensor: Sensor) -> &'static str {
+        match sensor {
+            Sensor::Accel => "accel_scale_sigma_ppm",
+            Sensor::Gyro => "gyro_scale_sigma_ppm",
+        }
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first key whose value is refused.
+    pub fn validate(&self) -> Result<(), SettingError> {
+        require_positive("pos_sigma_m", &self.pos_sigma_m)?;
+        require_positive("vel_sigma_m_s", &self.vel_sigma_m_s)?;
+        require_positive("att_sigma_deg", &self.att_sigma_deg)?;
+        // At 30° the sine is 5 % off the angle and the cosine 13 % off 1: beyond, a linear filter is a
+        // different problem.
+        if let Some(large) = self.att_sigma_deg.iter().find(|s| **s > 30.0) {
+            let requirement = "the error-state filter is linear: at most 30 degrees";
+            return Err(SettingError::new("att_sigma_deg", large, requirement));
+        }
+        for sensor in Sensor::ALL {
+            let (key, sigma) = (Self::bias_key(sensor), self.bias_sigma(sensor));
+            let limit = if sensor == Sensor::Accel { 10.0 } else { 1.0 };
+            require_non_negative(key, sigma.as_slice())?;
+            at_most(key, sigma.as_slice(), limit, sensor.unit())?;
+            let (key, ppm) = (Self::scale_key(sensor), self.scale_sigma_ppm(sensor));
+            require_non_negative(key, ppm.as_slice())?;
+            at_most(key, ppm.as_slice(), 1e5, "parts per million, a tenth")?;
+        }
+        at_most("pos_sigma_m", &self.pos_sigma_m, 1e5, "m")?;
+        at_most("vel_sigma_m_s", &self.vel_sigma_m_s, 1000.0, "m/s")
+    }
+}
+
+/// A deviation so large that the linear filter means nothing with it is a slip of unit.
+fn at_most(key: &str, sigmas: &[f64], limit: f64, unit: &str) -> Result<(), SettingError> {
+    match sigmas.iter().find(|s| **s > limit) {
+        Some(large) => {
+            let requirement = format!("the error-state filter is linear: at most {limit} {unit}");
+            Err(SettingError::new(key, large, requirement))
+        }
+        None => Ok(()),
+    }
+}
+
+/// The rotation vector psi_n of small roll, pitch and yaw errors at an attitude: the inverse of
+/// [`RollPitchYaw::jacobian_of_psi_n`]. At pitch ±90° roll and yaw are not separate: the errors are then
+/// taken about the axes of n.
+#[must_use]
+pub(crate) fn psi_of_angles(q_b_n: DQuat) -> Matrix3<f64> {
+    // Inverted numerically: one formula for the Jacobian, in one place.
+    let j = RollPitchYaw::from_quat(q_b_n).jacobian_of_psi_n();
+    Matrix3::from_fn(|row, column| j[row][column])
+        .try_inverse()
+        .unwrap_or_else(Matrix3::identity)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -457,5 +706,88 @@ mod tests {
 
     fn phi_squared(phi: f64) -> f64 {
         phi * phi
+    }
+}
+
+#[cfg(test)]
+mod states_tests {
+    use super::*;
+
+    #[test]
+    fn a_filter_is_read_as_it_is_written() {
+        for states in FilterStates::ALL {
+            assert_eq!(states.to_string().parse(), Ok(states));
+            assert_eq!(serde_json::to_value(states).unwrap(), states.name());
+            assert_eq!(
+                serde_json::from_value::<FilterStates>(states.name().into()).unwrap(),
+                states
+            );
+        }
+        assert_eq!(
+            serde_json::from_str::<FilterStates>("21").unwrap(),
+            FilterStates::Reduced21
+        );
+        assert!(
+            "16".parse::<FilterStates>().is_err()
+                && serde_json::from_str::<FilterStates>("27").is_err()
+        );
+    }
+}
+
+#[cfg(test)]
+mod initial_tests {
+    use super::*;
+
+    #[test]
+    fn impossible_values_are_refused_by_key() {
+        let d = InitialSettings::default();
+        let cases = [
+            (
+                InitialSettings {
+                    pos_sigma_m: [0.0, 1.0, 1.0],
+                    ..d.clone()
+                },
+                "pos_sigma_m",
+            ),
+            (
+                InitialSettings {
+                    vel_sigma_m_s: [1.0, -1.0, 1.0],
+                    ..d.clone()
+                },
+                "vel_sigma_m_s",
+            ),
+            (
+                InitialSettings {
+                    att_sigma_deg: [1.0, 1.0, 90.0],
+                    ..d.clone()
+                },
+                "att_sigma_deg",
+            ),
+            (
+                InitialSettings {
+                    gyro_bias_sigma_rad_s: Some(-1.0),
+                    ..d.clone()
+                },
+                "gyro_bias_sigma_rad_s",
+            ),
+            (
+                InitialSettings {
+                    gyro_scale_sigma_ppm: Some(2e5),
+                    ..d.clone()
+                },
+                "gyro_scale_sigma_ppm",
+            ),
+            (
+                InitialSettings {
+                    accel_scale_sigma_ppm: Some(-1.0),
+                    ..d.clone()
+                },
+                "accel_scale_sigma_ppm",
+            ),
+        ];
+        for (settings, key) in cases {
+            assert_eq!(settings.validate().unwrap_err().key, key);
+        }
+        assert_eq!(d.validate(), Ok(()));
     }
 }

@@ -8,11 +8,13 @@
 //! biases the upper triangle repeats it, so that a column can be read as a row.
 
 use super::belief::{Belief, BiasGroup, MAX_BLOCKS};
-use super::dynamics::{ErrorMap, NavError};
-use super::unknowns::Regressor;
+use super::filter::{Ekf, Regressor};
+use crate::earth::{E2, OMEGA_IE, gravity_down, radii};
 use crate::imu::Sensor;
 use crate::lanes::{LANES, Lanes, Mat3, Real, Vec3, Wide};
+use crate::strapdown::{StepTrace, Strapdown};
 use glam::DVec3;
+use nalgebra::DMatrix;
 use std::ops::Range;
 
 /// Position error block (m, n).
@@ -373,7 +375,7 @@ impl Covariance {
 
 /// The first nine lanes of a row as a navigation error.
 #[inline(always)]
-pub(super) fn load_error<W: Wide>(row: &[Lanes]) -> NavError<W> {
+fn load_error<W: Wide>(row: &[Lanes]) -> NavError<W> {
     let row = &row[..NAV];
     [
         load_triple(&row[..3]),
@@ -383,7 +385,7 @@ pub(super) fn load_error<W: Wide>(row: &[Lanes]) -> NavError<W> {
 }
 
 #[inline(always)]
-pub(super) fn store_error<W: Wide>(row: &mut [Lanes], x: &NavError<W>) {
+fn store_error<W: Wide>(row: &mut [Lanes], x: &NavError<W>) {
     let row = &mut row[..NAV];
     for k in 0..NAV {
         x[k / 3][k % 3].store(&mut row[k]);
@@ -411,7 +413,7 @@ fn sum_triples<W: Wide>(row: &[Lanes]) -> Vec3<W> {
 
 /// The errors of the sample of each sensor in the row of a state behind the navigation's.
 #[inline(always)]
-pub(super) fn row_errors<W: Wide>(row: &[Lanes], sources: &Sources<'_>) -> [Vec3<W>; 2] {
+fn row_errors<W: Wide>(row: &[Lanes], sources: &Sources<'_>) -> [Vec3<W>; 2] {
     let (accel, rest) = row.split_at(3 * sources.biases[0]);
     let (gyro, rest) = rest.split_at(3 * sources.biases[1]);
     let [of_accel, of_gyro] = sources.regressors;
@@ -433,5 +435,361 @@ fn add_products<W: Wide>(mut sum: Vec3<W>, row: &[Lanes], regressors: &[Regresso
     sum
 }
 
+// First-order dynamics of the error state, in blocks.
+//
+// Two maps compose one step. [`Sample`] holds what changes with every IMU sample: the rotation of the
+// biases into n and the specific force. `EarthTerms` holds what the Earth contributes: transport and
+// Earth rate, Coriolis, gravity gradient, the errors of the transport rate. The latter change slowly and
+// are below 1e-4 /s, so they are applied in steps of up to `EARTH_STEP_S` (the splitting is of second
+// order: 1e-5 relative in a standard deviation over an outage, tested against the matrix exponential).
+//
+// [Groves](crate::bibliography::Groves13), sec. 14.2.4, with position in metres: delta r_n =
+// ((R_N + h) δlat, (R_E + h) cos lat δlon, −δh), whose dynamics are derived in closed form.
+
+/// Longest step of the Earth terms (s).
+pub(crate) const EARTH_STEP_S: f64 = 0.2;
+
+/// A navigation error: triples [`R`], [`V`] and [`PSI`].
+pub(crate) type NavError<L> = [Vec3<L>; 3];
+
+/// A linear map of the navigation error, given the errors of the accelerometer and gyroscope biases.
+pub(crate) trait ErrorMap<L> {
+    /// The error after the map.
+    #[must_use]
+    fn apply(&self, x: NavError<L>, accel: Vec3<L>, gyro: Vec3<L>) -> NavError<L>;
+}
+
+/// The part of the transition that changes with every sample. Errors of the sample's biases are those of
+/// the estimates: b_est − b.
+#[derive(Debug, Clone, Copy)]
+pub struct Sample<L> {
+    /// C_b_n · dt (s).
+    c_dt: Mat3<L>,
+    /// ½ ∫ f_ib_n dt (m/s).
+    half_f_dt: Vec3<L>,
+    half_dt: L,
+}
+
+impl<L: Real> Sample<L> {
+    /// From what the strapdown passed through.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) fn new(trace: &StepTrace<L>, dt: f64) -> Self {
+        Self {
+            c_dt: trace.c_b_n.scaled(L::from(dt)),
+            half_f_dt: trace.dv_n * L::from(0.5),
+            half_dt: L::from(0.5 * dt),
+        }
+    }
+
+    /// C diag(variances) Cᵀ dt²: the noise of one sample of a sensor, in n.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) fn rotated_noise(&self, variances: DVec3) -> Mat3<L> {
+        let z = L::from(0.0);
+        let mut noise = Mat3([[z; 3]; 3]);
+        // C Cᵀ = I: equal axes need no rotation, and the mean attitude's missing cos(θ/2) does not enter
+        // either.
+        if variances.x == variances.y && variances.x == variances.z {
+            for i in 0..3 {
+                noise.0[i][i] = self.half_dt * self.half_dt * (4.0 * variances.x);
+            }
+            return noise;
+        }
+        for i in 0..3 {
+            let row = self.c_dt.0[i];
+            let scaled = Vec3([
+                row[0] * variances.x,
+                row[1] * variances.y,
+                row[2] * variances.z,
+            ]);
+            for j in 0..3 {
+                noise.0[i][j] = scaled.dot(Vec3(self.c_dt.0[j]));
+            }
+        }
+        noise
+    }
+
+    /// The gyroscope noise of a sample tilts the specific force of the same sample: column j of what that adds to
+    /// the covariance of V and PSI, −½ \[f_n dt ×\] q_psi.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) fn tilted_noise(&self, q_psi: &Mat3<L>, j: usize) -> Vec3<L> {
+        Vec3([q_psi.0[0][j], q_psi.0[1][j], q_psi.0[2][j]]).cross(self.half_f_dt)
+    }
+}
+
+impl<L: Real> ErrorMap<L> for Sample<L> {
+    /// Attitude first, velocity with its mean, position with the mean velocity: the second-order terms of
+    /// the matrix exponential come with it.
+    #[inline(always)]
+    fn apply(&self, x: NavError<L>, accel: Vec3<L>, gyro: Vec3<L>) -> NavError<L> {
+        // psi_n turns C_true into C_est; a bias estimated too large is taken off too much, hence the minus
+        // signs.
+        let psi = x[PSI] - self.c_dt * gyro;
+        // ½ (psi before + psi after) × f dt: a gyroscope bias reaches v with dt²/2, exactly; r below with
+        // dt³/4 instead of dt³/6.
+        let v = x[V] + (x[PSI] + psi).cross(self.half_f_dt) - self.c_dt * accel;
+        let r = (x[V] + v).mul_add(self.half_dt, x[R]);
+        [r, v, psi]
+    }
+}
+
+/// The blocks of F that the rotating, curved, heavy Earth contributes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct EarthTerms<L> {
+    /// ∂(dr/dt)/∂r (1/s).
+    pub rr: Mat3<L>,
+    /// ∂(dv/dt)/∂r (1/s²).
+    pub vr: Mat3<L>,
+    /// ∂(dv/dt)/∂v (1/s).
+    pub vv: Mat3<L>,
+    /// ∂(dpsi/dt)/∂r (rad/(m s)).
+    pub psi_r: Mat3<L>,
+    /// ∂(dpsi/dt)/∂v (rad/m).
+    pub psi_v: Mat3<L>,
+    /// ∂(dpsi/dt)/∂psi (1/s).
+    pub psi_psi: Mat3<L>,
+}
+
+impl<L: Real> EarthTerms<L> {
+    /// At the nominal state.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) fn at(ins: &Strapdown<L>) -> Self {
+        let (z, one) = (L::from(0.0), L::from(1.0));
+        let (s, c) = ins.lat.sin_cos();
+        let radii = radii(s);
+        let (rn, re) = (radii.meridian + ins.h, radii.transverse + ins.h);
+        let [vn, ve, vd] = ins.v_n.0;
+        let tan = s / c;
+        let (wn, we) = (vn / rn, ve / re); // dlat/dt, cos(lat) dlon/dt
+        // dR/dlat of both radii: 3 e² R_N s c/(1 − e² s²) and e² R_E s c/(1 − e² s²)
+        let w2 = s * s * -E2 + 1.0;
+        let drn = radii.meridian * s * c * (3.0 * E2) / w2;
+        let dre = radii.transverse * s * c * E2 / w2;
+
+        // d/dt of (R_N + h) δlat: the slope of R_N cancels between the factor and δlat. East, the slope of
+        // (R_E + h) cos lat by latitude is −(R_N + h) sin lat: hence no derivative of a radius in this block.
+        let rr = Mat3([
+            [-(vd / rn), z, wn],
+            [we * tan, -(wn * tan * rn / re) - vd / re, we],
+            [z, z, z],
+        ]);
+        // For r in metres: ∂/∂lat · 1/rn per metre north, −∂/∂h per metre down.
+        let omega_ie = Vec3([c * OMEGA_IE, z, s * -OMEGA_IE]);
+        let omega_en = Vec3([we, -wn, -(we * tan)]);
+        // omega_ie_n is (cos, 0, −sin)·omega_ie; its derivative by latitude, per metre north.
+        let d_ie_north = Vec3([s * -OMEGA_IE, z, c * -OMEGA_IE]) * (one / rn);
+        let east = -(we * dre / re);
+        let d_en_north =
+            Vec3([east, wn * drn / rn, -(east * tan) - we * (tan * tan + 1.0)]) * (one / rn);
+        let d_en_down = Vec3([we / re, -(wn / rn), -(we * tan / re)]);
+        // omega_en_n is linear in the velocity: this is the matrix itself.
+        let d_en_v = Mat3([[z, one / re, z], [-(one / rn), z, z], [z, -(tan / re), z]]);
+
+        let coriolis = omega_ie + omega_ie + omega_en;
+        let mut v_north = -(d_ie_north + d_ie_north + d_en_north).cross(ins.v_n);
+        let mut v_down = -d_en_down.cross(ins.v_n);
+        let (g_north, g_down) = gravity_gradient(ins, s, c);
+        // Gravity by latitude is 8e-9 m/s² a metre; by height 3.1e-6 /s², what makes the vertical channel
+        // unstable (570 s).
+        v_north[2] += g_north / rn;
+        v_down[2] += g_down;
+        // ∂(−(2 w_ie + w_en) × v)/∂v = −[w×] + [v×] ∂w_en/∂v
+        let vv = Mat3::skew(ins.v_n) * d_en_v - Mat3::skew(coriolis);
+        // dpsi/dt = −w_in × psi − δw_in
+        let (psi_north, psi_down) = (-(d_ie_north + d_en_north), -d_en_down);
+        Self {
+            rr,
+            vr: columns(v_north, v_down),
+            vv,
+            psi_r: columns(psi_north, psi_down),
+            psi_v: d_en_v.scaled(L::from(-1.0)),
+            psi_psi: Mat3::skew(-(omega_ie + omega_en)),
+        }
+    }
+}
+
+/// The Earth terms over a time step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct EarthStep<L> {
+    /// The terms.
+    pub terms: EarthTerms<L>,
+    /// How long they act (s).
+    pub dt: f64,
+}
+
+impl<L: Real> ErrorMap<L> for EarthStep<L> {
+    #[inline(always)]
+    fn apply(&self, x: NavError<L>, _accel: Vec3<L>, _gyro: Vec3<L>) -> NavError<L> {
+        let (t, dt) = (&self.terms, L::from(self.dt));
+        [
+            // I + F dt: the next term, F² dt²/2, is (1e-4 · 0.2)²/2 = 2e-10.
+            (t.rr * x[R]).mul_add(dt, x[R]),
+            (t.vr * x[R] + t.vv * x[V]).mul_add(dt, x[V]),
+            (t.psi_r * x[R] + t.psi_v * x[V] + t.psi_psi * x[PSI]).mul_add(dt, x[PSI]),
+        ]
+    }
+}
+
+/// The matrix with the given north and down columns; nothing depends on longitude.
+#[inline(always)]
+fn columns<L: Real>(north: Vec3<L>, down: Vec3<L>) -> Mat3<L> {
+    let z = L::from(0.0);
+    Mat3([
+        [north[0], z, down[0]],
+        [north[1], z, down[1]],
+        [north[2], z, down[2]],
+    ])
+}
+
+/// (∂g/∂lat, ∂g/∂(down)) of the down component, by differences of the model itself: the step is exact
+/// enough (second order, 1e-9 relative) and follows whatever gravity model is in use.
+#[inline(always)]
+fn gravity_gradient<L: Real>(ins: &Strapdown<L>, s: L, c: L) -> (L, L) {
+    // The rounding of g over this step, 1e-15/1e-5, is 1e-9 of the derivative, its truncation less. In height
+    // the series is quadratic, and a central difference exact for any step.
+    const STEP_RAD: f64 = 1e-5;
+    const STEP_M: f64 = 100.0;
+    let (model, h) = (ins.gravity(), ins.h);
+    let north = gravity_down(model, s + c * STEP_RAD, h) - gravity_down(model, s - c * STEP_RAD, h);
+    let down = gravity_down(model, s, h + -STEP_M) - gravity_down(model, s, h + STEP_M);
+    (north * (0.5 / STEP_RAD), down * (0.5 / STEP_M))
+}
+
+// The transition of the error state from one instant to a later one, dense: what a smoother goes back by. The
+// filter itself never needs it.
+
+/// The product of the maps of all steps since the beginning, as columns. The lanes of the filter are one run, the
+/// same in all of them, so that each of them can carry a column of its own.
+#[derive(Debug, Clone)]
+pub(super) struct Transition {
+    dim: usize,
+    /// Eight columns after eight columns, each a vector of states.
+    columns: Vec<Lanes>,
+}
+
+impl Transition {
+    fn identity(dim: usize) -> Self {
+        let mut columns = vec![Lanes::ZERO; dim.div_ceil(LANES) * dim];
+        for j in 0..dim {
+            columns[j / LANES * dim + j][j % LANES] = 1.0;
+        }
+        Self { dim, columns }
+    }
+
+    /// The map after those before: of every column as [`Covariance::step`](super::Covariance) has it of its own.
+    #[inline(always)]
+    pub(super) fn step<W: Wide>(&mut self, map: &impl ErrorMap<W>, sources: &Sources<'_>) {
+        for column in self.columns.chunks_exact_mut(self.dim) {
+            let (nav, rest) = column.split_at_mut(NAV);
+            for (i, state) in rest.iter_mut().enumerate() {
+                // In the order of the filter: biases take their step, then the map uses them.
+                (W::load(state) * sources.steps[i / 3].phi[i % 3]).store(state);
+            }
+            let [accel, gyro] = row_errors(rest, sources);
+            store_error(nav, &map.apply(load_error(nav), accel, gyro));
+        }
+    }
+
+    fn matrix(&self) -> DMatrix<f64> {
+        DMatrix::from_fn(self.dim, self.dim, |i, j| {
+            self.columns[j / LANES * self.dim + i][j % LANES]
+        })
+    }
+}
+
+impl Ekf {
+    /// From now on the transition is kept. All lanes must be the same run.
+    pub(crate) fn keep_transition(&mut self) {
+        super::settle(self);
+        self.transition = Some(Transition::identity(self.p.dim()));
+    }
+
+    /// The transition since this was last called, or since [`keep_transition`](Self::keep_transition), to be called
+    /// when the filter is settled; the identity where none is kept.
+    pub(crate) fn take_transition(&mut self) -> DMatrix<f64> {
+        let fresh = Transition::identity(self.p.dim());
+        self.transition
+            .replace(fresh)
+            .unwrap_or_else(|| Transition::identity(self.p.dim()))
+            .matrix()
+    }
+}
+
 #[cfg(test)]
-mod tests;
+#[path = "covariance_tests.rs"]
+mod covariance_tests;
+
+#[cfg(test)]
+mod transition_tests {
+    use super::*;
+    use crate::earth::GravityModel;
+    use crate::ekf::tests::{gauss_markov_model, manoeuvre, predict};
+    use crate::ekf::{Belief, FilterStates, InitialSettings, UnknownKind, settle};
+    use crate::frames::NavState;
+    use crate::imu::Sensor;
+    use crate::strapdown::Strapdown;
+    use glam::{DQuat, DVec3};
+
+    /// A covariance as large as this one, with correlations all over.
+    fn correlated(p: &DMatrix<f64>) -> DMatrix<f64> {
+        let n = p.nrows();
+        let mixed = DMatrix::from_fn(n, n, |i, j| ((i * 7 + j * 3) % 11) as f64 / 11.0 - 0.4);
+        let sigma = DMatrix::from_diagonal(&p.diagonal().map(f64::sqrt));
+        &sigma * (&mixed * mixed.transpose() + DMatrix::identity(n, n)) * &sigma
+    }
+
+    /// Two covariances that go through the same steps differ by Phi (P₁ − P₂) Phiᵀ, whatever noise is added to both:
+    /// in every block, with turn-on biases, drifts and scale factors.
+    #[test]
+    fn the_transition_is_that_of_the_covariance() {
+        let turn_on = InitialSettings {
+            gyro_bias_sigma_rad_s: Some(1e-3),
+            ..InitialSettings::default()
+        };
+        let mut belief = Belief::new(&gauss_markov_model(), FilterStates::Reduced21, 1.0, 800.0)
+            .unwrap()
+            .with_initial(&turn_on);
+        belief.set_unknown(
+            Sensor::Accel,
+            UnknownKind::Drift,
+            DVec3::new(1e-6, 2e-6, 3e-6),
+        );
+        let start = NavState {
+            lat: 0.8,
+            lon: 0.1,
+            h: 400.0,
+            v_n: DVec3::new(150.0, -50.0, 0.5),
+            q_b_n: DQuat::from_scaled_axis(DVec3::new(0.05, -0.1, 1.0)),
+        };
+        let nominal = Strapdown::new(&start, GravityModel::Wgs84);
+        let mut filters =
+            [0, 1].map(|_| Ekf::new(nominal, &belief, &start, &InitialSettings::default()));
+        let correlated = correlated(&filters[0].p.lane(0));
+        filters[0].p.set_lane(0, &correlated);
+        filters.iter_mut().for_each(Ekf::keep_transition);
+        let before = filters[0].p.lane(0) - filters[1].p.lane(0);
+        for filter in &mut filters {
+            for k in 0..137 {
+                let (omega, f) = manoeuvre(f64::from(k) * 0.01);
+                predict(filter, omega, f);
+            }
+            settle(filter);
+        }
+        let phi = filters.each_mut().map(Ekf::take_transition);
+        assert_eq!(phi[0], phi[1]);
+        let [p, q] = filters.each_ref().map(|filter| filter.p.lane(0));
+        let (found, expected) = (&p - &q, &phi[0] * before * phi[0].transpose());
+        assert_eq!(found.nrows(), 27);
+        for (i, j) in (0..27).flat_map(|i| (0..27).map(move |j| (i, j))) {
+            let scale = ((p[(i, i)] + q[(i, i)]) * (p[(j, j)] + q[(j, j)])).sqrt();
+            assert!(
+                (found[(i, j)] - expected[(i, j)]).abs() <= 1e-12 * scale,
+                "({i}, {j})"
+            );
+        }
+        assert_eq!(filters[0].take_transition(), DMatrix::identity(27, 27));
+    }
+}

@@ -1,19 +1,17 @@
 //! The filter itself: nominal state, bias estimates and covariance of eight runs.
 
-use super::belief::{Belief, BiasGroup};
-use super::covariance::{BIAS, Covariance, PSI, R, Sources, V};
-use super::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, Sample};
-use super::initial::{InitialSettings, psi_of_angles};
-use super::transition::Transition;
-use super::unknowns::{Regressor, UnknownKind};
+use super::belief::{Belief, BiasGroup, InitialSettings, psi_of_angles};
+use super::covariance::{
+    BIAS, Covariance, EARTH_STEP_S, EarthStep, EarthTerms, PSI, R, Sample, Sources, Transition, V,
+};
 use super::update::FixUpdate;
 use crate::frames::NavState;
 use crate::imu::{ImuSample, Sensor};
-use crate::lanes::{Kernel, Lanes, Level, Mat3, Vec3, Wide, dispatch};
+use crate::lanes::{Kernel, Lanes, Level, Mat3, Real, Vec3, Wide, dispatch};
 use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::DVec3;
-use nalgebra::Matrix3;
+use nalgebra::{DMatrix, DVector, Matrix3};
 
 /// Error-state extended Kalman filter, closed loop.
 #[derive(Debug, Clone)]
@@ -36,7 +34,7 @@ pub struct Ekf {
     /// Samples of the belief's rate since the start.
     age: f64,
     /// Time since the Earth terms were last applied (s).
-    pub(super) earth_age: f64,
+    earth_age: f64,
     /// Angular rate of the last sample less its bias (rad/s), for the lever arm's velocity.
     pub(super) omega_ib_b: Vec3,
     /// The transition since it was last looked at, where a smoother needs it.
@@ -382,5 +380,195 @@ impl Kernel for Advance<'_> {
             self.ekf.predict(&mut ins, omega_ib_b, f_ib_b);
         }
         self.ekf.nominal.store(&ins);
+    }
+}
+
+// One run of the filter at an instant, to be returned to.
+
+/// Nominal state and estimates of the first lane, without their covariance.
+#[derive(Debug, Clone)]
+pub(crate) struct Snapshot {
+    nominal: NavState,
+    /// Estimates of biases and unknowns, then what the unknowns are multiplied by.
+    triples: Vec<DVec3>,
+}
+
+impl Ekf {
+    /// The first lane as it is.
+    pub(crate) fn snapshot(&self) -> Snapshot {
+        // The regressors too: the bias of a drift is slope times the age of the sample, and that is of the
+        // past here.
+        let regressors = self.regressors.iter().flatten().map(|r| &r.value);
+        let triples = self
+            .estimates
+            .iter()
+            .chain(regressors)
+            .map(|triple| triple.lane(0))
+            .collect();
+        Snapshot {
+            nominal: self.nominal.lane(0),
+            triples,
+        }
+    }
+
+    /// Sets the first lane to a snapshot less an estimated error, whose covariance is `p`. The other lanes, and what the
+    /// next sample needs of the ones before, are left as they are: the filter is then to be looked at only.
+    pub(crate) fn show(&mut self, snapshot: &Snapshot, error: &DVector<f64>, p: &DMatrix<f64>) {
+        self.nominal.set_lane(0, &snapshot.nominal);
+        let regressors = self.regressors.iter_mut().flatten().map(|r| &mut r.value);
+        let triples = self.estimates.iter_mut().chain(regressors);
+        triples
+            .zip(&snapshot.triples)
+            .for_each(|(to, from)| to.set_lane(0, *from));
+        self.p.set_lane(0, p);
+        // `p` is that of the snapshot's instant: an age left over would add the Earth terms of another
+        // interval.
+        self.earth_age = 0.0;
+        for (to, from) in self.scratch.error.iter_mut().zip(error.iter()) {
+            *to = Lanes::ZERO;
+            // The other lanes get no correction: zero moves them nowhere.
+            to[0] = *from;
+        }
+        apply_correction(self);
+    }
+
+    /// What the last update took out of the state of the first lane.
+    pub(crate) fn correction(&self) -> DVector<f64> {
+        DVector::from_iterator(
+            self.p.dim(),
+            self.scratch.error.iter().map(|error| error[0]),
+        )
+    }
+}
+
+/// Takes the estimated errors out of the state and the estimates of all lanes.
+pub(super) fn apply_correction(ekf: &mut Ekf) {
+    dispatch(ekf.level, Correct(ekf));
+}
+
+struct Correct<'a>(&'a mut Ekf);
+
+impl Kernel for Correct<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        let ins = self.0.nominal.load::<W>();
+        self.0.correct(ins);
+    }
+}
+
+// Unknown constants of a sensor that act on its samples multiplied by something known: the regressor. The
+// error of a sample is their product, axis by axis; a bias is the case whose regressor is 1.
+
+/// What the constant is, and so what it is multiplied by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum UnknownKind {
+    /// The slope of a drift (units per sample of the model), times the samples since the filter's start: a
+    /// known magnitude of unknown sign has the same second moments as a normal slope of that deviation.
+    Drift,
+    /// A scale-factor error (1), times the sample itself: f_ib_b or omega_ib_b.
+    ScaleFactor,
+}
+
+/// An unknown constant on each axis of a sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unknown {
+    /// Its kind.
+    pub kind: UnknownKind,
+    /// Its standard deviations on the three axes (units per sample, or 1).
+    pub sigma: DVec3,
+}
+
+/// What an unknown constant is multiplied by in the last sample.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Regressor {
+    pub(super) kind: UnknownKind,
+    pub(super) value: Vec3,
+}
+
+impl Regressor {
+    /// The regressor of an unknown before the first sample: zero.
+    pub(super) const fn of(unknown: &Unknown) -> Self {
+        Self {
+            kind: unknown.kind,
+            value: Vec3::ZERO,
+        }
+    }
+}
+
+/// Most kinds of unknowns of a sensor.
+pub(super) const KINDS: usize = 2;
+
+/// A block of three states and what each of them is multiplied by.
+type Term = (usize, Vec3);
+
+impl Ekf {
+    /// The bias estimate of a sensor (m/s² or rad/s): the sum of its groups and its drift.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) fn bias_of<W: Wide>(&self, sensor: Sensor) -> Vec3<W> {
+        let mut sum = self.bias_sum::<W>(sensor);
+        if let Some((block, factor)) = self.drift_term(sensor) {
+            let (slope, age) = (self.estimates[block - BIAS].load::<W>(), factor.load::<W>());
+            for axis in 0..3 {
+                sum[axis] = slope[axis].mul_add(age[axis], sum[axis]);
+            }
+        }
+        sum
+    }
+
+    /// Standard deviations of that estimate on the three axes (m/s² or rad/s).
+    #[must_use]
+    pub(crate) fn bias_sigma(&self, sensor: Sensor) -> Vec3 {
+        let sources = self.sources();
+        let [accel, gyro] = sources.biases;
+        let blocks = if sensor == Sensor::Accel {
+            0..accel
+        } else {
+            accel..accel + gyro
+        };
+        let one = Vec3::splat(DVec3::ONE);
+        let groups = blocks.map(move |g| (BIAS + g, one));
+        self.deviation(groups.chain(self.drift_term(sensor)))
+    }
+
+    /// Standard deviations of the estimated scale-factor error of a sensor (1); none where the filter has no state for it.
+    #[must_use]
+    pub fn scale_sigma(&self, sensor: Sensor) -> Option<Vec3> {
+        let block = self.unknown_block(sensor, UnknownKind::ScaleFactor)?;
+        Some(self.deviation(std::iter::once((block, Vec3::splat(DVec3::ONE)))))
+    }
+
+    /// The block of an unknown of a sensor, if there is one.
+    fn unknown_block(&self, sensor: Sensor, kind: UnknownKind) -> Option<usize> {
+        let sources = self.sources();
+        let u = sources.regressors[sensor as usize]
+            .iter()
+            .position(|r| r.kind == kind)?;
+        Some(BIAS + sources.unknowns(sensor) + u)
+    }
+
+    /// The slope of a sensor's drift and the age of the last sample.
+    fn drift_term(&self, sensor: Sensor) -> Option<Term> {
+        let drift = self.sources().regressors[sensor as usize]
+            .iter()
+            .find(|r| r.kind == UnknownKind::Drift)?;
+        Some((self.unknown_block(sensor, UnknownKind::Drift)?, drift.value))
+    }
+
+    /// Standard deviations of the sum of the terms on the three axes.
+    fn deviation(&self, terms: impl Iterator<Item = Term> + Clone) -> Vec3 {
+        let variance = |axis: usize| {
+            // Var(Σ c_a x_a) with all covariances: after some fixes the groups of an axis are strongly
+            // anti-correlated (the sum is observed, not its parts), and a sum of variances would be too large
+            // many times over.
+            let pairs = terms
+                .clone()
+                .flat_map(|a| terms.clone().map(move |b| (a, b)));
+            pairs.fold(Lanes::ZERO, |sum, ((a, of_a), (b, of_b))| {
+                sum + self.p.get::<Lanes>(3 * a + axis, 3 * b + axis) * of_a[axis] * of_b[axis]
+            })
+        };
+        Vec3([0, 1, 2].map(|axis| variance(axis).sqrt()))
     }
 }

@@ -5,33 +5,20 @@
 //!
 //! The filter never sees truth: it is given increments, fixes, and what it believes of the noise.
 
-mod aiding;
 pub mod belief;
 pub mod covariance;
-pub mod dynamics;
 pub mod filter;
-pub mod gate;
-pub mod initial;
-mod iterated;
-mod snapshot;
-pub mod states;
-mod transition;
-pub mod unknowns;
 pub mod update;
 
-pub(crate) use aiding::{
-    BodyVelocity, body_velocity_rows, dense_yaw_row, update_body_velocity, update_yaw,
-};
-pub use belief::{Belief, BeliefError};
+pub use belief::{Belief, BeliefError, FilterStates, InitialSettings};
 pub use covariance::Covariance;
-pub use filter::{Ekf, advance, settle};
-pub(crate) use gate::{nis_limit, update_within};
-pub use initial::InitialSettings;
-pub(crate) use snapshot::Snapshot;
-pub use states::FilterStates;
-pub use unknowns::{Unknown, UnknownKind};
+pub(crate) use filter::Snapshot;
+pub use filter::{Ekf, Unknown, UnknownKind, advance, settle};
+pub(crate) use update::{
+    BodyVelocity, body_velocity_rows, dense_yaw_row, fix_rows, nis_limit, update_body_velocity,
+    update_height, update_within, update_yaw,
+};
 pub use update::{Fix, FixUpdate, update};
-pub(crate) use update::{fix_rows, update_height};
 
 #[cfg(test)]
 mod tests;

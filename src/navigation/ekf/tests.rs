@@ -3,8 +3,7 @@
 
 mod measurements;
 
-use super::covariance::{PSI, R, V};
-use super::dynamics::{EarthStep, EarthTerms, ErrorMap, Sample};
+use super::covariance::{EarthStep, EarthTerms, ErrorMap, PSI, R, Sample, V};
 use super::{Belief, Ekf, FilterStates, Fix, InitialSettings, advance, settle, update};
 use crate::earth::{self, GravityModel};
 use crate::frames::NavState;

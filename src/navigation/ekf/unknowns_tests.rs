@@ -2,8 +2,7 @@
 //! against dense matrices.
 
 use super::belief::BiasGroup;
-use super::covariance::{PSI, V};
-use super::dynamics::EarthTerms;
+use super::covariance::{EarthTerms, PSI, V};
 use super::tests::{
     Matrix15, continuous_f, continuous_q, error_of, fix_at_nominal, gauss_markov_model, generator,
     manoeuvre, predict, random_case,

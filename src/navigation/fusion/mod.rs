@@ -46,33 +46,22 @@
 //! ```
 
 pub mod alignment;
-mod assessment;
 mod clocks;
-mod correlation;
 mod displaced;
-mod error;
-mod filter;
-pub mod gap;
 pub mod mounting;
-mod origin;
 mod outcome;
 mod run;
-mod smoother;
-pub mod standstill;
 mod vehicle;
 #[cfg(test)]
 mod vehicle_tests;
 
-pub use assessment::{Assessment, Confidence, Finding, assess};
-pub use clocks::{ClocksApart, clocks_apart};
-pub use correlation::{Correlation, Weighed, Whiteness, fuse_correlated};
-pub use displaced::{Displaced, displaced};
-pub use error::FusionError;
-pub use origin::{earlier, rest_of_origin, rough_origin};
+pub use clocks::{ClocksApart, clocks_apart, earlier, rest_of_origin, rough_origin};
+pub use displaced::{Correlation, Displaced, Weighed, Whiteness, displaced, fuse_correlated};
 pub use outcome::{
-    Drift, Ends, FromReference, OutageDrift, Outcome, SmoothedOutage, SmoothedOutcome, outcome,
+    Assessment, Confidence, Drift, Ends, Finding, FromReference, FusionError, OutageDrift, Outcome,
+    SmoothedOutage, SmoothedOutcome, assess, outcome,
 };
-pub use run::fuse;
+pub use run::{LONGEST_GAP_S, bridged, fuse};
 pub use vehicle::{
     AidInnovations, AidRecord, VehicleVelocity, WheelSpeed, aid_innovations, vehicle_velocities,
     wheel_ratio,

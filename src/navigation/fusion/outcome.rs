@@ -1,9 +1,12 @@
 //! Figures of a fusion: fixes used, consistency, errors at the ends of outages. They serialize as `summary.json` has them.
 
-use super::correlation::middle;
-use super::{Confidence, FixRecord, Nine, Row, RowError, Solution, Use};
-use crate::metrics::PerState;
+use super::displaced::middle;
+use super::{
+    AidInnovations, FixRecord, Nine, Row, RowError, Solution, Use, Weighed, aid_innovations,
+};
+use crate::metrics::{PerState, VerdictKind};
 use crate::sensors::outage::Outage;
+use crate::simulation::REPORTED_NAMES;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -77,7 +80,7 @@ pub struct FromReference {
     /// Mean NEES.
     pub nees_mean: f64,
     /// What it is if both are right.
-    pub nees_dof: usize,
+    nees_dof: usize,
     /// How well the velocity of the reference is known, which the NEES allows for: root mean square (m/s).
     pub velocity_sigma_m_s: f64,
 }
@@ -268,5 +271,649 @@ fn drift(solution: &Solution, outage: Outage) -> OutageDrift {
         followed_by_fix: after.is_some(),
         end_from_fix,
         end_from_reference,
+    }
+}
+
+// Worth of a solution: by its own innovations, and by a reference where there is one.
+
+/// NIS per component that is doubtful, and that is too large: innovations 1.4 times and twice as large as stated.
+/// Receivers state their standard deviations to a factor like that; right solutions of real drives have a NIS below
+/// 1.5, most of them far below 1.
+const NIS_LIMITS: (f64, f64) = (2.0, 4.0);
+/// NIS per component below which the fixes do not tell: their standard deviations are too large.
+const NIS_LOW: f64 = 0.5;
+/// Components of which the mean NIS of a right filter stays below the first limit.
+const FEWEST: usize = 50;
+/// Stretch in which the NIS is looked at by itself (s), and the share of bad ones that is too much.
+const STRETCH_S: f64 = 60.0;
+const BAD_STRETCHES: f64 = 0.1;
+/// Share of rejected fixes that is doubtful, and that is too much.
+const REJECTED: (f64, f64) = (0.1, 0.5);
+/// How improbable errors at the ends of outages are doubtful, and how many times the stated ones, then, are too much.
+const ENDS: (f64, f64) = (1e-3, 2.0);
+/// Root mean square of error over standard deviation, of all states together, that is not right: below and above.
+/// A drive in which no error ever changes shows nine of them once: chi-square is below 9/4 once in 76 such drives, above
+/// 81/4 once in 61.
+const ALL_STATES: (f64, f64) = (0.5, 1.5);
+/// The same of one state by itself: one of nine that never change is three standard deviations off once in 41 drives.
+const ONE_STATE: f64 = 3.0;
+
+/// Evidence on a solution.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(tag = "evidence", rename_all = "snake_case")]
+pub enum Finding {
+    /// No fix was used.
+    NoFix,
+    /// The fixes of the minute after the start contradict it, and every other that was tried.
+    Start {
+        /// Their NIS divided by the number of components.
+        nis_per_component: f64,
+    },
+    /// The fixes do not tell whether the vehicle goes forwards or backwards: forwards is taken.
+    Direction,
+    /// Axes of the IMU that are hardly front, right, down.
+    NotLevel {
+        /// Roll at the start (degrees).
+        roll_deg: f64,
+        /// Pitch (degrees).
+        pitch_deg: f64,
+    },
+    /// Errors of the fixes that last.
+    Correlated {
+        /// Autocorrelation of the innovations of position from one fix to the next.
+        lag_1: f64,
+        /// How many times the stated standard deviation of position the filter believes.
+        pos_sigma_factor: f64,
+    },
+    /// Mean NIS of the fixes used.
+    Nis {
+        /// Divided by the number of components: 1 if right.
+        per_component: f64,
+    },
+    /// Minutes in which most fixes are too far from the solution.
+    Minutes {
+        /// How many of them.
+        bad: usize,
+        /// All minutes with fixes.
+        of: usize,
+        /// Beginning of the worst (s).
+        worst_s: f64,
+        /// NIS per component of the nearest nine tenths of its fixes.
+        nis_per_component: f64,
+    },
+    /// Mean NIS of what the vehicle knows.
+    Aid {
+        /// As [`super::AidInnovations`] has it.
+        aid: &'static str,
+        /// Divided by the number of components: 1 if right.
+        nis_per_component: f64,
+    },
+    /// Fixes rejected by the gate.
+    Rejected {
+        /// How many of them.
+        rejected: usize,
+        /// Those used and rejected.
+        of: usize,
+    },
+    /// Errors at the ends of outages and gaps.
+    Ends(Ends),
+    /// Errors against the reference.
+    Reference(Confidence),
+}
+
+/// VerdictKind and evidence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assessment {
+    /// The gravest of the findings.
+    pub verdict: VerdictKind,
+    /// What was found, the gravest first.
+    pub findings: Vec<(VerdictKind, Finding)>,
+}
+
+/// Standard deviations against the errors by a reference.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Confidence {
+    /// Whether they are as large.
+    pub verdict: VerdictKind,
+    /// Root mean square of error over standard deviation, of all states together.
+    pub error_over_sigma: f64,
+    /// State that is farthest off in the direction of the verdict; of a right one, that with the largest errors.
+    pub worst_state: &'static str,
+    /// Root mean square of error over standard deviation of this state.
+    pub worst_error_over_sigma: f64,
+}
+
+impl FromReference {
+    /// Whether the errors are as large as stated.
+    #[must_use]
+    pub fn confidence(&self) -> Confidence {
+        let all = (self.nees_mean / self.nees_dof as f64).sqrt();
+        let states = || REPORTED_NAMES.into_iter().zip(self.error_over_sigma.0);
+        let by_size = |a: &(&str, f64), b: &(&str, f64)| a.1.total_cmp(&b.1);
+        let largest = states().max_by(by_size).unwrap_or_default();
+        let (verdict, worst) = if all > ALL_STATES.1 || largest.1 > ONE_STATE {
+            (VerdictKind::Overconfident, largest)
+        } else if all < ALL_STATES.0 && largest.1 < 1.0 {
+            (
+                VerdictKind::Underconfident,
+                states().min_by(by_size).unwrap_or_default(),
+            )
+        } else {
+            (VerdictKind::Consistent, largest)
+        };
+        Confidence {
+            verdict,
+            error_over_sigma: all,
+            worst_state: worst.0,
+            worst_error_over_sigma: worst.1,
+        }
+    }
+}
+
+/// The largest mean NIS per component that is `limit` or chance: five standard deviations of the mean of
+/// chi-squares.
+fn bound(limit: f64, components: usize) -> f64 {
+    limit.max(1.0 + 5.0 * (2.0 / components.max(1) as f64).sqrt())
+}
+
+/// Mean NIS per component above which a solution is overconfident.
+pub(super) fn nis_bound(components: usize) -> f64 {
+    bound(NIS_LIMITS.1, components)
+}
+
+/// Judges a solution: its fixes with standard deviations as stated, its errors as believed. `of_start` is what speaks
+/// against the start, as the alignment found it.
+#[must_use]
+pub fn assess(
+    weighed: &Weighed,
+    outcome: &Outcome,
+    of_start: &[(VerdictKind, Finding)],
+) -> Assessment {
+    let mut findings = of_start.to_vec();
+    let of_fixes = weighed.judged();
+    let correlated = correlated(weighed);
+    findings.push(match (nis(of_fixes), correlated) {
+        // errors that last make small innovations of right standard deviations
+        ((VerdictKind::Undecided, Finding::Nis { .. }), Some(correlated)) => correlated,
+        (nis, _) => nis,
+    });
+    findings.extend(correlated.filter(|found| !findings.contains(found)));
+    findings.extend(stretches(of_fixes));
+    findings.extend(aids(of_fixes));
+    findings.extend(rejected(outcome));
+    findings.extend(ends_finding(outcome));
+    if let Some(reference) = outcome.reference {
+        // the reference tells what fixes do not
+        let is_told = |finding: &Finding| matches!(finding, Finding::Correlated { .. });
+        findings
+            .retain(|(verdict, finding)| *verdict != VerdictKind::Undecided && !is_told(finding));
+        let confidence = reference.confidence();
+        findings.push((confidence.verdict, Finding::Reference(confidence)));
+    }
+    findings.sort_by_key(|(verdict, _)| std::cmp::Reverse(*verdict));
+    let verdict = findings
+        .first()
+        .map_or(VerdictKind::Consistent, |(verdict, _)| *verdict);
+    Assessment { verdict, findings }
+}
+
+/// Whether the fixes contradict a solution.
+pub(super) fn is_contradicted(solution: &Solution, of_start: &[(VerdictKind, Finding)]) -> bool {
+    let found = [Some(nis(solution)), stretches(solution)];
+    of_start
+        .iter()
+        .chain(found.iter().flatten())
+        .any(|(verdict, _)| *verdict == VerdictKind::Overconfident)
+}
+
+/// Errors that last: with standard deviations as stated, those of the position are too small.
+fn correlated(weighed: &Weighed) -> Option<(VerdictKind, Finding)> {
+    let lag_1 = weighed
+        .whiteness
+        .filter(super::Whiteness::is_correlated)?
+        .lag_1;
+    let pos_sigma_factor = weighed.pos_sigma_factor;
+    let verdict = if pos_sigma_factor > 1.0 {
+        VerdictKind::Undecided
+    } else {
+        VerdictKind::Doubtful
+    };
+    Some((
+        verdict,
+        Finding::Correlated {
+            lag_1,
+            pos_sigma_factor,
+        },
+    ))
+}
+
+fn used(solution: &Solution) -> impl Iterator<Item = &FixRecord> {
+    solution.fixes.iter().filter(|f| f.used == Use::Used)
+}
+
+fn nis(solution: &Solution) -> (VerdictKind, Finding) {
+    let components: usize = used(solution).map(|f| f.innovation.len()).sum();
+    let per_component = nis_per_component(solution);
+    let verdict = match per_component {
+        _ if components == 0 => return (VerdictKind::Doubtful, Finding::NoFix),
+        nis if nis > nis_bound(components) => VerdictKind::Overconfident,
+        nis if nis > bound(NIS_LIMITS.0, components) => VerdictKind::Doubtful,
+        nis if nis < NIS_LOW || components < FEWEST => VerdictKind::Undecided,
+        _ => VerdictKind::Consistent,
+    };
+    (verdict, Finding::Nis { per_component })
+}
+
+/// Aids that are farther from the solution than stated.
+fn aids(solution: &Solution) -> impl Iterator<Item = (VerdictKind, Finding)> {
+    let is_far = |w: &AidInnovations| w.nis_per_component > NIS_LIMITS.0.max(w.nis_band.upper);
+    aid_innovations(&solution.aids)
+        .into_iter()
+        .filter(is_far)
+        .map(
+            |AidInnovations {
+                 aid,
+                 nis_per_component,
+                 ..
+             }| {
+                (
+                    VerdictKind::Doubtful,
+                    Finding::Aid {
+                        aid,
+                        nis_per_component,
+                    },
+                )
+            },
+        )
+}
+
+/// Minutes in which most fixes are far from what is stated. The farthest tenth of them is left out: single
+/// wild fixes are the receiver's.
+fn stretches(solution: &Solution) -> Option<(VerdictKind, Finding)> {
+    let begin_s = used(solution).next()?.t_s;
+    let mut minutes: Vec<Vec<&FixRecord>> = Vec::new();
+    for fix in used(solution) {
+        let minute = ((fix.t_s - begin_s) / STRETCH_S) as usize;
+        minutes.resize(minutes.len().max(minute + 1), Vec::new());
+        minutes[minute].push(fix);
+    }
+    let of = minutes.iter().filter(|m| !m.is_empty()).count();
+    let bad: Vec<(usize, f64)> = minutes
+        .iter()
+        .enumerate()
+        .filter_map(|(k, fixes)| Some((k, far(fixes)?)))
+        .collect();
+    let (worst, nis_per_component) = *bad.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let is_much = bad.len() as f64 > BAD_STRETCHES * of as f64;
+    let verdict = if is_much {
+        VerdictKind::Overconfident
+    } else {
+        VerdictKind::Doubtful
+    };
+    let worst_s = begin_s + STRETCH_S * worst as f64;
+    Some((
+        verdict,
+        Finding::Minutes {
+            bad: bad.len(),
+            of,
+            worst_s,
+            nis_per_component,
+        },
+    ))
+}
+
+/// Mean NIS per component of the nearest nine tenths of these fixes, where it is too large.
+fn far(fixes: &[&FixRecord]) -> Option<f64> {
+    let mut sorted: Vec<(f64, usize)> = fixes.iter().map(|f| (f.nis, f.innovation.len())).collect();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let kept = &sorted[..sorted.len() * 9 / 10];
+    let components: usize = kept.iter().map(|(_, n)| n).sum();
+    let nis = kept.iter().map(|(nis, _)| nis).sum::<f64>() / components.max(1) as f64;
+    (components > 0 && nis > nis_bound(components)).then_some(nis)
+}
+
+fn rejected(outcome: &Outcome) -> Option<(VerdictKind, Finding)> {
+    let [used, _, rejected] = outcome.fixes;
+    let of = used + rejected;
+    let share = rejected as f64 / of.max(1) as f64;
+    let verdict = match share {
+        share if share > REJECTED.1 => VerdictKind::Overconfident,
+        // three of a short recording are no share
+        share if share > REJECTED.0 && rejected > 3 => VerdictKind::Doubtful,
+        _ => return None,
+    };
+    Some((verdict, Finding::Rejected { rejected, of }))
+}
+
+/// Errors at the ends of outages and gaps that are not as stated.
+fn ends_finding(outcome: &Outcome) -> Option<(VerdictKind, Finding)> {
+    let ends = outcome.ends.filter(|ends| ends.p_value < ENDS.0)?;
+    let is_much = ends.error_over_sigma > ENDS.1;
+    let verdict = if is_much {
+        VerdictKind::Overconfident
+    } else {
+        VerdictKind::Doubtful
+    };
+    Some((verdict, Finding::Ends(ends)))
+}
+
+// Recorded data that cannot be fused.
+
+/// Recorded data that cannot be fused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FusionError {
+    /// The clocks have nothing in common.
+    #[error("the clocks do not overlap: IMU {} to {} s, GNSS {} to {} s", .imu.0, .imu.1, .gnss.0, .gnss.1)]
+    Clocks {
+        /// First and last sample (s).
+        imu: (f64, f64),
+        /// First and last fix (s).
+        gnss: (f64, f64),
+    },
+    /// It begins after the data end, or before they begin.
+    #[error("the start at {t_s:.2} s is not within the IMU's {} to {} s", .imu.0, .imu.1)]
+    Start {
+        /// The start (s).
+        t_s: f64,
+        /// First and last sample (s).
+        imu: (f64, f64),
+    },
+    /// The initial position is not where the fixes are.
+    #[error(
+        "the initial position is {metres:.0} m from the fix at {t_s:.2} s, with a standard deviation of {sigma_m:.1} m"
+    )]
+    Place {
+        /// The first fix after the start (s).
+        t_s: f64,
+        /// How far (m).
+        metres: f64,
+        /// Horizontal standard deviation of both (m).
+        sigma_m: f64,
+    },
+    /// Latitude and longitude lose their meaning.
+    #[error("latitude {lat_deg:.3}° at {t_s:.2} s is beyond ±89.9°")]
+    Pole {
+        /// When (s).
+        t_s: f64,
+        /// Where (degrees).
+        lat_deg: f64,
+    },
+    /// What a smoother would have to keep.
+    #[error("the smoother would take {:.1} GB for {marks} rows and fixes of {states} states, 2 GB at most", bytes / 1e9)]
+    Memory {
+        /// How much (bytes).
+        bytes: f64,
+        /// Rows and fixes.
+        marks: f64,
+        /// States of the filter.
+        states: usize,
+    },
+    /// State or covariance stopped being finite.
+    #[error("the filter diverged at {t_s:.2} s")]
+    Diverged {
+        /// When (s).
+        t_s: f64,
+    },
+}
+
+/// Seconds of a GNSS week.
+const WEEK_S: f64 = 604_800.0;
+
+impl FusionError {
+    /// How late the fixes are by their clock, where that is why nothing overlaps (s): whole weeks, or what makes both
+    /// recordings begin in the same second.
+    #[must_use]
+    pub fn delay_s(&self) -> Option<f64> {
+        let Self::Clocks { imu, gnss } = self else {
+            return None;
+        };
+        let apart_s = gnss.0 - imu.0;
+        let overlap = |delay_s: &f64| gnss.0 - delay_s <= imu.1 && imu.0 <= gnss.1 - delay_s;
+        [WEEK_S, 1.0]
+            .map(|step| (apart_s / step).round() * step)
+            .into_iter()
+            .find(overlap)
+    }
+}
+
+#[cfg(test)]
+mod assessment_tests {
+    use super::*;
+    use crate::fusion::outcome;
+    use crate::metrics::PerState;
+    use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+    /// A fix a second of three components with this NIS per component.
+    fn solution(nis: impl Fn(usize) -> f64, seconds: usize) -> Solution {
+        let fix = |k: usize| FixRecord {
+            t_s: k as f64,
+            used: Use::Used,
+            innovation: vec![0.0; 3],
+            sigma: vec![1.0; 3],
+            nis: 3.0 * nis(k),
+            horizontal_nis: 2.0 * nis(k),
+            horizontal_sigma_m: 1.0,
+            error: None,
+        };
+        Solution {
+            fixes: (0..seconds).map(fix).collect(),
+            ..Solution::default()
+        }
+    }
+
+    fn judged(solution: &Solution) -> Assessment {
+        assess(&weighed(solution), &outcome(solution, &[]), &[])
+    }
+
+    fn weighed(solution: &Solution) -> Weighed {
+        Weighed {
+            solution: solution.clone(),
+            as_stated: None,
+            whiteness: crate::fusion::Whiteness::of(&solution.fixes),
+            pos_sigma_factor: 1.0,
+            gnss: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn the_nis_tells_what_is_consistent_too_large_and_untold() {
+        let verdict = |nis: f64| judged(&solution(|_| nis, 600)).verdict;
+        assert_eq!([0.6, 1.0, 1.6].map(verdict), [VerdictKind::Consistent; 3]);
+        assert_eq!(
+            [0.3, 2.5, 5.0].map(verdict),
+            [
+                VerdictKind::Undecided,
+                VerdictKind::Doubtful,
+                VerdictKind::Overconfident
+            ]
+        );
+        assert_eq!(
+            judged(&solution(|_| 1.0, 10)).verdict,
+            VerdictKind::Undecided
+        );
+    }
+
+    /// Bad minutes count although the mean over the drive hides them; one wild fix is no bad minute.
+    #[test]
+    fn bad_minutes_count_and_wild_fixes_do_not() {
+        let bad = |minutes: usize| {
+            judged(&solution(
+                move |k| if k < 60 * minutes { 9.0 } else { 0.3 },
+                1800,
+            ))
+        };
+        assert_eq!(bad(1).verdict, VerdictKind::Doubtful);
+        assert!(
+            matches!(
+                bad(1).findings[0].1,
+                Finding::Minutes { bad: 1, of: 30, .. }
+            ),
+            "{:?}",
+            bad(1)
+        );
+        assert_eq!(bad(4).verdict, VerdictKind::Overconfident);
+        assert_eq!(
+            judged(&solution(|k| if k == 77 { 200.0 } else { 0.5 }, 600)).verdict,
+            VerdictKind::Consistent
+        );
+    }
+
+    #[test]
+    fn a_solution_that_rejects_its_fixes_is_not_believed() {
+        let mut all = solution(|_| 1.0, 600);
+        all.fixes[..90]
+            .iter_mut()
+            .for_each(|f| f.used = Use::Rejected);
+        assert_eq!(judged(&all).verdict, VerdictKind::Doubtful);
+        all.fixes[..400]
+            .iter_mut()
+            .for_each(|f| f.used = Use::Rejected);
+        assert_eq!(judged(&all).verdict, VerdictKind::Overconfident);
+    }
+
+    /// Nine outages of ends 1.8 times as far as stated are doubtful, 2.5 times is too much, and 1.3 is chance: of chi-square
+    /// of 18 degrees 58, 113 and 30 are exceeded with probabilities of 4e-6, 1e-15 and 0.03.
+    #[test]
+    fn ends_of_outages_count() {
+        let verdict = |ratio: f64| {
+            let mut all = solution(|k| if k % 60 == 59 { ratio * ratio } else { 0.9 }, 600);
+            all.fixes
+                .retain(|f| f.t_s % 60.0 >= 59.0 || f.t_s % 60.0 < 30.0);
+            let outcome = outcome(&all, &[]);
+            assert_eq!(outcome.ends.unwrap().count, 10);
+            assert!((outcome.ends.unwrap().error_over_sigma / ratio - 1.0).abs() < 1e-12);
+            assess(&weighed(&all), &outcome, &[])
+                .findings
+                .into_iter()
+                .find(|(_, f)| matches!(f, Finding::Ends(_)))
+        };
+        assert_eq!(
+            [1.3, 1.8, 2.5].map(|ratio| verdict(ratio).map(|(kind, _)| kind)),
+            [
+                None,
+                Some(VerdictKind::Doubtful),
+                Some(VerdictKind::Overconfident)
+            ]
+        );
+    }
+
+    /// Innovations of position whose neighbours are alike: what is small is then no sign of large standard deviations, and
+    /// is not called consistent.
+    #[test]
+    fn errors_that_last_are_told() {
+        let mut all = solution(|_| 0.3, 600);
+        for (k, fix) in all.fixes.iter_mut().enumerate() {
+            fix.innovation = vec![if k % 40 < 20 { 0.5 } else { -0.5 }; 3];
+        }
+        let found = judged(&all);
+        let Finding::Correlated {
+            lag_1,
+            pos_sigma_factor,
+        } = found.findings[0].1
+        else {
+            panic!("{found:?}")
+        };
+        // of 599 pairs 29 are of either sign
+        assert!(
+            (lag_1 - (1.0 - 2.0 * 29.0 / 599.0)).abs() < 1e-12 && pos_sigma_factor == 1.0,
+            "{found:?}"
+        );
+        assert_eq!(found.verdict, VerdictKind::Doubtful);
+        assert!(
+            !found
+                .findings
+                .iter()
+                .any(|(kind, _)| *kind == VerdictKind::Undecided),
+            "{found:?}"
+        );
+        let answered = Weighed {
+            pos_sigma_factor: 4.3,
+            ..weighed(&all)
+        };
+        let found = assess(&answered, &outcome(&all, &[]), &[]);
+        assert_eq!(found.verdict, VerdictKind::Undecided);
+    }
+
+    /// The reference decides, also where the fixes do not tell.
+    #[test]
+    fn a_reference_decides_and_names_the_state_farthest_off() {
+        let all = solution(|_| 0.3, 600);
+        let judged = |over_sigma: [f64; 9], nees_mean: f64| {
+            let reference = FromReference {
+                rmse: PerState([1.0; 9]),
+                horizontal_rmse_m: 1.0,
+                horizontal_max_m: 1.0,
+                error_over_sigma: PerState(over_sigma),
+                nees_mean,
+                nees_dof: 9,
+                velocity_sigma_m_s: 0.0,
+            };
+            let assessment = assess(
+                &weighed(&all),
+                &Outcome {
+                    reference: Some(reference),
+                    ..outcome(&all, &[])
+                },
+                &[],
+            );
+            let Finding::Reference(confidence) = assessment.findings[0].1 else {
+                panic!("{assessment:?}")
+            };
+            (assessment.verdict, confidence.worst_state)
+        };
+        let with = |state: usize, value: f64| {
+            std::array::from_fn(|i| if i == state { value } else { 1.0 })
+        };
+        assert_eq!(
+            judged(with(8, 1.4), 9.0),
+            (VerdictKind::Consistent, "yaw_deg")
+        );
+        assert_eq!(
+            judged(with(8, 1.4), 9.0 * 1.6 * 1.6),
+            (VerdictKind::Overconfident, "yaw_deg")
+        );
+        assert_eq!(
+            judged(with(2, 3.1), 9.0),
+            (VerdictKind::Overconfident, "pos_d_m")
+        );
+        let all_small = |state: usize| std::array::from_fn(|i| if i == state { 0.1 } else { 0.4 });
+        assert_eq!(
+            judged(all_small(6), 9.0 * 0.16),
+            (VerdictKind::Underconfident, "roll_deg")
+        );
+        // of one state that is not small the word would be wrong
+        assert_eq!(judged(with(6, 0.1), 9.0 * 0.16).0, VerdictKind::Consistent);
+    }
+
+    /// Right standard deviations are called wrong by chance in fewer than 1 of 18 drives, however little errors change
+    /// within them.
+    #[test]
+    fn chance_is_no_verdict_by_a_reference() {
+        let (nine, one) = (ChiSquared::new(9.0).unwrap(), ChiSquared::new(1.0).unwrap());
+        let (below, above) = (
+            nine.cdf(9.0 * ALL_STATES.0.powi(2)),
+            nine.sf(9.0 * ALL_STATES.1.powi(2)),
+        );
+        let in_one = 9.0 * one.sf(ONE_STATE.powi(2));
+        assert!(
+            (1.0 / below).round() == 76.0 && (1.0 / above).round() == 61.0,
+            "{below} {above}"
+        );
+        assert!(
+            (1.0 / in_one).round() == 41.0 && below + above + in_one < 1.0 / 18.0,
+            "{in_one}"
+        );
+    }
+
+    /// What is as believed is doubted once in 500 at most, however few its fixes.
+    #[test]
+    fn chance_is_no_doubt() {
+        for components in [3, 6, 12, 30, 100, 1000] {
+            let n = f64::from(components);
+            let p = ChiSquared::new(n)
+                .unwrap()
+                .sf(n * bound(NIS_LIMITS.0, components as usize));
+            assert!(p < 2e-3, "{components}: {p}");
+        }
     }
 }

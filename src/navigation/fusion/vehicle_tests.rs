@@ -1,7 +1,7 @@
 //! Recordings with what the vehicle knows: wheel scale and mounting are found, drift falls as the covariance analysis
 //! says.
 
-use super::standstill::MISSES;
+use super::vehicle::MISSES;
 use super::{
     Recorded, Settings, Solution, Start, VehicleVelocity, WheelSpeed, aid_innovations, fuse,
     vehicle_velocities,

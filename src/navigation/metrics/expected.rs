@@ -1,9 +1,9 @@
 //! What a covariance analysis says: the figures that runs would scatter about, without a run.
 
-use super::epoch::{Accuracy, EpochMetrics};
-use super::estimate::{Estimate, PerState, Quantile};
-use super::outage::{OutageMetrics, Reconvergence, is_beyond_linear, within};
-use super::quadratic_form::QuadraticForm;
+use super::estimate::{Estimate, PerState, QuadraticForm, Quantile};
+use super::outage::{
+    Accuracy, EpochMetrics, OutageMetrics, Reconvergence, is_beyond_linear, within,
+};
 use super::summary::{
     AccuracySummary, Consistency, Coverage, Nis, OutageSummary, SCHEMA_VERSION, Summary,
 };

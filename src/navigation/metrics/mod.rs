@@ -13,35 +13,27 @@
 //! assert!((band.upper + 2.0 * 0.025_f64.ln()).abs() < 1e-9);
 //! ```
 
-mod agreement;
-mod budget;
-mod consistency;
-mod epoch;
 mod estimate;
 mod expected;
-mod fan;
 mod outage;
-mod quadratic_form;
 mod ratio;
-mod reduction;
-mod requirement;
 mod summary;
 mod verdict;
 
-pub use budget::Budget;
-pub use consistency::{Band, chi_square_band};
-pub use epoch::{Accuracy, EpochMetrics, epochs};
-pub use estimate::{Estimate, PerState, Quantile, SampleSize, quantile};
+pub use estimate::{
+    Band, Estimate, PerState, QuadraticForm, Quantile, SampleSize, chi_square_band, quantile,
+};
 pub use expected::{Expected, horizontal_quantiles};
-pub use fan::{FAN_LEVELS, FanEpoch, expected_fan, fan};
-pub use outage::{OutageMetrics, Reconvergence, outages};
-pub use quadratic_form::QuadraticForm;
+pub use outage::{
+    Accuracy, Budget, EpochMetrics, FAN_LEVELS, FanEpoch, OutageMetrics, Reconvergence, epochs,
+    expected_fan, fan, outages,
+};
 pub use ratio::{
     ComparisonError, EpochRow, Measured, OutageComparison, RatioError, StateRatio, compare,
 };
-pub use reduction::{AxisReduction, ReductionQuality, ReductionSummary, TOLERANCE};
-pub use requirement::{Met, Requirement, UnknownRequirement};
 pub use summary::{
-    AccuracySummary, Consistency, Coverage, Nis, OutageSummary, Recovery, Spread, Summary,
+    AccuracySummary, AxisReduction, Consistency, Coverage, Met, Nis, OutageSummary, Recovery,
+    ReductionQuality, ReductionSummary, Requirement, Spread, Summary, TOLERANCE,
+    UnknownRequirement,
 };
 pub use verdict::{ALL_STATES, OutageVerdict, StateName, Verdict, VerdictKind};

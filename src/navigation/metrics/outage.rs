@@ -1,11 +1,17 @@
 //! Statistics of one outage.
 
-use super::epoch::{Accuracy, EpochMetrics, epochs};
-use super::estimate::{Estimate, PerState, Quantile, quantile};
+use super::estimate::{
+    Estimate, PerState, Quantile, SampleSize, quantile, sample_quantile, serialize_named,
+};
+use super::expected::horizontal_quantiles;
 use crate::sensors::outage::Outage;
-use crate::simulation::{OutageRecord, REPORTED, RunResult};
+use crate::simulation::lincov::{FilterPass, Instant, Judged, NamedSource, TruthSide};
+use crate::simulation::{
+    BIASES, EpochSums, OutageRecord, REPORTED, RunRecord, RunResult, fan_epochs,
+};
 use crate::units::{DEG, STANDARD_GRAVITY};
-use serde::{Deserialize, Serialize};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize, Serializer};
 
 /// What the runs say about one outage (m, m/s, degrees, s).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -156,6 +162,262 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     values
 }
 
+// Statistics at one reporting epoch.
+
+/// What the runs say at one epoch (m, m/s, degrees).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EpochMetrics {
+    /// Time on the trajectory (s).
+    pub t_s: f64,
+    /// Whether a fix was used.
+    pub gnss: bool,
+    /// Runs behind the numbers.
+    pub count: u64,
+    /// Averaged standard estimation error: mean over runs of the filter's own standard deviation
+    /// ([Minaretzis et al.](crate::bibliography::Minaretzis24), Section V).
+    pub asee: PerState<Estimate>,
+    /// The same of each sensor's bias (m/s², rad/s).
+    pub bias_asee: [f64; BIASES],
+    /// Root mean square error.
+    pub rmse: PerState<Estimate>,
+    /// Mean error, estimate − truth.
+    pub bias: PerState<Estimate>,
+    /// Mean 3-D position error (m).
+    pub mean_pos_err_m: Estimate,
+    /// Mean attitude error (degrees).
+    pub mean_att_err_deg: Estimate,
+    /// Mean NEES of position, velocity and attitude.
+    pub nees: Estimate,
+    /// Share of runs inside the filter's ellipsoid at the coverage level.
+    pub coverage: f64,
+}
+
+impl EpochMetrics {
+    fn of(s: &EpochSums, windows: Option<f64>) -> Self {
+        let size = SampleSize::of(s.count, windows);
+        let mean = |sum, sum_sq| Estimate::mean(size, sum, sum_sq);
+        let per_state = |f: &dyn Fn(usize) -> Estimate| PerState(std::array::from_fn(f));
+        Self {
+            t_s: s.t_s,
+            gnss: s.gnss,
+            count: s.count,
+            asee: per_state(&|i| mean(s.see[i], s.see_sq[i])),
+            bias_asee: s.bias_see.map(|sum| sum / s.count as f64),
+            rmse: per_state(&|i| Estimate::root_mean_square(size, s.error_sq[i], s.error_4[i])),
+            bias: per_state(&|i| mean(s.error[i], s.error_sq[i])),
+            mean_pos_err_m: mean(s.pos_error[0], s.pos_error[1]),
+            mean_att_err_deg: mean(s.att_error[0], s.att_error[1]),
+            nees: mean(s.nees[0], s.nees[1]),
+            coverage: s.covered as f64 / s.count as f64,
+        }
+    }
+}
+
+/// Statistics of every epoch.
+#[must_use]
+pub fn epochs(result: &RunResult) -> Vec<EpochMetrics> {
+    result
+        .epochs
+        .iter()
+        .map(|sums| EpochMetrics::of(sums, result.independent_windows))
+        .collect()
+}
+
+/// ASEE and RMSE as means over epochs, the one beside the other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Accuracy {
+    /// Mean over the epochs of the ASEE.
+    pub asee_mean: PerState<Estimate>,
+    /// Mean over the epochs of the RMSE: like the ASEE a mean of standard deviations, so that their ratio is 1
+    /// for a right filter, however fast both grow.
+    pub rmse_mean: PerState<Estimate>,
+}
+
+impl Accuracy {
+    /// Over some epochs. The standard errors are upper bounds: as if all epochs erred together.
+    pub(crate) fn over<'a>(epochs: impl Iterator<Item = &'a EpochMetrics> + Clone) -> Self {
+        let n = epochs.clone().count() as f64;
+        let mean = |of: &dyn Fn(&EpochMetrics) -> Estimate| Estimate {
+            value: epochs.clone().map(|e| of(e).value).sum::<f64>() / n,
+            // The mean of the errors, not the root of the sum of their squares: epochs of a run are strongly
+            // correlated.
+            std_error: epochs.clone().map(|e| of(e).std_error).sum::<f64>() / n,
+        };
+        Self {
+            asee_mean: PerState(std::array::from_fn(|i| mean(&|e| e.asee.0[i]))),
+            rmse_mean: PerState(std::array::from_fn(|i| mean(&|e| e.rmse.0[i]))),
+        }
+    }
+}
+
+// Quantiles of the horizontal position error over time.
+
+/// Probabilities of the quantiles.
+pub const FAN_LEVELS: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
+
+/// The horizontal error at one instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FanEpoch {
+    /// Time on the trajectory (s).
+    pub t_s: f64,
+    /// Its quantiles at [`FAN_LEVELS`] (m): over the runs, or of a covariance analysis without runs.
+    pub quantiles_m: [f64; FAN_LEVELS.len()],
+    /// What covariance analysis expects of them, where it stands beside runs.
+    pub lincov_m: Option<[f64; FAN_LEVELS.len()]>,
+}
+
+/// Over the runs that did not diverge, at the times at which their errors were kept, and just before the first fix after
+/// each outage, where errors are largest: that row stands before the one after the fix, at the same time.
+#[must_use]
+pub fn fan(result: &RunResult) -> Vec<FanEpoch> {
+    // Runs after the hundred thousandth have no errors over time: they are left out at the ends as well, so
+    // that the band is of one set of runs.
+    let kept: Vec<&RunRecord> = result
+        .runs
+        .iter()
+        .filter(|run| !run.diverged && !run.horizontal_m.is_empty())
+        .collect();
+    let epoch = |t_s: f64, error: &dyn Fn(&RunRecord) -> f64| {
+        let mut errors: Vec<f64> = kept.iter().map(|run| error(run)).collect();
+        errors.sort_unstable_by(f64::total_cmp);
+        let quantiles_m = FAN_LEVELS.map(|p| sample_quantile(&errors, p));
+        FanEpoch {
+            t_s,
+            quantiles_m,
+            lincov_m: None,
+        }
+    };
+    let over_time = result.fan_t_s.par_iter().enumerate();
+    let over_time = over_time
+        .map(|(k, t_s)| epoch(*t_s, &|run| f64::from(run.horizontal_m[k])))
+        .collect();
+    let ends = result.outage_fix_t_s.iter().enumerate();
+    with_ends(
+        over_time,
+        ends.map(|(k, t_s)| epoch(*t_s, &|run| run.outages[k].horizontal_error_end_m)),
+    )
+}
+
+/// The quantiles of a filter's errors by covariance analysis, at the same times.
+#[must_use]
+pub fn expected_fan(
+    filter: &FilterPass<'_>,
+    truth: &TruthSide,
+    outages: &[Outage],
+) -> Vec<FanEpoch> {
+    let law = filter.errors(truth);
+    let times: Vec<f64> = law.reports.iter().map(|report| report.errors.t_s).collect();
+    let epoch = |instant: &Instant| {
+        let quantiles_m = horizontal_quantiles(instant, FAN_LEVELS);
+        FanEpoch {
+            t_s: instant.t_s,
+            quantiles_m,
+            lincov_m: None,
+        }
+    };
+    let over_time = fan_epochs(&times, outages)
+        .par_iter()
+        .map(|i| epoch(&law.reports[*i].errors))
+        .collect();
+    with_ends(
+        over_time,
+        law.outage_ends.iter().map(|end| epoch(&end.errors)),
+    )
+}
+
+/// Puts the ends of outages into their places in time, before what comes after the fix.
+fn with_ends(mut epochs: Vec<FanEpoch>, ends: impl Iterator<Item = FanEpoch>) -> Vec<FanEpoch> {
+    for end in ends {
+        // Strictly before: the end of an outage comes ahead of the report after the fix at the same time.
+        epochs.insert(epochs.partition_point(|epoch| epoch.t_s < end.t_s), end);
+    }
+    epochs
+}
+
+// Error budgets: which share of the mean square of the errors each of their sources has.
+
+/// Shares of independent sources in the mean square of each reported state; of a state they sum to 1. In files an
+/// object with the names of the sources as keys.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Budget {
+    /// Every source with its shares.
+    pub shares: Vec<(String, PerState<f64>)>,
+    /// Mean squares, all sources together (m², (m/s)², degrees²).
+    pub total: [f64; REPORTED],
+}
+
+impl Budget {
+    /// Just before the first fix after each outage: every source goes alone through the gains of one filter.
+    #[must_use]
+    pub fn at_outage_ends(filter: &FilterPass<'_>, sources: &[NamedSource]) -> Vec<Self> {
+        let squares = |source: &NamedSource| -> Vec<[f64; REPORTED]> {
+            // Mean squares, not variances: a deterministic source (drift) has a mean and no variance.
+            let squares = |end: &Judged| end.errors.variances(&end.errors.moments());
+            filter
+                .errors_at_ends(&source.side)
+                .iter()
+                .map(squares)
+                .collect()
+        };
+        let of_source: Vec<Vec<[f64; REPORTED]>> = sources.par_iter().map(squares).collect();
+        let is_there =
+            |ends: &[[f64; REPORTED]]| ends.iter().flatten().any(|square| *square != 0.0);
+        let (sources, of_source): (Vec<&NamedSource>, Vec<_>) = sources
+            .iter()
+            .zip(of_source)
+            .filter(|(_, ends)| is_there(ends))
+            .unzip();
+        let outages = of_source.first().map_or(0, Vec::len);
+        let budget = |k: usize| {
+            let mut total = [0.0; REPORTED];
+            for ends in &of_source {
+                total
+                    .iter_mut()
+                    .zip(&ends[k])
+                    .for_each(|(sum, square)| *sum += square);
+            }
+            let share = |ends: &Vec<[f64; REPORTED]>| {
+                PerState(std::array::from_fn(|i| ends[k][i] / total[i]))
+            };
+            let shares = sources
+                .iter()
+                .zip(&of_source)
+                .map(|(source, ends)| (source.name.clone(), share(ends)));
+            Self {
+                shares: shares.collect(),
+                total,
+            }
+        };
+        (0..outages).map(budget).collect()
+    }
+
+    /// Shares in the sum of the mean squares of some states (horizontal position: 0 and 1), the largest first.
+    #[must_use]
+    pub fn ranked(&self, states: &[usize]) -> Vec<(&str, f64)> {
+        let whole: f64 = states.iter().map(|i| self.total[*i]).sum();
+        let share = |of: &PerState<f64>| {
+            states
+                .iter()
+                .map(|i| of.0[*i] * self.total[*i])
+                .sum::<f64>()
+                / whole
+        };
+        let mut all: Vec<(&str, f64)> = self
+            .shares
+            .iter()
+            .map(|(name, of)| (name.as_str(), share(of)))
+            .collect();
+        all.sort_by(|a, b| b.1.total_cmp(&a.1));
+        all
+    }
+}
+
+impl Serialize for Budget {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serialize_named(&self.shares, serializer)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -249,5 +511,137 @@ mod tests {
         };
         let metrics = &outages(&result)[0];
         assert!(metrics.asee_mean.0[0].value.is_nan() && metrics.horizontal_max_m.is_nan());
+    }
+}
+
+#[cfg(test)]
+mod epoch_tests {
+    use super::*;
+    use crate::simulation::REPORTED;
+
+    /// Two runs of SEE 1 and 3, errors 1 and −7: ASEE is the mean 2 (not the root mean square √5), its standard
+    /// error √2/√2; RMSE √25, bias −3; NEES 8 and 12.
+    fn two_runs() -> EpochSums {
+        EpochSums {
+            count: 2,
+            see: [4.0; REPORTED],
+            see_sq: [10.0; REPORTED],
+            bias_see: [0.5; BIASES],
+            error: [-6.0; REPORTED],
+            error_sq: [50.0; REPORTED],
+            error_4: [2402.0; REPORTED],
+            nees: [20.0, 208.0],
+            covered: 1,
+            ..EpochSums::default()
+        }
+    }
+
+    #[test]
+    fn an_epoch_of_two_runs_in_closed_form() {
+        let e = EpochMetrics::of(&two_runs(), None);
+        assert_eq!(
+            (e.asee.0[3].value, e.rmse.0[3].value, e.bias.0[3].value),
+            (2.0, 5.0, -3.0)
+        );
+        assert!((e.asee.0[3].std_error - 1.0).abs() < 1e-15);
+        assert_eq!(e.bias_asee, [0.25; BIASES]);
+        // squares 1 and 49: standard deviation 24 √2, of their mean 24, of its root 24/(2·5)
+        assert!(
+            (e.rmse.0[3].std_error - 2.4).abs() < 1e-14,
+            "{:?}",
+            e.rmse.0[3]
+        );
+        assert_eq!(
+            (e.nees.value, e.nees.std_error, e.coverage),
+            (10.0, 2.0, 0.5)
+        );
+    }
+
+    #[test]
+    fn accuracy_is_the_mean_of_standard_deviations() {
+        let mut later = two_runs();
+        later.see = [12.0; REPORTED];
+        later.error_sq = [2.0 * 81.0; REPORTED];
+        let all = [
+            EpochMetrics::of(&two_runs(), None),
+            EpochMetrics::of(&later, None),
+        ];
+        let accuracy = Accuracy::over(all.iter());
+        assert_eq!(
+            (accuracy.asee_mean.0[0].value, accuracy.rmse_mean.0[8].value),
+            (4.0, 7.0)
+        );
+    }
+}
+
+#[cfg(test)]
+mod fan_tests {
+    use super::*;
+    use crate::simulation::OutageRecord;
+
+    /// Runs of the errors 0, 1, …, 20 m: the quantile at p is 20 p, and ten times that just before the fix at 4 s that ends an
+    /// outage. One that diverged is left out.
+    #[test]
+    fn quantiles_over_the_runs_that_are_left() {
+        let run = |run: u16, diverged| RunRecord {
+            run: u64::from(run),
+            diverged,
+            outages: vec![OutageRecord {
+                horizontal_error_end_m: 10.0 * f64::from(run),
+                ..OutageRecord::default()
+            }],
+            horizontal_m: vec![f32::from(run), 2.0 * f32::from(20 - run.min(20))],
+            ..RunRecord::default()
+        };
+        let runs = (0..=20)
+            .map(|k| run(k, false))
+            .chain([run(21, true)])
+            .collect();
+        let result = RunResult {
+            runs,
+            fan_t_s: vec![3.0, 4.0],
+            outage_fix_t_s: vec![4.0],
+            ..RunResult::default()
+        };
+        let fan = fan(&result);
+        assert_eq!(fan[0].quantiles_m, [1.0, 5.0, 10.0, 15.0, 19.0]);
+        assert_eq!(
+            (fan[1].t_s, fan[1].quantiles_m),
+            (4.0, [10.0, 50.0, 100.0, 150.0, 190.0])
+        );
+        assert_eq!(
+            (fan[2].t_s, fan[2].quantiles_m),
+            (4.0, [2.0, 10.0, 20.0, 30.0, 38.0])
+        );
+    }
+
+    #[test]
+    fn no_run_left_is_no_number() {
+        let result = RunResult {
+            fan_t_s: vec![0.0],
+            ..RunResult::default()
+        };
+        assert!(fan(&result)[0].quantiles_m.iter().all(|q| q.is_nan()));
+    }
+
+    /// A quarter of an hour by the third second, and on both sides of where fixes end and begin again.
+    #[test]
+    fn epochs_are_few_and_hold_the_ends_of_outages() {
+        let times: Vec<f64> = (0..=900).map(f64::from).collect();
+        let outage = Outage {
+            start_s: 301.0,
+            end_s: 389.5,
+        };
+        let kept = fan_epochs(&times, &[outage]);
+        assert!((301..=305).contains(&kept.len()), "{}", kept.len());
+        assert!(
+            [0, 300, 301, 389, 390, 900]
+                .iter()
+                .all(|t| kept.contains(t))
+                && !kept.contains(&302)
+        );
+        assert!(kept.is_sorted_by(|a, b| a < b));
+        assert_eq!(fan_epochs(&times[..400], &[]), (0..400).collect::<Vec<_>>());
+        assert!(fan_epochs(&[], &[]).is_empty());
     }
 }

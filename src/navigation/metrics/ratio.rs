@@ -1,9 +1,9 @@
 //! Ratios between two experiments on the same trajectory with the same outages: what the filter of one
 //! believes, relative to the other ([Minaretzis et al.](crate::bibliography::Minaretzis24), Table I).
 
-use super::epoch::{EpochMetrics, epochs};
 use super::estimate::{Estimate, PerState, SampleSize};
 use super::expected::Expected;
+use super::outage::{EpochMetrics, epochs};
 use super::verdict::Verdict;
 use crate::sensors::outage::Outage;
 use crate::simulation::{OutageRecord, REPORTED, RunRecord, RunResult};

@@ -10,8 +10,7 @@
 //! A filter that does not alarm is consistent only where the runs would have found errors that matter: 25 % above the
 //! filter's standard deviations in all states together, 50 % in one of them. Fewer runs leave it undecided.
 
-use super::consistency::chi_square_interval;
-use super::estimate::Estimate;
+use super::estimate::{Estimate, chi_square_interval};
 use crate::simulation::{NEES_DOF, OutageRecord, REPORTED, REPORTED_NAMES, RunRecord, TOLERANCE};
 use serde::{Deserialize, Deserializer, Serialize};
 

@@ -14,11 +14,9 @@
 
 mod course;
 mod imu;
-mod margins;
 
 pub use course::{Course, Drift, evenly};
-pub use imu::{Answer, IMU_PARAMETERS, ImuParameters, Need};
-pub use margins::Margins;
+pub use imu::{Answer, IMU_PARAMETERS, ImuParameters, Margins, Need};
 
 use crate::ekf::BeliefError;
 use crate::simulation::ExperimentError;

@@ -1,17 +1,14 @@
 //! One lane batch: eight runs through one trajectory.
 
-mod aided;
-mod assessment;
 mod batch;
 pub mod lincov;
 mod plan;
-mod recording;
 mod source;
 
 pub use batch::{Batch, run_batch};
 pub use plan::{Experiment, ExperimentError, Plan};
 pub(crate) use plan::{fan_epochs, samples_per};
-pub use recording::{Recording, record};
+pub use source::{Recording, record};
 
 use serde::{Deserialize, Serialize};
 

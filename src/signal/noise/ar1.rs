@@ -1,6 +1,5 @@
 //! First-order autoregressive process: X_t = phi X_{t−1} + W_t, W white with variance sigma2.
 
-use super::slow_ar1::{Slow, half_scale, sinhc};
 use super::{ParameterError, non_negative};
 use std::f64::consts::LN_2;
 
@@ -145,6 +144,280 @@ fn alternating_shape(r: f64, level: u32) -> (f64, f64) {
     let derivative = m + sum * (2.0 - p - slant) + q * (moment + m * sum);
     let value = numerator / (2.0 * m * m * plus * plus * plus);
     (value, value * (derivative / numerator - 3.0 / plus))
+}
+
+// Haar wavelet variance of first-order autoregressions, free of cancellation.
+//
+// The textbook closed form loses every digit as phi → 1. Written in kappa = −ln phi it is a sum of
+// positive terms: with m = 2^(level−1),
+// nu = sigma2·e^κ·B/s(κ), B = [2·S(κ) + m²·f(mκ)]/[4m·s(κ/2)²], where s = sinh x/x, S = (sinh x − x)/x³
+// and f = (2x − 3 + 4e^−x − e^−2x)/x³.
+
+/// Half the scale of a level, in samples: m = 2^(level−1).
+pub(super) fn half_scale(level: u32) -> f64 {
+    f64::from(level.saturating_sub(1)).exp2()
+}
+
+/// B and the derivative of its logarithm with respect to κ.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bracket {
+    pub(super) value: f64,
+    log_derivative: f64,
+}
+
+/// The parts of B that depend on κ alone, for 0 ≤ κ ≤ ln 2 (phi ≥ ½).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slow {
+    kappa: f64,
+    /// 2·S(κ) and its derivative.
+    excess: (f64, f64),
+    /// s(κ/2) and the derivative of 2·ln s(κ/2) with respect to κ.
+    sinhc_half: (f64, f64),
+}
+
+impl Slow {
+    pub(super) fn new(kappa: f64) -> Self {
+        let (s, ds) = sinh_series::<1>(0.5 * kappa);
+        let (excess, excess_derivative) = sinh_series::<3>(kappa);
+        Self {
+            kappa,
+            excess: (2.0 * excess, 2.0 * excess_derivative),
+            sinhc_half: (s, ds / s),
+        }
+    }
+
+    pub(super) fn bracket(&self, m: f64) -> Bracket {
+        let (f, df) = ramp(m * self.kappa);
+        let sum = m.mul_add(m * f, self.excess.0);
+        let derivative = self.excess.1 + m * m * m * df;
+        let (s, half_log_derivative) = self.sinhc_half;
+        Bracket {
+            value: sum / (4.0 * m * s * s),
+            log_derivative: derivative / sum - half_log_derivative,
+        }
+    }
+}
+
+/// s(κ) = sinh κ/κ and d ln s/dκ.
+fn sinhc(kappa: f64) -> (f64, f64) {
+    let (s, ds) = sinh_series::<1>(kappa);
+    (s, ds / s)
+}
+
+/// Σ_k x^2k/(2k+N)! and its derivative, |x| ≤ ln 2: sinh x/x for N = 1, (sinh x − x)/x³ for N = 3.
+fn sinh_series<const N: usize>(x: f64) -> (f64, f64) {
+    let x2 = x * x;
+    let mut term = if N == 1 { 1.0 } else { 1.0 / 6.0 };
+    let (mut sum, mut derivative) = (term, 0.0);
+    // At x = ln 2 the first term left out, x^20/21!, is below 1e-22 of the sum.
+    for k in 1..10_usize {
+        let n = 2 * k + N;
+        term /= ((n - 1) * n) as f64;
+        let power = x2.powi(k as i32 - 1);
+        sum += term * power * x2;
+        derivative += term * (2 * k) as f64 * power * x;
+    }
+    (sum, derivative)
+}
+
+/// f(x) = (2x − 3 + 4e^−x − e^−2x)/x³ and its derivative, x ≥ 0.
+fn ramp(x: f64) -> (f64, f64) {
+    if x < 1.0 {
+        return ramp_series(x);
+    }
+    // At x = 1 the numerator is 0.34, of terms up to 3: at most one digit is lost here, and fewer as x grows.
+    let e = (-x).exp();
+    let f = (2.0 * x - 3.0 + e * (4.0 - e)) / (x * x * x);
+    (f, (2.0 * (1.0 - e) * (1.0 - e) / (x * x) - 3.0 * f) / x)
+}
+
+/// The same by f = Σ_{n≥3} (−1)^n (4 − 2^n) x^(n−3)/n!, for small x.
+fn ramp_series(x: f64) -> (f64, f64) {
+    let (mut f, mut df) = (0.0, 0.0);
+    for &c in RAMP.iter().rev() {
+        // Horner's rule for the derivative needs f from before this coefficient.
+        df = df * x + f;
+        f = f * x + c;
+    }
+    (f, df)
+}
+
+/// Coefficients of x^k, k = n − 3; the first one left out is below 1e-17 of the sum at x = 1.
+const RAMP: [f64; 24] = {
+    let mut c = [0.0; 24];
+    let (mut factorial, mut power, mut n) = (2.0, 4.0, 3);
+    while n < 27 {
+        factorial *= n as f64;
+        power *= 2.0;
+        let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
+        c[n - 3] = sign * (4.0 - power) / factorial;
+        n += 1;
+    }
+    c
+};
+
+// First-order moving average: X_t = W_t + theta W_{t−1}.
+
+/// First-order moving average, invertible: |theta| ≤ 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ma1 {
+    theta: f64,
+    sigma2: f64,
+}
+
+impl Ma1 {
+    /// Code in model files.
+    pub(crate) const CODE: &'static str = "MA1";
+
+    /// From the coefficient (dimensionless) and the innovation variance (units²).
+    ///
+    /// # Errors
+    /// When |theta| > 1, the variance is negative, or either is not finite.
+    pub fn new(theta: f64, sigma2: f64) -> Result<Self, ParameterError> {
+        if !(theta.is_finite() && theta.abs() <= 1.0) {
+            return Err(ParameterError {
+                process: Self::CODE,
+                parameter: "theta",
+                value: theta,
+                domain: "between −1 and 1",
+            });
+        }
+        Ok(Self {
+            theta,
+            sigma2: non_negative(Self::CODE, "sigma2", sigma2)?,
+        })
+    }
+
+    /// Coefficient.
+    #[must_use]
+    pub const fn theta(&self) -> f64 {
+        self.theta
+    }
+
+    /// Innovation variance (units²).
+    #[must_use]
+    pub const fn sigma2(&self) -> f64 {
+        self.sigma2
+    }
+
+    /// Haar wavelet variance at a level (units²): sigma2 [m(1 + theta)² − 3 theta]/(2m²), m = 2^(level−1).
+    #[must_use]
+    pub fn haar_wv(&self, level: u32) -> f64 {
+        self.sigma2 * Self::haar_shape(self.theta, level).0
+    }
+
+    /// Haar wavelet variance per unit of sigma2, and its derivative with respect to theta.
+    #[must_use]
+    pub fn haar_shape(theta: f64, level: u32) -> (f64, f64) {
+        let m = half_scale(level);
+        let sum = 1.0 + theta;
+        (
+            (m * sum * sum - 3.0 * theta) / (2.0 * m * m),
+            (2.0 * m * sum - 3.0) / (2.0 * m * m),
+        )
+    }
+}
+
+// First-order Gauss-Markov process: an AR1 described in continuous time.
+
+/// Gauss-Markov process: autocovariance s2·exp(−beta·|t|); sampled, an AR1 with phi = exp(−beta/f).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GaussMarkov {
+    beta: f64,
+    s2: f64,
+    rate_hz: f64,
+    ar1: Ar1,
+}
+
+impl GaussMarkov {
+    /// Code in model files.
+    pub(crate) const CODE: &'static str = "GM";
+    /// Largest Allan deviation over standard deviation, reached with averages of [`Self::ALLAN_PEAK_AT`]
+    /// correlation times: with averages of x correlation times the Allan variance is
+    /// s2·(2/x)·[1 − (3 − 4e^(−x) + e^(−2x))/(2x)].
+    pub(crate) const ALLAN_PEAK: f64 = 0.617_364_283_144_441_3;
+    /// Averaging time of the largest Allan deviation (correlation times).
+    pub(crate) const ALLAN_PEAK_AT: f64 = 1.892_617_8;
+
+    /// From the inverse correlation time beta (1/s), the stationary variance s2 (units²) and the rate (Hz).
+    ///
+    /// # Errors
+    /// When beta or the rate is not positive, the variance is negative, or one is not finite.
+    pub fn new(beta: f64, s2: f64, rate_hz: f64) -> Result<Self, ParameterError> {
+        let positive = |parameter, value: f64| {
+            if value.is_finite() && value > 0.0 {
+                Ok(value)
+            } else {
+                Err(ParameterError {
+                    process: Self::CODE,
+                    parameter,
+                    value,
+                    domain: "a finite number > 0",
+                })
+            }
+        };
+        let x = positive("beta", beta)? / positive("rate_hz", rate_hz)?;
+        let s2 = non_negative(Self::CODE, "s2", s2)?;
+        // sigma2 = s2 (1 − phi²) by expm1: of a slow process phi² is next to 1 and the difference would lose
+        // its digits.
+        let ar1 = Ar1::new((-x).exp(), s2 * -(-2.0 * x).exp_m1())?;
+        Ok(Self {
+            beta,
+            s2,
+            rate_hz,
+            ar1,
+        })
+    }
+
+    /// Inverse correlation time (1/s).
+    #[must_use]
+    pub const fn beta(&self) -> f64 {
+        self.beta
+    }
+
+    /// Sample rate (Hz).
+    #[must_use]
+    pub const fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// Stationary variance (units²).
+    #[must_use]
+    pub const fn s2(&self) -> f64 {
+        self.s2
+    }
+
+    /// The same process sampled: an AR1 with phi = e^(−beta/f) and sigma2 = s2 (1 − phi²).
+    #[must_use]
+    pub const fn ar1(&self) -> Ar1 {
+        self.ar1
+    }
+
+    /// Haar wavelet variance at a level (units²), scale tau = 2^level samples.
+    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
+        self.s2 * Self::haar_shape(self.beta / self.rate_hz, level).0
+    }
+
+    /// Haar wavelet variance per unit of s2, and its derivative with respect to kappa = beta/f, the inverse
+    /// correlation time in samples.
+    #[must_use]
+    pub fn haar_shape(kappa: f64, level: u32) -> (f64, f64) {
+        let m = half_scale(level);
+        if kappa < LN_2 {
+            let bracket = Slow::new(kappa).bracket(m);
+            let value = 2.0 * kappa * bracket.value;
+            (value, 2.0 * bracket.value + value * bracket.log_derivative)
+        } else {
+            let phi = (-kappa).exp();
+            // phi ≤ ½: nothing cancels in the form of phi. d/dκ = −phi d/dphi, and 1 − phi² is sigma2/s2.
+            let variance = (1.0 - phi) * (1.0 + phi);
+            let (value, derivative) = fast_shape(phi, m);
+            (
+                value * variance,
+                -phi * (derivative * variance - 2.0 * phi * value),
+            )
+        }
+    }
 }
 
 #[cfg(test)]

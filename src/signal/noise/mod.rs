@@ -17,42 +17,25 @@
 
 mod allan;
 mod ar1;
-mod composite;
 pub mod continuous;
-mod drift;
-mod flicker;
 mod flicker_noise;
-mod gauss_markov;
 mod kind;
-mod ma1;
-mod mean;
-mod normal;
 pub mod practical;
-mod quantization;
-mod random_walk;
 pub mod reduction;
-pub mod replicate;
 
 pub mod contamination;
-mod slow_ar1;
 pub mod spread;
 mod synthesis;
 mod white;
 
-pub use ar1::Ar1;
-pub use composite::Composite;
-pub use drift::Drift;
-pub use flicker::Flicker;
-pub use flicker_noise::{FlickerNoise, Ladder};
-pub use gauss_markov::GaussMarkov;
-pub use kind::{Kind, Parameter, ParameterRef, labels};
-pub use ma1::Ma1;
-pub use quantization::Quantization;
-pub use random_walk::RandomWalk;
-pub use replicate::{ReplicateError, VirtualImu};
-pub use spread::{Law, LognormalIntervals, Spread, SpreadError, Variation};
+pub use ar1::{Ar1, GaussMarkov, Ma1};
+pub use flicker_noise::{Flicker, FlickerNoise, Ladder};
+pub use kind::{Composite, Kind, Parameter, ParameterRef, labels};
+pub use spread::{
+    Law, LognormalIntervals, ReplicateError, Spread, SpreadError, Variation, VirtualImu,
+};
 pub use synthesis::Synthesizer;
-pub use white::White;
+pub use white::{Drift, Quantization, RandomWalk, White};
 
 use crate::imu::{Channel, Sensor};
 use serde::ser::{Serialize, SerializeMap, Serializer};

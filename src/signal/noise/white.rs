@@ -1,6 +1,6 @@
 //! White noise: independent samples.
 
-use super::slow_ar1::half_scale;
+use super::ar1::half_scale;
 use super::{ParameterError, non_negative};
 
 /// White noise: independent samples.
@@ -38,5 +38,135 @@ impl White {
     #[must_use]
     pub fn haar_shape(level: u32) -> f64 {
         0.5 / half_scale(level)
+    }
+}
+
+// Quantization noise: X_t = √(12 Q²) (U_t − U_{t−1}), U uniform on (0, 1); variance 2 Q².
+
+/// Quantization noise: X_t = √(12 Q²) (U_t − U_{t−1}), U uniform on (0, 1); variance 2 Q².
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quantization {
+    q2: f64,
+}
+
+impl Quantization {
+    /// Code in model files.
+    pub(crate) const CODE: &'static str = "QN";
+
+    /// Q² (units²).
+    ///
+    /// # Errors
+    /// When it is negative or not finite.
+    pub fn new(q2: f64) -> Result<Self, ParameterError> {
+        Ok(Self {
+            q2: non_negative(Self::CODE, "q2", q2)?,
+        })
+    }
+
+    /// Q² (units²).
+    #[must_use]
+    pub const fn q2(&self) -> f64 {
+        self.q2
+    }
+
+    /// Haar wavelet variance at a level (units²): 6 Q²/tau², tau = 2^level.
+    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
+        self.q2 * Self::haar_shape(level)
+    }
+
+    /// Haar wavelet variance per unit of Q².
+    #[must_use]
+    pub fn haar_shape(level: u32) -> f64 {
+        let m = half_scale(level);
+        1.5 / (m * m)
+    }
+}
+
+// Random walk: the running sum of white increments.
+
+/// Random walk: the running sum of white increments.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RandomWalk {
+    gamma2: f64,
+}
+
+impl RandomWalk {
+    /// Code in model files.
+    pub(crate) const CODE: &'static str = "RW";
+
+    /// Variance of an increment (units²).
+    ///
+    /// # Errors
+    /// When it is negative or not finite.
+    pub fn new(gamma2: f64) -> Result<Self, ParameterError> {
+        Ok(Self {
+            gamma2: non_negative(Self::CODE, "gamma2", gamma2)?,
+        })
+    }
+
+    /// Variance of an increment (units²).
+    #[must_use]
+    pub const fn gamma2(&self) -> f64 {
+        self.gamma2
+    }
+
+    /// Haar wavelet variance at a level (units²): gamma2 (tau² + 2)/(12 tau), tau = 2^level.
+    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
+        self.gamma2 * Self::haar_shape(level)
+    }
+
+    /// Haar wavelet variance per unit of gamma2.
+    #[must_use]
+    pub fn haar_shape(level: u32) -> f64 {
+        let tau = 2.0 * half_scale(level);
+        (tau * tau + 2.0) / (12.0 * tau)
+    }
+}
+
+// Drift: a deterministic ramp.
+
+/// Drift: X_t = slope · t, t in samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drift {
+    slope: f64,
+}
+
+impl Drift {
+    /// Code in model files.
+    pub(crate) const CODE: &'static str = "DR";
+
+    /// Slope (units per sample).
+    ///
+    /// # Errors
+    /// When it is not finite.
+    pub fn new(slope: f64) -> Result<Self, ParameterError> {
+        if slope.is_finite() {
+            Ok(Self { slope })
+        } else {
+            Err(ParameterError {
+                process: Self::CODE,
+                parameter: "slope",
+                value: slope,
+                domain: "a finite number",
+            })
+        }
+    }
+
+    /// Slope (units per sample).
+    #[must_use]
+    pub const fn slope(&self) -> f64 {
+        self.slope
+    }
+
+    /// Haar wavelet variance at a level (units²), not centred: slope² tau²/16, tau = 2^level.
+    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
+        self.slope * self.slope * Self::haar_shape(level)
+    }
+
+    /// Haar wavelet variance per unit of slope².
+    #[must_use]
+    pub fn haar_shape(level: u32) -> f64 {
+        let m = half_scale(level);
+        0.25 * m * m
     }
 }

@@ -328,4 +328,5 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 #[cfg(test)]
+#[path = "gappy_tests.rs"]
 mod tests;

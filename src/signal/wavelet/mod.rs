@@ -11,20 +11,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod curve;
 mod gappy;
 pub mod haar;
 pub mod interval;
-mod quantization;
 pub mod robust;
-mod tuning;
 
-pub use curve::Curve;
 pub use gappy::{Gappy, gappy};
-pub use haar::classical;
-pub use quantization::QuantizationResponse;
-pub use robust::{RobustVariance, Status, both};
-pub use tuning::{Convention, Tuning};
+pub use haar::{Curve, classical};
+pub use robust::{Convention, QuantizationResponse, RobustVariance, Status, Tuning, both};
 
 /// Why there is no wavelet variance.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,8 +1,8 @@
 //! Rows of measurements, sums of biases, and the noise of one sample.
 
-use super::super::aiding::{body_velocity_rows, dense_yaw_row};
 use super::super::update::update_height;
 use super::*;
+use crate::ekf::update::{body_velocity_rows, dense_yaw_row};
 use crate::frames::{RollPitchYaw, wrap_angle};
 
 /// H of position and velocity on a lever arm against central differences of the antenna itself.

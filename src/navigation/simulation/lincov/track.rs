@@ -4,10 +4,10 @@ use super::pass::add_scaled;
 use super::truth::defects;
 use crate::closure::Bounds;
 use crate::earth::ned_difference;
-use crate::ekf::belief::BiasGroup;
-use crate::ekf::covariance::{PSI, R, V};
-use crate::ekf::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, ErrorMap, NavError, Sample};
-use crate::ekf::initial::psi_of_angles;
+use crate::ekf::belief::{BiasGroup, psi_of_angles};
+use crate::ekf::covariance::{
+    EARTH_STEP_S, EarthStep, EarthTerms, ErrorMap, NavError, PSI, R, Sample, V,
+};
 use crate::ekf::{Belief, UnknownKind, body_velocity_rows, dense_yaw_row, fix_rows};
 use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::{Channel, Sensor};
@@ -16,8 +16,7 @@ use crate::noise::{Ladder, Model, Process};
 use crate::sensors::aiding::{Aid, AidPart, Law};
 use crate::sensors::defects::{Felt, Surroundings};
 use crate::simulation::BIASES;
-use crate::simulation::aided::Aided;
-use crate::simulation::plan::{Event, Experiment, ExperimentError, Plan};
+use crate::simulation::plan::{Aided, Event, Experiment, ExperimentError, Plan};
 use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};

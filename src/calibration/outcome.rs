@@ -1,0 +1,848 @@
+//! Settings and results of a calibration: data that estimation, tests and words share.
+
+use crate::curve::{Estimator, Pool, Scope, Trim, implied};
+use crate::fit::{Fit, FitError, Weighting, avlr, refit, score};
+use crate::imu::Axis;
+use crate::model::{ModelSpec, SpecError};
+use crate::noise::practical::AxisParameters;
+use crate::noise::{Composite, Model, ParameterRef, Process};
+use crate::wavelet::{Curve, Tuning};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::str::FromStr;
+
+/// The noise model of outcomes, at a rate (Hz); axes of none have no noise.
+pub fn model_of<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>, rate_hz: f64) -> Model {
+    let mut model = Model {
+        rate_hz,
+        axes: Default::default(),
+    };
+    outcomes
+        .into_iter()
+        .for_each(|outcome| outcome.put_into(&mut model));
+    model
+}
+
+/// Scale of a level (s).
+#[must_use]
+pub fn tau_s(level: u32, rate_hz: f64) -> f64 {
+    f64::from(level).exp2() / rate_hz
+}
+
+/// Gives noise to the axes of a model.
+pub fn put(composite: &Composite, scope: Scope, model: &mut Model) {
+    for channel in scope.channels() {
+        model.axes[channel.index()] = composite.clone();
+    }
+}
+
+/// One fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// Scope of the model: an axis of a sensor, or all its axes.
+    pub scope: Scope,
+    /// Replicates averaged; 0 for a curve from elsewhere.
+    pub replicates: usize,
+    /// Recordings that these are of.
+    pub recordings: usize,
+    /// The estimator.
+    pub estimator: Estimator,
+    /// Specification of the model.
+    pub spec: ModelSpec,
+    /// Ranking by which the specification was chosen, if it was.
+    pub ranking: Option<Ranking>,
+    /// The curve that was fitted.
+    pub curve: Curve,
+    /// The model.
+    pub fit: Fit,
+    /// Difference of the pooled axes, where there is one.
+    pub axes_differ: Option<AxesDiffer>,
+    /// Intervals of its parameters and goodness of fit, once [`infer`](crate::infer) was asked for them.
+    pub inference: Option<Inference>,
+}
+
+impl Outcome {
+    /// Gives its noise to the axes of a model that it is for.
+    pub fn put_into(&self, model: &mut Model) {
+        put(&self.fit.composite, self.scope, model);
+    }
+
+    /// Whether a parameter follows the curve: its process has an amplitude, and it is not at the end of the search.
+    pub(crate) fn moves(&self, of: ParameterRef) -> bool {
+        let at_end = self.fit.at_end.contains(&of.process) && of.parameter.is_shape();
+        !(self.fit.zero.contains(&of.process) || at_end)
+    }
+
+    /// The fit to a curve that resembles this one.
+    pub(crate) fn estimate_again(
+        &self,
+        curve: &Curve,
+        settings: &Settings,
+    ) -> Result<Fit, FitError> {
+        match self.estimator {
+            Estimator::Avlr => avlr(curve, &self.spec),
+            _ => refit(
+                curve,
+                &self.spec,
+                settings.rate_hz,
+                settings.weighting,
+                &self.fit,
+            ),
+        }
+    }
+}
+
+// Settings of a calibration.
+
+/// Settings of a calibration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// The curves to fit.
+    pub estimators: Vec<Estimator>,
+    /// Choice of the model.
+    pub model: ModelChoice,
+    /// Replicates that DR-AWV drops.
+    pub trim: Trim,
+    /// The tuning the robust wavelet variances were made with.
+    pub tuning: Tuning,
+    /// Weights of the scales.
+    pub weighting: Weighting,
+    /// The scales that count (s); none: all.
+    pub fit_range: Option<FitRange>,
+    /// Sample rate (Hz).
+    pub rate_hz: f64,
+}
+
+/// Scales that count in a fit, both ends included (s).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitRange {
+    /// Shortest (s).
+    pub from_s: f64,
+    /// Longest (s).
+    pub to_s: f64,
+}
+
+impl FitRange {
+    /// Whether a level counts at a rate (Hz); ends may be off by rounding.
+    pub(crate) fn holds(&self, level: u32, rate_hz: f64) -> bool {
+        let scale_s = f64::from(level).exp2() / rate_hz;
+        scale_s >= self.from_s * (1.0 - 1e-9) && scale_s <= self.to_s * (1.0 + 1e-9)
+    }
+}
+
+/// Who says what the model is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ModelChoice {
+    /// The user.
+    Given(ModelSpec),
+    /// The curves.
+    Auto,
+}
+
+impl Default for ModelChoice {
+    fn default() -> Self {
+        Self::Given(ModelSpec::n2())
+    }
+}
+
+impl FromStr for ModelChoice {
+    type Err = SpecError;
+
+    /// "auto", or a sum of processes.
+    fn from_str(text: &str) -> Result<Self, SpecError> {
+        if text.eq_ignore_ascii_case("auto") {
+            Ok(Self::Auto)
+        } else {
+            text.parse().map(Self::Given)
+        }
+    }
+}
+
+/// Is told how many more steps of a long computation are done, from any thread.
+pub type Advance<'a> = &'a (dyn Fn(u64) + Sync);
+
+impl ModelChoice {
+    /// Stages of a choice.
+    pub(crate) const STAGES: u64 = 3;
+
+    /// Number of steps of a fit, in which a draw of the bootstrap is one.
+    #[must_use]
+    pub const fn steps(&self) -> u64 {
+        match self {
+            Self::Given(_) => 10,
+            // dozens of candidates, each fitted to as many draws
+            Self::Auto => Self::STAGES * 300,
+        }
+    }
+
+    /// Parameters that are to be found, at least.
+    #[must_use]
+    pub fn parameters(&self) -> usize {
+        match self {
+            Self::Given(spec) => spec.parameters(),
+            Self::Auto => 2,
+        }
+    }
+}
+
+impl std::fmt::Display for ModelChoice {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Given(spec) => spec.fmt(f),
+            Self::Auto => f.write_str("auto"),
+        }
+    }
+}
+
+impl Default for Settings {
+    /// Settings that suit most recordings: DR-AWV, N2. At 1 Hz, until a rate is known.
+    fn default() -> Self {
+        Self {
+            estimators: vec![Estimator::default()],
+            model: ModelChoice::default(),
+            trim: Trim::default(),
+            tuning: Tuning::default(),
+            weighting: Weighting::default(),
+            fit_range: None,
+            rate_hz: 1.0,
+        }
+    }
+}
+
+impl Settings {
+    /// Signals that the estimators take as replicates of one another, unless told otherwise: those of single
+    /// recordings pool nothing.
+    #[must_use]
+    pub fn pool(&self) -> Pool {
+        if self.estimators.iter().any(|e| e.is_single()) {
+            Pool::Axes
+        } else {
+            Pool::Sensor
+        }
+    }
+}
+
+// Uncertainty of a fit: the results.
+
+/// Settings of the bootstrap.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Bootstrap {
+    /// Number of draws.
+    pub draws: usize,
+    /// Seed of all of them.
+    pub seed: u64,
+}
+
+impl Bootstrap {
+    /// Draws, usually: the ends of a 95 % interval are the fifth of them at either side.
+    pub const DRAWS: usize = 200;
+}
+
+impl Default for Bootstrap {
+    fn default() -> Self {
+        Self {
+            draws: Self::DRAWS,
+            seed: 1,
+        }
+    }
+}
+
+/// Uncertainty of a fit by the bootstrap.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inference {
+    /// Draws made.
+    pub draws: usize,
+    /// Draws that had a fit.
+    pub fitted: usize,
+    /// The models of these draws: what other recordings of the same IMU would have given.
+    pub drawn: Vec<Composite>,
+    /// Factor of the distances of the quantiles of the draws from their median, for the few replicates from
+    /// which their scatter is known: Student's quantile over the normal one.
+    pub stretch: f64,
+    /// One interval a parameter that is not fixed, in the order of the model.
+    pub intervals: Vec<ParameterInterval>,
+    /// Whether the model describes the curve; of slopes (AVLR), which are not fitted to it, nothing is known.
+    pub goodness: Option<Goodness>,
+    /// Spread of the replicates at each level of the curve. Empty for a curve from elsewhere.
+    pub spread: Vec<LevelSpread>,
+    /// Probability that replicates of one noise differ as much at some scale (see [`ALIKE_LEVEL`](crate::ALIKE_LEVEL)); none of a
+    /// single signal.
+    pub alike: Option<f64>,
+    /// Parameters that are known to differ between recordings; none where [`alike`](Self::alike) does not say that these differ.
+    pub varying: Vec<ParameterSpread>,
+    /// Alike processes that cannot be told apart, and the simpler model.
+    pub indistinct: Option<Indistinct>,
+    /// Intervals of N, K and B.
+    pub practical: PracticalIntervals,
+}
+
+/// Practitioners' parameters of a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Practical {
+    /// N, K, B and T, of the policy "matched" over the default horizon.
+    pub parameters: AxisParameters,
+    /// 95 % intervals of N, K and B.
+    pub intervals: PracticalIntervals,
+    /// Longest averaging time that was observed (s): how far a minimum was looked for.
+    pub range_s: f64,
+    /// First of these averaging times (s) at which the pair of N and K has more than [`Practical::BESIDE`] times the Allan
+    /// deviation of the model, if there is one: K is no random walk beyond.
+    pub walk_until_s: Option<f64>,
+}
+
+impl Practical {
+    /// Ratio of Allan deviations from which on a random walk does not stand for a model: over an octave of averaging times a
+    /// random walk and a floor part by √2, over two by this.
+    pub const BESIDE: f64 = 2.0;
+
+    /// Whether the data hold averages so long that the random walk is the larger part of them, and the model has it over an
+    /// octave of these: where they do not, K is what the pair says of times that nobody saw, or that were seen to be otherwise.
+    #[must_use]
+    pub fn walk_is_observed(&self) -> bool {
+        let lasts = |from: f64| self.walk_until_s.is_none_or(|until| until >= 2.0 * from);
+        self.parameters
+            .walk
+            .crossover_s()
+            .is_some_and(|from| from <= self.range_s && lasts(from))
+    }
+}
+
+/// 95 % intervals (units of the parameter); none where the draws do not determine it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PracticalIntervals {
+    /// White noise density N (units/√Hz).
+    pub density: Option<[f64; 2]>,
+    /// Random-walk density K (units/s/√Hz).
+    pub walk: Option<[f64; 2]>,
+    /// Bias instability B (units).
+    pub instability: Option<[f64; 2]>,
+}
+
+/// The axes of a pooled sensor, where they differ.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxesDiffer {
+    /// Level at which they differ by the largest ratio.
+    pub level: u32,
+    /// Probability that alike axes differ so at some scale.
+    pub p_value: f64,
+    /// The axis with the largest wavelet variance there.
+    pub largest: Axis,
+    /// The one with the smallest.
+    pub smallest: Axis,
+    /// The one over the other.
+    pub ratio: f64,
+}
+
+/// Spread of replicates at one scale: standard deviations of ln nu of a replicate.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct LevelSpread {
+    /// Scale (s).
+    pub tau_s: f64,
+    /// Standard deviation by the law of the noise alone.
+    pub within: f64,
+    /// Standard deviation of the differences beyond that.
+    pub between: f64,
+}
+
+/// How a parameter differs between recordings: its logarithm (of phi and beta that of the correlation time) is normal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParameterSpread {
+    /// The parameter.
+    pub of: ParameterRef,
+    /// Its median (units of the parameter).
+    pub median: f64,
+    /// 95 % interval of that.
+    pub median_ci95: [f64; 2],
+    /// Standard deviation of the logarithm.
+    pub sd: f64,
+    /// 95 % interval of that.
+    pub sd_ci95: [f64; 2],
+}
+
+/// The 95 % interval of one parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterInterval {
+    /// The parameter.
+    pub of: ParameterRef,
+    /// Lower end (units of the parameter); NaN where the draws do not determine it.
+    pub low: f64,
+    /// Upper end (units of the parameter); NaN where the draws do not determine it.
+    pub high: f64,
+    /// Share of the draws in which its process has vanished: is zero, or has its correlation time at the end of what can be
+    /// searched, where it is another process by name only.
+    pub lost: f64,
+    /// Why there is no interval, if there is none.
+    pub absent: Option<Undetermined>,
+    /// Standard error by the sandwich (units of the parameter); NaN where it stands at a bound.
+    pub standard_error: f64,
+}
+
+/// Why a parameter has no interval.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Undetermined {
+    /// Its process is zero at the optimum.
+    Zero,
+    /// Its process vanishes in more of the draws than the quantile leaves out.
+    Vanishes,
+    /// The draws lie to one side of the estimate.
+    OneSided,
+    /// The interval of the correlation time ends beyond what can be searched.
+    BeyondSearch,
+    /// The draws leave the amplitude of its process open by more than a factor of 100: in some of them it all but vanishes.
+    Open,
+    /// These processes, which are alike, cannot be told apart.
+    Indistinct(Vec<usize>),
+}
+
+/// The test of over-identifying restrictions. Its statistic is the least Σ Omega_j (nu_j − nu_j(theta))²; what it
+/// is when the model holds is known from the bootstrap, which repeats the whole estimation, so no weighting and
+/// no trim makes the probability wrong, and the replicates' differences are allowed for.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Goodness {
+    /// J, the objective.
+    pub statistic: f64,
+    /// Scales less free parameters of processes that are there.
+    pub dof: usize,
+    /// Median of J when the model holds.
+    pub expected: f64,
+    /// Probability of a J at least this large when the model holds: (1 + draws that have one) / (1 + draws).
+    pub p_value: f64,
+}
+
+/// Probability below which the model is said not to describe the curve.
+pub(super) const LEVEL: f64 = 0.05;
+
+impl Goodness {
+    /// Whether so large a J has a probability below 5 % when the model holds.
+    #[must_use]
+    pub fn is_rejected(&self) -> bool {
+        self.p_value < LEVEL
+    }
+}
+
+/// Processes of one kind that cannot be told apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Indistinct {
+    /// Their positions in the model.
+    pub processes: Vec<usize>,
+    /// The model with one of them less, which describes the curve as well.
+    pub spec: ModelSpec,
+    /// Its parameters.
+    pub composite: Composite,
+    /// Probability of so large a gain by the further process if the simpler model is true.
+    pub p_value: f64,
+    /// Intervals of the simpler model's parameters.
+    pub intervals: Vec<ParameterInterval>,
+}
+
+// Choice of a model: the results.
+
+/// A model that was tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// The model.
+    pub spec: ModelSpec,
+    /// Σ Omega_j (nu_j − nu_j(theta))².
+    pub objective: f64,
+    /// 2 Σ Omega_j cov(nu_j, nu_j(theta)).
+    pub optimism: f64,
+    /// For a simpler one than the best that was tested against it: the probability of so large a difference of
+    /// their objectives if it is true.
+    pub p_value: Option<f64>,
+    /// Probability of so large an objective if it is true, where that was asked: the J-test.
+    pub j_p_value: Option<f64>,
+}
+
+impl Candidate {
+    /// Whether it was tested and does not describe the curve.
+    #[must_use]
+    pub fn is_rejected(&self) -> bool {
+        self.j_p_value.is_some_and(|p| p < LEVEL)
+    }
+
+    /// The criterion.
+    #[must_use]
+    pub fn wvic(&self) -> f64 {
+        self.objective + self.optimism
+    }
+}
+
+/// The candidates and the choice.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ranking {
+    /// The candidates all of whose processes can be identified, by WVIC; those whose distance alone exceeds the
+    /// WVIC of the nearest are left out.
+    pub candidates: Vec<Candidate>,
+    /// Position of the chosen candidate.
+    pub chosen: usize,
+    /// Number of candidates left out because a process of theirs is zero or at the end of its range: the same
+    /// without it is among the others.
+    pub not_identifiable: usize,
+    /// Number of candidates left out because their distance alone is too large.
+    pub far: usize,
+    /// The last simpler candidate that was given up, if any was.
+    pub too_simple: Option<TooSimple>,
+}
+
+/// A simpler model that does not do as well as the chosen one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TooSimple {
+    /// The model.
+    pub spec: ModelSpec,
+    /// Probability of so large a difference of their objectives if it is true, at most.
+    pub p_value: f64,
+    /// The level that speaks loudest against it.
+    pub level: u32,
+    /// Share of that level in all that speaks against it.
+    pub share: f64,
+}
+
+// Remarks on a fit and on what it cannot determine, as values: their words are those of the document of a calibration.
+
+/// Remark on a fit. `process`: position in the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Note {
+    /// Axes that are pooled differ ([`Outcome::axes_differ`]).
+    AxesDiffer,
+    /// Scales that count in no fit, for the steps of a quantiser or too many outliers: the first and the last (s).
+    LeftOut([f64; 2]),
+    /// Alike processes that cannot be told apart ([`Inference::indistinct`](Inference::indistinct)).
+    Indistinct,
+    /// Amplitude known to a factor, either way; none: it may be zero.
+    Wide(ParameterRef, Option<f64>),
+    /// Process without an amplitude.
+    Zero(usize),
+    /// Process whose correlation time (s) is shorter than a sample: white noise by another name.
+    LikeWhite(usize, f64),
+    /// Process whose correlation time (s) has its peak beyond the longest scale (s): a random walk by another name.
+    LikeWalk(usize, f64, f64),
+}
+
+/// An amplitude known to no better than this factor, either way, is told.
+const FACTOR: f64 = 3.0;
+/// The wavelet variance of an AR1 peaks at this many correlation times.
+const PEAK: f64 = 3.78;
+
+impl Outcome {
+    /// Remarks on the fit, the most important first.
+    #[must_use]
+    pub fn notes(&self, settings: &Settings) -> Vec<Note> {
+        let (rate_hz, mut notes) = (settings.rate_hz, Vec::new());
+        notes.extend(self.axes_differ.map(|_| Note::AxesDiffer));
+        let ignored = &self.curve.ignored;
+        // A range that was asked for is no news.
+        if let (Some(first), Some(last), None) =
+            (ignored.first(), ignored.last(), settings.fit_range)
+        {
+            notes.push(Note::LeftOut(
+                [*first, *last].map(|level| tau_s(level, rate_hz)),
+            ));
+        }
+        if let Some(inference) = &self.inference {
+            notes.extend(inference.indistinct.as_ref().map(|_| Note::Indistinct));
+            let amplitudes = inference
+                .intervals
+                .iter()
+                .filter(|i| !i.of.parameter.is_shape() && i.absent.is_none());
+            let wide = amplitudes.filter(|i| i.high > FACTOR * FACTOR * i.low);
+            notes.extend(
+                wide.map(|i| Note::Wide(i.of, (i.low > 0.0).then_some((i.high / i.low).sqrt()))),
+            );
+        }
+        let fit = &self.fit;
+        notes.extend(fit.zero.iter().map(|i| Note::Zero(*i)));
+        let longest_s = self
+            .counted_levels()
+            .last()
+            .map_or(0.0, |level| tau_s(*level, rate_hz));
+        for (i, process) in fit
+            .composite
+            .processes
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| !fit.zero.contains(i))
+        {
+            let Some(time_s) = process.correlation_time_s(rate_hz) else {
+                continue;
+            };
+            if time_s * rate_hz < 1.0 {
+                notes.push(Note::LikeWhite(i, time_s));
+            }
+            // Before its peak the curve of an AR1 rises as that of a random walk does: without the peak only sigma2 is known.
+            if PEAK * time_s > longest_s {
+                notes.push(Note::LikeWalk(i, time_s, longest_s));
+            }
+        }
+        notes
+    }
+}
+
+/// Contribution of a process to a model's wavelet variance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Share {
+    /// Levels at which it is the largest part, ascending.
+    pub leads: Vec<u32>,
+    /// Its largest part of the whole, and the level of that.
+    pub largest: (f64, u32),
+}
+
+/// The share of each process of a model over some levels.
+#[must_use]
+pub fn shares(model: &Composite, levels: &[u32]) -> Vec<Share> {
+    let part = |process: &Process, level: u32| match process.haar_wv(level) / model.haar_wv(level) {
+        part if part.is_finite() => part,
+        // Of nothing nothing is a part.
+        _ => 0.0,
+    };
+    let leader = |level: u32| {
+        let parts = model.processes.iter().map(|p| part(p, level));
+        parts
+            .enumerate()
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(i, _)| i)
+    };
+    let share = |(i, process): (usize, &Process)| Share {
+        leads: levels
+            .iter()
+            .copied()
+            .filter(|level| leader(*level) == Some(i))
+            .collect(),
+        largest: levels
+            .iter()
+            .map(|level| (part(process, *level), *level))
+            .fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a }),
+    };
+    model.processes.iter().enumerate().map(share).collect()
+}
+
+// Departure of a curve from the model that was fitted to it: where it matters, and where it is most certain.
+
+/// Scales missed by more standard deviations than this are told.
+const MISSED: f64 = 4.0;
+/// Scales off by more standard deviations than this are what speaks against a model whose scales are off together.
+const DOUBTFUL: f64 = 2.0;
+/// Standard deviation (relative) to which a wavelet variance must be known for its distance from the model to be told.
+const KNOWN: f64 = 0.1;
+
+/// A curve at one level, against the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Miss {
+    /// Level.
+    pub level: u32,
+    /// Wavelet variance of the data over that of the model.
+    pub ratio: f64,
+    /// The normal score of that ratio, a chi-square over its degrees of freedom where the model holds.
+    pub deviations: f64,
+    /// Whether the scale counts in the fit.
+    pub is_fitted: bool,
+}
+
+/// Disagreement of a curve with its model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Misfit {
+    /// Probability of the J-test, if it was made.
+    pub p_value: Option<f64>,
+    /// The scale with the ratio furthest from 1 of all that are missed, those that count in no fit included.
+    pub worst: Miss,
+}
+
+/// Probability of the scores of all scales together below which a model is not said to fit, where no J-test was made.
+const IMPOSSIBLE: f64 = 1e-4;
+
+/// A curve against its model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Departure {
+    /// Scales that count in the fit.
+    pub scales: usize,
+    /// Those that are missed by more than four standard deviations.
+    pub missed: Vec<Miss>,
+    /// Of the scales that count in no fit and are missed as far, the one with the ratio furthest from 1.
+    pub left_out: Option<Miss>,
+    /// Of the scales that are known to 10 % (of all, if none is), the one with the ratio furthest from 1.
+    pub furthest: Option<Miss>,
+    /// The longest of these scales, where there are longer ones.
+    pub known_to: Option<u32>,
+    /// Of the scales that are off by more than two deviations, the one with the ratio furthest from 1.
+    pub doubtful: Option<Miss>,
+    /// Probability of scores at least as far off together, where the model holds: their squares as a chi-square of as many
+    /// degrees of freedom as scales. That parameters were fitted makes it larger, that neighbours hang together smaller.
+    pub chance: f64,
+}
+
+impl Departure {
+    fn of(all: &[Miss], is_known: impl Fn(&&Miss) -> bool) -> Self {
+        let (all, ignored): (Vec<Miss>, Vec<Miss>) = all.iter().copied().partition(|m| m.is_fitted);
+        let ignored: Vec<Miss> = ignored
+            .into_iter()
+            .filter(|m| m.deviations.abs() > MISSED)
+            .collect();
+        let beyond = |deviations: f64| -> Vec<Miss> {
+            all.iter()
+                .copied()
+                .filter(|m| m.deviations.abs() > deviations)
+                .collect()
+        };
+        let known: Vec<Miss> = all.iter().filter(is_known).copied().collect();
+        let longest = all.last().map(|m| m.level);
+        let squares: f64 = all.iter().map(|m| m.deviations * m.deviations).sum();
+        Self {
+            scales: all.len(),
+            missed: beyond(MISSED),
+            left_out: furthest(&ignored),
+            furthest: furthest(if known.is_empty() { &all } else { &known }),
+            known_to: known
+                .last()
+                .map(|m| m.level)
+                .filter(|level| Some(*level) != longest),
+            doubtful: furthest(&beyond(DOUBTFUL)),
+            chance: ChiSquared::new(all.len().max(1) as f64).map_or(1.0, |law| law.sf(squares)),
+        }
+    }
+
+    /// Of the scales that are missed, the one with the ratio furthest from 1: where the model is worst for whoever uses it.
+    #[must_use]
+    pub fn worst(&self) -> Option<Miss> {
+        furthest(&self.missed)
+    }
+}
+
+fn furthest(all: &[Miss]) -> Option<Miss> {
+    // In the logarithm half is as far from 1 as twice.
+    all.iter()
+        .copied()
+        .max_by(|a, b| a.ratio.ln().abs().total_cmp(&b.ratio.ln().abs()))
+}
+
+impl Outcome {
+    /// The disagreement of the curve with its model, by single scales, by all together or by the J-test; none where it fits.
+    #[must_use]
+    pub fn misfit(&self) -> Option<Misfit> {
+        let departure = self.departure();
+        let goodness = self.inference.as_ref().and_then(|i| i.goodness);
+        let together = match goodness {
+            Some(goodness) => goodness.is_rejected(),
+            None => departure.chance < IMPOSSIBLE && departure.doubtful.is_some(),
+        };
+        let missed: Vec<Miss> = departure
+            .missed
+            .iter()
+            .chain(&departure.left_out)
+            .copied()
+            .collect();
+        let worst = furthest(&missed)
+            .or(departure.doubtful)
+            .or(departure.furthest);
+        let is_missed = together || !departure.missed.is_empty();
+        worst.filter(|_| is_missed).map(|worst| Misfit {
+            p_value: goodness.map(|g| g.p_value),
+            worst,
+        })
+    }
+
+    /// The curve against the model.
+    #[must_use]
+    pub fn departure(&self) -> Departure {
+        let is_known = |m: &&Miss| {
+            let place = self.curve.levels.iter().position(|level| *level == m.level);
+            place.is_some_and(|i| (2.0 / self.curve.edof[i]).sqrt() <= KNOWN)
+        };
+        Departure::of(&self.misses(), is_known)
+    }
+
+    /// The scales that count.
+    #[must_use]
+    pub fn counted_levels(&self) -> Vec<u32> {
+        self.curve
+            .levels
+            .iter()
+            .copied()
+            .filter(|level| !self.curve.ignored.contains(level))
+            .collect()
+    }
+
+    fn misses(&self) -> Vec<Miss> {
+        let curve = &self.curve;
+        let implied = implied(&self.fit.composite, curve);
+        let scales = curve
+            .levels
+            .iter()
+            .zip(&curve.wv)
+            .zip(&curve.edof)
+            .zip(implied);
+        scales
+            .map(|(((level, nu), edof), implied)| {
+                let ratio = nu / implied;
+                let is_fitted = !curve.ignored.contains(level);
+                Miss {
+                    level: *level,
+                    ratio,
+                    deviations: score(ratio, *edof),
+                    is_fitted,
+                }
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod departure_tests {
+    use super::{Departure, Miss};
+    use crate::fit::score;
+    use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+    /// Twelve scales that are off by one deviation each are what chance brings: P(chi-square of 12 > 12) = 0.4457 (tables). Off by
+    /// three each, none is missed by itself, and together they are impossible. What is told is of the scales that are known;
+    /// what speaks against the model is the scale where it is worst.
+    #[test]
+    fn scales_are_judged_together_and_told_as_far_as_they_are_known() {
+        let off = |deviations: f64| -> Vec<Miss> {
+            (1..=12)
+                .map(|level| Miss {
+                    level,
+                    ratio: 1.0 - 0.05 * f64::from(level),
+                    deviations,
+                    is_fitted: true,
+                })
+                .collect()
+        };
+        let departure = |deviations| Departure::of(&off(deviations), |m| m.level <= 8);
+        let allowed = departure(-1.0);
+        assert!(
+            (allowed.chance - 0.4457).abs() < 5e-5 && allowed.doubtful.is_none(),
+            "{allowed:?}"
+        );
+        assert_eq!(
+            (allowed.furthest.unwrap().level, allowed.known_to),
+            (8, Some(8))
+        );
+        let impossible = departure(-3.0);
+        assert!(
+            impossible.missed.is_empty() && impossible.chance < 1e-15,
+            "{impossible:?}"
+        );
+        assert_eq!(impossible.doubtful.unwrap().level, 12);
+        assert_eq!(Departure::of(&off(1.0), |_| true).known_to, None);
+    }
+
+    /// Against the exact law: the cube is good to a tenth of a deviation out to five of them, from ten degrees on.
+    #[test]
+    fn scores_are_those_of_the_chi_square() {
+        let normal = Normal::new(0.0, 1.0).unwrap();
+        for edof in [10.0, 32.0, 300.0] {
+            let law = ChiSquared::new(edof).unwrap();
+            for ratio in [0.2, 0.39, 0.7, 1.0, 1.5, 2.5] {
+                let below = law.cdf(ratio * edof);
+                let exact = if below < 0.5 {
+                    normal.inverse_cdf(below)
+                } else {
+                    -normal.inverse_cdf(law.sf(ratio * edof))
+                };
+                if exact.abs() < 5.0 {
+                    assert!(
+                        (score(ratio, edof) - exact).abs() < 0.1,
+                        "{edof} {ratio}: {exact}"
+                    );
+                }
+            }
+        }
+    }
+}

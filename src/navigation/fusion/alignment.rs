@@ -1,0 +1,989 @@
+//! Coarse alignment: where a recording that says nothing of its start begins to be navigated.
+//!
+//! Heading is the course of the first fix that moves fast enough, or its opposite: the filter is run from
+//! both, and the innovations of the fixes that follow tell whether the vehicle goes forwards or backwards.
+//! Roll and pitch come from levelling ([Groves](crate::bibliography::Groves13), sec. 5.6.1) in a static
+//! window before it, carried on with the gyroscopes, or from the mean specific force while it moves and the
+//! change of the GNSS velocity, whichever is known better. A start that the fixes of the following minute
+//! contradict is given up for the next, and a heading that they move is not believed as well as it says.
+
+use super::outcome::{Finding, nis_bound};
+use super::{Found, Heading, Levelling, Recorded, Settings, Solution, Start, Use, fuse};
+use crate::earth::{gravity_down, radii};
+use crate::ekf::{Belief, InitialSettings};
+use crate::frames::{NavState, RollPitchYaw, wrap_angle};
+use crate::gnss::GnssFix;
+use crate::imu::{ImuIncrement, Sensor};
+use crate::metrics::VerdictKind;
+use crate::units::DEG;
+use glam::{DQuat, DVec3};
+use std::f64::consts::PI;
+
+/// How much later other starts are tried (s), where none at the first moving fix agrees with what follows.
+const LATER_S: [f64; 5] = [15.0, 30.0, 60.0, 120.0, 240.0];
+/// Tilt beyond which the axes of an IMU are hardly those of a vehicle (rad).
+const UPRIGHT: f64 = 45.0 * DEG;
+
+/// Standard deviations of the biases, which spoil a levelling.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct BiasSigma {
+    /// Accelerometer (m/s²).
+    accel: f64,
+    /// Gyroscope (rad/s).
+    gyro: f64,
+}
+
+/// Why a recording cannot be aligned.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AlignmentError {
+    /// It never moves fast enough.
+    #[error(
+        "no course: no fix moves at {:.1} m/s and ten standard deviations{}",
+        SLOW.0,
+        .nearest.map_or_else(String::new, |(t, v, s)| format!(" (nearest: {v:.2} ± {s:.2} m/s at {t:.2} s)"))
+    )]
+    NoCourse {
+        /// The fix that comes nearest to it: when (s), its speed and the standard deviation of that (m/s).
+        nearest: Option<(f64, f64, f64)>,
+    },
+    /// A heading was given, and nothing to level with.
+    #[error("no fix with IMU samples around it to level with")]
+    NoLevel,
+    /// No specific force to level with.
+    #[error("no IMU samples after the first moving fix at {t_s:.2} s to level with")]
+    NoSamples {
+        /// The fix (s).
+        t_s: f64,
+    },
+}
+
+/// A start found in the recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alignment {
+    /// Where the filter starts.
+    pub start: Start,
+    /// What speaks against it.
+    pub doubts: Vec<(VerdictKind, Finding)>,
+}
+
+/// The start of a recording. Fixes that are withheld are not looked at.
+///
+/// # Errors
+/// When it never moves, or there is nothing to level with.
+pub fn coarse(
+    recorded: &Recorded<'_>,
+    settings: &Settings,
+    belief: &Belief,
+) -> Result<Alignment, AlignmentError> {
+    let gnss = kept(recorded, settings);
+    let recorded = Recorded {
+        gnss: &gnss,
+        ..*recorded
+    };
+    let courses = courses(&gnss, recorded.imu);
+    let Some(first) = first_fast(&courses, f64::NEG_INFINITY) else {
+        return Err(AlignmentError::NoCourse {
+            nearest: nearest_to_fast(&courses),
+        });
+    };
+    let first_s = courses[first].fix.t_s;
+    let later = LATER_S
+        .iter()
+        .filter_map(|s| first_fast(&courses, first_s + s));
+    let finished = |mut candidate: Candidate| {
+        widen(&recorded, belief, settings, &mut candidate.start);
+        candidate.alignment()
+    };
+    let mut best: Option<Candidate> = None;
+    let mut tried_s = f64::NEG_INFINITY;
+    for at in std::iter::once(first).chain(later) {
+        if courses[at].fix.t_s <= tried_s {
+            continue;
+        }
+        tried_s = courses[at].fix.t_s;
+        for candidate in candidates(&recorded, settings, belief, &courses, at) {
+            // on a straight road anything agrees: a later start must also tell forwards from backwards
+            if candidate.agrees() && (at == first || candidate.trial.decided) {
+                return Ok(finished(candidate));
+            }
+            best.get_or_insert(candidate);
+        }
+    }
+    best.map(finished)
+        .ok_or(AlignmentError::NoSamples { t_s: first_s })
+}
+
+/// The fixes that are not withheld.
+fn kept(recorded: &Recorded<'_>, settings: &Settings) -> Vec<GnssFix> {
+    let withheld = |f: &&GnssFix| settings.outages.iter().any(|o| o.withholds(f.t_s));
+    recorded
+        .gnss
+        .iter()
+        .filter(|f| !withheld(f))
+        .copied()
+        .collect()
+}
+
+/// The start at the first fix where the IMU can be levelled, its heading given: it need not move.
+///
+/// # Errors
+/// When there is nothing to level with.
+pub fn towards(
+    recorded: &Recorded<'_>,
+    settings: &Settings,
+    belief: &Belief,
+    heading: Heading,
+) -> Result<Alignment, AlignmentError> {
+    let gnss = kept(recorded, settings);
+    let recorded = Recorded {
+        gnss: &gnss,
+        ..*recorded
+    };
+    let courses = courses(&gnss, recorded.imu);
+    let sigma = heading.sigma.hypot(settings.mounting_sigma_b.z);
+    let start_at = |at: usize| {
+        let scene = Scene::new(&recorded, settings, belief, &courses[at].fix);
+        let rest = scene.at_rest(&courses[..at], &courses[at]);
+        let level = rest.or_else(|| scene.in_motion(&courses[at..], heading.yaw, sigma))?;
+        Some(start(
+            &courses[at],
+            &level,
+            Along::Given,
+            (heading.yaw, sigma),
+            settings,
+        ))
+    };
+    let mut start = (0..courses.len())
+        .find_map(start_at)
+        .ok_or(AlignmentError::NoLevel)?;
+    let trial = alone(&recorded, belief, settings, &start);
+    widen(&recorded, belief, settings, &mut start);
+    Ok(Candidate { start, trial }.alignment())
+}
+
+/// Which way the vehicle goes along its course.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Along {
+    Forwards,
+    Backwards,
+    /// Not asked: the heading is given.
+    Given,
+}
+
+/// A start that was tried on the fixes after it.
+struct Candidate {
+    start: Start,
+    trial: Trial,
+}
+
+impl Candidate {
+    fn agrees(&self) -> bool {
+        self.trial.agreements.iter().all(Agreement::holds)
+    }
+
+    fn alignment(self) -> Alignment {
+        let mut doubts = Vec::new();
+        if !self.agrees() {
+            let nis_per_component = self.trial.agreements[0].nis;
+            doubts.push((
+                VerdictKind::Overconfident,
+                Finding::Start { nis_per_component },
+            ));
+        }
+        if !self.trial.decided {
+            doubts.push((VerdictKind::Doubtful, Finding::Direction));
+        }
+        // a vehicle is level, more or less, at its start
+        let RollPitchYaw { roll, pitch, .. } = RollPitchYaw::from_quat(self.start.state.q_b_n);
+        if (roll.cos() * pitch.cos()).acos() > UPRIGHT {
+            let (roll_deg, pitch_deg) = (roll / DEG, pitch / DEG);
+            doubts.push((
+                VerdictKind::Doubtful,
+                Finding::NotLevel {
+                    roll_deg,
+                    pitch_deg,
+                },
+            ));
+        }
+        Alignment {
+            start: self.start,
+            doubts,
+        }
+    }
+}
+
+/// The starts at a moving fix, the one whose levelling is known best first, in the direction that the fixes
+/// speak for.
+fn candidates(
+    recorded: &Recorded<'_>,
+    settings: &Settings,
+    belief: &Belief,
+    courses: &[Moving],
+    at: usize,
+) -> Vec<Candidate> {
+    let moving = &courses[at];
+    let scene = Scene::new(recorded, settings, belief, &moving.fix);
+    // the course is the heading of the vehicle; how the IMU sits in it is not better known than the mounting
+    let heading_sigma = moving
+        .heading_sigma(recorded.imu)
+        .hypot(settings.mounting_sigma_b.z);
+    let in_motion = |heading| scene.in_motion(&courses[at..], heading, heading_sigma);
+    let forwards = moving.course();
+    let backwards = wrap_angle(forwards + PI);
+    let rest = scene
+        .at_rest(&courses[..at], moving)
+        .map(|level| [level; 2]);
+    let motion = in_motion(forwards)
+        .zip(in_motion(backwards))
+        .map(|(f, b)| [f, b]);
+    let mut levels: Vec<[Level; 2]> = [rest, motion].into_iter().flatten().collect();
+    levels.sort_by(|a, b| a[0].sigma.total_cmp(&b[0].sigma));
+    let tried = |[f, b]: [Level; 2]| {
+        let starts = [
+            (f, Along::Forwards, forwards),
+            (b, Along::Backwards, backwards),
+        ]
+        .map(|(level, along, yaw)| start(moving, &level, along, (yaw, heading_sigma), settings));
+        let trial = opposite(recorded, belief, settings, starts.each_ref());
+        let [f, b] = starts;
+        Candidate {
+            start: if trial.better == 0 { f } else { b },
+            trial,
+        }
+    };
+    levels.into_iter().map(tried).collect()
+}
+
+fn start(
+    moving: &Moving,
+    level: &Level,
+    along: Along,
+    (yaw, heading_sigma): (f64, f64),
+    settings: &Settings,
+) -> Start {
+    let fix = moving.fix;
+    let q_b_n = RollPitchYaw {
+        roll: level.roll,
+        pitch: level.pitch,
+        yaw,
+    }
+    .to_quat();
+    let arm_n = q_b_n * settings.lever_arm_b;
+    let r = radii(fix.lat.sin());
+    let state = NavState {
+        lat: fix.lat - arm_n.x / (r.meridian + fix.h),
+        lon: fix.lon - arm_n.y / ((r.transverse + fix.h) * fix.lat.cos()),
+        h: fix.h + arm_n.z,
+        v_n: moving.v_n,
+        q_b_n,
+    };
+    let degrees = |angle: f64| (angle / DEG).min(30.0);
+    let (tilt, heading) = (degrees(level.sigma), degrees(heading_sigma));
+    let sigma = InitialSettings {
+        pos_sigma_m: fix.pos_sigma_n.to_array(),
+        vel_sigma_m_s: moving.sigma_n.to_array(),
+        att_sigma_deg: [tilt, tilt, heading],
+        ..InitialSettings::default()
+    };
+    let found = Found {
+        level: level.from,
+        course_sigma_deg: heading,
+        is_given: along == Along::Given,
+        is_reversing: along == Along::Backwards,
+        moved_deg: None,
+    };
+    Start {
+        t_s: fix.t_s,
+        state,
+        sigma,
+        found: Some(found),
+    }
+}
+
+/// Samples whose interval ends in (from, to].
+pub(in crate::fusion) fn between(imu: &[ImuIncrement], from: f64, to: f64) -> &[ImuIncrement] {
+    let first = imu.partition_point(|s| s.t_s <= from + 1e-9);
+    let end = imu.partition_point(|s| s.t_s <= to + 1e-9);
+    &imu[first..end.max(first)]
+}
+
+/// How far the IMU turns through the samples, from its axes then to those at the start, and the velocity that the
+/// specific force makes, in the axes at the start (m/s).
+pub(in crate::fusion) fn carried(samples: &[ImuIncrement]) -> (DQuat, DVec3) {
+    let (mut q, mut dv) = (DQuat::IDENTITY, DVec3::ZERO);
+    for s in samples {
+        let half = DQuat::from_scaled_axis(s.dtheta * 0.5);
+        dv += q * half * s.dv;
+        q = (q * half * half).normalize();
+    }
+    (q, dv)
+}
+
+// The course of the vehicle from GNSS: velocities as measured, or from positions a second or more apart.
+
+/// How far the axis of a vehicle may be from its course on a straight road (rad): slip, mounting.
+const SLIP: f64 = 2.0 * DEG;
+/// Distance from the axle that does not steer to the IMU (m): in a turn the course there leaves the axis.
+const AXLE_M: f64 = 2.0;
+/// Slowest course that is taken as a heading, and how many of its standard deviations: of what goes fast at times, as road
+/// vehicles do, and of what never does, as people, carts and small robots.
+const FAST: (f64, f64) = (3.0, 5.0);
+pub(super) const SLOW: (f64, f64) = (0.5, 10.0);
+/// What sways to the side at a walk (m/s).
+const SWAY: f64 = 0.15;
+/// Shortest time from one position to another that gives a velocity, and the longest (s).
+const BASELINE_S: (f64, f64) = (1.0, 3.0);
+/// What a vehicle may accelerate between two positions, of which their mean velocity says nothing (m/s²).
+const ACCELERATION: f64 = 2.0;
+
+/// How a drive goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::fusion) enum Pace {
+    Fast,
+    Slow,
+}
+
+impl Pace {
+    /// The speed from which a course is a heading, where velocities are known as well as `sigma` (m/s).
+    pub(in crate::fusion) fn needed(self, sigma: f64) -> f64 {
+        let (least, sigmas) = if self == Self::Fast { FAST } else { SLOW };
+        least.max(sigmas * sigma)
+    }
+
+    /// How far the axis is from the course at such a speed (rad).
+    pub(in crate::fusion) fn slip(self, speed: f64) -> f64 {
+        if self == Self::Fast {
+            SLIP
+        } else {
+            SLIP.hypot(SWAY / speed)
+        }
+    }
+}
+
+/// A fix with its velocity and the standard deviations of it (m/s).
+#[derive(Debug, Clone, Copy)]
+pub(in crate::fusion) struct Moving {
+    pub(in crate::fusion) fix: GnssFix,
+    pub(in crate::fusion) v_n: DVec3,
+    pub(in crate::fusion) sigma_n: DVec3,
+    /// Half the time between the two positions it comes from: it is as old as that (s); 0 as measured.
+    pub(in crate::fusion) lag_s: f64,
+    pub(in crate::fusion) pace: Pace,
+}
+
+impl Moving {
+    pub(in crate::fusion) fn speed(&self) -> f64 {
+        self.v_n.truncate().length()
+    }
+
+    pub(in crate::fusion) fn sigma(&self) -> f64 {
+        self.sigma_n.truncate().max_element()
+    }
+
+    /// The speed from which the course of this fix is a heading (m/s).
+    pub(in crate::fusion) fn needed(&self) -> f64 {
+        self.pace.needed(self.sigma())
+    }
+
+    /// The direction in which it moves (rad from north).
+    pub(in crate::fusion) fn course(&self) -> f64 {
+        self.v_n.y.atan2(self.v_n.x)
+    }
+
+    /// Standard deviation of the vehicle's axis about the course (rad).
+    fn heading_sigma(&self, imu: &[ImuIncrement]) -> f64 {
+        let sum =
+            |samples: &[ImuIncrement]| samples.iter().map(|s| s.dtheta).sum::<DVec3>().length();
+        let turned = sum(between(imu, self.fix.t_s - self.lag_s, self.fix.t_s));
+        // the angular rate over a second around the fix
+        let around = between(imu, self.fix.t_s - 0.5, self.fix.t_s + 0.5);
+        let seconds: f64 = around.iter().map(|s| s.dt_s).sum();
+        let rate = if seconds > 0.0 {
+            sum(around) / seconds
+        } else {
+            0.0
+        };
+        // the first fast fix is one whose error makes it fast: the vehicle moves more slowly than it says
+        let speed = self.speed() - 1.5 * self.sigma();
+        (self.sigma() / speed)
+            .hypot(self.pace.slip(speed))
+            .hypot(turned)
+            .hypot(rate * AXLE_M / speed)
+    }
+}
+
+/// The velocities within the IMU recording.
+pub(in crate::fusion) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<Moving> {
+    let first = imu.first().map_or(f64::INFINITY, |s| s.t_s - s.dt_s);
+    let last = imu.last().map_or(f64::NEG_INFINITY, |s| s.t_s);
+    let inside = |m: &Moving| m.fix.t_s >= first && m.fix.t_s < last;
+    let velocity = |(i, fix): (usize, &GnssFix)| match fix.velocity {
+        Some(velocity) => Some(Moving {
+            fix: *fix,
+            v_n: velocity.v_n(),
+            sigma_n: velocity.sigma_n(),
+            lag_s: 0.0,
+            pace: Pace::Fast,
+        }),
+        None => {
+            let earlier = gnss[..i].partition_point(|f| f.t_s <= fix.t_s - BASELINE_S.0 + 1e-6);
+            derived(&gnss[earlier.checked_sub(1)?], fix)
+        }
+    };
+    let mut all: Vec<Moving> = gnss
+        .iter()
+        .enumerate()
+        .filter_map(velocity)
+        .filter(inside)
+        .collect();
+    if first_fast(&all, f64::NEG_INFINITY).is_none() {
+        all.iter_mut().for_each(|moving| moving.pace = Pace::Slow);
+    }
+    all
+}
+
+/// Fixes one after the other that are at least `apart_s` apart, with when their velocities were (s).
+pub(in crate::fusion) fn steps(courses: &[Moving], apart_s: f64) -> Vec<[(&Moving, f64); 2]> {
+    let when = |m: &Moving| m.fix.t_s - m.lag_s;
+    let mut all = Vec::new();
+    let mut first = 0;
+    while let Some(from) = courses.get(first) {
+        let later = courses[first..].partition_point(|m| when(m) < when(from) + apart_s);
+        // twice at the same time, by files that a clock sets back
+        let next = first + later.max(1);
+        let Some(to) = courses.get(next) else { break };
+        all.push([(from, when(from)), (to, when(to))]);
+        first = next;
+    }
+    all
+}
+
+/// The first fix from `from_s` on whose course is a heading. One fix alone may be an outlier, and among
+/// thousands at rest one is five standard deviations off: the next must move as well.
+fn first_fast(courses: &[Moving], from_s: f64) -> Option<usize> {
+    let fast = |i: usize| {
+        let supported = courses
+            .get(i + 1)
+            .is_none_or(|next| next.speed() >= 0.6 * next.needed());
+        courses[i].fix.t_s >= from_s && courses[i].speed() >= courses[i].needed() && supported
+    };
+    (0..courses.len()).find(|i| fast(*i))
+}
+
+/// The fix that comes nearest to moving fast enough: when (s), its speed and standard deviation (m/s).
+fn nearest_to_fast(courses: &[Moving]) -> Option<(f64, f64, f64)> {
+    let share = |m: &Moving| m.speed() / m.needed();
+    let nearest = courses
+        .iter()
+        .max_by(|a, b| share(a).total_cmp(&share(b)))?;
+    Some((nearest.fix.t_s, nearest.speed(), nearest.sigma()))
+}
+
+/// The mean velocity between two fixes; none where they are too far apart in time.
+fn derived(before: &GnssFix, fix: &GnssFix) -> Option<Moving> {
+    let (r, dt) = (radii(fix.lat.sin()), fix.t_s - before.t_s);
+    if dt > BASELINE_S.1 {
+        return None;
+    }
+    let north = (fix.lat - before.lat) * (r.meridian + fix.h);
+    let east = wrap_angle(fix.lon - before.lon) * (r.transverse + fix.h) * fix.lat.cos();
+    let v_n = DVec3::new(north, east, before.h - fix.h) / dt;
+    let lag_s = 0.5 * dt;
+    let variance = (fix.pos_sigma_n.powf(2.0) + before.pos_sigma_n.powf(2.0)) / (dt * dt);
+    let sigma_n = (variance + DVec3::splat((ACCELERATION * lag_s).powi(2))).powf(0.5);
+    Some(Moving {
+        fix: *fix,
+        v_n,
+        sigma_n,
+        lag_s,
+        pace: Pace::Fast,
+    })
+}
+
+// Roll and pitch at a fix: from gravity in a static window before it, or from the specific force in motion
+// and the change of the GNSS velocity.
+
+/// Lengths of static windows (s). A long one leaves less acceleration that GNSS does not see.
+const STILL_S: [f64; 4] = [2.0, 4.0, 8.0, 16.0];
+/// How long it takes from the first acceleration to a speed that GNSS shows (s).
+const DEPARTURE_S: f64 = 3.0;
+/// How long the gyroscopes carry a levelling on (s).
+const MAX_AGE_S: f64 = 60.0;
+/// Length of the window in motion (s).
+const MOVING_S: f64 = 5.0;
+/// Spread of specific force (m/s²) and mean angular rate (rad/s) above which nothing is static.
+const STILL: (f64, f64) = (0.5, 0.03);
+/// How many times the spread of the quietest window a static one may have: engines idle, roads shake more.
+const QUIET: f64 = 3.0;
+
+/// What levelling needs to know.
+pub(super) struct Scene<'a> {
+    recorded: Recorded<'a>,
+    settings: &'a Settings,
+    bias: BiasSigma,
+    g: f64,
+}
+
+/// Roll and pitch at the first moving fix.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Level {
+    pub(super) roll: f64,
+    pub(super) pitch: f64,
+    /// Standard deviation of both (rad).
+    pub(super) sigma: f64,
+    pub(super) from: Levelling,
+}
+
+/// Statistics of a window in the vehicle's axes.
+struct Window {
+    end_s: f64,
+    seconds: f64,
+    /// Mean specific force (m/s²) and angular rate (rad/s).
+    f: DVec3,
+    omega: DVec3,
+    /// Standard deviation of the specific force of a sample (m/s²) and of its rate (rad/s).
+    spread: (f64, f64),
+}
+
+fn window(samples: &[ImuIncrement], q_s_b: DQuat) -> Window {
+    let seconds: f64 = samples.iter().map(|s| s.dt_s).sum();
+    let f = samples.iter().map(|s| s.dv).sum::<DVec3>() / seconds;
+    let omega = samples.iter().map(|s| s.dtheta).sum::<DVec3>() / seconds;
+    let n = samples.len() as f64;
+    let force = samples
+        .iter()
+        .map(|s| (s.dv / s.dt_s - f).length_squared())
+        .sum::<f64>();
+    let rate = samples
+        .iter()
+        .map(|s| (s.dtheta / s.dt_s - omega).length_squared())
+        .sum::<f64>();
+    let end_s = samples.last().map_or(f64::NAN, |s| s.t_s);
+    let spread = ((force / n).sqrt(), (rate / n).sqrt());
+    Window {
+        end_s,
+        seconds,
+        f: q_s_b * f,
+        omega: q_s_b * omega,
+        spread,
+    }
+}
+
+/// True where the specific force is spread too much for anything that stands: vibrations at rest are less.
+#[must_use]
+pub fn moves(imu: &[ImuIncrement]) -> bool {
+    window(imu, DQuat::IDENTITY).spread.0 >= STILL.0
+}
+
+impl<'a> Scene<'a> {
+    /// About a fix.
+    pub(super) fn new(
+        recorded: &Recorded<'a>,
+        settings: &'a Settings,
+        belief: &Belief,
+        fix: &GnssFix,
+    ) -> Self {
+        let sigma = |sensor| belief.initial_bias_sigma(sensor);
+        let bias = BiasSigma {
+            accel: sigma(Sensor::Accel),
+            gyro: sigma(Sensor::Gyro),
+        };
+        Self {
+            recorded: *recorded,
+            settings,
+            bias,
+            g: gravity_down(settings.gravity, fix.lat.sin(), fix.h),
+        }
+    }
+
+    /// The tilt's standard deviation with the biases and a levelling of age `age_s` (rad).
+    fn tilt_sigma(&self, age_s: f64, own: f64) -> f64 {
+        (self.bias.accel / self.g)
+            .hypot(self.bias.gyro * age_s)
+            .hypot(own)
+            .hypot(0.3 * crate::units::DEG)
+    }
+
+    /// Levelling in the static window that says most of the attitude at the fix, carried on by the gyroscopes.
+    ///
+    /// A window is judged by its own standard deviation: what GNSS lets the vehicle accelerate unseen falls with
+    /// its length, the drift of the gyroscopes grows with its age.
+    pub(super) fn at_rest(&self, before: &[Moving], moving: &Moving) -> Option<Level> {
+        let to_s = moving.fix.t_s;
+        let ends = (0..)
+            .map(|k| to_s - 0.25 * f64::from(k))
+            .take_while(|end| to_s - end <= MAX_AGE_S);
+        let windows: Vec<Window> = ends
+            .flat_map(|end| STILL_S.map(|length| self.calm(end, length)))
+            .flatten()
+            .collect();
+        let quietest = windows
+            .iter()
+            .map(|w| w.spread.0)
+            .fold(f64::INFINITY, f64::min);
+        windows
+            .iter()
+            .filter(|w| w.spread.0 <= QUIET * quietest)
+            .filter_map(|w| self.carried(w, before, moving))
+            .min_by(|a, b| a.sigma.total_cmp(&b.sigma))
+    }
+
+    /// The window, when the IMU sees nothing happen in it.
+    fn calm(&self, end_s: f64, length_s: f64) -> Option<Window> {
+        let samples = between(self.recorded.imu, end_s - length_s, end_s);
+        let q_s_b = self.settings.q_s_b;
+        let (first, second) = samples.split_at(samples.len() / 2);
+        let (whole, first, second) = (
+            window(samples, q_s_b),
+            window(first, q_s_b),
+            window(second, q_s_b),
+        );
+        let (force, rate) = whole.spread;
+        // constant, as gravity and biases are; the spread's share is for vibrations, which average out slowly
+        let constant = first.f.distance(second.f) < 0.1 + force / 4.0
+            && first.omega.distance(second.omega) < 0.01 + rate / 4.0;
+        let gravity = (whole.f.length() - self.g).abs() < 0.5_f64.max(4.0 * self.bias.accel);
+        let turning = whole.omega.length() > STILL.1.max(4.0 * self.bias.gyro);
+        let calm =
+            whole.seconds > 0.8 * length_s && force < STILL.0 && constant && gravity && !turning;
+        calm.then_some(whole)
+    }
+
+    /// The levelling of a window at the time of the fix, unless GNSS contradicts its standing still.
+    fn carried(&self, w: &Window, before: &[Moving], moving: &Moving) -> Option<Level> {
+        let (from, departed) = (w.end_s - w.seconds, w.end_s + DEPARTURE_S);
+        let age_s = moving.fix.t_s - w.end_s;
+        let (q, gained) = self.carry(w, moving.fix.t_s);
+        let unseen = if moving.fix.velocity.is_some() {
+            let seen: Vec<&Moving> = before
+                .iter()
+                .filter(|m| (from..=departed).contains(&m.fix.t_s))
+                .collect();
+            slow(&seen)
+                .then(|| std::f64::consts::SQRT_2 * seen[0].sigma() / (w.seconds * self.g))?
+        } else {
+            // positions alone are slow to tell rest from acceleration: what the IMU gained on the way must be
+            // the speed that GNSS then shows
+            let agrees = (gained.truncate().length() - moving.speed()).abs() < 3.0 * moving.sigma();
+            (stays(before, from, departed) && agrees).then(|| moving.sigma() / (age_s * self.g))?
+        };
+        let now = RollPitchYaw::from_quat(q);
+        let own = (w.spread.0 / self.g / 10.0).hypot(unseen);
+        let from = Levelling::AtRest(w.end_s);
+        Some(Level {
+            roll: now.roll,
+            pitch: now.pitch,
+            sigma: self.tilt_sigma(age_s, own),
+            from,
+        })
+    }
+
+    /// A levelling at rest carried on with the gyroscopes: the attitude from level axes whose first is the
+    /// heading of the body then, and the velocity gained in them.
+    fn carry(&self, w: &Window, to_s: f64) -> (DQuat, DVec3) {
+        let (roll, pitch) = level(w.f, DVec3::Z * -self.g);
+        let (mut q, mut gained) = (
+            RollPitchYaw {
+                roll,
+                pitch,
+                yaw: 0.0,
+            }
+            .to_quat(),
+            DVec3::ZERO,
+        );
+        for s in between(self.recorded.imu, w.end_s, to_s) {
+            gained += q * (self.settings.q_s_b * s.dv) + DVec3::Z * self.g * s.dt_s;
+            q = (q * DQuat::from_scaled_axis(self.settings.q_s_b * s.dtheta)).normalize();
+        }
+        (q, gained)
+    }
+
+    /// Levelling while it moves: the mean specific force after the fix is the change of the GNSS velocity
+    /// less gravity, in the axes of this heading.
+    fn in_motion(&self, after: &[Moving], heading: f64, heading_sigma: f64) -> Option<Level> {
+        let from = after.first()?;
+        let near = after
+            .iter()
+            .take_while(|m| m.fix.t_s <= from.fix.t_s + MOVING_S)
+            .count();
+        // with fixes far apart, the next one
+        let to = after.get(near.max(2) - 1)?;
+        let (from_s, to_s) = (from.fix.t_s - from.lag_s, to.fix.t_s - to.lag_s);
+        let (samples, seconds) = (between(self.recorded.imu, from_s, to_s), to_s - from_s);
+        if samples.is_empty() || seconds > MAX_AGE_S / 2.0 {
+            return None;
+        }
+        let dv = self.settings.q_s_b * carried(samples).1;
+        let a_n = (to.v_n - from.v_n) / seconds;
+        let (roll, pitch) = level(
+            dv / seconds,
+            DQuat::from_rotation_z(-heading) * (a_n - DVec3::Z * self.g),
+        );
+        let velocities = from.sigma().hypot(to.sigma()) / (seconds * self.g);
+        let own = velocities.hypot(heading_sigma * a_n.truncate().length() / self.g);
+        let sigma = self.tilt_sigma(0.5 * seconds, own);
+        Some(Level {
+            roll,
+            pitch,
+            sigma,
+            from: Levelling::InMotion(seconds),
+        })
+    }
+}
+
+/// Whether velocities are those of rest, each and on average, as far as they are good to.
+fn slow(seen: &[&Moving]) -> bool {
+    let n = seen.len() as f64;
+    let mean = seen
+        .iter()
+        .map(|m| m.v_n.truncate())
+        .sum::<glam::DVec2>()
+        .length()
+        / n;
+    let sigma = (seen.iter().map(|m| m.sigma().powi(2)).sum::<f64>()).sqrt() / n;
+    let each = |m: &&Moving| m.speed() < 0.3_f64.max(4.0 * m.sigma());
+    !seen.is_empty() && seen.iter().all(each) && mean < 0.2_f64.max(4.0 * sigma)
+}
+
+/// Whether the fixes in a stretch of time stay in one place, as far as they are good to: within four
+/// standard deviations of the first.
+fn stays(fixes: &[Moving], from: f64, to: f64) -> bool {
+    let within: Vec<&GnssFix> = fixes
+        .iter()
+        .map(|m| &m.fix)
+        .filter(|f| (from..=to).contains(&f.t_s))
+        .collect();
+    let Some((first, rest)) = within.split_first() else {
+        return false;
+    };
+    let r = radii(first.lat.sin());
+    let near = |f: &&GnssFix| {
+        let north = (f.lat - first.lat) * (r.meridian + first.h);
+        let east = wrap_angle(f.lon - first.lon) * (r.transverse + first.h) * first.lat.cos();
+        let sigma = f
+            .pos_sigma_n
+            .truncate()
+            .length()
+            .hypot(first.pos_sigma_n.truncate().length());
+        north.hypot(east) < 0.5_f64.max(4.0 / std::f64::consts::SQRT_2 * sigma)
+    };
+    rest.len() >= 2 && rest.iter().all(near)
+}
+
+/// Roll and pitch that take a specific force in b to the same one in level axes of the right heading:
+/// f_h = R_y(pitch) R_x(roll) f_b, upright.
+fn level(f_b: DVec3, f_h: DVec3) -> (f64, f64) {
+    // After the roll, y is as it is in the level axes: ρ sin(delta − roll) = f_h.y with f_z < 0.
+    let (rho, delta) = (f_b.y.hypot(f_b.z), f_b.y.atan2(f_b.z));
+    let roll = wrap_angle(delta - std::f64::consts::PI + (f_h.y / rho).clamp(-1.0, 1.0).asin());
+    let v = DQuat::from_rotation_x(roll) * f_b;
+    let pitch = (v.z * f_h.x - v.x * f_h.z).atan2(v.x * f_h.x + v.z * f_h.z);
+    (roll, pitch)
+}
+
+// Which of two starts the fixes that follow speak for: the filter is run from both, and its innovations tell.
+
+/// How much of the recording is tried at first (s). Doubled while the two starts are not told apart.
+const TRIAL_S: f64 = 60.0;
+/// A heading that the smoother moves by more than so many of its standard deviations is not known as well as it says.
+const MOVED: f64 = 3.0;
+/// Largest standard deviation of a start (degrees).
+const WIDEST_DEG: f64 = 30.0;
+/// Difference of −2 ln(likelihood) between forwards and backwards from which one is refuted: odds of e^10.
+const DECIDED: f64 = 20.0;
+
+/// How well a start agrees with the fixes after it.
+#[derive(Debug, Clone, Copy)]
+struct Agreement {
+    /// −2 ln(likelihood) of the innovations, up to a constant.
+    cost: f64,
+    /// Mean NIS per component, and of how many components.
+    pub(super) nis: f64,
+    components: usize,
+}
+
+impl Agreement {
+    pub(super) fn holds(&self) -> bool {
+        self.nis <= nis_bound(self.components)
+    }
+}
+
+/// What the trial of two opposite starts says.
+pub struct Trial {
+    /// The better one, 0 or 1, and whether the other is refuted.
+    pub(super) better: usize,
+    pub(super) decided: bool,
+    /// How well the better one agrees with the first minute, and with all that was tried.
+    agreements: [Agreement; 2],
+}
+
+/// The solution from a start as far as `to_s`, its rows those of the start and the end.
+fn until(
+    recorded: &Recorded<'_>,
+    belief: &Belief,
+    settings: &Settings,
+    start: &Start,
+    to_s: f64,
+) -> Option<Solution> {
+    let imu = &recorded.imu[..recorded.imu.partition_point(|s| s.t_s <= to_s)];
+    let gnss = &recorded.gnss[..recorded.gnss.partition_point(|f| f.t_s <= to_s)];
+    let settings = Settings {
+        nis_gate: None,
+        rows_hz: 1e-3,
+        ..settings.clone()
+    };
+    fuse(
+        &Recorded {
+            imu,
+            gnss,
+            ..*recorded
+        },
+        belief,
+        start,
+        &settings,
+        None,
+    )
+    .ok()
+}
+
+fn agreement(
+    recorded: &Recorded<'_>,
+    belief: &Belief,
+    settings: &Settings,
+    start: &Start,
+    to_s: f64,
+) -> Agreement {
+    let failed = Agreement {
+        cost: f64::INFINITY,
+        nis: f64::INFINITY,
+        components: 0,
+    };
+    let settings = Settings {
+        smooth: false,
+        ..settings.clone()
+    };
+    let Some(solution) = until(recorded, belief, &settings, start, to_s) else {
+        return failed;
+    };
+    let mut sum = Agreement {
+        cost: 0.0,
+        nis: 0.0,
+        components: 0,
+    };
+    for fix in solution.fixes.iter().filter(|f| f.used == Use::Used) {
+        // the sum of the logarithms stands for the determinant: the correlations of both starts are alike
+        sum.cost += fix.nis + 2.0 * fix.sigma.iter().map(|s| s.ln()).sum::<f64>();
+        sum.nis += fix.nis;
+        sum.components += fix.innovation.len();
+    }
+    sum.nis = if sum.components > 0 {
+        sum.nis / sum.components as f64
+    } else {
+        0.0
+    };
+    sum
+}
+
+/// Runs the filter from both starts over the first minute, and longer while that does not tell them apart.
+fn opposite(
+    recorded: &Recorded<'_>,
+    belief: &Belief,
+    settings: &Settings,
+    starts: [&Start; 2],
+) -> Trial {
+    let begin_s = starts[0].t_s;
+    let end_s = recorded.gnss.last().map_or(begin_s, |f| f.t_s);
+    let mut window_s = TRIAL_S;
+    let mut first: Option<[Agreement; 2]> = None;
+    loop {
+        let to_s = begin_s + window_s;
+        let both = starts.map(|start| agreement(recorded, belief, settings, start, to_s));
+        let first = *first.get_or_insert(both);
+        // a receiver that is worse than it says exaggerates the difference as much as the NIS of the better
+        let least = both[0].nis.min(both[1].nis).max(1.0);
+        let gain = (both[0].cost - both[1].cost) / least;
+        let decided = gain.abs() >= DECIDED;
+        if decided || to_s >= end_s {
+            // forwards unless that is refuted
+            let better = usize::from(decided && gain > 0.0);
+            return Trial {
+                better,
+                decided,
+                agreements: [first[better], both[better]],
+            };
+        }
+        window_s *= 2.0;
+    }
+}
+
+/// Runs the filter from a start that has no other beside it, over the first minute.
+pub(super) fn alone(
+    recorded: &Recorded<'_>,
+    belief: &Belief,
+    settings: &Settings,
+    start: &Start,
+) -> Trial {
+    let agreement = agreement(recorded, belief, settings, start, start.t_s + TRIAL_S);
+    Trial {
+        better: 0,
+        decided: true,
+        agreements: [agreement; 2],
+    }
+}
+
+/// Widens the standard deviation of a heading that is not the course: wind sets an aircraft off, currents a boat. The
+/// smoother, from all fixes of the first minute, says how far.
+pub(super) fn widen(
+    recorded: &Recorded<'_>,
+    belief: &Belief,
+    settings: &Settings,
+    start: &mut Start,
+) {
+    let settings = Settings {
+        smooth: true,
+        ..settings.clone()
+    };
+    let solution = until(recorded, belief, &settings, start, start.t_s + TRIAL_S);
+    let Some([first, ..]) = solution.as_ref().and_then(|s| s.smoothed.as_deref()) else {
+        return;
+    };
+    let [course, heading] =
+        [start.state.q_b_n, first.state.q_b_n].map(|q| RollPitchYaw::from_quat(q).yaw);
+    let moved_deg = wrap_angle(heading - course) / DEG;
+    let sigma_deg = &mut start.sigma.att_sigma_deg[2];
+    if moved_deg.abs() > MOVED * *sigma_deg {
+        *sigma_deg = sigma_deg.hypot(moved_deg).min(WIDEST_DEG);
+        start
+            .found
+            .iter_mut()
+            .for_each(|found| found.moved_deg = Some(moved_deg));
+    }
+}
+
+#[cfg(test)]
+mod levelling_tests {
+    use super::*;
+
+    /// The two angles that made the specific force come out again, at rest and while turning and braking.
+    #[test]
+    fn levelling_inverts_the_attitude() {
+        for (roll, pitch) in [(0.0, 0.0), (0.3, -0.4), (-1.0, 0.7)] {
+            for a_h in [DVec3::ZERO, DVec3::new(2.0, -3.0, 0.5)] {
+                let f_h = a_h - DVec3::Z * 9.81;
+                let f_b = RollPitchYaw {
+                    roll,
+                    pitch,
+                    yaw: 0.0,
+                }
+                .to_quat()
+                .inverse()
+                    * f_h;
+                let (r, p) = level(f_b, f_h);
+                assert!(
+                    (r - roll).abs() < 1e-12 && (p - pitch).abs() < 1e-12,
+                    "{roll} {pitch}: {r} {p}"
+                );
+            }
+        }
+    }
+}

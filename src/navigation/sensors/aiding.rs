@@ -1,0 +1,889 @@
+//! What a vehicle knows of its own motion: the non-holonomic constraint, a wheel, standstill, a heading.
+//!
+//! Each is believed by the filter as white noise, and its lasting errors as states where a deviation of theirs is
+//! given. What is truly wrong with it stands apart in a table `truth`, so that a filter that leaves it out is seen.
+//!
+//! The vehicle's axes are forward, right, down, those of the reference. Models of the errors:
+//! [Groves](crate::bibliography::Groves13), sec. 15.3 (constraints) and 16.3 (odometers).
+
+use super::gnss::{MAX_LEVER_ARM_M, require_lever_arm};
+use crate::rng::{Generator, StreamKey};
+use crate::units::{
+    DEG, NonNegative, Positive, SettingError, exactly, require_non_negative, require_positive,
+};
+use glam::DVec3;
+use rand_distr::{Distribution, StandardNormal};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// `[aiding]`: measurements of the vehicle by itself, which outages do not concern but for a heading of two antennas.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct AidingSettings {
+    /// Non-holonomic constraint: a road vehicle moves neither sideways nor up.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nhc: Option<NhcSettings>,
+    /// Forward speed of a wheel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub odometer: Option<OdometerSettings>,
+    /// Zero velocity where the reference stands.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zupt: Option<ZuptSettings>,
+    /// Heading of a compass or of two antennas.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub heading: Option<HeadingSettings>,
+}
+
+impl AidingSettings {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first key whose value is refused, with its table within `aiding`.
+    pub fn validate(&self) -> Result<(), SettingError> {
+        let all = [
+            self.nhc.as_ref().map(NhcSettings::validate),
+            self.odometer.as_ref().map(OdometerSettings::validate),
+            self.zupt.as_ref().map(ZuptSettings::validate),
+            self.heading.as_ref().map(HeadingSettings::validate),
+        ];
+        for (aid, checked) in Aid::ALL.into_iter().zip(all) {
+            checked.transpose().map_err(|e| e.in_section(aid.name()))?;
+        }
+        Ok(())
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        self.rates().next().is_none()
+    }
+
+    /// Those that are there, and their rates (Hz).
+    pub fn rates(&self) -> impl Iterator<Item = (Aid, f64)> {
+        let rates = [
+            self.nhc.as_ref().map(|s| s.rate_hz),
+            self.odometer.as_ref().map(|s| s.rate_hz),
+            self.zupt.as_ref().map(|s| s.rate_hz),
+            self.heading.as_ref().map(|s| s.rate_hz),
+        ];
+        Aid::ALL
+            .into_iter()
+            .zip(rates)
+            .filter_map(|(aid, rate)| rate.map(|rate| (aid, rate)))
+    }
+
+    /// Whether an aid is part of the receiver: it measures nothing in outages.
+    pub(crate) fn is_of_gnss(&self, aid: Aid) -> bool {
+        let heading = self.heading.as_ref().filter(|_| aid == Aid::Heading);
+        heading.is_some_and(|heading| heading.source == HeadingSource::Antennas)
+    }
+
+    /// The point of which an aid measures the velocity, with respect to the IMU, in b (m).
+    pub(crate) fn lever_arm_b(&self, aid: Aid) -> DVec3 {
+        let arm = match aid {
+            Aid::Nhc => self.nhc.as_ref().map(|s| s.lever_arm_m),
+            Aid::Odometer => self.odometer.as_ref().map(|s| s.lever_arm_m),
+            Aid::Zupt | Aid::Heading => None,
+        };
+        arm.map_or(DVec3::ZERO, DVec3::from)
+    }
+
+    /// Standard deviations of one measurement's white noise, as the filter believes and in truth (m/s or rad).
+    #[must_use]
+    pub fn sigmas(&self, aid: Aid) -> [f64; 2] {
+        let (sigma, noise) = match aid {
+            Aid::Nhc => self
+                .nhc
+                .as_ref()
+                .map(|s| (s.sigma_m_s, s.truth.noise_sigma_m_s)),
+            Aid::Odometer => self
+                .odometer
+                .as_ref()
+                .map(|s| (s.sigma_m_s, s.truth.noise_sigma_m_s)),
+            Aid::Zupt => self
+                .zupt
+                .as_ref()
+                .map(|s| (s.sigma_m_s, s.truth.noise_sigma_m_s)),
+            Aid::Heading => {
+                let radians = |s: &HeadingSettings| {
+                    (s.sigma_deg * DEG, s.truth.noise_sigma_deg.map(|n| n * DEG))
+                };
+                self.heading.as_ref().map(radians)
+            }
+        }
+        .unwrap_or_default();
+        [sigma, noise.unwrap_or(sigma)]
+    }
+
+    /// Standard deviations of what a filter may have as states: scale of the wheel (1), pitch and yaw of the vehicle's
+    /// axes (rad); 0 where it has none.
+    #[must_use]
+    pub fn state_sigmas(&self) -> DVec3 {
+        let scale = self.odometer.as_ref().map_or(0.0, |s| s.scale_sigma);
+        let mounting = self
+            .nhc
+            .as_ref()
+            .map_or(0.0, |s| s.mounting_sigma_deg * DEG);
+        DVec3::new(scale, mounting, mounting)
+    }
+
+    /// A car: the constraint at the rear axle with states of its mounting, and what is truly wrong with it: 0.5° of
+    /// mounting, sideslip of 0.003 rad s²/m, 0.05 m/s of the suspension over a second.
+    #[must_use]
+    pub fn car() -> Self {
+        let truth = NhcErrors {
+            noise_sigma_m_s: Some(0.02),
+            mounting_sigma_deg: 0.5,
+            sideslip_s2_m: 0.003,
+            walk_sigma_m_s: 0.05,
+            correlation_time_s: 1.0,
+        };
+        let nhc = NhcSettings {
+            mounting_sigma_deg: 0.5,
+            truth,
+            ..NhcSettings::default()
+        };
+        Self {
+            nhc: Some(nhc),
+            ..Self::default()
+        }
+    }
+
+    /// The same with a wheel whose scale is off by one per cent, of which the filter has a state.
+    #[must_use]
+    pub fn car_with_odometer() -> Self {
+        let truth = OdometerErrors {
+            scale_sigma: 0.01,
+            noise_sigma_m_s: None,
+            slip_s2_m: 0.002,
+        };
+        let odometer = OdometerSettings {
+            sigma_m_s: 0.1,
+            scale_sigma: 0.01,
+            truth,
+            ..OdometerSettings::default()
+        };
+        Self {
+            odometer: Some(odometer),
+            ..Self::car()
+        }
+    }
+}
+
+/// A kind of aiding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Aid {
+    /// Non-holonomic constraint.
+    Nhc,
+    /// Speed of a wheel.
+    Odometer,
+    /// Zero velocity.
+    Zupt,
+    /// Yaw.
+    Heading,
+}
+
+impl Aid {
+    /// All, in the order of their use at one instant.
+    pub(crate) const ALL: [Self; 4] = [Self::Nhc, Self::Odometer, Self::Zupt, Self::Heading];
+
+    /// As its table is called.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        ["nhc", "odometer", "zupt", "heading"][self as usize]
+    }
+
+    /// The axes of the vehicle along which it measures the velocity; none of a heading.
+    pub(crate) const fn axes(self) -> &'static [usize] {
+        match self {
+            Self::Nhc => &[1, 2],
+            Self::Odometer => &[0],
+            Self::Zupt => &[0, 1, 2],
+            Self::Heading => &[],
+        }
+    }
+}
+
+// What is truly wrong with a vehicle's own measurements, and how it goes on.
+
+/// Acceleration times speed of a brisk drive (m²/s³): 2 m/s² at 10 m/s.
+const BRISK: f64 = 20.0;
+/// A constant is felt where the mean of a hundred measurements would show it.
+const LASTING_FIXES: f64 = 10.0;
+
+impl AidingSettings {
+    /// Errors that last, felt beside the white noise that the filter expects, of which it has no states: their names in
+    /// a budget, and the key that makes it expect them.
+    pub(crate) fn unexpected(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
+        // As for the errors of positions: a filter averages white noise over the time that the error lasts.
+        let felt = |error: f64, time_s: f64, rate_hz: f64, sigma: f64| {
+            error > 0.5 * sigma / (rate_hz * time_s).max(1.0).sqrt()
+        };
+        let (nhc, odometer) = (self.nhc.as_ref(), self.odometer.as_ref());
+        let (zupt, heading) = (self.zupt.as_ref(), self.heading.as_ref());
+        let slips = |slip: f64, sigma: f64| slip * BRISK > 0.5 * sigma;
+        let all = [
+            (
+                nhc.is_some_and(|s| {
+                    s.truth
+                        .noise_sigma_m_s
+                        .is_some_and(|noise| noise > s.sigma_m_s)
+                }),
+                ("aiding.nhc", "aiding.nhc.sigma_m_s"),
+            ),
+            (
+                nhc.is_some_and(|s| slips(s.truth.sideslip_s2_m, s.sigma_m_s)),
+                ("aiding.nhc.slip", "aiding.nhc.sigma_m_s"),
+            ),
+            (
+                odometer.is_some_and(|s| {
+                    s.truth
+                        .noise_sigma_m_s
+                        .is_some_and(|noise| noise > s.sigma_m_s)
+                }),
+                ("aiding.odometer", "aiding.odometer.sigma_m_s"),
+            ),
+            (
+                odometer.is_some_and(|s| slips(s.truth.slip_s2_m, s.sigma_m_s)),
+                ("aiding.odometer.slip", "aiding.odometer.sigma_m_s"),
+            ),
+            (
+                nhc.is_some_and(|s| s.mounting_sigma_deg < 0.5 * s.truth.mounting_sigma_deg),
+                ("aiding.nhc.mounting", "aiding.nhc.mounting_sigma_deg"),
+            ),
+            (
+                nhc.is_some_and(|s| {
+                    felt(
+                        s.truth.walk_sigma_m_s,
+                        s.truth.correlation_time_s,
+                        s.rate_hz,
+                        s.sigma_m_s,
+                    )
+                }),
+                ("aiding.nhc.suspension", "aiding.nhc.sigma_m_s"),
+            ),
+            (
+                odometer.is_some_and(|s| s.scale_sigma < 0.5 * s.truth.scale_sigma),
+                ("aiding.odometer.scale", "aiding.odometer.scale_sigma"),
+            ),
+            (
+                zupt.is_some_and(|s| {
+                    felt(
+                        s.truth.walk_sigma_m_s,
+                        s.truth.correlation_time_s,
+                        s.rate_hz,
+                        s.sigma_m_s,
+                    )
+                }),
+                ("aiding.zupt.creep", "aiding.zupt.sigma_m_s"),
+            ),
+            (
+                heading
+                    .is_some_and(|s| s.truth.offset_sigma_deg > 0.5 * s.sigma_deg / LASTING_FIXES),
+                ("aiding.heading.offset", "aiding.heading.sigma_deg"),
+            ),
+            (
+                heading.is_some_and(|s| {
+                    felt(
+                        s.truth.walk_sigma_deg,
+                        s.truth.correlation_time_s,
+                        s.rate_hz,
+                        s.sigma_deg,
+                    )
+                }),
+                ("aiding.heading.correlated", "aiding.heading.sigma_deg"),
+            ),
+        ];
+        all.into_iter()
+            .filter_map(|(is_there, found)| is_there.then_some(found))
+    }
+
+    /// What is truly wrong with them beside white noise (m/s, rad, 1).
+    pub(crate) fn errors(&self) -> Vec<AidError> {
+        let mut all = Vec::new();
+        let mut push = |aid, part, law: Law| {
+            all.extend((law.size() > 0.0).then_some(AidError { aid, part, law }))
+        };
+        if let Some(NhcSettings { truth, .. }) = &self.nhc {
+            let mounting = Law::Constant(truth.mounting_sigma_deg * DEG);
+            push(Aid::Nhc, AidPart::MountingPitch, mounting);
+            push(Aid::Nhc, AidPart::MountingYaw, mounting);
+            push(Aid::Nhc, AidPart::Slip, Law::Known(truth.sideslip_s2_m));
+            let moving = Law::GaussMarkov {
+                sigma: truth.walk_sigma_m_s,
+                time_s: truth.correlation_time_s,
+            };
+            push(Aid::Nhc, AidPart::SuspensionLateral, moving);
+            push(Aid::Nhc, AidPart::SuspensionVertical, moving);
+        }
+        if let Some(OdometerSettings { truth, .. }) = &self.odometer {
+            push(
+                Aid::Odometer,
+                AidPart::WheelScale,
+                Law::Constant(truth.scale_sigma),
+            );
+            push(
+                Aid::Odometer,
+                AidPart::WheelSlip,
+                Law::Known(truth.slip_s2_m),
+            );
+        }
+        if let Some(ZuptSettings { truth, .. }) = &self.zupt {
+            let creeping = Law::GaussMarkov {
+                sigma: truth.walk_sigma_m_s,
+                time_s: truth.correlation_time_s,
+            };
+            push(Aid::Zupt, AidPart::Creep, creeping);
+        }
+        if let Some(HeadingSettings { truth, .. }) = &self.heading {
+            push(
+                Aid::Heading,
+                AidPart::HeadingOffset,
+                Law::Constant(truth.offset_sigma_deg * DEG),
+            );
+            let sigma = truth.walk_sigma_deg * DEG;
+            let lasting = Law::GaussMarkov {
+                sigma,
+                time_s: truth.correlation_time_s,
+            };
+            push(Aid::Heading, AidPart::HeadingCorrelated, lasting);
+        }
+        all
+    }
+}
+
+/// An error of an aid that lasts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct AidError {
+    pub(crate) aid: Aid,
+    pub(crate) part: AidPart,
+    pub(crate) law: Law,
+}
+
+/// Which of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum AidPart {
+    MountingPitch,
+    MountingYaw,
+    Slip,
+    SuspensionLateral,
+    SuspensionVertical,
+    WheelScale,
+    WheelSlip,
+    Creep,
+    HeadingOffset,
+    HeadingCorrelated,
+}
+
+impl AidPart {
+    /// As a budget calls it; parts of one name are one source.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::MountingPitch | Self::MountingYaw => "mounting",
+            Self::Slip | Self::WheelSlip => "slip",
+            Self::SuspensionLateral | Self::SuspensionVertical => "suspension",
+            Self::WheelScale => "scale",
+            Self::Creep => "creep",
+            Self::HeadingOffset => "offset",
+            Self::HeadingCorrelated => "correlated",
+        }
+    }
+
+    /// Its stream of random numbers: its name, and the axis where a name has two.
+    const fn stream(self) -> &'static str {
+        match self {
+            Self::MountingPitch => "mounting_pitch",
+            Self::MountingYaw => "mounting_yaw",
+            Self::SuspensionLateral => "suspension_lateral",
+            Self::SuspensionVertical => "suspension_vertical",
+            other => other.name(),
+        }
+    }
+
+    /// The aid that it is part of.
+    pub(crate) const fn aid(self) -> Aid {
+        match self {
+            Self::MountingPitch
+            | Self::MountingYaw
+            | Self::Slip
+            | Self::SuspensionLateral
+            | Self::SuspensionVertical => Aid::Nhc,
+            Self::WheelScale | Self::WheelSlip => Aid::Odometer,
+            Self::Creep => Aid::Zupt,
+            Self::HeadingOffset | Self::HeadingCorrelated => Aid::Heading,
+        }
+    }
+
+    /// What a unit of it adds to the measurement along an axis of the vehicle (a heading has one, 0), which moves with
+    /// this velocity (m/s) and acceleration (m/s²), both in the vehicle's axes.
+    ///
+    /// The axes of the vehicle are those of the IMU turned by the small angles m: its velocity there is v − m × v.
+    pub(crate) fn coefficient(self, axis: usize, v_b: DVec3, a_b: DVec3) -> f64 {
+        match (self, axis) {
+            (Self::MountingYaw, 1) => -v_b.x,
+            (Self::MountingPitch, 2) | (Self::WheelScale, 0) => v_b.x,
+            // Tyres slip outwards, against the acceleration, and the constraint says that they do not; a driven wheel turns
+            // more than the way. Both in either direction of travel.
+            (Self::Slip, 1) => a_b.y * v_b.x.abs(),
+            (Self::WheelSlip, 0) => a_b.x * v_b.x.abs(),
+            (Self::SuspensionLateral, 1) | (Self::SuspensionVertical, 2) => 1.0,
+            (Self::Creep | Self::HeadingOffset | Self::HeadingCorrelated, 0) => 1.0,
+            _ => 0.0,
+        }
+    }
+}
+
+/// How an error goes on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Law {
+    /// The same value in every run.
+    Known(f64),
+    /// A constant of each run, of this standard deviation.
+    Constant(f64),
+    /// A Gauss-Markov process.
+    GaussMarkov { sigma: f64, time_s: f64 },
+}
+
+impl Law {
+    pub(crate) const fn size(self) -> f64 {
+        match self {
+            Self::Known(size) | Self::Constant(size) | Self::GaussMarkov { sigma: size, .. } => {
+                size
+            }
+        }
+    }
+}
+
+/// The errors of the aids in one run. Each has a stream of its own.
+#[derive(Debug, Clone)]
+pub(crate) struct AidNoise {
+    lasting: Vec<(AidError, Walk)>,
+    /// White noise of each aid along each of its axes: deviation and streams.
+    white: [(f64, [Generator; 3]); 4],
+}
+
+/// A lasting error as it goes on.
+#[derive(Debug, Clone)]
+struct Walk {
+    stream: Generator,
+    value: f64,
+    /// When it had that value (s).
+    at_s: f64,
+}
+
+impl AidNoise {
+    /// The errors of run `key.run`.
+    pub(crate) fn new(settings: &AidingSettings, key: StreamKey<'_>) -> Self {
+        let walk = |error: AidError| {
+            let process = error.part.stream();
+            let mut stream = StreamKey {
+                source: error.aid.name(),
+                process,
+                ..key
+            }
+            .generator();
+            let value = match error.law {
+                Law::Known(value) => value,
+                // a Gauss-Markov process is stationary from the start
+                Law::Constant(sigma) | Law::GaussMarkov { sigma, .. } => {
+                    sigma * normal(&mut stream)
+                }
+            };
+            (
+                error,
+                Walk {
+                    stream,
+                    value,
+                    at_s: 0.0,
+                },
+            )
+        };
+        let white = Aid::ALL.map(|aid| {
+            let stream = |process| {
+                StreamKey {
+                    source: aid.name(),
+                    process,
+                    ..key
+                }
+                .generator()
+            };
+            (
+                settings.sigmas(aid)[1],
+                ["white_x", "white_y", "white_z"].map(stream),
+            )
+        });
+        Self {
+            lasting: settings.errors().into_iter().map(walk).collect(),
+            white,
+        }
+    }
+
+    /// The error of a measurement along an axis, `after_s` seconds from the start, where the vehicle moves so.
+    pub(crate) fn draw(
+        &mut self,
+        aid: Aid,
+        axis: usize,
+        after_s: f64,
+        v_b: DVec3,
+        a_b: DVec3,
+    ) -> f64 {
+        let (sigma, streams) = &mut self.white[aid as usize];
+        let mut sum = *sigma * normal(&mut streams[axis]);
+        for (error, walk) in self
+            .lasting
+            .iter_mut()
+            .filter(|(error, _)| error.aid == aid)
+        {
+            let coefficient = error.part.coefficient(axis, v_b, a_b);
+            if coefficient != 0.0 {
+                sum += coefficient * walk.at(error.law, after_s);
+            }
+        }
+        sum
+    }
+}
+
+impl Walk {
+    fn at(&mut self, law: Law, after_s: f64) -> f64 {
+        if let Law::GaussMarkov { sigma, time_s } = law {
+            let kappa = (after_s - self.at_s) / time_s;
+            // phi e + √(1 − phi²) σ w keeps the variance; expm1 keeps the digits of a short step.
+            self.value = (-kappa).exp() * self.value
+                + (-(-2.0 * kappa).exp_m1()).sqrt() * sigma * normal(&mut self.stream);
+            self.at_s = after_s;
+        }
+        self.value
+    }
+}
+
+fn normal(generator: &mut Generator) -> f64 {
+    StandardNormal.sample(generator)
+}
+
+// The settings of each kind of aiding: what a filter believes, and what is true.
+
+/// `[aiding.nhc]`: lateral and vertical velocity of a point of the vehicle are zero.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct NhcSettings {
+    /// Measurements per second.
+    #[schemars(with = "Positive")]
+    pub rate_hz: f64,
+    /// Standard deviation of one measurement, white, as the filter believes (m/s).
+    #[schemars(with = "Positive")]
+    pub sigma_m_s: f64,
+    /// The point that moves neither sideways nor up, with respect to the IMU: front, right, down (m).
+    #[schemars(inner(range(min = -MAX_LEVER_ARM_M, max = MAX_LEVER_ARM_M)))]
+    #[serde(deserialize_with = "exactly")]
+    pub lever_arm_m: [f64; 3],
+    /// Pitch and yaw of the vehicle's axes in those of the IMU, as the filter expects them (1 σ, degrees): two states;
+    /// 0: none.
+    #[schemars(with = "NonNegative")]
+    pub mounting_sigma_deg: f64,
+    /// What is truly wrong with it.
+    pub truth: NhcErrors,
+}
+
+/// `[aiding.nhc.truth]`: without it, the white noise is as the filter believes, and there is nothing else.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct NhcErrors {
+    /// White noise of one measurement (m/s); unless given, what the filter believes.
+    #[schemars(with = "Option<NonNegative>")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_sigma_m_s: Option<f64>,
+    /// Pitch and yaw of the vehicle's axes in those of the IMU (1 σ, degrees), constant in a run.
+    #[schemars(with = "NonNegative")]
+    pub mounting_sigma_deg: f64,
+    /// Sideslip angle per lateral acceleration (rad s²/m), the same in every run.
+    #[schemars(with = "NonNegative")]
+    pub sideslip_s2_m: f64,
+    /// Lateral and vertical velocity of the body on its suspension (1 σ, m/s), a Gauss-Markov process.
+    #[schemars(with = "NonNegative")]
+    pub walk_sigma_m_s: f64,
+    /// Correlation time of that velocity (s).
+    #[schemars(with = "Positive")]
+    pub correlation_time_s: f64,
+}
+
+/// `[aiding.odometer]`: forward velocity of a point of the vehicle, by a wheel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct OdometerSettings {
+    /// Measurements per second.
+    #[schemars(with = "Positive")]
+    pub rate_hz: f64,
+    /// Standard deviation of one measurement, white, as the filter believes (m/s).
+    #[schemars(with = "Positive")]
+    pub sigma_m_s: f64,
+    /// The wheel, or the middle of its axle, with respect to the IMU: front, right, down (m).
+    #[schemars(inner(range(min = -MAX_LEVER_ARM_M, max = MAX_LEVER_ARM_M)))]
+    #[serde(deserialize_with = "exactly")]
+    pub lever_arm_m: [f64; 3],
+    /// Scale factor of the wheel, as the filter expects it (1 σ): a state; 0: none.
+    #[schemars(with = "NonNegative")]
+    pub scale_sigma: f64,
+    /// What is truly wrong with it.
+    pub truth: OdometerErrors,
+}
+
+/// `[aiding.odometer.truth]`: without it, the white noise is as the filter believes, and there is nothing else.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct OdometerErrors {
+    /// White noise of one measurement (m/s); unless given, what the filter believes.
+    #[schemars(with = "Option<NonNegative>")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_sigma_m_s: Option<f64>,
+    /// Scale-factor error (1 σ), constant in a run: the tyre.
+    #[schemars(with = "NonNegative")]
+    pub scale_sigma: f64,
+    /// Slip of the wheel: share of the speed per forward acceleration (s²/m), the same in every run.
+    #[schemars(with = "NonNegative")]
+    pub slip_s2_m: f64,
+}
+
+/// `[aiding.zupt]`: the velocity is zero, wherever the reference stands (below 0.01 m/s and 0.01 deg/s).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ZuptSettings {
+    /// Measurements per second.
+    #[schemars(with = "Positive")]
+    pub rate_hz: f64,
+    /// Standard deviation of one measurement, white, as the filter believes (m/s).
+    #[schemars(with = "Positive")]
+    pub sigma_m_s: f64,
+    /// What is truly wrong with it.
+    pub truth: ZuptErrors,
+}
+
+/// `[aiding.zupt.truth]`: without it, the white noise is as the filter believes, and there is nothing else.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ZuptErrors {
+    /// White noise of one measurement (m/s); unless given, what the filter believes.
+    #[schemars(with = "Option<NonNegative>")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_sigma_m_s: Option<f64>,
+    /// Forward velocity that is taken for standstill (1 σ, m/s), a Gauss-Markov process.
+    #[schemars(with = "NonNegative")]
+    pub walk_sigma_m_s: f64,
+    /// Correlation time of that velocity (s).
+    #[schemars(with = "Positive")]
+    pub correlation_time_s: f64,
+}
+
+/// `[aiding.heading]`: yaw of the vehicle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct HeadingSettings {
+    /// Measurements per second.
+    #[schemars(with = "Positive")]
+    pub rate_hz: f64,
+    /// Standard deviation of one measurement, white, as the filter believes (degrees).
+    #[schemars(with = "Positive")]
+    pub sigma_deg: f64,
+    /// What measures it.
+    pub source: HeadingSource,
+    /// What is truly wrong with it.
+    pub truth: HeadingErrors,
+}
+
+/// What measures a heading.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum HeadingSource {
+    /// A compass, which outages of GNSS do not concern.
+    #[default]
+    Compass,
+    /// Two antennas of GNSS: no heading in its outages.
+    Antennas,
+}
+
+/// `[aiding.heading.truth]`: without it, the white noise is as the filter believes, and there is nothing else.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct HeadingErrors {
+    /// White noise of one measurement (degrees); unless given, what the filter believes.
+    #[schemars(with = "Option<NonNegative>")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_sigma_deg: Option<f64>,
+    /// Offset (1 σ, degrees), constant in a run.
+    #[schemars(with = "NonNegative")]
+    pub offset_sigma_deg: f64,
+    /// Error that lasts (1 σ, degrees), a Gauss-Markov process: iron about a compass.
+    #[schemars(with = "NonNegative")]
+    pub walk_sigma_deg: f64,
+    /// Correlation time of that error (s).
+    #[schemars(with = "Positive")]
+    pub correlation_time_s: f64,
+}
+
+impl Default for NhcSettings {
+    fn default() -> Self {
+        Self {
+            rate_hz: 1.0,
+            // Sideslip and suspension last: 0.1 is overconfident by a third with those of a car.
+            sigma_m_s: 0.2,
+            lever_arm_m: [0.0; 3],
+            mounting_sigma_deg: 0.0,
+            truth: NhcErrors::default(),
+        }
+    }
+}
+
+impl Default for NhcErrors {
+    fn default() -> Self {
+        Self {
+            noise_sigma_m_s: None,
+            mounting_sigma_deg: 0.0,
+            sideslip_s2_m: 0.0,
+            walk_sigma_m_s: 0.0,
+            correlation_time_s: 1.0,
+        }
+    }
+}
+
+impl Default for OdometerSettings {
+    fn default() -> Self {
+        Self {
+            rate_hz: 1.0,
+            sigma_m_s: 0.05,
+            lever_arm_m: [0.0; 3],
+            scale_sigma: 0.0,
+            truth: OdometerErrors::default(),
+        }
+    }
+}
+
+impl Default for ZuptSettings {
+    fn default() -> Self {
+        Self {
+            rate_hz: 1.0,
+            sigma_m_s: 0.02,
+            truth: ZuptErrors::default(),
+        }
+    }
+}
+
+impl Default for ZuptErrors {
+    fn default() -> Self {
+        Self {
+            noise_sigma_m_s: None,
+            walk_sigma_m_s: 0.0,
+            correlation_time_s: 10.0,
+        }
+    }
+}
+
+impl Default for HeadingSettings {
+    fn default() -> Self {
+        Self {
+            rate_hz: 1.0,
+            sigma_deg: 0.5,
+            source: HeadingSource::default(),
+            truth: HeadingErrors::default(),
+        }
+    }
+}
+
+impl Default for HeadingErrors {
+    fn default() -> Self {
+        Self {
+            noise_sigma_deg: None,
+            offset_sigma_deg: 0.0,
+            walk_sigma_deg: 0.0,
+            correlation_time_s: 60.0,
+        }
+    }
+}
+
+/// Standard deviations that are 0 or more, by their keys.
+fn deviations(all: &[(&str, f64)]) -> Result<(), SettingError> {
+    all.iter()
+        .try_for_each(|(key, sigma)| require_non_negative(key, &[*sigma]))
+}
+
+impl NhcSettings {
+    pub(super) fn validate(&self) -> Result<(), SettingError> {
+        require_positive("rate_hz", &[self.rate_hz])?;
+        require_positive("sigma_m_s", &[self.sigma_m_s])?;
+        require_lever_arm(&self.lever_arm_m)?;
+        deviations(&[("mounting_sigma_deg", self.mounting_sigma_deg)])?;
+        let NhcErrors {
+            noise_sigma_m_s,
+            mounting_sigma_deg,
+            sideslip_s2_m,
+            walk_sigma_m_s,
+            correlation_time_s,
+        } = self.truth;
+        let all = [
+            ("noise_sigma_m_s", noise_sigma_m_s.unwrap_or(0.0)),
+            ("mounting_sigma_deg", mounting_sigma_deg),
+            ("sideslip_s2_m", sideslip_s2_m),
+            ("walk_sigma_m_s", walk_sigma_m_s),
+        ];
+        deviations(&all)
+            .and_then(|()| require_positive("correlation_time_s", &[correlation_time_s]))
+            .map_err(|e| e.in_section("truth"))
+    }
+}
+
+impl OdometerSettings {
+    pub(super) fn validate(&self) -> Result<(), SettingError> {
+        require_positive("rate_hz", &[self.rate_hz])?;
+        require_positive("sigma_m_s", &[self.sigma_m_s])?;
+        require_lever_arm(&self.lever_arm_m)?;
+        deviations(&[("scale_sigma", self.scale_sigma)])?;
+        let OdometerErrors {
+            noise_sigma_m_s,
+            scale_sigma,
+            slip_s2_m,
+        } = self.truth;
+        let all = [
+            ("noise_sigma_m_s", noise_sigma_m_s.unwrap_or(0.0)),
+            ("scale_sigma", scale_sigma),
+            ("slip_s2_m", slip_s2_m),
+        ];
+        deviations(&all).map_err(|e| e.in_section("truth"))
+    }
+}
+
+impl ZuptSettings {
+    pub(super) fn validate(&self) -> Result<(), SettingError> {
+        require_positive("rate_hz", &[self.rate_hz])?;
+        require_positive("sigma_m_s", &[self.sigma_m_s])?;
+        let ZuptErrors {
+            noise_sigma_m_s,
+            walk_sigma_m_s,
+            correlation_time_s,
+        } = self.truth;
+        deviations(&[
+            ("noise_sigma_m_s", noise_sigma_m_s.unwrap_or(0.0)),
+            ("walk_sigma_m_s", walk_sigma_m_s),
+        ])
+        .and_then(|()| require_positive("correlation_time_s", &[correlation_time_s]))
+        .map_err(|e| e.in_section("truth"))
+    }
+}
+
+impl HeadingSettings {
+    pub(super) fn validate(&self) -> Result<(), SettingError> {
+        require_positive("rate_hz", &[self.rate_hz])?;
+        require_positive("sigma_deg", &[self.sigma_deg])?;
+        let HeadingErrors {
+            noise_sigma_deg,
+            offset_sigma_deg,
+            walk_sigma_deg,
+            correlation_time_s,
+        } = self.truth;
+        let noise = noise_sigma_deg.unwrap_or(0.0);
+        deviations(&[
+            ("noise_sigma_deg", noise),
+            ("offset_sigma_deg", offset_sigma_deg),
+            ("walk_sigma_deg", walk_sigma_deg),
+        ])
+        .and_then(|()| require_positive("correlation_time_s", &[correlation_time_s]))
+        .map_err(|e| e.in_section("truth"))
+    }
+}

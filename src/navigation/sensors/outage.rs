@@ -1,0 +1,566 @@
+//! When GNSS is missing: fixed windows, periodic ones, random ones.
+//!
+//! A fix at t is missing when start ≤ t < end of any outage. Times are on the trajectory's own clock.
+
+use crate::rng::StreamKey;
+use crate::units::{Positive, SettingError, require_finite, require_positive};
+use rand_distr::{Distribution, Exp};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::str::FromStr;
+
+/// A window without fixes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Outage {
+    /// First instant without a fix (s).
+    pub start_s: f64,
+    /// First instant with a fix again (s).
+    pub end_s: f64,
+}
+
+/// What a time that is typed and the same time as a multiple of 1/rate differ by at most (s): times of days, 1e5 s, are
+/// rounded to 1.5e-11 s, so that some tens of roundings are less, and no two samples are as near.
+const SLACK_S: f64 = 1e-9;
+
+impl Outage {
+    /// The two outages of [Minaretzis et al.](crate::bibliography::Minaretzis24), Section V: one on a
+    /// straight stretch, one with turns.
+    pub const PAPER: [Self; 2] = [
+        Self {
+            start_s: 300.0,
+            end_s: 390.0,
+        },
+        Self {
+            start_s: 700.0,
+            end_s: 790.0,
+        },
+    ];
+
+    /// Whether a fix at `t_s` is missing.
+    #[must_use]
+    pub fn withholds(&self, t_s: f64) -> bool {
+        self.start_s <= t_s + SLACK_S && !self.is_over(t_s)
+    }
+
+    /// Whether a fix at `t_s` comes after it.
+    #[must_use]
+    pub(crate) fn is_over(&self, t_s: f64) -> bool {
+        self.end_s <= t_s + SLACK_S
+    }
+
+    /// Checks that it is finite and lasts.
+    ///
+    /// # Errors
+    /// The key whose value is refused.
+    pub(crate) fn validate(&self) -> Result<(), SettingError> {
+        require_finite("start_s", &[self.start_s])?;
+        require_finite("end_s", &[self.end_s])?;
+        if self.end_s > self.start_s {
+            return Ok(());
+        }
+        Err(SettingError::new(
+            "end_s",
+            self.end_s,
+            format!("it must come after start_s = {}", self.start_s),
+        ))
+    }
+}
+
+/// A text that is no outage.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NotAnOutage {
+    /// It does not have two times.
+    #[error("expected START:END in seconds, such as 300:390")]
+    Form,
+    /// They are refused.
+    #[error(transparent)]
+    Times(#[from] SettingError),
+}
+
+impl FromStr for Outage {
+    type Err = NotAnOutage;
+
+    /// `START:END`, in seconds.
+    fn from_str(text: &str) -> Result<Self, NotAnOutage> {
+        let time = |text: &str| text.trim().parse().map_err(|_| NotAnOutage::Form);
+        let (start, end) = text.split_once(':').ok_or(NotAnOutage::Form)?;
+        let outage = Self {
+            start_s: time(start)?,
+            end_s: time(end)?,
+        };
+        outage.validate()?;
+        Ok(outage)
+    }
+}
+
+// The data that outages are placed on, and what becomes of them there.
+
+/// When fixes come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fixes<'a> {
+    /// At whole intervals after the start of the data.
+    Every {
+        /// From one to the next (s).
+        interval_s: f64,
+    },
+    /// At these times (s), in order.
+    At(&'a [f64]),
+}
+
+/// The data that outages are placed on: the one rule of runs, studies and fusions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FixedData<'a> {
+    /// From when to when they last (s).
+    pub span_s: (f64, f64),
+    /// Their fixes.
+    pub fixes: Fixes<'a>,
+}
+
+impl<'a> FixedData<'a> {
+    /// Recorded fixes at these times (s): an outage may last until a fix later than the last would come, and
+    /// begin as early before the first.
+    #[must_use]
+    pub fn recorded(times_s: &'a [f64]) -> Self {
+        let interval_s = times_s.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+        let (first, last) = times_s
+            .first()
+            .zip(times_s.last())
+            .map_or((0.0, 0.0), |(f, l)| (*f, *l));
+        Self {
+            span_s: (first - interval_s, last + interval_s),
+            fixes: Fixes::At(times_s),
+        }
+    }
+
+    fn has_fix_in(&self, outage: &Outage) -> bool {
+        match self.fixes {
+            Fixes::Every { interval_s } => {
+                // The last fix before the outage and the first after its start, which rounding may exchange; at the
+                // earliest one interval after the start of the data: there is no fix at the start itself.
+                let last = ((outage.start_s - self.span_s.0) / interval_s)
+                    .floor()
+                    .max(1.0);
+                [last, last + 1.0]
+                    .iter()
+                    .any(|k| outage.withholds(self.span_s.0 + k * interval_s))
+            }
+            Fixes::At(times_s) => times_s.iter().any(|t_s| outage.withholds(*t_s)),
+        }
+    }
+
+    fn described(&self) -> String {
+        match self.fixes {
+            Fixes::Every { interval_s } => {
+                format!("fixes come every {interval_s} s from {} s", self.span_s.0)
+            }
+            Fixes::At([]) => "there are no fixes".to_owned(),
+            Fixes::At([first, .., last] | [first @ last]) => {
+                format!("the fixes run from {first} to {last} s")
+            }
+        }
+    }
+
+    /// An outage asked for by its times, cut where the data end.
+    pub(super) fn place(&self, asked: Outage) -> Result<Outage, OutageError> {
+        let (start_s, end_s) = self.span_s;
+        // clocks and people round to a microsecond
+        if asked.start_s < start_s - 1e-6 || asked.start_s >= end_s {
+            let span_s = self.span_s;
+            return Err(OutageError::Outside {
+                asked,
+                span_s,
+                fixes: self.described(),
+            });
+        }
+        let placed = Outage {
+            end_s: asked.end_s.min(end_s),
+            ..asked
+        };
+        if self.has_fix_in(&placed) {
+            return Ok(placed);
+        }
+        Err(OutageError::NoFix {
+            asked,
+            fixes: self.described(),
+        })
+    }
+}
+
+/// An outage that is refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum OutageError {
+    /// A value that no data could have.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// One asked for by its times that begins before the data or after them.
+    #[error("outage {}:{} does not lie on the data, which last from {} to {} s", .asked.start_s, .asked.end_s, .span_s.0, .span_s.1)]
+    Outside {
+        /// As asked for.
+        asked: Outage,
+        /// Of the data (s).
+        span_s: (f64, f64),
+        /// The fixes of the data, in words.
+        fixes: String,
+    },
+    /// One asked for by its times into which no fix falls.
+    #[error("outage {}:{} withholds no fix", .asked.start_s, .asked.end_s)]
+    NoFix {
+        /// As asked for.
+        asked: Outage,
+        /// The fixes of the data, in words.
+        fixes: String,
+    },
+}
+
+impl OutageError {
+    /// What to know to correct it.
+    #[must_use]
+    pub fn hint(&self) -> Option<&str> {
+        match self {
+            Self::Setting(_) => None,
+            Self::Outside { fixes, .. } | Self::NoFix { fixes, .. } => Some(fixes),
+        }
+    }
+}
+
+/// What became of outages on data that are not as they were asked for.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum OutageRemark {
+    /// One asked for is cut where the trajectory ends.
+    #[error("outage {}:{} is cut: the trajectory ends at {end_s} s", .asked.start_s, .asked.end_s)]
+    Cut {
+        /// As asked for.
+        asked: Outage,
+        /// End of the data (s).
+        end_s: f64,
+    },
+    /// One asked for is cut where the next fix would come.
+    #[error("outage {}:{} is cut at {end_s} s: the fixes end at {last_s} s", .asked.start_s, .asked.end_s)]
+    CutAfterFixes {
+        /// As asked for.
+        asked: Outage,
+        /// Where it ends (s).
+        end_s: f64,
+        /// Last fix (s).
+        last_s: f64,
+    },
+    /// Some overlap or touch.
+    #[error("outages that overlap or touch are made one")]
+    United,
+    /// The periodic ones begin after the data.
+    #[error("outage_periodic.first_s = {first_s} s: the trajectory ends at {end_s} s")]
+    PeriodicTooLate {
+        /// Start of the first (s).
+        first_s: f64,
+        /// End of the data (s).
+        end_s: f64,
+    },
+    /// A default one is cut.
+    #[error("the default outage {}:{} is cut: the trajectory lasts from {} to {} s", .default.start_s, .default.end_s, .span_s.0, .span_s.1)]
+    DefaultCut {
+        /// As it would be.
+        default: Outage,
+        /// Of the data (s).
+        span_s: (f64, f64),
+    },
+    /// A default one lies outside.
+    #[error("the default outage {}:{} is left out: the trajectory lasts from {} to {} s", .default.start_s, .default.end_s, .span_s.0, .span_s.1)]
+    DefaultLeftOut {
+        /// As it would be.
+        default: Outage,
+        /// Of the data (s).
+        span_s: (f64, f64),
+    },
+}
+
+/// Outages as they are on data.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PlacedOutages {
+    /// In time order, apart from one another.
+    pub windows: Vec<Outage>,
+    /// Where they are not what was asked for.
+    pub remarks: Vec<OutageRemark>,
+}
+
+// Outages at regular and at random times.
+
+/// Outages of one length at regular times, to the end of the trajectory.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PeriodicOutages {
+    /// Start of the first (s), on the clock of the trajectory: its `t_s`, which need not begin at 0.
+    pub first_s: f64,
+    /// From one start to the next (s).
+    #[schemars(range(min = Self::LEAST_INTERVAL_S))]
+    pub every_s: f64,
+    /// Length of each (s), less than `every_s`.
+    #[schemars(with = "Positive")]
+    pub duration_s: f64,
+}
+
+impl PeriodicOutages {
+    /// Shortest time from one start to the next (s).
+    pub const LEAST_INTERVAL_S: f64 = 0.1;
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The key whose value is refused.
+    pub(crate) fn validate(&self) -> Result<(), SettingError> {
+        require_finite("first_s", &[self.first_s])?;
+        require_positive("duration_s", &[self.duration_s])?;
+        if !(self.every_s.is_finite() && self.every_s >= Self::LEAST_INTERVAL_S) {
+            let requirement = format!("it must be a finite number ≥ {}", Self::LEAST_INTERVAL_S);
+            return Err(SettingError::new("every_s", self.every_s, requirement));
+        }
+        if self.duration_s < self.every_s {
+            return Ok(());
+        }
+        let requirement = format!("it must be shorter than every_s = {}", self.every_s);
+        Err(SettingError::new(
+            "duration_s",
+            self.duration_s,
+            requirement,
+        ))
+    }
+
+    pub(super) fn windows(&self, (from_s, end_s): (f64, f64)) -> Vec<Outage> {
+        // those that end before the span begins are not counted through: there may be as many as there is time
+        let skipped = ((from_s - self.duration_s - self.first_s) / self.every_s)
+            .floor()
+            .max(0.0);
+        (0_u32..)
+            .map(|k| self.first_s + (skipped + f64::from(k)) * self.every_s)
+            .take_while(|start| *start < end_s)
+            .map(|start_s| Outage {
+                start_s,
+                end_s: start_s + self.duration_s,
+            })
+            .collect()
+    }
+}
+
+/// Outages of one length at random times: from the end of one to the start of the next, an exponential
+/// waiting time. One draw for the whole experiment, so that every run has the same outages.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RandomOutages {
+    /// Outages per hour of time with fixes.
+    #[schemars(with = "Positive", range(max = Self::MOST_PER_HOUR))]
+    pub rate_per_hour: f64,
+    /// Length of each (s).
+    #[schemars(with = "Positive")]
+    pub duration_s: f64,
+}
+
+impl RandomOutages {
+    /// One a second.
+    pub const MOST_PER_HOUR: f64 = 3600.0;
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The key whose value is refused.
+    pub(crate) fn validate(&self) -> Result<(), SettingError> {
+        require_positive("rate_per_hour", &[self.rate_per_hour])?;
+        if self.rate_per_hour > Self::MOST_PER_HOUR {
+            let requirement = format!("it must be at most {}", Self::MOST_PER_HOUR);
+            return Err(SettingError::new(
+                "rate_per_hour",
+                self.rate_per_hour,
+                requirement,
+            ));
+        }
+        require_positive("duration_s", &[self.duration_s])
+    }
+
+    pub(super) fn windows(
+        &self,
+        (start_s, end_s): (f64, f64),
+        seed: u64,
+    ) -> Result<Vec<Outage>, SettingError> {
+        let refused = |_| {
+            SettingError::new(
+                "rate_per_hour",
+                self.rate_per_hour,
+                "it must be a number > 0",
+            )
+        };
+        let waiting = Exp::new(self.rate_per_hour / 3600.0).map_err(refused)?;
+        let key = StreamKey {
+            seed,
+            scenario: "",
+            run: 0,
+            source: "gnss.outage",
+            process: "waiting",
+        };
+        let mut generator = key.generator();
+        let mut windows = Vec::new();
+        let mut t = start_s + waiting.sample(&mut generator);
+        while t < end_s {
+            windows.push(Outage {
+                start_s: t,
+                end_s: t + self.duration_s,
+            });
+            // Waiting begins when fixes are back: the rate is that of outages per hour with fixes, and none
+            // overlap.
+            t += self.duration_s + waiting.sample(&mut generator);
+        }
+        Ok(windows)
+    }
+}
+
+// What outages are asked for, and the one rule of runs, studies and fusions that places them on data.
+
+/// What is asked for: the union of all kinds.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct OutagePlan {
+    /// Windows asked for by their times: they must lie on the data.
+    pub fixed: Vec<Outage>,
+    /// Windows that nobody asked for: cut or left out where the data are shorter.
+    pub default: Vec<Outage>,
+    /// Regular ones.
+    pub periodic: Option<PeriodicOutages>,
+    /// Random ones.
+    pub random: Option<RandomOutages>,
+}
+
+impl OutagePlan {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The key whose value is refused.
+    pub fn validate(&self) -> Result<(), SettingError> {
+        for (i, outage) in self.fixed.iter().enumerate() {
+            outage
+                .validate()
+                .map_err(|e| e.in_section(&format!("outage[{}]", i + 1)))?;
+        }
+        if let Some(periodic) = &self.periodic {
+            periodic
+                .validate()
+                .map_err(|e| e.in_section("outage_periodic"))?;
+        }
+        if let Some(random) = &self.random {
+            random
+                .validate()
+                .map_err(|e| e.in_section("outage_random"))?;
+        }
+        Ok(())
+    }
+
+    /// The outages on data: windows asked for must begin on them and withhold a fix, and are cut where the data
+    /// end; of all other kinds, what lies on the data remains.
+    ///
+    /// ```
+    /// use nav_sim_navigation::sensors::outage::{FixedData, Fixes, Outage, OutagePlan};
+    ///
+    /// let data = FixedData { span_s: (0.0, 60.0), fixes: Fixes::Every { interval_s: 1.0 } };
+    /// let plan = |start_s, end_s| OutagePlan {
+    ///     fixed: vec![Outage { start_s, end_s }],
+    ///     ..OutagePlan::default()
+    /// };
+    /// let placed = plan(50.0, 70.0).on(&data, 1)?;
+    /// assert_eq!(placed.windows, [Outage { start_s: 50.0, end_s: 60.0 }]);
+    /// assert_eq!(placed.remarks[0].to_string(), "outage 50:70 is cut: the trajectory ends at 60 s");
+    /// assert!(plan(70.0, 90.0).on(&data, 1).is_err());
+    /// # Ok::<(), nav_sim_navigation::sensors::outage::OutageError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// A value that is refused, or a window asked for that does not lie on the data.
+    pub fn on(&self, data: &FixedData<'_>, seed: u64) -> Result<PlacedOutages, OutageError> {
+        self.validate()?;
+        let (start_s, end_s) = data.span_s;
+        let mut remarks = Vec::new();
+        for asked in &self.fixed {
+            if data.place(*asked)? != *asked {
+                remarks.push(match data.fixes {
+                    Fixes::At([.., last_s]) => OutageRemark::CutAfterFixes {
+                        asked: *asked,
+                        end_s,
+                        last_s: *last_s,
+                    },
+                    _ => OutageRemark::Cut {
+                        asked: *asked,
+                        end_s,
+                    },
+                });
+            }
+        }
+        let windows = self.windows(data.span_s, seed)?;
+        // Every fixed window lies on the data by now: fewer windows than were asked for can only come of a
+        // union.
+        if self.fixed.len() > windows.len() {
+            remarks.push(OutageRemark::United);
+        }
+        if let Some(first_s) = self
+            .periodic
+            .map(|p| p.first_s)
+            .filter(|first_s| *first_s >= end_s)
+        {
+            remarks.push(OutageRemark::PeriodicTooLate { first_s, end_s });
+        }
+        for default in self.default.iter().copied() {
+            if default.end_s <= start_s || default.start_s >= end_s {
+                remarks.push(OutageRemark::DefaultLeftOut {
+                    default,
+                    span_s: data.span_s,
+                });
+            } else if default.start_s < start_s || default.end_s > end_s {
+                remarks.push(OutageRemark::DefaultCut {
+                    default,
+                    span_s: data.span_s,
+                });
+            }
+        }
+        Ok(PlacedOutages { windows, remarks })
+    }
+
+    /// The windows on data that last from `span_s.0` to `span_s.1`: in time order, those that overlap or touch
+    /// made one, cut at the ends, those outside left out.
+    pub(super) fn windows(
+        &self,
+        span_s: (f64, f64),
+        seed: u64,
+    ) -> Result<Vec<Outage>, SettingError> {
+        let mut all: Vec<Outage> = self.fixed.iter().chain(&self.default).copied().collect();
+        all.extend(
+            self.periodic
+                .iter()
+                .flat_map(|periodic| periodic.windows(span_s)),
+        );
+        if let Some(random) = &self.random {
+            all.extend(
+                random
+                    .windows(span_s, seed)
+                    .map_err(|e| e.in_section("outage_random"))?,
+            );
+        }
+        Ok(united(all, span_s))
+    }
+}
+
+fn united(mut windows: Vec<Outage>, (start_s, end_s): (f64, f64)) -> Vec<Outage> {
+    windows.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
+    let mut united: Vec<Outage> = Vec::new();
+    for window in windows {
+        let cut = Outage {
+            start_s: window.start_s.max(start_s),
+            end_s: window.end_s.min(end_s),
+        };
+        match united.last_mut() {
+            _ if cut.start_s >= cut.end_s => {}
+            // Touching counts as overlapping: the first fix after the one is the first that the other
+            // withholds.
+            Some(last) if cut.start_s <= last.end_s => last.end_s = last.end_s.max(cut.end_s),
+            _ => united.push(cut),
+        }
+    }
+    united
+}
+
+#[cfg(test)]
+#[path = "outage_tests.rs"]
+mod outage_tests;

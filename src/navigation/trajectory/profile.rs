@@ -1,0 +1,982 @@
+//! Motion profiles: a start and segments (straight, accelerate, turn, climb, stop, waypoints) become a
+//! trajectory with continuous acceleration and angular rate.
+//!
+//! Heading, speed and slope are closed-form functions of time within a segment; latitude and longitude are
+//! integrated on the ellipsoid (Runge-Kutta of fourth order, 0.02 s), then splined.
+//!
+//! ```
+//! use nav_sim_navigation::earth::radii;
+//! use nav_sim_navigation::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
+//!
+//! let start = Start { t_s: 0.0, lat: 0.9, lon: 0.2, h: 0.0, heading: 0.0, speed: 20.0 };
+//! let north = Segment { kind: Kind::Straight(Length::Duration(60.0)), climb_m: 0.0, ramp_s: None };
+//! let drive = Profile { start, bank: Bank::None, ramp_s: 2.0, segments: vec![north] }.build()?;
+//! let arc_m = (drive.state(60.0).lat - start.lat) * radii(start.lat.sin()).meridian;
+//! // 60 s at 20 m/s; the radius changes by 1e-6 on the way.
+//! assert!((arc_m - 1200.0).abs() < 0.01);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use super::{Trajectory, TrajectorySample};
+use crate::earth::radii;
+use crate::frames::{RollPitchYaw, wrap_angle};
+use crate::units::{DEG, STANDARD_GRAVITY};
+
+/// A motion profile.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profile {
+    /// Where and how it starts.
+    pub start: Start,
+    /// What the vehicle does with its roll angle.
+    pub bank: Bank,
+    /// Time over which accelerations and rates build up and fade (s), unless a segment says otherwise or
+    /// is shorter than twice that.
+    pub ramp_s: f64,
+    /// What it does, in order.
+    pub segments: Vec<Segment>,
+}
+
+/// The start of a profile.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start {
+    /// Time (s).
+    pub t_s: f64,
+    /// Geodetic latitude (rad).
+    pub lat: f64,
+    /// Longitude (rad).
+    pub lon: f64,
+    /// Height above the ellipsoid (m).
+    pub h: f64,
+    /// Heading from north (rad).
+    pub heading: f64,
+    /// Speed (m/s).
+    pub speed: f64,
+}
+
+/// Roll in turns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Bank {
+    /// Stays level across, as a land vehicle.
+    #[default]
+    None,
+    /// Banks so that the specific force stays in the plane of symmetry, as an aircraft:
+    /// tan(roll) = v · heading rate / g.
+    Coordinated,
+}
+
+/// One segment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Segment {
+    /// What happens.
+    pub kind: Kind,
+    /// Height gained over the segment (m), negative downwards.
+    pub climb_m: f64,
+    /// Overrides [`Profile::ramp_s`].
+    pub ramp_s: Option<f64>,
+}
+
+/// What happens in a segment.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Kind {
+    /// Constant speed and heading; at speed zero, standing.
+    Straight(Length),
+    /// Speed changes.
+    Accelerate {
+        /// Final speed (m/s).
+        to_speed: f64,
+        /// How fast.
+        by: Acceleration,
+    },
+    /// Heading changes.
+    Turn {
+        /// By how much (rad), positive to the right.
+        angle: f64,
+        /// How fast.
+        by: Turning,
+    },
+    /// Brakes if moving, then stands.
+    Stop {
+        /// Time at rest (s).
+        duration: f64,
+        /// Largest deceleration while braking (m/s²).
+        decel: f64,
+    },
+    /// From point to point on straight legs, cutting the corners with turns.
+    Waypoints {
+        /// The points; the path ends at the last and passes inside the others.
+        points: Vec<Waypoint>,
+        /// How fast the turns are.
+        by: Turning,
+    },
+}
+
+/// How long a straight is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Length {
+    /// In time (s).
+    Duration(f64),
+    /// Along the path (m).
+    Distance(f64),
+}
+
+/// How fast speed changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Acceleration {
+    /// Within a time (s).
+    Duration(f64),
+    /// With this largest acceleration (m/s²).
+    Peak(f64),
+}
+
+/// How fast heading changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Turning {
+    /// Within a time (s).
+    Duration(f64),
+    /// With this largest rate (rad/s).
+    Rate(f64),
+    /// With this smallest radius (m).
+    Radius(f64),
+    /// With this largest lateral acceleration (m/s²).
+    LateralAccel(f64),
+}
+
+impl Profile {
+    /// The trajectory of the profile.
+    ///
+    /// # Errors
+    /// The first value outside its domain, or segment that cannot be followed.
+    pub fn build(&self) -> Result<Trajectory, Error> {
+        let at_start = |problem| Error {
+            segment: None,
+            problem,
+        };
+        self.check_start().map_err(at_start)?;
+        let mut path = Path::new(self);
+        for (index, segment) in self.segments.iter().enumerate() {
+            path.follow(segment).map_err(|problem| Error {
+                segment: Some(index),
+                problem,
+            })?;
+        }
+        Trajectory::from_samples(&path.samples).map_err(|e| at_start(Problem::Samples(e)))
+    }
+
+    fn check_start(&self) -> Result<(), Problem> {
+        let s = &self.start;
+        for (key, value) in [
+            ("t_s", s.t_s),
+            ("lon_deg", s.lon),
+            ("h_m", s.h),
+            ("heading_deg", s.heading),
+        ] {
+            domain(key, "a finite number", value.is_finite())?;
+        }
+        domain(
+            "lat_deg",
+            "a latitude within ±89.9°",
+            s.lat.abs() <= crate::earth::MAX_LATITUDE,
+        )?;
+        domain(
+            "speed_m_s",
+            "a speed ≥ 0",
+            s.speed.is_finite() && s.speed >= 0.0,
+        )?;
+        positive("ramp_s", self.ramp_s)?;
+        domain(
+            "segment",
+            "a list of at least one segment",
+            !self.segments.is_empty(),
+        )
+    }
+}
+
+// What is wrong with a profile.
+
+/// A profile that cannot be followed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{}: \"{}\" {problem}", place(*segment), problem.key())]
+pub struct Error {
+    /// Which segment, counted from 0; none for the profile's own keys and its start.
+    pub segment: Option<usize>,
+    /// What is wrong.
+    pub problem: Problem,
+}
+
+fn place(segment: Option<usize>) -> String {
+    segment.map_or("start".to_owned(), |i| format!("segment {}", i + 1))
+}
+
+/// What is wrong with a profile; the texts continue `"key" = value`.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Problem {
+    /// A value outside its domain.
+    #[error("is not {domain}")]
+    Domain {
+        /// Key in profile files.
+        key: &'static str,
+        /// What would be accepted.
+        domain: &'static str,
+    },
+    /// Something that only a moving vehicle can do.
+    #[error("needs a moving vehicle, but it stands still here")]
+    AtRest {
+        /// Key in profile files.
+        key: &'static str,
+    },
+    /// Too much height for the path.
+    #[error("is too steep: {climb_m} m over {length_m:.1} m of path climbs more than 60°")]
+    TooSteep {
+        /// Height gained (m).
+        climb_m: f64,
+        /// Length of the path (m).
+        length_m: f64,
+    },
+    /// More than a day.
+    #[error("makes the trajectory {total_s:.3e} s long: more than a day")]
+    TooLong {
+        /// Duration up to the end of the segment (s).
+        total_s: f64,
+    },
+    /// A waypoint nearer than the turns before and after it need.
+    #[error("has waypoint {number} too near: {leg_m:.1} m away, the turns take {needed_m:.1} m")]
+    TooNear {
+        /// Which waypoint, from 1.
+        number: usize,
+        /// Distance left to it (m).
+        leg_m: f64,
+        /// Distance the turn needs (m).
+        needed_m: f64,
+    },
+    /// A waypoint inside the turning circle.
+    #[error("has waypoint {number} inside the turning circle")]
+    Unreachable {
+        /// Which waypoint, from 1.
+        number: usize,
+    },
+    /// A corner that turns back.
+    #[error("turns back by {angle_deg:.0}° at waypoint {number}: more than 150°")]
+    TurnsBack {
+        /// Which waypoint, from 1.
+        number: usize,
+        /// The corner (deg).
+        angle_deg: f64,
+    },
+    /// The path leaves the region of latitude and longitude, or turns too fast to sample.
+    #[error("gives no trajectory: {0}")]
+    Samples(super::Error),
+}
+
+impl Problem {
+    /// The key in profile files that is to blame.
+    #[must_use]
+    pub const fn key(&self) -> &'static str {
+        match self {
+            Self::Domain { key, .. } | Self::AtRest { key } => key,
+            Self::TooSteep { .. } => "climb_m",
+            Self::TooNear { .. } | Self::Unreachable { .. } | Self::TurnsBack { .. } => "points",
+            Self::TooLong { .. } => "duration_s",
+            Self::Samples(_) => "segment",
+        }
+    }
+
+    /// What to do about it, where that is not plain.
+    #[must_use]
+    pub const fn hint(&self) -> Option<&'static str> {
+        Some(match self {
+            Self::AtRest { .. } => {
+                "put an accelerate segment before it, or give the start a speed_m_s"
+            }
+            Self::TooSteep { .. } => "climb over a longer path, or for longer",
+            Self::TooNear { .. } | Self::Unreachable { .. } => {
+                "turn tighter, go slower, or move the point away"
+            }
+            Self::TurnsBack { .. } => "turn back over two points",
+            Self::Samples(super::Error::Rotation { .. }) => "give the turn more time",
+            Self::Domain { .. } | Self::TooLong { .. } | Self::Samples(_) => return None,
+        })
+    }
+}
+
+// From segments to samples.
+
+/// Time between samples of the path (s), at most.
+const STEP_S: f64 = 0.02;
+/// Steepest path (rad).
+const MAX_SLOPE: f64 = 60.0 * DEG;
+/// Longest path (s): a day.
+const MAX_DURATION_S: f64 = 86_400.0;
+
+pub(super) fn domain(key: &'static str, domain: &'static str, holds: bool) -> Result<(), Problem> {
+    if holds {
+        Ok(())
+    } else {
+        Err(Problem::Domain { key, domain })
+    }
+}
+
+pub(super) fn positive(key: &'static str, value: f64) -> Result<(), Problem> {
+    domain(key, "a finite number > 0", value.is_finite() && value > 0.0)
+}
+
+/// The path so far.
+pub(super) struct Path<'a> {
+    pub(super) profile: &'a Profile,
+    pub(super) t_s: f64,
+    pub(super) lat: f64,
+    pub(super) lon: f64,
+    pub(super) h: f64,
+    pub(super) heading: f64,
+    pub(super) speed: f64,
+    pub(super) samples: Vec<TrajectorySample>,
+}
+
+impl<'a> Path<'a> {
+    pub(super) fn new(profile: &'a Profile) -> Self {
+        let Start {
+            t_s,
+            lat,
+            lon,
+            h,
+            heading,
+            speed,
+        } = profile.start;
+        let mut path = Self {
+            profile,
+            t_s,
+            lat,
+            lon,
+            h,
+            heading,
+            speed,
+            samples: Vec::new(),
+        };
+        let still = Motion {
+            horizontal: speed,
+            heading,
+            heading_rate: 0.0,
+            slope: 0.0,
+            h,
+        };
+        path.sample(t_s, &still);
+        path
+    }
+
+    pub(super) fn follow(&mut self, segment: &Segment) -> Result<(), Problem> {
+        domain("climb_m", "a finite number", segment.climb_m.is_finite())?;
+        let ramp_s = segment.ramp_s.unwrap_or(self.profile.ramp_s);
+        positive("ramp_s", ramp_s)?;
+        let climb = segment.climb_m;
+        match &segment.kind {
+            Kind::Straight(length) => self.straight(*length, climb, ramp_s),
+            Kind::Accelerate { to_speed, by } => self.accelerate(*to_speed, *by, climb, ramp_s),
+            Kind::Turn { angle, by } => {
+                domain("angle_deg", "a finite number", angle.is_finite())?;
+                let duration = self.turn_duration(*angle, *by, ramp_s)?;
+                self.push([duration, ramp_s], 0.0, *angle, climb)
+            }
+            Kind::Stop { duration, decel } => {
+                if self.speed > 0.0 {
+                    positive("decel_m_s2", *decel)?;
+                    self.accelerate(0.0, Acceleration::Peak(*decel), 0.0, ramp_s)?;
+                }
+                self.straight(Length::Duration(*duration), climb, ramp_s)
+            }
+            Kind::Waypoints { points, by } => self.waypoints(points, *by, climb, ramp_s),
+        }
+    }
+
+    pub(super) fn straight(
+        &mut self,
+        length: Length,
+        climb: f64,
+        ramp_s: f64,
+    ) -> Result<(), Problem> {
+        let duration = match length {
+            Length::Duration(s) => {
+                positive("duration_s", s)?;
+                s
+            }
+            Length::Distance(m) => {
+                positive("distance_m", m)?;
+                m / self.moving("distance_m")?
+            }
+        };
+        self.push([duration, ramp_s], 0.0, 0.0, climb)
+    }
+
+    fn accelerate(
+        &mut self,
+        to: f64,
+        by: Acceleration,
+        climb: f64,
+        ramp_s: f64,
+    ) -> Result<(), Problem> {
+        domain("to_speed_m_s", "a speed ≥ 0", to.is_finite() && to >= 0.0)?;
+        let change = to - self.speed;
+        let duration = match by {
+            Acceleration::Duration(s) => {
+                positive("duration_s", s)?;
+                s
+            }
+            Acceleration::Peak(a) => {
+                positive("accel_m_s2", a)?;
+                domain("to_speed_m_s", "another speed than before", change != 0.0)?;
+                duration_of(change, a, ramp_s)
+            }
+        };
+        self.push([duration, ramp_s], change, 0.0, climb)?;
+        self.speed = to; // exactly
+        Ok(())
+    }
+
+    /// Duration of a turn at the present speed (s).
+    fn turn_duration(&self, angle: f64, by: Turning, ramp_s: f64) -> Result<f64, Problem> {
+        domain("angle_deg", "an angle other than 0", angle != 0.0)?;
+        let rate = match by {
+            Turning::Duration(s) => {
+                positive("duration_s", s)?;
+                return Ok(s);
+            }
+            Turning::Rate(rate) => {
+                positive("rate_deg_s", rate)?;
+                rate
+            }
+            Turning::Radius(m) => {
+                positive("radius_m", m)?;
+                self.moving("radius_m")? / m
+            }
+            Turning::LateralAccel(a) => {
+                positive("lateral_accel_m_s2", a)?;
+                a / self.moving("lateral_accel_m_s2")?
+            }
+        };
+        Ok(duration_of(angle, rate, ramp_s))
+    }
+
+    pub(super) fn moving(&self, key: &'static str) -> Result<f64, Problem> {
+        if self.speed > 0.0 {
+            Ok(self.speed)
+        } else {
+            Err(Problem::AtRest { key })
+        }
+    }
+
+    /// The piece that continues the path for a duration with a ramp (s).
+    pub(super) fn piece(
+        &self,
+        [duration, ramp_s]: [f64; 2],
+        speed: f64,
+        heading: f64,
+        climb: f64,
+    ) -> Piece {
+        let shape = Shape::new(ramp_s / duration);
+        let (speed, heading) = ([self.speed, speed], [self.heading, heading]);
+        Piece {
+            duration,
+            shape,
+            speed,
+            heading,
+            height: [self.h, climb],
+        }
+    }
+
+    /// Adds a piece of the given duration and ramp (s), changing speed, heading and height.
+    pub(super) fn push(
+        &mut self,
+        [duration, ramp_s]: [f64; 2],
+        speed: f64,
+        heading: f64,
+        climb: f64,
+    ) -> Result<(), Problem> {
+        let piece = self.piece([duration, ramp_s], speed, heading, climb);
+        if climb != 0.0 && piece.length() <= 0.0 {
+            return Err(Problem::AtRest { key: "climb_m" });
+        }
+        if piece.steepest() > MAX_SLOPE.sin() {
+            return Err(Problem::TooSteep {
+                climb_m: climb,
+                length_m: piece.length(),
+            });
+        }
+        let total_s = self.t_s + duration - self.profile.start.t_s;
+        if total_s > MAX_DURATION_S {
+            return Err(Problem::TooLong { total_s });
+        }
+        self.integrate(&piece);
+        Ok(())
+    }
+
+    fn integrate(&mut self, piece: &Piece) {
+        // A whole number of steps, so that the end of the piece, where the fourth derivative of the speed may
+        // jump, is a sample.
+        let n = (piece.duration / STEP_S - 1e-9).ceil().max(1.0);
+        let dt = piece.duration / n;
+        for k in 0..n as usize {
+            let x = |part: f64| (k as f64 + part) / n;
+            // Speed, heading and height are known in closed form: of the Runge-Kutta stages only the latitude
+            // is a guess, and nothing depends on the longitude.
+            let [from, middle, to] = [piece.at(x(0.0)), piece.at(x(0.5)), piece.at(x(1.0))];
+            let k1 = rates(self.lat, &from);
+            let k2 = rates(self.lat + 0.5 * dt * k1[0], &middle);
+            let k3 = rates(self.lat + 0.5 * dt * k2[0], &middle);
+            let k4 = rates(self.lat + dt * k3[0], &to);
+            let step = |i: usize| dt / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
+            (self.lat, self.lon) = (self.lat + step(0), self.lon + step(1));
+            self.sample(self.t_s + piece.duration * x(1.0), &to);
+        }
+        let end = piece.at(1.0);
+        self.t_s = (1e9 * (self.t_s + piece.duration)).round() / 1e9; // sums of decimals stay decimals
+        // From the closed form, not from the sums of steps: no error builds up over the segments.
+        (self.h, self.heading) = (end.h, end.heading);
+        self.speed += piece.speed[1];
+    }
+
+    fn sample(&mut self, t_s: f64, motion: &Motion) {
+        let roll = match self.profile.bank {
+            Bank::None => 0.0,
+            // Level turn: the lateral specific force v·ψ̇ and gravity combine along the down axis of the
+            // body.
+            Bank::Coordinated => {
+                (motion.horizontal * motion.heading_rate / STANDARD_GRAVITY).atan()
+            }
+        };
+        let q_b_n = RollPitchYaw {
+            roll,
+            pitch: motion.slope,
+            yaw: motion.heading,
+        }
+        .to_quat();
+        self.samples.push(TrajectorySample {
+            t_s,
+            lat: self.lat,
+            lon: self.lon,
+            h: motion.h,
+            q_b_n,
+        });
+    }
+}
+
+/// Duration of a change with a given peak rate: change/rate plus one ramp, or two ramps when it is short.
+fn duration_of(change: f64, rate: f64, ramp_s: f64) -> f64 {
+    let plateau = (change / rate).abs();
+    // peak = change/(duration − ramp) where ramp ≤ duration/2; a shorter change is all ramp, peak
+    // 2·change/duration.
+    plateau + ramp_s.min(plateau)
+}
+
+/// Rates of latitude and longitude (rad/s), [Groves](crate::bibliography::Groves13) eq. 2.111.
+fn rates(lat: f64, motion: &Motion) -> [f64; 2] {
+    let ((sin_lat, cos_lat), (sin_psi, cos_psi)) = (lat.sin_cos(), motion.heading.sin_cos());
+    let r = radii(sin_lat);
+    let (north, east) = (motion.horizontal * cos_psi, motion.horizontal * sin_psi);
+    [
+        north / (r.meridian + motion.h),
+        east / ((r.transverse + motion.h) * cos_lat),
+    ]
+}
+
+// One smooth stretch of motion: speed, heading and height go from one value to another with bell- or
+// table-shaped rates, so that acceleration and angular rate are continuous.
+
+/// The shape of a change from 0 to 1 over x in [0, 1]: its rate rises over a share `ramp` of the time as a
+/// quintic smooth step, stays, and falls likewise. Value, rate, and the rate's first two derivatives are
+/// continuous; outside [0, 1] nothing changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::trajectory) struct Shape {
+    /// Share of the whole that each ramp takes, in (0, 1/2].
+    ramp: f64,
+}
+
+impl Shape {
+    pub(in crate::trajectory) fn new(ramp: f64) -> Self {
+        Self {
+            ramp: ramp.min(0.5),
+        }
+    }
+
+    /// Largest rate; reached in the middle.
+    fn peak(self) -> f64 {
+        1.0 / (1.0 - self.ramp)
+    }
+
+    /// Rate of change at x.
+    pub(super) fn rate(self, x: f64) -> f64 {
+        let y = (x.min(1.0 - x) / self.ramp).clamp(0.0, 1.0);
+        // 10y³ − 15y⁴ + 6y⁵: first and second derivative are zero at both ends.
+        self.peak() * y * y * y * (10.0 + y * (6.0 * y - 15.0))
+    }
+
+    /// The change so far: the integral of the rate.
+    pub(in crate::trajectory) fn value(self, x: f64) -> f64 {
+        if x > 0.5 {
+            // The rate is symmetric about the middle: one formula for both ramps, and exactly 1 at the end.
+            return 1.0 - self.value(1.0 - x);
+        }
+        let y = (x / self.ramp).clamp(0.0, 1.0);
+        let ramped = self.ramp * y.powi(4) * (2.5 + y * (y - 3.0));
+        self.peak() * (ramped + (x - self.ramp).max(0.0))
+    }
+
+    /// The integral of the change so far.
+    pub(super) fn integral(self, x: f64) -> f64 {
+        if x > 0.5 {
+            return x - 0.5 + self.integral(1.0 - x); // from value(x) = 1 − value(1 − x)
+        }
+        let y = (x / self.ramp).clamp(0.0, 1.0);
+        let ramped = self.ramp * self.ramp * y.powi(5) * (0.5 + y * (y / 7.0 - 0.5));
+        let past = (x - self.ramp).max(0.0);
+        self.peak() * (ramped + past * (0.5 * self.ramp + 0.5 * past))
+    }
+}
+
+/// A stretch of motion: everything as a function of the share x of its duration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Piece {
+    /// Duration (s).
+    pub(super) duration: f64,
+    pub(super) shape: Shape,
+    /// Speed along the path at the start, and its change (m/s).
+    pub(super) speed: [f64; 2],
+    /// Heading at the start, and its change (rad).
+    pub(super) heading: [f64; 2],
+    /// Height at the start, and its change (m).
+    pub(super) height: [f64; 2],
+}
+
+/// The motion at an instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Motion {
+    /// Horizontal speed (m/s).
+    pub(super) horizontal: f64,
+    /// Heading (rad) and its rate (rad/s).
+    pub(super) heading: f64,
+    heading_rate: f64,
+    /// Angle of the path above the horizon (rad).
+    pub(super) slope: f64,
+    /// Height (m).
+    pub(super) h: f64,
+}
+
+impl Piece {
+    /// Length of the path (m): the mean of a symmetric change is half of it.
+    pub(super) fn length(&self) -> f64 {
+        self.duration * (self.speed[0] + 0.5 * self.speed[1])
+    }
+
+    /// Sine of the steepest slope; the height changes with the path, not with time, so that a vehicle that
+    /// starts or stops on a hill follows the road.
+    pub(super) fn steepest(&self) -> f64 {
+        if self.height[1] == 0.0 {
+            0.0
+        } else {
+            (self.height[1] / self.length()).abs() * self.shape.peak()
+        }
+    }
+
+    pub(super) fn at(&self, x: f64) -> Motion {
+        let speed = self.speed[0] + self.speed[1] * self.shape.value(x);
+        let (mut sin_slope, mut h) = (0.0, self.height[0]);
+        if self.height[1] != 0.0 {
+            let path = self.duration * (self.speed[0] * x + self.speed[1] * self.shape.integral(x));
+            let share = path / self.length();
+            sin_slope = self.height[1] / self.length() * self.shape.rate(share);
+            h += self.height[1] * self.shape.value(share);
+        }
+        Motion {
+            // Speed is along the path; what climbs does not go forwards.
+            horizontal: speed * (1.0 - sin_slope * sin_slope).sqrt(),
+            heading: self.heading[0] + self.heading[1] * self.shape.value(x),
+            heading_rate: self.heading[1] * self.shape.rate(x) / self.duration,
+            slope: sin_slope.asin(),
+            h,
+        }
+    }
+}
+
+// Straight legs between points, corners cut by smooth turns.
+
+/// The sharpest corner (rad): beyond it the turn would begin far before the corner.
+const MAX_CORNER: f64 = 150.0 * DEG;
+
+/// A point to pass.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Waypoint {
+    /// Where.
+    pub place: Place,
+    /// Height above the ellipsoid (m), if it is to change.
+    pub h: Option<f64>,
+}
+
+/// A horizontal position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Place {
+    /// Latitude and longitude (rad).
+    Geodetic {
+        /// Geodetic latitude (rad).
+        lat: f64,
+        /// Longitude (rad).
+        lon: f64,
+    },
+    /// North and east of the profile's start (m), curvilinear.
+    Local {
+        /// North (m).
+        north: f64,
+        /// East (m).
+        east: f64,
+    },
+}
+
+/// The geometry of a turn that cuts a corner.
+struct Corner {
+    /// Length of the straight line from its begin to its end (m), in the direction of half the turn.
+    chord: f64,
+    /// From its begin to the corner it cuts, and from there to its end (m).
+    lead: f64,
+}
+
+impl Path<'_> {
+    pub(super) fn waypoints(
+        &mut self,
+        points: &[Waypoint],
+        by: Turning,
+        climb: f64,
+        ramp_s: f64,
+    ) -> Result<(), Problem> {
+        domain("points", "a list of at least one point", !points.is_empty())?;
+        domain(
+            "climb_m",
+            "for waypoints: give the points \"h_m\"",
+            climb == 0.0,
+        )?;
+        self.moving("points")?;
+        let targets = points
+            .iter()
+            .map(|p| self.target(p))
+            .collect::<Result<Vec<_>, _>>()?;
+        for (i, &target) in targets.iter().enumerate() {
+            let number = i + 1;
+            self.turn_towards(target, by, ramp_s, number)?;
+            let (_, distance) = self.course([self.lat, self.lon], target);
+            let lead = match targets.get(i + 1) {
+                Some(&next) => self.lead(target, next, by, ramp_s, number)?,
+                None => 0.0,
+            };
+            if distance <= lead {
+                return Err(Problem::TooNear {
+                    number,
+                    leg_m: distance,
+                    needed_m: lead,
+                });
+            }
+            let climb = points[i].h.map_or(0.0, |h| h - self.h);
+            let length = self.path_length(distance - lead, climb, ramp_s);
+            self.straight(Length::Distance(length), climb, ramp_s)?;
+        }
+        Ok(())
+    }
+
+    /// Latitude and longitude of a waypoint (rad).
+    fn target(&self, point: &Waypoint) -> Result<[f64; 2], Problem> {
+        let start = &self.profile.start;
+        let r = radii(start.lat.sin());
+        let [lat, lon] = match point.place {
+            Place::Geodetic { lat, lon } => [lat, lon],
+            Place::Local { north, east } => [
+                start.lat + north / (r.meridian + start.h),
+                start.lon + east / ((r.transverse + start.h) * start.lat.cos()),
+            ],
+        };
+        let finite = lon.is_finite() && point.h.is_none_or(f64::is_finite);
+        domain(
+            "points",
+            "a list of points within ±89.9°",
+            finite && lat.abs() <= crate::earth::MAX_LATITUDE,
+        )?;
+        Ok([lat, lon])
+    }
+
+    /// Heading (rad) and length (m) of the loxodrome between two places, by the middle latitude: exact to
+    /// the third order in distance over Earth radius (1 mm at 10 km).
+    fn course(&self, from: [f64; 2], to: [f64; 2]) -> (f64, f64) {
+        let middle = 0.5 * (from[0] + to[0]);
+        let r = radii(middle.sin());
+        let north = (to[0] - from[0]) * (r.meridian + self.h);
+        let east = wrap_angle(to[1] - from[1]) * (r.transverse + self.h) * middle.cos();
+        (east.atan2(north), north.hypot(east))
+    }
+
+    /// Length of the path (m) that covers a horizontal distance while it climbs.
+    fn path_length(&self, distance: f64, climb: f64, ramp_s: f64) -> f64 {
+        let mut length = distance.hypot(climb);
+        for _ in 0..50 {
+            let duration = length / self.speed;
+            let piece = self.piece([duration, ramp_s], 0.0, 0.0, climb);
+            if piece.steepest() > MAX_SLOPE.sin() {
+                break; // refused when the path is to take it
+            }
+            // The horizontal distance grows almost as the path does: the iteration contracts unless the slope
+            // nears its limit.
+            let correction = distance - duration * mean(|x| piece.at(x).horizontal);
+            length += correction;
+            if correction.abs() < 1e-9 * distance {
+                break;
+            }
+        }
+        length
+    }
+
+    fn corner(&self, angle: f64, by: Turning, ramp_s: f64) -> Result<Corner, Problem> {
+        let duration = self.turn_duration(angle, by, ramp_s)?;
+        let piece = self.piece([duration, ramp_s], 0.0, angle, 0.0);
+        let half = self.heading + 0.5 * angle;
+        // By symmetry the path of a turn ends in the direction of half its angle; only the part of the
+        // velocity along it counts.
+        let chord = self.speed * duration * mean(|x| (piece.at(x).heading - half).cos());
+        // Chord and both leads are an isosceles triangle with the angle of the turn outside at the corner.
+        Ok(Corner {
+            chord,
+            lead: 0.5 * chord / (0.5 * angle).cos(),
+        })
+    }
+
+    /// Distance before the corner at `target` at which the turn to `next` begins (m).
+    fn lead(
+        &self,
+        target: [f64; 2],
+        next: [f64; 2],
+        by: Turning,
+        ramp_s: f64,
+        number: usize,
+    ) -> Result<f64, Problem> {
+        let angle = wrap_angle(self.course(target, next).0 - self.heading);
+        if angle.abs() > MAX_CORNER {
+            return Err(Problem::TurnsBack {
+                number,
+                angle_deg: angle.abs() / DEG,
+            });
+        }
+        if angle.abs() < 1e-9 {
+            Ok(0.0)
+        } else {
+            Ok(self.corner(angle, by, ramp_s)?.lead)
+        }
+    }
+
+    /// Turns so that the heading after the turn points from there to the target: secant steps on the angle.
+    fn turn_towards(
+        &mut self,
+        target: [f64; 2],
+        by: Turning,
+        ramp_s: f64,
+        number: usize,
+    ) -> Result<(), Problem> {
+        let mut angle = wrap_angle(self.course([self.lat, self.lon], target).0 - self.heading);
+        let mut before: Option<(f64, f64)> = None;
+        for _ in 0..50 {
+            if angle.abs() < 1e-9 {
+                return Ok(());
+            }
+            let miss = self.miss(angle, target, by, ramp_s)?;
+            if miss.abs() < 1e-11 {
+                let duration = self.turn_duration(angle, by, ramp_s)?;
+                return self.push([duration, ramp_s], 0.0, angle, 0.0);
+            }
+            // Turning by more leaves as much less to turn, but for the displacement during the turn.
+            let slope = before.map_or(-1.0, |(a, m)| (miss - m) / (angle - a));
+            before = Some((angle, miss));
+            // At most a radian at once: near the turning circle the slope nearly vanishes, and a secant would
+            // leap.
+            angle -= (miss / slope).clamp(-1.0, 1.0);
+        }
+        Err(Problem::Unreachable { number })
+    }
+
+    /// What is left to turn (rad) to the target after a turn by an angle.
+    fn miss(&self, angle: f64, target: [f64; 2], by: Turning, ramp_s: f64) -> Result<f64, Problem> {
+        let corner = self.corner(angle, by, ramp_s)?;
+        let r = radii(self.lat.sin());
+        let (sin_psi, cos_psi) = (self.heading + 0.5 * angle).sin_cos();
+        // Flat over the chord of a turn: hundreds of metres over the radius of the Earth, second order 1e-8
+        // of it.
+        let after = [
+            self.lat + corner.chord * cos_psi / (r.meridian + self.h),
+            self.lon + corner.chord * sin_psi / ((r.transverse + self.h) * self.lat.cos()),
+        ];
+        Ok(wrap_angle(
+            self.course(after, target).0 - self.heading - angle,
+        ))
+    }
+}
+
+/// The mean of a smooth function over [0, 1], by Simpson's rule.
+fn mean(f: impl Fn(f64) -> f64) -> f64 {
+    let n = 200;
+    let weight = |k: usize| {
+        if k == 0 || k == n {
+            1.0
+        } else {
+            2.0 + 2.0 * (k % 2) as f64
+        }
+    };
+    (0..=n)
+        .map(|k| weight(k) * f(k as f64 / n as f64))
+        .sum::<f64>()
+        / (3.0 * n as f64)
+}
+
+#[cfg(test)]
+#[path = "profile_tests.rs"]
+mod profile_tests;
+
+#[cfg(test)]
+mod piece_tests {
+    use super::*;
+
+    #[test]
+    fn rate_value_and_integral_are_derivatives_of_one_another() {
+        for ramp in [0.05, 0.3, 0.5] {
+            let s = Shape::new(ramp);
+            assert_eq!(
+                (s.value(0.0), s.value(1.0), s.integral(0.0)),
+                (0.0, 1.0, 0.0)
+            );
+            assert!(
+                (s.integral(1.0) - 0.5).abs() < 1e-15 && (s.rate(0.5) - s.peak()).abs() < 1e-15
+            );
+            for k in 1..200 {
+                let (x, step) = (f64::from(k) / 200.0, 1e-5);
+                let slope = |f: &dyn Fn(f64) -> f64| (f(x + step) - f(x - step)) / (2.0 * step);
+                assert!(
+                    (slope(&|x| s.value(x)) - s.rate(x)).abs() < 1e-6,
+                    "{ramp} {x}"
+                );
+                assert!(
+                    (slope(&|x| s.integral(x)) - s.value(x)).abs() < 1e-9,
+                    "{ramp} {x}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn height_follows_the_path_also_from_rest() {
+        let shape = Shape::new(0.25);
+        let piece = Piece {
+            duration: 10.0,
+            shape,
+            speed: [0.0, 8.0],
+            heading: [0.0; 2],
+            height: [100.0, 3.0],
+        };
+        let step = 1e-4;
+        for k in 1..100 {
+            let x = f64::from(k) / 100.0;
+            let [before, now, after] = [x - step, x, x + step].map(|x| piece.at(x));
+            let vertical = (after.h - before.h) / (2.0 * step * piece.duration);
+            assert!((now.slope.tan() * now.horizontal - vertical).abs() < 1e-6);
+        }
+        assert_eq!(piece.at(0.0).slope, 0.0);
+        assert!((piece.at(1.0).h - 103.0).abs() < 1e-12 && (piece.length() - 40.0).abs() < 1e-12);
+    }
+}
