@@ -1,8 +1,7 @@
 //! Outputs appear whole or not at all, whoever is killed.
 
 use super::*;
-use crate::formats::atomic::claim::guard_inputs;
-use std::fs;
+use std::cell::Cell;
 
 fn listing(dir: &Path) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(dir)
@@ -25,26 +24,47 @@ fn a_file_appears_at_commit_only() {
     assert_eq!(listing(path.parent().unwrap()), ["model.toml"]);
 }
 
-/// What a killed writer left is removed by the next one of the same output; what a living one writes, and
-/// what only looks like it, stays.
+thread_local! {
+    static STEPS_LEFT: Cell<usize> = const { Cell::new(usize::MAX) };
+}
+
+/// Lets this thread take so many steps more before it is killed.
+fn kill_after(steps: usize) {
+    STEPS_LEFT.set(steps);
+}
+
+pub(super) fn before_step() -> io::Result<()> {
+    let left = STEPS_LEFT.get();
+    STEPS_LEFT.set(left.saturating_sub(1));
+    (left > 0)
+        .then_some(())
+        .ok_or_else(|| io::Error::other("killed"))
+}
+
+/// What a killed writer left is removed by the next one that claims the same output; what only looks like it stays.
 #[test]
-fn what_killed_writers_left_goes_with_the_next_write() {
+fn what_killed_writers_left_goes_with_the_next_claim() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.csv");
-    let living = AtomicFile::create(&path).unwrap();
     fs::write(dir.path().join(".a.csv.12345-0.partial"), "half").unwrap();
     fs::create_dir(dir.path().join(".run.12345-7.partial")).unwrap();
     fs::write(dir.path().join(".a.csv.mine.partial"), "other").unwrap();
+    let claims = (
+        claim_file(&path, []).unwrap(),
+        claim_directory(
+            &dir.path().join("run"),
+            &["b.csv"],
+            std::iter::empty(),
+            Existing::Keep,
+            |_| Ok(Found::Same),
+        ),
+    );
     write(&path, "whole").unwrap();
-    let mut names = listing(dir.path());
-    assert_eq!(names.len(), 4, "{names:?}");
-    assert!(!names.iter().any(|n| n == ".a.csv.12345-0.partial"));
-    drop(living);
     let mut run = AtomicDir::create(&dir.path().join("run")).unwrap();
     run.write("b.csv", "b").unwrap();
     run.commit().unwrap();
-    names = listing(dir.path());
-    assert_eq!(names, [".a.csv.mine.partial", "a.csv", "run"]);
+    drop(claims);
+    assert_eq!(listing(dir.path()), [".a.csv.mine.partial", "a.csv", "run"]);
 }
 
 #[test]
@@ -197,11 +217,11 @@ fn a_replacement_that_is_killed_is_finished_by_the_next_command() {
         for name in ["a.csv", "b.csv", "manifest.json"] {
             out.write(name, "new").unwrap();
         }
-        directory::kill::after(first);
+        kill_after(first);
         assert!(out.commit().is_err(), "step {first}");
-        directory::kill::after(second);
+        kill_after(second);
         recover(dir.path());
-        directory::kill::after(usize::MAX);
+        kill_after(usize::MAX);
         recover(dir.path());
         assert_eq!(
             listing(dir.path()),
@@ -225,9 +245,9 @@ fn a_manifest_stands_beside_its_own_files_only() {
         let mut out = AtomicDir::create(dir.path()).unwrap();
         out.write("a.csv", "new").unwrap();
         out.write("manifest.json", "new").unwrap();
-        directory::kill::after(steps);
+        kill_after(steps);
         let _ = out.commit();
-        directory::kill::after(usize::MAX);
+        kill_after(usize::MAX);
         let contents = |name: &str| fs::read_to_string(dir.path().join(name)).ok();
         let manifest = contents("manifest.json");
         assert!(

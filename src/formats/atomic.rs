@@ -1,0 +1,741 @@
+//! Outputs that appear whole or not at all: written under a temporary name in the same directory, flushed
+//! to the disk, then renamed. What a command may write is found out before its work, and no other writes it meanwhile.
+//!
+//! Refused, with `--force` too: an input, what another command writes, what nav-sim did not write.
+//! A file takes the place of an earlier result of its own kind; `--force` is for one of another kind.
+//! A directory takes the place of the same run; `--force` is for one of another configuration, inputs or seed.
+
+use super::{FileError, Place, Setting, source};
+use std::collections::BTreeSet;
+use std::fs::{self, File, TryLockError};
+use std::io::{self, BufWriter, ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// What this process is writing. Whoever gives an output its name holds the list meanwhile, so that an
+/// interrupt finds the output whole or without its name.
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+/// What this process has claimed.
+static CLAIMED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn locked<T>(list: &'static Mutex<T>) -> MutexGuard<'static, T> {
+    list.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes everything this process is writing. From then on none of its outputs gets its name: for a process
+/// that is about to end.
+pub(crate) fn remove_unfinished() {
+    let unfinished = locked(&UNFINISHED);
+    for path in unfinished.iter() {
+        // other threads may still make files in a directory that is being removed
+        for _ in 0..10_000 {
+            remove(path);
+            if !path.exists() {
+                break;
+            }
+            std::thread::yield_now();
+        }
+    }
+    std::mem::forget(unfinished);
+}
+
+fn remove(path: &Path) {
+    drop(match path.is_dir() {
+        true => fs::remove_dir_all(path),
+        false => fs::remove_file(path),
+    });
+}
+
+/// A file or directory under a temporary name; removed when dropped, unless it was renamed.
+#[derive(Debug)]
+struct Temporary {
+    path: PathBuf,
+    /// Locked until it is closed, where it is a marker.
+    _lock: Option<File>,
+}
+
+/// Ending of what is being written, and of a directory whose files are being moved to their places.
+const PARTIAL: &str = "partial";
+const MOVING: &str = "moving";
+
+impl Temporary {
+    fn new(path: PathBuf, lock: Option<File>) -> Self {
+        locked(&UNFINISHED).insert(path.clone());
+        Self { path, _lock: lock }
+    }
+
+    /// Makes something beside the destination: hidden, and with an ending that no reader takes for data.
+    fn beside<T>(
+        destination: &Path,
+        make: impl Fn(&Path) -> io::Result<T>,
+    ) -> io::Result<(T, Self)> {
+        static COUNT: AtomicU64 = AtomicU64::new(0);
+        loop {
+            let (process, count) = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+            let name = format!(".{}.{process}-{count}.{PARTIAL}", name_of(destination));
+            let path = destination.with_file_name(name);
+            match make(&path) {
+                // left by a killed process whose number this one has now
+                Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
+                made => return Ok((made?, Self::new(path, None))),
+            }
+        }
+    }
+
+    /// The marker of an output, locked by the operating system: a process that is killed holds none. `None` while another
+    /// holds it.
+    fn marker(path: &Path) -> io::Result<Option<Self>> {
+        loop {
+            let file = File::options()
+                .create(true)
+                .truncate(false)
+                .write(true)
+                .open(path)?;
+            let lock = match file.try_lock() {
+                Ok(()) if !is_at(&file, path) => continue,
+                Ok(()) => Some(file),
+                Err(TryLockError::WouldBlock) => return Ok(None),
+                // there are no locks here
+                Err(TryLockError::Error(_)) => None,
+            };
+            return Ok(Some(Self::new(path.to_owned(), lock)));
+        }
+    }
+
+    /// Gives it its name.
+    fn rename(&mut self, to: &Path) -> io::Result<()> {
+        let mut unfinished = locked(&UNFINISHED);
+        fs::rename(&self.path, to)?;
+        unfinished.remove(&self.path);
+        Ok(())
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if locked(&UNFINISHED).remove(&self.path) {
+            remove(&self.path);
+        }
+    }
+}
+
+/// Whether a file has not lost its name since it was opened.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |m: fs::Metadata| (m.dev(), m.ino());
+    let found = file.metadata().ok().map(identity);
+    found.is_some() && fs::metadata(path).ok().map(identity) == found
+}
+
+#[cfg(not(unix))]
+fn is_at(_: &File, path: &Path) -> bool {
+    path.exists()
+}
+
+fn name_of(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+fn parent_of(path: &Path) -> &Path {
+    let parent = path.parent().unwrap_or(Path::new(""));
+    if parent.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        parent
+    }
+}
+
+/// What killed writers of an output left under temporary names of that ending: for who holds its marker.
+fn abandoned(path: &Path, ending: &str) -> Vec<PathBuf> {
+    let start = format!(".{}.", name_of(path));
+    let is_left = |name: &str| {
+        let middle = name
+            .strip_prefix(&start)
+            .and_then(|rest| rest.strip_suffix(ending)?.strip_suffix('.'));
+        middle.is_some_and(|m| m.bytes().all(|b| b.is_ascii_digit() || b == b'-'))
+    };
+    let entries = fs::read_dir(parent_of(path))
+        .into_iter()
+        .flatten()
+        .flatten();
+    let left = entries.filter(|e| is_left(&e.file_name().to_string_lossy()));
+    left.map(|e| e.path()).collect()
+}
+
+/// Writes a whole file.
+///
+/// # Errors
+/// As [`AtomicFile::create`] and [`AtomicFile::commit`].
+pub(crate) fn write(destination: &Path, contents: impl AsRef<[u8]>) -> Result<(), FileError> {
+    filled(destination, contents.as_ref())?.commit()
+}
+
+/// A file that is written but does not have its name yet.
+pub(crate) fn filled(destination: &Path, contents: &[u8]) -> Result<AtomicFile, FileError> {
+    let mut file = AtomicFile::create(destination)?;
+    let written = file.write_all(contents).and_then(|()| file.flush());
+    written.map_err(|e| FileError::io(destination, e))?;
+    Ok(file)
+}
+
+/// A file under a temporary name until [`AtomicFile::commit`]; dropped before that, it leaves nothing.
+///
+/// A destination that exists and is no regular file (a pipe, `/dev/null`) is written directly; a symbolic
+/// link is followed. Missing parent directories are made.
+#[derive(Debug)]
+pub(crate) struct AtomicFile {
+    destination: PathBuf,
+    temporary: Option<Temporary>,
+    file: BufWriter<File>,
+}
+
+impl AtomicFile {
+    /// Opens the temporary file beside `destination`.
+    ///
+    /// # Errors
+    /// When the directory cannot be made or written to.
+    pub(crate) fn create(destination: &Path) -> Result<Self, FileError> {
+        Self::open(destination).map_err(|e| FileError::unwritable(destination, e))
+    }
+
+    fn open(destination: &Path) -> io::Result<Self> {
+        let (file, temporary, destination) = match fs::metadata(destination) {
+            Ok(there) if there.is_dir() => return Err(ErrorKind::IsADirectory.into()),
+            Ok(there) if !there.is_file() => {
+                let file = File::options().write(true).open(destination)?;
+                (file, None, destination.to_owned())
+            }
+            there => {
+                let real = there.and_then(|_| destination.canonicalize());
+                let destination = real.unwrap_or_else(|_| destination.to_owned());
+                fs::create_dir_all(parent_of(&destination))?;
+                let (file, temporary) =
+                    Temporary::beside(&destination, |path| File::create_new(path))?;
+                (file, Some(temporary), destination)
+            }
+        };
+        Ok(Self {
+            destination,
+            temporary,
+            file: BufWriter::with_capacity(1 << 16, file),
+        })
+    }
+
+    /// Flushes to the disk and gives the file its name.
+    ///
+    /// # Errors
+    /// When the disk is full or the rename is refused; nothing is left then.
+    pub(crate) fn commit(mut self) -> Result<(), FileError> {
+        let mut finish = || {
+            self.file.flush()?;
+            let Some(temporary) = &mut self.temporary else {
+                return Ok(());
+            };
+            self.file.get_ref().sync_all()?;
+            temporary.rename(&self.destination)
+        };
+        finish().map_err(|e| FileError::io(&self.destination, e))
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// A directory of outputs, built under a temporary name until [`AtomicDir::commit`]; dropped before that,
+/// it leaves nothing.
+///
+/// If the destination exists (it may be a mount point, or hold files of the user), files of the same names are
+/// replaced and others left alone. The file declared last (a manifest, say) vanishes first and appears last:
+/// where it is, the rest is whole. Killed on the way, everything is still there, and [`recover`] finishes.
+#[derive(Debug)]
+pub(crate) struct AtomicDir {
+    destination: PathBuf,
+    staging: Temporary,
+    names: Vec<String>,
+}
+
+/// In a directory whose files are being moved: their names, a line each, in the order they were declared.
+const ORDER: &str = ".order";
+/// Temporary directories within a destination are named after this.
+const INSIDE: &str = "out";
+
+impl AtomicDir {
+    /// Makes the temporary directory, beside the destination or, if that exists, in it.
+    ///
+    /// # Errors
+    /// When the destination is a file, or a directory cannot be made.
+    pub(crate) fn create(destination: &Path) -> Result<Self, FileError> {
+        let make = || {
+            let path = match fs::metadata(destination) {
+                Ok(there) if !there.is_dir() => return Err(ErrorKind::NotADirectory.into()),
+                Ok(_) => destination.join(INSIDE),
+                Err(_) => destination.to_owned(),
+            };
+            recover(destination);
+            fs::create_dir_all(parent_of(&path))?;
+            Temporary::beside(&path, |path| fs::create_dir(path))
+        };
+        let ((), staging) = make().map_err(|e| FileError::unwritable(destination, e))?;
+        Ok(Self {
+            destination: destination.into(),
+            staging,
+            names: Vec::new(),
+        })
+    }
+
+    /// Declares a file and returns the path to write it at for now.
+    pub(crate) fn path(&mut self, name: &str) -> PathBuf {
+        if !self.names.iter().any(|n| n == name) {
+            self.names.push(name.to_owned());
+        }
+        self.staging.path.join(name)
+    }
+
+    /// Writes a whole small file.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub(crate) fn write(
+        &mut self,
+        name: &str,
+        contents: impl AsRef<[u8]>,
+    ) -> Result<(), FileError> {
+        self.write_parts(name, [contents])
+    }
+
+    /// Writes a file part by part.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub(crate) fn write_parts(
+        &mut self,
+        name: &str,
+        parts: impl IntoIterator<Item = impl AsRef<[u8]>>,
+    ) -> Result<(), FileError> {
+        let path = self.path(name);
+        let write = || {
+            let mut file = BufWriter::new(File::create(&path)?);
+            parts
+                .into_iter()
+                .try_for_each(|part| file.write_all(part.as_ref()))?;
+            file.flush()
+        };
+        write().map_err(|e| FileError::io(&self.destination.join(name), e))
+    }
+
+    /// Flushes the declared files to the disk and gives them their names.
+    ///
+    /// # Errors
+    /// When a declared file was not written, the disk is full, or a rename is refused.
+    pub(crate) fn commit(mut self) -> Result<(), FileError> {
+        for name in &self.names {
+            // Windows flushes through a handle for writing only
+            let mut options = File::options();
+            let file = options
+                .read(true)
+                .write(cfg!(windows))
+                .open(self.staging.path.join(name));
+            file.and_then(|file| file.sync_all())
+                .map_err(|e| FileError::io(&self.destination.join(name), e))?;
+        }
+        let moved = match self.destination.is_dir() {
+            true => self.replace(),
+            false => self.staging.rename(&self.destination),
+        };
+        moved.map_err(|e| FileError::io(&self.destination, e))
+    }
+
+    /// From the first rename on the new files are the ones that count: who is killed later leaves a directory
+    /// that [`recover`] takes further, so that no instant has neither the old files nor the new ones.
+    fn replace(&mut self) -> io::Result<()> {
+        let mut order = File::create(self.staging.path.join(ORDER))?;
+        order.write_all(self.names.join("\n").as_bytes())?;
+        order.sync_all()?;
+        // Windows renames no directory in which a file is open
+        drop(order);
+        let moving = self.staging.path.with_extension(MOVING);
+        self.staging.rename(&moving)?;
+        move_files(&moving, &self.destination)
+    }
+}
+
+/// Finishes what a writer of this directory had begun to put in place when it was killed. What cannot be
+/// finished (in a directory that may not be written to, say) stays as it is.
+pub(crate) fn recover(destination: &Path) {
+    if !abandoned(&destination.join(INSIDE), MOVING).is_empty()
+        && let Ok(Some(_marker)) = Temporary::marker(&destination.join(MARKER))
+    {
+        finish(destination);
+    }
+}
+
+fn finish(destination: &Path) {
+    for moving in abandoned(&destination.join(INSIDE), MOVING) {
+        drop(move_files(&moving, destination));
+    }
+}
+
+/// Moves files to their places and removes the directory they were in. May be done again from any point.
+fn move_files(moving: &Path, destination: &Path) -> io::Result<()> {
+    let _interrupts_wait = locked(&UNFINISHED);
+    let order = match fs::read_to_string(moving.join(ORDER)) {
+        Err(e) if e.kind() == ErrorKind::NotFound => String::new(), // all moved, the rest being removed
+        order => order?,
+    };
+    let mut names = order
+        .lines()
+        .filter(|name| moving.join(name).exists())
+        .peekable();
+    if let (Some(_), Some(last)) = (names.peek(), order.lines().last()) {
+        match step(|| fs::remove_file(destination.join(last))) {
+            Err(e) if e.kind() != ErrorKind::NotFound => return Err(e),
+            _ => {}
+        }
+    }
+    for name in names {
+        step(|| fs::rename(moving.join(name), destination.join(name)))?;
+    }
+    step(|| fs::remove_dir_all(moving))
+}
+
+/// A change of the file system; tests are killed before one of them.
+fn step(change: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+    #[cfg(test)]
+    tests::before_step()?;
+    change()
+}
+
+/// Outputs that are this command's own until this is dropped.
+#[derive(Debug)]
+#[must_use = "another command may write there as soon as this is dropped"]
+pub(crate) struct Claim {
+    outputs: Vec<PathBuf>,
+    _marker: Option<Temporary>,
+}
+
+/// Name of the marker in a directory of outputs; ending of the one beside an output.
+const MARKER: &str = ".claim";
+
+impl Claim {
+    /// Claims outputs in the place that `shown` names.
+    fn new(shown: &Path, marker: &Path, outputs: Vec<PathBuf>) -> Result<Self, FileError> {
+        let mut claimed = locked(&CLAIMED);
+        if outputs.iter().any(|output| claimed.contains(output)) {
+            let why = "is another output of the same command";
+            return Err(refused(shown, why).setting(Setting::Output));
+        }
+        let marked = fs::create_dir_all(parent_of(marker)).and_then(|()| Temporary::marker(marker));
+        let Some(marked) = marked.map_err(|e| FileError::unwritable(shown, e))? else {
+            return Err(refused(shown, "is being written by another nav-sim")
+                .setting(Setting::Output)
+                .advice("wait until that is done"));
+        };
+        claimed.extend(outputs.iter().cloned());
+        Ok(Self {
+            outputs,
+            _marker: Some(marked),
+        })
+    }
+
+    fn of_directory(directory: &Path, files: &[impl AsRef<str>]) -> Result<Self, FileError> {
+        loop {
+            let is_there = directory.is_dir();
+            let marker = match is_there {
+                true => directory.join(MARKER),
+                false => marker_beside(directory),
+            };
+            let at = resolved(directory);
+            let outputs = files.iter().map(|name| at.join(name.as_ref()));
+            let claim = Self::new(directory, &marker, outputs.chain([at.join("")]).collect())?;
+            // where the directory was made meanwhile, its writers hold the marker in it
+            if directory.is_dir() == is_there {
+                return Ok(claim);
+            }
+        }
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        let mut claimed = locked(&CLAIMED);
+        self.outputs
+            .iter()
+            .for_each(|output| _ = claimed.remove(output));
+    }
+}
+
+fn refused(path: &Path, why: &str) -> FileError {
+    FileError::contents(path.display().to_string(), Place::Itself, why)
+}
+
+fn marker_beside(path: &Path) -> PathBuf {
+    path.with_file_name(format!(".{}{MARKER}", name_of(path)))
+}
+
+/// A path by one name, whether anything is there or not.
+fn resolved(path: &Path) -> PathBuf {
+    let by_parent = || Some(parent_of(path).canonicalize().ok()?.join(path.file_name()?));
+    let own = path.canonicalize().ok().or_else(by_parent);
+    own.unwrap_or_else(|| path.to_owned())
+}
+
+/// Claims a file that can be made and is none of the inputs. A device is everybody's.
+///
+/// # Errors
+/// When it is an input, cannot be made, or another command writes it.
+pub(crate) fn claim_file<'a>(
+    output: &Path,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<Claim, FileError> {
+    guard_inputs(output, inputs)?;
+    AtomicFile::create(output)?; // dropped at once
+    if fs::metadata(output).is_ok_and(|m| !m.is_file()) {
+        return Ok(Claim {
+            outputs: Vec::new(),
+            _marker: None,
+        });
+    }
+    let output_at = resolved(output);
+    let claim = Claim::new(output, &marker_beside(&output_at), vec![output_at.clone()])?;
+    abandoned(&output_at, PARTIAL)
+        .iter()
+        .for_each(|left| remove(left));
+    Ok(claim)
+}
+
+/// Claims a file for a result: what stands there may be replaced.
+///
+/// # Errors
+/// As [`claim_file`]; when nav-sim did not write what stands there, or it is a result of another kind and to stay.
+pub(crate) fn claim_result<'a>(
+    output: &Path,
+    inputs: impl IntoIterator<Item = &'a Path>,
+    kind: Written,
+    existing: Existing,
+) -> Result<Claim, FileError> {
+    let claim = claim_file(output, inputs)?;
+    replaceable(output, kind.found(output), existing)?;
+    Ok(claim)
+}
+
+fn replaceable(path: &Path, found: Found, existing: Existing) -> Result<(), FileError> {
+    match found {
+        Found::Foreign => {
+            let why = "is not of this command: it is not replaced";
+            let error = refused(path, why).setting(Setting::Output);
+            Err(error.advice("move it away"))
+        }
+        Found::Other(why) if existing == Existing::Keep => {
+            Err(refused(path, why).setting(Setting::Force))
+        }
+        Found::Other(_) | Found::Same => Ok(()),
+    }
+}
+
+/// Refuses an output that is one of the inputs, under whatever name.
+fn guard_inputs<'a>(
+    output: &Path,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), FileError> {
+    let target = output.canonicalize().ok();
+    let is_it = |input: &Path| target.is_some() && input.canonicalize().ok() == target;
+    match inputs.into_iter().any(is_it) {
+        false => Ok(()),
+        true => {
+            let why = "is an input of this command and would be overwritten";
+            Err(refused(output, why).setting(Setting::Output))
+        }
+    }
+}
+
+/// What may become of a result that is there already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Existing {
+    /// It stays, unless what takes its place is of the same kind or run.
+    Keep,
+    /// Another takes its place.
+    Replace,
+}
+
+/// Claims a directory before the work whose results are to be written there: none of `files` is an input, the
+/// directory is new, empty, or of this command, and what it holds is the same or to be replaced. Finishes what a
+/// killed command had begun to put in place. Nothing is left: a command that is interrupted leaves no trace.
+///
+/// `recognise` is given the text of the last of `files`, if it is there.
+///
+/// # Errors
+/// Why not.
+pub(crate) fn claim_directory<'a>(
+    directory: &Path,
+    files: &[impl AsRef<str>],
+    inputs: impl Iterator<Item = &'a Path> + Clone,
+    existing: Existing,
+    recognise: impl FnOnce(&str) -> Result<Found, FileError>,
+) -> Result<Claim, FileError> {
+    for name in files {
+        guard_inputs(&directory.join(name.as_ref()), inputs.clone())?;
+    }
+    AtomicDir::create(directory)?; // dropped at once
+    let claim = Claim::of_directory(directory, files)?;
+    finish(directory);
+    let left = [directory, &directory.join(INSIDE)].map(|path| abandoned(path, PARTIAL));
+    left.concat().iter().for_each(|left| remove(left));
+    let last = directory.join(files.last().map_or("", AsRef::as_ref));
+    let found = match fs::read_to_string(&last) {
+        Err(_) => empty_or_new(directory),
+        Ok(text) => recognise(&text)?,
+    };
+    replaceable(directory, found, existing)?;
+    Ok(claim)
+}
+
+/// Files of the same names would be lost in a directory that holds anything.
+fn empty_or_new(directory: &Path) -> Found {
+    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
+    let mut names = entries.map(|entry| entry.file_name());
+    match names.any(|name| !name.to_string_lossy().starts_with('.')) {
+        true => Found::Foreign,
+        false => Found::Same,
+    }
+}
+
+/// A kind of file that nav-sim writes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Written {
+    Calibrated,
+    Datasheet,
+    Required,
+    Tuned,
+    Curves,
+    Draws,
+    Signals,
+    Comparison,
+    Export,
+    Page,
+    Svg,
+    Png,
+    Trajectory,
+}
+
+/// Most of a file that is looked at (bytes).
+const HEAD: u64 = 1 << 20;
+
+impl Written {
+    const ALL: [Self; 13] = [
+        Self::Calibrated,
+        Self::Datasheet,
+        Self::Required,
+        Self::Tuned,
+        Self::Curves,
+        Self::Draws,
+        Self::Signals,
+        Self::Comparison,
+        Self::Export,
+        Self::Page,
+        Self::Svg,
+        Self::Png,
+        Self::Trajectory,
+    ];
+
+    /// Texts that every file of the kind has.
+    const fn marks(self) -> [&'static str; 2] {
+        const MODEL: &str = "program = \"nav-sim ";
+        const JSON: &str = "\"schema_version\"";
+        match self {
+            Self::Calibrated => [MODEL, "[[provenance.fits]]"],
+            Self::Datasheet => [MODEL, "estimator = \"datasheet\""],
+            Self::Required => [MODEL, "made_by = \"require\""],
+            Self::Tuned => [MODEL, "made_by = \"tune\""],
+            Self::Curves => [JSON, "\"curves\""],
+            Self::Draws => [JSON, "\"draws\""],
+            Self::Signals => [JSON, "\"edof_method\""],
+            Self::Comparison => [JSON, "\"paired\""],
+            Self::Export => ["(nav-sim export)", ""],
+            Self::Page => ["<meta name=\"generator\" content=\"nav-sim\">", ""],
+            Self::Svg => ["<svg", "class=\"chart wide\""],
+            Self::Png => ["PNG", "Software\0nav-sim"],
+            Self::Trajectory => [
+                "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n",
+                "",
+            ],
+        }
+    }
+
+    /// What stands at a path where a file of this kind is to be written.
+    fn found(self, path: &Path) -> Found {
+        let Some(text) = head(path) else {
+            return if path.exists() {
+                Found::Foreign
+            } else {
+                Found::Same
+            };
+        };
+        let is_of = |kind: &Self| {
+            kind.marks().iter().all(|mark| text.contains(mark)) && kind.is_as_written(&text)
+        };
+        match () {
+            () if text.is_empty() || is_of(&self) => Found::Same,
+            () if Self::ALL.iter().any(is_of) => Found::Other("holds another kind of result"),
+            () => Found::Foreign,
+        }
+    }
+
+    /// Other programs write tables with the same header, but not each number in its shortest form.
+    fn is_as_written(self, text: &str) -> bool {
+        let row = text.lines().nth(1).unwrap_or_default();
+        let is_shortest = |cell: &str| cell.parse::<f64>().is_ok_and(|x| x.to_string() == cell);
+        self != Self::Trajectory || row.split(',').all(is_shortest)
+    }
+}
+
+fn head(path: &Path) -> Option<String> {
+    let file = source::open(path).ok()?;
+    let mut bytes = Vec::new();
+    let is_packed = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+    let read = match is_packed {
+        true => flate2::read::GzDecoder::new(file)
+            .take(HEAD)
+            .read_to_end(&mut bytes),
+        false => file.take(HEAD).read_to_end(&mut bytes),
+    };
+    read.is_ok()
+        .then(|| String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// What stands where a result is to be written; in a directory told by its last file, which appears when the others are whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Found {
+    /// Nothing that may be replaced.
+    Foreign,
+    /// Another result: how so.
+    Other(&'static str),
+    /// An earlier result of what is to be written, or nothing.
+    Same,
+}
+
+impl Found {
+    /// A result of this command, by whether all that decides it is the same.
+    pub(crate) const fn result(is_same: bool) -> Self {
+        match is_same {
+            true => Self::Same,
+            false => Self::Other(
+                "holds the result of another configuration, other inputs or another seed",
+            ),
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "atomic_tests.rs"]
+mod tests;
