@@ -3,7 +3,7 @@
 use super::parse::one_of;
 use super::pictures::claim_output;
 use super::{Failure, Session};
-use crate::export::{self, ExportError, Target};
+use crate::export::{self, Target};
 use crate::formats::atomic::{self, Written};
 use crate::formats::model_file;
 use crate::report;
@@ -49,7 +49,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let shown = args.model.display().to_string();
     let _own = claim_output(args.out.as_deref(), [&args.model], Written::Export, session)?;
     let export = export::exported(&file, args.target, args.policy, args.horizon)
-        .map_err(|e| Failure::input(format!("{shown}: {e}")).maybe_hint(advice(&e)))?;
+        .map_err(|failure| failure.within(&shown))?;
     let text = export.text(&shown);
     if let Some(out) = &args.out {
         atomic::write(out, text.clone() + "\n")?;
@@ -62,20 +62,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     match &args.out {
         _ if session.json() => session.result(report::json(&export.json(&shown)).trim_end()),
-        Some(out) => session.result(format!("{}: {}", out.display(), args.target.name())),
+        Some(out) => session.result(format!("{}: {}", out.display(), args.target.name)),
         None => session.result(&text),
     }
     Ok(())
-}
-
-fn advice(e: &ExportError) -> Option<String> {
-    match e {
-        ExportError::NoSensor { .. } => Some(
-            "calibrate recordings of both sensors, or write the other one's section by hand".into(),
-        ),
-        ExportError::NoSuchBias { .. } | ExportError::TwoTimes { .. } => {
-            Some("--policy matched fits the bias that the target has, over --horizon".to_owned())
-        }
-        ExportError::Curve { .. } => None,
-    }
 }

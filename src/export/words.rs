@@ -1,19 +1,70 @@
-//! What people are told: the head of the file, and doubts.
+//! What people and programs are told of an export: the head of the file, doubts, JSON.
 
-use super::{Export, Quantity, SensorExport};
+use super::{Export, SensorExport};
 use nav_sim_calibration::percent;
 use nav_sim_document::readable;
-use nav_sim_signal::noise::practical::{Pair, Policy, Ratio};
+use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::noise::practical::{AxisParameters, Markov, Pair, Policy, Ratio};
+use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
+use serde_json::{Map, Value, json};
 
 /// A pair is in doubt when its Allan deviation is off by more than this.
 const TOLERANCE: f64 = 1.5;
 /// Shares of the Allan variance, and differences of axes, that are told.
 const NOTABLE: f64 = 0.1;
 
+/// A quantity of a sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Quantity {
+    /// White noise density N: velocity or angle random walk.
+    Density,
+    /// Random-walk density K: acceleration or rate random walk.
+    Walk,
+    /// A bias: its instability, its standard deviation.
+    Bias,
+}
+
+impl Quantity {
+    /// Its SI unit, the unit of data sheets in ASCII as `nav-sim datasheet` reads it, and how many of those one SI unit is.
+    const fn units(self, sensor: Sensor) -> (&'static str, &'static str, f64) {
+        const ROOT_HOUR: f64 = 60.0;
+        match (self, sensor) {
+            (Self::Density, Sensor::Accel) => ("m/s^2/sqrt(Hz)", "m/s/sqrt(h)", ROOT_HOUR),
+            (Self::Density, Sensor::Gyro) => ("rad/s/sqrt(Hz)", "deg/sqrt(h)", ROOT_HOUR / DEG),
+            (Self::Walk, Sensor::Accel) => ("m/s^3/sqrt(Hz)", "m/s^2/sqrt(h)", ROOT_HOUR),
+            (Self::Walk, Sensor::Gyro) => (
+                "rad/s^2/sqrt(Hz)",
+                "deg/h/sqrt(h)",
+                ROOT_HOUR / DEG_PER_HOUR,
+            ),
+            (Self::Bias, Sensor::Accel) => (Sensor::Accel.unit(), "ug", 1e6 / STANDARD_GRAVITY),
+            (Self::Bias, Sensor::Gyro) => (Sensor::Gyro.unit(), "deg/h", 1.0 / DEG_PER_HOUR),
+        }
+    }
+
+    /// Its unit on data sheets, and how many of them one SI unit is.
+    pub(crate) const fn sheet(self, sensor: Sensor) -> (&'static str, f64) {
+        let (_, unit, factor) = self.units(sensor);
+        (unit, factor)
+    }
+
+    /// As text in the unit of data sheets.
+    fn text(self, x: f64, sensor: Sensor) -> String {
+        let (unit, factor) = self.sheet(sensor);
+        format!("{} {unit}", readable(x * factor))
+    }
+
+    /// As JSON, in SI and in the unit of data sheets.
+    fn json(self, x: f64, sensor: Sensor) -> Value {
+        let (si, unit, factor) = self.units(sensor);
+        json!({ "value": x, "unit": si, "data_sheet": { "value": x * factor, "unit": unit } })
+    }
+}
+
 impl Export {
     /// What stands at the head of the file.
     pub(super) fn head(&self, model: &str) -> Vec<String> {
-        let (horizon, name) = (self.settings.horizon, self.target.name());
+        let (horizon, name) = (self.settings.horizon, self.target.name);
         let mut lines = vec![format!(
             "{name}: {model}, {} Hz, policy {} over averages of {} s to {} s (nav-sim export)",
             self.rate_hz,
@@ -30,121 +81,199 @@ impl Export {
     pub(crate) fn summary(&self) -> Vec<String> {
         let line = |s: &SensorExport| {
             let (low, high) = (s.closure.lowest.ratio, s.closure.highest.ratio);
-            let off = format!("{low:.2} to {high:.2} × the model");
-            format!("{}: {}; {off}", s.sensor.name(), parameters(s))
+            format!(
+                "{}: {}; {low:.2} to {high:.2} × the model",
+                s.sensor.name(),
+                s.parameters()
+            )
         };
         self.sensors.iter().map(line).collect()
     }
 
     /// What a user should know before pasting, the most important first.
     pub(crate) fn doubts(&self) -> Vec<String> {
-        let mut doubts: Vec<String> = self
+        let misfit = self
             .settings
             .misfit
             .iter()
-            .map(|misfit| format!("the model {misfit}"))
-            .collect();
-        doubts.extend(self.sensors.iter().flat_map(|s| self.doubts_of(s)));
-        doubts.extend(self.entries.iter().filter_map(|e| {
-            let wanted = e.wanted?;
+            .map(|misfit| format!("the model {misfit}"));
+        let mut doubts: Vec<String> = misfit.collect();
+        for s in &self.sensors {
+            let own = s.doubts(self.settings.policy).into_iter();
+            doubts.extend(own.map(|doubt| format!("{}: {doubt}", s.sensor.name())));
+        }
+        doubts.extend(self.entries().iter().filter_map(|e| {
+            let (key, value, wanted) = (&e.key, e.value, e.wanted?);
             Some(format!(
-                "{} is {:.3e}, the end of its range; the model says {wanted:.3e}",
-                e.key, e.value
+                "{key} is {value:.3e}, the end of its range; the model says {wanted:.3e}"
             ))
         }));
-        if self.target.is_autopilot() {
+        if self.target.vibrates {
             doubts.push(
-                "a recording at rest has no vibration: these values are a lower bound".to_owned(),
+                "a recording at rest has no vibration: these values are a lower bound".into(),
             );
         }
         doubts
     }
 
-    fn doubts_of(&self, s: &SensorExport) -> Vec<String> {
+    /// As a JSON document.
+    pub(crate) fn json(&self, model: &str) -> Value {
+        let horizon = self.settings.horizon;
+        let sensors: Map<String, Value> = self
+            .sensors
+            .iter()
+            .map(|s| (s.sensor.name().to_owned(), s.json()))
+            .collect();
+        json!({
+            "schema_version": 1,
+            "target": self.target.name,
+            "model": model,
+            "rate_hz": self.rate_hz,
+            "policy": self.settings.policy.name(),
+            "horizon_s": [horizon.from_s, horizon.to_s],
+            "entries": self.entries(),
+            "sensors": sensors,
+            "warnings": self.doubts(),
+        })
+    }
+}
+
+impl SensorExport {
+    fn doubts(&self, policy: Policy) -> Vec<String> {
         let mut doubts = Vec::new();
-        if s.exported.density <= 0.0 {
+        let Pair {
+            density,
+            walk,
+            markov,
+        } = self.exported;
+        if density <= 0.0 {
             doubts.push("N is 0, with which many filters fail: try --policy matched".to_owned());
         }
-        if s.exported.walk <= 0.0 && s.exported.markov.is_none_or(|m| m.sigma <= 0.0) {
+        if walk <= 0.0 && markov.is_none_or(|m| m.sigma <= 0.0) {
             doubts.push("K is 0: a filter will hold its bias estimate for certain".to_owned());
         }
         let off = |Ratio { ratio, tau_s }: Ratio, trust: &str| {
+            let at = seconds(tau_s);
             format!(
-                "{ratio:.2} times the model's Allan deviation at {}: trusted too {trust} there",
-                seconds(tau_s)
+                "{ratio:.2} times the model's Allan deviation at {at}: trusted too {trust} there"
             )
         };
-        if s.closure.lowest.ratio < 1.0 / TOLERANCE {
-            doubts.push(off(s.closure.lowest, "much"));
+        if self.closure.lowest.ratio < 1.0 / TOLERANCE {
+            doubts.push(off(self.closure.lowest, "much"));
         }
-        if s.closure.highest.ratio > TOLERANCE {
-            doubts.push(off(s.closure.highest, "little"));
+        if self.closure.highest.ratio > TOLERANCE {
+            doubts.push(off(self.closure.highest, "little"));
         }
-        if s.left_out.ratio > NOTABLE && self.settings.policy != Policy::Envelope {
-            let (share, at) = (percent(s.left_out.ratio), seconds(s.left_out.tau_s));
+        if self.left_out.ratio > NOTABLE && policy != Policy::Envelope {
+            let (share, at) = (percent(self.left_out.ratio), seconds(self.left_out.tau_s));
             doubts.push(format!(
                 "quantization noise or drift, {share} of the Allan variance at {at}, is left out"
             ));
         }
-        doubts.extend(axes_differ(s));
+        let largest = self.axes.iter().map(|(_, _, d)| *d).fold(0.0, f64::max);
+        if self
+            .axes
+            .iter()
+            .any(|(_, _, d)| *d < (1.0 - NOTABLE) * largest)
+        {
+            let ratios: Vec<String> = self
+                .axes
+                .iter()
+                .map(|(c, _, d)| format!("{} {:.2}", c.axis.name(), d / largest))
+                .collect();
+            let ratios = ratios.join(", ");
+            doubts.push(format!(
+                "axes differ (Allan deviation at 1 s: {ratios}); the largest is exported"
+            ));
+        } else if self.axes.len() < 3 {
+            doubts.push(format!("the model has {} of three axes", self.axes.len()));
+        }
         doubts
-            .into_iter()
-            .map(|doubt| format!("{}: {doubt}", s.sensor.name()))
-            .collect()
+    }
+
+    /// `N 0.42 deg/sqrt(h), K 12 deg/h/sqrt(h), B 8.3 deg/h at 160 s`.
+    fn parameters(&self) -> String {
+        let figure = |what: Quantity, x: f64| what.text(x, self.sensor);
+        let Pair {
+            density,
+            walk,
+            markov,
+        } = self.exported;
+        let bias = markov.map_or_else(
+            || format!("K {}", figure(Quantity::Walk, walk)),
+            |m| {
+                format!(
+                    "bias {} with T = {}",
+                    figure(Quantity::Bias, m.sigma),
+                    seconds(m.t_corr_s)
+                )
+            },
+        );
+        let floor = self.largest.minimum.map_or_else(
+            || "B not reached".to_owned(),
+            |m| {
+                format!(
+                    "B {} at {}",
+                    figure(Quantity::Bias, m.bias_instability()),
+                    seconds(m.tau_s)
+                )
+            },
+        );
+        format!("N {}, {bias}, {floor}", figure(Quantity::Density, density))
+    }
+
+    fn json(&self) -> Value {
+        let unit = self.sensor.unit();
+        let axes: Map<String, Value> = self
+            .axes
+            .iter()
+            .map(|(channel, found, deviation)| {
+                let mut value = parameters(found, self.sensor);
+                value["allan_deviation_at_1_s"] = json!({ "value": deviation, "unit": unit });
+                (channel.axis.name().to_owned(), value)
+            })
+            .collect();
+        let ratio = |r: Ratio| json!({ "ratio": r.ratio, "tau_s": r.tau_s });
+        json!({
+            "exported": pair(&self.exported, self.sensor),
+            "closure": { "lowest": ratio(self.closure.lowest), "highest": ratio(self.closure.highest) },
+            "bias_sd": { "value": self.bias_sd, "unit": unit },
+            "largest": parameters(&self.largest, self.sensor),
+            "axes": axes,
+        })
     }
 }
 
-/// The axes beside the largest, where they differ or some are missing.
-fn axes_differ(s: &SensorExport) -> Option<String> {
-    let largest = s.deviation_at_1_s.iter().copied().fold(0.0, f64::max);
-    if s.deviation_at_1_s
-        .iter()
-        .all(|d| *d >= (1.0 - NOTABLE) * largest)
-    {
-        return (s.axes.len() < 3).then(|| format!("the model has {} of three axes", s.axes.len()));
-    }
-    let ratio = |((channel, _), d): (&(nav_sim_signal::imu::Channel, _), &f64)| {
-        format!("{} {:.2}", channel.axis.name(), d / largest)
-    };
-    let ratios: Vec<String> = s.axes.iter().zip(&s.deviation_at_1_s).map(ratio).collect();
-    Some(format!(
-        "axes differ (Allan deviation at 1 s: {}); the largest is exported",
-        ratios.join(", ")
-    ))
+/// The parameters of an axis, each in SI and in the unit of data sheets.
+pub(crate) fn parameters(p: &AxisParameters, sensor: Sensor) -> Value {
+    let minimum = p.minimum.map(|m| {
+        let b = Quantity::Bias.json(m.bias_instability(), sensor);
+        json!({ "tau_s": m.tau_s, "allan_deviation": m.deviation, "bias_instability": b })
+    });
+    let correlated = p.correlated.iter().map(|c| {
+        let mut value = markov(&c.markov, sensor);
+        value["process"] = json!(c.label);
+        value
+    });
+    json!({
+        "white_and_walk": pair(&p.walk, sensor),
+        "white_and_markov": pair(&p.markov, sensor),
+        "minimum": minimum,
+        "correlated": correlated.collect::<Vec<_>>(),
+    })
 }
 
-/// `N 0.42 deg/sqrt(h), K 12 deg/h/sqrt(h), B 8.3 deg/h at 160 s`.
-fn parameters(s: &SensorExport) -> String {
-    let figure = |what: Quantity, x: f64| {
-        let (unit, factor) = what.sheet(s.sensor);
-        format!("{} {unit}", readable(x * factor))
-    };
-    let Pair {
-        density,
-        walk,
-        markov,
-    } = s.exported;
-    let bias = markov.map_or_else(
-        || format!("K {}", figure(Quantity::Walk, walk)),
-        |m| {
-            format!(
-                "bias {} with T = {}",
-                figure(Quantity::Bias, m.sigma),
-                seconds(m.t_corr_s)
-            )
-        },
-    );
-    let floor = s.largest.minimum.map_or_else(
-        || "B not reached".to_owned(),
-        |m| {
-            format!(
-                "B {} at {}",
-                figure(Quantity::Bias, m.bias_instability()),
-                seconds(m.tau_s)
-            )
-        },
-    );
-    format!("N {}, {bias}, {floor}", figure(Quantity::Density, density))
+fn pair(p: &Pair, sensor: Sensor) -> Value {
+    let crossover = p.crossover_s();
+    let mut n = Quantity::Density.json(p.density, sensor);
+    n["governs"] = json!({ "from_s": null, "to_s": crossover });
+    let mut k = Quantity::Walk.json(p.walk, sensor);
+    k["governs"] = json!({ "from_s": crossover, "to_s": null });
+    json!({ "n": n, "k": k, "markov": p.markov.as_ref().map(|m| markov(m, sensor)) })
+}
+
+fn markov(m: &Markov, sensor: Sensor) -> Value {
+    json!({ "sigma": Quantity::Bias.json(m.sigma, sensor), "t_corr_s": m.t_corr_s })
 }
 
 fn seconds(t_s: f64) -> String {

@@ -272,15 +272,15 @@ def scales(values):
     return largest
 
 
-def after_minimiser(path, old, new, stored):
-    """An objective is no higher by 1e-9, a parameter is within 2 % of half its interval, all else within 1e-3."""
+def after_minimiser(path, old, new, stored, tolerance):
+    """An objective is no higher by 1e-9, a parameter is within 2 % of half its interval, all else within the tolerance."""
     key = path.rsplit("/", 1)[-1]
     if key == "objective":
         return new <= old + 1e-9 * abs(old)
     low, high = (stored.get(f"{path}_ci95/{i}") for i in (0, 1))
     if low is not None and high is not None and abs(new - old) <= 0.02 * (high - low) / 2:
         return True
-    return abs(new - old) <= 1e-3 * abs(old)
+    return abs(new - old) <= tolerance * abs(old)
 
 
 def is_equal(old, new, close):
@@ -306,7 +306,7 @@ def differences(name, stored, now, tolerance):
         def close(a, b):
             strict = abs(a - b) <= tolerance * max(abs(a), abs(b), largest.get(path.rsplit("/", 1)[0], 0.0))
             is_relaxed = name in MAP["changed_minimiser"] or (tolerance > 1e-12 and FITTED.match(name))
-            return strict or (is_relaxed and after_minimiser(path, a, b, stored))
+            return strict or (is_relaxed and after_minimiser(path, a, b, stored, MAP["changed_minimiser"].get(name, 1e-3)))
         if place not in now:
             lines.append(f"{place}: {old} -> missing")
         elif not is_equal(old, now[place], close):
