@@ -9,7 +9,7 @@ mod words;
 pub use targets::Target;
 pub(crate) use words::{Quantity, parameters as parameters_json};
 
-use crate::failure::Failure;
+use crate::app::Failure;
 use crate::formats::model_file::ModelFile;
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::noise::practical::{
