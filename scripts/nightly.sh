@@ -36,7 +36,7 @@ full_disk() (
 # Workers that are killed at random points, five times the test of a push.
 kills() {
     for _ in 1 2 3 4 5; do
-        cargo test --locked --test cli batch_kills || return 1
+        cargo test --locked --test cli batch::killed || return 1
         cargo test --locked --test cli killed || return 1
     done
     echo "figure kills: 100 workers killed, the bytes of an undisturbed study"

@@ -1,13 +1,13 @@
 //! Entries for fuzzing: each reads what a file holds as its command does, and must not panic. `tests/fuzz` runs them from a
 //! small corpus with a fixed seed, `fuzz/` at length.
 
+use crate::commands::batch::{Study, part_of};
 use crate::formats::recordings::ReadOptions;
 use crate::formats::trajectory_file::{self, Options};
 use crate::formats::{
     contamination_file, curve_file, datasheet, draws_file, fusion_files, model_file,
 };
 use crate::formats::{recordings, run_directory, scenario_file};
-use crate::study::{Planned, file, plan_in, unit_file};
 use nav_sim_navigation::gnss::FixSigma;
 use std::cell::OnceCell;
 use std::fs;
@@ -18,7 +18,7 @@ use tempfile::TempDir;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All readers: recordings, drives, trajectories, then the program's own files.
-pub const TARGETS: [Target; 30] = [
+pub const TARGETS: [Target; 29] = [
     ("recording_csv", |bytes| {
         recording("recording_csv", "a.csv", bytes)
     }),
@@ -66,10 +66,10 @@ pub const TARGETS: [Target; 30] = [
         _ = scenario_file::read(&written("scenario", "a.toml", bytes))
     }),
     ("study", |bytes| {
-        _ = file::read(&written("study", "a.toml", bytes))
+        let path = written("study", "a.toml", bytes);
+        _ = Study::read(&path, &[]).and_then(|study| study.cells(std::path::Path::new("")));
     }),
-    ("plan", plan),
-    ("unit", unit),
+    ("part", part),
     ("curves", |bytes| {
         _ = curve_file::read(&written("curves", "a.json", bytes))
     }),
@@ -181,27 +181,10 @@ fn contamination(bytes: &[u8]) {
     _ = contamination_file::find(&path.display().to_string(), 100.0);
 }
 
-/// The plan, its grid, and its first units.
-fn plan(bytes: &[u8]) {
-    let directory = directory("plan", "plan.json", bytes);
-    let Ok(Some(plan)) = plan_in(&directory) else {
-        return;
-    };
-    if let Ok(planned) = Planned::new(&directory.join("study.toml"), &directory, plan) {
-        _ = planned
-            .plan
-            .units(&planned.grid)
-            .take(100)
-            .map(|unit| planned.plan.unit_s(&planned.grid, unit))
-            .sum::<f64>();
-    }
-}
-
 /// As read, and with a checksum that is right, so that more than the checksum is tried.
-fn unit(bytes: &[u8]) {
-    _ = unit_file::decode(bytes);
-    let content = &bytes[..bytes.len().saturating_sub(unit_file::CHECKSUM)];
-    _ = unit_file::decode(&[content, blake3::hash(content).as_bytes()].concat());
+fn part(bytes: &[u8]) {
+    _ = part_of(bytes);
+    _ = part_of(&[bytes, blake3::hash(bytes).as_bytes()].concat());
 }
 
 /// The draws beside a model.

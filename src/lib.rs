@@ -19,7 +19,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`prelude`] has what most programs need, [`jobs`] one function for what a command does, [`study`] grids of experiments.
+//! [`prelude`] has what most programs need, [`jobs`] one function for what a command does, [`commands::batch`] studies.
 //! The mathematics is in three crates: [`signal`] (noise, wavelet variance), [`calibration`] (recordings to model) and
 //! [`navigation`] (trajectory to errors). `calibration` and `navigation` stand on `signal` and never import each other.
 //!
@@ -75,8 +75,6 @@ mod paper;
 pub mod synthesize;
 // Which model, on the user's own recordings.
 pub mod choose;
-// Scenarios, candidates and outages, in parts.
-pub mod study;
 // The IMU that is needed.
 pub mod require;
 // A directory to start from.

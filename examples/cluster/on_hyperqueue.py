@@ -4,7 +4,7 @@
     pip install hyperqueue
     python3 examples/cluster/on_hyperqueue.py target/release/nav-sim
 
-Starts a HyperQueue server with two workers on this machine and gives them the shards of a study of 50 units. One
+Starts a HyperQueue server with two workers on this machine and gives them the shards of a study of 50 cells. One
 task is killed (SIGKILL) while it works, then the server with both workers; a second server with two workers does what
 is left. The merged tables must be those of a run in one process, byte by byte.
 
@@ -24,25 +24,25 @@ from hyperqueue import Job, LocalCluster
 from hyperqueue.cluster import WorkerConfig
 
 SHARDS = 8
-UNITS = 50
+CELLS = 50
 HERE = Path(__file__).resolve().parent.parent
 STUDY = f"""
-runs = 3000
-unit_runs = 300
-seed = 1
-metrics = ["outages", "ratios", "epochs"]
-trajectory = [{{ file = "{HERE}/quick_drive.toml" }}]
-truth = [{{ model = "{HERE}/../calib_data/consumer_mems.toml" }}]
-candidate = [
-  {{ model = "{HERE}/../calib_data/consumer_mems.toml" }},
-  {{ model = "{HERE}/../calib_data/tactical.toml" }},
-]
-outages = [{{ sweep = {{ start_s = 20, duration_s = [2, 5, 10, 20, 30] }} }}]
+[run]
+trajectory = "{HERE}/quick_drive.toml"
+truth = "{HERE}/../calib_data/consumer_mems.toml"
+outage = ["20:+{{length_s}}"]
+seed = [1, 2, 3, 4, 5]
+runs = 300
+[vary]
+length_s = [2, 5, 10, 20, 30]
+[vary.model]
+right = {{ model = "{HERE}/../calib_data/consumer_mems.toml" }}
+optimist = {{ model = "{HERE}/../calib_data/tactical.toml" }}
 """
 
 
-def batch(program, command, directory, *more):
-    arguments = [program, "batch", command, "study.toml", "--out", directory, "--quiet", *more]
+def batch(program, directory):
+    arguments = [program, "batch", "study.toml", "--out", directory, "--quiet"]
     return subprocess.run(arguments, check=True, stdout=subprocess.DEVNULL)
 
 
@@ -52,19 +52,19 @@ def serve(program):
         for _ in range(2):
             cluster.start_worker(WorkerConfig(cores=1))
         job = Job(default_workdir=Path.cwd(), max_fails=SHARDS)
-        run = [program, "batch", "run", "study.toml", "--out", "hq", "--shards", str(SHARDS), "-j", "1"]
+        run = [program, "batch", "study.toml", "--out", "hq", "--shards", str(SHARDS), "-j", "1"]
         for _ in range(SHARDS):  # HQ_TASK_ID counts them from 0
             job.program([*run, "--no-progress"])
         client = cluster.client()
         client.wait_for_jobs([client.submit(job)], raise_on_error=False)
 
 
-def units():
-    return len(list(Path("hq/units").glob("*/*.unit")))
+def cells():
+    return len(list(Path("hq/cells").glob("*/manifest.json")))
 
 
 def wait_for(number):
-    while units() < number:
+    while cells() < number:
         time.sleep(0.01)
 
 
@@ -76,7 +76,7 @@ def tasks(server):
 
 
 def results(directory):
-    return {path.name: path.read_bytes() for path in sorted(Path(directory, "results").iterdir())}
+    return {name: Path(directory, name).read_bytes() for name in ["results.csv", "summary.json", "report.html"]}
 
 
 def main():
@@ -84,33 +84,30 @@ def main():
     with tempfile.TemporaryDirectory() as place:
         os.chdir(place)
         Path("study.toml").write_text(STUDY)
-        for directory in ["one", "hq"]:
-            batch(program, "plan", directory)
-        batch(program, "run", "one")
-        batch(program, "merge", "one")
+        batch(program, "one")
 
         server = multiprocessing.Process(target=serve, args=(program,))
         server.start()
         wait_for(5)
         victim = tasks(server.pid)[0]
         os.kill(victim, signal.SIGKILL)
-        print(f"killed task {victim} after {units()} of {UNITS} units")
+        print(f"killed task {victim} after {cells()} of {CELLS} cells")
         wait_for(15)
         orphans = tasks(server.pid)
         for pid in [server.pid, *orphans]:
             os.kill(pid, signal.SIGKILL)
         server.join()
-        left = units()
-        print(f"killed the server with both workers after {left} units")
-        assert left < UNITS
+        left = cells()
+        print(f"killed the server with both workers after {left} cells")
+        assert left < CELLS
 
         server = multiprocessing.Process(target=serve, args=(program,))
         server.start()
         server.join()
-        print(f"{units()} units after the second server")
-        batch(program, "merge", "hq")
+        print(f"{cells()} cells after the second server")
+        batch(program, "hq")
         assert results("hq") == results("one"), "the tables differ"
-        print(f"{len(results('hq'))} merged files are the same bytes as undisturbed")
+        print(f"{len(results('hq'))} results are the same bytes as undisturbed")
         os.chdir("/")
 
 

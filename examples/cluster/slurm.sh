@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# sbatch this file after `nav-sim batch plan examples/paper_table1_10000.toml -o out/paper`; it may be submitted again.
+# sbatch this file where examples/paper_models.sh was run; it may be submitted again.
 #SBATCH --job-name=paper
 #SBATCH --account=ACCOUNT
 #SBATCH --partition=PARTITION
@@ -10,7 +10,7 @@
 #SBATCH --requeue
 #SBATCH --open-mode=append
 #SBATCH --output=%x_%A_%a.log
-nav-sim batch run examples/paper_table1_10000.toml -o out/paper -j 2 --time-limit 58m --no-progress
+nav-sim batch examples/paper_table1.toml --set runs=10000 -o out/paper/table1_10000 -j 2 --time-limit 58m --no-progress
 code=$?
 # 75: stopped in time, to be resumed
 if [ $code -eq 75 ]; then scontrol requeue "${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID}"; fi

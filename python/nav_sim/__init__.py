@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from nav_sim._navigation import lincov as lincov
     from nav_sim._navigation import run as run
     from nav_sim._study import Study as Study
-    from nav_sim._study import StudyTables as StudyTables
+    from nav_sim._study import StudyAnswer as StudyAnswer
     from nav_sim._trajectory import Trajectory as Trajectory
     from nav_sim._wavelet import Curve as Curve
     from nav_sim._wavelet import WaveletVariances as WaveletVariances
@@ -54,7 +54,7 @@ _HOMES = {
     "_errors": ["NavSimError", "NavSimWarning"],
     "_model": ["Model", "catalogue"],
     "_navigation": ["Fusion", "Run", "fuse", "lincov", "run"],
-    "_study": ["Study", "StudyTables"],
+    "_study": ["Study", "StudyAnswer"],
     "_trajectory": ["Trajectory"],
     "_wavelet": ["Curve", "WaveletVariances", "allan_deviation", "wavelet_variance", "wv"],
 }

@@ -19,8 +19,6 @@ __all__ = [
     "model_practical",
     "model_recording",
     "model_wavelet",
-    "study_merge",
-    "study_plan",
     "study_run",
     "trajectory_states",
     "wavelet",
@@ -55,22 +53,14 @@ def model_recording(
     text: str, samples: int, replicate: int, seed: int, spread: bool, contaminate: str | None
 ) -> dict[str, _Floats]: ...
 def model_wavelet(text: str, channel: str, scales: int) -> _Floats: ...
-def study_merge(
-    study: str | PathLike[str], directory: str | PathLike[str], progress: Callable[[int, int], object] | None
-) -> tuple[Answer, Path]: ...
-def study_plan(
-    study: str | PathLike[str],
-    directory: str | PathLike[str],
-    seed: int | None,
-    progress: Callable[[int, int], object] | None,
-) -> tuple[int, list[str]]: ...
 def study_run(
     study: str | PathLike[str],
     directory: str | PathLike[str],
-    shard: int,
-    shards: int,
+    shard: tuple[int, int] | None,
+    time_limit_s: float | None,
     progress: Callable[[int, int], object] | None,
-) -> tuple[tuple[int, int], list[str]]: ...
+    threads: int | None = None,
+) -> tuple[Answer | None, list[str], list[str]]: ...
 def trajectory_states(
     path: str | PathLike[str], rate_hz: float, hidden: str
 ) -> tuple[dict[str, _Floats], tuple[float, float], list[str]]: ...

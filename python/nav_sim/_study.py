@@ -1,10 +1,13 @@
-"""Studies: grids of experiments in units that survive, resume and spread over machines."""
+"""Studies: runs whose values may be lists, in cells that survive, resume and spread over machines."""
 
 from __future__ import annotations
 
+import json
 import os
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,77 +16,80 @@ from nav_sim._answer import Answer, Columns, Progress, bar
 from nav_sim._errors import NavSimError, warn
 from nav_sim._inputs import StrPath, path as path_of
 
+#: Shards that a pool is given at most.
+_SHARDS = 64
 
-class StudyTables(Answer):
-    """The tables of a study: `nav-sim batch merge`."""
 
-    def __init__(self, native: _native.Answer, results: Path) -> None:
+class StudyAnswer(Answer):
+    """The results of a study: `nav-sim batch`."""
+
+    def __init__(self, native: _native.Answer, directory: Path) -> None:
         super().__init__(native)
-        #: The directory of the tables.
-        self.results = results
-
-    @property
-    def files(self) -> list[str]:
-        """Names of the files in `results`."""
-        return sorted(path.name for path in self.results.iterdir())
-
-    def text(self, name: str) -> str:
-        """The text of one of `files`."""
-        try:
-            return (self.results / name).read_text(encoding="utf-8")
-        except OSError as e:
-            raise NavSimError(f"{self.results / name}: {e.strerror}", file=str(self.results / name)) from None
-
-    def table(self, name: str) -> Columns:
-        """One of `files` that is a table: columns by name."""
-        return {key: np.asarray(values) for key, values in _native.columns(self.text(name)).items()}
+        #: Directory of the study, with `results.csv`, `summary.json`, `report.html` and `cells/`.
+        self.directory = directory
 
     @cached_property
-    def outages(self) -> Columns:
-        """A row for each outage of each candidate in each cell."""
-        return self.table("outages.csv")
+    def table(self) -> Columns:  # type: ignore[override]
+        """`results.csv`: a row for each cell, outage and state."""
+        text = (self.directory / "results.csv").read_text(encoding="utf-8")
+        return {key: np.asarray(values) for key, values in _native.columns(text).items()}
 
-    @cached_property
-    def runs(self) -> Columns:
-        """A row for each run."""
-        return self.table("runs.csv")
+    def cell(self, name: str) -> Path:
+        """The run directory of a cell."""
+        place = self.directory / "cells" / name
+        if not place.is_dir():
+            raise NavSimError(f"{place}: there is no such cell", file=str(place))
+        return place
+
+
+def _shard(study: str, directory: str, shard: tuple[int, int] | None, time_limit: float | None) -> list[str]:
+    """Computes a shard, in a process of its own; returns the cells that are missing."""
+    return _native.study_run(study, directory, shard, time_limit, None)[1]
 
 
 class Study:
-    """A grid of experiments, described in a file: `nav-sim batch`.
+    """A run whose values may be lists, described in a file or a dict: `nav-sim batch`.
 
     study = Study("study.toml")
-    study.plan()
-    study.run(progress=True)          # again after an interruption: it goes on where it was
-    table = study.merge().outages
+    found = study.run(progress=True)     # again after an interruption: it goes on where it was
+    found.table, found.cell("length_s=5_right")
     """
 
-    def __init__(self, path: StrPath, directory: StrPath | None = None) -> None:
-        self.path = Path(path_of(path, "path"))
-        #: Where its plan, units and results are: `out/` and its name if nothing else is said.
-        self.directory = Path("out") / self.path.stem if directory is None else Path(directory)
+    def __init__(self, study: StrPath | Mapping[str, Any], directory: StrPath | None = None) -> None:
+        if isinstance(study, Mapping):
+            if directory is None:
+                raise NavSimError("directory: a study that is a dict needs one")
+            self.directory = Path(directory)
+            self.directory.mkdir(parents=True, exist_ok=True)
+            self.path = self.directory / "study.json"
+            self.path.write_text(json.dumps(study, indent=1, default=os.fspath), encoding="utf-8")
+        else:
+            self.path = Path(path_of(study, "study"))
+            #: Where its cells and results are: `out/` and its name if nothing else is said.
+            self.directory = Path("out") / self.path.stem if directory is None else Path(directory)
 
-    def plan(self, *, seed: int | None = None, progress: Progress = None) -> int:
-        """Checks it, calibrates its candidates and cuts it into units; returns how many."""
+    def run(
+        self,
+        pool: Any = None,
+        *,
+        threads: int | None = None,
+        shard: tuple[int, int] | None = None,
+        time_limit: float | None = None,
+        progress: Progress = None,
+    ) -> StudyAnswer | None:
+        """Computes what is missing, and compares all cells; None while some are missing.
+
+        `pool`: a `concurrent.futures.Executor` (also of dask and mpi4py), or what has a `map`, that computes shards.
+        `shard`: this process computes number `shard[0]` of `shard[1]`. `time_limit`: seconds after which it stops.
+        """
+        place = (os.fspath(self.path), os.fspath(self.directory))
+        if pool is not None:
+            shards = [(k, _SHARDS) for k in range(_SHARDS)]
+            list(pool.map(_shard, *zip(*[(*place, one, time_limit) for one in shards])))
         with bar(progress) as told:
-            units, doubts = _native.study_plan(os.fspath(self.path), os.fspath(self.directory), seed, told)
+            native, _, doubts = _native.study_run(*place, shard, time_limit, told, threads)
         warn(doubts)
-        return units
-
-    def run(self, *, shard: tuple[int, int] = (0, 1), progress: Progress = None) -> int:
-        """Computes the units that are not there yet, of shard number `shard[0]` of `shard[1]`; returns how many."""
-        with bar(progress) as told:
-            place = (os.fspath(self.path), os.fspath(self.directory))
-            (finished, _), doubts = _native.study_run(*place, *shard, told)
-        warn(doubts)
-        return finished
-
-    def merge(self, *, progress: Progress = None) -> StudyTables:
-        """Makes its tables, when all units are there."""
-        with bar(progress) as told:
-            native, results = _native.study_merge(os.fspath(self.path), os.fspath(self.directory), told)
-        warn(native.warnings)
-        return StudyTables(native, results)
+        return None if native is None else StudyAnswer(native, self.directory)
 
     def __repr__(self) -> str:
         return f"<Study: {self.path} in {self.directory}>"

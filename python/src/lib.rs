@@ -21,7 +21,7 @@ mod native {
     #[pymodule_export]
     use crate::request::{answer, main};
     #[pymodule_export]
-    use crate::study::{study_merge, study_plan, study_run};
+    use crate::study::study_run;
     #[pymodule_export]
     use crate::table::columns;
     #[pymodule_export]

@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use serde_json::{Map, Value};
 use std::ffi::OsString;
 use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
 /// Seed where neither the request nor a file has one: the same call gives the same answer.
 pub(crate) const SEED: u64 = 1;
@@ -17,13 +18,21 @@ pub(crate) const SEED: u64 = 1;
 pub(crate) struct Clerk<'a> {
     pub(crate) meter: &'a Meter,
     warnings: Mutex<Vec<String>>,
+    deadline: Option<Instant>,
 }
 
 impl<'a> Clerk<'a> {
     pub(crate) fn new(meter: &'a Meter) -> Self {
+        Self::until(meter, None)
+    }
+
+    /// One that stops jobs which can be resumed at a time.
+    pub(crate) fn until(meter: &'a Meter, deadline: Option<Instant>) -> Self {
+        let warnings = Mutex::default();
         Self {
             meter,
-            warnings: Mutex::default(),
+            warnings,
+            deadline,
         }
     }
 
@@ -58,6 +67,9 @@ impl Front for Clerk<'_> {
 
     fn go_on(&self) -> bool {
         self.meter.goes_on()
+            && self
+                .deadline
+                .is_none_or(|deadline| Instant::now() < deadline)
     }
 }
 

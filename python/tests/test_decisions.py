@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import nav_sim
@@ -86,44 +88,36 @@ def test_compare(short: Path, command: Command, tmp_path: Path) -> None:
     assert own.table("comparison.csv")
 
 
-STUDY = """
-runs = 4
-unit_runs = 2
-seed = 1
-reference = "tactical"
-[[trajectory]]
-file = "short.csv"
-[[truth]]
-model = "{TACTICAL}"
-[[candidate]]
-name = "tactical"
-model = "{TACTICAL}"
-[[candidate]]
-name = "consumer"
-model = "{CONSUMER}"
-[[outages]]
-sweep = {{ start_s = 20, duration_s = [5, 20] }}
-"""
+STUDY = {
+    "run": {
+        "trajectory": "../short.csv",
+        "truth": TACTICAL,
+        "outage": ["20:+{length_s}"],
+        "runs": 16,
+        "seed": 1,
+    },
+    "vary": {
+        "length_s": [5, 20],
+        "model": {"tactical": {"model": TACTICAL}, "consumer": {"model": CONSUMER}},
+    },
+}
 
 
 def test_a_study(short: Path, command: Command, tmp_path: Path) -> None:
     (tmp_path / "short.csv").write_bytes(short.read_bytes())
-    path = tmp_path / "study.toml"
-    path.write_text(STUDY.format(TACTICAL=TACTICAL.as_posix(), CONSUMER=CONSUMER.as_posix()), encoding="utf-8")
-    for step in ("plan", "run", "merge"):
-        command("batch", step, path, "-o", tmp_path / "command", "-q")
-    study = nav_sim.Study(path, tmp_path / "own")
-    with pytest.raises(nav_sim.NavSimError, match="plan"):
-        study.run()
-    units = study.plan()
-    with pytest.raises(nav_sim.NavSimError):
-        study.merge()
-    assert study.run(shard=(0, 2)) + study.run(shard=(1, 2)) == units
-    assert study.run() == 0
-    tables = study.merge()
-    for name in ("outages.csv", "runs.csv"):
-        assert tables.text(name) == (tmp_path / "command" / "results" / name).read_text(encoding="utf-8"), name
-    assert set(tables.outages["candidate"]) == {"tactical", "consumer"} and tables.summary()
+    study = nav_sim.Study(STUDY, tmp_path / "own")
+    assert study.run(shard=(0, 2)) is None
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        found = study.run(pool)
+    assert found is not None
+    command("batch", study.path, "-o", tmp_path / "command", "--state", "all", "-q")
+    for name in ("results.csv", "summary.json"):
+        own, commands = ((tmp_path / place / name).read_text(encoding="utf-8") for place in ("own", "command"))
+        assert own == commands, name
+    assert set(found.table["model"]) == {"tactical", "consumer"} and found.summary()
+    assert (found.cell("length_s=5_tactical") / "runs.csv").exists()
+    with pytest.raises(nav_sim.NavSimError, match="no such cell"):
+        found.cell("gone")
     with pytest.raises(nav_sim.NavSimError, match="shard"):
         study.run(shard=(2, 2))
 

@@ -233,9 +233,10 @@ fn options<C: Command>(matches: &ArgMatches) -> BTreeMap<String, Vec<String>> {
 
 /// Numbers in their shortest form: `8.0:11` is `8:11`.
 fn canonical(value: &str) -> String {
+    // `300:+30` is a length, and no 300:30
     let shortest = |part: &str| {
-        part.parse::<f64>()
-            .map_or(part.to_owned(), |x| x.to_string())
+        let number = part.parse::<f64>().ok().filter(|_| !part.starts_with('+'));
+        number.map_or(part.to_owned(), |x| x.to_string())
     };
     value
         .split_inclusive([',', ':', '='])
@@ -266,7 +267,9 @@ impl<C: Command> Asked<C> {
     /// # Errors
     /// Keys that are no options, and values that are refused, as on the command line.
     pub fn named(request: &Map<String, Value>) -> Result<Self> {
-        let command = <Self as clap::Args>::augment_args(clap::Command::new(C::NAME));
+        let mut command = <Self as clap::Args>::augment_args(clap::Command::new(C::NAME));
+        // gives positional arguments their places
+        command.build();
         let (mut words, mut positional) = (Vec::new(), BTreeMap::new());
         for (key, value) in request {
             let option = key.replace('_', "-");

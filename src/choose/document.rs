@@ -28,19 +28,6 @@ pub(crate) struct ChoiceReport<'a> {
     pub seed: u64,
 }
 
-/// One ranking of a study, in words and as JSON.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct RankedPlace {
-    /// Trajectory, scenario, receiver and outages.
-    pub name: String,
-    /// What the data say.
-    pub verdict: Vec<String>,
-    /// A row for each candidate.
-    pub table: Table,
-    /// As in `ranking.json`, and `place`.
-    pub json: serde_json::Value,
-}
-
 /// `ranking.json`.
 #[derive(Serialize)]
 struct RankingFile<'a> {
@@ -305,18 +292,6 @@ impl ChoiceReport<'_> {
         others
             .filter(|p| p.eligible && p.tied)
             .map(|p| p.candidate.as_str())
-    }
-
-    /// One of several rankings.
-    pub(crate) fn of_place(&self, name: String) -> RankedPlace {
-        let mut json = serde_json::to_value(self).expect("plain structs are always JSON");
-        json["place"] = name.as_str().into();
-        RankedPlace {
-            name,
-            verdict: self.verdict(),
-            table: self.table(),
-            json,
-        }
     }
 }
 

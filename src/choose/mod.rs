@@ -17,7 +17,6 @@ mod request;
 mod score;
 
 pub use candidate::{Candidate, Inflation};
-pub(crate) use document::{ChoiceReport, RankedPlace};
 pub use drive::{Drive, Fold};
 pub use job::{ChoiceDrive, Chosen, choose};
 pub use laboratory::{Laboratory, Unit};

@@ -1,6 +1,7 @@
 //! `nav-sim check`: whether a file is what it should be.
 
 use super::{Failure, Session, parse, read};
+use crate::commands::batch::Study;
 use crate::commands::inspect::inspect;
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
@@ -16,7 +17,7 @@ use std::path::{Path, PathBuf};
 /// Check scenario, study, model, trajectory and recording files without running anything
 ///
 /// What a file is follows from its contents. A TOML file with [accel] or [gyro] is a noise model; with segments or
-/// waypoints a motion profile; with candidates a study of `batch`; with operations
+/// waypoints a motion profile; with [run] beside [vary], or a trajectory in it, a study of `batch`; with operations
 /// one for `synthesize --contaminate`; with lat_deg and yaw_deg an initial state of `fuse`; with [unit] an entry of
 /// the catalogue of IMUs; any other is a scenario. A table with lat_deg or n_m is a trajectory, as are .nav, .tum
 /// and .gpx; with standard deviations it is GNSS fixes; with tau_samples (or a .wv.json) a curve; any other table or
@@ -109,9 +110,6 @@ fn resolved(path: &Path) -> Result<Option<String>, Failure> {
         FileKind::Scenario => {
             toml::to_string(&scenario_file::read(path)?).map_err(Failure::could_not)?
         }
-        FileKind::Study => {
-            toml::to_string(&crate::study::file::read(path)?.study).map_err(Failure::could_not)?
-        }
         FileKind::Model => model_file::to_toml(&model_file::read(path)?),
         _ => return Ok(None),
     };
@@ -126,15 +124,8 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             Ok(format!("a scenario of {} runs", scenario.run.runs))
         }
         FileKind::Study => {
-            let study = crate::study::named_files::read(path)?.study;
-            let (candidates, sets) = (
-                study.candidates().len(),
-                study.outage_sets().map_or(0, |s| s.len()),
-            );
-            Ok(format!(
-                "a study of {candidates} candidates, {sets} outage sets, {} runs each",
-                study.runs
-            ))
+            let cells = Study::read(path, &[])?.cells(path.parent().unwrap_or(Path::new("")))?;
+            Ok(format!("a study of {} cells", cells.len()))
         }
         FileKind::Model => model(path, session),
         FileKind::Log => {

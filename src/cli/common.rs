@@ -168,11 +168,6 @@ impl Session {
         self.common.verbose
     }
 
-    /// Threads that work.
-    pub(crate) fn threads(&self) -> usize {
-        rayon::current_num_threads()
-    }
-
     /// The seed: `--seed`, else the one given (of a file), else one drawn once and said.
     pub(crate) fn seed(&self, of_file: Option<u64>) -> u64 {
         let draw = || {

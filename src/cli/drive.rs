@@ -34,6 +34,12 @@ fn show<C: Command>(asked: &Asked<C>, answer: &C::Answer, session: &Session) -> 
         None if session.verbose() => document.verbose(WIDTH),
         None => document.terminal(WIDTH),
     };
+    tell(&document, &shown, session);
+    document
+}
+
+/// Puts a text to stdout and the notes of a document to stderr.
+pub(super) fn tell(document: &Document, shown: &str, session: &Session) {
     if !shown.is_empty() {
         session.result(shown.trim_end());
     }
@@ -43,5 +49,4 @@ fn show<C: Command>(asked: &Asked<C>, answer: &C::Answer, session: &Session) -> 
             _ => session.say(format!("note: {}", note.text)),
         }
     }
-    document
 }

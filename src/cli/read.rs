@@ -2,23 +2,10 @@
 
 use super::{Failure, Session};
 use crate::app::inputs as read;
-use crate::app::option_elsewhere;
 use crate::formats::model_file::ModelFile;
-use crate::formats::{FileError, Setting};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::Recording;
 use std::path::{Path, PathBuf};
-
-/// For files that a study names: its keys have the place of options.
-pub(super) fn of_study(e: &FileError) -> Failure {
-    Failure::of_file(e, |setting| {
-        Some(match setting {
-            Setting::Rate => "set rate_hz beside the recordings in the study file",
-            Setting::WrongRate => "leave rate_hz out of the study file, or correct it",
-            other => option_elsewhere(other),
-        })
-    })
-}
 
 /// A trajectory.
 pub(super) fn trajectory(path: &Path, session: &Session) -> Result<Trajectory, Failure> {

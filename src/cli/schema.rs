@@ -1,8 +1,8 @@
 //! `nav-sim schema`: JSON schemas of the files people write.
 
 use super::{Failure, Session};
+use crate::commands::batch::Study;
 use crate::formats::{contamination_file, fusion_files, model_file, trajectory_file};
-use crate::study::Study;
 use nav_sim_navigation::scenario::Scenario;
 
 /// Print the JSON schema of a file that people write, for editors and checkers

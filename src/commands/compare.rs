@@ -111,11 +111,31 @@ impl Command for Compare {
 fn compare(runs: &[PathBuf], reference: &Path, states: Vec<usize>) -> Result<Comparison> {
     let name = reference.display().to_string();
     let directory = run_directory::read(reference)?;
+    let read = |path: &PathBuf| {
+        let of_itself = is_same_place(path, reference);
+        Ok((
+            path.display().to_string(),
+            run_directory::read(path)?,
+            of_itself,
+        ))
+    };
+    let read = runs.iter().map(read).collect::<Result<Vec<_>>>()?;
+    let runs = read
+        .iter()
+        .map(|(run, found, of_itself)| (run.as_str(), found, *of_itself));
+    between(runs, (&name, &directory), states)
+}
+
+/// Compares runs by name, each with whether it is the reference itself.
+pub(crate) fn between<'a>(
+    runs: impl Iterator<Item = (&'a str, &'a RunDirectory, bool)>,
+    (name, directory): (&str, &RunDirectory),
+    states: Vec<usize>,
+) -> Result<Comparison> {
     let (mut candidates, mut curves, mut doubts) = (Vec::new(), Vec::new(), Vec::new());
-    for path in runs {
-        let run = path.display().to_string();
-        let candidate = run_directory::read(path)?;
-        let differences = differences(&candidate, &directory);
+    for (run, candidate, is_reference) in runs {
+        let run = run.to_owned();
+        let differences = differences(candidate, directory);
         let doubt = |what: &&str| {
             format!("{run}: {what} not that of the reference; the runs are not paired")
         };
@@ -123,21 +143,20 @@ fn compare(runs: &[PathBuf], reference: &Path, states: Vec<usize>) -> Result<Com
         if !(candidate.experiment.is_expected && directory.experiment.is_expected) {
             doubts.extend(differences.iter().map(doubt));
         }
-        let is_reference = is_same_place(path, reference);
         curves.push(RatioCurves::of(
             &candidate.experiment,
             &directory.experiment,
         ));
         candidates.push(compared(
             run,
-            &candidate,
-            &directory,
+            candidate,
+            directory,
             differences.is_empty(),
             is_reference,
         )?);
     }
-    let outages = directory.experiment.outages;
-    let comparison = Comparison::new((&name, &directory.verdict), candidates, curves, outages);
+    let outages = directory.experiment.outages.clone();
+    let comparison = Comparison::new((name, &directory.verdict), candidates, curves, outages);
     Ok(Comparison {
         doubts,
         states,

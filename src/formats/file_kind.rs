@@ -104,6 +104,8 @@ fn toml_kind(table: &toml::Table) -> FileKind {
             .iter()
             .filter_map(|sensor| table.get(*sensor))
     };
+    let run = table.get("run").and_then(toml::Value::as_table);
+    let in_run = run.is_some_and(|run| run.contains_key("trajectory"));
     if has(&["unit"]) {
         FileKind::CatalogueEntry
     } else if sensors().any(toml::Value::is_array) {
@@ -114,7 +116,7 @@ fn toml_kind(table: &toml::Table) -> FileKind {
         FileKind::Initial
     } else if has(&["segment", "waypoint", "start", "vehicle"]) {
         FileKind::Trajectory
-    } else if has(&["candidate", "trajectory", "truth"]) {
+    } else if has(&["vary"]) || in_run {
         FileKind::Study
     } else {
         FileKind::Scenario

@@ -17,14 +17,6 @@ pub(crate) fn input(role: &str, path: &Path) -> Result<Input, FileError> {
     })
 }
 
-/// BLAKE3 of a file as it is now, in hexadecimal.
-///
-/// # Errors
-/// When the system refuses.
-pub(crate) fn fingerprint(path: &Path) -> Result<String, FileError> {
-    hash::of_file(path).map_err(|e| FileError::io(path, e))
-}
-
 /// The files themselves and those of directories, in name order.
 ///
 /// # Errors

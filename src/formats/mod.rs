@@ -4,7 +4,6 @@ pub(crate) mod atomic;
 pub mod contamination_file;
 pub(crate) mod curve_file;
 pub mod datasheet;
-pub(crate) mod difference;
 pub mod draws_file;
 mod error;
 pub(crate) mod file_kind;
@@ -13,8 +12,6 @@ pub(crate) mod hash;
 pub(crate) mod input;
 pub mod logs;
 pub mod model_file;
-#[cfg(feature = "parquet")]
-mod parquet_file;
 #[cfg(test)]
 mod property_tests;
 pub mod recordings;
@@ -24,7 +21,6 @@ pub(crate) mod scenario_file;
 pub(crate) mod source;
 pub(crate) mod suggest;
 pub(crate) mod table;
-pub(crate) mod table_files;
 pub(crate) mod toml_file;
 pub mod trajectory_file;
 

@@ -12,26 +12,18 @@ pub(crate) mod requirement;
 #[cfg(test)]
 pub(crate) mod sample;
 pub(crate) mod states;
-mod study;
 pub(crate) mod tables;
 pub(crate) mod trajectory;
 mod unexpected;
 pub(crate) mod verdict;
 
 pub(crate) use closure::TrajectoryCheck;
-pub(crate) use comparison_table::Label;
 pub(crate) use curves::{CurvesFile, FittedCurve, ReplicateCurve, SignalsFile};
 pub use nav_sim_document::readable;
 pub(crate) use nav_sim_document::{seconds, six_digits};
 pub(crate) use output::json;
 pub(crate) use recording::{gnss_csv, imu_csv, initial_toml};
 pub(crate) use states::{STATES, error_of, tone};
-#[cfg(any(test, feature = "parquet"))]
-pub(crate) use study::ValueKind;
-pub(crate) use study::{
-    ColumnResult, TableColumn, TableRow, Value, epoch_columns, epoch_rows, outage_columns,
-    outage_rows, run_columns, run_rows,
-};
 pub use trajectory::TrajectorySeries;
 pub(crate) use unexpected::{
     reduction_doubt, reduction_line, unexpected_in_words, unexpected_line,

@@ -201,9 +201,7 @@ def make(nav_sim, place):
         "-o fused", codes=(0, 3))
     run("choose static --trajectory trajectories/figure_eight.toml --outage 60:90 --estimator awv --model WN+RW --filter 15 "
         "--inflate none,x10 --seed 1 -o choice")
-    run("batch plan examples/quick_study.toml --seed 1 -o study")
-    run("batch run examples/quick_study.toml -o study")
-    run("batch merge examples/quick_study.toml -o study", codes=(0, 3))
+    run("batch examples/quick_study.toml -o study", codes=(0, 3))
     tuned = "tune calib_data/tactical.toml --truth calib_data/consumer_mems.toml --outage 60:90"
     run(f"{tuned} --plot tuned.html --format json", keep="tuned.json")
     asked = "require trajectories/figure_eight.toml"
@@ -219,7 +217,7 @@ def make(nav_sim, place):
     pages = [("wv.html", None), ("model.html", "fits.json"), ("runs/I_awv/report.html", "runs/I_awv/summary.json"),
              ("runs/lincov/report.html", "runs/lincov/summary.json"), ("comparison.html", "comparison.json"),
              ("fused/report.html", "fused/summary.json"), 
-             ("choice/report.html", "choice/ranking.json"), ("study/results/report.html", None), ("tuned.html", "tuned.json"), ("needed.html", "needed.json"),
+             ("choice/report.html", "choice/ranking.json"), ("study/report.html", "study/summary.json"), ("tuned.html", "tuned.json"), ("needed.html", "needed.json"),
              ("given.html", "given.json"), ("ranked.html", "ranked.json"), ("designs.html", "designs.json"),
              ("design.html", "design.json")]
     return [(place / page, results and place / results) for page, results in pages]

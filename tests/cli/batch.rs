@@ -1,433 +1,362 @@
-//! `nav-sim batch` as a user runs it: sharded, stopped, damaged, misused.
-
-mod parts;
-mod studies;
+//! Studies: cells that survive kills, changes and company.
 
 use crate::common::batch::*;
+use rand::{RngExt, SeedableRng};
 use std::fs;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
-const FILES: [&str; 6] = [
-    "epochs.csv",
-    "outages.csv",
-    "outages.json",
-    "report.html",
-    "runs.csv",
-    "study.json",
-];
-
-/// Plans and runs the study in one process.
-fn whole(dir: &Path, out: &str) -> Vec<(String, Vec<u8>)> {
-    done(dir, &format!("plan study.toml -o {out}"));
-    done(dir, &format!("run study.toml -o {out} -j 1"));
-    done(dir, &format!("merge study.toml -o {out}"));
-    results(&dir.join(out))
-}
-
+/// Shards in any order, one killed and one repeated, make the bytes of one process, and each cell those of `run`.
 #[test]
-fn shards_in_any_order_on_any_threads_merge_to_the_same_bytes() {
+fn parts_make_the_bytes_of_the_whole_and_cells_those_of_run() {
     let place = place();
     let dir = place.path();
-    let undisturbed = whole(dir, "one");
-    assert_eq!(
-        undisturbed
-            .iter()
-            .map(|(name, _)| name.as_str())
-            .collect::<Vec<_>>(),
-        FILES
-    );
-    done(dir, "plan study.toml -o three");
-    for shard in ["2/3 -j 2", "0/3 -j 1", "1/3 -j 3"] {
-        let said = refused(dir, "merge study.toml -o three", 1);
-        assert!(
-            said.contains("of 50 units are missing or damaged, of the cells sweep(30,2); "),
-            "{said}"
-        );
-        assert!(!dir.join("three/results").exists());
-        done(dir, &format!("run study.toml -o three --shard {shard}"));
-    }
-    done(dir, "merge study.toml -o three -j 2");
-    assert_eq!(results(&dir.join("three")), undisturbed);
-    let said = done(dir, "run study.toml -o three");
+    ended(dir, "batch study.toml -o whole", 0);
+    let said = ended(dir, "batch study.toml -o parts --shard 1/2 -j 1", 0);
     assert!(
-        said.contains("50 units are done already, 0 to do"),
+        said.contains("4 of 8 cells are missing: length_s=2_imu, length_s=2_wrong"),
         "{said}"
     );
-    let verified = batch(dir, "verify study.toml -o three --units 5 --seed 1");
-    assert!(verified.status.success());
-    assert!(String::from_utf8_lossy(&verified.stdout).starts_with("5 of 50 finished units"));
-}
-
-/// One unit a cell is the same sums as `nav-sim run`, to the last bit.
-#[test]
-fn a_cell_is_what_run_makes() {
-    let place = place();
-    let dir = place.path();
-    let study = STUDY.replace("unit_runs = 8", "unit_runs = 77");
-    fs::write(dir.join("study.toml"), study).unwrap();
-    whole(dir, "one");
-    let arguments =
-        "run drive.toml wrong.toml --truth imu.toml --outage 30:38 --runs 77 --seed 5 -o single";
-    let ran = std::process::Command::new(env!("CARGO_BIN_EXE_nav-sim"))
-        .current_dir(dir)
-        .args(arguments.split_whitespace())
-        .output()
-        .unwrap();
-    assert!(ran.status.success());
-    let mut single = csv::Reader::from_path(dir.join("single/epochs.csv")).unwrap();
-    let mut all = csv::Reader::from_path(dir.join("one/results/epochs.csv")).unwrap();
-    let (single_head, all_head) = (
-        single.headers().unwrap().clone(),
-        all.headers().unwrap().clone(),
-    );
-    let at = |head: &csv::StringRecord, name: &str| head.iter().position(|h| h == name).unwrap();
-    let (set, candidate) = (at(&all_head, "outage_set"), at(&all_head, "candidate"));
-    let mine = all.records().map(Result::unwrap);
-    let mine: Vec<_> = mine
-        .filter(|r| &r[set] == "sweep(30,8)" && &r[candidate] == "wrong")
-        .collect();
-    let single: Vec<_> = single.records().map(Result::unwrap).collect();
-    assert_eq!((mine.len(), single.len()), (61, 61));
-    for (a, b) in mine.iter().zip(&single) {
-        for (i, name) in single_head.iter().enumerate() {
-            let name = if name == "gnss" { "fix" } else { name };
-            assert_eq!(a[at(&all_head, name)], b[i], "{name}");
-        }
-    }
-}
-
-#[test]
-fn damaged_units_are_noticed_and_computed_again() {
-    let place = place();
-    let dir = place.path();
-    let undisturbed = whole(dir, "out");
-    let files = units(&dir.join("out"));
-    assert_eq!(files.len(), UNITS);
-    let bytes = fs::read(&files[3]).unwrap();
-    fs::write(&files[3], &bytes[..bytes.len() / 2]).unwrap();
-    let mut flipped = fs::read(&files[7]).unwrap();
-    flipped[500] ^= 1;
-    fs::write(&files[7], flipped).unwrap();
-    fs::write(&files[9], "").unwrap();
-    fs::copy(&files[20], &files[21]).unwrap();
-    fs::remove_dir_all(dir.join("out/results")).unwrap();
-    let said = refused(dir, "merge study.toml -o out", 1);
-    assert!(
-        said.contains("4 of 50 units are missing or damaged"),
-        "{said}"
-    );
-    let status = batch(dir, "status study.toml -o out --format json").stdout;
-    let status: serde_json::Value = serde_json::from_slice(&status).unwrap();
-    assert_eq!(
-        (status["done"].as_u64(), status["damaged"].as_u64()),
-        (Some(46), Some(4))
-    );
-    assert!(!dir.join("out/results").exists());
-    let said = refused(dir, "verify study.toml -o out --units 1 --seed 1", 3);
-    assert!(
-        said.contains("4 units are damaged: ") && said.matches(".unit is damaged").count() == 4,
-        "{said}"
-    );
-    refused(dir, "verify study.toml -o out --units 0", 2);
-    let said = done(dir, "run study.toml -o out");
-    assert_eq!(said.matches("it is computed again").count(), 4, "{said}");
-    done(dir, "merge study.toml -o out");
-    assert_eq!(results(&dir.join("out")), undisturbed);
-}
-
-/// A directory in a unit's place: `merge` says it is damaged, and `run` mends it.
-#[test]
-fn a_directory_in_the_place_of_a_unit_is_computed_again() {
-    let place = place();
-    let dir = place.path();
-    let undisturbed = whole(dir, "out");
-    let files = units(&dir.join("out"));
-    fs::remove_file(&files[3]).unwrap();
-    fs::create_dir(&files[3]).unwrap();
-    fs::write(files[3].join("note"), "mine").unwrap();
-    fs::remove_dir_all(dir.join("out/results")).unwrap();
-    refused(dir, "merge study.toml -o out", 1);
-    let said = done(dir, "run study.toml -o out");
-    assert!(
-        said.contains(".unit is damaged: it is a directory; it is computed again"),
-        "{said}"
-    );
-    assert_eq!(
-        fs::read(files[3].with_extension("unit.damaged").join("note")).unwrap(),
-        b"mine"
-    );
-    done(dir, "merge study.toml -o out");
-    assert_eq!(results(&dir.join("out")), undisturbed);
-}
-
-#[test]
-fn what_changed_since_the_plan_is_refused() {
-    let place = place();
-    let dir = place.path();
-    done(dir, "plan study.toml -o out");
-    assert!(done(dir, "plan study.toml -o out").contains("was planned already"));
-    fs::write(dir.join("imu.toml"), MODEL.replace("1e-9", "2e-9")).unwrap();
-    for command in ["run", "plan"] {
-        let said = refused(dir, &format!("{command} study.toml -o out"), 2);
-        assert!(
-            said.contains("has changed since the study was planned"),
-            "{said}"
-        );
-    }
-    fs::write(dir.join("imu.toml"), MODEL).unwrap();
-    fs::write(
-        dir.join("study.toml"),
-        STUDY.replace("runs = 77", "runs = 78"),
-    )
-    .unwrap();
-    for command in ["plan", "run", "merge", "status"] {
-        let said = refused(dir, &format!("{command} study.toml -o out"), 2);
-        assert!(
-            said.contains("\"runs\" is 77 in the plan, 78 in the study"),
-            "{said}"
-        );
-    }
-    fs::write(dir.join("study.toml"), STUDY.replace("seed = 5\n", "")).unwrap();
-    done(dir, "status study.toml -o out");
-    let said = refused(dir, "plan study.toml -o out --seed 6", 2);
-    assert!(
-        said.contains("\"seed\" is 5 in the plan, 6 in the study"),
-        "{said}"
-    );
-    // --seed wins over the study's, then and later
-    fs::write(dir.join("study.toml"), STUDY).unwrap();
-    done(dir, "plan study.toml -o seven --seed 7");
-    done(dir, "run study.toml -o seven --shard 0/50");
-    assert!(
-        fs::read_to_string(dir.join("seven/plan.json"))
-            .unwrap()
-            .contains("\"seed\": 7")
-    );
-    let plan = fs::read_to_string(dir.join("out/plan.json")).unwrap();
-    let other = plan.replace("\"version\": \"", "\"version\": \"0.0.");
-    fs::write(dir.join("out/plan.json"), other).unwrap();
-    let said = refused(dir, "run study.toml -o out", 2);
-    assert!(said.contains("the plan was made by nav-sim 0.0."), "{said}");
-}
-
-/// A file that a study names and that is not there is told by line and key, before anything is planned.
-#[test]
-fn a_named_file_that_is_missing_is_told_by_its_key() {
-    let place = place();
-    let dir = place.path();
-    fs::write(
-        dir.join("study.toml"),
-        STUDY.replace("wrong.toml", "wrnog.toml"),
-    )
-    .unwrap();
-    let expected = "error: study.toml, line 8: \"candidate[2].model\" = \"wrnog.toml\" names wrnog.toml, which does not exist";
-    let said = refused(dir, "plan study.toml -o out", 2);
-    assert!(
-        said.starts_with(expected) && said.contains("hint: paths are relative"),
-        "{said}"
-    );
-    let output = std::process::Command::new(env!("CARGO_BIN_EXE_nav-sim"))
-        .current_dir(dir)
-        .args(["check", "study.toml"])
-        .output();
-    let output = output.unwrap();
-    assert_eq!(output.status.code(), Some(2));
-    assert!(
-        String::from_utf8_lossy(&output.stderr).starts_with(expected),
-        "{output:?}"
-    );
-    let contaminated = |name: &str| {
-        let calibrated = format!(
-            "{{ name = \"II\", calibrate = {{ synthesize = {{ model = \"imu.toml\", contaminate = \"{name}\" }} }} }}"
-        );
-        let study = STUDY.replace("{ name = \"wrong\", model = \"wrong.toml\" }", &calibrated);
-        fs::write(dir.join("study.toml"), study).unwrap();
-        refused(dir, "plan study.toml -o out", 2)
-    };
-    let key = "error: study.toml, line 8: \"candidate[2].calibrate.synthesize.contaminate\" = ";
-    let said = contaminated("gone.toml");
-    assert!(
-        said.starts_with(&format!(
-            "{key}\"gone.toml\" names gone.toml, which does not exist"
-        )),
-        "{said}"
-    );
-    let said = contaminated("section5-2");
-    assert!(
-        said.starts_with(key) && said.contains("hint: did you mean \"section5-I\"?"),
-        "{said}"
-    );
-    assert!(!dir.join("out").exists());
-}
-
-/// With every unit done there is nothing to compute, and yet the results would not be of the inputs that stand there.
-#[test]
-fn an_input_that_changed_when_all_was_done_is_told() {
-    let place = place();
-    let dir = place.path();
-    let undisturbed = whole(dir, "out");
-    fs::write(dir.join("wrong.toml"), MODEL.replace("4e-12", "5e-13")).unwrap();
-    for command in ["run", "status", "merge", "verify"] {
-        let said = refused(dir, &format!("{command} study.toml -o out"), 2);
-        assert!(
-            said.contains("wrong.toml has changed since the study was planned"),
-            "{said}"
-        );
-    }
-    fs::write(dir.join("wrong.toml"), MODEL.replace("4e-12", "4e-13")).unwrap();
-    let output = batch(
+    assert!(!dir.join("parts/results.csv").exists());
+    ended(dir, "batch study.toml -o parts --shard 1/2 -j 1", 0);
+    ended(dir, "batch study.toml -o parts --shard 0/2 -j 2", 0);
+    assert_eq!(results(&dir.join("parts")), results(&dir.join("whole")));
+    assert_eq!(cells(&dir.join("whole")).len(), CELLS);
+    ended(
         dir,
-        "verify study.toml -o out --units 1 --seed 1 --format json",
+        "run drive.toml wrong.toml --truth imu.toml --outage 30:38 --runs 77 --seed 5 -o alone",
+        3,
     );
-    let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(
-        (found["whole"].as_u64(), found["compared"].as_u64()),
-        (Some(UNITS as u64), Some(1))
+    for file in ["epochs.csv", "runs.csv", "fan.csv"] {
+        let cell = dir.join("whole/cells/length_s=8_wrong").join(file);
+        assert_eq!(
+            fs::read(cell).unwrap(),
+            fs::read(dir.join("alone").join(file)).unwrap(),
+            "{file}"
+        );
+    }
+    let rows = fs::read_to_string(dir.join("whole/results.csv")).unwrap();
+    assert_eq!(rows.lines().count(), 1 + CELLS * 9);
+    let head = "cell,length_s,model,method,filter,runs,diverged,outage,start_s,end_s,duration_s,state,asee_mean";
+    assert!(rows.starts_with(head), "{rows}");
+}
+
+/// A new label computes its own cells; another name of the same cell moves it; a changed input is refused.
+#[test]
+fn cells_are_known_by_what_they_hold() {
+    let place = place();
+    let dir = place.path();
+    ended(dir, "batch study.toml -o out", 0);
+    let time_of = |name: &str| {
+        fs::metadata(dir.join("out/cells").join(name).join("runs.csv"))
+            .unwrap()
+            .modified()
+            .unwrap()
+    };
+    let before = time_of("length_s=4_imu");
+    let more = STUDY
+        .replace("imu = {", "right = {")
+        .replace("[2, 4,", "[2, 3, 4,");
+    fs::write(dir.join("study.toml"), &more).unwrap();
+    ended(dir, "batch study.toml -o out", 0);
+    assert_eq!(cells(&dir.join("out")).len(), 10);
+    assert_eq!(time_of("length_s=4_right"), before, "moved, not made again");
+
+    fs::write(dir.join("wrong.toml"), MODEL.replace("4e-12", "5e-13")).unwrap();
+    let said = ended(dir, "batch study.toml -o out", 2);
+    assert!(
+        said.contains("cell length_s=2_wrong is of another study: wrong.toml has changed"),
+        "{said}"
     );
-    // what is not on this machine has not changed
-    fs::remove_file(dir.join("wrong.toml")).unwrap();
-    done(dir, "merge study.toml -o out");
+    let said = ended(dir, "batch study.toml -o out --set runs=78", 2);
+    assert!(said.contains("its \"runs\" is 77, not 78"), "{said}");
+    let dry = ended(dir, "batch study.toml -o out --dry-run", 0);
+    assert!(!dry.contains("error"), "{dry}");
+    ended(dir, "batch study.toml -o out --force", 0);
+    ended(dir, "batch study.toml -o fresh", 0);
+    assert_eq!(results(&dir.join("out")), results(&dir.join("fresh")));
+    // cells of another study are named and left
+    fs::write(dir.join("study.toml"), more.replace("[2, 3, 4,", "[2, 4,")).unwrap();
+    let said = ended(dir, "batch study.toml -o out", 0);
+    assert!(
+        said.contains("cells of another study are left out: 2, such as length_s=3_"),
+        "{said}"
+    );
+}
+
+#[test]
+fn damaged_cells_are_set_aside_and_computed_again() {
+    let place = place();
+    let dir = place.path();
+    ended(dir, "batch study.toml -o out", 0);
+    let undisturbed = results(&dir.join("out"));
+    let all = cells(&dir.join("out"));
+    let mut flipped = fs::read(all[3].join("runs.csv")).unwrap();
+    let last = flipped.len() - 4;
+    flipped[last] ^= 1;
+    fs::write(all[3].join("runs.csv"), flipped).unwrap();
+    fs::remove_file(all[5].join("manifest.json")).unwrap();
+    let said = ended(dir, "batch study.toml -o out --merge", 75);
+    assert!(
+        said.contains("is set aside") && said.contains("2 cells are missing"),
+        "{said}"
+    );
+    let summary = fs::read_to_string(dir.join("out/summary.json")).unwrap();
+    assert!(summary.contains("\"complete\": false"));
+    ended(dir, "batch study.toml -o out", 0);
+    fs::remove_dir_all(
+        dir.join("out/cells")
+            .join(format!("{}.damaged", all[3].file_name().unwrap().display())),
+    )
+    .unwrap();
     assert_eq!(results(&dir.join("out")), undisturbed);
 }
 
+/// Exit code 75 is "stopped, to be resumed", 1 where resuming would not help.
 #[test]
-fn units_of_another_plan_are_named_and_left_out() {
+fn a_time_limit_and_sigterm_end_with_75_and_two_at_once_do_no_harm() {
     let place = place();
     let dir = place.path();
-    whole(dir, "five");
-    fs::write(
-        dir.join("study.toml"),
-        STUDY.replace("seed = 5", "seed = 6"),
-    )
-    .unwrap();
-    let undisturbed = whole(dir, "six");
-    let stray = units(&dir.join("five")).remove(0);
-    let inner = dir
-        .join("six/units")
-        .join(stray.parent().unwrap().file_name().unwrap());
-    fs::create_dir_all(&inner).unwrap();
-    fs::copy(&stray, inner.join(stray.file_name().unwrap())).unwrap();
-    for command in ["plan", "run", "merge", "status"] {
-        let said = done(dir, &format!("{command} study.toml -o six"));
-        assert!(
-            said.contains("unit files of another plan are left out: 1, such as six/units/"),
-            "{said}"
-        );
-    }
-    assert_eq!(results(&dir.join("six")), undisturbed);
-}
-
-/// Names with a slash, several filters: every candidate and filter has a row of its own, with its numbers.
-#[test]
-fn every_candidate_and_filter_is_in_the_ratio_table() {
-    let place = place();
-    let dir = place.path();
-    let candidates = "{ name = \"clean/awv\", model = \"imu.toml\" }, { name = \"III/awv\", model = \"wrong.toml\" }, \
-         { name = \"II\", calibrate = { estimators = [\"awv\", \"dr-awv\"], fit = \"AR1+WN\", trim = 1, \
-         synthesize = { model = \"imu.toml\", replicates = 3, samples = 8192, axes = \"x\" } } }";
-    let study = STUDY.replace(
-        "{ model = \"imu.toml\" }, { name = \"wrong\", model = \"wrong.toml\" }",
-        candidates,
-    );
-    let study = study.replace(
-        "runs = 77",
-        "runs = 8\nreference = \"III/awv\"\nfilters = [15, \"full\"]",
-    );
-    fs::write(
-        dir.join("study.toml"),
-        study.replace("[2, 4, 8, 16]", "[8]"),
-    )
-    .unwrap();
-    // two processes, which 15 states reduce to one
-    let two = MODEL.replace(
-        "4e-12 }",
-        "4e-12 }, { type = \"AR1\", phi = 0.99, sigma2 = 1e-8 }",
-    );
-    fs::write(dir.join("wrong.toml"), two).unwrap();
-    whole(dir, "out");
-    let page = fs::read_to_string(dir.join("out/results/report.html")).unwrap();
-    let (_, ratios) = page
-        .split_once(": ASEE relative to III/awv with the same filter</h2>")
-        .unwrap();
-    let ratios = ratios.split("</table>").next().unwrap();
-    let filters = ["15", "full"];
-    for name in ["clean/awv", "III/awv", "II"]
-        .iter()
-        .flat_map(|c| filters.map(|f| format!("{c} {f}")))
-    {
-        let rows: Vec<&str> = ratios
-            .split("<tr>")
-            .filter(|row| row.contains(&format!(">{name}<")))
-            .collect();
-        assert_eq!(rows.len(), 1, "{name}: {ratios}");
-        // two states are shown, each by estimator: two for the calibrated ones, none for the others
-        let filled = rows[0].matches('±').count() + rows[0].matches("reference").count();
-        assert_eq!(
-            filled,
-            if name.starts_with("II ") { 4 } else { 2 },
-            "{ratios}"
-        );
-        assert_eq!(
-            rows[0].contains("reference"),
-            name.starts_with("III"),
-            "{ratios}"
-        );
-    }
-    let text = fs::read_to_string(dir.join("out/results/outages.json")).unwrap();
-    let rows: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap();
-    assert_eq!(rows.len(), 4 * 2);
-    let mut different = false;
-    for row in &rows {
-        assert_eq!(row["reference"], "III/awv");
-        let of_reference = |r: &&serde_json::Value| {
-            r["candidate"] == row["reference"] && r["filter"] == row["filter"]
-        };
-        let own = rows.iter().find(of_reference).unwrap();
-        assert_eq!(row["nees_mean_reference"], own["nees_mean"]);
-        different |= own["nees_mean"] != rows[0]["nees_mean_reference"];
-    }
-    assert!(different, "the two filters are two references");
-}
-
-#[test]
-fn tables_of_an_earlier_plan_do_not_survive() {
-    let place = place();
-    let dir = place.path();
-    whole(dir, "out");
-    fs::remove_file(dir.join("out/plan.json")).unwrap();
-    let study = STUDY
-        .replace("seed = 5", "seed = 6")
-        .replace(", \"epochs\"]", "]");
-    fs::write(dir.join("study.toml"), &study).unwrap();
-    let said = done(dir, "plan study.toml -o out");
+    ended(dir, "batch study.toml -o one", 0);
+    let said = ended(dir, "batch study.toml -o out --time-limit 0", 1);
     assert!(
-        said.contains("unit files of another plan are left out: 50, such as"),
+        said.contains("stopped before a single unit was done; 4 units left"),
         "{said}"
     );
-    refused(dir, "merge study.toml -o out", 1);
-    let again = whole(dir, "out");
-    let names: Vec<&str> = again.iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(
-        names,
-        FILES
-            .into_iter()
-            .filter(|f| !f.starts_with("epochs"))
-            .collect::<Vec<_>>()
-    );
-    assert_eq!(again, whole(dir, "fresh"));
+    // the first limit in which a unit fits, on a machine as busy as may be
+    let long = "batch study.toml -o long --set runs=3000";
+    let limited = |limit: &u32| {
+        drop(fs::remove_dir_all(dir.join("long")));
+        let (code, said) = ran(dir, &format!("{long} --time-limit {limit} -j 1"));
+        (code == 75).then_some(said)
+    };
+    let said = [1, 2, 3, 5, 8, 13, 21, 34]
+        .iter()
+        .find_map(limited)
+        .unwrap();
+    assert!(said.contains("goes on where this one stopped"), "{said}");
+    drop(fs::remove_dir_all(dir.join("long")));
+    let mut child = spawn(dir, &format!("{long}0 -j 1"));
+    while cells(&dir.join("long")).is_empty() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let kill = std::process::Command::new("kill")
+        .args(["-TERM", &child.id().to_string()])
+        .status();
+    assert!(kill.unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(75));
+    let mut twins = [0, 1].map(|_| spawn(dir, "batch study.toml -o out -j 1"));
+    assert!(twins.iter_mut().all(|t| t.wait().unwrap().success()));
+    ended(dir, "batch study.toml -o out", 0);
+    assert_eq!(results(&dir.join("out")), results(&dir.join("one")));
+}
+
+/// Workers that are killed (SIGKILL) at random points leave a study that ends with the bytes of an undisturbed one.
+#[test]
+fn killed_workers_leave_no_trace() {
+    let place = place();
+    let dir = place.path();
+    let start = Instant::now();
+    ended(dir, "batch study.toml -o whole -j 1 --set runs=400", 0);
+    let undisturbed = start.elapsed();
+    let mut random = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(1);
+    let (mut kills, mut amid) = (0, 0);
+    while kills < 20 || amid < 3 {
+        let mut workers =
+            [0, 1].map(|_| spawn(dir, "batch study.toml -o killed -j 1 --set runs=400"));
+        std::thread::sleep(undisturbed.mul_f64(random.random_range(0.0..0.6)));
+        for worker in &mut workers {
+            worker.kill().unwrap();
+            worker.wait().unwrap();
+            kills += 1;
+        }
+        let there = cells(&dir.join("killed"));
+        amid += usize::from(!there.is_empty() && there.len() < CELLS);
+        if there.len() == CELLS {
+            there
+                .iter()
+                .step_by(2)
+                .for_each(|cell| fs::remove_dir_all(cell).unwrap());
+        }
+        assert!(kills < 200, "no worker gets to a cell");
+    }
+    ended(dir, "batch study.toml -o killed --set runs=400", 0);
+    assert_eq!(results(&dir.join("killed")), results(&dir.join("whole")));
 }
 
 #[test]
-fn another_seed_than_the_plans_is_refused() {
+fn the_scheduler_says_which_shard() {
     let place = place();
     let dir = place.path();
-    done(dir, "plan study.toml -o out");
-    for command in ["run", "merge", "status", "plan"] {
-        let said = refused(dir, &format!("{command} study.toml -o out --seed 6"), 2);
+    let slurm = |index: &str| {
+        let mut command = command(dir, "batch study.toml -o out");
+        command
+            .env("SLURM_ARRAY_TASK_ID", index)
+            .env("SLURM_ARRAY_TASK_MIN", "1");
+        command.env("SLURM_ARRAY_TASK_COUNT", "2").output().unwrap()
+    };
+    let output = slurm("2");
+    assert!(output.status.success());
+    assert!(String::from_utf8_lossy(&output.stderr).contains("shard 1/2 (SLURM_ARRAY_TASK_ID=2)"));
+    assert_eq!(cells(&dir.join("out")).len(), CELLS / 2);
+    assert!(slurm("1").status.success());
+    assert_eq!(cells(&dir.join("out")).len(), CELLS);
+    assert_eq!(slurm("3").status.code(), Some(2));
+}
+
+#[test]
+fn bad_studies_are_refused_before_anything_is_written() {
+    let place = place();
+    let dir = place.path();
+    let cases = [
+        (
+            "runs = 77",
+            "rns = 77",
+            "cell length_s=2_imu: run: there is no option rns",
+            "did you mean runs?",
+        ),
+        ("[vary]\n", "[varies]\n", "study.toml", "varies"),
+        (
+            "[2, 4, 8, 16]",
+            "[]",
+            "\"vary.length_s\" is empty",
+            "a list of labels",
+        ),
+        (
+            "{length_s}",
+            "{length}",
+            "there is no axis length",
+            "[vary]",
+        ),
+        (
+            "drive.toml",
+            "gone.toml",
+            "gone.toml",
+            "relative to the study's file",
+        ),
+        (
+            "seed = 5",
+            "out = \"x\"",
+            "a study has its own directory",
+            "-o",
+        ),
+        ("seed = 5", "seed = 5\ngnss.rate = 5", "rate", "gnss"),
+        (
+            "wrong = {",
+            "IMU = {",
+            "two cells have the name length_s=2_IMU",
+            "[vary]",
+        ),
+    ];
+    for (from, to, message, more) in cases {
+        fs::write(dir.join("study.toml"), STUDY.replace(from, to)).unwrap();
+        let said = ran(dir, "batch study.toml -o out");
         assert!(
-            said.contains("\"seed\" is 5 in the plan, 6 in the study"),
+            matches!(said.0, 1 | 2) && said.1.contains(message) && said.1.contains(more),
+            "{to}: {}",
+            said.1
+        );
+        assert!(!dir.join("out").exists(), "{from}");
+    }
+    fs::write(
+        dir.join("study.toml"),
+        STUDY.to_owned() + "[reference]\nmodel = \"imo\"\n",
+    )
+    .unwrap();
+    let said = ended(dir, "batch study.toml -o out", 2);
+    assert!(
+        said.contains("\"imo\" is no label of an axis\n\nhint: labels: imu, wrong"),
+        "{said}"
+    );
+}
+
+/// A list is an axis where a single run would not take it.
+#[test]
+fn lists_are_axes_where_a_run_takes_none() {
+    let place = place();
+    let dir = place.path();
+    let study = "[run]\ntrajectory = \"drive.toml\"\nmodel = [\"imu.toml\", \"wrong.toml\"]\nfilter = [15, \"full\"]\nruns = 8\n\
+                 outage = [[\"20:24\"], [\"20:24\", \"40:44\"]]\ngnss.rate_hz = [1, 2]\ngnss.pos_sigma_m = [1, 1, 2]\nseed = [1, 2]\n";
+    fs::write(dir.join("study.toml"), study).unwrap();
+    ended(dir, "batch study.toml -o out --set seed=1", 0);
+    let names: Vec<String> = cells(&dir.join("out"))
+        .iter()
+        .map(|cell| cell.file_name().unwrap().display().to_string())
+        .collect();
+    assert_eq!(names.len(), 16);
+    assert!(
+        names.contains(&"wrong_full_20-24+40-44_rate_hz=2".to_owned()),
+        "{names:?}"
+    );
+    let check = ended(dir, "check study.toml", 0);
+    assert!(!check.contains("error"), "{check}");
+}
+
+/// A covariance analysis is that of `run`, and a cell that cannot be computed is named while others go on.
+#[test]
+fn without_sampling() {
+    let place = place();
+    let dir = place.path();
+    ended(dir, "batch study.toml -o out --set method=lincov", 0);
+    ended(
+        dir,
+        "run drive.toml wrong.toml --truth imu.toml --outage 30:34 --method lincov -o alone",
+        3,
+    );
+    let cell = dir.join("out/cells/length_s=4_wrong/epochs.csv");
+    assert_eq!(
+        fs::read(cell).unwrap(),
+        fs::read(dir.join("alone/epochs.csv")).unwrap()
+    );
+    fs::write(
+        dir.join("study.toml"),
+        STUDY.replace("[2, 4, 8, 16]", "[2, 4, 8, 70]"),
+    )
+    .unwrap();
+    let said = ended(dir, "batch study.toml -o beyond", 1);
+    assert!(
+        said.contains("cell length_s=70_imu: ") && said.contains("outage"),
+        "{said}"
+    );
+    assert_eq!(cells(&dir.join("beyond")).len(), 6);
+}
+
+#[test]
+fn shipped_studies_are_studies() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for (name, cells) in [("quick_study", 6), ("outage_length_expected", 40)] {
+        let output = command(root, &format!("check examples/{name}.toml"))
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stdout).into_owned()
+            + &String::from_utf8_lossy(&output.stderr);
+        assert!(
+            said.contains(&format!("a study of {cells} cells")),
             "{said}"
         );
     }
-    done(dir, "status study.toml -o out --seed 5");
+}
+
+/// Three blocks on three shards are one `run`: 10 s of work each.
+#[test]
+#[ignore = "half a minute of work"]
+fn blocks_on_shards_make_the_bytes_of_run() {
+    let place = place();
+    let dir = place.path();
+    let study = "[run]\ntrajectory = \"drive.toml\"\nmodel = \"imu.toml\"\noutage = [\"30:40\"]\nruns = 40000\nseed = 5\n";
+    fs::write(dir.join("study.toml"), study).unwrap();
+    for shard in ["2/3", "0/3", "1/3"] {
+        ended(dir, &format!("batch study.toml -o out --shard {shard}"), 0);
+    }
+    ended(
+        dir,
+        "run drive.toml imu.toml --outage 30:40 --runs 40000 --seed 5 -o alone",
+        0,
+    );
+    for file in ["epochs.csv", "runs.csv"] {
+        assert_eq!(
+            fs::read(dir.join("out/cells/run").join(file)).unwrap(),
+            fs::read(dir.join("alone").join(file)).unwrap()
+        );
+    }
 }

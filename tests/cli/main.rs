@@ -13,8 +13,6 @@
 mod common;
 
 mod batch;
-mod batch_kills;
-mod batch_lincov;
 mod calibrate;
 mod calibrate_words;
 mod choose;
@@ -36,7 +34,6 @@ mod readme;
 mod require;
 mod require_catalogue;
 mod run;
-mod study;
 mod synthesize;
 mod trajectory_command;
 mod tune;

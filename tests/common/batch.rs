@@ -1,4 +1,4 @@
-//! A study of 50 units of a few milliseconds, and how to run parts of it.
+//! A study of eight cells of a few milliseconds, and how to run parts of it.
 
 #[path = "drive.rs"]
 mod drive;
@@ -8,18 +8,21 @@ use drive::{DRIVE, place_with};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
-/// Five cells of ten units; two columns.
+/// Four units of two cells.
 pub const STUDY: &str = "
+[run]
+trajectory = \"drive.toml\"
+truth = \"imu.toml\"
+outage = [\"30:+{length_s}\"]
 runs = 77
-unit_runs = 8
 seed = 5
-metrics = [\"outages\", \"ratios\", \"epochs\"]
-trajectory = [{ file = \"drive.toml\" }]
-truth = [{ model = \"imu.toml\" }]
-candidate = [{ model = \"imu.toml\" }, { name = \"wrong\", model = \"wrong.toml\" }]
-outages = [{ sweep = { start_s = 30, duration_s = [2, 4, 8, 16] } }, { name = \"none\", windows = [] }]
+[vary]
+length_s = [2, 4, 8, 16]
+[vary.model]
+imu = { model = \"imu.toml\" }
+wrong = { model = \"wrong.toml\" }
 ";
-pub const UNITS: usize = 50;
+pub const CELLS: usize = 8;
 
 /// A directory with the study and what it needs.
 pub fn place() -> tempfile::TempDir {
@@ -33,13 +36,10 @@ pub fn place() -> tempfile::TempDir {
     dir
 }
 
-/// `nav-sim batch …` in a directory.
+/// `nav-sim …` in a directory.
 pub fn command(dir: &Path, arguments: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_nav-sim"));
-    command
-        .current_dir(dir)
-        .arg("batch")
-        .args(arguments.split_whitespace());
+    command.current_dir(dir).args(arguments.split_whitespace());
     for variable in [
         "HQ_TASK_ID",
         "SLURM_ARRAY_TASK_ID",
@@ -51,27 +51,19 @@ pub fn command(dir: &Path, arguments: &str) -> Command {
     command
 }
 
-pub fn batch(dir: &Path, arguments: &str) -> Output {
-    command(dir, arguments).output().unwrap()
-}
-
-/// What it said; it must have succeeded.
-pub fn done(dir: &Path, arguments: &str) -> String {
-    let output = batch(dir, arguments);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(
-        output.status.success(),
-        "{arguments}: {:?}\n{said}",
-        output.status
-    );
-    said
+/// The exit code and what it said.
+pub fn ran(dir: &Path, arguments: &str) -> (i32, String) {
+    let Output { status, stderr, .. } = command(dir, arguments).output().unwrap();
+    (
+        status.code().unwrap(),
+        String::from_utf8_lossy(&stderr).into_owned(),
+    )
 }
 
 /// What it said; it must have ended with this code.
-pub fn refused(dir: &Path, arguments: &str, code: i32) -> String {
-    let output = batch(dir, arguments);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(code), "{arguments}\n{said}");
+pub fn ended(dir: &Path, arguments: &str, code: i32) -> String {
+    let (ended, said) = ran(dir, arguments);
+    assert_eq!(ended, code, "{arguments}\n{said}");
     said
 }
 
@@ -84,34 +76,31 @@ pub fn spawn(dir: &Path, arguments: &str) -> Child {
         .unwrap()
 }
 
-/// Every merged file with its bytes.
-pub fn results(dir: &Path) -> Vec<(String, Vec<u8>)> {
-    let entries = std::fs::read_dir(dir.join("results")).unwrap();
-    let mut files: Vec<(String, Vec<u8>)> = entries
-        .map(|e| e.unwrap().path())
-        .map(|p| {
-            (
-                p.file_name().unwrap().to_string_lossy().into_owned(),
-                std::fs::read(&p).unwrap(),
-            )
-        })
-        .collect();
-    files.sort();
-    files
+/// Results and the tables of cells, with their bytes.
+pub fn results(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut files = ["results.csv", "summary.json", "report.html"]
+        .map(|name| dir.join(name))
+        .to_vec();
+    for cell in cells(dir) {
+        files.extend(["epochs.csv", "runs.csv", "fan.csv"].map(|name| cell.join(name)));
+    }
+    let of_file = |path: PathBuf| {
+        let bytes = std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        (path.strip_prefix(dir).unwrap().to_owned(), bytes)
+    };
+    files.into_iter().map(of_file).collect()
 }
 
-/// The unit files of a study directory.
-pub fn units(dir: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(dir.join("units")) else {
-        return Vec::new();
-    };
-    let inner = entries
+/// The finished cells of a study directory.
+pub fn cells(dir: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(dir.join("cells"))
+        .into_iter()
         .flatten()
-        .flat_map(|e| std::fs::read_dir(e.path()).unwrap().flatten());
-    let mut files: Vec<PathBuf> = inner
+        .flatten();
+    let mut cells: Vec<PathBuf> = entries
         .map(|e| e.path())
-        .filter(|p| p.extension().is_some_and(|e| e == "unit"))
+        .filter(|path| path.join("manifest.json").exists())
         .collect();
-    files.sort();
-    files
+    cells.sort();
+    cells
 }

@@ -22,10 +22,13 @@ use crate::report::requirement::requirement_line;
 use crate::report::tables::{epochs_csv, fan_csv, runs_csv};
 use crate::report::{TrajectorySeries, json};
 use nav_sim_document::{Document, svg};
+use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::metrics::{Requirement, Summary};
+use nav_sim_navigation::monte_carlo;
 use nav_sim_navigation::scenario::{Method, Scenario};
 use nav_sim_navigation::sensors::imu::TruthError;
-use nav_sim_navigation::simulation::ExperimentError;
+use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_navigation::simulation::{ExperimentError, Plan, RunResult};
 use nav_sim_signal::noise::{Model, continuous};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -219,7 +222,7 @@ impl Run {
     }
 
     /// The scenario file with the options over it, checked.
-    fn scenario(&self) -> Result<Scenario> {
+    pub(crate) fn scenario(&self) -> Result<Scenario> {
         let mut scenario = self.settings.scenario()?;
         if let Some(path) = &self.gnss {
             scenario.gnss = scenario_file::read(path)?.gnss;
@@ -337,8 +340,80 @@ impl Run {
     }
 }
 
+/// Runs of this request that are summed together: the bytes of results depend on it alone, not on who computed them.
+pub(crate) fn block_of(request: &Run, context: &Context<'_>) -> Result<u64> {
+    let trajectory = inputs::trajectory(&request.trajectory, context)?;
+    Ok(navigate::block(&trajectory, &request.scenario()?))
+}
+
+/// Runs `first..first + count` of filters on the same noise, one result a filter (none for covariance analysis); nothing if the
+/// context stopped.
+pub(crate) fn columns(
+    runs: &[&PreparedRun<'_>],
+    first: u64,
+    count: u64,
+    context: &Context<'_>,
+) -> Result<Option<Vec<Option<RunResult>>>> {
+    let Some(one) = runs
+        .first()
+        .filter(|run| run.scenario.run.method != Method::Lincov)
+    else {
+        context.advance(count * runs.len() as u64);
+        return Ok(Some(runs.iter().map(|_| None).collect()));
+    };
+    let outages = one.outages();
+    let belief = |run: &&PreparedRun<'_>| {
+        let track = run
+            .scenario
+            .track(&run.inputs.trajectory, &run.inputs.model, &outages)?;
+        Ok::<_, NavigateError>(run.scenario.belief(&run.inputs.model, &outages, &track)?)
+    };
+    let beliefs = runs
+        .iter()
+        .map(|run| belief(run).map_err(|e| run.request.impossible(e)));
+    let beliefs = beliefs.collect::<Result<Vec<_>>>()?;
+    let inputs = &one.inputs;
+    let experiment = one.scenario.experiment(
+        &inputs.trajectory,
+        inputs.truth(),
+        &beliefs,
+        &outages,
+        one.seed,
+    );
+    let plan = Plan::new(&experiment)
+        .map_err(|e| one.request.impossible(e.into()))?
+        .with_fan();
+    let progress = |done| context.advance(done * runs.len() as u64);
+    let results = monte_carlo::run_range(&plan, first, count, &|| context.go_on(), &progress);
+    Ok(results.map(|results| results.into_iter().map(Some).collect()))
+}
+
 impl PreparedRun<'_> {
+    fn outages(&self) -> Vec<Outage> {
+        self.origin.configuration.outage.clone().unwrap_or_default()
+    }
+
+    /// Whether two runs differ in the filter alone.
+    pub(crate) fn shares_noise_with(&self, other: &Self) -> bool {
+        let noise = |run: &Self| {
+            let mut scenario = run.origin.configuration.clone();
+            scenario.filter.states = FilterStates::Full;
+            scenario
+        };
+        noise(self) == noise(other) && self.seed == other.seed
+    }
+
     fn navigate(self, context: &Context<'_>) -> Result<RunAnswer> {
+        self.navigate_with(None, context)
+    }
+
+    /// Navigates; `sampled`: runs that were made already.
+    pub(crate) fn navigate_with(
+        self,
+        sampled: Option<RunResult>,
+        context: &Context<'_>,
+    ) -> Result<RunAnswer> {
+        let outages = self.outages();
         let Self {
             request,
             inputs,
@@ -346,8 +421,7 @@ impl PreparedRun<'_> {
             mut origin,
             seed,
         } = self;
-        let outages = origin.configuration.outage.clone().unwrap_or_default();
-        let found = navigate(&inputs, &scenario, &outages, seed, context);
+        let found = navigate::with_runs(&inputs, &scenario, &outages, seed, sampled, context);
         let mut navigation = found.map_err(|e| request.impossible(e))?;
         let summary = &mut navigation.summary;
         summary.require = request.require.iter().map(|r| r.check(summary)).collect();

@@ -106,6 +106,18 @@ pub fn navigate(
     seed: u64,
     context: &Context<'_>,
 ) -> Result<Navigation, NavigateError> {
+    with_runs(inputs, scenario, outages, seed, None, context)
+}
+
+/// The same with runs that were made already.
+pub(super) fn with_runs(
+    inputs: &NavigateInputs,
+    scenario: &Scenario,
+    outages: &[Outage],
+    seed: u64,
+    runs: Option<RunResult>,
+    context: &Context<'_>,
+) -> Result<Navigation, NavigateError> {
     let method = scenario.run.method;
     if method != Method::MonteCarlo {
         possible(inputs, scenario)?;
@@ -148,7 +160,13 @@ pub fn navigate(
             }
         }
         (method, expected) => {
-            let mut sampled = sampled(&experiment, scenario.run.runs, seed, context)?;
+            let mut sampled = match runs {
+                Some(runs) => Navigation::of_runs(runs, seed),
+                None => {
+                    let block = block(&inputs.trajectory, scenario);
+                    sampled(&experiment, scenario.run.runs, block, seed, context)?
+                }
+            };
             match expected {
                 Some((_, expected)) if method == Method::Both => {
                     sampled = sampled.beside(expected, &analysis.fan(&belief));
@@ -283,18 +301,32 @@ fn heading(filter: &FilterPass<'_>) -> Option<HeadingDoubt> {
     weak_heading(filter.yaw_while_measured().into_iter())
 }
 
-/// All runs.
+/// Runs that are summed together: some ten seconds of work.
+pub(super) fn block(trajectory: &Trajectory, scenario: &Scenario) -> u64 {
+    let samples = (trajectory.end_s() - trajectory.start_s()) * scenario.imu.rate_hz;
+    8 * ((1e8 / (8.0 * samples)) as u64).max(1)
+}
+
+/// All runs, block by block.
 fn sampled(
     experiment: &Experiment<'_>,
     runs: u64,
+    block: u64,
     seed: u64,
     context: &Context<'_>,
 ) -> Result<Navigation, NavigateError> {
     context.begin("runs", runs);
     let plan = Plan::new(experiment)?.with_fan();
-    let mut results = monte_carlo::run_plan(&plan, runs, &|n| context.advance(n));
+    let of_block = |first: u64| {
+        let count = block.min(runs - first);
+        let found = monte_carlo::run_range(&plan, first, count, &|| true, &|n| context.advance(n));
+        found.expect("nothing stops it").swap_remove(0)
+    };
+    let mut result = of_block(0);
+    for first in (block..runs).step_by(block as usize) {
+        result.append(of_block(first));
+    }
     context.end();
-    let result = results.swap_remove(0);
     Ok(Navigation::of_runs(result, seed))
 }
 
@@ -414,7 +446,7 @@ impl NavigateInputs {
         }
     }
 
-    fn truth(&self) -> Truth<'_> {
+    pub(super) fn truth(&self) -> Truth<'_> {
         match &self.truth {
             TrueImu::AsBelieved => Truth::Model(&self.model),
             TrueImu::Model(model) => Truth::Model(model),

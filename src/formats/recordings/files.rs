@@ -62,14 +62,6 @@ pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, FileError> {
     Ok(files)
 }
 
-/// The recordings that are meant: files as given, those of a directory in name order.
-///
-/// # Errors
-/// When a path cannot be read, or one is given twice.
-pub(crate) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
-    Ok(expand(paths)?.into_iter().map(|file| file.path).collect())
-}
-
 /// A directory without recordings.
 pub(super) fn no_files(path: String) -> FileError {
     FileError::contents(path, Place::Within, "no recordings in it").advice(

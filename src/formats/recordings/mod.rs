@@ -10,7 +10,7 @@ mod samples;
 pub(in crate::formats) mod timing;
 mod write;
 
-pub(crate) use files::{is_recording, listed};
+pub(crate) use files::is_recording;
 pub use report::{FileReport, Report};
 pub(in crate::formats) use samples::{check_gravity, gravity_factor};
 pub use write::FileFormat;

@@ -102,11 +102,6 @@ impl Source {
             .map_or((0..0, false), |table| span_of(table.get_ref(), key))
     }
 
-    /// Whether the file sets a key.
-    pub(crate) fn has(&self, key: &str) -> bool {
-        self.place(key).1
-    }
-
     /// The line of a key, or of the innermost table around it that the file has.
     pub(crate) fn line_of(&self, key: &str) -> usize {
         self.line(self.place(key).0.start)

@@ -81,14 +81,16 @@ pub enum NotAnOutage {
 impl FromStr for Outage {
     type Err = NotAnOutage;
 
-    /// `START:END`, in seconds.
+    /// `START:END` or `START:+DURATION`, in seconds.
     fn from_str(text: &str) -> Result<Self, NotAnOutage> {
-        let time = |text: &str| text.trim().parse().map_err(|_| NotAnOutage::Form);
+        let time = |text: &str| text.trim().parse::<f64>().map_err(|_| NotAnOutage::Form);
         let (start, end) = text.split_once(':').ok_or(NotAnOutage::Form)?;
-        let outage = Self {
-            start_s: time(start)?,
-            end_s: time(end)?,
+        let start_s = time(start)?;
+        let end_s = match end.trim().strip_prefix('+') {
+            Some(duration) => start_s + time(duration)?,
+            None => time(end)?,
         };
+        let outage = Self { start_s, end_s };
         outage.validate()?;
         Ok(outage)
     }

@@ -1,14 +1,13 @@
 //! Which part of a plan a process does: by flag, or by what the scheduler says.
 
-use crate::cli::Failure;
-use crate::study::Shard;
+use crate::app::Failure;
 
 /// `i/n`, i from 0.
-pub(super) fn parse(text: &str) -> Result<Shard, String> {
+pub(crate) fn parse(text: &str) -> Result<(u64, u64), String> {
     let numbers = text
         .split_once('/')
         .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
-    let shard = numbers.and_then(|(index, count)| Shard::new(index, count));
+    let shard = numbers.filter(|(index, count): &(u64, u64)| index < count);
     shard.ok_or_else(|| "expected i/n with i from 0 to n − 1, such as 0/4".to_owned())
 }
 
@@ -27,22 +26,22 @@ const SCHEDULERS: [(&str, Option<[&str; 3]>); 4] = [
     ("JOB_COMPLETION_INDEX", None),
 ];
 
-/// The shard of this process and where it comes from. A flag wins; without one and without a scheduler, all
-/// there is. `shards` is how many there are, where the scheduler does not say.
-pub(super) fn find(
-    flag: Option<Shard>,
+/// The shard of this process and where it comes from; none without a flag and a scheduler. `shards` is how many there are,
+/// where the scheduler does not say.
+pub(crate) fn find(
+    flag: Option<(u64, u64)>,
     shards: Option<u64>,
     variable: &dyn Fn(&str) -> Option<String>,
-) -> Result<(Shard, String), Failure> {
-    if let Some(shard) = flag {
-        return Ok((shard, "--shard".to_owned()));
+) -> Result<(Option<(u64, u64)>, String), Failure> {
+    if flag.is_some() {
+        return Ok((flag, "--shard".to_owned()));
     }
     let set = SCHEDULERS
         .iter()
         .find_map(|(name, more)| Some((*name, *more, variable(name)?)));
     let Some((name, more, text)) = set else {
         return match shards {
-            None | Some(1) => Ok((Shard::ALL, "no scheduler".to_owned())),
+            None | Some(1) => Ok((None, "no scheduler".to_owned())),
             Some(n) => {
                 let failure = Failure::input(format!(
                     "--shards {n}: no scheduler says which of them this is"
@@ -72,8 +71,8 @@ pub(super) fn find(
         ));
         return Err(failure.hint("add --shards n (indices from 0 to n − 1)"));
     };
-    match index.and_then(|index| Shard::new(index, count)) {
-        Some(shard) => Ok((shard, format!("{name}={id}"))),
+    match index.filter(|index| *index < count) {
+        Some(index) => Ok((Some((index, count)), format!("{name}={id}"))),
         None => {
             let failure = Failure::input(format!("{name}={id} is not one of {count} shards"));
             Err(failure.hint(format!(
@@ -98,7 +97,8 @@ mod tests {
         let variable = |name: &str| set.get(name).map(|v| (*v).to_owned());
         let flag = flag.map(|f| parse(f).unwrap());
         find(flag, shards, &variable)
-            .map(|(s, from)| (s.parts().0, s.parts().1, from))
+            .map(|(s, from)| (s.map_or((0, 1), |s| s), from))
+            .map(|((index, count), from)| (index, count, from))
             .map_err(|e| e.to_string())
     }
 

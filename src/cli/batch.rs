@@ -1,0 +1,134 @@
+//! `nav-sim batch` on a terminal: signals, the time limit, what is shown.
+
+use super::{Failure, Session, drive};
+use crate::app::{Answer, Context, Front};
+use crate::commands::batch::{BatchRequest, Outcome};
+use crate::formats::atomic::Existing;
+use crate::report::{WIDTH, json as to_json};
+use nav_sim_document::Note;
+use serde_json::json;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+#[derive(clap::Args, Debug)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    request: BatchRequest,
+    /// Stop after this time (exit code 75; 1 if nothing was finished): seconds, or with s, m, h
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    time_limit: Option<Duration>,
+}
+
+/// `90`, `90s`, `1.5m`, `2h`.
+fn time(text: &str) -> Result<Duration, String> {
+    let (number, unit) = match text.char_indices().last() {
+        Some((i, 's')) => (&text[..i], 1.0),
+        Some((i, 'm')) => (&text[..i], 60.0),
+        Some((i, 'h')) => (&text[..i], 3600.0),
+        _ => (text, 1.0),
+    };
+    let seconds = number.parse::<f64>().ok().map(|x| x * unit);
+    let time = seconds.and_then(|s| Duration::try_from_secs_f64(s).ok());
+    time.ok_or_else(|| "expected a time such as 3000, 50m or 1.5h".to_owned())
+}
+
+/// A session that stops at a signal or a time.
+struct Watch<'a> {
+    session: &'a Session,
+    terminated: Arc<AtomicBool>,
+    interrupted: Arc<AtomicBool>,
+    deadline: Option<Instant>,
+}
+
+impl Front for Watch<'_> {
+    fn note(&self, note: Note) {
+        self.session.note(note);
+    }
+
+    fn begin(&self, unit: &str, steps: u64) {
+        self.session.begin(unit, steps);
+    }
+
+    fn advance(&self, steps: u64) {
+        self.session.advance(steps);
+    }
+
+    fn end(&self) {
+        self.session.end();
+    }
+
+    fn go_on(&self) -> bool {
+        let signal = [&self.terminated, &self.interrupted]
+            .iter()
+            .any(|flag| flag.load(Ordering::Relaxed));
+        !signal && self.deadline.is_none_or(|d| Instant::now() < d)
+    }
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let flag = |signal| -> Result<Arc<AtomicBool>, Failure> {
+        let flag = Arc::new(AtomicBool::new(false));
+        // A second signal of the kind ends the process at once: whatever is there is whole.
+        signal_hook::flag::register_conditional_default(signal, Arc::clone(&flag))
+            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&flag)))
+            .map_err(Failure::could_not)?;
+        Ok(flag)
+    };
+    let watch = Watch {
+        session,
+        terminated: flag(SIGTERM)?,
+        interrupted: flag(SIGINT)?,
+        deadline: args
+            .time_limit
+            .and_then(|limit| Instant::now().checked_add(limit)),
+    };
+    let mut request = args.request.clone();
+    request.force = session.existing() == Existing::Replace;
+    request
+        .set
+        .extend(session.asked_seed().map(|seed| format!("seed={seed}")));
+    let variable = |name: &str| std::env::var(name).ok();
+    let outcome = match request.run(&variable, &Context::new(&watch, None)) {
+        Err(_) if watch.interrupted.load(Ordering::Relaxed) => {
+            return Err(Failure::interrupted("interrupted")
+                .hint("the same command goes on where this one stopped"));
+        }
+        outcome => outcome?,
+    };
+    match &outcome {
+        Outcome::Merged(answer) => {
+            let document = answer.document();
+            let shown = match session.verbose() {
+                _ if session.json() => to_json(&**answer),
+                true => document.verbose(WIDTH),
+                false => document.terminal(WIDTH),
+            };
+            drive::tell(&document, &shown, session);
+            session.wrote(&request.directory());
+        }
+        Outcome::Partial(missing) if session.json() => {
+            session.result(json!({ "schema_version": 1, "complete": false, "missing": missing }));
+        }
+        Outcome::Partial(_) => session.say("own share done"),
+        Outcome::Estimate(text) => session.result(text),
+    }
+    outcome.unmet().map_or(Ok(()), Err)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_understood() {
+        let seconds = ["90", "90s", "1.5m", "2h"].map(|t| time(t).unwrap().as_secs());
+        assert_eq!(seconds, [90, 90, 90, 7200]);
+        assert!(
+            ["", "m", "-1", "1d", "nan"]
+                .iter()
+                .all(|t| time(t).is_err())
+        );
+    }
+}

@@ -1,0 +1,338 @@
+//! Studies: runs whose values may be lists, in cells that survive kills and spread over machines.
+//!
+//! A cell is one request of `run`, and its directory a run directory. It is done when its manifest has its key: options and
+//! contents of inputs. Cells that differ in the filter alone share a pass of noise, and many runs are cut into blocks.
+
+mod cells;
+mod results;
+mod shard;
+mod units;
+
+pub(crate) use cells::Study;
+pub use results::StudyAnswer;
+pub(crate) use units::part_of;
+
+use crate::app::{Answer, Context, Failure, Manifest, Result};
+use crate::commands::run::columns;
+use cells::Cell;
+use results::{first_of, merge, withdraw};
+use std::collections::HashMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+use units::{Place, Unit, assemble, units, work};
+
+/// Run a study: a run whose values may be lists
+///
+/// STUDY (TOML) has the options of `run` as keys of [run], and sections of a scenario. A list is an axis where a single run
+/// would not take it; [vary] names axes, and {NAME} stands for a label. Every cell becomes a run directory in DIR/cells; then
+/// all are compared (results.csv, summary.json, report.html). Computes what is missing: kill and repeat at will, on any
+/// number of processes and machines that share the directory. Stopped by SIGTERM or the time limit the exit code is 75.
+#[derive(clap::Args, Debug, Clone, Default)]
+#[command(before_help = "\
+Examples:
+  nav-sim batch examples/quick_study.toml -o out/quick
+  nav-sim batch examples/quick_study.toml --shard 0/2 --time-limit 50m
+  nav-sim batch examples/quick_study.toml --set runs=8 --dry-run")]
+pub struct BatchRequest {
+    /// The study (TOML)
+    #[arg(value_name = "STUDY")]
+    pub study: PathBuf,
+    /// Directory of the study (default: out/ and the study's name)
+    #[arg(long, short, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Share of the work, from 0/N to N−1/N (default: from HQ_TASK_ID, SLURM_ARRAY_TASK_ID, PBS_ARRAY_INDEX or
+    /// JOB_COMPLETION_INDEX, else what no other process has)
+    #[arg(long, value_name = "K/N", value_parser = shard::parse)]
+    pub shard: Option<(u64, u64)>,
+    /// Number of shards, if only the index comes from the scheduler
+    #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = clap::value_parser!(u64).range(1..))]
+    pub shards: Option<u64>,
+    /// Say what there is to do, and compute nothing
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Compute nothing, merge the cells that are there
+    #[arg(long, conflicts_with = "dry_run")]
+    pub merge: bool,
+    /// A key of [run] over that of the study, such as runs=10000 (repeatable)
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// States in the tables of the page (repeatable), or "all"
+    #[arg(long = "state", value_name = "STATE", default_values = ["pos_e_m", "roll_deg"])]
+    pub states: Vec<String>,
+    /// Compute cells again whose request has changed
+    #[arg(skip)]
+    pub force: bool,
+}
+
+/// What became of a study.
+#[derive(Debug)]
+pub enum Outcome {
+    /// Merged: what is there is compared.
+    Merged(Box<StudyAnswer>),
+    /// Own share done; cells are missing.
+    Partial(Vec<String>),
+    /// The estimate of a dry run.
+    Estimate(String),
+}
+
+impl BatchRequest {
+    /// Directory of the study.
+    #[must_use]
+    pub fn directory(&self) -> PathBuf {
+        let stem = || Path::new("out").join(self.study.file_stem().unwrap_or_default());
+        self.out.clone().unwrap_or_else(stem)
+    }
+
+    /// Computes the cells that are missing, and merges when none is.
+    ///
+    /// # Errors
+    /// What is wrong with the study, before anything is computed; cells that cannot be computed (exit code 1); stopped early
+    /// (75).
+    pub fn run(
+        &self,
+        variable: &dyn Fn(&str) -> Option<String>,
+        context: &Context<'_>,
+    ) -> Result<Outcome> {
+        let study = Study::read(&self.study, &self.set)?;
+        study
+            .run_in(&self.study, self, variable, context)
+            .map_err(|e| match e.code() {
+                2 if e.file().is_none() => e.within(&self.study.display().to_string()),
+                _ => e,
+            })
+    }
+}
+
+impl Study {
+    fn run_in(
+        &self,
+        file: &Path,
+        o: &BatchRequest,
+        variable: &dyn Fn(&str) -> Option<String>,
+        context: &Context<'_>,
+    ) -> Result<Outcome> {
+        let directory = o.directory();
+        let place = Place(&directory);
+        let cells = self.cells(file.parent().unwrap_or(Path::new("")))?;
+        if !self.run.contains_key("seed") {
+            context.remark("no seed in the study: 1");
+        }
+        crate::commands::compare::states(&o.states)?;
+        let (share, from) = shard::find(o.shard, o.shards, variable)?;
+        if o.merge {
+            return self.merged(&cells, &place, o, context);
+        }
+        let changed = adopt(&place, &cells, o.dry_run, context);
+        if let (Some((name, what)), false) = (changed.first(), o.force || o.dry_run) {
+            let message = format!("cell {name} is of another study: {what}");
+            return Err(Failure::input(message)
+                .hint("choose another directory with --out, or compute it again with --force"));
+        }
+        let units = units(&cells, context)?;
+        if o.dry_run {
+            let changed = changed.len();
+            return estimate(&cells, &units, &place, changed, context).map(Outcome::Estimate);
+        }
+        if cells.iter().any(|cell| !place.is_done(cell)) {
+            withdraw(&place);
+        }
+        let own = match share {
+            Some(share) => {
+                context.remark(format!("shard {}/{} ({from})", share.0, share.1));
+                units::shard(&units, share)
+            }
+            None => units.iter().collect(),
+        };
+        let worked = work(&place, &own, context)?;
+        for cell in &cells {
+            let has_cell = |unit: &&Unit<'_>| unit.cells.iter().any(|own| own.name == cell.name);
+            let firsts: Vec<u64> = units
+                .iter()
+                .filter(has_cell)
+                .map(|unit| unit.first)
+                .collect();
+            if firsts.len() > 1 {
+                assemble(&place, cell, &firsts, context)?;
+            }
+        }
+        let failures = worked.failures.into_inner().unwrap_or_default();
+        if let Some((name, failure)) = failures.into_iter().next() {
+            return Err(failure.within(&format!("cell {name}")));
+        }
+        let left = own.iter().filter(|unit| !place.has_unit(unit)).count();
+        if left > 0 && !context.go_on() {
+            return Err(match worked.finished.load(Ordering::Relaxed) {
+                // the same command would end the same way: no code for "to be resumed"
+                0 => Failure::could_not(format!(
+                    "stopped before a single unit was done; {left} units left"
+                ))
+                .hint("a longer --time-limit"),
+                _ => Failure::stopped(format!("stopped; {left} units left"))
+                    .hint("the same command goes on where this one stopped"),
+            });
+        }
+        let missing: Vec<String> = cells
+            .iter()
+            .filter(|cell| !place.is_done(cell))
+            .map(|cell| cell.name.clone())
+            .collect();
+        if missing.is_empty() {
+            drop(fs::remove_dir_all(directory.join("locks")));
+            return self.merged(&cells, &place, o, context);
+        }
+        context.remark(format!(
+            "{} of {} cells are missing: {}",
+            missing.len(),
+            cells.len(),
+            first_of(&missing)
+        ));
+        Ok(Outcome::Partial(missing))
+    }
+
+    fn merged(
+        &self,
+        cells: &[Cell],
+        place: &Place<'_>,
+        o: &BatchRequest,
+        context: &Context<'_>,
+    ) -> Result<Outcome> {
+        let answer = merge(
+            self,
+            cells,
+            place,
+            &crate::commands::compare::states(&o.states)?,
+            context,
+        )?;
+        answer.write(place)?;
+        Ok(Outcome::Merged(Box::new(answer)))
+    }
+}
+
+/// Renames cells that have another name than they had; names and reasons of those whose request has changed.
+fn adopt(
+    place: &Place<'_>,
+    cells: &[Cell],
+    is_dry: bool,
+    context: &Context<'_>,
+) -> Vec<(String, String)> {
+    let mut there: HashMap<String, (String, Manifest)> = HashMap::new();
+    for entry in fs::read_dir(place.0.join("cells"))
+        .into_iter()
+        .flatten()
+        .flatten()
+    {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if let Some(manifest) = place.manifest(&name) {
+            there.insert(manifest.key.clone(), (name, manifest));
+        }
+    }
+    let is_own = |name: &str| {
+        cells
+            .iter()
+            .any(|cell| cell.name == name && place.is_done(cell))
+    };
+    for cell in cells.iter().filter(|_| !is_dry) {
+        if let Some((name, _)) = there.get(&cell.manifest.key)
+            && *name != cell.name
+            && !is_own(name)
+            && !place.cell(&cell.name).exists()
+        {
+            drop(fs::rename(place.cell(name), place.cell(&cell.name)));
+        }
+    }
+    let others: Vec<String> = there
+        .values()
+        .map(|(name, _)| name.clone())
+        .filter(|name| {
+            place.cell(name).exists()
+                && !cells.iter().any(|cell| cell.name == *name)
+                && !name.ends_with(".damaged")
+        })
+        .collect();
+    if !others.is_empty() {
+        context.remark(format!(
+            "cells of another study are left out: {}, such as {}",
+            others.len(),
+            others[0]
+        ));
+    }
+    let changed = |cell: &Cell| {
+        let manifest = place.manifest(&cell.name)?;
+        (manifest.key != cell.manifest.key)
+            .then(|| (cell.name.clone(), difference(&manifest, &cell.manifest)))
+    };
+    cells.iter().filter_map(changed).collect()
+}
+
+/// The first setting or input in which two requests differ.
+fn difference(there: &Manifest, wanted: &Manifest) -> String {
+    let keys = there.options.keys().chain(wanted.options.keys());
+    let shown =
+        |values: Option<&Vec<String>>| values.map_or("not given".to_owned(), |v| v.join(" "));
+    for key in keys {
+        let [old, new] = [there, wanted].map(|manifest| manifest.options.get(key));
+        if old != new {
+            return format!("its \"{key}\" is {}, not {}", shown(old), shown(new));
+        }
+    }
+    let differs = |input: &&crate::app::Input| {
+        !there
+            .inputs
+            .iter()
+            .any(|old| old.role == input.role && old.blake3 == input.blake3)
+    };
+    match wanted.inputs.iter().find(differs) {
+        Some(input) => format!("{} has changed", input.path),
+        None => "it is of another version of the figures".to_owned(),
+    }
+}
+
+/// Cells, passes, what is done, the processor time of the rest from eight timed runs, and its size.
+fn estimate(
+    cells: &[Cell],
+    units: &[Unit<'_>],
+    place: &Place<'_>,
+    changed: usize,
+    context: &Context<'_>,
+) -> Result<String> {
+    const BYTES: f64 = 1.2e6;
+    let done = cells.iter().filter(|cell| place.is_done(cell)).count();
+    let left: Vec<&Unit<'_>> = units.iter().filter(|unit| !place.has_unit(unit)).collect();
+    let passes = units.iter().filter(|unit| unit.first == 0).count();
+    let mut text = format!(
+        "{} cells in {passes} passes: {done} done, {} to do, {changed} changed",
+        cells.len(),
+        cells.len() - done
+    );
+    if let Some(unit) = left.first() {
+        let cell = unit.cells[0];
+        let quiet = Context::new(&(), Some(cell.seed));
+        let prepared = cell.asked.request.prepare(&quiet)?;
+        let (start, runs) = (Instant::now(), unit.runs.min(8));
+        columns(&[&prepared], 0, runs, &quiet)?;
+        let per_run =
+            start.elapsed().as_secs_f64() / runs as f64 * rayon::current_num_threads() as f64;
+        let cost: u64 = left.iter().map(|unit| unit.cost()).sum();
+        text += &format!(
+            "\n{} of processor time, {:.0} MB",
+            nav_sim_calibration::duration(per_run * cost as f64),
+            BYTES * (cells.len() - done) as f64 / 1e6
+        );
+    }
+    for cell in cells {
+        context.detail(&cell.name);
+    }
+    Ok(text)
+}
+
+impl Outcome {
+    /// What is missed: stated bounds, or cells of a merge that is to be resumed.
+    pub(crate) fn unmet(&self) -> Option<Failure> {
+        match self {
+            Self::Merged(answer) => answer.incomplete().or_else(|| answer.unmet()),
+            Self::Partial(_) | Self::Estimate(_) => None,
+        }
+    }
+}
