@@ -272,6 +272,13 @@ impl<C: Command> Asked<C> {
         command.build();
         let (mut words, mut positional) = (Vec::new(), BTreeMap::new());
         for (key, value) in request {
+            // settings: a scenario, or one of its sections
+            if let Value::Object(settings) = value {
+                let section = format!("{key}.");
+                let place = if key == "scenario" { "" } else { &section };
+                words.extend(set(settings, place)?);
+                continue;
+            }
             let option = key.replace('_', "-");
             let is_meant = |arg: &&Arg| arg.get_long() == Some(&option) || arg.get_id() == key;
             let Some(arg) = command.get_arguments().find(is_meant) else {
@@ -282,10 +289,6 @@ impl<C: Command> Asked<C> {
                 ));
             };
             let option = arg.get_long().unwrap_or(key);
-            if let Value::Object(settings) = value {
-                words.extend(set(settings, "")?);
-                continue;
-            }
             let values = values(arg, value);
             match arg.get_index() {
                 Some(index) => _ = positional.insert(index, values),

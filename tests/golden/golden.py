@@ -39,6 +39,7 @@ MACHINE_KEYS = {
 }
 HASH = re.compile(r"^[0-9a-f]{16,64}$")
 COMMENT = re.compile(r"\s*(#|//|%|<!--)")
+LAST_COMMENT = re.compile(r"\s+(#|//|%|<!--).*$")
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 ROWS_KEPT = 300
 # Commands after a minimiser: another machine may end the search elsewhere on the same floor of the objective.
@@ -53,15 +54,17 @@ baro = { rate_hz = 1.0, sigma_m = 0.5 }
 outage_periodic = { first_s = 30, duration_s = 5, every_s = 15 }
 """
 LINCOV_STUDY = """
+[run]
 method = "lincov"
-trajectory = [{ file = "examples/quick_drive.toml" }]
-truth = [{ model = "calib_data/consumer_mems.toml" }]
-filters = ["15", "full"]
-candidate = [
-  { name = "right", model = "calib_data/consumer_mems.toml" },
-  { name = "optimist", model = "calib_data/tactical.toml" },
-]
-outages = [{ sweep = { start_s = 25, duration_s = [10, 20] } }]
+trajectory = "examples/quick_drive.toml"
+truth = "calib_data/consumer_mems.toml"
+outage = ["25:+{duration_s}"]
+filter = ["15", "full"]
+[vary]
+duration_s = [10, 20]
+[vary.model]
+right = { model = "calib_data/consumer_mems.toml" }
+optimist = { model = "calib_data/tactical.toml" }
 """
 
 EIGHT, DRIVE, QUICK = "trajectories/figure_eight.toml", "trajectories/land_vehicle.toml", "examples/quick_drive.toml"
@@ -216,7 +219,7 @@ def figures(program, place, name, arguments):
 
 def chosen(only):
     """Commands as they are now spelled, by name: those asked for, and those whose files they read."""
-    now = {name: MAP["commands"].get(name, arguments) for name, arguments in COMMANDS if name not in MAP["deleted"]}
+    now = {name: MAP["commands"].get(name, arguments) for name, arguments in COMMANDS if name not in {**MAP["deleted"], **MAP["moved"]}}
     now |= {name: arguments for name, arguments in MAP["commands"].items() if name not in now and name not in MAP["deleted"]}
     wanted = {name for name in now if only in name}
     for name in reversed(now):
@@ -250,16 +253,23 @@ def pattern(text):
     return re.compile("".join(parts))
 
 
-RENAMED = [(pattern(old), re.sub(r"\*\*?", "{}", new.replace("{", "{{").replace("}", "}}"))) for old, new in MAP["keys"].items()]
+RENAMED = [(pattern(old), new) for old, new in MAP["keys"].items()]
 DROPPED = [pattern(old) for old in MAP["dropped"]]
 
 
 def path_now(path):
     """Where a stored figure is to be found, or None where a deletion dropped it."""
+    for table, names in MAP["rows"].items():
+        if path.startswith(table + "/") and path.rsplit("/", 1)[-1].isdigit():
+            column, row = path.rsplit("/", 1)
+            path = f"{column}/{names[int(row)]}"
     if any(old.fullmatch(path) for old in DROPPED):
         return None
-    matches = ((old.fullmatch(path), new) for old, new in RENAMED)
-    return next((new.format(*match.groups()) for match, new in matches if match), path)
+    for old, new in RENAMED:
+        if match := old.fullmatch(path):
+            texts = iter(match.groups())
+            return re.sub(r"\*(\d)|\*\*?", lambda star: match[int(star[1])] if star[1] else next(texts), new)
+    return path
 
 
 def scales(values):
@@ -292,6 +302,7 @@ def is_equal(old, new, close):
         return (math.isnan(old) and math.isnan(new)) or close(old, new)
     if any(numbers) or not (isinstance(old, str) and isinstance(new, str)):
         return False
+    old, new = (LAST_COMMENT.sub("", text) for text in (old, new))
     pairs = list(zip(NUMBER.findall(old), NUMBER.findall(new)))
     return NUMBER.split(old) == NUMBER.split(new) and all(close(float(a), float(b)) for a, b in pairs)
 
@@ -301,7 +312,7 @@ def differences(name, stored, now, tolerance):
     largest, lines = scales(stored), []
     for path, old in stored.items():
         place = path_now(path)
-        if place is None:
+        if place is None or (old != old and place not in now):
             continue
         def close(a, b):
             strict = abs(a - b) <= tolerance * max(abs(a), abs(b), largest.get(path.rsplit("/", 1)[0], 0.0))
@@ -339,14 +350,16 @@ def main():
             return 1
     compared, differing = 0, 0
     for name, expected in stored["figures"].items():
-        if name not in now:
+        name_now = MAP["moved"].get(name, name)
+        if name_now not in now:
             continue
-        lines = differences(name, expected, now[name], tolerance)
+        lines = differences(name, expected, now[name_now], tolerance)
         compared, differing = compared + len(expected), differing + len(lines)
         if lines:
             print(f"{name}: {len(lines)} of {len(expected)} figures differ")
             print("\n".join(f"  {line[:220]}" for line in lines[: arguments.most]))
-    gone = [name for name in stored["figures"] if name not in now and name not in MAP["deleted"] and arguments.only in name]
+    gone = [name for name in stored["figures"] if name not in MAP["deleted"] and arguments.only in name]
+    gone = [name for name in gone if MAP["moved"].get(name, name) not in now]
     print("".join(f"{name}: not run\n" for name in gone) + f"{differing} of {compared} figures of {len(now)} commands differ")
     return 1 if differing or gone else 0
 

@@ -224,6 +224,9 @@ fn adopt(
         .flatten()
     {
         let name = entry.file_name().to_string_lossy().into_owned();
+        if name.ends_with(".damaged") {
+            continue;
+        }
         if let Some(manifest) = place.manifest(&name) {
             there.insert(manifest.key.clone(), (name, manifest));
         }
@@ -242,15 +245,12 @@ fn adopt(
             drop(fs::rename(place.cell(name), place.cell(&cell.name)));
         }
     }
-    let others: Vec<String> = there
+    let mut others: Vec<String> = there
         .values()
         .map(|(name, _)| name.clone())
-        .filter(|name| {
-            place.cell(name).exists()
-                && !cells.iter().any(|cell| cell.name == *name)
-                && !name.ends_with(".damaged")
-        })
+        .filter(|name| place.cell(name).exists() && !cells.iter().any(|cell| cell.name == *name))
         .collect();
+    others.sort();
     if !others.is_empty() {
         context.remark(format!(
             "cells of another study are left out: {}, such as {}",
