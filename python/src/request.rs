@@ -11,9 +11,6 @@ use std::ffi::OsString;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-/// Seed where neither the request nor a file has one: the same call gives the same answer.
-pub(crate) const SEED: u64 = 1;
-
 /// Takes down what a job warns of, and counts what it does.
 pub(crate) struct Clerk<'a> {
     pub(crate) meter: &'a Meter,
