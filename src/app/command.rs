@@ -231,20 +231,20 @@ fn options<C: Command>(matches: &ArgMatches) -> BTreeMap<String, Vec<String>> {
     deciding.filter_map(values).collect()
 }
 
-/// Numbers in their shortest form: `8.0:11` is `8:11`.
+/// Numbers in their shortest form: `8.0:11` is `8:11`, `x2.0` is `x2`.
 fn canonical(value: &str) -> String {
     // `300:+30` is a length, and no 300:30
     let shortest = |part: &str| {
-        let number = part.parse::<f64>().ok().filter(|_| !part.starts_with('+'));
-        number.map_or(part.to_owned(), |x| x.to_string())
+        let start = part.find(|c: char| c.is_ascii_digit() || "+-.".contains(c));
+        let (word, number) = part.split_at(start.unwrap_or(part.len()));
+        let number = number.parse::<f64>().ok().filter(|_| !number.starts_with('+'));
+        number.map_or(part.to_owned(), |x| format!("{word}{x}"))
     };
-    value
-        .split_inclusive([',', ':', '='])
-        .map(|part| {
-            let end = part.len() - usize::from(part.ends_with([',', ':', '=']));
-            shortest(&part[..end]) + &part[end..]
-        })
-        .collect()
+    let part = |part: &str| {
+        let end = part.trim_end_matches([',', ':', '=']).len();
+        shortest(&part[..end]) + &part[end..]
+    };
+    value.split_inclusive([',', ':', '=']).map(part).collect()
 }
 
 impl<C: Command> Asked<C> {

@@ -6,13 +6,13 @@ use crate::formats::atomic::Existing;
 use nav_sim_document::Note;
 use std::fmt::Display;
 use std::path::Path;
-use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Flags that mean the same in every command.
 #[derive(clap::Args, Clone, Debug)]
 #[command(next_help_heading = "Common options")]
 pub(crate) struct Common {
-    /// Seed of all random numbers; without it one is drawn, printed and recorded
+    /// Seed of all random numbers [default: 1]
     #[arg(long, global = true, value_name = "N", value_parser = seed)]
     pub(crate) seed: Option<u64>,
     /// Worker threads, at most 1024 (default: one per core)
@@ -67,7 +67,6 @@ pub(crate) struct Session {
     progress: Mutex<Option<Progress>>,
     /// Where results and remarks go.
     pub(crate) printer: Printer,
-    drawn: OnceLock<u64>,
 }
 
 impl Session {
@@ -82,7 +81,6 @@ impl Session {
             printer: Printer::new(&common),
             common,
             progress: Mutex::default(),
-            drawn: OnceLock::new(),
         })
     }
 
@@ -104,7 +102,6 @@ impl Session {
             printer,
             common,
             progress: Mutex::default(),
-            drawn: OnceLock::new(),
         }
     }
 
@@ -168,18 +165,9 @@ impl Session {
         self.common.verbose
     }
 
-    /// The seed: `--seed`, else the one given (of a file), else one drawn once and said.
+    /// The seed: `--seed`, else the one given (of a file), else the default.
     pub(crate) fn seed(&self, of_file: Option<u64>) -> u64 {
-        let draw = || {
-            // 53 bits, so that it survives JSON readers that know doubles only
-            let seed = rand::random::<u64>() >> 11;
-            self.say(format!("seed {seed} (drawn; repeat with --seed {seed})"));
-            seed
-        };
-        self.common
-            .seed
-            .or(of_file)
-            .unwrap_or_else(|| *self.drawn.get_or_init(draw))
+        self.context().seed_or(of_file)
     }
 
     /// Notes and progress of a job on this terminal, and the seed.

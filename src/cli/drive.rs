@@ -13,8 +13,13 @@ pub(super) fn drive<C: Command>(asked: &Asked<C>, session: &Session) -> Result<C
     let context = session.context().reading(manifest.inputs.clone());
     let answer = asked.request.run(&context)?;
     let document = show(asked, &answer, session);
-    for path in asked.write(&answer, &document, manifest, &context)? {
-        session.wrote(&path);
+    let written = asked.write(&answer, &document, manifest, &context)?;
+    if !written.is_empty() {
+        let names: Vec<String> = written
+            .iter()
+            .map(|path| path.display().to_string())
+            .collect();
+        session.say(format!("wrote {}", names.join(", ")));
     }
     answer.unmet().map_or(Ok(answer), Err)
 }

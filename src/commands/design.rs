@@ -218,12 +218,16 @@ fn design(inputs: &mut DesignInputs<'_>, recordings: usize, hours: f64) -> Resul
         Some(destination) => destination_quantiles(destination, &all, model.rate_hz)?,
         None => Vec::new(),
     };
-    Ok(DesignOutcome {
+    let mut design = DesignOutcome {
         recordings,
         hours,
         parameters,
         horizontal_p95,
-    })
+        known_least: String::new(),
+        undetermined: 0,
+    };
+    (design.known_least, design.undetermined) = (design.least_known(), design.undetermined());
+    Ok(design)
 }
 
 /// The parameters of an outcome; correlation times in the place of phi and beta, of which a per cent says nothing.
@@ -326,6 +330,10 @@ pub(crate) struct DesignOutcome {
     pub parameters: Vec<DesignedParameter>,
     /// The horizontal p95 at the end of each outage.
     pub horizontal_p95: Vec<DesignedQuantile>,
+    /// The parameter with the widest interval.
+    pub known_least: String,
+    /// Number of parameters without an interval.
+    pub undetermined: usize,
 }
 
 /// The interval that a parameter would have.
@@ -441,40 +449,28 @@ impl Designs {
 
     /// A row a design, or of one design a row a parameter.
     fn lead(&self) -> Table {
-        if let [design] = self.designs.as_slice() {
-            return parameters(design);
-        }
-        let windows = self
-            .designs
-            .first()
-            .into_iter()
-            .flat_map(|d| &d.horizontal_p95);
-        let windows =
-            windows.map(|q| format!("p95 at the end of {} (± %)", window(q.start_s, q.end_s)));
-        let mut table = Table::new([
-            "recordings",
-            "hours",
-            "parameter known least",
-            "not determined",
-        ])
-        .and(windows)
-        .with_keys(2);
-        for (i, design) in self.designs.iter().enumerate() {
-            let p95 = design.horizontal_p95.iter().enumerate().map(|(k, q)| {
-                Cell::number(
-                    q.half_width_pct,
-                    &format!("/designs/{i}/horizontal_p95/{k}/half_width_pct"),
-                )
-            });
-            let keys = [
-                Cell::figures(design.recordings.to_string()),
-                Cell::number(design.hours, &format!("/designs/{i}/hours")),
-                design.least_known().into(),
-                Cell::figures(design.undetermined().to_string()),
+        if self.designs.len() == 1 {
+            let columns = [
+                ("parameter", "{signals} {parameter}"),
+                ("value", "value"),
+                ("from", "ci95/0"),
+                ("to", "ci95/1"),
+                ("± (%)", "half_width_pct"),
+                ("± however long (%)", "endless_half_width_pct"),
             ];
-            table.row(keys.into_iter().chain(p95));
+            return Table::of(self, "/designs/0/parameters/*", &columns).without_unknown();
         }
-        table
+        let columns = [
+            ("recordings", "recordings"),
+            ("hours", "hours"),
+            ("parameter known least", "known_least"),
+            ("not determined", "undetermined"),
+            (
+                "p95 at the end of {start_s}–{end_s} s (± %)",
+                "horizontal_p95/*/half_width_pct",
+            ),
+        ];
+        Table::of(self, "/designs/*", &columns).with_keys(2)
     }
 }
 
@@ -506,7 +502,19 @@ impl Answer for Designs {
             if designs.len() > 1 {
                 document.chart(&navigation(designs), "Half of the 95 % interval of the 95 % quantile of the horizontal error at the end of each outage.");
             }
-            document.table(&quantiles(designs));
+            document.table(&Table::of(
+                self,
+                "/designs/*/horizontal_p95/*",
+                &[
+                    ("recordings", "../../recordings"),
+                    ("hours", "../../hours"),
+                    ("outage", "{start_s}–{end_s} s"),
+                    ("p95 (m)", "p95_m"),
+                    ("from", "ci95/0"),
+                    ("to", "ci95/1"),
+                    ("half width (%)", "half_width_pct"),
+                ],
+            ));
         }
         if designs.len() > 1 {
             document.section("All parameters");
@@ -521,32 +529,6 @@ impl Answer for Designs {
 
 const BESIDE: &str = "Half of the 95 % interval to expect (% of the value).";
 const AGAINST: &str = "Half of the 95 % interval to expect (% of the value) against the length of each recording; dashed: however long they are.";
-
-/// Every parameter of one design.
-fn parameters(design: &DesignOutcome) -> Table {
-    let floors = design
-        .parameters
-        .iter()
-        .any(|p| p.endless_half_width_pct.is_some());
-    let mut table = Table::new(["parameter", "value", "from", "to", "± (%)"])
-        .and(floors.then(|| "± however long (%)".to_owned()));
-    for (k, p) in design.parameters.iter().enumerate() {
-        let number = |value: Option<f64>, key: &str| match value {
-            Some(value) => Cell::number(value, &format!("/designs/0/parameters/{k}/{key}")),
-            None => Cell::figures("–"),
-        };
-        let cells = [
-            p.name().into(),
-            number(Some(p.value), "value"),
-            number(p.ci95.map(|[low, _]| low), "ci95/0"),
-            number(p.ci95.map(|[_, high]| high), "ci95/1"),
-            number(p.half_width_pct, "half_width_pct"),
-        ];
-        let floor = floors.then(|| number(p.endless_half_width_pct, "endless_half_width_pct"));
-        table.row(cells.into_iter().chain(floor));
-    }
-    table
-}
 
 /// The parameters of one design beside one another.
 fn beside(design: &DesignOutcome) -> Chart {
@@ -653,33 +635,6 @@ fn navigation(designs: &[DesignOutcome]) -> Chart {
         Axis::log("hours"),
         (0..outages).map(panel).collect(),
     )
-}
-
-fn quantiles(designs: &[DesignOutcome]) -> Table {
-    let mut table = Table::new([
-        "recordings",
-        "hours",
-        "outage",
-        "p95 (m)",
-        "from",
-        "to",
-        "half width (%)",
-    ]);
-    for (i, d) in designs.iter().enumerate() {
-        for (k, q) in d.horizontal_p95.iter().enumerate() {
-            let source_of = |key: &str| format!("/designs/{i}/horizontal_p95/{k}/{key}");
-            table.row([
-                Cell::figures(d.recordings.to_string()),
-                Cell::number(d.hours, &format!("/designs/{i}/hours")),
-                window(q.start_s, q.end_s).into(),
-                Cell::number(q.p95_m, &source_of("p95_m")),
-                Cell::number(q.ci95[0], &source_of("ci95/0")),
-                Cell::number(q.ci95[1], &source_of("ci95/1")),
-                Cell::number(q.half_width_pct, &source_of("half_width_pct")),
-            ]);
-        }
-    }
-    table
 }
 
 /// Half widths: a row a parameter, a column a design.

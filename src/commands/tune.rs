@@ -8,7 +8,7 @@ use crate::formats::model_file::{self, ModelFile, PROGRAM};
 use crate::parse;
 use crate::report::unexpected_line;
 use nav_sim_calibration::derived_interval;
-use nav_sim_document::{Cell, Document, Importance, Table, Tone, readable, seconds, short_names};
+use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds, short_names};
 use nav_sim_navigation::ekf::{BeliefError, FilterStates};
 use nav_sim_navigation::metrics::{PerState, VerdictKind};
 use nav_sim_navigation::scenario::Scenario;
@@ -628,6 +628,8 @@ impl Serialize for TuneAnswer {
         };
         let filter = |(filter, found): (&'static str, &FilterConsistency)| FilterEntry {
             filter,
+            verdict: kind(found).to_string(),
+            place: self.place(found),
             nees: found.nees,
             largest_ratio: found.largest.ratio,
             state: REPORTED_NAMES[found.largest.state],
@@ -694,6 +696,7 @@ struct FactorEntry {
     /// `accel` or `gyro`.
     sensor: &'static str,
     on_variance: f64,
+    on_sigma: f64,
 }
 
 impl FactorEntry {
@@ -701,6 +704,7 @@ impl FactorEntry {
         Self {
             sensor: factor.sensor.name(),
             on_variance: factor.on_variance,
+            on_sigma: factor.on_variance.sqrt(),
         }
     }
 }
@@ -708,6 +712,8 @@ impl FactorEntry {
 #[derive(Serialize)]
 struct FilterEntry {
     filter: &'static str,
+    verdict: String,
+    place: String,
     nees: f64,
     largest_ratio: f64,
     state: &'static str,
@@ -781,30 +787,16 @@ impl Answer for TuneAnswer {
 
 impl TuneAnswer {
     fn table(&self) -> Table {
-        let ends = self
-            .before
-            .end_s
-            .iter()
-            .map(|t| format!("RMSE {} s (m)", seconds(*t)));
         let nees = format!("NEES ({NEES_DOF})");
-        let mut table = Table::new(["filter", "verdict", &nees, "RMSE/sigma", "in"]).and(ends);
-        for (i, (name, found)) in self.filters().enumerate() {
-            let number =
-                |value: f64, key: String| Cell::number(value, &format!("/filters/{i}/{key}"));
-            let mut row = vec![
-                name.into(),
-                kind(found).to_string().into(),
-                number(found.nees, "nees".to_owned()),
-                number(found.largest.ratio, "largest_ratio".to_owned()),
-                self.place(found).into(),
-            ];
-            let ends = found.horizontal_m().enumerate();
-            row.extend(
-                ends.map(|(k, rmse)| number(rmse, format!("outage_end/{k}/horizontal_rmse_m"))),
-            );
-            table.row(row);
-        }
-        table
+        let columns = [
+            ("filter", "filter"),
+            ("verdict", "verdict"),
+            (nees.as_str(), "nees"),
+            ("RMSE/sigma", "largest_ratio"),
+            ("in", "place"),
+            ("RMSE {after_s} s (m)", "outage_end/*/horizontal_rmse_m"),
+        ];
+        Table::of(self, "/filters/*", &columns)
     }
 
     /// State, time and truth of the largest error.
@@ -825,19 +817,12 @@ impl TuneAnswer {
     }
 
     fn factor_table(&self) -> Table {
-        let mut table = Table::new([
-            "sensor",
-            "factor on the variance",
-            "on the standard deviation",
-        ]);
-        for (i, f) in self.factors.iter().enumerate() {
-            table.row([
-                f.sensor.name().into(),
-                Cell::number(f.on_variance, &format!("/factors/{i}/on_variance")),
-                Cell::figures(readable(f.on_variance.sqrt())),
-            ]);
-        }
-        table
+        let columns = [
+            ("sensor", "sensor"),
+            ("factor on the variance", "on_variance"),
+            ("on the standard deviation", "on_sigma"),
+        ];
+        Table::of(self, "/factors/*", &columns)
     }
 }
 

@@ -1,6 +1,8 @@
 //! Tables: their cells keep where a number stands in the result.
 
-use crate::number::{percent, readable};
+use crate::number::{percent, readable, seconds};
+use serde::Serialize;
+use serde_json::Value;
 
 /// A cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -133,4 +135,123 @@ impl Table {
             ..self
         }
     }
+}
+
+impl Table {
+    /// A table of the entries of a result, by its own JSON.
+    ///
+    /// `rows` is the path of the entries, with `*` for each of a list: `/designs/*/horizontal_p95/*`. A column is a
+    /// title and a key of the entry: `p95_m`, or `../../hours` of what holds it. After `|` stands the text where the
+    /// value is missing, else `–`; a key of braces, `{start_s}–{end_s} s`, is a text with values in it. A key with `*`
+    /// makes a column for each of the list, with a title from its entries: `("RMSE {after_s} s", "ends/*/rmse_m")`.
+    ///
+    /// ```
+    /// use nav_sim_document::Table;
+    ///
+    /// let result = serde_json::json!({ "filters": [{ "name": "tuned", "ends": [{ "after_s": 60, "rmse_m": 4.2 }] }] });
+    /// let columns = [("filter", "name"), ("RMSE {after_s} s", "ends/*/rmse_m"), ("cost", "cost|none")];
+    /// let table = Table::of(&result, "/filters/*", &columns);
+    /// assert_eq!(table.csv(), "filter,RMSE 60 s,cost\ntuned,4.20,none\n");
+    /// ```
+    pub fn of(result: &impl Serialize, rows: &str, columns: &[(&str, &str)]) -> Self {
+        let json = serde_json::to_value(result).unwrap_or_default();
+        let places = places(&json, rows);
+        let mut expanded = Vec::new();
+        for (title, key) in columns {
+            match (key.split_once("/*"), places.first()) {
+                (Some((list, rest)), Some(first)) => {
+                    for place in self::places(&json, &format!("{first}/{list}/*")) {
+                        let index = place.rsplit('/').next().unwrap_or_default();
+                        let title = filled(title, &json, &place);
+                        expanded.push((title, format!("{list}/{index}{rest}")));
+                    }
+                }
+                (Some(_), None) => {}
+                (None, _) => expanded.push(((*title).to_owned(), (*key).to_owned())),
+            }
+        }
+        let row = |place: &String| {
+            let cell = |(_, key): &(String, String)| cell(&json, place, key);
+            expanded.iter().map(cell).collect()
+        };
+        Self {
+            rows: places.iter().map(row).collect(),
+            head: expanded.into_iter().map(|(title, _)| title).collect(),
+            keys: 1,
+        }
+    }
+}
+
+/// The places that a path with `*` stands for.
+fn places(json: &Value, path: &str) -> Vec<String> {
+    let mut places = vec![String::new()];
+    for part in path.split('/').skip(1) {
+        let of = |place: &String| match (part, json.pointer(place)) {
+            ("*", Some(Value::Array(list))) => {
+                (0..list.len()).map(|k| format!("{place}/{k}")).collect()
+            }
+            ("*", Some(Value::Object(fields))) => {
+                fields.keys().map(|key| format!("{place}/{key}")).collect()
+            }
+            ("*", _) => Vec::new(),
+            (part, _) => vec![format!("{place}/{part}")],
+        };
+        places = places.iter().flat_map(of).collect();
+    }
+    places
+}
+
+/// The place of a key beside or above another.
+fn resolved(place: &str, key: &str) -> String {
+    let mut parts: Vec<&str> = place.split('/').collect();
+    for part in key.split('/') {
+        match part {
+            ".." => _ = parts.pop(),
+            part => parts.push(part),
+        }
+    }
+    parts.join("/")
+}
+
+fn cell(json: &Value, place: &str, key: &str) -> Cell {
+    if key.contains('{') {
+        return filled(key, json, place).into();
+    }
+    let (key, missing) = key.split_once('|').unwrap_or((key, "–"));
+    let pointer = resolved(place, key);
+    match json.pointer(&pointer) {
+        Some(Value::Number(number)) if number.is_f64() => {
+            Cell::number(number.as_f64().unwrap_or(f64::NAN), &pointer)
+        }
+        Some(Value::Null) | None => Cell::figures(missing),
+        Some(value) => match value.is_number() {
+            true => Cell::figures(text(value)),
+            false => text(value).into(),
+        },
+    }
+}
+
+fn text(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Number(number) if number.is_f64() => readable(number.as_f64().unwrap_or(f64::NAN)),
+        Value::Bool(yes) => if *yes { "yes" } else { "no" }.to_owned(),
+        Value::Null => "–".to_owned(),
+        other => other.to_string(),
+    }
+}
+
+/// A text with the values of an entry in its braces; numbers to a hundredth.
+fn filled(template: &str, json: &Value, place: &str) -> String {
+    let mut parts = template.split('{');
+    let mut filled = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (key, rest) = part.split_once('}').unwrap_or((part, ""));
+        match json.pointer(&resolved(place, key)) {
+            Some(Value::Number(number)) => filled += &seconds(number.as_f64().unwrap_or(f64::NAN)),
+            value => filled += &value.map_or_else(|| "–".to_owned(), text),
+        }
+        filled += rest;
+    }
+    filled
 }

@@ -119,7 +119,7 @@ fn the_model_that_made_the_recordings_is_chosen_and_written() {
     // what is there is not replaced
     let again = choose(directory.path(), &["-o", "out"]).code(2);
     assert!(
-        said(&again).contains("holds the result of an earlier choose"),
+        said(&again).contains("holds the result of another configuration"),
         "{}",
         said(&again)
     );

@@ -338,11 +338,7 @@ fn json_is_spoken_by_commands_that_write_files() {
     );
     assert_eq!(json("init .")["kept"], made["written"]);
     let drive = "trajectories/figure_eight.toml";
-    for (command, file) in [
-        ("plot", "eight.svg"),
-        ("convert", "eight.csv"),
-        ("generate", "rows.csv"),
-    ] {
+    for (command, file) in [("convert", "eight.csv"), ("generate", "rows.csv")] {
         assert_eq!(
             json(&format!("trajectory {command} {drive} -o {file}"))["written"][0],
             file

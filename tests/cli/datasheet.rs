@@ -17,7 +17,7 @@ fn figures_in_the_units_of_a_datasheet_become_a_model() {
     );
     assert!(
         ran.stderr
-            .contains("wrote model.toml: an assumption, not a calibration"),
+            .contains("an assumption, not a calibration\nwrote model.toml\n"),
         "{}",
         ran.stderr
     );
