@@ -237,7 +237,10 @@ fn canonical(value: &str) -> String {
     let shortest = |part: &str| {
         let start = part.find(|c: char| c.is_ascii_digit() || "+-.".contains(c));
         let (word, number) = part.split_at(start.unwrap_or(part.len()));
-        let number = number.parse::<f64>().ok().filter(|_| !number.starts_with('+'));
+        let number = number
+            .parse::<f64>()
+            .ok()
+            .filter(|_| !number.starts_with('+'));
         number.map_or(part.to_owned(), |x| format!("{word}{x}"))
     };
     let part = |part: &str| {

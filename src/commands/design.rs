@@ -693,6 +693,8 @@ mod tests {
             hours,
             parameters: vec![parameter],
             horizontal_p95: Vec::new(),
+            known_least: String::new(),
+            undetermined: 0,
         }
     }
 

@@ -442,15 +442,12 @@ fn a_damaged_table_is_refused_by_file_line_and_column() {
     assert!(ran.stderr.starts_with(expected), "{}", ran.stderr);
 }
 
-/// A table whose numbers are numbers, but not those that were written; where the manifest says nothing of it, it is taken.
+/// A table whose numbers are numbers, but not those that were written.
 #[test]
 fn a_table_that_was_changed_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     write(&directory.path().join("a"), 1.0, |_, _| {});
-    let (epochs, manifest) = (
-        directory.path().join("a/epochs.csv"),
-        directory.path().join("a/manifest.json"),
-    );
+    let epochs = directory.path().join("a/epochs.csv");
     let text = std::fs::read_to_string(&epochs).unwrap();
     let row = text.lines().nth(6).unwrap();
     let changed = |cell: &str| {
