@@ -265,7 +265,7 @@ mod tests {
             parse_epochs("e.csv", &text.replacen("rmse_yaw_deg", "rmse_roll_deg", 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "e.csv, line 1: two columns are named \"rmse_roll_deg\""
+            "e.csv, line 1: columns \"rmse_roll_deg\" and \"rmse_roll_deg\" both give rmse_roll_deg"
         );
         let cut = &text[..text.rfind(',').unwrap()];
         let error = parse_epochs("e.csv", cut).unwrap_err().to_string();

@@ -348,7 +348,7 @@ fn schemas_have_the_bounds_of_their_readers() {
     let path = place.path().join("sample.toml");
     let model = "rate_hz = 100.0\n[accel]\nprocesses = [{ type = \"WN\", sigma2 = 1.0 }]\n";
     std::fs::write(place.path().join("m.toml"), model).unwrap();
-    let mut bounds = [0; 8];
+    let mut bounds = [0; 6];
     let mut wrong = Vec::new();
     for Sample { kind, text, loose } in SAMPLES {
         let refused = |text: String| {

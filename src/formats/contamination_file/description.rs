@@ -30,13 +30,14 @@ pub(super) struct RuleTable {
     /// Replicates, counted from 1 (default: every one)
     #[schemars(length(min = 1))]
     pub(super) replicates: Option<Vec<NonZero<u64>>>,
-    #[serde(flatten)]
+    #[schemars(flatten)]
     pub(super) operation: Described,
 }
 
 /// The operations of files, each with its keys.
 #[derive(Deserialize, JsonSchema)]
-#[serde(tag = "operation", rename_all = "kebab-case")]
+#[serde(rename_all = "kebab-case")]
+#[schemars(tag = "operation")]
 pub(super) enum Described {
     /// A jump of the mean
     Step(Step),

@@ -6,7 +6,7 @@ use crate::formats::toml_file::{
 use nav_sim_signal::imu::MAX_RATE_HZ;
 use nav_sim_signal::noise::{Law, LognormalIntervals};
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use serde_json::{Map, Value};
 
 /// What nav-sim calibrate writes and run, fuse, synthesize, export read
@@ -44,6 +44,10 @@ pub(super) struct SensorTable {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(inline)]
+#[expect(
+    dead_code,
+    reason = "its values are read by the names of their parameters"
+)]
 pub(super) struct AxisTable {
     pub(super) processes: Vec<ProcessTable>,
 }
@@ -52,9 +56,13 @@ pub(super) struct AxisTable {
 type Ends = [f64; 2];
 
 /// A process: variances in units² of the signal
-#[derive(Deserialize, Serialize, JsonSchema)]
-#[serde(tag = "type", deny_unknown_fields)]
-#[schemars(inline)]
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(tag = "type", inline)]
+#[expect(
+    dead_code,
+    reason = "its values are read by the names of their parameters"
+)]
 pub(super) enum ProcessTable {
     /// White noise: variance a sample
     WN {
@@ -114,13 +122,6 @@ pub(super) enum ProcessTable {
     },
 }
 
-impl ProcessTable {
-    /// The keys with their values.
-    pub(super) fn values(&self) -> toml::Table {
-        toml::Table::try_from(self).expect("numbers and texts are TOML")
-    }
-}
-
 /// Standard deviations of the constant bias of a switching-on: one, or one for each axis
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -150,7 +151,8 @@ pub(super) struct LawAxes {
 
 /// The law of a parameter of one process, such as AR1_2
 #[derive(Deserialize, JsonSchema)]
-#[serde(tag = "distribution", rename_all = "lowercase", deny_unknown_fields)]
+#[serde(rename_all = "lowercase", deny_unknown_fields)]
+#[schemars(tag = "distribution")]
 pub(super) enum LawTable {
     /// low + width × a beta law
     Beta {

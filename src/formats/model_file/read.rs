@@ -1,6 +1,6 @@
 //! Reading model files.
 
-use super::description::{Description, LawAxes, LawTable, ProcessTable, SensorTable, TurnOnTable};
+use super::description::{Description, LawAxes, LawTable, SensorTable, TurnOnTable};
 use super::{CI, Interval, ModelFile, TurnOn};
 use crate::formats::toml_file::{Finite, OneOrEach, Source};
 use crate::formats::{FileError, Kind as Refusal};
@@ -10,6 +10,7 @@ use nav_sim_signal::noise::{
     Composite, Kind, Model, ParameterError, Process, Spread, SpreadError, Variation,
 };
 use std::path::Path;
+use toml::Value;
 
 /// Reads a model file.
 ///
@@ -45,6 +46,8 @@ pub(super) fn parse(source: &Source) -> Result<ModelFile, FileError> {
         provenance,
         ..
     } = source.get()?;
+    // the same by the names of keys
+    let named: toml::Table = source.get()?;
     if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
         let reason = format!("is not a rate: it must be > 0 and at most {MAX_RATE_HZ}");
         return Err(source.refused("rate_hz", reason));
@@ -55,7 +58,7 @@ pub(super) fn parse(source: &Source) -> Result<ModelFile, FileError> {
     });
     for (sensor, table) in Sensor::ALL.into_iter().zip([accel, gyro]) {
         match table {
-            Some(table) => read_sensor(source, sensor, table, &mut file)?,
+            Some(table) => read_sensor(source, sensor, table, &named[sensor.name()], &mut file)?,
             None => file
                 .missing
                 .extend(Axis::ALL.map(|axis| Channel { sensor, axis })),
@@ -83,6 +86,7 @@ fn read_sensor(
     source: &Source,
     sensor: Sensor,
     table: SensorTable,
+    named: &Value,
     file: &mut ModelFile,
 ) -> Result<(), FileError> {
     let name = sensor.name();
@@ -98,8 +102,8 @@ fn read_sensor(
                 let error = source.refused(&key, "is given both for all axes and for this one");
                 return Err(error.advice(format!("write either [{name}] or one table an axis")));
             }
-            (Some(all), None) => read_processes(source, name, all, channel, file)?,
-            (None, Some(own)) => read_processes(source, &key, &own.processes, channel, file)?,
+            (Some(_), None) => read_processes(source, name, named, channel, file)?,
+            (None, Some(_)) => read_processes(source, &key, &named[axis.name()], channel, file)?,
             (None, None) => file.missing.push(channel),
         }
     }
@@ -131,15 +135,16 @@ fn read_turn_on(source: &Source, table: &TurnOnTable) -> Result<TurnOn, FileErro
 fn read_processes(
     source: &Source,
     key: &str,
-    tables: &[ProcessTable],
+    named: &Value,
     channel: Channel,
     file: &mut ModelFile,
 ) -> Result<(), FileError> {
     let rate_hz = file.model.rate_hz;
-    let tables = (1..)
+    let tables = named["processes"].as_array().into_iter().flatten();
+    let tables: Vec<(String, &Value)> = (1..)
         .zip(tables)
-        .map(|(i, table)| (format!("{key}.processes[{i}]"), table.values()));
-    let tables: Vec<(String, toml::Table)> = tables.collect();
+        .map(|(i, table)| (format!("{key}.processes[{i}]"), table))
+        .collect();
     let processes = tables
         .iter()
         .map(|(key, values)| read_process(source, key, values, rate_hz));
@@ -148,10 +153,10 @@ fn read_processes(
     {
         for (parameter, _) in process.parameters() {
             let name = format!("{parameter}{CI}");
-            let Some(ends) = values.get(&name).and_then(toml::Value::as_array) else {
+            let Some(ends) = values.get(&name).and_then(Value::as_array) else {
                 continue;
             };
-            let [low, high] = [0, 1].map(|end| ends[end].as_float().unwrap_or(f64::NAN));
+            let [low, high] = [0, 1].map(|end| number(&ends[end]));
             if low.is_nan() || high.is_nan() || low > high {
                 return Err(source.refused(&format!("{key}.{name}"), "is not a pair [low, high]"));
             }
@@ -172,19 +177,22 @@ fn read_processes(
 /// What is made of larger parameters, such as the sum of a random walk's variances, may be no number any more.
 const LARGEST: f64 = 1e30;
 
+/// A number, written with a point or not.
+fn number(value: &Value) -> f64 {
+    let whole = value.as_integer().map(|whole| whole as f64);
+    value.as_float().or(whole).unwrap_or(f64::NAN)
+}
+
 fn read_process(
     source: &Source,
     key: &str,
-    values: &toml::Table,
+    values: &Value,
     rate_hz: f64,
 ) -> Result<Process, FileError> {
     let code = values["type"].as_str().unwrap_or_default();
     let kind = Kind::named(code).expect("the description has the codes of the kinds");
     let names = kind.parameters().iter().map(|p| p.name());
-    let values: Vec<f64> = names
-        .clone()
-        .filter_map(|name| values[name].as_float())
-        .collect();
+    let values: Vec<f64> = names.clone().map(|name| number(&values[name])).collect();
     if let Some((name, _)) = names.zip(&values).find(|(_, value)| value.abs() > LARGEST) {
         let reason = format!("is more than {LARGEST:e}, which no sensor has");
         return Err(source.refused(&format!("{key}.{name}"), reason));

@@ -205,8 +205,8 @@ impl Head {
                 if record.iter().all(is_empty) {
                     continue;
                 }
-                // a logger that lost its power within a row
-                let is_cut = found < expected && row > 0;
+                // a logger that lost its power within a row; tables of this program are whole or damaged
+                let is_cut = found < expected && row > 0 && dictionary.numbers != Numbers::Missing;
                 if is_cut && !rows.read_byte_record(&mut record).map_err(cannot)? {
                     let text = format!("line {line}, the last, is cut off: left out");
                     table.assumptions.push(text);

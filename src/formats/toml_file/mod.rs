@@ -2,10 +2,9 @@
 //!
 //! Keys have paths, `outage[2].end_s`; entries of lists of tables are counted from 1.
 
-mod paths;
+mod node;
 mod values;
 
-pub(crate) use paths::dotted;
 pub(crate) use values::{
     Between, Finite, NonNegative, OneOrEach, Positive, Share, Stationary, Version,
 };
@@ -14,13 +13,37 @@ use super::error::{FileError, Kind, Place, Setting};
 use super::source;
 use super::suggest::nearest;
 use nav_sim_signal::units::SettingError;
-use paths::{culprit, span_of};
+use node::{Node, Refusal, What};
 use serde::de::DeserializeOwned;
 use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::Path;
-use toml::Spanned;
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
+
+/// A key with the path of its table before it.
+fn dotted(path: &str, key: &str) -> String {
+    if path.is_empty() {
+        key.to_owned()
+    } else {
+        format!("{path}.{key}")
+    }
+}
+
+/// Where the value of a path is written, and whether it is: if not, the span of the innermost table around it.
+fn span_of(table: &DeTable<'_>, path: &str) -> (Range<usize>, bool) {
+    let (mut table, mut span) = (Some(table), 0..0);
+    for part in path.split('.').filter(|part| !part.is_empty()) {
+        let (key, entry) = part.split_once('[').unwrap_or((part, ""));
+        let Some(value) = table.and_then(|table| table.get(key)) else {
+            return (span, false);
+        };
+        let entry = entry.trim_end_matches(']').parse::<usize>().ok();
+        let inner = entry.and_then(|i| value.get_ref().as_array()?.get(i.checked_sub(1)?));
+        let value = inner.unwrap_or(value);
+        (table, span) = (value.get_ref().as_table(), value.span());
+    }
+    (span, !path.is_empty())
+}
 
 /// A TOML text and the name it goes by in messages.
 #[derive(Debug)]
@@ -68,24 +91,22 @@ impl Source {
     /// # Errors
     /// Line and column of what is not TOML; line, key and value of what is refused, a mistyped key with the nearest legal one.
     pub(crate) fn get<T: DeserializeOwned>(&self) -> Result<T, FileError> {
-        let table = self.table()?;
-        T::deserialize(toml::de::Deserializer::from(table.clone()))
-            .map_err(|e| self.explained(&e, &culprit::<T>(&table, &e)))
+        let table = DeTable::parse(&self.text).map_err(|e| self.syntax(&e))?;
+        let value = DeValue::Table(table.into_inner());
+        T::deserialize(Node(&value)).map_err(|refusal| self.explained(refusal))
     }
 
-    fn table(&self) -> Result<Spanned<DeTable<'_>>, FileError> {
-        DeTable::parse(&self.text).map_err(|e| {
-            let span = e.span().unwrap_or_default();
-            let line_start = self.text[..span.start].rfind('\n').map_or(0, |i| i + 1);
-            let column = self.text[line_start..span.start].chars().count() + 1;
-            let key = self.text.get(span.clone()).unwrap_or_default().trim();
-            let message = match e.message() {
-                "duplicate key" => format!("the key \"{key}\" is there already"),
-                other => other.to_owned(),
-            };
-            let place = Place::Character(self.line(span.start) as u64, column as u64);
-            FileError::contents(self.path.as_str(), place, message)
-        })
+    fn syntax(&self, e: &toml::de::Error) -> FileError {
+        let span = e.span().unwrap_or_default();
+        let line_start = self.text[..span.start].rfind('\n').map_or(0, |i| i + 1);
+        let column = self.text[line_start..span.start].chars().count() + 1;
+        let key = self.text.get(span.clone()).unwrap_or_default().trim();
+        let message = match e.message() {
+            "duplicate key" => format!("the key \"{key}\" is there already"),
+            other => other.to_owned(),
+        };
+        let place = Place::Character(self.line(span.start) as u64, column as u64);
+        FileError::contents(self.path.as_str(), place, message)
     }
 
     /// The line (from 1) a byte stands in.
@@ -98,8 +119,8 @@ impl Source {
 
     /// Where the value of a key is written, and whether it is: if not, the innermost table around it.
     fn place(&self, key: &str) -> (Range<usize>, bool) {
-        self.table()
-            .map_or((0..0, false), |table| span_of(table.get_ref(), key))
+        let table = DeTable::parse(&self.text);
+        table.map_or((0..0, false), |table| span_of(table.get_ref(), key))
     }
 
     /// The line of a key, or of the innermost table around it that the file has.
@@ -187,48 +208,38 @@ impl Source {
             .advice(advice)
     }
 
-    /// A refusal by serde of the value of a key.
-    fn explained(&self, error: &toml::de::Error, key: &str) -> FileError {
-        let message = error.message();
-        let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
-        match quoted.split_first() {
-            Some((field, legal)) if message.starts_with("unknown field") => {
-                let key = if key.rsplit('.').next() == Some(field) {
-                    key.to_owned()
-                } else {
-                    dotted(key, field)
-                };
-                return self.unknown(&key, legal.iter().copied());
+    /// The refusal of a value or key by its type.
+    fn explained(&self, refusal: Refusal) -> FileError {
+        let key = refusal.path;
+        match refusal.what {
+            What::Unknown(field, legal) => {
+                self.unknown(&dotted(&key, &field), legal.iter().copied())
             }
-            Some((field, _)) if message.starts_with("missing field") => {
-                return self.missing(key, &[field]);
+            What::Missing(field) => self.missing(&key, &[field]),
+            What::Variant(word, legal) => {
+                let meant = nearest(&word, legal.iter().copied());
+                let words: Vec<String> = legal.iter().map(|w| format!("\"{w}\"")).collect();
+                self.of_value(&key, format!("is not one of {}", words.join(", ")))
+                    .advice_if(meant.map(|meant| format!("did you mean \"{meant}\"?")))
             }
-            _ => {}
-        }
-        let (own, told) = (self.place(key).0, error.span().unwrap_or_default());
-        let span = if own.start <= told.start && told.end <= own.end {
-            told
-        } else {
-            own
-        };
-        let meant = quoted
-            .split_first()
-            .filter(|_| message.starts_with("unknown variant"));
-        let advice = match meant.and_then(|(word, legal)| nearest(word, legal.iter().copied())) {
-            Some(meant) => Some(format!("did you mean \"{meant}\"?")),
-            None if message == Finite::REFUSAL => {
-                Some("a number such as 1.5e-4; neither nan nor inf".to_owned())
-            }
-            None if message.starts_with("invalid type: map, expected a sequence") => {
+            What::NoList => {
                 let name = key.rsplit('.').next().unwrap_or_default();
-                Some(format!(
-                    "there may be several: write [[{name}]], in double brackets"
-                ))
+                let advice = format!("there may be several: write [[{name}]], in double brackets");
+                self.of_value(&key, "is not a list").advice(advice)
             }
-            None => None,
-        };
-        self.refused_at(span, key, reason(message, &quoted))
-            .advice_if(advice)
+            What::Reason(reason) => self.of_value(&key, reason),
+        }
+    }
+
+    /// A refusal of a value; an entry of a list of plain values goes by the name of the list.
+    fn of_value(&self, key: &str, reason: impl Into<Box<str>>) -> FileError {
+        let span = self.place(key).0;
+        self.refused_at(
+            span,
+            key.strip_suffix(']')
+                .map_or(key, |k| k.rsplit_once('[').map_or(key, |k| k.0)),
+            reason,
+        )
     }
 }
 
@@ -241,41 +252,6 @@ fn shown(written: &str) -> String {
         .chars()
         .take(60)
         .collect()
-}
-
-/// Why a value is refused, in words that follow it: serde's types in ours.
-fn reason(message: &str, quoted: &[&str]) -> String {
-    if message.starts_with("unknown variant") {
-        let legal: Vec<String> = quoted
-            .iter()
-            .skip(1)
-            .map(|word| format!("\"{word}\""))
-            .collect();
-        return format!("is not one of {}", legal.join(", "));
-    }
-    let expected = message
-        .strip_prefix("invalid ")
-        .and_then(|rest| rest.rsplit_once(", expected "));
-    match expected.map(|(_, expected)| expected) {
-        Some("f64") => "is not a number".to_owned(),
-        Some("u8" | "u16" | "u32" | "u64" | "usize") => "is not a whole number ≥ 0".to_owned(),
-        Some("a nonzero u64") => "is not a whole number ≥ 1".to_owned(),
-        Some("a string") => "is not a text in quotes".to_owned(),
-        Some("a sequence") => "is not a list".to_owned(),
-        Some("a boolean") => "is not true or false".to_owned(),
-        Some("path string") => "is not a path".to_owned(),
-        Some(other) if other.starts_with("internally tagged enum") => "is not a table".to_owned(),
-        Some(other) if !other.contains(' ') => format!("is refused: {message}"),
-        Some(other) => format!(
-            "is not {}",
-            other.strip_prefix("struct").map_or(other, |_| "a table")
-        ),
-        // a type of ours says it in words that follow the value
-        None if message.starts_with("is ") => message.to_owned(),
-        None if message.starts_with("not ") => format!("is {message}"),
-        None if message.starts_with("expected ") => message.replacen("expected", "is not", 1),
-        None => format!("is refused: {message}"),
-    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
 //! What is refused, and where it is said to stand.
 
-use super::paths::{span_of, within};
 use super::*;
 use serde::Deserialize;
 
@@ -120,7 +119,7 @@ const TEXT: &str = "runs = 3\n[gnss]\nsigma = [1,\n 2]\n[[outage]]\nend_s = 1\n[
                     [[scenario]]\nsettings.gnss.rate_hz = -1\n[[scenario]]\nsettings = { gnss = { rate_hz = -2 } }\n";
 
 #[test]
-fn path_and_span_are_inverse() {
+fn paths_lead_to_where_values_are_written() {
     let table = DeTable::parse(TEXT).unwrap();
     for (path, written) in [
         ("runs", "3"),
@@ -134,8 +133,7 @@ fn path_and_span_are_inverse() {
         ("scenario[2].settings.gnss", "{ rate_hz = -2 }"),
     ] {
         let (span, is_set) = span_of(table.get_ref(), path);
-        assert_eq!((&TEXT[span.clone()], is_set), (written, true), "{path}");
-        assert_eq!(within(table.get_ref(), "", &span).unwrap(), path);
+        assert_eq!((&TEXT[span], is_set), (written, true), "{path}");
     }
 }
 
@@ -173,12 +171,11 @@ struct Axis {
 #[expect(dead_code, reason = "only whether it reads matters")]
 struct Rule {
     replicates: Option<Vec<u64>>,
-    #[serde(flatten)]
     operation: Operation,
 }
 
 #[derive(Debug, Deserialize)]
-#[serde(tag = "operation", rename_all = "lowercase")]
+#[serde(rename_all = "lowercase")]
 #[expect(dead_code, reason = "only whether it reads matters")]
 enum Operation {
     Step(Step),
@@ -193,7 +190,6 @@ struct Step {
     at: Option<Positive>,
 }
 
-/// Of tables that a word tells apart serde knows no places.
 #[test]
 fn keys_of_tagged_tables_are_found() {
     let two = |second: &str| {
@@ -203,7 +199,7 @@ fn keys_of_tagged_tables_are_found() {
         (two("operation = \"step\"\nheight = 2"), "line 6: \"rule[2].height\" = 2 is not between 0 and 1 | "),
         (
             two("operation = \"step\"\nheight = [0, \"a\"]"),
-            "line 6: \"rule[2].height\" = [0, \"a\"] is not a number | ",
+            "line 6: \"rule[2].height\" = \"a\" is not a number | ",
         ),
         (
             two("operation = \"step\"\nheight = 1\nat = 0"),
@@ -233,7 +229,7 @@ fn keys_of_tagged_tables_are_found() {
         ),
         (
             "other = [1, nan]".to_owned(),
-            "line 1: \"other\" = [1, nan] is not a finite number | a number such as 1.5e-4; neither nan nor inf",
+            "line 1: \"other\" = nan is not a finite number such as 1.5e-4 | ",
         ),
     ] {
         let e = Source::new("f.toml", &text).get::<Rules>().unwrap_err();

@@ -14,10 +14,6 @@ use std::marker::PhantomData;
 #[schemars(inline)]
 pub(crate) struct Finite(pub(crate) f64);
 
-impl Finite {
-    pub(super) const REFUSAL: &str = "is not a finite number";
-}
-
 impl TryFrom<f64> for Finite {
     type Error = &'static str;
 
@@ -25,7 +21,7 @@ impl TryFrom<f64> for Finite {
         if value.is_finite() {
             Ok(Self(value))
         } else {
-            Err(Self::REFUSAL)
+            Err("is not a finite number such as 1.5e-4")
         }
     }
 }

@@ -70,13 +70,14 @@ pub(super) struct SegmentTable {
     /// Overrides that of the vehicle (s)
     #[schemars(with = "Option<Positive>")]
     pub(super) ramp_s: Option<Finite>,
-    #[serde(flatten)]
+    #[schemars(flatten)]
     pub(super) kind: Described,
 }
 
 /// The kinds of segment, each with its keys.
 #[derive(Deserialize, JsonSchema)]
-#[serde(tag = "kind", rename_all = "lowercase")]
+#[serde(rename_all = "lowercase")]
+#[schemars(tag = "kind")]
 pub(super) enum Described {
     /// Constant speed and heading; at speed zero, standing
     Straight(Straight),
