@@ -63,20 +63,12 @@ pub mod report;
 pub mod formats;
 // From here on a room for each command: request, job, result, document. The main job.
 pub mod commands;
-// Recorded drives.
-pub mod fuse;
 // Parameters for other programs.
 pub mod export;
-// Recordings to models.
-pub mod calibrate;
 // Figures of the paper.
 mod paper;
 // Models to recordings.
 pub mod synthesize;
-// Which model, on the user's own recordings.
-pub mod choose;
-// The IMU that is needed.
-pub mod require;
 // A directory to start from.
 mod init;
 // All that most programs need.

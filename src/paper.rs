@@ -1,6 +1,6 @@
 //! The figures of Minaretzis et al. 2024 from the files of a case study: what it shows of each, in the paper's order.
 
-use crate::calibrate::{CAPTION as FITTED, variance_chart as fitted_chart};
+use crate::commands::calibrate::{CAPTION as FITTED, variance_chart as fitted_chart};
 use crate::report::curve_chart::{curve, scale_axis, sensor_name, variance_axis};
 use crate::report::curves::{CurvesFile, FittedCurve};
 use crate::report::page::{Chart, Colour, Page, Panel, Series, Tone, svg};

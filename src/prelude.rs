@@ -15,7 +15,7 @@
 //! ```
 
 pub use crate::app::Context;
-pub use crate::calibrate::{Calibration, CalibrationOptions, calibrate};
+pub use crate::commands::calibrate::{Calibration, CalibrationOptions, calibrate};
 pub use crate::commands::run::{NavigateInputs, Navigation, TrueImu, navigate};
 pub use crate::export::Target;
 pub use crate::formats::model_file::{ModelFile, read as read_model};

@@ -30,7 +30,7 @@ pub(crate) struct Help {
 }
 
 /// The result of a command or of a part of it.
-pub type Result<T> = std::result::Result<T, Failure>;
+pub type Result<T, E = Failure> = std::result::Result<T, E>;
 
 impl std::error::Error for Failure {}
 

@@ -2,12 +2,12 @@
 
 use super::{Failure, Session, parse, read};
 use crate::commands::batch::Study;
+use crate::commands::fuse::FuseError;
 use crate::commands::inspect::inspect;
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
 use crate::formats::logs::LogOptions;
 use crate::formats::{contamination_file, curve_file, datasheet, model_file, scenario_file};
-use crate::fuse::FuseError;
 use crate::report::six_digits;
 use nav_sim_document::seconds;
 use nav_sim_navigation::fusion::alignment::moves;

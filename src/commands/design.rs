@@ -2,7 +2,7 @@
 
 use crate::app::inputs::{self, OutageFlag, files};
 use crate::app::{Answer, Command, Context, Failure, Result};
-use crate::calibrate::ESTIMATORS;
+use crate::commands::calibrate::ESTIMATORS;
 use crate::commands::run::{NavigateInputs, TrueImu, navigate};
 use crate::formats::draws_file::DrawsFile;
 use crate::formats::model_file::ModelFile;

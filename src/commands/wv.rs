@@ -3,8 +3,8 @@
 use crate::app::inputs::listed;
 use crate::app::reading::{RecordingRequest, VarianceRequest};
 use crate::app::{Answer, Command, Context, Out, OutputFile, Result};
-use crate::calibrate::stem;
-use crate::calibrate::{visit, without_warm_up};
+use crate::commands::calibrate::stem;
+use crate::commands::calibrate::{visit, without_warm_up};
 use crate::formats::atomic::Written;
 use crate::formats::recordings::ReadOptions;
 use crate::parse;

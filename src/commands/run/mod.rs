@@ -1,16 +1,10 @@
 //! `nav-sim run`: the main job.
 
-mod assumptions;
-mod budgets;
-mod charts;
 mod document;
 mod navigate;
-mod reduction;
-mod remedy;
-mod uncertainty;
 
+pub(crate) use navigate::Reduced;
 pub use navigate::{NavigateError, NavigateInputs, Navigation, TrueImu, navigate};
-pub(crate) use reduction::Reduced;
 
 use crate::app::inputs::{self, FilterArgs, SettingsArgs, files};
 use crate::app::{Answer, Command, Context, Failure, Input, Out, OutputFile, Refuse, Result};
@@ -482,9 +476,9 @@ impl Answer for RunAnswer {
             ..
         } = &self.navigation;
         let shown = [
-            charts::horizontal(epochs, summary),
-            charts::fan_chart(fan, summary),
-            charts::nees(epochs, summary),
+            document::horizontal(epochs, summary),
+            document::fan_chart(fan, summary),
+            document::nees(epochs, summary),
         ];
         svg("Navigation errors", &shown)
     }

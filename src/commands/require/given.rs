@@ -1,6 +1,6 @@
 //! A given IMU against its limits.
 
-use super::question::{
+use super::{
     BeyondLinear, CHECKED, CURVE_S, DRIFT, DriftCurve, LONGEST_S, Question, drift_chart, points,
     points_json, quantity_in_words, value,
 };

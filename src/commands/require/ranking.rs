@@ -1,7 +1,7 @@
 //! Units of a catalogue against a limit.
 
 use super::given::Longest;
-use super::question::{
+use super::{
     BeyondLinear, CHECKED, CURVE_S, DRIFT, DriftCurve, Question, drift_chart, points, points_json,
     quantity_in_words, value, warn_of_units,
 };

@@ -1,20 +1,81 @@
-//! Arguments of a fusion.
+//! `nav-sim fuse`: the filter on recorded data.
 
-use super::FuseError;
-use super::start::{StartChoice, TopicChoice};
+mod document;
+mod drive;
+mod files;
+mod summary;
+
+pub use drive::FuseAnswer;
+pub use summary::{Cause, FuseSummary, VehicleSummary};
+
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result, option_elsewhere};
+use crate::formats::{FileError, Setting};
+use drive::Drive;
 use glam::{DMat3, DQuat, DVec3};
+use nav_sim_document::Document;
 use nav_sim_navigation::earth::GravityModel;
-use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
+use nav_sim_navigation::ekf::{BeliefError, FilterStates, InitialSettings};
 use nav_sim_navigation::frames::RollPitchYaw;
-use nav_sim_navigation::fusion::mounting::Mounted;
-use nav_sim_navigation::fusion::{Correlation, Heading, Settings};
+use nav_sim_navigation::fusion::alignment::AlignmentError;
+use nav_sim_navigation::fusion::mounting::{Mounted, MountingError};
+use nav_sim_navigation::fusion::{ClocksApart, Correlation, FusionError, Heading, Settings};
 use nav_sim_navigation::gnss::FixSigma;
+use nav_sim_navigation::metrics::VerdictKind;
+use nav_sim_navigation::sensors::aiding::AidingSettings;
 use nav_sim_navigation::sensors::gnss::MAX_LEVER_ARM_M;
-use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_navigation::sensors::outage::{Outage, OutageError};
+use nav_sim_signal::noise::{ParameterError, continuous};
 use nav_sim_signal::units::DEG;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::fmt::{self, Display, Formatter};
 use std::path::PathBuf;
 use std::str::FromStr;
+
+impl Command for Fuse {
+    type Answer = FuseAnswer;
+    const NAME: &'static str = "fuse";
+    const OUT: Out = Out::Directory {
+        path: "out/fuse",
+        files: &files::FILES,
+    };
+    const PLOT: bool = false;
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        Ok(self
+            .files()
+            .map(|(role, path)| (role, path.clone()))
+            .collect())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<FuseAnswer> {
+        let inputs = context.inputs().to_vec();
+        Ok(Drive::read(self)?.fuse(inputs)?)
+    }
+}
+
+impl Answer for FuseAnswer {
+    fn document(&self) -> Document {
+        self.page()
+    }
+
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        files::directory(self)
+    }
+
+    fn record(&self) -> serde_json::Value {
+        json!({ "kind": "fusion", "configuration": self.configuration })
+    }
+
+    /// A filter that is not overconfident.
+    fn unmet(&self) -> Option<Failure> {
+        let is_overconfident = self.summary.verdict.kind == VerdictKind::Overconfident;
+        is_overconfident
+            .then(|| Failure::bound("the solution is overconfident").hint(self.advice()))
+    }
+}
+
+// Arguments of a fusion.
 
 /// Rows of the solution per second.
 const ROWS_HZ: f64 = 10.0;
@@ -374,7 +435,7 @@ fn fix_sigma(text: &str) -> Result<FixSigma, &'static str> {
 }
 
 #[cfg(test)]
-mod tests {
+mod request_tests {
     use super::*;
 
     /// At rest and level an accelerometer measures g upwards: −z of front, right, down.
@@ -408,6 +469,245 @@ mod tests {
         );
         for bad in ["", "0", "1,2", "nan", "1:", "1:2:3", "1,2,-3"] {
             assert!(sigma(bad).is_err(), "{bad}");
+        }
+    }
+}
+
+// Choices of a start and of topics, as users write them.
+
+/// Start of a fusion.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StartChoice {
+    /// Found in the data.
+    Auto,
+    /// Found in the data but for the heading.
+    Heading {
+        /// From north, clockwise (degrees).
+        deg: f64,
+        /// Standard deviation (degrees).
+        sigma_deg: f64,
+    },
+    /// Stated in a file.
+    File(PathBuf),
+}
+
+impl FromStr for StartChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text
+            .split_once(':')
+            .map(|(deg, sigma)| (number(deg), number(sigma)));
+        match numbers {
+            _ if text == "auto" => Ok(Self::Auto),
+            Some((Ok(deg), Ok(sigma_deg)))
+                if sigma_deg > 0.0 && sigma_deg <= MAX_SIGMA_DEG && deg.abs() <= 360.0 =>
+            {
+                Ok(Self::Heading { deg, sigma_deg })
+            }
+            Some((Ok(_), Ok(_))) => Err(format!(
+                "expected a heading and its standard deviation of up to {MAX_SIGMA_DEG}°, such as 90:5"
+            )),
+            _ => Ok(Self::File(text.into())),
+        }
+    }
+}
+
+crate::parse::textual!(StartChoice);
+
+impl Display for StartChoice {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Heading { deg, sigma_deg } => write!(f, "{deg}:{sigma_deg}"),
+            Self::File(path) => write!(f, "{}", path.display()),
+        }
+    }
+}
+
+/// Topics of a log that has several.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct TopicChoice {
+    /// Of the IMU; none: the only one.
+    pub imu: Option<String>,
+    /// Of the fixes; none: the only one.
+    pub fixes: Option<String>,
+}
+
+impl FromStr for TopicChoice {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let (imu, fixes) = text.split_once(',').unwrap_or((text, ""));
+        let named = |name: &str| (!name.is_empty()).then(|| name.to_owned());
+        Ok(Self {
+            imu: named(imu),
+            fixes: named(fixes),
+        })
+    }
+}
+
+#[cfg(test)]
+mod start_tests {
+    use super::*;
+
+    #[test]
+    fn a_start_is_a_file_a_heading_or_found() {
+        let start = |text: &str| text.parse::<StartChoice>();
+        assert_eq!(start("auto"), Ok(StartChoice::Auto));
+        assert_eq!(
+            start("-90:5"),
+            Ok(StartChoice::Heading {
+                deg: -90.0,
+                sigma_deg: 5.0
+            })
+        );
+        assert_eq!(
+            start("a/initial.toml"),
+            Ok(StartChoice::File("a/initial.toml".into()))
+        );
+        for bad in ["400:5", "90:0", "90:31"] {
+            assert!(start(bad).is_err(), "{bad}");
+        }
+        for text in ["auto", "-90:5", "a:b.toml"] {
+            assert_eq!(start(text).unwrap().to_string(), text);
+        }
+    }
+}
+
+// The configuration of a fusion in its manifest.
+
+/// Settings of a fusion beside its files.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Configuration {
+    /// Settings of the filter's run; where the mounting is found, about which axes it is looked for.
+    pub(crate) settings: Settings,
+    /// Source of the mounting.
+    pub(crate) mounted: Mounted,
+    /// States of the filter.
+    pub(crate) filter: FilterStates,
+    /// The filter's expectation at the start, and of the IMU beside the model.
+    pub(crate) initial: InitialSettings,
+    /// Standard deviations of fixes that state none.
+    pub(crate) gnss_sigma: Option<FixSigma>,
+    /// Factors of the standard deviations of position and velocity.
+    pub(crate) gnss_sigma_factor: [f64; 2],
+    /// How long errors of positions last.
+    #[serde(default)]
+    pub(crate) gnss_correlation: Correlation,
+    /// Heading at the start, where it was given.
+    #[serde(default)]
+    pub(crate) heading: Option<Heading>,
+    /// What is believed of the vehicle's own knowledge.
+    #[serde(default, skip_serializing_if = "AidingSettings::is_none")]
+    pub(crate) aiding: AidingSettings,
+    /// How much earlier than its time a fix is taken to be (s).
+    pub(crate) gnss_delay_s: f64,
+}
+
+// Recordings that cannot be fused, and what helps.
+
+/// A fusion that cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FuseError {
+    /// A file that cannot be used.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A setting out of its range.
+    #[error("{0}")]
+    Setting(String),
+    /// Data and settings that do not fit together, or a filter that diverged.
+    #[error(transparent)]
+    Fusion(#[from] FusionError),
+    /// The model cannot be converted to the rate of the recording.
+    #[error("the model: {0}")]
+    Rate(#[from] continuous::RateError),
+    /// The model has no such filter.
+    #[error("the model: {0}")]
+    Belief(#[from] BeliefError),
+    /// The reduction cannot be assessed.
+    #[error(transparent)]
+    Reduction(#[from] ParameterError),
+    /// Windows that are not on the data.
+    #[error(transparent)]
+    Outage(#[from] OutageError),
+    /// The data do not show where the drive starts.
+    #[error(transparent)]
+    Alignment(#[from] AlignmentError),
+    /// The drive does not show how the IMU is mounted.
+    #[error(transparent)]
+    Mounting(#[from] MountingError),
+    /// The clocks are apart, and so the drive does not show how the IMU is mounted.
+    #[error("{0}")]
+    Apart(MountingError, ClocksApart),
+    /// The wheel is of another time.
+    #[error("the wheel and the IMU have no time in common")]
+    WheelClock,
+    /// The wheel is no wheel, or in another unit.
+    #[error("the wheel reads {0:.2} times the speed of the fixes")]
+    WheelSpeed(f64),
+    /// The reference is of another time.
+    #[error("the reference and the solution have no time in common")]
+    NothingInCommon,
+}
+
+impl FuseError {
+    /// What helps.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        let fixed = match self {
+            Self::Fusion(e @ FusionError::Clocks { .. }) => {
+                return e.delay_s().map(|s| format!("--gnss-delay {s}"));
+            }
+            Self::Apart(_, clocks) => return Some(document::apart(clocks)),
+            Self::Outage(e) => return e.hint().map(str::to_owned),
+            Self::Fusion(FusionError::Start { .. }) => {
+                "give t_s of the initial state on the clock of the IMU"
+            }
+            Self::Fusion(FusionError::Place { .. }) => {
+                "check t_s, lat_deg, lon_deg and pos_sigma_m of the initial state"
+            }
+            Self::Fusion(FusionError::Memory { .. }) => {
+                "a filter of fewer states, or the drive in parts"
+            }
+            Self::Fusion(FusionError::Diverged { .. }) => "check axes, units and the initial state",
+            Self::Alignment(_) => {
+                "give the heading with --initial DEG:SD, or the whole start with --initial FILE"
+            }
+            Self::Mounting(_) => {
+                "give --mounting ROLL,PITCH,YAW, or minutes of driving with braking and turns, and velocities in the fixes"
+            }
+            Self::NothingInCommon | Self::WheelClock => "both need one clock",
+            Self::WheelSpeed(_) => "check the unit in the header: _m_s, _km_h or _mph",
+            _ => return None,
+        };
+        Some(fixed.to_owned())
+    }
+
+    /// Whether the data are at fault rather than the numerics.
+    pub(crate) const fn is_input(&self) -> bool {
+        !matches!(
+            self,
+            Self::Reduction(_) | Self::Fusion(FusionError::Diverged { .. })
+        )
+    }
+}
+
+// Why there is no solution: what helps.
+
+impl From<FuseError> for Failure {
+    fn from(e: FuseError) -> Self {
+        match e {
+            // All six channels are needed, as the file names them: without the options for static recordings.
+            FuseError::File(e) => Self::of_file(&e, |setting| match setting {
+                Setting::ColumnNames => Some("correct the header"),
+                Setting::Channels | Setting::FewerChannels | Setting::Gaps => None,
+                Setting::RemoveLine => Some("remove the line: gaps of up to 5 s are bridged"),
+                other => Some(option_elsewhere(other)),
+            }),
+            e if e.is_input() => Self::input(&e).maybe_hint(e.hint()),
+            e => Self::could_not(&e).maybe_hint(e.hint()),
         }
     }
 }

@@ -1,0 +1,608 @@
+//! What is chosen among.
+
+use super::FEWEST;
+use super::ranking::Score;
+use crate::app::Failure;
+use nav_sim_calibration::{
+    CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Outcome, Pool, Replicate, Settings,
+    Verdict, calibrate, diagnose, grouped, model_of,
+};
+use nav_sim_navigation::ekf::{Belief, BeliefError, FilterStates};
+use nav_sim_navigation::monte_carlo;
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::imu::{Truth, TruthError};
+use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_navigation::simulation::ExperimentError;
+use nav_sim_navigation::simulation::lincov::{
+    Aim, Factor, FilterPass, Task, Track, TrueErrors, TruthSide, scaled,
+};
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_signal::imu::{Channel, Recording, Sensor};
+use nav_sim_signal::noise::continuous::same_rate;
+use nav_sim_signal::noise::{Kind, Model};
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::fmt;
+use std::sync::OnceLock;
+
+/// A way from recordings to a filter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// How replicates become one curve.
+    pub estimator: Estimator,
+    /// What is fitted to it.
+    pub model: ModelChoice,
+    /// How the model becomes states of the filter.
+    pub filter: FilterStates,
+    /// What is done to the model in between.
+    pub inflation: Inflation,
+}
+
+/// What is done to a model before a filter is made of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Inflation {
+    /// Nothing.
+    #[default]
+    None,
+    /// One factor on the variances of each sensor, so that the filter is honest, in the mean, for the models of the
+    /// single recordings that it was calibrated on.
+    Tuned,
+    /// All standard deviations ten times: the rule of thumb.
+    Tenfold,
+}
+
+nav_sim_signal::named!(Inflation { None = "none", Tuned = "tuned", Tenfold = "x10" });
+crate::parse::textual!(Inflation);
+
+impl Candidate {
+    /// The estimator's model as it is, in the default filter of 15 states.
+    #[must_use]
+    pub fn new(estimator: Estimator, model: ModelSpec) -> Self {
+        let (filter, inflation) = (FilterStates::default(), Inflation::default());
+        Self {
+            estimator,
+            model: ModelChoice::Given(model),
+            filter,
+            inflation,
+        }
+    }
+
+    /// What is compared where nothing else is said: the three averages of N2, and beside AWV what else is done in
+    /// practice, from all states to the rule of thumb, and single recordings.
+    pub(crate) fn usual() -> Vec<Self> {
+        let n2 = |estimator| Self::new(estimator, ModelSpec::n2());
+        let two_slopes = |estimator| Self::new(estimator, white_and_walk());
+        vec![
+            n2(Estimator::Awv),
+            n2(Estimator::SrAwv),
+            n2(Estimator::DrAwv),
+            Self {
+                filter: FilterStates::Full,
+                ..n2(Estimator::Awv)
+            },
+            Self {
+                inflation: Inflation::Tuned,
+                ..n2(Estimator::Awv)
+            },
+            Self {
+                inflation: Inflation::Tenfold,
+                ..n2(Estimator::Awv)
+            },
+            two_slopes(Estimator::Awv),
+            n2(Estimator::Gmwm),
+            two_slopes(Estimator::Avlr),
+        ]
+    }
+
+    /// All combinations; AVLR, which reads slopes, with the models that have nothing else, or WN+RW.
+    pub(crate) fn product(
+        estimators: &[Estimator],
+        models: &[ModelChoice],
+        filters: &[FilterStates],
+        inflations: &[Inflation],
+    ) -> Vec<Self> {
+        let mut all: Vec<Self> = Vec::new();
+        for &estimator in estimators {
+            for model in models {
+                let model = if estimator == Estimator::Avlr && !is_of_slopes(model) {
+                    ModelChoice::Given(white_and_walk())
+                } else {
+                    model.clone()
+                };
+                for &filter in filters {
+                    for &inflation in inflations {
+                        let candidate = Self {
+                            estimator,
+                            model: model.clone(),
+                            filter,
+                            inflation,
+                        };
+                        if !all.contains(&candidate) {
+                            all.push(candidate);
+                        }
+                    }
+                }
+            }
+        }
+        all
+    }
+
+    /// Whether another one has the same model, before any inflation.
+    pub(crate) fn is_calibrated_as(&self, other: &Self) -> bool {
+        self.estimator == other.estimator && self.model == other.model
+    }
+
+    /// Whether it may be chosen. What is made of a single recording, while there are several, is shown for comparison.
+    #[must_use]
+    pub const fn is_eligible(&self) -> bool {
+        !self.estimator.is_single()
+    }
+}
+
+/// What most filters of other programs know.
+fn white_and_walk() -> ModelSpec {
+    "WN+RW".parse().expect("a sum of known processes")
+}
+
+/// Whether every process has a slope of its own in the Allan deviation.
+fn is_of_slopes(model: &ModelChoice) -> bool {
+    match model {
+        ModelChoice::Given(spec) => spec
+            .kinds()
+            .iter()
+            .all(|kind: &Kind| kind.shape().is_none()),
+        ModelChoice::Auto => false,
+    }
+}
+
+impl fmt::Display for Candidate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let n2 = ModelChoice::Given(ModelSpec::n2());
+        write!(f, "{} ", self.estimator)?;
+        if self.model == n2 {
+            f.write_str("N2")?
+        } else {
+            self.model.fmt(f)?
+        }
+        write!(f, ", {}", self.filter)?;
+        match self.inflation {
+            Inflation::None => Ok(()),
+            inflation => write!(f, ", {}", inflation.name()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod candidate_tests {
+    use super::*;
+
+    #[test]
+    fn names_tell_candidates_apart() {
+        let mut names: Vec<String> = Candidate::usual().iter().map(ToString::to_string).collect();
+        assert_eq!(
+            (names[0].as_str(), names[8].as_str()),
+            ("awv N2, 15", "avlr WN+RW, 15")
+        );
+        let count = names.len();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), count);
+    }
+
+    #[test]
+    fn slopes_are_read_off_models_that_have_them() {
+        let models = ["N2", "WN+RW"].map(|m| m.parse().unwrap());
+        let all = Candidate::product(
+            &[Estimator::Awv, Estimator::Avlr],
+            &models,
+            &[FilterStates::Reduced15],
+            &[Inflation::None],
+        );
+        let names: Vec<String> = all.iter().map(ToString::to_string).collect();
+        assert_eq!(names, ["awv N2, 15", "awv WN+RW, 15", "avlr WN+RW, 15"]);
+    }
+}
+
+// The recordings of a laboratory, measured, and the models that are made of all but one of them.
+
+/// One recording: what is kept of it. The stretches of a file that has gaps are one.
+#[derive(Debug, Clone)]
+pub struct Unit {
+    /// What it is called.
+    pub name: String,
+    /// The wavelet variances of its signals.
+    pub replicates: Vec<(Channel, Replicate)>,
+}
+
+/// All recordings and how models are made of them.
+#[derive(Debug)]
+pub struct Laboratory {
+    units: Vec<Unit>,
+    settings: Settings,
+    pool: Option<Pool>,
+    /// The noise of each recording alone, once it was asked for.
+    models: Vec<OnceLock<Model>>,
+}
+
+/// The groups of recordings that were calibrated, their fits, and how these were made.
+pub(crate) type Calibrated = (Vec<Group>, Vec<Outcome>, Settings);
+
+impl Laboratory {
+    /// Estimators and model of the settings count nothing: those of the candidates do. `pool`: which signals are
+    /// replicates of one another; none: the axes of a sensor, but for single recordings.
+    #[must_use]
+    pub fn new(units: Vec<Unit>, settings: Settings, pool: Option<Pool>) -> Self {
+        let models = units.iter().map(|_| OnceLock::new()).collect();
+        Self {
+            units,
+            settings,
+            pool,
+            models,
+        }
+    }
+
+    /// The recordings.
+    pub(crate) fn units(&self) -> &[Unit] {
+        &self.units
+    }
+
+    /// Calibrates a candidate on all recordings but one, before any inflation. An estimator of single recordings takes
+    /// that after the one left out (the first, where none is), so that each is taken once.
+    ///
+    /// # Errors
+    /// When a trim leaves no replicate, or a curve is too short for the model.
+    pub(crate) fn calibrate(
+        &self,
+        candidate: &Candidate,
+        without: Option<usize>,
+    ) -> Result<Calibrated, CalibrationError> {
+        let of_units: Vec<&Unit> = if candidate.estimator.is_single() {
+            vec![&self.units[without.map_or(0, |k| (k + 1) % self.units.len())]]
+        } else {
+            self.others(without).map(|k| &self.units[k]).collect()
+        };
+        self.fit(&of_units, candidate.estimator, &candidate.model, self.pool)
+    }
+
+    /// The recordings but one.
+    pub(super) fn others(&self, without: Option<usize>) -> impl Iterator<Item = usize> {
+        (0..self.units.len()).filter(move |k| Some(*k) != without)
+    }
+
+    /// The recordings that judge candidates: an abnormal one has errors that the IMU does not have in use, and a score that
+    /// outweighs all others. All, where too few are normal.
+    ///
+    /// # Errors
+    /// When a curve is too short for the model.
+    pub(crate) fn judges(&self) -> Result<Vec<usize>, CalibrationError> {
+        let all: Vec<usize> = self.others(None).collect();
+        let n2 = ModelChoice::Given(ModelSpec::n2());
+        let (groups, outcomes, settings) = self.fit(
+            &self.units.iter().collect::<Vec<_>>(),
+            Estimator::DrAwv,
+            &n2,
+            self.pool,
+        )?;
+        let abnormal: Vec<String> = diagnose(&groups, &outcomes, &settings)
+            .into_iter()
+            .filter(|diagnosis| diagnosis.verdict != Verdict::Normal)
+            .map(|diagnosis| diagnosis.name)
+            .collect();
+        let is_normal = |k: &usize| {
+            self.units[*k]
+                .replicates
+                .iter()
+                .all(|(_, r)| !abnormal.contains(&r.name))
+        };
+        let normal: Vec<usize> = all.iter().copied().filter(is_normal).collect();
+        Ok(if normal.len() < FEWEST { all } else { normal })
+    }
+
+    /// The noise of one recording as it was met: N2 fitted to the classical wavelet variance of each axis.
+    ///
+    /// # Errors
+    /// When a curve is too short for the model.
+    pub(crate) fn own_model(&self, k: usize) -> Result<&Model, CalibrationError> {
+        if self.models[k].get().is_none() {
+            let n2 = ModelChoice::Given(ModelSpec::n2());
+            let (_, outcomes, settings) =
+                self.fit(&[&self.units[k]], Estimator::Awv, &n2, Some(Pool::Axes))?;
+            // another thread may have been as quick, with the same model
+            let _ = self.models[k].set(model_of(&outcomes, settings.rate_hz));
+        }
+        Ok(self.models[k].get().expect("set above"))
+    }
+
+    fn fit(
+        &self,
+        units: &[&Unit],
+        estimator: Estimator,
+        model: &ModelChoice,
+        pool: Option<Pool>,
+    ) -> Result<Calibrated, CalibrationError> {
+        let settings = Settings {
+            estimators: vec![estimator],
+            model: model.clone(),
+            ..self.settings.clone()
+        };
+        // an estimator of single recordings cannot pool axes
+        let pool = if estimator.is_single() {
+            Pool::Axes
+        } else {
+            pool.unwrap_or(settings.pool())
+        };
+        let groups = grouped(
+            units
+                .iter()
+                .flat_map(|unit| unit.replicates.clone())
+                .collect(),
+            pool,
+        );
+        let outcomes = calibrate(&groups, &settings)?;
+        Ok((groups, outcomes, settings))
+    }
+}
+
+// Where candidates navigate, and what they do on a recording that they have not seen.
+
+/// A trajectory with its fixes, outages and random numbers.
+#[derive(Debug)]
+pub struct Drive {
+    trajectory: Trajectory,
+    scenario: Scenario,
+    outages: Vec<Outage>,
+    seed: u64,
+    track: Track,
+}
+
+/// One recording left out.
+#[derive(Debug, Clone)]
+pub struct Fold {
+    /// Scores of the candidates, in their order: on windows of the recording, or what is expected where it is shorter
+    /// than the trajectory.
+    pub scores: Vec<Score>,
+    /// What covariance analysis expects of each where the recording's own N2 makes the errors, if it was asked.
+    pub expected: Option<Vec<Score>>,
+    /// Windows that were navigated; 0 where the recording is shorter than the trajectory.
+    pub windows: u64,
+}
+
+impl Drive {
+    /// Along a trajectory as far as the end of the last outage, with the rate of the recordings (Hz), which becomes that
+    /// of the IMU.
+    ///
+    /// # Errors
+    /// When trajectory, rates and fixes do not fit together.
+    pub fn new(
+        trajectory: &Trajectory,
+        mut scenario: Scenario,
+        outages: Vec<Outage>,
+        rate_hz: f64,
+        seed: u64,
+    ) -> Result<Self, ExperimentError> {
+        if !same_rate(scenario.imu.rate_hz, rate_hz) {
+            scenario.imu.rate_hz = rate_hz;
+        }
+        // what comes after the last outage is not judged
+        let judged_s = outages
+            .iter()
+            .map(|o| o.end_s)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let trajectory = trajectory.until(judged_s + 1.0 / scenario.gnss.rate_hz);
+        let none = Model {
+            rate_hz,
+            axes: Default::default(),
+        };
+        let track = scenario.track(&trajectory, &none, &outages)?;
+        Ok(Self {
+            trajectory,
+            scenario,
+            outages,
+            seed,
+            track,
+        })
+    }
+
+    /// How many windows as long as the trajectory lie side by side in so many samples.
+    pub(crate) fn independent_windows(&self, samples: usize) -> f64 {
+        let lasts_s = self.trajectory.end_s() - self.trajectory.start_s();
+        samples as f64 / (lasts_s * self.scenario.imu.rate_hz)
+    }
+
+    /// Leaves out recording `k`, whose samples are `recordings` (several stretches of a file that has gaps), and
+    /// takes every candidate along the trajectory `runs` times. `progress` is told how many runs are done.
+    ///
+    /// # Errors
+    /// When a model cannot be made, has no such filter, or rates do not fit together.
+    pub fn leave_out(
+        &self,
+        laboratory: &Laboratory,
+        k: usize,
+        recordings: &[Recording],
+        candidates: &[Candidate],
+        runs: u64,
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> Result<Fold, Failure> {
+        let models = self.models(laboratory, Some(k), candidates)?;
+        let beliefs = self.beliefs(candidates, &models)?;
+        let left_out_model = own_model(laboratory, k)?;
+        let expected = self.expected(&beliefs, left_out_model);
+        let is_long = |r: &Recording| self.independent_windows(r.len()) >= 1.0;
+        let usable: Cow<'_, [Recording]> = if recordings.iter().all(is_long) {
+            recordings.into()
+        } else {
+            recordings.iter().filter(|r| is_long(r)).cloned().collect()
+        };
+        let sampled = if usable.is_empty() {
+            None
+        } else {
+            self.sampled(&beliefs, &usable, runs, progress)?
+        };
+        if sampled.is_none() {
+            progress(runs);
+        }
+        let windows = if sampled.is_some() { runs } else { 0 };
+        Ok(Fold {
+            scores: sampled.unwrap_or_else(|| expected.clone()),
+            expected: Some(expected),
+            windows,
+        })
+    }
+
+    /// The model of every candidate, of all recordings but one, inflated as it says.
+    ///
+    /// # Errors
+    /// When a model cannot be made or tuned.
+    pub fn models(
+        &self,
+        laboratory: &Laboratory,
+        without: Option<usize>,
+        candidates: &[Candidate],
+    ) -> Result<Vec<Model>, Failure> {
+        let mut made: Vec<(&Candidate, Model)> = Vec::new();
+        for candidate in candidates {
+            if !made
+                .iter()
+                .any(|(other, _)| other.is_calibrated_as(candidate))
+            {
+                let calibrated = laboratory.calibrate(candidate, without);
+                let (_, outcomes, settings) =
+                    calibrated.map_err(|source| uncalibrated(candidate, source))?;
+                made.push((candidate, model_of(&outcomes, settings.rate_hz)));
+            }
+        }
+        let inflated = |candidate: &Candidate| {
+            let (_, model) = made
+                .iter()
+                .find(|(c, _)| c.is_calibrated_as(candidate))
+                .expect("made above");
+            self.inflated(laboratory, without, candidate, model)
+        };
+        candidates.iter().map(inflated).collect()
+    }
+
+    /// A candidate's calibrated model, inflated as it says; tuned for the recordings but one.
+    ///
+    /// # Errors
+    /// When the noise of a recording cannot be described, or a model has no filter.
+    pub(crate) fn inflated(
+        &self,
+        laboratory: &Laboratory,
+        without: Option<usize>,
+        candidate: &Candidate,
+        model: &Model,
+    ) -> Result<Model, Failure> {
+        match candidate.inflation {
+            Inflation::None => Ok(model.clone()),
+            Inflation::Tenfold => Ok(tenfold(model)),
+            Inflation::Tuned => {
+                let others: Vec<usize> = laboratory.others(without).collect();
+                let model_of = |k: &usize| own_model(laboratory, *k).cloned();
+                let truths: Vec<Model> =
+                    others.par_iter().map(model_of).collect::<Result<_, _>>()?;
+                self.tuned(candidate, model, &truths)
+            }
+        }
+    }
+
+    fn tuned(
+        &self,
+        candidate: &Candidate,
+        model: &Model,
+        truths: &[Model],
+    ) -> Result<Model, Failure> {
+        let full = self.scenario.with_full_noise();
+        let full = |model: &Model| full.belief(model, &self.outages, &self.track);
+        let truths: Vec<TrueErrors> = truths.iter().cloned().map(TrueErrors::from).collect();
+        let task = Task {
+            model,
+            truths: &truths,
+            drawn: None,
+            track: &self.track,
+            full: &full,
+            // a reduced filter is made so that it is as honest as the full one
+            filter: &full,
+            aim: Aim::Mean,
+            allow_smaller: true,
+        };
+        let factors = task.factors().map_err(|source| unfit(candidate, source))?;
+        Ok(scaled(model, &factors))
+    }
+
+    /// What each candidate's filter believes.
+    fn beliefs(&self, candidates: &[Candidate], models: &[Model]) -> Result<Vec<Belief>, Failure> {
+        let pairs: Vec<(&Candidate, &Model)> = candidates.iter().zip(models).collect();
+        let belief = |(candidate, model): &(&Candidate, &Model)| {
+            let mut scenario = self.scenario.clone();
+            scenario.filter.states = candidate.filter;
+            scenario
+                .belief(model, &self.outages, &self.track)
+                .map_err(|source| unfit(candidate, source))
+        };
+        pairs.par_iter().map(belief).collect()
+    }
+
+    /// Every filter on the same windows; none where the recordings are shorter than the trajectory.
+    fn sampled(
+        &self,
+        beliefs: &[Belief],
+        recordings: &[Recording],
+        runs: u64,
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> Result<Option<Vec<Score>>, ExperimentError> {
+        let truth = Truth::Static(recordings);
+        let experiment =
+            self.scenario
+                .experiment(&self.trajectory, truth, beliefs, &self.outages, self.seed);
+        match monte_carlo::run(&experiment, runs, progress) {
+            Ok(results) => Ok(Some(
+                results
+                    .iter()
+                    .map(|r| Score::of_runs(&r.runs, r.outages.len()))
+                    .collect(),
+            )),
+            // a window counts the last sample too
+            Err(ExperimentError::Truth(TruthError::TooShort { .. })) => Ok(None),
+            Err(e) => Err(e),
+        }
+    }
+
+    /// Every filter where a model makes the errors.
+    fn expected(&self, beliefs: &[Belief], truth: &Model) -> Vec<Score> {
+        let experiment = self.scenario.experiment(
+            &self.trajectory,
+            Truth::Model(truth),
+            beliefs,
+            &self.outages,
+            self.seed,
+        );
+        let sources = TruthSide::together(&TruthSide::sources(&experiment, truth));
+        let score = |belief: &Belief| {
+            Score::expected(&FilterPass::new(&self.track, belief).errors_at_ends(&sources))
+        };
+        beliefs.par_iter().map(score).collect()
+    }
+}
+
+fn own_model(laboratory: &Laboratory, k: usize) -> Result<&Model, Failure> {
+    let recording = &laboratory.units()[k].name;
+    let told = |e| Failure::from(e).within(&format!("the noise of {recording} alone"));
+    laboratory.own_model(k).map_err(told)
+}
+
+fn uncalibrated(candidate: &Candidate, e: CalibrationError) -> Failure {
+    Failure::from(e).within(&candidate.to_string())
+}
+
+/// Ten times every standard deviation.
+fn tenfold(model: &Model) -> Model {
+    let factors = Sensor::ALL.map(|sensor| Factor {
+        sensor,
+        on_variance: 100.0,
+    });
+    scaled(model, &factors)
+}
+
+fn unfit(candidate: &Candidate, e: BeliefError) -> Failure {
+    Failure::input(e).within(&candidate.to_string())
+}

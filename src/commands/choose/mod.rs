@@ -1,0 +1,491 @@
+//! The choice of the noise model for a filter, by the recordings themselves.
+//!
+//! One recording at a time is left out. Every [`Candidate`] is calibrated on the others and navigates on windows of the
+//! one left out, whose errors are new to it; all candidates have the same windows and fixes. Candidates are judged by
+//! the [`Score`] at the ends of outages, above all the mean log density of the true error under the filter's belief:
+//! a proper score ([Gneiting and Raftery 2007](https://doi.org/10.1198/016214506000001437)), which a filter cannot
+//! raise by claiming more, or less, than it knows. The recording is the unit of every interval, not the window:
+//! windows of one recording share its noise. [`Ranking`] compares candidates pair by pair, recording by recording.
+
+mod candidates;
+mod document;
+mod ranking;
+
+pub use candidates::{Candidate, Drive, Fold, Inflation, Laboratory, Unit};
+pub use ranking::{Contender, Difference, EndScore, FoldScore, Mean, Placed, Ranking, Score};
+
+use crate::app::inputs::{self, SettingsArgs, files, listed};
+use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::commands::calibrate::{
+    Calibration, CalibrationNote, CalibrationOptions, ESTIMATORS, EstimatorChoice, Measured,
+    measure, without_warm_up,
+};
+use crate::formats::recordings;
+use crate::formats::recordings::{FileReport, Gaps, ReadOptions};
+use crate::parse;
+use crate::report::{json, six_digits};
+use document::ChoiceReport;
+use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, diagnose, model_of};
+use nav_sim_document::Document;
+use nav_sim_navigation::ekf::FilterStates;
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_signal::imu::{Axis, Channel, Recording};
+use nav_sim_signal::noise::Model;
+use nav_sim_signal::wavelet::Convention;
+use serde::Serialize;
+use std::path::PathBuf;
+
+// `nav-sim choose`: the noise model for a filter, by the recordings themselves.
+
+/// Choose the noise model for a filter by navigating on recordings left out of its calibration
+///
+/// Leaves out one recording at a time, calibrates every candidate on the others and navigates along TRAJECTORY with
+/// windows of the one left out; abnormal recordings are not left out, and judge nothing. Ranks the candidates by the mean log density of the true errors at the ends of outages
+/// under the filter's covariance, which rewards accuracy and consistency together. Also prints RMSE, NEES and coverage,
+/// with intervals over recordings. Writes report.html, ranking.json and model.toml, the winner calibrated on all
+/// recordings.
+#[derive(clap::Args, Debug, Clone)]
+#[command(before_help = "\
+Examples:
+  nav-sim synthesize calib_data/consumer_mems.toml --replicates 4 --samples 16384 -o recordings
+  nav-sim choose recordings --trajectory trajectories/figure_eight.toml --outage 60:90 \\
+      --estimator awv,dr-awv --inflate none,x10
+  nav-sim choose recordings --trajectory trajectories/figure_eight.toml --outage 60:90 \\
+      --estimator awv --model N1,WN+RW --filter 15,full -o out/models --format json")]
+pub struct Choose {
+    /// Static recordings, three or more files, or directories of them
+    #[arg(required = true, value_name = "RECORDINGS")]
+    pub inputs: Vec<PathBuf>,
+    /// Trajectory: motion profile (.toml) or table (.csv)
+    #[arg(long, value_name = "FILE")]
+    pub trajectory: PathBuf,
+    /// Outages, receiver, start, what filters expect.
+    #[command(flatten)]
+    pub settings: SettingsArgs,
+    /// Estimators to compare [default: awv, sr-awv, dr-awv and, for comparison, gmwm and avlr of single recordings]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = parse::words::<Estimator>(EACH))]
+    pub estimator: Vec<Estimator>,
+    /// Models to compare, such as N2,N1,WN+RW,auto [default: N2, and WN+RW with awv]
+    #[arg(long, value_name = "MODELS", value_delimiter = ',')]
+    pub model: Vec<String>,
+    /// Filters to compare: 15, 21, full [default: 15, and full with awv]
+    #[arg(long, value_name = "STATES", value_delimiter = ',')]
+    pub filter: Vec<FilterStates>,
+    /// How models are inflated: none, tuned (consistent in the mean for the models of the single recordings), x10 (ten
+    /// times the standard deviations) [default: none, and all three with awv]
+    #[arg(long, value_name = "HOW", value_delimiter = ',')]
+    pub inflate: Vec<Inflation>,
+    /// Runs on each recording (default: two for each window that fits side by side, 16 to 64)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    pub runs: Option<u64>,
+    /// What DR-AWV drops at each end of each scale: a number, or a share such as 30%
+    #[arg(long, value_name = "A", default_value_t)]
+    pub trim: Trim,
+    /// What to do where the time jumps or stands still
+    #[arg(long, value_parser = parse::words::<Gaps>(WHOLE), default_value_t)]
+    pub gaps: Gaps,
+    /// How recordings are read.
+    #[command(flatten)]
+    pub recordings: ReadingRequest,
+}
+
+/// The estimators that are one.
+const EACH: &[(&str, &str)] = ESTIMATORS.split_at(6).0;
+
+/// What was chosen, and where.
+pub struct ChoiceMade {
+    chosen: Chosen,
+    note: CalibrationNote,
+    outages: Vec<Outage>,
+    trajectory: String,
+    seed: u64,
+}
+
+impl ChoiceMade {
+    fn report(&self) -> ChoiceReport<'_> {
+        ChoiceReport {
+            ranking: &self.chosen.ranking,
+            abnormal: &self.chosen.abnormal,
+            outages: &self.outages,
+            trajectory: &self.trajectory,
+            seed: self.seed,
+        }
+    }
+}
+
+impl Serialize for ChoiceMade {
+    fn serialize<S: serde::Serializer>(
+        &self,
+        serializer: S,
+    ) -> std::result::Result<S::Ok, S::Error> {
+        self.report().serialize(serializer)
+    }
+}
+
+impl Answer for ChoiceMade {
+    fn document(&self) -> Document {
+        self.report().document()
+    }
+
+    /// The winner's model with its curves and draws, and the ranking.
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        let Chosen {
+            winner,
+            calibration,
+            model,
+            ..
+        } = &self.chosen;
+        let Calibration {
+            groups,
+            outcomes,
+            settings,
+            ..
+        } = calibration;
+        let diagnoses = diagnose(groups, outcomes, settings);
+        let names = ("model.toml".to_owned(), "model".to_owned());
+        let how = winner.inflation;
+        let inflated = (how != Inflation::None).then(|| (model, how.name()));
+        let made = (&self.note, diagnoses.as_slice());
+        let mut files = calibration.files_of(winner.estimator, names, made, inflated);
+        files.push(OutputFile::whole("ranking.json", json(self)));
+        files
+    }
+}
+
+impl Command for Choose {
+    type Answer = ChoiceMade;
+    const NAME: &'static str = "choose";
+    const OUT: Out = Out::Directory {
+        path: "out/choice",
+        files: &[
+            "model.toml",
+            "model.wv.json",
+            "model.html",
+            "model.svg",
+            "model.draws.json",
+            "ranking.json",
+        ],
+    };
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        self.candidates()?;
+        let trajectory = files("trajectory", [&self.trajectory]);
+        let scenario = files("scenario", &self.settings.file.scenario);
+        let recordings = listed("recording", &self.inputs)?;
+        Ok(trajectory.chain(recordings).chain(scenario).collect())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<ChoiceMade> {
+        let candidates = self.candidates()?;
+        let scenario = self.settings.checked()?;
+        let trajectory = inputs::trajectory(&self.trajectory, context)?;
+        let seed = context.seed_or(scenario.run.seed);
+        let outages = inputs::placed(&scenario, &trajectory, seed, context)?;
+        if outages.is_empty() {
+            let message = "there is no outage, and candidates are judged at the ends of outages";
+            return Err(Failure::input(message).hint("give one with --outage START:END"));
+        }
+        let options = CalibrationOptions {
+            reading: self.recordings.options(self.gaps),
+            skip_warm_up: self.recordings.skips_warm_up(),
+            settings: Settings {
+                trim: self.trim,
+                ..Settings::default()
+            },
+            bootstrap: Some(Bootstrap {
+                seed,
+                ..Bootstrap::default()
+            }),
+            turn_on: false,
+            ..CalibrationOptions::default()
+        };
+        let drive = ChoiceDrive {
+            trajectory,
+            scenario,
+            outages: outages.clone(),
+            seed,
+            runs: self.runs,
+        };
+        let chosen = choose(&self.inputs, &options, &candidates, drive, context)?;
+        let note = CalibrationNote {
+            efficiency_convention: Convention::Exact,
+            reading: self.recordings.provenance(self.gaps),
+            seed: Some(seed),
+            inputs: context.inputs().to_vec(),
+        };
+        Ok(ChoiceMade {
+            chosen,
+            note,
+            outages,
+            trajectory: self.trajectory.display().to_string(),
+            seed,
+        })
+    }
+}
+
+impl Choose {
+    /// Those that are usual, or all combinations of what is given.
+    fn candidates(&self) -> Result<Vec<Candidate>> {
+        let Self {
+            estimator,
+            model,
+            filter,
+            inflate,
+            ..
+        } = self;
+        if estimator.is_empty() && model.is_empty() && filter.is_empty() && inflate.is_empty() {
+            return Ok(Candidate::usual());
+        }
+        let mut models = model
+            .iter()
+            .map(|m| m.parse().map_err(unknown_model))
+            .collect::<Result<Vec<ModelChoice>>>()?;
+        if models.is_empty() {
+            models.push(ModelChoice::default());
+        }
+        let averages = [Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv];
+        let candidates = Candidate::product(
+            if estimator.is_empty() {
+                &averages
+            } else {
+                estimator
+            },
+            &models,
+            if filter.is_empty() {
+                &[FilterStates::Reduced15]
+            } else {
+                filter
+            },
+            if inflate.is_empty() {
+                &[Inflation::None]
+            } else {
+                inflate
+            },
+        );
+        if candidates.iter().any(Candidate::is_eligible) {
+            return Ok(candidates);
+        }
+        Err(Failure::input(
+            "no candidate uses all recordings: gmwm, rgmwm and avlr take one at a time",
+        )
+        .hint("add awv, sr-awv or dr-awv to --estimator"))
+    }
+}
+
+// Static recordings and a trajectory → the noise model that a filter is best made of.
+
+/// Where candidates navigate.
+#[derive(Debug)]
+pub struct ChoiceDrive {
+    /// The reference.
+    pub trajectory: Trajectory,
+    /// Receiver, start, what filters expect beside the noise model.
+    pub scenario: Scenario,
+    /// When there are no fixes; at least one.
+    pub outages: Vec<Outage>,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Runs on each recording; none: two on each window that lies in it side by side, between 16 and 64.
+    pub runs: Option<u64>,
+}
+
+/// What was found.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Chosen {
+    /// The candidates, the winner first.
+    pub ranking: Ranking,
+    /// What the winner is.
+    pub winner: Candidate,
+    /// The winner's calibration of all recordings, before any inflation.
+    pub calibration: Calibration,
+    /// Its noise model.
+    pub model: Model,
+    /// The recordings that are calibrated on but judge no candidate.
+    pub abnormal: Vec<String>,
+    /// The files that were read, in the order of the recordings.
+    pub files: Vec<PathBuf>,
+}
+
+/// Fewest recordings of which one can be left out: two remain to be averaged.
+pub(super) const FEWEST: usize = 3;
+
+/// Leaves out one recording after the other, but those that are abnormal, and ranks candidates by what they do on it. Files are read twice, so that
+/// no more than a few are in memory. `options.estimators` and the model of `options.settings` count nothing: the
+/// candidates have theirs.
+///
+/// # Errors
+/// When recordings cannot be read or are fewer than three, a model cannot be made, or trajectory and rates do not fit
+/// together.
+pub fn choose(
+    paths: &[PathBuf],
+    options: &CalibrationOptions,
+    candidates: &[Candidate],
+    drive: ChoiceDrive,
+    context: &Context<'_>,
+) -> Result<Chosen, Failure> {
+    let options = CalibrationOptions {
+        estimators: EstimatorChoice::One(Estimator::Awv),
+        ..options.clone()
+    };
+    let asked_pool = options.pool;
+    let mut measured = measure(
+        paths,
+        &CalibrationOptions {
+            pool: None,
+            ..options.clone()
+        },
+        context,
+    )?;
+    let found_hz = measured.settings.rate_hz;
+    let rate_hz = nominal_hz(found_hz, drive.scenario.gnss.rate_hz);
+    if rate_hz != found_hz {
+        context.remark(format!(
+            "the recordings run at {} Hz: taken as {rate_hz} Hz, so that fixes meet samples",
+            six_digits(found_hz)
+        ));
+        measured.settings.rate_hz = rate_hz;
+    }
+    // The clocks of the files are not quite alike: one rate is that of all.
+    let reading = ReadOptions {
+        rate_hz: Some(rate_hz),
+        ..options.reading.clone()
+    };
+    let options = CalibrationOptions { reading, ..options };
+    let files = measured.report.files.clone();
+    if files.len() < FEWEST {
+        let message = format!(
+            "{} recordings are too few to leave one out: {FEWEST} or more are needed",
+            files.len()
+        );
+        return Err(
+            Failure::input(message).hint("each recording is a file; nav-sim calibrate takes fewer")
+        );
+    }
+    let units = units(&measured);
+    let samples: Vec<usize> = units.iter().map(samples_in).collect();
+    let laboratory = Laboratory::new(units, measured.settings, asked_pool);
+    let ChoiceDrive {
+        trajectory,
+        scenario,
+        outages,
+        seed,
+        runs,
+    } = drive;
+    let drive = Drive::new(&trajectory, scenario, outages, rate_hz, seed)?;
+    let runs: Vec<u64> = samples
+        .iter()
+        .map(|count| runs.unwrap_or_else(|| runs_on(&drive, *count)))
+        .collect();
+    let judges = laboratory.judges().map_err(Failure::from)?;
+    context.begin("runs", judges.iter().map(|k| runs[*k]).sum());
+    let mut folds: Vec<(String, Fold)> = Vec::new();
+    for &k in &judges {
+        let file = &files[k];
+        let read = samples_of(file, &options)?;
+        let advance = |n| context.advance(n);
+        let fold = drive.leave_out(&laboratory, k, &read, candidates, runs[k], &advance)?;
+        folds.push((file.file.clone(), fold));
+    }
+    context.end();
+    let contenders: Vec<Contender> = candidates.iter().map(Contender::from).collect();
+    let ranking = Ranking::new(&contenders, &folds);
+    let winner = candidates[ranking.winner().index].clone();
+    // an estimator of single recordings never wins: this is of all of them
+    let (groups, outcomes, settings) =
+        laboratory.calibrate(&winner, None).map_err(Failure::from)?;
+    let calibrated = model_of(&outcomes, settings.rate_hz);
+    let model = drive.inflated(&laboratory, None, &winner, &calibrated)?;
+    let calibration = Calibration {
+        groups,
+        outcomes,
+        settings,
+        beginnings: Default::default(),
+        turn_on: Vec::new(),
+    }
+    .with_inference(options.bootstrap, &|_| {});
+    let is_judge = |(k, _): &(usize, &FileReport)| judges.contains(k);
+    let abnormal = files
+        .iter()
+        .enumerate()
+        .filter(|found| !is_judge(found))
+        .map(|(_, file)| file.file.clone());
+    let abnormal = abnormal.collect();
+    let files = files.into_iter().map(|file| file.path).collect();
+    Ok(Chosen {
+        ranking,
+        winner,
+        calibration,
+        model,
+        abnormal,
+        files,
+    })
+}
+
+/// The rate of which that of the fixes is a whole divisor, if the clock of the recordings (Hz) shows it to within its own
+/// error: quartz is within 1e-4, and a stamp that was rounded at either end costs no more than the rest. Else that of the
+/// clock.
+fn nominal_hz(found_hz: f64, fix_hz: f64) -> f64 {
+    const CLOCK: f64 = 1e-3;
+    let nominal_hz = (found_hz / fix_hz).round() * fix_hz;
+    let apart = (nominal_hz / found_hz - 1.0).abs();
+    // To the precision of a rate that is written with seven digits it is one already.
+    if apart > 1e-6 && apart <= CLOCK {
+        nominal_hz
+    } else {
+        found_hz
+    }
+}
+
+/// The recordings, each with its signals' wavelet variances.
+fn units(measured: &Measured) -> Vec<Unit> {
+    let signals = || {
+        measured.groups.iter().flat_map(|group| {
+            let axis_of = move |axis: Option<Axis>| axis.or(group.scope.axis).unwrap_or(Axis::X);
+            let channel = move |axis| Channel {
+                sensor: group.scope.sensor,
+                axis: axis_of(axis),
+            };
+            group.replicates.iter().map(move |r| (channel(r.axis), r))
+        })
+    };
+    let unit = |file: &FileReport| {
+        let names: Vec<String> = file.recordings().map(|(name, _)| name).collect();
+        let replicates = signals()
+            .filter(|(_, r)| names.contains(&r.name))
+            .map(|(c, r)| (c, r.clone()));
+        Unit {
+            name: file.file.clone(),
+            replicates: replicates.collect(),
+        }
+    };
+    measured.report.files.iter().map(unit).collect()
+}
+
+/// Samples of a recording that were measured: a warm-up that is left out is not among them.
+fn samples_in(unit: &Unit) -> usize {
+    let of_channel = |channel: Channel| {
+        unit.replicates
+            .iter()
+            .filter(|(of_channel, _)| *of_channel == channel)
+            .map(|(_, r)| r.samples)
+            .sum::<usize>()
+    };
+    Channel::ALL.into_iter().map(of_channel).max().unwrap_or(0)
+}
+
+/// Two runs on each window that lies in a recording of so many samples side by side; whole batches.
+fn runs_on(drive: &Drive, samples: usize) -> u64 {
+    let windows = drive.independent_windows(samples);
+    ((2.0 * windows / 8.0).ceil() as u64 * 8).clamp(16, 64)
+}
+
+/// The samples that were measured: a warm-up that was left out of the curves is no stretch to navigate on either.
+fn samples_of(file: &FileReport, options: &CalibrationOptions) -> Result<Vec<Recording>, Failure> {
+    let (read, _) = recordings::read(std::slice::from_ref(&file.path), &options.reading)?;
+    let measured = |recording| without_warm_up(recording, options.skip_warm_up).0;
+    Ok(read.into_iter().map(measured).collect())
+}
