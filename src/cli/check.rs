@@ -2,7 +2,7 @@
 
 use super::{Failure, Session, parse, read};
 use crate::commands::batch::Study;
-use crate::commands::fuse::FuseError;
+use crate::commands::fuse::refused;
 use crate::commands::inspect::inspect;
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
@@ -204,7 +204,7 @@ fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
     let ((fixes, remarks), unsaid) = match read {
         Err(e) => match read_gnss(path, Some(&given), None, None) {
             Ok(read) => (read, ", without standard deviations (fuse --gnss-sigma)"),
-            Err(_) => return Err(FuseError::from(e).into()),
+            Err(_) => return Err(refused(e)),
         },
         Ok(read) => read,
     };
@@ -228,7 +228,7 @@ fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
 }
 
 fn imu(path: &Path, session: &Session) -> Result<String, Failure> {
-    let imu = read_imu(path, None, None).map_err(FuseError::from)?;
+    let imu = read_imu(path, None, None).map_err(refused)?;
     imu.remarks
         .iter()
         .for_each(|remark| session.printer.remark(remark));

@@ -3,8 +3,9 @@
 use super::summary::{
     Cause, FixCorrelation, Fixes, FuseSummary, FuseVerdict, Initial, VehicleSummary,
 };
-use super::{Configuration, Fuse, FuseError};
+use super::{Configuration, Fuse, document, refused};
 use crate::app::{Context, Input, inputs};
+use crate::app::{Failure, Refuse, Result};
 use crate::commands::run::Reduced;
 use crate::formats::fusion_files::{self, read_gnss, read_imu, read_initial, read_wheel};
 use crate::formats::model_file::{self, ModelFile};
@@ -77,7 +78,7 @@ impl Drive {
     ///
     /// # Errors
     /// A setting out of range, a file that cannot be used.
-    pub(crate) fn read(request: &Fuse) -> Result<Self, FuseError> {
+    pub(crate) fn read(request: &Fuse) -> Result<Self> {
         let settings = request.settings()?;
         let (unsaid, gnss_sigma_factor) = request.fix_sigma();
         let [position, velocity] = gnss_sigma_factor;
@@ -86,7 +87,8 @@ impl Drive {
             &request.imu,
             request.columns.as_deref(),
             topic.imu.as_deref(),
-        )?;
+        )
+        .map_err(refused)?;
         let span_s = imu
             .samples
             .first()
@@ -97,7 +99,8 @@ impl Drive {
             unsaid.as_ref(),
             span_s,
             topic.fixes.as_deref(),
-        )?;
+        )
+        .map_err(refused)?;
         for fix in &mut gnss {
             *fix = fix.with_sigmas_times(position, velocity);
             fix.t_s -= request.gnss_delay_s;
@@ -111,12 +114,14 @@ impl Drive {
         let wheel = request
             .odometer
             .as_deref()
-            .map_or_else(|| Ok(Vec::new()), read_wheel)?;
+            .map_or_else(|| Ok(Vec::new()), read_wheel)
+            .map_err(refused)?;
         let initial = request
             .initial_file()
             .map(|path| read_initial(path))
-            .transpose()?;
-        let model = model_file::read(&request.model)?;
+            .transpose()
+            .map_err(refused)?;
+        let model = model_file::read(&request.model).map_err(refused)?;
         notes.extend(model.doubts(&request.model).into_iter().map(warning));
         if (model.model.rate_hz / imu.rate_hz - 1.0).abs() > 0.01 {
             let (from, to) = (model.model.rate_hz, imu.rate_hz);
@@ -134,15 +139,14 @@ impl Drive {
             let text = format!("the model states a turn-on bias: {sigma} {unit} ({sensor})");
             notes.push(note(Importance::Remark, text));
         }
-        expected
-            .validate()
-            .map_err(|e| FuseError::Setting(e.to_string()))?;
+        expected.validate().refuse()?;
         let options = trajectory_file::Options::default();
         let reference = request
             .reference
             .as_deref()
             .map(|path| load_reference(path, &options))
-            .transpose()?;
+            .transpose()
+            .map_err(refused)?;
         let reference = reference.map(|(reference, warnings)| {
             notes.extend(warnings.iter().map(warning));
             reference
@@ -179,7 +183,7 @@ impl Drive {
     ///
     /// # Errors
     /// Data and settings that do not fit together, or a filter that diverges.
-    pub(crate) fn fuse(mut self, inputs: Vec<Input>) -> Result<FuseAnswer, FuseError> {
+    pub(crate) fn fuse(mut self, inputs: Vec<Input>) -> Result<FuseAnswer> {
         let origin_s = self.common_origin()?;
         let mut recorded = Recorded {
             imu: &self.imu,
@@ -248,7 +252,8 @@ impl Drive {
         let asked = (self.reference.as_ref(), self.request.gnss_correlation);
         let weighed = fuse_correlated(&recorded, &belief, &start, &settings, asked)?;
         if self.reference.is_some() && weighed.solution.rows.iter().all(|row| row.error.is_none()) {
-            return Err(FuseError::NothingInCommon);
+            let message = "the reference and the solution have no time in common";
+            return Err(Failure::input(message).hint("both need one clock"));
         }
         self.notes
             .extend(doubt_heading(&weighed.solution, &settings.outages).map(warning));
@@ -338,7 +343,7 @@ impl Drive {
 
 impl Drive {
     /// Brings fixes to the clock of the IMU where the two have nothing in common and no delay is given; by how much (s).
-    fn common_origin(&mut self) -> Result<Option<f64>, FuseError> {
+    fn common_origin(&mut self) -> Result<Option<f64>> {
         let recorded = Recorded {
             imu: &self.imu,
             gnss: &self.gnss,
@@ -357,17 +362,22 @@ impl Drive {
     }
 
     /// Refuses a wheel of another time or unit.
-    fn check_wheel(&self, recorded: &Recorded<'_>, outages: &[Outage]) -> Result<(), FuseError> {
+    fn check_wheel(&self, recorded: &Recorded<'_>, outages: &[Outage]) -> Result<()> {
         /// Tyres and speeds by noisy positions differ by less, units by more.
         const RATIO: Range<f64> = 0.6..1.55;
         let span = self.imu.first().zip(self.imu.last());
         let is_within =
             |w: &WheelSpeed| span.is_some_and(|(a, b)| (a.t_s..=b.t_s).contains(&w.t_s));
         if !self.wheel.is_empty() && !self.wheel.iter().any(is_within) {
-            return Err(FuseError::WheelClock);
+            let message = "the wheel and the IMU have no time in common";
+            return Err(Failure::input(message).hint("both need one clock"));
         }
         match wheel_ratio(recorded, &self.wheel, outages) {
-            Some(ratio) if !RATIO.contains(&ratio) => Err(FuseError::WheelSpeed(ratio)),
+            Some(ratio) if !RATIO.contains(&ratio) => {
+                let message = format!("the wheel reads {ratio:.2} times the speed of the fixes");
+                Err(Failure::input(message)
+                    .hint("check the unit in the header: _m_s, _km_h or _mph"))
+            }
             _ => Ok(()),
         }
     }
@@ -379,7 +389,7 @@ impl Drive {
         recorded: &Recorded<'_>,
         settings: &Settings,
         belief: &Belief,
-    ) -> FuseError {
+    ) -> Failure {
         let Some(clocks) = clocks_apart(recorded) else {
             return e.into();
         };
@@ -402,7 +412,7 @@ impl Drive {
             clocks.refined(delay_s, sigma_s)
         });
         clocks.delay_s += self.request.gnss_delay_s;
-        FuseError::Apart(e, clocks)
+        Failure::input(e).hint(document::apart(&clocks))
     }
 }
 
@@ -533,13 +543,13 @@ pub(super) fn belief(
     rate_hz: f64,
     gnss: &[GnssFix],
     outages: &[Outage],
-) -> Result<(Belief, Option<ReductionSummary>), FuseError> {
-    let model = at_rate(model, rate_hz)?;
+) -> Result<(Belief, Option<ReductionSummary>)> {
+    let model = at_rate(model, rate_hz).refuse_within("the model")?;
     let lengths: Vec<f64> = outages.iter().map(|o| o.end_s - o.start_s).collect();
     let steps = gnss.windows(2).map(|w| w[1].t_s - w[0].t_s);
     let interval_s = middle(steps.collect()).unwrap_or(1.0);
     let window_s = reduction::window_s(lengths.iter().copied().fold(0.0, f64::max));
-    let belief = Belief::new(&model, states, interval_s, window_s)?;
+    let belief = Belief::new(&model, states, interval_s, window_s).refuse_within("the model")?;
     let drive = || {
         lincov::drive(
             &model,
@@ -565,7 +575,9 @@ pub(super) fn belief(
         interval_s,
         window_s,
     };
-    let summary = reduced.summary(&Context::default())?;
+    let summary = reduced
+        .summary(&Context::default())
+        .map_err(Failure::could_not)?;
     Ok((belief, Some(summary)))
 }
 

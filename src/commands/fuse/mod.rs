@@ -14,17 +14,16 @@ use drive::Drive;
 use glam::{DMat3, DQuat, DVec3};
 use nav_sim_document::Document;
 use nav_sim_navigation::earth::GravityModel;
-use nav_sim_navigation::ekf::{BeliefError, FilterStates, InitialSettings};
+use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
 use nav_sim_navigation::frames::RollPitchYaw;
 use nav_sim_navigation::fusion::alignment::AlignmentError;
 use nav_sim_navigation::fusion::mounting::{Mounted, MountingError};
-use nav_sim_navigation::fusion::{ClocksApart, Correlation, FusionError, Heading, Settings};
+use nav_sim_navigation::fusion::{Correlation, FusionError, Heading, Settings};
 use nav_sim_navigation::gnss::FixSigma;
 use nav_sim_navigation::metrics::VerdictKind;
 use nav_sim_navigation::sensors::aiding::AidingSettings;
 use nav_sim_navigation::sensors::gnss::MAX_LEVER_ARM_M;
-use nav_sim_navigation::sensors::outage::{Outage, OutageError};
-use nav_sim_signal::noise::{ParameterError, continuous};
+use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_signal::units::DEG;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -253,8 +252,8 @@ impl Fuse {
     ///
     /// # Errors
     /// A value that is out of its range.
-    pub(super) fn settings(&self) -> Result<Settings, FuseError> {
-        let refuse = |message: String| Err(FuseError::Setting(message));
+    pub(super) fn settings(&self) -> Result<Settings> {
+        let refuse = |message: String| Err(Failure::input(message));
         for (option, arm) in [
             ("--lever-arm", self.lever_arm_m),
             ("--rear-axle", self.rear_axle_m),
@@ -605,109 +604,50 @@ pub(crate) struct Configuration {
     pub(crate) gnss_delay_s: f64,
 }
 
-// Recordings that cannot be fused, and what helps.
-
-/// A fusion that cannot be made.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum FuseError {
-    /// A file that cannot be used.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// A setting out of its range.
-    #[error("{0}")]
-    Setting(String),
-    /// Data and settings that do not fit together, or a filter that diverged.
-    #[error(transparent)]
-    Fusion(#[from] FusionError),
-    /// The model cannot be converted to the rate of the recording.
-    #[error("the model: {0}")]
-    Rate(#[from] continuous::RateError),
-    /// The model has no such filter.
-    #[error("the model: {0}")]
-    Belief(#[from] BeliefError),
-    /// The reduction cannot be assessed.
-    #[error(transparent)]
-    Reduction(#[from] ParameterError),
-    /// Windows that are not on the data.
-    #[error(transparent)]
-    Outage(#[from] OutageError),
-    /// The data do not show where the drive starts.
-    #[error(transparent)]
-    Alignment(#[from] AlignmentError),
-    /// The drive does not show how the IMU is mounted.
-    #[error(transparent)]
-    Mounting(#[from] MountingError),
-    /// The clocks are apart, and so the drive does not show how the IMU is mounted.
-    #[error("{0}")]
-    Apart(MountingError, ClocksApart),
-    /// The wheel is of another time.
-    #[error("the wheel and the IMU have no time in common")]
-    WheelClock,
-    /// The wheel is no wheel, or in another unit.
-    #[error("the wheel reads {0:.2} times the speed of the fixes")]
-    WheelSpeed(f64),
-    /// The reference is of another time.
-    #[error("the reference and the solution have no time in common")]
-    NothingInCommon,
+/// What is wrong with a file of a drive: all six channels are needed, as the file names them.
+pub(crate) fn refused(e: FileError) -> Failure {
+    Failure::of_file(&e, |setting| match setting {
+        Setting::ColumnNames => Some("correct the header"),
+        Setting::Channels | Setting::FewerChannels | Setting::Gaps => None,
+        Setting::RemoveLine => Some("remove the line: gaps of up to 5 s are bridged"),
+        other => Some(option_elsewhere(other)),
+    })
 }
 
-impl FuseError {
-    /// What helps.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
-        let fixed = match self {
-            Self::Fusion(e @ FusionError::Clocks { .. }) => {
-                return e.delay_s().map(|s| format!("--gnss-delay {s}"));
+impl From<FusionError> for Failure {
+    fn from(e: FusionError) -> Self {
+        let hint = match &e {
+            FusionError::Clocks { .. } => e.delay_s().map(|s| format!("--gnss-delay {s}")),
+            FusionError::Start { .. } => {
+                Some("give t_s of the initial state on the clock of the IMU".to_owned())
             }
-            Self::Apart(_, clocks) => return Some(document::apart(clocks)),
-            Self::Outage(e) => return e.hint().map(str::to_owned),
-            Self::Fusion(FusionError::Start { .. }) => {
-                "give t_s of the initial state on the clock of the IMU"
+            FusionError::Place { .. } => {
+                Some("check t_s, lat_deg, lon_deg and pos_sigma_m of the initial state".to_owned())
             }
-            Self::Fusion(FusionError::Place { .. }) => {
-                "check t_s, lat_deg, lon_deg and pos_sigma_m of the initial state"
+            FusionError::Memory { .. } => {
+                Some("a filter of fewer states, or the drive in parts".to_owned())
             }
-            Self::Fusion(FusionError::Memory { .. }) => {
-                "a filter of fewer states, or the drive in parts"
+            FusionError::Diverged { .. } => {
+                let failure = Self::could_not(&e);
+                return failure.hint("check axes, units and the initial state");
             }
-            Self::Fusion(FusionError::Diverged { .. }) => "check axes, units and the initial state",
-            Self::Alignment(_) => {
-                "give the heading with --initial DEG:SD, or the whole start with --initial FILE"
-            }
-            Self::Mounting(_) => {
-                "give --mounting ROLL,PITCH,YAW, or minutes of driving with braking and turns, and velocities in the fixes"
-            }
-            Self::NothingInCommon | Self::WheelClock => "both need one clock",
-            Self::WheelSpeed(_) => "check the unit in the header: _m_s, _km_h or _mph",
-            _ => return None,
+            _ => None,
         };
-        Some(fixed.to_owned())
-    }
-
-    /// Whether the data are at fault rather than the numerics.
-    pub(crate) const fn is_input(&self) -> bool {
-        !matches!(
-            self,
-            Self::Reduction(_) | Self::Fusion(FusionError::Diverged { .. })
-        )
+        Self::input(e).maybe_hint(hint)
     }
 }
 
-// Why there is no solution: what helps.
+impl From<AlignmentError> for Failure {
+    fn from(e: AlignmentError) -> Self {
+        Self::input(e)
+            .hint("give the heading with --initial DEG:SD, or the whole start with --initial FILE")
+    }
+}
 
-impl From<FuseError> for Failure {
-    fn from(e: FuseError) -> Self {
-        match e {
-            // All six channels are needed, as the file names them: without the options for static recordings.
-            FuseError::File(e) => Self::of_file(&e, |setting| match setting {
-                Setting::ColumnNames => Some("correct the header"),
-                Setting::Channels | Setting::FewerChannels | Setting::Gaps => None,
-                Setting::RemoveLine => Some("remove the line: gaps of up to 5 s are bridged"),
-                other => Some(option_elsewhere(other)),
-            }),
-            e if e.is_input() => Self::input(&e).maybe_hint(e.hint()),
-            e => Self::could_not(&e).maybe_hint(e.hint()),
-        }
+impl From<MountingError> for Failure {
+    fn from(e: MountingError) -> Self {
+        Self::input(e).hint(
+            "give --mounting ROLL,PITCH,YAW, or minutes of driving with braking and turns, and velocities in the fixes",
+        )
     }
 }
