@@ -112,17 +112,13 @@ impl ShownCalibration<'_> {
                 .iter()
                 .flat_map(|r| reasons(r, settings.rate_hz));
             let name = fit_name(outcome, fits);
-            let lines = reasons.chain(fit_notes(outcome, settings));
-            let noted = |line: String| {
-                let is_detail = line.contains("no interval");
-                let importance = if is_detail {
-                    Importance::Detail
-                } else {
-                    Importance::Remark
-                };
-                (importance, format!("{name}: {line}"))
+            let noted = |importance| {
+                let name = &name;
+                move |line: String| (importance, format!("{name}: {line}"))
             };
-            notes.extend(lines.map(noted));
+            let remarks = reasons.chain(fit_notes(outcome, settings));
+            notes.extend(remarks.map(noted(Importance::Remark)));
+            notes.extend(without_interval(outcome).map(noted(Importance::Detail)));
         }
         notes
     }
@@ -987,16 +983,24 @@ pub(super) fn fit_name(outcome: &Outcome, outcomes: &[&Outcome]) -> String {
     }
 }
 
+/// The remarks on a fit.
+fn fit_notes(outcome: &Outcome, settings: &Settings) -> impl Iterator<Item = String> {
+    let notes = outcome.notes(settings).into_iter();
+    notes.map(|note| note_line(&note, outcome))
+}
+
 /// The remarks on a fit, and why parameters have no interval.
-pub(crate) fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
-    let labels = outcome.fit.composite.labels();
-    let own = outcome
-        .notes(settings)
-        .into_iter()
-        .map(|note| note_line(&note, outcome));
-    let intervals = outcome.inference.iter().flat_map(|i| &i.intervals);
-    own.chain(intervals.filter_map(|i| undetermined(i, &labels)))
+pub(crate) fn all_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
+    fit_notes(outcome, settings)
+        .chain(without_interval(outcome))
         .collect()
+}
+
+/// Why parameters have no interval.
+fn without_interval(outcome: &Outcome) -> impl Iterator<Item = String> {
+    let labels = outcome.fit.composite.labels();
+    let intervals = outcome.inference.iter().flat_map(|i| &i.intervals);
+    intervals.filter_map(move |i| undetermined(i, &labels))
 }
 
 /// A remark on a fit.

@@ -1,7 +1,7 @@
 //! Fitted models as JSON.
 
 use super::model_file::TurnOnEntry;
-use super::{fit_notes, reasons};
+use super::{all_notes, reasons};
 use crate::export::{Quantity, parameters_json};
 use nav_sim_calibration::{
     Candidate, Diagnosis, Goodness, Indistinct, LevelSpread, Miss, Outcome, ParameterInterval,
@@ -224,7 +224,7 @@ impl FitEntry {
             runner_up: fit.runner_up,
             zero: labelled(&fit.zero),
             at_end: labelled(&fit.at_end),
-            notes: fit_notes(outcome, settings),
+            notes: all_notes(outcome, settings),
         }
     }
 }

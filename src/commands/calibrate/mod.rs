@@ -41,7 +41,7 @@ use crate::formats::hash;
 use crate::formats::model_file::ModelFile;
 use crate::parse;
 use crate::report::{self, CurvesFile};
-use document::{fit_notes, reasons, turn_on_remark};
+use document::{all_notes, reasons, turn_on_remark};
 use measure::{Curves, read_curves};
 use model_file::with_turn_on;
 use nav_sim_calibration::{

@@ -1,6 +1,6 @@
 //! The model file of a calibration.
 
-use super::{fit_notes, turn_on_remark};
+use super::{all_notes, turn_on_remark};
 use crate::app::Input;
 use crate::formats::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn};
 use nav_sim_calibration::{
@@ -217,7 +217,7 @@ fn fit(outcome: &Outcome, settings: &Settings) -> Table {
             tau_s(misfit.worst.level, settings.rate_hz).into(),
         );
     }
-    put("notes", fit_notes(outcome, settings).into());
+    put("notes", all_notes(outcome, settings).into());
     table
 }
 
