@@ -18,16 +18,23 @@ nav-sim calibrate out/paper_section5/I --estimator all --seed 1 -o out/paper_sec
 nav-sim calibrate out/paper_section5/II --estimator all --seed 1 -o out/paper_section5/models/II.toml
 nav-sim calibrate out/paper_section5/III --estimator all --seed 1 -o out/paper_section5/models/III.toml
 
-# 100 runs with each model in the filter (a state for each AR1 and random walk), on the same errors and GNSS noise.
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/I_awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/I_awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/I_sr-awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/I_sr-awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/I_dr-awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/I_dr-awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/II_awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/II_awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/II_sr-awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/II_sr-awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/II_dr-awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/II_dr-awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/III_awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/III_awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/III_sr-awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/III_sr-awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/III_dr-awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/III_dr-awv
+# 100 runs with each model in the filter (a state for each AR1 and random walk), on the same errors and GNSS noise; the filters'
+# own standard deviations relative to AWV on clean recordings are the paper's Table I.
+cat > out/paper_section5/study.toml <<'END'
+[run]
+trajectory = "../../trajectories/land_vehicle.toml"
+static = ["ninth"] # windows of one more clean recording are the errors of the simulated INS
+model = "models/{scenario}_{estimator}.toml"
+filter = "full" # a state for each AR1 and random walk, as in the paper
+runs = 100
+seed = 1
 
-# The filters' own standard deviations relative to AWV on clean recordings: the paper's Table I.
-nav-sim compare out/paper_section5/runs/I_awv out/paper_section5/runs/I_sr-awv out/paper_section5/runs/I_dr-awv out/paper_section5/runs/II_awv out/paper_section5/runs/II_sr-awv out/paper_section5/runs/II_dr-awv out/paper_section5/runs/III_awv out/paper_section5/runs/III_sr-awv out/paper_section5/runs/III_dr-awv --reference out/paper_section5/runs/I_awv -o out/paper_section5/comparison.json
+[vary]
+scenario = ["I", "II", "III"]
+estimator = ["awv", "sr-awv", "dr-awv"]
+
+[reference]
+scenario = "I"
+estimator = "awv"
+END
+nav-sim batch out/paper_section5/study.toml -o out/paper_section5

@@ -1,25 +1,27 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
 use super::pictures::claim_output;
-use super::{Cli, Command, Failure, Session, drive, read};
+use super::{Cli, Failure, Session, drive, read};
 use crate::app::Answer;
+use crate::commands::batch::{BatchRequest, Outcome};
 use crate::commands::compare::Comparison;
 use crate::formats::atomic::{Existing, Written};
 use crate::formats::{FileError, atomic, model_file};
 use crate::paper::{StudyCurves, paper_figures, paper_page};
-use crate::report::{self, TrajectorySeries};
+use crate::report::{self, TrajectorySeries, WIDTH};
 use clap::Parser;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Run the case study of Minaretzis et al. 2024, Section V, on a virtual IMU: calibrate with three estimators
 /// on clean and corrupted recordings, navigate with each model, compare (their Table I)
 ///
-/// Runs other commands of nav-sim one after the other (--print lists them, to be pasted, changed and run again): eight static recordings of a virtual consumer IMU (scenario I), the same with replaced points,
-/// vibrations and steps (II), and with two abnormal recordings of each sensor (III); AWV, SR-AWV and DR-AWV
-/// on each; Monte-Carlo navigation with errors from windows of one more clean recording and two outages of
-/// 90 s, the filter with a state for each AR1 and random walk as in the paper; the ASEE of each filter relative to AWV in
-/// scenario I. If interrupted, the same command continues: demo.json in the directory says how far it is.
+/// Runs other commands of nav-sim one after the other (--print lists them, to be pasted, changed and run again): eight static
+/// recordings of a virtual consumer IMU (scenario I), the same with replaced points, vibrations and steps (II), and with two
+/// abnormal recordings of each sensor (III); AWV, SR-AWV and DR-AWV on each; a study of Monte-Carlo navigation with errors from
+/// windows of one more clean recording and two outages of 90 s, the filter with a state for each AR1 and random walk as in the
+/// paper; the ASEE of each filter relative to AWV in scenario I. If interrupted, the same command continues: demo.json in the
+/// directory says how far it is.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -121,7 +123,15 @@ impl Progress {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.print {
         let commands = commands(args, session.seed(None));
-        let lines: Vec<String> = commands.iter().map(|c| typed(c)).collect();
+        let mut lines: Vec<String> = commands.iter().map(|c| typed(c)).collect();
+        let (study, out) = (
+            shell_quoted(&study_of(&args.out).display().to_string()),
+            shell_quoted(&args.out),
+        );
+        let text = study_text(args, session.seed(None))?;
+        lines.push(format!(
+            "cat > {study} <<'END'\n{text}END\nnav-sim batch {study} -o {out}"
+        ));
         session.result(lines.join("\n"));
         return Ok(());
     }
@@ -134,11 +144,20 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     ];
     let mut progress = Progress::of(args, session)?;
     let commands = commands(args, progress.seed);
-    let last = commands.len() - 1;
-    // what is compared is shown again, and what was removed is made again
+    let study = study_of(&args.out);
+    if study.exists() && !Progress::path(&args.out).exists() {
+        let message = format!(
+            "{} is not of this command: it is not replaced",
+            study.display()
+        );
+        return Err(
+            Failure::input(message).hint("choose another directory with --out, or move it away")
+        );
+    }
+    // what was removed is made again
     let done = commands
         .iter()
-        .take(progress.commands_done.min(last))
+        .take(progress.commands_done)
         .take_while(|c| is_there(c))
         .count();
     if done > 0 {
@@ -156,25 +175,91 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.detail(format!("$ {}", typed(command)));
         let words = std::iter::once("nav-sim").chain(command.iter().map(String::as_str));
         let cli = Cli::try_parse_from(words).map_err(Failure::input)?;
-        let inner = session.within(&cli.common, i < last);
-        match cli.command {
-            Command::Compare(mut compared) => {
-                compared.request.cause = "contamination costs".to_owned();
-                let found = drive(&compared, &inner)?;
-                figures(&found, &args.out, session)?;
-                index(found, &args.out)?;
-            }
-            command => command.run(&inner)?,
-        }
+        cli.command.run(&session.within(&cli.common, true))?;
         progress.commands_done = i + 1;
         progress.write(&args.out)?;
         bar.add(1);
     }
+    drop(bar);
+    atomic::write(&study, study_text(args, progress.seed)?)?;
+    let request = BatchRequest {
+        study,
+        out: Some(PathBuf::from(&args.out)),
+        states: ["pos_e_m", "roll_deg"].map(str::to_owned).to_vec(),
+        force: session.existing() == Existing::Replace,
+        ..BatchRequest::default()
+    };
+    let Outcome::Merged(found) = request.run(&|_| None, &session.context())? else {
+        return Err(Failure::stopped("cells are in work elsewhere")
+            .hint("the same command goes on where it was"));
+    };
+    let found = found
+        .comparisons
+        .into_iter()
+        .next()
+        .map(|(_, comparison)| comparison);
+    let found = found.ok_or_else(|| Failure::could_not("there is nothing to compare"))?;
+    let found = Comparison {
+        cause: "contamination costs".to_owned(),
+        ..found
+    };
+    drive::tell(
+        &found.document(),
+        &found.document().terminal(WIDTH),
+        session,
+    );
+    atomic::write(
+        &Path::new(&args.out).join("comparison.json"),
+        report::json(&found),
+    )?;
+    figures(&found, &args.out, session)?;
+    index(found, &args.out)?;
     session.say(format!(
         "all results on one page: {}",
         page(&args.out).display()
     ));
     Ok(())
+}
+
+fn study_of(out: &str) -> PathBuf {
+    Path::new(out).join("study.toml")
+}
+
+/// The study of the demo; its paths are relative to the directory of results where that is.
+fn study_text(args: &Args, seed: u64) -> Result<String, Failure> {
+    let out = Path::new(&args.out);
+    let is_below = out.is_relative()
+        && out
+            .components()
+            .all(|part| matches!(part, Component::Normal(_)));
+    let trajectory = match is_below {
+        true => Path::new(&"../".repeat(out.components().count())).join(TRAJECTORY),
+        false => Path::new(TRAJECTORY)
+            .canonicalize()
+            .map_err(Failure::could_not)?,
+    };
+    let (trajectory, runs) = (
+        toml::Value::from(trajectory.display().to_string()),
+        args.runs,
+    );
+    Ok(format!(
+        "[run]
+trajectory = {trajectory}
+static = [\"ninth\"] # windows of one more clean recording are the errors of the simulated INS
+model = \"models/{{scenario}}_{{estimator}}.toml\"
+filter = \"full\" # a state for each AR1 and random walk, as in the paper
+runs = {runs}
+seed = {seed}
+
+[vary]
+scenario = {SCENARIOS:?}
+estimator = {ESTIMATORS:?}
+
+[reference]
+scenario = \"I\"
+estimator = \"awv\"
+"
+    ))
 }
 
 /// Refuses no runs, and recordings in which no window is as long as the trajectory, before anything is made.
@@ -241,7 +326,7 @@ fn index(found: Comparison, out: &str) -> Result<(), Failure> {
             format!("model {name}: curves and parameters"),
         ));
         links.push((
-            format!("runs/{name}/report.html"),
+            format!("cells/{name}/report.html"),
             format!("navigation with {name}: errors and consistency"),
         ));
     }
@@ -319,21 +404,6 @@ fn commands(args: &Args, seed: u64) -> Vec<Vec<String>> {
             "calibrate @/{scenario} --estimator all --seed {seed} -o @/models/{scenario}.toml"
         ));
     }
-    lines.extend(names().into_iter().map(|name| {
-        format!(
-            "run {TRAJECTORY} @/models/{name}.toml --static @/ninth --filter full --outage 300:390 --outage 700:790 \
-             --runs {} --seed {seed} -o @/runs/{name}",
-            args.runs
-        )
-    }));
-    let candidates: Vec<String> = names()
-        .iter()
-        .map(|name| format!("@/runs/{name}"))
-        .collect();
-    lines.push(format!(
-        "compare {} --reference @/runs/I_awv -o @/comparison.json",
-        candidates.join(" ")
-    ));
     // The directory takes its place after the words are apart: its name may hold blanks.
     let words = |line: &String| {
         line.split_whitespace()
