@@ -50,7 +50,7 @@ pub use {
     nav_sim_navigation as navigation, nav_sim_signal as signal,
 };
 
-pub use export::export;
+pub use commands::export::export;
 
 // Values of arguments.
 mod parse;
@@ -63,8 +63,6 @@ pub mod report;
 pub mod formats;
 // From here on a room for each command: request, job, result, document. The main job.
 pub mod commands;
-// Parameters for other programs.
-pub mod export;
 // Figures of the paper.
 mod paper;
 // Models to recordings.

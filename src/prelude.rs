@@ -16,8 +16,8 @@
 
 pub use crate::app::Context;
 pub use crate::commands::calibrate::{Calibration, CalibrationOptions, calibrate};
+pub use crate::commands::export::Target;
 pub use crate::commands::run::{NavigateInputs, Navigation, TrueImu, navigate};
-pub use crate::export::Target;
 pub use crate::formats::model_file::{ModelFile, read as read_model};
 pub use crate::formats::trajectory_file::{Options as TrajectoryOptions, load as load_trajectory};
 pub use nav_sim_calibration::Estimator;

@@ -3,7 +3,7 @@
 use crate::error;
 use crate::work::work;
 use nav_sim::commands::datasheet::catalogue_json;
-use nav_sim::export::exported;
+use nav_sim::commands::export::exported;
 use nav_sim::failure::Failure;
 use nav_sim::formats::contamination_file;
 use nav_sim::formats::model_file::{self, ModelFile};

@@ -6,7 +6,6 @@ mod common;
 mod completions;
 mod demo;
 mod drive;
-mod export;
 mod init;
 mod interrupt;
 mod man;
@@ -20,17 +19,7 @@ mod trajectory;
 mod version;
 
 use crate::app::Asked;
-use crate::commands::calibrate::Calibrate;
-use crate::commands::choose::Choose;
-use crate::commands::compare::Compare;
-use crate::commands::datasheet::DatasheetArgs;
-use crate::commands::design::Design;
-use crate::commands::fuse::Fuse;
-use crate::commands::inspect::Inspect;
-use crate::commands::require::Require;
-use crate::commands::run::Run;
-use crate::commands::tune::Tune;
-use crate::commands::wv::Wv;
+use crate::commands::with_commands;
 use crate::parse;
 use clap::error::{ContextKind, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -57,22 +46,31 @@ struct Cli {
     command: Command,
 }
 
+macro_rules! driven {
+    ($($variant:ident: $command:path),* $(,)?) => {
+        /// Commands that answer a question.
+        #[derive(Subcommand, Debug)]
+        enum Driven {
+            $($variant(Asked<$command>)),*
+        }
+
+        impl Driven {
+            fn run(&self, session: &Session) -> Result<(), Failure> {
+                match self {
+                    $(Self::$variant(asked) => drive(asked, session).map(drop)),*
+                }
+            }
+        }
+    };
+}
+with_commands!(driven);
+
 #[derive(Subcommand, Debug)]
 enum Command {
-    Wv(Asked<Wv>),
-    Calibrate(Asked<Calibrate>),
-    Datasheet(Asked<DatasheetArgs>),
+    #[command(flatten)]
+    Driven(Driven),
     Synthesize(synthesize::Args),
     Trajectory(trajectory::Args),
-    Run(Asked<Run>),
-    Tune(Asked<Tune>),
-    Require(Asked<Require>),
-    Choose(Asked<Choose>),
-    Design(Asked<Design>),
-    Fuse(Asked<Fuse>),
-    Compare(Asked<Compare>),
-    Inspect(Asked<Inspect>),
-    Export(export::Args),
     Batch(batch::Args),
     Demo(demo::Args),
     Check(check::Args),
@@ -94,27 +92,16 @@ impl Command {
     }
 
     fn run(self, session: &Session) -> Result<(), Failure> {
-        if session.csv() && !matches!(self, Self::Wv(_)) {
+        if session.csv() && !matches!(self, Self::Driven(Driven::Wv(_) | Driven::Compare(_))) {
             let failure = Failure::input("--format csv: only wv prints CSV");
             return Err(
                 failure.hint("compare has --table csv; other commands write CSV files to --out")
             );
         }
         match self {
-            Self::Wv(asked) => drive(&asked, session).map(drop),
-            Self::Calibrate(asked) => drive(&asked, session).map(drop),
-            Self::Datasheet(asked) => drive(&asked, session).map(drop),
+            Self::Driven(driven) => driven.run(session),
             Self::Synthesize(args) => synthesize::run(&args, session),
             Self::Trajectory(args) => trajectory::run(&args, session),
-            Self::Run(asked) => drive(&asked, session).map(drop),
-            Self::Require(asked) => drive(&asked, session).map(drop),
-            Self::Choose(asked) => drive(&asked, session).map(drop),
-            Self::Design(asked) => drive(&asked, session).map(drop),
-            Self::Tune(asked) => drive(&asked, session).map(drop),
-            Self::Fuse(asked) => drive(&asked, session).map(drop),
-            Self::Compare(asked) => drive(&asked, session).map(drop),
-            Self::Inspect(asked) => drive(&asked, session).map(drop),
-            Self::Export(args) => export::run(&args, session),
             Self::Batch(args) => batch::run(&args, session),
             Self::Demo(args) => demo::run(&args, session),
             Self::Check(args) => check::run(&args, session),

@@ -6,6 +6,7 @@ pub mod choose;
 pub mod compare;
 pub mod datasheet;
 pub mod design;
+pub mod export;
 pub mod fuse;
 pub mod inspect;
 pub mod require;
@@ -13,26 +14,46 @@ pub mod run;
 pub mod tune;
 pub mod wv;
 
-use crate::app::{Answered, Context, Failure, Result, answered};
+use crate::app::{Answered, Command, Context, Failure, Result, answered};
 use serde_json::{Map, Value};
 
-/// Answers a request by the names of a command and its options, without writing files.
-///
-/// # Errors
-/// Unknown names, values that are refused, and why there is no answer.
-pub fn answer(name: &str, options: &Map<String, Value>, context: Context<'_>) -> Result<Answered> {
-    match name {
-        "calibrate" => answered::<crate::commands::calibrate::Calibrate>(options, context),
-        "choose" => answered::<crate::commands::choose::Choose>(options, context),
-        "compare" => answered::<compare::Compare>(options, context),
-        "datasheet" => answered::<datasheet::DatasheetArgs>(options, context),
-        "design" => answered::<design::Design>(options, context),
-        "fuse" => answered::<crate::commands::fuse::Fuse>(options, context),
-        "inspect" => answered::<inspect::Inspect>(options, context),
-        "require" => answered::<crate::commands::require::Require>(options, context),
-        "run" => answered::<run::Run>(options, context),
-        "tune" => answered::<tune::Tune>(options, context),
-        "wv" => answered::<wv::Wv>(options, context),
-        other => Err(Failure::input(format!("there is no command {other}"))),
-    }
+/// Calls a macro with all commands that answer a question, in the order of the help.
+macro_rules! with_commands {
+    ($then:ident) => {
+        $then! {
+            Wv: crate::commands::wv::Wv,
+            Calibrate: crate::commands::calibrate::Calibrate,
+            Choose: crate::commands::choose::Choose,
+            Design: crate::commands::design::Design,
+            Datasheet: crate::commands::datasheet::DatasheetArgs,
+            Export: crate::commands::export::ExportArgs,
+            Tune: crate::commands::tune::Tune,
+            Require: crate::commands::require::Require,
+            Run: crate::commands::run::Run,
+            Compare: crate::commands::compare::Compare,
+            Fuse: crate::commands::fuse::Fuse,
+            Inspect: crate::commands::inspect::Inspect,
+        }
+    };
 }
+pub(crate) use with_commands;
+
+macro_rules! by_name {
+    ($($variant:ident: $command:path),* $(,)?) => {
+        /// Answers a request by the names of a command and its options, without writing files.
+        ///
+        /// # Errors
+        /// Unknown names, values that are refused, and why there is no answer.
+        pub fn answer(
+            name: &str,
+            options: &Map<String, Value>,
+            context: Context<'_>,
+        ) -> Result<Answered> {
+            $(if name == <$command as Command>::NAME {
+                return answered::<$command>(options, context);
+            })*
+            Err(Failure::input(format!("there is no command {name}")))
+        }
+    };
+}
+with_commands!(by_name);

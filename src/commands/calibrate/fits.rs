@@ -2,7 +2,7 @@
 
 use super::model_file::TurnOnEntry;
 use super::{all_notes, reasons};
-use crate::export::{Quantity, parameters_json};
+use crate::commands::export::{Quantity, parameters_json};
 use nav_sim_calibration::{
     Candidate, Diagnosis, Goodness, Indistinct, LevelSpread, Miss, Outcome, ParameterInterval,
     ParameterSpread, Practical, Ranking, Settings, Share, TurnOnSpread, duration, percent, shares,

@@ -1,4 +1,4 @@
-//! A noise model as the parameters of other programs: each value with its key, unit, rate and meaning.
+//! `nav-sim export`: a noise model as the parameters of other programs, each value with its key, unit, rate and meaning.
 //!
 //! [`Export::new`] fits the pair that the target knows ([`noise::practical`](nav_sim_signal::noise::practical)) to the model's
 //! noisiest axis, states by how much the two differ, and [`Export::text`] writes it in the target's own syntax (`targets.rs`).
@@ -9,16 +9,113 @@ mod words;
 pub use targets::Target;
 pub(crate) use words::{Quantity, parameters as parameters_json};
 
-use crate::app::Failure;
+use crate::app::inputs::files;
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::formats::atomic::Written;
+use crate::formats::model_file;
 use crate::formats::model_file::ModelFile;
+use crate::parse::{one_of, seconds_range};
+use nav_sim_document::{Document, Importance, Tone};
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::noise::practical::{
     AxisParameters, Bias, Closure, Curve, Horizon, Pair, Policy, Ratio,
 };
 use nav_sim_signal::noise::{Composite, Model, Process};
+use serde::Serialize;
+use serde_json::Value;
+use std::path::PathBuf;
 
 /// Longest averaging time at which a minimum is believed of a model that no calibration made (s).
 const LONGEST_S: f64 = 10_000.0;
+
+/// Write a noise model as the parameters of another program
+///
+/// Other filters know white noise (N) and one bias process, a random walk (K) or a Gauss-Markov process. --policy says
+/// which such pair stands for the model's noisiest axis over --horizon.
+#[derive(clap::Args, Debug, Clone)]
+#[command(before_help = "\
+Examples:
+  nav-sim export calib_data/consumer_mems.toml --target kalibr -o imu.yaml
+  nav-sim export calib_data/consumer_mems.toml --target px4 --policy envelope --horizon 1s:30s
+  nav-sim export calib_data/tactical.toml --target kf-gins --format json")]
+pub struct ExportArgs {
+    /// Noise model (TOML)
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Program to export to
+    #[arg(long, value_name = "PROGRAM", value_parser = one_of::<Target>(&Target::NAMES))]
+    pub target: Target,
+    /// strict: WN and RW as they are; matched: the model's Allan deviation at 1 s and the closest bias; envelope: the
+    /// smallest pair that is nowhere below the model
+    #[arg(long, value_name = "POLICY", value_parser = one_of::<Policy>(&Policy::NAMES), default_value = Policy::Matched.name())]
+    pub policy: Policy,
+    /// Averaging times over which the pair stands for the model
+    #[arg(long, value_name = "FROM:TO", value_parser = horizon, default_value = "1s:100s")]
+    pub horizon: Horizon,
+}
+
+fn horizon(text: &str) -> Result<Horizon, String> {
+    let (from_s, to_s) = seconds_range(text)?;
+    Ok(Horizon { from_s, to_s })
+}
+
+/// The file of a target, and what is said of it.
+pub struct ExportAnswer {
+    text: String,
+    json: Value,
+    document: Document,
+}
+
+impl Command for ExportArgs {
+    type Answer = ExportAnswer;
+    const NAME: &'static str = "export";
+    const OUT: Out = Out::File {
+        kind: Written::Export,
+        name: "parameters.txt",
+        help: "File to write to (default: stdout)",
+    };
+    const PLOT: bool = false;
+    const PRINTS_FILE: bool = true;
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        Ok(files("model", [&self.model]).collect())
+    }
+
+    fn run(&self, _: &Context<'_>) -> Result<ExportAnswer> {
+        let file = model_file::read(&self.model)?;
+        let shown = self.model.display().to_string();
+        let export = exported(&file, self.target, self.policy, self.horizon)
+            .map_err(|failure| failure.within(&shown))?;
+        let mut document = Document::new(self.target.name, Tone::Good, [""; 0]);
+        for line in export.summary() {
+            document.note(Importance::Remark, line);
+        }
+        for doubt in export.doubts() {
+            document.note(Importance::Warning, doubt);
+        }
+        Ok(ExportAnswer {
+            text: export.text(&shown),
+            json: export.json(&shown),
+            document,
+        })
+    }
+}
+
+impl Serialize for ExportAnswer {
+    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        self.json.serialize(to)
+    }
+}
+
+impl Answer for ExportAnswer {
+    fn document(&self) -> Document {
+        self.document.clone()
+    }
+
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        vec![OutputFile::whole("", self.text.clone() + "\n")]
+    }
+}
 
 /// How a model is turned into parameters.
 #[derive(Debug, Clone, PartialEq)]
