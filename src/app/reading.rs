@@ -10,13 +10,11 @@ use nav_sim_document::Importance;
 use nav_sim_logs::Stamp;
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::wavelet::{Convention, Tuning};
-use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
 /// How recordings are read.
-#[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
-#[serde(default, deny_unknown_fields)]
+#[derive(clap::Args, Debug, Clone, PartialEq, Default)]
 #[command(next_help_heading = "Recordings")]
 pub struct ReadingRequest {
     /// Sample rate (Hz) of files without a time column
@@ -34,8 +32,7 @@ pub struct ReadingRequest {
 }
 
 /// What is read of a log.
-#[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
-#[serde(default, deny_unknown_fields)]
+#[derive(clap::Args, Debug, Clone, PartialEq, Default)]
 pub struct LogRequest {
     /// Stamps of a log: header, of the measurement; log, of its arrival
     #[arg(long, value_name = "WHICH", value_parser = parse::words::<Stamps>(STAMPS), default_value_t)]
@@ -66,8 +63,6 @@ pub enum Stamps {
     Log,
 }
 
-parse::textual!(Stamps);
-
 nav_sim_signal::named!(Stamps { Header = "header", Log = "log" });
 
 const STAMPS: &[(&str, &str)] = &[
@@ -76,8 +71,7 @@ const STAMPS: &[(&str, &str)] = &[
 ];
 
 /// How recordings are read, and which of their signals are used.
-#[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(clap::Args, Debug, Clone, PartialEq)]
 #[command(next_help_heading = "Recordings")]
 pub struct RecordingRequest {
     #[command(flatten)]
@@ -85,7 +79,6 @@ pub struct RecordingRequest {
     pub reading: ReadingRequest,
     /// What to do where the time jumps or stands still
     #[arg(long, value_parser = parse::words::<Gaps>(GAPS), default_value_t = Gaps::Keep)]
-    #[serde(with = "parse::text")]
     pub gaps: Gaps,
     /// Signals to use: all, accel, gyro, x, accel.x, … (repeatable or comma-separated; default: all)
     #[arg(long, value_name = "AXES", value_delimiter = ',')]
@@ -134,8 +127,6 @@ pub enum Skip {
     Auto,
 }
 
-parse::textual!(Skip);
-
 impl Default for Skip {
     fn default() -> Self {
         Self::Seconds(0.0)
@@ -171,8 +162,6 @@ pub struct ChannelSet {
     /// The signals.
     pub channels: Vec<Channel>,
 }
-
-parse::textual!(ChannelSet);
 
 impl fmt::Display for ChannelSet {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -276,8 +265,7 @@ impl RecordingRequest {
 }
 
 /// How wavelet variances are taken.
-#[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(clap::Args, Debug, Clone, PartialEq)]
 #[command(next_help_heading = "Wavelet variance")]
 pub struct VarianceRequest {
     /// Efficiency of the robust wavelet variance at the Gaussian model, 0.3 to 0.99
@@ -306,8 +294,6 @@ pub enum Scales {
     /// All, of which these are fitted.
     Fitted(FitRange),
 }
-
-parse::textual!(Scales);
 
 impl fmt::Display for Scales {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

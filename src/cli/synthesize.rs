@@ -26,11 +26,8 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let request = SynthesisRequest {
-        seed: session.asked_seed(),
-        ..args.request.clone()
-    };
-    let job = request.synthesis(|| session.seed(None), &session.context())?;
+    let request = &args.request;
+    let job = request.synthesis(&session.context())?;
     let contamination = request.contaminate.as_deref().map(Path::new);
     let inputs = contamination.into_iter().chain([request.model.as_path()]);
     let _own = job.claim(&args.out, inputs, session.existing())?;

@@ -91,7 +91,6 @@ pub enum Intervals {
 }
 
 nav_sim_signal::named!(Intervals { Eta3 = "eta3", LargeSample = "large-sample" });
-crate::parse::textual!(Intervals);
 
 /// How wavelet variances are taken.
 #[derive(Debug, Clone, Default)]

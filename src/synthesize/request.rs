@@ -10,12 +10,10 @@ use crate::formats::{contamination_file, input};
 use crate::parse;
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::contamination::{Contamination, Rule};
-use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// A model, and the recordings that are made of it.
-#[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(clap::Args, Debug, Clone)]
 pub struct SynthesisRequest {
     /// Noise model (TOML)
     #[arg(value_name = "MODEL")]
@@ -43,33 +41,11 @@ pub struct SynthesisRequest {
         default_value = "all"
     )]
     pub axes: Vec<ChannelSet>,
-    /// Seed of all random numbers; drawn without it.
-    #[arg(skip)]
-    pub seed: Option<u64>,
-}
-
-impl Default for SynthesisRequest {
-    fn default() -> Self {
-        Self {
-            model: PathBuf::new(),
-            replicates: 1,
-            samples: None,
-            duration: None,
-            spread: false,
-            contaminate: None,
-            axes: vec!["all".parse().expect("a word of the list")],
-            seed: None,
-        }
-    }
 }
 
 impl SynthesisRequest {
     /// Everything that is decided before the first number is drawn.
-    pub(crate) fn synthesis(
-        &self,
-        draw: impl FnOnce() -> u64,
-        context: &Context<'_>,
-    ) -> Result<Synthesis, Failure> {
+    pub(crate) fn synthesis(&self, context: &Context<'_>) -> Result<Synthesis, Failure> {
         let file = model_file::read(&self.model)?;
         let shown = self.model.display();
         if self.spread && file.spread.is_none() {
@@ -113,7 +89,7 @@ impl SynthesisRequest {
             samples: samples as usize,
             format: FileFormat::Csv,
             spread: self.spread,
-            seed: self.seed.unwrap_or_else(draw),
+            seed: context.seed_or(None),
             file,
             contamination,
             channels,

@@ -52,7 +52,6 @@ pub enum Inflation {
 }
 
 nav_sim_signal::named!(Inflation { None = "none", Tuned = "tuned", Tenfold = "x10" });
-crate::parse::textual!(Inflation);
 
 impl Candidate {
     /// The estimator's model as it is, in the default filter of 15 states.

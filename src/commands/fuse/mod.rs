@@ -295,8 +295,7 @@ impl Fuse {
 }
 
 /// Axes as loggers name them, where they are not front, right, down.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LoggerAxes {
     /// Front, left, up.
     Flu,
@@ -316,8 +315,7 @@ impl LoggerAxes {
 }
 
 /// Attitude of the IMU in the vehicle.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum MountingChoice {
     /// Found from the drive.
     Auto,
@@ -362,8 +360,7 @@ impl FromStr for MountingChoice {
 }
 
 /// Standard deviations of fixes, as a user gives them.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum GnssSigma {
     /// Where the file states none.
     Unsaid(FixSigma),
@@ -512,8 +509,6 @@ impl FromStr for StartChoice {
     }
 }
 
-crate::parse::textual!(StartChoice);
-
 impl Display for StartChoice {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self {
@@ -525,7 +520,7 @@ impl Display for StartChoice {
 }
 
 /// Topics of a log that has several.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct TopicChoice {
     /// Of the IMU; none: the only one.
     pub imu: Option<String>,
