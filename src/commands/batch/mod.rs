@@ -158,8 +158,14 @@ impl Study {
             }
         }
         let failures = worked.failures.into_inner().unwrap_or_default();
-        if let Some((name, failure)) = failures.into_iter().next() {
-            return Err(failure.within(&format!("cell {name}")));
+        if let Some((name, failure)) = failures.first() {
+            let more = match failures.len() - 1 {
+                0 => String::new(),
+                n => format!(" (and {n} more cells)"),
+            };
+            let hint = failure.advice().map(str::to_owned);
+            let failed = Failure::could_not(format!("cell {name}: {failure}{more}"));
+            return Err(failed.maybe_hint(hint));
         }
         let left = own.iter().filter(|unit| !place.has_unit(unit)).count();
         if left > 0 && !context.go_on() {

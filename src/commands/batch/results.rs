@@ -9,16 +9,16 @@ use crate::formats::run_directory::{self, RunDirectory};
 use crate::formats::source;
 use crate::report::json;
 use crate::report::states::tone;
-use crate::report::verdict::{gravest, verdict_in_short};
+use crate::report::verdict::gravest;
 use nav_sim_document::{
     Axis, Cell as TableCell, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke,
-    Table, Tone, shortest, window,
+    Table, Tone, shortest,
 };
 use nav_sim_navigation::metrics::{Verdict, compare};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use serde::Serialize;
 use serde_json::{Value, json};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;
 
 const FILES: [&str; 3] = ["results.csv", "summary.json", "report.html"];
@@ -49,16 +49,7 @@ struct CellSummary {
     diverged: u64,
     verdict: Verdict,
     /// Time, p50 and p95 of the horizontal error and NEES at the end of each outage.
-    outages: Vec<OutageEnd>,
-}
-
-#[derive(Debug, Serialize)]
-struct OutageEnd {
-    start_s: f64,
-    end_s: f64,
-    p50_m: Option<f64>,
-    p95_m: Option<f64>,
-    nees: Option<f64>,
+    outages: Vec<Value>,
 }
 
 /// Reads all cells that are there and compares them; a damaged one is set aside.
@@ -70,18 +61,19 @@ pub(crate) fn merge(
     context: &Context<'_>,
 ) -> Result<StudyAnswer> {
     let fixed = study.fixed(cells);
-    let reference_of = |labels: &Labels| -> Option<&Cell> {
-        let is_reference = |cell: &&Cell| {
-            let wanted = |(axis, label): &(String, String)| {
-                let label = fixed
-                    .iter()
-                    .find(|(a, _)| a == axis)
-                    .map_or(label, |(_, l)| l);
-                cell.labels.iter().any(|(a, l)| a == axis && l == label)
-            };
-            !fixed.is_empty() && labels.iter().all(wanted)
+    let by_labels: HashMap<&Labels, &Cell> =
+        cells.iter().map(|cell| (&cell.labels, cell)).collect();
+    let reference_of = |cell: &Cell| {
+        let label = |(axis, label): &(String, String)| {
+            let fixed = fixed.iter().find(|(fixed, _)| fixed == axis);
+            (
+                axis.clone(),
+                fixed.map_or(label, |(_, label)| label).clone(),
+            )
         };
-        cells.iter().find(is_reference)
+        let labels: Labels = cell.labels.iter().map(label).collect();
+        let found = by_labels.get(&labels).copied();
+        found.filter(|cell| !fixed.is_empty() && place.is_done(cell))
     };
     let mut answer = StudyAnswer {
         schema_version: 1,
@@ -96,18 +88,17 @@ pub(crate) fn merge(
         comparisons: Vec::new(),
         unmet: None,
     };
-    // by the reference's name: its cells, one setting of the other axes
+    // of each reference its cells: one setting of the other axes
     let mut settings: Vec<(Option<&Cell>, Vec<&Cell>)> = Vec::new();
+    let mut at = HashMap::new();
     for cell in cells {
-        let reference = reference_of(&cell.labels).filter(|cell| place.is_done(cell));
-        let name = |cell: Option<&Cell>| cell.map(|cell| cell.name.clone());
-        match settings
-            .iter_mut()
-            .find(|(of, _)| of.is_some() && name(*of) == name(reference))
-        {
-            Some((_, members)) => members.push(cell),
-            None => settings.push((reference, vec![cell])),
+        let reference = reference_of(cell);
+        let name = &reference.unwrap_or(cell).name;
+        let index = *at.entry(name).or_insert(settings.len());
+        if index == settings.len() {
+            settings.push((reference, Vec::new()));
         }
+        settings[index].1.push(cell);
     }
     for (reference, members) in settings {
         let mut read = Vec::new();
@@ -173,16 +164,15 @@ impl StudyAnswer {
                 .zip(&alone)
                 .enumerate()
             {
-                let [start_s, end_s] =
-                    ["start_s", "end_s"].map(|key| outage[key].as_f64().unwrap_or(f64::NAN));
                 let horizontal = &outage["horizontal_error_end_m"];
-                ends.push(OutageEnd {
-                    start_s,
-                    end_s,
-                    p50_m: horizontal["p50"].as_f64(),
-                    p95_m: horizontal["p95"].as_f64(),
-                    nees: outage["nees_end"].as_f64(),
-                });
+                let time = |key: &str| outage[key].as_f64().unwrap_or(f64::NAN);
+                ends.push(json!({
+                    "start_s": outage["start_s"],
+                    "end_s": outage["end_s"],
+                    "p50_m": horizontal["p50"],
+                    "p95_m": horizontal["p95"],
+                    "nees": outage["nees_end"],
+                }));
                 for (s, state) in REPORTED_NAMES.iter().enumerate() {
                     let ratio = ratios.filter(|(candidate, _)| !candidate.is_reference);
                     let ratio = ratio.map(|(candidate, _)| &candidate.outages[i].states[s]);
@@ -194,9 +184,9 @@ impl StudyAnswer {
                         "runs": summary["runs"],
                         "diverged": summary["diverged"],
                         "outage": i,
-                        "start_s": start_s,
-                        "end_s": end_s,
-                        "duration_s": end_s - start_s,
+                        "start_s": outage["start_s"],
+                        "end_s": outage["end_s"],
+                        "duration_s": time("end_s") - time("start_s"),
                         "state": state,
                         "reference": ratios.map(|(_, name)| name),
                         "paired": ratios.map(|(candidate, _)| candidate.is_paired),
@@ -378,7 +368,15 @@ impl Answer for StudyAnswer {
                 ),
             );
         }
-        document.lead(self.table());
+        let columns = [
+            ("cell", "../../name"),
+            ("outage", "{start_s}–{end_s} s"),
+            ("p50 (m)", "p50_m"),
+            ("p95 (m)", "p95_m"),
+            ("NEES", "nees"),
+            ("verdict", "../../verdict/kind"),
+        ];
+        document.lead(Table::of(self, "/cells/*/outages/*", &columns).with_keys(2));
         document.charts(
             &self.charts(),
             "Horizontal error at the end of the first outage: p95 and, thin, the median.",
@@ -405,29 +403,6 @@ impl Answer for StudyAnswer {
 }
 
 impl StudyAnswer {
-    /// A row a cell and outage.
-    fn table(&self) -> Table {
-        let mut table =
-            Table::new(["cell", "outage", "p50 (m)", "p95 (m)", "NEES", "verdict"]).with_keys(2);
-        for (i, cell) in self.cells.iter().enumerate() {
-            for (k, outage) in cell.outages.iter().enumerate() {
-                let number = |value: Option<f64>, key: &str| {
-                    let source = format!("/cells/{i}/outages/{k}/{key}");
-                    value.map_or_else(|| TableCell::figures(""), |x| TableCell::number(x, &source))
-                };
-                table.row([
-                    TableCell::from(cell.name.clone()),
-                    window(outage.start_s, outage.end_s).into(),
-                    number(outage.p50_m, "p50_m"),
-                    number(outage.p95_m, "p95_m"),
-                    number(outage.nees, "nees"),
-                    verdict_in_short(&cell.verdict).into(),
-                ]);
-            }
-        }
-        table
-    }
-
     /// A chart for each axis of numbers: a line for each setting of the others.
     fn charts(&self) -> Vec<Chart> {
         const LINES: usize = 12;
@@ -441,13 +416,10 @@ impl StudyAnswer {
                     .filter(|(other, _)| *other != axis)
                     .map(|(_, label)| label.as_str());
                 let name = others.collect::<Vec<_>>().join(" ");
-                if let Some(OutageEnd {
-                    p50_m: Some(p50),
-                    p95_m: Some(p95),
-                    ..
-                }) = cell.outages.first()
+                let outage = cell.outages.first()?;
+                if let (Some(p50), Some(p95)) = (outage["p50_m"].as_f64(), outage["p95_m"].as_f64())
                 {
-                    lines.entry(name).or_default().push((x, *p50, *p95));
+                    lines.entry(name).or_default().push((x, p50, p95));
                 }
             }
             let series =
