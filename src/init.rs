@@ -1,6 +1,6 @@
 //! A directory to start from: a commented file of every kind, trajectories, virtual IMUs.
 
-use crate::formats::{FileError, atomic};
+use crate::formats::{Failure, atomic};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -43,7 +43,7 @@ pub(crate) struct StartFiles {
 ///
 /// # Errors
 /// When the system refuses.
-pub(crate) fn write_start_files(directory: &Path) -> Result<StartFiles, FileError> {
+pub(crate) fn write_start_files(directory: &Path) -> Result<StartFiles, Failure> {
     let mut made = Made::default();
     let mut kept = Vec::new();
     for (name, contents) in FILES {

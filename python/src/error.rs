@@ -34,7 +34,7 @@ pub(crate) fn of_failure(py: Python<'_>, failure: &Failure, hidden: &str) -> PyE
     let line = failure
         .line()
         .and_then(|line| staged.map_or(Some(line), |staged| staged.row(line)));
-    let hint = failure.advice().map(|hint| shown(hint, hidden));
+    let hint = failure.advice().map(|hint| shown(&hint, hidden));
     raise(
         py,
         &shown(&failure.to_string(), hidden),

@@ -1,7 +1,6 @@
 //! What went wrong with a request, as the user reads it, and the exit code that it means.
 
 use crate::commands::run::NavigateError;
-use crate::formats::{FileError, Setting};
 use nav_sim_calibration::{
     AnticipationError, AverageError, CalibrationError, Cause, FitError, SignalError,
 };
@@ -10,7 +9,10 @@ use nav_sim_navigation::simulation::ExperimentError;
 use nav_sim_signal::noise::ReplicateError;
 use nav_sim_signal::noise::continuous::RateError;
 use nav_sim_signal::wavelet::WaveletError;
+use std::borrow::Cow;
 use std::fmt;
+use std::io::{self, ErrorKind};
+use std::path::Path;
 
 /// A command without a result: exit code, message, place and help. 1 could not (I/O, numerics); 2 usage or input;
 /// 3 a stated bound was not met; 75 stopped early, resume; 130 interrupted (143 by SIGTERM, 129 by SIGHUP).
@@ -20,13 +22,101 @@ pub struct Failure {
     message: String,
     help: Vec<Help>,
     place: Option<(String, Option<u64>)>,
+    /// Reason for which the file is passed over where it was not named but found in a directory.
+    passed_over: Option<&'static str>,
 }
 
-/// Advice; with an option, it is for commands that have that option.
+/// Advice; with an option, it is for commands that have that option, or that have not.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Help {
-    option: Option<&'static str>,
-    text: String,
+    option: Option<(&'static str, bool)>,
+    text: Cow<'static, str>,
+}
+
+/// Advice that several readers give.
+pub(crate) mod help {
+    use super::Help;
+    use std::borrow::Cow;
+
+    const fn of(option: &'static str, text: &'static str) -> Help {
+        Help {
+            option: Some((option, true)),
+            text: Cow::Borrowed(text),
+        }
+    }
+
+    const fn without(option: &'static str, text: &'static str) -> Help {
+        Help {
+            option: Some((option, false)),
+            text: Cow::Borrowed(text),
+        }
+    }
+
+    const fn always(text: &'static str) -> Help {
+        Help {
+            option: None,
+            text: Cow::Borrowed(text),
+        }
+    }
+
+    pub(crate) const COLUMN_NAMES: Help = always("correct the header");
+    pub(crate) const REMOVE_LINE: Help = always("remove the line");
+    pub(crate) const OUTPUT: Help = always("choose another output with --out");
+    pub(crate) const DIRECTORY: Help = always("choose another directory with --out");
+    pub(crate) const FORCE: Help = always("name another place for it, or replace it with --force");
+    pub(crate) const START_FILES: Help = always("start from the files that nav-sim init makes");
+    pub(crate) const CHANNELS: Help = of("axes", "leave the axis out with --axes");
+    pub(crate) const FEWER_CHANNELS: Help = of("axes", "take fewer signals at a time with --axes");
+    pub(crate) const GAPS: Help = of(
+        "gaps",
+        "--gaps split takes the stretches between as recordings of their own; --gaps ignore takes the samples as evenly \
+         spaced (stamped late, none lost)",
+    );
+    pub(crate) const GAPS_ELSEWHERE: Help = without(
+        "gaps",
+        "wv and calibrate read it with --gaps split or --gaps ignore; fuse bridges gaps of up to 5 s",
+    );
+    pub(crate) const RATE: Help = of("rate-hz", "give the rate with --rate-hz");
+    pub(crate) const WRONG_RATE: Help = of("rate-hz", "leave --rate-hz out, or correct it");
+    pub(crate) const SKIP: Help = of("skip-s", "a smaller --skip-s");
+    pub(crate) const ORIGIN: Help = of("origin", "give --origin LAT_DEG,LON_DEG,H_M");
+    pub(crate) const ORIGIN_ELSEWHERE: Help = without(
+        "origin",
+        "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M",
+    );
+    pub(crate) const FIX_SIGMA: Help = of(
+        "gnss-sigma",
+        "give them for all fixes with --gnss-sigma POS[:VEL]",
+    );
+    pub(crate) const TOPIC: Help = always("--topic NAME names one (nav-sim inspect lists them)");
+    pub(crate) const STAMP: Help = of("stamp", "--stamp log takes the times of arrival");
+}
+
+/// Where in a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Place {
+    /// Anywhere in it.
+    Within,
+    /// The file as a whole: its name is the subject of the sentence.
+    Itself,
+    /// A line, from 1.
+    Line(u64),
+    /// Line and column, from 1.
+    Character(u64, u64),
+    /// A part that is no line: which.
+    Part(String),
+}
+
+impl From<u64> for Place {
+    fn from(line: u64) -> Self {
+        Self::Line(line)
+    }
+}
+
+impl From<usize> for Place {
+    fn from(line: usize) -> Self {
+        Self::Line(line as u64)
+    }
 }
 
 /// The result of a command or of a part of it.
@@ -41,6 +131,7 @@ impl Failure {
             message: message.to_string(),
             help: Vec::new(),
             place: None,
+            passed_over: None,
         }
     }
 
@@ -80,18 +171,105 @@ impl Failure {
             .maybe_hint(tip.map(str::to_owned))
     }
 
-    /// What is wrong with a file, for a command whose options `option` knows.
-    pub(crate) fn of_file(e: &FileError, option: impl Fn(Setting) -> Option<&'static str>) -> Self {
-        let failure = if e.is_system() {
-            Self::could_not(e)
-        } else {
-            Self::input(e)
+    /// Contents of a file that are refused (exit code 2).
+    pub(crate) fn contents(
+        path: impl fmt::Display,
+        place: impl Into<Place>,
+        message: impl fmt::Display,
+    ) -> Self {
+        let (message, line) = match place.into() {
+            Place::Within => (format!("{path}: {message}"), None),
+            Place::Itself => (format!("{path} {message}"), None),
+            Place::Line(line) => (format!("{path}, line {line}: {message}"), Some(line)),
+            Place::Character(line, column) => {
+                let message = format!("{path}, line {line}, column {column}: {message}");
+                (message, Some(line))
+            }
+            Place::Part(part) => (format!("{path}, {part}: {message}"), None),
         };
         Self {
-            place: Some((e.path.to_string(), e.line())),
-            ..failure
+            place: Some((path.to_string(), line)),
+            ..Self::input(message)
         }
-        .maybe_hint(e.hint_with(option))
+    }
+
+    /// A value in a column that is refused, with the reason in words that follow it.
+    pub(crate) fn cell(
+        path: &str,
+        line: u64,
+        column: &str,
+        value: impl fmt::Display,
+        reason: &str,
+    ) -> Self {
+        Self::contents(path, line, format!("column \"{column}\": {value} {reason}"))
+    }
+
+    /// A row with too few or too many values.
+    pub(crate) fn row_length(path: &str, line: u64, found: usize, expected: usize) -> Self {
+        Self::contents(
+            path,
+            line,
+            format!("{found} values, but {expected} columns"),
+        )
+        .or_hint("every row needs one value a column; was the file cut off?")
+    }
+
+    /// What the system said of a file, and what helps.
+    pub(crate) fn io(path: &Path, e: io::Error) -> Self {
+        use ErrorKind as K;
+        let kind = e.kind();
+        let advice = match kind {
+            K::NotFound => "check the path",
+            K::UnexpectedEof => "the file is cut off: copy or pack it again",
+            K::FileTooLarge => "write what comes through a pipe to a file first",
+            K::PermissionDenied | K::ReadOnlyFilesystem => {
+                "change the permissions of the file or its directory, or name another path"
+            }
+            K::IsADirectory => "name a file",
+            K::NotADirectory | K::AlreadyExists => "name another path, or move that file away",
+            K::StorageFull | K::QuotaExceeded => "make room, or name a path on another disk",
+            _ => "",
+        };
+        // what has a number of the system is its own: a file that may not grow, too
+        let is_system = e.raw_os_error().is_some() || !is_damage(kind);
+        let failure = Self {
+            code: if is_system { 1 } else { 2 },
+            ..Self::contents(path.display(), Place::Within, system_words(&e))
+        };
+        match advice {
+            "" => failure,
+            advice => failure.or_hint(advice),
+        }
+    }
+
+    /// What the system said of a file that was to be written, and what helps: another place if nothing else.
+    pub(crate) fn unwritable(path: &Path, e: io::Error) -> Self {
+        let failure = match e.kind() {
+            // its directory is there or was made: where files are the system's own, it makes none
+            ErrorKind::NotFound => {
+                let message = "the system makes no file or directory there";
+                Self::io(path, io::Error::other(message))
+            }
+            _ => Self::io(path, e),
+        };
+        if failure.help.is_empty() {
+            failure.or_hint("name another path")
+        } else {
+            failure
+        }
+    }
+
+    /// The same, where a file that was found in a directory is passed over for that reason.
+    pub(crate) fn passing_over(self, reason: &'static str) -> Self {
+        Self {
+            passed_over: Some(reason),
+            ..self
+        }
+    }
+
+    /// Reason for which the file is passed over, if it was found in a directory.
+    pub(crate) const fn passed_over(&self) -> Option<&'static str> {
+        self.passed_over
     }
 
     /// The same, of a part.
@@ -103,9 +281,9 @@ impl Failure {
     }
 
     /// With advice, in the place of other advice.
-    pub fn hint(mut self, hint: impl Into<String>) -> Self {
+    pub fn hint(mut self, hint: impl Into<Cow<'static, str>>) -> Self {
         self.help.clear();
-        self.or_option(None, hint)
+        self.or_hint(hint)
     }
 
     /// With advice, if there is any.
@@ -116,14 +294,33 @@ impl Failure {
         }
     }
 
-    /// With further advice, for commands that have an option.
-    pub(crate) fn or_option(
-        mut self,
-        option: Option<&'static str>,
-        text: impl Into<String>,
-    ) -> Self {
-        let text = text.into();
-        self.help.push(Help { option, text });
+    /// With advice, beside what it has.
+    pub(crate) fn or_hint(self, text: impl Into<Cow<'static, str>>) -> Self {
+        let (option, text) = (None, text.into());
+        self.or(Help { option, text })
+    }
+
+    /// The same, if there is any.
+    pub(crate) fn or_hint_if(self, text: Option<String>) -> Self {
+        match text {
+            Some(text) => self.or_hint(text),
+            None => self,
+        }
+    }
+
+    /// With further advice, perhaps for commands that have an option.
+    pub(crate) fn or(mut self, help: Help) -> Self {
+        self.help.push(help);
+        self
+    }
+
+    /// With the advice that a command with such options can follow.
+    pub(crate) fn for_options(mut self, has: impl Fn(&str) -> bool) -> Self {
+        let fits = |help: &mut Help| match help.option.take() {
+            None => true,
+            Some((option, is_there)) => has(option) == is_there,
+        };
+        self.help.retain_mut(fits);
         self
     }
 
@@ -133,16 +330,13 @@ impl Failure {
         self.code
     }
 
-    /// The first advice.
+    /// Advice: any one of what helps.
     #[must_use]
-    pub fn advice(&self) -> Option<&str> {
-        self.advice_with(&|_| true)
-    }
-
-    /// The first advice for a command that has these options.
-    pub(crate) fn advice_with(&self, has: &dyn Fn(&str) -> bool) -> Option<&str> {
-        let fits = |help: &&Help| help.option.is_none_or(has);
-        self.help.iter().find(fits).map(|help| help.text.as_str())
+    pub fn advice(&self) -> Option<String> {
+        let fits = |help: &&Help| help.option.is_none_or(|(_, is_there)| is_there);
+        let texts = self.help.iter().filter(fits).map(|help| help.text.as_ref());
+        let texts: Vec<&str> = texts.collect();
+        (!texts.is_empty()).then(|| texts.join(", or "))
     }
 
     /// The file that is at fault.
@@ -180,11 +374,11 @@ impl<T, E: fmt::Display> Refuse<T> for std::result::Result<T, E> {
 /// Advice on a result.
 pub(crate) trait OrHelp<T> {
     /// With advice.
-    fn or_help(self, text: impl Into<String>) -> Result<T>;
+    fn or_help(self, text: impl Into<Cow<'static, str>>) -> Result<T>;
 }
 
 impl<T, E: Into<Failure>> OrHelp<T> for std::result::Result<T, E> {
-    fn or_help(self, text: impl Into<String>) -> Result<T> {
+    fn or_help(self, text: impl Into<Cow<'static, str>>) -> Result<T> {
         self.map_err(|e| e.into().hint(text))
     }
 }
@@ -195,45 +389,34 @@ impl fmt::Display for Failure {
     }
 }
 
-impl From<FileError> for Failure {
-    fn from(e: FileError) -> Self {
-        Self::of_file(&e, |setting| Some(option_for(setting)))
-    }
+/// Whether an error of the system is one of the contents: no text, no compressed data, cut off, too long.
+pub(crate) const fn is_damage(kind: ErrorKind) -> bool {
+    use ErrorKind as K;
+    matches!(
+        kind,
+        K::InvalidData | K::InvalidInput | K::UnexpectedEof | K::FileTooLarge
+    )
 }
 
-/// How the commands say a setting that helps.
-pub(crate) const fn option_for(setting: Setting) -> &'static str {
-    match setting {
-        Setting::ColumnNames => "correct the header",
-        Setting::Channels => "leave the axis out with --axes",
-        Setting::FewerChannels => "take fewer signals at a time with --axes",
-        Setting::Gaps => {
-            "--gaps split takes the stretches between as recordings of their own; --gaps ignore takes the samples as \
-             evenly spaced (stamped late, none lost)"
+/// What the system said, in our words where it comes often, without its numbers.
+pub(crate) fn system_words(error: &io::Error) -> Cow<'static, str> {
+    use ErrorKind as K;
+    let words = match error.kind() {
+        // an error of our own says more than its kind
+        _ if error.get_ref().is_some() => return error.to_string().into(),
+        K::PermissionDenied => "the system does not permit it",
+        K::ReadOnlyFilesystem => "the disk is read-only",
+        K::IsADirectory => "it is a directory, not a file",
+        K::NotADirectory | K::AlreadyExists => "a file is where a directory is needed",
+        K::StorageFull => "no space is left on the disk",
+        K::QuotaExceeded => "no space is left within the quota",
+        _ => {
+            let text = error.to_string();
+            let words = text.split(" (os error").next().unwrap_or_default();
+            return words.to_owned().into();
         }
-        Setting::Rate => "give the rate with --rate-hz",
-        Setting::WrongRate => "leave --rate-hz out, or correct it",
-        Setting::Skip => "a smaller --skip-s",
-        Setting::Origin => "give --origin LAT_DEG,LON_DEG,H_M",
-        Setting::Output => "choose another output with --out",
-        Setting::Force => "name another place for it, or replace it with --force",
-        Setting::OutputDirectory => "choose another directory with --out",
-        Setting::RemoveLine => "remove the line",
-        Setting::FixSigma => "give them for all fixes with --gnss-sigma POS[:VEL]",
-        Setting::Topic => "--topic NAME names one (nav-sim inspect lists them)",
-        Setting::Stamp => "--stamp log takes the times of arrival",
-        Setting::StartFiles => "start from the files that nav-sim init makes",
-    }
-}
-
-/// What helps where the setting is no option of the command.
-pub(crate) const fn option_elsewhere(setting: Setting) -> &'static str {
-    match setting {
-        Setting::Origin => {
-            "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M"
-        }
-        other => option_for(other),
-    }
+    };
+    words.into()
 }
 
 impl From<OutageError> for Failure {

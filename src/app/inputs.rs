@@ -1,9 +1,9 @@
 //! Inputs that several commands share: files, settings, outages.
 
-use super::{Context, Failure, OrHelp, Refuse, Result, option_elsewhere};
+use super::{Context, Failure, OrHelp, Refuse, Result};
 use crate::formats::model_file::{self, ModelFile, TurnOn};
 use crate::formats::recordings::{self, ReadOptions};
-use crate::formats::{FileError, Setting, input, scenario_file, trajectory_file};
+use crate::formats::{input, scenario_file, trajectory_file};
 use crate::parse;
 use crate::report::readable;
 use nav_sim_navigation::ekf::{BeliefError, FilterStates, InitialSettings};
@@ -17,22 +17,9 @@ use nav_sim_signal::noise::{Model, continuous};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// What is wrong with a file, for commands without the options of recordings.
-fn refused(e: FileError) -> Failure {
-    Failure::of_file(&e, |setting| {
-        Some(match setting {
-            Setting::Gaps => {
-                "wv and calibrate read it with --gaps split or --gaps ignore; fuse bridges gaps of up to 5 s"
-            }
-            other => option_elsewhere(other),
-        })
-    })
-}
-
 /// A trajectory; where no vehicle moves so.
 pub(crate) fn trajectory(path: &Path, context: &Context<'_>) -> Result<Trajectory> {
-    let (trajectory, warnings) =
-        trajectory_file::load(path, &trajectory_file::Options::default()).map_err(refused)?;
+    let (trajectory, warnings) = trajectory_file::load(path, &trajectory_file::Options::default())?;
     warnings.iter().for_each(|doubt| context.warn(doubt));
     let (_, beyond) = examine(&trajectory, &Limits::default());
     let farthest = |e: &&Excess| e.worst / e.limit;
@@ -93,7 +80,7 @@ pub(crate) fn recordings(
         rate_hz,
         ..ReadOptions::default()
     };
-    let (recordings, report) = recordings::read(paths, &options).map_err(refused)?;
+    let (recordings, report) = recordings::read(paths, &options)?;
     report
         .all_warnings()
         .iter()
@@ -313,7 +300,7 @@ pub(crate) fn no_filter(
     let within = |failure: Failure, file: &Path| failure.within(&file.display().to_string());
     match e {
         BeliefError::Setting(_) => {
-            let failure = Failure::input(e).hint(advice);
+            let failure = Failure::input(e).hint(advice.to_owned());
             settings.into_iter().fold(failure, within)
         }
         _ => within(Failure::input(e), model),

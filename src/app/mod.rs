@@ -11,6 +11,6 @@ pub mod reading;
 pub use command::{Answer, Answered, Asked, Command, Out, OutputFile, answered};
 pub use context::{Context, DEFAULT_SEED, Front};
 pub use failure::{Failure, Result};
-pub(crate) use failure::{OrHelp, Refuse, option_elsewhere};
+pub(crate) use failure::{OrHelp, Place, Refuse, help, is_damage, system_words};
 
 pub use manifest::{Input, Manifest};

@@ -2,7 +2,6 @@
 
 use super::{Failure, Session, parse, read};
 use crate::commands::batch::Study;
-use crate::commands::fuse::refused;
 use crate::commands::inspect::inspect;
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
@@ -204,7 +203,7 @@ fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
     let ((fixes, remarks), unsaid) = match read {
         Err(e) => match read_gnss(path, Some(&given), None, None) {
             Ok(read) => (read, ", without standard deviations (fuse --gnss-sigma)"),
-            Err(_) => return Err(refused(e)),
+            Err(_) => return Err(e),
         },
         Ok(read) => read,
     };
@@ -228,7 +227,7 @@ fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
 }
 
 fn imu(path: &Path, session: &Session) -> Result<String, Failure> {
-    let imu = read_imu(path, None, None).map_err(refused)?;
+    let imu = read_imu(path, None, None)?;
     imu.remarks
         .iter()
         .for_each(|remark| session.printer.remark(remark));

@@ -6,7 +6,7 @@ use crate::app::Answer;
 use crate::commands::batch::{BatchRequest, Outcome};
 use crate::commands::compare::Comparison;
 use crate::formats::atomic::{Existing, Written};
-use crate::formats::{FileError, atomic, model_file};
+use crate::formats::{atomic, model_file};
 use crate::paper::{StudyCurves, paper_figures, paper_page};
 use crate::report::{self, TrajectorySeries, WIDTH};
 use clap::Parser;
@@ -345,7 +345,7 @@ fn figures(found: &Comparison, out: &str, session: &Session) -> Result<(), Failu
             .map(move |estimator| (scenario, estimator))
     }) {
         let path = Path::new(out).join(format!("models/{scenario}_{estimator}.wv.json"));
-        let text = std::fs::read_to_string(&path).map_err(|e| FileError::io(&path, e))?;
+        let text = std::fs::read_to_string(&path).map_err(|e| Failure::io(&path, e))?;
         let file = serde_json::from_str(&text).map_err(Failure::could_not)?;
         let (scenario, estimator) = ((*scenario).to_owned(), (*estimator).to_owned());
         curves.push(StudyCurves {
@@ -359,7 +359,7 @@ fn figures(found: &Comparison, out: &str, session: &Session) -> Result<(), Failu
     let mut figures = paper_figures(&curves, &track, &found.outages);
     figures.push(found.figure());
     let directory = figures_of(out);
-    std::fs::create_dir_all(&directory).map_err(|e| FileError::io(&directory, e))?;
+    std::fs::create_dir_all(&directory).map_err(|e| Failure::io(&directory, e))?;
     for figure in &figures {
         atomic::write(&directory.join(figure.file_name()), figure.svg())?;
     }

@@ -22,7 +22,7 @@ use crate::app::Asked;
 use crate::commands::with_commands;
 use crate::parse;
 use clap::error::{ContextKind, ErrorKind};
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use drive::drive;
 use std::error::Error;
 use std::ffi::{OsStr, OsString};
@@ -253,10 +253,22 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
     match outcome {
         Ok(()) => 0,
         Err(failure) => {
-            printer.failure(&failure);
-            failure.code()
+            let code = failure.code();
+            printer.failure(&failure.for_options(|option| has_option(&matches, option)));
+            code
         }
     }
+}
+
+/// Whether the command of some words has an option.
+fn has_option(mut words: &ArgMatches, option: &str) -> bool {
+    let mut known = command();
+    while let Some((name, inner)) = words.subcommand() {
+        known = known.find_subcommand(name).cloned().unwrap_or_default();
+        words = inner;
+    }
+    let mut options = known.get_arguments().filter_map(|a| a.get_long());
+    options.any(|long| long == option)
 }
 
 #[cfg(test)]

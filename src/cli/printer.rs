@@ -2,8 +2,8 @@
 
 use super::Failure;
 use super::common::{Color, Common};
+use crate::app::system_words;
 use crate::formats::fusion_files::Remark;
-use crate::formats::system_words;
 use nav_sim_document::{Importance, Note, turns};
 use std::borrow::Cow;
 use std::io::{ErrorKind, IsTerminal, Write};
@@ -125,7 +125,7 @@ impl Printer {
             text += &format!(
                 "\n{} {}\n",
                 self.painted("hint:", "\x1b[1;36m"),
-                safe(advice)
+                safe(&advice)
             );
         }
         let _ = std::io::stderr().write_all(text.as_bytes());

@@ -2,7 +2,6 @@
 
 use crate::app::inputs::files;
 use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
-use crate::formats::FileError;
 use crate::formats::atomic::Written;
 use crate::formats::datasheet::{CATALOGUE, Datasheet, Entry, Figure, Quantity, catalogued, read};
 use crate::formats::model_file::{self, ModelFile};
@@ -299,7 +298,7 @@ fn left_out(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
     offset.into_iter().chain(scale).collect()
 }
 
-fn units() -> std::result::Result<Vec<(&'static str, Datasheet)>, FileError> {
+fn units() -> std::result::Result<Vec<(&'static str, Datasheet)>, Failure> {
     let units = CATALOGUE
         .iter()
         .filter_map(|(name, _)| Some((*name, catalogued(name)?)));
@@ -310,7 +309,7 @@ fn units() -> std::result::Result<Vec<(&'static str, Datasheet)>, FileError> {
 ///
 /// # Errors
 /// An entry that cannot be read.
-fn catalogue_text() -> std::result::Result<String, FileError> {
+fn catalogue_text() -> std::result::Result<String, Failure> {
     let mut lines = Vec::new();
     for (unit, sheet) in units()? {
         let (class, name) = (sheet.class.as_deref(), sheet.name.as_deref());
@@ -334,7 +333,7 @@ fn catalogue_text() -> std::result::Result<String, FileError> {
 ///
 /// # Errors
 /// An entry that cannot be read.
-pub fn catalogue_json() -> std::result::Result<Value, FileError> {
+pub fn catalogue_json() -> std::result::Result<Value, Failure> {
     let figure = |e: &Entry| json!({ "sensor": e.sensor.name(), "figure": e.figure.key(), "given": e.quantity.given, "source": e.source });
     let unit = |(unit, sheet): (&str, Datasheet)| {
         let figures: Vec<Value> = sheet.entries.iter().map(figure).collect();

@@ -3,7 +3,7 @@
 use crate::app::inputs::files;
 use crate::app::reading::LogRequest;
 use crate::app::{Answer, Command, Context, Result};
-use crate::formats::FileError;
+use crate::formats::Failure;
 use crate::formats::logs::{self, LogOptions};
 use nav_sim_document::{Cell, Document, Importance, Table, Tone, shortest, six_digits};
 use nav_sim_logs::{Channel, Content, Error, Log};
@@ -99,7 +99,7 @@ pub struct InspectedChannel {
 ///
 /// # Errors
 /// When the file is not a log that is read, or is damaged before its end.
-pub fn inspect(path: &Path, options: &LogOptions) -> std::result::Result<Inspection, FileError> {
+pub fn inspect(path: &Path, options: &LogOptions) -> std::result::Result<Inspection, Failure> {
     let log = logs::open(path)?;
     let channels = log
         .channels()

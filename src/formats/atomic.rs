@@ -5,7 +5,7 @@
 //! A file takes the place of an earlier result of its own kind; `--force` is for one of another kind.
 //! A directory takes the place of the same run; `--force` is for one of another configuration, inputs or seed.
 
-use super::{FileError, Place, Setting, source};
+use super::{Failure, Place, help, source};
 use std::collections::BTreeSet;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, BufWriter, ErrorKind, Read, Write};
@@ -169,15 +169,15 @@ fn abandoned(path: &Path, ending: &str) -> Vec<PathBuf> {
 ///
 /// # Errors
 /// As [`AtomicFile::create`] and [`AtomicFile::commit`].
-pub(crate) fn write(destination: &Path, contents: impl AsRef<[u8]>) -> Result<(), FileError> {
+pub(crate) fn write(destination: &Path, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
     filled(destination, contents.as_ref())?.commit()
 }
 
 /// A file that is written but does not have its name yet.
-pub(crate) fn filled(destination: &Path, contents: &[u8]) -> Result<AtomicFile, FileError> {
+pub(crate) fn filled(destination: &Path, contents: &[u8]) -> Result<AtomicFile, Failure> {
     let mut file = AtomicFile::create(destination)?;
     let written = file.write_all(contents).and_then(|()| file.flush());
-    written.map_err(|e| FileError::io(destination, e))?;
+    written.map_err(|e| Failure::io(destination, e))?;
     Ok(file)
 }
 
@@ -197,8 +197,8 @@ impl AtomicFile {
     ///
     /// # Errors
     /// When the directory cannot be made or written to.
-    pub(crate) fn create(destination: &Path) -> Result<Self, FileError> {
-        Self::open(destination).map_err(|e| FileError::unwritable(destination, e))
+    pub(crate) fn create(destination: &Path) -> Result<Self, Failure> {
+        Self::open(destination).map_err(|e| Failure::unwritable(destination, e))
     }
 
     fn open(destination: &Path) -> io::Result<Self> {
@@ -228,7 +228,7 @@ impl AtomicFile {
     ///
     /// # Errors
     /// When the disk is full or the rename is refused; nothing is left then.
-    pub(crate) fn commit(mut self) -> Result<(), FileError> {
+    pub(crate) fn commit(mut self) -> Result<(), Failure> {
         let mut finish = || {
             self.file.flush()?;
             let Some(temporary) = &mut self.temporary else {
@@ -237,7 +237,7 @@ impl AtomicFile {
             self.file.get_ref().sync_all()?;
             temporary.rename(&self.destination)
         };
-        finish().map_err(|e| FileError::io(&self.destination, e))
+        finish().map_err(|e| Failure::io(&self.destination, e))
     }
 }
 
@@ -273,7 +273,7 @@ impl AtomicDir {
     ///
     /// # Errors
     /// When the destination is a file, or a directory cannot be made.
-    pub(crate) fn create(destination: &Path) -> Result<Self, FileError> {
+    pub(crate) fn create(destination: &Path) -> Result<Self, Failure> {
         let make = || {
             let path = match fs::metadata(destination) {
                 Ok(there) if !there.is_dir() => return Err(ErrorKind::NotADirectory.into()),
@@ -284,7 +284,7 @@ impl AtomicDir {
             fs::create_dir_all(parent_of(&path))?;
             Temporary::beside(&path, |path| fs::create_dir(path))
         };
-        let ((), staging) = make().map_err(|e| FileError::unwritable(destination, e))?;
+        let ((), staging) = make().map_err(|e| Failure::unwritable(destination, e))?;
         Ok(Self {
             destination: destination.into(),
             staging,
@@ -304,11 +304,7 @@ impl AtomicDir {
     ///
     /// # Errors
     /// When the system refuses.
-    pub(crate) fn write(
-        &mut self,
-        name: &str,
-        contents: impl AsRef<[u8]>,
-    ) -> Result<(), FileError> {
+    pub(crate) fn write(&mut self, name: &str, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
         self.write_parts(name, [contents])
     }
 
@@ -320,7 +316,7 @@ impl AtomicDir {
         &mut self,
         name: &str,
         parts: impl IntoIterator<Item = impl AsRef<[u8]>>,
-    ) -> Result<(), FileError> {
+    ) -> Result<(), Failure> {
         let path = self.path(name);
         let write = || {
             let mut file = BufWriter::new(File::create(&path)?);
@@ -329,14 +325,14 @@ impl AtomicDir {
                 .try_for_each(|part| file.write_all(part.as_ref()))?;
             file.flush()
         };
-        write().map_err(|e| FileError::io(&self.destination.join(name), e))
+        write().map_err(|e| Failure::io(&self.destination.join(name), e))
     }
 
     /// Flushes the declared files to the disk and gives them their names.
     ///
     /// # Errors
     /// When a declared file was not written, the disk is full, or a rename is refused.
-    pub(crate) fn commit(mut self) -> Result<(), FileError> {
+    pub(crate) fn commit(mut self) -> Result<(), Failure> {
         for name in &self.names {
             // Windows flushes through a handle for writing only
             let mut options = File::options();
@@ -345,13 +341,13 @@ impl AtomicDir {
                 .write(cfg!(windows))
                 .open(self.staging.path.join(name));
             file.and_then(|file| file.sync_all())
-                .map_err(|e| FileError::io(&self.destination.join(name), e))?;
+                .map_err(|e| Failure::io(&self.destination.join(name), e))?;
         }
         let moved = match self.destination.is_dir() {
             true => self.replace(),
             false => self.staging.rename(&self.destination),
         };
-        moved.map_err(|e| FileError::io(&self.destination, e))
+        moved.map_err(|e| Failure::io(&self.destination, e))
     }
 
     /// From the first rename on the new files are the ones that count: who is killed later leaves a directory
@@ -427,17 +423,17 @@ const MARKER: &str = ".claim";
 
 impl Claim {
     /// Claims outputs in the place that `shown` names.
-    fn new(shown: &Path, marker: &Path, outputs: Vec<PathBuf>) -> Result<Self, FileError> {
+    fn new(shown: &Path, marker: &Path, outputs: Vec<PathBuf>) -> Result<Self, Failure> {
         let mut claimed = locked(&CLAIMED);
         if outputs.iter().any(|output| claimed.contains(output)) {
             let why = "is another output of the same command";
-            return Err(refused(shown, why).setting(Setting::Output));
+            return Err(refused(shown, why).or(help::OUTPUT));
         }
         let marked = fs::create_dir_all(parent_of(marker)).and_then(|()| Temporary::marker(marker));
-        let Some(marked) = marked.map_err(|e| FileError::unwritable(shown, e))? else {
+        let Some(marked) = marked.map_err(|e| Failure::unwritable(shown, e))? else {
             return Err(refused(shown, "is being written by another nav-sim")
-                .setting(Setting::Output)
-                .advice("wait until that is done"));
+                .or(help::OUTPUT)
+                .or_hint("wait until that is done"));
         };
         claimed.extend(outputs.iter().cloned());
         Ok(Self {
@@ -446,7 +442,7 @@ impl Claim {
         })
     }
 
-    fn of_directory(directory: &Path, files: &[impl AsRef<str>]) -> Result<Self, FileError> {
+    fn of_directory(directory: &Path, files: &[impl AsRef<str>]) -> Result<Self, Failure> {
         loop {
             let is_there = directory.is_dir();
             let marker = match is_there {
@@ -473,8 +469,8 @@ impl Drop for Claim {
     }
 }
 
-fn refused(path: &Path, why: &str) -> FileError {
-    FileError::contents(path.display().to_string(), Place::Itself, why)
+fn refused(path: &Path, why: &str) -> Failure {
+    Failure::contents(path.display().to_string(), Place::Itself, why)
 }
 
 fn marker_beside(path: &Path) -> PathBuf {
@@ -495,7 +491,7 @@ fn resolved(path: &Path) -> PathBuf {
 pub(crate) fn claim_file<'a>(
     output: &Path,
     inputs: impl IntoIterator<Item = &'a Path>,
-) -> Result<Claim, FileError> {
+) -> Result<Claim, Failure> {
     guard_inputs(output, inputs)?;
     AtomicFile::create(output)?; // dropped at once
     if fs::metadata(output).is_ok_and(|m| !m.is_file()) {
@@ -521,22 +517,20 @@ pub(crate) fn claim_result<'a>(
     inputs: impl IntoIterator<Item = &'a Path>,
     kind: Written,
     existing: Existing,
-) -> Result<Claim, FileError> {
+) -> Result<Claim, Failure> {
     let claim = claim_file(output, inputs)?;
     replaceable(output, kind.found(output), existing)?;
     Ok(claim)
 }
 
-fn replaceable(path: &Path, found: Found, existing: Existing) -> Result<(), FileError> {
+fn replaceable(path: &Path, found: Found, existing: Existing) -> Result<(), Failure> {
     match found {
         Found::Foreign => {
             let why = "is not of this command: it is not replaced";
-            let error = refused(path, why).setting(Setting::Output);
-            Err(error.advice("move it away"))
+            let error = refused(path, why).or(help::OUTPUT);
+            Err(error.or_hint("move it away"))
         }
-        Found::Other(why) if existing == Existing::Keep => {
-            Err(refused(path, why).setting(Setting::Force))
-        }
+        Found::Other(why) if existing == Existing::Keep => Err(refused(path, why).or(help::FORCE)),
         Found::Other(_) | Found::Same => Ok(()),
     }
 }
@@ -545,14 +539,14 @@ fn replaceable(path: &Path, found: Found, existing: Existing) -> Result<(), File
 fn guard_inputs<'a>(
     output: &Path,
     inputs: impl IntoIterator<Item = &'a Path>,
-) -> Result<(), FileError> {
+) -> Result<(), Failure> {
     let target = output.canonicalize().ok();
     let is_it = |input: &Path| target.is_some() && input.canonicalize().ok() == target;
     match inputs.into_iter().any(is_it) {
         false => Ok(()),
         true => {
             let why = "is an input of this command and would be overwritten";
-            Err(refused(output, why).setting(Setting::Output))
+            Err(refused(output, why).or(help::OUTPUT))
         }
     }
 }
@@ -579,8 +573,8 @@ pub(crate) fn claim_directory<'a>(
     files: &[impl AsRef<str>],
     inputs: impl Iterator<Item = &'a Path> + Clone,
     existing: Existing,
-    recognise: impl FnOnce(&str) -> Result<Found, FileError>,
-) -> Result<Claim, FileError> {
+    recognise: impl FnOnce(&str) -> Result<Found, Failure>,
+) -> Result<Claim, Failure> {
     for name in files {
         guard_inputs(&directory.join(name.as_ref()), inputs.clone())?;
     }

@@ -2,12 +2,11 @@
 //! writes (the classical curve of a signal is GMWM's, the robust one RGMWM's).
 
 use super::table::{Asked, Dictionary, Numbers, Quantity, parse as parse_table};
-use super::{FileError, Kind, Place, source};
+use super::{Failure, Place, source};
 use crate::report::{CurvesFile, FittedCurve, SignalsFile};
 use nav_sim_signal::imu::{Axis, Sensor};
 use nav_sim_signal::wavelet::{Convention, Curve, QuantizationResponse, Tuning};
 use std::fmt::Display;
-use std::io::ErrorKind;
 use std::path::Path;
 
 /// A curve and what it is of.
@@ -36,8 +35,8 @@ fn refused(
     column: &str,
     value: impl Display,
     expected: &str,
-) -> FileError {
-    FileError::contents(
+) -> Failure {
+    Failure::contents(
         path,
         place.clone(),
         format!("{column} = {value} is not {expected}"),
@@ -48,25 +47,24 @@ fn refused(
 ///
 /// # Errors
 /// When it cannot be read, or is no curve file.
-pub(crate) fn read(path: &Path) -> Result<Vec<NamedCurve>, FileError> {
-    let text = source::text(path).map_err(|e| FileError::io(path, e));
+pub(crate) fn read(path: &Path) -> Result<Vec<NamedCurve>, Failure> {
+    let text = source::text(path).map_err(|e| Failure::io(path, e));
     let curves = text.and_then(|text| parse(&path.display().to_string(), &text));
-    curves.map_err(|e| match &e.kind {
-        Kind::System(source) if source.kind() == ErrorKind::NotFound => e.advice("check the path"),
-        _ if e.is_system() => e,
-        Kind::Header(_) => e.advice_instead(LAYOUT),
-        _ => e.advice(LAYOUT),
+    // what the system refuses is no matter of the layout
+    curves.map_err(|e| match e.code() {
+        1 => e,
+        _ => e.or_hint(LAYOUT),
     })
 }
 
-fn parse(path: &str, text: &str) -> Result<Vec<NamedCurve>, FileError> {
+fn parse(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
     let curves = if text.trim_start().starts_with('{') {
         json(path, text)?
     } else {
         vec![csv(path, text)?]
     };
     if curves.iter().any(|c| c.curve.levels.is_empty()) || curves.is_empty() {
-        return Err(FileError::contents(path, Place::Within, "no curve in it"));
+        return Err(Failure::contents(path, Place::Within, "no curve in it"));
     }
     Ok(curves)
 }
@@ -82,12 +80,12 @@ const DICTIONARY: Dictionary = Dictionary {
     bare: &[],
     array: &[],
     numbers: Numbers::Finite,
-    advice: LAYOUT,
+    advice: "the first line names them",
     empty: "no rows in it",
     bad_cell: |error, _| error,
 };
 
-fn csv(path: &str, text: &str) -> Result<NamedCurve, FileError> {
+fn csv(path: &str, text: &str) -> Result<NamedCurve, Failure> {
     let table = parse_table(path, text, &DICTIONARY, &Asked::default())?;
     let names = QUANTITIES.each_ref().map(|quantity| quantity.name);
     table.require(names, &DICTIONARY)?;
@@ -112,13 +110,13 @@ struct Signals {
     signals: Option<serde::de::IgnoredAny>,
 }
 
-fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, FileError> {
-    let syntax = |e: serde_json::Error| FileError::contents(path, e.line(), e.to_string());
+fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
+    let syntax = |e: serde_json::Error| Failure::contents(path, e.line(), e.to_string());
     let is_of_wv = serde_json::from_str::<Signals>(text)
         .map_err(syntax)?
         .signals
         .is_some();
-    let head = Place::Part("head".into());
+    let head = Place::Part("head".to_owned());
     let file = if is_of_wv {
         let file: SignalsFile = serde_json::from_str(text).map_err(syntax)?;
         quantization(path, &head, Some(file.efficiency))?;
@@ -136,7 +134,7 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, FileError> {
         ));
     }
     if !(file.rate_hz.is_finite() && file.rate_hz > 0.0) {
-        let rate = Place::Part("rate".into());
+        let rate = Place::Part("rate".to_owned());
         return Err(refused(
             path,
             &rate,
@@ -157,15 +155,15 @@ fn named_curve(
     number: usize,
     entry: &FittedCurve,
     rate_hz: f64,
-) -> Result<NamedCurve, FileError> {
+) -> Result<NamedCurve, Failure> {
     let (tau, wv, edof) = (entry.tau_s.len(), entry.wv.len(), entry.edof.len());
     if tau != wv || tau != edof {
         let message = format!(
             "curve {number} has {tau} scales, {wv} wavelet variances and {edof} degrees of freedom"
         );
-        return Err(FileError::contents(path, Place::Within, message));
+        return Err(Failure::contents(path, Place::Within, message));
     }
-    let place = Place::Part(format!("curve {number}").into());
+    let place = Place::Part(format!("curve {number}"));
     let sensor = entry.sensor.parse();
     let sensor =
         sensor.map_err(|_| refused(path, &place, "sensor", &entry.sensor, "accel or gyro"))?;
@@ -178,7 +176,7 @@ fn named_curve(
         ..Curve::default()
     };
     for i in 0..tau {
-        let place = Place::Part(format!("curve {number}, scale {}", i + 1).into());
+        let place = Place::Part(format!("curve {number}, scale {}", i + 1));
         push(
             &mut curve,
             path,
@@ -203,7 +201,7 @@ fn quantization(
     path: &str,
     place: &Place,
     efficiency: Option<f64>,
-) -> Result<Option<QuantizationResponse>, FileError> {
+) -> Result<Option<QuantizationResponse>, Failure> {
     let Some(efficiency) = efficiency else {
         return Ok(None);
     };
@@ -227,7 +225,7 @@ fn push(
     path: &str,
     place: &Place,
     [tau, wv, edof]: [f64; 3],
-) -> Result<(), FileError> {
+) -> Result<(), Failure> {
     let refuse = |column, value: f64, expected| Err(refused(path, place, column, value, expected));
     let level = tau.log2().round();
     // Scales in seconds come back from a division by the rate.

@@ -4,7 +4,7 @@
 //! They carry the uncertainty of a calibration on into what is computed from its model.
 
 use super::model_file::ModelFile;
-use super::{FileError, source};
+use super::{Failure, source};
 use nav_sim_calibration::Outcome;
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::continuous::{self, RateError};
@@ -108,16 +108,16 @@ fn usable_as(
 ///
 /// # Errors
 /// When it cannot be read, or is not of this layout.
-pub fn read(model: &Path) -> Result<Option<DrawsFile>, FileError> {
+pub fn read(model: &Path) -> Result<Option<DrawsFile>, Failure> {
     let path = beside(model);
     let text = match source::text(&path) {
         Ok(text) => text,
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
-        Err(e) => return Err(FileError::io(&path, e)),
+        Err(e) => return Err(Failure::io(&path, e)),
     };
     let refused = |line: usize, message: String| {
-        FileError::contents(path.display().to_string(), line as u64, message)
-            .advice("calibrate again, or remove the file")
+        Failure::contents(path.display().to_string(), line as u64, message)
+            .or_hint("calibrate again, or remove the file")
     };
     let file: DrawsFile =
         serde_json::from_str(&text).map_err(|e| refused(e.line(), e.to_string()))?;

@@ -1,7 +1,7 @@
 //! What kind of file a path holds, by its ending and its contents.
 
 use super::fusion_files::{bare_row, is_nmea, is_rtklib};
-use super::{FileError, logs, source};
+use super::{Failure, logs, source};
 use flate2::read::GzDecoder;
 use std::io::Read;
 use std::path::Path;
@@ -44,7 +44,7 @@ const HEAD: u64 = 1 << 20;
 ///
 /// # Errors
 /// When the system refuses.
-pub(crate) fn of(path: &Path) -> Result<FileKind, FileError> {
+pub(crate) fn of(path: &Path) -> Result<FileKind, Failure> {
     let name = path.to_string_lossy().to_lowercase();
     if path.is_dir() || name.ends_with(".npy") {
         return Ok(FileKind::Recording);
@@ -61,7 +61,7 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, FileError> {
     {
         return Ok(FileKind::Trajectory);
     }
-    let error = |e| FileError::io(path, e);
+    let error = |e| Failure::io(path, e);
     let file = source::open(path).map_err(error)?;
     let is_compressed = plain != name;
     let reader: Box<dyn Read> = if is_compressed {

@@ -1,6 +1,6 @@
 //! Files as inputs: which ones are meant, and their fingerprints.
 
-use super::{FileError, hash};
+use super::{Failure, hash};
 use crate::app::Input;
 use std::path::{Path, PathBuf};
 
@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// When the system refuses.
-pub(crate) fn input(role: &str, path: &Path) -> Result<Input, FileError> {
-    let blake3 = hash::as_read(path).map_err(|e| FileError::io(path, e))?;
+pub(crate) fn input(role: &str, path: &Path) -> Result<Input, Failure> {
+    let blake3 = hash::as_read(path).map_err(|e| Failure::io(path, e))?;
     Ok(Input {
         role: role.to_owned(),
         path: path.display().to_string(),
@@ -21,14 +21,14 @@ pub(crate) fn input(role: &str, path: &Path) -> Result<Input, FileError> {
 ///
 /// # Errors
 /// When a directory cannot be read.
-pub(crate) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
+pub(crate) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut files = Vec::new();
     for path in paths {
         if !path.is_dir() {
             files.push(path.clone());
             continue;
         }
-        let refused = |e| FileError::io(path, e);
+        let refused = |e| Failure::io(path, e);
         let entries = std::fs::read_dir(path).map_err(refused)?;
         let entries = entries.collect::<Result<Vec<_>, _>>().map_err(refused)?;
         let mut within: Vec<PathBuf> = entries

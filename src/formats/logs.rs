@@ -1,6 +1,6 @@
 //! Logs of robots, flight controllers and receivers ([`nav_sim_logs`]), among the files that are read.
 
-use super::{FileError, Place, Setting};
+use super::{Failure, Place, help};
 use nav_sim_logs::{Damage, Error, HEAD, Kind, Log, Stamp, recognise};
 use std::fs::File;
 use std::io::Read;
@@ -31,28 +31,28 @@ pub(crate) fn kind_of(path: &Path) -> Option<Kind> {
 ///
 /// # Errors
 /// When it is not of a format that is read, or is damaged before its end.
-pub(crate) fn open(path: &Path) -> Result<Log, FileError> {
+pub(crate) fn open(path: &Path) -> Result<Log, Failure> {
     Log::open(path).map_err(|e| refused(path, e))
 }
 
 /// The refusal of a log, with what helps.
-pub(crate) fn refused(path: &Path, error: Error) -> FileError {
+pub(crate) fn refused(path: &Path, error: Error) -> Failure {
     let hint = error.hint();
     let shown = path.display().to_string();
     match error {
-        Error::Io(source) => FileError::io(path, source),
+        Error::Io(source) => Failure::io(path, source),
         Error::SeveralTopics { .. } | Error::NoTopic { .. } => {
-            FileError::contents(shown, Place::Within, error.to_string()).setting(Setting::Topic)
+            Failure::contents(shown, Place::Within, error.to_string()).or(help::TOPIC)
         }
         Error::TimeBack { .. } => {
-            FileError::contents(shown, Place::Within, error.to_string()).setting(Setting::Stamp)
+            Failure::contents(shown, Place::Within, error.to_string()).or(help::STAMP)
         }
         Error::NotRead(_) => {
-            let refusal = FileError::contents(shown, Place::Itself, format!("is {error}"));
-            refusal.advice_if(hint.map(|command| format!("convert it: {command}")))
+            let refusal = Failure::contents(shown, Place::Itself, format!("is {error}"));
+            refusal.or_hint_if(hint.map(|command| format!("convert it: {command}")))
         }
-        _ => FileError::contents(shown, Place::Within, error.to_string())
-            .advice_if(hint.map(str::to_owned)),
+        _ => Failure::contents(shown, Place::Within, error.to_string())
+            .or_hint_if(hint.map(str::to_owned)),
     }
 }
 

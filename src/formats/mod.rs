@@ -5,7 +5,6 @@ pub mod contamination_file;
 pub(crate) mod curve_file;
 pub mod datasheet;
 pub mod draws_file;
-mod error;
 pub(crate) mod file_kind;
 pub(crate) mod fusion_files;
 pub(crate) mod hash;
@@ -24,6 +23,4 @@ pub(crate) mod table;
 pub(crate) mod toml_file;
 pub mod trajectory_file;
 
-pub use error::FileError;
-pub(crate) use error::system_words;
-pub(crate) use error::{Kind, Place, Setting};
+pub(crate) use crate::app::{Failure, Place, help};

@@ -1,7 +1,7 @@
 //! Run directories read back, as far as comparisons need them.
 
 use super::run_tables::{REPEAT, parse_epochs, parse_runs};
-use super::{FileError, Place, atomic, hash, source};
+use super::{Failure, Place, atomic, hash, source};
 use crate::app::Manifest;
 use crate::commands::run::RunOrigin;
 use nav_sim_navigation::metrics::{EpochRow, Measured, PerState, Verdict};
@@ -31,7 +31,7 @@ pub(crate) struct RunDirectory {
 ///
 /// # Errors
 /// The file, and what is wrong with it.
-pub(crate) fn read(directory: &Path) -> Result<RunDirectory, FileError> {
+pub(crate) fn read(directory: &Path) -> Result<RunDirectory, Failure> {
     atomic::recover(directory);
     let (manifest, origin) = manifest(directory)?;
     let (path, epochs_text) = text(directory, "epochs.csv")?;
@@ -76,7 +76,7 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, FileError> {
 }
 
 /// The verdict, and the intervals that the calibration leaves outage by outage, from the summary.
-fn found(directory: &Path, manifest: &Manifest) -> Result<(Verdict, Vec<OpenEnds>), FileError> {
+fn found(directory: &Path, manifest: &Manifest) -> Result<(Verdict, Vec<OpenEnds>), Failure> {
     #[derive(serde::Deserialize)]
     struct Found {
         verdict: Verdict,
@@ -105,20 +105,20 @@ fn as_written(
     manifest: &Manifest,
     name: &str,
     text: &str,
-) -> Result<(), FileError> {
+) -> Result<(), Failure> {
     match manifest.outputs.get(name) {
         Some(blake3) if *blake3 != hash::of_bytes(text.as_bytes()) => {
             let path = directory.join(name).display().to_string();
             let message =
                 "is not what its manifest.json says (BLAKE3): it is damaged, or was changed";
-            Err(FileError::contents(path, Place::Within, message).advice(REPEAT))
+            Err(Failure::contents(path, Place::Within, message).or_hint(REPEAT))
         }
         _ => Ok(()),
     }
 }
 
 /// The run that stands for what covariance analysis expects, from its epochs and its summary.
-fn expected_run(path: &str, summary: &str, epochs: &[EpochRow]) -> Result<RunRecord, FileError> {
+fn expected_run(path: &str, summary: &str, epochs: &[EpochRow]) -> Result<RunRecord, Failure> {
     #[derive(serde::Deserialize)]
     struct Expected {
         outages: Vec<ExpectedOutage>,
@@ -150,7 +150,7 @@ fn expected_run(path: &str, summary: &str, epochs: &[EpochRow]) -> Result<RunRec
     })
 }
 
-fn manifest(directory: &Path) -> Result<(Manifest, RunOrigin), FileError> {
+fn manifest(directory: &Path) -> Result<(Manifest, RunOrigin), Failure> {
     let (path, json) = text(directory, "manifest.json")?;
     let value: serde_json::Value = serde_json::from_str(&json).map_err(|e| not_json(&path, &e))?;
     let (found, expected) = (&value["schema_version"], Manifest::SCHEMA_VERSION);
@@ -163,28 +163,27 @@ fn manifest(directory: &Path) -> Result<(Manifest, RunOrigin), FileError> {
         };
     }
     let message = format!("\"schema_version\" is {found}; this nav-sim reads {expected}");
-    Err(FileError::contents(path, Place::Within, message)
-        .advice("repeat the run with this version"))
+    Err(Failure::contents(path, Place::Within, message).or_hint("repeat the run with this version"))
 }
 
-fn not_json(path: &str, e: &serde_json::Error) -> FileError {
+fn not_json(path: &str, e: &serde_json::Error) -> Failure {
     let message = e
         .to_string()
         .split(" at line ")
         .next()
         .unwrap_or_default()
         .to_owned();
-    FileError::contents(path, e.line(), message).advice(REPEAT)
+    Failure::contents(path, e.line(), message).or_hint(REPEAT)
 }
 
-fn text(directory: &Path, name: &str) -> Result<(String, String), FileError> {
+fn text(directory: &Path, name: &str) -> Result<(String, String), Failure> {
     let path = directory.join(name);
     match source::text(&path) {
         Ok(text) => Ok((path.display().to_string(), text)),
         Err(source) => {
             let unfinished = "not a finished run directory: make one with `nav-sim run … -o DIR`";
             let is_missing = source.kind() == std::io::ErrorKind::NotFound;
-            Err(FileError::io(&path, source).advice_if(is_missing.then(|| unfinished.to_owned())))
+            Err(Failure::io(&path, source).or_hint_if(is_missing.then(|| unfinished.to_owned())))
         }
     }
 }

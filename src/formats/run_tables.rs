@@ -1,6 +1,6 @@
 //! `epochs.csv` and `runs.csv` of a run directory, read back.
 
-use super::FileError;
+use super::Failure;
 use super::table::{Asked, Column, Dictionary, Numbers, Quantity, Table, parse};
 use nav_sim_navigation::metrics::EpochRow;
 use nav_sim_navigation::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, RunRecord};
@@ -63,8 +63,8 @@ pub(super) const REPEAT: &str = "repeat the run, or put back its files";
 ///
 /// # Errors
 /// A missing or doubled column, or a value that is not a finite number (unless no run is left at the epoch).
-pub(super) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, FileError> {
-    let read = || -> Result<Vec<EpochRow>, FileError> {
+pub(super) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, Failure> {
+    let read = || -> Result<Vec<EpochRow>, Failure> {
         let table = parse(path, text, &dictionary(), &Asked::default())?;
         let [asee, rmse] = [states(&table, "asee_")?, states(&table, "rmse_")?];
         let [t_s, nees, coverage] = named(&table, ["t_s", "nees", "coverage"])?;
@@ -89,12 +89,12 @@ pub(super) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, File
 ///
 /// # Errors
 /// A missing column or a value that is not a number.
-pub(super) fn parse_runs(path: &str, text: &str) -> Result<Vec<RunRecord>, FileError> {
+pub(super) fn parse_runs(path: &str, text: &str) -> Result<Vec<RunRecord>, Failure> {
     let table = parse(path, text, &dictionary(), &Asked::default());
     table.and_then(|table| runs(&table)).map_err(damaged)
 }
 
-fn runs(table: &Table) -> Result<Vec<RunRecord>, FileError> {
+fn runs(table: &Table) -> Result<Vec<RunRecord>, Failure> {
     let of_run = [
         "run",
         "diverged",
@@ -158,23 +158,23 @@ fn runs(table: &Table) -> Result<Vec<RunRecord>, FileError> {
 fn named<'a, const N: usize>(
     table: &'a Table,
     names: [&str; N],
-) -> Result<[&'a Column; N], FileError> {
+) -> Result<[&'a Column; N], Failure> {
     table.require(names, &dictionary())?;
     table.all(names).ok_or_else(|| table.refused(REPEAT))
 }
 
-fn states<'a>(table: &'a Table, prefix: &str) -> Result<[&'a Column; REPORTED], FileError> {
+fn states<'a>(table: &'a Table, prefix: &str) -> Result<[&'a Column; REPORTED], Failure> {
     let names = REPORTED_NAMES.map(|name| format!("{prefix}{name}"));
     named(table, names.each_ref().map(String::as_str))
 }
 
 /// Refuses a row of an epoch in which some values are finite and others not. Where no run is left, all are NaN.
-fn finite_or_lost(table: &Table, row: usize, columns: &[&Column]) -> Result<(), FileError> {
+fn finite_or_lost(table: &Table, row: usize, columns: &[&Column]) -> Result<(), Failure> {
     let is_lost = columns.iter().all(|column| column.si(row).is_nan());
     match columns.iter().find(|column| !column.si(row).is_finite()) {
         Some(column) if !is_lost => {
             let (line, value) = (table.lines.of(row), column.si(row).to_string());
-            Err(FileError::cell(
+            Err(Failure::cell(
                 &table.path,
                 line,
                 &column.name,
@@ -187,8 +187,8 @@ fn finite_or_lost(table: &Table, row: usize, columns: &[&Column]) -> Result<(), 
 }
 
 /// A table of a run is written by the program: what is wrong with it is damage.
-fn damaged(error: FileError) -> FileError {
-    error.advice_instead(REPEAT)
+fn damaged(error: Failure) -> Failure {
+    error.hint(REPEAT)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Scenario files (TOML): see [`Scenario`].
 
-use super::FileError;
+use super::Failure;
 use super::toml_file::Source;
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_signal::units::SettingError;
@@ -10,7 +10,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
-pub(crate) fn read(path: &Path) -> Result<Scenario, FileError> {
+pub(crate) fn read(path: &Path) -> Result<Scenario, Failure> {
     read_for(path, |_| Ok(()))
 }
 
@@ -21,14 +21,14 @@ pub(crate) fn read(path: &Path) -> Result<Scenario, FileError> {
 pub(crate) fn read_for(
     path: &Path,
     rule: impl FnOnce(&Scenario) -> Result<(), SettingError>,
-) -> Result<Scenario, FileError> {
+) -> Result<Scenario, Failure> {
     from_source(&Source::read(path)?, rule)
 }
 
 fn from_source(
     source: &Source,
     rule: impl FnOnce(&Scenario) -> Result<(), SettingError>,
-) -> Result<Scenario, FileError> {
+) -> Result<Scenario, Failure> {
     let scenario: Scenario = source.get()?;
     scenario
         .validate()
@@ -44,7 +44,7 @@ mod tests {
 
     fn refused(text: &str) -> (String, Option<String>) {
         let error = from_source(&Source::new("s.toml", text), |_| Ok(())).unwrap_err();
-        (error.to_string(), error.hint())
+        (error.to_string(), error.advice())
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Where inputs are opened: what can be read once only is kept, what has no end is refused.
 
-use super::FileError;
+use super::Failure;
 use flate2::read::MultiGzDecoder;
 use std::collections::HashMap;
 use std::fs::File;
@@ -151,18 +151,18 @@ impl<R: BufRead> Read for Unpacked<R> {
 ///
 /// # Errors
 /// When the system refuses.
-pub(crate) fn table_text(path: &Path) -> Result<String, FileError> {
+pub(crate) fn table_text(path: &Path) -> Result<String, Failure> {
     let mut bytes = Vec::new();
     table(path)
         .and_then(|mut reader| reader.read_to_end(&mut bytes))
-        .map_err(|e| FileError::io(path, e))?;
+        .map_err(|e| Failure::io(path, e))?;
     Ok(without_mark(String::from_utf8_lossy(&bytes).into_owned()))
 }
 
 /// A text of at most 64 MiB.
 ///
 /// # Errors
-/// When the system refuses, it is longer, or it is not UTF-8 ([`is_damage`]): with the line.
+/// When the system refuses, it is longer, or it is not UTF-8: with the line.
 pub(crate) fn text(path: &Path) -> io::Result<String> {
     String::from_utf8(bounded(open(path)?, LARGEST_TEXT)?)
         .map(without_mark)
@@ -195,18 +195,10 @@ fn bounded(reader: impl Read, largest: u64) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Whether an error of the system is one of the contents: no text, no compressed data, cut off, too long.
-pub(crate) const fn is_damage(kind: ErrorKind) -> bool {
-    use ErrorKind as K;
-    matches!(
-        kind,
-        K::InvalidData | K::InvalidInput | K::UnexpectedEof | K::FileTooLarge
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::is_damage;
 
     #[test]
     fn text_that_is_none_is_refused_with_its_line() {

@@ -9,7 +9,7 @@ use crate::app::Input;
 use crate::formats::atomic::{AtomicDir, Claim, Existing, Found, claim_directory};
 use crate::formats::model_file::ModelFile;
 use crate::formats::recordings::{FileFormat, is_recording};
-use crate::formats::{FileError, Place, Setting};
+use crate::formats::{Place, help};
 use crate::report;
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::contamination::Contamination;
@@ -53,7 +53,7 @@ impl Synthesis {
         out: &Path,
         inputs: impl Iterator<Item = &'a Path> + Clone,
         existing: Existing,
-    ) -> Result<Claim, FileError> {
+    ) -> Result<Claim, Failure> {
         let (names, own) = (self.names(), self.identity());
         let files: Vec<&str> = names
             .iter()
@@ -125,7 +125,7 @@ impl Synthesis {
             .collect::<Result<Vec<_>, ReplicateError>>()?;
         let written =
             File::create(path).and_then(|file| self.format.write(file, model.rate_hz, &signals));
-        written.map_err(|e| FileError::io(shown, e))?;
+        written.map_err(|e| Failure::io(shown, e))?;
         Ok(model)
     }
 
@@ -168,7 +168,7 @@ impl Synthesis {
 }
 
 /// Refuses recordings in a directory that no synthesis made, or that would be left beside those to be written.
-fn no_others(directory: &Path, names: &[String], made: &[String]) -> Result<(), FileError> {
+fn no_others(directory: &Path, names: &[String], made: &[String]) -> Result<(), Failure> {
     let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
     let inside = entries.filter_map(|e| e.file_name().into_string().ok());
     let mut inside: Vec<String> = inside
@@ -177,9 +177,9 @@ fn no_others(directory: &Path, names: &[String], made: &[String]) -> Result<(), 
     inside.sort();
     let refusal = |message: String, advice: &'static str| {
         let path = directory.display().to_string();
-        FileError::contents(path, Place::Itself, message)
-            .advice(advice)
-            .setting(Setting::OutputDirectory)
+        Failure::contents(path, Place::Itself, message)
+            .or_hint(advice)
+            .or(help::DIRECTORY)
     };
     if let Some(other) = inside
         .iter()

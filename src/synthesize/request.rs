@@ -152,11 +152,11 @@ fn contamination(name: &str, rate_hz: f64) -> Result<Contamination, Failure> {
     contamination_file::find(name, rate_hz).map_err(|e| {
         let known = contamination_file::names().join(", ");
         let meant = contamination_file::meant(name);
-        let hint = match (e.is_system(), meant) {
+        let hint = match (e.code() == 1, meant) {
             (false, _) => None,
             (true, Some(meant)) => Some(format!("did you mean \"{meant}\"?")),
             (true, None) => Some(format!("give a file or one of {known}")),
         };
-        Failure::from(e).maybe_hint(hint)
+        e.maybe_hint(hint)
     })
 }

@@ -2,7 +2,7 @@
 
 use super::{Kind, schema};
 use crate::formats::{
-    FileError, contamination_file, fusion_files, model_file, scenario_file, trajectory_file,
+    Failure, contamination_file, fusion_files, model_file, scenario_file, trajectory_file,
 };
 use serde_json::Value;
 use std::path::Path;
@@ -216,7 +216,7 @@ const SAMPLES: [Sample; 6] = [
     },
 ];
 
-fn read(kind: Kind, path: &Path) -> Result<(), FileError> {
+fn read(kind: Kind, path: &Path) -> Result<(), Failure> {
     match kind {
         Kind::Scenario => scenario_file::read(path).map(|_| ()),
         Kind::Study => unreachable!("what a run takes is for its options to say"),

@@ -163,7 +163,7 @@ impl Study {
                 0 => String::new(),
                 n => format!(" (and {n} more cells)"),
             };
-            let hint = failure.advice().map(str::to_owned);
+            let hint = failure.advice();
             let failed = Failure::could_not(format!("cell {name}: {failure}{more}"));
             return Err(failed.maybe_hint(hint));
         }

@@ -108,7 +108,7 @@ pub(crate) fn merge(
                 .then(|| run_directory::read(&place.cell(&cell.name)))
             {
                 Some(Ok(found)) => read.push((cell, found)),
-                Some(Err(e)) if e.is_system() => return Err(e.into()),
+                Some(Err(e)) if e.code() == 1 => return Err(e),
                 damaged => {
                     if let Some(Err(e)) = damaged {
                         context.warn(format!("{e}; {} is set aside", cell.name));

@@ -4,7 +4,7 @@
 use super::cells::Cell;
 use crate::app::{Answer, Context, Failure, Front, Manifest, Result};
 use crate::commands::run::{PreparedRun, block_of, columns};
-use crate::formats::{FileError, atomic};
+use crate::formats::atomic;
 use nav_sim_document::{Importance, Note};
 use nav_sim_navigation::simulation::RunResult;
 use rayon::prelude::*;
@@ -71,7 +71,7 @@ impl Place<'_> {
         let locks = self.0.join("locks");
         let path = locks.join(format!("{}-{}", &unit.cells[0].noise[..32], unit.first));
         let made = fs::create_dir_all(&locks).and_then(|()| File::create(&path));
-        let file = made.map_err(|e| FileError::io(&path, e))?;
+        let file = made.map_err(|e| Failure::io(&path, e))?;
         Ok(match file.try_lock() {
             Err(fs::TryLockError::WouldBlock) => None,
             _ => Some(file),

@@ -3,7 +3,7 @@
 use super::summary::{
     Cause, FixCorrelation, Fixes, FuseSummary, FuseVerdict, Initial, VehicleSummary,
 };
-use super::{Configuration, Fuse, document, refused};
+use super::{Configuration, Fuse, document};
 use crate::app::{Context, Input, inputs};
 use crate::app::{Failure, Refuse, Result};
 use crate::commands::run::Reduced;
@@ -87,8 +87,7 @@ impl Drive {
             &request.imu,
             request.columns.as_deref(),
             topic.imu.as_deref(),
-        )
-        .map_err(refused)?;
+        )?;
         let span_s = imu
             .samples
             .first()
@@ -99,8 +98,7 @@ impl Drive {
             unsaid.as_ref(),
             span_s,
             topic.fixes.as_deref(),
-        )
-        .map_err(refused)?;
+        )?;
         for fix in &mut gnss {
             *fix = fix.with_sigmas_times(position, velocity);
             fix.t_s -= request.gnss_delay_s;
@@ -114,14 +112,12 @@ impl Drive {
         let wheel = request
             .odometer
             .as_deref()
-            .map_or_else(|| Ok(Vec::new()), read_wheel)
-            .map_err(refused)?;
+            .map_or_else(|| Ok(Vec::new()), read_wheel)?;
         let initial = request
             .initial_file()
             .map(|path| read_initial(path))
-            .transpose()
-            .map_err(refused)?;
-        let model = model_file::read(&request.model).map_err(refused)?;
+            .transpose()?;
+        let model = model_file::read(&request.model)?;
         notes.extend(model.doubts(&request.model).into_iter().map(warning));
         if (model.model.rate_hz / imu.rate_hz - 1.0).abs() > 0.01 {
             let (from, to) = (model.model.rate_hz, imu.rate_hz);
@@ -145,8 +141,7 @@ impl Drive {
             .reference
             .as_deref()
             .map(|path| load_reference(path, &options))
-            .transpose()
-            .map_err(refused)?;
+            .transpose()?;
         let reference = reference.map(|(reference, warnings)| {
             notes.extend(warnings.iter().map(warning));
             reference

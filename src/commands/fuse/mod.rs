@@ -8,8 +8,7 @@ mod summary;
 pub use drive::FuseAnswer;
 pub use summary::{Cause, FuseSummary, VehicleSummary};
 
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result, option_elsewhere};
-use crate::formats::{FileError, Setting};
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
 use drive::Drive;
 use glam::{DMat3, DQuat, DVec3};
 use nav_sim_document::Document;
@@ -597,16 +596,6 @@ pub(crate) struct Configuration {
     pub(crate) aiding: AidingSettings,
     /// How much earlier than its time a fix is taken to be (s).
     pub(crate) gnss_delay_s: f64,
-}
-
-/// What is wrong with a file of a drive: all six channels are needed, as the file names them.
-pub(crate) fn refused(e: FileError) -> Failure {
-    Failure::of_file(&e, |setting| match setting {
-        Setting::ColumnNames => Some("correct the header"),
-        Setting::Channels | Setting::FewerChannels | Setting::Gaps => None,
-        Setting::RemoveLine => Some("remove the line: gaps of up to 5 s are bridged"),
-        other => Some(option_elsewhere(other)),
-    })
 }
 
 impl From<FusionError> for Failure {

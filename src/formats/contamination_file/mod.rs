@@ -21,7 +21,7 @@
 
 mod description;
 
-use super::FileError;
+use super::Failure;
 use super::suggest::nearest;
 use super::toml_file::{OneOrEach, Source};
 use description::{Bursts, Described, Description, Mean, Replace, RuleTable, Step};
@@ -66,7 +66,7 @@ pub fn names() -> [&'static str; 6] {
 ///
 /// # Errors
 /// When the file cannot be read or is refused.
-pub fn find(name_or_path: &str, rate_hz: f64) -> Result<Contamination, FileError> {
+pub fn find(name_or_path: &str, rate_hz: f64) -> Result<Contamination, Failure> {
     match PRESETS.iter().find(|(name, _)| *name == name_or_path) {
         Some((name, text)) => parse(&Source::new(name, text), rate_hz),
         None => parse(&Source::read(Path::new(name_or_path))?, rate_hz),
@@ -78,7 +78,7 @@ pub(crate) fn meant(name: &str) -> Option<&'static str> {
     nearest(name, names())
 }
 
-fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, FileError> {
+fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, Failure> {
     let Description { accel, gyro, .. } = source.get()?;
     let mut rules = Vec::new();
     for (sensor, tables) in [(Sensor::Accel, accel), (Sensor::Gyro, gyro)] {
@@ -100,7 +100,7 @@ fn read_rules(
     table: &RuleTable,
     rate_hz: f64,
     into: &mut Vec<Rule>,
-) -> Result<(), FileError> {
+) -> Result<(), Failure> {
     let RuleTable {
         replicates,
         operation,
@@ -162,16 +162,12 @@ struct Entry<'a> {
 }
 
 impl Entry<'_> {
-    fn refused(&self, key: &str, reason: impl Into<Box<str>>) -> FileError {
+    fn refused(&self, key: &str, reason: impl std::fmt::Display) -> Failure {
         self.source.refused(&format!("{}.{key}", self.key), reason)
     }
 
     /// A number, or this replicate's of a list.
-    fn number<T: Copy + Into<f64>>(
-        &self,
-        key: &str,
-        given: &OneOrEach<T>,
-    ) -> Result<f64, FileError> {
+    fn number<T: Copy + Into<f64>>(&self, key: &str, given: &OneOrEach<T>) -> Result<f64, Failure> {
         match given {
             OneOrEach::One(value) => Ok((*value).into()),
             OneOrEach::Each(values) if values.len() == self.listed => Ok(values[self.i].into()),
@@ -186,7 +182,7 @@ impl Entry<'_> {
         &self,
         key: &str,
         given: &Option<OneOrEach<T>>,
-    ) -> Result<Option<f64>, FileError> {
+    ) -> Result<Option<f64>, Failure> {
         given
             .as_ref()
             .map(|given| self.number(key, given))
@@ -194,7 +190,7 @@ impl Entry<'_> {
     }
 
     /// Refuses more than one of several ways to say the same.
-    fn at_most_one(&self, keys: &[(&str, bool)]) -> Result<(), FileError> {
+    fn at_most_one(&self, keys: &[(&str, bool)]) -> Result<(), Failure> {
         let mut given = keys.iter().filter(|(_, is_given)| *is_given);
         match (given.next(), given.next()) {
             (Some((first, _)), Some((second, _))) => {
@@ -204,7 +200,7 @@ impl Entry<'_> {
         }
     }
 
-    fn step(&self, step: &Step, rate_hz: f64) -> Result<Operation, FileError> {
+    fn step(&self, step: &Step, rate_hz: f64) -> Result<Operation, Failure> {
         let (share, samples, seconds) = (&step.at_share, step.at_samples, &step.at_s);
         self.at_most_one(&[
             ("at_share", share.is_some()),
@@ -223,7 +219,7 @@ impl Entry<'_> {
         })
     }
 
-    fn replace(&self, replace: &Replace) -> Result<Operation, FileError> {
+    fn replace(&self, replace: &Replace) -> Result<Operation, Failure> {
         self.at_most_one(&[
             ("share", replace.share.is_some()),
             ("points", replace.points.is_some()),
@@ -246,7 +242,7 @@ impl Entry<'_> {
         })
     }
 
-    fn bursts(&self, bursts: &Bursts) -> Result<Operation, FileError> {
+    fn bursts(&self, bursts: &Bursts) -> Result<Operation, Failure> {
         let period = self.optional("of_samples", &bursts.of_samples)?;
         let extent = |samples: u64| match period {
             Some(period) => Extent::Share(samples as f64 / period),
@@ -283,7 +279,7 @@ mod tests {
 
     fn refusal(text: &str) -> String {
         let e = parse(&Source::new("c.toml", text), 100.0).unwrap_err();
-        format!("{e} | {}", e.hint().unwrap_or_default())
+        format!("{e} | {}", e.advice().unwrap_or_default())
     }
 
     /// The paper's items, by the numbers printed there.

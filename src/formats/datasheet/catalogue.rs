@@ -11,7 +11,7 @@
 //! ```
 
 use super::{Datasheet, Entry, Figure, Quantity};
-use crate::formats::FileError;
+use crate::formats::Failure;
 use crate::formats::toml_file::Source;
 use nav_sim_signal::imu::Sensor;
 use serde::Deserialize;
@@ -77,20 +77,20 @@ struct Given {
 ///
 /// # Errors
 /// File, line, key and value of what is refused.
-pub fn read(path: &Path) -> Result<Datasheet, FileError> {
+pub fn read(path: &Path) -> Result<Datasheet, Failure> {
     parse(&Source::read(path)?)
 }
 
 /// The entry of that name, if the catalogue has it; capitals do not matter.
 #[must_use]
-pub fn catalogued(name: &str) -> Option<Result<Datasheet, FileError>> {
+pub fn catalogued(name: &str) -> Option<Result<Datasheet, Failure>> {
     let (name, text) = CATALOGUE
         .iter()
         .find(|(known, _)| known.eq_ignore_ascii_case(name))?;
     Some(parse(&Source::new(name, text)))
 }
 
-pub(super) fn parse(source: &Source) -> Result<Datasheet, FileError> {
+pub(super) fn parse(source: &Source) -> Result<Datasheet, Failure> {
     let file: File = source.get()?;
     let mut entries = Vec::new();
     for (sensor, table) in [(Sensor::Accel, file.accel), (Sensor::Gyro, file.gyro)] {
@@ -107,7 +107,7 @@ pub(super) fn parse(source: &Source) -> Result<Datasheet, FileError> {
     })
 }
 
-fn entry(source: &Source, sensor: Sensor, key: &str, given: Given) -> Result<Entry, FileError> {
+fn entry(source: &Source, sensor: Sensor, key: &str, given: Given) -> Result<Entry, Failure> {
     let path = format!("{}.{key}", sensor.name());
     let Some(figure) = Figure::ALL.into_iter().find(|f| f.key() == key) else {
         return Err(source.unknown(&path, Figure::ALL.map(Figure::key).into_iter()));

@@ -4,7 +4,7 @@ use super::nmea::{self, is_nmea};
 use super::rtklib::{self, is_rtklib, of_unix};
 use super::{Remark, time_back};
 use crate::formats::table::{self, Asked, Column, Dictionary, Numbers, Quantity, Table};
-use crate::formats::{FileError as Error, Place, Setting, logs, source};
+use crate::formats::{Failure as Error, Place, help, logs, source};
 use glam::{DMat3, DVec3};
 use nav_sim_logs::{Clock, Fix, Stamp};
 use nav_sim_navigation::earth::{A, MAX_LATITUDE, ecef_to_geodetic, geodetic_to_ecef};
@@ -103,7 +103,7 @@ const DICTIONARY: Dictionary = Dictionary {
              sd_vn_m_s …; without a header, as KF-GINS has it, 7 of them (t_s, latitude, longitude, height, three deviations) \
              or 13 (velocity behind the height)",
     empty: "no rows in it",
-    bad_cell: |error, _| error.advice_instead("remove the row: a fix that is not whole is no fix"),
+    bad_cell: |error, _| error.hint("remove the row: a fix that is not whole is no fix"),
 };
 
 /// Columns of each quantity; standard deviations may be given for the whole file.
@@ -149,7 +149,7 @@ impl<'a> FixColumns<'a> {
         }
         // a receiver's log that has all but these
         let found = table.require(sigmas, &DICTIONARY);
-        found.map_err(|e| e.setting(Setting::FixSigma))?;
+        found.map_err(|e| e.or(help::FIX_SIGMA))?;
         let lost = || table.refused(DICTIONARY.advice);
         Ok(Self {
             table,
@@ -208,7 +208,7 @@ impl<'a> FixColumns<'a> {
     fn check(&self, row: usize, fix: &GnssFix) -> Result<(), Error> {
         let refuse = |column: &Column, reason, advice| {
             let (line, value) = (self.table.lines.of(row), column.values[row].to_string());
-            Err(Error::cell(&self.table.path, line, &column.name, value, reason).advice(advice))
+            Err(Error::cell(&self.table.path, line, &column.name, value, reason).or_hint(advice))
         };
         const DEGREES: &str = "latitude within ±89.9, longitude in (−180, 180] or [0, 360), in degrees (or lat_rad, lon_rad)";
         let [first, second, _] = self.place;
@@ -274,7 +274,7 @@ pub(crate) fn read_gnss(
             let text = source::table_text(path)?;
             if text.trim_start().starts_with('<') {
                 let message = "XML, as GPX and KML are, not a table of fixes";
-                return Err(Error::contents(shown, 1_u64, message).advice(
+                return Err(Error::contents(shown, 1_u64, message).or_hint(
                     "write its points as a table t_s, lat_deg, lon_deg, h_m on the clock of the IMU",
                 ));
             }
@@ -354,8 +354,7 @@ fn of_log(
     for (row, fix) in read.by_ref().enumerate() {
         let fix = in_radians(&fix.map_err(refused)?, unsaid).ok_or_else(|| {
             let message = "the fixes have no standard deviations";
-            Error::contents(path.display().to_string(), Place::Within, message)
-                .setting(Setting::FixSigma)
+            Error::contents(path.display().to_string(), Place::Within, message).or(help::FIX_SIGMA)
         })?;
         fixes.push((row as u64 + 1, fix));
     }
@@ -412,7 +411,7 @@ fn check_step(path: &str, line: u64, before: &GnssFix, fix: &GnssFix) -> Result<
         (1e6 * seconds).round() / 1e6
     );
     Err(Error::contents(path, line, message)
-        .advice("is a latitude swapped with a longitude, a sign lost, or a row damaged?"))
+        .or_hint("is a latitude swapped with a longitude, a sign lost, or a row damaged?"))
 }
 
 #[cfg(test)]
@@ -431,7 +430,7 @@ mod tests {
                 .ends_with("line 1: columns \"h_m\" and \"altitude\" both give h_m"),
             "{e}"
         );
-        assert_eq!(e.hint().unwrap(), "remove one of them");
+        assert_eq!(e.advice().unwrap(), "remove one of them");
     }
 
     /// On the equator at Greenwich x is up, y east and z north; equal deviations are equal in any axes.

@@ -5,7 +5,7 @@ use crate::formats::logs::LogOptions;
 use crate::formats::recordings::timing::{median_step, unit_of_step};
 use crate::formats::recordings::{self, ReadOptions, check_gravity, gravity_factor};
 use crate::formats::table::{Column, Dictionary};
-use crate::formats::{FileError as Error, Place};
+use crate::formats::{Failure as Error, Place};
 use glam::DVec3;
 use nav_sim_navigation::fusion::{LONGEST_GAP_S, bridged};
 use nav_sim_navigation::strapdown::MAX_ROTATION;
@@ -92,7 +92,7 @@ pub(crate) fn read_imu(
     };
     let table = recordings::load(path, &options, &DICTIONARY)?;
     let lacking = |message: String| {
-        Error::contents(table.path.as_str(), Place::Within, message).advice(DICTIONARY.advice)
+        Error::contents(table.path.as_str(), Place::Within, message).or_hint(DICTIONARY.advice)
     };
     let signals = Channel::ALL.map(|channel| channel.to_string());
     if let Some(missing) = signals.iter().find(|name| !table.has(name)) {
@@ -165,7 +165,7 @@ impl Columns {
                     "no samples from {previous_s} s to {t_s} s: {LONGEST_GAP_S} s can be bridged"
                 );
                 return Err(
-                    refuse(message).advice("fuse the stretches before and after it one by one")
+                    refuse(message).or_hint("fuse the stretches before and after it one by one")
                 );
             }
             let angle = sample.dtheta.length();
@@ -174,7 +174,7 @@ impl Columns {
                 let message =
                     format!("a rotation of {degrees:.1}° in one sample, {most:.1}° at most");
                 let advice = "is the unit right? gyro_x_deg_s is in degrees, gyro_x_rad_s in radians a second";
-                return Err(refuse(message).advice(advice));
+                return Err(refuse(message).or_hint(advice));
             }
             if is_hole {
                 holes.push((k, since_s - step));

@@ -1,6 +1,6 @@
 //! An initial state (TOML).
 
-use crate::formats::FileError;
+use crate::formats::Failure;
 use crate::formats::toml_file::{Between, Finite, Source};
 use glam::DVec3;
 use nav_sim_navigation::earth::MAX_LATITUDE_DEG;
@@ -80,11 +80,11 @@ pub(crate) fn initial_schema() -> serde_json::Value {
 ///
 /// # Errors
 /// File, line, key and value of what is refused.
-pub(crate) fn read_initial(path: &Path) -> Result<Start, FileError> {
+pub(crate) fn read_initial(path: &Path) -> Result<Start, Failure> {
     parse(&Source::read(path)?)
 }
 
-fn parse(source: &Source) -> Result<Start, FileError> {
+fn parse(source: &Source) -> Result<Start, Failure> {
     let d: Description = source.get()?;
     if d.lat_deg.0.abs() > MAX_LATITUDE_DEG {
         return Err(source.refused("lat_deg", format!("is not within ±{MAX_LATITUDE_DEG}")));
@@ -126,7 +126,7 @@ mod tests {
         let sound = "t_s = 0\nlat_deg = 46\nlon_deg = 6\nh_m = 400\nroll_deg = 0\npitch_deg = 0\nyaw_deg = 40\n";
         let refused = |text: &str| {
             let e = parse(&Source::new("i.toml", text)).unwrap_err();
-            format!("{e} | {}", e.hint().unwrap_or_default())
+            format!("{e} | {}", e.advice().unwrap_or_default())
         };
         assert_eq!(
             parse(&Source::new("i.toml", sound)).unwrap().sigma,

@@ -16,7 +16,7 @@ pub(in crate::formats) use nmea::is_nmea;
 pub(in crate::formats) use rtklib::is_rtklib;
 pub(crate) use wheel::read_wheel;
 
-use crate::formats::FileError;
+use crate::formats::Failure;
 
 /// What is said of a file that was read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -57,12 +57,12 @@ pub(super) fn bare_row(text: &str) -> Option<Vec<f64>> {
 }
 
 /// Time that stands still or goes back.
-fn time_back(path: &str, line: u64, previous_s: f64, t_s: f64) -> FileError {
+fn time_back(path: &str, line: u64, previous_s: f64, t_s: f64) -> Failure {
     let advice = if previous_s - t_s > 500_000.0 {
         "a new GPS week? Count the seconds on, in both files"
     } else {
         "sort the rows by time and remove repeated ones"
     };
     let message = format!("time goes from {previous_s} s to {t_s} s: it must increase");
-    FileError::contents(path, line, message).advice(advice)
+    Failure::contents(path, line, message).or_hint(advice)
 }

@@ -2,7 +2,7 @@
 //! east, up, and perhaps velocity; more is not used.
 
 use super::fixes::WEEK_S;
-use crate::formats::FileError as Error;
+use crate::formats::Failure as Error;
 use chrono::{DateTime, NaiveDateTime};
 
 /// Columns of a row up to the standard deviation upwards; time takes two of them.
@@ -143,7 +143,7 @@ pub(super) fn rows(
 ) -> Result<(String, String), Error> {
     let (at, names) = header(text).unwrap_or_default();
     let refuse = |line: usize, message: &str, advice: &'static str| {
-        Err(Error::contents(path, line + 1, message).advice(advice))
+        Err(Error::contents(path, line + 1, message).or_hint(advice))
     };
     if !names.contains("GPST") {
         return refuse(

@@ -1,7 +1,7 @@
 //! Recorded speeds of a wheel.
 
 use super::time_back;
-use crate::formats::FileError as Error;
+use crate::formats::Failure as Error;
 use crate::formats::recordings::{OF_CLOCK, OF_RECEIVER, STAMP};
 use crate::formats::table::{
     self, Asked, Bare, Column, Dictionary, NONE, Numbers, Quantity, SPEED, Table, normalised,
@@ -54,7 +54,7 @@ const DICTIONARY: Dictionary = Dictionary {
 /// Whatever is wrong with it, with its line.
 pub(crate) fn read_wheel(path: &Path) -> Result<Vec<WheelSpeed>, Error> {
     let table = table::read(path, &DICTIONARY, &Asked::default())?;
-    let no_time = || table.refused("no time column").advice(DICTIONARY.advice);
+    let no_time = || table.refused("no time column").or_hint(DICTIONARY.advice);
     let time = table.get("t_s").ok_or_else(no_time)?;
     let speeds = speed_columns(&table)?;
     let speed = |row| speeds.iter().map(|c| c.si(row)).sum::<f64>() / speeds.len() as f64;
@@ -82,20 +82,20 @@ fn speed_columns(table: &Table) -> Result<Vec<&Column>, Error> {
         (Some(left), Some(right), _) => vec![*left, *right],
         (_, _, []) => {
             let refusal = table.refused("no speed of a wheel");
-            return Err(refusal.advice(DICTIONARY.advice));
+            return Err(refusal.or_hint(DICTIONARY.advice));
         }
         (_, _, [one]) => vec![*one],
         (_, _, many) => {
             let names: Vec<_> = many.iter().map(|c| format!("\"{}\"", c.name)).collect();
             let message = format!("several speeds: {}", names.join(", "));
-            return Err(table.refused(message).advice("keep one of them"));
+            return Err(table.refused(message).or_hint("keep one of them"));
         }
     };
     for column in &chosen {
         let name = &column.name;
         if column.quantity.name == COUNTS {
             let message = format!("column \"{name}\" counts turns: a speed is needed");
-            return Err(table.refused(message).advice(
+            return Err(table.refused(message).or_hint(
                 "ticks over ticks a turn, over seconds, times the wheel's circumference: wheel_m_s",
             ));
         }
@@ -103,7 +103,7 @@ fn speed_columns(table: &Table) -> Result<Vec<&Column>, Error> {
             let message = format!("column \"{name}\" has no unit of speed in its name");
             return Err(table
                 .refused(message)
-                .advice("end its name in _m_s, _km_h or _mph"));
+                .or_hint("end its name in _m_s, _km_h or _mph"));
         }
     }
     Ok(chosen)
@@ -197,9 +197,9 @@ mod tests {
             let e = read(text).unwrap_err();
             assert!(e.to_string().contains(said), "{e}");
             assert!(
-                e.hint().unwrap_or_default().contains(hint),
+                e.advice().unwrap_or_default().contains(hint),
                 "{text}: {:?}",
-                e.hint()
+                e.advice()
             );
         }
     }

@@ -2,8 +2,9 @@
 
 use super::description::{Description, LawAxes, LawTable, SensorTable, TurnOnTable};
 use super::{CI, Interval, ModelFile, TurnOn};
+use crate::formats::Failure;
+use crate::formats::file_kind::{self, FileKind};
 use crate::formats::toml_file::{Finite, OneOrEach, Source};
-use crate::formats::{FileError, Kind as Refusal};
 use nav_sim_navigation::sensors::defects::{MAX_BIAS_M_S2, MAX_BIAS_RAD_S};
 use nav_sim_signal::imu::{Axis, Channel, MAX_RATE_HZ, Sensor};
 use nav_sim_signal::noise::{
@@ -17,11 +18,15 @@ use toml::Value;
 /// # Errors
 /// When the file cannot be read, is not TOML, has unknown keys, lacks some, or has values outside their
 /// domains.
-pub fn read(path: &Path) -> Result<ModelFile, FileError> {
+pub fn read(path: &Path) -> Result<ModelFile, Failure> {
     parse(&Source::read(path)?).map_err(|e| {
-        let is_toml = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
-        let is_profile = matches!(&e.kind, Refusal::UnknownKey(key) if ["start", "segment", "vehicle"].contains(&key.as_ref()));
-        if is_profile || !is_toml && e.remedies.is_empty() { e.advice_instead(NOT_A_MODEL) } else { e }
+        use FileKind as K;
+        match file_kind::of(path) {
+            Ok(K::Trajectory | K::Recording | K::Imu | K::Gnss | K::Curve | K::Record) => {
+                e.hint(NOT_A_MODEL)
+            }
+            _ => e,
+        }
     })
 }
 
@@ -32,11 +37,11 @@ const NOT_A_MODEL: &str = "a model is a TOML file, as calibrate and datasheet wr
 ///
 /// # Errors
 /// As [`read`].
-pub fn from_text(path: &Path, text: &str) -> Result<ModelFile, FileError> {
+pub fn from_text(path: &Path, text: &str) -> Result<ModelFile, Failure> {
     parse(&Source::new(&path.display().to_string(), text))
 }
 
-pub(super) fn parse(source: &Source) -> Result<ModelFile, FileError> {
+pub(super) fn parse(source: &Source) -> Result<ModelFile, Failure> {
     let Description {
         rate_hz: Finite(rate_hz),
         accel,
@@ -88,7 +93,7 @@ fn read_sensor(
     table: SensorTable,
     named: &Value,
     file: &mut ModelFile,
-) -> Result<(), FileError> {
+) -> Result<(), Failure> {
     let name = sensor.name();
     let own = [table.x, table.y, table.z];
     if table.processes.is_none() && own.iter().all(Option::is_none) {
@@ -100,7 +105,7 @@ fn read_sensor(
         match (&table.processes, own) {
             (Some(_), Some(_)) => {
                 let error = source.refused(&key, "is given both for all axes and for this one");
-                return Err(error.advice(format!("write either [{name}] or one table an axis")));
+                return Err(error.or_hint(format!("write either [{name}] or one table an axis")));
             }
             (Some(_), None) => read_processes(source, name, named, channel, file)?,
             (None, Some(_)) => read_processes(source, &key, &named[axis.name()], channel, file)?,
@@ -110,7 +115,7 @@ fn read_sensor(
     Ok(())
 }
 
-fn read_turn_on(source: &Source, table: &TurnOnTable) -> Result<TurnOn, FileError> {
+fn read_turn_on(source: &Source, table: &TurnOnTable) -> Result<TurnOn, Failure> {
     let axes = |sensor: Sensor, given: &Option<OneOrEach<Finite, [Finite; 3]>>, limit: f64| {
         let axes = match given {
             None => return Ok(None),
@@ -138,7 +143,7 @@ fn read_processes(
     named: &Value,
     channel: Channel,
     file: &mut ModelFile,
-) -> Result<(), FileError> {
+) -> Result<(), Failure> {
     let rate_hz = file.model.rate_hz;
     let tables = named["processes"].as_array().into_iter().flatten();
     let tables: Vec<(String, &Value)> = (1..)
@@ -188,7 +193,7 @@ fn read_process(
     key: &str,
     values: &Value,
     rate_hz: f64,
-) -> Result<Process, FileError> {
+) -> Result<Process, Failure> {
     let code = values["type"].as_str().unwrap_or_default();
     let kind = Kind::named(code).expect("the description has the codes of the kinds");
     let names = kind.parameters().iter().map(|p| p.name());
@@ -203,17 +208,17 @@ fn read_process(
     process.map_err(|e| refuse_parameter(source, key, &e))
 }
 
-fn refuse_parameter(source: &Source, key: &str, e: &ParameterError) -> FileError {
+fn refuse_parameter(source: &Source, key: &str, e: &ParameterError) -> Failure {
     let refusal = source.refused(
         &format!("{key}.{}", e.parameter),
         format!("is not {}", e.domain),
     );
     match e.parameter {
-        "phi" => refusal.advice(
+        "phi" => refusal.or_hint(
             "phi = exp(−1/(T·rate_hz)) for a correlation time of T seconds; phi = 1 is a random walk: RW",
         ),
         "sigma2" | "gamma2" | "q2" | "s2" => {
-            refusal.advice("a variance is never negative; 0 switches the process off")
+            refusal.or_hint("a variance is never negative; 0 switches the process off")
         }
         _ => refusal,
     }
@@ -225,7 +230,7 @@ fn read_laws(
     laws: &OneOrEach<LawAxes, Vec<LawTable>>,
     file: &ModelFile,
     into: &mut Spread,
-) -> Result<(), FileError> {
+) -> Result<(), Failure> {
     for axis in Axis::ALL {
         let channel = Channel { sensor, axis };
         let (key, laws) = match laws {
@@ -259,16 +264,16 @@ fn read_laws(
     Ok(())
 }
 
-fn refuse_law(source: &Source, key: &str, e: &SpreadError) -> FileError {
+fn refuse_law(source: &Source, key: &str, e: &SpreadError) -> Failure {
     let refused = |name: &str, reason: String| source.refused(&format!("{key}.{name}"), reason);
     let there = |known: &[String]| format!("there: {}", known.join(", "));
     match e {
         SpreadError::NoProcess { known, .. } => {
-            refused("process", "is no process of this model".to_owned()).advice(there(known))
+            refused("process", "is no process of this model".to_owned()).or_hint(there(known))
         }
         SpreadError::NoParameter { process, known, .. } => {
             let known: Vec<String> = known.iter().map(ToString::to_string).collect();
-            refused("parameter", format!("is no parameter of {process}")).advice(there(&known))
+            refused("parameter", format!("is no parameter of {process}")).or_hint(there(&known))
         }
         SpreadError::Constant { name, domain, .. } => refused(name, format!("is not {domain}")),
         SpreadError::Lognormal => refused("distribution", "needs a parameter > 0".to_owned()),

@@ -1,6 +1,6 @@
 use super::read::parse;
 use super::*;
-use crate::formats::FileError;
+use crate::formats::Failure;
 use crate::formats::toml_file::Source;
 use nav_sim_signal::imu::{Axis, Sensor};
 use nav_sim_signal::noise::{Composite, Law, LognormalIntervals, Process, Variation};
@@ -10,12 +10,12 @@ const ACCEL_X: Channel = Channel {
     axis: Axis::X,
 };
 
-fn read_text(text: &str) -> Result<ModelFile, FileError> {
+fn read_text(text: &str) -> Result<ModelFile, Failure> {
     parse(&Source::new("m.toml", text))
 }
 
 /// One process of a file otherwise sound, on line 4.
-fn with_process(process: &str) -> Result<ModelFile, FileError> {
+fn with_process(process: &str) -> Result<ModelFile, Failure> {
     read_text(&format!(
         "schema = 1\nrate_hz = 100.0\n[accel]\nprocesses = [{{ {process} }}]\n"
     ))
@@ -23,12 +23,12 @@ fn with_process(process: &str) -> Result<ModelFile, FileError> {
 
 fn refusal(text: &str) -> String {
     let e = read_text(text).unwrap_err();
-    format!("{e} | {}", e.hint().unwrap_or_default())
+    format!("{e} | {}", e.advice().unwrap_or_default())
 }
 
 fn process_refusal(process: &str) -> String {
     let e = with_process(process).unwrap_err();
-    format!("{e} | {}", e.hint().unwrap_or_default())
+    format!("{e} | {}", e.advice().unwrap_or_default())
 }
 
 fn process(code: &str, values: &[f64]) -> Process {

@@ -1,7 +1,7 @@
 //! Writing model files: numbers in the shortest form that reads back to the same bits.
 
 use super::{CI, Interval, ModelFile, SCHEMA, TurnOn};
-use crate::formats::FileError;
+use crate::formats::Failure;
 use crate::formats::atomic;
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::{Law, Process, Variation};
@@ -12,7 +12,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// When the system refuses, or another model is there and is to stay.
-pub fn write(path: &Path, file: &ModelFile) -> Result<(), FileError> {
+pub fn write(path: &Path, file: &ModelFile) -> Result<(), Failure> {
     atomic::write(path, to_toml(file))
 }
 

@@ -1,7 +1,7 @@
 //! Which files are meant: directories stand for the recordings in them.
 
 use crate::formats::table::{is_oxts, unreadable};
-use crate::formats::{FileError, Place};
+use crate::formats::{Failure, Place};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
@@ -18,13 +18,13 @@ const ENDINGS: [&str; 10] = [
 ];
 
 /// The files, in the order given, those of a directory in name order.
-pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, FileError> {
+pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, Failure> {
     let mut files = Vec::new();
     for path in paths {
         let io = |e: std::io::Error| {
             let is_missing = e.kind() == std::io::ErrorKind::NotFound;
             let advice = "check the path; a directory stands for all its recordings";
-            unreadable(path, e).advice_if(is_missing.then(|| advice.to_owned()))
+            unreadable(path, e).or_hint_if(is_missing.then(|| advice.to_owned()))
         };
         if std::fs::metadata(path).map_err(io)?.is_dir() && !is_oxts(path) {
             let inside = listing(path).map_err(io)?;
@@ -51,20 +51,18 @@ pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, FileError> {
                 .unwrap_or_else(|_| file.path.clone()),
         ) {
             let message = "is given twice: it would count as two replicates";
-            return Err(FileError::contents(
-                file.path.display().to_string(),
-                Place::Itself,
-                message,
-            )
-            .advice("name each file once; a directory stands for all its recordings"));
+            return Err(
+                Failure::contents(file.path.display().to_string(), Place::Itself, message)
+                    .or_hint("name each file once; a directory stands for all its recordings"),
+            );
         }
     }
     Ok(files)
 }
 
 /// A directory without recordings.
-pub(super) fn no_files(path: String) -> FileError {
-    FileError::contents(path, Place::Within, "no recordings in it").advice(
+pub(super) fn no_files(path: String) -> Failure {
+    Failure::contents(path, Place::Within, "no recordings in it").or_hint(
         "recordings end in .csv, .tsv, .txt (also .gz), .npy, .npz, .mcap, .bag, .ulg or .ubx",
     )
 }

@@ -2,7 +2,7 @@
 //!
 //! Columns are found by their names, their units by the names' endings; what was found, and
 //! what was assumed, is told in the [`Report`]. What cannot be right is refused with file and line
-//! ([`FileError`]).
+//! ([`Failure`]).
 
 mod files;
 mod report;
@@ -16,11 +16,12 @@ pub(in crate::formats) use samples::{check_gravity, gravity_factor};
 pub use write::FileFormat;
 
 use super::logs::LogOptions;
+use super::table::NO_COLUMN;
 use super::table::{
     self, ACCELERATION, ANGLE, ANGULAR_RATE, Asked, Bare, Column, Dictionary, NONE, Numbers,
     Quantity, TIME, Table, Units,
 };
-use super::{FileError, Kind, Place, Setting};
+use super::{Failure, Place, help};
 use files::no_files;
 use nav_sim_signal::imu::{Channel, Recording};
 use rayon::prelude::*;
@@ -229,13 +230,13 @@ pub(in crate::formats) const DICTIONARY: Dictionary = Dictionary {
     advice: "name the columns t_s, accel_x_m_s2 … gyro_z_rad_s (also _g, _mg, _deg_s, _deg_h; t_ms, t_us, t_ns)",
     empty: "no samples in it",
     bad_cell: |error, value| match value.matches(':').count() > 1 {
-        _ if !error.remedies.is_empty() => error,
+        _ if error.advice().is_some() => error,
         true => {
-            error.advice("write the time in seconds, from any instant on, and name the column t_s")
+            error.or_hint("write the time in seconds, from any instant on, and name the column t_s")
         }
         false => error
-            .setting(Setting::RemoveLine)
-            .advice("record again: a sample that is made up would change the noise"),
+            .or(help::REMOVE_LINE)
+            .or_hint("record again: a sample that is made up would change the noise"),
     },
 };
 
@@ -258,7 +259,7 @@ pub(in crate::formats) fn load(
     path: &Path,
     options: &ReadOptions,
     dictionary: &Dictionary,
-) -> Result<Table, FileError> {
+) -> Result<Table, Failure> {
     let wanted = options.channels.as_ref();
     let is_unwanted = |q: &Quantity| {
         let own = Channel::named(q.name);
@@ -285,18 +286,17 @@ pub(in crate::formats) fn load(
             "no accelerometer or gyroscope column among {}",
             names.join(", ")
         );
-        let place = Place::Line(table.header_line.max(1));
-        return Err(
-            FileError::new(table.path, place, Kind::Columns(message.into()))
-                .advice(dictionary.advice)
-                .setting(Setting::ColumnNames),
-        );
+        return Err(table
+            .refused(message)
+            .passing_over(NO_COLUMN)
+            .or_hint(dictionary.advice)
+            .or(help::COLUMN_NAMES));
     }
     Ok(table)
 }
 
 /// A column without a unit that cannot be known.
-fn no_unit(table: &Table, column: &str) -> FileError {
+fn no_unit(table: &Table, column: &str) -> Failure {
     let units = if column.to_lowercase().starts_with('a') {
         "end its name in _m_s2, _g or _mg"
     } else {
@@ -304,25 +304,22 @@ fn no_unit(table: &Table, column: &str) -> FileError {
     };
     table
         .refused(format!("column \"{column}\" has no unit in its name"))
-        .advice(units)
-        .setting(Setting::ColumnNames)
+        .or_hint(units)
+        .or(help::COLUMN_NAMES)
 }
 
 /// Fewer samples than are needed.
-fn too_short(path: &str, samples: usize, needed: usize) -> FileError {
+fn too_short(path: &str, samples: usize, needed: usize) -> Failure {
     let message = format!("{samples} samples, but {needed} are needed");
-    FileError::contents(path, Place::Within, message)
-        .advice("record for longer, or ask for fewer scales")
+    Failure::contents(path, Place::Within, message)
+        .or_hint("record for longer, or ask for fewer scales")
 }
 
 /// Reads recordings; those of a directory in name order (numbers in names by value). All are held.
 ///
 /// # Errors
-/// When a file cannot be read, or holds what no sound recording can: [`FileError`].
-pub fn read(
-    paths: &[PathBuf],
-    options: &ReadOptions,
-) -> Result<(Vec<Recording>, Report), FileError> {
+/// When a file cannot be read, or holds what no sound recording can: [`Failure`].
+pub fn read(paths: &[PathBuf], options: &ReadOptions) -> Result<(Vec<Recording>, Report), Failure> {
     visit(paths, options, &|recording| recording, &|_, _| {})
 }
 
@@ -333,13 +330,13 @@ const AT_ONCE: usize = 8;
 /// time. What `look` returned is in the order of the files. `tell` is told how many files are done, and of how many, from 0 on.
 ///
 /// # Errors
-/// When a file cannot be read, or holds what no sound recording can: [`FileError`].
+/// When a file cannot be read, or holds what no sound recording can: [`Failure`].
 pub(crate) fn visit<T: Send>(
     paths: &[PathBuf],
     options: &ReadOptions,
     look: &(dyn Fn(Recording) -> T + Sync),
     tell: &dyn Fn(usize, usize),
-) -> Result<(Vec<T>, Report), FileError> {
+) -> Result<(Vec<T>, Report), Failure> {
     let files = files::expand(paths)?;
     let (mut looks, mut report) = (Vec::new(), Report::default());
     tell(0, files.len());
@@ -351,23 +348,10 @@ pub(crate) fn visit<T: Send>(
             .collect();
         for (file, outcome) in some.iter().zip(outcomes) {
             match outcome {
-                // The output of this very command, say, when it goes to a file in the directory.
-                Err(FileError {
-                    kind: Kind::Empty(_),
-                    ..
-                }) if file.from_directory => {
-                    report
-                        .warnings
-                        .push(format!("{}: passed over, it is empty", file.path.display()));
-                }
-                Err(FileError {
-                    kind: Kind::Columns(_),
-                    ..
-                }) if file.from_directory => {
-                    let text = format!(
-                        "{}: passed over, no column is a known one",
-                        file.path.display()
-                    );
+                // the output of this very command, say, when it goes to a file in the directory
+                Err(e) if file.from_directory && e.passed_over().is_some() => {
+                    let (path, why) = (file.path.display(), e.passed_over().unwrap_or_default());
+                    let text = format!("{path}: passed over, {why}");
                     report.warnings.push(text);
                 }
                 outcome => {
@@ -396,7 +380,7 @@ fn held<T>(
     path: &Path,
     options: &ReadOptions,
     look: &(dyn Fn(Recording) -> T + Sync),
-) -> Result<(FileReport, Vec<T>), FileError> {
+) -> Result<(FileReport, Vec<T>), Failure> {
     let (prepared, mut report) = Prepared::new(load(path, options, &DICTIONARY)?, options)?;
     path.clone_into(&mut report.path);
     Ok((

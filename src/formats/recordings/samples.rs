@@ -4,7 +4,7 @@ use super::report::{FileReport, name_of};
 use super::timing::{self, Timing};
 use super::{ReadOptions, channel_of, no_unit, too_short};
 use crate::formats::table::{Column, Table};
-use crate::formats::{FileError, Place, Setting};
+use crate::formats::{Failure, Place, help};
 use crate::report::six_digits;
 use nav_sim_signal::imu::{Channel, Recording, Sensor, Signal};
 use nav_sim_signal::units::STANDARD_GRAVITY;
@@ -36,7 +36,7 @@ impl Prepared {
     pub(super) fn new(
         mut raw: Table,
         options: &ReadOptions,
-    ) -> Result<(Self, FileReport), FileError> {
+    ) -> Result<(Self, FileReport), Failure> {
         let mut report = FileReport::new(&raw);
         let timing = timing::timing(&mut raw, options, &mut report)?;
         raw.columns
@@ -155,7 +155,7 @@ fn pieces(
     timing: &Timing,
     options: &ReadOptions,
     report: &mut FileReport,
-) -> Result<Vec<Range<usize>>, FileError> {
+) -> Result<Vec<Range<usize>>, Failure> {
     let skip = ((options.skip_s.max(0.0) * timing.rate_hz).round() as usize).min(samples);
     let inner = timing.breaks.iter().copied().filter(|b| *b > skip);
     let ends: Vec<usize> = std::iter::once(skip)
@@ -173,9 +173,9 @@ fn pieces(
         let message = format!(
             "leaving out the first {skip_s} s leaves {longest} samples of {seconds} s, but {needed} are needed"
         );
-        return Err(FileError::contents(path, Place::Within, message)
-            .setting(Setting::Skip)
-            .advice("a longer recording"));
+        return Err(Failure::contents(path, Place::Within, message)
+            .or(help::SKIP)
+            .or_hint("a longer recording"));
     }
     if longest < needed {
         return Err(too_short(path, longest, needed));
@@ -195,7 +195,7 @@ fn pieces(
 const NO_GRAVITY: f64 = 0.3;
 
 /// What brings each column to SI units; refuses dead axes.
-fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, FileError> {
+fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
     let from_gravity = gravity_factor(raw)?;
     let factor = |column: &Column| {
         let channel = column.quantity.name;
@@ -204,11 +204,9 @@ fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, FileError> {
                 "{channel} (column \"{}\") is dead: every sample is {value}",
                 column.name
             );
-            return Err(
-                FileError::contents(raw.path.as_str(), Place::Within, message)
-                    .setting(Setting::Channels)
-                    .advice("record again"),
-            );
+            return Err(Failure::contents(raw.path.as_str(), Place::Within, message)
+                .or(help::CHANNELS)
+                .or_hint("record again"));
         }
         let per_sample = if column.quantity.per_sample {
             rate_hz
@@ -223,7 +221,7 @@ fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, FileError> {
 }
 
 /// The unit of accelerometer columns that do not say it, from the length of their mean.
-pub(in crate::formats) fn gravity_factor(raw: &Table) -> Result<f64, FileError> {
+pub(in crate::formats) fn gravity_factor(raw: &Table) -> Result<f64, Failure> {
     let is_unnamed = |c: &&Column| c.factor.is_none() && channel_of(c).is_some();
     let unnamed: Vec<&Column> = raw.columns.iter().filter(is_unnamed).collect();
     let Some(first) = unnamed.first() else {
@@ -304,7 +302,7 @@ fn norm(vector: &[f64]) -> f64 {
 }
 
 /// Static specific force is gravity, or nothing where the mean was removed before; rates are small.
-fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), FileError> {
+fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Failure> {
     let means_of_sensor = |sensor| -> Vec<f64> {
         means
             .iter()
@@ -323,9 +321,9 @@ fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Fi
             "accelerometers and gyroscopes are exchanged: |f| is {f:.4} m/s², the mean rate {rate:.4} rad/s"
         );
         return Err(
-            FileError::contents(report.file.as_str(), Place::Within, message)
-                .advice("without names the first three columns are the accelerometers")
-                .setting(Setting::ColumnNames),
+            Failure::contents(report.file.as_str(), Place::Within, message)
+                .or_hint("without names the first three columns are the accelerometers")
+                .or(help::COLUMN_NAMES),
         );
     }
     if accel.len() == 3 {
@@ -340,7 +338,7 @@ fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Fi
     Ok(())
 }
 
-pub(in crate::formats) fn check_gravity(path: &str, norm: f64) -> Result<(), FileError> {
+pub(in crate::formats) fn check_gravity(path: &str, norm: f64) -> Result<(), Failure> {
     let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
     if near(STANDARD_GRAVITY) || norm < NO_GRAVITY {
         return Ok(());
@@ -355,12 +353,12 @@ pub(in crate::formats) fn check_gravity(path: &str, norm: f64) -> Result<(), Fil
         "wrong unit, or the sensor was moving"
     };
     let message = format!("static |f| is {norm:.4} m/s², far from 9.81 m/s²: {guess}");
-    Err(FileError::contents(path, Place::Within, message)
-        .advice("name the unit in the columns: accel_x_m_s2, accel_x_g or accel_x_mg"))
+    Err(Failure::contents(path, Place::Within, message)
+        .or_hint("name the unit in the columns: accel_x_m_s2, accel_x_g or accel_x_mg"))
 }
 
 /// Replicates of one sensor have one rate (0.5 % allows for clocks).
-pub(super) fn same_rate(files: &[FileReport]) -> Result<(), FileError> {
+pub(super) fn same_rate(files: &[FileReport]) -> Result<(), Failure> {
     let Some(first) = files.first() else {
         return Ok(());
     };
@@ -377,8 +375,8 @@ pub(super) fn same_rate(files: &[FileReport]) -> Result<(), FileError> {
                 six_digits(first.rate_hz)
             );
             Err(
-                FileError::contents(other.file.as_str(), Place::Itself, message)
-                    .advice("calibrate recordings of one rate at a time, or resample them"),
+                Failure::contents(other.file.as_str(), Place::Itself, message)
+                    .or_hint("calibrate recordings of one rate at a time, or resample them"),
             )
         }
     }

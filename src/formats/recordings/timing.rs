@@ -3,7 +3,7 @@
 use super::report::FileReport;
 use super::{Gaps, ReadOptions, too_short};
 use crate::formats::table::{Column, Table};
-use crate::formats::{FileError, Place, Setting};
+use crate::formats::{Failure, Place, help};
 use crate::report::six_digits;
 
 /// When the samples were taken.
@@ -21,12 +21,11 @@ pub(super) fn timing(
     raw: &mut Table,
     options: &ReadOptions,
     report: &mut FileReport,
-) -> Result<Timing, FileError> {
+) -> Result<Timing, Failure> {
     if let Some(rate_hz) = options.rate_hz.filter(|r| !(r.is_finite() && *r > 0.0)) {
         let message = format!("{rate_hz} Hz is not a sample rate");
         return Err(
-            FileError::contents(raw.path.as_str(), Place::Within, message)
-                .setting(Setting::WrongRate),
+            Failure::contents(raw.path.as_str(), Place::Within, message).or(help::WRONG_RATE)
         );
     }
     let [time, counter, ticks] = ["t_s", "counter", "ticks"].map(|clock| raw.take(clock));
@@ -59,10 +58,7 @@ pub(super) fn timing(
         }
         (None, _, None, None) => {
             let message = "no time column, and no rate is given";
-            return Err(
-                FileError::contents(raw.path.as_str(), Place::Within, message)
-                    .setting(Setting::Rate),
-            );
+            return Err(Failure::contents(raw.path.as_str(), Place::Within, message).or(help::RATE));
         }
     };
     let timing = clock.check(raw, options)?;
@@ -81,7 +77,7 @@ pub(super) fn timing(
 }
 
 /// Refuses a rate that is given where the file, or the manifest beside it, states another.
-fn agree(raw: &Table, options: &ReadOptions, report: &mut FileReport) -> Result<(), FileError> {
+fn agree(raw: &Table, options: &ReadOptions, report: &mut FileReport) -> Result<(), Failure> {
     let Some((given, (stated, source))) = options.rate_hz.zip(raw.rate_hz) else {
         return Ok(());
     };
@@ -92,8 +88,7 @@ fn agree(raw: &Table, options: &ReadOptions, report: &mut FileReport) -> Result<
     );
     if difference > DISAGREEING {
         return Err(
-            FileError::contents(raw.path.as_str(), Place::Within, message)
-                .setting(Setting::WrongRate),
+            Failure::contents(raw.path.as_str(), Place::Within, message).or(help::WRONG_RATE)
         );
     }
     if difference > ROUNDED {
@@ -242,14 +237,14 @@ impl Clock {
         ((self.start + self.since[sample] * self.unit_s) * 1e9).round() / 1e9
     }
 
-    fn check(&self, raw: &Table, options: &ReadOptions) -> Result<Checked, FileError> {
+    fn check(&self, raw: &Table, options: &ReadOptions) -> Result<Checked, Failure> {
         let steps = || self.since.windows(2).map(|w| w[1] - w[0]);
         let step_at = |i: usize| (raw.lines.of(i + 1), self.time_of(i), self.time_of(i + 1));
         if let Some(i) = steps().position(|s| s < 0.0) {
             let (line, from, to) = step_at(i);
             let message = format!("time goes back from {from} s to {to} s");
-            return Err(FileError::contents(raw.path.as_str(), line, message)
-                .advice("sort the rows by time, or split the file where the clock was set back"));
+            return Err(Failure::contents(raw.path.as_str(), line, message)
+                .or_hint("sort the rows by time, or split the file where the clock was set back"));
         }
         let median = median_step(&self.since);
         if self.since.len() < 2 {
@@ -285,9 +280,9 @@ impl Clock {
                 n => format!(" ({n} such steps in all)"),
             };
             let message = format!("{what}, the median step is {step} s{more}");
-            return Err(
-                FileError::contents(raw.path.as_str(), line, message).setting(Setting::Gaps)
-            );
+            return Err(Failure::contents(raw.path.as_str(), line, message)
+                .or(help::GAPS)
+                .or(help::GAPS_ELSEWHERE));
         }
         let rate = |step: f64| rounded(1.0 / (step * self.unit_s));
         if let Some([first, last]) =
@@ -297,7 +292,7 @@ impl Clock {
                 "the rate changes from {first} Hz in the first tenth to {last} Hz in the last"
             );
             return Err(
-                FileError::contents(raw.path.as_str(), Place::Within, message).advice(
+                Failure::contents(raw.path.as_str(), Place::Within, message).or_hint(
                     "split the file where the rate changes: a wavelet variance is of one rate",
                 ),
             );
@@ -319,8 +314,7 @@ impl Clock {
                 six_digits(found)
             );
             return Err(
-                FileError::contents(raw.path.as_str(), Place::Within, message)
-                    .setting(Setting::WrongRate),
+                Failure::contents(raw.path.as_str(), Place::Within, message).or(help::WRONG_RATE)
             );
         }
         let holes = holes.unwrap_or_default();
@@ -352,14 +346,14 @@ impl Clock {
     }
 
     /// A clock that does not advance, or by coarser steps than those of the samples.
-    fn still(&self, path: &str) -> FileError {
+    fn still(&self, path: &str) -> Failure {
         let message = format!(
             "column \"{}\" does not advance: its median step is 0",
             self.name
         );
-        let error = FileError::contents(path, Place::Within, message);
+        let error = Failure::contents(path, Place::Within, message);
         if mean_step(&self.since) > 0.0 {
-            error.setting(Setting::Gaps)
+            error.or(help::GAPS).or(help::GAPS_ELSEWHERE)
         } else {
             error
         }

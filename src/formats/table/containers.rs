@@ -2,7 +2,7 @@
 
 use super::text::{layout, number};
 use super::{Asked, BETWEEN, Dictionary, Table, shown, unreadable};
-use crate::formats::{FileError, Kind, Place, Setting, logs, source};
+use crate::formats::{Failure, Place, help, logs, source};
 use chrono::NaiveDateTime;
 use nav_sim_logs::Clock;
 use nav_sim_logs::npy::{self, Array};
@@ -16,10 +16,10 @@ fn of_columns(
     columns: Vec<(String, Vec<f64>)>,
     dictionary: &Dictionary,
     asked: &Asked<'_>,
-) -> Result<Table, FileError> {
+) -> Result<Table, Failure> {
     let names: Vec<String> = match asked.names {
         Some(names) if names.len() != columns.len() => {
-            return Err(FileError::row_length(path, 1, columns.len(), names.len()));
+            return Err(Failure::row_length(path, 1, columns.len(), names.len()));
         }
         Some(names) => names.to_vec(),
         None => columns.iter().map(|(name, _)| name.clone()).collect(),
@@ -50,7 +50,7 @@ pub(super) fn npy(
     path: &Path,
     dictionary: &Dictionary,
     asked: &Asked<'_>,
-) -> Result<Table, FileError> {
+) -> Result<Table, Failure> {
     let name = path.display().to_string();
     let array = npy::read(path).map_err(|e| logs::refused(path, e))?;
     let count = match array.shape[..] {
@@ -60,7 +60,7 @@ pub(super) fn npy(
             let dimensions = array.shape.len();
             let message =
                 format!("an array of {dimensions} dimensions, samples × columns are needed");
-            return Err(FileError::contents(name, Place::Within, message));
+            return Err(Failure::contents(name, Place::Within, message));
         }
     };
     let manifest = Manifest::beside(path);
@@ -72,13 +72,12 @@ pub(super) fn npy(
         .or_else(|| layout(dictionary.array, count))
         .ok_or_else(|| {
             let message = format!("an array of {count} columns, which names are not known");
-            let kind = Kind::Header(message.into());
-            FileError::new(name.as_str(), Place::Within, kind)
-                .advice(dictionary.advice)
-                .setting(Setting::ColumnNames)
+            Failure::contents(&name, Place::Within, message)
+                .or_hint(dictionary.advice)
+                .or(help::COLUMN_NAMES)
         })?;
     if names.len() != count {
-        return Err(FileError::row_length(&name, 1, count, names.len()));
+        return Err(Failure::row_length(&name, 1, count, names.len()));
     }
     let without_names = Asked {
         names: None,
@@ -159,7 +158,7 @@ pub(super) fn npz(
     path: &Path,
     dictionary: &Dictionary,
     asked: &Asked<'_>,
-) -> Result<Table, FileError> {
+) -> Result<Table, Failure> {
     use nav_sim_logs::{Error, npz::Archive};
     /// Name of the array of a single number that states the rate (Hz).
     const RATE: &str = "rate_hz";
@@ -204,11 +203,11 @@ pub(super) fn parquet(
     path: &Path,
     dictionary: &Dictionary,
     asked: &Asked<'_>,
-) -> Result<Table, FileError> {
+) -> Result<Table, Failure> {
     use parquet::file::reader::{FileReader, SerializedFileReader};
     let name = path.display().to_string();
     let damaged = |e: parquet::errors::ParquetError| {
-        FileError::contents(name.as_str(), Place::Within, e.to_string())
+        Failure::contents(name.as_str(), Place::Within, e.to_string())
     };
     let file = std::fs::File::open(path).map_err(|e| unreadable(path, e))?;
     let reader = SerializedFileReader::new(file).map_err(damaged)?;
@@ -222,7 +221,7 @@ pub(super) fn parquet(
             .collect(),
     };
     if names.len() != schema.num_columns() {
-        return Err(FileError::row_length(
+        return Err(Failure::row_length(
             &name,
             1,
             schema.num_columns(),
@@ -247,7 +246,7 @@ pub(super) fn parquet(
                 parquet::record::Field::Long(value) => *value as f64,
                 _ => {
                     let message = format!("column \"{of_column}\" has no numbers");
-                    return Err(FileError::contents(name, Place::Within, message));
+                    return Err(Failure::contents(name, Place::Within, message));
                 }
             };
             table.push(column, value, line, dictionary)?;
@@ -279,7 +278,7 @@ pub(super) fn oxts(
     directory: &Path,
     dictionary: &Dictionary,
     asked: &Asked<'_>,
-) -> Result<Table, FileError> {
+) -> Result<Table, Failure> {
     let name = directory.display().to_string();
     let times = oxts_times(&directory.join("timestamps.txt"))?;
     let data = directory.join("data");
@@ -290,7 +289,7 @@ pub(super) fn oxts(
     if files.len() != times.len() {
         let (samples, times) = (files.len(), times.len());
         let message = format!("{samples} samples in data, {times} times in timestamps.txt");
-        return Err(FileError::contents(name, Place::Within, message));
+        return Err(Failure::contents(name, Place::Within, message));
     }
     let mut columns = vec![("t_s".to_owned(), times)];
     columns.extend(OXTS.map(|(name, _)| (name.to_owned(), Vec::new())));
@@ -302,7 +301,7 @@ pub(super) fn oxts(
             let finite = number(cell.as_bytes(), b' ').filter(|x| x.is_finite());
             values.push(finite.ok_or_else(|| {
                 let (path, cell) = (path.display().to_string(), format!("\"{cell}\""));
-                FileError::cell(&path, 1, name, cell, "is not a finite number")
+                Failure::cell(&path, 1, name, cell, "is not a finite number")
             })?);
         }
     }
@@ -314,14 +313,14 @@ pub(super) fn oxts(
 }
 
 /// Times of the samples (s since 1970).
-fn oxts_times(path: &Path) -> Result<Vec<f64>, FileError> {
+fn oxts_times(path: &Path) -> Result<Vec<f64>, Failure> {
     let text = source::text(path).map_err(|e| unreadable(path, e))?;
     let time = |(i, line): (usize, &str)| {
         let parsed = NaiveDateTime::parse_from_str(line.trim(), "%Y-%m-%d %H:%M:%S%.f");
         let found = parsed.map_err(|_| {
             let message = format!("\"{}\" is not a time", shown(line, 40));
-            FileError::contents(path.display().to_string(), i + 1, message)
-                .advice("2011-09-26 13:02:25.964389445")
+            Failure::contents(path.display().to_string(), i + 1, message)
+                .or_hint("2011-09-26 13:02:25.964389445")
         })?;
         let since = found.and_utc();
         Ok(since.timestamp() as f64 + 1e-9 * f64::from(since.timestamp_subsec_nanos()))
@@ -338,7 +337,7 @@ pub(super) fn log(
     path: &Path,
     dictionary: &Dictionary,
     asked: &Asked<'_>,
-) -> Result<Table, FileError> {
+) -> Result<Table, Failure> {
     let refused = |e| logs::refused(path, e);
     let log = logs::open(path)?;
     let mut samples = log

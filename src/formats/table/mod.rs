@@ -13,8 +13,10 @@ pub(crate) use quantity::{ACCELERATION, ANGLE, ANGULAR_RATE, NONE, SPEED, TIME};
 pub(crate) use quantity::{Bare, Quantity, Units, normalised};
 
 use super::suggest::nearest;
-use super::{FileError, Kind, Place, logs, source};
+use super::{Failure, Place, help, logs, source};
+use crate::app::is_damage;
 use nav_sim_logs::Kind as LogKind;
+use std::fmt::Display;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -33,7 +35,7 @@ pub(crate) struct Dictionary {
     /// Words for a table without rows.
     pub(crate) empty: &'static str,
     /// Advice of a cell that is refused.
-    pub(crate) bad_cell: fn(FileError, &str) -> FileError,
+    pub(crate) bad_cell: fn(Failure, &str) -> Failure,
 }
 
 /// Numbers that a table may hold.
@@ -129,7 +131,7 @@ pub(crate) fn read(
     path: &Path,
     dictionary: &Dictionary,
     asked: &Asked<'_>,
-) -> Result<Table, FileError> {
+) -> Result<Table, Failure> {
     let ends_in = |ending: &str| {
         path.extension()
             .is_some_and(|e| e.eq_ignore_ascii_case(ending))
@@ -145,8 +147,8 @@ pub(crate) fn read(
         #[cfg(not(feature = "parquet"))]
         None if ends_in("parquet") => {
             let message = "is Apache Parquet, which this build does not read";
-            let refusal = FileError::contents(name, Place::Itself, message);
-            Err(refusal.advice("build with --features parquet, or write CSV"))
+            let refusal = Failure::contents(name, Place::Itself, message);
+            Err(refusal.or_hint("build with --features parquet, or write CSV"))
         }
         None if is_oxts(path) => containers::oxts(path, dictionary, asked),
         None => {
@@ -166,22 +168,20 @@ pub(crate) fn parse(
     text: &str,
     dictionary: &Dictionary,
     asked: &Asked<'_>,
-) -> Result<Table, FileError> {
+) -> Result<Table, Failure> {
     let reader = Box::new(Cursor::new(text.to_owned()));
     text::read(name, reader, dictionary, asked)?.filled(dictionary)
 }
 
 /// What the system said of a table, with what helps.
-pub(crate) fn unreadable(path: &Path, e: std::io::Error) -> FileError {
-    use std::io::ErrorKind as K;
-    let kind = e.kind();
-    let error = FileError::io(path, e);
-    match kind {
-        K::FileTooLarge => error.advice("write what comes through a pipe to a file first"),
-        kind if source::is_damage(kind) => error.advice_instead(
+pub(crate) fn unreadable(path: &Path, e: std::io::Error) -> Failure {
+    let is_cut = is_damage(e.kind()) && e.kind() != std::io::ErrorKind::FileTooLarge;
+    let failure = Failure::io(path, e);
+    match is_cut {
+        true => failure.hint(
             "the file is cut off, or not gzipped though it ends in .gz: copy it again, or rename it",
         ),
-        _ => error,
+        false => failure,
     }
 }
 
@@ -199,6 +199,15 @@ pub(crate) fn shown(text: &str, longest: usize) -> String {
     }
 }
 
+/// Reasons for which a file of a directory is passed over.
+pub(crate) const NO_COLUMN: &str = "no column is a known one";
+const IS_EMPTY: &str = "it is empty";
+
+/// A table without rows.
+fn empty(path: &str, dictionary: &Dictionary) -> Failure {
+    Failure::contents(path, Place::Within, dictionary.empty).passing_over(IS_EMPTY)
+}
+
 /// Beyond this a number is no measurement, and its square may be no number.
 const LARGEST: f64 = 1e100;
 const BEYOND: &str = "is beyond 1e100, no measurement";
@@ -214,7 +223,7 @@ impl Table {
         dictionary: &Dictionary,
         asked: &Asked<'_>,
         is_si: bool,
-    ) -> Result<(Self, Vec<Option<usize>>), FileError> {
+    ) -> Result<(Self, Vec<Option<usize>>), Failure> {
         let mut table = Self {
             path: path.to_owned(),
             header_line,
@@ -255,7 +264,7 @@ impl Table {
     }
 
     /// Keeps one column of each quantity.
-    fn choose(&mut self, places: &mut Vec<usize>) -> Result<(), FileError> {
+    fn choose(&mut self, places: &mut Vec<usize>) -> Result<(), Failure> {
         let rank = |c: &Column| c.quantity.rank.map(|rank| (rank, c.factor.is_none()));
         let mut k = 1;
         while k < self.columns.len() {
@@ -276,7 +285,7 @@ impl Table {
             let (Some(first), Some(second)) = (rank(earlier), rank(later)) else {
                 let (a, b) = (&earlier.name, &later.name);
                 let message = format!("columns \"{a}\" and \"{b}\" both give {name}");
-                return Err(self.refused(message).advice("remove one of them"));
+                return Err(self.refused(message).or_hint("remove one of them"));
             };
             let out = if second < first { i } else { k };
             places.remove(out);
@@ -286,7 +295,7 @@ impl Table {
     }
 
     /// A column that is an axis by its name, but in a unit that is not known, must not be dropped in silence.
-    fn no_unknown_unit(&self, dictionary: &Dictionary, asked: &Asked<'_>) -> Result<(), FileError> {
+    fn no_unknown_unit(&self, dictionary: &Dictionary, asked: &Asked<'_>) -> Result<(), Failure> {
         for name in &self.ignored {
             let plain = normalised(name);
             let is_meant = |q: &&Quantity| {
@@ -303,9 +312,9 @@ impl Table {
                 let message = format!("column \"{name}\" is in a unit that is not known");
                 return Err(self
                     .refused(message)
-                    .advice(format!("end its name in one of {}", endings.join(", ")))
-                    .setting(super::Setting::ColumnNames)
-                    .setting(super::Setting::Channels));
+                    .or_hint(format!("end its name in one of {}", endings.join(", ")))
+                    .or(help::COLUMN_NAMES)
+                    .or(help::CHANNELS));
             }
         }
         Ok(())
@@ -318,7 +327,7 @@ impl Table {
         value: f64,
         line: u64,
         dictionary: &Dictionary,
-    ) -> Result<(), FileError> {
+    ) -> Result<(), Failure> {
         self.push_written(column, value, None, line, dictionary)
     }
 
@@ -330,7 +339,7 @@ impl Table {
         written: Option<&[u8]>,
         line: u64,
         dictionary: &Dictionary,
-    ) -> Result<(), FileError> {
+    ) -> Result<(), Failure> {
         let own = &mut self.columns[column];
         let is_measured = value.is_finite() && value.abs() <= LARGEST;
         if is_measured || dictionary.numbers != Numbers::Finite || own.quantity.may_be_empty {
@@ -356,13 +365,17 @@ impl Table {
         value: &str,
         reason: &str,
         dictionary: &Dictionary,
-    ) -> FileError {
-        let error = FileError::cell(&self.path, line, column, value, reason);
+    ) -> Failure {
+        let mut error = Failure::cell(&self.path, line, column, value, reason);
+        let point = value.trim_matches('"').replacen(',', ".", 1);
+        if point.len() + 2 == value.len() && value.contains(',') && point.parse::<f64>().is_ok() {
+            error = error.or_hint("write decimals with a point: 0.5, not 0,5");
+        }
         (dictionary.bad_cell)(error, value)
     }
 
     /// Refuses a table without rows, or whose rows end before others.
-    fn filled(mut self, dictionary: &Dictionary) -> Result<Self, FileError> {
+    fn filled(mut self, dictionary: &Dictionary) -> Result<Self, Failure> {
         let is_clock =
             |c: &Column| !(c.quantity.may_be_empty && c.values.iter().any(|v| v.is_nan()));
         self.columns.retain(is_clock);
@@ -375,20 +388,16 @@ impl Table {
                 first.name,
                 first.values.len()
             );
-            return Err(FileError::contents(self.path, Place::Within, message));
+            return Err(Failure::contents(self.path, Place::Within, message));
         }
         if self.columns.first().is_some_and(|c| c.values.is_empty()) {
-            return Err(FileError::new(
-                self.path,
-                Place::Within,
-                Kind::Empty(dictionary.empty),
-            ));
+            return Err(empty(&self.path, dictionary));
         }
         Ok(self)
     }
 
     /// Refuses columns whose rows, so many or more, do not fit into the memory that is free.
-    fn fits(&self, rows: u64) -> Result<(), FileError> {
+    fn fits(&self, rows: u64) -> Result<(), Failure> {
         let bytes = |rows: u64| rows.saturating_mul((size_of::<f64>() * self.columns.len()) as u64);
         let held = bytes(self.rows() as u64);
         let free = free_memory().map_or(u64::MAX, |free| free.saturating_add(held));
@@ -397,13 +406,13 @@ impl Table {
         }
         let [needed, free] = [bytes(rows), free].map(|bytes| bytes.div_ceil(1 << 20));
         let message = format!("its samples need {needed} MiB of memory, and {free} MiB are free");
-        let refusal = FileError::contents(self.path.as_str(), Place::Within, message);
-        Err(refusal.setting(super::Setting::FewerChannels))
+        let refusal = Failure::contents(self.path.as_str(), Place::Within, message);
+        Err(refusal.or(help::FEWER_CHANNELS))
     }
 
     /// Something wrong with the header.
-    pub(crate) fn refused(&self, message: impl Into<Box<str>>) -> FileError {
-        FileError::contents(self.path.as_str(), self.header_line.max(1), message)
+    pub(crate) fn refused(&self, message: impl Display) -> Failure {
+        Failure::contents(self.path.as_str(), self.header_line.max(1), message)
     }
 
     pub(crate) fn rows(&self) -> usize {
@@ -456,21 +465,20 @@ impl Table {
         &self,
         needed: impl IntoIterator<Item = &'a str>,
         dictionary: &Dictionary,
-    ) -> Result<(), FileError> {
+    ) -> Result<(), Failure> {
         let missing: Vec<&str> = needed.into_iter().filter(|q| !self.has(q)).collect();
         let slip = |name: &String| Some((name.clone(), nearest(name, missing.iter().copied())?));
         if let Some((name, meant)) = self.ignored.iter().find_map(slip) {
             let refusal = self.refused(format!("unknown column \"{name}\""));
-            return Err(refusal.advice(format!("did you mean \"{meant}\"?")));
+            return Err(refusal.or_hint(format!("did you mean \"{meant}\"?")));
         }
         let columns = match &missing[..] {
             [] => return Ok(()),
             [one] => format!("column {one} is missing"),
             many => format!("columns {} are missing", many.join(", ")),
         };
-        let kind = Kind::Columns(columns.into());
-        let refusal = FileError::new(self.path.as_str(), self.header_line.max(1), kind);
-        Err(refusal.advice(dictionary.advice))
+        let refusal = self.refused(columns).passing_over(NO_COLUMN);
+        Err(refusal.or_hint(dictionary.advice))
     }
 }
 

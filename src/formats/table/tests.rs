@@ -9,7 +9,7 @@ fn found(name: &str) -> Option<(&'static str, Option<f64>)> {
     quantity::find(DICTIONARY.quantities, name).map(|(quantity, factor)| (quantity.name, factor))
 }
 
-fn with_header(names: &[&str], unwanted: &[&str]) -> Result<Table, FileError> {
+fn with_header(names: &[&str], unwanted: &[&str]) -> Result<Table, Failure> {
     let names: Vec<String> = names.iter().map(|n| (*n).to_owned()).collect();
     let is_unwanted = |q: &Quantity| unwanted.contains(&q.name);
     let asked = Asked {

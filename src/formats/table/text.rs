@@ -1,8 +1,8 @@
 //! Tables of text: RFC 4180 with `,` `;` tab or blanks, comments and other lines before the header.
 
 use super::quantity::find;
-use super::{Asked, BETWEEN, Dictionary, Numbers, Table, shown, unreadable};
-use crate::formats::{FileError, Kind, Place, Setting};
+use super::{Asked, BETWEEN, Dictionary, Numbers, Table, empty, shown, unreadable};
+use crate::formats::{Failure, Place, help};
 use std::io::{BufRead, Cursor, Read};
 use std::path::Path;
 
@@ -20,7 +20,7 @@ pub(super) fn read(
     mut reader: Reader,
     dictionary: &Dictionary,
     asked: &Asked<'_>,
-) -> Result<Table, FileError> {
+) -> Result<Table, Failure> {
     let head = Head::read(path, &mut reader, dictionary, asked)?;
     let (mut table, places) = Table::new(
         path,
@@ -70,7 +70,7 @@ impl Head {
         reader: &mut Reader,
         dictionary: &Dictionary,
         asked: &Asked<'_>,
-    ) -> Result<Self, FileError> {
+    ) -> Result<Self, Failure> {
         let mut head = Self {
             names: Vec::new(),
             delimiter: b',',
@@ -96,12 +96,11 @@ impl Head {
                 return Ok(head);
             }
             if is_end {
-                let kind = Kind::Empty(dictionary.empty);
-                return Err(FileError::new(path, Place::Within, kind));
+                return Err(empty(path, dictionary));
             }
             if let Some(what) = no_text(&bytes) {
                 let message = format!("is no table of text: {what}");
-                return Err(FileError::contents(path, Place::Itself, message).advice(
+                return Err(Failure::contents(path, Place::Itself, message).or_hint(
                     "save it as CSV in UTF-8, one row a line; arrays end in .npy, gzipped tables in .gz",
                 ));
             }
@@ -168,7 +167,7 @@ impl Head {
         reader: Reader,
         places: &[Option<usize>],
         dictionary: &Dictionary,
-    ) -> Result<(), FileError> {
+    ) -> Result<(), Failure> {
         let path = table.path.clone();
         let rows = Cursor::new(self.first_row.clone()).chain(reader);
         let rows: Box<dyn Read> = match self.delimiter {
@@ -212,7 +211,7 @@ impl Head {
                     table.assumptions.push(text);
                     break;
                 }
-                return Err(FileError::row_length(&path, line, found, expected));
+                return Err(Failure::row_length(&path, line, found, expected));
             }
             if row % BETWEEN == 0 {
                 let all = (row as u64).saturating_mul(length) / rows.position().byte().max(1);
@@ -252,10 +251,9 @@ fn no_header(
     cells: &[String],
     text: &str,
     dictionary: &Dictionary,
-) -> FileError {
-    let refused = |message: String| {
-        FileError::new(path, line, Kind::Header(message.into())).advice(dictionary.advice)
-    };
+) -> Failure {
+    let refused =
+        |message: String| Failure::contents(path, line, message).or_hint(dictionary.advice);
     if !dictionary.bare.is_empty() {
         return refused(format!("{} columns without a header", cells.len()));
     }
@@ -263,7 +261,7 @@ fn no_header(
     refused(format!(
         "a header that names the columns is missing, found \"{found}\""
     ))
-    .setting(Setting::ColumnNames)
+    .or(help::COLUMN_NAMES)
 }
 
 /// The rate in a comment such as `Update Rate: 100.0Hz`.

@@ -9,12 +9,13 @@ pub(crate) use values::{
     Between, Finite, NonNegative, OneOrEach, Positive, Share, Stationary, Version,
 };
 
-use super::error::{FileError, Kind, Place, Setting};
 use super::source;
 use super::suggest::nearest;
+use super::{Failure, Place, help};
 use nav_sim_signal::units::SettingError;
 use node::{Node, Refusal, What};
 use serde::de::DeserializeOwned;
+use std::fmt::Display;
 use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::Path;
@@ -57,13 +58,13 @@ impl Source {
     ///
     /// # Errors
     /// When it cannot be read.
-    pub(crate) fn read(path: &Path) -> Result<Self, FileError> {
+    pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let text = source::text(path).map_err(|e| {
             let kind = e.kind();
-            let error = FileError::io(path, e);
+            let error = Failure::io(path, e);
             match kind {
-                ErrorKind::NotFound => error.advice("check the path").setting(Setting::StartFiles),
-                ErrorKind::InvalidData => error.advice("a TOML file is text in UTF-8"),
+                ErrorKind::NotFound => error.or_hint("check the path").or(help::START_FILES),
+                ErrorKind::InvalidData => error.or_hint("a TOML file is text in UTF-8"),
                 _ => error,
             }
         })?;
@@ -90,13 +91,13 @@ impl Source {
     ///
     /// # Errors
     /// Line and column of what is not TOML; line, key and value of what is refused, a mistyped key with the nearest legal one.
-    pub(crate) fn get<T: DeserializeOwned>(&self) -> Result<T, FileError> {
+    pub(crate) fn get<T: DeserializeOwned>(&self) -> Result<T, Failure> {
         let table = DeTable::parse(&self.text).map_err(|e| self.syntax(&e))?;
         let value = DeValue::Table(table.into_inner());
         T::deserialize(Node(&value)).map_err(|refusal| self.explained(refusal))
     }
 
-    fn syntax(&self, e: &toml::de::Error) -> FileError {
+    fn syntax(&self, e: &toml::de::Error) -> Failure {
         let span = e.span().unwrap_or_default();
         let line_start = self.text[..span.start].rfind('\n').map_or(0, |i| i + 1);
         let column = self.text[line_start..span.start].chars().count() + 1;
@@ -106,7 +107,7 @@ impl Source {
             other => other.to_owned(),
         };
         let place = Place::Character(self.line(span.start) as u64, column as u64);
-        FileError::contents(self.path.as_str(), place, message)
+        Failure::contents(self.path.as_str(), place, message)
     }
 
     /// The line (from 1) a byte stands in.
@@ -129,44 +130,43 @@ impl Source {
     }
 
     /// Something wrong in the line of a key.
-    pub(crate) fn error(&self, key: &str, kind: Kind) -> FileError {
-        FileError::new(self.path.as_str(), self.line_of(key), kind)
+    pub(crate) fn error(&self, key: &str, message: impl Display) -> Failure {
+        Failure::contents(&self.path, self.line_of(key), message)
     }
 
     /// A refusal of the value of a key.
-    pub(crate) fn refused(&self, key: &str, reason: impl Into<Box<str>>) -> FileError {
+    pub(crate) fn refused(&self, key: &str, reason: impl Display) -> Failure {
         let (span, is_set) = self.place(key);
         let span = if is_set { span } else { span.start..span.start };
         self.refused_at(span, key, reason)
     }
 
-    fn refused_at(&self, span: Range<usize>, key: &str, reason: impl Into<Box<str>>) -> FileError {
-        let value = shown(self.text.get(span.clone()).unwrap_or_default()).into();
-        let kind = Kind::Value {
-            key: key.into(),
-            value,
-            reason: reason.into(),
-        };
-        FileError::new(self.path.as_str(), self.line(span.start), kind)
+    fn refused_at(&self, span: Range<usize>, key: &str, reason: impl Display) -> Failure {
+        let line = self.line(span.start);
+        let value = shown(self.text.get(span).unwrap_or_default());
+        Failure::contents(&self.path, line, format!("\"{key}\" = {value} {reason}"))
     }
 
     /// The refusal of a setting by its rule.
-    pub(crate) fn setting(&self, error: &SettingError) -> FileError {
-        let reason = format!("is refused: {}", error.requirement);
-        if self.place(&error.key).1 {
-            return self
-                .refused(&error.key, reason)
-                .advice_if(error.advice.map(str::to_owned));
+    pub(crate) fn setting(&self, error: &SettingError) -> Failure {
+        let SettingError {
+            key,
+            value,
+            requirement,
+            advice,
+            ..
+        } = error;
+        let advice = advice.map(str::to_owned);
+        if self.place(key).1 {
+            let refusal = self.refused(key, format!("is refused: {requirement}"));
+            return refusal.or_hint_if(advice);
         }
-        let (key, value, reason) = (
-            error.key.as_str().into(),
-            error.value.as_str().into(),
-            reason.into(),
-        );
-        let refusal = self.error(&error.key, Kind::Value { key, value, reason });
-        refusal
-            .advice_if(error.advice.map(str::to_owned))
-            .advice("the file does not set it: this is the default")
+        self.error(
+            key,
+            format!("\"{key}\" = {value} is refused: {requirement}"),
+        )
+        .or_hint_if(advice)
+        .or_hint("the file does not set it: this is the default")
     }
 
     /// A key that means nothing where it stands, with the nearest that does.
@@ -174,7 +174,7 @@ impl Source {
         &self,
         key: &str,
         legal: impl Iterator<Item = &'a str> + Clone,
-    ) -> FileError {
+    ) -> Failure {
         let name = key.rsplit('.').next().unwrap_or_default();
         // what profiles call heading, tables and initial states call yaw
         let other_name = match name {
@@ -190,11 +190,12 @@ impl Source {
             Some(meant) => format!("did you mean \"{meant}\"?"),
             None => format!("legal here: {}", legal.collect::<Vec<_>>().join(", ")),
         };
-        self.error(key, Kind::UnknownKey(key.into())).advice(hint)
+        self.error(key, format!("unknown key \"{key}\""))
+            .or_hint(hint)
     }
 
     /// A table that lacks a key, one of several that would do.
-    pub(crate) fn missing(&self, table: &str, keys: &[&str]) -> FileError {
+    pub(crate) fn missing(&self, table: &str, keys: &[&str]) -> Failure {
         let keys: Vec<String> = keys
             .iter()
             .map(|key| format!("\"{}\"", dotted(table, key)))
@@ -204,12 +205,12 @@ impl Source {
             "\"rate_hz\"" => "add rate_hz = 100.0, the sample rate (Hz)".to_owned(),
             _ => format!("add the key {keys}"),
         };
-        self.error(table, Kind::MissingKey(keys.into()))
-            .advice(advice)
+        self.error(table, format!("{keys} is missing"))
+            .or_hint(advice)
     }
 
     /// The refusal of a value or key by its type.
-    fn explained(&self, refusal: Refusal) -> FileError {
+    fn explained(&self, refusal: Refusal) -> Failure {
         let key = refusal.path;
         match refusal.what {
             What::Unknown(field, legal) => {
@@ -220,19 +221,19 @@ impl Source {
                 let meant = nearest(&word, legal.iter().copied());
                 let words: Vec<String> = legal.iter().map(|w| format!("\"{w}\"")).collect();
                 self.of_value(&key, format!("is not one of {}", words.join(", ")))
-                    .advice_if(meant.map(|meant| format!("did you mean \"{meant}\"?")))
+                    .or_hint_if(meant.map(|meant| format!("did you mean \"{meant}\"?")))
             }
             What::NoList => {
                 let name = key.rsplit('.').next().unwrap_or_default();
                 let advice = format!("there may be several: write [[{name}]], in double brackets");
-                self.of_value(&key, "is not a list").advice(advice)
+                self.of_value(&key, "is not a list").or_hint(advice)
             }
             What::Reason(reason) => self.of_value(&key, reason),
         }
     }
 
     /// A refusal of a value; an entry of a list of plain values goes by the name of the list.
-    fn of_value(&self, key: &str, reason: impl Into<Box<str>>) -> FileError {
+    fn of_value(&self, key: &str, reason: impl Display) -> Failure {
         let span = self.place(key).0;
         self.refused_at(
             span,

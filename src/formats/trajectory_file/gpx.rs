@@ -4,7 +4,7 @@
 //! namespace; comments, extensions and everything outside track points are passed over.
 
 use super::samples::{Attitude, Rows};
-use crate::formats::{FileError as Error, Kind, Place};
+use crate::formats::{Failure as Error, Place};
 use chrono::{DateTime, NaiveDateTime, Utc};
 use glam::DQuat;
 use nav_sim_navigation::trajectory::TrajectorySample;
@@ -23,7 +23,7 @@ pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
         let absent = |column: usize| {
             let reason = "does not have it, or not as a number";
             let error = Error::cell(path, line, COLUMNS[column], "the track point", reason);
-            error.advice(
+            error.or_hint(
                 "every <trkpt> needs lat, lon, <ele> and <time>: export them with the track",
             )
         };
@@ -45,11 +45,7 @@ pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
         rows.samples.push(sample);
     }
     if rows.samples.is_empty() {
-        return Err(Error::new(
-            path,
-            Place::Within,
-            Kind::Empty("no rows in it"),
-        ));
+        return Err(Error::contents(path, Place::Within, "no rows in it"));
     }
     rows.doubt(
         None,
@@ -192,7 +188,7 @@ mod tests {
             "{rpy:?}"
         );
         let e = load("a.gpx", &text.replacen("<ele>500</ele>", "", 1)).unwrap_err();
-        assert!(e.hint().unwrap().contains("<ele> and <time>"), "{e:?}");
+        assert!(e.advice().unwrap().contains("<ele> and <time>"), "{e:?}");
         let e = e.to_string();
         assert_eq!(
             e,

@@ -2,7 +2,7 @@
 
 use super::Options;
 use super::samples::{Attitude, Rows, dictionary, local, origin, rows};
-use crate::formats::FileError as Error;
+use crate::formats::Failure as Error;
 use crate::formats::table::{Asked, Column, Dictionary, Numbers, Quantity, Table, parse};
 use glam::{DQuat, DVec3};
 use std::f64::consts::{FRAC_1_SQRT_2, PI};

@@ -15,7 +15,7 @@ pub(crate) use write::write_csv;
 pub(crate) use write::write_rows;
 
 use super::table::{Asked, Numbers, parse as parse_text};
-use super::{FileError, Place, source};
+use super::{Failure, Place, source};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_navigation::trajectory::reference::Reference;
 use std::fmt;
@@ -61,7 +61,7 @@ const KNOWN: &str =
 ///
 /// # Errors
 /// Whatever is wrong with the file, with its line.
-pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<Warning>), FileError> {
+pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<Warning>), Failure> {
     match parse(path, options, Numbers::Finite)? {
         Parsed::Profile(trajectory) => Ok((trajectory, Vec::new())),
         Parsed::Rows(rows) => rows.trajectory(),
@@ -77,7 +77,7 @@ pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<Warning>)
 pub(crate) fn load_reference(
     path: &Path,
     options: &Options,
-) -> Result<(Reference, Vec<Warning>), FileError> {
+) -> Result<(Reference, Vec<Warning>), Failure> {
     match parse(path, options, Numbers::Any)? {
         Parsed::Profile(trajectory) => Ok((trajectory.into(), Vec::new())),
         Parsed::Rows(rows) => rows.reference(),
@@ -89,7 +89,7 @@ enum Parsed {
     Rows(samples::Rows),
 }
 
-fn parse(path: &Path, options: &Options, numbers: Numbers) -> Result<Parsed, FileError> {
+fn parse(path: &Path, options: &Options, numbers: Numbers) -> Result<Parsed, Failure> {
     let name = path.display().to_string();
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
@@ -100,7 +100,7 @@ fn parse(path: &Path, options: &Options, numbers: Numbers) -> Result<Parsed, Fil
         "tum" => imports::tum(&name, &text()?, options, numbers),
         "gpx" => gpx::gpx(&name, &text()?),
         "csv" | "tsv" | "txt" => parse_table(&name, &text()?, options, numbers),
-        _ => Err(FileError::contents(
+        _ => Err(Failure::contents(
             name,
             Place::Within,
             format!("a trajectory file ends in {KNOWN}"),
@@ -114,7 +114,7 @@ fn parse_table(
     text: &str,
     options: &Options,
     numbers: Numbers,
-) -> Result<samples::Rows, FileError> {
+) -> Result<samples::Rows, Failure> {
     let table = parse_text(name, text, &samples::dictionary(numbers), &Asked::default())?;
     samples::rows(table, options, numbers)
 }

@@ -3,8 +3,9 @@
 mod description;
 
 use super::samples::HEIGHT;
+use crate::formats::Failure;
+use crate::formats::file_kind::{self, FileKind};
 use crate::formats::toml_file::{Finite, Source};
-use crate::formats::{FileError, Kind as Refusal};
 use description::{Described, Description, Point, Roll, SegmentTable};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_navigation::trajectory::profile::{
@@ -23,14 +24,14 @@ pub(crate) fn schema() -> serde_json::Value {
     schemars::schema_for!(Description).to_value()
 }
 
-pub(super) fn load(path: &Path) -> Result<Trajectory, FileError> {
-    build(&Source::read(path)?).map_err(|e| {
-        let is_model = matches!(&e.kind, Refusal::UnknownKey(key) if ["rate_hz", "accel", "gyro"].contains(&key.as_ref()));
-        if is_model { e.advice_instead("this is a noise model: are the arguments in another order?") } else { e }
+pub(super) fn load(path: &Path) -> Result<Trajectory, Failure> {
+    build(&Source::read(path)?).map_err(|e| match file_kind::of(path) {
+        Ok(FileKind::Model) => e.hint("this is a noise model: are the arguments in another order?"),
+        _ => e,
     })
 }
 
-pub(super) fn build(source: &Source) -> Result<Trajectory, FileError> {
+pub(super) fn build(source: &Source) -> Result<Trajectory, Failure> {
     let Description {
         start,
         vehicle,
@@ -77,7 +78,7 @@ fn path_of(segment: usize) -> String {
 }
 
 /// The refusal of a profile at the line of the key at fault.
-fn blame(source: &Source, segments: &[SegmentTable], e: &profile::Error) -> FileError {
+fn blame(source: &Source, segments: &[SegmentTable], e: &profile::Error) -> Failure {
     let key = e.problem.key();
     let path = match e.segment {
         Some(i) if key == "climb_m" && matches!(segments[i].kind, Described::Climb(_)) => {
@@ -89,11 +90,11 @@ fn blame(source: &Source, segments: &[SegmentTable], e: &profile::Error) -> File
     };
     source
         .refused(&path, e.problem.to_string())
-        .advice_if(e.problem.hint().map(str::to_owned))
+        .or_hint_if(e.problem.hint().map(str::to_owned))
 }
 
 /// A height at which the gravity model means something.
-fn height(source: &Source, key: &str, h_m: Finite) -> Result<f64, FileError> {
+fn height(source: &Source, key: &str, h_m: Finite) -> Result<f64, Failure> {
     if HEIGHT.contains(&h_m.0) {
         return Ok(h_m.0);
     }
@@ -115,7 +116,7 @@ impl Keys<'_> {
     fn one_of<const N: usize>(
         &self,
         keys: [(&'static str, Option<Finite>); N],
-    ) -> Result<(&'static str, f64), FileError> {
+    ) -> Result<(&'static str, f64), Failure> {
         let mut given = keys
             .iter()
             .filter_map(|(key, value)| value.map(|value| (*key, value.0)));
@@ -126,16 +127,12 @@ impl Keys<'_> {
                 let refusal = self
                     .source
                     .refused(&self.path(second), format!("stands beside {first}"));
-                Err(refusal.advice("give one of them"))
+                Err(refusal.or_hint("give one of them"))
             }
         }
     }
 
-    fn length(
-        &self,
-        duration: Option<Finite>,
-        distance: Option<Finite>,
-    ) -> Result<Kind, FileError> {
+    fn length(&self, duration: Option<Finite>, distance: Option<Finite>) -> Result<Kind, Failure> {
         Ok(Kind::Straight(
             match self.one_of([("duration_s", duration), ("distance_m", distance)])? {
                 ("duration_s", s) => Length::Duration(s),
@@ -147,7 +144,7 @@ impl Keys<'_> {
     fn turning<const N: usize>(
         &self,
         given: [(&'static str, Option<Finite>); N],
-    ) -> Result<Turning, FileError> {
+    ) -> Result<Turning, Failure> {
         Ok(match self.one_of(given)? {
             ("duration_s", s) => Turning::Duration(s),
             ("rate_deg_s", rate) => Turning::Rate(rate * DEG),
@@ -157,7 +154,7 @@ impl Keys<'_> {
     }
 }
 
-fn read_segment(keys: &Keys<'_>, table: &SegmentTable) -> Result<Segment, FileError> {
+fn read_segment(keys: &Keys<'_>, table: &SegmentTable) -> Result<Segment, Failure> {
     let (kind, climb) = match &table.kind {
         Described::Straight(own) => (keys.length(own.duration_s, own.distance_m)?, own.climb_m),
         Described::Climb(own) => (keys.length(own.duration_s, own.distance_m)?, own.height_m),
@@ -232,7 +229,7 @@ fn read_segment(keys: &Keys<'_>, table: &SegmentTable) -> Result<Segment, FileEr
     })
 }
 
-fn waypoint(keys: &Keys<'_>, point: &Point) -> Result<Waypoint, FileError> {
+fn waypoint(keys: &Keys<'_>, point: &Point) -> Result<Waypoint, Failure> {
     let pair = |names: [&str; 2], values: [Option<Finite>; 2]| match values {
         [Some(first), Some(second)] => Ok((first.0, second.0)),
         [None, _] => Err(keys.source.missing(&keys.path, &names[..1])),
@@ -244,7 +241,7 @@ fn waypoint(keys: &Keys<'_>, point: &Point) -> Result<Waypoint, FileError> {
             let refusal = keys
                 .source
                 .refused(&keys.path(extra), "stands beside n_m, e_m");
-            return Err(refusal.advice("give one pair of them"));
+            return Err(refusal.or_hint("give one pair of them"));
         }
         let (north, east) = pair(["n_m", "e_m"], [point.n_m, point.e_m])?;
         Place::Local { north, east }

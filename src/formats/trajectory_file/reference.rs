@@ -2,7 +2,7 @@
 
 use super::Warning;
 use super::samples::{Attitude, Rows, follow_path, no_trajectory};
-use crate::formats::{FileError as Error, Place};
+use crate::formats::{Failure as Error, Place};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_navigation::trajectory::reference::{Reference, breaks, usable};
 use std::ops::Range;

@@ -4,7 +4,7 @@ use super::doubts;
 use super::{Options, Warning};
 use crate::formats::fusion_files::WEEK_S;
 use crate::formats::table::{Column, Dictionary, Numbers, Quantity, Table, normalised};
-use crate::formats::{FileError as Error, Place, Setting};
+use crate::formats::{Failure as Error, Place, help};
 use glam::{DQuat, DVec3};
 use nav_sim_navigation::earth::{e_to_n, ecef_to_geodetic, geodetic_to_ecef};
 use nav_sim_navigation::frames::{RollPitchYaw, q_e_n, wrap_angle};
@@ -190,7 +190,7 @@ impl Rows {
     }
 
     fn refuse(&self, index: usize, message: String, advice: &'static str) -> Error {
-        Error::contents(self.path.as_str(), self.lines[index], message).advice(advice)
+        Error::contents(self.path.as_str(), self.lines[index], message).or_hint(advice)
     }
 
     fn check_jumps(&self) -> Result<(), Error> {
@@ -230,7 +230,7 @@ pub(super) fn no_trajectory(path: &str, line: u64, source: &trajectory::Error) -
         }
         E::NotFinite { .. } => return Error::contents(path, line, source.to_string()),
     };
-    Error::contents(path, line, source.to_string()).advice(advice)
+    Error::contents(path, line, source.to_string()).or_hint(advice)
 }
 
 /// The rows of a table. Cells out of range are refused, or their rows left out where not every row is needed.
@@ -310,7 +310,7 @@ fn check_units(table: &Table) -> Result<(), Error> {
     let message = format!("the unit of {names} is not in the name, and no value exceeds 2π");
     Err(table
         .refused(message)
-        .advice("end the names in _deg or _rad"))
+        .or_hint("end the names in _deg or _rad"))
 }
 
 fn triad(columns: [&Column; 3], row: usize) -> DVec3 {
@@ -377,8 +377,9 @@ pub(super) fn origin(table: &Table, options: &Options) -> Result<[f64; 3], Error
         .ok_or_else(|| {
             let message = "a trajectory in local coordinates needs an origin on the Earth";
             Error::contents(table.path.as_str(), Place::Within, message)
-                .setting(Setting::Origin)
-                .advice("a first line \"# origin: LAT_DEG, LON_DEG, H_M\"")
+                .or(help::ORIGIN)
+                .or(help::ORIGIN_ELSEWHERE)
+                .or_hint("a first line \"# origin: LAT_DEG, LON_DEG, H_M\"")
         })
 }
 
@@ -414,7 +415,7 @@ fn check_ranges(table: &Table) -> Result<(), Error> {
     let mut found = (0..table.rows()).filter_map(|row| Some((row, out_of_range(table, row)?)));
     found.next().map_or(Ok(()), |(row, (column, reason))| {
         let (line, value) = (table.lines.of(row), column.values[row].to_string());
-        Err(Error::cell(&table.path, line, &column.name, value, reason).advice(DEGREES))
+        Err(Error::cell(&table.path, line, &column.name, value, reason).or_hint(DEGREES))
     })
 }
 

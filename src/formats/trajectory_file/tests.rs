@@ -8,11 +8,11 @@ use nav_sim_signal::units::DEG;
 
 const HEADER: &str = "t_s,lat_deg,lon_deg,h_m,roll_deg,pitch_deg,yaw_deg\n";
 
-fn read(text: &str) -> Result<(Trajectory, Vec<Warning>), FileError> {
+fn read(text: &str) -> Result<(Trajectory, Vec<Warning>), Failure> {
     read_with(text, &Options::default())
 }
 
-fn read_with(text: &str, options: &Options) -> Result<(Trajectory, Vec<Warning>), FileError> {
+fn read_with(text: &str, options: &Options) -> Result<(Trajectory, Vec<Warning>), Failure> {
     parse_table("a.csv", text, options, Numbers::Finite)?.trajectory()
 }
 
@@ -52,8 +52,8 @@ fn attitude_without_a_unit_is_degrees_where_radians_cannot_be() {
 
 fn refused(text: &str) -> (String, String) {
     let e = read(text).unwrap_err();
-    assert!(!e.is_system());
-    (e.to_string(), e.hint().unwrap_or_default())
+    assert!(e.code() == 2);
+    (e.to_string(), e.advice().unwrap_or_default())
 }
 
 fn doubted(text: &str) -> Vec<String> {
@@ -274,7 +274,7 @@ fn local_coordinates_need_and_use_an_origin() {
         message,
         "a.csv: a trajectory in local coordinates needs an origin on the Earth"
     );
-    assert!(hint.starts_with("give an origin") && hint.contains("# origin:"));
+    assert!(hint.starts_with("give --origin") && hint.contains("# origin:"));
     let options = Options {
         origin: Some([-30.0 * DEG, 150.0 * DEG, 100.0]),
     };
@@ -373,7 +373,7 @@ fn what_is_written_reads_back_the_same() {
     );
     let e = load(&dir.path().join("none.csv"), &Options::default()).unwrap_err();
     assert!(
-        e.is_system() && e.to_string().contains("none.csv: No such file"),
+        e.code() == 1 && e.to_string().contains("none.csv: No such file"),
         "{e}"
     );
 }

@@ -1,6 +1,6 @@
 //! Trajectories as CSV.
 
-use crate::formats::FileError;
+use crate::formats::Failure;
 use crate::formats::atomic::AtomicFile;
 use flate2::{Compression, write::GzEncoder};
 use nav_sim_navigation::frames::{RollPitchYaw, wrap_angle};
@@ -37,9 +37,9 @@ impl Rows {
 ///
 /// # Errors
 /// The file cannot be written.
-pub(crate) fn write_csv(path: &Path, trajectory: &Trajectory, rows: Rows) -> Result<(), FileError> {
+pub(crate) fn write_csv(path: &Path, trajectory: &Trajectory, rows: Rows) -> Result<(), Failure> {
     let mut file = AtomicFile::create(path)?;
-    let io = |e| FileError::io(path, e);
+    let io = |e| Failure::io(path, e);
     if path
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("gz"))

@@ -9,7 +9,7 @@ mod sentence;
 
 use super::Remark;
 use super::fixes::Fixes;
-use crate::formats::{FileError as Error, Setting};
+use crate::formats::{Failure as Error, help};
 use clock::{Clock, Dates};
 use glam::{DVec2, DVec3};
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
@@ -84,7 +84,7 @@ impl Log {
                     let found: String = line.chars().take(60).collect();
                     let advice = "remove the line, if no more than it is damaged";
                     return Err(
-                        Error::contents(path, i + 1, format!("{message}: {found}")).advice(advice)
+                        Error::contents(path, i + 1, format!("{message}: {found}")).or_hint(advice)
                     );
                 }
                 _ => {}
@@ -210,7 +210,7 @@ pub(super) fn fixes(
         let Some(pos_sigma_n) = stated.or(given) else {
             let message =
                 "a fix without standard deviations: no GST sentence of its time states them";
-            return Err(Error::contents(path, epoch.line, message).setting(Setting::FixSigma));
+            return Err(Error::contents(path, epoch.line, message).or(help::FIX_SIGMA));
         };
         let velocity =
             epoch
@@ -239,9 +239,8 @@ pub(super) fn fixes(
     }
     if fixes.is_empty() {
         let message = "NMEA sentences without a position: no GGA with a fix";
-        return Err(
-            Error::contents(path, 1_u64, message).advice("let the receiver write GGA, RMC and GST")
-        );
+        return Err(Error::contents(path, 1_u64, message)
+            .or_hint("let the receiver write GGA, RMC and GST"));
     }
     let remarks = log.remarks(&fixes, unsaid, clock);
     Ok((fixes, remarks))

@@ -216,7 +216,7 @@ fn coarse_and_bursting_stamps_keep_the_rate_of_the_whole() {
         let r = read_one("a.csv", &text, &ignore(Some(rate_hz))).unwrap();
         assert_close(&[r.rate_hz], &[rate_hz]);
         let (_, hint) = refusal_with("a.csv", &text, &ReadOptions::default());
-        assert!(hint.contains("ignore them"), "{hint}");
+        assert!(hint.contains("--gaps ignore"), "{hint}");
     }
 }
 

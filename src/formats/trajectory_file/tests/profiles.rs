@@ -4,7 +4,7 @@ use super::*;
 
 const START: &str = "[start]\nlat_deg = 46.5\nlon_deg = 6.6\nh_m = 400\nheading_deg = 90\n";
 
-fn profile(text: &str) -> Result<Trajectory, FileError> {
+fn profile(text: &str) -> Result<Trajectory, Failure> {
     profile::build(&Source::new("p.toml", text))
 }
 
@@ -42,7 +42,7 @@ fn a_profile_of_every_kind_of_segment() {
 fn profiles_are_refused_with_line_key_and_hint() {
     let refused = |text: &str| {
         let e = profile(&format!("{START}{text}")).unwrap_err();
-        (e.to_string(), e.hint().unwrap_or_default())
+        (e.to_string(), e.advice().unwrap_or_default())
     };
     let segment = |keys: &str| refused(&format!("[[segment]]\n{keys}\n"));
     assert_eq!(
