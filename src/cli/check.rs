@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 #[command(before_help = "\
 Examples:
   nav-sim check calib_data/consumer_mems.toml
-  nav-sim check trajectories/land_vehicle.toml examples/paper_table1.toml
+  nav-sim check trajectories/land_vehicle.toml examples/quick_study.toml
   nav-sim init study && nav-sim check study/scenario.toml")]
 pub(crate) struct Args {
     /// Files
