@@ -19,7 +19,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`prelude`] has what most programs need, [`jobs`] one function for what a command does, [`commands::batch`] studies.
+//! [`prelude`] has what most programs need, [`commands`] a struct for each command, [`commands::batch`] studies.
 //! The mathematics is in three crates: [`signal`] (noise, wavelet variance), [`calibration`] (recordings to model) and
 //! [`navigation`] (trajectory to errors). `calibration` and `navigation` stand on `signal` and never import each other.
 //!
