@@ -54,17 +54,16 @@ pub use commands::export::export;
 
 // Values of arguments.
 mod parse;
-// What every command does: notes, progress, outputs.
-pub mod app;
-pub use app as failure;
+// Failures and results.
+pub mod failure;
 // Words and shapes that several results share.
 pub mod report;
 // Files.
 pub mod formats;
-// From here on a room for each command: request, job, result, document. The main job.
+// What every command does: options, inputs, notes, outputs.
+pub mod app;
+// A file or a folder for each command.
 pub mod commands;
-// Figures of the paper.
-mod paper;
 // Models to recordings.
 pub mod synthesize;
 // A directory to start from.

@@ -1,19 +1,9 @@
 //! `manifest.json`: where a result directory came from, and whether another command makes the same.
 
+use super::Input;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
-
-/// A file that was read.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Input {
-    /// What for: "trajectory", "model", "truth", "static", "scenario".
-    pub role: String,
-    /// Path as given.
-    pub path: String,
-    /// BLAKE3 of its bytes, in hexadecimal.
-    pub blake3: String,
-}
 
 /// Where a result directory came from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

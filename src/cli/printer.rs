@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::common::{Color, Common};
-use crate::app::system_words;
+use crate::failure::system_words;
 use crate::formats::fusion_files::Remark;
 use nav_sim_document::{Importance, Note, turns};
 use std::borrow::Cow;

@@ -1,10 +1,10 @@
 //! `nav-sim compare`: run directories → ratios between runs.
 
 use crate::app::{Answer, Command, Context, Failure, Manifest, Out, OutputFile, Result};
+use crate::commands::paper::PaperFigure;
 use crate::commands::run::RUN_FILES;
+use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::formats::atomic::Written;
-use crate::formats::run_directory::{self, RunDirectory};
-use crate::paper::PaperFigure;
 use crate::report::comparison_table::{CandidateResult, Label, Layout, ratio_rows, ratio_table};
 use crate::report::json;
 use crate::report::states::{SPOKEN, axis_of, tone};

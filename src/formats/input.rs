@@ -1,8 +1,19 @@
 //! Files as inputs: which ones are meant, and their fingerprints.
 
 use super::{Failure, hash};
-use crate::app::Input;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Input {
+    /// What for: "trajectory", "model", "truth", "static", "scenario".
+    pub role: String,
+    /// Path as given.
+    pub path: String,
+    /// BLAKE3 of its bytes, in hexadecimal.
+    pub blake3: String,
+}
 
 /// An input with its fingerprint, of the bytes that were read.
 ///

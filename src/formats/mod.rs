@@ -14,8 +14,7 @@ pub mod model_file;
 #[cfg(test)]
 mod property_tests;
 pub mod recordings;
-pub(crate) mod run_directory;
-mod run_tables;
+pub(crate) mod run_tables;
 pub(crate) mod scenario_file;
 pub(crate) mod source;
 pub(crate) mod suggest;
@@ -23,4 +22,4 @@ pub(crate) mod table;
 pub(crate) mod toml_file;
 pub mod trajectory_file;
 
-pub(crate) use crate::app::{Failure, Place, help};
+pub(crate) use crate::failure::{Failure, Place, help};

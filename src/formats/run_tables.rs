@@ -57,13 +57,13 @@ fn dictionary() -> Dictionary {
 }
 
 /// What to do about a damaged table.
-pub(super) const REPEAT: &str = "repeat the run, or put back its files";
+pub(crate) const REPEAT: &str = "repeat the run, or put back its files";
 
 /// Reads `epochs.csv` back, as far as comparisons need it.
 ///
 /// # Errors
 /// A missing or doubled column, or a value that is not a finite number (unless no run is left at the epoch).
-pub(super) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, Failure> {
+pub(crate) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, Failure> {
     let read = || -> Result<Vec<EpochRow>, Failure> {
         let table = parse(path, text, &dictionary(), &Asked::default())?;
         let [asee, rmse] = [states(&table, "asee_")?, states(&table, "rmse_")?];
@@ -89,7 +89,7 @@ pub(super) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, Fail
 ///
 /// # Errors
 /// A missing column or a value that is not a number.
-pub(super) fn parse_runs(path: &str, text: &str) -> Result<Vec<RunRecord>, Failure> {
+pub(crate) fn parse_runs(path: &str, text: &str) -> Result<Vec<RunRecord>, Failure> {
     let table = parse(path, text, &dictionary(), &Asked::default());
     table.and_then(|table| runs(&table)).map_err(damaged)
 }

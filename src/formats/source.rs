@@ -198,7 +198,7 @@ fn bounded(reader: impl Read, largest: u64) -> io::Result<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::is_damage;
+    use crate::failure::is_damage;
 
     #[test]
     fn text_that_is_none_is_refused_with_its_line() {

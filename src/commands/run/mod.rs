@@ -1,5 +1,6 @@
 //! `nav-sim run`: the main job.
 
+pub(crate) mod directory;
 mod document;
 mod navigate;
 

@@ -1,7 +1,7 @@
 //! The main job: from a trajectory, the filter's noise model and the model of the true errors to navigation errors, by
 //! Monte-Carlo runs, by covariance analysis, or by both.
 
-use crate::app::Context;
+use crate::app::{Context, Failure};
 use crate::formats::draws_file::Draws;
 use crate::report::{reduction_doubt, reduction_line, unexpected_line};
 use nav_sim_calibration::derived_interval;
@@ -95,6 +95,12 @@ pub enum NavigateError {
     /// Numbers ran away.
     #[error("the covariance analysis did not stay finite and positive definite")]
     NotFinite,
+}
+
+impl From<NavigateError> for Failure {
+    fn from(e: NavigateError) -> Self {
+        Self::input(e)
+    }
 }
 
 /// Navigates along a trajectory, with these outages and this seed.

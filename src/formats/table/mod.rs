@@ -14,7 +14,7 @@ pub(crate) use quantity::{Bare, Quantity, Units, normalised};
 
 use super::suggest::nearest;
 use super::{Failure, Place, help, logs, source};
-use crate::app::is_damage;
+use crate::failure::is_damage;
 use nav_sim_logs::Kind as LogKind;
 use std::fmt::Display;
 use std::io::Cursor;

@@ -1,6 +1,5 @@
 //! What went wrong with a request, as the user reads it, and the exit code that it means.
 
-use crate::commands::run::NavigateError;
 use nav_sim_calibration::{
     AnticipationError, AverageError, CalibrationError, Cause, FitError, SignalError,
 };
@@ -478,6 +477,6 @@ macro_rules! failures {
 }
 
 failures! {
-    input: AnticipationError, NavigateError, ReplicateError, RateError;
+    input: AnticipationError, ReplicateError, RateError;
     could_not: WaveletError;
 }
