@@ -672,7 +672,7 @@ fn names_of_models_forge_nothing() {
                 .any(|line| line.starts_with("update_rate: 1\u{1b}"))
         );
         assert!(
-            !text.contains('{') || target.name == "gnss-ins-sim",
+            !clean.contains('{') || target.name == "gnss-ins-sim",
             "{text}"
         );
         assert!(!text.contains("NaN"), "{text}");
