@@ -290,6 +290,8 @@ pub(crate) fn assemble(
     write_cell(place, cell, run, whole, &context)?;
     if let Some(parts) = place.part(cell, 0).parent() {
         drop(fs::remove_dir_all(parts));
+        // empty after the last
+        drop(fs::remove_dir(place.0.join("parts")));
     }
     Ok(())
 }
