@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from nav_sim import _native
 from nav_sim._errors import NavSimError, warn
-from nav_sim._inputs import FloatArray, Staging, StrPath, numbers
+from nav_sim._inputs import FloatArray, Staging, StrPath, as_json, numbers
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -139,18 +139,9 @@ A = TypeVar("A", bound=Answer)
 def ask(kind: type[A], command: str, staging: Staging, progress: Progress = None, **request: Any) -> A:
     """The answer to a request; what is None in it is left to the engine."""
     with bar(progress) as told:
-        native = _native.answer(command, _json(request), staging.hidden, told)
+        native = _native.answer(command, as_json(request), staging.hidden, told)
     warn(native.warnings)
     return kind(native)
-
-
-def _json(request: dict[str, Any]) -> str:
-    return json.dumps(_given(request), default=lambda value: value.tolist())
-
-
-def _given(request: Mapping[str, Any]) -> dict[str, Any]:
-    inner = {key: _given(value) if isinstance(value, Mapping) else value for key, value in request.items()}
-    return {key: value for key, value in inner.items() if value is not None}
 
 
 class _Line:

@@ -6,6 +6,7 @@ so that one reader checks both; no text that comes back shows the directory, onl
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,11 +17,34 @@ from typing import Any, Protocol, TypeAlias, TypeGuard, Union
 import numpy as np
 import numpy.typing as npt
 
-from nav_sim import _toml
+from nav_sim import _native
 from nav_sim._errors import NavSimError
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 StrPath: TypeAlias = Union[str, "os.PathLike[str]"]
+
+
+def as_json(given: Mapping[str, Any]) -> str:
+    """Options or settings for the engine; what is None is left to it."""
+    try:
+        return json.dumps(_known(given), allow_nan=False, default=_plain)
+    except (TypeError, ValueError) as e:
+        raise NavSimError(str(e)) from None
+
+
+def as_toml(given: Mapping[str, Any]) -> str:
+    """Settings as the text of a file."""
+    return _native.toml(as_json(given))
+
+
+def _known(given: Any) -> Any:
+    if isinstance(given, Mapping):
+        return {key: _known(value) for key, value in given.items() if value is not None}
+    return [_known(value) for value in given] if isinstance(given, (list, tuple)) else given
+
+
+def _plain(value: Any) -> Any:
+    return os.fspath(value) if isinstance(value, os.PathLike) else value.tolist()
 
 
 class Frame(Protocol):
@@ -209,7 +233,7 @@ class Staging:
     def settings(self, value: StrPath | Mapping[str, Any], name: str) -> str:
         """Settings as TOML."""
         if isinstance(value, Mapping):
-            return self.text(f"{name}.toml", _toml.dumps(value))
+            return self.text(f"{name}.toml", as_toml(value))
         if is_path(value):
             return os.fspath(value)
         raise NavSimError(f"{name}: a {type(value).__name__} is neither a path nor a dict")

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
 
-from nav_sim import _native, _toml
+from nav_sim import _native
 from nav_sim._answer import Answer, Columns, ask, axes_or_new, flattened
 from nav_sim._errors import NavSimError
-from nav_sim._inputs import FloatArray, Staging, StrPath, number, numbers, path, whole, word
+from nav_sim._inputs import FloatArray, Staging, StrPath, as_toml, number, numbers, path, whole, word
 from nav_sim._wavelet import Curve, scales_s
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class Model:
     ) -> None:
         sensors = {name: _axes(given, name) for name, given in (("accel", accel), ("gyro", gyro)) if given is not None}
         try:
-            self._take(_toml.dumps({"schema": 1, "rate_hz": number(rate_hz, "rate_hz"), **sensors}), None)
+            self._take(as_toml({"schema": 1, "rate_hz": number(rate_hz, "rate_hz"), **sensors}), None)
         except NavSimError as e:
             # no line of a text that the caller never saw
             raise NavSimError(re.sub(r"^model, line \d+: ", "", e.message), hint=e.hint) from None
@@ -232,9 +232,9 @@ def _axes(given: Processes | Process, name: str) -> dict[str, Any]:
     if isinstance(given, Mapping) and "type" in given:
         return _axes([given], name)
     if isinstance(given, Mapping):
-        return {axis: {"processes": _toml.Inline(own)} for axis, own in given.items()}
+        return {axis: {"processes": own} for axis, own in given.items()}
     if isinstance(given, (list, tuple)):
-        return {"processes": _toml.Inline(given)}
+        return {"processes": given}
     hint = 'a list such as [{"type": "WN", "sigma2": 1e-6}]'
     raise NavSimError(f"{name}={given!r} is not a list of processes", hint=hint)
 

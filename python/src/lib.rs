@@ -19,7 +19,7 @@ mod native {
         catalogue, model_contents, model_export, model_practical, model_recording, model_wavelet,
     };
     #[pymodule_export]
-    use crate::request::{answer, main};
+    use crate::request::{answer, main, toml};
     #[pymodule_export]
     use crate::study::study_run;
     #[pymodule_export]

@@ -96,6 +96,18 @@ pub(crate) fn answer(
     Ok(Answer::new(answered, hidden, warnings))
 }
 
+/// JSON as TOML.
+#[pyfunction]
+pub(crate) fn toml(py: Python<'_>, json: &str) -> PyResult<String> {
+    let table: Result<::toml::Table, _> = serde_json::from_str(json);
+    let text = table.map(|table| ::toml::to_string(&table));
+    match text {
+        Ok(Ok(text)) => Ok(text),
+        Ok(Err(e)) => Err(error::refused(py, &e.to_string())),
+        Err(e) => Err(error::refused(py, &e.to_string())),
+    }
+}
+
 /// The options of a request, from JSON.
 fn options(request: &str) -> Result<Map<String, Value>, Failure> {
     serde_json::from_str(request).map_err(Failure::input)
