@@ -58,7 +58,7 @@ pub(crate) mod help {
         }
     }
 
-    pub(crate) const COLUMN_NAMES: Help = always("correct the header");
+    pub(crate) const COLUMN_NAMES: Help = of("columns", "name all columns with --columns");
     pub(crate) const REMOVE_LINE: Help = always("remove the line");
     pub(crate) const OUTPUT: Help = always("choose another output with --out");
     pub(crate) const DIRECTORY: Help = always("choose another directory with --out");

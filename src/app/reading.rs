@@ -23,6 +23,9 @@ pub struct ReadingRequest {
     /// Seconds to leave out at the beginning of each file (warm-up); auto: what differs from the rest of each file
     #[arg(long, value_name = "S|auto", default_value_t)]
     pub skip_s: Skip,
+    /// Names of the columns, for files without a header or instead of it
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub columns: Vec<String>,
     /// Topic of the IMU in a log that has several
     #[arg(long, value_name = "NAME")]
     pub topic: Option<String>,
@@ -203,6 +206,9 @@ impl ReadingRequest {
         if let Some(rate_hz) = self.rate_hz {
             table.insert("rate_hz_given".to_owned(), rate_hz.into());
         }
+        if !self.columns.is_empty() {
+            table.insert("columns".to_owned(), self.columns.clone().into());
+        }
         if let Some(topic) = &self.topic {
             table.insert("topic".to_owned(), topic.as_str().into());
         }
@@ -220,7 +226,9 @@ impl ReadingRequest {
             0.0
         };
         let log = self.log.options(self.topic.clone());
+        let columns = (!self.columns.is_empty()).then(|| self.columns.clone());
         ReadOptions {
+            columns,
             rate_hz: self.rate_hz,
             skip_s,
             gaps,

@@ -108,3 +108,33 @@ impl<'a> Bytes<'a> {
 pub(crate) fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
+
+/// Types of numbers, with their bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Number {
+    Signed(usize),
+    Unsigned(usize),
+    Float(usize),
+}
+
+impl Number {
+    pub(crate) const fn size(self) -> usize {
+        let (Self::Signed(size) | Self::Unsigned(size) | Self::Float(size)) = self;
+        size
+    }
+
+    pub(crate) fn read(self, bytes: &mut Bytes<'_>) -> Option<f64> {
+        Some(match self {
+            Self::Signed(1) => bytes.u8()?.cast_signed().into(),
+            Self::Signed(2) => bytes.u16()?.cast_signed().into(),
+            Self::Signed(4) => bytes.i32()?.into(),
+            Self::Signed(_) => bytes.u64()?.cast_signed() as f64,
+            Self::Unsigned(1) => bytes.u8()?.into(),
+            Self::Unsigned(2) => bytes.u16()?.into(),
+            Self::Unsigned(4) => bytes.u32()?.into(),
+            Self::Unsigned(_) => bytes.u64()? as f64,
+            Self::Float(4) => f32::from_bits(bytes.u32()?).into(),
+            Self::Float(_) => bytes.f64()?,
+        })
+    }
+}

@@ -1,6 +1,6 @@
 //! Arrays in NumPy's own format, `.npy` (`numpy.lib.format`).
 
-use crate::bytes::{Alignment, Bytes, Order};
+use crate::bytes::{Alignment, Bytes, Number, Order};
 use crate::error::{Error, Place};
 use crate::input::Origin;
 use std::io::{self, Read};
@@ -26,36 +26,6 @@ struct Header {
     order: Order,
     shape: Vec<usize>,
     is_fortran: bool,
-}
-
-/// Types of numbers.
-#[derive(Clone, Copy)]
-enum Number {
-    Signed(usize),
-    Unsigned(usize),
-    Float(usize),
-}
-
-impl Number {
-    const fn size(self) -> usize {
-        let (Self::Signed(size) | Self::Unsigned(size) | Self::Float(size)) = self;
-        size
-    }
-
-    fn read(self, bytes: &mut Bytes<'_>) -> Option<f64> {
-        Some(match self {
-            Self::Signed(1) => bytes.u8()?.cast_signed().into(),
-            Self::Signed(2) => bytes.u16()?.cast_signed().into(),
-            Self::Signed(4) => bytes.i32()?.into(),
-            Self::Signed(_) => bytes.u64()?.cast_signed() as f64,
-            Self::Unsigned(1) => bytes.u8()?.into(),
-            Self::Unsigned(2) => bytes.u16()?.into(),
-            Self::Unsigned(4) => bytes.u32()?.into(),
-            Self::Unsigned(_) => bytes.u64()? as f64,
-            Self::Float(4) => f32::from_bits(bytes.u32()?).into(),
-            Self::Float(_) => bytes.f64()?,
-        })
-    }
 }
 
 /// Reads the array of a file.

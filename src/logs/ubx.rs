@@ -11,6 +11,7 @@ use crate::input::{Input, Origin};
 use crate::recognise::{UBX_SYNC, ubx_checksum};
 use crate::sample::{Clock, Fix, ImuSample, Motion, NS, Stamp, stated};
 use crate::stream::Stream;
+use chrono::NaiveDate;
 use std::collections::BTreeMap;
 
 const NAV_PVT: [u8; 2] = [0x01, 0x07];
@@ -160,8 +161,9 @@ impl Format for Ubx {
 /// Values of a NAV-PVT as they stand in it.
 struct Pvt {
     tow_ms: u32,
-    date: [i64; 3],
-    time: [i64; 3],
+    year: u16,
+    /// Month, day, hour, minute, second.
+    time: [u8; 5],
     valid: u8,
     nano: i32,
     fix_type: u8,
@@ -180,8 +182,8 @@ impl Pvt {
     fn parse(payload: &[u8]) -> Option<Self> {
         let mut b = Bytes::little(payload);
         let tow_ms = b.u32()?;
-        let date = [b.u16()?.into(), b.u8()?.into(), b.u8()?.into()];
-        let time = [b.u8()?.into(), b.u8()?.into(), b.u8()?.into()];
+        let year = b.u16()?;
+        let time = [b.u8()?, b.u8()?, b.u8()?, b.u8()?, b.u8()?];
         let valid = b.u8()?;
         b.u32()?;
         let (nano, fix_type, flags) = (b.i32()?, b.u8()?, b.u8()?);
@@ -194,7 +196,7 @@ impl Pvt {
         let speed_accuracy = b.u32()?;
         Some(Self {
             tow_ms,
-            date,
+            year,
             time,
             valid,
             nano,
@@ -212,30 +214,20 @@ impl Pvt {
         const GNSS_3D: u8 = 3;
         const WITH_SENSORS: u8 = 4;
         // nanoseconds since 1970 end in 2262
-        const LAST_YEAR: i64 = 2200;
+        const LAST_YEAR: u16 = 2200;
         matches!(self.fix_type, GNSS_3D | WITH_SENSORS)
             && self.flags & 1 != 0
             && self.valid & 3 == 3
-            && self.date[0] <= LAST_YEAR
+            && self.year <= LAST_YEAR
     }
 
-    fn stamp_ns(&self) -> i64 {
-        let [hour, minute, second] = self.time;
-        let seconds = ((days(self.date) * 24 + hour) * 60 + minute) * 60 + second;
-        seconds * NS + i64::from(self.nano)
+    fn stamp_ns(&self) -> Option<i64> {
+        let [month, day, hour, minute, second] = self.time.map(u32::from);
+        let date = NaiveDate::from_ymd_opt(self.year.into(), month, day)?;
+        // a leap second has the number 60
+        let before = date.and_hms_opt(hour, minute, 0)?.and_utc().timestamp();
+        Some((before + i64::from(second)) * NS + i64::from(self.nano))
     }
-}
-
-/// Days from 1 January 1970 to a date of the Gregorian calendar: years from March on, so that the odd day of a leap
-/// year comes last.
-fn days([year, month, day]: [i64; 3]) -> i64 {
-    let (year, month) = if month > 2 {
-        (year, month - 3)
-    } else {
-        (year - 1, month + 9)
-    };
-    let (era, year) = (year.div_euclid(400), year.rem_euclid(400));
-    era * 146_097 + year * 365 + year / 4 - year / 100 + (153 * month + 2) / 5 + day - 1 - 719_468
 }
 
 /// A fix of NAV-PVT. Its accuracies are taken as one standard deviation of each axis, as the ROS driver of u-blox
@@ -246,7 +238,7 @@ fn pvt(payload: &[u8]) -> Option<Fix> {
     let [lon, lat, h] = pvt.place.map(f64::from);
     let [horizontal, vertical] = pvt.accuracy.map(|a| milli(a.into()));
     Some(Fix {
-        stamp_ns: pvt.stamp_ns(),
+        stamp_ns: pvt.stamp_ns()?,
         gps_tow_ms: Some(pvt.tow_ms),
         lat_deg: lat / 1e7,
         lon_deg: lon / 1e7,

@@ -317,7 +317,7 @@ fn refusals_name_what_is_wrong_and_leave_nothing() {
     refused(
         "run drive.toml drive.toml -o out",
         2,
-        "drive.toml, line 3: unknown key \"segment\"",
+        "drive.toml, line 2: unknown key \"start\"",
     );
     refused(
         &format!("{base} --outage 70:90"),

@@ -284,7 +284,11 @@ fn mistakes_are_refused_and_leave_nothing() {
         "[[accel]]\noperation = \"replace\"\npoints = 500\nsigma = 1\n",
     )
     .unwrap();
-    refused(&["plain.toml"], "plain.toml, line 1: \"accel[1]\"", "");
+    refused(
+        &["plain.toml"],
+        "plain.toml, line 1: \"accel\" = [[accel]] is not a table",
+        "",
+    );
 }
 
 #[test]

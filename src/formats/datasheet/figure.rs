@@ -123,40 +123,12 @@ pub struct Quantity {
     pub value: f64,
 }
 
-/// Why a text is no such figure; the sentence follows the text.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum QuantityError {
-    /// No number > 0 at the beginning.
-    #[error("does not begin with a number > 0, such as {example}")]
-    Number {
-        /// One that would do.
-        example: String,
-    },
-    /// More than any sensor has: its square, times a rate, is to stay a variance.
-    #[error("is more than {MOST:e} in SI units, which no sensor has")]
-    TooLarge,
-    /// A number alone.
-    #[error("has no unit; units that fit: {fitting}")]
-    NoUnit {
-        /// The units, between commas.
-        fitting: String,
-    },
-    /// A unit of something else.
-    #[error("has the unit {unit}, which does not fit; units that fit: {fitting}")]
-    Unit {
-        /// As written.
-        unit: String,
-        /// The units, between commas.
-        fitting: String,
-    },
-}
-
 impl Quantity {
     /// A number and one of the units; °, µ, √, ², dps and hr are read too.
     ///
     /// # Errors
     /// When there is no positive number, no unit, or one that does not fit.
-    pub(crate) fn parse(text: &str, units: Units) -> Result<Self, QuantityError> {
+    pub(crate) fn parse(text: &str, units: Units) -> Result<Self, String> {
         let given = text.trim();
         // of "0.5e-3 deg/h" the longest beginning that is a number; 'e' may begin no unit here
         let end = given
@@ -175,23 +147,26 @@ impl Quantity {
             .ok()
             .filter(|x: &f64| x.is_finite() && *x > 0.0);
         let Some(number) = number else {
-            return Err(QuantityError::Number {
-                example: format!("0.1 {}", units[0].0),
-            });
+            return Err(format!(
+                "does not begin with a number > 0, such as 0.1 {}",
+                units[0].0
+            ));
         };
         if unit.is_empty() {
-            return Err(QuantityError::NoUnit { fitting: fitting() });
+            return Err(format!("has no unit; units that fit: {}", fitting()));
         }
         match units.iter().find(|(name, _)| plain(name) == plain(unit)) {
-            Some((_, factor)) if number * factor > MOST => Err(QuantityError::TooLarge),
+            Some((_, factor)) if number * factor > MOST => Err(format!(
+                "is more than {MOST:e} in SI units, which no sensor has"
+            )),
             Some((_, factor)) => Ok(Self {
                 given: given.to_owned(),
                 value: number * factor,
             }),
-            None => Err(QuantityError::Unit {
-                unit: unit.to_owned(),
-                fitting: fitting(),
-            }),
+            None => Err(format!(
+                "has the unit {unit}, which does not fit; units that fit: {}",
+                fitting()
+            )),
         }
     }
 }

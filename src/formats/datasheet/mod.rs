@@ -23,7 +23,7 @@ mod figure;
 
 pub(crate) use catalogue::CATALOGUE;
 pub use catalogue::{catalogued, read};
-pub use figure::{Figure, Quantity, QuantityError};
+pub use figure::{Figure, Quantity};
 
 use crate::formats::model_file::{ModelFile, NOT_STATED, PROGRAM, SCHEMA, TurnOn};
 use crate::report::readable;

@@ -168,6 +168,9 @@ impl<'de> Deserializer<'de> for Node<'_> {
         fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Refusal> {
+        if let DeValue::Array(_) = self.0 {
+            return Err(What::Reason("is not a table".to_owned()).into());
+        }
         let tag = fields.iter().find(|field| TAGS.contains(field));
         let (DeValue::Table(table), Some(tag)) = (self.0, tag) else {
             return self.deserialize_any(visitor);

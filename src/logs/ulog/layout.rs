@@ -1,6 +1,6 @@
 //! Fields of the messages of a topic.
 
-use crate::bytes::Bytes;
+use crate::bytes::{Bytes, Number};
 use std::collections::HashMap;
 
 /// Formats within formats: deeper ones are not followed.
@@ -23,61 +23,21 @@ pub(super) struct Field {
     count: usize,
 }
 
-/// Types of numbers.
-#[derive(Debug, Clone, Copy)]
-enum Number {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    I64,
-    U64,
-    F32,
-    F64,
-}
-
-impl Number {
-    fn new(name: &str) -> Option<Self> {
-        Some(match name {
-            "int8_t" => Self::I8,
-            "uint8_t" | "bool" | "char" => Self::U8,
-            "int16_t" => Self::I16,
-            "uint16_t" => Self::U16,
-            "int32_t" => Self::I32,
-            "uint32_t" => Self::U32,
-            "int64_t" => Self::I64,
-            "uint64_t" => Self::U64,
-            "float" => Self::F32,
-            "double" => Self::F64,
-            _ => return None,
-        })
-    }
-
-    const fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::I64 | Self::U64 | Self::F64 => 8,
-        }
-    }
-
-    fn read(self, bytes: &mut Bytes<'_>) -> Option<f64> {
-        Some(match self {
-            Self::I8 => bytes.u8()?.cast_signed().into(),
-            Self::U8 => bytes.u8()?.into(),
-            Self::I16 => bytes.u16()?.cast_signed().into(),
-            Self::U16 => bytes.u16()?.into(),
-            Self::I32 => bytes.i32()?.into(),
-            Self::U32 => bytes.u32()?.into(),
-            Self::I64 => bytes.u64()?.cast_signed() as f64,
-            Self::U64 => bytes.u64()? as f64,
-            Self::F32 => f32::from_bits(bytes.u32()?).into(),
-            Self::F64 => bytes.f64()?,
-        })
-    }
+/// The type of a name.
+fn number(name: &str) -> Option<Number> {
+    Some(match name {
+        "int8_t" => Number::Signed(1),
+        "uint8_t" | "bool" | "char" => Number::Unsigned(1),
+        "int16_t" => Number::Signed(2),
+        "uint16_t" => Number::Unsigned(2),
+        "int32_t" => Number::Signed(4),
+        "uint32_t" => Number::Unsigned(4),
+        "int64_t" => Number::Signed(8),
+        "uint64_t" => Number::Unsigned(8),
+        "float" => Number::Float(4),
+        "double" => Number::Float(8),
+        _ => return None,
+    })
 }
 
 impl Layout {
@@ -86,7 +46,7 @@ impl Layout {
         let mut layout = Self::default();
         let mut at = 0_usize;
         for (type_name, count, field) in fields(formats.get(name)?) {
-            let size = match Number::new(type_name) {
+            let size = match number(type_name) {
                 Some(number) => {
                     layout
                         .fields
@@ -128,7 +88,7 @@ fn size_of_format(name: &str, formats: &Formats, depth: usize) -> Option<usize> 
         return None;
     }
     fields(formats.get(name)?).try_fold(0_usize, |sum, (type_name, count, _)| {
-        let size = match Number::new(type_name) {
+        let size = match number(type_name) {
             Some(number) => number.size(),
             None => size_of_format(type_name, formats, depth + 1)?,
         };
@@ -168,9 +128,9 @@ impl Field {
 
     /// Time (µs in the message) (ns); none beyond what can be a time.
     pub(super) fn time_ns(self, message: &[u8]) -> Option<i64> {
-        let Number::U64 = self.number else {
+        if self.number != Number::Unsigned(8) {
             return None;
-        };
+        }
         let us = Bytes::little(message.get(self.at..)?).u64()?;
         i64::try_from(us).ok()?.checked_mul(1000)
     }

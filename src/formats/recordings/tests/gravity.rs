@@ -46,7 +46,7 @@ fn exchanged_sensors_are_refused() {
         message.starts_with("a.npy: accelerometers and gyroscopes are exchanged: |f| is 0.000"),
         "{message}"
     );
-    assert!(hint.contains("correct the header"), "{hint}");
+    assert!(hint.contains("--columns"), "{hint}");
     let named =
         |sensor: &str, unit: &str| ["x", "y", "z"].map(|axis| format!("{sensor}_{axis}_{unit}"));
     let columns = [named("gyro", "rad_s"), named("accel", "m_s2")].concat();
