@@ -1,7 +1,6 @@
 //! Numbers for people.
 
 /// A part of a whole, in per cent: `12 %`, `3.4 %`, `0.05 %`.
-#[must_use]
 pub fn percent(part: f64) -> String {
     match 100.0 * part {
         p if p >= 9.5 => format!("{p:.0} %"),
@@ -11,7 +10,6 @@ pub fn percent(part: f64) -> String {
 }
 
 /// A time for people: seconds, minutes or hours.
-#[must_use]
 pub fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 120.0 => format!("{} s", three_digits(s)),

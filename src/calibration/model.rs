@@ -72,13 +72,11 @@ impl ModelSpec {
     pub const USUAL: &str = "N2";
 
     /// N1 = WN + AR1 + RW of the paper.
-    #[must_use]
     pub fn n1() -> Self {
         Self::of([Kind::White, Kind::Ar1, Kind::RandomWalk])
     }
 
     /// N2 = WN + QN + 2 AR1 + RW of the paper: the usual model.
-    #[must_use]
     pub fn n2() -> Self {
         Self::of([
             Kind::White,
@@ -97,7 +95,6 @@ impl ModelSpec {
     }
 
     /// Labels of the processes, as those of a fitted model: `WN`, `AR1_1`, `AR1_2`, …
-    #[must_use]
     pub fn labels(&self) -> Vec<String> {
         labels(&self.kinds)
     }
@@ -122,13 +119,11 @@ impl ModelSpec {
     }
 
     /// The kinds of process.
-    #[must_use]
     pub fn kinds(&self) -> &[Kind] {
         &self.kinds
     }
 
     /// Number of parameters.
-    #[must_use]
     pub fn parameters(&self) -> usize {
         self.kinds.iter().map(|kind| kind.parameters().len()).sum()
     }

@@ -23,7 +23,6 @@ pub fn model_of<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>, rate_hz: f6
 }
 
 /// Scale of a level (s).
-#[must_use]
 pub fn tau_s(level: u32, rate_hz: f64) -> f64 {
     f64::from(level).exp2() / rate_hz
 }
@@ -165,7 +164,6 @@ impl ModelChoice {
     pub(crate) const STAGES: u64 = 3;
 
     /// Number of steps of a fit, in which a draw of the bootstrap is one.
-    #[must_use]
     pub const fn steps(&self) -> u64 {
         match self {
             Self::Given(_) => 10,
@@ -175,7 +173,6 @@ impl ModelChoice {
     }
 
     /// Parameters that are to be found, at least.
-    #[must_use]
     pub fn parameters(&self) -> usize {
         match self {
             Self::Given(spec) => spec.parameters(),
@@ -211,7 +208,6 @@ impl Default for Settings {
 impl Settings {
     /// Signals that the estimators take as replicates of one another, unless told otherwise: those of single
     /// recordings pool nothing.
-    #[must_use]
     pub fn pool(&self) -> Pool {
         if self.estimators.iter().any(|e| e.is_single()) {
             Pool::Axes
@@ -296,7 +292,6 @@ impl Practical {
 
     /// Whether the data hold averages so long that the random walk is the larger part of them, and the model has it over an
     /// octave of these: where they do not, K is what the pair says of times that nobody saw, or that were seen to be otherwise.
-    #[must_use]
     pub fn walk_is_observed(&self) -> bool {
         let lasts = |from: f64| self.walk_until_s.is_none_or(|until| until >= 2.0 * from);
         self.parameters
@@ -413,7 +408,6 @@ pub(super) const LEVEL: f64 = 0.05;
 
 impl Goodness {
     /// Whether so large a J has a probability below 5 % when the model holds.
-    #[must_use]
     pub fn is_rejected(&self) -> bool {
         self.p_value < LEVEL
     }
@@ -454,13 +448,11 @@ pub struct Candidate {
 
 impl Candidate {
     /// Whether it was tested and does not describe the curve.
-    #[must_use]
     pub fn is_rejected(&self) -> bool {
         self.j_p_value.is_some_and(|p| p < LEVEL)
     }
 
     /// The criterion.
-    #[must_use]
     pub fn wvic(&self) -> f64 {
         self.objective + self.optimism
     }
@@ -524,7 +516,6 @@ const PEAK: f64 = 3.78;
 
 impl Outcome {
     /// Remarks on the fit, the most important first.
-    #[must_use]
     pub fn notes(&self, settings: &Settings) -> Vec<Note> {
         let (rate_hz, mut notes) = (settings.rate_hz, Vec::new());
         notes.extend(self.axes_differ.map(|_| Note::AxesDiffer));
@@ -586,7 +577,6 @@ pub struct Share {
 }
 
 /// The share of each process of a model over some levels.
-#[must_use]
 pub fn shares(model: &Composite, levels: &[u32]) -> Vec<Share> {
     let part = |process: &Process, level: u32| match process.haar_wv(level) / model.haar_wv(level) {
         part if part.is_finite() => part,
@@ -699,7 +689,6 @@ impl Departure {
     }
 
     /// Of the scales that are missed, the one with the ratio furthest from 1: where the model is worst for whoever uses it.
-    #[must_use]
     pub fn worst(&self) -> Option<Miss> {
         furthest(&self.missed)
     }
@@ -714,7 +703,6 @@ fn furthest(all: &[Miss]) -> Option<Miss> {
 
 impl Outcome {
     /// The disagreement of the curve with its model, by single scales, by all together or by the J-test; none where it fits.
-    #[must_use]
     pub fn misfit(&self) -> Option<Misfit> {
         let departure = self.departure();
         let goodness = self.inference.as_ref().and_then(|i| i.goodness);
@@ -739,7 +727,6 @@ impl Outcome {
     }
 
     /// The curve against the model.
-    #[must_use]
     pub fn departure(&self) -> Departure {
         let is_known = |m: &&Miss| {
             let place = self.curve.levels.iter().position(|level| *level == m.level);
@@ -749,7 +736,6 @@ impl Outcome {
     }
 
     /// The scales that count.
-    #[must_use]
     pub fn counted_levels(&self) -> Vec<u32> {
         self.curve
             .levels

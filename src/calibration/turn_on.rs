@@ -81,7 +81,6 @@ pub struct TurnOnSpread {
 
 impl TurnOnSpread {
     /// The standard deviations of the turn-on bias, where one is seen: of each axis, or of all where some have no recording.
-    #[must_use]
     pub fn sigmas(&self) -> Option<[f64; 3]> {
         let seen = self.finding == TurnOnFinding::Seen;
         let spread_of_axis = |axis: Axis| {
@@ -94,25 +93,21 @@ impl TurnOnSpread {
     }
 
     /// Root mean square over the axes of the spread of the means (m/s² or rad/s).
-    #[must_use]
     pub fn spread(&self) -> f64 {
         self.root_mean_square(|a| a.spread)
     }
 
     /// Root mean square over the axes of the part that the noise makes (m/s² or rad/s).
-    #[must_use]
     pub fn noise(&self) -> f64 {
         self.root_mean_square(|a| a.noise)
     }
 
     /// Fewest recordings of an axis.
-    #[must_use]
     pub fn recordings(&self) -> usize {
         self.axes.iter().map(|a| a.recordings).min().unwrap_or(0)
     }
 
     /// Relative standard error of the spread of an axis, of Gaussian biases: 1/√(2(n − 1)).
-    #[must_use]
     pub fn relative_error(&self) -> f64 {
         1.0 / (2.0 * (self.recordings().max(2) - 1) as f64).sqrt()
     }
@@ -125,7 +120,6 @@ impl TurnOnSpread {
 
 /// The spread of the recordings' means, sensor by sensor; nothing of a sensor without two recordings whose means are known.
 /// `outcomes`: those of one estimator.
-#[must_use]
 pub fn turn_on(groups: &[Group], outcomes: &[&Outcome]) -> Vec<TurnOnSpread> {
     let mut found: Vec<TurnOnSpread> = Sensor::ALL
         .into_iter()

@@ -128,7 +128,6 @@ impl Closure {
     }
 
     /// Whether it is within the bounds; what is not finite is within none.
-    #[must_use]
     pub fn within(&self, bounds: &Bounds) -> bool {
         self.position_m <= bounds.position_m
             && self.velocity_m_s <= bounds.velocity_m_s

@@ -110,7 +110,6 @@ impl<R: Real> Parallel<R> {
 
 /// Radii of curvature at the latitude whose sine is given.
 #[inline(always)]
-#[must_use]
 pub fn radii<R: Real>(sin_lat: R) -> Radii<R> {
     Parallel::at(sin_lat).radii()
 }
@@ -141,13 +140,11 @@ nav_sim_signal::named!(GravityModel { Wgs84 = "wgs84", FirstOrder = "first-order
 
 /// `Parallel::gravity_down` at the latitude whose sine is given.
 #[inline(always)]
-#[must_use]
 pub fn gravity_down<R: Real>(model: GravityModel, sin_lat: R, h: R) -> R {
     Parallel::at(sin_lat).gravity_down(model, h)
 }
 
 /// Position in e (m).
-#[must_use]
 pub fn geodetic_to_ecef(lat: f64, lon: f64, h: f64) -> DVec3 {
     let (sin_lat, cos_lat) = lat.sin_cos();
     let (sin_lon, cos_lon) = lon.sin_cos();
@@ -161,7 +158,6 @@ pub fn geodetic_to_ecef(lat: f64, lon: f64, h: f64) -> DVec3 {
 
 /// Latitude, longitude (rad) and height (m) of a position in e: fixed-point iteration of
 /// tan lat = (z + e² N sin lat)/p from the latitude that is exact at h = 0, to rounding; for |h| up to 1000 km.
-#[must_use]
 pub fn ecef_to_geodetic(r_e: DVec3) -> (f64, f64, f64) {
     let p = r_e.x.hypot(r_e.y);
     let lon = r_e.y.atan2(r_e.x);
@@ -180,13 +176,11 @@ pub fn ecef_to_geodetic(r_e: DVec3) -> (f64, f64, f64) {
 }
 
 /// Earth rate in n (rad/s) at a latitude, [Groves](crate::bibliography::Groves13) eq. 2.123.
-#[must_use]
 pub fn omega_ie_n(lat: f64) -> DVec3 {
     DVec3::new(OMEGA_IE * lat.cos(), 0.0, -OMEGA_IE * lat.sin())
 }
 
 /// Transport rate in n (rad/s), [Groves](crate::bibliography::Groves13) eq. 5.44.
-#[must_use]
 pub fn omega_en_n(lat: f64, h: f64, v_n: DVec3) -> DVec3 {
     let r = radii(lat.sin());
     let east = v_n.y / (r.transverse + h);
@@ -196,7 +190,6 @@ pub fn omega_en_n(lat: f64, h: f64, v_n: DVec3) -> DVec3 {
 
 /// Position difference `b − a` in metres north, east, down at a: curvilinear, (R_N + h) δlat,
 /// (R_E + h) cos(lat) δlon, −δh.
-#[must_use]
 pub fn ned_difference(a: &NavState, lat: f64, lon: f64, h: f64) -> DVec3 {
     let r = radii(a.lat.sin());
     DVec3::new(
@@ -208,7 +201,6 @@ pub fn ned_difference(a: &NavState, lat: f64, lon: f64, h: f64) -> DVec3 {
 }
 
 /// A vector of e written in n at the given place.
-#[must_use]
 pub fn e_to_n(lat: f64, lon: f64, v_e: DVec3) -> DVec3 {
     q_e_n(lat, lon) * v_e
 }

@@ -43,13 +43,11 @@ pub struct RollPitchYaw {
 
 impl RollPitchYaw {
     /// The attitude quaternion q_b_n.
-    #[must_use]
     pub fn to_quat(self) -> DQuat {
         DQuat::from_euler(EulerRot::ZYX, self.yaw, self.pitch, self.roll)
     }
 
     /// The angles of an attitude q_b_n. At pitch = ±π/2 roll and yaw are not unique; one pair is given.
-    #[must_use]
     pub fn from_quat(q_b_n: DQuat) -> Self {
         let (yaw, pitch, roll) = q_b_n.to_euler(EulerRot::ZYX);
         Self { roll, pitch, yaw }
@@ -57,7 +55,6 @@ impl RollPitchYaw {
 
     /// The Jacobian ∂(roll, pitch, yaw)/∂psi_n, rows in that order, for C_est = (I + \[psi_n×\]) C_true.
     /// Grows as 1/cos(pitch).
-    #[must_use]
     pub fn jacobian_of_psi_n(&self) -> [DVec3; 3] {
         // psi_n = roll · x_b + pitch · (−sin yaw, cos yaw, 0) + yaw · (0, 0, 1), the axes of the three turns
         // in n, solved for the angles.
@@ -72,7 +69,6 @@ impl RollPitchYaw {
 }
 
 /// The rotation from e to n at a latitude and longitude (rad): takes e, returns n.
-#[must_use]
 pub fn q_e_n(lat: f64, lon: f64) -> DQuat {
     // From n to e: a turn by the longitude about the axis of the Earth, then by −lat − 90° about the new y
     // axis, east. Asked for is its inverse.
@@ -81,7 +77,6 @@ pub fn q_e_n(lat: f64, lon: f64) -> DQuat {
 }
 
 /// Wraps an angle to (−π, π]; one that is there already comes back as it is, to the last bit.
-#[must_use]
 pub fn wrap_angle(angle: f64) -> f64 {
     if angle.abs() < std::f64::consts::PI {
         return angle;

@@ -37,7 +37,6 @@ const OPEN_M_S: f64 = 1000.0;
 
 impl GnssVelocity {
     /// With all three components measured: velocity and standard deviations (m/s).
-    #[must_use]
     pub fn new(v_n: DVec3, sigma_n: DVec3) -> Self {
         Self {
             horizontal: v_n.truncate(),
@@ -48,13 +47,11 @@ impl GnssVelocity {
 
     /// North, east, down (m/s), for who takes three components: where the last is not measured it is 0, and its
     /// standard deviation too large to tell anything.
-    #[must_use]
     pub fn v_n(&self) -> DVec3 {
         self.horizontal.extend(self.down.map_or(0.0, |(v, _)| v))
     }
 
     /// Standard deviations of [`Self::v_n`] (m/s).
-    #[must_use]
     pub fn sigma_n(&self) -> DVec3 {
         self.horizontal_sigma
             .extend(self.down.map_or(OPEN_M_S, |(_, sigma)| sigma))
@@ -72,7 +69,6 @@ pub struct FixSigma {
 
 impl GnssFix {
     /// With its standard deviations of position and velocity times these; what was not measured stays open.
-    #[must_use]
     pub fn with_sigmas_times(mut self, position: f64, velocity: f64) -> Self {
         self.pos_sigma_n *= position;
         if let Some(measured) = &mut self.velocity {
@@ -84,7 +80,6 @@ impl GnssFix {
 
     /// How many components were measured: what is open adds nothing to the NIS, and counts for nothing in it. They stand
     /// in the order of north, east, down of the position and of the velocity.
-    #[must_use]
     pub fn components(&self) -> usize {
         3 + self
             .velocity

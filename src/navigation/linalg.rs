@@ -4,7 +4,6 @@ use glam::DVec3;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 /// The larger of two numbers; NaN where either is, so that what was lost is not overlooked.
-#[must_use]
 pub const fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a >= b { a } else { b }
 }

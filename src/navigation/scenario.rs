@@ -145,7 +145,6 @@ impl FilterSettings {
 impl Scenario {
     /// The experiment that this scenario describes: a trajectory, what makes the inertial errors, the
     /// candidates, and the outages and the seed, which have been drawn.
-    #[must_use]
     pub fn experiment<'a>(
         &'a self,
         trajectory: &'a Trajectory,
@@ -283,7 +282,6 @@ impl Scenario {
 
     /// The same with a filter that has a state for every process of the model; what it expects beside the model
     /// stays.
-    #[must_use]
     pub fn with_full_noise(&self) -> Self {
         let mut full = self.clone();
         full.filter.states = FilterStates::Full;
@@ -356,13 +354,11 @@ pub(crate) mod aiding_tests;
 
 impl Scenario {
     /// Whether no error of the true IMU, the receiver or the aiding is stated.
-    #[must_use]
     pub fn has_no_errors(&self) -> bool {
         self.imu.is_ideal() && self.aiding.errors().is_empty() && self.unexpected().is_empty()
     }
 
     /// Errors that the true IMU and receiver have and the filter does not expect: its own will be larger than it says.
-    #[must_use]
     pub fn unexpected(&self) -> Vec<Unexpected> {
         let mut found = Vec::new();
         for sensor in Sensor::ALL {
@@ -412,7 +408,6 @@ impl Scenario {
     }
 
     /// The integration error of the strapdown, where the largest is a tenth of sigma: a hundredth of a mean square.
-    #[must_use]
     pub fn unexpected_integration(&self, over_sigma: f64) -> Option<Unexpected> {
         let rate_hz = self.imu.rate_hz;
         (over_sigma > 0.1).then_some(Unexpected::Integration {
@@ -470,7 +465,6 @@ pub enum Unexpected {
 
 impl Unexpected {
     /// Its names among the sources of a [`Budget`](crate::metrics::Budget): their shares together are its own.
-    #[must_use]
     pub fn sources(&self) -> Vec<String> {
         match self {
             Self::TurnOnBias { sensor, .. } => vec![format!("{}.turn_on_bias", sensor.name())],

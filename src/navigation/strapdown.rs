@@ -68,7 +68,6 @@ pub struct StepTrace<L> {
 
 impl Strapdown {
     /// Starts every lane from the same state.
-    #[must_use]
     pub fn new(start: &NavState, gravity: GravityModel) -> Self {
         Self {
             lat: Lanes::splat(start.lat),
@@ -87,7 +86,6 @@ impl Strapdown {
     }
 
     /// The state of one lane.
-    #[must_use]
     pub fn lane(&self, i: usize) -> NavState {
         NavState {
             lat: self.lat[i],

@@ -19,7 +19,6 @@ crate::named!(Sensor { Accel = "accel", Gyro = "gyro" }, in files);
 
 impl Sensor {
     /// Unit of a sample.
-    #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
             Self::Accel => "m/s²",
@@ -68,14 +67,12 @@ impl Channel {
         all
     };
     /// Position in [`Channel::ALL`].
-    #[must_use]
     pub const fn index(self) -> usize {
         self.sensor as usize * 3 + self.axis as usize
     }
 
     /// Channels that a word stands for: `all`, a sensor (`accel`), an axis of both sensors (`x`) or one
     /// channel (`accel.x`); none for any other.
-    #[must_use]
     pub fn named(word: &str) -> Vec<Self> {
         let meant = |c: &Self| {
             word == "all"
@@ -105,7 +102,6 @@ pub struct ImuSample {
 
 impl ImuSample {
     /// What a sensor measures of it: specific force (m/s²) or angular rate (rad/s).
-    #[must_use]
     pub const fn of(&self, sensor: Sensor) -> DVec3 {
         match sensor {
             Sensor::Accel => self.f_ib_b,
@@ -151,17 +147,14 @@ pub struct Recording {
 
 impl Recording {
     /// The signal of a channel, if recorded.
-    #[must_use]
     pub fn signal(&self, channel: Channel) -> Option<&Signal> {
         self.signals.iter().find(|s| s.channel == channel)
     }
     /// Samples per signal.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.signals.first().map_or(0, |s| s.samples.len())
     }
     /// Whether it holds no samples.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

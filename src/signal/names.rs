@@ -25,7 +25,6 @@ macro_rules! named {
             pub const NAMES: [&'static str; Self::ALL.len()] = [$($word),+];
 
             /// Name in files and on the command line.
-            #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$member => $word),+

@@ -40,7 +40,6 @@ pub struct StreamKey<'a> {
 
 impl StreamKey<'_> {
     /// The generator of this stream, at its beginning.
-    #[must_use]
     pub fn generator(&self) -> Generator {
         let mut hasher = blake3::Hasher::new();
         hasher

@@ -34,7 +34,6 @@ pub struct SettingError {
 
 impl SettingError {
     /// The refusal of a value.
-    #[must_use]
     pub fn new(key: &str, value: impl ToString, requirement: impl Into<String>) -> Self {
         Self {
             key: key.to_owned(),
@@ -45,14 +44,12 @@ impl SettingError {
     }
 
     /// The same with what to do about it.
-    #[must_use]
     pub const fn advising(mut self, advice: &'static str) -> Self {
         self.advice = Some(advice);
         self
     }
 
     /// The same with the section's name before the key.
-    #[must_use]
     pub fn in_section(mut self, section: &str) -> Self {
         self.key = format!("{section}.{}", self.key);
         self

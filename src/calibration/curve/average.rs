@@ -46,13 +46,11 @@ nav_sim_signal::named!(
 
 impl Estimator {
     /// Whether it uses the robust wavelet variance.
-    #[must_use]
     pub const fn is_robust(self) -> bool {
         matches!(self, Self::SrAwv | Self::DrAwv | Self::Rgmwm)
     }
 
     /// Whether it takes one replicate at a time.
-    #[must_use]
     pub const fn is_single(self) -> bool {
         matches!(self, Self::Gmwm | Self::Rgmwm | Self::Avlr | Self::Given)
     }
@@ -69,7 +67,6 @@ pub enum Trim {
 
 impl Trim {
     /// The number for K replicates.
-    #[must_use]
     pub fn count(self, replicates: usize) -> usize {
         match self {
             Self::Count(a) => a,
@@ -152,7 +149,6 @@ impl Replicate {
     }
 
     /// The wavelet variances that an estimator uses, from level 1 on (units²).
-    #[must_use]
     pub fn values(&self, estimator: Estimator) -> Vec<f64> {
         (0..self.levels())
             .map(|index| self.value(estimator, index))
@@ -165,7 +161,6 @@ impl Replicate {
     }
 
     /// eta3 of the samples that are there.
-    #[must_use]
     pub fn edof_eta3(&self, level: u32) -> f64 {
         (interval::edof_eta3(self.samples, level) * self.covered(level as usize - 1)).max(1.0)
     }
@@ -427,7 +422,6 @@ pub struct Scope {
 
 impl Scope {
     /// `accel.x`, or `accel` if the axes are pooled.
-    #[must_use]
     pub fn name(&self) -> String {
         match self.axis {
             None => self.sensor.name().to_owned(),
@@ -440,7 +434,6 @@ impl Scope {
     }
 
     /// The channels it covers.
-    #[must_use]
     pub fn channels(&self) -> Vec<Channel> {
         let axes = self.axis.map_or(Axis::ALL.to_vec(), |axis| vec![axis]);
         axes.into_iter()
@@ -545,7 +538,6 @@ pub fn replicates(
 }
 
 /// Mean of the later half of a signal less that of its earlier half; the middle one of an odd number is left out.
-#[must_use]
 pub fn trend(samples: &[f64]) -> f64 {
     let half = samples.len() / 2;
     // Half by half about their first value, so that no digits of a small change are lost.
@@ -560,7 +552,6 @@ pub(super) fn mean_about(value: f64, samples: &[f64]) -> f64 {
 }
 
 /// The groups, in the order of [`Channel::ALL`].
-#[must_use]
 pub fn grouped(replicates: Vec<(Channel, Replicate)>, pool: Pool) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     let mut replicates = replicates;
@@ -589,7 +580,6 @@ pub fn grouped(replicates: Vec<(Channel, Replicate)>, pool: Pool) -> Vec<Group> 
 pub(crate) const MAD_TO_DEVIATION: f64 = 1.482_602_218_505_602;
 
 /// The median; NaN of nothing.
-#[must_use]
 pub fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

@@ -501,7 +501,6 @@ const fn is_quantization(process: &Process) -> bool {
 }
 
 /// The curve a model implies, at the levels and of the kind (classical or robust) of a given one.
-#[must_use]
 pub fn implied(model: &Composite, curve: &Curve) -> Vec<f64> {
     let at_level = |level: &u32| {
         let nu = model.haar_wv(*level);

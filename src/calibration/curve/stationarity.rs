@@ -56,7 +56,6 @@ pub struct Beginning {
 
 impl Beginning {
     /// The signal that is furthest from its rest.
-    #[must_use]
     pub fn surest(&self) -> Option<(Channel, WarmUp)> {
         self.signals
             .iter()
@@ -76,7 +75,6 @@ pub struct Beginnings {
 
 /// Looks at a signal, again after what would be left out, until what remains begins as it goes on; none where it does from
 /// the start, or is too short to tell.
-#[must_use]
 pub fn warm_up(samples: &[f64]) -> Option<WarmUp> {
     let first = look(samples)?;
     let mut left = first.samples;

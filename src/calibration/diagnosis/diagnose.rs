@@ -12,7 +12,6 @@ use serde::{Serialize, Serializer};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Diagnoses every recording, sensor by sensor. Without two recordings there is nothing to compare.
-#[must_use]
 pub fn diagnose(groups: &[Group], outcomes: &[Outcome], settings: &Settings) -> Vec<Diagnosis> {
     Sensor::ALL
         .into_iter()

@@ -326,7 +326,6 @@ impl Draws {
 
 /// The 95 % interval of what is positive and follows from a whole model, from what follows from the models of draws:
 /// as that of an amplitude. Such a figure is there whatever the model, not shown because it came out large.
-#[must_use]
 pub fn derived_interval(estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2] {
     Draws::new(Parameter::Sigma2, drawn, stretch).around(estimate)
 }
@@ -370,7 +369,6 @@ fn observed_s(outcome: &Outcome, rate_hz: f64) -> Option<f64> {
 impl Outcome {
     /// N, K, B and T of practitioners, as exports have them; none at a rate without averages of 1 s, nor
     /// without noise.
-    #[must_use]
     pub fn practical(&self, rate_hz: f64) -> Option<Practical> {
         let (horizon, policy) = (Horizon::default(), Policy::Matched);
         let range_s = observed_s(self, rate_hz)?;

@@ -556,7 +556,6 @@ pub(crate) fn p_value(
 
 impl Outcome {
     /// Probability of such differences of the replicates and the scale where they are largest, where they differ beyond their noise.
-    #[must_use]
     pub fn differing(&self) -> Option<(f64, LevelSpread)> {
         let inference = self.inference.as_ref()?;
         let p_value = inference.alike.filter(|p| *p <= LEVEL)?;

@@ -71,7 +71,6 @@ pub struct BiasGroup {
 
 impl BiasGroup {
     /// A constant that is not known: the same for all time, with this standard deviation on each axis.
-    #[must_use]
     pub(crate) const fn constant(sigma: f64) -> Self {
         Self {
             phi: DVec3::ONE,
@@ -93,7 +92,6 @@ impl BiasGroup {
     /// The same bias with a step of `ratio` samples, which need not be whole: a Gauss-Markov process keeps its
     /// correlation time and variance, a random walk its growth. A coefficient ≤ 0 belongs to no process in
     /// continuous time and is left as it is.
-    #[must_use]
     pub(crate) fn over(&self, ratio: f64) -> Self {
         let axis = |i: usize| match self.phi[i] {
             phi if phi >= 1.0 => (phi, self.innovation[i] * ratio),
@@ -190,7 +188,6 @@ impl Belief {
 
     /// With the turn-on biases and scale factors that the settings of the start expect; the attitude, position
     /// and velocity of the start are the filter's own affair ([`super::Ekf::new`]).
-    #[must_use]
     pub fn with_initial(mut self, initial: &InitialSettings) -> Self {
         for sensor in Sensor::ALL {
             self.add_constant(sensor, initial.bias_sigma(sensor).unwrap_or(0.0));
@@ -203,7 +200,6 @@ impl Belief {
 
     /// With states of a vehicle's own measurements, of these deviations: scale of the wheel (1), pitch and yaw of the
     /// vehicle's axes in those of the IMU (rad).
-    #[must_use]
     pub fn with_vehicle(mut self, sigmas: DVec3) -> Self {
         self.vehicle = sigmas;
         self.states += self
@@ -230,13 +226,11 @@ impl Belief {
     }
 
     /// The unknown constants of a sensor that are multiplied.
-    #[must_use]
     pub(crate) fn unknowns(&self, sensor: Sensor) -> &[Unknown] {
         &self.unknowns[sensor as usize]
     }
 
     /// Blocks of the covariance: R, V, PSI, the bias groups, the unknowns, and one of the vehicle.
-    #[must_use]
     pub(crate) fn blocks(&self) -> usize {
         3 + Sensor::ALL
             .map(|s| self.groups[s as usize].len() + self.unknowns[s as usize].len())
@@ -283,13 +277,11 @@ impl Belief {
     }
 
     /// Standard deviation of the biases of a sensor at the start: the largest of the three axes.
-    #[must_use]
     pub fn initial_bias_sigma(&self, sensor: Sensor) -> f64 {
         self.deviation(sensor, |_| true)
     }
 
     /// The part of it that the model's processes have, the unknown constant apart.
-    #[must_use]
     pub fn process_sigma(&self, sensor: Sensor) -> f64 {
         self.deviation(sensor, |g| !g.is_constant())
     }
@@ -441,7 +433,6 @@ impl FilterStates {
     pub const ALL: [Self; 3] = [Self::Reduced15, Self::Reduced21, Self::Full];
 
     /// As it is written: `15`, `21` or `full`.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Reduced15 => "15",
@@ -451,7 +442,6 @@ impl FilterStates {
     }
 
     /// Scale-factor error that the filter expects of both sensors where nothing else is said (1).
-    #[must_use]
     pub const fn scale_sigma(self) -> f64 {
         match self {
             Self::Reduced21 => SCALE_SIGMA,
@@ -460,7 +450,6 @@ impl FilterStates {
     }
 
     /// Whether the model's processes are reduced to one bias an axis.
-    #[must_use]
     pub const fn is_reduced(self) -> bool {
         !matches!(self, Self::Full)
     }
@@ -565,7 +554,6 @@ impl Default for InitialSettings {
 
 impl InitialSettings {
     /// The turn-on bias that the filter expects of a sensor (m/s² or rad/s).
-    #[must_use]
     pub const fn bias_sigma(&self, sensor: Sensor) -> Option<f64> {
         match sensor {
             Sensor::Accel => self.accel_bias_sigma_m_s2,
@@ -574,7 +562,6 @@ impl InitialSettings {
     }
 
     /// The scale-factor error that the filter expects of a sensor (parts per million).
-    #[must_use]
     pub const fn scale_sigma_ppm(&self, sensor: Sensor) -> Option<f64> {
         match sensor {
             Sensor::Accel => self.accel_scale_sigma_ppm,
@@ -583,7 +570,6 @@ impl InitialSettings {
     }
 
     /// The key of [`Self::bias_sigma`].
-    #[must_use]
     pub const fn bias_key(sensor: Sensor) -> &'static str {
         match sensor {
             Sensor::Accel => "accel_bias_sigma_m_s2",
@@ -592,7 +578,6 @@ impl InitialSettings {
     }
 
     /// The key of [`Self::scale_sigma_ppm`].
-    #[must_use]
     pub const fn scale_key(sensor: Sensor) -> &'static str {
         match sensor {
             Sensor::Accel => "accel_scale_sigma_ppm",
@@ -642,7 +627,6 @@ fn at_most(key: &str, sigmas: &[f64], limit: f64, unit: &str) -> Result<(), Sett
 /// The rotation vector psi_n of small roll, pitch and yaw errors at an attitude: the inverse of
 /// [`RollPitchYaw::jacobian_of_psi_n`]. At pitch ±90° roll and yaw are not separate: the errors are then
 /// taken about the axes of n.
-#[must_use]
 pub(crate) fn psi_of_angles(q_b_n: DQuat) -> Matrix3<f64> {
     // Inverted numerically: one formula for the Jacobian, in one place.
     let j = RollPitchYaw::from_quat(q_b_n).jacobian_of_psi_n();

@@ -99,7 +99,6 @@ impl<'a> Sources<'a> {
 
 impl Covariance {
     /// Zero covariance of `dim` states.
-    #[must_use]
     pub(crate) fn zeros(dim: usize) -> Self {
         Self {
             dim,
@@ -109,14 +108,12 @@ impl Covariance {
     }
 
     /// States: rows of the matrix.
-    #[must_use]
     pub(crate) const fn dim(&self) -> usize {
         self.dim
     }
 
     /// Element (i, j) of the matrix.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn get<W: Wide>(&self, i: usize, j: usize) -> W {
         W::load(&self.p[i.max(j) * self.dim + i.min(j)])
     }
@@ -268,7 +265,6 @@ impl Covariance {
     }
 
     /// The variances of a block's three states.
-    #[must_use]
     pub(crate) fn variances(&self, block: usize) -> Vec3 {
         Vec3([0, 1, 2].map(|i| self.get(3 * block + i, 3 * block + i)))
     }
@@ -319,7 +315,6 @@ impl Covariance {
 
     /// xᵀ P⁻¹ x over the states listed, by Cholesky; NaN where the covariance is not positive definite.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn normalised_square<const N: usize>(
         &self,
         states: [usize; N],
@@ -330,7 +325,6 @@ impl Covariance {
 
     /// Logarithm of the normal density of mean zero and this covariance at `x` (nats; the units of the density are
     /// those of the states, inverse).
-    #[must_use]
     pub(crate) fn log_density<const N: usize>(&self, states: [usize; N], x: [Lanes; N]) -> Lanes {
         let (square, root_of_det) = self.whitened(states, x);
         let constant = N as f64 * std::f64::consts::TAU.ln();
@@ -367,7 +361,6 @@ impl Covariance {
     }
 
     /// The matrix of one lane.
-    #[must_use]
     pub fn lane(&self, lane: usize) -> nalgebra::DMatrix<f64> {
         nalgebra::DMatrix::from_fn(self.dim(), self.dim(), |i, j| self.get::<Lanes>(i, j)[lane])
     }
@@ -455,7 +448,6 @@ pub(crate) type NavError<L> = [Vec3<L>; 3];
 /// A linear map of the navigation error, given the errors of the accelerometer and gyroscope biases.
 pub(crate) trait ErrorMap<L> {
     /// The error after the map.
-    #[must_use]
     fn apply(&self, x: NavError<L>, accel: Vec3<L>, gyro: Vec3<L>) -> NavError<L>;
 }
 
@@ -473,7 +465,6 @@ pub struct Sample<L> {
 impl<L: Real> Sample<L> {
     /// From what the strapdown passed through.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn new(trace: &StepTrace<L>, dt: f64) -> Self {
         Self {
             c_dt: trace.c_b_n.scaled(L::from(dt)),
@@ -484,7 +475,6 @@ impl<L: Real> Sample<L> {
 
     /// C diag(variances) Cᵀ dt²: the noise of one sample of a sensor, in n.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn rotated_noise(&self, variances: DVec3) -> Mat3<L> {
         let z = L::from(0.0);
         let mut noise = Mat3([[z; 3]; 3]);
@@ -513,7 +503,6 @@ impl<L: Real> Sample<L> {
     /// The gyroscope noise of a sample tilts the specific force of the same sample: column j of what that adds to
     /// the covariance of V and PSI, −½ \[f_n dt ×\] q_psi.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn tilted_noise(&self, q_psi: &Mat3<L>, j: usize) -> Vec3<L> {
         Vec3([q_psi.0[0][j], q_psi.0[1][j], q_psi.0[2][j]]).cross(self.half_f_dt)
     }
@@ -555,7 +544,6 @@ pub(crate) struct EarthTerms<L> {
 impl<L: Real> EarthTerms<L> {
     /// At the nominal state.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn at(ins: &Strapdown<L>) -> Self {
         let (z, one) = (L::from(0.0), L::from(1.0));
         let (s, c) = ins.lat.sin_cos();

@@ -69,7 +69,6 @@ impl Ekf {
     /// A filter at its nominal start, with zero estimates of biases and unknowns, whose deviations are those
     /// of the belief. The attitude standard deviations, given for roll, pitch and yaw, are brought to psi_n at
     /// the attitude of `about`, the same in all lanes.
-    #[must_use]
     pub fn new(
         nominal: Strapdown,
         belief: &Belief,
@@ -140,13 +139,11 @@ impl Ekf {
     }
 
     /// The same filter with another update by fixes.
-    #[must_use]
     pub(crate) fn with_update(self, fix_update: FixUpdate) -> Self {
         Self { fix_update, ..self }
     }
 
     /// The same filter with other vector units, for comparison; portable where the machine lacks them.
-    #[must_use]
     pub fn at_level(self, level: Level) -> Self {
         Self { level, ..self }
     }
@@ -505,7 +502,6 @@ type Term = (usize, Vec3);
 impl Ekf {
     /// The bias estimate of a sensor (m/s² or rad/s): the sum of its groups and its drift.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn bias_of<W: Wide>(&self, sensor: Sensor) -> Vec3<W> {
         let mut sum = self.bias_sum::<W>(sensor);
         if let Some((block, factor)) = self.drift_term(sensor) {
@@ -518,7 +514,6 @@ impl Ekf {
     }
 
     /// Standard deviations of that estimate on the three axes (m/s² or rad/s).
-    #[must_use]
     pub(crate) fn bias_sigma(&self, sensor: Sensor) -> Vec3 {
         let sources = self.sources();
         let [accel, gyro] = sources.biases;
@@ -533,7 +528,6 @@ impl Ekf {
     }
 
     /// Standard deviations of the estimated scale-factor error of a sensor (1); none where the filter has no state for it.
-    #[must_use]
     pub fn scale_sigma(&self, sensor: Sensor) -> Option<Vec3> {
         let block = self.unknown_block(sensor, UnknownKind::ScaleFactor)?;
         Some(self.deviation(std::iter::once((block, Vec3::splat(DVec3::ONE)))))

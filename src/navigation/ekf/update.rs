@@ -79,7 +79,6 @@ impl Ekf {
 
     /// Estimated less measured position and velocity of the antenna: metres and m/s north, east, down; the
     /// velocity zero where none is measured.
-    #[must_use]
     pub(crate) fn innovation(&self, fix: &Fix) -> [Vec3; 2] {
         Antenna::new(&self.nominal, self.omega_ib_b, fix.lever_arm_b).innovation(&self.nominal, fix)
     }
@@ -283,7 +282,6 @@ impl<W: Wide> Antenna<W> {
 
 /// The measurement rows of a fix about a nominal state: position north, east, down, then velocity. Twelve
 /// coefficients each: R, V, PSI, and the error of the gyroscope's bias.
-#[must_use]
 pub(crate) fn fix_rows(
     ins: &Strapdown<f64>,
     omega_ib_b: DVec3,
@@ -374,7 +372,6 @@ impl<W: Wide> Row<W> {
 
 impl Ekf {
     /// The six measurement rows (position, velocity) of the first lane, dense.
-    #[must_use]
     pub(crate) fn measurement_rows(&self, lever_arm_b: DVec3) -> Vec<Vec<f64>> {
         let antenna = Antenna::new(&self.nominal, self.omega_ib_b, lever_arm_b);
         let position = (0..3).map(|axis| antenna.position_row(axis));
@@ -588,7 +585,6 @@ fn yaw_row<L: Real>(ins: &Strapdown<L>) -> Vec3<L> {
 
 /// The rows of a velocity along forward, right and down about a nominal state: V, PSI and the error of the gyroscope's
 /// bias behind R, twelve coefficients each.
-#[must_use]
 pub(crate) fn body_velocity_rows(
     ins: &Strapdown<f64>,
     omega_ib_b: DVec3,
@@ -606,7 +602,6 @@ pub(crate) fn body_velocity_rows(
 }
 
 /// The row of a yaw in the same form.
-#[must_use]
 pub(crate) fn dense_yaw_row(ins: &Strapdown<f64>) -> [f64; 12] {
     let mut dense = [0.0; 12];
     dense[3 * PSI..3 * PSI + 3].copy_from_slice(&yaw_row(ins).0);
@@ -617,7 +612,6 @@ pub(crate) fn dense_yaw_row(ins: &Strapdown<f64>) -> [f64; 12] {
 
 /// The NIS above which a fix of `components` is refused: the chi-square quantile of a probability
 /// ([Bar-Shalom](crate::bibliography::BarShalom01), sec. 5.4).
-#[must_use]
 pub(crate) fn nis_limit(probability: f64, components: usize) -> f64 {
     ChiSquared::new(components as f64).map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(probability))
 }

@@ -570,7 +570,6 @@ fn window(samples: &[ImuIncrement], q_s_b: DQuat) -> Window {
 }
 
 /// True where the specific force is spread too much for anything that stands: vibrations at rest are less.
-#[must_use]
 pub fn moves(imu: &[ImuIncrement]) -> bool {
     window(imu, DQuat::IDENTITY).spread.0 >= STILL.0
 }

@@ -45,7 +45,6 @@ pub struct ClocksApart {
 
 impl ClocksApart {
     /// With what is left of the delay, and how well that is known (s).
-    #[must_use]
     pub fn refined(mut self, rest_s: f64, sigma_s: f64) -> Self {
         (self.delay_s, self.sigma_s) = (self.delay_s + rest_s, Some(sigma_s));
         self
@@ -53,7 +52,6 @@ impl ClocksApart {
 }
 
 /// The lag at which the turns agree; none where they agree as they are, or at no lag.
-#[must_use]
 pub fn clocks_apart(recorded: &Recorded<'_>) -> Option<ClocksApart> {
     let [lag_s, best, now] = agreement(recorded)?;
     // 1 − r², for r < 0 more than 1: turns that go against each other explain less than nothing.
@@ -182,7 +180,6 @@ const CONTRADICTS: f64 = 16.0;
 
 /// Time that the clock of the fixes is ahead of the IMU's (s), where the two have nothing in common and the turns agree
 /// when both recordings begin within a minute of one another.
-#[must_use]
 pub fn rough_origin(recorded: &Recorded<'_>) -> Option<f64> {
     let begins_s = check_clocks(recorded).err()?.delay_s()?;
     let gnss = earlier(recorded.gnss, begins_s);
@@ -194,7 +191,6 @@ pub fn rough_origin(recorded: &Recorded<'_>) -> Option<f64> {
 }
 
 /// The rest of a delay that was found roughly (s): the one at which the innovations are smallest.
-#[must_use]
 pub fn rest_of_origin(recorded: &Recorded<'_>, belief: &Belief, settings: &Settings) -> f64 {
     let to_s = recorded.gnss.first().map_or(0.0, |fix| fix.t_s) + MOST_S;
     let imu = &recorded.imu[..recorded.imu.partition_point(|sample| sample.t_s <= to_s)];
@@ -253,7 +249,6 @@ fn disagreement(solution: &Solution, fixes: usize) -> f64 {
 }
 
 /// Fixes so much earlier (s).
-#[must_use]
 pub fn earlier(gnss: &[GnssFix], seconds: f64) -> Vec<GnssFix> {
     gnss.iter()
         .map(|fix| GnssFix {

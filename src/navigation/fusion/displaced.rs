@@ -45,7 +45,6 @@ pub struct Displaced {
 }
 
 /// Finds where the antenna is and how late the fixes are, where that makes the innovations smaller.
-#[must_use]
 pub fn displaced(
     recorded: &Recorded<'_>,
     belief: &Belief,
@@ -294,7 +293,6 @@ pub struct Whiteness {
 
 impl Whiteness {
     /// Of the fixes used; none where they are few.
-    #[must_use]
     pub fn of<'a>(fixes: impl IntoIterator<Item = &'a FixRecord>) -> Option<Self> {
         let used = fixes.into_iter().filter(|f| f.used == Use::Used);
         let position = |f: &FixRecord| [0, 1, 2].map(|i| f.innovation[i] / f.sigma[i]);
@@ -324,7 +322,6 @@ impl Whiteness {
     }
 
     /// Whether the innovations are correlated.
-    #[must_use]
     pub fn is_correlated(&self) -> bool {
         self.lag_1 > self.limit
     }
@@ -347,7 +344,6 @@ pub struct Weighed {
 
 impl Weighed {
     /// The solution whose innovations tell what the fixes are worth.
-    #[must_use]
     pub fn judged(&self) -> &Solution {
         self.as_stated.as_ref().unwrap_or(&self.solution)
     }

@@ -50,13 +50,11 @@ pub struct Mounting {
 
 impl Mounting {
     /// Roll, pitch and yaw in degrees.
-    #[must_use]
     pub fn angles_deg(&self) -> [f64; 3] {
         [self.angles.roll, self.angles.pitch, self.angles.yaw].map(|a| a / DEG)
     }
 
     /// Standard deviations about front, right and down in degrees.
-    #[must_use]
     pub fn sigma_deg(&self) -> [f64; 3] {
         (self.sigma_b / DEG).to_array()
     }

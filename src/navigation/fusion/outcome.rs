@@ -121,7 +121,6 @@ pub struct SmoothedOutage {
 }
 
 /// The figures of a solution with these outages.
-#[must_use]
 pub fn outcome(solution: &Solution, outages: &[Outage]) -> Outcome {
     let count = |kind: Use| solution.fixes.iter().filter(|f| f.used == kind).count();
     Outcome {
@@ -385,7 +384,6 @@ pub struct Confidence {
 
 impl FromReference {
     /// Whether the errors are as large as stated.
-    #[must_use]
     pub fn confidence(&self) -> Confidence {
         let all = (self.nees_mean / self.nees_dof as f64).sqrt();
         let states = || REPORTED_NAMES.into_iter().zip(self.error_over_sigma.0);
@@ -423,7 +421,6 @@ pub(super) fn nis_bound(components: usize) -> f64 {
 
 /// Judges a solution: its fixes with standard deviations as stated, its errors as believed. `of_start` is what speaks
 /// against the start, as the alignment found it.
-#[must_use]
 pub fn assess(
     weighed: &Weighed,
     outcome: &Outcome,
@@ -662,7 +659,6 @@ const WEEK_S: f64 = 604_800.0;
 impl FusionError {
     /// How late the fixes are by their clock, where that is why nothing overlaps (s): whole weeks, or what makes both
     /// recordings begin in the same second.
-    #[must_use]
     pub fn delay_s(&self) -> Option<f64> {
         let Self::Clocks { imu, gnss } = self else {
             return None;

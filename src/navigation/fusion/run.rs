@@ -511,7 +511,6 @@ const FEWEST: usize = 20;
 type Spread = [DVec3; 2];
 
 /// Fills the holes between samples. `step_s` is how long a sample lasts.
-#[must_use]
 pub fn bridged(samples: &[ImuIncrement], step_s: f64) -> Vec<ImuIncrement> {
     let hole = |k: usize| samples[k].t_s - samples[k].dt_s - samples[k - 1].t_s;
     let holes: Vec<usize> = (1..samples.len())

@@ -77,7 +77,6 @@ pub struct AidInnovations {
 }
 
 /// The innovations of each aid there is.
-#[must_use]
 pub fn aid_innovations(records: &[AidRecord]) -> Vec<AidInnovations> {
     let worth = |aid: Aid| {
         let own: Vec<&AidRecord> = records.iter().filter(|r| r.aid == aid).collect();
@@ -105,7 +104,6 @@ pub fn aid_innovations(records: &[AidRecord]) -> Vec<AidInnovations> {
 
 /// The measurements of a recording: the constraint and standstill at sample times, a wheel at its own. Fixes that are
 /// withheld tell nothing of standstill, which is none where the recording shows too little of it.
-#[must_use]
 pub fn vehicle_velocities(
     recorded: &Recorded<'_>,
     wheel: &[WheelSpeed],
@@ -159,7 +157,6 @@ pub fn vehicle_velocities(
 }
 
 /// How many times the speed of the fixes a wheel reads where both move: the median; none where they never do.
-#[must_use]
 pub fn wheel_ratio(
     recorded: &Recorded<'_>,
     wheel: &[WheelSpeed],
@@ -356,7 +353,6 @@ fn degrees(samples: usize) -> f64 {
 
 impl Standstill {
     /// Learns it from windows of one length; none where too few stand.
-    #[must_use]
     fn learn(windows: &[(&[ImuIncrement], Motion)]) -> Option<Self> {
         let of = |motion: Motion| {
             windows
@@ -410,7 +406,6 @@ impl Standstill {
     }
 
     /// Whether a window is one of standstill, of which fixes or a wheel say this.
-    #[must_use]
     fn stands(&self, window: &[ImuIncrement], motion: Motion) -> bool {
         match motion {
             Motion::Still => self.statistic(window) < self.thresholds[0],

@@ -71,7 +71,6 @@ impl Lanes {
 
     /// The same value in every lane.
     #[inline(always)]
-    #[must_use]
     pub const fn splat(value: f64) -> Self {
         Self([value; LANES])
     }
@@ -304,7 +303,6 @@ impl Vec3 {
 impl<L: Real> Vec3<L> {
     /// The same vector in every lane.
     #[inline(always)]
-    #[must_use]
     pub fn splat(v: glam::DVec3) -> Self {
         Self([L::from(v.x), L::from(v.y), L::from(v.z)])
     }
@@ -393,7 +391,6 @@ pub struct Mat3<L = Lanes>(pub [[L; 3]; 3]);
 
 impl Mat3 {
     /// The matrix of one lane.
-    #[must_use]
     pub fn lane(&self, lane: usize) -> nalgebra::Matrix3<f64> {
         nalgebra::Matrix3::from_fn(|i, j| self.0[i][j][lane])
     }
@@ -528,7 +525,6 @@ impl<L: Real> Quat<L> {
 
     /// The direction cosine matrix.
     #[inline(always)]
-    #[must_use]
     pub fn to_matrix(&self) -> Mat3<L> {
         let (w, [x, y, z]) = (self.w, self.v.0);
         // Doubling by addition is exact, and leaves nine products.

@@ -38,7 +38,6 @@ pub enum Level {
 
 impl Level {
     /// The best of this machine.
-    #[must_use]
     pub fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
         {

@@ -22,7 +22,6 @@ impl Estimate {
     /// The mean of a sample from its sum and its sum of squares. Values that hang together scatter less about
     /// their own mean: by 1 − 1/`independent` in the variance, which the division by `independent` − 1 makes
     /// good as it does for independent ones.
-    #[must_use]
     pub fn mean(size: SampleSize, sum: f64, sum_sq: f64) -> Self {
         let n = size.values as f64;
         let value = sum / n;
@@ -46,13 +45,11 @@ impl Estimate {
     }
 
     /// The root mean square of a sample from its sums of squares and of fourth powers.
-    #[must_use]
     pub fn root_mean_square(size: SampleSize, sum_sq: f64, sum_4: f64) -> Self {
         Self::mean(size, sum_sq, sum_4).root()
     }
 
     /// The square root, its standard error by linearisation: that of the square over twice the root.
-    #[must_use]
     pub fn root(self) -> Self {
         let value = self.value.sqrt();
         let std_error = if value > 0.0 {
@@ -64,7 +61,6 @@ impl Estimate {
     }
 
     /// The mean of a sample, of which no more than `windows` values are independent ([`SampleSize::of`]).
-    #[must_use]
     pub fn mean_of(sample: impl Iterator<Item = f64> + Clone, windows: Option<f64>) -> Self {
         let size = SampleSize::of(sample.clone().count() as u64, windows);
         let n = size.values as f64;
@@ -90,7 +86,6 @@ pub struct SampleSize {
 impl SampleSize {
     /// The size of a sample of `values` runs, no more than `windows` of which have noise of their own (none: all
     /// have).
-    #[must_use]
     pub fn of(values: u64, windows: Option<f64>) -> Self {
         Self {
             values,
@@ -160,7 +155,6 @@ pub struct Quantile {
 /// The quantile at `p` of a sorted sample. The interval runs between order statistics: the number of
 /// values below the true quantile is binomial (n, p), whatever the distribution. Where no more than `windows`
 /// values are independent, it runs between the order statistics at the same shares of the sample.
-#[must_use]
 pub fn quantile(sorted: &[f64], p: f64, windows: Option<f64>) -> Quantile {
     Quantile {
         value: sample_quantile(sorted, p),
@@ -232,7 +226,6 @@ impl Band {
 
 /// The band of the mean of `count` independent chi-square statistics of `dof` degrees of freedom:
 /// χ²(count·dof)/count ([Bar-Shalom et al.](crate::bibliography::BarShalom01), sec. 5.4).
-#[must_use]
 pub fn chi_square_band(dof: usize, count: f64) -> Band {
     chi_square_interval(dof, count, 0.025)
 }
@@ -310,7 +303,6 @@ const ROUNDING: f64 = 1e-14;
 
 impl QuadraticForm {
     /// From weights and shifts; weights that are not above zero (beside the largest: rounding) are left out.
-    #[must_use]
     pub fn new(terms: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let terms: Vec<(f64, f64)> = terms.into_iter().collect();
         let largest = terms.iter().map(|t| t.0).fold(0.0, f64::max);

@@ -48,7 +48,6 @@ pub struct Expected {
 impl Expected {
     /// The figures of a filter in an experiment whose inertial errors `truth` makes, along the experiment's track; none
     /// where a covariance did not stay finite and positive.
-    #[must_use]
     pub fn along(
         track: &Track,
         experiment: &Experiment<'_>,
@@ -102,7 +101,6 @@ impl Expected {
     }
 
     /// The summary: as that of runs, without what only runs have (null).
-    #[must_use]
     pub fn summary(&self) -> Summary {
         let verdict = Verdict::expected(&self.record, self.beyond_linear());
         let unknown = f64::NAN;
@@ -175,7 +173,6 @@ fn mean_size(instant: &Instant, states: &[usize]) -> f64 {
 }
 
 /// Quantiles of the horizontal error (m).
-#[must_use]
 pub fn horizontal_quantiles<const N: usize>(
     instant: &Instant,
     probabilities: [f64; N],

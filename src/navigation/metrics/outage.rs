@@ -59,7 +59,6 @@ pub struct Reconvergence {
 }
 
 /// Statistics of every outage, diverged runs left out.
-#[must_use]
 pub fn outages(result: &RunResult) -> Vec<OutageMetrics> {
     let kept = || result.runs.iter().filter(|r| !r.diverged);
     let epochs = epochs(result);
@@ -214,7 +213,6 @@ impl EpochMetrics {
 }
 
 /// Statistics of every epoch.
-#[must_use]
 pub fn epochs(result: &RunResult) -> Vec<EpochMetrics> {
     result
         .epochs
@@ -268,7 +266,6 @@ pub struct FanEpoch {
 
 /// Over the runs that did not diverge, at the times at which their errors were kept, and just before the first fix after
 /// each outage, where errors are largest: that row stands before the one after the fix, at the same time.
-#[must_use]
 pub fn fan(result: &RunResult) -> Vec<FanEpoch> {
     // Runs after the hundred thousandth have no errors over time: they are left out at the ends as well, so
     // that the band is of one set of runs.
@@ -299,7 +296,6 @@ pub fn fan(result: &RunResult) -> Vec<FanEpoch> {
 }
 
 /// The quantiles of a filter's errors by covariance analysis, at the same times.
-#[must_use]
 pub fn expected_fan(
     filter: &FilterPass<'_>,
     truth: &TruthSide,
@@ -348,7 +344,6 @@ pub struct Budget {
 
 impl Budget {
     /// Just before the first fix after each outage: every source goes alone through the gains of one filter.
-    #[must_use]
     pub fn at_outage_ends(filter: &FilterPass<'_>, sources: &[NamedSource]) -> Vec<Self> {
         let squares = |source: &NamedSource| -> Vec<[f64; REPORTED]> {
             // Mean squares, not variances: a deterministic source (drift) has a mean and no variance.
@@ -392,7 +387,6 @@ impl Budget {
     }
 
     /// Shares in the sum of the mean squares of some states (horizontal position: 0 and 1), the largest first.
-    #[must_use]
     pub fn ranked(&self, states: &[usize]) -> Vec<(&str, f64)> {
         let whole: f64 = states.iter().map(|i| self.total[*i]).sum();
         let share = |of: &PerState<f64>| {

@@ -85,13 +85,11 @@ impl From<&Expected> for Measured {
 
 impl Measured {
     /// The runs that were made; none of a covariance analysis.
-    #[must_use]
     pub fn sampled(&self) -> &[RunRecord] {
         if self.is_expected { &[] } else { &self.runs }
     }
 
     /// Whether the filter is as good as it believes.
-    #[must_use]
     pub fn verdict(&self) -> Verdict {
         match self.runs.as_slice() {
             [record] if self.is_expected => Verdict::expected(record, self.beyond_linear),

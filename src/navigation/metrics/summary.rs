@@ -226,13 +226,11 @@ pub struct Coverage {
 
 impl Summary {
     /// Whether its figures are those of a covariance analysis, or stand beside them.
-    #[must_use]
     pub const fn is_analysed(&self) -> bool {
         self.runs == 0 || self.lincov.is_some()
     }
 
     /// The summary of a Monte-Carlo experiment.
-    #[must_use]
     pub fn of(result: &RunResult, epochs: &[EpochMetrics], seed: u64) -> Self {
         let windows = result.independent_windows;
         let verdict = Verdict::of(&result.runs, result.outages.len(), windows);
@@ -558,7 +556,6 @@ impl ReductionSummary {
     }
 
     /// Whether the pair is the model itself: nothing was lost.
-    #[must_use]
     pub fn is_exact(&self) -> bool {
         self.axes.iter().all(|a| a.misfit == 0.0)
     }
@@ -631,7 +628,6 @@ impl AxisReduction {
 
 impl ReductionQuality {
     /// From a covariance analysis of the reduced filter and, where there is one, of the full filter.
-    #[must_use]
     pub fn of(reduced: &Assessment, full: Option<&Assessment>) -> Self {
         // At the start the errors are those that the filter believes in, or none: that says nothing of it.
         let later: Vec<&lincov::Consistency> =
@@ -662,7 +658,6 @@ impl ReductionQuality {
     }
 
     /// Reported state, outage and ratio that is further from 1 than the tolerance, the furthest of all; none where none is.
-    #[must_use]
     pub fn worst(&self) -> Option<(usize, usize, f64)> {
         let ends = self.outage_end.iter().enumerate();
         let all = ends
@@ -674,7 +669,6 @@ impl ReductionQuality {
 
     /// Errors over those of the full filter at the ends of outages: the largest ratio of the horizontal position (north or east,
     /// whichever is larger), and that of all states with its state.
-    #[must_use]
     pub fn cost(&self) -> Option<(f64, (usize, f64))> {
         let ends = || self.rmse_over_full.iter().flatten();
         let most = |state: usize| (state, ends().map(|end| end.0[state]).fold(0.0, f64::max));
@@ -771,13 +765,11 @@ impl FromStr for Requirement {
 
 impl Requirement {
     /// Whether it says anything only of outages.
-    #[must_use]
     pub const fn needs_outage(&self) -> bool {
         matches!(self.figure, Figure::P50 | Figure::P95)
     }
 
     /// Its name.
-    #[must_use]
     pub fn name(&self) -> String {
         match self.figure {
             Figure::P50 => "p50_m".to_owned(),
@@ -790,7 +782,6 @@ impl Requirement {
     /// Compares the limit with the expectation of the covariance analysis where there is one, else with the runs. From the first
     /// outage that is beyond linear theory on, position and velocity down are not in the analysis: the runs beside it decide, and
     /// without runs no limit is met. All other figures hold (docs/limits.md).
-    #[must_use]
     pub fn check(&self, summary: &Summary) -> Met {
         if self.figure == Figure::Consistent {
             let Verdict {

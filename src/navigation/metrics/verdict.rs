@@ -170,7 +170,6 @@ impl OutageVerdict {
 impl Verdict {
     /// From the records of the runs through a number of outages, those that diverged left out;
     /// `independent_windows` as in [`RunResult`](crate::simulation::RunResult).
-    #[must_use]
     pub fn of(runs: &[RunRecord], outages: usize, independent_windows: Option<f64>) -> Self {
         let kept: Vec<&RunRecord> = runs.iter().filter(|r| !r.diverged).collect();
         let evidence = Evidence {
@@ -241,13 +240,11 @@ impl Verdict {
     }
 
     /// Whether it rests on covariance analysis, not on runs.
-    #[must_use]
     pub const fn is_expected(&self) -> bool {
         self.independent_runs.is_infinite()
     }
 
     /// Whether the errors are of another order than the filter believes.
-    #[must_use]
     pub fn is_far_off(&self) -> bool {
         self.nees > FAR
     }

@@ -51,14 +51,12 @@ pub fn run(
 }
 
 /// The same of a planned experiment.
-#[must_use]
 pub fn run_plan(plan: &Plan<'_>, runs: u64, progress: &(dyn Fn(u64) + Sync)) -> Vec<RunResult> {
     run_range(plan, 0, runs, &|| true, progress).expect("nothing stops it")
 }
 
 /// Runs `first..first + runs` of a planned experiment; `None` if `go_on`, asked before each batch of eight,
 /// said no. Sums are made in run order, batches of eight from `first` on.
-#[must_use]
 pub fn run_range(
     plan: &Plan<'_>,
     first: u64,

@@ -41,7 +41,6 @@ impl Drift {
     }
 
     /// The value of a quantity (m or degrees).
-    #[must_use]
     pub fn value(&self, quantity: Quantity) -> f64 {
         match quantity {
             Quantity::P50 => self.quantile(0.5),
@@ -80,14 +79,12 @@ impl Drift {
     }
 
     /// Whether a limit is exceeded, or the value is not a number.
-    #[must_use]
     pub fn exceeds(&self, limit: &Limit) -> bool {
         let is_within = |value: f64| value <= limit.most;
         !is_within(self.bound(limit.quantity)) && !is_within(self.value(limit.quantity))
     }
 
     /// The largest value of a quantity and where it is; what is not a number is the largest.
-    #[must_use]
     pub fn largest(drifts: &[Self], quantity: Quantity) -> Option<(usize, f64)> {
         let bound = |drift: &Self| {
             Some(drift.bound(quantity))
@@ -321,7 +318,6 @@ impl<'a> Course<'a> {
 }
 
 /// Outages of one length at `places` times, the first at `first_s`, evenly to the end of the trajectory.
-#[must_use]
 pub fn evenly(first_s: f64, end_s: f64, length_s: f64, places: u32) -> Vec<Outage> {
     let last_s = end_s - length_s;
     let step = if places > 1 {

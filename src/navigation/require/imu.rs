@@ -53,7 +53,6 @@ impl ImuParameters {
     ];
 
     /// The noise model.
-    #[must_use]
     pub fn model(&self, rate_hz: f64) -> Model {
         let [accel_white, accel_bias, gyro_white, gyro_bias] = self.values;
         let axis = |density: f64, bias: f64| {
@@ -79,7 +78,6 @@ impl ImuParameters {
     }
 
     /// Between which averaging times the Allan deviation of a bias is nowhere below its bias instability (s).
-    #[must_use]
     pub fn floor_s(&self) -> (f64, f64) {
         Flicker {
             floor: 1.0,
@@ -89,7 +87,6 @@ impl ImuParameters {
     }
 
     /// An intensity in the unit of datasheets.
-    #[must_use]
     pub fn in_datasheets(which: usize, value: f64) -> f64 {
         match which {
             0 => value * HOUR_S.sqrt(),
@@ -339,13 +336,11 @@ impl Margins {
     }
 
     /// Whether the limits are kept.
-    #[must_use]
     pub fn met(&self) -> bool {
         self.worst.margin() >= 0.0
     }
 
     /// Whether any IMU keeps the limits.
-    #[must_use]
     pub fn an_imu_helps(&self) -> bool {
         self.without_imu.margin() >= 0.0
     }

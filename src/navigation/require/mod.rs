@@ -46,7 +46,6 @@ impl Quantity {
     ];
 
     /// Its name, unit included.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::P50 => "p50_m",
@@ -59,7 +58,6 @@ impl Quantity {
     }
 
     /// Its unit.
-    #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
             Self::P50 | Self::P95 | Self::Rmse => "m",
@@ -68,7 +66,6 @@ impl Quantity {
     }
 
     /// A value with its unit, to a thousandth; a larger one, or a smaller, in powers of ten.
-    #[must_use]
     pub fn shown(self, value: f64) -> String {
         let rounded = (value * 1e3).round() / 1e3;
         if (1e-3..1e6).contains(&value) {
@@ -101,7 +98,6 @@ pub struct Worst {
 
 impl Worst {
     /// Logarithm of limit over error: above 0 there is a reserve.
-    #[must_use]
     pub fn margin(&self) -> f64 {
         // In logarithms limits of different units compare, and the margin is nearly linear in the logarithm
         // of an intensity.
@@ -109,7 +105,6 @@ impl Worst {
     }
 
     /// The hardest of some limits for the errors at several places; none without limits or places.
-    #[must_use]
     pub fn of(limits: &[Limit], drifts: &[Drift]) -> Option<Self> {
         let worst_of_limit = |limit: &Limit| {
             let (place, value) = Drift::largest(drifts, limit.quantity)?;

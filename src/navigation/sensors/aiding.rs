@@ -53,7 +53,6 @@ impl AidingSettings {
     }
 
     /// Whether there is none.
-    #[must_use]
     pub fn is_none(&self) -> bool {
         self.rates().next().is_none()
     }
@@ -89,7 +88,6 @@ impl AidingSettings {
     }
 
     /// Standard deviations of one measurement's white noise, as the filter believes and in truth (m/s or rad).
-    #[must_use]
     pub fn sigmas(&self, aid: Aid) -> [f64; 2] {
         let (sigma, noise) = match aid {
             Aid::Nhc => self
@@ -117,7 +115,6 @@ impl AidingSettings {
 
     /// Standard deviations of what a filter may have as states: scale of the wheel (1), pitch and yaw of the vehicle's
     /// axes (rad); 0 where it has none.
-    #[must_use]
     pub fn state_sigmas(&self) -> DVec3 {
         let scale = self.odometer.as_ref().map_or(0.0, |s| s.scale_sigma);
         let mounting = self
@@ -129,7 +126,6 @@ impl AidingSettings {
 
     /// A car: the constraint at the rear axle with states of its mounting, and what is truly wrong with it: 0.5° of
     /// mounting, sideslip of 0.003 rad s²/m, 0.05 m/s of the suspension over a second.
-    #[must_use]
     pub fn car() -> Self {
         let truth = NhcErrors {
             noise_sigma_m_s: Some(0.02),
@@ -150,7 +146,6 @@ impl AidingSettings {
     }
 
     /// The same with a wheel whose scale is off by one per cent, of which the filter has a state.
-    #[must_use]
     pub fn car_with_odometer() -> Self {
         let truth = OdometerErrors {
             scale_sigma: 0.01,
@@ -188,7 +183,6 @@ impl Aid {
     pub(crate) const ALL: [Self; 4] = [Self::Nhc, Self::Odometer, Self::Zupt, Self::Heading];
 
     /// As its table is called.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         ["nhc", "odometer", "zupt", "heading"][self as usize]
     }

@@ -174,7 +174,6 @@ impl ImuSettings {
     }
 
     /// Standard deviations of turn-on bias (m/s² or rad/s) and scale factor (parts per million) of a sensor.
-    #[must_use]
     pub fn deviations(&self, sensor: Sensor) -> (f64, f64) {
         let ppm = match sensor {
             Sensor::Accel => self.scale_ppm_accel,
@@ -184,7 +183,6 @@ impl ImuSettings {
     }
 
     /// Standard deviation of the turn-on bias of a sensor (m/s² or rad/s), where it is stated.
-    #[must_use]
     pub const fn turn_on_bias(&self, sensor: Sensor) -> Option<f64> {
         match sensor {
             Sensor::Accel => self.turn_on_bias_accel_m_s2,

@@ -38,13 +38,11 @@ impl Outage {
     ];
 
     /// Whether a fix at `t_s` is missing.
-    #[must_use]
     pub fn withholds(&self, t_s: f64) -> bool {
         self.start_s <= t_s + SLACK_S && !self.is_over(t_s)
     }
 
     /// Whether a fix at `t_s` comes after it.
-    #[must_use]
     pub(crate) fn is_over(&self, t_s: f64) -> bool {
         self.end_s <= t_s + SLACK_S
     }
@@ -122,7 +120,6 @@ pub struct FixedData<'a> {
 impl<'a> FixedData<'a> {
     /// Recorded fixes at these times (s): an outage may last until a fix later than the last would come, and
     /// begin as early before the first.
-    #[must_use]
     pub fn recorded(times_s: &'a [f64]) -> Self {
         let interval_s = times_s.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
         let (first, last) = times_s
@@ -217,7 +214,6 @@ pub enum OutageError {
 
 impl OutageError {
     /// What to know to correct it.
-    #[must_use]
     pub fn hint(&self) -> Option<&str> {
         match self {
             Self::Setting(_) => None,

@@ -27,7 +27,6 @@ pub struct Batch {
 }
 
 /// Runs `first..first + live` (at most [`LANES`]) through all candidates: the noise is drawn once.
-#[must_use]
 pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
     let experiment = plan.experiment;
     let mut source = Source::new(plan, first, live);

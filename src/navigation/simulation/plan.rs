@@ -229,7 +229,6 @@ impl<'a> Plan<'a> {
     }
 
     /// The same with the horizontal error of every run kept over time, at `fan_epochs`.
-    #[must_use]
     pub fn with_fan(mut self) -> Self {
         let times: Vec<f64> = self.reports().map(|e| e.t_s).collect();
         self.fan = fan_epochs(&times, self.experiment.outages);
@@ -241,14 +240,12 @@ impl<'a> Plan<'a> {
     }
 
     /// Times at which the horizontal error is kept run by run (s).
-    #[must_use]
     pub(crate) fn fan_t_s(&self) -> Vec<f64> {
         let times: Vec<f64> = self.reports().map(|e| e.t_s).collect();
         self.fan.iter().map(|i| times[*i]).collect()
     }
 
     /// Times of the first fix after each outage, or of the end of the trajectory (s).
-    #[must_use]
     pub(crate) fn outage_fix_t_s(&self) -> Vec<f64> {
         self.outages
             .iter()
@@ -257,7 +254,6 @@ impl<'a> Plan<'a> {
     }
 
     /// What was planned.
-    #[must_use]
     pub(crate) const fn experiment(&self) -> &'a Experiment<'a> {
         self.experiment
     }
@@ -275,7 +271,6 @@ impl<'a> Plan<'a> {
     }
 
     /// IMU samples of one run.
-    #[must_use]
     pub(crate) fn samples(&self) -> usize {
         self.ideal.len()
     }
@@ -287,7 +282,6 @@ const FAN_EPOCHS: usize = 400;
 /// Of reports at these times, those at which the horizontal error of every run is kept: every one, or every second,
 /// third …, so that they are few on a long drive, and those on both sides of the beginning and the end of each outage,
 /// between which errors are largest.
-#[must_use]
 pub(crate) fn fan_epochs(t_s: &[f64], outages: &[Outage]) -> Vec<usize> {
     let step = t_s.len().div_ceil(FAN_EPOCHS).max(1);
     let withheld: Vec<bool> = t_s

@@ -234,7 +234,6 @@ pub struct Recording {
 }
 
 /// What the sensors record in a run: the same noise as the run itself has.
-#[must_use]
 pub fn record(plan: &Plan<'_>, run: u64) -> Recording {
     let experiment = plan.experiment;
     let (seed, scenario) = (experiment.seed, experiment.scenario);

@@ -88,7 +88,6 @@ pub enum Error {
 
 impl Error {
     /// The sample at fault, counted from 0, if it is one.
-    #[must_use]
     pub const fn index(&self) -> Option<usize> {
         match self {
             Self::TooFew { .. } => None,
@@ -159,25 +158,21 @@ impl Trajectory {
     }
 
     /// Time of the first sample (s).
-    #[must_use]
     pub fn start_s(&self) -> f64 {
         self.knots()[0]
     }
 
     /// Time of the last sample (s).
-    #[must_use]
     pub fn end_s(&self) -> f64 {
         self.knots()[self.knots().len() - 1]
     }
 
     /// Times of the samples (s): the third derivative is constant between two of them.
-    #[must_use]
     pub fn knots(&self) -> &[f64] {
         self.curve.knots()
     }
 
     /// The same motion as far as its first sample at or after `t_s`.
-    #[must_use]
     pub fn until(&self, t_s: f64) -> Self {
         Self {
             origin_e: self.origin_e,
@@ -186,7 +181,6 @@ impl Trajectory {
     }
 
     /// The motion with respect to the Earth. Outside start and end the first and last pieces continue.
-    #[must_use]
     pub fn kinematics(&self, t_s: f64) -> Kinematics {
         let ([x, y, z, qx, qy, qz, qw], first, second) = self.curve.at(t_s);
         let p = DQuat::from_xyzw(qx, qy, qz, qw);
@@ -205,7 +199,6 @@ impl Trajectory {
     }
 
     /// Position, velocity and attitude in n. Outside start and end the first and last pieces continue.
-    #[must_use]
     pub fn state(&self, t_s: f64) -> NavState {
         let k = self.kinematics(t_s);
         let (lat, lon, h) = ecef_to_geodetic(k.r_e);

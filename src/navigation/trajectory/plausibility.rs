@@ -56,7 +56,6 @@ impl Quantity {
     pub(crate) const ALL: [Self; 4] = [Self::Speed, Self::Acceleration, Self::Jerk, Self::Rate];
 
     /// Name, unit of display, and its factor from SI.
-    #[must_use]
     pub const fn display(self) -> (&'static str, &'static str, f64) {
         match self {
             Self::Speed => ("speed", "m/s", 1.0),
@@ -116,7 +115,6 @@ impl fmt::Display for Excess {
 
 /// The largest speed, acceleration, jerk and rate of a trajectory (SI), in the order of `Quantity::ALL`,
 /// and every stretch beyond the limits, in order of time.
-#[must_use]
 pub fn examine(trajectory: &Trajectory, limits: &Limits) -> ([f64; 4], Vec<Excess>) {
     let (mut largest, mut found) = ([0.0_f64; 4], Vec::new());
     let mut open: [Option<Excess>; 4] = [None; 4];
@@ -189,7 +187,6 @@ pub struct VelocityMisfit {
 
 impl VelocityMisfit {
     /// Compares (time, velocity in n) with the trajectory; none without any.
-    #[must_use]
     pub fn new(trajectory: &Trajectory, velocities: &[(f64, DVec3)]) -> Option<Self> {
         let found = |t_s: f64| trajectory.state(t_s).v_n;
         let off: Vec<(f64, f64)> = velocities
@@ -212,7 +209,6 @@ impl VelocityMisfit {
     }
 
     /// Whether they contradict the positions: 0.1 m/s + 2 % of the speed in the mean, or 1 m/s + 10 % once.
-    #[must_use]
     pub fn contradicts(&self) -> bool {
         self.rms > 0.1 + 0.02 * self.rms_speed || self.worst > 1.0 + 0.1 * self.rms_speed
     }

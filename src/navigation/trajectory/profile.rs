@@ -269,7 +269,6 @@ pub enum Problem {
 
 impl Problem {
     /// The key in profile files that is to blame.
-    #[must_use]
     pub const fn key(&self) -> &'static str {
         match self {
             Self::Domain { key, .. } | Self::AtRest { key } => key,
@@ -281,7 +280,6 @@ impl Problem {
     }
 
     /// What to do about it, where that is not plain.
-    #[must_use]
     pub const fn hint(&self) -> Option<&'static str> {
         Some(match self {
             Self::AtRest { .. } => {

@@ -96,14 +96,12 @@ pub struct Break {
 
 impl Reference {
     /// The reference of stretches in order of time; none without any.
-    #[must_use]
     pub fn of_stretches(stretches: Vec<Trajectory>) -> Option<Self> {
         let stretches: Vec<Stretch> = stretches.into_iter().map(Into::into).collect();
         (!stretches.is_empty()).then_some(Self { stretches })
     }
 
     /// Position, velocity and attitude at an instant; none where nothing is known.
-    #[must_use]
     pub fn state(&self, t_s: f64) -> Option<NavState> {
         Some(self.stretch(t_s)?.curve.state(t_s))
     }
@@ -111,7 +109,6 @@ impl Reference {
     /// How well the velocity is known at an instant (m/s, each axis): it follows from the positions, and is as uneven
     /// as they are. A filter that corrects its position by half a metre from one sample to the next, 20 ms later, does
     /// not move at 25 m/s.
-    #[must_use]
     pub fn velocity_sigma(&self, t_s: f64) -> Option<f64> {
         let stretch = self.stretch(t_s)?;
         // the worse one of the knots on either side
@@ -175,7 +172,6 @@ fn velocity_sigma(curve: &Trajectory) -> Vec<f64> {
 }
 
 /// Where samples do not follow one another as a vehicle moves.
-#[must_use]
 pub fn breaks(samples: &[TrajectorySample]) -> Vec<Break> {
     let steps = Steps::new(samples);
     let break_before = |index| steps.fault(index).map(|fault| Break { index, fault });
@@ -183,7 +179,6 @@ pub fn breaks(samples: &[TrajectorySample]) -> Vec<Break> {
 }
 
 /// Samples that can be compared with: those between breaks, without what is near a jump.
-#[must_use]
 pub fn usable(samples: &[TrajectorySample], breaks: &[Break]) -> Vec<Range<usize>> {
     let jump = |b: Option<&Break>| {
         b.is_some_and(|b| matches!(b.fault, Fault::Position(_) | Fault::Attitude(_)))

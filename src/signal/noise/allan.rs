@@ -30,7 +30,6 @@ impl Process {
 
 impl Composite {
     /// Theoretical Allan variance (units²) of averages over m ≥ 1 samples: the sum over the processes.
-    #[must_use]
     pub fn allan_variance(&self, samples: u32) -> f64 {
         self.processes
             .iter()
@@ -80,7 +79,6 @@ fn of_ar1(p: &Ar1, samples: u32) -> f64 {
 impl Composite {
     /// Variance of the mean of the first N samples after a switching-on (units²), as [`super::Synthesizer`] makes them: a
     /// random walk begins at zero, an AR1 in its stationary law. A ramp is the same each time and adds nothing.
-    #[must_use]
     pub fn mean_variance(&self, samples: usize) -> f64 {
         self.processes
             .iter()

@@ -34,19 +34,16 @@ impl Ar1 {
     }
 
     /// Coefficient.
-    #[must_use]
     pub const fn phi(&self) -> f64 {
         self.phi
     }
 
     /// Innovation variance (units²).
-    #[must_use]
     pub const fn sigma2(&self) -> f64 {
         self.sigma2
     }
 
     /// Stationary variance sigma2/(1 − phi²) (units²).
-    #[must_use]
     pub fn variance(&self) -> f64 {
         // Factorised: 1 − phi is exact for phi ≥ ½, whereas phi² would be rounded before the subtraction.
         self.sigma2 / ((1.0 - self.phi) * (1.0 + self.phi))
@@ -81,7 +78,6 @@ impl Ar1 {
 
     /// The same in kappa = −ln phi > 0, the inverse correlation time in samples: value and derivative with
     /// respect to kappa. Keeps the digits of a kappa too small to be told from 0 in phi.
-    #[must_use]
     pub fn haar_shape_of_kappa(kappa: f64, level: u32) -> (f64, f64) {
         if kappa < LN_2 && level > 1 {
             slow_shape(kappa, half_scale(level))
@@ -289,25 +285,21 @@ impl Ma1 {
     }
 
     /// Coefficient.
-    #[must_use]
     pub const fn theta(&self) -> f64 {
         self.theta
     }
 
     /// Innovation variance (units²).
-    #[must_use]
     pub const fn sigma2(&self) -> f64 {
         self.sigma2
     }
 
     /// Haar wavelet variance at a level (units²): sigma2 [m(1 + theta)² − 3 theta]/(2m²), m = 2^(level−1).
-    #[must_use]
     pub fn haar_wv(&self, level: u32) -> f64 {
         self.sigma2 * Self::haar_shape(self.theta, level).0
     }
 
     /// Haar wavelet variance per unit of sigma2, and its derivative with respect to theta.
-    #[must_use]
     pub fn haar_shape(theta: f64, level: u32) -> (f64, f64) {
         let m = half_scale(level);
         let sum = 1.0 + theta;
@@ -370,25 +362,21 @@ impl GaussMarkov {
     }
 
     /// Inverse correlation time (1/s).
-    #[must_use]
     pub const fn beta(&self) -> f64 {
         self.beta
     }
 
     /// Sample rate (Hz).
-    #[must_use]
     pub const fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
 
     /// Stationary variance (units²).
-    #[must_use]
     pub const fn s2(&self) -> f64 {
         self.s2
     }
 
     /// The same process sampled: an AR1 with phi = e^(−beta/f) and sigma2 = s2 (1 − phi²).
-    #[must_use]
     pub const fn ar1(&self) -> Ar1 {
         self.ar1
     }
@@ -400,7 +388,6 @@ impl GaussMarkov {
 
     /// Haar wavelet variance per unit of s2, and its derivative with respect to kappa = beta/f, the inverse
     /// correlation time in samples.
-    #[must_use]
     pub fn haar_shape(kappa: f64, level: u32) -> (f64, f64) {
         let m = half_scale(level);
         if kappa < LN_2 {

@@ -159,7 +159,6 @@ pub struct Contamination {
 
 impl Contamination {
     /// Operations on a signal of a replicate (counted from 1), in the order of application.
-    #[must_use]
     pub fn operations_for(&self, channel: Channel, replicate: u64) -> Vec<&Operation> {
         self.rules_for(channel, replicate)
             .into_iter()
@@ -177,7 +176,6 @@ impl Contamination {
     }
 
     /// Whether anything is done to a replicate (counted from 1).
-    #[must_use]
     pub fn touches(&self, replicate: u64) -> bool {
         self.rules
             .iter()

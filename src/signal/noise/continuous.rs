@@ -14,7 +14,6 @@ pub(crate) fn white_density(sigma2: f64, rate_hz: f64) -> f64 {
 }
 
 /// Variance of a sample of white noise of density N (units/√Hz).
-#[must_use]
 pub fn white_sigma2(density: f64, rate_hz: f64) -> f64 {
     density * density * rate_hz
 }
@@ -25,13 +24,11 @@ pub(crate) fn walk_density(gamma2: f64, rate_hz: f64) -> f64 {
 }
 
 /// Variance of a random-walk increment of density K (units/s/√Hz).
-#[must_use]
 pub fn walk_gamma2(density: f64, rate_hz: f64) -> f64 {
     density * density / rate_hz
 }
 
 /// Correlation time T = −dt/ln phi (s) of an AR1 with 0 < phi < 1.
-#[must_use]
 pub fn correlation_time_s(phi: f64, rate_hz: f64) -> f64 {
     // phi − 1 is exact for phi ≥ ½: T keeps its digits where phi is next to 1.
     -1.0 / (rate_hz * (phi - 1.0).ln_1p())
@@ -39,7 +36,6 @@ pub fn correlation_time_s(phi: f64, rate_hz: f64) -> f64 {
 
 impl Process {
     /// Correlation time (s) of an AR1 with phi > 0 or a GM; none of the others.
-    #[must_use]
     pub fn correlation_time_s(&self, rate_hz: f64) -> Option<f64> {
         match self {
             Self::Ar1(p) if p.phi() > 0.0 => Some(correlation_time_s(p.phi(), rate_hz)),
@@ -90,7 +86,6 @@ pub fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, RateError> {
 }
 
 /// Whether two rates are the same to the precision of a clock (1 ppm).
-#[must_use]
 pub fn same_rate(a_hz: f64, b_hz: f64) -> bool {
     (a_hz / b_hz - 1.0).abs() < 1e-6
 }

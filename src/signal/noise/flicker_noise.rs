@@ -72,13 +72,11 @@ impl FlickerNoise {
     }
 
     /// B² (units²).
-    #[must_use]
     pub const fn b2(&self) -> f64 {
         self.b2
     }
 
     /// Haar wavelet variance per unit of B².
-    #[must_use]
     pub fn haar_shape(level: u32) -> f64 {
         static SHAPES: OnceLock<[f64; 40]> = OnceLock::new();
         let shapes = SHAPES
@@ -115,7 +113,6 @@ impl FlickerNoise {
     }
 
     /// White noise and the AR1 whose sum stands for it, the fastest first.
-    #[must_use]
     pub fn parts(&self, ladder: Ladder) -> Vec<Process> {
         let Ladder {
             ratio,
@@ -142,7 +139,6 @@ impl FlickerNoise {
     }
 
     /// Variance at the beginning of what is slower than the fastest AR1 of a filter: of all that is synthesised, however slow.
-    #[must_use]
     pub fn initial_variance(&self) -> f64 {
         let fastest = (-1.0 / Ladder::FILTER.shortest).exp() * (1.0 - 1e-9);
         let slow = |part: Process| match part {
@@ -188,7 +184,6 @@ pub struct Flicker {
 impl Flicker {
     /// The Allan deviation is nowhere below the floor between these averaging times (s): 1.9 times the shortest and the
     /// longest correlation time.
-    #[must_use]
     pub fn range_s(&self) -> (f64, f64) {
         let shortest_s = self.t_corr_s * APART.powi(1 - self.count());
         (

@@ -129,32 +129,27 @@ impl Kind {
     }
 
     /// The kind of that code.
-    #[must_use]
     pub fn named(code: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.code() == code)
     }
 
     /// Code in model files and specifications.
-    #[must_use]
     pub const fn code(self) -> &'static str {
         self.row().code
     }
 
     /// Its parameters in the order of [`Process::parameters`].
-    #[must_use]
     pub const fn parameters(self) -> &'static [Parameter] {
         self.row().parameters
     }
 
     /// The parameter its wavelet variance grows with.
-    #[must_use]
     pub const fn amplitude(self) -> Parameter {
         let parameters = self.parameters();
         parameters[parameters.len() - 1]
     }
 
     /// The parameter that gives its shape, if its wavelet variance depends on more than an amplitude.
-    #[must_use]
     pub const fn shape(self) -> Option<Parameter> {
         match self.parameters() {
             [shape, _] => Some(*shape),
@@ -163,7 +158,6 @@ impl Kind {
     }
 
     /// Units of its parameters, where those of the signal are `unit`.
-    #[must_use]
     pub fn units(self, unit: &str) -> String {
         self.row().units.replace("{u}", unit)
     }
@@ -173,7 +167,6 @@ impl Kind {
     ///
     /// # Errors
     /// When a value is outside its domain.
-    #[must_use]
     pub fn process(self, values: &[f64], rate_hz: f64) -> Option<Result<Process, ParameterError>> {
         Some(match (self, values) {
             (Self::White, &[sigma2]) => White::new(sigma2).map(Process::White),
@@ -193,7 +186,6 @@ impl Kind {
 
 impl Parameter {
     /// Name in files.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Phi => "phi",
@@ -209,14 +201,12 @@ impl Parameter {
     }
 
     /// Whether it gives the shape of a wavelet variance rather than its size.
-    #[must_use]
     pub const fn is_shape(self) -> bool {
         matches!(self, Self::Phi | Self::Beta | Self::Theta)
     }
 
     /// A value on the scale on which the law of an estimate does not depend on it, and on which recordings differ: the logarithm,
     /// of phi that of κ = −ln phi = 1/(T·rate), the correlation time but for sign and rate; theta as it is.
-    #[must_use]
     pub fn scaled(self, value: f64) -> f64 {
         match self {
             Self::Phi => (-value.ln()).ln(),
@@ -226,7 +216,6 @@ impl Parameter {
     }
 
     /// The value that is there on that scale.
-    #[must_use]
     pub fn unscaled(self, scaled: f64) -> f64 {
         match self {
             Self::Phi => (-scaled.exp()).exp(),
@@ -236,7 +225,6 @@ impl Parameter {
     }
 
     /// Ends of its domain, (low, high).
-    #[must_use]
     pub const fn domain(self) -> (f64, f64) {
         match self {
             Self::Phi | Self::Theta => (-1.0, 1.0),
@@ -254,7 +242,6 @@ impl Process {
     ///
     /// # Errors
     /// When a value is outside its domain.
-    #[must_use]
     pub fn from_values(
         code: &str,
         values: &[f64],
@@ -264,13 +251,11 @@ impl Process {
     }
 
     /// Code in model files and specifications.
-    #[must_use]
     pub const fn code(&self) -> &'static str {
         self.kind().code()
     }
 
     /// The parameters as (name in model files, value).
-    #[must_use]
     pub fn parameters(&self) -> Vec<(&'static str, f64)> {
         self.kind()
             .parameters()
@@ -284,7 +269,6 @@ impl Process {
     ///
     /// # Errors
     /// When the value is outside its domain.
-    #[must_use]
     pub fn with_parameter(
         &self,
         name: &str,
@@ -303,7 +287,6 @@ impl Process {
 
 /// A label for each process of a sum, unique within it: "WN", "AR1_1", "AR1_2", … (numbered only where a kind occurs
 /// more than once, in order of appearance).
-#[must_use]
 pub fn labels(kinds: &[Kind]) -> Vec<String> {
     let count = |kinds: &[Kind], kind: Kind| kinds.iter().filter(|k| **k == kind).count();
     let label = |(i, kind): (usize, &Kind)| match count(kinds, *kind) {
@@ -324,21 +307,18 @@ pub struct Composite {
 
 impl Composite {
     /// The sum of the given processes.
-    #[must_use]
     pub const fn new(processes: Vec<Process>) -> Self {
         Self { processes }
     }
 
     /// Theoretical Haar wavelet variance at a level (units²): the sum over the processes, which are
     /// independent. Level j has scale tau = 2^j samples.
-    #[must_use]
     pub fn haar_wv(&self, level: u32) -> f64 {
         self.processes.iter().map(|p| p.haar_wv(level)).sum()
     }
 
     /// Its gradient with respect to the parameters of all processes, concatenated (see
     /// [`Process::haar_wv_gradient`]).
-    #[must_use]
     pub fn haar_wv_gradient(&self, level: u32) -> Vec<f64> {
         self.processes
             .iter()
@@ -347,7 +327,6 @@ impl Composite {
     }
 
     /// A label for each summand, unique within the sum (see [`labels`]).
-    #[must_use]
     pub fn labels(&self) -> Vec<String> {
         labels(&self.processes.iter().map(Process::kind).collect::<Vec<_>>())
     }
@@ -356,7 +335,6 @@ impl Composite {
     ///
     /// # Panics
     /// When there is no such process.
-    #[must_use]
     pub fn name_of(&self, of: ParameterRef) -> String {
         format!("{} {}", self.labels()[of.process], of.parameter.name())
     }

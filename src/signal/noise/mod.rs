@@ -108,7 +108,6 @@ impl Serialize for Process {
 
 impl Process {
     /// Its kind.
-    #[must_use]
     pub const fn kind(&self) -> Kind {
         match self {
             Self::White(_) => Kind::White,
@@ -123,7 +122,6 @@ impl Process {
     }
 
     /// The values of its parameters, in the order of [`Kind::parameters`].
-    #[must_use]
     pub fn values(&self) -> Vec<f64> {
         match self {
             Self::White(p) => vec![p.sigma2()],
@@ -140,7 +138,6 @@ impl Process {
     /// Theoretical Haar wavelet variance (MODWT, scale tau = 2^level samples) of the process (units²);
     /// level ≥ 1. Half the Allan variance of averages over tau/2 samples
     /// ([Guerrier](crate::bibliography::Guerrier13), [Percival](crate::bibliography::Percival95)).
-    #[must_use]
     pub fn haar_wv(&self, level: u32) -> f64 {
         match self {
             Self::White(p) => p.haar_wv(level),
@@ -156,7 +153,6 @@ impl Process {
 
     /// Derivatives of [`Self::haar_wv`] with respect to the parameters, in the order of
     /// [`Self::parameters`].
-    #[must_use]
     pub fn haar_wv_gradient(&self, level: u32) -> Vec<f64> {
         match self {
             Self::White(_) => vec![White::haar_shape(level)],
@@ -191,7 +187,6 @@ pub struct Model {
 
 impl Model {
     /// A model with the same noise on the three axes of each sensor.
-    #[must_use]
     pub fn pooled(rate_hz: f64, accel: &Composite, gyro: &Composite) -> Self {
         let axes = Channel::ALL.map(|c| {
             if c.sensor == Sensor::Accel {
@@ -204,7 +199,6 @@ impl Model {
     }
 
     /// The noise of one axis.
-    #[must_use]
     pub fn axis(&self, channel: Channel) -> &Composite {
         &self.axes[channel.index()]
     }

@@ -89,7 +89,6 @@ pub struct Markov {
 
 impl Markov {
     /// Density of the white noise that drives it, sigma √(2/T) (units/s/√Hz).
-    #[must_use]
     pub fn drive(&self) -> f64 {
         self.sigma * (2.0 / self.t_corr_s).sqrt()
     }
@@ -108,7 +107,6 @@ pub struct Pair {
 
 impl Pair {
     /// Its Allan variance (units²) for averages over `samples` at `rate_hz`, sampled as the model is.
-    #[must_use]
     pub fn allan_variance(&self, samples: u32, rate_hz: f64) -> f64 {
         let n2 = self.density * self.density * white(samples, rate_hz);
         let k2 = self.walk * self.walk * bias(None, samples, rate_hz);
@@ -118,7 +116,6 @@ impl Pair {
 
     /// Averaging time from which on the random walk exceeds the white noise, τ = √3 N/K (s); none without a
     /// random walk.
-    #[must_use]
     pub fn crossover_s(&self) -> Option<f64> {
         (self.walk > 0.0).then(|| 3.0_f64.sqrt() * self.density / self.walk)
     }
@@ -126,7 +123,6 @@ impl Pair {
     /// First averaging time (s), from its crossover on and up to `to_s`, at which its Allan deviation is more than `factor`
     /// times that of a model: from there on the model's deviation does not rise as the random walk's does. None where it is
     /// nowhere, or without a random walk.
-    #[must_use]
     pub fn departs_s(
         &self,
         model: &Composite,
@@ -145,7 +141,6 @@ impl Pair {
     }
 
     /// Smallest and largest ratio of its Allan deviation to that of the model.
-    #[must_use]
     pub fn closure(&self, curve: &Curve) -> Closure {
         let ratio = |p: &Point| Ratio {
             ratio: (self.allan_variance(p.samples, curve.rate_hz) / p.whole).sqrt(),
@@ -274,7 +269,6 @@ impl Curve {
     }
 
     /// The pair that stands for the model.
-    #[must_use]
     pub fn pair(&self, policy: Policy, bias: Bias) -> Pair {
         let walk = bias == Bias::Walk;
         // A model that is such a pair is itself the best one, exactly and not to the accuracy of a search.
@@ -286,7 +280,6 @@ impl Curve {
 
     /// The one correlation time of Gauss-Markov biases that suits this curve and another together (s), by least squares
     /// over both: a curve without a bias leaves it to the other. Not for [`Policy::Strict`], which takes times as they are.
-    #[must_use]
     pub fn shared_correlation_time_s(&self, other: &Self, policy: Policy) -> f64 {
         correlation_time_s(&[self, other], policy)
     }
@@ -323,7 +316,6 @@ impl Curve {
 
     /// Largest share that quantization noise and drift have of the Allan variance over the horizon, and where (s): what
     /// [`Policy::Matched`] leaves out.
-    #[must_use]
     pub fn left_out(&self) -> Ratio {
         let share = |p: &Point| Ratio {
             ratio: 1.0 - p.carried / p.whole,
@@ -601,7 +593,6 @@ pub struct Minimum {
 impl Minimum {
     /// The lowest minimum of the largest Allan deviation of some axes, strictly within one sample and `range_s`; none where it
     /// still falls, or rises from the start.
-    #[must_use]
     pub fn of(axes: &[&Composite], rate_hz: f64, range_s: f64) -> Option<Self> {
         // The grid of 1/16 octave is fine enough: around its minimum N²/τ + K²τ/3 is proportional to cosh x with
         // x = ln(τ/τ₀), and √cosh(ln 2/32) exceeds 1 by 1e-4.
@@ -623,7 +614,6 @@ impl Minimum {
     }
 
     /// Bias instability B = Allan deviation/0.664 (units).
-    #[must_use]
     pub fn bias_instability(&self) -> f64 {
         self.deviation / FLICKER_FLOOR
     }

@@ -9,7 +9,6 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Longest time scale that matters to a filter whose longest outage is given (s): eight times the outage,
 /// at least 800 s. A window that ends with the outage makes the filter trust itself too much.
-#[must_use]
 pub fn window_s(longest_outage_s: f64) -> f64 {
     (8.0 * longest_outage_s).max(800.0)
 }
@@ -92,7 +91,6 @@ pub fn reduce(
 }
 
 /// Whether a filter with one bias an axis carries the noise as it is: at most one of its processes is a bias.
-#[must_use]
 pub fn is_exact(noise: &Composite) -> bool {
     let is_bias = |p: &&Process| {
         matches!(
@@ -105,7 +103,6 @@ pub fn is_exact(noise: &Composite) -> bool {
 }
 
 /// The processes that the pair stands for: without quantization noise and without drift.
-#[must_use]
 pub fn carried(noise: &Composite) -> Composite {
     let apart = |p: &&Process| matches!(p, Process::Quantization(_) | Process::Drift(_));
     Composite::new(

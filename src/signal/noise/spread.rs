@@ -170,19 +170,16 @@ impl Variation {
     }
 
     /// Label of the process, as [`Composite::labels`].
-    #[must_use]
     pub fn process(&self) -> &str {
         &self.process
     }
 
     /// Name of the parameter, as [`Process::parameters`].
-    #[must_use]
     pub fn parameter(&self) -> &str {
         &self.parameter
     }
 
     /// Its law.
-    #[must_use]
     pub const fn law(&self) -> Law {
         self.law
     }

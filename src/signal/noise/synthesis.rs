@@ -27,7 +27,6 @@ const TOGETHER: usize = 3;
 impl Synthesizer {
     /// The noise of one axis (units of the model) at its beginning. The key names seed, scenario, run and
     /// axis; its `process` is replaced by the label of each summand ([`Composite::labels`]).
-    #[must_use]
     pub fn new(noise: &Composite, key: StreamKey<'_>) -> Self {
         let mut synthesizer = Self {
             direct: Vec::new(),

@@ -24,7 +24,6 @@ impl White {
     }
 
     /// Variance of a sample (units²).
-    #[must_use]
     pub const fn sigma2(&self) -> f64 {
         self.sigma2
     }
@@ -35,7 +34,6 @@ impl White {
     }
 
     /// Haar wavelet variance per unit of sigma2.
-    #[must_use]
     pub fn haar_shape(level: u32) -> f64 {
         0.5 / half_scale(level)
     }
@@ -64,7 +62,6 @@ impl Quantization {
     }
 
     /// Q² (units²).
-    #[must_use]
     pub const fn q2(&self) -> f64 {
         self.q2
     }
@@ -75,7 +72,6 @@ impl Quantization {
     }
 
     /// Haar wavelet variance per unit of Q².
-    #[must_use]
     pub fn haar_shape(level: u32) -> f64 {
         let m = half_scale(level);
         1.5 / (m * m)
@@ -105,7 +101,6 @@ impl RandomWalk {
     }
 
     /// Variance of an increment (units²).
-    #[must_use]
     pub const fn gamma2(&self) -> f64 {
         self.gamma2
     }
@@ -116,7 +111,6 @@ impl RandomWalk {
     }
 
     /// Haar wavelet variance per unit of gamma2.
-    #[must_use]
     pub fn haar_shape(level: u32) -> f64 {
         let tau = 2.0 * half_scale(level);
         (tau * tau + 2.0) / (12.0 * tau)
@@ -153,7 +147,6 @@ impl Drift {
     }
 
     /// Slope (units per sample).
-    #[must_use]
     pub const fn slope(&self) -> f64 {
         self.slope
     }
@@ -164,7 +157,6 @@ impl Drift {
     }
 
     /// Haar wavelet variance per unit of slope².
-    #[must_use]
     pub fn haar_shape(level: u32) -> f64 {
         let m = half_scale(level);
         0.25 * m * m

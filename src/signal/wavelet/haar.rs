@@ -212,7 +212,6 @@ impl Curve {
     pub const EDOF_RANGE: (f64, f64) = (1e-15, 1e15);
 
     /// Response to quantization noise at a level; none where it is read as it is.
-    #[must_use]
     pub fn response(&self, level: u32) -> Option<&QuantizationResponse> {
         self.quantization
             .as_ref()

@@ -8,13 +8,11 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// The field's usual equivalent degrees of freedom, eta3 = max(M_j/2^j, 1). Conservative: beyond the first
 /// scale a 95 % interval covers 99 % or more.
-#[must_use]
 pub fn edof_eta3(samples: usize, level: u32) -> f64 {
     (coefficient_count(samples, level) as f64 / f64::from(level).exp2()).max(1.0)
 }
 
 /// Degrees of freedom of a robust variance: those of the classical one times the efficiency, at least 1.
-#[must_use]
 pub fn edof_robust(edof: f64, efficiency: f64) -> f64 {
     (edof * efficiency).max(1.0)
 }
@@ -25,7 +23,6 @@ pub fn edof_robust(edof: f64, efficiency: f64) -> f64 {
 ///
 /// The lags run to twice the scale, where the coefficients of every process of this crate are uncorrelated
 /// or nearly so, in steps of a sixteenth of it; the sampling noise of s_k², Σ s²/M each, is taken out.
-#[must_use]
 pub fn edof_large_sample(coefficients: &[f64], level: u32) -> f64 {
     let samples = coefficients.len() + (1 << level) - 1;
     let count = coefficients.len();
@@ -57,7 +54,6 @@ pub fn edof_large_sample(coefficients: &[f64], level: u32) -> f64 {
 }
 
 /// Interval \[eta·nu/q(1 − α/2), eta·nu/q(α/2)\] of confidence 1 − α (units²).
-#[must_use]
 pub fn interval(nu: f64, edof: f64, confidence: f64) -> (f64, f64) {
     let tail = 0.5 * (1.0 - confidence);
     // nu = eta·nu_hat/chi²: the upper quantile of chi² gives the lower end.

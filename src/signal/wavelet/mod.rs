@@ -51,20 +51,17 @@ pub enum WaveletError {
 }
 
 /// The most levels that have a coefficient: floor(log2 T).
-#[must_use]
 fn max_levels(samples: usize) -> u32 {
     samples.checked_ilog2().unwrap_or(0)
 }
 
 /// The usual number of levels: floor(log2 T) − 1, at least 1.
-#[must_use]
 pub fn default_levels(samples: usize) -> u32 {
     // At the last level of all the record holds less than two lengths of the scale.
     max_levels(samples).saturating_sub(1).max(1)
 }
 
 /// M_j = T − 2^j + 1, the number of coefficients of a level (0 when the signal is too short).
-#[must_use]
 pub fn coefficient_count(samples: usize, level: u32) -> usize {
     1_usize
         .checked_shl(level)

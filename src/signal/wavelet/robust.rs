@@ -52,7 +52,6 @@ const ZERO: f64 = 1e-3;
 impl RobustVariance {
     /// Whether the coefficients lie on steps so coarse that the variance is not that of Gaussian ones: a tenth of them are zero,
     /// the step (of the coefficients) a quarter of their standard deviation.
-    #[must_use]
     pub fn is_stepped(&self) -> bool {
         self.zeros > MOST_ZEROS
     }
@@ -390,13 +389,11 @@ impl QuantizationResponse {
 
     /// b, the robust wavelet variance over the variance, and db/dshare, where `share` (0 to 1) of the variance is
     /// quantization noise.
-    #[must_use]
     pub fn factor(&self, share: f64) -> (f64, f64) {
         departure(&self.factor, share)
     }
 
     /// Degrees of freedom of the robust wavelet variance over those it has of Gaussian coefficients as correlated as these.
-    #[must_use]
     pub fn degrees(&self, share: f64) -> f64 {
         departure(&self.efficiency, share).0
     }
@@ -587,13 +584,11 @@ impl Tuning {
     }
 
     /// Rejection point: coefficients beyond c standard deviations have no influence.
-    #[must_use]
     pub const fn c(&self) -> f64 {
         self.c
     }
 
     /// E chi(Z), the consistency constant.
-    #[must_use]
     pub const fn a(&self) -> f64 {
         self.a
     }
@@ -602,19 +597,16 @@ impl Tuning {
     /// high): 0.295 at efficiency 0.6, 0 for the classical variance. To second order in the estimating
     /// equation it is 1 + 2 cov(chi, chi')/var chi − E chi''/E chi', derivatives with respect to ln s of
     /// chi(W/√s).
-    #[must_use]
     pub fn bias(&self) -> f64 {
         Moments::new(self.c).bias()
     }
 
     /// Response of the robust wavelet variance to quantization noise.
-    #[must_use]
     pub const fn quantization(&self) -> &QuantizationResponse {
         &self.quantization
     }
 
     /// True efficiency at the Gaussian model, whatever the convention says it is.
-    #[must_use]
     pub const fn efficiency(&self) -> f64 {
         self.efficiency
     }

@@ -41,7 +41,6 @@ pub struct Consistency {
 
 impl Consistency {
     /// True RMSE over stated standard deviation: above 1 the filter is overconfident.
-    #[must_use]
     pub fn ratio(&self) -> [f64; REPORTED] {
         std::array::from_fn(|i| self.rmse[i] / self.sigma[i])
     }
@@ -59,7 +58,6 @@ pub struct Assessment {
 impl Assessment {
     /// True RMSE over stated standard deviation over the whole run, as verdicts have it: the root mean square over the
     /// reports.
-    #[must_use]
     pub fn ratio_over_run(&self) -> [f64; REPORTED] {
         let count = self.reports.len() as f64;
         let ratios: Vec<[f64; REPORTED]> = self.reports.iter().map(Consistency::ratio).collect();
@@ -71,7 +69,6 @@ impl Assessment {
 /// inertial errors, turn-on biases and scale factors are as the filter expects them, and the receiver is as the filter
 /// believes. A drift (DR) is taken as the filter takes it: of that magnitude, either sign, each axis by itself; where
 /// the same drift is in every run, [`super::TruthSide`] adds the errors instead of their variances.
-#[must_use]
 pub fn assess(track: &Track, belief: &Belief, truth: &Model) -> Assessment {
     FilterPass::new(track, belief)
         .errors_as_expected(belief, truth)
@@ -80,7 +77,6 @@ pub fn assess(track: &Track, belief: &Belief, truth: &Model) -> Assessment {
 
 /// Largest error of any reported state that the strapdown alone makes at the IMU's rate, over the standard deviation that the
 /// filter states of it; 0 where the closure along the track is good.
-#[must_use]
 pub fn strapdown_over_sigma(track: &Track, belief: &Belief) -> f64 {
     if track.is_closed() {
         return 0.0;
@@ -150,7 +146,6 @@ pub struct FilterPass<'a> {
 
 impl<'a> FilterPass<'a> {
     /// Takes a filter along a track.
-    #[must_use]
     pub fn new(track: &'a Track, belief: &Belief) -> Self {
         let own = Sides::of_filter(Sources::of_belief(belief), track);
         let mut filter = Joint::new(track.start, &own);
@@ -179,13 +174,11 @@ impl<'a> FilterPass<'a> {
     }
 
     /// Standard deviations that the filter states of the sensors' biases (m/s², rad/s), at every report.
-    #[must_use]
     pub fn bias_sigmas(&self) -> &[[f64; BIASES]] {
         &self.biases
     }
 
     /// Times from the start (s) of the reports at which something is measured, and the standard deviations of yaw there (degrees).
-    #[must_use]
     pub fn yaw_while_measured(&self) -> Vec<(f64, f64)> {
         let reports = self
             .track
@@ -203,7 +196,6 @@ impl<'a> FilterPass<'a> {
 
     /// Standard deviations that the filter states of the reported states (m, m/s, degrees), just before the first fix
     /// after each outage (or at the end).
-    #[must_use]
     pub fn sigma_at_ends(&self) -> Vec<[f64; REPORTED]> {
         let mut sigmas = vec![[0.0; REPORTED]; self.track.outages];
         for mark in &self.track.marks {
@@ -215,7 +207,6 @@ impl<'a> FilterPass<'a> {
     }
 
     /// Their means over the reports within each of some outages.
-    #[must_use]
     pub fn sigma_means(&self, outages: &[Outage]) -> Vec<[f64; REPORTED]> {
         let reports = self
             .track
@@ -246,13 +237,11 @@ impl<'a> FilterPass<'a> {
     }
 
     /// The true errors of the filter.
-    #[must_use]
     pub fn errors(&self, truth: &TruthSide) -> ErrorLaw {
         self.errors_until(self.track.marks.len(), truth)
     }
 
     /// The same at the ends of outages alone: what comes after the last is not computed.
-    #[must_use]
     pub fn errors_at_ends(&self, truth: &TruthSide) -> Vec<Judged> {
         let last = self
             .track
@@ -304,14 +293,12 @@ impl ErrorLaw {
 
 impl Instant {
     /// Mean squares and products of the true errors.
-    #[must_use]
     pub(crate) fn moments(&self) -> [Nav; NAV] {
         let m = &self.mean;
         std::array::from_fn(|j| std::array::from_fn(|i| self.covariance[j][i] + m[i] * m[j]))
     }
 
     /// The reported states (m, m/s, degrees) of a vector of the filter's states.
-    #[must_use]
     pub(crate) fn reported(&self, x: &Nav) -> [f64; REPORTED] {
         let psi = DVec3::new(x[3 * PSI], x[3 * PSI + 1], x[3 * PSI + 2]);
         std::array::from_fn(|i| {
@@ -324,7 +311,6 @@ impl Instant {
     }
 
     /// Variances of the reported states (m², (m/s)², degrees²) of a covariance of the filter's states.
-    #[must_use]
     pub(crate) fn variances(&self, p: &[Nav; NAV]) -> [f64; REPORTED] {
         let squares = squares(&self.jacobian, p);
         std::array::from_fn(|i| {
@@ -337,7 +323,6 @@ impl Instant {
     }
 
     /// Root mean squares of the true errors of the reported states.
-    #[must_use]
     pub fn rmse(&self) -> [f64; REPORTED] {
         deviations(&self.jacobian, &self.moments())
     }
@@ -345,7 +330,6 @@ impl Instant {
 
 impl Judged {
     /// Standard deviations that the filter states of the reported states.
-    #[must_use]
     pub fn sigma(&self) -> [f64; REPORTED] {
         deviations(&self.errors.jacobian, &self.believed)
     }
@@ -366,7 +350,6 @@ impl Judged {
     }
 
     /// How the filter's covariance stands to that of its true errors.
-    #[must_use]
     pub fn consistency(&self) -> Consistency {
         let moments = self.errors.moments();
         let p = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| self.believed[j][i]);
@@ -432,7 +415,6 @@ pub(crate) enum Moments {
 /// outage alone finds, at the cost of the outage instead of the way from the start.
 ///
 /// The outages may overlap: no branch knows of another.
-#[must_use]
 pub(crate) fn errors_in_outages(
     track: &Track,
     belief: &Belief,

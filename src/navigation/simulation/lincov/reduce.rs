@@ -36,7 +36,6 @@ type Factors = [f64; FACTORS];
 /// The belief of 15 states whose covariance is closest to that of the errors it makes along a track, where the
 /// errors are those of `model`; `wavelet` is the belief by wavelet variance, from which the search starts; axes of a
 /// sensor are reduced as `alike` says. Axes that are white noise and one bias already stay as they are.
-#[must_use]
 pub fn reduced_belief(model: &Model, wavelet: Belief, track: &Track, alike: Alike) -> Belief {
     let exact = Channel::ALL.map(|c| reduction::is_exact(model.axis(c)));
     let is_free = |i: &usize| {
@@ -328,7 +327,6 @@ const DRIVE_HZ: f64 = 10.0;
 
 /// A built-in drive with a receiver and two outages, as long as the shortest and the longest of `outages_s` (s):
 /// for data whose reference is not known. None where the receiver's rate does not allow it.
-#[must_use]
 pub fn drive(
     model: &Model,
     defects: &ImuSettings,

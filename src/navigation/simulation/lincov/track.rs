@@ -217,7 +217,6 @@ impl Track {
     }
 
     /// The same where a filter believes the vehicle's own measurements to be so much worse; in truth they are as they were.
-    #[must_use]
     pub fn with_aiding_sigmas(&self, factor: f64) -> Self {
         let mut track = self.clone();
         let rows = track.marks.iter_mut().flat_map(|mark| &mut mark.rows);
@@ -466,7 +465,6 @@ const REPORT_S: f64 = 10.0;
 impl Track {
     /// As [`Self::merged`], with a report every ten, and white noise through its mean over a step as well: a tenth faster
     /// for the hundreds of passes of a search, and within 1e-3 in every ratio.
-    #[must_use]
     pub fn coarse(&self) -> Self {
         let mut track = self.with_legs(Step::of_means);
         let mut reports = 0;
@@ -480,7 +478,6 @@ impl Track {
 
     /// The same with one step from mark to mark, at most a second: a few times faster. White noise is exact; a bias is
     /// its mean over the step, which leaves up to 1e-4 of an error after ten seconds without fixes, 1.2e-3 after five.
-    #[must_use]
     pub fn merged(&self) -> Self {
         self.with_legs(Step::then)
     }
@@ -510,7 +507,6 @@ impl Track {
 
     /// The drive in half of the steps or fewer: what the search for a reduction passes along. Several fixes are one of their
     /// mean at the last of them.
-    #[must_use]
     pub(super) fn outline(&self) -> Self {
         let last_fixes = self.last_fixes();
         let (mut steps, mut marks, mut block) = (Vec::new(), Vec::new(), Block::default());

@@ -87,7 +87,6 @@ pub const STRAPDOWN: &str = "strapdown";
 
 impl TruthSide {
     /// Several independent sources together.
-    #[must_use]
     pub fn together(parts: &[NamedSource]) -> Self {
         let mut all = Self::default();
         for NamedSource { side: part, .. } in parts {
@@ -105,7 +104,6 @@ impl TruthSide {
     /// Every source of an experiment whose inertial noise is that of `model`, at the IMU's rate: its processes
     /// sensor by sensor, the defects of the true IMU, start, receiver, barometer and aiding. All drifts are one source:
     /// they are the same in every run, so that their errors add, not their variances.
-    #[must_use]
     pub fn sources(experiment: &Experiment<'_>, model: &Model) -> Vec<NamedSource> {
         let mut parts = beside_the_imu(experiment, !experiment.initial.perfect);
         let mut drifts = Vec::new();
@@ -129,7 +127,6 @@ impl TruthSide {
     }
 
     /// The sources that a filter believes in: its bias states instead of a model's processes.
-    #[must_use]
     pub fn believed(experiment: &Experiment<'_>, belief: &Belief) -> Vec<NamedSource> {
         // The filter believes in an uncertain start, also where the true one is perfect.
         let mut parts = beside_the_imu(experiment, true);
@@ -433,7 +430,6 @@ impl fmt::Display for HeadingDoubt {
 
 /// Where the heading is hardly observable: `while_fixed` are the times from the start (s) at which fixes are used,
 /// and the standard deviations of yaw there (degrees). The first two minutes belong to the alignment.
-#[must_use]
 pub fn weak_heading(while_fixed: impl Iterator<Item = (f64, f64)>) -> Option<HeadingDoubt> {
     let settled = while_fixed.filter(|(after_s, _)| *after_s >= SETTLED_S);
     let worst = settled.max_by(|a, b| a.1.total_cmp(&b.1));

@@ -99,7 +99,6 @@ impl Task<'_> {
     }
 
     /// Sensors whose model has no noise that a factor could multiply, where that of a truth has some.
-    #[must_use]
     pub fn without_factor(&self) -> Vec<Sensor> {
         let has_factor = |model: &Model, sensor: &Sensor| {
             multiplied(model)
@@ -341,7 +340,6 @@ impl Task<'_> {
 
 /// The smallest factor on the standard deviations that a filter believes of a vehicle's own measurements with which it states
 /// its errors, at the ends of outages and over the run; 1 where it does already, none where a factor of a thousand does not help.
-#[must_use]
 pub fn aiding_factor(track: &Track, belief: &Belief, truth: &TrueErrors) -> Option<f64> {
     let largest = |ln: f64| {
         let track = track.with_aiding_sigmas(ln.exp());
@@ -639,7 +637,6 @@ pub struct Factor {
 
 impl Factor {
     /// Whether the search ended at the largest factor that it tries, e^12: the factor says nothing then.
-    #[must_use]
     pub fn is_at_limit(&self) -> bool {
         self.on_variance.ln().abs() > MAX_LN - 1e-6
     }
@@ -695,7 +692,6 @@ pub(super) fn set(factors: &[Factor], ln: &[f64]) -> Vec<Factor> {
 }
 
 /// A model whose processes are multiplied; the factors are the same at any sample rate.
-#[must_use]
 pub fn scaled(model: &Model, factors: &[Factor]) -> Model {
     let mut scaled = model.clone();
     for channel in Channel::ALL {
