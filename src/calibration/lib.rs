@@ -23,7 +23,7 @@
 //! ```
 
 #[allow(unused_imports, reason = "sources are named in the documentation")]
-pub(crate) use nav_sim_signal::{bibliography, imu, noise, rng, wavelet};
+pub(crate) use nav_sim_signal::{bibliography, imu, minimise, noise, rng, wavelet};
 
 // Wavelet variances: of replicates, averaged, as a model implies them, and how they scatter.
 mod curve;

@@ -1,0 +1,383 @@
+//! Minimisation within bounds: least squares by active sets, and damped Newton steps
+//! ([Levenberg-Marquardt](crate::bibliography::More78)).
+
+/// A step this small (natural logarithms, or numbers of the order of 1) is the last.
+const SMALL_STEP: f64 = 1e-11;
+/// No variable moves further in one step.
+const LARGE_STEP: f64 = 2.0;
+/// A damping at which no step helps.
+const HOPELESS: f64 = 1e12;
+const MOST_ITERATIONS: usize = 300;
+
+/// Local minimum to which a start led.
+#[derive(Debug, Clone)]
+pub struct Minimum<V> {
+    /// The variables.
+    pub at: Vec<f64>,
+    /// What was evaluated there.
+    pub value: V,
+    /// Whether a step no longer changes anything.
+    pub has_converged: bool,
+}
+
+/// Descends from a start to a local minimum of a cost within `ranges`. `quadratic`: half the gradient of the cost, and half
+/// its second derivatives or Gauss and Newton's approximation of them.
+pub fn descend<V>(
+    start: &[f64],
+    ranges: &[(f64, f64)],
+    evaluate: impl Fn(&[f64]) -> V,
+    cost: impl Fn(&V) -> f64,
+    quadratic: impl Fn(&[f64], &V) -> (Vec<f64>, Matrix),
+) -> Minimum<V> {
+    let (mut damping, mut growth) = (1e-3, 2.0);
+    let (mut at, mut value) = (start.to_vec(), evaluate(start));
+    for _ in 0..MOST_ITERATIONS {
+        let before = cost(&value);
+        if before <= f64::MIN_POSITIVE {
+            return Minimum {
+                at,
+                value,
+                has_converged: true,
+            };
+        }
+        let (gradient, curvature) = quadratic(&at, &value);
+        let (step, expected) = damped_step(&at, ranges, &gradient, &curvature, damping);
+        let there: Vec<f64> = at.iter().zip(&step).map(|(x, s)| x + s).collect();
+        let next = evaluate(&there);
+        if cost(&next) < before {
+            damping = (damping * 0.2).max(1e-12);
+            growth = 2.0;
+            (at, value) = (there, next);
+        } else {
+            // Doubling the factor with each refusal: a start far off needs few tries to become cautious
+            // enough.
+            damping *= growth;
+            growth *= 2.0;
+        }
+        let is_small = step.iter().all(|s| s.abs() < SMALL_STEP);
+        // No decrease that the cost could show.
+        let is_flat = expected <= 1e-16 * before;
+        if is_small || is_flat || damping > HOPELESS {
+            return Minimum {
+                at,
+                value,
+                has_converged: true,
+            };
+        }
+    }
+    Minimum {
+        at,
+        value,
+        has_converged: false,
+    }
+}
+
+/// The damped step within the ranges, and the decrease the quadratic model expects of it.
+fn damped_step(
+    at: &[f64],
+    ranges: &[(f64, f64)],
+    gradient: &[f64],
+    curvature: &Matrix,
+    damping: f64,
+) -> (Vec<f64>, f64) {
+    let n = at.len();
+    let mut problem = Bounded::new(n);
+    problem.gram = *curvature;
+    let largest = (0..n)
+        .map(|i| curvature[i][i])
+        .fold(f64::MIN_POSITIVE, f64::max);
+    // Damped along the diagonal (Marquardt), so that the step does not depend on the units of the variables.
+    for i in 0..n {
+        // A variable without effect has no slope: it stays where it is.
+        problem.gram[i][i] += damping * (curvature[i][i] + 1e-12 * largest);
+    }
+    // Shifted so that the start is 0, and scaled to a unit diagonal.
+    let scale: Vec<f64> = (0..n).map(|i| problem.gram[i][i].sqrt()).collect();
+    for i in 0..n {
+        for j in 0..n {
+            problem.gram[i][j] /= scale[i] * scale[j];
+        }
+        let (low, high) = ranges[i];
+        problem.right[i] = -gradient[i] / scale[i];
+        problem.lower[i] = (low - at[i]).max(-LARGE_STEP) * scale[i];
+        problem.upper[i] = (high - at[i]).min(LARGE_STEP) * scale[i];
+    }
+    // The bounds are part of the quadratic problem: cut off afterwards, the step of the other variables would be
+    // wrong.
+    let scaled = problem.minimise();
+    let step = (0..n).map(|i| scaled[i] / scale[i]).collect();
+    // Gradient and curvature are halves: the cost falls by 2g·s − s·Hs, which is g·s where Hs = g, g downhill.
+    (step, (0..n).map(|i| scaled[i] * problem.right[i]).sum())
+}
+
+// Least squares with bounds, from the normal equations: minimises ½·xᵀGx − rᵀx over lower ≤ x ≤ upper.
+//
+// The active-set method of [Lawson and Hanson](crate::bibliography::LawsonHanson74) (NNLS, chapter 23),
+// with upper bounds treated like lower ones. Columns are expected at unit length, so that G has a unit
+// diagonal and tolerances mean the same for every parameter.
+
+/// Largest number of parameters.
+pub const MOST: usize = 12;
+
+/// A small symmetric matrix; rows and columns beyond the problem's size are not read.
+pub type Matrix = [[f64; MOST]; MOST];
+/// A small vector.
+pub type Vector = [f64; MOST];
+
+/// A bounded quadratic problem of size `n`.
+#[derive(Debug, Clone, Copy)]
+pub struct Bounded {
+    /// Variables.
+    pub n: usize,
+    /// G.
+    pub gram: Matrix,
+    /// r.
+    pub right: Vector,
+    /// Lower bounds, finite.
+    pub lower: Vector,
+    /// Upper bounds.
+    pub upper: Vector,
+}
+
+/// Place of a parameter: between its bounds, or on one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    Free,
+    Lower,
+    Upper,
+}
+
+/// A gradient component below this is rounding (target and columns have unit length).
+const FLAT: f64 = 1e-15;
+/// A pivot below this share of the diagonal element means that the column depends on those before it.
+const DEPENDENT: f64 = 1e-13;
+
+impl Bounded {
+    /// All zero: bounds 0 … ∞.
+    pub const fn new(n: usize) -> Self {
+        let zero = [0.0; MOST];
+        Self {
+            n,
+            gram: [zero; MOST],
+            right: zero,
+            lower: zero,
+            upper: [f64::INFINITY; MOST],
+        }
+    }
+
+    /// The minimiser. Lower bounds are finite.
+    pub fn minimise(&self) -> Vector {
+        let mut x = self.lower;
+        let mut places = [Place::Lower; MOST];
+        let mut refused = [false; MOST];
+        // Each pass lowers the objective strictly, so no set of free parameters comes twice; the limit
+        // guards against rounding.
+        for _ in 0..20 * self.n {
+            let Some(entering) = self.steepest(&x, &places, &refused) else {
+                break;
+            };
+            let before = places[entering];
+            places[entering] = Place::Free;
+            if self.descend(&mut x, &mut places, entering) {
+                refused = [false; MOST];
+            } else {
+                // The column depends on the free ones or cannot leave its bound: it is tried again only after
+                // another step.
+                places[entering] = before;
+                refused[entering] = true;
+            }
+        }
+        x
+    }
+
+    /// −gradient.
+    fn downhill(&self, x: &Vector, i: usize) -> f64 {
+        self.right[i] - (0..self.n).map(|j| self.gram[i][j] * x[j]).sum::<f64>()
+    }
+
+    /// The bound parameter that most wants to leave its bound.
+    fn steepest(
+        &self,
+        x: &Vector,
+        places: &[Place; MOST],
+        refused: &[bool; MOST],
+    ) -> Option<usize> {
+        let mut best = (FLAT, None);
+        for i in (0..self.n).filter(|i| !refused[*i]) {
+            let w = self.downhill(x, i);
+            let pull = match places[i] {
+                Place::Lower if self.upper[i] > self.lower[i] => w,
+                Place::Upper => -w,
+                _ => continue,
+            };
+            if pull > best.0 {
+                best = (pull, Some(i));
+            }
+        }
+        best.1
+    }
+
+    /// Moves to the minimum over the free parameters, binding those that meet a bound on the way; false if
+    /// the one that enters cannot move.
+    fn descend(&self, x: &mut Vector, places: &mut [Place; MOST], entering: usize) -> bool {
+        let start = x[entering];
+        loop {
+            // Only the first solution can fail: afterwards the free columns get fewer, and those left are
+            // independent.
+            let Some(goal) = self.solve_free(x, places) else {
+                return false;
+            };
+            let mut blocking = (1.0, None);
+            for i in (0..self.n).filter(|i| places[*i] == Place::Free) {
+                let step = goal[i] - x[i];
+                let room = if step < 0.0 {
+                    self.lower[i] - x[i]
+                } else {
+                    self.upper[i] - x[i]
+                };
+                // The part of the way to the minimum at which this parameter meets its bound; the nearest of
+                // all stops the step.
+                if step.abs() > room.abs() && room / step < blocking.0 {
+                    let place = if step < 0.0 {
+                        Place::Lower
+                    } else {
+                        Place::Upper
+                    };
+                    blocking = ((room / step).max(0.0), Some((i, place)));
+                }
+            }
+            for i in (0..self.n).filter(|i| places[*i] == Place::Free) {
+                x[i] += blocking.0 * (goal[i] - x[i]);
+            }
+            let Some((i, place)) = blocking.1 else {
+                return true;
+            };
+            // The bound itself: the sum above meets it to rounding only.
+            x[i] = if place == Place::Lower {
+                self.lower[i]
+            } else {
+                self.upper[i]
+            };
+            places[i] = place;
+            if i == entering && (x[i] - start).abs() <= 0.0 {
+                return false;
+            }
+        }
+    }
+
+    /// The unconstrained minimum over the free parameters, the others kept; none if G is singular there.
+    fn solve_free(&self, x: &Vector, places: &[Place; MOST]) -> Option<Vector> {
+        let mut free = [0; MOST];
+        let mut count = 0;
+        for i in (0..self.n).filter(|i| places[*i] == Place::Free) {
+            free[count] = i;
+            count += 1;
+        }
+        let free = &free[..count];
+        let mut right = [0.0; MOST];
+        for (a, &i) in free.iter().enumerate() {
+            let bound = (0..self.n).filter(|j| places[*j] != Place::Free);
+            right[a] = self.right[i] - bound.map(|j| self.gram[i][j] * x[j]).sum::<f64>();
+        }
+        let solution = cholesky_solve(|a, b| self.gram[free[a]][free[b]], right, count)?;
+        let mut goal = *x;
+        for (a, &i) in free.iter().enumerate() {
+            goal[i] = solution[a];
+        }
+        Some(goal)
+    }
+}
+
+/// Solves A·x = b, A symmetric of size n; none if it is not positive definite to working precision.
+pub fn cholesky_solve(a: impl Fn(usize, usize) -> f64, mut b: Vector, n: usize) -> Option<Vector> {
+    let mut l = [[0.0; MOST]; MOST];
+    for i in 0..n {
+        for j in 0..=i {
+            let dot: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+            if i == j {
+                // The squared part of the column that is independent of those before it. Its rounding error
+                // is 1e-16 of the whole.
+                let pivot = a(i, i) - dot;
+                if pivot <= DEPENDENT * a(i, i) {
+                    return None;
+                }
+                l[i][i] = pivot.sqrt();
+            } else {
+                l[i][j] = (a(i, j) - dot) / l[j][j];
+            }
+        }
+    }
+    for i in 0..n {
+        b[i] = (b[i] - (0..i).map(|k| l[i][k] * b[k]).sum::<f64>()) / l[i][i];
+    }
+    for i in (0..n).rev() {
+        b[i] = (b[i] - (i + 1..n).map(|k| l[k][i] * b[k]).sum::<f64>()) / l[i][i];
+    }
+    Some(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::Generator;
+    use rand::{RngExt, SeedableRng};
+
+    fn objective(p: &Bounded, x: &Vector) -> f64 {
+        let quadratic: f64 = (0..p.n)
+            .flat_map(|i| (0..p.n).map(move |j| (i, j)))
+            .map(|(i, j)| x[i] * p.gram[i][j] * x[j])
+            .sum();
+        0.5 * quadratic - (0..p.n).map(|i| p.right[i] * x[i]).sum::<f64>()
+    }
+
+    /// Random problems against the conditions that characterise the minimum (Karush-Kuhn-Tucker).
+    #[test]
+    fn the_minimum_satisfies_its_conditions() {
+        let mut generator = Generator::seed_from_u64(11);
+        for case in 0..500 {
+            let n = 1 + case % 7;
+            let mut p = Bounded::new(n);
+            let columns: Vec<Vec<f64>> = (0..n)
+                .map(|_| {
+                    (0..n + 3)
+                        .map(|_| generator.random_range(-0.2..1.0))
+                        .collect()
+                })
+                .collect();
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+            for i in 0..n {
+                for j in 0..n {
+                    p.gram[i][j] = dot(&columns[i], &columns[j]);
+                }
+                p.right[i] = generator.random_range(-1.0..1.0);
+                p.lower[i] = generator.random_range(-0.3..0.1);
+                if case % 2 == 0 {
+                    p.upper[i] = p.lower[i] + generator.random_range(0.0..0.5);
+                }
+            }
+            let x = p.minimise();
+            for i in 0..n {
+                let w = p.downhill(&x, i);
+                assert!(x[i] >= p.lower[i] && x[i] <= p.upper[i]);
+                if x[i] > p.lower[i] + 1e-12 {
+                    assert!(w > -1e-9, "case {case}: {w}");
+                }
+                if x[i] < p.upper[i] - 1e-12 {
+                    assert!(w < 1e-9, "case {case}: {w}");
+                }
+            }
+            let mut corner = p.lower;
+            corner[0] = 0.5 * (p.lower[0] + p.upper[0].min(1.0));
+            assert!(objective(&p, &x) <= objective(&p, &corner) + 1e-12);
+        }
+    }
+
+    #[test]
+    fn equal_columns_do_not_hang_and_do_not_blow_up() {
+        let mut p = Bounded::new(3);
+        p.gram = [[1.0; MOST]; MOST];
+        p.right = [1.0; MOST];
+        let x = p.minimise();
+        assert!((x[0] + x[1] + x[2] - 1.0).abs() < 1e-12, "{x:?}");
+    }
+}
