@@ -106,7 +106,7 @@ mod tests {
         let (message, _) = refused("[run]\nruns = 0\n");
         assert_eq!(
             message,
-            "s.toml, line 2: \"run.runs\" = 0 is refused: at least one run"
+            "s.toml, line 2: \"run.runs\" = 0 is refused: it must be a finite number ≥ 1 and ≤ 10000000"
         );
         let (message, _) =
             refused("[[outage]]\nstart_s = 1\nend_s = 2\n[[outage]]\nstart_s = 5\nend_s = 5\n");

@@ -7,6 +7,7 @@ use crate::imu::Sensor;
 use crate::noise::Model;
 use crate::noise::reduction::{self, ReductionError};
 use crate::sensors::aiding::AidingSettings;
+use crate::sensors::check_bounds;
 use crate::sensors::defects::{Defect, ImuSettings, Output};
 use crate::sensors::gnss::{BaroSettings, GnssSettings};
 use crate::sensors::imu::Truth;
@@ -129,19 +130,6 @@ pub enum Reduction {
     Wavelet,
 }
 
-impl FilterSettings {
-    fn validate(&self) -> Result<(), SettingError> {
-        match self.nis_gate {
-            Some(p) if !(p > 0.0 && p < 1.0) => Err(SettingError::new(
-                "nis_gate",
-                p,
-                "a probability between 0 and 1, such as 0.999",
-            )),
-            _ => Ok(()),
-        }
-    }
-}
-
 impl Scenario {
     /// The experiment that this scenario describes: a trajectory, what makes the inertial errors, the
     /// candidates, and the outages and the seed, which have been drawn.
@@ -178,19 +166,12 @@ impl Scenario {
     /// # Errors
     /// The first key whose value is refused, with its section.
     pub fn validate(&self) -> Result<(), SettingError> {
-        self.run.validate().map_err(|e| e.in_section("run"))?;
+        check_bounds(self)?;
         self.imu.validate().map_err(|e| e.in_section("imu"))?;
-        self.gnss.validate().map_err(|e| e.in_section("gnss"))?;
-        self.initial
-            .validate()
-            .map_err(|e| e.in_section("initial"))?;
         self.outages().validate()?;
-        self.filter.validate().map_err(|e| e.in_section("filter"))?;
         if let Some(baro) = &self.baro {
-            baro.validate().map_err(|e| e.in_section("baro"))?;
             self.meets_imu_samples("baro.rate_hz", baro.rate_hz)?;
         }
-        self.aiding.validate().map_err(|e| e.in_section("aiding"))?;
         for (aid, rate_hz) in self.aiding.rates() {
             self.meets_imu_samples(&format!("aiding.{}.rate_hz", aid.name()), rate_hz)?;
         }
@@ -320,29 +301,6 @@ impl Scenario {
             periodic: self.outage_periodic,
             random: self.outage_random,
         }
-    }
-}
-
-impl RunSettings {
-    fn validate(&self) -> Result<(), SettingError> {
-        if self.runs == 0 {
-            return Err(SettingError::new("runs", self.runs, "at least one run"));
-        }
-        if self.runs > MAX_RUNS {
-            return Err(SettingError::new(
-                "runs",
-                self.runs,
-                format!("at most {MAX_RUNS} runs"),
-            ));
-        }
-        if self.coverage_level > 0.0 && self.coverage_level < 1.0 {
-            return Ok(());
-        }
-        Err(SettingError::new(
-            "coverage_level",
-            self.coverage_level,
-            "it must lie between 0 and 1",
-        ))
     }
 }
 

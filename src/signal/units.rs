@@ -78,11 +78,11 @@ macro_rules! number_in_schemas {
 }
 
 number_in_schemas!(
-    /// In schemas, what [`require_positive`] accepts.
+    /// In schemas, a number > 0.
     Positive, { "type": "number", "exclusiveMinimum": 0 }
 );
 number_in_schemas!(
-    /// In schemas, what [`require_non_negative`] accepts.
+    /// In schemas, a number ≥ 0.
     NonNegative, { "type": "number", "minimum": 0 }
 );
 number_in_schemas!(
@@ -112,40 +112,4 @@ pub fn exactly_if<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize
     deserializer: D,
 ) -> Result<Option<[T; N]>, D::Error> {
     exactly(deserializer).map(Some)
-}
-
-/// Accepts finite numbers > 0.
-///
-/// # Errors
-/// The first value that is not.
-pub fn require_positive(key: &str, values: &[f64]) -> Result<(), SettingError> {
-    require(key, values, "a finite number > 0", |v| v > 0.0)
-}
-
-/// Accepts finite numbers ≥ 0.
-///
-/// # Errors
-/// The first value that is not.
-pub fn require_non_negative(key: &str, values: &[f64]) -> Result<(), SettingError> {
-    require(key, values, "a finite number ≥ 0", |v| v >= 0.0)
-}
-
-/// Accepts finite numbers.
-///
-/// # Errors
-/// The first value that is not.
-pub fn require_finite(key: &str, values: &[f64]) -> Result<(), SettingError> {
-    require(key, values, "a finite number", |_| true)
-}
-
-fn require(
-    key: &str,
-    values: &[f64],
-    what: &str,
-    ok: impl Fn(f64) -> bool,
-) -> Result<(), SettingError> {
-    match values.iter().find(|v| !(v.is_finite() && ok(**v))) {
-        Some(bad) => Err(SettingError::new(key, bad, format!("it must be {what}"))),
-        None => Ok(()),
-    }
 }

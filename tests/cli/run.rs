@@ -352,7 +352,7 @@ fn refusals_name_what_is_wrong_and_leave_nothing() {
     refused(
         &format!("{base} --runs 0"),
         2,
-        "run.runs = 0 is refused: at least one run",
+        "run.runs = 0 is refused: it must be a finite number ≥ 1 and ≤ 10000000",
     );
     refused(
         &format!("{base} --filter 16"),

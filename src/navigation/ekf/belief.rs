@@ -19,9 +19,8 @@ use super::filter::{KINDS, Unknown, UnknownKind};
 use crate::frames::RollPitchYaw;
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Composite, Ladder, Model, Process, reduction};
-use crate::units::{
-    NonNegative, Positive, SettingError, exactly, require_non_negative, require_positive,
-};
+use crate::sensors::check_bounds;
+use crate::units::{NonNegative, Positive, SettingError, exactly};
 use glam::{DQuat, DVec3};
 use nalgebra::Matrix3;
 use schemars::JsonSchema;
@@ -590,37 +589,7 @@ impl InitialSettings {
     /// # Errors
     /// The first key whose value is refused.
     pub fn validate(&self) -> Result<(), SettingError> {
-        require_positive("pos_sigma_m", &self.pos_sigma_m)?;
-        require_positive("vel_sigma_m_s", &self.vel_sigma_m_s)?;
-        require_positive("att_sigma_deg", &self.att_sigma_deg)?;
-        // At 30° the sine is 5 % off the angle and the cosine 13 % off 1: beyond, a linear filter is a
-        // different problem.
-        if let Some(large) = self.att_sigma_deg.iter().find(|s| **s > 30.0) {
-            let requirement = "the error-state filter is linear: at most 30 degrees";
-            return Err(SettingError::new("att_sigma_deg", large, requirement));
-        }
-        for sensor in Sensor::ALL {
-            let (key, sigma) = (Self::bias_key(sensor), self.bias_sigma(sensor));
-            let limit = if sensor == Sensor::Accel { 10.0 } else { 1.0 };
-            require_non_negative(key, sigma.as_slice())?;
-            at_most(key, sigma.as_slice(), limit, sensor.unit())?;
-            let (key, ppm) = (Self::scale_key(sensor), self.scale_sigma_ppm(sensor));
-            require_non_negative(key, ppm.as_slice())?;
-            at_most(key, ppm.as_slice(), 1e5, "parts per million, a tenth")?;
-        }
-        at_most("pos_sigma_m", &self.pos_sigma_m, 1e5, "m")?;
-        at_most("vel_sigma_m_s", &self.vel_sigma_m_s, 1000.0, "m/s")
-    }
-}
-
-/// A deviation so large that the linear filter means nothing with it is a slip of unit.
-fn at_most(key: &str, sigmas: &[f64], limit: f64, unit: &str) -> Result<(), SettingError> {
-    match sigmas.iter().find(|s| **s > limit) {
-        Some(large) => {
-            let requirement = format!("the error-state filter is linear: at most {limit} {unit}");
-            Err(SettingError::new(key, large, requirement))
-        }
-        None => Ok(()),
+        check_bounds(self)
     }
 }
 

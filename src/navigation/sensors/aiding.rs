@@ -6,11 +6,9 @@
 //! The vehicle's axes are forward, right, down, those of the reference. Models of the errors:
 //! [Groves](crate::bibliography::Groves13), sec. 15.3 (constraints) and 16.3 (odometers).
 
-use super::gnss::{MAX_LEVER_ARM_M, require_lever_arm};
+use super::gnss::MAX_LEVER_ARM_M;
 use crate::rng::{Generator, StreamKey};
-use crate::units::{
-    DEG, NonNegative, Positive, SettingError, exactly, require_non_negative, require_positive,
-};
+use crate::units::{DEG, NonNegative, Positive, exactly};
 use glam::DVec3;
 use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
@@ -35,23 +33,6 @@ pub struct AidingSettings {
 }
 
 impl AidingSettings {
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key whose value is refused, with its table within `aiding`.
-    pub fn validate(&self) -> Result<(), SettingError> {
-        let all = [
-            self.nhc.as_ref().map(NhcSettings::validate),
-            self.odometer.as_ref().map(OdometerSettings::validate),
-            self.zupt.as_ref().map(ZuptSettings::validate),
-            self.heading.as_ref().map(HeadingSettings::validate),
-        ];
-        for (aid, checked) in Aid::ALL.into_iter().zip(all) {
-            checked.transpose().map_err(|e| e.in_section(aid.name()))?;
-        }
-        Ok(())
-    }
-
     /// Whether there is none.
     pub fn is_none(&self) -> bool {
         self.rates().next().is_none()
@@ -789,95 +770,5 @@ impl Default for HeadingErrors {
             walk_sigma_deg: 0.0,
             correlation_time_s: 60.0,
         }
-    }
-}
-
-/// Standard deviations that are 0 or more, by their keys.
-fn deviations(all: &[(&str, f64)]) -> Result<(), SettingError> {
-    all.iter()
-        .try_for_each(|(key, sigma)| require_non_negative(key, &[*sigma]))
-}
-
-impl NhcSettings {
-    pub(super) fn validate(&self) -> Result<(), SettingError> {
-        require_positive("rate_hz", &[self.rate_hz])?;
-        require_positive("sigma_m_s", &[self.sigma_m_s])?;
-        require_lever_arm(&self.lever_arm_m)?;
-        deviations(&[("mounting_sigma_deg", self.mounting_sigma_deg)])?;
-        let NhcErrors {
-            noise_sigma_m_s,
-            mounting_sigma_deg,
-            sideslip_s2_m,
-            walk_sigma_m_s,
-            correlation_time_s,
-        } = self.truth;
-        let all = [
-            ("noise_sigma_m_s", noise_sigma_m_s.unwrap_or(0.0)),
-            ("mounting_sigma_deg", mounting_sigma_deg),
-            ("sideslip_s2_m", sideslip_s2_m),
-            ("walk_sigma_m_s", walk_sigma_m_s),
-        ];
-        deviations(&all)
-            .and_then(|()| require_positive("correlation_time_s", &[correlation_time_s]))
-            .map_err(|e| e.in_section("truth"))
-    }
-}
-
-impl OdometerSettings {
-    pub(super) fn validate(&self) -> Result<(), SettingError> {
-        require_positive("rate_hz", &[self.rate_hz])?;
-        require_positive("sigma_m_s", &[self.sigma_m_s])?;
-        require_lever_arm(&self.lever_arm_m)?;
-        deviations(&[("scale_sigma", self.scale_sigma)])?;
-        let OdometerErrors {
-            noise_sigma_m_s,
-            scale_sigma,
-            slip_s2_m,
-        } = self.truth;
-        let all = [
-            ("noise_sigma_m_s", noise_sigma_m_s.unwrap_or(0.0)),
-            ("scale_sigma", scale_sigma),
-            ("slip_s2_m", slip_s2_m),
-        ];
-        deviations(&all).map_err(|e| e.in_section("truth"))
-    }
-}
-
-impl ZuptSettings {
-    pub(super) fn validate(&self) -> Result<(), SettingError> {
-        require_positive("rate_hz", &[self.rate_hz])?;
-        require_positive("sigma_m_s", &[self.sigma_m_s])?;
-        let ZuptErrors {
-            noise_sigma_m_s,
-            walk_sigma_m_s,
-            correlation_time_s,
-        } = self.truth;
-        deviations(&[
-            ("noise_sigma_m_s", noise_sigma_m_s.unwrap_or(0.0)),
-            ("walk_sigma_m_s", walk_sigma_m_s),
-        ])
-        .and_then(|()| require_positive("correlation_time_s", &[correlation_time_s]))
-        .map_err(|e| e.in_section("truth"))
-    }
-}
-
-impl HeadingSettings {
-    pub(super) fn validate(&self) -> Result<(), SettingError> {
-        require_positive("rate_hz", &[self.rate_hz])?;
-        require_positive("sigma_deg", &[self.sigma_deg])?;
-        let HeadingErrors {
-            noise_sigma_deg,
-            offset_sigma_deg,
-            walk_sigma_deg,
-            correlation_time_s,
-        } = self.truth;
-        let noise = noise_sigma_deg.unwrap_or(0.0);
-        deviations(&[
-            ("noise_sigma_deg", noise),
-            ("offset_sigma_deg", offset_sigma_deg),
-            ("walk_sigma_deg", walk_sigma_deg),
-        ])
-        .and_then(|()| require_positive("correlation_time_s", &[correlation_time_s]))
-        .map_err(|e| e.in_section("truth"))
     }
 }

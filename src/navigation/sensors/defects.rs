@@ -2,10 +2,7 @@
 
 use crate::imu::{ImuSample, MAX_RATE_HZ, Sensor};
 use crate::rng::StreamKey;
-use crate::units::{
-    NonNegative, Positive, SettingError, exactly, require_finite, require_non_negative,
-    require_positive,
-};
+use crate::units::{NonNegative, Positive, SettingError, exactly};
 use glam::{DMat3, DVec3};
 use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
@@ -78,19 +75,6 @@ const MAX_ANGLE_RAD: f64 = 0.1;
 /// Largest g-sensitivity (rad/s per m/s²): 11 °/s per g.
 const MAX_G_SENSITIVITY: f64 = 0.02;
 
-/// Accepts 0 to `most`; `mistake` is what a larger value may be.
-fn at_most(key: &str, value: f64, most: f64, mistake: &str) -> Result<(), SettingError> {
-    require_non_negative(key, &[value])?;
-    if value <= most {
-        return Ok(());
-    }
-    Err(SettingError::new(
-        key,
-        value,
-        format!("at most {most} ({mistake})"),
-    ))
-}
-
 #[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
 fn is_zero(sigma: &f64) -> bool {
     *sigma == 0.0
@@ -119,58 +103,10 @@ impl ImuSettings {
     /// # Errors
     /// The first key whose value is refused.
     pub(crate) fn validate(&self) -> Result<(), SettingError> {
-        require_positive("rate_hz", &[self.rate_hz])?;
-        if self.rate_hz > MAX_RATE_HZ {
-            let requirement = format!("at most {MAX_RATE_HZ} samples a second");
-            return Err(SettingError::new("rate_hz", self.rate_hz, requirement));
-        }
-        let [(accel, _), (gyro, _)] = Sensor::ALL.map(|sensor| self.deviations(sensor));
-        let sensitivity = self.g_sensitivity_rad_s_per_m_s2;
-        at_most(
-            "turn_on_bias_accel_m_s2",
-            accel,
-            MAX_BIAS_M_S2,
-            "mg named m/s²?",
-        )?;
-        at_most(
-            "turn_on_bias_gyro_rad_s",
-            gyro,
-            MAX_BIAS_RAD_S,
-            "degrees an hour named rad/s?",
-        )?;
-        at_most(
-            "scale_ppm_accel",
-            self.scale_ppm_accel,
-            MAX_SCALE_PPM,
-            "a tenth",
-        )?;
-        at_most(
-            "scale_ppm_gyro",
-            self.scale_ppm_gyro,
-            MAX_SCALE_PPM,
-            "a tenth",
-        )?;
-        at_most(
-            "misalignment_rad",
-            self.misalignment_rad,
-            MAX_ANGLE_RAD,
-            "degrees named radians?",
-        )?;
-        at_most(
-            "g_sensitivity_rad_s_per_m_s2",
-            sensitivity,
-            MAX_G_SENSITIVITY,
-            "°/s per g named rad/s per m/s²?",
-        )?;
-        self.vibration
-            .iter()
-            .try_for_each(|v| v.validate().map_err(|e| e.in_section("vibration")))?;
+        super::check_bounds(self)?;
         self.temperature
             .iter()
-            .try_for_each(|t| t.validate().map_err(|e| e.in_section("temperature")))?;
-        self.output
-            .iter()
-            .try_for_each(|o| o.validate().map_err(|e| e.in_section("output")))
+            .try_for_each(|t| t.validate().map_err(|e| e.in_section("temperature")))
     }
 
     /// Standard deviations of turn-on bias (m/s² or rad/s) and scale factor (parts per million) of a sensor.
@@ -391,34 +327,9 @@ fn pairs<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 2]>, D:
         .collect())
 }
 
-impl Vibration {
-    pub(super) fn validate(&self) -> Result<(), SettingError> {
-        at_most("rms_m_s2", self.rms_m_s2, MAX_VIBRATION, "mg named m/s²?")?;
-        at_most(
-            "rectification_s2_m",
-            self.rectification_s2_m,
-            MAX_RECTIFICATION,
-            "mg per g² named s²/m?",
-        )
-    }
-}
-
 impl Temperature {
     pub(super) fn validate(&self) -> Result<(), SettingError> {
-        at_most(
-            "accel_m_s2_k",
-            self.accel_m_s2_k,
-            MAX_PER_KELVIN[0],
-            "mg named m/s²?",
-        )?;
-        at_most(
-            "gyro_rad_s_k",
-            self.gyro_rad_s_k,
-            MAX_PER_KELVIN[1],
-            "degrees named radians?",
-        )?;
         let key = "profile_c";
-        require_finite(key, self.profile_c.as_flattened())?;
         if self.profile_c.len() < 2 {
             let requirement = "it must be two pairs of time (s) and temperature (°C), or more";
             return Err(SettingError::new(
@@ -554,37 +465,6 @@ pub struct Output {
 }
 
 impl Output {
-    pub(super) fn validate(&self) -> Result<(), SettingError> {
-        let ranges = [
-            ("range_accel_m_s2", self.range_accel_m_s2),
-            ("range_gyro_rad_s", self.range_gyro_rad_s),
-        ];
-        ranges
-            .iter()
-            .try_for_each(|(key, range)| require_positive(key, range.as_slice()))?;
-        if let Some(range) = self
-            .range_accel_m_s2
-            .filter(|range| *range < LEAST_RANGE_M_S2)
-        {
-            let requirement = format!(
-                "at least {LEAST_RANGE_M_S2} m/s²: gravity is in every sample (g named m/s²?)"
-            );
-            return Err(SettingError::new("range_accel_m_s2", range, requirement));
-        }
-        at_most(
-            "resolution_accel_m_s2",
-            self.resolution_accel_m_s2,
-            MAX_STEPS[0],
-            "mg named m/s²?",
-        )?;
-        at_most(
-            "resolution_gyro_rad_s",
-            self.resolution_gyro_rad_s,
-            MAX_STEPS[1],
-            "degrees named radians?",
-        )
-    }
-
     /// Range and resolution of a sensor (m/s² or rad/s).
     fn of(&self, sensor: Sensor) -> (Option<f64>, f64) {
         match sensor {

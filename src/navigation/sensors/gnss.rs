@@ -1,10 +1,7 @@
 //! The GNSS receiver: what it measures, how often and how well.
 
 use crate::rng::{Generator, StreamKey};
-use crate::units::{
-    NonNegative, Positive, SettingError, exactly, require_finite, require_non_negative,
-    require_positive,
-};
+use crate::units::{NonNegative, Positive, SettingError, exactly};
 use glam::DVec3;
 use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
@@ -67,35 +64,12 @@ impl GnssSettings {
     /// # Errors
     /// The first key whose value is refused.
     pub fn validate(&self) -> Result<(), SettingError> {
-        require_positive("rate_hz", &[self.rate_hz])?;
-        require_positive("pos_sigma_m", &self.pos_sigma_m)?;
-        require_positive(
-            "vel_sigma_m_s",
-            self.vel_sigma_m_s.as_ref().map_or(&[], |v| v.as_slice()),
-        )?;
-        require_lever_arm(&self.lever_arm_m)?;
-        require_non_negative("correlated_pos_sigma_m", &self.correlated_pos_sigma_m)?;
-        require_positive("correlation_time_s", &[self.correlation_time_s])
+        super::check_bounds(self)
     }
 
     /// Components of one fix: 3 (position) or 6 (and velocity).
     pub(crate) const fn components(&self) -> usize {
         if self.vel_sigma_m_s.is_some() { 6 } else { 3 }
-    }
-}
-
-/// Accepts a point of the vehicle with respect to the IMU.
-///
-/// # Errors
-/// The first coordinate that is farther than any vehicle is large.
-pub(crate) fn require_lever_arm(lever_arm_m: &[f64; 3]) -> Result<(), SettingError> {
-    require_finite("lever_arm_m", lever_arm_m)?;
-    match lever_arm_m.iter().find(|x| x.abs() > MAX_LEVER_ARM_M) {
-        Some(long) => {
-            let requirement = format!("metres from the IMU, at most {MAX_LEVER_ARM_M}");
-            Err(SettingError::new("lever_arm_m", long, requirement))
-        }
-        None => Ok(()),
     }
 }
 
@@ -260,17 +234,6 @@ pub struct BaroSettings {
     /// Standard deviation of a height (m).
     #[schemars(with = "Positive")]
     pub sigma_m: f64,
-}
-
-impl BaroSettings {
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key whose value is refused.
-    pub(crate) fn validate(&self) -> Result<(), SettingError> {
-        require_positive("rate_hz", &[self.rate_hz])?;
-        require_positive("sigma_m", &[self.sigma_m])
-    }
 }
 
 /// The noise of the altimeter in one run.

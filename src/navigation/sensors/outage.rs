@@ -3,7 +3,7 @@
 //! A fix at t is missing when start ≤ t < end of any outage. Times are on the trajectory's own clock.
 
 use crate::rng::StreamKey;
-use crate::units::{Positive, SettingError, require_finite, require_positive};
+use crate::units::{Positive, SettingError};
 use rand_distr::{Distribution, Exp};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -52,8 +52,7 @@ impl Outage {
     /// # Errors
     /// The key whose value is refused.
     pub(crate) fn validate(&self) -> Result<(), SettingError> {
-        require_finite("start_s", &[self.start_s])?;
-        require_finite("end_s", &[self.end_s])?;
+        super::check_bounds(self)?;
         if self.end_s > self.start_s {
             return Ok(());
         }
@@ -306,12 +305,7 @@ impl PeriodicOutages {
     /// # Errors
     /// The key whose value is refused.
     pub(crate) fn validate(&self) -> Result<(), SettingError> {
-        require_finite("first_s", &[self.first_s])?;
-        require_positive("duration_s", &[self.duration_s])?;
-        if !(self.every_s.is_finite() && self.every_s >= Self::LEAST_INTERVAL_S) {
-            let requirement = format!("it must be a finite number ≥ {}", Self::LEAST_INTERVAL_S);
-            return Err(SettingError::new("every_s", self.every_s, requirement));
-        }
+        super::check_bounds(self)?;
         if self.duration_s < self.every_s {
             return Ok(());
         }
@@ -355,23 +349,6 @@ pub struct RandomOutages {
 impl RandomOutages {
     /// One a second.
     pub const MOST_PER_HOUR: f64 = 3600.0;
-
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The key whose value is refused.
-    pub(crate) fn validate(&self) -> Result<(), SettingError> {
-        require_positive("rate_per_hour", &[self.rate_per_hour])?;
-        if self.rate_per_hour > Self::MOST_PER_HOUR {
-            let requirement = format!("it must be at most {}", Self::MOST_PER_HOUR);
-            return Err(SettingError::new(
-                "rate_per_hour",
-                self.rate_per_hour,
-                requirement,
-            ));
-        }
-        require_positive("duration_s", &[self.duration_s])
-    }
 
     pub(super) fn windows(
         &self,
@@ -441,9 +418,7 @@ impl OutagePlan {
                 .map_err(|e| e.in_section("outage_periodic"))?;
         }
         if let Some(random) = &self.random {
-            random
-                .validate()
-                .map_err(|e| e.in_section("outage_random"))?;
+            super::check_bounds(random).map_err(|e| e.in_section("outage_random"))?;
         }
         Ok(())
     }
