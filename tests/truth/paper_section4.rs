@@ -301,7 +301,7 @@ mod target {
             let (mut low, mut high) = (0.0, 0.5);
             for _ in 0..60 {
                 let middle = 0.5 * (low + high);
-                if Ma1::new(middle, 1.0).unwrap().haar_wv(1) > nu {
+                if Ma1::haar_shape(middle, 1).0 > nu {
                     low = middle
                 } else {
                     high = middle

@@ -49,11 +49,6 @@ impl Ar1 {
         self.sigma2 / ((1.0 - self.phi) * (1.0 + self.phi))
     }
 
-    /// Haar wavelet variance at a level (units²), scale tau = 2^level samples.
-    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
-        self.sigma2 * Self::haar_shape(self.phi, level).0
-    }
-
     /// Haar wavelet variance per unit of sigma2, and its derivative with respect to phi. Relative error a
     /// few 1e-15 for every |phi| < 1, up to |phi| = 1 − 1e-16.
     pub(crate) fn haar_shape(phi: f64, level: u32) -> (f64, f64) {
@@ -294,11 +289,6 @@ impl Ma1 {
         self.sigma2
     }
 
-    /// Haar wavelet variance at a level (units²): sigma2 [m(1 + theta)² − 3 theta]/(2m²), m = 2^(level−1).
-    pub fn haar_wv(&self, level: u32) -> f64 {
-        self.sigma2 * Self::haar_shape(self.theta, level).0
-    }
-
     /// Haar wavelet variance per unit of sigma2, and its derivative with respect to theta.
     pub fn haar_shape(theta: f64, level: u32) -> (f64, f64) {
         let m = half_scale(level);
@@ -379,11 +369,6 @@ impl GaussMarkov {
     /// The same process sampled: an AR1 with phi = e^(−beta/f) and sigma2 = s2 (1 − phi²).
     pub const fn ar1(&self) -> Ar1 {
         self.ar1
-    }
-
-    /// Haar wavelet variance at a level (units²), scale tau = 2^level samples.
-    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
-        self.s2 * Self::haar_shape(self.beta / self.rate_hz, level).0
     }
 
     /// Haar wavelet variance per unit of s2, and its derivative with respect to kappa = beta/f, the inverse
@@ -474,7 +459,11 @@ mod tests {
                 let (value, derivative) = GaussMarkov::haar_shape(kappa, level);
                 // The rounding of phi, 1e-16, is 1e-16/kappa of 1 − phi.
                 let tolerance = 1e-14 + 2e-16 / kappa;
-                assert_relative_eq!(value, ar1.haar_wv(level), max_relative = tolerance);
+                assert_relative_eq!(
+                    value,
+                    crate::noise::Process::Ar1(ar1).haar_wv(level),
+                    max_relative = tolerance
+                );
                 let h = 1e-5 * kappa;
                 let (high, low) = (
                     GaussMarkov::haar_shape(kappa + h, level),

@@ -84,10 +84,6 @@ impl FlickerNoise {
         shapes[(level as usize).clamp(1, shapes.len()) - 1]
     }
 
-    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
-        self.b2 * Self::haar_shape(level)
-    }
-
     /// Allan variance of averages over m samples, of a B².
     pub(super) fn allan_shape(b2: f64, samples: u32) -> f64 {
         if samples > Self::SUMMED {
@@ -257,7 +253,7 @@ mod tests {
         ] {
             let sum = Composite::new(noise.parts(ladder));
             for level in levels {
-                let ratio = sum.haar_wv(level) / noise.haar_wv(level);
+                let ratio = sum.haar_wv(level) / (4.0 * FlickerNoise::haar_shape(level));
                 assert!((ratio - 1.0).abs() < error, "{ladder:?}, {level}: {ratio}");
             }
         }

@@ -139,40 +139,38 @@ impl Process {
     /// level ≥ 1. Half the Allan variance of averages over tau/2 samples
     /// ([Guerrier](crate::bibliography::Guerrier13), [Percival](crate::bibliography::Percival95)).
     pub fn haar_wv(&self, level: u32) -> f64 {
-        match self {
-            Self::White(p) => p.haar_wv(level),
-            Self::Quantization(p) => p.haar_wv(level),
-            Self::Ar1(p) => p.haar_wv(level),
-            Self::RandomWalk(p) => p.haar_wv(level),
-            Self::Drift(p) => p.haar_wv(level),
-            Self::GaussMarkov(p) => p.haar_wv(level),
-            Self::Ma1(p) => p.haar_wv(level),
-            Self::Flicker(p) => p.haar_wv(level),
-        }
+        let (amplitude, shape, _) = self.haar_parts(level);
+        amplitude * shape
     }
 
     /// Derivatives of [`Self::haar_wv`] with respect to the parameters, in the order of
     /// [`Self::parameters`].
     pub fn haar_wv_gradient(&self, level: u32) -> Vec<f64> {
+        let (amplitude, shape, slope) = self.haar_parts(level);
         match self {
-            Self::White(_) => vec![White::haar_shape(level)],
-            Self::Quantization(_) => vec![Quantization::haar_shape(level)],
-            Self::Ar1(p) => {
-                let (value, derivative) = Ar1::haar_shape(p.phi(), level);
-                vec![p.sigma2() * derivative, value]
-            }
-            Self::RandomWalk(_) => vec![RandomWalk::haar_shape(level)],
-            Self::Flicker(_) => vec![FlickerNoise::haar_shape(level)],
-            Self::Drift(p) => vec![2.0 * p.slope() * Drift::haar_shape(level)],
-            Self::GaussMarkov(p) => {
-                let (value, derivative) = GaussMarkov::haar_shape(p.beta() / p.rate_hz(), level);
-                vec![p.s2() * derivative / p.rate_hz(), value]
-            }
-            Self::Ma1(p) => {
-                let (value, derivative) = Ma1::haar_shape(p.theta(), level);
-                vec![p.sigma2() * derivative, value]
-            }
+            Self::Drift(p) => vec![2.0 * p.slope() * shape],
+            _ if self.kind().shape().is_some() => vec![amplitude * slope, shape],
+            _ => vec![shape],
         }
+    }
+
+    /// The amplitude in which the wavelet variance is linear, the variance per unit of it, and the derivative of that with
+    /// respect to the shape.
+    fn haar_parts(&self, level: u32) -> (f64, f64, f64) {
+        let (amplitude, (shape, slope)) = match self {
+            Self::White(p) => (p.sigma2(), (White::haar_shape(level), 0.0)),
+            Self::Quantization(p) => (p.q2(), (Quantization::haar_shape(level), 0.0)),
+            Self::RandomWalk(p) => (p.gamma2(), (RandomWalk::haar_shape(level), 0.0)),
+            Self::Flicker(p) => (p.b2(), (FlickerNoise::haar_shape(level), 0.0)),
+            Self::Drift(p) => (p.slope() * p.slope(), (Drift::haar_shape(level), 0.0)),
+            Self::Ar1(p) => (p.sigma2(), Ar1::haar_shape(p.phi(), level)),
+            Self::Ma1(p) => (p.sigma2(), Ma1::haar_shape(p.theta(), level)),
+            Self::GaussMarkov(p) => {
+                let (shape, slope) = GaussMarkov::haar_shape(p.beta() / p.rate_hz(), level);
+                (p.s2(), (shape, slope / p.rate_hz()))
+            }
+        };
+        (amplitude, shape, slope)
     }
 }
 

@@ -5,10 +5,11 @@
 //! integral is bounded. So is a drift: the filter has a state for its slope. The reduction is a pure function of model, interval and window.
 
 use super::{Ar1, Composite, GaussMarkov, ParameterError, Process, White};
-use crate::minimise::{MOST, Matrix, descend};
+use nalgebra::{Matrix3, Vector3};
 
 /// Longest time scale that matters to a filter whose longest outage is given (s): eight times the outage,
 /// at least 800 s. A window that ends with the outage makes the filter trust itself too much.
+#[must_use]
 pub fn window_s(longest_outage_s: f64) -> f64 {
     (8.0 * longest_outage_s).max(800.0)
 }
@@ -91,6 +92,7 @@ pub fn reduce(
 }
 
 /// Whether a filter with one bias an axis carries the noise as it is: at most one of its processes is a bias.
+#[must_use]
 pub fn is_exact(noise: &Composite) -> bool {
     let is_bias = |p: &&Process| {
         matches!(
@@ -103,6 +105,7 @@ pub fn is_exact(noise: &Composite) -> bool {
 }
 
 /// The processes that the pair stands for: without quantization noise and without drift.
+#[must_use]
 pub fn carried(noise: &Composite) -> Composite {
     let apart = |p: &&Process| matches!(p, Process::Quantization(_) | Process::Drift(_));
     Composite::new(
@@ -132,7 +135,7 @@ struct Fit {
 }
 
 impl Fit {
-    /// Best start of a grid over the correlation time, then damped Gauss-Newton steps.
+    /// Best start of a grid over the correlation time, then Levenberg-Marquardt.
     fn solve(&self) -> [f64; 3] {
         let (first, last) = (
             f64::from(self.levels[0]),
@@ -191,33 +194,49 @@ impl Fit {
         self.residuals(x).iter().map(|r| r * r).sum()
     }
 
-    /// The stationary point to which a start leads.
-    fn polish(&self, start: [f64; 3]) -> [f64; 3] {
-        let found = descend(
-            &start,
-            &[(f64::NEG_INFINITY, f64::INFINITY); 3],
-            |x| [x[0], x[1], x[2]],
-            |x| self.cost(x),
-            |_, x| self.normal_equations(x),
-        );
-        found.value
+    /// Levenberg-Marquardt with the analytic Jacobian, to a stationary point or 200 steps.
+    fn polish(&self, mut x: [f64; 3]) -> [f64; 3] {
+        let (mut cost, mut damping) = (self.cost(&x), 1e-3);
+        for _ in 0..200 {
+            let (normal, gradient) = self.normal_equations(&x);
+            // Marquardt's scaling by the diagonal; the 1e-12 keeps the matrix regular where an amplitude has
+            // vanished and its row with it.
+            let damped =
+                normal + Matrix3::from_diagonal(&normal.diagonal().add_scalar(1e-12)) * damping;
+            let Some(step) = damped.lu().solve(&-gradient) else {
+                break;
+            };
+            // a parameter that the fit does not feel may wander: at most e² a step
+            let trial = std::array::from_fn(|i| x[i] + step[i].clamp(-2.0, 2.0));
+            let trial_cost = self.cost(&trial);
+            if trial_cost <= cost {
+                let done = step.amax() < 1e-10;
+                (x, cost, damping) = (trial, trial_cost, (damping * 0.2).max(1e-12));
+                if done {
+                    break;
+                }
+            } else {
+                damping *= 5.0;
+                if damping > 1e12 {
+                    break;
+                }
+            }
+        }
+        x
     }
 
-    /// Jᵀr and JᵀJ of the residuals r.
-    fn normal_equations(&self, x: &[f64; 3]) -> (Vec<f64>, Matrix) {
+    fn normal_equations(&self, x: &[f64; 3]) -> (Matrix3<f64>, Vector3<f64>) {
         let (white, variance, kappa) = (x[0].exp(), x[1].exp(), x[2].exp());
-        let (mut gradient, mut normal) = (vec![0.0; 3], [[0.0; MOST]; MOST]);
-        for (level, residual) in self.levels.iter().zip(self.residuals(x)) {
+        let (mut normal, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
+        for (level, target) in self.levels.iter().zip(&self.target) {
             let (shape, slope) = GaussMarkov::haar_shape(kappa, *level);
             let (a, b) = (white * White::haar_shape(*level), variance * shape);
             // d ln(a + b) with respect to ln sigma2, ln variance and ln kappa.
-            let row = [a, b, variance * slope * kappa].map(|d| d / (a + b));
-            for i in 0..3 {
-                gradient[i] += row[i] * residual;
-                (0..3).for_each(|j| normal[i][j] += row[i] * row[j]);
-            }
+            let row = Vector3::new(a, b, variance * slope * kappa) / (a + b);
+            normal += row * row.transpose();
+            gradient += row * ((a + b) / target).ln();
         }
-        (gradient, normal)
+        (normal, gradient)
     }
 }
 

@@ -28,11 +28,6 @@ impl White {
         self.sigma2
     }
 
-    /// Haar wavelet variance at a level (units²): sigma2/tau, tau = 2^level.
-    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
-        self.sigma2 * Self::haar_shape(level)
-    }
-
     /// Haar wavelet variance per unit of sigma2.
     pub fn haar_shape(level: u32) -> f64 {
         0.5 / half_scale(level)
@@ -64,11 +59,6 @@ impl Quantization {
     /// Q² (units²).
     pub const fn q2(&self) -> f64 {
         self.q2
-    }
-
-    /// Haar wavelet variance at a level (units²): 6 Q²/tau², tau = 2^level.
-    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
-        self.q2 * Self::haar_shape(level)
     }
 
     /// Haar wavelet variance per unit of Q².
@@ -103,11 +93,6 @@ impl RandomWalk {
     /// Variance of an increment (units²).
     pub const fn gamma2(&self) -> f64 {
         self.gamma2
-    }
-
-    /// Haar wavelet variance at a level (units²): gamma2 (tau² + 2)/(12 tau), tau = 2^level.
-    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
-        self.gamma2 * Self::haar_shape(level)
     }
 
     /// Haar wavelet variance per unit of gamma2.
@@ -149,11 +134,6 @@ impl Drift {
     /// Slope (units per sample).
     pub const fn slope(&self) -> f64 {
         self.slope
-    }
-
-    /// Haar wavelet variance at a level (units²), not centred: slope² tau²/16, tau = 2^level.
-    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
-        self.slope * self.slope * Self::haar_shape(level)
     }
 
     /// Haar wavelet variance per unit of slope².
