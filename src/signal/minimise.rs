@@ -1,13 +1,17 @@
 //! Minimisation within bounds: least squares by active sets, and damped Newton steps
 //! ([Levenberg-Marquardt](crate::bibliography::More78)).
 
+use argmin::core::{
+    Error, Executor, IterState, KV, Problem, Solver, State, TerminationReason, TerminationStatus,
+};
+
 /// A step this small (natural logarithms, or numbers of the order of 1) is the last.
 const SMALL_STEP: f64 = 1e-11;
 /// No variable moves further in one step.
 const LARGE_STEP: f64 = 2.0;
 /// A damping at which no step helps.
 const HOPELESS: f64 = 1e12;
-const MOST_ITERATIONS: usize = 300;
+const MOST_ITERATIONS: u64 = 300;
 
 /// Local minimum to which a start led.
 #[derive(Debug, Clone)]
@@ -29,46 +33,99 @@ pub fn descend<V>(
     cost: impl Fn(&V) -> f64,
     quadratic: impl Fn(&[f64], &V) -> (Vec<f64>, Matrix),
 ) -> Minimum<V> {
-    let (mut damping, mut growth) = (1e-3, 2.0);
-    let (mut at, mut value) = (start.to_vec(), evaluate(start));
-    for _ in 0..MOST_ITERATIONS {
-        let before = cost(&value);
-        if before <= f64::MIN_POSITIVE {
-            return Minimum {
-                at,
-                value,
-                has_converged: true,
-            };
-        }
-        let (gradient, curvature) = quadratic(&at, &value);
-        let (step, expected) = damped_step(&at, ranges, &gradient, &curvature, damping);
-        let there: Vec<f64> = at.iter().zip(&step).map(|(x, s)| x + s).collect();
-        let next = evaluate(&there);
-        if cost(&next) < before {
-            damping = (damping * 0.2).max(1e-12);
-            growth = 2.0;
-            (at, value) = (there, next);
+    let solver = DampedNewton {
+        ranges,
+        cost,
+        quadratic,
+        damping: 1e-3,
+        growth: 2.0,
+        at: start.to_vec(),
+        value: evaluate(start),
+    };
+    let run = Executor::new(evaluate, solver)
+        .configure(|state: Iterate| state.param(start.to_vec()).max_iters(MOST_ITERATIONS))
+        .timer(false)
+        .run()
+        .expect("no step fails");
+    let has_converged = matches!(
+        run.state.get_termination_reason(),
+        Some(TerminationReason::SolverConverged | TerminationReason::TargetCostReached)
+    );
+    Minimum {
+        at: run.solver.at,
+        value: run.solver.value,
+        has_converged,
+    }
+}
+
+/// Damped Newton steps, whose iterations argmin drives.
+struct DampedNewton<'a, V, C, Q> {
+    ranges: &'a [(f64, f64)],
+    cost: C,
+    quadratic: Q,
+    damping: f64,
+    growth: f64,
+    at: Vec<f64>,
+    value: V,
+}
+
+type Iterate = IterState<Vec<f64>, (), (), (), (), f64>;
+
+impl<V, E, C, Q> Solver<E, Iterate> for DampedNewton<'_, V, C, Q>
+where
+    E: Fn(&[f64]) -> V,
+    C: Fn(&V) -> f64,
+    Q: Fn(&[f64], &V) -> (Vec<f64>, Matrix),
+{
+    fn name(&self) -> &str {
+        "damped Newton"
+    }
+
+    fn init(&mut self, _: &mut Problem<E>, state: Iterate) -> Result<(Iterate, Option<KV>), Error> {
+        Ok((state.cost((self.cost)(&self.value)), None))
+    }
+
+    fn next_iter(
+        &mut self,
+        problem: &mut Problem<E>,
+        state: Iterate,
+    ) -> Result<(Iterate, Option<KV>), Error> {
+        let before = (self.cost)(&self.value);
+        let (gradient, curvature) = (self.quadratic)(&self.at, &self.value);
+        let (step, expected) =
+            damped_step(&self.at, self.ranges, &gradient, &curvature, self.damping);
+        let there: Vec<f64> = self.at.iter().zip(&step).map(|(x, s)| x + s).collect();
+        let next = problem.problem("evaluations", |evaluate| Ok(evaluate(&there)))?;
+        let after = (self.cost)(&next);
+        if after < before {
+            self.damping = (self.damping * 0.2).max(1e-12);
+            self.growth = 2.0;
+            (self.at, self.value) = (there, next);
         } else {
             // Doubling the factor with each refusal: a start far off needs few tries to become cautious
             // enough.
-            damping *= growth;
-            growth *= 2.0;
+            self.damping *= self.growth;
+            self.growth *= 2.0;
         }
+        let state = state.param(self.at.clone()).cost((self.cost)(&self.value));
         let is_small = step.iter().all(|s| s.abs() < SMALL_STEP);
         // No decrease that the cost could show.
         let is_flat = expected <= 1e-16 * before;
-        if is_small || is_flat || damping > HOPELESS {
-            return Minimum {
-                at,
-                value,
-                has_converged: true,
-            };
-        }
+        let is_done = is_small || is_flat || self.damping > HOPELESS;
+        Ok(match is_done {
+            true => (
+                state.terminate_with(TerminationReason::SolverConverged),
+                None,
+            ),
+            false => (state, None),
+        })
     }
-    Minimum {
-        at,
-        value,
-        has_converged: false,
+
+    fn terminate(&mut self, state: &Iterate) -> TerminationStatus {
+        match state.get_cost() <= f64::MIN_POSITIVE {
+            true => TerminationStatus::Terminated(TerminationReason::TargetCostReached),
+            false => TerminationStatus::NotTerminated,
+        }
     }
 }
 
