@@ -98,7 +98,8 @@ class Model:
         (instabilities, "0.5 deg/h"), `corr_time` (their correlation time, "100 s"), `accel_turn_on` and `gyro_turn_on`
         (standard deviations, "2 mg"). `rate_hz` is that of the model.
         """
-        figures = {"vrw": vrw, "arw": arw, "accel_bias": accel_bias, "gyro_bias": gyro_bias, "corr_time": corr_time}
+        figures: dict[str, Any] = {"vrw": vrw, "arw": arw, "corr_time": corr_time}
+        figures |= {"accel_bias": accel_bias, "gyro_bias": gyro_bias}
         figures |= {"accel_turn_on": accel_turn_on, "gyro_turn_on": gyro_turn_on}
         with Staging() as staging:
             own = None if entry is None else staging.settings(entry, "entry")
