@@ -1,6 +1,5 @@
 //! Sentences of the manuals, and damaged ones.
 
-use super::sentence::{KNOT, fields};
 use super::*;
 use nav_sim_signal::units::DEG;
 

@@ -1,13 +1,81 @@
-//! Messages of ROS 1 and ROS 2: `sensor_msgs/Imu` and `sensor_msgs/NavSatFix`.
+//! Logs of ROS: topics of a container.
 
 use crate::bytes::{Alignment, Bytes, Order};
-use crate::channel::Content;
-use crate::container::Message;
+use crate::channel::{Channel, Content};
+use crate::container::{Dialect, Message, Reader, Survey, survey};
 use crate::error::Error;
+use crate::format::{Format, Opened};
+use crate::input::Origin;
 use crate::sample::{Fix, ImuSample, Motion, NS, Stamp, stated};
+use crate::stream::Stream;
+use std::marker::PhantomData;
+
+/// Opens a container.
+pub(crate) fn open<D: Dialect + Sync>(origin: Origin) -> Result<Opened, Error> {
+    let mut survey = survey::<D>(&origin)?;
+    let channel = |(id, definition): (&u32, &crate::container::Definition)| {
+        let content = content(&definition.type_name);
+        let mut channel = Channel::new(&definition.topic, &definition.type_name, content);
+        channel.id = *id;
+        if let Some(tally) = survey.tallies.get(id) {
+            channel.count(tally.messages, tally.first_ns, tally.last_ns);
+        }
+        channel
+    };
+    let mut channels: Vec<Channel> = survey.definitions.iter().map(channel).collect();
+    channels.sort_by(|a, b| a.topic.cmp(&b.topic));
+    let damage = survey.damage.take();
+    Ok(Opened {
+        channels,
+        damage,
+        format: Box::new(Ros::<D> {
+            origin,
+            survey,
+            dialect: PhantomData,
+        }),
+    })
+}
+
+/// A container that was surveyed.
+struct Ros<D> {
+    origin: Origin,
+    survey: Survey,
+    dialect: PhantomData<D>,
+}
+
+/// Decoder of a message in an encoding.
+type Decode<T> = fn(&str, &Message, Stamp) -> Result<Option<T>, Error>;
+
+impl<D: Dialect> Ros<D> {
+    fn stream<T: 'static>(
+        &self,
+        channel: &Channel,
+        stamp: Stamp,
+        decode: Decode<T>,
+    ) -> Result<Stream<T>, Error> {
+        let definition = self.survey.definitions.get(&channel.id);
+        let encoding = definition.map(|d| d.encoding.clone()).unwrap_or_default();
+        let reader = Reader::<D>::new(&self.origin, &self.survey, channel.id)?;
+        Ok(Box::new(reader.filter_map(move |message| {
+            let decoded = message
+                .and_then(|m| Ok(decode(&encoding, &m, stamp)?.map(|sample| (m.offset, sample))));
+            decoded.transpose()
+        })))
+    }
+}
+
+impl<D: Dialect + Sync> Format for Ros<D> {
+    fn imu(&self, channel: &Channel, stamp: Stamp) -> Result<Stream<ImuSample>, Error> {
+        self.stream(channel, stamp, imu)
+    }
+
+    fn fixes(&self, channel: &Channel, stamp: Stamp) -> Result<Stream<Fix>, Error> {
+        self.stream(channel, stamp, fix)
+    }
+}
 
 /// Content of a type of messages.
-pub(crate) fn content(type_name: &str) -> Content {
+fn content(type_name: &str) -> Content {
     match type_name {
         "sensor_msgs/msg/Imu" | "sensor_msgs/Imu" => Content::Imu,
         "sensor_msgs/msg/NavSatFix" | "sensor_msgs/NavSatFix" => Content::Fix,
@@ -77,11 +145,7 @@ fn short(message: &Message) -> Error {
 }
 
 /// A sample of `sensor_msgs/Imu`: the orientation and the covariances are passed over.
-pub(crate) fn imu(
-    encoding: &str,
-    message: &Message,
-    stamp: Stamp,
-) -> Result<Option<ImuSample>, Error> {
+fn imu(encoding: &str, message: &Message, stamp: Stamp) -> Result<Option<ImuSample>, Error> {
     let Body {
         mut bytes,
         stamp_ns,
@@ -102,7 +166,7 @@ pub(crate) fn imu(
 }
 
 /// A fix of `sensor_msgs/NavSatFix`; none where its status is below 0.
-pub(crate) fn fix(encoding: &str, message: &Message, stamp: Stamp) -> Result<Option<Fix>, Error> {
+fn fix(encoding: &str, message: &Message, stamp: Stamp) -> Result<Option<Fix>, Error> {
     let Body {
         mut bytes,
         stamp_ns,

@@ -4,18 +4,16 @@
 //! The layout of the sentences is that of the receivers' manuals (Trimble R6/R7/R8, appendix A; u-blox protocol
 //! specifications).
 
-mod clock;
-mod sentence;
-
 use super::Remark;
 use super::fixes::Fixes;
+use super::rtklib::{GPS_EPOCH_S, leap_s};
+use crate::formats::fusion_files::WEEK_S;
 use crate::formats::{Failure as Error, help};
-use clock::{Clock, Dates};
+use chrono::NaiveDate;
 use glam::{DVec2, DVec3};
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
-use sentence::{
-    address, angle, date_of_rmc, fields, horizontal, midnight, time_of_day, unchecked_fields,
-};
+use nav_sim_signal::units::DEG;
+use std::collections::BTreeMap;
 
 /// Seconds of a day.
 const DAY_S: f64 = 86_400.0;
@@ -301,6 +299,193 @@ impl Log {
         );
         remarks
     }
+}
+
+/// What a receiver is off that counts GPS weeks in ten bits (s).
+const ROLLOVER_S: f64 = 1024.0 * WEEK_S;
+/// Midnights before the first sentence (Unix s) and how many sentences state them.
+#[derive(Debug, Default)]
+struct Dates(BTreeMap<i64, usize>);
+
+impl Dates {
+    fn add(&mut self, midnight_s: Option<f64>) {
+        if let Some(midnight_s) = midnight_s {
+            *self.0.entry(midnight_s as i64).or_default() += 1;
+        }
+    }
+
+    /// The one that most sentences state: before a receiver has found the time, it states any.
+    fn most(&self) -> Option<f64> {
+        self.0
+            .iter()
+            .max_by_key(|(_, count)| **count)
+            .map(|(s, _)| *s as f64)
+    }
+}
+
+/// The clock of a log.
+#[derive(Debug, Default)]
+struct Clock {
+    /// What is added to seconds of the first day (s).
+    origin_s: f64,
+    /// Times of the fixes then.
+    words: &'static str,
+    /// Whether the receiver's week counter has rolled over.
+    is_rolled: bool,
+}
+
+impl Log {
+    /// Unix time where the IMU runs in it from one time to the other, else seconds of the first day, else GPS time. A receiver whose week
+    /// counter has rolled over is known by dates that are the IMU's after 1024 weeks, or twice that.
+    fn clock(&self, imu_s: Option<(f64, f64)>) -> Clock {
+        let time_of_epoch = |e: &Epoch| DAY_S * e.day + e.time_s;
+        let span = self
+            .epochs
+            .first()
+            .map(time_of_epoch)
+            .zip(self.epochs.last().map(time_of_epoch));
+        let overlaps = |origin_s: f64| {
+            let both = imu_s.zip(span);
+            both.is_some_and(|(imu, gnss)| imu.0 <= origin_s + gnss.1 && origin_s + gnss.0 <= imu.1)
+        };
+        let midnight_s = self.dates.most();
+        let origins =
+            midnight_s.map(|midnight_s| [0.0, 1.0, 2.0].map(|n| midnight_s + n * ROLLOVER_S));
+        if let Some((n, origin_s)) =
+            origins.and_then(|all| all.into_iter().enumerate().find(|(_, s)| overlaps(*s)))
+        {
+            return Clock {
+                origin_s,
+                words: "Unix time",
+                is_rolled: n > 0,
+            };
+        }
+        let day = Clock {
+            words: "seconds of the day (UTC)",
+            ..Clock::default()
+        };
+        let gps_s = midnight_s
+            .map(|s| s - GPS_EPOCH_S as f64 + leap_s(s))
+            .unwrap_or(f64::NAN);
+        let of_gps = [
+            (gps_s, "seconds of GPS time"),
+            (gps_s.rem_euclid(WEEK_S), "seconds of the GPS week"),
+        ];
+        match of_gps
+            .into_iter()
+            .find(|(origin_s, _)| !overlaps(0.0) && overlaps(*origin_s))
+        {
+            Some((origin_s, words)) => Clock {
+                origin_s,
+                words,
+                is_rolled: false,
+            },
+            None => day,
+        }
+    }
+}
+
+/// A knot (m/s).
+const KNOT: f64 = 1852.0 / 3600.0;
+
+/// Fields of a sentence with its address, at the least (NMEA 0183, version 2).
+const LEAST_FIELDS: [(&str, usize); 5] =
+    [("GGA", 15), ("RMC", 12), ("VTG", 9), ("GST", 9), ("ZDA", 7)];
+
+/// What stands between `$` and the end of a line; before it, a logger may have written when it came.
+fn body(line: &str) -> Result<&str, &'static str> {
+    line.find(['$', '!'])
+        .map(|start| &line[start + 1..])
+        .ok_or("not a sentence: it has no $")
+}
+
+/// The address of the sentence in a line, such as `GPGGA`.
+fn address(line: &str) -> Option<&str> {
+    let address = body(line).ok()?.split(',').next()?;
+    (address.len() == 5 && address.bytes().all(|b| b.is_ascii_uppercase())).then_some(address)
+}
+
+/// The fields of a sentence in a log without checksums: whole by its number of fields.
+fn unchecked_fields(line: &str) -> Result<Vec<&str>, &'static str> {
+    let body = body(line)?;
+    if body.contains(['$', '!']) {
+        return Err("a sentence within a sentence");
+    }
+    let fields: Vec<&str> = body.split(',').collect();
+    let is_cut = |(kind, least): &(&str, usize)| fields[0].ends_with(kind) && fields.len() < *least;
+    if LEAST_FIELDS.iter().any(is_cut) {
+        Err("a sentence that is cut")
+    } else {
+        Ok(fields)
+    }
+}
+
+/// The fields of a sentence whose checksum is right: what is between `$` and `*`, a XOR of its bytes.
+fn fields(line: &str) -> Result<Vec<&str>, &'static str> {
+    let body = body(line)?;
+    let (body, sum) = body
+        .rsplit_once('*')
+        .ok_or("a sentence without its checksum")?;
+    let sum = u8::from_str_radix(sum, 16).map_err(|_| "a sentence without its checksum")?;
+    let right = sum == body.bytes().fold(0, |all, byte| all ^ byte);
+    if right {
+        Ok(body.split(',').collect())
+    } else {
+        Err("a sentence whose checksum is wrong")
+    }
+}
+
+/// `hhmmss.ss` (s of the day).
+fn time_of_day(text: &str) -> Option<f64> {
+    let two = |start: usize| {
+        text.get(start..start + 2)?
+            .parse::<u8>()
+            .ok()
+            .map(f64::from)
+    };
+    let seconds: f64 = text.get(4..)?.parse().ok()?;
+    let (hours, minutes) = (two(0)?, two(2)?);
+    (hours < 24.0 && minutes < 60.0 && (0.0..61.0).contains(&seconds))
+        .then_some(3600.0 * hours + 60.0 * minutes + seconds)
+}
+
+/// `ddmm.mmmm` or `dddmm.mmmm` and its hemisphere (rad).
+fn angle(text: &str, hemisphere: &str, limit_deg: f64) -> Option<f64> {
+    let point = text.find('.').unwrap_or(text.len());
+    let (degrees, minutes) = text.split_at_checked(point.checked_sub(2)?)?;
+    let (degrees, minutes): (u16, f64) = (degrees.parse().ok()?, minutes.parse().ok()?);
+    let value = f64::from(degrees) + minutes / 60.0;
+    let sign = match hemisphere {
+        "N" | "E" => 1.0,
+        "S" | "W" => -1.0,
+        _ => return None,
+    };
+    ((0.0..60.0).contains(&minutes) && value <= limit_deg).then_some(sign * value * DEG)
+}
+
+/// Midnight of a date (Unix s).
+fn midnight(year: i32, month: u32, day: u32) -> Option<f64> {
+    let date = NaiveDate::from_ymd_opt(year, month, day)?;
+    Some(date.and_hms_opt(0, 0, 0)?.and_utc().timestamp() as f64)
+}
+
+/// `ddmmyy`; years from 80 on are of the last century, as receivers count GPS.
+fn date_of_rmc(text: &str) -> Option<f64> {
+    let two = |start: usize| text.get(start..start + 2)?.parse::<u8>().ok();
+    let year = i32::from(two(4)?);
+    midnight(
+        year + if year < 80 { 2000 } else { 1900 },
+        two(2)?.into(),
+        two(0)?.into(),
+    )
+}
+
+/// Speed and course as north and east; without a course, as receivers have none at rest, nothing but as slow as that.
+fn horizontal(knots: f64, course_deg: Option<f64>) -> (DVec2, f64) {
+    let speed = knots * KNOT;
+    course_deg.map_or((DVec2::ZERO, speed), |course| {
+        (speed * DVec2::from_angle(course * DEG), 0.0)
+    })
 }
 
 #[cfg(test)]
