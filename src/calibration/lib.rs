@@ -47,7 +47,6 @@ mod pipeline;
 mod turn_on;
 // Intervals to be expected of a calibration that is planned.
 mod anticipated;
-// Studies of estimators.
 
 pub use anticipated::{Anticipated, AnticipationError};
 pub use curve::{

@@ -304,10 +304,6 @@ impl Scenario {
     }
 }
 
-#[cfg(test)]
-#[path = "scenario_aiding_tests.rs"]
-pub(crate) mod aiding_tests;
-
 // What is true and the filter does not expect.
 
 impl Scenario {
@@ -442,3 +438,7 @@ impl Unexpected {
 #[cfg(test)]
 #[path = "scenario_tests.rs"]
 mod scenario_tests;
+
+#[cfg(test)]
+#[path = "scenario_aiding_tests.rs"]
+pub(crate) mod aiding_tests;
