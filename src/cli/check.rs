@@ -1,6 +1,7 @@
 //! `nav-sim check`: whether a file is what it should be.
 
-use super::{Failure, Session, parse, read};
+use super::{Failure, Session, parse};
+use crate::app::inputs;
 use crate::commands::batch::Study;
 use crate::commands::inspect::inspect;
 use crate::formats::file_kind::{self, FileKind};
@@ -164,7 +165,7 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             "a record that nav-sim wrote beside a result: nothing in it to be checked".to_owned(),
         ),
         FileKind::Trajectory => {
-            let trajectory = read::trajectory(path, session)?;
+            let trajectory = inputs::trajectory(path, &session.context())?;
             let span = trajectory.end_s() - trajectory.start_s();
             Ok(format!("a trajectory of {span} s"))
         }
@@ -179,7 +180,7 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
 }
 
 fn model(path: &Path, session: &Session) -> Result<String, Failure> {
-    let file = read::model(path, session)?;
+    let file = inputs::model(path, &session.context())?;
     let labels: Vec<String> = file
         .model
         .axes
@@ -254,7 +255,7 @@ fn moving(path: &Path, session: &Session) -> Option<String> {
 }
 
 fn recording(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String, Failure> {
-    let recordings = match read::recordings_at(&[path.to_owned()], rate_hz, session) {
+    let recordings = match inputs::recordings(&[path.to_owned()], rate_hz, &session.context()) {
         Ok(recordings) => recordings,
         Err(refusal) => return moving(path, session).ok_or(refusal),
     };

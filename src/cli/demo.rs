@@ -1,8 +1,8 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
 use super::pictures::claim_output;
-use super::{Cli, Failure, Session, drive, read};
-use crate::app::Answer;
+use super::{Cli, Failure, Session, drive};
+use crate::app::{Answer, inputs};
 use crate::commands::batch::{BatchRequest, Outcome};
 use crate::commands::compare::Comparison;
 use crate::commands::paper::{StudyCurves, paper_figures, paper_page};
@@ -272,7 +272,8 @@ fn refuse_the_impossible(args: &Args, session: &Session) -> Result<(), Failure> 
     let of_repository = |e: Failure| {
         e.hint("the demo takes its IMU and its trajectory from the top of the repository: run it there")
     };
-    let trajectory = read::trajectory(Path::new(TRAJECTORY), session).map_err(of_repository)?;
+    let trajectory =
+        inputs::trajectory(Path::new(TRAJECTORY), &session.context()).map_err(of_repository)?;
     let rate_hz = model_file::read(Path::new(IMU))
         .map_err(|e| of_repository(e.into()))?
         .model
@@ -354,7 +355,7 @@ fn figures(found: &Comparison, out: &str, session: &Session) -> Result<(), Failu
             file,
         });
     }
-    let trajectory = read::trajectory(Path::new(TRAJECTORY), session)?;
+    let trajectory = inputs::trajectory(Path::new(TRAJECTORY), &session.context())?;
     let track = TrajectorySeries::of(&trajectory);
     let mut figures = paper_figures(&curves, &track, &found.outages);
     figures.push(found.figure());

@@ -12,7 +12,6 @@ mod man;
 mod pictures;
 mod printer;
 mod progress;
-mod read;
 mod schema;
 mod synthesize;
 mod trajectory;

@@ -1,8 +1,8 @@
 //! `nav-sim trajectory record`.
 
 use super::{Source, wrote};
-use crate::app::inputs::make_turn_on;
-use crate::cli::{Failure, Session, read};
+use crate::app::inputs;
+use crate::cli::{Failure, Session};
 use crate::formats::atomic::{AtomicDir, Claim, Found, claim_directory};
 use crate::formats::scenario_file;
 use crate::formats::trajectory_file::{Rows, write_rows};
@@ -52,10 +52,11 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         .unwrap_or_default();
     let (trajectory, _) = args.source.read(session)?;
     let shown = args.model.display();
-    let file = read::model(&args.model, session)?;
+    let context = session.context();
+    let file = inputs::model(&args.model, &context)?;
     let model = continuous::at_rate(&file.model, scenario.imu.rate_hz)
         .map_err(|e| Failure::input(format!("{shown}: {e}")))?;
-    make_turn_on(&mut scenario.imu, &file, &args.model, &session.context());
+    inputs::make_turn_on(&mut scenario.imu, &file, &args.model, &context);
     let seed = session.seed(scenario.run.seed);
     // a recording is what IMU and receiver give: neither barometer nor wheel, no filter
     let scenario = Scenario {
