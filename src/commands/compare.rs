@@ -7,7 +7,7 @@ use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::formats::atomic::Written;
 use crate::report::comparison_table::{CandidateResult, Label, Layout, ratio_rows, ratio_table};
 use crate::report::json;
-use crate::report::states::{SPOKEN, axis_of, tone};
+use crate::report::verdict::{SPOKEN, axis_of, tone};
 use crate::report::verdict::{gravest, verdict_in_short};
 use nav_sim_document::{
     Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,

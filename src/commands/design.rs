@@ -7,7 +7,7 @@ use crate::commands::run::{NavigateInputs, TrueImu, navigate};
 use crate::formats::draws_file::DrawsFile;
 use crate::formats::model_file::ModelFile;
 use crate::parse;
-use crate::report::dots::{Dots, dot_chart};
+use crate::report::curves::{Dots, dot_chart};
 use nav_sim_calibration::{
     Anticipated, Bootstrap, Estimator, Outcome, ParameterInterval, Scattering, Settings,
 };

@@ -1,10 +1,10 @@
 //! The figures of Minaretzis et al. 2024 from the files of a case study: what it shows of each, in the paper's order.
 
 use crate::commands::calibrate::{CAPTION as FITTED, variance_chart as fitted_chart};
-use crate::report::curve_chart::{curve, scale_axis, sensor_name, variance_axis};
 use crate::report::curves::{CurvesFile, FittedCurve};
-use crate::report::page::{Chart, Colour, Page, Panel, Series, Tone, svg};
+use crate::report::curves::{curve, scale_axis, sensor_name, variance_axis};
 use crate::report::trajectory::TrajectorySeries;
+use nav_sim_document::{Chart, Colour, Document as Page, Panel, Series, Tone, svg};
 use nav_sim_signal::imu::Sensor;
 
 /// A figure of the paper.

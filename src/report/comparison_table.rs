@@ -1,6 +1,6 @@
 //! The layout of the paper's Table I: scenario by outage, state by estimator.
 
-use super::states::axis_of;
+use super::verdict::axis_of;
 use nav_sim_document::{Cell, Table, short_names, shortest, window};
 use nav_sim_navigation::metrics::{OutageComparison, RatioError, Verdict};
 use nav_sim_navigation::simulation::REPORTED_NAMES;

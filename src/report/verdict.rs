@@ -1,7 +1,13 @@
 //! Verdicts in words.
 
-use super::number::{readable, window};
-use nav_sim_navigation::metrics::{ALL_STATES, StateName, Summary, Verdict, VerdictKind};
+use nav_sim_document::{Tone, percent, readable, window};
+use nav_sim_navigation::ekf::InitialSettings;
+use nav_sim_navigation::metrics::{
+    ALL_STATES, Met, ReductionQuality, StateName, Summary, Verdict, VerdictKind,
+};
+use nav_sim_navigation::scenario::Unexpected;
+use nav_sim_navigation::sensors::defects::Defect;
+use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 
 /// Most characters of a line, of which "verdict: " takes some.
 const WIDTH: usize = 111;
@@ -163,7 +169,7 @@ pub(crate) fn gravest<'a>(verdicts: impl Iterator<Item = &'a Verdict>) -> Verdic
 }
 
 #[cfg(test)]
-mod tests {
+mod verdict_tests {
     use super::*;
     use nav_sim_navigation::metrics::epochs;
     use nav_sim_navigation::simulation::{OutageRecord, RunRecord, RunResult};
@@ -248,4 +254,224 @@ mod tests {
             "{lines:?}"
         );
     }
+}
+
+// Limits that errors must keep, in words.
+
+/// `required p95_m<=5: NOT MET, 7.41 m at the end of the outage 300–390 s`
+pub(crate) fn requirement_line(met: &Met, summary: &Summary) -> String {
+    if met.name == "consistent" {
+        let word = if met.met { "met" } else { "NOT MET" };
+        return format!(
+            "required consistent: {word}, the filter is {}",
+            summary.verdict.kind
+        );
+    }
+    let outage = |k: usize| {
+        format!(
+            "outage {}",
+            window(summary.outages[k].start_s, summary.outages[k].end_s)
+        )
+    };
+    let place = met.outage.map_or_else(
+        || "over the run".to_owned(),
+        |k| format!("at the end of the {}", outage(k)),
+    );
+    let is_shown = met.met || met.value > met.limit;
+    let word = match met.met {
+        true => "met",
+        // within the limit, by a figure that proves nothing
+        false if !is_shown => "NOT SHOWN",
+        false => "NOT MET",
+    };
+    let by = match met.beyond_linear.map(outage) {
+        None => String::new(),
+        Some(outage) if is_shown => {
+            format!(" by the runs, beyond linear theory from the {outage} on")
+        }
+        Some(outage) => {
+            format!(" beyond linear theory from the {outage} on: confirm with --method both")
+        }
+    };
+    let (name, limit, value, unit) = (&met.name, met.limit, readable(met.value), unit(&met.name));
+    format!("required {name}<={limit}: {word}, {value} {unit} {place}{by}")
+}
+
+/// The unit that the name of a figure ends with.
+fn unit(name: &str) -> &'static str {
+    let units = [("_m_s", "m/s"), ("_deg", "°"), ("_m", "m")];
+    units
+        .iter()
+        .find(|(end, _)| name.ends_with(end))
+        .map_or("", |(_, unit)| unit)
+}
+
+// The reported states in words; the colour of a verdict.
+
+/// As they stand in a sentence.
+pub(crate) const SPOKEN: [&str; REPORTED] = [
+    "North position",
+    "East position",
+    "Down position",
+    "North velocity",
+    "East velocity",
+    "Down velocity",
+    "roll",
+    "pitch",
+    "yaw",
+];
+
+/// As they stand in the head of a table.
+pub(crate) fn axis_of(state: usize) -> &'static str {
+    SPOKEN[state].trim_end_matches(" position")
+}
+
+/// The reported states and their units, in words.
+pub(crate) const STATES: [&str; REPORTED] = [
+    "position north (m)",
+    "position east (m)",
+    "position down (m)",
+    "velocity north (m/s)",
+    "velocity east (m/s)",
+    "velocity down (m/s)",
+    "roll (°)",
+    "pitch (°)",
+    "yaw (°)",
+];
+
+/// A state as the title of a chart of its errors: `roll error (°)`.
+pub(crate) fn error_of(state: &str) -> String {
+    state.replacen(" (", " error (", 1)
+}
+
+/// The colour of a verdict.
+pub(crate) const fn tone(kind: VerdictKind) -> Tone {
+    match kind {
+        VerdictKind::Consistent => Tone::Good,
+        VerdictKind::Undecided => Tone::Undecided,
+        VerdictKind::Doubtful | VerdictKind::Underconfident => Tone::Doubtful,
+        VerdictKind::Overconfident | VerdictKind::NotMet | VerdictKind::Diverged => Tone::Bad,
+    }
+}
+
+// Words on what a filter does not expect, and on what a reduction costs it.
+
+/// An error that the filter does not expect: what it is, and what helps.
+pub(crate) fn unexpected_in_words(unexpected: &Unexpected) -> (String, String) {
+    match unexpected {
+        Unexpected::TurnOnBias {
+            sensor,
+            sigma,
+            expected,
+        } => (
+            format!(
+                "the true {sensor} has a turn-on bias of {sigma} {}, the filter expects {expected}",
+                sensor.unit()
+            ),
+            format!(
+                "initial.{} gives it states",
+                InitialSettings::bias_key(*sensor)
+            ),
+        ),
+        Unexpected::Scale {
+            sensor,
+            ppm,
+            expected_ppm,
+        } => (
+            format!(
+                "the true {sensor} has a scale-factor error of {ppm} ppm, the filter expects {expected_ppm}"
+            ),
+            format!(
+                "--scale-ppm (initial.{}) gives it states",
+                InitialSettings::scale_key(*sensor)
+            ),
+        ),
+        Unexpected::Defect(Defect {
+            key,
+            sigma,
+            unit,
+            sensors,
+            ..
+        }) => (
+            format!("{key} = {sigma} {unit} is in no filter"),
+            match sensors {
+                // By gravity, by steady vibration, by what a warming ends with: most of it is a bias.
+                [sensor] => format!(
+                    "initial.{} gives what is constant of it states",
+                    InitialSettings::bias_key(*sensor)
+                ),
+                _ => "calibrate the IMU for it".to_owned(),
+            },
+        ),
+        Unexpected::CorrelatedPositions {
+            sigma_m: [n, e, d],
+            correlation_time_s,
+        } => (
+            format!(
+                "the true receiver errs by {n}, {e}, {d} m over {correlation_time_s} s, the filter expects white errors"
+            ),
+            "a larger gnss.pos_sigma_m".to_owned(),
+        ),
+        Unexpected::Aiding { source, key } => (
+            format!("the truth has {source}, of which the filter expects less"),
+            match key.ends_with("sigma_m_s") || *key == "aiding.heading.sigma_deg" {
+                true => format!("a larger {key} (nav-sim tune --scenario FILE finds how much)"),
+                false => format!("{key} gives it states"),
+            },
+        ),
+        Unexpected::Integration {
+            rate_hz,
+            over_sigma,
+        } => (
+            format!(
+                "at {rate_hz} Hz the strapdown alone errs by {} sigma on this motion",
+                readable(*over_sigma)
+            ),
+            "a larger imu.rate_hz".to_owned(),
+        ),
+    }
+}
+
+/// The same in one line.
+pub(crate) fn unexpected_line(unexpected: &Unexpected) -> String {
+    let (what, remedy) = unexpected_in_words(unexpected);
+    format!("{what}: {remedy}")
+}
+
+/// What a filter reduced to 15 states is like, in one line: its NEES, its errors above those of the full filter.
+pub(crate) fn reduction_line(quality: &ReductionQuality) -> String {
+    let more = |ratio: f64| format!("{:+.1} %", 100.0 * (ratio - 1.0));
+    let cost = quality
+        .cost()
+        .map_or(String::new(), |(horizontal, (state, most))| {
+            let largest = match most > horizontal {
+                true => format!(", {} {}", REPORTED_NAMES[state], more(most)),
+                false => String::new(),
+            };
+            format!(
+                "; RMSE over --filter full at outages: horizontal {}{largest}",
+                more(horizontal)
+            )
+        });
+    format!(
+        "reduced filter: NEES {} (9 if right){cost}",
+        readable(quality.nees)
+    )
+}
+
+/// A standard deviation of the reduced filter that is too small or too large at an outage's end.
+pub(crate) fn reduction_doubt(quality: &ReductionQuality) -> Option<String> {
+    let (state, outage, ratio) = quality.worst()?;
+    let size = if ratio > 1.0 { "small" } else { "large" };
+    let full = if quality.rmse_over_full.is_some() {
+        "; --filter full reduces nothing"
+    } else {
+        ""
+    };
+    Some(format!(
+        "reduced filter: sigma of {} at the end of outage {} is {} too {size}{full}",
+        REPORTED_NAMES[state],
+        outage + 1,
+        percent((1.0 / ratio - 1.0).abs())
+    ))
 }

@@ -8,8 +8,8 @@ use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::formats::atomic::AtomicDir;
 use crate::formats::source;
 use crate::report::json;
-use crate::report::states::tone;
 use crate::report::verdict::gravest;
+use crate::report::verdict::tone;
 use nav_sim_document::{
     Axis, Cell as TableCell, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke,
     Table, Tone, shortest,

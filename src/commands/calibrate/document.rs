@@ -2,8 +2,8 @@
 
 use super::fits::{averages, figures, interval_of, policy};
 use crate::report::comparison_table::in_order;
-use crate::report::curve_chart::{band, curve, scale_axis, sensor_name, unit, variance_axis};
 use crate::report::curves::{CurvesFile, FittedCurve, ReplicateCurve};
+use crate::report::curves::{band, curve, scale_axis, sensor_name, unit, variance_axis};
 use nav_sim_calibration::{
     Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, Misfit, Miss, Note,
     Outcome, ParameterInterval, Ranking, Settings, TurnOnFinding, TurnOnSpread, Undetermined,

@@ -1,7 +1,7 @@
 //! The ranking of candidates: `ranking.json`, and what is said and drawn of it.
 
 use super::{FoldScore, Mean, Placed, Ranking};
-use crate::report::dots::{Dots, dot_chart};
+use crate::report::curves::{Dots, dot_chart};
 use nav_sim_document::{
     Axis, Cell, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, Tone,
     readable, short_names, window,

@@ -1,7 +1,7 @@
 //! The document of a run: verdict, outages, notes, charts and tables.
 
 use super::{Navigation, RunAnswer};
-use crate::report::requirement::requirement_line;
+use crate::report::verdict::requirement_line;
 use crate::report::verdict::verdict_lines;
 use crate::report::{
     STATES, error_of, reduction_doubt, reduction_line, tone, unexpected_in_words, unexpected_line,
