@@ -112,6 +112,11 @@ impl<'a> Context<'a> {
         *lock(&self.runs_s)
     }
 
+    /// Worker threads.
+    pub fn threads(&self) -> usize {
+        rayon::current_num_threads()
+    }
+
     /// Whether to continue.
     pub fn go_on(&self) -> bool {
         self.front.go_on()

@@ -54,7 +54,7 @@ impl Manifest {
             inputs,
             outputs: BTreeMap::new(),
             key: String::new(),
-            threads: rayon::current_num_threads(),
+            threads: 0,
             wall_s: 0.0,
             record: Map::new(),
         };

@@ -122,6 +122,7 @@ impl<C: Command> Asked<C> {
                 }
                 manifest.seed = context.used_seed();
                 manifest.wall_s = context.runs_s();
+                manifest.threads = context.threads();
                 if let serde_json::Value::Object(record) = answer.record() {
                     manifest.record = record;
                 }

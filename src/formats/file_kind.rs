@@ -176,7 +176,10 @@ mod tests {
             FileKind::CatalogueEntry
         );
         assert_eq!(of_toml("start = {}\nsegment = []"), FileKind::Trajectory);
-        assert_eq!(of_toml("runs = 3\n[[candidate]]"), FileKind::Study);
+        assert_eq!(
+            of_toml("[run]\nruns = 3\n[vary]\nmodel = ['a', 'b']"),
+            FileKind::Study
+        );
         assert_eq!(of_toml("[run]\nruns = 3"), FileKind::Scenario);
         assert_eq!(
             of_toml("[[accel]]\noperation = 'ar1'"),

@@ -20,7 +20,6 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
-use std::time::Instant;
 use units::{Place, Unit, assemble, units, work};
 
 /// Run a study: a run whose values may be lists
@@ -316,10 +315,11 @@ fn estimate(
         let cell = unit.cells[0];
         let quiet = Context::new(&(), Some(cell.seed));
         let prepared = cell.asked.request.prepare(&quiet)?;
-        let (start, runs) = (Instant::now(), unit.runs.min(8));
+        let runs = unit.runs.min(8);
+        quiet.begin("runs", runs);
         columns(&[&prepared], 0, runs, &quiet)?;
-        let per_run =
-            start.elapsed().as_secs_f64() / runs as f64 * rayon::current_num_threads() as f64;
+        quiet.end();
+        let per_run = quiet.runs_s() / runs as f64 * quiet.threads() as f64;
         let cost: u64 = left.iter().map(|unit| unit.cost()).sum();
         text += &format!(
             "\n{} of processor time, {:.0} MB",

@@ -142,8 +142,7 @@ pub(crate) fn work(place: &Place<'_>, own: &[&Unit<'_>], context: &Context<'_>) 
     let (worked, front) = (Worked::default(), OfCells(context, Mutex::default()));
     let todo: Vec<&&Unit<'_>> = own.iter().filter(|unit| !place.has_unit(unit)).collect();
     context.begin("runs", todo.iter().map(|unit| unit.cost()).sum());
-    let at_once =
-        |unit: &Unit<'_>| (128 * rayon::current_num_threads() as u64 / unit.runs.max(8)).max(1);
+    let at_once = |unit: &Unit<'_>| (128 * context.threads() as u64 / unit.runs.max(8)).max(1);
     let mut rest = todo.as_slice();
     while let (Some(first), true) = (rest.first(), context.go_on()) {
         let (now, later) = rest.split_at(rest.len().min(at_once(first) as usize));
