@@ -166,7 +166,7 @@ mod tests {
             (
                 "t_s = 0",
                 "t_s = 0\npos_sigma_m = [1, 1, -1]",
-                "i.toml, line 2: \"pos_sigma_m\" = [1, 1, -1] is refused: it must be a finite number > 0 | ",
+                "i.toml, line 2: \"pos_sigma_m\" = [1, 1, -1] is refused: it must be a finite number > 0 and ≤ 100000 | ",
             ),
         ] {
             assert_eq!(refused(&sound.replacen(old, new, 1)), expected);
