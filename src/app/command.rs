@@ -70,6 +70,14 @@ pub trait Command: clap::Args + Send + Sync + 'static {
         false
     }
 
+    /// Refuses `--out` where the request has nothing to write.
+    ///
+    /// # Errors
+    /// Why nothing can be written.
+    fn check_out(&self) -> Result<()> {
+        Ok(())
+    }
+
     /// Endings and kinds of the files beside [`Out::File`], itself included: "" is the file itself.
     fn endings(&self) -> Vec<(Cow<'static, str>, Written)> {
         match Self::OUT {

@@ -1,7 +1,7 @@
 //! Outputs of a command: claimed before its work, written whole after it.
 
 use super::command::{Answer, Asked, Command, Out, OutputFile, beside};
-use super::{Context, Failure, Input, Manifest, OrHelp, Result};
+use super::{Context, Failure, Input, Manifest, Result};
 use crate::formats::atomic::{
     self, AtomicDir, Claim, Existing, Found, Written, claim_directory, claim_result,
 };
@@ -43,9 +43,7 @@ const MANIFEST: &str = "manifest.json";
 impl<C: Command> Asked<C> {
     /// The manifest before the run: options, seed, contents of inputs.
     pub(crate) fn manifest(&self, seed: Option<u64>) -> Result<Manifest> {
-        let fingerprint = |(role, path): &(&'static str, PathBuf)| {
-            input::input(role, path).or_help("check the path")
-        };
+        let fingerprint = |(role, path): &(&'static str, PathBuf)| input::input(role, path);
         let inputs = self.request.inputs()?;
         let inputs: Result<Vec<Input>> = inputs.iter().map(fingerprint).collect();
         let mut options = self.options.clone();
@@ -81,11 +79,14 @@ impl<C: Command> Asked<C> {
                 })?);
             }
             (Out::File { .. }, Some(out)) => {
-                if out.is_dir() || out.as_os_str() == "-" || out.to_string_lossy().ends_with('/') {
-                    let failure = Failure::input(format!("{}: is not a file", out.display()));
+                self.request.check_out()?;
+                let endings = self.request.endings();
+                let is_file = !out.is_dir() && !out.to_string_lossy().ends_with('/');
+                if endings.len() > 1 && (!is_file || out.as_os_str() == "-") {
+                    let failure = Failure::input(format!("{} is not a file", out.display()));
                     return Err(failure.hint("name a file, such as model.toml"));
                 }
-                for (ending, kind) in self.request.endings() {
+                for (ending, kind) in endings {
                     claims.own.push(claim_result(
                         &beside(out, &ending),
                         inputs(),

@@ -61,7 +61,7 @@ fn calibrate_writes_its_page_beside_the_model_the_same_on_any_number_of_threads(
     let ran = done(dir, &format!("{command} -j 1"));
     assert!(
         ran.stderr
-            .contains("m.wv.json, m.draws.json, m.html, m.svg"),
+            .contains("wrote m.draws.json, m.wv.json, m.toml, m.html, m.svg"),
         "{}",
         ran.stderr
     );

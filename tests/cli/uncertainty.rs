@@ -21,7 +21,7 @@ fn intervals_go_from_recordings_to_navigation() {
     );
     let said = done(dir, "calibrate made --model WN+RW --seed 1 -o m.toml").stderr;
     assert!(
-        said.contains("wrote m.toml, m.wv.json, m.draws.json"),
+        said.contains("wrote m.draws.json, m.wv.json, m.toml, m.html, m.svg"),
         "{said}"
     );
     let analysis = |model: &str, out: &str| {

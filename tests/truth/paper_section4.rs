@@ -620,7 +620,7 @@ mod sensitivity {
         let e = abnormal_curve(&design, 1, &[2.0]).unwrap_err();
         assert_eq!(
             e.to_string(),
-            "accel.x has no random walk whose variance could be made abnormal"
+            "no random walk whose variance could be made abnormal"
         );
     }
 }

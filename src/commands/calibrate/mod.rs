@@ -187,6 +187,22 @@ impl Command for Calibrate {
         endings(&self.estimator.possible())
     }
 
+    /// A model has a sensor; what is only printed needs one for its units alone.
+    fn check_out(&self) -> Result<()> {
+        let Some(path) = &self.curve else {
+            return Ok(());
+        };
+        let (_, is_unsaid) = self.curves(path, &self.settings()?)?;
+        match is_unsaid {
+            false => Ok(()),
+            true => Err(Failure::input(format!(
+                "{}: the curve does not say of which sensor it is",
+                path.display()
+            ))
+            .hint("--axes accel or --axes gyro")),
+        }
+    }
+
     fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
         let curve = files("curve", &self.curve);
         Ok(curve.chain(listed("recording", &self.inputs)?).collect())

@@ -183,6 +183,14 @@ impl Command for Require {
         help: "Model file to write, of the required IMU",
     };
 
+    fn check_out(&self) -> Result<()> {
+        if self.model.is_none() && self.catalogue.is_none() {
+            return Ok(());
+        }
+        let message = "--out is for the required IMU: it cannot be used with MODEL or --catalogue";
+        Err(Failure::input(message).hint("--plot FILE.html writes the page"))
+    }
+
     fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
         self.possible()?;
         Ok(files("trajectory", [&self.trajectory])

@@ -184,7 +184,11 @@ fn text(directory: &Path, name: &str) -> Result<(String, String), Failure> {
         Err(source) => {
             let unfinished = "not a finished run directory: make one with `nav-sim run … -o DIR`";
             let is_missing = source.kind() == std::io::ErrorKind::NotFound;
-            Err(Failure::io(&path, source).or_hint_if(is_missing.then(|| unfinished.to_owned())))
+            let failure = Failure::io(&path, source);
+            Err(match is_missing {
+                true => failure.hint(unfinished),
+                false => failure,
+            })
         }
     }
 }

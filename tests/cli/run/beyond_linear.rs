@@ -138,7 +138,7 @@ fn a_verdict_of_linear_theory_says_until_where_it_holds() {
         summary["verdict"]["beyond_linear"].is_null() && !short.stdout.contains("linear theory")
     );
 
-    let (both, _) = run("--method both --outage 300:600 --runs 40 --seed 1", "both");
+    let (both, summary) = run("--method both --outage 300:600 --runs 40 --seed 1", "both");
     let verdict = both.stdout.lines().next().unwrap();
     assert!(
         verdict.starts_with("verdict: overconfident: errors 1."),
