@@ -81,8 +81,8 @@ impl<C: Command> Asked<C> {
             (Out::File { .. }, Some(out)) => {
                 self.request.check_out()?;
                 let endings = self.request.endings();
-                let is_file = !out.is_dir() && !out.to_string_lossy().ends_with('/');
-                if endings.len() > 1 && (!is_file || out.as_os_str() == "-") {
+                let is_new = !out.exists() && !out.to_string_lossy().ends_with('/');
+                if endings.len() > 1 && (!is_new && !out.is_file() || out.as_os_str() == "-") {
                     let failure = Failure::input(format!("{} is not a file", out.display()));
                     return Err(failure.hint("name a file, such as model.toml"));
                 }

@@ -89,7 +89,7 @@ pub struct InspectedChannel {
 /// Reads the channels of a log, and every stamp of its samples and fixes.
 ///
 /// ```
-/// use nav_sim::inspect::inspect;
+/// use nav_sim::commands::inspect::inspect;
 ///
 /// let log = inspect("src/logs/tests/data/ros2_zstd.mcap".as_ref(), &Default::default())?;
 /// let imu = log.channels.iter().find(|channel| channel.content == "imu").expect("one is there");
