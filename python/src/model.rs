@@ -4,7 +4,6 @@ use crate::error;
 use crate::work::work;
 use nav_sim::commands::datasheet::catalogue_json;
 use nav_sim::commands::export::exported;
-use nav_sim::failure::Failure;
 use nav_sim::formats::contamination_file;
 use nav_sim::formats::model_file::{self, ModelFile};
 use nav_sim::prelude::{AxisParameters, Channel, Composite, Horizon, Pair, Policy, Sensor, Target};
@@ -21,7 +20,7 @@ const IN_MEMORY: &str = "model";
 
 fn read(py: Python<'_>, text: &str, path: Option<&str>) -> PyResult<ModelFile> {
     let path = Path::new(path.unwrap_or(IN_MEMORY));
-    model_file::from_text(path, text).map_err(|e| error::of_failure(py, &Failure::from(e), ""))
+    model_file::from_text(path, text).map_err(|e| error::of_failure(py, &e, ""))
 }
 
 /// What a model file holds, as JSON: `rate_hz`, and for each channel the list of its processes.
@@ -45,7 +44,7 @@ pub(crate) fn model_contents(py: Python<'_>, text: &str, path: Option<&str>) -> 
 /// The catalogue of data sheets, as JSON.
 #[pyfunction]
 pub(crate) fn catalogue(py: Python<'_>) -> PyResult<String> {
-    let catalogue = catalogue_json().map_err(|e| error::of_failure(py, &Failure::from(e), ""))?;
+    let catalogue = catalogue_json().map_err(|e| error::of_failure(py, &e, ""))?;
     Ok(catalogue.to_string())
 }
 
@@ -65,7 +64,7 @@ pub(crate) fn model_recording<'py>(
     let found = contaminate
         .map(|name| contamination_file::find(name, file.model.rate_hz))
         .transpose();
-    let contamination = found.map_err(|e| error::of_failure(py, &Failure::from(e), ""))?;
+    let contamination = found.map_err(|e| error::of_failure(py, &e, ""))?;
     let made = work(py, None, move |meter| {
         let spread = file.spread.as_ref().filter(|_| spread);
         let imu = VirtualImu {

@@ -69,12 +69,12 @@ impl<C: Command> Asked<C> {
                 claims.own.push(claimed.map_err(|e| {
                     let there = std::fs::read_to_string(out.join(MANIFEST)).unwrap_or_default();
                     match present(&there).and_then(|there| manifest.other_seed(&there)) {
-                        Some(seed) => Failure::from(e).hint(format!(
+                        Some(seed) => e.hint(format!(
                             "make that {} again with --seed {seed}, name another directory with -o, or replace it with \
                              --force",
                             C::NAME
                         )),
-                        None => e.into(),
+                        None => e,
                     }
                 })?);
             }
@@ -207,8 +207,8 @@ fn form(path: &Path) -> Result<Form> {
 /// Writes a page, or figures in the form that the name says.
 fn write_plot(path: &Path, document: &Document, svg: String) -> Result<()> {
     if is_page(path) {
-        return Ok(atomic::write(path, document.html())?);
+        return atomic::write(path, document.html());
     }
     let picture = encode(svg, form(path)?).map_err(Failure::could_not)?;
-    Ok(atomic::write(path, picture)?)
+    atomic::write(path, picture)
 }

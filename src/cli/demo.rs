@@ -116,7 +116,7 @@ impl Progress {
     }
 
     fn write(&self, out: &str) -> Result<(), Failure> {
-        Ok(atomic::write(&Self::path(out), report::json(self))?)
+        atomic::write(&Self::path(out), report::json(self))
     }
 }
 
@@ -275,7 +275,7 @@ fn refuse_the_impossible(args: &Args, session: &Session) -> Result<(), Failure> 
     let trajectory =
         inputs::trajectory(Path::new(TRAJECTORY), &session.context()).map_err(of_repository)?;
     let rate_hz = model_file::read(Path::new(IMU))
-        .map_err(|e| of_repository(e.into()))?
+        .map_err(of_repository)?
         .model
         .rate_hz;
     let needed = ((trajectory.end_s() - trajectory.start_s()) * rate_hz).ceil();
@@ -331,10 +331,7 @@ fn index(found: Comparison, out: &str) -> Result<(), Failure> {
             format!("navigation with {name}: errors and consistency"),
         ));
     }
-    Ok(atomic::write(
-        &page(out),
-        Comparison { links, ..found }.document().html(),
-    )?)
+    atomic::write(&page(out), Comparison { links, ..found }.document().html())
 }
 
 /// Writes the paper's figures and a page of them; Figure 2 is of `examples/paper_section4.rs`.

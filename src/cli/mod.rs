@@ -65,6 +65,7 @@ macro_rules! driven {
 with_commands!(driven);
 
 #[derive(Subcommand, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one, once a process")]
 enum Command {
     #[command(flatten)]
     Driven(Driven),

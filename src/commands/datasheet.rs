@@ -247,7 +247,7 @@ impl DatasheetArgs {
 
 fn named(name: &str) -> Result<Datasheet> {
     if let Some(sheet) = catalogued(name) {
-        return Ok(sheet?);
+        return sheet;
     }
     let failure = Failure::input(format!("--unit {name}: the catalogue has no such unit"));
     Err(failure.hint(

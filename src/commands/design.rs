@@ -131,7 +131,7 @@ impl Design {
         let settings = Settings::default();
         let bootstrap = Bootstrap {
             draws: self.draws as usize,
-            seed: seed,
+            seed,
         };
         let mut inputs = DesignInputs {
             file,

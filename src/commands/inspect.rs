@@ -42,7 +42,7 @@ impl Command for Inspect {
     }
 
     fn run(&self, _: &Context<'_>) -> Result<Inspection> {
-        Ok(inspect(&self.file, &self.log.options(None))?)
+        inspect(&self.file, &self.log.options(None))
     }
 }
 

@@ -160,31 +160,6 @@ fn lines(header: String, rows: impl Iterator<Item = String>) -> String {
     text
 }
 
-#[cfg(test)]
-mod tables_tests {
-    use super::*;
-
-    #[test]
-    fn the_columns_are_those_of_the_interface() {
-        let header = epoch_columns().join(", ");
-        assert!(
-            header.starts_with(
-                "t_s, gnss, asee_pos_n_m, asee_pos_e_m, asee_pos_d_m, asee_vel_n_m_s, "
-            )
-        );
-        assert!(
-            header.contains("asee_yaw_deg, rmse_pos_n_m")
-                && header.contains("rmse_yaw_deg, bias_pos_n_m")
-        );
-        assert!(header.contains(
-            "bias_yaw_deg, mean_pos_err_m, mean_att_err_deg, nees, coverage, asee_b_ax_m_s2"
-        ));
-        assert!(
-            header.ends_with("asee_b_az_m_s2, asee_b_gx_rad_s, asee_b_gy_rad_s, asee_b_gz_rad_s")
-        );
-    }
-}
-
 // A simulated recording as the files that `fuse` reads.
 
 /// `imu.csv`: mean rates over the interval that ends at the time given.
@@ -272,4 +247,29 @@ pub(crate) fn initial_toml(t_s: f64, state: &NavState, sigma: &InitialSettings) 
         beside(Sensor::Accel),
         beside(Sensor::Gyro)
     )
+}
+
+#[cfg(test)]
+mod tables_tests {
+    use super::*;
+
+    #[test]
+    fn the_columns_are_those_of_the_interface() {
+        let header = epoch_columns().join(", ");
+        assert!(
+            header.starts_with(
+                "t_s, gnss, asee_pos_n_m, asee_pos_e_m, asee_pos_d_m, asee_vel_n_m_s, "
+            )
+        );
+        assert!(
+            header.contains("asee_yaw_deg, rmse_pos_n_m")
+                && header.contains("rmse_yaw_deg, bias_pos_n_m")
+        );
+        assert!(header.contains(
+            "bias_yaw_deg, mean_pos_err_m, mean_att_err_deg, nees, coverage, asee_b_ax_m_s2"
+        ));
+        assert!(
+            header.ends_with("asee_b_az_m_s2, asee_b_gx_rad_s, asee_b_gy_rad_s, asee_b_gz_rad_s")
+        );
+    }
 }

@@ -168,94 +168,6 @@ pub(crate) fn gravest<'a>(verdicts: impl Iterator<Item = &'a Verdict>) -> Verdic
         .unwrap_or(VerdictKind::Consistent)
 }
 
-#[cfg(test)]
-mod verdict_tests {
-    use super::*;
-    use nav_sim_navigation::metrics::epochs;
-    use nav_sim_navigation::simulation::{OutageRecord, RunRecord, RunResult};
-
-    /// Runs whose errors are `scale` times what the filter believes, in every state and at every time.
-    fn summary(runs: u64, scale: f64) -> Summary {
-        let square = scale * scale;
-        let outage = OutageRecord {
-            see_end: [1.0; 9],
-            error_end: [scale; 9],
-            nees_end: 9.0 * square,
-            ..Default::default()
-        };
-        let run = |run| RunRecord {
-            run,
-            outages: vec![outage.clone()],
-            nees_mean: 9.0 * square,
-            covered: 0.5,
-            normalised_sq: [square; 9],
-            ..RunRecord::default()
-        };
-        let result = RunResult {
-            runs: (0..runs).map(run).collect(),
-            outages: vec![(300.123_456_789, 390.0)],
-            ..RunResult::default()
-        };
-        Summary::of(&result, &epochs(&result), 1)
-    }
-
-    #[test]
-    fn verdicts_are_told_in_one_line() {
-        let line = |runs: u64, scale: f64| {
-            let lines = verdict_lines(&summary(runs, scale));
-            assert!(
-                lines.len() == 1 && lines[0].chars().count() <= WIDTH,
-                "{lines:?}"
-            );
-            lines[0].clone()
-        };
-        assert_eq!(
-            line(100, 1.0),
-            "consistent: NEES 9.00 (9 if right), coverage 0.500; 100 runs"
-        );
-        let over = line(100, 1.5);
-        assert!(
-            over.starts_with("overconfident: errors 1.50 times sigma in "),
-            "{over}"
-        );
-        assert!(over.contains("at the end of outage 300.12–390 s"), "{over}");
-        assert!(
-            line(100, 0.5).starts_with("underconfident: errors 0.500"),
-            "{}",
-            line(100, 0.5)
-        );
-        assert!(
-            line(100, 12.0).starts_with("overconfident by far: "),
-            "{}",
-            line(100, 12.0)
-        );
-        let few = line(8, 1.0);
-        assert!(
-            few.starts_with("undecided: 8 runs miss") && few.ends_with(" would decide"),
-            "{few}"
-        );
-    }
-
-    /// The word of covariance analysis stands beside the verdict; what the runs contradict comes first.
-    #[test]
-    fn covariance_analysis_has_a_word_beside_the_runs() {
-        let mut found = summary(8, 1.0);
-        found.verdict.by_covariance_analysis = Some(VerdictKind::Overconfident);
-        let lines = verdict_lines(&found);
-        assert!(
-            lines
-                .join("\n")
-                .ends_with("by covariance analysis overconfident"),
-            "{lines:?}"
-        );
-        found.is_contradicted = true;
-        assert!(
-            verdict_lines(&found)[0].starts_with("undecided in the runs, overconfident by"),
-            "{lines:?}"
-        );
-    }
-}
-
 // Limits that errors must keep, in words.
 
 /// `required p95_m<=5: NOT MET, 7.41 m at the end of the outage 300–390 s`
@@ -474,4 +386,92 @@ pub(crate) fn reduction_doubt(quality: &ReductionQuality) -> Option<String> {
         outage + 1,
         percent((1.0 / ratio - 1.0).abs())
     ))
+}
+
+#[cfg(test)]
+mod verdict_tests {
+    use super::*;
+    use nav_sim_navigation::metrics::epochs;
+    use nav_sim_navigation::simulation::{OutageRecord, RunRecord, RunResult};
+
+    /// Runs whose errors are `scale` times what the filter believes, in every state and at every time.
+    fn summary(runs: u64, scale: f64) -> Summary {
+        let square = scale * scale;
+        let outage = OutageRecord {
+            see_end: [1.0; 9],
+            error_end: [scale; 9],
+            nees_end: 9.0 * square,
+            ..Default::default()
+        };
+        let run = |run| RunRecord {
+            run,
+            outages: vec![outage.clone()],
+            nees_mean: 9.0 * square,
+            covered: 0.5,
+            normalised_sq: [square; 9],
+            ..RunRecord::default()
+        };
+        let result = RunResult {
+            runs: (0..runs).map(run).collect(),
+            outages: vec![(300.123_456_789, 390.0)],
+            ..RunResult::default()
+        };
+        Summary::of(&result, &epochs(&result), 1)
+    }
+
+    #[test]
+    fn verdicts_are_told_in_one_line() {
+        let line = |runs: u64, scale: f64| {
+            let lines = verdict_lines(&summary(runs, scale));
+            assert!(
+                lines.len() == 1 && lines[0].chars().count() <= WIDTH,
+                "{lines:?}"
+            );
+            lines[0].clone()
+        };
+        assert_eq!(
+            line(100, 1.0),
+            "consistent: NEES 9.00 (9 if right), coverage 0.500; 100 runs"
+        );
+        let over = line(100, 1.5);
+        assert!(
+            over.starts_with("overconfident: errors 1.50 times sigma in "),
+            "{over}"
+        );
+        assert!(over.contains("at the end of outage 300.12–390 s"), "{over}");
+        assert!(
+            line(100, 0.5).starts_with("underconfident: errors 0.500"),
+            "{}",
+            line(100, 0.5)
+        );
+        assert!(
+            line(100, 12.0).starts_with("overconfident by far: "),
+            "{}",
+            line(100, 12.0)
+        );
+        let few = line(8, 1.0);
+        assert!(
+            few.starts_with("undecided: 8 runs miss") && few.ends_with(" would decide"),
+            "{few}"
+        );
+    }
+
+    /// The word of covariance analysis stands beside the verdict; what the runs contradict comes first.
+    #[test]
+    fn covariance_analysis_has_a_word_beside_the_runs() {
+        let mut found = summary(8, 1.0);
+        found.verdict.by_covariance_analysis = Some(VerdictKind::Overconfident);
+        let lines = verdict_lines(&found);
+        assert!(
+            lines
+                .join("\n")
+                .ends_with("by covariance analysis overconfident"),
+            "{lines:?}"
+        );
+        found.is_contradicted = true;
+        assert!(
+            verdict_lines(&found)[0].starts_with("undecided in the runs, overconfident by"),
+            "{lines:?}"
+        );
+    }
 }

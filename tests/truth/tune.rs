@@ -255,7 +255,7 @@ fn no_factor_is_larger_than_it_must_be() {
     let smaller = |is_of: &dyn Fn(usize) -> bool| -> Vec<Factor> {
         let less = |(i, f): (usize, &Factor)| Factor {
             on_variance: f.on_variance * if is_of(i) { 0.98 } else { 1.0 },
-            ..f.clone()
+            ..*f
         };
         factors.iter().enumerate().map(less).collect()
     };

@@ -107,11 +107,5 @@ fn claim(args: &Args, contents: &[Vec<u8>; 4], session: &Session) -> Result<Clai
             Found::Foreign
         })
     };
-    Ok(claim_directory(
-        &args.out,
-        &FILES,
-        inputs,
-        session.existing(),
-        recognise,
-    )?)
+    claim_directory(&args.out, &FILES, inputs, session.existing(), recognise)
 }

@@ -231,8 +231,7 @@ impl Door {
                     request.remove("static");
                 }
                 request.insert(path.to_owned(), value.clone());
-                !is_nested
-                    && !(is_one_path && list.is_some())
+                !(is_nested || is_one_path && list.is_some())
                     && named_request(&request).is_ok_and(|r| Asked::<Run>::named(&r).is_ok())
             }
             None => nested(path, value.clone()).try_into::<Scenario>().is_ok(),

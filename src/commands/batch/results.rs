@@ -287,7 +287,7 @@ impl StudyAnswer {
         {
             files.write(name, text)?;
         }
-        Ok(files.commit()?)
+        files.commit()
     }
 }
 
@@ -362,7 +362,7 @@ impl Answer for StudyAnswer {
             let names: Vec<String> = diverged.iter().map(|name| (*name).to_owned()).collect();
             document.note(
                 Importance::Warning,
-                &format!(
+                format!(
                     "runs diverged in {}; they are in no number",
                     first_of(&names)
                 ),

@@ -293,7 +293,7 @@ impl Calibrate {
             bootstrap: self.draws(context),
             turn_on: true,
         };
-        Ok(measure(&self.inputs, &options, context)?)
+        measure(&self.inputs, &options, context)
     }
 
     /// The curves in the place of recordings, and whether they do not say of which sensor: then as of an accelerometer.

@@ -48,7 +48,7 @@ impl Command for Fuse {
 
     fn run(&self, context: &Context<'_>) -> Result<FuseAnswer> {
         let inputs = context.inputs().to_vec();
-        Ok(Drive::read(self)?.fuse(inputs)?)
+        Drive::read(self)?.fuse(inputs)
     }
 }
 

@@ -70,15 +70,20 @@ fn check(
 fn check_number(schema: &Schema, number: f64, key: &str) -> Result<(), SettingError> {
     let mut is_within = number.is_finite();
     let mut words = Vec::new();
-    let bounds: [(&str, &str, fn(&f64, &f64) -> bool); 4] = [
-        ("exclusiveMinimum", ">", f64::gt),
-        ("minimum", "≥", f64::ge),
-        ("exclusiveMaximum", "<", f64::lt),
-        ("maximum", "≤", f64::le),
+    let bounds = [
+        ("exclusiveMinimum", ">"),
+        ("minimum", "≥"),
+        ("exclusiveMaximum", "<"),
+        ("maximum", "≤"),
     ];
-    for (name, sign, holds) in bounds {
+    for (name, sign) in bounds {
         if let Some(bound) = schema[name].as_f64() {
-            is_within &= holds(&number, &bound);
+            is_within &= match sign {
+                ">" => number > bound,
+                "≥" => number >= bound,
+                "<" => number < bound,
+                _ => number <= bound,
+            };
             words.push(format!("{sign} {bound}"));
         }
     }
