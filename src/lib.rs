@@ -61,8 +61,18 @@ pub mod report;
 // Files.
 pub mod formats;
 // What every command does: options, inputs, notes, outputs.
+#[allow(
+    rustdoc::broken_intra_doc_links,
+    rustdoc::invalid_html_tags,
+    reason = "help texts have sections of files and names to be filled in"
+)]
 pub mod app;
 // A file or a folder for each command.
+#[allow(
+    rustdoc::broken_intra_doc_links,
+    rustdoc::invalid_html_tags,
+    reason = "help texts have sections of files and names to be filled in"
+)]
 pub mod commands;
 // Models to recordings.
 pub mod synthesize;

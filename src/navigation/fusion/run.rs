@@ -22,7 +22,7 @@ use glam::{DQuat, DVec3};
 use nalgebra::{DMatrix, DVector, Matrix3, SVector};
 
 /// Runs the filter through recorded data from `start`. A fix or an aid is applied at its own time: the sample it
-/// falls into is split there. A sample much longer than the others bridges a gap ([`super::gap`]). `reference` is only
+/// falls into is split there. A sample much longer than the others bridges a gap (`Gap`). `reference` is only
 /// compared with.
 ///
 /// # Errors
@@ -294,7 +294,7 @@ impl Filter {
         advance(&mut self.ekf, &[mean], &[[Vec3::ZERO; 2]]);
     }
 
-    /// Through `seconds` of a sample that bridges a gap, in steps, as uncertain as [`super::gap`] says.
+    /// Through `seconds` of a sample that bridges a gap, in steps, as uncertain as `Gap` says.
     pub(super) fn cross(&mut self, bridge: &ImuIncrement, seconds: f64, spread: Spread) {
         let steps = (seconds / BRIDGE_STEP_S).ceil().max(1.0);
         let step_s = seconds / steps;

@@ -877,7 +877,7 @@ pub(super) fn add_scaled(to: &mut Nav, factor: f64, x: &Nav) {
 // One number for each state: a mean, covariances with something, or the coefficients of a linear form.
 
 /// A number for each state of z = \[navigation error `x`; bias states `b`\] and for each state `t` of the truth, as
-/// [`Joint`](Joint) has them.
+/// [`Joint`] has them.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Column {
     pub(super) x: Nav,
@@ -911,7 +911,7 @@ impl Column {
 
 // The mean of the true errors, which is the same in every run.
 
-/// Mean of z and of the truth's states, as [`Joint`](Joint) has their covariance.
+/// Mean of z and of the truth's states, as [`Joint`] has their covariance.
 #[derive(Debug, Clone)]
 pub(super) struct Mean<'a> {
     sides: &'a Sides,
