@@ -1,5 +1,6 @@
 //! What went wrong with a request, as the user reads it, and the exit code that it means.
 
+use clap::error::ContextKind;
 use nav_sim_calibration::{
     AnticipationError, AverageError, CalibrationError, Cause, FitError, SignalError,
 };
@@ -9,6 +10,7 @@ use nav_sim_signal::noise::ReplicateError;
 use nav_sim_signal::noise::continuous::RateError;
 use nav_sim_signal::wavelet::WaveletError;
 use std::borrow::Cow;
+use std::error::Error as _;
 use std::fmt;
 use std::io::{self, ErrorKind};
 use std::path::Path;
@@ -159,15 +161,27 @@ impl Failure {
         Self::new(130, &message)
     }
 
-    /// Words that clap refuses: its first paragraph, the rest as advice.
+    /// Words that clap refuses: `--option='value': reason` where a value is wrong, else its first paragraph.
     pub(crate) fn usage(e: &clap::Error) -> Self {
         let text = e.to_string();
         let text = text.strip_prefix("error: ").unwrap_or(&text);
         let mut paragraphs = text.split("\n\n").map(str::trim);
         let message = paragraphs.next().unwrap_or_default();
         let tip = paragraphs.find_map(|p| p.strip_prefix("tip: "));
-        Self::input(message.split_whitespace().collect::<Vec<_>>().join(" "))
-            .maybe_hint(tip.map(str::to_owned))
+        let said = |kind| e.get(kind).map(ToString::to_string);
+        let known = || {
+            let values = e.get(ContextKind::ValidValue);
+            values.map(|values| format!("not one of {values}"))
+        };
+        let value = said(ContextKind::InvalidValue).filter(|value| !value.is_empty());
+        let reason = e.source().map(ToString::to_string).or_else(known);
+        let argument = said(ContextKind::InvalidArg).unwrap_or_default();
+        let option = argument.split(' ').next().unwrap_or_default();
+        let message = match value.zip(reason) {
+            Some((value, reason)) => format!("{option}='{value}': {reason}"),
+            None => without_places(message),
+        };
+        Self::input(message).maybe_hint(tip.map(str::to_owned))
     }
 
     /// Contents of a file that are refused (exit code 2).
@@ -349,6 +363,17 @@ impl Failure {
     pub fn line(&self) -> Option<u64> {
         self.place.as_ref().and_then(|(_, line)| *line)
     }
+}
+
+/// A message of clap on one line, without quotes and without the names of values: `--out`, not `'--out <FILE>'`.
+fn without_places(message: &str) -> String {
+    let message = message.replace('\'', "");
+    let mut words: Vec<&str> = Vec::new();
+    for word in message.split_whitespace() {
+        let is_place = word.starts_with('<') && words.last().is_some_and(|w| w.starts_with("--"));
+        words.extend((!is_place).then_some(word));
+    }
+    words.join(" ")
 }
 
 /// Failures made of any error where it is known what it means.

@@ -19,6 +19,12 @@ where
     PossibleValuesParser::new(values).map(|word| word.parse().expect("a word of the list"))
 }
 
+/// A seed of random numbers.
+pub(crate) fn seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_| format!("not a whole number from 0 to {}", u64::MAX))
+}
+
 /// A finite number ≥ 0.
 pub(crate) fn non_negative(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {

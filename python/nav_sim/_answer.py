@@ -66,9 +66,6 @@ class Answer:
     files that it makes.
     """
 
-    #: Name of the page among the files of the command.
-    _page: str | None = None
-
     def __init__(self, native: _native.Answer) -> None:
         self._native: _native.Answer | Kept = native
 
@@ -122,8 +119,6 @@ class Answer:
         place.mkdir(parents=True, exist_ok=True)
         for name in self.files:
             (place / name).write_text(self.text(name), encoding="utf-8", newline="\n")
-        if self._page is not None:
-            self.to_html(place / self._page)
         return place
 
     def __repr__(self) -> str:

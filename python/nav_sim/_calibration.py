@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 class Calibration(Answer):
     """Noise models that were fitted to recordings: `nav-sim calibrate`."""
 
-    _page = "model.html"
-
     @cached_property
     def model(self) -> Model:
         """The noise model; of several estimators the first one's (see `models`)."""

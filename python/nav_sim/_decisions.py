@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from nav_sim import _model, _trajectory
 from nav_sim._answer import Answer, Progress, ask, window, windows
-from nav_sim._inputs import Staging, StrPath, Table, number, path, settings, texts
+from nav_sim._inputs import Staging, StrPath, Table, number, path, settings
 from nav_sim._model import Model
-from nav_sim._navigation import AnyModel, AnyTrajectory, Outages, Settings, states
+from nav_sim._navigation import AnyModel, AnyTrajectory, Outages, Settings
 from nav_sim._wavelet import reading
 
 
@@ -58,7 +58,7 @@ def tune(
             intervals=intervals,
             trajectory=None if trajectory is None else _trajectory.staged(trajectory, staging),
             outage=windows(outages),
-            filter=states(filter),
+            filter=filter,
             scenario=settings(scenario, "scenario"),
             seed=seed,
             **{"for": aim},
@@ -95,7 +95,7 @@ def require(
             trajectory=_trajectory.staged(trajectory, staging),
             model=None if model is None else _model.staged(model, "model", staging),
             outage=asked,
-            require=texts(limits, "limits"),
+            require=limits,
             start=start,
             gnss=settings(gnss, "gnss"),
             scenario=settings(scenario, "scenario"),
@@ -181,10 +181,10 @@ def choose(
             inputs=staging.recordings(recordings, "recordings", None),
             trajectory=_trajectory.staged(trajectory, staging),
             outage=windows(outages),
-            estimator=texts(estimator, "estimator"),
-            model=texts(model, "model"),
-            filter=texts(filter, "filter"),
-            inflate=texts(inflate, "inflate"),
+            estimator=estimator,
+            model=model,
+            filter=filter,
+            inflate=inflate,
             runs=runs,
             trim=trim,
             scenario=settings(scenario, "scenario"),
@@ -207,4 +207,4 @@ def compare(
     directories = runs if isinstance(runs, (list, tuple)) else [runs]
     request: dict[str, Any] = {"runs": [path(run, "runs") for run in directories], "reference": path(reference, "reference")}
     with Staging() as staging:
-        return ask(Answer, "compare", staging, progress, **request, state=texts(states, "states"))
+        return ask(Answer, "compare", staging, progress, **request, state=states)

@@ -26,10 +26,14 @@ StrPath: TypeAlias = Union[str, "os.PathLike[str]"]
 
 def as_json(given: Mapping[str, Any]) -> str:
     """Options or settings for the engine; what is None is left to it."""
+    return "{" + ",".join(f"{json.dumps(key)}:{_text(value, key)}" for key, value in _known(given).items()) + "}"
+
+
+def _text(value: Any, name: str) -> str:
     try:
-        return json.dumps(_known(given), allow_nan=False, default=_plain)
-    except (TypeError, ValueError) as e:
-        raise NavSimError(str(e)) from None
+        return json.dumps(value, allow_nan=False, default=_plain)
+    except (AttributeError, TypeError, ValueError):
+        raise NavSimError(f"{name}: a {type(value).__name__} is neither a text nor finite numbers") from None
 
 
 def as_toml(given: Mapping[str, Any]) -> str:
@@ -101,14 +105,6 @@ def word(value: Any, name: str) -> str:
     if isinstance(value, str):
         return value
     raise NavSimError(f"{name}={value!r} is not a text")
-
-
-def texts(values: Any, name: str) -> list[str]:
-    """One text or several, as a list."""
-    given = [values] if isinstance(values, (str, int)) else values
-    if not isinstance(given, (list, tuple)):
-        raise NavSimError(f"{name}={values!r} is neither a text nor a list of texts")
-    return [str(one) for one in given]
 
 
 def settings(value: Any, name: str) -> Any:
@@ -234,9 +230,7 @@ class Staging:
         """Settings as TOML."""
         if isinstance(value, Mapping):
             return self.text(f"{name}.toml", as_toml(value))
-        if is_path(value):
-            return os.fspath(value)
-        raise NavSimError(f"{name}: a {type(value).__name__} is neither a path nor a dict")
+        return path(value, name)
 
     def recordings(self, value: Any, name: str, channel: str | None) -> list[str]:
         """One recording or several."""

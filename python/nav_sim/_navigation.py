@@ -12,7 +12,7 @@ import numpy.typing as npt
 from nav_sim import _model, _trajectory
 from nav_sim._answer import Answer, Columns, Progress, ask, axes_or_new, flattened, windows
 from nav_sim._errors import NavSimError
-from nav_sim._inputs import Staging, StrPath, Table, number, numbers, settings, texts
+from nav_sim._inputs import Staging, StrPath, Table, number, numbers, settings
 from nav_sim._model import Model
 from nav_sim._trajectory import Trajectory
 
@@ -35,8 +35,6 @@ class Run(Answer):
     `epochs` and `fan` over time, `runs` run by run, `outages` outage by outage: dicts of columns. ASEE (averaged
     standard estimation error) is what the filter believes of its error, RMSE how wrong it is.
     """
-
-    _page = "report.html"
 
     @cached_property
     def epochs(self) -> Columns:
@@ -156,11 +154,11 @@ def run(
             rate_hz=rate_hz,
             outage=windows(outages),
             runs=runs,
-            filter=states(filter),
+            filter=filter,
             turn_on_bias=turn_on_bias,
             scale_ppm=scale_ppm,
             method=method,
-            require=None if require is None else texts(require, "require"),
+            require=require,
             gnss=settings(gnss, "gnss"),
             scenario=settings(scenario, "scenario"),
             seed=seed,
@@ -225,15 +223,8 @@ def lincov(
     )
 
 
-def states(filter: str | int | None) -> str | None:
-    """The name of a filter."""
-    return None if filter is None else str(filter)
-
-
 class Fusion(Answer):
     """The filter on recorded data: `nav-sim fuse`. `solution`, `innovations` and `errors` are dicts of columns."""
-
-    _page = "report.html"
 
     @cached_property
     def solution(self) -> Columns:
@@ -360,7 +351,7 @@ def fuse(
             lever_arm_m=numbers(lever_arm_m, "lever_arm_m", 3),
             mounting=_mounting(mounting),
             reference=None if reference is None else _reference(reference, staging),
-            outage=_withheld(outages),
+            outage=windows(outages or None),
             filter=filter,
             turn_on_bias=turn_on_bias,
             gnss_sigma=_sigma(gnss_sigma),
@@ -375,14 +366,8 @@ def fuse(
         )
 
 
-def _withheld(outages: Sequence[tuple[float, float]]) -> list[str]:
-    if not isinstance(outages, (list, tuple)):
-        raise NavSimError(f"outages={outages!r}: not pairs of start and end (s)", hint="such as outages=[(300, 390)]")
-    return [_joined(numbers(pair, "outages", 2), ":") for pair in outages]
-
-
-def _joined(values: Any, by: str = ",") -> str:
-    return by.join(repr(float(value)) for value in values)
+def _joined(values: Any) -> str:
+    return ",".join(repr(float(value)) for value in values)
 
 
 def _topics(topic: tuple[str | None, str | None] | None) -> Any:

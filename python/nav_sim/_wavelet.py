@@ -134,9 +134,7 @@ def reading(
     rate_hz: float | None, skip_s: float | str | None, gaps: str | None, axes: str | Sequence[str] | None
 ) -> dict[str, Any]:
     """How recordings are read, as a request has it."""
-    words = axes.split(",") if isinstance(axes, str) else axes
-    skip = None if skip_s is None else str(skip_s)
-    return {"rate_hz": rate_hz, "skip_s": skip, "gaps": gaps, "axes": words}
+    return {"rate_hz": rate_hz, "skip_s": skip_s, "gaps": gaps, "axes": axes}
 
 
 def wv(

@@ -3,10 +3,9 @@
 use crate::answer::Answer;
 use crate::error;
 use crate::work::{Meter, work};
-use nav_sim::app::{Context, Failure, Front};
+use nav_sim::app::{Failure, Front};
 use nav_sim::document::{Importance, Note};
 use pyo3::prelude::*;
-use serde_json::{Map, Value};
 use std::ffi::OsString;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -82,10 +81,9 @@ pub(crate) fn answer(
 ) -> PyResult<Answer> {
     let (answered, warnings) = work(py, progress, move |meter| {
         let clerk = Clerk::new(meter);
-        let answered = options(&request).and_then(|mut options| {
-            let seed = options.remove("seed").and_then(|seed| seed.as_u64());
-            nav_sim::commands::answer(&command, &options, Context::new(&clerk, seed))
-        });
+        let options = serde_json::from_str(&request).map_err(Failure::input);
+        let answered =
+            options.and_then(|options| nav_sim::commands::answer(&command, options, &clerk));
         (answered, clerk.warnings())
     })?;
     let answered = answered.map_err(|failure| error::of_failure(py, &failure, &hidden))?;
@@ -106,11 +104,6 @@ pub(crate) fn toml(py: Python<'_>, json: &str) -> PyResult<String> {
         Ok(Err(e)) => Err(error::refused(py, &e.to_string())),
         Err(e) => Err(error::refused(py, &e.to_string())),
     }
-}
-
-/// The options of a request, from JSON.
-fn options(request: &str) -> Result<Map<String, Value>, Failure> {
-    serde_json::from_str(request).map_err(Failure::input)
 }
 
 /// The command line: does what its words, the program first, ask for, and returns the exit code.

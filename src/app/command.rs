@@ -1,9 +1,11 @@
 //! A command is a struct of options with inputs and an answer. Words of a command line and requests by name (Python,
 //! studies) become it by the same parser, so that both are refused in the same words.
 
-use super::{Context, Failure, Refuse, Result};
+use super::outputs::each_file;
+use super::{Context, Failure, Front, Refuse, Result};
 use crate::formats::atomic::Written;
 use crate::formats::suggest;
+use crate::parse;
 use clap::builder::ValueParser;
 use clap::{Arg, ArgAction, ArgMatches, FromArgMatches};
 use nav_sim_document::Document;
@@ -371,24 +373,43 @@ pub struct Answered {
 /// # Errors
 /// As [`Asked::named`] and [`Command::run`].
 pub fn answered<C: Command>(
-    request: &Map<String, Value>,
-    context: Context<'_>,
+    mut request: Map<String, Value>,
+    front: &dyn Front,
 ) -> Result<Answered> {
-    let asked = Asked::<C>::named(request)?;
-    let context = context.reading(asked.manifest(None)?.inputs);
+    let seed = request.remove("seed").filter(|seed| !seed.is_null());
+    let seed = seed
+        .map(|seed| parse::seed(&seed.to_string()).refuse_within(format!("--seed='{seed}'")))
+        .transpose()?;
+    let asked = Asked::<C>::named(&request)?;
+    let mut manifest = asked.manifest(seed)?;
+    let context = Context::new(front, seed).untimed();
+    let context = context.reading(manifest.inputs.clone());
     let answer = asked.request.run(&context)?;
+    let document = answer.document();
     let name = |ending: &str| match C::OUT {
         Out::File { name, .. } => beside(Path::new(name), ending).display().to_string(),
         _ => ending.to_owned(),
     };
-    let table = answer.csv().map(|text| OutputFile::whole(".csv", text));
-    let files = answer.files().into_iter().chain(table);
+    let mut files = Vec::new();
+    let mut keep = |file: OutputFile<'_>| {
+        files.push((name(&file.name), file.parts.collect()));
+        Ok(())
+    };
+    match C::OUT {
+        Out::Directory { .. } => each_file(&answer, &document, &mut manifest, &context, keep)?,
+        _ => {
+            let table = answer.csv().map(|text| OutputFile::whole(".csv", text));
+            answer
+                .files()
+                .into_iter()
+                .chain(table)
+                .try_for_each(&mut keep)?;
+        }
+    }
     Ok(Answered {
         json: crate::report::json(&answer),
-        document: answer.document(),
-        files: files
-            .map(|file| (name(&file.name), file.parts.collect()))
-            .collect(),
+        document,
+        files,
         unmet: answer.unmet(),
     })
 }

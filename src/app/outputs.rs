@@ -117,18 +117,8 @@ impl<C: Command> Asked<C> {
         match (C::OUT, &self.out) {
             (Out::Directory { files, .. }, Some(out)) => {
                 let mut directory = AtomicDir::create(out)?;
-                for file in answer.files() {
-                    let blake3 = write_hashed(&mut directory, file)?;
-                    manifest.outputs.extend([blake3]);
-                }
-                manifest.seed = context.used_seed();
-                manifest.wall_s = context.runs_s();
-                manifest.threads = context.threads();
-                if let serde_json::Value::Object(record) = answer.record() {
-                    manifest.record = record;
-                }
-                directory.write(PAGE, document.html())?;
-                directory.write(MANIFEST, json(&manifest))?;
+                let give = |file: OutputFile<'_>| directory.write_parts(&file.name, file.parts);
+                each_file(answer, document, &mut manifest, context, give)?;
                 directory.commit()?;
                 // files of an earlier result that this one does not have
                 for old in files
@@ -161,16 +151,32 @@ impl<C: Command> Asked<C> {
     }
 }
 
-fn write_hashed(directory: &mut AtomicDir, file: OutputFile<'_>) -> Result<(String, String)> {
-    let mut hasher = blake3::Hasher::new();
-    let parts = file
-        .parts
-        .inspect(|part| _ = hasher.update(part.as_bytes()));
-    directory.write_parts(&file.name, parts)?;
-    Ok((
-        file.name.into_owned(),
-        hasher.finalize().to_hex().to_string(),
-    ))
+/// Gives the files of a directory: those of the answer, the page, and the manifest, with the hashes of the first, last.
+pub(super) fn each_file(
+    answer: &impl Answer,
+    document: &Document,
+    manifest: &mut Manifest,
+    context: &Context<'_>,
+    mut give: impl FnMut(OutputFile<'_>) -> Result<()>,
+) -> Result<()> {
+    for OutputFile { name, parts } in answer.files() {
+        let mut hasher = blake3::Hasher::new();
+        let parts = parts.inspect(|part| _ = hasher.update(part.as_bytes()));
+        give(OutputFile {
+            name: name.as_ref().into(),
+            parts: Box::new(parts),
+        })?;
+        let hash = hasher.finalize().to_hex().to_string();
+        manifest.outputs.insert(name.into_owned(), hash);
+    }
+    manifest.seed = context.used_seed();
+    manifest.wall_s = context.runs_s();
+    manifest.threads = context.threads();
+    if let serde_json::Value::Object(record) = answer.record() {
+        manifest.record = record;
+    }
+    give(OutputFile::whole(PAGE, document.html()))?;
+    give(OutputFile::whole(MANIFEST, json(manifest)))
 }
 
 fn is_page(path: &Path) -> bool {

@@ -3,6 +3,7 @@
 use super::{Failure, Printer, Progress};
 use crate::app::{Context, Front};
 use crate::formats::atomic::Existing;
+use crate::parse;
 use nav_sim_document::Note;
 use std::fmt::Display;
 use std::path::Path;
@@ -13,7 +14,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 #[command(next_help_heading = "Common options")]
 pub(crate) struct Common {
     /// Seed of all random numbers [default: 1]
-    #[arg(long, global = true, value_name = "N", value_parser = seed)]
+    #[arg(long, global = true, value_name = "N", value_parser = parse::seed)]
     pub(crate) seed: Option<u64>,
     /// Worker threads, at most 1024 (default: one per core)
     #[arg(long, short = 'j', global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -36,11 +37,6 @@ pub(crate) struct Common {
     /// Format of what goes to stdout
     #[arg(long, global = true, value_enum, default_value_t)]
     pub(crate) format: Format,
-}
-
-fn seed(text: &str) -> Result<u64, String> {
-    text.parse()
-        .map_err(|_| format!("not a whole number from 0 to {}", u64::MAX))
 }
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]

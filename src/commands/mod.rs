@@ -15,7 +15,7 @@ pub mod run;
 pub mod tune;
 pub mod wv;
 
-use crate::app::{Answered, Command, Context, Failure, Result, answered};
+use crate::app::{Answered, Command, Failure, Front, Result, answered};
 use serde_json::{Map, Value};
 
 /// Calls a macro with all commands that answer a question, in the order of the help.
@@ -47,11 +47,11 @@ macro_rules! by_name {
         /// Unknown names, values that are refused, and why there is no answer.
         pub fn answer(
             name: &str,
-            options: &Map<String, Value>,
-            context: Context<'_>,
+            options: Map<String, Value>,
+            front: &dyn Front,
         ) -> Result<Answered> {
             $(if name == <$command as Command>::NAME {
-                return answered::<$command>(options, context);
+                return answered::<$command>(options, front);
             })*
             Err(Failure::input(format!("there is no command {name}")))
         }

@@ -39,7 +39,7 @@ pub(super) fn read(
     if !table.columns.is_empty() {
         head.rows(&mut table, reader, &places, dictionary)?;
     }
-    table.comments = head.comments;
+    table.comments.splice(..0, head.comments);
     Ok(table)
 }
 
@@ -53,8 +53,6 @@ struct Head {
     before: u64,
     first_row: Vec<u8>,
     comments: Vec<String>,
-    /// Mark of comments, where there were some.
-    mark: Option<u8>,
     /// Whether it is that of an Xsens MT Manager export, which is in SI.
     is_xsens: bool,
     rate_hz: Option<f64>,
@@ -78,7 +76,6 @@ impl Head {
             before: 0,
             first_row: Vec::new(),
             comments: Vec::new(),
-            mark: None,
             is_xsens: false,
             rate_hz: None,
             is_bare: false,
@@ -124,7 +121,6 @@ impl Head {
             };
             let known = cells.iter().filter(known).count();
             if inside.len() < text.len() {
-                head.mark = Some(text.as_bytes()[0]);
                 head.comments.push(inside.to_owned());
                 // words between blanks may be those of a sentence
                 if known == 0 || delimiter == b' ' && 2 * known + 1 < cells.len() {
@@ -181,7 +177,6 @@ impl Head {
             .has_headers(false)
             .flexible(true)
             .delimiter(self.delimiter)
-            .comment(self.mark)
             .buffer_capacity(BUFFER)
             .from_reader(rows);
         // of a packed file no more than what is read is known
@@ -192,6 +187,15 @@ impl Head {
         while rows.read_byte_record(&mut record).map_err(cannot)? {
             let line = self.before + line_of(&record, rows.position().line());
             let found = record.len();
+            let first = record.get(0).unwrap_or_default().trim_ascii_start();
+            if first.starts_with(b"#") || first.starts_with(b"%") {
+                let cells: Vec<&[u8]> = record.iter().collect();
+                let text = String::from_utf8_lossy(&cells.join(&self.delimiter)).into_owned();
+                table
+                    .comments
+                    .push(text.trim_start_matches(['#', '%', ' ']).to_owned());
+                continue;
+            }
             if row == 0 && !has_units && found == expected && is_words(&record) {
                 has_units = true;
                 let text = format!("line {line} has words and no numbers: passed over");
