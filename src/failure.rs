@@ -13,6 +13,7 @@ use std::borrow::Cow;
 use std::error::Error as _;
 use std::fmt;
 use std::io::{self, ErrorKind};
+use std::num::{ParseFloatError, ParseIntError};
 use std::path::Path;
 
 /// A command without a result: exit code, message, place and help. 1 could not (I/O, numerics); 2 usage or input;
@@ -174,10 +175,14 @@ impl Failure {
             values.map(|values| format!("not one of {values}"))
         };
         let value = said(ContextKind::InvalidValue).filter(|value| !value.is_empty());
-        let reason = e.source().map(ToString::to_string).or_else(known);
+        let reason = e.source().map(|source| match source {
+            _ if source.is::<ParseIntError>() => "not a whole number".to_owned(),
+            _ if source.is::<ParseFloatError>() => "not a number".to_owned(),
+            _ => source.to_string(),
+        });
         let argument = said(ContextKind::InvalidArg).unwrap_or_default();
         let option = argument.split(' ').next().unwrap_or_default();
-        let message = match value.zip(reason) {
+        let message = match value.zip(reason.or_else(known)) {
             Some((value, reason)) => format!("{option}='{value}': {reason}"),
             None => without_places(message),
         };

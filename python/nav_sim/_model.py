@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -42,11 +41,9 @@ class Model:
         self, rate_hz: float, accel: Processes | Process | None = None, gyro: Processes | Process | None = None
     ) -> None:
         sensors = {name: _axes(given, name) for name, given in (("accel", accel), ("gyro", gyro)) if given is not None}
-        try:
-            self._take(as_toml({"schema": 1, "rate_hz": number(rate_hz, "rate_hz"), **sensors}), None)
-        except NavSimError as e:
-            # no line of a text that the caller never saw
-            raise NavSimError(re.sub(r"^model, line \d+: ", "", e.message), hint=e.hint) from None
+        # without a name no line is told of a text that the caller never saw
+        self._take(as_toml({"schema": 1, "rate_hz": number(rate_hz, "rate_hz"), **sensors}), "")
+        self._path = None
 
     def _take(self, text: str, path: str | None) -> None:
         self._text, self._path = text, path

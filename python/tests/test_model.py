@@ -152,8 +152,8 @@ def test_a_density_is_that_of_the_sheet() -> None:
     [
         ({}, "no figure is given"),
         ({"unit": "stim301"}, "unit= stim301"),
-        ({"arw": "0.15 m"}, 'arw="0.15 m"'),
-        ({"arw": 0.15}, "arw=0.15 is not a text"),
+        ({"arw": "0.15 m"}, "arw='0.15 m': has the unit m"),
+        ({"arw": 0.15}, "arw='0.15': has no unit"),
         ({"entry": {"unit": {"manufacturer": "a"}}}, "entry: "),
     ],
 )

@@ -22,8 +22,10 @@ def test_a_run_is_that_of_the_command(command: Command, tmp_path: Path) -> None:
     assert without_times(own._native.json()) == without_times(said)
     for name in FILES:
         assert own.text(name) == (tmp_path / "run" / name).read_text(encoding="utf-8"), name
-    own.to_html(tmp_path / "own.html")
-    assert (tmp_path / "own.html").read_bytes() == (tmp_path / "run" / "report.html").read_bytes()
+    own.write(tmp_path / "own")
+    assert (tmp_path / "own" / "report.html").read_bytes() == (tmp_path / "run" / "report.html").read_bytes()
+    manifests = [json.loads((tmp_path / place / "manifest.json").read_bytes()) for place in ("own", "run")]
+    assert manifests[0]["key"] == manifests[1]["key"] and manifests[0]["outputs"].keys() == manifests[1]["outputs"].keys()
     assert own.verdict == own.data["verdict"]["kind"]
 
 
@@ -174,13 +176,13 @@ def test_local_coordinates_ask_for_an_origin() -> None:
 
 
 WRONG: list[tuple[dict[str, Any], str]] = [
-    ({"filter": 16}, 'filter="16" is not "15"'),
-    ({"require": "p95<5"}, 'require=["p95<5"] is not "consistent" or NAME'),
-    ({"require": 5.0}, "require=5.0 is neither a text nor a list"),
+    ({"filter": 16}, 'filter=\'16\': expected "15", "21" or "full"'),
+    ({"require": "p95<5"}, 'require=\'p95<5\': expected "consistent" or NAME'),
+    ({"require": 5.0}, "require='5.0': expected"),
     ({"turn_on_bias": (1,)}, "turn_on_bias="),
-    ({"turn_on_bias": ("a", 1.0)}, 'turn_on_bias="a" is not a number'),
-    ({"scenario": {"imu": {"rate": 1.0}}}, 'scenario: unknown key "imu.rate"'),
-    ({"scenario": {"gnss": {"rate_hz": "x"}}}, 'scenario: "gnss.rate_hz" = "x" is not a number'),
+    ({"turn_on_bias": ("a", 1.0)}, "turn_on_bias='a,1.0': expected two numbers"),
+    ({"scenario": {"imu": {"rate": 1.0}}}, 'unknown key "imu.rate"'),
+    ({"scenario": {"gnss": {"rate_hz": "x"}}}, '"gnss.rate_hz" = "x" is not a number'),
     ({"scenario": 3}, "scenario: a int is neither a path nor a dict"),
     ({"truth": 3}, "truth: a int is no path"),
     ({"outages": [(1, 2, 3)]}, "outages="),

@@ -3,6 +3,7 @@
 use super::{Context, Failure, OrHelp, Refuse, Result};
 use crate::formats::model_file::{self, ModelFile, TurnOn};
 use crate::formats::recordings::{self, ReadOptions};
+use crate::formats::toml_file::Source;
 use crate::formats::{input, scenario_file, trajectory_file};
 use crate::parse;
 use crate::report::readable;
@@ -230,7 +231,7 @@ impl ScenarioArgs {
         let over: toml::Table = self.set.join("\n").parse().refuse_within("--set")?;
         let mut table = toml::Table::try_from(&scenario).refuse()?;
         merge(&mut table, over);
-        table.try_into().refuse_within("--set")
+        Source::new("", &toml::to_string(&table).refuse()?).get()
     }
 }
 

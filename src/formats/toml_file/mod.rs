@@ -107,7 +107,7 @@ impl Source {
             other => other.to_owned(),
         };
         let place = Place::Character(self.line(span.start) as u64, column as u64);
-        Failure::contents(self.path.as_str(), place, message)
+        self.at(place, message)
     }
 
     /// The line (from 1) a byte stands in.
@@ -129,9 +129,17 @@ impl Source {
         self.line(self.place(key).0.start)
     }
 
+    /// Something wrong at a place; of a text that nobody sees, without a name, the place is left out.
+    fn at(&self, place: impl Into<Place>, message: impl Display) -> Failure {
+        match self.path.as_str() {
+            "" => Failure::input(message),
+            path => Failure::contents(path, place, message),
+        }
+    }
+
     /// Something wrong in the line of a key.
     pub(crate) fn error(&self, key: &str, message: impl Display) -> Failure {
-        Failure::contents(&self.path, self.line_of(key), message)
+        self.at(self.line_of(key), message)
     }
 
     /// A refusal of the value of a key.
@@ -144,7 +152,7 @@ impl Source {
     fn refused_at(&self, span: Range<usize>, key: &str, reason: impl Display) -> Failure {
         let line = self.line(span.start);
         let value = shown(self.text.get(span).unwrap_or_default());
-        Failure::contents(&self.path, line, format!("\"{key}\" = {value} {reason}"))
+        self.at(line, format!("\"{key}\" = {value} {reason}"))
     }
 
     /// The refusal of a setting by its rule.
