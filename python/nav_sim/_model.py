@@ -43,7 +43,7 @@ class Model:
         sensors = {name: _axes(given, name) for name, given in (("accel", accel), ("gyro", gyro)) if given is not None}
         # without a name no line is told of a text that the caller never saw
         self._take(as_toml({"schema": 1, "rate_hz": number(rate_hz, "rate_hz"), **sensors}), "")
-        self._path = None
+        self._path: str | None = None
 
     def _take(self, text: str, path: str | None) -> None:
         self._text, self._path = text, path
