@@ -178,6 +178,7 @@ impl Command for Calibrate {
         name: "model.toml",
         help: "The model file (default: model.toml; none for --curve)",
     };
+    const PLOT: bool = false;
 
     fn writes_by_default(&self) -> bool {
         self.curve.is_none()
