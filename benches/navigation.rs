@@ -14,7 +14,7 @@ use kinavis_kernel::{
     Angle, Distance, GeodeticPoint, Height, Instant, Position, Speed, TrueCourse, Utc, Vector3,
 };
 use nalgebra::SMatrix;
-use nav_sim::formats::trajectory_file;
+use nav_sim::io::trajectory_file;
 use nav_sim::navigation::ekf::{Belief, FilterStates};
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;

@@ -1,7 +1,7 @@
 //! From a motion profile to the samples of a perfect IMU, and what they are at rest.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
-use nav_sim::formats::trajectory_file::{Options, load};
+use nav_sim::io::trajectory_file::{Options, load};
 use nav_sim::navigation::earth::GravityModel;
 use nav_sim::navigation::sensors::ideal_imu::ideal_imu;
 use std::path::Path;

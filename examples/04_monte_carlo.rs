@@ -2,7 +2,7 @@
 //! times as steady. Prints the errors that they claim and the true ones.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
-use nav_sim::formats::trajectory_file::{Options, load};
+use nav_sim::io::trajectory_file::{Options, load};
 use nav_sim::navigation::ekf::{Belief, FilterStates};
 use nav_sim::navigation::metrics::{Summary, epochs};
 use nav_sim::navigation::monte_carlo;

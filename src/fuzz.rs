@@ -3,12 +3,10 @@
 
 use crate::commands::batch::{Study, part_of};
 use crate::commands::run::directory as run_directory;
-use crate::formats::recordings::ReadOptions;
-use crate::formats::trajectory_file::{self, Options};
-use crate::formats::{
-    contamination_file, curve_file, datasheet, draws_file, fusion_files, model_file,
-};
-use crate::formats::{recordings, scenario_file};
+use crate::io::recordings::ReadOptions;
+use crate::io::trajectory_file::{self, Options};
+use crate::io::{contamination_file, curve_file, datasheet, draws_file, fusion_files, model_file};
+use crate::io::{recordings, scenario_file};
 use nav_sim_navigation::gnss::FixSigma;
 use std::cell::OnceCell;
 use std::fs;

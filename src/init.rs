@@ -1,6 +1,6 @@
 //! A directory to start from: a commented file of every kind, trajectories, virtual IMUs.
 
-use crate::formats::{Failure, atomic};
+use crate::io::{Failure, atomic};
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -59,7 +59,7 @@ pub mod failure;
 // Words and shapes that several results share.
 pub mod report;
 // Files.
-pub mod formats;
+pub mod io;
 // What every command does: options, inputs, notes, outputs.
 #[allow(
     rustdoc::broken_intra_doc_links,

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test")]
 #![allow(unsafe_code, reason = "an allocator that counts")]
 
-use nav_sim::formats::trajectory_file::{Options, load};
+use nav_sim::io::trajectory_file::{Options, load};
 use nav_sim::navigation::ekf::{Belief, FilterStates};
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;

@@ -8,7 +8,7 @@
 //! horizontal error is from its binomial mean, in standard deviations. Every truth has random numbers of its own.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
-use nav_sim::formats::{model_file, trajectory_file};
+use nav_sim::io::{model_file, trajectory_file};
 use nav_sim::navigation::ekf::FilterStates;
 use nav_sim::navigation::metrics::{Expected, OutageMetrics, epochs};
 use nav_sim::navigation::monte_carlo;

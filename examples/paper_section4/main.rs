@@ -10,7 +10,7 @@
 
 use nav_sim::calibration::{Estimator, Trim, Weighting};
 use nav_sim::document::{Axis, Chart, Colour, Interval, Mark, Panel, Series, svg};
-use nav_sim::formats::contamination_file;
+use nav_sim::io::contamination_file;
 use nav_sim::prelude::*;
 use nav_sim::signal::noise::contamination::Contamination;
 use nav_sim::signal::wavelet::{Tuning, default_levels};

@@ -3,8 +3,8 @@
 
 use super::outputs::each_file;
 use super::{Context, Failure, Front, Refuse, Result};
-use crate::formats::atomic::Written;
-use crate::formats::suggest;
+use crate::io::atomic::Written;
+use crate::io::suggest;
 use crate::parse;
 use clap::builder::ValueParser;
 use clap::{Arg, ArgAction, ArgMatches, FromArgMatches};

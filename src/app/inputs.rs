@@ -1,10 +1,10 @@
 //! Inputs that several commands share: files, settings, outages.
 
 use super::{Context, Failure, OrHelp, Refuse, Result};
-use crate::formats::model_file::{self, ModelFile, TurnOn};
-use crate::formats::recordings::{self, ReadOptions};
-use crate::formats::toml_file::Source;
-use crate::formats::{input, scenario_file, trajectory_file};
+use crate::io::model_file::{self, ModelFile, TurnOn};
+use crate::io::recordings::{self, ReadOptions};
+use crate::io::toml_file::Source;
+use crate::io::{input, scenario_file, trajectory_file};
 use crate::parse;
 use crate::report::readable;
 use nav_sim_navigation::ekf::{BeliefError, FilterStates, InitialSettings};

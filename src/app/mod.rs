@@ -9,7 +9,7 @@ pub mod reading;
 
 pub use crate::failure::{Failure, Result};
 pub(crate) use crate::failure::{OrHelp, Refuse};
-pub use crate::formats::input::Input;
+pub use crate::io::input::Input;
 pub use command::{Answer, Answered, Asked, Command, Out, OutputFile, answered};
 pub use context::{Context, DEFAULT_SEED, Front};
 pub use manifest::Manifest;

@@ -2,10 +2,10 @@
 
 use super::command::{Answer, Asked, Command, Out, OutputFile, beside};
 use super::{Context, Failure, Input, Manifest, Result};
-use crate::formats::atomic::{
+use crate::io::atomic::{
     self, AtomicDir, Claim, Existing, Found, Written, claim_directory, claim_result,
 };
-use crate::formats::input;
+use crate::io::input;
 use crate::report::json;
 use nav_sim_document::{Document, Form, encode};
 use std::path::{Path, PathBuf};

@@ -1,9 +1,9 @@
 //! How recordings are read and their wavelet variances taken: arguments that several commands share.
 
 use crate::app::{Context, Failure};
-use crate::formats::logs::LogOptions;
-use crate::formats::recordings::{Gaps, ReadOptions, Report};
-use crate::formats::suggest;
+use crate::io::logs::LogOptions;
+use crate::io::recordings::{Gaps, ReadOptions, Report};
+use crate::io::suggest;
 use crate::parse;
 use nav_sim_calibration::{FitRange, ModelSpec, SpecError};
 use nav_sim_document::Importance;

@@ -3,7 +3,7 @@
 use super::{Failure, Session, drive};
 use crate::app::{Answer, Context, Front};
 use crate::commands::batch::{BatchRequest, Outcome};
-use crate::formats::atomic::Existing;
+use crate::io::atomic::Existing;
 use crate::report::{WIDTH, json as to_json};
 use nav_sim_document::Note;
 use serde_json::json;

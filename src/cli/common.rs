@@ -2,7 +2,7 @@
 
 use super::{Failure, Printer, Progress};
 use crate::app::{Context, Front};
-use crate::formats::atomic::Existing;
+use crate::io::atomic::Existing;
 use crate::parse;
 use nav_sim_document::Note;
 use std::fmt::Display;

@@ -1,7 +1,7 @@
 //! Ctrl-C, SIGTERM and a closed terminal: what is being written is removed before the process ends.
 
 use super::{Failure, Printer};
-use crate::formats::atomic;
+use crate::io::atomic;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);

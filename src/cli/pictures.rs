@@ -1,7 +1,7 @@
 //! Outputs of commands that write files themselves.
 
 use super::{Failure, Session};
-use crate::formats::atomic::{self, Claim, Written};
+use crate::io::atomic::{self, Claim, Written};
 use std::path::Path;
 
 /// Claims an output of that kind, if one is asked for.

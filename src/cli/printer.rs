@@ -3,7 +3,7 @@
 use super::Failure;
 use super::common::{Color, Common};
 use crate::failure::system_words;
-use crate::formats::fusion_files::Remark;
+use crate::io::fusion_files::Remark;
 use nav_sim_document::{Importance, Note, turns};
 use std::borrow::Cow;
 use std::io::{ErrorKind, IsTerminal, Write};

@@ -2,7 +2,7 @@
 
 use super::{Failure, Session};
 use crate::commands::batch::Study;
-use crate::formats::{contamination_file, fusion_files, model_file, trajectory_file};
+use crate::io::{contamination_file, fusion_files, model_file, trajectory_file};
 use nav_sim_navigation::scenario::Scenario;
 
 /// Print the JSON schema of a file that people write, for editors and checkers

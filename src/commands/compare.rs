@@ -4,7 +4,7 @@ use crate::app::{Answer, Command, Context, Failure, Manifest, Out, OutputFile, R
 use crate::commands::paper::PaperFigure;
 use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
-use crate::formats::atomic::Written;
+use crate::io::atomic::Written;
 use crate::report::comparison_table::{CandidateResult, Label, Layout, ratio_rows, ratio_table};
 use crate::report::json;
 use crate::report::verdict::{SPOKEN, axis_of, tone};

@@ -2,10 +2,10 @@
 
 use crate::app::inputs::files;
 use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
-use crate::formats::atomic::Written;
-use crate::formats::datasheet::{CATALOGUE, Datasheet, Entry, Figure, Quantity, catalogued, read};
-use crate::formats::model_file::{self, ModelFile};
-use crate::formats::suggest::nearest;
+use crate::io::atomic::Written;
+use crate::io::datasheet::{CATALOGUE, Datasheet, Entry, Figure, Quantity, catalogued, read};
+use crate::io::model_file::{self, ModelFile};
+use crate::io::suggest::nearest;
 use crate::parse;
 use nav_sim_document::{Document, Tone};
 use nav_sim_signal::imu::Sensor;

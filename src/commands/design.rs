@@ -4,8 +4,8 @@ use crate::app::inputs::{self, OutageFlag, files};
 use crate::app::{Answer, Command, Context, Failure, Result};
 use crate::commands::calibrate::ESTIMATORS;
 use crate::commands::run::{NavigateInputs, TrueImu, navigate};
-use crate::formats::draws_file::DrawsFile;
-use crate::formats::model_file::ModelFile;
+use crate::io::draws_file::DrawsFile;
+use crate::io::model_file::ModelFile;
 use crate::parse;
 use crate::report::curves::{Dots, dot_chart};
 use nav_sim_calibration::{

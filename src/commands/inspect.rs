@@ -3,8 +3,8 @@
 use crate::app::inputs::files;
 use crate::app::reading::LogRequest;
 use crate::app::{Answer, Command, Context, Result};
-use crate::formats::Failure;
-use crate::formats::logs::{self, LogOptions};
+use crate::io::Failure;
+use crate::io::logs::{self, LogOptions};
 use nav_sim_document::{Cell, Document, Importance, Table, Tone, shortest, six_digits};
 use nav_sim_logs::{Channel, Content, Error, Log};
 use serde::Serialize;

@@ -2,9 +2,9 @@
 
 use crate::app::inputs::{self, SettingsArgs, files};
 use crate::app::{Answer, Command, Context, Failure, Input, Out, OutputFile, Result};
-use crate::formats::atomic::Written;
-use crate::formats::draws_file::{self, Draws};
-use crate::formats::model_file::{self, ModelFile, PROGRAM};
+use crate::io::atomic::Written;
+use crate::io::draws_file::{self, Draws};
+use crate::io::model_file::{self, ModelFile, PROGRAM};
 use crate::parse;
 use crate::report::unexpected_line;
 use nav_sim_calibration::derived_interval;

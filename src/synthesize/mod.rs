@@ -6,10 +6,10 @@ pub use request::SynthesisRequest;
 
 use crate::app::Failure;
 use crate::app::Input;
-use crate::formats::atomic::{AtomicDir, Claim, Existing, Found, claim_directory};
-use crate::formats::model_file::ModelFile;
-use crate::formats::recordings::{FileFormat, is_recording};
-use crate::formats::{Place, help};
+use crate::io::atomic::{AtomicDir, Claim, Existing, Found, claim_directory};
+use crate::io::model_file::ModelFile;
+use crate::io::recordings::{FileFormat, is_recording};
+use crate::io::{Place, help};
 use crate::report;
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::contamination::Contamination;

@@ -130,9 +130,8 @@ fn recordings_become_a_model_file_and_its_curves() {
     }
     let model = Composite::new(truth().to_vec());
     for estimator in ["awv", "sr-awv", "dr-awv"] {
-        let file =
-            nav_sim::formats::model_file::read(&dir.path().join(format!("imu_{estimator}.toml")))
-                .unwrap();
+        let file = nav_sim::io::model_file::read(&dir.path().join(format!("imu_{estimator}.toml")))
+            .unwrap();
         assert_eq!(file.model.rate_hz.round() as i64, 50);
         let missing: Vec<String> = file.missing.iter().map(ToString::to_string).collect();
         assert_eq!(

@@ -1,7 +1,7 @@
 //! `nav-sim datasheet` as a user runs it, and the turn-on bias that a model file states.
 
 use crate::common::drive::*;
-use nav_sim::formats::model_file;
+use nav_sim::io::model_file;
 use serde_json::Value;
 use std::fs;
 

@@ -2,7 +2,7 @@
 //! stand beside them (`src/logs/tests/data`).
 
 use crate::common::drive::*;
-use nav_sim::formats::recordings::{self, ReadOptions};
+use nav_sim::io::recordings::{self, ReadOptions};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! `nav-sim synthesize` as a user runs it.
 
 use assert_cmd::Command;
-use nav_sim::formats::recordings::{ReadOptions, read};
+use nav_sim::io::recordings::{ReadOptions, read};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};

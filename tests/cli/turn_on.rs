@@ -1,7 +1,7 @@
 //! What the means of recordings say of a turn-on bias, as a user meets it.
 
 use crate::common::drive::*;
-use nav_sim::formats::model_file;
+use nav_sim::io::model_file;
 use nav_sim::signal::imu::Sensor;
 use serde_json::Value;
 use std::fs;

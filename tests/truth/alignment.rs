@@ -2,7 +2,7 @@
 //! says, and never the wrong way round.
 
 use glam::{DQuat, DVec3};
-use nav_sim::formats::model_file;
+use nav_sim::io::model_file;
 use nav_sim::navigation::earth::GravityModel;
 use nav_sim::navigation::ekf::{Belief, FilterStates};
 use nav_sim::navigation::frames::RollPitchYaw;

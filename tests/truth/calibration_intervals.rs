@@ -8,7 +8,7 @@ use nav_sim::calibration::{
     replicates,
 };
 use nav_sim::commands::run::{NavigateInputs, TrueImu, navigate};
-use nav_sim::formats::draws_file::{Draws, DrawsFile};
+use nav_sim::io::draws_file::{Draws, DrawsFile};
 use nav_sim::navigation::metrics::Summary;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::simulation::REPORTED_NAMES;

@@ -1,7 +1,7 @@
 //! Filters whose models are right are as sure as they should be, on three shipped trajectories, with 15 states
 //! and with all states of the model; a model that is wrong by 4 in any parameter shows.
 
-use nav_sim::formats::trajectory_file::{Options, load};
+use nav_sim::io::trajectory_file::{Options, load};
 use nav_sim::navigation::ekf::{Belief, FilterStates};
 use nav_sim::navigation::metrics::{EpochMetrics, Expected};
 use nav_sim::navigation::monte_carlo;
@@ -192,7 +192,7 @@ fn long_outages_shift_the_velocity_down_by_the_square_of_the_tilts() {
         start_s: 100.0,
         end_s: 400.0,
     }];
-    let mut file = nav_sim::formats::model_file::read(
+    let mut file = nav_sim::io::model_file::read(
         &Path::new(env!("CARGO_MANIFEST_DIR")).join("calib_data/consumer_mems.toml"),
     )
     .unwrap();

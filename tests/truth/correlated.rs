@@ -2,7 +2,7 @@
 
 use crate::fusion::{belief, recorded, settings, shipped};
 use glam::DVec3;
-use nav_sim::formats::model_file;
+use nav_sim::io::model_file;
 use nav_sim::navigation::fusion::{Correlation, Recorded, fuse_correlated, outcome};
 use nav_sim::navigation::sensors::gnss::GnssSettings;
 use nav_sim::navigation::trajectory::reference::Reference;

@@ -1,7 +1,7 @@
 //! The examples of `calib_data/`: one recording in every format, and the virtual IMUs.
 
-use nav_sim::formats::model_file;
-use nav_sim::formats::recordings::{ReadOptions, read};
+use nav_sim::io::model_file;
+use nav_sim::io::recordings::{ReadOptions, read};
 use nav_sim::signal::imu::Recording;
 use nav_sim::signal::noise::Composite;
 use std::path::{Path, PathBuf};

@@ -3,7 +3,7 @@
 
 use crate::common::drive::{DRIVE, MODEL, place_with};
 use glam::{DQuat, DVec3};
-use nav_sim::formats::{model_file, trajectory_file};
+use nav_sim::io::{model_file, trajectory_file};
 use nav_sim::navigation::earth::GravityModel;
 use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim::navigation::frames::RollPitchYaw;

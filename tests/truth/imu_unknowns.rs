@@ -2,7 +2,7 @@
 //! be, one that does not is far too sure.
 
 use crate::common::drive::{DRIVE, MODEL, done, nav_sim, place_with};
-use nav_sim::formats::trajectory_file::{Options, load};
+use nav_sim::io::trajectory_file::{Options, load};
 use nav_sim::navigation::ekf::Belief;
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::scenario::Scenario;

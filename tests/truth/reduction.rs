@@ -1,8 +1,8 @@
 //! The default filter of 15 states is as sure as it should be: true RMSE over its own sigma at the ends of outages,
 //! by covariance analysis, on the shipped IMUs and trajectories.
 
-use nav_sim::formats::model_file;
-use nav_sim::formats::trajectory_file::{Options, load};
+use nav_sim::io::model_file;
+use nav_sim::io::trajectory_file::{Options, load};
 use nav_sim::navigation::scenario::{Reduction, Scenario};
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{Assessment, assess};

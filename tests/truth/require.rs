@@ -1,6 +1,6 @@
 //! The IMU that a limit needs meets it in sampled runs, and answers are monotone.
 
-use nav_sim::formats::datasheet::{Figure, catalogued};
+use nav_sim::io::datasheet::{Figure, catalogued};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::require::{
     Answer, Course, Drift, IMU_PARAMETERS, Limit, Margins, Need, Quantity, RequireError,

@@ -4,7 +4,7 @@ use crate::common::drive::{DRIVE, MODEL, place_with};
 use crate::fusion::{belief, model, recorded, run, settings, shipped};
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
-use nav_sim::formats::trajectory_file;
+use nav_sim::io::trajectory_file;
 use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim::navigation::fusion::{FusionError, Row, Settings, Start, fuse, outcome};
 use nav_sim::navigation::fusion::{Recorded, Solution};

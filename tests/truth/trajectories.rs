@@ -2,7 +2,7 @@
 //! them. And ideal samples and strapdown agree with independent truth.
 
 use glam::DVec3;
-use nav_sim::formats::trajectory_file::{Options, load};
+use nav_sim::io::trajectory_file::{Options, load};
 use nav_sim::navigation::earth::GravityModel;
 use nav_sim::navigation::frames::NavState;
 use nav_sim::navigation::sensors::ideal_imu::ideal_imu;

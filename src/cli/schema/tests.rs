@@ -1,7 +1,7 @@
 //! The ranges of schemas are those of the readers.
 
 use super::{Kind, schema};
-use crate::formats::{
+use crate::io::{
     Failure, contamination_file, fusion_files, model_file, scenario_file, trajectory_file,
 };
 use serde_json::Value;

@@ -5,7 +5,7 @@ mod record;
 mod write;
 
 use super::{Failure, Session};
-use crate::formats::trajectory_file::{Options, load, parse_origin};
+use crate::io::trajectory_file::{Options, load, parse_origin};
 use nav_sim_navigation::trajectory::Trajectory;
 use serde_json::json;
 use std::path::{Path, PathBuf};

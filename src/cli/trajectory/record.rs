@@ -3,9 +3,9 @@
 use super::{Source, wrote};
 use crate::app::inputs;
 use crate::cli::{Failure, Session};
-use crate::formats::atomic::{AtomicDir, Claim, Found, claim_directory};
-use crate::formats::scenario_file;
-use crate::formats::trajectory_file::{Rows, write_rows};
+use crate::io::atomic::{AtomicDir, Claim, Found, claim_directory};
+use crate::io::scenario_file;
+use crate::io::trajectory_file::{Rows, write_rows};
 use crate::report::{gnss_csv, imu_csv, initial_toml};
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::aiding::AidingSettings;

@@ -2,8 +2,8 @@
 
 use super::{Source, wrote};
 use crate::cli::{Failure, Session, parse};
-use crate::formats::atomic::{Written, claim_result};
-use crate::formats::trajectory_file::{Rows, write_csv, write_rows};
+use crate::io::atomic::{Written, claim_result};
+use crate::io::trajectory_file::{Rows, write_csv, write_rows};
 use std::path::{Path, PathBuf};
 
 /// Write a motion profile as a table of evenly spaced rows

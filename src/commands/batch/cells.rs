@@ -2,7 +2,7 @@
 
 use crate::app::{Asked, Command, Failure, Input, Manifest, OrHelp, Refuse, Result};
 use crate::commands::run::Run;
-use crate::formats::{input, source};
+use crate::io::{input, source};
 use clap::{Arg, ArgAction, Args};
 use nav_sim_navigation::scenario::{Method, Scenario};
 use schemars::JsonSchema;
@@ -56,7 +56,7 @@ pub(crate) struct Cell {
 impl Study {
     /// Reads a study; `set` are keys of `[run]` over its own, as `KEY=VALUE`.
     pub(crate) fn read(path: &Path, set: &[String]) -> Result<Self> {
-        let text = source::text(path).map_err(|e| crate::formats::Failure::io(path, e))?;
+        let text = source::text(path).map_err(|e| crate::io::Failure::io(path, e))?;
         let is_json = path.extension().is_some_and(|ending| ending == "json");
         let mut study: Self = match is_json {
             true => serde_json::from_str(&text).refuse_within(path.display())?,

@@ -4,7 +4,7 @@
 use super::cells::Cell;
 use crate::app::{Answer, Context, Failure, Front, Manifest, Result};
 use crate::commands::run::{PreparedRun, block_of, columns};
-use crate::formats::atomic;
+use crate::io::atomic;
 use nav_sim_document::{Importance, Note};
 use nav_sim_navigation::simulation::RunResult;
 use rayon::prelude::*;

@@ -3,8 +3,8 @@
 use super::ShownCalibration;
 use crate::app::reading::note_report;
 use crate::app::{Context, Failure};
-use crate::formats::recordings::{FileReport, ReadOptions, Report};
-use crate::formats::{curve_file, hash, recordings};
+use crate::io::recordings::{FileReport, ReadOptions, Report};
+use crate::io::{curve_file, hash, recordings};
 use crate::report::CurvesFile;
 use nav_sim_calibration::{
     self, Advance, Beginning, Beginnings, Bootstrap, Diagnosis, Estimator, Group, Outcome, Pool,

@@ -35,10 +35,10 @@ pub(crate) use model_file::CalibrationNote;
 use crate::app::inputs::{files, listed};
 use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
 use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
-use crate::formats::atomic::Written;
-use crate::formats::draws_file::DrawsFile;
-use crate::formats::hash;
-use crate::formats::model_file::ModelFile;
+use crate::io::atomic::Written;
+use crate::io::draws_file::DrawsFile;
+use crate::io::hash;
+use crate::io::model_file::ModelFile;
 use crate::parse;
 use crate::report::{self, CurvesFile};
 use document::{all_notes, reasons, turn_on_remark};
@@ -461,7 +461,7 @@ impl Calibration {
             .collect();
         files.extend([
             named(".wv.json", curves),
-            OutputFile::whole(model_name, crate::formats::model_file::to_toml(&model)),
+            OutputFile::whole(model_name, crate::io::model_file::to_toml(&model)),
             named(".html", page.html()),
             named(".svg", page.svg()),
         ]);

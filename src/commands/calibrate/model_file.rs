@@ -2,7 +2,7 @@
 
 use super::{all_notes, turn_on_remark};
 use crate::app::Input;
-use crate::formats::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn};
+use crate::io::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn};
 use nav_sim_calibration::{
     Estimator, MeansOfAxis, Outcome, ParameterSpread, Settings, TURN_ON_LEVEL, TurnOnSpread, tau_s,
 };

@@ -21,8 +21,8 @@ use crate::commands::calibrate::{
     Calibration, CalibrationNote, CalibrationOptions, ESTIMATORS, EstimatorChoice, Measured,
     measure, without_warm_up,
 };
-use crate::formats::recordings;
-use crate::formats::recordings::{FileReport, Gaps, ReadOptions};
+use crate::io::recordings;
+use crate::io::recordings::{FileReport, Gaps, ReadOptions};
 use crate::parse;
 use crate::report::{json, six_digits};
 use document::ChoiceReport;

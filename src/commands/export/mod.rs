@@ -11,9 +11,9 @@ pub(crate) use words::{Quantity, parameters as parameters_json};
 
 use crate::app::inputs::files;
 use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
-use crate::formats::atomic::Written;
-use crate::formats::model_file;
-use crate::formats::model_file::ModelFile;
+use crate::io::atomic::Written;
+use crate::io::model_file;
+use crate::io::model_file::ModelFile;
 use crate::parse::{one_of, seconds_range};
 use nav_sim_document::{Document, Importance, Tone};
 use nav_sim_signal::imu::{Channel, Sensor};

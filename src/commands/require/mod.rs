@@ -9,12 +9,12 @@ pub(crate) use needed::{CatalogueUnit, Misplaced, Requirements};
 
 use crate::app::inputs::{self, ScenarioArgs, files};
 use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
-use crate::formats::atomic::Written;
-use crate::formats::datasheet::{self, CATALOGUE, Datasheet};
-use crate::formats::file_kind::{self, FileKind};
-use crate::formats::input::listed;
-use crate::formats::model_file::{self, ModelFile};
-use crate::formats::scenario_file;
+use crate::io::atomic::Written;
+use crate::io::datasheet::{self, CATALOGUE, Datasheet};
+use crate::io::file_kind::{self, FileKind};
+use crate::io::input::listed;
+use crate::io::model_file::{self, ModelFile};
+use crate::io::scenario_file;
 use crate::parse;
 use given::GivenImu;
 use nav_sim_document::{

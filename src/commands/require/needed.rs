@@ -4,7 +4,7 @@ use super::given::{Aided, GivenImu, Longest};
 use super::ranking::{RankedUnit, Ranking};
 use super::{BeyondLinear, CHECKED, CURVE_S, LONGEST_S, Question};
 use crate::app::inputs;
-use crate::formats::model_file::{ModelFile, PROGRAM, TurnOn};
+use crate::io::model_file::{ModelFile, PROGRAM, TurnOn};
 use nav_sim_document::{Cell, Document, Importance, Table, Tone, readable};
 use nav_sim_navigation::ekf::BeliefError;
 use nav_sim_navigation::metrics::Expected;

@@ -3,8 +3,8 @@
 use crate::app::Manifest;
 use crate::commands::run::RunOrigin;
 use crate::failure::{Failure, Place};
-use crate::formats::run_tables::{REPEAT, parse_epochs, parse_runs};
-use crate::formats::{atomic, hash, source};
+use crate::io::run_tables::{REPEAT, parse_epochs, parse_runs};
+use crate::io::{atomic, hash, source};
 use nav_sim_navigation::metrics::{EpochRow, Measured, PerState, Verdict};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::{OutageRecord, RunRecord};

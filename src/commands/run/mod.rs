@@ -9,9 +9,9 @@ pub use navigate::{NavigateError, NavigateInputs, Navigation, TrueImu, navigate}
 
 use crate::app::inputs::{self, FilterArgs, SettingsArgs, files};
 use crate::app::{Answer, Command, Context, Failure, Input, Out, OutputFile, Refuse, Result};
-use crate::formats::draws_file::{self, Draws};
-use crate::formats::model_file::ModelFile;
-use crate::formats::scenario_file;
+use crate::io::draws_file::{self, Draws};
+use crate::io::model_file::ModelFile;
+use crate::io::scenario_file;
 use crate::parse;
 use crate::report::tables::{epochs_csv, fan_csv, runs_csv};
 use crate::report::verdict::requirement_line;

@@ -2,7 +2,7 @@
 //! Monte-Carlo runs, by covariance analysis, or by both.
 
 use crate::app::{Context, Failure};
-use crate::formats::draws_file::Draws;
+use crate::io::draws_file::Draws;
 use crate::report::{reduction_doubt, reduction_line, unexpected_line};
 use nav_sim_calibration::derived_interval;
 use nav_sim_navigation::ekf::{Belief, BeliefError};
@@ -528,7 +528,7 @@ impl Reduced<'_> {
 
 // What the calibration of a model leaves open in the figures of a covariance analysis.
 //
-// Every draw of the calibration ([`draws_file`](crate::formats::draws_file)) goes through the analysis as the model
+// Every draw of the calibration ([`draws_file`](crate::io::draws_file)) goes through the analysis as the model
 // itself did, and a figure has the interval that its draws give, as a parameter has ([`derived_interval`]).
 //
 // Two questions, two kinds of draws. What the filter's errors will be is open by the calibration of what *makes* them:

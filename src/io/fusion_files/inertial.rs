@@ -1,0 +1,261 @@
+//! Recorded IMU data.
+
+use super::{Remark, time_back};
+use crate::io::logs::LogOptions;
+use crate::io::recordings::timing::{median_step, unit_of_step};
+use crate::io::recordings::{self, ReadOptions, check_gravity, gravity_factor};
+use crate::io::table::{Column, Dictionary};
+use crate::io::{Failure as Error, Place};
+use glam::DVec3;
+use nav_sim_navigation::fusion::{LONGEST_GAP_S, bridged};
+use nav_sim_navigation::strapdown::MAX_ROTATION;
+use nav_sim_signal::imu::{Axis, Channel, ImuIncrement, Sensor};
+use nav_sim_signal::units::DEG;
+use std::path::Path;
+
+/// A step this many times the median one is a gap.
+const GAP: f64 = 1.5;
+/// Mean angular rate above which the unit is doubted (rad/s).
+const FAST: f64 = 2.0;
+
+/// A recording, ready to be fused.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ImuFile {
+    /// Samples whose intervals follow one another.
+    pub samples: Vec<ImuIncrement>,
+    /// Samples a second, by the median step.
+    pub rate_hz: f64,
+    /// What is doubtful, and how the file was read.
+    pub remarks: Vec<Remark>,
+}
+
+/// Six values a sample, and the time it ends.
+struct Columns {
+    path: String,
+    t_s: Vec<f64>,
+    /// In the order of [`Channel::ALL`], SI: rates, or increments.
+    values: Vec<[f64; 6]>,
+    /// Which of the two each sensor gives.
+    increments: [bool; 2],
+    lines: Vec<u64>,
+    remarks: Vec<Remark>,
+}
+
+/// Dictionary of recordings under way. Texts without a header are those of KF-GINS, with or without an odometer.
+const DICTIONARY: Dictionary = Dictionary {
+    bare: &[
+        &[
+            "t_s",
+            "dtheta_x_rad",
+            "dtheta_y_rad",
+            "dtheta_z_rad",
+            "dv_x_m_s",
+            "dv_y_m_s",
+            "dv_z_m_s",
+        ],
+        &[
+            "t_s",
+            "dtheta_x_rad",
+            "dtheta_y_rad",
+            "dtheta_z_rad",
+            "dv_x_m_s",
+            "dv_y_m_s",
+            "dv_z_m_s",
+            "odometer_m_s",
+        ],
+    ],
+    advice: "columns: t_s, gyro_x_rad_s … accel_z_m_s2 (rates) or t_s, dtheta_x_rad … dv_z_m_s (increments); without a header, \
+             as KF-GINS has it, 7 of them (t_s, dtheta_x, dtheta_y, dtheta_z in rad, dv_x, dv_y, dv_z in m/s), or 8 with an \
+             odometer",
+    ..recordings::DICTIONARY
+};
+
+/// Reads a recording: a table whose headers are those of static recordings (rates, or increments over the
+/// interval that ends at the time given), or the text of KF-GINS: time, three angle increments (rad), three
+/// velocity increments (m/s), and perhaps an odometer's speed, which is left. `names` are those of the columns of a file
+/// without a header, `topic` is that of a log that has several.
+///
+/// # Errors
+/// Whatever is wrong with it, with its line.
+pub(crate) fn read_imu(
+    path: &Path,
+    names: Option<&[String]>,
+    topic: Option<&str>,
+) -> Result<ImuFile, Error> {
+    let options = ReadOptions {
+        columns: names.map(<[String]>::to_vec),
+        log: LogOptions {
+            topic: topic.map(str::to_owned),
+            ..LogOptions::default()
+        },
+        ..ReadOptions::default()
+    };
+    let table = recordings::load(path, &options, &DICTIONARY)?;
+    let lacking = |message: String| {
+        Error::contents(table.path.as_str(), Place::Within, message).or_hint(DICTIONARY.advice)
+    };
+    let signals = Channel::ALL.map(|channel| channel.to_string());
+    if let Some(missing) = signals.iter().find(|name| !table.has(name)) {
+        let message = format!("channel {missing} is missing; all six are needed");
+        return Err(lacking(message));
+    }
+    let signals: Vec<&Column> = signals.iter().filter_map(|name| table.get(name)).collect();
+    let time = table
+        .get("t_s")
+        .ok_or_else(|| lacking("no time column".to_owned()))?;
+    let unit_s = |values| unit_of_step(median_step(values)).0;
+    let unit_s = time.factor.unwrap_or_else(|| unit_s(&time.values));
+    let from_gravity = gravity_factor(&table)?;
+    let value =
+        |column: &Column, k: usize| column.values[k] * column.factor.unwrap_or(from_gravity);
+    let rows = 0..table.rows();
+    let mut remarks: Vec<Remark> = table.assumptions.iter().map(Remark::note).collect();
+    remarks.extend(table.warnings.iter().map(Remark::doubt));
+    if table.is_bare {
+        let odometer = match table.ignored.is_empty() {
+            true => "",
+            false => "; the odometer's speed in column 8 is not used",
+        };
+        let text = "no header: read as KF-GINS text, angle then velocity increments";
+        remarks.push(Remark::note(format!("{text}{odometer}")));
+    }
+    let columns = Columns {
+        t_s: time.values.iter().map(|t| t * unit_s).collect(),
+        values: rows
+            .clone()
+            .map(|k| std::array::from_fn(|i| value(signals[i], k)))
+            .collect(),
+        increments: [0, 3].map(|i| signals[i].quantity.per_sample),
+        lines: rows.map(|k| table.lines.of(k)).collect(),
+        remarks,
+        path: table.path.clone(),
+    };
+    columns.increments()
+}
+
+impl Columns {
+    fn increments(mut self) -> Result<ImuFile, Error> {
+        if self.t_s.len() < 3 {
+            let message = format!("{} samples, but at least 3 are needed", self.t_s.len());
+            return Err(Error::contents(self.path, Place::Within, message));
+        }
+        if let Some(k) = (1..self.t_s.len()).find(|k| self.t_s[*k] <= self.t_s[k - 1]) {
+            return Err(time_back(
+                &self.path,
+                self.lines[k],
+                self.t_s[k - 1],
+                self.t_s[k],
+            ));
+        }
+        let step = median_step(&self.t_s);
+        self.doubt_units(step)?;
+        let mut samples = Vec::with_capacity(self.t_s.len());
+        let mut holes = Vec::new();
+        for k in 0..self.t_s.len() {
+            let t_s = self.t_s[k];
+            let since_s = if k == 0 { step } else { t_s - self.t_s[k - 1] };
+            // a sample after a hole lasts a step like any other
+            let is_hole = since_s > GAP * step;
+            let sample = self.sample(k, if is_hole { step } else { since_s }, t_s);
+            let refuse =
+                |message: String| Error::contents(self.path.as_str(), self.lines[k], message);
+            if is_hole && since_s - step > LONGEST_GAP_S + 0.5 * step {
+                let previous_s = self.t_s[k - 1];
+                let message = format!(
+                    "no samples from {previous_s} s to {t_s} s: {LONGEST_GAP_S} s can be bridged"
+                );
+                return Err(
+                    refuse(message).or_hint("fuse the stretches before and after it one by one")
+                );
+            }
+            let angle = sample.dtheta.length();
+            if angle > MAX_ROTATION {
+                let [degrees, most] = [angle, MAX_ROTATION].map(|a| a / DEG);
+                let message =
+                    format!("a rotation of {degrees:.1}° in one sample, {most:.1}° at most");
+                let advice = "is the unit right? gyro_x_deg_s is in degrees, gyro_x_rad_s in radians a second";
+                return Err(refuse(message).or_hint(advice));
+            }
+            if is_hole {
+                holes.push((k, since_s - step));
+            }
+            samples.push(sample);
+        }
+        self.tell_of_holes(&holes);
+        let remarks = self
+            .remarks
+            .into_iter()
+            .map(|r| r.of_file(&self.path))
+            .collect();
+        Ok(ImuFile {
+            samples: bridged(&samples, step),
+            rate_hz: 1.0 / step,
+            remarks,
+        })
+    }
+
+    fn tell_of_holes(&mut self, holes: &[(usize, f64)]) {
+        let Some((k, seconds)) = holes.first() else {
+            return;
+        };
+        let (t_s, line, more) = (self.t_s[*k], self.lines[*k], holes.len() - 1);
+        self.remarks.push(Remark::doubt(format!(
+            "samples missing: {seconds:.2} s before {t_s:.2} s (line {line}) and {more} more gaps; bridged"
+        )));
+    }
+
+    /// Sample k over `dt` seconds that end at `t_s`.
+    fn sample(&self, k: usize, dt: f64, t_s: f64) -> ImuIncrement {
+        let v = &self.values[k];
+        let seconds = |sensor: Sensor| {
+            if self.increments[sensor as usize] {
+                1.0
+            } else {
+                dt
+            }
+        };
+        let triad = |sensor: Sensor| {
+            let first = Channel {
+                sensor,
+                axis: Axis::X,
+            }
+            .index();
+            DVec3::new(v[first], v[first + 1], v[first + 2]) * seconds(sensor)
+        };
+        ImuIncrement {
+            t_s,
+            dt_s: dt,
+            dtheta: triad(Sensor::Gyro),
+            dv: triad(Sensor::Accel),
+        }
+    }
+
+    /// Over a whole recording the specific force is gravity in the mean, and nothing turns all the time.
+    fn doubt_units(&mut self, step: f64) -> Result<(), Error> {
+        let n = self.values.len() as f64;
+        let mean = |sensor: Sensor| {
+            let length = |k: usize| {
+                let s = self.sample(k, step, 0.0);
+                (if sensor == Sensor::Accel {
+                    s.dv
+                } else {
+                    s.dtheta
+                })
+                .length()
+                    / step
+            };
+            (0..self.values.len()).map(length).sum::<f64>() / n
+        };
+        let (force, rate) = (mean(Sensor::Accel), mean(Sensor::Gyro));
+        if !(4.0..25.0).contains(&force) {
+            check_gravity(&self.path, force.max(0.3))?;
+        }
+        if rate > FAST {
+            let degrees = rate / DEG;
+            let text =
+                format!("mean angular rate {degrees:.0} deg/s: are these degrees named radians?");
+            self.remarks.push(Remark::doubt(text));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,271 @@
+//! Where inputs are opened: what can be read once only is kept, what has no end is refused.
+
+use super::Failure;
+use flate2::read::MultiGzDecoder;
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Cursor, ErrorKind, Read};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Largest text that is read whole for its structure (TOML, JSON, curves): bytes.
+const LARGEST_TEXT: u64 = 64 << 20;
+/// Largest contents of a pipe or device (bytes).
+const LARGEST_PIPE: u64 = 256 << 20;
+
+/// Opens an input. A pipe gives its bytes once: they are kept, so that it reads, and hashes, the same again.
+///
+/// # Errors
+/// When the system refuses, or a pipe or device has more than 256 MiB.
+pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
+    static KEPT: Mutex<Option<HashMap<PathBuf, Arc<[u8]>>>> = Mutex::new(None);
+    let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    let kept = kept.get_or_insert_default();
+    if let Some(bytes) = kept.get(path) {
+        return Ok(Box::new(Cursor::new(Arc::clone(bytes))));
+    }
+    let file = File::open(path)?;
+    let metadata = file.metadata()?;
+    if metadata.is_file() || metadata.is_dir() {
+        return Ok(Box::new(file));
+    }
+    let bytes: Arc<[u8]> = bounded(file, LARGEST_PIPE)?.into();
+    kept.insert(path.to_owned(), Arc::clone(&bytes));
+    Ok(Box::new(Cursor::new(bytes)))
+}
+
+/// Bytes that are read at once.
+const BUFFER: usize = 1 << 17;
+/// Longest line of a packed table (bytes).
+const LONGEST_LINE: usize = 1 << 16;
+/// Most equal lines one after the other: no measurement, no clock.
+const MOST_EQUAL: u64 = 1 << 16;
+/// How many times its packed size a table may be, beyond [`LARGEST_PIPE`]: tables of measurements pack to a third to a
+/// twentieth, and gzip makes up to 1032 times as much of nothing.
+const MOST_PACKED: u64 = 40;
+
+/// Opens a table of text, unpacking it when its name ends in `.gz`.
+///
+/// # Errors
+/// When the system refuses.
+pub(crate) fn table(path: &Path) -> io::Result<Box<dyn BufRead>> {
+    let file = BufReader::with_capacity(BUFFER, open(path)?);
+    if path
+        .extension()
+        .is_none_or(|e| !e.eq_ignore_ascii_case("gz"))
+    {
+        return Ok(Box::new(file));
+    }
+    let packed = std::fs::metadata(path)?.len();
+    let largest = LARGEST_PIPE.max(packed.saturating_mul(MOST_PACKED));
+    let inner = BufReader::with_capacity(BUFFER, MultiGzDecoder::new(file));
+    Ok(Box::new(BufReader::with_capacity(
+        BUFFER,
+        Unpacked::new(inner, largest),
+    )))
+}
+
+/// Lines of a packed table, as far as they are those of a table: what a small file holds has no bound of its own.
+struct Unpacked<R> {
+    inner: R,
+    line: Vec<u8>,
+    /// How many bytes of the line were given.
+    given: usize,
+    before: Vec<u8>,
+    lines: u64,
+    equal: u64,
+    left: u64,
+    largest: u64,
+}
+
+impl<R: BufRead> Unpacked<R> {
+    const fn new(inner: R, largest: u64) -> Self {
+        let line = Vec::new();
+        Self {
+            inner,
+            line,
+            given: 0,
+            before: Vec::new(),
+            lines: 0,
+            equal: 0,
+            left: largest,
+            largest,
+        }
+    }
+
+    fn next_line(&mut self) -> io::Result<()> {
+        std::mem::swap(&mut self.line, &mut self.before);
+        (self.given, self.lines) = (0, self.lines + 1);
+        self.line.clear();
+        self.inner
+            .by_ref()
+            .take(LONGEST_LINE as u64)
+            .read_until(b'\n', &mut self.line)?;
+        self.equal = if self.line == self.before {
+            self.equal + 1
+        } else {
+            0
+        };
+        let refuse = |what: String| Err(io::Error::new(ErrorKind::InvalidData, what));
+        if self.line.len() == LONGEST_LINE {
+            return refuse(format!(
+                "line {} is longer than 64 KiB: not a table of text",
+                self.lines
+            ));
+        }
+        if self.equal >= MOST_EQUAL && !self.line.is_empty() {
+            return refuse(format!(
+                "line {} and the {MOST_EQUAL} before it are the same",
+                self.lines
+            ));
+        }
+        let Some(left) = self.left.checked_sub(self.line.len() as u64) else {
+            return refuse(format!("unpacks to more than {} MiB", self.largest >> 20));
+        };
+        self.left = left;
+        Ok(())
+    }
+}
+
+impl<R: BufRead> Read for Unpacked<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let mut filled = 0;
+        while filled < buffer.len() {
+            if self.given == self.line.len() {
+                self.next_line()?;
+                if self.line.is_empty() {
+                    break;
+                }
+            }
+            let count = (buffer.len() - filled).min(self.line.len() - self.given);
+            buffer[filled..filled + count]
+                .copy_from_slice(&self.line[self.given..self.given + count]);
+            (filled, self.given) = (filled + count, self.given + count);
+        }
+        Ok(filled)
+    }
+}
+
+/// The whole text of a table, unpacked when its name ends in `.gz`; what is not UTF-8 in it (a degree sign of another
+/// encoding) is replaced.
+///
+/// # Errors
+/// When the system refuses.
+pub(crate) fn table_text(path: &Path) -> Result<String, Failure> {
+    let mut bytes = Vec::new();
+    table(path)
+        .and_then(|mut reader| reader.read_to_end(&mut bytes))
+        .map_err(|e| Failure::io(path, e))?;
+    Ok(without_mark(String::from_utf8_lossy(&bytes).into_owned()))
+}
+
+/// A text of at most 64 MiB.
+///
+/// # Errors
+/// When the system refuses, it is longer, or it is not UTF-8: with the line.
+pub(crate) fn text(path: &Path) -> io::Result<String> {
+    String::from_utf8(bounded(open(path)?, LARGEST_TEXT)?)
+        .map(without_mark)
+        .map_err(|e| {
+            let line = 1 + e.as_bytes()[..e.utf8_error().valid_up_to()]
+                .iter()
+                .filter(|b| **b == b'\n')
+                .count();
+            io::Error::new(
+                ErrorKind::InvalidData,
+                format!("line {line} is not text in UTF-8"),
+            )
+        })
+}
+
+/// A text without the byte-order mark that editors of some systems begin it with.
+pub(crate) fn without_mark(text: String) -> String {
+    text.strip_prefix('\u{feff}')
+        .map(str::to_owned)
+        .unwrap_or(text)
+}
+
+fn bounded(reader: impl Read, largest: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    reader.take(largest + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > largest {
+        let message = format!("more than {} MiB, or without an end", largest >> 20);
+        return Err(io::Error::new(ErrorKind::FileTooLarge, message));
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::failure::is_damage;
+
+    #[test]
+    fn text_that_is_none_is_refused_with_its_line() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.toml");
+        std::fs::write(&path, b"a = 1\nb = \"\xe9\"\n").unwrap();
+        let e = text(&path).unwrap_err();
+        assert_eq!(e.to_string(), "line 2 is not text in UTF-8");
+        assert!(is_damage(e.kind()));
+    }
+
+    #[test]
+    fn what_has_no_end_is_refused() {
+        let e = text(Path::new("/dev/zero")).unwrap_err();
+        assert_eq!(e.to_string(), "more than 256 MiB, or without an end");
+        assert!(is_damage(e.kind()));
+    }
+
+    /// A table comes out as it went in; an endless line, rows that repeat and what is beyond measure are refused before they
+    /// are held.
+    #[test]
+    fn what_a_packed_table_holds_is_bounded() {
+        let unpacked = |text: &[u8], largest: u64| {
+            let mut out = Vec::new();
+            let read = Unpacked::new(Cursor::new(text), largest).read_to_end(&mut out);
+            read.map(|_| out).map_err(|e| e.to_string())
+        };
+        let rows: Vec<u8> = (0..9000)
+            .flat_map(|k| format!("{k},{}\n", k % 7).into_bytes())
+            .collect();
+        assert_eq!(unpacked(&rows, 1 << 20).unwrap(), rows);
+        assert_eq!(unpacked(b"a\nb", 1 << 20).unwrap(), b"a\nb");
+        let long = [b"t\n".to_vec(), vec![b'7'; 1 << 17]].concat();
+        assert_eq!(
+            unpacked(&long, 1 << 20).unwrap_err(),
+            "line 2 is longer than 64 KiB: not a table of text"
+        );
+        let equal = [b"t,x\n".to_vec(), b"0,1\n".repeat(70_000)].concat();
+        assert_eq!(
+            unpacked(&equal, 1 << 20).unwrap_err(),
+            "line 65538 and the 65536 before it are the same"
+        );
+        assert_eq!(
+            unpacked(&rows, 1 << 10).unwrap_err(),
+            "unpacks to more than 0 MiB"
+        );
+    }
+
+    #[test]
+    fn a_pipe_reads_the_same_again() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("pipe");
+        assert!(
+            std::process::Command::new("mkfifo")
+                .arg(&path)
+                .status()
+                .unwrap()
+                .success()
+        );
+        let writer = std::thread::spawn({
+            let path = path.clone();
+            move || std::fs::write(path, "a = 1\n").unwrap()
+        });
+        assert_eq!(text(&path).unwrap(), "a = 1\n");
+        writer.join().unwrap();
+        assert_eq!(text(&path).unwrap(), "a = 1\n");
+        let hash = crate::io::hash::of_file(&path).unwrap();
+        assert_eq!(hash, blake3::hash(b"a = 1\n").to_hex().to_string());
+    }
+}

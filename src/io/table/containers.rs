@@ -1,0 +1,376 @@
+//! Tables that are no text: arrays of NumPy, Parquet, directories of KITTI, logs.
+
+use super::text::{layout, number};
+use super::{Asked, BETWEEN, Dictionary, Table, shown, unreadable};
+use crate::io::{Failure, Place, help, logs, source};
+use chrono::NaiveDateTime;
+use nav_sim_logs::Clock;
+use nav_sim_logs::npy::{self, Array};
+use serde::Deserialize;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// Columns by names, each with its numbers.
+fn of_columns(
+    path: &str,
+    columns: Vec<(String, Vec<f64>)>,
+    dictionary: &Dictionary,
+    asked: &Asked<'_>,
+) -> Result<Table, Failure> {
+    let names: Vec<String> = match asked.names {
+        Some(names) if names.len() != columns.len() => {
+            return Err(Failure::row_length(path, 1, columns.len(), names.len()));
+        }
+        Some(names) => names.to_vec(),
+        None => columns.iter().map(|(name, _)| name.clone()).collect(),
+    };
+    let (mut table, places) = Table::new(path, 0, &names, dictionary, asked, false)?;
+    for ((_, values), place) in columns.into_iter().zip(places) {
+        let Some(column) = place else { continue };
+        for (line, value) in (1..).zip(values) {
+            table.push(column, value, line, dictionary)?;
+        }
+    }
+    Ok(table)
+}
+
+/// Every `step`-th number from the `first` on.
+fn strided(array: &Array, first: usize, step: usize) -> Vec<f64> {
+    array
+        .values
+        .iter()
+        .skip(first)
+        .step_by(step)
+        .copied()
+        .collect()
+}
+
+/// Reads an array: columns named by the manifest of its synthesis, by who asks, or by their number.
+pub(super) fn npy(
+    path: &Path,
+    dictionary: &Dictionary,
+    asked: &Asked<'_>,
+) -> Result<Table, Failure> {
+    let name = path.display().to_string();
+    let array = npy::read(path).map_err(|e| logs::refused(path, e))?;
+    let count = match array.shape[..] {
+        [_] => 1,
+        [_, columns] => columns,
+        _ => {
+            let dimensions = array.shape.len();
+            let message =
+                format!("an array of {dimensions} dimensions, samples × columns are needed");
+            return Err(Failure::contents(name, Place::Within, message));
+        }
+    };
+    let manifest = Manifest::beside(path);
+    let own = manifest.as_ref().filter(|m| m.axes.len() == count);
+    let names = asked
+        .names
+        .map(<[String]>::to_vec)
+        .or_else(|| own.map(Manifest::columns))
+        .or_else(|| layout(dictionary.array, count))
+        .ok_or_else(|| {
+            let message = format!("an array of {count} columns, which names are not known");
+            Failure::contents(&name, Place::Within, message)
+                .or_hint(dictionary.advice)
+                .or(help::COLUMN_NAMES)
+        })?;
+    if names.len() != count {
+        return Err(Failure::row_length(&name, 1, count, names.len()));
+    }
+    let without_names = Asked {
+        names: None,
+        unwanted: asked.unwanted,
+        log: asked.log.clone(),
+    };
+    let columns = (0..)
+        .zip(names)
+        .map(|(k, name)| (name, strided(&array, k, count)));
+    let mut table = of_columns(&name, columns.collect(), dictionary, &without_names)?;
+    table.rate_hz = manifest.map(|manifest| (manifest.rate_hz, MANIFEST));
+    Ok(table)
+}
+
+/// Name of the manifest of a synthesis.
+const MANIFEST: &str = "manifest.json";
+
+/// The parts of the manifest of a synthesis that tell how to read its arrays.
+#[derive(Deserialize)]
+struct Manifest {
+    command: String,
+    /// Channels, such as `accel.x`.
+    axes: Vec<String>,
+    /// Sample rate (Hz).
+    rate_hz: f64,
+    replicates: Vec<Replicate>,
+}
+
+#[derive(Deserialize)]
+struct Replicate {
+    file: String,
+}
+
+impl Manifest {
+    /// That of the synthesis which made a file, if its manifest is beside it.
+    fn beside(path: &Path) -> Option<Self> {
+        let text = std::fs::read_to_string(path.with_file_name(MANIFEST)).ok()?;
+        let manifest: Self = serde_json::from_str(&text).ok()?;
+        let name = path.file_name()?.to_str()?;
+        let is_of_it = manifest.command == "synthesize"
+            && manifest.replicates.iter().any(|own| own.file == name);
+        (is_of_it && manifest.rate_hz > 0.0).then_some(manifest)
+    }
+
+    fn columns(&self) -> Vec<String> {
+        let unit = |name: &str| {
+            if name.starts_with('a') {
+                "m_s2"
+            } else {
+                "rad_s"
+            }
+        };
+        let column = |name: &String| format!("{}_{}", name.replace('.', "_"), unit(name));
+        self.axes.iter().map(column).collect()
+    }
+}
+
+/// Writes the header of a C-ordered array of `f64`; the elements follow, little-endian, row by row.
+///
+/// # Errors
+/// When the system refuses.
+pub(crate) fn write_npy_header(to: &mut impl Write, rows: usize, columns: usize) -> io::Result<()> {
+    let mut text =
+        format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
+    // elements begin at a multiple of 64 bytes; the header ends in a newline
+    while !(10 + text.len() + 1).is_multiple_of(64) {
+        text.push(' ');
+    }
+    text.push('\n');
+    to.write_all(b"\x93NUMPY\x01\x00")?;
+    to.write_all(&(text.len() as u16).to_le_bytes())?;
+    to.write_all(text.as_bytes())
+}
+
+/// Reads named arrays: a vector is a column, an array of three columns the three axes of a sensor.
+#[cfg(feature = "npz")]
+pub(super) fn npz(
+    path: &Path,
+    dictionary: &Dictionary,
+    asked: &Asked<'_>,
+) -> Result<Table, Failure> {
+    use nav_sim_logs::{Error, npz::Archive};
+    /// Name of the array of a single number that states the rate (Hz).
+    const RATE: &str = "rate_hz";
+    let refused = |e| logs::refused(path, e);
+    let archive = Archive::open(path).map_err(refused)?;
+    let (mut columns, mut rate_hz) = (Vec::new(), None);
+    for name in archive.names() {
+        let array = match archive.read(name) {
+            // texts and the like are passed over
+            Err(Error::Encoding { .. }) => Array {
+                shape: Vec::new(),
+                values: Vec::new(),
+            },
+            read => read.map_err(refused)?,
+        };
+        match array.shape[..] {
+            [] | [1] if name == RATE => rate_hz = array.values.first().map(|hz| (*hz, RATE)),
+            [_] => columns.push((name.to_owned(), array.values)),
+            [_, 3] => {
+                columns.extend((0..3).map(|k| (of_axis(name, k), strided(&array, k, 3))));
+            }
+            _ => columns.push((name.to_owned(), Vec::new())),
+        }
+    }
+    let mut table = of_columns(&path.display().to_string(), columns, dictionary, asked)?;
+    table.rate_hz = rate_hz;
+    Ok(table)
+}
+
+/// The name of one axis of a sensor's array: `accel_m_s2` has `accel_x_m_s2`.
+#[cfg(feature = "npz")]
+fn of_axis(name: &str, axis: usize) -> String {
+    let units = ["_m_s2", "_rad_s", "_deg_s"];
+    let unit = units.iter().find_map(|unit| name.find(unit));
+    let (stem, unit) = name.split_at(unit.or(name.find('_')).unwrap_or(name.len()));
+    format!("{stem}_{}{unit}", ["x", "y", "z"][axis])
+}
+
+/// Reads Apache Parquet: columns by their names, one after the other.
+#[cfg(feature = "parquet")]
+pub(super) fn parquet(
+    path: &Path,
+    dictionary: &Dictionary,
+    asked: &Asked<'_>,
+) -> Result<Table, Failure> {
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    let name = path.display().to_string();
+    let damaged = |e: parquet::errors::ParquetError| {
+        Failure::contents(name.as_str(), Place::Within, e.to_string())
+    };
+    let file = std::fs::File::open(path).map_err(|e| unreadable(path, e))?;
+    let reader = SerializedFileReader::new(file).map_err(damaged)?;
+    let schema = reader.metadata().file_metadata().schema_descr_ptr();
+    let names: Vec<String> = match asked.names {
+        Some(names) => names.to_vec(),
+        None => schema
+            .columns()
+            .iter()
+            .map(|c| c.name().to_owned())
+            .collect(),
+    };
+    if names.len() != schema.num_columns() {
+        return Err(Failure::row_length(
+            &name,
+            1,
+            schema.num_columns(),
+            names.len(),
+        ));
+    }
+    let (mut table, places) = Table::new(&name, 0, &names, dictionary, asked, false)?;
+    table.fits(reader.metadata().file_metadata().num_rows().cast_unsigned())?;
+    for row in reader.get_row_iter(None).map_err(damaged)? {
+        let row = row.map_err(damaged)?;
+        let line = table.rows() as u64 + 1;
+        for ((_, field), place) in row.get_column_iter().zip(&places) {
+            let Some(column) = *place else { continue };
+            let of_column = table.columns[column].name.clone();
+            let value = match field {
+                parquet::record::Field::Null => {
+                    return Err(table.bad_cell(&of_column, line, "\"\"", "is empty", dictionary));
+                }
+                parquet::record::Field::Double(value) => *value,
+                parquet::record::Field::Float(value) => f64::from(*value),
+                parquet::record::Field::Int(value) => f64::from(*value),
+                parquet::record::Field::Long(value) => *value as f64,
+                _ => {
+                    let message = format!("column \"{of_column}\" has no numbers");
+                    return Err(Failure::contents(name, Place::Within, message));
+                }
+            };
+            table.push(column, value, line, dictionary)?;
+        }
+    }
+    Ok(table)
+}
+
+/// Names of the quantities of a sample of KITTI that are read, and their places in its line.
+///
+/// The numbers are those of `dataformat.txt` there ([Geiger et al. 2013](https://doi.org/10.1177/0278364913491297), sec.
+/// III-A): accelerations and angular rates in the axes of the vehicle, front, left, up, are the 12th to 14th and 18th to 20th.
+const OXTS: [(&str, usize); 6] = [
+    ("accel_x_m_s2", 11),
+    ("accel_y_m_s2", 12),
+    ("accel_z_m_s2", 13),
+    ("gyro_x_rad_s", 17),
+    ("gyro_y_rad_s", 18),
+    ("gyro_z_rad_s", 19),
+];
+
+/// Whether a directory is a recording of KITTI: one line a sample in `data/`, and their times in `timestamps.txt`.
+pub(crate) fn is_oxts(directory: &Path) -> bool {
+    directory.join("timestamps.txt").is_file() && directory.join("data").is_dir()
+}
+
+/// Reads such a directory.
+pub(super) fn oxts(
+    directory: &Path,
+    dictionary: &Dictionary,
+    asked: &Asked<'_>,
+) -> Result<Table, Failure> {
+    let name = directory.display().to_string();
+    let times = oxts_times(&directory.join("timestamps.txt"))?;
+    let data = directory.join("data");
+    let entries = std::fs::read_dir(&data).map_err(|e| unreadable(&data, e))?;
+    let mut files: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+    files.retain(|path| path.extension().is_some_and(|e| e == "txt"));
+    files.sort();
+    if files.len() != times.len() {
+        let (samples, times) = (files.len(), times.len());
+        let message = format!("{samples} samples in data, {times} times in timestamps.txt");
+        return Err(Failure::contents(name, Place::Within, message));
+    }
+    let mut columns = vec![("t_s".to_owned(), times)];
+    columns.extend(OXTS.map(|(name, _)| (name.to_owned(), Vec::new())));
+    for path in &files {
+        let text = source::text(path).map_err(|e| unreadable(path, e))?;
+        let cells: Vec<&str> = text.split_ascii_whitespace().collect();
+        for ((_, values), (name, at)) in columns[1..].iter_mut().zip(OXTS) {
+            let cell = cells.get(at).copied().unwrap_or_default();
+            let finite = number(cell.as_bytes(), b' ').filter(|x| x.is_finite());
+            values.push(finite.ok_or_else(|| {
+                let (path, cell) = (path.display().to_string(), format!("\"{cell}\""));
+                Failure::cell(&path, 1, name, cell, "is not a finite number")
+            })?);
+        }
+    }
+    let mut table = of_columns(&name, columns, dictionary, asked)?;
+    table
+        .assumptions
+        .push("KITTI oxts, axes front, left, up".to_owned());
+    Ok(table)
+}
+
+/// Times of the samples (s since 1970).
+fn oxts_times(path: &Path) -> Result<Vec<f64>, Failure> {
+    let text = source::text(path).map_err(|e| unreadable(path, e))?;
+    let time = |(i, line): (usize, &str)| {
+        let parsed = NaiveDateTime::parse_from_str(line.trim(), "%Y-%m-%d %H:%M:%S%.f");
+        let found = parsed.map_err(|_| {
+            let message = format!("\"{}\" is not a time", shown(line, 40));
+            Failure::contents(path.display().to_string(), i + 1, message)
+                .or_hint("2011-09-26 13:02:25.964389445")
+        })?;
+        let since = found.and_utc();
+        Ok(since.timestamp() as f64 + 1e-9 * f64::from(since.timestamp_subsec_nanos()))
+    };
+    let lines = text.lines().enumerate();
+    lines
+        .filter(|(_, line)| !line.trim().is_empty())
+        .map(time)
+        .collect()
+}
+
+/// Reads the samples of the IMU of a log.
+pub(super) fn log(
+    path: &Path,
+    dictionary: &Dictionary,
+    asked: &Asked<'_>,
+) -> Result<Table, Failure> {
+    let refused = |e| logs::refused(path, e);
+    let log = logs::open(path)?;
+    let mut samples = log
+        .imu(asked.log.topic.as_deref(), asked.log.stamp)
+        .map_err(refused)?;
+    let names = ["t_s"].into_iter().chain(OXTS.map(|(name, _)| name));
+    let names: Vec<String> = names.map(str::to_owned).collect();
+    let (mut table, places) = Table::new(
+        &path.display().to_string(),
+        0,
+        &names,
+        dictionary,
+        asked,
+        false,
+    )?;
+    for (row, sample) in samples.by_ref().enumerate() {
+        let sample = sample.map_err(refused)?;
+        if row % BETWEEN == 0 {
+            table.fits((row + BETWEEN) as u64)?;
+        }
+        let (accel, gyro) = sample.motion.rates();
+        let values = [sample.t_s()].into_iter().chain(accel).chain(gyro);
+        for (value, place) in values.zip(&places) {
+            let Some(column) = *place else { continue };
+            table.push(column, value, row as u64 + 1, dictionary)?;
+        }
+    }
+    table.assumptions.push(format!("topic {}", samples.topic()));
+    let cut = samples.damage().or(log.damage());
+    table.warnings.extend(cut.map(logs::cut_off));
+    let is_other =
+        |c: &&nav_sim_logs::Channel| c.topic != samples.topic() && c.clock == Clock::Unix;
+    let others = log.channels().iter().filter(is_other);
+    table.ignored = others.map(|c| c.topic.clone()).collect();
+    Ok(table)
+}
