@@ -1,4 +1,4 @@
-//! What went wrong with a request, as the user reads it, and the exit code that it means.
+//! Errors as the user reads them, with their exit codes.
 
 use clap::error::ContextKind;
 use nav_sim_calibration::{
@@ -176,7 +176,7 @@ impl Failure {
         };
         let value = said(ContextKind::InvalidValue).filter(|value| !value.is_empty());
         let reason = e.source().map(|source| match source {
-            _ if source.is::<ParseIntError>() => "not a whole number".to_owned(),
+            _ if source.is::<ParseIntError>() => "not a whole number ≥ 0".to_owned(),
             _ if source.is::<ParseFloatError>() => "not a number".to_owned(),
             _ => source.to_string(),
         });
@@ -232,7 +232,7 @@ impl Failure {
         .or_hint("every row needs one value a column; was the file cut off?")
     }
 
-    /// What the system said of a file, and what helps.
+    /// Error of the system on reading a file, with a hint.
     pub(crate) fn io(path: &Path, e: io::Error) -> Self {
         use ErrorKind as K;
         let kind = e.kind();
@@ -260,7 +260,7 @@ impl Failure {
         }
     }
 
-    /// What the system said of a file that was to be written, and what helps: another place if nothing else.
+    /// Error of the system on writing a file, with a hint: another place if nothing else.
     pub(crate) fn unwritable(path: &Path, e: io::Error) -> Self {
         let failure = match e.kind() {
             // its directory is there or was made: where files are the system's own, it makes none
@@ -418,7 +418,7 @@ impl fmt::Display for Failure {
     }
 }
 
-/// Whether an error of the system is one of the contents: no text, no compressed data, cut off, too long.
+/// True if an error of the system is one of the contents: no text, no compressed data, cut off, too long.
 pub(crate) const fn is_damage(kind: ErrorKind) -> bool {
     use ErrorKind as K;
     matches!(
@@ -427,7 +427,7 @@ pub(crate) const fn is_damage(kind: ErrorKind) -> bool {
     )
 }
 
-/// What the system said, in our words where it comes often, without its numbers.
+/// Message of a system error, in our words where it is frequent, without its number.
 pub(crate) fn system_words(error: &io::Error) -> Cow<'static, str> {
     use ErrorKind as K;
     let words = match error.kind() {

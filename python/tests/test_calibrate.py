@@ -132,7 +132,7 @@ def test_a_calibrated_model_keeps_its_intervals(recordings: Path, short: Path, t
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"bootstrap": "many"}, "bootstrap='many': not a whole number"),
+        ({"bootstrap": "many"}, "bootstrap='many': not a whole number ≥ 0"),
         ({"seed": 1.5}, "seed='1.5': not a whole number"),
         ({"efficiency": "high"}, "efficiency='high': not a number"),
         ({"estimator": "best"}, "estimator='best': not one of awv"),

@@ -42,15 +42,15 @@ pub enum Out {
 
 /// A command: options, inputs, answer.
 pub trait Command: clap::Args + Send + Sync + 'static {
-    /// What it answers.
+    /// Its answer.
     type Answer: Answer;
     /// Its name on the command line.
     const NAME: &'static str;
     /// Where it writes.
     const OUT: Out = Out::Nothing;
-    /// Whether its document can be written as a page or a picture.
+    /// True if its document can be written as a page or a picture.
     const PLOT: bool = true;
-    /// Whether the file goes to stdout where `--out` is not given.
+    /// True if the file goes to stdout where `--out` is not given.
     const PRINTS_FILE: bool = false;
     /// Options that do not change the result, such as `--require`.
     const JUDGES: &'static [&'static str] = &[];
@@ -64,10 +64,10 @@ pub trait Command: clap::Args + Send + Sync + 'static {
     /// Reads the files and answers; writes nothing.
     ///
     /// # Errors
-    /// What is wrong with a file or a setting, or why there is no answer.
+    /// A file or a setting is wrong, or there is no answer.
     fn run(&self, context: &Context<'_>) -> Result<Self::Answer>;
 
-    /// Whether a file is written where `--out` is not given.
+    /// True if a file is written where `--out` is not given.
     fn writes_by_default(&self) -> bool {
         false
     }
@@ -114,7 +114,7 @@ pub trait Answer: Serialize {
         Vec::new()
     }
 
-    /// What is recorded in the manifest beside options and inputs.
+    /// Facts for the manifest beside options and inputs.
     fn record(&self) -> Value {
         json!({})
     }

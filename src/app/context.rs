@@ -20,7 +20,7 @@ pub trait Front: Sync {
     /// The steps have ended.
     fn end(&self) {}
 
-    /// Whether to continue; called from any thread, several times a second, by jobs that can be resumed.
+    /// False to stop; called from any thread, several times a second, by jobs that can be resumed.
     fn go_on(&self) -> bool {
         true
     }
@@ -125,7 +125,7 @@ impl<'a> Context<'a> {
         rayon::current_num_threads()
     }
 
-    /// Whether to continue.
+    /// False to stop.
     pub fn go_on(&self) -> bool {
         self.front.go_on()
     }

@@ -30,7 +30,7 @@ pub struct Manifest {
     pub threads: usize,
     /// Time of the runs (s).
     pub wall_s: f64,
-    /// What the command records of itself, such as the resolved configuration of a run.
+    /// Facts that the command records, such as the resolved configuration of a run.
     #[serde(flatten)]
     pub record: Map<String, Value>,
 }
@@ -84,7 +84,7 @@ impl Manifest {
     }
 }
 
-/// What files hold and what for, wherever they are.
+/// Roles and contents of files, without their paths.
 fn contents(inputs: &[Input]) -> Vec<(&str, &str)> {
     let content = |input| {
         let Input { role, blake3, .. }: &Input = input;

@@ -1,4 +1,4 @@
-//! How recordings are read and their wavelet variances taken: arguments that several commands share.
+//! Arguments for reading recordings and taking wavelet variances, shared by several commands.
 
 use crate::app::{Context, Failure};
 use crate::io::logs::LogOptions;
@@ -13,7 +13,7 @@ use nav_sim_signal::wavelet::{Convention, Tuning};
 use std::fmt;
 use std::str::FromStr;
 
-/// How recordings are read.
+/// Options for reading recordings.
 #[derive(clap::Args, Debug, Clone, PartialEq, Default)]
 #[command(next_help_heading = "Recordings")]
 pub struct ReadingRequest {
@@ -30,11 +30,11 @@ pub struct ReadingRequest {
     #[arg(long, value_name = "NAME")]
     pub topic: Option<String>,
     #[command(flatten)]
-    /// What is read of a log.
+    /// The part of a log that is read.
     pub log: LogRequest,
 }
 
-/// What is read of a log.
+/// The part of a log that is read.
 #[derive(clap::Args, Debug, Clone, PartialEq, Default)]
 pub struct LogRequest {
     /// Stamps of a log: header, of the measurement; log, of its arrival
@@ -59,10 +59,10 @@ impl LogRequest {
 /// Stamps of a log by their names.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Stamps {
-    /// Of the measurement.
+    /// The time of the measurement.
     #[default]
     Header,
-    /// Of arrival.
+    /// The time of arrival.
     Log,
 }
 
@@ -73,12 +73,12 @@ const STAMPS: &[(&str, &str)] = &[
     ("log", "Of arrival, as the logger states it"),
 ];
 
-/// How recordings are read, and which of their signals are used.
+/// Options for reading recordings and choosing their signals.
 #[derive(clap::Args, Debug, Clone, PartialEq)]
 #[command(next_help_heading = "Recordings")]
 pub struct RecordingRequest {
     #[command(flatten)]
-    /// How they are read.
+    /// Options for reading them.
     pub reading: ReadingRequest,
     /// What to do where the time jumps or stands still
     #[arg(long, value_parser = parse::words::<Gaps>(GAPS), default_value_t = Gaps::Keep)]
@@ -121,12 +121,12 @@ pub(crate) const WHOLE: &[(&str, &str)] = &[
     ),
 ];
 
-/// What is left out at the beginning.
+/// The beginning that is left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Skip {
     /// So many seconds.
     Seconds(f64),
-    /// What is found not to be as the rest.
+    /// The stretch that differs from the rest.
     Auto,
 }
 
@@ -158,7 +158,7 @@ impl FromStr for Skip {
     }
 }
 
-/// What one word of `--axes` stands for.
+/// The axes that one word of `--axes` stands for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelSet {
     word: String,
@@ -189,12 +189,12 @@ impl FromStr for ChannelSet {
 }
 
 impl ReadingRequest {
-    /// Whether each recording's own warm-up is left out.
+    /// True if each recording's own warm-up is left out.
     pub(crate) fn skips_warm_up(&self) -> bool {
         self.skip_s == Skip::Auto
     }
 
-    /// What decides what is read of the files, for the provenance of a result.
+    /// Options that decide which samples are read, for the provenance of a result.
     pub(crate) fn provenance(&self, gaps: Gaps) -> toml::Table {
         let skip_s = match self.skip_s {
             Skip::Seconds(s) => s.into(),
@@ -218,7 +218,7 @@ impl ReadingRequest {
         table
     }
 
-    /// How the files are to be read.
+    /// Options for the reader of the files.
     pub(crate) fn options(&self, gaps: Gaps) -> ReadOptions {
         let skip_s = if let Skip::Seconds(s) = self.skip_s {
             s
@@ -252,7 +252,7 @@ impl RecordingRequest {
         Sensor::ALL.into_iter().find(of_sensor)
     }
 
-    /// What decides what is read of the files, for the provenance of a result.
+    /// Options that decide which samples are read, for the provenance of a result.
     pub(crate) fn provenance(&self) -> toml::Table {
         let mut table = self.reading.provenance(self.gaps);
         if !self.axes.is_empty() {
@@ -262,7 +262,7 @@ impl RecordingRequest {
         table
     }
 
-    /// How the files are to be read.
+    /// Options for the reader of the files.
     pub(crate) fn options(&self) -> ReadOptions {
         let channels = (!self.axes.is_empty()).then(|| self.channels().copied().collect());
         ReadOptions {
@@ -272,7 +272,7 @@ impl RecordingRequest {
     }
 }
 
-/// How wavelet variances are taken.
+/// Options for wavelet variances.
 #[derive(clap::Args, Debug, Clone, PartialEq)]
 #[command(next_help_heading = "Wavelet variance")]
 pub struct VarianceRequest {

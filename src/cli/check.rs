@@ -40,12 +40,12 @@ pub(crate) struct Args {
     dry_run: bool,
 }
 
-/// What is said of a file in JSON.
+/// The JSON of one file.
 #[derive(serde::Serialize)]
 struct Checked {
     file: String,
     ok: bool,
-    /// What it is, or what is wrong.
+    /// Its kind, or its error.
     found: String,
 }
 

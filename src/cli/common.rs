@@ -52,11 +52,11 @@ pub(crate) enum Format {
     #[default]
     Text,
     Json,
-    /// For wv only: all scales of all signals
+    /// For wv (all scales of all signals) and compare
     Csv,
 }
 
-/// What every command is given: where to print, the seed, progress.
+/// Surroundings of every command: printer, seed, progress.
 #[derive(Debug)]
 pub(crate) struct Session {
     common: Common,
@@ -137,12 +137,12 @@ impl Session {
         self.say(format!("wrote {}", path.display()));
     }
 
-    /// Whether stdout gets JSON rather than text.
+    /// True if stdout gets JSON rather than text.
     pub(crate) fn json(&self) -> bool {
         self.common.format == Format::Json
     }
 
-    /// What may become of results that are there already.
+    /// Rule for results that are there already.
     pub(crate) const fn existing(&self) -> Existing {
         if self.common.force {
             Existing::Replace
@@ -151,12 +151,12 @@ impl Session {
         }
     }
 
-    /// Whether stdout gets CSV rather than text.
+    /// True if stdout gets CSV rather than text.
     pub(crate) fn csv(&self) -> bool {
         self.common.format == Format::Csv
     }
 
-    /// Whether all is to be said.
+    /// True with `--verbose`.
     pub(crate) const fn verbose(&self) -> bool {
         self.common.verbose
     }

@@ -1,4 +1,4 @@
-//! What every command does on a terminal: claim outputs, run, show, write.
+//! Runs a command on a terminal: claims outputs, runs, shows, writes.
 
 use super::Session;
 use crate::app::{Answer, Asked, Command, Result};

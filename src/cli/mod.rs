@@ -20,13 +20,11 @@ mod version;
 use crate::app::Asked;
 use crate::commands::with_commands;
 use crate::parse;
-use clap::error::{ContextKind, ErrorKind};
+use clap::error::ErrorKind;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use drive::drive;
-use std::error::Error;
 use std::ffi::{OsStr, OsString};
 use std::io::Write;
-use std::num::ParseIntError;
 use std::process::ExitCode;
 use std::sync::OnceLock;
 
@@ -81,22 +79,20 @@ enum Command {
 }
 
 impl Command {
-    /// Whether the command itself ends in good order at a signal.
+    /// True if the command itself ends in good order at a signal.
     const fn heeds_signals(&self) -> bool {
         matches!(self, Self::Batch(_))
     }
 
-    /// What to do after a signal.
+    /// Advice after a signal.
     fn advice_at_signals(&self) -> Option<String> {
         matches!(self, Self::Demo(_)).then(|| "the same command goes on where it was".to_owned())
     }
 
     fn run(self, session: &Session) -> Result<(), Failure> {
         if session.csv() && !matches!(self, Self::Driven(Driven::Wv(_) | Driven::Compare(_))) {
-            let failure = Failure::input("--format csv: only wv prints CSV");
-            return Err(
-                failure.hint("compare has --table csv; other commands write CSV files to --out")
-            );
+            let failure = Failure::input("--format csv: only wv and compare print CSV");
+            return Err(failure.hint("other commands write CSV files to --out"));
         }
         match self {
             Self::Driven(driven) => driven.run(session),
@@ -113,7 +109,7 @@ impl Command {
     }
 }
 
-/// What `nav-sim` alone prints.
+/// Text of `nav-sim` without arguments.
 const OVERVIEW: &str = "\
 nav-sim COMMAND --help has examples of each command; the book is docs/README.md.
 
@@ -181,27 +177,14 @@ fn is_bare_option(word: &OsStr) -> bool {
     text.len() > 2 && text.starts_with("--") && !text.contains('=')
 }
 
-/// Ends the program as clap would, with clearer words where a count or a format is wrong.
+/// Ends the program with help or version, or with the error in the words that requests by name get too.
 fn end(e: &clap::Error) -> ! {
-    let said = |kind| e.get(kind).map(ToString::to_string).unwrap_or_default();
-    let (option, value) = (
-        said(ContextKind::InvalidArg),
-        said(ContextKind::InvalidValue),
-    );
-    let is_count = e.kind() == ErrorKind::ValueValidation
-        && e.source()
-            .is_some_and(|source| source.downcast_ref::<ParseIntError>().is_some());
-    let failure = if is_count {
-        Failure::input(format!("{option}: \"{value}\" is not a count"))
-            .hint("a whole number such as 100")
-    } else if e.kind() == ErrorKind::InvalidValue && option.starts_with("--format") {
-        Failure::input(format!(
-            "--format \"{value}\" is none of text, json, csv (of wv)"
-        ))
-        .hint("compare has --table csv, latex and markdown")
-    } else {
-        e.exit()
-    };
+    if !e.use_stderr() || e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        e.exit();
+    }
+    let is_incomplete = e.kind() == ErrorKind::MissingRequiredArgument;
+    let help = is_incomplete.then(|| "--help shows usage and examples".to_owned());
+    let failure = Failure::usage(e).maybe_hint(help);
     Printer::plain().failure(&failure);
     std::process::exit(failure.code().into())
 }
@@ -260,7 +243,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
     }
 }
 
-/// Whether the command of some words has an option.
+/// True if the command of some words has an option.
 fn has_option(mut words: &ArgMatches, option: &str) -> bool {
     let mut known = command();
     while let Some((name, inner)) = words.subcommand() {

@@ -89,7 +89,7 @@ impl Printer {
         ));
     }
 
-    /// What is said of a file that was read, to stderr.
+    /// Prints a remark on a file that was read, to stderr.
     pub(crate) fn remark(&self, remark: &Remark) {
         match remark {
             Remark::Note(text) => self.say(&format!("note: {text}")),
@@ -113,7 +113,7 @@ impl Printer {
         }
     }
 
-    /// What went wrong and what to do about it, to stderr, even with `--quiet`.
+    /// Prints an error and its hint to stderr, even with `--quiet`.
     pub(crate) fn failure(&self, failure: &Failure) {
         let message = failure.to_string();
         let mut text = format!(

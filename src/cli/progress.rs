@@ -1,4 +1,4 @@
-//! How far a long computation is: a bar on a terminal, a line every 10 % elsewhere.
+//! Progress of a long computation: a bar on a terminal, a line every 10 % elsewhere.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};

@@ -16,7 +16,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// What this process is writing. Whoever gives an output its name holds the list meanwhile, so that an
 /// interrupt finds the output whole or without its name.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-/// What this process has claimed.
+/// Claims of this process.
 static CLAIMED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn locked<T>(list: &'static Mutex<T>) -> MutexGuard<'static, T> {
@@ -120,7 +120,7 @@ impl Drop for Temporary {
     }
 }
 
-/// Whether a file has not lost its name since it was opened.
+/// True if a file has not lost its name since it was opened.
 #[cfg(unix)]
 fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -551,7 +551,7 @@ fn guard_inputs<'a>(
     }
 }
 
-/// What may become of a result that is there already.
+/// Rule for a result that is there already.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Existing {
     /// It stays, unless what takes its place is of the same kind or run.

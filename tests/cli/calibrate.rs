@@ -516,7 +516,7 @@ fn wv_prints_the_curves_of_every_signal() {
         &["check", "runs/run0.csv", "--format", "csv"],
         2,
     );
-    assert!(stderr.contains("only wv prints CSV"), "{stderr}");
+    assert!(stderr.contains("only wv and compare print CSV"), "{stderr}");
 }
 
 #[test]

@@ -279,11 +279,11 @@ fn negative_values_are_refused_in_the_words_of_their_option() {
         ),
         (
             "run a.toml b.toml --runs -3",
-            "\"-3\" is not a count\n\nhint: a whole number",
+            "--runs='-3': not a whole number ≥ 0",
         ),
         (
             "compare a --reference b --format latex",
-            "compare has --table csv, latex and markdown",
+            "--format='latex': not one of text, json, csv",
         ),
         ("calibrate a --skip-s -5", "not a finite number ≥ 0"),
         (

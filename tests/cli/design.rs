@@ -61,7 +61,7 @@ fn one_design_is_a_screen_and_what_cannot_be_planned_is_refused() {
     };
     refused(
         "calib_data/tactical.toml --estimator gmwm",
-        "[possible values: awv, sr-awv, dr-awv]",
+        "--estimator='gmwm': not one of awv, sr-awv, dr-awv",
     );
     refused("calib_data/tactical.toml --hours 1e6", "longer than a year");
     refused(

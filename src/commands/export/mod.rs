@@ -117,7 +117,7 @@ impl Answer for ExportAnswer {
     }
 }
 
-/// How a model is turned into parameters.
+/// Options for turning a model into parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Which pair stands for the model.
@@ -141,14 +141,14 @@ pub(crate) struct Entry {
     pub value: f64,
     /// The unit, in ASCII.
     pub unit: &'static str,
-    /// What it is, and at which rate.
+    /// Meaning and rate of the value.
     pub meaning: String,
-    /// What the model asks for, where the target's documented range does not hold it.
+    /// Value of the model, where the target's documented range does not hold it.
     #[serde(rename = "model_value")]
     pub wanted: Option<f64>,
 }
 
-/// What is known of one sensor.
+/// Known figures of one sensor.
 #[derive(Debug, Clone, PartialEq)]
 struct SensorExport {
     sensor: Sensor,
@@ -158,7 +158,7 @@ struct SensorExport {
     largest: AxisParameters,
     /// The pair that the target is given.
     exported: Pair,
-    /// How that pair compares with the model over the horizon.
+    /// Ratio of that pair to the model over the horizon.
     closure: Closure,
     /// Standard deviation of the bias at the start (units): of the turn-on bias where the model states one, else of the
     /// bias that the pair has.

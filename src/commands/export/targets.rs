@@ -20,9 +20,9 @@ pub struct Target {
     pub name: &'static str,
     /// What it takes a bias for.
     pub(super) bias: Bias,
-    /// Whether both sensors share one correlation time.
+    /// True if both sensors share one correlation time.
     pub(super) has_one_time: bool,
-    /// Whether it flies a vehicle, whose vibration no static recording holds.
+    /// True if it flies a vehicle, whose vibration no static recording holds.
     pub(super) vibrates: bool,
     template: &'static str,
 }
@@ -560,7 +560,7 @@ impl Export {
     }
 }
 
-/// What stands before the next placeholder, the placeholder, and what stands behind it.
+/// Text before the next placeholder, the placeholder, and the text behind it.
 fn next(text: &'static str) -> Option<(&'static str, &'static str, &'static str)> {
     let (before, rest) = text.split_once('{')?;
     let (placeholder, after) = rest.split_once('}')?;

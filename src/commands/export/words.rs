@@ -1,4 +1,4 @@
-//! What people and programs are told of an export: the head of the file, doubts, JSON.
+//! Head of an exported file, its warnings and its JSON.
 
 use super::{Export, SensorExport};
 use nav_sim_calibration::percent;
@@ -62,7 +62,7 @@ impl Quantity {
 }
 
 impl Export {
-    /// What stands at the head of the file.
+    /// The comment at the head of the file.
     pub(super) fn head(&self, model: &str) -> Vec<String> {
         let (horizon, name) = (self.settings.horizon, self.target.name);
         let mut lines = vec![format!(
@@ -90,7 +90,7 @@ impl Export {
         self.sensors.iter().map(line).collect()
     }
 
-    /// What a user should know before pasting, the most important first.
+    /// Warnings before pasting, the most important first.
     pub(crate) fn doubts(&self) -> Vec<String> {
         let misfit = self
             .settings

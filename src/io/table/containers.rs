@@ -268,7 +268,7 @@ const OXTS: [(&str, usize); 6] = [
     ("gyro_z_rad_s", 19),
 ];
 
-/// Whether a directory is a recording of KITTI: one line a sample in `data/`, and their times in `timestamps.txt`.
+/// True if a directory is a recording of KITTI: one line a sample in `data/`, and their times in `timestamps.txt`.
 pub(crate) fn is_oxts(directory: &Path) -> bool {
     directory.join("timestamps.txt").is_file() && directory.join("data").is_dir()
 }

@@ -74,11 +74,11 @@ pub(crate) struct Table {
     /// Rate that is stated beside the columns (Hz), and where.
     pub(crate) rate_hz: Option<(f64, &'static str)>,
     pub(crate) lines: Lines,
-    /// Whether the text has no header.
+    /// True if the text has no header.
     pub(crate) is_bare: bool,
-    /// What was passed over, or taken for granted.
+    /// Notes on skipped and assumed parts.
     pub(crate) assumptions: Vec<String>,
-    /// What is doubtful.
+    /// Warnings.
     pub(crate) warnings: Vec<String>,
 }
 
@@ -173,7 +173,7 @@ pub(crate) fn parse(
     text::read(name, reader, dictionary, asked)?.filled(dictionary)
 }
 
-/// What the system said of a table, with what helps.
+/// Error of the system on a table, with a hint.
 pub(crate) fn unreadable(path: &Path, e: std::io::Error) -> Failure {
     let is_cut = is_damage(e.kind()) && e.kind() != std::io::ErrorKind::FileTooLarge;
     let failure = Failure::io(path, e);
@@ -460,7 +460,7 @@ impl Table {
     /// is a slip.
     ///
     /// # Errors
-    /// What is missing, with the dictionary's advice.
+    /// Error for a missing column, with the dictionary's advice.
     pub(crate) fn require<'a>(
         &self,
         needed: impl IntoIterator<Item = &'a str>,

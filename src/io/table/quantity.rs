@@ -73,13 +73,13 @@ pub(crate) struct Quantity {
     pub(crate) bare: Bare,
     /// Sign of what the file has.
     pub(crate) sign: f64,
-    /// Whether a stem is one word of the name.
+    /// True if a stem is one word of the name.
     pub(crate) of_words: bool,
     /// Preference among columns of the quantity; without it there may be but one.
     pub(crate) rank: Option<u8>,
-    /// Whether it is an increment over the sample.
+    /// True if it is an increment over the sample.
     pub(crate) per_sample: bool,
-    /// Whether empty cells make it a column that is passed over.
+    /// True if empty cells make it a column that is passed over.
     pub(crate) may_be_empty: bool,
 }
 
@@ -177,7 +177,7 @@ impl Quantity {
         }
     }
 
-    /// Whether a name is that of an axis and something else, such as `accel_x_ft_s2`.
+    /// True if a name is that of an axis and something else, such as `accel_x_ft_s2`.
     pub(super) fn is_in_unknown_unit(&self, plain: &str) -> bool {
         let rest_of = |stem: &&str| {
             let rest = plain.strip_prefix(stem)?.trim_start_matches('_');

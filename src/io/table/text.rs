@@ -53,12 +53,12 @@ struct Head {
     before: u64,
     first_row: Vec<u8>,
     comments: Vec<String>,
-    /// Whether it is that of an Xsens MT Manager export, which is in SI.
+    /// True if it is that of an Xsens MT Manager export, which is in SI.
     is_xsens: bool,
     rate_hz: Option<f64>,
-    /// Whether there is no header.
+    /// True if there is no header.
     is_bare: bool,
-    /// Whether the header is no UTF-8: `²` and `°` are one byte each then.
+    /// True if the header is no UTF-8: `²` and `°` are one byte each then.
     is_latin_1: bool,
 }
 
@@ -279,7 +279,7 @@ fn rate_in(comment: &str) -> Option<f64> {
     digits.parse().ok().filter(|r: &f64| *r > 0.0)
 }
 
-/// What separates the cells of a line: of equals the last. Blanks do only where nothing else does and they are not inside
+/// The separator of the cells of a line: of equals the last. Blanks do only where nothing else does and they are not inside
 /// one name.
 fn delimiter_of(line: &str, dictionary: &Dictionary) -> u8 {
     let count = |d: u8| line.bytes().filter(|b| *b == d).count();
@@ -315,7 +315,7 @@ fn split(text: &str, delimiter: u8) -> Vec<String> {
     cells
 }
 
-/// Whether a row has units, say, below the names: no cell begins as a number does.
+/// True if a row has units, say, below the names: no cell begins as a number does.
 fn is_words(record: &csv::ByteRecord) -> bool {
     let first = |cell: &[u8]| cell.trim_ascii().first().copied();
     let is_word = |cell: &[u8]| {
@@ -325,7 +325,7 @@ fn is_words(record: &csv::ByteRecord) -> bool {
     record.iter().all(is_word) && record.iter().any(|cell| first(cell).is_some())
 }
 
-/// What the system said, with its kind.
+/// Error of the system, with its kind.
 fn of_csv(e: csv::Error) -> std::io::Error {
     match e.into_kind() {
         csv::ErrorKind::Io(source) => source,
@@ -333,7 +333,7 @@ fn of_csv(e: csv::Error) -> std::io::Error {
     }
 }
 
-/// What a line shows a file to be that is no text of lines, if it does.
+/// The reason why a line is no text, if there is one.
 fn no_text(bytes: &[u8]) -> Option<&'static str> {
     if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
         return Some("it is in UTF-16");
@@ -374,7 +374,7 @@ pub(super) fn number(cell: &[u8], delimiter: u8) -> Option<f64> {
 /// Bytes with one blank for several blanks and tabs, and none at the beginning of a line.
 struct Blanks<R> {
     inner: R,
-    /// Whether a blank may follow.
+    /// True if a blank may follow.
     is_inside: bool,
 }
 

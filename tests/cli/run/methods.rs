@@ -389,7 +389,7 @@ fn requirements_decide_the_exit_code() {
     refused(
         "run drive.toml imu.toml --require p95<=5 -o out",
         2,
-        "invalid value 'p95<=5'",
+        "--require='p95<=5'",
     );
 }
 
