@@ -404,7 +404,7 @@ pub struct Goodness {
 }
 
 /// Probability below which the model is said not to describe the curve.
-pub(super) const LEVEL: f64 = 0.05;
+const LEVEL: f64 = 0.05;
 
 impl Goodness {
     /// Whether so large a J has a probability below 5 % when the model holds.

@@ -18,7 +18,7 @@ use crate::trajectory::profile::{
 };
 use crate::units::DEG;
 
-pub(crate) const RATE_HZ: f64 = 50.0;
+const RATE_HZ: f64 = 50.0;
 pub(crate) const OUTAGE: Outage = Outage {
     start_s: 30.0,
     end_s: 85.0,

@@ -285,7 +285,7 @@ impl Test {
         pieces.iter().filter_map(of_piece).max().unwrap_or(0)
     }
 
-    pub(super) const fn name(self) -> &'static str {
+    const fn name(self) -> &'static str {
         match self {
             Self::Noise => "noise",
             Self::Outliers => "outliers",

@@ -32,7 +32,7 @@ pub(super) struct Table {
 impl Table {
     /// New files of the same noise, that differ by Gaussian numbers besides, of the standard deviation given
     /// for each level, independent from level to level; of their variance the axes of a file share a part.
-    pub(super) fn drawn(
+    fn drawn(
         &self,
         noise: &[Noise],
         between: &[f64],
@@ -81,7 +81,7 @@ impl Table {
     /// Share that the axes of a file have in common of the variance by which the active files differ beyond
     /// their noise: the covariance between axes over the excess variance, over all levels, each weighted by
     /// its certainty.
-    pub(super) fn shared(&self, noise: &[Noise], between: &[f64], active: &[bool]) -> f64 {
+    fn shared(&self, noise: &[Noise], between: &[f64], active: &[bool]) -> f64 {
         let (mut covariance, mut variance) = (0.0, 0.0);
         for (j, between) in between.iter().enumerate() {
             let contrasts = self.contrasts(noise, Window { first: j, width: 1 }, j, active);
@@ -237,7 +237,7 @@ impl Contrast {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Distance {
     /// F, with one of the others passed over or none.
-    pub(super) f: f64,
+    f: f64,
     /// For each axis (index), d in standard deviations.
     pub(super) deviations: Vec<(usize, f64)>,
 }
@@ -282,15 +282,15 @@ fn distance(contrasts: &[Contrast], file: usize, pass_over: bool) -> Option<Dist
 
 /// The largest distances of a file: against all others, and with one of them passed over (0 if too few).
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Furthest {
+struct Furthest {
     /// The two F.
-    pub(super) f: [f64; 2],
+    f: [f64; 2],
     /// The window of each, with the deviations there.
-    pub(super) at: [Option<(Window, Distance)>; 2],
+    at: [Option<(Window, Distance)>; 2],
 }
 
 /// The largest distances of every file.
-pub(super) fn furthest(table: &Table, noise: &[Noise], active: &[bool]) -> Vec<Furthest> {
+fn furthest(table: &Table, noise: &[Noise], active: &[bool]) -> Vec<Furthest> {
     let levels = noise.first().map_or(0, Noise::levels);
     let count = active.iter().filter(|on| **on).count();
     let mut all = vec![
@@ -359,14 +359,14 @@ pub(super) struct Window {
 
 impl Window {
     /// All windows over so many scales.
-    pub(super) fn all(levels: usize) -> Vec<Self> {
+    fn all(levels: usize) -> Vec<Self> {
         let of_width = |width: usize| {
             (0..(levels + 1).saturating_sub(width)).map(move |first| Self { first, width })
         };
         WIDTHS.into_iter().flat_map(of_width).collect()
     }
 
-    pub(super) fn range(self) -> std::ops::Range<usize> {
+    fn range(self) -> std::ops::Range<usize> {
         self.first..self.first + self.width
     }
 }
@@ -378,7 +378,7 @@ pub(super) struct Noise {
     /// Degrees of freedom, `[file][level]`.
     edof: Vec<Vec<f64>>,
     /// Variance of the contrast of each window, `[window][file]`.
-    pub(super) variances: Vec<Vec<f64>>,
+    variances: Vec<Vec<f64>>,
 }
 
 /// Law of the values of a file.

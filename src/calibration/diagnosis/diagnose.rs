@@ -175,7 +175,7 @@ impl Excess {
 }
 
 /// The findings of all signals of a sensor together.
-pub(super) fn common(pieces: &[Piece<'_>], settings: &Settings) -> Vec<CommonFinding> {
+fn common(pieces: &[Piece<'_>], settings: &Settings) -> Vec<CommonFinding> {
     let all = (0..Test::Outliers.most_levels(pieces)).map(|level| excess(pieces, level, settings));
     let (stepped, fine): (Vec<Excess>, Vec<Excess>) = all.partition(|e| e.is_stepped);
     let found: Vec<Excess> = fine.into_iter().filter(|e| e.alarms(e.quantizer)).collect();
@@ -342,12 +342,7 @@ pub struct Movement {
 }
 
 /// Movement of an outcome without the recording of that name; none if no curve is left.
-pub(super) fn left_out(
-    group: &Group,
-    name: &str,
-    outcome: &Outcome,
-    settings: &Settings,
-) -> Option<LeftOut> {
+fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &Settings) -> Option<LeftOut> {
     let mut rest: Vec<Replicate> = group
         .replicates
         .iter()

@@ -293,7 +293,7 @@ pub(crate) struct Component {
 
 impl Component {
     /// Wavelet variance per unit of amplitude and its derivative with respect to the coordinate.
-    pub(crate) fn shape(&self, u: f64, level: u32) -> (f64, f64) {
+    fn shape(&self, u: f64, level: u32) -> (f64, f64) {
         match self.kind {
             Kind::White => (White::haar_shape(level), 0.0),
             Kind::Quantization => (Quantization::haar_shape(level), 0.0),
@@ -316,7 +316,7 @@ fn of_log(u: f64, shape: impl Fn(f64) -> (f64, f64)) -> (f64, f64) {
 /// Wavelet variance of a component per unit of its amplitude, at all levels.
 #[derive(Debug, Clone)]
 pub(crate) struct Shape {
-    pub(crate) component: usize,
+    component: usize,
     values: Vec<f64>,
     /// Derivative with respect to the coordinate.
     slopes: Vec<f64>,
@@ -324,8 +324,8 @@ pub(crate) struct Shape {
 
 /// A column of the linear problem, at unit length.
 #[derive(Debug, Clone)]
-pub(crate) struct Column {
-    pub(crate) values: Vec<f64>,
+struct Column {
+    values: Vec<f64>,
     /// The length taken out.
     pub(crate) length: f64,
 }
@@ -356,7 +356,7 @@ pub(crate) struct Objective {
     roots: Vec<f64>,
     /// Response of a robust curve to quantization noise, level by level, where the model has some; none: as it is.
     quantization: Option<Vec<Option<QuantizationResponse>>>,
-    pub(crate) target: Vec<f64>,
+    target: Vec<f64>,
     pub(crate) length: f64,
     pub(crate) components: Vec<Component>,
 }
@@ -370,7 +370,7 @@ pub(crate) struct Solution {
     pub(crate) residuals: Vec<f64>,
     /// Derivative of the residuals with respect to each coordinate, the amplitudes following: Kaufman's
     /// approximation. In the order of the components that have a coordinate.
-    pub(crate) jacobian: Vec<Vec<f64>>,
+    jacobian: Vec<Vec<f64>>,
 }
 
 impl Solution {
@@ -381,7 +381,7 @@ impl Solution {
 
     /// Half its derivative with respect to a coordinate. Exact: at the best amplitudes their own
     /// derivatives do not matter.
-    pub(crate) fn gradient(&self, coordinate: usize) -> f64 {
+    fn gradient(&self, coordinate: usize) -> f64 {
         dot(&self.jacobian[coordinate], &self.residuals)
     }
 }
@@ -419,7 +419,7 @@ impl Objective {
     }
 
     /// Whether the model is linear in its amplitudes.
-    pub(crate) const fn is_linear(&self) -> bool {
+    const fn is_linear(&self) -> bool {
         self.quantization.is_none()
     }
 
@@ -431,7 +431,7 @@ impl Objective {
             .filter_map(|(i, c)| Some((i, c.coordinate?)))
     }
 
-    pub(crate) fn shape(&self, component: usize, u: f64) -> Shape {
+    fn shape(&self, component: usize, u: f64) -> Shape {
         let process = &self.components[component];
         let (values, slopes) = self
             .levels
@@ -446,7 +446,7 @@ impl Objective {
     }
 
     /// The column of a shape where the curve responds so, level by level.
-    pub(crate) fn column(&self, shape: &Shape, responses: &[Response]) -> Column {
+    fn column(&self, shape: &Shape, responses: &[Response]) -> Column {
         let mut values = self.weighted(shape.component, &shape.values, responses);
         // Unit columns: the Gram matrix has a unit diagonal, and its condition is that of the shapes, not of
         // the units.
@@ -661,7 +661,7 @@ fn project(
     Some(solution[..n].to_vec())
 }
 
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
@@ -702,7 +702,7 @@ pub(crate) struct End {
 }
 
 /// Descends from a start to the local minimum.
-pub(crate) fn descend(objective: &Objective, start: &[f64]) -> End {
+fn descend(objective: &Objective, start: &[f64]) -> End {
     let ranges: Vec<(f64, f64)> = objective.shaped().map(|(_, r)| (r.low, r.high)).collect();
     let found = minimise::descend(
         start,

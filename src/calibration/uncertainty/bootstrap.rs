@@ -321,7 +321,7 @@ pub(crate) fn like(replicate: &Replicate, nu: Vec<f64>) -> Replicate {
 // ([Guerrier](crate::bibliography::Guerrier13)).
 
 /// The test of a fit, given the fits of the draws.
-pub(crate) fn goodness(outcome: &Outcome, draws: &[Fit]) -> Goodness {
+fn goodness(outcome: &Outcome, draws: &[Fit]) -> Goodness {
     let Outcome { fit, .. } = outcome;
     let objectives: Vec<f64> = draws.iter().map(|d| d.objective).collect();
     // A parameter of a process without amplitude took nothing from the curve.
@@ -354,11 +354,7 @@ fn p_value(observed: f64, draws: &[f64]) -> f64 {
 
 /// Standard errors of the parameters, in the order of the model and in their units; NaN where a
 /// parameter stands at a bound. `covariance` is that of curves, relative to the model.
-pub(crate) fn standard_errors(
-    outcome: &Outcome,
-    settings: &Settings,
-    covariance: &DMatrix<f64>,
-) -> Vec<f64> {
+fn standard_errors(outcome: &Outcome, settings: &Settings, covariance: &DMatrix<f64>) -> Vec<f64> {
     let (fit, curve) = (&outcome.fit, &outcome.curve);
     let least_squares = outcome.estimator != Estimator::Avlr;
     // Of each parameter: whether it moves, and its value.

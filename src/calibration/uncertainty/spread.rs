@@ -352,7 +352,7 @@ pub(super) fn small_sample(count: usize) -> f64 {
 
 /// Mean square of the residuals of ln nu at one level, each over the deviation that its noise alone gives it: 1 on average
 /// where replicates do not differ. For DR-AWV of clipped residuals. NaN of what cannot be compared.
-pub(crate) fn mean_square(logs: &[f64], noise: &[f64], estimator: Estimator) -> f64 {
+fn mean_square(logs: &[f64], noise: &[f64], estimator: Estimator) -> f64 {
     let weights: Vec<f64> = noise.iter().map(|n| 1.0 / n).collect();
     let clipped = estimator == Estimator::DrAwv;
     let correction = if clipped {

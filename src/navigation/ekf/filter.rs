@@ -212,7 +212,7 @@ impl Ekf {
 
     /// The sum of the bias groups of a sensor.
     #[inline(always)]
-    pub(super) fn bias_sum<W: Wide>(&self, sensor: Sensor) -> Vec3<W> {
+    fn bias_sum<W: Wide>(&self, sensor: Sensor) -> Vec3<W> {
         let [accel, gyro] = self.belief.groups.each_ref().map(Vec::len);
         let of_sensor = if sensor == Sensor::Accel {
             0..accel

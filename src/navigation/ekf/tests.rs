@@ -56,7 +56,7 @@ pub(super) fn error_of(lane: &NavState, nominal: &NavState) -> [f64; 9] {
     std::array::from_fn(|i| [r, v, psi][i / 3][i % 3])
 }
 
-pub(super) fn perturbed(state: &NavState, block: usize, axis: usize, size: f64) -> NavState {
+fn perturbed(state: &NavState, block: usize, axis: usize, size: f64) -> NavState {
     let d = DVec3::AXES[axis] * size;
     let r = earth::radii(state.lat.sin());
     match block {

@@ -208,12 +208,12 @@ struct Antenna<L> {
     /// Lever arm in n (m).
     arm_n: Vec3<L>,
     /// Velocity of the antenna about the IMU, C (omega_eb_b × l), in n (m/s).
-    pub(super) swing_n: Vec3<L>,
+    swing_n: Vec3<L>,
     /// Change of that velocity per attitude error psi_n (m/s per rad):
     /// −\[C (omega_ib_b × l) ×\] + \[omega_ie_n ×\] \[C l ×\].
     of_psi: Mat3<L>,
     /// Change of that velocity per error of the gyroscope's bias (m): C \[l ×\].
-    pub(super) of_bias: Mat3<L>,
+    of_bias: Mat3<L>,
 }
 
 impl<W: Real> Antenna<W> {
@@ -331,7 +331,7 @@ impl<L: Real> Row<L> {
     }
 
     #[inline(always)]
-    pub(super) fn push(&mut self, state: usize, coefficient: L) {
+    fn push(&mut self, state: usize, coefficient: L) {
         self.entries[self.len] = (state, coefficient);
         self.len += 1;
     }
@@ -345,7 +345,7 @@ impl<L: Real> Row<L> {
     }
 
     #[inline(always)]
-    pub(super) fn entries(&self) -> &[(usize, L)] {
+    fn entries(&self) -> &[(usize, L)] {
         &self.entries[..self.len]
     }
 }
@@ -407,7 +407,7 @@ pub(crate) struct BodyVelocity {
 }
 
 /// What a scalar measurement found: estimate less measured, and the variance that the filter states of that.
-pub(crate) type Innovation = [Lanes; 2];
+type Innovation = [Lanes; 2];
 
 /// Uses a velocity along the vehicle's axes; returns the innovation of each of its axes in sequence.
 pub(crate) fn update_body_velocity(ekf: &mut Ekf, measured: &BodyVelocity) -> [Innovation; 3] {

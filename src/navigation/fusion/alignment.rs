@@ -328,7 +328,7 @@ const AXLE_M: f64 = 2.0;
 /// Slowest course that is taken as a heading, and how many of its standard deviations: of what goes fast at times, as road
 /// vehicles do, and of what never does, as people, carts and small robots.
 const FAST: (f64, f64) = (3.0, 5.0);
-pub(super) const SLOW: (f64, f64) = (0.5, 10.0);
+const SLOW: (f64, f64) = (0.5, 10.0);
 /// What sways to the side at a walk (m/s).
 const SWAY: f64 = 0.15;
 /// Shortest time from one position to another that gives a velocity, and the longest (s).
@@ -367,7 +367,7 @@ pub(in crate::fusion) struct Moving {
     pub(in crate::fusion) v_n: DVec3,
     pub(in crate::fusion) sigma_n: DVec3,
     /// Half the time between the two positions it comes from: it is as old as that (s); 0 as measured.
-    pub(in crate::fusion) lag_s: f64,
+    lag_s: f64,
     pub(in crate::fusion) pace: Pace,
 }
 
@@ -517,7 +517,7 @@ const STILL: (f64, f64) = (0.5, 0.03);
 const QUIET: f64 = 3.0;
 
 /// What levelling needs to know.
-pub(super) struct Scene<'a> {
+struct Scene<'a> {
     recorded: Recorded<'a>,
     settings: &'a Settings,
     bias: BiasSigma,
@@ -526,9 +526,9 @@ pub(super) struct Scene<'a> {
 
 /// Roll and pitch at the first moving fix.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Level {
-    pub(super) roll: f64,
-    pub(super) pitch: f64,
+struct Level {
+    roll: f64,
+    pitch: f64,
     /// Standard deviation of both (rad).
     pub(super) sigma: f64,
     pub(super) from: Levelling,
@@ -607,7 +607,7 @@ impl<'a> Scene<'a> {
     ///
     /// A window is judged by its own standard deviation: what GNSS lets the vehicle accelerate unseen falls with
     /// its length, the drift of the gyroscopes grows with its age.
-    pub(super) fn at_rest(&self, before: &[Moving], moving: &Moving) -> Option<Level> {
+    fn at_rest(&self, before: &[Moving], moving: &Moving) -> Option<Level> {
         let to_s = moving.fix.t_s;
         let ends = (0..)
             .map(|k| to_s - 0.25 * f64::from(k))
@@ -802,7 +802,7 @@ struct Agreement {
 }
 
 impl Agreement {
-    pub(super) fn holds(&self) -> bool {
+    fn holds(&self) -> bool {
         self.nis <= nis_bound(self.components)
     }
 }
@@ -810,8 +810,8 @@ impl Agreement {
 /// What the trial of two opposite starts says.
 pub struct Trial {
     /// The better one, 0 or 1, and whether the other is refuted.
-    pub(super) better: usize,
-    pub(super) decided: bool,
+    better: usize,
+    decided: bool,
     /// How well the better one agrees with the first minute, and with all that was tried.
     agreements: [Agreement; 2],
 }
@@ -916,12 +916,7 @@ fn opposite(
 }
 
 /// Runs the filter from a start that has no other beside it, over the first minute.
-pub(super) fn alone(
-    recorded: &Recorded<'_>,
-    belief: &Belief,
-    settings: &Settings,
-    start: &Start,
-) -> Trial {
+fn alone(recorded: &Recorded<'_>, belief: &Belief, settings: &Settings, start: &Start) -> Trial {
     let agreement = agreement(recorded, belief, settings, start, start.t_s + TRIAL_S);
     Trial {
         better: 0,
@@ -932,12 +927,7 @@ pub(super) fn alone(
 
 /// Widens the standard deviation of a heading that is not the course: wind sets an aircraft off, currents a boat. The
 /// smoother, from all fixes of the first minute, says how far.
-pub(super) fn widen(
-    recorded: &Recorded<'_>,
-    belief: &Belief,
-    settings: &Settings,
-    start: &mut Start,
-) {
+fn widen(recorded: &Recorded<'_>, belief: &Belief, settings: &Settings, start: &mut Start) {
     let settings = Settings {
         smooth: true,
         ..settings.clone()

@@ -65,7 +65,7 @@ pub fn clocks_apart(recorded: &Recorded<'_>) -> Option<ClocksApart> {
 }
 
 /// The lag of the gyroscopes at which the turns are the same ones (s), their correlation there and as the clocks are.
-pub(super) fn agreement(recorded: &Recorded<'_>) -> Option<[f64; 3]> {
+fn agreement(recorded: &Recorded<'_>) -> Option<[f64; 3]> {
     let turns = turns(recorded);
     let turned = Turned::new(recorded.imu);
     let steps = (LONGEST_S / STEP_S) as i32;

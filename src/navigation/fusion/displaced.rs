@@ -406,7 +406,7 @@ pub fn fuse_correlated(
 }
 
 /// Standard deviation of white noise that counts as much as one of 1 whose autocorrelation is ρᵏ.
-pub(super) fn sigma_factor(lag_1: f64) -> f64 {
+fn sigma_factor(lag_1: f64) -> f64 {
     let rho = lag_1.clamp(0.0, LARGEST);
     ((1.0 + rho) / (1.0 - rho)).sqrt()
 }

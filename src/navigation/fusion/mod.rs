@@ -77,7 +77,7 @@ use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// Position (m, north, east, down), velocity (m/s), roll, pitch, yaw (degrees).
-pub(crate) type Nine = [f64; 9];
+type Nine = [f64; 9];
 
 /// What was recorded, each in order of time.
 #[derive(Debug, Clone, Copy)]

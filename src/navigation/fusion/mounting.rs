@@ -214,11 +214,11 @@ fn refined(
 /// Length of a block (s): slopes, banks and slips of a road are mostly over by then.
 const BLOCK_S: f64 = 20.0;
 /// Fewest blocks of which a scatter is known.
-pub(super) const FEWEST: usize = 6;
+const FEWEST: usize = 6;
 
 /// Sums over blocks of time.
 #[derive(Debug, Default)]
-pub(super) struct Blocks {
+struct Blocks {
     /// Number of the block, and the sum in it.
     sums: Vec<(i64, f64)>,
     weight: f64,
@@ -235,7 +235,7 @@ impl Blocks {
         }
     }
 
-    pub(super) fn count(&self) -> usize {
+    fn count(&self) -> usize {
         self.sums.len()
     }
 
@@ -284,9 +284,9 @@ const UNDECIDED: f64 = 0.25;
 
 /// The mounting, its standard deviations (rad), the way it rests on (m).
 pub struct Refined {
-    pub(super) q_s_b: DQuat,
-    pub(super) sigma_b: DVec3,
-    pub(super) way_m: f64,
+    q_s_b: DQuat,
+    sigma_b: DVec3,
+    way_m: f64,
 }
 
 /// The filter's yaw must be that of the accelerations: biases, which a filter may not expect, do not touch the latter.
@@ -317,7 +317,7 @@ struct Moment {
     way_m: f64,
 }
 
-pub(super) fn through(
+fn through(
     recorded: &Recorded<'_>,
     settings: &Settings,
     belief: &Belief,
@@ -498,9 +498,9 @@ const ROUGH: f64 = 20.0 * DEG;
 /// A mounting, how well its yaw is known, and why.
 #[derive(Debug, Clone, Copy)]
 pub struct Rough {
-    pub(super) q_s_b: DQuat,
+    q_s_b: DQuat,
     /// Standard deviation of the yaw (rad).
-    pub(super) yaw_sigma: f64,
+    yaw_sigma: f64,
 }
 
 /// A stretch between two velocities.
@@ -522,7 +522,7 @@ fn track_attitude(v_n: DVec3, sigma_down: f64) -> DQuat {
 }
 
 /// The rotation from the IMU to the track.
-pub(super) fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<Rough, MountingError> {
+fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<Rough, MountingError> {
     let stretches = stretches(recorded, settings);
     let mut seen = Blocks::default();
     stretches.iter().for_each(|s| seen.add(s.t_s, 0.0, 1.0));

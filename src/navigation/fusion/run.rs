@@ -260,7 +260,7 @@ impl Run<'_> {
 const BRIDGE_STEP_S: f64 = 0.1;
 
 /// The filter in the axes of the IMU.
-pub(super) struct Filter {
+struct Filter {
     pub(super) ekf: Ekf,
     q_s_b: DQuat,
     mounting_sigma_b: DVec3,
@@ -285,7 +285,7 @@ impl Filter {
     }
 
     /// Through `seconds` of a sample.
-    pub(super) fn advance(&mut self, sample: &ImuIncrement, seconds: f64) {
+    fn advance(&mut self, sample: &ImuIncrement, seconds: f64) {
         let mean = ImuSample {
             omega_ib_b: sample.dtheta / sample.dt_s,
             f_ib_b: sample.dv / sample.dt_s,
@@ -366,7 +366,7 @@ impl Filter {
         }
     }
 
-    pub(super) fn settle(&mut self) {
+    fn settle(&mut self) {
         settle(&mut self.ekf);
     }
 
@@ -412,7 +412,7 @@ impl Filter {
         axes.iter().map(|axis| axis * axis.transpose()).sum()
     }
 
-    pub(super) fn row(&mut self, t_s: f64) -> Row {
+    fn row(&mut self, t_s: f64) -> Row {
         settle(&mut self.ekf);
         let (state, p) = (self.state(), &self.ekf.p);
         let (r, v) = (p.variances(R).lane(0), p.variances(V).lane(0));
@@ -569,7 +569,7 @@ impl<'a> Bridges<'a> {
     }
 
     /// The spread of a sample that is a bridge; none of any other.
-    pub(super) fn spread(&mut self, sample: &ImuIncrement) -> Option<Spread> {
+    fn spread(&mut self, sample: &ImuIncrement) -> Option<Spread> {
         if sample.dt_s <= LONG * self.step_s {
             return None;
         }
@@ -696,7 +696,7 @@ impl Tape {
     }
 
     /// A row is written here.
-    pub(super) fn row(&mut self, filter: &mut Filter, t_s: f64) {
+    fn row(&mut self, filter: &mut Filter, t_s: f64) {
         self.mark(filter, t_s);
         self.rows.push(self.marks.len() - 1);
     }
@@ -717,7 +717,7 @@ impl Tape {
     }
 
     /// Runs backwards. `filtered` are the rows of the filter, which is used to show the smoothed ones.
-    pub(super) fn smoothed(
+    fn smoothed(
         self,
         filter: &mut Filter,
         filtered: &[Row],

@@ -183,7 +183,7 @@ impl Real for Lanes {
 /// [−π/4, π/4] to rounding. Without branches and comparisons, so that it is the same text for every width;
 /// within 2 ulp of the scalar functions (tested).
 #[inline(always)]
-pub(super) fn sin_cos<L: Real>(angle: L) -> (L, L) {
+fn sin_cos<L: Real>(angle: L) -> (L, L) {
     // π/2 = P1 + P2 + P3, each with enough trailing zeros that k·P is exact for |k| < 2^20 (fdlibm).
     const P1: f64 = 1.570_796_326_734_125_6;
     const P2: f64 = 6.077_100_506_303_966e-11;

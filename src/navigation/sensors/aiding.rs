@@ -420,7 +420,7 @@ pub(crate) enum Law {
 }
 
 impl Law {
-    pub(crate) const fn size(self) -> f64 {
+    const fn size(self) -> f64 {
         match self {
             Self::Known(size) | Self::Constant(size) | Self::GaussMarkov { sigma: size, .. } => {
                 size

@@ -104,7 +104,7 @@ impl Truth<'_> {
     ///
     /// # Errors
     /// What is missing, and by how much.
-    pub(crate) fn check(&self, imu_hz: f64, samples: usize) -> Result<(), TruthError> {
+    fn check(&self, imu_hz: f64, samples: usize) -> Result<(), TruthError> {
         let check_model = |model: &Model| match same_rate(model.rate_hz, imu_hz) {
             true => Ok(()),
             false => Err(TruthError::ModelRate {
@@ -306,7 +306,7 @@ impl<'a> Windows<'a> {
     }
 
     /// The window of a run: for each channel its samples and the level they start from.
-    pub(super) fn of_run(&self, key: StreamKey<'_>, samples: usize) -> [(&'a [f64], f64); 6] {
+    fn of_run(&self, key: StreamKey<'_>, samples: usize) -> [(&'a [f64], f64); 6] {
         let (index, start) = self.place(key, samples);
         let recording = &self.recordings[index];
         Channel::ALL.map(|channel| {

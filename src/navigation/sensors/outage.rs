@@ -317,7 +317,7 @@ impl PeriodicOutages {
         ))
     }
 
-    pub(super) fn windows(&self, (from_s, end_s): (f64, f64)) -> Vec<Outage> {
+    fn windows(&self, (from_s, end_s): (f64, f64)) -> Vec<Outage> {
         // those that end before the span begins are not counted through: there may be as many as there is time
         let skipped = ((from_s - self.duration_s - self.first_s) / self.every_s)
             .floor()
@@ -350,7 +350,7 @@ impl RandomOutages {
     /// One a second.
     pub const MOST_PER_HOUR: f64 = 3600.0;
 
-    pub(super) fn windows(
+    fn windows(
         &self,
         (start_s, end_s): (f64, f64),
         seed: u64,
@@ -493,11 +493,7 @@ impl OutagePlan {
 
     /// The windows on data that last from `span_s.0` to `span_s.1`: in time order, those that overlap or touch
     /// made one, cut at the ends, those outside left out.
-    pub(super) fn windows(
-        &self,
-        span_s: (f64, f64),
-        seed: u64,
-    ) -> Result<Vec<Outage>, SettingError> {
+    fn windows(&self, span_s: (f64, f64), seed: u64) -> Result<Vec<Outage>, SettingError> {
         let mut all: Vec<Outage> = self.fixed.iter().chain(&self.default).copied().collect();
         all.extend(
             self.periodic

@@ -289,9 +289,9 @@ fn standard_deviations(ekf: &Ekf, jacobian: &[DVec3; 3]) -> [Lanes; REPORTED] {
 // How far eight runs are from the reference, and how far their filters believe they are.
 
 /// Errors and beliefs of eight runs at one instant; the covariance must be settled.
-pub(super) struct Assessment {
+struct Assessment {
     /// The filter's own standard deviation of each reported state (m, m/s, degrees).
-    pub(super) see: [Lanes; REPORTED],
+    see: [Lanes; REPORTED],
     /// Error of each reported state, estimate − truth (m, m/s, degrees).
     pub(super) error: [Lanes; REPORTED],
     /// Rotation from the true to the estimated attitude (degrees).
@@ -299,7 +299,7 @@ pub(super) struct Assessment {
     /// Position (m), velocity (m/s) and attitude error (rad), in the order of the filter's states.
     navigation: [Lanes; NEES_DOF],
     /// Normalised estimation error squared of position, velocity and attitude.
-    pub(super) nees: Lanes,
+    nees: Lanes,
 }
 
 impl Assessment {
@@ -345,13 +345,13 @@ impl Assessment {
 struct EpochLanes {
     t_s: f64,
     gnss: bool,
-    pub(super) see: [Lanes; REPORTED],
+    see: [Lanes; REPORTED],
     /// The filter's own standard deviation of each sensor's bias (m/s², rad/s).
     bias_see: [Lanes; BIASES],
     pub(super) error: [Lanes; REPORTED],
     att_error_deg: Lanes,
-    pub(super) nees: Lanes,
-    pub(super) covered: [bool; LANES],
+    nees: Lanes,
+    covered: [bool; LANES],
 }
 
 impl EpochLanes {
@@ -379,7 +379,7 @@ impl EpochLanes {
         }
     }
 
-    pub(super) fn sum(&self, kept: &[usize]) -> EpochSums {
+    fn sum(&self, kept: &[usize]) -> EpochSums {
         let mut sums = EpochSums {
             t_s: self.t_s,
             gnss: self.gnss,

@@ -449,7 +449,7 @@ pub(super) struct Aided {
 }
 
 /// What the vehicle measures of itself, of these aids.
-pub(super) fn aided<'a>(
+fn aided<'a>(
     experiment: &Experiment<'_>,
     t_s: f64,
     aids: impl Iterator<Item = &'a (Aid, usize)>,

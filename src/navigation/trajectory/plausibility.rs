@@ -66,7 +66,7 @@ impl Quantity {
     }
 
     /// The limit on it.
-    pub(crate) const fn limit(self, limits: &Limits) -> f64 {
+    const fn limit(self, limits: &Limits) -> f64 {
         match self {
             Self::Speed => limits.speed,
             Self::Acceleration => limits.acceleration,

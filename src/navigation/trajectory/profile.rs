@@ -305,7 +305,7 @@ const MAX_SLOPE: f64 = 60.0 * DEG;
 /// Longest path (s): a day.
 const MAX_DURATION_S: f64 = 86_400.0;
 
-pub(super) fn domain(key: &'static str, domain: &'static str, holds: bool) -> Result<(), Problem> {
+fn domain(key: &'static str, domain: &'static str, holds: bool) -> Result<(), Problem> {
     if holds {
         Ok(())
     } else {
@@ -313,18 +313,18 @@ pub(super) fn domain(key: &'static str, domain: &'static str, holds: bool) -> Re
     }
 }
 
-pub(super) fn positive(key: &'static str, value: f64) -> Result<(), Problem> {
+fn positive(key: &'static str, value: f64) -> Result<(), Problem> {
     domain(key, "a finite number > 0", value.is_finite() && value > 0.0)
 }
 
 /// The path so far.
-pub(super) struct Path<'a> {
-    pub(super) profile: &'a Profile,
+struct Path<'a> {
+    profile: &'a Profile,
     pub(super) t_s: f64,
-    pub(super) lat: f64,
-    pub(super) lon: f64,
+    lat: f64,
+    lon: f64,
     pub(super) h: f64,
-    pub(super) heading: f64,
+    heading: f64,
     pub(super) speed: f64,
     pub(super) samples: Vec<TrajectorySample>,
 }
@@ -360,7 +360,7 @@ impl<'a> Path<'a> {
         path
     }
 
-    pub(super) fn follow(&mut self, segment: &Segment) -> Result<(), Problem> {
+    fn follow(&mut self, segment: &Segment) -> Result<(), Problem> {
         domain("climb_m", "a finite number", segment.climb_m.is_finite())?;
         let ramp_s = segment.ramp_s.unwrap_or(self.profile.ramp_s);
         positive("ramp_s", ramp_s)?;
@@ -384,12 +384,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    pub(super) fn straight(
-        &mut self,
-        length: Length,
-        climb: f64,
-        ramp_s: f64,
-    ) -> Result<(), Problem> {
+    fn straight(&mut self, length: Length, climb: f64, ramp_s: f64) -> Result<(), Problem> {
         let duration = match length {
             Length::Duration(s) => {
                 positive("duration_s", s)?;
@@ -452,7 +447,7 @@ impl<'a> Path<'a> {
         Ok(duration_of(angle, rate, ramp_s))
     }
 
-    pub(super) fn moving(&self, key: &'static str) -> Result<f64, Problem> {
+    fn moving(&self, key: &'static str) -> Result<f64, Problem> {
         if self.speed > 0.0 {
             Ok(self.speed)
         } else {
@@ -461,13 +456,7 @@ impl<'a> Path<'a> {
     }
 
     /// The piece that continues the path for a duration with a ramp (s).
-    pub(super) fn piece(
-        &self,
-        [duration, ramp_s]: [f64; 2],
-        speed: f64,
-        heading: f64,
-        climb: f64,
-    ) -> Piece {
+    fn piece(&self, [duration, ramp_s]: [f64; 2], speed: f64, heading: f64, climb: f64) -> Piece {
         let shape = Shape::new(ramp_s / duration);
         let (speed, heading) = ([self.speed, speed], [self.heading, heading]);
         Piece {
@@ -480,7 +469,7 @@ impl<'a> Path<'a> {
     }
 
     /// Adds a piece of the given duration and ramp (s), changing speed, heading and height.
-    pub(super) fn push(
+    fn push(
         &mut self,
         [duration, ramp_s]: [f64; 2],
         speed: f64,
@@ -581,7 +570,7 @@ fn rates(lat: f64, motion: &Motion) -> [f64; 2] {
 /// quintic smooth step, stays, and falls likewise. Value, rate, and the rate's first two derivatives are
 /// continuous; outside [0, 1] nothing changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::trajectory) struct Shape {
+struct Shape {
     /// Share of the whole that each ramp takes, in (0, 1/2].
     ramp: f64,
 }
@@ -599,7 +588,7 @@ impl Shape {
     }
 
     /// Rate of change at x.
-    pub(super) fn rate(self, x: f64) -> f64 {
+    fn rate(self, x: f64) -> f64 {
         let y = (x.min(1.0 - x) / self.ramp).clamp(0.0, 1.0);
         // 10y³ − 15y⁴ + 6y⁵: first and second derivative are zero at both ends.
         self.peak() * y * y * y * (10.0 + y * (6.0 * y - 15.0))
@@ -617,7 +606,7 @@ impl Shape {
     }
 
     /// The integral of the change so far.
-    pub(super) fn integral(self, x: f64) -> f64 {
+    fn integral(self, x: f64) -> f64 {
         if x > 0.5 {
             return x - 0.5 + self.integral(1.0 - x); // from value(x) = 1 − value(1 − x)
         }
@@ -630,41 +619,41 @@ impl Shape {
 
 /// A stretch of motion: everything as a function of the share x of its duration.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Piece {
+struct Piece {
     /// Duration (s).
-    pub(super) duration: f64,
-    pub(super) shape: Shape,
+    duration: f64,
+    shape: Shape,
     /// Speed along the path at the start, and its change (m/s).
     pub(super) speed: [f64; 2],
     /// Heading at the start, and its change (rad).
-    pub(super) heading: [f64; 2],
+    heading: [f64; 2],
     /// Height at the start, and its change (m).
     pub(super) height: [f64; 2],
 }
 
 /// The motion at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Motion {
+struct Motion {
     /// Horizontal speed (m/s).
-    pub(super) horizontal: f64,
+    horizontal: f64,
     /// Heading (rad) and its rate (rad/s).
-    pub(super) heading: f64,
+    heading: f64,
     heading_rate: f64,
     /// Angle of the path above the horizon (rad).
-    pub(super) slope: f64,
+    slope: f64,
     /// Height (m).
     pub(super) h: f64,
 }
 
 impl Piece {
     /// Length of the path (m): the mean of a symmetric change is half of it.
-    pub(super) fn length(&self) -> f64 {
+    fn length(&self) -> f64 {
         self.duration * (self.speed[0] + 0.5 * self.speed[1])
     }
 
     /// Sine of the steepest slope; the height changes with the path, not with time, so that a vehicle that
     /// starts or stops on a hill follows the road.
-    pub(super) fn steepest(&self) -> f64 {
+    fn steepest(&self) -> f64 {
         if self.height[1] == 0.0 {
             0.0
         } else {
@@ -734,7 +723,7 @@ struct Corner {
 }
 
 impl Path<'_> {
-    pub(super) fn waypoints(
+    fn waypoints(
         &mut self,
         points: &[Waypoint],
         by: Turning,

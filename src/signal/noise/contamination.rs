@@ -22,7 +22,7 @@ pub enum Extent {
 
 impl Extent {
     /// In samples of a record of `length` samples.
-    pub(crate) fn of(self, length: usize) -> usize {
+    fn of(self, length: usize) -> usize {
         match self {
             Self::Samples(n) => usize::try_from(n).unwrap_or(usize::MAX),
             // A share written as a ratio of whole numbers must not lose one to rounding.
@@ -257,7 +257,7 @@ impl Rule {
 
 impl Operation {
     /// Name in files.
-    pub(crate) const fn name(&self) -> &'static str {
+    const fn name(&self) -> &'static str {
         match self {
             Self::Scale { .. } => "scale",
             Self::Ar1(_) => "ar1",

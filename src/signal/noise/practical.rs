@@ -409,12 +409,12 @@ fn markov_of(process: &Process, rate_hz: f64) -> Option<Markov> {
 const LEAST_SHARE: f64 = 1e-9;
 
 /// Allan variance of white noise of density 1 at `rate_hz`.
-pub(super) fn white(samples: u32, rate_hz: f64) -> f64 {
+fn white(samples: u32, rate_hz: f64) -> f64 {
     rate_hz / f64::from(samples)
 }
 
 /// Allan variance of a random walk of density 1, or of a Gauss-Markov process of variance 1 and correlation time T.
-pub(super) fn bias(t_corr_s: Option<f64>, samples: u32, rate_hz: f64) -> f64 {
+fn bias(t_corr_s: Option<f64>, samples: u32, rate_hz: f64) -> f64 {
     let m = f64::from(samples);
     // K²τ/3 with the term of the sampling: twice the wavelet variance gamma2 (4m² + 2)/(24m), gamma2 = K²/f.
     let Some(t_corr_s) = t_corr_s else {
@@ -425,7 +425,7 @@ pub(super) fn bias(t_corr_s: Option<f64>, samples: u32, rate_hz: f64) -> f64 {
 }
 
 /// The pair of a policy.
-pub(super) fn pair(curve: &Curve, policy: Policy, kind: Bias) -> Pair {
+fn pair(curve: &Curve, policy: Policy, kind: Bias) -> Pair {
     let t_corr_s = match kind {
         Bias::Walk => None,
         Bias::MarkovOf(t_corr_s) => Some(t_corr_s),
@@ -452,7 +452,7 @@ pub(super) fn pair(curve: &Curve, policy: Policy, kind: Bias) -> Pair {
 
 /// The correlation time whose pairs are the closest to the curves together (s). A curve without a bias is as close with
 /// any: it has no say.
-pub(super) fn correlation_time_s(curves: &[&Curve], policy: Policy) -> f64 {
+fn correlation_time_s(curves: &[&Curve], policy: Policy) -> f64 {
     // A quarter of the horizon's begin looks white over it, thirty times its end like a random walk.
     let horizon = curves[0].horizon;
     let (low, high) = (horizon.from_s / 4.0, horizon.to_s * 30.0);
@@ -668,7 +668,7 @@ impl AxisParameters {
 }
 
 /// The AR1 and GM of an axis that have a correlation time.
-pub(super) fn correlated(axis: &Composite, rate_hz: f64) -> Vec<CorrelatedProcess> {
+fn correlated(axis: &Composite, rate_hz: f64) -> Vec<CorrelatedProcess> {
     let labelled = axis.labels().into_iter().zip(&axis.processes);
     labelled
         .filter_map(|(label, p)| {

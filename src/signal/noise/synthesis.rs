@@ -252,7 +252,7 @@ static ZIGGURAT: LazyLock<Ziggurat> = LazyLock::new(Ziggurat::new);
 
 impl Ziggurat {
     /// The tables, computed once.
-    pub(super) fn get() -> &'static Self {
+    fn get() -> &'static Self {
         &ZIGGURAT
     }
 
@@ -274,7 +274,7 @@ impl Ziggurat {
 
     /// A standard normal number.
     #[inline(always)]
-    pub(super) fn draw(&self, g: &mut Generator) -> f64 {
+    fn draw(&self, g: &mut Generator) -> f64 {
         let (layer, u, x) = self.candidate(g);
         // Within the next narrower layer the whole height of this one lies below the density.
         if x.abs() < self.x[layer + 1] {

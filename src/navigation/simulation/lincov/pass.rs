@@ -392,7 +392,7 @@ fn squares(jacobian: &[DVec3; 3], p: &[Nav; NAV]) -> [f64; REPORTED] {
 }
 
 /// Standard deviations of the reported states (m, m/s, degrees).
-pub(super) fn deviations(jacobian: &[DVec3; 3], p: &[Nav; NAV]) -> [f64; REPORTED] {
+fn deviations(jacobian: &[DVec3; 3], p: &[Nav; NAV]) -> [f64; REPORTED] {
     let roots = squares(jacobian, p).map(f64::sqrt);
     std::array::from_fn(|i| if i < 6 { roots[i] } else { roots[i] / DEG })
 }
@@ -512,13 +512,13 @@ impl<'a> Pass<'a> {
     }
 
     /// Over the steps that lead to a mark.
-    pub(super) fn follow(&mut self, steps: &[Step], mark: &Mark) {
+    fn follow(&mut self, steps: &[Step], mark: &Mark) {
         steps.iter().for_each(|step| self.filter.step(step));
         self.errors.follow(steps, mark);
     }
 
     /// The measurements of a mark that are wanted.
-    pub(super) fn measure(&mut self, mark: &Mark, is_wanted: impl Fn(&Row) -> bool) {
+    fn measure(&mut self, mark: &Mark, is_wanted: impl Fn(&Row) -> bool) {
         for row in mark.rows.iter().filter(|row| is_wanted(row)) {
             let (gain, _) = self.filter.measure(row);
             self.errors.measure(row, &gain);
@@ -535,9 +535,9 @@ impl<'a> Pass<'a> {
 /// error of a bias is estimate less truth, so both enter the navigation error alike. States t are independent
 /// of one another and stay so.
 #[derive(Debug, Clone)]
-pub(super) struct Joint<'a> {
+struct Joint<'a> {
     sides: &'a Sides,
-    pub(super) xx: [Nav; NAV],
+    xx: [Nav; NAV],
     xb: Vec<Nav>,
     /// Row-major.
     bb: Vec<f64>,
@@ -737,7 +737,7 @@ impl<'a> Joint<'a> {
     }
 
     /// What a row measures, as a linear form.
-    pub(super) fn measured(&self, row: &Row) -> Column {
+    fn measured(&self, row: &Row) -> Column {
         Column::measured(row, self.sides, self.elapsed)
     }
 
@@ -751,7 +751,7 @@ impl<'a> Joint<'a> {
 
     /// Corrects by a measurement as the filter does whose own covariance this is; returns its gain, and the variance that it
     /// states for the innovation.
-    pub(super) fn measure(&mut self, row: &Row) -> (Gain, f64) {
+    fn measure(&mut self, row: &Row) -> (Gain, f64) {
         let y = self.innovation(&self.measured(row), row.r);
         let gain = y.gain();
         self.correct(&y, &gain);
@@ -819,10 +819,10 @@ impl<'a> Joint<'a> {
 
 /// Covariances with an innovation, and its variance.
 #[derive(Debug, Clone)]
-pub(super) struct Innovation {
-    pub(super) with: Column,
+struct Innovation {
+    with: Column,
     /// Its variance.
-    pub(super) s: f64,
+    s: f64,
 }
 
 impl Innovation {
@@ -837,8 +837,8 @@ impl Innovation {
 
 /// A filter's gain.
 #[derive(Debug, Clone)]
-pub(super) struct Gain {
-    pub(super) x: Nav,
+struct Gain {
+    x: Nav,
     pub(super) b: Vec<f64>,
 }
 
@@ -879,15 +879,15 @@ pub(super) fn add_scaled(to: &mut Nav, factor: f64, x: &Nav) {
 /// A number for each state of z = \[navigation error `x`; bias states `b`\] and for each state `t` of the truth, as
 /// [`Joint`] has them.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Column {
-    pub(super) x: Nav,
+struct Column {
+    x: Nav,
     pub(super) b: Vec<f64>,
     pub(super) t: Vec<f64>,
 }
 
 impl Column {
     /// What a row measures, as a linear form after `elapsed` samples.
-    pub(super) fn measured(row: &Row, sides: &Sides, elapsed: f64) -> Self {
+    fn measured(row: &Row, sides: &Sides, elapsed: f64) -> Self {
         let coefficients = |sources: &[Source]| {
             sources
                 .iter()
@@ -913,9 +913,9 @@ impl Column {
 
 /// Mean of z and of the truth's states, as [`Joint`] has their covariance.
 #[derive(Debug, Clone)]
-pub(super) struct Mean<'a> {
+struct Mean<'a> {
     sides: &'a Sides,
-    pub(super) values: Column,
+    values: Column,
     /// Samples so far.
     elapsed: f64,
 }
@@ -972,15 +972,15 @@ impl<'a> Mean<'a> {
 
 /// The true errors at an instant.
 #[derive(Clone)]
-pub(super) struct Errors<'a> {
+struct Errors<'a> {
     truth: &'a TruthSide,
-    pub(super) joint: Joint<'a>,
+    joint: Joint<'a>,
     mean: Option<Mean<'a>>,
 }
 
 impl<'a> Errors<'a> {
     /// Those of the start.
-    pub(super) fn at_start(track: &Track, sides: &'a Sides, truth: &'a TruthSide) -> Self {
+    fn at_start(track: &Track, sides: &'a Sides, truth: &'a TruthSide) -> Self {
         let begin = if truth.starts_off {
             track.start
         } else {
@@ -998,7 +998,7 @@ impl<'a> Errors<'a> {
     }
 
     /// Over the steps that lead to a mark.
-    pub(super) fn follow(&mut self, steps: &[Step], mark: &Mark) {
+    fn follow(&mut self, steps: &[Step], mark: &Mark) {
         for step in steps {
             self.joint.step(step);
             self.mean.iter_mut().for_each(|mean| mean.step(step));
@@ -1011,7 +1011,7 @@ impl<'a> Errors<'a> {
     }
 
     /// Corrects by a measurement with the filter's gain; returns the expected square of the innovation.
-    pub(super) fn measure(&mut self, row: &Row, gain: &Gain) -> f64 {
+    fn measure(&mut self, row: &Row, gain: &Gain) -> f64 {
         // Without its noise where the source under study is another one: covariances of independent sources
         // add.
         let measured = self.joint.measured(row);
@@ -1032,14 +1032,14 @@ impl<'a> Errors<'a> {
         y.s + mean * mean
     }
 
-    pub(super) fn judged(&self, mark: &Mark, believed: &[Nav; NAV]) -> Judged {
+    fn judged(&self, mark: &Mark, believed: &[Nav; NAV]) -> Judged {
         Judged {
             errors: self.instant(mark),
             believed: *believed,
         }
     }
 
-    pub(super) fn instant(&self, mark: &Mark) -> Instant {
+    fn instant(&self, mark: &Mark) -> Instant {
         Instant {
             after_s: mark.after_s,
             t_s: mark.t_s,

@@ -28,7 +28,7 @@ pub(super) const NAV: usize = 9;
 pub(super) type Nav = [f64; NAV];
 
 /// Longest step (s): a bias is represented by its mean over the step.
-pub(super) const STEP_S: f64 = 0.2;
+const STEP_S: f64 = 0.2;
 
 /// What happens to the navigation error over a step: x⁺ = `m` x + `b` e, e the errors of the biases (estimate
 /// less truth) of the signals, their means over the step. Columns; `b` of the signals that the track follows.
@@ -81,7 +81,7 @@ pub(super) struct Row {
     pub(super) noise: f64,
     pub(super) what: Measured,
     /// Velocity of the point of the vehicle (m/s) and acceleration (m/s²), in b.
-    pub(super) motion: [DVec3; 2],
+    motion: [DVec3; 2],
     /// Whether outages withhold it.
     pub(super) of_gnss: bool,
 }

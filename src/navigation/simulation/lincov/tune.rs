@@ -551,7 +551,7 @@ impl DrawFactors {
     }
 
     /// The consistency of another filter, by the first truth.
-    pub(super) fn consistency(&self, first: &[Assessment]) -> FilterConsistency {
+    fn consistency(&self, first: &[Assessment]) -> FilterConsistency {
         let mut consistency = FilterConsistency::of(first, None);
         let mut departures = departures(first, None);
         departures
@@ -643,7 +643,7 @@ impl Factor {
 }
 
 /// Largest logarithm of a factor.
-pub(super) const MAX_LN: f64 = 12.0;
+const MAX_LN: f64 = 12.0;
 
 /// The factors of a model, all 1: of the sensors with noise that a filter models.
 pub(super) fn multiplied(model: &Model) -> Vec<Factor> {
@@ -680,7 +680,7 @@ fn amplitude(process: &Process) -> (&'static str, f64) {
     }
 }
 
-pub(super) fn set(factors: &[Factor], ln: &[f64]) -> Vec<Factor> {
+fn set(factors: &[Factor], ln: &[f64]) -> Vec<Factor> {
     factors
         .iter()
         .zip(ln)
