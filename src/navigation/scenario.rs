@@ -356,6 +356,7 @@ impl Scenario {
         found.extend(
             self.aiding
                 .unexpected()
+                .into_iter()
                 .map(|(source, key)| Unexpected::Aiding { source, key }),
         );
         found

@@ -168,6 +168,16 @@ impl Aid {
         ["nhc", "odometer", "zupt", "heading"][self as usize]
     }
 
+    /// Its white noise in a budget, and the key that makes a filter expect it.
+    const fn noise(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Nhc => ("aiding.nhc", "aiding.nhc.sigma_m_s"),
+            Self::Odometer => ("aiding.odometer", "aiding.odometer.sigma_m_s"),
+            Self::Zupt => ("aiding.zupt", "aiding.zupt.sigma_m_s"),
+            Self::Heading => ("aiding.heading", "aiding.heading.sigma_deg"),
+        }
+    }
+
     /// The axes of the vehicle along which it measures the velocity; none of a heading.
     pub(crate) const fn axes(self) -> &'static [usize] {
         match self {
@@ -187,141 +197,81 @@ const BRISK: f64 = 20.0;
 const LASTING_FIXES: f64 = 10.0;
 
 impl AidingSettings {
-    /// Errors that last, felt beside the white noise that the filter expects, of which it has no states: their names in
-    /// a budget, and the key that makes it expect them.
-    pub(crate) fn unexpected(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
-        // As for the errors of positions: a filter averages white noise over the time that the error lasts.
-        let felt = |error: f64, time_s: f64, rate_hz: f64, sigma: f64| {
-            error > 0.5 * sigma / (rate_hz * time_s).max(1.0).sqrt()
+    /// Sources of error that a filter feels and does not expect: their names in a budget, and the key that makes it expect
+    /// them.
+    pub(crate) fn unexpected(&self) -> Vec<(&'static str, &'static str)> {
+        let is_noisier = |(aid, _): &(Aid, f64)| {
+            let [believed, true_sigma] = self.sigmas(*aid);
+            true_sigma > believed
         };
-        let (nhc, odometer) = (self.nhc.as_ref(), self.odometer.as_ref());
-        let (zupt, heading) = (self.zupt.as_ref(), self.heading.as_ref());
-        let slips = |slip: f64, sigma: f64| slip * BRISK > 0.5 * sigma;
-        let all = [
-            (
-                nhc.is_some_and(|s| {
-                    s.truth
-                        .noise_sigma_m_s
-                        .is_some_and(|noise| noise > s.sigma_m_s)
-                }),
-                ("aiding.nhc", "aiding.nhc.sigma_m_s"),
-            ),
-            (
-                nhc.is_some_and(|s| slips(s.truth.sideslip_s2_m, s.sigma_m_s)),
-                ("aiding.nhc.slip", "aiding.nhc.sigma_m_s"),
-            ),
-            (
-                odometer.is_some_and(|s| {
-                    s.truth
-                        .noise_sigma_m_s
-                        .is_some_and(|noise| noise > s.sigma_m_s)
-                }),
-                ("aiding.odometer", "aiding.odometer.sigma_m_s"),
-            ),
-            (
-                odometer.is_some_and(|s| slips(s.truth.slip_s2_m, s.sigma_m_s)),
-                ("aiding.odometer.slip", "aiding.odometer.sigma_m_s"),
-            ),
-            (
-                nhc.is_some_and(|s| s.mounting_sigma_deg < 0.5 * s.truth.mounting_sigma_deg),
-                ("aiding.nhc.mounting", "aiding.nhc.mounting_sigma_deg"),
-            ),
-            (
-                nhc.is_some_and(|s| {
-                    felt(
-                        s.truth.walk_sigma_m_s,
-                        s.truth.correlation_time_s,
-                        s.rate_hz,
-                        s.sigma_m_s,
-                    )
-                }),
-                ("aiding.nhc.suspension", "aiding.nhc.sigma_m_s"),
-            ),
-            (
-                odometer.is_some_and(|s| s.scale_sigma < 0.5 * s.truth.scale_sigma),
-                ("aiding.odometer.scale", "aiding.odometer.scale_sigma"),
-            ),
-            (
-                zupt.is_some_and(|s| {
-                    felt(
-                        s.truth.walk_sigma_m_s,
-                        s.truth.correlation_time_s,
-                        s.rate_hz,
-                        s.sigma_m_s,
-                    )
-                }),
-                ("aiding.zupt.creep", "aiding.zupt.sigma_m_s"),
-            ),
-            (
-                heading
-                    .is_some_and(|s| s.truth.offset_sigma_deg > 0.5 * s.sigma_deg / LASTING_FIXES),
-                ("aiding.heading.offset", "aiding.heading.sigma_deg"),
-            ),
-            (
-                heading.is_some_and(|s| {
-                    felt(
-                        s.truth.walk_sigma_deg,
-                        s.truth.correlation_time_s,
-                        s.rate_hz,
-                        s.sigma_deg,
-                    )
-                }),
-                ("aiding.heading.correlated", "aiding.heading.sigma_deg"),
-            ),
-        ];
-        all.into_iter()
-            .filter_map(|(is_there, found)| is_there.then_some(found))
+        let noise = self.rates().filter(is_noisier).map(|(aid, _)| aid.noise());
+        let lasting = self.errors().into_iter().filter(|error| error.is_felt);
+        let mut found: Vec<_> = noise
+            .chain(lasting.map(|error| error.part.names()))
+            .collect();
+        // Two parts of one name stand together.
+        found.dedup();
+        found
     }
 
     /// What is truly wrong with them beside white noise (m/s, rad, 1).
     pub(crate) fn errors(&self) -> Vec<AidError> {
+        use AidPart::*;
         let mut all = Vec::new();
-        let mut push = |aid, part, law: Law| {
-            all.extend((law.size() > 0.0).then_some(AidError { aid, part, law }))
+        let mut push = |part, law: Law, unfelt: f64| {
+            let size = law.size();
+            let is_felt = size > unfelt;
+            all.extend((size > 0.0).then_some(AidError { part, law, is_felt }));
         };
-        if let Some(NhcSettings { truth, .. }) = &self.nhc {
-            let mounting = Law::Constant(truth.mounting_sigma_deg * DEG);
-            push(Aid::Nhc, AidPart::MountingPitch, mounting);
-            push(Aid::Nhc, AidPart::MountingYaw, mounting);
-            push(Aid::Nhc, AidPart::Slip, Law::Known(truth.sideslip_s2_m));
-            let moving = Law::GaussMarkov {
-                sigma: truth.walk_sigma_m_s,
-                time_s: truth.correlation_time_s,
-            };
-            push(Aid::Nhc, AidPart::SuspensionLateral, moving);
-            push(Aid::Nhc, AidPart::SuspensionVertical, moving);
-        }
-        if let Some(OdometerSettings { truth, .. }) = &self.odometer {
+        // As for the errors of positions: a filter averages white noise over the time that the error lasts.
+        let averaged = |sigma: f64, measurements: f64| 0.5 * sigma / measurements.max(1.0).sqrt();
+        if let Some(nhc) = &self.nhc {
+            let (truth, time_s) = (&nhc.truth, nhc.truth.correlation_time_s);
+            for part in [MountingPitch, MountingYaw] {
+                let law = Law::Constant(truth.mounting_sigma_deg * DEG);
+                push(part, law, 2.0 * nhc.mounting_sigma_deg * DEG);
+            }
             push(
-                Aid::Odometer,
-                AidPart::WheelScale,
+                Slip,
+                Law::Known(truth.sideslip_s2_m),
+                0.5 * nhc.sigma_m_s / BRISK,
+            );
+            for part in [SuspensionLateral, SuspensionVertical] {
+                let sigma = truth.walk_sigma_m_s;
+                let law = Law::GaussMarkov { sigma, time_s };
+                push(part, law, averaged(nhc.sigma_m_s, nhc.rate_hz * time_s));
+            }
+        }
+        if let Some(wheel) = &self.odometer {
+            let truth = &wheel.truth;
+            push(
+                WheelScale,
                 Law::Constant(truth.scale_sigma),
+                2.0 * wheel.scale_sigma,
             );
             push(
-                Aid::Odometer,
-                AidPart::WheelSlip,
+                WheelSlip,
                 Law::Known(truth.slip_s2_m),
+                0.5 * wheel.sigma_m_s / BRISK,
             );
         }
-        if let Some(ZuptSettings { truth, .. }) = &self.zupt {
-            let creeping = Law::GaussMarkov {
-                sigma: truth.walk_sigma_m_s,
-                time_s: truth.correlation_time_s,
-            };
-            push(Aid::Zupt, AidPart::Creep, creeping);
+        if let Some(zupt) = &self.zupt {
+            let (sigma, time_s) = (zupt.truth.walk_sigma_m_s, zupt.truth.correlation_time_s);
+            let law = Law::GaussMarkov { sigma, time_s };
+            push(Creep, law, averaged(zupt.sigma_m_s, zupt.rate_hz * time_s));
         }
-        if let Some(HeadingSettings { truth, .. }) = &self.heading {
-            push(
-                Aid::Heading,
-                AidPart::HeadingOffset,
-                Law::Constant(truth.offset_sigma_deg * DEG),
-            );
+        if let Some(heading) = &self.heading {
+            let (truth, time_s) = (&heading.truth, heading.truth.correlation_time_s);
+            let white = heading.sigma_deg * DEG;
+            let offset = Law::Constant(truth.offset_sigma_deg * DEG);
+            push(HeadingOffset, offset, averaged(white, LASTING_FIXES));
             let sigma = truth.walk_sigma_deg * DEG;
-            let lasting = Law::GaussMarkov {
-                sigma,
-                time_s: truth.correlation_time_s,
-            };
-            push(Aid::Heading, AidPart::HeadingCorrelated, lasting);
+            let law = Law::GaussMarkov { sigma, time_s };
+            push(
+                HeadingCorrelated,
+                law,
+                averaged(white, heading.rate_hz * time_s),
+            );
         }
         all
     }
@@ -330,9 +280,10 @@ impl AidingSettings {
 /// An error of an aid that lasts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct AidError {
-    pub(crate) aid: Aid,
     pub(crate) part: AidPart,
     pub(crate) law: Law,
+    /// True if the filter, with the states that it has, does not expect so large a one.
+    is_felt: bool,
 }
 
 /// Which of them.
@@ -351,42 +302,55 @@ pub(crate) enum AidPart {
 }
 
 impl AidPart {
-    /// As a budget calls it; parts of one name are one source.
-    pub(crate) const fn name(self) -> &'static str {
+    /// The aid, its source in a budget (parts of one name are one source), its stream of random numbers, and the key that makes
+    /// a filter expect it.
+    const fn row(self) -> (Aid, &'static str, &'static str, &'static str) {
+        const NHC: (&str, &str) = ("aiding.nhc.sigma_m_s", "aiding.nhc.mounting_sigma_deg");
+        const HEADING: &str = "aiding.heading.sigma_deg";
+        let (wheel, scale) = ("aiding.odometer.sigma_m_s", "aiding.odometer.scale_sigma");
         match self {
-            Self::MountingPitch | Self::MountingYaw => "mounting",
-            Self::Slip | Self::WheelSlip => "slip",
-            Self::SuspensionLateral | Self::SuspensionVertical => "suspension",
-            Self::WheelScale => "scale",
-            Self::Creep => "creep",
-            Self::HeadingOffset => "offset",
-            Self::HeadingCorrelated => "correlated",
-        }
-    }
-
-    /// Its stream of random numbers: its name, and the axis where a name has two.
-    const fn stream(self) -> &'static str {
-        match self {
-            Self::MountingPitch => "mounting_pitch",
-            Self::MountingYaw => "mounting_yaw",
-            Self::SuspensionLateral => "suspension_lateral",
-            Self::SuspensionVertical => "suspension_vertical",
-            other => other.name(),
+            Self::MountingPitch => (Aid::Nhc, "aiding.nhc.mounting", "mounting_pitch", NHC.1),
+            Self::MountingYaw => (Aid::Nhc, "aiding.nhc.mounting", "mounting_yaw", NHC.1),
+            Self::Slip => (Aid::Nhc, "aiding.nhc.slip", "slip", NHC.0),
+            Self::SuspensionLateral => (
+                Aid::Nhc,
+                "aiding.nhc.suspension",
+                "suspension_lateral",
+                NHC.0,
+            ),
+            Self::SuspensionVertical => (
+                Aid::Nhc,
+                "aiding.nhc.suspension",
+                "suspension_vertical",
+                NHC.0,
+            ),
+            Self::WheelScale => (Aid::Odometer, "aiding.odometer.scale", "scale", scale),
+            Self::WheelSlip => (Aid::Odometer, "aiding.odometer.slip", "slip", wheel),
+            Self::Creep => (
+                Aid::Zupt,
+                "aiding.zupt.creep",
+                "creep",
+                "aiding.zupt.sigma_m_s",
+            ),
+            Self::HeadingOffset => (Aid::Heading, "aiding.heading.offset", "offset", HEADING),
+            Self::HeadingCorrelated => (
+                Aid::Heading,
+                "aiding.heading.correlated",
+                "correlated",
+                HEADING,
+            ),
         }
     }
 
     /// The aid that it is part of.
     pub(crate) const fn aid(self) -> Aid {
-        match self {
-            Self::MountingPitch
-            | Self::MountingYaw
-            | Self::Slip
-            | Self::SuspensionLateral
-            | Self::SuspensionVertical => Aid::Nhc,
-            Self::WheelScale | Self::WheelSlip => Aid::Odometer,
-            Self::Creep => Aid::Zupt,
-            Self::HeadingOffset | Self::HeadingCorrelated => Aid::Heading,
-        }
+        self.row().0
+    }
+
+    /// Its source in a budget, and the key that makes a filter expect it.
+    pub(crate) const fn names(self) -> (&'static str, &'static str) {
+        let (_, source, _, key) = self.row();
+        (source, key)
     }
 
     /// What a unit of it adds to the measurement along an axis of the vehicle (a heading has one, 0), which moves with
@@ -450,9 +414,10 @@ impl AidNoise {
     /// The errors of run `key.run`.
     pub(crate) fn new(settings: &AidingSettings, key: StreamKey<'_>) -> Self {
         let walk = |error: AidError| {
-            let process = error.part.stream();
+            let (aid, _, process, _) = error.part.row();
+            let source = aid.name();
             let mut stream = StreamKey {
-                source: error.aid.name(),
+                source,
                 process,
                 ..key
             }
@@ -507,7 +472,7 @@ impl AidNoise {
         for (error, walk) in self
             .lasting
             .iter_mut()
-            .filter(|(error, _)| error.aid == aid)
+            .filter(|(error, _)| error.part.aid() == aid)
         {
             let coefficient = error.part.coefficient(axis, v_b, a_b);
             if coefficient != 0.0 {

@@ -332,18 +332,18 @@ fn correlated(gnss: &GnssSettings, imu_hz: f64) -> Option<NamedSource> {
 
 /// What is wrong with the vehicle's own measurements beside white noise: parts of one name are one source.
 fn lasting(aiding: &AidingSettings, imu_hz: f64) -> Vec<NamedSource> {
-    let mut found: Vec<(String, Vec<Source>)> = Vec::new();
-    for AidError { aid, part, law } in aiding.errors() {
-        let name = format!("aiding.{}.{}", aid.name(), part.name());
+    let mut found: Vec<(&str, Vec<Source>)> = Vec::new();
+    for AidError { part, law, .. } in aiding.errors() {
+        let (name, _) = part.names();
         let source = Source::of_vehicle(part, law, imu_hz);
-        match found.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, states)) => states.push(source),
-            None => found.push((name, vec![source])),
+        match found.last_mut() {
+            Some((known, states)) if *known == name => states.push(source),
+            _ => found.push((name, vec![source])),
         }
     }
-    found
-        .into_iter()
-        .filter_map(|(name, states)| inertial(name, states))
+    let sources = found.into_iter();
+    sources
+        .filter_map(|(name, states)| inertial(name.to_owned(), states))
         .collect()
 }
 
