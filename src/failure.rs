@@ -456,7 +456,7 @@ impl From<OutageError> for Failure {
 
 impl From<ExperimentError> for Failure {
     fn from(e: ExperimentError) -> Self {
-        let is_rate = matches!(e, ExperimentError::FixBetweenSamples { .. });
+        let is_rate = matches!(e, ExperimentError::BetweenSamples(_));
         let hint = "the IMU has the rate of the recordings: another [gnss] rate_hz in --scenario";
         Self::input(e).maybe_hint(is_rate.then(|| hint.to_owned()))
     }

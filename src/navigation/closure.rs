@@ -5,33 +5,10 @@ use crate::earth::{GravityModel, MAX_LATITUDE, ned_difference};
 use crate::frames::NavState;
 use crate::lanes::{Lanes, Vec3};
 use crate::linalg::larger;
-use crate::sensors::ideal_imu::{self, ideal_imu};
+use crate::sensors::ideal_imu::ideal_imu;
 use crate::strapdown::{self, Strapdown};
 use crate::trajectory::Trajectory;
-
-/// The closure cannot be computed.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Error {
-    /// No IMU samples.
-    #[error(transparent)]
-    Imu(#[from] ideal_imu::Error),
-    /// Too much rotation in a sample.
-    #[error(
-        "the vehicle turns {angle_deg:.0}° within one sample at {t_s} s: too slow a rate for it"
-    )]
-    Rotation {
-        /// Angle (deg).
-        angle_deg: f64,
-        /// Time of the sample (s).
-        t_s: f64,
-    },
-    /// Too near a pole.
-    #[error("the trajectory comes nearer than 0.1° to a pole at {t_s} s")]
-    Pole {
-        /// When (s).
-        t_s: f64,
-    },
-}
+use crate::units::Refused;
 
 /// How far the mechanised samples come away from the trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -82,7 +59,7 @@ impl Closure {
         trajectory: &Trajectory,
         rate_hz: f64,
         gravity: GravityModel,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, Refused> {
         let samples = ideal_imu(trajectory, rate_hz, gravity)?;
         let dt = 1.0 / rate_hz;
         let mut ins = Strapdown::new(&trajectory.state(trajectory.start_s()), gravity);
@@ -100,15 +77,17 @@ impl Closure {
             let t_s = trajectory.start_s() + (k + 1) as f64 / rate_hz;
             let dtheta = sample.omega_ib_b * dt;
             if dtheta.length() > strapdown::MAX_ROTATION {
-                return Err(Error::Rotation {
-                    angle_deg: dtheta.length() / crate::units::DEG,
-                    t_s,
-                });
+                let angle_deg = dtheta.length() / crate::units::DEG;
+                return Err(Refused(format!(
+                    "the vehicle turns {angle_deg:.0}° within one sample at {t_s} s: too slow a rate for it"
+                )));
             }
             ins.step(Vec3::splat(dtheta), Vec3::splat(sample.f_ib_b * dt), dt);
             let truth = trajectory.state(t_s);
             if truth.lat.abs() > MAX_LATITUDE {
-                return Err(Error::Pole { t_s });
+                return Err(Refused(format!(
+                    "the trajectory comes nearer than 0.1° to a pole at {t_s} s"
+                )));
             }
             closure.widen(&truth, &ins.lane(0));
             damp(&mut ins, &truth, dt);

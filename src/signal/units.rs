@@ -56,6 +56,11 @@ impl SettingError {
     }
 }
 
+/// Data or settings for which there is no answer, in words.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Refused(pub String);
+
 /// A number as schemas of files have it.
 macro_rules! number_in_schemas {
     ($(#[$meta:meta])* $name:ident, $bounds:tt) => {

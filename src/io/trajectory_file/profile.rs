@@ -79,7 +79,7 @@ fn path_of(segment: usize) -> String {
 
 /// The refusal of a profile at the line of the key at fault.
 fn blame(source: &Source, segments: &[SegmentTable], e: &profile::Error) -> Failure {
-    let key = e.problem.key();
+    let key = e.problem.key;
     let path = match e.segment {
         Some(i) if key == "climb_m" && matches!(segments[i].kind, Described::Climb(_)) => {
             format!("{}.height_m", path_of(i))
@@ -90,7 +90,7 @@ fn blame(source: &Source, segments: &[SegmentTable], e: &profile::Error) -> Fail
     };
     source
         .refused(&path, e.problem.to_string())
-        .or_hint_if(e.problem.hint().map(str::to_owned))
+        .or_hint_if(e.problem.advice.map(str::to_owned))
 }
 
 /// A height at which the gravity model means something.

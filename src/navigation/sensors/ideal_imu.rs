@@ -3,23 +3,8 @@
 use crate::earth::{GravityModel, OMEGA_IE, ecef_to_geodetic, gravity_down};
 use crate::imu::{ImuSample, MAX_RATE_HZ};
 use crate::trajectory::Trajectory;
+use crate::units::Refused;
 use glam::DVec3;
-
-/// No IMU samples can be made.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Error {
-    /// Not a sample rate.
-    #[error("IMU rate {0} Hz is not a number > 0 and ≤ {MAX_RATE_HZ}")]
-    Rate(f64),
-    /// The trajectory ends before the first sample does.
-    #[error("the trajectory lasts {duration_s} s: less than one sample at {rate_hz} Hz")]
-    TooShort {
-        /// Duration of the trajectory (s).
-        duration_s: f64,
-        /// Sample rate (Hz).
-        rate_hz: f64,
-    },
-}
 
 /// Angular rate omega_ib_b and specific force f_ib_b at an instant
 /// ([Groves](crate::bibliography::Groves13), eqs. 2.26, 2.125 and 2.147 without inertial frame):
@@ -54,19 +39,20 @@ pub fn ideal_imu(
     trajectory: &Trajectory,
     rate_hz: f64,
     gravity: GravityModel,
-) -> Result<Vec<ImuSample>, Error> {
+) -> Result<Vec<ImuSample>, Refused> {
     if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
-        return Err(Error::Rate(rate_hz));
+        return Err(Refused(format!(
+            "IMU rate {rate_hz} Hz is not a number > 0 and ≤ {MAX_RATE_HZ}"
+        )));
     }
     let start_s = trajectory.start_s();
     let duration_s = trajectory.end_s() - start_s;
     // A duration of 900 s at 100 Hz is 90000 samples, also when it was written 899.9999999 s.
     let n = (duration_s * rate_hz + 1e-6).floor() as usize;
     if n == 0 {
-        return Err(Error::TooShort {
-            duration_s,
-            rate_hz,
-        });
+        return Err(Refused(format!(
+            "the trajectory lasts {duration_s} s: less than one sample at {rate_hz} Hz"
+        )));
     }
     let instant = |k: usize| start_s + k as f64 / rate_hz;
     let mut knots = trajectory.knots();

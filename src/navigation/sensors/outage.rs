@@ -7,6 +7,7 @@ use crate::units::{Positive, SettingError};
 use rand_distr::{Distribution, Exp};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use std::str::FromStr;
 
 /// A window without fixes.
@@ -61,6 +62,12 @@ impl Outage {
             self.end_s,
             format!("it must come after start_s = {}", self.start_s),
         ))
+    }
+}
+
+impl fmt::Display for Outage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.start_s, self.end_s)
     }
 }
 
@@ -162,14 +169,17 @@ impl<'a> FixedData<'a> {
     /// An outage asked for by its times, cut where the data end.
     pub(super) fn place(&self, asked: Outage) -> Result<Outage, OutageError> {
         let (start_s, end_s) = self.span_s;
+        let refused = |reason: String| {
+            Err(OutageError::Placed {
+                message: format!("outage {asked} {reason}"),
+                fixes: self.described(),
+            })
+        };
         // clocks and people round to a microsecond
         if asked.start_s < start_s - 1e-6 || asked.start_s >= end_s {
-            let span_s = self.span_s;
-            return Err(OutageError::Outside {
-                asked,
-                span_s,
-                fixes: self.described(),
-            });
+            return refused(format!(
+                "does not lie on the data, which last from {start_s} to {end_s} s"
+            ));
         }
         let placed = Outage {
             end_s: asked.end_s.min(end_s),
@@ -178,10 +188,7 @@ impl<'a> FixedData<'a> {
         if self.has_fix_in(&placed) {
             return Ok(placed);
         }
-        Err(OutageError::NoFix {
-            asked,
-            fixes: self.described(),
-        })
+        refused("withholds no fix".to_owned())
     }
 }
 
@@ -191,21 +198,11 @@ pub enum OutageError {
     /// A value that no data could have.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// One asked for by its times that begins before the data or after them.
-    #[error("outage {}:{} does not lie on the data, which last from {} to {} s", .asked.start_s, .asked.end_s, .span_s.0, .span_s.1)]
-    Outside {
-        /// As asked for.
-        asked: Outage,
-        /// Of the data (s).
-        span_s: (f64, f64),
-        /// The fixes of the data, in words.
-        fixes: String,
-    },
-    /// One asked for by its times into which no fix falls.
-    #[error("outage {}:{} withholds no fix", .asked.start_s, .asked.end_s)]
-    NoFix {
-        /// As asked for.
-        asked: Outage,
+    /// One asked for by its times that begins off the data, or into which no fix falls.
+    #[error("{message}")]
+    Placed {
+        /// The refusal.
+        message: String,
         /// The fixes of the data, in words.
         fixes: String,
     },
@@ -216,59 +213,9 @@ impl OutageError {
     pub fn hint(&self) -> Option<&str> {
         match self {
             Self::Setting(_) => None,
-            Self::Outside { fixes, .. } | Self::NoFix { fixes, .. } => Some(fixes),
+            Self::Placed { fixes, .. } => Some(fixes),
         }
     }
-}
-
-/// What became of outages on data that are not as they were asked for.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum OutageRemark {
-    /// One asked for is cut where the trajectory ends.
-    #[error("outage {}:{} is cut: the trajectory ends at {end_s} s", .asked.start_s, .asked.end_s)]
-    Cut {
-        /// As asked for.
-        asked: Outage,
-        /// End of the data (s).
-        end_s: f64,
-    },
-    /// One asked for is cut where the next fix would come.
-    #[error("outage {}:{} is cut at {end_s} s: the fixes end at {last_s} s", .asked.start_s, .asked.end_s)]
-    CutAfterFixes {
-        /// As asked for.
-        asked: Outage,
-        /// Where it ends (s).
-        end_s: f64,
-        /// Last fix (s).
-        last_s: f64,
-    },
-    /// Some overlap or touch.
-    #[error("outages that overlap or touch are made one")]
-    United,
-    /// The periodic ones begin after the data.
-    #[error("outage_periodic.first_s = {first_s} s: the trajectory ends at {end_s} s")]
-    PeriodicTooLate {
-        /// Start of the first (s).
-        first_s: f64,
-        /// End of the data (s).
-        end_s: f64,
-    },
-    /// A default one is cut.
-    #[error("the default outage {}:{} is cut: the trajectory lasts from {} to {} s", .default.start_s, .default.end_s, .span_s.0, .span_s.1)]
-    DefaultCut {
-        /// As it would be.
-        default: Outage,
-        /// Of the data (s).
-        span_s: (f64, f64),
-    },
-    /// A default one lies outside.
-    #[error("the default outage {}:{} is left out: the trajectory lasts from {} to {} s", .default.start_s, .default.end_s, .span_s.0, .span_s.1)]
-    DefaultLeftOut {
-        /// As it would be.
-        default: Outage,
-        /// Of the data (s).
-        span_s: (f64, f64),
-    },
 }
 
 /// Outages as they are on data.
@@ -277,7 +224,7 @@ pub struct PlacedOutages {
     /// In time order, apart from one another.
     pub windows: Vec<Outage>,
     /// Where they are not what was asked for.
-    pub remarks: Vec<OutageRemark>,
+    pub remarks: Vec<String>,
 }
 
 // Outages at regular and at random times.
@@ -436,7 +383,7 @@ impl OutagePlan {
     /// };
     /// let placed = plan(50.0, 70.0).on(&data, 1)?;
     /// assert_eq!(placed.windows, [Outage { start_s: 50.0, end_s: 60.0 }]);
-    /// assert_eq!(placed.remarks[0].to_string(), "outage 50:70 is cut: the trajectory ends at 60 s");
+    /// assert_eq!(placed.remarks[0], "outage 50:70 is cut: the trajectory ends at 60 s");
     /// assert!(plan(70.0, 90.0).on(&data, 1).is_err());
     /// # Ok::<(), nav_sim_navigation::sensors::outage::OutageError>(())
     /// ```
@@ -450,15 +397,10 @@ impl OutagePlan {
         for asked in &self.fixed {
             if data.place(*asked)? != *asked {
                 remarks.push(match data.fixes {
-                    Fixes::At([.., last_s]) => OutageRemark::CutAfterFixes {
-                        asked: *asked,
-                        end_s,
-                        last_s: *last_s,
-                    },
-                    _ => OutageRemark::Cut {
-                        asked: *asked,
-                        end_s,
-                    },
+                    Fixes::At([.., last]) => {
+                        format!("outage {asked} is cut at {end_s} s: the fixes end at {last} s")
+                    }
+                    _ => format!("outage {asked} is cut: the trajectory ends at {end_s} s"),
                 });
             }
         }
@@ -466,27 +408,28 @@ impl OutagePlan {
         // Every fixed window lies on the data by now: fewer windows than were asked for can only come of a
         // union.
         if self.fixed.len() > windows.len() {
-            remarks.push(OutageRemark::United);
+            remarks.push("outages that overlap or touch are made one".to_owned());
         }
         if let Some(first_s) = self
             .periodic
             .map(|p| p.first_s)
             .filter(|first_s| *first_s >= end_s)
         {
-            remarks.push(OutageRemark::PeriodicTooLate { first_s, end_s });
+            remarks.push(format!(
+                "outage_periodic.first_s = {first_s} s: the trajectory ends at {end_s} s"
+            ));
         }
         for default in self.default.iter().copied() {
-            if default.end_s <= start_s || default.start_s >= end_s {
-                remarks.push(OutageRemark::DefaultLeftOut {
-                    default,
-                    span_s: data.span_s,
-                });
+            let what = if default.end_s <= start_s || default.start_s >= end_s {
+                "left out"
             } else if default.start_s < start_s || default.end_s > end_s {
-                remarks.push(OutageRemark::DefaultCut {
-                    default,
-                    span_s: data.span_s,
-                });
-            }
+                "cut"
+            } else {
+                continue;
+            };
+            remarks.push(format!(
+                "the default outage {default} is {what}: the trajectory lasts from {start_s} to {end_s} s"
+            ));
         }
         Ok(PlacedOutages { windows, remarks })
     }

@@ -8,12 +8,12 @@ use crate::noise::continuous::same_rate;
 use crate::sensors::aiding::{Aid, AidingSettings};
 use crate::sensors::defects::{ImuSettings, Surroundings};
 use crate::sensors::gnss::{BaroSettings, GnssSettings};
-use crate::sensors::ideal_imu::{self, ideal_imu};
+use crate::sensors::ideal_imu::ideal_imu;
 use crate::sensors::imu::{ErrorSource, Truth, TruthError};
 use crate::sensors::outage::Outage;
 use crate::strapdown::MAX_ROTATION;
 use crate::trajectory::Trajectory;
-use crate::units::DEG;
+use crate::units::{DEG, Refused};
 use glam::DVec3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -57,65 +57,19 @@ pub struct Experiment<'a> {
 /// Why an experiment cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum ExperimentError {
-    /// The ideal IMU could not be computed.
+    /// Trajectory, IMU and filter do not fit together.
     #[error(transparent)]
-    IdealImu(#[from] ideal_imu::Error),
+    Refused(#[from] Refused),
     /// The truth does not serve.
     #[error(transparent)]
     Truth(#[from] TruthError),
-    /// Latitude and longitude lose their meaning.
-    #[error(
-        "the trajectory reaches latitude {lat_deg}° at {t_s} s; beyond ±89.9° it cannot be navigated in latitude and longitude"
-    )]
-    Pole {
-        /// When (s).
-        t_s: f64,
-        /// Where (degrees).
-        lat_deg: f64,
-    },
-    /// The body turns too far in one sample.
-    #[error(
-        "the vehicle turns {angle_deg:.1}° within one IMU sample at {t_s} s; at most {max_deg:.1}° can be followed at {rate_hz} Hz"
-    )]
-    TurnsTooFast {
-        /// When (s).
-        t_s: f64,
-        /// Rotation of the sample (degrees).
-        angle_deg: f64,
-        /// Largest valid rotation (degrees).
-        max_deg: f64,
-        /// IMU rate (Hz).
-        rate_hz: f64,
-    },
-    /// The filter's model belongs to another rate.
-    #[error("the filter's model belongs to {model_hz} Hz, the IMU runs at {imu_hz} Hz")]
-    BeliefRate {
-        /// Rate of the model (Hz).
-        model_hz: f64,
-        /// Rate of the IMU (Hz).
-        imu_hz: f64,
-    },
-    /// The vehicle moves sideways or up by itself.
-    #[error(
-        "aiding.nhc.sigma_m_s = {sigma_m_s}: the reference itself moves sideways and up with {rms_m_s:.2} m/s (root mean \
-         square of each) at this point, more than 0.3 of it: set lever_arm_m to the rear axle of a car, or a larger sigma"
-    )]
-    Sideslip {
-        /// Root mean square of lateral and vertical velocity (m/s).
-        rms_m_s: f64,
-        /// What the constraint allows (m/s).
-        sigma_m_s: f64,
-    },
-    /// A fix that meets no sample.
-    #[error("the IMU rate {imu_hz} Hz is not a whole multiple of the rate {fix_hz} Hz of {what}")]
-    FixBetweenSamples {
-        /// IMU rate (Hz).
-        imu_hz: f64,
-        /// Rate of the fixes (Hz).
-        fix_hz: f64,
-        /// The sensor.
-        what: &'static str,
-    },
+    /// A measurement that meets no sample.
+    #[error(transparent)]
+    BetweenSamples(Refused),
+}
+
+fn refused<T>(message: String) -> Result<T, ExperimentError> {
+    Err(Refused(message).into())
 }
 
 /// Something happens after this many IMU samples.
@@ -168,10 +122,10 @@ impl<'a> Plan<'a> {
         let rate_hz = experiment.rate_hz;
         for belief in experiment.beliefs {
             if !same_rate(belief.rate_hz, rate_hz) {
-                return Err(ExperimentError::BeliefRate {
-                    model_hz: belief.rate_hz,
-                    imu_hz: rate_hz,
-                });
+                return refused(format!(
+                    "the filter's model belongs to {} Hz, the IMU runs at {rate_hz} Hz",
+                    belief.rate_hz
+                ));
             }
         }
         Self::with_source(experiment, |samples| {
@@ -313,12 +267,11 @@ fn check_rotation(ideal: &[ImuSample], start_s: f64, rate_hz: f64) -> Result<(),
         .iter()
         .position(|s| s.omega_ib_b.length() / rate_hz > MAX_ROTATION);
     too_fast.map_or(Ok(()), |k| {
-        Err(ExperimentError::TurnsTooFast {
-            t_s: start_s + k as f64 / rate_hz,
-            angle_deg: ideal[k].omega_ib_b.length() / rate_hz / DEG,
-            max_deg: MAX_ROTATION / DEG,
-            rate_hz,
-        })
+        let (t_s, most) = (start_s + k as f64 / rate_hz, MAX_ROTATION / DEG);
+        let angle = ideal[k].omega_ib_b.length() / rate_hz / DEG;
+        refused(format!(
+            "the vehicle turns {angle:.1}° within one IMU sample at {t_s} s; at most {most:.1}° can be followed at {rate_hz} Hz"
+        ))
     })
 }
 
@@ -331,11 +284,13 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
         ..
     } = *experiment;
     let step = |fix_hz: f64, what| {
-        samples_per(rate_hz, fix_hz).ok_or(ExperimentError::FixBetweenSamples {
-            imu_hz: rate_hz,
-            fix_hz,
-            what,
-        })
+        let between = || {
+            let multiple = "is not a whole multiple of the rate";
+            Refused(format!(
+                "the IMU rate {rate_hz} Hz {multiple} {fix_hz} Hz of {what}"
+            ))
+        };
+        samples_per(rate_hz, fix_hz).ok_or_else(|| ExperimentError::BetweenSamples(between()))
     };
     let per_fix = step(gnss.rate_hz, "GNSS")?;
     let baro = experiment
@@ -368,10 +323,10 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
         let t_s = trajectory.start_s() + sample as f64 / rate_hz;
         let reference = trajectory.state(t_s);
         if reference.lat.abs() > MAX_LATITUDE {
-            return Err(ExperimentError::Pole {
-                t_s,
-                lat_deg: reference.lat / DEG,
-            });
+            return refused(format!(
+                "the trajectory reaches latitude {}° at {t_s} s; beyond ±89.9° it cannot be navigated in latitude and longitude",
+                reference.lat / DEG
+            ));
         }
         // None at the very start: the initial deviations are those of a vehicle that GNSS has helped to align
         // already.
@@ -497,8 +452,9 @@ fn check_sideslip(experiment: &Experiment<'_>, events: &[Event]) -> Result<(), E
     if rms_m_s <= FORGIVEN * nhc.sigma_m_s {
         return Ok(());
     }
-    Err(ExperimentError::Sideslip {
-        rms_m_s,
-        sigma_m_s: nhc.sigma_m_s,
-    })
+    refused(format!(
+        "aiding.nhc.sigma_m_s = {}: the reference itself moves sideways and up with {rms_m_s:.2} m/s (root mean square of each) \
+         at this point, more than 0.3 of it: set lever_arm_m to the rear axle of a car, or a larger sigma",
+        nhc.sigma_m_s
+    ))
 }

@@ -159,7 +159,14 @@ impl Profile {
                 problem,
             })?;
         }
-        Trajectory::from_samples(&path.samples).map_err(|e| at_start(Problem::Samples(e)))
+        let no_trajectory = |e: super::Error| {
+            let problem = Problem::new("segment", format!("gives no trajectory: {e}"));
+            at_start(match e {
+                super::Error::Rotation { .. } => problem.advise("give the turn more time"),
+                _ => problem,
+            })
+        };
+        Trajectory::from_samples(&path.samples).map_err(no_trajectory)
     }
 
     fn check_start(&self) -> Result<(), Problem> {
@@ -195,7 +202,7 @@ impl Profile {
 
 /// A profile that cannot be followed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{}: \"{}\" {problem}", place(*segment), problem.key())]
+#[error("{}: \"{}\" {problem}", place(*segment), problem.key)]
 pub struct Error {
     /// Which segment, counted from 0; none for the profile's own keys and its start.
     pub segment: Option<usize>,
@@ -207,94 +214,42 @@ fn place(segment: Option<usize>) -> String {
     segment.map_or("start".to_owned(), |i| format!("segment {}", i + 1))
 }
 
-/// What is wrong with a profile; the texts continue `"key" = value`.
+/// The fault of a profile; `text` continues `"key"`.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Problem {
-    /// A value outside its domain.
-    #[error("is not {domain}")]
-    Domain {
-        /// Key in profile files.
-        key: &'static str,
-        /// What would be accepted.
-        domain: &'static str,
-    },
-    /// Something that only a moving vehicle can do.
-    #[error("needs a moving vehicle, but it stands still here")]
-    AtRest {
-        /// Key in profile files.
-        key: &'static str,
-    },
-    /// Too much height for the path.
-    #[error("is too steep: {climb_m} m over {length_m:.1} m of path climbs more than 60°")]
-    TooSteep {
-        /// Height gained (m).
-        climb_m: f64,
-        /// Length of the path (m).
-        length_m: f64,
-    },
-    /// More than a day.
-    #[error("makes the trajectory {total_s:.3e} s long: more than a day")]
-    TooLong {
-        /// Duration up to the end of the segment (s).
-        total_s: f64,
-    },
-    /// A waypoint nearer than the turns before and after it need.
-    #[error("has waypoint {number} too near: {leg_m:.1} m away, the turns take {needed_m:.1} m")]
-    TooNear {
-        /// Which waypoint, from 1.
-        number: usize,
-        /// Distance left to it (m).
-        leg_m: f64,
-        /// Distance the turn needs (m).
-        needed_m: f64,
-    },
-    /// A waypoint inside the turning circle.
-    #[error("has waypoint {number} inside the turning circle")]
-    Unreachable {
-        /// Which waypoint, from 1.
-        number: usize,
-    },
-    /// A corner that turns back.
-    #[error("turns back by {angle_deg:.0}° at waypoint {number}: more than 150°")]
-    TurnsBack {
-        /// Which waypoint, from 1.
-        number: usize,
-        /// The corner (deg).
-        angle_deg: f64,
-    },
-    /// The path leaves the region of latitude and longitude, or turns too fast to sample.
-    #[error("gives no trajectory: {0}")]
-    Samples(super::Error),
+#[error("{text}")]
+pub struct Problem {
+    /// The key in profile files that is to blame.
+    pub key: &'static str,
+    text: String,
+    /// Advice, where the text does not say what to do.
+    pub advice: Option<&'static str>,
 }
 
 impl Problem {
-    /// The key in profile files that is to blame.
-    pub const fn key(&self) -> &'static str {
-        match self {
-            Self::Domain { key, .. } | Self::AtRest { key } => key,
-            Self::TooSteep { .. } => "climb_m",
-            Self::TooNear { .. } | Self::Unreachable { .. } | Self::TurnsBack { .. } => "points",
-            Self::TooLong { .. } => "duration_s",
-            Self::Samples(_) => "segment",
+    fn new(key: &'static str, text: impl Into<String>) -> Self {
+        Self {
+            key,
+            text: text.into(),
+            advice: None,
         }
     }
 
-    /// What to do about it, where that is not plain.
-    pub const fn hint(&self) -> Option<&'static str> {
-        Some(match self {
-            Self::AtRest { .. } => {
-                "put an accelerate segment before it, or give the start a speed_m_s"
-            }
-            Self::TooSteep { .. } => "climb over a longer path, or for longer",
-            Self::TooNear { .. } | Self::Unreachable { .. } => {
-                "turn tighter, go slower, or move the point away"
-            }
-            Self::TurnsBack { .. } => "turn back over two points",
-            Self::Samples(super::Error::Rotation { .. }) => "give the turn more time",
-            Self::Domain { .. } | Self::TooLong { .. } | Self::Samples(_) => return None,
-        })
+    fn advise(self, advice: &'static str) -> Self {
+        Self {
+            advice: Some(advice),
+            ..self
+        }
+    }
+
+    /// Something that only a moving vehicle can do.
+    fn at_rest(key: &'static str) -> Self {
+        Self::new(key, "needs a moving vehicle, but it stands still here")
+            .advise("put an accelerate segment before it, or give the start a speed_m_s")
     }
 }
+
+/// Advice for waypoints that cannot be turned to.
+const NEARER: &str = "turn tighter, go slower, or move the point away";
 
 // From segments to samples.
 
@@ -309,7 +264,7 @@ fn domain(key: &'static str, domain: &'static str, holds: bool) -> Result<(), Pr
     if holds {
         Ok(())
     } else {
-        Err(Problem::Domain { key, domain })
+        Err(Problem::new(key, format!("is not {domain}")))
     }
 }
 
@@ -451,7 +406,7 @@ impl<'a> Path<'a> {
         if self.speed > 0.0 {
             Ok(self.speed)
         } else {
-            Err(Problem::AtRest { key })
+            Err(Problem::at_rest(key))
         }
     }
 
@@ -478,17 +433,21 @@ impl<'a> Path<'a> {
     ) -> Result<(), Problem> {
         let piece = self.piece([duration, ramp_s], speed, heading, climb);
         if climb != 0.0 && piece.length() <= 0.0 {
-            return Err(Problem::AtRest { key: "climb_m" });
+            return Err(Problem::at_rest("climb_m"));
         }
         if piece.steepest() > MAX_SLOPE.sin() {
-            return Err(Problem::TooSteep {
-                climb_m: climb,
-                length_m: piece.length(),
-            });
+            let length_m = piece.length();
+            let text = format!(
+                "is too steep: {climb} m over {length_m:.1} m of path climbs more than 60°"
+            );
+            return Err(
+                Problem::new("climb_m", text).advise("climb over a longer path, or for longer")
+            );
         }
         let total_s = self.t_s + duration - self.profile.start.t_s;
         if total_s > MAX_DURATION_S {
-            return Err(Problem::TooLong { total_s });
+            let text = format!("makes the trajectory {total_s:.3e} s long: more than a day");
+            return Err(Problem::new("duration_s", text));
         }
         self.integrate(&piece);
         Ok(())
@@ -750,11 +709,10 @@ impl Path<'_> {
                 None => 0.0,
             };
             if distance <= lead {
-                return Err(Problem::TooNear {
-                    number,
-                    leg_m: distance,
-                    needed_m: lead,
-                });
+                let text = format!(
+                    "has waypoint {number} too near: {distance:.1} m away, the turns take {lead:.1} m"
+                );
+                return Err(Problem::new("points", text).advise(NEARER));
             }
             let climb = points[i].h.map_or(0.0, |h| h - self.h);
             let length = self.path_length(distance - lead, climb, ramp_s);
@@ -838,10 +796,10 @@ impl Path<'_> {
     ) -> Result<f64, Problem> {
         let angle = wrap_angle(self.course(target, next).0 - self.heading);
         if angle.abs() > MAX_CORNER {
-            return Err(Problem::TurnsBack {
-                number,
-                angle_deg: angle.abs() / DEG,
-            });
+            let angle_deg = angle.abs() / DEG;
+            let text =
+                format!("turns back by {angle_deg:.0}° at waypoint {number}: more than 150°");
+            return Err(Problem::new("points", text).advise("turn back over two points"));
         }
         if angle.abs() < 1e-9 {
             Ok(0.0)
@@ -876,7 +834,8 @@ impl Path<'_> {
             // leap.
             angle -= (miss / slope).clamp(-1.0, 1.0);
         }
-        Err(Problem::Unreachable { number })
+        let text = format!("has waypoint {number} inside the turning circle");
+        Err(Problem::new("points", text).advise(NEARER))
     }
 
     /// What is left to turn (rad) to the target after a turn by an angle.
