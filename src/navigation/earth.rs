@@ -37,7 +37,6 @@ pub const MAX_LATITUDE: f64 = MAX_LATITUDE_DEG * crate::units::DEG;
 pub const MAX_LATITUDE_DEG: f64 = 89.9;
 
 /// The functions of latitude that radii and gravity share: one square root and one division for all.
-#[derive(Debug, Clone, Copy)]
 pub(crate) struct Parallel<R> {
     sin_lat: R,
     /// 1/√(1 − e² sin² lat).

@@ -24,7 +24,6 @@ pub(crate) fn to_glam(v: &Vector3<f64>) -> DVec3 {
 /// C = P Φᵀ (P⁻)⁻¹ times the error there, its covariance D = P − C P⁻ Cᵀ, where P is the covariance here and P⁻ that
 /// predicted there ([Särkkä](crate::bibliography::Sarkka13), sec. 8.2). With the covariance P_s there, that here is
 /// C P_s Cᵀ + D: a sum of what cannot be negative, unlike P + C (P_s − P⁻) Cᵀ, which it equals.
-#[derive(Debug, Clone)]
 pub(crate) struct Link {
     gain: DMatrix<f64>,
     /// Lower triangle of D, column after column.

@@ -197,7 +197,7 @@ pub struct Bounded {
 }
 
 /// Place of a parameter: between its bounds, or on one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq)]
 enum Place {
     Free,
     Lower,

@@ -325,7 +325,7 @@ pub(crate) struct Shape {
 }
 
 /// A value and what its normal score consists of: the score is w·√k + c/√k, with k degrees of freedom a weight.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Point {
     ln: f64,
     w: f64,
@@ -537,7 +537,7 @@ pub(crate) fn implied_gradients(model: &Composite, curve: &Curve) -> Vec<Vec<f64
 
 /// Derivatives of nu·b(q/nu), q the variance of quantization noise and nu that of all: with respect to q and to that of
 /// any other process. nu·b is homogeneous, so that it is q times the first plus (nu − q) times the second.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Clone)]
 pub(crate) struct Response {
     pub(crate) quantization: f64,
     pub(crate) others: f64,

@@ -228,7 +228,7 @@ pub(super) fn axes<'a>(
 }
 
 /// Quantity in which recordings are compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq)]
 pub(super) enum Test {
     /// ln robust wavelet variance.
     Noise,

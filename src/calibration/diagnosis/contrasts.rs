@@ -22,7 +22,6 @@ const FEWEST_TO_PASS_OVER: usize = 6;
 type Files = Vec<Option<Vec<f64>>>;
 
 /// ln nu of every file on the axes of a sensor, `[axis][file][level]`; not every file has every axis.
-#[derive(Debug, Clone)]
 pub(super) struct Table {
     pub(super) logs: Vec<Files>,
     /// Only what lies above the others counts.
@@ -159,7 +158,6 @@ impl Table {
 }
 
 /// The values of one axis at one window, about their mean.
-#[derive(Debug)]
 struct Contrast {
     axis: usize,
     values: Vec<Option<f64>>,
@@ -234,7 +232,7 @@ impl Contrast {
 }
 
 /// Distance of a file from the others at one window.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(super) struct Distance {
     /// F, with one of the others passed over or none.
     f: f64,
@@ -281,7 +279,7 @@ fn distance(contrasts: &[Contrast], file: usize, pass_over: bool) -> Option<Dist
 }
 
 /// The largest distances of a file: against all others, and with one of them passed over (0 if too few).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 struct Furthest {
     /// The two F.
     f: [f64; 2],
@@ -349,7 +347,7 @@ pub(super) fn scores(
 const WIDTHS: [usize; 3] = [1, 3, 5];
 
 /// Neighbouring scales.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Window {
     /// Index of the first.
     pub(super) first: usize,
@@ -474,7 +472,6 @@ const FEWEST_TO_SHARE: usize = 4;
 const SEED: u64 = 1;
 
 /// An abnormal file, and where it is so.
-#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Found {
     pub(super) file: usize,
     /// Probability that the most unusual of alike files is as unusual.

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 const POINTS: usize = 160;
 
 /// Effort of a search.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub(crate) struct Effort {
     /// Limit of the number of combinations of the grid, where its dimensions are alike; 0: no grid where minima are known.
     combinations: usize,
@@ -45,7 +45,6 @@ impl Effort {
 }
 
 /// Result of the search.
-#[derive(Debug)]
 pub(crate) struct Found {
     /// The ends of all starts, best first; one at least.
     pub(crate) ends: Vec<End>,
@@ -285,7 +284,7 @@ pub(crate) struct Range {
 /// One process of the model that is fitted. Its amplitude is the parameter in which its wavelet variance is
 /// linear: sigma2, q2, gamma2, s2 or slope². Its coordinate says its shape: ln κ (κ = −ln phi or beta/f)
 /// for AR1 and GM, theta for MA1.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(PartialEq)]
 pub(crate) struct Component {
     pub(crate) kind: Kind,
     pub(crate) coordinate: Option<Range>,
@@ -323,7 +322,6 @@ pub(crate) struct Shape {
 }
 
 /// A column of the linear problem, at unit length.
-#[derive(Debug, Clone)]
 struct Column {
     values: Vec<f64>,
     /// The length taken out.
@@ -350,7 +348,6 @@ const SETTLED_CHANGE: f64 = 1e-13;
 const NEARLY_SETTLED: usize = 3;
 
 /// The least-squares problem: weighted curve, in units of its length.
-#[derive(Debug, Clone)]
 pub(crate) struct Objective {
     levels: Vec<u32>,
     roots: Vec<f64>,
@@ -362,7 +359,7 @@ pub(crate) struct Objective {
 }
 
 /// The best amplitudes for given coordinates.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(crate) struct Solution {
     /// Amplitudes, in the parameters' units.
     pub(crate) amplitudes: Vec<f64>,
@@ -693,7 +690,6 @@ nav_sim_signal::named!(
 );
 
 /// Local minimum to which a start led.
-#[derive(Debug, Clone)]
 pub(crate) struct End {
     pub(crate) coordinates: Vec<f64>,
     /// Σ residual², in units of the target's length.

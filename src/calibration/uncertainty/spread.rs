@@ -27,7 +27,6 @@ const NORMAL_975: f64 = 1.959_963_984_540_054;
 const CLIP: f64 = 3.0;
 
 /// The spread of replicates around an estimator's curve.
-#[derive(Debug, Clone)]
 pub(crate) struct Spread {
     /// Standard deviation of ln nu of a replicate of the same noise, of each level.
     pub(crate) within: Vec<f64>,
@@ -51,7 +50,6 @@ pub(crate) struct Spread {
 }
 
 /// A signal's place among the recordings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Origin {
     pub(super) recording: usize,
     pub(super) position: usize,

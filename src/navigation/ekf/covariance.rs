@@ -525,7 +525,7 @@ impl<L: Real> ErrorMap<L> for Sample<L> {
 }
 
 /// The blocks of F that the rotating, curved, heavy Earth contributes.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub(crate) struct EarthTerms<L> {
     /// ∂(dr/dt)/∂r (1/s).
     pub rr: Mat3<L>,
@@ -600,7 +600,6 @@ impl<L: Real> EarthTerms<L> {
 }
 
 /// The Earth terms over a time step.
-#[derive(Debug, Clone, Copy)]
 pub(crate) struct EarthStep<L> {
     /// The terms.
     pub terms: EarthTerms<L>,

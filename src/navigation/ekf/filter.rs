@@ -383,7 +383,6 @@ impl Kernel for Advance<'_> {
 // One run of the filter at an instant, to be returned to.
 
 /// Nominal state and estimates of the first lane, without their covariance.
-#[derive(Debug, Clone)]
 pub(crate) struct Snapshot {
     nominal: NavState,
     /// Estimates of biases and unknowns, then what the unknowns are multiplied by.
@@ -477,7 +476,7 @@ pub struct Unknown {
 }
 
 /// What an unknown constant is multiplied by in the last sample.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Regressor {
     pub(super) kind: UnknownKind,
     pub(super) value: Vec3,

@@ -392,7 +392,6 @@ impl Ekf {
 // has states of them.
 
 /// Velocity of a point of the vehicle along some of the vehicle's axes.
-#[derive(Debug, Clone, Copy)]
 pub(crate) struct BodyVelocity {
     /// Measured velocity along forward, right, down (m/s); read where `axes` has them.
     pub(crate) value: Vec3,

@@ -25,7 +25,6 @@ const LATER_S: [f64; 5] = [15.0, 30.0, 60.0, 120.0, 240.0];
 const UPRIGHT: f64 = 45.0 * DEG;
 
 /// Standard deviations of the biases, which spoil a levelling.
-#[derive(Debug, Clone, Copy, PartialEq)]
 struct BiasSigma {
     /// Accelerometer (m/s²).
     accel: f64,
@@ -162,7 +161,7 @@ pub fn towards(
 }
 
 /// Which way the vehicle goes along its course.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(PartialEq)]
 enum Along {
     Forwards,
     Backwards,
@@ -337,7 +336,7 @@ const BASELINE_S: (f64, f64) = (1.0, 3.0);
 const ACCELERATION: f64 = 2.0;
 
 /// How a drive goes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 pub(in crate::fusion) enum Pace {
     Fast,
     Slow,
@@ -361,7 +360,6 @@ impl Pace {
 }
 
 /// A fix with its velocity and the standard deviations of it (m/s).
-#[derive(Debug, Clone, Copy)]
 pub(in crate::fusion) struct Moving {
     pub(in crate::fusion) fix: GnssFix,
     pub(in crate::fusion) v_n: DVec3,
@@ -525,7 +523,7 @@ struct Scene<'a> {
 }
 
 /// Roll and pitch at the first moving fix.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 struct Level {
     roll: f64,
     pitch: f64,
@@ -792,7 +790,7 @@ const WIDEST_DEG: f64 = 30.0;
 const DECIDED: f64 = 20.0;
 
 /// How well a start agrees with the fixes after it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 struct Agreement {
     /// −2 ln(likelihood) of the innovations, up to a constant.
     cost: f64,

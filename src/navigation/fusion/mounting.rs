@@ -217,7 +217,7 @@ const BLOCK_S: f64 = 20.0;
 const FEWEST: usize = 6;
 
 /// Sums over blocks of time.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Blocks {
     /// Number of the block, and the sum in it.
     sums: Vec<(i64, f64)>,

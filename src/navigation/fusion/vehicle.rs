@@ -290,7 +290,7 @@ const KEPT: f64 = 0.9;
 const FEWEST: usize = 10;
 
 /// What fixes or a wheel say of an instant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq)]
 enum Motion {
     /// It stands.
     Still,

@@ -278,7 +278,7 @@ impl AidingSettings {
 }
 
 /// An error of an aid that lasts.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Clone, Copy)]
 pub(crate) struct AidError {
     pub(crate) part: AidPart,
     pub(crate) law: Law,
@@ -287,7 +287,7 @@ pub(crate) struct AidError {
 }
 
 /// Which of them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum AidPart {
     MountingPitch,
     MountingYaw,
@@ -373,7 +373,7 @@ impl AidPart {
 }
 
 /// How an error goes on.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Clone, Copy)]
 pub(crate) enum Law {
     /// The same value in every run.
     Known(f64),
@@ -394,7 +394,6 @@ impl Law {
 }
 
 /// The errors of the aids in one run. Each has a stream of its own.
-#[derive(Debug, Clone)]
 pub(crate) struct AidNoise {
     lasting: Vec<(AidError, Walk)>,
     /// White noise of each aid along each of its axes: deviation and streams.
@@ -402,7 +401,6 @@ pub(crate) struct AidNoise {
 }
 
 /// A lasting error as it goes on.
-#[derive(Debug, Clone)]
 struct Walk {
     stream: Generator,
     value: f64,

@@ -201,7 +201,6 @@ impl ImuSettings {
 // The defects of one run.
 
 /// The defects of one run.
-#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Defects {
     /// Turn-on bias of accelerometer and gyroscope (m/s², rad/s).
     pub bias: [DVec3; 2],
@@ -383,7 +382,6 @@ impl Temperature {
 }
 
 /// What an error of a sensor's axis is proportional to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Felt {
     /// Nothing that changes: a bias.
     Unit,
@@ -396,7 +394,7 @@ pub(crate) enum Felt {
 }
 
 /// What an IMU feels over a sample.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Surroundings {
     /// Specific force (m/s²) and angular rate (rad/s) in b.
     pub(crate) sample: [DVec3; 2],

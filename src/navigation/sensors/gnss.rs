@@ -75,7 +75,6 @@ impl GnssSettings {
 
 /// The noise of the receiver in one run: one stream a component, drawn at every epoch whether the fix is
 /// used or not, so that outages change no number.
-#[derive(Debug, Clone)]
 pub(crate) struct GnssNoise {
     streams: [Generator; 6],
     sigma: [f64; 6],
@@ -83,7 +82,6 @@ pub(crate) struct GnssNoise {
 }
 
 /// One component of the correlated error: e_k = phi e_{k−1} + w, stationary from the first epoch.
-#[derive(Debug, Clone)]
 struct Correlated {
     stream: Generator,
     phi: f64,
@@ -237,7 +235,6 @@ pub struct BaroSettings {
 }
 
 /// The noise of the altimeter in one run.
-#[derive(Debug, Clone)]
 pub(crate) struct BaroNoise {
     stream: Generator,
     sigma_m: f64,

@@ -73,7 +73,7 @@ fn refused<T>(message: String) -> Result<T, ExperimentError> {
 }
 
 /// Something happens after this many IMU samples.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Event {
     /// IMU samples from the start.
     pub(super) sample: usize,

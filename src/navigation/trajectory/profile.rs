@@ -528,7 +528,7 @@ fn rates(lat: f64, motion: &Motion) -> [f64; 2] {
 /// The shape of a change from 0 to 1 over x in [0, 1]: its rate rises over a share `ramp` of the time as a
 /// quintic smooth step, stays, and falls likewise. Value, rate, and the rate's first two derivatives are
 /// continuous; outside [0, 1] nothing changes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Clone, Copy)]
 struct Shape {
     /// Share of the whole that each ramp takes, in (0, 1/2].
     ramp: f64,
@@ -577,7 +577,6 @@ impl Shape {
 }
 
 /// A stretch of motion: everything as a function of the share x of its duration.
-#[derive(Debug, Clone, Copy, PartialEq)]
 struct Piece {
     /// Duration (s).
     duration: f64,
@@ -591,7 +590,7 @@ struct Piece {
 }
 
 /// The motion at an instant.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 struct Motion {
     /// Horizontal speed (m/s).
     horizontal: f64,

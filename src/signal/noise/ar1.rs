@@ -150,14 +150,12 @@ pub(super) fn half_scale(level: u32) -> f64 {
 }
 
 /// B and the derivative of its logarithm with respect to κ.
-#[derive(Debug, Clone, Copy)]
 pub(super) struct Bracket {
     pub(super) value: f64,
     log_derivative: f64,
 }
 
 /// The parts of B that depend on κ alone, for 0 ≤ κ ≤ ln 2 (phi ≥ ½).
-#[derive(Debug, Clone, Copy)]
 pub(super) struct Slow {
     kappa: f64,
     /// 2·S(κ) and its derivative.

@@ -186,7 +186,7 @@ pub struct Curve {
 }
 
 /// The largest axis at one averaging time.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 struct Point {
     samples: u32,
     /// Allan variance of the whole model.

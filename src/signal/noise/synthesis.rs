@@ -237,7 +237,6 @@ const R: f64 = 3.654_152_885_361_009;
 const AREA: f64 = 0.004_928_673_233_974_655;
 
 /// Edges of the layers and the density there.
-#[derive(Debug)]
 struct Ziggurat {
     x: [f64; LAYERS + 1],
     f: [f64; LAYERS + 1],

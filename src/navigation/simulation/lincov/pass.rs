@@ -403,7 +403,7 @@ fn deviations(jacobian: &[DVec3; 3], p: &[Nav; NAV]) -> [f64; REPORTED] {
 const TOGETHER: usize = 256;
 
 /// Which moments of an outage are looked at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(PartialEq)]
 pub(crate) enum Moments {
     /// Its end: just before the first fix after it, or at the end of the track.
     End,
@@ -534,7 +534,7 @@ impl<'a> Pass<'a> {
 /// estimates, which nothing drives but the corrections, and t are the negated states of the true IMU: the
 /// error of a bias is estimate less truth, so both enter the navigation error alike. States t are independent
 /// of one another and stay so.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 struct Joint<'a> {
     sides: &'a Sides,
     xx: [Nav; NAV],
@@ -818,7 +818,6 @@ impl<'a> Joint<'a> {
 }
 
 /// Covariances with an innovation, and its variance.
-#[derive(Debug, Clone)]
 struct Innovation {
     with: Column,
     /// Its variance.
@@ -878,7 +877,7 @@ pub(super) fn add_scaled(to: &mut Nav, factor: f64, x: &Nav) {
 
 /// A number for each state of z = \[navigation error `x`; bias states `b`\] and for each state `t` of the truth, as
 /// [`Joint`] has them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone)]
 struct Column {
     x: Nav,
     pub(super) b: Vec<f64>,
@@ -912,7 +911,7 @@ impl Column {
 // The mean of the true errors, which is the same in every run.
 
 /// Mean of z and of the truth's states, as [`Joint`] has their covariance.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 struct Mean<'a> {
     sides: &'a Sides,
     values: Column,

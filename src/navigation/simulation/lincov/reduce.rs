@@ -203,7 +203,6 @@ fn horizontal_m(assessment: &Assessment) -> impl Iterator<Item = f64> {
 
 /// A logarithm that costs its fourth power: `scale` off costs `weight`, half of that a sixteenth, twice as much sixteen times;
 /// both directions count alike.
-#[derive(Debug, Clone, Copy)]
 struct Steep {
     x: f64,
     scale: f64,
@@ -449,14 +448,13 @@ const LESS: f64 = 0.2;
 const TRIALS: usize = 8;
 
 /// A value of the cost.
-#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Value {
     pub(super) cost: f64,
     pub(super) parts: Vec<Part>,
 }
 
 /// A number that the variables change, and the second derivative of the cost with respect to it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Clone, Copy)]
 pub(super) struct Part {
     pub(super) value: f64,
     pub(super) curvature: f64,

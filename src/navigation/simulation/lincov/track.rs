@@ -43,7 +43,7 @@ pub(super) struct Step {
 }
 
 /// What is measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) enum Measured {
     /// This component of a fix's position.
     Position(usize),
@@ -780,7 +780,6 @@ const NONE: Source = Source {
 };
 
 /// What a source does over a step: the mean of its samples' errors is `mean`·s + w₁, and s⁺ = `decay`·s + w₂.
-#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct StepOfSource {
     pub(super) signal: usize,
     pub(super) mean: f64,
@@ -1094,7 +1093,6 @@ impl Sources {
 // The states beside the navigation error, and what they do over the steps of a track.
 
 /// The states `b` of a filter and `t` of the truth, as [`Joint`](super::pass::Joint) has them.
-#[derive(Debug)]
 pub(super) struct Sides {
     pub(super) b: Sources,
     pub(super) t: Sources,
@@ -1150,7 +1148,6 @@ impl Sides {
 }
 
 /// What sources do over steps of one length.
-#[derive(Debug, Clone)]
 pub(super) struct Inputs {
     pub(super) b: Vec<StepOfSource>,
     pub(super) t: Vec<StepOfSource>,

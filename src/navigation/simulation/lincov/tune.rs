@@ -507,7 +507,6 @@ impl Departure {
 }
 
 /// What draws add to the first truth under a filter, as factors; they hardly depend on the filter.
-#[derive(Debug, Clone, PartialEq)]
 struct DrawFactors {
     /// The upper end of each ratio, in the order of [`departures`].
     ratios: Vec<f64>,
