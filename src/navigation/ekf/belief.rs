@@ -18,7 +18,7 @@
 use super::filter::{KINDS, Unknown, UnknownKind};
 use crate::frames::RollPitchYaw;
 use crate::imu::{Axis, Channel, Sensor};
-use crate::noise::{Composite, Ladder, Model, Process, reduction};
+use crate::noise::{Composite, Kind, Ladder, Model, Process, reduction};
 use crate::sensors::check_bounds;
 use crate::units::{NonNegative, Positive, SettingError, exactly};
 use glam::{DQuat, DVec3};
@@ -297,21 +297,9 @@ impl Belief {
 
 /// Magnitudes of the drifts of a sensor's axes (units per sample).
 fn drift(model: &Model, sensor: Sensor) -> DVec3 {
-    let slope = |p: &Process| {
-        if let Process::Drift(p) = p {
-            p.slope()
-        } else {
-            0.0
-        }
-    };
     let of_axis = |axis| {
-        model
-            .axis(Channel { sensor, axis })
-            .processes
-            .iter()
-            .map(slope)
-            .sum::<f64>()
-            .abs()
+        let noise = model.axis(Channel { sensor, axis });
+        noise.amplitude_of(Kind::Drift).abs()
     };
     DVec3::from_array(Axis::ALL.map(of_axis))
 }

@@ -255,6 +255,11 @@ impl Process {
         self.kind().code()
     }
 
+    /// The parameter that its size grows with, [`Kind::amplitude`].
+    pub fn amplitude(&self) -> f64 {
+        self.values().last().copied().unwrap_or(0.0)
+    }
+
     /// The parameters as (name in model files, value).
     pub fn parameters(&self) -> Vec<(&'static str, f64)> {
         self.kind()
@@ -324,6 +329,12 @@ impl Composite {
             .iter()
             .flat_map(|p| p.haar_wv_gradient(level))
             .collect()
+    }
+
+    /// Sum of the amplitudes ([`Kind::amplitude`]) of the processes of a kind.
+    pub fn amplitude_of(&self, kind: Kind) -> f64 {
+        let own = self.processes.iter().filter(|p| p.kind() == kind);
+        own.map(Process::amplitude).sum()
     }
 
     /// A label for each summand, unique within the sum (see [`labels`]).

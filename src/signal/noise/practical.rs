@@ -25,7 +25,7 @@
 //! ```
 
 use super::continuous::{walk_density, white_density};
-use super::{Composite, Process};
+use super::{Composite, Kind, Process};
 
 /// Allan deviation over B of pure flicker noise: √(2 ln 2/π) = 0.664.
 const FLICKER_FLOOR: f64 = 0.664_282_8;
@@ -295,8 +295,8 @@ impl Curve {
     fn strict(&self, walk: bool) -> Pair {
         // Each figure is the largest of any axis, so the pair need not be that of one of them.
         let largest = |f: &dyn Fn(&Composite) -> f64| self.axes.iter().map(f).fold(0.0, f64::max);
-        let density = largest(&|axis| white_density(white_sigma2(axis), self.rate_hz));
-        let k = largest(&|axis| walk_density(walk_gamma2(axis), self.rate_hz));
+        let density = largest(&|axis| white_density(axis.amplitude_of(Kind::White), self.rate_hz));
+        let k = largest(&|axis| walk_density(axis.amplitude_of(Kind::RandomWalk), self.rate_hz));
         let slowest = self.axes.iter().filter_map(|axis| {
             let of_axis = correlated(axis, self.rate_hz);
             of_axis
@@ -363,28 +363,6 @@ fn averages(from: f64, to: f64) -> Vec<u32> {
     // Of few samples neighbouring times round to the same number, which would count twice.
     all.dedup();
     all
-}
-
-fn white_sigma2(axis: &Composite) -> f64 {
-    let sigma2 = |p: &Process| {
-        if let Process::White(p) = p {
-            p.sigma2()
-        } else {
-            0.0
-        }
-    };
-    axis.processes.iter().map(sigma2).sum()
-}
-
-fn walk_gamma2(axis: &Composite) -> f64 {
-    let gamma2 = |p: &Process| {
-        if let Process::RandomWalk(p) = p {
-            p.gamma2()
-        } else {
-            0.0
-        }
-    };
-    axis.processes.iter().map(gamma2).sum()
 }
 
 /// Standard deviation and correlation time of an AR1 or GM that has them.

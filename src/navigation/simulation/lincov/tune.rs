@@ -11,7 +11,7 @@ use super::track::Track;
 use super::truth::TrueErrors;
 use crate::ekf::{Belief, BeliefError};
 use crate::imu::{Channel, Sensor};
-use crate::noise::{Model, Process};
+use crate::noise::{Kind, Model, Process};
 use crate::simulation::{NEES_DOF, REPORTED};
 use rayon::prelude::*;
 
@@ -659,24 +659,9 @@ pub(super) fn multiplied(model: &Model) -> Vec<Factor> {
     Sensor::ALL.into_iter().filter(has_noise).map(one).collect()
 }
 
-/// Whether a filter models the process and its amplitude is not zero.
+/// True if a filter models the process and its amplitude is not zero.
 fn is_felt(process: &Process) -> bool {
-    let (_, amplitude) = amplitude(process);
-    amplitude != 0.0 && !matches!(process, Process::Quantization(_))
-}
-
-/// The parameter that a process is proportional to.
-fn amplitude(process: &Process) -> (&'static str, f64) {
-    match process {
-        Process::White(p) => ("sigma2", p.sigma2()),
-        Process::Quantization(p) => ("q2", p.q2()),
-        Process::Ar1(p) => ("sigma2", p.sigma2()),
-        Process::Flicker(p) => ("b2", p.b2()),
-        Process::RandomWalk(p) => ("gamma2", p.gamma2()),
-        Process::Drift(p) => ("slope", p.slope()),
-        Process::GaussMarkov(p) => ("s2", p.s2()),
-        Process::Ma1(p) => ("sigma2", p.sigma2()),
-    }
+    process.amplitude() != 0.0 && process.kind() != Kind::Quantization
 }
 
 fn set(factors: &[Factor], ln: &[f64]) -> Vec<Factor> {
@@ -708,15 +693,18 @@ pub fn scaled(model: &Model, factors: &[Factor]) -> Model {
 
 /// A process whose variance is multiplied.
 fn times(process: &Process, on_variance: f64, rate_hz: f64) -> Process {
-    let (name, value) = amplitude(process);
     // a drift has an amplitude, the others a variance
-    let factor = if matches!(process, Process::Drift(_)) {
+    let factor = if process.kind() == Kind::Drift {
         on_variance.sqrt()
     } else {
         on_variance
     };
     let changed = process
-        .with_parameter(name, value * factor, rate_hz)
+        .with_parameter(
+            process.kind().amplitude().name(),
+            process.amplitude() * factor,
+            rate_hz,
+        )
         .and_then(Result::ok);
     // beyond the largest number nothing is left to enlarge
     changed.unwrap_or(*process)
