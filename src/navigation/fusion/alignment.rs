@@ -74,11 +74,8 @@ pub fn coarse(
     settings: &Settings,
     belief: &Belief,
 ) -> Result<Alignment, AlignmentError> {
-    let gnss = kept(recorded, settings);
-    let recorded = Recorded {
-        gnss: &gnss,
-        ..*recorded
-    };
+    let gnss = settings.kept(recorded.gnss);
+    let recorded = recorded.with_gnss(&gnss);
     let courses = courses(&gnss, recorded.imu);
     let Some(first) = first_fast(&courses, f64::NEG_INFINITY) else {
         return Err(AlignmentError::NoCourse {
@@ -112,17 +109,6 @@ pub fn coarse(
         .ok_or(AlignmentError::NoSamples { t_s: first_s })
 }
 
-/// The fixes that are not withheld.
-fn kept(recorded: &Recorded<'_>, settings: &Settings) -> Vec<GnssFix> {
-    let withheld = |f: &&GnssFix| settings.outages.iter().any(|o| o.withholds(f.t_s));
-    recorded
-        .gnss
-        .iter()
-        .filter(|f| !withheld(f))
-        .copied()
-        .collect()
-}
-
 /// The start at the first fix where the IMU can be levelled, its heading given: it need not move.
 ///
 /// # Errors
@@ -133,11 +119,8 @@ pub fn towards(
     belief: &Belief,
     heading: Heading,
 ) -> Result<Alignment, AlignmentError> {
-    let gnss = kept(recorded, settings);
-    let recorded = Recorded {
-        gnss: &gnss,
-        ..*recorded
-    };
+    let gnss = settings.kept(recorded.gnss);
+    let recorded = recorded.with_gnss(&gnss);
     let courses = courses(&gnss, recorded.imu);
     let sigma = heading.sigma.hypot(settings.mounting_sigma_b.z);
     let start_at = |at: usize| {
@@ -822,25 +805,7 @@ fn until(
     start: &Start,
     to_s: f64,
 ) -> Option<Solution> {
-    let imu = &recorded.imu[..recorded.imu.partition_point(|s| s.t_s <= to_s)];
-    let gnss = &recorded.gnss[..recorded.gnss.partition_point(|f| f.t_s <= to_s)];
-    let settings = Settings {
-        nis_gate: None,
-        rows_hz: 1e-3,
-        ..settings.clone()
-    };
-    fuse(
-        &Recorded {
-            imu,
-            gnss,
-            ..*recorded
-        },
-        belief,
-        start,
-        &settings,
-        None,
-    )
-    .ok()
+    fuse(&recorded.until(to_s), belief, start, settings, None).ok()
 }
 
 fn agreement(
@@ -855,11 +820,7 @@ fn agreement(
         nis: f64::INFINITY,
         components: 0,
     };
-    let settings = Settings {
-        smooth: false,
-        ..settings.clone()
-    };
-    let Some(solution) = until(recorded, belief, &settings, start, to_s) else {
+    let Some(solution) = until(recorded, belief, &settings.trial(), start, to_s) else {
         return failed;
     };
     let mut sum = Agreement {
@@ -928,7 +889,7 @@ fn alone(recorded: &Recorded<'_>, belief: &Belief, settings: &Settings, start: &
 fn widen(recorded: &Recorded<'_>, belief: &Belief, settings: &Settings, start: &mut Start) {
     let settings = Settings {
         smooth: true,
-        ..settings.clone()
+        ..settings.trial()
     };
     let solution = until(recorded, belief, &settings, start, start.t_s + TRIAL_S);
     let Some([first, ..]) = solution.as_ref().and_then(|s| s.smoothed.as_deref()) else {

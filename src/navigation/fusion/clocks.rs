@@ -183,31 +183,23 @@ const CONTRADICTS: f64 = 16.0;
 pub fn rough_origin(recorded: &Recorded<'_>) -> Option<f64> {
     let begins_s = check_clocks(recorded).err()?.delay_s()?;
     let gnss = earlier(recorded.gnss, begins_s);
-    let [lag_s, ..] = agreement(&Recorded {
-        gnss: &gnss,
-        ..*recorded
-    })?;
+    let [lag_s, ..] = agreement(&recorded.with_gnss(&gnss))?;
     Some(begins_s - lag_s)
 }
 
 /// The rest of a delay that was found roughly (s): the one at which the innovations are smallest.
 pub fn rest_of_origin(recorded: &Recorded<'_>, belief: &Belief, settings: &Settings) -> f64 {
     let to_s = recorded.gnss.first().map_or(0.0, |fix| fix.t_s) + MOST_S;
-    let imu = &recorded.imu[..recorded.imu.partition_point(|sample| sample.t_s <= to_s)];
-    let fixes = &recorded.gnss[..recorded.gnss.partition_point(|fix| fix.t_s <= to_s)];
+    let recorded = recorded.until(to_s);
+    let fixes = recorded.gnss;
     let settings = Settings {
-        rows_hz: 1e-3,
-        smooth: false,
-        ..settings.clone()
+        nis_gate: settings.nis_gate,
+        ..settings.trial()
     };
     let tried = |k: i32| {
         let delay_s = f64::from(k) * TRIED.1;
         let gnss = earlier(fixes, delay_s);
-        let recorded = Recorded {
-            imu,
-            gnss: &gnss,
-            ..*recorded
-        };
+        let recorded = recorded.with_gnss(&gnss);
         let start = coarse(&recorded, &settings, belief).ok()?.start;
         let solution = fuse(&recorded, belief, &start, &settings, None).ok()?;
         Some((delay_s, disagreement(&solution, fixes.len()), start))
@@ -220,16 +212,7 @@ pub fn rest_of_origin(recorded: &Recorded<'_>, belief: &Belief, settings: &Setti
         return 0.0;
     };
     let gnss = earlier(fixes, delay_s);
-    let found = displaced(
-        &Recorded {
-            imu,
-            gnss: &gnss,
-            ..*recorded
-        },
-        belief,
-        &start,
-        &settings,
-    );
+    let found = displaced(&recorded.with_gnss(&gnss), belief, &start, &settings);
     delay_s
         + found
             .and_then(|found| found.delay_s)

@@ -6,7 +6,7 @@
 //! here). What was found is a cause only if the NIS of the filter, run with it, is smaller: an explanation is tested by
 //! taking the cause away.
 
-use super::{FixRecord, FusionError, Recorded, Settings, Solution, Start, Use, fuse};
+use super::{FixRecord, FusionError, Recorded, Settings, Solution, Start, Use, earlier, fuse};
 use crate::ekf::Belief;
 use crate::gnss::GnssFix;
 use crate::trajectory::reference::Reference;
@@ -52,14 +52,8 @@ pub fn displaced(
     settings: &Settings,
 ) -> Option<Displaced> {
     let to_s = start.t_s + MOST_S;
-    let imu = &recorded.imu[..recorded.imu.partition_point(|s| s.t_s <= to_s)];
-    let gnss = &recorded.gnss[..recorded.gnss.partition_point(|f| f.t_s <= to_s)];
     let scene = Scene {
-        recorded: Recorded {
-            imu,
-            gnss,
-            ..*recorded
-        },
+        recorded: recorded.until(to_s),
         belief,
         start,
         settings,
@@ -112,22 +106,12 @@ struct Scene<'a> {
 impl Scene<'_> {
     /// The innovations with the antenna and the delay off by `x`.
     fn innovations(&self, x: &Vector4<f64>) -> Option<Innovations> {
-        let earlier = |fix: &GnssFix| GnssFix {
-            t_s: fix.t_s - x[3],
-            ..*fix
-        };
-        let gnss: Vec<GnssFix> = self.recorded.gnss.iter().map(earlier).collect();
+        let gnss = earlier(self.recorded.gnss, x[3]);
         let settings = Settings {
             lever_arm_b: self.settings.lever_arm_b + DVec3::new(x[0], x[1], x[2]),
-            nis_gate: None,
-            rows_hz: 1e-3,
-            smooth: false,
-            ..self.settings.clone()
+            ..self.settings.trial()
         };
-        let recorded = Recorded {
-            gnss: &gnss,
-            ..self.recorded
-        };
+        let recorded = self.recorded.with_gnss(&gnss);
         let solution = fuse(&recorded, self.belief, self.start, &settings, None).ok()?;
         let first = gnss.partition_point(|f| f.t_s <= self.start.t_s);
         let mut of_fix = vec![None; gnss.len()];
@@ -386,16 +370,8 @@ pub fn fuse_correlated(
         .iter()
         .map(|f| f.with_sigmas_times(pos_sigma_factor, 1.0))
         .collect();
-    let solution = fuse(
-        &Recorded {
-            gnss: &gnss,
-            ..*recorded
-        },
-        belief,
-        start,
-        settings,
-        reference,
-    )?;
+    let recorded = recorded.with_gnss(&gnss);
+    let solution = fuse(&recorded, belief, start, settings, reference)?;
     Ok(Weighed {
         solution,
         as_stated: Some(stated),

@@ -90,6 +90,43 @@ pub struct Recorded<'a> {
     pub aids: &'a [VehicleVelocity],
 }
 
+impl<'a> Recorded<'a> {
+    /// The same with other fixes.
+    fn with_gnss<'b>(self, gnss: &'b [GnssFix]) -> Recorded<'b>
+    where
+        'a: 'b,
+    {
+        Recorded { gnss, ..self }
+    }
+
+    /// Samples and fixes up to a time (s).
+    fn until(self, to_s: f64) -> Self {
+        Self {
+            imu: &self.imu[..self.imu.partition_point(|s| s.t_s <= to_s)],
+            gnss: &self.gnss[..self.gnss.partition_point(|f| f.t_s <= to_s)],
+            ..self
+        }
+    }
+}
+
+impl Settings {
+    /// For a trial, of which innovations are looked at and hardly a row.
+    fn trial(&self) -> Self {
+        Self {
+            nis_gate: None,
+            rows_hz: 1e-3,
+            smooth: false,
+            ..self.clone()
+        }
+    }
+
+    /// The fixes that are not withheld.
+    fn kept(&self, gnss: &[GnssFix]) -> Vec<GnssFix> {
+        let is_kept = |f: &&GnssFix| !self.outages.iter().any(|o| o.withholds(f.t_s));
+        gnss.iter().filter(is_kept).copied().collect()
+    }
+}
+
 /// How it is fused.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settings {

@@ -14,7 +14,6 @@ use super::{FusionError, Recorded, Row, Settings, fuse};
 use crate::earth::gravity_down;
 use crate::ekf::Belief;
 use crate::frames::RollPitchYaw;
-use crate::gnss::GnssFix;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
@@ -135,17 +134,8 @@ pub fn find(
     settings: &Settings,
     belief: &Belief,
 ) -> Result<Mounting, MountingError> {
-    let withheld = |f: &GnssFix| settings.outages.iter().any(|o| o.withholds(f.t_s));
-    let gnss: Vec<GnssFix> = recorded
-        .gnss
-        .iter()
-        .filter(|f| !withheld(f))
-        .copied()
-        .collect();
-    let recorded = Recorded {
-        gnss: &gnss,
-        ..*recorded
-    };
+    let gnss = settings.kept(recorded.gnss);
+    let recorded = recorded.with_gnss(&gnss);
     let rough = along(&recorded, settings)?;
     let (fine, sigma_factor) = refined(&recorded, settings, belief, &rough)?;
     let named = ["roll", "pitch", "yaw"]
@@ -185,15 +175,7 @@ fn refined(
 ) -> Result<(Refined, f64), MountingError> {
     let (mut gnss, mut factor) = (recorded.gnss.to_vec(), 1.0);
     loop {
-        match through(
-            &Recorded {
-                gnss: &gnss,
-                ..*recorded
-            },
-            settings,
-            belief,
-            rough,
-        ) {
+        match through(&recorded.with_gnss(&gnss), settings, belief, rough) {
             Err(MountingError::Contradicted {
                 nis_per_component: nis,
             }) if nis > 1.0 && factor * nis.sqrt() <= MOST_WIDENED => {
