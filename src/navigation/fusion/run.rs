@@ -4,7 +4,7 @@ use super::{
     AidRecord, FixRecord, FusionError, Nine, Recorded, Row, RowError, Settings, Solution, Start,
     Use, VehicleVelocity, check_clocks, spans,
 };
-use crate::earth::{MAX_LATITUDE, geodetic_to_ecef, ned_difference};
+use crate::earth::{MAX_LATITUDE, geodetic_to_ecef};
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::{
     Belief, BodyVelocity, Ekf, Fix, Snapshot, advance, nis_limit, settle, update,
@@ -15,6 +15,7 @@ use crate::gnss::GnssFix;
 use crate::imu::{ImuIncrement, ImuSample, Sensor};
 use crate::lanes::{Lanes, Vec3};
 use crate::linalg::{Link, to_nalgebra};
+use crate::simulation::{ReportedError, reported_error};
 use crate::strapdown::Strapdown;
 use crate::trajectory::reference::Reference;
 use crate::units::DEG;
@@ -443,15 +444,10 @@ impl Filter {
     /// Difference from a state whose velocity is known as well as `velocity_sigma` (m/s).
     fn error(&mut self, truth: &NavState, velocity_sigma: f64) -> RowError {
         settle(&mut self.ekf);
-        let estimate = self.state();
-        let r = ned_difference(truth, estimate.lat, estimate.lon, estimate.h);
-        let v = estimate.v_n - truth.v_n;
-        let q = estimate.q_b_n * truth.q_b_n.inverse();
-        let psi_n = (if q.w < 0.0 { -q } else { q }).to_scaled_axis();
-        let angles = RollPitchYaw::from_quat(truth.q_b_n)
-            .jacobian_of_psi_n()
-            .map(|row| row.dot(psi_n) / DEG);
-        let x = SVector::<f64, 9>::from_iterator([r, v, psi_n].iter().flat_map(DVec3::to_array));
+        let ReportedError { values, psi_n } = reported_error(&self.state(), truth);
+        let mut x = SVector::from(values);
+        x.fixed_rows_mut::<3>(3 * PSI)
+            .copy_from(&to_nalgebra(psi_n));
         let mut p = self.ekf.p.lane(0).fixed_view::<9, 9>(0, 0).into_owned();
         let mut psi = p.fixed_view_mut::<3, 3>(3 * PSI, 3 * PSI);
         psi += self.of_mounting(truth.q_b_n);
@@ -464,7 +460,7 @@ impl Filter {
         let sigma = nine(&[sigma(R), sigma(V), angle_sigma]);
         let nees = p.cholesky().map_or(f64::NAN, |c| x.dot(&c.solve(&x)));
         RowError {
-            values: nine(&[r, v, angles.into()]),
+            values,
             sigma,
             velocity_sigma,
             nees,

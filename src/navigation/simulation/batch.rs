@@ -419,12 +419,12 @@ impl EpochLanes {
 }
 
 /// Errors of a run in the reported states (m, m/s, degrees) and the attitude error vector (rad).
-struct ReportedError {
-    values: [f64; REPORTED],
-    psi_n: DVec3,
+pub(crate) struct ReportedError {
+    pub(crate) values: [f64; REPORTED],
+    pub(crate) psi_n: DVec3,
 }
 
-fn reported_error(estimate: &NavState, truth: &NavState) -> ReportedError {
+pub(crate) fn reported_error(estimate: &NavState, truth: &NavState) -> ReportedError {
     let r = ned_difference(truth, estimate.lat, estimate.lon, estimate.h);
     let v = estimate.v_n - truth.v_n;
     // C_est = (I + [psi×]) C_true, hence the estimate on the left: the same error vector as the filter's PSI
@@ -445,11 +445,7 @@ fn reported_error(estimate: &NavState, truth: &NavState) -> ReportedError {
 /// The rotation vector of a rotation (rad), the logarithm, exact for small ones too.
 fn rotation_vector(q: DQuat) -> DVec3 {
     // q and −q are the same rotation: the one with w ≥ 0 is the shorter way.
-    let (v, w) = if q.w < 0.0 {
-        (-q.xyz(), -q.w)
-    } else {
-        (q.xyz(), q.w)
-    };
+    let (v, w) = (q.xyz() * 1.0_f64.copysign(q.w), q.w.abs());
     let sine = v.length();
     // Below it atan2(s, w)/s is 1 to rounding, and 0/0 is avoided.
     if sine < 1e-12 {

@@ -6,6 +6,7 @@ mod plan;
 mod source;
 
 pub use batch::{Batch, run_batch};
+pub(crate) use batch::{ReportedError, reported_error};
 pub use plan::{Experiment, ExperimentError, Plan};
 pub(crate) use plan::{fan_epochs, samples_per};
 pub use source::{Recording, record};

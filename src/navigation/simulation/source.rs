@@ -6,7 +6,7 @@ use crate::ekf::Fix;
 use crate::ekf::belief::psi_of_angles;
 use crate::frames::{NavState, RollPitchYaw};
 use crate::gnss::{GnssFix, GnssVelocity};
-use crate::imu::{Channel, ImuIncrement, Sensor};
+use crate::imu::{ImuIncrement, Sensor};
 use crate::lanes::{Lanes, Vec3};
 use crate::linalg;
 use crate::rng::StreamKey;
@@ -152,9 +152,17 @@ impl<'a> Source<'a> {
 
     /// The fixes of this epoch.
     pub(super) fn fix(&mut self, plan: &Plan<'_>, event: &Event) -> Fix {
-        let (antenna, velocity) = event.antenna;
+        let (gnss, (antenna, velocity)) = (plan.experiment.gnss, event.antenna);
         let r = radii(antenna.x.sin());
-        let mut fix = exact_fix(plan, event);
+        let mut fix = Fix {
+            lat: Lanes::splat(antenna.x),
+            lon: Lanes::splat(antenna.y),
+            h: Lanes::splat(antenna.z),
+            v_n: gnss.vel_sigma_m_s.map(|_| Vec3::splat(velocity)),
+            pos_sigma_m: gnss.pos_sigma_m.into(),
+            vel_sigma_m_s: gnss.vel_sigma_m_s.unwrap_or_default().into(),
+            lever_arm_b: gnss.lever_arm_m.into(),
+        };
         for (lane, noise) in self.gnss.iter_mut().enumerate() {
             let (position, speed) = noise.draw();
             // Metres to angles at the antenna: the white error is small enough for one set of radii.
@@ -167,21 +175,6 @@ impl<'a> Source<'a> {
             }
         }
         fix
-    }
-}
-
-/// The fix of a receiver without noise, with the standard deviations of the one that is simulated.
-fn exact_fix(plan: &Plan<'_>, event: &Event) -> Fix {
-    let gnss = plan.experiment.gnss;
-    let (antenna, velocity) = event.antenna;
-    Fix {
-        lat: Lanes::splat(antenna.x),
-        lon: Lanes::splat(antenna.y),
-        h: Lanes::splat(antenna.z),
-        v_n: gnss.vel_sigma_m_s.map(|_| Vec3::splat(velocity)),
-        pos_sigma_m: gnss.pos_sigma_m.into(),
-        vel_sigma_m_s: gnss.vel_sigma_m_s.unwrap_or_default().into(),
-        lever_arm_b: gnss.lever_arm_m.into(),
     }
 }
 
@@ -233,83 +226,48 @@ pub struct Recording {
     pub start: NavState,
 }
 
+/// Samples whose errors are drawn at a time.
+const BLOCK: usize = 4096;
+
 /// What the sensors record in a run: the same noise as the run itself has.
 pub fn record(plan: &Plan<'_>, run: u64) -> Recording {
-    let experiment = plan.experiment;
-    let (seed, scenario) = (experiment.seed, experiment.scenario);
-    let key = StreamKey {
-        seed,
-        scenario,
-        run,
-        source: "",
-        process: "",
+    let mut source = Source::new(plan, run, 1);
+    let fix = |event: &Event| {
+        let fix = source.fix(plan, event); // at every epoch, so that outages change no number
+        let velocity = |v_n: Vec3| GnssVelocity::new(v_n.lane(0), fix.vel_sigma_m_s);
+        event.fix.then(|| GnssFix {
+            t_s: event.t_s,
+            lat: fix.lat[0],
+            lon: fix.lon[0],
+            h: fix.h[0],
+            pos_sigma_n: fix.pos_sigma_m,
+            velocity: fix.v_n.map(velocity),
+        })
     };
-    let mut noise = GnssNoise::new(experiment.gnss, key);
-    let gnss = plan
-        .events
-        .iter()
-        .filter(|e| e.gnss_epoch)
-        .filter_map(|event| {
-            let (dr, dv) = noise.draw(); // at every epoch, so that outages change no number
-            let (antenna, velocity) = event.antenna;
-            let r = radii(antenna.x.sin());
-            let sigma = experiment.gnss.vel_sigma_m_s;
-            event.fix.then(|| GnssFix {
-                t_s: event.t_s,
-                lat: antenna.x + dr.x / (r.meridian + antenna.z),
-                lon: antenna.y + dr.y / ((r.transverse + antenna.z) * antenna.x.cos()),
-                h: antenna.z - dr.z,
-                pos_sigma_n: experiment.gnss.pos_sigma_m.into(),
-                velocity: sigma.map(|sigma| GnssVelocity::new(velocity + dv, sigma.into())),
-            })
-        });
-    Recording {
-        gnss: gnss.collect(),
-        imu: inertial(plan, key),
-        start: nominal_start(plan, key),
-    }
-}
-
-fn inertial(plan: &Plan<'_>, key: StreamKey<'_>) -> Vec<ImuIncrement> {
-    let (rate_hz, start_s) = (
-        plan.experiment.rate_hz,
-        plan.experiment.trajectory.start_s(),
-    );
-    let mut errors = ImuErrors::new(&plan.errors, key, plan.samples());
-    let errors_of = |channel: Channel, errors: &mut ImuErrors<'_>| {
-        let mut signal = vec![0.0; plan.samples()];
-        errors.fill(channel, &mut signal);
-        signal
-    };
-    // One stream a channel: drawn channel by channel or sample by sample, the numbers are those of the run.
-    let signals = Channel::ALL.map(|channel| errors_of(channel, &mut errors));
-    let defects = Defects::draw(plan.experiment.defects, key);
-    let triad = |sensor: Sensor, k: usize| {
-        let first = 3 * sensor as usize;
-        DVec3::new(
-            signals[first][k],
-            signals[first + 1][k],
-            signals[first + 2][k],
-        )
-    };
+    let epochs = plan.events.iter().filter(|e| e.gnss_epoch);
+    let gnss = epochs.filter_map(fix).collect();
+    let (rate_hz, start_s) = (source.rate_hz, plan.experiment.trajectory.start_s());
     let dt_s = 1.0 / rate_hz;
-    let settings = plan.experiment.defects;
-    let sample = |(k, ideal): (usize, &crate::imu::ImuSample)| {
-        let felt = plan.felt(k);
-        let [dv, dtheta] = Sensor::ALL.map(|sensor| {
-            let value = ideal.of(sensor) + defects.error(&felt)[sensor as usize] + triad(sensor, k);
-            settings
-                .output
-                .as_ref()
-                .map_or(value, |output| output.put(sensor, value))
-                * dt_s
-        });
-        ImuIncrement {
-            t_s: start_s + (k + 1) as f64 / rate_hz,
-            dt_s,
-            dtheta,
-            dv,
+    let mut imu = Vec::with_capacity(plan.samples());
+    for first in (0..plan.samples()).step_by(BLOCK) {
+        let block = first..plan.samples().min(first + BLOCK);
+        for (ideal, error) in plan.ideal[block.clone()]
+            .iter()
+            .zip(source.errors(plan, block))
+        {
+            let [dv, dtheta] = Sensor::ALL
+                .map(|sensor| (ideal.of(sensor) + error[sensor as usize].lane(0)) * dt_s);
+            imu.push(ImuIncrement {
+                t_s: start_s + (imu.len() + 1) as f64 / rate_hz,
+                dt_s,
+                dtheta,
+                dv,
+            });
         }
-    };
-    plan.ideal.iter().enumerate().map(sample).collect()
+    }
+    Recording {
+        imu,
+        gnss,
+        start: source.starts(plan)[0],
+    }
 }
