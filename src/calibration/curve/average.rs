@@ -3,7 +3,6 @@
 
 use super::sampling::variance_of_log;
 use crate::imu::{Axis, Channel, Recording, Sensor, Signal};
-use crate::wavelet::interval::edof_robust;
 use crate::wavelet::{
     Curve, Gappy, RobustVariance, Status, Tuning, WaveletError, both, default_levels, gappy,
     interval,
@@ -165,6 +164,16 @@ impl Replicate {
         (interval::edof_eta3(self.samples, level) * self.covered(level as usize - 1)).max(1.0)
     }
 
+    /// Degrees of freedom of the wavelet variance that an estimator uses.
+    pub(crate) fn edof(&self, estimator: Estimator, level: u32, tuning: &Tuning) -> f64 {
+        let eta3 = self.edof_eta3(level);
+        if self.is_robust(estimator, level as usize - 1) {
+            interval::edof_robust(eta3, tuning.efficiency())
+        } else {
+            eta3
+        }
+    }
+
     /// Number of levels at which it has wavelet variances.
     pub(crate) fn levels(&self) -> usize {
         self.classical.len()
@@ -264,7 +273,7 @@ pub fn average(
         let kept_of = |estimator: Estimator| {
             let terms = replicates
                 .iter()
-                .map(|r| Term::new(r, level, estimator, tuning.efficiency()));
+                .map(|r| Term::new(r, level, estimator, tuning));
             trimmed(terms.collect(), dropped(replicates.len()))
         };
         let mut kept = kept_of(estimator);
@@ -312,18 +321,13 @@ struct Term {
 }
 
 impl Term {
-    fn new(replicate: &Replicate, level: u32, estimator: Estimator, efficiency: f64) -> Self {
+    fn new(replicate: &Replicate, level: u32, estimator: Estimator, tuning: &Tuning) -> Self {
         let i = level as usize - 1;
-        let eta3 = replicate.edof_eta3(level);
         let is_robust = replicate.is_robust(estimator, i);
         Self {
             samples: replicate.samples as f64,
             nu: replicate.value(estimator, i),
-            edof: if is_robust {
-                interval::edof_robust(eta3, efficiency)
-            } else {
-                eta3
-            },
+            edof: replicate.edof(estimator, level, tuning),
             is_robust,
             is_without_root: is_robust && replicate.robust[i].status == Status::NoRoot,
         }
@@ -350,7 +354,7 @@ pub(super) fn between(replicates: &[Replicate], estimator: Estimator, tuning: &T
                 .collect();
             let noise = present
                 .iter()
-                .map(|r| variance_of_log(degrees(r, estimator, level, tuning)));
+                .map(|r| variance_of_log(r.edof(estimator, level, tuning)));
             (
                 scatter(&logs, estimator),
                 noise.sum::<f64>() / present.len() as f64,
@@ -386,16 +390,6 @@ pub(crate) fn falling_root(function: impl Fn(f64) -> f64, high: f64) -> f64 {
         }
     }
     low
-}
-
-fn degrees(replicate: &Replicate, estimator: Estimator, level: u32, tuning: &Tuning) -> f64 {
-    let eta3 = replicate.edof_eta3(level);
-    let is_robust = replicate.is_robust(estimator, level as usize - 1);
-    if is_robust {
-        edof_robust(eta3, tuning.efficiency())
-    } else {
-        eta3
-    }
 }
 
 /// Variance of ln nu from replicate to replicate: for DR-AWV of those near the middle, as those that differ most are trimmed.

@@ -155,10 +155,15 @@ impl<'a> CurveSampler<'a> {
     /// A new curve of the same estimator, of replicates that scatter by the law and by what they differ beyond it.
     pub(crate) fn draw(&self, key: &StreamKey<'_>, settings: &Settings) -> Option<Curve> {
         let mut generator = key.generator();
-        match &self.spread {
-            Some(spread) => self.curve(self.random_effects(spread, &mut generator), settings),
-            None => Some(self.elsewhere(&mut generator)),
-        }
+        let Some(spread) = &self.spread else {
+            return Some(self.elsewhere(&mut generator));
+        };
+        let mut between = spread.draw_between(&mut generator);
+        between.iter_mut().flatten().for_each(|b| *b = b.exp());
+        self.curve(
+            self.scattered(&between, Scattering::All, &mut generator)?,
+            settings,
+        )
     }
 
     /// A new curve of the same estimator, of replicates that differ by `between` (`[replicate][level]`, over the model)
@@ -170,46 +175,26 @@ impl<'a> CurveSampler<'a> {
         scattering: Scattering,
         settings: &Settings,
     ) -> Option<Curve> {
-        let mut generator = key.generator();
-        let ratios_of_recording = |(edof, between): (&Vec<f64>, &Vec<f64>)| match scattering {
-            Scattering::All => {
-                let within = self.law.draw(edof, &mut generator);
-                within
-                    .into_iter()
-                    .zip(between)
-                    .map(|(ratio, b)| ratio * b)
-                    .collect()
-            }
-            Scattering::BetweenRecordings => between.clone(),
-        };
-        let ratios = self
-            .spread
-            .as_ref()?
-            .edof
-            .iter()
-            .zip(between)
-            .map(ratios_of_recording)
-            .collect();
+        let ratios = self.scattered(between, scattering, &mut key.generator())?;
         self.curve(ratios, settings)
     }
 
-    /// nu*/nu of new replicates: what they differ by, and the scatter of each.
-    fn random_effects(&self, spread: &Spread, generator: &mut Generator) -> Vec<Vec<f64>> {
-        let between = spread.draw_between(generator);
-        let ratios_of_recording = |(edof, between): (&Vec<f64>, Vec<f64>)| {
-            let within = self.law.draw(edof, generator);
-            within
-                .into_iter()
-                .zip(between)
-                .map(|(ratio, b)| ratio * b.exp())
-                .collect()
+    /// nu*/nu of new replicates that differ by `between`.
+    fn scattered(
+        &self,
+        between: &[Vec<f64>],
+        scattering: Scattering,
+        generator: &mut Generator,
+    ) -> Option<Vec<Vec<f64>>> {
+        if scattering == Scattering::BetweenRecordings {
+            return Some(between.to_vec());
+        }
+        let of_recording = |(edof, between): (&Vec<f64>, &Vec<f64>)| {
+            let within = self.law.draw(edof, generator).into_iter();
+            within.zip(between).map(|(ratio, b)| ratio * b).collect()
         };
-        spread
-            .edof
-            .iter()
-            .zip(between)
-            .map(ratios_of_recording)
-            .collect()
+        let edof = &self.spread.as_ref()?.edof;
+        Some(edof.iter().zip(between).map(of_recording).collect())
     }
 
     /// The estimator's curve of replicates of which nu*/nu is given.

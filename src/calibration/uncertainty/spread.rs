@@ -15,7 +15,6 @@ use crate::imu::Axis;
 use crate::outcome::{AxesDiffer, LevelSpread, Outcome};
 use crate::rng::{Generator, StreamKey};
 use crate::wavelet::Tuning;
-use crate::wavelet::interval::edof_robust;
 use rand::RngExt;
 use rand_distr::StandardNormal;
 use rayon::prelude::*;
@@ -343,9 +342,13 @@ pub(super) const fn share_of_freedom(estimator: Estimator) -> f64 {
     }
 }
 
-/// Factor that makes the clipped variance of K Gaussian numbers unbiased: 1.075 for K = 8.
-pub(super) fn small_sample(count: usize) -> f64 {
-    1.0 + 0.6 / count as f64
+/// Factor that makes the variance of K Gaussian numbers unbiased where they are clipped: 1.075 for K = 8.
+pub(super) fn small_sample(count: usize, is_clipped: bool) -> f64 {
+    if is_clipped {
+        1.0 + 0.6 / count as f64
+    } else {
+        1.0
+    }
 }
 
 /// Mean square of the residuals of ln nu at one level, each over the deviation that its noise alone gives it: 1 on average
@@ -353,11 +356,7 @@ pub(super) fn small_sample(count: usize) -> f64 {
 fn mean_square(logs: &[f64], noise: &[f64], estimator: Estimator) -> f64 {
     let weights: Vec<f64> = noise.iter().map(|n| 1.0 / n).collect();
     let clipped = estimator == Estimator::DrAwv;
-    let correction = if clipped {
-        small_sample(logs.len())
-    } else {
-        1.0
-    };
+    let correction = small_sample(logs.len(), clipped);
     let squares: f64 = residuals(logs, &weights, clipped)
         .iter()
         .map(|z| z * z)
@@ -392,11 +391,7 @@ impl Scatter {
             };
         }
         let clipped = estimator == Estimator::DrAwv;
-        let correction = if clipped {
-            small_sample(logs.len())
-        } else {
-            1.0
-        };
+        let correction = small_sample(logs.len(), clipped);
         let weighted = |between: f64| {
             let weights: Vec<f64> = noise
                 .iter()
@@ -426,22 +421,25 @@ impl Scatter {
 
 /// Residuals from the weighted mean in standard deviations (weights: 1/variance); clipped ones are those from the
 /// weighted median, within [`CLIP`] deviations by their median, about their own weighted mean.
-fn residuals(values: &[f64], weights: &[f64], is_clipped: bool) -> Vec<f64> {
-    let kept = if is_clipped {
-        clipped(values, weights)
-    } else {
-        values.to_vec()
-    };
-    let sum: f64 = kept.iter().zip(weights).map(|(x, w)| x * w).sum();
-    let mean = sum / weights.iter().sum::<f64>();
+pub(super) fn residuals(values: &[f64], weights: &[f64], is_clipped: bool) -> Vec<f64> {
+    let kept = kept(values, weights, is_clipped);
+    let mean = weighted_mean(&kept, weights);
     kept.iter()
         .zip(weights)
         .map(|(x, w)| (x - mean) * w.sqrt())
         .collect()
 }
 
-/// The values within [`CLIP`] deviations of their weighted median, those beyond at the ends.
-pub(super) fn clipped(values: &[f64], weights: &[f64]) -> Vec<f64> {
+pub(super) fn weighted_mean(values: &[f64], weights: &[f64]) -> f64 {
+    let sum: f64 = values.iter().zip(weights).map(|(x, w)| x * w).sum();
+    sum / weights.iter().sum::<f64>()
+}
+
+/// The values; clipped ones within [`CLIP`] deviations of their weighted median, those beyond at the ends.
+pub(super) fn kept(values: &[f64], weights: &[f64], is_clipped: bool) -> Vec<f64> {
+    if !is_clipped {
+        return values.to_vec();
+    }
     let centre = weighted_median(values, weights);
     let distances: Vec<f64> = values
         .iter()
@@ -644,12 +642,7 @@ pub(crate) fn axes_differ(
         .filter(|axis| replicates.iter().any(|r| r.axis == Some(*axis)))
         .collect();
     let table = layout(replicates, &axes)?;
-    let degrees = |r: &Replicate, level: u32| match r.edof_eta3(level) {
-        edof if r.is_robust(estimator, level as usize - 1) => {
-            edof_robust(edof, tuning.efficiency())
-        }
-        edof => edof,
-    };
+    let degrees = |r: &Replicate, level: u32| r.edof(estimator, level, tuning);
     let is_usable = |r: &Replicate, level: u32| {
         r.levels() >= level as usize && degrees(r, level) >= NEARLY_GAUSSIAN
     };

@@ -12,7 +12,7 @@
 
 use super::bootstrap::CurveSampler;
 use super::intervals::{TAIL, matched, quantile};
-use super::spread::{clipped, origins, share_of_freedom, small_sample};
+use super::spread::{kept, origins, residuals, share_of_freedom, small_sample, weighted_mean};
 use crate::curve::{Estimator, Group, Replicate, average, falling_root};
 use crate::fit::{Fit, refit};
 use crate::model::ModelSpec;
@@ -174,41 +174,17 @@ struct OfAxis {
 }
 
 impl OfAxis {
-    /// Values (clipped, if asked for) and weights where recordings differ by this variance.
-    fn weighted(&self, between: f64, is_clipped: bool) -> (Vec<f64>, Vec<f64>) {
-        let weights: Vec<f64> = self
-            .noise
-            .iter()
-            .map(|noise| 1.0 / (noise + between))
-            .collect();
-        let values = if is_clipped {
-            clipped(&self.values, &weights)
-        } else {
-            self.values.clone()
-        };
-        (values, weights)
+    fn weights(&self, between: f64) -> Vec<f64> {
+        let weight = |noise| 1.0 / (noise + between);
+        self.noise.iter().map(weight).collect()
     }
 
     /// Residuals in standard deviations, from the mean of the axis.
     fn residuals(&self, between: f64, is_clipped: bool) -> Vec<f64> {
-        let (values, weights) = self.weighted(between, is_clipped);
-        let mean = weighted_mean(&values, &weights);
-        let correction = if is_clipped {
-            small_sample(values.len()).sqrt()
-        } else {
-            1.0
-        };
-        values
-            .iter()
-            .zip(weights)
-            .map(|(x, w)| correction * (x - mean) * w.sqrt())
-            .collect()
+        let correction = small_sample(self.values.len(), is_clipped).sqrt();
+        let residuals = residuals(&self.values, &self.weights(between), is_clipped);
+        residuals.into_iter().map(|z| correction * z).collect()
     }
-}
-
-fn weighted_mean(values: &[f64], weights: &[f64]) -> f64 {
-    let sum: f64 = values.iter().zip(weights).map(|(x, w)| x * w).sum();
-    sum / weights.iter().sum::<f64>()
 }
 
 impl Differences {
@@ -273,9 +249,9 @@ impl Differences {
         }
         let (mut values, mut weights) = (Vec::new(), Vec::new());
         for axis in &self.axes {
-            let (own, own_weights) = axis.weighted(sd * sd, self.is_clipped);
-            values.extend(own);
-            weights.extend(own_weights);
+            let own = axis.weights(sd * sd);
+            values.extend(kept(&axis.values, &own, self.is_clipped));
+            weights.extend(own);
         }
         let mean = weighted_mean(&values, &weights);
         let shared = 1.0 + others * squared_correlation.sqrt();
