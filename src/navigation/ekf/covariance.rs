@@ -386,7 +386,7 @@ fn store_error<W: Wide>(row: &mut [Lanes], x: &NavError<W>) {
 }
 
 #[inline(always)]
-fn load_triple<W: Wide>(triple: &[Lanes]) -> Vec3<W> {
+pub(super) fn load_triple<W: Wide>(triple: &[Lanes]) -> Vec3<W> {
     Vec3([
         W::load(&triple[0]),
         W::load(&triple[1]),

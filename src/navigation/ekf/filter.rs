@@ -3,6 +3,7 @@
 use super::belief::{Belief, BiasGroup, InitialSettings, psi_of_angles};
 use super::covariance::{
     BIAS, Covariance, EARTH_STEP_S, EarthStep, EarthTerms, PSI, R, Sample, Sources, Transition, V,
+    load_triple,
 };
 use super::update::FixUpdate;
 use crate::frames::NavState;
@@ -56,12 +57,7 @@ impl Scratch {
     /// The estimated errors of a block.
     #[inline(always)]
     pub(super) fn of<W: Wide>(&self, block: usize) -> Vec3<W> {
-        let triple = &self.error[3 * block..];
-        Vec3([
-            W::load(&triple[0]),
-            W::load(&triple[1]),
-            W::load(&triple[2]),
-        ])
+        load_triple(&self.error[3 * block..])
     }
 }
 

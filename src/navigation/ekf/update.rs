@@ -66,17 +66,6 @@ impl Ekf {
         nis
     }
 
-    #[inline(always)]
-    fn use_height<W: Wide>(&mut self, h: W, sigma_m: f64) -> W {
-        let ins = self.nominal.load::<W>();
-        self.apply_earth_terms(&ins);
-        self.scratch.error.fill(Lanes::ZERO);
-        // the third component of the position error is down: estimated less measured
-        let nis = self.scalar(&[(3 * R + 2, W::from(1.0))], h - ins.h, sigma_m * sigma_m);
-        self.correct(ins);
-        nis
-    }
-
     /// Estimated less measured position and velocity of the antenna: metres and m/s north, east, down; the
     /// velocity zero where none is measured.
     pub(crate) fn innovation(&self, fix: &Fix) -> [Vec3; 2] {
@@ -181,24 +170,48 @@ impl Kernel for Update<'_> {
 
 /// Uses a height above the ellipsoid (m), measured at the IMU with a standard deviation. Returns its NIS.
 pub(crate) fn update_height(ekf: &mut Ekf, h: &Lanes, sigma_m: f64) -> Lanes {
-    dispatch(ekf.level, UpdateHeight { ekf, h, sigma_m })
+    // the third component of the position error is down: estimated less measured
+    let (row, z) = (Row::new(3 * R + 2), *h - ekf.nominal.h);
+    let [z, s] = update_scalar(ekf, &row, z, sigma_m * sigma_m);
+    z * z / s
 }
 
-struct UpdateHeight<'a> {
+/// Uses one scalar measurement of a variance, estimate less measured `z`.
+fn update_scalar(ekf: &mut Ekf, row: &Row<Lanes>, z: Lanes, variance: f64) -> Innovation {
+    let level = ekf.level;
+    dispatch(
+        level,
+        UpdateScalar {
+            ekf,
+            row,
+            z,
+            variance,
+        },
+    )
+}
+
+struct UpdateScalar<'a> {
     ekf: &'a mut Ekf,
-    h: &'a Lanes,
-    sigma_m: f64,
+    row: &'a Row<Lanes>,
+    z: Lanes,
+    variance: f64,
 }
 
-impl Kernel for UpdateHeight<'_> {
-    type Output = Lanes;
+impl Kernel for UpdateScalar<'_> {
+    type Output = Innovation;
     #[inline(always)]
-    fn run<W: Wide>(self) -> Lanes {
-        let mut nis = Lanes::ZERO;
-        self.ekf
-            .use_height(W::load(self.h), self.sigma_m)
-            .store(&mut nis);
-        nis
+    fn run<W: Wide>(self) -> Innovation {
+        let ekf = self.ekf;
+        let ins = ekf.nominal.load::<W>();
+        ekf.apply_earth_terms(&ins);
+        ekf.scratch.error.fill(Lanes::ZERO);
+        let mut row = Row::default();
+        for (state, coefficient) in self.row.entries() {
+            row.push(*state, W::load(coefficient));
+        }
+        let innovation = ekf.innovated(row.entries(), W::load(&self.z), self.variance);
+        ekf.correct(ins);
+        innovation
     }
 }
 
@@ -433,36 +446,9 @@ pub(crate) fn update_yaw(ekf: &mut Ekf, yaw: &Lanes, variance: f64) -> Innovatio
     for lane in 0..LANES {
         z[lane] = wrap_angle(c.0[1][0][lane].atan2(c.0[0][0][lane]) - yaw[lane]);
     }
-    dispatch(
-        ekf.level,
-        UpdateYaw {
-            ekf,
-            z: &z,
-            variance,
-        },
-    )
-}
-
-struct UpdateYaw<'a> {
-    ekf: &'a mut Ekf,
-    z: &'a Lanes,
-    variance: f64,
-}
-
-impl Kernel for UpdateYaw<'_> {
-    type Output = Innovation;
-    #[inline(always)]
-    fn run<W: Wide>(self) -> Innovation {
-        let Self { ekf, z, variance } = self;
-        let ins = ekf.nominal.load::<W>();
-        ekf.apply_earth_terms(&ins);
-        ekf.scratch.error.fill(Lanes::ZERO);
-        let mut row = Row::default();
-        row.push3(3 * PSI, yaw_row(&ins).0);
-        let innovation = ekf.innovated(row.entries(), W::load(z), variance);
-        ekf.correct(ins);
-        innovation
-    }
+    let mut row = Row::default();
+    row.push3(3 * PSI, yaw_row(&ekf.nominal).0);
+    update_scalar(ekf, &row, z, variance)
 }
 
 impl Ekf {

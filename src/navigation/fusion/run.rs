@@ -184,12 +184,18 @@ impl Run<'_> {
             Some(tape) => tape.fix(&mut self.filter, self.now, |filter| filter.update(fix)),
             None => self.filter.update(fix),
         }
-        let finite = record.nis.is_finite();
+        let nis = record.nis;
         self.solution.fixes.push(record);
-        if finite {
+        self.finite(nis)
+    }
+
+    /// Refuses to go on with what is not a number.
+    fn finite(&self, value: f64) -> Result<(), FusionError> {
+        let diverged = FusionError::Diverged { t_s: self.now };
+        if value.is_finite() {
             Ok(())
         } else {
-            Err(FusionError::Diverged { t_s: self.now })
+            Err(diverged)
         }
     }
 
@@ -206,21 +212,15 @@ impl Run<'_> {
             Some(tape) => tape.fix(&mut self.filter, self.now, update),
             None => update(&mut self.filter),
         }
-        let finite = record.nis().is_finite();
+        let nis = record.nis();
         self.solution.aids.push(record);
-        if finite {
-            Ok(())
-        } else {
-            Err(FusionError::Diverged { t_s: self.now })
-        }
+        self.finite(nis)
     }
 
     fn row(&mut self) -> Result<(), FusionError> {
         self.next_row = (self.next_row + 1.0 / self.settings.rows_hz).max(self.now);
         let mut row = self.filter.row(self.now);
-        if !(row.sigma.iter().all(|s| s.is_finite()) && row.state.q_b_n.is_finite()) {
-            return Err(FusionError::Diverged { t_s: self.now });
-        }
+        self.finite(row.sigma.iter().sum::<f64>() + row.state.q_b_n.length())?;
         if row.state.lat.abs() > MAX_LATITUDE {
             return Err(FusionError::Pole {
                 t_s: self.now,
@@ -287,11 +287,16 @@ impl Filter {
 
     /// Through `seconds` of a sample.
     fn advance(&mut self, sample: &ImuIncrement, seconds: f64) {
+        self.ekf.set_interval(seconds);
+        self.step(sample);
+    }
+
+    /// Through an interval that was set, with the mean of a sample.
+    fn step(&mut self, sample: &ImuIncrement) {
         let mean = ImuSample {
             omega_ib_b: sample.dtheta / sample.dt_s,
             f_ib_b: sample.dv / sample.dt_s,
         };
-        self.ekf.set_interval(seconds);
         advance(&mut self.ekf, &[mean], &[[Vec3::ZERO; 2]]);
     }
 
@@ -299,17 +304,11 @@ impl Filter {
     pub(super) fn cross(&mut self, bridge: &ImuIncrement, seconds: f64, spread: Spread) {
         let steps = (seconds / BRIDGE_STEP_S).ceil().max(1.0);
         let step_s = seconds / steps;
-        let mean = ImuSample {
-            omega_ib_b: bridge.dtheta / bridge.dt_s,
-            f_ib_b: bridge.dv / bridge.dt_s,
-        };
         self.ekf.set_interval(step_s);
         // density σ²T over a step
         self.ekf
             .add_white(spread.map(|sigma| sigma * sigma * (bridge.dt_s / step_s)));
-        for _ in 0..steps as usize {
-            advance(&mut self.ekf, &[mean], &[[Vec3::ZERO; 2]]);
-        }
+        (0..steps as usize).for_each(|_| self.step(bridge));
     }
 
     fn fix(&self, fix: &GnssFix) -> Fix {
