@@ -59,11 +59,11 @@ nav_sim_signal::named!(
         WithinNoise = "within_noise",
         Moved = "moved",
         Removed = "removed",
-    }
+    }, in files
 );
 
 /// Scatter of the means of a sensor, and the finding.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct TurnOnSpread {
     /// The sensor.
     pub sensor: Sensor,

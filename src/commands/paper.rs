@@ -61,11 +61,7 @@ pub(crate) fn paper_figures(
         let result = curves
             .iter()
             .find(|c| c.scenario == scenario && c.estimator == estimator)?;
-        result
-            .file
-            .curves
-            .iter()
-            .find(|c| c.sensor == sensor.name())
+        result.file.curves.iter().find(|c| c.sensor == sensor)
     };
     let replicates = |scenario: &str| {
         let kinds = [
@@ -130,7 +126,7 @@ fn recordings(kind: &str, fitted: &FittedCurve) -> Panel {
             curve(&fitted.tau_s, &replicate.wv),
         )
     };
-    let mut axis = variance_axis(&fitted.sensor);
+    let mut axis = variance_axis(fitted.sensor);
     axis.label = format!("{kind} {}", axis.label);
     Panel::new(
         axis,
@@ -171,11 +167,11 @@ fn averages<'a>(
                         ))
                     },
                 ));
-                let mut axis = variance_axis(sensor.name());
+                let mut axis = variance_axis(sensor);
                 axis.label = format!("scenario {scenario}: {}", axis.label);
                 Panel::new(axis, series)
             };
-        let title = sensor_name(sensor.name());
+        let title = sensor_name(sensor);
         Chart::new(
             title,
             scale_axis(),
@@ -191,8 +187,8 @@ mod tests {
     use crate::report::ReplicateCurve;
 
     fn study() -> Vec<StudyCurves> {
-        let curve = |sensor: &str, factor: f64| FittedCurve {
-            sensor: sensor.into(),
+        let curve = |sensor: Sensor, factor: f64| FittedCurve {
+            sensor,
             axis: "all".into(),
             tau_s: vec![0.02, 0.04, 0.08],
             wv: [4.0, 2.0, 1.0].map(|x| x * factor).into(),
@@ -216,7 +212,7 @@ mod tests {
             file: CurvesFile {
                 schema_version: 1,
                 rate_hz: 100.0,
-                curves: vec![curve("accel", factor), curve("gyro", factor)],
+                curves: vec![curve(Sensor::Accel, factor), curve(Sensor::Gyro, factor)],
             },
         };
         let scenarios = [("I", 1.0), ("II", 2.0), ("III", 3.0)];

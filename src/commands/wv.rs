@@ -3,22 +3,19 @@
 use crate::app::inputs::listed;
 use crate::app::reading::{RecordingRequest, VarianceRequest};
 use crate::app::{Answer, Command, Context, Out, OutputFile, Result};
-use crate::commands::calibrate::stem;
 use crate::commands::calibrate::{visit, without_warm_up};
 use crate::io::atomic::Written;
 use crate::io::recordings::ReadOptions;
 use crate::parse;
 use crate::report::comparison_table::in_order;
-use crate::report::curves::{Band, SignalCurves, SignalsFile};
-use crate::report::curves::{band, curve, scale_axis, sensor_name, unit, variance_axis};
+use crate::report::curves::{Band, CONFIDENCE, SignalCurves, SignalsFile, recording_names};
+use crate::report::curves::{band, curve, scale_axis, sensor_name, variance_axis};
 use crate::report::json;
 use nav_sim_calibration::{Replicate, replicates};
 use nav_sim_calibration::{duration, median};
-use nav_sim_document::{
-    Cell, Chart, Colour, Document, Panel, Series, Table, Tone, short_names, shortest,
-};
+use nav_sim_document::{Cell, Chart, Colour, Document, Panel, Series, Table, Tone, shortest};
 use nav_sim_signal::imu::{Channel, Recording};
-use nav_sim_signal::wavelet::{Tuning, WaveletError, haar, interval};
+use nav_sim_signal::wavelet::{WaveletError, haar, interval};
 use rayon::prelude::*;
 use std::path::PathBuf;
 
@@ -69,14 +66,61 @@ impl Command for Wv {
     }
 
     fn run(&self, context: &Context<'_>) -> Result<SignalsFile> {
-        let options = WaveletOptions {
-            reading: self.recordings.options(),
-            skip_warm_up: self.recordings.reading.skips_warm_up(),
-            scales: self.tuning.levels(),
-            tuning: self.tuning.tuning()?,
-            intervals: self.intervals,
+        let (scales, tuning) = (self.tuning.levels(), self.tuning.tuning()?);
+        let skips_warm_up = self.recordings.reading.skips_warm_up();
+        // Four samples have a scale.
+        let reading = ReadOptions {
+            min_samples: scales.map_or(4, |j| 1 << j),
+            ..self.recordings.options()
         };
-        wavelet_variances(&self.files, &options, context)
+        let look = |recording: Recording| -> Result<Vec<SignalCurves>> {
+            let recording = match skips_warm_up {
+                true => without_warm_up(recording, true).0,
+                false => recording,
+            };
+            let measured = replicates(&recording, scales, &tuning)?;
+            let curves = |(channel, replicate): &(Channel, Replicate)| {
+                let edof = self.degrees_of_freedom(&recording, *channel, replicate)?;
+                let (rate_hz, efficiency) = (recording.rate_hz, tuning.efficiency());
+                Ok(SignalCurves::new(
+                    *channel, replicate, rate_hz, edof, efficiency,
+                ))
+            };
+            let curves = measured.par_iter().map(curves);
+            Ok(curves.collect::<std::result::Result<_, WaveletError>>()?)
+        };
+        let (looks, report) = visit(&self.files, &reading, &look, context)?;
+        let signals: Vec<Vec<SignalCurves>> = looks.into_iter().collect::<Result<_>>()?;
+        Ok(SignalsFile {
+            schema_version: 1,
+            rate_hz: report.files[0].rate_hz,
+            efficiency: tuning.efficiency(),
+            edof_method: self.intervals.name().to_owned(),
+            confidence: CONFIDENCE,
+            signals: signals.concat(),
+        })
+    }
+}
+
+impl Wv {
+    fn degrees_of_freedom(
+        &self,
+        recording: &Recording,
+        channel: Channel,
+        replicate: &Replicate,
+    ) -> std::result::Result<Vec<f64>, WaveletError> {
+        let levels = 1..=replicate.classical.len() as u32;
+        match (self.intervals, recording.signal(channel)) {
+            // Of a signal with holes eta3 of what is there.
+            (Intervals::LargeSample, Some(signal)) if replicate.coverage.is_empty() => {
+                let edof = levels.map(|level| {
+                    let coefficients = haar::coefficients(&signal.samples, level)?;
+                    Ok(interval::edof_large_sample(&coefficients, level))
+                });
+                edof.collect()
+            }
+            _ => Ok(levels.map(|level| replicate.edof_eta3(level)).collect()),
+        }
     }
 }
 
@@ -91,100 +135,6 @@ pub enum Intervals {
 }
 
 nav_sim_signal::named!(Intervals { Eta3 = "eta3", LargeSample = "large-sample" });
-
-/// How wavelet variances are taken.
-#[derive(Debug, Clone, Default)]
-struct WaveletOptions {
-    /// How the recordings are read.
-    pub reading: ReadOptions,
-    /// Whether each recording's warm-up, as it is found, is left out.
-    pub skip_warm_up: bool,
-    /// Number of scales; none: one less than each signal allows.
-    pub scales: Option<u32>,
-    /// Tuning of the robust ones.
-    pub tuning: Tuning,
-    /// Where the intervals' degrees of freedom are from.
-    pub intervals: Intervals,
-}
-
-/// The wavelet variances of all signals of recordings, or directories of them.
-///
-/// # Errors
-/// When a recording cannot be read, or is too short for the scales.
-fn wavelet_variances(
-    paths: &[PathBuf],
-    options: &WaveletOptions,
-    context: &Context<'_>,
-) -> Result<SignalsFile> {
-    let WaveletOptions {
-        reading,
-        skip_warm_up,
-        scales,
-        tuning,
-        intervals,
-    } = options;
-    // Four samples have a scale.
-    let reading = ReadOptions {
-        min_samples: scales.map_or(4, |j| 1 << j),
-        ..reading.clone()
-    };
-    let look = |recording: Recording| -> Result<Vec<SignalCurves>> {
-        let recording = if *skip_warm_up {
-            without_warm_up(recording, true).0
-        } else {
-            recording
-        };
-        let measured = replicates(&recording, *scales, tuning)?;
-        let curves = |(channel, replicate): &(Channel, Replicate)| {
-            let edof = degrees_of_freedom(*intervals, &recording, *channel, replicate)?;
-            Ok(SignalCurves::new(
-                *channel,
-                replicate,
-                recording.rate_hz,
-                edof,
-                tuning.efficiency(),
-            ))
-        };
-        Ok(measured
-            .par_iter()
-            .map(curves)
-            .collect::<std::result::Result<_, WaveletError>>()?)
-    };
-    let (looks, report) = visit(paths, &reading, &look, context)?;
-    let signals = looks
-        .into_iter()
-        .collect::<Result<Vec<_>>>()?
-        .into_iter()
-        .flatten()
-        .collect();
-    Ok(SignalsFile::new(
-        report.files[0].rate_hz,
-        tuning.efficiency(),
-        intervals.name(),
-        signals,
-    ))
-}
-
-fn degrees_of_freedom(
-    intervals: Intervals,
-    recording: &Recording,
-    channel: Channel,
-    replicate: &Replicate,
-) -> std::result::Result<Vec<f64>, WaveletError> {
-    let levels = 1..=replicate.classical.len() as u32;
-    match (intervals, recording.signal(channel)) {
-        // Of a signal with holes eta3 of what is there.
-        (Intervals::LargeSample, Some(signal)) if replicate.coverage.is_empty() => levels
-            .map(|level| {
-                Ok(interval::edof_large_sample(
-                    &haar::coefficients(&signal.samples, level)?,
-                    level,
-                ))
-            })
-            .collect(),
-        _ => Ok(levels.map(|level| replicate.edof_eta3(level)).collect()),
-    }
-}
 
 /// Degrees of freedom from which on robust over classical tells of outliers rather than of chance.
 const LEAST: f64 = 100.0;
@@ -201,46 +151,35 @@ impl Answer for SignalsFile {
     }
 
     fn document(&self) -> Document {
-        let worst = self.signals.iter().filter_map(|s| Some((excess(s)?, s)));
-        let worst = worst.max_by(|a, b| a.0.1.total_cmp(&b.0.1));
-        let count = recordings(self).len();
-        let (tone, verdict) = match worst {
-            Some(((tau_s, ratio), s)) if ratio > OUTLIERS => {
-                let (at, name) = (duration(tau_s), short_names(&[&s.file]).remove(0));
-                let of = format!("{} {}.{}", stem(&name), s.sensor, s.axis);
-                (
-                    Tone::Doubtful,
-                    format!(
-                        "outliers? {of}: classical wavelet variance {ratio:.2} times the robust one at {at}"
-                    ),
-                )
+        let all = self.signals.iter();
+        let ratios = all.flat_map(|s| ratios(s, self.efficiency).map(move |r| (s, r)));
+        let lowest = ratios.min_by(|a, b| a.1.ratio.total_cmp(&b.1.ratio));
+        let (tone, verdict) = match lowest {
+            Some((s, Ratio { ratio, tau_s, .. })) if ratio < 1.0 / OUTLIERS => {
+                let (name, ratio) = (recording_names([s.file.as_str()]).concat(), 1.0 / ratio);
+                let (channel, at) = (s.channel(), duration(tau_s));
+                let verdict = format!(
+                    "outliers? {name} {channel}: classical wavelet variance {ratio:.2} times the robust one at {at}"
+                );
+                (Tone::Doubtful, verdict)
             }
-            _ => (
-                Tone::Good,
-                "classical and robust wavelet variances agree".to_owned(),
-            ),
+            _ => {
+                let verdict = "classical and robust wavelet variances agree".to_owned();
+                (Tone::Good, verdict)
+            }
         };
-        let median = if count > 1 {
-            format!(", median of {count} recordings")
-        } else {
-            String::new()
-        };
+        let count = recordings(self).len();
         let head = format!(
-            "Allan deviation over averages{median}; ratio: robust/classical, * less than by chance"
+            "Allan deviation over averages, median of {count} recordings; ratio: robust/classical, * less than by chance"
         );
-        let mut document = Document::new(
-            "Wavelet variance of static recordings",
-            tone,
-            [verdict, head],
-        );
+        let title = "Wavelet variance of static recordings";
+        let mut document = Document::new(title, tone, [verdict, head]);
         document.lead(digest(self));
-        let charts: Vec<Chart> = channels(self)
-            .into_iter()
-            .map(|channel| chart(self, channel))
-            .collect();
+        let charts: Vec<Chart> = channels(self).map(|channel| chart(self, channel)).collect();
         document.charts(&charts, "Robust wavelet variance; dashed: classical, which outliers raise. τ is twice the averaging time.");
-        for (title, table) in side_by_side(self) {
-            document.folded(&title, |inside| inside.table(&table));
+        for channel in channels(self) {
+            let title = format!("{channel}: Allan deviation ({})", channel.sensor.unit());
+            document.folded(&title, |inside| inside.table(&side_by_side(self, channel)));
         }
         document.checked(
             "wavelet variances to 1e-12, ends of intervals to 1e-9 of an independent implementation",
@@ -250,32 +189,29 @@ impl Answer for SignalsFile {
 }
 
 /// A chart of an axis, the recordings in colour.
-fn chart(file: &SignalsFile, (sensor, axis): (&str, &str)) -> Chart {
+fn chart(file: &SignalsFile, channel: Channel) -> Chart {
     let files = recordings(file);
-    let names = short_names(&files);
-    let names: Vec<&str> = names.iter().map(|name| stem(name)).collect();
+    let names = recording_names(files.iter().copied());
     let mut series = Vec::new();
-    for s in signals_of(file, sensor, axis) {
+    for s in signals_of(file, channel) {
         let k = files.iter().position(|name| *name == s.file).unwrap_or(0);
-        let (name, colour) = (names[k], Colour::Hue(k));
+        let colour = Colour::Hue(k);
         if files.len() == 1 {
-            series.push(Series::new(
-                "95 %",
-                colour,
-                band(&s.tau_s, &s.robust.ci_low, &s.robust.ci_high),
-            ));
+            let band = band(&s.tau_s, &s.robust.ci_low, &s.robust.ci_high);
+            series.push(Series::new("95 %", colour, band));
         }
         series.push(Series::dashed("", colour, curve(&s.tau_s, &s.classical.wv)));
-        series.push(Series::line(name, colour, curve(&s.tau_s, &s.robust.wv)));
+        series.push(Series::line(
+            &names[k],
+            colour,
+            curve(&s.tau_s, &s.robust.wv),
+        ));
     }
-    let title = format!("{} {axis}", sensor_name(sensor));
-    Chart::new(
-        &title,
-        scale_axis(),
-        vec![Panel::new(variance_axis(sensor), series)],
-    )
-    .small()
-    .in_group("scales")
+    let title = format!("{} {}", sensor_name(channel.sensor), channel.axis);
+    let panel = Panel::new(variance_axis(channel.sensor), series);
+    Chart::new(&title, scale_axis(), vec![panel])
+        .small()
+        .in_group("scales")
 }
 
 /// The recordings, each once.
@@ -283,169 +219,135 @@ fn recordings(file: &SignalsFile) -> Vec<&str> {
     in_order(file.signals.iter().map(|s| s.file.as_str()))
 }
 
-/// The scale at which classical over robust is largest of those that are well known, and that ratio.
-fn excess(s: &SignalCurves) -> Option<(f64, f64)> {
-    let ratio = |i: usize| (s.tau_s[i], s.classical.wv[i] / s.robust.wv[i]);
-    let told = (0..s.tau_s.len())
-        .filter(|i| s.edof[*i] >= LEAST)
-        .map(ratio)
-        .filter(|r| r.1.is_finite());
-    told.max_by(|a, b| a.1.total_cmp(&b.1))
-}
-
 /// One table for all recordings: a row for each sensor and axis, its Allan deviation at one averaging time a decade (the
 /// median over the recordings), the lowest of all averaging times, and how far the robust wavelet variance is below the
 /// classical one.
 fn digest(file: &SignalsFile) -> Table {
-    let decades = decades(file);
-    let times = decades
-        .iter()
-        .map(|i| duration(allan_time_s(&longest(file).tau_s, *i)));
-    let head = times.chain(["lowest", "ratio"].map(str::to_owned));
-    let mut table = Table::new(["axis"]).and(head);
-    let row = |(sensor, axis): (&str, &str)| {
-        let signals = signals_of(file, sensor, axis);
-        let median_at = |i: usize| {
-            let of_files = signals
-                .iter()
-                .filter_map(|s| Some(allan_deviation(*s.classical.wv.get(i)?)));
-            let all: Vec<f64> = of_files.collect();
-            (!all.is_empty()).then(|| median(&all))
-        };
-        let cells = decades
-            .iter()
-            .map(|i| median_at(*i).map_or(String::new(), |x| format!("{x:.2e}")));
-        let name = format!("{sensor}.{axis} ({})", unit(sensor));
-        let scales = signals.iter().map(|s| s.tau_s.len()).max().unwrap_or(0);
-        let lowest = (0..scales)
-            .filter_map(|i| Some((i, median_at(i)?)))
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        let lowest = lowest.map_or(String::new(), |(i, deviation)| {
-            format!(
-                "{deviation:.2e} at {}",
-                duration(allan_time_s(&longest(file).tau_s, i))
-            )
-        });
+    let (times, decades) = (times(file), decades(file));
+    let head = decades.iter().map(|i| duration(times[*i]));
+    let mut table = Table::new(["axis"]).and(head.chain(["lowest", "ratio"].map(str::to_owned)));
+    for channel in channels(file) {
+        let signals = signals_of(file, channel);
+        let medians: Vec<f64> = (0..times.len())
+            .map(|i| {
+                let all: Vec<f64> = signals
+                    .iter()
+                    .filter_map(|s| s.allan_deviation(i))
+                    .collect();
+                if all.is_empty() {
+                    f64::NAN
+                } else {
+                    median(&all)
+                }
+            })
+            .collect();
+        let lowest = medians.iter().zip(&times).min_by(|a, b| a.0.total_cmp(b.0));
+        let lowest =
+            lowest.map(|(deviation, time)| format!("{deviation:.2e} at {}", duration(*time)));
         let ratios: Vec<Ratio> = signals
             .iter()
             .flat_map(|s| ratios(s, file.efficiency))
             .collect();
-        let ratio = least_ratio(&ratios).map_or(String::new(), |(r, mark)| format!("{r:.2}{mark}"));
-        let figures = cells.chain([lowest, ratio]).map(Cell::figures);
-        std::iter::once(Cell::from(name))
-            .chain(figures)
-            .collect::<Vec<Cell>>()
-    };
-    channels(file)
-        .into_iter()
-        .for_each(|channel| table.row(row(channel)));
+        let ratio = least_ratio(&ratios).map(|(r, mark)| format!("{r:.2}{mark}"));
+        let cells = decades.iter().map(|i| Some(format!("{:.2e}", medians[*i])));
+        let figures = cells
+            .chain([lowest, ratio])
+            .map(|text| Cell::figures(text.unwrap_or_default()));
+        let name = format!("{channel} ({})", channel.sensor.unit());
+        table.row(std::iter::once(Cell::from(name)).chain(figures));
+    }
     table
 }
 
-/// For each sensor and axis a title and a table: a row a scale, a column a recording.
-fn side_by_side(file: &SignalsFile) -> Vec<(String, Table)> {
-    let table = |(sensor, axis): (&str, &str)| {
-        let signals = signals_of(file, sensor, axis);
-        let names = short_names(&signals.iter().map(|s| s.file.as_str()).collect::<Vec<_>>());
-        let mut table = Table::new(["averages of"]).and(names);
-        for i in 0..signals.iter().map(|s| s.tau_s.len()).max().unwrap_or(0) {
-            let cell = |s: &&SignalCurves| {
-                let deviation = s
-                    .classical
-                    .wv
-                    .get(i)
-                    .map(|wv| format!("{:.3e}", allan_deviation(*wv)));
-                Cell::figures(deviation.unwrap_or_default())
-            };
-            let time = duration(allan_time_s(&longest(file).tau_s, i));
-            table.row(std::iter::once(Cell::from(time)).chain(signals.iter().map(cell)));
-        }
-        (
-            format!("{sensor}.{axis}: Allan deviation ({})", unit(sensor)),
-            table,
-        )
-    };
-    channels(file).into_iter().map(table).collect()
+/// A row a scale, a column a recording.
+fn side_by_side(file: &SignalsFile, channel: Channel) -> Table {
+    let signals = signals_of(file, channel);
+    let names = recording_names(signals.iter().map(|s| s.file.as_str()));
+    let mut table = Table::new(["averages of"]).and(names);
+    for (i, time) in times(file).into_iter().enumerate() {
+        let cell = |s: &&SignalCurves| {
+            let deviation = s
+                .allan_deviation(i)
+                .map(|deviation| format!("{deviation:.3e}"));
+            Cell::figures(deviation.unwrap_or_default())
+        };
+        table.row(std::iter::once(Cell::from(duration(time))).chain(signals.iter().map(cell)));
+    }
+    table
 }
 
 /// All scales of all signals as CSV.
 fn signals_csv(file: &SignalsFile) -> String {
-    let mut text = "file,sensor,axis,tau_s,edof,classical_wv,classical_ci_low,classical_ci_high,robust_wv,robust_ci_low,\
-                    robust_ci_high,robust_status,allan_tau_s,allan_deviation\n"
-        .to_owned();
+    let mut table = Table::new([
+        "file",
+        "sensor",
+        "axis",
+        "tau_s",
+        "edof",
+        "classical_wv",
+        "classical_ci_low",
+        "classical_ci_high",
+        "robust_wv",
+        "robust_ci_low",
+        "robust_ci_high",
+        "robust_status",
+        "allan_tau_s",
+        "allan_deviation",
+    ]);
     for s in &file.signals {
-        let name = if s.file.contains([',', '"', '\n']) {
-            format!("\"{}\"", s.file.replace('"', "\"\""))
-        } else {
-            s.file.clone()
-        };
-        for i in 0..s.tau_s.len() {
-            let band = |b: &Band| [b.wv[i], b.ci_low[i], b.ci_high[i]].map(shortest).join(",");
-            let allan = [
-                allan_time_s(&s.tau_s, i),
-                allan_deviation(s.classical.wv[i]),
-            ]
-            .map(shortest)
-            .join(",");
-            text += &format!(
-                "{name},{},{},{},{},{},{},{},{allan}\n",
-                s.sensor,
-                s.axis,
-                shortest(s.tau_s[i]),
-                shortest(s.edof[i]),
-                band(&s.classical),
-                band(&s.robust),
-                s.robust.status[i]
+        for (i, deviation) in (0..).map_while(|i| Some((i, s.allan_deviation(i)?))) {
+            let band = |b: &Band| {
+                [b.wv[i], b.ci_low[i], b.ci_high[i]]
+                    .map(shortest)
+                    .map(Cell::from)
+            };
+            let cells = [s.file.as_str(), s.sensor.name(), s.axis.name()].map(Cell::from);
+            let scale = [s.tau_s[i], s.edof[i]].map(shortest).map(Cell::from);
+            let allan = [0.5 * s.tau_s[i], deviation].map(shortest).map(Cell::from);
+            let status = Cell::from(s.robust.status[i].as_str());
+            let bands = band(&s.classical).into_iter().chain(band(&s.robust));
+            table.row(
+                cells
+                    .into_iter()
+                    .chain(scale)
+                    .chain(bands)
+                    .chain([status])
+                    .chain(allan),
             );
         }
     }
-    text
+    table.csv()
 }
 
-/// A scale is two averages long.
-fn allan_time_s(tau_s: &[f64], index: usize) -> f64 {
-    0.5 * tau_s[index]
-}
-
-/// The wavelet variance is half the Allan variance.
-fn allan_deviation(wv: f64) -> f64 {
-    (2.0 * wv).sqrt()
-}
-
-fn signals_of<'a>(file: &'a SignalsFile, sensor: &str, axis: &str) -> Vec<&'a SignalCurves> {
+fn signals_of(file: &SignalsFile, channel: Channel) -> Vec<&SignalCurves> {
     file.signals
         .iter()
-        .filter(|s| s.sensor == sensor && s.axis == axis)
+        .filter(|s| s.channel() == channel)
         .collect()
 }
 
-/// Sensors and axes, as they first appear.
-fn channels(file: &SignalsFile) -> Vec<(&str, &str)> {
-    let mut channels: Vec<(&str, &str)> = Vec::new();
-    for s in &file.signals {
-        if !channels.contains(&(&s.sensor, &s.axis)) {
-            channels.push((&s.sensor, &s.axis));
-        }
-    }
-    channels
+fn channels(file: &SignalsFile) -> impl Iterator<Item = Channel> {
+    Channel::ALL
+        .into_iter()
+        .filter(|channel| !signals_of(file, *channel).is_empty())
 }
 
-/// The signal with the most scales.
-fn longest(file: &SignalsFile) -> &SignalCurves {
-    let most = file.signals.iter().max_by_key(|s| s.tau_s.len());
-    most.expect("a file of signals has one")
+/// The averaging times (s) of the signal with the most scales: a scale is two averages long.
+fn times(file: &SignalsFile) -> Vec<f64> {
+    let longest = file.signals.iter().max_by_key(|s| s.tau_s.len());
+    longest.map_or(Vec::new(), |s| {
+        s.tau_s.iter().map(|tau_s| 0.5 * tau_s).collect()
+    })
 }
 
 /// The scales whose averaging times are nearest to powers of ten (s), each once.
 fn decades(file: &SignalsFile) -> Vec<usize> {
-    let tau_s = &longest(file).tau_s;
-    let log = |i: usize| allan_time_s(tau_s, i).log10();
-    let (first, last) = (log(0).floor() as i32, log(tau_s.len() - 1).ceil() as i32);
+    let logs: Vec<f64> = times(file).iter().map(|time| time.log10()).collect();
+    let (first, last) = (logs[0].floor() as i32, logs[logs.len() - 1].ceil() as i32);
     let nearest = |decade: i32| {
-        let distance = |i: &usize| (log(*i) - f64::from(decade)).abs();
-        (0..tau_s.len())
-            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-            .unwrap_or(0)
+        let distance = |i: &usize| (logs[*i] - f64::from(decade)).abs();
+        let nearest = (0..logs.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        nearest.unwrap_or(0)
     };
     let mut found: Vec<usize> = (first..=last).map(nearest).collect();
     found.dedup();
@@ -454,6 +356,7 @@ fn decades(file: &SignalsFile) -> Vec<usize> {
 
 /// Robust over classical at one scale, and the standard deviation of its logarithm that chance has.
 struct Ratio {
+    tau_s: f64,
     ratio: f64,
     deviation: f64,
 }
@@ -463,6 +366,7 @@ struct Ratio {
 fn ratios(s: &SignalCurves, efficiency: f64) -> impl Iterator<Item = Ratio> {
     let known = (0..s.tau_s.len()).filter(|i| s.edof[*i] >= LEAST && s.robust.status[*i] == "ok");
     known.map(move |i| Ratio {
+        tau_s: s.tau_s[i],
         ratio: s.robust.wv[i] / s.classical.wv[i],
         deviation: ((1.0 / efficiency - 1.0) * 2.0 / s.edof[i]).sqrt(),
     })
@@ -483,6 +387,7 @@ fn least_ratio(ratios: &[Ratio]) -> Option<(f64, &'static str)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nav_sim_signal::imu::{Axis, Sensor};
     use nav_sim_signal::rng::Generator;
     use nav_sim_signal::wavelet::{Convention, Tuning, interval};
     use rand::{RngExt, SeedableRng};
@@ -501,15 +406,22 @@ mod tests {
         };
         let signal = |k: usize| SignalCurves {
             file: format!("rec/run{k}.csv"),
-            sensor: "gyro".to_owned(),
-            axis: "z".to_owned(),
+            sensor: Sensor::Gyro,
+            axis: Axis::Z,
             samples: 1 << 15,
             tau_s: tau_s.clone(),
             edof: edof.clone(),
             classical: band(1.0, ""),
             robust: band(0.9, "ok"),
         };
-        SignalsFile::new(100.0, 0.6, "eta3", (0..count).map(signal).collect())
+        SignalsFile {
+            schema_version: 1,
+            rate_hz: 100.0,
+            efficiency: 0.6,
+            edof_method: "eta3".to_owned(),
+            confidence: CONFIDENCE,
+            signals: (0..count).map(signal).collect(),
+        }
     }
 
     /// 1/√t at the octaves nearest to the decades: 0.01, 0.08, 1.28 and 10.24 s (81.92 s is the last).
@@ -547,6 +459,7 @@ mod tests {
                 .map(|level| (level, interval::edof_eta3(4096, level)))
                 .filter(|(_, edof)| *edof >= LEAST)
                 .map(|(level, edof)| Ratio {
+                    tau_s: 1.0,
                     ratio: robust[level as usize - 1].value / classical[level as usize - 1],
                     deviation: ((1.0 / 0.6 - 1.0) * 2.0 / edof).sqrt(),
                 })
@@ -562,13 +475,14 @@ mod tests {
 
     #[test]
     fn recordings_stand_side_by_side() {
-        let tables = side_by_side(&file(2));
-        assert_eq!(tables.len(), 1);
-        let text = tables[0].1.csv();
+        let file = file(2);
+        let channels: Vec<Channel> = channels(&file).collect();
+        assert_eq!(channels.len(), 1);
+        let text = side_by_side(&file, channels[0]).csv();
         assert!(
-            text.starts_with("averages of,run0.csv,run1.csv\n") && text.lines().count() == 15,
+            text.starts_with("averages of,run0,run1\n") && text.lines().count() == 15,
             "{text}"
         );
-        assert_eq!(signals_csv(&file(2)).lines().count(), 1 + 2 * 14);
+        assert_eq!(signals_csv(&file).lines().count(), 1 + 2 * 14);
     }
 }

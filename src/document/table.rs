@@ -142,7 +142,7 @@ impl Table {
     ///
     /// `rows` is the path of the entries, with `*` for each of a list: `/designs/*/horizontal_p95/*`. A column is a
     /// title and a key of the entry: `p95_m`, or `../../hours` of what holds it. After `|` stands the text where the
-    /// value is missing, else `–`; a key of braces, `{start_s}–{end_s} s`, is a text with values in it. A key with `*`
+    /// value is missing, else `–`; a list is an interval, `1 … 2`; a key of braces, `{start_s}–{end_s} s`, is a text with values in it. A key with `*`
     /// makes a column for each of the list, with a title from its entries: `("RMSE {after_s} s", "ends/*/rmse_m")`.
     ///
     /// ```
@@ -224,10 +224,8 @@ fn cell(json: &Value, place: &str, key: &str) -> Cell {
             Cell::number(number.as_f64().unwrap_or(f64::NAN), &pointer)
         }
         Some(Value::Null) | None => Cell::figures(missing),
-        Some(value) => match value.is_number() {
-            true => Cell::figures(text(value)),
-            false => text(value).into(),
-        },
+        Some(value @ (Value::Number(_) | Value::Array(_))) => Cell::figures(text(value)),
+        Some(value) => text(value).into(),
     }
 }
 
@@ -237,6 +235,7 @@ fn text(value: &Value) -> String {
         Value::Number(number) if number.is_f64() => readable(number.as_f64().unwrap_or(f64::NAN)),
         Value::Bool(yes) => if *yes { "yes" } else { "no" }.to_owned(),
         Value::Null => "–".to_owned(),
+        Value::Array(list) => list.iter().map(text).collect::<Vec<_>>().join(" … "),
         other => other.to_string(),
     }
 }

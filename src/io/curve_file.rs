@@ -164,9 +164,6 @@ fn named_curve(
         return Err(Failure::contents(path, Place::Within, message));
     }
     let place = Place::Part(format!("curve {number}"));
-    let sensor = entry.sensor.parse();
-    let sensor =
-        sensor.map_err(|_| refused(path, &place, "sensor", &entry.sensor, "accel or gyro"))?;
     let axis = Axis::ALL.into_iter().find(|a| a.name() == entry.axis);
     if axis.is_none() && entry.axis != "all" {
         return Err(refused(path, &place, "axis", &entry.axis, "x, y, z or all"));
@@ -188,7 +185,7 @@ fn named_curve(
     curve.classical = entry.classical_tau_s.iter().map(level).collect();
     let estimator = (!entry.estimator.is_empty()).then(|| entry.estimator.clone());
     Ok(NamedCurve {
-        sensor: Some(sensor),
+        sensor: Some(entry.sensor),
         axis,
         rate_hz: Some(rate_hz),
         estimator,
@@ -276,7 +273,7 @@ mod tests {
     #[test]
     fn what_calibrate_writes() {
         let entry = FittedCurve {
-            sensor: "gyro".into(),
+            sensor: Sensor::Gyro,
             axis: "all".into(),
             tau_s: vec![2.0 / 30.0, 4.0 / 30.0],
             wv: vec![2e-7, 1e-7],

@@ -1,14 +1,15 @@
 //! Wavelet-variance curves as JSON: of signals (`wv`), and of fits (`<model>.wv.json`).
 
 use nav_sim_calibration::{Estimator, Group, Outcome, Replicate, Settings, implied, tau_s};
-use nav_sim_document::{Axis, Chart, Colour, Mark, Panel, Series, squared};
-use nav_sim_signal::imu::{Channel, Sensor};
+use nav_sim_document::{
+    Axis as ChartAxis, Chart, Colour, Mark, Panel, Series, short_names, squared,
+};
+use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::wavelet::interval;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::path::Path;
 
-/// Layout version of both files.
-const SCHEMA_VERSION: u32 = 1;
 /// Confidence of all intervals.
 pub(crate) const CONFIDENCE: f64 = 0.95;
 
@@ -44,10 +45,10 @@ impl Band {
 pub struct SignalCurves {
     /// Recording.
     pub file: String,
-    /// `accel` or `gyro`.
-    pub sensor: String,
-    /// `x`, `y` or `z`.
-    pub axis: String,
+    /// Sensor.
+    pub sensor: Sensor,
+    /// Axis.
+    pub axis: Axis,
     /// Samples.
     pub samples: usize,
     /// Scales, 2^j samples (s).
@@ -80,14 +81,24 @@ impl SignalCurves {
             .unzip();
         Self {
             file: replicate.name.clone(),
-            sensor: channel.sensor.name().to_owned(),
-            axis: channel.axis.name().to_owned(),
+            sensor: channel.sensor,
+            axis: channel.axis,
             samples: replicate.samples,
             tau_s: (1..=edof.len() as u32).map(|j| tau_s(j, rate_hz)).collect(),
             classical: Band::new(replicate.classical.clone(), &edof, Vec::new()),
             robust: Band::new(values, &robust_edof, status),
             edof,
         }
+    }
+
+    pub(crate) fn channel(&self) -> Channel {
+        let (sensor, axis) = (self.sensor, self.axis);
+        Channel { sensor, axis }
+    }
+
+    /// The Allan deviation at a scale, if it has that: the wavelet variance is half the Allan variance.
+    pub(crate) fn allan_deviation(&self, scale: usize) -> Option<f64> {
+        Some((2.0 * self.classical.wv.get(scale)?).sqrt())
     }
 }
 
@@ -108,50 +119,29 @@ pub struct SignalsFile {
     pub signals: Vec<SignalCurves>,
 }
 
-impl SignalsFile {
-    /// The file of some signals.
-    pub(crate) fn new(
-        rate_hz: f64,
-        efficiency: f64,
-        edof_method: &str,
-        signals: Vec<SignalCurves>,
-    ) -> Self {
-        Self {
-            schema_version: SCHEMA_VERSION,
-            rate_hz,
-            efficiency,
-            edof_method: edof_method.to_owned(),
-            confidence: CONFIDENCE,
-            signals,
-        }
-    }
-}
-
 impl From<SignalsFile> for CurvesFile {
     /// The classical variance of each signal as the curve of GMWM, the robust one as that of RGMWM.
     fn from(file: SignalsFile) -> Self {
-        let efficiency = file.efficiency;
-        let curves = file.signals.into_iter().flat_map(|s| {
-            let robust_edof = s
-                .edof
-                .iter()
-                .map(|e| interval::edof_robust(*e, efficiency))
-                .collect();
-            let curve_of_estimator =
-                |estimator: Estimator, wv: Vec<f64>, edof: Vec<f64>| FittedCurve {
-                    efficiency: estimator.is_robust().then_some(efficiency),
-                    sensor: s.sensor.clone(),
-                    axis: s.axis.clone(),
+        let curves = file.signals.iter().flat_map(|s| {
+            [
+                (Estimator::Gmwm, &s.classical),
+                (Estimator::Rgmwm, &s.robust),
+            ]
+            .map(|(estimator, band)| {
+                let efficiency = estimator.is_robust().then_some(file.efficiency);
+                let edof =
+                    |e: &f64| efficiency.map_or(*e, |share| interval::edof_robust(*e, share));
+                FittedCurve {
+                    efficiency,
+                    sensor: s.sensor,
+                    axis: s.axis.name().to_owned(),
                     estimator: estimator.name().to_owned(),
                     tau_s: s.tau_s.clone(),
-                    wv,
-                    edof,
+                    wv: band.wv.clone(),
+                    edof: s.edof.iter().map(edof).collect(),
                     ..FittedCurve::default()
-                };
-            [
-                curve_of_estimator(Estimator::Gmwm, s.classical.wv.clone(), s.edof.clone()),
-                curve_of_estimator(Estimator::Rgmwm, s.robust.wv.clone(), robust_edof),
-            ]
+                }
+            })
         });
         Self {
             schema_version: file.schema_version,
@@ -176,8 +166,8 @@ pub(crate) struct CurvesFile {
 /// and edof are needed to fit a model to it again.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct FittedCurve {
-    /// `accel` or `gyro`.
-    pub sensor: String,
+    /// Sensor.
+    pub sensor: Sensor,
     /// `x`, `y`, `z`, or `all`.
     pub axis: String,
     /// Estimator.
@@ -238,7 +228,7 @@ impl CurvesFile {
         let curve = |o: &&Outcome| fitted(o, replicates(o), settings);
         let curves = outcomes.iter().map(curve).collect();
         Self {
-            schema_version: SCHEMA_VERSION,
+            schema_version: 1,
             rate_hz: settings.rate_hz,
             curves,
         }
@@ -263,7 +253,7 @@ fn fitted(outcome: &Outcome, replicates: &[Replicate], settings: &Settings) -> F
         wv: r.values(*estimator),
     };
     FittedCurve {
-        sensor: outcome.scope.sensor.name().to_owned(),
+        sensor: outcome.scope.sensor,
         axis: outcome.scope.axis.map_or("all", |a| a.name()).to_owned(),
         estimator: estimator.name().to_owned(),
         tau_s: over_levels(&|level| tau_s(level, settings.rate_hz)),
@@ -288,29 +278,31 @@ fn fitted(outcome: &Outcome, replicates: &[Replicate], settings: &Settings) -> F
 // Axes, points and bands of charts of wavelet variances.
 
 /// The axis of scales.
-pub(crate) fn scale_axis() -> Axis {
-    Axis::log("scale τ (s)")
+pub(crate) fn scale_axis() -> ChartAxis {
+    ChartAxis::log("scale τ (s)")
 }
 
 /// The axis of wavelet variances of a sensor.
-pub(crate) fn variance_axis(sensor: &str) -> Axis {
-    Axis::log(&format!("wavelet variance ({})", squared(unit(sensor))))
+pub(crate) fn variance_axis(sensor: Sensor) -> ChartAxis {
+    ChartAxis::log(&format!("wavelet variance ({})", squared(sensor.unit())))
 }
 
-/// Unit of a sensor, by its name in files.
-pub(crate) fn unit(sensor: &str) -> &'static str {
-    Sensor::ALL
-        .into_iter()
-        .find(|s| s.name() == sensor)
-        .map_or("", Sensor::unit)
+/// Names of recordings, short and without the endings of their files: `run4` of `static/run4.csv.gz`.
+pub(crate) fn recording_names<'a>(files: impl IntoIterator<Item = &'a str>) -> Vec<String> {
+    let stem = |name: String| {
+        let path = Path::new(&name);
+        let stem = path.file_prefix().map(|prefix| path.with_file_name(prefix));
+        stem.map_or_else(String::new, |stem| stem.display().to_string())
+    };
+    let files: Vec<&str> = files.into_iter().collect();
+    short_names(&files).into_iter().map(stem).collect()
 }
 
 /// A sensor in words.
-pub(crate) fn sensor_name(sensor: &str) -> &'static str {
-    if sensor == Sensor::Accel.name() {
-        "Accelerometer"
-    } else {
-        "Gyroscope"
+pub(crate) fn sensor_name(sensor: Sensor) -> &'static str {
+    match sensor {
+        Sensor::Accel => "Accelerometer",
+        Sensor::Gyro => "Gyroscope",
     }
 }
 
@@ -343,7 +335,7 @@ pub(crate) struct Dots<'a> {
 /// A chart with a row for each name, from top to bottom; `level`: a value to compare with, and its name.
 pub(crate) fn dot_chart(
     title: &str,
-    axis: Axis,
+    axis: ChartAxis,
     names: impl IntoIterator<Item = String>,
     level: Option<(&str, f64)>,
     dots: &[Dots<'_>],
@@ -380,7 +372,7 @@ pub(crate) fn dot_chart(
     }
     let panel = Panel {
         height: 0.1 * (rows + 1.0),
-        ..Panel::new(Axis::names(names), series)
+        ..Panel::new(ChartAxis::names(names), series)
     };
     Chart::new(title, axis, vec![panel])
 }

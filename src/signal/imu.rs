@@ -7,9 +7,10 @@ use std::fmt;
 pub const MAX_RATE_HZ: f64 = 100_000.0;
 
 /// Kind of inertial sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Sensor {
     /// Accelerometer (m/s²).
+    #[default]
     Accel,
     /// Gyroscope (rad/s).
     Gyro,

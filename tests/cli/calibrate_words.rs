@@ -128,21 +128,25 @@ fn practitioners_parameters_are_those_of_export() {
     let out = json(dir.path(), &calibrate);
     let exported = json(dir.path(), &["export", "m.toml", "--target", "kalibr"]);
     for fit in out["fits"].as_array().unwrap() {
-        let own = &fit["parameters"]["white_and_walk"];
+        let own = &fit["figures"];
         let of_export =
             &exported["sensors"][fit["sensor"].as_str().unwrap()]["axes"]["x"]["white_and_walk"];
-        for key in ["n", "k"] {
-            assert_eq!(own[key]["value"], of_export[key]["value"], "{fit}");
-            assert_eq!(own[key]["data_sheet"], of_export[key]["data_sheet"]);
+        for (key, of_export) in [("N", &of_export["n"]), ("K", &of_export["k"])] {
+            for part in ["value", "unit"] {
+                assert_eq!(own[key][part], of_export["data_sheet"][part], "{fit}");
+            }
         }
-        let density = own["n"]["value"].as_f64().unwrap();
+        let density = of_export["n"]["value"].as_f64().unwrap();
         assert!(
             (density / (4e-6_f64 / 50.0).sqrt() - 1.0).abs() < 0.02,
             "{density}"
         );
-        let ends = numbers(&own["n"]["ci95"]);
+        let (n, ends) = (
+            own["N"]["value"].as_f64().unwrap(),
+            numbers(&own["N"]["ci95"]),
+        );
         assert!(
-            ends[0] < density && density < ends[1] && ends[1] / ends[0] < 1.05,
+            ends[0] < n && n < ends[1] && ends[1] / ends[0] < 1.05,
             "{ends:?}"
         );
         assert!(fit["missed"].as_array().unwrap().is_empty());
@@ -187,8 +191,7 @@ fn bad_data_are_told_in_a_line() {
     let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
     let first = text.lines().next().unwrap();
     assert!(
-        first.starts_with("gyro: WN does not fit: data/model ")
-            && first.contains("(all together: p = "),
+        first.starts_with("gyro: WN does not fit: data/model ") && first.contains("(p = "),
         "{first}"
     );
     assert!(
@@ -239,7 +242,7 @@ fn terminal_and_page_name_the_same_scale() {
         .split(": ")
         .nth(1)
         .unwrap()
-        .split(" (all")
+        .split(" (p")
         .next()
         .unwrap();
     assert_eq!(
@@ -285,7 +288,7 @@ fn the_page_and_the_terminal_say_the_same_of_n_and_k() {
         .next()
         .unwrap();
     let page = std::fs::read_to_string(dir.path().join("m.html")).unwrap();
-    let cell = "/fits/0/parameters/white_and_walk/n/data_sheet/value\">";
+    let cell = "/fits/0/figures/N/value\">";
     let (figure, chart) = (
         page.find(cell).unwrap(),
         page.find("<svg class=\"chart").unwrap(),
@@ -347,7 +350,7 @@ fn a_random_walk_that_nobody_saw_is_not_stated() {
             .unwrap();
         assert_eq!(!row.contains("not observed"), is_observed, "{text}");
         assert_eq!(
-            json(dir.path(), &fit)["fits"][0]["parameters"]["white_and_walk"]["k"]["observed"],
+            json(dir.path(), &fit)["fits"][0]["figures"]["K"]["value"].is_number(),
             is_observed
         );
     }

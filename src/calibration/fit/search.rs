@@ -686,7 +686,7 @@ nav_sim_signal::named!(
         Converged = "converged",
         IterationLimit = "iteration_limit",
         Regression = "regression",
-    }
+    }, in files
 );
 
 /// Local minimum to which a start led.

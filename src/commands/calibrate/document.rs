@@ -1,60 +1,112 @@
 //! The document of a calibration.
 
-use super::fits::{averages, figures, interval_of, policy};
+use super::fits::{CalibrationFile, goodness, interval_of, intervals};
+use crate::commands::export::Quantity;
 use crate::report::comparison_table::in_order;
-use crate::report::curves::{CurvesFile, FittedCurve, ReplicateCurve};
-use crate::report::curves::{band, curve, scale_axis, sensor_name, unit, variance_axis};
+use crate::report::curves::{CurvesFile, FittedCurve, recording_names};
+use crate::report::curves::{band, curve, scale_axis, sensor_name, variance_axis};
 use nav_sim_calibration::{
-    Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, Misfit, Miss, Note,
-    Outcome, ParameterInterval, Ranking, Settings, TurnOnFinding, TurnOnSpread, Undetermined,
-    Verdict, WIDEST, WarmUp, duration, percent, shares, tau_s,
+    Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, Note, Outcome,
+    ParameterInterval, Ranking, Settings, TurnOnFinding, TurnOnSpread, Undetermined, Verdict,
+    WIDEST, duration, percent, tau_s,
 };
 use nav_sim_document::{
     Axis as ChartAxis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone,
-    readable, short_names,
+    readable,
 };
-use nav_sim_signal::imu::{Axis, Channel, Sensor};
+use nav_sim_signal::imu::{Axis, Sensor};
+use nav_sim_signal::noise::practical::Horizon;
+use serde_json::{Value, json};
 
-/// The fits of a calibration, all of them or those of one estimator, and what was found of the recordings.
+/// The fits of a calibration, all of them or those of one estimator, and the findings about the recordings.
 pub(crate) struct ShownCalibration<'a> {
-    /// The fits, each with its place among all of the command.
-    pub outcomes: Vec<(usize, &'a Outcome)>,
-    /// Their curves, in the same order.
+    pub file: CalibrationFile<'a>,
+    /// The outcomes of the fits, in the same order.
+    pub outcomes: Vec<&'a Outcome>,
     pub curves: CurvesFile,
-    /// The recordings against one another.
-    pub diagnoses: &'a [Diagnosis],
-    /// Their means.
-    pub turn_on: &'a [TurnOnSpread],
-    /// Their beginnings.
     pub beginnings: &'a Beginnings,
-    /// How all was fitted.
     pub settings: &'a Settings,
 }
 
 impl ShownCalibration<'_> {
-    /// The document.
     pub(crate) fn document(&self) -> Document {
-        let estimators = in_order(self.outcomes.iter().map(|(_, o)| o.estimator.name()));
+        let json = json!(self.file);
+        let estimators = in_order(self.outcomes.iter().map(|o| o.estimator.name()));
         let title = format!("Stochastic calibration, {}", estimators.join(", "));
-        let fits: Vec<&Outcome> = self.outcomes.iter().map(|(_, o)| *o).collect();
-        let mut document = Document::new(
-            &title,
-            self.tone(),
-            verdict(&fits, self.diagnoses, self.settings),
-        );
-        document.lead(if fits.len() > 2 {
-            self.fits_table()
+        let mut document = Document::new(&title, self.tone(), self.verdict());
+        let of_one = self.outcomes.iter().all(|o| o.recordings == 1);
+        let interval = if of_one {
+            "95 %, this power-on"
         } else {
-            self.figures_table()
-        });
-        for (importance, note) in self.notes(&fits) {
+            "95 %, mean of power-ons"
+        };
+        let policy = policy();
+        let columns = [
+            (policy.as_str(), "{../../name} {name} ({unit})"),
+            ("value", "value"),
+            (interval, "interval"),
+            ("averages of", "averages"),
+        ];
+        document.lead(Table::of(&json, "/fits/*/figures/*", &columns));
+        for (importance, note) in self.notes() {
             document.note(importance, note);
         }
-        for ((index, outcome), fitted) in self.outcomes.iter().zip(&self.curves.curves) {
-            self.fit(*index, outcome, fitted, &mut document);
+        for (index, (outcome, fitted)) in self.outcomes.iter().zip(&self.curves.curves).enumerate()
+        {
+            document.section(&format!("{} · {}", group_name(fitted), outcome.spec));
+            let diagnoses = self.file.replicates;
+            document.chart(
+                &allan(fitted, outcome, diagnoses, self.settings.rate_hz),
+                &format!("Allan deviation: recordings, model, and what is exported: {policy}. N is read at 1 s, K at 3 s, 0.664 B at the floor."),
+            );
+            document.chart(&variance(fitted, diagnoses), CAPTION);
+            document.table(&parameters(outcome));
+            if outcome.ranking.is_some() {
+                document.heading("Candidate models");
+                let columns = [
+                    ("model", "model"),
+                    ("WVIC", "wvic"),
+                    ("objective", "objective"),
+                    ("optimism", "optimism"),
+                    ("p", "p_value"),
+                    ("J-test p", "j_test_p_value"),
+                    ("chosen", "chosen"),
+                ];
+                document.table(&Table::of(
+                    &json,
+                    &format!("/fits/{index}/ranking/*"),
+                    &columns,
+                ));
+            }
         }
-        self.recordings(&mut document);
-        self.means(&mut document);
+        document.section("Fits");
+        let columns = [
+            ("fit", "name"),
+            ("recordings", "recordings"),
+            ("signals", "replicates"),
+            ("scales", "scales"),
+            ("objective", "objective"),
+            ("end", "termination"),
+            ("local minima", "starts"),
+            ("of them the best", "agreeing"),
+            ("J-test p", "j_p_value"),
+            ("signals alike: p", "spread_p_value"),
+        ];
+        document.table(&Table::of(&json, "/fits/*", &columns));
+        if self.file.replicates.iter().any(is_abnormal) {
+            recordings_section(&json, &mut document);
+        }
+        if !self.file.turn_on.is_empty() {
+            document.section("Turn-on bias");
+            let columns = [
+                ("sensor", "../../sensor"),
+                ("axis", "axis"),
+                ("recordings", "recordings"),
+                ("spread of the means (SI)", "spread"),
+                ("by noise alone", "noise"),
+            ];
+            document.table(&Table::of(&json, "/turn_on/*/axes/*", &columns));
+        }
         document.checked(
             "wavelet variances of models to 1e-13 of an independent implementation, the optimum to 1e-6 of an exhaustive search",
         );
@@ -62,462 +114,150 @@ impl ShownCalibration<'_> {
     }
 
     fn tone(&self) -> Tone {
-        let rejected = |o: &Outcome| {
-            o.inference
-                .as_ref()
-                .and_then(|i| i.goodness)
-                .is_some_and(|g| g.is_rejected())
-        };
-        let is_abnormal = self.diagnoses.iter().any(|d| d.verdict != Verdict::Normal);
-        match () {
-            () if self.outcomes.iter().any(|(_, o)| rejected(o)) => Tone::Bad,
-            () if is_abnormal || self.outcomes.iter().any(|(_, o)| o.misfit().is_some()) => {
-                Tone::Doubtful
-            }
-            () => Tone::Good,
+        let is_rejected = |o: &&Outcome| goodness(o).is_some_and(|g| g.is_rejected());
+        if self.outcomes.iter().any(is_rejected) {
+            return Tone::Bad;
+        }
+        let misfits = self.outcomes.iter().filter_map(|o| o.misfit()).count();
+        match misfits > 0 || self.file.replicates.iter().any(is_abnormal) {
+            true => Tone::Doubtful,
+            false => Tone::Good,
         }
     }
 
-    /// Remarks, the most important first.
-    fn notes(&self, fits: &[&Outcome]) -> Vec<(Importance, String)> {
-        let settings = self.settings;
-        let mut notes: Vec<(Importance, String)> = Vec::new();
-        notes.extend(
-            fits.iter()
-                .find_map(|o| self.too_loud(o))
-                .map(|line| (Importance::Warning, line)),
-        );
-        for sensor in Sensor::ALL {
-            let lines = recording_notes(sensor, fits, self.diagnoses, settings).into_iter();
-            notes.extend(
-                lines.map(|line| (Importance::Warning, format!("{}: {line}", sensor.name()))),
+    /// A line for each model, and one for the recordings.
+    fn verdict(&self) -> Vec<String> {
+        let fits = self.outcomes.iter();
+        let fits = fits.map(|o| fit_line(o, &fit_name(o, &self.outcomes), self.settings.rate_hz));
+        fits.chain(recordings_line(&self.outcomes, self.file.replicates))
+            .collect()
+    }
+
+    /// Notes, the most important first.
+    fn notes(&self) -> Vec<(Importance, String)> {
+        let (settings, fits) = (self.settings, &self.outcomes);
+        let mut notes = Vec::new();
+        let mut note = |importance, place: &str, text: String| {
+            notes.push((importance, format!("{place}: {text}")));
+        };
+        if let Some(n) = fits.iter().find_map(|o| too_loud(o, settings.rate_hz)) {
+            let text = format!(
+                "N of {} deg/sqrt(h), where catalogued units have 0.02 to 2: columns in degrees are named gyro_x_deg_s",
+                readable(n)
             );
+            note(Importance::Warning, "gyro", text);
         }
-        for found in self.own_means().map(|(_, found)| found) {
-            let is_stored = found.sigmas().is_some();
-            let importance = if is_stored {
-                Importance::Warning
-            } else {
-                Importance::Detail
+        for sensor in Sensor::ALL {
+            for text in recording_notes(sensor, fits, self.file.replicates, settings) {
+                note(Importance::Warning, sensor.name(), text);
+            }
+        }
+        for entry in &self.file.turn_on {
+            let importance = match entry.found.finding {
+                TurnOnFinding::Seen => Importance::Warning,
+                _ => Importance::Detail,
             };
-            notes.push((
-                importance,
-                format!("{}: {}", found.sensor.name(), turn_on_remark(found)),
-            ));
+            note(importance, entry.found.sensor.name(), entry.remark.clone());
         }
-        notes.extend(beginnings(self.beginnings, fits).map(|line| (Importance::Remark, line)));
+        if let Some((head, text)) = beginnings(self.beginnings) {
+            note(Importance::Remark, head, text);
+        }
         for outcome in fits {
             let reasons = outcome
                 .ranking
                 .iter()
                 .flat_map(|r| reasons(r, settings.rate_hz));
             let name = fit_name(outcome, fits);
-            let noted = |importance| {
-                let name = &name;
-                move |line: String| (importance, format!("{name}: {line}"))
-            };
-            let remarks = reasons.chain(fit_notes(outcome, settings));
-            notes.extend(remarks.map(noted(Importance::Remark)));
-            notes.extend(without_interval(outcome).map(noted(Importance::Detail)));
+            for text in reasons.chain(fit_notes(outcome, settings)) {
+                note(Importance::Remark, &name, text);
+            }
+            for text in without_interval(outcome) {
+                note(Importance::Detail, &name, text);
+            }
         }
         notes
     }
-
-    /// A gyroscope of more noise than any in the catalogue (0.02 to 2 deg/√h), such as one in degrees under the name of radians.
-    fn too_loud(&self, outcome: &Outcome) -> Option<String> {
-        const MOST_DEG_SQRT_H: f64 = 5.0;
-        let is_gyro = outcome.scope.sensor == Sensor::Gyro;
-        let rows = figures(outcome, self.settings.rate_hz);
-        let n = rows
-            .first()
-            .filter(|row| is_gyro && row.name.ends_with(" N"))?
-            .value
-            .ok()?;
-        (n > MOST_DEG_SQRT_H).then(|| {
-            let n = readable(n);
-            format!("gyro: N of {n} deg/sqrt(h), where catalogued units have 0.02 to 2: columns in degrees are named gyro_x_deg_s")
-        })
-    }
-
-    /// A row a figure of a model.
-    fn figures_table(&self) -> Table {
-        let fits: Vec<&Outcome> = self.outcomes.iter().map(|(_, o)| *o).collect();
-        let of_one = fits.iter().all(|outcome| outcome.recordings == 1);
-        let interval = if of_one {
-            "95 %, this power-on"
-        } else {
-            "95 %, mean of power-ons"
-        };
-        let mut table = Table::new([policy().as_str(), "value", interval, "averages of"]);
-        for (index, outcome) in &self.outcomes {
-            let name = fit_name(outcome, &fits);
-            for row in figures(outcome, self.settings.rate_hz) {
-                let value = match (row.value, row.source) {
-                    (Ok(value), Some(source)) => {
-                        Cell::number(value, &format!("/fits/{index}/parameters/{source}"))
-                    }
-                    (Ok(value), None) => Cell::figures(readable(value)),
-                    (Err(_), _) => Cell::figures("–"),
-                };
-                let interval = row.value.err().map_or(row.interval, str::to_owned);
-                let figure = format!("{name} {} ({})", row.name, row.unit);
-                table.row([
-                    figure.into(),
-                    value,
-                    Cell::figures(interval),
-                    row.averages.into(),
-                ]);
-            }
-        }
-        table
-    }
-
-    /// A row a fit.
-    fn fits_table(&self) -> Table {
-        let rate_hz = self.settings.rate_hz;
-        let mut table = Table::new(["fit", "N (95 %)", "B", "K", "T (s)", "fits"]);
-        for (_, outcome) in &self.outcomes {
-            let rows = figures(outcome, rate_hz);
-            let cell = |letter: &str| {
-                let row = rows
-                    .iter()
-                    .find(|row| row.source.is_some() && row.name.ends_with(letter));
-                row.map_or_else(
-                    || "–".to_owned(),
-                    |row| match row.value {
-                        Ok(value) => format!("{} {}", readable(value), row.unit),
-                        Err(why) => why.to_owned(),
-                    },
-                )
-            };
-            let ends = rows
-                .first()
-                .map(|n| n.interval.as_str())
-                .filter(|ends| !ends.is_empty());
-            let times = outcome
-                .fit
-                .composite
-                .processes
-                .iter()
-                .filter_map(|p| p.correlation_time_s(rate_hz));
-            let fits = outcome.misfit().map_or_else(
-                || "yes".to_owned(),
-                |m| {
-                    format!(
-                        "no: {} at {}",
-                        readable(m.worst.ratio),
-                        duration(tau_s(m.worst.level, rate_hz))
-                    )
-                },
-            );
-            table.row([
-                format!(
-                    "{} {} {}",
-                    outcome.scope.name(),
-                    outcome.estimator.name(),
-                    outcome.spec
-                )
-                .into(),
-                Cell::figures(format!(
-                    "{}{}",
-                    cell(" N"),
-                    ends.map_or(String::new(), |ends| format!(" ({ends})"))
-                )),
-                Cell::figures(cell(" B")),
-                Cell::figures(cell(" K")),
-                Cell::figures(times.map(readable).collect::<Vec<_>>().join(", ")),
-                fits.into(),
-            ]);
-        }
-        table
-    }
-
-    /// The section of a fit.
-    fn fit(&self, index: usize, outcome: &Outcome, fitted: &FittedCurve, document: &mut Document) {
-        let rate_hz = self.settings.rate_hz;
-        document.section(&format!("{} · {}", group_name(fitted), outcome.spec));
-        document.facts(&self.facts(outcome));
-        document.charts(
-            &allan(fitted, outcome, self.diagnoses, rate_hz),
-            &allan_caption(),
-        );
-        document.chart(&variance(fitted, self.diagnoses), CAPTION);
-        document.table(&parameters(outcome, index, rate_hz));
-        if let Some(ranking) = &outcome.ranking {
-            document.heading("Candidate models");
-            document.table(&candidates(ranking));
-        }
-    }
-
-    fn facts(&self, outcome: &Outcome) -> Vec<(&'static str, String)> {
-        let fit = &outcome.fit;
-        let mut facts = vec![
-            ("fitted to", signals(outcome)),
-            (
-                "scales",
-                format!(
-                    "{} of {}",
-                    outcome.counted_levels().len(),
-                    outcome.curve.levels.len()
-                ),
-            ),
-            (
-                "objective",
-                format!(
-                    "{} ({})",
-                    readable(fit.objective),
-                    fit.termination.name().replace('_', " ")
-                ),
-            ),
-            (
-                "local minima",
-                format!("{}, {} of them the best", fit.starts, fit.agreeing),
-            ),
-        ];
-        let Some(inference) = &outcome.inference else {
-            return facts;
-        };
-        if let Some(g) = inference.goodness {
-            let (j, expected) = (readable(g.statistic), readable(g.expected));
-            facts.push((
-                "J-test",
-                format!(
-                    "J = {j}, median {expected} where the model holds, p = {:.3}",
-                    g.p_value
-                ),
-            ));
-        }
-        if let Some((p, most)) = outcome.differing() {
-            let by = nav_sim_calibration::percent(most.between);
-            facts.push((
-                "signals differ",
-                format!(
-                    "by {by} at {}, beyond their noise (p = {p:.3})",
-                    duration(most.tau_s)
-                ),
-            ));
-        }
-        facts
-    }
-
-    /// The recordings beside one another: which are abnormal, and what they change.
-    fn recordings(&self, document: &mut Document) {
-        let abnormal: Vec<&Diagnosis> = self
-            .diagnoses
-            .iter()
-            .filter(|d| d.verdict != Verdict::Normal)
-            .collect();
-        if abnormal.is_empty() {
-            return;
-        }
-        let names: Vec<&str> = self.diagnoses.iter().map(|d| d.name.as_str()).collect();
-        let shown = short_names(&names);
-        let short = |name: &str| {
-            let place = names.iter().position(|n| *n == name).unwrap_or(0);
-            stem(&shown[place]).to_owned()
-        };
-        document.section("Abnormal recordings");
-        let mut table = Table::new([
-            "recording",
-            "sensor",
-            "finding",
-            "scales",
-            "x (σ)",
-            "y (σ)",
-            "z (σ)",
-            "p",
-        ]);
-        let mut effects = Table::new(["without", "fit", "moves by (%)", "at scale", "σ"]);
-        for d in abnormal {
-            let mut row = |finding: &str, scales: String, deviations: &[(Axis, f64)], p: f64| {
-                let of_axis = |axis: Axis| {
-                    let own = deviations.iter().find(|(a, _)| *a == axis);
-                    Cell::figures(own.map_or(String::new(), |(_, z)| format!("{z:+.1}")))
-                };
-                let [x, y, z] = Axis::ALL.map(of_axis);
-                let p = Cell::figures(format!("{p:.4}"));
-                table.row([
-                    short(&d.name).into(),
-                    d.sensor.name().into(),
-                    finding.into(),
-                    scales.into(),
-                    x,
-                    y,
-                    z,
-                    p,
-                ]);
-            };
-            for (finding, alarm) in [("noise", &d.noise), ("outliers", &d.outliers)] {
-                if let Some(a) = alarm {
-                    let [first, last] = a.tau_s.map(duration);
-                    let scales = if first == last {
-                        first
-                    } else {
-                        format!("{first} – {last}")
-                    };
-                    row(finding, scales, &a.deviations, a.p_value);
-                }
-            }
-            if let Some(drift) = &d.drift {
-                row("drift", String::new(), &drift.deviations, drift.p_value);
-            }
-            for left in &d.left_out {
-                effects.row([
-                    short(&d.name).into(),
-                    format!("{} {}", left.group, left.estimator.name()).into(),
-                    Cell::figures(format!("{:+.2}", 100.0 * left.change)),
-                    duration(left.tau_s).into(),
-                    Cell::figures(format!("{:+.1}", left.deviations)),
-                ]);
-            }
-        }
-        document.table(&table);
-        document.table(&effects);
-    }
-
-    /// The means of the fits that are shown, each with its place in the JSON of the command.
-    fn own_means(&self) -> impl Iterator<Item = (usize, &TurnOnSpread)> {
-        let is_own = |t: &TurnOnSpread| {
-            self.outcomes
-                .iter()
-                .any(|(_, o)| o.estimator == t.estimator)
-        };
-        self.turn_on
-            .iter()
-            .enumerate()
-            .filter(move |(_, t)| is_own(t))
-    }
-
-    /// What the recordings' means say of a turn-on bias.
-    fn means(&self, document: &mut Document) {
-        let mut table = Table::new([
-            "axis",
-            "recordings",
-            "spread of the means",
-            "by noise alone",
-            "unit",
-        ]);
-        for (i, found) in self.own_means() {
-            for (k, axis) in found.axes.iter().enumerate() {
-                let number = |value: f64, key: &str| {
-                    Cell::number(value, &format!("/turn_on/{i}/axes/{k}/{key}"))
-                };
-                table.row([
-                    format!("{} {}", found.sensor.name(), axis.axis.name()).into(),
-                    number(axis.recordings as f64, "recordings"),
-                    number(axis.spread, "spread"),
-                    number(axis.noise, "noise"),
-                    found.sensor.unit().into(),
-                ]);
-            }
-        }
-        if !table.is_empty() {
-            document.section("Turn-on bias");
-            document.table(&table);
-        }
-    }
 }
 
-/// A row a parameter. Values and intervals stand in the JSON of `calibrate` under /fits/`index`.
-fn parameters(outcome: &Outcome, index: usize, rate_hz: f64) -> Table {
-    let (model, unit) = (&outcome.fit.composite, outcome.scope.sensor.unit());
-    let intervals = outcome.inference.as_ref().map_or(&[][..], |i| &i.intervals);
-    let (shares, labels) = (shares(model, &outcome.counted_levels()), model.labels());
-    let mut table = Table::new(["parameter", "value", "95 % interval", "averages of"]);
-    let mut last = None;
+/// `N, K matched over 1–100 s`
+fn policy() -> String {
+    let Horizon { from_s, to_s } = Horizon::default();
+    format!("N, K matched over {from_s}–{to_s} s")
+}
+
+fn is_abnormal(diagnosis: &Diagnosis) -> bool {
+    diagnosis.verdict != Verdict::Normal
+}
+
+/// The white noise (deg/√h) of a gyroscope above any in the catalogue (0.02 to 2), such as one in degrees under the name of
+/// radians.
+fn too_loud(outcome: &Outcome, rate_hz: f64) -> Option<f64> {
+    const MOST_DEG_SQRT_H: f64 = 5.0;
+    let practical = outcome.practical(rate_hz)?;
+    let n = practical.parameters.walk.density * Quantity::Density.sheet(Sensor::Gyro).1;
+    (outcome.scope.sensor == Sensor::Gyro && n > MOST_DEG_SQRT_H).then_some(n)
+}
+
+/// The recordings beside one another, and the change of each fit without one of them.
+fn recordings_section(json: &Value, document: &mut Document) {
+    document.section("Abnormal recordings");
+    let columns = [
+        ("recording", "file"),
+        ("sensor", "sensor"),
+        ("verdict", "verdict"),
+        ("noise: p", "noise/p_value"),
+        ("scales (s)", "noise/tau_s"),
+        ("outliers: p", "outliers/p_value"),
+        ("scales (s)", "outliers/tau_s"),
+        ("drift: p", "drift/p_value"),
+    ];
+    document.table(&Table::of(json, "/replicates/*", &columns).without_unknown());
+    let columns = [
+        ("without", "../../file"),
+        ("fit", "{signals} {estimator}"),
+        ("moves by", "change"),
+        ("at scale (s)", "tau_s"),
+        ("σ", "deviations"),
+    ];
+    let moved = Table::of(json, "/replicates/*/left_out/*", &columns);
+    document.folded("Fits without a recording", |inside| inside.table(&moved));
+}
+
+/// A row a parameter.
+fn parameters(outcome: &Outcome) -> Table {
+    let model = &outcome.fit.composite;
+    let mut table = Table::new(["parameter (SI, of a sample)", "value", "95 % interval"]);
     for (of, value) in model.parameters() {
-        let name = of.parameter.name();
-        // φ is told by its distance from 1.
-        let digits = |x: f64| {
-            if name == "phi" {
-                format!("{x:.6}")
-            } else {
-                readable(x)
-            }
+        // phi is told by its distance from 1
+        let digits = |x: f64| match of.parameter.is_shape() {
+            true => format!("{x:.6}"),
+            false => readable(x),
         };
-        let interval = interval_of(intervals, of).map_or_else(String::new, |i| match i.absent {
-            None => format!("{} … {}", digits(i.low), digits(i.high)),
+        let interval = interval_of(intervals(outcome), of).map(|i| match i.absent {
+            None => [i.low, i.high].map(digits).join(" … "),
             Some(_) => "not determined".to_owned(),
         });
-        let source = format!("/fits/{index}/processes/{}/{name}", of.process);
-        let value = if name == "phi" {
-            Cell::figures(digits(value))
-        } else {
-            Cell::number(value, &source)
-        };
-        let is_first = last.replace(of.process) != Some(of.process);
-        let averages = if is_first {
-            averages(&shares[of.process], rate_hz)
-        } else {
-            String::new()
-        };
-        let unit = match name {
-            "phi" | "theta" => String::new(),
-            "beta" => " (1/s)".to_owned(),
-            "slope" => format!(" ({unit} a sample)"),
-            _ => format!(" (({unit})²)"),
-        };
-        table.row([
-            format!("{} {name}{unit}", labels[of.process]).into(),
-            value,
-            Cell::figures(interval),
-            averages.into(),
-        ]);
-    }
-    table
-}
-
-/// Candidates of a choice that are shown.
-const SHOWN: usize = 8;
-
-/// The candidates of a choice, best first.
-fn candidates(ranking: &Ranking) -> Table {
-    let mut table = Table::new(["model", "WVIC", "objective", "optimism", "p", "J-test p"]);
-    let p = |p: Option<f64>| Cell::figures(p.map_or(String::new(), |p| format!("{p:.3}")));
-    for (i, c) in ranking
-        .candidates
-        .iter()
-        .enumerate()
-        .take(SHOWN.max(ranking.chosen + 1))
-    {
-        let chosen = if i == ranking.chosen { " (chosen)" } else { "" };
-        let number = |x: f64| Cell::figures(format!("{x:.4}"));
-        table.row([
-            format!("{}{chosen}", c.spec).into(),
-            number(c.wvic()),
-            number(c.objective),
-            number(c.optimism),
-            p(c.p_value),
-            p(c.j_p_value),
-        ]);
+        let figures = [digits(value), interval.unwrap_or_default()].map(Cell::figures);
+        table.row(std::iter::once(model.name_of(of).into()).chain(figures));
     }
     table
 }
 
 // The charts of a calibration: wavelet variance and model, and what is exported on the Allan deviation.
 
-/// What is to be seen in [`variance`].
+/// Caption of [`variance`].
 pub(crate) const CAPTION: &str = "Wavelet variance with its 95 % band, the recordings, the model and its processes; below: data over model.";
 
-/// What is to be seen in [`allan`].
-pub(super) fn allan_caption() -> String {
-    format!(
-        "Allan deviation: recordings, model, and what is exported: {}. N is read at 1 s, K at 3 s, 0.664 B at the floor.",
-        super::fits::policy()
-    )
-}
-
 /// `Accelerometer x`, or `Gyroscope, all axes`.
-pub(super) fn group_name(fitted: &FittedCurve) -> String {
-    let sensor = sensor_name(&fitted.sensor);
-    if fitted.axis == "all" {
-        format!("{sensor}, all axes")
-    } else {
-        format!("{sensor} {}", fitted.axis)
+fn group_name(fitted: &FittedCurve) -> String {
+    let sensor = sensor_name(fitted.sensor);
+    match fitted.axis.as_str() {
+        "all" => format!("{sensor}, all axes"),
+        axis => format!("{sensor} {axis}"),
     }
 }
 
-/// The wavelet variance, and what the model leaves of it.
+/// The wavelet variance, and its ratio to that of the model.
 pub(crate) fn variance(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Chart {
     let FittedCurve {
         tau_s,
@@ -540,27 +280,33 @@ pub(crate) fn variance(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Chart {
             Series::line("data, 95 %", Colour::Ink, curve(tau_s, wv)),
         ]
     };
-    let mut upper = recordings(fitted, diagnoses, |_| true, |tau, nu| (tau, nu));
-    upper.extend(processes(fitted));
+    let mut upper = recordings(fitted, diagnoses, |tau, nu| (tau, nu));
+    let parts = fitted
+        .processes
+        .iter()
+        .filter(|(_, wv)| wv.iter().any(|nu| *nu > 0.0));
+    upper.extend(
+        parts
+            .zip(PROCESSES.into_iter().cycle())
+            .map(|((name, wv), hue)| Series::dashed(name, Colour::Hue(hue), curve(tau_s, wv))),
+    );
     upper.extend(data(wv, ci_low, ci_high));
     upper.push(Series::line("model", Colour::REAL, curve(tau_s, implied)));
     let mut lower = data(&ratio(wv), &ratio(ci_low), &ratio(ci_high)).to_vec();
     lower.push(Series::new("model", Colour::REAL, Mark::Level(1.0)));
+    let ratios = ChartAxis::log("data / model").including(0.8, 1.25);
     let panels = vec![
         Panel {
             height: 1.4,
-            ..Panel::new(variance_axis(&fitted.sensor), upper)
+            ..Panel::new(variance_axis(fitted.sensor), upper)
         },
         Panel {
             height: 0.5,
-            ..Panel::new(ChartAxis::log("data / model").including(0.8, 1.25), lower)
+            ..Panel::new(ratios, lower)
         },
     ];
-    let title = format!(
-        "Wavelet variance: {}, {}",
-        group_name(fitted),
-        fitted.estimator.to_uppercase()
-    );
+    let (group, estimator) = (group_name(fitted), fitted.estimator.to_uppercase());
+    let title = format!("Wavelet variance: {group}, {estimator}");
     Chart::new(&title, scale_axis(), panels).in_group("scales")
 }
 
@@ -569,65 +315,30 @@ fn deviation(tau_s: f64, nu: f64) -> (f64, f64) {
     (0.5 * tau_s, (2.0 * nu).sqrt())
 }
 
-/// The Allan deviation of each axis with N, B and K, where they are read off it.
-pub(super) fn allan(
-    fitted: &FittedCurve,
-    outcome: &Outcome,
-    diagnoses: &[Diagnosis],
-    rate_hz: f64,
-) -> Vec<Chart> {
-    let mut axes: Vec<&str> = fitted
-        .replicates
-        .iter()
-        .filter_map(|r| r.axis.as_deref())
-        .collect();
-    axes.sort_unstable();
-    axes.dedup();
-    let axes = if fitted.axis == "all" {
-        axes
-    } else {
-        vec![fitted.axis.as_str()]
+/// The Allan deviation with N, B and K, where they are read off it.
+fn allan(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_hz: f64) -> Chart {
+    let of = |wv: &[f64]| -> Vec<(f64, f64)> {
+        fitted
+            .tau_s
+            .iter()
+            .zip(wv)
+            .map(|(t, nu)| deviation(*t, *nu))
+            .collect()
     };
-    let model: Vec<(f64, f64)> = fitted
-        .tau_s
-        .iter()
-        .zip(&fitted.implied)
-        .map(|(t, nu)| deviation(*t, *nu))
-        .collect();
-    let chart = |axis: &&str| {
-        let mut series = recordings(
-            fitted,
-            diagnoses,
-            |r| r.axis.as_deref().is_none_or(|own| own == *axis),
-            deviation,
-        );
-        if series.is_empty() {
-            let data = fitted
-                .tau_s
-                .iter()
-                .zip(&fitted.wv)
-                .map(|(t, nu)| deviation(*t, *nu));
-            series.push(Series::line("data", Colour::Ink, data.collect()));
-        }
-        series.push(Series::line("model", Colour::REAL, model.clone()));
-        series.extend(exported(outcome, &model, rate_hz));
-        let y = ChartAxis::log(&format!("Allan deviation ({})", unit(&fitted.sensor)));
-        let title = format!("{} {axis}", sensor_name(&fitted.sensor));
-        Chart::new(
-            &title,
-            ChartAxis::log("averaging time (s)"),
-            vec![Panel {
-                height: 1.2,
-                ..Panel::new(y, series)
-            }],
-        )
-    };
-    let charts: Vec<Chart> = axes.iter().map(chart).collect();
-    if charts.len() > 1 {
-        charts.into_iter().map(Chart::small).collect()
-    } else {
-        charts
+    let mut series = recordings(fitted, diagnoses, deviation);
+    if series.is_empty() {
+        series.push(Series::line("data", Colour::Ink, of(&fitted.wv)));
     }
+    let model = of(&fitted.implied);
+    series.push(Series::line("model", Colour::REAL, model.clone()));
+    series.extend(exported(outcome, &model, rate_hz));
+    let y = ChartAxis::log(&format!("Allan deviation ({})", fitted.sensor.unit()));
+    let title = format!("Allan deviation: {}", group_name(fitted));
+    Chart::new(
+        &title,
+        ChartAxis::log("averaging time (s)"),
+        vec![Panel::new(y, series)],
+    )
 }
 
 /// Lines of N and K over the times of a model, with the points where they are read, and the floor.
@@ -635,46 +346,29 @@ fn exported(outcome: &Outcome, model: &[(f64, f64)], rate_hz: f64) -> Vec<Series
     let Some(practical) = outcome.practical(rate_hz) else {
         return Vec::new();
     };
-    let pair = practical.parameters.walk;
-    let lowest = model.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
-    let highest = model.iter().map(|p| p.1).fold(0.0, f64::max);
+    let (pair, minimum) = (practical.parameters.walk, practical.parameters.minimum);
     // Beyond the model's own values the lines would only stretch the axis.
-    let over = |line: &dyn Fn(f64) -> f64| {
-        let points = model.iter().map(|(t, _)| (*t, line(*t)));
-        points
-            .filter(|(_, y)| *y > 0.3 * lowest && *y < 1.5 * highest)
-            .collect::<Vec<_>>()
+    let lowest = 0.3 * model.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
+    let highest = 1.5 * model.iter().map(|p| p.1).fold(0.0, f64::max);
+    let line = |name, colour, value: &dyn Fn(f64) -> f64| {
+        let points = model.iter().map(|(t, _)| (*t, value(*t)));
+        let shown = points.filter(|(_, y)| (lowest..highest).contains(y));
+        Series::dashed(name, colour, shown.collect())
     };
+    let reading = |name, colour, x, y| Series::new(name, colour, Mark::Reading(x, y));
+    let [n, k, b] = [0, 2, 3].map(Colour::Hue);
     let mut series = Vec::new();
     if pair.density > 0.0 {
-        series.push(Series::dashed(
-            "N/√τ",
-            N,
-            over(&|t| pair.density / t.sqrt()),
-        ));
-        series.push(Series::new("N", N, Mark::Reading(1.0, pair.density)));
+        series.push(line("N/√τ", n, &|t| pair.density / t.sqrt()));
+        series.push(reading("N", n, 1.0, pair.density));
     }
     if practical.walk_is_observed() {
-        series.push(Series::dashed(
-            "K√(τ/3)",
-            K,
-            over(&|t| pair.walk * (t / 3.0).sqrt()),
-        ));
-        series.push(Series::new("K", K, Mark::Reading(3.0, pair.walk)));
+        series.push(line("K√(τ/3)", k, &|t| pair.walk * (t / 3.0).sqrt()));
+        series.push(reading("K", k, 3.0, pair.walk));
     }
-    if let Some(minimum) = practical.parameters.minimum {
-        series.push(Series::new(
-            "0.664 B",
-            B,
-            Mark::Reading(minimum.tau_s, minimum.deviation),
-        ));
-    }
+    series.extend(minimum.map(|m| reading("0.664 B", b, m.tau_s, m.deviation)));
     series
 }
-
-const N: Colour = Colour::Hue(0);
-const K: Colour = Colour::Hue(2);
-const B: Colour = Colour::Hue(3);
 
 /// Hues of processes: those that neither model nor recordings have.
 const PROCESSES: [usize; 5] = [0, 2, 3, 4, 5];
@@ -685,166 +379,68 @@ const ABNORMAL: [usize; 2] = [6, 7];
 fn recordings(
     fitted: &FittedCurve,
     diagnoses: &[Diagnosis],
-    is_shown: impl Fn(&ReplicateCurve) -> bool,
     point: impl Fn(f64, f64) -> (f64, f64),
 ) -> Vec<Series> {
-    let is_abnormal = |file: &str| {
-        let of_file = |d: &&Diagnosis| d.name == file && d.sensor.name() == fitted.sensor;
-        diagnoses
-            .iter()
-            .find(of_file)
-            .is_some_and(|d| d.verdict != Verdict::Normal)
-    };
     if fitted.replicates.len() < 2 {
         return Vec::new();
     }
-    let names = short_names(
-        &fitted
-            .replicates
-            .iter()
-            .map(|r| r.file.as_str())
-            .collect::<Vec<_>>(),
-    );
-    let mut abnormal: Vec<&str> = Vec::new();
-    let mut all = Vec::new();
-    for (replicate, name) in fitted.replicates.iter().zip(&names) {
-        let file = replicate.file.as_str();
-        if is_abnormal(file) && !abnormal.contains(&file) {
-            abnormal.push(file);
-        }
-        if !is_shown(replicate) {
-            continue;
-        }
-        let points = fitted
-            .tau_s
-            .iter()
-            .zip(&replicate.wv)
-            .map(|(t, nu)| point(*t, *nu))
-            .collect();
-        all.push(match abnormal.iter().position(|other| *other == file) {
-            None => Series::thin("recordings", Colour::Soft, points),
-            Some(k) => {
-                let hue = Colour::Hue(ABNORMAL[k % ABNORMAL.len()]);
-                Series::line(&format!("{} (abnormal)", stem(name)), hue, points)
+    let own = diagnoses.iter().filter(|d| d.sensor == fitted.sensor);
+    let abnormal: Vec<&str> = own
+        .filter(|d| is_abnormal(d))
+        .map(|d| d.name.as_str())
+        .collect();
+    let names = recording_names(fitted.replicates.iter().map(|r| r.file.as_str()));
+    let series = fitted
+        .replicates
+        .iter()
+        .zip(names)
+        .map(|(replicate, name)| {
+            let points = fitted.tau_s.iter().zip(&replicate.wv);
+            let points = points.map(|(t, nu)| point(*t, *nu)).collect();
+            match abnormal.iter().position(|file| *file == replicate.file) {
+                None => Series::thin("recordings", Colour::Soft, points),
+                Some(k) => {
+                    let hue = Colour::Hue(ABNORMAL[k % ABNORMAL.len()]);
+                    Series::line(&format!("{name} (abnormal)"), hue, points)
+                }
             }
         });
+    series.collect()
+}
+
+// A calibration in words: the verdict on models and recordings, the notes.
+
+/// The first of these names, and how many more there are.
+fn some(names: &[String]) -> String {
+    const NAMED: usize = 4;
+    let shown = names[..names.len().min(NAMED)].join(", ");
+    match names.len().saturating_sub(NAMED) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
     }
-    all
 }
 
-fn processes(fitted: &FittedCurve) -> Vec<Series> {
-    let known = fitted
-        .processes
-        .iter()
-        .filter(|(_, wv)| wv.iter().any(|nu| *nu > 0.0));
-    let line = |(k, (name, wv)): (usize, (&String, &Vec<f64>))| {
-        Series::dashed(
-            name,
-            Colour::Hue(PROCESSES[k % PROCESSES.len()]),
-            curve(&fitted.tau_s, wv),
-        )
-    };
-    known.enumerate().map(line).collect()
-}
-
-// A calibration in words: the verdict on models and recordings, the remarks.
-
-/// Recordings that are named in a line.
-const NAMED: usize = 4;
-
-/// The verdict: a line for each model (of more than two, for each sensor), and one for the recordings.
-pub(super) fn verdict(
-    outcomes: &[&Outcome],
-    diagnoses: &[Diagnosis],
-    settings: &Settings,
-) -> Vec<String> {
-    let mut lines: Vec<String> = match outcomes.len() {
-        0..=2 => outcomes
-            .iter()
-            .map(|o| fit_line(o, &fit_name(o, outcomes), settings.rate_hz))
-            .collect(),
-        _ => Sensor::ALL
-            .into_iter()
-            .filter_map(|sensor| of_sensor(sensor, outcomes, settings.rate_hz))
-            .collect(),
-    };
-    lines.extend(recordings_line(outcomes, diagnoses));
-    lines
-}
-
-/// `accel: N1 does not fit: data/model 0.33 at 0.02 s (not fitted), 1.26 at 1.28 s; 6 of 16 scales off (all together: p = 0.005)`
+/// `accel: N1 does not fit: data/model 0.33 at 0.02 s; 6 of 16 scales off (p = 0.005)`
 fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {
     let (spec, departure) = (&outcome.spec, outcome.departure());
-    let ratio = |miss: Miss| {
-        let left_out = if miss.is_fitted { "" } else { " (not fitted)" };
-        format!(
-            "{} at {}{left_out}",
-            readable(miss.ratio),
-            duration(tau_s(miss.level, rate_hz))
-        )
-    };
-    let test = outcome.inference.as_ref().and_then(|i| i.goodness);
-    let p = |of: &str| test.map_or(String::new(), |g| format!(" ({of}p = {:.3})", g.p_value));
-    if let Some(Misfit { worst, .. }) = outcome.misfit() {
-        let fitted = departure.worst().filter(|miss| miss.level != worst.level);
-        let ratios: Vec<String> = [Some(worst), fitted]
-            .into_iter()
-            .flatten()
-            .map(ratio)
-            .collect();
+    let at = |level| duration(tau_s(level, rate_hz));
+    let p = goodness(outcome).map_or(String::new(), |g| format!(" (p = {:.3})", g.p_value));
+    if let Some(misfit) = outcome.misfit() {
+        let (ratio, at) = (readable(misfit.worst.ratio), at(misfit.worst.level));
         let (missed, scales) = (departure.missed.len(), departure.scales);
         return format!(
-            "{name}: {spec} does not fit: data/model {}; {missed} of {scales} scales off{}",
-            ratios.join(", "),
-            p("all together: ")
+            "{name}: {spec} does not fit: data/model {ratio} at {at}; {missed} of {scales} scales off{p}"
         );
     }
     let off = departure.furthest.map_or(String::new(), |m| {
-        format!(
-            ", within {} at all scales known to 10 %",
-            percent((m.ratio - 1.0).abs())
-        )
+        let off = percent((m.ratio - 1.0).abs());
+        let known = departure
+            .known_to
+            .map(|level| format!(" (up to {})", at(level)));
+        let known = known.unwrap_or_default();
+        format!(", within {off} at all scales known to 10 %{known}")
     });
-    let known = departure.known_to.map_or(String::new(), |level| {
-        format!(" (up to {})", duration(tau_s(level, rate_hz)))
-    });
-    let left_out = departure.left_out.map_or(String::new(), |miss| {
-        format!("; data/model {}", ratio(miss))
-    });
-    format!("{name}: {spec} fits{}{off}{known}{left_out}", p(""))
-}
-
-/// Whether the models of a sensor fit, in a line; none without one.
-fn of_sensor(sensor: Sensor, outcomes: &[&Outcome], rate_hz: f64) -> Option<String> {
-    let own: Vec<&&Outcome> = outcomes
-        .iter()
-        .filter(|o| o.scope.sensor == sensor)
-        .collect();
-    let misfits: Vec<(Misfit, &&Outcome)> =
-        own.iter().filter_map(|o| Some((o.misfit()?, *o))).collect();
-    let size = |m: &Misfit| m.worst.ratio.ln().abs();
-    let worst = misfits
-        .iter()
-        .max_by(|a, b| size(&a.0).total_cmp(&size(&b.0)));
-    let worst = worst.map_or(String::new(), |(m, o)| {
-        let (ratio, at) = (
-            readable(m.worst.ratio),
-            duration(tau_s(m.worst.level, rate_hz)),
-        );
-        format!(
-            "; worst data/model {ratio} at {at} ({} {})",
-            o.scope.name(),
-            o.estimator.name()
-        )
-    });
-    let fitting = own.len() - misfits.len();
-    (!own.is_empty()).then(|| {
-        format!(
-            "{}: {fitting} of {} models fit{worst}",
-            sensor.name(),
-            own.len()
-        )
-    })
+    format!("{name}: {spec} fits{p}{off}")
 }
 
 /// `2 of 6 recordings are abnormal: run4 (accel outliers), run5 (accel noise, gyro noise)`; none of a single recording.
@@ -859,17 +455,18 @@ fn recordings_line(outcomes: &[&Outcome], diagnoses: &[Diagnosis]) -> Option<Str
             "{count} recordings: too few to name an abnormal one (4 are needed)"
         ));
     }
-    let shown = short_names(&names);
-    let mut abnormal: Vec<String> = Vec::new();
-    for (name, shown) in names.iter().zip(&shown) {
+    let finding = |d: &Diagnosis| match d.verdict {
+        Verdict::Noise => format!("{} noise", d.sensor),
+        verdict => format!("{} {verdict}", d.sensor),
+    };
+    let mut abnormal = Vec::new();
+    for (name, shown) in names.iter().zip(recording_names(names.iter().copied())) {
         let own = diagnoses
             .iter()
-            .filter(|d| d.name == *name && d.verdict != Verdict::Normal);
-        let findings: Vec<String> = own
-            .map(|d| format!("{} {}", d.sensor.name(), findings(d).join(" and ")))
-            .collect();
+            .filter(|d| d.name == *name && is_abnormal(d));
+        let findings: Vec<String> = own.map(finding).collect();
         if !findings.is_empty() {
-            abnormal.push(format!("{} ({})", stem(shown), findings.join(", ")));
+            abnormal.push(format!("{shown} ({})", findings.join(", ")));
         }
     }
     if abnormal.is_empty() {
@@ -879,118 +476,51 @@ fn recordings_line(outcomes: &[&Outcome], diagnoses: &[Diagnosis]) -> Option<Str
         });
         return Some(format!("{count} recordings, none abnormal{differ}"));
     }
-    let more = abnormal.len().saturating_sub(NAMED);
-    let more = if more > 0 {
-        format!(" and {more} more")
-    } else {
-        String::new()
-    };
-    let named = &abnormal[..abnormal.len().min(NAMED)];
+    let named = some(&abnormal);
     Some(format!(
-        "{} of {count} recordings are abnormal: {}{more}",
-        abnormal.len(),
-        named.join(", ")
+        "{} of {count} recordings are abnormal: {named}",
+        abnormal.len()
     ))
 }
 
-/// `run4` of `run4.csv.gz`.
-pub(crate) fn stem(name: &str) -> &str {
-    let end = name.rfind('/').map_or(0, |slash| slash + 1);
-    name[end..]
-        .find('.')
-        .filter(|dot| *dot > 0)
-        .map_or(name, |dot| &name[..end + dot])
-}
-
-/// What a recording is abnormal by.
-fn findings(diagnosis: &Diagnosis) -> Vec<&'static str> {
-    let found = [
-        diagnosis.noise.as_ref().map(|_| "noise"),
-        diagnosis.outliers.as_ref().map(|_| "outliers"),
-        diagnosis.drift.as_ref().map(|_| "drift"),
-    ];
-    found.into_iter().flatten().collect()
-}
-
-/// Relative change of a wavelet variance by a warm-up that is told where no interval says what matters.
-const NOTABLE: f64 = 0.05;
-/// Beginnings that are named in a line.
-const BEGINNINGS: usize = 2;
-
-/// Beginnings that are left out, or that change a wavelet variance by more than the parameters of its sensor are known to.
-pub(super) fn beginnings(found: &Beginnings, outcomes: &[&Outcome]) -> Option<String> {
-    let known_to = |sensor: Sensor| {
-        let fits = outcomes
-            .iter()
-            .filter(|o| o.scope.sensor == sensor)
-            .filter_map(|o| o.inference.as_ref());
-        let amplitudes = fits
-            .flat_map(|i| &i.intervals)
-            .filter(|i| !i.of.parameter.is_shape() && i.low > 0.0);
-        let widths = amplitudes.map(|i| 0.5 * (i.high / i.low).ln());
-        widths
-            .filter(|w| w.is_finite())
-            .min_by(f64::total_cmp)
-            .unwrap_or(NOTABLE)
-    };
+/// Beginnings that are left out, or that change a wavelet variance notably, and what of them.
+fn beginnings(found: &Beginnings) -> Option<(&'static str, String)> {
+    const NOTABLE: f64 = 0.05;
     let matters = |b: &&Beginning| {
-        let changes = |(channel, w): &(Channel, WarmUp)| {
-            w.change
-                .is_none_or(|c| c.ratio.ln().abs() > known_to(channel.sensor))
-        };
-        found.left_out || b.signals.iter().any(changes)
+        let mut changes = b.signals.iter().map(|(_, w)| w.change);
+        found.left_out || changes.any(|c| c.is_none_or(|c| c.ratio.ln().abs() > NOTABLE))
     };
     let told: Vec<&Beginning> = found.all.iter().filter(matters).collect();
-    let names: Vec<&str> = told.iter().map(|b| b.recording.as_str()).collect();
-    let line = |(b, name): (&&Beginning, &String)| {
-        let change = b
-            .surest()
-            .and_then(|(channel, w)| Some((channel, w.change?)));
-        let change = change.map_or(String::new(), |(channel, c)| {
-            format!(" ({channel} {:+.0} %)", 100.0 * (c.ratio - 1.0))
-        });
-        match b.skip_s {
-            Some(s) if found.left_out => format!("{} {s} s", stem(name)),
-            Some(s) => format!("{} --skip-s {s}{change}", stem(name)),
-            None => format!("{} never settles", stem(name)),
-        }
+    let names = recording_names(told.iter().map(|b| b.recording.as_str()));
+    let line = |(b, name): (&&Beginning, String)| match b.skip_s {
+        Some(s) if found.left_out => format!("{name} {s} s"),
+        Some(s) => format!("{name} --skip-s {s}"),
+        None => format!("{name} never settles"),
     };
-    let lines: Vec<String> = told
-        .iter()
-        .zip(short_names(&names).iter())
-        .map(line)
-        .take(BEGINNINGS)
-        .collect();
-    let more = told.len().saturating_sub(BEGINNINGS);
-    let more = if more > 0 {
-        format!(", {more} more")
-    } else {
-        String::new()
+    let lines: Vec<String> = told.iter().zip(names).map(line).collect();
+    let head = match found.left_out {
+        true => "left out at the beginning",
+        false => "not stationary at the beginning",
     };
-    let head = if found.left_out {
-        "left out at the beginning"
-    } else {
-        "not stationary at the beginning"
-    };
-    (!told.is_empty()).then(|| format!("{head}: {}{more}", lines.join(", ")))
+    (!lines.is_empty()).then(|| (head, some(&lines)))
 }
 
 /// `accel.x`, with the estimator where there are several.
 pub(super) fn fit_name(outcome: &Outcome, outcomes: &[&Outcome]) -> String {
     match outcomes.iter().filter(|o| o.scope == outcome.scope).count() {
         1 => outcome.scope.name(),
-        _ => format!("{} {}", outcome.scope.name(), outcome.estimator.name()),
+        _ => format!("{} {}", outcome.scope.name(), outcome.estimator),
     }
 }
 
-/// The remarks on a fit.
+/// The notes on a fit.
 fn fit_notes(outcome: &Outcome, settings: &Settings) -> impl Iterator<Item = String> {
     let notes = outcome.notes(settings).into_iter();
     notes.map(|note| note_line(&note, outcome))
 }
 
-/// The remarks on a fit, and why parameters have no interval.
-pub(crate) fn all_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
+/// The notes on a fit, and why parameters have no interval.
+pub(super) fn all_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
     fit_notes(outcome, settings)
         .chain(without_interval(outcome))
         .collect()
@@ -999,8 +529,9 @@ pub(crate) fn all_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
 /// Why parameters have no interval.
 fn without_interval(outcome: &Outcome) -> impl Iterator<Item = String> {
     let labels = outcome.fit.composite.labels();
-    let intervals = outcome.inference.iter().flat_map(|i| &i.intervals);
-    intervals.filter_map(move |i| undetermined(i, &labels))
+    intervals(outcome)
+        .iter()
+        .filter_map(move |i| undetermined(i, &labels))
 }
 
 /// A remark on a fit.
@@ -1213,19 +744,4 @@ pub(crate) fn reasons(ranking: &Ranking, rate_hz: f64) -> Vec<String> {
         )
     }));
     lines
-}
-
-/// What a fit is of: `6 recordings × 3 axes`.
-pub(super) fn signals(outcome: &Outcome) -> String {
-    let recordings = match outcome.recordings {
-        0 => return "a curve".to_owned(),
-        1 => "1 recording".to_owned(),
-        count => format!("{count} recordings"),
-    };
-    match outcome.replicates.checked_div(outcome.recordings) {
-        Some(axes) if axes > 1 && axes * outcome.recordings == outcome.replicates => {
-            format!("{recordings} × {axes} axes")
-        }
-        _ => recordings,
-    }
 }

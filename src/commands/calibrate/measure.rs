@@ -1,6 +1,7 @@
 //! Calibration: from static recordings, or directories of them, to a noise model for each sensor or axis.
 
-use super::ShownCalibration;
+use super::document::ShownCalibration;
+use super::fits::{CalibrationFile, FitEntry, TurnOnEntry};
 use crate::app::reading::note_report;
 use crate::app::{Context, Failure};
 use crate::io::recordings::{FileReport, ReadOptions, Report};
@@ -8,7 +9,7 @@ use crate::io::{curve_file, hash, recordings};
 use crate::report::CurvesFile;
 use nav_sim_calibration::{
     self, Advance, Beginning, Beginnings, Bootstrap, Diagnosis, Estimator, Group, Outcome, Pool,
-    Replicate, Scope, Settings, SignalError, TurnOnSpread, WarmUp, fit_curve, grouped,
+    Replicate, Scope, Settings, SignalError, TurnOnSpread, WarmUp, diagnose, fit_curve, grouped,
     infer_telling, replicates, turn_on, warm_up,
 };
 use nav_sim_signal::imu::{Channel, Recording, Sensor, Signal};
@@ -108,8 +109,6 @@ pub struct CalibrationOptions {
     pub settings: Settings,
     /// The bootstrap behind intervals and goodness of fit; `None`: neither is computed.
     pub bootstrap: Option<Bootstrap>,
-    /// Whether the recordings' means are asked for a turn-on bias.
-    pub turn_on: bool,
 }
 
 impl Default for CalibrationOptions {
@@ -122,7 +121,6 @@ impl Default for CalibrationOptions {
             pool: None,
             settings: Settings::default(),
             bootstrap: Some(Bootstrap::default()),
-            turn_on: true,
         }
     }
 }
@@ -141,8 +139,6 @@ pub struct Measured {
     pub settings: Settings,
     /// The draws behind intervals.
     pub bootstrap: Option<Bootstrap>,
-    /// Whether the recordings' means are asked for a turn-on bias.
-    pub turn_on: bool,
 }
 
 /// A calibration: the fitted models and the wavelet variances behind them.
@@ -157,8 +153,10 @@ pub struct Calibration {
     pub settings: Settings,
     /// The recordings that do not begin as they go on.
     pub beginnings: Beginnings,
-    /// Turn-on bias from the recordings' means, for each estimator and sensor; empty if it was not tested.
+    /// Turn-on bias from the recordings' means, for each estimator and sensor.
     pub turn_on: Vec<TurnOnSpread>,
+    /// Each recording against the others.
+    pub diagnoses: Vec<Diagnosis>,
 }
 
 /// Calibrates recordings, or directories of them.
@@ -190,7 +188,6 @@ pub fn measure(
         pool,
         settings,
         bootstrap,
-        turn_on,
     } = options;
     // As many scales as parameters, and one that the default leaves out.
     let needed = scales.map_or(2 << settings.model.parameters(), |j| 1 << j);
@@ -226,7 +223,6 @@ pub fn measure(
         beginnings,
         settings,
         bootstrap: *bootstrap,
-        turn_on: *turn_on,
     })
 }
 
@@ -244,32 +240,48 @@ impl Measured {
     /// # Errors
     /// When a trim leaves no replicate, or a curve is too short for the model.
     pub fn calibrate(self, advance: Advance<'_>) -> Result<Calibration, Failure> {
-        let Self {
-            groups,
-            beginnings,
-            settings,
-            bootstrap,
-            turn_on,
-            ..
-        } = self;
-        let outcomes = nav_sim_calibration::calibrate_telling(&groups, &settings, advance)?;
-        let calibration = Calibration {
-            groups,
+        let outcomes =
+            nav_sim_calibration::calibrate_telling(&self.groups, &self.settings, advance)?;
+        let made = Calibration::new(
+            self.groups,
             outcomes,
-            settings,
-            beginnings,
-            turn_on: Vec::new(),
-        };
-        let calibration = if turn_on {
-            calibration.with_turn_on()
-        } else {
-            calibration
-        };
-        Ok(calibration.with_inference(bootstrap, advance))
+            self.settings,
+            self.bootstrap,
+            advance,
+        );
+        Ok(Calibration {
+            beginnings: self.beginnings,
+            ..made
+        })
     }
 }
 
 impl Calibration {
+    /// Adds intervals and goodness of fit, if they are asked for, diagnoses and turn-on biases to fits.
+    pub(crate) fn new(
+        groups: Vec<Group>,
+        mut outcomes: Vec<Outcome>,
+        settings: Settings,
+        bootstrap: Option<Bootstrap>,
+        advance: Advance<'_>,
+    ) -> Self {
+        if let Some(bootstrap) = bootstrap {
+            infer_telling(&groups, &mut outcomes, &settings, bootstrap, advance);
+        }
+        let of_estimator = |e: &Estimator| {
+            let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == *e).collect();
+            turn_on(&groups, &own)
+        };
+        Self {
+            turn_on: settings.estimators.iter().flat_map(of_estimator).collect(),
+            diagnoses: diagnose(&groups, &outcomes, &settings),
+            beginnings: Beginnings::default(),
+            groups,
+            outcomes,
+            settings,
+        }
+    }
+
     /// The noise model of an estimator, at the rate of the recordings; axes without a recording have no noise.
     #[must_use]
     pub fn model(&self, estimator: Estimator) -> Model {
@@ -277,60 +289,32 @@ impl Calibration {
         nav_sim_calibration::model_of(own, self.settings.rate_hz)
     }
 
-    /// The fits that are chosen, to be shown.
-    pub(crate) fn shown<'a>(
-        &'a self,
-        diagnoses: &'a [Diagnosis],
-        is_chosen: impl Fn(&Outcome) -> bool,
-    ) -> ShownCalibration<'a> {
-        let outcomes: Vec<(usize, &Outcome)> = self
+    /// The fits of one estimator, or all of them.
+    pub(crate) fn shown(&self, estimator: Option<Estimator>) -> ShownCalibration<'_> {
+        let is_shown = |own: Estimator| estimator.is_none_or(|chosen| chosen == own);
+        let outcomes: Vec<&Outcome> = self
             .outcomes
             .iter()
-            .enumerate()
-            .filter(|(_, outcome)| is_chosen(outcome))
+            .filter(|o| is_shown(o.estimator))
             .collect();
-        let chosen: Vec<&Outcome> = outcomes.iter().map(|(_, outcome)| *outcome).collect();
+        let fits = outcomes
+            .iter()
+            .map(|o| FitEntry::new(o, &outcomes, &self.settings));
+        let turn_on = self.turn_on.iter().filter(|t| is_shown(t.estimator));
         ShownCalibration {
-            curves: CurvesFile::new(&self.groups, &chosen, &self.settings),
+            file: CalibrationFile {
+                schema_version: 1,
+                rate_hz: self.settings.rate_hz,
+                model: self.settings.model.to_string(),
+                fits: fits.collect(),
+                replicates: &self.diagnoses,
+                turn_on: turn_on.map(TurnOnEntry::new).collect(),
+            },
+            curves: CurvesFile::new(&self.groups, &outcomes, &self.settings),
             outcomes,
-            diagnoses,
-            turn_on: &self.turn_on,
             beginnings: &self.beginnings,
             settings: &self.settings,
         }
-    }
-
-    /// The same with what the recordings' means say.
-    fn with_turn_on(mut self) -> Self {
-        let of_estimator = |e: &Estimator| {
-            let own: Vec<&Outcome> = self.outcomes.iter().filter(|o| o.estimator == *e).collect();
-            turn_on(&self.groups, &own)
-        };
-        self.turn_on = self
-            .settings
-            .estimators
-            .iter()
-            .flat_map(of_estimator)
-            .collect();
-        self
-    }
-
-    /// The same with intervals and goodness of fit, if they are asked for.
-    pub(crate) fn with_inference(
-        mut self,
-        bootstrap: Option<Bootstrap>,
-        advance: Advance<'_>,
-    ) -> Self {
-        if let Some(bootstrap) = bootstrap {
-            infer_telling(
-                &self.groups,
-                &mut self.outcomes,
-                &self.settings,
-                bootstrap,
-                advance,
-            );
-        }
-        self
     }
 }
 
@@ -583,8 +567,7 @@ impl Curves {
     /// When a curve is too short for the model.
     pub(crate) fn calibrate(self, bootstrap: Option<Bootstrap>) -> Result<Calibration, Failure> {
         let Self { curves, settings } = self;
-        let mut groups: Vec<Group> = Vec::new();
-        let mut outcomes: Vec<Outcome> = Vec::new();
+        let (mut groups, mut outcomes) = (Vec::new(), Vec::new());
         for (scope, estimator, curve) in curves {
             let group = Group {
                 scope,
@@ -593,13 +576,12 @@ impl Curves {
             outcomes.push(fit_curve(&group, estimator, curve, &settings)?);
             groups.push(group);
         }
-        let calibration = Calibration {
+        Ok(Calibration::new(
             groups,
             outcomes,
             settings,
-            beginnings: Default::default(),
-            turn_on: Vec::new(),
-        };
-        Ok(calibration.with_inference(bootstrap, &|_| {}))
+            bootstrap,
+            &|_| {},
+        ))
     }
 }

@@ -26,8 +26,7 @@ mod fits;
 mod measure;
 mod model_file;
 
-pub(crate) use document::{CAPTION, ShownCalibration, stem, variance as variance_chart};
-pub(crate) use fits::FitsFile;
+pub(crate) use document::{CAPTION, variance as variance_chart};
 pub use measure::{Calibration, CalibrationOptions, EstimatorChoice, Measured, calibrate, measure};
 pub(crate) use measure::{visit, without_warm_up};
 pub(crate) use model_file::CalibrationNote;
@@ -40,17 +39,13 @@ use crate::io::draws_file::DrawsFile;
 use crate::io::hash;
 use crate::io::model_file::ModelFile;
 use crate::parse;
-use crate::report::{self, CurvesFile};
-use document::{all_notes, reasons, turn_on_remark};
+use crate::report;
 use measure::{Curves, read_curves};
-use model_file::with_turn_on;
 use nav_sim_calibration::{
-    Bootstrap, Diagnosis, Estimator, ModelChoice, ModelSpec, Outcome, Pool, Settings, Trim,
-    Weighting, diagnose,
+    Bootstrap, Estimator, ModelChoice, ModelSpec, Pool, Settings, Trim, Weighting,
 };
 use nav_sim_document::Document;
 use nav_sim_signal::noise::Model;
-use nav_sim_signal::wavelet::Convention;
 use serde::Serialize;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -167,7 +162,6 @@ const POOLS: [(&str, &str); 2] = [
 pub struct CalibrationAnswer {
     calibration: Calibration,
     note: CalibrationNote,
-    diagnoses: Vec<Diagnosis>,
 }
 
 impl Command for Calibrate {
@@ -230,15 +224,8 @@ impl Command for Calibrate {
                 calibration
             }
         };
-        let Calibration {
-            groups,
-            outcomes,
-            settings,
-            ..
-        } = &calibration;
         Ok(CalibrationAnswer {
-            diagnoses: diagnose(groups, outcomes, settings),
-            note: self.note(settings, context),
+            note: self.note(&calibration.settings, context),
             calibration,
         })
     }
@@ -249,23 +236,24 @@ impl Serialize for CalibrationAnswer {
         &self,
         serializer: S,
     ) -> std::result::Result<S::Ok, S::Error> {
-        let Calibration {
-            outcomes,
-            turn_on,
-            settings,
-            ..
-        } = &self.calibration;
-        FitsFile::new(outcomes, &self.diagnoses, turn_on, settings).serialize(serializer)
+        self.calibration.shown(None).file.serialize(serializer)
     }
 }
 
 impl Answer for CalibrationAnswer {
     fn document(&self) -> Document {
-        self.calibration.shown(&self.diagnoses, |_| true).document()
+        self.calibration.shown(None).document()
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {
-        self.calibration.files(&self.note, &self.diagnoses)
+        let estimators = &self.calibration.settings.estimators;
+        let of_estimator = |estimator: &Estimator| {
+            let stem = stem_of(*estimator, estimators);
+            let names = (model_ending(&stem), stem);
+            self.calibration
+                .files_of(*estimator, names, &self.note, None)
+        };
+        estimators.iter().flat_map(of_estimator).collect()
     }
 }
 
@@ -292,7 +280,6 @@ impl Calibrate {
             pool: self.pool,
             settings,
             bootstrap: self.draws(context),
-            turn_on: true,
         };
         measure(&self.inputs, &options, context)
     }
@@ -314,7 +301,6 @@ impl Calibrate {
     /// What is recorded of the calibration.
     fn note(&self, settings: &Settings, context: &Context<'_>) -> CalibrationNote {
         CalibrationNote {
-            efficiency_convention: Convention::Exact,
             reading: self.reading(settings),
             seed: self.draws(context).map(|draws| draws.seed),
             inputs: context.inputs().to_vec(),
@@ -405,66 +391,41 @@ pub(crate) fn endings(estimators: &[Estimator]) -> Vec<(Cow<'static, str>, Writt
 }
 
 impl Calibration {
-    /// The files of all estimators, as endings of `--out`.
-    pub(crate) fn files(
-        &self,
-        note: &CalibrationNote,
-        diagnoses: &[Diagnosis],
-    ) -> Vec<OutputFile<'static>> {
-        let estimators = &self.settings.estimators;
-        let of_estimator = |estimator: &Estimator| {
-            let stem = stem_of(*estimator, estimators);
-            let names = (model_ending(&stem), stem);
-            self.files_of(*estimator, names, (note, diagnoses), None)
-        };
-        estimators.iter().flat_map(of_estimator).collect()
-    }
-
     /// Draws, curves, model, page and figures of an estimator; names of the model and of what comes before the other
-    /// endings. Of a model that is inflated (and how) there are no intervals and draws, which are of its own.
+    /// endings. A model that is inflated (and how) has no intervals and draws, which are of its own.
     pub(crate) fn files_of(
         &self,
         estimator: Estimator,
         (model_name, stem): (String, String),
-        (note, diagnoses): (&CalibrationNote, &[Diagnosis]),
+        note: &CalibrationNote,
         inflated: Option<(&Model, &str)>,
     ) -> Vec<OutputFile<'static>> {
-        let own = self.outcomes.iter().filter(|o| o.estimator == estimator);
-        let own: Vec<&Outcome> = own.collect();
-        let curves = report::json(&CurvesFile::new(&self.groups, &own, &self.settings));
-        let blake3 = hash::of_bytes(curves.as_bytes());
-        let means = self.turn_on.iter().filter(|t| t.estimator == estimator);
-        let model = with_turn_on(note.model_file(&own, &self.settings, Some(&blake3)), means);
-        let (draws, model) = match inflated {
-            None => (DrawsFile::of(&own, self.settings.rate_hz), model),
-            Some((inflated, how)) => {
-                let mut provenance = model.provenance.unwrap_or_default();
-                provenance.insert("inflation".to_owned(), how.into());
-                let inflated = ModelFile {
-                    missing: model.missing,
-                    provenance: Some(provenance),
-                    ..ModelFile::new(inflated.clone())
-                };
-                (None, inflated)
-            }
-        };
-        let page = self
-            .shown(diagnoses, |outcome| outcome.estimator == estimator)
-            .document();
-        let draws = draws.map(|draws| {
-            serde_json::to_string(&draws).expect("plain structs are always JSON") + "\n"
-        });
+        let shown = self.shown(Some(estimator));
+        let curves = report::json(&shown.curves);
+        let mut model = note.model_file(&shown, &hash::of_bytes(curves.as_bytes()));
+        let mut draws = DrawsFile::of(&shown.outcomes, self.settings.rate_hz);
+        if let Some((inflated, how)) = inflated {
+            draws = None;
+            let mut provenance = model.provenance.unwrap_or_default();
+            provenance.insert("inflation".to_owned(), how.into());
+            model = ModelFile {
+                missing: model.missing,
+                provenance: Some(provenance),
+                ..ModelFile::new(inflated.clone())
+            };
+        }
+        let page = shown.document();
         let named = |ending: &str, text| OutputFile::whole(format!("{stem}{ending}"), text);
-        let mut files: Vec<_> = draws
-            .map(|text| named(".draws.json", text))
-            .into_iter()
-            .collect();
-        files.extend([
+        let draws = draws.map(|draws| {
+            let text = serde_json::to_string(&draws).expect("plain structs are always JSON");
+            named(".draws.json", text + "\n")
+        });
+        let others = [
             named(".wv.json", curves),
             OutputFile::whole(model_name, crate::io::model_file::to_toml(&model)),
             named(".html", page.html()),
             named(".svg", page.svg()),
-        ]);
-        files
+        ];
+        draws.into_iter().chain(others).collect()
     }
 }

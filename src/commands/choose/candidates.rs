@@ -23,7 +23,6 @@ use nav_sim_signal::noise::{Kind, Model};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::fmt;
-use std::sync::OnceLock;
 
 /// A way from recordings to a filter.
 #[derive(Debug, Clone, PartialEq)]
@@ -218,31 +217,39 @@ pub struct Unit {
 pub struct Laboratory {
     units: Vec<Unit>,
     settings: Settings,
-    pool: Option<Pool>,
-    /// The noise of each recording alone, once it was asked for.
-    models: Vec<OnceLock<Model>>,
+    /// The noise of each recording alone, as it was met: N2 fitted to the classical wavelet variance of each axis.
+    models: Vec<Model>,
 }
 
 /// The groups of recordings that were calibrated, their fits, and how these were made.
 pub(crate) type Calibrated = (Vec<Group>, Vec<Outcome>, Settings);
 
 impl Laboratory {
-    /// Estimators and model of the settings count nothing: those of the candidates do. `pool`: which signals are
-    /// replicates of one another; none: the axes of a sensor, but for single recordings.
-    #[must_use]
-    pub fn new(units: Vec<Unit>, settings: Settings, pool: Option<Pool>) -> Self {
-        let models = units.iter().map(|_| OnceLock::new()).collect();
-        Self {
+    /// Estimators and model of the settings count nothing: those of the candidates do.
+    ///
+    /// # Errors
+    /// When a curve is too short for N2.
+    pub fn new(units: Vec<Unit>, settings: Settings) -> Result<Self, Failure> {
+        let mut laboratory = Self {
             units,
             settings,
-            pool,
-            models,
-        }
-    }
-
-    /// The recordings.
-    pub(crate) fn units(&self) -> &[Unit] {
-        &self.units
+            models: Vec::new(),
+        };
+        let own = |unit: &Unit| {
+            let n2 = ModelChoice::Given(ModelSpec::n2());
+            let (_, outcomes, settings) = laboratory
+                .fit(&[unit], Estimator::Awv, &n2, Some(Pool::Axes))
+                .map_err(|e| {
+                    Failure::from(e).within(&format!("the noise of {} alone", unit.name))
+                })?;
+            Ok(model_of(&outcomes, settings.rate_hz))
+        };
+        laboratory.models = laboratory
+            .units
+            .par_iter()
+            .map(own)
+            .collect::<Result<_, Failure>>()?;
+        Ok(laboratory)
     }
 
     /// Calibrates a candidate on all recordings but one, before any inflation. An estimator of single recordings takes
@@ -260,7 +267,7 @@ impl Laboratory {
         } else {
             self.others(without).map(|k| &self.units[k]).collect()
         };
-        self.fit(&of_units, candidate.estimator, &candidate.model, self.pool)
+        self.fit(&of_units, candidate.estimator, &candidate.model, None)
     }
 
     /// The recordings but one.
@@ -280,7 +287,7 @@ impl Laboratory {
             &self.units.iter().collect::<Vec<_>>(),
             Estimator::DrAwv,
             &n2,
-            self.pool,
+            None,
         )?;
         let abnormal: Vec<String> = diagnose(&groups, &outcomes, &settings)
             .into_iter()
@@ -295,21 +302,6 @@ impl Laboratory {
         };
         let normal: Vec<usize> = all.iter().copied().filter(is_normal).collect();
         Ok(if normal.len() < FEWEST { all } else { normal })
-    }
-
-    /// The noise of one recording as it was met: N2 fitted to the classical wavelet variance of each axis.
-    ///
-    /// # Errors
-    /// When a curve is too short for the model.
-    pub(crate) fn own_model(&self, k: usize) -> Result<&Model, CalibrationError> {
-        if self.models[k].get().is_none() {
-            let n2 = ModelChoice::Given(ModelSpec::n2());
-            let (_, outcomes, settings) =
-                self.fit(&[&self.units[k]], Estimator::Awv, &n2, Some(Pool::Axes))?;
-            // another thread may have been as quick, with the same model
-            let _ = self.models[k].set(model_of(&outcomes, settings.rate_hz));
-        }
-        Ok(self.models[k].get().expect("set above"))
     }
 
     fn fit(
@@ -360,8 +352,8 @@ pub struct Fold {
     /// Scores of the candidates, in their order: on windows of the recording, or what is expected where it is shorter
     /// than the trajectory.
     pub scores: Vec<Score>,
-    /// What covariance analysis expects of each where the recording's own N2 makes the errors, if it was asked.
-    pub expected: Option<Vec<Score>>,
+    /// As covariance analysis expects them where the recording's own N2 makes the errors.
+    pub expected: Vec<Score>,
     /// Windows that were navigated; 0 where the recording is shorter than the trajectory.
     pub windows: u64,
 }
@@ -424,8 +416,7 @@ impl Drive {
     ) -> Result<Fold, Failure> {
         let models = self.models(laboratory, Some(k), candidates)?;
         let beliefs = self.beliefs(candidates, &models)?;
-        let left_out_model = own_model(laboratory, k)?;
-        let expected = self.expected(&beliefs, left_out_model);
+        let expected = self.expected(&beliefs, &laboratory.models[k]);
         let is_long = |r: &Recording| self.independent_windows(r.len()) >= 1.0;
         let usable: Cow<'_, [Recording]> = if recordings.iter().all(is_long) {
             recordings.into()
@@ -443,7 +434,7 @@ impl Drive {
         let windows = if sampled.is_some() { runs } else { 0 };
         Ok(Fold {
             scores: sampled.unwrap_or_else(|| expected.clone()),
-            expected: Some(expected),
+            expected,
             windows,
         })
     }
@@ -464,9 +455,9 @@ impl Drive {
                 .iter()
                 .any(|(other, _)| other.is_calibrated_as(candidate))
             {
-                let calibrated = laboratory.calibrate(candidate, without);
-                let (_, outcomes, settings) =
-                    calibrated.map_err(|source| uncalibrated(candidate, source))?;
+                let (_, outcomes, settings) = laboratory
+                    .calibrate(candidate, without)
+                    .map_err(|e| Failure::from(e).within(&candidate.to_string()))?;
                 made.push((candidate, model_of(&outcomes, settings.rate_hz)));
             }
         }
@@ -495,11 +486,9 @@ impl Drive {
             Inflation::None => Ok(model.clone()),
             Inflation::Tenfold => Ok(tenfold(model)),
             Inflation::Tuned => {
-                let others: Vec<usize> = laboratory.others(without).collect();
-                let model_of = |k: &usize| own_model(laboratory, *k).cloned();
-                let truths: Vec<Model> =
-                    others.par_iter().map(model_of).collect::<Result<_, _>>()?;
-                self.tuned(candidate, model, &truths)
+                let truths = laboratory.others(without);
+                let truths = truths.map(|k| laboratory.models[k].clone().into());
+                self.tuned(candidate, model, &truths.collect::<Vec<_>>())
             }
         }
     }
@@ -508,14 +497,13 @@ impl Drive {
         &self,
         candidate: &Candidate,
         model: &Model,
-        truths: &[Model],
+        truths: &[TrueErrors],
     ) -> Result<Model, Failure> {
         let full = self.scenario.with_full_noise();
         let full = |model: &Model| full.belief(model, &self.outages, &self.track);
-        let truths: Vec<TrueErrors> = truths.iter().cloned().map(TrueErrors::from).collect();
         let task = Task {
             model,
-            truths: &truths,
+            truths,
             drawn: None,
             track: &self.track,
             full: &full,
@@ -581,16 +569,6 @@ impl Drive {
         };
         beliefs.par_iter().map(score).collect()
     }
-}
-
-fn own_model(laboratory: &Laboratory, k: usize) -> Result<&Model, Failure> {
-    let recording = &laboratory.units()[k].name;
-    let told = |e| Failure::from(e).within(&format!("the noise of {recording} alone"));
-    laboratory.own_model(k).map_err(told)
-}
-
-fn uncalibrated(candidate: &Candidate, e: CalibrationError) -> Failure {
-    Failure::from(e).within(&candidate.to_string())
 }
 
 /// Ten times every standard deviation.

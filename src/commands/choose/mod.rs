@@ -7,12 +7,9 @@
 //! raise by claiming more, or less, than it knows. The recording is the unit of every interval, not the window:
 //! windows of one recording share its noise. [`Ranking`] compares candidates pair by pair, recording by recording.
 
-mod candidates;
+pub mod candidates;
 mod document;
-mod ranking;
-
-pub use candidates::{Candidate, Drive, Fold, Inflation, Laboratory, Unit};
-pub use ranking::{Contender, Difference, EndScore, FoldScore, Mean, Placed, Ranking, Score};
+pub mod ranking;
 
 use crate::app::inputs::{self, SettingsArgs, files, listed};
 use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
@@ -25,16 +22,14 @@ use crate::io::recordings;
 use crate::io::recordings::{FileReport, Gaps, ReadOptions};
 use crate::parse;
 use crate::report::{json, six_digits};
-use document::ChoiceReport;
-use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, diagnose, model_of};
+use candidates::{Candidate, Drive, Fold, Inflation, Laboratory, Unit};
+use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, model_of};
 use nav_sim_document::Document;
 use nav_sim_navigation::ekf::FilterStates;
-use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::{Axis, Channel, Recording};
 use nav_sim_signal::noise::Model;
-use nav_sim_signal::wavelet::Convention;
+use ranking::Ranking;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -95,61 +90,45 @@ pub struct Choose {
 /// The estimators that are one.
 const EACH: &[(&str, &str)] = ESTIMATORS.split_at(6).0;
 
-/// What was chosen, and where.
+/// The ranking (`ranking.json`), and the winner's calibration of all recordings.
+#[derive(Serialize)]
 pub struct ChoiceMade {
-    chosen: Chosen,
-    note: CalibrationNote,
-    outages: Vec<Outage>,
+    schema_version: u32,
+    verdict: Vec<String>,
     trajectory: String,
+    outages: Vec<Outage>,
     seed: u64,
-}
-
-impl ChoiceMade {
-    fn report(&self) -> ChoiceReport<'_> {
-        ChoiceReport {
-            ranking: &self.chosen.ranking,
-            abnormal: &self.chosen.abnormal,
-            outages: &self.outages,
-            trajectory: &self.trajectory,
-            seed: self.seed,
-        }
-    }
-}
-
-impl Serialize for ChoiceMade {
-    fn serialize<S: serde::Serializer>(
-        &self,
-        serializer: S,
-    ) -> std::result::Result<S::Ok, S::Error> {
-        self.report().serialize(serializer)
-    }
+    #[serde(flatten)]
+    ranking: Ranking,
+    /// Recordings that are calibrated on but judge no candidate.
+    #[serde(skip)]
+    abnormal: Vec<String>,
+    #[serde(skip)]
+    calibration: Calibration,
+    #[serde(skip)]
+    note: CalibrationNote,
+    #[serde(skip)]
+    estimator: Estimator,
+    /// The winner's model, if it is inflated, and how.
+    #[serde(skip)]
+    inflated: Option<(Model, Inflation)>,
 }
 
 impl Answer for ChoiceMade {
     fn document(&self) -> Document {
-        self.report().document()
+        self.ranked()
     }
 
     /// The winner's model with its curves and draws, and the ranking.
     fn files(&self) -> Vec<OutputFile<'_>> {
-        let Chosen {
-            winner,
-            calibration,
-            model,
-            ..
-        } = &self.chosen;
-        let Calibration {
-            groups,
-            outcomes,
-            settings,
-            ..
-        } = calibration;
-        let diagnoses = diagnose(groups, outcomes, settings);
         let names = ("model.toml".to_owned(), "model".to_owned());
-        let how = winner.inflation;
-        let inflated = (how != Inflation::None).then(|| (model, how.name()));
-        let made = (&self.note, diagnoses.as_slice());
-        let mut files = calibration.files_of(winner.estimator, names, made, inflated);
+        let inflated = self
+            .inflated
+            .as_ref()
+            .map(|(model, how)| (model, how.name()));
+        let mut files = self
+            .calibration
+            .files_of(self.estimator, names, &self.note, inflated);
         files.push(OutputFile::whole("ranking.json", json(self)));
         files
     }
@@ -178,6 +157,7 @@ impl Command for Choose {
         Ok(trajectory.chain(recordings).chain(scenario).collect())
     }
 
+    /// Files are read twice, so that no more than a few are in memory.
     fn run(&self, context: &Context<'_>) -> Result<ChoiceMade> {
         let candidates = self.candidates()?;
         let scenario = self.settings.checked()?;
@@ -188,6 +168,7 @@ impl Command for Choose {
             let message = "there is no outage, and candidates are judged at the ends of outages";
             return Err(Failure::input(message).hint("give one with --outage START:END"));
         }
+        // the candidates have estimators and models of their own
         let options = CalibrationOptions {
             reading: self.recordings.options(self.gaps),
             skip_warm_up: self.recordings.skips_warm_up(),
@@ -195,33 +176,91 @@ impl Command for Choose {
                 trim: self.trim,
                 ..Settings::default()
             },
-            bootstrap: Some(Bootstrap {
-                seed,
-                ..Bootstrap::default()
-            }),
-            turn_on: false,
+            estimators: EstimatorChoice::One(Estimator::Awv),
             ..CalibrationOptions::default()
         };
-        let drive = ChoiceDrive {
-            trajectory,
-            scenario,
-            outages: outages.clone(),
+        let mut measured = measure(&self.inputs, &options, context)?;
+        let found_hz = measured.settings.rate_hz;
+        let rate_hz = nominal_hz(found_hz, scenario.gnss.rate_hz);
+        if rate_hz != found_hz {
+            context.remark(format!(
+                "the recordings run at {} Hz: taken as {rate_hz} Hz, so that fixes meet samples",
+                six_digits(found_hz)
+            ));
+            measured.settings.rate_hz = rate_hz;
+        }
+        // The clocks of the files are not quite alike: one rate is that of all.
+        let reading = ReadOptions {
+            rate_hz: Some(rate_hz),
+            ..options.reading
+        };
+        let files = &measured.report.files;
+        if files.len() < FEWEST {
+            let message = format!(
+                "{} recordings are too few to leave one out: {FEWEST} or more are needed",
+                files.len()
+            );
+            let hint = "each recording is a file; nav-sim calibrate takes fewer";
+            return Err(Failure::input(message).hint(hint));
+        }
+        let units = units(&measured);
+        let samples: Vec<usize> = units.iter().map(samples_in).collect();
+        let laboratory = Laboratory::new(units, measured.settings)?;
+        let drive = Drive::new(&trajectory, scenario, outages.clone(), rate_hz, seed)?;
+        let runs_on = |k: &usize| {
+            // two on each window that lies in the recording side by side; whole batches
+            let windows = drive.independent_windows(samples[*k]);
+            let usual = ((2.0 * windows / 8.0).ceil() as u64 * 8).clamp(16, 64);
+            self.runs.unwrap_or(usual)
+        };
+        let judges = laboratory.judges()?;
+        context.begin("runs", judges.iter().map(runs_on).sum());
+        let mut folds: Vec<(String, Fold)> = Vec::new();
+        for k in &judges {
+            let file = &files[*k];
+            let (read, _) = recordings::read(std::slice::from_ref(&file.path), &reading)?;
+            // a warm-up that was left out of the curves is no stretch to navigate on either
+            let measured = |recording| without_warm_up(recording, options.skip_warm_up).0;
+            let read: Vec<Recording> = read.into_iter().map(measured).collect();
+            let advance = |n| context.advance(n);
+            let fold =
+                drive.leave_out(&laboratory, *k, &read, &candidates, runs_on(k), &advance)?;
+            folds.push((file.file.clone(), fold));
+        }
+        context.end();
+        let ranking = Ranking::new(&candidates, &folds);
+        let winner = &candidates[ranking.candidates[0].index];
+        // an estimator of single recordings never wins: this is of all of them
+        let (groups, outcomes, settings) = laboratory.calibrate(winner, None)?;
+        let model = model_of(&outcomes, settings.rate_hz);
+        let model = drive.inflated(&laboratory, None, winner, &model)?;
+        let bootstrap = Bootstrap {
             seed,
-            runs: self.runs,
+            ..Bootstrap::default()
         };
-        let chosen = choose(&self.inputs, &options, &candidates, drive, context)?;
-        let note = CalibrationNote {
-            efficiency_convention: Convention::Exact,
-            reading: self.recordings.provenance(self.gaps),
-            seed: Some(seed),
-            inputs: context.inputs().to_vec(),
-        };
+        let mut calibration =
+            Calibration::new(groups, outcomes, settings, Some(bootstrap), &|_| {});
+        calibration.turn_on.clear();
+        let others = files
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| !judges.contains(k));
         Ok(ChoiceMade {
-            chosen,
-            note,
-            outages,
+            schema_version: 1,
+            verdict: ranking.verdict(),
             trajectory: self.trajectory.display().to_string(),
+            outages,
             seed,
+            ranking,
+            abnormal: others.map(|(_, file)| file.file.clone()).collect(),
+            calibration,
+            note: CalibrationNote {
+                reading: self.recordings.provenance(self.gaps),
+                seed: Some(seed),
+                inputs: context.inputs().to_vec(),
+            },
+            estimator: winner.estimator,
+            inflated: (winner.inflation != Inflation::None).then_some((model, winner.inflation)),
         })
     }
 }
@@ -239,31 +278,19 @@ impl Choose {
         if estimator.is_empty() && model.is_empty() && filter.is_empty() && inflate.is_empty() {
             return Ok(Candidate::usual());
         }
-        let mut models = model
-            .iter()
-            .map(|m| m.parse().map_err(unknown_model))
-            .collect::<Result<Vec<ModelChoice>>>()?;
-        if models.is_empty() {
-            models.push(ModelChoice::default());
+        let models = model.iter().map(|m| m.parse().map_err(unknown_model));
+        let models: Vec<ModelChoice> = models.collect::<Result<_>>()?;
+        fn or<T: Clone>(given: &[T], usual: &[T]) -> Vec<T> {
+            if given.is_empty() { usual } else { given }.to_vec()
         }
-        let averages = [Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv];
         let candidates = Candidate::product(
-            if estimator.is_empty() {
-                &averages
-            } else {
-                estimator
-            },
-            &models,
-            if filter.is_empty() {
-                &[FilterStates::Reduced15]
-            } else {
-                filter
-            },
-            if inflate.is_empty() {
-                &[Inflation::None]
-            } else {
-                inflate
-            },
+            &or(
+                estimator,
+                &[Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv],
+            ),
+            &or(&models, &[ModelChoice::default()]),
+            &or(filter, &[FilterStates::Reduced15]),
+            &or(inflate, &[Inflation::None]),
         );
         if candidates.iter().any(Candidate::is_eligible) {
             return Ok(candidates);
@@ -275,155 +302,8 @@ impl Choose {
     }
 }
 
-// Static recordings and a trajectory → the noise model that a filter is best made of.
-
-/// Where candidates navigate.
-#[derive(Debug)]
-pub struct ChoiceDrive {
-    /// The reference.
-    pub trajectory: Trajectory,
-    /// Receiver, start, what filters expect beside the noise model.
-    pub scenario: Scenario,
-    /// When there are no fixes; at least one.
-    pub outages: Vec<Outage>,
-    /// Seed of all random numbers.
-    pub seed: u64,
-    /// Runs on each recording; none: two on each window that lies in it side by side, between 16 and 64.
-    pub runs: Option<u64>,
-}
-
-/// What was found.
-#[derive(Debug)]
-#[non_exhaustive]
-pub struct Chosen {
-    /// The candidates, the winner first.
-    pub ranking: Ranking,
-    /// What the winner is.
-    pub winner: Candidate,
-    /// The winner's calibration of all recordings, before any inflation.
-    pub calibration: Calibration,
-    /// Its noise model.
-    pub model: Model,
-    /// The recordings that are calibrated on but judge no candidate.
-    pub abnormal: Vec<String>,
-    /// The files that were read, in the order of the recordings.
-    pub files: Vec<PathBuf>,
-}
-
 /// Fewest recordings of which one can be left out: two remain to be averaged.
-pub(super) const FEWEST: usize = 3;
-
-/// Leaves out one recording after the other, but those that are abnormal, and ranks candidates by what they do on it. Files are read twice, so that
-/// no more than a few are in memory. `options.estimators` and the model of `options.settings` count nothing: the
-/// candidates have theirs.
-///
-/// # Errors
-/// When recordings cannot be read or are fewer than three, a model cannot be made, or trajectory and rates do not fit
-/// together.
-pub fn choose(
-    paths: &[PathBuf],
-    options: &CalibrationOptions,
-    candidates: &[Candidate],
-    drive: ChoiceDrive,
-    context: &Context<'_>,
-) -> Result<Chosen, Failure> {
-    let options = CalibrationOptions {
-        estimators: EstimatorChoice::One(Estimator::Awv),
-        ..options.clone()
-    };
-    let asked_pool = options.pool;
-    let mut measured = measure(
-        paths,
-        &CalibrationOptions {
-            pool: None,
-            ..options.clone()
-        },
-        context,
-    )?;
-    let found_hz = measured.settings.rate_hz;
-    let rate_hz = nominal_hz(found_hz, drive.scenario.gnss.rate_hz);
-    if rate_hz != found_hz {
-        context.remark(format!(
-            "the recordings run at {} Hz: taken as {rate_hz} Hz, so that fixes meet samples",
-            six_digits(found_hz)
-        ));
-        measured.settings.rate_hz = rate_hz;
-    }
-    // The clocks of the files are not quite alike: one rate is that of all.
-    let reading = ReadOptions {
-        rate_hz: Some(rate_hz),
-        ..options.reading.clone()
-    };
-    let options = CalibrationOptions { reading, ..options };
-    let files = measured.report.files.clone();
-    if files.len() < FEWEST {
-        let message = format!(
-            "{} recordings are too few to leave one out: {FEWEST} or more are needed",
-            files.len()
-        );
-        return Err(
-            Failure::input(message).hint("each recording is a file; nav-sim calibrate takes fewer")
-        );
-    }
-    let units = units(&measured);
-    let samples: Vec<usize> = units.iter().map(samples_in).collect();
-    let laboratory = Laboratory::new(units, measured.settings, asked_pool);
-    let ChoiceDrive {
-        trajectory,
-        scenario,
-        outages,
-        seed,
-        runs,
-    } = drive;
-    let drive = Drive::new(&trajectory, scenario, outages, rate_hz, seed)?;
-    let runs: Vec<u64> = samples
-        .iter()
-        .map(|count| runs.unwrap_or_else(|| runs_on(&drive, *count)))
-        .collect();
-    let judges = laboratory.judges().map_err(Failure::from)?;
-    context.begin("runs", judges.iter().map(|k| runs[*k]).sum());
-    let mut folds: Vec<(String, Fold)> = Vec::new();
-    for &k in &judges {
-        let file = &files[k];
-        let read = samples_of(file, &options)?;
-        let advance = |n| context.advance(n);
-        let fold = drive.leave_out(&laboratory, k, &read, candidates, runs[k], &advance)?;
-        folds.push((file.file.clone(), fold));
-    }
-    context.end();
-    let contenders: Vec<Contender> = candidates.iter().map(Contender::from).collect();
-    let ranking = Ranking::new(&contenders, &folds);
-    let winner = candidates[ranking.winner().index].clone();
-    // an estimator of single recordings never wins: this is of all of them
-    let (groups, outcomes, settings) =
-        laboratory.calibrate(&winner, None).map_err(Failure::from)?;
-    let calibrated = model_of(&outcomes, settings.rate_hz);
-    let model = drive.inflated(&laboratory, None, &winner, &calibrated)?;
-    let calibration = Calibration {
-        groups,
-        outcomes,
-        settings,
-        beginnings: Default::default(),
-        turn_on: Vec::new(),
-    }
-    .with_inference(options.bootstrap, &|_| {});
-    let is_judge = |(k, _): &(usize, &FileReport)| judges.contains(k);
-    let abnormal = files
-        .iter()
-        .enumerate()
-        .filter(|found| !is_judge(found))
-        .map(|(_, file)| file.file.clone());
-    let abnormal = abnormal.collect();
-    let files = files.into_iter().map(|file| file.path).collect();
-    Ok(Chosen {
-        ranking,
-        winner,
-        calibration,
-        model,
-        abnormal,
-        files,
-    })
-}
+const FEWEST: usize = 3;
 
 /// The rate of which that of the fixes is a whole divisor, if the clock of the recordings (Hz) shows it to within its own
 /// error: quartz is within 1e-4, and a stamp that was rounded at either end costs no more than the rest. Else that of the
@@ -475,17 +355,4 @@ fn samples_in(unit: &Unit) -> usize {
             .sum::<usize>()
     };
     Channel::ALL.into_iter().map(of_channel).max().unwrap_or(0)
-}
-
-/// Two runs on each window that lies in a recording of so many samples side by side; whole batches.
-fn runs_on(drive: &Drive, samples: usize) -> u64 {
-    let windows = drive.independent_windows(samples);
-    ((2.0 * windows / 8.0).ceil() as u64 * 8).clamp(16, 64)
-}
-
-/// The samples that were measured: a warm-up that was left out of the curves is no stretch to navigate on either.
-fn samples_of(file: &FileReport, options: &CalibrationOptions) -> Result<Vec<Recording>, Failure> {
-    let (read, _) = recordings::read(std::slice::from_ref(&file.path), &options.reading)?;
-    let measured = |recording| without_warm_up(recording, options.skip_warm_up).0;
-    Ok(read.into_iter().map(measured).collect())
 }

@@ -12,24 +12,6 @@ pub(super) const FEWEST: usize = 4;
 /// A recording whose errors are this many times as large in NEES as any filter believes is described by no candidate.
 const FAILS: f64 = 2.0 * 9.0;
 
-/// Who is compared.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Contender {
-    /// In words.
-    pub name: String,
-    /// Whether it may be chosen.
-    pub eligible: bool,
-}
-
-impl From<&Candidate> for Contender {
-    fn from(candidate: &Candidate) -> Self {
-        Self {
-            name: candidate.to_string(),
-            eligible: candidate.is_eligible(),
-        }
-    }
-}
-
 /// A mean over recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mean {
@@ -42,7 +24,6 @@ pub struct Mean {
 
 /// A candidate beside the winner, on the same recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[non_exhaustive]
 pub struct Difference {
     /// Its log score less the winner's (nats an outage end); negative is worse.
     pub log_score: Mean,
@@ -54,7 +35,6 @@ pub struct Difference {
 
 /// A candidate on one recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
 pub struct FoldScore {
     /// The recording that was left out.
     pub recording: String,
@@ -63,17 +43,17 @@ pub struct FoldScore {
     /// How it did.
     #[serde(flatten)]
     pub score: Score,
-    /// What covariance analysis expects where the recording's own N2 makes the errors, if it was asked.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub expected: Option<Score>,
+    /// As covariance analysis expects it where the recording's own N2 makes the errors.
+    pub expected: Score,
 }
 
 /// A candidate with its place.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
 pub struct Placed {
     /// In words.
     pub candidate: String,
+    /// `best`, `tied` with it, or `single`: of one recording, for comparison.
+    pub place: &'static str,
     /// Its index among those that were given.
     pub index: usize,
     /// Whether it may be chosen; others are shown for comparison.
@@ -99,8 +79,11 @@ pub struct Placed {
 
 /// All candidates, the best first, those that may be chosen before the others.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
 pub struct Ranking {
+    /// The candidate of the highest mean score of those that may be chosen.
+    pub winner: String,
+    /// Candidates that the data cannot tell from the winner.
+    pub tied: Vec<String>,
     /// The candidates.
     pub candidates: Vec<Placed>,
     /// Recordings without which another candidate would win.
@@ -117,9 +100,9 @@ impl Ranking {
     /// # Panics
     /// Without a candidate that may be chosen, or without a recording.
     #[must_use]
-    pub fn new(candidates: &[Contender], folds: &[(String, Fold)]) -> Self {
+    pub fn new(candidates: &[Candidate], folds: &[(String, Fold)]) -> Self {
         let eligible: Vec<usize> = (0..candidates.len())
-            .filter(|c| candidates[*c].eligible)
+            .filter(|c| candidates[*c].is_eligible())
             .collect();
         let all: Vec<&Fold> = folds.iter().map(|(_, fold)| fold).collect();
         let winner = best(&eligible, &all).expect("one may be chosen, of one recording at least");
@@ -149,7 +132,10 @@ impl Ranking {
         };
         let fails = |k: &usize| least(all[*k]) > FAILS;
         let tells = folds.len() >= FEWEST && placed.iter().any(|p| p.eligible && !p.tied);
+        let tied = placed.iter().skip(1).filter(|p| p.place == "tied");
         Self {
+            winner: placed[0].candidate.clone(),
+            tied: tied.map(|p| p.candidate.clone()).collect(),
             candidates: placed,
             decisive: (0..folds.len())
                 .filter(|k| without(*k))
@@ -158,12 +144,6 @@ impl Ranking {
             undescribed: (0..folds.len()).filter(fails).map(named).collect(),
             tells,
         }
-    }
-
-    /// The candidate with the highest mean score of those that may be chosen.
-    #[must_use]
-    pub fn winner(&self) -> &Placed {
-        &self.candidates[0]
     }
 }
 
@@ -181,7 +161,7 @@ fn best(eligible: &[usize], folds: &[&Fold]) -> Option<usize> {
 
 fn place(
     c: usize,
-    candidate: &Contender,
+    candidate: &Candidate,
     winner: usize,
     rivals: usize,
     folds: &[(String, Fold)],
@@ -205,16 +185,23 @@ fn place(
         recording: recording.clone(),
         windows: fold.windows,
         score: fold.scores[c].clone(),
-        expected: fold.expected.as_ref().map(|fields| fields[c].clone()),
+        expected: fold.expected[c].clone(),
     };
     let coverage: Option<Vec<f64>> = scores().map(|s| s.coverage).collect();
     // where nothing is known of the difference, nothing tells them apart
     let is_worse = joint95.1 < 0.0 || log_score.value == f64::NEG_INFINITY;
+    let (eligible, tied) = (candidate.is_eligible(), c == winner || !is_worse);
     Placed {
-        candidate: candidate.name.clone(),
+        candidate: candidate.to_string(),
+        place: match (c == winner, eligible, tied) {
+            (true, ..) => "best",
+            (_, false, _) => "single",
+            (_, _, true) => "tied",
+            _ => "",
+        },
         index: c,
-        eligible: candidate.eligible,
-        tied: c == winner || !is_worse,
+        eligible,
+        tied,
         log_score: interval(&per_recording(&|s| s.log_score), 0.05),
         rmse_m: root_mean_square(per_recording(&|s| s.rmse_m)),
         believed_m: root_mean_square(per_recording(&|s| s.believed_m)),
@@ -289,7 +276,7 @@ mod ranking_tests {
         };
         let scores: Vec<Score> = scores.iter().map(score).collect();
         Fold {
-            expected: None,
+            expected: scores.clone(),
             scores,
             windows: 16,
         }
@@ -309,6 +296,7 @@ mod ranking_tests {
                 })
                 .to_vec();
             Fold {
+                expected: scores.clone(),
                 scores,
                 ..fold(&[])
             }
@@ -340,9 +328,9 @@ mod ranking_tests {
     }
 
     fn ranked(estimators: &[Estimator], folds: &[&[f64]]) -> Ranking {
-        let candidates: Vec<Contender> = estimators
+        let candidates: Vec<Candidate> = estimators
             .iter()
-            .map(|e| Contender::from(&Candidate::new(*e, "WN".parse().unwrap())))
+            .map(|e| Candidate::new(*e, "WN".parse().unwrap()))
             .collect();
         let folds: Vec<(String, Fold)> = folds
             .iter()
@@ -374,7 +362,7 @@ mod ranking_tests {
                 &[-90.0, -91.0],
             ],
         );
-        assert!(found.tells && found.winner().index == 0 && !found.candidates[1].tied);
+        assert!(found.tells && found.candidates[0].index == 0 && !found.candidates[1].tied);
         assert!((found.candidates[1].difference.log_score.value + 1.0).abs() < 1e-12);
     }
 
@@ -391,7 +379,7 @@ mod ranking_tests {
                 &[-30.0, -10.0],
             ],
         );
-        assert_eq!((found.winner().index, found.tells), (1, false));
+        assert_eq!((found.candidates[0].index, found.tells), (1, false));
         assert_eq!(found.decisive, ["r3"]);
         assert!(found.candidates.iter().all(|c| c.tied));
     }
@@ -400,7 +388,7 @@ mod ranking_tests {
     fn three_recordings_tell_nothing_and_single_estimators_never_win() {
         let two = [Estimator::Awv, Estimator::Gmwm];
         let found = ranked(&two, &[&[-10.0, -1.0], &[-10.0, -1.1], &[-10.0, -0.9]]);
-        assert!(!found.tells && found.winner().index == 0 && !found.candidates[1].eligible);
+        assert!(!found.tells && found.candidates[0].index == 0 && !found.candidates[1].eligible);
     }
 
     #[test]
@@ -416,7 +404,10 @@ mod ranking_tests {
                 &[-1.0, -11.0],
             ],
         );
-        assert_eq!((found.winner().index, found.candidates[1].index), (1, 0));
+        assert_eq!(
+            (found.candidates[0].index, found.candidates[1].index),
+            (1, 0)
+        );
         assert!(!found.candidates[1].tied);
     }
 }

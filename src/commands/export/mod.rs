@@ -7,7 +7,7 @@ mod targets;
 mod words;
 
 pub use targets::Target;
-pub(crate) use words::{Quantity, parameters as parameters_json};
+pub(crate) use words::Quantity;
 
 use crate::app::inputs::files;
 use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
