@@ -32,9 +32,9 @@ impl Ruler {
     }
 }
 
-/// Whether a value can be shown on an axis.
-pub(crate) fn is_shown(value: f64, scale: &Scale) -> bool {
-    value.is_finite() && (*scale != Scale::Log || value > 0.0)
+/// Whether a value can be shown on an axis, which may be logarithmic.
+pub(crate) fn is_shown(value: f64, is_log: bool) -> bool {
+    value.is_finite() && (!is_log || value > 0.0)
 }
 
 /// What an axis shows: the values with some air, none without a value.
@@ -47,7 +47,9 @@ pub(crate) fn range(
         return Some((-0.5, names.len() as f64 - 0.5));
     }
     let extra = axis.include.into_iter().flat_map(|(low, high)| [low, high]);
-    let shown = values.chain(extra).filter(|v| is_shown(*v, &axis.scale));
+    let shown = values
+        .chain(extra)
+        .filter(|v| is_shown(*v, axis.scale == Scale::Log));
     let (low, high) = extremes(shown)?;
     Some(match axis.scale {
         Scale::Log => {
@@ -106,13 +108,6 @@ fn decades((low, high): (f64, f64), most: usize) -> Vec<(f64, String)> {
         .into_iter()
         .map(|(v, f, e)| (v, if is_plain { plain(v) } else { power(f, e) }))
         .collect()
-}
-
-/// Between the labelled powers of ten: 2 to 9 times each.
-pub(crate) fn minor_ticks((low, high): (f64, f64)) -> Vec<f64> {
-    let exponents = low.log10().floor() as i32..=high.log10().ceil() as i32;
-    let all = exponents.flat_map(|e| (2..10).map(move |f| f64::from(f) * 10f64.powi(e)));
-    all.filter(|v| (low..=high).contains(v)).collect()
 }
 
 /// Even steps of 1, 2 or 5 times a power of ten.

@@ -44,18 +44,11 @@ pub(crate) const SMALL: Canvas = Canvas {
     map: 260.0,
 };
 
-/// A coordinate to a tenth of a pixel, without idle zeros.
-pub(crate) fn short(pixels: f64) -> String {
-    let text = format!("{pixels:.1}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
-}
-
 /// A text at a place; `anchor`: which part of it stands there.
 pub(crate) fn text(svg: &mut String, class: &str, (x, y): (f64, f64), anchor: &str, words: &str) {
-    let (x, y) = (short(x), short(y));
+    let words = escape(words);
     let _ = writeln!(
         svg,
-        "<text class=\"{class}\" x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{}</text>",
-        escape(words)
+        "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{words}</text>"
     );
 }

@@ -1,7 +1,7 @@
 //! Charts as SVG: layout, axes, stripes; for a screen and for a phone, so that text is never scaled.
 
-use crate::axis::{Ruler, extremes, is_shown, minor_ticks, range, ticks};
-use crate::canvas::{Canvas, short, text};
+use crate::axis::{Ruler, extremes, is_shown, range, ticks};
+use crate::canvas::{Canvas, text};
 use crate::chart::{Chart, Mark, Panel, Scale, Stroke};
 use crate::escape::escape;
 use crate::legend::{Legend, text_width};
@@ -13,44 +13,33 @@ const GAP: f64 = 14.0;
 
 /// The content of an `<svg>` and its height; nothing without a value to show.
 pub(crate) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
-    let mut svg = String::new();
+    let (mut svg, mut top) = (String::new(), 0.0);
     let legend = Legend::of(chart);
-    let mut top = 0.0;
-    let x_values = chart
-        .panels
-        .iter()
-        .flat_map(|p| p.series.iter())
-        .flat_map(|s| xs(&s.mark));
-    let shown_y: Vec<Option<(f64, f64)>> = chart.panels.iter().map(y_range).collect();
-    if shown_y.iter().all(Option::is_none) {
-        return None;
-    }
-    let air = if chart.x.scale == Scale::Log || chart.is_map {
-        0.03
-    } else {
-        0.0
-    };
-    let shown_x = range(&chart.x, x_values.collect::<Vec<_>>().into_iter(), air)?;
+    let shown: Vec<(usize, &Panel, (f64, f64))> = (0..)
+        .zip(&chart.panels)
+        .filter_map(|(i, panel)| Some((i, panel, y_range(panel)?)))
+        .collect();
+    let last = shown.last()?.0;
+    let is_log = chart.x.scale == Scale::Log;
+    let air = if is_log || chart.is_map { 0.03 } else { 0.0 };
+    let series = chart.panels.iter().flat_map(|p| &p.series);
+    let x_range = range(&chart.x, series.flat_map(|s| xs(&s.mark)), air)?;
     let y_ticks =
         |panel: &Panel, range, height: f64| ticks(&panel.y, range, (height / 42.0).ceil() as usize);
-    let widest = chart.panels.iter().zip(&shown_y).flat_map(|(p, range)| {
-        range.map_or_else(Vec::new, |range| y_ticks(p, range, canvas.panel * p.height))
+    let width = |(_, label): (f64, String)| text_width(&label, canvas.font);
+    let labels = shown.iter().flat_map(|(_, panel, range)| {
+        y_ticks(panel, *range, canvas.panel * panel.height)
+            .into_iter()
+            .map(width)
     });
-    let left = 10.0
-        + widest
-            .map(|(_, label)| text_width(&label, canvas.font))
-            .fold(24.0, f64::max);
-    let right = canvas.width - GAP;
+    let left = 10.0 + labels.fold(24.0, f64::max);
     // the first of slanted names begins left of its place
-    let left = slanted_names(chart, canvas, right - left).map_or(left, |(longest, slot)| {
-        left.max(0.79 * longest - 0.4 * slot)
-    });
-    for (i, (panel, range)) in chart.panels.iter().zip(&shown_y).enumerate() {
-        let Some(range) = *range else { continue };
+    let left = longest_name(chart, canvas).map_or(left, |longest| left.max(0.79 * longest));
+    for (i, panel, range) in shown {
         let mut x = Ruler {
-            range: shown_x,
-            is_log: chart.x.scale == Scale::Log,
-            pixels: (left, right),
+            range: x_range,
+            is_log,
+            pixels: (left, canvas.width - GAP),
         };
         let mut y = Ruler {
             range,
@@ -63,20 +52,17 @@ pub(crate) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
         }
         let plot_top = legend.draw(i, &panel.y.label, (left, top), canvas, &mut svg) + 2.0;
         y.pixels = (plot_top + height, plot_top);
+        let y_ticks = y_ticks(panel, y.range, height);
+        let most = canvas.width as usize;
+        let frame = Frame { x, y, most };
         let sketch = Sketch {
             chart,
             panel,
-            frame: Frame {
-                x,
-                y,
-                scales: [&chart.x.scale, &panel.y.scale],
-                most: canvas.width as usize,
-            },
+            canvas,
+            frame,
         };
-        let is_last = i + 1 == chart.panels.len();
-        let y_ticks = y_ticks(panel, sketch.frame.y.range, height);
-        let below = sketch.draw(canvas, &y_ticks, is_last, &legend, &mut svg);
-        top = plot_top + height + if is_last { below } else { GAP };
+        let below = sketch.draw(&y_ticks, i == last, &legend, &mut svg);
+        top = plot_top + height + if i == last { below } else { GAP };
     }
     Some((svg, top.ceil()))
 }
@@ -98,88 +84,62 @@ fn equalise(x: &mut Ruler, y: &mut Ruler, canvas: &Canvas) -> f64 {
 struct Sketch<'a> {
     chart: &'a Chart,
     panel: &'a Panel,
-    frame: Frame<'a>,
+    canvas: &'a Canvas,
+    frame: Frame,
 }
 
 impl Sketch<'_> {
     /// Returns the height of what stands below the plot.
     fn draw(
         &self,
-        canvas: &Canvas,
         y_ticks: &[(f64, String)],
         is_last: bool,
         legend: &Legend<'_>,
         svg: &mut String,
     ) -> f64 {
-        let (x, y) = (&self.frame.x, &self.frame.y);
+        let Frame { x, y, .. } = &self.frame;
         let ((left, right), (bottom, top)) = (x.pixels, y.pixels);
         *svg += "<g class=\"ticks\">\n";
-        self.minor(svg);
         for (value, label) in y_ticks {
             let height = y.at(*value);
             let _ = writeln!(
                 svg,
-                "<path class=\"grid\" d=\"M{} {}H{}\"/>",
-                short(left),
-                short(height),
-                short(right)
+                "<path class=\"grid\" d=\"M{left:.1} {height:.1}H{right:.1}\"/>"
             );
-            text(
-                svg,
-                "tick",
-                (left - 6.0, height + 0.35 * canvas.font),
-                "end",
-                label,
-            );
+            let place = (left - 6.0, height + 0.35 * self.canvas.font);
+            text(svg, "tick", place, "end", label);
         }
-        let below = self.x_axis(canvas, is_last, svg);
+        let below = self.x_axis(is_last, svg);
         *svg += "</g>\n";
         self.inside(legend, svg);
         let _ = writeln!(
             svg,
-            "<path class=\"axis\" d=\"M{} {}V{}H{}\"/>",
-            short(left),
-            short(top),
-            short(bottom),
-            short(right)
+            "<path class=\"axis\" d=\"M{left:.1} {top:.1}V{bottom:.1}H{right:.1}\"/>"
         );
-        self.places(canvas, svg);
-        if self.chart.is_map {
-            self.scale_bar(canvas, svg);
-        }
+        self.places(svg);
         below
     }
 
     /// All that moves when the panel is zoomed; the script reads the axes from it.
     fn inside(&self, legend: &Legend<'_>, svg: &mut String) {
-        let (x, y) = (&self.frame.x, &self.frame.y);
+        let Frame { x, y, .. } = &self.frame;
         let ((left, right), (bottom, top)) = (x.pixels, y.pixels);
-        let place = [left, top, right - left, bottom - top].map(short);
+        let (width, height) = (right - left, bottom - top);
         let _ = writeln!(
             svg,
-            "<svg class=\"plot\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" viewBox=\"{}\" preserveAspectRatio=\"none\" \
-             data-x=\"{}\" data-y=\"{}\">",
-            place[0],
-            place[1],
-            place[2],
-            place[3],
-            place.join(" "),
+            "<svg class=\"plot\" x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" \
+             viewBox=\"{left:.1} {top:.1} {width:.1} {height:.1}\" preserveAspectRatio=\"none\" data-x=\"{}\" data-y=\"{}\">",
             x.data(),
             y.data()
         );
-        if !self.chart.is_map {
-            for (from, to) in &self.chart.stripes.1 {
-                let (a, b) = (x.within(*from), x.within(*to));
-                if b > a {
-                    let _ = writeln!(
-                        svg,
-                        "<rect class=\"outage\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>",
-                        short(a),
-                        place[1],
-                        short(b - a),
-                        place[3]
-                    );
-                }
+        let stripes = self.chart.stripes.1.iter().filter(|_| !self.chart.is_map);
+        for (from, to) in stripes.map(|(from, to)| (x.within(*from), x.within(*to))) {
+            if to > from {
+                let width = to - from;
+                let _ = writeln!(
+                    svg,
+                    "<rect class=\"outage\" x=\"{from:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"/>"
+                );
             }
         }
         for series in &self.panel.series {
@@ -188,147 +148,74 @@ impl Sketch<'_> {
         *svg += "</svg>\n";
     }
 
-    /// Short lines between the labels of logarithmic axes.
-    fn minor(&self, svg: &mut String) {
-        let (x, y) = (&self.frame.x, &self.frame.y);
-        let few = |ruler: &Ruler| ruler.is_log && ruler.range.1 / ruler.range.0 < 1e7;
-        let mut d = String::new();
-        for value in few(y).then(|| minor_ticks(y.range)).into_iter().flatten() {
-            let _ = write!(d, "M{} {}h4", short(x.pixels.0), short(y.at(value)));
-        }
-        for value in few(x).then(|| minor_ticks(x.range)).into_iter().flatten() {
-            let _ = write!(d, "M{} {}v-4", short(x.at(value)), short(y.pixels.0));
-        }
-        if !d.is_empty() {
-            let _ = writeln!(svg, "<path class=\"minor\" d=\"{d}\"/>");
-        }
-    }
-
     /// Returns its height.
-    fn x_axis(&self, canvas: &Canvas, is_last: bool, svg: &mut String) -> f64 {
-        let (x, y) = (&self.frame.x, &self.frame.y);
-        let ticks = ticks(&self.chart.x, x.range, canvas.labels);
-        let is_named = matches!(self.chart.x.scale, Scale::Names(_));
-        let slanted_name = slanted_names(self.chart, canvas, x.pixels.1 - x.pixels.0);
-        for (value, label) in &ticks {
-            let place = x.at(*value);
-            if !is_named {
+    fn x_axis(&self, is_last: bool, svg: &mut String) -> f64 {
+        let (Frame { x, y, .. }, axis, font) = (&self.frame, &self.chart.x, self.canvas.font);
+        let (bottom, top) = y.pixels;
+        let longest = longest_name(self.chart, self.canvas);
+        for (value, label) in ticks(axis, x.range, self.canvas.labels) {
+            let place = x.at(value);
+            if longest.is_none() {
                 let _ = writeln!(
                     svg,
-                    "<path class=\"grid\" d=\"M{} {}V{}\"/>",
-                    short(place),
-                    short(y.pixels.0),
-                    short(y.pixels.1)
+                    "<path class=\"grid\" d=\"M{place:.1} {bottom:.1}V{top:.1}\"/>"
                 );
             }
-            if is_last && slanted_name.is_some() {
-                slanted(svg, (place + 4.0, y.pixels.0 + 16.0), label);
-            } else if is_last {
-                text(
-                    svg,
-                    "tick",
-                    (place, y.pixels.0 + canvas.font + 5.0),
-                    "middle",
-                    label,
-                );
+            match (is_last, longest) {
+                (true, None) => text(svg, "tick", (place, bottom + font + 5.0), "middle", &label),
+                // a name that ends at its place, rising towards it
+                (true, Some(_)) => {
+                    let (x, y, label) = (place + 4.0, bottom + 16.0, escape(&label));
+                    let _ = writeln!(
+                        svg,
+                        "<text class=\"tick\" text-anchor=\"end\" transform=\"translate({x:.1} {y:.1}) rotate(-38)\">{label}</text>"
+                    );
+                }
+                _ => {}
             }
         }
-        let labels = slanted_name.map_or(canvas.font + 9.0, |(longest, _)| 0.62 * longest + 22.0);
-        if self.chart.x.label.is_empty() {
-            return labels + 4.0;
-        }
+        let labels = longest.map_or(font + 9.0, |longest| 0.62 * longest + 22.0);
         if is_last {
             text(
                 svg,
                 "name",
-                (x.pixels.1, y.pixels.0 + labels + canvas.font),
+                (x.pixels.1, bottom + labels + font),
                 "end",
-                &self.chart.x.label,
+                &axis.label,
             );
         }
-        labels + canvas.font + 8.0
+        labels + font + 8.0
     }
 
-    /// Names of places, in turn above and below them.
-    fn places(&self, canvas: &Canvas, svg: &mut String) {
-        let (x, y) = (&self.frame.x, &self.frame.y);
-        let named = self.panel.series.iter().filter_map(|s| match s.mark {
-            Mark::Place(px, py) | Mark::Reading(px, py)
-                if is_shown(px, &self.chart.x.scale) && is_shown(py, &self.panel.y.scale) =>
-            {
-                Some((s, x.at(px), y.at(py)))
+    /// Names of places beside them.
+    fn places(&self, svg: &mut String) {
+        let Frame { x, y, .. } = &self.frame;
+        for series in &self.panel.series {
+            let (Mark::Place(px, py) | Mark::Reading(px, py)) = series.mark else {
+                continue;
+            };
+            if !self.frame.shows(px, py) {
+                continue;
             }
-            _ => None,
-        });
-        for (k, (series, px, py)) in named.enumerate() {
-            let width = text_width(&series.name, canvas.font);
-            let is_right = px + 8.0 + width < x.pixels.1;
-            let (anchor, px) = if is_right {
-                ("start", px + 7.0)
-            } else {
-                ("end", px - 7.0)
+            let width = text_width(&series.name, self.canvas.font);
+            let (px, py) = (x.at(px), y.at(py) - 6.0);
+            let (anchor, px) = match px + 8.0 + width < x.pixels.1 {
+                true => ("start", px + 7.0),
+                false => ("end", px - 7.0),
             };
-            let py = if k % 2 == 0 {
-                py - 6.0
-            } else {
-                py + canvas.font + 3.0
-            };
-            text(
-                svg,
-                &format!("place {}", series.colour.class()),
-                (px, py),
-                anchor,
-                &series.name,
-            );
+            let class = format!("place {}", series.colour.class());
+            text(svg, &class, (px, py), anchor, &series.name);
         }
-    }
-
-    /// A round length at the bottom right of a map.
-    fn scale_bar(&self, canvas: &Canvas, svg: &mut String) {
-        let (x, y) = (&self.frame.x, &self.frame.y);
-        let metres_per_pixel = (x.range.1 - x.range.0) / (x.pixels.1 - x.pixels.0);
-        let most = 0.22 * (x.pixels.1 - x.pixels.0) * metres_per_pixel;
-        let power = 10f64.powf(most.log10().floor());
-        let length = [5.0, 2.0, 1.0]
-            .into_iter()
-            .map(|m| m * power)
-            .find(|l| *l <= most)
-            .unwrap_or(power);
-        let (right, bottom) = (x.pixels.1 - 10.0, y.pixels.0 - 10.0);
-        let left = right - length / metres_per_pixel;
-        let label = if length >= 1000.0 {
-            format!("{} km", length / 1000.0)
-        } else {
-            format!("{length} m")
-        };
-        let _ = writeln!(
-            svg,
-            "<path class=\"scale\" d=\"M{} {}v5H{}v-5\"/>",
-            short(left),
-            short(bottom - 5.0),
-            short(right)
-        );
-        text(
-            svg,
-            "tick",
-            (0.5 * (left + right), bottom - 0.5 * canvas.font),
-            "middle",
-            &label,
-        );
     }
 }
 
-/// Where the names of the x axis have no room beside one another: the width of the longest, and the room of each.
-fn slanted_names(chart: &Chart, canvas: &Canvas, width: f64) -> Option<(f64, f64)> {
+/// Width of the longest of the names of an x axis, if it has names.
+fn longest_name(chart: &Chart, canvas: &Canvas) -> Option<f64> {
     let Scale::Names(names) = &chart.x.scale else {
         return None;
     };
-    let longest = names
-        .iter()
-        .map(|name| text_width(name, canvas.font))
-        .fold(0.0, f64::max);
-    let slot = width / names.len().max(1) as f64;
-    (longest > slot - 6.0).then_some((longest, slot))
+    let widths = names.iter().map(|name| text_width(name, canvas.font));
+    Some(widths.fold(0.0, f64::max))
 }
 
 fn xs(mark: &Mark) -> Vec<f64> {
@@ -356,54 +243,31 @@ fn ys(mark: &Mark) -> Vec<f64> {
     }
 }
 
-/// Whether a mark must be seen whole: bands, bars and auxiliary lines may leave the panel.
-fn is_main(mark: &Mark) -> bool {
-    matches!(
-        mark,
-        Mark::Line(_, Stroke::Plain)
-            | Mark::Level(_)
-            | Mark::Points(_)
-            | Mark::Place(..)
-            | Mark::Reading(..)
-    )
-}
-
 /// How far beyond the main curves a logarithmic axis follows others.
 const BEYOND: f64 = 30.0;
 
-/// What a panel shows: what is far beyond the main curves is cut, so that it does not flatten them.
+/// What a panel shows: what is far beyond the main curves is cut, so that it does not flatten them. Bands, bars and
+/// auxiliary lines may leave the panel.
 fn y_range(panel: &Panel) -> Option<(f64, f64)> {
     let has_bars = panel.series.iter().any(|s| matches!(s.mark, Mark::Bars(_)));
     let air = if has_bars { 0.0 } else { 0.04 };
-    let values: Vec<f64> = panel.series.iter().flat_map(|s| ys(&s.mark)).collect();
-    let main = panel
-        .series
-        .iter()
-        .filter(|s| is_main(&s.mark))
-        .flat_map(|s| match &s.mark {
-            Mark::Points(points) if panel.y.scale == Scale::Log => {
-                points.iter().map(|p| p.y).collect()
-            }
-            mark => ys(mark),
-        });
-    let Some((low, high)) = extremes(main.filter(|y| is_shown(*y, &panel.y.scale))) else {
-        return range(&panel.y, values.into_iter(), air);
-    };
-    let (low, high) = match panel.y.scale {
-        Scale::Log => (low / BEYOND, high * BEYOND),
-        _ if low < high => (low - (high - low), high + (high - low)),
+    let is_log = panel.y.scale == Scale::Log;
+    let main = panel.series.iter().flat_map(|s| match &s.mark {
+        Mark::Points(points) if is_log => points.iter().map(|p| p.y).collect(),
+        Mark::Line(_, Stroke::Plain)
+        | Mark::Level(_)
+        | Mark::Points(_)
+        | Mark::Place(..)
+        | Mark::Reading(..) => ys(&s.mark),
+        _ => Vec::new(),
+    });
+    let main = extremes(main.filter(|y| is_shown(*y, is_log)));
+    let (low, high) = match main {
+        Some((low, high)) if is_log => (low / BEYOND, high * BEYOND),
+        Some((low, high)) if low < high => (2.0 * low - high, 2.0 * high - low),
         _ => (f64::NEG_INFINITY, f64::INFINITY),
     };
-    let shown = values.into_iter().filter(|y| is_shown(*y, &panel.y.scale));
+    let values = panel.series.iter().flat_map(|s| ys(&s.mark));
+    let shown = values.filter(|y| is_shown(*y, is_log));
     range(&panel.y, shown.map(|y| y.clamp(low, high)), air)
-}
-
-/// A tick label that ends at a point, rising towards it.
-fn slanted(svg: &mut String, (x, y): (f64, f64), words: &str) {
-    let (x, y) = (short(x), short(y));
-    let _ = writeln!(
-        svg,
-        "<text class=\"tick\" text-anchor=\"end\" transform=\"translate({x} {y}) rotate(-38)\">{}</text>",
-        escape(words)
-    );
 }

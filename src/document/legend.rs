@@ -1,8 +1,7 @@
 //! The legend above the panels.
 
-use crate::canvas::{Canvas, short, text};
+use crate::canvas::{Canvas, text};
 use crate::chart::{Chart, Mark, Series};
-use std::borrow::Cow;
 use std::fmt::Write as _;
 
 /// Width of a text (pixels), rather too much: that of a wide typeface.
@@ -36,39 +35,32 @@ pub(crate) struct Legend<'a> {
 impl<'a> Legend<'a> {
     pub(crate) fn of(chart: &'a Chart) -> Self {
         let mut entries: Vec<Entry<'a>> = Vec::new();
-        for (panel, series) in chart
-            .panels
-            .iter()
-            .enumerate()
-            .flat_map(|(i, p)| p.series.iter().map(move |s| (i, s)))
-        {
-            if series.name.is_empty() || matches!(series.mark, Mark::Place(..) | Mark::Reading(..))
-            {
-                continue;
-            }
-            match entries.iter_mut().find(|e| e.name == series.name) {
-                Some(entry) => entry.series.push(series),
-                None => entries.push(Entry {
-                    name: &series.name,
-                    panel,
-                    series: vec![series],
-                }),
+        for (panel, of_panel) in chart.panels.iter().enumerate() {
+            for series in &of_panel.series {
+                let is_beside = matches!(series.mark, Mark::Place(..) | Mark::Reading(..));
+                match entries.iter_mut().find(|e| e.name == series.name) {
+                    _ if series.name.is_empty() || is_beside => {}
+                    Some(entry) => entry.series.push(series),
+                    None => entries.push(Entry {
+                        name: &series.name,
+                        panel,
+                        series: vec![series],
+                    }),
+                }
             }
         }
-        let has_stripes =
-            !chart.stripes.1.is_empty() && !chart.is_map && !chart.stripes.0.is_empty();
+        let (name, stripes) = &chart.stripes;
+        let has_stripes = !stripes.is_empty() && !chart.is_map;
         Self {
             entries,
-            stripes: has_stripes.then_some(chart.stripes.0.as_str()),
+            stripes: has_stripes.then_some(name),
         }
     }
 
     /// The number of a name, of which the script knows what to hide.
     pub(crate) fn key(&self, name: &str) -> usize {
-        self.entries
-            .iter()
-            .position(|e| e.name == name)
-            .unwrap_or(self.entries.len())
+        let found = self.entries.iter().position(|e| e.name == name);
+        found.unwrap_or(self.entries.len())
     }
 
     /// Draws what one panel tells, beginning behind `title`, at the height `top`; returns where it ends.
@@ -82,22 +74,23 @@ impl<'a> Legend<'a> {
     ) -> f64 {
         let line = canvas.font + 7.0;
         text(svg, "name", (left, top + canvas.font), "start", title);
-        let stripes = self.stripes.filter(|_| panel == 0);
         if self.entries.len() + usize::from(self.stripes.is_some()) < 2 {
             return top + line;
         }
-        let x = if title.is_empty() {
-            left
-        } else {
-            left + text_width(title, canvas.font) + SPACE
+        let (mut x, mut y) = (left, top);
+        if !title.is_empty() {
+            x += text_width(title, canvas.font) + SPACE;
+        }
+        // the place of the next entry
+        let mut place = |name: &str| {
+            let width = SWATCH + 6.0 + text_width(name, canvas.font);
+            if x > left && x + width > canvas.width {
+                (x, y) = (left, y + line);
+            }
+            x += width + SPACE;
+            (x - width - SPACE, y)
         };
-        let mut pen = Pen {
-            left,
-            x,
-            y: top,
-            line,
-            canvas,
-        };
+        let mut end = top;
         for (k, entry) in self
             .entries
             .iter()
@@ -105,89 +98,55 @@ impl<'a> Legend<'a> {
             .filter(|(_, e)| e.panel == panel)
         {
             let name = fitting(entry.name, canvas);
-            let (x, y) = pen.place(&name);
-            let _ = write!(
-                svg,
-                "<g class=\"key {}\" data-k=\"{k}\">",
-                entry.series[0].colour.class()
-            );
-            entry
-                .series
-                .iter()
-                .for_each(|s| swatch(&s.mark, (x, y + 0.5 * line - 1.0), svg));
+            let (x, y) = place(&name);
+            let class = entry.series[0].colour.class();
+            let _ = write!(svg, "<g class=\"key {class}\" data-k=\"{k}\">");
+            let swatches = entry.series.iter().map(|s| &s.mark);
+            swatches.for_each(|mark| swatch(mark, (x, y + 0.5 * line - 1.0), svg));
             text(svg, "", (x + SWATCH + 6.0, y + canvas.font), "start", &name);
             *svg += "</g>\n";
+            end = y;
         }
-        if let Some(name) = stripes {
-            let (x, y) = pen.place(name);
-            let (px, py) = (short(x), short(y + 0.5 * line - 7.0));
+        if let Some(name) = self.stripes.filter(|_| panel == 0) {
+            let (x, y) = place(name);
             let _ = write!(
                 svg,
-                "<rect class=\"outage\" x=\"{px}\" y=\"{py}\" width=\"{SWATCH}\" height=\"12\"/>"
+                "<rect class=\"outage\" x=\"{x:.1}\" y=\"{:.1}\" width=\"{SWATCH}\" height=\"12\"/>",
+                y + 0.5 * line - 7.0
             );
             text(svg, "", (x + SWATCH + 6.0, y + canvas.font), "start", name);
+            end = y;
         }
-        pen.y + line
+        end + line
     }
 }
 
 /// A name, without its middle if it is wider than the picture: ends tell names apart that begin alike.
-fn fitting<'a>(name: &'a str, canvas: &Canvas) -> Cow<'a, str> {
-    let room = canvas.width - 2.0 * (SWATCH + SPACE);
-    let mut letters: Vec<char> = name.chars().collect();
-    if text_width(name, canvas.font) <= room {
-        return Cow::Borrowed(name);
+fn fitting(name: &str, canvas: &Canvas) -> String {
+    let share = (canvas.width - 2.0 * (SWATCH + SPACE)) / text_width(name, canvas.font);
+    let letters: Vec<char> = name.chars().collect();
+    if share >= 1.0 {
+        return name.to_owned();
     }
-    let mut shown = String::new();
-    while letters.len() > 2 {
-        let middle = letters.len() / 2;
-        letters.remove(middle);
-        let (before, after) = letters.split_at(middle);
-        shown = before.iter().chain(&['…']).chain(after).collect();
-        if text_width(&shown, canvas.font) <= room {
-            break;
-        }
-    }
-    Cow::Owned(shown)
+    let half = (0.5 * share * letters.len() as f64) as usize;
+    let half = half.saturating_sub(1);
+    let (before, after) = (&letters[..half], &letters[letters.len() - half..]);
+    before.iter().chain(&['…']).chain(after).collect()
 }
 
-/// Where the next entry begins.
-struct Pen<'a> {
-    left: f64,
-    x: f64,
-    y: f64,
-    line: f64,
-    canvas: &'a Canvas,
-}
-
-impl Pen<'_> {
-    fn place(&mut self, name: &str) -> (f64, f64) {
-        let width = SWATCH + 6.0 + text_width(name, self.canvas.font);
-        if self.x > self.left && self.x + width > self.canvas.width {
-            (self.x, self.y) = (self.left, self.y + self.line);
-        }
-        let here = (self.x, self.y);
-        self.x += width + SPACE;
-        here
-    }
-}
-
-/// What a mark looks like, in small.
+/// A mark in small.
 fn swatch(mark: &Mark, (x, y): (f64, f64), svg: &mut String) {
-    let square = || format!("M{} {}h{SWATCH}v12h-{SWATCH}Z", short(x), short(y - 6.0));
+    let line = format!("M{x:.1} {y:.1}h{SWATCH}");
+    let square = format!("M{x:.1} {:.1}h{SWATCH}v12h-{SWATCH}Z", y - 6.0);
     let (class, d) = match mark {
-        Mark::Line(_, stroke) => (
-            stroke.class(),
-            format!("M{} {}h{SWATCH}", short(x), short(y)),
-        ),
-        Mark::Level(_) => ("line level", format!("M{} {}h{SWATCH}", short(x), short(y))),
-        Mark::Band(_) | Mark::Zone(..) => ("area", square()),
-        Mark::InnerBand(_) => ("area inner", square()),
-        Mark::Bars(_) => ("bar", square()),
-        Mark::Points(_) | Mark::Place(..) | Mark::Reading(..) => (
-            "dot",
-            format!("M{} {}h0", short(x + 0.5 * SWATCH), short(y)),
-        ),
+        Mark::Line(_, stroke) => (stroke.class(), line),
+        Mark::Level(_) => ("line level", line),
+        Mark::Band(_) | Mark::Zone(..) => ("area", square),
+        Mark::InnerBand(_) => ("area inner", square),
+        Mark::Bars(_) => ("bar", square),
+        Mark::Points(_) | Mark::Place(..) | Mark::Reading(..) => {
+            ("dot", format!("M{:.1} {y:.1}h0", x + 0.5 * SWATCH))
+        }
     };
     let _ = write!(svg, "<path class=\"{class}\" d=\"{d}\"/>");
 }

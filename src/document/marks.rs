@@ -1,30 +1,28 @@
 //! Marks as SVG paths.
 
 use crate::axis::{Ruler, is_shown};
-use crate::canvas::short;
-use crate::chart::{Interval, Mark, Scale, Series};
+use crate::chart::{Interval, Mark, Series};
 use crate::escape::escape;
 use std::fmt::Write as _;
 
 /// Points beyond which each is small.
 const MANY: usize = 150;
 
-/// Rulers and scales of one panel.
-pub(crate) struct Frame<'a> {
+/// Rulers of one panel.
+pub(crate) struct Frame {
     pub(crate) x: Ruler,
     pub(crate) y: Ruler,
-    pub(crate) scales: [&'a Scale; 2],
     /// Points of a line that can be told apart.
     pub(crate) most: usize,
 }
 
-impl Frame<'_> {
-    fn shows(&self, x: f64, y: f64) -> bool {
-        is_shown(x, self.scales[0]) && is_shown(y, self.scales[1])
+impl Frame {
+    pub(crate) fn shows(&self, x: f64, y: f64) -> bool {
+        is_shown(x, self.x.is_log) && is_shown(y, self.y.is_log)
     }
 
     fn point(&self, x: f64, y: f64) -> String {
-        format!("{} {}", short(self.x.at(x)), short(self.y.at(y)))
+        format!("{:.1} {:.1}", self.x.at(x), self.y.at(y))
     }
 
     /// The series as a group of paths.
@@ -54,10 +52,14 @@ impl Frame<'_> {
             }
             Mark::Place(x, y) => path(svg, "dot", &format!("M{}h0", self.point(*x, *y))),
             Mark::Reading(x, y) => {
-                let (left, bottom) = (short(self.x.pixels.0), short(self.y.pixels.0));
-                let (px, py) = (short(self.x.at(*x)), short(self.y.at(*y)));
-                path(svg, "line level", &format!("M{left} {py}H{px}V{bottom}"));
-                path(svg, "dot", &format!("M{px} {py}h0"));
+                let (left, bottom) = (self.x.pixels.0, self.y.pixels.0);
+                let (px, py) = (self.x.at(*x), self.y.at(*y));
+                path(
+                    svg,
+                    "line level",
+                    &format!("M{left:.1} {py:.1}H{px:.1}V{bottom:.1}"),
+                );
+                path(svg, "dot", &format!("M{px:.1} {py:.1}h0"));
             }
         }
         *svg += "</g>\n";
@@ -79,15 +81,12 @@ impl Frame<'_> {
     fn band(&self, points: &[(f64, f64, f64)]) -> String {
         // A line of as many points has the lowest and the highest of every two pixels.
         let points = thinned_band(points, self.most / 2);
-        let is_drawn = |p: &(f64, f64, f64)| {
-            is_shown(p.0, self.scales[0]) && is_shown(p.2, self.scales[1]) && !p.1.is_nan()
-        };
+        let is_drawn = |p: &(f64, f64, f64)| self.shows(p.0, p.2) && !p.1.is_nan();
         let pieces = points
             .split(|p| !is_drawn(p))
             .filter(|piece| !piece.is_empty());
         let closed = |piece: &[(f64, f64, f64)]| {
-            let corner =
-                |x: f64, y: f64| format!("{} {}", short(self.x.at(x)), short(self.y.within(y)));
+            let corner = |x, y| format!("{:.1} {:.1}", self.x.at(x), self.y.within(y));
             let forth = piece.iter().map(|p| corner(p.0, p.2));
             let back = piece.iter().rev().map(|p| corner(p.0, p.1));
             format!("M{}Z", forth.chain(back).collect::<Vec<_>>().join("L"))
@@ -99,9 +98,9 @@ impl Frame<'_> {
         let shown = || points.iter().filter(|p| self.shows(p.x, p.y));
         let with_bar = |p: &&Interval| !(p.low.is_nan() && p.high.is_nan());
         let bar = |p: &Interval| {
-            let [low, high] = [p.low, p.high]
-                .map(|end| short(self.y.within(if end.is_nan() { p.y } else { end })));
-            format!("M{} {low}V{high}", short(self.x.at(p.x)))
+            let [low, high] =
+                [p.low, p.high].map(|end| self.y.within(if end.is_nan() { p.y } else { end }));
+            format!("M{:.1} {low:.1}V{high:.1}", self.x.at(p.x))
         };
         path(
             svg,
@@ -123,9 +122,9 @@ impl Frame<'_> {
     /// As wide as 0.7 of the distance of two names.
     fn bars(&self, bars: &[(f64, f64, f64)]) -> String {
         let bar = |(x, from, to): &(f64, f64, f64)| {
-            let [left, right] = [x - 0.35, x + 0.35].map(|x| short(self.x.at(x)));
-            let [low, high] = [*from, *to].map(|y| short(self.y.within(y)));
-            format!("M{left} {low}H{right}V{high}H{left}Z")
+            let [left, right] = [x - 0.35, x + 0.35].map(|x| self.x.at(x));
+            let [low, high] = [*from, *to].map(|y| self.y.within(y));
+            format!("M{left:.1} {low:.1}H{right:.1}V{high:.1}H{left:.1}Z")
         };
         bars.iter()
             .filter(|(_, from, to)| from != to)
@@ -134,10 +133,10 @@ impl Frame<'_> {
     }
 
     fn span(&self, y: f64) -> String {
-        if !is_shown(y, self.scales[1]) {
+        let (a, b) = self.x.range;
+        if !self.shows(b, y) {
             return String::new();
         }
-        let (a, b) = self.x.range;
         format!("M{}L{}", self.point(a, y), self.point(b, y))
     }
 }
@@ -204,16 +203,15 @@ fn thinned_band(points: &[(f64, f64, f64)], most: usize) -> Vec<(f64, f64, f64)>
 mod tests {
     use super::*;
 
-    fn frame(y: &Scale) -> Frame<'_> {
-        let ruler = |pixels| Ruler {
+    fn frame(is_log: bool) -> Frame {
+        let ruler = |is_log, pixels| Ruler {
             range: (1.0, 11.0),
-            is_log: false,
+            is_log,
             pixels,
         };
         Frame {
-            x: ruler((0.0, 100.0)),
-            y: ruler((100.0, 0.0)),
-            scales: [&Scale::Linear, y],
+            x: ruler(false, (0.0, 100.0)),
+            y: ruler(is_log, (100.0, 0.0)),
             most: 100,
         }
     }
@@ -223,27 +221,30 @@ mod tests {
         let points = [
             (1.0, 1.0),
             (2.0, f64::NAN),
-            (3.0, 2.0),
-            (4.0, 3.0),
+            (3.0, 1.0),
+            (4.0, 11.0),
             (5.0, -1.0),
-            (6.0, 3.0),
+            (6.0, 1.0),
         ];
-        assert_eq!(frame(&Scale::Log).line(&points), "M0 100M20 90L30 80M50 80");
         assert_eq!(
-            frame(&Scale::Linear).line(&points[2..]),
-            "M20 90L30 80L40 120L50 80"
+            frame(true).line(&points),
+            "M0.0 100.0M20.0 100.0L30.0 0.0M50.0 100.0"
+        );
+        assert_eq!(
+            frame(false).line(&points[2..]),
+            "M20.0 100.0L30.0 0.0L40.0 120.0L50.0 100.0"
         );
     }
 
     #[test]
     fn a_band_goes_there_and_back() {
         assert_eq!(
-            frame(&Scale::Linear).band(&[(1.0, 2.0, 3.0), (11.0, 2.0, 30.0)]),
-            "M0 80L100 0L100 90L0 90Z"
+            frame(false).band(&[(1.0, 2.0, 3.0), (11.0, 2.0, 30.0)]),
+            "M0.0 80.0L100.0 0.0L100.0 90.0L0.0 90.0Z"
         );
         assert_eq!(
-            frame(&Scale::Linear).bars(&[(6.0, 1.0, 2.0), (7.0, 2.0, 2.0)]),
-            "M46.5 100H53.5V90H46.5Z"
+            frame(false).bars(&[(6.0, 1.0, 2.0), (7.0, 2.0, 2.0)]),
+            "M46.5 100.0H53.5V90.0H46.5Z"
         );
     }
 

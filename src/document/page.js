@@ -132,7 +132,7 @@
     const [x, y, w, h] = box(plot);
     const [vx, vy, vw, vh] = view(plot);
     const isWhole = plot.getAttribute("viewBox") === plot.dataset.whole;
-    svg.querySelectorAll(".place, .scale").forEach((e) => (e.style.display = isWhole ? "" : "none"));
+    svg.querySelectorAll(".place").forEach((e) => (e.style.display = isWhole ? "" : "none"));
     if (isWhole) return void (old.innerHTML = old._whole);
     const rulers = axes(plot);
     old.innerHTML = "";

@@ -507,7 +507,7 @@ fn wv_prints_the_curves_of_every_signal() {
         "{digest}"
     );
     assert!(
-        all.contains("gyro.x: Allan deviation (rad/s)") && all.contains("run0.csv"),
+        all.contains("gyro.x: Allan deviation (rad/s)") && all.contains("run0"),
         "{all}"
     );
     assert_eq!(text(&["--format", "csv"]).lines().count(), 1 + 4 * 13);

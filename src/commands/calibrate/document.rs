@@ -47,7 +47,24 @@ impl ShownCalibration<'_> {
             (interval, "interval"),
             ("averages of", "averages"),
         ];
-        document.lead(Table::of(&json, "/fits/*/figures/*", &columns));
+        let figures = Table::of(&json, "/fits/*/figures/*", &columns);
+        if self.outcomes.len() > 2 {
+            let columns = [
+                ("fit", "name"),
+                ("N", "figures/N/value"),
+                ("95 %", "figures/N/interval"),
+                ("B", "figures/B/value"),
+                ("K", "figures/K/value"),
+                (
+                    "units",
+                    "{figures/N/unit}, {figures/B/unit}, {figures/K/unit}",
+                ),
+            ];
+            document.lead(Table::of(&json, "/fits/*", &columns));
+            document.table(&figures);
+        } else {
+            document.lead(figures);
+        }
         for (importance, note) in self.notes() {
             document.note(importance, note);
         }

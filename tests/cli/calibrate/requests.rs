@@ -284,7 +284,11 @@ fn what_is_skipped_counts_in_the_advice() {
             .split(before)
             .nth(1)
             .unwrap_or_else(|| panic!("{said}"));
-        rest.split(' ').next().unwrap().parse::<f64>().unwrap()
+        rest.split_whitespace()
+            .next()
+            .unwrap()
+            .parse::<f64>()
+            .unwrap()
     };
     for skip in ["0", "20"] {
         let advised = seconds(&said_with(skip), "--skip-s ");
