@@ -46,8 +46,8 @@ pub struct DatasheetArgs {
 pub enum DatasheetAnswer {
     /// The model.
     Model(Box<ModelFile>),
-    /// The catalogue, as text and as JSON.
-    Catalogue(String, Value),
+    /// The catalogue as JSON.
+    Catalogue(Value),
 }
 
 impl Command for DatasheetArgs {
@@ -67,14 +67,30 @@ impl Command for DatasheetArgs {
 
     fn run(&self, context: &Context<'_>) -> Result<DatasheetAnswer> {
         if self.list {
-            return Ok(DatasheetAnswer::Catalogue(
-                catalogue_text()?,
-                catalogue_json()?,
-            ));
+            return Ok(DatasheetAnswer::Catalogue(catalogue_json()?));
         }
-        let made = self.model()?;
-        made.doubts.iter().for_each(|doubt| context.warn(doubt));
-        made.notes.iter().for_each(|note| context.remark(note));
+        let mut sheet = match (&self.entry, &self.unit) {
+            (Some(path), _) => read(path)?,
+            (None, Some(name)) => named(name)?,
+            (None, None) => Datasheet::default(),
+        };
+        self.figures.over(&mut sheet)?;
+        let made = sheet.model_file(self.rate_hz).map_err(Failure::input)?;
+        if made.file.missing.len() == made.file.model.axes.len() {
+            let failure = Failure::input("no figure is given that makes a noise model");
+            let hint = "give --vrw and --arw, or --unit NAME (nav-sim datasheet --list)";
+            return Err(failure.hint(hint));
+        }
+        let lacking = Sensor::ALL
+            .into_iter()
+            .flat_map(|sensor| lacking(&sheet, sensor));
+        lacking
+            .chain(made.doubts)
+            .for_each(|doubt| context.warn(doubt));
+        let left_out = Sensor::ALL
+            .into_iter()
+            .flat_map(|sensor| left_out(&sheet, sensor));
+        left_out.for_each(|note| context.remark(note));
         context.remark("an assumption, not a calibration");
         Ok(DatasheetAnswer::Model(Box::new(made.file)))
     }
@@ -88,7 +104,7 @@ impl Serialize for DatasheetAnswer {
                 let table: std::result::Result<toml::Table, _> = model_file::to_toml(file).parse();
                 table.map_err(serde::ser::Error::custom)?.serialize(to)
             }
-            Self::Catalogue(_, json) => json.serialize(to),
+            Self::Catalogue(json) => json.serialize(to),
         }
     }
 }
@@ -101,7 +117,7 @@ impl Answer for DatasheetAnswer {
     fn text(&self) -> Option<String> {
         match self {
             Self::Model(_) => None,
-            Self::Catalogue(text, _) => Some(text.clone()),
+            Self::Catalogue(json) => Some(catalogue_text(json)),
         }
     }
 
@@ -199,52 +215,6 @@ impl Figures {
     }
 }
 
-/// The model of a data sheet.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct DatasheetModel {
-    /// The model.
-    pub file: ModelFile,
-    /// What the figures lack, what had to be assumed, what does not fit together.
-    pub doubts: Vec<String>,
-    /// Figures that a model does not hold.
-    pub notes: Vec<String>,
-}
-
-impl DatasheetArgs {
-    /// The model that the figures are assumed to mean.
-    ///
-    /// # Errors
-    /// An entry that cannot be read or does not exist, a figure that cannot be read, no figure at all.
-    pub fn model(&self) -> Result<DatasheetModel> {
-        let mut sheet = match (&self.entry, &self.unit) {
-            (Some(path), _) => read(path)?,
-            (None, Some(name)) => named(name)?,
-            (None, None) => Datasheet::default(),
-        };
-        self.figures.over(&mut sheet)?;
-        let made = sheet.model_file(self.rate_hz).map_err(Failure::input)?;
-        if made.file.missing.len() == made.file.model.axes.len() {
-            let failure = Failure::input("no figure is given that makes a noise model");
-            return Err(
-                failure.hint("give --vrw and --arw, or --unit NAME (nav-sim datasheet --list)")
-            );
-        }
-        let doubts = Sensor::ALL
-            .into_iter()
-            .flat_map(|sensor| lacking(&sheet, sensor))
-            .chain(made.doubts);
-        let notes = Sensor::ALL
-            .into_iter()
-            .flat_map(|sensor| left_out(&sheet, sensor));
-        Ok(DatasheetModel {
-            file: made.file,
-            doubts: doubts.collect(),
-            notes: notes.collect(),
-        })
-    }
-}
-
 fn named(name: &str) -> Result<Datasheet> {
     if let Some(sheet) = catalogued(name) {
         return sheet;
@@ -258,33 +228,20 @@ fn named(name: &str) -> Result<Datasheet> {
     ))
 }
 
-fn lacking(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
-    let name = sensor.name();
-    let flag = if sensor == Sensor::Accel {
-        "--vrw"
-    } else {
-        "--arw"
+fn lacking(sheet: &Datasheet, sensor: Sensor) -> impl Iterator<Item = String> {
+    let flag = match sensor {
+        Sensor::Accel => "vrw",
+        Sensor::Gyro => "arw",
     };
     let figures = [
-        (
-            Figure::Noise,
-            format!("{name}: no white noise is given ({flag})"),
-        ),
-        (
-            Figure::Bias,
-            format!("{name}: no bias instability is given (--{name}-bias)"),
-        ),
-        (
-            Figure::TurnOn,
-            format!("{name}: no turn-on bias is given (--{name}-turn-on)"),
-        ),
+        (Figure::Noise, "white noise", flag.to_owned()),
+        (Figure::Bias, "bias instability", format!("{sensor}-bias")),
+        (Figure::TurnOn, "turn-on bias", format!("{sensor}-turn-on")),
     ];
-    let is_lacking = |figure: &Figure| sheet.value(sensor, *figure).is_none();
-    figures
+    let lacking = figures
         .into_iter()
-        .filter(|(figure, _)| is_lacking(figure))
-        .map(|(_, text)| text)
-        .collect()
+        .filter(move |f| sheet.value(sensor, f.0).is_none());
+    lacking.map(move |(_, name, flag)| format!("{sensor}: no {name} is given (--{flag})"))
 }
 
 fn left_out(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
@@ -298,47 +255,37 @@ fn left_out(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
     offset.into_iter().chain(scale).collect()
 }
 
-fn units() -> std::result::Result<Vec<(&'static str, Datasheet)>, Failure> {
-    let units = CATALOGUE
-        .iter()
-        .filter_map(|(name, _)| Some((*name, catalogued(name)?)));
-    units.map(|(name, sheet)| Ok((name, sheet?))).collect()
-}
-
-/// Name, class, and the figures of both sensors as given.
-///
-/// # Errors
-/// An entry that cannot be read.
-fn catalogue_text() -> std::result::Result<String, Failure> {
+/// Unit, class and name, and the figures of both sensors as given.
+fn catalogue_text(catalogue: &Value) -> String {
+    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     let mut lines = Vec::new();
-    for (unit, sheet) in units()? {
-        let (class, name) = (sheet.class.as_deref(), sheet.name.as_deref());
-        lines.push(format!(
-            "{unit:<12} {:<12} {}",
-            class.unwrap_or_default(),
-            name.unwrap_or_default()
-        ));
+    for unit in catalogue["units"].as_array().into_iter().flatten() {
+        let [name, class, long_name] = ["unit", "class", "name"].map(|key| text(&unit[key]));
+        lines.push(format!("{name:<12} {class:<12} {long_name}"));
         for sensor in Sensor::ALL {
-            let of_sensor = sheet.entries.iter().filter(|e| e.sensor == sensor);
-            let shown: Vec<String> = of_sensor
-                .map(|e| format!("{} {}", e.figure.key(), e.quantity.given))
-                .collect();
-            lines.push(format!("  {:<5} {}", sensor.name(), shown.join(", ")));
+            let figures = unit["figures"].as_array().into_iter().flatten();
+            let own = figures.filter(|figure| figure["sensor"] == sensor.name());
+            let shown = own.map(|f| format!("{} {}", text(&f["figure"]), text(&f["given"])));
+            lines.push(format!(
+                "  {sensor:<5} {}",
+                shown.collect::<Vec<_>>().join(", ")
+            ));
         }
     }
-    Ok(lines.join("\n"))
+    lines.join("\n")
 }
 
-/// The same with the sources of the figures, as JSON.
+/// The catalogue with the sources of the figures.
 ///
 /// # Errors
 /// An entry that cannot be read.
-pub fn catalogue_json() -> std::result::Result<Value, Failure> {
-    let figure = |e: &Entry| json!({ "sensor": e.sensor.name(), "figure": e.figure.key(), "given": e.quantity.given, "source": e.source });
-    let unit = |(unit, sheet): (&str, Datasheet)| {
+pub fn catalogue_json() -> Result<Value> {
+    let figure = |e: &Entry| json!({ "sensor": e.sensor, "figure": e.figure.key(), "given": e.quantity.given, "source": e.source });
+    let unit = |(unit, _): &(&str, _)| {
+        let sheet = named(unit)?;
         let figures: Vec<Value> = sheet.entries.iter().map(figure).collect();
-        json!({ "unit": unit, "name": sheet.name, "class": sheet.class, "figures": figures })
+        Ok(json!({ "unit": unit, "name": sheet.name, "class": sheet.class, "figures": figures }))
     };
-    let units: Vec<Value> = units()?.into_iter().map(unit).collect();
+    let units: Vec<Value> = CATALOGUE.iter().map(unit).collect::<Result<_>>()?;
     Ok(json!({ "schema_version": 1, "units": units }))
 }

@@ -5,7 +5,7 @@ use crate::app::reading::LogRequest;
 use crate::app::{Answer, Command, Context, Result};
 use crate::io::Failure;
 use crate::io::logs::{self, LogOptions};
-use nav_sim_document::{Cell, Document, Importance, Table, Tone, shortest, six_digits};
+use nav_sim_document::{Document, Importance, Table, Tone, six_digits};
 use nav_sim_logs::{Channel, Content, Error, Log};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -124,136 +124,91 @@ fn inspected(
     let (content, units, stamps) = match channel.content {
         _ if channel.messages == 0 => ("other", None, Vec::new()),
         Content::Imu => {
-            let samples = log.imu(topic, options.stamp)?;
-            let stamps = samples
-                .map(|sample| Ok(sample?.stamp_ns))
-                .collect::<std::result::Result<Vec<i64>, Error>>()?;
-            ("imu", Some("m/s², rad/s"), stamps)
+            let samples = log
+                .imu(topic, options.stamp)?
+                .map(|sample| Ok(sample?.stamp_ns));
+            let stamps: std::result::Result<Vec<i64>, Error> = samples.collect();
+            ("imu", Some("m/s², rad/s"), stamps?)
         }
         Content::Fix => {
-            let fixes = log.fixes(topic, options.stamp)?;
-            let stamps = fixes
-                .map(|fix| Ok(fix?.stamp_ns))
-                .collect::<std::result::Result<Vec<i64>, Error>>()?;
-            ("fix", Some("deg, m"), stamps)
+            let fixes = log
+                .fixes(topic, options.stamp)?
+                .map(|fix| Ok(fix?.stamp_ns));
+            let stamps: std::result::Result<Vec<i64>, Error> = fixes.collect();
+            ("fix", Some("deg, m"), stamps?)
         }
         Content::Other => ("other", None, Vec::new()),
     };
     let ends = channel.first_ns.zip(channel.last_ns);
-    let span_s = ends.map_or(0.0, |(first, last)| {
-        last.saturating_sub(first) as f64 * 1e-9
-    });
+    let span_ns = ends.map_or(0, |(first, last)| last.saturating_sub(first));
+    let span_s = span_ns as f64 * 1e-9;
     let by_span = (span_s > 0.0).then(|| channel.messages.saturating_sub(1) as f64 / span_s);
-    let steps = Steps::of(&stamps);
+    let steps = steps(&stamps);
     Ok(InspectedChannel {
         topic: channel.topic.clone(),
         type_name: channel.type_name.clone(),
         content,
         messages: channel.messages,
         span_s,
-        rate_hz: steps
-            .as_ref()
-            .map(|steps| six_digits(1.0 / steps.median_s))
-            .or(by_span),
-        gaps: steps.as_ref().map(|steps| steps.gaps),
-        longest_step_s: steps.as_ref().map(|steps| steps.longest_s),
-        jitter_s: steps.as_ref().map(|steps| steps.jitter_s),
+        rate_hz: steps.map(|steps| six_digits(1.0 / steps.0)).or(by_span),
+        gaps: steps.map(|steps| steps.1),
+        longest_step_s: steps.map(|steps| steps.2),
+        jitter_s: steps.map(|steps| steps.3),
         units,
     })
 }
 
-/// Steps from one stamp to the next.
-struct Steps {
-    median_s: f64,
-    longest_s: f64,
-    jitter_s: f64,
-    gaps: u64,
-}
-
-impl Steps {
-    fn of(stamps_ns: &[i64]) -> Option<Self> {
-        let mut steps: Vec<f64> = stamps_ns
-            .windows(2)
-            .map(|pair| pair[1].saturating_sub(pair[0]) as f64 * 1e-9)
-            .collect();
-        steps.sort_by(f64::total_cmp);
-        let median_s = *steps.get(steps.len() / 2).filter(|step| **step > 0.0)?;
-        let mut off: Vec<f64> = steps.iter().map(|step| (step - median_s).abs()).collect();
-        off.sort_by(f64::total_cmp);
-        Some(Self {
-            median_s,
-            longest_s: *steps.last()?,
-            jitter_s: off[(off.len() * 95).div_ceil(100) - 1],
-            gaps: steps.iter().filter(|step| **step > GAP * median_s).count() as u64,
-        })
-    }
+/// Median of the steps from one stamp to the next (s), gaps, longest step (s) and jitter (s).
+fn steps(stamps_ns: &[i64]) -> Option<(f64, u64, f64, f64)> {
+    let steps = stamps_ns
+        .windows(2)
+        .map(|pair| pair[1].saturating_sub(pair[0]) as f64 * 1e-9);
+    let mut steps: Vec<f64> = steps.collect();
+    steps.sort_by(f64::total_cmp);
+    let median_s = *steps.get(steps.len() / 2).filter(|step| **step > 0.0)?;
+    let mut off: Vec<f64> = steps.iter().map(|step| (step - median_s).abs()).collect();
+    off.sort_by(f64::total_cmp);
+    let gaps = steps.iter().filter(|step| **step > GAP * median_s).count() as u64;
+    Some((
+        median_s,
+        gaps,
+        *steps.last()?,
+        off[(off.len() * 95).div_ceil(100) - 1],
+    ))
 }
 
 impl Answer for Inspection {
     fn document(&self) -> Document {
-        let of = |content: &str| {
-            let topics = self
-                .channels
-                .iter()
-                .filter(|c| c.content == content)
-                .map(|c| c.topic.as_str());
-            topics.collect::<Vec<_>>().join(", ")
+        let named = |content: &str| {
+            let own = self.channels.iter().filter(|c| c.content == content);
+            let topics: Vec<&str> = own.map(|c| c.topic.as_str()).collect();
+            match topics.is_empty() {
+                true => "none".to_owned(),
+                false => topics.join(", "),
+            }
         };
-        let named = |name: &str, topics: String| {
-            format!(
-                "{name} {}",
-                if topics.is_empty() { "none" } else { &topics }
-            )
-        };
-        let topics = [named("IMU", of("imu")), named("GNSS", of("fix"))].join("; ");
-        let line = format!("{}: {}; {topics}", self.file, self.format);
-        let tone = if self.damage.is_some() {
-            Tone::Doubtful
-        } else {
-            Tone::Good
+        let (imu, fix) = (named("imu"), named("fix"));
+        let line = format!("{}: {}; IMU {imu}; GNSS {fix}", self.file, self.format);
+        let tone = match self.damage {
+            Some(_) => Tone::Doubtful,
+            None => Tone::Good,
         };
         let mut document = Document::new("Contents of a log", tone, [line]);
-        let head = [
-            "channel",
-            "type",
-            "messages",
-            "span (s)",
-            "rate (Hz)",
-            "gaps",
-            "jitter (s)",
-            "units",
+        let columns = [
+            ("channel", "topic"),
+            ("type", "type"),
+            ("content", "content"),
+            ("messages", "messages"),
+            ("span (s)", "span_s"),
+            ("rate (Hz)", "rate_hz"),
+            ("gaps", "gaps"),
+            ("jitter (s)", "jitter_s"),
+            ("units", "units"),
         ];
-        let mut table = Table::new(head);
-        let rank = |channel: &InspectedChannel| {
-            ["imu", "fix", "other"]
-                .iter()
-                .position(|c| *c == channel.content)
-        };
-        let mut ranked: Vec<(usize, &InspectedChannel)> =
-            self.channels.iter().enumerate().collect();
-        ranked.sort_by_key(|(_, channel)| rank(channel));
-        for (k, channel) in ranked {
-            let number = |value: Option<f64>, key: &str| {
-                value.map_or(Cell::from("–"), |value| {
-                    Cell::number(value, &format!("/channels/{k}/{key}"))
-                })
-            };
-            let figures = |text: Option<String>| text.map_or(Cell::from("–"), Cell::figures);
-            table.row(vec![
-                channel.topic.as_str().into(),
-                channel.type_name.as_str().into(),
-                Cell::figures(channel.messages.to_string()),
-                number(Some(channel.span_s), "span_s"),
-                figures(channel.rate_hz.map(|rate_hz| shortest(six_digits(rate_hz)))),
-                figures(channel.gaps.map(|gaps| gaps.to_string())),
-                number(channel.jitter_s, "jitter_s"),
-                channel.units.unwrap_or("–").into(),
-            ]);
+        document.lead(Table::of(self, "/channels/*", &columns));
+        if let Some(damage) = &self.damage {
+            document.note(Importance::Warning, damage.as_str());
         }
-        document.lead(table);
-        self.damage
-            .iter()
-            .for_each(|damage| document.note(Importance::Warning, damage.as_str()));
         document
     }
 }

@@ -551,38 +551,51 @@ fn without_interval(outcome: &Outcome) -> impl Iterator<Item = String> {
         .filter_map(move |i| undetermined(i, &labels))
 }
 
-/// A remark on a fit.
+/// A note on a fit.
 fn note_line(note: &Note, outcome: &Outcome) -> String {
     let labels = outcome.fit.composite.labels();
     let named = |of| outcome.fit.composite.name_of(of);
-    match note {
-        Note::AxesDiffer => outcome.axes_differ.map_or_else(String::new, |a| {
-            let (ratio, largest, smallest) = (readable(a.ratio), a.largest.name(), a.smallest.name());
-            format!("axes differ: {largest} has up to {ratio} times the wavelet variance of {smallest}; --pool axes fits each")
-        }),
-        Note::LeftOut([first, last]) => format!(
-            "scales {} to {} are not fitted: too many outliers",
-            duration(*first),
-            duration(*last)
+    let indistinct = outcome
+        .inference
+        .as_ref()
+        .and_then(|i| i.indistinct.as_ref());
+    match (note, outcome.axes_differ, indistinct) {
+        (Note::AxesDiffer, Some(a), _) => format!(
+            "axes differ: {} has up to {} times the wavelet variance of {}; --pool axes fits each",
+            a.largest,
+            readable(a.ratio),
+            a.smallest
         ),
-        Note::Indistinct => {
-            let simpler = outcome.inference.as_ref().and_then(|i| i.indistinct.as_ref());
-            simpler.map_or_else(String::new, |i| {
-                format!("{} describes the curve as well (p = {:.2})", i.spec, i.p_value)
-            })
+        (Note::Indistinct, _, Some(i)) => {
+            format!(
+                "{} describes the curve as well (p = {:.2})",
+                i.spec, i.p_value
+            )
         }
-        Note::Wide(of, Some(factor)) => format!("{} is known to a factor of {} only", named(*of), readable(*factor)),
-        Note::Wide(of, None) => format!("{} may be zero", named(*of)),
-        Note::Zero(process) => format!("{} is zero: not seen in these data", labels[*process]),
-        Note::LikeWhite(process, time_s) => {
-            format!("{}: correlation time {} is below a sample, as of white noise", labels[*process], duration(*time_s))
+        (Note::AxesDiffer | Note::Indistinct, ..) => String::new(),
+        (Note::LeftOut(ends), ..) => {
+            let scales = ends.map(duration).join(" to ");
+            format!("scales {scales} are not fitted: too many outliers")
         }
-        Note::LikeWalk(process, time_s, longest_s) => format!(
-            "{}: correlation time {} is not identifiable from scales up to {}",
-            labels[*process],
-            duration(*time_s),
-            duration(*longest_s)
-        ),
+        (Note::Wide(of, Some(factor)), ..) => {
+            format!(
+                "{} is known to a factor of {} only",
+                named(*of),
+                readable(*factor)
+            )
+        }
+        (Note::Wide(of, None), ..) => format!("{} may be zero", named(*of)),
+        (Note::Zero(process), ..) => {
+            format!("{} is zero: not seen in these data", labels[*process])
+        }
+        (Note::LikeWhite(process, time_s), ..) => {
+            let (label, time) = (&labels[*process], duration(*time_s));
+            format!("{label}: correlation time {time} is below a sample, as of white noise")
+        }
+        (Note::LikeWalk(process, time_s, longest_s), ..) => {
+            let (label, [time, to]) = (&labels[*process], [*time_s, *longest_s].map(duration));
+            format!("{label}: correlation time {time} is not identifiable from scales up to {to}")
+        }
     }
 }
 
@@ -609,48 +622,38 @@ fn undetermined(interval: &ParameterInterval, labels: &[String]) -> Option<Strin
     ))
 }
 
-/// Remarks on the recordings of a sensor: on those that are abnormal, on what all have in common.
-pub(super) fn recording_notes(
+/// Notes on the recordings of a sensor: on those that are abnormal, on what all have in common.
+fn recording_notes(
     sensor: Sensor,
     outcomes: &[&Outcome],
     diagnoses: &[Diagnosis],
     settings: &Settings,
 ) -> Vec<String> {
     let own: Vec<&Diagnosis> = diagnoses.iter().filter(|d| d.sensor == sensor).collect();
-    let Some(first) = own.first() else {
-        return Vec::new();
-    };
-    let mut notes = Vec::new();
     let abnormal = own.iter().filter(|d| d.verdict == Verdict::Noise).count();
-    if 2 * abnormal >= own.len() {
+    let mut notes = Vec::new();
+    if abnormal > 0 && 2 * abnormal >= own.len() {
         notes.push(
             "half of the recordings or more are abnormal: there is no majority to trust".to_owned(),
         );
     } else if abnormal > 0 {
         notes.extend(trim_note(sensor, abnormal, outcomes, settings));
     }
-    let ends = |tau_s: &[f64]| {
-        format!(
-            "{} to {}",
-            duration(tau_s[0]),
-            duration(tau_s[tau_s.len() - 1])
-        )
-    };
-    for found in &first.common {
-        let from_to = || ends(&found.tau_s);
+    for found in own.first().iter().flat_map(|d| &d.common) {
+        let ends = [found.tau_s.first(), found.tau_s.last()];
+        let from_to = ends
+            .map(|end| end.map_or_else(String::new, |s| duration(*s)))
+            .join(" to ");
         let size = percent(found.size);
         notes.push(match found.cause {
             CommonCause::Outliers => format!(
-                "outliers in most recordings: they add up to {size} to the wavelet variance, from {}; awv has them",
-                from_to()
+                "outliers in most recordings: they add up to {size} to the wavelet variance, from {from_to}; awv has them"
             ),
             CommonCause::GaussianQuantization => format!(
-                "QN is Gaussian from {}: robust estimators read it up to {size} too low; use awv",
-                from_to()
+                "QN is Gaussian from {from_to}: robust estimators read it up to {size} too low; use awv"
             ),
             CommonCause::CoarseSteps => format!(
-                "quantisation steps are as large as the noise from {}: without outliers use awv",
-                from_to()
+                "quantisation steps are as large as the noise from {from_to}: without outliers use awv"
             ),
             CommonCause::Drift => format!(
                 "all recordings drift alike ({} {:+.2e} {}/h): add DR, or warm up longer",
@@ -663,41 +666,40 @@ pub(super) fn recording_notes(
     notes
 }
 
-/// Whether the estimators leave so many abnormal recordings out; none where DR-AWV ran and does.
+/// The advice where estimators do not leave out so many abnormal recordings.
 fn trim_note(
     sensor: Sensor,
     abnormal: usize,
     outcomes: &[&Outcome],
     settings: &Settings,
 ) -> Option<String> {
+    if !settings.estimators.contains(&Estimator::DrAwv) {
+        let advice =
+            "the model includes the abnormal recordings: --estimator dr-awv leaves them out";
+        return Some(advice.to_owned());
+    }
     let own = outcomes
         .iter()
         .filter(|o| o.scope.sensor == sensor && o.recordings > 0);
     let fit = own.min_by_key(|o| o.replicates)?;
     // Pooled, a recording has a signal for each axis.
     let needed = abnormal * fit.replicates.div_ceil(fit.recordings);
-    if !settings.estimators.contains(&Estimator::DrAwv) {
-        return Some(
-            "the model includes the abnormal recordings: --estimator dr-awv leaves them out"
-                .to_owned(),
-        );
-    }
     let trim = settings.trim.count(fit.replicates);
-    (trim < needed).then(|| {
-        format!("a trim of {trim} does not leave out the abnormal recordings: --trim {needed}")
-    })
+    let advice =
+        format!("a trim of {trim} does not leave out the abnormal recordings: --trim {needed}");
+    (trim < needed).then_some(advice)
 }
 
-/// What follows from the means of one sensor, without its name.
-pub(crate) fn turn_on_remark(found: &TurnOnSpread) -> String {
-    let unit = found.sensor.unit();
-    let spread = format!("{} {unit}", readable(found.spread()));
+/// The finding about the means of one sensor, without its name.
+pub(super) fn turn_on_remark(found: &TurnOnSpread) -> String {
+    let spread = format!("{} {}", readable(found.spread()), found.sensor.unit());
     match found.finding {
-        TurnOnFinding::Seen => format!(
-            "turn-on bias {spread} ± {:.0} % from the means of {} recordings, stored as [turn_on]",
-            100.0 * found.relative_error(),
-            found.recordings()
-        ),
+        TurnOnFinding::Seen => {
+            let (error, recordings) = (percent(found.relative_error()), found.recordings());
+            format!(
+                "turn-on bias {spread} ± {error} from the means of {recordings} recordings, stored as [turn_on]"
+            )
+        }
         TurnOnFinding::WithinNoise => {
             format!("no turn-on bias seen: the recordings' means scatter by {spread}")
         }
@@ -711,52 +713,27 @@ pub(crate) fn turn_on_remark(found: &TurnOnSpread) -> String {
 }
 
 /// The reasons of a choice.
-pub(crate) fn reasons(ranking: &Ranking, rate_hz: f64) -> Vec<String> {
-    let Ranking {
-        candidates,
-        chosen,
-        too_simple,
-        ..
-    } = ranking;
-    let (best, taken) = (&candidates[0], &candidates[*chosen]);
+pub(super) fn reasons(ranking: &Ranking, rate_hz: f64) -> Vec<String> {
+    let (best, taken) = (&ranking.candidates[0], &ranking.candidates[ranking.chosen]);
     let wvic = |c: &Candidate| format!("{} {:.4}", c.spec, c.wvic());
+    let (name, pair) = (&taken.spec, format!("{}, {}", wvic(taken), wvic(best)));
     let mut lines = vec![match taken.p_value {
         None if taken.spec == best.spec => {
-            format!(
-                "{} has the least WVIC, nothing simpler fits as well",
-                best.spec
-            )
+            format!("{name} has the least WVIC, nothing simpler fits as well")
         }
-        None => format!(
-            "{} has the least WVIC that the J-test accepts ({}, {})",
-            taken.spec,
-            wvic(taken),
-            wvic(best)
-        ),
-        Some(p) => format!(
-            "{} fits as well as the least WVIC (p = {p:.2}; {}, {})",
-            taken.spec,
-            wvic(taken),
-            wvic(best)
-        ),
+        None => format!("{name} has the least WVIC that the J-test accepts ({pair})"),
+        Some(p) => format!("{name} fits as well as the least WVIC (p = {p:.2}; {pair})"),
     }];
-    let rejected = candidates
-        .iter()
-        .filter(|c| c.spec != taken.spec && c.is_rejected());
-    lines.extend(rejected.map(|c| {
-        format!(
-            "the J-test rejects {} (p = {:.3})",
-            c.spec,
-            c.j_p_value.unwrap_or(f64::NAN)
-        )
-    }));
     if taken.is_rejected() {
         lines.push("the J-test rejects every candidate".to_owned());
     }
-    lines.extend(too_simple.iter().map(|simple| {
-        let (share, at) = (100.0 * simple.share, duration(tau_s(simple.level, rate_hz)));
+    lines.extend(ranking.too_simple.iter().map(|simple| {
+        let (share, at) = (
+            percent(simple.share),
+            duration(tau_s(simple.level, rate_hz)),
+        );
         format!(
-            "{} is too simple (p ≤ {:.3}): {share:.0} % of the difference is at {at}",
+            "{} is too simple (p ≤ {:.3}): {share} of the difference is at {at}",
             simple.spec, simple.p_value
         )
     }));

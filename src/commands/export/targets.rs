@@ -3,8 +3,7 @@
 //! `{gyro.N deg/sqrt(h)}` is white noise in that unit. A placeholder is `{QUANTITY [UNIT] [in LOW..HIGH] [else TEXT] [as KEY]}`;
 //! those with a unit are the entries of the file, named by the first word of their line or by `as`. Quantities are those of
 //! [`Export::quantity`], with `^2`, `*f`, `*sqrt(f)`, `*sqrt(2f)` or `/sqrt(SECONDS)` behind them; `in` clamps to the documented
-//! range, `else` stands for what is not finite. `{=}` repeats the last value, `{unit}` its unit, `{outside}` what its range does
-//! not hold; `{head OPEN|CLOSE}` is the head of comments.
+//! range, `else` stands for what is not finite. `{=}` repeats the last value, `{unit}` its unit; `{head OPEN|CLOSE}` is the head of comments.
 
 use super::{Entry, Export, SensorExport};
 use nav_sim_navigation::ekf::FilterStates;
@@ -116,10 +115,10 @@ lio_sam:
         template: "{head # |}
 # Keys and units: FAST-LIO2 and FAST-LIVO2, config/*.yaml; paste in the place of the same keys
 mapping:
-    acc_cov: {accel.N^2*f (m/s^2)^2}  # {unit}; N^2 f, of a sample at {f} Hz{shipped 0.1}
-    gyr_cov: {gyro.N^2*f (rad/s)^2}  # {unit}; N^2 f, of a sample at {f} Hz{shipped 0.1}
-    b_acc_cov: {accel.K^2*f (m/s^3)^2}  # {unit}; K^2 f, of a sample at {f} Hz{shipped 0.0001}
-    b_gyr_cov: {gyro.K^2*f (rad/s^2)^2}  # {unit}; K^2 f, of a sample at {f} Hz{shipped 0.0001}",
+    acc_cov: {accel.N^2*f (m/s^2)^2}  # {unit}; N^2 f, of a sample at {f} Hz
+    gyr_cov: {gyro.N^2*f (rad/s)^2}  # {unit}; N^2 f, of a sample at {f} Hz
+    b_acc_cov: {accel.K^2*f (m/s^3)^2}  # {unit}; K^2 f, of a sample at {f} Hz
+    b_gyr_cov: {gyro.K^2*f (rad/s^2)^2}  # {unit}; K^2 f, of a sample at {f} Hz",
         ..WALK
     },
     // The nine numbers of the message: the variance of a sample's white noise, N²f. What moves slowly is no noise of a sample, and
@@ -141,10 +140,10 @@ linear_acceleration_covariance: [{accel.N^2*f (m/s^2)^2}, 0.0, 0.0, 0.0, {=}, 0.
         vibrates: true,
         template: "{head # |}
 # Keys and units: PX4 parameter reference, group EKF2
-param set EKF2_ACC_NOISE {accel.N/sqrt(0.01) m/s^2 in 0.01..1 as EKF2_ACC_NOISE}  # {unit}; N/sqrt(dt), white noise, dt = 0.01 s (EKF2_PREDICT_US = 10000), range 0.01 to 1{outside}
-param set EKF2_GYR_NOISE {gyro.N/sqrt(0.01) rad/s in 0.0001..0.1 as EKF2_GYR_NOISE}  # {unit}; N/sqrt(dt), white noise, dt = 0.01 s (EKF2_PREDICT_US = 10000), range 0.0001 to 0.1{outside}
-param set EKF2_ACC_B_NOISE {accel.K/sqrt(0.01) m/s^3 in 0..0.01 as EKF2_ACC_B_NOISE}  # {unit}; K/sqrt(dt), bias, dt = 0.01 s (EKF2_PREDICT_US = 10000), range 0 to 0.01{outside}
-param set EKF2_GYR_B_NOISE {gyro.K/sqrt(0.01) rad/s^2 in 0..0.01 as EKF2_GYR_B_NOISE}  # {unit}; K/sqrt(dt), bias, dt = 0.01 s (EKF2_PREDICT_US = 10000), range 0 to 0.01{outside}",
+param set EKF2_ACC_NOISE {accel.N/sqrt(0.01) m/s^2 in 0.01..1 as EKF2_ACC_NOISE}  # {unit}; N/sqrt(dt), white noise, dt = 0.01 s (EKF2_PREDICT_US = 10000), range 0.01 to 1
+param set EKF2_GYR_NOISE {gyro.N/sqrt(0.01) rad/s in 0.0001..0.1 as EKF2_GYR_NOISE}  # {unit}; N/sqrt(dt), white noise, dt = 0.01 s (EKF2_PREDICT_US = 10000), range 0.0001 to 0.1
+param set EKF2_ACC_B_NOISE {accel.K/sqrt(0.01) m/s^3 in 0..0.01 as EKF2_ACC_B_NOISE}  # {unit}; K/sqrt(dt), bias, dt = 0.01 s (EKF2_PREDICT_US = 10000), range 0 to 0.01
+param set EKF2_GYR_B_NOISE {gyro.K/sqrt(0.01) rad/s^2 in 0..0.01 as EKF2_GYR_B_NOISE}  # {unit}; K/sqrt(dt), bias, dt = 0.01 s (EKF2_PREDICT_US = 10000), range 0 to 0.01",
         ..WALK
     },
     // EKF3 adds (dt·noise)² to velocity and angle and (dt²·bias noise)² to biases of increments in a step of dt: N/√dt and K/√dt as
@@ -156,13 +155,13 @@ param set EKF2_GYR_B_NOISE {gyro.K/sqrt(0.01) rad/s^2 in 0..0.01 as EKF2_GYR_B_N
         template: "{head # |}
 # Keys and units: ArduPilot, complete parameter list, EK3_
 EK3_ACC_P_NSE,{accel.N/sqrt(0.012) m/s^2 in 0.01..1}
-# {unit}; N/sqrt(dt), white noise, dt = 0.012 s (EKF_TARGET_DT = 0.012), range 0.01 to 1{outside}
+# {unit}; N/sqrt(dt), white noise, dt = 0.012 s (EKF_TARGET_DT = 0.012), range 0.01 to 1
 EK3_GYRO_P_NSE,{gyro.N/sqrt(0.012) rad/s in 0.0001..0.1}
-# {unit}; N/sqrt(dt), white noise, dt = 0.012 s (EKF_TARGET_DT = 0.012), range 0.0001 to 0.1{outside}
+# {unit}; N/sqrt(dt), white noise, dt = 0.012 s (EKF_TARGET_DT = 0.012), range 0.0001 to 0.1
 EK3_ABIAS_P_NSE,{accel.K/sqrt(0.012) m/s^3 in 0.00001..0.02}
-# {unit}; K/sqrt(dt), bias, dt = 0.012 s (EKF_TARGET_DT = 0.012), range 0.00001 to 0.02{outside}
+# {unit}; K/sqrt(dt), bias, dt = 0.012 s (EKF_TARGET_DT = 0.012), range 0.00001 to 0.02
 EK3_GBIAS_P_NSE,{gyro.K/sqrt(0.012) rad/s^2 in 0.00001..0.001}
-# {unit}; K/sqrt(dt), bias, dt = 0.012 s (EKF_TARGET_DT = 0.012), range 0.00001 to 0.001{outside}",
+# {unit}; K/sqrt(dt), bias, dt = 0.012 s (EKF_TARGET_DT = 0.012), range 0.00001 to 0.001",
         ..WALK
     },
     // White noise per √h and Gauss-Markov biases of one correlation time (https://github.com/i2Nav-WHU/KF-GINS,
@@ -448,34 +447,13 @@ impl Export {
                         line += entry.unit;
                         meaning = Some(line.len());
                     }
-                    (
-                        "outside",
-                        Some(Entry {
-                            wanted: Some(wanted),
-                            ..
-                        }),
-                    ) => {
-                        let wanted = number(*wanted);
-                        line += &format!("; the model says {wanted}, outside the documented range");
-                    }
-                    ("shipped", Some(entry)) if entry.value > 0.0 => {
-                        let times = (argument.parse().unwrap_or(f64::NAN) / entry.value).sqrt();
-                        let times = nav_sim_document::readable(times);
-                        line += &format!(
-                            "; the shipped {argument} is {times} times its standard deviation"
-                        );
-                    }
                     ("accel.unstated" | "gyro.unstated", _) => {
-                        let is_stated = self.sensors[usize::from(name.starts_with('g'))]
-                            .turn_on
-                            .is_some();
-                        line += if is_stated {
-                            ""
-                        } else {
-                            "; the model states no turn-on bias"
-                        };
+                        let sensor = &self.sensors[usize::from(name.starts_with('g'))];
+                        if sensor.turn_on.is_none() {
+                            line += "; the model states no turn-on bias";
+                        }
                     }
-                    ("outside" | "shipped" | "unit", _) => {}
+                    ("unit", _) => {}
                     _ => {
                         let (shown, entry) = self.value(name, argument, &line);
                         line += &shown;

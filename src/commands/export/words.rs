@@ -1,6 +1,6 @@
 //! Head of an exported file, its warnings and its JSON.
 
-use super::{Export, SensorExport};
+use super::{Entry, Export, SensorExport, Settings};
 use nav_sim_calibration::percent;
 use nav_sim_document::readable;
 use nav_sim_signal::imu::Sensor;
@@ -37,8 +37,8 @@ impl Quantity {
                 "deg/h/sqrt(h)",
                 ROOT_HOUR / DEG_PER_HOUR,
             ),
-            (Self::Bias, Sensor::Accel) => (Sensor::Accel.unit(), "ug", 1e6 / STANDARD_GRAVITY),
-            (Self::Bias, Sensor::Gyro) => (Sensor::Gyro.unit(), "deg/h", 1.0 / DEG_PER_HOUR),
+            (Self::Bias, Sensor::Accel) => ("m/s²", "ug", 1e6 / STANDARD_GRAVITY),
+            (Self::Bias, Sensor::Gyro) => ("rad/s", "deg/h", 1.0 / DEG_PER_HOUR),
         }
     }
 
@@ -50,7 +50,7 @@ impl Quantity {
 
     /// As text in the unit of data sheets.
     fn text(self, x: f64, sensor: Sensor) -> String {
-        let (unit, factor) = self.sheet(sensor);
+        let (_, unit, factor) = self.units(sensor);
         format!("{} {unit}", readable(x * factor))
     }
 
@@ -92,18 +92,14 @@ impl Export {
 
     /// Warnings before pasting, the most important first.
     pub(crate) fn doubts(&self) -> Vec<String> {
-        let misfit = self
-            .settings
-            .misfit
-            .iter()
-            .map(|misfit| format!("the model {misfit}"));
-        let mut doubts: Vec<String> = misfit.collect();
+        let misfit = self.settings.misfit.iter();
+        let mut doubts: Vec<String> = misfit.map(|misfit| format!("the model {misfit}")).collect();
         for s in &self.sensors {
             let own = s.doubts(self.settings.policy).into_iter();
             doubts.extend(own.map(|doubt| format!("{}: {doubt}", s.sensor.name())));
         }
         doubts.extend(self.entries().iter().filter_map(|e| {
-            let (key, value, wanted) = (&e.key, e.value, e.wanted?);
+            let (Entry { key, value, .. }, wanted) = (e, e.wanted?);
             Some(format!(
                 "{key} is {value:.3e}, the end of its range; the model says {wanted:.3e}"
             ))
@@ -118,21 +114,19 @@ impl Export {
 
     /// As a JSON document.
     pub(crate) fn json(&self, model: &str) -> Value {
-        let horizon = self.settings.horizon;
-        let sensors: Map<String, Value> = self
-            .sensors
-            .iter()
-            .map(|s| (s.sensor.name().to_owned(), s.json()))
-            .collect();
+        let Settings {
+            horizon, policy, ..
+        } = &self.settings;
+        let [accel, gyro] = self.sensors.each_ref().map(SensorExport::json);
         json!({
             "schema_version": 1,
             "target": self.target.name,
             "model": model,
             "rate_hz": self.rate_hz,
-            "policy": self.settings.policy.name(),
+            "policy": policy.name(),
             "horizon_s": [horizon.from_s, horizon.to_s],
             "entries": self.entries(),
-            "sensors": sensors,
+            "sensors": { "accel": accel, "gyro": gyro },
             "warnings": self.doubts(),
         })
     }
@@ -152,17 +146,18 @@ impl SensorExport {
         if walk <= 0.0 && markov.is_none_or(|m| m.sigma <= 0.0) {
             doubts.push("K is 0: a filter will hold its bias estimate for certain".to_owned());
         }
-        let off = |Ratio { ratio, tau_s }: Ratio, trust: &str| {
-            let at = seconds(tau_s);
-            format!(
-                "{ratio:.2} times the model's Allan deviation at {at}: trusted too {trust} there"
-            )
-        };
-        if self.closure.lowest.ratio < 1.0 / TOLERANCE {
-            doubts.push(off(self.closure.lowest, "much"));
-        }
-        if self.closure.highest.ratio > TOLERANCE {
-            doubts.push(off(self.closure.highest, "little"));
+        let (lowest, highest) = (self.closure.lowest, self.closure.highest);
+        let is_far = [lowest.ratio < 1.0 / TOLERANCE, highest.ratio > TOLERANCE];
+        for ((Ratio { ratio, tau_s }, trust), is_far) in [(lowest, "much"), (highest, "little")]
+            .into_iter()
+            .zip(is_far)
+        {
+            if is_far {
+                let at = seconds(tau_s);
+                doubts.push(format!(
+                    "{ratio:.2} times the model's Allan deviation at {at}: trusted too {trust} there"
+                ));
+            }
         }
         if self.left_out.ratio > NOTABLE && policy != Policy::Envelope {
             let (share, at) = (percent(self.left_out.ratio), seconds(self.left_out.tau_s));
@@ -171,19 +166,15 @@ impl SensorExport {
             ));
         }
         let largest = self.axes.iter().map(|(_, _, d)| *d).fold(0.0, f64::max);
-        if self
+        let shares = self
             .axes
             .iter()
-            .any(|(_, _, d)| *d < (1.0 - NOTABLE) * largest)
-        {
-            let ratios: Vec<String> = self
-                .axes
-                .iter()
-                .map(|(c, _, d)| format!("{} {:.2}", c.axis.name(), d / largest))
-                .collect();
-            let ratios = ratios.join(", ");
+            .map(|(channel, _, d)| (channel.axis, d / largest));
+        if shares.clone().any(|(_, share)| share < 1.0 - NOTABLE) {
+            let shares: Vec<String> = shares.map(|(axis, d)| format!("{axis} {d:.2}")).collect();
+            let shares = shares.join(", ");
             doubts.push(format!(
-                "axes differ (Allan deviation at 1 s: {ratios}); the largest is exported"
+                "axes differ (Allan deviation at 1 s: {shares}); the largest is exported"
             ));
         } else if self.axes.len() < 3 {
             doubts.push(format!("the model has {} of three axes", self.axes.len()));
@@ -194,32 +185,25 @@ impl SensorExport {
     /// `N 0.42 deg/sqrt(h), K 12 deg/h/sqrt(h), B 8.3 deg/h at 160 s`.
     fn parameters(&self) -> String {
         let figure = |what: Quantity, x: f64| what.text(x, self.sensor);
-        let Pair {
-            density,
-            walk,
-            markov,
-        } = self.exported;
-        let bias = markov.map_or_else(
-            || format!("K {}", figure(Quantity::Walk, walk)),
-            |m| {
-                format!(
-                    "bias {} with T = {}",
-                    figure(Quantity::Bias, m.sigma),
-                    seconds(m.t_corr_s)
-                )
-            },
-        );
-        let floor = self.largest.minimum.map_or_else(
-            || "B not reached".to_owned(),
-            |m| {
-                format!(
-                    "B {} at {}",
-                    figure(Quantity::Bias, m.bias_instability()),
-                    seconds(m.tau_s)
-                )
-            },
-        );
-        format!("N {}, {bias}, {floor}", figure(Quantity::Density, density))
+        let pair = self.exported;
+        let bias = match pair.markov {
+            None => format!("K {}", figure(Quantity::Walk, pair.walk)),
+            Some(m) => {
+                let sigma = figure(Quantity::Bias, m.sigma);
+                format!("bias {sigma} with T = {}", seconds(m.t_corr_s))
+            }
+        };
+        let floor = match self.largest.minimum {
+            None => "B not reached".to_owned(),
+            Some(m) => {
+                let floor = figure(Quantity::Bias, m.bias_instability());
+                format!("B {floor} at {}", seconds(m.tau_s))
+            }
+        };
+        format!(
+            "N {}, {bias}, {floor}",
+            figure(Quantity::Density, pair.density)
+        )
     }
 
     fn json(&self) -> Value {
