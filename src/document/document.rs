@@ -79,8 +79,6 @@ pub enum Block {
     Code(String),
     /// What few want to see, under a title.
     Folded(String, Vec<Block>),
-    /// What the figures were checked against.
-    Checked(String),
 }
 
 /// A result as a document: title, verdict, blocks in their order, notes in that of their importance.
@@ -184,7 +182,7 @@ impl Document {
 
     /// Adds what the figures were checked against, and to which tolerance.
     pub fn checked(&mut self, words: &str) {
-        self.blocks.push(Block::Checked(words.to_owned()));
+        self.text(&format!("Checked: {words}"));
     }
 
     /// Adds a note behind those of its importance, once.

@@ -46,7 +46,7 @@ pub use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Scale, Series, Size,
 pub use document::{Banner, Block, Document, Importance, Note, Tone};
 pub use escape::{escape, turns};
 pub use names::short_names;
-pub use number::{percent, readable, seconds, shortest, six_digits, squared, window};
+pub use number::{percent, readable, seconds, shortest, six_digits, window};
 pub use picture::{Form, encode, svg};
 pub use table::{Cell, Table};
 pub use terminal::NOTES;

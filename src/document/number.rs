@@ -26,15 +26,6 @@ pub fn window(start_s: f64, end_s: f64) -> String {
     format!("{}–{} s", seconds(start_s), seconds(end_s))
 }
 
-/// The square of a sensor's unit.
-pub fn squared(unit: &str) -> String {
-    match unit {
-        "m/s²" => "m²/s⁴".to_owned(),
-        "rad/s" => "rad²/s²".to_owned(),
-        other => format!("({other})²"),
-    }
-}
-
 /// A share, to one per cent.
 pub fn percent(share: f64) -> String {
     format!("{:.0} %", 100.0 * share)

@@ -90,24 +90,23 @@ fn block(block: &Block, html: &mut String) {
             )
         }
         Block::Table { table, .. } => self::table(table),
-        Block::Charts(charts, caption) => match charts.as_slice() {
-            // The head of a section stands for the title of its first chart.
-            [chart] if html.ends_with(&format!("<h2>{}</h2>\n", escape(&chart.title))) => {
-                drawn(chart, caption)
+        Block::Charts(charts, caption) => {
+            // The head of a section stands for the title of its only chart.
+            let head = |chart: &Chart| format!("<h2>{}</h2>\n", escape(&chart.title));
+            let is_titled = matches!(&charts[..], [only] if html.ends_with(&head(only)));
+            let figures: String = charts
+                .iter()
+                .map(|chart| figure(chart, is_titled))
+                .collect();
+            let caption = match caption.as_str() {
+                "" => String::new(),
+                caption => format!("<figcaption>{}</figcaption>\n", escape(caption)),
+            };
+            match charts.iter().all(|chart| chart.size == Size::Small) {
+                true => format!("<div class=\"charts\">\n{figures}</div>\n{caption}"),
+                false => figures + &caption,
             }
-            [chart] => figure(chart, caption),
-            charts if charts.iter().any(|chart| chart.size != Size::Small) => {
-                let figures: String = charts.iter().map(|chart| figure(chart, "")).collect();
-                figures + &captioned(caption)
-            }
-            charts => {
-                let figures: String = charts.iter().map(|chart| figure(chart, "")).collect();
-                format!(
-                    "<div class=\"charts\">\n{figures}</div>\n{}",
-                    captioned(caption)
-                )
-            }
-        },
+        }
         Block::Links(links) => {
             let link = |(path, name): &(String, String)| {
                 format!(
@@ -122,7 +121,6 @@ fn block(block: &Block, html: &mut String) {
             )
         }
         Block::Code(text) => format!("<pre>{}</pre>\n", escape(text)),
-        Block::Checked(words) => format!("<p class=\"checked\">Checked: {}</p>\n", escape(words)),
         Block::Folded(title, blocks) => {
             let mut inside = String::new();
             blocks.iter().for_each(|b| self::block(b, &mut inside));
@@ -163,36 +161,24 @@ fn table(table: &Table) -> String {
     )
 }
 
-fn figure(chart: &Chart, caption: &str) -> String {
-    let title = format!("<figure>\n<h3>{}</h3>\n", escape(&chart.title));
-    drawn(chart, caption).replacen("<figure>\n", &title, 1)
-}
-
-/// A chart without its title.
-fn drawn(chart: &Chart, caption: &str) -> String {
-    let canvases: &[Canvas] = if chart.size == Size::Small {
-        &[SMALL]
-    } else {
-        &[WIDE, NARROW]
+fn figure(chart: &Chart, is_titled: bool) -> String {
+    let canvases: &[Canvas] = match chart.size {
+        Size::Small => &[SMALL],
+        Size::Full => &[WIDE, NARROW],
     };
     let drawn: String = canvases
         .iter()
         .filter_map(|canvas| drawing(chart, canvas))
         .collect();
-    let inside = if drawn.is_empty() {
-        "<p>No value to show.</p>\n"
-    } else {
-        &drawn
+    let title = match is_titled {
+        true => String::new(),
+        false => format!("<h3>{}</h3>\n", escape(&chart.title)),
     };
-    format!("<figure>\n{inside}{}</figure>\n", captioned(caption))
-}
-
-fn captioned(caption: &str) -> String {
-    if caption.is_empty() {
-        String::new()
-    } else {
-        format!("<figcaption>{}</figcaption>\n", escape(caption))
-    }
+    let inside = match drawn.is_empty() {
+        true => "<p>No value to show.</p>\n",
+        false => &drawn,
+    };
+    format!("<figure>\n{title}{inside}</figure>\n")
 }
 
 fn drawing(chart: &Chart, canvas: &Canvas) -> Option<String> {

@@ -1,6 +1,6 @@
 //! Tables: their cells keep where a number stands in the result.
 
-use crate::number::{percent, readable, seconds};
+use crate::number::{readable, seconds};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -21,14 +21,6 @@ impl Cell {
             text: readable(value),
             pointer: pointer.to_owned(),
             is_number: true,
-        }
-    }
-
-    /// A share, shown in per cent; `pointer` as that of [`Self::number`].
-    pub fn share(value: f64, pointer: &str) -> Self {
-        Self {
-            text: percent(value),
-            ..Self::number(value, pointer)
         }
     }
 
@@ -75,19 +67,6 @@ impl Table {
     pub fn and(mut self, head: impl IntoIterator<Item = String>) -> Self {
         self.head.extend(head);
         self
-    }
-
-    /// A table of texts, the first row its head.
-    pub fn of_rows(rows: &[Vec<String>]) -> Self {
-        let Some((head, rows)) = rows.split_first() else {
-            return Self::new([]);
-        };
-        let cells = |row: &Vec<String>| row.iter().map(|text| Cell::from(text.clone())).collect();
-        Self {
-            head: head.clone(),
-            rows: rows.iter().map(cells).collect(),
-            keys: 1,
-        }
     }
 
     /// The same with so many columns that name a row.

@@ -193,18 +193,23 @@ mod tests {
     use super::*;
     use crate::table::Cell;
 
-    fn table(rows: &[&[&str]]) -> Table {
-        Table::of_rows(
-            &rows
-                .iter()
-                .map(|row| row.iter().map(|cell| (*cell).to_owned()).collect())
-                .collect::<Vec<_>>(),
-        )
+    fn table<T: AsRef<str>>(rows: &[Vec<T>]) -> Table {
+        let texts = |row: &Vec<T>| {
+            row.iter()
+                .map(|c| c.as_ref().to_owned())
+                .collect::<Vec<_>>()
+        };
+        let mut table = Table::new([]).and(texts(&rows[0]));
+        let cells = rows[1..]
+            .iter()
+            .map(|row| texts(row).into_iter().map(Cell::from));
+        cells.for_each(|row| table.row(row));
+        table.with_keys(1)
     }
 
     #[test]
     fn names_stay_in_their_cells() {
-        let markdown = table(&[&["run"], &["a|b\n<script>"]]).markdown();
+        let markdown = table(&[vec!["run"], vec!["a|b\n<script>"]]).markdown();
         assert_eq!(
             markdown,
             "| run              |\n|------------------|\n| a\\|b &lt;script> |"
@@ -213,7 +218,7 @@ mod tests {
 
     #[test]
     fn tables_of_other_programs_are_escaped() {
-        let table = table(&[&["run", "a, b"], &["x_1 & 5 %", "1 ± 2"]]);
+        let table = table(&[vec!["run", "a, b"], vec!["x_1 & 5 %", "1 ± 2"]]);
         assert_eq!(table.csv(), "run,\"a, b\"\nx_1 & 5 %,1 ± 2\n");
         let names = ["=cmd|x", "@SUM(1)", "-2+3", "+a", "-2.5 ± 1", "-"].map(is_formula);
         assert_eq!(names, [true, true, true, true, false, false]);
@@ -246,12 +251,8 @@ mod tests {
                 .chain(cells)
                 .collect::<Vec<String>>()
         };
-        let table = Table::of_rows(&(0..3).map(row).collect::<Vec<_>>());
-        let parts: Vec<String> = table
-            .columns(100)
-            .split("\n\n")
-            .map(str::to_owned)
-            .collect();
+        let wide = table(&(0..3).map(row).collect::<Vec<_>>());
+        let parts: Vec<String> = wide.columns(100).split("\n\n").map(str::to_owned).collect();
         assert_eq!(parts.len(), 3);
         assert!(
             parts
@@ -272,7 +273,7 @@ mod tests {
         );
         // nothing can be done about a column that is wider than a terminal
         assert_eq!(
-            Table::of_rows(&[vec!["a".repeat(100), "b".repeat(100)]])
+            table(&[vec!["a".repeat(100), "b".repeat(100)]])
                 .columns(100)
                 .lines()
                 .count(),

@@ -1,7 +1,6 @@
 //! Documents for a terminal.
 
 use crate::document::{Block, Document, Importance, Note};
-use crate::table::Table;
 
 /// Notes that a terminal shows without being asked for more.
 pub const NOTES: usize = 3;
@@ -61,15 +60,13 @@ fn blocks(all: &[Block], width: usize, text: &mut String) {
             Block::Section(title) => *text += &format!("\n{}\n", title.to_uppercase()),
             Block::Heading(words) | Block::Text(words) => *text += &format!("\n{words}\n"),
             Block::Facts(facts) => {
-                let rows: Vec<Vec<String>> = facts
+                let lines = facts
                     .iter()
-                    .map(|(k, v)| vec![k.clone(), v.clone()])
-                    .collect();
-                *text += &format!("\n{}\n", Table::of_rows(&rows).columns(usize::MAX));
+                    .map(|(name, value)| format!("\n  {name}: {value}"));
+                *text += &(lines.collect::<String>() + "\n");
             }
             Block::Table { table, .. } => *text += &format!("\n{}\n", table.columns(width)),
             Block::Code(code) => *text += &format!("\n{}\n", code.trim_end()),
-            Block::Checked(words) => *text += &format!("\nchecked: {words}\n"),
             Block::Folded(title, inside) => {
                 *text += &format!("\n{title}\n");
                 blocks(inside, width, text);

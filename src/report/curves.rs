@@ -1,9 +1,7 @@
 //! Wavelet-variance curves as JSON: of signals (`wv`), and of fits (`<model>.wv.json`).
 
 use nav_sim_calibration::{Estimator, Group, Outcome, Replicate, Settings, implied, tau_s};
-use nav_sim_document::{
-    Axis as ChartAxis, Chart, Colour, Mark, Panel, Series, short_names, squared,
-};
+use nav_sim_document::{Axis as ChartAxis, Chart, Colour, Mark, Panel, Series, short_names};
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::wavelet::interval;
 use serde::{Deserialize, Serialize};
@@ -284,7 +282,10 @@ pub(crate) fn scale_axis() -> ChartAxis {
 
 /// The axis of wavelet variances of a sensor.
 pub(crate) fn variance_axis(sensor: Sensor) -> ChartAxis {
-    ChartAxis::log(&format!("wavelet variance ({})", squared(sensor.unit())))
+    ChartAxis::log(match sensor {
+        Sensor::Accel => "wavelet variance (m²/s⁴)",
+        Sensor::Gyro => "wavelet variance (rad²/s²)",
+    })
 }
 
 /// Names of recordings, short and without the endings of their files: `run4` of `static/run4.csv.gz`.

@@ -126,19 +126,11 @@ impl Default for CalibrationOptions {
 }
 
 /// Recordings that were measured and found to be replicates of one another.
-#[derive(Debug, Clone)]
-#[non_exhaustive]
-pub struct Measured {
-    /// What was found in the files.
+pub(crate) struct Measured {
     pub report: Report,
-    /// The wavelet variances.
     pub groups: Vec<Group>,
-    /// The recordings that do not begin as they go on.
     pub beginnings: Beginnings,
-    /// How models are fitted.
     pub settings: Settings,
-    /// The draws behind intervals.
-    pub bootstrap: Option<Bootstrap>,
 }
 
 /// A calibration: the fitted models and the wavelet variances behind them.
@@ -162,38 +154,49 @@ pub struct Calibration {
 /// Calibrates recordings, or directories of them.
 ///
 /// # Errors
-/// As [`measure`] and [`Measured::calibrate`].
+/// When a recording cannot be read, is too short, or is no replicate of its own; when the estimator takes one recording
+/// only, a trim leaves no replicate, or a curve is too short for the model.
 pub fn calibrate(
     paths: &[PathBuf],
     options: &CalibrationOptions,
     context: &Context<'_>,
 ) -> Result<Calibration, Failure> {
-    measure(paths, options, context)?.calibrate(&|_| {})
+    let Measured {
+        groups,
+        beginnings,
+        settings,
+        ..
+    } = measure(paths, options, context)?;
+    let bootstrap = options.bootstrap;
+    let steps = settings.model.steps() + bootstrap.map_or(0, |bootstrap| bootstrap.draws as u64);
+    let fits = (groups.len() * settings.estimators.len()) as u64;
+    context.begin("steps of the fits", fits * steps);
+    let advance = |steps| context.advance(steps);
+    let outcomes = nav_sim_calibration::calibrate_telling(&groups, &settings, &advance)?;
+    let made = Calibration::new(groups, outcomes, settings, bootstrap, &advance);
+    context.end();
+    Ok(Calibration { beginnings, ..made })
 }
 
-/// The first half of [`calibrate()`], which reads the files: errors in them are known before the long half begins.
-///
-/// # Errors
-/// When a recording cannot be read, is too short, or is no replicate of its own; when the estimator takes one recording only.
-pub fn measure(
+/// Reads and measures recordings: errors in them are known before the long half begins.
+pub(crate) fn measure(
     paths: &[PathBuf],
     options: &CalibrationOptions,
     context: &Context<'_>,
 ) -> Result<Measured, Failure> {
     let CalibrationOptions {
-        reading,
         skip_warm_up,
         scales,
         estimators,
         pool,
         settings,
-        bootstrap,
+        ..
     } = options;
     // As many scales as parameters, and one that the default leaves out.
     let needed = scales.map_or(2 << settings.model.parameters(), |j| 1 << j);
     let reading = ReadOptions {
         min_samples: needed,
-        ..reading.clone()
+        ..options.reading.clone()
     };
     let look = |recording: Recording| {
         MeasuredRecording::new(recording, *skip_warm_up, *scales, &settings.tuning)
@@ -222,38 +225,7 @@ pub fn measure(
         groups,
         beginnings,
         settings,
-        bootstrap: *bootstrap,
     })
-}
-
-impl Measured {
-    /// How many steps the second half is.
-    #[must_use]
-    pub fn steps(&self) -> u64 {
-        let draws = self.bootstrap.map_or(0, |bootstrap| bootstrap.draws as u64);
-        (self.groups.len() * self.settings.estimators.len()) as u64
-            * (self.settings.model.steps() + draws)
-    }
-
-    /// The second half, which fits; `advance` is told how many more of its [`Measured::steps`] are done.
-    ///
-    /// # Errors
-    /// When a trim leaves no replicate, or a curve is too short for the model.
-    pub fn calibrate(self, advance: Advance<'_>) -> Result<Calibration, Failure> {
-        let outcomes =
-            nav_sim_calibration::calibrate_telling(&self.groups, &self.settings, advance)?;
-        let made = Calibration::new(
-            self.groups,
-            outcomes,
-            self.settings,
-            self.bootstrap,
-            advance,
-        );
-        Ok(Calibration {
-            beginnings: self.beginnings,
-            ..made
-        })
-    }
 }
 
 impl Calibration {

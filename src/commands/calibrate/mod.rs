@@ -27,8 +27,8 @@ mod measure;
 mod model_file;
 
 pub(crate) use document::{CAPTION, variance as variance_chart};
-pub use measure::{Calibration, CalibrationOptions, EstimatorChoice, Measured, calibrate, measure};
-pub(crate) use measure::{visit, without_warm_up};
+pub use measure::{Calibration, CalibrationOptions, EstimatorChoice, calibrate};
+pub(crate) use measure::{Measured, measure, visit, without_warm_up};
 pub(crate) use model_file::CalibrationNote;
 
 use crate::app::inputs::{files, listed};
@@ -217,11 +217,16 @@ impl Command for Calibrate {
                 curves.calibrate(self.draws(context))?
             }
             None => {
-                let measured = self.measure(settings, context)?;
-                context.begin("steps of the fits", measured.steps());
-                let calibration = measured.calibrate(&|steps| context.advance(steps))?;
-                context.end();
-                calibration
+                let options = CalibrationOptions {
+                    reading: self.recordings.options(),
+                    skip_warm_up: self.recordings.reading.skips_warm_up(),
+                    scales: self.tuning.levels(),
+                    estimators: self.estimator,
+                    pool: self.pool,
+                    settings,
+                    bootstrap: self.draws(context),
+                };
+                calibrate(&self.inputs, &options, context)?
             }
         };
         Ok(CalibrationAnswer {
@@ -268,20 +273,6 @@ impl Calibrate {
             fit_range: self.tuning.fitted(),
             ..Settings::default()
         })
-    }
-
-    /// The recordings, read and measured.
-    pub(crate) fn measure(&self, settings: Settings, context: &Context<'_>) -> Result<Measured> {
-        let options = CalibrationOptions {
-            reading: self.recordings.options(),
-            skip_warm_up: self.recordings.reading.skips_warm_up(),
-            scales: self.tuning.levels(),
-            estimators: self.estimator,
-            pool: self.pool,
-            settings,
-            bootstrap: self.draws(context),
-        };
-        measure(&self.inputs, &options, context)
     }
 
     /// The curves in the place of recordings, and whether they do not say of which sensor: then as of an accelerometer.

@@ -12,16 +12,15 @@ use nav_sim_navigation::monte_carlo;
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::imu::{Truth, TruthError};
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_navigation::simulation::ExperimentError;
 use nav_sim_navigation::simulation::lincov::{
     Aim, Factor, FilterPass, Task, Track, TrueErrors, TruthSide, scaled,
 };
+use nav_sim_navigation::simulation::{Experiment, ExperimentError, RunResult};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::noise::continuous::same_rate;
 use nav_sim_signal::noise::{Kind, Model};
 use rayon::prelude::*;
-use std::borrow::Cow;
 use std::fmt;
 
 /// A way from recordings to a filter.
@@ -100,25 +99,27 @@ impl Candidate {
         inflations: &[Inflation],
     ) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
-        for &estimator in estimators {
-            for model in models {
-                let model = if estimator == Estimator::Avlr && !is_of_slopes(model) {
-                    ModelChoice::Given(white_and_walk())
-                } else {
-                    model.clone()
+        for (estimator, model) in estimators
+            .iter()
+            .flat_map(|e| models.iter().map(move |m| (*e, m)))
+        {
+            let model = match estimator == Estimator::Avlr && !is_of_slopes(model) {
+                true => ModelChoice::Given(white_and_walk()),
+                false => model.clone(),
+            };
+            for (filter, inflation) in filters
+                .iter()
+                .flat_map(|f| inflations.iter().map(move |i| (*f, *i)))
+            {
+                let model = model.clone();
+                let candidate = Self {
+                    estimator,
+                    model,
+                    filter,
+                    inflation,
                 };
-                for &filter in filters {
-                    for &inflation in inflations {
-                        let candidate = Self {
-                            estimator,
-                            model: model.clone(),
-                            filter,
-                            inflation,
-                        };
-                        if !all.contains(&candidate) {
-                            all.push(candidate);
-                        }
-                    }
+                if !all.contains(&candidate) {
+                    all.push(candidate);
                 }
             }
         }
@@ -155,17 +156,16 @@ fn is_of_slopes(model: &ModelChoice) -> bool {
 
 impl fmt::Display for Candidate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let n2 = ModelChoice::Given(ModelSpec::n2());
-        write!(f, "{} ", self.estimator)?;
-        if self.model == n2 {
-            f.write_str("N2")?
+        let is_usual = self.model == ModelChoice::default();
+        let model = if is_usual {
+            "N2".to_owned()
         } else {
-            self.model.fmt(f)?
-        }
-        write!(f, ", {}", self.filter)?;
+            self.model.to_string()
+        };
+        write!(f, "{} {model}, {}", self.estimator, self.filter)?;
         match self.inflation {
             Inflation::None => Ok(()),
-            inflation => write!(f, ", {}", inflation.name()),
+            inflation => write!(f, ", {inflation}"),
         }
     }
 }
@@ -281,27 +281,23 @@ impl Laboratory {
     /// # Errors
     /// When a curve is too short for the model.
     pub(crate) fn judges(&self) -> Result<Vec<usize>, CalibrationError> {
-        let all: Vec<usize> = self.others(None).collect();
         let n2 = ModelChoice::Given(ModelSpec::n2());
-        let (groups, outcomes, settings) = self.fit(
-            &self.units.iter().collect::<Vec<_>>(),
-            Estimator::DrAwv,
-            &n2,
-            None,
-        )?;
-        let abnormal: Vec<String> = diagnose(&groups, &outcomes, &settings)
-            .into_iter()
-            .filter(|diagnosis| diagnosis.verdict != Verdict::Normal)
-            .map(|diagnosis| diagnosis.name)
-            .collect();
+        let all: Vec<&Unit> = self.units.iter().collect();
+        let (groups, outcomes, settings) = self.fit(&all, Estimator::DrAwv, &n2, None)?;
+        let mut diagnoses = diagnose(&groups, &outcomes, &settings);
+        diagnoses.retain(|diagnosis| diagnosis.verdict != Verdict::Normal);
+        let is_abnormal = |name: &String| diagnoses.iter().any(|d| d.name == *name);
         let is_normal = |k: &usize| {
-            self.units[*k]
+            !self.units[*k]
                 .replicates
                 .iter()
-                .all(|(_, r)| !abnormal.contains(&r.name))
+                .any(|(_, r)| is_abnormal(&r.name))
         };
-        let normal: Vec<usize> = all.iter().copied().filter(is_normal).collect();
-        Ok(if normal.len() < FEWEST { all } else { normal })
+        let normal: Vec<usize> = self.others(None).filter(is_normal).collect();
+        Ok(match normal.len() < FEWEST {
+            true => self.others(None).collect(),
+            false => normal,
+        })
     }
 
     fn fit(
@@ -409,7 +405,7 @@ impl Drive {
         &self,
         laboratory: &Laboratory,
         k: usize,
-        recordings: &[Recording],
+        mut recordings: Vec<Recording>,
         candidates: &[Candidate],
         runs: u64,
         progress: &(dyn Fn(u64) + Sync),
@@ -417,16 +413,17 @@ impl Drive {
         let models = self.models(laboratory, Some(k), candidates)?;
         let beliefs = self.beliefs(candidates, &models)?;
         let expected = self.expected(&beliefs, &laboratory.models[k]);
-        let is_long = |r: &Recording| self.independent_windows(r.len()) >= 1.0;
-        let usable: Cow<'_, [Recording]> = if recordings.iter().all(is_long) {
-            recordings.into()
-        } else {
-            recordings.iter().filter(|r| is_long(r)).cloned().collect()
-        };
-        let sampled = if usable.is_empty() {
-            None
-        } else {
-            self.sampled(&beliefs, &usable, runs, progress)?
+        recordings.retain(|r| self.independent_windows(r.len()) >= 1.0);
+        let truth = Truth::Static(&recordings);
+        let sampled = match monte_carlo::run(&self.experiment(truth, &beliefs), runs, progress) {
+            Ok(results) => {
+                let score = |r: &RunResult| Score::of_runs(&r.runs, r.outages.len());
+                Some(results.iter().map(score).collect())
+            }
+            // none is as long as the trajectory, or lacks its last sample
+            Err(ExperimentError::Truth(TruthError::TooShort { .. })) => None,
+            Err(_) if recordings.is_empty() => None,
+            Err(e) => return Err(e.into()),
         };
         if sampled.is_none() {
             progress(runs);
@@ -450,25 +447,24 @@ impl Drive {
         candidates: &[Candidate],
     ) -> Result<Vec<Model>, Failure> {
         let mut made: Vec<(&Candidate, Model)> = Vec::new();
+        let mut models = Vec::new();
         for candidate in candidates {
-            if !made
+            let known = made
                 .iter()
-                .any(|(other, _)| other.is_calibrated_as(candidate))
-            {
-                let (_, outcomes, settings) = laboratory
-                    .calibrate(candidate, without)
-                    .map_err(|e| Failure::from(e).within(&candidate.to_string()))?;
-                made.push((candidate, model_of(&outcomes, settings.rate_hz)));
-            }
+                .find(|(other, _)| other.is_calibrated_as(candidate));
+            let model = match known {
+                Some((_, model)) => model.clone(),
+                None => {
+                    let calibrated = laboratory.calibrate(candidate, without);
+                    let (_, outcomes, settings) =
+                        calibrated.map_err(|e| Failure::from(e).within(&candidate.to_string()))?;
+                    model_of(&outcomes, settings.rate_hz)
+                }
+            };
+            models.push(self.inflated(laboratory, without, candidate, &model)?);
+            made.push((candidate, model));
         }
-        let inflated = |candidate: &Candidate| {
-            let (_, model) = made
-                .iter()
-                .find(|(c, _)| c.is_calibrated_as(candidate))
-                .expect("made above");
-            self.inflated(laboratory, without, candidate, model)
-        };
-        candidates.iter().map(inflated).collect()
+        Ok(models)
     }
 
     /// A candidate's calibrated model, inflated as it says; tuned for the recordings but one.
@@ -529,40 +525,16 @@ impl Drive {
         pairs.par_iter().map(belief).collect()
     }
 
-    /// Every filter on the same windows; none where the recordings are shorter than the trajectory.
-    fn sampled(
-        &self,
-        beliefs: &[Belief],
-        recordings: &[Recording],
-        runs: u64,
-        progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<Option<Vec<Score>>, ExperimentError> {
-        let truth = Truth::Static(recordings);
-        let experiment =
-            self.scenario
-                .experiment(&self.trajectory, truth, beliefs, &self.outages, self.seed);
-        match monte_carlo::run(&experiment, runs, progress) {
-            Ok(results) => Ok(Some(
-                results
-                    .iter()
-                    .map(|r| Score::of_runs(&r.runs, r.outages.len()))
-                    .collect(),
-            )),
-            // a window counts the last sample too
-            Err(ExperimentError::Truth(TruthError::TooShort { .. })) => Ok(None),
-            Err(e) => Err(e),
-        }
+    /// Every filter on the same fixes.
+    fn experiment<'a>(&'a self, truth: Truth<'a>, beliefs: &'a [Belief]) -> Experiment<'a> {
+        let (trajectory, outages) = (&self.trajectory, &self.outages);
+        self.scenario
+            .experiment(trajectory, truth, beliefs, outages, self.seed)
     }
 
     /// Every filter where a model makes the errors.
     fn expected(&self, beliefs: &[Belief], truth: &Model) -> Vec<Score> {
-        let experiment = self.scenario.experiment(
-            &self.trajectory,
-            Truth::Model(truth),
-            beliefs,
-            &self.outages,
-            self.seed,
-        );
+        let experiment = self.experiment(Truth::Model(truth), beliefs);
         let sources = TruthSide::together(&TruthSide::sources(&experiment, truth));
         let score = |belief: &Belief| {
             Score::expected(&FilterPass::new(&self.track, belief).errors_at_ends(&sources))

@@ -223,8 +223,7 @@ impl Command for Choose {
             let measured = |recording| without_warm_up(recording, options.skip_warm_up).0;
             let read: Vec<Recording> = read.into_iter().map(measured).collect();
             let advance = |n| context.advance(n);
-            let fold =
-                drive.leave_out(&laboratory, *k, &read, &candidates, runs_on(k), &advance)?;
+            let fold = drive.leave_out(&laboratory, *k, read, &candidates, runs_on(k), &advance)?;
             folds.push((file.file.clone(), fold));
         }
         context.end();
