@@ -63,7 +63,7 @@ nav_sim_signal::named!(
 );
 
 /// Scatter of the means of a sensor, and the finding.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct TurnOnSpread {
     /// The sensor.
     pub sensor: Sensor,

@@ -359,7 +359,10 @@ fn figures(found: &Comparison, out: &str, session: &Session) -> Result<(), Failu
     let directory = figures_of(out);
     std::fs::create_dir_all(&directory).map_err(|e| Failure::io(&directory, e))?;
     for figure in &figures {
-        atomic::write(&directory.join(figure.file_name()), figure.svg())?;
+        atomic::write(
+            &directory.join(format!("fig{}.svg", figure.number)),
+            figure.svg(),
+        )?;
     }
     atomic::write(&directory.join("index.html"), paper_page(&figures))?;
     session.say(format!("the paper's figures: {}", directory.display()));

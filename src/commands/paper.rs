@@ -1,7 +1,7 @@
 //! The figures of Minaretzis et al. 2024 from the files of a case study: what it shows of each, in the paper's order.
 
-use crate::commands::calibrate::{CAPTION as FITTED, variance_chart as fitted_chart};
-use crate::report::curves::{CurvesFile, FittedCurve};
+use crate::commands::calibrate::variance_chart as fitted_chart;
+use crate::report::curves::{CurvesFile, FittedCurve, ReplicateCurve};
 use crate::report::curves::{curve, scale_axis, sensor_name, variance_axis};
 use crate::report::trajectory::TrajectorySeries;
 use nav_sim_document::{Chart, Colour, Document as Page, Panel, Series, Tone, svg};
@@ -10,33 +10,26 @@ use nav_sim_signal::imu::Sensor;
 /// A figure of the paper.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PaperFigure {
-    /// Its number.
     pub number: u32,
-    /// What it shows.
     pub caption: String,
-    charts: Vec<Chart>,
+    pub charts: Vec<Chart>,
 }
 
 impl PaperFigure {
-    /// `fig1.svg`
-    pub(crate) fn file_name(&self) -> String {
-        format!("fig{}.svg", self.number)
+    pub(crate) fn new(number: u32, caption: &str, charts: Vec<Chart>) -> Self {
+        let caption = caption.to_owned();
+        Self {
+            number,
+            caption,
+            charts,
+        }
     }
 
-    /// As a picture.
     pub(crate) fn svg(&self) -> String {
         svg(
             &format!("Fig. {}: {}", self.number, self.caption),
             &self.charts,
         )
-    }
-
-    pub(crate) fn new(number: u32, caption: &str, charts: Vec<Chart>) -> Self {
-        Self {
-            number,
-            caption: caption.to_owned(),
-            charts,
-        }
     }
 }
 
@@ -47,7 +40,6 @@ pub(crate) struct StudyCurves {
     pub scenario: String,
     /// `awv`, `sr-awv`, `dr-awv`.
     pub estimator: String,
-    /// The curves.
     pub file: CurvesFile,
 }
 
@@ -57,51 +49,75 @@ pub(crate) fn paper_figures(
     track: &TrajectorySeries,
     outages: &[(f64, f64)],
 ) -> Vec<PaperFigure> {
-    let fitted_curve = |scenario: &str, estimator: &str, sensor: Sensor| {
-        let result = curves
-            .iter()
-            .find(|c| c.scenario == scenario && c.estimator == estimator)?;
-        result.file.curves.iter().find(|c| c.sensor == sensor)
+    let of = |scenario: &str, estimator: &str, sensor: Sensor| {
+        let mut models = curves.iter();
+        let model = models.find(|c| c.scenario == scenario && c.estimator == estimator)?;
+        model.file.curves.iter().find(|c| c.sensor == sensor)
     };
     let replicates = |scenario: &str| {
-        let kinds = [
-            ("robust", fitted_curve(scenario, "sr-awv", Sensor::Accel)),
-            ("classical", fitted_curve(scenario, "awv", Sensor::Accel)),
-        ];
-        let panels = kinds
-            .into_iter()
-            .filter_map(|(kind, fitted)| Some(recordings(kind, fitted?)));
+        let kinds = [("robust", "sr-awv"), ("classical", "awv")];
+        let panels = kinds.into_iter().filter_map(|(kind, estimator)| {
+            let FittedCurve {
+                tau_s, replicates, ..
+            } = of(scenario, estimator, Sensor::Accel)?;
+            let line = |(k, r): (usize, &ReplicateCurve)| {
+                Series::line(&r.file, Colour::Hue(k), curve(tau_s, &r.wv))
+            };
+            Some(panel(
+                kind,
+                Sensor::Accel,
+                replicates.iter().enumerate().map(line).collect(),
+            ))
+        });
         vec![Chart::new(
             "Accelerometer recordings",
             scale_axis(),
             panels.collect(),
         )]
     };
-    let fit = fitted_curve("I", "awv", Sensor::Accel).map(|fitted| fitted_chart(fitted, &[]));
+    let averages = |sensor: Sensor| {
+        let panels = ["II", "III"].map(|scenario| {
+            let clean = of("I", "awv", sensor);
+            let clean = clean
+                .map(|c| Series::dashed("AWV, scenario I", Colour::Ink, curve(&c.tau_s, &c.wv)));
+            let lines = (0..)
+                .zip(["awv", "sr-awv", "dr-awv"])
+                .filter_map(|(hue, estimator)| {
+                    let FittedCurve { tau_s, wv, .. } = of(scenario, estimator, sensor)?;
+                    let name = estimator.to_uppercase();
+                    Some(Series::line(&name, Colour::Hue(hue), curve(tau_s, wv)))
+                });
+            let series = clean.into_iter().chain(lines).collect();
+            panel(&format!("scenario {scenario}:"), sensor, series)
+        });
+        Chart::new(sensor_name(sensor), scale_axis(), panels.into())
+    };
+    let fit = of("I", "awv", Sensor::Accel).map(|fitted| fitted_chart(fitted, &[]));
+    let tracks = vec![
+        track.map("Reference trajectory", outages),
+        track.over_time(outages),
+    ];
     vec![
         PaperFigure::new(1, ABNORMAL, replicates("III")),
-        PaperFigure::new(
-            3,
-            TRAJECTORY,
-            vec![
-                track.map("Reference trajectory", outages),
-                track.over_time(outages),
-            ],
-        ),
+        PaperFigure::new(3, TRAJECTORY, tracks),
         PaperFigure::new(4, CLEAN, replicates("I")),
-        PaperFigure::new(
-            5,
-            &format!("Fit of N2 to the accelerometers of scenario I. {FITTED}"),
-            fit.into_iter().collect(),
-        ),
-        PaperFigure::new(6, AVERAGES, averages(&fitted_curve)),
+        PaperFigure::new(5, FIT, fit.into_iter().collect()),
+        PaperFigure::new(6, AVERAGES, Sensor::ALL.map(averages).into()),
     ]
+}
+
+/// A panel of wavelet variances, with words before the name of its axis.
+fn panel(words: &str, sensor: Sensor, series: Vec<Series>) -> Panel {
+    let mut axis = variance_axis(sensor);
+    axis.label = format!("{words} {}", axis.label);
+    Panel::new(axis, series)
 }
 
 const ABNORMAL: &str = "Robust (above) and classical (below) wavelet variance of the recordings of scenario III, two of which are abnormal.";
 const TRAJECTORY: &str = "Reference trajectory of a land vehicle on the horizontal plane, its height, speed and attitude.";
 const CLEAN: &str =
     "Robust (above) and classical (below) wavelet variance of the clean recordings (scenario I).";
+const FIT: &str = "Fit of N2 to the accelerometers of scenario I: wavelet variance with its 95 % band, recordings, model and processes; below: data over model.";
 const AVERAGES: &str = "The wavelet variances that AWV, SR-AWV and DR-AWV are fitted to, in scenarios II and III; dashed: AWV of scenario I.";
 
 /// The page of all of them.
@@ -117,74 +133,9 @@ pub(crate) fn paper_page(figures: &[PaperFigure]) -> String {
     page.html()
 }
 
-/// A curve a recording.
-fn recordings(kind: &str, fitted: &FittedCurve) -> Panel {
-    let series_of_recording = |(k, replicate): (usize, &crate::report::ReplicateCurve)| {
-        Series::line(
-            &replicate.file,
-            Colour::Hue(k),
-            curve(&fitted.tau_s, &replicate.wv),
-        )
-    };
-    let mut axis = variance_axis(fitted.sensor);
-    axis.label = format!("{kind} {}", axis.label);
-    Panel::new(
-        axis,
-        fitted
-            .replicates
-            .iter()
-            .enumerate()
-            .map(series_of_recording)
-            .collect(),
-    )
-}
-
-/// A chart a sensor, a panel a scenario.
-fn averages<'a>(
-    fitted_curve: &dyn Fn(&str, &str, Sensor) -> Option<&'a FittedCurve>,
-) -> Vec<Chart> {
-    let chart = |sensor: Sensor| {
-        let panel =
-            |scenario: &&str| {
-                let names = [("awv", "AWV"), ("sr-awv", "SR-AWV"), ("dr-awv", "DR-AWV")];
-                let mut series: Vec<Series> = fitted_curve("I", "awv", sensor)
-                    .map(|clean| {
-                        Series::dashed(
-                            "AWV, scenario I",
-                            Colour::Ink,
-                            curve(&clean.tau_s, &clean.wv),
-                        )
-                    })
-                    .into_iter()
-                    .collect();
-                series.extend(names.into_iter().enumerate().filter_map(
-                    |(hue, (estimator, name))| {
-                        let fitted = fitted_curve(scenario, estimator, sensor)?;
-                        Some(Series::line(
-                            name,
-                            Colour::Hue(hue),
-                            curve(&fitted.tau_s, &fitted.wv),
-                        ))
-                    },
-                ));
-                let mut axis = variance_axis(sensor);
-                axis.label = format!("scenario {scenario}: {}", axis.label);
-                Panel::new(axis, series)
-            };
-        let title = sensor_name(sensor);
-        Chart::new(
-            title,
-            scale_axis(),
-            ["II", "III"].iter().map(panel).collect(),
-        )
-    };
-    Sensor::ALL.map(chart).into()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::ReplicateCurve;
 
     fn study() -> Vec<StudyCurves> {
         let curve = |sensor: Sensor, factor: f64| FittedCurve {
@@ -243,7 +194,7 @@ mod tests {
         assert!(drawn(3, "model") > 1 && drawn(3, "WN") > 0);
         // two sensors, each with two scenarios
         assert_eq!((drawn(4, "SR-AWV"), drawn(4, "AWV, scenario I")), (4, 4));
-        assert_eq!(figures[4].file_name(), "fig6.svg");
+        assert_eq!(figures[4].number, 6);
         let page = paper_page(&figures);
         assert!(page.contains("<h2>Figure 6</h2>") && !page.contains("NaN"));
     }

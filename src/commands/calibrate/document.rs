@@ -1,6 +1,6 @@
 //! The document of a calibration.
 
-use super::fits::{CalibrationFile, goodness, interval_of, intervals};
+use super::fits::{goodness, interval_of, intervals};
 use crate::commands::export::Quantity;
 use crate::report::comparison_table::in_order;
 use crate::report::curves::{CurvesFile, FittedCurve, recording_names};
@@ -16,21 +16,24 @@ use nav_sim_document::{
 };
 use nav_sim_signal::imu::{Axis, Sensor};
 use nav_sim_signal::noise::practical::Horizon;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 /// The fits of a calibration, all of them or those of one estimator, and the findings about the recordings.
 pub(crate) struct ShownCalibration<'a> {
-    pub file: CalibrationFile<'a>,
+    /// The JSON of the command.
+    pub json: Value,
     /// The outcomes of the fits, in the same order.
     pub outcomes: Vec<&'a Outcome>,
     pub curves: CurvesFile,
+    pub diagnoses: &'a [Diagnosis],
+    pub turn_on: Vec<&'a TurnOnSpread>,
     pub beginnings: &'a Beginnings,
     pub settings: &'a Settings,
 }
 
 impl ShownCalibration<'_> {
     pub(crate) fn document(&self) -> Document {
-        let json = json!(self.file);
+        let json = &self.json;
         let estimators = in_order(self.outcomes.iter().map(|o| o.estimator.name()));
         let title = format!("Stochastic calibration, {}", estimators.join(", "));
         let mut document = Document::new(&title, self.tone(), self.verdict());
@@ -47,7 +50,7 @@ impl ShownCalibration<'_> {
             (interval, "interval"),
             ("averages of", "averages"),
         ];
-        let figures = Table::of(&json, "/fits/*/figures/*", &columns);
+        let figures = Table::of(json, "/fits/*/figures/*", &columns);
         if self.outcomes.len() > 2 {
             let columns = [
                 ("fit", "name"),
@@ -60,7 +63,7 @@ impl ShownCalibration<'_> {
                     "{figures/N/unit}, {figures/B/unit}, {figures/K/unit}",
                 ),
             ];
-            document.lead(Table::of(&json, "/fits/*", &columns));
+            document.lead(Table::of(json, "/fits/*", &columns));
             document.table(&figures);
         } else {
             document.lead(figures);
@@ -71,7 +74,7 @@ impl ShownCalibration<'_> {
         for (index, (outcome, fitted)) in self.outcomes.iter().zip(&self.curves.curves).enumerate()
         {
             document.section(&format!("{} · {}", group_name(fitted), outcome.spec));
-            let diagnoses = self.file.replicates;
+            let diagnoses = self.diagnoses;
             document.chart(
                 &allan(fitted, outcome, diagnoses, self.settings.rate_hz),
                 &format!("Allan deviation: recordings, model, and what is exported: {policy}. N is read at 1 s, K at 3 s, 0.664 B at the floor."),
@@ -90,7 +93,7 @@ impl ShownCalibration<'_> {
                     ("chosen", "chosen"),
                 ];
                 document.table(&Table::of(
-                    &json,
+                    json,
                     &format!("/fits/{index}/ranking/*"),
                     &columns,
                 ));
@@ -109,11 +112,11 @@ impl ShownCalibration<'_> {
             ("J-test p", "j_p_value"),
             ("signals alike: p", "spread_p_value"),
         ];
-        document.table(&Table::of(&json, "/fits/*", &columns));
-        if self.file.replicates.iter().any(is_abnormal) {
-            recordings_section(&json, &mut document);
+        document.table(&Table::of(json, "/fits/*", &columns));
+        if self.diagnoses.iter().any(is_abnormal) {
+            recordings_section(json, &mut document);
         }
-        if !self.file.turn_on.is_empty() {
+        if !self.turn_on.is_empty() {
             document.section("Turn-on bias");
             let columns = [
                 ("sensor", "../../sensor"),
@@ -122,7 +125,7 @@ impl ShownCalibration<'_> {
                 ("spread of the means (SI)", "spread"),
                 ("by noise alone", "noise"),
             ];
-            document.table(&Table::of(&json, "/turn_on/*/axes/*", &columns));
+            document.table(&Table::of(json, "/turn_on/*/axes/*", &columns));
         }
         document.checked(
             "wavelet variances of models to 1e-13 of an independent implementation, the optimum to 1e-6 of an exhaustive search",
@@ -136,7 +139,7 @@ impl ShownCalibration<'_> {
             return Tone::Bad;
         }
         let misfits = self.outcomes.iter().filter_map(|o| o.misfit()).count();
-        match misfits > 0 || self.file.replicates.iter().any(is_abnormal) {
+        match misfits > 0 || self.diagnoses.iter().any(is_abnormal) {
             true => Tone::Doubtful,
             false => Tone::Good,
         }
@@ -146,7 +149,7 @@ impl ShownCalibration<'_> {
     fn verdict(&self) -> Vec<String> {
         let fits = self.outcomes.iter();
         let fits = fits.map(|o| fit_line(o, &fit_name(o, &self.outcomes), self.settings.rate_hz));
-        fits.chain(recordings_line(&self.outcomes, self.file.replicates))
+        fits.chain(recordings_line(&self.outcomes, self.diagnoses))
             .collect()
     }
 
@@ -165,16 +168,16 @@ impl ShownCalibration<'_> {
             note(Importance::Warning, "gyro", text);
         }
         for sensor in Sensor::ALL {
-            for text in recording_notes(sensor, fits, self.file.replicates, settings) {
+            for text in recording_notes(sensor, fits, self.diagnoses, settings) {
                 note(Importance::Warning, sensor.name(), text);
             }
         }
-        for entry in &self.file.turn_on {
-            let importance = match entry.found.finding {
+        for found in &self.turn_on {
+            let importance = match found.finding {
                 TurnOnFinding::Seen => Importance::Warning,
                 _ => Importance::Detail,
             };
-            note(importance, entry.found.sensor.name(), entry.remark.clone());
+            note(importance, found.sensor.name(), turn_on_remark(found));
         }
         if let Some((head, text)) = beginnings(self.beginnings) {
             note(Importance::Remark, head, text);
@@ -263,7 +266,7 @@ fn parameters(outcome: &Outcome) -> Table {
 // The charts of a calibration: wavelet variance and model, and what is exported on the Allan deviation.
 
 /// Caption of [`variance`].
-pub(crate) const CAPTION: &str = "Wavelet variance with its 95 % band, the recordings, the model and its processes; below: data over model.";
+const CAPTION: &str = "Wavelet variance with its 95 % band, the recordings, the model and its processes; below: data over model.";
 
 /// `Accelerometer x`, or `Gyroscope, all axes`.
 fn group_name(fitted: &FittedCurve) -> String {

@@ -3,165 +3,103 @@
 use super::document::{all_notes, fit_name, reasons, turn_on_remark};
 use crate::commands::export::Quantity;
 use nav_sim_calibration::{
-    Candidate, Diagnosis, Estimator, Goodness, LevelSpread, Miss, Outcome, ParameterInterval,
-    Practical, Ranking, Settings, Share, TURN_ON_LEVEL, Termination, TurnOnSpread, duration,
-    percent, shares, tau_s,
+    Candidate, Estimator, Goodness, Miss, Outcome, ParameterInterval, ParameterSpread, Practical,
+    Ranking, Settings, Share, TURN_ON_LEVEL, TurnOnSpread, duration, percent, shares, tau_s,
 };
 use nav_sim_document::readable;
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::{Composite, Parameter, ParameterRef, Process};
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
-/// The JSON of `calibrate`.
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct CalibrationFile<'a> {
-    pub schema_version: u32,
-    pub rate_hz: f64,
-    /// Structure of the models, or `auto`.
-    pub model: String,
-    pub fits: Vec<FitEntry<'a>>,
-    pub replicates: &'a [Diagnosis],
-    pub turn_on: Vec<TurnOnEntry<'a>>,
+/// The facts of a fit that stand in the provenance of its model too; null where there are none.
+pub(super) fn fit_record(outcome: &Outcome, settings: &Settings) -> Map<String, Value> {
+    let (fit, goodness) = (&outcome.fit, goodness(outcome));
+    let worst = outcome.misfit().map(|misfit| misfit.worst);
+    let is_trimmed = outcome.estimator == Estimator::DrAwv;
+    object(json!({
+        "signals": outcome.scope.name(),
+        "model": outcome.spec.to_string(),
+        "replicates": outcome.replicates,
+        "recordings": outcome.recordings,
+        "trim": is_trimmed.then(|| settings.trim.count(outcome.replicates)),
+        "scales": outcome.curve.levels.len(),
+        "objective": fit.objective,
+        "termination": fit.termination,
+        "combinations": fit.combinations,
+        "starts": fit.starts,
+        "agreeing": fit.agreeing,
+        "runner_up": fit.runner_up,
+        "bootstrap": outcome.inference.as_ref().map_or(0, |i| i.draws),
+        "j_dof": goodness.map(|g| g.dof),
+        "j_p_value": goodness.map(|g| g.p_value),
+        "worst_ratio": worst.map(|miss| miss.ratio),
+        "worst_tau_s": worst.map(|miss| tau_s(miss.level, settings.rate_hz)),
+        "notes": all_notes(outcome, settings),
+    }))
 }
 
-/// The facts of a fit that stand in the provenance of its model too.
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct FitRecord {
-    signals: String,
-    model: String,
-    replicates: usize,
-    recordings: usize,
-    trim: Option<usize>,
-    scales: usize,
-    objective: f64,
-    termination: Termination,
-    combinations: usize,
-    starts: usize,
-    agreeing: usize,
-    runner_up: Option<f64>,
-    bootstrap: usize,
-    j_dof: Option<usize>,
-    j_p_value: Option<f64>,
-    worst_ratio: Option<f64>,
-    worst_tau_s: Option<f64>,
-    notes: Vec<String>,
-}
-
-impl FitRecord {
-    pub(super) fn new(outcome: &Outcome, settings: &Settings) -> Self {
-        let fit = &outcome.fit;
-        let goodness = goodness(outcome);
-        let worst = outcome.misfit().map(|misfit| misfit.worst);
-        let is_trimmed = outcome.estimator == Estimator::DrAwv;
-        Self {
-            signals: outcome.scope.name(),
-            model: outcome.spec.to_string(),
-            replicates: outcome.replicates,
-            recordings: outcome.recordings,
-            trim: is_trimmed.then(|| settings.trim.count(outcome.replicates)),
-            scales: outcome.curve.levels.len(),
-            objective: fit.objective,
-            termination: fit.termination,
-            combinations: fit.combinations,
-            starts: fit.starts,
-            agreeing: fit.agreeing,
-            runner_up: fit.runner_up,
-            bootstrap: outcome.inference.as_ref().map_or(0, |i| i.draws),
-            j_dof: goodness.map(|g| g.dof),
-            j_p_value: goodness.map(|g| g.p_value),
-            worst_ratio: worst.map(|miss| miss.ratio),
-            worst_tau_s: worst.map(|miss| tau_s(miss.level, settings.rate_hz)),
-            notes: all_notes(outcome, settings),
-        }
+fn object(json: Value) -> Map<String, Value> {
+    match json {
+        Value::Object(map) => map,
+        _ => Map::new(),
     }
 }
 
-/// A fit.
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct FitEntry<'a> {
-    /// Its name among the fits.
-    name: String,
-    sensor: Sensor,
-    axis: &'static str,
-    estimator: &'static str,
-    #[serde(flatten)]
-    record: FitRecord,
-    /// The models it was chosen from, best first; empty where it was given.
-    ranking: Vec<Value>,
-    reasons: Vec<String>,
-    /// The processes, with the keys of model files.
-    processes: Vec<Value>,
-    goodness: Option<Goodness>,
-    spread: &'a [LevelSpread],
-    /// Probability that replicates of one noise differ as much at some scale; none of a single signal.
-    spread_p_value: Option<f64>,
-    /// Parameters that differ between recordings, as laws of model files.
-    parameter_spread: Vec<Value>,
-    /// Alike processes that cannot be told apart.
-    indistinct: Option<Value>,
-    /// N, B and K; Q of quantization noise, T of correlated processes, R of a ramp.
-    figures: BTreeMap<String, Figure>,
-    /// Scales at which curve and model differ by more than four standard deviations.
-    missed: Vec<Value>,
-    /// Processes whose amplitude is zero.
-    zero: Vec<String>,
-    /// Processes whose correlation time lies at the end of its range.
-    at_end: Vec<String>,
-}
-
-impl<'a> FitEntry<'a> {
-    pub(super) fn new(outcome: &'a Outcome, all: &[&Outcome], settings: &Settings) -> Self {
-        let rate_hz = settings.rate_hz;
-        let inference = outcome.inference.as_ref();
-        let labels = outcome.fit.composite.labels();
-        let labelled = |processes: &[usize]| -> Vec<String> {
-            processes.iter().map(|i| labels[*i].clone()).collect()
-        };
-        let miss = |m: &Miss| json!({ "tau_s": tau_s(m.level, rate_hz), "ratio": m.ratio, "deviations": m.deviations });
-        let ranking = outcome.ranking.as_ref();
-        Self {
-            name: fit_name(outcome, all),
-            sensor: outcome.scope.sensor,
-            axis: outcome.scope.axis.map_or("all", |a| a.name()),
-            estimator: outcome.estimator.name(),
-            record: FitRecord::new(outcome, settings),
-            ranking: ranking.map_or(Vec::new(), candidates),
-            reasons: ranking.map_or(Vec::new(), |r| reasons(r, rate_hz)),
-            processes: processes(&outcome.fit.composite, intervals(outcome)),
-            goodness: goodness(outcome),
-            spread: inference.map_or(&[], |i| &i.spread),
-            spread_p_value: inference.and_then(|i| i.alike),
-            parameter_spread: inference
-                .iter()
-                .flat_map(|i| &i.varying)
-                .map(|found| {
-                    json!({
-                        "process": labels[found.of.process],
-                        "parameter": found.of.parameter.name(),
-                        "distribution": "lognormal",
-                        "median": found.median,
-                        "median_ci95": found.median_ci95,
-                        "sd": found.sd,
-                        "sd_ci95": found.sd_ci95,
-                    })
-                })
-                .collect(),
-            indistinct: inference.and_then(|i| i.indistinct.as_ref()).map(|i| {
-                json!({
-                    "processes": labelled(&i.processes),
-                    "simpler": i.spec.to_string(),
-                    "p_value": i.p_value,
-                    "simpler_processes": processes(&i.composite, &i.intervals),
-                })
-            }),
-            figures: figures(outcome, rate_hz),
-            missed: outcome.departure().missed.iter().map(miss).collect(),
-            zero: labelled(&outcome.fit.zero),
-            at_end: labelled(&outcome.fit.at_end),
-        }
-    }
+/// A fit: its record, models and figures. `axis` is `all` of pooled axes; `spread_p_value` is the probability that
+/// replicates of one noise differ as much at some scale; `parameter_spread` are laws of model files; `missed` are the
+/// scales at which curve and model differ by more than four standard deviations; `zero` are the processes whose amplitude
+/// is zero, `at_end` those whose correlation time lies at the end of its range.
+pub(super) fn fit_json(outcome: &Outcome, all: &[&Outcome], settings: &Settings) -> Value {
+    let (fit, rate_hz) = (&outcome.fit, settings.rate_hz);
+    let (inference, ranking) = (outcome.inference.as_ref(), outcome.ranking.as_ref());
+    let labels = fit.composite.labels();
+    let labelled = |processes: &[usize]| -> Vec<&str> {
+        processes.iter().map(|i| labels[*i].as_str()).collect()
+    };
+    let miss = |m: &Miss| json!({ "tau_s": tau_s(m.level, rate_hz), "ratio": m.ratio, "deviations": m.deviations });
+    let missed: Vec<Value> = outcome.departure().missed.iter().map(miss).collect();
+    let law = |found: &ParameterSpread| {
+        json!({
+            "process": labels[found.of.process],
+            "parameter": found.of.parameter.name(),
+            "distribution": "lognormal",
+            "median": found.median,
+            "median_ci95": found.median_ci95,
+            "sd": found.sd,
+            "sd_ci95": found.sd_ci95,
+        })
+    };
+    let laws: Vec<Value> = inference.iter().flat_map(|i| &i.varying).map(law).collect();
+    let indistinct = inference.and_then(|i| i.indistinct.as_ref()).map(|i| {
+        json!({
+            "processes": labelled(&i.processes),
+            "simpler": i.spec.to_string(),
+            "p_value": i.p_value,
+            "simpler_processes": processes(&i.composite, &i.intervals),
+        })
+    });
+    let mut record = fit_record(outcome, settings);
+    record.extend(object(json!({
+        "name": fit_name(outcome, all),
+        "sensor": outcome.scope.sensor,
+        "axis": outcome.scope.axis.map_or("all", |axis| axis.name()),
+        "estimator": outcome.estimator,
+        "ranking": ranking.map_or(Vec::new(), candidates),
+        "reasons": ranking.map_or(Vec::new(), |r| reasons(r, rate_hz)),
+        "processes": processes(&fit.composite, intervals(outcome)),
+        "goodness": goodness(outcome),
+        "spread": inference.map_or(&[][..], |i| &i.spread),
+        "spread_p_value": inference.and_then(|i| i.alike),
+        "parameter_spread": laws,
+        "indistinct": indistinct,
+        "figures": figures(outcome, rate_hz),
+        "missed": missed,
+        "zero": labelled(&fit.zero),
+        "at_end": labelled(&fit.at_end),
+    })));
+    record.into()
 }
 
 pub(super) fn goodness(outcome: &Outcome) -> Option<Goodness> {
@@ -210,32 +148,22 @@ pub(super) fn interval_of(
     intervals.iter().find(|i| i.of == of)
 }
 
-/// The means of one sensor, by the model of one estimator.
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct TurnOnEntry<'a> {
-    #[serde(flatten)]
-    pub found: &'a TurnOnSpread,
-    sigmas: Option<[f64; 3]>,
-    spread: f64,
-    noise: f64,
-    relative_error: f64,
-    /// Both probabilities are below it where a bias is seen.
-    level: f64,
-    pub remark: String,
-}
-
-impl<'a> TurnOnEntry<'a> {
-    pub(super) fn new(found: &'a TurnOnSpread) -> Self {
-        Self {
-            found,
-            sigmas: found.sigmas(),
-            spread: found.spread(),
-            noise: found.noise(),
-            relative_error: found.relative_error(),
-            level: TURN_ON_LEVEL,
-            remark: turn_on_remark(found),
-        }
-    }
+/// The means of one sensor, by the model of one estimator; where a bias is seen both probabilities are below `level`.
+pub(super) fn turn_on_json(found: &TurnOnSpread) -> Value {
+    json!({
+        "sensor": found.sensor,
+        "estimator": found.estimator,
+        "finding": found.finding,
+        "sigmas": found.sigmas(),
+        "spread": found.spread(),
+        "noise": found.noise(),
+        "relative_error": found.relative_error(),
+        "p_noise": found.p_noise,
+        "p_drift": found.p_drift,
+        "level": TURN_ON_LEVEL,
+        "axes": found.axes,
+        "remark": turn_on_remark(found),
+    })
 }
 
 /// A figure of a model, in the unit of data sheets.

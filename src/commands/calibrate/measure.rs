@@ -1,7 +1,7 @@
 //! Calibration: from static recordings, or directories of them, to a noise model for each sensor or axis.
 
 use super::document::ShownCalibration;
-use super::fits::{CalibrationFile, FitEntry, TurnOnEntry};
+use super::fits::{fit_json, turn_on_json};
 use crate::app::reading::note_report;
 use crate::app::{Context, Failure};
 use crate::io::recordings::{FileReport, ReadOptions, Report};
@@ -17,6 +17,7 @@ use nav_sim_signal::names::UnknownName;
 use nav_sim_signal::noise::Model;
 use nav_sim_signal::wavelet::{Curve, Tuning, default_levels};
 use rayon::prelude::*;
+use serde_json::json;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -271,17 +272,20 @@ impl Calibration {
             .collect();
         let fits = outcomes
             .iter()
-            .map(|o| FitEntry::new(o, &outcomes, &self.settings));
+            .map(|o| fit_json(o, &outcomes, &self.settings));
         let turn_on = self.turn_on.iter().filter(|t| is_shown(t.estimator));
+        let turn_on: Vec<&TurnOnSpread> = turn_on.collect();
         ShownCalibration {
-            file: CalibrationFile {
-                schema_version: 1,
-                rate_hz: self.settings.rate_hz,
-                model: self.settings.model.to_string(),
-                fits: fits.collect(),
-                replicates: &self.diagnoses,
-                turn_on: turn_on.map(TurnOnEntry::new).collect(),
-            },
+            json: json!({
+                "schema_version": 1,
+                "rate_hz": self.settings.rate_hz,
+                "model": self.settings.model.to_string(),
+                "fits": fits.collect::<Vec<_>>(),
+                "replicates": self.diagnoses,
+                "turn_on": turn_on.iter().map(|t| turn_on_json(t)).collect::<Vec<_>>(),
+            }),
+            diagnoses: &self.diagnoses,
+            turn_on,
             curves: CurvesFile::new(&self.groups, &outcomes, &self.settings),
             outcomes,
             beginnings: &self.beginnings,

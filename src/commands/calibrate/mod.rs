@@ -26,7 +26,7 @@ mod fits;
 mod measure;
 mod model_file;
 
-pub(crate) use document::{CAPTION, variance as variance_chart};
+pub(crate) use document::variance as variance_chart;
 pub use measure::{Calibration, CalibrationOptions, EstimatorChoice, calibrate};
 pub(crate) use measure::{Measured, measure, visit, without_warm_up};
 pub(crate) use model_file::CalibrationNote;
@@ -241,7 +241,7 @@ impl Serialize for CalibrationAnswer {
         &self,
         serializer: S,
     ) -> std::result::Result<S::Ok, S::Error> {
-        self.calibration.shown(None).file.serialize(serializer)
+        self.calibration.shown(None).json.serialize(serializer)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The model file of a calibration.
 
-use super::document::ShownCalibration;
-use super::fits::FitRecord;
+use super::document::{ShownCalibration, turn_on_remark};
+use super::fits::fit_record;
 use crate::app::Input;
 use crate::io::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn};
 use nav_sim_calibration::{Estimator, Outcome, ParameterSpread, Settings, model_of};
@@ -39,10 +39,10 @@ impl CalibrationNote {
         provenance.insert("curves_blake3".to_owned(), curves.into());
         let mut remarks = Table::new();
         let mut turn_on = TurnOn::default();
-        for entry in &shown.file.turn_on {
-            let sensor = entry.found.sensor;
-            remarks.insert(sensor.name().to_owned(), entry.remark.as_str().into());
-            let sigmas = entry.found.sigmas().map(|sigmas| {
+        for found in &shown.turn_on {
+            let sensor = found.sensor;
+            remarks.insert(sensor.name().to_owned(), turn_on_remark(found).into());
+            let sigmas = found.sigmas().map(|sigmas| {
                 Axis::ALL.map(
                     |axis| match file.missing.contains(&Channel { sensor, axis }) {
                         true => 0.0,
@@ -89,11 +89,13 @@ impl CalibrationNote {
         for (key, value) in &self.reading {
             put(key, value.clone());
         }
-        let fits: Vec<FitRecord> = outcomes
-            .iter()
-            .map(|o| FitRecord::new(o, settings))
-            .collect();
-        put("fits", Value::try_from(fits).expect("plain structs"));
+        let known = |outcome: &&Outcome| {
+            let mut record = fit_record(outcome, settings);
+            record.retain(|_, value| !value.is_null());
+            record
+        };
+        let fits: Vec<_> = outcomes.iter().map(known).collect();
+        put("fits", Value::try_from(fits).expect("numbers and texts"));
         put(
             "inputs",
             Value::try_from(&self.inputs).expect("plain structs"),
