@@ -170,7 +170,7 @@ impl Answer for SignalsFile {
         };
         let count = recordings(self).len();
         let head = format!(
-            "Allan deviation over averages, median of {count} recordings; ratio: robust/classical, * less than by chance"
+            "Allan deviation over averages, median of recordings ({count}); ratio: robust/classical, * less than by chance"
         );
         let title = "Wavelet variance of static recordings";
         let mut document = Document::new(title, tone, [verdict, head]);

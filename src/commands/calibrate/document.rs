@@ -475,9 +475,14 @@ fn recordings_line(outcomes: &[&Outcome], diagnoses: &[Diagnosis]) -> Option<Str
             "{count} recordings: too few to name an abnormal one (4 are needed)"
         ));
     }
-    let finding = |d: &Diagnosis| match d.verdict {
-        Verdict::Noise => format!("{} noise", d.sensor),
-        verdict => format!("{} {verdict}", d.sensor),
+    let finding = |d: &Diagnosis| {
+        let found = [
+            ("noise", d.noise.is_some()),
+            ("outliers", d.outliers.is_some()),
+            ("drift", d.drift.is_some()),
+        ];
+        let found: Vec<&str> = found.into_iter().filter(|f| f.1).map(|f| f.0).collect();
+        format!("{} {}", d.sensor, found.join(" and "))
     };
     let mut abnormal = Vec::new();
     for (name, shown) in names.iter().zip(recording_names(names.iter().copied())) {

@@ -115,10 +115,10 @@ lio_sam:
         template: "{head # |}
 # Keys and units: FAST-LIO2 and FAST-LIVO2, config/*.yaml; paste in the place of the same keys
 mapping:
-    acc_cov: {accel.N^2*f (m/s^2)^2}  # {unit}; N^2 f, of a sample at {f} Hz
-    gyr_cov: {gyro.N^2*f (rad/s)^2}  # {unit}; N^2 f, of a sample at {f} Hz
-    b_acc_cov: {accel.K^2*f (m/s^3)^2}  # {unit}; K^2 f, of a sample at {f} Hz
-    b_gyr_cov: {gyro.K^2*f (rad/s^2)^2}  # {unit}; K^2 f, of a sample at {f} Hz",
+    acc_cov: {accel.N^2*f (m/s^2)^2}  # {unit}; N^2 f, of a sample at {f} Hz{shipped 0.1}
+    gyr_cov: {gyro.N^2*f (rad/s)^2}  # {unit}; N^2 f, of a sample at {f} Hz{shipped 0.1}
+    b_acc_cov: {accel.K^2*f (m/s^3)^2}  # {unit}; K^2 f, of a sample at {f} Hz{shipped 0.0001}
+    b_gyr_cov: {gyro.K^2*f (rad/s^2)^2}  # {unit}; K^2 f, of a sample at {f} Hz{shipped 0.0001}",
         ..WALK
     },
     // The nine numbers of the message: the variance of a sample's white noise, N²f. What moves slowly is no noise of a sample, and
@@ -453,7 +453,14 @@ impl Export {
                             line += "; the model states no turn-on bias";
                         }
                     }
-                    ("unit", _) => {}
+                    ("shipped", Some(entry)) if entry.value > 0.0 => {
+                        let times = (argument.parse().unwrap_or(f64::NAN) / entry.value).sqrt();
+                        let times = nav_sim_document::readable(times);
+                        line += &format!(
+                            "; the shipped {argument} is {times} times its standard deviation"
+                        );
+                    }
+                    ("shipped" | "unit", _) => {}
                     _ => {
                         let (shown, entry) = self.value(name, argument, &line);
                         line += &shown;

@@ -537,7 +537,7 @@ fn lio_sam_has_densities() {
 }
 
 /// FAST-LIO's own recursion, P ← F P Fᵀ + (dt·f_w) Q (dt·f_w)ᵀ: in a second of 200 samples the white noise makes a velocity or
-/// angle of N², and the bias grows by K².
+/// angle of N², and the bias grows by K². The shipped values are told by how many standard deviations of these they are.
 #[test]
 fn fast_lio_has_variances_of_a_sample() {
     let export = walks("fast-lio");
@@ -556,6 +556,12 @@ fn fast_lio_has_variances_of_a_sample() {
             "{noise}"
         );
     }
+    // √(0.1/(200 N²)): √5e-4/(0.02/60) = 67.1
+    let text = export.text("m");
+    assert!(
+        text.contains("the shipped 0.1 is 67.1 times its standard deviation"),
+        "{text}"
+    );
 }
 
 /// Gazebo's own recursion in its variances: the bias of each sample ends at that of the model and keeps exp(−dt/τ) of itself,
