@@ -1,11 +1,11 @@
 //! The choice of the noise model for a filter, by the recordings themselves.
 //!
-//! One recording at a time is left out. Every [`Candidate`](candidates::Candidate) is calibrated on the others and navigates on windows of the
+//! One recording at a time is left out. Every [`Candidate`] is calibrated on the others and navigates on windows of the
 //! one left out, whose errors are new to it; all candidates have the same windows and fixes. Candidates are judged by
 //! the [`Score`](ranking::Score) at the ends of outages, above all the mean log density of the true error under the filter's belief:
 //! a proper score ([Gneiting and Raftery 2007](https://doi.org/10.1198/016214506000001437)), which a filter cannot
 //! raise by claiming more, or less, than it knows. The recording is the unit of every interval, not the window:
-//! windows of one recording share its noise. [`Ranking`](ranking::Ranking) compares candidates pair by pair, recording by recording.
+//! windows of one recording share its noise. [`Ranking`] compares candidates pair by pair, recording by recording.
 
 pub mod candidates;
 mod document;
