@@ -8,17 +8,7 @@ fn what_is_printed_fits_a_screen() {
     let dir = tempfile::tempdir().unwrap();
     recordings(dir.path(), 4);
     let lines = |more: &[&str]| {
-        let arguments = [
-            "calibrate",
-            "runs",
-            "--bootstrap",
-            "19",
-            "--no-progress",
-            "--seed",
-            "1",
-            "-o",
-            "m.toml",
-        ];
+        let arguments = "calibrate runs --bootstrap 19 --no-progress --seed 1 -o m.toml".split(' ');
         let output = nav_sim(dir.path())
             .args(arguments)
             .args(more)
@@ -100,18 +90,8 @@ fn practitioners_parameters_are_those_of_export() {
         "processes = [{ type = \"WN\", sigma2 = 4e-6 }, { type = \"RW\", gamma2 = 1e-12 }]";
     let model = format!("schema = 1\nrate_hz = 50.0\n[accel]\n{processes}\n[gyro]\n{processes}\n");
     std::fs::write(dir.path().join("imu.toml"), model).unwrap();
-    let synthesize = [
-        "synthesize",
-        "imu.toml",
-        "--replicates",
-        "3",
-        "--samples",
-        "16384",
-        "--seed",
-        "1",
-        "-o",
-        "made",
-    ];
+    let synthesize =
+        "synthesize imu.toml --replicates 3 --samples 16384 --seed 1 -o made".split(' ');
     nav_sim(dir.path()).args(synthesize).assert().success();
     let calibrate = [
         "calibrate",
@@ -174,19 +154,8 @@ fn bad_data_are_told_in_a_line() {
         });
         std::fs::write(&path, doctored.collect::<String>()).unwrap();
     }
-    let fit = [
-        "calibrate",
-        "runs",
-        "--model",
-        "WN",
-        "--bootstrap",
-        "39",
-        "--seed",
-        "1",
-        "-o",
-        "m.toml",
-        "--no-progress",
-    ];
+    let fit =
+        "calibrate runs --model WN --bootstrap 39 --seed 1 -o m.toml --no-progress".split(' ');
     let output = nav_sim(dir.path()).args(fit).assert().success();
     let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
     let first = text.lines().next().unwrap();
@@ -222,19 +191,8 @@ fn terminal_and_page_name_the_same_scale() {
         text += &format!("{},{:e},{edof}\n", 1_u64 << level, factor * white);
     }
     std::fs::write(dir.path().join("curve.csv"), text).unwrap();
-    let fit = [
-        "calibrate",
-        "--curve",
-        "curve.csv",
-        "--axes",
-        "gyro",
-        "--model",
-        "WN",
-        "--rate-hz",
-        "100",
-        "-o",
-        "m.toml",
-    ];
+    let fit =
+        "calibrate --curve curve.csv --axes gyro --model WN --rate-hz 100 -o m.toml".split(' ');
     let output = nav_sim(dir.path()).args(fit).assert().success();
     let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
     let verdict = text.lines().next().unwrap().split_once(": ").unwrap().1;
@@ -458,33 +416,10 @@ fn a_gyroscope_louder_than_any_is_doubted() {
     let sigma2 = (0.3_f64 / 60.0).to_radians().powi(2) * 100.0;
     for (factor, is_doubted) in [(1.0, false), (1.0_f64.to_degrees().powi(2), true)] {
         std::fs::write(dir.path().join("imu.toml"), model(sigma2 * factor)).unwrap();
-        let make = [
-            "synthesize",
-            "imu.toml",
-            "--samples",
-            "4096",
-            "--axes",
-            "gyro",
-            "--seed",
-            "1",
-            "-o",
-            "r",
-            "--force",
-        ];
+        let make =
+            "synthesize imu.toml --samples 4096 --axes gyro --seed 1 -o r --force".split(' ');
         nav_sim(dir.path()).args(make).assert().success();
-        let fit = [
-            "calibrate",
-            "r",
-            "--estimator",
-            "gmwm",
-            "--model",
-            "WN",
-            "--seed",
-            "1",
-            "-o",
-            "m.toml",
-            "--force",
-        ];
+        let fit = "calibrate r --estimator gmwm --model WN --seed 1 -o m.toml --force".split(' ');
         let output = nav_sim(dir.path()).args(fit).assert().success();
         let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
         assert_eq!(

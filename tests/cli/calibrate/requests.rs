@@ -262,16 +262,8 @@ fn what_is_skipped_counts_in_the_advice() {
     }
     std::fs::write(dir.path().join("warm.csv"), text).unwrap();
     let said_with = |skip: &str| {
-        let arguments = [
-            "calibrate",
-            "warm.csv",
-            "--estimator",
-            "gmwm",
-            "--model",
-            "WN+RW",
-            "--bootstrap",
-            "0",
-        ];
+        let arguments =
+            "calibrate warm.csv --estimator gmwm --model WN+RW --bootstrap 0".split(' ');
         let output = nav_sim(dir.path())
             .args(arguments)
             .args(["--skip-s", skip])
