@@ -64,7 +64,6 @@ pub(crate) mod help {
     pub(crate) const COLUMN_NAMES: Help = of("columns", "name all columns with --columns");
     pub(crate) const REMOVE_LINE: Help = always("remove the line");
     pub(crate) const OUTPUT: Help = always("choose another output with --out");
-    pub(crate) const DIRECTORY: Help = always("choose another directory with --out");
     pub(crate) const FORCE: Help = always("name another place for it, or replace it with --force");
     pub(crate) const START_FILES: Help = always("start from the files that nav-sim init makes");
     pub(crate) const CHANNELS: Help = of("axes", "leave the axis out with --axes");

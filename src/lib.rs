@@ -74,8 +74,6 @@ pub mod app;
     reason = "help texts have sections of files and names to be filled in"
 )]
 pub mod commands;
-// Models to recordings.
-pub mod synthesize;
 // A directory to start from.
 mod init;
 // All that most programs need.

@@ -80,6 +80,14 @@ pub trait Command: clap::Args + Send + Sync + 'static {
         Ok(())
     }
 
+    /// Names of the files of [`Out::Directory`].
+    fn output_names(&self) -> Vec<Cow<'static, str>> {
+        match Self::OUT {
+            Out::Directory { files, .. } => files.iter().map(|name| (*name).into()).collect(),
+            _ => Vec::new(),
+        }
+    }
+
     /// Endings and kinds of the files beside [`Out::File`], itself included: "" is the file itself.
     fn endings(&self) -> Vec<(Cow<'static, str>, Written)> {
         match Self::OUT {
@@ -396,7 +404,10 @@ pub fn answered<C: Command>(
         Ok(())
     };
     match C::OUT {
-        Out::Directory { .. } => each_file(&answer, &document, &mut manifest, &context, keep)?,
+        Out::Directory { .. } => {
+            let page = C::PLOT.then_some(&document);
+            each_file(&answer, page, &mut manifest, &context, keep)?;
+        }
         _ => {
             let table = answer.csv().map(|text| OutputFile::whole(".csv", text));
             answer

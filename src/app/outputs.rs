@@ -7,7 +7,11 @@ use crate::io::atomic::{
 };
 use crate::io::input;
 use crate::report::json;
+use flate2::{Compression, write::GzEncoder};
 use nav_sim_document::{Document, Form, encode};
+use std::borrow::Cow;
+use std::ffi::OsStr;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Claims on all outputs of a command. Directories that were made for them and are empty go when this is dropped.
@@ -58,13 +62,22 @@ impl<C: Command> Asked<C> {
         let mut claims = Claims::default();
         claims.note_missing(self.out.iter().chain(&self.plots));
         match (C::OUT, &self.out) {
-            (Out::Directory { files, .. }, Some(out)) => {
-                let names: Vec<&str> = files.iter().copied().chain([PAGE, MANIFEST]).collect();
+            (Out::Directory { .. }, Some(out)) => {
+                let names = self.request.output_names();
                 let present = |text: &str| serde_json::from_str::<Manifest>(text).ok();
                 let recognise = |text: &str| {
-                    Ok(present(text)
-                        .map_or(Found::Foreign, |m| Found::result(m.key == manifest.key)))
+                    let Some(there) = present(text) else {
+                        return Found::Foreign;
+                    };
+                    let is_own = |name: &str| there.outputs.contains_key(name);
+                    let mut others = names.iter().filter(|name| !is_own(name));
+                    match others.any(|name| out.join(name.as_ref()).exists()) {
+                        true => Found::Foreign,
+                        false => Found::result(there.key == manifest.key),
+                    }
                 };
+                let own = [PAGE, MANIFEST].map(Cow::Borrowed);
+                let names = [&names[..], &own].concat();
                 let claimed = claim_directory(out, &names, inputs(), existing, recognise);
                 claims.own.push(claimed.map_err(|e| {
                     let there = std::fs::read_to_string(out.join(MANIFEST)).unwrap_or_default();
@@ -115,17 +128,19 @@ impl<C: Command> Asked<C> {
     ) -> Result<Vec<PathBuf>> {
         let mut written = Vec::new();
         match (C::OUT, &self.out) {
-            (Out::Directory { files, .. }, Some(out)) => {
+            (Out::Directory { .. }, Some(out)) => {
+                let before = std::fs::read_to_string(out.join(MANIFEST)).unwrap_or_default();
+                let before = serde_json::from_str::<Manifest>(&before).ok();
                 let mut directory = AtomicDir::create(out)?;
                 let give = |file: OutputFile<'_>| directory.write_parts(&file.name, file.parts);
-                each_file(answer, document, &mut manifest, context, give)?;
+                let page = C::PLOT.then_some(document);
+                each_file(answer, page, &mut manifest, context, give)?;
                 directory.commit()?;
                 // files of an earlier result that this one does not have
-                for old in files
-                    .iter()
-                    .filter(|name| !manifest.outputs.contains_key(**name))
-                {
-                    drop(std::fs::remove_file(out.join(old)));
+                for old in before.iter().flat_map(|before| before.outputs.keys()) {
+                    if !manifest.outputs.contains_key(old) {
+                        drop(std::fs::remove_file(out.join(old)));
+                    }
                 }
                 written.push(out.clone());
             }
@@ -134,7 +149,8 @@ impl<C: Command> Asked<C> {
                 let filled = answer.files().into_iter().map(|file| {
                     let path = beside(out, &file.name);
                     let text: String = file.parts.collect();
-                    Ok((atomic::filled(&path, text.as_bytes())?, path))
+                    let bytes = packed(&path, text).map_err(|e| Failure::io(&path, e))?;
+                    Ok((atomic::filled(&path, &bytes)?, path))
                 });
                 for (file, path) in filled.collect::<Result<Vec<_>>>()? {
                     file.commit()?;
@@ -154,7 +170,7 @@ impl<C: Command> Asked<C> {
 /// Gives the files of a directory: those of the answer, the page, and the manifest, with the hashes of the first, last.
 pub(super) fn each_file(
     answer: &impl Answer,
-    document: &Document,
+    page: Option<&Document>,
     manifest: &mut Manifest,
     context: &Context<'_>,
     mut give: impl FnMut(OutputFile<'_>) -> Result<()>,
@@ -175,8 +191,21 @@ pub(super) fn each_file(
     if let serde_json::Value::Object(record) = answer.record() {
         manifest.record = record;
     }
-    give(OutputFile::whole(PAGE, document.html()))?;
+    if let Some(page) = page {
+        give(OutputFile::whole(PAGE, page.html()))?;
+    }
     give(OutputFile::whole(MANIFEST, json(manifest)))
+}
+
+/// The bytes of a file: packed where its name ends in `.gz`.
+fn packed(path: &Path, text: String) -> std::io::Result<Vec<u8>> {
+    let is_packed = |ending: &OsStr| ending.eq_ignore_ascii_case("gz");
+    if !path.extension().is_some_and(is_packed) {
+        return Ok(text.into_bytes());
+    }
+    let mut packed = GzEncoder::new(Vec::new(), Compression::default());
+    packed.write_all(text.as_bytes())?;
+    packed.finish()
 }
 
 fn is_page(path: &Path) -> bool {

@@ -106,7 +106,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
                 false => document.terminal(WIDTH),
             };
             drive::tell(&document, &shown, session);
-            session.wrote(&request.directory());
+            session.say(format!("wrote {}", request.directory().display()));
         }
         Outcome::Partial(missing) if session.json() => {
             session.result(json!({ "schema_version": 1, "complete": false, "missing": missing }));

@@ -6,7 +6,6 @@ use crate::io::atomic::Existing;
 use crate::parse;
 use nav_sim_document::Note;
 use std::fmt::Display;
-use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Flags that mean the same in every command.
@@ -101,12 +100,6 @@ impl Session {
         }
     }
 
-    /// Puts a result to stdout: as JSON where that is asked for, else as text.
-    pub(crate) fn show(&self, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
-        let shown = if self.json() { json() } else { text() };
-        self.printer.result(shown.trim_end());
-    }
-
     /// Puts a result to stdout.
     pub(crate) fn result(&self, text: impl Display) {
         self.printer.result(&text.to_string());
@@ -115,26 +108,6 @@ impl Session {
     /// Says what is done.
     pub(crate) fn say(&self, text: impl Display) {
         self.printer.say(&text.to_string());
-    }
-
-    /// Says what is worth knowing to those who ask for more.
-    pub(crate) fn detail(&self, text: impl Display) {
-        self.printer.detail(&text.to_string());
-    }
-
-    /// Warns.
-    pub(crate) fn warn(&self, text: impl Display) {
-        self.printer.warn(&text.to_string());
-    }
-
-    /// Warns of each.
-    pub(crate) fn warn_all<T: Display>(&self, texts: impl IntoIterator<Item = T>) {
-        texts.into_iter().for_each(|text| self.warn(text));
-    }
-
-    /// Says that a file or a directory was written.
-    pub(crate) fn wrote(&self, path: &Path) {
-        self.say(format!("wrote {}", path.display()));
     }
 
     /// True if stdout gets JSON rather than text.
@@ -161,11 +134,6 @@ impl Session {
         self.common.verbose
     }
 
-    /// The seed: `--seed`, else the one given (of a file), else the default.
-    pub(crate) fn seed(&self, of_file: Option<u64>) -> u64 {
-        self.context().seed_or(of_file)
-    }
-
     /// Notes and progress of a job on this terminal, and the seed.
     pub(crate) fn context(&self) -> Context<'_> {
         Context::new(self, self.common.seed)
@@ -183,9 +151,7 @@ impl Session {
         }
         Progress::new(unit, total)
     }
-}
 
-impl Session {
     fn running(&self) -> MutexGuard<'_, Option<Progress>> {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -1,6 +1,5 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
-use super::pictures::claim_output;
 use super::{Cli, Failure, Session, drive};
 use crate::app::{Answer, inputs};
 use crate::commands::batch::{BatchRequest, Outcome};
@@ -45,7 +44,6 @@ pub(crate) struct Args {
 
 const IMU: &str = "calib_data/consumer_mems.toml";
 const TRAJECTORY: &str = "trajectories/land_vehicle.toml";
-const NO_INPUTS: [&Path; 0] = [];
 const SCENARIOS: [&str; 3] = ["I", "II", "III"];
 const ESTIMATORS: [&str; 3] = ["awv", "sr-awv", "dr-awv"];
 
@@ -57,7 +55,14 @@ struct Progress {
     samples: u64,
     runs: u64,
     commands_done: usize,
-    commands: usize,
+}
+
+fn foreign(path: &Path) -> Failure {
+    let message = format!(
+        "{} is not of this command: it is not replaced",
+        path.display()
+    );
+    Failure::input(message).hint("choose another directory with --out, or move it away")
 }
 
 impl Progress {
@@ -65,41 +70,18 @@ impl Progress {
     fn of(args: &Args, session: &Session) -> Result<Self, Failure> {
         let path = Self::path(&args.out);
         let there = std::fs::read_to_string(&path).ok();
-        let begun: Option<Self> = there
-            .as_ref()
-            .and_then(|text| serde_json::from_str(text).ok());
-        if there.is_some() && begun.is_none() {
-            let message = format!(
-                "{} is not of this command: it is not replaced",
-                path.display()
-            );
-            return Err(Failure::input(message)
-                .hint("choose another directory with --out, or move it away"));
-        }
+        let there = there.map(|text| serde_json::from_str::<Self>(&text));
+        let begun = there.transpose().map_err(|_| foreign(&path))?;
         let seed = begun.as_ref().map(|progress| progress.seed);
-        let seed = session
-            .asked_seed()
-            .or(seed)
-            .unwrap_or_else(|| session.seed(None));
         let new = Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            seed,
+            seed: session.context().seed_or(seed),
             samples: args.samples,
             runs: args.runs,
-            commands_done: 0,
-            commands: commands(args, seed).len(),
+            commands_done: begun.as_ref().map_or(0, |begun| begun.commands_done),
         };
         match begun {
-            Some(begun)
-                if begun
-                    == (Self {
-                        commands_done: begun.commands_done,
-                        ..new.clone()
-                    }) =>
-            {
-                Ok(begun)
-            }
-            Some(_) if session.existing() == Existing::Keep => {
+            Some(begun) if begun != new && session.existing() == Existing::Keep => {
                 let message = format!(
                     "{} is of a demo of another seed, size or version",
                     path.display()
@@ -107,6 +89,10 @@ impl Progress {
                 Err(Failure::input(message)
                     .hint("name another directory with --out, or replace it with --force"))
             }
+            Some(begun) if begun != new => Ok(Self {
+                commands_done: 0,
+                ..new
+            }),
             _ => Ok(new),
         }
     }
@@ -121,58 +107,43 @@ impl Progress {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let out = Path::new(&args.out);
+    let study = out.join("study.toml");
     if args.print {
-        let commands = commands(args, session.seed(None));
-        let mut lines: Vec<String> = commands.iter().map(|c| typed(c)).collect();
-        let (study, out) = (
-            shell_quoted(&study_of(&args.out).display().to_string()),
-            shell_quoted(&args.out),
-        );
-        let text = study_text(args, session.seed(None))?;
+        let seed = session.context().seed_or(None);
+        let mut lines: Vec<String> = commands(args, seed).iter().map(|c| typed(c)).collect();
+        let quoted = shell_quoted(&study.display().to_string());
         lines.push(format!(
-            "cat > {study} <<'END'\n{text}END\nnav-sim batch {study} -o {out}"
+            "cat > {quoted} <<'END'\n{}END\nnav-sim batch {quoted} -o {}",
+            study_text(args, seed)?,
+            shell_quoted(&args.out)
         ));
         session.result(lines.join("\n"));
         return Ok(());
     }
     refuse_the_impossible(args, session)?;
+    let (page, figures) = (out.join("report.html"), out.join("figures"));
     let _own = atomic::claim_file(&Progress::path(&args.out), [])?;
-    let own_page = |path: &Path| claim_output(Some(path), NO_INPUTS, Written::Page, session);
-    let _pages = [
-        own_page(&page(&args.out))?,
-        own_page(&figures_of(&args.out).join("index.html"))?,
-    ];
+    let own_page = |path: &Path| atomic::claim_result(path, [], Written::Page, session.existing());
+    let _pages = [own_page(&page)?, own_page(&figures.join("index.html"))?];
     let mut progress = Progress::of(args, session)?;
     let commands = commands(args, progress.seed);
-    let study = study_of(&args.out);
     if study.exists() && !Progress::path(&args.out).exists() {
-        let message = format!(
-            "{} is not of this command: it is not replaced",
-            study.display()
-        );
-        return Err(
-            Failure::input(message).hint("choose another directory with --out, or move it away")
-        );
+        return Err(foreign(&study));
     }
     // what was removed is made again
-    let done = commands
-        .iter()
-        .take(progress.commands_done)
-        .take_while(|c| is_there(c))
-        .count();
+    let done = commands.iter().take(progress.commands_done);
+    let done = done.take_while(|c| is_there(c)).count();
     if done > 0 {
-        let told = format!(
-            "{}: {done} of {} commands are done, seed {}",
-            args.out,
-            commands.len(),
-            progress.seed
-        );
-        session.say(&told);
+        let (out, count, seed) = (&args.out, commands.len(), progress.seed);
+        session.say(format!(
+            "{out}: {done} of {count} commands are done, seed {seed}"
+        ));
     }
     progress.write(&args.out)?;
     let bar = session.progress("commands", (commands.len() - done) as u64);
     for (i, command) in commands.iter().enumerate().skip(done) {
-        session.detail(format!("$ {}", typed(command)));
+        session.context().detail(format!("$ {}", typed(command)));
         let words = std::iter::once("nav-sim").chain(command.iter().map(String::as_str));
         let cli = Cli::try_parse_from(words).map_err(Failure::input)?;
         cli.command.run(&session.within(&cli.common, true))?;
@@ -184,7 +155,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     atomic::write(&study, study_text(args, progress.seed)?)?;
     let request = BatchRequest {
         study,
-        out: Some(PathBuf::from(&args.out)),
+        out: Some(out.to_owned()),
         states: ["pos_e_m", "roll_deg"].map(str::to_owned).to_vec(),
         force: session.existing() == Existing::Replace,
         ..BatchRequest::default()
@@ -193,36 +164,20 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Err(Failure::stopped("cells are in work elsewhere")
             .hint("the same command goes on where it was"));
     };
-    let found = found
-        .comparisons
-        .into_iter()
-        .next()
-        .map(|(_, comparison)| comparison);
-    let found = found.ok_or_else(|| Failure::could_not("there is nothing to compare"))?;
+    let found = found.comparisons.into_iter().next();
+    let (_, found) = found.ok_or_else(|| Failure::could_not("there is nothing to compare"))?;
     let found = Comparison {
         cause: "contamination costs".to_owned(),
         ..found
     };
-    drive::tell(
-        &found.document(),
-        &found.document().terminal(WIDTH),
-        session,
-    );
-    atomic::write(
-        &Path::new(&args.out).join("comparison.json"),
-        report::json(&found),
-    )?;
-    figures(&found, &args.out, session)?;
-    index(found, &args.out)?;
-    session.say(format!(
-        "all results on one page: {}",
-        page(&args.out).display()
-    ));
+    let document = found.document();
+    drive::tell(&document, &document.terminal(WIDTH), session);
+    atomic::write(&out.join("comparison.json"), report::json(&found))?;
+    write_figures(&found, out, &figures, session)?;
+    let links = links();
+    atomic::write(&page, Comparison { links, ..found }.document().html())?;
+    session.say(format!("all results on one page: {}", page.display()));
     Ok(())
-}
-
-fn study_of(out: &str) -> PathBuf {
-    Path::new(out).join("study.toml")
 }
 
 /// The study of the demo; its paths are relative to the directory of results where that is.
@@ -305,59 +260,48 @@ fn is_there(command: &[String]) -> bool {
     })
 }
 
-/// The page that leads to all others.
-fn page(out: &str) -> PathBuf {
-    Path::new(out).join("report.html")
-}
-
-/// The directory of the paper's figures.
-fn figures_of(out: &str) -> PathBuf {
-    Path::new(out).join("figures")
-}
-
-/// Writes that page: the comparison, with links to the pages of its models and runs.
-fn index(found: Comparison, out: &str) -> Result<(), Failure> {
-    let mut links = vec![(
-        "figures/index.html".to_owned(),
-        "the paper's figures".to_owned(),
-    )];
-    for name in names() {
-        links.push((
-            format!("models/{name}.html"),
-            format!("model {name}: curves and parameters"),
-        ));
-        links.push((
-            format!("cells/{name}/report.html"),
-            format!("navigation with {name}: errors and consistency"),
-        ));
-    }
-    atomic::write(&page(out), Comparison { links, ..found }.document().html())
+/// Links of the page to those of models and runs.
+fn links() -> Vec<(String, String)> {
+    let of_pair = |(scenario, estimator): (&str, &str)| {
+        let name = format!("{scenario}_{estimator}");
+        [
+            (
+                format!("models/{name}.html"),
+                format!("model {name}: curves and parameters"),
+            ),
+            (
+                format!("cells/{name}/report.html"),
+                format!("navigation with {name}: errors and consistency"),
+            ),
+        ]
+    };
+    let figures = ("figures/index.html".into(), "the paper's figures".into());
+    std::iter::once(figures)
+        .chain(pairs().flat_map(of_pair))
+        .collect()
 }
 
 /// Writes the paper's figures and a page of them; Figure 2 is of `examples/paper_section4.rs`.
-fn figures(found: &Comparison, out: &str, session: &Session) -> Result<(), Failure> {
-    let mut curves = Vec::new();
-    for (scenario, estimator) in SCENARIOS.iter().flat_map(|scenario| {
-        ESTIMATORS
-            .iter()
-            .map(move |estimator| (scenario, estimator))
-    }) {
-        let path = Path::new(out).join(format!("models/{scenario}_{estimator}.wv.json"));
+fn write_figures(
+    found: &Comparison,
+    out: &Path,
+    directory: &Path,
+    session: &Session,
+) -> Result<(), Failure> {
+    let curves = pairs().map(|(scenario, estimator)| {
+        let path = out.join(format!("models/{scenario}_{estimator}.wv.json"));
         let text = std::fs::read_to_string(&path).map_err(|e| Failure::io(&path, e))?;
-        let file = serde_json::from_str(&text).map_err(Failure::could_not)?;
-        let (scenario, estimator) = ((*scenario).to_owned(), (*estimator).to_owned());
-        curves.push(StudyCurves {
-            scenario,
-            estimator,
-            file,
-        });
-    }
+        Ok(StudyCurves {
+            scenario: scenario.to_owned(),
+            estimator: estimator.to_owned(),
+            file: serde_json::from_str(&text).map_err(Failure::could_not)?,
+        })
+    });
+    let curves = curves.collect::<Result<Vec<_>, Failure>>()?;
     let trajectory = inputs::trajectory(Path::new(TRAJECTORY), &session.context())?;
     let track = TrajectorySeries::of(&trajectory);
     let mut figures = paper_figures(&curves, &track, &found.outages);
     figures.push(found.figure());
-    let directory = figures_of(out);
-    std::fs::create_dir_all(&directory).map_err(|e| Failure::io(&directory, e))?;
     for figure in &figures {
         atomic::write(
             &directory.join(format!("fig{}.svg", figure.number)),
@@ -370,11 +314,10 @@ fn figures(found: &Comparison, out: &str, session: &Session) -> Result<(), Failu
 }
 
 /// Scenario and estimator of each model.
-fn names() -> Vec<String> {
+fn pairs() -> impl Iterator<Item = (&'static str, &'static str)> {
     SCENARIOS
-        .iter()
-        .flat_map(|s| ESTIMATORS.iter().map(move |e| format!("{s}_{e}")))
-        .collect()
+        .into_iter()
+        .flat_map(|scenario| ESTIMATORS.map(|estimator| (scenario, estimator)))
 }
 
 /// The commands, as words.

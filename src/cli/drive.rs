@@ -50,7 +50,7 @@ pub(super) fn tell(document: &Document, shown: &str, session: &Session) {
     }
     for note in document.spoken(session.verbose()) {
         match note.importance {
-            Importance::Warning => session.warn(&note.text),
+            Importance::Warning => session.printer.warn(&note.text),
             _ => session.say(format!("note: {}", note.text)),
         }
     }

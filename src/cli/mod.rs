@@ -1,7 +1,6 @@
 //! The command line: one file per subcommand, each its `Args` and a `run(args, &Session)`.
 
 mod batch;
-mod check;
 mod common;
 mod completions;
 mod demo;
@@ -9,17 +8,14 @@ mod drive;
 mod init;
 mod interrupt;
 mod man;
-mod pictures;
 mod printer;
 mod progress;
 mod schema;
-mod synthesize;
-mod trajectory;
 mod version;
 
 use crate::app::Asked;
+use crate::commands::trajectory::{TrajectoryArgs, TrajectoryCommand};
 use crate::commands::with_commands;
-use crate::parse;
 use clap::error::ErrorKind;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use drive::drive;
@@ -67,11 +63,9 @@ with_commands!(driven);
 enum Command {
     #[command(flatten)]
     Driven(Driven),
-    Synthesize(synthesize::Args),
-    Trajectory(trajectory::Args),
+    Trajectory(TrajectoryArgs),
     Batch(batch::Args),
     Demo(demo::Args),
-    Check(check::Args),
     Init(init::Args),
     Schema(schema::Args),
     Completions(completions::Args),
@@ -96,11 +90,14 @@ impl Command {
         }
         match self {
             Self::Driven(driven) => driven.run(session),
-            Self::Synthesize(args) => synthesize::run(&args, session),
-            Self::Trajectory(args) => trajectory::run(&args, session),
+            Self::Trajectory(args) => match &args.command {
+                TrajectoryCommand::Generate(asked) => drive(asked, session).map(drop),
+                TrajectoryCommand::Check(asked) => drive(asked, session).map(drop),
+                TrajectoryCommand::Convert(asked) => drive(asked, session).map(drop),
+                TrajectoryCommand::Record(asked) => drive(asked, session).map(drop),
+            },
             Self::Batch(args) => batch::run(&args, session),
             Self::Demo(args) => demo::run(&args, session),
-            Self::Check(args) => check::run(&args, session),
             Self::Init(args) => init::run(&args, session),
             Self::Schema(args) => schema::run(&args, session),
             Self::Completions(args) => completions::run(&args, session),

@@ -3,7 +3,6 @@
 use super::Failure;
 use super::common::{Color, Common};
 use crate::failure::system_words;
-use crate::io::fusion_files::Remark;
 use nav_sim_document::{Importance, Note, turns};
 use std::borrow::Cow;
 use std::io::{ErrorKind, IsTerminal, Write};
@@ -87,14 +86,6 @@ impl Printer {
             self.painted("warning:", "\x1b[1;33m"),
             safe(text)
         ));
-    }
-
-    /// Prints a remark on a file that was read, to stderr.
-    pub(crate) fn remark(&self, remark: &Remark) {
-        match remark {
-            Remark::Note(text) => self.say(&format!("note: {text}")),
-            Remark::Doubt(text) => self.warn(text),
-        }
     }
 
     /// A detail, to stderr, with `--verbose`.

@@ -2,6 +2,7 @@
 
 pub mod batch;
 pub mod calibrate;
+pub mod check;
 pub mod choose;
 pub mod compare;
 pub mod datasheet;
@@ -12,6 +13,8 @@ pub mod inspect;
 pub(crate) mod paper;
 pub mod require;
 pub mod run;
+pub mod synthesize;
+pub mod trajectory;
 pub mod tune;
 pub mod wv;
 
@@ -26,6 +29,7 @@ macro_rules! with_commands {
             Calibrate: crate::commands::calibrate::Calibrate,
             Choose: crate::commands::choose::Choose,
             Design: crate::commands::design::Design,
+            Synthesize: crate::commands::synthesize::Synthesize,
             Datasheet: crate::commands::datasheet::DatasheetArgs,
             Export: crate::commands::export::ExportArgs,
             Tune: crate::commands::tune::Tune,
@@ -34,6 +38,7 @@ macro_rules! with_commands {
             Compare: crate::commands::compare::Compare,
             Fuse: crate::commands::fuse::Fuse,
             Inspect: crate::commands::inspect::Inspect,
+            Check: crate::commands::check::CheckFiles,
         }
     };
 }

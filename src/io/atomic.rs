@@ -55,9 +55,8 @@ struct Temporary {
     _lock: Option<File>,
 }
 
-/// Ending of what is being written, and of a directory whose files are being moved to their places.
-const PARTIAL: &str = "partial";
-const MOVING: &str = "moving";
+/// Ending of what is being written.
+const PARTIAL: &str = ".partial";
 
 impl Temporary {
     fn new(path: PathBuf, lock: Option<File>) -> Self {
@@ -73,7 +72,7 @@ impl Temporary {
         static COUNT: AtomicU64 = AtomicU64::new(0);
         loop {
             let (process, count) = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
-            let name = format!(".{}.{process}-{count}.{PARTIAL}", name_of(destination));
+            let name = format!(".{}.{process}-{count}{PARTIAL}", name_of(destination));
             let path = destination.with_file_name(name);
             match make(&path) {
                 // left by a killed process whose number this one has now
@@ -84,9 +83,10 @@ impl Temporary {
     }
 
     /// The marker of an output, locked by the operating system: a process that is killed holds none. `None` while another
-    /// holds it.
-    fn marker(path: &Path) -> io::Result<Option<Self>> {
+    /// holds it. True if a killed process left it.
+    fn marker(path: &Path) -> io::Result<Option<(Self, bool)>> {
         loop {
+            let is_left = path.exists();
             let file = File::options()
                 .create(true)
                 .truncate(false)
@@ -99,7 +99,7 @@ impl Temporary {
                 // there are no locks here
                 Err(TryLockError::Error(_)) => None,
             };
-            return Ok(Some(Self::new(path.to_owned(), lock)));
+            return Ok(Some((Self::new(path.to_owned(), lock), is_left)));
         }
     }
 
@@ -148,21 +148,20 @@ fn parent_of(path: &Path) -> &Path {
     }
 }
 
-/// What killed writers of an output left under temporary names of that ending: for who holds its marker.
-fn abandoned(path: &Path, ending: &str) -> Vec<PathBuf> {
+/// Removes what killed writers of an output left under temporary names: for the holder of its marker.
+fn remove_abandoned(path: &Path) {
     let start = format!(".{}.", name_of(path));
     let is_left = |name: &str| {
-        let middle = name
-            .strip_prefix(&start)
-            .and_then(|rest| rest.strip_suffix(ending)?.strip_suffix('.'));
+        let rest = name.strip_prefix(&start);
+        let middle = rest.and_then(|rest| rest.strip_suffix(PARTIAL));
         middle.is_some_and(|m| m.bytes().all(|b| b.is_ascii_digit() || b == b'-'))
     };
-    let entries = fs::read_dir(parent_of(path))
-        .into_iter()
-        .flatten()
-        .flatten();
-    let left = entries.filter(|e| is_left(&e.file_name().to_string_lossy()));
-    left.map(|e| e.path()).collect()
+    let entries = fs::read_dir(parent_of(path)).into_iter().flatten();
+    for entry in entries.flatten() {
+        if is_left(&entry.file_name().to_string_lossy()) {
+            remove(&entry.path());
+        }
+    }
 }
 
 /// Writes a whole file.
@@ -255,7 +254,7 @@ impl Write for AtomicFile {
 ///
 /// If the destination exists (it may be a mount point, or hold files of the user), files of the same names are
 /// replaced and others left alone. The file declared last (a manifest, say) vanishes first and appears last:
-/// where it is, the rest is whole. Killed on the way, everything is still there, and [`recover`] finishes.
+/// where it is, the rest is whole.
 #[derive(Debug)]
 pub(crate) struct AtomicDir {
     destination: PathBuf,
@@ -263,8 +262,6 @@ pub(crate) struct AtomicDir {
     names: Vec<String>,
 }
 
-/// In a directory whose files are being moved: their names, a line each, in the order they were declared.
-const ORDER: &str = ".order";
 /// Temporary directories within a destination are named after this.
 const INSIDE: &str = "out";
 
@@ -280,7 +277,6 @@ impl AtomicDir {
                 Ok(_) => destination.join(INSIDE),
                 Err(_) => destination.to_owned(),
             };
-            recover(destination);
             fs::create_dir_all(parent_of(&path))?;
             Temporary::beside(&path, |path| fs::create_dir(path))
         };
@@ -350,64 +346,18 @@ impl AtomicDir {
         moved.map_err(|e| Failure::io(&self.destination, e))
     }
 
-    /// From the first rename on the new files are the ones that count: who is killed later leaves a directory
-    /// that [`recover`] takes further, so that no instant has neither the old files nor the new ones.
-    fn replace(&mut self) -> io::Result<()> {
-        let mut order = File::create(self.staging.path.join(ORDER))?;
-        order.write_all(self.names.join("\n").as_bytes())?;
-        order.sync_all()?;
-        // Windows renames no directory in which a file is open
-        drop(order);
-        let moving = self.staging.path.with_extension(MOVING);
-        self.staging.rename(&moving)?;
-        move_files(&moving, &self.destination)
-    }
-}
-
-/// Finishes what a writer of this directory had begun to put in place when it was killed. What cannot be
-/// finished (in a directory that may not be written to, say) stays as it is.
-pub(crate) fn recover(destination: &Path) {
-    if !abandoned(&destination.join(INSIDE), MOVING).is_empty()
-        && let Ok(Some(_marker)) = Temporary::marker(&destination.join(MARKER))
-    {
-        finish(destination);
-    }
-}
-
-fn finish(destination: &Path) {
-    for moving in abandoned(&destination.join(INSIDE), MOVING) {
-        drop(move_files(&moving, destination));
-    }
-}
-
-/// Moves files to their places and removes the directory they were in. May be done again from any point.
-fn move_files(moving: &Path, destination: &Path) -> io::Result<()> {
-    let _interrupts_wait = locked(&UNFINISHED);
-    let order = match fs::read_to_string(moving.join(ORDER)) {
-        Err(e) if e.kind() == ErrorKind::NotFound => String::new(), // all moved, the rest being removed
-        order => order?,
-    };
-    let mut names = order
-        .lines()
-        .filter(|name| moving.join(name).exists())
-        .peekable();
-    if let (Some(_), Some(last)) = (names.peek(), order.lines().last()) {
-        match step(|| fs::remove_file(destination.join(last))) {
+    fn replace(&self) -> io::Result<()> {
+        let _interrupts_wait = locked(&UNFINISHED);
+        let last = self.names.last().map(|last| self.destination.join(last));
+        match last.map_or(Ok(()), fs::remove_file) {
             Err(e) if e.kind() != ErrorKind::NotFound => return Err(e),
             _ => {}
         }
+        let mut names = self.names.iter();
+        names.try_for_each(|name| {
+            fs::rename(self.staging.path.join(name), self.destination.join(name))
+        })
     }
-    for name in names {
-        step(|| fs::rename(moving.join(name), destination.join(name)))?;
-    }
-    step(|| fs::remove_dir_all(moving))
-}
-
-/// A change of the file system; tests are killed before one of them.
-fn step(change: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
-    #[cfg(test)]
-    tests::before_step()?;
-    change()
 }
 
 /// Outputs that are this command's own until this is dropped.
@@ -416,6 +366,8 @@ fn step(change: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
 pub(crate) struct Claim {
     outputs: Vec<PathBuf>,
     _marker: Option<Temporary>,
+    /// True if a process was killed that had claimed the same.
+    is_left: bool,
 }
 
 /// Name of the marker in a directory of outputs; ending of the one beside an output.
@@ -430,7 +382,7 @@ impl Claim {
             return Err(refused(shown, why).or(help::OUTPUT));
         }
         let marked = fs::create_dir_all(parent_of(marker)).and_then(|()| Temporary::marker(marker));
-        let Some(marked) = marked.map_err(|e| Failure::unwritable(shown, e))? else {
+        let Some((marker, is_left)) = marked.map_err(|e| Failure::unwritable(shown, e))? else {
             return Err(refused(shown, "is being written by another nav-sim")
                 .or(help::OUTPUT)
                 .or_hint("wait until that is done"));
@@ -438,7 +390,8 @@ impl Claim {
         claimed.extend(outputs.iter().cloned());
         Ok(Self {
             outputs,
-            _marker: Some(marked),
+            _marker: Some(marker),
+            is_left,
         })
     }
 
@@ -498,13 +451,12 @@ pub(crate) fn claim_file<'a>(
         return Ok(Claim {
             outputs: Vec::new(),
             _marker: None,
+            is_left: false,
         });
     }
     let output_at = resolved(output);
     let claim = Claim::new(output, &marker_beside(&output_at), vec![output_at.clone()])?;
-    abandoned(&output_at, PARTIAL)
-        .iter()
-        .for_each(|left| remove(left));
+    remove_abandoned(&output_at);
     Ok(claim)
 }
 
@@ -561,8 +513,8 @@ pub(crate) enum Existing {
 }
 
 /// Claims a directory before the work whose results are to be written there: none of `files` is an input, the
-/// directory is new, empty, or of this command, and what it holds is the same or to be replaced. Finishes what a
-/// killed command had begun to put in place. Nothing is left: a command that is interrupted leaves no trace.
+/// directory is new, empty, or of this command, and what it holds is the same or to be replaced. Nothing is left: a
+/// command that is interrupted leaves no trace.
 ///
 /// `recognise` is given the text of the last of `files`, if it is there.
 ///
@@ -573,20 +525,21 @@ pub(crate) fn claim_directory<'a>(
     files: &[impl AsRef<str>],
     inputs: impl Iterator<Item = &'a Path> + Clone,
     existing: Existing,
-    recognise: impl FnOnce(&str) -> Result<Found, Failure>,
+    recognise: impl FnOnce(&str) -> Found,
 ) -> Result<Claim, Failure> {
     for name in files {
         guard_inputs(&directory.join(name.as_ref()), inputs.clone())?;
     }
     AtomicDir::create(directory)?; // dropped at once
     let claim = Claim::of_directory(directory, files)?;
-    finish(directory);
-    let left = [directory, &directory.join(INSIDE)].map(|path| abandoned(path, PARTIAL));
-    left.concat().iter().for_each(|left| remove(left));
+    remove_abandoned(directory);
+    remove_abandoned(&directory.join(INSIDE));
     let last = directory.join(files.last().map_or("", AsRef::as_ref));
     let found = match fs::read_to_string(&last) {
+        // killed where it put its files in place
+        Err(_) if claim.is_left => Found::Same,
         Err(_) => empty_or_new(directory),
-        Ok(text) => recognise(&text)?,
+        Ok(text) => recognise(&text),
     };
     replaceable(directory, found, existing)?;
     Ok(claim)
@@ -623,63 +576,53 @@ pub enum Written {
 /// Most of a file that is looked at (bytes).
 const HEAD: u64 = 1 << 20;
 
-impl Written {
-    const ALL: [Self; 13] = [
-        Self::Calibrated,
-        Self::Datasheet,
-        Self::Required,
-        Self::Tuned,
-        Self::Curves,
-        Self::Draws,
-        Self::Signals,
-        Self::Comparison,
-        Self::Export,
-        Self::Page,
-        Self::Svg,
-        Self::Png,
-        Self::Trajectory,
-    ];
-
-    /// Texts that every file of the kind has.
-    const fn marks(self) -> [&'static str; 2] {
-        const MODEL: &str = "program = \"nav-sim ";
-        const JSON: &str = "\"schema_version\"";
-        match self {
-            Self::Calibrated => [MODEL, "[[provenance.fits]]"],
-            Self::Datasheet => [MODEL, "estimator = \"datasheet\""],
-            Self::Required => [MODEL, "made_by = \"require\""],
-            Self::Tuned => [MODEL, "made_by = \"tune\""],
-            Self::Curves => [JSON, "\"curves\""],
-            Self::Draws => [JSON, "\"draws\""],
-            Self::Signals => [JSON, "\"edof_method\""],
-            Self::Comparison => [JSON, "\"paired\""],
-            Self::Export => ["(nav-sim export)", ""],
-            Self::Page => ["<meta name=\"generator\" content=\"nav-sim\">", ""],
-            Self::Svg => ["<svg", "class=\"chart wide\""],
-            Self::Png => ["PNG", "Software\0nav-sim"],
-            Self::Trajectory => [
+/// Texts that every file of a kind has.
+const MARKS: [(Written, [&str; 2]); 13] = {
+    const MODEL: &str = "program = \"nav-sim ";
+    const JSON: &str = "\"schema_version\"";
+    [
+        (Written::Calibrated, [MODEL, "[[provenance.fits]]"]),
+        (Written::Datasheet, [MODEL, "estimator = \"datasheet\""]),
+        (Written::Required, [MODEL, "made_by = \"require\""]),
+        (Written::Tuned, [MODEL, "made_by = \"tune\""]),
+        (Written::Curves, [JSON, "\"curves\""]),
+        (Written::Draws, [JSON, "\"draws\""]),
+        (Written::Signals, [JSON, "\"edof_method\""]),
+        (Written::Comparison, [JSON, "\"paired\""]),
+        (Written::Export, ["(nav-sim export)", ""]),
+        (
+            Written::Page,
+            ["<meta name=\"generator\" content=\"nav-sim\">", ""],
+        ),
+        (Written::Svg, ["<svg", "class=\"chart wide\""]),
+        (Written::Png, ["PNG", "Software\0nav-sim"]),
+        (
+            Written::Trajectory,
+            [
                 "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n",
                 "",
             ],
-        }
-    }
+        ),
+    ]
+};
 
+impl Written {
     /// What stands at a path where a file of this kind is to be written.
     fn found(self, path: &Path) -> Found {
         let Some(text) = head(path) else {
-            return if path.exists() {
-                Found::Foreign
-            } else {
-                Found::Same
+            return match path.exists() {
+                true => Found::Foreign,
+                false => Found::Same,
             };
         };
-        let is_of = |kind: &Self| {
-            kind.marks().iter().all(|mark| text.contains(mark)) && kind.is_as_written(&text)
+        let is_of = |(kind, marks): &&(Self, [&str; 2])| {
+            marks.iter().all(|mark| text.contains(mark)) && kind.is_as_written(&text)
         };
-        match () {
-            () if text.is_empty() || is_of(&self) => Found::Same,
-            () if Self::ALL.iter().any(is_of) => Found::Other("holds another kind of result"),
-            () => Found::Foreign,
+        let kinds: Vec<Self> = MARKS.iter().filter(is_of).map(|(kind, _)| *kind).collect();
+        match kinds[..] {
+            _ if text.is_empty() || kinds.contains(&self) => Found::Same,
+            [] => Found::Foreign,
+            _ => Found::Other("holds another kind of result"),
         }
     }
 

@@ -1,7 +1,6 @@
 //! Outputs appear whole or not at all, whoever is killed.
 
 use super::*;
-use std::cell::Cell;
 
 fn listing(dir: &Path) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(dir)
@@ -24,23 +23,6 @@ fn a_file_appears_at_commit_only() {
     assert_eq!(listing(path.parent().unwrap()), ["model.toml"]);
 }
 
-thread_local! {
-    static STEPS_LEFT: Cell<usize> = const { Cell::new(usize::MAX) };
-}
-
-/// Lets this thread take so many steps more before it is killed.
-fn kill_after(steps: usize) {
-    STEPS_LEFT.set(steps);
-}
-
-pub(super) fn before_step() -> io::Result<()> {
-    let left = STEPS_LEFT.get();
-    STEPS_LEFT.set(left.saturating_sub(1));
-    (left > 0)
-        .then_some(())
-        .ok_or_else(|| io::Error::other("killed"))
-}
-
 /// What a killed writer left is removed by the next one that claims the same output; what only looks like it stays.
 #[test]
 fn what_killed_writers_left_goes_with_the_next_claim() {
@@ -56,7 +38,7 @@ fn what_killed_writers_left_goes_with_the_next_claim() {
             &["b.csv"],
             std::iter::empty(),
             Existing::Keep,
-            |_| Ok(Found::Same),
+            |_| Found::Same,
         ),
     );
     write(&path, "whole").unwrap();
@@ -201,60 +183,29 @@ fn writers_of_one_output_do_not_remove_what_the_others_write() {
     assert_eq!(listing(dir.path()), ["a.unit"]);
 }
 
-/// Killed before any step of replacing a directory's files, it has the old files or, when the next command looks,
-/// the new ones; killed again while it looks, too.
-#[test]
-fn a_replacement_that_is_killed_is_finished_by_the_next_command() {
-    let old = |dir: &Path| {
-        for name in ["a.csv", "b.csv", "manifest.json", "notes.txt"] {
-            fs::write(dir.join(name), "old").unwrap();
-        }
-    };
-    for (first, second) in (0..5).flat_map(|first| (0..5).map(move |second| (first, second))) {
-        let dir = tempfile::tempdir().unwrap();
-        old(dir.path());
-        let mut out = AtomicDir::create(dir.path()).unwrap();
-        for name in ["a.csv", "b.csv", "manifest.json"] {
-            out.write(name, "new").unwrap();
-        }
-        kill_after(first);
-        assert!(out.commit().is_err(), "step {first}");
-        kill_after(second);
-        recover(dir.path());
-        kill_after(usize::MAX);
-        recover(dir.path());
-        assert_eq!(
-            listing(dir.path()),
-            ["a.csv", "b.csv", "manifest.json", "notes.txt"]
-        );
-        let contents = |name: &str| fs::read_to_string(dir.path().join(name)).unwrap();
-        assert_eq!(
-            ["a.csv", "b.csv", "manifest.json", "notes.txt"].map(contents),
-            ["new", "new", "new", "old"]
-        );
-    }
-}
-
-/// No instant of a replacement shows a manifest beside files that are not its own.
+/// No instant of a replacement shows a manifest beside files that are not its own: one that fails, or is killed, on the
+/// way leaves none, and the next claim of a killed one's directory takes it.
 #[test]
 fn a_manifest_stands_beside_its_own_files_only() {
-    for steps in 0..5 {
-        let dir = tempfile::tempdir().unwrap();
-        fs::write(dir.path().join("a.csv"), "old").unwrap();
-        fs::write(dir.path().join("manifest.json"), "old").unwrap();
-        let mut out = AtomicDir::create(dir.path()).unwrap();
-        out.write("a.csv", "new").unwrap();
-        out.write("manifest.json", "new").unwrap();
-        kill_after(steps);
-        let _ = out.commit();
-        kill_after(usize::MAX);
-        let contents = |name: &str| fs::read_to_string(dir.path().join(name)).ok();
-        let manifest = contents("manifest.json");
-        assert!(
-            manifest.is_none() || manifest == contents("a.csv"),
-            "{steps}: {manifest:?}"
-        );
+    let dir = tempfile::tempdir().unwrap();
+    fs::create_dir_all(dir.path().join("b.csv/in the way")).unwrap();
+    fs::write(dir.path().join("manifest.json"), "old").unwrap();
+    let mut out = AtomicDir::create(dir.path()).unwrap();
+    for name in ["a.csv", "b.csv", "manifest.json"] {
+        out.write(name, "new").unwrap();
     }
+    assert!(out.commit().is_err());
+    assert_eq!(listing(dir.path()), ["a.csv", "b.csv"]);
+    let claim = || {
+        let (inputs, keep) = (std::iter::empty(), Existing::Keep);
+        claim_directory(dir.path(), &["manifest.json"], inputs, keep, |_| {
+            Found::Same
+        })
+    };
+    assert!(claim().is_err());
+    fs::write(dir.path().join(MARKER), "").unwrap();
+    drop(claim().unwrap());
+    assert_eq!(listing(dir.path()), ["a.csv", "b.csv"]);
 }
 
 /// A process that ended without a word left its marker: the next one takes it, and it goes with that one's claim.

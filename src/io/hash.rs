@@ -1,31 +1,8 @@
 //! Fingerprints of inputs.
 
 use super::source;
-use std::collections::HashMap;
 use std::io;
-use std::path::{Path, PathBuf};
-use std::sync::{LazyLock, Mutex};
-
-/// Digests of the texts that were read, by path: what was used is what is recorded, though the file change or be a pipe that
-/// can be read once only.
-static READ: LazyLock<Mutex<HashMap<PathBuf, String>>> = LazyLock::new(Mutex::default);
-
-/// Remembers the digest of a text that was read.
-pub(crate) fn remember(path: &Path, contents: &[u8]) {
-    if let Ok(mut read) = READ.lock() {
-        read.insert(path.to_owned(), of_bytes(contents));
-    }
-}
-
-/// BLAKE3 in hexadecimal of the bytes that this process last read of a TOML file; of another file, or one it has not read, of
-/// its bytes now.
-///
-/// # Errors
-/// When the system refuses.
-pub(crate) fn as_read(path: &Path) -> io::Result<String> {
-    let known = READ.lock().ok().and_then(|read| read.get(path).cloned());
-    known.map_or_else(|| of_file(path), Ok)
-}
+use std::path::Path;
 
 /// BLAKE3 of a file's bytes, in hexadecimal, whatever its size.
 ///

@@ -15,12 +15,12 @@ pub struct Input {
     pub blake3: String,
 }
 
-/// An input with its fingerprint, of the bytes that were read.
+/// An input with its fingerprint.
 ///
 /// # Errors
 /// When the system refuses.
 pub(crate) fn input(role: &str, path: &Path) -> Result<Input, Failure> {
-    let blake3 = hash::as_read(path).map_err(|e| Failure::io(path, e))?;
+    let blake3 = hash::of_file(path).map_err(|e| Failure::io(path, e))?;
     Ok(Input {
         role: role.to_owned(),
         path: path.display().to_string(),

@@ -3,13 +3,24 @@
 
 use super::draws_file::{self, DrawsFile, SignalDraws};
 use super::model_file::{self, ModelFile, TurnOn};
-use super::recordings::{FileFormat, ReadOptions, read};
-use super::trajectory_file::{self, Options, Rows, write_rows};
+use super::recordings::{ReadOptions, csv, read};
+use super::trajectory_file::{self, Options, Rows};
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::{Ar1, Composite, Model, Process, Quantization, RandomWalk, White};
 use proptest::prelude::*;
 use std::fs;
 use std::path::PathBuf;
+
+/// An array of `f64` as NumPy writes it: rows, columns, and its numbers row by row.
+pub(super) fn npy([rows, columns]: [usize; 2], values: impl Iterator<Item = f64>) -> Vec<u8> {
+    let head =
+        format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((head.len() as u16).to_le_bytes());
+    bytes.extend(head.as_bytes());
+    values.for_each(|x| bytes.extend(x.to_le_bytes()));
+    bytes
+}
 
 /// A place of its own for a case.
 struct Case(tempfile::TempDir);
@@ -125,8 +136,8 @@ proptest! {
     #[test]
     fn an_array_comes_back_bit_by_bit_and_a_part_of_it_is_refused(signals in signals(), cut in 0.0..1.0_f64) {
         let case = Case::new();
-        let mut bytes = Vec::new();
-        FileFormat::Npy.write(&mut bytes, 100.0, &signals).unwrap();
+        let rows = (0..8).flat_map(|k| signals.iter().map(move |(_, x)| x[k]));
+        let bytes = npy([8, 6], rows);
         let array = nav_sim_logs::npy::read(&case.file("a.npy", &bytes)).unwrap();
         prop_assert_eq!(array.values.len(), 8 * 6);
         let of_row = |(i, x): (usize, &f64)| signals[i % 6].1[i / 6].to_bits() == x.to_bits();
@@ -140,8 +151,9 @@ proptest! {
     #[test]
     fn a_packed_recording_comes_back_and_a_part_of_it_is_refused(signals in signals(), cut in 0.0..1.0_f64) {
         let case = Case::new();
-        let mut bytes = Vec::new();
-        FileFormat::CsvGz.write(&mut bytes, 100.0, &signals).unwrap();
+        let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        std::io::Write::write_all(&mut packed, csv(100.0, &signals).as_bytes()).unwrap();
+        let bytes = packed.finish().unwrap();
         let options = ReadOptions::default();
         let (recordings, _) = read(&[case.file("a.csv.gz", &bytes)], &options).unwrap();
         for (found, (channel, written)) in recordings[0].signals.iter().zip(&signals) {
@@ -161,9 +173,7 @@ proptest! {
         let case = Case::new();
         let again = |name: &str, text: &str| {
             let (trajectory, _) = trajectory_file::load(&case.file(name, text), &Options::default()).unwrap();
-            let mut bytes = Vec::new();
-            write_rows(&mut bytes, &trajectory, Rows::Knots).unwrap();
-            String::from_utf8(bytes).unwrap()
+            trajectory_file::csv(&trajectory, Rows::Knots)
         };
         let numbers = |text: &str| -> Vec<f64> {
             text.lines().skip(1).flat_map(|line| line.split(',').map(|cell| cell.parse().unwrap())).collect()

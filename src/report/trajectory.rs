@@ -5,7 +5,7 @@ use nav_sim_navigation::closure::{Bounds, Closure};
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::frames::RollPitchYaw;
 use nav_sim_navigation::trajectory::Trajectory;
-use nav_sim_navigation::trajectory::plausibility::{Excess, Quantity};
+use nav_sim_navigation::trajectory::plausibility::{Excess, Limits, Quantity};
 use nav_sim_signal::units::DEG;
 use serde::Serialize;
 
@@ -189,7 +189,7 @@ mod trajectory_tests {
 
 /// What was found.
 #[derive(Debug, Serialize)]
-pub(crate) struct TrajectoryCheck {
+pub struct TrajectoryCheck {
     /// File.
     pub file: String,
     start_s: f64,
@@ -202,6 +202,8 @@ pub(crate) struct TrajectoryCheck {
     closure: Closed,
     #[serde(skip)]
     bounds: Bounds,
+    #[serde(skip)]
+    limits: Limits,
 }
 
 #[derive(Debug, Serialize)]
@@ -224,7 +226,7 @@ impl TrajectoryCheck {
     pub(crate) fn new(
         (file, warnings): (String, Vec<String>),
         trajectory: &Trajectory,
-        (largest, beyond): ([f64; 4], &[Excess]),
+        (largest, beyond, limits): ([f64; 4], &[Excess], Limits),
         (closure, bounds): (Closure, Bounds),
     ) -> Self {
         let shown = |q: Quantity| largest[q as usize] * q.display().2;
@@ -247,6 +249,7 @@ impl TrajectoryCheck {
                 within_bounds: closure.within(&bounds),
             },
             bounds,
+            limits,
         }
     }
 
@@ -260,8 +263,15 @@ impl TrajectoryCheck {
         self.beyond_limits.is_empty()
     }
 
-    /// The same for people; limits of speed, acceleration, jerk and rate (deg/s) as they were given.
-    pub(crate) fn text(&self, [speed, acceleration, jerk, rate_deg_s]: [f64; 4]) -> String {
+    /// The same for people.
+    pub(crate) fn text(&self) -> String {
+        let Limits {
+            speed,
+            acceleration,
+            jerk,
+            rate,
+        } = self.limits;
+        let rate_deg_s = rate / DEG;
         let (l, c, b) = (&self.largest, &self.closure.closure, &self.bounds);
         let verdict = if self.is_closed() {
             "within bounds"

@@ -7,7 +7,7 @@ use super::{Configuration, Fuse, document};
 use crate::app::{Context, Input, inputs};
 use crate::app::{Failure, Refuse, Result};
 use crate::commands::run::Reduced;
-use crate::io::fusion_files::{self, read_gnss, read_imu, read_initial, read_wheel};
+use crate::io::fusion_files::{read_gnss, read_imu, read_initial, read_wheel};
 use crate::io::model_file::{self, ModelFile};
 use crate::io::trajectory_file::{self, load_reference};
 use nav_sim_document::{Importance, Note, readable, window};
@@ -103,12 +103,7 @@ impl Drive {
             *fix = fix.with_sigmas_times(position, velocity);
             fix.t_s -= request.gnss_delay_s;
         }
-        let mut notes: Vec<Note> = imu
-            .remarks
-            .into_iter()
-            .chain(remarks)
-            .map(note_of)
-            .collect();
+        let mut notes: Vec<Note> = imu.remarks.into_iter().chain(remarks).collect();
         let wheel = request
             .odometer
             .as_deref()
@@ -418,13 +413,6 @@ fn note(importance: Importance, text: impl ToString) -> Note {
 
 fn warning(text: impl ToString) -> Note {
     note(Importance::Warning, text)
-}
-
-fn note_of(remark: fusion_files::Remark) -> Note {
-    match remark {
-        fusion_files::Remark::Note(text) => note(Importance::Remark, text),
-        fusion_files::Remark::Doubt(text) => warning(text),
-    }
 }
 
 /// What a cause is looked for with.

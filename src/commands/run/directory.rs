@@ -4,7 +4,7 @@ use crate::app::Manifest;
 use crate::commands::run::RunOrigin;
 use crate::failure::{Failure, Place};
 use crate::io::run_tables::{REPEAT, parse_epochs, parse_runs};
-use crate::io::{atomic, hash, source};
+use crate::io::{hash, source};
 use nav_sim_navigation::metrics::{EpochRow, Measured, PerState, Verdict};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::{OutageRecord, RunRecord};
@@ -28,12 +28,11 @@ pub(crate) struct RunDirectory {
     pub asee_mean_ci95: Vec<OpenEnds>,
 }
 
-/// Reads a run directory; what a killed command had begun to replace in it is finished first.
+/// Reads a run directory.
 ///
 /// # Errors
 /// The file, and what is wrong with it.
 pub(crate) fn read(directory: &Path) -> Result<RunDirectory, Failure> {
-    atomic::recover(directory);
     let (manifest, origin) = manifest(directory)?;
     let (path, epochs_text) = text(directory, "epochs.csv")?;
     let epochs = parse_epochs(&path, &epochs_text)?;

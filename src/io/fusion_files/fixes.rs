@@ -1,11 +1,12 @@
 //! Recorded GNSS fixes.
 
 use super::nmea::{self, is_nmea};
-use super::rtklib::{self, is_rtklib, of_unix};
-use super::{Remark, time_back};
+use super::rtklib::{self, is_rtklib};
+use super::{doubt, of_file, remark, time_back};
 use crate::io::table::{self, Asked, Column, Dictionary, Numbers, Quantity, Table};
 use crate::io::{Failure as Error, Place, help, logs, source};
 use glam::{DMat3, DVec3};
+use nav_sim_document::Note;
 use nav_sim_logs::{Clock, Fix, Stamp};
 use nav_sim_navigation::earth::{A, MAX_LATITUDE, ecef_to_geodetic, geodetic_to_ecef};
 use nav_sim_navigation::frames::q_e_n;
@@ -20,7 +21,7 @@ pub(in crate::io) const WEEK_S: f64 = 604_800.0;
 const MAX_SPEED: f64 = 8000.0;
 
 /// Quantities of fixes; a deviation up is one down.
-static QUANTITIES: [Quantity; 20] = [
+static QUANTITIES: [Quantity; 21] = [
     Quantity::time(&["t", "time", "timestamp", "tow", "sow"]),
     Quantity::angle("lat_deg", &["lat", "latitude"]),
     Quantity::angle("lon_deg", &["lon", "lng", "longitude"]),
@@ -34,11 +35,20 @@ static QUANTITIES: [Quantity; 20] = [
             "pos_std_n",
             "sd_north",
             "sd_lat",
+            "sdn",
         ],
     ),
     Quantity::length(
         "sd_e_m",
-        &["sd_e", "std_e", "sigma_e", "pos_std_e", "sd_east", "sd_lon"],
+        &[
+            "sd_e",
+            "std_e",
+            "sigma_e",
+            "pos_std_e",
+            "sd_east",
+            "sd_lon",
+            "sde",
+        ],
     ),
     Quantity::length(
         "sd_d_m",
@@ -50,14 +60,16 @@ static QUANTITIES: [Quantity; 20] = [
             "sd_u",
             "std_u",
             "sd_h",
+            "sdu",
         ],
     ),
     Quantity::speed("v_n_m_s", &["v_n", "vn"]),
     Quantity::speed("v_e_m_s", &["v_e", "ve"]),
-    Quantity::speed("v_d_m_s", &["v_d", "vd"]),
-    Quantity::speed("sd_vn_m_s", &["sd_vn", "sd_v_n", "vel_std_n"]),
-    Quantity::speed("sd_ve_m_s", &["sd_ve", "sd_v_e", "vel_std_e"]),
-    Quantity::speed("sd_vd_m_s", &["sd_vd", "sd_v_d", "vel_std_d"]),
+    V_D,
+    V_D.reversed(&["v_u", "vu"]),
+    Quantity::speed("sd_vn_m_s", &["sd_vn", "sd_v_n", "vel_std_n", "sdvn"]),
+    Quantity::speed("sd_ve_m_s", &["sd_ve", "sd_v_e", "vel_std_e", "sdve"]),
+    Quantity::speed("sd_vd_m_s", &["sd_vd", "sd_v_d", "vel_std_d", "sdvu"]),
     Quantity::number("week", &["week", "gps_week"]),
     Quantity::length("x_m", &["x", "x_ecef", "ecef_x", "pos_x"]),
     Quantity::length("y_m", &["y", "y_ecef", "ecef_y", "pos_y"]),
@@ -66,6 +78,7 @@ static QUANTITIES: [Quantity; 20] = [
     Quantity::length("sd_y_m", &["sd_y", "sdy", "std_y", "sigma_y"]),
     Quantity::length("sd_z_m", &["sd_z", "sdz", "std_z", "sigma_z"]),
 ];
+const V_D: Quantity = Quantity::speed("v_d_m_s", &["v_d", "vd"]);
 const PLACE: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
 const PLACE_SIGMA: [&str; 3] = ["sd_n_m", "sd_e_m", "sd_d_m"];
 /// The same in the Earth's axes.
@@ -164,15 +177,15 @@ impl<'a> FixColumns<'a> {
     }
 
     /// Standard deviations that are not of the file, and columns that are not used.
-    fn remarks(&self) -> Vec<Remark> {
+    fn remarks(&self) -> Vec<Note> {
         let mut remarks = Vec::new();
         if self.place_sigma.is_none() || self.velocity.is_some() && self.velocity_sigma.is_none() {
-            remarks.push(Remark::note("standard deviations as given for all fixes"));
+            remarks.push(remark("standard deviations as given for all fixes"));
         }
         let ignored = &self.table.ignored;
         if !ignored.is_empty() {
             let text = format!("columns not used: {}", ignored.join(", "));
-            remarks.push(Remark::note(text));
+            remarks.push(remark(text));
         }
         remarks
     }
@@ -266,7 +279,7 @@ pub(crate) fn read_gnss(
     unsaid: Option<&FixSigma>,
     clock_s: Option<(f64, f64)>,
     topic: Option<&str>,
-) -> Result<(Vec<GnssFix>, Vec<Remark>), Error> {
+) -> Result<(Vec<GnssFix>, Vec<Note>), Error> {
     let shown = path.display().to_string();
     let (fixes, remarks) = match logs::kind_of(path) {
         Some(_) => of_log(path, (unsaid, topic), clock_s)?,
@@ -288,12 +301,12 @@ pub(crate) fn read_gnss(
         check_step(&shown, pair[1].0, &pair[0].1, &pair[1].1)?;
     }
     let fixes = fixes.into_iter().map(|(_, fix)| fix).collect();
-    let remarks = remarks.into_iter().map(|r| r.of_file(&shown));
+    let remarks = remarks.into_iter().map(|note| of_file(note, &shown));
     Ok((fixes, remarks.collect()))
 }
 
 /// Fixes with their lines, and remarks.
-pub(super) type Fixes = (Vec<(u64, GnssFix)>, Vec<Remark>);
+pub(super) type Fixes = (Vec<(u64, GnssFix)>, Vec<Note>);
 
 /// The fixes of a table, of KF-GINS or of RTKLIB.
 fn of_table(
@@ -302,26 +315,42 @@ fn of_table(
     unsaid: Option<&FixSigma>,
     clock_s: Option<(f64, f64)>,
 ) -> Result<Fixes, Error> {
-    let mut remarks = Vec::new();
-    let is_rtklib = is_rtklib(&text);
-    if is_rtklib {
-        let (table, remark) = rtklib::rows(shown, &text, clock_s)?;
-        (text, remarks) = (table, vec![Remark::note(remark)]);
+    let mut clock = None;
+    if is_rtklib(&text) {
+        let (table, name) = rtklib::table(shown, &text, clock_s)?;
+        (text, clock) = (table, Some(name));
     }
-    let table = table::parse(shown, &text, &DICTIONARY, &Asked::default())?;
+    let mut table = table::parse(shown, &text, &DICTIONARY, &Asked::default())?;
+    let has_all = |table: &Table, columns: [&Column; 3]| {
+        (0..table.rows()).all(|row| columns.iter().all(|c| c.si(row) > 0.0))
+    };
+    if clock.is_some() {
+        table.ignored.clear();
+        let sigma = table.all(VELOCITY_SIGMA);
+        // what states no deviation of one velocity states none
+        if !sigma.is_some_and(|sigma| has_all(&table, sigma)) {
+            let velocity = VELOCITY.into_iter().chain(VELOCITY_SIGMA);
+            velocity.for_each(|name| drop(table.take(name)));
+        }
+    }
     let columns = FixColumns::new(&table, unsaid)?;
-    if table.is_bare && !is_rtklib {
-        let velocity = if table.has(VELOCITY[0]) {
-            ", velocity"
-        } else {
-            ""
-        };
-        let text =
-            format!("no header: read as KF-GINS text, position{velocity} and standard deviations");
-        remarks.push(Remark::note(text));
+    let velocity = match table.has(VELOCITY[0]) {
+        true => ", velocity",
+        false => "",
+    };
+    let mut remarks = Vec::new();
+    if table.is_bare {
+        remarks.push(remark(format!(
+            "no header: read as KF-GINS text, position{velocity} and standard deviations"
+        )));
     }
+    remarks.extend(clock.map(|clock| {
+        remark(format!(
+            "an RTKLIB solution: position{velocity} and standard deviations, in {clock}"
+        ))
+    }));
     remarks.extend(columns.remarks());
-    remarks.extend(table.assumptions.iter().map(Remark::note));
+    remarks.extend(table.assumptions.iter().map(remark));
     let mut fixes = Vec::with_capacity(table.rows());
     for row in 0..table.rows() {
         let fix = columns.fix(row);
@@ -332,7 +361,7 @@ fn of_table(
         |(_, f): &(u64, GnssFix)| f.lat.abs() <= 0.5 * PI * DEG && f.lon.abs() <= 2.0 * PI * DEG;
     if fixes.iter().all(small) {
         let text = "latitude and longitude never exceed π: radians? Then name the columns lat_rad, lon_rad";
-        remarks.push(Remark::doubt(text));
+        remarks.push(doubt(text));
     }
     Ok((fixes, remarks))
 }
@@ -367,18 +396,18 @@ fn of_log(
         .first()
         .zip(fixes.last())
         .map(|((_, first), (_, last))| (first.t_s, last.t_s));
-    if let Some(clock) = span_s
+    let clock = span_s
         .filter(|_| is_dated)
-        .and_then(|span_s| of_unix(span_s, imu_s))
-    {
+        .and_then(|span_s| rtklib::clock(span_s, imu_s));
+    if let Some(clock) = clock.filter(|clock| clock.origin_s != 0.0) {
         fixes
             .iter_mut()
             .for_each(|(_, fix)| fix.t_s -= clock.origin_s);
         said = format!("{said}, in {}", clock.name);
     }
     let cut = read.damage().or(log.damage()).map(logs::cut_off);
-    let remarks = cut.map(Remark::doubt).into_iter();
-    Ok((fixes, remarks.chain([Remark::note(said)]).collect()))
+    let remarks = cut.map(doubt).into_iter();
+    Ok((fixes, remarks.chain([remark(said)]).collect()))
 }
 
 /// The same fix with angles in radians; none without standard deviations.

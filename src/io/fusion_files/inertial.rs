@@ -1,12 +1,13 @@
 //! Recorded IMU data.
 
-use super::{Remark, time_back};
+use super::{doubt, of_file, remark, time_back};
 use crate::io::logs::LogOptions;
 use crate::io::recordings::timing::{median_step, unit_of_step};
 use crate::io::recordings::{self, ReadOptions, check_gravity, gravity_factor};
 use crate::io::table::{Column, Dictionary};
 use crate::io::{Failure as Error, Place};
 use glam::DVec3;
+use nav_sim_document::Note;
 use nav_sim_navigation::fusion::{LONGEST_GAP_S, bridged};
 use nav_sim_navigation::strapdown::MAX_ROTATION;
 use nav_sim_signal::imu::{Axis, Channel, ImuIncrement, Sensor};
@@ -26,7 +27,7 @@ pub(crate) struct ImuFile {
     /// Samples a second, by the median step.
     pub rate_hz: f64,
     /// What is doubtful, and how the file was read.
-    pub remarks: Vec<Remark>,
+    pub remarks: Vec<Note>,
 }
 
 /// Six values a sample, and the time it ends.
@@ -38,7 +39,7 @@ struct Columns {
     /// Which of the two each sensor gives.
     increments: [bool; 2],
     lines: Vec<u64>,
-    remarks: Vec<Remark>,
+    remarks: Vec<Note>,
 }
 
 /// Dictionary of recordings under way. Texts without a header are those of KF-GINS, with or without an odometer.
@@ -109,15 +110,15 @@ pub(crate) fn read_imu(
     let value =
         |column: &Column, k: usize| column.values[k] * column.factor.unwrap_or(from_gravity);
     let rows = 0..table.rows();
-    let mut remarks: Vec<Remark> = table.assumptions.iter().map(Remark::note).collect();
-    remarks.extend(table.warnings.iter().map(Remark::doubt));
+    let mut remarks: Vec<Note> = table.assumptions.iter().map(remark).collect();
+    remarks.extend(table.warnings.iter().map(doubt));
     if table.is_bare {
         let odometer = match table.ignored.is_empty() {
             true => "",
             false => "; the odometer's speed in column 8 is not used",
         };
         let text = "no header: read as KF-GINS text, angle then velocity increments";
-        remarks.push(Remark::note(format!("{text}{odometer}")));
+        remarks.push(remark(format!("{text}{odometer}")));
     }
     let columns = Columns {
         t_s: time.values.iter().map(|t| t * unit_s).collect(),
@@ -185,7 +186,7 @@ impl Columns {
         let remarks = self
             .remarks
             .into_iter()
-            .map(|r| r.of_file(&self.path))
+            .map(|note| of_file(note, &self.path))
             .collect();
         Ok(ImuFile {
             samples: bridged(&samples, step),
@@ -199,7 +200,7 @@ impl Columns {
             return;
         };
         let (t_s, line, more) = (self.t_s[*k], self.lines[*k], holes.len() - 1);
-        self.remarks.push(Remark::doubt(format!(
+        self.remarks.push(doubt(format!(
             "samples missing: {seconds:.2} s before {t_s:.2} s (line {line}) and {more} more gaps; bridged"
         )));
     }
@@ -254,7 +255,7 @@ impl Columns {
             let degrees = rate / DEG;
             let text =
                 format!("mean angular rate {degrees:.0} deg/s: are these degrees named radians?");
-            self.remarks.push(Remark::doubt(text));
+            self.remarks.push(doubt(text));
         }
         Ok(())
     }

@@ -10,39 +10,34 @@ mod wheel;
 
 pub(in crate::io) use fixes::WEEK_S;
 pub(crate) use fixes::read_gnss;
-pub(crate) use inertial::read_imu;
+pub(crate) use inertial::{ImuFile, read_imu};
 pub(crate) use initial::{initial_schema, read_initial};
 pub(in crate::io) use nmea::is_nmea;
 pub(in crate::io) use rtklib::is_rtklib;
 pub(crate) use wheel::read_wheel;
 
 use crate::io::Failure;
+use nav_sim_document::{Importance, Note};
 
-/// What is said of a file that was read.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Remark {
-    /// How it was read.
-    Note(String),
-    /// What is doubtful about it.
-    Doubt(String),
+fn note(importance: Importance, text: impl Into<String>) -> Note {
+    let text = text.into();
+    Note { importance, text }
 }
 
-impl Remark {
-    fn note(text: impl Into<String>) -> Self {
-        Self::Note(text.into())
-    }
+/// How a file was read.
+fn remark(text: impl Into<String>) -> Note {
+    note(Importance::Remark, text)
+}
 
-    fn doubt(text: impl Into<String>) -> Self {
-        Self::Doubt(text.into())
-    }
+/// What is doubtful about a file.
+fn doubt(text: impl Into<String>) -> Note {
+    note(Importance::Warning, text)
+}
 
-    /// The same with the name of the file before it.
-    fn of_file(self, path: &str) -> Self {
-        match self {
-            Self::Note(text) => Self::Note(format!("{path}: {text}")),
-            Self::Doubt(text) => Self::Doubt(format!("{path}: {text}")),
-        }
-    }
+/// A note with the name of the file before it.
+fn of_file(note: Note, path: &str) -> Note {
+    let text = format!("{path}: {}", note.text);
+    Note { text, ..note }
 }
 
 /// The first row of a table of numbers between blanks without a header; none of any other text.

@@ -4,13 +4,14 @@
 //! The layout of the sentences is that of the receivers' manuals (Trimble R6/R7/R8, appendix A; u-blox protocol
 //! specifications).
 
-use super::Remark;
 use super::fixes::Fixes;
-use super::rtklib::{GPS_EPOCH_S, leap_s};
+use super::rtklib;
+use super::{doubt, remark};
 use crate::io::fusion_files::WEEK_S;
 use crate::io::{Failure as Error, help};
 use chrono::NaiveDate;
 use glam::{DVec2, DVec3};
+use nav_sim_document::Note;
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
 use nav_sim_signal::units::DEG;
 use std::collections::BTreeMap;
@@ -240,7 +241,7 @@ pub(super) fn fixes(
         return Err(Error::contents(path, 1_u64, message)
             .or_hint("let the receiver write GGA, RMC and GST"));
     }
-    let remarks = log.remarks(&fixes, unsaid, clock);
+    let remarks = log.remarks(&fixes, unsaid, &clock);
     Ok((fixes, remarks))
 }
 
@@ -255,20 +256,20 @@ impl Log {
         &self,
         fixes: &[(u64, GnssFix)],
         unsaid: Option<&FixSigma>,
-        clock: Clock,
-    ) -> Vec<Remark> {
+        clock: &Clock,
+    ) -> Vec<Note> {
         let moving = fixes
             .iter()
             .filter(|(_, fix)| fix.velocity.is_some())
             .count();
         let count = fixes.len();
-        let mut remarks = vec![Remark::note(format!(
+        let mut remarks = vec![remark(format!(
             "NMEA sentences: {count} fixes, {moving} with a horizontal velocity, {} left out, times are {}",
             self.left_out, clock.words
         ))];
         let is_unsaid = |e: &Epoch| e.position.is_some() && e.sigma.is_none();
         if self.epochs.iter().any(is_unsaid) {
-            remarks.push(Remark::note(
+            remarks.push(remark(
                 "standard deviations without GST as given, in proportion to HDOP",
             ));
         }
@@ -295,7 +296,7 @@ impl Log {
             doubts
                 .into_iter()
                 .filter(|(is, _)| *is)
-                .map(|(_, text)| Remark::doubt(text)),
+                .map(|(_, text)| doubt(text)),
         );
         remarks
     }
@@ -329,7 +330,7 @@ struct Clock {
     /// What is added to seconds of the first day (s).
     origin_s: f64,
     /// Times of the fixes then.
-    words: &'static str,
+    words: String,
     /// Whether the receiver's week counter has rolled over.
     is_rolled: bool,
 }
@@ -339,49 +340,32 @@ impl Log {
     /// counter has rolled over is known by dates that are the IMU's after 1024 weeks, or twice that.
     fn clock(&self, imu_s: Option<(f64, f64)>) -> Clock {
         let time_of_epoch = |e: &Epoch| DAY_S * e.day + e.time_s;
-        let span = self
-            .epochs
-            .first()
-            .map(time_of_epoch)
-            .zip(self.epochs.last().map(time_of_epoch));
-        let overlaps = |origin_s: f64| {
-            let both = imu_s.zip(span);
-            both.is_some_and(|(imu, gnss)| imu.0 <= origin_s + gnss.1 && origin_s + gnss.0 <= imu.1)
-        };
-        let midnight_s = self.dates.most();
-        let origins =
-            midnight_s.map(|midnight_s| [0.0, 1.0, 2.0].map(|n| midnight_s + n * ROLLOVER_S));
-        if let Some((n, origin_s)) =
-            origins.and_then(|all| all.into_iter().enumerate().find(|(_, s)| overlaps(*s)))
-        {
-            return Clock {
-                origin_s,
-                words: "Unix time",
-                is_rolled: n > 0,
-            };
-        }
+        let [first, last] = [self.epochs.first(), self.epochs.last()].map(|e| e.map(time_of_epoch));
         let day = Clock {
-            words: "seconds of the day (UTC)",
+            words: "seconds of the day (UTC)".to_owned(),
             ..Clock::default()
         };
-        let gps_s = midnight_s
-            .map(|s| s - GPS_EPOCH_S as f64 + leap_s(s))
-            .unwrap_or(f64::NAN);
-        let of_gps = [
-            (gps_s, "seconds of GPS time"),
-            (gps_s.rem_euclid(WEEK_S), "seconds of the GPS week"),
-        ];
-        match of_gps
-            .into_iter()
-            .find(|(origin_s, _)| !overlaps(0.0) && overlaps(*origin_s))
-        {
-            Some((origin_s, words)) => Clock {
-                origin_s,
-                words,
-                is_rolled: false,
-            },
-            None => day,
+        let (Some(midnight_s), Some(first), Some(last), Some(imu)) =
+            (self.dates.most(), first, last, imu_s)
+        else {
+            return day;
+        };
+        let is_of_day = imu.0 <= last && first <= imu.1;
+        for (n, is_rolled) in [(0.0, false), (1.0, true), (2.0, true)] {
+            let midnight_s = midnight_s + n * ROLLOVER_S;
+            let found = rtklib::clock((midnight_s + first, midnight_s + last), imu_s);
+            match found {
+                Some(clock) if clock.origin_s == 0.0 || !is_of_day && !is_rolled => {
+                    return Clock {
+                        origin_s: midnight_s - clock.origin_s,
+                        words: clock.name,
+                        is_rolled,
+                    };
+                }
+                _ => {}
+            }
         }
+        day
     }
 }
 

@@ -10,10 +10,9 @@ mod samples;
 pub(in crate::io) mod timing;
 mod write;
 
-pub(crate) use files::is_recording;
 pub use report::{FileReport, Report};
 pub(in crate::io) use samples::{check_gravity, gravity_factor};
-pub use write::FileFormat;
+pub(crate) use write::csv;
 
 use super::logs::LogOptions;
 use super::table::NO_COLUMN;

@@ -5,7 +5,7 @@ mod gravity;
 mod texts;
 
 use super::*;
-use crate::io::table::write_npy_header;
+use crate::io::property_tests::npy;
 use nav_sim_signal::imu::{Channel, Signal};
 use nav_sim_signal::units::{DEG, STANDARD_GRAVITY};
 use std::fs;
@@ -233,10 +233,10 @@ fn xsens_counter_wraps_and_tells_what_was_lost() {
 #[test]
 fn arrays() {
     let array = |rows: usize, columns: usize| {
-        let mut bytes = Vec::new();
-        write_npy_header(&mut bytes, rows, columns).unwrap();
-        (0..rows * columns).for_each(|i| bytes.extend((i as f64 * 1e-3).to_le_bytes()));
-        bytes
+        npy(
+            [rows, columns],
+            (0..rows * columns).map(|i| i as f64 * 1e-3),
+        )
     };
     let r = read_one("a.npy", array(4, 6), &at_100_hz()).unwrap();
     assert_eq!(channels(&r).len(), 6);
@@ -440,9 +440,7 @@ fn warm_up_and_gaps_are_left_out_of_every_kind_of_file() {
             .join("\n")
             + "\n"
     };
-    let mut array = Vec::new();
-    write_npy_header(&mut array, 9000, 6).unwrap();
-    (0..54_000).for_each(|i| array.extend((f64::from(i % 13) * 1e-3).to_le_bytes()));
+    let array = npy([9000, 6], (0..54_000).map(|i| f64::from(i % 13) * 1e-3));
     let files = Files::new();
     let paths = [
         files.add("a.csv", table(true)),

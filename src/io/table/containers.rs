@@ -6,8 +6,6 @@ use crate::io::{Failure, Place, help, logs, source};
 use chrono::NaiveDateTime;
 use nav_sim_logs::Clock;
 use nav_sim_logs::npy::{self, Array};
-use serde::Deserialize;
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Columns by names, each with its numbers.
@@ -45,7 +43,7 @@ fn strided(array: &Array, first: usize, step: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Reads an array: columns named by the manifest of its synthesis, by who asks, or by their number.
+/// Reads an array: columns named by who asks, or by their number.
 pub(super) fn npy(
     path: &Path,
     dictionary: &Dictionary,
@@ -63,12 +61,9 @@ pub(super) fn npy(
             return Err(Failure::contents(name, Place::Within, message));
         }
     };
-    let manifest = Manifest::beside(path);
-    let own = manifest.as_ref().filter(|m| m.axes.len() == count);
     let names = asked
         .names
         .map(<[String]>::to_vec)
-        .or_else(|| own.map(Manifest::columns))
         .or_else(|| layout(dictionary.array, count))
         .ok_or_else(|| {
             let message = format!("an array of {count} columns, which names are not known");
@@ -87,69 +82,7 @@ pub(super) fn npy(
     let columns = (0..)
         .zip(names)
         .map(|(k, name)| (name, strided(&array, k, count)));
-    let mut table = of_columns(&name, columns.collect(), dictionary, &without_names)?;
-    table.rate_hz = manifest.map(|manifest| (manifest.rate_hz, MANIFEST));
-    Ok(table)
-}
-
-/// Name of the manifest of a synthesis.
-const MANIFEST: &str = "manifest.json";
-
-/// The parts of the manifest of a synthesis that tell how to read its arrays.
-#[derive(Deserialize)]
-struct Manifest {
-    command: String,
-    /// Channels, such as `accel.x`.
-    axes: Vec<String>,
-    /// Sample rate (Hz).
-    rate_hz: f64,
-    replicates: Vec<Replicate>,
-}
-
-#[derive(Deserialize)]
-struct Replicate {
-    file: String,
-}
-
-impl Manifest {
-    /// That of the synthesis which made a file, if its manifest is beside it.
-    fn beside(path: &Path) -> Option<Self> {
-        let text = std::fs::read_to_string(path.with_file_name(MANIFEST)).ok()?;
-        let manifest: Self = serde_json::from_str(&text).ok()?;
-        let name = path.file_name()?.to_str()?;
-        let is_of_it = manifest.command == "synthesize"
-            && manifest.replicates.iter().any(|own| own.file == name);
-        (is_of_it && manifest.rate_hz > 0.0).then_some(manifest)
-    }
-
-    fn columns(&self) -> Vec<String> {
-        let unit = |name: &str| {
-            if name.starts_with('a') {
-                "m_s2"
-            } else {
-                "rad_s"
-            }
-        };
-        let column = |name: &String| format!("{}_{}", name.replace('.', "_"), unit(name));
-        self.axes.iter().map(column).collect()
-    }
-}
-
-/// Writes the header of a C-ordered array of `f64`; the elements follow, little-endian, row by row.
-///
-/// # Errors
-/// When the system refuses.
-pub(crate) fn write_npy_header(to: &mut impl Write, rows: usize, columns: usize) -> io::Result<()> {
-    let mut text =
-        format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
-    // elements begin at a multiple of 64 bytes; the header ends in a newline
-    while !(10 + text.len() + 1).is_multiple_of(64) {
-        text.push(' ');
-    }
-    text.push('\n');
-    to.write_all(b"\x93NUMPY\x01\x00")?;
-    to.write_all(&(text.len() as u16).to_le_bytes())?;
-    to.write_all(text.as_bytes())
+    of_columns(&name, columns.collect(), dictionary, &without_names)
 }
 
 /// Reads named arrays: a vector is a column, an array of three columns the three axes of a sensor.

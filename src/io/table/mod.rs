@@ -6,7 +6,7 @@ mod containers;
 mod quantity;
 mod text;
 
-pub(crate) use containers::{is_oxts, write_npy_header};
+pub(crate) use containers::is_oxts;
 #[cfg(test)]
 pub(crate) use quantity::find;
 pub(crate) use quantity::{ACCELERATION, ANGLE, ANGULAR_RATE, NONE, SPEED, TIME};

@@ -68,7 +68,6 @@ impl Source {
                 _ => error,
             }
         })?;
-        super::hash::remember(path, text.as_bytes());
         Ok(Self {
             path: path.display().to_string(),
             text,

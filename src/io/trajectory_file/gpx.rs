@@ -139,12 +139,11 @@ fn seconds_between(start: DateTime<Utc>, end: DateTime<Utc>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::trajectory_file::Warning;
     use glam::DVec3;
     use nav_sim_navigation::frames::RollPitchYaw;
     use nav_sim_navigation::trajectory::Trajectory;
 
-    fn load(path: &str, text: &str) -> Result<(Trajectory, Vec<Warning>), Error> {
+    fn load(path: &str, text: &str) -> Result<(Trajectory, Vec<String>), Error> {
         gpx(path, text)?.trajectory()
     }
 

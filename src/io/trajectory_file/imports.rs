@@ -107,11 +107,10 @@ pub(super) fn tum(
 mod tests {
     use super::*;
     use crate::io::fusion_files::WEEK_S;
-    use crate::io::trajectory_file::Warning;
     use nav_sim_navigation::frames::RollPitchYaw;
     use nav_sim_navigation::trajectory::Trajectory;
 
-    type Loaded = Result<(Trajectory, Vec<Warning>), Error>;
+    type Loaded = Result<(Trajectory, Vec<String>), Error>;
 
     fn nav(text: &str) -> Loaded {
         kf_gins("truth.nav", text, &Options::default(), Numbers::Finite)?.trajectory()
@@ -156,7 +155,7 @@ mod tests {
             origin: Some([0.8, 0.1, 50.0]),
         };
         let (t, warnings) = tum("a.tum", &text, &options).unwrap();
-        assert!(warnings[0].message.contains("ROS"));
+        assert!(warnings[0].contains("ROS"));
         let state = t.state(2.0);
         let rpy = RollPitchYaw::from_quat(state.q_b_n);
         assert!(

@@ -10,15 +10,12 @@ mod write;
 
 pub(crate) use profile::schema as profile_schema;
 pub(crate) use samples::parse_origin;
-pub(crate) use write::Rows;
-pub(crate) use write::write_csv;
-pub(crate) use write::write_rows;
+pub(crate) use write::{Rows, csv};
 
 use super::table::{Asked, Numbers, parse as parse_text};
 use super::{Failure, Place, source};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_navigation::trajectory::reference::Reference;
-use std::fmt;
 use std::path::Path;
 
 /// How to read a trajectory file.
@@ -27,26 +24,6 @@ pub struct Options {
     /// Where local coordinates begin: latitude, longitude (rad), height (m). Without it: the file's own
     /// `# origin:` line.
     pub origin: Option<[f64; 3]>,
-}
-
-/// A doubt about a trajectory file that can be used all the same.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Warning {
-    /// The file.
-    pub path: String,
-    /// The line it is about, if it is about one.
-    pub line: Option<u64>,
-    /// What is doubtful.
-    pub message: String,
-}
-
-impl fmt::Display for Warning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.line {
-            Some(line) => write!(f, "{}, line {line}: {}", self.path, self.message),
-            None => write!(f, "{}: {}", self.path, self.message),
-        }
-    }
 }
 
 const KNOWN: &str =
@@ -61,7 +38,7 @@ const KNOWN: &str =
 ///
 /// # Errors
 /// Whatever is wrong with the file, with its line.
-pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<Warning>), Failure> {
+pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<String>), Failure> {
     match parse(path, options, Numbers::Finite)? {
         Parsed::Profile(trajectory) => Ok((trajectory, Vec::new())),
         Parsed::Rows(rows) => rows.trajectory(),
@@ -77,7 +54,7 @@ pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<Warning>)
 pub(crate) fn load_reference(
     path: &Path,
     options: &Options,
-) -> Result<(Reference, Vec<Warning>), Failure> {
+) -> Result<(Reference, Vec<String>), Failure> {
     match parse(path, options, Numbers::Any)? {
         Parsed::Profile(trajectory) => Ok((trajectory.into(), Vec::new())),
         Parsed::Rows(rows) => rows.reference(),

@@ -1,6 +1,5 @@
 //! A recorded trajectory that is only compared with: what jumps is left out.
 
-use super::Warning;
 use super::samples::{Attitude, Rows, follow_path, no_trajectory};
 use crate::io::{Failure as Error, Place};
 use nav_sim_navigation::trajectory::Trajectory;
@@ -9,7 +8,7 @@ use std::ops::Range;
 
 impl Rows {
     /// The stretches of the rows between what no vehicle does, and what is doubtful about them.
-    pub(super) fn reference(mut self) -> Result<(Reference, Vec<Warning>), Error> {
+    pub(super) fn reference(mut self) -> Result<(Reference, Vec<String>), Error> {
         let found = breaks(&self.samples);
         let mut refused = None;
         let (mut stretches, mut seconds) = (Vec::new(), 0.0);

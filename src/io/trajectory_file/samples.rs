@@ -1,7 +1,7 @@
 //! From rows to a trajectory.
 
+use super::Options;
 use super::doubts;
-use super::{Options, Warning};
 use crate::io::fusion_files::WEEK_S;
 use crate::io::table::{Column, Dictionary, Numbers, Quantity, Table, normalised};
 use crate::io::{Failure as Error, Place, help};
@@ -86,7 +86,7 @@ pub(super) struct Rows {
     pub(super) velocities: Vec<DVec3>,
     /// Whether positions are latitude and longitude, which may have been given in the wrong unit.
     pub(super) geodetic: bool,
-    pub(super) doubts: Vec<Warning>,
+    pub(super) doubts: Vec<String>,
 }
 
 impl Rows {
@@ -110,16 +110,14 @@ impl Rows {
     }
 
     pub(super) fn doubt(&mut self, line: Option<u64>, message: impl Into<String>) {
-        self.doubts.push(Warning {
-            path: self.path.clone(),
-            line,
-            message: message.into(),
-        });
+        let line = line.map_or(String::new(), |line| format!(", line {line}"));
+        let text = format!("{}{line}: {}", self.path, message.into());
+        self.doubts.push(text);
     }
 
     /// The trajectory through all rows, and what is doubtful about it. Every format comes through here, so that
     /// what is refused in one is refused in all.
-    pub(super) fn trajectory(mut self) -> Result<(Trajectory, Vec<Warning>), Error> {
+    pub(super) fn trajectory(mut self) -> Result<(Trajectory, Vec<String>), Error> {
         self.check_heights()?;
         self.check_steps()?;
         doubts::steps(&mut self);

@@ -1,13 +1,9 @@
 //! Trajectories as CSV.
 
-use crate::io::Failure;
-use crate::io::atomic::AtomicFile;
-use flate2::{Compression, write::GzEncoder};
 use nav_sim_navigation::frames::{RollPitchYaw, wrap_angle};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::units::DEG;
-use std::io::{self, Write};
-use std::path::Path;
+use std::fmt::Write;
 
 /// Which instants become rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,7 +15,7 @@ pub(crate) enum Rows {
 }
 
 impl Rows {
-    fn times(self, trajectory: &Trajectory) -> Vec<f64> {
+    pub(crate) fn times(self, trajectory: &Trajectory) -> Vec<f64> {
         match self {
             Self::Knots => trajectory.knots().to_vec(),
             Self::Rate(rate_hz) => {
@@ -31,61 +27,24 @@ impl Rows {
     }
 }
 
-/// Writes a trajectory as CSV, packed when the name ends in `.gz`. Positions are written with the digits
-/// that read back to them, since accelerations are their second differences; times to the nanosecond,
-/// velocities to 1e-9 m/s, angles to 1e-12 degrees.
-///
-/// # Errors
-/// The file cannot be written.
-pub(crate) fn write_csv(path: &Path, trajectory: &Trajectory, rows: Rows) -> Result<(), Failure> {
-    let mut file = AtomicFile::create(path)?;
-    let io = |e| Failure::io(path, e);
-    if path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("gz"))
-    {
-        let mut packed = GzEncoder::new(&mut file, Compression::default());
-        write_rows(&mut packed, trajectory, rows).map_err(io)?;
-        packed.finish().map_err(io)?;
-    } else {
-        write_rows(&mut file, trajectory, rows).map_err(io)?;
-    }
-    file.commit()
-}
-
-/// Writes the header and the rows.
-///
-/// # Errors
-/// What the system says.
-pub(crate) fn write_rows(
-    out: &mut impl Write,
-    trajectory: &Trajectory,
-    rows: Rows,
-) -> io::Result<()> {
-    writeln!(
-        out,
-        "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg"
-    )?;
+/// A trajectory as CSV. Positions are written with the digits that read back to them, since accelerations are their second
+/// differences; times to the nanosecond, velocities to 1e-9 m/s, angles to 1e-12 degrees.
+pub(crate) fn csv(trajectory: &Trajectory, rows: Rows) -> String {
+    let mut text =
+        "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n".to_owned();
     for t_s in rows.times(trajectory) {
         let state = trajectory.state(t_s);
         let (v, rpy) = (state.v_n, RollPitchYaw::from_quat(state.q_b_n));
-        let (roll, pitch, yaw) = (rpy.roll / DEG, rpy.pitch / DEG, rpy.yaw / DEG);
-        writeln!(
-            out,
-            "{},{},{},{},{},{},{},{},{},{}",
-            tidy(t_s, 9),
-            state.lat / DEG + 0.0,
-            wrap_angle(state.lon) / DEG + 0.0,
-            state.h + 0.0,
-            tidy(v.x, 9),
-            tidy(v.y, 9),
-            tidy(v.z, 9),
-            tidy(roll, 12),
-            tidy(pitch, 12),
-            tidy(yaw, 12)
-        )?;
+        let [v_n, v_e, v_d] = v.to_array().map(|v| tidy(v, 9));
+        let [roll, pitch, yaw] = [rpy.roll, rpy.pitch, rpy.yaw].map(|a| tidy(a / DEG, 12));
+        let (lat, lon) = (state.lat / DEG + 0.0, wrap_angle(state.lon) / DEG + 0.0);
+        let (t_s, h) = (tidy(t_s, 9), state.h + 0.0);
+        let _ = writeln!(
+            text,
+            "{t_s},{lat},{lon},{h},{v_n},{v_e},{v_d},{roll},{pitch},{yaw}"
+        );
     }
-    Ok(())
+    text
 }
 
 /// The nearest number of so many decimals; no negative zero.

@@ -1,6 +1,7 @@
 //! Sentences of the manuals, and damaged ones.
 
 use super::*;
+use nav_sim_document::Importance;
 use nav_sim_signal::units::DEG;
 
 const SIGMA: FixSigma = FixSigma {
@@ -28,9 +29,9 @@ fn read(text: &str) -> Vec<GnssFix> {
 /// The fixes of a log, and what is said of it.
 fn said(text: &str, imu_s: Option<(f64, f64)>) -> (Vec<GnssFix>, Vec<String>) {
     let (all, remarks) = fixes("a.nmea", text, Some(&SIGMA), imu_s).unwrap();
-    let words = |remark| match remark {
-        Remark::Note(text) => format!("note: {text}"),
-        Remark::Doubt(text) => format!("doubt: {text}"),
+    let words = |note: Note| match note.importance {
+        Importance::Warning => format!("doubt: {}", note.text),
+        _ => format!("note: {}", note.text),
     };
     (
         all.into_iter().map(|(_, fix)| fix).collect(),

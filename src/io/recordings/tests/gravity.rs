@@ -33,14 +33,11 @@ fn gravity_tells_wrong_units() {
 /// An array with the gyroscopes first: gravity stands in the columns that are taken for theirs.
 #[test]
 fn exchanged_sensors_are_refused() {
-    let mut bytes = Vec::new();
-    write_npy_header(&mut bytes, 200, 6).unwrap();
-    for i in 0..200 {
+    let row = |i: u32| {
         let small = f64::from(i % 7) * 1e-4;
-        for x in [small, -small, small, small, -small, 9.8 + small] {
-            bytes.extend(x.to_le_bytes());
-        }
-    }
+        [small, -small, small, small, -small, 9.8 + small]
+    };
+    let bytes = npy([200, 6], (0..200).flat_map(row));
     let (message, hint) = refusal_with("a.npy", &bytes, &at_100_hz());
     assert!(
         message.starts_with("a.npy: accelerometers and gyroscopes are exchanged: |f| is 0.000"),

@@ -69,36 +69,3 @@ fn a_header_in_iso_8859_1_has_its_units() {
         ["header not in UTF-8, taken as ISO-8859-1"]
     );
 }
-
-#[test]
-fn an_array_is_read_as_the_manifest_beside_it_says() {
-    let files = Files::new();
-    let signals: [(Channel, Vec<f64>); 2] = [
-        (Channel::ALL[3], vec![1.0, 2.0, 4.0]),
-        (Channel::ALL[5], vec![3.0, 5.0, 8.0]),
-    ];
-    let mut bytes = Vec::new();
-    FileFormat::Npy.write(&mut bytes, 50.0, &signals).unwrap();
-    let path = files.add("replicate_1.npy", &bytes);
-    let other = files.add("other.npy", &bytes);
-    files.add(
-        "manifest.json",
-        "{\"command\": \"synthesize\", \"axes\": [\"gyro.x\", \"gyro.z\"], \"rate_hz\": 50.0, \"replicates\": \
-         [{\"file\": \"replicate_1.npy\"}]}",
-    );
-    let (recordings, report) = read(std::slice::from_ref(&path), &ReadOptions::default()).unwrap();
-    assert_eq!(channels(&recordings[0]), ["gyro.x", "gyro.z"]);
-    assert_close(&[recordings[0].rate_hz], &[50.0]);
-    assert_close(
-        &samples_with_mean(&recordings[0].signals[1]),
-        &[3.0, 5.0, 8.0],
-    );
-    assert_eq!(report.files[0].rate_from, "manifest.json");
-    let e = read(&[path], &at_100_hz()).unwrap_err().to_string();
-    assert!(
-        e.ends_with("replicate_1.npy: the manifest.json says 50 Hz, but 100 Hz is given"),
-        "{e}"
-    );
-    // It says nothing of a file that it does not name.
-    assert!(read(&[other], &at_100_hz()).is_err());
-}

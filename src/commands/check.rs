@@ -1,0 +1,240 @@
+//! `nav-sim check`: whether a file is what it should be.
+
+use super::batch::Study;
+use super::inspect::inspect;
+use crate::app::{Answer, Command, Context, Failure, Result, inputs};
+use crate::io::file_kind::{self, FileKind};
+use crate::io::fusion_files::{ImuFile, read_gnss, read_imu, read_initial};
+use crate::io::logs::LogOptions;
+use crate::io::{contamination_file, curve_file, datasheet, model_file, scenario_file};
+use crate::parse;
+use crate::report::six_digits;
+use nav_sim_document::{Document, Note, Tone, seconds};
+use nav_sim_navigation::fusion::alignment::moves;
+use nav_sim_navigation::gnss::FixSigma;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Check scenario, study, model, trajectory and recording files without running anything
+///
+/// What a file is follows from its contents. A TOML file with [accel] or [gyro] is a noise model; with segments or
+/// waypoints a motion profile; with [run] beside [vary], or a trajectory in it, a study of `batch`; with operations
+/// one for `synthesize --contaminate`; with lat_deg and yaw_deg an initial state of `fuse`; with [unit] an entry of
+/// the catalogue of IMUs; any other is a scenario. A table with lat_deg or n_m is a trajectory, as are .nav, .tum
+/// and .gpx; with standard deviations it is GNSS fixes; with tau_samples (or a .wv.json) a curve; any other table or
+/// .npy is a static recording.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim check calib_data/consumer_mems.toml
+  nav-sim check trajectories/land_vehicle.toml examples/quick_study.toml
+  nav-sim init study && nav-sim check study/scenario.toml")]
+pub struct CheckFiles {
+    /// Files
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Sample rate of recordings without a time column
+    #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
+    rate_hz: Option<f64>,
+    /// Also print the contents: scenarios and studies with every key, defaults included; models axis by axis
+    #[arg(long)]
+    dry_run: bool,
+}
+
+/// Files that were looked at.
+#[derive(Debug, Serialize)]
+#[serde(transparent)]
+pub struct Checked {
+    files: Vec<CheckedFile>,
+    #[serde(skip)]
+    unmet: Option<Failure>,
+}
+
+#[derive(Debug, Serialize)]
+struct CheckedFile {
+    file: String,
+    ok: bool,
+    /// Its kind, or its error.
+    found: String,
+    #[serde(skip)]
+    contents: Option<String>,
+}
+
+impl Command for CheckFiles {
+    type Answer = Checked;
+    const NAME: &'static str = "check";
+    const PLOT: bool = false;
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        Ok(Vec::new())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<Checked> {
+        let (mut files, mut failures) = (Vec::new(), Vec::new());
+        for path in &self.files {
+            let found = check(path, self.rate_hz, context).and_then(|found| {
+                let contents = self.dry_run.then(|| resolved(path)).transpose()?;
+                Ok((found, contents.flatten()))
+            });
+            let ok = found.is_ok();
+            let (found, contents) = found.unwrap_or_else(|failure| {
+                let message = failure.to_string();
+                failures.push(failure);
+                (message, None)
+            });
+            files.push(CheckedFile {
+                file: path.display().to_string(),
+                ok,
+                found,
+                contents,
+            });
+        }
+        let unmet = match failures.len() {
+            0 => None,
+            1 if files.len() == 1 => failures.pop(),
+            wrong => {
+                failures.iter().for_each(|failure| context.warn(failure));
+                let message = format!("{wrong} of {} files are refused", files.len());
+                Some(match failures.iter().any(|failure| failure.code() == 1) {
+                    true => Failure::could_not(message),
+                    false => Failure::input(message),
+                })
+            }
+        };
+        Ok(Checked { files, unmet })
+    }
+}
+
+impl Answer for Checked {
+    fn document(&self) -> Document {
+        let sound = self.files.iter().filter(|file| file.ok);
+        let lines = sound.map(|CheckedFile { file, found, .. }| format!("{file}: {found}"));
+        Document::new("Files", Tone::Good, lines)
+    }
+
+    fn text(&self) -> Option<String> {
+        let sound = self.files.iter().filter(|file| file.ok);
+        let lines = sound.flat_map(|checked| {
+            let line = format!("{}: {}\n", checked.file, checked.found);
+            [line, checked.contents.clone().unwrap_or_default()]
+        });
+        Some(lines.collect())
+    }
+
+    fn unmet(&self) -> Option<Failure> {
+        self.unmet.clone()
+    }
+}
+
+/// The configuration that a file stands for, every key of it.
+fn resolved(path: &Path) -> Result<Option<String>> {
+    Ok(match file_kind::of(path)? {
+        FileKind::Scenario => {
+            let scenario = scenario_file::read(path)?;
+            Some(toml::to_string(&scenario).map_err(Failure::could_not)?)
+        }
+        FileKind::Model => Some(model_file::to_toml(&model_file::read(path)?)),
+        _ => None,
+    })
+}
+
+fn tell(notes: &[Note], context: &Context<'_>) {
+    for Note { importance, text } in notes {
+        context.note(*importance, text);
+    }
+}
+
+fn drive(imu: &ImuFile, context: &Context<'_>) -> String {
+    tell(&imu.remarks, context);
+    let (samples, rate_hz) = (imu.samples.len(), imu.rate_hz);
+    format!("an IMU recording of {samples} samples at {rate_hz:.2} Hz, for fuse")
+}
+
+/// Reads a file as what it is, and says what was found.
+fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<String> {
+    Ok(match file_kind::of(path)? {
+        FileKind::Scenario => {
+            let scenario = scenario_file::read(path)?;
+            format!("a scenario of {} runs", scenario.run.runs)
+        }
+        FileKind::Study => {
+            let cells = Study::read(path, &[])?.cells(path.parent().unwrap_or(Path::new("")))?;
+            format!("a study of {} cells", cells.len())
+        }
+        FileKind::Model => {
+            let model = inputs::model(path, context)?.model;
+            let [accel, gyro] = [0, 3].map(|axis| model.axes[axis].labels().join(" + "));
+            let rate_hz = model.rate_hz;
+            format!("a noise model at {rate_hz} Hz, accel {accel}, gyro {gyro}")
+        }
+        FileKind::Log => {
+            let log = inspect(path, &LogOptions::default())?;
+            let (format, channels) = (log.format, log.channels.len());
+            format!("{format} of {channels} channels (nav-sim inspect lists them)")
+        }
+        FileKind::CatalogueEntry => {
+            let sheet = datasheet::read(path)?;
+            let (name, figures) = (sheet.name.unwrap_or_default(), sheet.entries.len());
+            format!("a catalogue entry, {name}, of {figures} figures")
+        }
+        FileKind::Contamination => {
+            // the rate only turns seconds into samples
+            let rate_hz = rate_hz.unwrap_or(100.0);
+            let rules = contamination_file::find(&path.to_string_lossy(), rate_hz)?.rules;
+            format!("a contamination of {} operations", rules.len())
+        }
+        FileKind::Curve => format!("{} wavelet-variance curves", curve_file::read(path)?.len()),
+        FileKind::Record => {
+            "a record that nav-sim wrote beside a result: nothing in it to be checked".to_owned()
+        }
+        FileKind::Trajectory => {
+            let trajectory = inputs::trajectory(path, context)?;
+            let span = trajectory.end_s() - trajectory.start_s();
+            format!("a trajectory of {span} s")
+        }
+        FileKind::Initial => format!("an initial state at {} s", read_initial(path)?.t_s),
+        FileKind::Gnss => {
+            // standard deviations that no file states are an option of fuse
+            let given = FixSigma {
+                pos_m: [1.0; 3],
+                vel_m_s: Some([1.0; 3]),
+            };
+            let read = read_gnss(path, None, None, None);
+            let unsaid = match read.is_err() {
+                true => ", without standard deviations (fuse --gnss-sigma)",
+                false => "",
+            };
+            let read = read.or_else(|e| read_gnss(path, Some(&given), None, None).map_err(|_| e));
+            let (fixes, notes) = read?;
+            tell(&notes, context);
+            let span = fixes.first().zip(fixes.last());
+            let span = seconds(span.map_or(0.0, |(a, b)| b.t_s - a.t_s));
+            format!("{} GNSS fixes over {span} s{unsaid}", fixes.len())
+        }
+        FileKind::Imu => drive(&read_imu(path, None, None)?, context),
+        FileKind::Recording => {
+            let recordings = match inputs::recordings(&[path.to_owned()], rate_hz, context) {
+                Ok(recordings) => recordings,
+                // what is no static recording may be one of a drive or a flight
+                Err(refusal) => {
+                    let imu = read_imu(path, None, None).ok();
+                    let imu = imu.filter(|imu| moves(&imu.samples)).ok_or(refusal)?;
+                    return Ok(drive(&imu, context));
+                }
+            };
+            let mut described: Vec<String> = recordings
+                .iter()
+                .map(|r| {
+                    let (channels, rate_hz) = (r.signals.len(), six_digits(r.rate_hz));
+                    format!("{channels} channels of {} samples at {rate_hz} Hz", r.len())
+                })
+                .collect();
+            described.dedup();
+            let count = match recordings.len() {
+                1 => "a static recording".to_owned(),
+                n => format!("{n} static recordings"),
+            };
+            format!("read as {count}, {}", described.join("; "))
+        }
+    })
+}

@@ -1,0 +1,313 @@
+//! `nav-sim synthesize`: replicate recordings of a noise model.
+
+use crate::app::reading::ChannelSet;
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::io::model_file::{self, ModelFile};
+use crate::io::{contamination_file, recordings};
+use crate::parse;
+use nav_sim_document::{Document, Tone};
+use nav_sim_signal::imu::Channel;
+use nav_sim_signal::noise::contamination::{Contamination, Rule};
+use nav_sim_signal::noise::{Model, Process, ReplicateError, VirtualImu};
+use rayon::prelude::*;
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Synthesise static recordings from a noise model
+///
+/// Writes replicate_1, replicate_2, … and a manifest.json with the parameters that were drawn. The same seed gives the
+/// same noise with and without contamination, and at any number of threads.
+#[derive(clap::Args, Debug, Clone)]
+#[command(before_help = "\
+Examples:
+  nav-sim synthesize calib_data/consumer_mems.toml \\
+      --replicates 9 --samples 65536 --spread --seed 1 -o replicates
+  nav-sim synthesize calib_data/consumer_mems.toml --replicates 8 --samples 65536 \\
+      --axes x --contaminate section5-II -o corrupted
+  nav-sim synthesize calib_data/tactical.toml --duration 600 -o tactical")]
+pub struct Synthesize {
+    /// Noise model (TOML)
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Recordings to make
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    pub replicates: u64,
+    /// Samples of each [default: 524284, as in the paper]
+    #[arg(long, value_name = "T", conflicts_with = "duration", value_parser = clap::value_parser!(u64).range(2..))]
+    pub samples: Option<u64>,
+    /// Length of each in seconds, instead of --samples
+    #[arg(long, value_name = "S", value_parser = parse::positive)]
+    pub duration: Option<f64>,
+    /// Draw each replicate's parameters from the spread that the model states
+    #[arg(long)]
+    pub spread: bool,
+    /// Corrupt the replicates: a scenario of the paper (section4-II, section4-III, section5-II, section5-III) or a file
+    #[arg(long, value_name = "NAME|FILE")]
+    pub contaminate: Option<String>,
+    /// Signals to make: all, accel, gyro, x, accel.x, … (comma-separated)
+    #[arg(
+        long,
+        value_name = "AXES",
+        value_delimiter = ',',
+        default_value = "all"
+    )]
+    pub axes: Vec<ChannelSet>,
+}
+
+/// Recordings whose models are drawn; their noise is drawn as they are written.
+#[derive(Debug, Serialize)]
+pub struct Synthesis {
+    schema_version: u32,
+    seed: u64,
+    #[serde(flatten)]
+    drawn: Drawn,
+    #[serde(skip)]
+    file: ModelFile,
+    #[serde(skip)]
+    contamination: Option<Contamination>,
+    #[serde(skip)]
+    channels: Vec<Channel>,
+    #[serde(skip)]
+    models: Vec<Model>,
+}
+
+#[derive(Debug, Serialize)]
+struct Drawn {
+    rate_hz: f64,
+    samples: usize,
+    spread: bool,
+    axes: Vec<String>,
+    contamination: Option<String>,
+    replicates: Vec<Replicate>,
+}
+
+#[derive(Debug, Serialize)]
+struct Replicate {
+    file: String,
+    contaminated: bool,
+    axes: BTreeMap<String, Vec<Process>>,
+}
+
+impl Command for Synthesize {
+    type Answer = Synthesis;
+    const NAME: &'static str = "synthesize";
+    const OUT: Out = Out::Directory {
+        path: "out/replicates",
+        files: &[],
+    };
+    const PLOT: bool = false;
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        let contamination = self.contaminate.iter().map(PathBuf::from);
+        let contamination = contamination.filter(|path| path.exists());
+        let files = contamination.map(|path| ("contamination", path));
+        Ok(files.chain([("model", self.model.clone())]).collect())
+    }
+
+    fn output_names(&self) -> Vec<Cow<'static, str>> {
+        (1..=self.replicates).map(|k| name(k).into()).collect()
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<Synthesis> {
+        let file = model_file::read(&self.model)?;
+        let (shown, rate_hz) = (self.model.display(), file.model.rate_hz);
+        if self.spread && file.spread.is_none() {
+            let hint = "see the head of calib_data/consumer_mems.toml, or leave --spread out";
+            let message = format!("{shown}: no [spread] to draw parameters from");
+            return Err(Failure::input(message).hint(hint));
+        }
+        if file.turn_on.is_some() {
+            context.remark(format!(
+                "{shown}: its turn-on biases are not drawn: recordings are of noise about their mean"
+            ));
+        }
+        let contamination = self.contaminate.as_deref();
+        let contamination = contamination.map(|name| find(name, rate_hz)).transpose()?;
+        let channels = self.wanted(&file, context)?;
+        reaches(contamination.as_ref(), self.replicates, &channels, context)?;
+        let samples = match self.duration {
+            Some(s) => (s * rate_hz).round(),
+            None => self.samples.unwrap_or(524_284) as f64,
+        };
+        if samples < 2.0 {
+            let message = format!("a recording needs at least 2 samples; these are {samples}");
+            return Err(Failure::input(message));
+        }
+        let bytes = samples * channels.len() as f64 * 8.0;
+        if bytes >= isize::MAX as f64 || Vec::<u8>::new().try_reserve_exact(bytes as usize).is_err()
+        {
+            let gigabytes = bytes / 1e9;
+            let message = format!("{samples} samples need {gigabytes:.0} GB of memory");
+            return Err(Failure::could_not(message));
+        }
+        let mut synthesis = Synthesis {
+            schema_version: 1,
+            seed: context.seed_or(None),
+            drawn: Drawn {
+                rate_hz,
+                samples: samples as usize,
+                spread: self.spread,
+                axes: channels.iter().map(Channel::to_string).collect(),
+                contamination: contamination.as_ref().map(|c| c.name.clone()),
+                replicates: Vec::new(),
+            },
+            file,
+            contamination,
+            channels,
+            models: Vec::new(),
+        };
+        for k in 1..=self.replicates {
+            let model = synthesis.model(k)?;
+            let axes = synthesis.channels.iter();
+            let axes = axes.map(|c| (c.to_string(), model.axis(*c).processes.clone()));
+            let replicate = Replicate {
+                file: name(k),
+                contaminated: synthesis.is_contaminated(k),
+                axes: axes.collect(),
+            };
+            synthesis.drawn.replicates.push(replicate);
+            synthesis.models.push(model);
+        }
+        Ok(synthesis)
+    }
+}
+
+impl Synthesize {
+    /// The channels to make: those asked for that the model has.
+    fn wanted(&self, file: &ModelFile, context: &Context<'_>) -> Result<Vec<Channel>> {
+        let asked = |c: &Channel| self.axes.iter().any(|set| set.channels.contains(c));
+        let (missing, present): (Vec<Channel>, Vec<Channel>) = Channel::ALL
+            .into_iter()
+            .filter(asked)
+            .partition(|c| file.missing.contains(c));
+        let shown = self.model.display();
+        if present.is_empty() {
+            let message = format!("{shown} has no noise model for the axes asked for");
+            return Err(Failure::input(message));
+        }
+        for channel in missing {
+            context.warn(format!(
+                "{shown} has no noise model for {channel}; no signal is written for that axis"
+            ));
+        }
+        Ok(present)
+    }
+}
+
+fn name(replicate: u64) -> String {
+    format!("replicate_{replicate}.csv")
+}
+
+impl Synthesis {
+    fn imu(&self) -> VirtualImu<'_> {
+        VirtualImu {
+            model: &self.file.model,
+            spread: self.file.spread.as_ref().filter(|_| self.drawn.spread),
+            contamination: self.contamination.as_ref(),
+            seed: self.seed,
+        }
+    }
+
+    fn is_contaminated(&self, replicate: u64) -> bool {
+        let contamination = self.contamination.as_ref();
+        contamination.is_some_and(|c| c.touches(replicate))
+    }
+
+    /// The model of a replicate, whose contamination is tried on silence.
+    fn model(&self, replicate: u64) -> Result<Model> {
+        let model = self.imu().model_of(replicate)?;
+        let contamination = self.contamination.iter();
+        for contamination in contamination.filter(|c| c.touches(replicate)) {
+            let mut silence = vec![0.0; self.drawn.samples];
+            for channel in &self.channels {
+                contamination
+                    .apply(&mut silence, *channel, replicate, model.rate_hz, self.seed)
+                    .map_err(|source| ReplicateError::Contamination { replicate, source })?;
+            }
+        }
+        Ok(model)
+    }
+
+    fn text(&self, replicate: u64, model: &Model) -> String {
+        let signal = |channel: &Channel| {
+            let signal = self
+                .imu()
+                .signal(model, replicate, *channel, self.drawn.samples);
+            (*channel, signal.expect("its contamination was tried"))
+        };
+        let signals: Vec<_> = self.channels.par_iter().map(signal).collect();
+        recordings::csv(model.rate_hz, &signals)
+    }
+}
+
+impl Answer for Synthesis {
+    fn document(&self) -> Document {
+        let Drawn {
+            rate_hz,
+            samples,
+            axes,
+            ..
+        } = &self.drawn;
+        let (replicates, axes, seed) = (self.models.len(), axes.join(" "), self.seed);
+        let line = format!(
+            "{replicates} replicates of {samples} samples at {rate_hz} Hz, {axes}, seed {seed}"
+        );
+        Document::new("Synthesised recordings", Tone::Good, [line])
+    }
+
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        let file = |(k, model)| OutputFile {
+            name: name(k).into(),
+            parts: Box::new(std::iter::once_with(move || self.text(k, model))),
+        };
+        (1..).zip(&self.models).map(file).collect()
+    }
+
+    fn record(&self) -> Value {
+        json!(self.drawn)
+    }
+}
+
+/// Refuses a contamination that touches nothing of what is made: the replicates would be clean by another name. Says
+/// which of its rules do not.
+fn reaches(
+    contamination: Option<&Contamination>,
+    replicates: u64,
+    channels: &[Channel],
+    context: &Context<'_>,
+) -> Result<()> {
+    let Some(contamination) = contamination else {
+        return Ok(());
+    };
+    let Contamination { name, rules } = contamination;
+    if !(1..=replicates).any(|replicate| contamination.touches(replicate)) {
+        let message =
+            format!("--contaminate {name}: it touches none of the replicates 1 to {replicates}");
+        return Err(Failure::input(message)
+            .hint("replicates are counted from 1; more of them with --replicates"));
+    }
+    let made = |rule: &Rule| channels.iter().any(|c| c.sensor == rule.sensor);
+    let Some(Rule { sensor, place, .. }) = rules.iter().find(|rule| !made(rule)) else {
+        return Ok(());
+    };
+    let message = format!("{place}: corrupts the {}, which is not made", sensor.name());
+    if rules.iter().any(made) {
+        context.detail(message);
+        return Ok(());
+    }
+    Err(Failure::input(message).hint("another contamination, or --axes with that sensor"))
+}
+
+fn find(name: &str, rate_hz: f64) -> Result<Contamination> {
+    contamination_file::find(name, rate_hz).map_err(|e| match contamination_file::meant(name) {
+        _ if e.code() != 1 => e,
+        Some(meant) => e.hint(format!("did you mean \"{meant}\"?")),
+        None => {
+            let known = contamination_file::names().join(", ");
+            e.hint(format!("give a file or one of {known}"))
+        }
+    })
+}

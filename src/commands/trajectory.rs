@@ -1,0 +1,361 @@
+//! `nav-sim trajectory`: reference trajectories.
+
+use crate::app::{Answer, Asked, Command, Context, Failure, Out, OutputFile, Result, inputs};
+use crate::io::atomic::Written;
+use crate::io::scenario_file;
+use crate::io::trajectory_file::{self, Options, Rows, parse_origin};
+use crate::parse;
+use crate::report::{TrajectoryCheck, gnss_csv, imu_csv, initial_toml};
+use nav_sim_document::{Document, Tone};
+use nav_sim_navigation::closure::{Bounds, Closure};
+use nav_sim_navigation::earth::GravityModel;
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::aiding::AidingSettings;
+use nav_sim_navigation::sensors::imu::Truth;
+use nav_sim_navigation::simulation::{Plan, record};
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_navigation::trajectory::plausibility::{Limits, examine};
+use nav_sim_signal::noise::continuous;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Make, check and convert reference trajectories
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim trajectory check trajectories/land_vehicle.toml
+  nav-sim trajectory generate trajectories/fixed_wing.toml --rate-hz 10 -o flight.csv
+  nav-sim trajectory convert trajectories/land_vehicle.toml --rate-hz 1 -o drive.csv")]
+pub(crate) struct TrajectoryArgs {
+    #[command(subcommand)]
+    pub(crate) command: TrajectoryCommand,
+}
+
+#[derive(clap::Subcommand, Debug)]
+pub(crate) enum TrajectoryCommand {
+    Generate(Asked<Generate>),
+    Check(Asked<CheckTrajectory>),
+    Convert(Asked<Convert>),
+    Record(Asked<Record>),
+}
+
+/// The trajectory of a command.
+#[derive(clap::Args, Debug)]
+struct Source {
+    /// Motion profile (.toml) or table (.csv, .tsv, .txt, also .gz)
+    #[arg(value_name = "TRAJECTORY")]
+    path: PathBuf,
+    /// Origin of local coordinates, if the file does not state it: latitude, longitude, height
+    #[arg(long, value_name = "LAT_DEG,LON_DEG,H_M", value_parser = origin, allow_hyphen_values = true)]
+    origin: Option<Origin>,
+}
+
+/// Latitude, longitude (rad), height (m).
+#[derive(Debug, Clone, Copy)]
+struct Origin([f64; 3]);
+
+fn origin(text: &str) -> Result<Origin, String> {
+    let expected = || "not LAT_DEG,LON_DEG,H_M with a latitude within ±89.9".to_owned();
+    parse_origin(text).map(Origin).ok_or_else(expected)
+}
+
+impl Source {
+    /// Reads it, and warns of what is doubtful about it.
+    fn read(&self, context: &Context<'_>) -> Result<(Trajectory, Vec<String>)> {
+        let origin = self.origin.map(|o| o.0);
+        let read = trajectory_file::load(&self.path, &Options { origin })?;
+        read.1.iter().for_each(|doubt| context.warn(doubt));
+        Ok(read)
+    }
+
+    fn table(&self, rows: Rows, context: &Context<'_>) -> Result<TrajectoryTable> {
+        let (trajectory, _) = self.read(context)?;
+        Ok(TrajectoryTable {
+            schema_version: 1,
+            rows: rows.times(&trajectory).len(),
+            text: trajectory_file::csv(&trajectory, rows),
+        })
+    }
+
+    fn input(&self) -> (&'static str, PathBuf) {
+        ("trajectory", self.path.clone())
+    }
+}
+
+/// A trajectory as a table of nav-sim.
+#[derive(Debug, Serialize)]
+pub struct TrajectoryTable {
+    schema_version: u32,
+    rows: usize,
+    #[serde(skip)]
+    text: String,
+}
+
+impl Answer for TrajectoryTable {
+    fn document(&self) -> Document {
+        Document::new("Trajectory", Tone::Good, [format!("{} rows", self.rows)])
+    }
+
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        vec![OutputFile::whole("", self.text.clone())]
+    }
+}
+
+const TABLE: Out = Out::File {
+    kind: Written::Trajectory,
+    name: "trajectory.csv",
+    help: "Table to write (.csv or .csv.gz); without it, standard output",
+};
+
+/// Write a motion profile as a table of evenly spaced rows
+///
+/// Columns: time, latitude, longitude, height, velocity north, east, down, roll, pitch, yaw. Numbers have
+/// enough digits to be read back exactly.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim trajectory generate trajectories/land_vehicle.toml -o drive.csv
+  nav-sim trajectory generate trajectories/fixed_wing.toml --rate-hz 10 -o flight.csv.gz
+  nav-sim trajectory generate trajectories/figure_eight.toml --rate-hz 1")]
+pub struct Generate {
+    #[command(flatten)]
+    source: Source,
+    /// Rows per second
+    #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = parse::rate_hz)]
+    rate_hz: f64,
+}
+
+impl Command for Generate {
+    type Answer = TrajectoryTable;
+    const NAME: &'static str = "trajectory generate";
+    const OUT: Out = TABLE;
+    const PLOT: bool = false;
+    const PRINTS_FILE: bool = true;
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        Ok(vec![self.source.input()])
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<TrajectoryTable> {
+        self.source.table(Rows::Rate(self.rate_hz), context)
+    }
+}
+
+/// Convert a trajectory file of any kind to a nav-sim table
+///
+/// The rows are those of the input, or evenly spaced ones with --rate-hz. Local coordinates become latitude,
+/// longitude and height. A path without attitude gets the heading and pitch along it.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim trajectory convert trajectories/figure_eight.toml -o eight.csv
+  nav-sim trajectory convert trajectories/fixed_wing.toml --rate-hz 20 -o denser.csv.gz
+  nav-sim trajectory convert trajectories/land_vehicle.toml --rate-hz 1 -o thinned.csv")]
+pub struct Convert {
+    #[command(flatten)]
+    source: Source,
+    /// Rows per second (default: the rows of the input)
+    #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
+    rate_hz: Option<f64>,
+}
+
+impl Command for Convert {
+    type Answer = TrajectoryTable;
+    const NAME: &'static str = "trajectory convert";
+    const OUT: Out = TABLE;
+    const PLOT: bool = false;
+    const PRINTS_FILE: bool = true;
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        Ok(vec![self.source.input()])
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<TrajectoryTable> {
+        let rows = self.rate_hz.map_or(Rows::Knots, Rows::Rate);
+        self.source.table(rows, context)
+    }
+}
+
+/// Check a trajectory: could a vehicle move so, and does navigation close on it?
+///
+/// Closure: the noise-free IMU samples of the trajectory are mechanised from its exact start and compared with
+/// it. The difference is the error of the strapdown algorithm at this rate. Closure beyond a bound and motion beyond
+/// a limit end with exit code 3. Velocity columns that contradict the positions are warnings.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim trajectory check trajectories/land_vehicle.toml
+  nav-sim trajectory check trajectories/fixed_wing.toml --rate-hz 200 --max-position-m 0.001
+  nav-sim trajectory check trajectories/figure_eight.toml --limit-speed 15 --format json")]
+pub struct CheckTrajectory {
+    #[command(flatten)]
+    source: Source,
+    /// IMU rate at which the closure is computed
+    #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = parse::rate_hz)]
+    rate_hz: f64,
+    /// Bound on the position error of the closure (m)
+    #[arg(long, value_name = "M", default_value_t = Bounds::default().position_m, value_parser = parse::positive)]
+    max_position_m: f64,
+    /// Largest plausible speed (m/s)
+    #[arg(long, value_name = "M_S", default_value_t = Limits::default().speed, value_parser = parse::positive)]
+    limit_speed: f64,
+}
+
+/// Stretches beyond limits that are said one by one.
+const SAID: usize = 10;
+
+impl Command for CheckTrajectory {
+    type Answer = TrajectoryCheck;
+    const NAME: &'static str = "trajectory check";
+    const PLOT: bool = false;
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        Ok(vec![self.source.input()])
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<TrajectoryCheck> {
+        let (trajectory, warnings) = self.source.read(context)?;
+        let limits = Limits {
+            speed: self.limit_speed,
+            ..Limits::default()
+        };
+        let bounds = Bounds {
+            position_m: self.max_position_m,
+            ..Bounds::default()
+        };
+        let (largest, beyond) = examine(&trajectory, &limits);
+        let name = self.source.path.display().to_string();
+        for excess in beyond.iter().take(SAID) {
+            context.warn(format!("{name}: {excess}"));
+        }
+        if beyond.len() > SAID {
+            let more = beyond.len() - SAID;
+            context.warn(format!(
+                "{name}: and {more} more stretches beyond limits (--format json lists all)"
+            ));
+        }
+        let closure = Closure::new(&trajectory, self.rate_hz, GravityModel::default())
+            .map_err(|e| Failure::input(format!("{name}: {e}")).hint("give another --rate-hz"))?;
+        Ok(TrajectoryCheck::new(
+            (name, warnings),
+            &trajectory,
+            (largest, &beyond, limits),
+            (closure, bounds),
+        ))
+    }
+}
+
+impl Answer for TrajectoryCheck {
+    fn document(&self) -> Document {
+        Document::new("Trajectory", Tone::Good, [self.text()])
+    }
+
+    fn text(&self) -> Option<String> {
+        Some(self.text())
+    }
+
+    fn unmet(&self) -> Option<Failure> {
+        let closure = (!self.is_closed())
+            .then_some("a higher --rate-hz closes better; rough motion may deserve a wider bound");
+        let motion = (!self.is_plausible())
+            .then_some("a vehicle that does move so deserves a larger --limit-speed");
+        let hint: Vec<&str> = closure.into_iter().chain(motion).collect();
+        Some(Failure::bound(self.missed()?).hint(hint.join("; ")))
+    }
+}
+
+/// Write what an IMU with the noise of MODEL and a GNSS receiver record along a trajectory
+///
+/// The files are those that `fuse` reads: imu.csv (rates), gnss.csv, reference.csv (the truth, 10 Hz),
+/// initial.toml (a start drawn from the initial standard deviations). The noise is that of the first run of
+/// `run` with the same seed; a turn-on bias that MODEL states is drawn too.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim trajectory record trajectories/land_vehicle.toml calib_data/tactical.toml -o recorded
+  nav-sim trajectory record trajectories/figure_eight.toml calib_data/tactical.toml --seed 1
+  nav-sim trajectory record trajectories/fixed_wing.toml calib_data/consumer_mems.toml \\
+      --scenario examples/scenario.toml -o flight")]
+pub struct Record {
+    #[command(flatten)]
+    source: Source,
+    /// Noise model of the IMU
+    #[arg(value_name = "MODEL")]
+    model: PathBuf,
+    /// Scenario file whose [imu], [gnss] and [initial] sections are used
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+}
+
+/// Recorded drive: its files by name.
+#[derive(Debug, Serialize)]
+pub struct RecordedDrive {
+    schema_version: u32,
+    files: [&'static str; 4],
+    #[serde(skip)]
+    texts: [String; 4],
+}
+
+const RECORDED: [&str; 4] = ["imu.csv", "gnss.csv", "reference.csv", "initial.toml"];
+
+impl Command for Record {
+    type Answer = RecordedDrive;
+    const NAME: &'static str = "trajectory record";
+    const OUT: Out = Out::Directory {
+        path: "out/recording",
+        files: &RECORDED,
+    };
+    const PLOT: bool = false;
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        let scenario = inputs::files("scenario", &self.scenario);
+        let model = ("model", self.model.clone());
+        Ok([self.source.input(), model]
+            .into_iter()
+            .chain(scenario)
+            .collect())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<RecordedDrive> {
+        let scenario = self.scenario.as_deref().map(scenario_file::read);
+        let mut scenario = scenario.transpose()?.unwrap_or_default();
+        let (trajectory, _) = self.source.read(context)?;
+        let file = inputs::model(&self.model, context)?;
+        let model = continuous::at_rate(&file.model, scenario.imu.rate_hz)
+            .map_err(|e| Failure::input(format!("{}: {e}", self.model.display())))?;
+        inputs::make_turn_on(&mut scenario.imu, &file, &self.model, context);
+        let seed = context.seed_or(scenario.run.seed);
+        // a recording is what IMU and receiver give: neither barometer nor wheel, no filter
+        let scenario = Scenario {
+            baro: None,
+            aiding: AidingSettings::default(),
+            ..scenario
+        };
+        let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &[], &[], seed);
+        let plan = Plan::new(&experiment).map_err(Failure::input)?;
+        let recording = record(&plan, 0);
+        Ok(RecordedDrive {
+            schema_version: 1,
+            files: RECORDED,
+            texts: [
+                imu_csv(&recording.imu),
+                gnss_csv(&recording.gnss),
+                trajectory_file::csv(&trajectory, Rows::Rate(10.0)),
+                initial_toml(trajectory.start_s(), &recording.start, &scenario.initial),
+            ],
+        })
+    }
+}
+
+impl Answer for RecordedDrive {
+    fn document(&self) -> Document {
+        Document::new("Recorded drive", Tone::Good, [self.files.join(", ")])
+    }
+
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        let files = self.files.into_iter().zip(self.texts.clone());
+        files
+            .map(|(name, text)| OutputFile::whole(name, text))
+            .collect()
+    }
+}
