@@ -5,7 +5,7 @@
 use std::env;
 use std::sync::LazyLock;
 
-static READER: LazyLock<fn(&[u8])> =
-    LazyLock::new(|| nav_sim::fuzz::target(&env::var("NAV_SIM_FUZZ_TARGET").expect("the name of a reader")));
+static READER: LazyLock<String> =
+    LazyLock::new(|| env::var("NAV_SIM_FUZZ_TARGET").expect("the name of a reader"));
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| READER(bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| nav_sim::fuzz::read(&READER, bytes));

@@ -50,6 +50,8 @@ pub trait Command: clap::Args + Send + Sync + 'static {
     const OUT: Out = Out::Nothing;
     /// True if its document can be written as a page or a picture.
     const PLOT: bool = true;
+    /// True if a page stands in its directory.
+    const PAGE: bool = true;
     /// True if the file goes to stdout where `--out` is not given.
     const PRINTS_FILE: bool = false;
     /// Options that do not change the result, such as `--require`.
@@ -405,7 +407,7 @@ pub fn answered<C: Command>(
     };
     match C::OUT {
         Out::Directory { .. } => {
-            let page = C::PLOT.then_some(&document);
+            let page = C::PAGE.then_some(&document);
             each_file(&answer, page, &mut manifest, &context, keep)?;
         }
         _ => {

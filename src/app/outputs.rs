@@ -133,7 +133,7 @@ impl<C: Command> Asked<C> {
                 let before = serde_json::from_str::<Manifest>(&before).ok();
                 let mut directory = AtomicDir::create(out)?;
                 let give = |file: OutputFile<'_>| directory.write_parts(&file.name, file.parts);
-                let page = C::PLOT.then_some(document);
+                let page = C::PAGE.then_some(document);
                 each_file(answer, page, &mut manifest, context, give)?;
                 directory.commit()?;
                 // files of an earlier result that this one does not have

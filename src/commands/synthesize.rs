@@ -99,6 +99,7 @@ impl Command for Synthesize {
         files: &[],
     };
     const PLOT: bool = false;
+    const PAGE: bool = false;
 
     fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
         let contamination = self.contaminate.iter().map(PathBuf::from);

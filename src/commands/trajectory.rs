@@ -306,6 +306,7 @@ impl Command for Record {
         files: &RECORDED,
     };
     const PLOT: bool = false;
+    const PAGE: bool = false;
 
     fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
         let scenario = inputs::files("scenario", &self.scenario);

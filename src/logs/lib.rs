@@ -60,8 +60,6 @@ mod ubx;
 mod ulog;
 // L6
 mod log;
-// L7
-pub mod fuzz;
 
 pub use channel::{Channel, Content};
 pub use error::{Error, Place};

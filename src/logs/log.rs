@@ -57,11 +57,6 @@ impl Log {
 
     fn new(origin: Origin) -> Result<Self, Error> {
         let kind = recognise(&origin.head(HEAD as u64)?).ok_or(Error::Unknown)?;
-        Self::of_kind(kind, origin)
-    }
-
-    /// Finds the channels of a file of such a format.
-    pub(crate) fn of_kind(kind: Kind, origin: Origin) -> Result<Self, Error> {
         let file_bytes = origin.open()?.length();
         let opened = match kind {
             #[cfg(feature = "mcap")]

@@ -218,7 +218,7 @@ fn inputs_may_be_pipes() {
     let manifest: serde_json::Value = serde_json::from_str(&read("out/manifest.json")).unwrap();
     let bytes = std::fs::read(&model).unwrap();
     assert_eq!(
-        manifest["model_blake3"],
+        manifest["inputs"][0]["blake3"],
         blake3::hash(&bytes).to_hex().to_string()
     );
     assert_eq!(
@@ -339,10 +339,8 @@ fn json_is_spoken_by_commands_that_write_files() {
     assert_eq!(json("init .")["kept"], made["written"]);
     let drive = "trajectories/figure_eight.toml";
     for (command, file) in [("convert", "eight.csv"), ("generate", "rows.csv")] {
-        assert_eq!(
-            json(&format!("trajectory {command} {drive} -o {file}"))["written"][0],
-            file
-        );
+        let table = json(&format!("trajectory {command} {drive} -o {file}"));
+        assert!(table["rows"].as_u64() > Some(100), "{table}");
     }
     let units = json("datasheet --list");
     assert!(

@@ -323,10 +323,10 @@ fn bad_fixes_are_refused_by_line_and_value() {
     );
     refused(
         gnss,
-        cell(1, 4, "sdn_m"),
+        cell(1, 4, "s_n_m"),
         "",
         &[
-            "line 1: unknown column \"sdn_m\"",
+            "line 1: unknown column \"s_n_m\"",
             "hint: did you mean \"sd_n_m\"?",
         ],
     );

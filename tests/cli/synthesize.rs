@@ -340,7 +340,10 @@ fn recordings_of_another_job_are_not_mixed_in_and_inputs_not_overwritten() {
         "out",
     ]);
     assert_eq!(code, 2);
-    assert!(said.contains("out already holds replicate_3.csv"), "{said}");
+    assert!(
+        said.contains("out holds the result of another configuration"),
+        "{said}"
+    );
 
     fs::rename(place.path("model.toml"), place.path("manifest.json")).unwrap();
     let (code, said) = place.run(&["manifest.json", "--samples", "10", "-o", "."]);
@@ -380,7 +383,7 @@ fn recordings_that_this_command_did_not_make_are_left_alone() {
     fs::remove_dir_all(place.path("own")).unwrap();
     place.make("own", &["--samples", "10"]);
     fs::write(place.path("own/replicate_2.csv"), own).unwrap();
-    refused("own holds replicate_2.csv, which this command did not make");
+    refused("own is not of this command");
 }
 
 /// Interrupted, it ends with 128 + signal and leaves nothing; a signal that it was started to ignore does nothing.

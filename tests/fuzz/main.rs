@@ -5,7 +5,7 @@
 
 mod mutate;
 
-use nav_sim::fuzz::{TARGETS, Target};
+use nav_sim::fuzz::{TARGETS, Target, read};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::ops::Range;
@@ -40,13 +40,13 @@ fn entries(directory: &Path) -> Vec<PathBuf> {
 }
 
 /// The number of the executions; panics with the name of what makes the reader panic.
-fn tried((name, read): Target, numbers: Range<u64>) -> u64 {
+fn tried((name, ..): Target, numbers: Range<u64>) -> u64 {
     let files = corpus(name);
     assert!(!files.is_empty(), "no corpus of {name}");
     let mut executions = 0;
     let mut attempt = |bytes: &[u8], what: &str| {
         executions += 1;
-        if catch_unwind(AssertUnwindSafe(|| read(bytes))).is_err() {
+        if catch_unwind(AssertUnwindSafe(|| read(name, bytes))).is_err() {
             let kept = std::env::temp_dir().join(format!("nav-sim-fuzz-{name}-{what}"));
             std::fs::write(&kept, bytes).unwrap();
             panic!("{name}: {what} makes it panic; kept as {}", kept.display());
@@ -84,7 +84,7 @@ fn no_reader_panics_on_a_damaged_file() {
     let only = std::env::var("NAV_SIM_FUZZ_TARGET").ok();
     let wanted: Vec<Target> = TARGETS
         .into_iter()
-        .filter(|(name, _)| only.as_deref().is_none_or(|only| only == *name))
+        .filter(|(name, ..)| only.as_deref().is_none_or(|only| only == *name))
         .collect();
     let worker = || {
         let mut executions = 0;

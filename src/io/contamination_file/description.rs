@@ -36,111 +36,76 @@ pub(super) struct RuleTable {
 
 /// The operations of files, each with its keys.
 #[derive(Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-#[schemars(tag = "operation")]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[schemars(tag = "operation", !deny_unknown_fields)]
 pub(super) enum Described {
     /// A jump of the mean
-    Step(Step),
+    Step {
+        /// Height of the step (units of the signal)
+        amplitude: OneOrEach<Finite>,
+        /// Where in the record, as a share of it (default: 0.5)
+        at_share: Option<OneOrEach<Share>>,
+        /// Where in the record (samples)
+        at_samples: Option<u64>,
+        /// Where in the record (s)
+        at_s: Option<OneOrEach<NonNegative>>,
+    },
     /// A drift over the whole record
-    Drift(Drift),
+    Drift {
+        /// Value at the end of the record (units of the signal)
+        amplitude: OneOrEach<Finite>,
+    },
     /// Samples replaced by outliers
-    Replace(Replace),
+    Replace {
+        /// Share of the samples
+        share: Option<OneOrEach<Share>>,
+        /// Number of samples
+        points: Option<u64>,
+        /// Samples replaced together (default: 1)
+        length_samples: Option<NonZero<u64>>,
+        /// Standard deviation of what replaces them
+        sigma: OneOrEach<NonNegative>,
+        /// Mean of what replaces them (default: the signal's)
+        mean: Option<Mean>,
+    },
     /// Bursts of vibration
-    Bursts(Bursts),
+    Bursts {
+        /// Number of bursts (default: 5)
+        count: Option<u64>,
+        /// Length of a burst (samples; default: 500)
+        length_samples: Option<u64>,
+        /// From one burst to the next (samples; default: 90000)
+        spacing_samples: Option<u64>,
+        /// Length of the record that these are meant for (samples; default: as it is)
+        of_samples: Option<OneOrEach<AtLeastOne>>,
+        /// Amplitude (units of the signal)
+        amplitude: OneOrEach<Finite>,
+        /// Frequency (Hz; default: 5)
+        frequency_hz: Option<OneOrEach<Positive>>,
+    },
     /// A first-order autoregression on top
-    Ar1(Autoregression),
+    Ar1 {
+        /// Coefficient
+        phi: OneOrEach<Stationary>,
+        /// Innovation variance per sample
+        sigma2: OneOrEach<NonNegative>,
+    },
     /// Noise with heavy tails on top
-    HeavyTails(HeavyTails),
+    HeavyTails {
+        /// Degrees of freedom, more than 2
+        freedom: OneOrEach<AboveTwo>,
+        /// Scale of Student's t (units of the signal)
+        sigma: OneOrEach<NonNegative>,
+    },
     /// A parameter of the model, scaled
-    Scale(Scale),
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(!deny_unknown_fields)]
-pub(super) struct Step {
-    /// Height of the step (units of the signal)
-    pub(super) amplitude: OneOrEach<Finite>,
-    /// Where in the record, as a share of it (default: 0.5)
-    pub(super) at_share: Option<OneOrEach<Share>>,
-    /// Where in the record (samples)
-    pub(super) at_samples: Option<u64>,
-    /// Where in the record (s)
-    pub(super) at_s: Option<OneOrEach<NonNegative>>,
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(!deny_unknown_fields)]
-pub(super) struct Drift {
-    /// Value at the end of the record (units of the signal)
-    pub(super) amplitude: OneOrEach<Finite>,
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(!deny_unknown_fields)]
-pub(super) struct Replace {
-    /// Share of the samples
-    pub(super) share: Option<OneOrEach<Share>>,
-    /// Number of samples
-    pub(super) points: Option<u64>,
-    /// Samples replaced together (default: 1)
-    pub(super) length_samples: Option<NonZero<u64>>,
-    /// Standard deviation of what replaces them
-    pub(super) sigma: OneOrEach<NonNegative>,
-    /// Mean of what replaces them (default: the signal's)
-    pub(super) mean: Option<Mean>,
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(!deny_unknown_fields)]
-pub(super) struct Bursts {
-    /// Number of bursts (default: 5)
-    pub(super) count: Option<u64>,
-    /// Length of a burst (samples; default: 500)
-    pub(super) length_samples: Option<u64>,
-    /// From one burst to the next (samples; default: 90000)
-    pub(super) spacing_samples: Option<u64>,
-    /// Length of the record that these are meant for (samples; default: as it is)
-    pub(super) of_samples: Option<OneOrEach<AtLeastOne>>,
-    /// Amplitude (units of the signal)
-    pub(super) amplitude: OneOrEach<Finite>,
-    /// Frequency (Hz; default: 5)
-    pub(super) frequency_hz: Option<OneOrEach<Positive>>,
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(!deny_unknown_fields)]
-pub(super) struct Autoregression {
-    /// Coefficient
-    pub(super) phi: OneOrEach<Stationary>,
-    /// Innovation variance per sample
-    pub(super) sigma2: OneOrEach<NonNegative>,
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(!deny_unknown_fields)]
-pub(super) struct HeavyTails {
-    /// Degrees of freedom, more than 2
-    pub(super) freedom: OneOrEach<AboveTwo>,
-    /// Scale of Student's t (units of the signal)
-    pub(super) sigma: OneOrEach<NonNegative>,
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(!deny_unknown_fields)]
-pub(super) struct Scale {
-    /// Process of the model, such as RW
-    pub(super) process: String,
-    /// Its parameter, such as gamma2
-    pub(super) parameter: String,
-    /// What it is multiplied by
-    pub(super) factor: OneOrEach<NonNegative>,
+    Scale {
+        /// Process of the model, such as RW
+        process: String,
+        /// Its parameter, such as gamma2
+        parameter: String,
+        /// What it is multiplied by
+        factor: OneOrEach<NonNegative>,
+    },
 }
 
 /// Degrees of freedom with a variance.

@@ -24,7 +24,7 @@ mod description;
 use super::Failure;
 use super::suggest::nearest;
 use super::toml_file::{OneOrEach, Source};
-use description::{Bursts, Described, Description, Mean, Replace, RuleTable, Step};
+use description::{Described, Description, Mean, RuleTable};
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::contamination::{Contamination, Extent, Operation, Rule};
 use nav_sim_signal::noise::{Ar1, ParameterError};
@@ -118,30 +118,7 @@ fn read_rules(
     };
     for i in 0..listed {
         entry.i = i;
-        let operation = match operation {
-            Described::Step(step) => entry.step(step, rate_hz)?,
-            Described::Drift(drift) => Operation::Drift {
-                amplitude: entry.number("amplitude", &drift.amplitude)?,
-            },
-            Described::Replace(replace) => entry.replace(replace)?,
-            Described::Bursts(bursts) => entry.bursts(bursts)?,
-            Described::Ar1(process) => {
-                let phi = entry.number("phi", &process.phi)?;
-                let sigma2 = entry.number("sigma2", &process.sigma2)?;
-                let refused =
-                    |e: ParameterError| entry.refused(e.parameter, format!("is not {}", e.domain));
-                Operation::Ar1(Ar1::new(phi, sigma2).map_err(refused)?)
-            }
-            Described::HeavyTails(tails) => Operation::HeavyTails {
-                freedom: entry.number("freedom", &tails.freedom)?,
-                sigma: entry.number("sigma", &tails.sigma)?,
-            },
-            Described::Scale(scale) => Operation::Scale {
-                process: scale.process.clone(),
-                parameter: scale.parameter.clone(),
-                factor: entry.number("factor", &scale.factor)?,
-            },
-        };
+        let operation = entry.operation(operation, rate_hz)?;
         let replicate = replicates.as_ref().map(|r| r[i].get());
         into.push(Rule {
             sensor,
@@ -200,62 +177,99 @@ impl Entry<'_> {
         }
     }
 
-    fn step(&self, step: &Step, rate_hz: f64) -> Result<Operation, Failure> {
-        let (share, samples, seconds) = (&step.at_share, step.at_samples, &step.at_s);
-        self.at_most_one(&[
-            ("at_share", share.is_some()),
-            ("at_samples", samples.is_some()),
-            ("at_s", seconds.is_some()),
-        ])?;
-        let share = self.optional("at_share", share)?.unwrap_or(0.5);
-        let seconds = self
-            .optional("at_s", seconds)?
-            .map(|seconds| (seconds * rate_hz).round() as u64);
-        Ok(Operation::Step {
-            at: samples
-                .or(seconds)
-                .map_or(Extent::Share(share), Extent::Samples),
-            amplitude: self.number("amplitude", &step.amplitude)?,
-        })
-    }
-
-    fn replace(&self, replace: &Replace) -> Result<Operation, Failure> {
-        self.at_most_one(&[
-            ("share", replace.share.is_some()),
-            ("points", replace.points.is_some()),
-        ])?;
-        let points = match (replace.points, self.optional("share", &replace.share)?) {
-            (Some(points), _) => Extent::Samples(points),
-            (None, Some(share)) => Extent::Share(share),
-            (None, None) => return Err(self.source.missing(&self.key, &["share", "points"])),
-        };
-        let mean = match &replace.mean {
-            None | Some(Mean::Kept(_)) => None,
-            Some(Mean::Own(mean)) => Some(self.number("mean", mean)?),
-        };
-        let block = Extent::Samples(replace.length_samples.map_or(1, NonZero::get));
-        Ok(Operation::Replace {
-            points,
-            block,
-            mean,
-            sigma: self.number("sigma", &replace.sigma)?,
-        })
-    }
-
-    fn bursts(&self, bursts: &Bursts) -> Result<Operation, Failure> {
-        let period = self.optional("of_samples", &bursts.of_samples)?;
-        let extent = |samples: u64| match period {
-            Some(period) => Extent::Share(samples as f64 / period),
-            None => Extent::Samples(samples),
-        };
-        Ok(Operation::Bursts {
-            count: bursts.count.unwrap_or(5),
-            length: extent(bursts.length_samples.unwrap_or(500)),
-            spacing: extent(bursts.spacing_samples.unwrap_or(90_000)),
-            amplitude: self.number("amplitude", &bursts.amplitude)?,
-            frequency_hz: self
-                .optional("frequency_hz", &bursts.frequency_hz)?
-                .unwrap_or(5.0),
+    fn operation(&self, operation: &Described, rate_hz: f64) -> Result<Operation, Failure> {
+        Ok(match operation {
+            Described::Step {
+                amplitude,
+                at_share,
+                at_samples,
+                at_s,
+            } => {
+                self.at_most_one(&[
+                    ("at_share", at_share.is_some()),
+                    ("at_samples", at_samples.is_some()),
+                    ("at_s", at_s.is_some()),
+                ])?;
+                let share = self.optional("at_share", at_share)?.unwrap_or(0.5);
+                let seconds = self.optional("at_s", at_s)?;
+                let samples = seconds.map(|seconds| (seconds * rate_hz).round() as u64);
+                Operation::Step {
+                    at: at_samples
+                        .or(samples)
+                        .map_or(Extent::Share(share), Extent::Samples),
+                    amplitude: self.number("amplitude", amplitude)?,
+                }
+            }
+            Described::Drift { amplitude } => Operation::Drift {
+                amplitude: self.number("amplitude", amplitude)?,
+            },
+            Described::Replace {
+                share,
+                points,
+                length_samples,
+                sigma,
+                mean,
+            } => {
+                self.at_most_one(&[("share", share.is_some()), ("points", points.is_some())])?;
+                let points = match (points, self.optional("share", share)?) {
+                    (Some(points), _) => Extent::Samples(*points),
+                    (None, Some(share)) => Extent::Share(share),
+                    (None, None) => {
+                        return Err(self.source.missing(&self.key, &["share", "points"]));
+                    }
+                };
+                let mean = match mean {
+                    None | Some(Mean::Kept(_)) => None,
+                    Some(Mean::Own(mean)) => Some(self.number("mean", mean)?),
+                };
+                Operation::Replace {
+                    points,
+                    block: Extent::Samples(length_samples.map_or(1, NonZero::get)),
+                    mean,
+                    sigma: self.number("sigma", sigma)?,
+                }
+            }
+            Described::Bursts {
+                count,
+                length_samples,
+                spacing_samples,
+                of_samples,
+                amplitude,
+                frequency_hz,
+            } => {
+                let period = self.optional("of_samples", of_samples)?;
+                let extent = |samples: u64| match period {
+                    Some(period) => Extent::Share(samples as f64 / period),
+                    None => Extent::Samples(samples),
+                };
+                let frequency_hz = self.optional("frequency_hz", frequency_hz)?;
+                Operation::Bursts {
+                    count: count.unwrap_or(5),
+                    length: extent(length_samples.unwrap_or(500)),
+                    spacing: extent(spacing_samples.unwrap_or(90_000)),
+                    amplitude: self.number("amplitude", amplitude)?,
+                    frequency_hz: frequency_hz.unwrap_or(5.0),
+                }
+            }
+            Described::Ar1 { phi, sigma2 } => {
+                let (phi, sigma2) = (self.number("phi", phi)?, self.number("sigma2", sigma2)?);
+                let refused =
+                    |e: ParameterError| self.refused(e.parameter, format!("is not {}", e.domain));
+                Operation::Ar1(Ar1::new(phi, sigma2).map_err(refused)?)
+            }
+            Described::HeavyTails { freedom, sigma } => Operation::HeavyTails {
+                freedom: self.number("freedom", freedom)?,
+                sigma: self.number("sigma", sigma)?,
+            },
+            Described::Scale {
+                process,
+                parameter,
+                factor,
+            } => Operation::Scale {
+                process: process.clone(),
+                parameter: parameter.clone(),
+                factor: self.number("factor", factor)?,
+            },
         })
     }
 }

@@ -2,10 +2,9 @@
 
 mod description;
 
-use super::samples::HEIGHT;
 use crate::io::Failure;
 use crate::io::file_kind::{self, FileKind};
-use crate::io::toml_file::{Finite, Source};
+use crate::io::toml_file::{Finite, Positive, Source};
 use description::{Described, Description, Point, Roll, SegmentTable};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_navigation::trajectory::profile::{
@@ -37,38 +36,25 @@ pub(super) fn build(source: &Source) -> Result<Trajectory, Failure> {
         vehicle,
         segment,
     } = source.get()?;
-    let ramp_s = vehicle.ramp_s.map_or(RAMP_S, |ramp| ramp.0);
-    if ramp_s <= 0.0 {
-        return Err(source.refused("vehicle.ramp_s", "is not a number > 0"));
-    }
-    let read = |(i, table): (usize, &SegmentTable)| {
-        read_segment(
-            &Keys {
-                source,
-                path: path_of(i),
-            },
-            table,
-        )
+    let read = |(i, table)| {
+        let path = path_of(i);
+        read_segment(&Keys { source, path }, table)
     };
     let profile = Profile {
         start: Start {
             t_s: start.t_s.0,
             lat: start.lat_deg.0 * DEG,
             lon: start.lon_deg.0 * DEG,
-            h: height(source, "start.h_m", start.h_m)?,
+            h: start.h_m.0,
             heading: start.heading_deg.0 * DEG,
-            speed: start.speed_m_s.0,
+            speed: start.speed_m_s.map_or(0.0, |speed| speed.0),
         },
         bank: match vehicle.bank {
             Roll::None => Bank::None,
             Roll::Coordinated => Bank::Coordinated,
         },
-        ramp_s,
-        segments: segment
-            .iter()
-            .enumerate()
-            .map(read)
-            .collect::<Result<_, _>>()?,
+        ramp_s: vehicle.ramp_s.map_or(RAMP_S, |ramp| ramp.0),
+        segments: (0..).zip(&segment).map(read).collect::<Result<_, _>>()?,
     };
     profile.build().map_err(|e| blame(source, &segment, &e))
 }
@@ -81,7 +67,7 @@ fn path_of(segment: usize) -> String {
 fn blame(source: &Source, segments: &[SegmentTable], e: &profile::Error) -> Failure {
     let key = e.problem.key;
     let path = match e.segment {
-        Some(i) if key == "climb_m" && matches!(segments[i].kind, Described::Climb(_)) => {
+        Some(i) if key == "climb_m" && matches!(segments[i].kind, Described::Climb { .. }) => {
             format!("{}.height_m", path_of(i))
         }
         Some(i) => format!("{}.{key}", path_of(i)),
@@ -91,14 +77,6 @@ fn blame(source: &Source, segments: &[SegmentTable], e: &profile::Error) -> Fail
     source
         .refused(&path, e.problem.to_string())
         .or_hint_if(e.problem.advice.map(str::to_owned))
-}
-
-/// A height at which the gravity model means something.
-fn height(source: &Source, key: &str, h_m: Finite) -> Result<f64, Failure> {
-    if HEIGHT.contains(&h_m.0) {
-        return Ok(h_m.0);
-    }
-    Err(source.refused(key, "is no height within −12 to 1000 km"))
 }
 
 /// The keys of a table.
@@ -112,17 +90,14 @@ impl Keys<'_> {
         format!("{}.{key}", self.path)
     }
 
-    /// The one key of several that is given, and its value.
-    fn one_of<const N: usize>(
-        &self,
-        keys: [(&'static str, Option<Finite>); N],
-    ) -> Result<(&'static str, f64), Failure> {
+    /// What the one key of several that is given means.
+    fn one_of<T, const N: usize>(&self, keys: [Meant<T>; N]) -> Result<T, Failure> {
         let mut given = keys
             .iter()
-            .filter_map(|(key, value)| value.map(|value| (*key, value.0)));
+            .filter_map(|(key, value, meant)| Some((key, meant((*value)?.0))));
         match (given.next(), given.next()) {
-            (None, _) => Err(self.source.missing(&self.path, &keys.map(|(key, _)| key))),
-            (Some(only), None) => Ok(only),
+            (None, _) => Err(self.source.missing(&self.path, &keys.map(|(key, ..)| key))),
+            (Some((_, only)), None) => Ok(only),
             (Some((first, _)), Some((second, _))) => {
                 let refusal = self
                     .source
@@ -132,94 +107,96 @@ impl Keys<'_> {
         }
     }
 
-    fn length(&self, duration: Option<Finite>, distance: Option<Finite>) -> Result<Kind, Failure> {
-        Ok(Kind::Straight(
-            match self.one_of([("duration_s", duration), ("distance_m", distance)])? {
-                ("duration_s", s) => Length::Duration(s),
-                (_, m) => Length::Distance(m),
-            },
-        ))
-    }
-
-    fn turning<const N: usize>(
+    fn straight(
         &self,
-        given: [(&'static str, Option<Finite>); N],
-    ) -> Result<Turning, Failure> {
-        Ok(match self.one_of(given)? {
-            ("duration_s", s) => Turning::Duration(s),
-            ("rate_deg_s", rate) => Turning::Rate(rate * DEG),
-            ("radius_m", m) => Turning::Radius(m),
-            (_, a) => Turning::LateralAccel(a),
-        })
+        duration: Option<Positive>,
+        distance: Option<Positive>,
+    ) -> Result<Kind, Failure> {
+        let length = self.one_of([
+            ("duration_s", duration, Length::Duration),
+            ("distance_m", distance, Length::Distance),
+        ])?;
+        Ok(Kind::Straight(length))
     }
+}
+
+/// A key, its value, and what that means.
+type Meant<T> = (&'static str, Option<Positive>, fn(f64) -> T);
+
+fn turnings(
+    rate: Option<Positive>,
+    radius: Option<Positive>,
+    accel: Option<Positive>,
+) -> [Meant<Turning>; 3] {
+    [
+        ("rate_deg_s", rate, |rate| Turning::Rate(rate * DEG)),
+        ("radius_m", radius, Turning::Radius),
+        ("lateral_accel_m_s2", accel, Turning::LateralAccel),
+    ]
 }
 
 fn read_segment(keys: &Keys<'_>, table: &SegmentTable) -> Result<Segment, Failure> {
     let (kind, climb) = match &table.kind {
-        Described::Straight(own) => (keys.length(own.duration_s, own.distance_m)?, own.climb_m),
-        Described::Climb(own) => (keys.length(own.duration_s, own.distance_m)?, own.height_m),
-        Described::Accelerate(own) => {
-            let by = match keys.one_of([
-                ("duration_s", own.duration_s),
-                ("accel_m_s2", own.accel_m_s2),
-            ])? {
-                ("duration_s", s) => Acceleration::Duration(s),
-                (_, a) => Acceleration::Peak(a),
-            };
-            (
-                Kind::Accelerate {
-                    to_speed: own.to_speed_m_s.0,
-                    by,
-                },
-                own.climb_m,
-            )
-        }
-        Described::Turn(own) => {
-            let by = keys.turning([
-                ("duration_s", own.duration_s),
-                ("rate_deg_s", own.rate_deg_s),
-                ("radius_m", own.radius_m),
-                ("lateral_accel_m_s2", own.lateral_accel_m_s2),
+        Described::Straight {
+            duration_s,
+            distance_m,
+            climb_m,
+        } => (keys.straight(*duration_s, *distance_m)?, climb_m),
+        Described::Climb {
+            height_m,
+            duration_s,
+            distance_m,
+        } => (keys.straight(*duration_s, *distance_m)?, height_m),
+        Described::Accelerate {
+            to_speed_m_s,
+            duration_s,
+            accel_m_s2,
+            climb_m,
+        } => {
+            let by = keys.one_of([
+                ("duration_s", *duration_s, Acceleration::Duration),
+                ("accel_m_s2", *accel_m_s2, Acceleration::Peak),
             ])?;
-            (
-                Kind::Turn {
-                    angle: own.angle_deg.0 * DEG,
-                    by,
-                },
-                own.climb_m,
-            )
+            let to_speed = to_speed_m_s.0;
+            (Kind::Accelerate { to_speed, by }, climb_m)
         }
-        Described::Stop(own) => {
-            let decel = own.decel_m_s2.map_or(DECEL, |decel| decel.0);
-            (
-                Kind::Stop {
-                    duration: own.duration_s.0,
-                    decel,
-                },
-                own.climb_m,
-            )
+        Described::Turn {
+            angle_deg,
+            duration_s,
+            rate_deg_s,
+            radius_m,
+            lateral_accel_m_s2,
+            climb_m,
+        } => {
+            let [rate, radius, accel] = turnings(*rate_deg_s, *radius_m, *lateral_accel_m_s2);
+            let duration: Meant<_> = ("duration_s", *duration_s, Turning::Duration);
+            let by = keys.one_of([duration, rate, radius, accel])?;
+            let angle = angle_deg.0 * DEG;
+            (Kind::Turn { angle, by }, climb_m)
         }
-        Described::Waypoints(own) => {
-            let by = keys.turning([
-                ("rate_deg_s", own.rate_deg_s),
-                ("radius_m", own.radius_m),
-                ("lateral_accel_m_s2", own.lateral_accel_m_s2),
-            ])?;
+        Described::Stop {
+            duration_s,
+            decel_m_s2,
+            climb_m,
+        } => {
+            let decel = decel_m_s2.map_or(DECEL, |decel| decel.0);
+            let duration = duration_s.0;
+            (Kind::Stop { duration, decel }, climb_m)
+        }
+        Described::Waypoints {
+            points,
+            rate_deg_s,
+            radius_m,
+            lateral_accel_m_s2,
+            climb_m,
+        } => {
+            let by = keys.one_of(turnings(*rate_deg_s, *radius_m, *lateral_accel_m_s2))?;
             let point = |(i, point)| {
-                let path = keys.path(&format!("points[{i}]"));
-                waypoint(
-                    &Keys {
-                        source: keys.source,
-                        path,
-                    },
-                    point,
-                )
+                let (source, path) = (keys.source, keys.path(&format!("points[{i}]")));
+                waypoint(&Keys { source, path }, point)
             };
-            let points = (1..)
-                .zip(&own.points)
-                .map(point)
-                .collect::<Result<_, _>>()?;
-            (Kind::Waypoints { points, by }, own.climb_m)
+            let points = (1..).zip(points).map(point).collect::<Result<_, _>>()?;
+            (Kind::Waypoints { points, by }, climb_m)
         }
     };
     Ok(Segment {
@@ -252,9 +229,6 @@ fn waypoint(keys: &Keys<'_>, point: &Point) -> Result<Waypoint, Failure> {
             lon: lon * DEG,
         }
     };
-    let h = point
-        .h_m
-        .map(|h| height(keys.source, &keys.path("h_m"), h))
-        .transpose()?;
+    let h = point.h_m.map(|h| h.0);
     Ok(Waypoint { place, h })
 }

@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 /// Positions faster than this from one row to the next are no motion (m/s).
 const MAX_SPEED: f64 = 8000.0;
 /// Heights at which the gravity model means something (m).
-pub(super) const HEIGHT: std::ops::RangeInclusive<f64> = -12_000.0..=1_000_000.0;
+const HEIGHT: std::ops::RangeInclusive<f64> = -12_000.0..=1_000_000.0;
 /// Below this speed a path has no direction (m/s).
 pub(super) const MOVING: f64 = 0.5;
 /// A trajectory lasts a day at most (s), as motion profiles do: a wrong time stamp would ask for more memory

@@ -58,7 +58,7 @@ fn check_knows_recordings_that_move() {
     write("rest.csv", 0.0);
     let flight = done(place.path(), "check flight.csv");
     assert!(
-        flight.stdout.contains("that moves, for fuse"),
+        flight.stdout.contains("an IMU recording of 1000 samples"),
         "{}",
         flight.stdout
     );

@@ -1,11 +1,12 @@
 //! Keys of a motion profile: their types, ranges and words, for the reader and for editors.
 
-use super::super::samples::HEIGHT;
-use crate::io::toml_file::Finite;
+use crate::io::toml_file::{Between, Finite, NonNegative, Positive};
 use nav_sim_navigation::earth::MAX_LATITUDE_DEG;
-use nav_sim_signal::units::{NonNegative, Positive};
 use schemars::JsonSchema;
 use serde::Deserialize;
+
+/// Heights at which the gravity model means something (m).
+pub(super) type Height = Between<-12_000, 1_000_000, false>;
 
 /// A drive by what the vehicle does: the trajectory of nav-sim run
 #[derive(Deserialize, JsonSchema)]
@@ -33,14 +34,11 @@ pub(super) struct Origin {
     /// Longitude (degrees)
     pub(super) lon_deg: Finite,
     /// Height above the ellipsoid (m)
-    #[schemars(range(min = *HEIGHT.start(), max = *HEIGHT.end()))]
-    pub(super) h_m: Finite,
+    pub(super) h_m: Height,
     /// Heading from north (degrees)
     pub(super) heading_deg: Finite,
     /// Speed (m/s; default: 0)
-    #[serde(default)]
-    #[schemars(with = "NonNegative")]
-    pub(super) speed_m_s: Finite,
+    pub(super) speed_m_s: Option<NonNegative>,
 }
 
 /// How the vehicle moves
@@ -51,8 +49,7 @@ pub(super) struct Vehicle {
     #[serde(default)]
     pub(super) bank: Roll,
     /// Time over which accelerations and rates build up and fade (s; default: 2)
-    #[schemars(with = "Option<Positive>")]
-    pub(super) ramp_s: Option<Finite>,
+    pub(super) ramp_s: Option<Positive>,
 }
 
 #[derive(Clone, Copy, Default, Deserialize, JsonSchema)]
@@ -68,135 +65,88 @@ pub(super) enum Roll {
 #[schemars(deny_unknown_fields)]
 pub(super) struct SegmentTable {
     /// Overrides that of the vehicle (s)
-    #[schemars(with = "Option<Positive>")]
-    pub(super) ramp_s: Option<Finite>,
+    pub(super) ramp_s: Option<Positive>,
     #[schemars(flatten)]
     pub(super) kind: Described,
 }
 
 /// The kinds of segment, each with its keys.
 #[derive(Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-#[schemars(tag = "kind")]
+#[serde(rename_all = "lowercase", deny_unknown_fields)]
+#[schemars(tag = "kind", !deny_unknown_fields)]
 pub(super) enum Described {
     /// Constant speed and heading; at speed zero, standing
-    Straight(Straight),
+    Straight {
+        /// Duration (s), or …
+        duration_s: Option<Positive>,
+        /// … distance along the path (m)
+        distance_m: Option<Positive>,
+        /// Height gained (m; default: 0)
+        #[serde(default)]
+        climb_m: Finite,
+    },
     /// Speed changes
-    Accelerate(Accelerate),
+    Accelerate {
+        /// Final speed (m/s)
+        to_speed_m_s: NonNegative,
+        /// Duration (s), or …
+        duration_s: Option<Positive>,
+        /// … largest acceleration (m/s²)
+        accel_m_s2: Option<Positive>,
+        /// Height gained (m; default: 0)
+        #[serde(default)]
+        climb_m: Finite,
+    },
     /// Heading changes
-    Turn(Turn),
+    Turn {
+        /// Change of heading, positive to the right (degrees)
+        angle_deg: Finite,
+        /// Duration (s), or …
+        duration_s: Option<Positive>,
+        /// … largest rate (degrees/s), or …
+        rate_deg_s: Option<Positive>,
+        /// … smallest radius (m), or …
+        radius_m: Option<Positive>,
+        /// … largest lateral acceleration (m/s²)
+        lateral_accel_m_s2: Option<Positive>,
+        /// Height gained (m; default: 0)
+        #[serde(default)]
+        climb_m: Finite,
+    },
     /// Height changes
-    Climb(Climb),
+    Climb {
+        /// Height gained (m)
+        height_m: Finite,
+        /// Duration (s), or …
+        duration_s: Option<Positive>,
+        /// … distance along the path (m)
+        distance_m: Option<Positive>,
+    },
     /// Brakes if moving, then stands
-    Stop(Stop),
+    Stop {
+        /// Time at rest (s)
+        duration_s: Positive,
+        /// Largest deceleration while braking (m/s²; default: 1.5)
+        decel_m_s2: Option<Positive>,
+        /// Height gained (m; default: 0)
+        #[serde(default)]
+        climb_m: Finite,
+    },
     /// From point to point on straight legs, cutting the corners with turns
-    Waypoints(Waypoints),
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(!deny_unknown_fields)]
-pub(super) struct Straight {
-    /// Duration (s), or …
-    #[schemars(with = "Option<Positive>")]
-    pub(super) duration_s: Option<Finite>,
-    /// … distance along the path (m)
-    #[schemars(with = "Option<Positive>")]
-    pub(super) distance_m: Option<Finite>,
-    /// Height gained (m; default: 0)
-    #[serde(default)]
-    pub(super) climb_m: Finite,
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(!deny_unknown_fields)]
-pub(super) struct Climb {
-    /// Height gained (m)
-    pub(super) height_m: Finite,
-    /// Duration (s), or …
-    #[schemars(with = "Option<Positive>")]
-    pub(super) duration_s: Option<Finite>,
-    /// … distance along the path (m)
-    #[schemars(with = "Option<Positive>")]
-    pub(super) distance_m: Option<Finite>,
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(!deny_unknown_fields)]
-pub(super) struct Accelerate {
-    /// Final speed (m/s)
-    #[schemars(with = "NonNegative")]
-    pub(super) to_speed_m_s: Finite,
-    /// Duration (s), or …
-    #[schemars(with = "Option<Positive>")]
-    pub(super) duration_s: Option<Finite>,
-    /// … largest acceleration (m/s²)
-    #[schemars(with = "Option<Positive>")]
-    pub(super) accel_m_s2: Option<Finite>,
-    /// Height gained (m; default: 0)
-    #[serde(default)]
-    pub(super) climb_m: Finite,
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(!deny_unknown_fields)]
-pub(super) struct Turn {
-    /// Change of heading, positive to the right (degrees)
-    pub(super) angle_deg: Finite,
-    /// Duration (s), or …
-    #[schemars(with = "Option<Positive>")]
-    pub(super) duration_s: Option<Finite>,
-    /// … largest rate (degrees/s), or …
-    #[schemars(with = "Option<Positive>")]
-    pub(super) rate_deg_s: Option<Finite>,
-    /// … smallest radius (m), or …
-    #[schemars(with = "Option<Positive>")]
-    pub(super) radius_m: Option<Finite>,
-    /// … largest lateral acceleration (m/s²)
-    #[schemars(with = "Option<Positive>")]
-    pub(super) lateral_accel_m_s2: Option<Finite>,
-    /// Height gained (m; default: 0)
-    #[serde(default)]
-    pub(super) climb_m: Finite,
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(!deny_unknown_fields)]
-pub(super) struct Stop {
-    /// Time at rest (s)
-    #[schemars(with = "Positive")]
-    pub(super) duration_s: Finite,
-    /// Largest deceleration while braking (m/s²; default: 1.5)
-    #[schemars(with = "Option<Positive>")]
-    pub(super) decel_m_s2: Option<Finite>,
-    /// Height gained (m; default: 0)
-    #[serde(default)]
-    pub(super) climb_m: Finite,
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(!deny_unknown_fields)]
-pub(super) struct Waypoints {
-    /// The points; the path ends at the last and passes inside the others
-    #[schemars(length(min = 1))]
-    pub(super) points: Vec<Point>,
-    /// Largest rate of turns (degrees/s), or …
-    #[schemars(with = "Option<Positive>")]
-    pub(super) rate_deg_s: Option<Finite>,
-    /// … smallest radius (m), or …
-    #[schemars(with = "Option<Positive>")]
-    pub(super) radius_m: Option<Finite>,
-    /// … largest lateral acceleration (m/s²)
-    #[schemars(with = "Option<Positive>")]
-    pub(super) lateral_accel_m_s2: Option<Finite>,
-    /// Height gained (m; default: 0)
-    #[serde(default)]
-    pub(super) climb_m: Finite,
+    Waypoints {
+        /// The points; the path ends at the last and passes inside the others
+        #[schemars(length(min = 1))]
+        points: Vec<Point>,
+        /// Largest rate of turns (degrees/s), or …
+        rate_deg_s: Option<Positive>,
+        /// … smallest radius (m), or …
+        radius_m: Option<Positive>,
+        /// … largest lateral acceleration (m/s²)
+        lateral_accel_m_s2: Option<Positive>,
+        /// Height gained (m; default: 0)
+        #[serde(default)]
+        climb_m: Finite,
+    },
 }
 
 /// A point, by latitude and longitude or by metres from the start
@@ -213,6 +163,5 @@ pub(super) struct Point {
     /// East of the start (m)
     pub(super) e_m: Option<Finite>,
     /// Height above the ellipsoid (m; default: that before it)
-    #[schemars(range(min = *HEIGHT.start(), max = *HEIGHT.end()))]
-    pub(super) h_m: Option<Finite>,
+    pub(super) h_m: Option<Height>,
 }
