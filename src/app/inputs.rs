@@ -335,20 +335,10 @@ pub(crate) fn made_turn_on(imu: &mut ImuSettings, stated: &TurnOn) -> Vec<(Senso
 
 /// Fills in the settings of both sensors that are not given.
 fn set_turn_on(settings: [&mut Option<f64>; 2], stated: &TurnOn) -> Vec<(Sensor, f64)> {
-    let sigmas = Sensor::ALL
-        .into_iter()
-        .filter_map(|sensor| Some((sensor, stated.sigma(sensor)?)));
-    let mut set: Vec<(Sensor, f64)> = sigmas.collect();
-    let [accel, gyro] = settings;
-    set.retain(|(sensor, sigma)| {
-        let setting = if *sensor == Sensor::Accel {
-            &mut *accel
-        } else {
-            &mut *gyro
-        };
-        let is_open = setting.is_none();
-        setting.get_or_insert(*sigma);
-        is_open
+    let settings = Sensor::ALL.into_iter().zip(settings);
+    let set = settings.filter_map(|(sensor, setting)| {
+        let sigma = stated.sigma(sensor).filter(|_| setting.is_none())?;
+        Some((sensor, *setting.insert(sigma)))
     });
-    set
+    set.collect()
 }

@@ -28,19 +28,18 @@ pub(crate) struct NamedCurve {
 const LAYOUT: &str = "a curve is a CSV with the columns tau_samples,wv,edof (tau_samples = 2, 4, 8, …), or a .wv.json \
                       written by calibrate or wv";
 
-/// A value of a column or key that means nothing.
-fn refused(
-    path: &str,
-    place: &Place,
-    column: &str,
-    value: impl Display,
-    expected: &str,
-) -> Failure {
-    Failure::contents(
-        path,
-        place.clone(),
-        format!("{column} = {value} is not {expected}"),
-    )
+/// A part of a file, for what is refused in it.
+struct Part<'a> {
+    path: &'a str,
+    place: Place,
+}
+
+impl Part<'_> {
+    /// Refuses a value of a column or key that means nothing.
+    fn refused<T>(&self, column: &str, value: impl Display, expected: &str) -> Result<T, Failure> {
+        let message = format!("{column} = {value} is not {expected}");
+        Err(Failure::contents(self.path, self.place.clone(), message))
+    }
 }
 
 /// Reads the curves of a file.
@@ -93,7 +92,7 @@ fn csv(path: &str, text: &str) -> Result<NamedCurve, Failure> {
     for row in 0..table.rows() {
         let place = Place::Line(table.lines.of(row));
         let point = names.map(|name| table.get(name).map_or(f64::NAN, |column| column.si(row)));
-        push(&mut curve, path, &place, point)?;
+        push(&mut curve, &Part { path, place }, point)?;
     }
     Ok(NamedCurve {
         sensor: None,
@@ -116,87 +115,64 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
         .map_err(syntax)?
         .signals
         .is_some();
-    let head = Place::Part("head".to_owned());
+    let part = |name: String| Part {
+        path,
+        place: Place::Part(name),
+    };
+    let head = part("head".to_owned());
     let file = if is_of_wv {
         let file: SignalsFile = serde_json::from_str(text).map_err(syntax)?;
-        quantization(path, &head, Some(file.efficiency))?;
+        quantization(&head, Some(file.efficiency))?;
         CurvesFile::from(file)
     } else {
         serde_json::from_str(text).map_err(syntax)?
     };
-    if file.schema_version != 1 {
-        return Err(refused(
-            path,
-            &head,
-            "schema_version",
-            file.schema_version,
-            "1, which this version reads",
-        ));
+    let (version, rate_hz) = (file.schema_version, file.rate_hz);
+    if version != 1 {
+        return head.refused("schema_version", version, "1, which this version reads");
     }
-    if !(file.rate_hz.is_finite() && file.rate_hz > 0.0) {
-        let rate = Place::Part("rate".to_owned());
-        return Err(refused(
-            path,
-            &rate,
-            "rate_hz",
-            file.rate_hz,
-            "a finite number > 0",
-        ));
+    if !(rate_hz.is_finite() && rate_hz > 0.0) {
+        return head.refused("rate_hz", rate_hz, "a finite number > 0");
     }
-    let numbered = (1..).zip(&file.curves);
-    numbered
-        .map(|(number, entry)| named_curve(path, number, entry, file.rate_hz))
-        .collect()
-}
-
-/// One curve of a JSON file.
-fn named_curve(
-    path: &str,
-    number: usize,
-    entry: &FittedCurve,
-    rate_hz: f64,
-) -> Result<NamedCurve, Failure> {
-    let (tau, wv, edof) = (entry.tau_s.len(), entry.wv.len(), entry.edof.len());
-    if tau != wv || tau != edof {
-        let message = format!(
-            "curve {number} has {tau} scales, {wv} wavelet variances and {edof} degrees of freedom"
-        );
-        return Err(Failure::contents(path, Place::Within, message));
-    }
-    let place = Place::Part(format!("curve {number}"));
-    let axis = Axis::ALL.into_iter().find(|a| a.name() == entry.axis);
-    if axis.is_none() && entry.axis != "all" {
-        return Err(refused(path, &place, "axis", &entry.axis, "x, y, z or all"));
-    }
-    let mut curve = Curve {
-        quantization: quantization(path, &place, entry.efficiency)?,
-        ..Curve::default()
+    let named = |(number, entry): (usize, &FittedCurve)| {
+        let name = format!("curve {number}");
+        let (tau, wv, edof) = (entry.tau_s.len(), entry.wv.len(), entry.edof.len());
+        if tau != wv || tau != edof {
+            let message = format!(
+                "{name} has {tau} scales, {wv} wavelet variances and {edof} degrees of freedom"
+            );
+            return Err(Failure::contents(path, Place::Within, message));
+        }
+        let own = part(name.clone());
+        let axis = Axis::ALL.into_iter().find(|a| a.name() == entry.axis);
+        if axis.is_none() && entry.axis != "all" {
+            return own.refused("axis", &entry.axis, "x, y, z or all");
+        }
+        let mut curve = Curve {
+            quantization: quantization(&own, entry.efficiency)?,
+            ..Curve::default()
+        };
+        for i in 0..tau {
+            let scale = part(format!("{name}, scale {}", i + 1));
+            let point = [entry.tau_s[i] * rate_hz, entry.wv[i], entry.edof[i]];
+            push(&mut curve, &scale, point)?;
+        }
+        let level = |tau_s: &f64| (tau_s * rate_hz).log2().round() as u32;
+        curve.classical = entry.classical_tau_s.iter().map(level).collect();
+        Ok(NamedCurve {
+            sensor: Some(entry.sensor),
+            axis,
+            rate_hz: Some(rate_hz),
+            estimator: Some(entry.estimator.clone()).filter(|name| !name.is_empty()),
+            curve,
+        })
     };
-    for i in 0..tau {
-        let place = Place::Part(format!("curve {number}, scale {}", i + 1));
-        push(
-            &mut curve,
-            path,
-            &place,
-            [entry.tau_s[i] * rate_hz, entry.wv[i], entry.edof[i]],
-        )?;
-    }
-    let level = |tau_s: &f64| (tau_s * rate_hz).log2().round() as u32;
-    curve.classical = entry.classical_tau_s.iter().map(level).collect();
-    let estimator = (!entry.estimator.is_empty()).then(|| entry.estimator.clone());
-    Ok(NamedCurve {
-        sensor: Some(entry.sensor),
-        axis,
-        rate_hz: Some(rate_hz),
-        estimator,
-        curve,
-    })
+    (1..).zip(&file.curves).map(named).collect()
 }
 
 /// How robust variances of an efficiency read quantization noise.
 fn quantization(
-    path: &str,
-    place: &Place,
+    part: &Part<'_>,
     efficiency: Option<f64>,
 ) -> Result<Option<QuantizationResponse>, Failure> {
     let Some(efficiency) = efficiency else {
@@ -206,43 +182,27 @@ fn quantization(
     let tuning = Tuning::new(efficiency.clamp(0.3, 0.99), Convention::Exact);
     match tuning {
         Ok(tuning) if efficiency > 0.0 && efficiency <= 1.0 => Ok(Some(*tuning.quantization())),
-        _ => Err(refused(
-            path,
-            place,
-            "efficiency",
-            efficiency,
-            "a number above 0, up to 1",
-        )),
+        _ => part.refused("efficiency", efficiency, "a number above 0, up to 1"),
     }
 }
 
 /// Appends a point (scale in samples, wavelet variance, degrees of freedom); scales are powers of two, ascending.
-fn push(
-    curve: &mut Curve,
-    path: &str,
-    place: &Place,
-    [tau, wv, edof]: [f64; 3],
-) -> Result<(), Failure> {
-    let refuse = |column, value: f64, expected| Err(refused(path, place, column, value, expected));
+fn push(curve: &mut Curve, part: &Part<'_>, [tau, wv, edof]: [f64; 3]) -> Result<(), Failure> {
     let level = tau.log2().round();
     // Scales in seconds come back from a division by the rate.
     let is_power = (1.0..=62.0).contains(&level) && (tau / level.exp2() - 1.0).abs() < 1e-6;
     if !is_power {
-        return refuse("tau_samples", tau, "a power of two ≥ 2");
+        return part.refused("tau_samples", tau, "a power of two ≥ 2");
     }
-    if curve
-        .levels
-        .last()
-        .is_some_and(|last| *last >= level as u32)
-    {
-        return refuse("tau_samples", tau, "greater than the one before");
+    if curve.levels.last() >= Some(&(level as u32)) {
+        return part.refused("tau_samples", tau, "greater than the one before");
     }
-    let positive = |range: (f64, f64), value: f64| value >= range.0 && value <= range.1;
-    if !positive(Curve::WV_RANGE, wv) {
-        return refuse("wv", wv, "a number from 1e-100 to 1e100");
+    let is_in = |range: (f64, f64), value: f64| value >= range.0 && value <= range.1;
+    if !is_in(Curve::WV_RANGE, wv) {
+        return part.refused("wv", wv, "a number from 1e-100 to 1e100");
     }
-    if !positive(Curve::EDOF_RANGE, edof) {
-        return refuse("edof", edof, "a number from 1e-15 to 1e15");
+    if !is_in(Curve::EDOF_RANGE, edof) {
+        return part.refused("edof", edof, "a number from 1e-15 to 1e15");
     }
     curve.levels.push(level as u32);
     curve.wv.push(wv);

@@ -7,8 +7,7 @@ use super::model_file::ModelFile;
 use super::{Failure, source};
 use nav_sim_calibration::Outcome;
 use nav_sim_signal::imu::Channel;
-use nav_sim_signal::noise::continuous::{self, RateError};
-use nav_sim_signal::noise::{Composite, Model};
+use nav_sim_signal::noise::{Composite, Model, Spread, continuous};
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -62,7 +61,7 @@ pub(crate) fn beside(model: &Path) -> PathBuf {
 /// # Errors
 /// Why those that are there cannot be used, in words.
 pub(crate) fn usable(path: &Path, model: &Model, rate_hz: f64) -> Result<Option<Draws>, String> {
-    usable_as(path, model, rate_hz, &|draws| draws)
+    usable_as(path, model, rate_hz, &|_, model| model)
 }
 
 /// The same of single recordings: what is drawn about a model with a spread differs by that too.
@@ -75,15 +74,9 @@ pub(crate) fn of_recordings(
     rate_hz: f64,
     seed: u64,
 ) -> Result<Option<Draws>, String> {
-    let of_recording = |(run, centre): (u64, &Model)| match &file.spread {
-        Some(spread) => spread
-            .draw_about(centre, &file.model, seed, run)
-            .unwrap_or_else(|_| centre.clone()),
-        None => centre.clone(),
-    };
-    usable_as(path, &file.model, rate_hz, &|draws| Draws {
-        models: (0..).zip(&draws.models).map(of_recording).collect(),
-        ..draws
+    usable_as(path, &file.model, rate_hz, &|run, centre| {
+        let about = |spread: &Spread| spread.draw_about(&centre, &file.model, seed, run).ok();
+        file.spread.as_ref().and_then(about).unwrap_or(centre)
     })
 }
 
@@ -91,14 +84,19 @@ fn usable_as(
     path: &Path,
     model: &Model,
     rate_hz: f64,
-    made: &dyn Fn(Draws) -> Draws,
+    of_recording: &dyn Fn(u64, Model) -> Model,
 ) -> Result<Option<Draws>, String> {
     let Some(file) = read(path).map_err(|e| e.to_string())? else {
         return Ok(None);
     };
-    let draws = file
-        .draws(model)
-        .and_then(|draws| made(draws).at_rate(rate_hz).ok());
+    let at_rate = |Draws { models, stretch }| {
+        let models = (0..).zip(models);
+        let models = models.map(|(run, model)| of_recording(run, model));
+        let models = models.map(|model| continuous::at_rate(&model, rate_hz).ok());
+        let models = models.collect::<Option<_>>()?;
+        Some(Draws { models, stretch })
+    };
+    let draws = file.draws(model).and_then(at_rate);
     draws
         .map(Some)
         .ok_or_else(|| format!("{} is not of {}", beside(path).display(), path.display()))
@@ -190,23 +188,6 @@ impl DrawsFile {
         }
         let stretch = self.signals.iter().map(|s| s.stretch).fold(1.0, f64::max);
         Some(Draws { models, stretch })
-    }
-}
-
-impl Draws {
-    /// The same at another rate (Hz).
-    ///
-    /// # Errors
-    /// As [`continuous::at_rate`].
-    pub(crate) fn at_rate(&self, rate_hz: f64) -> Result<Self, RateError> {
-        let models = self
-            .models
-            .iter()
-            .map(|model| continuous::at_rate(model, rate_hz));
-        Ok(Self {
-            models: models.collect::<Result<_, _>>()?,
-            stretch: self.stretch,
-        })
     }
 }
 

@@ -162,17 +162,12 @@ fn number(text: &str) -> Option<(Order, Number)> {
 
 /// Numbers of an array whose first dimension runs fastest, the last running fastest.
 fn transposed(values: &[f64], shape: &[usize]) -> Vec<f64> {
-    let mut steps = vec![1; shape.len()];
-    for k in 1..shape.len() {
-        steps[k] = steps[k - 1] * shape[k - 1];
-    }
-    let place = |mut row_major: usize| {
-        let mut at = 0;
-        for k in (0..shape.len()).rev() {
-            at += row_major % shape[k] * steps[k];
-            row_major /= shape[k];
-        }
-        at
+    let Some((rows, inner)) = shape.split_first().filter(|(rows, _)| **rows > 0) else {
+        return values.to_vec();
     };
-    (0..values.len()).map(|k| values[place(k)]).collect()
+    let row = |row: usize| {
+        let own: Vec<f64> = values.iter().skip(row).step_by(*rows).copied().collect();
+        transposed(&own, inner)
+    };
+    (0..*rows).flat_map(row).collect()
 }

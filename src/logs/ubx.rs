@@ -158,94 +158,43 @@ impl Format for Ubx {
     }
 }
 
-/// Values of a NAV-PVT as they stand in it.
-struct Pvt {
-    tow_ms: u32,
-    year: u16,
-    /// Month, day, hour, minute, second.
-    time: [u8; 5],
-    valid: u8,
-    nano: i32,
-    fix_type: u8,
-    flags: u8,
-    /// Longitude, latitude (1e-7 deg), height (mm).
-    place: [i32; 3],
-    /// Accuracies of the position (mm).
-    accuracy: [u32; 2],
-    /// North, east, down (mm/s).
-    velocity: [i32; 3],
-    /// Its accuracy (mm/s).
-    speed_accuracy: u32,
-}
-
-impl Pvt {
-    fn parse(payload: &[u8]) -> Option<Self> {
-        let mut b = Bytes::little(payload);
-        let tow_ms = b.u32()?;
-        let year = b.u16()?;
-        let time = [b.u8()?, b.u8()?, b.u8()?, b.u8()?, b.u8()?];
-        let valid = b.u8()?;
-        b.u32()?;
-        let (nano, fix_type, flags) = (b.i32()?, b.u8()?, b.u8()?);
-        b.take(2)?;
-        let place = [b.i32()?, b.i32()?, b.i32()?];
-        b.i32()?;
-        let accuracy = [b.u32()?, b.u32()?];
-        let velocity = [b.i32()?, b.i32()?, b.i32()?];
-        b.take(8)?;
-        let speed_accuracy = b.u32()?;
-        Some(Self {
-            tow_ms,
-            year,
-            time,
-            valid,
-            nano,
-            fix_type,
-            flags,
-            place,
-            accuracy,
-            velocity,
-            speed_accuracy,
-        })
-    }
-
-    /// A fix in three dimensions, flagged good, at a date and time that are valid.
-    const fn is_fix(&self) -> bool {
-        const GNSS_3D: u8 = 3;
-        const WITH_SENSORS: u8 = 4;
-        // nanoseconds since 1970 end in 2262
-        const LAST_YEAR: u16 = 2200;
-        matches!(self.fix_type, GNSS_3D | WITH_SENSORS)
-            && self.flags & 1 != 0
-            && self.valid & 3 == 3
-            && self.year <= LAST_YEAR
-    }
-
-    fn stamp_ns(&self) -> Option<i64> {
-        let [month, day, hour, minute, second] = self.time.map(u32::from);
-        let date = NaiveDate::from_ymd_opt(self.year.into(), month, day)?;
-        // a leap second has the number 60
-        let before = date.and_hms_opt(hour, minute, 0)?.and_utc().timestamp();
-        Some((before + i64::from(second)) * NS + i64::from(self.nano))
-    }
-}
-
-/// A fix of NAV-PVT. Its accuracies are taken as one standard deviation of each axis, as the ROS driver of u-blox
-/// does (`ublox_gps`, `NavSatFix` of NAV-PVT).
+/// A fix of NAV-PVT in three dimensions, flagged good, at a date and time that are valid. Its accuracies are taken as one
+/// standard deviation of each axis, as the ROS driver of u-blox does (`ublox_gps`, `NavSatFix` of NAV-PVT).
 fn pvt(payload: &[u8]) -> Option<Fix> {
-    let pvt = Pvt::parse(payload).filter(Pvt::is_fix)?;
-    let milli = |value: f64| value / 1e3;
-    let [lon, lat, h] = pvt.place.map(f64::from);
-    let [horizontal, vertical] = pvt.accuracy.map(|a| milli(a.into()));
+    const GNSS_3D: u8 = 3;
+    const WITH_SENSORS: u8 = 4;
+    // nanoseconds since 1970 end in 2262
+    const LAST_YEAR: u16 = 2200;
+    let mut b = Bytes::little(payload);
+    let (tow_ms, year) = (b.u32()?, b.u16()?);
+    let (month, day, hour, minute, second) = (b.u8()?, b.u8()?, b.u8()?, b.u8()?, b.u8()?);
+    let valid = b.u8()?;
+    b.u32()?;
+    let (nano, fix_type, flags) = (b.i32()?, b.u8()?, b.u8()?);
+    b.take(2)?;
+    let [lon, lat, h] = [b.i32()?, b.i32()?, b.i32()?].map(f64::from);
+    b.i32()?;
+    let [horizontal, vertical] = [b.u32()?, b.u32()?].map(|a| f64::from(a) / 1e3);
+    let velocity = [b.i32()?, b.i32()?, b.i32()?].map(|v| f64::from(v) / 1e3);
+    b.take(8)?;
+    let speed_accuracy = f64::from(b.u32()?) / 1e3;
+    let is_fix = matches!(fix_type, GNSS_3D | WITH_SENSORS) && flags & 1 != 0 && valid & 3 == 3;
+    if !is_fix || year > LAST_YEAR {
+        return None;
+    }
+    let date = NaiveDate::from_ymd_opt(year.into(), month.into(), day.into())?;
+    // a leap second has the number 60
+    let minute = date.and_hms_opt(hour.into(), minute.into(), 0)?;
+    let before = minute.and_utc().timestamp();
     Some(Fix {
-        stamp_ns: pvt.stamp_ns()?,
-        gps_tow_ms: Some(pvt.tow_ms),
+        stamp_ns: (before + i64::from(second)) * NS + i64::from(nano),
+        gps_tow_ms: Some(tow_ms),
         lat_deg: lat / 1e7,
         lon_deg: lon / 1e7,
-        h_m: milli(h),
+        h_m: h / 1e3,
         sd_ned_m: stated([horizontal, horizontal, vertical]),
-        v_ned_m_s: Some(pvt.velocity.map(|v| milli(v.into()))),
-        sd_v_ned_m_s: stated([milli(pvt.speed_accuracy.into()); 3]),
+        v_ned_m_s: Some(velocity),
+        sd_v_ned_m_s: stated([speed_accuracy; 3]),
     })
 }
 

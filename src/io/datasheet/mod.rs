@@ -31,7 +31,7 @@ use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::noise::{
     Composite, Flicker, Model, ParameterError, Process, RandomWalk, White, continuous,
 };
-use toml::Table;
+use toml::{Table, Value};
 
 /// The correlation time that is assumed where none is given (s).
 pub(crate) const ASSUMED_CORRELATION_TIME_S: f64 = 300.0;
@@ -168,30 +168,22 @@ impl Datasheet {
     }
 
     fn provenance(&self, doubts: &[String]) -> Table {
-        let mut table = Table::new();
-        table.insert("program".into(), PROGRAM.into());
-        table.insert("schema".into(), (SCHEMA as i64).into());
-        table.insert("estimator".into(), "datasheet".into());
-        table.insert(
-            "label".into(),
-            "an assumption: figures of a datasheet, not a calibration".into(),
-        );
-        if let Some(name) = &self.name {
-            table.insert("unit".into(), name.as_str().into());
-        }
-        let assumptions: Vec<toml::Value> = self
-            .assumptions
+        let mut table = toml::toml! {
+            estimator = "datasheet"
+            label = "an assumption: figures of a datasheet, not a calibration"
+        };
+        let mut insert = |key: &str, value: Value| _ = table.insert(key.to_owned(), value);
+        insert("program", PROGRAM.into());
+        insert("schema", (SCHEMA as i64).into());
+        self.name
             .iter()
-            .chain(doubts)
-            .map(|text| text.as_str().into())
-            .collect();
-        table.insert("assumptions".into(), assumptions.into());
-        let figures: Vec<toml::Value> =
-            self.entries.iter().map(|e| e.provenance().into()).collect();
-        table.insert("figures".into(), figures.into());
-        let not_stated: Vec<toml::Value> = self.not_stated().into_iter().map(Into::into).collect();
+            .for_each(|name| insert("unit", name.clone().into()));
+        insert("assumptions", [&self.assumptions, doubts].concat().into());
+        let figures = self.entries.iter().map(Entry::provenance);
+        insert("figures", figures.collect::<Vec<_>>().into());
+        let not_stated = self.not_stated();
         if !not_stated.is_empty() {
-            table.insert(NOT_STATED.into(), not_stated.into());
+            insert(NOT_STATED, not_stated.into());
         }
         table
     }
@@ -199,19 +191,18 @@ impl Datasheet {
 
 impl Entry {
     fn provenance(&self) -> Table {
-        let mut table = Table::new();
-        table.insert(
-            "figure".into(),
-            format!("{}.{}", self.sensor.name(), self.figure.key()).into(),
-        );
-        table.insert("given".into(), self.quantity.given.as_str().into());
-        table.insert("became".into(), became(self.figure).into());
-        for (key, text) in [("source", &self.source), ("quote", &self.quote)] {
-            if let Some(text) = text {
-                table.insert(key.into(), text.as_str().into());
-            }
-        }
-        table
+        let figure = format!("{}.{}", self.sensor.name(), self.figure.key());
+        let texts = [
+            ("figure", Some(figure)),
+            ("given", Some(self.quantity.given.clone())),
+            ("became", Some(became(self.figure).to_owned())),
+            ("source", self.source.clone()),
+            ("quote", self.quote.clone()),
+        ];
+        let texts = texts.into_iter();
+        texts
+            .filter_map(|(key, text)| Some((key.to_owned(), text?.into())))
+            .collect()
     }
 }
 

@@ -4,13 +4,13 @@ use super::{doubt, of_file, remark, time_back};
 use crate::io::logs::LogOptions;
 use crate::io::recordings::timing::{median_step, unit_of_step};
 use crate::io::recordings::{self, ReadOptions, check_gravity, gravity_factor};
-use crate::io::table::{Column, Dictionary};
+use crate::io::table::{Column, Dictionary, Lines};
 use crate::io::{Failure as Error, Place};
 use glam::DVec3;
 use nav_sim_document::Note;
 use nav_sim_navigation::fusion::{LONGEST_GAP_S, bridged};
 use nav_sim_navigation::strapdown::MAX_ROTATION;
-use nav_sim_signal::imu::{Axis, Channel, ImuIncrement, Sensor};
+use nav_sim_signal::imu::{Channel, ImuIncrement};
 use nav_sim_signal::units::DEG;
 use std::path::Path;
 
@@ -30,16 +30,14 @@ pub(crate) struct ImuFile {
     pub remarks: Vec<Note>,
 }
 
-/// Six values a sample, and the time it ends.
-struct Columns {
-    path: String,
+/// Specific force and angular rate of each sample, and the time it ends.
+struct Columns<'a> {
+    path: &'a str,
     t_s: Vec<f64>,
-    /// In the order of [`Channel::ALL`], SI: rates, or increments.
-    values: Vec<[f64; 6]>,
-    /// Which of the two each sensor gives.
+    values: Vec<[DVec3; 2]>,
+    /// True for a sensor whose values are increments.
     increments: [bool; 2],
-    lines: Vec<u64>,
-    remarks: Vec<Note>,
+    lines: &'a Lines,
 }
 
 /// Dictionary of recordings under way. Texts without a header are those of KF-GINS, with or without an odometer.
@@ -109,7 +107,6 @@ pub(crate) fn read_imu(
     let from_gravity = gravity_factor(&table)?;
     let value =
         |column: &Column, k: usize| column.values[k] * column.factor.unwrap_or(from_gravity);
-    let rows = 0..table.rows();
     let mut remarks: Vec<Note> = table.assumptions.iter().map(remark).collect();
     remarks.extend(table.warnings.iter().map(doubt));
     if table.is_bare {
@@ -121,49 +118,57 @@ pub(crate) fn read_imu(
         remarks.push(remark(format!("{text}{odometer}")));
     }
     let columns = Columns {
+        path: &table.path,
         t_s: time.values.iter().map(|t| t * unit_s).collect(),
-        values: rows
-            .clone()
-            .map(|k| std::array::from_fn(|i| value(signals[i], k)))
+        values: (0..table.rows())
+            .map(|k| {
+                let three =
+                    |i: usize| DVec3::from([0, 1, 2].map(|axis| value(signals[i + axis], k)));
+                [three(0), three(3)]
+            })
             .collect(),
         increments: [0, 3].map(|i| signals[i].quantity.per_sample),
-        lines: rows.map(|k| table.lines.of(k)).collect(),
-        remarks,
-        path: table.path.clone(),
+        lines: &table.lines,
     };
-    columns.increments()
+    let samples = columns.increments(&mut remarks)?;
+    let step = median_step(&columns.t_s);
+    Ok(ImuFile {
+        samples: bridged(&samples, step),
+        rate_hz: 1.0 / step,
+        remarks: remarks
+            .into_iter()
+            .map(|note| of_file(note, &table.path))
+            .collect(),
+    })
 }
 
-impl Columns {
-    fn increments(mut self) -> Result<ImuFile, Error> {
-        if self.t_s.len() < 3 {
-            let message = format!("{} samples, but at least 3 are needed", self.t_s.len());
-            return Err(Error::contents(self.path, Place::Within, message));
+impl Columns<'_> {
+    /// The samples; those after a hole last a step like any other.
+    fn increments(&self, remarks: &mut Vec<Note>) -> Result<Vec<ImuIncrement>, Error> {
+        let Self {
+            path, t_s, lines, ..
+        } = self;
+        if t_s.len() < 3 {
+            let message = format!("{} samples, but at least 3 are needed", t_s.len());
+            return Err(Error::contents(path, Place::Within, message));
         }
-        if let Some(k) = (1..self.t_s.len()).find(|k| self.t_s[*k] <= self.t_s[k - 1]) {
-            return Err(time_back(
-                &self.path,
-                self.lines[k],
-                self.t_s[k - 1],
-                self.t_s[k],
-            ));
+        if let Some(k) = (1..t_s.len()).find(|k| t_s[*k] <= t_s[k - 1]) {
+            return Err(time_back(path, lines.of(k), t_s[k - 1], t_s[k]));
         }
-        let step = median_step(&self.t_s);
-        self.doubt_units(step)?;
-        let mut samples = Vec::with_capacity(self.t_s.len());
+        let step = median_step(t_s);
+        self.doubt_units(step, remarks)?;
+        let mut samples = Vec::with_capacity(t_s.len());
         let mut holes = Vec::new();
-        for k in 0..self.t_s.len() {
-            let t_s = self.t_s[k];
-            let since_s = if k == 0 { step } else { t_s - self.t_s[k - 1] };
-            // a sample after a hole lasts a step like any other
+        for k in 0..t_s.len() {
+            let since_s = if k == 0 { step } else { t_s[k] - t_s[k - 1] };
             let is_hole = since_s > GAP * step;
-            let sample = self.sample(k, if is_hole { step } else { since_s }, t_s);
-            let refuse =
-                |message: String| Error::contents(self.path.as_str(), self.lines[k], message);
+            let sample = self.sample(k, if is_hole { step } else { since_s });
+            let refuse = |message: String| Error::contents(path, lines.of(k), message);
             if is_hole && since_s - step > LONGEST_GAP_S + 0.5 * step {
-                let previous_s = self.t_s[k - 1];
                 let message = format!(
-                    "no samples from {previous_s} s to {t_s} s: {LONGEST_GAP_S} s can be bridged"
+                    "no samples from {} s to {} s: {LONGEST_GAP_S} s can be bridged",
+                    t_s[k - 1],
+                    t_s[k]
                 );
                 return Err(
                     refuse(message).or_hint("fuse the stretches before and after it one by one")
@@ -182,80 +187,42 @@ impl Columns {
             }
             samples.push(sample);
         }
-        self.tell_of_holes(&holes);
-        let remarks = self
-            .remarks
-            .into_iter()
-            .map(|note| of_file(note, &self.path))
-            .collect();
-        Ok(ImuFile {
-            samples: bridged(&samples, step),
-            rate_hz: 1.0 / step,
-            remarks,
-        })
+        if let Some((k, seconds)) = holes.first() {
+            let (at_s, line, more) = (t_s[*k], lines.of(*k), holes.len() - 1);
+            remarks.push(doubt(format!(
+                "samples missing: {seconds:.2} s before {at_s:.2} s (line {line}) and {more} more gaps; bridged"
+            )));
+        }
+        Ok(samples)
     }
 
-    fn tell_of_holes(&mut self, holes: &[(usize, f64)]) {
-        let Some((k, seconds)) = holes.first() else {
-            return;
-        };
-        let (t_s, line, more) = (self.t_s[*k], self.lines[*k], holes.len() - 1);
-        self.remarks.push(doubt(format!(
-            "samples missing: {seconds:.2} s before {t_s:.2} s (line {line}) and {more} more gaps; bridged"
-        )));
-    }
-
-    /// Sample k over `dt` seconds that end at `t_s`.
-    fn sample(&self, k: usize, dt: f64, t_s: f64) -> ImuIncrement {
-        let v = &self.values[k];
-        let seconds = |sensor: Sensor| {
-            if self.increments[sensor as usize] {
-                1.0
-            } else {
-                dt
-            }
-        };
-        let triad = |sensor: Sensor| {
-            let first = Channel {
-                sensor,
-                axis: Axis::X,
-            }
-            .index();
-            DVec3::new(v[first], v[first + 1], v[first + 2]) * seconds(sensor)
-        };
+    /// Sample k over `dt_s` seconds.
+    fn sample(&self, k: usize, dt_s: f64) -> ImuIncrement {
+        let [accel, gyro] = self.values[k];
+        let seconds = self.increments.map(|is| if is { 1.0 } else { dt_s });
         ImuIncrement {
-            t_s,
-            dt_s: dt,
-            dtheta: triad(Sensor::Gyro),
-            dv: triad(Sensor::Accel),
+            t_s: self.t_s[k],
+            dt_s,
+            dtheta: gyro * seconds[1],
+            dv: accel * seconds[0],
         }
     }
 
     /// Over a whole recording the specific force is gravity in the mean, and nothing turns all the time.
-    fn doubt_units(&mut self, step: f64) -> Result<(), Error> {
-        let n = self.values.len() as f64;
-        let mean = |sensor: Sensor| {
-            let length = |k: usize| {
-                let s = self.sample(k, step, 0.0);
-                (if sensor == Sensor::Accel {
-                    s.dv
-                } else {
-                    s.dtheta
-                })
-                .length()
-                    / step
-            };
-            (0..self.values.len()).map(length).sum::<f64>() / n
+    fn doubt_units(&self, step: f64, remarks: &mut Vec<Note>) -> Result<(), Error> {
+        let mean = |of: fn(ImuIncrement) -> DVec3| {
+            let lengths = (0..self.values.len()).map(|k| of(self.sample(k, step)).length() / step);
+            lengths.sum::<f64>() / self.values.len() as f64
         };
-        let (force, rate) = (mean(Sensor::Accel), mean(Sensor::Gyro));
+        let (force, rate) = (mean(|sample| sample.dv), mean(|sample| sample.dtheta));
         if !(4.0..25.0).contains(&force) {
-            check_gravity(&self.path, force.max(0.3))?;
+            check_gravity(self.path, force.max(0.3))?;
         }
         if rate > FAST {
             let degrees = rate / DEG;
             let text =
                 format!("mean angular rate {degrees:.0} deg/s: are these degrees named radians?");
-            self.remarks.push(doubt(text));
+            remarks.push(doubt(text));
         }
         Ok(())
     }

@@ -7,9 +7,13 @@ use crate::io::{Failure, Place, help};
 use crate::report::six_digits;
 
 /// When the samples were taken.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Timing {
     pub(super) rate_hz: f64,
+    /// The clock's own rate (Hz).
+    found_hz: f64,
+    /// The rate of its median step (Hz).
+    step_hz: f64,
     /// First samples of the stretches after a gap, if the file is to be split.
     pub(super) breaks: Vec<usize>,
     /// Samples before which others are missing, and how many, if they are to be kept apart.
@@ -52,8 +56,7 @@ pub(super) fn timing(
             report.rate_from = source.into();
             return Ok(Timing {
                 rate_hz,
-                breaks: Vec::new(),
-                holes: Vec::new(),
+                ..Timing::default()
             });
         }
         (None, _, None, None) => {
@@ -61,19 +64,13 @@ pub(super) fn timing(
             return Err(Failure::contents(raw.path.as_str(), Place::Within, message).or(help::RATE));
         }
     };
-    let timing = clock.check(raw, options)?;
+    let mut timing = clock.check(raw, options)?;
     report.rate_from = clock.source;
     doubt(&timing, &clock.name, raw, options, report);
-    let breaks = if options.gaps == Gaps::Split {
-        timing.breaks
-    } else {
-        Vec::new()
-    };
-    Ok(Timing {
-        rate_hz: timing.rate_hz,
-        breaks,
-        holes: timing.holes,
-    })
+    if options.gaps != Gaps::Split {
+        timing.breaks.clear();
+    }
+    Ok(timing)
 }
 
 /// Refuses a rate that is given where the file, or the manifest beside it, states another.
@@ -99,7 +96,7 @@ fn agree(raw: &Table, options: &ReadOptions, report: &mut FileReport) -> Result<
 
 /// Says what is doubtful about a clock.
 fn doubt(
-    timing: &Checked,
+    timing: &Timing,
     column: &str,
     raw: &Table,
     options: &ReadOptions,
@@ -151,17 +148,6 @@ fn doubt(
     }
 }
 
-/// What the steps of a clock say.
-struct Checked {
-    rate_hz: f64,
-    /// The clock's own rate (Hz).
-    found_hz: f64,
-    /// The rate of its median step (Hz).
-    step_hz: f64,
-    breaks: Vec<usize>,
-    holes: Vec<(usize, usize)>,
-}
-
 /// A rate that is given may differ from the clock's by so much without a word: it was rounded.
 const ROUNDED: f64 = 1e-3;
 
@@ -202,11 +188,11 @@ impl Clock {
             None => {
                 let step = step_of(&since, options.gaps);
                 let known = options.rate_hz.or(raw.rate_hz.map(|(rate_hz, _)| rate_hz));
-                let guess = Guess::new(step, first, known);
+                let (unit, others) = guess(step, first, known);
                 if since.len() > 1 {
-                    guess.tell(&name, step, report);
+                    tell(&name, step, unit, &others, report);
                 }
-                guess.unit_s
+                unit.0
             }
         };
         Self {
@@ -237,7 +223,7 @@ impl Clock {
         ((self.start + self.since[sample] * self.unit_s) * 1e9).round() / 1e9
     }
 
-    fn check(&self, raw: &Table, options: &ReadOptions) -> Result<Checked, Failure> {
+    fn check(&self, raw: &Table, options: &ReadOptions) -> Result<Timing, Failure> {
         let steps = || self.since.windows(2).map(|w| w[1] - w[0]);
         let step_at = |i: usize| (raw.lines.of(i + 1), self.time_of(i), self.time_of(i + 1));
         if let Some(i) = steps().position(|s| s < 0.0) {
@@ -317,13 +303,12 @@ impl Clock {
                 Failure::contents(raw.path.as_str(), Place::Within, message).or(help::WRONG_RATE)
             );
         }
-        let holes = holes.unwrap_or_default();
-        Ok(Checked {
+        Ok(Timing {
             rate_hz: given,
             found_hz: found,
             step_hz: rate(median),
             breaks,
-            holes,
+            holes: holes.unwrap_or_default(),
         })
     }
 
@@ -487,77 +472,44 @@ pub(in crate::io) fn unit_of_step(step: f64) -> (f64, &'static str) {
     }]
 }
 
-/// The unit that is assumed.
-struct Guess {
-    unit_s: f64,
-    word: &'static str,
-    /// Other units in which the step would be that of an IMU too.
-    others: Vec<(f64, &'static str)>,
+/// A unit of time: its length (s) and its name.
+type Unit = (f64, &'static str);
+
+/// The unit that is assumed from the step, the first time and a rate that is known otherwise (Hz), and others in which the
+/// step would be that of an IMU too.
+fn guess(step: f64, first: f64, known_hz: Option<f64>) -> (Unit, Vec<Unit>) {
+    if let Some(rate_hz) = known_hz.filter(|_| step > 0.0) {
+        // The units are thousands apart: the nearest ratio is the one that is meant.
+        let apart = |(unit_s, _): &Unit| (rate_hz * step * unit_s).ln().abs();
+        let nearest = UNITS
+            .into_iter()
+            .min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        return (nearest.unwrap_or(UNITS[0]), Vec::new());
+    }
+    let usual = |(unit_s, _): &Unit| USUAL_RATES_HZ.contains(&(1.0 / (step * unit_s)));
+    let mut plausible: Vec<Unit> = UNITS.into_iter().filter(usual).collect();
+    let mut all = plausible.iter();
+    if let Some(unit) = all.find(|(unit_s, _)| UNIX_S.contains(&(first * unit_s))) {
+        return (*unit, Vec::new());
+    }
+    let unit = unit_of_step(step);
+    plausible.retain(|other| other.1 != unit.1);
+    (unit, plausible)
 }
 
-impl Guess {
-    /// From the step, the first time and a rate that is known otherwise (Hz).
-    fn new(step: f64, first: f64, known_hz: Option<f64>) -> Self {
-        let usual = |(unit_s, _): &(f64, &str)| USUAL_RATES_HZ.contains(&(1.0 / (step * unit_s)));
-        let plausible: Vec<(f64, &str)> = UNITS.into_iter().filter(usual).collect();
-        if let Some(rate_hz) = known_hz.filter(|_| step > 0.0) {
-            // The units are thousands apart: the nearest ratio is the one that is meant.
-            let apart = |(unit_s, _): &(f64, &str)| (rate_hz * step * unit_s).ln().abs();
-            let nearest = UNITS
-                .into_iter()
-                .min_by(|a, b| apart(a).total_cmp(&apart(b)));
-            let (unit_s, word) = nearest.unwrap_or(UNITS[0]);
-            return Self {
-                unit_s,
-                word,
-                others: Vec::new(),
-            };
-        }
-        if let Some(&(unit_s, word)) = plausible
-            .iter()
-            .find(|(unit_s, _)| UNIX_S.contains(&(first * unit_s)))
-        {
-            return Self {
-                unit_s,
-                word,
-                others: Vec::new(),
-            };
-        }
-        let (unit_s, word) = unit_of_step(step);
-        let others = plausible
-            .into_iter()
-            .filter(|(_, other)| *other != word)
-            .collect();
-        Self {
-            unit_s,
-            word,
-            others,
-        }
+/// Tells what is assumed, and warns where it may as well be another unit.
+fn tell(column: &str, step: f64, unit: Unit, others: &[Unit], report: &mut FileReport) {
+    let text = format!("column \"{column}\" taken as {}", unit.1);
+    report.assumptions.push(text);
+    if others.is_empty() {
+        return;
     }
-
-    /// Tells what is assumed, and warns where it may as well be another unit.
-    fn tell(&self, column: &str, step: f64, report: &mut FileReport) {
-        let Self {
-            unit_s,
-            word,
-            others,
-        } = self;
-        report
-            .assumptions
-            .push(format!("column \"{column}\" taken as {word}"));
-        if !others.is_empty() {
-            let rate = |unit_s: &f64, word: &str| {
-                format!("{} Hz in {word}", six_digits(1.0 / (step * unit_s)))
-            };
-            let others: Vec<String> = others
-                .iter()
-                .map(|(unit_s, word)| rate(unit_s, word))
-                .collect();
-            report.warn(format!(
-                "column \"{column}\" has no unit: taken as {}, but it would be {}; name it t_s, t_ms, t_us or t_ns",
-                rate(unit_s, word),
-                others.join(", ")
-            ));
-        }
-    }
+    let rate =
+        |(unit_s, word): &Unit| format!("{} Hz in {word}", six_digits(1.0 / (step * unit_s)));
+    let others: Vec<String> = others.iter().map(rate).collect();
+    report.warn(format!(
+        "column \"{column}\" has no unit: taken as {}, but it would be {}; name it t_s, t_ms, t_us or t_ns",
+        rate(&unit),
+        others.join(", ")
+    ));
 }
