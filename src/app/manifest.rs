@@ -1,6 +1,7 @@
 //! `manifest.json`: where a result directory came from, and whether another command makes the same.
 
 use super::Input;
+use crate::io::hash;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -58,23 +59,15 @@ impl Manifest {
             wall_s: 0.0,
             record: Map::new(),
         };
-        manifest.key = manifest.key_with(manifest.options.get("seed"));
-        manifest
-    }
-
-    /// The key of the same command with another seed.
-    fn key_with(&self, seed: Option<&Vec<String>>) -> String {
-        let mut options = self.options.clone();
-        options.remove("seed");
-        let decides = (&self.name, options, seed, contents(&self.inputs), NUMERICS);
+        let decides = (
+            name,
+            &manifest.options,
+            contents(&manifest.inputs),
+            NUMERICS,
+        );
         let text = serde_json::to_string(&decides).expect("texts and numbers are always JSON");
-        blake3::hash(text.as_bytes()).to_hex().to_string()
-    }
-
-    /// The seed of another result that is the same but for it.
-    pub(crate) fn other_seed(&self, present: &Self) -> Option<u64> {
-        let same = self.key_with(present.options.get("seed")) == present.key;
-        present.seed.filter(|_| same && self.key != present.key)
+        manifest.key = hash::of_bytes(text.as_bytes());
+        manifest
     }
 
     /// The hashes of the inputs of a role, in the order given.

@@ -78,18 +78,8 @@ impl<C: Command> Asked<C> {
                 };
                 let own = [PAGE, MANIFEST].map(Cow::Borrowed);
                 let names = [&names[..], &own].concat();
-                let claimed = claim_directory(out, &names, inputs(), existing, recognise);
-                claims.own.push(claimed.map_err(|e| {
-                    let there = std::fs::read_to_string(out.join(MANIFEST)).unwrap_or_default();
-                    match present(&there).and_then(|there| manifest.other_seed(&there)) {
-                        Some(seed) => e.hint(format!(
-                            "make that {} again with --seed {seed}, name another directory with -o, or replace it with \
-                             --force",
-                            C::NAME
-                        )),
-                        None => e,
-                    }
-                })?);
+                let claim = claim_directory(out, &names, inputs(), existing, recognise)?;
+                claims.own.push(claim);
             }
             (Out::File { .. }, Some(out)) => {
                 self.request.check_out()?;

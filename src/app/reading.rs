@@ -368,7 +368,8 @@ const FEW: usize = 2;
 pub(crate) fn note_report(report: &Report, context: &Context<'_>) {
     let is_many = report.files.len() > FEW;
     if is_many {
-        context.remark(format!("{} (--verbose: each of them)", report.summary()));
+        let count = report.files.len();
+        context.remark(format!("{count} recordings (--verbose: each of them)"));
     }
     let each = match is_many {
         true => Importance::Detail,

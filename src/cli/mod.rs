@@ -90,8 +90,11 @@ impl Command {
         }
         match self {
             Self::Driven(driven) => driven.run(session),
-            Self::Trajectory(args) => match &args.command {
-                TrajectoryCommand::Generate(asked) => drive(asked, session).map(drop),
+            Self::Trajectory(mut args) => match &mut args.command {
+                TrajectoryCommand::Generate(asked) => {
+                    asked.request.rate_hz.get_or_insert(100.0);
+                    drive(asked, session).map(drop)
+                }
                 TrajectoryCommand::Check(asked) => drive(asked, session).map(drop),
                 TrajectoryCommand::Convert(asked) => drive(asked, session).map(drop),
                 TrajectoryCommand::Record(asked) => drive(asked, session).map(drop),
@@ -128,24 +131,6 @@ first:        nav-sim init study && cd study && nav-sim run trajectories/land_ve
 /// The whole command line as clap knows it.
 fn command() -> clap::Command {
     Cli::command()
-}
-
-/// `--color` as written, for the help and usage errors, which clap prints before it has read the flags.
-fn color_choice(words: &[String]) -> clap::ColorChoice {
-    let after = words
-        .iter()
-        .skip_while(|w| *w != "--color")
-        .nth(1)
-        .map(String::as_str);
-    match words
-        .iter()
-        .find_map(|w| w.strip_prefix("--color="))
-        .or(after)
-    {
-        Some("always") => clap::ColorChoice::Always,
-        Some("never") => clap::ColorChoice::Never,
-        _ => clap::ColorChoice::Auto,
-    }
 }
 
 /// The words of the command line. A negative number after an option is its value, not a flag: no flag begins with a
@@ -217,9 +202,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
         let _ = writeln!(std::io::stderr(), "{OVERVIEW}");
         return 2;
     }
-    let known = command()
-        .color(color_choice(&words))
-        .version(&*version::version(&words).leak());
+    let known = command().version(&*version::version(&words).leak());
     let matches = known
         .try_get_matches_from(&given)
         .unwrap_or_else(|e| end(&e));

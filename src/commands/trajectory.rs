@@ -33,8 +33,26 @@ pub(crate) struct TrajectoryArgs {
 
 #[derive(clap::Subcommand, Debug)]
 pub(crate) enum TrajectoryCommand {
-    Generate(Asked<Generate>),
+    /// Write a motion profile as a table of evenly spaced rows
+    ///
+    /// Columns: time, latitude, longitude, height, velocity north, east, down, roll, pitch, yaw. Numbers have
+    /// enough digits to be read back exactly.
+    #[command(before_help = "\
+Examples:
+  nav-sim trajectory generate trajectories/land_vehicle.toml -o drive.csv
+  nav-sim trajectory generate trajectories/fixed_wing.toml --rate-hz 10 -o flight.csv.gz
+  nav-sim trajectory generate trajectories/figure_eight.toml --rate-hz 1")]
+    Generate(Asked<Convert>),
     Check(Asked<CheckTrajectory>),
+    /// Convert a trajectory file of any kind to a nav-sim table
+    ///
+    /// The rows are those of the input, or evenly spaced ones with --rate-hz. Local coordinates become latitude,
+    /// longitude and height. A path without attitude gets the heading and pitch along it.
+    #[command(before_help = "\
+Examples:
+  nav-sim trajectory convert trajectories/figure_eight.toml -o eight.csv
+  nav-sim trajectory convert trajectories/fixed_wing.toml --rate-hz 20 -o denser.csv.gz
+  nav-sim trajectory convert trajectories/land_vehicle.toml --rate-hz 1 -o thinned.csv")]
     Convert(Asked<Convert>),
     Record(Asked<Record>),
 }
@@ -68,15 +86,6 @@ impl Source {
         Ok(read)
     }
 
-    fn table(&self, rows: Rows, context: &Context<'_>) -> Result<TrajectoryTable> {
-        let (trajectory, _) = self.read(context)?;
-        Ok(TrajectoryTable {
-            schema_version: 1,
-            rows: rows.times(&trajectory).len(),
-            text: trajectory_file::csv(&trajectory, rows),
-        })
-    }
-
     fn input(&self) -> (&'static str, PathBuf) {
         ("trajectory", self.path.clone())
     }
@@ -101,68 +110,24 @@ impl Answer for TrajectoryTable {
     }
 }
 
-const TABLE: Out = Out::File {
-    kind: Written::Trajectory,
-    name: "trajectory.csv",
-    help: "Table to write (.csv or .csv.gz); without it, standard output",
-};
-
-/// Write a motion profile as a table of evenly spaced rows
-///
-/// Columns: time, latitude, longitude, height, velocity north, east, down, roll, pitch, yaw. Numbers have
-/// enough digits to be read back exactly.
+/// Table of the rows of a trajectory, or of evenly spaced ones.
 #[derive(clap::Args, Debug)]
-#[command(before_help = "\
-Examples:
-  nav-sim trajectory generate trajectories/land_vehicle.toml -o drive.csv
-  nav-sim trajectory generate trajectories/fixed_wing.toml --rate-hz 10 -o flight.csv.gz
-  nav-sim trajectory generate trajectories/figure_eight.toml --rate-hz 1")]
-pub struct Generate {
-    #[command(flatten)]
-    source: Source,
-    /// Rows per second
-    #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = parse::rate_hz)]
-    rate_hz: f64,
-}
-
-impl Command for Generate {
-    type Answer = TrajectoryTable;
-    const NAME: &'static str = "trajectory generate";
-    const OUT: Out = TABLE;
-    const PLOT: bool = false;
-    const PRINTS_FILE: bool = true;
-
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
-        Ok(vec![self.source.input()])
-    }
-
-    fn run(&self, context: &Context<'_>) -> Result<TrajectoryTable> {
-        self.source.table(Rows::Rate(self.rate_hz), context)
-    }
-}
-
-/// Convert a trajectory file of any kind to a nav-sim table
-///
-/// The rows are those of the input, or evenly spaced ones with --rate-hz. Local coordinates become latitude,
-/// longitude and height. A path without attitude gets the heading and pitch along it.
-#[derive(clap::Args, Debug)]
-#[command(before_help = "\
-Examples:
-  nav-sim trajectory convert trajectories/figure_eight.toml -o eight.csv
-  nav-sim trajectory convert trajectories/fixed_wing.toml --rate-hz 20 -o denser.csv.gz
-  nav-sim trajectory convert trajectories/land_vehicle.toml --rate-hz 1 -o thinned.csv")]
 pub struct Convert {
     #[command(flatten)]
     source: Source,
-    /// Rows per second (default: the rows of the input)
+    /// Rows per second (default: of generate 100, of convert the rows of the input)
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
-    rate_hz: Option<f64>,
+    pub(crate) rate_hz: Option<f64>,
 }
 
 impl Command for Convert {
     type Answer = TrajectoryTable;
     const NAME: &'static str = "trajectory convert";
-    const OUT: Out = TABLE;
+    const OUT: Out = Out::File {
+        kind: Written::Trajectory,
+        name: "trajectory.csv",
+        help: "Table to write (.csv or .csv.gz); without it, standard output",
+    };
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
 
@@ -171,8 +136,13 @@ impl Command for Convert {
     }
 
     fn run(&self, context: &Context<'_>) -> Result<TrajectoryTable> {
+        let (trajectory, _) = self.source.read(context)?;
         let rows = self.rate_hz.map_or(Rows::Knots, Rows::Rate);
-        self.source.table(rows, context)
+        Ok(TrajectoryTable {
+            schema_version: 1,
+            rows: rows.times(&trajectory).len(),
+            text: trajectory_file::csv(&trajectory, rows),
+        })
     }
 }
 

@@ -1,7 +1,7 @@
 //! Wavelet-variance curves to fit: CSV with columns `tau_samples,wv,edof`, or the JSON that `calibrate` or `wv`
 //! writes (the classical curve of a signal is GMWM's, the robust one RGMWM's).
 
-use super::table::{Asked, Dictionary, Numbers, Quantity, parse as parse_table};
+use super::table::{Asked, Dictionary, Quantity, parse as parse_table};
 use super::{Failure, Place, source};
 use crate::report::{CurvesFile, FittedCurve, SignalsFile};
 use nav_sim_signal::imu::{Axis, Sensor};
@@ -74,15 +74,7 @@ static QUANTITIES: [Quantity; 3] = [
     Quantity::number("wv", &["wv"]),
     Quantity::number("edof", &["edof"]),
 ];
-const DICTIONARY: Dictionary = Dictionary {
-    quantities: &QUANTITIES,
-    bare: &[],
-    array: &[],
-    numbers: Numbers::Finite,
-    advice: "the first line names them",
-    empty: "no rows in it",
-    bad_cell: |error, _| error,
-};
+const DICTIONARY: Dictionary = Dictionary::new(&QUANTITIES, "the first line names them");
 
 fn csv(path: &str, text: &str) -> Result<NamedCurve, Failure> {
     let table = parse_table(path, text, &DICTIONARY, &Asked::default())?;

@@ -3,7 +3,7 @@
 use super::nmea::{self, is_nmea};
 use super::rtklib::{self, is_rtklib};
 use super::{doubt, of_file, remark, time_back};
-use crate::io::table::{self, Asked, Column, Dictionary, Numbers, Quantity, Table};
+use crate::io::table::{self, Asked, Column, Dictionary, Quantity, Table};
 use crate::io::{Failure as Error, Place, help, logs, source};
 use glam::{DMat3, DVec3};
 use nav_sim_document::Note;
@@ -89,7 +89,6 @@ const VELOCITY_SIGMA: [&str; 3] = ["sd_vn_m_s", "sd_ve_m_s", "sd_vd_m_s"];
 
 /// Dictionary of fixes. Texts without a header are those of KF-GINS.
 const DICTIONARY: Dictionary = Dictionary {
-    quantities: &QUANTITIES,
     bare: &[
         &[
             "t_s", "lat_deg", "lon_deg", "h_m", "sd_n_m", "sd_e_m", "sd_d_m",
@@ -110,13 +109,13 @@ const DICTIONARY: Dictionary = Dictionary {
             "sd_vd_m_s",
         ],
     ],
-    array: &[],
-    numbers: Numbers::Finite,
-    advice: "columns: t_s, lat_deg, lon_deg, h_m (or x_m, y_m, z_m), sd_n_m, sd_e_m, sd_d_m; with velocity v_n_m_s … and \
+    bad_cell: |error, _| error.hint("remove the row: a fix that is not whole is no fix"),
+    ..Dictionary::new(
+        &QUANTITIES,
+        "columns: t_s, lat_deg, lon_deg, h_m (or x_m, y_m, z_m), sd_n_m, sd_e_m, sd_d_m; with velocity v_n_m_s … and \
              sd_vn_m_s …; without a header, as KF-GINS has it, 7 of them (t_s, latitude, longitude, height, three deviations) \
              or 13 (velocity behind the height)",
-    empty: "no rows in it",
-    bad_cell: |error, _| error.hint("remove the row: a fix that is not whole is no fix"),
+    )
 };
 
 /// Columns of each quantity; standard deviations may be given for the whole file.

@@ -4,7 +4,7 @@ use super::time_back;
 use crate::io::Failure as Error;
 use crate::io::recordings::{OF_CLOCK, OF_RECEIVER, STAMP};
 use crate::io::table::{
-    self, Asked, Bare, Column, Dictionary, NONE, Numbers, Quantity, SPEED, Table, normalised,
+    self, Asked, Bare, Column, Dictionary, NONE, Quantity, SPEED, Table, normalised,
 };
 use nav_sim_navigation::fusion::WheelSpeed;
 use std::path::Path;
@@ -38,15 +38,10 @@ static QUANTITIES: [Quantity; 6] = [
 ];
 const COUNTS: &str = "counts";
 
-const DICTIONARY: Dictionary = Dictionary {
-    quantities: &QUANTITIES,
-    bare: &[],
-    array: &[],
-    numbers: Numbers::Finite,
-    advice: "columns: t_s and wheel_m_s (or wheel_km_h, wheel_mph), negative in reverse; or rear_left_m_s and rear_right_m_s",
-    empty: "no rows in it",
-    bad_cell: |error, _| error,
-};
+const DICTIONARY: Dictionary = Dictionary::new(
+    &QUANTITIES,
+    "columns: t_s and wheel_m_s (or wheel_km_h, wheel_mph), negative in reverse; or rear_left_m_s and rear_right_m_s",
+);
 
 /// Reads speeds: a table with a time, and a speed or those of both rear wheels, whose mean is taken.
 ///

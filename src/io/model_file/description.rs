@@ -151,28 +151,29 @@ pub(super) struct LawAxes {
 
 /// The law of a parameter of one process, such as AR1_2
 #[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct LawTable {
+    pub(super) process: String,
+    pub(super) parameter: String,
+    #[schemars(flatten)]
+    pub(super) distribution: Distribution,
+}
+
+#[derive(Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
-#[schemars(tag = "distribution")]
-pub(super) enum LawTable {
+#[schemars(tag = "distribution", !deny_unknown_fields)]
+pub(super) enum Distribution {
     /// low + width × a beta law
     Beta {
-        process: String,
-        parameter: String,
         a: Finite,
         b: Finite,
         low: Finite,
         width: Finite,
     },
     /// A normal law about the parameter
-    Normal {
-        process: String,
-        parameter: String,
-        sd: Finite,
-    },
+    Normal { sd: Finite },
     /// A normal law of the logarithm of the parameter, of phi and beta of that of the correlation time
     Lognormal {
-        process: String,
-        parameter: String,
         median: Finite,
         median_ci95: Option<Ends>,
         sd: Finite,
@@ -180,52 +181,25 @@ pub(super) enum LawTable {
     },
 }
 
-impl LawTable {
-    /// Process, parameter, law.
-    pub(super) fn parts(&self) -> (&str, &str, Law) {
-        match self {
+impl Distribution {
+    pub(super) fn law(&self) -> Law {
+        match *self {
             Self::Beta {
-                process,
-                parameter,
-                a,
-                b,
-                low,
-                width,
-            } => (
-                process,
-                parameter,
-                Law::Beta {
-                    a: a.0,
-                    b: b.0,
-                    low: low.0,
-                    width: width.0,
-                },
-            ),
-            Self::Normal {
-                process,
-                parameter,
-                sd,
-            } => (process, parameter, Law::Normal { sd: sd.0 }),
+                a: Finite(a),
+                b: Finite(b),
+                low: Finite(low),
+                width: Finite(width),
+            } => Law::Beta { a, b, low, width },
+            Self::Normal { sd: Finite(sd) } => Law::Normal { sd },
             Self::Lognormal {
-                process,
-                parameter,
-                median,
+                median: Finite(median),
                 median_ci95,
-                sd,
+                sd: Finite(sd),
                 sd_ci95,
             } => {
-                let ci95 = median_ci95
-                    .zip(*sd_ci95)
-                    .map(|(median, sd)| LognormalIntervals { median, sd });
-                (
-                    process,
-                    parameter,
-                    Law::Lognormal {
-                        median: median.0,
-                        sd: sd.0,
-                        ci95,
-                    },
-                )
+                let ends = median_ci95.zip(sd_ci95);
+                let ci95 = ends.map(|(median, sd)| LognormalIntervals { median, sd });
+                Law::Lognormal { median, sd, ci95 }
             }
         }
     }

@@ -242,7 +242,8 @@ fn read_laws(
         let into = &mut into.axes[channel.index()];
         for (i, law) in (1..).zip(laws) {
             let key = format!("{key}[{i}]");
-            let (process, parameter, law) = law.parts();
+            let (process, parameter) = (law.process.as_str(), law.parameter.as_str());
+            let law = law.distribution.law();
             let variation = Variation::new(
                 file.model.axis(channel),
                 file.model.rate_hz,

@@ -18,29 +18,6 @@ pub struct Report {
 }
 
 impl Report {
-    /// `8 recordings at 100 Hz, 655 s each`
-    pub(crate) fn summary(&self) -> String {
-        let seconds = self
-            .files
-            .iter()
-            .map(|f| f.samples.iter().sum::<usize>() as f64 / f.rate_hz);
-        let (low, high) = seconds.fold((f64::INFINITY, 0.0_f64), |(low, high), s| {
-            (low.min(s), high.max(s))
-        });
-        let rate_hz = six_digits(self.files.first().map_or(f64::NAN, |f| f.rate_hz));
-        let length = if high - low < 0.5 {
-            format!("{high:.0} s each")
-        } else {
-            format!("{low:.0} to {high:.0} s")
-        };
-        let assumed = self.files.iter().any(|f| !f.assumptions.is_empty());
-        let assumed = if assumed { ", with assumptions" } else { "" };
-        format!(
-            "{} recordings at {rate_hz} Hz, {length}{assumed}",
-            self.files.len()
-        )
-    }
-
     /// Every doubt, those about a file with its name.
     #[must_use]
     pub fn all_warnings(&self) -> Vec<String> {

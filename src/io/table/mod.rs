@@ -38,6 +38,21 @@ pub(crate) struct Dictionary {
     pub(crate) bad_cell: fn(Failure, &str) -> Failure,
 }
 
+impl Dictionary {
+    /// Finite numbers in named columns.
+    pub(crate) const fn new(quantities: &'static [Quantity], advice: &'static str) -> Self {
+        Self {
+            quantities,
+            bare: &[],
+            array: &[],
+            numbers: Numbers::Finite,
+            advice,
+            empty: "no rows in it",
+            bad_cell: |error, _| error,
+        }
+    }
+}
+
 /// Numbers that a table may hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Numbers {

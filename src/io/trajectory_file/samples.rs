@@ -49,13 +49,11 @@ const V_D: Quantity = Quantity::speed("v_d_m_s", &["v_d", "vd", "v_down"]).with_
 /// Dictionary of trajectories with such numbers.
 pub(super) const fn dictionary(numbers: Numbers) -> Dictionary {
     Dictionary {
-        quantities: &QUANTITIES,
-        bare: &[],
-        array: &[],
         numbers,
-        advice: "a trajectory has the columns t_s, lat_deg, lon_deg, h_m (or n_m, e_m, d_m) and may have roll_deg, pitch_deg, yaw_deg",
-        empty: "no rows in it",
-        bad_cell: |error, _| error,
+        ..Dictionary::new(
+            &QUANTITIES,
+            "a trajectory has the columns t_s, lat_deg, lon_deg, h_m (or n_m, e_m, d_m) and may have roll_deg, pitch_deg, yaw_deg",
+        )
     }
 }
 const DEGREES: &str = "degrees: latitude within ±89.9, longitude and yaw in (−180, 180] or [0, 360), pitch within ±90";
