@@ -2,9 +2,7 @@
 
 use super::command::{Answer, Asked, Command, Out, OutputFile, beside};
 use super::{Context, Failure, Input, Manifest, Result};
-use crate::io::atomic::{
-    self, AtomicDir, Claim, Existing, Found, Written, claim_directory, claim_result,
-};
+use crate::io::atomic::{self, AtomicDir, Claim, Found, Written, claim_directory, claim_result};
 use crate::io::input;
 use crate::report::json;
 use flate2::{Compression, write::GzEncoder};
@@ -57,7 +55,7 @@ impl<C: Command> Asked<C> {
 
     /// Claims all outputs: none is an input, nothing is replaced that is not of this command, and nobody else writes
     /// there.
-    pub(crate) fn claim(&self, manifest: &Manifest, existing: Existing) -> Result<Claims> {
+    pub(crate) fn claim(&self, manifest: &Manifest, force: bool) -> Result<Claims> {
         let inputs = || manifest.inputs.iter().map(|input| Path::new(&input.path));
         let mut claims = Claims::default();
         claims.note_missing(self.out.iter().chain(&self.plots));
@@ -78,7 +76,7 @@ impl<C: Command> Asked<C> {
                 };
                 let own = [PAGE, MANIFEST].map(Cow::Borrowed);
                 let names = [&names[..], &own].concat();
-                let claim = claim_directory(out, &names, inputs(), existing, recognise)?;
+                let claim = claim_directory(out, &names, inputs(), force, recognise)?;
                 claims.own.push(claim);
             }
             (Out::File { .. }, Some(out)) => {
@@ -90,12 +88,9 @@ impl<C: Command> Asked<C> {
                     return Err(failure.hint("name a file, such as model.toml"));
                 }
                 for (ending, kind) in endings {
-                    claims.own.push(claim_result(
-                        &beside(out, &ending),
-                        inputs(),
-                        kind,
-                        existing,
-                    )?);
+                    claims
+                        .own
+                        .push(claim_result(&beside(out, &ending), inputs(), kind, force)?);
                 }
             }
             _ => {}
@@ -103,7 +98,7 @@ impl<C: Command> Asked<C> {
         for path in &self.plots {
             claims
                 .own
-                .push(claim_result(path, inputs(), kind_of_plot(path)?, existing)?);
+                .push(claim_result(path, inputs(), kind_of_plot(path)?, force)?);
         }
         Ok(claims)
     }

@@ -3,7 +3,6 @@
 use super::{Failure, Session, drive};
 use crate::app::{Answer, Context, Front};
 use crate::commands::batch::{BatchRequest, Outcome};
-use crate::io::atomic::Existing;
 use crate::report::{WIDTH, json as to_json};
 use nav_sim_document::Note;
 use serde_json::json;
@@ -85,7 +84,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             .and_then(|limit| Instant::now().checked_add(limit)),
     };
     let mut request = args.request.clone();
-    request.force = session.existing() == Existing::Replace;
+    request.force = session.force();
     request
         .set
         .extend(session.asked_seed().map(|seed| format!("seed={seed}")));

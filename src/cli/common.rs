@@ -2,7 +2,6 @@
 
 use super::{Failure, Printer, Progress};
 use crate::app::{Context, Front};
-use crate::io::atomic::Existing;
 use crate::parse;
 use nav_sim_document::Note;
 use std::fmt::Display;
@@ -115,13 +114,9 @@ impl Session {
         self.common.format == Format::Json
     }
 
-    /// Rule for results that are there already.
-    pub(crate) const fn existing(&self) -> Existing {
-        if self.common.force {
-            Existing::Replace
-        } else {
-            Existing::Keep
-        }
+    /// True if another result takes the place of one that is there.
+    pub(crate) const fn force(&self) -> bool {
+        self.common.force
     }
 
     /// True if stdout gets CSV rather than text.

@@ -5,7 +5,7 @@ use crate::app::{Answer, inputs};
 use crate::commands::batch::{BatchRequest, Outcome};
 use crate::commands::compare::Comparison;
 use crate::commands::paper::{StudyCurves, paper_figures, paper_page};
-use crate::io::atomic::{Existing, Written};
+use crate::io::atomic::Written;
 use crate::io::{atomic, model_file};
 use crate::report::{self, TrajectorySeries, WIDTH};
 use clap::Parser;
@@ -81,7 +81,7 @@ impl Progress {
             commands_done: begun.as_ref().map_or(0, |begun| begun.commands_done),
         };
         match begun {
-            Some(begun) if begun != new && session.existing() == Existing::Keep => {
+            Some(begun) if begun != new && !session.force() => {
                 let message = format!(
                     "{} is of a demo of another seed, size or version",
                     path.display()
@@ -124,7 +124,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     refuse_the_impossible(args, session)?;
     let (page, figures) = (out.join("report.html"), out.join("figures"));
     let _own = atomic::claim_file(&Progress::path(&args.out), [])?;
-    let own_page = |path: &Path| atomic::claim_result(path, [], Written::Page, session.existing());
+    let own_page = |path: &Path| atomic::claim_result(path, [], Written::Page, session.force());
     let _pages = [own_page(&page)?, own_page(&figures.join("index.html"))?];
     let mut progress = Progress::of(args, session)?;
     let commands = commands(args, progress.seed);
@@ -157,7 +157,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         study,
         out: Some(out.to_owned()),
         states: ["pos_e_m", "roll_deg"].map(str::to_owned).to_vec(),
-        force: session.existing() == Existing::Replace,
+        force: session.force(),
         ..BatchRequest::default()
     };
     let Outcome::Merged(found) = request.run(&|_| None, &session.context())? else {

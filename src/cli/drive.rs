@@ -9,7 +9,7 @@ use nav_sim_document::{Document, Importance};
 pub(super) fn drive<C: Command>(asked: &Asked<C>, session: &Session) -> Result<C::Answer> {
     let mut manifest = asked.manifest(session.asked_seed())?;
     manifest.command = super::given();
-    let _claims = asked.claim(&manifest, session.existing())?;
+    let _claims = asked.claim(&manifest, session.force())?;
     let context = session.context().reading(manifest.inputs.clone());
     let answer = asked.request.run(&context)?;
     let document = show(asked, &answer, session);

@@ -167,7 +167,7 @@ fn end(e: &clap::Error) -> ! {
     let is_incomplete = e.kind() == ErrorKind::MissingRequiredArgument;
     let help = is_incomplete.then(|| "--help shows usage and examples".to_owned());
     let failure = Failure::usage(e).maybe_hint(help);
-    Printer::plain().failure(&failure);
+    Printer::default().failure(&failure);
     std::process::exit(failure.code().into())
 }
 

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::io::{ErrorKind, IsTerminal, Write};
 
 /// Where results and remarks go.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Printer {
     quiet: bool,
     verbose: bool,
@@ -28,16 +28,6 @@ impl Printer {
             quiet: common.quiet,
             verbose: common.verbose,
             color,
-            muted: false,
-        }
-    }
-
-    /// For what is wrong before the flags are read.
-    pub(crate) const fn plain() -> Self {
-        Self {
-            quiet: false,
-            verbose: false,
-            color: false,
             muted: false,
         }
     }

@@ -468,21 +468,21 @@ pub(crate) fn claim_result<'a>(
     output: &Path,
     inputs: impl IntoIterator<Item = &'a Path>,
     kind: Written,
-    existing: Existing,
+    force: bool,
 ) -> Result<Claim, Failure> {
     let claim = claim_file(output, inputs)?;
-    replaceable(output, kind.found(output), existing)?;
+    replaceable(output, kind.found(output), force)?;
     Ok(claim)
 }
 
-fn replaceable(path: &Path, found: Found, existing: Existing) -> Result<(), Failure> {
+fn replaceable(path: &Path, found: Found, force: bool) -> Result<(), Failure> {
     match found {
         Found::Foreign => {
             let why = "is not of this command: it is not replaced";
             let error = refused(path, why).or(help::OUTPUT);
             Err(error.or_hint("move it away"))
         }
-        Found::Other(why) if existing == Existing::Keep => Err(refused(path, why).or(help::FORCE)),
+        Found::Other(why) if !force => Err(refused(path, why).or(help::FORCE)),
         Found::Other(_) | Found::Same => Ok(()),
     }
 }
@@ -503,15 +503,6 @@ fn guard_inputs<'a>(
     }
 }
 
-/// Rule for a result that is there already.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Existing {
-    /// It stays, unless what takes its place is of the same kind or run.
-    Keep,
-    /// Another takes its place.
-    Replace,
-}
-
 /// Claims a directory before the work whose results are to be written there: none of `files` is an input, the
 /// directory is new, empty, or of this command, and what it holds is the same or to be replaced. Nothing is left: a
 /// command that is interrupted leaves no trace.
@@ -524,7 +515,7 @@ pub(crate) fn claim_directory<'a>(
     directory: &Path,
     files: &[impl AsRef<str>],
     inputs: impl Iterator<Item = &'a Path> + Clone,
-    existing: Existing,
+    force: bool,
     recognise: impl FnOnce(&str) -> Found,
 ) -> Result<Claim, Failure> {
     for name in files {
@@ -541,7 +532,7 @@ pub(crate) fn claim_directory<'a>(
         Err(_) => empty_or_new(directory),
         Ok(text) => recognise(&text),
     };
-    replaceable(directory, found, existing)?;
+    replaceable(directory, found, force)?;
     Ok(claim)
 }
 

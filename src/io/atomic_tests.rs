@@ -37,7 +37,7 @@ fn what_killed_writers_left_goes_with_the_next_claim() {
             &dir.path().join("run"),
             &["b.csv"],
             std::iter::empty(),
-            Existing::Keep,
+            false,
             |_| Found::Same,
         ),
     );
@@ -197,8 +197,8 @@ fn a_manifest_stands_beside_its_own_files_only() {
     assert!(out.commit().is_err());
     assert_eq!(listing(dir.path()), ["a.csv", "b.csv"]);
     let claim = || {
-        let (inputs, keep) = (std::iter::empty(), Existing::Keep);
-        claim_directory(dir.path(), &["manifest.json"], inputs, keep, |_| {
+        let (inputs, force) = (std::iter::empty(), false);
+        claim_directory(dir.path(), &["manifest.json"], inputs, force, |_| {
             Found::Same
         })
     };

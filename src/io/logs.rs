@@ -1,7 +1,7 @@
 //! Logs of robots, flight controllers and receivers ([`nav_sim_logs`]), among the files that are read.
 
 use super::{Failure, Place, help};
-use nav_sim_logs::{Damage, Error, HEAD, Kind, Log, Stamp, recognise};
+use nav_sim_logs::{Damage, Error, Fault, HEAD, Kind, Log, Stamp, recognise};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -44,7 +44,7 @@ pub(crate) fn refused(path: &Path, error: Error) -> Failure {
         Error::SeveralTopics { .. } | Error::NoTopic { .. } => {
             Failure::contents(shown, Place::Within, error.to_string()).or(help::TOPIC)
         }
-        Error::TimeBack { .. } => {
+        Error::At(_, Fault::TimeBack { .. }) => {
             Failure::contents(shown, Place::Within, error.to_string()).or(help::STAMP)
         }
         Error::NotRead(_) => {

@@ -2,7 +2,7 @@
 
 use crate::bytes::{Bytes, text};
 use crate::container::{Definition, Dialect, Head, Record, Tally};
-use crate::error::{Error, Place};
+use crate::error::{Error, Fault};
 use crate::input::Input;
 use crate::sample::NS;
 use crate::unpack::Chunk;
@@ -85,9 +85,7 @@ impl Dialect for Bag {
     fn finish(&self, input: &Input) -> Result<(), Error> {
         let [stated, found] = self.chunks;
         if self.index == 0 || self.index > input.length() || found < stated {
-            return Err(Error::StillWritten {
-                place: Place::byte(input.offset()),
-            });
+            return Err(Error::at(input.offset(), Fault::StillWritten));
         }
         Ok(())
     }

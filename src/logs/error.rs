@@ -12,15 +12,6 @@ pub struct Place {
     pub topic: Option<String>,
 }
 
-impl Place {
-    pub(crate) const fn byte(offset: u64) -> Self {
-        Self {
-            offset,
-            topic: None,
-        }
-    }
-}
-
 impl Display for Place {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         write!(f, "byte {}", self.offset)?;
@@ -37,46 +28,9 @@ pub enum Error {
     /// The operating system refused.
     #[error("{0}")]
     Io(#[from] std::io::Error),
-    /// A record goes beyond the end of the file.
-    #[error("{place}: cut off, a record of {needed} bytes has {left}")]
-    #[expect(missing_docs, reason = "bytes, as the message says")]
-    Truncated {
-        place: Place,
-        needed: u64,
-        left: u64,
-    },
-    /// The file lacks the end that its writer puts there last.
-    #[error("{place}: the end is missing: still being written, or its writer was stopped")]
-    #[expect(missing_docs, reason = "the place of the end")]
-    StillWritten { place: Place },
-    /// A checksum differs.
-    #[error("{place}: CRC failed, stored {stored:08x}, computed {computed:08x}")]
-    #[expect(missing_docs, reason = "checksums, as the message says")]
-    Crc {
-        place: Place,
-        stored: u32,
-        computed: u32,
-    },
-    /// An encoding or a compression that is not known.
-    #[error("{place}: unknown encoding {encoding:?}")]
-    #[expect(missing_docs, reason = "its name in the file")]
-    Encoding { place: Place, encoding: String },
-    /// A length beyond what any such message has.
-    #[error("{place}: {bytes} bytes where at most {limit} make sense")]
-    #[expect(missing_docs, reason = "bytes, as the message says")]
-    TooLarge {
-        place: Place,
-        bytes: u64,
-        limit: u64,
-    },
-    /// Stamps of a topic run backwards.
-    #[error("{place}: time goes back from {} s to {} s", seconds(*.from_ns), seconds(*.to_ns))]
-    #[expect(missing_docs, reason = "stamps, as the message says")]
-    TimeBack {
-        place: Place,
-        from_ns: i64,
-        to_ns: i64,
-    },
+    /// Bytes at a place are at fault.
+    #[error("{0}: {1}")]
+    At(Place, Fault),
     /// Several topics could be meant.
     #[error("{} topics have {what}: {}", .topics.len(), .topics.join(", "))]
     #[expect(missing_docs, reason = "the choice")]
@@ -88,10 +42,6 @@ pub enum Error {
     #[error("no topic has {what}{}", in_place_of(.topics))]
     #[expect(missing_docs, reason = "the topics that are there instead")]
     NoTopic { what: String, topics: Vec<String> },
-    /// Bytes that do not follow the format.
-    #[error("{place}: {what}")]
-    #[expect(missing_docs, reason = "the fault")]
-    Malformed { place: Place, what: String },
     /// A format that is known by its first bytes, and is not read.
     #[error("{}, which is not read", .0.name())]
     NotRead(Kind),
@@ -100,55 +50,60 @@ pub enum Error {
     Unknown,
 }
 
+/// Faults of bytes.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
+pub enum Fault {
+    /// A record goes beyond the end of the file.
+    #[error("cut off, a record of {needed} bytes has {left}")]
+    Truncated { needed: u64, left: u64 },
+    /// The file lacks the end that its writer puts there last.
+    #[error("the end is missing: still being written, or its writer was stopped")]
+    StillWritten,
+    /// A checksum differs.
+    #[error("CRC failed, stored {stored:08x}, computed {computed:08x}")]
+    Crc { stored: u32, computed: u32 },
+    /// An encoding or a compression that is not known.
+    #[error("unknown encoding {0:?}")]
+    Encoding(String),
+    /// A length beyond what any such message has.
+    #[error("{bytes} bytes where at most {limit} make sense")]
+    TooLarge { bytes: u64, limit: u64 },
+    /// Stamps of a topic run backwards.
+    #[error("time goes back from {} s to {} s", seconds(*.from_ns), seconds(*.to_ns))]
+    TimeBack { from_ns: i64, to_ns: i64 },
+    /// Bytes that do not follow the format.
+    #[error("{0}")]
+    Malformed(String),
+}
+
 impl Error {
+    pub(crate) const fn at(offset: u64, fault: Fault) -> Self {
+        let topic = None;
+        Self::At(Place { offset, topic }, fault)
+    }
+
     pub(crate) fn malformed(offset: u64, what: impl Into<String>) -> Self {
-        Self::Malformed {
-            place: Place::byte(offset),
-            what: what.into(),
-        }
+        Self::at(offset, Fault::Malformed(what.into()))
     }
 
     pub(crate) fn encoding(offset: u64, encoding: &[u8]) -> Self {
         let encoding = String::from_utf8_lossy(encoding).into_owned();
-        Self::Encoding {
-            place: Place::byte(offset),
-            encoding,
-        }
-    }
-
-    /// Place of the fault, where it has one.
-    #[must_use]
-    pub const fn place(&self) -> Option<&Place> {
-        match self {
-            Self::Truncated { place, .. }
-            | Self::StillWritten { place }
-            | Self::Crc { place, .. }
-            | Self::Encoding { place, .. }
-            | Self::TooLarge { place, .. }
-            | Self::TimeBack { place, .. }
-            | Self::Malformed { place, .. } => Some(place),
-            _ => None,
-        }
+        Self::at(offset, Fault::Encoding(encoding))
     }
 
     /// Byte at which a file ends that its writer did not end.
     pub(crate) const fn cut(&self) -> Option<u64> {
         match self {
-            Self::Truncated { place, .. } | Self::StillWritten { place } => Some(place.offset),
+            Self::At(place, Fault::Truncated { .. } | Fault::StillWritten) => Some(place.offset),
             _ => None,
         }
     }
 
     /// The same, said of a topic.
     pub(crate) fn of_topic(mut self, name: &str) -> Self {
-        if let Self::Truncated { place, .. }
-        | Self::StillWritten { place }
-        | Self::Crc { place, .. }
-        | Self::Encoding { place, .. }
-        | Self::TooLarge { place, .. }
-        | Self::TimeBack { place, .. }
-        | Self::Malformed { place, .. } = &mut self
-        {
+        if let Self::At(place, _) = &mut self {
             place.topic.get_or_insert_with(|| name.to_owned());
         }
         self
@@ -158,13 +113,11 @@ impl Error {
     #[must_use]
     pub const fn hint(&self) -> Option<&'static str> {
         match self {
-            Self::Truncated { .. }
-            | Self::StillWritten { .. }
-            | Self::Crc { .. }
-            | Self::Malformed { .. } => Some("the file is damaged: copy it again"),
-            Self::TimeBack { .. } => {
+            Self::At(_, Fault::TimeBack { .. }) => {
                 Some("the stamps of the log may be in order where those of the header are not")
             }
+            Self::At(_, Fault::Encoding(_) | Fault::TooLarge { .. }) => None,
+            Self::At(..) => Some("the file is damaged: copy it again"),
             Self::SeveralTopics { .. } => Some("name one of them"),
             Self::NotRead(kind) => kind.conversion(),
             _ => None,

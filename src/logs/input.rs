@@ -1,6 +1,6 @@
 //! Bytes of a log, with their offsets.
 
-use crate::error::{Error, Place};
+use crate::error::{Error, Fault};
 use std::fs::File;
 use std::io::{self, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::PathBuf;
@@ -104,14 +104,7 @@ impl Input {
             return Ok(());
         }
         match self.within {
-            Within::File => {
-                let place = Place::byte(self.position);
-                Err(Error::Truncated {
-                    place,
-                    needed,
-                    left,
-                })
-            }
+            Within::File => Err(Error::at(self.position, Fault::Truncated { needed, left })),
             Within::Chunk(offset) => {
                 Err(Error::malformed(offset, "a record goes beyond its chunk"))
             }
@@ -170,12 +163,8 @@ impl Input {
     pub(crate) fn bytes(&mut self, count: u64, limit: u64) -> Result<Vec<u8>, Error> {
         self.expect(count)?;
         if count > limit {
-            let place = Place::byte(self.offset());
-            return Err(Error::TooLarge {
-                place,
-                bytes: count,
-                limit,
-            });
+            let bytes = count;
+            return Err(Error::at(self.offset(), Fault::TooLarge { bytes, limit }));
         }
         let mut bytes = vec![0; count as usize];
         self.fill(&mut bytes)?;

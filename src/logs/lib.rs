@@ -62,7 +62,7 @@ mod ulog;
 mod log;
 
 pub use channel::{Channel, Content};
-pub use error::{Error, Place};
+pub use error::{Error, Fault, Place};
 pub use log::Log;
 pub use recognise::{HEAD, Kind, recognise};
 pub use sample::{Clock, Fix, ImuSample, Motion, Stamp};

@@ -2,7 +2,7 @@
 
 use crate::bytes::{Bytes, text};
 use crate::container::{Definition, Dialect, Head, Record, Tally};
-use crate::error::{Error, Place};
+use crate::error::{Error, Fault};
 use crate::input::Input;
 use crate::unpack::Chunk;
 use std::collections::HashMap;
@@ -79,9 +79,7 @@ impl Dialect for Mcap {
         if self.has_footer {
             Ok(())
         } else {
-            Err(Error::StillWritten {
-                place: Place::byte(input.offset()),
-            })
+            Err(Error::at(input.offset(), Fault::StillWritten))
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Arrays in NumPy's own format, `.npy` (`numpy.lib.format`).
 
 use crate::bytes::{Alignment, Bytes, Number, Order};
-use crate::error::{Error, Place};
+use crate::error::{Error, Fault};
 use crate::input::Origin;
 use std::io::{self, Read};
 use std::path::Path;
@@ -41,11 +41,10 @@ pub fn read(path: &Path) -> Result<Array, Error> {
 /// Reads an array that has so many bytes with its header.
 pub(crate) fn read_from(from: &mut impl Read, size: u64, offset: u64) -> Result<Array, Error> {
     let fault = |error: io::Error| match error.kind() {
-        io::ErrorKind::UnexpectedEof => Error::Truncated {
-            place: Place::byte(offset),
-            needed: size + 1,
-            left: size,
-        },
+        io::ErrorKind::UnexpectedEof => {
+            let (needed, left) = (size + 1, size);
+            Error::at(offset, Fault::Truncated { needed, left })
+        }
         _ => Error::malformed(offset, format!("not a NumPy array: {error}")),
     };
     let (text, header_bytes) = header_text(from).map_err(fault)?;
@@ -58,12 +57,8 @@ pub(crate) fn read_from(from: &mut impl Read, size: u64, offset: u64) -> Result<
     let left = size.saturating_sub(header_bytes);
     let needed = bytes.map_or(u64::MAX, |bytes| bytes as u64);
     let Some(bytes) = bytes.filter(|_| needed <= left) else {
-        let place = Place::byte(offset + header_bytes);
-        return Err(Error::Truncated {
-            place,
-            needed,
-            left,
-        });
+        let fault = Fault::Truncated { needed, left };
+        return Err(Error::at(offset + header_bytes, fault));
     };
     let mut values = Vec::new();
     let mut block = vec![0; BLOCK * header.number.size()];

@@ -14,7 +14,7 @@
 //! ```
 
 use crate::bytes::{Bytes, text};
-use crate::error::{Error, Place};
+use crate::error::{Error, Fault};
 use crate::input::{Input, Origin};
 use crate::npy::{self, Array};
 use flate2::read::DeflateDecoder;
@@ -78,11 +78,7 @@ impl Archive {
     fn array(&self, entry: &Entry) -> Result<Array, Error> {
         if entry.unpacked > LARGEST_ARRAY {
             let (bytes, limit) = (entry.unpacked, LARGEST_ARRAY);
-            return Err(Error::TooLarge {
-                place: Place::byte(entry.offset),
-                bytes,
-                limit,
-            });
+            return Err(Error::at(entry.offset, Fault::TooLarge { bytes, limit }));
         }
         let mut input = self.origin.open()?;
         let offset = entry.data_offset(&mut input)?;
@@ -110,11 +106,7 @@ fn checked(unpacked: impl Read, entry: &Entry, offset: u64) -> Result<Array, Err
     if stored == computed {
         Ok(array)
     } else {
-        Err(Error::Crc {
-            place: Place::byte(offset),
-            stored,
-            computed,
-        })
+        Err(Error::at(offset, Fault::Crc { stored, computed }))
     }
 }
 
@@ -203,9 +195,7 @@ fn directory(input: &mut Input) -> Result<(u64, u64), Error> {
     let start = length.saturating_sub(END + LONGEST_COMMENT);
     input.seek(start)?;
     let tail = input.bytes(length - start, END + LONGEST_COMMENT)?;
-    let missing = || Error::StillWritten {
-        place: Place::byte(length),
-    };
+    let missing = || Error::at(length, Fault::StillWritten);
     let at = tail
         .windows(4)
         .rposition(|w| w == b"PK\x05\x06")

@@ -1,7 +1,7 @@
 //! Samples of one channel, in order, as they are read.
 
 use crate::channel::Channel;
-use crate::error::{Error, Place};
+use crate::error::{Error, Fault};
 use crate::sample::Stamped;
 
 /// End of a file that was cut off, at which the reading ended.
@@ -87,11 +87,7 @@ impl<T: Stamped> Iterator for Samples<T> {
                 let to_ns = sample.stamp_ns();
                 match self.last_ns.replace(to_ns) {
                     Some(from_ns) if to_ns < from_ns => self
-                        .end(Error::TimeBack {
-                            place: Place::byte(offset),
-                            from_ns,
-                            to_ns,
-                        })
+                        .end(Error::at(offset, Fault::TimeBack { from_ns, to_ns }))
                         .map(Err),
                     _ => Some(Ok(sample)),
                 }

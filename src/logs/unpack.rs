@@ -1,6 +1,6 @@
 //! Chunks and their compressions.
 
-use crate::error::{Error, Place};
+use crate::error::{Error, Fault};
 use crate::input::Input;
 use std::io::{self, Read};
 
@@ -24,12 +24,8 @@ impl Chunk {
     /// Unpacks it: the input stands at its first byte.
     pub(crate) fn open(&self, input: &mut Input) -> Result<Input, Error> {
         if self.unpacked > LARGEST_CHUNK {
-            let place = Place::byte(self.offset);
-            return Err(Error::TooLarge {
-                place,
-                bytes: self.unpacked,
-                limit: LARGEST_CHUNK,
-            });
+            let (bytes, limit) = (self.unpacked, LARGEST_CHUNK);
+            return Err(Error::at(self.offset, Fault::TooLarge { bytes, limit }));
         }
         let packed = input.bytes(self.packed, LARGEST_CHUNK)?;
         let bytes = match self.compression.as_slice() {
@@ -80,11 +76,7 @@ impl Chunk {
         if stored == computed {
             return Ok(());
         }
-        Err(Error::Crc {
-            place: Place::byte(self.offset),
-            stored,
-            computed,
-        })
+        Err(Error::at(self.offset, Fault::Crc { stored, computed }))
     }
 
     #[cfg(not(feature = "mcap"))]

@@ -12,8 +12,6 @@ pub(super) struct Timing {
     pub(super) rate_hz: f64,
     /// The clock's own rate (Hz).
     found_hz: f64,
-    /// The rate of its median step (Hz).
-    step_hz: f64,
     /// First samples of the stretches after a gap, if the file is to be split.
     pub(super) breaks: Vec<usize>,
     /// Samples before which others are missing, and how many, if they are to be kept apart.
@@ -123,15 +121,7 @@ fn doubt(
         let n = timing.breaks.len();
         report.warn(match options.gaps {
             Gaps::Ignore => {
-                // Lost samples lengthen the span, late stamps do not.
-                let is_other = (timing.step_hz / timing.found_hz - 1.0).abs() > DISAGREEING;
-                let rates = if is_other && options.rate_hz.is_none() {
-                    let (span, step) = (six_digits(timing.found_hz), six_digits(timing.step_hz));
-                    format!("; {span} Hz over the whole, {step} Hz by the median step")
-                } else {
-                    String::new()
-                };
-                format!("{n} gaps or duplicates in time ignored, the first in line {first}{rates}")
+                format!("{n} gaps or duplicates in time ignored, the first in line {first}")
             }
             Gaps::Keep => {
                 let lost: usize = timing.holes.iter().map(|(_, lost)| lost).sum();
@@ -306,7 +296,6 @@ impl Clock {
         Ok(Timing {
             rate_hz: given,
             found_hz: found,
-            step_hz: rate(median),
             breaks,
             holes: holes.unwrap_or_default(),
         })

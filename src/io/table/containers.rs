@@ -92,7 +92,7 @@ pub(super) fn npz(
     dictionary: &Dictionary,
     asked: &Asked<'_>,
 ) -> Result<Table, Failure> {
-    use nav_sim_logs::{Error, npz::Archive};
+    use nav_sim_logs::{Error, Fault, npz::Archive};
     /// Name of the array of a single number that states the rate (Hz).
     const RATE: &str = "rate_hz";
     let refused = |e| logs::refused(path, e);
@@ -101,7 +101,7 @@ pub(super) fn npz(
     for name in archive.names() {
         let array = match archive.read(name) {
             // texts and the like are passed over
-            Err(Error::Encoding { .. }) => Array {
+            Err(Error::At(_, Fault::Encoding(_))) => Array {
                 shape: Vec::new(),
                 values: Vec::new(),
             },

@@ -9,7 +9,7 @@
     feature = "npz"
 ))]
 
-use nav_sim_logs::{Content, Error, Log, Stamp, npz};
+use nav_sim_logs::{Content, Error, Fault, Log, Stamp, npz};
 use std::path::PathBuf;
 
 fn bytes(name: &str) -> Vec<u8> {
@@ -149,7 +149,7 @@ fn a_file_without_its_end_is_still_being_written() {
         let log = Log::from_bytes(&all[..*end]).unwrap();
         let error = &log.damage().unwrap().error;
         assert!(
-            matches!(error, Error::StillWritten { place } if place.offset == *end as u64),
+            matches!(error, Error::At(place, Fault::StillWritten) if place.offset == *end as u64),
             "{error}"
         );
     }
@@ -170,7 +170,7 @@ fn a_changed_chunk_fails_its_crc() {
         .filter(|k| &all[*k..k + 8] == frame)
         .collect();
     all[places[11] + 60] ^= 1;
-    assert!(matches!(refused(&all), Error::Crc { .. }));
+    assert!(matches!(refused(&all), Error::At(_, Fault::Crc { .. })));
 }
 
 #[test]
@@ -214,7 +214,7 @@ fn lengths_and_encodings_are_checked_before_anything_is_unpacked() {
     large[at - 12..at - 4].copy_from_slice(&(2_u64 << 30).to_le_bytes());
     let error = refused(&large);
     assert!(
-        matches!(error, Error::TooLarge { bytes, .. } if bytes == 2 << 30),
+        matches!(error, Error::At(_, Fault::TooLarge { bytes, .. }) if bytes == 2 << 30),
         "{error}"
     );
     let mut unknown = all;
@@ -224,7 +224,10 @@ fn lengths_and_encodings_are_checked_before_anything_is_unpacked() {
             .to_string()
             .ends_with("topic /imu: unknown encoding \"zstx\"")
     );
-    assert!(matches!(refused(b"#ROSBAG V1.2\n"), Error::Encoding { .. }));
+    assert!(matches!(
+        refused(b"#ROSBAG V1.2\n"),
+        Error::At(_, Fault::Encoding(_))
+    ));
     // a message of 2 GB in a file that is that long is refused, in a shorter one it is cut off
     let mut bag = bytes("ros1_none.bag");
     let at = bag
@@ -235,7 +238,7 @@ fn lengths_and_encodings_are_checked_before_anything_is_unpacked() {
     bag[size..size + 4].copy_from_slice(&(2_u32 << 30).to_le_bytes());
     let log = Log::from_bytes(bag).unwrap();
     let error = &log.damage().unwrap().error;
-    assert!(matches!(error, Error::Truncated { needed, .. } if *needed == 2 << 30));
+    assert!(matches!(error, Error::At(_, Fault::Truncated { needed, .. }) if *needed == 2 << 30));
 }
 
 #[test]

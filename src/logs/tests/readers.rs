@@ -9,7 +9,9 @@
     feature = "npz"
 ))]
 
-use nav_sim_logs::{Clock, Content, Error, Fix, ImuSample, Kind, Log, Stamp, npz, recognise};
+use nav_sim_logs::{
+    Clock, Content, Error, Fault, Fix, ImuSample, Kind, Log, Stamp, npz, recognise,
+};
 use std::path::PathBuf;
 
 fn path(name: &str) -> PathBuf {
@@ -198,7 +200,7 @@ fn arrays_are_those_that_were_written() {
         assert_eq!(archive.read("flag").unwrap().values, [1.0, 0.0]);
         assert!(matches!(
             archive.read("name").unwrap_err(),
-            Error::Encoding { .. }
+            Error::At(_, Fault::Encoding(_))
         ));
         assert!(matches!(
             archive.read("mag").unwrap_err(),
