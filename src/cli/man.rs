@@ -16,33 +16,23 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut page = Vec::new();
-    let root = super::command();
+    let mut root = super::command();
+    // hands the common flags down
+    root.build();
     let of_command = match &args.command {
         None => root,
-        Some(name) => subcommand(root, name)?,
+        Some(name) => {
+            let names = root.get_subcommands().map(clap::Command::get_name);
+            let known = names.collect::<Vec<_>>().join(", ");
+            let found = root.find_subcommand(name).cloned();
+            let unknown = format!("no command is named \"{name}\"");
+            let found = found.ok_or_else(|| Failure::input(unknown).hint(known))?;
+            found.display_name(format!("nav-sim-{name}"))
+        }
     };
     clap_mangen::Man::new(of_command)
         .render(&mut page)
         .map_err(Failure::could_not)?;
     session.result(String::from_utf8_lossy(&page).trim_end());
     Ok(())
-}
-
-/// A subcommand with the common flags, which clap hands down when it builds.
-fn subcommand(mut root: clap::Command, name: &str) -> Result<clap::Command, Failure> {
-    root.build();
-    let found = root
-        .get_subcommands()
-        .find(|c| c.get_name() == name)
-        .cloned();
-    let known = || {
-        root.get_subcommands()
-            .map(clap::Command::get_name)
-            .collect::<Vec<_>>()
-            .join(", ")
-    };
-    let unknown = || Failure::input(format!("no command is named \"{name}\"")).hint(known());
-    Ok(found
-        .ok_or_else(unknown)?
-        .display_name(format!("nav-sim-{name}")))
 }

@@ -39,8 +39,8 @@ struct Epoch {
 #[derive(Debug, Default)]
 pub(super) struct Log {
     epochs: Vec<Epoch>,
-    /// Midnights before the first sentence, by the dates that are stated.
-    dates: Dates,
+    /// Midnights before the first sentence (Unix s), and how many sentences state them.
+    dates: BTreeMap<i64, usize>,
     /// Positions that are none: no fix, dead reckoning, typed in by hand.
     left_out: usize,
     has_separation: bool,
@@ -126,16 +126,22 @@ impl Log {
                 if field(2) == "A" {
                     epoch.velocity = number(7).map(|knots| horizontal(knots, number(8)));
                 }
-                self.dates.add(date_of_rmc(field(9)).map(|s| s - day_s));
+                self.date(date_of_rmc(field(9)).map(|s| s - day_s));
             }
             "ZDA" => {
                 let date = number(4).zip(number(3)).zip(number(2));
                 let date = date.and_then(|((y, m), d)| midnight(y as i32, m as u32, d as u32));
-                self.dates.add(date.map(|s| s - day_s));
+                self.date(date.map(|s| s - day_s));
             }
             _ => {}
         }
         Ok(())
+    }
+
+    fn date(&mut self, midnight_s: Option<f64>) {
+        if let Some(midnight_s) = midnight_s {
+            *self.dates.entry(midnight_s as i64).or_default() += 1;
+        }
     }
 
     /// The epoch of a time of day: the last one, or a new one, after midnight a day later.
@@ -304,26 +310,6 @@ impl Log {
 
 /// What a receiver is off that counts GPS weeks in ten bits (s).
 const ROLLOVER_S: f64 = 1024.0 * WEEK_S;
-/// Midnights before the first sentence (Unix s) and how many sentences state them.
-#[derive(Debug, Default)]
-struct Dates(BTreeMap<i64, usize>);
-
-impl Dates {
-    fn add(&mut self, midnight_s: Option<f64>) {
-        if let Some(midnight_s) = midnight_s {
-            *self.0.entry(midnight_s as i64).or_default() += 1;
-        }
-    }
-
-    /// The one that most sentences state: before a receiver has found the time, it states any.
-    fn most(&self) -> Option<f64> {
-        self.0
-            .iter()
-            .max_by_key(|(_, count)| **count)
-            .map(|(s, _)| *s as f64)
-    }
-}
-
 /// The clock of a log.
 #[derive(Debug, Default)]
 struct Clock {
@@ -345,14 +331,16 @@ impl Log {
             words: "seconds of the day (UTC)".to_owned(),
             ..Clock::default()
         };
-        let (Some(midnight_s), Some(first), Some(last), Some(imu)) =
-            (self.dates.most(), first, last, imu_s)
+        // before a receiver has found the time, it states any date
+        let midnight = self.dates.iter().max_by_key(|(_, count)| **count);
+        let (Some((midnight_s, _)), Some(first), Some(last), Some(imu)) =
+            (midnight, first, last, imu_s)
         else {
             return day;
         };
         let is_of_day = imu.0 <= last && first <= imu.1;
         for (n, is_rolled) in [(0.0, false), (1.0, true), (2.0, true)] {
-            let midnight_s = midnight_s + n * ROLLOVER_S;
+            let midnight_s = *midnight_s as f64 + n * ROLLOVER_S;
             let found = rtklib::clock((midnight_s + first, midnight_s + last), imu_s);
             match found {
                 Some(clock) if clock.origin_s == 0.0 || !is_of_day && !is_rolled => {

@@ -26,7 +26,7 @@ fn of_columns(
     for ((_, values), place) in columns.into_iter().zip(places) {
         let Some(column) = place else { continue };
         for (line, value) in (1..).zip(values) {
-            table.push(column, value, line, dictionary)?;
+            table.push(column, value, None, line, dictionary)?;
         }
     }
     Ok(table)
@@ -182,7 +182,7 @@ pub(super) fn parquet(
                     return Err(Failure::contents(name, Place::Within, message));
                 }
             };
-            table.push(column, value, line, dictionary)?;
+            table.push(column, value, None, line, dictionary)?;
         }
     }
     Ok(table)
@@ -295,7 +295,7 @@ pub(super) fn log(
         let values = [sample.t_s()].into_iter().chain(accel).chain(gyro);
         for (value, place) in values.zip(&places) {
             let Some(column) = *place else { continue };
-            table.push(column, value, row as u64 + 1, dictionary)?;
+            table.push(column, value, None, row as u64 + 1, dictionary)?;
         }
     }
     table.assumptions.push(format!("topic {}", samples.topic()));

@@ -335,19 +335,8 @@ impl Table {
         Ok(())
     }
 
-    /// Appends a number to a column.
+    /// Appends a number to a column; `written`: as the file has it.
     fn push(
-        &mut self,
-        column: usize,
-        value: f64,
-        line: u64,
-        dictionary: &Dictionary,
-    ) -> Result<(), Failure> {
-        self.push_written(column, value, None, line, dictionary)
-    }
-
-    /// Appends a number that is written so to a column.
-    fn push_written(
         &mut self,
         column: usize,
         value: f64,

@@ -234,7 +234,7 @@ impl Head {
                         return Err(table.bad_cell(name, line, &value, reason, dictionary));
                     }
                 };
-                table.push_written(column, value, Some(cell), line, dictionary)?;
+                table.push(column, value, Some(cell), line, dictionary)?;
             }
             table.lines.push(row, line);
             row += 1;

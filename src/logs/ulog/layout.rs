@@ -60,20 +60,18 @@ impl Layout {
         Some(layout)
     }
 
-    /// A field of one number.
-    pub(super) fn one(&self, name: &str) -> Option<Field> {
-        self.fields
-            .get(name)
-            .filter(|field| field.count == 1)
-            .copied()
+    /// A field of so many numbers.
+    fn field(&self, name: &str, count: usize) -> Option<Field> {
+        let field = self.fields.get(name).copied();
+        field.filter(|field| field.count == count)
     }
 
-    /// A field of three numbers.
+    pub(super) fn one(&self, name: &str) -> Option<Field> {
+        self.field(name, 1)
+    }
+
     pub(super) fn three(&self, name: &str) -> Option<Field> {
-        self.fields
-            .get(name)
-            .filter(|field| field.count == 3)
-            .copied()
+        self.field(name, 3)
     }
 
     /// Time of a message (µs in it) (ns).
