@@ -64,7 +64,8 @@ impl<C: Command> Asked<C> {
                 let names = self.request.output_names();
                 let present = |text: &str| serde_json::from_str::<Manifest>(text).ok();
                 let recognise = |text: &str| {
-                    let Some(there) = present(text) else {
+                    let there = present(text).filter(|there| there.name == C::NAME);
+                    let Some(there) = there else {
                         return Found::Foreign;
                     };
                     let is_own = |name: &str| there.outputs.contains_key(name);

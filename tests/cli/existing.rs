@@ -306,24 +306,6 @@ fn a_second_calibration_takes_the_place_of_the_first() {
     );
 }
 
-/// A run whose seed is drawn is another one the next time: the hint says how to make the first one again.
-#[test]
-fn a_run_of_another_seed_is_told_the_first_ones() {
-    let place = place_with(DRIVE, MODEL);
-    let run = "run drive.toml imu.toml --outage none";
-    done(place.path(), &format!("{run} --runs 2 --seed 77"));
-    for (runs, is_same) in [("--runs 2", true), ("--runs 3", false)] {
-        let ran = plain(place.path(), &format!("{run} {runs}"));
-        refused(&ran, "holds the result of another");
-        assert_eq!(
-            ran.stderr.contains("with --seed 77,"),
-            is_same,
-            "{}",
-            ran.stderr
-        );
-    }
-}
-
 /// Two outputs of one name, whatever either is.
 #[test]
 fn two_outputs_of_one_name_are_refused_at_once() {
