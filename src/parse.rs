@@ -49,25 +49,24 @@ pub(crate) fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A time (s): `90`, `90s`, `1.5m` or `1.5min`, `2h`.
+pub(crate) fn seconds(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let units = [("min", 60.0), ("s", 1.0), ("m", 60.0), ("h", 3600.0)];
+    let mut units = units.into_iter();
+    let said = units.find_map(|(name, unit_s)| Some((text.strip_suffix(name)?, unit_s)));
+    let (number, unit_s) = said.unwrap_or((text, 1.0));
+    let expected = |_| "expected a time such as 3000, 50m or 1.5h".to_owned();
+    let number = non_negative(number.trim()).map_err(expected)?;
+    Ok(number * unit_s)
+}
+
 /// Two times (s): `1s:100s`, also without the unit.
 pub(crate) fn seconds_range(text: &str) -> Result<(f64, f64), String> {
-    let seconds = |text: &str| {
-        let text = text.trim();
-        // as results have it
-        let units = [("min", 60.0), ("s", 1.0), ("h", 3600.0)];
-        let said = units
-            .iter()
-            .find_map(|(name, unit_s)| Some((text.strip_suffix(name)?, *unit_s)));
-        let (number, unit_s) = said.unwrap_or((text, 1.0));
-        positive(number.trim()).ok().map(|value| value * unit_s)
-    };
-    match text
-        .split_once(':')
-        .map(|(from, to)| (seconds(from), seconds(to)))
-    {
-        Some((Some(from_s), Some(to_s))) => Ok((from_s, to_s)),
-        _ => Err("expected two times, such as 1s:100s or 1min:2h".into()),
-    }
+    let time = |text| seconds(text).ok().filter(|time| *time > 0.0);
+    let range = text.split_once(':');
+    let range = range.and_then(|(from, to)| time(from).zip(time(to)));
+    range.ok_or_else(|| "expected two times, such as 1s:100s or 1min:2h".into())
 }
 
 /// Numbers between commas.

@@ -13,7 +13,9 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::{Map, Value, json};
+use std::fmt::Display;
 use std::path::Path;
+use std::str::FromStr;
 
 /// Name of the file that a model is in, where it is in none.
 const IN_MEMORY: &str = "model";
@@ -21,6 +23,11 @@ const IN_MEMORY: &str = "model";
 fn read(py: Python<'_>, text: &str, path: Option<&str>) -> PyResult<ModelFile> {
     let path = Path::new(path.unwrap_or(IN_MEMORY));
     model_file::from_text(path, text).map_err(|e| error::of_failure(py, &e, ""))
+}
+
+fn parsed<T: FromStr<Err: Display>>(py: Python<'_>, argument: &str, word: &str) -> PyResult<T> {
+    let refused = |e| error::refused(py, &format!("{argument}: {e}"));
+    word.parse().map_err(refused)
 }
 
 /// What a model file holds, as JSON: `rate_hz`, and for each channel the list of its processes.
@@ -129,10 +136,7 @@ pub(crate) fn model_practical(
     to_s: f64,
 ) -> PyResult<String> {
     let file = read(py, text, None)?;
-    let refused = |message: String| error::refused(py, &message);
-    let policy: Policy = policy
-        .parse()
-        .map_err(|e| refused(format!("policy: {e}")))?;
+    let policy: Policy = parsed(py, "policy", policy)?;
     let mut sensors = Map::new();
     for sensor in Sensor::ALL {
         let present = Channel::ALL
@@ -150,7 +154,8 @@ pub(crate) fn model_practical(
             policy,
             LONGEST_S.max(to_s),
         );
-        let found = found.map_err(|e| refused(format!("{}: {e}", sensor.name())))?;
+        let name = sensor.name();
+        let found = found.map_err(|e| error::refused(py, &format!("{name}: {e}")))?;
         sensors.insert(sensor.name().to_owned(), figures(sensor, &found));
     }
     Ok(Value::Object(sensors).to_string())
@@ -169,17 +174,11 @@ pub(crate) fn model_export(
     to_s: f64,
 ) -> PyResult<String> {
     let file = read(py, text, None)?;
-    let refused = |message: String| error::refused(py, &message);
-    let target: Target = target
-        .parse()
-        .map_err(|e| refused(format!("target: {e}")))?;
-    let policy: Policy = policy
-        .parse()
-        .map_err(|e| refused(format!("policy: {e}")))?;
+    let target: Target = parsed(py, "target", target)?;
+    let policy: Policy = parsed(py, "policy", policy)?;
     let export = exported(&file, target, policy, Horizon { from_s, to_s });
-    Ok(export
-        .map_err(|e| refused(format!("{name}: {e}")))?
-        .text(name))
+    let export = export.map_err(|e| error::refused(py, &format!("{name}: {e}")))?;
+    Ok(export.text(name))
 }
 
 /// Longest averaging time at which a minimum of the Allan deviation is believed (s).

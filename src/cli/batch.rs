@@ -3,6 +3,7 @@
 use super::{Failure, Session, drive};
 use crate::app::{Answer, Context, Front};
 use crate::commands::batch::{BatchRequest, Outcome};
+use crate::parse;
 use crate::report::{WIDTH, json as to_json};
 use nav_sim_document::Note;
 use serde_json::json;
@@ -16,21 +17,8 @@ pub(crate) struct Args {
     #[command(flatten)]
     request: BatchRequest,
     /// Stop after this time (exit code 75; 1 if nothing was finished): seconds, or with s, m, h
-    #[arg(long, value_name = "TIME", value_parser = time)]
-    time_limit: Option<Duration>,
-}
-
-/// `90`, `90s`, `1.5m`, `2h`.
-fn time(text: &str) -> Result<Duration, String> {
-    let (number, unit) = match text.char_indices().last() {
-        Some((i, 's')) => (&text[..i], 1.0),
-        Some((i, 'm')) => (&text[..i], 60.0),
-        Some((i, 'h')) => (&text[..i], 3600.0),
-        _ => (text, 1.0),
-    };
-    let seconds = number.parse::<f64>().ok().map(|x| x * unit);
-    let time = seconds.and_then(|s| Duration::try_from_secs_f64(s).ok());
-    time.ok_or_else(|| "expected a time such as 3000, 50m or 1.5h".to_owned())
+    #[arg(long, value_name = "TIME", value_parser = parse::seconds)]
+    time_limit: Option<f64>,
 }
 
 /// A session that stops at a signal or a time.
@@ -81,6 +69,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         interrupted: flag(SIGINT)?,
         deadline: args
             .time_limit
+            .and_then(|limit| Duration::try_from_secs_f64(limit).ok())
             .and_then(|limit| Instant::now().checked_add(limit)),
     };
     let mut request = args.request.clone();
