@@ -7,35 +7,8 @@ use nav_sim_navigation::trajectory::plausibility::VelocityMisfit;
 use nav_sim_signal::units::DEG;
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Longest step between rows that is not doubted (s).
-const LONG_STEP_S: f64 = 1.0 + 1e-6;
 /// Instants at which path and attitude are compared: more tell no more.
 const LOOKS: usize = 2000;
-
-/// Long steps, where the curve between rows is a guess, and gaps.
-pub(super) fn steps(rows: &mut Rows) {
-    let time = |i: usize| rows.samples[i].t_s;
-    let mut steps: Vec<(f64, usize)> = (1..rows.samples.len())
-        .map(|i| (time(i) - time(i - 1), i))
-        .collect();
-    steps.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((&(median, _), &(longest, i))) = steps.get(steps.len() / 2).zip(steps.last()) else {
-        return;
-    };
-    if longest > LONG_STEP_S.max(1.5 * median) {
-        let message = format!(
-            "gap of {longest:.3} s before {} s: the path in it is a guess",
-            time(i)
-        );
-        rows.doubt(Some(rows.lines[i]), message);
-    }
-    if median > LONG_STEP_S {
-        rows.doubt(
-            None,
-            format!("rows are {median} s apart: the path between is a guess"),
-        );
-    }
-}
 
 /// The path against the other columns.
 pub(super) fn of_trajectory(rows: &mut Rows, trajectory: &Trajectory) {

@@ -12,6 +12,8 @@ use nav_sim_navigation::trajectory::{self, Trajectory, TrajectorySample};
 use nav_sim_signal::units::DEG;
 use std::f64::consts::TAU;
 
+/// Longest step between rows that is not doubted (s).
+const LONG_STEP_S: f64 = 1.0 + 1e-6;
 /// Positions faster than this from one row to the next are no motion (m/s).
 const MAX_SPEED: f64 = 8000.0;
 /// Heights at which the gravity model means something (m).
@@ -118,7 +120,6 @@ impl Rows {
     pub(super) fn trajectory(mut self) -> Result<(Trajectory, Vec<String>), Error> {
         self.check_heights()?;
         self.check_steps()?;
-        doubts::steps(&mut self);
         self.check_jumps()?;
         if self.attitude == Attitude::OfPath {
             self.through(&self.samples)?; // times increase, positions are on the Earth
@@ -155,34 +156,37 @@ impl Rows {
     }
 
     /// Rows a minute apart are no trajectory of a vehicle, their time is in milliseconds; and one time stamp
-    /// that is far off makes no trajectory of years.
-    fn check_steps(&self) -> Result<(), Error> {
-        let step = |i: usize| self.samples[i].t_s - self.samples[i - 1].t_s;
+    /// that is far off makes no trajectory of years. In long steps the curve between rows is a guess.
+    fn check_steps(&mut self) -> Result<(), Error> {
+        let time = |i: usize| self.samples[i].t_s;
+        let step = |i: &usize| time(*i) - time(*i - 1);
         let mut order: Vec<usize> = (1..self.samples.len()).collect();
-        order.sort_by(|a, b| step(*a).total_cmp(&step(*b)));
-        let (Some(&middle), Some(&longest)) = (order.get(order.len() / 2), order.last()) else {
+        order.sort_by(|a, b| step(a).total_cmp(&step(b)));
+        let (Some(middle), Some(&longest)) = (order.get(order.len() / 2), order.last()) else {
             return Ok(());
         };
-        if step(middle) >= 50.0 {
-            let message = format!("the rows are {} s apart", step(middle));
-            return Err(self.refuse(
-                1,
-                message,
-                "one row a second at least; is the time in milliseconds (t_ms)?",
-            ));
+        let (median_s, longest_s) = (step(middle), step(&longest));
+        let (previous_s, t_s) = (time(longest - 1), time(longest));
+        if median_s >= 50.0 {
+            let message = format!("the rows are {median_s} s apart");
+            let advice = "one row a second at least; is the time in milliseconds (t_ms)?";
+            return Err(self.refuse(1, message, advice));
         }
-        let duration_s = self.samples[self.samples.len() - 1].t_s - self.samples[0].t_s;
-        if duration_s <= MAX_DURATION_S {
-            return Ok(());
+        if time(self.samples.len() - 1) - time(0) > MAX_DURATION_S {
+            let message =
+                format!("time goes from {previous_s} s to {t_s} s, and may span a day at most");
+            let advice = "is that time stamp damaged, on another clock, or in another unit?";
+            return Err(self.refuse(longest, message, advice));
         }
-        let (previous_s, t_s) = (self.samples[longest - 1].t_s, self.samples[longest].t_s);
-        let message =
-            format!("time goes from {previous_s} s to {t_s} s, and may span a day at most");
-        Err(self.refuse(
-            longest,
-            message,
-            "is that time stamp damaged, on another clock, or in another unit?",
-        ))
+        if longest_s > LONG_STEP_S.max(1.5 * median_s) {
+            let text = format!("gap of {longest_s:.3} s before {t_s} s: the path in it is a guess");
+            self.doubt(Some(self.lines[longest]), text);
+        }
+        if median_s > LONG_STEP_S {
+            let text = format!("rows are {median_s} s apart: the path between is a guess");
+            self.doubt(None, text);
+        }
+        Ok(())
     }
 
     fn refuse(&self, index: usize, message: String, advice: &'static str) -> Error {
