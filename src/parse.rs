@@ -91,3 +91,19 @@ where
 {
     PossibleValuesParser::new(names).try_map(|name| name.parse())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_understood() {
+        let found = ["90", "90s", "1.5m", "2h"].map(|t| seconds(t).unwrap());
+        assert_eq!(found, [90.0, 90.0, 90.0, 7200.0]);
+        assert!(
+            ["", "m", "-1", "1d", "nan"]
+                .iter()
+                .all(|t| seconds(t).is_err())
+        );
+    }
+}

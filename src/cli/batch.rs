@@ -104,19 +104,3 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     outcome.unmet().map_or(Ok(()), Err)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn times_are_understood() {
-        let seconds = ["90", "90s", "1.5m", "2h"].map(|t| time(t).unwrap().as_secs());
-        assert_eq!(seconds, [90, 90, 90, 7200]);
-        assert!(
-            ["", "m", "-1", "1d", "nan"]
-                .iter()
-                .all(|t| time(t).is_err())
-        );
-    }
-}
