@@ -195,7 +195,6 @@ impl Entry {
         let texts = [
             ("figure", Some(figure)),
             ("given", Some(self.quantity.given.clone())),
-            ("became", Some(became(self.figure).to_owned())),
             ("source", self.source.clone()),
             ("quote", self.quote.clone()),
         ];
@@ -203,26 +202,6 @@ impl Entry {
         texts
             .filter_map(|(key, text)| Some((key.to_owned(), text?.into())))
             .collect()
-    }
-}
-
-/// Which assumption turns a figure into parameters.
-const fn became(figure: Figure) -> &'static str {
-    match figure {
-        Figure::Noise => "white noise of this density: sigma2 = N² rate_hz",
-        Figure::Bias => {
-            "Gauss-Markov processes of correlation times T, T/16, T/256, … down to 1 s whose Allan deviation is nowhere \
-             below it from 1.9 times the shortest to 1.9 T"
-        }
-        Figure::CorrelationTime => "the longest correlation time T of these processes: beta = 1/T",
-        Figure::Walk => "a random walk of this density: gamma2 = K² / rate_hz",
-        Figure::TurnOn => "the standard deviation of a constant bias, alike on three axes",
-        Figure::Offset => {
-            "nothing: an initial tolerance, measured and removed before use; it says nothing of the next switching-on"
-        }
-        Figure::Scale => {
-            "nothing: a scale factor is not noise (run --scale-ppm, [imu] scale_ppm of a scenario)"
-        }
     }
 }
 
