@@ -193,16 +193,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Err(Failure::stopped("cells are in work elsewhere")
             .hint("the same command goes on where it was"));
     };
-    let found = found
-        .comparisons
-        .into_iter()
-        .next()
-        .map(|(_, comparison)| comparison);
+    let found = found.comparisons.into_iter().next();
     let found = found.ok_or_else(|| Failure::could_not("there is nothing to compare"))?;
-    let found = Comparison {
-        cause: "contamination costs".to_owned(),
-        ..found
-    };
     drive::tell(
         &found.document(),
         &found.document().terminal(WIDTH),

@@ -144,6 +144,7 @@ impl Table {
     /// title and a key of the entry: `p95_m`, or `../../hours` of what holds it. After `|` stands the text where the
     /// value is missing, else `–`; a key of braces, `{start_s}–{end_s} s`, is a text with values in it. A key with `*`
     /// makes a column for each of the list, with a title from its entries: `("RMSE {after_s} s", "ends/*/rmse_m")`.
+    /// `.` is the entry itself, `@` its name, such as in `../../asee_end/@`.
     ///
     /// ```
     /// use nav_sim_document::Table;
@@ -204,9 +205,12 @@ fn places(json: &Value, path: &str) -> Vec<String> {
 /// The place of a key beside or above another.
 fn resolved(place: &str, key: &str) -> String {
     let mut parts: Vec<&str> = place.split('/').collect();
+    let name = parts.last().copied().unwrap_or_default();
     for part in key.split('/') {
         match part {
+            "." => {}
             ".." => _ = parts.pop(),
+            "@" => parts.push(name),
             part => parts.push(part),
         }
     }
@@ -216,6 +220,9 @@ fn resolved(place: &str, key: &str) -> String {
 fn cell(json: &Value, place: &str, key: &str) -> Cell {
     if key.contains('{') {
         return filled(key, json, place).into();
+    }
+    if key == "@" {
+        return place.rsplit('/').next().unwrap_or_default().into();
     }
     let (key, missing) = key.split_once('|').unwrap_or((key, "–"));
     let pointer = resolved(place, key);

@@ -65,7 +65,6 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, Failure> {
         outages,
         independent_windows,
         is_expected,
-        beyond_linear: verdict.beyond_linear,
     };
     Ok(RunDirectory {
         manifest,

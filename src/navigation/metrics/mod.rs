@@ -28,9 +28,7 @@ pub use outage::{
     Accuracy, Budget, EpochMetrics, FAN_LEVELS, FanEpoch, OutageMetrics, Reconvergence, epochs,
     expected_fan, fan, outages,
 };
-pub use ratio::{
-    ComparisonError, EpochRow, Measured, OutageComparison, RatioError, StateRatio, compare,
-};
+pub use ratio::{ComparisonError, EpochRow, Measured, OutageComparison, StateRatio, compare};
 pub use summary::{
     AccuracySummary, AxisReduction, Consistency, Coverage, Met, Nis, OutageSummary, Recovery,
     ReductionQuality, ReductionSummary, Requirement, Spread, Summary, TOLERANCE,

@@ -40,7 +40,6 @@ fn experiment(asee: &[f64], runs: Vec<RunRecord>) -> Measured {
         outages: vec![(1.0, 3.0)],
         independent_windows: None,
         is_expected: false,
-        beyond_linear: None,
     }
 }
 
@@ -57,9 +56,15 @@ fn ratio_errors_are_means_over_the_outage_signed_and_absolute() {
     );
     let result = compare(&candidate, &reference, true).unwrap();
     let state = result[0].states[4];
-    assert!((state.asee.pct - 5.0).abs() < 1e-12, "{state:?}");
-    assert!((state.asee_abs_pct - 15.0).abs() < 1e-12, "{state:?}");
-    assert!((state.rmse_end.pct - 100.0).abs() < 1e-12, "{state:?}");
+    assert!((state.ratio_error_pct - 5.0).abs() < 1e-12, "{state:?}");
+    assert!(
+        (state.abs_ratio_error_pct - 15.0).abs() < 1e-12,
+        "{state:?}"
+    );
+    assert!(
+        (state.rmse_end_ratio_error_pct - 100.0).abs() < 1e-12,
+        "{state:?}"
+    );
 }
 
 /// Epochs are the trajectory's start plus whole seconds, outages are typed: 0.36 + 1 is below 1.36 in a double, and yet
@@ -79,9 +84,7 @@ fn an_epoch_at_a_typed_time_is_on_the_side_of_its_fix() {
             shifted(&[1.2, 1.2, 1.8, 9.0]),
             shifted(&[1.0, 1.0, 2.0, 1.0]),
         );
-        let found = compare(&candidate, &reference, true).unwrap()[0].states[0]
-            .asee
-            .pct;
+        let found = compare(&candidate, &reference, true).unwrap()[0].states[0].ratio_error_pct;
         assert!((found - expected).abs() < 1e-12, "{outage:?}: {found}");
     }
 }
@@ -99,7 +102,6 @@ fn proportional_runs_leave_no_doubt_when_paired_and_some_when_not() {
     );
     let width = |paired| {
         let ci = compare(&candidate, &reference, paired).unwrap()[0].states[0]
-            .asee
             .ci95_pct
             .unwrap();
         ci[1] - ci[0]
@@ -233,8 +235,8 @@ fn runs_that_either_side_lost_are_not_paired() {
     };
     let (c, r) = records(&candidate, &reference, 0, true);
     assert_eq!((c.len(), r.len()), (2, 2));
-    let rmse = compare(&candidate, &reference, true).unwrap()[0].states[0].rmse_end;
-    assert!(rmse.pct.abs() < 1e-12, "{rmse:?}");
+    let rmse = compare(&candidate, &reference, true).unwrap()[0].states[0].rmse_end_ratio_error_pct;
+    assert!(rmse.abs() < 1e-12, "{rmse:?}");
 }
 
 #[test]
@@ -266,7 +268,7 @@ fn what_calibrations_leave_open_widens_the_interval() {
         experiment(&[1.0; 4], runs()),
     );
     let mut outage = compare(&candidate, &reference, true).unwrap().remove(0);
-    let [low, high] = outage.states[3].asee.ci95_pct.unwrap();
+    let [low, high] = outage.states[3].ci95_pct.unwrap();
     let half = 0.5 * (high - low);
     let open = |half: f64| PerState([((-half).exp(), half.exp()); REPORTED]);
     outage.widen(&open(0.3), &open(0.4));
@@ -275,7 +277,7 @@ fn what_calibrations_leave_open_widens_the_interval() {
         half < 1e-9 && (state.calibration_half_pct.unwrap() - 52.5).abs() < 1e-9,
         "{state:?}"
     );
-    let [low, high] = state.asee.ci95_pct.unwrap();
+    let [low, high] = state.ci95_pct.unwrap();
     assert!(
         (low + 47.5).abs() < 1e-9 && (high - 57.5).abs() < 1e-9,
         "{state:?}"
@@ -291,13 +293,13 @@ fn what_calibrations_leave_open_widens_the_interval() {
         outage
             .states
             .iter()
-            .all(|s| s.asee.ci95_pct.is_none() && s.rmse_end.ci95_pct.is_none())
+            .all(|s| s.ci95_pct.is_none() && s.rmse_end_ci95_pct.is_none())
     );
     outage.widen(&open(0.3), &open(0.4));
-    let [low, high] = outage.states[3].asee.ci95_pct.unwrap();
+    let [low, high] = outage.states[3].ci95_pct.unwrap();
     assert!(
         (low + 47.5).abs() < 1e-9 && (high - 57.5).abs() < 1e-9,
         "{outage:?}"
     );
-    assert!(outage.states[3].rmse_end.ci95_pct.is_none());
+    assert!(outage.states[3].rmse_end_ci95_pct.is_none());
 }
