@@ -20,7 +20,7 @@ use given::GivenImu;
 use nav_sim_document::{
     Axis, Cell, Chart, Document, Importance, Panel, Series, readable, seconds, window,
 };
-use nav_sim_navigation::metrics::OutageMetrics;
+use nav_sim_navigation::metrics::OutageSummary;
 use nav_sim_navigation::require::{Limit, Quantity, RequireError, Worst};
 use nav_sim_navigation::sensors::aiding::AidingSettings;
 use nav_sim_navigation::sensors::outage::{NotAnOutage, Outage};
@@ -444,7 +444,7 @@ pub(crate) struct BeyondLinear {
 
 impl BeyondLinear {
     /// None where linear theory covers the outage.
-    pub(super) fn of(outage: &OutageMetrics) -> Option<Self> {
+    pub(super) fn of(outage: &OutageSummary) -> Option<Self> {
         outage.beyond_linear.then_some(Self {
             start_s: outage.start_s,
             end_s: outage.end_s,

@@ -390,7 +390,7 @@ impl Requirements {
         let Some(expected) = Expected::along(&track, &experiment, &belief, model) else {
             return Ok(None);
         };
-        Ok(expected.outages.first().and_then(BeyondLinear::of))
+        Ok(expected.summary.outages.first().and_then(BeyondLinear::of))
     }
 
     /// Units after the outage and after those of `CURVE_S`: those whose figures are all stated, the best first, then the others

@@ -359,8 +359,7 @@ impl<'a> Analysis<'a> {
     /// The expected figures; none where the covariance runs away.
     fn expected(&self, belief: &Belief) -> Option<(Vec<EpochMetrics>, Summary)> {
         let expected = Expected::along(self.track, self.experiment, belief, self.model?)?;
-        let summary = expected.summary();
-        Some((expected.epochs, summary))
+        Some((expected.epochs, expected.summary))
     }
 
     /// Quantiles of the horizontal error over time; none where nothing models what makes the errors.

@@ -14,8 +14,6 @@ pub struct EpochRow {
     pub t_s: f64,
     /// ASEE of each reported state.
     pub asee: [f64; REPORTED],
-    /// RMSE of each reported state.
-    pub rmse: [f64; REPORTED],
     /// Mean NEES.
     pub nees: f64,
     /// Share of runs covered.

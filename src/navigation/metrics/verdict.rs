@@ -23,9 +23,10 @@ const DECISIVE: [f64; 2] = [1.25, 1.5];
 const FAR: f64 = 100.0;
 
 /// Verdict on a filter in one word, the gravest last.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum VerdictKind {
     /// Errors are as large as the filter believes; other ones would have been found.
+    #[default]
     Consistent,
     /// No fault was found, by runs too few to find one.
     Undecided,
@@ -58,7 +59,7 @@ pub type StateName = &'static str;
 pub const ALL_STATES: StateName = "all";
 
 /// The verdict on the filter of an experiment.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     /// In one word.
     pub kind: VerdictKind,
@@ -126,7 +127,7 @@ fn state<'de, D: Deserializer<'de>>(value: D) -> Result<&'static str, D::Error> 
 }
 
 /// The verdict on the filter at the end of one outage.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct OutageVerdict {
     /// In one word.
     pub kind: VerdictKind,
