@@ -181,6 +181,30 @@ impl Table {
             keys: 1,
         }
     }
+
+    /// A table of single values of a result: a row is a title and the keys of its cells, as in [`Table::of`], with blanks
+    /// between them. A row of which nothing is known is left out.
+    ///
+    /// ```
+    /// use nav_sim_document::Table;
+    ///
+    /// let result = serde_json::json!({ "nis": { "mean": 5.9, "dof": 6 } });
+    /// let rows = [("NIS ({nis/dof} if right)", "nis/mean"), ("NEES", "nees/mean")];
+    /// assert_eq!(Table::of_keys(&result, &["", "mean"], &rows).csv(), ",mean\nNIS (6 if right),5.90\n");
+    /// ```
+    pub fn of_keys(result: &impl Serialize, head: &[&str], rows: &[(&str, &str)]) -> Self {
+        let json = serde_json::to_value(result).unwrap_or_default();
+        let row = |(title, keys): &(&str, &str)| {
+            let cells: Vec<Cell> = keys.split(' ').map(|key| cell(&json, "", key)).collect();
+            let is_known = cells.iter().any(|cell| cell.text != "–");
+            is_known.then(|| [vec![filled(title, &json, "").into()], cells].concat())
+        };
+        Self {
+            head: head.iter().map(|title| (*title).to_owned()).collect(),
+            rows: rows.iter().filter_map(row).collect(),
+            keys: 1,
+        }
+    }
 }
 
 /// The places that a path with `*` stands for.

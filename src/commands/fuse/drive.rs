@@ -8,9 +8,9 @@ use crate::app::{Context, Input, inputs};
 use crate::app::{Failure, Refuse, Result};
 use crate::commands::run::Reduced;
 use crate::io::fusion_files::{self, read_gnss, read_imu, read_initial, read_wheel};
-use crate::io::model_file::{self, ModelFile};
+use crate::io::model_file::ModelFile;
 use crate::io::trajectory_file::{self, load_reference};
-use nav_sim_document::{Importance, Note, readable, window};
+use nav_sim_document::window;
 use nav_sim_navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
 use nav_sim_navigation::fusion::mounting::{self, Mounted, Mounting, MountingError};
@@ -43,8 +43,6 @@ pub struct FuseAnswer {
     pub summary: FuseSummary,
     /// Reduction of the model to the filter's states, where it loses something.
     pub reduction: Option<ReductionSummary>,
-    /// Remarks on the files and the drive.
-    pub notes: Vec<Note>,
     /// Files by their roles.
     pub(super) inputs: Vec<Input>,
     /// Settings, for the manifest.
@@ -69,7 +67,6 @@ pub(crate) struct Drive {
     expected: InitialSettings,
     initial: Option<Start>,
     reference: Option<Reference>,
-    notes: Vec<Note>,
     configuration: Configuration,
 }
 
@@ -78,7 +75,7 @@ impl Drive {
     ///
     /// # Errors
     /// A setting out of range, a file that cannot be used.
-    pub(crate) fn read(request: &Fuse) -> Result<Self> {
+    pub(crate) fn read(request: &Fuse, context: &Context<'_>) -> Result<Self> {
         let settings = request.settings()?;
         let (unsaid, gnss_sigma_factor) = request.fix_sigma();
         let [position, velocity] = gnss_sigma_factor;
@@ -103,12 +100,12 @@ impl Drive {
             *fix = fix.with_sigmas_times(position, velocity);
             fix.t_s -= request.gnss_delay_s;
         }
-        let mut notes: Vec<Note> = imu
-            .remarks
-            .into_iter()
-            .chain(remarks)
-            .map(note_of)
-            .collect();
+        for remark in imu.remarks.into_iter().chain(remarks) {
+            match remark {
+                fusion_files::Remark::Note(text) => context.remark(text),
+                fusion_files::Remark::Doubt(text) => context.warn(text),
+            }
+        }
         let wheel = request
             .odometer
             .as_deref()
@@ -117,24 +114,19 @@ impl Drive {
             .initial_file()
             .map(|path| read_initial(path))
             .transpose()?;
-        let model = model_file::read(&request.model)?;
-        notes.extend(model.doubts(&request.model).into_iter().map(warning));
+        let model = inputs::model(&request.model, context)?;
         if (model.model.rate_hz / imu.rate_hz - 1.0).abs() > 0.01 {
             let (from, to) = (model.model.rate_hz, imu.rate_hz);
-            let text = format!("the model was converted from {from} Hz to {to:.3} Hz");
-            notes.push(note(Importance::Detail, text));
+            context.detail(format!(
+                "the model was converted from {from} Hz to {to:.3} Hz"
+            ));
         }
         let of_file = initial
             .as_ref()
             .map(|start| start.sigma.clone())
             .unwrap_or_default();
         let mut expected = request.expected(of_file);
-        let stated = inputs::expected_turn_on(&mut expected, &model.turn_on.unwrap_or_default());
-        for (sensor, sigma) in stated {
-            let (sigma, unit) = (readable(sigma), sensor.unit());
-            let text = format!("the model states a turn-on bias: {sigma} {unit} ({sensor})");
-            notes.push(note(Importance::Remark, text));
-        }
+        inputs::expect_turn_on(&mut expected, &model, &request.model, context);
         expected.validate().refuse()?;
         let options = trajectory_file::Options::default();
         let reference = request
@@ -143,7 +135,7 @@ impl Drive {
             .map(|path| load_reference(path, &options))
             .transpose()?;
         let reference = reference.map(|(reference, warnings)| {
-            notes.extend(warnings.iter().map(warning));
+            warnings.iter().for_each(|warning| context.warn(warning));
             reference
         });
         let configuration = Configuration {
@@ -169,7 +161,6 @@ impl Drive {
             expected,
             initial,
             reference,
-            notes,
             configuration,
         })
     }
@@ -178,7 +169,7 @@ impl Drive {
     ///
     /// # Errors
     /// Data and settings that do not fit together, or a filter that diverges.
-    pub(crate) fn fuse(mut self, inputs: Vec<Input>) -> Result<FuseAnswer> {
+    pub(crate) fn fuse(mut self, context: &Context<'_>) -> Result<FuseAnswer> {
         let origin_s = self.common_origin()?;
         let mut recorded = Recorded {
             imu: &self.imu,
@@ -195,7 +186,10 @@ impl Drive {
         };
         let times_s: Vec<f64> = self.gnss.iter().map(|fix| fix.t_s).collect();
         let placed = plan.on(&FixedData::recorded(&times_s), 0)?;
-        self.notes.extend(placed.remarks.into_iter().map(warning));
+        placed
+            .remarks
+            .iter()
+            .for_each(|remark| context.warn(remark));
         settings.outages = placed.windows;
         let mounting = match self.request.mounted() {
             Mounted::AsGiven => None,
@@ -211,11 +205,11 @@ impl Drive {
         let gnss = earlier(recorded.gnss, rest_s);
         recorded.gnss = &gnss;
         let delay_s = self.request.gnss_delay_s + origin_s.unwrap_or(0.0) + rest_s;
-        self.notes.extend(origin_s.map(|_| {
-            warning(format!(
+        if origin_s.is_some() {
+            context.warn(format!(
                 "the clocks had nothing in common: fused with --gnss-delay={delay_s:.2}, from turns and innovations"
-            ))
-        }));
+            ));
+        }
         let Alignment { start, doubts } = match (&self.initial, self.request.given_heading()) {
             (Some(start), _) => Alignment {
                 start: beside_mounting(start.clone(), &settings),
@@ -224,20 +218,16 @@ impl Drive {
             (None, Some(heading)) => towards(&recorded, &settings, &belief, heading)?,
             (None, None) => coarse(&recorded, &settings, &belief)?,
         };
-        let is_early = |outage: &Outage| outage.end_s <= start.t_s;
-        let early = settings
-            .outages
-            .iter()
-            .copied()
-            .filter(is_early)
-            .map(|outage| {
+        settings.outages.retain(|outage| {
+            let is_early = outage.end_s <= start.t_s;
+            if is_early {
                 let span = window(outage.start_s, outage.end_s);
-                warning(format!(
+                context.warn(format!(
                     "outage {span} ends before the start of the solution: it is left out"
-                ))
-            });
-        self.notes.extend(early.collect::<Vec<_>>());
-        settings.outages.retain(|outage| !is_early(outage));
+                ));
+            }
+            !is_early
+        });
         // the start and the mounting are found without: they are what the vehicle's axes come from
         let aiding = self.request.aiding();
         self.check_wheel(&recorded, &settings.outages)?;
@@ -250,8 +240,9 @@ impl Drive {
             let message = "the reference and the solution have no time in common";
             return Err(Failure::input(message).hint("both need one clock"));
         }
-        self.notes
-            .extend(doubt_heading(&weighed.solution, &settings.outages).map(warning));
+        doubt_heading(&weighed.solution, &settings.outages)
+            .iter()
+            .for_each(|doubt| context.warn(doubt));
         let outcome = outcome(&weighed.solution, &settings.outages);
         let Assessment { verdict, findings } = assess(&weighed, &outcome, &doubts);
         let is_correlated = weighed
@@ -289,6 +280,10 @@ impl Drive {
             .filter(|g| g.is_constant())
             .count();
         let [used, withheld, rejected] = outcome.fixes;
+        let rows = &weighed.solution.rows;
+        let squares = rows
+            .iter()
+            .map(|row| row.sigma[0].powi(2) + row.sigma[1].powi(2));
         let summary = FuseSummary {
             schema_version: 1,
             method: "fusion",
@@ -318,6 +313,7 @@ impl Drive {
                 rejected,
             },
             nis_per_component: outcome.nis_per_component,
+            horizontal_sigma_rms_m: (squares.sum::<f64>() / rows.len() as f64).sqrt(),
             gnss_correlation: FixCorrelation::of(&weighed),
             vehicle: VehicleSummary::of(&weighed.solution, &aiding),
             outages: outcome.outages,
@@ -329,8 +325,7 @@ impl Drive {
             solution: weighed.solution,
             summary,
             reduction,
-            notes: self.notes,
-            inputs,
+            inputs: context.inputs().to_vec(),
             configuration: self.configuration,
         })
     }
@@ -408,22 +403,6 @@ impl Drive {
         });
         clocks.delay_s += self.request.gnss_delay_s;
         Failure::input(e).hint(document::apart(&clocks))
-    }
-}
-
-fn note(importance: Importance, text: impl ToString) -> Note {
-    let text = text.to_string();
-    Note { importance, text }
-}
-
-fn warning(text: impl ToString) -> Note {
-    note(Importance::Warning, text)
-}
-
-fn note_of(remark: fusion_files::Remark) -> Note {
-    match remark {
-        fusion_files::Remark::Note(text) => note(Importance::Remark, text),
-        fusion_files::Remark::Doubt(text) => warning(text),
     }
 }
 

@@ -47,8 +47,7 @@ impl Command for Fuse {
     }
 
     fn run(&self, context: &Context<'_>) -> Result<FuseAnswer> {
-        let inputs = context.inputs().to_vec();
-        Drive::read(self)?.fuse(inputs)
+        Drive::read(self, context)?.fuse(context)
     }
 }
 

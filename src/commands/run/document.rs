@@ -189,21 +189,22 @@ fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
 }
 
 fn consistency(answer: &RunAnswer) -> Table {
-    let columns = [
-        ("NEES (9 if right)", "nees/mean"),
-        ("95 % from", "nees/lower95"),
-        ("to", "nees/upper95"),
-        ("epochs inside", "nees/fraction_inside"),
-        ("NIS", "nis/mean"),
-        ("if right", "nis/dof"),
-        ("95 % from", "nis/lower95"),
-        ("to", "nis/upper95"),
-        ("coverage (0.95 if right)", "coverage/mean"),
-        ("95 % from", "coverage/lower95"),
-        ("to", "coverage/upper95"),
-        ("epochs inside", "coverage/fraction_inside"),
+    let head = ["", "mean", "95 % from", "to", "epochs inside"];
+    let rows = [
+        (
+            "NEES ({nees/dof} if right)",
+            "nees/mean nees/lower95 nees/upper95 nees/fraction_inside",
+        ),
+        (
+            "NIS of {nis/fixes} fixes ({nis/dof} if right)",
+            "nis/mean nis/lower95 nis/upper95 nis/inside",
+        ),
+        (
+            "coverage ({coverage/level} if right)",
+            "coverage/mean coverage/lower95 coverage/upper95 coverage/fraction_inside",
+        ),
     ];
-    Table::of(answer, "", &columns).without_unknown()
+    Table::of_keys(answer, &head, &rows).without_unknown()
 }
 
 fn provenance(answer: &RunAnswer, page: &mut Document) {
