@@ -6,7 +6,7 @@ use super::summary::{
 use super::{Configuration, Fuse, document};
 use crate::app::{Context, Input, inputs};
 use crate::app::{Failure, Refuse, Result};
-use crate::commands::run::Reduced;
+use crate::commands::run::reduction_of;
 use crate::io::fusion_files::{self, read_gnss, read_imu, read_initial, read_wheel};
 use crate::io::model_file::ModelFile;
 use crate::io::trajectory_file::{self, load_reference};
@@ -541,17 +541,10 @@ pub(super) fn belief(
     let full = full
         .ok()
         .map(|full| full.with_initial(&beside(states, initial)));
-    let reduced = Reduced {
-        model: &model,
-        belief: &belief,
-        full,
-        track: &track,
-        interval_s,
-        window_s,
-    };
-    let summary = reduced
-        .summary(&Context::default())
-        .map_err(Failure::could_not)?;
+    let made = (&model, &belief, full.as_ref());
+    let scales_s = [interval_s, window_s];
+    let summary = reduction_of(made, &track, scales_s, &Context::default());
+    let summary = summary.map_err(Failure::could_not)?;
     Ok((belief, Some(summary)))
 }
 

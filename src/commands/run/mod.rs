@@ -4,7 +4,7 @@ pub(crate) mod directory;
 mod document;
 mod navigate;
 
-pub(crate) use navigate::Reduced;
+pub(crate) use navigate::reduction_of;
 pub use navigate::{NavigateError, NavigateInputs, Navigation, TrueImu, navigate};
 
 use crate::app::inputs::{self, FilterArgs, SettingsArgs, files};
