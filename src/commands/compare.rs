@@ -501,9 +501,7 @@ impl Comparison {
             }
         };
         let panels = self.states.iter().map(panel).collect();
-        Chart::new(title, Axis::linear("time (s)"), panels)
-            .with_outages(&self.outages)
-            .in_group("time")
+        Chart::over_time(title, panels, &self.outages)
     }
 
     /// A row a run and outage, as they stand in comparison.json.

@@ -6,7 +6,6 @@ use crate::report::TrajectoryCheck;
 use nav_sim_navigation::closure::{Bounds, Closure};
 use nav_sim_navigation::earth::GravityModel;
 use nav_sim_navigation::trajectory::plausibility::{Limits, examine};
-use nav_sim_signal::units::DEG;
 
 /// Check a trajectory: could a vehicle move so, and does navigation close on it?
 ///
@@ -56,16 +55,10 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         found,
         &trajectory,
         (largest, &beyond),
+        &args.limits(),
         (closure, args.bounds()),
     );
-    let Limits {
-        speed,
-        acceleration,
-        jerk,
-        rate,
-    } = args.limits();
-    let limits = [speed, acceleration, jerk, rate / DEG];
-    session.show(|| crate::report::json(&check), || check.text(limits));
+    session.show(|| crate::report::json(&check), || check.text());
     match check.missed() {
         Some(missed) => Err(Failure::bound(missed).hint(hint(&check))),
         None => Ok(()),

@@ -355,12 +355,6 @@ pub(super) const FIXES: &str = "Of a right filter 95 % of the used fixes are in 
 /// Colour of what is smoothed.
 const SMOOTHED: Colour = Colour::Hue(2);
 
-fn timed(title: &str, panels: Vec<Panel>, outages: &[(f64, f64)]) -> Chart {
-    Chart::new(title, Axis::linear("time (s)"), panels)
-        .with_outages(outages)
-        .in_group("time")
-}
-
 pub(super) fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     let Some(first) = solution.rows.first() else {
         return Chart::map("Track", Vec::new());
@@ -452,7 +446,7 @@ pub(super) fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
         let errors: Vec<_> = errors.collect();
         series.extend((!errors.is_empty()).then(|| Series::line(error, real, errors)));
     }
-    timed(
+    Chart::over_time(
         "Horizontal position",
         vec![Panel::new(Axis::log("horizontal (m)"), series)],
         outages,
@@ -476,7 +470,7 @@ pub(super) fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> 
             series.push(Series::new(stated, believed, Mark::Band(sigma)));
             series.push(Series::line(line, real, rows.iter().map(error).collect()));
         }
-        timed(
+        Chart::over_time(
             name,
             vec![Panel::new(Axis::linear("").with_zero(), series)],
             outages,
@@ -535,7 +529,7 @@ pub(super) fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart 
         .enumerate()
         .map(panel)
         .collect();
-    timed("Innovations of position, normalised", panels, outages)
+    Chart::over_time("Innovations of position, normalised", panels, outages)
 }
 
 pub(super) fn nis(records: &[FixRecord], outages: &[(f64, f64)]) -> Chart {
@@ -551,7 +545,7 @@ pub(super) fn nis(records: &[FixRecord], outages: &[(f64, f64)]) -> Chart {
         Mark::Zone(band.lower, band.upper),
     )];
     series.extend(fixes(records, &|f| f.nis));
-    timed(
+    Chart::over_time(
         "NIS",
         vec![Panel::new(
             Axis::log(&format!("NIS ({dof} if right)")),

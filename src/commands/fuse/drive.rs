@@ -3,7 +3,7 @@
 use super::summary::{
     Cause, FixCorrelation, Fixes, FuseSummary, FuseVerdict, Initial, VehicleSummary,
 };
-use super::{Configuration, Fuse, document};
+use super::{Fuse, document};
 use crate::app::{Context, Input, inputs};
 use crate::app::{Failure, Refuse, Result};
 use crate::commands::run::reduction_of;
@@ -31,6 +31,7 @@ use nav_sim_signal::imu::ImuIncrement;
 use nav_sim_signal::noise::{Composite, Model, Process, continuous, reduction};
 use nav_sim_signal::units::DEG;
 use serde::{Serialize, Serializer};
+use serde_json::{Value, json};
 use std::ops::Range;
 
 /// Solution of a recorded drive.
@@ -46,7 +47,7 @@ pub struct FuseAnswer {
     /// Files by their roles.
     pub(super) inputs: Vec<Input>,
     /// Settings, for the manifest.
-    pub(super) configuration: Configuration,
+    pub(super) configuration: Value,
 }
 
 impl Serialize for FuseAnswer {
@@ -67,7 +68,7 @@ pub(crate) struct Drive {
     expected: InitialSettings,
     initial: Option<Start>,
     reference: Option<Reference>,
-    configuration: Configuration,
+    configuration: Value,
 }
 
 impl Drive {
@@ -79,23 +80,20 @@ impl Drive {
         let settings = request.settings()?;
         let (unsaid, gnss_sigma_factor) = request.fix_sigma();
         let [position, velocity] = gnss_sigma_factor;
-        let topic = request.topic.clone().unwrap_or_default();
-        let imu = read_imu(
-            &request.imu,
-            request.columns.as_deref(),
-            topic.imu.as_deref(),
-        )?;
+        let topic = |k: usize| {
+            request
+                .topic
+                .get(k)
+                .map(String::as_str)
+                .filter(|t| !t.is_empty())
+        };
+        let imu = read_imu(&request.imu, request.columns.as_deref(), topic(0))?;
         let span_s = imu
             .samples
             .first()
             .zip(imu.samples.last())
             .map(|(first, last)| (first.t_s, last.t_s));
-        let (mut gnss, remarks) = read_gnss(
-            &request.gnss,
-            unsaid.as_ref(),
-            span_s,
-            topic.fixes.as_deref(),
-        )?;
+        let (mut gnss, remarks) = read_gnss(&request.gnss, unsaid.as_ref(), span_s, topic(1))?;
         for fix in &mut gnss {
             *fix = fix.with_sigmas_times(position, velocity);
             fix.t_s -= request.gnss_delay_s;
@@ -138,18 +136,21 @@ impl Drive {
             warnings.iter().for_each(|warning| context.warn(warning));
             reference
         });
-        let configuration = Configuration {
-            settings: settings.clone(),
-            mounted: request.mounted(),
-            filter: request.filter,
-            initial: expected.clone(),
-            gnss_sigma: unsaid,
-            gnss_sigma_factor,
-            gnss_correlation: request.gnss_correlation,
-            heading: request.given_heading(),
-            aiding: request.aiding(),
-            gnss_delay_s: request.gnss_delay_s,
-        };
+        let mut configuration = json!({
+            "settings": settings,
+            "mounted": request.mounted(),
+            "filter": request.filter,
+            "initial": expected,
+            "gnss_sigma": unsaid,
+            "gnss_sigma_factor": gnss_sigma_factor,
+            "gnss_correlation": request.gnss_correlation,
+            "heading": request.given_heading(),
+            "gnss_delay_s": request.gnss_delay_s,
+        });
+        let aiding = request.aiding();
+        if !aiding.is_none() {
+            configuration["aiding"] = json!(aiding);
+        }
         Ok(Self {
             request: request.clone(),
             settings,

@@ -314,7 +314,7 @@ pub(super) fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
         height: 1.2,
         ..Panel::new(Axis::log("horizontal error (m)"), series)
     };
-    timed("Horizontal position error", panel, &windows(summary))
+    Chart::over_time("Horizontal position error", vec![panel], &windows(summary))
 }
 
 /// Quantiles of the horizontal error over time, those of a covariance analysis beside the runs dashed.
@@ -342,17 +342,11 @@ pub(super) fn fan_chart(fan: &[FanEpoch], summary: &Summary) -> Chart {
         );
     }
     let panel = Panel::new(Axis::log("horizontal error (m)"), series);
-    timed(
+    Chart::over_time(
         "Percentiles of the horizontal position error",
-        panel,
+        vec![panel],
         &windows(summary),
     )
-}
-
-fn timed(title: &str, panel: Panel, outages: &[(f64, f64)]) -> Chart {
-    Chart::new(title, Axis::linear("time (s)"), vec![panel])
-        .with_outages(outages)
-        .in_group("time")
 }
 
 /// Every state: what the filter believes and how wrong it is.
@@ -370,7 +364,12 @@ pub(super) fn states(epochs: &[EpochMetrics], outages: &[(f64, f64)]) -> Vec<Cha
                 over_time(epochs, |e| e.asee.0[i].value),
             ),
         ];
-        timed(&error_of(state), Panel::new(Axis::log(""), series), outages).small()
+        Chart::over_time(
+            &error_of(state),
+            vec![Panel::new(Axis::log(""), series)],
+            outages,
+        )
+        .small()
     };
     STATES.iter().enumerate().map(chart).collect()
 }
@@ -405,9 +404,7 @@ pub(super) fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
             |e| e.coverage,
         ),
     ];
-    Chart::new("Consistency", Axis::linear("time (s)"), panels)
-        .with_outages(&windows(summary))
-        .in_group("time")
+    Chart::over_time("Consistency", panels, &windows(summary))
 }
 
 /// Sources with a colour of their own.
