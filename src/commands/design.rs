@@ -563,6 +563,7 @@ fn curves(designs: &[DesignOutcome], value: impl Fn(&DesignOutcome) -> f64) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nav_sim_document::Mark;
 
     fn designed(
         recordings: usize,

@@ -399,18 +399,13 @@ mod request_tests {
     /// At rest and level an accelerometer measures g upwards: −z of front, right, down.
     #[test]
     fn axes_of_loggers_are_rotations_to_front_right_down() {
-        let to = |axes: LoggerAxes, v: DVec3| (axes.to_frd() * v).round();
-        for axes in [LoggerAxes::Flu, LoggerAxes::Rfu] {
-            assert_eq!(to(axes, DVec3::Z), DVec3::NEG_Z, "{axes:?}");
+        for (name, x, y) in [("flu", DVec3::X, DVec3::NEG_Y), ("rfu", DVec3::Y, DVec3::X)] {
+            let Ok(MountingChoice::Axes(q)) = name.parse() else {
+                panic!("{name}");
+            };
+            let found = [DVec3::X, DVec3::Y, DVec3::Z].map(|v| (q * v).round());
+            assert_eq!(found, [x, y, DVec3::NEG_Z], "{name}");
         }
-        assert_eq!(
-            (to(LoggerAxes::Flu, DVec3::X), to(LoggerAxes::Flu, DVec3::Y)),
-            (DVec3::X, DVec3::NEG_Y)
-        );
-        assert_eq!(
-            (to(LoggerAxes::Rfu, DVec3::X), to(LoggerAxes::Rfu, DVec3::Y)),
-            (DVec3::Y, DVec3::X)
-        );
         let asked = crate::app::Asked::<Fuse>::of(["imu.csv", "gnss.csv", "m.toml"]).unwrap();
         let settings = asked.request.settings().unwrap();
         assert_eq!(settings.q_s_b, DQuat::IDENTITY);

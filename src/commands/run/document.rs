@@ -147,12 +147,12 @@ fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
         return;
     }
     page.section("At the ends of outages");
-    page.text("Just before the first fix after the outage; from, to: 95 % intervals.");
+    page.text("Just before the first fix after the outage.");
     let columns = [
         ("outage", "{start_s}–{end_s} s"),
         ("horizontal p50 (m)", "horizontal_error_end_m/p50"),
         ("p95 (m)", "horizontal_error_end_m/p95"),
-        ("from", "horizontal_error_end_m/p95_ci95/0"),
+        ("95 % from", "horizontal_error_end_m/p95_ci95/0"),
         ("to", "horizontal_error_end_m/p95_ci95/1"),
         ("p99.9 (m)", "horizontal_error_end_m/p999"),
         ("max (m)", "horizontal_error_end_m/max"),
@@ -234,22 +234,21 @@ fn assumptions(summary: &Summary, answer: &RunAnswer) -> Vec<(&'static str, Stri
         ("", model) => model.to_owned(),
         (recording, _) => format!("windows of {recording}"),
     };
-    let worth = readable(summary.independent_runs);
-    vec![
+    let mut facts = vec![
         ("trajectory", input("trajectory").to_owned()),
         (
             "model of the filter",
             format!("{}, {} states", input("model"), summary.filter_states),
         ),
         ("what makes the errors", truth),
-        (
-            "runs",
-            format!(
-                "{} ({} diverged), worth {worth} independent ones",
-                summary.runs, summary.diverged
-            ),
-        ),
-    ]
+    ];
+    let (runs, diverged) = (summary.runs, summary.diverged);
+    if runs > 0 {
+        let worth = readable(summary.independent_runs);
+        let text = format!("{runs} ({diverged} diverged), worth {worth} independent ones");
+        facts.push(("runs", text));
+    }
+    facts
 }
 
 /// The sources of the errors at the ends of the outages that are shown, beside what the filter believes.

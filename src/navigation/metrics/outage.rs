@@ -499,9 +499,9 @@ mod epoch_tests {
             EpochMetrics::of(&two_runs(), None),
             EpochMetrics::of(&later, None),
         ];
-        let accuracy = Accuracy::over(all.iter());
+        let accuracy = AccuracySummary::over(all.iter());
         assert_eq!(
-            (accuracy.asee_mean.0[0].value, accuracy.rmse_mean.0[8].value),
+            (accuracy.asee_mean.0[0], accuracy.rmse_mean.0[8]),
             (4.0, 7.0)
         );
     }

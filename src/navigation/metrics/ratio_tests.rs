@@ -137,7 +137,7 @@ fn paired_intervals_cover_at_their_level() {
             is_expected: [false; 2],
         }
         .mean_ratio(&a, &b);
-        covered += u32::from(((ratio.ratio - 1.2) * 100.0).abs() <= ratio.half_width_pct.unwrap());
+        covered += u32::from(((ratio.0 - 1.2) * 100.0).abs() <= ratio.1.unwrap());
     }
     let share = f64::from(covered) / f64::from(repetitions);
     assert!(
@@ -157,11 +157,11 @@ fn an_unpaired_interval_in_closed_form() {
     };
     let found = unpaired.mean_ratio(&[1.0, 2.0, 3.0, 6.0], &[1.0, 2.0, 3.0]);
     let expected = 100.0 * 4.302_653 * (23.0_f64 / 48.0).sqrt();
-    assert_eq!(found.ratio, 1.5);
+    assert_eq!(found.0, 1.5);
     assert!(
-        (found.half_width_pct.unwrap() / expected - 1.0).abs() < 1e-6,
+        (found.1.unwrap() / expected - 1.0).abs() < 1e-6,
         "{} {expected}",
-        found.half_width_pct.unwrap()
+        found.1.unwrap()
     );
     // the same from every value twice, of which as many are independent as before
     let twice = |values: &[f64]| values.iter().flat_map(|x| [*x, *x]).collect::<Vec<_>>();
@@ -175,7 +175,7 @@ fn an_unpaired_interval_in_closed_form() {
         unpaired.mean_ratio(&a, &b),
         shared.mean_ratio(&twice(&a), &twice(&b)),
     );
-    assert!((doubled.half_width_pct.unwrap() / once.half_width_pct.unwrap() - 1.0).abs() < 1e-12);
+    assert!((doubled.1.unwrap() / once.1.unwrap() - 1.0).abs() < 1e-12);
 }
 
 /// Differences a − ρ b = −1, 0, 1 with ρ = 1, b̄ = 2: standard error 1/√3 of a mean of 2; t of 2: 4.302653.
@@ -189,9 +189,9 @@ fn a_paired_interval_in_closed_form() {
     .mean_ratio(&[0.0, 2.0, 4.0], &[1.0, 2.0, 3.0]);
     let expected = 100.0 * 4.302_653 / 3.0_f64.sqrt() / 2.0;
     assert!(
-        (found.half_width_pct.unwrap() / expected - 1.0).abs() < 1e-6,
+        (found.1.unwrap() / expected - 1.0).abs() < 1e-6,
         "{} {expected}",
-        found.half_width_pct.unwrap()
+        found.1.unwrap()
     );
 }
 
@@ -204,10 +204,10 @@ fn the_interval_of_an_rmse_ratio_is_positive() {
     let runs = |errors: [f64; 2]| (0..2).map(|k| run(k, 1.0, errors[k as usize])).collect();
     let candidate = experiment(&[1.0; 3], runs(errors));
     let reference = experiment(&[1.0; 3], runs([1.0; 2]));
-    let rmse = compare(&candidate, &reference, true).unwrap()[0].states[0].rmse_end;
+    let rmse = compare(&candidate, &reference, true).unwrap()[0].states[0];
     let half: f64 = 12.706_205 * 0.98 / 2.0;
     for (found, expected) in rmse
-        .ci95_pct
+        .rmse_end_ci95_pct
         .unwrap()
         .into_iter()
         .zip([-half, half].map(|x| (x.exp() - 1.0) * 100.0))
@@ -215,7 +215,7 @@ fn the_interval_of_an_rmse_ratio_is_positive() {
         assert!((found / expected - 1.0).abs() < 1e-6, "{rmse:?}");
     }
     assert!(
-        rmse.ci95_pct.unwrap()[0] > -100.0 && rmse.pct.abs() < 1e-12,
+        rmse.rmse_end_ci95_pct.unwrap()[0] > -100.0 && rmse.rmse_end_ratio_error_pct.abs() < 1e-12,
         "{rmse:?}"
     );
 }
