@@ -13,9 +13,7 @@ pub(crate) use nav_sim_document::{seconds, six_digits};
 pub(crate) use tables::{gnss_csv, imu_csv, initial_toml};
 pub(crate) use trajectory::TrajectoryCheck;
 pub use trajectory::TrajectorySeries;
-pub(crate) use verdict::{
-    STATES, error_of, reduction_doubt, reduction_line, tone, unexpected_line,
-};
+pub(crate) use verdict::{reduction_doubt, reduction_line, tone, unexpected_line};
 
 pub(crate) mod comparison_table;
 #[cfg(test)]

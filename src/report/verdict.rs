@@ -260,24 +260,6 @@ pub(crate) fn axis_of(state: usize) -> &'static str {
     SPOKEN[state].trim_end_matches(" position")
 }
 
-/// The reported states and their units, in words.
-pub(crate) const STATES: [&str; REPORTED] = [
-    "position north (m)",
-    "position east (m)",
-    "position down (m)",
-    "velocity north (m/s)",
-    "velocity east (m/s)",
-    "velocity down (m/s)",
-    "roll (°)",
-    "pitch (°)",
-    "yaw (°)",
-];
-
-/// A state as the title of a chart of its errors: `roll error (°)`.
-pub(crate) fn error_of(state: &str) -> String {
-    state.replacen(" (", " error (", 1)
-}
-
 /// The colour of a verdict.
 pub(crate) const fn tone(kind: VerdictKind) -> Tone {
     match kind {

@@ -260,7 +260,9 @@ fn evidence(finding: &Finding) -> String {
         Finding::Correlated {
             lag_1,
             pos_sigma_factor,
-        } => lasting(lag_1, pos_sigma_factor),
+        } => format!(
+            "the errors of the fixes last (correlation {lag_1:.2} from one to the next): positions count as {pos_sigma_factor:.1} times as uncertain"
+        ),
         Finding::Minutes {
             bad,
             of,
@@ -289,16 +291,6 @@ fn evidence(finding: &Finding) -> String {
             c.error_over_sigma, c.worst_error_over_sigma, c.worst_state
         ),
     }
-}
-
-/// Errors of fixes that last, and what is made of that.
-fn lasting(lag_1: f64, pos_sigma_factor: f64) -> String {
-    let made = if pos_sigma_factor > 1.0 {
-        format!("positions count as {pos_sigma_factor:.1} times as uncertain")
-    } else {
-        "the position's σ is too small".to_owned()
-    };
-    format!("the errors of the fixes last (correlation {lag_1:.2} from one to the next): {made}")
 }
 
 /// Clocks that are not the same, and the option that makes them so.
@@ -342,8 +334,8 @@ fn cause(cause: &Cause) -> String {
 const MOST: usize = 120;
 /// Fixes of one fate in a panel: more lie on one another.
 const MOST_FIXES: usize = 1000;
-/// Points of a map along its larger half.
-const PIXELS: f64 = 400.0;
+/// Points of a line on the map.
+const MOST_PLACES: usize = 2000;
 /// Velocities of a reference that are known worse than this are not drawn: its positions jump (m/s).
 const UNEVEN: f64 = 0.5;
 
@@ -368,43 +360,29 @@ pub(super) fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
             .map_or(DVec2::NAN, |e| DVec2::new(e.values[1], e.values[0]))
     };
     let reference = |row: &Row| place(row) - error(row);
-    let all: Vec<DVec2> = solution.rows.iter().map(place).collect();
-    let extent = all
-        .iter()
-        .fold(DVec2::ZERO, |most, p| most.max(p.abs()))
-        .max_element();
-    // what lies within a pixel is one point
-    let way = |points: &mut dyn Iterator<Item = DVec2>| {
-        let mut kept: Vec<DVec2> = Vec::new();
-        points.for_each(|p| match kept.last() {
-            Some(last) if last.distance(p) < extent / PIXELS => {}
-            _ => kept.push(p),
-        });
-        kept.into_iter().map(|p| (p.x, p.y)).collect::<Vec<_>>()
+    let way = |rows: &[Row], point: &dyn Fn(&Row) -> DVec2| -> Vec<(f64, f64)> {
+        let shown = rows.iter().step_by(rows.len().div_ceil(MOST_PLACES).max(1));
+        shown.map(point).map(|p| (p.x, p.y)).collect()
     };
     let mut series = Vec::new();
     // the three lie on one another but for metres: wide beneath narrow beneath dashed, all are seen
     if solution.rows.iter().any(|row| row.error.is_some()) {
-        let line = Mark::Line(way(&mut solution.rows.iter().map(reference)), Stroke::Bold);
+        let line = Mark::Line(way(&solution.rows, &reference), Stroke::Bold);
         series.push(Series::new("reference", Colour::Ink, line));
     }
     for (start_s, end_s) in outages {
-        let within = solution
-            .rows
-            .iter()
-            .filter(|row| (start_s..end_s).contains(&&row.t_s));
-        let line = Mark::Line(way(&mut within.map(place)), Stroke::Bold);
+        let [first, end] =
+            [start_s, end_s].map(|t| solution.rows.partition_point(|row| row.t_s < *t));
+        let line = Mark::Line(way(&solution.rows[first..end], &place), Stroke::Bold);
         series.push(Series::new("outage", Colour::Hue(4), line));
     }
     series.push(Series::line(
         "solution",
         Colour::REAL,
-        way(&mut all.iter().copied()),
+        way(&solution.rows, &place),
     ));
     let smoothed = solution.smoothed.iter();
-    series.extend(
-        smoothed.map(|rows| Series::dashed("smoothed", SMOOTHED, way(&mut rows.iter().map(place)))),
-    );
+    series.extend(smoothed.map(|rows| Series::dashed("smoothed", SMOOTHED, way(rows, &place))));
     let ends = [("start", Some(first)), ("end", solution.rows.last())];
     series.extend(ends.into_iter().filter_map(|(name, row)| {
         let DVec2 { x, y } = place(row?);

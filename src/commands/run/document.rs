@@ -3,7 +3,7 @@
 use super::{Navigation, RunAnswer};
 use crate::report::verdict::requirement_line;
 use crate::report::verdict::verdict_lines;
-use crate::report::{STATES, error_of, reduction_doubt, reduction_line, tone, unexpected_line};
+use crate::report::{reduction_doubt, reduction_line, tone, unexpected_line};
 use nav_sim_document::{
     Axis, Cell, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, Tone,
     readable, window,
@@ -363,14 +363,9 @@ pub(super) fn states(epochs: &[EpochMetrics], outages: &[(f64, f64)]) -> Vec<Cha
                 over_time(epochs, |e| e.asee.0[i].value),
             ),
         ];
-        Chart::over_time(
-            &error_of(state),
-            vec![Panel::new(Axis::log(""), series)],
-            outages,
-        )
-        .small()
+        Chart::over_time(state, vec![Panel::new(Axis::log(""), series)], outages).small()
     };
-    STATES.iter().enumerate().map(chart).collect()
+    REPORTED_NAMES.iter().enumerate().map(chart).collect()
 }
 
 pub(super) fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {

@@ -54,16 +54,20 @@ pub enum TrueImu {
 }
 
 /// Results of [`navigate()`].
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize)]
 #[non_exhaustive]
 pub struct Navigation {
     /// The runs; `None` for a covariance analysis.
+    #[serde(skip)]
     pub runs: Option<RunResult>,
     /// Statistics at every reporting epoch: of the runs, if there are any.
+    #[serde(skip)]
     pub epochs: Vec<EpochMetrics>,
     /// Quantiles of the horizontal error over time: of the runs, if there are any.
+    #[serde(skip)]
     pub fan: Vec<FanEpoch>,
     /// The summary.
+    #[serde(flatten)]
     pub summary: Summary,
 }
 

@@ -3,14 +3,13 @@
 use crate::simulation::{REPORTED, REPORTED_NAMES};
 use nalgebra::{Complex, DMatrix};
 use serde::de::Error as _;
-use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
 /// A value estimated from runs and its Monte-Carlo standard error (NaN when one run cannot tell).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// The estimate.
     pub value: f64,
@@ -94,7 +93,7 @@ impl SampleSize {
     }
 }
 
-/// One value for each reported state; in files that people read an object with their names as keys.
+/// One value for each reported state; in files an object with their names as keys.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PerState<T>(pub [T; REPORTED]);
 
@@ -107,34 +106,12 @@ impl PerState<f64> {
 
 impl<T: Serialize> Serialize for PerState<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        if !serializer.is_human_readable() {
-            return self.0.serialize(serializer);
-        }
-        let mut map = serializer.serialize_map(Some(REPORTED))?;
-        for (name, value) in REPORTED_NAMES.iter().zip(&self.0) {
-            map.serialize_entry(name, value)?;
-        }
-        map.end()
+        serializer.collect_map(REPORTED_NAMES.iter().zip(&self.0))
     }
-}
-
-/// An object with these names as keys, in their order.
-pub(super) fn serialize_named<T: Serialize, S: Serializer>(
-    named: &[(String, T)],
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    let mut map = serializer.serialize_map(Some(named.len()))?;
-    for (name, value) in named {
-        map.serialize_entry(name, value)?;
-    }
-    map.end()
 }
 
 impl<'de, T: Deserialize<'de> + Copy> Deserialize<'de> for PerState<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        if !deserializer.is_human_readable() {
-            return Deserialize::deserialize(deserializer).map(Self);
-        }
         let by_name = HashMap::<String, T>::deserialize(deserializer)?;
         let value = |name: &&'static str| {
             by_name

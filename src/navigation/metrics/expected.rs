@@ -2,8 +2,10 @@
 
 use super::estimate::{Estimate, PerState, QuadraticForm};
 use super::outage::{EpochMetrics, is_beyond_linear, within};
-use super::summary::{AccuracySummary, Nis, OutageSummary, Recovery, Spread, Summary};
-use super::verdict::{OutageVerdict, Verdict};
+use super::summary::{
+    AccuracySummary, Nis, OutageSummary, Recovery, Spread, Summary, with_verdicts,
+};
+use super::verdict;
 use crate::ekf::Belief;
 use crate::noise::Model;
 use crate::simulation::lincov::{ErrorLaw, FilterPass, Instant, Judged, Track, TruthSide};
@@ -69,17 +71,14 @@ impl Expected {
             outage.beyond_linear = !sees_height && is_beyond_linear(window, &epochs, sigma_m_s);
         }
         let record = record(&epochs, &law, &outages);
-        for (outage, verdict) in outages.iter_mut().zip(OutageVerdict::expected(&record)) {
-            outage.verdict = verdict;
-        }
         let beyond_linear = outages.iter().position(|outage| outage.beyond_linear);
-        let verdict = Verdict::expected(&record, beyond_linear);
+        let (verdict, verdicts) = verdict::expected(&record, beyond_linear);
         let (nis, fixes) = record.nis;
         let summary = Summary {
             method: "lincov",
             filter_states: belief.states,
             seed: Some(experiment.seed),
-            outages,
+            outages: with_verdicts(outages, verdicts),
             nis: Nis {
                 dof: experiment.gnss.components(),
                 mean: if fixes > 0 { nis } else { f64::NAN },

@@ -1,11 +1,8 @@
 //! Statistics of one outage.
 
-use super::estimate::{
-    Estimate, PerState, SampleSize, quantile_interval, sample_quantile, serialize_named,
-};
+use super::estimate::{Estimate, PerState, SampleSize, quantile_interval, sample_quantile};
 use super::expected::horizontal_quantiles;
 use super::summary::{AccuracySummary, OutageSummary, Recovery, Spread};
-use super::verdict::OutageVerdict;
 use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{FilterPass, Instant, Judged, NamedSource, TruthSide};
 use crate::simulation::{
@@ -13,14 +10,13 @@ use crate::simulation::{
 };
 use crate::units::{DEG, STANDARD_GRAVITY};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize, Serializer};
+use serde::{Serialize, Serializer};
 
 /// Statistics of every outage, diverged runs left out.
 pub(super) fn outages(result: &RunResult, epochs: &[EpochMetrics]) -> Vec<OutageSummary> {
     let windows = result.independent_windows;
-    let verdicts = OutageVerdict::of(&result.runs, result.outages.len(), windows);
     let kept = || result.runs.iter().filter(|r| !r.diverged);
-    let of_outage = |(i, (window, verdict)): (usize, (&(f64, f64), OutageVerdict))| {
+    let of_outage = |(i, window): (usize, &(f64, f64))| {
         let records: Vec<&OutageRecord> = kept().filter_map(|r| r.outages.get(i)).collect();
         let horizontal = sorted(records.iter().map(|r| r.horizontal_error_end_m));
         // Runs that never recover have NaN here. They are counted apart: no finite time stands for them.
@@ -40,7 +36,6 @@ pub(super) fn outages(result: &RunResult, epochs: &[EpochMetrics]) -> Vec<Outage
         OutageSummary {
             start_s: window.0,
             end_s: window.1,
-            verdict,
             asee_mean,
             asee_mean_std_error,
             rmse_mean: accuracy.rmse_mean,
@@ -69,8 +64,7 @@ pub(super) fn outages(result: &RunResult, epochs: &[EpochMetrics]) -> Vec<Outage
             ..OutageSummary::default()
         }
     };
-    let windows = result.outages.iter().zip(verdicts);
-    windows.enumerate().map(of_outage).collect()
+    result.outages.iter().enumerate().map(of_outage).collect()
 }
 
 /// The epochs without a fix of an outage.
@@ -115,7 +109,7 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
 // Statistics at one reporting epoch.
 
 /// What the runs say at one epoch (m, m/s, degrees).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct EpochMetrics {
     /// Time on the trajectory (s).
     pub t_s: f64,
@@ -350,7 +344,7 @@ impl Budget {
 
 impl Serialize for Budget {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serialize_named(&self.shares, serializer)
+        serializer.collect_map(self.shares.iter().map(|(name, share)| (name, share)))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::estimate::{Band, PerState, SampleSize, chi_square_band, coverage_band};
 use super::outage::{Budget, EpochMetrics, outages};
-use super::verdict::{OutageVerdict, Verdict, VerdictKind};
+use super::verdict::{OutageVerdict, Verdict, VerdictKind, judged};
 use crate::ekf::Belief;
 use crate::ekf::belief::BiasGroup;
 use crate::imu::Channel;
@@ -228,6 +228,7 @@ impl Summary {
     /// The summary of a Monte-Carlo experiment.
     pub fn of(result: &RunResult, epochs: &[EpochMetrics], seed: u64) -> Self {
         let windows = result.independent_windows;
+        let (verdict, verdicts) = judged(&result.runs, result.outages.len(), windows);
         let diverged = result.runs.iter().filter(|r| r.diverged);
         let diverged_runs: Vec<u64> = diverged.map(|r| r.run).collect();
         Self {
@@ -237,14 +238,9 @@ impl Summary {
             diverged_runs,
             filter_states: result.filter_states,
             seed: Some(seed),
-            outages: outages(result, epochs),
+            outages: with_verdicts(outages(result, epochs), verdicts),
             nis: nis(result),
-            ..Self::over(
-                epochs,
-                Verdict::of(&result.runs, result.outages.len(), windows),
-                result.coverage_level,
-                windows,
-            )
+            ..Self::over(epochs, verdict, result.coverage_level, windows)
         }
     }
 
@@ -265,6 +261,17 @@ impl Summary {
             ..Self::default()
         }
     }
+}
+
+/// Outages with their verdicts.
+pub(super) fn with_verdicts(
+    mut outages: Vec<OutageSummary>,
+    verdicts: Vec<OutageVerdict>,
+) -> Vec<OutageSummary> {
+    for (outage, verdict) in outages.iter_mut().zip(verdicts) {
+        outage.verdict = verdict;
+    }
+    outages
 }
 
 /// Independent runs behind most epochs (all but the diverged ones).
