@@ -7,7 +7,6 @@ use crate::commands::run::{NavigateInputs, TrueImu, navigate};
 use crate::io::draws_file::DrawsFile;
 use crate::io::model_file::ModelFile;
 use crate::parse;
-use crate::report::curves::{Dots, dot_chart};
 use nav_sim_calibration::{
     Anticipated, Bootstrap, Estimator, Outcome, ParameterInterval, Scattering, Settings,
 };
@@ -425,9 +424,7 @@ impl Answer for Designs {
         }
         document.note(Importance::Remark, STATED);
         document.lead(self.lead());
-        if let [design] = designs.as_slice() {
-            document.chart(&beside(design), BESIDE);
-        } else {
+        if designs.len() > 1 {
             let parameters = designs.first().map_or(0, |d| d.parameters.len());
             let charts: Vec<Chart> = (0..parameters)
                 .filter_map(|k| against_hours(designs, k))
@@ -475,41 +472,7 @@ impl Answer for Designs {
     }
 }
 
-const BESIDE: &str = "Half of the 95 % interval to expect (% of the value).";
 const AGAINST: &str = "Half of the 95 % interval to expect (% of the value) against the length of each recording; dashed: however long they are.";
-
-/// The parameters of one design beside one another.
-fn beside(design: &DesignOutcome) -> Chart {
-    let points = |value: &dyn Fn(&DesignedParameter) -> Option<f64>| {
-        let point = |p: &DesignedParameter| [value(p).unwrap_or(f64::NAN), f64::NAN, f64::NAN];
-        design.parameters.iter().map(point).collect::<Vec<_>>()
-    };
-    let mut dots = vec![Dots {
-        name: "this plan",
-        colour: Colour::REAL,
-        points: points(&|p| p.half_width_pct),
-    }];
-    if design
-        .parameters
-        .iter()
-        .any(|p| p.endless_half_width_pct.is_some())
-    {
-        let points = points(&|p| p.endless_half_width_pct);
-        dots.push(Dots {
-            name: "however long",
-            colour: Colour::Soft,
-            points,
-        });
-    }
-    let names = design.parameters.iter().map(DesignedParameter::name);
-    dot_chart(
-        "Intervals to expect",
-        Axis::log("half width (%)"),
-        names,
-        None,
-        &dots,
-    )
-}
 
 /// One parameter of several designs: a curve for each number of recordings.
 fn against_hours(designs: &[DesignOutcome], k: usize) -> Option<Chart> {
