@@ -335,7 +335,7 @@ const MOST: usize = 120;
 /// Fixes of one fate in a panel: more lie on one another.
 const MOST_FIXES: usize = 1000;
 /// Points of a line on the map.
-const MOST_PLACES: usize = 2000;
+const MOST_PLACES: usize = 400;
 /// Velocities of a reference that are known worse than this are not drawn: its positions jump (m/s).
 const UNEVEN: f64 = 0.5;
 
