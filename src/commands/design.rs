@@ -424,13 +424,9 @@ impl Answer for Designs {
         }
         document.note(Importance::Remark, STATED);
         document.lead(self.lead());
-        if designs.len() > 1 {
-            let parameters = designs.first().map_or(0, |d| d.parameters.len());
-            let charts: Vec<Chart> = (0..parameters)
-                .filter_map(|k| against_hours(designs, k))
-                .collect();
-            document.charts(&charts, AGAINST);
-        }
+        let parameters = designs.first().map_or(0, |d| d.parameters.len());
+        let charts = (0..parameters).filter_map(|k| against_hours(designs, k));
+        document.charts(&charts.collect::<Vec<_>>(), AGAINST);
         if designs.iter().any(|d| !d.horizontal_p95.is_empty()) {
             document.section("What that is in navigation");
             document.table(&Table::of(
