@@ -181,10 +181,10 @@ mod tests {
     fn unreadable_tables_are_refused_by_line_and_column() {
         let text = epochs_csv(&metrics::epochs(&sample::result()));
         let error =
-            parse_epochs("e.csv", &text.replacen("rmse_yaw_deg", "rmse_yow_deg", 1)).unwrap_err();
+            parse_epochs("e.csv", &text.replacen("asee_yaw_deg", "asee_yow_deg", 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "e.csv, line 1: unknown column \"rmse_yow_deg\""
+            "e.csv, line 1: unknown column \"asee_yow_deg\""
         );
         let broken: String = text
             .lines()
@@ -203,10 +203,10 @@ mod tests {
             "e.csv, line 3: column \"t_s\": \"x1\" is not a number"
         );
         let error =
-            parse_epochs("e.csv", &text.replacen("rmse_yaw_deg", "rmse_roll_deg", 1)).unwrap_err();
+            parse_epochs("e.csv", &text.replacen("asee_yaw_deg", "asee_roll_deg", 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "e.csv, line 1: columns \"rmse_roll_deg\" and \"rmse_roll_deg\" both give rmse_roll_deg"
+            "e.csv, line 1: columns \"asee_roll_deg\" and \"asee_roll_deg\" both give asee_roll_deg"
         );
         let cut = &text[..text.rfind(',').unwrap()];
         let error = parse_epochs("e.csv", cut).unwrap_err().to_string();

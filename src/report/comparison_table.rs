@@ -129,7 +129,7 @@ pub(crate) fn separate(candidates: &mut [CandidateResult]) {
             continue;
         }
         let is_taken = |label: &Label, there: &[CandidateResult]| {
-            before.contains(label) || there.iter().any(|c| c.label == *label)
+            there.iter().any(|c| c.label == *label) || before.contains(label) && !is_shared(label)
         };
         let mut label = Label {
             scenario: name.clone(),
