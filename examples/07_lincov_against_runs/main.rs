@@ -10,7 +10,7 @@
 
 use nav_sim::io::{model_file, trajectory_file};
 use nav_sim::navigation::ekf::FilterStates;
-use nav_sim::navigation::metrics::{Expected, OutageMetrics, epochs};
+use nav_sim::navigation::metrics::{Expected, OutageSummary, epochs};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
@@ -141,10 +141,10 @@ fn departures(sampled: &RunResult, expected: &Expected) -> String {
 /// Runs whose horizontal error at an outage's end is below the expected p50 and p95: their number less its binomial mean, in
 /// standard deviations.
 fn quantiles_at_ends(sampled: &RunResult, expected: &Expected) -> impl Iterator<Item = f64> {
-    let both = |(i, outage): (usize, &OutageMetrics)| {
+    let both = |(i, outage): (usize, &OutageSummary)| {
         [
-            (0.5, outage.horizontal_p50_m.value),
-            (0.95, outage.horizontal_p95_m.value),
+            (0.5, outage.horizontal_error_end_m.p50),
+            (0.95, outage.horizontal_error_end_m.p95),
         ]
         .map(|(p, quantile)| {
             let below = sampled
@@ -156,7 +156,7 @@ fn quantiles_at_ends(sampled: &RunResult, expected: &Expected) -> impl Iterator<
             (below as f64 - p * count) / (p * (1.0 - p) * count).sqrt()
         })
     };
-    expected.outages.iter().enumerate().flat_map(both)
+    expected.summary.outages.iter().enumerate().flat_map(both)
 }
 
 fn main() -> Result<(), Failure> {

@@ -165,11 +165,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             .hint("the same command goes on where it was"));
     };
     let found = found.comparisons.into_iter().next();
-    let (_, found) = found.ok_or_else(|| Failure::could_not("there is nothing to compare"))?;
-    let found = Comparison {
-        cause: "contamination costs".to_owned(),
-        ..found
-    };
+    let found = found.ok_or_else(|| Failure::could_not("there is nothing to compare"))?;
     let document = found.document();
     drive::tell(&document, &document.terminal(WIDTH), session);
     atomic::write(&out.join("comparison.json"), report::json(&found))?;

@@ -5,19 +5,18 @@ use crate::commands::paper::PaperFigure;
 use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::io::atomic::Written;
-use crate::report::comparison_table::{CandidateResult, Label, Layout, ratio_rows, ratio_table};
+use crate::report::comparison_table::{CandidateResult, Label, layout, ratio_table, separate};
+use crate::report::csv::{csv, flat};
 use crate::report::json;
-use crate::report::verdict::{SPOKEN, axis_of, tone};
-use crate::report::verdict::{gravest, verdict_in_short};
+use crate::report::verdict::{SPOKEN, axis_of, gravest, tone, verdict_counts};
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
-    window,
+    Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
 };
 use nav_sim_navigation::metrics::{
-    self, ComparisonError, Measured, OutageComparison, Verdict, VerdictKind,
+    self, ComparisonError, OutageComparison, PerState, StateRatio, Verdict,
 };
 use nav_sim_navigation::scenario::Method;
-use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
+use nav_sim_navigation::simulation::REPORTED_NAMES;
 use serde::Serialize;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -50,9 +49,6 @@ pub struct Compare {
     /// Print the table alone in this form
     #[arg(long, value_name = "FORM", value_enum)]
     pub table: Option<TableForm>,
-    /// Beginning of the verdict, such as "contamination costs"; empty: the name of the reference.
-    #[arg(skip)]
-    pub(crate) cause: String,
 }
 
 /// How a table is written.
@@ -97,7 +93,6 @@ impl Command for Compare {
 
     fn run(&self, _: &Context<'_>) -> Result<Comparison> {
         Ok(Comparison {
-            cause: self.cause.clone(),
             form: self.table,
             ..compare(&self.runs, &self.reference, states(&self.states)?)?
         })
@@ -132,36 +127,81 @@ pub(crate) fn between<'a>(
     (name, directory): (&str, &RunDirectory),
     states: Vec<usize>,
 ) -> Result<Comparison> {
-    let (mut candidates, mut curves, mut doubts) = (Vec::new(), Vec::new(), Vec::new());
+    let mut found = Comparison {
+        schema_version: 1,
+        reference: name.to_owned(),
+        paired: true,
+        verdicts: vec![VerdictRow {
+            run: name.to_owned(),
+            verdict: directory.verdict,
+        }],
+        rows: Vec::new(),
+        consistency: Vec::new(),
+        candidates: Vec::new(),
+        outages: directory.experiment.outages.clone(),
+        doubts: Vec::new(),
+        states,
+        form: None,
+        links: Vec::new(),
+    };
     for (run, candidate, is_reference) in runs {
-        let run = run.to_owned();
         let differences = differences(candidate, directory);
         let doubt = |what: &&str| {
             format!("{run}: {what} not that of the reference; the runs are not paired")
         };
         // two covariance analyses have no runs that could be paired, and nothing by chance that pairing would take away
         if !(candidate.experiment.is_expected && directory.experiment.is_expected) {
-            doubts.extend(differences.iter().map(doubt));
+            found.doubts.extend(differences.iter().map(doubt));
         }
-        curves.push(RatioCurves::of(
-            &candidate.experiment,
-            &directory.experiment,
-        ));
-        candidates.push(compared(
-            run,
+        let is_paired = differences.is_empty();
+        found.paired &= is_paired;
+        let compared = compared(
+            run.to_owned(),
             candidate,
             directory,
-            differences.is_empty(),
+            is_paired,
             is_reference,
-        )?);
+        )?;
+        found.candidates.push(compared);
     }
-    let outages = directory.experiment.outages.clone();
-    let comparison = Comparison::new((name, &directory.verdict), candidates, curves, outages);
-    Ok(Comparison {
-        doubts,
-        states,
-        ..comparison
-    })
+    separate(&mut found.candidates);
+    for candidate in &found.candidates {
+        if !candidate.is_reference {
+            found.verdicts.push(VerdictRow {
+                run: candidate.run.clone(),
+                verdict: candidate.verdict,
+            });
+        }
+        for (outage, comparison) in candidate.outages.iter().enumerate() {
+            let (outage_start_s, outage_end_s) = found.outages[outage];
+            for (state, ratio) in REPORTED_NAMES.iter().zip(comparison.states) {
+                found.rows.push(Row {
+                    label: candidate.label.clone(),
+                    run: candidate.run.clone(),
+                    reference: name.to_owned(),
+                    outage_start_s,
+                    outage_end_s,
+                    state,
+                    ratio,
+                    paired: candidate.is_paired,
+                    outage,
+                });
+            }
+            found.consistency.push(ConsistencyRow {
+                run: candidate.run.clone(),
+                outage,
+                outage_start_s,
+                outage_end_s,
+                comparison: comparison.clone(),
+                rmse_end_ratio_error_pct: PerState(
+                    comparison
+                        .states
+                        .map(|state| state.rmse_end_ratio_error_pct),
+                ),
+            });
+        }
+    }
+    Ok(found)
 }
 
 /// One run.
@@ -199,7 +239,12 @@ fn compared(
         }
     }
     let label = Label::of(&run, candidate.origin.model.estimator.as_deref());
+    let epochs = candidate.experiment.epochs.iter();
+    let both = epochs.zip(&reference.experiment.epochs);
+    let pct = |a: f64, b: f64| 100.0 * (a / b - 1.0);
+    let curve = both.map(|(c, r)| (c.t_s, std::array::from_fn(|i| pct(c.asee[i], r.asee[i]))));
     Ok(CandidateResult {
+        curve: curve.collect(),
         run,
         label,
         is_reference,
@@ -266,29 +311,6 @@ pub(crate) fn states(names: &[String]) -> Result<Vec<usize>> {
     names.iter().map(index).collect()
 }
 
-/// How the ASEE of a run departs from that of the reference over time.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct RatioCurves {
-    /// Time (s).
-    pub t_s: Vec<f64>,
-    /// (ratio − 1)·100 of each reported state.
-    pub asee_pct: Vec<[f64; REPORTED]>,
-}
-
-impl RatioCurves {
-    /// Of two experiments with the same epochs.
-    pub(crate) fn of(candidate: &Measured, reference: &Measured) -> Self {
-        let both = candidate.epochs.iter().zip(&reference.epochs);
-        let pct = |i: usize, a: &[f64; REPORTED], b: &[f64; REPORTED]| 100.0 * (a[i] / b[i] - 1.0);
-        Self {
-            t_s: candidate.epochs.iter().map(|e| e.t_s).collect(),
-            asee_pct: both
-                .map(|(c, r)| std::array::from_fn(|i| pct(i, &c.asee, &r.asee)))
-                .collect(),
-        }
-    }
-}
-
 /// Runs against a reference: as JSON, `comparison.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
@@ -307,9 +329,6 @@ pub struct Comparison {
     /// The runs.
     #[serde(skip)]
     pub(crate) candidates: Vec<CandidateResult>,
-    /// How their ratios go with time, one a run.
-    #[serde(skip)]
-    pub(crate) curves: Vec<RatioCurves>,
     /// Start and end of each outage (s).
     #[serde(skip)]
     pub(crate) outages: Vec<(f64, f64)>,
@@ -319,9 +338,6 @@ pub struct Comparison {
     /// The states that are shown.
     #[serde(skip)]
     pub(crate) states: Vec<usize>,
-    /// Beginning of the verdict, such as "contamination costs"; empty: the name of the reference.
-    #[serde(skip)]
-    pub(crate) cause: String,
     /// Form in which the table alone is printed.
     #[serde(skip)]
     pub(crate) form: Option<TableForm>,
@@ -343,27 +359,26 @@ pub(crate) struct VerdictRow {
 /// One state of one run in one outage, against the reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Row {
+    /// Scenario and estimator.
+    #[serde(flatten)]
+    pub label: Label,
     /// Run directory.
     pub run: String,
-    /// Whether run k saw the same noise as that of the reference, so that the intervals are those of paired differences.
+    /// Run directory of the reference.
+    pub reference: String,
+    /// Start of the outage (s).
+    pub outage_start_s: f64,
+    /// Its end (s).
+    pub outage_end_s: f64,
+    /// State.
+    pub state: &'static str,
+    /// Its ratios.
+    #[serde(flatten)]
+    pub ratio: StateRatio,
+    /// True if run k saw the same noise as that of the reference, so that the intervals are those of paired differences.
     pub paired: bool,
     /// Outage, from 0.
     pub outage: usize,
-    /// State.
-    pub state: &'static str,
-    /// Mean over the outage of (ASEE ratio − 1)·100.
-    pub ratio_error_pct: f64,
-    /// Mean of its absolute value.
-    pub abs_ratio_error_pct: f64,
-    /// 95 % interval of the signed mean: Monte Carlo and, where it is known, what the calibrations leave open; null where
-    /// nothing was drawn and nothing is known of those.
-    pub ci95_pct: Option<[f64; 2]>,
-    /// Half the interval that the calibrations alone leave (points); null where it is not known.
-    pub calibration_half_pct: Option<f64>,
-    /// (ratio − 1)·100 of the RMSE at the outage's end.
-    pub rmse_end_ratio_error_pct: f64,
-    /// Its 95 % Monte-Carlo interval; null where nothing was drawn.
-    pub rmse_end_ci95_pct: Option<[f64; 2]>,
 }
 
 /// Consistency of one run in one outage, beside the reference's.
@@ -373,80 +388,32 @@ pub(crate) struct ConsistencyRow {
     pub run: String,
     /// Outage, from 0.
     pub outage: usize,
-    /// Mean NEES over the outage.
-    pub nees_mean: f64,
-    /// The reference's.
-    pub nees_mean_reference: f64,
-    /// Mean coverage over the outage.
-    pub coverage_mean: f64,
-    /// The reference's.
-    pub coverage_mean_reference: f64,
+    /// Its start (s).
+    pub outage_start_s: f64,
+    /// Its end (s).
+    pub outage_end_s: f64,
+    /// NEES and coverage.
+    #[serde(flatten)]
+    pub comparison: OutageComparison,
+    /// (ratio − 1)·100 of the RMSE at its end.
+    pub rmse_end_ratio_error_pct: PerState<f64>,
 }
 
 impl Comparison {
-    /// All candidates against one reference; `curves`: one a candidate.
-    pub(crate) fn new(
-        reference: (&str, &Verdict),
-        candidates: Vec<CandidateResult>,
-        curves: Vec<RatioCurves>,
-        outages: Vec<(f64, f64)>,
-    ) -> Self {
-        let others = candidates
-            .iter()
-            .filter(|c| !c.is_reference)
-            .map(|c| (c.run.as_str(), &c.verdict));
-        let verdicts = std::iter::once(reference).chain(others);
-        let row = |(run, verdict): (&str, &Verdict)| VerdictRow {
-            run: run.to_owned(),
-            verdict: *verdict,
-        };
-        let verdicts = verdicts.map(row).collect();
-        let (mut all_rows, mut consistency) = (Vec::new(), Vec::new());
-        for candidate in &candidates {
-            for (outage, comparison) in candidate.outages.iter().enumerate() {
-                all_rows.extend(rows(candidate, outage, comparison));
-                consistency.push(ConsistencyRow {
-                    run: candidate.run.clone(),
-                    outage,
-                    nees_mean: comparison.nees[0],
-                    nees_mean_reference: comparison.nees[1],
-                    coverage_mean: comparison.coverage[0],
-                    coverage_mean_reference: comparison.coverage[1],
-                });
-            }
-        }
-        Self {
-            schema_version: 1,
-            reference: reference.0.to_owned(),
-            paired: candidates.iter().all(|candidate| candidate.is_paired),
-            verdicts,
-            rows: all_rows,
-            consistency,
-            candidates,
-            curves,
-            outages,
-            doubts: Vec::new(),
-            states: vec![1, 6],
-            cause: String::new(),
-            form: None,
-            links: Vec::new(),
-        }
-    }
-
     /// The paper's Table I.
     pub(crate) fn table(&self) -> Table {
         ratio_table(&self.candidates, &self.states, &self.outages)
     }
 
-    /// The same for other programs.
+    /// The ratios of the states that are shown, for other programs.
     fn rows_csv(&self) -> String {
-        ratio_rows(
-            &self.candidates,
-            &self.states,
-            &self.outages,
-            &self.reference,
-        )
-        .csv()
+        let is_shown = |row: &&Row| self.states.iter().any(|k| REPORTED_NAMES[*k] == row.state);
+        csv(&self
+            .rows
+            .iter()
+            .filter(is_shown)
+            .map(flat)
+            .collect::<Vec<_>>())
     }
 
     /// The paper's Figure 7, beside its other ones.
@@ -454,135 +421,72 @@ impl Comparison {
         PaperFigure::new(7, FIGURE, self.charts())
     }
 
-    /// How much larger or smaller than the reference's the standard deviations are that the filters state.
+    /// The candidates but for the reference itself, with short names.
+    fn others(&self) -> Vec<(String, &CandidateResult)> {
+        let others: Vec<_> = self.candidates.iter().filter(|c| !c.is_reference).collect();
+        let runs: Vec<&str> = others.iter().map(|c| c.run.as_str()).collect();
+        short_names(&runs).into_iter().zip(others).collect()
+    }
+
+    fn name_of_reference(&self) -> String {
+        short_names(&[self.reference.as_str()]).concat()
+    }
+
+    /// Departures of the standard deviations that the filters state from the reference's.
     fn cost(&self) -> Option<String> {
         let state = *self.states.first()?;
-        let layout = Layout::of(&self.candidates);
-        let reference = self.candidates.iter().find(|c| c.is_reference);
-        let scenario = reference.map_or("", |c| c.label.scenario.as_str());
-        let others: Vec<(&CandidateResult, String)> = match layout.is_grid() {
-            true => {
-                let others = self
-                    .candidates
-                    .iter()
-                    .filter(|c| c.label.scenario != scenario);
-                others.map(|c| (c, c.label.estimator.clone())).collect()
-            }
-            false => {
-                let others: Vec<_> = self.candidates.iter().filter(|c| !c.is_reference).collect();
-                let names = short_names(&others.iter().map(|c| c.run.as_str()).collect::<Vec<_>>());
-                others.into_iter().zip(names).collect()
-            }
-        };
-        let in_state = SPOKEN[state];
-        if let [(only, _)] = others.as_slice() {
-            let (own, worst) = (range(&[only], state)?, worst(only)?);
-            let [name, reference] =
-                [&only.run, &self.reference].map(|run| short_names(&[run.as_str()]).concat());
-            return Some(format!(
-                "{name} against {reference}: uncertainty of {in_state} {own}, {worst}"
-            ));
-        }
-        let mut names: Vec<&str> = Vec::new();
-        others.iter().for_each(|(_, name)| {
-            if !names.contains(&name.as_str()) {
-                names.push(name)
-            }
-        });
-        let cost = |name: &&str| {
-            let of_name: Vec<_> = others
+        let others = self.others();
+        let cost = |(name, c): &(String, &CandidateResult)| {
+            let all = c
+                .outages
                 .iter()
-                .filter(|(_, other)| other == name)
-                .map(|(c, _)| *c)
-                .collect();
-            range(&of_name, state).map(|range| format!("{name} {range}"))
+                .map(|outage| outage.states[state].ratio_error_pct);
+            let low = all.clone().reduce(f64::min)?;
+            let [low, high] = [low, all.fold(low, f64::max)].map(|pct| format!("{pct:+.0}"));
+            Some(match low == high {
+                true => format!("{name} {low} %"),
+                false => format!("{name} {low} to {high} %"),
+            })
         };
-        let costs: Vec<String> = names.iter().filter_map(cost).collect();
-        let named = costs
-            .iter()
-            .take(NAMED)
-            .map(String::as_str)
-            .collect::<Vec<_>>()
-            .join(", ");
-        let more = if costs.len() > NAMED { ", …" } else { "" };
-        let cause = match self.cause.as_str() {
-            "" => format!(
-                "against {}:",
-                short_names(&[self.reference.as_str()]).concat()
-            ),
-            cause => cause.to_owned(),
-        };
-        (!costs.is_empty())
-            .then(|| format!("{cause} {named}{more} of the uncertainty of {in_state}"))
+        let costs: Vec<String> = others.iter().take(NAMED).filter_map(cost).collect();
+        let more = if others.len() > NAMED { ", …" } else { "" };
+        (!costs.is_empty()).then(|| {
+            let (reference, costs, state) =
+                (self.name_of_reference(), costs.join(", "), SPOKEN[state]);
+            format!("against {reference}: {costs}{more} of the uncertainty of {state}")
+        })
     }
 
     /// Departure of the ASEE over time: a chart a scenario, with a curve an estimator; where the names of the runs tell
     /// neither, one with all runs.
     fn charts(&self) -> Vec<Chart> {
-        let all: Vec<(&CandidateResult, &RatioCurves)> = self
-            .candidates
-            .iter()
-            .zip(&self.curves)
-            .filter(|(c, _)| !c.is_reference)
-            .collect();
-        let layout = Layout::of(&self.candidates);
-        if !layout.is_grid() || layout.scenarios.len() > SCENARIOS {
-            let names = short_names(&all.iter().map(|(c, _)| c.run.as_str()).collect::<Vec<_>>());
-            let curve = |(hue, (name, (_, curves)))| (name, hue, curves);
-            let curves: Vec<_> = names
-                .iter()
-                .map(String::as_str)
-                .zip(all)
-                .enumerate()
-                .map(curve)
-                .collect();
-            return vec![self.chart(&self.title(), &curves)];
+        let others = self.others();
+        let title = format!("ASEE against {}", self.name_of_reference());
+        let [scenarios, estimators] = layout(&self.candidates);
+        let is_grid = scenarios.len() > 1 && estimators.len() > 1 && !estimators.contains(&"");
+        if !is_grid || scenarios.len() > SCENARIOS {
+            let curves = others.iter().enumerate();
+            let curves = curves.map(|(hue, (name, c))| (name.as_str(), hue, *c));
+            return vec![self.chart(&title, &curves.collect::<Vec<_>>())];
         }
-        let hue = |estimator: &str| {
-            layout
-                .estimators
-                .iter()
-                .position(|e| e == estimator)
-                .unwrap_or(0)
-        };
-        let of_scenario = |scenario: &String| {
-            let curve = |(c, curves): &(&'_ CandidateResult, &'_ RatioCurves)| {
-                (
-                    c.label.estimator.clone(),
-                    hue(&c.label.estimator),
-                    (*curves).clone(),
-                )
-            };
-            let of_scenario = all
-                .iter()
-                .filter(|(c, _)| c.label.scenario == *scenario)
-                .map(curve);
-            let curves: Vec<(String, usize, RatioCurves)> = of_scenario.collect();
-            let curves: Vec<_> = curves
-                .iter()
-                .map(|(name, hue, curves)| (name.as_str(), *hue, curves))
-                .collect();
-            let title = format!("{}, scenario {scenario}", self.title());
+        let of_scenario = |scenario: &&str| {
+            let curves = others.iter().filter(|(_, c)| c.label.scenario == *scenario);
+            let curves = curves.filter_map(|(_, c)| {
+                let estimator = c.label.estimator.as_str();
+                let hue = estimators.iter().position(|e| *e == estimator)?;
+                Some((estimator, hue, *c))
+            });
+            let curves: Vec<_> = curves.collect();
+            let title = format!("{title}, scenario {scenario}");
             (!curves.is_empty()).then(|| self.chart(&title, &curves))
         };
-        layout.scenarios.iter().filter_map(of_scenario).collect()
+        scenarios.iter().filter_map(of_scenario).collect()
     }
 
-    fn title(&self) -> String {
-        format!(
-            "ASEE against {}",
-            short_names(&[self.reference.as_str()]).concat()
-        )
-    }
-
-    fn chart(&self, title: &str, curves: &[(&str, usize, &RatioCurves)]) -> Chart {
+    fn chart(&self, title: &str, curves: &[(&str, usize, &CandidateResult)]) -> Chart {
         let panel = |state: &usize| {
-            let line = |(name, hue, curves): &(&str, usize, &RatioCurves)| {
-                let points = curves
-                    .t_s
-                    .iter()
-                    .zip(&curves.asee_pct)
-                    .map(|(t, pct)| (*t, pct[*state]));
+            let line = |(name, hue, c): &(&str, usize, &CandidateResult)| {
+                let points = c.curve.iter().map(|(t, pct)| (*t, pct[*state]));
                 Series::line(name, Colour::Hue(*hue), points.collect())
             };
             let zero = Series::new("", Colour::Ink, Mark::Level(0.0));
@@ -597,49 +501,29 @@ impl Comparison {
             }
         };
         let panels = self.states.iter().map(panel).collect();
-        Chart::new(title, Axis::linear("time (s)"), panels)
-            .with_outages(&self.outages)
-            .in_group("time")
+        Chart::over_time(title, panels, &self.outages)
     }
 
     /// A row a run and outage, as they stand in comparison.json.
     fn consistency_table(&self) -> Table {
-        let errors = self
-            .states
-            .iter()
-            .map(|s| format!("RMSE {} (%)", axis_of(*s)));
-        let mut table =
-            Table::new(["run", "outage", "NEES", "NEES of the reference", "coverage"]).and(errors);
-        let names = short_names(
-            &self
-                .consistency
+        let states = self.states.iter().map(|s| {
+            let key = format!("rmse_end_ratio_error_pct/{}", REPORTED_NAMES[*s]);
+            (format!("RMSE {} (%)", axis_of(*s)), key)
+        });
+        let states: Vec<(String, String)> = states.collect();
+        let mut columns = vec![
+            ("run", "run"),
+            ("outage", "{outage_start_s}–{outage_end_s} s"),
+            ("NEES", "nees_mean"),
+            ("NEES of the reference", "nees_mean_reference"),
+            ("coverage", "coverage_mean"),
+        ];
+        columns.extend(
+            states
                 .iter()
-                .map(|row| row.run.as_str())
-                .collect::<Vec<_>>(),
+                .map(|(title, key)| (title.as_str(), key.as_str())),
         );
-        for (i, (row, name)) in self.consistency.iter().zip(names).enumerate() {
-            let source_of = |key: &str| format!("/consistency/{i}/{key}");
-            let mut cells: Vec<Cell> = vec![
-                name.into(),
-                self.outages
-                    .get(row.outage)
-                    .map_or_else(String::new, |w| window(w.0, w.1))
-                    .into(),
-                Cell::number(row.nees_mean, &source_of("nees_mean")),
-                Cell::number(row.nees_mean_reference, &source_of("nees_mean_reference")),
-                Cell::number(row.coverage_mean, &source_of("coverage_mean")),
-            ];
-            for state in &self.states {
-                let k = REPORTED * i + state;
-                let pointer = format!("/rows/{k}/rmse_end_ratio_error_pct");
-                cells.push(Cell::number(
-                    self.rows[k].rmse_end_ratio_error_pct,
-                    &pointer,
-                ));
-            }
-            table.row(cells);
-        }
-        table
+        Table::of(self, "/consistency/*", &columns)
     }
 }
 
@@ -664,19 +548,23 @@ impl Answer for Comparison {
     }
 
     fn document(&self) -> Document {
-        let kind = gravest(self.verdicts.iter().map(|row| &row.verdict));
-        let lines = self.cost().into_iter().chain(verdict_lines(&self.verdicts));
-        let mut document = Document::new("What the filters believe, compared", tone(kind), lines);
+        let verdicts = || {
+            self.verdicts
+                .iter()
+                .map(|row| (row.run.as_str(), &row.verdict))
+        };
+        let lines = self.cost().into_iter().chain(verdict_counts(verdicts()));
+        let tone = tone(gravest(verdicts()));
+        let mut document = Document::new("What the filters believe, compared", tone, lines);
         self.doubts
             .iter()
             .for_each(|doubt| document.note(Importance::Warning, doubt));
         if !self.outages.is_empty() && !self.candidates.is_empty() {
             document.text(&format!(
-                "Mean over the outage of (ASEE ratio − 1)·100 against {}; {}.",
-                short_names(&[self.reference.as_str()]).concat(),
-                meaning_of_intervals(&self.candidates)
+                "Mean over the outage of (ASEE ratio − 1)·100 against {}; {INTERVALS}.",
+                self.name_of_reference()
             ));
-            document.lead(Layout::of(&self.candidates).by_state(&self.states, &self.outages));
+            document.lead(self.table());
         }
         if !self.links.is_empty() {
             document.folded("Pages of the single results", |page| {
@@ -694,106 +582,7 @@ impl Answer for Comparison {
     }
 }
 
-/// Smallest and largest departure of the ASEE of a state, over runs and outages: "+3 %", "+24 to +35 %".
-fn range(candidates: &[&CandidateResult], state: usize) -> Option<String> {
-    let all = candidates
-        .iter()
-        .flat_map(|c| &c.outages)
-        .map(|outage| outage.states[state].asee.pct);
-    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), pct| {
-        (a.min(pct), b.max(pct))
-    });
-    let [low_text, high_text] = [low, high].map(|pct| format!("{pct:+.0}"));
-    match low_text == high_text {
-        _ if low > high => None,
-        true => Some(format!("{low_text} %")),
-        false => Some(format!("{low_text} to {high_text} %")),
-    }
-}
-
-/// The state whose ASEE departs most: "most in roll (+8 %)".
-fn worst(candidate: &CandidateResult) -> Option<String> {
-    let all = candidate
-        .outages
-        .iter()
-        .flat_map(|outage| outage.states.iter().map(|s| s.asee.pct).enumerate());
-    let (state, pct) = all.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-    Some(format!("most in {} ({pct:+.0} %)", SPOKEN[state]))
-}
-
-fn rows<'a>(
-    candidate: &'a CandidateResult,
-    outage: usize,
-    comparison: &'a OutageComparison,
-) -> impl Iterator<Item = Row> + 'a {
-    REPORTED_NAMES
-        .iter()
-        .zip(&comparison.states)
-        .map(move |(state, ratio)| Row {
-            run: candidate.run.clone(),
-            paired: candidate.is_paired,
-            outage,
-            state,
-            ratio_error_pct: ratio.asee.pct,
-            abs_ratio_error_pct: ratio.asee_abs_pct,
-            ci95_pct: ratio.asee.ci95_pct,
-            calibration_half_pct: ratio.calibration_half_pct,
-            rmse_end_ratio_error_pct: ratio.rmse_end.pct,
-            rmse_end_ci95_pct: ratio.rmse_end.ci95_pct,
-        })
-}
-
-/// How many filters are consistent and undecided, and which are neither: one line, or one a kind where that is long.
-pub(crate) fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
-    let names = short_names(
-        &verdicts
-            .iter()
-            .map(|row| row.run.as_str())
-            .collect::<Vec<_>>(),
-    );
-    let mut kinds: Vec<VerdictKind> = verdicts.iter().map(|row| row.verdict.kind).collect();
-    kinds.sort_unstable_by(|a, b| b.cmp(a));
-    kinds.dedup();
-    let part = |kind: &VerdictKind| {
-        let of_kind: Vec<_> = verdicts
-            .iter()
-            .zip(&names)
-            .filter(|(row, _)| row.verdict.kind == *kind)
-            .collect();
-        let count = format!("{} of {} filters {kind}", of_kind.len(), verdicts.len());
-        match kind {
-            VerdictKind::Consistent => count,
-            VerdictKind::Undecided => {
-                let needed = of_kind
-                    .iter()
-                    .filter_map(|(row, _)| row.verdict.runs_to_decide)
-                    .max();
-                format!("{count} ({} runs would decide)", needed.unwrap_or_default())
-            }
-            VerdictKind::Doubtful => format!("{count} (beyond linear theory: run --method both)"),
-            _ => {
-                let named = |(row, name): &(&VerdictRow, &String)| {
-                    format!("{name} ({})", verdict_in_short(&row.verdict))
-                };
-                let worst = of_kind
-                    .iter()
-                    .max_by(|a, b| a.0.verdict.nees.total_cmp(&b.0.verdict.nees));
-                format!("{count}, most: {}", worst.map(named).unwrap_or_default())
-            }
-        }
-    };
-    let parts: Vec<String> = kinds.iter().map(part).collect();
-    let line = parts.join("; ");
-    if line.chars().count() <= LINE {
-        vec![line]
-    } else {
-        parts
-    }
-}
-
-/// Characters of a line.
-const LINE: usize = 120;
-/// Estimators or runs that the verdict names.
+/// Runs that the verdict names.
 const NAMED: usize = 3;
 /// Scenarios that have a chart each; of more, one chart has all runs.
 const SCENARIOS: usize = 6;
@@ -802,49 +591,5 @@ const FIGURE: &str = "Departure of the ASEE of each filter from that of AWV in s
 
 const CAPTION: &str = "ASEE (averaged standard estimation error) is the filter's own standard deviation: 0 % is as the reference believes.";
 
-/// What the ± of the table are.
-pub(crate) fn meaning_of_intervals(candidates: &[CandidateResult]) -> &'static str {
-    let states = || {
-        candidates
-            .iter()
-            .flat_map(|c| &c.outages)
-            .flat_map(|outage| &outage.states)
-    };
-    if states().any(|state| state.calibration_half_pct.is_some()) {
-        "± half the 95 % interval, Monte Carlo and calibrations"
-    } else if states().all(|state| state.asee.ci95_pct.is_none()) {
-        "covariance analysis: no Monte-Carlo intervals"
-    } else {
-        "± half the 95 % interval of Monte Carlo"
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::report::comparison_table::tests::candidate;
-
-    #[test]
-    fn the_file_has_the_keys_of_the_interface() {
-        let verdict = Verdict::of(&[], 2, None);
-        let file = Comparison::new(
-            ("I/awv", &verdict),
-            vec![candidate("II/awv", 3.0, false)],
-            vec![],
-            vec![],
-        );
-        let json = serde_json::to_value(&file).unwrap();
-        assert_eq!(json["reference"], "I/awv");
-        assert_eq!(json["rows"].as_array().unwrap().len(), 18);
-        let row = &json["rows"][10];
-        assert_eq!(
-            (&row["run"], &row["outage"], &row["state"]),
-            (&"II/awv".into(), &1.into(), &"pos_e_m".into())
-        );
-        assert_eq!(
-            (&row["ratio_error_pct"], &row["ci95_pct"][0]),
-            (&3.0.into(), &2.5.into())
-        );
-        assert_eq!(row["abs_ratio_error_pct"], 4.0);
-    }
-}
+const INTERVALS: &str =
+    "± half the 95 % interval of Monte Carlo, and of the calibrations where they are known";

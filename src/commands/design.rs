@@ -7,13 +7,11 @@ use crate::commands::run::{NavigateInputs, TrueImu, navigate};
 use crate::io::draws_file::DrawsFile;
 use crate::io::model_file::ModelFile;
 use crate::parse;
-use crate::report::curves::{Dots, dot_chart};
 use nav_sim_calibration::{
     Anticipated, Bootstrap, Estimator, Outcome, ParameterInterval, Scattering, Settings,
 };
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone, readable,
-    window,
+    Axis, Chart, Colour, Document, Importance, Panel, Series, Table, Tone, readable, window,
 };
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::metrics::OutageSummary;
@@ -87,7 +85,7 @@ impl Command for Design {
         }
         let file = inputs::model(&self.model, context)?;
         let mut scenario = self.scenario()?;
-        let mut navigation = None;
+        let mut destination = None;
         if let Some(path) = &self.trajectory {
             let trajectory = inputs::trajectory(path, context)?;
             let span = (trajectory.start_s(), trajectory.end_s());
@@ -95,19 +93,32 @@ impl Command for Design {
             scenario.imu.rate_hz = file.model.rate_hz;
             scenario.validate().map_err(Failure::input)?;
             let inputs = NavigateInputs::new(trajectory, file.model.clone(), TrueImu::AsBelieved);
-            navigation = Some((inputs, outages));
+            destination = Some((inputs, scenario, outages));
         }
-        let destination = navigation.as_mut().map(|(inputs, outages)| Destination {
-            inputs,
-            scenario: &scenario,
-            outages,
-        });
+        let bootstrap = Bootstrap {
+            draws: self.draws as usize,
+            seed: context.seed_or(None),
+        };
+        let recordings = self.recordings.map_or(vec![3, 6, 12], |k| vec![k as usize]);
+        let hours = self.hours.map_or(vec![1.0, 3.0, 10.0], |h| vec![h]);
+        let mut designs = Vec::new();
+        for k in recordings {
+            for h in &hours {
+                let design = self.design(&file, &mut destination, bootstrap, k, *h);
+                designs.push(
+                    design.map_err(|e| Failure::input(e).hint("more, or longer recordings"))?,
+                );
+            }
+        }
         Ok(Designs {
             schema_version: 1,
-            designs: self.designs(&file, destination, context.seed_or(None))?,
+            designs,
         })
     }
 }
+
+/// A navigation with the model that will be calibrated: trajectory and model, filter and receiver, outages.
+type Destination = (NavigateInputs, Scenario, Vec<Outage>);
 
 impl Design {
     /// Drives are analysed, with a state for every process.
@@ -116,118 +127,59 @@ impl Design {
         scenario.run.method = Method::Lincov;
         scenario.filter.states = FilterStates::Full;
         if !self.outages.is_empty() {
-            scenario.outage = Some(crate::app::inputs::windows_of(&self.outages)?);
+            scenario.outage = Some(inputs::windows_of(&self.outages)?);
         }
         Ok(scenario)
     }
 
-    /// One design for each number of recordings and length.
-    fn designs(
+    /// The intervals that `recordings` of `hours` each would give.
+    fn design(
         &self,
         file: &ModelFile,
-        navigation: Option<Destination<'_>>,
-        seed: u64,
-    ) -> Result<Vec<DesignOutcome>> {
+        destination: &mut Option<Destination>,
+        bootstrap: Bootstrap,
+        recordings: usize,
+        hours: f64,
+    ) -> Result<DesignOutcome> {
+        let model = &file.model;
+        let anticipated = Anticipated {
+            model,
+            spread: file.spread.as_ref(),
+            recordings,
+            samples: (hours * 3600.0 * model.rate_hz).round() as usize,
+        };
         let settings = Settings::default();
-        let bootstrap = Bootstrap {
-            draws: self.draws as usize,
-            seed,
+        let outcomes =
+            |scattering| anticipated.outcomes(self.estimator, &settings, scattering, bootstrap);
+        let all = outcomes(Scattering::All)?;
+        let designed = |all: &[Outcome]| -> Vec<DesignedParameter> {
+            all.iter()
+                .flat_map(|o| designed(o, model.rate_hz))
+                .collect()
         };
-        let mut inputs = DesignInputs {
-            file,
-            estimator: self.estimator,
-            settings: &settings,
-            bootstrap,
-            navigation,
-        };
-        let recordings = self.recordings.map_or(vec![3, 6, 12], |k| vec![k as usize]);
-        let hours = self.hours.map_or(vec![1.0, 3.0, 10.0], |h| vec![h]);
-        let mut designs = Vec::new();
-        for k in recordings {
-            for h in &hours {
-                let design = design(&mut inputs, k, *h);
-                designs.push(
-                    design.map_err(|e| Failure::input(e).hint("more, or longer recordings"))?,
-                );
+        let mut parameters = designed(&all);
+        if file.spread.is_some() {
+            let endless = designed(&outcomes(Scattering::BetweenRecordings)?);
+            for (parameter, endless) in parameters.iter_mut().zip(endless) {
+                parameter.endless_half_width_pct = endless.half_width_pct;
             }
         }
-        Ok(designs)
+        let horizontal_p95 = match destination {
+            Some(destination) => destination_quantiles(destination, &all, model.rate_hz)?,
+            None => Vec::new(),
+        };
+        Ok(DesignOutcome {
+            recordings,
+            hours,
+            horizontal_p95,
+            known_least: least_known(&parameters),
+            undetermined: parameters
+                .iter()
+                .filter(|p| p.half_width_pct.is_none())
+                .count(),
+            parameters,
+        })
     }
-}
-
-/// What is planned with.
-struct DesignInputs<'a> {
-    /// The IMU as it is believed to be, with its spread where recordings differ.
-    pub file: &'a ModelFile,
-    /// How it will be calibrated.
-    pub estimator: Estimator,
-    /// Trim, tuning and weighting of it.
-    pub settings: &'a Settings,
-    /// Draws and their seed.
-    pub bootstrap: Bootstrap,
-    /// A navigation to which the calibration leads, if there is one.
-    pub navigation: Option<Destination<'a>>,
-}
-
-/// A navigation with the model that will be calibrated.
-struct Destination<'a> {
-    /// Trajectory and model.
-    pub inputs: &'a mut NavigateInputs,
-    /// Filter and receiver; the method is covariance analysis.
-    pub scenario: &'a Scenario,
-    /// The outages.
-    pub outages: &'a [Outage],
-}
-
-/// What `recordings` of `hours` each would tell.
-///
-/// # Errors
-/// When the recordings are too few or too short, or the navigation cannot be analysed.
-fn design(inputs: &mut DesignInputs<'_>, recordings: usize, hours: f64) -> Result<DesignOutcome> {
-    let model = &inputs.file.model;
-    let samples = (hours * 3600.0 * model.rate_hz).round() as usize;
-    let anticipated = Anticipated {
-        model,
-        spread: inputs.file.spread.as_ref(),
-        recordings,
-        samples,
-    };
-    let outcomes = |scattering| {
-        anticipated.outcomes(
-            inputs.estimator,
-            inputs.settings,
-            scattering,
-            inputs.bootstrap,
-        )
-    };
-    let all = outcomes(Scattering::All)?;
-    let mut parameters: Vec<DesignedParameter> = all
-        .iter()
-        .flat_map(|o| designed(o, model.rate_hz))
-        .collect();
-    if inputs.file.spread.is_some() {
-        let endless = outcomes(Scattering::BetweenRecordings)?;
-        for (parameter, endless) in parameters
-            .iter_mut()
-            .zip(endless.iter().flat_map(|o| designed(o, model.rate_hz)))
-        {
-            parameter.endless_half_width_pct = endless.half_width_pct;
-        }
-    }
-    let horizontal_p95 = match &mut inputs.navigation {
-        Some(destination) => destination_quantiles(destination, &all, model.rate_hz)?,
-        None => Vec::new(),
-    };
-    let mut design = DesignOutcome {
-        recordings,
-        hours,
-        parameters,
-        horizontal_p95,
-        known_least: String::new(),
-        undetermined: 0,
-    };
-    (design.known_least, design.undetermined) = (design.least_known(), design.undetermined());
-    Ok(design)
 }
 
 /// The parameters of an outcome; correlation times in the place of phi and beta, of which a per cent says nothing.
@@ -277,24 +229,16 @@ fn half_width_pct(value: f64, [low, high]: [f64; 2]) -> f64 {
 
 /// The draws of the calibration, taken through the analysis.
 fn destination_quantiles(
-    destination: &mut Destination<'_>,
+    (inputs, scenario, outages): &mut Destination,
     outcomes: &[Outcome],
     rate_hz: f64,
 ) -> Result<Vec<DesignedQuantile>> {
-    let mut model = destination.inputs.model.clone();
     outcomes
         .iter()
-        .for_each(|outcome| outcome.put_into(&mut model));
+        .for_each(|outcome| outcome.put_into(&mut inputs.model));
     let draws = DrawsFile::of(&outcomes.iter().collect::<Vec<_>>(), rate_hz);
-    destination.inputs.model_draws = draws.and_then(|draws| draws.draws(&model));
-    destination.inputs.model = model;
-    let found = navigate(
-        destination.inputs,
-        destination.scenario,
-        destination.outages,
-        0,
-        &Context::default(),
-    )?;
+    inputs.model_draws = draws.and_then(|draws| draws.draws(&inputs.model));
+    let found = navigate(inputs, scenario, outages, 0, &Context::default())?;
     let quantile = |o: &OutageSummary| {
         let h = &o.horizontal_error_end_m;
         let ci95: [f64; 2] = h.p95_ci95.0.zip(h.p95_ci95.1)?.into();
@@ -386,26 +330,18 @@ const STATED: &str = "where ± 100 % are expected, half of the calibrations stat
 /// A part of an interval this large is nearly all of it.
 const NEARLY_ALL: f64 = 0.8;
 
+/// The parameter that would be known least: its name, and how well.
+fn least_known(parameters: &[DesignedParameter]) -> String {
+    let known = parameters
+        .iter()
+        .filter_map(|p| Some((p, p.half_width_pct?)));
+    let widest = known.max_by(|a, b| a.1.total_cmp(&b.1));
+    widest.map_or("–".to_owned(), |(p, half)| {
+        format!("{} ± {} %", p.name(), readable(half))
+    })
+}
+
 impl DesignOutcome {
-    fn undetermined(&self) -> usize {
-        self.parameters
-            .iter()
-            .filter(|p| p.half_width_pct.is_none())
-            .count()
-    }
-
-    /// The parameter that would be known least: its name, and how well.
-    fn least_known(&self) -> String {
-        let known = self
-            .parameters
-            .iter()
-            .filter_map(|p| Some((p, p.half_width_pct?)));
-        let widest = known.max_by(|a, b| a.1.total_cmp(&b.1));
-        widest.map_or("–".to_owned(), |(p, half)| {
-            format!("{} ± {} %", p.name(), readable(half))
-        })
-    }
-
     /// Parameters whose intervals are nearly all due to what recordings differ by: longer ones tell no more.
     fn lengths_do_not_help(&self) -> usize {
         let is_floor = |p: &&DesignedParameter| {
@@ -422,12 +358,12 @@ impl Designs {
         let Some(largest) = self.designs.last() else {
             return (Tone::Undecided, vec!["nothing was planned".to_owned()]);
         };
-        let (all, open) = (largest.parameters.len(), largest.undetermined());
+        let (all, open) = (largest.parameters.len(), largest.undetermined);
         let plan = format!("{} recordings of {} h", largest.recordings, largest.hours);
         let first = format!(
             "{plan} would determine {} of {all} parameters; known least: {}",
             all - open,
-            largest.least_known()
+            largest.known_least
         );
         let p95 = largest.horizontal_p95.iter().map(|q| {
             let (window, half) = (window(q.start_s, q.end_s), readable(q.half_width_pct));
@@ -488,20 +424,11 @@ impl Answer for Designs {
         }
         document.note(Importance::Remark, STATED);
         document.lead(self.lead());
-        if let [design] = designs.as_slice() {
-            document.chart(&beside(design), BESIDE);
-        } else {
-            let parameters = designs.first().map_or(0, |d| d.parameters.len());
-            let charts: Vec<Chart> = (0..parameters)
-                .filter_map(|k| against_hours(designs, k))
-                .collect();
-            document.charts(&charts, AGAINST);
-        }
+        let parameters = designs.first().map_or(0, |d| d.parameters.len());
+        let charts = (0..parameters).filter_map(|k| against_hours(designs, k));
+        document.charts(&charts.collect::<Vec<_>>(), AGAINST);
         if designs.iter().any(|d| !d.horizontal_p95.is_empty()) {
             document.section("What that is in navigation");
-            if designs.len() > 1 {
-                document.chart(&navigation(designs), "Half of the 95 % interval of the 95 % quantile of the horizontal error at the end of each outage.");
-            }
             document.table(&Table::of(
                 self,
                 "/designs/*/horizontal_p95/*",
@@ -518,7 +445,21 @@ impl Answer for Designs {
         }
         if designs.len() > 1 {
             document.section("All parameters");
-            document.table(&all_parameters(designs));
+            let plan = |(i, d): (usize, &DesignOutcome)| {
+                let title = format!("{} × {} h (± %)", d.recordings, d.hours);
+                (
+                    title,
+                    format!("../../../{i}/parameters/@/half_width_pct|not determined"),
+                )
+            };
+            let plans: Vec<_> = designs.iter().enumerate().map(plan).collect();
+            let mut columns = vec![("parameter", "{signals} {parameter}"), ("value", "value")];
+            columns.extend(
+                plans
+                    .iter()
+                    .map(|(title, key)| (title.as_str(), key.as_str())),
+            );
+            document.table(&Table::of(self, "/designs/0/parameters/*", &columns));
         }
         document.checked(
             "against 150 calibrations of synthetic recordings, within four deviations of the scatter (27 %).",
@@ -527,41 +468,7 @@ impl Answer for Designs {
     }
 }
 
-const BESIDE: &str = "Half of the 95 % interval to expect (% of the value).";
 const AGAINST: &str = "Half of the 95 % interval to expect (% of the value) against the length of each recording; dashed: however long they are.";
-
-/// The parameters of one design beside one another.
-fn beside(design: &DesignOutcome) -> Chart {
-    let points = |value: &dyn Fn(&DesignedParameter) -> Option<f64>| {
-        let point = |p: &DesignedParameter| [value(p).unwrap_or(f64::NAN), f64::NAN, f64::NAN];
-        design.parameters.iter().map(point).collect::<Vec<_>>()
-    };
-    let mut dots = vec![Dots {
-        name: "this plan",
-        colour: Colour::REAL,
-        points: points(&|p| p.half_width_pct),
-    }];
-    if design
-        .parameters
-        .iter()
-        .any(|p| p.endless_half_width_pct.is_some())
-    {
-        let points = points(&|p| p.endless_half_width_pct);
-        dots.push(Dots {
-            name: "however long",
-            colour: Colour::Soft,
-            points,
-        });
-    }
-    let names = design.parameters.iter().map(DesignedParameter::name);
-    dot_chart(
-        "Intervals to expect",
-        Axis::log("half width (%)"),
-        names,
-        None,
-        &dots,
-    )
-}
 
 /// One parameter of several designs: a curve for each number of recordings.
 fn against_hours(designs: &[DesignOutcome], k: usize) -> Option<Chart> {
@@ -612,67 +519,10 @@ fn curves(designs: &[DesignOutcome], value: impl Fn(&DesignOutcome) -> f64) -> V
         .collect()
 }
 
-/// The horizontal error: a panel an outage.
-fn navigation(designs: &[DesignOutcome]) -> Chart {
-    let outages = designs.first().map_or(0, |d| d.horizontal_p95.len());
-    let panel = |k: usize| {
-        let q = &designs[0].horizontal_p95[k];
-        let value = |d: &DesignOutcome| {
-            d.horizontal_p95
-                .get(k)
-                .map_or(f64::NAN, |q| q.half_width_pct)
-        };
-        let label = format!("{} (%)", window(q.start_s, q.end_s));
-        let mut series = curves(designs, value);
-        series.insert(0, Series::new("", Colour::Soft, Mark::Level(0.0)));
-        Panel {
-            height: 0.8,
-            ..Panel::new(Axis::linear(&label), series)
-        }
-    };
-    Chart::new(
-        "Horizontal error, 95 % quantile",
-        Axis::log("hours"),
-        (0..outages).map(panel).collect(),
-    )
-}
-
-/// Half widths: a row a parameter, a column a design.
-fn all_parameters(designs: &[DesignOutcome]) -> Table {
-    let plans = designs
-        .iter()
-        .map(|d| format!("{} × {} h (± %)", d.recordings, d.hours));
-    let mut table = Table::new(["parameter", "value"]).and(plans);
-    for (k, p) in designs
-        .iter()
-        .take(1)
-        .flat_map(|d| &d.parameters)
-        .enumerate()
-    {
-        let cell = |(i, d): (usize, &DesignOutcome)| match d
-            .parameters
-            .get(k)
-            .and_then(|p| p.half_width_pct)
-        {
-            Some(half) => {
-                Cell::number(half, &format!("/designs/{i}/parameters/{k}/half_width_pct"))
-            }
-            None => Cell::figures("not determined"),
-        };
-        let value = Cell::number(p.value, &format!("/designs/0/parameters/{k}/value"));
-        let first = [Cell::from(p.name()), value];
-        table.row(
-            first
-                .into_iter()
-                .chain(designs.iter().enumerate().map(cell)),
-        );
-    }
-    table
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nav_sim_document::Mark;
 
     fn designed(
         recordings: usize,

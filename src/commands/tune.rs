@@ -21,6 +21,7 @@ use nav_sim_navigation::simulation::{NEES_DOF, REPORTED_NAMES, TOLERANCE};
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Model;
 use serde::{Serialize, Serializer};
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// Find the smallest factors on MODEL that make its filter consistent for another truth
@@ -100,15 +101,7 @@ impl Command for Tune {
         inputs::expect_turn_on(&mut scenario.initial, &file, &self.model, context);
         let truths = self.truths((&file, &model), &scenario, context)?;
         let (track, outages) = self.track(&scenario, &model, context)?;
-        let found = tune(&TuneInputs {
-            scenario: &scenario,
-            model: &model,
-            truths,
-            track: &track,
-            outages: &outages,
-            states: self.filter,
-            aim: self.aim,
-        });
+        let found = self.tune(&scenario, &model, truths, &track, &outages);
         let settings = self.settings.file.scenario.as_deref();
         let mut answer =
             found.map_err(|e| inputs::no_filter(&e, &self.model, settings, RARE_FIXES))?;
@@ -277,24 +270,6 @@ fn draws(path: &Path, file: &ModelFile, rate_hz: f64, seed: u64) -> Result<Draws
     })
 }
 
-/// What is tuned, for what, and where. Models are at the rate of the IMU.
-struct TuneInputs<'a> {
-    /// Receiver, start, and the filter that `run` would have.
-    pub scenario: &'a Scenario,
-    /// The model to be tuned.
-    pub model: &'a Model,
-    /// What may be true.
-    pub truths: Truths,
-    /// The way of the analysis.
-    pub track: &'a Track,
-    /// Its outages.
-    pub outages: &'a [Outage],
-    /// The filter that is made consistent.
-    pub states: FilterStates,
-    /// Condition under which the filter is consistent.
-    pub aim: Aim,
-}
-
 /// What may be true of an IMU: some models, or one and the draws of its calibration.
 struct Truths {
     /// The names of the models; of draws one for all.
@@ -305,105 +280,102 @@ struct Truths {
     pub stretch: Option<f64>,
 }
 
-/// The factors, and the filter before and after them.
-///
-/// # Errors
-/// When a model has no filter.
-fn tune(inputs: &TuneInputs<'_>) -> std::result::Result<TuneAnswer, BeliefError> {
-    let TuneInputs {
-        model,
-        truths,
-        track,
-        outages,
-        states,
-        aim,
-        ..
-    } = inputs;
-    // Draws are many: within 1.2e-3 the analysis is the same with one step from fix to fix, which `run` takes for them too.
-    let merged = truths.stretch.map(|_| track.merged());
-    let analysed = merged.as_ref().unwrap_or(track);
-    // The interval that `run` states for an error: the filter and its standard deviation are the same in all draws.
-    let upper_end = |stretch| {
-        move |estimate: f64, draws: Vec<f64>| derived_interval(estimate, draws, stretch)[1]
-    };
-    let upper_end = truths.stretch.map(upper_end);
-    let mut scenario = inputs.scenario.clone();
-    match states {
-        // what goes with the filter of 21 states beside the model stays
-        FilterStates::Full => scenario = scenario.with_full_noise(),
-        reduced => scenario.filter.states = *reduced,
-    }
-    let filter_of_run = inputs.scenario.filter.states;
-    // What is wrong with the vehicle's own measurements no noise of the IMU stands for: their sigmas come first.
-    let aiding = &inputs.scenario.aiding;
-    let belief = scenario
-        .with_full_noise()
-        .belief(model, outages, analysed)?;
-    let known = TrueErrors {
-        aiding: aiding.clone(),
-        ..TrueErrors::from((*model).clone())
-    };
-    let aiding_sigmas =
-        (!aiding.is_none()).then(|| aiding_factor(analysed, &belief, &known).unwrap_or(f64::NAN));
-    let widened = aiding_sigmas
-        .filter(|factor| *factor > 1.0)
-        .map(|factor| analysed.with_aiding_sigmas(factor));
-    let believed = analysed;
-    let analysed = widened.as_ref().unwrap_or(analysed);
-    let full = scenario.with_full_noise();
-    let full = |model: &Model| full.belief(model, outages, analysed);
-    let tuned = |model: &Model| scenario.belief(model, outages, analysed);
-    let of_run = |model: &Model| inputs.scenario.belief(model, outages, analysed);
-    let task = Task {
-        model,
-        truths: &truths.errors,
-        drawn: upper_end.as_ref().map(|end| end as &UpperEnd<'_>),
-        track: analysed,
-        full: &full,
-        filter: &tuned,
-        aim: *aim,
-        allow_smaller: false,
-    };
-    let factors = task.factors()?;
-    let ones: Vec<Factor> = factors
-        .iter()
-        .map(|f| Factor {
-            on_variance: 1.0,
-            ..*f
-        })
-        .collect();
-    let after = task.consistency(task.filter, &factors)?;
-    Ok(TuneAnswer {
-        model: String::new(),
-        tuned: None,
-        filter: *states,
-        filter_of_run,
-        before: Task {
-            track: believed,
-            ..task
+impl Tune {
+    /// The factors, and the filter before and after them. `given` has the filter that `run` would have.
+    fn tune(
+        &self,
+        given: &Scenario,
+        model: &Model,
+        truths: Truths,
+        track: &Track,
+        outages: &[Outage],
+    ) -> std::result::Result<TuneAnswer, BeliefError> {
+        // Draws are many: within 1.2e-3 the analysis is the same with one step from fix to fix, which `run` takes for them too.
+        let merged = truths.stretch.map(|_| track.merged());
+        let analysed = merged.as_ref().unwrap_or(track);
+        // The interval that `run` states for an error: the filter and its standard deviation are the same in all draws.
+        let upper_end = |stretch| {
+            move |estimate: f64, draws: Vec<f64>| derived_interval(estimate, draws, stretch)[1]
+        };
+        let upper_end = truths.stretch.map(upper_end);
+        let mut scenario = given.clone();
+        match self.filter {
+            // what goes with the filter of 21 states beside the model stays
+            FilterStates::Full => scenario = scenario.with_full_noise(),
+            reduced => scenario.filter.states = reduced,
         }
-        .consistency(task.filter, &ones)?,
-        aiding_sigmas,
-        after,
-        of_run: (*states != filter_of_run)
-            .then(|| task.consistency(&of_run, &factors))
-            .transpose()?,
-        informed: truths
-            .errors
+        let filter_of_run = given.filter.states;
+        // What is wrong with the vehicle's own measurements no noise of the IMU stands for: their sigmas come first.
+        let aiding = &given.aiding;
+        let belief = scenario
+            .with_full_noise()
+            .belief(model, outages, analysed)?;
+        let known = TrueErrors {
+            aiding: aiding.clone(),
+            ..TrueErrors::from(model.clone())
+        };
+        let aiding_sigmas = (!aiding.is_none())
+            .then(|| aiding_factor(analysed, &belief, &known).unwrap_or(f64::NAN));
+        let widened = aiding_sigmas
+            .filter(|factor| *factor > 1.0)
+            .map(|factor| analysed.with_aiding_sigmas(factor));
+        let believed = analysed;
+        let analysed = widened.as_ref().unwrap_or(analysed);
+        let full = scenario.with_full_noise();
+        let full = |model: &Model| full.belief(model, outages, analysed);
+        let tuned = |model: &Model| scenario.belief(model, outages, analysed);
+        let of_run = |model: &Model| given.belief(model, outages, analysed);
+        let task = Task {
+            model,
+            truths: &truths.errors,
+            drawn: upper_end.as_ref().map(|end| end as &UpperEnd<'_>),
+            track: analysed,
+            full: &full,
+            filter: &tuned,
+            aim: self.aim,
+            allow_smaller: false,
+        };
+        let factors = task.factors()?;
+        let ones: Vec<Factor> = factors
             .iter()
-            .all(|truth| truth.imu.without_states().next().is_none())
-            .then(|| {
-                task.informed(|truth| {
-                    knowing(&scenario, &truth.imu).belief(&truth.model, outages, analysed)
-                })
+            .map(|f| Factor {
+                on_variance: 1.0,
+                ..*f
             })
-            .transpose()?,
-        factors,
-        truths: truths.names.clone(),
-        is_drawn: truths.stretch.is_some(),
-        aim: *aim,
-        without_factor: task.without_factor(),
-    })
+            .collect();
+        let after = task.consistency(task.filter, &factors)?;
+        Ok(TuneAnswer {
+            model: String::new(),
+            tuned: None,
+            filter: self.filter,
+            filter_of_run,
+            before: Task {
+                track: believed,
+                ..task
+            }
+            .consistency(task.filter, &ones)?,
+            aiding_sigmas,
+            after,
+            of_run: (self.filter != filter_of_run)
+                .then(|| task.consistency(&of_run, &factors))
+                .transpose()?,
+            informed: truths
+                .errors
+                .iter()
+                .all(|truth| truth.imu.without_states().next().is_none())
+                .then(|| {
+                    task.informed(|truth| {
+                        knowing(&scenario, &truth.imu).belief(&truth.model, outages, analysed)
+                    })
+                })
+                .transpose()?,
+            factors,
+            is_drawn: truths.stretch.is_some(),
+            truths: truths.names,
+            aim: self.aim,
+            without_factor: task.without_factor(),
+        })
+    }
 }
 
 /// The scenario with the filter that has states for what the true IMU is stated to have beside its noise.
@@ -435,9 +407,11 @@ fn tuned(file: &ModelFile, factors: &[Factor], goal: &str, inputs: &[Input]) -> 
     put("program", PROGRAM.into());
     put("made_by", "tune".into());
     put("honest_for", goal.into());
-    let entries: Vec<FactorEntry> = factors.iter().map(FactorEntry::of).collect();
     let value = "texts and numbers are always TOML";
-    put("factors", toml::Value::try_from(entries).expect(value));
+    put(
+        "factors",
+        toml::Value::try_from(entries(factors)).expect(value),
+    );
     put("inputs", toml::Value::try_from(inputs).expect(value));
     let (missing, turn_on) = (file.missing.clone(), file.turn_on);
     ModelFile {
@@ -621,32 +595,50 @@ impl TuneAnswer {
 
 impl Serialize for TuneAnswer {
     fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
-        let end = |(after_s, rmse): (&f64, &[f64; REPORTED_NAMES.len()])| EndEntry {
-            after_s: *after_s,
-            rmse: PerState(*rmse),
-            horizontal_rmse_m: rmse[0].hypot(rmse[1]),
+        let end = |(after_s, rmse): (&f64, &[f64; REPORTED_NAMES.len()])| {
+            json!({
+                "after_s": after_s,
+                "rmse": PerState(*rmse),
+                "horizontal_rmse_m": rmse[0].hypot(rmse[1]),
+            })
         };
-        let filter = |(filter, found): (&'static str, &FilterConsistency)| FilterEntry {
-            filter,
-            verdict: kind(found).to_string(),
-            place: self.place(found),
-            nees: found.nees,
-            largest_ratio: found.largest.ratio,
-            state: REPORTED_NAMES[found.largest.state],
-            truth: self.worst_truth(found).to_owned(),
-            outage_end: found.end_s.iter().zip(&found.rmse_end).map(end).collect(),
+        let filter = |(filter, found): (&str, &FilterConsistency)| {
+            json!({
+                "filter": filter,
+                "verdict": kind(found).name(),
+                "place": self.place(found),
+                "nees": found.nees,
+                "largest_ratio": found.largest.ratio,
+                "state": REPORTED_NAMES[found.largest.state],
+                "truth": self.worst_truth(found),
+                "outage_end": found.end_s.iter().zip(&found.rmse_end).map(end).collect::<Value>(),
+            })
         };
-        let file = TuneFile {
-            schema_version: 1,
-            verdict: self.verdict().join("; "),
-            factors: self.factors.iter().map(FactorEntry::of).collect(),
-            aiding_sigma_factor: self.aiding_sigmas,
-            truths: &self.truths,
-            horizontal_rmse_cost: self.cost(&self.after),
-            filters: self.filters().map(filter).collect(),
-        };
+        let mut file = json!({
+            "schema_version": 1,
+            "verdict": self.verdict().join("; "),
+            "factors": entries(&self.factors),
+            "truths": self.truths,
+            "horizontal_rmse_cost": self.cost(&self.after),
+            "filters": self.filters().map(filter).collect::<Value>(),
+        });
+        if let Some(factor) = self.aiding_sigmas {
+            file["aiding_sigma_factor"] = json!(factor);
+        }
         file.serialize(serializer)
     }
+}
+
+/// Factors in files.
+fn entries(factors: &[Factor]) -> Value {
+    let entry = |factor: &Factor| {
+        json!({
+            "sensor": factor.sensor.name(),
+            "on_variance": factor.on_variance,
+            "on_sigma": factor.on_variance.sqrt(),
+        })
+    };
+    factors.iter().map(entry).collect()
 }
 
 fn is_changed(factor: &Factor) -> bool {
@@ -675,57 +667,6 @@ fn filter_name(states: FilterStates) -> String {
 fn factors_in_words(changed: &[&Factor]) -> String {
     let word = |f: &&Factor| format!("{} × {}", f.sensor.name(), readable(f.on_variance));
     changed.iter().map(word).collect::<Vec<_>>().join(", ")
-}
-
-#[derive(Serialize)]
-struct TuneFile<'a> {
-    schema_version: u32,
-    verdict: String,
-    factors: Vec<FactorEntry>,
-    /// On the sigmas of the vehicle's own measurements.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    aiding_sigma_factor: Option<f64>,
-    truths: &'a [String],
-    horizontal_rmse_cost: f64,
-    filters: Vec<FilterEntry>,
-}
-
-/// A factor in files.
-#[derive(Debug, Clone, Serialize)]
-struct FactorEntry {
-    /// `accel` or `gyro`.
-    sensor: &'static str,
-    on_variance: f64,
-    on_sigma: f64,
-}
-
-impl FactorEntry {
-    fn of(factor: &Factor) -> Self {
-        Self {
-            sensor: factor.sensor.name(),
-            on_variance: factor.on_variance,
-            on_sigma: factor.on_variance.sqrt(),
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct FilterEntry {
-    filter: &'static str,
-    verdict: String,
-    place: String,
-    nees: f64,
-    largest_ratio: f64,
-    state: &'static str,
-    truth: String,
-    outage_end: Vec<EndEntry>,
-}
-
-#[derive(Serialize)]
-struct EndEntry {
-    after_s: f64,
-    horizontal_rmse_m: f64,
-    rmse: PerState<f64>,
 }
 
 impl Answer for TuneAnswer {

@@ -293,6 +293,13 @@ impl Chart {
         }
     }
 
+    /// Panels over time with outages (start, end) marked, in the group of charts that are zoomed together.
+    pub fn over_time(title: &str, panels: Vec<Panel>, outages: &[(f64, f64)]) -> Self {
+        Self::new(title, Axis::linear("time (s)"), panels)
+            .with_outages(outages)
+            .in_group("time")
+    }
+
     /// The same with outages (start, end) marked.
     pub fn with_outages(self, outages: &[(f64, f64)]) -> Self {
         Self {

@@ -123,6 +123,7 @@ impl Table {
     /// title and a key of the entry: `p95_m`, or `../../hours` of what holds it. After `|` stands the text where the
     /// value is missing, else `–`; a list is an interval, `1 … 2`; a key of braces, `{start_s}–{end_s} s`, is a text with values in it. A key with `*`
     /// makes a column for each of the list, with a title from its entries: `("RMSE {after_s} s", "ends/*/rmse_m")`.
+    /// `.` is the entry itself, `@` its name, such as in `../../asee_end/@`.
     ///
     /// ```
     /// use nav_sim_document::Table;
@@ -159,6 +160,30 @@ impl Table {
             keys: 1,
         }
     }
+
+    /// A table of single values of a result: a row is a title and the keys of its cells, as in [`Table::of`], with blanks
+    /// between them. A row of which nothing is known is left out.
+    ///
+    /// ```
+    /// use nav_sim_document::Table;
+    ///
+    /// let result = serde_json::json!({ "nis": { "mean": 5.9, "dof": 6 } });
+    /// let rows = [("NIS ({nis/dof} if right)", "nis/mean"), ("NEES", "nees/mean")];
+    /// assert_eq!(Table::of_keys(&result, &["", "mean"], &rows).csv(), ",mean\nNIS (6 if right),5.90\n");
+    /// ```
+    pub fn of_keys(result: &impl Serialize, head: &[&str], rows: &[(&str, &str)]) -> Self {
+        let json = serde_json::to_value(result).unwrap_or_default();
+        let row = |(title, keys): &(&str, &str)| {
+            let cells: Vec<Cell> = keys.split(' ').map(|key| cell(&json, "", key)).collect();
+            let is_known = cells.iter().any(|cell| cell.text != "–");
+            is_known.then(|| [vec![filled(title, &json, "").into()], cells].concat())
+        };
+        Self {
+            head: head.iter().map(|title| (*title).to_owned()).collect(),
+            rows: rows.iter().filter_map(row).collect(),
+            keys: 1,
+        }
+    }
 }
 
 /// The places that a path with `*` stands for.
@@ -183,9 +208,12 @@ fn places(json: &Value, path: &str) -> Vec<String> {
 /// The place of a key beside or above another.
 fn resolved(place: &str, key: &str) -> String {
     let mut parts: Vec<&str> = place.split('/').collect();
+    let name = parts.last().copied().unwrap_or_default();
     for part in key.split('/') {
         match part {
+            "." => {}
             ".." => _ = parts.pop(),
+            "@" => parts.push(name),
             part => parts.push(part),
         }
     }
@@ -195,6 +223,9 @@ fn resolved(place: &str, key: &str) -> String {
 fn cell(json: &Value, place: &str, key: &str) -> Cell {
     if key.contains('{') {
         return filled(key, json, place).into();
+    }
+    if key == "@" {
+        return place.rsplit('/').next().unwrap_or_default().into();
     }
     let (key, missing) = key.split_once('|').unwrap_or((key, "–"));
     let pointer = resolved(place, key);

@@ -7,30 +7,9 @@ use nav_sim_navigation::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, Run
 use std::sync::LazyLock;
 
 /// Columns that are one number each.
-const SINGLE: [&str; 13] = [
-    "t_s",
-    "nees",
-    "coverage",
-    "run",
-    "diverged",
-    "nis_mean",
-    "fixes",
-    "nees_mean",
-    "outage",
-    "nees_end",
-    "log_density_end",
-    "horizontal_error_end_m",
-    "reconvergence_s",
-];
+const SINGLE: [&str; 6] = ["t_s", "nees", "coverage", "run", "diverged", "outage"];
 /// Columns that are one number for each state.
-const OF_STATES: [&str; 6] = [
-    "asee_",
-    "rmse_",
-    "normalised_sq_",
-    "see_mean_",
-    "see_end_",
-    "error_end_",
-];
+const OF_STATES: [&str; 3] = ["asee_", "see_mean_", "error_end_"];
 
 static QUANTITIES: LazyLock<Vec<Quantity>> = LazyLock::new(|| {
     let of_states = OF_STATES
@@ -66,16 +45,14 @@ pub(crate) const REPEAT: &str = "repeat the run, or put back its files";
 pub(crate) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, Failure> {
     let read = || -> Result<Vec<EpochRow>, Failure> {
         let table = parse(path, text, &dictionary(), &Asked::default())?;
-        let [asee, rmse] = [states(&table, "asee_")?, states(&table, "rmse_")?];
+        let asee = states(&table, "asee_")?;
         let [t_s, nees, coverage] = named(&table, ["t_s", "nees", "coverage"])?;
-        let columns = [&asee[..], &rmse[..], &[nees, coverage]].concat();
+        let columns = [&asee[..], &[nees, coverage]].concat();
         let epoch = |row: usize| {
             finite_or_lost(&table, row, &columns)?;
-            let [asee, rmse] = [asee, rmse].map(|columns| columns.map(|c| c.si(row)));
             Ok(EpochRow {
                 t_s: t_s.si(row),
-                asee,
-                rmse,
+                asee: asee.map(|column| column.si(row)),
                 nees: nees.si(row),
                 coverage: coverage.si(row),
             })
@@ -85,7 +62,7 @@ pub(crate) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, Fail
     read().map_err(damaged)
 }
 
-/// Reads `runs.csv` back: a row for each outage of a run, or one that ends where outages begin.
+/// Reads `runs.csv` back, as far as comparisons need it: a row for each outage of a run, or one that ends where outages begin.
 ///
 /// # Errors
 /// A missing column or a value that is not a number.
@@ -95,62 +72,25 @@ pub(crate) fn parse_runs(path: &str, text: &str) -> Result<Vec<RunRecord>, Failu
 }
 
 fn runs(table: &Table) -> Result<Vec<RunRecord>, Failure> {
-    let of_run = [
-        "run",
-        "diverged",
-        "nis_mean",
-        "fixes",
-        "nees_mean",
-        "coverage",
-    ];
-    let of_outage = [
-        "outage",
-        "nees_end",
-        "log_density_end",
-        "horizontal_error_end_m",
-        "reconvergence_s",
-    ];
-    let (of_run, of_outage) = (named(table, of_run)?, named(table, of_outage)?);
-    let normalised = states(table, "normalised_sq_")?;
-    let ends = ["see_mean_", "see_end_", "error_end_"].map(|prefix| states(table, prefix));
-    let [see_mean, see_end, error_end] = ends;
-    let ends = [see_mean?, see_end?, error_end?];
+    let columns = named(table, ["run", "diverged", "outage"])?;
+    let (see_mean, error_end) = (states(table, "see_mean_")?, states(table, "error_end_")?);
     let mut runs: Vec<RunRecord> = Vec::new();
     for row in 0..table.rows() {
-        let [run, diverged, nis, fixes, nees_mean, covered] = of_run.map(|c| c.si(row));
+        let [run, diverged, outage] = columns.map(|c| c.si(row));
         if runs.last().is_none_or(|r| r.run != run as u64) {
             runs.push(RunRecord {
                 run: run as u64,
                 diverged: diverged > 0.0,
-                outages: Vec::new(),
-                nis: (nis, fixes as u64),
-                rejected: 0, // known to the summary only
-                nees_mean,
-                covered,
-                normalised_sq: normalised.map(|column| column.si(row)),
-                horizontal_m: Vec::new(), // its quantiles are in fan.csv
+                ..RunRecord::default()
             });
         }
-        let [
-            outage,
-            nees_end,
-            log_density_end,
-            horizontal_error_end_m,
-            reconvergence_s,
-        ] = of_outage.map(|c| c.si(row));
-        let Some(last) = runs.last_mut().filter(|_| !outage.is_nan()) else {
-            continue;
-        };
-        let [see_mean, see_end, error_end] = ends.map(|columns| columns.map(|c| c.si(row)));
-        last.outages.push(OutageRecord {
-            see_mean,
-            see_end,
-            nees_end,
-            log_density_end,
-            error_end,
-            horizontal_error_end_m,
-            reconvergence_s,
-        });
+        if let Some(last) = runs.last_mut().filter(|_| !outage.is_nan()) {
+            last.outages.push(OutageRecord {
+                see_mean: see_mean.map(|c| c.si(row)),
+                error_end: error_end.map(|c| c.si(row)),
+                ..OutageRecord::default()
+            });
+        }
     }
     Ok(runs)
 }
@@ -214,7 +154,6 @@ mod tests {
                 (metric.t_s, metric.nees.value, metric.coverage)
             );
             assert_eq!(row.asee, metric.asee.0.map(|e| e.value));
-            assert_eq!(row.rmse, metric.rmse.0.map(|e| e.value));
         }
         assert_eq!(text.lines().nth(1).unwrap().split(',').nth(1), Some("1"));
     }
@@ -222,28 +161,30 @@ mod tests {
     #[test]
     fn runs_read_back_exactly() {
         let mut result = sample::result();
-        result.runs[1].outages[0].reconvergence_s = 2.5e-9;
-        assert_eq!(
-            parse_runs("r.csv", &runs_csv(&result).collect::<String>()).unwrap(),
-            result.runs
-        );
-        for run in &mut result.runs {
-            run.outages.clear();
+        result.runs[1].outages[0].error_end[2] = 2.5e-9;
+        for is_cleared in [false, true] {
+            for run in result.runs.iter_mut().filter(|_| is_cleared) {
+                run.outages.clear();
+            }
+            let read = parse_runs("r.csv", &runs_csv(&result).collect::<String>()).unwrap();
+            let kept = |runs: &[RunRecord]| -> Vec<_> {
+                let ends = |o: &OutageRecord| (o.see_mean, o.error_end);
+                let kept =
+                    |r: &RunRecord| (r.run, r.diverged, r.outages.iter().map(ends).collect());
+                runs.iter().map(kept).collect::<Vec<(u64, bool, Vec<_>)>>()
+            };
+            assert_eq!(kept(&read), kept(&result.runs));
         }
-        assert_eq!(
-            parse_runs("r.csv", &runs_csv(&result).collect::<String>()).unwrap(),
-            result.runs
-        );
     }
 
     #[test]
     fn unreadable_tables_are_refused_by_line_and_column() {
         let text = epochs_csv(&metrics::epochs(&sample::result()));
         let error =
-            parse_epochs("e.csv", &text.replacen("rmse_yaw_deg", "rmse_yow_deg", 1)).unwrap_err();
+            parse_epochs("e.csv", &text.replacen("asee_yaw_deg", "asee_yow_deg", 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "e.csv, line 1: unknown column \"rmse_yow_deg\""
+            "e.csv, line 1: unknown column \"asee_yow_deg\""
         );
         let broken: String = text
             .lines()
@@ -262,10 +203,10 @@ mod tests {
             "e.csv, line 3: column \"t_s\": \"x1\" is not a number"
         );
         let error =
-            parse_epochs("e.csv", &text.replacen("rmse_yaw_deg", "rmse_roll_deg", 1)).unwrap_err();
+            parse_epochs("e.csv", &text.replacen("asee_yaw_deg", "asee_roll_deg", 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "e.csv, line 1: columns \"rmse_roll_deg\" and \"rmse_roll_deg\" both give rmse_roll_deg"
+            "e.csv, line 1: columns \"asee_roll_deg\" and \"asee_roll_deg\" both give asee_roll_deg"
         );
         let cut = &text[..text.rfind(',').unwrap()];
         let error = parse_epochs("e.csv", cut).unwrap_err().to_string();

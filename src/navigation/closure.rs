@@ -28,7 +28,7 @@ pub struct Closure {
 }
 
 /// What a closure must not exceed.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Bounds {
     /// Distance (m).
     pub position_m: f64,

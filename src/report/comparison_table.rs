@@ -1,15 +1,15 @@
 //! The layout of the paper's Table I: scenario by outage, state by estimator.
 
 use super::verdict::axis_of;
-use nav_sim_document::{Cell, Table, short_names, shortest, window};
-use nav_sim_navigation::metrics::{OutageComparison, RatioError, Verdict};
-use nav_sim_navigation::simulation::REPORTED_NAMES;
+use nav_sim_document::{Cell, Table, short_names, window};
+use nav_sim_navigation::metrics::{OutageComparison, StateRatio, Verdict};
+use nav_sim_navigation::simulation::REPORTED;
 
 /// Estimators by the names their run directories end in.
 const ESTIMATORS: [&str; 6] = ["sr-awv", "dr-awv", "awv", "rgmwm", "gmwm", "avlr"];
 
 /// Where a run stands in Table I: its row (scenario) and column (estimator, may be empty).
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub(crate) struct Label {
     /// Row.
     pub scenario: String,
@@ -59,90 +59,25 @@ pub(crate) struct CandidateResult {
     pub run: String,
     /// Its place in the table.
     pub label: Label,
-    /// Whether it is the reference itself.
+    /// True of the reference itself.
     pub is_reference: bool,
-    /// Whether run k saw the same noise as that of the reference.
+    /// True if run k saw the same noise as that of the reference.
     pub is_paired: bool,
-    /// Whether its filter is as good as it believes.
+    /// The verdict on its filter.
     pub verdict: Verdict,
     /// Outage by outage.
     pub outages: Vec<OutageComparison>,
+    /// Time (s) and (ASEE ratio − 1)·100 of each reported state.
+    pub curve: Vec<(f64, [f64; REPORTED])>,
 }
 
-/// Candidates by scenario and estimator, both in the order in which they were given.
-pub(crate) struct Layout<'a> {
-    candidates: &'a [CandidateResult],
-    labels: Vec<Label>,
-    /// Scenarios.
-    pub scenarios: Vec<String>,
-    /// Estimators; one without a name where none is known.
-    pub estimators: Vec<String>,
-}
-
-impl<'a> Layout<'a> {
-    /// Of candidates, each in a place of its own.
-    pub(crate) fn of(candidates: &'a [CandidateResult]) -> Self {
-        let labels = distinct_labels(candidates);
-        let scenarios = in_order(labels.iter().map(|label| label.scenario.as_str()));
-        let estimators = in_order(labels.iter().map(|label| label.estimator.as_str()));
-        let owned = |names: Vec<&str>| names.into_iter().map(str::to_owned).collect();
-        Self {
-            candidates,
-            scenarios: owned(scenarios),
-            estimators: owned(estimators),
-            labels,
-        }
-    }
-
-    /// Whether scenarios and estimators are known, so that they can stand beside one another.
-    pub(crate) fn is_grid(&self) -> bool {
-        self.scenarios.len() > 1
-            && self.estimators.len() > 1
-            && self.estimators.iter().all(|e| !e.is_empty())
-    }
-
-    /// Ratio of one place; empty where there is none.
-    fn cell(&self, scenario: &str, estimator: &str, outage: usize, state: usize) -> Cell {
-        let here = |label: &Label| label.scenario == scenario && label.estimator == estimator;
-        let found = self
-            .labels
-            .iter()
-            .position(here)
-            .map(|i| &self.candidates[i]);
-        match found.map(|c| (c.is_reference, c.outages.get(outage))) {
-            Some((true, _)) => Cell::figures("reference"),
-            Some((false, Some(found))) => Cell::figures(signed(&found.states[state].asee)),
-            _ => Cell::figures(""),
-        }
-    }
-
-    /// A row a scenario, outage and state, a column an estimator.
-    pub(crate) fn by_state(&self, states: &[usize], outages: &[(f64, f64)]) -> Table {
-        let heads = self
-            .estimators
-            .iter()
-            .map(|estimator| format!("{estimator} (%)").trim_start().to_owned());
-        let mut table = Table::new(["scenario", "outage", "state"])
-            .and(heads)
-            .with_keys(3);
-        for scenario in &self.scenarios {
-            for (outage, (start_s, end_s)) in outages.iter().enumerate() {
-                for state in states {
-                    let keys = [
-                        scenario.clone(),
-                        window(*start_s, *end_s),
-                        axis_of(*state).to_owned(),
-                    ];
-                    let cells = self
-                        .estimators
-                        .iter()
-                        .map(|e| self.cell(scenario, e, outage, *state));
-                    table.row(keys.into_iter().map(Cell::from).chain(cells));
-                }
-            }
-        }
-        table
-    }
+/// Scenarios and estimators of candidates, in the order in which they were given.
+pub(crate) fn layout(candidates: &[CandidateResult]) -> [Vec<&str>; 2] {
+    let labels = || candidates.iter().map(|c| &c.label);
+    [
+        in_order(labels().map(|label| label.scenario.as_str())),
+        in_order(labels().map(|label| label.estimator.as_str())),
+    ]
 }
 
 /// The paper's Table I: a row a scenario and outage, a column a state and estimator; (ASEE ratio − 1)·100 with half its
@@ -152,120 +87,61 @@ pub(crate) fn ratio_table(
     states: &[usize],
     outages: &[(f64, f64)],
 ) -> Table {
-    let layout = Layout::of(candidates);
+    let [scenarios, estimators] = layout(candidates);
     let columns = || {
         states
             .iter()
-            .flat_map(|s| layout.estimators.iter().map(move |e| (*s, e)))
+            .flat_map(|s| estimators.iter().map(move |e| (*s, *e)))
     };
-    let name =
-        |(s, e): (usize, &String)| format!("{} {e}", axis_of(s)).trim_end().to_owned() + " (%)";
+    let name = |(s, e)| format!("{} {e}", axis_of(s)).trim_end().to_owned() + " (%)";
     let mut table = Table::new(["scenario", "outage"])
         .and(columns().map(name))
         .with_keys(2);
-    for scenario in &layout.scenarios {
+    for scenario in scenarios {
         for (outage, (start_s, end_s)) in outages.iter().enumerate() {
-            let keys = [scenario.clone(), window(*start_s, *end_s)].map(Cell::from);
-            table.row(
-                keys.into_iter()
-                    .chain(columns().map(|(s, e)| layout.cell(scenario, e, outage, s))),
-            );
+            let keys = [scenario.to_owned(), window(*start_s, *end_s)].map(Cell::from);
+            let cell = |(state, estimator): (usize, &str)| {
+                let is_here = |c: &&CandidateResult| {
+                    c.label.scenario == scenario && c.label.estimator == estimator
+                };
+                let text = match candidates.iter().find(is_here) {
+                    Some(c) if c.is_reference => "reference".to_owned(),
+                    Some(c) => signed(&c.outages[outage].states[state]),
+                    None => String::new(),
+                };
+                Cell::figures(text)
+            };
+            table.row(keys.into_iter().chain(columns().map(cell)));
         }
     }
     table
 }
 
-/// Ratios for other programs: one row a run, outage and state, every number in a cell of its own,
-/// and no number for the reference itself.
-pub(crate) fn ratio_rows(
-    candidates: &[CandidateResult],
-    states: &[usize],
-    outages: &[(f64, f64)],
-    reference: &str,
-) -> Table {
-    let mut table = Table::new([
-        "scenario",
-        "estimator",
-        "run",
-        "reference",
-        "outage_start_s",
-        "outage_end_s",
-        "state",
-        "ratio_error_pct",
-        "ci95_low_pct",
-        "ci95_high_pct",
-        "calibration_half_pct",
-        "abs_ratio_error_pct",
-    ]);
-    let number = |x: Option<f64>| {
-        x.filter(|x| x.is_finite())
-            .map_or_else(String::new, shortest)
-    };
-    for (
-        candidate,
-        Label {
-            scenario,
-            estimator,
-        },
-    ) in candidates.iter().zip(distinct_labels(candidates))
-    {
-        for (outage, (start_s, end_s)) in candidate.outages.iter().zip(outages) {
-            for state in states {
-                let found = (!candidate.is_reference).then_some(outage.states[*state]);
-                let names =
-                    [scenario.as_str(), &estimator, &candidate.run, reference].map(str::to_owned);
-                let window = [*start_s, *end_s].map(shortest);
-                let numbers = [
-                    found.map(|ratio| ratio.asee.pct),
-                    found.and_then(|ratio| Some(ratio.asee.ci95_pct?[0])),
-                    found.and_then(|ratio| Some(ratio.asee.ci95_pct?[1])),
-                    found.and_then(|ratio| ratio.calibration_half_pct),
-                    found.map(|ratio| ratio.asee_abs_pct),
-                ];
-                let state = REPORTED_NAMES[*state].to_owned();
-                let cells = names
-                    .into_iter()
-                    .chain(window)
-                    .chain([state])
-                    .chain(numbers.map(number));
-                table.row(cells.map(Cell::from));
-            }
+/// Gives each candidate a place of its own: those that would share one have rows of their names, and a number if even these are
+/// the same.
+pub(crate) fn separate(candidates: &mut [CandidateResult]) {
+    let before: Vec<Label> = candidates.iter().map(|c| c.label.clone()).collect();
+    let runs: Vec<&str> = candidates.iter().map(|c| c.run.as_str()).collect();
+    let names = short_names(&runs);
+    let is_shared = |label: &Label| before.iter().filter(|other| *other == label).count() > 1;
+    for (k, name) in names.into_iter().enumerate() {
+        if !is_shared(&before[k]) {
+            continue;
         }
-    }
-    table
-}
-
-/// The places of candidates, each its own: those that would share one have rows of their names, and a
-/// number if even these are the same.
-fn distinct_labels(candidates: &[CandidateResult]) -> Vec<Label> {
-    let shared = |c: &CandidateResult| candidates.iter().filter(|o| o.label == c.label).count() > 1;
-    let names = short_names(
-        &candidates
-            .iter()
-            .map(|c| c.run.as_str())
-            .collect::<Vec<_>>(),
-    );
-    let mut labels: Vec<Label> = Vec::new();
-    for (candidate, name) in candidates.iter().zip(names) {
-        let mut label = candidate.label.clone();
-        if shared(candidate) {
-            label.scenario = name;
-        }
-        let name = label.scenario.clone();
-        let taken = |label: &Label, labels: &[Label]| {
-            labels.contains(label)
-                || candidates
-                    .iter()
-                    .any(|c| !shared(c) && shared(candidate) && c.label == *label)
+        let is_taken = |label: &Label, there: &[CandidateResult]| {
+            there.iter().any(|c| c.label == *label) || before.contains(label) && !is_shared(label)
+        };
+        let mut label = Label {
+            scenario: name.clone(),
+            ..before[k].clone()
         };
         let mut number = 1;
-        while taken(&label, &labels) {
+        while is_taken(&label, &candidates[..k]) {
             number += 1;
             label.scenario = format!("{name} ({number})");
         }
-        labels.push(label);
+        candidates[k].label = label;
     }
-    labels
 }
 
 /// Each name once, where it stood first.
@@ -280,34 +156,34 @@ pub(crate) fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str>
 }
 
 /// A ratio's distance from unity with half its 95 % interval (%): none where runs are too few for one, or ratios equal.
-fn signed(error: &RatioError) -> String {
-    let half = error.ci95_pct.map(|[low, high]| (high - low) / 2.0);
+fn signed(ratio: &StateRatio) -> String {
+    let half = ratio.ci95_pct.map(|[low, high]| (high - low) / 2.0);
     match half.filter(|half| (0.005..1e3).contains(half)) {
-        Some(half) => format!("{:+.2} ± {half:.2}", error.pct),
-        None => format!("{:+.2}", error.pct),
+        Some(half) => format!("{:+.2} ± {half:.2}", ratio.ratio_error_pct),
+        None => format!("{:+.2}", ratio.ratio_error_pct),
     }
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use nav_sim_navigation::metrics::StateRatio;
 
     pub(crate) fn candidate(run: &str, pct: f64, is_reference: bool) -> CandidateResult {
-        let error = RatioError {
-            pct,
-            ci95_pct: Some([pct - 0.5, pct + 0.5]),
-        };
+        let ci95_pct = Some([pct - 0.5, pct + 0.5]);
         let state = StateRatio {
-            asee: error,
-            asee_abs_pct: pct.abs() + 1.0,
+            ratio_error_pct: pct,
+            ci95_pct,
             calibration_half_pct: None,
-            rmse_end: error,
+            abs_ratio_error_pct: pct.abs() + 1.0,
+            rmse_end_ratio_error_pct: pct,
+            rmse_end_ci95_pct: ci95_pct,
         };
         let outage = OutageComparison {
             states: [state; 9],
-            nees: [9.5, 9.0],
-            coverage: [0.9, 0.95],
+            nees_mean: 9.5,
+            nees_mean_reference: 9.0,
+            coverage_mean: 0.9,
+            coverage_mean_reference: 0.95,
         };
         let outages = vec![outage.clone(), outage];
         let verdict = Verdict::of(&[], 2, None);
@@ -319,6 +195,7 @@ pub(crate) mod tests {
             is_paired: true,
             verdict,
             outages,
+            curve: Vec::new(),
         }
     }
 
@@ -362,38 +239,16 @@ pub(crate) mod tests {
             "I,300–390 s,reference,+0.96 ± 0.50,reference,+0.96 ± 0.50"
         );
         assert_eq!(rows[4], "II,700–790 s,-75.00 ± 0.50,,-75.00 ± 0.50,");
-        let by_state = Layout::of(&all).by_state(&[1, 6], &outages).csv();
-        let rows: Vec<&str> = by_state.lines().collect();
-        assert_eq!(
-            (rows.len(), rows[0]),
-            (9, "scenario,outage,state,AWV (%),SR-AWV (%)")
-        );
-        assert_eq!(rows[2], "I,300–390 s,roll,reference,+0.96 ± 0.50");
-    }
-
-    #[test]
-    fn every_number_of_the_table_for_other_programs_is_one() {
-        let all = [
-            candidate("I/awv", 0.0, true),
-            candidate("II/sr-awv", -75.0, false),
-        ];
-        let table = ratio_rows(&all, &[1, 6], &[(4.0, 8.0), (20.0, 30.5)], "I/awv").csv();
-        let rows: Vec<&str> = table.lines().collect();
-        assert_eq!(rows.len(), 1 + 2 * 2 * 2);
-        assert_eq!(rows[1], "I,AWV,I/awv,I/awv,4,8,pos_e_m,,,,,");
-        assert_eq!(
-            rows[8],
-            "II,SR-AWV,II/sr-awv,I/awv,20,30.5,roll_deg,-75,-75.5,-74.5,,76"
-        );
     }
 
     #[test]
     fn candidates_that_would_share_a_place_all_have_one() {
         let runs = ["a/drive", "b/drive", "x/I_awv", "y/I_awv", "c", "c"];
-        let all: Vec<_> = (1..)
+        let mut all: Vec<_> = (1..)
             .zip(runs)
             .map(|(k, run)| candidate(run, f64::from(k), false))
             .collect();
+        separate(&mut all);
         let table = ratio_table(&all, &[0], &[(1.0, 2.0), (3.0, 4.0)]).csv();
         let rows: Vec<Vec<&str>> = table
             .lines()

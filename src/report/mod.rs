@@ -1,6 +1,7 @@
 //! Results as files: tables, JSON, self-contained pages (`page`). The module computes no statistic and touches
 //! no file: every function returns a text, and the command line writes it.
 
+pub(crate) mod csv;
 pub(crate) mod curves;
 pub(crate) mod tables;
 pub(crate) mod trajectory;
@@ -12,9 +13,7 @@ pub(crate) use nav_sim_document::{seconds, six_digits};
 pub(crate) use tables::{gnss_csv, imu_csv, initial_toml};
 pub(crate) use trajectory::TrajectoryCheck;
 pub use trajectory::TrajectorySeries;
-pub(crate) use verdict::{
-    STATES, error_of, reduction_doubt, reduction_line, tone, unexpected_in_words, unexpected_line,
-};
+pub(crate) use verdict::{reduction_doubt, reduction_line, tone, unexpected_line};
 
 pub(crate) mod comparison_table;
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! A trajectory in pictures: map, height, speed, attitude, outages marked.
 
-use nav_sim_document::{Axis, Chart, Colour, Mark, Panel, Series};
+use nav_sim_document::{Axis, Chart, Colour, Mark, Panel, Series, Table};
 use nav_sim_navigation::closure::{Bounds, Closure};
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::frames::RollPitchYaw;
@@ -185,9 +185,9 @@ mod trajectory_tests {
     }
 }
 
-// Whether a vehicle could move along a trajectory and navigation closes on it, in words and as JSON.
+// The check of a trajectory: could a vehicle move along it, and does navigation close on it?
 
-/// What was found.
+/// Results of the check.
 #[derive(Debug, Serialize)]
 pub struct TrajectoryCheck {
     /// File.
@@ -196,18 +196,16 @@ pub struct TrajectoryCheck {
     end_s: f64,
     points: usize,
     path_m: f64,
-    largest: Largest,
+    largest: Motion,
+    limits: Motion,
     beyond_limits: Vec<String>,
     warnings: Vec<String>,
     closure: Closed,
-    #[serde(skip)]
     bounds: Bounds,
-    #[serde(skip)]
-    limits: Limits,
 }
 
 #[derive(Debug, Serialize)]
-struct Largest {
+struct Motion {
     speed_m_s: f64,
     acceleration_m_s2: f64,
     jerk_m_s3: f64,
@@ -236,11 +234,17 @@ impl TrajectoryCheck {
             end_s: trajectory.end_s(),
             points: trajectory.knots().len(),
             path_m: path_length(trajectory),
-            largest: Largest {
+            largest: Motion {
                 speed_m_s: shown(Quantity::Speed),
                 acceleration_m_s2: shown(Quantity::Acceleration),
                 jerk_m_s3: shown(Quantity::Jerk),
                 rate_deg_s: shown(Quantity::Rate),
+            },
+            limits: Motion {
+                speed_m_s: limits.speed,
+                acceleration_m_s2: limits.acceleration,
+                jerk_m_s3: limits.jerk,
+                rate_deg_s: limits.rate / DEG,
             },
             beyond_limits: beyond.iter().map(ToString::to_string).collect(),
             warnings,
@@ -249,82 +253,77 @@ impl TrajectoryCheck {
                 within_bounds: closure.within(&bounds),
             },
             bounds,
-            limits,
         }
     }
 
-    /// Whether the closure is within the bounds.
+    /// True if the closure is within the bounds.
     pub(crate) const fn is_closed(&self) -> bool {
         self.closure.within_bounds
     }
 
-    /// Whether the motion is within the limits.
+    /// True if the motion is within the limits.
     pub(crate) const fn is_plausible(&self) -> bool {
         self.beyond_limits.is_empty()
     }
 
     /// The same for people.
     pub(crate) fn text(&self) -> String {
-        let Limits {
-            speed,
-            acceleration,
-            jerk,
-            rate,
-        } = self.limits;
-        let rate_deg_s = rate / DEG;
-        let (l, c, b) = (&self.largest, &self.closure.closure, &self.bounds);
-        let verdict = if self.is_closed() {
-            "within bounds"
-        } else {
-            "BEYOND A BOUND"
-        };
-        let Self {
-            file,
-            start_s,
-            end_s,
-            points,
-            path_m,
-            ..
-        } = self;
         let rows = [
-            format!(
-                "{file}: {} s from {start_s} s, {points} points",
-                end_s - start_s
+            ("path (m)", "path_m -"),
+            ("speed (m/s)", "largest/speed_m_s limits/speed_m_s"),
+            (
+                "acceleration (m/s²)",
+                "largest/acceleration_m_s2 limits/acceleration_m_s2",
             ),
-            format!("  path          {path_m:.1} m"),
-            format!("  speed         {:8.3} m/s    limit {speed}", l.speed_m_s),
-            format!(
-                "  acceleration  {:8.3} m/s²   limit {acceleration}",
-                l.acceleration_m_s2
+            (
+                "jerk over 0.1 s (m/s³)",
+                "largest/jerk_m_s3 limits/jerk_m_s3",
             ),
-            format!("  jerk (0.1 s)  {:8.3} m/s³   limit {jerk}", l.jerk_m_s3),
-            format!(
-                "  angular rate  {:8.3} deg/s  limit {rate_deg_s}",
-                l.rate_deg_s
+            (
+                "angular rate (deg/s)",
+                "largest/rate_deg_s limits/rate_deg_s",
             ),
-            format!(
-                "closure at {} Hz over {} s: {verdict}",
-                c.rate_hz, c.duration_s
+            (
+                "closure: position (m)",
+                "closure/position_m bounds/position_m",
             ),
-            format!(
-                "  position      {:.3e} m (horizontal {:.3e})  bound {:e}",
-                c.position_m, c.horizontal_m, b.position_m
-            ),
-            format!(
-                "  velocity      {:.3e} m/s  bound {:e}",
-                c.velocity_m_s, b.velocity_m_s
-            ),
-            format!(
-                "  attitude      {:.3e} rad  bound {:e}",
-                c.attitude_rad, b.attitude_rad
-            ),
+            ("horizontal (m)", "closure/horizontal_m -"),
+            ("velocity (m/s)", "closure/velocity_m_s bounds/velocity_m_s"),
+            ("attitude (rad)", "closure/attitude_rad bounds/attitude_rad"),
         ];
-        rows.join("\n")
+        let c = &self.closure.closure;
+        format!(
+            "{}: {} s from {} s, {} points\nclosure at {} Hz over {} s: {}\n{}",
+            self.file,
+            self.end_s - self.start_s,
+            self.start_s,
+            self.points,
+            c.rate_hz,
+            c.duration_s,
+            if self.is_closed() {
+                "within bounds"
+            } else {
+                "BEYOND A BOUND"
+            },
+            Table::of_keys(self, &["", "largest", "limit"], &rows).columns(usize::MAX)
+        )
     }
 
-    /// Which bounds are not met, and how often limits are exceeded; none where all is well.
+    /// Bounds that are not met, and how often limits are exceeded; none where all is well.
     pub(crate) fn missed(&self) -> Option<String> {
-        let closure = (!self.is_closed()).then(|| self.beyond_bounds());
+        let closure = (!self.is_closed()).then(|| {
+            let (c, b) = (&self.closure.closure, &self.bounds);
+            format!(
+                "closure at {} Hz is {:.3e} m, {:.3e} m/s, {:.3e} rad, beyond {:e} m, {:e} m/s or {:e} rad",
+                c.rate_hz,
+                c.position_m,
+                c.velocity_m_s,
+                c.attitude_rad,
+                b.position_m,
+                b.velocity_m_s,
+                b.attitude_rad
+            )
+        });
         let motion = match self.beyond_limits.len() {
             0 => None,
             1 => Some("the motion is beyond a limit in 1 stretch".to_owned()),
@@ -332,25 +331,6 @@ impl TrajectoryCheck {
         };
         let missed: Vec<String> = closure.into_iter().chain(motion).collect();
         (!missed.is_empty()).then(|| format!("{}: {}", self.file, missed.join("; ")))
-    }
-
-    fn beyond_bounds(&self) -> String {
-        let (c, b) = (&self.closure.closure, &self.bounds);
-        let all = [
-            (c.position_m, b.position_m, "m"),
-            (c.velocity_m_s, b.velocity_m_s, "m/s"),
-            (c.attitude_rad, b.attitude_rad, "rad"),
-        ];
-        let beyond = all
-            .into_iter()
-            .filter(|(found, bound, _)| found.is_nan() || found > bound);
-        let text = beyond
-            .map(|(found, bound, unit)| format!("{found:.3e} {unit}, beyond {bound:e} {unit}"));
-        format!(
-            "closure at {} Hz is {}",
-            c.rate_hz,
-            text.collect::<Vec<_>>().join("; ")
-        )
     }
 }
 

@@ -1,6 +1,6 @@
 //! Verdicts in words.
 
-use nav_sim_document::{Tone, percent, readable, window};
+use nav_sim_document::{Tone, percent, readable, short_names, window};
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::metrics::{
     ALL_STATES, Met, ReductionQuality, StateName, Summary, Verdict, VerdictKind,
@@ -8,6 +8,7 @@ use nav_sim_navigation::metrics::{
 use nav_sim_navigation::scenario::Unexpected;
 use nav_sim_navigation::sensors::defects::Defect;
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
+use std::collections::BTreeMap;
 
 /// Most characters of a line, of which "verdict: " takes some.
 const WIDTH: usize = 111;
@@ -138,7 +139,7 @@ fn with_error(value: f64, error: f64) -> String {
 }
 
 /// A state, or all of them, in words.
-pub(crate) fn state_in_words(name: StateName) -> &'static str {
+fn state_in_words(name: StateName) -> &'static str {
     if name == ALL_STATES {
         "all states together"
     } else {
@@ -146,9 +147,9 @@ pub(crate) fn state_in_words(name: StateName) -> &'static str {
     }
 }
 
-/// For a line or a cell among several: "NEES 1189, 34.6 × in yaw_deg"; of runs too few to decide, how many would:
+/// For a line among several: "NEES 1189, 34.6 × in yaw_deg"; of runs too few to decide, how many would:
 /// "NEES 8.7, 0.91 × in yaw_deg, 27 runs would decide".
-pub(crate) fn verdict_in_short(verdict: &Verdict) -> String {
+fn verdict_in_short(verdict: &Verdict) -> String {
     let decide = verdict
         .runs_to_decide
         .map_or_else(String::new, |runs| format!(", {runs} runs would decide"));
@@ -160,12 +161,33 @@ pub(crate) fn verdict_in_short(verdict: &Verdict) -> String {
     )
 }
 
-/// The gravest of several.
-pub(crate) fn gravest<'a>(verdicts: impl Iterator<Item = &'a Verdict>) -> VerdictKind {
-    verdicts
-        .map(|verdict| verdict.kind)
-        .max()
-        .unwrap_or(VerdictKind::Consistent)
+/// The gravest of several, with names.
+pub(crate) fn gravest<'a>(verdicts: impl Iterator<Item = (&'a str, &'a Verdict)>) -> VerdictKind {
+    let kinds = verdicts.map(|(_, verdict)| verdict.kind);
+    kinds.max().unwrap_or(VerdictKind::Consistent)
+}
+
+/// A line a kind, the gravest first: `1 of 2 filters overconfident, most: b (NEES 24.1, 2.10 × in yaw_deg)`.
+pub(crate) fn verdict_counts<'a>(
+    verdicts: impl Iterator<Item = (&'a str, &'a Verdict)>,
+) -> Vec<String> {
+    let (runs, verdicts): (Vec<&str>, Vec<&Verdict>) = verdicts.unzip();
+    let names = short_names(&runs);
+    let mut kinds: BTreeMap<VerdictKind, Vec<(&String, &Verdict)>> = BTreeMap::new();
+    for (name, verdict) in names.iter().zip(&verdicts) {
+        kinds.entry(verdict.kind).or_default().push((name, verdict));
+    }
+    let line = |(kind, of_kind): (&VerdictKind, &Vec<(&String, &Verdict)>)| {
+        let worst = of_kind
+            .iter()
+            .max_by(|a, b| a.1.nees.total_cmp(&b.1.nees))?;
+        let (count, all, short) = (of_kind.len(), verdicts.len(), verdict_in_short(worst.1));
+        Some(format!(
+            "{count} of {all} filters {kind}, most: {} ({short})",
+            worst.0
+        ))
+    };
+    kinds.iter().rev().filter_map(line).collect()
 }
 
 // Limits that errors must keep, in words.
@@ -238,24 +260,6 @@ pub(crate) fn axis_of(state: usize) -> &'static str {
     SPOKEN[state].trim_end_matches(" position")
 }
 
-/// The reported states and their units, in words.
-pub(crate) const STATES: [&str; REPORTED] = [
-    "position north (m)",
-    "position east (m)",
-    "position down (m)",
-    "velocity north (m/s)",
-    "velocity east (m/s)",
-    "velocity down (m/s)",
-    "roll (°)",
-    "pitch (°)",
-    "yaw (°)",
-];
-
-/// A state as the title of a chart of its errors: `roll error (°)`.
-pub(crate) fn error_of(state: &str) -> String {
-    state.replacen(" (", " error (", 1)
-}
-
 /// The colour of a verdict.
 pub(crate) const fn tone(kind: VerdictKind) -> Tone {
     match kind {
@@ -269,8 +273,8 @@ pub(crate) const fn tone(kind: VerdictKind) -> Tone {
 // Words on what a filter does not expect, and on what a reduction costs it.
 
 /// An error that the filter does not expect: what it is, and what helps.
-pub(crate) fn unexpected_in_words(unexpected: &Unexpected) -> (String, String) {
-    match unexpected {
+pub(crate) fn unexpected_line(unexpected: &Unexpected) -> String {
+    let (what, remedy) = match unexpected {
         Unexpected::TurnOnBias {
             sensor,
             sigma,
@@ -341,12 +345,7 @@ pub(crate) fn unexpected_in_words(unexpected: &Unexpected) -> (String, String) {
             ),
             "a larger imu.rate_hz".to_owned(),
         ),
-    }
-}
-
-/// The same in one line.
-pub(crate) fn unexpected_line(unexpected: &Unexpected) -> String {
-    let (what, remedy) = unexpected_in_words(unexpected);
+    };
     format!("{what}: {remedy}")
 }
 

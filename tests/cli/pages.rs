@@ -151,7 +151,7 @@ fn runs_and_their_comparison_have_pages_with_the_numbers_of_their_results() {
     assert!(numbers_as_in(&page, &summary) > 40);
     for word in [
         "GNSS",
-        "start (1 σ)",
+        "att_sigma_deg",
         "Reference trajectory",
         "Percentiles of the horizontal",
         "NEES (9 if right)",

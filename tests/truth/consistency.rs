@@ -261,7 +261,7 @@ fn long_outages_shift_the_velocity_down_by_the_square_of_the_tilts() {
         );
         let expected = Expected::along(&track, &experiment, &beliefs[0], &file.model).unwrap();
         assert_eq!(
-            expected.outages[0].beyond_linear, is_beyond,
+            expected.summary.outages[0].beyond_linear, is_beyond,
             "{:?}",
             scenario.baro
         );

@@ -244,7 +244,7 @@ fn the_fan_of_another_truth_is_out_of_place() {
 
 /// At the outage's end: RMSE, NEES, and as many runs below each quantile as a binomial law allows.
 fn assert_outage_agrees(name: &str, sampled: &RunResult, expected: &Expected) {
-    let summary = expected.summary();
+    let summary = &expected.summary;
     let outage = &summary.outages[0];
     let records = || sampled.runs.iter().map(|r| &r.outages[0]);
     for i in 0..9 {

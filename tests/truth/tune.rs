@@ -208,7 +208,7 @@ fn a_tuned_filter_is_honest_over_the_run_as_a_verdict_judges_it() {
             .experiment(&drive.trajectory, Truth::Model(&truth), &[], &OUTAGES, 1);
     let summary = Expected::along(&drive.track, &experiment, &belief, &truth)
         .unwrap()
-        .summary();
+        .summary;
     assert!(
         summary.verdict.kind != VerdictKind::Overconfident,
         "{:?} {factors:?}",

@@ -7,17 +7,16 @@ use crate::commands::compare::{Comparison, between};
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::io::atomic::AtomicDir;
 use crate::io::source;
+use crate::report::csv::{csv, flat};
 use crate::report::json;
-use crate::report::verdict::gravest;
-use crate::report::verdict::tone;
+use crate::report::verdict::{gravest, tone, verdict_counts};
 use nav_sim_document::{
-    Axis, Cell as TableCell, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke,
-    Table, Tone, shortest,
+    Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke, Table, Tone,
 };
-use nav_sim_navigation::metrics::{Verdict, compare};
+use nav_sim_navigation::metrics::Verdict;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;
 
@@ -32,12 +31,12 @@ pub struct StudyAnswer {
     missing: Vec<String>,
     cells: Vec<CellSummary>,
     /// One row a cell, outage and state.
-    rows: Vec<Value>,
+    rows: Vec<Map<String, Value>>,
     versions: BTreeSet<String>,
     #[serde(skip)]
     axes: Vec<String>,
     #[serde(skip)]
-    pub(crate) comparisons: Vec<(String, Comparison)>,
+    pub(crate) comparisons: Vec<Comparison>,
     #[serde(skip)]
     unmet: Option<Failure>,
 }
@@ -138,32 +137,23 @@ impl StudyAnswer {
         reference: Option<usize>,
         states: &[usize],
     ) -> Result<()> {
-        let comparison = match reference {
-            Some(i) if read.len() > 1 => {
-                let runs = read.iter().enumerate();
-                let runs = runs.map(|(k, (cell, found))| (cell.name.as_str(), found, k == i));
-                let (cell, found) = &read[i];
-                Some(between(runs, (&cell.name, found), states.to_vec())?)
-            }
-            _ => None,
+        // without the reference each is alone
+        let Some(i) = reference else {
+            let mut alone = read.iter().map(std::slice::from_ref);
+            return alone.try_for_each(|one| self.add(place, one, Some(0), states));
         };
-        for (k, (cell, found)) in read.iter().enumerate() {
+        let runs = read.iter().enumerate();
+        let runs = runs.map(|(k, (cell, found))| (cell.name.as_str(), found, k == i));
+        let (cell, found) = &read[i];
+        let comparison = between(runs, (&cell.name, found), states.to_vec())?;
+        let is_compared = read.len() > 1;
+        for ((cell, found), candidate) in read.iter().zip(&comparison.candidates) {
             let text = source::text(&place.cell(&cell.name).join("summary.json"))
                 .map_err(Failure::could_not)?;
             let summary: Value = serde_json::from_str(&text).map_err(Failure::could_not)?;
-            let alone =
-                compare(&found.experiment, &found.experiment, true).map_err(Failure::could_not)?;
-            let ratios = comparison
-                .as_ref()
-                .map(|c| (&c.candidates[k], c.reference.as_str()));
+            let outages = summary["outages"].as_array().into_iter().flatten();
             let mut ends = Vec::new();
-            for (i, (outage, own)) in summary["outages"]
-                .as_array()
-                .into_iter()
-                .flatten()
-                .zip(&alone)
-                .enumerate()
-            {
+            for (i, (outage, own)) in outages.zip(&candidate.outages).enumerate() {
                 let horizontal = &outage["horizontal_error_end_m"];
                 let time = |key: &str| outage[key].as_f64().unwrap_or(f64::NAN);
                 ends.push(json!({
@@ -173,12 +163,8 @@ impl StudyAnswer {
                     "p95_m": horizontal["p95"],
                     "nees": outage["nees_end"],
                 }));
-                for (s, state) in REPORTED_NAMES.iter().enumerate() {
-                    let ratio = ratios.filter(|(candidate, _)| !candidate.is_reference);
-                    let ratio = ratio.map(|(candidate, _)| &candidate.outages[i].states[s]);
-                    let ends = |ends: Option<[f64; 2]>, k: usize| ends.map(|ends| ends[k]);
-                    let mut row = json!({
-                        "cell": cell.name,
+                for (state, ratio) in REPORTED_NAMES.iter().zip(&own.states) {
+                    let own = json!({
                         "method": summary["method"],
                         "filter": summary["filter_states"],
                         "runs": summary["runs"],
@@ -188,36 +174,32 @@ impl StudyAnswer {
                         "end_s": outage["end_s"],
                         "duration_s": time("end_s") - time("start_s"),
                         "state": state,
-                        "reference": ratios.map(|(_, name)| name),
-                        "paired": ratios.map(|(candidate, _)| candidate.is_paired),
-                        "ratio_error_pct": ratio.map(|r| r.asee.pct),
-                        "abs_ratio_error_pct": ratio.map(|r| r.asee_abs_pct),
-                        "ci95_low_pct": ratio.and_then(|r| ends(r.asee.ci95_pct, 0)),
-                        "ci95_high_pct": ratio.and_then(|r| ends(r.asee.ci95_pct, 1)),
-                        "calibration_half_pct": ratio.and_then(|r| r.calibration_half_pct),
-                        "rmse_end_ratio_error_pct": ratio.map(|r| r.rmse_end.pct),
-                        "rmse_end_ci95_low_pct": ratio.and_then(|r| ends(r.rmse_end.ci95_pct, 0)),
-                        "rmse_end_ci95_high_pct": ratio.and_then(|r| ends(r.rmse_end.ci95_pct, 1)),
-                        "nees_mean": own.nees[0],
+                        "asee_mean": outage["asee_mean"][*state],
+                        "asee_end": outage["asee_end"][*state],
+                        "rmse_mean": outage["rmse_mean"][*state],
+                        "rmse_end": outage["rmse_end"][*state],
+                        "rmse_end_std_error": outage["rmse_end_std_error"][*state],
+                        "reference": is_compared.then_some(&comparison.reference),
+                        "paired": is_compared.then_some(candidate.is_paired),
+
+                        "nees_mean": own.nees_mean,
                         "nees_end": outage["nees_end"],
-                        "coverage": own.coverage[0],
+                        "coverage": own.coverage_mean,
                         "horizontal_p50_m": horizontal["p50"],
                         "horizontal_p95_m": horizontal["p95"],
                         "horizontal_max_m": horizontal["max"],
                         "log_density_end": outage["log_density_end"],
                         "verdict": outage["verdict"]["kind"],
                     });
-                    for key in [
-                        "asee_mean",
-                        "asee_end",
-                        "rmse_mean",
-                        "rmse_end",
-                        "rmse_end_std_error",
-                    ] {
-                        row[key] = outage[key][*state].clone();
-                    }
-                    for (axis, label) in &cell.labels {
-                        row[axis] = label.as_str().into();
+                    let mut row = Map::from_iter([("cell".to_owned(), cell.name.clone().into())]);
+                    row.extend(
+                        cell.labels
+                            .iter()
+                            .map(|(axis, label)| (axis.clone(), label.as_str().into())),
+                    );
+                    let ratio = (!candidate.is_reference).then(|| flat(ratio));
+                    for (key, value) in flat(&own).into_iter().chain(ratio.into_iter().flatten()) {
+                        row.entry(key).or_insert(value);
                     }
                     self.rows.push(row);
                 }
@@ -239,34 +221,10 @@ impl StudyAnswer {
                 outages: ends,
             });
         }
-        let title = reference.map_or_else(String::new, |i| read[i].0.name.clone());
-        self.comparisons
-            .extend(comparison.map(|comparison| (title, comparison)));
-        Ok(())
-    }
-
-    /// A row a cell, outage and state.
-    fn csv(&self) -> String {
-        let axes = self.axes.iter().map(String::as_str);
-        let own = |column: &&str| !self.axes.iter().any(|axis| axis == column);
-        let rest = COLUMNS[1..].iter().copied().filter(own);
-        let columns: Vec<&str> = [COLUMNS[0]].into_iter().chain(axes).chain(rest).collect();
-        let heads = columns[1..].iter().map(|column| (*column).to_owned());
-        let mut table = Table::new([columns[0]]).and(heads);
-        let shown = |value: &Value| match value {
-            Value::Null => String::new(),
-            Value::String(text) => text.clone(),
-            Value::Number(x) if x.is_f64() => shortest(x.as_f64().unwrap_or(f64::NAN)),
-            other => other.to_string(),
-        };
-        for row in &self.rows {
-            table.row(
-                columns
-                    .iter()
-                    .map(|column| TableCell::from(shown(&row[*column]))),
-            );
+        if is_compared {
+            self.comparisons.push(comparison);
         }
-        table.csv()
+        Ok(())
     }
 
     /// Cells that are missing (exit code 75), if there are any.
@@ -281,9 +239,10 @@ impl StudyAnswer {
     /// Writes the results, all or none.
     pub(crate) fn write(&self, place: &Place<'_>) -> Result<()> {
         let mut files = AtomicDir::create(place.0)?;
-        for (name, text) in FILES
-            .into_iter()
-            .zip([self.csv(), json(self), self.document().html()])
+        for (name, text) in
+            FILES
+                .into_iter()
+                .zip([csv(&self.rows), json(self), self.document().html()])
         {
             files.write(name, text)?;
         }
@@ -298,75 +257,28 @@ pub(crate) fn withdraw(place: &Place<'_>) {
         .for_each(|name| drop(fs::remove_file(place.0.join(name))));
 }
 
-const COLUMNS: [&str; 33] = [
-    "cell",
-    "method",
-    "filter",
-    "runs",
-    "diverged",
-    "outage",
-    "start_s",
-    "end_s",
-    "duration_s",
-    "state",
-    "asee_mean",
-    "asee_end",
-    "rmse_mean",
-    "rmse_end",
-    "rmse_end_std_error",
-    "reference",
-    "paired",
-    "ratio_error_pct",
-    "abs_ratio_error_pct",
-    "ci95_low_pct",
-    "ci95_high_pct",
-    "calibration_half_pct",
-    "rmse_end_ratio_error_pct",
-    "rmse_end_ci95_low_pct",
-    "rmse_end_ci95_high_pct",
-    "nees_mean",
-    "nees_end",
-    "coverage",
-    "horizontal_p50_m",
-    "horizontal_p95_m",
-    "horizontal_max_m",
-    "log_density_end",
-    "verdict",
-];
-
 impl Answer for StudyAnswer {
     fn document(&self) -> Document {
-        let kind = gravest(self.cells.iter().map(|cell| &cell.verdict));
-        let count = self.cells.len();
-        let mut lines = vec![format!("{count} cells, {}", verdict_lines(&self.cells))];
-        if !self.complete {
-            lines.push(format!(
-                "{} cells are missing: {}",
-                self.missing.len(),
-                first_of(&self.missing)
-            ));
-        }
-        let tone = if self.complete {
-            tone(kind)
-        } else {
-            Tone::Undecided
+        let verdicts = || {
+            self.cells
+                .iter()
+                .map(|cell| (cell.name.as_str(), &cell.verdict))
+        };
+        let mut lines = verdict_counts(verdicts());
+        lines.extend(self.incomplete().map(|failure| failure.to_string()));
+        let tone = match self.complete {
+            true => tone(gravest(verdicts())),
+            false => Tone::Undecided,
         };
         let mut document = Document::new("Study", tone, lines);
-        let diverged: Vec<&str> = self
-            .cells
-            .iter()
-            .filter(|c| c.diverged > 0)
-            .map(|c| c.name.as_str())
-            .collect();
-        if !diverged.is_empty() {
-            let names: Vec<String> = diverged.iter().map(|name| (*name).to_owned()).collect();
-            document.note(
-                Importance::Warning,
-                format!(
-                    "runs diverged in {}; they are in no number",
-                    first_of(&names)
-                ),
+        let diverged = self.cells.iter().filter(|c| c.diverged > 0);
+        let names: Vec<String> = diverged.map(|c| c.name.clone()).collect();
+        if !names.is_empty() {
+            let text = format!(
+                "runs diverged in {}; they are in no number",
+                first_of(&names)
             );
+            document.note(Importance::Warning, text);
         }
         let columns = [
             ("cell", "../../name"),
@@ -381,8 +293,8 @@ impl Answer for StudyAnswer {
             &self.charts(),
             "Horizontal error at the end of the first outage: p95 and, thin, the median.",
         );
-        for (reference, comparison) in &self.comparisons {
-            document.section(&format!("ASEE relative to {reference}"));
+        for comparison in &self.comparisons {
+            document.section(&format!("ASEE relative to {}", comparison.reference));
             document.text("Mean over the outage of (ratio − 1)·100, with its 95 % interval.");
             document.table(&comparison.table());
         }
@@ -446,19 +358,6 @@ impl StudyAnswer {
         };
         self.axes.iter().filter_map(chart).collect()
     }
-}
-
-/// `3 consistent, 1 overconfident`.
-fn verdict_lines(cells: &[CellSummary]) -> String {
-    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-    for cell in cells {
-        *counts.entry(cell.verdict.kind.name()).or_default() += 1;
-    }
-    counts
-        .iter()
-        .map(|(kind, n)| format!("{n} {kind}"))
-        .collect::<Vec<_>>()
-        .join(", ")
 }
 
 /// The first names of a list.

@@ -1,18 +1,17 @@
 //! A fusion as a document: verdict, figures, track, errors, innovations.
 
 use super::FuseAnswer;
-use super::summary::{Cause, Fixes};
-use crate::report::{reduction_doubt, reduction_line};
+use super::summary::Cause;
+use crate::report::{reduction_doubt, reduction_line, tone};
 use glam::{DVec2, DVec3};
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke, Table, Tone,
-    readable, seconds, window,
+    Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke, Table, readable,
+    seconds, window,
 };
 use nav_sim_navigation::earth::ned_difference;
-use nav_sim_navigation::fusion::{
-    ClocksApart, Drift, Finding, FixRecord, FromReference, Row, SmoothedOutage, Solution, Use,
-};
-use nav_sim_navigation::metrics::{VerdictKind, chi_square_band};
+use nav_sim_navigation::fusion::{ClocksApart, Finding, FixRecord, Row, Solution, Use};
+use nav_sim_navigation::metrics::chi_square_band;
+use nav_sim_navigation::simulation::REPORTED_NAMES;
 use std::path::Path;
 
 const CHECKED: &str =
@@ -22,12 +21,7 @@ impl FuseAnswer {
     /// Verdict, figures, charts and notes.
     pub(super) fn page(&self) -> Document {
         let (solution, summary) = (&self.solution, &self.summary);
-        let tone = match summary.verdict.kind {
-            VerdictKind::Consistent => Tone::Good,
-            VerdictKind::Undecided => Tone::Undecided,
-            VerdictKind::Overconfident => Tone::Bad,
-            _ => Tone::Doubtful,
-        };
+        let tone = tone(summary.verdict.kind);
         let mut document = Document::new("INS/GNSS fusion of recorded data", tone, self.verdict());
         document.facts(&self.facts());
         let outages: Vec<_> = summary
@@ -35,20 +29,7 @@ impl FuseAnswer {
             .iter()
             .map(|o| (o.outage.start_s, o.outage.end_s))
             .collect();
-        document.section("Figures");
-        document.lead(self.figures());
-        if !outages.is_empty() {
-            document.heading("Outages");
-            document.table(&self.outage_table());
-        }
-        if let Some(vehicle) = &summary.vehicle {
-            document.heading("Vehicle");
-            document.table(&vehicle.table());
-        }
-        if let Some(reference) = &summary.reference {
-            document.heading("States");
-            document.table(&state_table(reference));
-        }
+        self.figures(&mut document);
         document.section("Track");
         document.chart(&map(solution, &outages), "North and east of the start.");
         document.section("Position");
@@ -61,9 +42,6 @@ impl FuseAnswer {
         document.chart(&innovations(solution, &outages), FIXES);
         document.chart(&nis(&solution.fixes, &outages), FIXES);
         document.checked(CHECKED);
-        self.notes
-            .iter()
-            .for_each(|note| document.note(note.importance, &note.text));
         if let Some(quality) = self
             .reduction
             .as_ref()
@@ -145,157 +123,110 @@ impl FuseAnswer {
     }
 
     /// Consistency and errors, of the filter and smoothed.
-    fn figures(&self) -> Table {
-        let summary = &self.summary;
-        let smoothed = summary.smoothed.as_ref();
-        let mut table = Table::new(["", "filter", "smoothed"]);
-        let Fixes {
-            used,
-            withheld,
-            rejected,
-        } = summary.fixes;
-        let fixes = format!(
-            "NIS per component, {used} fixes used, {withheld} withheld, {rejected} rejected"
-        );
-        let nis = Cell::number(summary.nis_per_component, "/nis_per_component");
-        table.row([fixes.into(), nis, Cell::figures("–")]);
-        if let Some(ends) = &summary.ends {
-            let name = format!(
-                "error over σ at the ends of {} outages and gaps, rms",
-                ends.count
-            );
-            let ratio = Cell::number(ends.error_over_sigma, "/ends/error_over_sigma");
-            table.row([name.into(), ratio, Cell::figures("–")]);
-        }
-        let rows = &self.solution.rows;
-        let square = |row: &Row| row.sigma[0].powi(2) + row.sigma[1].powi(2);
-        let sigma = (rows.iter().map(square).sum::<f64>() / rows.len() as f64).sqrt();
-        let of_smoothed = number(
-            smoothed.map(|s| s.horizontal_sigma_rms_m),
-            "/smoothed/horizontal_sigma_rms_m",
-        );
-        table.row([
-            "horizontal 1 σ, rms (m)".into(),
-            Cell::figures(readable(sigma)),
-            of_smoothed,
-        ]);
-        let both = [
-            summary.reference.as_ref(),
-            smoothed.and_then(|s| s.reference.as_ref()),
+    fn figures(&self, document: &mut Document) {
+        const OUTAGE: (&str, &str) = ("outage", "{start_s}–{end_s} s");
+        document.section("Figures");
+        let mut rows = [
+            (
+                "NIS per component, {fixes/used} fixes used, {fixes/withheld} withheld, {fixes/rejected} rejected",
+                "nis_per_component -",
+            ),
+            (
+                "error over σ at the ends of {ends/count} outages and gaps, rms",
+                "ends/error_over_sigma -",
+            ),
+            (
+                "horizontal 1 σ, rms (m)",
+                "horizontal_sigma_rms_m smoothed/horizontal_sigma_rms_m",
+            ),
+        ]
+        .map(|(title, keys)| (title.to_owned(), keys.to_owned()))
+        .to_vec();
+        let of_reference = [
+            ("NEES (9 if right)", "nees_mean"),
+            ("horizontal RMSE (m)", "horizontal_rmse_m"),
+            ("horizontal error, largest (m)", "horizontal_max_m"),
+            ("down RMSE (m)", "rmse/pos_d_m"),
+            ("roll RMSE (°)", "rmse/roll_deg"),
+            ("pitch RMSE (°)", "rmse/pitch_deg"),
+            ("yaw RMSE (°)", "rmse/yaw_deg"),
         ];
-        let shown: [Figure; 7] = [
-            ("NEES (9 if right)", "nees_mean", |r| r.nees_mean),
-            ("horizontal RMSE (m)", "horizontal_rmse_m", |r| {
-                r.horizontal_rmse_m
-            }),
-            ("horizontal error, largest (m)", "horizontal_max_m", |r| {
-                r.horizontal_max_m
-            }),
-            ("down RMSE (m)", "rmse/pos_d_m", |r| r.rmse.0[2]),
-            ("roll RMSE (°)", "rmse/roll_deg", |r| r.rmse.0[6]),
-            ("pitch RMSE (°)", "rmse/pitch_deg", |r| r.rmse.0[7]),
-            ("yaw RMSE (°)", "rmse/yaw_deg", |r| r.rmse.0[8]),
+        rows.extend(of_reference.map(|(title, key)| {
+            let keys = format!("reference/{key} smoothed/reference/{key}");
+            (title.to_owned(), keys)
+        }));
+        for (k, o) in self.summary.outages.iter().enumerate() {
+            let window = window(o.outage.start_s, o.outage.end_s);
+            for end in ["fix", "reference"] {
+                rows.push((
+                    format!("end of outage {window}: error from the {end} (m)"),
+                    format!("outages/{k}/end_from_{end}/horizontal_m -"),
+                ));
+            }
+        }
+        let rows: Vec<_> = rows
+            .iter()
+            .map(|(title, keys)| (title.as_str(), keys.as_str()))
+            .collect();
+        let table = Table::of_keys(self, &["", "filter", "smoothed"], &rows);
+        document.lead(table.without_unknown());
+        let mut table = |title: &str, table: Table| {
+            if !table.is_empty() {
+                document.heading(title);
+                document.table(&table.without_unknown());
+            }
+        };
+        let columns = [
+            OUTAGE,
+            ("fixes withheld", "fixes_withheld"),
+            ("end: from the next fix (m)", "end_from_fix/horizontal_m"),
+            ("1 σ", "end_from_fix/expected_sigma_m"),
+            ("from the reference (m)", "end_from_reference/horizontal_m"),
+            ("1 σ", "end_from_reference/expected_sigma_m"),
         ];
-        for (name, key, value) in shown.into_iter().filter(|_| both[0].is_some()) {
-            let [filter, smoothed] = both.map(|reference| reference.map(value));
-            let pointers = [
-                format!("/reference/{key}"),
-                format!("/smoothed/reference/{key}"),
-            ];
-            table.row([
-                name.into(),
-                number(filter, &pointers[0]),
-                number(smoothed, &pointers[1]),
-            ]);
-        }
-        for o in &summary.outages {
-            let name = format!(
-                "end of outage {}: error (1 σ) (m)",
-                window(o.outage.start_s, o.outage.end_s)
-            );
-            table.row([
-                name.into(),
-                drift(o.end_from_reference.or(o.end_from_fix)),
-                Cell::figures("–"),
-            ]);
-        }
-        table.without_unknown()
-    }
-
-    /// Errors at the ends of outages, and the largest in them.
-    fn outage_table(&self) -> Table {
-        let mut table = Table::new([
-            "outage",
-            "fixes withheld",
-            "end: from the next fix (1 σ) (m)",
-        ])
-        .and(
-            [
-                "end: from the reference (1 σ) (m)",
-                "largest 1 σ (m)",
-                "smoothed (m)",
-                "largest error (m)",
-                "smoothed (m)",
-            ]
-            .map(str::to_owned),
+        table("Outages", Table::of(self, "/outages/*", &columns));
+        let columns = [
+            OUTAGE,
+            ("largest 1 σ (m)", "sigma_max_filter_m"),
+            ("smoothed", "sigma_max_m"),
+            ("largest error (m)", "horizontal_max_filter_m"),
+            ("smoothed", "horizontal_max_m"),
+        ];
+        table(
+            "Outages, smoothed",
+            Table::of(self, "/smoothed/outages/*", &columns),
         );
-        for (i, o) in self.summary.outages.iter().enumerate() {
-            let smoothed = self.summary.smoothed.as_ref();
-            let inside = smoothed.and_then(|s| s.outages.iter().find(|s| s.outage == o.outage));
-            let largest = |key: &str, value: fn(&SmoothedOutage) -> Option<f64>| {
-                number(
-                    inside.and_then(value),
-                    &format!("/smoothed/outages/{i}/{key}"),
-                )
-            };
-            table.row([
-                window(o.outage.start_s, o.outage.end_s).into(),
-                Cell::figures(o.fixes_withheld.to_string()),
-                drift(o.end_from_fix),
-                drift(o.end_from_reference),
-                largest("sigma_max_filter_m", |s| Some(s.sigma_max_filter_m)),
-                largest("sigma_max_m", |s| Some(s.sigma_max_m)),
-                largest("horizontal_max_filter_m", |s| s.horizontal_max_filter_m),
-                largest("horizontal_max_m", |s| s.horizontal_max_m),
-            ]);
-        }
-        table.without_unknown()
+        let rows = [
+            ("wheel scale", "wheel_scale"),
+            ("mounting pitch (°)", "mounting_pitch_deg"),
+            ("mounting yaw (°)", "mounting_yaw_deg"),
+        ];
+        let rows =
+            rows.map(|(title, key)| (title, format!("vehicle/{key}/value vehicle/{key}/sigma")));
+        let rows: Vec<_> = rows
+            .iter()
+            .map(|(title, keys)| (*title, keys.as_str()))
+            .collect();
+        table(
+            "Vehicle",
+            Table::of_keys(self, &["", "value", "1 σ"], &rows),
+        );
+        let columns = [
+            ("aid", "aid"),
+            ("used", "count"),
+            ("NIS per component", "nis_per_component"),
+            ("95 % if right: from", "nis_band/lower"),
+            ("to", "nis_band/upper"),
+            ("correlation", "whiteness/lag_1"),
+        ];
+        table("Aids", Table::of(self, "/vehicle/aids/*", &columns));
+        let columns = [
+            ("state", "@"),
+            ("RMSE", "."),
+            ("error over σ, rms", "../../error_over_sigma/@"),
+        ];
+        table("States", Table::of(self, "/reference/rmse/*", &columns));
     }
-}
-
-/// Name, key in JSON, value.
-type Figure = (&'static str, &'static str, fn(&FromReference) -> f64);
-
-fn number(value: Option<f64>, pointer: &str) -> Cell {
-    value.map_or_else(|| Cell::figures("–"), |value| Cell::number(value, pointer))
-}
-
-/// A distance and what the filter states of it.
-fn drift(end: Option<Drift>) -> Cell {
-    let text = end.map(|end| {
-        format!(
-            "{} ({})",
-            readable(end.horizontal_m),
-            readable(end.expected_sigma_m)
-        )
-    });
-    Cell::figures(text.unwrap_or_else(|| "–".to_owned()))
-}
-
-/// Errors of each state, and over their standard deviations.
-fn state_table(reference: &FromReference) -> Table {
-    let mut table = Table::new(["state", "RMSE", "error over σ, rms"]);
-    for (i, (key, name)) in STATES.iter().enumerate() {
-        let cell =
-            |value: f64, group: &str| Cell::number(value, &format!("/reference/{group}/{key}"));
-        let [rmse, ratio] = [reference.rmse.0[i], reference.error_over_sigma.0[i]];
-        table.row([
-            (*name).into(),
-            cell(rmse, "rmse"),
-            cell(ratio, "error_over_sigma"),
-        ]);
-    }
-    table
 }
 
 /// Evidence in a sentence.
@@ -329,7 +260,9 @@ fn evidence(finding: &Finding) -> String {
         Finding::Correlated {
             lag_1,
             pos_sigma_factor,
-        } => lasting(lag_1, pos_sigma_factor),
+        } => format!(
+            "the errors of the fixes last (correlation {lag_1:.2} from one to the next): positions count as {pos_sigma_factor:.1} times as uncertain"
+        ),
         Finding::Minutes {
             bad,
             of,
@@ -358,16 +291,6 @@ fn evidence(finding: &Finding) -> String {
             c.error_over_sigma, c.worst_error_over_sigma, c.worst_state
         ),
     }
-}
-
-/// Errors of fixes that last, and what is made of that.
-fn lasting(lag_1: f64, pos_sigma_factor: f64) -> String {
-    let made = if pos_sigma_factor > 1.0 {
-        format!("positions count as {pos_sigma_factor:.1} times as uncertain")
-    } else {
-        "the position's σ is too small".to_owned()
-    };
-    format!("the errors of the fixes last (correlation {lag_1:.2} from one to the next): {made}")
 }
 
 /// Clocks that are not the same, and the option that makes them so.
@@ -407,24 +330,12 @@ fn cause(cause: &Cause) -> String {
 
 // A fusion drawn: track, position, errors, innovations.
 
-/// States in JSON and on axes.
-pub(super) const STATES: [(&str, &str); 9] = [
-    ("pos_n_m", "north (m)"),
-    ("pos_e_m", "east (m)"),
-    ("pos_d_m", "down (m)"),
-    ("vel_n_m_s", "velocity north (m/s)"),
-    ("vel_e_m_s", "velocity east (m/s)"),
-    ("vel_d_m_s", "velocity down (m/s)"),
-    ("roll_deg", "roll (°)"),
-    ("pitch_deg", "pitch (°)"),
-    ("yaw_deg", "yaw (°)"),
-];
 /// Points of a curve that is smooth: more do not show.
 const MOST: usize = 120;
 /// Fixes of one fate in a panel: more lie on one another.
 const MOST_FIXES: usize = 1000;
-/// Points of a map along its larger half.
-const PIXELS: f64 = 400.0;
+/// Points of a line on the map.
+const MOST_PLACES: usize = 400;
 /// Velocities of a reference that are known worse than this are not drawn: its positions jump (m/s).
 const UNEVEN: f64 = 0.5;
 
@@ -435,12 +346,6 @@ pub(super) const FIXES: &str = "Of a right filter 95 % of the used fixes are in 
 
 /// Colour of what is smoothed.
 const SMOOTHED: Colour = Colour::Hue(2);
-
-fn timed(title: &str, panels: Vec<Panel>, outages: &[(f64, f64)]) -> Chart {
-    Chart::new(title, Axis::linear("time (s)"), panels)
-        .with_outages(outages)
-        .in_group("time")
-}
 
 pub(super) fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     let Some(first) = solution.rows.first() else {
@@ -455,43 +360,29 @@ pub(super) fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
             .map_or(DVec2::NAN, |e| DVec2::new(e.values[1], e.values[0]))
     };
     let reference = |row: &Row| place(row) - error(row);
-    let all: Vec<DVec2> = solution.rows.iter().map(place).collect();
-    let extent = all
-        .iter()
-        .fold(DVec2::ZERO, |most, p| most.max(p.abs()))
-        .max_element();
-    // what lies within a pixel is one point
-    let way = |points: &mut dyn Iterator<Item = DVec2>| {
-        let mut kept: Vec<DVec2> = Vec::new();
-        points.for_each(|p| match kept.last() {
-            Some(last) if last.distance(p) < extent / PIXELS => {}
-            _ => kept.push(p),
-        });
-        kept.into_iter().map(|p| (p.x, p.y)).collect::<Vec<_>>()
+    let way = |rows: &[Row], point: &dyn Fn(&Row) -> DVec2| -> Vec<(f64, f64)> {
+        let shown = rows.iter().step_by(rows.len().div_ceil(MOST_PLACES).max(1));
+        shown.map(point).map(|p| (p.x, p.y)).collect()
     };
     let mut series = Vec::new();
     // the three lie on one another but for metres: wide beneath narrow beneath dashed, all are seen
     if solution.rows.iter().any(|row| row.error.is_some()) {
-        let line = Mark::Line(way(&mut solution.rows.iter().map(reference)), Stroke::Bold);
+        let line = Mark::Line(way(&solution.rows, &reference), Stroke::Bold);
         series.push(Series::new("reference", Colour::Ink, line));
     }
     for (start_s, end_s) in outages {
-        let within = solution
-            .rows
-            .iter()
-            .filter(|row| (start_s..end_s).contains(&&row.t_s));
-        let line = Mark::Line(way(&mut within.map(place)), Stroke::Bold);
+        let [first, end] =
+            [start_s, end_s].map(|t| solution.rows.partition_point(|row| row.t_s < *t));
+        let line = Mark::Line(way(&solution.rows[first..end], &place), Stroke::Bold);
         series.push(Series::new("outage", Colour::Hue(4), line));
     }
     series.push(Series::line(
         "solution",
         Colour::REAL,
-        way(&mut all.iter().copied()),
+        way(&solution.rows, &place),
     ));
     let smoothed = solution.smoothed.iter();
-    series.extend(
-        smoothed.map(|rows| Series::dashed("smoothed", SMOOTHED, way(&mut rows.iter().map(place)))),
-    );
+    series.extend(smoothed.map(|rows| Series::dashed("smoothed", SMOOTHED, way(rows, &place))));
     let ends = [("start", Some(first)), ("end", solution.rows.last())];
     series.extend(ends.into_iter().filter_map(|(name, row)| {
         let DVec2 { x, y } = place(row?);
@@ -533,7 +424,7 @@ pub(super) fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
         let errors: Vec<_> = errors.collect();
         series.extend((!errors.is_empty()).then(|| Series::line(error, real, errors)));
     }
-    timed(
+    Chart::over_time(
         "Horizontal position",
         vec![Panel::new(Axis::log("horizontal (m)"), series)],
         outages,
@@ -541,7 +432,7 @@ pub(super) fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
 }
 
 pub(super) fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
-    let chart = |(i, (_, name)): (usize, &(&str, &str))| {
+    let chart = |(i, name): (usize, &&str)| {
         let is_velocity = (3..6).contains(&i);
         let error = |row: &Row| {
             let known = row
@@ -557,14 +448,14 @@ pub(super) fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> 
             series.push(Series::new(stated, believed, Mark::Band(sigma)));
             series.push(Series::line(line, real, rows.iter().map(error).collect()));
         }
-        timed(
+        Chart::over_time(
             name,
             vec![Panel::new(Axis::linear("").with_zero(), series)],
             outages,
         )
         .small()
     };
-    STATES.iter().enumerate().map(chart).collect()
+    REPORTED_NAMES.iter().enumerate().map(chart).collect()
 }
 
 /// Fates of fixes, and their colours.
@@ -616,7 +507,7 @@ pub(super) fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart 
         .enumerate()
         .map(panel)
         .collect();
-    timed("Innovations of position, normalised", panels, outages)
+    Chart::over_time("Innovations of position, normalised", panels, outages)
 }
 
 pub(super) fn nis(records: &[FixRecord], outages: &[(f64, f64)]) -> Chart {
@@ -632,7 +523,7 @@ pub(super) fn nis(records: &[FixRecord], outages: &[(f64, f64)]) -> Chart {
         Mark::Zone(band.lower, band.upper),
     )];
     series.extend(fixes(records, &|f| f.nis));
-    timed(
+    Chart::over_time(
         "NIS",
         vec![Panel::new(
             Axis::log(&format!("NIS ({dof} if right)")),

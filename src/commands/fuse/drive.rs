@@ -3,14 +3,14 @@
 use super::summary::{
     Cause, FixCorrelation, Fixes, FuseSummary, FuseVerdict, Initial, VehicleSummary,
 };
-use super::{Configuration, Fuse, document};
+use super::{Fuse, document};
 use crate::app::{Context, Input, inputs};
 use crate::app::{Failure, Refuse, Result};
-use crate::commands::run::Reduced;
+use crate::commands::run::reduction_of;
 use crate::io::fusion_files::{read_gnss, read_imu, read_initial, read_wheel};
-use crate::io::model_file::{self, ModelFile};
+use crate::io::model_file::ModelFile;
 use crate::io::trajectory_file::{self, load_reference};
-use nav_sim_document::{Importance, Note, readable, window};
+use nav_sim_document::{Importance, window};
 use nav_sim_navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
 use nav_sim_navigation::fusion::mounting::{self, Mounted, Mounting, MountingError};
@@ -31,6 +31,7 @@ use nav_sim_signal::imu::ImuIncrement;
 use nav_sim_signal::noise::{Composite, Model, Process, continuous, reduction};
 use nav_sim_signal::units::DEG;
 use serde::{Serialize, Serializer};
+use serde_json::{Value, json};
 use std::ops::Range;
 
 /// Solution of a recorded drive.
@@ -43,12 +44,10 @@ pub struct FuseAnswer {
     pub summary: FuseSummary,
     /// Reduction of the model to the filter's states, where it loses something.
     pub reduction: Option<ReductionSummary>,
-    /// Remarks on the files and the drive.
-    pub notes: Vec<Note>,
     /// Files by their roles.
     pub(super) inputs: Vec<Input>,
     /// Settings, for the manifest.
-    pub(super) configuration: Configuration,
+    pub(super) configuration: Value,
 }
 
 impl Serialize for FuseAnswer {
@@ -69,8 +68,7 @@ pub(crate) struct Drive {
     expected: InitialSettings,
     initial: Option<Start>,
     reference: Option<Reference>,
-    notes: Vec<Note>,
-    configuration: Configuration,
+    configuration: Value,
 }
 
 impl Drive {
@@ -78,32 +76,34 @@ impl Drive {
     ///
     /// # Errors
     /// A setting out of range, a file that cannot be used.
-    pub(crate) fn read(request: &Fuse) -> Result<Self> {
+    pub(crate) fn read(request: &Fuse, context: &Context<'_>) -> Result<Self> {
         let settings = request.settings()?;
         let (unsaid, gnss_sigma_factor) = request.fix_sigma();
         let [position, velocity] = gnss_sigma_factor;
-        let topic = request.topic.clone().unwrap_or_default();
-        let imu = read_imu(
-            &request.imu,
-            request.columns.as_deref(),
-            topic.imu.as_deref(),
-        )?;
+        let topic = |k: usize| {
+            request
+                .topic
+                .get(k)
+                .map(String::as_str)
+                .filter(|t| !t.is_empty())
+        };
+        let imu = read_imu(&request.imu, request.columns.as_deref(), topic(0))?;
         let span_s = imu
             .samples
             .first()
             .zip(imu.samples.last())
             .map(|(first, last)| (first.t_s, last.t_s));
-        let (mut gnss, remarks) = read_gnss(
-            &request.gnss,
-            unsaid.as_ref(),
-            span_s,
-            topic.fixes.as_deref(),
-        )?;
+        let (mut gnss, remarks) = read_gnss(&request.gnss, unsaid.as_ref(), span_s, topic(1))?;
         for fix in &mut gnss {
             *fix = fix.with_sigmas_times(position, velocity);
             fix.t_s -= request.gnss_delay_s;
         }
-        let mut notes: Vec<Note> = imu.remarks.into_iter().chain(remarks).collect();
+        for note in imu.remarks.into_iter().chain(remarks) {
+            match note.importance {
+                Importance::Warning => context.warn(note.text),
+                _ => context.remark(note.text),
+            }
+        }
         let wheel = request
             .odometer
             .as_deref()
@@ -112,24 +112,19 @@ impl Drive {
             .initial_file()
             .map(|path| read_initial(path))
             .transpose()?;
-        let model = model_file::read(&request.model)?;
-        notes.extend(model.doubts(&request.model).into_iter().map(warning));
+        let model = inputs::model(&request.model, context)?;
         if (model.model.rate_hz / imu.rate_hz - 1.0).abs() > 0.01 {
             let (from, to) = (model.model.rate_hz, imu.rate_hz);
-            let text = format!("the model was converted from {from} Hz to {to:.3} Hz");
-            notes.push(note(Importance::Detail, text));
+            context.detail(format!(
+                "the model was converted from {from} Hz to {to:.3} Hz"
+            ));
         }
         let of_file = initial
             .as_ref()
             .map(|start| start.sigma.clone())
             .unwrap_or_default();
         let mut expected = request.expected(of_file);
-        let stated = inputs::expected_turn_on(&mut expected, &model.turn_on.unwrap_or_default());
-        for (sensor, sigma) in stated {
-            let (sigma, unit) = (readable(sigma), sensor.unit());
-            let text = format!("the model states a turn-on bias: {sigma} {unit} ({sensor})");
-            notes.push(note(Importance::Remark, text));
-        }
+        inputs::expect_turn_on(&mut expected, &model, &request.model, context);
         expected.validate().refuse()?;
         let options = trajectory_file::Options::default();
         let reference = request
@@ -138,21 +133,24 @@ impl Drive {
             .map(|path| load_reference(path, &options))
             .transpose()?;
         let reference = reference.map(|(reference, warnings)| {
-            notes.extend(warnings.iter().map(warning));
+            warnings.iter().for_each(|warning| context.warn(warning));
             reference
         });
-        let configuration = Configuration {
-            settings: settings.clone(),
-            mounted: request.mounted(),
-            filter: request.filter,
-            initial: expected.clone(),
-            gnss_sigma: unsaid,
-            gnss_sigma_factor,
-            gnss_correlation: request.gnss_correlation,
-            heading: request.given_heading(),
-            aiding: request.aiding(),
-            gnss_delay_s: request.gnss_delay_s,
-        };
+        let mut configuration = json!({
+            "settings": settings,
+            "mounted": request.mounted(),
+            "filter": request.filter,
+            "initial": expected,
+            "gnss_sigma": unsaid,
+            "gnss_sigma_factor": gnss_sigma_factor,
+            "gnss_correlation": request.gnss_correlation,
+            "heading": request.given_heading(),
+            "gnss_delay_s": request.gnss_delay_s,
+        });
+        let aiding = request.aiding();
+        if !aiding.is_none() {
+            configuration["aiding"] = json!(aiding);
+        }
         Ok(Self {
             request: request.clone(),
             settings,
@@ -164,7 +162,6 @@ impl Drive {
             expected,
             initial,
             reference,
-            notes,
             configuration,
         })
     }
@@ -173,7 +170,7 @@ impl Drive {
     ///
     /// # Errors
     /// Data and settings that do not fit together, or a filter that diverges.
-    pub(crate) fn fuse(mut self, inputs: Vec<Input>) -> Result<FuseAnswer> {
+    pub(crate) fn fuse(mut self, context: &Context<'_>) -> Result<FuseAnswer> {
         let origin_s = self.common_origin()?;
         let mut recorded = Recorded {
             imu: &self.imu,
@@ -190,7 +187,10 @@ impl Drive {
         };
         let times_s: Vec<f64> = self.gnss.iter().map(|fix| fix.t_s).collect();
         let placed = plan.on(&FixedData::recorded(&times_s), 0)?;
-        self.notes.extend(placed.remarks.into_iter().map(warning));
+        placed
+            .remarks
+            .iter()
+            .for_each(|remark| context.warn(remark));
         settings.outages = placed.windows;
         let mounting = match self.request.mounted() {
             Mounted::AsGiven => None,
@@ -206,11 +206,11 @@ impl Drive {
         let gnss = earlier(recorded.gnss, rest_s);
         recorded.gnss = &gnss;
         let delay_s = self.request.gnss_delay_s + origin_s.unwrap_or(0.0) + rest_s;
-        self.notes.extend(origin_s.map(|_| {
-            warning(format!(
+        if origin_s.is_some() {
+            context.warn(format!(
                 "the clocks had nothing in common: fused with --gnss-delay={delay_s:.2}, from turns and innovations"
-            ))
-        }));
+            ));
+        }
         let Alignment { start, doubts } = match (&self.initial, self.request.given_heading()) {
             (Some(start), _) => Alignment {
                 start: beside_mounting(start.clone(), &settings),
@@ -219,20 +219,16 @@ impl Drive {
             (None, Some(heading)) => towards(&recorded, &settings, &belief, heading)?,
             (None, None) => coarse(&recorded, &settings, &belief)?,
         };
-        let is_early = |outage: &Outage| outage.end_s <= start.t_s;
-        let early = settings
-            .outages
-            .iter()
-            .copied()
-            .filter(is_early)
-            .map(|outage| {
+        settings.outages.retain(|outage| {
+            let is_early = outage.end_s <= start.t_s;
+            if is_early {
                 let span = window(outage.start_s, outage.end_s);
-                warning(format!(
+                context.warn(format!(
                     "outage {span} ends before the start of the solution: it is left out"
-                ))
-            });
-        self.notes.extend(early.collect::<Vec<_>>());
-        settings.outages.retain(|outage| !is_early(outage));
+                ));
+            }
+            !is_early
+        });
         // the start and the mounting are found without: they are what the vehicle's axes come from
         let aiding = self.request.aiding();
         self.check_wheel(&recorded, &settings.outages)?;
@@ -245,8 +241,9 @@ impl Drive {
             let message = "the reference and the solution have no time in common";
             return Err(Failure::input(message).hint("both need one clock"));
         }
-        self.notes
-            .extend(doubt_heading(&weighed.solution, &settings.outages).map(warning));
+        doubt_heading(&weighed.solution, &settings.outages)
+            .iter()
+            .for_each(|doubt| context.warn(doubt));
         let outcome = outcome(&weighed.solution, &settings.outages);
         let Assessment { verdict, findings } = assess(&weighed, &outcome, &doubts);
         let is_correlated = weighed
@@ -284,6 +281,10 @@ impl Drive {
             .filter(|g| g.is_constant())
             .count();
         let [used, withheld, rejected] = outcome.fixes;
+        let rows = &weighed.solution.rows;
+        let squares = rows
+            .iter()
+            .map(|row| row.sigma[0].powi(2) + row.sigma[1].powi(2));
         let summary = FuseSummary {
             schema_version: 1,
             method: "fusion",
@@ -313,6 +314,7 @@ impl Drive {
                 rejected,
             },
             nis_per_component: outcome.nis_per_component,
+            horizontal_sigma_rms_m: (squares.sum::<f64>() / rows.len() as f64).sqrt(),
             gnss_correlation: FixCorrelation::of(&weighed),
             vehicle: VehicleSummary::of(&weighed.solution, &aiding),
             outages: outcome.outages,
@@ -324,8 +326,7 @@ impl Drive {
             solution: weighed.solution,
             summary,
             reduction,
-            notes: self.notes,
-            inputs,
+            inputs: context.inputs().to_vec(),
             configuration: self.configuration,
         })
     }
@@ -404,15 +405,6 @@ impl Drive {
         clocks.delay_s += self.request.gnss_delay_s;
         Failure::input(e).hint(document::apart(&clocks))
     }
-}
-
-fn note(importance: Importance, text: impl ToString) -> Note {
-    let text = text.to_string();
-    Note { importance, text }
-}
-
-fn warning(text: impl ToString) -> Note {
-    note(Importance::Warning, text)
 }
 
 /// What a cause is looked for with.
@@ -550,17 +542,10 @@ pub(super) fn belief(
     let full = full
         .ok()
         .map(|full| full.with_initial(&beside(states, initial)));
-    let reduced = Reduced {
-        model: &model,
-        belief: &belief,
-        full,
-        track: &track,
-        interval_s,
-        window_s,
-    };
-    let summary = reduced
-        .summary(&Context::default())
-        .map_err(Failure::could_not)?;
+    let made = (&model, &belief, full.as_ref());
+    let scales_s = [interval_s, window_s];
+    let summary = reduction_of(made, &track, scales_s, &Context::default());
+    let summary = summary.map_err(Failure::could_not)?;
     Ok((belief, Some(summary)))
 }
 

@@ -8,6 +8,7 @@ mod summary;
 pub use drive::FuseAnswer;
 pub use summary::{Cause, FuseSummary, VehicleSummary};
 
+use crate::app::inputs::files;
 use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
 use drive::Drive;
 use glam::{DMat3, DQuat, DVec3};
@@ -20,11 +21,9 @@ use nav_sim_navigation::fusion::mounting::{Mounted, MountingError};
 use nav_sim_navigation::fusion::{Correlation, FusionError, Heading, Settings};
 use nav_sim_navigation::gnss::FixSigma;
 use nav_sim_navigation::metrics::VerdictKind;
-use nav_sim_navigation::sensors::aiding::AidingSettings;
 use nav_sim_navigation::sensors::gnss::MAX_LEVER_ARM_M;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_signal::units::DEG;
-use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::fmt::{self, Display, Formatter};
 use std::path::PathBuf;
@@ -35,20 +34,22 @@ impl Command for Fuse {
     const NAME: &'static str = "fuse";
     const OUT: Out = Out::Directory {
         path: "out/fuse",
-        files: &files::FILES,
+        files: &self::files::FILES,
     };
     const PLOT: bool = false;
 
     fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
-        Ok(self
-            .files()
-            .map(|(role, path)| (role, path.clone()))
+        Ok(files("imu", [&self.imu])
+            .chain(files("gnss", [&self.gnss]))
+            .chain(files("model", [&self.model]))
+            .chain(files("initial", self.initial_file()))
+            .chain(files("odometer", &self.odometer))
+            .chain(files("reference", &self.reference))
             .collect())
     }
 
     fn run(&self, context: &Context<'_>) -> Result<FuseAnswer> {
-        let inputs = context.inputs().to_vec();
-        Drive::read(self)?.fuse(inputs)
+        Drive::read(self, context)?.fuse(context)
     }
 }
 
@@ -58,7 +59,7 @@ impl Answer for FuseAnswer {
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {
-        files::directory(self)
+        self::files::directory(self)
     }
 
     fn record(&self) -> serde_json::Value {
@@ -170,8 +171,8 @@ pub struct Fuse {
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub columns: Option<Vec<String>>,
     /// Topic of the IMU in a log that has several; after a comma that of the fixes
-    #[arg(long, value_name = "IMU[,FIXES]")]
-    pub topic: Option<TopicChoice>,
+    #[arg(long, value_name = "IMU[,FIXES]", value_delimiter = ',')]
+    pub topic: Vec<String>,
     /// Also smooth the solution: every row is then estimated from all fixes, later ones included
     #[arg(long)]
     pub smooth: bool,
@@ -185,25 +186,6 @@ impl Fuse {
         } else {
             None
         }
-    }
-
-    /// Every file that is read, by its role.
-    pub(super) fn files(&self) -> impl Iterator<Item = (&'static str, &PathBuf)> {
-        let given = [
-            ("imu", &self.imu),
-            ("gnss", &self.gnss),
-            ("model", &self.model),
-        ];
-        let asked = [
-            ("initial", self.initial_file()),
-            ("odometer", self.odometer.as_ref()),
-            ("reference", self.reference.as_ref()),
-        ];
-        given.into_iter().chain(
-            asked
-                .into_iter()
-                .filter_map(|(role, path)| Some((role, path?))),
-        )
     }
 
     /// Source of the mounting.
@@ -277,7 +259,7 @@ impl Fuse {
                 .to_quat(),
                 DVec3::from(sigma_deg) * DEG,
             ),
-            Some(MountingChoice::Axes(axes)) => (axes.to_frd(), DVec3::ZERO),
+            Some(MountingChoice::Axes(q_s_b)) => (q_s_b, DVec3::ZERO),
             _ => (DQuat::IDENTITY, DVec3::ZERO),
         };
         Ok(Settings {
@@ -293,33 +275,13 @@ impl Fuse {
     }
 }
 
-/// Axes as loggers name them, where they are not front, right, down.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LoggerAxes {
-    /// Front, left, up.
-    Flu,
-    /// Right, front, up: east, north, up of an IMU that points north.
-    Rfu,
-}
-
-impl LoggerAxes {
-    /// Takes a vector in the logger's axes to front, right, down.
-    fn to_frd(self) -> DQuat {
-        let columns = match self {
-            Self::Flu => [DVec3::X, DVec3::NEG_Y, DVec3::NEG_Z],
-            Self::Rfu => [DVec3::Y, DVec3::X, DVec3::NEG_Z],
-        };
-        DQuat::from_mat3(&DMat3::from_cols(columns[0], columns[1], columns[2]))
-    }
-}
-
 /// Attitude of the IMU in the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum MountingChoice {
     /// Found from the drive.
     Auto,
-    /// Axes that have a name.
-    Axes(LoggerAxes),
+    /// From axes with a name to front, right, down.
+    Axes(DQuat),
     /// Given.
     Angles {
         /// Roll, pitch, yaw (degrees).
@@ -336,10 +298,11 @@ impl FromStr for MountingChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        let axes = |[x, y, z]: [DVec3; 3]| Self::Axes(DQuat::from_mat3(&DMat3::from_cols(x, y, z)));
         match text {
             "auto" => return Ok(Self::Auto),
-            "flu" => return Ok(Self::Axes(LoggerAxes::Flu)),
-            "rfu" | "enu" => return Ok(Self::Axes(LoggerAxes::Rfu)),
+            "flu" => return Ok(axes([DVec3::X, DVec3::NEG_Y, DVec3::NEG_Z])),
+            "rfu" | "enu" => return Ok(axes([DVec3::Y, DVec3::X, DVec3::NEG_Z])),
             _ => {}
         }
         // nobody mounts by less, and what a drive shows is known no better
@@ -436,18 +399,13 @@ mod request_tests {
     /// At rest and level an accelerometer measures g upwards: −z of front, right, down.
     #[test]
     fn axes_of_loggers_are_rotations_to_front_right_down() {
-        let to = |axes: LoggerAxes, v: DVec3| (axes.to_frd() * v).round();
-        for axes in [LoggerAxes::Flu, LoggerAxes::Rfu] {
-            assert_eq!(to(axes, DVec3::Z), DVec3::NEG_Z, "{axes:?}");
+        for (name, x, y) in [("flu", DVec3::X, DVec3::NEG_Y), ("rfu", DVec3::Y, DVec3::X)] {
+            let Ok(MountingChoice::Axes(q)) = name.parse() else {
+                panic!("{name}");
+            };
+            let found = [DVec3::X, DVec3::Y, DVec3::Z].map(|v| (q * v).round());
+            assert_eq!(found, [x, y, DVec3::NEG_Z], "{name}");
         }
-        assert_eq!(
-            (to(LoggerAxes::Flu, DVec3::X), to(LoggerAxes::Flu, DVec3::Y)),
-            (DVec3::X, DVec3::NEG_Y)
-        );
-        assert_eq!(
-            (to(LoggerAxes::Rfu, DVec3::X), to(LoggerAxes::Rfu, DVec3::Y)),
-            (DVec3::Y, DVec3::X)
-        );
         let asked = crate::app::Asked::<Fuse>::of(["imu.csv", "gnss.csv", "m.toml"]).unwrap();
         let settings = asked.request.settings().unwrap();
         assert_eq!(settings.q_s_b, DQuat::IDENTITY);
@@ -467,8 +425,6 @@ mod request_tests {
         }
     }
 }
-
-// Choices of a start and of topics, as users write them.
 
 /// Start of a fusion.
 #[derive(Debug, Clone, PartialEq)]
@@ -516,86 +472,6 @@ impl Display for StartChoice {
             Self::File(path) => write!(f, "{}", path.display()),
         }
     }
-}
-
-/// Topics of a log that has several.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct TopicChoice {
-    /// Of the IMU; none: the only one.
-    pub imu: Option<String>,
-    /// Of the fixes; none: the only one.
-    pub fixes: Option<String>,
-}
-
-impl FromStr for TopicChoice {
-    type Err = std::convert::Infallible;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let (imu, fixes) = text.split_once(',').unwrap_or((text, ""));
-        let named = |name: &str| (!name.is_empty()).then(|| name.to_owned());
-        Ok(Self {
-            imu: named(imu),
-            fixes: named(fixes),
-        })
-    }
-}
-
-#[cfg(test)]
-mod start_tests {
-    use super::*;
-
-    #[test]
-    fn a_start_is_a_file_a_heading_or_found() {
-        let start = |text: &str| text.parse::<StartChoice>();
-        assert_eq!(start("auto"), Ok(StartChoice::Auto));
-        assert_eq!(
-            start("-90:5"),
-            Ok(StartChoice::Heading {
-                deg: -90.0,
-                sigma_deg: 5.0
-            })
-        );
-        assert_eq!(
-            start("a/initial.toml"),
-            Ok(StartChoice::File("a/initial.toml".into()))
-        );
-        for bad in ["400:5", "90:0", "90:31"] {
-            assert!(start(bad).is_err(), "{bad}");
-        }
-        for text in ["auto", "-90:5", "a:b.toml"] {
-            assert_eq!(start(text).unwrap().to_string(), text);
-        }
-    }
-}
-
-// The configuration of a fusion in its manifest.
-
-/// Settings of a fusion beside its files.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Configuration {
-    /// Settings of the filter's run; where the mounting is found, about which axes it is looked for.
-    pub(crate) settings: Settings,
-    /// Source of the mounting.
-    pub(crate) mounted: Mounted,
-    /// States of the filter.
-    pub(crate) filter: FilterStates,
-    /// The filter's expectation at the start, and of the IMU beside the model.
-    pub(crate) initial: InitialSettings,
-    /// Standard deviations of fixes that state none.
-    pub(crate) gnss_sigma: Option<FixSigma>,
-    /// Factors of the standard deviations of position and velocity.
-    pub(crate) gnss_sigma_factor: [f64; 2],
-    /// How long errors of positions last.
-    #[serde(default)]
-    pub(crate) gnss_correlation: Correlation,
-    /// Heading at the start, where it was given.
-    #[serde(default)]
-    pub(crate) heading: Option<Heading>,
-    /// What is believed of the vehicle's own knowledge.
-    #[serde(default, skip_serializing_if = "AidingSettings::is_none")]
-    pub(crate) aiding: AidingSettings,
-    /// How much earlier than its time a fix is taken to be (s).
-    pub(crate) gnss_delay_s: f64,
 }
 
 impl From<FusionError> for Failure {

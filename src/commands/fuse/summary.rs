@@ -1,7 +1,7 @@
 //! Verdict and figures of a fusion: `summary.json`.
 
 use super::Fuse;
-use nav_sim_document::{Cell, Table, readable, seconds};
+use nav_sim_document::seconds;
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
 use nav_sim_navigation::fusion::mounting::Mounting;
@@ -56,6 +56,8 @@ pub struct FuseSummary {
     pub(super) fixes: Fixes,
     /// Mean NIS of the fixes used, divided by their number of components: 1 if right.
     pub nis_per_component: f64,
+    /// Root mean square of the horizontal standard deviation of the filter (m).
+    pub horizontal_sigma_rms_m: f64,
     /// Correlation of the innovations, and what the filter makes of it; none where fixes are few.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gnss_correlation: Option<FixCorrelation>,
@@ -323,53 +325,5 @@ impl VehicleSummary {
             mounting_yaw_deg: known(2, DEG),
             aids: aid_innovations(&solution.aids),
         })
-    }
-
-    /// Estimates, and the innovations of each aid.
-    pub(super) fn table(&self) -> Table {
-        let mut table = Table::new(["", "value", "1 σ, or 95 % if right", "correlation"]);
-        let states = [
-            ("wheel scale", "wheel_scale", self.wheel_scale),
-            (
-                "mounting pitch (°)",
-                "mounting_pitch_deg",
-                self.mounting_pitch_deg,
-            ),
-            (
-                "mounting yaw (°)",
-                "mounting_yaw_deg",
-                self.mounting_yaw_deg,
-            ),
-        ];
-        for (name, key, known) in states
-            .into_iter()
-            .filter_map(|(n, k, known)| Some((n, k, known?)))
-        {
-            let cell = |value, part: &str| Cell::number(value, &format!("/vehicle/{key}/{part}"));
-            table.row([
-                name.into(),
-                cell(known.value, "value"),
-                cell(known.sigma, "sigma"),
-                Cell::figures("–"),
-            ]);
-        }
-        for (i, aid) in self.aids.iter().enumerate() {
-            let pointer = |key: &str| format!("/vehicle/aids/{i}/{key}");
-            let band = format!(
-                "{}–{}",
-                readable(aid.nis_band.lower),
-                readable(aid.nis_band.upper)
-            );
-            let lag_1 = aid
-                .whiteness
-                .map(|w| Cell::number(w.lag_1, &pointer("whiteness/lag_1")));
-            table.row([
-                format!("{}: NIS per component, {} used", aid.aid, aid.count).into(),
-                Cell::number(aid.nis_per_component, &pointer("nis_per_component")),
-                Cell::figures(band),
-                lag_1.unwrap_or_else(|| Cell::figures("–")),
-            ]);
-        }
-        table.without_unknown()
     }
 }

@@ -5,7 +5,7 @@ mod needed;
 mod ranking;
 
 pub use needed::Ask;
-pub(crate) use needed::{CatalogueUnit, Misplaced, Requirements};
+pub(crate) use needed::{CatalogueUnit, Requirements};
 
 use crate::app::inputs::{self, ScenarioArgs, files};
 use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
@@ -18,16 +18,14 @@ use crate::io::scenario_file;
 use crate::parse;
 use given::GivenImu;
 use nav_sim_document::{
-    Axis, Cell, Chart, Document, Importance, Panel, Series, readable, seconds, window,
+    Axis, Chart, Document, Importance, Panel, Series, readable, seconds, window,
 };
-use nav_sim_navigation::metrics::OutageMetrics;
 use nav_sim_navigation::require::{Limit, Quantity, RequireError, Worst};
 use nav_sim_navigation::sensors::aiding::AidingSettings;
 use nav_sim_navigation::sensors::outage::{NotAnOutage, Outage};
 use needed::NeededImu;
 use ranking::{Ranking, stated_in_words};
 use serde::Serialize;
-use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -69,22 +67,15 @@ pub struct Require {
     #[command(flatten)]
     pub settings: ScenarioArgs,
     /// What the vehicle knows of its own motion: a car moves neither sideways nor up; with MODEL, a table with and without
-    #[arg(long, value_name = "KIND", value_parser = parse::one_of::<Vehicle>(&Vehicle::NAMES))]
-    pub vehicle: Option<Vehicle>,
+    #[arg(long, value_name = "KIND", value_parser = ["car"])]
+    pub vehicle: Option<String>,
     /// Rank the catalogued IMUs (`nav-sim datasheet --list`), or those of a directory of entries and model files
-    #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = Catalogue::BUILT_IN,
-        conflicts_with = "model")]
-    pub catalogue: Option<Catalogue>,
+    #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = BUILT_IN, conflicts_with = "model")]
+    pub catalogue: Option<PathBuf>,
 }
 
-/// A vehicle that knows something of its own motion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Vehicle {
-    /// A road vehicle.
-    Car,
-}
-
-nav_sim_signal::named!(Vehicle { Car = "car" }, in files);
+/// Stands for the units that are known by name.
+const BUILT_IN: &str = "built-in";
 
 /// A value of `--require`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -125,31 +116,6 @@ impl FromStr for Ask {
                 .map(Self::Length)
                 .map_err(|_| "expected a length in seconds, START:END or longest".to_owned()),
         }
-    }
-}
-
-/// Units that are ranked.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Catalogue {
-    /// Those that are known by name.
-    BuiltIn,
-    /// Entries and model files of a directory.
-    Directory(PathBuf),
-}
-
-impl Catalogue {
-    const BUILT_IN: &str = "built-in";
-}
-
-impl FromStr for Catalogue {
-    type Err = std::convert::Infallible;
-
-    fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
-        Ok(if text == Self::BUILT_IN {
-            Self::BuiltIn
-        } else {
-            Self::Directory(text.into())
-        })
     }
 }
 
@@ -204,10 +170,14 @@ impl Command for Require {
         let asked = self.requirements(context)?;
         let of_others = |found| RequireAnswer { found, file: None };
         match (&self.model, &self.catalogue) {
-            (Some(path), _) => given(path, &asked, self.vehicle, context).map(of_others),
-            (None, Some(Catalogue::BuiltIn)) => ranked(&catalogue(&asked)?, &asked).map(of_others),
-            (None, Some(Catalogue::Directory(directory))) => {
-                ranked(&units_of(directory, &asked, context)?, &asked).map(of_others)
+            (Some(path), _) => given(path, &asked, self.vehicle.is_some(), context).map(of_others),
+            (None, Some(directory)) => {
+                let units = match directory.as_os_str() == BUILT_IN {
+                    true => catalogue(&asked)?,
+                    false => units_of(directory, &asked, context)?,
+                };
+                let ranked = asked.ranked(&units).map_err(Failure::input)?;
+                Ok(of_others(Found::Ranked(ranked)))
             }
             (None, None) => {
                 let needed = sought(&asked)?;
@@ -246,8 +216,8 @@ impl Found {
         match self {
             Self::Needed(_) => None,
             Self::Given(judged) => {
-                let margins = judged.margins.as_ref().filter(|margins| !margins.met())?;
-                let Worst { limit, value, .. } = margins.worst;
+                let missed = judged.judged.as_ref().filter(|judged| !judged.met)?;
+                let Worst { limit, value, .. } = missed.worst;
                 let [value, most] = [value, limit.most].map(|x| limit.quantity.shown(x));
                 Some(Failure::bound(format!(
                     "{} is {value}, the limit is {most}",
@@ -296,7 +266,7 @@ impl Require {
         if let Some(path) = &self.gnss {
             scenario.gnss = scenario_file::read(path)?.gnss;
         }
-        if self.vehicle == Some(Vehicle::Car) {
+        if self.vehicle.is_some() {
             if !scenario.aiding.is_none() {
                 return Err(
                     Failure::input("--vehicle car beside [aiding] of --scenario")
@@ -307,16 +277,7 @@ impl Require {
         }
         scenario.validate().map_err(Failure::input)?;
         let trajectory = inputs::trajectory(&self.trajectory, context)?;
-        Requirements::new(scenario, trajectory, limits, self.outage, self.start).map_err(
-            |e: Misplaced| {
-                let earlier = if self.start.is_some() {
-                    ", or an earlier --start"
-                } else {
-                    ""
-                };
-                Failure::input(e).hint(format!("a shorter --outage{earlier}"))
-            },
-        )
+        Requirements::new(scenario, trajectory, limits, self.outage, self.start)
     }
 }
 
@@ -335,7 +296,7 @@ fn sought(requirements: &Requirements) -> Result<NeededImu> {
 fn given(
     path: &Path,
     requirements: &Requirements,
-    vehicle: Option<Vehicle>,
+    has_vehicle: bool,
     context: &Context<'_>,
 ) -> Result<Found> {
     let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
@@ -353,17 +314,10 @@ fn given(
     }
     let model = inputs::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
     let mut judged = requirements.judged(&scenario, &model).map_err(unusable)?;
-    if vehicle.is_some() {
+    if has_vehicle {
         judged.aidings = requirements.aidings(&scenario, &model).map_err(unusable)?;
     }
     Ok(Found::Given(Box::new(judged)))
-}
-
-/// The units, the best first.
-fn ranked(units: &[CatalogueUnit], requirements: &Requirements) -> Result<Found> {
-    Ok(Found::Ranked(
-        requirements.ranked(units).map_err(Failure::input)?,
-    ))
 }
 
 /// The units that are known by name.
@@ -425,59 +379,31 @@ pub(super) const CURVE_S: [u32; 7] = [1, 3, 10, 30, 60, 120, 300];
 /// Longest outage that is looked at (s).
 pub(super) const LONGEST_S: f64 = 600.0;
 /// What confirms a figure of covariance analysis.
-const CONFIRM: &str = "confirm with nav-sim run --method both";
+pub(super) const CONFIRM: &str = "confirm with nav-sim run --method both";
 /// Last line of each page.
 pub(super) const CHECKED: &str = "covariance analysis against sampled runs: docs/validation.md.";
 /// Caption of drift curves.
 pub(super) const DRIFT: &str =
     "The error at the end of an outage against its length, at the worst of the places.";
 
-/// Error after each of [`CURVE_S`]; none where the trajectory is too short.
-pub(super) type DriftCurve = [Option<f64>; CURVE_S.len()];
-
-/// An outage in which errors are beyond linear theory.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct BeyondLinear {
-    start_s: f64,
-    end_s: f64,
+/// The error after an outage; none where the trajectory is too short.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(super) struct DriftPoint {
+    pub outage_s: u32,
+    pub value: Option<f64>,
 }
 
-impl BeyondLinear {
-    /// None where linear theory covers the outage.
-    pub(super) fn of(outage: &OutageMetrics) -> Option<Self> {
-        outage.beyond_linear.then_some(Self {
-            start_s: outage.start_s,
-            end_s: outage.end_s,
-        })
+/// Warns of an outage in which errors are beyond linear theory.
+pub(super) fn note_beyond(beyond: Option<Outage>, document: &mut Document) {
+    if let Some(Outage { start_s, end_s }) = beyond {
+        let place = window(start_s, end_s);
+        let text = format!("beyond linear theory in outage {place}: {CONFIRM}");
+        document.note(Importance::Warning, text);
     }
-
-    /// Warns of it.
-    pub(super) fn note(beyond: Option<&Self>, document: &mut Document) {
-        if let Some(Self { start_s, end_s }) = beyond {
-            let place = window(*start_s, *end_s);
-            document.note(
-                Importance::Warning,
-                format!("beyond linear theory in outage {place}: {CONFIRM}"),
-            );
-        }
-    }
-}
-
-/// Warns of units beyond linear theory.
-pub(super) fn warn_of_units(names: &[&str], document: &mut Document) {
-    let units = match names.len() {
-        0 => return,
-        1..=3 => names.join(", "),
-        more => format!("{more} units"),
-    };
-    document.note(
-        Importance::Warning,
-        format!("beyond linear theory: {units}: {CONFIRM}"),
-    );
 }
 
 /// What was asked, and where.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Question {
     /// The limits.
     pub limits: Vec<Limit>,
@@ -518,23 +444,9 @@ impl Question {
         }
     }
 
-    /// The quantity that curves of units show: one for all, that of the first limit.
-    pub(super) fn curve_of(&self) -> Quantity {
-        self.limits[0].quantity
-    }
-
     pub(super) fn limits_in_words(&self) -> String {
         let limit = |l: &Limit| format!("{} ≤ {}", l.quantity.name(), readable(l.most));
         self.limits.iter().map(limit).collect::<Vec<_>>().join(", ")
-    }
-
-    pub(super) fn json(&self) -> Value {
-        let limit = |l: &Limit| json!({ "quantity": l.quantity.name(), "most": l.most });
-        let outage = |o: &Outage| json!({ "start_s": o.start_s, "end_s": o.end_s });
-        json!({
-            "limits": self.limits.iter().map(limit).collect::<Vec<_>>(),
-            "outages": self.outages.iter().map(outage).collect::<Vec<_>>(),
-        })
     }
 
     /// `p95_m 4.87 at the end of outage 300–360 s`
@@ -561,14 +473,6 @@ pub(super) const fn quantity_in_words(quantity: Quantity) -> &'static str {
     }
 }
 
-pub(super) fn points_json(curve: &DriftCurve) -> Vec<Value> {
-    CURVE_S
-        .iter()
-        .zip(curve)
-        .map(|(s, x)| json!({ "outage_s": s, "value": x }))
-        .collect()
-}
-
 pub(super) fn drift_chart(quantity: Quantity, series: Vec<Series>) -> Chart {
     let panel = Panel {
         height: 1.3,
@@ -581,14 +485,7 @@ pub(super) fn drift_chart(quantity: Quantity, series: Vec<Series>) -> Chart {
     )
 }
 
-pub(super) fn points(curve: &DriftCurve) -> Vec<(f64, f64)> {
-    CURVE_S
-        .iter()
-        .zip(curve)
-        .map(|(s, x)| (f64::from(*s), x.unwrap_or(f64::NAN)))
-        .collect()
-}
-
-pub(super) fn value(x: Option<f64>, pointer: &str) -> Cell {
-    x.map_or_else(|| Cell::figures("–"), |x| Cell::number(x, pointer))
+pub(super) fn points(curve: &[DriftPoint]) -> Vec<(f64, f64)> {
+    let point = |p: &DriftPoint| (f64::from(p.outage_s), p.value.unwrap_or(f64::NAN));
+    curve.iter().map(point).collect()
 }

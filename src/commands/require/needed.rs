@@ -1,16 +1,16 @@
 //! The IMU that a limit needs.
 
-use super::given::{Aided, GivenImu, Longest};
-use super::ranking::{RankedUnit, Ranking};
-use super::{BeyondLinear, CHECKED, CURVE_S, LONGEST_S, Question};
-use crate::app::inputs;
+use super::given::{Aided, GivenImu, Judged, LimitCurve, Longest};
+use super::ranking::{RankedUnit, Ranking, stated_in_words};
+use super::{CHECKED, CURVE_S, DriftPoint, LONGEST_S, Question, note_beyond};
+use crate::app::{Failure, inputs};
 use crate::io::model_file::{ModelFile, PROGRAM, TurnOn};
-use nav_sim_document::{Cell, Document, Importance, Table, Tone, readable};
+use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds};
 use nav_sim_navigation::ekf::BeliefError;
 use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{
-    Answer, Answer as Bound, Course, Drift, IMU_PARAMETERS, ImuParameters, Limit, Margins, Need,
-    Quantity, RequireError, Worst, evenly,
+    Answer as Bound, Course, Drift, IMU_PARAMETERS, ImuParameters, Limit, Margins, Need, Quantity,
+    RequireError, Worst, evenly,
 };
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::aiding::AidingSettings;
@@ -21,63 +21,59 @@ use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Model;
 use rayon::prelude::*;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 use serde_json::{Value, json};
 
 /// The IMU that a limit needs.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct NeededImu {
-    /// What was asked.
-    pub question: Question,
-    /// With equal shares.
-    pub imu: ImuParameters,
+    schema_version: u32,
+    question: Question,
+    t_corr_s: f64,
+    turn_on_bias: TurnOnBias,
+    figures: Vec<NeededFigure>,
     /// The hardest limit, and where.
-    pub worst: Worst,
-    /// What each intensity may be if there were no other.
-    pub alone: [Bound; IMU_PARAMETERS],
-    /// What each may be if the others are ten times better.
-    pub others_better: [Bound; IMU_PARAMETERS],
-    /// Turn-on biases that it has: accelerometer (m/s²), gyroscope (rad/s).
-    pub turn_on: [f64; 2],
-    /// Where the answer is beyond linear theory.
-    pub beyond_linear: Option<BeyondLinear>,
+    #[serde(flatten)]
+    worst: Worst,
+    /// The outage of the answer, where it is beyond linear theory.
+    beyond_linear: Option<Outage>,
+    /// With equal shares.
+    #[serde(skip)]
+    imu: ImuParameters,
+}
+
+/// Turn-on biases that it has.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct TurnOnBias {
+    accel_m_s2: f64,
+    gyro_rad_s: f64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct NeededFigure {
+    figure: &'static str,
+    /// With equal shares.
+    allocated: f64,
+    /// If there were no other; `any`, or null where none will do.
+    alone: Value,
+    /// If the others are ten times better.
+    others_10_times_better: Value,
 }
 
 impl NeededImu {
     /// The turn-on biases that the answer takes for granted.
-    pub(super) fn turn_on_in_words(&self) -> String {
-        if self.turn_on == [0.0; 2] {
+    fn turn_on_in_words(&self) -> String {
+        let TurnOnBias {
+            accel_m_s2,
+            gyro_rad_s,
+        } = self.turn_on_bias;
+        if accel_m_s2 == 0.0 && gyro_rad_s == 0.0 {
             return "without turn-on bias ([imu] of --scenario states one)".to_owned();
         }
-        let [accel, gyro] = self.turn_on.map(readable);
+        let [accel, gyro] = [accel_m_s2, gyro_rad_s].map(readable);
         format!("with turn-on biases of {accel} m/s² (accel) and {gyro} rad/s (gyro)")
     }
 
-    fn figures(&self) -> Table {
-        let mut table = Table::new([
-            "figure",
-            "at most, equal shares",
-            "if alone",
-            "others 10 × better",
-        ]);
-        for i in 0..IMU_PARAMETERS {
-            let pointer = |key: &str| format!("/figures/{i}/{key}");
-            table.row([
-                ImuParameters::NAMES[i].into(),
-                bound(i, &Bound::AtMost(self.imu.values[i]), &pointer("allocated")),
-                bound(i, &self.alone[i], &pointer("alone")),
-                bound(
-                    i,
-                    &self.others_better[i],
-                    &pointer("others_10_times_better"),
-                ),
-            ]);
-        }
-        table
-    }
-}
-
-impl NeededImu {
     /// Verdict, tables and charts.
     pub(super) fn document(&self) -> Document {
         let lines = [
@@ -86,7 +82,7 @@ impl NeededImu {
             format!("hardest: {}", self.question.worst(&self.worst)),
         ];
         let mut document = Document::new("The IMU that a limit needs", Tone::Good, lines);
-        BeyondLinear::note(self.beyond_linear.as_ref(), &mut document);
+        note_beyond(self.beyond_linear, &mut document);
         let (from_s, to_s) = self.imu.floor_s();
         let floor = format!(
             "bias instability: floor of the Allan deviation, here {} to {} s",
@@ -96,44 +92,19 @@ impl NeededImu {
         document.note(Importance::Detail, floor);
         document.section("Figures, at most");
         document.text("If alone: without any other error of the IMU. Others 10 × better: every other figure ten times smaller.");
-        document.lead(self.figures());
+        let columns = [
+            ("figure", "figure"),
+            ("at most, equal shares", "allocated"),
+            ("if alone", "alone"),
+            ("others 10 × better", "others_10_times_better"),
+        ];
+        document.lead(Table::of(self, "/figures/*", &columns));
         document.checked(CHECKED);
         document
     }
 }
 
-impl Serialize for NeededImu {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let figure = |i: usize| {
-            json!({
-                "figure": ImuParameters::NAMES[i],
-                "allocated": ImuParameters::in_datasheets(i, self.imu.values[i]),
-                "alone": bound_json(i, &self.alone[i]),
-                "others_10_times_better": bound_json(i, &self.others_better[i]),
-            })
-        };
-        let file = json!({
-            "schema_version": 1,
-            "question": self.question.json(),
-            "t_corr_s": self.imu.t_corr_s,
-            "turn_on_bias": { "accel_m_s2": self.turn_on[0], "gyro_rad_s": self.turn_on[1] },
-            "figures": (0..IMU_PARAMETERS).map(figure).collect::<Vec<_>>(),
-            "place": self.worst.place,
-            "beyond_linear": self.beyond_linear,
-        });
-        file.serialize(serializer)
-    }
-}
-
-fn bound(which: usize, found: &Bound, pointer: &str) -> Cell {
-    match found {
-        Bound::AtMost(value) => Cell::number(ImuParameters::in_datasheets(which, *value), pointer),
-        Bound::Any => Cell::figures("any"),
-        Bound::Never => Cell::figures("–"),
-    }
-}
-
-fn bound_json(which: usize, found: &Bound) -> Value {
+fn bound(which: usize, found: &Bound) -> Value {
     match found {
         Bound::AtMost(value) => json!(ImuParameters::in_datasheets(which, *value)),
         Bound::Any => json!("any"),
@@ -176,18 +147,6 @@ const TOGETHER_S: f64 = 60_000.0;
 /// Beginnings at least.
 const BEGINNINGS: f64 = 16.0;
 
-/// An outage that does not lie on the trajectory.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("an outage of {length_s} s from {begins_s} s on is not on the trajectory, which lasts from {} to {} s", .span_s.0, .span_s.1)]
-pub(crate) struct Misplaced {
-    /// How long it lasts (s).
-    pub length_s: f64,
-    /// When it begins (s).
-    pub begins_s: f64,
-    /// Of the trajectory (s).
-    pub span_s: (f64, f64),
-}
-
 /// What is asked of an IMU, and where.
 #[derive(Debug)]
 pub(crate) struct Requirements {
@@ -213,22 +172,22 @@ impl Requirements {
         limits: Vec<Limit>,
         ask: Ask,
         first_s: Option<f64>,
-    ) -> Result<Self, Misplaced> {
+    ) -> Result<Self, Failure> {
         let span_s = (trajectory.start_s(), trajectory.end_s());
         let (lasts_s, length_s) = (span_s.1 - span_s.0, ask.length_s());
         let settled_s = span_s.0 + SETTLED_S.min(0.5 * (lasts_s - length_s)).max(0.0);
+        let earlier = first_s.map_or("", |_| ", or an earlier --start");
         let first_s = first_s.unwrap_or(settled_s);
-        let begins_s = if let Ask::Window(outage) = ask {
-            outage.start_s
-        } else {
-            first_s
+        let begins_s = match ask {
+            Ask::Window(outage) => outage.start_s,
+            _ => first_s,
         };
         if begins_s < span_s.0 || begins_s + length_s > span_s.1 {
-            return Err(Misplaced {
-                length_s,
-                begins_s,
-                span_s,
-            });
+            let message = format!(
+                "an outage of {length_s} s from {begins_s} s on is not on the trajectory, which lasts from {} to {} s",
+                span_s.0, span_s.1
+            );
+            return Err(Failure::input(message).hint(format!("a shorter --outage{earlier}")));
         }
         Ok(Self {
             scenario,
@@ -257,20 +216,28 @@ impl Requirements {
         let model = imu.model(self.scenario.imu.rate_hz);
         let ends = course.drifts(scenario, &model)?;
         let worst = Worst::of(&self.limits, &ends).expect("at least one limit and one place");
-        let mut needed = NeededImu {
-            question: self.question(outages.clone()),
-            imu,
-            worst,
-            alone: [Answer::Any; IMU_PARAMETERS],
-            others_better: [Answer::Any; IMU_PARAMETERS],
-            turn_on: Sensor::ALL.map(|sensor| scenario.imu.turn_on_bias(sensor).unwrap_or(0.0)),
-            beyond_linear: self.beyond_linear(scenario, &model, outages[worst.place])?,
+        let figure = |i: usize| {
+            Ok::<_, RequireError>(NeededFigure {
+                figure: ImuParameters::NAMES[i],
+                allocated: ImuParameters::in_datasheets(i, imu.values[i]),
+                alone: bound(i, &need.quite_alone(&imu, i)?),
+                others_10_times_better: bound(i, &need.alone(&imu, i, 0.1)?),
+            })
         };
-        for i in 0..IMU_PARAMETERS {
-            needed.alone[i] = need.quite_alone(&imu, i)?;
-            needed.others_better[i] = need.alone(&imu, i, 0.1)?;
-        }
-        Ok(needed)
+        let turn_on = |sensor| scenario.imu.turn_on_bias(sensor).unwrap_or(0.0);
+        Ok(NeededImu {
+            schema_version: 1,
+            t_corr_s: imu.t_corr_s,
+            turn_on_bias: TurnOnBias {
+                accel_m_s2: turn_on(Sensor::Accel),
+                gyro_rad_s: turn_on(Sensor::Gyro),
+            },
+            figures: (0..IMU_PARAMETERS).map(figure).collect::<Result<_, _>>()?,
+            beyond_linear: self.beyond_linear(scenario, &model, outages[worst.place])?,
+            question: self.question(outages),
+            worst,
+            imu,
+        })
     }
 
     /// The scenario with a filter that expects the turn-on biases that `[imu]` states, as it expects those of a model file.
@@ -307,33 +274,42 @@ impl Requirements {
         let course = self.course(&long)?;
         let curves = course.curves(scenario, model)?;
         let longest = self.longest_of(&course, (scenario, model), &curves)?;
-        let of_limit = |limit: &Limit| CURVE_S.map(|s| worst_after(&curves, s, limit.quantity));
+        let of_limit = |limit: &Limit| LimitCurve {
+            quantity: limit.quantity,
+            points: drift_curve(&curves, limit.quantity),
+        };
         let curve_of_limit = self.limits.iter().map(of_limit).collect();
-        let (margins, outages, judged) = if self.ask == Ask::Longest {
+        let (judged, outages, shown) = if self.ask == Ask::Longest {
             let length_s = longest.length_s();
             let worst = Worst::of(&self.limits, &after(&curves, length_s));
-            let judged = worst.map(|worst| Outage {
+            let shown = worst.map(|worst| Outage {
                 end_s: long[worst.place].start_s + length_s,
                 ..long[worst.place]
             });
-            (None, long, judged)
+            (None, long, shown)
         } else {
             let outages = self.outages();
             let margins = Margins::of(&self.course(&outages)?, scenario, model, &self.limits)?;
-            let judged = outages[margins.worst.place];
-            (Some(margins), outages, Some(judged))
+            let shown = outages[margins.worst.place];
+            let judged = Judged {
+                met: margins.met(),
+                worst: margins.worst,
+                without_imu_errors: margins.without_imu,
+            };
+            (Some(judged), outages, Some(shown))
         };
-        let beyond_linear = match judged {
+        let beyond_linear = match shown {
             Some(outage) => self.beyond_linear(scenario, model, outage)?,
             None => None,
         };
         Ok(GivenImu {
-            margins,
+            schema_version: 1,
             question: self.question(outages),
-            longest,
+            outage: longest,
             curves: curve_of_limit,
-            aidings: Vec::new(),
             beyond_linear,
+            aidings: Vec::new(),
+            judged,
         })
     }
 
@@ -366,9 +342,9 @@ impl Requirements {
                 self.ask.length_s()
             };
             Ok(Aided {
-                name,
+                aiding: name,
                 worst: Worst::of(&self.limits, &after(&curves, length_s)),
-                longest,
+                outage: longest,
             })
         };
         all.into_par_iter().map(aided).collect()
@@ -381,16 +357,15 @@ impl Requirements {
         scenario: &Scenario,
         model: &Model,
         outage: Outage,
-    ) -> Result<Option<BeyondLinear>, RequireError> {
+    ) -> Result<Option<Outage>, RequireError> {
         let (scenario, outages) = (scenario.with_full_noise(), [outage]);
         let track = scenario.track(&self.trajectory, model, &outages)?;
         let belief = scenario.belief(model, &outages, &track)?;
         let experiment =
             scenario.experiment(&self.trajectory, Truth::Model(model), &[], &outages, 0);
-        let Some(expected) = Expected::along(&track, &experiment, &belief, model) else {
-            return Ok(None);
-        };
-        Ok(expected.outages.first().and_then(BeyondLinear::of))
+        let expected = Expected::along(&track, &experiment, &belief, model);
+        let is_beyond = expected.is_some_and(|expected| expected.summary.outages[0].beyond_linear);
+        Ok(is_beyond.then_some(outage))
     }
 
     /// Units after the outage and after those of `CURVE_S`: those whose figures are all stated, the best first, then the others
@@ -409,14 +384,16 @@ impl Requirements {
             |unit: &CatalogueUnit| self.rank(&course, unit).map_err(|e| named(&unit.name, e));
         let ranked: Vec<Result<RankedUnit, RequireError>> = units.par_iter().map(ranked).collect();
         let mut units = ranked.into_iter().collect::<Result<Vec<_>, _>>()?;
-        units.sort_by(|a, b| match (a.is_complete(), b.is_complete()) {
-            (true, true) => b.worst.margin().total_cmp(&a.worst.margin()),
-            (false, false) => a.name.cmp(&b.name),
-            (a, b) => b.cmp(&a),
+        units.sort_by(|a, b| match [a, b].map(|unit| unit.not_stated.is_empty()) {
+            [true, true] => b.worst.margin().total_cmp(&a.worst.margin()),
+            [false, false] => a.unit.cmp(&b.unit),
+            [a, b] => b.cmp(&a),
         });
         Ok(Ranking {
-            units,
+            schema_version: 1,
             question: self.question(self.outages()),
+            curve_quantity: self.limits[0].quantity,
+            units,
         })
     }
 
@@ -425,17 +402,23 @@ impl Requirements {
         let length_s = self.ask.length_s();
         let worst = Worst::of(&self.limits, &after(&curves, length_s));
         let worst = worst.ok_or(RequireError::PartOfASecond { length_s })?;
+        let is_complete = unit.not_stated.is_empty();
+        let kept = match worst.margin() >= 0.0 {
+            true if is_complete => "met",
+            true => "open",
+            false => "not met",
+        };
+        let outage = self.outages()[worst.place];
         Ok(RankedUnit {
-            name: unit.name.clone(),
+            unit: unit.name.clone(),
+            met: kept == "met",
+            kept,
+            missing: stated_in_words(&unit.not_stated),
             not_stated: unit.not_stated.clone(),
             worst,
-            curve: CURVE_S.map(|s| worst_after(&curves, s, self.limits[0].quantity)),
-            longest: self.longest_of(course, (&unit.scenario, &unit.model), &curves)?,
-            beyond_linear: self.beyond_linear(
-                &unit.scenario,
-                &unit.model,
-                self.outages()[worst.place],
-            )?,
+            curve: drift_curve(&curves, self.limits[0].quantity),
+            outage: self.longest_of(course, (&unit.scenario, &unit.model), &curves)?,
+            beyond_linear: self.beyond_linear(&unit.scenario, &unit.model, outage)?,
         })
     }
 
@@ -453,15 +436,26 @@ impl Requirements {
                 .iter()
                 .any(|drift| self.limits.iter().any(|l| drift.exceeds(l)))
         };
-        Ok(match lengths.iter().position(is_missed) {
-            Some(0) => {
-                let worst = Worst::of(&self.limits, &course.with_all_fixes(scenario, model)?);
-                worst
-                    .filter(|worst| worst.margin() < 0.0)
-                    .map_or(Longest::Seconds(0.0), Longest::Never)
-            }
-            Some(first) => Longest::Seconds(lengths[first - 1]),
-            None => Longest::AtLeast(lengths.last().copied().unwrap_or(0.0)),
+        let missed = lengths.iter().position(is_missed);
+        let with_all_fixes = match missed {
+            Some(0) => Worst::of(&self.limits, &course.with_all_fixes(scenario, model)?),
+            _ => None,
+        };
+        let with_all_fixes = with_all_fixes.filter(|worst| worst.margin() < 0.0);
+        let longest_s = missed.map(|first| first.checked_sub(1).map_or(0.0, |last| lengths[last]));
+        let at_least_s = lengths.last().copied().unwrap_or(0.0);
+        let text = match longest_s {
+            _ if with_all_fixes.is_some() => "none".to_owned(),
+            // curves begin with the first second: what is not kept then may be kept for a part of it
+            Some(s) if s < 1.0 => "less than 1 s".to_owned(),
+            Some(s) => format!("{} s", seconds(s)),
+            None => format!("≥ {} s", seconds(at_least_s)),
+        };
+        Ok(Longest {
+            longest_s,
+            at_least_s: longest_s.is_none().then_some(at_least_s),
+            with_all_fixes,
+            text,
         })
     }
 
@@ -583,9 +577,13 @@ fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
     curves.iter().filter_map(drift_of_curve).collect()
 }
 
-/// The largest value of a quantity after a time without fixes.
-fn worst_after(curves: &[Vec<Drift>], length_s: u32, quantity: Quantity) -> Option<f64> {
-    Drift::largest(&after(curves, f64::from(length_s)), quantity).map(|(_, value)| value)
+/// The largest value of a quantity after each of [`CURVE_S`] without fixes.
+fn drift_curve(curves: &[Vec<Drift>], quantity: Quantity) -> Vec<DriftPoint> {
+    let point = |outage_s: u32| DriftPoint {
+        outage_s,
+        value: Drift::largest(&after(curves, f64::from(outage_s)), quantity).map(|(_, x)| x),
+    };
+    CURVE_S.map(point).to_vec()
 }
 
 #[cfg(test)]

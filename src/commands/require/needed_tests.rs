@@ -5,7 +5,7 @@ use nav_sim_navigation::require::Quantity;
 use nav_sim_navigation::trajectory::TrajectorySample;
 
 /// At rest from 1000 s on, for so long.
-fn at_rest(lasts_s: f64, ask: Ask, first_s: Option<f64>) -> Result<Requirements, Misplaced> {
+fn at_rest(lasts_s: f64, ask: Ask, first_s: Option<f64>) -> Result<Requirements, Failure> {
     let sample = |k: u32| TrajectorySample {
         t_s: 1000.0 + lasts_s * f64::from(k) / 8.0,
         lat: 0.8,

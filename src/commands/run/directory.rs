@@ -5,7 +5,7 @@ use crate::commands::run::RunOrigin;
 use crate::failure::{Failure, Place};
 use crate::io::run_tables::{REPEAT, parse_epochs, parse_runs};
 use crate::io::{hash, source};
-use nav_sim_navigation::metrics::{EpochRow, Measured, PerState, Verdict};
+use nav_sim_navigation::metrics::{Measured, PerState, Verdict};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::{OutageRecord, RunRecord};
 use std::path::Path;
@@ -37,19 +37,27 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, Failure> {
     let (path, epochs_text) = text(directory, "epochs.csv")?;
     let epochs = parse_epochs(&path, &epochs_text)?;
     as_written(directory, &manifest, "epochs.csv", &epochs_text)?;
+    let (path, summary) = text(directory, "summary.json")?;
+    let found: Found = serde_json::from_str(&summary).map_err(|e| not_json(&path, &e))?;
+    as_written(directory, &manifest, "summary.json", &summary)?;
     let is_expected = origin.configuration.run.method == Method::Lincov;
     let runs = if is_expected {
-        let (path, summary) = text(directory, "summary.json")?;
-        let run = expected_run(&path, &summary, &epochs)?;
-        as_written(directory, &manifest, "summary.json", &summary)?;
-        vec![run]
+        let known = |state: PerState<Option<f64>>| state.0.map(|x| x.unwrap_or(f64::NAN));
+        let outage = |o: &FoundOutage| OutageRecord {
+            see_mean: known(o.asee_mean),
+            error_end: known(o.rmse_end),
+            ..OutageRecord::default()
+        };
+        vec![RunRecord {
+            outages: found.outages.iter().map(outage).collect(),
+            ..RunRecord::default()
+        }]
     } else {
         let (path, runs_text) = text(directory, "runs.csv")?;
         let runs = parse_runs(&path, &runs_text)?;
         as_written(directory, &manifest, "runs.csv", &runs_text)?;
         runs
     };
-    let (verdict, asee_mean_ci95) = found(directory, &manifest)?;
     let outages = origin
         .configuration
         .outage
@@ -64,39 +72,28 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, Failure> {
         outages,
         independent_windows,
         is_expected,
-        beyond_linear: verdict.beyond_linear,
     };
     Ok(RunDirectory {
         manifest,
         origin,
         experiment,
-        verdict,
-        asee_mean_ci95,
+        verdict: found.verdict,
+        asee_mean_ci95: found.outages.iter().map(|o| o.asee_mean_ci95).collect(),
     })
 }
 
-/// The verdict, and the intervals that the calibration leaves outage by outage, from the summary.
-fn found(directory: &Path, manifest: &Manifest) -> Result<(Verdict, Vec<OpenEnds>), Failure> {
-    #[derive(serde::Deserialize)]
-    struct Found {
-        verdict: Verdict,
-        outages: Vec<FoundOutage>,
-    }
-    #[derive(serde::Deserialize)]
-    struct FoundOutage {
-        asee_mean_ci95: Option<PerState<(f64, f64)>>,
-    }
-    let (path, summary) = text(directory, "summary.json")?;
-    let found: Found = serde_json::from_str(&summary).map_err(|e| not_json(&path, &e))?;
-    as_written(directory, manifest, "summary.json", &summary)?;
-    Ok((
-        found.verdict,
-        found
-            .outages
-            .into_iter()
-            .map(|o| o.asee_mean_ci95)
-            .collect(),
-    ))
+/// `summary.json`, as far as comparisons need it.
+#[derive(serde::Deserialize)]
+struct Found {
+    verdict: Verdict,
+    outages: Vec<FoundOutage>,
+}
+
+#[derive(serde::Deserialize)]
+struct FoundOutage {
+    asee_mean: PerState<Option<f64>>,
+    rmse_end: PerState<Option<f64>>,
+    asee_mean_ci95: OpenEnds,
 }
 
 /// Refuses a file that is not the one the manifest tells of; what can be read of it was, for a more exact message.
@@ -115,39 +112,6 @@ fn as_written(
         }
         _ => Ok(()),
     }
-}
-
-/// The run that stands for what covariance analysis expects, from its epochs and its summary.
-fn expected_run(path: &str, summary: &str, epochs: &[EpochRow]) -> Result<RunRecord, Failure> {
-    #[derive(serde::Deserialize)]
-    struct Expected {
-        outages: Vec<ExpectedOutage>,
-    }
-    #[derive(serde::Deserialize)]
-    struct ExpectedOutage {
-        asee_mean: PerState<f64>,
-        asee_end: PerState<f64>,
-        rmse_end: PerState<f64>,
-        nees_end: f64,
-    }
-    let expected: Expected = serde_json::from_str(summary).map_err(|e| not_json(path, &e))?;
-    let outage = |o: ExpectedOutage| OutageRecord {
-        see_mean: o.asee_mean.0,
-        see_end: o.asee_end.0,
-        error_end: o.rmse_end.0,
-        nees_end: o.nees_end,
-        ..OutageRecord::default()
-    };
-    let mean = |value: &dyn Fn(&EpochRow) -> f64| {
-        epochs.iter().map(value).sum::<f64>() / epochs.len() as f64
-    };
-    Ok(RunRecord {
-        outages: expected.outages.into_iter().map(outage).collect(),
-        nees_mean: mean(&|e| e.nees),
-        covered: mean(&|e| e.coverage),
-        normalised_sq: std::array::from_fn(|i| mean(&|e| (e.rmse[i] / e.asee[i]).powi(2))),
-        ..RunRecord::default()
-    })
 }
 
 fn manifest(directory: &Path) -> Result<(Manifest, RunOrigin), Failure> {

@@ -3,77 +3,64 @@
 use super::{Navigation, RunAnswer};
 use crate::report::verdict::requirement_line;
 use crate::report::verdict::verdict_lines;
-use crate::report::{
-    STATES, error_of, reduction_doubt, reduction_line, tone, unexpected_in_words, unexpected_line,
-};
+use crate::report::{reduction_doubt, reduction_line, tone, unexpected_line};
 use nav_sim_document::{
     Axis, Cell, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, Tone,
     readable, window,
 };
-use nav_sim_navigation::ekf::{FixUpdate, InitialSettings};
+use nav_sim_navigation::ekf::FixUpdate;
 use nav_sim_navigation::metrics::{
-    Budget, EpochMetrics, FanEpoch, Met, OutageSummary, PerState, Summary, VerdictKind,
+    Budget, EpochMetrics, FanEpoch, OutageSummary, Summary, VerdictKind,
 };
 use nav_sim_navigation::scenario::{Method, Unexpected};
-use nav_sim_navigation::sensors::aiding::{Aid, AidingSettings};
-use nav_sim_navigation::sensors::defects::{Defect, ImuSettings};
-use nav_sim_navigation::sensors::gnss::GnssSettings;
-use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
-use nav_sim_signal::imu::Sensor;
-use nav_sim_signal::units::DEG;
+use nav_sim_navigation::simulation::REPORTED_NAMES;
 
 /// Outages whose tables are shown: of more, those with the largest errors.
 const OUTAGES: usize = 3;
-/// Outages in the table of a terminal: of more, those with the largest errors.
-const LISTED: usize = 6;
 /// Sources of errors that a line names.
 const SOURCES: usize = 3;
 
+const HORIZONTAL: &str = "Horizontal RMSE, and the filter's own standard deviation (ASEE, averaged standard estimation error; north and \
+     east together) with the range up to three times that. Dots: median at the end of an outage, the bar up to the 95 % quantile.";
+const FAN: &str =
+    "Quantiles over time, as in fan.csv. Dashed: 5, 50 and 95 % by covariance analysis.";
+const STATES_SHOWN: &str = "RMSE: how wrong the filter is. ASEE: its own standard deviation. Their ratio is 1 if the filter is right.";
+const CONSISTENCY: &str = "NEES: normalised estimation error squared of position, velocity and attitude. Coverage: share of errors inside \
+     the filter's ellipsoid of position and attitude.";
+
 /// The document of an answer.
 pub(super) fn document(answer: &RunAnswer) -> Document {
-    let RunAnswer {
-        navigation:
-            Navigation {
-                epochs,
-                fan,
-                summary,
-                ..
-            },
-        track,
+    let Navigation {
+        epochs,
+        fan,
+        summary,
         ..
-    } = answer;
+    } = &answer.navigation;
     let windows = windows(summary);
-    let title = if summary.runs > 0 {
-        "INS/GNSS Monte-Carlo run"
-    } else {
-        "INS/GNSS covariance analysis"
+    let tone = match summary.require.iter().all(|met| met.met) {
+        true => tone(summary.verdict.kind),
+        false => Tone::Bad,
     };
-    let (kept, missed): (Vec<&Met>, Vec<&Met>) = summary.require.iter().partition(|met| met.met);
-    let tone = if missed.is_empty() {
-        tone(summary.verdict.kind)
-    } else {
-        Tone::Bad
-    };
-    // What the command ends with is what the reader asked for: it comes before the filter.
-    let mut lines: Vec<String> = missed
-        .iter()
-        .map(|met| requirement_line(met, summary))
-        .collect();
+    let required = summary.require.iter();
+    // What was asked for comes before the filter.
+    let mut lines: Vec<String> = required.map(|met| requirement_line(met, summary)).collect();
     let mut verdict = verdict_lines(summary);
     verdict[0] = format!("verdict: {}", verdict[0]);
     lines.extend(verdict);
-    lines.extend(kept.iter().map(|met| requirement_line(met, summary)));
-    let mut page = Document::new(title, tone, lines);
+    let mut page = Document::new(&format!("INS/GNSS {}", summary.method), tone, lines);
     notes(summary, answer, &mut page);
     page.facts(&assumptions(summary, answer));
-    page.chart(&track.map("Reference trajectory", &windows), "");
-    page.chart(&horizontal(epochs, summary), horizontal_caption(summary));
-    page.chart(&fan_chart(fan, summary), &fan_caption(fan, summary));
-    outages(summary, &mut page);
+    page.chart(&answer.track.map("Reference trajectory", &windows), "");
+    page.chart(&horizontal(epochs, summary), HORIZONTAL);
+    page.chart(&fan_chart(fan, summary), FAN);
+    let shown = largest(summary, OUTAGES);
+    outages(answer, &shown, &mut page);
     page.section("Errors over time");
-    page.charts(&states(epochs, &windows), rmse_and_asee(summary));
-    consistency(epochs, summary, &mut page);
-    budgets(summary, &largest(summary, OUTAGES), &mut page);
+    page.charts(&states(epochs, &windows), STATES_SHOWN);
+    page.section("Consistency");
+    page.chart(&nees(epochs, summary), CONSISTENCY);
+    page.table(&consistency(answer));
+    budgets(summary, &shown, &mut page);
     provenance(answer, &mut page);
     page.checked(
         "The filter's standard deviations agree to 2e-4 with an independent implementation; the NEES of filters whose model is right \
@@ -115,16 +102,6 @@ fn notes(summary: &Summary, answer: &RunAnswer, page: &mut Document) {
         sources(outage)
             .into_iter()
             .for_each(|line| page.note(Importance::Remark, line));
-        by_calibration(outage)
-            .into_iter()
-            .for_each(|line| page.note(Importance::Remark, line));
-    }
-    if summary.outages.len() > LISTED {
-        let all = summary.outages.len();
-        let text = format!(
-            "the table has the {LISTED} of {all} outages with the largest errors, the page all"
-        );
-        page.note(Importance::Remark, text);
     }
 }
 
@@ -146,66 +123,6 @@ fn sources(outage: &OutageSummary) -> Option<String> {
     ))
 }
 
-/// Intervals that the calibrations of the models leave.
-fn by_calibration(outage: &OutageSummary) -> Option<String> {
-    let shown = |name: &str, value: f64, (low, high): (f64, f64)| {
-        format!(
-            "{name} {} m [{}, {}]",
-            readable(value),
-            readable(low),
-            readable(high)
-        )
-    };
-    let h = &outage.horizontal_error_end_m;
-    let p95 = h
-        .p95_ci95
-        .0
-        .zip(h.p95_ci95.1)
-        .map(|ends| shown("p95", h.p95, ends));
-    let of_east = |name: &str, value: &PerState<f64>, interval: &Option<PerState<(f64, f64)>>| {
-        interval.map(|interval| shown(name, value.0[1], interval.0[1]))
-    };
-    let rmse = of_east("RMSE east", &outage.rmse_end, &outage.rmse_end_ci95);
-    let asee = of_east("ASEE east", &outage.asee_end, &outage.asee_end_ci95);
-    let is_known = outage.asee_end_ci95.is_some() || outage.rmse_end_ci95.is_some();
-    let all: Vec<String> = [p95, rmse, asee].into_iter().flatten().collect();
-    let place = window(outage.start_s, outage.end_s);
-    (is_known && !all.is_empty()).then(|| {
-        format!(
-            "95 % by the calibration, end of {place}: {}",
-            all.join(", ")
-        )
-    })
-}
-
-/// A table of figures, of which a covariance analysis does not have all: no draw, hence no interval.
-fn known(table: Table, summary: &Summary) -> Table {
-    if summary.runs > 0 {
-        table
-    } else {
-        table.without_unknown()
-    }
-}
-
-fn fan_caption(fan: &[FanEpoch], summary: &Summary) -> String {
-    let whose = if summary.runs > 0 {
-        "the runs' horizontal position errors"
-    } else {
-        "the horizontal position error by covariance analysis"
-    };
-    let beside = match fan.iter().any(|e| e.lincov_m.is_some()) {
-        true => " Dashed: 5, 50 and 95 % by covariance analysis.",
-        false => "",
-    };
-    let left_out = match summary.diverged {
-        0 => String::new(),
-        n => format!(" The {n} runs that diverged are left out."),
-    };
-    format!(
-        "Quantiles of {whose} over time: half of all errors in the dark band, nine in ten in both.{beside}{left_out} The numbers are in fan.csv."
-    )
-}
-
 /// Positions of the outages with the largest errors, in time order.
 fn largest(summary: &Summary, count: usize) -> Vec<usize> {
     let error =
@@ -217,207 +134,77 @@ fn largest(summary: &Summary, count: usize) -> Vec<usize> {
     all
 }
 
-fn outages(summary: &Summary, page: &mut Document) {
+fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
+    let summary = &answer.navigation.summary;
     if summary.outages.is_empty() {
         page.section("Accuracy over the run");
-        let a = &summary.accuracy;
-        page.lead(pairs(
-            &[("mean", "/accuracy".to_owned(), &a.rmse_mean, &a.asee_mean)],
-            "mean",
-        ));
+        let columns = [
+            ("state", "@"),
+            ("RMSE, mean", "."),
+            ("ASEE, mean", "../../asee_mean/@"),
+        ];
+        page.lead(Table::of(answer, "/accuracy/rmse_mean/*", &columns));
         return;
     }
     page.section("At the ends of outages");
-    page.lead(lead(summary));
-    let has_intervals = summary.runs > 0
-        || summary.outages.iter().any(|o| {
-            let h = &o.horizontal_error_end_m;
-            [h.p50_ci95, h.p95_ci95].iter().any(|ci| ci.0.is_some())
-        });
-    let brackets = if has_intervals {
-        "; brackets are 95 % intervals"
-    } else {
-        ""
-    };
-    page.text(&format!(
-        "Just before the first fix after the outage{brackets}."
-    ));
-    page.table(&known(ends(summary), summary));
-    by_state(summary, page);
-}
-
-/// Horizontal errors at the ends of outages, and how soon fixes mend them.
-fn ends(summary: &Summary) -> Table {
-    let is_expected = summary
-        .outages
-        .iter()
-        .any(|o| o.horizontal_error_end_m.p999.is_some());
-    let (last, key) = if is_expected {
-        ("99.9 % (m)", "p999")
-    } else {
-        ("largest (m)", "max")
-    };
-    let mut table = Table::new([
-        "outage",
-        "horizontal, median (m)",
-        "95 % interval",
-        "horizontal, 95 % (m)",
-        "95 % interval",
-        last,
-        "re-convergence, median (s)",
-    ]);
-    let interval = |ci: (Option<f64>, Option<f64>)| {
-        let bound = |b: Option<f64>| b.map_or("–".to_owned(), readable);
-        Cell::figures(format!("[{}, {}]", bound(ci.0), bound(ci.1)))
-    };
-    for (i, o) in summary.outages.iter().enumerate() {
-        let h = &o.horizontal_error_end_m;
-        let source_of = |key: &str| format!("/outages/{i}/{key}");
-        table.row([
-            window(o.start_s, o.end_s).into(),
-            Cell::number(h.p50, &source_of("horizontal_error_end_m/p50")),
-            interval(h.p50_ci95),
-            Cell::number(h.p95, &source_of("horizontal_error_end_m/p95")),
-            interval(h.p95_ci95),
-            Cell::number(
-                h.p999.unwrap_or(h.max),
-                &source_of(&format!("horizontal_error_end_m/{key}")),
-            ),
-            Cell::number(o.reconvergence_s.p50, &source_of("reconvergence_s/p50")),
-        ]);
-    }
-    table
-}
-
-/// State by state, the outages with the largest errors.
-fn by_state(summary: &Summary, page: &mut Document) {
-    let shown = largest(summary, OUTAGES);
-    let names: Vec<String> = shown
-        .iter()
-        .map(|i| &summary.outages[*i])
-        .map(|o| window(o.start_s, o.end_s))
-        .collect();
-    let table = |suffix: &str| {
-        let errors_of_outage = |i: &usize| {
-            let o = &summary.outages[*i];
-            let (rmse, asee) = if suffix == "end" {
-                (&o.rmse_end, &o.asee_end)
-            } else {
-                (&o.rmse_mean, &o.asee_mean)
-            };
-            (format!("/outages/{i}"), rmse, asee)
-        };
-        let columns: Vec<Pair<'_>> = names
-            .iter()
-            .zip(shown.iter().map(errors_of_outage))
-            .map(|(name, (place, rmse, asee))| (name.as_str(), place, rmse, asee))
-            .collect();
-        pairs(&columns, suffix)
-    };
-    page.heading("RMSE and ASEE at the end");
-    page.table(&table("end"));
-    page.text(rmse_and_asee(summary));
-    page.folded("Means over the outage", |page| page.table(&table("mean")));
-    if summary.outages.len() > shown.len() {
-        page.text(&format!(
-            "The {OUTAGES} outages with the largest errors of {}; summary.json has all.",
-            summary.outages.len()
-        ));
+    page.text("Just before the first fix after the outage.");
+    let columns = [
+        ("outage", "{start_s}–{end_s} s"),
+        ("horizontal p50 (m)", "horizontal_error_end_m/p50"),
+        ("p95 (m)", "horizontal_error_end_m/p95"),
+        ("95 % from", "horizontal_error_end_m/p95_ci95/0"),
+        ("to", "horizontal_error_end_m/p95_ci95/1"),
+        ("p99.9 (m)", "horizontal_error_end_m/p999"),
+        ("max (m)", "horizontal_error_end_m/max"),
+        ("RMSE pos_e_m", "rmse_end/pos_e_m"),
+        ("ASEE pos_e_m", "asee_end/pos_e_m"),
+        ("error/σ", "verdict/ratio"),
+        ("in", "verdict/worst_state"),
+    ];
+    page.lead(Table::of(answer, "/outages/*", &columns).without_unknown());
+    let columns = [
+        ("outage", "{start_s}–{end_s} s"),
+        ("re-convergence, median (s)", "reconvergence_s/p50"),
+        ("p50 (m) from", "horizontal_error_end_m/p50_ci95/0"),
+        ("to", "horizontal_error_end_m/p50_ci95/1"),
+        ("RMSE pos_e_m from", "rmse_end_ci95/pos_e_m/0"),
+        ("to", "rmse_end_ci95/pos_e_m/1"),
+        ("ASEE pos_e_m from", "asee_end_ci95/pos_e_m/0"),
+        ("to", "asee_end_ci95/pos_e_m/1"),
+    ];
+    page.table(&Table::of(answer, "/outages/*", &columns).without_unknown());
+    let columns = [
+        ("state", "@"),
+        ("RMSE, end", "."),
+        ("ASEE, end", "../../asee_end/@"),
+        ("RMSE, mean", "../../rmse_mean/@"),
+        ("ASEE, mean", "../../asee_mean/@"),
+    ];
+    for k in shown {
+        let outage = &summary.outages[*k];
+        let table = Table::of(answer, &format!("/outages/{k}/rmse_end/*"), &columns);
+        let title = format!("States, {}", window(outage.start_s, outage.end_s));
+        page.folded(&title, |page| page.table(&table));
     }
 }
 
-/// A name, where the figures stand in summary.json, RMSE, ASEE.
-type Pair<'a> = (&'a str, String, &'a PerState<f64>, &'a PerState<f64>);
-
-/// State by state, both at the same time.
-fn pairs(columns: &[Pair<'_>], suffix: &str) -> Table {
-    let heads = columns
-        .iter()
-        .flat_map(|(name, ..)| ["RMSE", "ASEE", "ratio"].map(|what| format!("{what}, {name}")));
-    let mut table = Table::new(["state"]).and(heads);
-    for (i, state) in STATES.iter().enumerate() {
-        let cells = columns.iter().flat_map(|(_, place, rmse, asee)| {
-            let source = |what: &str| format!("{place}/{what}_{suffix}/{}", REPORTED_NAMES[i]);
-            let (rmse, asee) = (rmse.0[i], asee.0[i]);
-            [
-                Cell::number(rmse, &source("rmse")),
-                Cell::number(asee, &source("asee")),
-                Cell::figures(readable(rmse / asee)),
-            ]
-        });
-        table.row(std::iter::once(Cell::from(*state)).chain(cells));
-    }
-    table
-}
-
-fn consistency(epochs: &[EpochMetrics], summary: &Summary, page: &mut Document) {
-    page.section("Consistency");
-    let covered = if summary.runs > 0 {
-        "share of runs"
-    } else {
-        "share of errors"
-    };
-    page.chart(
-        &nees(epochs, summary),
-        &format!(
-            "NEES: normalised estimation error squared of position, velocity and attitude. Coverage: {covered} inside the filter's \
-             ellipsoid of position and attitude."
-        ),
-    );
-    let (nees, nis, coverage) = (&summary.nees, &summary.nis, &summary.coverage);
-    let share = |x: f64| {
-        if x.is_finite() {
-            format!("{:.0} %", x * 100.0)
-        } else {
-            "–".to_owned()
-        }
-    };
-    let mut table = Table::new([
-        "",
-        "mean",
-        "if the filter is right",
-        "95 % band from",
-        "to",
-        "epochs inside",
-    ]);
-    let all_fixes = format!("NIS, all {} fixes", nis.fixes);
+fn consistency(answer: &RunAnswer) -> Table {
+    let head = ["", "mean", "95 % from", "to", "epochs inside"];
     let rows = [
         (
-            "NEES, per epoch",
-            "nees",
-            nees.mean,
-            nees.dof as f64,
-            [nees.lower95, nees.upper95],
-            nees.fraction_inside,
+            "NEES ({nees/dof} if right)",
+            "nees/mean nees/lower95 nees/upper95 nees/fraction_inside",
         ),
         (
-            &all_fixes,
-            "nis",
-            nis.mean,
-            nis.dof as f64,
-            [nis.lower95, nis.upper95],
-            f64::NAN,
+            "NIS of {nis/fixes} fixes ({nis/dof} if right)",
+            "nis/mean nis/lower95 nis/upper95 nis/inside",
         ),
         (
-            "coverage, per epoch",
-            "coverage",
-            coverage.mean,
-            coverage.level,
-            [coverage.lower95, coverage.upper95],
-            coverage.fraction_inside,
+            "coverage ({coverage/level} if right)",
+            "coverage/mean coverage/lower95 coverage/upper95 coverage/fraction_inside",
         ),
     ];
-    for (name, key, mean, right, [low, high], inside) in rows {
-        table.row([
-            name.into(),
-            Cell::number(mean, &format!("/{key}/mean")),
-            Cell::figures(right.to_string()),
-            Cell::number(low, &format!("/{key}/lower95")),
-            Cell::number(high, &format!("/{key}/upper95")),
-            Cell::figures(share(inside)),
-        ]);
-    }
-    page.table(&known(table, summary));
+    Table::of_keys(answer, &head, &rows).without_unknown()
 }
 
 fn provenance(answer: &RunAnswer, page: &mut Document) {
@@ -436,70 +223,17 @@ fn provenance(answer: &RunAnswer, page: &mut Document) {
     page.folded("Configuration", |page| page.code(&configuration));
 }
 
-/// The outages with the largest errors in one line each.
-fn lead(summary: &Summary) -> Table {
-    let is_expected = summary
-        .outages
-        .iter()
-        .any(|o| o.horizontal_error_end_m.p999.is_some());
-    let (last, key) = if is_expected {
-        ("p99.9 (m)", "p999")
-    } else {
-        ("max (m)", "max")
-    };
-    let mut table = Table::new([
-        "outage",
-        "horizontal p50 (m)",
-        "p95 (m)",
-        last,
-        "RMSE pos_e_m",
-        "ASEE pos_e_m",
-        "farthest RMSE/ASEE",
-    ]);
-    for i in largest(summary, LISTED) {
-        let o = &summary.outages[i];
-        let h = &o.horizontal_error_end_m;
-        let ratio = |state: usize| o.rmse_end.0[state] / o.asee_end.0[state];
-        let farther = |a: &usize, b: &usize| ratio(*a).ln().abs().total_cmp(&ratio(*b).ln().abs());
-        let farthest = (0..REPORTED).max_by(farther).unwrap_or_default();
-        let number = |value: f64, key: &str| Cell::number(value, &format!("/outages/{i}/{key}"));
-        table.row([
-            window(o.start_s, o.end_s).into(),
-            number(h.p50, "horizontal_error_end_m/p50"),
-            number(h.p95, "horizontal_error_end_m/p95"),
-            number(
-                h.p999.unwrap_or(h.max),
-                &format!("horizontal_error_end_m/{key}"),
-            ),
-            number(o.rmse_end.0[1], "rmse_end/pos_e_m"),
-            number(o.asee_end.0[1], "asee_end/pos_e_m"),
-            Cell::figures(format!(
-                "{} {}",
-                readable(ratio(farthest)),
-                REPORTED_NAMES[farthest]
-            )),
-        ]);
-    }
-    table
-}
-
-// What the results of a run rest on: models, true IMU, receiver, start.
-
-/// What the results rest on.
-pub(super) fn assumptions(summary: &Summary, answer: &RunAnswer) -> Vec<(&'static str, String)> {
+/// What the results rest on, beside the configuration.
+fn assumptions(summary: &Summary, answer: &RunAnswer) -> Vec<(&'static str, String)> {
     let input = |role: &str| {
-        answer
-            .inputs
-            .iter()
-            .find(|i| i.role == role)
-            .map_or("", |i| i.path.as_str())
+        let found = answer.inputs.iter().find(|i| i.role == role);
+        found.map_or("", |i| i.path.as_str())
     };
     let truth = match (input("static"), input("truth")) {
         ("", "") => format!("{} (the model of the filter)", input("model")),
         ("", model) => model.to_owned(),
         (recording, _) => format!("windows of {recording}"),
     };
-    let scenario = &answer.origin.configuration;
     let mut facts = vec![
         ("trajectory", input("trajectory").to_owned()),
         (
@@ -507,177 +241,31 @@ pub(super) fn assumptions(summary: &Summary, answer: &RunAnswer) -> Vec<(&'stati
             format!("{}, {} states", input("model"), summary.filter_states),
         ),
         ("what makes the errors", truth),
-        ("IMU", defects(&scenario.imu)),
-        ("GNSS", receiver(&scenario.gnss)),
-        ("start (1 σ)", start(&scenario.initial)),
     ];
-    if let Some(baro) = &scenario.baro {
-        facts.push((
-            "barometer",
-            format!("{} Hz; 1 σ {} m", baro.rate_hz, readable(baro.sigma_m)),
-        ));
-    }
-    let aids: Vec<String> = scenario
-        .aiding
-        .rates()
-        .map(|aid| aided(&scenario.aiding, aid))
-        .collect();
-    if !aids.is_empty() {
-        facts.push(("aiding (1 σ)", aids.join("; ")));
-    }
-    if summary.runs > 0 {
+    let (runs, diverged) = (summary.runs, summary.diverged);
+    if runs > 0 {
         let worth = readable(summary.independent_runs);
-        facts.push((
-            "runs",
-            format!(
-                "{} ({} diverged), worth {worth} independent ones",
-                summary.runs, summary.diverged
-            ),
-        ));
+        let text = format!("{runs} ({diverged} diverged), worth {worth} independent ones");
+        facts.push(("runs", text));
     }
-    facts.extend(summary.seed.map(|seed| ("seed", seed.to_string())));
     facts
 }
 
-fn three(sigma: &[f64; 3]) -> String {
-    sigma.map(readable).join(", ")
-}
-
-/// What the true IMU has beside its noise.
-fn defects(imu: &ImuSettings) -> String {
-    let [bias_a, bias_g] = Sensor::ALL.map(|sensor| readable(imu.deviations(sensor).0));
-    let [ppm_a, ppm_g] = Sensor::ALL.map(|sensor| readable(imu.deviations(sensor).1));
-    let mut facts = vec![
-        format!("{} Hz", imu.rate_hz),
-        format!("1 σ: turn-on bias {bias_a} m/s², {bias_g} rad/s"),
-        format!("scale factors {ppm_a}, {ppm_g} ppm"),
-    ];
-    let of = |defect: Defect| format!("{} {} {}", defect.key, readable(defect.sigma), defect.unit);
-    facts.extend(imu.without_states().map(of));
-    facts.extend(
-        imu.output
-            .as_ref()
-            .map(|_| "samples of a range and a resolution".to_owned()),
-    );
-    facts.join("; ")
-}
-
-/// `nhc 0.2 m/s at 1 Hz`
-fn aided(aiding: &AidingSettings, (aid, rate_hz): (Aid, f64)) -> String {
-    let [sigma, _] = aiding.sigmas(aid);
-    let (sigma, unit) = if aid == Aid::Heading {
-        (sigma / DEG, "°")
-    } else {
-        (sigma, "m/s")
+/// The sources of the errors at the ends of the outages that are shown, beside what the filter believes.
+fn budgets(summary: &Summary, shown: &[usize], page: &mut Document) {
+    let of_outage = |k: &usize| {
+        let o = &summary.outages[*k];
+        let kinds = [("true", &o.budget), ("believed", &o.believed_budget)];
+        kinds.into_iter().filter_map(|(kind, budget)| {
+            let name = format!("{}, {kind}", window(o.start_s, o.end_s));
+            Some((name, budget.as_ref()?))
+        })
     };
-    format!("{} {} {unit} at {rate_hz} Hz", aid.name(), readable(sigma))
-}
-
-fn receiver(gnss: &GnssSettings) -> String {
-    let velocity = gnss.vel_sigma_m_s.map_or("no velocity".to_owned(), |v| {
-        format!("velocity {} m/s", three(&v))
-    });
-    let position = three(&gnss.pos_sigma_m);
-    let mut words = format!(
-        "{} Hz; 1 σ north, east, down: position {position} m, {velocity}",
-        gnss.rate_hz
-    );
-    if gnss.correlated_pos_sigma_m.iter().any(|sigma| *sigma > 0.0) {
-        let (sigma, time) = (
-            three(&gnss.correlated_pos_sigma_m),
-            readable(gnss.correlation_time_s),
-        );
-        words +=
-            &format!("; in truth a correlated position error of {sigma} m over {time} s beside it");
+    let bars: Vec<(String, &Budget)> = shown.iter().flat_map(of_outage).collect();
+    if !bars.is_empty() {
+        page.section("Sources of errors");
+        page.chart(&budget_chart(&bars), "Shares in the mean square at the end of each outage, as in summary.json: of the true errors, by covariance analysis, and of those that the filter believes in.");
     }
-    if gnss.lever_arm_m.iter().any(|x| *x != 0.0) {
-        words += &format!(
-            "; antenna {} m front, right, down of the IMU",
-            three(&gnss.lever_arm_m)
-        );
-    }
-    words
-}
-
-/// What the filter knows at the start.
-fn start(initial: &InitialSettings) -> String {
-    if initial.perfect {
-        return "the true state".to_owned();
-    }
-    format!(
-        "position {} m, velocity {} m/s, attitude {} °",
-        three(&initial.pos_sigma_m),
-        three(&initial.vel_sigma_m_s),
-        three(&initial.att_sigma_deg)
-    )
-}
-
-// The sources of errors on the page of a run directory.
-
-/// What the errors at the ends of the outages that are shown are made of, beside what the filter believes.
-pub(super) fn budgets(summary: &Summary, shown: &[usize], page: &mut Document) {
-    let kinds = |o: &'_ OutageSummary| {
-        [
-            ("true errors", o.budget.clone(), "budget"),
-            (
-                "what the filter believes",
-                o.believed_budget.clone(),
-                "believed_budget",
-            ),
-        ]
-    };
-    let mut bars: Vec<(String, Budget)> = Vec::new();
-    for i in shown {
-        let o = &summary.outages[*i];
-        let word = |kind: &str| {
-            if kind == "true errors" {
-                "true"
-            } else {
-                "believed"
-            }
-        };
-        let known = kinds(o).into_iter().filter_map(|(kind, budget, _)| {
-            Some((
-                format!("{}, {}", window(o.start_s, o.end_s), word(kind)),
-                budget?,
-            ))
-        });
-        bars.extend(known);
-    }
-    if bars.is_empty() {
-        return;
-    }
-    page.section("Sources of errors");
-    page.chart(&budget_chart(&bars), "Shares in the mean square at the end of each outage: of the true errors, by covariance analysis, and of those that the filter believes in.");
-    for i in shown {
-        let o = &summary.outages[*i];
-        for (kind, budget, key) in kinds(o) {
-            let Some(budget) = budget else { continue };
-            let title = format!(
-                "Sources of errors at the end of {}: {kind} (shares)",
-                window(o.start_s, o.end_s)
-            );
-            let table = budget_table(&budget, &format!("/outages/{i}/{key}"));
-            page.folded(&title, |page| page.table(&table));
-        }
-    }
-}
-
-fn budget_table(budget: &Budget, place: &str) -> Table {
-    let names = STATES
-        .iter()
-        .map(|state| state.split(" (").next().unwrap_or(state).to_owned());
-    let mut table = Table::new(["source"]).and(names);
-    for (source, shares) in &budget.shares {
-        let key = source.replace('~', "~0").replace('/', "~1");
-        let cell =
-            |(share, state): (&f64, &&str)| Cell::number(*share, &format!("{place}/{key}/{state}"));
-        table.row(
-            std::iter::once(Cell::from(source.clone()))
-                .chain(shares.0.iter().zip(&REPORTED_NAMES).map(cell)),
-        );
-    }
-    table
 }
 
 // The figures of a run.
@@ -716,11 +304,7 @@ pub(super) fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
         Series::line("believed (ASEE)", Colour::BELIEVED, believed),
         Series::line("true (RMSE)", Colour::REAL, rmse),
         Series::new(
-            if summary.runs > 0 {
-                "median and 95 % of runs"
-            } else {
-                "median and 95 %"
-            },
+            "median and 95 %",
             Colour::Ink,
             Mark::Points(summary.outages.iter().map(end).collect()),
         ),
@@ -729,30 +313,7 @@ pub(super) fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
         height: 1.2,
         ..Panel::new(Axis::log("horizontal error (m)"), series)
     };
-    timed("Horizontal position error", panel, &windows(summary))
-}
-
-/// What stands beneath the horizontal error.
-pub(super) const fn horizontal_caption(summary: &Summary) -> &'static str {
-    if summary.runs > 0 {
-        "Horizontal RMSE of the runs, and what the filter believes: its own standard deviation (ASEE, north and east together) \
-         and the range up to three times that. Dots: median of the runs at the end of an outage, the bar up to their 95 % \
-         quantile."
-    } else {
-        "Horizontal RMSE by covariance analysis, and what the filter believes: its own standard deviation (ASEE, north and east \
-         together) and the range up to three times that. Dots: median at the end of an outage, the bar up to the 95 % quantile."
-    }
-}
-
-/// What ASEE and RMSE are, where they are shown.
-pub(super) const fn rmse_and_asee(summary: &Summary) -> &'static str {
-    if summary.runs > 0 {
-        "RMSE: how wrong the runs were. ASEE (averaged standard estimation error): the filter's own standard deviation, averaged \
-         over the runs. Their ratio is 1 if the filter is right."
-    } else {
-        "RMSE: how wrong the filter is, by covariance analysis. ASEE (averaged standard estimation error): its own standard \
-         deviation. Their ratio is 1 if the filter is right."
-    }
+    Chart::over_time("Horizontal position error", vec![panel], &windows(summary))
 }
 
 /// Quantiles of the horizontal error over time, those of a covariance analysis beside the runs dashed.
@@ -780,17 +341,11 @@ pub(super) fn fan_chart(fan: &[FanEpoch], summary: &Summary) -> Chart {
         );
     }
     let panel = Panel::new(Axis::log("horizontal error (m)"), series);
-    timed(
+    Chart::over_time(
         "Percentiles of the horizontal position error",
-        panel,
+        vec![panel],
         &windows(summary),
     )
-}
-
-fn timed(title: &str, panel: Panel, outages: &[(f64, f64)]) -> Chart {
-    Chart::new(title, Axis::linear("time (s)"), vec![panel])
-        .with_outages(outages)
-        .in_group("time")
 }
 
 /// Every state: what the filter believes and how wrong it is.
@@ -808,108 +363,88 @@ pub(super) fn states(epochs: &[EpochMetrics], outages: &[(f64, f64)]) -> Vec<Cha
                 over_time(epochs, |e| e.asee.0[i].value),
             ),
         ];
-        timed(&error_of(state), Panel::new(Axis::log(""), series), outages).small()
+        Chart::over_time(state, vec![Panel::new(Axis::log(""), series)], outages).small()
     };
-    STATES.iter().enumerate().map(chart).collect()
+    REPORTED_NAMES.iter().enumerate().map(chart).collect()
 }
 
 pub(super) fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
-    // of expected values there is no scatter, and no band for it
-    let zone = |low: f64, high: f64| {
-        let zone = Series::new(
-            "95 % band of a right filter",
-            Colour::RIGHT,
-            Mark::Zone(low, high),
-        );
-        (summary.runs > 0).then_some(zone)
-    };
-    let beside = |zone: Option<Series>, line: Series| zone.into_iter().chain([line]).collect();
-    let nees = beside(
-        zone(summary.nees.lower95, summary.nees.upper95),
-        Series::line("NEES", Colour::Ink, over_time(epochs, |e| e.nees.value)),
-    );
-    let coverage = beside(
-        zone(summary.coverage.lower95, summary.coverage.upper95),
-        Series::line("coverage", Colour::Ink, over_time(epochs, |e| e.coverage)),
-    );
-    let title = format!("coverage at level {}", summary.coverage.level);
-    let panels = vec![
-        Panel::new(
-            Axis::log(&format!("NEES ({} if right)", summary.nees.dof)),
-            nees,
-        ),
+    let panel = |axis: Axis, band: [f64; 2], value: fn(&EpochMetrics) -> f64| {
+        let mut series = vec![Series::line("", Colour::Ink, over_time(epochs, value))];
+        // of expected values there is no scatter, and no band for it
+        if summary.runs > 0 {
+            let zone = Mark::Zone(band[0], band[1]);
+            series.insert(
+                0,
+                Series::new("95 % band of a right filter", Colour::RIGHT, zone),
+            );
+        }
         Panel {
-            height: 0.6,
-            ..Panel::new(Axis::linear(&title).including(0.8, 1.0), coverage)
-        },
+            height: 0.8,
+            ..Panel::new(axis, series)
+        }
+    };
+    let (nees, coverage) = (&summary.nees, &summary.coverage);
+    let title = format!("coverage at level {}", coverage.level);
+    let panels = vec![
+        panel(
+            Axis::log(&format!("NEES ({} if right)", nees.dof)),
+            [nees.lower95, nees.upper95],
+            |e| e.nees.value,
+        ),
+        panel(
+            Axis::linear(&title).including(0.8, 1.0),
+            [coverage.lower95, coverage.upper95],
+            |e| e.coverage,
+        ),
     ];
-    Chart::new("Consistency", Axis::linear("time (s)"), panels)
-        .with_outages(&windows(summary))
-        .in_group("time")
+    Chart::over_time("Consistency", panels, &windows(summary))
 }
 
 /// Sources with a colour of their own.
 const SOURCES_DRAWN: usize = 7;
 
 /// A bar an outage and kind, for horizontal position and for yaw.
-pub(super) fn budget_chart(bars: &[(String, Budget)]) -> Chart {
-    let mut weight: Vec<(&str, f64)> = Vec::new();
-    for (source, share) in bars
+fn budget_chart(bars: &[(String, &Budget)]) -> Chart {
+    let mut weights: Vec<(&str, f64)> = Vec::new();
+    for (name, share) in bars
         .iter()
-        .flat_map(|(_, b)| b.ranked(&[0, 1]).into_iter().chain(b.ranked(&[8])))
+        .flat_map(|(_, b)| [b.ranked(&[0, 1]), b.ranked(&[8])].concat())
     {
-        match weight.iter_mut().find(|(name, _)| *name == source) {
+        match weights.iter_mut().find(|(known, _)| *known == name) {
             Some((_, sum)) => *sum += share,
-            None => weight.push((source, share)),
+            None => weights.push((name, share)),
         }
     }
-    weight.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let named: Vec<&str> = weight
-        .iter()
-        .take(SOURCES_DRAWN)
-        .map(|(name, _)| *name)
-        .collect();
+    weights.sort_by(|a, b| b.1.total_cmp(&a.1));
     let panel = |label: &str, states: &[usize]| {
-        let mut series: Vec<Vec<(f64, f64, f64)>> = vec![Vec::new(); named.len() + 1];
-        for (x, (_, budget)) in bars.iter().enumerate() {
-            let ranked = budget.ranked(states);
-            let share = |name: &str| {
-                100.0
-                    * ranked
-                        .iter()
-                        .find(|(source, _)| *source == name)
-                        .map_or(0.0, |r| r.1)
+        let ranked: Vec<_> = bars.iter().map(|(_, b)| b.ranked(states)).collect();
+        let mut tops = vec![0.0; bars.len()];
+        let series = weights.iter().enumerate().map(|(k, (name, _))| {
+            let bar = |(x, top): (usize, &mut f64)| {
+                let share = ranked[x].iter().find(|(source, _)| source == name);
+                let from = *top;
+                *top += share.map_or(0.0, |(_, share)| 100.0 * share);
+                (x as f64, from, *top)
             };
-            let mut from = 0.0;
-            for (k, name) in named.iter().enumerate() {
-                series[k].push((x as f64, from, from + share(name)));
-                from += share(name);
+            let mark = Mark::Bars(tops.iter_mut().enumerate().map(bar).collect());
+            match k < SOURCES_DRAWN {
+                true => Series::new(name, Colour::Hue(k), mark),
+                false => Series::new("others", Colour::Soft, mark),
             }
-            series[named.len()].push((x as f64, from, 100.0_f64.max(from)));
-        }
-        let others = (weight.len() > SOURCES_DRAWN).then_some(("others", Colour::Soft));
-        let names = named
-            .iter()
-            .enumerate()
-            .map(|(k, name)| (*name, Colour::Hue(k)))
-            .chain(others);
-        let series = names
-            .zip(series)
-            .map(|((name, colour), bars)| Series::new(name, colour, Mark::Bars(bars)));
+        });
+        let axis = Axis::linear(label).including(0.0, 100.0);
         Panel {
             height: 0.8,
-            ..Panel::new(Axis::linear(label).including(0.0, 100.0), series.collect())
+            ..Panel::new(axis, series.collect())
         }
     };
     let names = bars.iter().map(|(name, _)| name.clone()).collect();
-    Chart::new(
-        "Sources of errors",
-        Axis::names(names),
-        vec![
-            panel("horizontal position (%)", &[0, 1]),
-            panel("yaw (%)", &[8]),
-        ],
-    )
+    let panels = vec![
+        panel("horizontal position (%)", &[0, 1]),
+        panel("yaw (%)", &[8]),
+    ];
+    Chart::new("Sources of errors", Axis::names(names), panels)
 }
 
 // What helps a filter that is overconfident.
@@ -989,53 +524,30 @@ fn beside_the_states(summary: &Summary) -> &'static str {
     "the errors are not those of MODEL: nav-sim tune --scenario finds variances that cover them"
 }
 
-/// The source with the largest share of the worst error, of those that the filter does not expect, where it makes at least
-/// half of what is too much there; without an outage, which has the shares, the first.
+/// The error that the filter does not expect with the largest share in the worst error, where it makes at least half of what is
+/// too much there; without an outage, which has the shares, the first.
 fn largest_unexpected(summary: &Summary, unexpected: &[Unexpected]) -> Option<String> {
     let verdict = &summary.verdict;
     let outage = verdict
         .worst_outage
-        .or_else(|| summary.outages.len().checked_sub(1));
-    let known =
-        outage.and_then(|k| Some((&summary.outages[k], summary.outages[k].budget.as_ref()?)));
-    let Some((outage, budget)) = known else {
+        .map_or(summary.outages.last(), |k| summary.outages.get(k));
+    let Some(budget) = outage.and_then(|outage| outage.budget.as_ref()) else {
         return unexpected.first().map(unexpected_line);
     };
     let worst = REPORTED_NAMES
         .iter()
         .position(|name| *name == verdict.worst_state);
-    // the state, and the share in its mean square
+    let ranked = budget.ranked(&worst.map_or(vec![0, 1], |state| vec![state]));
     let share = |cause: &Unexpected| {
         let sources = cause.sources();
-        let of_cause = budget
-            .shares
+        let of_cause = ranked
             .iter()
-            .filter(|(name, _)| sources.contains(name));
-        let shares = of_cause.fold([0.0; REPORTED], |sum, (_, of)| {
-            std::array::from_fn(|i| sum[i] + of.0[i])
-        });
-        let states = worst.map_or(0..REPORTED, |state| state..state + 1);
-        states
-            .map(|state| (state, shares[state]))
-            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .filter(|(name, _)| sources.iter().any(|source| source == name));
+        of_cause.map(|(_, share)| share).sum::<f64>()
     };
-    let shares = unexpected
-        .iter()
-        .filter_map(|cause| Some((cause, share(cause)?)));
-    let (largest, (state, share)) = shares.max_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
+    let shares = unexpected.iter().map(|cause| (cause, share(cause)));
+    let (largest, share) = shares.max_by(|a, b| a.1.total_cmp(&b.1))?;
     // of a mean square that is ratio² times what is believed, this share is too much
     let excess = 1.0 - verdict.ratio.powi(-2);
-    let place = format!(
-        "{} at the end of {}",
-        REPORTED_NAMES[state],
-        window(outage.start_s, outage.end_s)
-    );
-    let told = || {
-        let (what, remedy) = unexpected_in_words(largest);
-        format!(
-            "{what} ({:.0} % of the mean square of {place}): {remedy}",
-            100.0 * share
-        )
-    };
-    (share > 0.5 * excess).then(told)
+    (share > 0.5 * excess).then(|| unexpected_line(largest))
 }

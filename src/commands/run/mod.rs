@@ -4,7 +4,7 @@ pub(crate) mod directory;
 mod document;
 mod navigate;
 
-pub(crate) use navigate::Reduced;
+pub(crate) use navigate::reduction_of;
 pub use navigate::{NavigateError, NavigateInputs, Navigation, TrueImu, navigate};
 
 use crate::app::inputs::{self, FilterArgs, SettingsArgs, files};
@@ -81,16 +81,27 @@ pub struct Run {
 }
 
 /// Results of a run. As JSON it is `summary.json`.
-#[derive(Debug)]
+#[derive(Debug, Serialize)]
 pub struct RunAnswer {
     /// Runs, statistics and summary.
+    #[serde(flatten)]
     pub navigation: Navigation,
-    /// Settings and sources, for the manifest.
+    /// Settings and sources, for the manifest; of them the speed, the only number that the seed does not determine.
+    #[serde(flatten, serialize_with = "throughput")]
     pub origin: RunOrigin,
     /// The files that were read.
+    #[serde(skip)]
     pub inputs: Vec<Input>,
     /// The reference trajectory, drawn.
+    #[serde(skip)]
     pub track: TrajectorySeries,
+}
+
+fn throughput<S: serde::Serializer>(
+    origin: &RunOrigin,
+    to: S,
+) -> std::result::Result<S::Ok, S::Error> {
+    to.collect_map([("throughput_epochs_per_s", origin.throughput_epochs_per_s)])
 }
 
 /// The record of a run in its manifest.
@@ -433,27 +444,6 @@ impl PreparedRun<'_> {
             navigation,
             origin,
         })
-    }
-}
-
-impl Serialize for RunAnswer {
-    /// The summary, and how fast it was found: its only number that the seed does not determine.
-    fn serialize<S: serde::Serializer>(
-        &self,
-        serializer: S,
-    ) -> std::result::Result<S::Ok, S::Error> {
-        #[derive(Serialize)]
-        struct WithThroughput<'a> {
-            #[serde(flatten)]
-            summary: &'a Summary,
-            throughput_epochs_per_s: f64,
-        }
-        let throughput_epochs_per_s = self.origin.throughput_epochs_per_s;
-        WithThroughput {
-            summary: &self.navigation.summary,
-            throughput_epochs_per_s,
-        }
-        .serialize(serializer)
     }
 }
 

@@ -15,8 +15,7 @@ use nav_sim_navigation::scenario::{Method, Scenario};
 use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
-    FilterPass, HeadingDoubt, Instant, NamedSource, Track, TruthSide, assess, strapdown_over_sigma,
-    weak_heading,
+    FilterPass, Instant, NamedSource, Track, TruthSide, assess, strapdown_over_sigma, weak_heading,
 };
 use nav_sim_navigation::simulation::{Experiment, ExperimentError, Plan, RunResult};
 use nav_sim_navigation::trajectory::Trajectory;
@@ -55,16 +54,20 @@ pub enum TrueImu {
 }
 
 /// Results of [`navigate()`].
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize)]
 #[non_exhaustive]
 pub struct Navigation {
     /// The runs; `None` for a covariance analysis.
+    #[serde(skip)]
     pub runs: Option<RunResult>,
     /// Statistics at every reporting epoch: of the runs, if there are any.
+    #[serde(skip)]
     pub epochs: Vec<EpochMetrics>,
     /// Quantiles of the horizontal error over time: of the runs, if there are any.
+    #[serde(skip)]
     pub fan: Vec<FanEpoch>,
     /// The summary.
+    #[serde(flatten)]
     pub summary: Summary,
 }
 
@@ -136,7 +139,9 @@ pub(super) fn with_runs(
     // Within 1e-3 the same in a quarter of the time: for what stands beside the figures.
     let merged = track.merged();
     let reduction = reduction(inputs, scenario, outages, &belief, &merged, context)?;
-    heading(&FilterPass::new(&merged, &belief))
+    // Where the motion hardly shows the heading, no filter of this kind is to be believed.
+    let yaw = FilterPass::new(&merged, &belief).yaw_while_measured();
+    weak_heading(yaw.into_iter())
         .iter()
         .for_each(|doubt| context.warn(doubt));
     let experiment = scenario.experiment(
@@ -146,15 +151,18 @@ pub(super) fn with_runs(
         outages,
         seed,
     );
-    let analysis = Analysis::new(&experiment, inputs, &track);
+    let analysis = Analysis {
+        experiment: &experiment,
+        track: &track,
+        belief: &belief,
+        model: inputs.truth_model(),
+    };
     let expected = match method {
         // beside runs that were asked for alone it may be impossible
         Method::MonteCarlo => possible(inputs, scenario)
             .ok()
-            .and_then(|()| analysis.expected(&belief)),
-        Method::Lincov | Method::Both => {
-            Some(analysis.expected(&belief).ok_or(NavigateError::NotFinite)?)
-        }
+            .and_then(|()| analysis.expected()),
+        Method::Lincov | Method::Both => Some(analysis.expected().ok_or(NavigateError::NotFinite)?),
     };
     let mut navigation = match (method, expected) {
         (Method::Lincov, Some((epochs, mut summary))) => {
@@ -163,7 +171,7 @@ pub(super) fn with_runs(
             Navigation {
                 runs: None,
                 epochs,
-                fan: analysis.fan(&belief),
+                fan: analysis.fan(),
                 summary,
             }
         }
@@ -177,7 +185,7 @@ pub(super) fn with_runs(
             };
             match expected {
                 Some((_, expected)) if method == Method::Both => {
-                    sampled = sampled.beside(expected, &analysis.fan(&belief));
+                    sampled = sampled.beside(expected, &analysis.fan());
                 }
                 Some((_, expected)) => {
                     sampled.summary.compare_with(&expected);
@@ -200,7 +208,7 @@ pub(super) fn with_runs(
             track: &merged,
             ..analysis
         }
-        .add_budgets(&mut navigation.summary, &belief);
+        .add_budgets(&mut navigation.summary);
     }
     if method == Method::Lincov {
         let full = |model: &Model| {
@@ -209,7 +217,7 @@ pub(super) fn with_runs(
                 .belief(model, outages, &track)
                 .ok()
         };
-        analysis.add_intervals(&mut navigation.summary, &belief, inputs, &full);
+        analysis.add_intervals(&mut navigation.summary.outages, inputs, &full);
     }
     Ok(navigation)
 }
@@ -288,25 +296,13 @@ fn reduction(
         .iter()
         .map(|o| o.end_s - o.start_s)
         .fold(0.0, f64::max);
-    let (interval_s, window_s) = (1.0 / scenario.gnss.rate_hz, window_s(longest));
+    let scales_s = [1.0 / scenario.gnss.rate_hz, window_s(longest)];
     let full = scenario
         .with_full_noise()
         .belief(&inputs.model, outages, track)
         .ok();
-    let reduced = Reduced {
-        model: &inputs.model,
-        belief,
-        full,
-        track,
-        interval_s,
-        window_s,
-    };
-    Ok(Some(reduced.summary(context)?))
-}
-
-/// Where the motion hardly shows the heading, no filter of this kind is to be believed.
-fn heading(filter: &FilterPass<'_>) -> Option<HeadingDoubt> {
-    weak_heading(filter.yaw_while_measured().into_iter())
+    let made = (&inputs.model, belief, full.as_ref());
+    Ok(Some(reduction_of(made, track, scales_s, context)?))
 }
 
 /// Runs that are summed together: some ten seconds of work.
@@ -343,34 +339,26 @@ fn sampled(
 struct Analysis<'a> {
     experiment: &'a Experiment<'a>,
     track: &'a Track,
+    belief: &'a Belief,
     /// None: what makes the errors has no model.
     model: Option<&'a Model>,
 }
 
-impl<'a> Analysis<'a> {
-    fn new(experiment: &'a Experiment<'a>, inputs: &'a NavigateInputs, track: &'a Track) -> Self {
-        Self {
-            experiment,
-            track,
-            model: inputs.truth_model(),
-        }
-    }
-
+impl Analysis<'_> {
     /// The expected figures; none where the covariance runs away.
-    fn expected(&self, belief: &Belief) -> Option<(Vec<EpochMetrics>, Summary)> {
-        let expected = Expected::along(self.track, self.experiment, belief, self.model?)?;
-        let summary = expected.summary();
-        Some((expected.epochs, summary))
+    fn expected(&self) -> Option<(Vec<EpochMetrics>, Summary)> {
+        let expected = Expected::along(self.track, self.experiment, self.belief, self.model?)?;
+        Some((expected.epochs, expected.summary))
     }
 
     /// Quantiles of the horizontal error over time; none where nothing models what makes the errors.
-    fn fan(&self, belief: &Belief) -> Vec<FanEpoch> {
+    fn fan(&self) -> Vec<FanEpoch> {
         let Some(model) = self.model else {
             return Vec::new();
         };
         let truth = TruthSide::together(&TruthSide::sources(self.experiment, model));
         expected_fan(
-            &FilterPass::new(self.track, belief),
+            &FilterPass::new(self.track, self.belief),
             &truth,
             self.experiment.outages,
         )
@@ -379,37 +367,31 @@ impl<'a> Analysis<'a> {
     /// What the calibrations leave open in the figures at the ends of outages.
     fn add_intervals(
         &self,
-        summary: &mut Summary,
-        belief: &Belief,
+        outages: &mut [OutageSummary],
         inputs: &NavigateInputs,
         full: &(dyn Fn(&Model) -> Option<Belief> + Sync),
     ) {
-        let analysed = Analysed {
-            experiment: self.experiment,
-            track: self.track,
-            belief,
-        };
         let truth_draws = match inputs.truth {
             TrueImu::AsBelieved => inputs.model_draws.as_ref(),
             _ => inputs.truth_draws.as_ref(),
         };
         if let (Some(truth), Some(draws)) = (self.model, truth_draws) {
-            analysed.errors(truth, draws, &mut summary.outages);
+            self.errors(truth, draws, outages);
         }
         if let Some(draws) = &inputs.model_draws {
-            analysed.beliefs(&inputs.model, draws, full, &mut summary.outages);
+            self.beliefs(&inputs.model, draws, full, outages);
         }
     }
 
     /// What the errors at the ends of outages are made of, and what the filter believes they are.
-    fn add_budgets(&self, summary: &mut Summary, belief: &Belief) {
-        let filter = FilterPass::new(self.track, belief);
+    fn add_budgets(&self, summary: &mut Summary) {
+        let filter = FilterPass::new(self.track, self.belief);
         let at_ends =
             |sources: &[NamedSource]| Budget::at_outage_ends(&filter, sources).into_iter();
         let mut truth = self
             .model
             .map(|model| at_ends(&TruthSide::sources(self.experiment, model)));
-        let believed = at_ends(&TruthSide::believed(self.experiment, belief));
+        let believed = at_ends(&TruthSide::believed(self.experiment, self.belief));
         for (outage, believed) in summary.outages.iter_mut().zip(believed) {
             outage.budget = truth.as_mut().and_then(Iterator::next);
             outage.believed_budget = Some(believed);
@@ -473,57 +455,29 @@ impl NavigateInputs {
     }
 }
 
-// What the reduction of a model to 15 states does.
-
-/// What a filter of 15 states was made for, and what it is assessed along.
-#[derive(Debug)]
-#[non_exhaustive]
-pub(crate) struct Reduced<'a> {
-    /// The model that was reduced.
-    pub model: &'a Model,
-    /// The filter.
-    pub belief: &'a Belief,
-    /// The filter with a state for every process, if the model has one.
-    pub full: Option<Belief>,
-    /// What both are assessed along.
-    pub track: &'a Track,
-    /// Time between fixes (s).
-    pub interval_s: f64,
-    /// Longest time scale (s).
-    pub window_s: f64,
-}
-
-impl Reduced<'_> {
-    /// The reduction and its quality, the model taken for the truth: one covariance analysis of the reduced and of
-    /// the full filter.
-    ///
-    /// # Errors
-    /// When a parameter of the belief is outside its domain.
-    pub(crate) fn summary(
-        &self,
-        context: &Context<'_>,
-    ) -> Result<ReductionSummary, ParameterError> {
-        let Self {
-            model,
-            belief,
-            track,
-            interval_s,
-            window_s,
-            ..
-        } = *self;
-        let mut summary = ReductionSummary::of(model, belief, interval_s, window_s)?;
-        if summary.is_exact() {
-            return Ok(summary);
-        }
-        let full = self.full.as_ref().map(|full| assess(track, full, model));
-        let quality = ReductionQuality::of(&assess(track, belief, model), full.as_ref());
-        context.remark(reduction_line(&quality));
-        reduction_doubt(&quality)
-            .iter()
-            .for_each(|doubt| context.warn(doubt));
-        summary.quality = Some(quality);
-        Ok(summary)
+/// The reduction of a model to a filter of 15 states, and its quality, the model taken for the truth: one covariance analysis of
+/// the reduced and of the full filter, if the model has one. `scales_s`: time between fixes, longest time scale.
+///
+/// # Errors
+/// When a parameter of the belief is outside its domain.
+pub(crate) fn reduction_of(
+    (model, belief, full): (&Model, &Belief, Option<&Belief>),
+    track: &Track,
+    [interval_s, window_s]: [f64; 2],
+    context: &Context<'_>,
+) -> Result<ReductionSummary, ParameterError> {
+    let mut summary = ReductionSummary::of(model, belief, interval_s, window_s)?;
+    if summary.is_exact() {
+        return Ok(summary);
     }
+    let full = full.map(|full| assess(track, full, model));
+    let quality = ReductionQuality::of(&assess(track, belief, model), full.as_ref());
+    context.remark(reduction_line(&quality));
+    reduction_doubt(&quality)
+        .iter()
+        .for_each(|doubt| context.warn(doubt));
+    summary.quality = Some(quality);
+    Ok(summary)
 }
 
 // What the calibration of a model leaves open in the figures of a covariance analysis.
@@ -536,22 +490,15 @@ impl Reduced<'_> {
 // it *believes*: each draw has the filter that knows it, with a state for each process, since the reduction to 15 states
 // would have to be found anew for each; the interval is carried over as a ratio.
 
-/// A covariance analysis that was made.
-pub(super) struct Analysed<'a> {
-    pub(super) experiment: &'a Experiment<'a>,
-    pub(super) track: &'a Track,
-    pub(super) belief: &'a Belief,
-}
-
 /// Figures at the end of an outage.
 type Figures = Vec<f64>;
 
 /// Probabilities of the quantiles of the horizontal error.
 const QUANTILES: [f64; 2] = [0.5, 0.95];
 
-impl Analysed<'_> {
+impl Analysis<'_> {
     /// Puts the intervals of RMSE and of the quantiles of the horizontal error into the outages.
-    pub(super) fn errors(&self, truth: &Model, draws: &Draws, outages: &mut [OutageSummary]) {
+    fn errors(&self, truth: &Model, draws: &Draws, outages: &mut [OutageSummary]) {
         let track = self.track.coarse();
         let filter = FilterPass::new(&track, self.belief);
         let figures = |model: &Model| -> Vec<Figures> {
@@ -575,7 +522,7 @@ impl Analysed<'_> {
 
     /// Puts the intervals of the ASEE into the outages; `full` makes the filter that knows a model. None are put where a
     /// model has no such filter.
-    pub(super) fn beliefs(
+    fn beliefs(
         &self,
         model: &Model,
         draws: &Draws,

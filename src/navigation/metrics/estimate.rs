@@ -1,16 +1,15 @@
 //! Estimates from a finite number of runs, with their uncertainty.
 
 use crate::simulation::{REPORTED, REPORTED_NAMES};
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 use serde::de::Error as _;
-use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
 /// A value estimated from runs and its Monte-Carlo standard error (NaN when one run cannot tell).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// The estimate.
     pub value: f64,
@@ -94,40 +93,25 @@ impl SampleSize {
     }
 }
 
-/// One value for each reported state; in files that people read an object with their names as keys.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// One value for each reported state; in files an object with their names as keys.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PerState<T>(pub [T; REPORTED]);
 
-impl<T: Serialize> Serialize for PerState<T> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        if !serializer.is_human_readable() {
-            return self.0.serialize(serializer);
-        }
-        let mut map = serializer.serialize_map(Some(REPORTED))?;
-        for (name, value) in REPORTED_NAMES.iter().zip(&self.0) {
-            map.serialize_entry(name, value)?;
-        }
-        map.end()
+impl PerState<f64> {
+    /// Values and standard errors.
+    pub(super) fn split(all: [Estimate; REPORTED]) -> [Self; 2] {
+        [all.map(|e| e.value), all.map(|e| e.std_error)].map(Self)
     }
 }
 
-/// An object with these names as keys, in their order.
-pub(super) fn serialize_named<T: Serialize, S: Serializer>(
-    named: &[(String, T)],
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    let mut map = serializer.serialize_map(Some(named.len()))?;
-    for (name, value) in named {
-        map.serialize_entry(name, value)?;
+impl<T: Serialize> Serialize for PerState<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(REPORTED_NAMES.iter().zip(&self.0))
     }
-    map.end()
 }
 
 impl<'de, T: Deserialize<'de> + Copy> Deserialize<'de> for PerState<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        if !deserializer.is_human_readable() {
-            return Deserialize::deserialize(deserializer).map(Self);
-        }
         let by_name = HashMap::<String, T>::deserialize(deserializer)?;
         let value = |name: &&'static str| {
             by_name
@@ -143,26 +127,7 @@ impl<'de, T: Deserialize<'de> + Copy> Deserialize<'de> for PerState<T> {
     }
 }
 
-/// A quantile and its distribution-free 95 % interval (`None` where the sample is too small for a bound).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Quantile {
-    /// The sample quantile (linear between order statistics).
-    pub value: f64,
-    /// Lower and upper bound of the interval.
-    pub ci95: (Option<f64>, Option<f64>),
-}
-
-/// The quantile at `p` of a sorted sample. The interval runs between order statistics: the number of
-/// values below the true quantile is binomial (n, p), whatever the distribution. Where no more than `windows`
-/// values are independent, it runs between the order statistics at the same shares of the sample.
-pub fn quantile(sorted: &[f64], p: f64, windows: Option<f64>) -> Quantile {
-    Quantile {
-        value: sample_quantile(sorted, p),
-        ci95: order_statistic_interval(sorted, p, windows),
-    }
-}
-
-/// The quantile alone; NaN of no value.
+/// The quantile at `p` of a sorted sample; NaN of no value.
 pub(super) fn sample_quantile(sorted: &[f64], p: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else {
         return f64::NAN;
@@ -174,8 +139,12 @@ pub(super) fn sample_quantile(sorted: &[f64], p: f64) -> f64 {
     sorted[below] + (position - below as f64) * (sorted[above] - sorted[below])
 }
 
+/// The distribution-free 95 % interval of the quantile at `p`; none where the sample is too small for a bound. It runs between
+/// order statistics: the number of values below the true quantile is binomial (n, p), whatever the distribution. Where no more
+/// than `windows` values are independent, it runs between the order statistics at the same shares of the sample.
+///
 /// x_(l) and x_(u), counted from 1, with P(B < l) ≤ 2.5 % and P(B ≥ u) ≤ 2.5 %, B binomial.
-fn order_statistic_interval(
+pub(super) fn quantile_interval(
     sorted: &[f64],
     p: f64,
     windows: Option<f64>,
@@ -388,14 +357,10 @@ impl QuadraticForm {
             // the parabola below are the optimal ones for the plain transform; scaled by the number of nodes
             // it follows x through p/x.
             let theta = (2.0 * f64::from(k) + 1.0) * PI / n;
-            let p = Complex(0.1309 - 0.1194 * theta * theta, 0.25 * theta).scaled(n);
-            let slope = Complex(-0.2388 * theta, 0.25).scaled(n);
+            let p = Complex::new(0.1309 - 0.1194 * theta * theta, 0.25 * theta) * n;
+            let slope = Complex::new(-0.2388 * theta, 0.25) * n;
             // twice the imaginary part of half the contour
-            p.exp()
-                .times(self.transform(p.scaled(1.0 / x)))
-                .times(slope)
-                .over(p)
-                .1
+            (p.exp() * self.transform(p / x) * slope / p).im
         };
         2.0 / n * (0..NODES / 2).map(node).sum::<f64>()
     }
@@ -408,10 +373,9 @@ impl QuadraticForm {
         // converges geometrically, and a quarter of a width is exact to rounding.
         let step = LINE_STEP * width;
         let value = |k: u32| {
-            let p = Complex(saddle, f64::from(k) * step);
+            let p = Complex::new(saddle, f64::from(k) * step);
             // the transform by its logarithm: beside e^{px} it would be 0
-            let ln = self.ln_transform_at(p);
-            Complex(ln.0 + p.0 * x, ln.1 + p.1 * x).exp().over(p).0
+            ((self.ln_transform_at(p) + p * x).exp() / p).re
         };
         let first = value(0);
         let mut sum = 0.5 * first;
@@ -514,67 +478,23 @@ impl QuadraticForm {
     }
 
     /// ln E e^(−p(Q − c)) for a complex p on the right.
-    fn ln_transform_at(&self, p: Complex) -> Complex {
-        let mut sum = Complex(0.0, 0.0);
-        for (w, d) in &self.terms {
-            let q = p.scaled(2.0 * w);
-            let base = Complex(1.0 + q.0, q.1);
-            let shift = q.over(base).scaled(d * d);
-            sum.0 -= 0.5 * (base.0.hypot(base.1).ln() + shift.0);
-            sum.1 -= 0.5 * (base.1.atan2(base.0) + shift.1);
-        }
-        sum
+    fn ln_transform_at(&self, p: Complex<f64>) -> Complex<f64> {
+        let term = |(w, d): &(f64, f64)| {
+            let q = p * (2.0 * w);
+            ((1.0 + q).ln() + q / (1.0 + q) * (d * d)) * -0.5
+        };
+        self.terms.iter().map(term).sum()
     }
 
     /// E e^(−p(Q − c)).
-    fn transform(&self, p: Complex) -> Complex {
-        let mut product = Complex(1.0, 0.0);
-        let mut exponent = Complex(0.0, 0.0);
-        for (w, d) in &self.terms {
-            let q = p.scaled(2.0 * w);
-            let base = Complex(1.0 + q.0, q.1);
-            // Root by root: each factor 1 + 2wp keeps to the plane cut along its negative axis, their product
-            // does not.
-            product = product.over(base.root());
-            let shift = q.over(base).scaled(-0.5 * d * d);
-            exponent = Complex(exponent.0 + shift.0, exponent.1 + shift.1);
-        }
-        product.times(exponent.exp())
-    }
-}
-
-/// A complex number, as far as it is needed here.
-#[derive(Debug, Clone, Copy)]
-struct Complex(f64, f64);
-
-impl Complex {
-    const fn scaled(self, s: f64) -> Self {
-        Self(self.0 * s, self.1 * s)
-    }
-
-    const fn times(self, other: Self) -> Self {
-        Self(
-            self.0 * other.0 - self.1 * other.1,
-            self.0 * other.1 + self.1 * other.0,
-        )
-    }
-
-    const fn over(self, other: Self) -> Self {
-        let square = other.0 * other.0 + other.1 * other.1;
-        self.times(Self(other.0, -other.1)).scaled(1.0 / square)
-    }
-
-    fn exp(self) -> Self {
-        let (sin, cos) = self.1.sin_cos();
-        Self(cos, sin).scaled(self.0.exp())
-    }
-
-    /// The root on the right, where no path of the contour leaves it.
-    fn root(self) -> Self {
-        let size = self.0.hypot(self.1);
-        let re = (0.5 * (size + self.0)).max(0.0).sqrt();
-        let im = (0.5 * (size - self.0)).max(0.0).sqrt();
-        Self(re, im.copysign(self.1))
+    fn transform(&self, p: Complex<f64>) -> Complex<f64> {
+        // Root by root: each factor 1 + 2wp keeps to the plane cut along its negative axis, their product
+        // does not.
+        let factor = |(w, d): &(f64, f64)| {
+            let q = p * (2.0 * w);
+            (q / (1.0 + q) * (-0.5 * d * d)).exp() / (1.0 + q).sqrt()
+        };
+        self.terms.iter().map(factor).product()
     }
 }
 
@@ -621,8 +541,8 @@ mod tests {
         let sorted: Vec<f64> = (1..=100).map(f64::from).collect();
         let doubled: Vec<f64> = sorted.iter().flat_map(|x| [*x, *x]).collect();
         assert_eq!(
-            quantile(&doubled, 0.5, Some(100.0)).ci95,
-            quantile(&sorted, 0.5, None).ci95
+            quantile_interval(&doubled, 0.5, Some(100.0)),
+            quantile_interval(&sorted, 0.5, None)
         );
         assert!(
             Estimate::mean_of(once.into_iter(), Some(1.0))
@@ -636,25 +556,28 @@ mod tests {
     #[test]
     fn quantiles_lie_between_order_statistics() {
         let sorted: Vec<f64> = (1..=100).map(f64::from).collect();
-        let median = quantile(&sorted, 0.5, None);
-        assert_eq!(
-            (median.value, median.ci95),
-            (50.5, (Some(40.0), Some(61.0)))
+        let (median, ci95) = (
+            sample_quantile(&sorted, 0.5),
+            quantile_interval(&sorted, 0.5, None),
         );
-        let high = quantile(&sorted, 0.95, None);
-        assert!((high.value - 95.05).abs() < 1e-12);
-        assert_eq!(high.ci95, (Some(90.0), Some(100.0)));
+        assert_eq!((median, ci95), (50.5, (Some(40.0), Some(61.0))));
+        let (high, high_ci95) = (
+            sample_quantile(&sorted, 0.95),
+            quantile_interval(&sorted, 0.95, None),
+        );
+        assert!((high - 95.05).abs() < 1e-12);
+        assert_eq!(high_ci95, (Some(90.0), Some(100.0)));
     }
 
     #[test]
     fn small_samples_have_open_intervals() {
         // P(B ≤ 1) = 0.7 %, P(B ≤ 2) = 14 %, P(B = 3) = 86 %
         assert_eq!(
-            quantile(&[1.0, 2.0, 3.0], 0.95, None).ci95,
+            quantile_interval(&[1.0, 2.0, 3.0], 0.95, None),
             (Some(2.0), None)
         );
-        assert_eq!(quantile(&[1.0, 2.0, 3.0], 0.5, None).ci95, (None, None));
-        assert!(quantile(&[], 0.5, None).value.is_nan());
+        assert_eq!(quantile_interval(&[1.0, 2.0, 3.0], 0.5, None), (None, None));
+        assert!(sample_quantile(&[], 0.5).is_nan());
     }
 
     #[test]

@@ -1,13 +1,11 @@
 //! What a covariance analysis says: the figures that runs would scatter about, without a run.
 
-use super::estimate::{Estimate, PerState, QuadraticForm, Quantile};
-use super::outage::{
-    Accuracy, EpochMetrics, OutageMetrics, Reconvergence, is_beyond_linear, within,
-};
+use super::estimate::{Estimate, PerState, QuadraticForm};
+use super::outage::{EpochMetrics, is_beyond_linear, within};
 use super::summary::{
-    AccuracySummary, Consistency, Coverage, Nis, OutageSummary, SCHEMA_VERSION, Summary,
+    AccuracySummary, Nis, OutageSummary, Recovery, Spread, Summary, with_verdicts,
 };
-use super::verdict::{OutageVerdict, Verdict};
+use super::verdict;
 use crate::ekf::Belief;
 use crate::noise::Model;
 use crate::simulation::lincov::{ErrorLaw, FilterPass, Instant, Judged, Track, TruthSide};
@@ -16,7 +14,6 @@ use crate::simulation::{
 };
 use crate::units::DEG;
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// States of the coverage statistic among those of the filter: position, attitude.
@@ -27,22 +24,14 @@ const VELOCITY_DOWN: usize = 5;
 const NEARLY_ALL: f64 = 0.999;
 
 /// The law of a filter's errors as the figures of a run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Expected {
     /// Statistics of every reporting epoch, all without a Monte-Carlo error.
     pub epochs: Vec<EpochMetrics>,
     /// A run whose squares are the expected ones: it stands for all runs where runs are compared.
     pub record: RunRecord,
-    /// Outages in time order.
-    pub outages: Vec<OutageMetrics>,
-    /// States of the filter.
-    pub filter_states: usize,
-    /// Components of a fix.
-    pub fix_components: usize,
-    /// Level of the coverage statistic.
-    pub coverage_level: f64,
-    /// Seed of the outages, where they were drawn.
-    pub seed: u64,
+    /// The summary: as that of runs, without what only runs have (null).
+    pub summary: Summary,
 }
 
 impl Expected {
@@ -65,7 +54,7 @@ impl Expected {
             .map(|(instant, bias)| epoch(instant, *bias, limit))
             .collect::<Option<_>>()?;
         let ends = experiment.outages.iter().zip(&law.outage_ends);
-        let mut outages: Vec<OutageMetrics> = ends
+        let mut outages: Vec<OutageSummary> = ends
             .map(|(window, end)| outage((window.start_s, window.end_s), end, &epochs))
             .collect();
         for outage in &mut outages {
@@ -78,76 +67,35 @@ impl Expected {
                     .nhc
                     .as_ref()
                     .is_some_and(|nhc| lasts(nhc.rate_hz));
-            let sigma_m_s = outage.asee_end.0[VELOCITY_DOWN].value;
+            let sigma_m_s = outage.asee_end.0[VELOCITY_DOWN];
             outage.beyond_linear = !sees_height && is_beyond_linear(window, &epochs, sigma_m_s);
         }
         let record = record(&epochs, &law, &outages);
+        let beyond_linear = outages.iter().position(|outage| outage.beyond_linear);
+        let (verdict, verdicts) = verdict::expected(&record, beyond_linear);
+        let (nis, fixes) = record.nis;
+        let summary = Summary {
+            method: "lincov",
+            filter_states: belief.states,
+            seed: Some(experiment.seed),
+            outages: with_verdicts(outages, verdicts),
+            nis: Nis {
+                dof: experiment.gnss.components(),
+                mean: if fixes > 0 { nis } else { f64::NAN },
+                lower95: f64::NAN,
+                upper95: f64::NAN,
+                fixes,
+                rejected: 0,
+            },
+            ..Summary::over(&epochs, verdict, experiment.coverage_level, None)
+        };
         // NaN comes from a believed covariance without a Cholesky factor: at any report it makes the mean
         // NaN.
         record.nees_mean.is_finite().then_some(Self {
             epochs,
             record,
-            outages,
-            filter_states: belief.states,
-            fix_components: experiment.gnss.components(),
-            coverage_level: experiment.coverage_level,
-            seed: experiment.seed,
+            summary,
         })
-    }
-
-    /// The first outage in which errors are beyond linear theory.
-    pub(super) fn beyond_linear(&self) -> Option<usize> {
-        self.outages.iter().position(|outage| outage.beyond_linear)
-    }
-
-    /// The summary: as that of runs, without what only runs have (null).
-    pub fn summary(&self) -> Summary {
-        let verdict = Verdict::expected(&self.record, self.beyond_linear());
-        let unknown = f64::NAN;
-        Summary {
-            schema_version: SCHEMA_VERSION,
-            method: "lincov",
-            verdict,
-            runs: 0,
-            diverged: 0,
-            diverged_runs: Vec::new(),
-            independent_runs: verdict.independent_runs,
-            filter_states: self.filter_states,
-            seed: Some(self.seed),
-            accuracy: AccuracySummary::from(&Accuracy::over(self.epochs.iter())),
-            outages: OutageSummary::all(&self.outages, OutageVerdict::expected(&self.record)),
-            nees: Consistency {
-                dof: NEES_DOF,
-                mean: self.record.nees_mean,
-                lower95: unknown,
-                upper95: unknown,
-                fraction_inside: unknown,
-            },
-            nis: Nis {
-                dof: self.fix_components,
-                mean: if self.record.nis.1 > 0 {
-                    self.record.nis.0
-                } else {
-                    unknown
-                },
-                lower95: unknown,
-                upper95: unknown,
-                fixes: self.record.nis.1,
-                rejected: 0,
-            },
-            coverage: Coverage {
-                level: self.coverage_level,
-                mean: self.record.covered,
-                lower95: unknown,
-                upper95: unknown,
-                fraction_inside: unknown,
-            },
-            reduction: None,
-            lincov: None,
-            is_contradicted: false,
-            strapdown_over_sigma: 0.0,
-            require: Vec::new(),
-        }
     }
 }
 
@@ -209,47 +157,46 @@ fn epoch(judged: &Judged, bias_asee: [f64; BIASES], limit: f64) -> Option<EpochM
     })
 }
 
-fn outage((start_s, end_s): (f64, f64), end: &Judged, epochs: &[EpochMetrics]) -> OutageMetrics {
-    let mean = Accuracy::over(within((start_s, end_s), epochs));
-    let without_error = |all: &PerState<Estimate>| PerState(all.0.map(|e| exact(e.value)));
+fn outage((start_s, end_s): (f64, f64), end: &Judged, epochs: &[EpochMetrics]) -> OutageSummary {
+    let accuracy = AccuracySummary::over(within((start_s, end_s), epochs));
     let [p50, p95, p999] = horizontal_quantiles(&end.errors, [0.5, 0.95, NEARLY_ALL]);
-    let quantile = |value: f64| Quantile {
-        value,
-        ci95: (None, None),
-    };
-    OutageMetrics {
+    let consistency = end.consistency();
+    OutageSummary {
         start_s,
         end_s,
-        asee_mean: without_error(&mean.asee_mean),
-        rmse_mean: without_error(&mean.rmse_mean),
-        asee_end: exactly(end.sigma()),
-        rmse_end: exactly(end.errors.rmse()),
-        nees_end: exact(end.consistency().nees),
-        log_density_end: exact(end.consistency().log_density),
-        horizontal_p50_m: quantile(p50),
-        horizontal_p95_m: quantile(p95),
-        horizontal_p999_m: Some(p999),
-        horizontal_max_m: f64::NAN,
-        beyond_linear: false,
-        reconvergence: Reconvergence {
-            p50_s: quantile(f64::NAN),
-            p95_s: quantile(f64::NAN),
+        asee_mean: accuracy.asee_mean,
+        rmse_mean: accuracy.rmse_mean,
+        asee_end: PerState(end.sigma()),
+        rmse_end: PerState(end.errors.rmse()),
+        nees_end: consistency.nees,
+        log_density_end: consistency.log_density,
+        horizontal_error_end_m: Spread {
+            p50,
+            p95,
+            p999: Some(p999),
+            max: f64::NAN,
+            ..Spread::default()
+        },
+        reconvergence_s: Recovery {
+            p50: f64::NAN,
+            p95: f64::NAN,
             never: None,
         },
+        ..OutageSummary::default()
     }
 }
 
 /// The run whose squares are the expected ones.
-fn record(epochs: &[EpochMetrics], law: &ErrorLaw, outages: &[OutageMetrics]) -> RunRecord {
+fn record(epochs: &[EpochMetrics], law: &ErrorLaw, outages: &[OutageSummary]) -> RunRecord {
     let mean = |value: &dyn Fn(&EpochMetrics) -> f64| {
         epochs.iter().map(value).sum::<f64>() / epochs.len() as f64
     };
-    let of_outage = |o: &OutageMetrics| OutageRecord {
-        see_mean: o.asee_mean.0.map(|e| e.value),
-        see_end: o.asee_end.0.map(|e| e.value),
-        error_end: o.rmse_end.0.map(|e| e.value),
-        nees_end: o.nees_end.value,
-        log_density_end: o.log_density_end.value,
+    let of_outage = |o: &OutageSummary| OutageRecord {
+        see_mean: o.asee_mean.0,
+        see_end: o.asee_end.0,
+        error_end: o.rmse_end.0,
+        nees_end: o.nees_end,
+        log_density_end: o.log_density_end,
         // The horizontal error is not normal, and a run with its mean square is not a run of its median.
         horizontal_error_end_m: f64::NAN,
         reconvergence_s: f64::NAN,

@@ -20,17 +20,10 @@ mod ratio;
 mod summary;
 mod verdict;
 
-pub use estimate::{
-    Band, Estimate, PerState, QuadraticForm, Quantile, SampleSize, chi_square_band, quantile,
-};
+pub use estimate::{Band, Estimate, PerState, QuadraticForm, SampleSize, chi_square_band};
 pub use expected::{Expected, horizontal_quantiles};
-pub use outage::{
-    Accuracy, Budget, EpochMetrics, FAN_LEVELS, FanEpoch, OutageMetrics, Reconvergence, epochs,
-    expected_fan, fan, outages,
-};
-pub use ratio::{
-    ComparisonError, EpochRow, Measured, OutageComparison, RatioError, StateRatio, compare,
-};
+pub use outage::{Budget, EpochMetrics, FAN_LEVELS, FanEpoch, epochs, expected_fan, fan};
+pub use ratio::{ComparisonError, EpochRow, Measured, OutageComparison, StateRatio, compare};
 pub use summary::{
     AccuracySummary, AxisReduction, Consistency, Coverage, Met, Nis, OutageSummary, Recovery,
     ReductionQuality, ReductionSummary, Requirement, Spread, Summary, TOLERANCE,

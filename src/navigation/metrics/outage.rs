@@ -1,9 +1,8 @@
 //! Statistics of one outage.
 
-use super::estimate::{
-    Estimate, PerState, Quantile, SampleSize, quantile, sample_quantile, serialize_named,
-};
+use super::estimate::{Estimate, PerState, SampleSize, quantile_interval, sample_quantile};
 use super::expected::horizontal_quantiles;
+use super::summary::{AccuracySummary, OutageSummary, Recovery, Spread};
 use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{FilterPass, Instant, Judged, NamedSource, TruthSide};
 use crate::simulation::{
@@ -11,69 +10,61 @@ use crate::simulation::{
 };
 use crate::units::{DEG, STANDARD_GRAVITY};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize, Serializer};
-
-/// What the runs say about one outage (m, m/s, degrees, s).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct OutageMetrics {
-    /// First instant without a fix (s).
-    pub start_s: f64,
-    /// First instant with a fix again (s).
-    pub end_s: f64,
-    /// Mean over the outage's epochs of the ASEE.
-    pub asee_mean: PerState<Estimate>,
-    /// Mean over the outage's epochs of the RMSE (NaN where the epochs were not kept).
-    pub rmse_mean: PerState<Estimate>,
-    /// ASEE just before the first fix after the outage.
-    pub asee_end: PerState<Estimate>,
-    /// Mean NEES at the same instant.
-    pub nees_end: Estimate,
-    /// Mean logarithm of the density of the errors under the filter's belief there (nats).
-    pub log_density_end: Estimate,
-    /// Root mean square error just before the first fix after the outage.
-    pub rmse_end: PerState<Estimate>,
-    /// Horizontal error there: median.
-    pub horizontal_p50_m: Quantile,
-    /// 95 % quantile.
-    pub horizontal_p95_m: Quantile,
-    /// 99.9 % quantile; of a covariance analysis only.
-    pub horizontal_p999_m: Option<f64>,
-    /// Largest; NaN of a covariance analysis, whose law has no end.
-    pub horizontal_max_m: f64,
-    /// Whether covariance analysis finds errors in it that are beyond linear theory.
-    pub beyond_linear: bool,
-    /// How soon the runs recover.
-    pub reconvergence: Reconvergence,
-}
-
-/// Time from the outage's end until the error is back to what it was (s).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Reconvergence {
-    /// Median over the runs that recover.
-    pub p50_s: Quantile,
-    /// 95 % quantile over the runs that recover.
-    pub p95_s: Quantile,
-    /// Runs that do not recover before the trajectory or the next outage ends their chance; none of a covariance
-    /// analysis, which follows no run.
-    pub never: Option<u64>,
-}
+use serde::{Serialize, Serializer};
 
 /// Statistics of every outage, diverged runs left out.
-pub fn outages(result: &RunResult) -> Vec<OutageMetrics> {
+pub(super) fn outages(result: &RunResult, epochs: &[EpochMetrics]) -> Vec<OutageSummary> {
+    let windows = result.independent_windows;
     let kept = || result.runs.iter().filter(|r| !r.diverged);
-    let epochs = epochs(result);
-    let metrics_of_outage = |(i, window): (usize, &(f64, f64))| {
+    let of_outage = |(i, window): (usize, &(f64, f64))| {
         let records: Vec<&OutageRecord> = kept().filter_map(|r| r.outages.get(i)).collect();
-        let mut metrics = outage(*window, &records, result.independent_windows);
-        metrics.rmse_mean = Accuracy::over(within(*window, &epochs)).rmse_mean;
-        metrics
+        let horizontal = sorted(records.iter().map(|r| r.horizontal_error_end_m));
+        // Runs that never recover have NaN here. They are counted apart: no finite time stands for them.
+        let times = records.iter().map(|r| r.reconvergence_s);
+        let recovery = sorted(times.filter(|s| s.is_finite()));
+        let mean = |value: &dyn Fn(&OutageRecord) -> f64| {
+            Estimate::mean_of(records.iter().map(|r| value(r)), windows)
+        };
+        let per_state = |f: &dyn Fn(usize) -> Estimate| PerState::split(std::array::from_fn(f));
+        let [asee_mean, asee_mean_std_error] = per_state(&|i| mean(&|r| r.see_mean[i]));
+        let [asee_end, asee_end_std_error] = per_state(&|i| mean(&|r| r.see_end[i]));
+        // Mean square first, then the root: the standard error is linearised once, at the root.
+        let [rmse_end, rmse_end_std_error] =
+            per_state(&|i| mean(&|r| r.error_end[i].powi(2)).root());
+        let accuracy = AccuracySummary::over(within(*window, epochs));
+        let (nees, density) = (mean(&|r| r.nees_end), mean(&|r| r.log_density_end));
+        OutageSummary {
+            start_s: window.0,
+            end_s: window.1,
+            asee_mean,
+            asee_mean_std_error,
+            rmse_mean: accuracy.rmse_mean,
+            rmse_mean_std_error: accuracy.rmse_mean_std_error,
+            asee_end,
+            asee_end_std_error,
+            rmse_end,
+            rmse_end_std_error,
+            nees_end: nees.value,
+            nees_end_std_error: nees.std_error,
+            log_density_end: density.value,
+            log_density_end_std_error: density.std_error,
+            horizontal_error_end_m: Spread {
+                p50: sample_quantile(&horizontal, 0.5),
+                p95: sample_quantile(&horizontal, 0.95),
+                p999: None,
+                max: horizontal.last().copied().unwrap_or(f64::NAN),
+                p50_ci95: quantile_interval(&horizontal, 0.5, windows),
+                p95_ci95: quantile_interval(&horizontal, 0.95, windows),
+            },
+            reconvergence_s: Recovery {
+                p50: sample_quantile(&recovery, 0.5),
+                p95: sample_quantile(&recovery, 0.95),
+                never: Some((records.len() - recovery.len()) as u64),
+            },
+            ..OutageSummary::default()
+        }
     };
-    result
-        .outages
-        .iter()
-        .enumerate()
-        .map(metrics_of_outage)
-        .collect()
+    result.outages.iter().enumerate().map(of_outage).collect()
 }
 
 /// The epochs without a fix of an outage.
@@ -109,52 +100,6 @@ pub(super) fn is_beyond_linear(
 /// Roll and pitch among the reported states.
 const TILT: [usize; 2] = [6, 7];
 
-/// Statistics of an outage from the records of the runs; what needs the epochs is NaN.
-fn outage(
-    (start_s, end_s): (f64, f64),
-    records: &[&OutageRecord],
-    windows: Option<f64>,
-) -> OutageMetrics {
-    let horizontal = sorted(records.iter().map(|r| r.horizontal_error_end_m));
-    // Runs that never recover have NaN here. They are counted apart: no finite time stands for them.
-    let recovery = sorted(
-        records
-            .iter()
-            .map(|r| r.reconvergence_s)
-            .filter(|s| s.is_finite()),
-    );
-    let mean = |value: &dyn Fn(&OutageRecord) -> f64| {
-        Estimate::mean_of(records.iter().map(|r| value(r)), windows)
-    };
-    let per_state = |f: &dyn Fn(usize) -> Estimate| PerState(std::array::from_fn(f));
-    OutageMetrics {
-        start_s,
-        end_s,
-        asee_mean: per_state(&|i| mean(&|r| r.see_mean[i])),
-        rmse_mean: PerState(
-            [Estimate {
-                value: f64::NAN,
-                std_error: f64::NAN,
-            }; REPORTED],
-        ),
-        asee_end: per_state(&|i| mean(&|r| r.see_end[i])),
-        nees_end: mean(&|r| r.nees_end),
-        log_density_end: mean(&|r| r.log_density_end),
-        // Mean square first, then the root: the standard error is linearised once, at the root.
-        rmse_end: per_state(&|i| mean(&|r| r.error_end[i].powi(2)).root()),
-        horizontal_p50_m: quantile(&horizontal, 0.5, windows),
-        horizontal_p95_m: quantile(&horizontal, 0.95, windows),
-        horizontal_p999_m: None,
-        horizontal_max_m: horizontal.last().copied().unwrap_or(f64::NAN),
-        beyond_linear: false,
-        reconvergence: Reconvergence {
-            p50_s: quantile(&recovery, 0.5, windows),
-            p95_s: quantile(&recovery, 0.95, windows),
-            never: Some((records.len() - recovery.len()) as u64),
-        },
-    }
-}
-
 fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
@@ -164,7 +109,7 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
 // Statistics at one reporting epoch.
 
 /// What the runs say at one epoch (m, m/s, degrees).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct EpochMetrics {
     /// Time on the trajectory (s).
     pub t_s: f64,
@@ -221,29 +166,20 @@ pub fn epochs(result: &RunResult) -> Vec<EpochMetrics> {
         .collect()
 }
 
-/// ASEE and RMSE as means over epochs, the one beside the other.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Accuracy {
-    /// Mean over the epochs of the ASEE.
-    pub asee_mean: PerState<Estimate>,
-    /// Mean over the epochs of the RMSE: like the ASEE a mean of standard deviations, so that their ratio is 1
-    /// for a right filter, however fast both grow.
-    pub rmse_mean: PerState<Estimate>,
-}
-
-impl Accuracy {
-    /// Over some epochs. The standard errors are upper bounds: as if all epochs erred together.
-    pub(crate) fn over<'a>(epochs: impl Iterator<Item = &'a EpochMetrics> + Clone) -> Self {
+impl AccuracySummary {
+    /// Over some epochs. The standard errors are upper bounds, the mean of those of the epochs: epochs of a run are strongly
+    /// correlated.
+    pub(super) fn over<'a>(epochs: impl Iterator<Item = &'a EpochMetrics> + Clone) -> Self {
         let n = epochs.clone().count() as f64;
-        let mean = |of: &dyn Fn(&EpochMetrics) -> Estimate| Estimate {
-            value: epochs.clone().map(|e| of(e).value).sum::<f64>() / n,
-            // The mean of the errors, not the root of the sum of their squares: epochs of a run are strongly
-            // correlated.
-            std_error: epochs.clone().map(|e| of(e).std_error).sum::<f64>() / n,
+        let mean = |of: &dyn Fn(&EpochMetrics, usize) -> f64| {
+            PerState(std::array::from_fn(|i| {
+                epochs.clone().map(|e| of(e, i)).sum::<f64>() / n
+            }))
         };
         Self {
-            asee_mean: PerState(std::array::from_fn(|i| mean(&|e| e.asee.0[i]))),
-            rmse_mean: PerState(std::array::from_fn(|i| mean(&|e| e.rmse.0[i]))),
+            asee_mean: mean(&|e, i| e.asee.0[i].value),
+            rmse_mean: mean(&|e, i| e.rmse.0[i].value),
+            rmse_mean_std_error: mean(&|e, i| e.rmse.0[i].std_error),
         }
     }
 }
@@ -408,7 +344,7 @@ impl Budget {
 
 impl Serialize for Budget {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serialize_named(&self.shares, serializer)
+        serializer.collect_map(self.shares.iter().map(|(name, share)| (name, share)))
     }
 }
 
@@ -449,23 +385,20 @@ mod tests {
             outages: vec![(300.0, 390.0)],
             ..RunResult::default()
         };
-        let metrics = &outages(&result)[0];
-        assert_eq!(metrics.asee_mean.0[1].value, 3.0);
-        assert!((metrics.rmse_end.0[4].value - (35.0_f64 / 3.0).sqrt()).abs() < 1e-15);
+        let metrics = &outages(&result, &[])[0];
+        assert_eq!(metrics.asee_mean.0[1], 3.0);
+        assert!((metrics.rmse_end.0[4] - (35.0_f64 / 3.0).sqrt()).abs() < 1e-15);
+        assert_eq!((metrics.asee_end.0[1], metrics.nees_end), (6.0, 27.0));
+        assert_eq!(metrics.log_density_end, -3.0);
         assert_eq!(
-            (metrics.asee_end.0[1].value, metrics.nees_end.value),
-            (6.0, 27.0)
-        );
-        assert_eq!(metrics.log_density_end.value, -3.0);
-        assert_eq!(
-            (metrics.horizontal_p50_m.value, metrics.horizontal_max_m),
+            (
+                metrics.horizontal_error_end_m.p50,
+                metrics.horizontal_error_end_m.max
+            ),
             (3.0, 5.0)
         );
         assert_eq!(
-            (
-                metrics.reconvergence.p50_s.value,
-                metrics.reconvergence.never
-            ),
+            (metrics.reconvergence_s.p50, metrics.reconvergence_s.never),
             (2.0, Some(1))
         );
     }
@@ -503,8 +436,8 @@ mod tests {
             outages: vec![(0.0, 1.0)],
             ..RunResult::default()
         };
-        let metrics = &outages(&result)[0];
-        assert!(metrics.asee_mean.0[0].value.is_nan() && metrics.horizontal_max_m.is_nan());
+        let metrics = &outages(&result, &[])[0];
+        assert!(metrics.asee_mean.0[0].is_nan() && metrics.horizontal_error_end_m.max.is_nan());
     }
 }
 
@@ -560,9 +493,9 @@ mod epoch_tests {
             EpochMetrics::of(&two_runs(), None),
             EpochMetrics::of(&later, None),
         ];
-        let accuracy = Accuracy::over(all.iter());
+        let accuracy = AccuracySummary::over(all.iter());
         assert_eq!(
-            (accuracy.asee_mean.0[0].value, accuracy.rmse_mean.0[8].value),
+            (accuracy.asee_mean.0[0], accuracy.rmse_mean.0[8]),
             (4.0, 7.0)
         );
     }

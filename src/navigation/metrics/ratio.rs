@@ -2,11 +2,9 @@
 //! believes, relative to the other ([Minaretzis et al.](crate::bibliography::Minaretzis24), Table I).
 
 use super::estimate::{Estimate, PerState, SampleSize};
-use super::expected::Expected;
-use super::outage::{EpochMetrics, epochs};
-use super::verdict::Verdict;
 use crate::sensors::outage::Outage;
-use crate::simulation::{OutageRecord, REPORTED, RunRecord, RunResult};
+use crate::simulation::{OutageRecord, REPORTED, RunRecord};
+use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// The statistics of one epoch that ratios are made of.
@@ -16,24 +14,10 @@ pub struct EpochRow {
     pub t_s: f64,
     /// ASEE of each reported state.
     pub asee: [f64; REPORTED],
-    /// RMSE of each reported state.
-    pub rmse: [f64; REPORTED],
     /// Mean NEES.
     pub nees: f64,
     /// Share of runs covered.
     pub coverage: f64,
-}
-
-impl From<&EpochMetrics> for EpochRow {
-    fn from(e: &EpochMetrics) -> Self {
-        Self {
-            t_s: e.t_s,
-            asee: e.asee.0.map(|e| e.value),
-            rmse: e.rmse.0.map(|e| e.value),
-            nees: e.nees.value,
-            coverage: e.coverage,
-        }
-    }
 }
 
 /// The results of an experiment, as far as ratios need them.
@@ -45,68 +29,23 @@ pub struct Measured {
     pub runs: Vec<RunRecord>,
     /// Outages (start, end) (s).
     pub outages: Vec<(f64, f64)>,
-    /// As in [`RunResult`]: runs beyond these share their noise.
+    /// As in [`RunResult`](crate::simulation::RunResult): runs beyond these share their noise.
     pub independent_windows: Option<f64>,
     /// Whether the one run stands for what covariance analysis expects: it has no Monte-Carlo error.
     pub is_expected: bool,
-    /// Of a covariance analysis, the first outage in which errors are beyond linear theory.
-    pub beyond_linear: Option<usize>,
-}
-
-impl From<&RunResult> for Measured {
-    fn from(result: &RunResult) -> Self {
-        Self {
-            epochs: epochs(result).iter().map(EpochRow::from).collect(),
-            runs: result.runs.clone(),
-            outages: result.outages.clone(),
-            independent_windows: result.independent_windows,
-            is_expected: false,
-            beyond_linear: None,
-        }
-    }
-}
-
-impl From<&Expected> for Measured {
-    fn from(expected: &Expected) -> Self {
-        Self {
-            epochs: expected.epochs.iter().map(EpochRow::from).collect(),
-            runs: vec![expected.record.clone()],
-            outages: expected
-                .outages
-                .iter()
-                .map(|o| (o.start_s, o.end_s))
-                .collect(),
-            independent_windows: None,
-            is_expected: true,
-            beyond_linear: expected.beyond_linear(),
-        }
-    }
-}
-
-impl Measured {
-    /// The runs that were made; none of a covariance analysis.
-    pub fn sampled(&self) -> &[RunRecord] {
-        if self.is_expected { &[] } else { &self.runs }
-    }
-
-    /// Whether the filter is as good as it believes.
-    pub fn verdict(&self) -> Verdict {
-        match self.runs.as_slice() {
-            [record] if self.is_expected => Verdict::expected(record, self.beyond_linear),
-            runs => Verdict::of(runs, self.outages.len(), self.independent_windows),
-        }
-    }
 }
 
 /// Why two experiments have no ratio.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ComparisonError {
-    /// Other outages.
-    #[error("the outages differ: {candidate} against {reference} of the reference")]
-    Outages {
-        /// Outages of the candidate, in words.
+    /// Other outages or epochs.
+    #[error("the {what} differ: {candidate} against {reference} of the reference")]
+    Other {
+        /// Outages or epochs.
+        what: &'static str,
+        /// Those of the candidate, in words.
         candidate: String,
-        /// Outages of the reference, in words.
+        /// Those of the reference, in words.
         reference: String,
     },
     /// Other numbers of runs of the same noise: the epochs' statistics are of all runs, not of the common ones.
@@ -117,48 +56,40 @@ pub enum ComparisonError {
         /// Runs of the reference.
         reference: usize,
     },
-    /// Other epochs.
-    #[error("the reporting epochs differ: {candidate} against {reference} of the reference")]
-    Epochs {
-        /// Epochs of the candidate, in words.
-        candidate: String,
-        /// Epochs of the reference, in words.
-        reference: String,
-    },
-}
-
-/// A mean ratio's distance from unity (%) and the 95 % interval of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RatioError {
-    /// (ratio − 1)·100.
-    pub pct: f64,
-    /// Its interval: of Monte Carlo, and of what the calibrations leave open where that is known
-    /// ([`OutageComparison::widen`]). NaN where runs are too few; none where nothing was drawn and nothing else is known.
-    pub ci95_pct: Option<[f64; 2]>,
 }
 
 /// One state in one outage.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StateRatio {
     /// Mean over the outage's epochs of (ASEE ratio − 1)·100.
-    pub asee: RatioError,
-    /// Mean over the outage's epochs of |ASEE ratio − 1|·100.
-    pub asee_abs_pct: f64,
+    pub ratio_error_pct: f64,
+    /// Its 95 % interval: of Monte Carlo, and of what the calibrations leave open where that is known
+    /// ([`OutageComparison::widen`]). NaN where runs are too few; none where nothing was drawn and nothing else is known.
+    pub ci95_pct: Option<[f64; 2]>,
     /// Half the 95 % interval of the ASEE ratio that the calibrations alone leave (points), where that is known.
     pub calibration_half_pct: Option<f64>,
+    /// Mean over the outage's epochs of |ASEE ratio − 1|·100.
+    pub abs_ratio_error_pct: f64,
     /// (ratio − 1)·100 of the RMSE just before the first fix after the outage.
-    pub rmse_end: RatioError,
+    pub rmse_end_ratio_error_pct: f64,
+    /// Its 95 % Monte-Carlo interval; none where nothing was drawn.
+    pub rmse_end_ci95_pct: Option<[f64; 2]>,
 }
 
 /// One outage of a candidate against the reference.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OutageComparison {
     /// Reported states.
+    #[serde(skip)]
     pub states: [StateRatio; REPORTED],
-    /// Mean NEES over the outage's epochs: candidate, reference.
-    pub nees: [f64; 2],
-    /// Mean coverage over the outage's epochs: candidate, reference.
-    pub coverage: [f64; 2],
+    /// Mean NEES over the outage's epochs.
+    pub nees_mean: f64,
+    /// The reference's.
+    pub nees_mean_reference: f64,
+    /// Mean coverage over the outage's epochs.
+    pub coverage_mean: f64,
+    /// The reference's.
+    pub coverage_mean_reference: f64,
 }
 
 /// The comparison of a candidate with the reference, outage by outage.
@@ -192,40 +123,31 @@ pub fn compare(
 }
 
 fn comparable(candidate: &Measured, reference: &Measured) -> Result<(), ComparisonError> {
+    let differ = |what, words: &dyn Fn(&Measured) -> String| {
+        Err(ComparisonError::Other {
+            what,
+            candidate: words(candidate),
+            reference: words(reference),
+        })
+    };
     if candidate.outages != reference.outages {
-        let words = |e: &Measured| match e.outages.as_slice() {
+        return differ("outages", &|e| match e.outages.as_slice() {
             [] => "none".to_owned(),
-            all => all
-                .iter()
-                .map(|(a, b)| format!("{a}:{b}"))
-                .collect::<Vec<_>>()
-                .join(", "),
-        };
-        let (candidate, reference) = (words(candidate), words(reference));
-        return Err(ComparisonError::Outages {
-            candidate,
-            reference,
+            all => {
+                let windows = all.iter().map(|(a, b)| format!("{a}:{b}"));
+                windows.collect::<Vec<_>>().join(", ")
+            }
         });
     }
     // To the last bit: epochs of the same schedule are equal, and ratios of unequal epochs would mean
     // nothing.
-    let times = |e: &Measured| {
-        e.epochs
-            .iter()
-            .map(|row| row.t_s.to_bits())
-            .collect::<Vec<_>>()
-    };
+    let times =
+        |e: &Measured| -> Vec<u64> { e.epochs.iter().map(|row| row.t_s.to_bits()).collect() };
     if times(candidate) != times(reference) {
-        let words = |e: &Measured| match (e.epochs.first(), e.epochs.last()) {
-            (Some(first), Some(last)) => {
-                format!("{} from {} to {} s", e.epochs.len(), first.t_s, last.t_s)
-            }
-            _ => "none".to_owned(),
-        };
-        let (candidate, reference) = (words(candidate), words(reference));
-        return Err(ComparisonError::Epochs {
-            candidate,
-            reference,
+        return differ("reporting epochs", &|e| {
+            let [first, last] = [e.epochs.first(), e.epochs.last()];
+            let t_s = |row: Option<&EpochRow>| row.map_or(f64::NAN, |row| row.t_s);
+            format!("{} from {} to {} s", e.epochs.len(), t_s(first), t_s(last))
         });
     }
     Ok(())
@@ -239,60 +161,47 @@ fn outage(
     paired: bool,
 ) -> OutageComparison {
     let outage = Outage { start_s, end_s };
-    let pick = |e: &Measured| {
-        e.epochs
-            .iter()
-            .filter(|row| outage.withholds(row.t_s))
-            .cloned()
-            .collect::<Vec<EpochRow>>()
-    };
-    let (c, r) = (pick(candidate), pick(reference));
-    let records = records(candidate, reference, index, paired);
+    let [c, r] = [candidate, reference].map(|e| {
+        let within = e.epochs.iter().filter(|row| outage.withholds(row.t_s));
+        within.collect::<Vec<_>>()
+    });
+    let (of_candidate, of_reference) = records(candidate, reference, index, paired);
     let windows = [candidate.independent_windows, reference.independent_windows]
         .into_iter()
         .flatten();
-    let is_expected = [candidate.is_expected, reference.is_expected];
     let pairing = Pairing {
         paired,
         windows: windows.reduce(f64::min),
-        is_expected,
+        is_expected: [candidate.is_expected, reference.is_expected],
+    };
+    let mean_ratio = |value: &dyn Fn(&OutageRecord) -> f64| {
+        let [a, b] = [&of_candidate, &of_reference]
+            .map(|side| side.iter().map(|o| value(o)).collect::<Vec<_>>());
+        pairing.mean_ratio(&a, &b)
     };
     let state = |i: usize| {
-        let ratios: Vec<f64> = c
-            .iter()
-            .zip(&r)
-            .map(|(c, r)| (c.asee[i] / r.asee[i] - 1.0) * 100.0)
-            .collect();
-        let see = |side: &[&OutageRecord]| side.iter().map(|o| o.see_mean[i]).collect::<Vec<_>>();
-        let square = |side: &[&OutageRecord]| {
-            side.iter()
-                .map(|o| o.error_end[i].powi(2))
-                .collect::<Vec<_>>()
-        };
-        let pct = mean(ratios.iter().copied());
-        let asee = pairing.mean_ratio(&see(&records.0), &see(&records.1));
+        let ratios = c.iter().zip(&r);
+        let ratios = ratios.map(|(c, r)| (c.asee[i] / r.asee[i] - 1.0) * 100.0);
+        let pct = mean(ratios.clone());
+        let (_, half) = mean_ratio(&|o| o.see_mean[i]);
+        let (rmse, rmse_ci95) = root(mean_ratio(&|o| o.error_end[i].powi(2)));
         StateRatio {
-            asee: RatioError {
-                pct,
-                ci95_pct: asee.half_width_pct.map(|half| [pct - half, pct + half]),
-            },
-            asee_abs_pct: mean(ratios.iter().map(|e| e.abs())),
+            ratio_error_pct: pct,
+            ci95_pct: half.map(|half| [pct - half, pct + half]),
             calibration_half_pct: None,
-            rmse_end: pairing
-                .mean_ratio(&square(&records.0), &square(&records.1))
-                .root(),
+            abs_ratio_error_pct: mean(ratios.map(f64::abs)),
+            rmse_end_ratio_error_pct: rmse,
+            rmse_end_ci95_pct: rmse_ci95,
         }
     };
+    let [nees, coverage] = [|row: &EpochRow| row.nees, |row: &EpochRow| row.coverage]
+        .map(|value| [&c, &r].map(|side| mean(side.iter().map(|row| value(row)))));
     OutageComparison {
         states: std::array::from_fn(state),
-        nees: [
-            mean(c.iter().map(|row| row.nees)),
-            mean(r.iter().map(|row| row.nees)),
-        ],
-        coverage: [
-            mean(c.iter().map(|row| row.coverage)),
-            mean(r.iter().map(|row| row.coverage)),
-        ],
+        nees_mean: nees[0],
+        nees_mean_reference: nees[1],
+        coverage_mean: coverage[0],
+        coverage_mean_reference: coverage[1],
     }
 }
 
@@ -307,7 +216,7 @@ impl OutageComparison {
             .iter_mut()
             .zip(candidate.0.iter().zip(&reference.0))
         {
-            let RatioError { pct, ci95_pct } = state.asee;
+            let (pct, ci95_pct) = (state.ratio_error_pct, state.ci95_pct);
             // In logarithms, where the intervals of scale parameters are nearly symmetric; independent, so
             // squares add.
             let calibration = (100.0 + pct) * half_of_log(*c).hypot(half_of_log(*r));
@@ -315,7 +224,7 @@ impl OutageComparison {
             let half = ci95_pct
                 .map_or(0.0, |[low, high]| 0.5 * (high - low))
                 .hypot(calibration);
-            state.asee.ci95_pct = Some([pct - half, pct + half]);
+            state.ci95_pct = Some([pct - half, pct + half]);
             state.calibration_half_pct = Some(calibration);
         }
     }
@@ -350,27 +259,17 @@ fn records<'a>(
 }
 
 /// A ratio of means and half the width of its 95 % interval (%); none where no side was sampled.
-struct MeanRatio {
-    ratio: f64,
-    half_width_pct: Option<f64>,
-}
+type MeanRatio = (f64, Option<f64>);
 
-impl MeanRatio {
-    /// The square root of the ratio, its interval by linearisation of the logarithm: a ratio of squares is skewed, and
-    /// none is below zero.
-    fn root(&self) -> RatioError {
-        let root = self.ratio.sqrt();
-        // d ln √R = dR/(2R).
-        let half = self
-            .half_width_pct
-            .map(|half| half / 100.0 / (2.0 * self.ratio));
-        let pct = |root: f64| (root - 1.0) * 100.0;
-        let interval = |half: f64| [-half, half].map(|x| pct(root * x.exp()));
-        RatioError {
-            pct: pct(root),
-            ci95_pct: half.map(interval),
-        }
-    }
+/// The square root of a ratio less 1 (%), its interval by linearisation of the logarithm: a ratio of squares is skewed, and none
+/// is below zero.
+fn root((ratio, half_width_pct): MeanRatio) -> (f64, Option<[f64; 2]>) {
+    let root = ratio.sqrt();
+    // d ln √R = dR/(2R).
+    let half = half_width_pct.map(|half| half / 100.0 / (2.0 * ratio));
+    let pct = |root: f64| (root - 1.0) * 100.0;
+    let interval = |half: f64| [-half, half].map(|x| pct(root * x.exp()));
+    (pct(root), half.map(interval))
 }
 
 /// How the runs of two experiments belong together.
@@ -393,10 +292,7 @@ impl Pairing {
             .filter_map(|(side, exact)| (!exact).then_some(side))
             .collect();
         let Some(fewest) = sampled.iter().map(|side| side.len()).min() else {
-            return MeanRatio {
-                ratio,
-                half_width_pct: None,
-            };
+            return (ratio, None);
         };
         let variance = if sampled.len() == 1 {
             // Var(a/b̄) is Var(ā)/b̄² with b certain, and ρ² Var(b̄)/b̄² with a certain.
@@ -417,10 +313,7 @@ impl Pairing {
         // The smaller sample decides: fewer degrees of freedom make a wider interval, never a narrower one.
         let freedom = SampleSize::of(fewest as u64, self.windows).independent - 1.0;
         let t = StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |t| t.inverse_cdf(0.975));
-        MeanRatio {
-            ratio,
-            half_width_pct: Some(t * variance.sqrt() / mean_b * 100.0),
-        }
+        (ratio, Some(t * variance.sqrt() / mean_b * 100.0))
     }
 
     fn variance_of_mean(&self, values: &[f64]) -> f64 {

@@ -1,10 +1,8 @@
 //! The summary of an experiment: what `summary.json` holds.
 
-use super::estimate::{
-    Band, Estimate, PerState, Quantile, SampleSize, chi_square_band, coverage_band,
-};
-use super::outage::{self, Accuracy, Budget, EpochMetrics, OutageMetrics};
-use super::verdict::{OutageVerdict, Verdict, VerdictKind};
+use super::estimate::{Band, PerState, SampleSize, chi_square_band, coverage_band};
+use super::outage::{Budget, EpochMetrics, outages};
+use super::verdict::{OutageVerdict, Verdict, VerdictKind, judged};
 use crate::ekf::Belief;
 use crate::ekf::belief::BiasGroup;
 use crate::imu::Channel;
@@ -19,11 +17,8 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::fmt;
 use std::str::FromStr;
 
-/// Version of the layout of `summary.json`.
-pub(super) const SCHEMA_VERSION: u32 = 1;
-
 /// What the user reads first.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Summary {
     /// Layout version.
     pub schema_version: u32,
@@ -78,7 +73,7 @@ fn is_zero(value: &f64) -> bool {
 }
 
 /// ASEE and RMSE as means over epochs.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct AccuracySummary {
     /// Mean over the epochs of the ASEE.
     pub asee_mean: PerState<f64>,
@@ -89,7 +84,7 @@ pub struct AccuracySummary {
 }
 
 /// One outage.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct OutageSummary {
     /// First instant without a fix (s).
     pub start_s: f64,
@@ -100,7 +95,7 @@ pub struct OutageSummary {
     /// Mean over the outage's epochs of the ASEE.
     pub asee_mean: PerState<f64>,
     /// Its Monte-Carlo standard error.
-    asee_mean_std_error: PerState<f64>,
+    pub(super) asee_mean_std_error: PerState<f64>,
     /// Mean over the outage's epochs of the RMSE.
     pub rmse_mean: PerState<f64>,
     /// Its Monte-Carlo standard error (an upper bound: as if all epochs erred together).
@@ -108,7 +103,7 @@ pub struct OutageSummary {
     /// ASEE just before the first fix after the outage.
     pub asee_end: PerState<f64>,
     /// Its Monte-Carlo standard error.
-    asee_end_std_error: PerState<f64>,
+    pub(super) asee_end_std_error: PerState<f64>,
     /// RMSE just before the first fix after the outage.
     pub rmse_end: PerState<f64>,
     /// Its Monte-Carlo standard error.
@@ -149,7 +144,7 @@ pub struct OutageSummary {
 
 /// Quantiles of a distribution over runs, with distribution-free 95 % intervals (null: too few runs); of a covariance
 /// analysis with the intervals that the calibration of what makes the errors leaves (null: its draws are not there).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Spread {
     /// Median.
     pub p50: f64,
@@ -167,7 +162,7 @@ pub struct Spread {
 }
 
 /// Quantiles over the runs that recover, and how many do not.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Recovery {
     /// Median.
     pub p50: f64,
@@ -178,7 +173,7 @@ pub struct Recovery {
 }
 
 /// Whether a chi-square statistic is where a correct filter puts it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Consistency {
     /// Degrees of freedom: what a correct filter's mean is.
     pub dof: usize,
@@ -193,7 +188,7 @@ pub struct Consistency {
 }
 
 /// Normalised innovation squared, all fixes of all runs together (independent for a correct filter).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Nis {
     /// Degrees of freedom of one fix.
     pub dof: usize,
@@ -210,7 +205,7 @@ pub struct Nis {
 }
 
 /// Empirical coverage.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Coverage {
     /// Nominal level.
     pub level: f64,
@@ -233,113 +228,50 @@ impl Summary {
     /// The summary of a Monte-Carlo experiment.
     pub fn of(result: &RunResult, epochs: &[EpochMetrics], seed: u64) -> Self {
         let windows = result.independent_windows;
-        let verdict = Verdict::of(&result.runs, result.outages.len(), windows);
-        let verdicts = OutageVerdict::of(&result.runs, result.outages.len(), windows);
-        let diverged_runs: Vec<u64> = result
-            .runs
-            .iter()
-            .filter(|r| r.diverged)
-            .map(|r| r.run)
-            .collect();
+        let (verdict, verdicts) = judged(&result.runs, result.outages.len(), windows);
+        let diverged = result.runs.iter().filter(|r| r.diverged);
+        let diverged_runs: Vec<u64> = diverged.map(|r| r.run).collect();
         Self {
-            schema_version: SCHEMA_VERSION,
             method: "monte-carlo",
-            verdict,
             runs: result.runs.len() as u64,
             diverged: diverged_runs.len() as u64,
             diverged_runs,
-            independent_runs: verdict.independent_runs,
             filter_states: result.filter_states,
             seed: Some(seed),
-            accuracy: AccuracySummary::from(&Accuracy::over(epochs.iter())),
-            outages: OutageSummary::all(&outage::outages(result), verdicts),
-            nees: nees(epochs, windows),
+            outages: with_verdicts(outages(result, epochs), verdicts),
             nis: nis(result),
-            coverage: coverage(epochs, result.coverage_level, windows),
-            reduction: None,
-            lincov: None,
-            is_contradicted: false,
-            strapdown_over_sigma: 0.0,
-            require: Vec::new(),
+            ..Self::over(epochs, verdict, result.coverage_level, windows)
         }
     }
-}
 
-fn values(all: &PerState<Estimate>) -> PerState<f64> {
-    PerState(all.0.map(|e| e.value))
-}
-
-fn errors(all: &PerState<Estimate>) -> PerState<f64> {
-    PerState(all.0.map(|e| e.std_error))
-}
-
-impl From<&Accuracy> for AccuracySummary {
-    fn from(a: &Accuracy) -> Self {
+    /// What is said of epochs alone.
+    pub(super) fn over(
+        epochs: &[EpochMetrics],
+        verdict: Verdict,
+        coverage_level: f64,
+        windows: Option<f64>,
+    ) -> Self {
         Self {
-            asee_mean: values(&a.asee_mean),
-            rmse_mean: values(&a.rmse_mean),
-            rmse_mean_std_error: errors(&a.rmse_mean),
-        }
-    }
-}
-
-impl OutageSummary {
-    /// All outages with their verdicts.
-    pub(super) fn all(outages: &[OutageMetrics], verdicts: Vec<OutageVerdict>) -> Vec<Self> {
-        outages
-            .iter()
-            .zip(verdicts)
-            .map(|(o, verdict)| Self::new(o, verdict))
-            .collect()
-    }
-
-    fn new(o: &OutageMetrics, verdict: OutageVerdict) -> Self {
-        Self {
-            start_s: o.start_s,
-            end_s: o.end_s,
+            schema_version: 1,
             verdict,
-            asee_mean: values(&o.asee_mean),
-            asee_mean_std_error: errors(&o.asee_mean),
-            rmse_mean: values(&o.rmse_mean),
-            rmse_mean_std_error: errors(&o.rmse_mean),
-            asee_end: values(&o.asee_end),
-            asee_end_std_error: errors(&o.asee_end),
-            rmse_end: values(&o.rmse_end),
-            rmse_end_std_error: errors(&o.rmse_end),
-            asee_end_ci95: None,
-            asee_mean_ci95: None,
-            rmse_end_ci95: None,
-            nees_end: o.nees_end.value,
-            nees_end_std_error: o.nees_end.std_error,
-            log_density_end: o.log_density_end.value,
-            log_density_end_std_error: o.log_density_end.std_error,
-            horizontal_error_end_m: Spread {
-                p999: o.horizontal_p999_m,
-                ..Spread::new(o.horizontal_p50_m, o.horizontal_p95_m, o.horizontal_max_m)
-            },
-            beyond_linear: o.beyond_linear,
-            reconvergence_s: Recovery {
-                p50: o.reconvergence.p50_s.value,
-                p95: o.reconvergence.p95_s.value,
-                never: o.reconvergence.never,
-            },
-            budget: None,
-            believed_budget: None,
+            independent_runs: verdict.independent_runs,
+            accuracy: AccuracySummary::over(epochs.iter()),
+            nees: nees(epochs, windows),
+            coverage: coverage(epochs, coverage_level, windows),
+            ..Self::default()
         }
     }
 }
 
-impl Spread {
-    const fn new(p50: Quantile, p95: Quantile, max: f64) -> Self {
-        Self {
-            p50: p50.value,
-            p95: p95.value,
-            p999: None,
-            max,
-            p50_ci95: p50.ci95,
-            p95_ci95: p95.ci95,
-        }
+/// Outages with their verdicts.
+pub(super) fn with_verdicts(
+    mut outages: Vec<OutageSummary>,
+    verdicts: Vec<OutageVerdict>,
+) -> Vec<OutageSummary> {
+    for (outage, verdict) in outages.iter_mut().zip(verdicts) {
+        outage.verdict = verdict;
     }
+    outages
 }
 
 /// Independent runs behind most epochs (all but the diverged ones).
@@ -378,7 +310,17 @@ fn mean_and_inside(
 ) -> (f64, f64) {
     let n = epochs.len() as f64;
     let inside = epochs.iter().filter(|e| band.contains(value(e))).count();
-    (epochs.iter().map(value).sum::<f64>() / n, inside as f64 / n)
+    let mean = epochs.iter().map(value).sum::<f64>() / n;
+    // of expected values there is no scatter, and no band for it
+    let has_band = band.lower.is_finite();
+    (
+        mean,
+        if has_band {
+            inside as f64 / n
+        } else {
+            f64::NAN
+        },
+    )
 }
 
 fn nis(result: &RunResult) -> Nis {

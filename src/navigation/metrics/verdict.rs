@@ -23,9 +23,10 @@ const DECISIVE: [f64; 2] = [1.25, 1.5];
 const FAR: f64 = 100.0;
 
 /// Verdict on a filter in one word, the gravest last.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum VerdictKind {
     /// Errors are as large as the filter believes; other ones would have been found.
+    #[default]
     Consistent,
     /// No fault was found, by runs too few to find one.
     Undecided,
@@ -58,7 +59,7 @@ pub type StateName = &'static str;
 pub const ALL_STATES: StateName = "all";
 
 /// The verdict on the filter of an experiment.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     /// In one word.
     pub kind: VerdictKind,
@@ -126,7 +127,7 @@ fn state<'de, D: Deserializer<'de>>(value: D) -> Result<&'static str, D::Error> 
 }
 
 /// The verdict on the filter at the end of one outage.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct OutageVerdict {
     /// In one word.
     pub kind: VerdictKind,
@@ -138,72 +139,62 @@ pub struct OutageVerdict {
     pub ratio_std_error: f64,
 }
 
-impl OutageVerdict {
-    /// From the records of the runs, as [`Verdict::of`]: with the same limits, so that no outage is called wrong
-    /// where the filter is not. A run that diverged did so in every outage, since nobody knows when.
-    pub(crate) fn of(
-        runs: &[RunRecord],
-        outages: usize,
-        independent_windows: Option<f64>,
-    ) -> Vec<Self> {
-        let kept: Vec<&RunRecord> = runs.iter().filter(|r| !r.diverged).collect();
-        let evidence = Evidence {
-            runs: &kept,
-            windows: independent_windows,
-        };
-        let statistics = evidence.statistics(outages);
-        let judge = Judge::new(evidence.independent_runs(), statistics.len());
-        judge.outages(&statistics, outages, kept.len() < runs.len())
-    }
+/// Verdicts on the whole and on each outage, from the records of the runs through a number of outages, those that diverged left
+/// out. No outage is called wrong where the filter is not. A run that diverged did so in every outage, since nobody knows when.
+pub(super) fn judged(
+    runs: &[RunRecord],
+    outages: usize,
+    windows: Option<f64>,
+) -> (Verdict, Vec<OutageVerdict>) {
+    let kept: Vec<&RunRecord> = runs.iter().filter(|r| !r.diverged).collect();
+    let evidence = Evidence {
+        runs: &kept,
+        windows,
+    };
+    let statistics = evidence.statistics(outages);
+    let independent_runs = evidence.independent_runs();
+    let judge = Judge::new(independent_runs, statistics.len());
+    let is_diverged = kept.len() < runs.len();
+    let kind = match is_diverged {
+        true => VerdictKind::Diverged,
+        false => judge.kind(&statistics),
+    };
+    (
+        Verdict::by(&judge, kind, &evidence, &statistics, independent_runs),
+        judge.outages(&statistics, outages, is_diverged),
+    )
+}
 
-    /// From the run whose squares are the expected ones, as [`Verdict::expected`].
-    pub(crate) fn expected(record: &RunRecord) -> Vec<Self> {
-        let statistics = Evidence {
-            runs: &[record],
-            windows: None,
-        }
-        .statistics(record.outages.len());
-        Judge::EXACT.outages(&statistics, record.outages.len(), false)
-    }
+/// The same from the run whose squares are the expected ones: nothing is left to chance, and what is off by more than
+/// the tolerance is wrong. Where errors are beyond linear theory, finding no fault is no proof.
+pub(super) fn expected(
+    record: &RunRecord,
+    beyond_linear: Option<usize>,
+) -> (Verdict, Vec<OutageVerdict>) {
+    let evidence = Evidence {
+        runs: &[record],
+        windows: None,
+    };
+    let statistics = evidence.statistics(record.outages.len());
+    let kind = match Judge::EXACT.kind(&statistics) {
+        VerdictKind::Consistent if beyond_linear.is_some() => VerdictKind::Doubtful,
+        kind => kind,
+    };
+    let verdict = Verdict::by(&Judge::EXACT, kind, &evidence, &statistics, f64::INFINITY);
+    (
+        Verdict {
+            beyond_linear,
+            ..verdict
+        },
+        Judge::EXACT.outages(&statistics, record.outages.len(), false),
+    )
 }
 
 impl Verdict {
     /// From the records of the runs through a number of outages, those that diverged left out;
     /// `independent_windows` as in [`RunResult`](crate::simulation::RunResult).
     pub fn of(runs: &[RunRecord], outages: usize, independent_windows: Option<f64>) -> Self {
-        let kept: Vec<&RunRecord> = runs.iter().filter(|r| !r.diverged).collect();
-        let evidence = Evidence {
-            runs: &kept,
-            windows: independent_windows,
-        };
-        let statistics = evidence.statistics(outages);
-        let independent_runs = evidence.independent_runs();
-        let judge = Judge::new(independent_runs, statistics.len());
-        let kind = if kept.len() < runs.len() {
-            VerdictKind::Diverged
-        } else {
-            judge.kind(&statistics)
-        };
-        Self::by(&judge, kind, &evidence, &statistics, independent_runs)
-    }
-
-    /// From the run whose squares are the expected ones: nothing is left to chance, and what is off by more than
-    /// the tolerance is wrong. Where errors are beyond linear theory, finding no fault is no proof.
-    pub(crate) fn expected(record: &RunRecord, beyond_linear: Option<usize>) -> Self {
-        let evidence = Evidence {
-            runs: &[record],
-            windows: None,
-        };
-        let statistics = evidence.statistics(record.outages.len());
-        let kind = match Judge::EXACT.kind(&statistics) {
-            VerdictKind::Consistent if beyond_linear.is_some() => VerdictKind::Doubtful,
-            kind => kind,
-        };
-        let verdict = Self::by(&Judge::EXACT, kind, &evidence, &statistics, f64::INFINITY);
-        Self {
-            beyond_linear,
-            ..verdict
-        }
+        judged(runs, outages, independent_windows).0
     }
 
     fn by(

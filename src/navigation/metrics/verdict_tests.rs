@@ -119,7 +119,7 @@ fn each_outage_has_a_verdict_of_its_own() {
     all.iter_mut()
         .zip(wrong)
         .for_each(|(run, wrong)| run.outages.extend(wrong.outages));
-    let found = OutageVerdict::of(&all, 2, None);
+    let found = judged(&all, 2, None).1;
     assert_eq!(found[0].kind, VerdictKind::Consistent);
     assert_eq!(
         (found[1].kind, found[1].worst_state),
@@ -129,7 +129,8 @@ fn each_outage_has_a_verdict_of_its_own() {
     assert_eq!(Verdict::of(&all, 2, None).worst_outage, Some(1));
     all[7].diverged = true;
     assert!(
-        OutageVerdict::of(&all, 2, None)
+        judged(&all, 2, None)
+            .1
             .iter()
             .all(|v| v.kind == VerdictKind::Diverged)
     );
@@ -203,6 +204,6 @@ fn too_few_runs_leave_a_right_filter_undecided() {
         "{decided:?}"
     );
     assert!(one_less.detectable_state_ratio > 1.5 && decided.runs_to_decide.is_none());
-    assert!(OutageVerdict::of(&runs(8, 1, 3, [1.0; 9]), 1, None)[0].kind == VerdictKind::Undecided);
+    assert!(judged(&runs(8, 1, 3, [1.0; 9]), 1, None).1[0].kind == VerdictKind::Undecided);
     assert_eq!(verdict(8, 2.5).kind, VerdictKind::Overconfident);
 }

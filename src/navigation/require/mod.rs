@@ -20,6 +20,8 @@ pub use imu::{Answer, IMU_PARAMETERS, ImuParameters, Margins, Need};
 
 use crate::ekf::BeliefError;
 use crate::simulation::ExperimentError;
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
 
 /// What is limited at the end of an outage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,8 +78,14 @@ impl Quantity {
     }
 }
 
+impl Serialize for Quantity {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
 /// A quantity and the most it may be.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Limit {
     /// The quantity.
     pub quantity: Quantity,
@@ -94,6 +102,17 @@ pub struct Worst {
     pub value: f64,
     /// At which place of the outage, counted from 0.
     pub place: usize,
+}
+
+impl Serialize for Worst {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut entry = serializer.serialize_struct("Worst", 4)?;
+        entry.serialize_field("quantity", &self.limit.quantity)?;
+        entry.serialize_field("value", &self.value)?;
+        entry.serialize_field("limit", &self.limit.most)?;
+        entry.serialize_field("place", &self.place)?;
+        entry.end()
+    }
 }
 
 impl Worst {

@@ -123,7 +123,7 @@ fn sentences_give_the_solution_of_the_table() {
         "{said}"
     );
     assert!(
-        said.contains("note: log.nmea: NMEA sentences") && !said.contains("warning: log.nmea"),
+        said.contains("log.nmea: NMEA sentences") && !said.contains("warning: log.nmea"),
         "{said}"
     );
     near(&day, 0.0);
