@@ -276,7 +276,7 @@ impl Covariance {
     #[inline(always)]
     pub(super) fn update<W: Wide>(
         &mut self,
-        h: &[(usize, W)],
+        h: &[(usize, Lanes)],
         r: f64,
         ph: &mut [Lanes],
         gain: &mut [Lanes],
@@ -285,13 +285,13 @@ impl Covariance {
         for i in 0..n {
             let mut sum = W::from(0.0);
             for (m, c) in h {
-                sum = self.get::<W>(i, *m).mul_add(*c, sum);
+                sum = self.get::<W>(i, *m).mul_add(W::load(c), sum);
             }
             sum.store(&mut ph[i]);
         }
         let mut h_ph = W::from(0.0);
         for (m, c) in h {
-            h_ph = W::load(&ph[*m]).mul_add(*c, h_ph);
+            h_ph = W::load(&ph[*m]).mul_add(W::load(c), h_ph);
         }
         let s = h_ph + r;
         let inverse = W::from(1.0) / s;

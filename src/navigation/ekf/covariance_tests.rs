@@ -22,7 +22,7 @@ fn scalar_update_agrees_with_the_dense_kalman_update() {
     (h[1], h[7], h[13]) = (1.0, -0.3, 2.0);
     let (mut ph, mut gain) = (vec![Lanes::ZERO; 15], vec![Lanes::ZERO; 15]);
     let sparse: Vec<_> = [1, 7, 13].map(|i| (i, Lanes::splat(h[i]))).to_vec();
-    let s = p.update(&sparse, 0.25, &mut ph, &mut gain);
+    let s: Lanes = p.update(&sparse, 0.25, &mut ph, &mut gain);
     let expected_s = (h.transpose() * &m * &h)[0] + 0.25;
     let k = &m * &h / expected_s;
     let expected = &m - &k * h.transpose() * &m;

@@ -254,24 +254,9 @@ impl Ekf {
         // At the sample nearest to the step: a comparison without slack would hang on the last bit of a sum
         // of 0.01 s.
         if self.earth_age + 0.5 * dt > EARTH_STEP_S {
-            self.apply_earth_terms(ins);
-        }
-    }
-
-    /// The Earth terms over the time since they were last applied.
-    #[inline(always)]
-    pub(super) fn apply_earth_terms<W: Wide>(&mut self, ins: &Strapdown<W>) {
-        if self.earth_age > 0.0 {
-            let step = EarthStep {
-                terms: EarthTerms::at(ins),
-                dt: self.earth_age,
-            };
-            self.earth_age = 0.0;
-            let sources = Sources::new(&self.belief, &self.steps, &self.regressors).still();
-            self.p.step(&step, &sources);
-            if let Some(transition) = &mut self.transition {
-                transition.step(&step, &sources);
-            }
+            // A kernel of its own, once in many samples: inlined here it takes the compiler long.
+            self.nominal.store(ins);
+            settle(self);
         }
     }
 
@@ -333,8 +318,19 @@ impl Kernel for Settle<'_> {
     type Output = ();
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let ins = self.0.nominal.load::<W>();
-        self.0.apply_earth_terms(&ins);
+        let ekf = self.0;
+        if ekf.earth_age > 0.0 {
+            let step = EarthStep {
+                terms: EarthTerms::at(&ekf.nominal.load::<W>()),
+                dt: ekf.earth_age,
+            };
+            ekf.earth_age = 0.0;
+            let sources = Sources::new(&ekf.belief, &ekf.steps, &ekf.regressors).still();
+            ekf.p.step(&step, &sources);
+            if let Some(transition) = &mut ekf.transition {
+                transition.step(&step, &sources);
+            }
+        }
     }
 }
 

@@ -1,6 +1,5 @@
 //! GNSS updates: position and velocity of an antenna on a lever arm, as scalars in sequence.
 
-use super::belief::MAX_BLOCKS;
 use super::covariance::{BIAS, NAV, PSI, R, Sources, V};
 use super::filter::{Ekf, apply_correction, settle};
 use crate::earth::{OMEGA_IE, radii};
@@ -34,36 +33,22 @@ pub struct Fix {
     pub lever_arm_b: DVec3,
 }
 
-/// Most entries of a measurement row: three of V and PSI, three of each gyroscope block, one of the vehicle's.
-const MAX_ROW: usize = 7 + 3 * MAX_BLOCKS;
-
 impl Ekf {
-    #[inline(always)]
-    fn use_fix<W: Wide>(&mut self, fix: &Fix) -> W {
-        let ins = self.nominal.load::<W>();
-        self.apply_earth_terms(&ins);
-        self.scratch.error.fill(Lanes::ZERO);
-        let antenna = Antenna::new(&ins, self.omega_ib_b.load(), fix.lever_arm_b);
-        let [position, velocity] = antenna.innovation(&ins, fix);
-        let mut nis = W::from(0.0);
-        for axis in 0..3 {
-            let row = antenna.position_row(axis);
-            // The density of six innovations is a product of conditional ones: the squares of the sequence
-            // sum to zᵀ S⁻¹ z.
-            nis += self.scalar(row.entries(), position[axis], fix.pos_sigma_m[axis].powi(2));
-        }
-        if fix.v_n.is_some() {
-            for axis in 0..3 {
-                let row = antenna.velocity_row(axis, &self.sources());
-                nis += self.scalar(
-                    row.entries(),
-                    velocity[axis],
-                    fix.vel_sigma_m_s[axis].powi(2),
-                );
-            }
-        }
-        self.correct(ins);
-        nis
+    /// The scalars of a fix: position, then velocity where it is measured.
+    fn scalars_of(&self, fix: &Fix) -> Vec<Scalar> {
+        let antenna = Antenna::new(&self.nominal, self.omega_ib_b, fix.lever_arm_b);
+        let z = antenna.innovation(&self.nominal, fix);
+        let sigmas = [fix.pos_sigma_m, fix.vel_sigma_m_s];
+        let count = if fix.v_n.is_some() { 6 } else { 3 };
+        let scalar = |i: usize| Scalar {
+            row: match i {
+                0..3 => antenna.position_row(i),
+                _ => antenna.velocity_row(i - 3, &self.sources()),
+            },
+            z: z[i / 3][i % 3],
+            variance: sigmas[i / 3][i % 3].powi(2),
+        };
+        (0..count).map(scalar).collect()
     }
 
     /// Estimated less measured position and velocity of the antenna: metres and m/s north, east, down; the
@@ -72,32 +57,18 @@ impl Ekf {
         Antenna::new(&self.nominal, self.omega_ib_b, fix.lever_arm_b).innovation(&self.nominal, fix)
     }
 
-    /// One scalar: innovation z = h·error + noise of variance r; returns its NIS.
+    /// One scalar; returns the innovation and its variance.
     #[inline(always)]
-    fn scalar<W: Wide>(&mut self, h: &[(usize, W)], z: W, r: f64) -> W {
-        let (innovation, s) = self.take(h, z, r);
-        innovation * innovation / s
-    }
-
-    /// The same; returns the innovation and its variance.
-    #[inline(always)]
-    fn innovated<W: Wide>(&mut self, h: &[(usize, W)], z: W, r: f64) -> Innovation {
-        let (innovation, s) = self.take(h, z, r);
-        let mut found = [Lanes::ZERO; 2];
-        innovation.store(&mut found[0]);
-        s.store(&mut found[1]);
-        found
-    }
-
-    #[inline(always)]
-    fn take<W: Wide>(&mut self, h: &[(usize, W)], z: W, r: f64) -> (W, W) {
-        let scratch = &mut self.scratch;
-        let s = self.p.update(h, r, &mut scratch.ph, &mut scratch.gain);
+    fn take<W: Wide>(&mut self, scalar: &Scalar) -> (W, W) {
+        let (h, scratch) = (&scalar.row, &mut self.scratch);
+        let s: W = self
+            .p
+            .update(h, scalar.variance, &mut scratch.ph, &mut scratch.gain);
         // What the scalars before have already explained. The nominal state moves only after the last one, so
         // all six are linearised at the same state, and their order changes nothing but rounding.
-        let mut innovation = z;
+        let mut innovation = W::load(&scalar.z);
         for (i, c) in h {
-            innovation -= *c * W::load(&scratch.error[*i]);
+            innovation -= W::load(c) * W::load(&scratch.error[*i]);
         }
         for (error, gain) in scratch.error.iter_mut().zip(&scratch.gain) {
             W::load(gain)
@@ -148,71 +119,71 @@ pub enum FixUpdate {
 /// normalised innovation squared (NIS) of the fix.
 pub fn update(ekf: &mut Ekf, fix: &Fix) -> Lanes {
     match ekf.fix_update {
-        FixUpdate::Ekf => dispatch(ekf.level, Update { ekf, fix }),
+        FixUpdate::Ekf => {
+            let scalars = ekf.scalars_of(fix);
+            // The density of six innovations is a product of conditional ones: the squares of the sequence sum
+            // to zᵀ S⁻¹ z.
+            let squares = use_scalars(ekf, &scalars).into_iter().map(nis);
+            squares.fold(Lanes::ZERO, |sum, square| sum + square)
+        }
         FixUpdate::Iterated => update_iterated(ekf, fix),
     }
 }
 
-struct Update<'a> {
-    ekf: &'a mut Ekf,
-    fix: &'a Fix,
+/// What a scalar measurement found: estimate less measured, and the variance that the filter states of that.
+type Innovation = [Lanes; 2];
+
+/// Normalised innovation squared.
+fn nis([z, s]: Innovation) -> Lanes {
+    z * z / s
 }
 
-impl Kernel for Update<'_> {
-    type Output = Lanes;
+/// A scalar measurement of eight runs.
+struct Scalar {
+    row: Row<Lanes>,
+    /// Estimate less measured.
+    z: Lanes,
+    /// Variance of its white noise.
+    variance: f64,
+}
+
+/// Uses scalars in sequence, then corrects the nominal state; returns the innovation of each.
+fn use_scalars(ekf: &mut Ekf, scalars: &[Scalar]) -> Vec<Innovation> {
+    settle(ekf);
+    ekf.scratch.error.fill(Lanes::ZERO);
+    let found = dispatch(ekf.level, UseScalars { ekf, scalars });
+    apply_correction(ekf);
+    found
+}
+
+struct UseScalars<'a> {
+    ekf: &'a mut Ekf,
+    scalars: &'a [Scalar],
+}
+
+impl Kernel for UseScalars<'_> {
+    type Output = Vec<Innovation>;
     #[inline(always)]
-    fn run<W: Wide>(self) -> Lanes {
-        let mut nis = Lanes::ZERO;
-        self.ekf.use_fix::<W>(self.fix).store(&mut nis);
-        nis
+    fn run<W: Wide>(self) -> Vec<Innovation> {
+        let mut found = vec![[Lanes::ZERO; 2]; self.scalars.len()];
+        for (scalar, [z, s]) in self.scalars.iter().zip(&mut found) {
+            let (innovation, variance) = self.ekf.take::<W>(scalar);
+            innovation.store(z);
+            variance.store(s);
+        }
+        found
     }
 }
 
 /// Uses a height above the ellipsoid (m), measured at the IMU with a standard deviation. Returns its NIS.
 pub(crate) fn update_height(ekf: &mut Ekf, h: &Lanes, sigma_m: f64) -> Lanes {
     // the third component of the position error is down: estimated less measured
-    let (row, z) = (Row::new(3 * R + 2), *h - ekf.nominal.h);
-    let [z, s] = update_scalar(ekf, &row, z, sigma_m * sigma_m);
-    z * z / s
-}
-
-/// Uses one scalar measurement of a variance, estimate less measured `z`.
-fn update_scalar(ekf: &mut Ekf, row: &Row<Lanes>, z: Lanes, variance: f64) -> Innovation {
-    let level = ekf.level;
-    dispatch(
-        level,
-        UpdateScalar {
-            ekf,
-            row,
-            z,
-            variance,
-        },
-    )
-}
-
-struct UpdateScalar<'a> {
-    ekf: &'a mut Ekf,
-    row: &'a Row<Lanes>,
-    z: Lanes,
-    variance: f64,
-}
-
-impl Kernel for UpdateScalar<'_> {
-    type Output = Innovation;
-    #[inline(always)]
-    fn run<W: Wide>(self) -> Innovation {
-        let ekf = self.ekf;
-        let ins = ekf.nominal.load::<W>();
-        ekf.apply_earth_terms(&ins);
-        ekf.scratch.error.fill(Lanes::ZERO);
-        let mut row = Row::default();
-        for (state, coefficient) in self.row.entries() {
-            row.push(*state, W::load(coefficient));
-        }
-        let innovation = ekf.innovated(row.entries(), W::load(&self.z), self.variance);
-        ekf.correct(ins);
-        innovation
-    }
+    let height = Scalar {
+        row: vec![(3 * R + 2, Lanes::splat(1.0))],
+        z: *h - ekf.nominal.h,
+        variance: sigma_m * sigma_m,
+    };
+    nis(use_scalars(ekf, &[height])[0])
 }
 
 /// Where the antenna is and how it moves about the IMU, and the measurement rows that follow.
@@ -249,46 +220,42 @@ impl<W: Real> Antenna<W> {
     }
 
     /// Position of the antenna: delta r_n − \[C l ×\] psi_n.
-    #[inline(always)]
     fn position_row(&self, axis: usize) -> Row<W> {
-        let mut row = Row::new(3 * R + axis);
+        let mut row = vec![(3 * R + axis, W::from(1.0))];
         if self.has_arm {
-            row.push3(3 * PSI, Mat3::skew(-self.arm_n).0[axis]);
+            row.extend(block(PSI, Mat3::skew(-self.arm_n).0[axis]));
         }
         row
     }
 }
 
-impl<W: Wide> Antenna<W> {
+impl Antenna<Lanes> {
     /// Velocity of the antenna: delta v_n + `of_psi` psi_n + C \[l ×\] (delta b_g + delta u ∘ regressor), u an
     /// unknown of the gyroscope.
-    #[inline(always)]
-    fn velocity_row(&self, axis: usize, sources: &Sources<'_>) -> Row<W> {
-        let mut row = Row::new(3 * V + axis);
+    fn velocity_row(&self, axis: usize, sources: &Sources<'_>) -> Row<Lanes> {
+        let mut row = vec![(3 * V + axis, Lanes::splat(1.0))];
         if self.has_arm {
-            row.push3(3 * PSI, self.of_psi.0[axis]);
-            row.push_gyro(self.of_bias.0[axis], sources);
+            row.extend(block(PSI, self.of_psi.0[axis]));
+            push_gyro(&mut row, self.of_bias.0[axis], sources);
         }
         row
     }
 
     /// Estimated less measured position (m) and velocity (m/s) of the antenna, north, east, down.
-    #[inline(always)]
-    fn innovation(&self, ins: &Strapdown<W>, fix: &Fix) -> [Vec3<W>; 2] {
+    fn innovation(&self, ins: &Strapdown, fix: &Fix) -> [Vec3; 2] {
         let (s, c) = ins.lat.sin_cos();
         let r = radii(s);
-        let (lat, lon, h) = (W::load(&fix.lat), W::load(&fix.lon), W::load(&fix.h));
         // longitudes may differ by whole turns
-        let dlon = ins.lon - lon;
+        let dlon = ins.lon - fix.lon;
         let dlon = dlon - rounded(dlon * (1.0 / TAU)) * TAU;
         let (north, east) = (
-            (ins.lat - lat) * (r.meridian + ins.h),
+            (ins.lat - fix.lat) * (r.meridian + ins.h),
             dlon * (r.transverse + ins.h) * c,
         );
-        let velocity = fix.v_n.map(|v_n| ins.v_n + self.swing_n - v_n.load());
+        let velocity = fix.v_n.map(|v_n| ins.v_n + self.swing_n - v_n);
         [
-            Vec3([north, east, h - ins.h]) + self.arm_n,
-            velocity.unwrap_or(Vec3::splat(DVec3::ZERO)),
+            Vec3([north, east, fix.h - ins.h]) + self.arm_n,
+            velocity.unwrap_or(Vec3::ZERO),
         ]
     }
 }
@@ -302,84 +269,38 @@ pub(crate) fn fix_rows(
 ) -> [[f64; 12]; 6] {
     let antenna = Antenna::new(ins, Vec3::splat(omega_ib_b), lever_arm_b);
     std::array::from_fn(|i| {
-        let mut row = if i < 3 {
-            antenna.position_row(i)
-        } else {
-            Row::new(3 * V + i - 3)
-        };
-        if i >= 3 {
-            row.push3(3 * PSI, antenna.of_psi.0[i - 3]);
-            row.push3(3 * BIAS, antenna.of_bias.0[i - 3]);
-        }
         let mut dense = [0.0; 12];
-        row.entries()
-            .iter()
-            .for_each(|(state, coefficient)| dense[*state] += coefficient);
+        if i < 3 {
+            let row = antenna.position_row(i);
+            row.iter().for_each(|(state, c)| dense[*state] = *c);
+        } else {
+            dense[3 * V + i - 3] = 1.0;
+            dense[3 * PSI..3 * BIAS].copy_from_slice(&antenna.of_psi.0[i - 3]);
+            dense[3 * BIAS..].copy_from_slice(&antenna.of_bias.0[i - 3]);
+        }
         dense
     })
 }
 
-/// One measurement row: (state, coefficient), without allocation.
-pub(super) struct Row<L> {
-    entries: [(usize, L); MAX_ROW],
-    len: usize,
+/// A measurement row: states and their coefficients.
+type Row<L> = Vec<(usize, L)>;
+
+/// The coefficients of the three states of a block.
+fn block<L>(block: usize, coefficients: [L; 3]) -> impl Iterator<Item = (usize, L)> {
+    (3 * block..).zip(coefficients)
 }
 
-impl<L: Real> Default for Row<L> {
-    #[inline(always)]
-    fn default() -> Self {
-        Self {
-            entries: [(0, L::from(0.0)); MAX_ROW],
-            len: 0,
-        }
+/// What the error of the gyroscope's rate does, times these coefficients: its biases and its unknowns.
+fn push_gyro(row: &mut Row<Lanes>, of_bias: [Lanes; 3], sources: &Sources<'_>) {
+    let [_, gyro, unknown, gyro_unknown] = sources.starts();
+    // The rate is that of the last sample: its biases count all alike. Its white noise times the arm
+    // is left out: at 1 m it is mm/s beside the cm/s of a receiver.
+    for group in gyro / 3..unknown / 3 {
+        row.extend(block(group, of_bias));
     }
-}
-
-impl<L: Real> Row<L> {
-    #[inline(always)]
-    fn new(state: usize) -> Self {
-        let mut row = Self::default();
-        row.push(state, L::from(1.0));
-        row
-    }
-
-    #[inline(always)]
-    fn push(&mut self, state: usize, coefficient: L) {
-        self.entries[self.len] = (state, coefficient);
-        self.len += 1;
-    }
-
-    #[inline(always)]
-    fn push3(&mut self, first: usize, coefficients: [L; 3]) {
-        coefficients
-            .into_iter()
-            .enumerate()
-            .for_each(|(i, c)| self.push(first + i, c));
-    }
-
-    #[inline(always)]
-    fn entries(&self) -> &[(usize, L)] {
-        &self.entries[..self.len]
-    }
-}
-
-impl<W: Wide> Row<W> {
-    /// What the error of the gyroscope's rate does, times these coefficients: its biases and its unknowns.
-    #[inline(always)]
-    fn push_gyro(&mut self, of_bias: [W; 3], sources: &Sources<'_>) {
-        let [_, gyro, unknown, gyro_unknown] = sources.starts();
-        // The rate is that of the last sample: its biases count all alike. Its white noise times the arm
-        // is left out: at 1 m it is mm/s beside the cm/s of a receiver.
-        for first in (gyro..unknown).step_by(3) {
-            self.push3(first, of_bias);
-        }
-        for (u, regressor) in sources.regressors[Sensor::Gyro as usize].iter().enumerate() {
-            let Vec3([x, y, z]) = regressor.value.load::<W>();
-            self.push3(
-                gyro_unknown + 3 * u,
-                [of_bias[0] * x, of_bias[1] * y, of_bias[2] * z],
-            );
-        }
+    for (u, regressor) in sources.regressors[Sensor::Gyro as usize].iter().enumerate() {
+        let product = |axis| of_bias[axis] * regressor.value[axis];
+        row.extend(block(gyro_unknown / 3 + u, [0, 1, 2].map(product)));
     }
 }
 
@@ -391,7 +312,7 @@ impl Ekf {
         let velocity = (0..3).map(|axis| antenna.velocity_row(axis, &self.sources()));
         let dense = |row: Row<Lanes>| {
             let mut dense = vec![0.0; self.p.dim()];
-            row.entries().iter().for_each(|(i, c)| dense[*i] += c[0]);
+            row.iter().for_each(|(i, c)| dense[*i] += c[0]);
             dense
         };
         position.chain(velocity).map(dense).collect()
@@ -418,25 +339,10 @@ pub(crate) struct BodyVelocity {
     pub(crate) vehicle_b: [DVec3; 3],
 }
 
-/// What a scalar measurement found: estimate less measured, and the variance that the filter states of that.
-type Innovation = [Lanes; 2];
-
 /// Uses a velocity along the vehicle's axes; returns the innovation of each of its axes in sequence.
-pub(crate) fn update_body_velocity(ekf: &mut Ekf, measured: &BodyVelocity) -> [Innovation; 3] {
-    dispatch(ekf.level, UpdateVelocity { ekf, measured })
-}
-
-struct UpdateVelocity<'a> {
-    ekf: &'a mut Ekf,
-    measured: &'a BodyVelocity,
-}
-
-impl Kernel for UpdateVelocity<'_> {
-    type Output = [Innovation; 3];
-    #[inline(always)]
-    fn run<W: Wide>(self) -> [Innovation; 3] {
-        self.ekf.use_body_velocity::<W>(self.measured)
-    }
+pub(crate) fn update_body_velocity(ekf: &mut Ekf, measured: &BodyVelocity) -> Vec<Innovation> {
+    let scalars = ekf.scalars_of_velocity(measured);
+    use_scalars(ekf, &scalars)
 }
 
 /// Uses a yaw (rad) of the body, of a variance (rad²).
@@ -446,9 +352,8 @@ pub(crate) fn update_yaw(ekf: &mut Ekf, yaw: &Lanes, variance: f64) -> Innovatio
     for lane in 0..LANES {
         z[lane] = wrap_angle(c.0[1][0][lane].atan2(c.0[0][0][lane]) - yaw[lane]);
     }
-    let mut row = Row::default();
-    row.push3(3 * PSI, yaw_row(&ekf.nominal).0);
-    update_scalar(ekf, &row, z, variance)
+    let row = block(PSI, yaw_row(&ekf.nominal).0).collect();
+    use_scalars(ekf, &[Scalar { row, z, variance }])[0]
 }
 
 impl Ekf {
@@ -465,39 +370,33 @@ impl Ekf {
         Some([self.estimates[first / 3 - BIAS].lane(0), sigma])
     }
 
-    #[inline(always)]
-    fn use_body_velocity<W: Wide>(&mut self, measured: &BodyVelocity) -> [Innovation; 3] {
-        let ins = self.nominal.load::<W>();
-        self.apply_earth_terms(&ins);
-        self.scratch.error.fill(Lanes::ZERO);
-        let point = Antenna::new(&ins, self.omega_ib_b.load(), measured.lever_arm_b);
+    fn scalars_of_velocity(&self, measured: &BodyVelocity) -> Vec<Scalar> {
+        let ins = &self.nominal;
+        let point = Antenna::new(ins, self.omega_ib_b, measured.lever_arm_b);
         let states = self.vehicle();
-        let estimates = states.map_or(Vec3::splat(DVec3::ZERO), |first| {
-            self.estimates[first / 3 - BIAS].load::<W>()
-        });
-        let rows = BodyRows::new(&point, &ins);
-        let [forward, right, down] = measured.vehicle_b.map(Vec3::<W>::splat);
-        let in_b = |v: Vec3<W>| forward * v[0] + right * v[1] + down * v[2];
-        let mut found = [[Lanes::ZERO; 2]; 3];
-        for (found, &axis) in found.iter_mut().zip(measured.axes) {
-            let along_b = in_b(along(axis, estimates));
+        let estimates = states.map_or(Vec3::ZERO, |first| self.estimates[first / 3 - BIAS]);
+        let rows = BodyRows::new(&point, ins);
+        let [forward, right, down] = measured.vehicle_b.map(Vec3::<Lanes>::splat);
+        let scalar = |&axis: &usize| {
+            let v = along(axis, estimates);
+            let along_b = forward * v[0] + right * v[1] + down * v[2];
             let [of_v, of_psi, of_gyro] = rows.along(along_b);
-            let mut row = Row::default();
-            row.push3(3 * V, of_v.0);
-            row.push3(3 * PSI, of_psi.0);
+            let mut row: Row<Lanes> = block(V, of_v.0).chain(block(PSI, of_psi.0)).collect();
             if measured.lever_arm_b != DVec3::ZERO {
-                row.push_gyro(of_gyro.0, &self.sources());
+                push_gyro(&mut row, of_gyro.0, &self.sources());
             }
             if let Some(first) = states {
                 // wheel scale, pitch, yaw: of the forward velocity, as `along` has them
                 let (state, sign) = [(0, 1.0), (2, -1.0), (1, 1.0)][axis];
-                row.push(first + state, forward.dot(rows.v_b) * sign);
+                row.push((first + state, forward.dot(rows.v_b) * sign));
             }
-            let z = along_b.dot(rows.v_b) - W::load(&measured.value[axis]);
-            *found = self.innovated(row.entries(), z, measured.variance);
-        }
-        self.correct(ins);
-        found
+            Scalar {
+                row,
+                z: along_b.dot(rows.v_b) - measured.value[axis],
+                variance: measured.variance,
+            }
+        };
+        measured.axes.iter().map(scalar).collect()
     }
 }
 
