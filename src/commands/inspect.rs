@@ -120,22 +120,17 @@ fn inspected(
     channel: &Channel,
     options: &LogOptions,
 ) -> std::result::Result<InspectedChannel, Error> {
-    let topic = Some(channel.topic.as_str());
     let (content, units, stamps) = match channel.content {
         _ if channel.messages == 0 => ("other", None, Vec::new()),
         Content::Imu => {
-            let samples = log
-                .imu(topic, options.stamp)?
-                .map(|sample| Ok(sample?.stamp_ns));
-            let stamps: std::result::Result<Vec<i64>, Error> = samples.collect();
-            ("imu", Some("m/s², rad/s"), stamps?)
+            let samples = log.imu(channel, options.stamp)?;
+            let stamps = samples.iter().map(|sample| sample.stamp_ns).collect();
+            ("imu", Some("m/s², rad/s"), stamps)
         }
         Content::Fix => {
-            let fixes = log
-                .fixes(topic, options.stamp)?
-                .map(|fix| Ok(fix?.stamp_ns));
-            let stamps: std::result::Result<Vec<i64>, Error> = fixes.collect();
-            ("fix", Some("deg, m"), stamps?)
+            let fixes = log.fixes(channel, options.stamp)?;
+            let stamps = fixes.iter().map(|fix| fix.stamp_ns).collect();
+            ("fix", Some("deg, m"), stamps)
         }
         Content::Other => ("other", None, Vec::new()),
     };

@@ -1,7 +1,7 @@
 //! Records of a ROS 1 bag (<https://wiki.ros.org/Bags/Format/2.0>).
 
 use crate::bytes::{Bytes, text};
-use crate::container::{Definition, Dialect, Head, Record, Tally};
+use crate::container::{Dialect, Head, Record};
 use crate::error::{Error, Fault};
 use crate::input::Input;
 use crate::sample::NS;
@@ -156,31 +156,13 @@ fn message(fields: Fields<'_>, size: u64) -> Option<Record> {
 
 /// Times and places of a connection's messages in the chunk before.
 fn index(fields: Fields<'_>, entries: &[u8]) -> Option<Record> {
-    const ENTRY: usize = 12;
-    let times = || {
-        entries
-            .chunks_exact(ENTRY)
-            .filter_map(|e| time_ns(&mut Bytes::little(e)))
-    };
-    let (Some(first_ns), Some(last_ns)) = (times().min(), times().max()) else {
-        return Some(Record::Other);
-    };
-    let messages = (entries.len() / ENTRY) as u64;
-    Some(Record::Index(Tally {
-        channel: fields.u32(b"conn")?,
-        messages,
-        first_ns,
-        last_ns,
-    }))
+    let entries = entries.chunks_exact(12);
+    let times = entries.filter_map(|entry| time_ns(&mut Bytes::little(entry)));
+    Some(Record::Index(fields.u32(b"conn")?, times.collect()))
 }
 
 fn connection(fields: Fields<'_>, data: &[u8]) -> Option<Record> {
-    let topic = text(fields.bytes(b"topic")?);
-    let type_name = text(Fields(data).bytes(b"type")?);
-    Some(Record::Channel(Definition {
-        id: fields.u32(b"conn")?,
-        topic,
-        type_name,
-        encoding: "ros1".to_owned(),
-    }))
+    let (topic, type_name) = (fields.bytes(b"topic")?, Fields(data).bytes(b"type")?);
+    let named = [text(topic), text(type_name), "ros1".to_owned()];
+    Some(Record::Channel(fields.u32(b"conn")?, named))
 }

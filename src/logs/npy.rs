@@ -2,7 +2,7 @@
 
 use crate::bytes::{Alignment, Bytes, Number, Order};
 use crate::error::{Error, Fault};
-use crate::input::Origin;
+use crate::input::Input;
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -33,7 +33,7 @@ struct Header {
 /// # Errors
 /// When it is cut off, or no array of real numbers.
 pub fn read(path: &Path) -> Result<Array, Error> {
-    let input = Origin::File(path.to_owned()).open()?;
+    let input = Input::open(path)?;
     let size = input.length();
     read_from(&mut input.take(size), size, 0)
 }

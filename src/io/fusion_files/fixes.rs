@@ -7,7 +7,7 @@ use crate::io::table::{self, Asked, Column, Dictionary, Quantity, Table};
 use crate::io::{Failure as Error, Place, help, logs, source};
 use glam::{DMat3, DVec3};
 use nav_sim_document::Note;
-use nav_sim_logs::{Clock, Fix, Stamp};
+use nav_sim_logs::{Clock, Content, Fix, Stamp, in_seconds};
 use nav_sim_navigation::earth::{A, MAX_LATITUDE, ecef_to_geodetic, geodetic_to_ecef};
 use nav_sim_navigation::frames::q_e_n;
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
@@ -377,34 +377,28 @@ fn of_log(
 ) -> Result<Fixes, Error> {
     let refused = |e| logs::refused(path, e);
     let log = logs::open(path)?;
-    let mut read = log.fixes(topic, Stamp::default()).map_err(refused)?;
-    let mut fixes = Vec::new();
-    for (row, fix) in read.by_ref().enumerate() {
-        let fix = in_radians(&fix.map_err(refused)?, unsaid).ok_or_else(|| {
-            let message = "the fixes have no standard deviations";
-            Error::contents(path.display().to_string(), Place::Within, message).or(help::FIX_SIGMA)
-        })?;
-        fixes.push((row as u64 + 1, fix));
-    }
-    let mut said = format!("fixes of {}", read.topic());
-    let is_dated = log
-        .channels()
-        .iter()
-        .any(|c| c.topic == read.topic() && c.clock == Clock::Unix);
-    let span_s = fixes
-        .first()
-        .zip(fixes.last())
-        .map(|((_, first), (_, last))| (first.t_s, last.t_s));
+    let channel = log.channel(Content::Fix, topic).map_err(refused)?;
+    let read = log.fixes(channel, Stamp::default()).map_err(refused)?;
+    let unstated = || {
+        let message = "the fixes have no standard deviations";
+        Error::contents(path.display(), Place::Within, message).or(help::FIX_SIGMA)
+    };
+    let fixes = (1..)
+        .zip(read)
+        .map(|(row, fix)| Some((row, in_radians(&fix, unsaid)?)));
+    let mut fixes: Vec<(u64, GnssFix)> = fixes.collect::<Option<_>>().ok_or_else(unstated)?;
+    let mut said = format!("fixes of {}", channel.topic);
+    let span_s = fixes.first().zip(fixes.last());
     let clock = span_s
-        .filter(|_| is_dated)
-        .and_then(|span_s| rtklib::clock(span_s, imu_s));
+        .filter(|_| channel.clock == Clock::Unix)
+        .and_then(|((_, first), (_, last))| rtklib::clock((first.t_s, last.t_s), imu_s));
     if let Some(clock) = clock.filter(|clock| clock.origin_s != 0.0) {
         fixes
             .iter_mut()
             .for_each(|(_, fix)| fix.t_s -= clock.origin_s);
         said = format!("{said}, in {}", clock.name);
     }
-    let cut = read.damage().or(log.damage()).map(logs::cut_off);
+    let cut = log.damage().map(logs::cut_off);
     let remarks = cut.map(doubt).into_iter();
     Ok((fixes, remarks.chain([remark(said)]).collect()))
 }
@@ -415,7 +409,7 @@ fn in_radians(fix: &Fix, unsaid: Option<&FixSigma>) -> Option<GnssFix> {
     let velocity_sigma = fix.sd_v_ned_m_s.or(unsaid.and_then(|sigma| sigma.vel_m_s));
     let velocity = fix.v_ned_m_s.zip(velocity_sigma);
     Some(GnssFix {
-        t_s: fix.t_s(),
+        t_s: in_seconds(fix.stamp_ns),
         lat: fix.lat_deg * DEG,
         lon: fix.lon_deg * DEG,
         h: fix.h_m,

@@ -1,11 +1,12 @@
 //! Tables that are no text: arrays of NumPy, Parquet, directories of KITTI, logs.
 
 use super::text::{layout, number};
-use super::{Asked, BETWEEN, Dictionary, Table, shown, unreadable};
+use super::{Asked, Dictionary, Table, shown, unreadable};
 use crate::io::{Failure, Place, help, logs, source};
 use chrono::NaiveDateTime;
-use nav_sim_logs::Clock;
+
 use nav_sim_logs::npy::{self, Array};
+use nav_sim_logs::{Channel, Clock, Content, in_seconds};
 use std::path::{Path, PathBuf};
 
 /// Columns by names, each with its numbers.
@@ -96,10 +97,10 @@ pub(super) fn npz(
     /// Name of the array of a single number that states the rate (Hz).
     const RATE: &str = "rate_hz";
     let refused = |e| logs::refused(path, e);
-    let archive = Archive::open(path).map_err(refused)?;
+    let mut archive = Archive::open(path).map_err(refused)?;
     let (mut columns, mut rate_hz) = (Vec::new(), None);
     for name in archive.names() {
-        let array = match archive.read(name) {
+        let array = match archive.read(&name) {
             // texts and the like are passed over
             Err(Error::At(_, Fault::Encoding(_))) => Array {
                 shape: Vec::new(),
@@ -109,11 +110,11 @@ pub(super) fn npz(
         };
         match array.shape[..] {
             [] | [1] if name == RATE => rate_hz = array.values.first().map(|hz| (*hz, RATE)),
-            [_] => columns.push((name.to_owned(), array.values)),
+            [_] => columns.push((name, array.values)),
             [_, 3] => {
-                columns.extend((0..3).map(|k| (of_axis(name, k), strided(&array, k, 3))));
+                columns.extend((0..3).map(|k| (of_axis(&name, k), strided(&array, k, 3))));
             }
-            _ => columns.push((name.to_owned(), Vec::new())),
+            _ => columns.push((name, Vec::new())),
         }
     }
     let mut table = of_columns(&path.display().to_string(), columns, dictionary, asked)?;
@@ -273,36 +274,25 @@ pub(super) fn log(
 ) -> Result<Table, Failure> {
     let refused = |e| logs::refused(path, e);
     let log = logs::open(path)?;
-    let mut samples = log
-        .imu(asked.log.topic.as_deref(), asked.log.stamp)
-        .map_err(refused)?;
+    let channel = log.channel(Content::Imu, asked.log.topic.as_deref());
+    let channel = channel.map_err(refused)?;
     let names = ["t_s"].into_iter().chain(OXTS.map(|(name, _)| name));
     let names: Vec<String> = names.map(str::to_owned).collect();
-    let (mut table, places) = Table::new(
-        &path.display().to_string(),
-        0,
-        &names,
-        dictionary,
-        asked,
-        false,
-    )?;
-    for (row, sample) in samples.by_ref().enumerate() {
-        let sample = sample.map_err(refused)?;
-        if row % BETWEEN == 0 {
-            table.fits((row + BETWEEN) as u64)?;
-        }
-        let (accel, gyro) = sample.motion.rates();
-        let values = [sample.t_s()].into_iter().chain(accel).chain(gyro);
+    let name = path.display().to_string();
+    let (mut table, places) = Table::new(&name, 0, &names, dictionary, asked, false)?;
+    table.fits(channel.messages)?;
+    let samples = log.imu(channel, asked.log.stamp).map_err(refused)?;
+    for (line, sample) in (1..).zip(samples) {
+        let values = [in_seconds(sample.stamp_ns)].into_iter();
+        let values = values.chain(sample.accel_m_s2).chain(sample.gyro_rad_s);
         for (value, place) in values.zip(&places) {
             let Some(column) = *place else { continue };
-            table.push(column, value, None, row as u64 + 1, dictionary)?;
+            table.push(column, value, None, line, dictionary)?;
         }
     }
-    table.assumptions.push(format!("topic {}", samples.topic()));
-    let cut = samples.damage().or(log.damage());
-    table.warnings.extend(cut.map(logs::cut_off));
-    let is_other =
-        |c: &&nav_sim_logs::Channel| c.topic != samples.topic() && c.clock == Clock::Unix;
+    table.assumptions.push(format!("topic {}", channel.topic));
+    table.warnings.extend(log.damage().map(logs::cut_off));
+    let is_other = |c: &&Channel| c.topic != channel.topic && c.clock == Clock::Unix;
     let others = log.channels().iter().filter(is_other);
     table.ignored = others.map(|c| c.topic.clone()).collect();
     Ok(table)
