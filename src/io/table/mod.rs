@@ -60,8 +60,6 @@ pub(crate) enum Numbers {
     Finite,
     /// Any: who reads it leaves those rows out.
     Any,
-    /// Any, and none: an empty cell is NaN.
-    Missing,
 }
 
 /// Choices of who reads a table.
