@@ -64,11 +64,12 @@ pub(crate) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, Fail
     let names = ["t_s", "nees", "coverage"];
     let rows = rows(path, text, names, ["asee_"])?.into_iter();
     rows.map(|(line, [t_s, nees, coverage], [asee])| {
-        let values = [&asee[..], &[nees, coverage]].concat();
-        let finite = values.iter().filter(|x| x.is_finite()).count();
-        if finite != 0 && finite != values.len() {
-            let message = "some values are finite and others not";
-            return Err(Failure::contents(path, line, message).hint(REPEAT));
+        let names = REPORTED_NAMES.map(|name| format!("asee_{name}"));
+        let values = names.iter().map(String::as_str).zip(asee);
+        let mut values = values.chain([("nees", nees), ("coverage", coverage)]);
+        let lost = values.clone().find(|(_, value)| !value.is_finite());
+        if let Some((name, value)) = lost.filter(|_| values.any(|(_, value)| value.is_finite())) {
+            return Err(Failure::cell(path, line, name, value, "is not finite").hint(REPEAT));
         }
         Ok(EpochRow {
             t_s,
@@ -201,7 +202,7 @@ mod tests {
         let error = parse_epochs("e.csv", &damaged).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "e.csv, line 3: some values are finite and others not"
+            "e.csv, line 3: column \"asee_pos_e_m\": NaN is not finite"
         );
         result.epochs[1] = EpochSums {
             t_s: result.epochs[1].t_s,

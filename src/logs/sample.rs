@@ -13,6 +13,18 @@ pub enum Stamp {
     Log,
 }
 
+impl std::str::FromStr for Stamp {
+    type Err = &'static str;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        match name {
+            "header" => Ok(Self::Header),
+            "log" => Ok(Self::Log),
+            _ => Err("neither header nor log"),
+        }
+    }
+}
+
 /// Origin of a channel's stamps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Clock {

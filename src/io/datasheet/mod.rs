@@ -99,7 +99,7 @@ impl Datasheet {
         let needed = figures.flat_map(|figure| Sensor::ALL.map(|sensor| (sensor, figure)));
         let lacking = needed.filter(|(sensor, figure)| self.value(*sensor, *figure).is_none());
         lacking
-            .map(|(sensor, figure)| format!("{} {}", sensor.name(), figure.key()))
+            .map(|(sensor, figure)| format!("{} {}", sensor.name(), figure.name()))
             .collect()
     }
 
@@ -191,7 +191,7 @@ impl Datasheet {
 
 impl Entry {
     fn provenance(&self) -> Table {
-        let figure = format!("{}.{}", self.sensor.name(), self.figure.key());
+        let figure = format!("{}.{}", self.sensor.name(), self.figure.name());
         let texts = [
             ("figure", Some(figure)),
             ("given", Some(self.quantity.given.clone())),

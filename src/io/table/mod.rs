@@ -150,20 +150,33 @@ pub(crate) fn read(
             .is_some_and(|e| e.eq_ignore_ascii_case(ending))
     };
     let name = path.display().to_string();
+    let of = |columns| containers::table(path, columns, dictionary, asked);
     let table = match logs::kind_of(path) {
         #[cfg(feature = "npz")]
-        Some(LogKind::Npz) => containers::npz(path, dictionary, asked),
+        Some(LogKind::Npz) => {
+            let (columns, rate_hz) = containers::npz(path)?;
+            Ok(Table {
+                rate_hz,
+                ..of(columns)?
+            })
+        }
         Some(_) => containers::log(path, dictionary, asked),
-        None if ends_in("npy") => containers::npy(path, dictionary, asked),
+        None if ends_in("npy") => of(containers::npy(path, dictionary, asked)?),
         #[cfg(feature = "parquet")]
-        None if ends_in("parquet") => containers::parquet(path, dictionary, asked),
+        None if ends_in("parquet") => of(containers::parquet(path)?),
         #[cfg(not(feature = "parquet"))]
         None if ends_in("parquet") => {
             let message = "is Apache Parquet, which this build does not read";
             let refusal = Failure::contents(name, Place::Itself, message);
             Err(refusal.or_hint("build with --features parquet, or write CSV"))
         }
-        None if is_oxts(path) => containers::oxts(path, dictionary, asked),
+        None if is_oxts(path) => {
+            let assumptions = vec!["KITTI oxts, axes front, left, up".to_owned()];
+            Ok(Table {
+                assumptions,
+                ..of(containers::oxts(path)?)?
+            })
+        }
         None => {
             let reader = source::table(path).map_err(|e| unreadable(path, e))?;
             text::read(&name, reader, dictionary, asked)

@@ -9,7 +9,7 @@ use chrono::{DateTime, NaiveDateTime, Utc};
 use glam::DQuat;
 use nav_sim_navigation::trajectory::TrajectorySample;
 use nav_sim_signal::units::DEG;
-use roxmltree::Document;
+use roxmltree::{Document, Node};
 
 /// A GPX track; heading and pitch follow the path.
 pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
@@ -26,7 +26,10 @@ pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
         counted = begin;
         // extensions have times and elevations of their own
         let child = |name| point.children().find(|own| own.tag_name().name() == name);
-        let text = |name| point.attribute(name).or_else(|| child(name)?.text());
+        let text = |name| {
+            let child = || child(name)?.children().find(Node::is_text)?.text();
+            point.attribute(name).or_else(child)
+        };
         let absent = |column| {
             let reason = "does not have it, or not as a number";
             Error::cell(path, line, column, "the track point", reason).or_hint(
@@ -40,7 +43,7 @@ pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
         let time = text("time").and_then(|text| instant(text.trim()));
         let time = time.ok_or_else(|| absent("time"))?;
         rows.samples.push(TrajectorySample {
-            t_s: seconds_between(*start.get_or_insert(time), time),
+            t_s: (time - *start.get_or_insert(time)).as_seconds_f64(),
             lat: number("lat")? * DEG,
             lon: number("lon")? * DEG,
             h: number("ele")?,
@@ -66,13 +69,6 @@ fn instant(text: &str) -> Option<DateTime<Utc>> {
         .map(|time| time.to_utc())
         .or_else(|_| local())
         .ok()
-}
-
-/// Exact to the nanosecond: seconds and nanoseconds are subtracted apart.
-fn seconds_between(start: DateTime<Utc>, end: DateTime<Utc>) -> f64 {
-    let nanoseconds =
-        f64::from(end.timestamp_subsec_nanos()) - f64::from(start.timestamp_subsec_nanos());
-    (end.timestamp() - start.timestamp()) as f64 + 1e-9 * nanoseconds
 }
 
 #[cfg(test)]
@@ -180,7 +176,7 @@ mod tests {
             ("2017-01-01T01:30:00+01:30", 0.25),
         ] {
             assert_eq!(
-                seconds_between(start, instant(text).unwrap()),
+                (instant(text).unwrap() - start).as_seconds_f64(),
                 seconds,
                 "{text}"
             );

@@ -421,36 +421,24 @@ fn check_ranges(table: &Table) -> Result<(), Error> {
 
 /// Heading and pitch along the path; at rest between those before and after.
 pub(super) fn follow_path(samples: &mut [TrajectorySample]) {
-    let directions: Vec<Option<(f64, f64)>> =
-        (0..samples.len()).map(|i| direction(samples, i)).collect();
-    let moving: Vec<usize> = (0..samples.len())
-        .filter(|&i| directions[i].is_some())
-        .collect();
-    for i in 0..samples.len() {
-        let next = moving.partition_point(|&k| k < i);
-        let after = moving.get(next).copied();
-        let before = if after == Some(i) {
-            after
-        } else {
-            next.checked_sub(1).map(|k| moving[k])
+    let moving = |i: usize| Some((samples[i].t_s, direction(samples, i)?));
+    let moving: Vec<(f64, (f64, f64))> = (0..samples.len()).filter_map(moving).collect();
+    let direction_of = |k: usize| moving.get(k.min(moving.len().saturating_sub(1)));
+    for sample in samples {
+        let next = moving.partition_point(|(t_s, ..)| *t_s < sample.t_s);
+        let from = direction_of(next.saturating_sub(1));
+        let (Some(from), Some(to)) = (from, direction_of(next)) else {
+            continue;
         };
-        let share = match (before, after) {
-            (Some(a), Some(b)) if b > a => {
-                (samples[i].t_s - samples[a].t_s) / (samples[b].t_s - samples[a].t_s)
-            }
+        let share = match to.0 - from.0 {
+            span if span > 0.0 => ((sample.t_s - from.0) / span).clamp(0.0, 1.0),
             _ => 0.0,
         };
-        let direction_of = |k: Option<usize>| k.and_then(|k| directions[k]);
-        let from = direction_of(before)
-            .or(direction_of(after))
-            .unwrap_or_default();
-        let to = direction_of(after).unwrap_or(from);
-        let yaw = from.0 + share * wrap_angle(to.0 - from.0);
-        let pitch = from.1 + share * (to.1 - from.1);
-        samples[i].q_b_n = RollPitchYaw {
+        let ((yaw, pitch), (to_yaw, to_pitch)) = (from.1, to.1);
+        sample.q_b_n = RollPitchYaw {
             roll: 0.0,
-            pitch,
-            yaw,
+            pitch: pitch + share * (to_pitch - pitch),
+            yaw: yaw + share * wrap_angle(to_yaw - yaw),
         }
         .to_quat();
     }

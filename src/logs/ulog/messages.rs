@@ -30,8 +30,8 @@ pub(super) struct Messages<'a> {
     formats: Formats,
     /// Topics by their numbers.
     pub(super) topics: HashMap<u16, Topic>,
-    /// Bytes from which on data was appended, the next one last.
-    appended: Vec<u64>,
+    /// Byte from which on data was appended: what comes before it may be cut, and it is no flight.
+    end: u64,
 }
 
 impl<'a> Messages<'a> {
@@ -45,21 +45,21 @@ impl<'a> Messages<'a> {
             input,
             formats: Formats::new(),
             topics: HashMap::new(),
-            appended: Vec::new(),
+            end: u64::MAX,
         })
     }
 
     /// The next message of a topic: of any, or of one.
     pub(super) fn next_data(&mut self, only: Option<u32>) -> Result<Option<Data>, Error> {
         loop {
-            if self.input.left() == 0 {
+            let offset = self.input.position();
+            if self.input.left() == 0 || offset + 3 > self.end {
                 return Ok(None);
             }
-            let offset = self.input.position();
-            if self.is_cut_at_appended(offset)? {
-                continue;
-            }
             let (size, kind) = (self.input.u16()?, self.input.u8()?);
+            if self.input.position() + u64::from(size) > self.end {
+                return Ok(None);
+            }
             self.input.expect(size.into())?;
             if kind != b'D' {
                 self.other(kind, size, offset)?;
@@ -79,26 +79,6 @@ impl<'a> Messages<'a> {
             }
             self.input.skip(rest)?;
         }
-    }
-
-    /// The last message before appended data may be cut off: goes on at that data.
-    fn is_cut_at_appended(&mut self, offset: u64) -> Result<bool, Error> {
-        let Some(next) = self.appended.last().copied() else {
-            return Ok(false);
-        };
-        if offset >= next {
-            self.appended.pop();
-            return Ok(false);
-        }
-        let is_cut = offset + 3 > next || {
-            let size = self.input.u16()?;
-            self.input.seek(offset)?;
-            offset + 3 + u64::from(size) > next
-        };
-        if is_cut {
-            self.input.seek(next)?;
-        }
-        Ok(is_cut)
     }
 
     /// Formats, subscriptions and flags.
@@ -149,11 +129,8 @@ impl<'a> Messages<'a> {
             )));
         }
         if incompatible[0] & APPENDED != 0 {
-            let offsets = [bytes.u64()?, bytes.u64()?, bytes.u64()?];
-            // one that lies behind the reader would send it in circles
-            let within = |at: &u64| *at > self.input.position() && *at <= self.input.length();
-            self.appended = offsets.into_iter().filter(within).collect();
-            self.appended.sort_unstable_by(|a, b| b.cmp(a));
+            let offsets = [bytes.u64()?, bytes.u64()?, bytes.u64()?].into_iter();
+            self.end = offsets.filter(|at| *at > 0).min().unwrap_or(u64::MAX);
         }
         Some(Ok(()))
     }
