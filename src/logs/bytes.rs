@@ -1,21 +1,21 @@
 //! Numbers within the bytes of a message.
 
 /// Order of a number's bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Order {
     Little,
     Big,
 }
 
 /// Alignment of numbers to their own size, at most to so many bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Alignment {
     Packed,
     UpTo(usize),
 }
 
 /// Bytes of a message, read in order; `None` beyond their end.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub(crate) struct Bytes<'a> {
     all: &'a [u8],
     at: usize,
@@ -74,7 +74,7 @@ impl<'a> Bytes<'a> {
         self.number().map(u64::from_le_bytes)
     }
 
-    pub(crate) fn f64(&mut self) -> Option<f64> {
+    fn f64(&mut self) -> Option<f64> {
         self.number().map(f64::from_le_bytes)
     }
 
@@ -110,7 +110,7 @@ pub(crate) fn text(bytes: &[u8]) -> String {
 }
 
 /// Types of numbers, with their bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Number {
     Signed(usize),
     Unsigned(usize),

@@ -21,7 +21,6 @@ pub(crate) enum Record {
 }
 
 /// Head of a message.
-#[derive(Clone, Copy)]
 pub(crate) struct Head {
     pub(crate) channel: u32,
     pub(crate) log_ns: i64,

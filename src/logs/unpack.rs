@@ -8,7 +8,6 @@ use std::io::{self, Read};
 const LARGEST_CHUNK: u64 = 256 << 20;
 
 /// Chunk of a container: where it stands, and how it is packed.
-#[derive(Debug, Clone)]
 pub(crate) struct Chunk {
     /// Byte of its first packed byte.
     pub(crate) offset: u64,

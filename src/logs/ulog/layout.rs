@@ -10,14 +10,14 @@ const DEEPEST: usize = 8;
 pub(super) type Formats = HashMap<String, String>;
 
 /// Places of a message's own fields; those of formats within it are passed over.
-#[derive(Debug, Clone, Default)]
+#[derive(Default)]
 pub(super) struct Layout {
     fields: HashMap<String, Field>,
 }
 
 /// Field of a message.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Field {
+#[derive(Clone, Copy)]
+struct Field {
     at: usize,
     number: Number,
     count: usize,
@@ -56,7 +56,7 @@ impl Layout {
     }
 
     /// A field of so many numbers.
-    pub(super) fn field(&self, name: &str, count: usize) -> Option<Field> {
+    fn field(&self, name: &str, count: usize) -> Option<Field> {
         let field = self.fields.get(name).copied();
         field.filter(|field| field.count == count)
     }
