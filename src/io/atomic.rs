@@ -423,7 +423,7 @@ impl Drop for Claim {
 }
 
 fn refused(path: &Path, why: &str) -> Failure {
-    Failure::contents(path.display().to_string(), Place::Itself, why)
+    Failure::contents(path.display(), Place::Itself, why)
 }
 
 fn marker_beside(path: &Path) -> PathBuf {

@@ -162,11 +162,11 @@ impl<'a> FixColumns<'a> {
         // a receiver's log that has all but these
         let found = table.require(sigmas, &DICTIONARY);
         found.map_err(|e| e.or(help::FIX_SIGMA))?;
-        let lost = || table.refused(DICTIONARY.advice);
+        let [time] = table.columns(["t_s"], &DICTIONARY)?;
         Ok(Self {
             table,
-            time: table.get("t_s").ok_or_else(lost)?,
-            place: table.all(place).ok_or_else(lost)?,
+            time,
+            place: table.columns(place, &DICTIONARY)?,
             is_earth,
             place_sigma: table.all(place_sigma),
             velocity: table.all(VELOCITY),
@@ -219,7 +219,7 @@ impl<'a> FixColumns<'a> {
 
     fn check(&self, row: usize, fix: &GnssFix) -> Result<(), Error> {
         let refuse = |column: &Column, reason, advice| {
-            let (line, value) = (self.table.lines.of(row), column.values[row].to_string());
+            let (line, value) = (self.table.line(row), column.values[row].to_string());
             Err(Error::cell(&self.table.path, line, &column.name, value, reason).or_hint(advice))
         };
         const DEGREES: &str = "latitude within ±89.9, longitude in (−180, 180] or [0, 360), in degrees (or lat_rad, lon_rad)";
@@ -354,7 +354,7 @@ fn of_table(
     for row in 0..table.rows() {
         let fix = columns.fix(row);
         columns.check(row, &fix)?;
-        fixes.push((table.lines.of(row), fix));
+        fixes.push((table.line(row), fix));
     }
     let small =
         |(_, f): &(u64, GnssFix)| f.lat.abs() <= 0.5 * PI * DEG && f.lon.abs() <= 2.0 * PI * DEG;

@@ -4,13 +4,13 @@ use super::{doubt, of_file, remark, time_back};
 use crate::io::logs::LogOptions;
 use crate::io::recordings::timing::{median_step, unit_of_step};
 use crate::io::recordings::{self, ReadOptions, check_gravity, gravity_factor};
-use crate::io::table::{Column, Dictionary, Lines};
+use crate::io::table::{Column, Dictionary, Table};
 use crate::io::{Failure as Error, Place};
 use glam::DVec3;
 use nav_sim_document::Note;
 use nav_sim_navigation::fusion::{LONGEST_GAP_S, bridged};
 use nav_sim_navigation::strapdown::MAX_ROTATION;
-use nav_sim_signal::imu::{Channel, ImuIncrement};
+use nav_sim_signal::imu::ImuIncrement;
 use nav_sim_signal::units::DEG;
 use std::path::Path;
 
@@ -32,12 +32,11 @@ pub(crate) struct ImuFile {
 
 /// Specific force and angular rate of each sample, and the time it ends.
 struct Columns<'a> {
-    path: &'a str,
+    table: &'a Table,
     t_s: Vec<f64>,
     values: Vec<[DVec3; 2]>,
     /// True for a sensor whose values are increments.
     increments: [bool; 2],
-    lines: &'a Lines,
 }
 
 /// Dictionary of recordings under way. Texts without a header are those of KF-GINS, with or without an odometer.
@@ -90,18 +89,10 @@ pub(crate) fn read_imu(
         ..ReadOptions::default()
     };
     let table = recordings::load(path, &options, &DICTIONARY)?;
-    let lacking = |message: String| {
-        Error::contents(table.path.as_str(), Place::Within, message).or_hint(DICTIONARY.advice)
-    };
-    let signals = Channel::ALL.map(|channel| channel.to_string());
-    if let Some(missing) = signals.iter().find(|name| !table.has(name)) {
-        let message = format!("channel {missing} is missing; all six are needed");
-        return Err(lacking(message));
-    }
-    let signals: Vec<&Column> = signals.iter().filter_map(|name| table.get(name)).collect();
-    let time = table
-        .get("t_s")
-        .ok_or_else(|| lacking("no time column".to_owned()))?;
+    let names = [
+        "t_s", "accel.x", "accel.y", "accel.z", "gyro.x", "gyro.y", "gyro.z",
+    ];
+    let [time, signals @ ..] = table.columns(names, &DICTIONARY)?;
     let unit_s = |values| unit_of_step(median_step(values)).0;
     let unit_s = time.factor.unwrap_or_else(|| unit_s(&time.values));
     let from_gravity = gravity_factor(&table)?;
@@ -118,7 +109,7 @@ pub(crate) fn read_imu(
         remarks.push(remark(format!("{text}{odometer}")));
     }
     let columns = Columns {
-        path: &table.path,
+        table: &table,
         t_s: time.values.iter().map(|t| t * unit_s).collect(),
         values: (0..table.rows())
             .map(|k| {
@@ -128,7 +119,6 @@ pub(crate) fn read_imu(
             })
             .collect(),
         increments: [0, 3].map(|i| signals[i].quantity.per_sample),
-        lines: &table.lines,
     };
     let samples = columns.increments(&mut remarks)?;
     let step = median_step(&columns.t_s);
@@ -145,15 +135,14 @@ pub(crate) fn read_imu(
 impl Columns<'_> {
     /// The samples; those after a hole last a step like any other.
     fn increments(&self, remarks: &mut Vec<Note>) -> Result<Vec<ImuIncrement>, Error> {
-        let Self {
-            path, t_s, lines, ..
-        } = self;
+        let Self { table, t_s, .. } = self;
+        let path = &table.path;
         if t_s.len() < 3 {
             let message = format!("{} samples, but at least 3 are needed", t_s.len());
             return Err(Error::contents(path, Place::Within, message));
         }
         if let Some(k) = (1..t_s.len()).find(|k| t_s[*k] <= t_s[k - 1]) {
-            return Err(time_back(path, lines.of(k), t_s[k - 1], t_s[k]));
+            return Err(time_back(path, table.line(k), t_s[k - 1], t_s[k]));
         }
         let step = median_step(t_s);
         self.doubt_units(step, remarks)?;
@@ -163,7 +152,7 @@ impl Columns<'_> {
             let since_s = if k == 0 { step } else { t_s[k] - t_s[k - 1] };
             let is_hole = since_s > GAP * step;
             let sample = self.sample(k, if is_hole { step } else { since_s });
-            let refuse = |message: String| Error::contents(path, lines.of(k), message);
+            let refuse = |message: String| Error::contents(path, table.line(k), message);
             if is_hole && since_s - step > LONGEST_GAP_S + 0.5 * step {
                 let message = format!(
                     "no samples from {} s to {} s: {LONGEST_GAP_S} s can be bridged",
@@ -188,7 +177,7 @@ impl Columns<'_> {
             samples.push(sample);
         }
         if let Some((k, seconds)) = holes.first() {
-            let (at_s, line, more) = (t_s[*k], lines.of(*k), holes.len() - 1);
+            let (at_s, line, more) = (t_s[*k], table.line(*k), holes.len() - 1);
             remarks.push(doubt(format!(
                 "samples missing: {seconds:.2} s before {at_s:.2} s (line {line}) and {more} more gaps; bridged"
             )));
@@ -216,7 +205,7 @@ impl Columns<'_> {
         };
         let (force, rate) = (mean(|sample| sample.dv), mean(|sample| sample.dtheta));
         if !(4.0..25.0).contains(&force) {
-            check_gravity(self.path, force.max(0.3))?;
+            check_gravity(&self.table.path, force.max(0.3))?;
         }
         if rate > FAST {
             let degrees = rate / DEG;

@@ -52,7 +52,7 @@ pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, Failure> {
         ) {
             let message = "is given twice: it would count as two replicates";
             return Err(
-                Failure::contents(file.path.display().to_string(), Place::Itself, message)
+                Failure::contents(file.path.display(), Place::Itself, message)
                     .or_hint("name each file once; a directory stands for all its recordings"),
             );
         }

@@ -204,7 +204,7 @@ fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
                 "{channel} (column \"{}\") is dead: every sample is {value}",
                 column.name
             );
-            return Err(Failure::contents(raw.path.as_str(), Place::Within, message)
+            return Err(Failure::contents(&raw.path, Place::Within, message)
                 .or(help::CHANNELS)
                 .or_hint("record again"));
         }
@@ -320,11 +320,9 @@ fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Fa
         let message = format!(
             "accelerometers and gyroscopes are exchanged: |f| is {f:.4} m/s², the mean rate {rate:.4} rad/s"
         );
-        return Err(
-            Failure::contents(report.file.as_str(), Place::Within, message)
-                .or_hint("without names the first three columns are the accelerometers")
-                .or(help::COLUMN_NAMES),
-        );
+        return Err(Failure::contents(&report.file, Place::Within, message)
+            .or_hint("without names the first three columns are the accelerometers")
+            .or(help::COLUMN_NAMES));
     }
     if accel.len() == 3 {
         check_gravity(&report.file, norm(&accel))?;
@@ -374,10 +372,8 @@ pub(super) fn same_rate(files: &[FileReport]) -> Result<(), Failure> {
                 first.file,
                 six_digits(first.rate_hz)
             );
-            Err(
-                Failure::contents(other.file.as_str(), Place::Itself, message)
-                    .or_hint("calibrate recordings of one rate at a time, or resample them"),
-            )
+            Err(Failure::contents(&other.file, Place::Itself, message)
+                .or_hint("calibrate recordings of one rate at a time, or resample them"))
         }
     }
 }

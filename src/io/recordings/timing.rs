@@ -64,7 +64,7 @@ pub(super) fn timing(
         }
         (None, _, None, None) => {
             let message = "no time column, and no rate is given";
-            return Err(Failure::contents(raw.path.as_str(), Place::Within, message).or(help::RATE));
+            return Err(Failure::contents(&raw.path, Place::Within, message).or(help::RATE));
         }
     };
     let mut timing = clock.check(raw, options)?;
@@ -101,7 +101,7 @@ fn doubt(
         ));
     }
     if !timing.breaks.is_empty() {
-        let first = raw.lines.of(timing.breaks[0]);
+        let first = raw.line(timing.breaks[0]);
         let n = timing.breaks.len();
         report.warn(match options.gaps {
             Gaps::Ignore => {
@@ -198,11 +198,11 @@ impl Clock {
 
     fn check(&self, raw: &Table, options: &ReadOptions) -> Result<Timing, Failure> {
         let steps = || self.since.windows(2).map(|w| w[1] - w[0]);
-        let step_at = |i: usize| (raw.lines.of(i + 1), self.time_of(i), self.time_of(i + 1));
+        let step_at = |i: usize| (raw.line(i + 1), self.time_of(i), self.time_of(i + 1));
         if let Some(i) = steps().position(|s| s < 0.0) {
             let (line, from, to) = step_at(i);
             let message = format!("time goes back from {from} s to {to} s");
-            return Err(Failure::contents(raw.path.as_str(), line, message)
+            return Err(Failure::contents(&raw.path, line, message)
                 .or_hint("sort the rows by time, or split the file where the clock was set back"));
         }
         let median = median_step(&self.since);
@@ -239,7 +239,7 @@ impl Clock {
                 n => format!(" ({n} such steps in all)"),
             };
             let message = format!("{what}, the median step is {step} s{more}");
-            return Err(Failure::contents(raw.path.as_str(), line, message)
+            return Err(Failure::contents(&raw.path, line, message)
                 .or(help::GAPS)
                 .or(help::GAPS_ELSEWHERE));
         }
@@ -251,7 +251,7 @@ impl Clock {
                 "the rate changes from {first} Hz in the first tenth to {last} Hz in the last"
             );
             return Err(
-                Failure::contents(raw.path.as_str(), Place::Within, message).or_hint(
+                Failure::contents(&raw.path, Place::Within, message).or_hint(
                     "split the file where the rate changes: a wavelet variance is of one rate",
                 ),
             );
@@ -272,9 +272,7 @@ impl Clock {
                 "the time column runs at {} Hz, but {given} Hz is given",
                 six_digits(found)
             );
-            return Err(
-                Failure::contents(raw.path.as_str(), Place::Within, message).or(help::WRONG_RATE)
-            );
+            return Err(Failure::contents(&raw.path, Place::Within, message).or(help::WRONG_RATE));
         }
         Ok(Timing {
             rate_hz: given,

@@ -210,7 +210,7 @@ fn oxts_times(path: &Path) -> Result<Vec<f64>, Failure> {
         let parsed = NaiveDateTime::parse_from_str(line.trim(), "%Y-%m-%d %H:%M:%S%.f");
         let found = parsed.map_err(|_| {
             let message = format!("\"{}\" is not a time", shown(line, 40));
-            Failure::contents(path.display().to_string(), i + 1, message)
+            Failure::contents(path.display(), i + 1, message)
                 .or_hint("2011-09-26 13:02:25.964389445")
         })?;
         let since = found.and_utc();

@@ -86,7 +86,8 @@ pub(crate) struct Table {
     pub(crate) comments: Vec<String>,
     /// Rate that is stated beside the columns (Hz), and where.
     pub(crate) rate_hz: Option<(f64, &'static str)>,
-    pub(crate) lines: Lines,
+    /// Lines of the rows, where it has some.
+    lines: Vec<u64>,
     /// True if the text has no header.
     pub(crate) is_bare: bool,
     /// Notes on skipped and assumed parts.
@@ -111,28 +112,6 @@ impl Column {
     /// The number of a row, in SI.
     pub(crate) fn si(&self, row: usize) -> f64 {
         self.values[row] * self.factor.unwrap_or(1.0)
-    }
-}
-
-/// Lines of the rows.
-#[derive(Debug, Default)]
-pub(crate) struct Lines {
-    /// (row from which on, line less row), where it changes.
-    shifts: Vec<(usize, u64)>,
-}
-
-impl Lines {
-    fn push(&mut self, row: usize, line: u64) {
-        let shift = line.saturating_sub(row as u64);
-        if self.shifts.last().is_none_or(|(_, s)| *s != shift) {
-            self.shifts.push((row, shift));
-        }
-    }
-
-    /// Line of a row (its number, from 1, in a file without lines).
-    pub(crate) fn of(&self, row: usize) -> u64 {
-        let before = self.shifts.partition_point(|(from, _)| *from <= row);
-        row as u64 + before.checked_sub(1).map_or(1, |i| self.shifts[i].1)
     }
 }
 
@@ -257,7 +236,7 @@ impl Table {
             ignored: Vec::new(),
             comments: Vec::new(),
             rate_hz: None,
-            lines: Lines::default(),
+            lines: Vec::new(),
             is_bare: false,
             assumptions: Vec::new(),
             warnings: Vec::new(),
@@ -421,17 +400,22 @@ impl Table {
         }
         let [needed, free] = [bytes(rows), free].map(|bytes| bytes.div_ceil(1 << 20));
         let message = format!("its samples need {needed} MiB of memory, and {free} MiB are free");
-        let refusal = Failure::contents(self.path.as_str(), Place::Within, message);
+        let refusal = Failure::contents(&self.path, Place::Within, message);
         Err(refusal.or(help::FEWER_CHANNELS))
     }
 
     /// Something wrong with the header.
     pub(crate) fn refused(&self, message: impl Display) -> Failure {
-        Failure::contents(self.path.as_str(), self.header_line.max(1), message)
+        Failure::contents(&self.path, self.header_line.max(1), message)
     }
 
     pub(crate) fn rows(&self) -> usize {
         self.columns.first().map_or(0, |c| c.values.len())
+    }
+
+    /// Line of a row (its number, from 1, in a file without lines).
+    pub(crate) fn line(&self, row: usize) -> u64 {
+        self.lines.get(row).copied().unwrap_or(row as u64 + 1)
     }
 
     /// The column of a quantity.
@@ -461,14 +445,10 @@ impl Table {
     /// Keeps the rows of which that holds.
     pub(crate) fn retain(&mut self, keep: impl Fn(&Self, usize) -> bool) {
         let kept: Vec<usize> = (0..self.rows()).filter(|row| keep(self, *row)).collect();
-        let mut lines = Lines::default();
-        kept.iter()
-            .enumerate()
-            .for_each(|(i, row)| lines.push(i, self.lines.of(*row)));
+        self.lines = kept.iter().map(|row| self.line(*row)).collect();
         for column in &mut self.columns {
             column.values = kept.iter().map(|row| column.values[*row]).collect();
         }
-        self.lines = lines;
     }
 
     /// Refuses a table without one of the quantities that are needed; a column that nearly has the name of a missing one
@@ -494,6 +474,20 @@ impl Table {
         };
         let refusal = self.refused(columns).passing_over(NO_COLUMN);
         Err(refusal.or_hint(dictionary.advice))
+    }
+
+    /// Columns of quantities that are needed.
+    ///
+    /// # Errors
+    /// Those of [`Self::require`].
+    pub(crate) fn columns<const N: usize>(
+        &self,
+        needed: [&str; N],
+        dictionary: &Dictionary,
+    ) -> Result<[&Column; N], Failure> {
+        self.require(needed, dictionary)?;
+        self.all(needed)
+            .ok_or_else(|| self.refused(dictionary.advice))
     }
 }
 

@@ -235,7 +235,7 @@ impl Head {
                 };
                 table.push(column, value, Some(cell), line, dictionary)?;
             }
-            table.lines.push(row, line);
+            table.lines.push(line);
             row += 1;
         }
         Ok(())

@@ -190,7 +190,7 @@ impl Rows {
     }
 
     fn refuse(&self, index: usize, message: String, advice: &'static str) -> Error {
-        Error::contents(self.path.as_str(), self.lines[index], message).or_hint(advice)
+        Error::contents(&self.path, self.lines[index], message).or_hint(advice)
     }
 
     fn check_jumps(&self) -> Result<(), Error> {
@@ -259,7 +259,7 @@ pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Res
         true => Attitude::Given,
         false => Attitude::OfPath,
     };
-    let lines = (0..table.rows()).map(|row| table.lines.of(row)).collect();
+    let lines = (0..table.rows()).map(|row| table.line(row)).collect();
     let samples = samples(&table, options)?;
     let mut rows = Rows::new(&table.path, lines, samples, attitude);
     rows.geodetic = !is_local;
@@ -376,7 +376,7 @@ pub(super) fn origin(table: &Table, options: &Options) -> Result<[f64; 3], Error
     line.and_then(|line| parse_origin(line.trim_start_matches([':', '=', ' '])))
         .ok_or_else(|| {
             let message = "a trajectory in local coordinates needs an origin on the Earth";
-            Error::contents(table.path.as_str(), Place::Within, message)
+            Error::contents(&table.path, Place::Within, message)
                 .or(help::ORIGIN)
                 .or(help::ORIGIN_ELSEWHERE)
                 .or_hint("a first line \"# origin: LAT_DEG, LON_DEG, H_M\"")
@@ -414,7 +414,7 @@ fn out_of_range(table: &Table, row: usize) -> Option<(&Column, &'static str)> {
 fn check_ranges(table: &Table) -> Result<(), Error> {
     let mut found = (0..table.rows()).filter_map(|row| Some((row, out_of_range(table, row)?)));
     found.next().map_or(Ok(()), |(row, (column, reason))| {
-        let (line, value) = (table.lines.of(row), column.values[row].to_string());
+        let (line, value) = (table.line(row), column.values[row].to_string());
         Err(Error::cell(&table.path, line, &column.name, value, reason).or_hint(DEGREES))
     })
 }
