@@ -34,7 +34,7 @@ use nav_sim_signal::noise::{
 use toml::{Table, Value};
 
 /// The correlation time that is assumed where none is given (s).
-pub(crate) const ASSUMED_CORRELATION_TIME_S: f64 = 300.0;
+const ASSUMED_CORRELATION_TIME_S: f64 = 300.0;
 
 /// One figure of one sensor, and where it was read.
 #[derive(Debug, Clone, PartialEq)]

@@ -87,7 +87,7 @@ fn name_of(path: &Path) -> String {
 }
 
 /// Whether a name ends like a recording's.
-pub(crate) fn is_recording(name: &str) -> bool {
+fn is_recording(name: &str) -> bool {
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
     plain

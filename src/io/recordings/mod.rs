@@ -240,7 +240,7 @@ pub(in crate::io) const DICTIONARY: Dictionary = Dictionary {
 };
 
 /// The name of a channel's column in files of this program.
-pub(crate) const fn column_name(channel: Channel) -> &'static str {
+const fn column_name(channel: Channel) -> &'static str {
     SIX[channel.index()]
 }
 

@@ -124,7 +124,7 @@ fn of_axis(name: &str, axis: usize) -> String {
 
 /// Reads Apache Parquet: columns by their names; what is no number is NaN.
 #[cfg(feature = "parquet")]
-pub(super) fn parquet(path: &Path) -> Result<Columns, Failure> {
+fn parquet(path: &Path) -> Result<Columns, Failure> {
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use parquet::record::Field;
     let damaged = |e: parquet::errors::ParquetError| {

@@ -78,7 +78,7 @@ pub(crate) struct Asked<'a> {
 pub(crate) struct Table {
     pub(crate) path: String,
     /// Line of the header, from 1; 0 where there is none.
-    pub(crate) header_line: u64,
+    header_line: u64,
     pub(crate) columns: Vec<Column>,
     /// Names of columns that mean nothing here.
     pub(crate) ignored: Vec<String>,

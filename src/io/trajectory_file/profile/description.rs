@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// Heights at which the gravity model means something (m).
-pub(super) type Height = Between<-12_000, 1_000_000, false>;
+type Height = Between<-12_000, 1_000_000, false>;
 
 /// A drive by what the vehicle does: the trajectory of nav-sim run
 #[derive(Deserialize, JsonSchema)]
