@@ -94,7 +94,7 @@ pub(crate) mod help {
 }
 
 /// Where in a file.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Clone)]
 pub(crate) enum Place {
     /// Anywhere in it.
     Within,

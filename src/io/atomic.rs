@@ -642,7 +642,6 @@ fn head(path: &Path) -> Option<String> {
 }
 
 /// What stands where a result is to be written; in a directory told by its last file, which appears when the others are whole.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Found {
     /// Nothing that may be replaced.
     Foreign,

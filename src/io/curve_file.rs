@@ -10,7 +10,7 @@ use std::fmt::Display;
 use std::path::Path;
 
 /// A curve and what it is of.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub(crate) struct NamedCurve {
     /// The sensor, if the file says it.
     pub sensor: Option<Sensor>,

@@ -7,7 +7,7 @@ use std::io::Read;
 use std::path::Path;
 
 /// The kinds of files that commands read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, PartialEq)]
 pub(crate) enum FileKind {
     /// A scenario of `run`.
     Scenario,

@@ -20,7 +20,6 @@ const GAP: f64 = 1.5;
 const FAST: f64 = 2.0;
 
 /// A recording, ready to be fused.
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ImuFile {
     /// Samples whose intervals follow one another.
     pub samples: Vec<ImuIncrement>,

@@ -6,7 +6,6 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// A file to read.
-#[derive(Debug)]
 pub(super) struct File {
     pub(super) path: PathBuf,
     /// Found in a directory, not named: may turn out to be something else.

@@ -7,7 +7,7 @@ use crate::io::{Failure, Place, help};
 use crate::report::six_digits;
 
 /// When the samples were taken.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(super) struct Timing {
     pub(super) rate_hz: f64,
     /// The clock's own rate (Hz).
@@ -129,7 +129,6 @@ const ROUNDED: f64 = 1e-3;
 const DISAGREEING: f64 = 0.01;
 
 /// Time of each sample.
-#[derive(Debug)]
 struct Clock {
     name: String,
     /// Time of the first sample (s).

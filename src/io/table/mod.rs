@@ -54,7 +54,7 @@ impl Dictionary {
 }
 
 /// Numbers that a table may hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Numbers {
     /// Finite ones.
     Finite,

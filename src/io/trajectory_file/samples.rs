@@ -66,7 +66,7 @@ const ATTITUDE: [&str; 3] = ["roll_deg", "pitch_deg", "yaw_deg"];
 const VELOCITY: [&str; 3] = ["v_n_m_s", "v_e_m_s", "v_d_m_s"];
 
 /// Source of the attitude of rows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, PartialEq)]
 pub(super) enum Attitude {
     /// The file.
     Given,

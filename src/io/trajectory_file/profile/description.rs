@@ -52,7 +52,7 @@ pub(super) struct Vehicle {
     pub(super) ramp_s: Option<Positive>,
 }
 
-#[derive(Clone, Copy, Default, Deserialize, JsonSchema)]
+#[derive(Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Roll {
     #[default]
