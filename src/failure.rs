@@ -388,18 +388,6 @@ impl<T, E: fmt::Display> Refuse<T> for std::result::Result<T, E> {
     }
 }
 
-/// Advice on a result.
-pub(crate) trait OrHelp<T> {
-    /// With advice.
-    fn or_help(self, text: impl Into<Cow<'static, str>>) -> Result<T>;
-}
-
-impl<T, E: Into<Failure>> OrHelp<T> for std::result::Result<T, E> {
-    fn or_help(self, text: impl Into<Cow<'static, str>>) -> Result<T> {
-        self.map_err(|e| e.into().hint(text))
-    }
-}
-
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.message)

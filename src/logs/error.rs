@@ -134,12 +134,10 @@ impl Error {
     #[must_use]
     pub const fn hint(&self) -> Option<&'static str> {
         match self {
-            Self::At(_, Fault::TimeBack { .. }) => {
-                Some("the stamps of the log may be in order where those of the header are not")
+            Self::At(_, Fault::Encoding(_) | Fault::TooLarge { .. } | Fault::TimeBack { .. }) => {
+                None
             }
-            Self::At(_, Fault::Encoding(_) | Fault::TooLarge { .. }) => None,
             Self::At(..) => Some("the file is damaged: copy it again"),
-            Self::SeveralTopics { .. } => Some("name one of them"),
             Self::NotRead(kind) => kind.conversion(),
             _ => None,
         }

@@ -227,7 +227,6 @@ pub(in crate::io) const DICTIONARY: Dictionary = Dictionary {
     array: &[&SIX, &SEVEN],
     numbers: Numbers::Finite,
     advice: "name the columns t_s, accel_x_m_s2 … gyro_z_rad_s (also _g, _mg, _deg_s, _deg_h; t_ms, t_us, t_ns)",
-    empty: "no samples in it",
     bad_cell: |error, value| match value.matches(':').count() > 1 {
         _ if error.advice().is_some() => error,
         true => {

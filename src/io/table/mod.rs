@@ -32,8 +32,6 @@ pub(crate) struct Dictionary {
     pub(crate) numbers: Numbers,
     /// Advice where columns are not found.
     pub(crate) advice: &'static str,
-    /// Words for a table without rows.
-    pub(crate) empty: &'static str,
     /// Advice of a cell that is refused.
     pub(crate) bad_cell: fn(Failure, &str) -> Failure,
 }
@@ -47,7 +45,6 @@ impl Dictionary {
             array: &[],
             numbers: Numbers::Finite,
             advice,
-            empty: "no rows in it",
             bad_cell: |error, _| error,
         }
     }
@@ -161,7 +158,7 @@ pub(crate) fn read(
             text::read(&name, reader, dictionary, asked)
         }
     }?;
-    table.filled(dictionary)
+    table.filled()
 }
 
 /// Reads a table from a text that is held.
@@ -175,7 +172,7 @@ pub(crate) fn parse(
     asked: &Asked<'_>,
 ) -> Result<Table, Failure> {
     let reader = Box::new(Cursor::new(text.to_owned()));
-    text::read(name, reader, dictionary, asked)?.filled(dictionary)
+    text::read(name, reader, dictionary, asked)?.filled()
 }
 
 /// Error of the system on a table, with a hint.
@@ -209,8 +206,8 @@ pub(crate) const NO_COLUMN: &str = "no column is a known one";
 const IS_EMPTY: &str = "it is empty";
 
 /// A table without rows.
-fn empty(path: &str, dictionary: &Dictionary) -> Failure {
-    Failure::contents(path, Place::Within, dictionary.empty).passing_over(IS_EMPTY)
+fn empty(path: &str) -> Failure {
+    Failure::contents(path, Place::Within, "no rows in it").passing_over(IS_EMPTY)
 }
 
 /// Beyond this a number is no measurement, and its square may be no number.
@@ -369,7 +366,7 @@ impl Table {
     }
 
     /// Refuses a table without rows, or whose rows end before others.
-    fn filled(mut self, dictionary: &Dictionary) -> Result<Self, Failure> {
+    fn filled(mut self) -> Result<Self, Failure> {
         let is_clock =
             |c: &Column| !(c.quantity.may_be_empty && c.values.iter().any(|v| v.is_nan()));
         self.columns.retain(is_clock);
@@ -385,7 +382,7 @@ impl Table {
             return Err(Failure::contents(self.path, Place::Within, message));
         }
         if self.columns.first().is_some_and(|c| c.values.is_empty()) {
-            return Err(empty(&self.path, dictionary));
+            return Err(empty(&self.path));
         }
         Ok(self)
     }

@@ -93,7 +93,7 @@ impl Head {
                 return Ok(head);
             }
             if is_end {
-                return Err(empty(path, dictionary));
+                return Err(empty(path));
             }
             if let Some(what) = no_text(&bytes) {
                 let message = format!("is no table of text: {what}");

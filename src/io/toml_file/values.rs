@@ -129,6 +129,16 @@ pub(crate) enum OneOrEach<One, Each = Vec<One>> {
     Each(Each),
 }
 
+impl<One: Copy + Into<f64>> OneOrEach<One> {
+    /// The one, or the i-th of a list (NaN beyond it).
+    pub(crate) fn of(&self, i: usize) -> f64 {
+        match self {
+            Self::One(value) => (*value).into(),
+            Self::Each(values) => values.get(i).map_or(f64::NAN, |value| (*value).into()),
+        }
+    }
+}
+
 impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Deserialize<'de> for OneOrEach<One, Each> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(EitherVisitor(PhantomData))
