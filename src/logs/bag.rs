@@ -19,7 +19,6 @@ mod opcode {
     pub(super) const BAG: u8 = 0x03;
     pub(super) const INDEX: u8 = 0x04;
     pub(super) const CHUNK: u8 = 0x05;
-    pub(super) const CHUNK_INFO: u8 = 0x06;
     pub(super) const CONNECTION: u8 = 0x07;
 }
 
@@ -28,8 +27,6 @@ mod opcode {
 pub(crate) struct Bag {
     /// Byte of the index at the end; 0 until the bag is closed.
     index: u64,
-    /// Chunks that the start and the end of the file state.
-    chunks: [u32; 2],
 }
 
 impl Dialect for Bag {
@@ -83,8 +80,7 @@ impl Dialect for Bag {
     }
 
     fn finish(&self, input: &Input) -> Result<(), Error> {
-        let [stated, found] = self.chunks;
-        if self.index == 0 || self.index > input.length() || found < stated {
+        if self.index == 0 || self.index > input.length() {
             return Err(Error::at(input.offset(), Fault::StillWritten));
         }
         Ok(())
@@ -94,24 +90,14 @@ impl Dialect for Bag {
 impl Bag {
     /// Counts of the start and of the end.
     fn note(&mut self, code: &[u8], fields: Fields<'_>, offset: u64) -> Result<(), Error> {
-        if code == [opcode::CHUNK_INFO] {
-            self.chunks[1] = self.chunks[1].saturating_add(1);
-        }
         if code == [opcode::BAG] {
             if let Some(name) = fields.bytes(b"encryptor").filter(|name| !name.is_empty()) {
                 return Err(Error::encoding(offset, name));
             }
-            let index = fields
-                .bytes(b"index_pos")
-                .and_then(|b| Bytes::little(b).u64());
-            let chunks = fields.u32(b"chunk_count");
-            let (Some(index), Some(chunks)) = (index, chunks) else {
-                return Err(Error::malformed(
-                    offset,
-                    "the start of the bag does not parse",
-                ));
-            };
-            (self.index, self.chunks[0]) = (index, chunks);
+            let index = fields.bytes(b"index_pos");
+            let index = index.and_then(|b| Bytes::little(b).u64());
+            let what = "the start of the bag does not parse";
+            self.index = index.ok_or_else(|| Error::malformed(offset, what))?;
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! Logs of ROS: topics of a container.
 
-use crate::bytes::{Alignment, Bytes, Order};
+use crate::bytes::Bytes;
 use crate::channel::{Channel, Content, Each};
 use crate::container::{self, Dialect, Record, walk};
 use crate::error::Error;
@@ -96,11 +96,11 @@ fn cdr(message: &Message) -> Result<Bytes<'_>, Error> {
         .data
         .split_at_checked(4)
         .ok_or_else(|| short(message))?;
-    let (order, most) = match head[..2] {
-        [0, 0] => (Order::Big, 8),
-        [0, 1] => (Order::Little, 8),
-        [0, 6] => (Order::Big, 4),
-        [0, 7] => (Order::Little, 4),
+    let (is_big_endian, most) = match head[..2] {
+        [0, 0] => (true, 8),
+        [0, 1] => (false, 8),
+        [0, 6] => (true, 4),
+        [0, 7] => (false, 4),
         _ => {
             return Err(Error::encoding(
                 message.offset,
@@ -108,7 +108,7 @@ fn cdr(message: &Message) -> Result<Bytes<'_>, Error> {
             ));
         }
     };
-    Ok(Bytes::new(rest, order, Alignment::UpTo(most)))
+    Ok(Bytes::new(rest, is_big_endian, most))
 }
 
 fn short(message: &Message) -> Error {
@@ -122,11 +122,11 @@ fn short(message: &Message) -> Error {
 fn imu(encoding: &str, message: &Message) -> Result<Sample, Error> {
     let (mut bytes, stamp_ns) = body(encoding, message)?;
     let mut sample = || {
-        bytes.skip_f64s(4 + 9)?;
+        bytes.f64s::<{ 4 + 9 }>()?;
         let gyro_rad_s = bytes.f64s()?;
-        bytes.skip_f64s(9)?;
+        bytes.f64s::<9>()?;
         let accel_m_s2 = bytes.f64s()?;
-        bytes.skip_f64s(9)?;
+        bytes.f64s::<9>()?;
         Some(Sample::Imu(ImuSample {
             stamp_ns,
             accel_m_s2,

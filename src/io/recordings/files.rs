@@ -95,22 +95,16 @@ fn is_recording(name: &str) -> bool {
 }
 
 /// Sort key: digits compare by value, so that `replicate_9` is before `replicate_10`.
-fn natural(name: &str) -> (Vec<(String, u64)>, String) {
-    let mut parts: Vec<(String, u64)> = Vec::new();
-    let mut rest = name;
-    while !rest.is_empty() {
-        let text = rest
-            .find(|c: char| c.is_ascii_digit())
-            .unwrap_or(rest.len());
-        let (word, after) = rest.split_at(text);
-        let digits = after
-            .find(|c: char| !c.is_ascii_digit())
-            .unwrap_or(after.len());
-        let (number, tail) = after.split_at(digits);
-        parts.push((word.to_owned(), number.parse().unwrap_or(u64::MAX)));
-        rest = tail;
-    }
-    (parts, name.to_owned())
+fn natural(name: &str) -> (String, String) {
+    let is_digit = |text: &[u8]| text[0].is_ascii_digit();
+    let parts = name
+        .as_bytes()
+        .chunk_by(|a, b| is_digit(&[*a]) == is_digit(&[*b]));
+    let padded = parts.map(|part| match String::from_utf8_lossy(part) {
+        number if is_digit(part) => format!("{number:0>20}"),
+        word => word.into_owned(),
+    });
+    (padded.collect(), name.to_owned())
 }
 
 #[cfg(test)]
