@@ -24,7 +24,6 @@ use super::{Failure, Place, help};
 use files::no_files;
 use nav_sim_signal::imu::{Channel, Recording};
 use rayon::prelude::*;
-use samples::Prepared;
 use std::path::{Path, PathBuf};
 
 /// How recordings are read.
@@ -379,12 +378,10 @@ fn held<T>(
     options: &ReadOptions,
     look: &(dyn Fn(Recording) -> T + Sync),
 ) -> Result<(FileReport, Vec<T>), Failure> {
-    let (prepared, mut report) = Prepared::new(load(path, options, &DICTIONARY)?, options)?;
+    let table = load(path, options, &DICTIONARY)?;
+    let (recordings, mut report) = samples::recordings(table, options)?;
     path.clone_into(&mut report.path);
-    Ok((
-        report,
-        prepared.recordings().into_iter().map(look).collect(),
-    ))
+    Ok((report, recordings.into_iter().map(look).collect()))
 }
 
 #[cfg(test)]
