@@ -255,17 +255,40 @@ pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Res
                 && out_of_range(table, row).is_none()
         }),
     }
-    let attitude = match table.has(ATTITUDE[0]) {
-        true => Attitude::Given,
-        false => Attitude::OfPath,
+    let (attitude, velocity) = (table.all(ATTITUDE), table.all(VELOCITY));
+    let [time] = table.columns(["t_s"], &dictionary(numbers))?;
+    let place = table.columns(position, &dictionary(numbers))?;
+    let (week, origin) = (
+        table.get("week"),
+        is_local.then(|| origin(&table, options)).transpose()?,
+    );
+    let triad = |columns: [&Column; 3], row| columns.map(|column| column.si(row));
+    let sample = |row| {
+        let weeks = week.map_or(0.0, |week| week.si(row) - week.si(0));
+        let t_s = time.si(row) + weeks * WEEK_S;
+        let [roll, pitch, yaw] = attitude.map_or([0.0; 3], |all| triad(all, row));
+        let q_b_n = RollPitchYaw { roll, pitch, yaw }.to_quat();
+        let [lat, lon, h] = triad(place, row);
+        match origin {
+            None => TrajectorySample {
+                t_s,
+                lat,
+                lon,
+                h,
+                q_b_n,
+            },
+            Some(origin) => local(t_s, origin, [lat, lon, h].into(), q_b_n),
+        }
     };
+    let samples = (0..table.rows()).map(sample).collect();
     let lines = (0..table.rows()).map(|row| table.line(row)).collect();
-    let samples = samples(&table, options)?;
+    let attitude = attitude.map_or(Attitude::OfPath, |_| Attitude::Given);
     let mut rows = Rows::new(&table.path, lines, samples, attitude);
     rows.geodetic = !is_local;
-    if let Some(velocity) = table.all(VELOCITY) {
-        rows.velocities = (0..table.rows()).map(|row| triad(velocity, row)).collect();
-    }
+    let velocity = velocity.into_iter();
+    rows.velocities = velocity
+        .flat_map(|own| (0..table.rows()).map(move |row| triad(own, row).into()))
+        .collect();
     if all > rows.lines.len() {
         let left_out = all - rows.lines.len();
         let text = format!("{left_out} rows left out: values not finite, or out of range");
@@ -311,42 +334,6 @@ fn check_units(table: &Table) -> Result<(), Error> {
     Err(table
         .refused(message)
         .or_hint("end the names in _deg or _rad"))
-}
-
-fn triad(columns: [&Column; 3], row: usize) -> DVec3 {
-    columns.map(|column| column.si(row)).into()
-}
-
-fn samples(table: &Table, options: &Options) -> Result<Vec<TrajectorySample>, Error> {
-    let (attitude, geodetic) = (table.all(ATTITUDE), table.all(GEODETIC));
-    let origin = match geodetic {
-        Some(_) => None,
-        None => Some(origin(table, options)?),
-    };
-    let (Some(time), Some(place)) = (table.get("t_s"), geodetic.or(table.all(LOCAL))) else {
-        return Ok(Vec::new());
-    };
-    let week_s = |row| {
-        let week = table.get("week");
-        week.map_or(0.0, |week| (week.si(row) - week.si(0)) * WEEK_S)
-    };
-    let sample = |row| {
-        let t_s = time.si(row) + week_s(row);
-        let [roll, pitch, yaw] = attitude.map_or([0.0; 3], |all| all.map(|c| c.si(row)));
-        let q_b_n = RollPitchYaw { roll, pitch, yaw }.to_quat();
-        let place = triad(place, row);
-        match origin {
-            None => TrajectorySample {
-                t_s,
-                lat: place.x,
-                lon: place.y,
-                h: place.z,
-                q_b_n,
-            },
-            Some(origin) => local(t_s, origin, place, q_b_n),
-        }
-    };
-    Ok((0..table.rows()).map(sample).collect())
 }
 
 /// A sample given in the axes north, east, down of the origin.
