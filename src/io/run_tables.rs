@@ -7,13 +7,16 @@ use nav_sim_navigation::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, Run
 /// What to do about a damaged table: it was written by the program.
 pub(crate) const REPEAT: &str = "repeat the run, or put back its files";
 
+/// Line, single columns, columns of each state.
+type Row<const N: usize, const M: usize> = (u64, [f64; N], [[f64; REPORTED]; M]);
+
 /// The columns of these names, and of each state with these prefixes, row by row with its line; an empty cell is NaN.
 fn rows<const N: usize, const M: usize>(
     path: &str,
     text: &str,
     names: [&str; N],
     prefixes: [&str; M],
-) -> Result<Vec<(u64, [f64; N], [[f64; REPORTED]; M])>, Failure> {
+) -> Result<Vec<Row<N, M>>, Failure> {
     let refused = |e: csv::Error| {
         let line = e.position().map_or(1, csv::Position::line);
         match e.kind() {

@@ -81,13 +81,15 @@ pub(super) fn npy(
         .collect())
 }
 
+/// Name of the array of a single number that states the rate (Hz).
+#[cfg(feature = "npz")]
+pub(super) const RATE: &str = "rate_hz";
+
 /// Reads named arrays: a vector is a column, an array of three columns the three axes of a sensor. Also the rate (Hz), if
 /// it is stated.
 #[cfg(feature = "npz")]
-pub(super) fn npz(path: &Path) -> Result<(Columns, Option<(f64, &'static str)>), Failure> {
+pub(super) fn npz(path: &Path) -> Result<(Columns, Option<f64>), Failure> {
     use nav_sim_logs::{Error, Fault, npz::Archive};
-    /// Name of the array of a single number that states the rate (Hz).
-    const RATE: &str = "rate_hz";
     let refused = |e| logs::refused(path, e);
     let mut archive = Archive::open(path).map_err(refused)?;
     let (mut columns, mut rate_hz) = (Vec::new(), None);
@@ -101,7 +103,7 @@ pub(super) fn npz(path: &Path) -> Result<(Columns, Option<(f64, &'static str)>),
             read => read.map_err(refused)?,
         };
         match shape[..] {
-            [] | [1] if name == RATE => rate_hz = values.first().map(|hz| (*hz, RATE)),
+            [] | [1] if name == RATE => rate_hz = values.first().copied(),
             [_] => columns.push((name, values)),
             [_, 3] => {
                 let array = Array { shape, values };
@@ -124,7 +126,7 @@ fn of_axis(name: &str, axis: usize) -> String {
 
 /// Reads Apache Parquet: columns by their names; what is no number is NaN.
 #[cfg(feature = "parquet")]
-fn parquet(path: &Path) -> Result<Columns, Failure> {
+pub(super) fn parquet(path: &Path) -> Result<Columns, Failure> {
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use parquet::record::Field;
     let damaged = |e: parquet::errors::ParquetError| {

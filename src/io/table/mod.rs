@@ -132,7 +132,7 @@ pub(crate) fn read(
         Some(LogKind::Npz) => {
             let (columns, rate_hz) = containers::npz(path)?;
             Ok(Table {
-                rate_hz,
+                rate_hz: rate_hz.map(|hz| (hz, containers::RATE)),
                 ..of(columns)?
             })
         }
