@@ -94,7 +94,7 @@ pub(crate) mod help {
 }
 
 /// Where in a file.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Clone)]
 pub(crate) enum Place {
     /// Anywhere in it.
     Within,
@@ -185,7 +185,7 @@ impl Failure {
             Some((value, reason)) => format!("{option}='{value}': {reason}"),
             None => without_places(message),
         };
-        Self::input(message).maybe_hint(tip.map(str::to_owned))
+        Self::input(message).or_hint_if(tip.map(str::to_owned))
     }
 
     /// Contents of a file that are refused (exit code 2).
@@ -253,10 +253,7 @@ impl Failure {
             code: if is_system { 1 } else { 2 },
             ..Self::contents(path.display(), Place::Within, system_words(&e))
         };
-        match advice {
-            "" => failure,
-            advice => failure.or_hint(advice),
-        }
+        failure.or_hint_if((!advice.is_empty()).then(|| advice.to_owned()))
     }
 
     /// Error of the system on writing a file, with a hint: another place if nothing else.
@@ -301,14 +298,6 @@ impl Failure {
     pub fn hint(mut self, hint: impl Into<Cow<'static, str>>) -> Self {
         self.help.clear();
         self.or_hint(hint)
-    }
-
-    /// With advice, if there is any.
-    pub(crate) fn maybe_hint(self, hint: Option<String>) -> Self {
-        match hint {
-            Some(hint) => self.hint(hint),
-            None => self,
-        }
     }
 
     /// With advice, beside what it has.
@@ -399,18 +388,6 @@ impl<T, E: fmt::Display> Refuse<T> for std::result::Result<T, E> {
     }
 }
 
-/// Advice on a result.
-pub(crate) trait OrHelp<T> {
-    /// With advice.
-    fn or_help(self, text: impl Into<Cow<'static, str>>) -> Result<T>;
-}
-
-impl<T, E: Into<Failure>> OrHelp<T> for std::result::Result<T, E> {
-    fn or_help(self, text: impl Into<Cow<'static, str>>) -> Result<T> {
-        self.map_err(|e| e.into().hint(text))
-    }
-}
-
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.message)
@@ -449,7 +426,7 @@ pub(crate) fn system_words(error: &io::Error) -> Cow<'static, str> {
 
 impl From<OutageError> for Failure {
     fn from(e: OutageError) -> Self {
-        Self::input(&e).maybe_hint(e.hint().map(str::to_owned))
+        Self::input(&e).or_hint_if(e.hint().map(str::to_owned))
     }
 }
 
@@ -457,7 +434,7 @@ impl From<ExperimentError> for Failure {
     fn from(e: ExperimentError) -> Self {
         let is_rate = matches!(e, ExperimentError::BetweenSamples(_));
         let hint = "the IMU has the rate of the recordings: another [gnss] rate_hz in --scenario";
-        Self::input(e).maybe_hint(is_rate.then(|| hint.to_owned()))
+        Self::input(e).or_hint_if(is_rate.then(|| hint.to_owned()))
     }
 }
 
@@ -484,7 +461,7 @@ impl From<&CalibrationError> for Failure {
             }
             _ => None,
         };
-        Self::input(e).maybe_hint(hint.map(str::to_owned))
+        Self::input(e).or_hint_if(hint.map(str::to_owned))
     }
 }
 

@@ -95,10 +95,9 @@ fn recording(path: &Path) {
 fn log(path: &Path) {
     let Ok(log) = Log::open(path) else { return };
     for channel in log.channels() {
-        let topic = Some(channel.topic.as_str());
         match channel.content {
-            Content::Imu => _ = log.imu(topic, Stamp::Header).map(Iterator::count),
-            Content::Fix => _ = log.fixes(topic, Stamp::Log).map(Iterator::count),
+            Content::Imu => _ = log.imu(channel, Stamp::Header),
+            Content::Fix => _ = log.fixes(channel, Stamp::Log),
             Content::Other => {}
         }
     }

@@ -307,7 +307,7 @@ impl<C: Command> Asked<C> {
             let Some(arg) = command.get_arguments().find(is_meant) else {
                 let known = command.get_arguments().map(|arg| arg.get_id().as_str());
                 let message = format!("{}: there is no option {key}", C::NAME);
-                return Err(Failure::input(message).maybe_hint(
+                return Err(Failure::input(message).or_hint_if(
                     suggest::nearest(key, known).map(|name| format!("did you mean {name}?")),
                 ));
             };

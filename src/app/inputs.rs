@@ -1,6 +1,6 @@
 //! Inputs that several commands share: files, settings, outages.
 
-use super::{Context, Failure, OrHelp, Refuse, Result};
+use super::{Context, Failure, Refuse, Result};
 use crate::io::model_file::{self, ModelFile, TurnOn};
 use crate::io::recordings::{self, ReadOptions};
 use crate::io::toml_file::Source;
@@ -58,9 +58,11 @@ pub(crate) fn at_rate(
 ) -> Result<Model> {
     let from_hz = model.rate_hz;
     let converted = continuous::at_rate(model, imu_hz);
-    let converted = converted.refuse_within(path.display()).or_help(format!(
-        "set rate_hz = {from_hz} in the [imu] section of a --scenario file"
-    ))?;
+    let converted = converted.refuse_within(path.display()).map_err(|e| {
+        e.hint(format!(
+            "set rate_hz = {from_hz} in the [imu] section of a --scenario file"
+        ))
+    })?;
     if !continuous::same_rate(from_hz, imu_hz) {
         let text = format!(
             "{}: converted from {from_hz} Hz to {imu_hz} Hz",

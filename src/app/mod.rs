@@ -7,8 +7,8 @@ mod manifest;
 mod outputs;
 pub mod reading;
 
+pub(crate) use crate::failure::Refuse;
 pub use crate::failure::{Failure, Result};
-pub(crate) use crate::failure::{OrHelp, Refuse};
 pub use crate::io::input::Input;
 pub use command::{Answer, Answered, Asked, Command, Out, OutputFile, answered};
 pub use context::{Context, DEFAULT_SEED, Front};

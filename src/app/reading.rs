@@ -10,18 +10,17 @@ use nav_sim_document::Importance;
 use nav_sim_logs::Stamp;
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::wavelet::{Convention, Tuning};
-use std::fmt;
 use std::str::FromStr;
 
 /// Options for reading recordings.
-#[derive(clap::Args, Debug, Clone, PartialEq, Default)]
+#[derive(clap::Args, Debug, Clone)]
 #[command(next_help_heading = "Recordings")]
 pub struct ReadingRequest {
     /// Sample rate (Hz) of files without a time column
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
     pub rate_hz: Option<f64>,
     /// Seconds to leave out at the beginning of each file (warm-up); auto: what differs from the rest of each file
-    #[arg(long, value_name = "S|auto", default_value_t)]
+    #[arg(long, value_name = "S|auto", default_value = "0")]
     pub skip_s: Skip,
     /// Names of the columns, for files without a header or instead of it
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
@@ -35,38 +34,12 @@ pub struct ReadingRequest {
 }
 
 /// The part of a log that is read.
-#[derive(clap::Args, Debug, Clone, PartialEq, Default)]
+#[derive(clap::Args, Debug, Clone)]
 pub struct LogRequest {
     /// Stamps of a log: header, of the measurement; log, of its arrival
-    #[arg(long, value_name = "WHICH", value_parser = parse::words::<Stamps>(STAMPS), default_value_t)]
-    pub stamp: Stamps,
+    #[arg(long, value_name = "WHICH", value_parser = parse::words::<Stamp>(STAMPS), default_value = "header")]
+    pub stamp: Stamp,
 }
-
-impl LogRequest {
-    /// The same, of a topic.
-    pub(crate) fn options(&self, topic: Option<String>) -> LogOptions {
-        LogOptions {
-            topic,
-            stamp: if self.stamp == Stamps::Log {
-                Stamp::Log
-            } else {
-                Stamp::Header
-            },
-        }
-    }
-}
-
-/// Stamps of a log by their names.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Stamps {
-    /// The time of the measurement.
-    #[default]
-    Header,
-    /// The time of arrival.
-    Log,
-}
-
-nav_sim_signal::named!(Stamps { Header = "header", Log = "log" });
 
 const STAMPS: &[(&str, &str)] = &[
     ("header", "Of the measurement, as the message states it"),
@@ -74,7 +47,7 @@ const STAMPS: &[(&str, &str)] = &[
 ];
 
 /// Options for reading recordings and choosing their signals.
-#[derive(clap::Args, Debug, Clone, PartialEq)]
+#[derive(clap::Args, Debug, Clone)]
 #[command(next_help_heading = "Recordings")]
 pub struct RecordingRequest {
     #[command(flatten)]
@@ -86,16 +59,6 @@ pub struct RecordingRequest {
     /// Signals to use: all, accel, gyro, x, accel.x, … (repeatable or comma-separated; default: all)
     #[arg(long, value_name = "AXES", value_delimiter = ',')]
     pub axes: Vec<ChannelSet>,
-}
-
-impl Default for RecordingRequest {
-    fn default() -> Self {
-        Self {
-            reading: ReadingRequest::default(),
-            gaps: Gaps::Keep,
-            axes: Vec::new(),
-        }
-    }
 }
 
 const GAPS: &[(&str, &str)] = &[
@@ -130,21 +93,6 @@ pub enum Skip {
     Auto,
 }
 
-impl Default for Skip {
-    fn default() -> Self {
-        Self::Seconds(0.0)
-    }
-}
-
-impl fmt::Display for Skip {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Seconds(seconds) => seconds.fmt(f),
-            Self::Auto => f.write_str("auto"),
-        }
-    }
-}
-
 impl FromStr for Skip {
     type Err = String;
 
@@ -159,17 +107,10 @@ impl FromStr for Skip {
 }
 
 /// The axes that one word of `--axes` stands for.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct ChannelSet {
-    word: String,
     /// The signals.
     pub channels: Vec<Channel>,
-}
-
-impl fmt::Display for ChannelSet {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.word)
-    }
 }
 
 impl FromStr for ChannelSet {
@@ -178,12 +119,9 @@ impl FromStr for ChannelSet {
     /// `all`, a sensor (`accel`), an axis of both sensors (`x`) or one channel (`accel.x`).
     fn from_str(word: &str) -> Result<Self, String> {
         let channels = Channel::named(word);
-        match channels.as_slice() {
-            [] => Err("not all, accel, gyro, x, y, z, or one channel such as accel.x".into()),
-            _ => Ok(Self {
-                word: word.to_owned(),
-                channels,
-            }),
+        match channels.is_empty() {
+            true => Err("not all, accel, gyro, x, y, z, or one channel such as accel.x".into()),
+            false => Ok(Self { channels }),
         }
     }
 }
@@ -212,27 +150,26 @@ impl ReadingRequest {
         if let Some(topic) = &self.topic {
             table.insert("topic".to_owned(), topic.as_str().into());
         }
-        if self.log.stamp != Stamps::default() {
-            table.insert("stamp".to_owned(), self.log.stamp.name().into());
+        if self.log.stamp == Stamp::Log {
+            table.insert("stamp".to_owned(), "log".into());
         }
         table
     }
 
     /// Options for the reader of the files.
     pub(crate) fn options(&self, gaps: Gaps) -> ReadOptions {
-        let skip_s = if let Skip::Seconds(s) = self.skip_s {
-            s
-        } else {
-            0.0
-        };
-        let log = self.log.options(self.topic.clone());
-        let columns = (!self.columns.is_empty()).then(|| self.columns.clone());
         ReadOptions {
-            columns,
+            columns: (!self.columns.is_empty()).then(|| self.columns.clone()),
             rate_hz: self.rate_hz,
-            skip_s,
+            skip_s: match self.skip_s {
+                Skip::Seconds(s) => s,
+                Skip::Auto => 0.0,
+            },
             gaps,
-            log,
+            log: LogOptions {
+                topic: self.topic.clone(),
+                stamp: self.log.stamp,
+            },
             ..ReadOptions::default()
         }
     }
@@ -273,7 +210,7 @@ impl RecordingRequest {
 }
 
 /// Options for wavelet variances.
-#[derive(clap::Args, Debug, Clone, PartialEq)]
+#[derive(clap::Args, Debug, Clone)]
 #[command(next_help_heading = "Wavelet variance")]
 pub struct VarianceRequest {
     /// Efficiency of the robust wavelet variance at the Gaussian model, 0.3 to 0.99
@@ -285,15 +222,6 @@ pub struct VarianceRequest {
     pub scales: Option<Scales>,
 }
 
-impl Default for VarianceRequest {
-    fn default() -> Self {
-        Self {
-            efficiency: Tuning::DEFAULT_EFFICIENCY,
-            scales: None,
-        }
-    }
-}
-
 /// Scales that are asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Scales {
@@ -301,15 +229,6 @@ pub enum Scales {
     Count(u32),
     /// All, of which these are fitted.
     Fitted(FitRange),
-}
-
-impl fmt::Display for Scales {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Count(count) => count.fmt(f),
-            Self::Fitted(FitRange { from_s, to_s }) => write!(f, "{from_s}:{to_s}"),
-        }
-    }
 }
 
 impl FromStr for Scales {
@@ -338,26 +257,36 @@ impl VarianceRequest {
 
     /// Number of scales, if it is given.
     pub(crate) fn levels(&self) -> Option<u32> {
-        if let Some(Scales::Count(count)) = self.scales {
-            Some(count)
-        } else {
-            None
+        match self.scales {
+            Some(Scales::Count(count)) => Some(count),
+            _ => None,
         }
     }
 
     /// The scales that are fitted, if they are given.
     pub(crate) fn fitted(&self) -> Option<FitRange> {
-        if let Some(Scales::Fitted(range)) = self.scales {
-            Some(range)
-        } else {
-            None
+        match self.scales {
+            Some(Scales::Fitted(range)) => Some(range),
+            _ => None,
         }
     }
 }
 
 /// Not a `--model`.
 pub(crate) fn unknown_model(e: SpecError) -> Failure {
-    let hint = suggest::model(&e, ModelSpec::legal().chain(["auto"]));
+    let hint = match &e {
+        SpecError::Unknown { term, .. } => {
+            let legal = || ModelSpec::legal().chain(["auto"]);
+            match suggest::nearest(term, legal()) {
+                Some(meant) => format!("did you mean \"{meant}\"?"),
+                None => format!(
+                    "processes and models: {}",
+                    legal().collect::<Vec<_>>().join(", ")
+                ),
+            }
+        }
+        _ => "a model is a sum such as 2*AR1+RW+WN+QN".to_owned(),
+    };
     Failure::input(format!("--model: {e}")).hint(hint)
 }
 
@@ -366,15 +295,14 @@ const FEW: usize = 2;
 
 /// Notes what was found in the recordings, and what is doubtful about them.
 pub(crate) fn note_report(report: &Report, context: &Context<'_>) {
-    let is_many = report.files.len() > FEW;
-    if is_many {
-        let count = report.files.len();
-        context.remark(format!("{count} recordings (--verbose: each of them)"));
-    }
-    let each = match is_many {
+    let count = report.files.len();
+    let each = match count > FEW {
         true => Importance::Detail,
         false => Importance::Remark,
     };
+    if count > FEW {
+        context.remark(format!("{count} recordings (--verbose: each of them)"));
+    }
     for file in &report.files {
         context.note(each, file);
         if !file.ignored.is_empty() {

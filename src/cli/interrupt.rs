@@ -13,7 +13,7 @@ pub(super) fn watch(printer: Printer, advice: Option<String>) {
         INTERRUPTED.store(true, Ordering::SeqCst);
         atomic::remove_unfinished();
         let failure = Failure::interrupted("interrupted; what was being written is removed");
-        printer.failure(&failure.maybe_hint(advice.clone()));
+        printer.failure(&failure.or_hint_if(advice.clone()));
         std::process::exit(128 + signal);
     });
 }

@@ -166,7 +166,7 @@ fn end(e: &clap::Error) -> ! {
     }
     let is_incomplete = e.kind() == ErrorKind::MissingRequiredArgument;
     let help = is_incomplete.then(|| "--help shows usage and examples".to_owned());
-    let failure = Failure::usage(e).maybe_hint(help);
+    let failure = Failure::usage(e).or_hint_if(help);
     Printer::default().failure(&failure);
     std::process::exit(failure.code().into())
 }

@@ -5,11 +5,11 @@ use super::inspect::inspect;
 use crate::app::{Answer, Command, Context, Failure, Result, inputs};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::fusion_files::{ImuFile, read_gnss, read_imu, read_initial};
-use crate::io::logs::LogOptions;
 use crate::io::{contamination_file, curve_file, datasheet, model_file, scenario_file};
 use crate::parse;
 use crate::report::six_digits;
 use nav_sim_document::{Document, Note, Tone, seconds};
+use nav_sim_logs::Stamp;
 use nav_sim_navigation::fusion::alignment::moves;
 use nav_sim_navigation::gnss::FixSigma;
 use serde::Serialize;
@@ -168,7 +168,7 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
             format!("a noise model at {rate_hz} Hz, accel {accel}, gyro {gyro}")
         }
         FileKind::Log => {
-            let log = inspect(path, &LogOptions::default())?;
+            let log = inspect(path, Stamp::default())?;
             let (format, channels) = (log.format, log.channels.len());
             format!("{format} of {channels} channels (nav-sim inspect lists them)")
         }

@@ -4,9 +4,9 @@ use crate::app::inputs::files;
 use crate::app::reading::LogRequest;
 use crate::app::{Answer, Command, Context, Result};
 use crate::io::Failure;
-use crate::io::logs::{self, LogOptions};
+use crate::io::logs;
 use nav_sim_document::{Document, Importance, Table, Tone, six_digits};
-use nav_sim_logs::{Channel, Content, Error, Log};
+use nav_sim_logs::{Channel, Content, Error, Log, Stamp};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -42,7 +42,7 @@ impl Command for Inspect {
     }
 
     fn run(&self, _: &Context<'_>) -> Result<Inspection> {
-        inspect(&self.file, &self.log.options(None))
+        inspect(&self.file, self.log.stamp)
     }
 }
 
@@ -91,7 +91,7 @@ pub struct InspectedChannel {
 /// ```
 /// use nav_sim::commands::inspect::inspect;
 ///
-/// let log = inspect("src/logs/tests/data/ros2_zstd.mcap".as_ref(), &Default::default())?;
+/// let log = inspect("src/logs/tests/data/ros2_zstd.mcap".as_ref(), Default::default())?;
 /// let imu = log.channels.iter().find(|channel| channel.content == "imu").expect("one is there");
 /// assert_eq!((imu.topic.as_str(), imu.messages, imu.units), ("/imu", 40, Some("m/s², rad/s")));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -99,12 +99,12 @@ pub struct InspectedChannel {
 ///
 /// # Errors
 /// When the file is not a log that is read, or is damaged before its end.
-pub fn inspect(path: &Path, options: &LogOptions) -> std::result::Result<Inspection, Failure> {
+pub fn inspect(path: &Path, stamp: Stamp) -> std::result::Result<Inspection, Failure> {
     let log = logs::open(path)?;
     let channels = log
         .channels()
         .iter()
-        .map(|channel| inspected(&log, channel, options));
+        .map(|channel| inspected(&log, channel, stamp));
     Ok(Inspection {
         file: path.display().to_string(),
         format: log.kind().name(),
@@ -118,24 +118,19 @@ pub fn inspect(path: &Path, options: &LogOptions) -> std::result::Result<Inspect
 fn inspected(
     log: &Log,
     channel: &Channel,
-    options: &LogOptions,
+    stamp: Stamp,
 ) -> std::result::Result<InspectedChannel, Error> {
-    let topic = Some(channel.topic.as_str());
     let (content, units, stamps) = match channel.content {
         _ if channel.messages == 0 => ("other", None, Vec::new()),
         Content::Imu => {
-            let samples = log
-                .imu(topic, options.stamp)?
-                .map(|sample| Ok(sample?.stamp_ns));
-            let stamps: std::result::Result<Vec<i64>, Error> = samples.collect();
-            ("imu", Some("m/s², rad/s"), stamps?)
+            let samples = log.imu(channel, stamp)?;
+            let stamps = samples.iter().map(|sample| sample.stamp_ns).collect();
+            ("imu", Some("m/s², rad/s"), stamps)
         }
         Content::Fix => {
-            let fixes = log
-                .fixes(topic, options.stamp)?
-                .map(|fix| Ok(fix?.stamp_ns));
-            let stamps: std::result::Result<Vec<i64>, Error> = fixes.collect();
-            ("fix", Some("deg, m"), stamps?)
+            let fixes = log.fixes(channel, stamp)?;
+            let stamps = fixes.iter().map(|fix| fix.stamp_ns).collect();
+            ("fix", Some("deg, m"), stamps)
         }
         Content::Other => ("other", None, Vec::new()),
     };

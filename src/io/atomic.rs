@@ -8,7 +8,7 @@
 use super::{Failure, Place, help, source};
 use std::collections::BTreeSet;
 use std::fs::{self, File, TryLockError};
-use std::io::{self, BufWriter, ErrorKind, Read, Write};
+use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -423,7 +423,7 @@ impl Drop for Claim {
 }
 
 fn refused(path: &Path, why: &str) -> Failure {
-    Failure::contents(path.display().to_string(), Place::Itself, why)
+    Failure::contents(path.display(), Place::Itself, why)
 }
 
 fn marker_beside(path: &Path) -> PathBuf {
@@ -564,9 +564,6 @@ pub enum Written {
     Trajectory,
 }
 
-/// Most of a file that is looked at (bytes).
-const HEAD: u64 = 1 << 20;
-
 /// Texts that every file of a kind has.
 const MARKS: [(Written, [&str; 2]); 13] = {
     const MODEL: &str = "program = \"nav-sim ";
@@ -600,7 +597,7 @@ const MARKS: [(Written, [&str; 2]); 13] = {
 impl Written {
     /// What stands at a path where a file of this kind is to be written.
     fn found(self, path: &Path) -> Found {
-        let Some(text) = head(path) else {
+        let Ok(text) = source::head(path) else {
             return match path.exists() {
                 true => Found::Foreign,
                 false => Found::Same,
@@ -625,24 +622,7 @@ impl Written {
     }
 }
 
-fn head(path: &Path) -> Option<String> {
-    let file = source::open(path).ok()?;
-    let mut bytes = Vec::new();
-    let is_packed = path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("gz"));
-    let read = match is_packed {
-        true => flate2::read::GzDecoder::new(file)
-            .take(HEAD)
-            .read_to_end(&mut bytes),
-        false => file.take(HEAD).read_to_end(&mut bytes),
-    };
-    read.is_ok()
-        .then(|| String::from_utf8_lossy(&bytes).into_owned())
-}
-
 /// What stands where a result is to be written; in a directory told by its last file, which appears when the others are whole.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Found {
     /// Nothing that may be replaced.
     Foreign,

@@ -10,7 +10,7 @@ use std::fmt::Display;
 use std::path::Path;
 
 /// A curve and what it is of.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub(crate) struct NamedCurve {
     /// The sensor, if the file says it.
     pub sensor: Option<Sensor>,
@@ -79,11 +79,11 @@ const DICTIONARY: Dictionary = Dictionary::new(&QUANTITIES, "the first line name
 fn csv(path: &str, text: &str) -> Result<NamedCurve, Failure> {
     let table = parse_table(path, text, &DICTIONARY, &Asked::default())?;
     let names = QUANTITIES.each_ref().map(|quantity| quantity.name);
-    table.require(names, &DICTIONARY)?;
+    let columns = table.columns(names, &DICTIONARY)?;
     let mut curve = Curve::default();
     for row in 0..table.rows() {
-        let place = Place::Line(table.lines.of(row));
-        let point = names.map(|name| table.get(name).map_or(f64::NAN, |column| column.si(row)));
+        let place = Place::Line(table.line(row));
+        let point = columns.map(|column| column.si(row));
         push(&mut curve, &Part { path, place }, point)?;
     }
     Ok(NamedCurve {

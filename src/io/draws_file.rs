@@ -114,7 +114,7 @@ pub fn read(model: &Path) -> Result<Option<DrawsFile>, Failure> {
         Err(e) => return Err(Failure::io(&path, e)),
     };
     let refused = |line: usize, message: String| {
-        Failure::contents(path.display().to_string(), line as u64, message)
+        Failure::contents(path.display(), line as u64, message)
             .or_hint("calibrate again, or remove the file")
     };
     let file: DrawsFile =

@@ -2,12 +2,10 @@
 
 use super::fusion_files::{bare_row, is_nmea, is_rtklib};
 use super::{Failure, logs, source};
-use flate2::read::GzDecoder;
-use std::io::Read;
 use std::path::Path;
 
 /// The kinds of files that commands read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, PartialEq)]
 pub(crate) enum FileKind {
     /// A scenario of `run`.
     Scenario,
@@ -37,9 +35,6 @@ pub(crate) enum FileKind {
     Recording,
 }
 
-/// Bytes of a file that tell what it is: all of a TOML, the header of a table.
-const HEAD: u64 = 1 << 20;
-
 /// What a path holds. A pipe is read, and reads the same again.
 ///
 /// # Errors
@@ -61,21 +56,11 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, Failure> {
     {
         return Ok(FileKind::Trajectory);
     }
-    let error = |e| Failure::io(path, e);
-    let file = source::open(path).map_err(error)?;
-    let is_compressed = plain != name;
-    let reader: Box<dyn Read> = if is_compressed {
-        Box::new(GzDecoder::new(file))
-    } else {
-        file
-    };
-    let mut head = Vec::new();
-    match reader.take(HEAD).read_to_end(&mut head) {
+    let text = match source::head(path) {
         // A damaged one: the reader of recordings says how.
-        Err(_) if is_compressed => return Ok(FileKind::Recording),
-        read => read.map_err(error)?,
+        Err(_) if plain != name => return Ok(FileKind::Recording),
+        read => read.map_err(|e| Failure::io(path, e))?,
     };
-    let text = source::without_mark(String::from_utf8_lossy(&head).into_owned());
     if name.ends_with(".json") || text.trim_start().starts_with('{') {
         // What this program says of its results has a version; of those only curves have wavelet variances to be read.
         let is_record = text.contains("\"schema_version\"") && !text.contains("\"wv\"");

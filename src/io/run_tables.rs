@@ -1,65 +1,87 @@
 //! `epochs.csv` and `runs.csv` of a run directory, read back.
 
 use super::Failure;
-use super::table::{Asked, Column, Dictionary, Numbers, Quantity, Table, parse};
 use nav_sim_navigation::metrics::EpochRow;
 use nav_sim_navigation::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, RunRecord};
-use std::sync::LazyLock;
 
-/// Columns that are one number each.
-const SINGLE: [&str; 6] = ["t_s", "nees", "coverage", "run", "diverged", "outage"];
-/// Columns that are one number for each state.
-const OF_STATES: [&str; 3] = ["asee_", "see_mean_", "error_end_"];
-
-static QUANTITIES: LazyLock<Vec<Quantity>> = LazyLock::new(|| {
-    let of_states = OF_STATES
-        .iter()
-        .flat_map(|prefix| REPORTED_NAMES.map(|name| format!("{prefix}{name}")));
-    let names = SINGLE.map(str::to_owned).into_iter().chain(of_states);
-    let named = |name: String| {
-        let stems: &[&str] = vec![&*name.leak()].leak();
-        Quantity::number(stems[0], stems)
-    };
-    names.map(named).collect()
-});
-
-fn dictionary() -> Dictionary {
-    Dictionary {
-        quantities: &QUANTITIES,
-        bare: &[],
-        array: &[],
-        numbers: Numbers::Missing,
-        advice: REPEAT,
-        empty: "no rows in it",
-        bad_cell: |error, _| error,
-    }
-}
-
-/// What to do about a damaged table.
+/// What to do about a damaged table: it was written by the program.
 pub(crate) const REPEAT: &str = "repeat the run, or put back its files";
+
+/// Line, single columns, columns of each state.
+type Row<const N: usize, const M: usize> = (u64, [f64; N], [[f64; REPORTED]; M]);
+
+/// The columns of these names, and of each state with these prefixes, row by row with its line; an empty cell is NaN.
+fn rows<const N: usize, const M: usize>(
+    path: &str,
+    text: &str,
+    names: [&str; N],
+    prefixes: [&str; M],
+) -> Result<Vec<Row<N, M>>, Failure> {
+    let refused = |e: csv::Error| {
+        let line = e.position().map_or(1, csv::Position::line);
+        match e.kind() {
+            csv::ErrorKind::UnequalLengths {
+                expected_len, len, ..
+            } => Failure::row_length(path, line, *len as usize, *expected_len as usize),
+            _ => Failure::contents(path, line, e),
+        }
+        .hint(REPEAT)
+    };
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let header = reader.headers().map_err(refused)?.clone();
+    let read = |record: csv::Result<csv::StringRecord>| {
+        let record = record.map_err(refused)?;
+        let line = record.position().map_or(1, csv::Position::line);
+        let value = |name: &str| {
+            let Some(column) = header.iter().position(|own| own == name) else {
+                let message = format!("column \"{name}\" is missing");
+                return Err(Failure::contents(path, 1_u64, message).hint(REPEAT));
+            };
+            match &record[column] {
+                "" => Ok(f64::NAN),
+                cell => cell.parse().map_err(|_| {
+                    let value = format!("\"{cell}\"");
+                    Failure::cell(path, line, name, value, "is not a number").hint(REPEAT)
+                }),
+            }
+        };
+        let (mut single, mut of_states) = ([0.0; N], [[0.0; REPORTED]; M]);
+        for (into, name) in single.iter_mut().zip(names) {
+            *into = value(name)?;
+        }
+        for (into, prefix) in of_states.iter_mut().zip(prefixes) {
+            for (into, name) in into.iter_mut().zip(REPORTED_NAMES) {
+                *into = value(&format!("{prefix}{name}"))?;
+            }
+        }
+        Ok((line, single, of_states))
+    };
+    reader.records().map(read).collect()
+}
 
 /// Reads `epochs.csv` back, as far as comparisons need it.
 ///
 /// # Errors
-/// A missing or doubled column, or a value that is not a finite number (unless no run is left at the epoch).
+/// A missing column, or a value that is not a finite number (unless no run is left at the epoch).
 pub(crate) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, Failure> {
-    let read = || -> Result<Vec<EpochRow>, Failure> {
-        let table = parse(path, text, &dictionary(), &Asked::default())?;
-        let asee = states(&table, "asee_")?;
-        let [t_s, nees, coverage] = named(&table, ["t_s", "nees", "coverage"])?;
-        let columns = [&asee[..], &[nees, coverage]].concat();
-        let epoch = |row: usize| {
-            finite_or_lost(&table, row, &columns)?;
-            Ok(EpochRow {
-                t_s: t_s.si(row),
-                asee: asee.map(|column| column.si(row)),
-                nees: nees.si(row),
-                coverage: coverage.si(row),
-            })
-        };
-        (0..table.rows()).map(epoch).collect()
-    };
-    read().map_err(damaged)
+    let names = ["t_s", "nees", "coverage"];
+    let rows = rows(path, text, names, ["asee_"])?.into_iter();
+    rows.map(|(line, [t_s, nees, coverage], [asee])| {
+        let names = REPORTED_NAMES.map(|name| format!("asee_{name}"));
+        let values = names.iter().map(String::as_str).zip(asee);
+        let mut values = values.chain([("nees", nees), ("coverage", coverage)]);
+        let lost = values.clone().find(|(_, value)| !value.is_finite());
+        if let Some((name, value)) = lost.filter(|_| values.any(|(_, value)| value.is_finite())) {
+            return Err(Failure::cell(path, line, name, value, "is not finite").hint(REPEAT));
+        }
+        Ok(EpochRow {
+            t_s,
+            asee,
+            nees,
+            coverage,
+        })
+    })
+    .collect()
 }
 
 /// Reads `runs.csv` back, as far as comparisons need it: a row for each outage of a run, or one that ends where outages begin.
@@ -67,16 +89,11 @@ pub(crate) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, Fail
 /// # Errors
 /// A missing column or a value that is not a number.
 pub(crate) fn parse_runs(path: &str, text: &str) -> Result<Vec<RunRecord>, Failure> {
-    let table = parse(path, text, &dictionary(), &Asked::default());
-    table.and_then(|table| runs(&table)).map_err(damaged)
-}
-
-fn runs(table: &Table) -> Result<Vec<RunRecord>, Failure> {
-    let columns = named(table, ["run", "diverged", "outage"])?;
-    let (see_mean, error_end) = (states(table, "see_mean_")?, states(table, "error_end_")?);
+    let names = ["run", "diverged", "outage"];
     let mut runs: Vec<RunRecord> = Vec::new();
-    for row in 0..table.rows() {
-        let [run, diverged, outage] = columns.map(|c| c.si(row));
+    for (_, [run, diverged, outage], [see_mean, error_end]) in
+        rows(path, text, names, ["see_mean_", "error_end_"])?
+    {
         if runs.last().is_none_or(|r| r.run != run as u64) {
             runs.push(RunRecord {
                 run: run as u64,
@@ -86,49 +103,13 @@ fn runs(table: &Table) -> Result<Vec<RunRecord>, Failure> {
         }
         if let Some(last) = runs.last_mut().filter(|_| !outage.is_nan()) {
             last.outages.push(OutageRecord {
-                see_mean: see_mean.map(|c| c.si(row)),
-                error_end: error_end.map(|c| c.si(row)),
+                see_mean,
+                error_end,
                 ..OutageRecord::default()
             });
         }
     }
     Ok(runs)
-}
-
-fn named<'a, const N: usize>(
-    table: &'a Table,
-    names: [&str; N],
-) -> Result<[&'a Column; N], Failure> {
-    table.require(names, &dictionary())?;
-    table.all(names).ok_or_else(|| table.refused(REPEAT))
-}
-
-fn states<'a>(table: &'a Table, prefix: &str) -> Result<[&'a Column; REPORTED], Failure> {
-    let names = REPORTED_NAMES.map(|name| format!("{prefix}{name}"));
-    named(table, names.each_ref().map(String::as_str))
-}
-
-/// Refuses a row of an epoch in which some values are finite and others not. Where no run is left, all are NaN.
-fn finite_or_lost(table: &Table, row: usize, columns: &[&Column]) -> Result<(), Failure> {
-    let is_lost = columns.iter().all(|column| column.si(row).is_nan());
-    match columns.iter().find(|column| !column.si(row).is_finite()) {
-        Some(column) if !is_lost => {
-            let (line, value) = (table.lines.of(row), column.si(row).to_string());
-            Err(Failure::cell(
-                &table.path,
-                line,
-                &column.name,
-                value,
-                "is not finite",
-            ))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// A table of a run is written by the program: what is wrong with it is damage.
-fn damaged(error: Failure) -> Failure {
-    error.hint(REPEAT)
 }
 
 #[cfg(test)]
@@ -184,7 +165,7 @@ mod tests {
             parse_epochs("e.csv", &text.replacen("asee_yaw_deg", "asee_yow_deg", 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "e.csv, line 1: unknown column \"asee_yow_deg\""
+            "e.csv, line 1: column \"asee_yaw_deg\" is missing"
         );
         let broken: String = text
             .lines()
@@ -206,7 +187,7 @@ mod tests {
             parse_epochs("e.csv", &text.replacen("asee_yaw_deg", "asee_roll_deg", 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "e.csv, line 1: columns \"asee_roll_deg\" and \"asee_roll_deg\" both give asee_roll_deg"
+            "e.csv, line 1: column \"asee_yaw_deg\" is missing"
         );
         let cut = &text[..text.rfind(',').unwrap()];
         let error = parse_epochs("e.csv", cut).unwrap_err().to_string();

@@ -18,7 +18,7 @@ pub(crate) fn read(path: &Path) -> Result<Scenario, Failure> {
 ///
 /// # Errors
 /// As [`read`].
-pub(crate) fn read_for(
+fn read_for(
     path: &Path,
     rule: impl FnOnce(&Scenario) -> Result<(), SettingError>,
 ) -> Result<Scenario, Failure> {

@@ -59,6 +59,19 @@ pub(crate) fn table(path: &Path) -> io::Result<Box<dyn BufRead>> {
     Ok(Box::new(BufReader::with_capacity(BUFFER, unpacked)))
 }
 
+/// Most of a file that is looked at to tell what it is (bytes).
+const HEAD: u64 = 1 << 20;
+
+/// The beginning of a file as text, unpacked when its name ends in `.gz`.
+///
+/// # Errors
+/// When the system refuses.
+pub(crate) fn head(path: &Path) -> io::Result<String> {
+    let mut bytes = Vec::new();
+    table(path)?.take(HEAD).read_to_end(&mut bytes)?;
+    Ok(without_mark(String::from_utf8_lossy(&bytes).into_owned()))
+}
+
 /// Bytes of a packed table, of which there may be so many: a small file unpacks to any number.
 struct Unpacked<R> {
     inner: io::Take<R>,

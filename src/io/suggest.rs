@@ -1,7 +1,5 @@
 //! The nearest legal word to a mistyped one.
 
-use nav_sim_calibration::SpecError;
-
 /// The candidate nearest to `word`, if near enough to be what was meant: at most one edit in three
 /// letters, or one begins with the other ("rate", "rate_hz"). Case is ignored; ties go to the first.
 pub(crate) fn nearest<'a>(
@@ -21,18 +19,6 @@ pub(crate) fn nearest<'a>(
         .into_iter()
         .filter_map(|c| near(&c).map(|edits| (edits, c)));
     scored.min_by_key(|(edits, _)| *edits).map(|(_, best)| best)
-}
-
-/// What to write in the place of what is not a model; `legal`: processes and models.
-pub(crate) fn model<'a>(e: &SpecError, legal: impl Iterator<Item = &'a str>) -> String {
-    let legal: Vec<&str> = legal.collect();
-    match e {
-        SpecError::Unknown { term, .. } => match nearest(term, legal.iter().copied()) {
-            Some(meant) => format!("did you mean \"{meant}\"?"),
-            None => format!("processes and models: {}", legal.join(", ")),
-        },
-        _ => "a model is a sum such as 2*AR1+RW+WN+QN".into(),
-    }
 }
 
 #[cfg(test)]

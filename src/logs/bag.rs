@@ -1,7 +1,7 @@
 //! Records of a ROS 1 bag (<https://wiki.ros.org/Bags/Format/2.0>).
 
 use crate::bytes::{Bytes, text};
-use crate::container::{Definition, Dialect, Head, Record, Tally};
+use crate::container::{Dialect, Head, Record};
 use crate::error::{Error, Fault};
 use crate::input::Input;
 use crate::sample::NS;
@@ -19,7 +19,6 @@ mod opcode {
     pub(super) const BAG: u8 = 0x03;
     pub(super) const INDEX: u8 = 0x04;
     pub(super) const CHUNK: u8 = 0x05;
-    pub(super) const CHUNK_INFO: u8 = 0x06;
     pub(super) const CONNECTION: u8 = 0x07;
 }
 
@@ -28,8 +27,6 @@ mod opcode {
 pub(crate) struct Bag {
     /// Byte of the index at the end; 0 until the bag is closed.
     index: u64,
-    /// Chunks that the start and the end of the file state.
-    chunks: [u32; 2],
 }
 
 impl Dialect for Bag {
@@ -83,8 +80,7 @@ impl Dialect for Bag {
     }
 
     fn finish(&self, input: &Input) -> Result<(), Error> {
-        let [stated, found] = self.chunks;
-        if self.index == 0 || self.index > input.length() || found < stated {
+        if self.index == 0 || self.index > input.length() {
             return Err(Error::at(input.offset(), Fault::StillWritten));
         }
         Ok(())
@@ -94,24 +90,14 @@ impl Dialect for Bag {
 impl Bag {
     /// Counts of the start and of the end.
     fn note(&mut self, code: &[u8], fields: Fields<'_>, offset: u64) -> Result<(), Error> {
-        if code == [opcode::CHUNK_INFO] {
-            self.chunks[1] = self.chunks[1].saturating_add(1);
-        }
         if code == [opcode::BAG] {
             if let Some(name) = fields.bytes(b"encryptor").filter(|name| !name.is_empty()) {
                 return Err(Error::encoding(offset, name));
             }
-            let index = fields
-                .bytes(b"index_pos")
-                .and_then(|b| Bytes::little(b).u64());
-            let chunks = fields.u32(b"chunk_count");
-            let (Some(index), Some(chunks)) = (index, chunks) else {
-                return Err(Error::malformed(
-                    offset,
-                    "the start of the bag does not parse",
-                ));
-            };
-            (self.index, self.chunks[0]) = (index, chunks);
+            let index = fields.bytes(b"index_pos");
+            let index = index.and_then(|b| Bytes::little(b).u64());
+            let what = "the start of the bag does not parse";
+            self.index = index.ok_or_else(|| Error::malformed(offset, what))?;
         }
         Ok(())
     }
@@ -156,31 +142,13 @@ fn message(fields: Fields<'_>, size: u64) -> Option<Record> {
 
 /// Times and places of a connection's messages in the chunk before.
 fn index(fields: Fields<'_>, entries: &[u8]) -> Option<Record> {
-    const ENTRY: usize = 12;
-    let times = || {
-        entries
-            .chunks_exact(ENTRY)
-            .filter_map(|e| time_ns(&mut Bytes::little(e)))
-    };
-    let (Some(first_ns), Some(last_ns)) = (times().min(), times().max()) else {
-        return Some(Record::Other);
-    };
-    let messages = (entries.len() / ENTRY) as u64;
-    Some(Record::Index(Tally {
-        channel: fields.u32(b"conn")?,
-        messages,
-        first_ns,
-        last_ns,
-    }))
+    let entries = entries.chunks_exact(12);
+    let times = entries.filter_map(|entry| time_ns(&mut Bytes::little(entry)));
+    Some(Record::Index(fields.u32(b"conn")?, times.collect()))
 }
 
 fn connection(fields: Fields<'_>, data: &[u8]) -> Option<Record> {
-    let topic = text(fields.bytes(b"topic")?);
-    let type_name = text(Fields(data).bytes(b"type")?);
-    Some(Record::Channel(Definition {
-        id: fields.u32(b"conn")?,
-        topic,
-        type_name,
-        encoding: "ros1".to_owned(),
-    }))
+    let (topic, type_name) = (fields.bytes(b"topic")?, Fields(data).bytes(b"type")?);
+    let named = [text(topic), text(type_name), "ros1".to_owned()];
+    Some(Record::Channel(fields.u32(b"conn")?, named))
 }

@@ -1,38 +1,25 @@
 //! Numbers within the bytes of a message.
 
-/// Order of a number's bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Order {
-    Little,
-    Big,
-}
-
-/// Alignment of numbers to their own size, at most to so many bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Alignment {
-    Packed,
-    UpTo(usize),
-}
-
 /// Bytes of a message, read in order; `None` beyond their end.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub(crate) struct Bytes<'a> {
     all: &'a [u8],
     at: usize,
-    order: Order,
-    alignment: Alignment,
+    is_big_endian: bool,
+    /// Numbers are aligned to their own size, at most to so many bytes.
+    alignment: usize,
 }
 
 impl<'a> Bytes<'a> {
     pub(crate) const fn little(all: &'a [u8]) -> Self {
-        Self::new(all, Order::Little, Alignment::Packed)
+        Self::new(all, false, 1)
     }
 
-    pub(crate) const fn new(all: &'a [u8], order: Order, alignment: Alignment) -> Self {
+    pub(crate) const fn new(all: &'a [u8], is_big_endian: bool, alignment: usize) -> Self {
         Self {
             all,
             at: 0,
-            order,
+            is_big_endian,
             alignment,
         }
     }
@@ -44,11 +31,9 @@ impl<'a> Bytes<'a> {
     }
 
     fn number<const N: usize>(&mut self) -> Option<[u8; N]> {
-        if let Alignment::UpTo(most) = self.alignment {
-            self.at = self.at.next_multiple_of(N.min(most));
-        }
+        self.at = self.at.next_multiple_of(N.min(self.alignment));
         let mut bytes = *self.take(N)?.first_chunk::<N>()?;
-        if self.order == Order::Big {
+        if self.is_big_endian {
             bytes.reverse();
         }
         Some(bytes)
@@ -74,7 +59,7 @@ impl<'a> Bytes<'a> {
         self.number().map(u64::from_le_bytes)
     }
 
-    pub(crate) fn f64(&mut self) -> Option<f64> {
+    fn f64(&mut self) -> Option<f64> {
         self.number().map(f64::from_le_bytes)
     }
 
@@ -84,17 +69,6 @@ impl<'a> Bytes<'a> {
             *value = self.f64()?;
         }
         Some(values)
-    }
-
-    pub(crate) fn skip_f64s(&mut self, count: usize) -> Option<()> {
-        match count.checked_sub(1) {
-            // the first aligns
-            Some(rest) => self
-                .f64()
-                .and_then(|_| self.take(rest * size_of::<f64>()))
-                .map(|_| ()),
-            None => Some(()),
-        }
     }
 
     /// A string behind its length.
@@ -110,7 +84,7 @@ pub(crate) fn text(bytes: &[u8]) -> String {
 }
 
 /// Types of numbers, with their bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Number {
     Signed(usize),
     Unsigned(usize),

@@ -1,10 +1,10 @@
 //! Channels of a log.
 
 use crate::error::Error;
-use crate::sample::Clock;
+use crate::sample::{Clock, Sample};
 
 /// Channel of a log.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Channel {
     /// Topic, or name of the messages.
     pub topic: String,
@@ -24,16 +24,19 @@ pub struct Channel {
     pub(crate) id: u32,
     /// Of channels of the same content, the lowest is read when none is named.
     pub(crate) rank: u8,
+    /// Encoding of the messages, of which a container may have several.
+    pub(crate) encoding: String,
 }
 
 /// Use of a channel's messages.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Content {
     /// Samples of an IMU.
     Imu,
     /// Fixes of a receiver.
     Fix,
     /// Anything else.
+    #[default]
     Other,
 }
 
@@ -48,30 +51,16 @@ impl Content {
 }
 
 impl Channel {
-    pub(crate) fn new(
-        topic: impl Into<String>,
-        type_name: impl Into<String>,
-        content: Content,
-    ) -> Self {
-        Self {
-            topic: topic.into(),
-            type_name: type_name.into(),
-            content,
-            messages: 0,
-            first_ns: None,
-            last_ns: None,
-            clock: Clock::Unix,
-            id: 0,
-            rank: 0,
-        }
-    }
-
-    pub(crate) fn count(&mut self, messages: u64, first_ns: i64, last_ns: i64) {
-        self.messages = self.messages.saturating_add(messages);
-        self.first_ns = Some(self.first_ns.map_or(first_ns, |t| t.min(first_ns)));
-        self.last_ns = Some(self.last_ns.map_or(last_ns, |t| t.max(last_ns)));
+    /// Counts a message.
+    pub(crate) fn count(&mut self, ns: i64) {
+        self.messages = self.messages.saturating_add(1);
+        self.first_ns = Some(self.first_ns.map_or(ns, |t| t.min(ns)));
+        self.last_ns = self.last_ns.max(Some(ns));
     }
 }
+
+/// Receives samples, each with its byte in the file.
+pub(crate) type Each<'a> = &'a mut dyn FnMut(u64, Sample) -> Result<(), Error>;
 
 /// The channel of such content: the one named, or the only one there.
 pub(crate) fn choose<'a>(
@@ -79,31 +68,27 @@ pub(crate) fn choose<'a>(
     content: Content,
     topic: Option<&str>,
 ) -> Result<&'a Channel, Error> {
-    let fitting = || {
-        channels
-            .iter()
-            .filter(|c| c.content == content && c.messages > 0)
-    };
-    let names = || fitting().map(|c| c.topic.clone()).collect::<Vec<_>>();
+    let mut fitting: Vec<&Channel> = channels.iter().collect();
+    fitting.retain(|c| c.content == content && c.messages > 0);
+    let topics = |fitting: &[&Channel]| fitting.iter().map(|c| c.topic.clone()).collect();
     if let Some(topic) = topic {
-        let what = || format!("{} and the name {topic}", content.words());
-        let named = fitting().find(|c| c.topic == topic);
+        let named = fitting.iter().find(|c| c.topic == topic).copied();
         return named.ok_or_else(|| Error::NoTopic {
-            what: what(),
-            topics: names(),
+            what: format!("{} and the name {topic}", content.words()),
+            topics: topics(&fitting),
         });
     }
-    let rank = fitting().map(|c| c.rank).min();
-    let mut best = fitting().filter(|c| Some(c.rank) == rank);
-    match (best.next(), best.next()) {
-        (None, _) => Err(Error::NoTopic {
+    let rank = fitting.iter().map(|c| c.rank).min();
+    fitting.retain(|c| Some(c.rank) == rank);
+    match fitting[..] {
+        [] => Err(Error::NoTopic {
             what: content.words().to_owned(),
             topics: Vec::new(),
         }),
-        (Some(only), None) => Ok(only),
+        [only] => Ok(only),
         _ => Err(Error::SeveralTopics {
             what: content.words(),
-            topics: names(),
+            topics: topics(&fitting),
         }),
     }
 }

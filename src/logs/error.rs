@@ -51,31 +51,52 @@ pub enum Error {
 }
 
 /// Faults of bytes.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum Fault {
     /// A record goes beyond the end of the file.
-    #[error("cut off, a record of {needed} bytes has {left}")]
     Truncated { needed: u64, left: u64 },
     /// The file lacks the end that its writer puts there last.
-    #[error("the end is missing: still being written, or its writer was stopped")]
     StillWritten,
     /// A checksum differs.
-    #[error("CRC failed, stored {stored:08x}, computed {computed:08x}")]
     Crc { stored: u32, computed: u32 },
     /// An encoding or a compression that is not known.
-    #[error("unknown encoding {0:?}")]
     Encoding(String),
     /// A length beyond what any such message has.
-    #[error("{bytes} bytes where at most {limit} make sense")]
     TooLarge { bytes: u64, limit: u64 },
     /// Stamps of a topic run backwards.
-    #[error("time goes back from {} s to {} s", seconds(*.from_ns), seconds(*.to_ns))]
     TimeBack { from_ns: i64, to_ns: i64 },
     /// Bytes that do not follow the format.
-    #[error("{0}")]
     Malformed(String),
+}
+
+impl Display for Fault {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Truncated { needed, left } => {
+                write!(f, "cut off, a record of {needed} bytes has {left}")
+            }
+            Self::StillWritten => {
+                f.write_str("the end is missing: still being written, or its writer was stopped")
+            }
+            Self::Crc { stored, computed } => {
+                write!(
+                    f,
+                    "CRC failed, stored {stored:08x}, computed {computed:08x}"
+                )
+            }
+            Self::Encoding(name) => write!(f, "unknown encoding {name:?}"),
+            Self::TooLarge { bytes, limit } => {
+                write!(f, "{bytes} bytes where at most {limit} make sense")
+            }
+            Self::TimeBack { from_ns, to_ns } => {
+                let [from, to] = [*from_ns, *to_ns].map(seconds);
+                write!(f, "time goes back from {from} s to {to} s")
+            }
+            Self::Malformed(what) => f.write_str(what),
+        }
+    }
 }
 
 impl Error {
@@ -113,12 +134,10 @@ impl Error {
     #[must_use]
     pub const fn hint(&self) -> Option<&'static str> {
         match self {
-            Self::At(_, Fault::TimeBack { .. }) => {
-                Some("the stamps of the log may be in order where those of the header are not")
+            Self::At(_, Fault::Encoding(_) | Fault::TooLarge { .. } | Fault::TimeBack { .. }) => {
+                None
             }
-            Self::At(_, Fault::Encoding(_) | Fault::TooLarge { .. }) => None,
             Self::At(..) => Some("the file is damaged: copy it again"),
-            Self::SeveralTopics { .. } => Some("name one of them"),
             Self::NotRead(kind) => kind.conversion(),
             _ => None,
         }

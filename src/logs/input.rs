@@ -2,79 +2,44 @@
 
 use crate::error::{Error, Fault};
 use std::fs::File;
-use std::io::{self, BufReader, Cursor, Read, Seek, SeekFrom};
-use std::path::PathBuf;
-use std::sync::Arc;
+use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
+use std::path::Path;
 
 /// Bytes that are read at once.
 const BUFFER: usize = 1 << 16;
 
-/// Origin of the bytes, which can be opened several times.
-#[derive(Debug, Clone)]
-pub(crate) enum Origin {
-    File(PathBuf),
-    Bytes(Arc<[u8]>),
-}
-
-impl Origin {
-    pub(crate) fn open(&self) -> Result<Input, Error> {
-        match self {
-            Self::File(path) => {
-                let file = File::open(path)?;
-                let length = file.metadata()?.len();
-                Ok(Input::new(Box::new(file), length, Within::File))
-            }
-            Self::Bytes(bytes) => {
-                let length = bytes.len() as u64;
-                Ok(Input::new(
-                    Box::new(Cursor::new(Arc::clone(bytes))),
-                    length,
-                    Within::File,
-                ))
-            }
-        }
-    }
-
-    /// The first bytes, at most so many.
-    pub(crate) fn head(&self, most: u64) -> Result<Vec<u8>, Error> {
-        let mut input = self.open()?;
-        let most = most.min(input.length);
-        input.bytes(most, most)
-    }
-}
-
 trait Source: Read + Seek + Send {}
 impl<T: Read + Seek + Send> Source for T {}
-
-/// Place of the bytes in the file.
-enum Within {
-    File,
-    /// Unpacked bytes of the chunk at this offset.
-    Chunk(u64),
-}
 
 /// Bytes to be read in order, with seeking.
 pub(crate) struct Input {
     source: BufReader<Box<dyn Source>>,
     position: u64,
     length: u64,
-    within: Within,
+    /// Byte of the file where the chunk stands whose unpacked bytes these are.
+    chunk: Option<u64>,
 }
 
 impl Input {
-    fn new(source: Box<dyn Source>, length: u64, within: Within) -> Self {
+    fn new(source: Box<dyn Source>, length: u64, chunk: Option<u64>) -> Self {
         Self {
             source: BufReader::with_capacity(BUFFER, source),
             position: 0,
             length,
-            within,
+            chunk,
         }
+    }
+
+    pub(crate) fn open(path: &Path) -> Result<Self, Error> {
+        let file = File::open(path)?;
+        let length = file.metadata()?.len();
+        Ok(Self::new(Box::new(file), length, None))
     }
 
     /// The unpacked bytes of a chunk.
     pub(crate) fn chunk(bytes: Vec<u8>, offset: u64) -> Self {
         let length = bytes.len() as u64;
-        Self::new(Box::new(Cursor::new(bytes)), length, Within::Chunk(offset))
+        Self::new(Box::new(Cursor::new(bytes)), length, Some(offset))
     }
 
     pub(crate) const fn position(&self) -> u64 {
@@ -90,41 +55,29 @@ impl Input {
     }
 
     /// Byte of the file.
-    pub(crate) const fn offset(&self) -> u64 {
-        match self.within {
-            Within::File => self.position,
-            Within::Chunk(offset) => offset,
-        }
+    pub(crate) fn offset(&self) -> u64 {
+        self.chunk.unwrap_or(self.position)
     }
 
     /// Holds when so many bytes are there.
     pub(crate) fn expect(&self, needed: u64) -> Result<(), Error> {
         let left = self.left();
-        if needed <= left {
-            return Ok(());
-        }
-        match self.within {
-            Within::File => Err(Error::at(self.position, Fault::Truncated { needed, left })),
-            Within::Chunk(offset) => {
-                Err(Error::malformed(offset, "a record goes beyond its chunk"))
-            }
+        match self.chunk {
+            _ if needed <= left => Ok(()),
+            None => Err(Error::at(self.position, Fault::Truncated { needed, left })),
+            Some(chunk) => Err(Error::malformed(chunk, "a record goes beyond its chunk")),
         }
     }
 
     pub(crate) fn skip(&mut self, bytes: u64) -> Result<(), Error> {
         self.expect(bytes)?;
-        let step =
-            i64::try_from(bytes).map_err(|_| io::Error::from(io::ErrorKind::InvalidInput))?;
-        self.source.seek_relative(step)?;
-        self.position += bytes;
-        Ok(())
+        self.seek(self.position + bytes)
     }
 
     pub(crate) fn seek(&mut self, position: u64) -> Result<(), Error> {
-        let step = i128::from(position) - i128::from(self.position);
-        match i64::try_from(step) {
-            Ok(step) => self.source.seek_relative(step)?,
-            Err(_) => _ = self.source.seek(SeekFrom::Start(position))?,
+        match position.checked_signed_diff(self.position) {
+            Some(step) => self.source.seek_relative(step)?,
+            None => _ = self.source.seek(SeekFrom::Start(position))?,
         }
         self.position = position;
         Ok(())

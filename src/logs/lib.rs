@@ -1,5 +1,5 @@
 //! Logs of inertial sensors and GNSS receivers. A [`Log`] is a file with its channels; one that holds samples of an IMU
-//! or fixes of a receiver is read as a stream, in SI units, and no more of the file is held than a chunk.
+//! or fixes of a receiver is read in SI units; of the file no more is held than a chunk.
 //!
 //! | format | feature | samples | fixes |
 //! |---|---|---|---|
@@ -40,13 +40,11 @@ mod input;
 pub mod npy;
 #[cfg(feature = "npz")]
 pub mod npz;
-mod stream;
 #[cfg(any(feature = "mcap", feature = "bag"))]
 mod unpack;
 // L4
 #[cfg(any(feature = "mcap", feature = "bag"))]
 mod container;
-mod format;
 // L5: formats
 #[cfg(feature = "bag")]
 mod bag;
@@ -63,7 +61,6 @@ mod log;
 
 pub use channel::{Channel, Content};
 pub use error::{Error, Fault, Place};
-pub use log::Log;
+pub use log::{Damage, Log};
 pub use recognise::{HEAD, Kind, recognise};
-pub use sample::{Clock, Fix, ImuSample, Motion, Stamp};
-pub use stream::{Damage, Samples};
+pub use sample::{Clock, Fix, ImuSample, Stamp, in_seconds};

@@ -1,42 +1,56 @@
 //! A log of any format.
 
-use crate::channel::{Channel, Content, choose};
-use crate::error::Error;
-use crate::format::{Format, Opened};
-use crate::input::Origin;
+use crate::channel::{Channel, Content, Each, choose};
+use crate::error::{Error, Fault};
+use crate::input::Input;
 use crate::recognise::{HEAD, Kind, recognise};
-use crate::sample::{Fix, ImuSample, Stamp};
-use crate::stream::{Damage, Samples};
-use std::path::Path;
-use std::sync::Arc;
+use crate::sample::{Fix, ImuSample, Sample, Stamp};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 /// Log whose channels are known.
 ///
 /// ```
-/// use nav_sim_logs::{Content, Error, Log, Stamp};
+/// use nav_sim_logs::{Content, Error, Log, Stamp, in_seconds};
 ///
 /// # fn main() -> Result<(), Error> {
 /// let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/ros2_zstd.mcap");
 /// let log = Log::open(path.as_ref())?;
-/// let imu = log.channels().iter().find(|c| c.content == Content::Imu).expect("one is there");
+/// // no topic is named, as there is but one
+/// let imu = log.channel(Content::Imu, None)?;
 /// assert_eq!((imu.topic.as_str(), imu.messages), ("/imu", 40));
 ///
-/// // no topic is named, as there is but one
-/// for sample in log.imu(None, Stamp::Header)? {
-///     let sample = sample?;
-///     let (accel_m_s2, _gyro_rad_s) = sample.motion.rates();
-///     assert!(accel_m_s2[2] > 9.0 && sample.t_s() > 1.7e9);
+/// for sample in log.imu(imu, Stamp::Header)? {
+///     assert!(sample.accel_m_s2[2] > 9.0 && in_seconds(sample.stamp_ns) > 1.7e9);
 /// }
 /// # Ok(())
 /// # }
 /// ```
+#[derive(Debug)]
 pub struct Log {
+    path: PathBuf,
     kind: Kind,
     channels: Vec<Channel>,
     damage: Option<Damage>,
-    file_bytes: u64,
-    format: Box<dyn Format>,
+    read: Read,
 }
+
+/// End of a file that was cut off, at which the reading ended.
+#[derive(Debug)]
+pub struct Damage {
+    /// The error that it would have been.
+    pub error: Error,
+    /// Bytes before it.
+    pub read_bytes: u64,
+    /// Bytes of the file.
+    pub file_bytes: u64,
+}
+
+/// Finds the channels of a file, by the numbers that the format knows them by.
+type Survey = fn(&mut Input, &mut BTreeMap<u32, Channel>) -> Result<(), Error>;
+
+/// Shows the samples or fixes of a channel in order of time.
+type Read = fn(&mut Input, &Channel, Stamp, Each<'_>) -> Result<(), Error>;
 
 impl Log {
     /// Opens a file and finds its channels.
@@ -44,42 +58,48 @@ impl Log {
     /// # Errors
     /// When the format is not one that is read, or the file is damaged before its end.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        Self::new(Origin::File(path.to_owned()))
-    }
-
-    /// Finds the channels of a file that is held.
-    ///
-    /// # Errors
-    /// Those of [`Self::open`].
-    pub fn from_bytes(bytes: impl Into<Arc<[u8]>>) -> Result<Self, Error> {
-        Self::new(Origin::Bytes(bytes.into()))
-    }
-
-    fn new(origin: Origin) -> Result<Self, Error> {
-        let kind = recognise(&origin.head(HEAD as u64)?).ok_or(Error::Unknown)?;
-        let file_bytes = origin.open()?.length();
-        let opened = match kind {
+        let mut input = Input::open(path)?;
+        let file_bytes = input.length();
+        let head = file_bytes.min(HEAD as u64);
+        let kind = recognise(&input.bytes(head, head)?).ok_or(Error::Unknown)?;
+        let (survey, read): (Survey, Read) = match kind {
             #[cfg(feature = "mcap")]
-            Kind::Mcap => crate::ros::open::<crate::mcap::Mcap>(origin),
+            Kind::Mcap => {
+                use crate::mcap::Mcap;
+                (crate::ros::survey::<Mcap>, crate::ros::read::<Mcap>)
+            }
             #[cfg(feature = "bag")]
-            Kind::Bag => crate::ros::open::<crate::bag::Bag>(origin),
+            Kind::Bag => {
+                use crate::bag::Bag;
+                (crate::ros::survey::<Bag>, crate::ros::read::<Bag>)
+            }
             #[cfg(feature = "ulog")]
-            Kind::Ulog => crate::ulog::open(origin),
+            Kind::Ulog => (crate::ulog::survey, crate::ulog::read),
             #[cfg(feature = "ubx")]
-            Kind::Ubx => crate::ubx::open(origin),
-            _ => Err(Error::NotRead(kind)),
+            Kind::Ubx => (crate::ubx::survey, crate::ubx::read),
+            _ => return Err(Error::NotRead(kind)),
         };
-        let Opened {
-            channels,
-            damage,
-            format,
-        } = opened?;
+        input.seek(0)?;
+        let mut channels = BTreeMap::new();
+        let damage = match survey(&mut input, &mut channels) {
+            Ok(()) => None,
+            Err(error) => match error.cut() {
+                None => return Err(error),
+                Some(read_bytes) => Some(Damage {
+                    error,
+                    read_bytes,
+                    file_bytes,
+                }),
+            },
+        };
+        let mut channels: Vec<Channel> = channels.into_values().collect();
+        channels.sort_by(|a, b| a.topic.cmp(&b.topic));
         Ok(Self {
+            path: path.to_owned(),
             kind,
             channels,
             damage,
-            file_bytes,
-            format,
+            read,
         })
     }
 
@@ -101,38 +121,56 @@ impl Log {
         self.damage.as_ref()
     }
 
-    /// Samples of an IMU: of this topic, or of the only one.
+    /// The channel of such content: of this topic, or the only one.
     ///
     /// # Errors
     /// When there is no such topic, or several and none is named.
-    pub fn imu(&self, topic: Option<&str>, stamp: Stamp) -> Result<Samples<ImuSample>, Error> {
-        let channel = choose(&self.channels, Content::Imu, topic)?;
-        Ok(Samples::new(
-            self.format.imu(channel, stamp)?,
-            channel,
-            self.file_bytes,
-        ))
+    pub fn channel(&self, content: Content, topic: Option<&str>) -> Result<&Channel, Error> {
+        choose(&self.channels, content, topic)
     }
 
-    /// Fixes of a receiver: of this topic, or of the only one.
+    /// Samples of an IMU in order of time, up to the cut if the file has one.
     ///
     /// # Errors
-    /// When there is no such topic, or several and none is named.
-    pub fn fixes(&self, topic: Option<&str>, stamp: Stamp) -> Result<Samples<Fix>, Error> {
-        let channel = choose(&self.channels, Content::Fix, topic)?;
-        Ok(Samples::new(
-            self.format.fixes(channel, stamp)?,
-            channel,
-            self.file_bytes,
-        ))
+    /// When the file is damaged before, or stamps go back.
+    pub fn imu(&self, channel: &Channel, stamp: Stamp) -> Result<Vec<ImuSample>, Error> {
+        self.samples(channel, stamp, |sample| match sample {
+            Sample::Imu(sample) => Some(sample),
+            Sample::Fix(_) => None,
+        })
     }
-}
 
-impl std::fmt::Debug for Log {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Log")
-            .field("kind", &self.kind)
-            .field("channels", &self.channels)
-            .finish_non_exhaustive()
+    /// Fixes of a receiver in order of time, up to the cut if the file has one.
+    ///
+    /// # Errors
+    /// Those of [`Self::imu`].
+    pub fn fixes(&self, channel: &Channel, stamp: Stamp) -> Result<Vec<Fix>, Error> {
+        self.samples(channel, stamp, |sample| match sample {
+            Sample::Imu(_) => None,
+            Sample::Fix(fix) => Some(*fix),
+        })
+    }
+
+    fn samples<T>(
+        &self,
+        channel: &Channel,
+        stamp: Stamp,
+        of: fn(Sample) -> Option<T>,
+    ) -> Result<Vec<T>, Error> {
+        let (mut samples, mut from_ns) = (Vec::new(), i64::MIN);
+        let mut input = Input::open(&self.path)?;
+        let outcome = (self.read)(&mut input, channel, stamp, &mut |offset, sample| {
+            let to_ns = sample.stamp_ns();
+            if to_ns < from_ns {
+                return Err(Error::at(offset, Fault::TimeBack { from_ns, to_ns }));
+            }
+            from_ns = to_ns;
+            samples.extend(of(sample));
+            Ok(())
+        });
+        match outcome {
+            Err(error) if error.cut().is_none() => Err(error.of_topic(&channel.topic)),
+            _ => Ok(samples),
+        }
     }
 }

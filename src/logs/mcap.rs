@@ -1,7 +1,7 @@
 //! Records of MCAP (<https://mcap.dev/spec>).
 
 use crate::bytes::{Bytes, text};
-use crate::container::{Definition, Dialect, Head, Record, Tally};
+use crate::container::{Dialect, Head, Record};
 use crate::error::{Error, Fault};
 use crate::input::Input;
 use crate::unpack::Chunk;
@@ -97,39 +97,17 @@ impl Mcap {
             opcode::CHANNEL => {
                 let type_name = self.types.get(&bytes.u16()?).cloned().unwrap_or_default();
                 let (topic, encoding) = (text(bytes.string()?), text(bytes.string()?));
-                Some(Record::Channel(Definition {
-                    id: id.into(),
-                    topic,
-                    type_name,
-                    encoding,
-                }))
+                Some(Record::Channel(id.into(), [topic, type_name, encoding]))
             }
-            _ => index(id, &mut bytes),
+            _ => {
+                // times and places of a channel's messages in the chunk before
+                let entries = bytes.string()?.chunks_exact(16);
+                let times = entries.filter_map(|entry| Bytes::little(entry).u64());
+                let times = times.map(u64::cast_signed).collect();
+                Some(Record::Index(id.into(), times))
+            }
         }
     }
-}
-
-/// Times and places of a channel's messages in the chunk before.
-fn index(channel: u16, bytes: &mut Bytes<'_>) -> Option<Record> {
-    const ENTRY: usize = 16;
-    let entries = bytes.string()?;
-    let times = || {
-        entries
-            .chunks_exact(ENTRY)
-            .filter_map(|e| Bytes::little(e).u64())
-            .map(|t| t as i64)
-    };
-    let tally = Tally {
-        channel: channel.into(),
-        messages: (entries.len() / ENTRY) as u64,
-        first_ns: times().min().unwrap_or(i64::MAX),
-        last_ns: times().max().unwrap_or(i64::MIN),
-    };
-    Some(if tally.messages == 0 {
-        Record::Other
-    } else {
-        Record::Index(tally)
-    })
 }
 
 /// A message behind its channel, number and two times.

@@ -1,8 +1,8 @@
 //! Arrays in NumPy's own format, `.npy` (`numpy.lib.format`).
 
-use crate::bytes::{Alignment, Bytes, Number, Order};
+use crate::bytes::{Bytes, Number};
 use crate::error::{Error, Fault};
-use crate::input::Origin;
+use crate::input::Input;
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -23,7 +23,7 @@ pub struct Array {
 /// Header of an array.
 struct Header {
     number: Number,
-    order: Order,
+    is_big_endian: bool,
     shape: Vec<usize>,
     is_fortran: bool,
 }
@@ -33,7 +33,7 @@ struct Header {
 /// # Errors
 /// When it is cut off, or no array of real numbers.
 pub fn read(path: &Path) -> Result<Array, Error> {
-    let input = Origin::File(path.to_owned()).open()?;
+    let input = Input::open(path)?;
     let size = input.length();
     read_from(&mut input.take(size), size, 0)
 }
@@ -67,7 +67,7 @@ pub(crate) fn read_from(from: &mut impl Read, size: u64, offset: u64) -> Result<
         let part = &mut block[..left.min(BLOCK * header.number.size())];
         from.read_exact(part).map_err(fault)?;
         left -= part.len();
-        let mut numbers = Bytes::new(part, header.order, Alignment::Packed);
+        let mut numbers = Bytes::new(part, header.is_big_endian, 1);
         values.extend(std::iter::from_fn(|| header.number.read(&mut numbers)));
     }
     if header.is_fortran {
@@ -113,7 +113,7 @@ impl Header {
             )
         };
         let kind = value("'descr'").ok_or_else(fault)?;
-        let (order, number) =
+        let (is_big_endian, number) =
             number(kind).ok_or_else(|| Error::encoding(offset, kind.as_bytes()))?;
         let shape = value("'shape'")
             .and_then(|v| v.strip_prefix('(')?.split_once(')'))
@@ -128,7 +128,7 @@ impl Header {
             .starts_with("True");
         Ok(Self {
             number,
-            order,
+            is_big_endian,
             shape,
             is_fortran,
         })
@@ -136,14 +136,10 @@ impl Header {
 }
 
 /// Order and type of numbers from `'<f8'`.
-fn number(text: &str) -> Option<(Order, Number)> {
+fn number(text: &str) -> Option<(bool, Number)> {
     let code = text.strip_prefix('\'')?.split_once('\'')?.0;
     let mut characters = code.chars();
-    let order = if characters.next()? == '>' {
-        Order::Big
-    } else {
-        Order::Little
-    };
+    let is_big_endian = characters.next()? == '>';
     let kind = characters.next()?;
     let size = characters.as_str().parse().ok()?;
     let number = match (kind, size) {
@@ -152,7 +148,7 @@ fn number(text: &str) -> Option<(Order, Number)> {
         ('u' | 'b', 1) | ('u', 2 | 4 | 8) => Number::Unsigned(size),
         _ => return None,
     };
-    Some((order, number))
+    Some((is_big_endian, number))
 }
 
 /// Numbers of an array whose first dimension runs fastest, the last running fastest.

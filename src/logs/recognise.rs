@@ -1,7 +1,5 @@
 //! Formats, told by their first bytes.
 
-use std::fmt::{self, Display, Formatter};
-
 /// Bytes from the start of a file that [`recognise`] looks at.
 pub const HEAD: usize = 4096;
 
@@ -70,12 +68,6 @@ impl Kind {
             Self::Zip => "unzip FILE.zip",
             Self::Mcap | Self::Bag | Self::Ulog | Self::Ubx | Self::Npz => return None,
         })
-    }
-}
-
-impl Display for Kind {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
     }
 }
 

@@ -1,96 +1,77 @@
 //! Logs of ROS: topics of a container.
 
-use crate::bytes::{Alignment, Bytes, Order};
-use crate::channel::{Channel, Content};
-use crate::container::{Dialect, Message, Reader, Survey, survey};
+use crate::bytes::Bytes;
+use crate::channel::{Channel, Content, Each};
+use crate::container::{self, Dialect, Record, walk};
 use crate::error::Error;
-use crate::format::{Format, Opened};
-use crate::input::Origin;
-use crate::sample::{Fix, ImuSample, Motion, NS, Stamp, stated};
-use crate::stream::Stream;
-use std::marker::PhantomData;
+use crate::input::Input;
+use crate::sample::{Fix, ImuSample, NS, Sample, Stamp, stated};
+use std::collections::BTreeMap;
 
-/// Opens a container.
-pub(crate) fn open<D: Dialect + Sync>(origin: Origin) -> Result<Opened, Error> {
-    let mut survey = survey::<D>(&origin)?;
-    let channel = |(id, definition): (&u32, &crate::container::Definition)| {
-        let content = content(&definition.type_name);
-        let mut channel = Channel::new(&definition.topic, &definition.type_name, content);
-        channel.id = *id;
-        if let Some(tally) = survey.tallies.get(id) {
-            channel.count(tally.messages, tally.first_ns, tally.last_ns);
+/// Largest message that is read (bytes): an IMU's has 400.
+const LARGEST_MESSAGE: u64 = 1 << 20;
+
+/// Finds the topics.
+pub(crate) fn survey<D: Dialect>(
+    input: &mut Input,
+    channels: &mut BTreeMap<u32, Channel>,
+) -> Result<(), Error> {
+    let outcome = container::survey::<D>(input, channels);
+    for channel in channels.values_mut() {
+        channel.content = match channel.type_name.as_str() {
+            "sensor_msgs/msg/Imu" | "sensor_msgs/Imu" => Content::Imu,
+            "sensor_msgs/msg/NavSatFix" | "sensor_msgs/NavSatFix" => Content::Fix,
+            _ => Content::Other,
+        };
+    }
+    outcome
+}
+
+/// Reads the messages of a topic, which may stand out of order in the file.
+pub(crate) fn read<D: Dialect>(
+    input: &mut Input,
+    channel: &Channel,
+    stamp: Stamp,
+    each: Each<'_>,
+) -> Result<(), Error> {
+    let mut found = Vec::new();
+    let outcome = walk::<D>(input, true, &mut |record, input| {
+        let Record::Message(head) = record else {
+            return Ok(());
+        };
+        if head.channel != channel.id {
+            return input.skip(head.size);
         }
-        channel
-    };
-    let mut channels: Vec<Channel> = survey.definitions.iter().map(channel).collect();
-    channels.sort_by(|a, b| a.topic.cmp(&b.topic));
-    let damage = survey.damage.take();
-    Ok(Opened {
-        channels,
-        damage,
-        format: Box::new(Ros::<D> {
-            origin,
-            survey,
-            dialect: PhantomData,
-        }),
-    })
-}
-
-/// A container that was surveyed.
-struct Ros<D> {
-    origin: Origin,
-    survey: Survey,
-    dialect: PhantomData<D>,
-}
-
-/// Decoder of a message in an encoding.
-type Decode<T> = fn(&str, &Message, Stamp) -> Result<Option<T>, Error>;
-
-impl<D: Dialect> Ros<D> {
-    fn stream<T: 'static>(
-        &self,
-        channel: &Channel,
-        stamp: Stamp,
-        decode: Decode<T>,
-    ) -> Result<Stream<T>, Error> {
-        let definition = self.survey.definitions.get(&channel.id);
-        let encoding = definition.map(|d| d.encoding.clone()).unwrap_or_default();
-        let reader = Reader::<D>::new(&self.origin, &self.survey, channel.id)?;
-        Ok(Box::new(reader.filter_map(move |message| {
-            let decoded = message
-                .and_then(|m| Ok(decode(&encoding, &m, stamp)?.map(|sample| (m.offset, sample))));
-            decoded.transpose()
-        })))
+        let message = Message {
+            log_ns: (stamp == Stamp::Log).then_some(head.log_ns),
+            offset: input.offset(),
+            data: input.bytes(head.size, LARGEST_MESSAGE)?,
+        };
+        let sample = match channel.content {
+            Content::Imu => imu(&channel.encoding, &message).map(Some)?,
+            _ => fix(&channel.encoding, &message)?,
+        };
+        found.extend(sample.map(|sample| (head.log_ns, message.offset, sample)));
+        Ok(())
+    });
+    found.sort_by_key(|(log_ns, ..)| *log_ns);
+    for (_, offset, sample) in found {
+        each(offset, sample)?;
     }
+    outcome
 }
 
-impl<D: Dialect + Sync> Format for Ros<D> {
-    fn imu(&self, channel: &Channel, stamp: Stamp) -> Result<Stream<ImuSample>, Error> {
-        self.stream(channel, stamp, imu)
-    }
-
-    fn fixes(&self, channel: &Channel, stamp: Stamp) -> Result<Stream<Fix>, Error> {
-        self.stream(channel, stamp, fix)
-    }
+/// Message of a channel.
+struct Message {
+    /// Time of arrival, where it is the one that counts.
+    log_ns: Option<i64>,
+    offset: u64,
+    data: Vec<u8>,
 }
 
-/// Content of a type of messages.
-fn content(type_name: &str) -> Content {
-    match type_name {
-        "sensor_msgs/msg/Imu" | "sensor_msgs/Imu" => Content::Imu,
-        "sensor_msgs/msg/NavSatFix" | "sensor_msgs/NavSatFix" => Content::Fix,
-        _ => Content::Other,
-    }
-}
-
-/// Body of a message, and its stamp.
-struct Body<'a> {
-    bytes: Bytes<'a>,
-    stamp_ns: i64,
-}
-
-/// Behind the header: in ROS 1 a sequence number, the time, a name; in ROS 2 the same without the number.
-fn body<'a>(encoding: &str, message: &'a Message, stamp: Stamp) -> Result<Body<'a>, Error> {
+/// Body of a message, and its stamp. Behind the header: in ROS 1 a sequence number, the time, a name; in ROS 2 the same
+/// without the number.
+fn body<'a>(encoding: &str, message: &'a Message) -> Result<(Bytes<'a>, i64), Error> {
     let mut bytes = match encoding {
         "ros1" => Bytes::little(&message.data),
         "cdr" => cdr(message)?,
@@ -105,14 +86,7 @@ fn body<'a>(encoding: &str, message: &'a Message, stamp: Stamp) -> Result<Body<'
         Some(header_ns)
     };
     let header_ns = header().ok_or_else(|| short(message))?;
-    Ok(Body {
-        bytes,
-        stamp_ns: if stamp == Stamp::Log {
-            message.log_ns
-        } else {
-            header_ns
-        },
-    })
+    Ok((bytes, message.log_ns.unwrap_or(header_ns)))
 }
 
 /// Common Data Representation (OMG DDSI-RTPS 2.3, 10.2): the order of bytes, then numbers that are aligned from there
@@ -122,11 +96,11 @@ fn cdr(message: &Message) -> Result<Bytes<'_>, Error> {
         .data
         .split_at_checked(4)
         .ok_or_else(|| short(message))?;
-    let (order, most) = match head[..2] {
-        [0, 0] => (Order::Big, 8),
-        [0, 1] => (Order::Little, 8),
-        [0, 6] => (Order::Big, 4),
-        [0, 7] => (Order::Little, 4),
+    let (is_big_endian, most) = match head[..2] {
+        [0, 0] => (true, 8),
+        [0, 1] => (false, 8),
+        [0, 6] => (true, 4),
+        [0, 7] => (false, 4),
         _ => {
             return Err(Error::encoding(
                 message.offset,
@@ -134,7 +108,7 @@ fn cdr(message: &Message) -> Result<Bytes<'_>, Error> {
             ));
         }
     };
-    Ok(Bytes::new(rest, order, Alignment::UpTo(most)))
+    Ok(Bytes::new(rest, is_big_endian, most))
 }
 
 fn short(message: &Message) -> Error {
@@ -145,57 +119,45 @@ fn short(message: &Message) -> Error {
 }
 
 /// A sample of `sensor_msgs/Imu`: the orientation and the covariances are passed over.
-fn imu(encoding: &str, message: &Message, stamp: Stamp) -> Result<Option<ImuSample>, Error> {
-    let Body {
-        mut bytes,
-        stamp_ns,
-    } = body(encoding, message, stamp)?;
-    let mut motion = || {
-        bytes.skip_f64s(4 + 9)?;
+fn imu(encoding: &str, message: &Message) -> Result<Sample, Error> {
+    let (mut bytes, stamp_ns) = body(encoding, message)?;
+    let mut sample = || {
+        bytes.f64s::<{ 4 + 9 }>()?;
         let gyro_rad_s = bytes.f64s()?;
-        bytes.skip_f64s(9)?;
+        bytes.f64s::<9>()?;
         let accel_m_s2 = bytes.f64s()?;
-        bytes.skip_f64s(9)?;
-        Some(Motion::Rates {
+        bytes.f64s::<9>()?;
+        Some(Sample::Imu(ImuSample {
+            stamp_ns,
             accel_m_s2,
             gyro_rad_s,
-        })
+        }))
     };
-    let motion = motion().ok_or_else(|| short(message))?;
-    Ok(Some(ImuSample { stamp_ns, motion }))
+    sample().ok_or_else(|| short(message))
 }
 
 /// A fix of `sensor_msgs/NavSatFix`; none where its status is below 0.
-fn fix(encoding: &str, message: &Message, stamp: Stamp) -> Result<Option<Fix>, Error> {
-    let Body {
-        mut bytes,
-        stamp_ns,
-    } = body(encoding, message, stamp)?;
+fn fix(encoding: &str, message: &Message) -> Result<Option<Sample>, Error> {
+    let (mut bytes, stamp_ns) = body(encoding, message)?;
     let mut rest = || {
         let status = bytes.u8()?.cast_signed();
         bytes.u16()?;
         Some((status, bytes.f64s::<3>()?, bytes.f64s::<9>()?, bytes.u8()?))
     };
-    let (status, [lat_deg, lon_deg, h_m], covariance, covariance_type) =
-        rest().ok_or_else(|| short(message))?;
+    let (status, place, covariance, covariance_type) = rest().ok_or_else(|| short(message))?;
+    let [lat_deg, lon_deg, h_m] = place;
     // the covariance is that of east, north, up (m²); type 0 is unknown
     let sd = [covariance[4], covariance[0], covariance[8]].map(f64::sqrt);
-    let sd_ned_m = if covariance_type == 0 {
-        None
-    } else {
-        stated(sd)
-    };
-    let (gps_tow_ms, v_ned_m_s, sd_v_ned_m_s) = (None, None, None);
-    let fix = Fix {
-        stamp_ns,
-        gps_tow_ms,
-        lat_deg,
-        lon_deg,
-        h_m,
-        sd_ned_m,
-        v_ned_m_s,
-        sd_v_ned_m_s,
-    };
-    let is_place = [lat_deg, lon_deg, h_m].iter().all(|v| v.is_finite());
-    Ok((status >= 0 && is_place).then_some(fix))
+    let is_fix = status >= 0 && place.iter().all(|v| v.is_finite());
+    Ok(is_fix.then(|| {
+        Sample::Fix(Box::new(Fix {
+            stamp_ns,
+            lat_deg,
+            lon_deg,
+            h_m,
+            sd_ned_m: stated(sd).filter(|_| covariance_type != 0),
+            v_ned_m_s: None,
+            sd_v_ned_m_s: None,
+        }))
+    }))
 }

@@ -4,158 +4,109 @@
 //! over, also one that is cut off at the end.
 
 use crate::bytes::Bytes;
-use crate::channel::{Channel, Content};
+use crate::channel::{Channel, Content, Each};
 use crate::error::Error;
-use crate::format::{Format, Opened};
-use crate::input::{Input, Origin};
+use crate::input::Input;
 use crate::recognise::{UBX_SYNC, ubx_checksum};
-use crate::sample::{Clock, Fix, ImuSample, Motion, NS, Stamp, stated};
-use crate::stream::Stream;
+use crate::sample::{Clock, Fix, ImuSample, NS, Sample, Stamp, stated};
 use chrono::NaiveDate;
 use std::collections::BTreeMap;
 
-const NAV_PVT: [u8; 2] = [0x01, 0x07];
-const ESF_MEAS: [u8; 2] = [0x10, 0x02];
+/// Class and number of messages, as one number.
+const NAV_PVT: u32 = 0x0107;
+const ESF_MEAS: u32 = 0x1002;
+/// Number of a channel of messages whose checksum failed.
+const REJECTED: u32 = u32::MAX;
 const MS: i64 = NS / 1000;
 
-/// Opens a log.
-pub(crate) fn open(origin: Origin) -> Result<Opened, Error> {
-    let mut messages = Messages {
-        input: origin.open()?,
-        only: None,
-        rejected: 0,
-    };
-    let mut channels = BTreeMap::new();
-    while let Some(message) = messages.next_message()? {
-        let channel = channels
-            .entry(message.id)
-            .or_insert_with(|| new_channel(message.id));
-        let stamp_ns = match message.id {
-            NAV_PVT => pvt(&message.payload).map(|fix| fix.stamp_ns),
-            ESF_MEAS => time_tag_ns(&message.payload),
+/// Finds the kinds of messages.
+pub(crate) fn survey(
+    input: &mut Input,
+    channels: &mut BTreeMap<u32, Channel>,
+) -> Result<(), Error> {
+    messages(input, |id, _, payload| {
+        let channel = channels.entry(id).or_insert_with(|| new_channel(id));
+        let stamp_ns = match id {
+            NAV_PVT => pvt(payload).map(|fix| fix.stamp_ns),
+            ESF_MEAS => time_tag_ns(payload),
             _ => None,
         };
         match stamp_ns {
-            Some(ns) => channel.count(1, ns, ns),
+            Some(ns) => channel.count(ns),
             None => channel.messages += u64::from(channel.content == Content::Other),
         }
-    }
-    let mut channels: Vec<Channel> = channels.into_values().collect();
-    if messages.rejected > 0 {
-        let mut rejected = Channel::new("UBX", "checksum failed", Content::Other);
-        rejected.messages = messages.rejected;
-        channels.push(rejected);
-    }
-    Ok(Opened {
-        channels,
-        damage: None,
-        format: Box::new(Ubx { origin }),
+        Ok(())
     })
 }
 
-fn new_channel(id: [u8; 2]) -> Channel {
-    match id {
-        NAV_PVT => Channel::new("NAV-PVT", "UBX-NAV-PVT", Content::Fix),
-        ESF_MEAS => Channel {
-            clock: Clock::Boot,
-            ..Channel::new("ESF-MEAS", "UBX-ESF-MEAS", Content::Imu)
-        },
-        [class, number] => {
-            let name = format!("UBX-{class:02X}-{number:02X}");
-            Channel::new(name.clone(), name, Content::Other)
+fn new_channel(id: u32) -> Channel {
+    let (topic, type_name, content, clock) = match id {
+        NAV_PVT => ("NAV-PVT", "UBX-NAV-PVT", Content::Fix, Clock::Unix),
+        ESF_MEAS => ("ESF-MEAS", "UBX-ESF-MEAS", Content::Imu, Clock::Boot),
+        REJECTED => ("UBX", "checksum failed", Content::Other, Clock::Unix),
+        _ => {
+            let topic = format!("UBX-{:02X}-{:02X}", id >> 8, id & 0xff);
+            return Channel {
+                type_name: topic.clone(),
+                topic,
+                ..Channel::default()
+            };
+        }
+    };
+    Channel {
+        topic: topic.to_owned(),
+        type_name: type_name.to_owned(),
+        content,
+        clock,
+        id,
+        ..Channel::default()
+    }
+}
+
+/// Shows the messages of a file, each with its number and its byte.
+fn messages(
+    input: &mut Input,
+    mut each: impl FnMut(u32, u64, &[u8]) -> Result<(), Error>,
+) -> Result<(), Error> {
+    while input.left() >= 8 {
+        let offset = input.position();
+        let (sync, head): ([u8; 2], [u8; 4]) = (input.array()?, input.array()?);
+        let length = u64::from(u16::from_le_bytes([head[2], head[3]]));
+        if sync != UBX_SYNC || input.left() < length + 2 {
+            input.seek(offset + 1)?;
+            continue;
+        }
+        let body = [&head[..], &input.bytes(length, length)?].concat();
+        if input.array()? == ubx_checksum(&body) {
+            each(
+                u16::from_be_bytes([head[0], head[1]]).into(),
+                offset,
+                &body[4..],
+            )?;
+        } else {
+            each(REJECTED, offset, &[])?;
+            input.seek(offset + 1)?;
         }
     }
+    Ok(())
 }
 
-/// Message of the receiver.
-struct Message {
-    offset: u64,
-    id: [u8; 2],
-    payload: Vec<u8>,
-}
-
-/// Messages of a file: all, or those with one number.
-struct Messages {
-    input: Input,
-    only: Option<[u8; 2]>,
-    /// Messages whose checksum failed.
-    rejected: u64,
-}
-
-impl Messages {
-    fn next_message(&mut self) -> Result<Option<Message>, Error> {
-        while self.input.left() >= 8 {
-            let offset = self.input.position();
-            if self.input.u8()? != UBX_SYNC[0] || self.input.u8()? != UBX_SYNC[1] {
-                self.input.seek(offset + 1)?;
-                continue;
-            }
-            let head: [u8; 4] = self.input.array()?;
-            let length = u64::from(u16::from_le_bytes([head[2], head[3]]));
-            if self.input.left() < length + 2 {
-                self.input.seek(offset + 1)?;
-                continue;
-            }
-            let mut body = head.to_vec();
-            body.extend(self.input.bytes(length, length)?);
-            if self.input.array()? != ubx_checksum(&body) {
-                self.rejected += 1;
-                self.input.seek(offset + 1)?;
-                continue;
-            }
-            let id = [head[0], head[1]];
-            if self.only.is_none_or(|only| only == id) {
-                return Ok(Some(Message {
-                    offset,
-                    id,
-                    payload: body.split_off(4),
-                }));
-            }
-        }
-        Ok(None)
-    }
-}
-
-impl Iterator for Messages {
-    type Item = Result<Message, Error>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        self.next_message().transpose()
-    }
-}
-
-struct Ubx {
-    origin: Origin,
-}
-
-impl Ubx {
-    fn stream<T: 'static>(
-        &self,
-        only: [u8; 2],
-        mut decode: impl FnMut(&[u8]) -> Option<T> + Send + 'static,
-    ) -> Result<Stream<T>, Error> {
-        let messages = Messages {
-            input: self.origin.open()?,
-            only: Some(only),
-            rejected: 0,
+/// Reads samples or fixes.
+pub(crate) fn read(
+    input: &mut Input,
+    channel: &Channel,
+    _: Stamp,
+    each: Each<'_>,
+) -> Result<(), Error> {
+    let mut measured = Measured::default();
+    messages(input, |id, offset, payload| {
+        let sample = match id {
+            _ if id != channel.id => None,
+            ESF_MEAS => measured.add(payload).map(Sample::Imu),
+            _ => pvt(payload).map(|fix| Sample::Fix(Box::new(fix))),
         };
-        Ok(Box::new(messages.filter_map(move |message| {
-            message
-                .map(|m| decode(&m.payload).map(|sample| (m.offset, sample)))
-                .transpose()
-        })))
-    }
-}
-
-impl Format for Ubx {
-    fn imu(&self, _: &Channel, _: Stamp) -> Result<Stream<ImuSample>, Error> {
-        let mut measured = Measured::default();
-        self.stream(ESF_MEAS, move |payload| measured.add(payload))
-    }
-
-    fn fixes(&self, _: &Channel, _: Stamp) -> Result<Stream<Fix>, Error> {
-        self.stream(NAV_PVT, pvt)
-    }
+        sample.map_or(Ok(()), |sample| each(offset, sample))
+    })
 }
 
 /// A fix of NAV-PVT in three dimensions, flagged good, at a date and time that are valid. Its accuracies are taken as one
@@ -166,7 +117,8 @@ fn pvt(payload: &[u8]) -> Option<Fix> {
     // nanoseconds since 1970 end in 2262
     const LAST_YEAR: u16 = 2200;
     let mut b = Bytes::little(payload);
-    let (tow_ms, year) = (b.u32()?, b.u16()?);
+    b.u32()?;
+    let year = b.u16()?;
     let (month, day, hour, minute, second) = (b.u8()?, b.u8()?, b.u8()?, b.u8()?, b.u8()?);
     let valid = b.u8()?;
     b.u32()?;
@@ -188,7 +140,6 @@ fn pvt(payload: &[u8]) -> Option<Fix> {
     let before = minute.and_utc().timestamp();
     Some(Fix {
         stamp_ns: (before + i64::from(second)) * NS + i64::from(nano),
-        gps_tow_ms: Some(tow_ms),
         lat_deg: lat / 1e7,
         lon_deg: lon / 1e7,
         h_m: h / 1e3,
@@ -228,7 +179,8 @@ impl Measured {
             self.put(bytes.u32()?);
         }
         let all = |axes: [Option<f64>; 3]| Some([axes[0]?, axes[1]?, axes[2]?]);
-        let motion = Motion::Rates {
+        let sample = ImuSample {
+            stamp_ns: time_ns,
             accel_m_s2: all(self.accel_m_s2)?,
             gyro_rad_s: all(self.gyro_rad_s)?,
         };
@@ -236,10 +188,7 @@ impl Measured {
             time_ns,
             ..Self::default()
         };
-        Some(ImuSample {
-            stamp_ns: time_ns,
-            motion,
-        })
+        Some(sample)
     }
 
     /// A measurement: 24 bits with sign, then its type.

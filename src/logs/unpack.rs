@@ -8,7 +8,6 @@ use std::io::{self, Read};
 const LARGEST_CHUNK: u64 = 256 << 20;
 
 /// Chunk of a container: where it stands, and how it is packed.
-#[derive(Debug, Clone)]
 pub(crate) struct Chunk {
     /// Byte of its first packed byte.
     pub(crate) offset: u64,
@@ -45,7 +44,14 @@ impl Chunk {
                 "a chunk has not the length it states",
             ));
         }
-        self.check(&bytes)?;
+        #[cfg(feature = "mcap")]
+        match (self.crc, crc32fast::hash(&bytes)) {
+            (0, _) => {}
+            (stored, computed) if stored == computed => {}
+            (stored, computed) => {
+                return Err(Error::at(self.offset, Fault::Crc { stored, computed }));
+            }
+        }
         Ok(Input::chunk(bytes, self.offset))
     }
 
@@ -61,26 +67,5 @@ impl Chunk {
             .read_to_end(&mut bytes)
             .map_err(fault)?;
         Ok(bytes)
-    }
-
-    #[cfg(feature = "mcap")]
-    fn check(&self, bytes: &[u8]) -> Result<(), Error> {
-        let (stored, computed) = (
-            self.crc,
-            if self.crc == 0 {
-                0
-            } else {
-                crc32fast::hash(bytes)
-            },
-        );
-        if stored == computed {
-            return Ok(());
-        }
-        Err(Error::at(self.offset, Fault::Crc { stored, computed }))
-    }
-
-    #[cfg(not(feature = "mcap"))]
-    const fn check(&self, _: &[u8]) -> Result<(), Error> {
-        Ok(())
     }
 }

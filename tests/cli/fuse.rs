@@ -370,7 +370,7 @@ fn bad_imu_data_and_flags_are_refused() {
         imu,
         |t| t.replace("gyro_z_rad_s", "magnet_z"),
         "",
-        &["channel gyro.z is missing"],
+        &["column gyro.z is missing"],
     );
     let same = |t: &str| t.to_owned();
     let gap = |t: &str| {

@@ -1,6 +1,6 @@
 //! From a study to its cells: each a request of `run` without lists.
 
-use crate::app::{Asked, Command, Failure, Input, Manifest, OrHelp, Refuse, Result};
+use crate::app::{Asked, Command, Failure, Input, Manifest, Refuse, Result};
 use crate::commands::run::Run;
 use crate::io::{input, source};
 use clap::{Arg, ArgAction, Args};
@@ -299,8 +299,8 @@ impl Door {
         let mut inputs = Vec::new();
         for (role, path) in asked.request.inputs()? {
             if !self.inputs.contains_key(&path) {
-                let read =
-                    input::input(role, &path).or_help("paths are relative to the study's file")?;
+                let read = input::input(role, &path)
+                    .map_err(|e| e.hint("paths are relative to the study's file"))?;
                 self.inputs.insert(path.clone(), read);
             }
             inputs.push(Input {

@@ -164,7 +164,7 @@ impl Study {
             };
             let hint = failure.advice();
             let failed = Failure::could_not(format!("cell {name}: {failure}{more}"));
-            return Err(failed.maybe_hint(hint));
+            return Err(failed.or_hint_if(hint));
         }
         let left = own.iter().filter(|unit| !place.has_unit(unit)).count();
         if left > 0 && !context.go_on() {

@@ -493,7 +493,7 @@ impl From<FusionError> for Failure {
             }
             _ => None,
         };
-        Self::input(e).maybe_hint(hint)
+        Self::input(e).or_hint_if(hint)
     }
 }
 

@@ -14,7 +14,7 @@ use std::num::NonZero;
 pub(super) struct Description {
     /// Version of the layout
     #[serde(rename = "schema")]
-    pub(super) _schema: Option<Version>,
+    _schema: Option<Version>,
     /// Of all axes of the accelerometers
     #[serde(default)]
     pub(super) accel: Vec<RuleTable>,
@@ -109,8 +109,8 @@ pub(super) enum Described {
 }
 
 /// Degrees of freedom with a variance.
-pub(super) type AboveTwo = Between<2, { i64::MAX }, true>;
-pub(super) type AtLeastOne = Between<1, { i64::MAX }, false>;
+type AboveTwo = Between<2, { i64::MAX }, true>;
+type AtLeastOne = Between<1, { i64::MAX }, false>;
 
 #[derive(Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "is neither a number nor \"signal\"")]

@@ -23,11 +23,11 @@ mod description;
 
 use super::Failure;
 use super::suggest::nearest;
-use super::toml_file::{OneOrEach, Source};
-use description::{Described, Description, Mean, RuleTable};
+use super::toml_file::Source;
+use description::{Described, Description, Mean};
 use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::noise::Ar1;
 use nav_sim_signal::noise::contamination::{Contamination, Extent, Operation, Rule};
-use nav_sim_signal::noise::{Ar1, ParameterError};
 use std::num::NonZero;
 use std::path::Path;
 
@@ -80,11 +80,33 @@ pub(crate) fn meant(name: &str) -> Option<&'static str> {
 
 fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, Failure> {
     let Description { accel, gyro, .. } = source.get()?;
+    // the same by the names of keys
+    let named: toml::Table = source.get()?;
     let mut rules = Vec::new();
     for (sensor, tables) in [(Sensor::Accel, accel), (Sensor::Gyro, gyro)] {
-        for (i, table) in (1..).zip(&tables) {
-            let key = format!("{}[{i}]", sensor.name());
-            read_rules(source, sensor, key, table, rate_hz, &mut rules)?;
+        for (number, table) in (1..).zip(&tables) {
+            let key = format!("{}[{number}]", sensor.name());
+            let replicates = table.replicates.as_ref();
+            let listed = replicates.map_or(1, Vec::len);
+            if listed == 0 {
+                return Err(source.refused(&format!("{key}.replicates"), "lists none"));
+            }
+            let values = named[sensor.name()][number - 1].as_table();
+            for (name, value) in values.into_iter().flatten() {
+                let count = value.as_array().map_or(listed, Vec::len);
+                if count != listed {
+                    let reason = format!("has {count} values for {listed} replicates");
+                    return Err(source.refused(&format!("{key}.{name}"), reason));
+                }
+            }
+            for i in 0..listed {
+                rules.push(Rule {
+                    sensor,
+                    replicate: replicates.map(|r| r[i].get()),
+                    operation: operation(source, &key, &table.operation, i, rate_hz)?,
+                    place: format!("{}, line {}", source.path(), source.line_of(&key)),
+                });
+            }
         }
     }
     Ok(Contamination {
@@ -93,185 +115,106 @@ fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, Failure> {
     })
 }
 
-fn read_rules(
+/// The share of the i-th replicate in a rule.
+fn operation(
     source: &Source,
-    sensor: Sensor,
-    key: String,
-    table: &RuleTable,
-    rate_hz: f64,
-    into: &mut Vec<Rule>,
-) -> Result<(), Failure> {
-    let RuleTable {
-        replicates,
-        operation,
-    } = table;
-    if replicates.as_ref().is_some_and(Vec::is_empty) {
-        return Err(source.refused(&format!("{key}.replicates"), "lists none"));
-    }
-    let place = format!("{}, line {}", source.path(), source.line_of(&key));
-    let listed = replicates.as_ref().map_or(1, Vec::len);
-    let mut entry = Entry {
-        source,
-        key,
-        i: 0,
-        listed,
-    };
-    for i in 0..listed {
-        entry.i = i;
-        let operation = entry.operation(operation, rate_hz)?;
-        let replicate = replicates.as_ref().map(|r| r[i].get());
-        into.push(Rule {
-            sensor,
-            replicate,
-            operation,
-            place: place.clone(),
-        });
-    }
-    Ok(())
-}
-
-/// One replicate's share of a rule.
-struct Entry<'a> {
-    source: &'a Source,
-    key: String,
+    key: &str,
+    described: &Described,
     i: usize,
-    listed: usize,
-}
-
-impl Entry<'_> {
-    fn refused(&self, key: &str, reason: impl std::fmt::Display) -> Failure {
-        self.source.refused(&format!("{}.{key}", self.key), reason)
-    }
-
-    /// A number, or this replicate's of a list.
-    fn number<T: Copy + Into<f64>>(&self, key: &str, given: &OneOrEach<T>) -> Result<f64, Failure> {
-        match given {
-            OneOrEach::One(value) => Ok((*value).into()),
-            OneOrEach::Each(values) if values.len() == self.listed => Ok(values[self.i].into()),
-            OneOrEach::Each(values) => {
-                let reason = format!("has {} values for {} replicates", values.len(), self.listed);
-                Err(self.refused(key, reason))
-            }
-        }
-    }
-
-    fn optional<T: Copy + Into<f64>>(
-        &self,
-        key: &str,
-        given: &Option<OneOrEach<T>>,
-    ) -> Result<Option<f64>, Failure> {
-        given
-            .as_ref()
-            .map(|given| self.number(key, given))
-            .transpose()
-    }
-
-    /// Refuses more than one of several ways to say the same.
-    fn at_most_one(&self, keys: &[(&str, bool)]) -> Result<(), Failure> {
+    rate_hz: f64,
+) -> Result<Operation, Failure> {
+    let refused = |name: &str, reason: String| source.refused(&format!("{key}.{name}"), reason);
+    // several ways to say the same
+    let at_most_one = |keys: &[(&str, bool)]| {
         let mut given = keys.iter().filter(|(_, is_given)| *is_given);
         match (given.next(), given.next()) {
             (Some((first, _)), Some((second, _))) => {
-                Err(self.refused(second, format!("says again what \"{first}\" says")))
+                Err(refused(second, format!("says again what \"{first}\" says")))
             }
             _ => Ok(()),
         }
-    }
-
-    fn operation(&self, operation: &Described, rate_hz: f64) -> Result<Operation, Failure> {
-        Ok(match operation {
-            Described::Step {
-                amplitude,
-                at_share,
-                at_samples,
-                at_s,
-            } => {
-                self.at_most_one(&[
-                    ("at_share", at_share.is_some()),
-                    ("at_samples", at_samples.is_some()),
-                    ("at_s", at_s.is_some()),
-                ])?;
-                let share = self.optional("at_share", at_share)?.unwrap_or(0.5);
-                let seconds = self.optional("at_s", at_s)?;
-                let samples = seconds.map(|seconds| (seconds * rate_hz).round() as u64);
-                Operation::Step {
-                    at: at_samples
-                        .or(samples)
-                        .map_or(Extent::Share(share), Extent::Samples),
-                    amplitude: self.number("amplitude", amplitude)?,
-                }
+    };
+    Ok(match described {
+        Described::Step {
+            amplitude,
+            at_share,
+            at_samples,
+            at_s,
+        } => {
+            at_most_one(&[
+                ("at_share", at_share.is_some()),
+                ("at_samples", at_samples.is_some()),
+                ("at_s", at_s.is_some()),
+            ])?;
+            let samples = at_s.as_ref().map(|s| (s.of(i) * rate_hz).round() as u64);
+            let share = at_share.as_ref().map_or(0.5, |share| share.of(i));
+            let samples = at_samples.or(samples).map(Extent::Samples);
+            Operation::Step {
+                at: samples.unwrap_or(Extent::Share(share)),
+                amplitude: amplitude.of(i),
             }
-            Described::Drift { amplitude } => Operation::Drift {
-                amplitude: self.number("amplitude", amplitude)?,
-            },
-            Described::Replace {
-                share,
-                points,
-                length_samples,
-                sigma,
-                mean,
-            } => {
-                self.at_most_one(&[("share", share.is_some()), ("points", points.is_some())])?;
-                let points = match (points, self.optional("share", share)?) {
-                    (Some(points), _) => Extent::Samples(*points),
-                    (None, Some(share)) => Extent::Share(share),
-                    (None, None) => {
-                        return Err(self.source.missing(&self.key, &["share", "points"]));
-                    }
-                };
-                let mean = match mean {
+        }
+        Described::Drift { amplitude } => Operation::Drift {
+            amplitude: amplitude.of(i),
+        },
+        Described::Replace {
+            share,
+            points,
+            length_samples,
+            sigma,
+            mean,
+        } => {
+            at_most_one(&[("share", share.is_some()), ("points", points.is_some())])?;
+            let share = share.as_ref().map(|share| Extent::Share(share.of(i)));
+            let points = points.map(Extent::Samples).or(share);
+            Operation::Replace {
+                points: points.ok_or_else(|| source.missing(key, &["share", "points"]))?,
+                block: Extent::Samples(length_samples.map_or(1, NonZero::get)),
+                mean: match mean {
                     None | Some(Mean::Kept(_)) => None,
-                    Some(Mean::Own(mean)) => Some(self.number("mean", mean)?),
-                };
-                Operation::Replace {
-                    points,
-                    block: Extent::Samples(length_samples.map_or(1, NonZero::get)),
-                    mean,
-                    sigma: self.number("sigma", sigma)?,
-                }
+                    Some(Mean::Own(mean)) => Some(mean.of(i)),
+                },
+                sigma: sigma.of(i),
             }
-            Described::Bursts {
-                count,
-                length_samples,
-                spacing_samples,
-                of_samples,
-                amplitude,
-                frequency_hz,
-            } => {
-                let period = self.optional("of_samples", of_samples)?;
-                let extent = |samples: u64| match period {
-                    Some(period) => Extent::Share(samples as f64 / period),
-                    None => Extent::Samples(samples),
-                };
-                let frequency_hz = self.optional("frequency_hz", frequency_hz)?;
-                Operation::Bursts {
-                    count: count.unwrap_or(5),
-                    length: extent(length_samples.unwrap_or(500)),
-                    spacing: extent(spacing_samples.unwrap_or(90_000)),
-                    amplitude: self.number("amplitude", amplitude)?,
-                    frequency_hz: frequency_hz.unwrap_or(5.0),
-                }
+        }
+        Described::Bursts {
+            count,
+            length_samples,
+            spacing_samples,
+            of_samples,
+            amplitude,
+            frequency_hz,
+        } => {
+            let extent = |samples: u64| match of_samples {
+                Some(period) => Extent::Share(samples as f64 / period.of(i)),
+                None => Extent::Samples(samples),
+            };
+            Operation::Bursts {
+                count: count.unwrap_or(5),
+                length: extent(length_samples.unwrap_or(500)),
+                spacing: extent(spacing_samples.unwrap_or(90_000)),
+                amplitude: amplitude.of(i),
+                frequency_hz: frequency_hz.as_ref().map_or(5.0, |hz| hz.of(i)),
             }
-            Described::Ar1 { phi, sigma2 } => {
-                let (phi, sigma2) = (self.number("phi", phi)?, self.number("sigma2", sigma2)?);
-                let refused =
-                    |e: ParameterError| self.refused(e.parameter, format!("is not {}", e.domain));
-                Operation::Ar1(Ar1::new(phi, sigma2).map_err(refused)?)
-            }
-            Described::HeavyTails { freedom, sigma } => Operation::HeavyTails {
-                freedom: self.number("freedom", freedom)?,
-                sigma: self.number("sigma", sigma)?,
-            },
-            Described::Scale {
-                process,
-                parameter,
-                factor,
-            } => Operation::Scale {
-                process: process.clone(),
-                parameter: parameter.clone(),
-                factor: self.number("factor", factor)?,
-            },
-        })
-    }
+        }
+        Described::Ar1 { phi, sigma2 } => {
+            let made = Ar1::new(phi.of(i), sigma2.of(i));
+            Operation::Ar1(made.map_err(|e| refused(e.parameter, format!("is not {}", e.domain)))?)
+        }
+        Described::HeavyTails { freedom, sigma } => Operation::HeavyTails {
+            freedom: freedom.of(i),
+            sigma: sigma.of(i),
+        },
+        Described::Scale {
+            process,
+            parameter,
+            factor,
+        } => Operation::Scale {
+            process: process.clone(),
+            parameter: parameter.clone(),
+            factor: factor.of(i),
+        },
+    })
 }
 
 #[cfg(test)]

@@ -109,8 +109,8 @@ pub(super) fn parse(source: &Source) -> Result<Datasheet, Failure> {
 
 fn entry(source: &Source, sensor: Sensor, key: &str, given: Given) -> Result<Entry, Failure> {
     let path = format!("{}.{key}", sensor.name());
-    let Some(figure) = Figure::ALL.into_iter().find(|f| f.key() == key) else {
-        return Err(source.unknown(&path, Figure::ALL.map(Figure::key).into_iter()));
+    let Ok(figure) = key.parse::<Figure>() else {
+        return Err(source.unknown(&path, Figure::NAMES.into_iter()));
     };
     let quantity = Quantity::parse(&given.value, figure.units(sensor))
         .map_err(|e| source.refused(&format!("{path}.value"), e.to_string()))?;

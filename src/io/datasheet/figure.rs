@@ -22,6 +22,10 @@ pub enum Figure {
     Scale,
 }
 
+nav_sim_signal::named!(Figure {
+    Noise = "noise", Bias = "bias", CorrelationTime = "corr_time", Walk = "walk", TurnOn = "turn_on", Offset = "offset", Scale = "scale"
+});
+
 /// Units as people write them, each with what one of it is in SI; ppm for scale factors.
 type Units = &'static [(&'static str, f64)];
 
@@ -72,30 +76,6 @@ const TIME: Units = &[("s", 1.0), ("min", 60.0), ("h", 3600.0)];
 const RATIO: Units = &[("ppm", 1.0), ("%", 1e4)];
 
 impl Figure {
-    /// All of them.
-    pub(crate) const ALL: [Self; 7] = [
-        Self::Noise,
-        Self::Bias,
-        Self::CorrelationTime,
-        Self::Walk,
-        Self::TurnOn,
-        Self::Offset,
-        Self::Scale,
-    ];
-
-    /// The key in a catalogue entry.
-    pub(crate) const fn key(self) -> &'static str {
-        match self {
-            Self::Noise => "noise",
-            Self::Bias => "bias",
-            Self::CorrelationTime => "corr_time",
-            Self::Walk => "walk",
-            Self::TurnOn => "turn_on",
-            Self::Offset => "offset",
-            Self::Scale => "scale",
-        }
-    }
-
     /// The units it may be given in.
     pub(crate) const fn units(self, sensor: Sensor) -> Units {
         match (self, sensor) {

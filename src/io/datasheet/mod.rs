@@ -34,7 +34,7 @@ use nav_sim_signal::noise::{
 use toml::{Table, Value};
 
 /// The correlation time that is assumed where none is given (s).
-pub(crate) const ASSUMED_CORRELATION_TIME_S: f64 = 300.0;
+const ASSUMED_CORRELATION_TIME_S: f64 = 300.0;
 
 /// One figure of one sensor, and where it was read.
 #[derive(Debug, Clone, PartialEq)]
@@ -99,7 +99,7 @@ impl Datasheet {
         let needed = figures.flat_map(|figure| Sensor::ALL.map(|sensor| (sensor, figure)));
         let lacking = needed.filter(|(sensor, figure)| self.value(*sensor, *figure).is_none());
         lacking
-            .map(|(sensor, figure)| format!("{} {}", sensor.name(), figure.key()))
+            .map(|(sensor, figure)| format!("{} {}", sensor.name(), figure.name()))
             .collect()
     }
 
@@ -191,7 +191,7 @@ impl Datasheet {
 
 impl Entry {
     fn provenance(&self) -> Table {
-        let figure = format!("{}.{}", self.sensor.name(), self.figure.key());
+        let figure = format!("{}.{}", self.sensor.name(), self.figure.name());
         let texts = [
             ("figure", Some(figure)),
             ("given", Some(self.quantity.given.clone())),

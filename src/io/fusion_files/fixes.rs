@@ -7,7 +7,7 @@ use crate::io::table::{self, Asked, Column, Dictionary, Quantity, Table};
 use crate::io::{Failure as Error, Place, help, logs, source};
 use glam::{DMat3, DVec3};
 use nav_sim_document::Note;
-use nav_sim_logs::{Clock, Fix, Stamp};
+use nav_sim_logs::{Clock, Content, Fix, Stamp, in_seconds};
 use nav_sim_navigation::earth::{A, MAX_LATITUDE, ecef_to_geodetic, geodetic_to_ecef};
 use nav_sim_navigation::frames::q_e_n;
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
@@ -118,136 +118,109 @@ const DICTIONARY: Dictionary = Dictionary {
     )
 };
 
-/// Columns of each quantity; standard deviations may be given for the whole file.
-struct FixColumns<'a> {
-    table: &'a Table,
-    time: &'a Column,
-    place: [&'a Column; 3],
-    /// Whether the place, and its deviations, are in the Earth's axes.
-    is_earth: [bool; 2],
-    place_sigma: Option<[&'a Column; 3]>,
-    velocity: Option<[&'a Column; 3]>,
-    velocity_sigma: Option<[&'a Column; 3]>,
-    unsaid: Option<&'a FixSigma>,
-}
-
-impl<'a> FixColumns<'a> {
-    /// Finds them. Position and its deviations are needed; velocity and its deviations come together or not at all.
-    fn new(table: &'a Table, unsaid: Option<&'a FixSigma>) -> Result<Self, Error> {
-        let any = |names: [&str; 3]| names.into_iter().any(|name| table.has(name));
-        // what is missing in all of a position or velocity may be given for the whole file
-        let is_given = |names: [&str; 3], given: bool| given && !any(names);
-        let is_earth = [
-            any(PLACE_E) && !table.has(PLACE[0]),
-            any(PLACE_SIGMA_E) && !table.has(PLACE_SIGMA[0]),
-        ];
-        let place = if is_earth[0] { PLACE_E } else { PLACE };
-        let place_sigma = if is_earth[1] {
-            PLACE_SIGMA_E
-        } else {
-            PLACE_SIGMA
-        };
-        let has_velocity = any(VELOCITY) || any(VELOCITY_SIGMA);
-        let own = ["t_s"].into_iter().chain(place);
-        let own = own.chain(VELOCITY.into_iter().filter(|_| has_velocity));
-        table.require(own, &DICTIONARY)?;
-        let mut sigmas = Vec::new();
-        if !is_given(place_sigma, unsaid.is_some()) {
-            sigmas.extend(place_sigma);
-        }
-        let is_velocity_given = unsaid.is_some_and(|sigma| sigma.vel_m_s.is_some());
-        if has_velocity && !is_given(VELOCITY_SIGMA, is_velocity_given) {
-            sigmas.extend(VELOCITY_SIGMA);
-        }
-        // a receiver's log that has all but these
-        let found = table.require(sigmas, &DICTIONARY);
-        found.map_err(|e| e.or(help::FIX_SIGMA))?;
-        let lost = || table.refused(DICTIONARY.advice);
-        Ok(Self {
-            table,
-            time: table.get("t_s").ok_or_else(lost)?,
-            place: table.all(place).ok_or_else(lost)?,
-            is_earth,
-            place_sigma: table.all(place_sigma),
-            velocity: table.all(VELOCITY),
-            velocity_sigma: table.all(VELOCITY_SIGMA),
-            unsaid,
-        })
+/// The fixes of the rows of a table, each with its line. Position and its deviations are needed; velocity and its deviations
+/// come together or not at all. `unsaid` are the standard deviations where the file states none.
+fn of_rows(
+    table: &Table,
+    unsaid: Option<&FixSigma>,
+    remarks: &mut Vec<Note>,
+) -> Result<Vec<(u64, GnssFix)>, Error> {
+    let any = |names: [&str; 3]| names.into_iter().any(|name| table.has(name));
+    // whether place, and its deviations, are in the Earth's axes
+    let is_earth = any(PLACE_E) && !table.has(PLACE[0]);
+    let is_sigma_earth = any(PLACE_SIGMA_E) && !table.has(PLACE_SIGMA[0]);
+    let place = if is_earth { PLACE_E } else { PLACE };
+    let place_sigma = match is_sigma_earth {
+        true => PLACE_SIGMA_E,
+        false => PLACE_SIGMA,
+    };
+    let has_velocity = any(VELOCITY) || any(VELOCITY_SIGMA);
+    let own = ["t_s"].into_iter().chain(place);
+    let own = own.chain(VELOCITY.into_iter().filter(|_| has_velocity));
+    table.require(own, &DICTIONARY)?;
+    let mut sigmas = Vec::new();
+    // what is missing in all of a position or velocity may be given for the whole file
+    if unsaid.is_none() || any(place_sigma) {
+        sigmas.extend(place_sigma);
     }
-
-    /// Standard deviations that are not of the file, and columns that are not used.
-    fn remarks(&self) -> Vec<Note> {
-        let mut remarks = Vec::new();
-        if self.place_sigma.is_none() || self.velocity.is_some() && self.velocity_sigma.is_none() {
-            remarks.push(remark("standard deviations as given for all fixes"));
-        }
-        let ignored = &self.table.ignored;
-        if !ignored.is_empty() {
-            let text = format!("columns not used: {}", ignored.join(", "));
-            remarks.push(remark(text));
-        }
-        remarks
+    let given_velocity = unsaid.and_then(|sigma| sigma.vel_m_s);
+    if has_velocity && (given_velocity.is_none() || any(VELOCITY_SIGMA)) {
+        sigmas.extend(VELOCITY_SIGMA);
     }
-
-    fn fix(&self, row: usize) -> GnssFix {
+    // a receiver's log that has all but these
+    let found = table.require(sigmas, &DICTIONARY);
+    found.map_err(|e| e.or(help::FIX_SIGMA))?;
+    let ([time], place) = (
+        table.columns(["t_s"], &DICTIONARY)?,
+        table.columns(place, &DICTIONARY)?,
+    );
+    let place_sigma = table.all(place_sigma);
+    let (velocity, velocity_sigma) = (table.all(VELOCITY), table.all(VELOCITY_SIGMA));
+    if place_sigma.is_none() || velocity.is_some() && velocity_sigma.is_none() {
+        remarks.push(remark("standard deviations as given for all fixes"));
+    }
+    if !table.ignored.is_empty() {
+        let text = format!("columns not used: {}", table.ignored.join(", "));
+        remarks.push(remark(text));
+    }
+    let fix = |row: usize| {
         let triad = |columns: [&Column; 3]| DVec3::from(columns.map(|column| column.si(row)));
-        let place = triad(self.place);
-        let (lat, lon, h) = match self.is_earth[0] {
-            false => (place.x, place.y, place.z),
-            true => ecef_to_geodetic(place),
+        let r = triad(place);
+        let (lat, lon, h) = match is_earth {
+            false => (r.x, r.y, r.z),
+            true => ecef_to_geodetic(r),
         };
-        let stated = self.place_sigma.map(|columns| match self.is_earth[1] {
+        let stated = place_sigma.map(|columns| match is_sigma_earth {
             false => triad(columns),
             true => sigma_of_earth(lat, lon, triad(columns)),
         });
-        let given = self.unsaid.map(|s| DVec3::from(s.pos_m));
-        let velocity = |columns| {
-            let given = self.unsaid.and_then(|s| s.vel_m_s).map(DVec3::from);
-            let sigma = self.velocity_sigma.map(triad).or(given);
+        let given = unsaid.map(|s| DVec3::from(s.pos_m));
+        let velocity = velocity.map(|columns| {
+            let sigma = velocity_sigma
+                .map(triad)
+                .or(given_velocity.map(DVec3::from));
             GnssVelocity::new(triad(columns), sigma.unwrap_or(DVec3::NAN))
-        };
-        let weeks = self.table.get("week").map_or(0.0, |week| week.si(row));
-        GnssFix {
-            t_s: self.time.si(row) + weeks * WEEK_S,
+        });
+        let weeks = table.get("week").map_or(0.0, |week| week.si(row));
+        let fix = GnssFix {
+            t_s: time.si(row) + weeks * WEEK_S,
             lat,
             lon,
             h,
             pos_sigma_n: stated.or(given).unwrap_or(DVec3::NAN),
-            velocity: self.velocity.map(velocity),
-        }
-    }
-
-    fn check(&self, row: usize, fix: &GnssFix) -> Result<(), Error> {
-        let refuse = |column: &Column, reason, advice| {
-            let (line, value) = (self.table.lines.of(row), column.values[row].to_string());
-            Err(Error::cell(&self.table.path, line, &column.name, value, reason).or_hint(advice))
+            velocity,
         };
         const DEGREES: &str = "latitude within ±89.9, longitude in (−180, 180] or [0, 360), in degrees (or lat_rad, lon_rad)";
-        let [first, second, _] = self.place;
-        if self.is_earth[0] {
-            let r_e = DVec3::from(self.place.map(|column| column.si(row)));
-            if (r_e.length() - A).abs() > BEYOND_EARTH_M {
-                let reason = "is not a place near the surface of the Earth";
-                let advice = "the Earth's x, y, z in metres, 6.4e6 from its centre";
-                return refuse(first, reason, advice);
-            }
-        } else if fix.lat.abs() > 90.0 * DEG {
-            return refuse(first, "is not a latitude", DEGREES);
-        } else if !(-180.0 * DEG - 1e-9..=360.0 * DEG + 1e-9).contains(&fix.lon) {
-            return refuse(second, "is not a longitude", DEGREES);
-        }
-        if fix.lat.abs() > MAX_LATITUDE {
+        const SIGMA: &str =
+            "a fix needs the standard deviations its receiver believes; remove rows without";
+        let sigmas = [place_sigma, velocity_sigma].into_iter().flatten();
+        let [first, second, _] = place;
+        let is_far = (r.length() - A).abs() > BEYOND_EARTH_M;
+        let is_longitude = (-180.0 * DEG - 1e-9..=360.0 * DEG + 1e-9).contains(&lon);
+        let (column, reason, advice) = if is_earth && is_far {
+            let advice = "the Earth's x, y, z in metres, 6.4e6 from its centre";
+            (
+                first,
+                "is not a place near the surface of the Earth",
+                advice,
+            )
+        } else if lat.abs() > 90.0 * DEG {
+            (first, "is not a latitude", DEGREES)
+        } else if !is_longitude {
+            (second, "is not a longitude", DEGREES)
+        } else if lat.abs() > MAX_LATITUDE {
             let reason = "is too near a pole to navigate in latitude and longitude";
-            return refuse(first, reason, DEGREES);
-        }
-        let sigmas = [self.place_sigma, self.velocity_sigma].into_iter();
-        let is_none = |column: &&Column| column.si(row) <= 0.0;
-        sigmas.flatten().flatten().find(is_none).map_or(Ok(()), |column| {
+            (first, reason, DEGREES)
+        } else if let Some(column) = sigmas.flatten().find(|column| column.si(row) <= 0.0) {
             let reason = "is not a standard deviation: it must be above 0";
-            let advice = "a fix needs the standard deviations its receiver believes; remove rows without";
-            refuse(column, reason, advice)
-        })
-    }
+            (column, reason, SIGMA)
+        } else {
+            return Ok((table.line(row), fix));
+        };
+        let (line, value) = (table.line(row), column.values[row].to_string());
+        Err(Error::cell(&table.path, line, &column.name, value, reason).or_hint(advice))
+    };
+    (0..table.rows()).map(fix).collect()
 }
 
 /// Distance from the Earth's equatorial radius beyond which nothing navigates (m): its flattening, and aircraft.
@@ -332,7 +305,8 @@ fn of_table(
             velocity.for_each(|name| drop(table.take(name)));
         }
     }
-    let columns = FixColumns::new(&table, unsaid)?;
+    let mut own = Vec::new();
+    let fixes = of_rows(&table, unsaid, &mut own)?;
     let velocity = match table.has(VELOCITY[0]) {
         true => ", velocity",
         false => "",
@@ -348,14 +322,8 @@ fn of_table(
             "an RTKLIB solution: position{velocity} and standard deviations, in {clock}"
         ))
     }));
-    remarks.extend(columns.remarks());
+    remarks.extend(own);
     remarks.extend(table.assumptions.iter().map(remark));
-    let mut fixes = Vec::with_capacity(table.rows());
-    for row in 0..table.rows() {
-        let fix = columns.fix(row);
-        columns.check(row, &fix)?;
-        fixes.push((table.lines.of(row), fix));
-    }
     let small =
         |(_, f): &(u64, GnssFix)| f.lat.abs() <= 0.5 * PI * DEG && f.lon.abs() <= 2.0 * PI * DEG;
     if fixes.iter().all(small) {
@@ -377,34 +345,28 @@ fn of_log(
 ) -> Result<Fixes, Error> {
     let refused = |e| logs::refused(path, e);
     let log = logs::open(path)?;
-    let mut read = log.fixes(topic, Stamp::default()).map_err(refused)?;
-    let mut fixes = Vec::new();
-    for (row, fix) in read.by_ref().enumerate() {
-        let fix = in_radians(&fix.map_err(refused)?, unsaid).ok_or_else(|| {
-            let message = "the fixes have no standard deviations";
-            Error::contents(path.display().to_string(), Place::Within, message).or(help::FIX_SIGMA)
-        })?;
-        fixes.push((row as u64 + 1, fix));
-    }
-    let mut said = format!("fixes of {}", read.topic());
-    let is_dated = log
-        .channels()
-        .iter()
-        .any(|c| c.topic == read.topic() && c.clock == Clock::Unix);
-    let span_s = fixes
-        .first()
-        .zip(fixes.last())
-        .map(|((_, first), (_, last))| (first.t_s, last.t_s));
+    let channel = log.channel(Content::Fix, topic).map_err(refused)?;
+    let read = log.fixes(channel, Stamp::default()).map_err(refused)?;
+    let unstated = || {
+        let message = "the fixes have no standard deviations";
+        Error::contents(path.display(), Place::Within, message).or(help::FIX_SIGMA)
+    };
+    let fixes = (1..)
+        .zip(read)
+        .map(|(row, fix)| Some((row, in_radians(&fix, unsaid)?)));
+    let mut fixes: Vec<(u64, GnssFix)> = fixes.collect::<Option<_>>().ok_or_else(unstated)?;
+    let mut said = format!("fixes of {}", channel.topic);
+    let span_s = fixes.first().zip(fixes.last());
     let clock = span_s
-        .filter(|_| is_dated)
-        .and_then(|span_s| rtklib::clock(span_s, imu_s));
+        .filter(|_| channel.clock == Clock::Unix)
+        .and_then(|((_, first), (_, last))| rtklib::clock((first.t_s, last.t_s), imu_s));
     if let Some(clock) = clock.filter(|clock| clock.origin_s != 0.0) {
         fixes
             .iter_mut()
             .for_each(|(_, fix)| fix.t_s -= clock.origin_s);
         said = format!("{said}, in {}", clock.name);
     }
-    let cut = read.damage().or(log.damage()).map(logs::cut_off);
+    let cut = log.damage().map(logs::cut_off);
     let remarks = cut.map(doubt).into_iter();
     Ok((fixes, remarks.chain([remark(said)]).collect()))
 }
@@ -415,7 +377,7 @@ fn in_radians(fix: &Fix, unsaid: Option<&FixSigma>) -> Option<GnssFix> {
     let velocity_sigma = fix.sd_v_ned_m_s.or(unsaid.and_then(|sigma| sigma.vel_m_s));
     let velocity = fix.v_ned_m_s.zip(velocity_sigma);
     Some(GnssFix {
-        t_s: fix.t_s(),
+        t_s: in_seconds(fix.stamp_ns),
         lat: fix.lat_deg * DEG,
         lon: fix.lon_deg * DEG,
         h: fix.h_m,

@@ -13,7 +13,7 @@ use serde::Deserialize;
 use std::path::Path;
 
 /// Where and how a drive begins: nav-sim fuse --initial
-#[derive(Debug, Deserialize, JsonSchema)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Initial state")]
 struct Description {

@@ -7,22 +7,22 @@
 use super::fixes::Fixes;
 use super::rtklib;
 use super::{doubt, remark};
-use crate::io::fusion_files::WEEK_S;
 use crate::io::{Failure as Error, help};
 use chrono::NaiveDate;
 use glam::{DVec2, DVec3};
-use nav_sim_document::Note;
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
 use nav_sim_signal::units::DEG;
 use std::collections::BTreeMap;
 
 /// Seconds of a day.
 const DAY_S: f64 = 86_400.0;
+/// A knot (m/s).
+const KNOT: f64 = 1852.0 / 3600.0;
 
 /// What the sentences of one time say.
-#[derive(Debug, Clone, Default)]
+#[derive(Default)]
 struct Epoch {
-    /// Line of its first sentence, and of its position.
+    /// Line of its position.
     line: usize,
     /// Time of day as written (s), and the days since the first sentence.
     time_s: f64,
@@ -35,64 +35,35 @@ struct Epoch {
     velocity: Option<(DVec2, f64)>,
 }
 
+impl Epoch {
+    /// Seconds since the first midnight.
+    fn since_s(&self) -> f64 {
+        DAY_S * self.day + self.time_s
+    }
+}
+
 /// All of a log.
-#[derive(Debug, Default)]
-pub(super) struct Log {
+#[derive(Default)]
+struct Log {
     epochs: Vec<Epoch>,
     /// Midnights before the first sentence (Unix s), and how many sentences state them.
     dates: BTreeMap<i64, usize>,
     /// Positions that are none: no fix, dead reckoning, typed in by hand.
     left_out: usize,
     has_separation: bool,
-    has_checksums: bool,
 }
 
 /// Whether a text is such a log: one of its first lines has a sentence of a receiver in it.
 pub(in crate::io) fn is_nmea(text: &str) -> bool {
-    text.lines()
-        .take(20)
-        .any(|line| address(line.trim_end()).is_some())
+    let is_address = |word: &str| word.len() == 5 && word.bytes().all(|b| b.is_ascii_uppercase());
+    let mut lines = text.lines().take(20).map(str::trim_end);
+    lines.any(|line| body(line).is_ok_and(|body| body.split(',').next().is_some_and(is_address)))
 }
 
 impl Log {
-    /// Reads all sentences, whatever a logger wrote before them in their lines. A first or last line that is cut is left
-    /// out. Where no sentence has a checksum, their numbers of fields tell those that are whole; a last line without an
-    /// end may be cut within a number.
-    pub(super) fn read(path: &str, text: &str) -> Result<Self, Error> {
-        let has_checksums = text.contains('*');
-        let ended = || text.rsplit_once('\n').map_or(text, |(whole, _)| whole);
-        let kept = if has_checksums { text } else { ended() };
-        let split = |line| {
-            if has_checksums {
-                fields(line)
-            } else {
-                unchecked_fields(line)
-            }
-        };
-        let lines = kept.lines().map(str::trim).enumerate();
-        let lines: Vec<(usize, &str)> = lines.filter(|(_, line)| !line.is_empty()).collect();
-        let ends = [lines.first().map(|l| l.0), lines.last().map(|l| l.0)];
-        let mut log = Self {
-            has_checksums,
-            ..Self::default()
-        };
-        for (i, line) in lines {
-            let said = split(line).and_then(|fields| log.sentence(i + 1, &fields));
-            match said {
-                Err(message) if !ends.contains(&Some(i)) => {
-                    let found: String = line.chars().take(60).collect();
-                    let advice = "remove the line, if no more than it is damaged";
-                    return Err(
-                        Error::contents(path, i + 1, format!("{message}: {found}")).or_hint(advice)
-                    );
-                }
-                _ => {}
-            }
-        }
-        Ok(log)
-    }
-
-    fn sentence(&mut self, line: usize, fields: &[&str]) -> Result<(), &'static str> {
+    /// A sentence, whatever a logger wrote before it in its line.
+    fn sentence(&mut self, line: usize, text: &str) -> Result<(), &'static str> {
+        let fields = fields(text)?;
         let field = |i: usize| fields.get(i).copied().unwrap_or_default();
         let number = |i: usize| field(i).parse::<f64>().ok();
         let kind = field(0).get(2..).unwrap_or_default();
@@ -100,23 +71,33 @@ impl Log {
         let epoch = match kind {
             "ZDA" | "RMC" | "GGA" | "GST" if !field(1).is_empty() && !field(0).starts_with('P') => {
                 let time_s = time_of_day(field(1)).ok_or("not a time of day hhmmss.ss")?;
-                self.at(line, time_s)
+                self.at(time_s)
             }
             // without a time: of the sentences before it
-            "VTG" => match self.epochs.last_mut() {
-                Some(epoch) => epoch,
-                None => return Ok(()),
-            },
-            _ => return Ok(()),
+            "VTG" => self.epochs.last_mut(),
+            _ => None,
         };
-        let day_s = DAY_S * epoch.day;
+        let Some(epoch) = epoch else { return Ok(()) };
+        let (mut midnight_s, mut left_out, mut has_separation) = (None, 0, false);
         match kind {
-            "GGA" if epoch.position.is_none() => return self.position(line, fields),
+            // 0: none, 6: dead reckoning, 7: typed in by hand
+            "GGA" if epoch.position.is_none() && matches!(field(6), "" | "0" | "6" | "7") => {
+                left_out = 1;
+            }
+            "GGA" if epoch.position.is_none() => {
+                let lat = angle(field(2), field(3), 90.0);
+                let lon = angle(field(4), field(5), 180.0);
+                let lat = lat.ok_or("not a latitude ddmm.mmmm,N or S")?;
+                let lon = lon.ok_or("not a longitude dddmm.mmmm,E or W")?;
+                let altitude = number(9).ok_or("not an altitude")?;
+                epoch.line = line;
+                epoch.hdop = number(8).filter(|hdop| *hdop > 0.0);
+                epoch.position = Some([lat, lon, altitude + number(11).unwrap_or(0.0)]);
+                has_separation = number(11).is_some();
+            }
             "GST" => {
-                epoch.sigma = number(6)
-                    .zip(number(7))
-                    .zip(number(8))
-                    .map(|((n, e), d)| DVec3::new(n, e, d))
+                let north_east = number(6).zip(number(7)).zip(number(8));
+                epoch.sigma = north_east.map(|((n, e), d)| DVec3::new(n, e, d));
             }
             "VTG" if epoch.velocity.is_none() => {
                 let knots = number(5).or(number(7).map(|km_h| km_h / 1.852));
@@ -126,68 +107,56 @@ impl Log {
                 if field(2) == "A" {
                     epoch.velocity = number(7).map(|knots| horizontal(knots, number(8)));
                 }
-                self.date(date_of_rmc(field(9)).map(|s| s - day_s));
+                midnight_s = date_of_rmc(field(9));
             }
             "ZDA" => {
                 let date = number(4).zip(number(3)).zip(number(2));
-                let date = date.and_then(|((y, m), d)| midnight(y as i32, m as u32, d as u32));
-                self.date(date.map(|s| s - day_s));
+                midnight_s = date.and_then(|((y, m), d)| midnight(y as i32, m as u32, d as u32));
             }
             _ => {}
         }
-        Ok(())
-    }
-
-    fn date(&mut self, midnight_s: Option<f64>) {
-        if let Some(midnight_s) = midnight_s {
-            *self.dates.entry(midnight_s as i64).or_default() += 1;
+        let first = midnight_s.map(|midnight_s| midnight_s - DAY_S * epoch.day);
+        self.left_out += left_out;
+        self.has_separation |= has_separation;
+        if let Some(first) = first {
+            *self.dates.entry(first as i64).or_default() += 1;
         }
+        Ok(())
     }
 
     /// The epoch of a time of day: the last one, or a new one, after midnight a day later.
-    fn at(&mut self, line: usize, time_s: f64) -> &mut Epoch {
+    fn at(&mut self, time_s: f64) -> Option<&mut Epoch> {
         let last = self.epochs.last().map(|e| (e.time_s, e.day));
         if last.is_none_or(|(last_s, _)| last_s != time_s) {
-            let day = last.map_or(0.0, |(last_s, day)| {
-                day + f64::from(last_s - time_s > DAY_S / 2.0)
-            });
+            let next_day = |(last_s, day)| day + f64::from(last_s - time_s > DAY_S / 2.0);
             self.epochs.push(Epoch {
-                line,
                 time_s,
-                day,
+                day: last.map_or(0.0, next_day),
                 ..Epoch::default()
             });
         }
-        let newest = self.epochs.len() - 1;
-        &mut self.epochs[newest]
+        self.epochs.last_mut()
     }
 
-    /// `GGA`: the position of the newest epoch.
-    fn position(&mut self, line: usize, fields: &[&str]) -> Result<(), &'static str> {
-        let field = |i: usize| fields.get(i).copied().unwrap_or_default();
-        let number = |i: usize| field(i).parse::<f64>().ok();
-        // 0: none, 6: dead reckoning, 7: typed in by hand
-        if matches!(field(6), "" | "0" | "6" | "7") {
-            self.left_out += 1;
-            return Ok(());
-        }
-        let lat = angle(field(2), field(3), 90.0).ok_or("not a latitude ddmm.mmmm,N or S")?;
-        let lon = angle(field(4), field(5), 180.0).ok_or("not a longitude dddmm.mmmm,E or W")?;
-        let altitude = number(9).ok_or("not an altitude")?;
-        self.has_separation |= number(11).is_some();
-        let newest = self
-            .epochs
-            .last_mut()
-            .ok_or("not a time of day hhmmss.ss")?;
-        newest.line = line;
-        newest.hdop = number(8).filter(|hdop| *hdop > 0.0);
-        newest.position = Some([lat, lon, altitude + number(11).unwrap_or(0.0)]);
-        Ok(())
+    /// What is added to seconds since the first midnight, and what times are then: Unix time where the IMU runs in it from
+    /// one time to the other, else seconds of the first day, else GPS time.
+    fn clock(&self, imu_s: Option<(f64, f64)>) -> Option<(f64, String)> {
+        // before a receiver has found the time, it states any date
+        let (midnight_s, _) = self.dates.iter().max_by_key(|(_, count)| **count)?;
+        let midnight_s = *midnight_s as f64;
+        let (first, last) = (
+            self.epochs.first()?.since_s(),
+            self.epochs.last()?.since_s(),
+        );
+        let is_of_day = imu_s.is_some_and(|imu| imu.0 <= last && first <= imu.1);
+        let clock = rtklib::clock((midnight_s + first, midnight_s + last), imu_s)?;
+        let is_meant = clock.origin_s == 0.0 || !is_of_day;
+        is_meant.then_some((midnight_s - clock.origin_s, clock.name))
     }
 }
 
 /// The fixes of a log, each with its line, and what is to be said of it. `unsaid` are the standard deviations where `GST` states none;
-/// `clock_s` is when the IMU begins and ends.
+/// `imu_s` is when the IMU begins and ends.
 ///
 /// # Errors
 /// A damaged sentence, no position at all, standard deviations that nobody states.
@@ -195,12 +164,30 @@ pub(super) fn fixes(
     path: &str,
     text: &str,
     unsaid: Option<&FixSigma>,
-    clock_s: Option<(f64, f64)>,
+    imu_s: Option<(f64, f64)>,
 ) -> Result<Fixes, Error> {
-    let log = Log::read(path, text)?;
-    let clock = log.clock(clock_s);
-    let hdop = log.middle_hdop();
-    let mut fixes = Vec::new();
+    let mut log = Log::default();
+    let lines = (1..).zip(text.lines().map(str::trim));
+    let lines: Vec<(usize, &str)> = lines.filter(|(_, line)| !line.is_empty()).collect();
+    let ends = [lines.first().map(|l| l.0), lines.last().map(|l| l.0)];
+    for (i, line) in lines {
+        match log.sentence(i, line) {
+            // cut at its ends by whatever logged it
+            Err(message) if !ends.contains(&Some(i)) => {
+                let found: String = line.chars().take(60).collect();
+                let refused = Error::contents(path, i, format!("{message}: {found}"));
+                return Err(refused.or_hint("remove the line, if no more than it is damaged"));
+            }
+            _ => {}
+        }
+    }
+    let day = || (0.0, "seconds of the day (UTC)".to_owned());
+    let (origin_s, clock) = log.clock(imu_s).unwrap_or_else(day);
+    let mut hdop: Vec<f64> = log.epochs.iter().filter_map(|e| e.hdop).collect();
+    hdop.sort_by(f64::total_cmp);
+    let middle = hdop.get(hdop.len() / 2);
+    let (mut fixes, mut is_given) = (Vec::new(), false);
+    let vel_sigma = unsaid.and_then(|s| s.vel_m_s);
     for epoch in &log.epochs {
         let Some([lat, lon, h]) = epoch.position else {
             continue;
@@ -208,217 +195,91 @@ pub(super) fn fixes(
         // a receiver's deviations as given are those of its middle HDOP
         let worse = epoch
             .hdop
-            .zip(hdop)
-            .map_or(1.0, |(epoch_hdop, middle)| epoch_hdop / middle);
+            .zip(middle)
+            .map_or(1.0, |(own, middle)| own / middle);
         let given = unsaid.map(|s| DVec3::from(s.pos_m) * worse);
+        is_given |= epoch.sigma.is_none();
         let stated = epoch.sigma.filter(|sigma| sigma.min_element() > 0.0);
-        let Some(pos_sigma_n) = stated.or(given) else {
+        let pos_sigma_n = stated.or(given).ok_or_else(|| {
             let message =
                 "a fix without standard deviations: no GST sentence of its time states them";
-            return Err(Error::contents(path, epoch.line, message).or(help::FIX_SIGMA));
+            Error::contents(path, epoch.line, message).or(help::FIX_SIGMA)
+        })?;
+        let velocity = epoch.velocity.zip(vel_sigma);
+        let velocity = velocity.map(|((horizontal, course), [n, e, _])| GnssVelocity {
+            horizontal,
+            horizontal_sigma: DVec2::new(n.hypot(course), e.hypot(course)),
+            down: None,
+        });
+        let fix = GnssFix {
+            t_s: origin_s + epoch.since_s(),
+            lat,
+            lon,
+            h,
+            pos_sigma_n,
+            velocity,
         };
-        let velocity =
-            epoch
-                .velocity
-                .zip(unsaid.and_then(|s| s.vel_m_s))
-                .map(|((v, course), [n, e, _])| {
-                    let horizontal_sigma = DVec2::new(n.hypot(course), e.hypot(course));
-                    GnssVelocity {
-                        horizontal: v,
-                        horizontal_sigma,
-                        down: None,
-                    }
-                });
-        let t_s = clock.origin_s + DAY_S * epoch.day + epoch.time_s;
-        fixes.push((
-            epoch.line as u64,
-            GnssFix {
-                t_s,
-                lat,
-                lon,
-                h,
-                pos_sigma_n,
-                velocity,
-            },
-        ));
+        fixes.push((epoch.line as u64, fix));
     }
     if fixes.is_empty() {
         let message = "NMEA sentences without a position: no GGA with a fix";
         return Err(Error::contents(path, 1_u64, message)
             .or_hint("let the receiver write GGA, RMC and GST"));
     }
-    let remarks = log.remarks(&fixes, unsaid, &clock);
+    let moving = fixes
+        .iter()
+        .filter(|(_, fix)| fix.velocity.is_some())
+        .count();
+    let (count, left_out) = (fixes.len(), log.left_out);
+    let mut remarks = vec![remark(format!(
+        "NMEA sentences: {count} fixes, {moving} with a horizontal velocity, {left_out} left out, times are {clock}"
+    ))];
+    if is_given {
+        let text = "standard deviations without GST as given, in proportion to HDOP";
+        remarks.push(remark(text));
+    }
+    if vel_sigma.is_none() && log.epochs.iter().any(|e| e.velocity.is_some()) {
+        let text =
+            "speed and course are not used without standard deviations: --gnss-sigma 2,2,4:0.1";
+        remarks.push(doubt(text));
+    }
+    if !log.has_separation {
+        let text = "GGA states no geoid separation: heights are above the sea, up to 100 m off";
+        remarks.push(doubt(text));
+    }
     Ok((fixes, remarks))
 }
 
-impl Log {
-    fn middle_hdop(&self) -> Option<f64> {
-        let mut all: Vec<f64> = self.epochs.iter().filter_map(|e| e.hdop).collect();
-        all.sort_by(f64::total_cmp);
-        all.get(all.len() / 2).copied()
-    }
-
-    fn remarks(
-        &self,
-        fixes: &[(u64, GnssFix)],
-        unsaid: Option<&FixSigma>,
-        clock: &Clock,
-    ) -> Vec<Note> {
-        let moving = fixes
-            .iter()
-            .filter(|(_, fix)| fix.velocity.is_some())
-            .count();
-        let count = fixes.len();
-        let mut remarks = vec![remark(format!(
-            "NMEA sentences: {count} fixes, {moving} with a horizontal velocity, {} left out, times are {}",
-            self.left_out, clock.words
-        ))];
-        let is_unsaid = |e: &Epoch| e.position.is_some() && e.sigma.is_none();
-        if self.epochs.iter().any(is_unsaid) {
-            remarks.push(remark(
-                "standard deviations without GST as given, in proportion to HDOP",
-            ));
-        }
-        let is_unused = moving == 0 && self.epochs.iter().any(|e| e.velocity.is_some());
-        let doubts = [
-            (
-                clock.is_rolled,
-                "the dates are 1024 weeks or more before the IMU's: a week counter has rolled over",
-            ),
-            (
-                !self.has_checksums,
-                "no sentence has a checksum: damaged digits go unseen",
-            ),
-            (
-                is_unused && unsaid.is_none_or(|s| s.vel_m_s.is_none()),
-                "speed and course are not used without standard deviations: --gnss-sigma 2,2,4:0.1",
-            ),
-            (
-                !self.has_separation,
-                "GGA states no geoid separation: heights are above the sea, up to 100 m off",
-            ),
-        ];
-        remarks.extend(
-            doubts
-                .into_iter()
-                .filter(|(is, _)| *is)
-                .map(|(_, text)| doubt(text)),
-        );
-        remarks
-    }
-}
-
-/// What a receiver is off that counts GPS weeks in ten bits (s).
-const ROLLOVER_S: f64 = 1024.0 * WEEK_S;
-/// The clock of a log.
-#[derive(Debug, Default)]
-struct Clock {
-    /// What is added to seconds of the first day (s).
-    origin_s: f64,
-    /// Times of the fixes then.
-    words: String,
-    /// Whether the receiver's week counter has rolled over.
-    is_rolled: bool,
-}
-
-impl Log {
-    /// Unix time where the IMU runs in it from one time to the other, else seconds of the first day, else GPS time. A receiver whose week
-    /// counter has rolled over is known by dates that are the IMU's after 1024 weeks, or twice that.
-    fn clock(&self, imu_s: Option<(f64, f64)>) -> Clock {
-        let time_of_epoch = |e: &Epoch| DAY_S * e.day + e.time_s;
-        let [first, last] = [self.epochs.first(), self.epochs.last()].map(|e| e.map(time_of_epoch));
-        let day = Clock {
-            words: "seconds of the day (UTC)".to_owned(),
-            ..Clock::default()
-        };
-        // before a receiver has found the time, it states any date
-        let midnight = self.dates.iter().max_by_key(|(_, count)| **count);
-        let (Some((midnight_s, _)), Some(first), Some(last), Some(imu)) =
-            (midnight, first, last, imu_s)
-        else {
-            return day;
-        };
-        let is_of_day = imu.0 <= last && first <= imu.1;
-        for (n, is_rolled) in [(0.0, false), (1.0, true), (2.0, true)] {
-            let midnight_s = *midnight_s as f64 + n * ROLLOVER_S;
-            let found = rtklib::clock((midnight_s + first, midnight_s + last), imu_s);
-            match found {
-                Some(clock) if clock.origin_s == 0.0 || !is_of_day && !is_rolled => {
-                    return Clock {
-                        origin_s: midnight_s - clock.origin_s,
-                        words: clock.name,
-                        is_rolled,
-                    };
-                }
-                _ => {}
-            }
-        }
-        day
-    }
-}
-
-/// A knot (m/s).
-const KNOT: f64 = 1852.0 / 3600.0;
-
-/// Fields of a sentence with its address, at the least (NMEA 0183, version 2).
-const LEAST_FIELDS: [(&str, usize); 5] =
-    [("GGA", 15), ("RMC", 12), ("VTG", 9), ("GST", 9), ("ZDA", 7)];
-
 /// What stands between `$` and the end of a line; before it, a logger may have written when it came.
 fn body(line: &str) -> Result<&str, &'static str> {
-    line.find(['$', '!'])
+    let start = line.find(['$', '!']);
+    start
         .map(|start| &line[start + 1..])
         .ok_or("not a sentence: it has no $")
 }
 
-/// The address of the sentence in a line, such as `GPGGA`.
-fn address(line: &str) -> Option<&str> {
-    let address = body(line).ok()?.split(',').next()?;
-    (address.len() == 5 && address.bytes().all(|b| b.is_ascii_uppercase())).then_some(address)
-}
-
-/// The fields of a sentence in a log without checksums: whole by its number of fields.
-fn unchecked_fields(line: &str) -> Result<Vec<&str>, &'static str> {
-    let body = body(line)?;
-    if body.contains(['$', '!']) {
-        return Err("a sentence within a sentence");
-    }
-    let fields: Vec<&str> = body.split(',').collect();
-    let is_cut = |(kind, least): &(&str, usize)| fields[0].ends_with(kind) && fields.len() < *least;
-    if LEAST_FIELDS.iter().any(is_cut) {
-        Err("a sentence that is cut")
-    } else {
-        Ok(fields)
-    }
-}
-
 /// The fields of a sentence whose checksum is right: what is between `$` and `*`, a XOR of its bytes.
 fn fields(line: &str) -> Result<Vec<&str>, &'static str> {
-    let body = body(line)?;
-    let (body, sum) = body
-        .rsplit_once('*')
-        .ok_or("a sentence without its checksum")?;
-    let sum = u8::from_str_radix(sum, 16).map_err(|_| "a sentence without its checksum")?;
-    let right = sum == body.bytes().fold(0, |all, byte| all ^ byte);
-    if right {
-        Ok(body.split(',').collect())
-    } else {
-        Err("a sentence whose checksum is wrong")
+    let whole = body(line)?.rsplit_once('*');
+    let summed = whole.and_then(|(body, sum)| Some((body, u8::from_str_radix(sum, 16).ok()?)));
+    let (body, sum) = summed.ok_or("a sentence without its checksum")?;
+    match sum == body.bytes().fold(0, |all, byte| all ^ byte) {
+        true => Ok(body.split(',').collect()),
+        false => Err("a sentence whose checksum is wrong"),
     }
+}
+
+/// Two digits.
+fn two(text: &str, start: usize) -> Option<u32> {
+    text.get(start..start + 2)?.parse().ok()
 }
 
 /// `hhmmss.ss` (s of the day).
 fn time_of_day(text: &str) -> Option<f64> {
-    let two = |start: usize| {
-        text.get(start..start + 2)?
-            .parse::<u8>()
-            .ok()
-            .map(f64::from)
-    };
+    let (hours, minutes) = (two(text, 0)?, two(text, 2)?);
     let seconds: f64 = text.get(4..)?.parse().ok()?;
-    let (hours, minutes) = (two(0)?, two(2)?);
-    (hours < 24.0 && minutes < 60.0 && (0.0..61.0).contains(&seconds))
-        .then_some(3600.0 * hours + 60.0 * minutes + seconds)
+    (hours < 24 && minutes < 60 && (0.0..61.0).contains(&seconds))
+        .then_some(f64::from(3600 * hours + 60 * minutes) + seconds)
 }
 
 /// `ddmm.mmmm` or `dddmm.mmmm` and its hemisphere (rad).
@@ -443,13 +304,9 @@ fn midnight(year: i32, month: u32, day: u32) -> Option<f64> {
 
 /// `ddmmyy`; years from 80 on are of the last century, as receivers count GPS.
 fn date_of_rmc(text: &str) -> Option<f64> {
-    let two = |start: usize| text.get(start..start + 2)?.parse::<u8>().ok();
-    let year = i32::from(two(4)?);
-    midnight(
-        year + if year < 80 { 2000 } else { 1900 },
-        two(2)?.into(),
-        two(0)?.into(),
-    )
+    let year = two(text, 4)?;
+    let century = if year < 80 { 2000 } else { 1900 };
+    midnight((century + year) as i32, two(text, 2)?, two(text, 0)?)
 }
 
 /// Speed and course as north and east; without a course, as receivers have none at rest, nothing but as slow as that.

@@ -31,7 +31,7 @@ fn header(text: &str) -> Option<(usize, &str)> {
 }
 
 /// Clock that an IMU may run in.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub(super) struct ClockOfImu {
     /// Subtracted from Unix times of the fixes (s).
     pub(super) origin_s: f64,

@@ -49,8 +49,7 @@ const DICTIONARY: Dictionary = Dictionary::new(
 /// Whatever is wrong with it, with its line.
 pub(crate) fn read_wheel(path: &Path) -> Result<Vec<WheelSpeed>, Error> {
     let table = table::read(path, &DICTIONARY, &Asked::default())?;
-    let no_time = || table.refused("no time column").or_hint(DICTIONARY.advice);
-    let time = table.get("t_s").ok_or_else(no_time)?;
+    let [time] = table.columns(["t_s"], &DICTIONARY)?;
     let speeds = speed_columns(&table)?;
     let speed = |row| speeds.iter().map(|c| c.si(row)).sum::<f64>() / speeds.len() as f64;
     let rows = (0..table.rows()).map(|row| WheelSpeed {
@@ -60,7 +59,7 @@ pub(crate) fn read_wheel(path: &Path) -> Result<Vec<WheelSpeed>, Error> {
     let read: Vec<WheelSpeed> = rows.collect();
     match read.windows(2).position(|w| w[1].t_s <= w[0].t_s) {
         Some(k) => {
-            let line = table.lines.of(k + 1);
+            let line = table.line(k + 1);
             Err(time_back(&table.path, line, read[k].t_s, read[k + 1].t_s))
         }
         None => Ok(read),
@@ -177,7 +176,7 @@ mod tests {
                 "keep one",
             ),
             ("t_s,gear\n0,1\n", "no speed of a wheel", "wheel_m_s"),
-            ("wheel_m_s\n1\n", "no time column", "t_s"),
+            ("wheel_m_s\n1\n", "column t_s is missing", "t_s"),
             (
                 "t_s,wheel_m_s\n1,2\n1,2\n",
                 "line 3: time goes from 1 s to 1 s",

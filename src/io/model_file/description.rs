@@ -16,7 +16,7 @@ use serde_json::{Map, Value};
 pub(super) struct Description {
     /// Version of the layout
     #[serde(rename = "schema")]
-    pub(super) _schema: Option<Version>,
+    _schema: Option<Version>,
     /// Sample rate that the variances are of (Hz)
     #[schemars(with = "Positive", range(max = MAX_RATE_HZ))]
     pub(super) rate_hz: Finite,

@@ -128,7 +128,7 @@ impl TurnOn {
     }
 
     /// The key of a sensor.
-    pub(crate) const fn key(sensor: Sensor) -> &'static str {
+    const fn key(sensor: Sensor) -> &'static str {
         match sensor {
             Sensor::Accel => "accel_m_s2",
             Sensor::Gyro => "gyro_rad_s",

@@ -54,7 +54,7 @@ impl ModelFile {
     }
 
     /// The largest whole number of that name that the provenance has of a fit.
-    pub(crate) fn most_of_fits(&self, key: &str) -> Option<i64> {
+    fn most_of_fits(&self, key: &str) -> Option<i64> {
         let fits = self.provenance.as_ref()?.get("fits")?.as_array()?;
         fits.iter()
             .filter_map(|fit| fit.get(key)?.as_integer())

@@ -266,24 +266,11 @@ fn read_laws(
 }
 
 fn refuse_law(source: &Source, key: &str, e: &SpreadError) -> Failure {
-    let refused = |name: &str, reason: String| source.refused(&format!("{key}.{name}"), reason);
-    let there = |known: &[String]| format!("there: {}", known.join(", "));
-    match e {
-        SpreadError::NoProcess { known, .. } => {
-            refused("process", "is no process of this model".to_owned()).or_hint(there(known))
-        }
-        SpreadError::NoParameter { process, known, .. } => {
-            let known: Vec<String> = known.iter().map(ToString::to_string).collect();
-            refused("parameter", format!("is no parameter of {process}")).or_hint(there(&known))
-        }
-        SpreadError::Constant { name, domain, .. } => refused(name, format!("is not {domain}")),
-        SpreadError::Lognormal => refused("distribution", "needs a parameter > 0".to_owned()),
-        SpreadError::Reaches(e) => refused(
-            "distribution",
-            format!(
-                "reaches {} = {}, which is not {}",
-                e.parameter, e.value, e.domain
-            ),
-        ),
-    }
+    let name = match e {
+        SpreadError::NoProcess { .. } => "process",
+        SpreadError::NoParameter { .. } => "parameter",
+        SpreadError::Constant { name, .. } => name,
+        SpreadError::Lognormal | SpreadError::Reaches(_) => "distribution",
+    };
+    source.refused(&format!("{key}.{name}"), format!("is refused: {e}"))
 }

@@ -261,11 +261,11 @@ fn laws_of_spread_are_checked_against_the_model() {
     };
     assert_eq!(
         spread("process = \"AR1_1\"\nparameter = \"phi\"\ndistribution = \"normal\"\nsd = 0.1\n"),
-        "m.toml, line 5: \"spread.accel[1].process\" = \"AR1_1\" is no process of this model | there: AR1"
+        "m.toml, line 5: \"spread.accel[1].process\" = \"AR1_1\" is refused: the model has no process \"AR1_1\" there, only AR1 | "
     );
     assert_eq!(
         spread("process = \"AR1\"\nparameter = \"phi\"\ndistribution = \"normal\"\nsd = -0.1\n"),
-        "m.toml, line 8: \"spread.accel[1].sd\" = -0.1 is not between 0 and 1 | "
+        "m.toml, line 8: \"spread.accel[1].sd\" = -0.1 is refused: sd = -0.1 is not between 0 and 1 | "
     );
     assert_eq!(
         spread("process = \"AR1\"\nparameter = \"phi\"\ndistribution = \"gamma\"\n"),
@@ -275,8 +275,8 @@ fn laws_of_spread_are_checked_against_the_model() {
         spread(
             "process = \"AR1\"\nparameter = \"phi\"\ndistribution = \"beta\"\na = 1\nb = 1\nlow = 0.9\nwidth = 0.2\n"
         ),
-        "m.toml, line 7: \"spread.accel[1].distribution\" = \"beta\" reaches phi = 1.1, \
-         which is not between −1 and 1 (exclusive) | "
+        "m.toml, line 7: \"spread.accel[1].distribution\" = \"beta\" is refused: \
+         the law reaches values that are refused: AR1: phi = 1.1 is not between −1 and 1 (exclusive) | "
     );
 }
 

@@ -6,7 +6,6 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// A file to read.
-#[derive(Debug)]
 pub(super) struct File {
     pub(super) path: PathBuf,
     /// Found in a directory, not named: may turn out to be something else.
@@ -52,7 +51,7 @@ pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, Failure> {
         ) {
             let message = "is given twice: it would count as two replicates";
             return Err(
-                Failure::contents(file.path.display().to_string(), Place::Itself, message)
+                Failure::contents(file.path.display(), Place::Itself, message)
                     .or_hint("name each file once; a directory stands for all its recordings"),
             );
         }
@@ -87,7 +86,7 @@ fn name_of(path: &Path) -> String {
 }
 
 /// Whether a name ends like a recording's.
-pub(crate) fn is_recording(name: &str) -> bool {
+fn is_recording(name: &str) -> bool {
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
     plain
@@ -96,22 +95,16 @@ pub(crate) fn is_recording(name: &str) -> bool {
 }
 
 /// Sort key: digits compare by value, so that `replicate_9` is before `replicate_10`.
-fn natural(name: &str) -> (Vec<(String, u64)>, String) {
-    let mut parts: Vec<(String, u64)> = Vec::new();
-    let mut rest = name;
-    while !rest.is_empty() {
-        let text = rest
-            .find(|c: char| c.is_ascii_digit())
-            .unwrap_or(rest.len());
-        let (word, after) = rest.split_at(text);
-        let digits = after
-            .find(|c: char| !c.is_ascii_digit())
-            .unwrap_or(after.len());
-        let (number, tail) = after.split_at(digits);
-        parts.push((word.to_owned(), number.parse().unwrap_or(u64::MAX)));
-        rest = tail;
-    }
-    (parts, name.to_owned())
+fn natural(name: &str) -> (String, String) {
+    let is_digit = |text: &[u8]| text[0].is_ascii_digit();
+    let parts = name
+        .as_bytes()
+        .chunk_by(|a, b| is_digit(&[*a]) == is_digit(&[*b]));
+    let padded = parts.map(|part| match String::from_utf8_lossy(part) {
+        number if is_digit(part) => format!("{number:0>20}"),
+        word => word.into_owned(),
+    });
+    (padded.collect(), name.to_owned())
 }
 
 #[cfg(test)]

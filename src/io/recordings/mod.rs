@@ -24,7 +24,6 @@ use super::{Failure, Place, help};
 use files::no_files;
 use nav_sim_signal::imu::{Channel, Recording};
 use rayon::prelude::*;
-use samples::Prepared;
 use std::path::{Path, PathBuf};
 
 /// How recordings are read.
@@ -227,7 +226,6 @@ pub(in crate::io) const DICTIONARY: Dictionary = Dictionary {
     array: &[&SIX, &SEVEN],
     numbers: Numbers::Finite,
     advice: "name the columns t_s, accel_x_m_s2 … gyro_z_rad_s (also _g, _mg, _deg_s, _deg_h; t_ms, t_us, t_ns)",
-    empty: "no samples in it",
     bad_cell: |error, value| match value.matches(':').count() > 1 {
         _ if error.advice().is_some() => error,
         true => {
@@ -240,7 +238,7 @@ pub(in crate::io) const DICTIONARY: Dictionary = Dictionary {
 };
 
 /// The name of a channel's column in files of this program.
-pub(crate) const fn column_name(channel: Channel) -> &'static str {
+const fn column_name(channel: Channel) -> &'static str {
     SIX[channel.index()]
 }
 
@@ -380,12 +378,10 @@ fn held<T>(
     options: &ReadOptions,
     look: &(dyn Fn(Recording) -> T + Sync),
 ) -> Result<(FileReport, Vec<T>), Failure> {
-    let (prepared, mut report) = Prepared::new(load(path, options, &DICTIONARY)?, options)?;
+    let table = load(path, options, &DICTIONARY)?;
+    let (recordings, mut report) = samples::recordings(table, options)?;
     path.clone_into(&mut report.path);
-    Ok((
-        report,
-        prepared.recordings().into_iter().map(look).collect(),
-    ))
+    Ok((report, recordings.into_iter().map(look).collect()))
 }
 
 #[cfg(test)]

@@ -10,132 +10,62 @@ use nav_sim_signal::imu::{Channel, Recording, Sensor, Signal};
 use nav_sim_signal::units::STANDARD_GRAVITY;
 use std::ops::Range;
 
-/// What recordings are made of.
-pub(super) struct Prepared {
-    path: String,
-    rate_hz: f64,
-    /// The signals, as they stand in the file.
-    columns: Vec<Signals>,
-    /// The stretches of samples that become recordings.
-    pieces: Vec<Range<usize>>,
-    /// Samples before which others are missing, and how many.
-    holes: Vec<(usize, usize)>,
-}
-
-/// The signals of one column.
-struct Signals {
-    column: Column,
-    channel: Channel,
-    /// What brings it to SI units.
-    factor: f64,
-    /// Mean of each stretch (SI units).
-    means: Vec<f64>,
-}
-
-impl Prepared {
-    pub(super) fn new(
-        mut raw: Table,
-        options: &ReadOptions,
-    ) -> Result<(Self, FileReport), Failure> {
-        let mut report = FileReport::new(&raw);
-        let timing = timing::timing(&mut raw, options, &mut report)?;
-        raw.columns
-            .sort_by_key(|c| channel_of(c).map(Channel::index));
-        let factors = factors(&raw, timing.rate_hz)?;
-        clipped(&raw, &mut report);
-        let samples = raw.columns.first().map_or(0, |c| c.values.len());
-        let pieces = pieces(&raw.path, samples, &timing, options, &mut report)?;
-        let mut columns = Vec::new();
-        for (column, factor) in raw.columns.into_iter().zip(factors) {
-            let Some(channel) = channel_of(&column) else {
-                continue;
-            };
-            let mean = |piece: &Range<usize>| mean(&column.values[piece.clone()], factor);
-            let means = pieces.iter().map(mean).collect();
-            columns.push(Signals {
-                column,
+/// The recordings of a file, and what was found in it.
+pub(super) fn recordings(
+    mut raw: Table,
+    options: &ReadOptions,
+) -> Result<(Vec<Recording>, FileReport), Failure> {
+    let mut report = FileReport::new(&raw);
+    let timing = timing::timing(&mut raw, options, &mut report)?;
+    raw.columns
+        .sort_by_key(|c| channel_of(c).map(Channel::index));
+    let factors = factors(&raw, timing.rate_hz)?;
+    clipped(&raw, &mut report);
+    let pieces = pieces(&raw.path, raw.rows(), &timing, options, &mut report)?;
+    let empty = |i| Recording {
+        name: name_of(&raw.path, i, pieces.len()),
+        rate_hz: timing.rate_hz,
+        signals: Vec::new(),
+    };
+    let mut recordings: Vec<Recording> = (0..pieces.len()).map(empty).collect();
+    // column by column, so that each is let go when it is copied
+    for (column, factor) in raw.columns.into_iter().zip(factors) {
+        let Some(channel) = channel_of(&column) else {
+            continue;
+        };
+        for (recording, piece) in recordings.iter_mut().zip(&pieces) {
+            let values = &column.values[piece.clone()];
+            let mean = mean(values, factor);
+            let mut samples = with_holes(values, piece, &timing.holes);
+            samples.iter_mut().for_each(|v| *v = *v * factor - mean);
+            recording.signals.push(Signal {
                 channel,
-                factor,
-                means,
+                mean,
+                samples,
             });
         }
-        let means_of = |i| {
-            columns
-                .iter()
-                .map(|c| (c.channel, c.means[i]))
-                .collect::<Vec<_>>()
-        };
-        for i in 0..pieces.len() {
-            plausible(&means_of(i), &mut report)?;
+    }
+    for recording in &recordings {
+        let means = recording.signals.iter().map(|s| (s.channel, s.mean));
+        let means: Vec<(Channel, f64)> = means.collect();
+        plausible(&means, &mut report)?;
+        let samples = recording.signals.first().map_or(0, |s| s.samples.len());
+        report.samples.push(samples);
+        if report.means.is_empty() {
+            report.means = means;
         }
-        let holes = timing.holes;
-        report.samples = pieces
-            .iter()
-            .map(|p| p.len() + missing(&holes, p).map(|(_, n)| n).sum::<usize>())
-            .collect();
-        report.rate_hz = timing.rate_hz;
-        report.means = means_of(0);
-        Ok((
-            Self {
-                path: raw.path.clone(),
-                rate_hz: timing.rate_hz,
-                columns,
-                pieces,
-                holes,
-            },
-            report,
-        ))
     }
-
-    /// All recordings of the file.
-    pub(super) fn recordings(self) -> Vec<Recording> {
-        let empty = |i| Recording {
-            name: name_of(&self.path, i, self.pieces.len()),
-            rate_hz: self.rate_hz,
-            signals: Vec::new(),
-        };
-        let mut recordings: Vec<Recording> = (0..self.pieces.len()).map(empty).collect();
-        // column by column, so that each is let go when it is copied
-        for of_file in self.columns {
-            for ((recording, piece), mean) in
-                recordings.iter_mut().zip(&self.pieces).zip(of_file.means)
-            {
-                let samples = with_holes(&of_file.column.values[piece.clone()], piece, &self.holes);
-                recording
-                    .signals
-                    .push(signal(of_file.channel, samples, of_file.factor, mean));
-            }
-        }
-        recordings
-    }
-}
-
-/// A signal in SI units without its mean.
-fn signal(channel: Channel, mut samples: Vec<f64>, factor: f64, mean: f64) -> Signal {
-    samples.iter_mut().for_each(|v| *v = *v * factor - mean);
-    Signal {
-        channel,
-        mean,
-        samples,
-    }
-}
-
-/// The holes within a stretch.
-fn missing<'a>(
-    holes: &'a [(usize, usize)],
-    piece: &'a Range<usize>,
-) -> impl Iterator<Item = &'a (usize, usize)> {
-    holes
-        .iter()
-        .filter(|(sample, _)| *sample > piece.start && *sample < piece.end)
+    report.rate_hz = timing.rate_hz;
+    Ok((recordings, report))
 }
 
 /// The samples of a stretch with NaN where some are missing.
 fn with_holes(samples: &[f64], piece: &Range<usize>, holes: &[(usize, usize)]) -> Vec<f64> {
-    let mut whole =
-        Vec::with_capacity(samples.len() + missing(holes, piece).map(|(_, n)| n).sum::<usize>());
-    let mut done = 0;
-    for (sample, lost) in missing(holes, piece) {
+    let is_inside = |(sample, _): &&(usize, usize)| *sample > piece.start && *sample < piece.end;
+    let inside = holes.iter().filter(is_inside);
+    let lost: usize = inside.clone().map(|(_, lost)| lost).sum();
+    let (mut whole, mut done) = (Vec::with_capacity(samples.len() + lost), 0);
+    for (sample, lost) in inside {
         let next = sample - piece.start;
         whole.extend_from_slice(&samples[done..next]);
         whole.extend(std::iter::repeat_n(f64::NAN, *lost));
@@ -204,7 +134,7 @@ fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
                 "{channel} (column \"{}\") is dead: every sample is {value}",
                 column.name
             );
-            return Err(Failure::contents(raw.path.as_str(), Place::Within, message)
+            return Err(Failure::contents(&raw.path, Place::Within, message)
                 .or(help::CHANNELS)
                 .or_hint("record again"));
         }
@@ -320,11 +250,9 @@ fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Fa
         let message = format!(
             "accelerometers and gyroscopes are exchanged: |f| is {f:.4} m/s², the mean rate {rate:.4} rad/s"
         );
-        return Err(
-            Failure::contents(report.file.as_str(), Place::Within, message)
-                .or_hint("without names the first three columns are the accelerometers")
-                .or(help::COLUMN_NAMES),
-        );
+        return Err(Failure::contents(&report.file, Place::Within, message)
+            .or_hint("without names the first three columns are the accelerometers")
+            .or(help::COLUMN_NAMES));
     }
     if accel.len() == 3 {
         check_gravity(&report.file, norm(&accel))?;
@@ -374,10 +302,8 @@ pub(super) fn same_rate(files: &[FileReport]) -> Result<(), Failure> {
                 first.file,
                 six_digits(first.rate_hz)
             );
-            Err(
-                Failure::contents(other.file.as_str(), Place::Itself, message)
-                    .or_hint("calibrate recordings of one rate at a time, or resample them"),
-            )
+            Err(Failure::contents(&other.file, Place::Itself, message)
+                .or_hint("calibrate recordings of one rate at a time, or resample them"))
         }
     }
 }

@@ -333,8 +333,8 @@ fn headers_that_do_not_help() {
         refusal("t_s,accel_x_g,ax_mps2\n0,1,2\n"),
         "a.csv, line 1: columns \"accel_x_g\" and \"ax_mps2\" both give accel.x"
     );
-    assert_eq!(refusal(""), "a.csv: no samples in it");
-    assert_eq!(refusal("t_s,gyro_x_rad_s\n"), "a.csv: no samples in it");
+    assert_eq!(refusal(""), "a.csv: no rows in it");
+    assert_eq!(refusal("t_s,gyro_x_rad_s\n"), "a.csv: no rows in it");
     let named = ReadOptions {
         columns: Some(vec!["t_s".into(), "gyro_x_rad_s".into()]),
         ..Default::default()

@@ -7,7 +7,7 @@ use crate::io::{Failure, Place, help};
 use crate::report::six_digits;
 
 /// When the samples were taken.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(super) struct Timing {
     pub(super) rate_hz: f64,
     /// The clock's own rate (Hz).
@@ -24,20 +24,25 @@ pub(super) fn timing(
     options: &ReadOptions,
     report: &mut FileReport,
 ) -> Result<Timing, Failure> {
+    let wrong_rate = |raw: &Table, message: String| {
+        Err(Failure::contents(&raw.path, Place::Within, message).or(help::WRONG_RATE))
+    };
     if let Some(rate_hz) = options.rate_hz.filter(|r| !(r.is_finite() && *r > 0.0)) {
-        let message = format!("{rate_hz} Hz is not a sample rate");
-        return Err(
-            Failure::contents(raw.path.as_str(), Place::Within, message).or(help::WRONG_RATE)
-        );
+        return wrong_rate(raw, format!("{rate_hz} Hz is not a sample rate"));
     }
     let [time, counter, ticks] = ["t_s", "counter", "ticks"].map(|clock| raw.take(clock));
+    if let (None, None, Some(given), Some((stated, source))) =
+        (&time, &ticks, options.rate_hz, raw.rate_hz)
+        && (stated / given - 1.0).abs() > DISAGREEING
+    {
+        let stated = six_digits(stated);
+        let message = format!("the {source} says {stated} Hz, but {given} Hz is given");
+        return wrong_rate(raw, message);
+    }
     let known = options
         .rate_hz
         .map(|rate_hz| (rate_hz, "given"))
         .or(raw.rate_hz);
-    if time.is_none() && ticks.is_none() {
-        agree(raw, options, report)?;
-    }
     let clock = match (time, counter, ticks, known) {
         (Some(time), ..) => Clock::of_time(time, raw, options, report),
         (None, Some(counter), _, Some((rate_hz, source))) => {
@@ -59,7 +64,7 @@ pub(super) fn timing(
         }
         (None, _, None, None) => {
             let message = "no time column, and no rate is given";
-            return Err(Failure::contents(raw.path.as_str(), Place::Within, message).or(help::RATE));
+            return Err(Failure::contents(&raw.path, Place::Within, message).or(help::RATE));
         }
     };
     let mut timing = clock.check(raw, options)?;
@@ -69,27 +74,6 @@ pub(super) fn timing(
         timing.breaks.clear();
     }
     Ok(timing)
-}
-
-/// Refuses a rate that is given where the file, or the manifest beside it, states another.
-fn agree(raw: &Table, options: &ReadOptions, report: &mut FileReport) -> Result<(), Failure> {
-    let Some((given, (stated, source))) = options.rate_hz.zip(raw.rate_hz) else {
-        return Ok(());
-    };
-    let difference = (stated / given - 1.0).abs();
-    let message = format!(
-        "the {source} says {} Hz, but {given} Hz is given",
-        six_digits(stated)
-    );
-    if difference > DISAGREEING {
-        return Err(
-            Failure::contents(raw.path.as_str(), Place::Within, message).or(help::WRONG_RATE)
-        );
-    }
-    if difference > ROUNDED {
-        report.warn(format!("{message}: the rate given is taken"));
-    }
-    Ok(())
 }
 
 /// Says what is doubtful about a clock.
@@ -117,7 +101,7 @@ fn doubt(
         ));
     }
     if !timing.breaks.is_empty() {
-        let first = raw.lines.of(timing.breaks[0]);
+        let first = raw.line(timing.breaks[0]);
         let n = timing.breaks.len();
         report.warn(match options.gaps {
             Gaps::Ignore => {
@@ -145,7 +129,6 @@ const ROUNDED: f64 = 1e-3;
 const DISAGREEING: f64 = 0.01;
 
 /// Time of each sample.
-#[derive(Debug)]
 struct Clock {
     name: String,
     /// Time of the first sample (s).
@@ -178,11 +161,10 @@ impl Clock {
             None => {
                 let step = step_of(&since, options.gaps);
                 let known = options.rate_hz.or(raw.rate_hz.map(|(rate_hz, _)| rate_hz));
-                let (unit, others) = guess(step, first, known);
-                if since.len() > 1 {
-                    tell(&name, step, unit, &others, report);
-                }
-                unit.0
+                let (unit_s, unit) = guess(step, first, known);
+                let text = format!("column \"{name}\" taken as {unit}");
+                report.assumptions.extend((since.len() > 1).then_some(text));
+                unit_s
             }
         };
         Self {
@@ -215,11 +197,11 @@ impl Clock {
 
     fn check(&self, raw: &Table, options: &ReadOptions) -> Result<Timing, Failure> {
         let steps = || self.since.windows(2).map(|w| w[1] - w[0]);
-        let step_at = |i: usize| (raw.lines.of(i + 1), self.time_of(i), self.time_of(i + 1));
+        let step_at = |i: usize| (raw.line(i + 1), self.time_of(i), self.time_of(i + 1));
         if let Some(i) = steps().position(|s| s < 0.0) {
             let (line, from, to) = step_at(i);
             let message = format!("time goes back from {from} s to {to} s");
-            return Err(Failure::contents(raw.path.as_str(), line, message)
+            return Err(Failure::contents(&raw.path, line, message)
                 .or_hint("sort the rows by time, or split the file where the clock was set back"));
         }
         let median = median_step(&self.since);
@@ -256,7 +238,7 @@ impl Clock {
                 n => format!(" ({n} such steps in all)"),
             };
             let message = format!("{what}, the median step is {step} s{more}");
-            return Err(Failure::contents(raw.path.as_str(), line, message)
+            return Err(Failure::contents(&raw.path, line, message)
                 .or(help::GAPS)
                 .or(help::GAPS_ELSEWHERE));
         }
@@ -268,7 +250,7 @@ impl Clock {
                 "the rate changes from {first} Hz in the first tenth to {last} Hz in the last"
             );
             return Err(
-                Failure::contents(raw.path.as_str(), Place::Within, message).or_hint(
+                Failure::contents(&raw.path, Place::Within, message).or_hint(
                     "split the file where the rate changes: a wavelet variance is of one rate",
                 ),
             );
@@ -289,9 +271,7 @@ impl Clock {
                 "the time column runs at {} Hz, but {given} Hz is given",
                 six_digits(found)
             );
-            return Err(
-                Failure::contents(raw.path.as_str(), Place::Within, message).or(help::WRONG_RATE)
-            );
+            return Err(Failure::contents(&raw.path, Place::Within, message).or(help::WRONG_RATE));
         }
         Ok(Timing {
             rate_hz: given,
@@ -461,44 +441,18 @@ pub(in crate::io) fn unit_of_step(step: f64) -> (f64, &'static str) {
     }]
 }
 
-/// A unit of time: its length (s) and its name.
-type Unit = (f64, &'static str);
-
-/// The unit that is assumed from the step, the first time and a rate that is known otherwise (Hz), and others in which the
-/// step would be that of an IMU too.
-fn guess(step: f64, first: f64, known_hz: Option<f64>) -> (Unit, Vec<Unit>) {
-    if let Some(rate_hz) = known_hz.filter(|_| step > 0.0) {
-        // The units are thousands apart: the nearest ratio is the one that is meant.
-        let apart = |(unit_s, _): &Unit| (rate_hz * step * unit_s).ln().abs();
-        let nearest = UNITS
-            .into_iter()
-            .min_by(|a, b| apart(a).total_cmp(&apart(b)));
-        return (nearest.unwrap_or(UNITS[0]), Vec::new());
-    }
-    let usual = |(unit_s, _): &Unit| USUAL_RATES_HZ.contains(&(1.0 / (step * unit_s)));
-    let mut plausible: Vec<Unit> = UNITS.into_iter().filter(usual).collect();
-    let mut all = plausible.iter();
-    if let Some(unit) = all.find(|(unit_s, _)| UNIX_S.contains(&(first * unit_s))) {
-        return (*unit, Vec::new());
-    }
-    let unit = unit_of_step(step);
-    plausible.retain(|other| other.1 != unit.1);
-    (unit, plausible)
-}
-
-/// Tells what is assumed, and warns where it may as well be another unit.
-fn tell(column: &str, step: f64, unit: Unit, others: &[Unit], report: &mut FileReport) {
-    let text = format!("column \"{column}\" taken as {}", unit.1);
-    report.assumptions.push(text);
-    if others.is_empty() {
-        return;
-    }
-    let rate =
-        |(unit_s, word): &Unit| format!("{} Hz in {word}", six_digits(1.0 / (step * unit_s)));
-    let others: Vec<String> = others.iter().map(rate).collect();
-    report.warn(format!(
-        "column \"{column}\" has no unit: taken as {}, but it would be {}; name it t_s, t_ms, t_us or t_ns",
-        rate(&unit),
-        others.join(", ")
-    ));
+/// The unit that is assumed from the step, the first time and a rate that is known otherwise (Hz).
+fn guess(step: f64, first: f64, known_hz: Option<f64>) -> (f64, &'static str) {
+    // The units are thousands apart: the nearest ratio is the one that is meant.
+    let apart = |unit_s: f64| known_hz.map_or(0.0, |hz| (hz * step * unit_s).ln().abs());
+    let is_known = known_hz.is_some() && step > 0.0;
+    let is_meant = |(unit_s, _): &(f64, &str)| match is_known {
+        true => UNITS.iter().all(|other| apart(*unit_s) <= apart(other.0)),
+        false => {
+            let is_usual = USUAL_RATES_HZ.contains(&(1.0 / (step * unit_s)));
+            is_usual && UNIX_S.contains(&(first * unit_s))
+        }
+    };
+    let found = UNITS.into_iter().find(is_meant);
+    found.unwrap_or_else(|| unit_of_step(step))
 }

@@ -1,28 +1,33 @@
 //! Tables that are no text: arrays of NumPy, Parquet, directories of KITTI, logs.
 
 use super::text::{layout, number};
-use super::{Asked, BETWEEN, Dictionary, Table, shown, unreadable};
+use super::{Asked, Dictionary, Table, shown, unreadable};
 use crate::io::{Failure, Place, help, logs, source};
 use chrono::NaiveDateTime;
-use nav_sim_logs::Clock;
 use nav_sim_logs::npy::{self, Array};
+use nav_sim_logs::{Channel, Clock, Content, in_seconds};
 use std::path::{Path, PathBuf};
 
-/// Columns by names, each with its numbers.
-fn of_columns(
-    path: &str,
-    columns: Vec<(String, Vec<f64>)>,
+/// Columns by their names.
+type Columns = Vec<(String, Vec<f64>)>;
+
+/// The table of such columns.
+pub(super) fn table(
+    path: &Path,
+    columns: Columns,
     dictionary: &Dictionary,
     asked: &Asked<'_>,
 ) -> Result<Table, Failure> {
+    let path = path.display().to_string();
     let names: Vec<String> = match asked.names {
         Some(names) if names.len() != columns.len() => {
-            return Err(Failure::row_length(path, 1, columns.len(), names.len()));
+            return Err(Failure::row_length(&path, 1, columns.len(), names.len()));
         }
         Some(names) => names.to_vec(),
         None => columns.iter().map(|(name, _)| name.clone()).collect(),
     };
-    let (mut table, places) = Table::new(path, 0, &names, dictionary, asked, false)?;
+    let (mut table, places) = Table::new(&path, 0, &names, dictionary, asked, false)?;
+    table.fits(columns.first().map_or(0, |(_, values)| values.len() as u64))?;
     for ((_, values), place) in columns.into_iter().zip(places) {
         let Some(column) = place else { continue };
         for (line, value) in (1..).zip(values) {
@@ -48,77 +53,66 @@ pub(super) fn npy(
     path: &Path,
     dictionary: &Dictionary,
     asked: &Asked<'_>,
-) -> Result<Table, Failure> {
-    let name = path.display().to_string();
+) -> Result<Columns, Failure> {
     let array = npy::read(path).map_err(|e| logs::refused(path, e))?;
+    let refused = |message: String| Failure::contents(path.display(), Place::Within, message);
     let count = match array.shape[..] {
         [_] => 1,
         [_, columns] => columns,
         _ => {
             let dimensions = array.shape.len();
-            let message =
-                format!("an array of {dimensions} dimensions, samples × columns are needed");
-            return Err(Failure::contents(name, Place::Within, message));
+            return Err(refused(format!(
+                "an array of {dimensions} dimensions, samples × columns are needed"
+            )));
         }
     };
-    let names = asked
-        .names
-        .map(<[String]>::to_vec)
-        .or_else(|| layout(dictionary.array, count))
-        .ok_or_else(|| {
-            let message = format!("an array of {count} columns, which names are not known");
-            Failure::contents(&name, Place::Within, message)
-                .or_hint(dictionary.advice)
-                .or(help::COLUMN_NAMES)
-        })?;
-    if names.len() != count {
-        return Err(Failure::row_length(&name, 1, count, names.len()));
-    }
-    let without_names = Asked {
-        names: None,
-        unwanted: asked.unwanted,
-        log: asked.log.clone(),
-    };
-    let columns = (0..)
-        .zip(names)
-        .map(|(k, name)| (name, strided(&array, k, count)));
-    of_columns(&name, columns.collect(), dictionary, &without_names)
+    let named = asked.names.map(|_| vec![String::new(); count]);
+    let names = named.or_else(|| layout(dictionary.array, count));
+    let names = names.ok_or_else(|| {
+        refused(format!(
+            "an array of {count} columns, which names are not known"
+        ))
+        .or_hint(dictionary.advice)
+        .or(help::COLUMN_NAMES)
+    })?;
+    let columns = (0..).zip(names);
+    Ok(columns
+        .map(|(k, name)| (name, strided(&array, k, count)))
+        .collect())
 }
 
-/// Reads named arrays: a vector is a column, an array of three columns the three axes of a sensor.
+/// Name of the array of a single number that states the rate (Hz).
 #[cfg(feature = "npz")]
-pub(super) fn npz(
-    path: &Path,
-    dictionary: &Dictionary,
-    asked: &Asked<'_>,
-) -> Result<Table, Failure> {
+pub(super) const RATE: &str = "rate_hz";
+
+/// Reads named arrays: a vector is a column, an array of three columns the three axes of a sensor. Also the rate (Hz), if
+/// it is stated.
+#[cfg(feature = "npz")]
+pub(super) fn npz(path: &Path) -> Result<(Columns, Option<f64>), Failure> {
     use nav_sim_logs::{Error, Fault, npz::Archive};
-    /// Name of the array of a single number that states the rate (Hz).
-    const RATE: &str = "rate_hz";
     let refused = |e| logs::refused(path, e);
-    let archive = Archive::open(path).map_err(refused)?;
+    let mut archive = Archive::open(path).map_err(refused)?;
     let (mut columns, mut rate_hz) = (Vec::new(), None);
     for name in archive.names() {
-        let array = match archive.read(name) {
+        let Array { shape, values } = match archive.read(&name) {
             // texts and the like are passed over
-            Err(Error::At(_, Fault::Encoding(_))) => Array {
-                shape: Vec::new(),
-                values: Vec::new(),
-            },
+            Err(Error::At(_, Fault::Encoding(_))) => {
+                columns.push((name, Vec::new()));
+                continue;
+            }
             read => read.map_err(refused)?,
         };
-        match array.shape[..] {
-            [] | [1] if name == RATE => rate_hz = array.values.first().map(|hz| (*hz, RATE)),
-            [_] => columns.push((name.to_owned(), array.values)),
+        match shape[..] {
+            [] | [1] if name == RATE => rate_hz = values.first().copied(),
+            [_] => columns.push((name, values)),
             [_, 3] => {
-                columns.extend((0..3).map(|k| (of_axis(name, k), strided(&array, k, 3))));
+                let array = Array { shape, values };
+                columns.extend((0..3).map(|k| (of_axis(&name, k), strided(&array, k, 3))));
             }
-            _ => columns.push((name.to_owned(), Vec::new())),
+            _ => columns.push((name, Vec::new())),
         }
     }
-    let mut table = of_columns(&path.display().to_string(), columns, dictionary, asked)?;
-    table.rate_hz = rate_hz;
-    Ok(table)
+    Ok((columns, rate_hz))
 }
 
 /// The name of one axis of a sensor's array: `accel_m_s2` has `accel_x_m_s2`.
@@ -130,62 +124,33 @@ fn of_axis(name: &str, axis: usize) -> String {
     format!("{stem}_{}{unit}", ["x", "y", "z"][axis])
 }
 
-/// Reads Apache Parquet: columns by their names, one after the other.
+/// Reads Apache Parquet: columns by their names; what is no number is NaN.
 #[cfg(feature = "parquet")]
-pub(super) fn parquet(
-    path: &Path,
-    dictionary: &Dictionary,
-    asked: &Asked<'_>,
-) -> Result<Table, Failure> {
+pub(super) fn parquet(path: &Path) -> Result<Columns, Failure> {
     use parquet::file::reader::{FileReader, SerializedFileReader};
-    let name = path.display().to_string();
+    use parquet::record::Field;
     let damaged = |e: parquet::errors::ParquetError| {
-        Failure::contents(name.as_str(), Place::Within, e.to_string())
+        Failure::contents(path.display(), Place::Within, e.to_string())
     };
     let file = std::fs::File::open(path).map_err(|e| unreadable(path, e))?;
     let reader = SerializedFileReader::new(file).map_err(damaged)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
-    let names: Vec<String> = match asked.names {
-        Some(names) => names.to_vec(),
-        None => schema
-            .columns()
-            .iter()
-            .map(|c| c.name().to_owned())
-            .collect(),
-    };
-    if names.len() != schema.num_columns() {
-        return Err(Failure::row_length(
-            &name,
-            1,
-            schema.num_columns(),
-            names.len(),
-        ));
-    }
-    let (mut table, places) = Table::new(&name, 0, &names, dictionary, asked, false)?;
-    table.fits(reader.metadata().file_metadata().num_rows().cast_unsigned())?;
+    let named = schema.columns().iter();
+    let named = named.map(|column| (column.name().to_owned(), Vec::new()));
+    let mut columns: Columns = named.collect();
     for row in reader.get_row_iter(None).map_err(damaged)? {
         let row = row.map_err(damaged)?;
-        let line = table.rows() as u64 + 1;
-        for ((_, field), place) in row.get_column_iter().zip(&places) {
-            let Some(column) = *place else { continue };
-            let of_column = table.columns[column].name.clone();
-            let value = match field {
-                parquet::record::Field::Null => {
-                    return Err(table.bad_cell(&of_column, line, "\"\"", "is empty", dictionary));
-                }
-                parquet::record::Field::Double(value) => *value,
-                parquet::record::Field::Float(value) => f64::from(*value),
-                parquet::record::Field::Int(value) => f64::from(*value),
-                parquet::record::Field::Long(value) => *value as f64,
-                _ => {
-                    let message = format!("column \"{of_column}\" has no numbers");
-                    return Err(Failure::contents(name, Place::Within, message));
-                }
-            };
-            table.push(column, value, None, line, dictionary)?;
+        for ((_, field), (_, values)) in row.get_column_iter().zip(&mut columns) {
+            values.push(match field {
+                Field::Double(value) => *value,
+                Field::Float(value) => f64::from(*value),
+                Field::Int(value) => f64::from(*value),
+                Field::Long(value) => *value as f64,
+                _ => f64::NAN,
+            });
         }
     }
-    Ok(table)
+    Ok(columns)
 }
 
 /// Names of the quantities of a sample of KITTI that are read, and their places in its line.
@@ -207,12 +172,7 @@ pub(crate) fn is_oxts(directory: &Path) -> bool {
 }
 
 /// Reads such a directory.
-pub(super) fn oxts(
-    directory: &Path,
-    dictionary: &Dictionary,
-    asked: &Asked<'_>,
-) -> Result<Table, Failure> {
-    let name = directory.display().to_string();
+pub(super) fn oxts(directory: &Path) -> Result<Columns, Failure> {
     let times = oxts_times(&directory.join("timestamps.txt"))?;
     let data = directory.join("data");
     let entries = std::fs::read_dir(&data).map_err(|e| unreadable(&data, e))?;
@@ -222,7 +182,11 @@ pub(super) fn oxts(
     if files.len() != times.len() {
         let (samples, times) = (files.len(), times.len());
         let message = format!("{samples} samples in data, {times} times in timestamps.txt");
-        return Err(Failure::contents(name, Place::Within, message));
+        return Err(Failure::contents(
+            directory.display(),
+            Place::Within,
+            message,
+        ));
     }
     let mut columns = vec![("t_s".to_owned(), times)];
     columns.extend(OXTS.map(|(name, _)| (name.to_owned(), Vec::new())));
@@ -238,11 +202,7 @@ pub(super) fn oxts(
             })?);
         }
     }
-    let mut table = of_columns(&name, columns, dictionary, asked)?;
-    table
-        .assumptions
-        .push("KITTI oxts, axes front, left, up".to_owned());
-    Ok(table)
+    Ok(columns)
 }
 
 /// Times of the samples (s since 1970).
@@ -252,7 +212,7 @@ fn oxts_times(path: &Path) -> Result<Vec<f64>, Failure> {
         let parsed = NaiveDateTime::parse_from_str(line.trim(), "%Y-%m-%d %H:%M:%S%.f");
         let found = parsed.map_err(|_| {
             let message = format!("\"{}\" is not a time", shown(line, 40));
-            Failure::contents(path.display().to_string(), i + 1, message)
+            Failure::contents(path.display(), i + 1, message)
                 .or_hint("2011-09-26 13:02:25.964389445")
         })?;
         let since = found.and_utc();
@@ -273,36 +233,22 @@ pub(super) fn log(
 ) -> Result<Table, Failure> {
     let refused = |e| logs::refused(path, e);
     let log = logs::open(path)?;
-    let mut samples = log
-        .imu(asked.log.topic.as_deref(), asked.log.stamp)
-        .map_err(refused)?;
-    let names = ["t_s"].into_iter().chain(OXTS.map(|(name, _)| name));
-    let names: Vec<String> = names.map(str::to_owned).collect();
-    let (mut table, places) = Table::new(
-        &path.display().to_string(),
-        0,
-        &names,
-        dictionary,
-        asked,
-        false,
-    )?;
-    for (row, sample) in samples.by_ref().enumerate() {
-        let sample = sample.map_err(refused)?;
-        if row % BETWEEN == 0 {
-            table.fits((row + BETWEEN) as u64)?;
-        }
-        let (accel, gyro) = sample.motion.rates();
-        let values = [sample.t_s()].into_iter().chain(accel).chain(gyro);
-        for (value, place) in values.zip(&places) {
-            let Some(column) = *place else { continue };
-            table.push(column, value, None, row as u64 + 1, dictionary)?;
-        }
+    let channel = log.channel(Content::Imu, asked.log.topic.as_deref());
+    let channel = channel.map_err(refused)?;
+    let samples = log.imu(channel, asked.log.stamp).map_err(refused)?;
+    let times = samples.iter().map(|sample| in_seconds(sample.stamp_ns));
+    let mut columns = vec![("t_s".to_owned(), times.collect())];
+    for (k, (name, _)) in OXTS.iter().enumerate() {
+        let values = samples.iter().map(|sample| match k.checked_sub(3) {
+            None => sample.accel_m_s2[k],
+            Some(axis) => sample.gyro_rad_s[axis],
+        });
+        columns.push(((*name).to_owned(), values.collect()));
     }
-    table.assumptions.push(format!("topic {}", samples.topic()));
-    let cut = samples.damage().or(log.damage());
-    table.warnings.extend(cut.map(logs::cut_off));
-    let is_other =
-        |c: &&nav_sim_logs::Channel| c.topic != samples.topic() && c.clock == Clock::Unix;
+    let mut table = table(path, columns, dictionary, asked)?;
+    table.assumptions.push(format!("topic {}", channel.topic));
+    table.warnings.extend(log.damage().map(logs::cut_off));
+    let is_other = |c: &&Channel| c.topic != channel.topic && c.clock == Clock::Unix;
     let others = log.channels().iter().filter(is_other);
     table.ignored = others.map(|c| c.topic.clone()).collect();
     Ok(table)

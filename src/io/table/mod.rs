@@ -32,8 +32,6 @@ pub(crate) struct Dictionary {
     pub(crate) numbers: Numbers,
     /// Advice where columns are not found.
     pub(crate) advice: &'static str,
-    /// Words for a table without rows.
-    pub(crate) empty: &'static str,
     /// Advice of a cell that is refused.
     pub(crate) bad_cell: fn(Failure, &str) -> Failure,
 }
@@ -47,21 +45,18 @@ impl Dictionary {
             array: &[],
             numbers: Numbers::Finite,
             advice,
-            empty: "no rows in it",
             bad_cell: |error, _| error,
         }
     }
 }
 
 /// Numbers that a table may hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Numbers {
     /// Finite ones.
     Finite,
     /// Any: who reads it leaves those rows out.
     Any,
-    /// Any, and none: an empty cell is NaN.
-    Missing,
 }
 
 /// Choices of who reads a table.
@@ -80,7 +75,7 @@ pub(crate) struct Asked<'a> {
 pub(crate) struct Table {
     pub(crate) path: String,
     /// Line of the header, from 1; 0 where there is none.
-    pub(crate) header_line: u64,
+    header_line: u64,
     pub(crate) columns: Vec<Column>,
     /// Names of columns that mean nothing here.
     pub(crate) ignored: Vec<String>,
@@ -88,7 +83,8 @@ pub(crate) struct Table {
     pub(crate) comments: Vec<String>,
     /// Rate that is stated beside the columns (Hz), and where.
     pub(crate) rate_hz: Option<(f64, &'static str)>,
-    pub(crate) lines: Lines,
+    /// Lines of the rows, where it has some.
+    lines: Vec<u64>,
     /// True if the text has no header.
     pub(crate) is_bare: bool,
     /// Notes on skipped and assumed parts.
@@ -116,28 +112,6 @@ impl Column {
     }
 }
 
-/// Lines of the rows.
-#[derive(Debug, Default)]
-pub(crate) struct Lines {
-    /// (row from which on, line less row), where it changes.
-    shifts: Vec<(usize, u64)>,
-}
-
-impl Lines {
-    fn push(&mut self, row: usize, line: u64) {
-        let shift = line.saturating_sub(row as u64);
-        if self.shifts.last().is_none_or(|(_, s)| *s != shift) {
-            self.shifts.push((row, shift));
-        }
-    }
-
-    /// Line of a row (its number, from 1, in a file without lines).
-    pub(crate) fn of(&self, row: usize) -> u64 {
-        let before = self.shifts.partition_point(|(from, _)| *from <= row);
-        row as u64 + before.checked_sub(1).map_or(1, |i| self.shifts[i].1)
-    }
-}
-
 /// Reads a table.
 ///
 /// # Errors
@@ -152,26 +126,39 @@ pub(crate) fn read(
             .is_some_and(|e| e.eq_ignore_ascii_case(ending))
     };
     let name = path.display().to_string();
+    let of = |columns| containers::table(path, columns, dictionary, asked);
     let table = match logs::kind_of(path) {
         #[cfg(feature = "npz")]
-        Some(LogKind::Npz) => containers::npz(path, dictionary, asked),
+        Some(LogKind::Npz) => {
+            let (columns, rate_hz) = containers::npz(path)?;
+            Ok(Table {
+                rate_hz: rate_hz.map(|hz| (hz, containers::RATE)),
+                ..of(columns)?
+            })
+        }
         Some(_) => containers::log(path, dictionary, asked),
-        None if ends_in("npy") => containers::npy(path, dictionary, asked),
+        None if ends_in("npy") => of(containers::npy(path, dictionary, asked)?),
         #[cfg(feature = "parquet")]
-        None if ends_in("parquet") => containers::parquet(path, dictionary, asked),
+        None if ends_in("parquet") => of(containers::parquet(path)?),
         #[cfg(not(feature = "parquet"))]
         None if ends_in("parquet") => {
             let message = "is Apache Parquet, which this build does not read";
             let refusal = Failure::contents(name, Place::Itself, message);
             Err(refusal.or_hint("build with --features parquet, or write CSV"))
         }
-        None if is_oxts(path) => containers::oxts(path, dictionary, asked),
+        None if is_oxts(path) => {
+            let assumptions = vec!["KITTI oxts, axes front, left, up".to_owned()];
+            Ok(Table {
+                assumptions,
+                ..of(containers::oxts(path)?)?
+            })
+        }
         None => {
             let reader = source::table(path).map_err(|e| unreadable(path, e))?;
             text::read(&name, reader, dictionary, asked)
         }
     }?;
-    table.filled(dictionary)
+    table.filled()
 }
 
 /// Reads a table from a text that is held.
@@ -185,7 +172,7 @@ pub(crate) fn parse(
     asked: &Asked<'_>,
 ) -> Result<Table, Failure> {
     let reader = Box::new(Cursor::new(text.to_owned()));
-    text::read(name, reader, dictionary, asked)?.filled(dictionary)
+    text::read(name, reader, dictionary, asked)?.filled()
 }
 
 /// Error of the system on a table, with a hint.
@@ -219,8 +206,8 @@ pub(crate) const NO_COLUMN: &str = "no column is a known one";
 const IS_EMPTY: &str = "it is empty";
 
 /// A table without rows.
-fn empty(path: &str, dictionary: &Dictionary) -> Failure {
-    Failure::contents(path, Place::Within, dictionary.empty).passing_over(IS_EMPTY)
+fn empty(path: &str) -> Failure {
+    Failure::contents(path, Place::Within, "no rows in it").passing_over(IS_EMPTY)
 }
 
 /// Beyond this a number is no measurement, and its square may be no number.
@@ -246,7 +233,7 @@ impl Table {
             ignored: Vec::new(),
             comments: Vec::new(),
             rate_hz: None,
-            lines: Lines::default(),
+            lines: Vec::new(),
             is_bare: false,
             assumptions: Vec::new(),
             warnings: Vec::new(),
@@ -379,7 +366,7 @@ impl Table {
     }
 
     /// Refuses a table without rows, or whose rows end before others.
-    fn filled(mut self, dictionary: &Dictionary) -> Result<Self, Failure> {
+    fn filled(mut self) -> Result<Self, Failure> {
         let is_clock =
             |c: &Column| !(c.quantity.may_be_empty && c.values.iter().any(|v| v.is_nan()));
         self.columns.retain(is_clock);
@@ -395,7 +382,7 @@ impl Table {
             return Err(Failure::contents(self.path, Place::Within, message));
         }
         if self.columns.first().is_some_and(|c| c.values.is_empty()) {
-            return Err(empty(&self.path, dictionary));
+            return Err(empty(&self.path));
         }
         Ok(self)
     }
@@ -410,17 +397,22 @@ impl Table {
         }
         let [needed, free] = [bytes(rows), free].map(|bytes| bytes.div_ceil(1 << 20));
         let message = format!("its samples need {needed} MiB of memory, and {free} MiB are free");
-        let refusal = Failure::contents(self.path.as_str(), Place::Within, message);
+        let refusal = Failure::contents(&self.path, Place::Within, message);
         Err(refusal.or(help::FEWER_CHANNELS))
     }
 
     /// Something wrong with the header.
     pub(crate) fn refused(&self, message: impl Display) -> Failure {
-        Failure::contents(self.path.as_str(), self.header_line.max(1), message)
+        Failure::contents(&self.path, self.header_line.max(1), message)
     }
 
     pub(crate) fn rows(&self) -> usize {
         self.columns.first().map_or(0, |c| c.values.len())
+    }
+
+    /// Line of a row (its number, from 1, in a file without lines).
+    pub(crate) fn line(&self, row: usize) -> u64 {
+        self.lines.get(row).copied().unwrap_or(row as u64 + 1)
     }
 
     /// The column of a quantity.
@@ -450,14 +442,10 @@ impl Table {
     /// Keeps the rows of which that holds.
     pub(crate) fn retain(&mut self, keep: impl Fn(&Self, usize) -> bool) {
         let kept: Vec<usize> = (0..self.rows()).filter(|row| keep(self, *row)).collect();
-        let mut lines = Lines::default();
-        kept.iter()
-            .enumerate()
-            .for_each(|(i, row)| lines.push(i, self.lines.of(*row)));
+        self.lines = kept.iter().map(|row| self.line(*row)).collect();
         for column in &mut self.columns {
             column.values = kept.iter().map(|row| column.values[*row]).collect();
         }
-        self.lines = lines;
     }
 
     /// Refuses a table without one of the quantities that are needed; a column that nearly has the name of a missing one
@@ -483,6 +471,20 @@ impl Table {
         };
         let refusal = self.refused(columns).passing_over(NO_COLUMN);
         Err(refusal.or_hint(dictionary.advice))
+    }
+
+    /// Columns of quantities that are needed.
+    ///
+    /// # Errors
+    /// Those of [`Self::require`].
+    pub(crate) fn columns<const N: usize>(
+        &self,
+        needed: [&str; N],
+        dictionary: &Dictionary,
+    ) -> Result<[&Column; N], Failure> {
+        self.require(needed, dictionary)?;
+        self.all(needed)
+            .ok_or_else(|| self.refused(dictionary.advice))
     }
 }
 

@@ -51,7 +51,7 @@ pub(crate) const SPEED: Units = &[
 ];
 
 /// Meaning of a name without a unit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) enum Bare {
     /// The quantity in such a unit.
     Is(f64),
@@ -62,7 +62,7 @@ pub(crate) enum Bare {
 }
 
 /// A quantity that a column may hold.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub(crate) struct Quantity {
     pub(crate) name: &'static str,
     /// Names without their unit and axis.

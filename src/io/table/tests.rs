@@ -118,12 +118,12 @@ fn the_stamp_of_the_measurement_is_the_time() {
 fn lines_before_the_header_and_decimal_commas_are_read() {
     let text = "Logger 7;\nStarted;2026-11-26\n\nt_s;Gyro X (deg/s)\n0,00;1,5\n0,01;-2\n";
     let table = parse("a.csv", text, &DICTIONARY, &Asked::default()).unwrap();
-    assert_eq!((table.header_line, table.lines.of(1)), (4, 6));
+    assert_eq!((table.header_line, table.line(1)), (4, 6));
     let gyro = table.get("gyro.x").unwrap();
     assert_eq!(gyro.values, [1.5, -2.0]);
     let quoted = "t_s,gyro_x_rad_s,note\n0,1,\"a, b\"\n1,2,\"c\nd\"\n2,3,e\n";
     let table = parse("a.csv", quoted, &DICTIONARY, &Asked::default()).unwrap();
-    assert_eq!((table.rows(), table.lines.of(2)), (3, 5));
+    assert_eq!((table.rows(), table.line(2)), (3, 5));
     let comments = "# made by hand\nt_s,gyro_x_rad_s\n0,1\n# a gap\n1,2\n";
     let table = parse("a.csv", comments, &DICTIONARY, &Asked::default()).unwrap();
     assert_eq!(table.rows(), 2);

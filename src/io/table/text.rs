@@ -1,7 +1,7 @@
 //! Tables of text: RFC 4180 with `,` `;` tab or blanks, comments and other lines before the header.
 
 use super::quantity::find;
-use super::{Asked, BETWEEN, Dictionary, Numbers, Table, empty, shown, unreadable};
+use super::{Asked, BETWEEN, Dictionary, Table, empty, shown, unreadable};
 use crate::io::{Failure, Place, help};
 use std::io::{BufRead, Cursor, Read};
 use std::path::Path;
@@ -93,7 +93,7 @@ impl Head {
                 return Ok(head);
             }
             if is_end {
-                return Err(empty(path, dictionary));
+                return Err(empty(path));
             }
             if let Some(what) = no_text(&bytes) {
                 let message = format!("is no table of text: {what}");
@@ -208,8 +208,8 @@ impl Head {
                 if record.iter().all(is_empty) {
                     continue;
                 }
-                // a logger that lost its power within a row; tables of this program are whole or damaged
-                let is_cut = found < expected && row > 0 && dictionary.numbers != Numbers::Missing;
+                // a logger that lost its power within a row
+                let is_cut = found < expected && row > 0;
                 if is_cut && !rows.read_byte_record(&mut record).map_err(cannot)? {
                     let text = format!("line {line}, the last, is cut off: left out");
                     table.assumptions.push(text);
@@ -226,7 +226,6 @@ impl Head {
                 let value = match number(cell, self.delimiter) {
                     Some(value) => value,
                     None if table.columns[column].quantity.may_be_empty => f64::NAN,
-                    None if dictionary.numbers == Numbers::Missing && is_empty(cell) => f64::NAN,
                     None => {
                         let value = shown(&String::from_utf8_lossy(cell.trim_ascii()), 40);
                         let (value, reason) = (format!("\"{value}\""), "is not a number");
@@ -236,7 +235,7 @@ impl Head {
                 };
                 table.push(column, value, Some(cell), line, dictionary)?;
             }
-            table.lines.push(row, line);
+            table.lines.push(line);
             row += 1;
         }
         Ok(())

@@ -137,7 +137,7 @@ impl Source {
     }
 
     /// Something wrong in the line of a key.
-    pub(crate) fn error(&self, key: &str, message: impl Display) -> Failure {
+    fn error(&self, key: &str, message: impl Display) -> Failure {
         self.at(self.line_of(key), message)
     }
 

@@ -118,7 +118,6 @@ impl Error for Refusal {
 }
 
 /// A value.
-#[derive(Clone, Copy)]
 pub(super) struct Node<'a>(pub(super) &'a DeValue<'a>);
 
 impl<'de> Deserializer<'de> for Node<'_> {
@@ -276,7 +275,6 @@ impl<'de> MapAccess<'de> for Keys<'_> {
 }
 
 /// A table whose word chooses its kind, without the keys that are passed.
-#[derive(Clone, Copy)]
 struct Kind<'a> {
     table: &'a DeTable<'a>,
     passed: &'static [&'static str],

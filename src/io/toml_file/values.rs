@@ -33,7 +33,7 @@ impl From<Finite> for f64 {
 }
 
 /// A number between two whole ones, or one of them unless it is open; `i64::MAX` is no end.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(try_from = "f64")]
 pub(crate) struct Between<const LOW: i64, const HIGH: i64, const OPEN: bool>(pub(crate) f64);
 
@@ -104,7 +104,7 @@ impl<const LOW: i64, const HIGH: i64, const OPEN: bool> JsonSchema for Between<L
 }
 
 /// The version of a file's layout: there is one
-#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(try_from = "u64")]
 #[schemars(inline, extend("minimum" = 1, "maximum" = 1))]
 pub(crate) struct Version;
@@ -127,6 +127,16 @@ impl TryFrom<u64> for Version {
 pub(crate) enum OneOrEach<One, Each = Vec<One>> {
     One(One),
     Each(Each),
+}
+
+impl<One: Copy + Into<f64>> OneOrEach<One> {
+    /// The one, or the i-th of a list (NaN beyond it).
+    pub(crate) fn of(&self, i: usize) -> f64 {
+        match self {
+            Self::One(value) => (*value).into(),
+            Self::Each(values) => values.get(i).map_or(f64::NAN, |value| (*value).into()),
+        }
+    }
 }
 
 impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Deserialize<'de> for OneOrEach<One, Each> {

@@ -9,40 +9,47 @@ use chrono::{DateTime, NaiveDateTime, Utc};
 use glam::DQuat;
 use nav_sim_navigation::trajectory::TrajectorySample;
 use nav_sim_signal::units::DEG;
-use quick_xml::Reader;
-use quick_xml::events::{BytesStart, Event};
-
-/// What a track point needs, in the order of the columns in messages.
-const COLUMNS: [&str; 4] = ["time", "lat", "lon", "ele"];
+use roxmltree::{Document, Node};
 
 /// A GPX track; heading and pitch follow the path.
 pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
+    let document = Document::parse(text).map_err(|e| {
+        let line = u64::from(e.pos().row);
+        Error::contents(path, line, format!("not well-formed XML: {e}"))
+    })?;
     let mut rows = Rows::new(path, Vec::new(), Vec::new(), Attitude::OfPath);
-    let mut start = None;
-    for Point { line, texts } in track_points(path, text)? {
-        let absent = |column: usize| {
+    let (mut start, mut line, mut counted) = (None, 1, 0);
+    let nodes = document.descendants();
+    for point in nodes.filter(|node| node.tag_name().name() == "trkpt") {
+        let begin = point.range().start;
+        line += text[counted..begin].matches('\n').count() as u64;
+        counted = begin;
+        // extensions have times and elevations of their own
+        let child = |name| point.children().find(|own| own.tag_name().name() == name);
+        let text = |name| {
+            let child = || child(name)?.children().find(Node::is_text)?.text();
+            point.attribute(name).or_else(child)
+        };
+        let absent = |column| {
             let reason = "does not have it, or not as a number";
-            let error = Error::cell(path, line, COLUMNS[column], "the track point", reason);
-            error.or_hint(
+            Error::cell(path, line, column, "the track point", reason).or_hint(
                 "every <trkpt> needs lat, lon, <ele> and <time>: export them with the track",
             )
         };
-        let number = |column: usize| {
-            texts[column]
-                .trim()
-                .parse::<f64>()
-                .map_err(|_| absent(column))
+        let number = |column| {
+            let number = text(column).and_then(|text| text.trim().parse::<f64>().ok());
+            number.ok_or_else(|| absent(column))
         };
-        let time = instant(texts[0].trim()).ok_or_else(|| absent(0))?;
-        let sample = TrajectorySample {
-            t_s: seconds_between(*start.get_or_insert(time), time),
-            lat: number(1)? * DEG,
-            lon: number(2)? * DEG,
-            h: number(3)?,
+        let time = text("time").and_then(|text| instant(text.trim()));
+        let time = time.ok_or_else(|| absent("time"))?;
+        rows.samples.push(TrajectorySample {
+            t_s: (time - *start.get_or_insert(time)).as_seconds_f64(),
+            lat: number("lat")? * DEG,
+            lon: number("lon")? * DEG,
+            h: number("ele")?,
             q_b_n: DQuat::IDENTITY,
-        };
+        });
         rows.lines.push(line);
-        rows.samples.push(sample);
     }
     if rows.samples.is_empty() {
         return Err(Error::contents(path, Place::Within, "no rows in it"));
@@ -54,71 +61,6 @@ pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
     Ok(rows)
 }
 
-/// A track point as it is written.
-#[derive(Debug, Default)]
-struct Point {
-    line: u64,
-    /// In the order of [`COLUMNS`]; empty where the point does not have it.
-    texts: [String; 4],
-}
-
-fn track_points(path: &str, text: &str) -> Result<Vec<Point>, Error> {
-    let mut reader = Reader::from_str(text);
-    reader.config_mut().expand_empty_elements = true;
-    // Names of the open elements, from the track point on: extensions have times and elevations of their own.
-    let mut within: Vec<String> = Vec::new();
-    let mut points: Vec<Point> = Vec::new();
-    let (mut line, mut counted) = (1, 0);
-    loop {
-        let begin = reader.buffer_position() as usize;
-        line += text[counted..begin].matches('\n').count() as u64;
-        counted = begin;
-        let malformed = |e| Error::contents(path, line, format!("not well-formed XML: {e}"));
-        let event = reader.read_event().map_err(malformed)?;
-        match event {
-            Event::Start(tag) if !within.is_empty() || tag.local_name().as_ref() == "trkpt" => {
-                if within.is_empty() {
-                    points.push(track_point(line, &tag));
-                }
-                within.push(tag.local_name().as_ref().to_owned());
-            }
-            Event::End(_) => {
-                within.pop();
-            }
-            Event::Text(part) => append(&mut points, &within, &part.into_inner()),
-            Event::CData(part) => append(&mut points, &within, &part.into_inner()),
-            Event::Eof => return Ok(points),
-            _ => {}
-        }
-    }
-}
-
-fn track_point(line: u64, tag: &BytesStart<'_>) -> Point {
-    let mut point = Point {
-        line,
-        ..Point::default()
-    };
-    for attribute in tag.attributes().flatten() {
-        if let Some(column) = COLUMNS
-            .iter()
-            .position(|name| *name == attribute.key.local_name().as_ref())
-        {
-            point.texts[column] = attribute.value.into_owned();
-        }
-    }
-    point
-}
-
-/// Appends text to what the open element of the last track point holds.
-fn append(points: &mut [Point], within: &[String], text: &str) {
-    let ([_, name], Some(point)) = (within, points.last_mut()) else {
-        return;
-    };
-    if let Some(column) = COLUMNS.iter().position(|column| column == name) {
-        point.texts[column].push_str(text);
-    }
-}
-
 /// A time as GPX has it: 2024-05-01T10:20:30.5Z, with another offset, or without one (UTC).
 fn instant(text: &str) -> Option<DateTime<Utc>> {
     let local =
@@ -127,13 +69,6 @@ fn instant(text: &str) -> Option<DateTime<Utc>> {
         .map(|time| time.to_utc())
         .or_else(|_| local())
         .ok()
-}
-
-/// Exact to the nanosecond: seconds and nanoseconds are subtracted apart.
-fn seconds_between(start: DateTime<Utc>, end: DateTime<Utc>) -> f64 {
-    let nanoseconds =
-        f64::from(end.timestamp_subsec_nanos()) - f64::from(start.timestamp_subsec_nanos());
-    (end.timestamp() - start.timestamp()) as f64 + 1e-9 * nanoseconds
 }
 
 #[cfg(test)]
@@ -241,7 +176,7 @@ mod tests {
             ("2017-01-01T01:30:00+01:30", 0.25),
         ] {
             assert_eq!(
-                seconds_between(start, instant(text).unwrap()),
+                (instant(text).unwrap() - start).as_seconds_f64(),
                 seconds,
                 "{text}"
             );

@@ -83,7 +83,7 @@ pub(super) fn tum(
         let q_flu_enu = DQuat::from_slice(&all[4..]);
         if (q_flu_enu.length() - 1.0).abs() > 0.01 {
             let reason = "does not make a unit quaternion with the others";
-            let line = table.lines.of(row);
+            let line = table.line(row);
             return Err(Error::cell(path, line, "qw", all[7].to_string(), reason));
         }
         let r_ned = q_enu_ned * DVec3::from_slice(&all[1..4]);
@@ -94,7 +94,7 @@ pub(super) fn tum(
             q_enu_ned * q_flu_enu * q_frd_flu,
         ));
     }
-    let lines = (0..table.rows()).map(|row| table.lines.of(row)).collect();
+    let lines = (0..table.rows()).map(|row| table.line(row)).collect();
     let mut rows = Rows::new(path, lines, samples, Attitude::Given);
     rows.doubt(
         None,

@@ -25,7 +25,7 @@ impl Rows {
         let Some(reference) = Reference::of_stretches(stretches) else {
             let whole = self.stretch(0..self.samples.len()).err();
             let none = "no stretch of five seconds without a jump in position or attitude";
-            let none = || Error::contents(self.path.as_str(), Place::Within, none);
+            let none = || Error::contents(&self.path, Place::Within, none);
             return Err(refused.or(whole).unwrap_or_else(none));
         };
         if let Some(first) = found.first() {

@@ -66,7 +66,7 @@ const ATTITUDE: [&str; 3] = ["roll_deg", "pitch_deg", "yaw_deg"];
 const VELOCITY: [&str; 3] = ["v_n_m_s", "v_e_m_s", "v_d_m_s"];
 
 /// Source of the attitude of rows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, PartialEq)]
 pub(super) enum Attitude {
     /// The file.
     Given,
@@ -190,7 +190,7 @@ impl Rows {
     }
 
     fn refuse(&self, index: usize, message: String, advice: &'static str) -> Error {
-        Error::contents(self.path.as_str(), self.lines[index], message).or_hint(advice)
+        Error::contents(&self.path, self.lines[index], message).or_hint(advice)
     }
 
     fn check_jumps(&self) -> Result<(), Error> {
@@ -255,17 +255,40 @@ pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Res
                 && out_of_range(table, row).is_none()
         }),
     }
-    let attitude = match table.has(ATTITUDE[0]) {
-        true => Attitude::Given,
-        false => Attitude::OfPath,
+    let (attitude, velocity) = (table.all(ATTITUDE), table.all(VELOCITY));
+    let [time] = table.columns(["t_s"], &dictionary(numbers))?;
+    let place = table.columns(position, &dictionary(numbers))?;
+    let (week, origin) = (
+        table.get("week"),
+        is_local.then(|| origin(&table, options)).transpose()?,
+    );
+    let triad = |columns: [&Column; 3], row| columns.map(|column| column.si(row));
+    let sample = |row| {
+        let weeks = week.map_or(0.0, |week| week.si(row) - week.si(0));
+        let t_s = time.si(row) + weeks * WEEK_S;
+        let [roll, pitch, yaw] = attitude.map_or([0.0; 3], |all| triad(all, row));
+        let q_b_n = RollPitchYaw { roll, pitch, yaw }.to_quat();
+        let [lat, lon, h] = triad(place, row);
+        match origin {
+            None => TrajectorySample {
+                t_s,
+                lat,
+                lon,
+                h,
+                q_b_n,
+            },
+            Some(origin) => local(t_s, origin, [lat, lon, h].into(), q_b_n),
+        }
     };
-    let lines = (0..table.rows()).map(|row| table.lines.of(row)).collect();
-    let samples = samples(&table, options)?;
+    let samples = (0..table.rows()).map(sample).collect();
+    let lines = (0..table.rows()).map(|row| table.line(row)).collect();
+    let attitude = attitude.map_or(Attitude::OfPath, |_| Attitude::Given);
     let mut rows = Rows::new(&table.path, lines, samples, attitude);
     rows.geodetic = !is_local;
-    if let Some(velocity) = table.all(VELOCITY) {
-        rows.velocities = (0..table.rows()).map(|row| triad(velocity, row)).collect();
-    }
+    let velocity = velocity.into_iter();
+    rows.velocities = velocity
+        .flat_map(|own| (0..table.rows()).map(move |row| triad(own, row).into()))
+        .collect();
     if all > rows.lines.len() {
         let left_out = all - rows.lines.len();
         let text = format!("{left_out} rows left out: values not finite, or out of range");
@@ -313,42 +336,6 @@ fn check_units(table: &Table) -> Result<(), Error> {
         .or_hint("end the names in _deg or _rad"))
 }
 
-fn triad(columns: [&Column; 3], row: usize) -> DVec3 {
-    columns.map(|column| column.si(row)).into()
-}
-
-fn samples(table: &Table, options: &Options) -> Result<Vec<TrajectorySample>, Error> {
-    let (attitude, geodetic) = (table.all(ATTITUDE), table.all(GEODETIC));
-    let origin = match geodetic {
-        Some(_) => None,
-        None => Some(origin(table, options)?),
-    };
-    let (Some(time), Some(place)) = (table.get("t_s"), geodetic.or(table.all(LOCAL))) else {
-        return Ok(Vec::new());
-    };
-    let week_s = |row| {
-        let week = table.get("week");
-        week.map_or(0.0, |week| (week.si(row) - week.si(0)) * WEEK_S)
-    };
-    let sample = |row| {
-        let t_s = time.si(row) + week_s(row);
-        let [roll, pitch, yaw] = attitude.map_or([0.0; 3], |all| all.map(|c| c.si(row)));
-        let q_b_n = RollPitchYaw { roll, pitch, yaw }.to_quat();
-        let place = triad(place, row);
-        match origin {
-            None => TrajectorySample {
-                t_s,
-                lat: place.x,
-                lon: place.y,
-                h: place.z,
-                q_b_n,
-            },
-            Some(origin) => local(t_s, origin, place, q_b_n),
-        }
-    };
-    Ok((0..table.rows()).map(sample).collect())
-}
-
 /// A sample given in the axes north, east, down of the origin.
 pub(super) fn local(
     t_s: f64,
@@ -376,7 +363,7 @@ pub(super) fn origin(table: &Table, options: &Options) -> Result<[f64; 3], Error
     line.and_then(|line| parse_origin(line.trim_start_matches([':', '=', ' '])))
         .ok_or_else(|| {
             let message = "a trajectory in local coordinates needs an origin on the Earth";
-            Error::contents(table.path.as_str(), Place::Within, message)
+            Error::contents(&table.path, Place::Within, message)
                 .or(help::ORIGIN)
                 .or(help::ORIGIN_ELSEWHERE)
                 .or_hint("a first line \"# origin: LAT_DEG, LON_DEG, H_M\"")
@@ -414,43 +401,31 @@ fn out_of_range(table: &Table, row: usize) -> Option<(&Column, &'static str)> {
 fn check_ranges(table: &Table) -> Result<(), Error> {
     let mut found = (0..table.rows()).filter_map(|row| Some((row, out_of_range(table, row)?)));
     found.next().map_or(Ok(()), |(row, (column, reason))| {
-        let (line, value) = (table.lines.of(row), column.values[row].to_string());
+        let (line, value) = (table.line(row), column.values[row].to_string());
         Err(Error::cell(&table.path, line, &column.name, value, reason).or_hint(DEGREES))
     })
 }
 
 /// Heading and pitch along the path; at rest between those before and after.
 pub(super) fn follow_path(samples: &mut [TrajectorySample]) {
-    let directions: Vec<Option<(f64, f64)>> =
-        (0..samples.len()).map(|i| direction(samples, i)).collect();
-    let moving: Vec<usize> = (0..samples.len())
-        .filter(|&i| directions[i].is_some())
-        .collect();
-    for i in 0..samples.len() {
-        let next = moving.partition_point(|&k| k < i);
-        let after = moving.get(next).copied();
-        let before = if after == Some(i) {
-            after
-        } else {
-            next.checked_sub(1).map(|k| moving[k])
+    let moving = |i: usize| Some((samples[i].t_s, direction(samples, i)?));
+    let moving: Vec<(f64, (f64, f64))> = (0..samples.len()).filter_map(moving).collect();
+    let direction_of = |k: usize| moving.get(k.min(moving.len().saturating_sub(1)));
+    for sample in samples {
+        let next = moving.partition_point(|(t_s, ..)| *t_s < sample.t_s);
+        let from = direction_of(next.saturating_sub(1));
+        let (Some(from), Some(to)) = (from, direction_of(next)) else {
+            continue;
         };
-        let share = match (before, after) {
-            (Some(a), Some(b)) if b > a => {
-                (samples[i].t_s - samples[a].t_s) / (samples[b].t_s - samples[a].t_s)
-            }
+        let share = match to.0 - from.0 {
+            span if span > 0.0 => ((sample.t_s - from.0) / span).clamp(0.0, 1.0),
             _ => 0.0,
         };
-        let direction_of = |k: Option<usize>| k.and_then(|k| directions[k]);
-        let from = direction_of(before)
-            .or(direction_of(after))
-            .unwrap_or_default();
-        let to = direction_of(after).unwrap_or(from);
-        let yaw = from.0 + share * wrap_angle(to.0 - from.0);
-        let pitch = from.1 + share * (to.1 - from.1);
-        samples[i].q_b_n = RollPitchYaw {
+        let ((yaw, pitch), (to_yaw, to_pitch)) = (from.1, to.1);
+        sample.q_b_n = RollPitchYaw {
             roll: 0.0,
-            pitch,
-            yaw,
+            pitch: pitch + share * (to_pitch - pitch),
+            yaw: yaw + share * wrap_angle(to_yaw - yaw),
         }
         .to_quat();
     }

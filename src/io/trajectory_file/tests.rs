@@ -408,9 +408,10 @@ fn a_far_time_stamp_is_refused_with_its_line_in_every_format() {
         )
     };
     let track = |last: u32| {
-        (0..5)
+        let points: String = (0..5)
             .map(|k| point(if k == 4 { last } else { 2 }, k))
-            .collect::<String>()
+            .collect();
+        format!("<gpx>{points}</gpx>")
     };
     let e = gpx::gpx("a.gpx", &track(0)).unwrap_err().to_string();
     assert_eq!(
@@ -455,8 +456,8 @@ fn jumps_and_heights_of_other_formats_are_refused_as_those_of_tables() {
             "<trkpt lat='46' lon='7'><ele>{h}</ele><time>2024-02-01T00:00:0{k}Z</time></trkpt>\n"
         )
     };
-    let text: String = (0..6).map(point).collect();
-    let e = gpx::gpx("a.gpx", &text)
+    let points: String = (0..6).map(point).collect();
+    let e = gpx::gpx("a.gpx", &format!("<gpx>{points}</gpx>"))
         .unwrap()
         .trajectory()
         .unwrap_err()

@@ -6,7 +6,7 @@ use nav_sim_signal::units::DEG;
 use std::fmt::Write;
 
 /// Which instants become rows.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) enum Rows {
     /// Evenly spaced ones, from the start (Hz).
     Rate(f64),

@@ -10,7 +10,8 @@
 ))]
 
 use nav_sim_logs::{Content, Error, Fault, Log, Stamp, npz};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
 
 fn bytes(name: &str) -> Vec<u8> {
     std::fs::read(
@@ -21,45 +22,54 @@ fn bytes(name: &str) -> Vec<u8> {
     .unwrap()
 }
 
+/// Opens a file of these bytes.
+fn from_bytes<T>(bytes: &[u8], open: fn(&Path) -> Result<T, Error>) -> (TempDir, Result<T, Error>) {
+    let in_memory = || tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir());
+    let place = in_memory().unwrap();
+    let path = place.path().join("log");
+    std::fs::write(&path, bytes).unwrap();
+    (place, open(&path))
+}
+
 fn refused(bytes: &[u8]) -> Error {
-    match Log::from_bytes(bytes) {
-        Err(error) => error,
-        Ok(log) => log
-            .imu(None, Stamp::Header)
-            .unwrap()
-            .find_map(Result::err)
-            .unwrap(),
+    match from_bytes(bytes, Log::open) {
+        (_, Err(error)) => error,
+        (_place, Ok(log)) => {
+            let imu = log.channel(Content::Imu, None).unwrap();
+            log.imu(imu, Stamp::Header).unwrap_err()
+        }
     }
 }
 
 /// Number of samples, the error of the cut, and the bytes before it.
 fn cut(bytes: &[u8]) -> (usize, String, u64) {
-    let log = Log::from_bytes(bytes).unwrap();
-    let mut samples = log.imu(None, Stamp::Header).unwrap();
-    let count = samples.by_ref().map(Result::unwrap).count();
-    let damage = samples.damage().or(log.damage()).unwrap();
+    let (_place, log) = from_bytes(bytes, Log::open);
+    let log = log.unwrap();
+    let imu = log.channel(Content::Imu, None).unwrap();
+    let count = log.imu(imu, Stamp::Header).unwrap().len();
+    let damage = log.damage().unwrap();
     assert_eq!(damage.file_bytes, bytes.len() as u64);
     (count, damage.error.to_string(), damage.read_bytes)
 }
 
 /// Reads all that a log holds.
 fn log(bytes: &[u8]) {
-    let Ok(log) = Log::from_bytes(bytes) else {
+    let (_place, Ok(log)) = from_bytes(bytes, Log::open) else {
         return;
     };
     for channel in log.channels() {
-        let topic = Some(channel.topic.as_str());
         match channel.content {
-            Content::Imu => _ = log.imu(topic, Stamp::Header).map(Iterator::count),
-            Content::Fix => _ = log.fixes(topic, Stamp::Log).map(Iterator::count),
+            Content::Imu => _ = log.imu(channel, Stamp::Header),
+            Content::Fix => _ = log.fixes(channel, Stamp::Log),
             Content::Other => {}
         }
     }
 }
 
 fn archive(bytes: &[u8]) {
-    if let Ok(archive) = npz::Archive::from_bytes(bytes) {
-        archive.names().for_each(|name| _ = archive.read(name));
+    if let (_place, Ok(mut archive)) = from_bytes(bytes, npz::Archive::open) {
+        let names = archive.names();
+        names.iter().for_each(|name| _ = archive.read(name));
     }
 }
 
@@ -146,7 +156,7 @@ fn a_file_without_its_end_is_still_being_written() {
         ends.push(ends[ends.len() - 1] + 9 + u64::from_le_bytes(*head) as usize);
     }
     for end in &ends[4..8] {
-        let log = Log::from_bytes(&all[..*end]).unwrap();
+        let log = from_bytes(&all[..*end], Log::open).1.unwrap();
         let error = &log.damage().unwrap().error;
         assert!(
             matches!(error, Error::At(place, Fault::StillWritten) if place.offset == *end as u64),
@@ -192,14 +202,10 @@ fn time_that_goes_back_is_refused() {
         "{text}"
     );
     // the arrivals are in order
-    let log = Log::from_bytes(all).unwrap();
-    assert_eq!(
-        log.imu(None, Stamp::Log)
-            .unwrap()
-            .filter(Result::is_ok)
-            .count(),
-        12
-    );
+    let (_place, log) = from_bytes(&all, Log::open);
+    let log = log.unwrap();
+    let imu = log.channel(Content::Imu, None).unwrap();
+    assert_eq!(log.imu(imu, Stamp::Log).unwrap().len(), 12);
 }
 
 #[test]
@@ -236,7 +242,7 @@ fn lengths_and_encodings_are_checked_before_anything_is_unpacked() {
         .unwrap();
     let size = bag[at..].windows(5).position(|w| w == b"size=").unwrap() + at + 9;
     bag[size..size + 4].copy_from_slice(&(2_u32 << 30).to_le_bytes());
-    let log = Log::from_bytes(bag).unwrap();
+    let log = from_bytes(&bag, Log::open).1.unwrap();
     let error = &log.damage().unwrap().error;
     assert!(matches!(error, Error::At(_, Fault::Truncated { needed, .. }) if *needed == 2 << 30));
 }
@@ -245,12 +251,10 @@ fn lengths_and_encodings_are_checked_before_anything_is_unpacked() {
 fn what_is_no_message_of_a_receiver_is_passed_over() {
     let all = bytes("ublox.ubx");
     let count = |bytes: &[u8]| {
-        let log = Log::from_bytes(bytes).unwrap();
-        let fixes = log
-            .fixes(None, Stamp::Header)
-            .unwrap()
-            .map(Result::unwrap)
-            .count();
+        let (_place, log) = from_bytes(bytes, Log::open);
+        let log = log.unwrap();
+        let fix = log.channel(Content::Fix, None).unwrap();
+        let fixes = log.fixes(fix, Stamp::Header).unwrap().len();
         let failed = log
             .channels()
             .iter()

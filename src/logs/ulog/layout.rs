@@ -10,14 +10,14 @@ const DEEPEST: usize = 8;
 pub(super) type Formats = HashMap<String, String>;
 
 /// Places of a message's own fields; those of formats within it are passed over.
-#[derive(Debug, Clone, Default)]
+#[derive(Default)]
 pub(super) struct Layout {
     fields: HashMap<String, Field>,
 }
 
 /// Field of a message.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Field {
+#[derive(Clone, Copy)]
+struct Field {
     at: usize,
     number: Number,
     count: usize,
@@ -46,16 +46,11 @@ impl Layout {
         let mut layout = Self::default();
         let mut at = 0_usize;
         for (type_name, count, field) in fields(formats.get(name)?) {
-            let size = match number(type_name) {
-                Some(number) => {
-                    layout
-                        .fields
-                        .insert(field.to_owned(), Field { at, number, count });
-                    number.size()
-                }
-                None => size_of_format(type_name, formats, 0)?,
-            };
-            at = at.checked_add(size.checked_mul(count)?)?;
+            if let Some(number) = number(type_name) {
+                let own = Field { at, number, count };
+                layout.fields.insert(field.to_owned(), own);
+            }
+            at = at.checked_add(size_of(type_name, formats, 0)?.checked_mul(count)?)?;
         }
         Some(layout)
     }
@@ -66,31 +61,34 @@ impl Layout {
         field.filter(|field| field.count == count)
     }
 
-    pub(super) fn one(&self, name: &str) -> Option<Field> {
-        self.field(name, 1)
+    /// Numbers of a field; none where the message is too short or the layout has no such field.
+    pub(super) fn numbers<const N: usize>(&self, name: &str, message: &[u8]) -> Option<[f64; N]> {
+        let field = self.field(name, N)?;
+        let mut bytes = Bytes::little(message.get(field.at..)?);
+        let mut values = [0.0; N];
+        for value in &mut values {
+            *value = field.number.read(&mut bytes)?;
+        }
+        Some(values)
     }
 
-    pub(super) fn three(&self, name: &str) -> Option<Field> {
-        self.field(name, 3)
-    }
-
-    /// Time of a message (µs in it) (ns).
-    pub(super) fn time_ns(&self, message: &[u8]) -> Option<i64> {
-        self.one("timestamp")?.time_ns(message)
+    /// Time (µs in the message) (ns); none beyond what can be a time.
+    pub(super) fn time_ns(&self, name: &str, message: &[u8]) -> Option<i64> {
+        let field = self.field(name, 1)?;
+        let field = (field.number == Number::Unsigned(8)).then_some(field)?;
+        let us = Bytes::little(message.get(field.at..)?).u64()?;
+        i64::try_from(us).ok()?.checked_mul(1000)
     }
 }
 
-/// Bytes of a format.
-fn size_of_format(name: &str, formats: &Formats, depth: usize) -> Option<usize> {
-    if depth > DEEPEST {
-        return None;
+/// Bytes of a type, or of a format.
+fn size_of(name: &str, formats: &Formats, depth: usize) -> Option<usize> {
+    if let Some(number) = number(name) {
+        return Some(number.size());
     }
-    fields(formats.get(name)?).try_fold(0_usize, |sum, (type_name, count, _)| {
-        let size = match number(type_name) {
-            Some(number) => number.size(),
-            None => size_of_format(type_name, formats, depth + 1)?,
-        };
-        sum.checked_add(size.checked_mul(count)?)
+    let mut fields = fields(formats.get(name).filter(|_| depth <= DEEPEST)?);
+    fields.try_fold(0_usize, |sum, (type_name, count, _)| {
+        sum.checked_add(size_of(type_name, formats, depth + 1)?.checked_mul(count)?)
     })
 }
 
@@ -104,32 +102,4 @@ fn fields(format: &str) -> impl Iterator<Item = (&str, usize, &str)> {
         };
         Some((type_name, count, name))
     })
-}
-
-impl Field {
-    fn numbers<const N: usize>(self, message: &[u8]) -> Option<[f64; N]> {
-        let mut bytes = Bytes::little(message.get(self.at..)?);
-        let mut values = [0.0; N];
-        for value in &mut values {
-            *value = self.number.read(&mut bytes)?;
-        }
-        Some(values)
-    }
-
-    pub(super) fn value(self, message: &[u8]) -> Option<f64> {
-        self.numbers::<1>(message).map(|[value]| value)
-    }
-
-    pub(super) fn triad(self, message: &[u8]) -> Option<[f64; 3]> {
-        self.numbers(message)
-    }
-
-    /// Time (µs in the message) (ns); none beyond what can be a time.
-    pub(super) fn time_ns(self, message: &[u8]) -> Option<i64> {
-        if self.number != Number::Unsigned(8) {
-            return None;
-        }
-        let us = Bytes::little(message.get(self.at..)?).u64()?;
-        i64::try_from(us).ok()?.checked_mul(1000)
-    }
 }

@@ -3,7 +3,7 @@
 use super::layout::{Formats, Layout};
 use crate::bytes::{Bytes, text};
 use crate::error::Error;
-use crate::input::{Input, Origin};
+use crate::input::Input;
 use std::collections::HashMap;
 
 const MAGIC: [u8; 7] = *b"ULog\x01\x12\x35";
@@ -12,66 +12,54 @@ const APPENDED: u8 = 1;
 
 /// Message of a topic.
 pub(super) struct Data {
-    pub(super) id: u32,
+    pub(super) id: u16,
     pub(super) offset: u64,
     pub(super) bytes: Vec<u8>,
 }
 
+/// Topic of a log.
+pub(super) struct Topic {
+    pub(super) name: String,
+    pub(super) instance: u8,
+    pub(super) layout: Layout,
+}
+
 /// Messages of a file.
-pub(super) struct Messages {
-    input: Input,
+pub(super) struct Messages<'a> {
+    input: &'a mut Input,
     formats: Formats,
-    subscriptions: HashMap<u16, (String, u8)>,
-    /// Bytes from which on data was appended, the next one last.
-    appended: Vec<u64>,
-    /// Byte behind the last message.
+    /// Topics by their numbers.
+    pub(super) topics: HashMap<u16, Topic>,
+    /// Byte from which on data was appended: what comes before it may be cut, and it is no flight.
     end: u64,
 }
 
-impl Messages {
-    pub(super) fn new(origin: &Origin) -> Result<Self, Error> {
-        let mut input = origin.open()?;
+impl<'a> Messages<'a> {
+    pub(super) fn new(input: &'a mut Input) -> Result<Self, Error> {
         if input.array()? != MAGIC {
             return Err(Error::malformed(0, "not the start of a ULog file"));
         }
         // version and time of the start
         input.skip(9)?;
-        let end = input.position();
         Ok(Self {
             input,
             formats: Formats::new(),
-            subscriptions: HashMap::new(),
-            appended: Vec::new(),
-            end,
+            topics: HashMap::new(),
+            end: u64::MAX,
         })
-    }
-
-    pub(super) const fn end(&self) -> u64 {
-        self.end
-    }
-
-    pub(super) const fn length(&self) -> u64 {
-        self.input.length()
-    }
-
-    /// Topic, instance and layout of a number.
-    pub(super) fn subscription(&self, id: u32) -> Option<(&str, u8, Layout)> {
-        let (name, instance) = self.subscriptions.get(&u16::try_from(id).ok()?)?;
-        Some((name, *instance, Layout::new(name, &self.formats)?))
     }
 
     /// The next message of a topic: of any, or of one.
     pub(super) fn next_data(&mut self, only: Option<u32>) -> Result<Option<Data>, Error> {
         loop {
-            self.end = self.input.position();
-            if self.input.left() == 0 {
+            let offset = self.input.position();
+            if self.input.left() == 0 || offset + 3 > self.end {
                 return Ok(None);
             }
-            let offset = self.input.position();
-            if self.is_cut_at_appended(offset)? {
-                continue;
-            }
             let (size, kind) = (self.input.u16()?, self.input.u8()?);
+            if self.input.position() + u64::from(size) > self.end {
+                return Ok(None);
+            }
             self.input.expect(size.into())?;
             if kind != b'D' {
                 self.other(kind, size, offset)?;
@@ -84,33 +72,13 @@ impl Messages {
                     "a message of a topic without a number",
                 ));
             };
-            let id = u32::from(self.input.u16()?);
-            if only.is_none_or(|only| only == id) {
+            let id = self.input.u16()?;
+            if only.is_none_or(|only| only == u32::from(id)) {
                 let bytes = self.input.bytes(rest, rest)?;
                 return Ok(Some(Data { id, offset, bytes }));
             }
             self.input.skip(rest)?;
         }
-    }
-
-    /// The last message before appended data may be cut off: goes on at that data.
-    fn is_cut_at_appended(&mut self, offset: u64) -> Result<bool, Error> {
-        let Some(next) = self.appended.last().copied() else {
-            return Ok(false);
-        };
-        if offset >= next {
-            self.appended.pop();
-            return Ok(false);
-        }
-        let is_cut = offset + 3 > next || {
-            let size = self.input.u16()?;
-            self.input.seek(offset)?;
-            offset + 3 + u64::from(size) > next
-        };
-        if is_cut {
-            self.input.seek(next)?;
-        }
-        Ok(is_cut)
     }
 
     /// Formats, subscriptions and flags.
@@ -133,11 +101,16 @@ impl Messages {
             }
             b'A' => {
                 let mut bytes = Bytes::little(&body);
-                let (instance, id) = (
-                    bytes.u8().ok_or_else(fault)?,
-                    bytes.u16().ok_or_else(fault)?,
-                );
-                self.subscriptions.insert(id, (text(&body[3..]), instance));
+                let (instance, id) = bytes.u8().zip(bytes.u16()).ok_or_else(fault)?;
+                let name = text(&body[3..]);
+                if let Some(layout) = Layout::new(&name, &self.formats) {
+                    let topic = Topic {
+                        name,
+                        instance,
+                        layout,
+                    };
+                    self.topics.insert(id, topic);
+                }
             }
             _ => self.flags(&body, offset).ok_or_else(fault)??,
         }
@@ -156,11 +129,8 @@ impl Messages {
             )));
         }
         if incompatible[0] & APPENDED != 0 {
-            let offsets = [bytes.u64()?, bytes.u64()?, bytes.u64()?];
-            // one that lies behind the reader would send it in circles
-            let within = |at: &u64| *at > self.input.position() && *at <= self.input.length();
-            self.appended = offsets.into_iter().filter(within).collect();
-            self.appended.sort_unstable_by(|a, b| b.cmp(a));
+            let offsets = [bytes.u64()?, bytes.u64()?, bytes.u64()?].into_iter();
+            self.end = offsets.filter(|at| *at > 0).min().unwrap_or(u64::MAX);
         }
         Some(Ok(()))
     }

@@ -1,7 +1,7 @@
 //! Sentences of the manuals, and damaged ones.
 
 use super::*;
-use nav_sim_document::Importance;
+use nav_sim_document::{Importance, Note};
 use nav_sim_signal::units::DEG;
 
 const SIGMA: FixSigma = FixSigma {
@@ -197,73 +197,20 @@ fn what_a_logger_writes_before_a_sentence_is_ignored() {
     assert!(!is_nmea("t_s,price\n0,$12\n") && !is_nmea("t_s,lat_deg\n0,46\n"));
 }
 
-/// The checksum is optional for most sentences: a log that has none is read, with a doubt, where its sentences are whole
-/// by their numbers of fields; one that has some is damaged where there is none.
+/// An IMU that runs in Unix time is on the day that most sentences state; another counts the seconds of the day.
 #[test]
-fn a_log_without_any_checksum_is_read_with_a_doubt() {
-    let log = second("123519", "230394") + &second("123520", "230394");
-    let bare: String = log
-        .lines()
-        .map(|line| line.split('*').next().unwrap().to_owned() + "\n")
-        .collect();
-    let (with, without) = (said(&log, None), said(&bare, None));
-    assert_eq!(with.0, without.0);
-    assert!(
-        without.1[1].starts_with("doubt: no sentence has a checksum"),
-        "{without:?}"
-    );
-    assert!(
-        without.1.iter().filter(|r| r.starts_with("doubt")).count() == 1
-            && with.1.len() + 1 == without.1.len()
-    );
-    let refused = |text: &str| {
-        fixes("a.nmea", text, Some(&SIGMA), None)
-            .unwrap_err()
-            .to_string()
-    };
-    let lines: Vec<&str> = bare.lines().collect();
-    let cut = bare.replacen(lines[1], &lines[1][..50], 1);
-    assert!(
-        refused(&cut).starts_with("a.nmea, line 2: a sentence that is cut: $GPGGA"),
-        "{}",
-        refused(&cut)
-    );
-    let run_together = bare.replacen(&format!("{}\n", lines[1]), &lines[1][..50], 1);
-    assert!(refused(&run_together).starts_with("a.nmea, line 2: a sentence within a sentence"));
-    let some = bare.replacen(lines[0], log.lines().next().unwrap(), 1);
-    assert!(refused(&some).starts_with("a.nmea, line 2: a sentence without its checksum"));
-    // a last line without an end, cut within the last of its numbers
-    let unfinished = format!(
-        "{bare}{}",
-        &second("123521", "230394")
-            .lines()
-            .nth(1)
-            .unwrap()
-            .replace(",,*", ",1")
-    );
-    assert_eq!(said(&unfinished, None).0.len(), 2);
-}
-
-/// 2026-11-23 was 2007-04-09 1024 weeks before: an IMU that runs in Unix time tells which of the two a receiver means.
-#[test]
-fn dates_of_a_week_counter_that_has_rolled_over_are_told() {
-    let log = second("100000", "090407") + &second("100001", "090407");
+fn the_day_is_that_of_most_sentences() {
+    let log = second("100000", "231126") + &second("100001", "231126");
     let day_s = 1_795_392_000.0;
     let imu = Some((day_s + 35_990.0, day_s + 36_100.0));
-    let (rolled, words) = said(&log, imu);
-    assert_eq!(rolled[0].t_s, day_s + 36_000.0);
-    assert!(
-        words[0].ends_with("times are Unix time") && words[1].contains("rolled over"),
-        "{words:?}"
-    );
+    let (fixes, words) = said(&log, imu);
+    assert_eq!(fixes[0].t_s, day_s + 36_000.0);
+    assert!(words[0].ends_with("times are Unix time"), "{words:?}");
     // another day than the IMU's, or an IMU that counts from its start: seconds of the day
     let other = second("100000", "080407") + &second("100001", "080407");
     assert_eq!(said(&other, imu).0[0].t_s, 36_000.0);
     assert_eq!(said(&log, Some((0.0, 100.0))).1.len(), 1);
     // before it has found the time, a receiver states any date
-    let (found, _) = said(
-        &(second("095959", "060180") + &second("100000", "231126") + &second("100001", "231126")),
-        imu,
-    );
+    let (found, _) = said(&(second("095959", "060180") + &log), imu);
     assert_eq!(found[1].t_s, day_s + 36_000.0);
 }

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// Heights at which the gravity model means something (m).
-pub(super) type Height = Between<-12_000, 1_000_000, false>;
+type Height = Between<-12_000, 1_000_000, false>;
 
 /// A drive by what the vehicle does: the trajectory of nav-sim run
 #[derive(Deserialize, JsonSchema)]
@@ -52,7 +52,7 @@ pub(super) struct Vehicle {
     pub(super) ramp_s: Option<Positive>,
 }
 
-#[derive(Clone, Copy, Default, Deserialize, JsonSchema)]
+#[derive(Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Roll {
     #[default]
