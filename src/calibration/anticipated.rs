@@ -142,13 +142,12 @@ impl Anticipated<'_> {
             .spread
             .as_ref()
             .map_or(1.0, |spread| spread.stated_where(&differ));
-        let unknown = vec![f64::NAN; outcome.fit.composite.parameters().count()];
         outcome.inference = Some(Inference {
             draws: bootstrap.draws,
             fitted: fits.len(),
             drawn: fits.iter().map(|fit| fit.composite.clone()).collect(),
             stretch,
-            intervals: intervals(&outcome, &fits, stretch, &unknown),
+            intervals: intervals(&outcome, &fits, stretch),
             practical: practical_intervals(&outcome, &fits, stretch, settings.rate_hz),
             goodness: None,
             spread: Vec::new(),

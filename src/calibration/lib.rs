@@ -55,8 +55,7 @@ pub use curve::{
     warm_up,
 };
 pub use diagnosis::{
-    Alarm, AxisScores, CommonCause, CommonFinding, Diagnosis, DriftAlarm, LeftOut, Movement,
-    Verdict, diagnose,
+    Alarm, CommonCause, CommonFinding, Diagnosis, FEWEST_TO_COMPARE, Verdict, diagnose,
 };
 pub use fit::{Fit, FitError, Termination, Weighting, estimate, fit};
 pub use format::{duration, percent};

@@ -65,12 +65,6 @@ impl Outcome {
         put(&self.fit.composite, self.scope, model);
     }
 
-    /// Whether a parameter follows the curve: its process has an amplitude, and it is not at the end of the search.
-    pub(crate) fn moves(&self, of: ParameterRef) -> bool {
-        let at_end = self.fit.at_end.contains(&of.process) && of.parameter.is_shape();
-        !(self.fit.zero.contains(&of.process) || at_end)
-    }
-
     /// The fit to a curve that resembles this one.
     pub(crate) fn estimate_again(
         &self,
@@ -367,8 +361,6 @@ pub struct ParameterInterval {
     pub lost: f64,
     /// Why there is no interval, if there is none.
     pub absent: Option<Undetermined>,
-    /// Standard error by the sandwich (units of the parameter); NaN where it stands at a bound.
-    pub standard_error: f64,
 }
 
 /// Why a parameter has no interval.

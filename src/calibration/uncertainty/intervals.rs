@@ -15,20 +15,15 @@ impl ParameterInterval {
     /// Puts the interval of another fit, of the same parameter, in place of this one, if it holds the estimate.
     pub(crate) fn replace(&mut self, other: &Self, value: f64) {
         [self.low, self.high] = holding(value, [other.low, other.high]);
-        (self.lost, self.standard_error) = (other.lost, other.standard_error);
+        self.lost = other.lost;
         let one_sided = self.low.is_nan().then_some(Undetermined::OneSided);
         self.absent = other.absent.clone().or(one_sided);
     }
 }
 
 /// The intervals of all parameters, in the order of the model. `stretch`: Student's quantile over
-/// the normal one, where the draws' own spread is known from few replicates. `standard_errors`: of the same parameters.
-pub(crate) fn intervals(
-    outcome: &Outcome,
-    fits: &[Fit],
-    stretch: f64,
-    standard_errors: &[f64],
-) -> Vec<ParameterInterval> {
+/// the normal one, where the draws' own spread is known from few replicates.
+pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<ParameterInterval> {
     let model = &outcome.fit.composite;
     let searched = correlated(&outcome.curve);
     let matched: Vec<Vec<Option<&Process>>> =
@@ -36,20 +31,47 @@ pub(crate) fn intervals(
     let mut intervals = Vec::new();
     for (i, process) in model.processes.iter().enumerate() {
         let there: Vec<&Process> = matched.iter().filter_map(|m| m[i]).collect();
-        let is_zero = outcome.fit.zero.contains(&i);
-        let lost = if is_zero {
-            1.0
-        } else {
-            1.0 - there.len() as f64 / fits.len() as f64
+        let lost = match outcome.fit.zero.contains(&i) {
+            true => 1.0,
+            false => 1.0 - there.len() as f64 / fits.len() as f64,
         };
-        let drawn = DrawnProcess {
-            index: i,
-            process,
-            drawn: there,
-            lost,
-            stretch,
+        let vanished = match lost {
+            1.0.. => Some(Undetermined::Zero),
+            lost if lost > TAIL => Some(Undetermined::Vanishes),
+            _ => None,
         };
-        let (mut own, quantiles) = drawn.intervals(&standard_errors[intervals.len()..]);
+        // By draws mirrored at the estimate, and the quantiles of the draws themselves.
+        let of_parameter = |(p, (&parameter, value)): (usize, (&Parameter, f64))| {
+            let drawn = there.iter().map(|process| process.values()[p]).collect();
+            let draws = Draws::new(parameter, drawn, stretch);
+            // Amplitudes are not negative.
+            let least = if parameter.is_shape() {
+                f64::NEG_INFINITY
+            } else {
+                0.0
+            };
+            let at_least = |end: f64| end.clamp(least, f64::INFINITY);
+            let [low, high] = match vanished {
+                // The quantile is that of what has vanished.
+                Some(_) => [f64::NAN; 2],
+                None => holding(value, draws.around(value)).map(at_least),
+            };
+            let one_sided = low.is_nan().then_some(Undetermined::OneSided);
+            let interval = ParameterInterval {
+                of: ParameterRef {
+                    process: i,
+                    parameter,
+                },
+                low,
+                high,
+                lost,
+                absent: vanished.clone().or(one_sided),
+            };
+            (interval, draws.stretched().map(at_least))
+        };
+        let parameters = process.kind().parameters().iter().zip(process.values());
+        let (mut own, quantiles): (Vec<_>, Vec<_>) =
+            parameters.enumerate().map(of_parameter).unzip();
         if own.iter().any(|i| leaves_search(searched, process, i)) {
             own.iter_mut()
                 .for_each(|i| i.refuse(Undetermined::BeyondSearch));
@@ -73,72 +95,6 @@ pub(crate) fn intervals(
         intervals.extend(own);
     }
     intervals
-}
-
-/// A process of a model, and what it is in the draws that have it.
-struct DrawnProcess<'a> {
-    /// Its position in the model.
-    index: usize,
-    process: &'a Process,
-    drawn: Vec<&'a Process>,
-    /// Share of the draws that do not have it.
-    lost: f64,
-    stretch: f64,
-}
-
-impl DrawnProcess<'_> {
-    /// The intervals of its parameters, by draws mirrored at the estimates, and the quantiles of the
-    /// draws themselves. `standard_errors`: of the same parameters.
-    fn intervals(&self, standard_errors: &[f64]) -> (Vec<ParameterInterval>, Vec<[f64; 2]>) {
-        let (mut intervals, mut quantiles) = (Vec::new(), Vec::new());
-        let parameters = self
-            .process
-            .kind()
-            .parameters()
-            .iter()
-            .zip(self.process.values());
-        for (p, (&parameter, value)) in parameters.enumerate() {
-            let of = ParameterRef {
-                process: self.index,
-                parameter,
-            };
-            let drawn = self
-                .drawn
-                .iter()
-                .map(|process| process.values()[p])
-                .collect();
-            let draws = Draws::new(parameter, drawn, self.stretch);
-            let [low, high] = match self.lost {
-                // The quantile is that of what has vanished.
-                lost if lost > TAIL => [f64::NAN; 2],
-                _ => holding(value, draws.around(value)),
-            };
-            // Amplitudes are not negative.
-            let least = if parameter.is_shape() {
-                f64::NEG_INFINITY
-            } else {
-                0.0
-            };
-            let at_least = |end: f64| end.clamp(least, f64::INFINITY);
-            let [low, high] = [low, high].map(at_least);
-            quantiles.push(draws.stretched().map(at_least));
-            let absent = match self.lost {
-                1.0.. => Some(Undetermined::Zero),
-                lost if lost > TAIL => Some(Undetermined::Vanishes),
-                _ => low.is_nan().then_some(Undetermined::OneSided),
-            };
-            let standard_error = standard_errors[intervals.len()];
-            intervals.push(ParameterInterval {
-                of,
-                low,
-                high,
-                lost: self.lost,
-                absent,
-                standard_error,
-            });
-        }
-        (intervals, quantiles)
-    }
 }
 
 /// Upper over lower quantile of the draws of an amplitude that say nothing any more; of its interval, which Student's quantile
@@ -505,9 +461,9 @@ mod tests {
             let whole = (0..100 - lost_ones).map(|i| whole(0.8 + 0.4 * i as f64 / 99.0));
             whole.chain((0..lost_ones).map(|_| lost.clone())).collect()
         };
-        let all = intervals(&outcome, &draws(2), 1.0, &[f64::NAN; 4]);
+        let all = intervals(&outcome, &draws(2), 1.0);
         assert!(all.iter().all(|i| i.absent.is_none()), "{all:?}");
-        let all = intervals(&outcome, &draws(10), 1.0, &[f64::NAN; 4]);
+        let all = intervals(&outcome, &draws(10), 1.0);
         assert!(
             all[0].absent == Some(Undetermined::Vanishes) && (all[0].lost - 0.1).abs() < 1e-9,
             "{all:?}"

@@ -422,7 +422,6 @@ impl Indistinct {
         for interval in intervals {
             let ParameterRef { process, parameter } = interval.of;
             if self.processes.contains(&process) {
-                interval.standard_error = f64::NAN;
                 interval.refuse(Undetermined::Indistinct(self.processes.clone()));
                 continue;
             }

@@ -6,7 +6,7 @@ use crate::report::comparison_table::in_order;
 use crate::report::curves::{CurvesFile, FittedCurve, recording_names};
 use crate::report::curves::{band, curve, scale_axis, sensor_name, variance_axis};
 use nav_sim_calibration::{
-    Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, Note, Outcome,
+    Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Note, Outcome,
     ParameterInterval, Ranking, Settings, TurnOnFinding, TurnOnSpread, Undetermined, Verdict,
     WIDEST, duration, percent, tau_s,
 };
@@ -232,15 +232,6 @@ fn recordings_section(json: &Value, document: &mut Document) {
         ("drift: p", "drift/p_value"),
     ];
     document.table(&Table::of(json, "/replicates/*", &columns).without_unknown());
-    let columns = [
-        ("without", "../../file"),
-        ("fit", "{signals} {estimator}"),
-        ("moves by", "change"),
-        ("at scale (s)", "tau_s"),
-        ("σ", "deviations"),
-    ];
-    let moved = Table::of(json, "/replicates/*/left_out/*", &columns);
-    document.folded("Fits without a recording", |inside| inside.table(&moved));
 }
 
 /// A row a parameter.
@@ -470,9 +461,9 @@ fn recordings_line(outcomes: &[&Outcome], diagnoses: &[Diagnosis]) -> Option<Str
     if count == 0 {
         return None;
     }
-    if diagnoses.iter().all(|d| d.scores.is_empty()) {
+    if count < FEWEST_TO_COMPARE {
         return Some(format!(
-            "{count} recordings: too few to name an abnormal one (4 are needed)"
+            "{count} recordings: too few to name an abnormal one ({FEWEST_TO_COMPARE} are needed)"
         ));
     }
     let finding = |d: &Diagnosis| {

@@ -132,7 +132,6 @@ fn processes(model: &Composite, intervals: &[ParameterInterval]) -> Vec<Value> {
     for i in intervals {
         let (entry, name) = (&mut all[i.of.process], i.of.parameter.name());
         entry[format!("{name}_ci95")] = json!(i.absent.is_none().then_some([i.low, i.high]));
-        entry[format!("{name}_se")] = json!(i.standard_error);
     }
     all
 }
