@@ -1,7 +1,7 @@
 //! Settings and results of a calibration: data that estimation, tests and words share.
 
-use crate::curve::{Estimator, Pool, Scope, Trim, implied};
-use crate::fit::{Fit, FitError, Weighting, avlr, refit, score};
+use crate::curve::{CalibrationError, Estimator, Pool, Scope, Trim, implied};
+use crate::fit::{Fit, Weighting, avlr, refit, score};
 use crate::imu::Axis;
 use crate::model::{ModelSpec, SpecError};
 use crate::noise::practical::AxisParameters;
@@ -70,7 +70,7 @@ impl Outcome {
         &self,
         curve: &Curve,
         settings: &Settings,
-    ) -> Result<Fit, FitError> {
+    ) -> Result<Fit, CalibrationError> {
         match self.estimator {
             Estimator::Avlr => avlr(curve, &self.spec),
             _ => refit(

@@ -1,51 +1,13 @@
 //! The whole of a calibration: groups of replicates × estimators → fits, and how sure they are.
 
-use crate::curve::{AverageError, Estimator, Group, average, implied};
-use crate::fit::{Fit, FitError, estimate};
+use crate::curve::{CalibrationError, Estimator, Group, average, implied};
+use crate::fit::{Fit, estimate};
 use crate::outcome::{Advance, Bootstrap, ModelChoice, Outcome, Settings};
 use crate::selection::choose;
 use crate::uncertainty::bootstrap::inference;
 use crate::uncertainty::spread::axes_differ;
 use crate::wavelet::Curve;
 use rayon::prelude::*;
-
-/// Why a group has no model.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{group}, {estimator}: {source}")]
-pub struct CalibrationError {
-    /// Name of the group.
-    pub group: String,
-    /// Name of the estimator.
-    pub estimator: &'static str,
-    /// Why.
-    pub source: Cause,
-}
-
-impl CalibrationError {
-    /// Error of a group without a curve.
-    pub(crate) fn of(group: &Group, estimator: Estimator, source: AverageError) -> Self {
-        Self::new(group, estimator, source)
-    }
-
-    fn new(group: &Group, estimator: Estimator, source: impl Into<Cause>) -> Self {
-        Self {
-            group: group.scope.name(),
-            estimator: estimator.name(),
-            source: source.into(),
-        }
-    }
-}
-
-/// Why a curve or a fit does not exist.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Cause {
-    /// No curve.
-    #[error(transparent)]
-    Average(#[from] AverageError),
-    /// No fit.
-    #[error(transparent)]
-    Fit(#[from] FitError),
-}
 
 /// Fits every group with every estimator, in that order.
 ///
@@ -76,7 +38,7 @@ pub fn calibrate_telling(
             settings.trim,
             &settings.tuning,
         )
-        .map_err(|source| CalibrationError::new(group, estimator, source))?;
+        .map_err(group.named(estimator))?;
         fit_telling(group, estimator, curve, settings, advance)
     };
     jobs.par_iter().map(run).collect()
@@ -102,7 +64,6 @@ fn fit_telling(
     settings: &Settings,
     advance: Advance<'_>,
 ) -> Result<Outcome, CalibrationError> {
-    let error = |source: Cause| CalibrationError::new(group, estimator, source);
     let without_root = curve.ignored.clone();
     leave_out(&mut curve, settings);
     let (spec, ranking) = match &settings.model {
@@ -111,28 +72,24 @@ fn fit_telling(
             (spec.clone(), None)
         }
         ModelChoice::Auto => {
-            let (spec, ranking) =
-                choose(group, estimator, &curve, settings, advance).map_err(|e| error(e.into()))?;
+            let (spec, ranking) = choose(group, estimator, &curve, settings, advance)
+                .map_err(group.named(estimator))?;
             (spec, Some(ranking))
         }
     };
-    let mut fit = estimate(
-        estimator,
-        &curve,
-        &spec,
-        settings.rate_hz,
-        settings.weighting,
-    )
-    .map_err(|e| error(e.into()))?;
-    while count_exceeded(&mut curve, &without_root, &fit, settings) {
-        fit = estimate(
+    let fitted = |curve: &Curve| {
+        estimate(
             estimator,
-            &curve,
+            curve,
             &spec,
             settings.rate_hz,
             settings.weighting,
         )
-        .map_err(|e| error(e.into()))?;
+        .map_err(group.named(estimator))
+    };
+    let mut fit = fitted(&curve)?;
+    while count_exceeded(&mut curve, &without_root, &fit, settings) {
+        fit = fitted(&curve)?;
     }
     Ok(Outcome {
         scope: group.scope,

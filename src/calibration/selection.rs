@@ -12,8 +12,8 @@
 //! it, at 1 %: the best is the most fortunate of several; and which the J-test does not reject at 1 %, by draws that
 //! scatter as the recordings do. Where it rejects the best too, the first by WVIC that passes is taken.
 
-use crate::curve::{Estimator, Group, implied};
-use crate::fit::{Fit, FitError, Weighting, fit, refit};
+use crate::curve::{CalibrationError, Estimator, Group, implied};
+use crate::fit::{Fit, Weighting, fit, refit, too_few_scales};
 use crate::model::ModelSpec;
 use crate::noise::Kind;
 use crate::outcome::{Advance, Candidate, ModelChoice, Ranking, Settings, TooSimple};
@@ -74,7 +74,7 @@ pub(crate) fn choose(
     curve: &Curve,
     settings: &Settings,
     advance: Advance<'_>,
-) -> Result<(ModelSpec, Ranking), FitError> {
+) -> Result<(ModelSpec, Ranking), CalibrationError> {
     let stage = ModelChoice::Auto.steps() / ModelChoice::STAGES;
     // One weighting for all candidates, whatever their models expect.
     let reported = settings;
@@ -105,11 +105,7 @@ pub(crate) fn choose(
     };
     field
         .rank(not_identifiable, &|| advance(stage))
-        .ok_or_else(|| FitError::TooFewScales {
-            spec: "auto".to_owned(),
-            parameters: 2,
-            scales,
-        })
+        .ok_or_else(|| too_few_scales("auto", 2, scales))
 }
 
 /// Function that draws a curve.

@@ -26,12 +26,12 @@ pub(crate) fn nearest<'a>(
 /// What to write in the place of what is not a model; `legal`: processes and models.
 pub(crate) fn model<'a>(e: &SpecError, legal: impl Iterator<Item = &'a str>) -> String {
     let legal: Vec<&str> = legal.collect();
-    match e {
-        SpecError::Unknown { term, .. } => match nearest(term, legal.iter().copied()) {
-            Some(meant) => format!("did you mean \"{meant}\"?"),
-            None => format!("processes and models: {}", legal.join(", ")),
-        },
-        _ => "a model is a sum such as 2*AR1+RW+WN+QN".into(),
+    let Some(term) = &e.term else {
+        return "a model is a sum such as 2*AR1+RW+WN+QN".into();
+    };
+    match nearest(term, legal.iter().copied()) {
+        Some(meant) => format!("did you mean \"{meant}\"?"),
+        None => format!("processes and models: {}", legal.join(", ")),
     }
 }
 

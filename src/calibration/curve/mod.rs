@@ -5,8 +5,8 @@ pub(crate) mod sampling;
 mod stationarity;
 
 pub use average::{
-    AverageError, Estimator, Group, Pool, Replicate, Scope, SignalError, Trim, TrimError, average,
-    grouped, median, replicates, trend,
+    CalibrationError, Cause, Estimator, Group, Pool, Replicate, Scope, Trim, average, grouped,
+    median, replicates, trend,
 };
 pub(crate) use average::{MAD_TO_DEVIATION, falling_root};
 pub use sampling::implied;

@@ -2,12 +2,10 @@
 
 use super::comparison::{Comparison, Piece, Test, axes, excess_of_classical};
 use super::contrasts::{FALSE_ALARM, FEWEST};
-use crate::curve::sampling::variance_of_log;
-use crate::curve::{Estimator, Group, Replicate, average};
+use crate::curve::{Group, Replicate};
 use crate::imu::{Axis, Sensor};
 use crate::noise::Process;
 use crate::outcome::{Outcome, Settings, tau_s};
-use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 

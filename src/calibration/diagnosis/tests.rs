@@ -335,9 +335,6 @@ fn a_slow_drift_is_found() {
 #[test]
 fn three_recordings_cannot_say_which() {
     let all = set(7, 3, NONE, |_, _, _| ());
-    assert!(
-        all.iter()
-            .all(|d| d.verdict == Verdict::Normal)
-    );
+    assert!(all.iter().all(|d| d.verdict == Verdict::Normal));
     assert!(set(7, 1, NONE, |_, _, _| ()).is_empty());
 }

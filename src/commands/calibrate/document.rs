@@ -6,9 +6,9 @@ use crate::report::comparison_table::in_order;
 use crate::report::curves::{CurvesFile, FittedCurve, recording_names};
 use crate::report::curves::{band, curve, scale_axis, sensor_name, variance_axis};
 use nav_sim_calibration::{
-    Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Note, Outcome,
-    ParameterInterval, Ranking, Settings, TurnOnFinding, TurnOnSpread, Undetermined, Verdict,
-    WIDEST, duration, percent, tau_s,
+    Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Note,
+    Outcome, ParameterInterval, Ranking, Settings, TurnOnFinding, TurnOnSpread, Undetermined,
+    Verdict, WIDEST, duration, percent, tau_s,
 };
 use nav_sim_document::{
     Axis as ChartAxis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone,

@@ -8,8 +8,8 @@ use crate::io::recordings::{FileReport, ReadOptions, Report};
 use crate::io::{curve_file, hash, recordings};
 use crate::report::CurvesFile;
 use nav_sim_calibration::{
-    self, Advance, Beginning, Beginnings, Bootstrap, Diagnosis, Estimator, Group, Outcome, Pool,
-    Replicate, Scope, Settings, SignalError, TurnOnSpread, WarmUp, diagnose, fit_curve, grouped,
+    self, Advance, Beginning, Beginnings, Bootstrap, CalibrationError, Diagnosis, Estimator, Group,
+    Outcome, Pool, Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve, grouped,
     infer_telling, replicates, turn_on, warm_up,
 };
 use nav_sim_signal::imu::{Channel, Recording, Sensor, Signal};
@@ -326,7 +326,7 @@ impl MeasuredRecording {
         skip_warm_up: bool,
         levels: Option<u32>,
         tuning: &Tuning,
-    ) -> Result<Self, SignalError> {
+    ) -> Result<Self, CalibrationError> {
         let signals = recording
             .signals
             .par_iter()
