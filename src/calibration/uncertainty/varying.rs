@@ -534,12 +534,6 @@ mod indistinct_tests {
             let outcome = fitted(seed, 3 + seed % 5, ratio);
             let inference = outcome.inference.as_ref().unwrap();
             indistinct += u32::from(inference.indistinct.is_some());
-            assert_eq!(
-                inference.indistinct.is_some(),
-                outcome
-                    .notes(&settings("WN+2*AR1"))
-                    .contains(&Note::Indistinct)
-            );
             for (process, phi) in [1, 2].into_iter().zip(phis) {
                 for (parameter, value) in
                     [(Parameter::Phi, phi), (Parameter::Sigma2, 1.0 - phi * phi)]

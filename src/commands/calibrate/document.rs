@@ -6,7 +6,7 @@ use crate::report::comparison_table::in_order;
 use crate::report::curves::{CurvesFile, FittedCurve, recording_names};
 use crate::report::curves::{band, curve, scale_axis, sensor_name, variance_axis};
 use nav_sim_calibration::{
-    Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Note,
+    Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE,
     Outcome, ParameterInterval, Ranking, Settings, TurnOnFinding, TurnOnSpread, Undetermined,
     Verdict, WIDEST, duration, percent, tau_s,
 };
@@ -138,8 +138,8 @@ impl ShownCalibration<'_> {
         if self.outcomes.iter().any(is_rejected) {
             return Tone::Bad;
         }
-        let misfits = self.outcomes.iter().filter_map(|o| o.misfit()).count();
-        match misfits > 0 || self.diagnoses.iter().any(is_abnormal) {
+        let is_misfit = |o: &&Outcome| o.departure().misfit.is_some();
+        match self.outcomes.iter().any(is_misfit) || self.diagnoses.iter().any(is_abnormal) {
             true => Tone::Doubtful,
             false => Tone::Good,
         }
@@ -436,8 +436,8 @@ fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {
     let (spec, departure) = (&outcome.spec, outcome.departure());
     let at = |level| duration(tau_s(level, rate_hz));
     let p = goodness(outcome).map_or(String::new(), |g| format!(" (p = {:.3})", g.p_value));
-    if let Some(misfit) = outcome.misfit() {
-        let (ratio, at) = (readable(misfit.worst.ratio), at(misfit.worst.level));
+    if let Some(worst) = departure.misfit {
+        let (ratio, at) = (readable(worst.ratio), at(worst.level));
         let (missed, scales) = (departure.missed.len(), departure.scales);
         return format!(
             "{name}: {spec} does not fit: data/model {ratio} at {at}; {missed} of {scales} scales off{p}"
@@ -529,17 +529,84 @@ pub(super) fn fit_name(outcome: &Outcome, outcomes: &[&Outcome]) -> String {
     }
 }
 
-/// The notes on a fit.
-fn fit_notes(outcome: &Outcome, settings: &Settings) -> impl Iterator<Item = String> {
-    let notes = outcome.notes(settings).into_iter();
-    notes.map(|note| note_line(&note, outcome))
+/// An amplitude known to no better than this factor, either way, is told.
+const FACTOR: f64 = 3.0;
+/// The wavelet variance of an AR1 peaks at this many correlation times.
+const PEAK: f64 = 3.78;
+
+/// Remarks on a fit, the most important first.
+fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
+    let (fit, curve, rate_hz) = (&outcome.fit, &outcome.curve, settings.rate_hz);
+    let (model, labels) = (&fit.composite, fit.composite.labels());
+    let seconds = |level: &u32| tau_s(*level, rate_hz);
+    let mut notes = Vec::new();
+    notes.extend(outcome.axes_differ.map(|a| {
+        let (largest, ratio, smallest) = (a.largest, readable(a.ratio), a.smallest);
+        format!(
+            "axes differ: {largest} has up to {ratio} times the wavelet variance of {smallest}; --pool axes fits each"
+        )
+    }));
+    // A range that was asked for is no news.
+    if let ([first, ..], None) = (&curve.ignored[..], settings.fit_range) {
+        let last = curve.ignored.last().unwrap_or(first);
+        let scales = [first, last]
+            .map(|level| duration(seconds(level)))
+            .join(" to ");
+        notes.push(format!("scales {scales} are not fitted: too many outliers"));
+    }
+    let indistinct = outcome
+        .inference
+        .iter()
+        .filter_map(|i| i.indistinct.as_ref());
+    notes.extend(indistinct.map(|i| {
+        format!(
+            "{} describes the curve as well (p = {:.2})",
+            i.spec, i.p_value
+        )
+    }));
+    let amplitudes = intervals(outcome)
+        .iter()
+        .filter(|i| !i.of.parameter.is_shape() && i.absent.is_none());
+    for i in amplitudes.filter(|i| i.high > FACTOR * FACTOR * i.low) {
+        let name = model.name_of(i.of);
+        let factor = readable((i.high / i.low).sqrt());
+        notes.push(match i.low > 0.0 {
+            true => format!("{name} is known to a factor of {factor} only"),
+            false => format!("{name} may be zero"),
+        });
+    }
+    let zero = fit.zero.iter().map(|i| &labels[*i]);
+    notes.extend(zero.map(|label| format!("{label} is zero: not seen in these data")));
+    let longest_s = outcome.counted_levels().last().map_or(0.0, seconds);
+    for (i, label) in labels
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| !fit.zero.contains(i))
+    {
+        let Some(time_s) = model.processes[i].correlation_time_s(rate_hz) else {
+            continue;
+        };
+        let [time, longest] = [time_s, longest_s].map(duration);
+        if time_s * rate_hz < 1.0 {
+            notes.push(format!(
+                "{label}: correlation time {time} is below a sample, as of white noise"
+            ));
+        }
+        // Before its peak the curve of an AR1 rises as that of a random walk does: without the peak only sigma2 is known.
+        if PEAK * time_s > longest_s {
+            notes.push(format!(
+                "{label}: correlation time {time} is not identifiable from scales up to {longest}"
+            ));
+        }
+    }
+    notes
 }
 
 /// The notes on a fit, and why parameters have no interval.
 pub(super) fn all_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
-    fit_notes(outcome, settings)
-        .chain(without_interval(outcome))
-        .collect()
+    let mut notes = fit_notes(outcome, settings);
+    notes.extend(without_interval(outcome));
+    notes
 }
 
 /// Why parameters have no interval.
@@ -548,54 +615,6 @@ fn without_interval(outcome: &Outcome) -> impl Iterator<Item = String> {
     intervals(outcome)
         .iter()
         .filter_map(move |i| undetermined(i, &labels))
-}
-
-/// A note on a fit.
-fn note_line(note: &Note, outcome: &Outcome) -> String {
-    let labels = outcome.fit.composite.labels();
-    let named = |of| outcome.fit.composite.name_of(of);
-    let indistinct = outcome
-        .inference
-        .as_ref()
-        .and_then(|i| i.indistinct.as_ref());
-    match (note, outcome.axes_differ, indistinct) {
-        (Note::AxesDiffer, Some(a), _) => format!(
-            "axes differ: {} has up to {} times the wavelet variance of {}; --pool axes fits each",
-            a.largest,
-            readable(a.ratio),
-            a.smallest
-        ),
-        (Note::Indistinct, _, Some(i)) => {
-            format!(
-                "{} describes the curve as well (p = {:.2})",
-                i.spec, i.p_value
-            )
-        }
-        (Note::AxesDiffer | Note::Indistinct, ..) => String::new(),
-        (Note::LeftOut(ends), ..) => {
-            let scales = ends.map(duration).join(" to ");
-            format!("scales {scales} are not fitted: too many outliers")
-        }
-        (Note::Wide(of, Some(factor)), ..) => {
-            format!(
-                "{} is known to a factor of {} only",
-                named(*of),
-                readable(*factor)
-            )
-        }
-        (Note::Wide(of, None), ..) => format!("{} may be zero", named(*of)),
-        (Note::Zero(process), ..) => {
-            format!("{} is zero: not seen in these data", labels[*process])
-        }
-        (Note::LikeWhite(process, time_s), ..) => {
-            let (label, time) = (&labels[*process], duration(*time_s));
-            format!("{label}: correlation time {time} is below a sample, as of white noise")
-        }
-        (Note::LikeWalk(process, time_s, longest_s), ..) => {
-            let (label, [time, to]) = (&labels[*process], [*time_s, *longest_s].map(duration));
-            format!("{label}: correlation time {time} is not identifiable from scales up to {to}")
-        }
-    }
 }
 
 /// Why a parameter of a model with processes of these labels has no interval, if it has none.

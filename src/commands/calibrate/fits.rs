@@ -4,7 +4,7 @@ use super::document::{all_notes, fit_name, reasons, turn_on_remark};
 use crate::commands::export::Quantity;
 use nav_sim_calibration::{
     Candidate, Estimator, Goodness, Miss, Outcome, ParameterInterval, ParameterSpread, Practical,
-    Ranking, Settings, Share, TURN_ON_LEVEL, TurnOnSpread, duration, percent, shares, tau_s,
+    Ranking, Settings, TURN_ON_LEVEL, TurnOnSpread, duration, percent, tau_s,
 };
 use nav_sim_document::readable;
 use nav_sim_signal::imu::Sensor;
@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 /// The facts of a fit that stand in the provenance of its model too; null where there are none.
 pub(super) fn fit_record(outcome: &Outcome, settings: &Settings) -> Map<String, Value> {
     let (fit, goodness) = (&outcome.fit, goodness(outcome));
-    let worst = outcome.misfit().map(|misfit| misfit.worst);
+    let worst = outcome.departure().misfit;
     let is_trimmed = outcome.estimator == Estimator::DrAwv;
     object(json!({
         "signals": outcome.scope.name(),
@@ -208,7 +208,6 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Figure> {
     let practical = outcome.practical(rate_hz);
     let mut figures = practical.map_or_else(BTreeMap::new, |p| practical_figures(outcome, &p));
     let model = &outcome.fit.composite;
-    let shares = shares(model, &outcome.counted_levels());
     for (index, (process, label)) in model.processes.iter().zip(model.labels()).enumerate() {
         let further = further_figure(process, outcome.scope.sensor, rate_hz);
         let Some((letter, name, unit, parameter, convert)) =
@@ -224,7 +223,7 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Figure> {
         });
         let value = model.parameters().find(|(of, _)| own(*of));
         let value = value.map(|(_, value)| convert(value)).ok_or("");
-        let averages = averages(&shares[index], rate_hz);
+        let averages = averages(outcome, index, rate_hz);
         let figure = Figure::new((format!("{label} {name}"), unit), value, interval, averages);
         let key = match letter {
             "T" => format!("T_{label}"),
@@ -331,12 +330,27 @@ fn further_figure(process: &Process, sensor: Sensor, rate_hz: f64) -> Option<Fur
     })
 }
 
-/// Averaging times, half a scale each, at which a process is the largest part of the wavelet variance.
-fn averages(share: &Share, rate_hz: f64) -> String {
-    let time = |level: u32| duration(0.5 * tau_s(level, rate_hz));
-    match (share.leads.first(), share.leads.last()) {
-        (Some(first), Some(last)) if first == last => time(*first),
-        (Some(first), Some(last)) => format!("{} – {}", time(*first), time(*last)),
-        _ => format!("none ({} at most)", percent(share.largest.0)),
+/// Averaging times at which a process is the largest part of the model's wavelet variance.
+fn averages(outcome: &Outcome, index: usize, rate_hz: f64) -> String {
+    let model = &outcome.fit.composite;
+    let part = |process: &Process, level: u32| match process.haar_wv(level) / model.haar_wv(level) {
+        part if part.is_finite() => part,
+        // Of nothing nothing is a part.
+        _ => 0.0,
+    };
+    let largest_at = |level: u32| {
+        let parts = model.processes.iter().map(|p| part(p, level)).enumerate();
+        parts.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+    };
+    let levels = outcome.counted_levels();
+    let leads = || levels.iter().filter(|l| largest_at(**l) == Some(index));
+    let time = |level: &u32| duration(0.5 * tau_s(*level, rate_hz));
+    match (leads().next(), leads().next_back()) {
+        (Some(first), Some(last)) if first == last => time(first),
+        (Some(first), Some(last)) => format!("{} – {}", time(first), time(last)),
+        _ => {
+            let parts = levels.iter().map(|l| part(&model.processes[index], *l));
+            format!("none ({} at most)", percent(parts.fold(0.0, f64::max)))
+        }
     }
 }
