@@ -15,7 +15,6 @@ use crate::model::ModelSpec;
 use crate::noise::{Composite, Model, Process, Spread};
 use crate::outcome::{Bootstrap, Inference, ModelChoice, Outcome, Settings};
 use crate::pipeline::fit_curve;
-use crate::rng::StreamKey;
 use crate::uncertainty::bootstrap::{CurveSampler, Scattering, like};
 use crate::uncertainty::intervals::{intervals, practical_intervals};
 use crate::wavelet::default_levels;
@@ -106,18 +105,12 @@ impl Anticipated<'_> {
         // The fit is kept for its minima, from which the draws are fitted; the centre of the draws is the
         // model itself.
         outcome.fit.composite = composite;
-        let sampler = CurveSampler::of_outcome(&group, &outcome, settings);
         let name = scope.name();
+        let sampler = CurveSampler::new(&name, &group.replicates, &outcome, settings);
         let draw = |run: usize| -> Result<Option<Fit>, CalibrationError> {
             let between = self.between(scope, run, &outcome, bootstrap)?;
-            let key = StreamKey {
-                seed: bootstrap.seed,
-                scenario: "anticipated",
-                run: run as u64,
-                source: &name,
-                process: estimator.name(),
-            };
-            let curve = sampler.draw_with(&key, &between, scattering, settings);
+            let generator = sampler.generator(bootstrap.seed, "anticipated", run);
+            let curve = sampler.draw_with(generator, &between, scattering);
             Ok(curve.and_then(|curve| outcome.estimate_again(&curve, settings).ok()))
         };
         let fits: Vec<Option<Fit>> = (0..bootstrap.draws)

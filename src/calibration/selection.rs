@@ -12,12 +12,11 @@
 //! it, at 1 %: the best is the most fortunate of several; and which the J-test does not reject at 1 %, by draws that
 //! scatter as the recordings do. Where it rejects the best too, the first by WVIC that passes is taken.
 
-use crate::curve::{CalibrationError, Estimator, Group, implied};
+use crate::curve::{CalibrationError, Estimator, Group, implied, p_value};
 use crate::fit::{Fit, Weighting, fit, refit, too_few_scales};
 use crate::model::ModelSpec;
 use crate::noise::Kind;
 use crate::outcome::{Advance, Candidate, ModelChoice, Ranking, Settings, TooSimple};
-use crate::rng::StreamKey;
 use crate::uncertainty::bootstrap::CurveSampler;
 use crate::wavelet::Curve;
 use rayon::prelude::*;
@@ -107,9 +106,6 @@ pub(crate) fn choose(
         .rank(not_identifiable, &|| advance(stage))
         .ok_or_else(|| too_few_scales("auto", 2, scales))
 }
-
-/// Function that draws a curve.
-type Draw = fn(&CurveSampler<'_>, &StreamKey<'_>, &Settings) -> Option<Curve>;
 
 /// The probabilities of the candidates that were tested.
 #[derive(Default)]
@@ -251,49 +247,29 @@ impl Field<'_> {
         let Ok(own) = fit(curve, spec, reported.rate_hz, reported.weighting) else {
             return 0.0;
         };
-        let curves = self.curves(&own, "auto J-test", |sampler, key, settings| {
-            sampler.draw_as_recorded(key, settings)
-        });
+        let name = self.group.scope.name();
+        let sampler = self.sampler(&name, &own);
+        let draw = |run| sampler.draw_as_recorded(sampler.generator(SEED, "auto J-test", run));
+        let curves: Vec<Curve> = (0..DRAWS).filter_map(draw).collect();
         let objective = |c: &Curve| {
-            refit(c, spec, reported.rate_hz, reported.weighting, &own)
-                .ok()
-                .map(|fit| fit.objective)
+            let fit = refit(c, spec, reported.rate_hz, reported.weighting, &own);
+            fit.ok().map(|fit| fit.objective)
         };
         let drawn: Vec<f64> = curves.par_iter().filter_map(objective).collect();
-        let larger = drawn
-            .iter()
-            .filter(|objective| **objective >= own.objective)
-            .count();
-        (1 + larger) as f64 / (1 + drawn.len()) as f64
+        p_value(own.objective, &drawn)
     }
 
     /// New curves of a candidate.
     fn draws(&self, i: usize) -> Vec<Curve> {
-        self.curves(&self.fits[i].1, "auto", |sampler, key, settings| {
-            sampler.draw(key, settings)
-        })
+        let name = self.group.scope.name();
+        let sampler = self.sampler(&name, &self.fits[i].1);
+        let draw = |run| sampler.draw(sampler.generator(SEED, "auto", run));
+        (0..DRAWS).filter_map(draw).collect()
     }
 
-    fn curves(&self, fit: &Fit, scenario: &str, draw: Draw) -> Vec<Curve> {
-        let sampler = CurveSampler::new(
-            &self.group.replicates,
-            self.estimator,
-            self.curve,
-            &fit.composite,
-            self.settings,
-        );
-        let (name, process) = (self.group.scope.name(), self.estimator.name());
-        let curve = |run: usize| {
-            let key = StreamKey {
-                seed: SEED,
-                scenario,
-                run: run as u64,
-                source: &name,
-                process,
-            };
-            draw(&sampler, &key, self.settings)
-        };
-        (0..DRAWS).filter_map(curve).collect()
+    fn sampler<'b>(&'b self, name: &'b str, fit: &Fit) -> CurveSampler<'b> {
+        let (replicates, settings) = (&self.group.replicates, self.settings);
+        CurveSampler::of_fit(name, replicates, self.estimator, self.curve, fit, settings)
     }
 
     fn again(&self, i: usize, curve: &Curve) -> Option<Fit> {
@@ -345,8 +321,7 @@ impl Field<'_> {
         if observed <= 2.0 * drawn.iter().copied().fold(0.0, f64::max) {
             drawn.extend(rest.par_iter().filter_map(difference).collect::<Vec<_>>());
         }
-        let larger = drawn.iter().filter(|d| **d >= observed).count();
-        (1 + larger) as f64 / (1 + drawn.len()) as f64
+        p_value(observed, &drawn)
     }
 
     fn too_simple(&self, chosen: usize, tested: &[(usize, f64)]) -> Option<TooSimple> {

@@ -3,6 +3,7 @@
 use super::*;
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Ar1, Composite, Process, RandomWalk, Synthesizer, White};
+use crate::rng::StreamKey;
 use crate::wavelet::{Convention, Tuning, both};
 use crate::{
     Bootstrap, FitRange, ModelChoice, Outcome, Pool, Replicate, Trim, Weighting, calibrate,

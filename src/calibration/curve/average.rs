@@ -595,6 +595,13 @@ pub fn median(values: &[f64]) -> f64 {
     }
 }
 
+/// Share of the statistics that are as large, the observed one among them: exchangeable with B draws it has any of B + 1 ranks
+/// with the same probability, so that P(p ≤ a) ≤ a ([Davison and Hinkley](crate::bibliography::DavisonHinkley97), eq. 4.11).
+pub(crate) fn p_value(observed: f64, draws: &[f64]) -> f64 {
+    let as_large = draws.iter().filter(|draw| **draw >= observed).count();
+    (1 + as_large) as f64 / (1 + draws.len()) as f64
+}
+
 #[cfg(test)]
 #[path = "average_tests.rs"]
 mod average_tests;

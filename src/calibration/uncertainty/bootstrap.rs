@@ -11,12 +11,12 @@
 //! scatters by its own degrees of freedom.
 
 use super::intervals::{intervals, practical_intervals};
-use super::spread::{LEVEL as ALIKE_LEVEL, Spread, p_value as alike_p_value};
+use super::spread::{LEVEL as ALIKE_LEVEL, Spread, alike_p_value};
 use super::varying::{parameter_spreads, simpler};
 use crate::curve::sampling::{SamplingLaw, implied};
-use crate::curve::{Estimator, Group, Replicate, average};
+use crate::curve::{Estimator, Group, Replicate, average, median, p_value};
 use crate::fit::Fit;
-use crate::noise::{Composite, ParameterRef};
+use crate::noise::ParameterRef;
 use crate::outcome::{
     Advance, Bootstrap, Goodness, Indistinct, Inference, LevelSpread, Outcome, Settings, tau_s,
 };
@@ -39,173 +39,135 @@ const LARGEST_BIAS: f64 = 0.2;
 
 /// Draws curves as a fitted model and the spread of the replicates would give them.
 pub(crate) struct CurveSampler<'a> {
+    /// Name of the group.
+    group: &'a str,
     replicates: &'a [Replicate],
     estimator: Estimator,
     /// The curve that was fitted.
     curve: &'a Curve,
+    settings: &'a Settings,
     pub(crate) law: SamplingLaw,
     /// Spread of the replicates; none for a curve from elsewhere.
     pub(crate) spread: Option<Spread>,
     /// The curve that the model implies.
     centre: Vec<f64>,
-    /// Relative bias of a robust variance times its degrees of freedom
-    /// ([`Tuning::bias`](crate::wavelet::Tuning::bias)).
-    bias_times_edof: f64,
 }
 
 impl<'a> CurveSampler<'a> {
+    /// A sampler of the curves of some replicates that the fit of an outcome would give.
     pub(crate) fn new(
+        group: &'a str,
+        replicates: &'a [Replicate],
+        outcome: &'a Outcome,
+        settings: &'a Settings,
+    ) -> Self {
+        let (estimator, curve) = (outcome.estimator, &outcome.curve);
+        Self::of_fit(group, replicates, estimator, curve, &outcome.fit, settings)
+    }
+
+    pub(crate) fn of_fit(
+        group: &'a str,
         replicates: &'a [Replicate],
         estimator: Estimator,
         curve: &'a Curve,
-        model: &Composite,
-        settings: &Settings,
+        fit: &Fit,
+        settings: &'a Settings,
     ) -> Self {
         let levels = curve.levels.iter().copied().max().unwrap_or(1) as usize;
-        let law = SamplingLaw::new(model, levels);
+        let law = SamplingLaw::new(&fit.composite, levels);
         let spread = (!replicates.is_empty())
             .then(|| Spread::new(replicates, estimator, &law, &settings.tuning));
-        let centre = implied(model, curve);
         Self {
+            group,
             replicates,
             estimator,
             curve,
+            settings,
             law,
             spread,
-            centre,
-            bias_times_edof: settings.tuning.bias(),
+            centre: implied(&fit.composite, curve),
         }
     }
 
-    /// A sampler of the curves that the fit of an outcome would give.
-    pub(crate) fn of_outcome(group: &'a Group, outcome: &'a Outcome, settings: &Settings) -> Self {
-        let Outcome {
-            estimator,
-            curve,
-            fit,
-            ..
-        } = outcome;
-        Self::new(
-            &group.replicates,
-            *estimator,
-            curve,
-            &fit.composite,
-            settings,
-        )
+    /// Generator of a draw.
+    pub(crate) fn generator(&self, seed: u64, scenario: &str, run: usize) -> Generator {
+        let key = StreamKey {
+            seed,
+            scenario,
+            run: run as u64,
+            source: self.group,
+            process: self.estimator.name(),
+        };
+        key.generator()
     }
 
     /// A new curve of the same estimator, of replicates that scatter as the recorded ones do.
-    pub(crate) fn draw_as_recorded(
-        &self,
-        key: &StreamKey<'_>,
-        settings: &Settings,
-    ) -> Option<Curve> {
+    pub(crate) fn draw_as_recorded(&self, mut generator: Generator) -> Option<Curve> {
         match &self.spread {
-            Some(spread) if self.replicates.len() > 1 => {
-                self.curve(spread.draw(&mut key.generator()), settings)
-            }
-            _ => self.draw(key, settings),
+            Some(spread) if self.replicates.len() > 1 => self.curve(spread.draw(&mut generator)),
+            _ => self.draw(generator),
         }
     }
 
     /// A new curve of the same estimator, of replicates that scatter by the law and by what they differ beyond it.
-    pub(crate) fn draw(&self, key: &StreamKey<'_>, settings: &Settings) -> Option<Curve> {
-        let mut generator = key.generator();
+    pub(crate) fn draw(&self, mut generator: Generator) -> Option<Curve> {
         let Some(spread) = &self.spread else {
             return Some(self.elsewhere(&mut generator));
         };
         let mut between = spread.draw_between(&mut generator);
         between.iter_mut().flatten().for_each(|b| *b = b.exp());
-        self.curve(
-            self.scattered(&between, Scattering::All, &mut generator)?,
-            settings,
-        )
+        self.draw_with(generator, &between, Scattering::All)
     }
 
     /// A new curve of the same estimator, of replicates that differ by `between` (`[replicate][level]`, over the model)
     /// and, unless they are endless, scatter by the law.
     pub(crate) fn draw_with(
         &self,
-        key: &StreamKey<'_>,
+        mut generator: Generator,
         between: &[Vec<f64>],
         scattering: Scattering,
-        settings: &Settings,
     ) -> Option<Curve> {
-        let ratios = self.scattered(between, scattering, &mut key.generator())?;
-        self.curve(ratios, settings)
-    }
-
-    /// nu*/nu of new replicates that differ by `between`.
-    fn scattered(
-        &self,
-        between: &[Vec<f64>],
-        scattering: Scattering,
-        generator: &mut Generator,
-    ) -> Option<Vec<Vec<f64>>> {
         if scattering == Scattering::BetweenRecordings {
-            return Some(between.to_vec());
+            return self.curve(between.to_vec());
         }
         let of_recording = |(edof, between): (&Vec<f64>, &Vec<f64>)| {
-            let within = self.law.draw(edof, generator).into_iter();
+            let within = self.law.draw(edof, &mut generator).into_iter();
             within.zip(between).map(|(ratio, b)| ratio * b).collect()
         };
         let edof = &self.spread.as_ref()?.edof;
-        Some(edof.iter().zip(between).map(of_recording).collect())
+        self.curve(edof.iter().zip(between).map(of_recording).collect())
     }
 
     /// The estimator's curve of replicates of which nu*/nu is given.
-    fn curve(&self, ratios: Vec<Vec<f64>>, settings: &Settings) -> Option<Curve> {
+    fn curve(&self, ratios: Vec<Vec<f64>>) -> Option<Curve> {
+        let tuning = &self.settings.tuning;
         let edof = self.spread.iter().flat_map(|s| &s.edof);
         let drawn_replicate = |((replicate, ratios), edof): ((&Replicate, Vec<f64>), &Vec<f64>)| {
-            let levels = self
-                .centre
-                .iter()
-                .zip(ratios)
-                .zip(edof)
-                .take(replicate.levels())
-                .enumerate();
-            // The law gives ratios whose mean is 1; robust variances of few coefficients read high, and so
-            // must those drawn.
-            let bias = |j: usize, edof: f64| {
-                if replicate.is_robust(self.estimator, j) {
-                    self.bias(edof)
-                } else {
-                    0.0
-                }
+            let levels = self.centre.iter().zip(ratios).zip(edof);
+            let drawn = |(j, ((nu, ratio), edof)): (usize, ((&f64, f64), &f64))| {
+                // The law gives ratios whose mean is 1; robust variances of few coefficients read high, and so
+                // must those drawn.
+                let bias = match replicate.is_robust(self.estimator, j) {
+                    true => (tuning.bias() / edof).min(LARGEST_BIAS),
+                    false => 0.0,
+                };
+                nu * ratio * (1.0 + bias)
             };
-            like(
-                replicate,
-                levels
-                    .map(|(j, ((nu, ratio), edof))| nu * ratio * (1.0 + bias(j, *edof)))
-                    .collect(),
-            )
+            let levels = levels.take(replicate.levels()).enumerate();
+            like(replicate, levels.map(drawn).collect())
         };
-        let replicates: Vec<Replicate> = self
-            .replicates
-            .iter()
-            .zip(ratios)
-            .zip(edof)
-            .map(drawn_replicate)
-            .collect();
-        let curve = average(&replicates, self.estimator, settings.trim, &settings.tuning).ok()?;
+        let pairs = self.replicates.iter().zip(ratios).zip(edof);
+        let replicates: Vec<Replicate> = pairs.map(drawn_replicate).collect();
+        let curve = average(&replicates, self.estimator, self.settings.trim, tuning).ok()?;
         // The draws have a root everywhere; what the fit left out, it leaves out of every draw.
-        let Curve {
-            differing,
-            classical,
-            ignored,
-            ..
-        } = self.curve.clone();
+        let (wv, edof, levels) = (curve.wv, curve.edof, curve.levels);
         Some(Curve {
-            differing,
-            classical,
-            ignored,
-            ..curve
+            levels,
+            wv,
+            edof,
+            quantization: curve.quantization,
+            ..self.curve.clone()
         })
-    }
-
-    /// Relative bias of a robust variance with so many degrees of freedom.
-    fn bias(&self, edof: f64) -> f64 {
-        (self.bias_times_edof / edof).min(LARGEST_BIAS)
     }
 
     /// A curve from elsewhere, which scatters by its degrees of freedom.
@@ -275,16 +237,9 @@ fn goodness(outcome: &Outcome, draws: &[Fit]) -> Goodness {
     Goodness {
         statistic: fit.objective,
         dof: outcome.counted_levels().len().saturating_sub(parameters),
-        expected: crate::curve::median(&objectives),
+        expected: median(&objectives),
         p_value: p_value(fit.objective, &objectives),
     }
-}
-
-/// Share of the statistics that are as large, the observed one among them: exchangeable with B draws it has any of B + 1 ranks
-/// with the same probability, so that P(p ≤ a) ≤ a ([Davison and Hinkley](crate::bibliography::DavisonHinkley97), eq. 4.11).
-fn p_value(observed: f64, draws: &[f64]) -> f64 {
-    let as_large = draws.iter().filter(|draw| **draw >= observed).count();
-    (1 + as_large) as f64 / (1 + draws.len()) as f64
 }
 
 // Uncertainty of a fit: intervals of its parameters, and whether the model describes the curve at all.
@@ -331,17 +286,10 @@ fn by_bootstrap(
     bootstrap: Bootstrap,
     advance: Advance<'_>,
 ) -> Inference {
-    let sampler = CurveSampler::of_outcome(group, outcome, settings);
     let name = group.scope.name();
+    let sampler = CurveSampler::new(&name, &group.replicates, outcome, settings);
     let draw = |run: usize| {
-        let key = StreamKey {
-            seed: bootstrap.seed,
-            scenario: "bootstrap",
-            run: run as u64,
-            source: &name,
-            process: outcome.estimator.name(),
-        };
-        let curve = sampler.draw_as_recorded(&key, settings);
+        let curve = sampler.draw_as_recorded(sampler.generator(bootstrap.seed, "bootstrap", run));
         let fit = curve.and_then(|curve| outcome.estimate_again(&curve, settings).ok());
         advance(1);
         fit

@@ -10,7 +10,7 @@
 //! freedom as there are recordings, less one, where `between` rules, and as there are signals, less one, where it does not.
 
 use crate::curve::sampling::{SamplingLaw, Shape, variance_of_log};
-use crate::curve::{Estimator, MAD_TO_DEVIATION, Replicate, falling_root, median};
+use crate::curve::{Estimator, MAD_TO_DEVIATION, Replicate, falling_root, median, p_value};
 use crate::imu::Axis;
 use crate::outcome::{AxesDiffer, LevelSpread, Outcome};
 use crate::rng::{Generator, StreamKey};
@@ -498,7 +498,7 @@ const SEED: u64 = 1;
 const LEAST: f64 = 4.0;
 
 /// Probability that replicates of one noise differ at some scale as much as these do; none of a single one.
-pub(crate) fn p_value(
+pub(crate) fn alike_p_value(
     replicates: &[Replicate],
     estimator: Estimator,
     spread: &Spread,
@@ -541,13 +541,8 @@ pub(crate) fn p_value(
             .collect();
         largest(&|i, j| ratios[i][j])
     };
-    let larger = (0..DRAWS)
-        .into_par_iter()
-        .filter(|run| draw(*run) >= observed)
-        .count();
-    // The observed set counts as one of the draws, all exchangeable if the fitted law holds: p is never 0,
-    // and the level is kept (Davison and Hinkley 1997, chapter 4).
-    Some((1 + larger) as f64 / (1 + DRAWS) as f64)
+    let drawn: Vec<f64> = (0..DRAWS).into_par_iter().map(draw).collect();
+    Some(p_value(observed, &drawn))
 }
 
 impl Outcome {
@@ -809,7 +804,7 @@ mod alike_tests {
         let differs = |seed: u64| {
             let replicates = set(seed, count, spread);
             let own = Spread::new(&replicates, estimator, &law, &tuning());
-            u32::from(p_value(&replicates, estimator, &own, &law, "accel").unwrap() <= LEVEL)
+            u32::from(alike_p_value(&replicates, estimator, &own, &law, "accel").unwrap() <= LEVEL)
         };
         (0..sets).into_par_iter().map(differs).sum()
     }
@@ -855,7 +850,9 @@ mod alike_tests {
             };
             let replicates: Vec<Replicate> = Axis::ALL.into_iter().flat_map(of_axis).collect();
             let own = Spread::new(&replicates, Estimator::Awv, &law, &tuning());
-            u32::from(p_value(&replicates, Estimator::Awv, &own, &law, "accel").unwrap() <= LEVEL)
+            u32::from(
+                alike_p_value(&replicates, Estimator::Awv, &own, &law, "accel").unwrap() <= LEVEL,
+            )
         };
         let told: u32 = (0..40).into_par_iter().map(differs).sum();
         assert!(told <= 5, "{told} of 40");
@@ -869,7 +866,10 @@ mod alike_tests {
         );
         let one = set(1, 1, 0.0);
         let own = Spread::new(&one, Estimator::Awv, &law, &tuning());
-        assert_eq!(p_value(&one, Estimator::Awv, &own, &law, "accel"), None);
+        assert_eq!(
+            alike_p_value(&one, Estimator::Awv, &own, &law, "accel"),
+            None
+        );
     }
 }
 
