@@ -1,6 +1,5 @@
 //! `nav-sim schema`: JSON schemas of the files people write.
 
-use super::{Failure, Session};
 use crate::commands::batch::Study;
 use crate::io::{contamination_file, fusion_files, model_file, trajectory_file};
 use nav_sim_navigation::scenario::Scenario;
@@ -34,9 +33,8 @@ enum Kind {
     Contamination,
 }
 
-pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    session.result(crate::report::json(&schema(args.of)).trim_end());
-    Ok(())
+pub(crate) fn run(args: &Args) -> String {
+    crate::report::json(&schema(args.of))
 }
 
 fn schema(of: Kind) -> serde_json::Value {

@@ -142,7 +142,6 @@ pub(crate) fn between<'a>(
         doubts: Vec::new(),
         states,
         form: None,
-        links: Vec::new(),
     };
     for (run, candidate, is_reference) in runs {
         let differences = differences(candidate, directory);
@@ -341,9 +340,6 @@ pub struct Comparison {
     /// Form in which the table alone is printed.
     #[serde(skip)]
     pub(crate) form: Option<TableForm>,
-    /// Pages of the single results, path and name.
-    #[serde(skip)]
-    pub(crate) links: Vec<(String, String)>,
 }
 
 /// Whether the filter of a run is as good as it believes.
@@ -565,11 +561,6 @@ impl Answer for Comparison {
                 self.name_of_reference()
             ));
             document.lead(self.table());
-        }
-        if !self.links.is_empty() {
-            document.folded("Pages of the single results", |page| {
-                page.links(&self.links)
-            });
         }
         document.text(CAPTION);
         document.charts(&self.charts(), "");
