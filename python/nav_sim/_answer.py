@@ -55,9 +55,6 @@ class Kept:
             raise NavSimError(f"there is no {name} in this answer")
         return self._files[name]
 
-    def table(self, name: str) -> dict[str, Any]:
-        return _native.columns(self.text(name))
-
 
 class Answer:
     """The answer of the command of the same name.
@@ -101,7 +98,7 @@ class Answer:
 
     def table(self, name: str) -> Columns:
         """One of `files` that is a table: columns by name."""
-        return {key: np.asarray(values) for key, values in self._native.table(name).items()}
+        return {key: np.asarray(values) for key, values in _native.columns(self.text(name)).items()}
 
     def summary(self) -> str:
         """What the command prints."""

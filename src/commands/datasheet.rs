@@ -279,7 +279,7 @@ fn catalogue_text(catalogue: &Value) -> String {
 ///
 /// # Errors
 /// An entry that cannot be read.
-pub fn catalogue_json() -> Result<Value> {
+fn catalogue_json() -> Result<Value> {
     let figure = |e: &Entry| json!({ "sensor": e.sensor, "figure": e.figure.key(), "given": e.quantity.given, "source": e.source });
     let unit = |(unit, _): &(&str, _)| {
         let sheet = named(unit)?;

@@ -58,6 +58,9 @@ macro_rules! by_name {
             $(if name == <$command as Command>::NAME {
                 return answered::<$command>(options, front);
             })*
+            if name == trajectory::Convert::NAME {
+                return answered::<trajectory::Convert>(options, front);
+            }
             Err(Failure::input(format!("there is no command {name}")))
         }
     };

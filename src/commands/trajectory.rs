@@ -95,6 +95,8 @@ impl Source {
 #[derive(Debug, Serialize)]
 pub struct TrajectoryTable {
     schema_version: u32,
+    start_s: f64,
+    end_s: f64,
     rows: usize,
     #[serde(skip)]
     text: String,
@@ -140,6 +142,8 @@ impl Command for Convert {
         let rows = self.rate_hz.map_or(Rows::Knots, Rows::Rate);
         Ok(TrajectoryTable {
             schema_version: 1,
+            start_s: trajectory.start_s(),
+            end_s: trajectory.end_s(),
             rows: rows.times(&trajectory).len(),
             text: trajectory_file::csv(&trajectory, rows),
         })
