@@ -112,7 +112,7 @@ class Model:
         return place
 
     def to_toml(self) -> str:
-        """Its text as model files have it, with intervals and provenance where they are known."""
+        """Its text as model files have it, with intervals and provenance."""
         return self._text
 
     @property
@@ -128,7 +128,7 @@ class Model:
     @cached_property
     def channels(self) -> list[str]:
         """The channels that it has."""
-        return [channel for channel in CHANNELS if channel in self._contents["channels"]]
+        return list(self._contents["channels"])
 
     def __add__(self, other: Model) -> Model:
         """The model whose noise is the sum of the two, at one and the same rate."""
@@ -240,7 +240,7 @@ def _axes(given: Processes | Process, name: str) -> dict[str, Any]:
 
 
 def staged(model: StrPath | Model, name: str, staging: Staging) -> str:
-    """The file of a model: its own where it was read from one and nothing was changed."""
+    """The file of a model: its own where it was read from one."""
     if not isinstance(model, Model):
         return path(model, name)
     if model._path is not None:

@@ -34,7 +34,6 @@ class Trajectory:
         else:
             self._path, self._columns = None, columns(source, "trajectory")  # type: ignore[arg-type]
         self._origin = None if origin is None else numbers(origin, "origin", 3)
-        # what is wrong with it, and what is doubtful, is known from the start
         found = self._read(1.0)
         self.start_s, self.end_s = float(found.data["start_s"]), float(found.data["end_s"])
         warn(found._native.warnings)
@@ -51,13 +50,13 @@ class Trajectory:
         return path
 
     def states(self, rate_hz: float = 10.0) -> dict[str, FloatArray]:
-        """Position, velocity (`v_n_m_s` …) and attitude at that rate, smoothly between the samples."""
+        """Position, velocity (`v_n_m_s` …) and attitude at that rate."""
         return self._read(number(rate_hz, "rate_hz")).table("trajectory.csv")
 
     def _read(self, rate_hz: float) -> Answer:
         with Staging() as staging:
-            request = as_json({"path": self.staged(staging), "rate_hz": rate_hz})
-            return Answer(_native.answer("trajectory convert", request, staging.hidden, None))
+            asked = as_json({"path": self.staged(staging), "rate_hz": rate_hz})
+            return Answer(_native.answer("trajectory convert", asked, staging.hidden, None))
 
     def write(self, path: StrPath) -> Path:
         """Writes its file, or its columns as a table."""

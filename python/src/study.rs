@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Computes what is missing of a study, or of a shard of it, and merges when nothing is: the answer, or the cells that are
+/// Computes what is missing of a study, or of a shard of it, and merges when nothing is: the answer, if nothing is
 /// missing; and what was warned of.
 #[pyfunction]
 #[pyo3(signature = (study, directory, shard, time_limit_s, progress, threads=None))]
@@ -21,7 +21,7 @@ pub(crate) fn study_run(
     time_limit_s: Option<f64>,
     progress: Option<&Bound<'_, PyAny>>,
     threads: Option<usize>,
-) -> PyResult<(Option<Answer>, Vec<String>, Vec<String>)> {
+) -> PyResult<(Option<Answer>, Vec<String>)> {
     if let Some((index, count)) = shard.filter(|(index, count)| index >= count) {
         let message = format!("shard: {index} of {count} is none, such as (0, 2) and (1, 2)");
         return Err(error::refused(py, &message));
@@ -43,7 +43,7 @@ pub(crate) fn study_run(
         let outcome = pool.map_or_else(run, |pool| pool.install(run));
         (outcome, meter.warnings())
     })?;
-    Ok(match outcome.map_err(|e| error::of_failure(py, &e, ""))? {
+    let answer = match outcome.map_err(|e| error::of_failure(py, &e, ""))? {
         Outcome::Merged(answer) => {
             let answered = Answered {
                 json: serde_json::to_string(&*answer).unwrap_or_default(),
@@ -51,10 +51,9 @@ pub(crate) fn study_run(
                 files: Vec::new(),
                 unmet: answer.unmet(),
             };
-            let answer = Answer::new(answered, String::new(), warnings.clone());
-            (Some(answer), Vec::new(), warnings)
+            Some(Answer::new(answered, String::new(), warnings.clone()))
         }
-        Outcome::Partial(missing) => (None, missing, warnings),
-        Outcome::Estimate(_) => (None, Vec::new(), warnings),
-    })
+        _ => None,
+    };
+    Ok((answer, warnings))
 }
