@@ -2,6 +2,7 @@
 
 use super::document::ShownCalibration;
 use super::fits::{fit_json, turn_on_json};
+use super::model_file::CalibrationNote;
 use crate::app::reading::note_report;
 use crate::app::{Context, Failure};
 use crate::io::recordings::{FileReport, ReadOptions, Report};
@@ -150,6 +151,8 @@ pub struct Calibration {
     pub turn_on: Vec<TurnOnSpread>,
     /// Each recording against the others.
     pub diagnoses: Vec<Diagnosis>,
+    /// What the model files record beside the fits.
+    pub(crate) note: CalibrationNote,
 }
 
 /// Calibrates recordings, or directories of them.
@@ -249,6 +252,7 @@ impl Calibration {
             turn_on: settings.estimators.iter().flat_map(of_estimator).collect(),
             diagnoses: diagnose(&groups, &outcomes, &settings),
             beginnings: Beginnings::default(),
+            note: CalibrationNote::default(),
             groups,
             outcomes,
             settings,
@@ -438,23 +442,16 @@ fn shortest(report: &Report, scales: Option<u32>, context: &Context<'_>) {
         found[(found.len() - 1) / 2],
         found[found.len() / 2],
     );
-    let short = found.iter().filter(|own| **own < used).count();
     if scales < usual {
-        context.warn(match short {
-            0 => format!(
+        context.warn(match scales < used {
+            false => format!(
                 "{recording}: its {samples} samples limit all recordings to {scales} scales; without it there \
                  would be more (half of them have {usual}): leave it out for those"
             ),
-            short => {
-                let others = match short {
-                    1 => String::new(),
-                    _ => format!(" ({} more are short)", short - 1),
-                };
-                format!(
-                    "{recording}: its {samples} samples have {scales} scales{others}; the longer ones, up to {used} \
-                     scales, are averaged over the longer recordings alone"
-                )
-            }
+            true => format!(
+                "{recording}: its {samples} samples have {scales} scales; the longer ones, up to {used} scales, are \
+                 averaged over the longer recordings alone"
+            ),
         });
     }
 }

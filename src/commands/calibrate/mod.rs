@@ -158,14 +158,8 @@ const POOLS: [(&str, &str); 2] = [
     ),
 ];
 
-/// A calibration, and what is recorded of it.
-pub struct CalibrationAnswer {
-    calibration: Calibration,
-    note: CalibrationNote,
-}
-
 impl Command for Calibrate {
-    type Answer = CalibrationAnswer;
+    type Answer = Calibration;
     const NAME: &'static str = "calibrate";
     const OUT: Out = Out::File {
         kind: Written::Calibrated,
@@ -203,9 +197,9 @@ impl Command for Calibrate {
         Ok(curve.chain(listed("recording", &self.inputs)?).collect())
     }
 
-    fn run(&self, context: &Context<'_>) -> Result<CalibrationAnswer> {
+    fn run(&self, context: &Context<'_>) -> Result<Calibration> {
         let settings = self.settings()?;
-        let calibration = match &self.curve {
+        let mut calibration = match &self.curve {
             Some(path) => {
                 let (curves, is_unsaid) = self.curves(path, &settings)?;
                 if is_unsaid {
@@ -229,34 +223,35 @@ impl Command for Calibrate {
                 calibrate(&self.inputs, &options, context)?
             }
         };
-        Ok(CalibrationAnswer {
-            note: self.note(&calibration.settings, context),
-            calibration,
-        })
+        calibration.note = CalibrationNote {
+            reading: self.reading(&calibration.settings),
+            seed: self.draws(context).map(|draws| draws.seed),
+            inputs: context.inputs().to_vec(),
+        };
+        Ok(calibration)
     }
 }
 
-impl Serialize for CalibrationAnswer {
+impl Serialize for Calibration {
     fn serialize<S: serde::Serializer>(
         &self,
         serializer: S,
     ) -> std::result::Result<S::Ok, S::Error> {
-        self.calibration.shown(None).json.serialize(serializer)
+        self.shown(None).json.serialize(serializer)
     }
 }
 
-impl Answer for CalibrationAnswer {
+impl Answer for Calibration {
     fn document(&self) -> Document {
-        self.calibration.shown(None).document()
+        self.shown(None).document()
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {
-        let estimators = &self.calibration.settings.estimators;
+        let estimators = &self.settings.estimators;
         let of_estimator = |estimator: &Estimator| {
             let stem = stem_of(*estimator, estimators);
             let names = (model_ending(&stem), stem);
-            self.calibration
-                .files_of(*estimator, names, &self.note, None)
+            self.files_of(*estimator, names, None)
         };
         estimators.iter().flat_map(of_estimator).collect()
     }
@@ -287,15 +282,6 @@ impl Calibrate {
             draws: self.bootstrap as usize,
             seed: context.seed_or(None),
         })
-    }
-
-    /// What is recorded of the calibration.
-    fn note(&self, settings: &Settings, context: &Context<'_>) -> CalibrationNote {
-        CalibrationNote {
-            reading: self.reading(settings),
-            seed: self.draws(context).map(|draws| draws.seed),
-            inputs: context.inputs().to_vec(),
-        }
     }
 
     /// How the recordings were read and grouped; of a curve nothing is known.
@@ -388,12 +374,13 @@ impl Calibration {
         &self,
         estimator: Estimator,
         (model_name, stem): (String, String),
-        note: &CalibrationNote,
         inflated: Option<(&Model, &str)>,
     ) -> Vec<OutputFile<'static>> {
         let shown = self.shown(Some(estimator));
         let curves = report::json(&shown.curves);
-        let mut model = note.model_file(&shown, &hash::of_bytes(curves.as_bytes()));
+        let mut model = self
+            .note
+            .model_file(&shown, &hash::of_bytes(curves.as_bytes()));
         let mut draws = DrawsFile::of(&shown.outcomes, self.settings.rate_hz);
         if let Some((inflated, how)) = inflated {
             draws = None;

@@ -106,8 +106,6 @@ pub struct ChoiceMade {
     #[serde(skip)]
     calibration: Calibration,
     #[serde(skip)]
-    note: CalibrationNote,
-    #[serde(skip)]
     estimator: Estimator,
     /// The winner's model, if it is inflated, and how.
     #[serde(skip)]
@@ -126,9 +124,7 @@ impl Answer for ChoiceMade {
             .inflated
             .as_ref()
             .map(|(model, how)| (model, how.name()));
-        let mut files = self
-            .calibration
-            .files_of(self.estimator, names, &self.note, inflated);
+        let mut files = self.calibration.files_of(self.estimator, names, inflated);
         files.push(OutputFile::whole("ranking.json", json(self)));
         files
     }
@@ -240,6 +236,11 @@ impl Command for Choose {
         let mut calibration =
             Calibration::new(groups, outcomes, settings, Some(bootstrap), &|_| {});
         calibration.turn_on.clear();
+        calibration.note = CalibrationNote {
+            reading: self.recordings.provenance(self.gaps),
+            seed: Some(seed),
+            inputs: context.inputs().to_vec(),
+        };
         let others = files
             .iter()
             .enumerate()
@@ -253,11 +254,6 @@ impl Command for Choose {
             ranking,
             abnormal: others.map(|(_, file)| file.file.clone()).collect(),
             calibration,
-            note: CalibrationNote {
-                reading: self.recordings.provenance(self.gaps),
-                seed: Some(seed),
-                inputs: context.inputs().to_vec(),
-            },
             estimator: winner.estimator,
             inflated: (winner.inflation != Inflation::None).then_some((model, winner.inflation)),
         })
