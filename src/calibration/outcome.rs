@@ -453,31 +453,13 @@ impl Candidate {
 /// The candidates and the choice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ranking {
-    /// The candidates all of whose processes can be identified, by WVIC; those whose distance alone exceeds the
-    /// WVIC of the nearest are left out.
+    /// The candidates, the least WVIC first.
     pub candidates: Vec<Candidate>,
-    /// Position of the chosen candidate.
+    /// Index of the chosen one.
     pub chosen: usize,
-    /// Number of candidates left out because a process of theirs is zero or at the end of its range: the same
-    /// without it is among the others.
-    pub not_identifiable: usize,
-    /// Number of candidates left out because their distance alone is too large.
-    pub far: usize,
-    /// The last simpler candidate that was given up, if any was.
-    pub too_simple: Option<TooSimple>,
-}
-
-/// A simpler model that does not do as well as the chosen one.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TooSimple {
-    /// The model.
-    pub spec: ModelSpec,
-    /// Probability of so large a difference of their objectives if it is true, at most.
-    pub p_value: f64,
-    /// The level that speaks loudest against it.
-    pub level: u32,
-    /// Share of that level in all that speaks against it.
-    pub share: f64,
+    /// The largest simpler model that does not do as well as the chosen one, and the probability of so large a difference of
+    /// their objectives if it is true, at most.
+    pub too_simple: Option<(ModelSpec, f64)>,
 }
 
 // Departure of a curve from the model that was fitted to it: where it matters, and where it is most certain.

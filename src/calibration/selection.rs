@@ -16,7 +16,7 @@ use crate::curve::{CalibrationError, Estimator, Group, implied, p_value};
 use crate::fit::{Fit, Weighting, fit, refit, too_few_scales};
 use crate::model::ModelSpec;
 use crate::noise::Kind;
-use crate::outcome::{Advance, Candidate, ModelChoice, Ranking, Settings, TooSimple};
+use crate::outcome::{Advance, Candidate, ModelChoice, Ranking, Settings};
 use crate::uncertainty::bootstrap::CurveSampler;
 use crate::wavelet::Curve;
 use rayon::prelude::*;
@@ -87,12 +87,10 @@ pub(crate) fn choose(
     let scales = curve.levels.len() - curve.ignored.len();
     let all = sums(scales);
     let fits = all.par_iter().map(fitted).collect::<Result<Vec<_>, _>>()?;
-    let tried = fits.len();
     let fits: Vec<(ModelSpec, Fit)> = fits
         .into_iter()
         .filter(|(_, f)| f.zero.is_empty() && f.at_end.is_empty())
         .collect();
-    let not_identifiable = tried - fits.len();
     advance(stage);
     let field = Field {
         group,
@@ -103,7 +101,7 @@ pub(crate) fn choose(
         fits,
     };
     field
-        .rank(not_identifiable, &|| advance(stage))
+        .rank(&|| advance(stage))
         .ok_or_else(|| too_few_scales("auto", 2, scales))
 }
 
@@ -142,7 +140,7 @@ struct Field<'a> {
 }
 
 impl Field<'_> {
-    fn rank(&self, not_identifiable: usize, stage_done: &dyn Fn()) -> Option<(ModelSpec, Ranking)> {
+    fn rank(&self, stage_done: &dyn Fn()) -> Option<(ModelSpec, Ranking)> {
         let nearest = (0..self.fits.len())
             .min_by(|a, b| self.objective(*a).total_cmp(&self.objective(*b)))?;
         // One set of curves for all candidates: their optimisms are then compared on the same noise.
@@ -181,17 +179,17 @@ impl Field<'_> {
         };
         let candidates: Vec<Candidate> = ranked.iter().map(candidate).collect();
         let place = ranked.iter().position(|(i, _)| *i == chosen)?;
-        let too_simple = self.too_simple(chosen, &trials.simpler);
-        let spec = self.fits[chosen].0.clone();
-        let far = self.fits.len() - candidates.len();
+        let too_simple = trials.simpler.iter().rev();
+        let too_simple = too_simple
+            .copied()
+            .find(|(i, p)| *p <= LEVEL && *i != chosen);
+        let spec = |i: usize| self.fits[i].0.clone();
         Some((
-            spec,
+            spec(chosen),
             Ranking {
                 candidates,
                 chosen: place,
-                not_identifiable,
-                far,
-                too_simple,
+                too_simple: too_simple.map(|(i, p)| (spec(i), p)),
             },
         ))
     }
@@ -322,37 +320,6 @@ impl Field<'_> {
             drawn.extend(rest.par_iter().filter_map(difference).collect::<Vec<_>>());
         }
         p_value(observed, &drawn)
-    }
-
-    fn too_simple(&self, chosen: usize, tested: &[(usize, f64)]) -> Option<TooSimple> {
-        let (simpler, p_value) = *tested
-            .iter()
-            .rev()
-            .find(|(i, p)| *p <= LEVEL && *i != chosen)?;
-        let (level, share) = self.deciding(simpler, chosen);
-        Some(TooSimple {
-            spec: self.fits[simpler].0.clone(),
-            p_value,
-            level,
-            share,
-        })
-    }
-
-    /// The scale that speaks loudest for one candidate against another, and its part of all that does.
-    fn deciding(&self, against: usize, chosen: usize) -> (u32, f64) {
-        let (a, b) = (
-            &self.fits[against].1.residuals,
-            &self.fits[chosen].1.residuals,
-        );
-        // Contribution of each scale to the difference of the objectives; the share is of those in favour of
-        // the chosen model.
-        let gains: Vec<f64> = a.iter().zip(b).map(|(a, b)| a * a - b * b).collect();
-        let total: f64 = gains.iter().filter(|g| **g > 0.0).sum();
-        let loudest = gains
-            .iter()
-            .zip(&self.curve.levels)
-            .max_by(|x, y| x.0.total_cmp(y.0));
-        loudest.map_or((0, 0.0), |(gain, level)| (*level, gain / total))
     }
 }
 

@@ -183,10 +183,7 @@ impl ShownCalibration<'_> {
             note(Importance::Remark, head, text);
         }
         for outcome in fits {
-            let reasons = outcome
-                .ranking
-                .iter()
-                .flat_map(|r| reasons(r, settings.rate_hz));
+            let reasons = outcome.ranking.iter().flat_map(reasons);
             let name = fit_name(outcome, fits);
             for text in reasons.chain(fit_notes(outcome, settings)) {
                 note(Importance::Remark, &name, text);
@@ -731,7 +728,7 @@ pub(super) fn turn_on_remark(found: &TurnOnSpread) -> String {
 }
 
 /// The reasons of a choice.
-pub(super) fn reasons(ranking: &Ranking, rate_hz: f64) -> Vec<String> {
+pub(super) fn reasons(ranking: &Ranking) -> Vec<String> {
     let (best, taken) = (&ranking.candidates[0], &ranking.candidates[ranking.chosen]);
     let wvic = |c: &Candidate| format!("{} {:.4}", c.spec, c.wvic());
     let (name, pair) = (&taken.spec, format!("{}, {}", wvic(taken), wvic(best)));
@@ -745,15 +742,7 @@ pub(super) fn reasons(ranking: &Ranking, rate_hz: f64) -> Vec<String> {
     if taken.is_rejected() {
         lines.push("the J-test rejects every candidate".to_owned());
     }
-    lines.extend(ranking.too_simple.iter().map(|simple| {
-        let (share, at) = (
-            percent(simple.share),
-            duration(tau_s(simple.level, rate_hz)),
-        );
-        format!(
-            "{} is too simple (p ≤ {:.3}): {share} of the difference is at {at}",
-            simple.spec, simple.p_value
-        )
-    }));
+    let simpler = ranking.too_simple.iter();
+    lines.extend(simpler.map(|(spec, p)| format!("{spec} is too simple (p ≤ {p:.3})")));
     lines
 }

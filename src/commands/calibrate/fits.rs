@@ -87,7 +87,7 @@ pub(super) fn fit_json(outcome: &Outcome, all: &[&Outcome], settings: &Settings)
         "axis": outcome.scope.axis.map_or("all", |axis| axis.name()),
         "estimator": outcome.estimator,
         "ranking": ranking.map_or(Vec::new(), candidates),
-        "reasons": ranking.map_or(Vec::new(), |r| reasons(r, rate_hz)),
+        "reasons": ranking.map_or(Vec::new(), reasons),
         "processes": processes(&fit.composite, intervals(outcome)),
         "goodness": goodness(outcome),
         "spread": inference.map_or(&[][..], |i| &i.spread),
