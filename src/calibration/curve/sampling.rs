@@ -94,23 +94,22 @@ impl SamplingLaw {
 
     /// The law of the first so many levels.
     pub(crate) fn first(&self, levels: usize) -> Self {
-        let correlation = self.correlation.view((0, 0), (levels, levels)).into_owned();
-        // The leading block of a lower triangular factor is the factor of the leading block.
-        let factor = self.factor.view((0, 0), (levels, levels)).into_owned();
-        let per_coefficient = self.per_coefficient[..levels].to_vec();
-        let quantization = self.quantization[..levels].to_vec();
-        let autocorrelations = self.autocorrelations[..levels].to_vec();
-        let fourth = self.fourth[..levels].to_vec();
-        let shapes = self.shapes[..levels].to_vec();
-        Self {
+        let mut first = self.clone();
+        for matrix in [&mut first.correlation, &mut first.factor] {
+            *matrix = matrix.view((0, 0), (levels, levels)).into_owned();
+        }
+        let Self {
             per_coefficient,
             quantization,
-            autocorrelations,
             fourth,
-            shapes,
-            correlation,
-            factor,
+            ..
+        } = &mut first;
+        for list in [per_coefficient, quantization, fourth] {
+            list.truncate(levels);
         }
+        first.autocorrelations.truncate(levels);
+        first.shapes.truncate(levels);
+        first
     }
 
     /// Degrees of freedom of the classical wavelet variance of a signal of so many samples.

@@ -500,8 +500,8 @@ fn recordings_line(outcomes: &[&Outcome], diagnoses: &[Diagnosis]) -> Option<Str
 fn beginnings(found: &Beginnings) -> Option<(&'static str, String)> {
     const NOTABLE: f64 = 0.05;
     let matters = |b: &&Beginning| {
-        let mut changes = b.signals.iter().map(|(_, w)| w.change);
-        found.left_out || changes.any(|c| c.is_none_or(|c| c.ratio.ln().abs() > NOTABLE))
+        let mut changes = b.signals.iter().map(|w| w.change);
+        found.left_out || changes.any(|c| c.is_none_or(|ratio| ratio.ln().abs() > NOTABLE))
     };
     let told: Vec<&Beginning> = found.all.iter().filter(matters).collect();
     let names = recording_names(told.iter().map(|b| b.recording.as_str()));

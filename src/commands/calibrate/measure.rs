@@ -320,7 +320,7 @@ struct MeasuredRecording {
     recording: String,
     /// What tells the samples of each signal from others.
     signals: Vec<(Channel, String)>,
-    warm_ups: Vec<(Channel, WarmUp)>,
+    warm_ups: Vec<WarmUp>,
     replicates: Vec<(Channel, Replicate)>,
 }
 
@@ -396,21 +396,17 @@ fn beginnings(
 }
 
 /// Samples to leave out of a recording for all its signals; none where that does not help one of them.
-fn longest(signals: &[(Channel, WarmUp)]) -> Option<usize> {
-    let helps = signals.iter().all(|(_, w)| w.change.is_some());
-    signals
-        .iter()
-        .map(|(_, w)| w.samples)
-        .max()
-        .filter(|_| helps)
+fn longest(signals: &[WarmUp]) -> Option<usize> {
+    let helps = signals.iter().all(|w| w.change.is_some());
+    signals.iter().map(|w| w.samples).max().filter(|_| helps)
 }
 
 /// How the signals of a recording begin; if it is to be left out, the recording without that.
 pub(crate) fn without_warm_up(
     mut recording: Recording,
     leave_out: bool,
-) -> (Recording, Vec<(Channel, WarmUp)>) {
-    let begins_otherwise = |s: &Signal| warm_up(&s.samples).map(|w| (s.channel, w));
+) -> (Recording, Vec<WarmUp>) {
+    let begins_otherwise = |s: &Signal| warm_up(&s.samples);
     let found: Vec<_> = recording
         .signals
         .par_iter()
