@@ -3,14 +3,12 @@
 use super::{Cli, Common, Failure, Session};
 use crate::app::{Answer, Front, inputs};
 use crate::commands::batch::{BatchRequest, Outcome};
-use crate::commands::compare::Comparison;
-use crate::commands::paper::{StudyCurves, paper_figures, paper_page};
 use crate::io::atomic::Written;
 use crate::io::{atomic, model_file};
-use crate::report::{self, TrajectorySeries};
+use crate::report;
 use clap::Parser;
 use serde::{Deserialize, Serialize};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Component, Path};
 
 /// Run the case study of Minaretzis et al. 2024, Section V, on a virtual IMU: calibrate with three estimators
 /// on clean and corrupted recordings, navigate with each model, compare (their Table I)
@@ -107,14 +105,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Ok(());
     }
     refuse_the_impossible(args, session)?;
-    let (path, figures) = (out.join("demo.json"), out.join("figures"));
+    let path = out.join("demo.json");
     let _own = atomic::claim_file(&path, [])?;
-    let own_page =
-        |path: PathBuf| atomic::claim_result(&path, [], Written::Page, session.common.force);
-    let _pages = [
-        own_page(out.join("report.html"))?,
-        own_page(figures.join("index.html"))?,
-    ];
+    let page = out.join("report.html");
+    let _page = atomic::claim_result(&page, [], Written::Page, session.common.force)?;
     let mut progress = Progress::of(args, &path, session)?;
     let commands = commands(args, progress.seed);
     if study.exists() && !path.exists() {
@@ -164,7 +158,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let found = found.comparisons.into_iter().next();
     let found = found.ok_or_else(|| Failure::could_not("there is nothing to compare"))?;
     session.show(&found, &found.document(), None);
-    write_figures(&found, out, &figures, session)
+    session.say(format!("all results: {}", page.display()));
+    Ok(())
 }
 
 /// The study of the demo; its paths are relative to the directory of results where that is.
@@ -229,45 +224,6 @@ fn refuse_the_impossible(args: &Args, session: &Session) -> Result<(), Failure> 
         args.samples
     );
     Err(Failure::input(message).hint(format!("at least --samples {needed}")))
-}
-
-/// Writes the paper's figures and a page of them; Figure 2 is of `examples/paper_section4.rs`.
-fn write_figures(
-    found: &Comparison,
-    out: &Path,
-    directory: &Path,
-    session: &Session,
-) -> Result<(), Failure> {
-    let curves = pairs().map(|(scenario, estimator)| {
-        let path = out.join(format!("models/{scenario}_{estimator}.wv.json"));
-        let text = std::fs::read_to_string(&path).map_err(|e| Failure::io(&path, e))?;
-        Ok(StudyCurves {
-            scenario: scenario.to_owned(),
-            estimator: estimator.to_owned(),
-            file: serde_json::from_str(&text).map_err(Failure::could_not)?,
-        })
-    });
-    let curves = curves.collect::<Result<Vec<_>, Failure>>()?;
-    let trajectory = inputs::trajectory(Path::new(TRAJECTORY), &session.context())?;
-    let track = TrajectorySeries::of(&trajectory);
-    let mut figures = paper_figures(&curves, &track, &found.outages);
-    figures.push(found.figure());
-    for figure in &figures {
-        atomic::write(
-            &directory.join(format!("fig{}.svg", figure.number)),
-            figure.svg(),
-        )?;
-    }
-    atomic::write(&directory.join("index.html"), paper_page(&figures))?;
-    session.say(format!("the paper's figures: {}", directory.display()));
-    Ok(())
-}
-
-/// Scenario and estimator of each model.
-fn pairs() -> impl Iterator<Item = (&'static str, &'static str)> {
-    SCENARIOS
-        .into_iter()
-        .flat_map(|scenario| ESTIMATORS.map(|estimator| (scenario, estimator)))
 }
 
 /// The commands, as words.

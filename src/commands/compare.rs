@@ -1,7 +1,6 @@
 //! `nav-sim compare`: run directories → ratios between runs.
 
 use crate::app::{Answer, Command, Context, Failure, Manifest, Out, OutputFile, Result};
-use crate::commands::paper::PaperFigure;
 use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::io::atomic::Written;
@@ -412,11 +411,6 @@ impl Comparison {
             .collect::<Vec<_>>())
     }
 
-    /// The paper's Figure 7, beside its other ones.
-    pub(crate) fn figure(&self) -> PaperFigure {
-        PaperFigure::new(7, FIGURE, self.charts())
-    }
-
     /// The candidates but for the reference itself, with short names.
     fn others(&self) -> Vec<(String, &CandidateResult)> {
         let others: Vec<_> = self.candidates.iter().filter(|c| !c.is_reference).collect();
@@ -577,8 +571,6 @@ impl Answer for Comparison {
 const NAMED: usize = 3;
 /// Scenarios that have a chart each; of more, one chart has all runs.
 const SCENARIOS: usize = 6;
-
-const FIGURE: &str = "Departure of the ASEE of each filter from that of AWV in scenario I, (ratio − 1)·100; outages shaded.";
 
 const CAPTION: &str = "ASEE (averaged standard estimation error) is the filter's own standard deviation: 0 % is as the reference believes.";
 

@@ -10,7 +10,6 @@ pub mod design;
 pub mod export;
 pub mod fuse;
 pub mod inspect;
-pub(crate) mod paper;
 pub mod require;
 pub mod run;
 pub mod synthesize;

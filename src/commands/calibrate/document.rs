@@ -266,7 +266,7 @@ fn group_name(fitted: &FittedCurve) -> String {
 }
 
 /// The wavelet variance, and its ratio to that of the model.
-pub(crate) fn variance(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Chart {
+fn variance(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Chart {
     let FittedCurve {
         tau_s,
         wv,

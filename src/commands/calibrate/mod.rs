@@ -26,7 +26,6 @@ mod fits;
 mod measure;
 mod model_file;
 
-pub(crate) use document::variance as variance_chart;
 pub use measure::{Calibration, CalibrationOptions, EstimatorChoice, calibrate};
 pub(crate) use measure::{Measured, measure, visit, without_warm_up};
 pub(crate) use model_file::CalibrationNote;
