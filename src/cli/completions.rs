@@ -1,7 +1,7 @@
 //! `nav-sim completions`: completion scripts for shells.
 
 /// Print a completion script for a shell
-#[derive(clap::Args, Debug)]
+#[derive(clap::Args)]
 #[command(before_help = "\
 Examples:
   nav-sim completions bash > nav-sim.bash

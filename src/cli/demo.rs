@@ -19,7 +19,7 @@ use std::path::{Component, Path};
 /// windows of one more clean recording and two outages of 90 s, the filter with a state for each AR1 and random walk as in the
 /// paper; the ASEE of each filter relative to AWV in scenario I. If interrupted, the same command continues: demo.json in the
 /// directory says how far it is.
-#[derive(clap::Args, Debug)]
+#[derive(clap::Args)]
 #[command(before_help = "\
 Examples:
   nav-sim demo --seed 1 --samples 100000 --runs 8
@@ -46,7 +46,7 @@ const SCENARIOS: [&str; 3] = ["I", "II", "III"];
 const ESTIMATORS: [&str; 3] = ["awv", "sr-awv", "dr-awv"];
 
 /// How far a demo is: demo.json of its directory.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(PartialEq, Serialize, Deserialize)]
 struct Progress {
     version: String,
     seed: u64,

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// scenario.toml, imu.toml, motion.toml, contamination.toml, initial.toml and examples/quick_study.toml say
 /// what each key means. The others are those of the repository; the examples of every --help work inside the directory. Files
 /// that exist already are left alone.
-#[derive(clap::Args, Debug)]
+#[derive(clap::Args)]
 #[command(before_help = "\
 Examples:
   nav-sim init study

@@ -3,7 +3,7 @@
 use super::Failure;
 
 /// Print the manual page of a command (without a name: of nav-sim itself)
-#[derive(clap::Args, Debug)]
+#[derive(clap::Args)]
 #[command(before_help = "\
 Examples:
   nav-sim man > nav-sim.1

@@ -37,7 +37,7 @@ struct Cli {
 macro_rules! driven {
     ($($variant:ident: $command:path),* $(,)?) => {
         /// Commands that answer a question.
-        #[derive(Subcommand, Debug)]
+        #[derive(Subcommand)]
         enum Driven {
             $($variant(Asked<$command>)),*
         }
@@ -53,7 +53,7 @@ macro_rules! driven {
 }
 with_commands!(driven);
 
-#[derive(Subcommand, Debug)]
+#[derive(Subcommand)]
 #[expect(clippy::large_enum_variant, reason = "there is one, once a process")]
 enum Command {
     #[command(flatten)]

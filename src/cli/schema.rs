@@ -5,7 +5,7 @@ use crate::io::{contamination_file, fusion_files, model_file, trajectory_file};
 use nav_sim_navigation::scenario::Scenario;
 
 /// Print the JSON schema of a file that people write, for editors and checkers
-#[derive(clap::Args, Debug)]
+#[derive(clap::Args)]
 #[command(before_help = "\
 Examples:
   nav-sim schema scenario > scenario.schema.json

@@ -13,7 +13,7 @@ use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Flags that mean the same in every command.
-#[derive(clap::Args, Clone, Debug, Default)]
+#[derive(clap::Args, Clone, Default)]
 #[command(next_help_heading = "Common options")]
 pub(crate) struct Common {
     /// Seed of all random numbers [default: 1]
@@ -42,7 +42,7 @@ pub(crate) struct Common {
     pub(crate) format: Format,
 }
 
-#[derive(clap::ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(clap::ValueEnum, Clone, Copy, Default, PartialEq)]
 pub(crate) enum Color {
     #[default]
     Auto,
@@ -50,7 +50,7 @@ pub(crate) enum Color {
     Never,
 }
 
-#[derive(clap::ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(clap::ValueEnum, Clone, Copy, Default, PartialEq)]
 pub(crate) enum Format {
     #[default]
     Text,

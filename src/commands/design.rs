@@ -258,14 +258,14 @@ fn destination_quantiles(
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Designs {
     /// Layout version.
-    pub(crate) schema_version: u32,
+    schema_version: u32,
     /// One for each number of recordings and length, the largest last.
-    pub(crate) designs: Vec<DesignOutcome>,
+    designs: Vec<DesignOutcome>,
 }
 
 /// What so many recordings, so long each, would tell.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct DesignOutcome {
+struct DesignOutcome {
     /// Recordings.
     pub recordings: usize,
     /// Length of each (h).
@@ -282,7 +282,7 @@ pub(crate) struct DesignOutcome {
 
 /// The interval that a parameter would have.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct DesignedParameter {
+struct DesignedParameter {
     /// `accel`, or `accel.x` alone.
     pub signals: String,
     /// `WN sigma2`, `AR1_1 correlation_time_s`.
@@ -307,7 +307,7 @@ impl DesignedParameter {
 
 /// The interval that the horizontal p95 at an outage's end would have.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct DesignedQuantile {
+struct DesignedQuantile {
     /// First instant without a fix (s).
     pub start_s: f64,
     /// First instant with a fix again (s).

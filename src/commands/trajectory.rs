@@ -20,7 +20,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 
 /// Make, check and convert reference trajectories
-#[derive(clap::Args, Debug)]
+#[derive(clap::Args)]
 #[command(before_help = "\
 Examples:
   nav-sim trajectory check trajectories/land_vehicle.toml
@@ -31,7 +31,7 @@ pub(crate) struct TrajectoryArgs {
     pub(crate) command: TrajectoryCommand,
 }
 
-#[derive(clap::Subcommand, Debug)]
+#[derive(clap::Subcommand)]
 pub(crate) enum TrajectoryCommand {
     /// Write a motion profile as a table of evenly spaced rows
     ///

@@ -166,8 +166,8 @@ pub(super) fn turn_on_json(found: &TurnOnSpread) -> Value {
 }
 
 /// A figure of a model, in the unit of data sheets.
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct Figure {
+#[derive(Serialize)]
+struct Figure {
     name: String,
     /// None where the data do not show it.
     value: Option<f64>,

@@ -455,7 +455,6 @@ fn shortest(report: &Report, scales: Option<u32>, context: &Context<'_>) {
 // Wavelet-variance curves that come from elsewhere → models.
 
 /// Curves of a file, each with what it is for.
-#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub(crate) struct Curves {
     curves: Vec<(Scope, Estimator, Curve)>,

@@ -258,7 +258,7 @@ impl Answer for Calibration {
 
 impl Calibrate {
     /// How models are fitted, checked before any file is read.
-    pub(crate) fn settings(&self) -> Result<Settings> {
+    fn settings(&self) -> Result<Settings> {
         Ok(Settings {
             model: self.structure()?,
             trim: self.trim,
@@ -270,7 +270,7 @@ impl Calibrate {
     }
 
     /// The curves in the place of recordings, and whether they do not say of which sensor: then as of an accelerometer.
-    pub(crate) fn curves(&self, path: &Path, settings: &Settings) -> Result<(Curves, bool)> {
+    fn curves(&self, path: &Path, settings: &Settings) -> Result<(Curves, bool)> {
         let rate_hz = self.recordings.reading.rate_hz;
         read_curves(path, rate_hz, self.recordings.sensor(), settings)
     }
@@ -352,7 +352,7 @@ fn model_ending(stem: &str) -> String {
 }
 
 /// Endings and kinds of all files of these estimators.
-pub(crate) fn endings(estimators: &[Estimator]) -> Vec<(Cow<'static, str>, Written)> {
+fn endings(estimators: &[Estimator]) -> Vec<(Cow<'static, str>, Written)> {
     let of_estimator = |estimator: &Estimator| {
         let stem = stem_of(*estimator, estimators);
         [

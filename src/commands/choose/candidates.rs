@@ -127,7 +127,7 @@ impl Candidate {
     }
 
     /// Whether another one has the same model, before any inflation.
-    pub(crate) fn is_calibrated_as(&self, other: &Self) -> bool {
+    fn is_calibrated_as(&self, other: &Self) -> bool {
         self.estimator == other.estimator && self.model == other.model
     }
 
@@ -222,7 +222,7 @@ pub struct Laboratory {
 }
 
 /// The groups of recordings that were calibrated, their fits, and how these were made.
-pub(crate) type Calibrated = (Vec<Group>, Vec<Outcome>, Settings);
+type Calibrated = (Vec<Group>, Vec<Outcome>, Settings);
 
 impl Laboratory {
     /// Estimators and model of the settings count nothing: those of the candidates do.
@@ -271,7 +271,7 @@ impl Laboratory {
     }
 
     /// The recordings but one.
-    pub(super) fn others(&self, without: Option<usize>) -> impl Iterator<Item = usize> {
+    fn others(&self, without: Option<usize>) -> impl Iterator<Item = usize> {
         (0..self.units.len()).filter(move |k| Some(*k) != without)
     }
 

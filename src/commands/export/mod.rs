@@ -132,8 +132,8 @@ impl Answer for ExportAnswer {
 }
 
 /// One value of the exported file.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Entry {
+#[derive(Serialize)]
+struct Entry {
     /// Key, as the target writes it.
     pub key: String,
     /// The value, in the target's unit.

@@ -13,7 +13,6 @@ const TOLERANCE: f64 = 1.5;
 const NOTABLE: f64 = 0.1;
 
 /// A quantity of a sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Quantity {
     /// White noise density N: velocity or angle random walk.
     Density,
