@@ -101,7 +101,7 @@ impl Anticipated<'_> {
             &settings.tuning,
         )
         .map_err(group.named(estimator))?;
-        let mut outcome = fit_curve(&group, estimator, curve, settings)?;
+        let mut outcome = fit_curve(&group, estimator, curve, settings, &|_| {})?;
         // The fit is kept for its minima, from which the draws are fitted; the centre of the draws is the
         // model itself.
         outcome.fit.composite = composite;

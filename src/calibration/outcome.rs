@@ -114,14 +114,6 @@ pub struct FitRange {
     pub to_s: f64,
 }
 
-impl FitRange {
-    /// Whether a level counts at a rate (Hz); ends may be off by rounding.
-    pub(crate) fn holds(&self, level: u32, rate_hz: f64) -> bool {
-        let scale_s = f64::from(level).exp2() / rate_hz;
-        scale_s >= self.from_s * (1.0 - 1e-9) && scale_s <= self.to_s * (1.0 + 1e-9)
-    }
-}
-
 /// Who says what the model is made of.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ModelChoice {
@@ -200,6 +192,14 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// Whether a level is within the range of the fit; ends may be off by rounding.
+    pub(crate) fn counts(&self, level: u32) -> bool {
+        let scale_s = tau_s(level, self.rate_hz);
+        self.fit_range.is_none_or(|range| {
+            scale_s >= range.from_s * (1.0 - 1e-9) && scale_s <= range.to_s * (1.0 + 1e-9)
+        })
+    }
+
     /// Signals that the estimators take as replicates of one another, unless told otherwise: those of single
     /// recordings pool nothing.
     pub fn pool(&self) -> Pool {

@@ -39,25 +39,16 @@ pub fn calibrate_telling(
             &settings.tuning,
         )
         .map_err(group.named(estimator))?;
-        fit_telling(group, estimator, curve, settings, advance)
+        fit_curve(group, estimator, curve, settings, advance)
     };
     jobs.par_iter().map(run).collect()
 }
 
-/// Fits the curve of a group.
+/// Fits the curve of a group, and tells `advance` of the steps.
 ///
 /// # Errors
 /// When the curve is too short for the model.
 pub fn fit_curve(
-    group: &Group,
-    estimator: Estimator,
-    curve: Curve,
-    settings: &Settings,
-) -> Result<Outcome, CalibrationError> {
-    fit_telling(group, estimator, curve, settings, &|_| {})
-}
-
-fn fit_telling(
     group: &Group,
     estimator: Estimator,
     mut curve: Curve,
@@ -107,11 +98,7 @@ fn fit_telling(
 
 /// Gives no weight to the scales outside the range of a fit.
 fn leave_out(curve: &mut Curve, settings: &Settings) {
-    let Some(range) = settings.fit_range else {
-        return;
-    };
-    let outside =
-        |level: &&u32| !range.holds(**level, settings.rate_hz) && !curve.ignored.contains(*level);
+    let outside = |level: &&u32| !settings.counts(**level) && !curve.ignored.contains(*level);
     let outside: Vec<u32> = curve.levels.iter().filter(outside).copied().collect();
     curve.ignored.extend(outside);
 }
@@ -119,14 +106,9 @@ fn leave_out(curve: &mut Curve, settings: &Settings) {
 /// Counts the scales without a root at which a fit exceeds the classical variance, which bounds the noise from above; whether
 /// there are any.
 fn count_exceeded(curve: &mut Curve, without_root: &[u32], fit: &Fit, settings: &Settings) -> bool {
-    let is_in_range = |level: u32| {
-        settings
-            .fit_range
-            .is_none_or(|range| range.holds(level, settings.rate_hz))
-    };
     let implied = implied(&fit.composite, curve);
     let scales = curve.levels.iter().zip(&curve.wv).zip(implied);
-    let is_exceeded = |level: &u32| without_root.contains(level) && is_in_range(*level);
+    let is_exceeded = |level: &u32| without_root.contains(level) && settings.counts(*level);
     let exceeded = scales
         .filter(|((level, wv), nu)| is_exceeded(level) && nu > *wv)
         .map(|((level, _), _)| *level);
@@ -208,7 +190,7 @@ mod tests {
             model,
             ..Settings::default()
         };
-        let outcome = fit_curve(&group, Estimator::Given, curve, &settings).unwrap();
+        let outcome = fit_curve(&group, Estimator::Given, curve, &settings, &|_| {}).unwrap();
         assert_eq!(outcome.curve.ignored, [7]);
     }
 
@@ -264,7 +246,14 @@ mod tests {
             ..Settings::default()
         };
         let fit = |curve: &Curve, range| {
-            fit_curve(&group, Estimator::Given, curve.clone(), &settings(range)).unwrap()
+            fit_curve(
+                &group,
+                Estimator::Given,
+                curve.clone(),
+                &settings(range),
+                &|_| {},
+            )
+            .unwrap()
         };
         let (ranged, shortened, all) = (
             fit(&whole, Some(range)),

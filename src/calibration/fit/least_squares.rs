@@ -431,26 +431,16 @@ nav_sim_signal::named!(
 impl Weighting {
     /// √Omega_j of each scale (1/units²), where its variance is taken to be `nu`.
     pub(crate) fn roots(self, curve: &Curve, nu: &[f64]) -> Vec<f64> {
-        // A classical variance has no protection of its own that its weight could keep.
-        if self == Self::Model && curve.quantization.is_some() {
-            let plain = inverse_deviations(curve, nu).into_iter();
-            let scales = curve.wv.iter().zip(nu).zip(&curve.edof);
-            return plain
-                .zip(scales)
-                .map(|(root, ((wv, nu), edof))| root * trust(wv / nu, *edof))
-                .collect();
-        }
-        let root = |((nu, edof), level): ((&f64, &f64), &u32)| match self {
-            _ if curve.ignored.contains(level) => 0.0,
-            // var nu_hat = 2 nu²/eta.
-            Self::Model => 1.0 / (nu * (2.0 / edof + curve.differing).sqrt()),
+        let plain = inverse_deviations(curve, nu);
+        let scales = plain.iter().zip(nu).zip(curve.wv.iter().zip(&curve.edof));
+        let root = |((plain, nu), (wv, edof)): ((&f64, &f64), (&f64, &f64))| match self {
+            _ if *plain == 0.0 => 0.0,
             Self::Edof => (0.5 * edof).sqrt() / nu,
+            // A classical variance has no protection of its own that its weight could keep.
+            Self::Model if curve.quantization.is_none() => *plain,
+            Self::Model => plain * trust(wv / nu, *edof),
         };
-        nu.iter()
-            .zip(&curve.edof)
-            .zip(&curve.levels)
-            .map(root)
-            .collect()
+        scales.map(root).collect()
     }
 }
 

@@ -131,7 +131,6 @@ fn holding(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
 /// them are paired as can be, the nearest.
 pub(super) fn matched<'a>(estimate: &Fit, fit: &'a Fit) -> Vec<Option<&'a Process>> {
     let (drawn, model) = (&fit.composite.processes, &estimate.composite.processes);
-    let is_present = |fit: &Fit, i: usize| !fit.zero.contains(&i) && !fit.at_end.contains(&i);
     let kinds: Vec<Kind> = model.iter().map(Process::kind).collect();
     let cost = |i: usize, d: usize| (log_time(&model[i]) - log_time(&drawn[d])).powi(2);
     let mut matched = vec![None; drawn.len()];
@@ -143,28 +142,19 @@ pub(super) fn matched<'a>(estimate: &Fit, fit: &'a Fit) -> Vec<Option<&'a Proces
         let own: Vec<usize> = (first..kinds.len())
             .filter(|i| kinds[*i] == *kind)
             .collect();
-        let items: Vec<usize> = own
-            .iter()
-            .copied()
-            .filter(|i| is_present(fit, *i))
-            .collect();
-        let places: Vec<usize> = own
-            .iter()
-            .copied()
-            .filter(|i| is_present(estimate, *i))
-            .collect();
+        let present = |of: &Fit| -> Vec<usize> {
+            let own = own.iter().copied();
+            own.filter(|i| !of.zero.contains(i) && !of.at_end.contains(i))
+                .collect()
+        };
+        let (items, places) = (present(fit), present(estimate));
         // Fits list alike processes by correlation time, and only their number may differ.
         let pairs: Vec<(usize, usize)> = if items.len() <= places.len() {
-            nearest(&places, &items, cost)
-                .into_iter()
-                .zip(items)
-                .collect()
+            let nearest = nearest(&places, &items, cost);
+            nearest.into_iter().zip(items).collect()
         } else {
-            places
-                .iter()
-                .copied()
-                .zip(nearest(&items, &places, |d, i| cost(i, d)))
-                .collect()
+            let nearest = nearest(&items, &places, |d, i| cost(i, d));
+            places.into_iter().zip(nearest).collect()
         };
         for (place, d) in pairs {
             matched[place] = Some(&drawn[d]);
@@ -242,41 +232,33 @@ impl Draws {
         }
     }
 
-    /// Distances of the quantiles from the median on that scale, stretched.
-    fn distances(&self) -> [f64; 2] {
-        self.quantiles
-            .map(|q| self.stretch * (self.parameter.scaled(q) - self.parameter.scaled(self.median)))
-    }
-
-    /// The quantiles, their distances stretched; as they are where one is at a bound.
-    fn stretched(&self) -> [f64; 2] {
-        let ends = self.distances().map(|d| {
-            self.parameter
-                .unscaled(self.parameter.scaled(self.median) + d)
-        });
-        if ends.iter().all(|e| e.is_finite()) {
+    /// The stretched distances of the quantiles from the median, times `sign`, from a centre on that scale; the quantiles
+    /// themselves where it or one of them is at a bound.
+    fn ends(&self, centre: f64, sign: f64) -> [f64; 2] {
+        let (parameter, median) = (self.parameter, self.parameter.scaled(self.median));
+        let distance = |q| self.stretch * (parameter.scaled(q) - median);
+        let mut ends = self
+            .quantiles
+            .map(|q| parameter.unscaled(centre + sign * distance(q)));
+        ends.sort_by(f64::total_cmp);
+        if centre.is_finite() && ends.iter().all(|e| e.is_finite()) {
             ends
         } else {
             self.quantiles
         }
     }
 
-    /// The 95 % interval.
-    fn around(&self, estimate: f64) -> [f64; 2] {
-        self.mirrored(estimate).unwrap_or(self.quantiles)
+    /// The quantiles, their distances stretched.
+    fn stretched(&self) -> [f64; 2] {
+        self.ends(self.parameter.scaled(self.median), 1.0)
     }
 
-    /// The quantiles mirrored at the estimate; none where it or one of them is at a bound.
-    fn mirrored(&self, estimate: f64) -> Option<[f64; 2]> {
+    /// The 95 % interval: the quantiles mirrored at the estimate.
+    fn around(&self, estimate: f64) -> [f64; 2] {
         // 2·estimate − quantile is the mirror image; written with the median, whose distance from the
         // quantiles is what is stretched.
-        let centre = 2.0 * self.parameter.scaled(estimate) - self.parameter.scaled(self.median);
-        let mut ends = self
-            .distances()
-            .map(|d| self.parameter.unscaled(centre - d));
-        ends.sort_by(f64::total_cmp);
-        (ends.iter().all(|e| e.is_finite()) && self.parameter.scaled(estimate).is_finite())
-            .then_some(ends)
+        let scaled = |x| self.parameter.scaled(x);
+        self.ends(2.0 * scaled(estimate) - scaled(self.median), -1.0)
     }
 }
 

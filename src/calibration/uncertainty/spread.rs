@@ -56,28 +56,8 @@ pub(super) struct Origin {
 
 /// Signals of one name are of one recording; a signal of its axis has the same position in every recording.
 pub(super) fn origins(replicates: &[Replicate]) -> Vec<Origin> {
-    let first = |is_same: &dyn Fn(&Replicate) -> bool| replicates.iter().position(is_same);
-    let ranked = |firsts: Vec<Option<usize>>| -> Vec<usize> {
-        let mut known = firsts.clone();
-        known.sort_unstable();
-        known.dedup();
-        firsts
-            .iter()
-            .map(|of| known.partition_point(|other| other < of))
-            .collect()
-    };
-    let recordings = ranked(
-        replicates
-            .iter()
-            .map(|r| first(&|other| other.name == r.name))
-            .collect(),
-    );
-    let positions = ranked(
-        replicates
-            .iter()
-            .map(|r| first(&|other| other.axis == r.axis))
-            .collect(),
-    );
+    let recordings = ranks(replicates.iter().map(|r| &r.name));
+    let positions = ranks(replicates.iter().map(|r| r.axis));
     let pairs = recordings.into_iter().zip(positions);
     pairs
         .map(|(recording, position)| Origin {
@@ -85,6 +65,19 @@ pub(super) fn origins(replicates: &[Replicate]) -> Vec<Origin> {
             position,
         })
         .collect()
+}
+
+/// Which of the different values each is, by first appearance.
+fn ranks<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<usize> {
+    let mut known = Vec::new();
+    let rank = |value| {
+        let found = known.iter().position(|k| *k == value);
+        found.unwrap_or_else(|| {
+            known.push(value);
+            known.len() - 1
+        })
+    };
+    values.map(rank).collect()
 }
 
 impl Spread {
@@ -177,33 +170,27 @@ impl Spread {
     /// because the variances are known from few replicates. 1 for a single replicate, whose variances are
     /// those of the law.
     pub(crate) fn student(&self) -> f64 {
-        self.student_where(&self.between)
+        self.stretch(&self.between, |_| 1.0)
     }
 
     /// The same where replicates differ by these standard deviations, times the median of the deviation that so few replicates show,
     /// over the true one: what half of all calibrations stretch the true scatter by, or less.
     pub(crate) fn stated_where(&self, between: &[f64]) -> f64 {
-        if self.units.len() < 2 {
-            return 1.0;
-        }
-        let freedom = self.left_of(self.freedom(between));
-        let median = ChiSquared::new(freedom).map_or(freedom, |law| law.inverse_cdf(0.5));
-        self.student_where(between) * (median / freedom).sqrt()
+        self.stretch(between, |freedom| {
+            let median = ChiSquared::new(freedom).map_or(freedom, |law| law.inverse_cdf(0.5));
+            (median / freedom).sqrt()
+        })
     }
 
-    fn student_where(&self, between: &[f64]) -> f64 {
+    fn stretch(&self, between: &[f64], shown: impl Fn(f64) -> f64) -> f64 {
         if self.units.len() < 2 {
             return 1.0;
         }
-        let freedom = self.left_of(self.freedom(between));
+        // Those that the estimator leaves.
+        let freedom = (self.share_of_freedom * self.freedom(between)).max(1.0);
         let student =
             StudentsT::new(0.0, 1.0, freedom).map_or(NORMAL_975, |law| law.inverse_cdf(0.975));
-        student / NORMAL_975
-    }
-
-    /// Degrees of freedom that the estimator leaves of so many.
-    fn left_of(&self, freedom: f64) -> f64 {
-        (self.share_of_freedom * freedom).max(1.0)
+        student / NORMAL_975 * shown(freedom)
     }
 
     /// Degrees of freedom of the variance of a mean: of its part that follows from the signals' own noise one less than

@@ -209,7 +209,7 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Figure> {
     let mut figures = practical.map_or_else(BTreeMap::new, |p| practical_figures(outcome, &p));
     let model = &outcome.fit.composite;
     for (index, (process, label)) in model.processes.iter().zip(model.labels()).enumerate() {
-        let further = further_figure(process, outcome.scope.sensor, rate_hz);
+        let further = further_figure(process, outcome.scope.sensor);
         let Some((letter, name, unit, parameter, convert)) =
             further.filter(|_| !outcome.fit.zero.contains(&index))
         else {
@@ -217,12 +217,12 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Figure> {
         };
         let own = |of: ParameterRef| of.process == index && of.parameter == parameter;
         let interval = intervals(outcome).iter().find(|i| own(i.of)).map(|i| {
-            let mut ends = [i.low, i.high].map(&convert);
+            let mut ends = [i.low, i.high].map(|end| convert(end, rate_hz));
             ends.sort_by(f64::total_cmp);
             i.absent.is_none().then_some(ends)
         });
         let value = model.parameters().find(|(of, _)| own(*of));
-        let value = value.map(|(_, value)| convert(value)).ok_or("");
+        let value = value.map(|(_, value)| convert(value, rate_hz)).ok_or("");
         let averages = averages(outcome, index, rate_hz);
         let figure = Figure::new((format!("{label} {name}"), unit), value, interval, averages);
         let key = match letter {
@@ -284,48 +284,37 @@ fn practical_figures(outcome: &Outcome, practical: &Practical) -> BTreeMap<Strin
     named.map(|(key, figure)| (key.to_owned(), figure)).into()
 }
 
+/// Letter, name and unit of what a process is known by beside N and K, the parameter that it follows from, and how, at a
+/// rate (Hz).
 type FurtherFigure = (
     &'static str,
     &'static str,
     &'static str,
     Parameter,
-    Box<dyn Fn(f64) -> f64>,
+    fn(f64, f64) -> f64,
 );
 
-/// Letter, name and unit of what a process is known by beside N and K, the parameter that it follows from, and how.
-fn further_figure(process: &Process, sensor: Sensor, rate_hz: f64) -> Option<FurtherFigure> {
+fn further_figure(process: &Process, sensor: Sensor) -> Option<FurtherFigure> {
     let [increment, ramp] = match sensor {
         Sensor::Accel => ["m/s", "m/s² per s"],
         Sensor::Gyro => ["rad", "rad/s per s"],
     };
     const TIME: &str = "correlation time T";
     Some(match process {
-        Process::Ar1(p) if p.phi() > 0.0 => (
-            "T",
-            TIME,
-            "s",
-            Parameter::Phi,
-            Box::new(move |phi| -1.0 / (phi.ln() * rate_hz)),
-        ),
-        Process::GaussMarkov(_) => ("T", TIME, "s", Parameter::Beta, Box::new(|beta| 1.0 / beta)),
+        Process::Ar1(p) if p.phi() > 0.0 => ("T", TIME, "s", Parameter::Phi, |phi, rate_hz| {
+            -1.0 / (phi.ln() * rate_hz)
+        }),
+        Process::GaussMarkov(_) => ("T", TIME, "s", Parameter::Beta, |beta, _| 1.0 / beta),
         // Of the increments over a sample, as IEEE 952 has it.
         Process::Quantization(_) => {
-            let of_increment = move |q2: f64| q2.sqrt() / rate_hz;
-            (
-                "Q",
-                "quantization Q",
-                increment,
-                Parameter::Q2,
-                Box::new(of_increment),
-            )
+            let name = "quantization Q";
+            ("Q", name, increment, Parameter::Q2, |q2, rate_hz| {
+                q2.sqrt() / rate_hz
+            })
         }
-        Process::Drift(_) => (
-            "R",
-            "ramp",
-            ramp,
-            Parameter::Slope,
-            Box::new(move |slope| slope * rate_hz),
-        ),
+        Process::Drift(_) => ("R", "ramp", ramp, Parameter::Slope, |slope, rate_hz| {
+            slope * rate_hz
+        }),
         _ => return None,
     })
 }

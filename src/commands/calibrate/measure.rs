@@ -541,7 +541,7 @@ impl Curves {
                 scope,
                 replicates: Vec::new(),
             };
-            outcomes.push(fit_curve(&group, estimator, curve, &settings)?);
+            outcomes.push(fit_curve(&group, estimator, curve, &settings, &|_| {})?);
             groups.push(group);
         }
         Ok(Calibration::new(
