@@ -532,7 +532,7 @@ const FACTOR: f64 = 3.0;
 const PEAK: f64 = 3.78;
 
 /// Remarks on a fit, the most important first.
-fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
+pub(super) fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
     let (fit, curve, rate_hz) = (&outcome.fit, &outcome.curve, settings.rate_hz);
     let (model, labels) = (&fit.composite, fit.composite.labels());
     let seconds = |level: &u32| tau_s(*level, rate_hz);
@@ -599,25 +599,17 @@ fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
     notes
 }
 
-/// The notes on a fit, and why parameters have no interval.
-pub(super) fn all_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
-    let mut notes = fit_notes(outcome, settings);
-    notes.extend(without_interval(outcome));
-    notes
-}
-
 /// Why parameters have no interval.
-fn without_interval(outcome: &Outcome) -> impl Iterator<Item = String> {
+pub(super) fn without_interval(outcome: &Outcome) -> impl Iterator<Item = String> {
     let labels = outcome.fit.composite.labels();
-    intervals(outcome)
-        .iter()
-        .filter_map(move |i| undetermined(i, &labels))
+    let absent = intervals(outcome).iter();
+    let absent = absent.filter_map(|i| Some((i, i.absent.as_ref()?)));
+    absent.map(move |(interval, why)| undetermined(interval, why, &labels))
 }
 
-/// Why a parameter of a model with processes of these labels has no interval, if it has none.
-fn undetermined(interval: &ParameterInterval, labels: &[String]) -> Option<String> {
+fn undetermined(interval: &ParameterInterval, why: &Undetermined, labels: &[String]) -> String {
     let process = &labels[interval.of.process];
-    let why = match interval.absent.as_ref()? {
+    let why = match why {
         Undetermined::Zero => format!("{process} is zero"),
         Undetermined::Vanishes => format!(
             "{process} is zero in {} of the draws",
@@ -631,10 +623,8 @@ fn undetermined(interval: &ParameterInterval, labels: &[String]) -> Option<Strin
             format!("the data do not need both {}", alike.join(" and "))
         }
     };
-    Some(format!(
-        "{process} {}: no interval: {why}",
-        interval.of.parameter.name()
-    ))
+    let name = interval.of.parameter.name();
+    format!("{process} {name}: no interval: {why}")
 }
 
 /// Notes on the recordings of a sensor: on those that are abnormal, on what all have in common.

@@ -1,6 +1,6 @@
 //! A calibration as JSON: fits with their figures, recordings, turn-on biases.
 
-use super::document::{all_notes, fit_name, reasons, turn_on_remark};
+use super::document::{fit_name, fit_notes, reasons, turn_on_remark, without_interval};
 use crate::commands::export::Quantity;
 use nav_sim_calibration::{
     Candidate, Estimator, Goodness, Miss, Outcome, ParameterInterval, ParameterSpread, Practical,
@@ -17,6 +17,8 @@ use std::collections::BTreeMap;
 pub(super) fn fit_record(outcome: &Outcome, settings: &Settings) -> Map<String, Value> {
     let (fit, goodness) = (&outcome.fit, goodness(outcome));
     let worst = outcome.departure().misfit;
+    let notes = fit_notes(outcome, settings).into_iter();
+    let notes: Vec<String> = notes.chain(without_interval(outcome)).collect();
     let is_trimmed = outcome.estimator == Estimator::DrAwv;
     object(json!({
         "signals": outcome.scope.name(),
@@ -36,7 +38,7 @@ pub(super) fn fit_record(outcome: &Outcome, settings: &Settings) -> Map<String, 
         "j_p_value": goodness.map(|g| g.p_value),
         "worst_ratio": worst.map(|miss| miss.ratio),
         "worst_tau_s": worst.map(|miss| tau_s(miss.level, settings.rate_hz)),
-        "notes": all_notes(outcome, settings),
+        "notes": notes,
     }))
 }
 

@@ -127,10 +127,10 @@ impl Default for CalibrationOptions {
     }
 }
 
-/// Recordings that were measured and found to be replicates of one another.
+/// Recordings that were measured, none a copy of another.
 pub(crate) struct Measured {
     pub report: Report,
-    pub groups: Vec<Group>,
+    pub replicates: Vec<(Channel, Replicate)>,
     pub beginnings: Beginnings,
     pub settings: Settings,
 }
@@ -166,11 +166,12 @@ pub fn calibrate(
     context: &Context<'_>,
 ) -> Result<Calibration, Failure> {
     let Measured {
-        groups,
+        replicates,
         beginnings,
         settings,
         ..
     } = measure(paths, options, context)?;
+    let groups = grouped(replicates, options.pool.unwrap_or(settings.pool()));
     let bootstrap = options.bootstrap;
     let steps = settings.model.steps() + bootstrap.map_or(0, |bootstrap| bootstrap.draws as u64);
     let fits = (groups.len() * settings.estimators.len()) as u64;
@@ -223,10 +224,9 @@ pub(crate) fn measure(
     }
     let mut measured: Vec<_> = looks.into_iter().flat_map(|look| look.replicates).collect();
     one_switching_on(&report, &mut measured);
-    let groups = grouped(measured, pool.unwrap_or(settings.pool()));
     Ok(Measured {
         report,
-        groups,
+        replicates: measured,
         beginnings,
         settings,
     })
@@ -455,14 +455,10 @@ fn shortest(report: &Report, scales: Option<u32>, context: &Context<'_>) {
 // Wavelet-variance curves that come from elsewhere → models.
 
 /// Curves of a file, each with what it is for.
-#[non_exhaustive]
-pub(crate) struct Curves {
-    curves: Vec<(Scope, Estimator, Curve)>,
-    /// How models are fitted: with the estimators and the rate of the curves.
-    pub settings: Settings,
-}
+pub(crate) type Curves = Vec<(Scope, Estimator, Curve)>;
 
-/// Reads curves. A rate (Hz) and a sensor are for those that do not say theirs.
+/// Reads curves, and the settings with their estimators and rate; whether one does not say its sensor. A rate (Hz)
+/// and a sensor are for those that do not say theirs.
 ///
 /// # Errors
 /// When the file cannot be read, says nothing of rate or sensor where nothing is given, or has two curves for one model.
@@ -471,7 +467,7 @@ pub(crate) fn read_curves(
     rate_hz: Option<f64>,
     sensor: Option<Sensor>,
     settings: &Settings,
-) -> Result<(Curves, bool), Failure> {
+) -> Result<(Curves, Settings, bool), Failure> {
     let named = curve_file::read(path)?;
     let path = || path.display().to_string();
     let rate_hz = match (named[0].rate_hz, rate_hz) {
@@ -491,7 +487,7 @@ pub(crate) fn read_curves(
         })?,
     };
     let mut is_unsaid = false;
-    let mut curves: Vec<(Scope, Estimator, Curve)> = Vec::new();
+    let mut curves = Curves::new();
     for named in named {
         let estimator = named.estimator.and_then(|name| name.parse().ok());
         let estimator = estimator.unwrap_or(Estimator::Given);
@@ -517,39 +513,37 @@ pub(crate) fn read_curves(
     }
     let has = |e: &Estimator| curves.iter().any(|(_, estimator, _)| estimator == e);
     let estimators = Estimator::ALL.into_iter().filter(has).collect();
-    let curves = Curves {
-        curves,
-        settings: Settings {
-            estimators,
-            rate_hz,
-            ..settings.clone()
-        },
+    let settings = Settings {
+        estimators,
+        rate_hz,
+        ..settings.clone()
     };
-    Ok((curves, is_unsaid))
+    Ok((curves, settings, is_unsaid))
 }
 
-impl Curves {
-    /// The models.
-    ///
-    /// # Errors
-    /// When a curve is too short for the model.
-    pub(crate) fn calibrate(self, bootstrap: Option<Bootstrap>) -> Result<Calibration, Failure> {
-        let Self { curves, settings } = self;
-        let (mut groups, mut outcomes) = (Vec::new(), Vec::new());
-        for (scope, estimator, curve) in curves {
-            let group = Group {
-                scope,
-                replicates: Vec::new(),
-            };
-            outcomes.push(fit_curve(&group, estimator, curve, &settings, &|_| {})?);
-            groups.push(group);
-        }
-        Ok(Calibration::new(
-            groups,
-            outcomes,
-            settings,
-            bootstrap,
-            &|_| {},
-        ))
+/// The models of curves.
+///
+/// # Errors
+/// When a curve is too short for the model.
+pub(crate) fn calibrate_curves(
+    curves: Curves,
+    settings: Settings,
+    bootstrap: Option<Bootstrap>,
+) -> Result<Calibration, Failure> {
+    let (mut groups, mut outcomes) = (Vec::new(), Vec::new());
+    for (scope, estimator, curve) in curves {
+        let group = Group {
+            scope,
+            replicates: Vec::new(),
+        };
+        outcomes.push(fit_curve(&group, estimator, curve, &settings, &|_| {})?);
+        groups.push(group);
     }
+    Ok(Calibration::new(
+        groups,
+        outcomes,
+        settings,
+        bootstrap,
+        &|_| {},
+    ))
 }

@@ -39,7 +39,7 @@ use crate::io::hash;
 use crate::io::model_file::ModelFile;
 use crate::parse;
 use crate::report;
-use measure::{Curves, read_curves};
+use measure::{Curves, calibrate_curves, read_curves};
 use nav_sim_calibration::{
     Bootstrap, Estimator, ModelChoice, ModelSpec, Pool, Settings, Trim, Weighting,
 };
@@ -180,7 +180,7 @@ impl Command for Calibrate {
         let Some(path) = &self.curve else {
             return Ok(());
         };
-        let (_, is_unsaid) = self.curves(path, &self.settings()?)?;
+        let (.., is_unsaid) = self.curves(path, &self.settings()?)?;
         match is_unsaid {
             false => Ok(()),
             true => Err(Failure::input(format!(
@@ -200,14 +200,14 @@ impl Command for Calibrate {
         let settings = self.settings()?;
         let mut calibration = match &self.curve {
             Some(path) => {
-                let (curves, is_unsaid) = self.curves(path, &settings)?;
+                let (curves, settings, is_unsaid) = self.curves(path, &settings)?;
                 if is_unsaid {
                     context.remark(format!(
                         "{}: taken as of an accelerometer (--axes gyro: of a gyroscope)",
                         path.display()
                     ));
                 }
-                curves.calibrate(self.draws(context))?
+                calibrate_curves(curves, settings, self.draws(context))?
             }
             None => {
                 let options = CalibrationOptions {
@@ -270,7 +270,7 @@ impl Calibrate {
     }
 
     /// The curves in the place of recordings, and whether they do not say of which sensor: then as of an accelerometer.
-    fn curves(&self, path: &Path, settings: &Settings) -> Result<(Curves, bool)> {
+    fn curves(&self, path: &Path, settings: &Settings) -> Result<(Curves, Settings, bool)> {
         let rate_hz = self.recordings.reading.rate_hz;
         read_curves(path, rate_hz, self.recordings.sensor(), settings)
     }
