@@ -62,7 +62,7 @@ pub use model::{ModelSpec, SpecError};
 pub use outcome::{
     Advance, AxesDiffer, Bootstrap, Candidate, Departure, FitRange, Goodness, Indistinct,
     Inference, LevelSpread, Miss, ModelChoice, Outcome, ParameterInterval, ParameterSpread,
-    Practical, PracticalIntervals, Ranking, Settings, Undetermined, model_of, put, tau_s,
+    Practical, PracticalIntervals, Ranking, Settings, Undetermined, model_of, tau_s,
 };
 pub use pipeline::{calibrate, calibrate_telling, fit_curve, infer, infer_telling};
 pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_on};

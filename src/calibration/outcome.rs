@@ -27,13 +27,6 @@ pub fn tau_s(level: u32, rate_hz: f64) -> f64 {
     f64::from(level).exp2() / rate_hz
 }
 
-/// Gives noise to the axes of a model.
-pub fn put(composite: &Composite, scope: Scope, model: &mut Model) {
-    for channel in scope.channels() {
-        model.axes[channel.index()] = composite.clone();
-    }
-}
-
 /// One fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
@@ -62,7 +55,9 @@ pub struct Outcome {
 impl Outcome {
     /// Gives its noise to the axes of a model that it is for.
     pub fn put_into(&self, model: &mut Model) {
-        put(&self.fit.composite, self.scope, model);
+        for channel in self.scope.channels() {
+            model.axes[channel.index()] = self.fit.composite.clone();
+        }
     }
 
     /// The fit to a curve that resembles this one.
@@ -560,7 +555,12 @@ impl Outcome {
             is_known: (2.0 / edof).sqrt() <= KNOWN,
         };
         let all: Vec<Miss> = curve.levels.iter().zip(data).map(miss).collect();
-        Departure::of(&all, self.inference.as_ref().and_then(|i| i.goodness))
+        Departure::of(&all, self.goodness())
+    }
+
+    /// Whether the model describes the curve, where that was asked for.
+    pub fn goodness(&self) -> Option<Goodness> {
+        self.inference.as_ref().and_then(|i| i.goodness)
     }
 
     /// The scales that count.

@@ -101,10 +101,10 @@ impl Command for DatasheetArgs {
 
 impl Serialize for DatasheetAnswer {
     /// A model file with the same keys as JSON.
-    fn serialize<S: serde::Serializer>(&self, to: S) -> std::result::Result<S::Ok, S::Error> {
+    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Model(file) => {
-                let table: std::result::Result<toml::Table, _> = model_file::to_toml(file).parse();
+                let table: Result<toml::Table, _> = model_file::to_toml(file).parse();
                 table.map_err(serde::ser::Error::custom)?.serialize(to)
             }
             Self::Catalogue(units) => json!({ "schema_version": 1, "units": units }).serialize(to),
@@ -163,10 +163,7 @@ pub struct Figures {
 }
 
 /// Checks a figure of a sensor.
-fn figure(
-    sensor: Sensor,
-    figure: Figure,
-) -> impl Fn(&str) -> std::result::Result<Quantity, String> + Clone {
+fn figure(sensor: Sensor, figure: Figure) -> impl Fn(&str) -> Result<Quantity, String> + Clone {
     move |text| Quantity::parse(text, figure.units(sensor))
 }
 

@@ -3,7 +3,6 @@
 use crate::app::inputs::files;
 use crate::app::reading::LogRequest;
 use crate::app::{Answer, Command, Context, Result};
-use crate::io::Failure;
 use crate::io::logs::{self, LogOptions};
 use nav_sim_document::{Document, Importance, Table, Tone, six_digits};
 use nav_sim_logs::{Channel, Content, Error, Log};
@@ -99,7 +98,7 @@ pub struct InspectedChannel {
 ///
 /// # Errors
 /// When the file is not a log that is read, or is damaged before its end.
-pub fn inspect(path: &Path, options: &LogOptions) -> std::result::Result<Inspection, Failure> {
+pub fn inspect(path: &Path, options: &LogOptions) -> Result<Inspection> {
     let log = logs::open(path)?;
     let channels = log
         .channels()
@@ -109,7 +108,7 @@ pub fn inspect(path: &Path, options: &LogOptions) -> std::result::Result<Inspect
         file: path.display().to_string(),
         format: log.kind().name(),
         channels: channels
-            .collect::<std::result::Result<_, _>>()
+            .collect::<Result<_, _>>()
             .map_err(|e| logs::refused(path, e))?,
         damage: log.damage().map(logs::cut_off),
     })
@@ -119,7 +118,7 @@ fn inspected(
     log: &Log,
     channel: &Channel,
     options: &LogOptions,
-) -> std::result::Result<InspectedChannel, Error> {
+) -> Result<InspectedChannel, Error> {
     let topic = Some(channel.topic.as_str());
     let (content, units, stamps) = match channel.content {
         _ if channel.messages == 0 => ("other", None, Vec::new()),
@@ -127,14 +126,14 @@ fn inspected(
             let samples = log
                 .imu(topic, options.stamp)?
                 .map(|sample| Ok(sample?.stamp_ns));
-            let stamps: std::result::Result<Vec<i64>, Error> = samples.collect();
+            let stamps: Result<Vec<i64>, Error> = samples.collect();
             ("imu", Some("m/s², rad/s"), stamps?)
         }
         Content::Fix => {
             let fixes = log
                 .fixes(topic, options.stamp)?
                 .map(|fix| Ok(fix?.stamp_ns));
-            let stamps: std::result::Result<Vec<i64>, Error> = fixes.collect();
+            let stamps: Result<Vec<i64>, Error> = fixes.collect();
             ("fix", Some("deg, m"), stamps?)
         }
         Content::Other => ("other", None, Vec::new()),

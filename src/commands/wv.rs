@@ -87,7 +87,7 @@ impl Command for Wv {
                 ))
             };
             let curves = measured.par_iter().map(curves);
-            Ok(curves.collect::<std::result::Result<_, WaveletError>>()?)
+            Ok(curves.collect::<Result<_, WaveletError>>()?)
         };
         let (looks, report) = visit(&self.files, &reading, &look, context)?;
         let signals: Vec<Vec<SignalCurves>> = looks.into_iter().collect::<Result<_>>()?;
@@ -108,7 +108,7 @@ impl Wv {
         recording: &Recording,
         channel: Channel,
         replicate: &Replicate,
-    ) -> std::result::Result<Vec<f64>, WaveletError> {
+    ) -> Result<Vec<f64>, WaveletError> {
         let levels = 1..=replicate.classical.len() as u32;
         match (self.intervals, recording.signal(channel)) {
             // Of a signal with holes eta3 of what is there.

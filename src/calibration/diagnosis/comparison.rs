@@ -47,7 +47,11 @@ impl Comparison {
             above_only: test == Test::Outliers,
         };
         let noise = pieces.iter().map(noise).collect();
-        Self::of(pieces, table, noise, sensor, test.name())
+        let name = match test {
+            Test::Noise => "noise",
+            Test::Outliers => "outliers",
+        };
+        Self::of(pieces, table, noise, sensor, name)
     }
 
     fn of(
@@ -248,12 +252,5 @@ impl Test {
                 .max()
         };
         pieces.iter().filter_map(of_piece).max().unwrap_or(0)
-    }
-
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Noise => "noise",
-            Self::Outliers => "outliers",
-        }
     }
 }

@@ -285,8 +285,6 @@ fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
     }
 }
 
-// Effect of leaving a recording out on each estimator: its curve, and every parameter.
-
 // Results of the diagnosis of each recording.
 
 /// Verdict on a recording.

@@ -335,50 +335,27 @@ pub(crate) fn practical_intervals(
     stretch: f64,
     rate_hz: f64,
 ) -> PracticalIntervals {
-    let none = PracticalIntervals::default();
     let Some(range_s) = observed_s(outcome, rate_hz) else {
-        return none;
+        return PracticalIntervals::default();
     };
-    let reading = |model: &Composite| Reading::of(model, rate_hz, range_s);
-    let Some(own) = reading(&outcome.fit.composite) else {
-        return none;
-    };
-    let drawn: Vec<Reading> = fits
-        .iter()
-        .filter_map(|fit| reading(&fit.composite))
-        .collect();
-    let interval = |value: &dyn Fn(&Reading) -> Option<f64>| {
-        let there: Vec<f64> = drawn
-            .iter()
-            .filter_map(value)
-            .filter(|x| *x > 0.0)
-            .collect();
-        scale_interval(value(&own)?, there, fits.len(), stretch)
-    };
-    PracticalIntervals {
-        density: interval(&|r| Some(r.density)),
-        walk: interval(&|r| Some(r.walk)),
-        instability: interval(&|r| r.instability),
-    }
-}
-
-/// N, K and B read off one model.
-struct Reading {
-    density: f64,
-    walk: f64,
-    instability: Option<f64>,
-}
-
-impl Reading {
-    fn of(model: &Composite, rate_hz: f64, range_s: f64) -> Option<Self> {
+    let read = |model: &Composite| -> Option<[Option<f64>; 3]> {
         let curve = Curve::largest(&[model], rate_hz, Horizon::default()).ok()?;
         let pair = curve.pair(Policy::Matched, Bias::Walk);
         let minimum = Minimum::of(&[model], rate_hz, range_s);
-        Some(Self {
-            density: pair.density,
-            walk: pair.walk,
-            instability: minimum.map(|m| m.bias_instability()),
-        })
+        let instability = minimum.map(|m| m.bias_instability());
+        Some([Some(pair.density), Some(pair.walk), instability])
+    };
+    let own = read(&outcome.fit.composite);
+    let drawn: Vec<_> = fits.iter().filter_map(|f| read(&f.composite)).collect();
+    let interval = |k: usize| {
+        let there = drawn.iter().filter_map(|r| r[k]).filter(|x| *x > 0.0);
+        scale_interval(own?[k]?, there.collect(), fits.len(), stretch)
+    };
+    let [density, walk, instability] = [0, 1, 2].map(interval);
+    PracticalIntervals {
+        density,
+        walk,
+        instability,
     }
 }
 

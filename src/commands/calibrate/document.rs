@@ -1,6 +1,6 @@
 //! The document of a calibration.
 
-use super::fits::{goodness, interval_of, intervals};
+use super::fits::{interval_of, intervals};
 use crate::commands::export::Quantity;
 use crate::report::comparison_table::in_order;
 use crate::report::curves::{CurvesFile, FittedCurve, recording_names};
@@ -134,7 +134,7 @@ impl ShownCalibration<'_> {
     }
 
     fn tone(&self) -> Tone {
-        let is_rejected = |o: &&Outcome| goodness(o).is_some_and(|g| g.is_rejected());
+        let is_rejected = |o: &&Outcome| o.goodness().is_some_and(|g| g.is_rejected());
         if self.outcomes.iter().any(is_rejected) {
             return Tone::Bad;
         }
@@ -432,7 +432,9 @@ fn some(names: &[String]) -> String {
 fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {
     let (spec, departure) = (&outcome.spec, outcome.departure());
     let at = |level| duration(tau_s(level, rate_hz));
-    let p = goodness(outcome).map_or(String::new(), |g| format!(" (p = {:.3})", g.p_value));
+    let p = outcome
+        .goodness()
+        .map_or(String::new(), |g| format!(" (p = {:.3})", g.p_value));
     if let Some(worst) = departure.misfit {
         let (ratio, at) = (readable(worst.ratio), at(worst.level));
         let (missed, scales) = (departure.missed.len(), departure.scales);

@@ -3,8 +3,8 @@
 use super::document::{fit_name, fit_notes, reasons, turn_on_remark, without_interval};
 use crate::commands::export::Quantity;
 use nav_sim_calibration::{
-    Candidate, Estimator, Goodness, Miss, Outcome, ParameterInterval, ParameterSpread, Practical,
-    Ranking, Settings, TURN_ON_LEVEL, TurnOnSpread, duration, percent, tau_s,
+    Candidate, Estimator, Miss, Outcome, ParameterInterval, ParameterSpread, Practical, Ranking,
+    Settings, TURN_ON_LEVEL, TurnOnSpread, duration, percent, tau_s,
 };
 use nav_sim_document::readable;
 use nav_sim_signal::imu::Sensor;
@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 
 /// The facts of a fit that stand in the provenance of its model too; null where there are none.
 pub(super) fn fit_record(outcome: &Outcome, settings: &Settings) -> Map<String, Value> {
-    let (fit, goodness) = (&outcome.fit, goodness(outcome));
+    let (fit, goodness) = (&outcome.fit, outcome.goodness());
     let worst = outcome.departure().misfit;
     let notes = fit_notes(outcome, settings).into_iter();
     let notes: Vec<String> = notes.chain(without_interval(outcome)).collect();
@@ -91,7 +91,7 @@ pub(super) fn fit_json(outcome: &Outcome, all: &[&Outcome], settings: &Settings)
         "ranking": ranking.map_or(Vec::new(), candidates),
         "reasons": ranking.map_or(Vec::new(), reasons),
         "processes": processes(&fit.composite, intervals(outcome)),
-        "goodness": goodness(outcome),
+        "goodness": outcome.goodness(),
         "spread": inference.map_or(&[][..], |i| &i.spread),
         "spread_p_value": inference.and_then(|i| i.alike),
         "parameter_spread": laws,
@@ -102,10 +102,6 @@ pub(super) fn fit_json(outcome: &Outcome, all: &[&Outcome], settings: &Settings)
         "at_end": labelled(&fit.at_end),
     })));
     record.into()
-}
-
-pub(super) fn goodness(outcome: &Outcome) -> Option<Goodness> {
-    outcome.inference.as_ref().and_then(|i| i.goodness)
 }
 
 fn candidates(ranking: &Ranking) -> Vec<Value> {

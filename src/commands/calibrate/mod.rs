@@ -232,10 +232,7 @@ impl Command for Calibrate {
 }
 
 impl Serialize for Calibration {
-    fn serialize<S: serde::Serializer>(
-        &self,
-        serializer: S,
-    ) -> std::result::Result<S::Ok, S::Error> {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         self.shown(None).json.serialize(serializer)
     }
 }
@@ -301,16 +298,15 @@ impl Calibrate {
 
     fn structure(&self) -> Result<ModelChoice> {
         let chosen: ModelChoice = self.model.parse().map_err(unknown_model)?;
-        if self.estimator == EstimatorChoice::One(Estimator::Avlr) && self.tuning.fitted().is_some()
-        {
+        if self.estimator != EstimatorChoice::One(Estimator::Avlr) {
+            return Ok(chosen);
+        }
+        if self.tuning.fitted().is_some() {
             let message =
                 "--scales FROM:TO with --estimator avlr: slopes are read where they are found";
             return Err(
                 Failure::input(message).hint("--estimator gmwm fits the same curve over a range")
             );
-        }
-        if self.estimator != EstimatorChoice::One(Estimator::Avlr) {
-            return Ok(chosen);
         }
         let without = match &chosen {
             ModelChoice::Given(spec) => spec
@@ -320,16 +316,13 @@ impl Calibrate {
                 .map(|k| k.code()),
             ModelChoice::Auto => Some("the AR1 of auto"),
         };
-        match without {
-            None => Ok(chosen),
-            Some(name) => {
-                let message = format!(
-                    "--estimator avlr: {name} has no slope of its own in the Allan deviation"
-                );
-                Err(Failure::input(message)
+        let Some(name) = without else {
+            return Ok(chosen);
+        };
+        let message =
+            format!("--estimator avlr: {name} has no slope of its own in the Allan deviation");
+        Err(Failure::input(message)
                 .hint("--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope); or --estimator gmwm"))
-            }
-        }
     }
 }
 
