@@ -1,9 +1,7 @@
 //! Errors as the user reads them, with their exit codes.
 
 use clap::error::ContextKind;
-use nav_sim_calibration::{
-    AnticipationError, AverageError, CalibrationError, Cause, FitError, SignalError,
-};
+use nav_sim_calibration::{CalibrationError, Cause};
 use nav_sim_navigation::sensors::outage::OutageError;
 use nav_sim_navigation::simulation::ExperimentError;
 use nav_sim_signal::noise::ReplicateError;
@@ -438,36 +436,18 @@ impl From<ExperimentError> for Failure {
     }
 }
 
-impl From<SignalError> for Failure {
-    fn from(e: SignalError) -> Self {
-        Self::input(e).hint("fewer --scales, or record for longer")
-    }
-}
-
-impl From<&CalibrationError> for Failure {
-    fn from(e: &CalibrationError) -> Self {
-        let hint = match &e.source {
-            Cause::Fit(FitError::TooFewScales { .. }) => {
-                Some("record for longer, or a --model with fewer processes")
-            }
-            Cause::Fit(FitError::NoSlope { .. }) => Some(
-                "--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope)",
-            ),
-            Cause::Fit(FitError::NotPositive { .. }) => Some(
-                "the signal is quantised so coarsely that scales are silent: --estimator awv, or another range",
-            ),
-            Cause::Average(AverageError::Trim { .. }) => {
-                Some("a smaller --trim, or --estimator sr-awv")
-            }
-            _ => None,
-        };
-        Self::input(e).or_hint_if(hint.map(str::to_owned))
-    }
-}
-
 impl From<CalibrationError> for Failure {
     fn from(e: CalibrationError) -> Self {
-        (&e).into()
+        let hint = match e.cause {
+            Cause::TooShort => "fewer --scales, or record for longer",
+            Cause::TooFewScales => "record for longer, or a --model with fewer processes",
+            Cause::NotPositive => {
+                "the signal is quantised so coarsely that scales are silent: --estimator awv, or another range"
+            }
+            Cause::Trim => "a smaller --trim, or --estimator sr-awv",
+            Cause::Other => return Self::input(e),
+        };
+        Self::input(e).hint(hint)
     }
 }
 
@@ -483,6 +463,6 @@ macro_rules! failures {
 }
 
 failures! {
-    input: AnticipationError, ReplicateError, RateError;
+    input: ReplicateError, RateError;
     could_not: WaveletError;
 }

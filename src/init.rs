@@ -31,60 +31,31 @@ const FILES: &[(&str, &[u8])] = repository_files![
     "examples/quick_drive.toml" => "examples/quick_drive.toml",
 ];
 
-/// What became of the files.
-pub(crate) struct StartFiles {
-    /// Those that were made.
-    pub(crate) written: Vec<PathBuf>,
-    /// Those that were there already.
-    pub(crate) kept: Vec<PathBuf>,
-}
-
-/// Makes them in a directory, all or none. Those that are there already are left alone.
+/// Makes them in a directory, all or none, and returns the paths of those that were made and of those that were there
+/// already, which are left alone.
 ///
 /// # Errors
 /// When the system refuses.
-pub(crate) fn write_start_files(directory: &Path) -> Result<StartFiles, Failure> {
-    let mut made = Made::default();
-    let mut kept = Vec::new();
-    for (name, contents) in FILES {
-        let path = directory.join(name);
-        if path.exists() {
-            kept.push(path);
-            continue;
-        }
-        made.directories.extend(
-            path.ancestors()
-                .skip(1)
-                .filter(|p| !p.exists())
-                .map(Path::to_owned),
-        );
-        atomic::write(&path, contents)?;
-        made.files.push(path);
-    }
-    made.directories.clear();
-    Ok(StartFiles {
-        written: std::mem::take(&mut made.files),
-        kept,
-    })
-}
-
-/// What was made so far; removed again if not all can be.
-#[derive(Default)]
-struct Made {
-    files: Vec<PathBuf>,
-    /// Those that were not there before.
-    directories: Vec<PathBuf>,
-}
-
-impl Drop for Made {
-    fn drop(&mut self) {
-        for file in &self.files {
-            let _ = fs::remove_file(file);
-        }
-        self.directories
-            .sort_by_key(|path| std::cmp::Reverse(path.components().count()));
-        for directory in &self.directories {
-            let _ = fs::remove_dir(directory); // if nothing else is in it
-        }
-    }
+pub(crate) fn write_start_files(directory: &Path) -> Result<(Vec<String>, Vec<String>), Failure> {
+    let files = FILES
+        .iter()
+        .map(|(name, contents)| (directory.join(name), contents));
+    let (kept, new): (Vec<_>, Vec<_>) = files.partition(|(path, _)| path.exists());
+    let above = new.iter().flat_map(|(path, _)| path.ancestors().skip(1));
+    let mut missing: Vec<&Path> = above.filter(|path| !path.exists()).collect();
+    missing.sort();
+    let mut written = new
+        .iter()
+        .map(|(path, contents)| atomic::write(path, contents));
+    written.try_for_each(|written| written).inspect_err(|_| {
+        new.iter().for_each(|(path, _)| drop(fs::remove_file(path)));
+        // the inner ones first, if nothing else is in them
+        missing
+            .iter()
+            .rev()
+            .for_each(|path| drop(fs::remove_dir(path)));
+    })?;
+    let shown =
+        |files: &[(PathBuf, _)]| files.iter().map(|(p, _)| p.display().to_string()).collect();
+    Ok((shown(&new), shown(&kept)))
 }

@@ -25,6 +25,11 @@ Progress = Union[Callable[[int, int], object], bool, None]
 Columns = dict[str, npt.NDArray[Any]]
 
 
+def columns(text: str) -> Columns:
+    """The columns of a CSV."""
+    return {key: np.asarray(values) for key, values in _native.columns(text).items()}
+
+
 class Kept:
     """An answer of the engine in texts, which pickle."""
 
@@ -54,9 +59,6 @@ class Kept:
         if name not in self._files:
             raise NavSimError(f"there is no {name} in this answer")
         return self._files[name]
-
-    def table(self, name: str) -> dict[str, Any]:
-        return _native.columns(self.text(name))
 
 
 class Answer:
@@ -101,7 +103,7 @@ class Answer:
 
     def table(self, name: str) -> Columns:
         """One of `files` that is a table: columns by name."""
-        return {key: np.asarray(values) for key, values in self._native.table(name).items()}
+        return columns(self.text(name))
 
     def summary(self) -> str:
         """What the command prints."""

@@ -89,7 +89,7 @@ def _parameters(fit: Mapping[str, Any]) -> list[dict[str, Any]]:
         kind = types[k]
         label = f"{kind}_{types[: k + 1].count(kind)}" if types.count(kind) > 1 else kind
         for name, value in process.items():
-            if name == "type" or name.endswith(("_ci95", "_se")):
+            if name == "type" or name.endswith("_ci95"):
                 continue
             low, high = process.get(f"{name}_ci95") or (None, None)
             place = {key: fit[key] for key in ("estimator", "sensor", "axis")}

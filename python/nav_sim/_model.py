@@ -13,7 +13,7 @@ import numpy as np
 from nav_sim import _native
 from nav_sim._answer import Answer, Columns, ask, axes_or_new, flattened
 from nav_sim._errors import NavSimError
-from nav_sim._inputs import FloatArray, Staging, StrPath, as_toml, number, numbers, path, whole, word
+from nav_sim._inputs import FloatArray, Staging, StrPath, as_json, as_toml, number, numbers, path, whole, word
 from nav_sim._wavelet import Curve, scales_s
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ class Model:
         return place
 
     def to_toml(self) -> str:
-        """Its text as model files have it, with intervals and provenance where they are known."""
+        """Its text as model files have it, with intervals and provenance."""
         return self._text
 
     @property
@@ -128,7 +128,7 @@ class Model:
     @cached_property
     def channels(self) -> list[str]:
         """The channels that it has."""
-        return [channel for channel in CHANNELS if channel in self._contents["channels"]]
+        return list(self._contents["channels"])
 
     def __add__(self, other: Model) -> Model:
         """The model whose noise is the sum of the two, at one and the same rate."""
@@ -209,12 +209,14 @@ class Model:
 
         Returns the text, and writes it where a path is given.
         """
-        name = self._path or "model"
-        horizon = numbers(horizon_s, "horizon_s", 2)
-        text = _native.model_export(self._text, name, word(target, "target"), word(policy, "policy"), *horizon)
+        horizon = "{}:{}".format(*numbers(horizon_s, "horizon_s", 2))
+        with Staging() as staging:
+            own = staged(self, "model", staging)
+            found = ask(Answer, "export", staging, model=own, target=target, policy=policy, horizon=horizon)
+        text = found.text("parameters.txt")
         if path is not None:
-            Path(path).write_text(text + "\n", encoding="utf-8", newline="\n")
-        return text
+            Path(path).write_text(text, encoding="utf-8", newline="\n")
+        return text[:-1]
 
     def plot(self, channel: str, ax: Axes | None = None, scales: int = 20, **line: Any) -> Axes:
         """Draws the wavelet variance that a channel implies."""
@@ -238,7 +240,7 @@ def _axes(given: Processes | Process, name: str) -> dict[str, Any]:
 
 
 def staged(model: StrPath | Model, name: str, staging: Staging) -> str:
-    """The file of a model: its own where it was read from one and nothing was changed."""
+    """The file of a model: its own where it was read from one."""
     if not isinstance(model, Model):
         return path(model, name)
     if model._path is not None:
@@ -251,6 +253,6 @@ def staged(model: StrPath | Model, name: str, staging: Staging) -> str:
 def catalogue() -> Columns:
     """Catalogued IMUs, a row a figure of a data sheet: `unit` (for `Model.from_datasheet`), `name`, `class`, `sensor`,
     `figure`, `given` (number and unit), `source`."""
-    units = json.loads(_native.catalogue())["units"]
+    units = json.loads(_native.answer("datasheet", as_json({"list": True}), "", None).json())["units"]
     rows = [{"unit": u["unit"], "name": u["name"], "class": u["class"], **figure} for u in units for figure in u["figures"]]
     return flattened(rows)

@@ -9,10 +9,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from nav_sim import _native
-from nav_sim._answer import Answer, Columns, Progress, bar
+from nav_sim._answer import Answer, Columns, Progress, bar, columns
 from nav_sim._errors import NavSimError, warn
 from nav_sim._inputs import StrPath, path as path_of
 
@@ -31,8 +29,7 @@ class StudyAnswer(Answer):
     @cached_property
     def table(self) -> Columns:  # type: ignore[override]
         """`results.csv`: a row for each cell, outage and state."""
-        text = (self.directory / "results.csv").read_text(encoding="utf-8")
-        return {key: np.asarray(values) for key, values in _native.columns(text).items()}
+        return columns((self.directory / "results.csv").read_text(encoding="utf-8"))
 
     def cell(self, name: str) -> Path:
         """The run directory of a cell."""
@@ -42,9 +39,9 @@ class StudyAnswer(Answer):
         return place
 
 
-def _shard(study: str, directory: str, shard: tuple[int, int] | None, time_limit: float | None) -> list[str]:
-    """Computes a shard, in a process of its own; returns the cells that are missing."""
-    return _native.study_run(study, directory, shard, time_limit, None)[1]
+def _shard(study: str, directory: str, shard: tuple[int, int] | None, time_limit: float | None) -> None:
+    """Computes a shard."""
+    _native.study_run(study, directory, shard, time_limit, None)
 
 
 class Study:
@@ -87,7 +84,7 @@ class Study:
             shards = [(k, _SHARDS) for k in range(_SHARDS)]
             list(pool.map(_shard, *zip(*[(*place, one, time_limit) for one in shards])))
         with bar(progress) as told:
-            native, _, doubts = _native.study_run(*place, shard, time_limit, told, threads)
+            native, doubts = _native.study_run(*place, shard, time_limit, told, threads)
         warn(doubts)
         return None if native is None else StudyAnswer(native, self.directory)
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nav_sim import _native
-from nav_sim._answer import axes_or_new
+from nav_sim._answer import Answer, axes_or_new
 from nav_sim._errors import warn
-from nav_sim._inputs import FloatArray, Staging, StrPath, Table, columns, is_path, number, numbers
+from nav_sim._inputs import FloatArray, Staging, StrPath, Table, as_json, columns, is_path, number, numbers
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,9 +34,9 @@ class Trajectory:
         else:
             self._path, self._columns = None, columns(source, "trajectory")  # type: ignore[arg-type]
         self._origin = None if origin is None else numbers(origin, "origin", 3)
-        # what is wrong with it, and what is doubtful, is known from the start
-        _, (self.start_s, self.end_s), doubts = self._read(1.0)
-        warn(doubts)
+        found = self._read(1.0)
+        self.start_s, self.end_s = float(found.data["start_s"]), float(found.data["end_s"])
+        warn(found._native.warnings)
 
     def staged(self, staging: Staging) -> str:
         """Its file."""
@@ -50,13 +50,13 @@ class Trajectory:
         return path
 
     def states(self, rate_hz: float = 10.0) -> dict[str, FloatArray]:
-        """Position, velocity (`v_n_m_s` …) and attitude at that rate, smoothly between the samples."""
-        return self._read(number(rate_hz, "rate_hz"))[0]
+        """Position, velocity (`v_n_m_s` …) and attitude at that rate."""
+        return self._read(number(rate_hz, "rate_hz")).table("trajectory.csv")
 
-    def _read(self, rate_hz: float) -> tuple[dict[str, FloatArray], tuple[float, float], list[str]]:
+    def _read(self, rate_hz: float) -> Answer:
         with Staging() as staging:
-            path = self.staged(staging)
-            return _native.trajectory_states(path, rate_hz, staging.hidden)
+            asked = as_json({"path": self.staged(staging), "rate_hz": rate_hz})
+            return Answer(_native.answer("trajectory convert", asked, staging.hidden, None))
 
     def write(self, path: StrPath) -> Path:
         """Writes its file, or its columns as a table."""

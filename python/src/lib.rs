@@ -6,7 +6,6 @@ mod model;
 mod request;
 mod study;
 mod table;
-mod trajectory;
 mod wavelet;
 mod work;
 
@@ -15,17 +14,13 @@ mod native {
     #[pymodule_export]
     use crate::answer::Answer;
     #[pymodule_export]
-    use crate::model::{
-        catalogue, model_contents, model_export, model_practical, model_recording, model_wavelet,
-    };
+    use crate::model::{model_contents, model_practical, model_recording, model_wavelet};
     #[pymodule_export]
     use crate::request::{answer, main, toml};
     #[pymodule_export]
     use crate::study::study_run;
     #[pymodule_export]
     use crate::table::columns;
-    #[pymodule_export]
-    use crate::trajectory::trajectory_states;
     #[pymodule_export]
     use crate::wavelet::wavelet;
 }

@@ -2,20 +2,17 @@
 
 use crate::error;
 use crate::work::work;
-use nav_sim::commands::datasheet::catalogue_json;
-use nav_sim::commands::export::exported;
+use nav_sim::app::Front;
 use nav_sim::io::contamination_file;
 use nav_sim::io::model_file::{self, ModelFile};
-use nav_sim::prelude::{AxisParameters, Channel, Composite, Horizon, Pair, Policy, Sensor, Target};
+use nav_sim::prelude::{AxisParameters, Channel, Composite, Horizon, Policy, Sensor};
 use nav_sim::signal::noise::practical::Minimum;
 use nav_sim::signal::noise::{ReplicateError, VirtualImu};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::{Map, Value, json};
-use std::fmt::Display;
 use std::path::Path;
-use std::str::FromStr;
 
 /// Name of the file that a model is in, where it is in none.
 const IN_MEMORY: &str = "model";
@@ -25,34 +22,17 @@ fn read(py: Python<'_>, text: &str, path: Option<&str>) -> PyResult<ModelFile> {
     model_file::from_text(path, text).map_err(|e| error::of_failure(py, &e, ""))
 }
 
-fn parsed<T: FromStr<Err: Display>>(py: Python<'_>, argument: &str, word: &str) -> PyResult<T> {
-    let refused = |e| error::refused(py, &format!("{argument}: {e}"));
-    word.parse().map_err(refused)
-}
-
 /// What a model file holds, as JSON: `rate_hz`, and for each channel the list of its processes.
 #[pyfunction]
 #[pyo3(signature = (text, path))]
 pub(crate) fn model_contents(py: Python<'_>, text: &str, path: Option<&str>) -> PyResult<String> {
     let file = read(py, text, path)?;
     let mut channels = Map::new();
-    for channel in Channel::ALL
-        .into_iter()
-        .filter(|channel| !file.missing.contains(channel))
-    {
-        channels.insert(
-            channel.to_string(),
-            json!(file.model.axis(channel).processes),
-        );
+    for channel in file.present() {
+        let processes = json!(file.model.axis(channel).processes);
+        channels.insert(channel.to_string(), processes);
     }
     Ok(json!({ "rate_hz": file.model.rate_hz, "channels": channels }).to_string())
-}
-
-/// The catalogue of data sheets, as JSON.
-#[pyfunction]
-pub(crate) fn catalogue(py: Python<'_>) -> PyResult<String> {
-    let catalogue = catalogue_json().map_err(|e| error::of_failure(py, &e, ""))?;
-    Ok(catalogue.to_string())
 }
 
 /// One recording of a model, counted from 1: a column a channel.
@@ -81,26 +61,18 @@ pub(crate) fn model_recording<'py>(
             seed,
         };
         let model = imu.model_of(replicate)?;
-        let present = Channel::ALL
-            .into_iter()
-            .filter(|channel| !file.missing.contains(channel));
         let signal = |channel| {
             meter.advance(1);
             Ok((channel, imu.signal(&model, replicate, channel, samples)?))
         };
-        present
-            .map(signal)
-            .collect::<Result<Vec<_>, ReplicateError>>()
+        let signals = file.present().map(signal);
+        signals.collect::<Result<Vec<_>, ReplicateError>>()
     })?;
     let made = made.map_err(|e| error::refused(py, &e.to_string()))?;
     let columns = PyDict::new(py);
     for (channel, samples) in made {
-        let unit = if channel.sensor == Sensor::Accel {
-            "m_s2"
-        } else {
-            "rad_s"
-        };
-        let name = format!("{}_{}_{unit}", channel.sensor.name(), channel.axis.name());
+        let Channel { sensor, axis } = channel;
+        let name = format!("{sensor}_{axis}_{}", units(sensor)[0]);
         columns.set_item(name, PyArray1::from_vec(py, samples))?;
     }
     Ok(columns)
@@ -136,12 +108,11 @@ pub(crate) fn model_practical(
     to_s: f64,
 ) -> PyResult<String> {
     let file = read(py, text, None)?;
-    let policy: Policy = parsed(py, "policy", policy)?;
+    let policy: Result<Policy, _> = policy.parse();
+    let policy = policy.map_err(|e| error::refused(py, &format!("policy: {e}")))?;
     let mut sensors = Map::new();
     for sensor in Sensor::ALL {
-        let present = Channel::ALL
-            .into_iter()
-            .filter(|c| c.sensor == sensor && !file.missing.contains(c));
+        let present = file.present().filter(|c| c.sensor == sensor);
         let axes: Vec<&Composite> = present.map(|channel| file.model.axis(channel)).collect();
         if axes.is_empty() {
             continue;
@@ -154,62 +125,31 @@ pub(crate) fn model_practical(
             policy,
             LONGEST_S.max(to_s),
         );
-        let name = sensor.name();
-        let found = found.map_err(|e| error::refused(py, &format!("{name}: {e}")))?;
+        let found = found.map_err(|e| error::refused(py, &format!("{sensor}: {e}")))?;
         sensors.insert(sensor.name().to_owned(), figures(sensor, &found));
     }
     Ok(Value::Object(sensors).to_string())
 }
 
-/// A model as the file of another program; `name` is that of the model in its head.
-#[pyfunction]
-#[pyo3(signature = (text, name, target, policy, from_s, to_s))]
-pub(crate) fn model_export(
-    py: Python<'_>,
-    text: &str,
-    name: &str,
-    target: &str,
-    policy: &str,
-    from_s: f64,
-    to_s: f64,
-) -> PyResult<String> {
-    let file = read(py, text, None)?;
-    let target: Target = parsed(py, "target", target)?;
-    let policy: Policy = parsed(py, "policy", policy)?;
-    let export = exported(&file, target, policy, Horizon { from_s, to_s });
-    let export = export.map_err(|e| error::refused(py, &format!("{name}: {e}")))?;
-    Ok(export.text(name))
-}
-
 /// Longest averaging time at which a minimum of the Allan deviation is believed (s).
 const LONGEST_S: f64 = 10_000.0;
 
+/// Units of a sensor and of its rate, as columns have them.
+const fn units(sensor: Sensor) -> [&'static str; 2] {
+    match sensor {
+        Sensor::Accel => ["m_s2", "m_s3"],
+        Sensor::Gyro => ["rad_s", "rad_s2"],
+    }
+}
+
 fn figures(sensor: Sensor, found: &AxisParameters) -> Value {
-    // of an accelerometer, of a gyroscope
-    let [density, walk, bias, floor] = match sensor {
-        Sensor::Accel => [
-            "density_m_s2_per_sqrt_hz",
-            "walk_m_s3_per_sqrt_hz",
-            "bias_sigma_m_s2",
-            "bias_instability_m_s2",
-        ],
-        Sensor::Gyro => [
-            "density_rad_s_per_sqrt_hz",
-            "walk_rad_s2_per_sqrt_hz",
-            "bias_sigma_rad_s",
-            "bias_instability_rad_s",
-        ],
-    };
-    let Pair {
-        density: n,
-        walk: k,
-        ..
-    } = found.walk;
-    let (sigma, t_corr_s) = found
-        .markov
-        .markov
-        .map(|markov| (markov.sigma, markov.t_corr_s))
-        .unzip();
-    let instability = found.minimum.as_ref().map(Minimum::bias_instability);
-    json!({ density: n, walk: k, bias: sigma, "bias_correlation_time_s": t_corr_s, floor: instability })
+    let [unit, rate] = units(sensor);
+    let (pair, markov) = (found.walk, found.markov.markov);
+    json!({
+        format!("density_{unit}_per_sqrt_hz"): pair.density,
+        format!("walk_{rate}_per_sqrt_hz"): pair.walk,
+        format!("bias_sigma_{unit}"): markov.map(|m| m.sigma),
+        "bias_correlation_time_s": markov.map(|m| m.t_corr_s),
+        format!("bias_instability_{unit}"): found.minimum.as_ref().map(Minimum::bias_instability),
+    })
 }

@@ -2,72 +2,10 @@
 
 use crate::answer::Answer;
 use crate::error;
-use crate::work::{Meter, work};
-use nav_sim::app::{Failure, Front};
-use nav_sim::document::{Importance, Note};
+use crate::work::work;
+use nav_sim::app::Failure;
 use pyo3::prelude::*;
 use std::ffi::OsString;
-use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
-
-/// Takes down what a job warns of, and counts what it does.
-pub(crate) struct Clerk<'a> {
-    pub(crate) meter: &'a Meter,
-    warnings: Mutex<Vec<String>>,
-    deadline: Option<Instant>,
-}
-
-impl<'a> Clerk<'a> {
-    pub(crate) fn new(meter: &'a Meter) -> Self {
-        Self::until(meter, None)
-    }
-
-    /// One that stops jobs which can be resumed at a time.
-    pub(crate) fn until(meter: &'a Meter, deadline: Option<Instant>) -> Self {
-        let warnings = Mutex::default();
-        Self {
-            meter,
-            warnings,
-            deadline,
-        }
-    }
-
-    pub(crate) fn warn_of(&self, doubt: String) {
-        self.warnings
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .push(doubt);
-    }
-
-    pub(crate) fn warnings(self) -> Vec<String> {
-        self.warnings
-            .into_inner()
-            .unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Front for Clerk<'_> {
-    fn note(&self, note: Note) {
-        if note.importance == Importance::Warning {
-            self.warn_of(note.text);
-        }
-    }
-
-    fn begin(&self, _: &str, steps: u64) {
-        self.meter.begin(steps);
-    }
-
-    fn advance(&self, steps: u64) {
-        self.meter.advance(steps);
-    }
-
-    fn go_on(&self) -> bool {
-        self.meter.goes_on()
-            && self
-                .deadline
-                .is_none_or(|deadline| Instant::now() < deadline)
-    }
-}
 
 /// What `command` answers to a request. `hidden`: a directory that no text shows.
 #[pyfunction]
@@ -80,11 +18,10 @@ pub(crate) fn answer(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Answer> {
     let (answered, warnings) = work(py, progress, move |meter| {
-        let clerk = Clerk::new(meter);
         let options = serde_json::from_str(&request).map_err(Failure::input);
         let answered =
-            options.and_then(|options| nav_sim::commands::answer(&command, options, &clerk));
-        (answered, clerk.warnings())
+            options.and_then(|options| nav_sim::commands::answer(&command, options, meter));
+        (answered, meter.warnings())
     })?;
     let answered = answered.map_err(|failure| error::of_failure(py, &failure, &hidden))?;
     let warnings = warnings

@@ -2,15 +2,14 @@
 
 use crate::answer::Answer;
 use crate::error;
-use crate::request::Clerk;
 use crate::work::work;
-use nav_sim::app::{Answer as _, Context};
+use nav_sim::app::{Answer as _, Answered, Context};
 use nav_sim::commands::batch::{BatchRequest, Outcome};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Computes what is missing of a study, or of a shard of it, and merges when nothing is: the answer, or the cells that are
+/// Computes what is missing of a study, or of a shard of it, and merges when nothing is: the answer, if nothing is
 /// missing; and what was warned of.
 #[pyfunction]
 #[pyo3(signature = (study, directory, shard, time_limit_s, progress, threads=None))]
@@ -22,7 +21,7 @@ pub(crate) fn study_run(
     time_limit_s: Option<f64>,
     progress: Option<&Bound<'_, PyAny>>,
     threads: Option<usize>,
-) -> PyResult<(Option<Answer>, Vec<String>, Vec<String>)> {
+) -> PyResult<(Option<Answer>, Vec<String>)> {
     if let Some((index, count)) = shard.filter(|(index, count)| index >= count) {
         let message = format!("shard: {index} of {count} is none, such as (0, 2) and (1, 2)");
         return Err(error::refused(py, &message));
@@ -30,7 +29,7 @@ pub(crate) fn study_run(
     let limit = time_limit_s.and_then(|s| Duration::try_from_secs_f64(s).ok());
     let (outcome, warnings) = work(py, progress, move |meter| {
         let deadline = limit.and_then(|limit| Instant::now().checked_add(limit));
-        let clerk = Clerk::until(meter, deadline);
+        deadline.map(|end| meter.deadline.set(end));
         let request = BatchRequest {
             study,
             out: Some(directory),
@@ -38,20 +37,23 @@ pub(crate) fn study_run(
             states: vec!["all".to_owned()],
             ..BatchRequest::default()
         };
-        let run = || request.run(&|_| None, &Context::new(&clerk, None));
+        let run = || request.run(&|_| None, &Context::new(meter, None));
         let pool =
             threads.and_then(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().ok());
         let outcome = pool.map_or_else(run, |pool| pool.install(run));
-        (outcome, clerk.warnings())
+        (outcome, meter.warnings())
     })?;
-    Ok(match outcome.map_err(|e| error::of_failure(py, &e, ""))? {
+    let answer = match outcome.map_err(|e| error::of_failure(py, &e, ""))? {
         Outcome::Merged(answer) => {
-            let json = serde_json::to_string(&*answer).unwrap_or_default();
-            let unmet = answer.unmet().map(|failure| failure.to_string());
-            let answer = Answer::of(json, answer.document(), unmet, warnings.clone());
-            (Some(answer), Vec::new(), warnings)
+            let answered = Answered {
+                json: serde_json::to_string(&*answer).unwrap_or_default(),
+                document: answer.document(),
+                files: Vec::new(),
+                unmet: answer.unmet(),
+            };
+            Some(Answer::new(answered, String::new(), warnings.clone()))
         }
-        Outcome::Partial(missing) => (None, missing, warnings),
-        Outcome::Estimate(_) => (None, Vec::new(), warnings),
-    })
+        _ => None,
+    };
+    Ok((answer, warnings))
 }

@@ -1,18 +1,20 @@
 //! Jobs that leave Python free: other threads run, Ctrl-C ends them, progress is told.
 
 use crate::error;
+use nav_sim::app::Front;
+use nav_sim::document::{Importance, Note};
 use pyo3::prelude::*;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Arc, Mutex, OnceLock};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
 
 /// How often Python is asked whether to stop, and told how far a job is.
 const SLICE: Duration = Duration::from_millis(50);
 
-/// Counts what a job has done, and stops it.
+/// Counts what a job has done, takes down what it warns of, and stops it.
 ///
 /// Threads that work never touch Python: they count here, and the calling thread looks.
 #[derive(Debug, Default)]
@@ -20,27 +22,48 @@ pub(crate) struct Meter {
     done: AtomicU64,
     total: AtomicU64,
     is_stopped: AtomicBool,
+    warnings: Mutex<Vec<String>>,
+    /// When a job that can be resumed is to stop.
+    pub(crate) deadline: OnceLock<Instant>,
 }
 
 /// What a stopped job unwinds with.
 struct Stopped;
 
-impl Meter {
-    pub(crate) fn begin(&self, units: u64) {
+impl Front for Meter {
+    fn note(&self, note: Note) {
+        if note.importance == Importance::Warning {
+            self.noted().push(note.text);
+        }
+    }
+
+    fn begin(&self, _: &str, steps: u64) {
         self.done.store(0, Ordering::Relaxed);
-        self.total.store(units, Ordering::Relaxed);
+        self.total.store(steps, Ordering::Relaxed);
     }
 
     /// Counts. Unwinds where the job is to stop, as it has no other way out: its unfinished files go with it.
-    pub(crate) fn advance(&self, units: u64) {
+    fn advance(&self, steps: u64) {
         if self.is_stopped.load(Ordering::Relaxed) {
             resume_unwind(Box::new(Stopped));
         }
-        self.done.fetch_add(units, Ordering::Relaxed);
+        self.done.fetch_add(steps, Ordering::Relaxed);
     }
 
-    pub(crate) fn goes_on(&self) -> bool {
-        !self.is_stopped.load(Ordering::Relaxed)
+    fn go_on(&self) -> bool {
+        let is_early = self.deadline.get().is_none_or(|end| Instant::now() < *end);
+        is_early && !self.is_stopped.load(Ordering::Relaxed)
+    }
+}
+
+impl Meter {
+    fn noted(&self) -> MutexGuard<'_, Vec<String>> {
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What the job has warned of.
+    pub(crate) fn warnings(&self) -> Vec<String> {
+        std::mem::take(&mut self.noted())
     }
 
     fn reached(&self) -> (u64, u64) {

@@ -366,7 +366,6 @@ fn values(arg: &Arg, value: &Value) -> Vec<String> {
 
 /// An answer as it is printed and written, for callers that have no terminal.
 #[derive(Debug)]
-#[non_exhaustive]
 pub struct Answered {
     /// As JSON.
     pub json: String,

@@ -274,18 +274,13 @@ impl VarianceRequest {
 
 /// Not a `--model`.
 pub(crate) fn unknown_model(e: SpecError) -> Failure {
-    let hint = match &e {
-        SpecError::Unknown { term, .. } => {
-            let legal = || ModelSpec::legal().chain(["auto"]);
-            match suggest::nearest(term, legal()) {
-                Some(meant) => format!("did you mean \"{meant}\"?"),
-                None => format!(
-                    "processes and models: {}",
-                    legal().collect::<Vec<_>>().join(", ")
-                ),
-            }
-        }
-        _ => "a model is a sum such as 2*AR1+RW+WN+QN".to_owned(),
+    let legal: Vec<&str> = ModelSpec::legal().chain(["auto"]).collect();
+    let hint = match &e.term {
+        None => "a model is a sum such as 2*AR1+RW+WN+QN".to_owned(),
+        Some(term) => match suggest::nearest(term, legal.iter().copied()) {
+            Some(meant) => format!("did you mean \"{meant}\"?"),
+            None => format!("processes and models: {}", legal.join(", ")),
+        },
     };
     Failure::input(format!("--model: {e}")).hint(hint)
 }

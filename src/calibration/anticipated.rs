@@ -8,14 +8,13 @@
 //! more: the interval anticipated is the one that half of such calibrations exceed. Where a parameter hangs on the last scales
 //! two in three are narrower.
 
-use crate::curve::{Estimator, Group, Replicate, Scope, average, implied};
+use crate::curve::{CalibrationError, Estimator, Group, Replicate, Scope, average, implied};
 use crate::fit::Fit;
 use crate::imu::{Axis, Channel, Sensor};
 use crate::model::ModelSpec;
-use crate::noise::{Composite, Model, Process, Spread, SpreadError};
+use crate::noise::{Composite, Model, Process, Spread};
 use crate::outcome::{Bootstrap, Inference, ModelChoice, Outcome, Settings};
-use crate::pipeline::{CalibrationError, fit_curve};
-use crate::rng::StreamKey;
+use crate::pipeline::fit_curve;
 use crate::uncertainty::bootstrap::{CurveSampler, Scattering, like};
 use crate::uncertainty::intervals::{intervals, practical_intervals};
 use crate::wavelet::default_levels;
@@ -34,17 +33,6 @@ pub struct Anticipated<'a> {
     pub samples: usize,
 }
 
-/// Why no calibration can be anticipated.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum AnticipationError {
-    /// No curve, or no fit.
-    #[error(transparent)]
-    Calibration(#[from] CalibrationError),
-    /// The spread does not belong to the model.
-    #[error(transparent)]
-    Spread(#[from] SpreadError),
-}
-
 impl Anticipated<'_> {
     /// The outcomes of each sensor (of each axis where the axes differ): the model itself, with the intervals that
     /// would be expected, in the inference.
@@ -57,7 +45,7 @@ impl Anticipated<'_> {
         settings: &Settings,
         scattering: Scattering,
         bootstrap: Bootstrap,
-    ) -> Result<Vec<Outcome>, AnticipationError> {
+    ) -> Result<Vec<Outcome>, CalibrationError> {
         let settings = Settings {
             estimators: vec![estimator],
             rate_hz: self.model.rate_hz,
@@ -98,7 +86,7 @@ impl Anticipated<'_> {
         settings: &Settings,
         scattering: Scattering,
         bootstrap: Bootstrap,
-    ) -> Result<Outcome, AnticipationError> {
+    ) -> Result<Outcome, CalibrationError> {
         let composite = in_order(self.model.axis(scope.channels()[0]));
         let group = self.expected(scope, &composite, estimator, settings)?;
         let spec = ModelSpec::of(composite.processes.iter().map(Process::kind));
@@ -106,30 +94,23 @@ impl Anticipated<'_> {
             model: ModelChoice::Given(spec),
             ..settings.clone()
         };
-        let failed = |source| CalibrationError::of(&group, estimator, source);
         let curve = average(
             &group.replicates,
             estimator,
             settings.trim,
             &settings.tuning,
         )
-        .map_err(failed)?;
-        let mut outcome = fit_curve(&group, estimator, curve, settings)?;
+        .map_err(group.named(estimator))?;
+        let mut outcome = fit_curve(&group, estimator, curve, settings, &|_| {})?;
         // The fit is kept for its minima, from which the draws are fitted; the centre of the draws is the
         // model itself.
         outcome.fit.composite = composite;
-        let sampler = CurveSampler::of_outcome(&group, &outcome, settings);
         let name = scope.name();
-        let draw = |run: usize| -> Result<Option<Fit>, AnticipationError> {
+        let sampler = CurveSampler::new(&name, &group.replicates, &outcome, settings);
+        let draw = |run: usize| -> Result<Option<Fit>, CalibrationError> {
             let between = self.between(scope, run, &outcome, bootstrap)?;
-            let key = StreamKey {
-                seed: bootstrap.seed,
-                scenario: "anticipated",
-                run: run as u64,
-                source: &name,
-                process: estimator.name(),
-            };
-            let curve = sampler.draw_with(&key, &between, scattering, settings);
+            let generator = sampler.generator(bootstrap.seed, "anticipated", run);
+            let curve = sampler.draw_with(generator, &between, scattering);
             Ok(curve.and_then(|curve| outcome.estimate_again(&curve, settings).ok()))
         };
         let fits: Vec<Option<Fit>> = (0..bootstrap.draws)
@@ -142,13 +123,12 @@ impl Anticipated<'_> {
             .spread
             .as_ref()
             .map_or(1.0, |spread| spread.stated_where(&differ));
-        let unknown = vec![f64::NAN; outcome.fit.composite.parameters().count()];
         outcome.inference = Some(Inference {
             draws: bootstrap.draws,
             fitted: fits.len(),
             drawn: fits.iter().map(|fit| fit.composite.clone()).collect(),
             stretch,
-            intervals: intervals(&outcome, &fits, stretch, &unknown),
+            intervals: intervals(&outcome, &fits, stretch),
             practical: practical_intervals(&outcome, &fits, stretch, settings.rate_hz),
             goodness: None,
             spread: Vec::new(),
@@ -202,7 +182,7 @@ impl Anticipated<'_> {
             settings.trim,
             &settings.tuning,
         )
-        .map_err(|source| CalibrationError::of(&first, estimator, source))?;
+        .map_err(first.named(estimator))?;
         Ok(group(&implied(composite, &curve)))
     }
 
@@ -212,7 +192,7 @@ impl Anticipated<'_> {
         scope: Scope,
         outcome: &Outcome,
         bootstrap: Bootstrap,
-    ) -> Result<Vec<f64>, AnticipationError> {
+    ) -> Result<Vec<f64>, CalibrationError> {
         // 50 sets of K signals give each deviation to 1/√(100 K), at most 10 %: enough for the degrees of
         // freedom.
         const DRAWS: usize = 50;
@@ -233,7 +213,7 @@ impl Anticipated<'_> {
         run: usize,
         outcome: &Outcome,
         bootstrap: Bootstrap,
-    ) -> Result<Vec<Vec<f64>>, SpreadError> {
+    ) -> Result<Vec<Vec<f64>>, CalibrationError> {
         let curve = &outcome.curve;
         let centre = implied(&outcome.fit.composite, curve);
         let Some(spread) = self.spread else {
@@ -249,7 +229,8 @@ impl Anticipated<'_> {
                 (run * self.recordings + k) as u64,
             )
         });
-        let recorded: Vec<Model> = recorded.collect::<Result<_, _>>()?;
+        let recorded: Result<Vec<Model>, _> = recorded.collect();
+        let recorded = recorded.map_err(CalibrationError::other)?;
         let ratio = |model: &Model, channel: Channel| {
             let own = implied(&in_order(model.axis(channel)), curve);
             own.iter()

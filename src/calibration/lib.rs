@@ -23,7 +23,7 @@
 //! ```
 
 #[allow(unused_imports, reason = "sources are named in the documentation")]
-pub(crate) use nav_sim_signal::{bibliography, imu, minimise, noise, rng, wavelet};
+pub(crate) use nav_sim_signal::{bibliography, imu, minimise, noise, rng, units, wavelet};
 
 // Wavelet variances: of replicates, averaged, as a model implies them, and how they scatter.
 mod curve;
@@ -48,27 +48,22 @@ mod turn_on;
 // Intervals to be expected of a calibration that is planned.
 mod anticipated;
 
-pub use anticipated::{Anticipated, AnticipationError};
+pub use anticipated::Anticipated;
 pub use curve::{
-    AverageError, Beginning, Beginnings, Change, Estimator, Group, Pool, Replicate, Scope,
-    SignalError, Trim, TrimError, WarmUp, average, grouped, implied, median, replicates, trend,
-    warm_up,
+    Beginning, Beginnings, CalibrationError, Cause, Estimator, Group, Pool, Replicate, Scope, Trim,
+    WarmUp, average, grouped, implied, median, replicates, trend, warm_up,
 };
 pub use diagnosis::{
-    Alarm, AxisScores, CommonCause, CommonFinding, Diagnosis, DriftAlarm, LeftOut, Movement,
-    Verdict, diagnose,
+    Alarm, CommonCause, CommonFinding, Diagnosis, FEWEST_TO_COMPARE, Verdict, diagnose,
 };
-pub use fit::{Fit, FitError, Termination, Weighting, estimate, fit};
+pub use fit::{Fit, Termination, Weighting, estimate, fit};
 pub use format::{duration, percent};
 pub use model::{ModelSpec, SpecError};
 pub use outcome::{
     Advance, AxesDiffer, Bootstrap, Candidate, Departure, FitRange, Goodness, Indistinct,
-    Inference, LevelSpread, Misfit, Miss, ModelChoice, Note, Outcome, ParameterInterval,
-    ParameterSpread, Practical, PracticalIntervals, Ranking, Settings, Share, TooSimple,
-    Undetermined, model_of, put, shares, tau_s,
+    Inference, LevelSpread, Miss, ModelChoice, Outcome, ParameterInterval, ParameterSpread,
+    Practical, PracticalIntervals, Ranking, Settings, Undetermined, model_of, tau_s,
 };
-pub use pipeline::{
-    CalibrationError, Cause, calibrate, calibrate_telling, fit_curve, infer, infer_telling,
-};
+pub use pipeline::{calibrate, calibrate_telling, fit_curve, infer, infer_telling};
 pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_on};
 pub use uncertainty::{ALIKE_LEVEL, Scattering, WIDEST, derived_interval};

@@ -4,14 +4,6 @@ use crate::noise::{Kind, labels};
 use std::fmt;
 use std::str::FromStr;
 
-/// Largest number of processes of a kind in one model.
-const fn most(kind: Kind) -> usize {
-    match kind {
-        Kind::Ar1 | Kind::GaussMarkov => MOST_SHAPES,
-        _ => 1,
-    }
-}
-
 /// Processes with a shape parameter that one model may have: the search is over all their combinations.
 const MOST_SHAPES: usize = 5;
 
@@ -23,48 +15,11 @@ pub struct ModelSpec {
 
 /// Why a specification means no model.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum SpecError {
-    /// A term that is neither a process nor a named model.
-    #[error("model \"{spec}\": \"{term}\" is no process")]
-    Unknown {
-        /// The specification.
-        spec: String,
-        /// The term.
-        term: String,
-    },
-    /// Nothing between two plus signs, or nothing at all.
-    #[error("model \"{0}\": a process is missing")]
-    Empty(String),
-    /// "0*AR1", "x*AR1".
-    #[error("model \"{spec}\": \"{count}\" is not a number of processes")]
-    Count {
-        /// The specification.
-        spec: String,
-        /// Text before the asterisk.
-        count: String,
-    },
-    /// Several of a kind that adds up to one of itself.
-    #[error(
-        "model \"{spec}\": {count} {code} are one {code}: their wavelet variances are proportional"
-    )]
-    Repeated {
-        /// The specification.
-        spec: String,
-        /// Code of the kind.
-        code: &'static str,
-        /// Number given.
-        count: usize,
-    },
-    /// More AR1, GM and MA1 than can be searched.
-    #[error(
-        "model \"{spec}\": {count} AR1, GM and MA1 processes; at most {MOST_SHAPES} can be told apart"
-    )]
-    TooMany {
-        /// The specification.
-        spec: String,
-        /// How many.
-        count: usize,
-    },
+#[error("model {message}")]
+pub struct SpecError {
+    message: String,
+    /// A term that is neither a process nor a named model, if that is why.
+    pub term: Option<String>,
 }
 
 impl ModelSpec {
@@ -138,67 +93,46 @@ impl FromStr for ModelSpec {
     type Err = SpecError;
 
     fn from_str(spec: &str) -> Result<Self, SpecError> {
+        let refused = |why: String| SpecError {
+            message: format!("\"{spec}\": {why}"),
+            term: None,
+        };
         let mut kinds = Vec::new();
         for term in spec.split('+').map(str::trim) {
             let (count, name) = match term.split_once('*') {
-                None => (1, term),
-                Some((count, name)) => (parse_count(spec, count.trim())?, name.trim()),
+                None => ("1", term),
+                Some((count, name)) => (count.trim(), name.trim()),
             };
-            for _ in 0..count {
-                kinds.extend(named(spec, name)?);
+            let counted = count.parse().ok().filter(|n| (1..=99).contains(n));
+            let counted: usize = counted
+                .ok_or_else(|| refused(format!("\"{count}\" is not a number of processes")))?;
+            let own = match name.to_ascii_uppercase().as_str() {
+                "" => return Err(refused("a process is missing".to_owned())),
+                "N1" => Self::n1().kinds,
+                "N2" => Self::n2().kinds,
+                code => vec![Kind::named(code).ok_or_else(|| SpecError {
+                    term: Some(name.to_owned()),
+                    ..refused(format!("\"{name}\" is no process"))
+                })?],
+            };
+            kinds.extend(std::iter::repeat_n(own, counted).flatten());
+        }
+        for kind in Kind::ALL {
+            let count = kinds.iter().filter(|k| **k == kind).count();
+            if count > 1 && !matches!(kind, Kind::Ar1 | Kind::GaussMarkov) {
+                let code = kind.code();
+                return Err(refused(format!(
+                    "{count} {code} are one {code}: their wavelet variances are proportional"
+                )));
             }
         }
-        kinds.sort_unstable();
-        check(spec, &kinds)?;
-        Ok(Self::of(kinds))
-    }
-}
-
-fn parse_count(spec: &str, count: &str) -> Result<usize, SpecError> {
-    match count.parse() {
-        Ok(n) if (1..=99).contains(&n) => Ok(n),
-        _ => Err(SpecError::Count {
-            spec: spec.into(),
-            count: count.into(),
-        }),
-    }
-}
-
-fn named(spec: &str, name: &str) -> Result<Vec<Kind>, SpecError> {
-    let upper = name.to_ascii_uppercase();
-    match upper.as_str() {
-        "" => Err(SpecError::Empty(spec.into())),
-        "N1" => Ok(ModelSpec::n1().kinds),
-        "N2" => Ok(ModelSpec::n2().kinds),
-        code => match Kind::named(code) {
-            Some(kind) => Ok(vec![kind]),
-            None => Err(SpecError::Unknown {
-                spec: spec.into(),
-                term: name.into(),
-            }),
-        },
-    }
-}
-
-fn check(spec: &str, kinds: &[Kind]) -> Result<(), SpecError> {
-    for kind in Kind::ALL {
-        let count = kinds.iter().filter(|k| **k == kind).count();
-        if count > 1 && most(kind) == 1 {
-            return Err(SpecError::Repeated {
-                spec: spec.into(),
-                code: kind.code(),
-                count,
-            });
+        match kinds.iter().filter(|k| k.shape().is_some()).count() {
+            count if count > MOST_SHAPES => Err(refused(format!(
+                "{count} AR1, GM and MA1 processes; at most {MOST_SHAPES} can be told apart"
+            ))),
+            _ => Ok(Self::of(kinds)),
         }
     }
-    let count = kinds.iter().filter(|k| k.shape().is_some()).count();
-    if count > MOST_SHAPES {
-        return Err(SpecError::TooMany {
-            spec: spec.into(),
-            count,
-        });
-    }
-    Ok(())
 }
 
 impl fmt::Display for ModelSpec {

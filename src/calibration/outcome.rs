@@ -1,11 +1,11 @@
 //! Settings and results of a calibration: data that estimation, tests and words share.
 
-use crate::curve::{Estimator, Pool, Scope, Trim, implied};
-use crate::fit::{Fit, FitError, Weighting, avlr, refit, score};
+use crate::curve::{CalibrationError, Estimator, Pool, Scope, Trim, implied};
+use crate::fit::{Fit, Weighting, avlr, refit, score};
 use crate::imu::Axis;
 use crate::model::{ModelSpec, SpecError};
 use crate::noise::practical::AxisParameters;
-use crate::noise::{Composite, Model, ParameterRef, Process};
+use crate::noise::{Composite, Model, ParameterRef};
 use crate::wavelet::{Curve, Tuning};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::str::FromStr;
@@ -25,13 +25,6 @@ pub fn model_of<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>, rate_hz: f6
 /// Scale of a level (s).
 pub fn tau_s(level: u32, rate_hz: f64) -> f64 {
     f64::from(level).exp2() / rate_hz
-}
-
-/// Gives noise to the axes of a model.
-pub fn put(composite: &Composite, scope: Scope, model: &mut Model) {
-    for channel in scope.channels() {
-        model.axes[channel.index()] = composite.clone();
-    }
 }
 
 /// One fit.
@@ -62,13 +55,9 @@ pub struct Outcome {
 impl Outcome {
     /// Gives its noise to the axes of a model that it is for.
     pub fn put_into(&self, model: &mut Model) {
-        put(&self.fit.composite, self.scope, model);
-    }
-
-    /// Whether a parameter follows the curve: its process has an amplitude, and it is not at the end of the search.
-    pub(crate) fn moves(&self, of: ParameterRef) -> bool {
-        let at_end = self.fit.at_end.contains(&of.process) && of.parameter.is_shape();
-        !(self.fit.zero.contains(&of.process) || at_end)
+        for channel in self.scope.channels() {
+            model.axes[channel.index()] = self.fit.composite.clone();
+        }
     }
 
     /// The fit to a curve that resembles this one.
@@ -76,7 +65,7 @@ impl Outcome {
         &self,
         curve: &Curve,
         settings: &Settings,
-    ) -> Result<Fit, FitError> {
+    ) -> Result<Fit, CalibrationError> {
         match self.estimator {
             Estimator::Avlr => avlr(curve, &self.spec),
             _ => refit(
@@ -118,14 +107,6 @@ pub struct FitRange {
     pub from_s: f64,
     /// Longest (s).
     pub to_s: f64,
-}
-
-impl FitRange {
-    /// Whether a level counts at a rate (Hz); ends may be off by rounding.
-    pub(crate) fn holds(&self, level: u32, rate_hz: f64) -> bool {
-        let scale_s = f64::from(level).exp2() / rate_hz;
-        scale_s >= self.from_s * (1.0 - 1e-9) && scale_s <= self.to_s * (1.0 + 1e-9)
-    }
 }
 
 /// Who says what the model is made of.
@@ -206,6 +187,14 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// Whether a level is within the range of the fit; ends may be off by rounding.
+    pub(crate) fn counts(&self, level: u32) -> bool {
+        let scale_s = tau_s(level, self.rate_hz);
+        self.fit_range.is_none_or(|range| {
+            scale_s >= range.from_s * (1.0 - 1e-9) && scale_s <= range.to_s * (1.0 + 1e-9)
+        })
+    }
+
     /// Signals that the estimators take as replicates of one another, unless told otherwise: those of single
     /// recordings pool nothing.
     pub fn pool(&self) -> Pool {
@@ -367,8 +356,6 @@ pub struct ParameterInterval {
     pub lost: f64,
     /// Why there is no interval, if there is none.
     pub absent: Option<Undetermined>,
-    /// Standard error by the sandwich (units of the parameter); NaN where it stands at a bound.
-    pub standard_error: f64,
 }
 
 /// Why a parameter has no interval.
@@ -461,147 +448,13 @@ impl Candidate {
 /// The candidates and the choice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ranking {
-    /// The candidates all of whose processes can be identified, by WVIC; those whose distance alone exceeds the
-    /// WVIC of the nearest are left out.
+    /// The candidates, the least WVIC first.
     pub candidates: Vec<Candidate>,
-    /// Position of the chosen candidate.
+    /// Index of the chosen one.
     pub chosen: usize,
-    /// Number of candidates left out because a process of theirs is zero or at the end of its range: the same
-    /// without it is among the others.
-    pub not_identifiable: usize,
-    /// Number of candidates left out because their distance alone is too large.
-    pub far: usize,
-    /// The last simpler candidate that was given up, if any was.
-    pub too_simple: Option<TooSimple>,
-}
-
-/// A simpler model that does not do as well as the chosen one.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TooSimple {
-    /// The model.
-    pub spec: ModelSpec,
-    /// Probability of so large a difference of their objectives if it is true, at most.
-    pub p_value: f64,
-    /// The level that speaks loudest against it.
-    pub level: u32,
-    /// Share of that level in all that speaks against it.
-    pub share: f64,
-}
-
-// Remarks on a fit and on what it cannot determine, as values: their words are those of the document of a calibration.
-
-/// Remark on a fit. `process`: position in the model.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Note {
-    /// Axes that are pooled differ ([`Outcome::axes_differ`]).
-    AxesDiffer,
-    /// Scales that count in no fit, for the steps of a quantiser or too many outliers: the first and the last (s).
-    LeftOut([f64; 2]),
-    /// Alike processes that cannot be told apart ([`Inference::indistinct`](Inference::indistinct)).
-    Indistinct,
-    /// Amplitude known to a factor, either way; none: it may be zero.
-    Wide(ParameterRef, Option<f64>),
-    /// Process without an amplitude.
-    Zero(usize),
-    /// Process whose correlation time (s) is shorter than a sample: white noise by another name.
-    LikeWhite(usize, f64),
-    /// Process whose correlation time (s) has its peak beyond the longest scale (s): a random walk by another name.
-    LikeWalk(usize, f64, f64),
-}
-
-/// An amplitude known to no better than this factor, either way, is told.
-const FACTOR: f64 = 3.0;
-/// The wavelet variance of an AR1 peaks at this many correlation times.
-const PEAK: f64 = 3.78;
-
-impl Outcome {
-    /// Remarks on the fit, the most important first.
-    pub fn notes(&self, settings: &Settings) -> Vec<Note> {
-        let (rate_hz, mut notes) = (settings.rate_hz, Vec::new());
-        notes.extend(self.axes_differ.map(|_| Note::AxesDiffer));
-        let ignored = &self.curve.ignored;
-        // A range that was asked for is no news.
-        if let (Some(first), Some(last), None) =
-            (ignored.first(), ignored.last(), settings.fit_range)
-        {
-            notes.push(Note::LeftOut(
-                [*first, *last].map(|level| tau_s(level, rate_hz)),
-            ));
-        }
-        if let Some(inference) = &self.inference {
-            notes.extend(inference.indistinct.as_ref().map(|_| Note::Indistinct));
-            let amplitudes = inference
-                .intervals
-                .iter()
-                .filter(|i| !i.of.parameter.is_shape() && i.absent.is_none());
-            let wide = amplitudes.filter(|i| i.high > FACTOR * FACTOR * i.low);
-            notes.extend(
-                wide.map(|i| Note::Wide(i.of, (i.low > 0.0).then_some((i.high / i.low).sqrt()))),
-            );
-        }
-        let fit = &self.fit;
-        notes.extend(fit.zero.iter().map(|i| Note::Zero(*i)));
-        let longest_s = self
-            .counted_levels()
-            .last()
-            .map_or(0.0, |level| tau_s(*level, rate_hz));
-        for (i, process) in fit
-            .composite
-            .processes
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| !fit.zero.contains(i))
-        {
-            let Some(time_s) = process.correlation_time_s(rate_hz) else {
-                continue;
-            };
-            if time_s * rate_hz < 1.0 {
-                notes.push(Note::LikeWhite(i, time_s));
-            }
-            // Before its peak the curve of an AR1 rises as that of a random walk does: without the peak only sigma2 is known.
-            if PEAK * time_s > longest_s {
-                notes.push(Note::LikeWalk(i, time_s, longest_s));
-            }
-        }
-        notes
-    }
-}
-
-/// Contribution of a process to a model's wavelet variance.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Share {
-    /// Levels at which it is the largest part, ascending.
-    pub leads: Vec<u32>,
-    /// Its largest part of the whole, and the level of that.
-    pub largest: (f64, u32),
-}
-
-/// The share of each process of a model over some levels.
-pub fn shares(model: &Composite, levels: &[u32]) -> Vec<Share> {
-    let part = |process: &Process, level: u32| match process.haar_wv(level) / model.haar_wv(level) {
-        part if part.is_finite() => part,
-        // Of nothing nothing is a part.
-        _ => 0.0,
-    };
-    let leader = |level: u32| {
-        let parts = model.processes.iter().map(|p| part(p, level));
-        parts
-            .enumerate()
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(i, _)| i)
-    };
-    let share = |(i, process): (usize, &Process)| Share {
-        leads: levels
-            .iter()
-            .copied()
-            .filter(|level| leader(*level) == Some(i))
-            .collect(),
-        largest: levels
-            .iter()
-            .map(|level| (part(process, *level), *level))
-            .fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a }),
-    };
-    model.processes.iter().enumerate().map(share).collect()
+    /// The largest simpler model that does not do as well as the chosen one, and the probability of so large a difference of
+    /// their objectives if it is true, at most.
+    pub too_simple: Option<(ModelSpec, f64)>,
 }
 
 // Departure of a curve from the model that was fitted to it: where it matters, and where it is most certain.
@@ -623,16 +476,9 @@ pub struct Miss {
     /// The normal score of that ratio, a chi-square over its degrees of freedom where the model holds.
     pub deviations: f64,
     /// Whether the scale counts in the fit.
-    pub is_fitted: bool,
-}
-
-/// Disagreement of a curve with its model.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Misfit {
-    /// Probability of the J-test, if it was made.
-    pub p_value: Option<f64>,
-    /// The scale with the ratio furthest from 1 of all that are missed, those that count in no fit included.
-    pub worst: Miss,
+    is_fitted: bool,
+    /// Whether the data are known to 10 % there.
+    is_known: bool,
 }
 
 /// Probability of the scores of all scales together below which a model is not said to fit, where no J-test was made.
@@ -645,53 +491,47 @@ pub struct Departure {
     pub scales: usize,
     /// Those that are missed by more than four standard deviations.
     pub missed: Vec<Miss>,
-    /// Of the scales that count in no fit and are missed as far, the one with the ratio furthest from 1.
-    pub left_out: Option<Miss>,
     /// Of the scales that are known to 10 % (of all, if none is), the one with the ratio furthest from 1.
     pub furthest: Option<Miss>,
     /// The longest of these scales, where there are longer ones.
     pub known_to: Option<u32>,
-    /// Of the scales that are off by more than two deviations, the one with the ratio furthest from 1.
-    pub doubtful: Option<Miss>,
-    /// Probability of scores at least as far off together, where the model holds: their squares as a chi-square of as many
-    /// degrees of freedom as scales. That parameters were fitted makes it larger, that neighbours hang together smaller.
-    pub chance: f64,
+    /// The scale with the ratio furthest from 1 of all that are missed, those that count in no fit included, where the model
+    /// does not fit: by single scales, by all together or by the J-test.
+    pub misfit: Option<Miss>,
 }
 
 impl Departure {
-    fn of(all: &[Miss], is_known: impl Fn(&&Miss) -> bool) -> Self {
-        let (all, ignored): (Vec<Miss>, Vec<Miss>) = all.iter().copied().partition(|m| m.is_fitted);
-        let ignored: Vec<Miss> = ignored
-            .into_iter()
-            .filter(|m| m.deviations.abs() > MISSED)
-            .collect();
-        let beyond = |deviations: f64| -> Vec<Miss> {
-            all.iter()
-                .copied()
-                .filter(|m| m.deviations.abs() > deviations)
-                .collect()
+    fn of(all: &[Miss], goodness: Option<Goodness>) -> Self {
+        let beyond = |all: &[Miss], deviations: f64| -> Vec<Miss> {
+            let is_beyond = |m: &&Miss| m.deviations.abs() > deviations;
+            all.iter().filter(is_beyond).copied().collect()
         };
-        let known: Vec<Miss> = all.iter().filter(is_known).copied().collect();
-        let longest = all.last().map(|m| m.level);
-        let squares: f64 = all.iter().map(|m| m.deviations * m.deviations).sum();
+        let fitted: Vec<Miss> = all.iter().filter(|m| m.is_fitted).copied().collect();
+        let known: Vec<Miss> = fitted.iter().filter(|m| m.is_known).copied().collect();
+        let missed = beyond(&fitted, MISSED);
+        let doubtful = furthest(&beyond(&fitted, DOUBTFUL));
+        let is_rejected = match goodness {
+            Some(goodness) => goodness.is_rejected(),
+            None => doubtful.is_some() && chance(&fitted) < IMPOSSIBLE,
+        };
+        let farthest = furthest(if known.is_empty() { &fitted } else { &known });
+        let worst = furthest(&beyond(all, MISSED)).or(doubtful).or(farthest);
+        let known_to = known.last().map(|m| m.level);
         Self {
-            scales: all.len(),
-            missed: beyond(MISSED),
-            left_out: furthest(&ignored),
-            furthest: furthest(if known.is_empty() { &all } else { &known }),
-            known_to: known
-                .last()
-                .map(|m| m.level)
-                .filter(|level| Some(*level) != longest),
-            doubtful: furthest(&beyond(DOUBTFUL)),
-            chance: ChiSquared::new(all.len().max(1) as f64).map_or(1.0, |law| law.sf(squares)),
+            scales: fitted.len(),
+            furthest: farthest,
+            known_to: known_to.filter(|level| fitted.last().is_some_and(|m| m.level != *level)),
+            misfit: worst.filter(|_| is_rejected || !missed.is_empty()),
+            missed,
         }
     }
+}
 
-    /// Of the scales that are missed, the one with the ratio furthest from 1: where the model is worst for whoever uses it.
-    pub fn worst(&self) -> Option<Miss> {
-        furthest(&self.missed)
-    }
+/// Probability of scores at least as far off together, where the model holds: their squares as a chi-square of as many
+/// degrees of freedom as scales. That parameters were fitted makes it larger, that neighbours hang together smaller.
+fn chance(all: &[Miss]) -> f64 {
+    let squares: f64 = all.iter().map(|m| m.deviations * m.deviations).sum();
+    ChiSquared::new(all.len().max(1) as f64).map_or(1.0, |law| law.sf(squares))
 }
 
 fn furthest(all: &[Miss]) -> Option<Miss> {
@@ -702,37 +542,25 @@ fn furthest(all: &[Miss]) -> Option<Miss> {
 }
 
 impl Outcome {
-    /// The disagreement of the curve with its model, by single scales, by all together or by the J-test; none where it fits.
-    pub fn misfit(&self) -> Option<Misfit> {
-        let departure = self.departure();
-        let goodness = self.inference.as_ref().and_then(|i| i.goodness);
-        let together = match goodness {
-            Some(goodness) => goodness.is_rejected(),
-            None => departure.chance < IMPOSSIBLE && departure.doubtful.is_some(),
-        };
-        let missed: Vec<Miss> = departure
-            .missed
-            .iter()
-            .chain(&departure.left_out)
-            .copied()
-            .collect();
-        let worst = furthest(&missed)
-            .or(departure.doubtful)
-            .or(departure.furthest);
-        let is_missed = together || !departure.missed.is_empty();
-        worst.filter(|_| is_missed).map(|worst| Misfit {
-            p_value: goodness.map(|g| g.p_value),
-            worst,
-        })
-    }
-
     /// The curve against the model.
     pub fn departure(&self) -> Departure {
-        let is_known = |m: &&Miss| {
-            let place = self.curve.levels.iter().position(|level| *level == m.level);
-            place.is_some_and(|i| (2.0 / self.curve.edof[i]).sqrt() <= KNOWN)
+        let curve = &self.curve;
+        let implied = implied(&self.fit.composite, curve);
+        let data = curve.wv.iter().zip(&curve.edof).zip(implied);
+        let miss = |(level, ((nu, edof), implied)): (&u32, ((&f64, &f64), f64))| Miss {
+            level: *level,
+            ratio: nu / implied,
+            deviations: score(nu / implied, *edof),
+            is_fitted: !curve.ignored.contains(level),
+            is_known: (2.0 / edof).sqrt() <= KNOWN,
         };
-        Departure::of(&self.misses(), is_known)
+        let all: Vec<Miss> = curve.levels.iter().zip(data).map(miss).collect();
+        Departure::of(&all, self.goodness())
+    }
+
+    /// Whether the model describes the curve, where that was asked for.
+    pub fn goodness(&self) -> Option<Goodness> {
+        self.inference.as_ref().and_then(|i| i.goodness)
     }
 
     /// The scales that count.
@@ -744,34 +572,11 @@ impl Outcome {
             .filter(|level| !self.curve.ignored.contains(level))
             .collect()
     }
-
-    fn misses(&self) -> Vec<Miss> {
-        let curve = &self.curve;
-        let implied = implied(&self.fit.composite, curve);
-        let scales = curve
-            .levels
-            .iter()
-            .zip(&curve.wv)
-            .zip(&curve.edof)
-            .zip(implied);
-        scales
-            .map(|(((level, nu), edof), implied)| {
-                let ratio = nu / implied;
-                let is_fitted = !curve.ignored.contains(level);
-                Miss {
-                    level: *level,
-                    ratio,
-                    deviations: score(ratio, *edof),
-                    is_fitted,
-                }
-            })
-            .collect()
-    }
 }
 
 #[cfg(test)]
 mod departure_tests {
-    use super::{Departure, Miss};
+    use super::{Departure, Miss, chance};
     use crate::fit::score;
     use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
@@ -787,13 +592,14 @@ mod departure_tests {
                     ratio: 1.0 - 0.05 * f64::from(level),
                     deviations,
                     is_fitted: true,
+                    is_known: level <= 8,
                 })
                 .collect()
         };
-        let departure = |deviations| Departure::of(&off(deviations), |m| m.level <= 8);
+        let departure = |deviations| Departure::of(&off(deviations), None);
         let allowed = departure(-1.0);
         assert!(
-            (allowed.chance - 0.4457).abs() < 5e-5 && allowed.doubtful.is_none(),
+            (chance(&off(-1.0)) - 0.4457).abs() < 5e-5 && allowed.misfit.is_none(),
             "{allowed:?}"
         );
         assert_eq!(
@@ -802,11 +608,11 @@ mod departure_tests {
         );
         let impossible = departure(-3.0);
         assert!(
-            impossible.missed.is_empty() && impossible.chance < 1e-15,
+            impossible.missed.is_empty() && chance(&off(-3.0)) < 1e-15,
             "{impossible:?}"
         );
-        assert_eq!(impossible.doubtful.unwrap().level, 12);
-        assert_eq!(Departure::of(&off(1.0), |_| true).known_to, None);
+        assert_eq!(impossible.misfit.unwrap().level, 12);
+        assert_eq!(Departure::of(&off(1.0)[..8], None).known_to, None);
     }
 
     /// Against the exact law: the cube is good to a tenth of a deviation out to five of them, from ten degrees on.

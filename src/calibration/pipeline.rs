@@ -1,51 +1,13 @@
 //! The whole of a calibration: groups of replicates × estimators → fits, and how sure they are.
 
-use crate::curve::{AverageError, Estimator, Group, average, implied};
-use crate::fit::{Fit, FitError, estimate};
+use crate::curve::{CalibrationError, Estimator, Group, average, implied};
+use crate::fit::{Fit, estimate};
 use crate::outcome::{Advance, Bootstrap, ModelChoice, Outcome, Settings};
 use crate::selection::choose;
 use crate::uncertainty::bootstrap::inference;
 use crate::uncertainty::spread::axes_differ;
 use crate::wavelet::Curve;
 use rayon::prelude::*;
-
-/// Why a group has no model.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{group}, {estimator}: {source}")]
-pub struct CalibrationError {
-    /// Name of the group.
-    pub group: String,
-    /// Name of the estimator.
-    pub estimator: &'static str,
-    /// Why.
-    pub source: Cause,
-}
-
-impl CalibrationError {
-    /// Error of a group without a curve.
-    pub(crate) fn of(group: &Group, estimator: Estimator, source: AverageError) -> Self {
-        Self::new(group, estimator, source)
-    }
-
-    fn new(group: &Group, estimator: Estimator, source: impl Into<Cause>) -> Self {
-        Self {
-            group: group.scope.name(),
-            estimator: estimator.name(),
-            source: source.into(),
-        }
-    }
-}
-
-/// Why a curve or a fit does not exist.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Cause {
-    /// No curve.
-    #[error(transparent)]
-    Average(#[from] AverageError),
-    /// No fit.
-    #[error(transparent)]
-    Fit(#[from] FitError),
-}
 
 /// Fits every group with every estimator, in that order.
 ///
@@ -76,33 +38,23 @@ pub fn calibrate_telling(
             settings.trim,
             &settings.tuning,
         )
-        .map_err(|source| CalibrationError::new(group, estimator, source))?;
-        fit_telling(group, estimator, curve, settings, advance)
+        .map_err(group.named(estimator))?;
+        fit_curve(group, estimator, curve, settings, advance)
     };
     jobs.par_iter().map(run).collect()
 }
 
-/// Fits the curve of a group.
+/// Fits the curve of a group, and tells `advance` of the steps.
 ///
 /// # Errors
 /// When the curve is too short for the model.
 pub fn fit_curve(
     group: &Group,
     estimator: Estimator,
-    curve: Curve,
-    settings: &Settings,
-) -> Result<Outcome, CalibrationError> {
-    fit_telling(group, estimator, curve, settings, &|_| {})
-}
-
-fn fit_telling(
-    group: &Group,
-    estimator: Estimator,
     mut curve: Curve,
     settings: &Settings,
     advance: Advance<'_>,
 ) -> Result<Outcome, CalibrationError> {
-    let error = |source: Cause| CalibrationError::new(group, estimator, source);
     let without_root = curve.ignored.clone();
     leave_out(&mut curve, settings);
     let (spec, ranking) = match &settings.model {
@@ -111,28 +63,24 @@ fn fit_telling(
             (spec.clone(), None)
         }
         ModelChoice::Auto => {
-            let (spec, ranking) =
-                choose(group, estimator, &curve, settings, advance).map_err(|e| error(e.into()))?;
+            let (spec, ranking) = choose(group, estimator, &curve, settings, advance)
+                .map_err(group.named(estimator))?;
             (spec, Some(ranking))
         }
     };
-    let mut fit = estimate(
-        estimator,
-        &curve,
-        &spec,
-        settings.rate_hz,
-        settings.weighting,
-    )
-    .map_err(|e| error(e.into()))?;
-    while count_exceeded(&mut curve, &without_root, &fit, settings) {
-        fit = estimate(
+    let fitted = |curve: &Curve| {
+        estimate(
             estimator,
-            &curve,
+            curve,
             &spec,
             settings.rate_hz,
             settings.weighting,
         )
-        .map_err(|e| error(e.into()))?;
+        .map_err(group.named(estimator))
+    };
+    let mut fit = fitted(&curve)?;
+    while count_exceeded(&mut curve, &without_root, &fit, settings) {
+        fit = fitted(&curve)?;
     }
     Ok(Outcome {
         scope: group.scope,
@@ -150,11 +98,7 @@ fn fit_telling(
 
 /// Gives no weight to the scales outside the range of a fit.
 fn leave_out(curve: &mut Curve, settings: &Settings) {
-    let Some(range) = settings.fit_range else {
-        return;
-    };
-    let outside =
-        |level: &&u32| !range.holds(**level, settings.rate_hz) && !curve.ignored.contains(*level);
+    let outside = |level: &&u32| !settings.counts(**level) && !curve.ignored.contains(*level);
     let outside: Vec<u32> = curve.levels.iter().filter(outside).copied().collect();
     curve.ignored.extend(outside);
 }
@@ -162,14 +106,9 @@ fn leave_out(curve: &mut Curve, settings: &Settings) {
 /// Counts the scales without a root at which a fit exceeds the classical variance, which bounds the noise from above; whether
 /// there are any.
 fn count_exceeded(curve: &mut Curve, without_root: &[u32], fit: &Fit, settings: &Settings) -> bool {
-    let is_in_range = |level: u32| {
-        settings
-            .fit_range
-            .is_none_or(|range| range.holds(level, settings.rate_hz))
-    };
     let implied = implied(&fit.composite, curve);
     let scales = curve.levels.iter().zip(&curve.wv).zip(implied);
-    let is_exceeded = |level: &u32| without_root.contains(level) && is_in_range(*level);
+    let is_exceeded = |level: &u32| without_root.contains(level) && settings.counts(*level);
     let exceeded = scales
         .filter(|((level, wv), nu)| is_exceeded(level) && nu > *wv)
         .map(|((level, _), _)| *level);
@@ -251,7 +190,7 @@ mod tests {
             model,
             ..Settings::default()
         };
-        let outcome = fit_curve(&group, Estimator::Given, curve, &settings).unwrap();
+        let outcome = fit_curve(&group, Estimator::Given, curve, &settings, &|_| {}).unwrap();
         assert_eq!(outcome.curve.ignored, [7]);
     }
 
@@ -307,7 +246,14 @@ mod tests {
             ..Settings::default()
         };
         let fit = |curve: &Curve, range| {
-            fit_curve(&group, Estimator::Given, curve.clone(), &settings(range)).unwrap()
+            fit_curve(
+                &group,
+                Estimator::Given,
+                curve.clone(),
+                &settings(range),
+                &|_| {},
+            )
+            .unwrap()
         };
         let (ranged, shortened, all) = (
             fit(&whole, Some(range)),

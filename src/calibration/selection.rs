@@ -12,12 +12,11 @@
 //! it, at 1 %: the best is the most fortunate of several; and which the J-test does not reject at 1 %, by draws that
 //! scatter as the recordings do. Where it rejects the best too, the first by WVIC that passes is taken.
 
-use crate::curve::{Estimator, Group, implied};
-use crate::fit::{Fit, FitError, Weighting, fit, refit};
+use crate::curve::{CalibrationError, Estimator, Group, implied, p_value};
+use crate::fit::{Fit, Weighting, fit, refit, too_few_scales};
 use crate::model::ModelSpec;
 use crate::noise::Kind;
-use crate::outcome::{Advance, Candidate, ModelChoice, Ranking, Settings, TooSimple};
-use crate::rng::StreamKey;
+use crate::outcome::{Advance, Candidate, ModelChoice, Ranking, Settings};
 use crate::uncertainty::bootstrap::CurveSampler;
 use crate::wavelet::Curve;
 use rayon::prelude::*;
@@ -74,7 +73,7 @@ pub(crate) fn choose(
     curve: &Curve,
     settings: &Settings,
     advance: Advance<'_>,
-) -> Result<(ModelSpec, Ranking), FitError> {
+) -> Result<(ModelSpec, Ranking), CalibrationError> {
     let stage = ModelChoice::Auto.steps() / ModelChoice::STAGES;
     // One weighting for all candidates, whatever their models expect.
     let reported = settings;
@@ -88,12 +87,10 @@ pub(crate) fn choose(
     let scales = curve.levels.len() - curve.ignored.len();
     let all = sums(scales);
     let fits = all.par_iter().map(fitted).collect::<Result<Vec<_>, _>>()?;
-    let tried = fits.len();
     let fits: Vec<(ModelSpec, Fit)> = fits
         .into_iter()
         .filter(|(_, f)| f.zero.is_empty() && f.at_end.is_empty())
         .collect();
-    let not_identifiable = tried - fits.len();
     advance(stage);
     let field = Field {
         group,
@@ -104,16 +101,9 @@ pub(crate) fn choose(
         fits,
     };
     field
-        .rank(not_identifiable, &|| advance(stage))
-        .ok_or_else(|| FitError::TooFewScales {
-            spec: "auto".to_owned(),
-            parameters: 2,
-            scales,
-        })
+        .rank(&|| advance(stage))
+        .ok_or_else(|| too_few_scales("auto", 2, scales))
 }
-
-/// Function that draws a curve.
-type Draw = fn(&CurveSampler<'_>, &StreamKey<'_>, &Settings) -> Option<Curve>;
 
 /// The probabilities of the candidates that were tested.
 #[derive(Default)]
@@ -150,7 +140,7 @@ struct Field<'a> {
 }
 
 impl Field<'_> {
-    fn rank(&self, not_identifiable: usize, stage_done: &dyn Fn()) -> Option<(ModelSpec, Ranking)> {
+    fn rank(&self, stage_done: &dyn Fn()) -> Option<(ModelSpec, Ranking)> {
         let nearest = (0..self.fits.len())
             .min_by(|a, b| self.objective(*a).total_cmp(&self.objective(*b)))?;
         // One set of curves for all candidates: their optimisms are then compared on the same noise.
@@ -189,17 +179,17 @@ impl Field<'_> {
         };
         let candidates: Vec<Candidate> = ranked.iter().map(candidate).collect();
         let place = ranked.iter().position(|(i, _)| *i == chosen)?;
-        let too_simple = self.too_simple(chosen, &trials.simpler);
-        let spec = self.fits[chosen].0.clone();
-        let far = self.fits.len() - candidates.len();
+        let too_simple = trials.simpler.iter().rev();
+        let too_simple = too_simple
+            .copied()
+            .find(|(i, p)| *p <= LEVEL && *i != chosen);
+        let spec = |i: usize| self.fits[i].0.clone();
         Some((
-            spec,
+            spec(chosen),
             Ranking {
                 candidates,
                 chosen: place,
-                not_identifiable,
-                far,
-                too_simple,
+                too_simple: too_simple.map(|(i, p)| (spec(i), p)),
             },
         ))
     }
@@ -255,49 +245,29 @@ impl Field<'_> {
         let Ok(own) = fit(curve, spec, reported.rate_hz, reported.weighting) else {
             return 0.0;
         };
-        let curves = self.curves(&own, "auto J-test", |sampler, key, settings| {
-            sampler.draw_as_recorded(key, settings)
-        });
+        let name = self.group.scope.name();
+        let sampler = self.sampler(&name, &own);
+        let draw = |run| sampler.draw_as_recorded(sampler.generator(SEED, "auto J-test", run));
+        let curves: Vec<Curve> = (0..DRAWS).filter_map(draw).collect();
         let objective = |c: &Curve| {
-            refit(c, spec, reported.rate_hz, reported.weighting, &own)
-                .ok()
-                .map(|fit| fit.objective)
+            let fit = refit(c, spec, reported.rate_hz, reported.weighting, &own);
+            fit.ok().map(|fit| fit.objective)
         };
         let drawn: Vec<f64> = curves.par_iter().filter_map(objective).collect();
-        let larger = drawn
-            .iter()
-            .filter(|objective| **objective >= own.objective)
-            .count();
-        (1 + larger) as f64 / (1 + drawn.len()) as f64
+        p_value(own.objective, &drawn)
     }
 
     /// New curves of a candidate.
     fn draws(&self, i: usize) -> Vec<Curve> {
-        self.curves(&self.fits[i].1, "auto", |sampler, key, settings| {
-            sampler.draw(key, settings)
-        })
+        let name = self.group.scope.name();
+        let sampler = self.sampler(&name, &self.fits[i].1);
+        let draw = |run| sampler.draw(sampler.generator(SEED, "auto", run));
+        (0..DRAWS).filter_map(draw).collect()
     }
 
-    fn curves(&self, fit: &Fit, scenario: &str, draw: Draw) -> Vec<Curve> {
-        let sampler = CurveSampler::new(
-            &self.group.replicates,
-            self.estimator,
-            self.curve,
-            &fit.composite,
-            self.settings,
-        );
-        let (name, process) = (self.group.scope.name(), self.estimator.name());
-        let curve = |run: usize| {
-            let key = StreamKey {
-                seed: SEED,
-                scenario,
-                run: run as u64,
-                source: &name,
-                process,
-            };
-            draw(&sampler, &key, self.settings)
-        };
-        (0..DRAWS).filter_map(curve).collect()
+    fn sampler<'b>(&'b self, name: &'b str, fit: &Fit) -> CurveSampler<'b> {
+        let (replicates, settings) = (&self.group.replicates, self.settings);
+        CurveSampler::of_fit(name, replicates, self.estimator, self.curve, fit, settings)
     }
 
     fn again(&self, i: usize, curve: &Curve) -> Option<Fit> {
@@ -349,39 +319,7 @@ impl Field<'_> {
         if observed <= 2.0 * drawn.iter().copied().fold(0.0, f64::max) {
             drawn.extend(rest.par_iter().filter_map(difference).collect::<Vec<_>>());
         }
-        let larger = drawn.iter().filter(|d| **d >= observed).count();
-        (1 + larger) as f64 / (1 + drawn.len()) as f64
-    }
-
-    fn too_simple(&self, chosen: usize, tested: &[(usize, f64)]) -> Option<TooSimple> {
-        let (simpler, p_value) = *tested
-            .iter()
-            .rev()
-            .find(|(i, p)| *p <= LEVEL && *i != chosen)?;
-        let (level, share) = self.deciding(simpler, chosen);
-        Some(TooSimple {
-            spec: self.fits[simpler].0.clone(),
-            p_value,
-            level,
-            share,
-        })
-    }
-
-    /// The scale that speaks loudest for one candidate against another, and its part of all that does.
-    fn deciding(&self, against: usize, chosen: usize) -> (u32, f64) {
-        let (a, b) = (
-            &self.fits[against].1.residuals,
-            &self.fits[chosen].1.residuals,
-        );
-        // Contribution of each scale to the difference of the objectives; the share is of those in favour of
-        // the chosen model.
-        let gains: Vec<f64> = a.iter().zip(b).map(|(a, b)| a * a - b * b).collect();
-        let total: f64 = gains.iter().filter(|g| **g > 0.0).sum();
-        let loudest = gains
-            .iter()
-            .zip(&self.curve.levels)
-            .max_by(|x, y| x.0.total_cmp(y.0));
-        loudest.map_or((0, 0.0), |(gain, level)| (*level, gain / total))
+        p_value(observed, &drawn)
     }
 }
 

@@ -1,18 +1,16 @@
 //! `nav-sim batch` on a terminal: signals, the time limit, what is shown.
 
-use super::{Failure, Session, drive};
-use crate::app::{Answer, Context, Front};
+use super::{Failure, Session};
+use crate::app::{Answer, Context};
 use crate::commands::batch::{BatchRequest, Outcome};
 use crate::parse;
-use crate::report::{WIDTH, json as to_json};
-use nav_sim_document::Note;
 use serde_json::json;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-#[derive(clap::Args, Debug)]
+#[derive(clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
     request: BatchRequest,
@@ -21,40 +19,8 @@ pub(crate) struct Args {
     time_limit: Option<f64>,
 }
 
-/// A session that stops at a signal or a time.
-struct Watch<'a> {
-    session: &'a Session,
-    terminated: Arc<AtomicBool>,
-    interrupted: Arc<AtomicBool>,
-    deadline: Option<Instant>,
-}
-
-impl Front for Watch<'_> {
-    fn note(&self, note: Note) {
-        self.session.note(note);
-    }
-
-    fn begin(&self, unit: &str, steps: u64) {
-        self.session.begin(unit, steps);
-    }
-
-    fn advance(&self, steps: u64) {
-        self.session.advance(steps);
-    }
-
-    fn end(&self) {
-        self.session.end();
-    }
-
-    fn go_on(&self) -> bool {
-        let signal = [&self.terminated, &self.interrupted]
-            .iter()
-            .any(|flag| flag.load(Ordering::Relaxed));
-        !signal && self.deadline.is_none_or(|d| Instant::now() < d)
-    }
-}
-
-pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+/// Runs a study, of a session that it makes stop at a signal or a time.
+pub(crate) fn run(args: &Args, mut session: Session) -> Result<(), Failure> {
     let flag = |signal| -> Result<Arc<AtomicBool>, Failure> {
         let flag = Arc::new(AtomicBool::new(false));
         // A second signal of the kind ends the process at once: whatever is there is whole.
@@ -63,23 +29,21 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             .map_err(Failure::could_not)?;
         Ok(flag)
     };
-    let watch = Watch {
-        session,
-        terminated: flag(SIGTERM)?,
-        interrupted: flag(SIGINT)?,
-        deadline: args
-            .time_limit
-            .and_then(|limit| Duration::try_from_secs_f64(limit).ok())
-            .and_then(|limit| Instant::now().checked_add(limit)),
-    };
+    let (terminated, interrupted) = (flag(SIGTERM)?, flag(SIGINT)?);
+    let limit = args.time_limit.map(Duration::try_from_secs_f64);
+    let deadline = limit.and_then(|limit| Instant::now().checked_add(limit.ok()?));
+    let is_interrupted = Arc::clone(&interrupted);
+    session.go_on = Some(Box::new(move || {
+        let is_stopped = [&terminated, &interrupted].map(|flag| flag.load(Ordering::Relaxed));
+        is_stopped == [false; 2] && deadline.is_none_or(|d| Instant::now() < d)
+    }));
     let mut request = args.request.clone();
-    request.force = session.force();
-    request
-        .set
-        .extend(session.asked_seed().map(|seed| format!("seed={seed}")));
+    request.force = session.common.force;
+    let seed = session.common.seed.map(|seed| format!("seed={seed}"));
+    request.set.extend(seed);
     let variable = |name: &str| std::env::var(name).ok();
-    let outcome = match request.run(&variable, &Context::new(&watch, None)) {
-        Err(_) if watch.interrupted.load(Ordering::Relaxed) => {
+    let outcome = match request.run(&variable, &Context::new(&session, None)) {
+        Err(_) if is_interrupted.load(Ordering::Relaxed) => {
             return Err(Failure::interrupted("interrupted")
                 .hint("the same command goes on where this one stopped"));
         }
@@ -87,16 +51,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     };
     match &outcome {
         Outcome::Merged(answer) => {
-            let document = answer.document();
-            let shown = match session.verbose() {
-                _ if session.json() => to_json(&**answer),
-                true => document.verbose(WIDTH),
-                false => document.terminal(WIDTH),
-            };
-            drive::tell(&document, &shown, session);
+            session.show(&**answer, &answer.document(), None);
             session.say(format!("wrote {}", request.directory().display()));
         }
-        Outcome::Partial(missing) if session.json() => {
+        Outcome::Partial(missing) if session.is_json() => {
             session.result(json!({ "schema_version": 1, "complete": false, "missing": missing }));
         }
         Outcome::Partial(_) => session.say("own share done"),

@@ -1,9 +1,7 @@
 //! `nav-sim completions`: completion scripts for shells.
 
-use super::{Failure, Session};
-
 /// Print a completion script for a shell
-#[derive(clap::Args, Debug)]
+#[derive(clap::Args)]
 #[command(before_help = "\
 Examples:
   nav-sim completions bash > nav-sim.bash
@@ -15,9 +13,8 @@ pub(crate) struct Args {
     shell: clap_complete::Shell,
 }
 
-pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+pub(crate) fn run(args: &Args) -> String {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut super::command(), "nav-sim", &mut script);
-    session.result(String::from_utf8_lossy(&script).trim_end());
-    Ok(())
+    String::from_utf8_lossy(&script).into_owned()
 }

@@ -1,16 +1,14 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
-use super::{Cli, Failure, Session, drive};
-use crate::app::{Answer, inputs};
+use super::{Cli, Common, Failure, Session};
+use crate::app::{Answer, Front, inputs};
 use crate::commands::batch::{BatchRequest, Outcome};
-use crate::commands::compare::Comparison;
-use crate::commands::paper::{StudyCurves, paper_figures, paper_page};
 use crate::io::atomic::Written;
 use crate::io::{atomic, model_file};
-use crate::report::{self, TrajectorySeries, WIDTH};
+use crate::report;
 use clap::Parser;
 use serde::{Deserialize, Serialize};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Component, Path};
 
 /// Run the case study of Minaretzis et al. 2024, Section V, on a virtual IMU: calibrate with three estimators
 /// on clean and corrupted recordings, navigate with each model, compare (their Table I)
@@ -21,7 +19,7 @@ use std::path::{Component, Path, PathBuf};
 /// windows of one more clean recording and two outages of 90 s, the filter with a state for each AR1 and random walk as in the
 /// paper; the ASEE of each filter relative to AWV in scenario I. If interrupted, the same command continues: demo.json in the
 /// directory says how far it is.
-#[derive(clap::Args, Debug)]
+#[derive(clap::Args)]
 #[command(before_help = "\
 Examples:
   nav-sim demo --seed 1 --samples 100000 --runs 8
@@ -48,7 +46,7 @@ const SCENARIOS: [&str; 3] = ["I", "II", "III"];
 const ESTIMATORS: [&str; 3] = ["awv", "sr-awv", "dr-awv"];
 
 /// How far a demo is: demo.json of its directory.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(PartialEq, Serialize, Deserialize)]
 struct Progress {
     version: String,
     seed: u64,
@@ -67,42 +65,27 @@ fn foreign(path: &Path) -> Failure {
 
 impl Progress {
     /// What is there to go on with, or a beginning.
-    fn of(args: &Args, session: &Session) -> Result<Self, Failure> {
-        let path = Self::path(&args.out);
-        let there = std::fs::read_to_string(&path).ok();
+    fn of(args: &Args, path: &Path, session: &Session) -> Result<Self, Failure> {
+        let there = std::fs::read_to_string(path).ok();
         let there = there.map(|text| serde_json::from_str::<Self>(&text));
-        let begun = there.transpose().map_err(|_| foreign(&path))?;
-        let seed = begun.as_ref().map(|progress| progress.seed);
-        let new = Self {
+        let begun = there.transpose().map_err(|_| foreign(path))?;
+        let mut new = Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            seed: session.context().seed_or(seed),
+            seed: session.context().seed_or(begun.as_ref().map(|b| b.seed)),
             samples: args.samples,
             runs: args.runs,
             commands_done: begun.as_ref().map_or(0, |begun| begun.commands_done),
         };
-        match begun {
-            Some(begun) if begun != new && !session.force() => {
-                let message = format!(
-                    "{} is of a demo of another seed, size or version",
-                    path.display()
-                );
-                Err(Failure::input(message)
-                    .hint("name another directory with --out, or replace it with --force"))
+        if begun.is_some_and(|begun| begun != new) {
+            if !session.common.force {
+                let path = path.display();
+                let message = format!("{path} is of a demo of another seed, size or version");
+                let hint = "name another directory with --out, or replace it with --force";
+                return Err(Failure::input(message).hint(hint));
             }
-            Some(begun) if begun != new => Ok(Self {
-                commands_done: 0,
-                ..new
-            }),
-            _ => Ok(new),
+            new.commands_done = 0;
         }
-    }
-
-    fn path(out: &str) -> PathBuf {
-        Path::new(out).join("demo.json")
-    }
-
-    fn write(&self, out: &str) -> Result<(), Failure> {
-        atomic::write(&Self::path(out), report::json(self))
+        Ok(new)
     }
 }
 
@@ -122,42 +105,50 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Ok(());
     }
     refuse_the_impossible(args, session)?;
-    let (page, figures) = (out.join("report.html"), out.join("figures"));
-    let _own = atomic::claim_file(&Progress::path(&args.out), [])?;
-    let own_page = |path: &Path| atomic::claim_result(path, [], Written::Page, session.force());
-    let _pages = [own_page(&page)?, own_page(&figures.join("index.html"))?];
-    let mut progress = Progress::of(args, session)?;
+    let path = out.join("demo.json");
+    let _own = atomic::claim_file(&path, [])?;
+    let page = out.join("report.html");
+    let _page = atomic::claim_result(&page, [], Written::Page, session.common.force)?;
+    let mut progress = Progress::of(args, &path, session)?;
     let commands = commands(args, progress.seed);
-    if study.exists() && !Progress::path(&args.out).exists() {
+    if study.exists() && !path.exists() {
         return Err(foreign(&study));
     }
-    // what was removed is made again
-    let done = commands.iter().take(progress.commands_done);
-    let done = done.take_while(|c| is_there(c)).count();
+    let done = progress.commands_done;
     if done > 0 {
         let (out, count, seed) = (&args.out, commands.len(), progress.seed);
         session.say(format!(
             "{out}: {done} of {count} commands are done, seed {seed}"
         ));
     }
-    progress.write(&args.out)?;
-    let bar = session.progress("commands", (commands.len() - done) as u64);
+    atomic::write(&path, report::json(&progress))?;
+    session.begin("commands", (commands.len() - done) as u64);
     for (i, command) in commands.iter().enumerate().skip(done) {
         session.context().detail(format!("$ {}", typed(command)));
         let words = std::iter::once("nav-sim").chain(command.iter().map(String::as_str));
         let cli = Cli::try_parse_from(words).map_err(Failure::input)?;
-        cli.command.run(&session.within(&cli.common, true))?;
+        // its results and remarks are kept back
+        cli.command.run(Session {
+            common: Common {
+                seed: cli.common.seed,
+                quiet: !session.common.verbose,
+                ..session.common.clone()
+            },
+            given: session.given.clone(),
+            is_muted: true,
+            ..Session::default()
+        })?;
         progress.commands_done = i + 1;
-        progress.write(&args.out)?;
-        bar.add(1);
+        atomic::write(&path, report::json(&progress))?;
+        session.advance(1);
     }
-    drop(bar);
+    session.end();
     atomic::write(&study, study_text(args, progress.seed)?)?;
     let request = BatchRequest {
         study,
         out: Some(out.to_owned()),
         states: ["pos_e_m", "roll_deg"].map(str::to_owned).to_vec(),
-        force: session.force(),
+        force: session.common.force,
         ..BatchRequest::default()
     };
     let Outcome::Merged(found) = request.run(&|_| None, &session.context())? else {
@@ -166,13 +157,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     };
     let found = found.comparisons.into_iter().next();
     let found = found.ok_or_else(|| Failure::could_not("there is nothing to compare"))?;
-    let document = found.document();
-    drive::tell(&document, &document.terminal(WIDTH), session);
-    atomic::write(&out.join("comparison.json"), report::json(&found))?;
-    write_figures(&found, out, &figures, session)?;
-    let links = links();
-    atomic::write(&page, Comparison { links, ..found }.document().html())?;
-    session.say(format!("all results on one page: {}", page.display()));
+    session.show(&found, &found.document(), None);
+    session.say(format!("all results: {}", page.display()));
     Ok(())
 }
 
@@ -238,82 +224,6 @@ fn refuse_the_impossible(args: &Args, session: &Session) -> Result<(), Failure> 
         args.samples
     );
     Err(Failure::input(message).hint(format!("at least --samples {needed}")))
-}
-
-/// Whether what a command makes is there: what follows its `-o`, or a model of each estimator beside it.
-fn is_there(command: &[String]) -> bool {
-    let Some(output) = command.last().map(Path::new) else {
-        return false;
-    };
-    if command[0] != "calibrate" {
-        return output.exists();
-    }
-    let scenario = output.file_stem().unwrap_or_default().to_string_lossy();
-    ESTIMATORS.iter().all(|estimator| {
-        output
-            .with_file_name(format!("{scenario}_{estimator}.toml"))
-            .exists()
-    })
-}
-
-/// Links of the page to those of models and runs.
-fn links() -> Vec<(String, String)> {
-    let of_pair = |(scenario, estimator): (&str, &str)| {
-        let name = format!("{scenario}_{estimator}");
-        [
-            (
-                format!("models/{name}.html"),
-                format!("model {name}: curves and parameters"),
-            ),
-            (
-                format!("cells/{name}/report.html"),
-                format!("navigation with {name}: errors and consistency"),
-            ),
-        ]
-    };
-    let figures = ("figures/index.html".into(), "the paper's figures".into());
-    std::iter::once(figures)
-        .chain(pairs().flat_map(of_pair))
-        .collect()
-}
-
-/// Writes the paper's figures and a page of them; Figure 2 is of `examples/paper_section4.rs`.
-fn write_figures(
-    found: &Comparison,
-    out: &Path,
-    directory: &Path,
-    session: &Session,
-) -> Result<(), Failure> {
-    let curves = pairs().map(|(scenario, estimator)| {
-        let path = out.join(format!("models/{scenario}_{estimator}.wv.json"));
-        let text = std::fs::read_to_string(&path).map_err(|e| Failure::io(&path, e))?;
-        Ok(StudyCurves {
-            scenario: scenario.to_owned(),
-            estimator: estimator.to_owned(),
-            file: serde_json::from_str(&text).map_err(Failure::could_not)?,
-        })
-    });
-    let curves = curves.collect::<Result<Vec<_>, Failure>>()?;
-    let trajectory = inputs::trajectory(Path::new(TRAJECTORY), &session.context())?;
-    let track = TrajectorySeries::of(&trajectory);
-    let mut figures = paper_figures(&curves, &track, &found.outages);
-    figures.push(found.figure());
-    for figure in &figures {
-        atomic::write(
-            &directory.join(format!("fig{}.svg", figure.number)),
-            figure.svg(),
-        )?;
-    }
-    atomic::write(&directory.join("index.html"), paper_page(&figures))?;
-    session.say(format!("the paper's figures: {}", directory.display()));
-    Ok(())
-}
-
-/// Scenario and estimator of each model.
-fn pairs() -> impl Iterator<Item = (&'static str, &'static str)> {
-    SCENARIOS
-        .into_iter()
-        .flat_map(|scenario| ESTIMATORS.map(|estimator| (scenario, estimator)))
 }
 
 /// The commands, as words.

@@ -1,7 +1,7 @@
 //! `nav-sim init`: a directory to start from.
 
 use super::{Failure, Session};
-use crate::init::{self, StartFiles};
+use crate::init;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// scenario.toml, imu.toml, motion.toml, contamination.toml, initial.toml and examples/quick_study.toml say
 /// what each key means. The others are those of the repository; the examples of every --help work inside the directory. Files
 /// that exist already are left alone.
-#[derive(clap::Args, Debug)]
+#[derive(clap::Args)]
 #[command(before_help = "\
 Examples:
   nav-sim init study
@@ -23,18 +23,13 @@ pub(crate) struct Args {
     directory: PathBuf,
 }
 
-pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let StartFiles { written, kept } = init::write_start_files(&args.directory)?;
-    let [written, kept] =
-        [written, kept].map(|paths| paths.iter().map(|p| p.display().to_string()).collect());
-    let (written, kept): (Vec<String>, Vec<String>) = (written, kept);
-    kept.iter()
-        .for_each(|path| session.say(format!("kept {path}")));
-    if session.json() {
-        let json = json!({ "schema_version": 1, "written": written, "kept": kept });
-        session.result(json);
-    } else {
-        written.iter().for_each(|path| session.result(path));
+pub(crate) fn run(args: &Args, session: &Session) -> Result<String, Failure> {
+    let (written, kept) = init::write_start_files(&args.directory)?;
+    for path in &kept {
+        session.say(format!("kept {path}"));
     }
-    Ok(())
+    Ok(match session.is_json() {
+        true => json!({ "schema_version": 1, "written": written, "kept": kept }).to_string(),
+        false => written.join("\n"),
+    })
 }

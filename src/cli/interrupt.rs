@@ -1,6 +1,6 @@
 //! Ctrl-C, SIGTERM and a closed terminal: what is being written is removed before the process ends.
 
-use super::{Failure, Printer};
+use super::{Failure, Session};
 use crate::io::atomic;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -8,12 +8,12 @@ static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
 /// From now on a signal removes what is being written and ends the process: exit code 128 + signal, 130 for
 /// Ctrl-C, with advice. A signal that this process was started to ignore (by `nohup`, say) is still ignored.
-pub(super) fn watch(printer: Printer, advice: Option<String>) {
+pub(super) fn watch(session: Session, advice: Option<String>) {
     system::on_signal(move |signal| {
         INTERRUPTED.store(true, Ordering::SeqCst);
         atomic::remove_unfinished();
         let failure = Failure::interrupted("interrupted; what was being written is removed");
-        printer.failure(&failure.or_hint_if(advice.clone()));
+        session.failure(&failure.or_hint_if(advice.clone()));
         std::process::exit(128 + signal);
     });
 }

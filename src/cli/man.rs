@@ -1,9 +1,9 @@
 //! `nav-sim man`: manual pages.
 
-use super::{Failure, Session};
+use super::Failure;
 
 /// Print the manual page of a command (without a name: of nav-sim itself)
-#[derive(clap::Args, Debug)]
+#[derive(clap::Args)]
 #[command(before_help = "\
 Examples:
   nav-sim man > nav-sim.1
@@ -14,7 +14,7 @@ pub(crate) struct Args {
     command: Option<String>,
 }
 
-pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+pub(crate) fn run(args: &Args) -> Result<String, Failure> {
     let mut page = Vec::new();
     let mut root = super::command();
     // hands the common flags down
@@ -33,6 +33,5 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     clap_mangen::Man::new(of_command)
         .render(&mut page)
         .map_err(Failure::could_not)?;
-    session.result(String::from_utf8_lossy(&page).trim_end());
-    Ok(())
+    Ok(String::from_utf8_lossy(&page).into_owned())
 }

@@ -1,16 +1,14 @@
 //! The command line: one file per subcommand, each its `Args` and a `run(args, &Session)`.
 
 mod batch;
-mod common;
 mod completions;
 mod demo;
 mod drive;
 mod init;
 mod interrupt;
 mod man;
-mod printer;
-mod progress;
 mod schema;
+mod session;
 mod version;
 
 use crate::app::Asked;
@@ -22,12 +20,9 @@ use drive::drive;
 use std::ffi::{OsStr, OsString};
 use std::io::Write;
 use std::process::ExitCode;
-use std::sync::OnceLock;
 
 pub(crate) use crate::app::Failure;
-pub(crate) use common::{Common, Session};
-pub(crate) use printer::Printer;
-pub(crate) use progress::Progress;
+pub(crate) use session::{Common, Format, Session};
 
 /// INS/GNSS navigation simulator with a robust stochastic-calibration front end.
 #[derive(Parser)]
@@ -42,7 +37,7 @@ struct Cli {
 macro_rules! driven {
     ($($variant:ident: $command:path),* $(,)?) => {
         /// Commands that answer a question.
-        #[derive(Subcommand, Debug)]
+        #[derive(Subcommand)]
         enum Driven {
             $($variant(Asked<$command>)),*
         }
@@ -50,7 +45,7 @@ macro_rules! driven {
         impl Driven {
             fn run(&self, session: &Session) -> Result<(), Failure> {
                 match self {
-                    $(Self::$variant(asked) => drive(asked, session).map(drop)),*
+                    $(Self::$variant(asked) => drive(asked, session)),*
                 }
             }
         }
@@ -58,7 +53,7 @@ macro_rules! driven {
 }
 with_commands!(driven);
 
-#[derive(Subcommand, Debug)]
+#[derive(Subcommand)]
 #[expect(clippy::large_enum_variant, reason = "there is one, once a process")]
 enum Command {
     #[command(flatten)]
@@ -83,29 +78,32 @@ impl Command {
         matches!(self, Self::Demo(_)).then(|| "the same command goes on where it was".to_owned())
     }
 
-    fn run(self, session: &Session) -> Result<(), Failure> {
-        if session.csv() && !matches!(self, Self::Driven(Driven::Wv(_) | Driven::Compare(_))) {
+    fn run(self, session: Session) -> Result<(), Failure> {
+        let has_csv = matches!(self, Self::Driven(Driven::Wv(_) | Driven::Compare(_)));
+        if session.common.format == Format::Csv && !has_csv {
             let failure = Failure::input("--format csv: only wv and compare print CSV");
             return Err(failure.hint("other commands write CSV files to --out"));
         }
-        match self {
-            Self::Driven(driven) => driven.run(session),
-            Self::Trajectory(mut args) => match &mut args.command {
-                TrajectoryCommand::Generate(asked) => {
+        let text = match self {
+            Self::Driven(driven) => return driven.run(&session),
+            Self::Trajectory(args) => match args.command {
+                TrajectoryCommand::Generate(mut asked) => {
                     asked.request.rate_hz.get_or_insert(100.0);
-                    drive(asked, session).map(drop)
+                    return drive(&asked, &session);
                 }
-                TrajectoryCommand::Check(asked) => drive(asked, session).map(drop),
-                TrajectoryCommand::Convert(asked) => drive(asked, session).map(drop),
-                TrajectoryCommand::Record(asked) => drive(asked, session).map(drop),
+                TrajectoryCommand::Check(asked) => return drive(&asked, &session),
+                TrajectoryCommand::Convert(asked) => return drive(&asked, &session),
+                TrajectoryCommand::Record(asked) => return drive(&asked, &session),
             },
-            Self::Batch(args) => batch::run(&args, session),
-            Self::Demo(args) => demo::run(&args, session),
-            Self::Init(args) => init::run(&args, session),
-            Self::Schema(args) => schema::run(&args, session),
-            Self::Completions(args) => completions::run(&args, session),
-            Self::Man(args) => man::run(&args, session),
-        }
+            Self::Batch(args) => return batch::run(&args, session),
+            Self::Demo(args) => return demo::run(&args, &session),
+            Self::Init(args) => init::run(&args, &session)?,
+            Self::Schema(args) => schema::run(&args),
+            Self::Completions(args) => completions::run(&args),
+            Self::Man(args) => man::run(&args)?,
+        };
+        session.result(text);
+        Ok(())
     }
 }
 
@@ -167,16 +165,8 @@ fn end(e: &clap::Error) -> ! {
     let is_incomplete = e.kind() == ErrorKind::MissingRequiredArgument;
     let help = is_incomplete.then(|| "--help shows usage and examples".to_owned());
     let failure = Failure::usage(e).or_hint_if(help);
-    Printer::default().failure(&failure);
+    Session::default().failure(&failure);
     std::process::exit(failure.code().into())
-}
-
-/// The command line of this process, as it was given.
-static GIVEN: OnceLock<Vec<String>> = OnceLock::new();
-
-/// The words of the command line, for manifests.
-fn given() -> Vec<String> {
-    GIVEN.get().cloned().unwrap_or_default()
 }
 
 /// Does what the arguments of the process ask for.
@@ -190,34 +180,43 @@ pub fn main() -> ExitCode {
 #[must_use]
 pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
     let given: Vec<OsString> = given.into_iter().collect();
-    let lossy = |all: &[OsString]| {
+    let lossy = |all: &[OsString]| -> Vec<String> {
         all.iter()
             .map(|w| w.to_string_lossy().into_owned())
-            .collect::<Vec<_>>()
+            .collect()
     };
-    let _ = GIVEN.set(lossy(&given));
-    let given = words(given.into_iter());
-    let words = lossy(&given);
+    let session = |common: &Common| Session {
+        common: common.clone(),
+        given: lossy(&given),
+        ..Session::default()
+    };
     if given.len() < 2 {
         let _ = writeln!(std::io::stderr(), "{OVERVIEW}");
         return 2;
     }
-    let known = command().version(&*version::version(&words).leak());
+    let words = words(given.iter().cloned());
+    let known = command().version(&*version::version(&lossy(&words)).leak());
     let matches = known
-        .try_get_matches_from(&given)
+        .try_get_matches_from(&words)
         .unwrap_or_else(|e| end(&e));
-    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
-    let printer = Printer::new(&cli.common);
-    if !cli.command.heeds_signals() {
-        interrupt::watch(Printer::new(&cli.common), cli.command.advice_at_signals());
+    let Cli { common, command } = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
+    if !command.heeds_signals() {
+        interrupt::watch(session(&common), command.advice_at_signals());
     }
-    let outcome = Session::new(cli.common).and_then(|session| cli.command.run(&session));
+    let threads = common.threads.map_or(0, usize::from); // 0: one per core
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build_global();
+    let outcome = pool
+        .map_err(Failure::could_not)
+        .and_then(|()| command.run(session(&common)));
     interrupt::settle();
     match outcome {
         Ok(()) => 0,
         Err(failure) => {
             let code = failure.code();
-            printer.failure(&failure.for_options(|option| has_option(&matches, option)));
+            let failure = failure.for_options(|option| has_option(&matches, option));
+            session(&common).failure(&failure);
             code
         }
     }

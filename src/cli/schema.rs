@@ -1,12 +1,11 @@
 //! `nav-sim schema`: JSON schemas of the files people write.
 
-use super::{Failure, Session};
 use crate::commands::batch::Study;
 use crate::io::{contamination_file, fusion_files, model_file, trajectory_file};
 use nav_sim_navigation::scenario::Scenario;
 
 /// Print the JSON schema of a file that people write, for editors and checkers
-#[derive(clap::Args, Debug)]
+#[derive(clap::Args)]
 #[command(before_help = "\
 Examples:
   nav-sim schema scenario > scenario.schema.json
@@ -34,9 +33,8 @@ enum Kind {
     Contamination,
 }
 
-pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    session.result(crate::report::json(&schema(args.of)).trim_end());
-    Ok(())
+pub(crate) fn run(args: &Args) -> String {
+    crate::report::json(&schema(args.of))
 }
 
 fn schema(of: Kind) -> serde_json::Value {

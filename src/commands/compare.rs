@@ -1,7 +1,6 @@
 //! `nav-sim compare`: run directories → ratios between runs.
 
 use crate::app::{Answer, Command, Context, Failure, Manifest, Out, OutputFile, Result};
-use crate::commands::paper::PaperFigure;
 use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::io::atomic::Written;
@@ -142,7 +141,6 @@ pub(crate) fn between<'a>(
         doubts: Vec::new(),
         states,
         form: None,
-        links: Vec::new(),
     };
     for (run, candidate, is_reference) in runs {
         let differences = differences(candidate, directory);
@@ -341,9 +339,6 @@ pub struct Comparison {
     /// Form in which the table alone is printed.
     #[serde(skip)]
     pub(crate) form: Option<TableForm>,
-    /// Pages of the single results, path and name.
-    #[serde(skip)]
-    pub(crate) links: Vec<(String, String)>,
 }
 
 /// Whether the filter of a run is as good as it believes.
@@ -414,11 +409,6 @@ impl Comparison {
             .filter(is_shown)
             .map(flat)
             .collect::<Vec<_>>())
-    }
-
-    /// The paper's Figure 7, beside its other ones.
-    pub(crate) fn figure(&self) -> PaperFigure {
-        PaperFigure::new(7, FIGURE, self.charts())
     }
 
     /// The candidates but for the reference itself, with short names.
@@ -566,11 +556,6 @@ impl Answer for Comparison {
             ));
             document.lead(self.table());
         }
-        if !self.links.is_empty() {
-            document.folded("Pages of the single results", |page| {
-                page.links(&self.links)
-            });
-        }
         document.text(CAPTION);
         document.charts(&self.charts(), "");
         if !self.outages.is_empty() {
@@ -586,8 +571,6 @@ impl Answer for Comparison {
 const NAMED: usize = 3;
 /// Scenarios that have a chart each; of more, one chart has all runs.
 const SCENARIOS: usize = 6;
-
-const FIGURE: &str = "Departure of the ASEE of each filter from that of AWV in scenario I, (ratio − 1)·100; outages shaded.";
 
 const CAPTION: &str = "ASEE (averaged standard estimation error) is the filter's own standard deviation: 0 % is as the reference believes.";
 

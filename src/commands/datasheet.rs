@@ -10,7 +10,7 @@ use crate::parse;
 use nav_sim_document::{Document, Tone};
 use nav_sim_signal::imu::Sensor;
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::path::PathBuf;
 
 /// Make a noise model from the figures of a data sheet, in their own units: an assumption, not a calibration
@@ -47,7 +47,7 @@ pub enum DatasheetAnswer {
     /// The model.
     Model(Box<ModelFile>),
     /// The catalogue as JSON.
-    Catalogue(Value),
+    Catalogue(Vec<CataloguedUnit>),
 }
 
 impl Command for DatasheetArgs {
@@ -67,14 +67,17 @@ impl Command for DatasheetArgs {
 
     fn run(&self, context: &Context<'_>) -> Result<DatasheetAnswer> {
         if self.list {
-            return Ok(DatasheetAnswer::Catalogue(catalogue_json()?));
+            let units = CATALOGUE
+                .iter()
+                .map(|(name, _)| CataloguedUnit::named(name));
+            return Ok(DatasheetAnswer::Catalogue(units.collect::<Result<_>>()?));
         }
         let mut sheet = match (&self.entry, &self.unit) {
             (Some(path), _) => read(path)?,
             (None, Some(name)) => named(name)?,
             (None, None) => Datasheet::default(),
         };
-        self.figures.over(&mut sheet)?;
+        self.figures.over(&mut sheet);
         let made = sheet.model_file(self.rate_hz).map_err(Failure::input)?;
         if made.file.missing.len() == made.file.model.axes.len() {
             let failure = Failure::input("no figure is given that makes a noise model");
@@ -98,13 +101,13 @@ impl Command for DatasheetArgs {
 
 impl Serialize for DatasheetAnswer {
     /// A model file with the same keys as JSON.
-    fn serialize<S: serde::Serializer>(&self, to: S) -> std::result::Result<S::Ok, S::Error> {
+    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Model(file) => {
-                let table: std::result::Result<toml::Table, _> = model_file::to_toml(file).parse();
+                let table: Result<toml::Table, _> = model_file::to_toml(file).parse();
                 table.map_err(serde::ser::Error::custom)?.serialize(to)
             }
-            Self::Catalogue(json) => json.serialize(to),
+            Self::Catalogue(units) => json!({ "schema_version": 1, "units": units }).serialize(to),
         }
     }
 }
@@ -117,7 +120,10 @@ impl Answer for DatasheetAnswer {
     fn text(&self) -> Option<String> {
         match self {
             Self::Model(_) => None,
-            Self::Catalogue(json) => Some(catalogue_text(json)),
+            Self::Catalogue(units) => {
+                let lines: Vec<String> = units.iter().map(CataloguedUnit::text).collect();
+                Some(lines.join("\n"))
+            }
         }
     }
 
@@ -135,83 +141,56 @@ impl Answer for DatasheetAnswer {
 pub struct Figures {
     /// Velocity random walk or noise density of the accelerometers: m/s/sqrt(h), ug/sqrt(Hz), …
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Noise))]
-    pub vrw: Option<String>,
+    pub vrw: Option<Quantity>,
     /// Angle random walk or noise density of the gyroscopes: deg/sqrt(h), deg/s/sqrt(Hz), …
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Noise))]
-    pub arw: Option<String>,
+    pub arw: Option<Quantity>,
     /// Bias instability of the accelerometers: ug, mg, m/s²
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Bias))]
-    pub accel_bias: Option<String>,
+    pub accel_bias: Option<Quantity>,
     /// Bias instability of the gyroscopes: deg/h, deg/s, rad/s
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Bias))]
-    pub gyro_bias: Option<String>,
+    pub gyro_bias: Option<Quantity>,
     /// Longest correlation time of both biases: s, min, h [default: 300 s, with a warning]
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::CorrelationTime))]
-    pub corr_time: Option<String>,
+    pub corr_time: Option<Quantity>,
     /// Turn-on bias of the accelerometers, as a standard deviation: mg, m/s²
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::TurnOn))]
-    pub accel_turn_on: Option<String>,
+    pub accel_turn_on: Option<Quantity>,
     /// Turn-on bias of the gyroscopes, as a standard deviation: deg/s, deg/h
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::TurnOn))]
-    pub gyro_turn_on: Option<String>,
+    pub gyro_turn_on: Option<Quantity>,
 }
 
 /// Checks a figure of a sensor.
-fn figure(
-    sensor: Sensor,
-    figure: Figure,
-) -> impl Fn(&str) -> std::result::Result<String, String> + Clone {
-    let parsed =
-        move |text: &str| Quantity::parse(text, figure.units(sensor)).map(|_| text.to_owned());
-    move |text| parsed(text).map_err(|e| e.to_string())
+fn figure(sensor: Sensor, figure: Figure) -> impl Fn(&str) -> Result<Quantity, String> + Clone {
+    move |text| Quantity::parse(text, figure.units(sensor))
 }
 
 impl Figures {
-    /// Puts those that are given in the place of those of an entry.
-    fn over(&self, sheet: &mut Datasheet) -> Result<()> {
+    /// Puts them into a sheet, over its own.
+    fn over(&self, sheet: &mut Datasheet) {
         let given = [
-            ("vrw", Sensor::Accel, Figure::Noise, &self.vrw),
-            ("arw", Sensor::Gyro, Figure::Noise, &self.arw),
-            ("accel-bias", Sensor::Accel, Figure::Bias, &self.accel_bias),
-            ("gyro-bias", Sensor::Gyro, Figure::Bias, &self.gyro_bias),
-            (
-                "corr-time",
-                Sensor::Accel,
-                Figure::CorrelationTime,
-                &self.corr_time,
-            ),
-            (
-                "corr-time",
-                Sensor::Gyro,
-                Figure::CorrelationTime,
-                &self.corr_time,
-            ),
-            (
-                "accel-turn-on",
-                Sensor::Accel,
-                Figure::TurnOn,
-                &self.accel_turn_on,
-            ),
-            (
-                "gyro-turn-on",
-                Sensor::Gyro,
-                Figure::TurnOn,
-                &self.gyro_turn_on,
-            ),
+            (Sensor::Accel, Figure::Noise, &self.vrw),
+            (Sensor::Gyro, Figure::Noise, &self.arw),
+            (Sensor::Accel, Figure::Bias, &self.accel_bias),
+            (Sensor::Gyro, Figure::Bias, &self.gyro_bias),
+            (Sensor::Accel, Figure::CorrelationTime, &self.corr_time),
+            (Sensor::Gyro, Figure::CorrelationTime, &self.corr_time),
+            (Sensor::Accel, Figure::TurnOn, &self.accel_turn_on),
+            (Sensor::Gyro, Figure::TurnOn, &self.gyro_turn_on),
         ];
-        for (option, sensor, figure, text) in given {
-            let Some(text) = text else { continue };
-            let quantity = Quantity::parse(text, figure.units(sensor))
-                .map_err(|e| Failure::input(format!("--{option}=\"{text}\": {e}")))?;
-            sheet.set(Entry {
-                sensor,
-                figure,
-                quantity,
-                source: Some("command line".into()),
-                quote: None,
-            });
+        for (sensor, figure, quantity) in given {
+            if let Some(quantity) = quantity {
+                sheet.set(Entry {
+                    sensor,
+                    figure,
+                    quantity: quantity.clone(),
+                    source: Some("command line".into()),
+                    quote: None,
+                });
+            }
         }
-        Ok(())
     }
 }
 
@@ -255,37 +234,50 @@ fn left_out(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
     offset.into_iter().chain(scale).collect()
 }
 
-/// Unit, class and name, and the figures of both sensors as given.
-fn catalogue_text(catalogue: &Value) -> String {
-    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
-    let mut lines = Vec::new();
-    for unit in catalogue["units"].as_array().into_iter().flatten() {
-        let [name, class, long_name] = ["unit", "class", "name"].map(|key| text(&unit[key]));
-        lines.push(format!("{name:<12} {class:<12} {long_name}"));
-        for sensor in Sensor::ALL {
-            let figures = unit["figures"].as_array().into_iter().flatten();
-            let own = figures.filter(|figure| figure["sensor"] == sensor.name());
-            let shown = own.map(|f| format!("{} {}", text(&f["figure"]), text(&f["given"])));
-            lines.push(format!(
-                "  {sensor:<5} {}",
-                shown.collect::<Vec<_>>().join(", ")
-            ));
-        }
-    }
-    lines.join("\n")
+/// A catalogued unit.
+#[derive(Serialize)]
+pub struct CataloguedUnit {
+    unit: &'static str,
+    name: Option<String>,
+    class: Option<String>,
+    figures: Vec<GivenFigure>,
 }
 
-/// The catalogue with the sources of the figures.
-///
-/// # Errors
-/// An entry that cannot be read.
-pub fn catalogue_json() -> Result<Value> {
-    let figure = |e: &Entry| json!({ "sensor": e.sensor, "figure": e.figure.name(), "given": e.quantity.given, "source": e.source });
-    let unit = |(unit, _): &(&str, _)| {
-        let sheet = named(unit)?;
-        let figures: Vec<Value> = sheet.entries.iter().map(figure).collect();
-        Ok(json!({ "unit": unit, "name": sheet.name, "class": sheet.class, "figures": figures }))
-    };
-    let units: Vec<Value> = CATALOGUE.iter().map(unit).collect::<Result<_>>()?;
-    Ok(json!({ "schema_version": 1, "units": units }))
+/// A figure of its data sheet.
+#[derive(Serialize)]
+struct GivenFigure {
+    sensor: Sensor,
+    figure: &'static str,
+    given: String,
+    source: Option<String>,
+}
+
+impl CataloguedUnit {
+    fn named(name: &'static str) -> Result<Self> {
+        let sheet = named(name)?;
+        let figure = |e: Entry| GivenFigure {
+            sensor: e.sensor,
+            figure: e.figure.name(),
+            given: e.quantity.given,
+            source: e.source,
+        };
+        Ok(Self {
+            unit: name,
+            name: sheet.name,
+            class: sheet.class,
+            figures: sheet.entries.into_iter().map(figure).collect(),
+        })
+    }
+
+    fn text(&self) -> String {
+        let [class, name] =
+            [&self.class, &self.name].map(|text| text.as_deref().unwrap_or_default());
+        let figures = |sensor: Sensor| {
+            let own = self.figures.iter().filter(|f| f.sensor == sensor);
+            let shown: Vec<_> = own.map(|f| format!("{} {}", f.figure, f.given)).collect();
+            format!("\n  {sensor:<5} {}", shown.join(", "))
+        };
+        let figures = Sensor::ALL.map(figures).concat();
+        format!("{:<12} {class:<12} {name}{figures}", self.unit)
+    }
 }

@@ -185,21 +185,16 @@ impl Design {
 /// The parameters of an outcome; correlation times in the place of phi and beta, of which a per cent says nothing.
 fn designed(outcome: &Outcome, rate_hz: f64) -> Vec<DesignedParameter> {
     let composite = &outcome.fit.composite;
-    let values: Vec<_> = composite.parameters().collect();
     let parameter_of_interval = |interval: &ParameterInterval| {
-        let (_, value) = *values
-            .iter()
-            .find(|(parameter, _)| *parameter == interval.of)?;
-        let (name, label) = (
-            composite.name_of(interval.of),
-            &composite.labels()[interval.of.process],
-        );
+        let mut values = composite.parameters();
+        let (_, value) = values.find(|(parameter, _)| *parameter == interval.of)?;
+        let label = &composite.labels()[interval.of.process];
         let (parameter, shown): (String, &dyn Fn(f64) -> f64) = match interval.of.parameter {
             Parameter::Phi => (format!("{label} correlation_time_s"), &|phi| {
                 -1.0 / (rate_hz * phi.ln())
             }),
             Parameter::Beta => (format!("{label} correlation_time_s"), &|beta| 1.0 / beta),
-            _ => (name, &|value| value),
+            _ => (composite.name_of(interval.of), &|value| value),
         };
         let value = shown(value);
         let ci95 = interval.absent.is_none().then(|| {
@@ -258,14 +253,14 @@ fn destination_quantiles(
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Designs {
     /// Layout version.
-    pub(crate) schema_version: u32,
+    schema_version: u32,
     /// One for each number of recordings and length, the largest last.
-    pub(crate) designs: Vec<DesignOutcome>,
+    designs: Vec<DesignOutcome>,
 }
 
 /// What so many recordings, so long each, would tell.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct DesignOutcome {
+struct DesignOutcome {
     /// Recordings.
     pub recordings: usize,
     /// Length of each (h).
@@ -282,7 +277,7 @@ pub(crate) struct DesignOutcome {
 
 /// The interval that a parameter would have.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct DesignedParameter {
+struct DesignedParameter {
     /// `accel`, or `accel.x` alone.
     pub signals: String,
     /// `WN sigma2`, `AR1_1 correlation_time_s`.
@@ -307,7 +302,7 @@ impl DesignedParameter {
 
 /// The interval that the horizontal p95 at an outage's end would have.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct DesignedQuantile {
+struct DesignedQuantile {
     /// First instant without a fix (s).
     pub start_s: f64,
     /// First instant with a fix again (s).
@@ -470,53 +465,32 @@ impl Answer for Designs {
 
 const AGAINST: &str = "Half of the 95 % interval to expect (% of the value) against the length of each recording; dashed: however long they are.";
 
-/// One parameter of several designs: a curve for each number of recordings.
+/// One parameter of several designs: a curve over hours for each number of recordings.
 fn against_hours(designs: &[DesignOutcome], k: usize) -> Option<Chart> {
     let name = designs.first()?.parameters[k].name();
-    let value = |d: &DesignOutcome| {
-        d.parameters
-            .get(k)
-            .and_then(|p| p.half_width_pct)
-            .unwrap_or(f64::NAN)
-    };
-    let mut series = curves(designs, value);
-    for (hue, count) in counts(designs).into_iter().enumerate() {
-        let last = designs.iter().rfind(|d| d.recordings == count)?;
-        let Some(floor) = last
+    let (mut series, mut floors) = (Vec::new(), Vec::new());
+    let of_count = designs.chunk_by(|a, b| a.recordings == b.recordings);
+    for (hue, designs) in of_count.enumerate() {
+        let point = |d: &DesignOutcome| {
+            let half = d.parameters.get(k).and_then(|p| p.half_width_pct);
+            (d.hours, half.unwrap_or(f64::NAN))
+        };
+        let name = format!("{} recordings", designs[0].recordings);
+        let points = designs.iter().map(point).collect();
+        series.extend(Series::dotted_line(&name, Colour::Hue(hue), points));
+        let last = designs.last()?;
+        let floor = last
             .parameters
             .get(k)
-            .and_then(|p| p.endless_half_width_pct)
-        else {
-            continue;
-        };
-        let hours = designs.iter().map(|d| d.hours);
-        let line = hours.clone().fold(f64::INFINITY, f64::min)..=hours.fold(0.0, f64::max);
-        let points = vec![(*line.start(), floor), (*line.end(), floor)];
-        series.push(Series::dashed("", Colour::Hue(hue), points));
+            .and_then(|p| p.endless_half_width_pct);
+        floors.extend(floor.map(|floor| {
+            let ends = [designs[0].hours, last.hours].map(|hours| (hours, floor));
+            Series::dashed("", Colour::Hue(hue), ends.to_vec())
+        }));
     }
+    series.extend(floors);
     let panel = Panel::new(Axis::log("half width (%)"), series);
     Some(Chart::new(&name, Axis::log("hours"), vec![panel]).small())
-}
-
-fn counts(designs: &[DesignOutcome]) -> Vec<usize> {
-    let mut counts: Vec<usize> = designs.iter().map(|d| d.recordings).collect();
-    counts.dedup();
-    counts
-}
-
-/// A curve over hours for each number of recordings.
-fn curves(designs: &[DesignOutcome], value: impl Fn(&DesignOutcome) -> f64) -> Vec<Series> {
-    let curve = |(hue, count): (usize, usize)| {
-        let designs_of_count = || designs.iter().filter(|d| d.recordings == count);
-        let points: Vec<(f64, f64)> = designs_of_count().map(|d| (d.hours, value(d))).collect();
-        let name = format!("{count} recordings");
-        Series::dotted_line(&name, Colour::Hue(hue), points)
-    };
-    counts(designs)
-        .into_iter()
-        .enumerate()
-        .flat_map(curve)
-        .collect()
 }
 
 #[cfg(test)]
@@ -560,9 +534,8 @@ mod tests {
     fn a_curve_has_the_designs_of_its_number_of_recordings() {
         let designs = [(4, 1.0, 40.0), (4, 2.0, 30.0), (6, 1.0, 35.0)]
             .map(|(n, h, w)| designed(n, h, w, None));
-        let drawn = curves(&designs, |design| {
-            design.parameters[0].half_width_pct.unwrap_or(f64::NAN)
-        });
+        let mut chart = against_hours(&designs, 0).unwrap();
+        let drawn = chart.panels.remove(0).series;
         let line = |series: Series| {
             if let Mark::Line(points, _) = series.mark {
                 Some(points)

@@ -3,7 +3,6 @@
 use crate::app::inputs::files;
 use crate::app::reading::LogRequest;
 use crate::app::{Answer, Command, Context, Result};
-use crate::io::Failure;
 use crate::io::logs;
 use nav_sim_document::{Document, Importance, Table, Tone, six_digits};
 use nav_sim_logs::{Channel, Content, Error, Log, Stamp};
@@ -99,7 +98,7 @@ pub struct InspectedChannel {
 ///
 /// # Errors
 /// When the file is not a log that is read, or is damaged before its end.
-pub fn inspect(path: &Path, stamp: Stamp) -> std::result::Result<Inspection, Failure> {
+pub fn inspect(path: &Path, stamp: Stamp) -> Result<Inspection> {
     let log = logs::open(path)?;
     let channels = log
         .channels()
@@ -109,17 +108,13 @@ pub fn inspect(path: &Path, stamp: Stamp) -> std::result::Result<Inspection, Fai
         file: path.display().to_string(),
         format: log.kind().name(),
         channels: channels
-            .collect::<std::result::Result<_, _>>()
+            .collect::<Result<_, _>>()
             .map_err(|e| logs::refused(path, e))?,
         damage: log.damage().map(logs::cut_off),
     })
 }
 
-fn inspected(
-    log: &Log,
-    channel: &Channel,
-    stamp: Stamp,
-) -> std::result::Result<InspectedChannel, Error> {
+fn inspected(log: &Log, channel: &Channel, stamp: Stamp) -> Result<InspectedChannel, Error> {
     let (content, units, stamps) = match channel.content {
         _ if channel.messages == 0 => ("other", None, Vec::new()),
         Content::Imu => {

@@ -10,7 +10,6 @@ pub mod design;
 pub mod export;
 pub mod fuse;
 pub mod inspect;
-pub(crate) mod paper;
 pub mod require;
 pub mod run;
 pub mod synthesize;
@@ -58,6 +57,9 @@ macro_rules! by_name {
             $(if name == <$command as Command>::NAME {
                 return answered::<$command>(options, front);
             })*
+            if name == trajectory::Convert::NAME {
+                return answered::<trajectory::Convert>(options, front);
+            }
             Err(Failure::input(format!("there is no command {name}")))
         }
     };

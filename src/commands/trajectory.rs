@@ -5,8 +5,8 @@ use crate::io::atomic::Written;
 use crate::io::scenario_file;
 use crate::io::trajectory_file::{self, Options, Rows, parse_origin};
 use crate::parse;
-use crate::report::{TrajectoryCheck, gnss_csv, imu_csv, initial_toml};
-use nav_sim_document::{Document, Tone};
+use crate::report::{gnss_csv, imu_csv, initial_toml};
+use nav_sim_document::{Document, Table, Tone};
 use nav_sim_navigation::closure::{Bounds, Closure};
 use nav_sim_navigation::earth::GravityModel;
 use nav_sim_navigation::scenario::Scenario;
@@ -16,11 +16,12 @@ use nav_sim_navigation::simulation::{Plan, record};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_navigation::trajectory::plausibility::{Limits, examine};
 use nav_sim_signal::noise::continuous;
+use nav_sim_signal::units::DEG;
 use serde::Serialize;
 use std::path::PathBuf;
 
 /// Make, check and convert reference trajectories
-#[derive(clap::Args, Debug)]
+#[derive(clap::Args)]
 #[command(before_help = "\
 Examples:
   nav-sim trajectory check trajectories/land_vehicle.toml
@@ -31,7 +32,7 @@ pub(crate) struct TrajectoryArgs {
     pub(crate) command: TrajectoryCommand,
 }
 
-#[derive(clap::Subcommand, Debug)]
+#[derive(clap::Subcommand)]
 pub(crate) enum TrajectoryCommand {
     /// Write a motion profile as a table of evenly spaced rows
     ///
@@ -95,6 +96,8 @@ impl Source {
 #[derive(Debug, Serialize)]
 pub struct TrajectoryTable {
     schema_version: u32,
+    start_s: f64,
+    end_s: f64,
     rows: usize,
     #[serde(skip)]
     text: String,
@@ -140,6 +143,8 @@ impl Command for Convert {
         let rows = self.rate_hz.map_or(Rows::Knots, Rows::Rate);
         Ok(TrajectoryTable {
             schema_version: 1,
+            start_s: trajectory.start_s(),
+            end_s: trajectory.end_s(),
             rows: rows.times(&trajectory).len(),
             text: trajectory_file::csv(&trajectory, rows),
         })
@@ -206,31 +211,145 @@ impl Command for CheckTrajectory {
         }
         let closure = Closure::new(&trajectory, self.rate_hz, GravityModel::default())
             .map_err(|e| Failure::input(format!("{name}: {e}")).hint("give another --rate-hz"))?;
-        Ok(TrajectoryCheck::new(
-            (name, warnings),
-            &trajectory,
-            (largest, &beyond, limits),
-            (closure, bounds),
-        ))
+        let motion = |[speed_m_s, acceleration_m_s2, jerk_m_s3, rate]: [f64; 4]| Motion {
+            speed_m_s,
+            acceleration_m_s2,
+            jerk_m_s3,
+            rate_deg_s: rate / DEG,
+        };
+        let Limits {
+            speed,
+            acceleration,
+            jerk,
+            rate,
+        } = limits;
+        let places = trajectory.knots().iter();
+        let places: Vec<_> = places.map(|t| trajectory.kinematics(*t).r_e).collect();
+        Ok(TrajectoryCheck {
+            file: name,
+            start_s: trajectory.start_s(),
+            end_s: trajectory.end_s(),
+            points: places.len(),
+            path_m: places.windows(2).map(|w| w[0].distance(w[1])).sum(),
+            largest: motion(largest),
+            limits: motion([speed, acceleration, jerk, rate]),
+            beyond_limits: beyond.iter().map(ToString::to_string).collect(),
+            warnings,
+            closure: Closed {
+                closure,
+                within_bounds: closure.within(&bounds),
+            },
+            bounds,
+        })
     }
+}
+
+/// Results of the check.
+#[derive(Serialize)]
+pub struct TrajectoryCheck {
+    file: String,
+    start_s: f64,
+    end_s: f64,
+    points: usize,
+    /// Length of the path: chords between the points.
+    path_m: f64,
+    largest: Motion,
+    limits: Motion,
+    beyond_limits: Vec<String>,
+    warnings: Vec<String>,
+    closure: Closed,
+    bounds: Bounds,
+}
+
+#[derive(Serialize)]
+struct Motion {
+    speed_m_s: f64,
+    acceleration_m_s2: f64,
+    jerk_m_s3: f64,
+    rate_deg_s: f64,
+}
+
+#[derive(Serialize)]
+struct Closed {
+    #[serde(flatten)]
+    closure: Closure,
+    within_bounds: bool,
 }
 
 impl Answer for TrajectoryCheck {
     fn document(&self) -> Document {
-        Document::new("Trajectory", Tone::Good, [self.text()])
+        Document::new("Trajectory", Tone::Good, self.text())
     }
 
     fn text(&self) -> Option<String> {
-        Some(self.text())
+        let rows = [
+            ("path (m)", "path_m -"),
+            ("speed (m/s)", "largest/speed_m_s limits/speed_m_s"),
+            (
+                "acceleration (m/s²)",
+                "largest/acceleration_m_s2 limits/acceleration_m_s2",
+            ),
+            (
+                "jerk over 0.1 s (m/s³)",
+                "largest/jerk_m_s3 limits/jerk_m_s3",
+            ),
+            (
+                "angular rate (deg/s)",
+                "largest/rate_deg_s limits/rate_deg_s",
+            ),
+            (
+                "closure: position (m)",
+                "closure/position_m bounds/position_m",
+            ),
+            ("horizontal (m)", "closure/horizontal_m -"),
+            ("velocity (m/s)", "closure/velocity_m_s bounds/velocity_m_s"),
+            ("attitude (rad)", "closure/attitude_rad bounds/attitude_rad"),
+        ];
+        let c = &self.closure.closure;
+        Some(format!(
+            "{}: {} s from {} s, {} points\nclosure at {} Hz over {} s: {}\n{}",
+            self.file,
+            self.end_s - self.start_s,
+            self.start_s,
+            self.points,
+            c.rate_hz,
+            c.duration_s,
+            if self.closure.within_bounds {
+                "within bounds"
+            } else {
+                "BEYOND A BOUND"
+            },
+            Table::of_keys(self, &["", "largest", "limit"], &rows).columns(usize::MAX)
+        ))
     }
 
     fn unmet(&self) -> Option<Failure> {
-        let closure = (!self.is_closed())
-            .then_some("a higher --rate-hz closes better; rough motion may deserve a wider bound");
-        let motion = (!self.is_plausible())
-            .then_some("a vehicle that does move so deserves a larger --limit-speed");
-        let hint: Vec<&str> = closure.into_iter().chain(motion).collect();
-        Some(Failure::bound(self.missed()?).hint(hint.join("; ")))
+        let (mut missed, mut hints) = (Vec::new(), Vec::new());
+        if !self.closure.within_bounds {
+            let (c, b) = (&self.closure.closure, &self.bounds);
+            missed.push(format!(
+                "closure at {} Hz is {:.3e} m, {:.3e} m/s, {:.3e} rad, beyond {:e} m, {:e} m/s or {:e} rad",
+                c.rate_hz,
+                c.position_m,
+                c.velocity_m_s,
+                c.attitude_rad,
+                b.position_m,
+                b.velocity_m_s,
+                b.attitude_rad
+            ));
+            hints.push("a higher --rate-hz closes better; rough motion may deserve a wider bound");
+        }
+        let stretches = match self.beyond_limits.len() {
+            0 => None,
+            1 => Some("1 stretch".to_owned()),
+            n => Some(format!("{n} stretches")),
+        };
+        if let Some(stretches) = stretches {
+            missed.push(format!("the motion is beyond a limit in {stretches}"));
+            hints.push("a vehicle that does move so deserves a larger --limit-speed");
+        }
+        let message = format!("{}: {}", self.file, missed.join("; "));
+        (!missed.is_empty()).then(|| Failure::bound(message).hint(hints.join("; ")))
     }
 }
 

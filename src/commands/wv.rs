@@ -87,7 +87,7 @@ impl Command for Wv {
                 ))
             };
             let curves = measured.par_iter().map(curves);
-            Ok(curves.collect::<std::result::Result<_, WaveletError>>()?)
+            Ok(curves.collect::<Result<_, WaveletError>>()?)
         };
         let (looks, report) = visit(&self.files, &reading, &look, context)?;
         let signals: Vec<Vec<SignalCurves>> = looks.into_iter().collect::<Result<_>>()?;
@@ -108,7 +108,7 @@ impl Wv {
         recording: &Recording,
         channel: Channel,
         replicate: &Replicate,
-    ) -> std::result::Result<Vec<f64>, WaveletError> {
+    ) -> Result<Vec<f64>, WaveletError> {
         let levels = 1..=replicate.classical.len() as u32;
         match (self.intervals, recording.signal(channel)) {
             // Of a signal with holes eta3 of what is there.
@@ -177,10 +177,6 @@ impl Answer for SignalsFile {
         document.lead(digest(self));
         let charts: Vec<Chart> = channels(self).map(|channel| chart(self, channel)).collect();
         document.charts(&charts, "Robust wavelet variance; dashed: classical, which outliers raise. τ is twice the averaging time.");
-        for channel in channels(self) {
-            let title = format!("{channel}: Allan deviation ({})", channel.sensor.unit());
-            document.folded(&title, |inside| inside.table(&side_by_side(self, channel)));
-        }
         document.checked(
             "wavelet variances to 1e-12, ends of intervals to 1e-9 of an independent implementation",
         );
@@ -255,23 +251,6 @@ fn digest(file: &SignalsFile) -> Table {
             .map(|text| Cell::figures(text.unwrap_or_default()));
         let name = format!("{channel} ({})", channel.sensor.unit());
         table.row(std::iter::once(Cell::from(name)).chain(figures));
-    }
-    table
-}
-
-/// A row a scale, a column a recording.
-fn side_by_side(file: &SignalsFile, channel: Channel) -> Table {
-    let signals = signals_of(file, channel);
-    let names = recording_names(signals.iter().map(|s| s.file.as_str()));
-    let mut table = Table::new(["averages of"]).and(names);
-    for (i, time) in times(file).into_iter().enumerate() {
-        let cell = |s: &&SignalCurves| {
-            let deviation = s
-                .allan_deviation(i)
-                .map(|deviation| format!("{deviation:.3e}"));
-            Cell::figures(deviation.unwrap_or_default())
-        };
-        table.row(std::iter::once(Cell::from(duration(time))).chain(signals.iter().map(cell)));
     }
     table
 }
@@ -474,15 +453,9 @@ mod tests {
     }
 
     #[test]
-    fn recordings_stand_side_by_side() {
+    fn a_csv_has_a_row_a_scale() {
         let file = file(2);
-        let channels: Vec<Channel> = channels(&file).collect();
-        assert_eq!(channels.len(), 1);
-        let text = side_by_side(&file, channels[0]).csv();
-        assert!(
-            text.starts_with("averages of,run0,run1\n") && text.lines().count() == 15,
-            "{text}"
-        );
+        assert_eq!(channels(&file).count(), 1);
         assert_eq!(signals_csv(&file).lines().count(), 1 + 2 * 14);
     }
 }

@@ -4,7 +4,6 @@ use crate::chart::{Axis, Scale};
 use crate::number::readable;
 
 /// From values to pixels along one axis.
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Ruler {
     /// First and last value shown.
     pub(crate) range: (f64, f64),

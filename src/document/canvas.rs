@@ -4,7 +4,6 @@ use crate::escape::escape;
 use std::fmt::Write as _;
 
 /// A size to draw in.
-#[derive(Debug, Clone, Copy)]
 pub(crate) struct Canvas {
     /// Class of the style sheet.
     pub(crate) class: &'static str,

@@ -23,7 +23,7 @@ pub(crate) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
     let is_log = chart.x.scale == Scale::Log;
     let air = if is_log || chart.is_map { 0.03 } else { 0.0 };
     let series = chart.panels.iter().flat_map(|p| &p.series);
-    let x_range = range(&chart.x, series.flat_map(|s| xs(&s.mark)), air)?;
+    let x_range = range(&chart.x, series.flat_map(|s| values(&s.mark).0), air)?;
     let y_ticks =
         |panel: &Panel, range, height: f64| ticks(&panel.y, range, (height / 42.0).ceil() as usize);
     let width = |(_, label): (f64, String)| text_width(&label, canvas.font);
@@ -218,28 +218,23 @@ fn longest_name(chart: &Chart, canvas: &Canvas) -> Option<f64> {
     Some(widths.fold(0.0, f64::max))
 }
 
-fn xs(mark: &Mark) -> Vec<f64> {
+/// The values of a mark on both axes.
+fn values(mark: &Mark) -> (Vec<f64>, Vec<f64>) {
     match mark {
-        Mark::Line(points, _) => points.iter().map(|p| p.0).collect(),
-        Mark::Band(points) | Mark::InnerBand(points) => points.iter().map(|p| p.0).collect(),
-        Mark::Points(points) => points.iter().map(|p| p.x).collect(),
-        Mark::Bars(bars) => bars.iter().map(|b| b.0).collect(),
-        Mark::Level(_) | Mark::Zone(..) => Vec::new(),
-        Mark::Place(x, _) | Mark::Reading(x, _) => vec![*x],
-    }
-}
-
-fn ys(mark: &Mark) -> Vec<f64> {
-    match mark {
-        Mark::Line(points, _) => points.iter().map(|p| p.1).collect(),
-        Mark::Band(points) | Mark::InnerBand(points) => {
-            points.iter().flat_map(|p| [p.1, p.2]).collect()
+        Mark::Line(points, _) => points.iter().copied().unzip(),
+        Mark::Band(points) | Mark::InnerBand(points) | Mark::Bars(points) => {
+            let ends = points.iter().flat_map(|&(x, a, b)| [(x, a), (x, b)]);
+            ends.unzip()
         }
-        Mark::Points(points) => points.iter().flat_map(|p| [p.y, p.low, p.high]).collect(),
-        Mark::Bars(bars) => bars.iter().flat_map(|b| [b.1, b.2]).collect(),
-        Mark::Level(y) => vec![*y],
-        Mark::Zone(low, high) => vec![*low, *high],
-        Mark::Place(_, y) | Mark::Reading(_, y) => vec![*y],
+        Mark::Points(points) => {
+            let ends = points
+                .iter()
+                .flat_map(|p| [p.y, p.low, p.high].map(|y| (p.x, y)));
+            ends.unzip()
+        }
+        Mark::Level(y) => (Vec::new(), vec![*y]),
+        Mark::Zone(low, high) => (Vec::new(), vec![*low, *high]),
+        Mark::Place(x, y) | Mark::Reading(x, y) => (vec![*x], vec![*y]),
     }
 }
 
@@ -258,7 +253,7 @@ fn y_range(panel: &Panel) -> Option<(f64, f64)> {
         | Mark::Level(_)
         | Mark::Points(_)
         | Mark::Place(..)
-        | Mark::Reading(..) => ys(&s.mark),
+        | Mark::Reading(..) => values(&s.mark).1,
         _ => Vec::new(),
     });
     let main = extremes(main.filter(|y| is_shown(*y, is_log)));
@@ -267,7 +262,7 @@ fn y_range(panel: &Panel) -> Option<(f64, f64)> {
         Some((low, high)) if low < high => (2.0 * low - high, 2.0 * high - low),
         _ => (f64::NEG_INFINITY, f64::INFINITY),
     };
-    let values = panel.series.iter().flat_map(|s| ys(&s.mark));
-    let shown = values.filter(|y| is_shown(*y, is_log));
+    let ys = panel.series.iter().flat_map(|s| values(&s.mark).1);
+    let shown = ys.filter(|y| is_shown(*y, is_log));
     range(&panel.y, shown.map(|y| y.clamp(low, high)), air)
 }

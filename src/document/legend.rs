@@ -18,7 +18,7 @@ pub(crate) fn text_width(text: &str, font: f64) -> f64 {
 const SWATCH: f64 = 24.0;
 const SPACE: f64 = 16.0;
 
-/// A name and all that has it.
+/// A name and all that has it; of stripes no series.
 struct Entry<'a> {
     name: &'a str,
     /// The first panel that shows it, and tells it.
@@ -27,10 +27,7 @@ struct Entry<'a> {
 }
 
 /// Names that are told. One name alone is told by the axis.
-pub(crate) struct Legend<'a> {
-    entries: Vec<Entry<'a>>,
-    stripes: Option<&'a str>,
-}
+pub(crate) struct Legend<'a>(Vec<Entry<'a>>);
 
 impl<'a> Legend<'a> {
     pub(crate) fn of(chart: &'a Chart) -> Self {
@@ -50,17 +47,20 @@ impl<'a> Legend<'a> {
             }
         }
         let (name, stripes) = &chart.stripes;
-        let has_stripes = !stripes.is_empty() && !chart.is_map;
-        Self {
-            entries,
-            stripes: has_stripes.then_some(name),
+        if !stripes.is_empty() && !chart.is_map {
+            entries.push(Entry {
+                name,
+                panel: 0,
+                series: Vec::new(),
+            });
         }
+        Self(entries)
     }
 
     /// The number of a name, of which the script knows what to hide.
     pub(crate) fn key(&self, name: &str) -> usize {
-        let found = self.entries.iter().position(|e| e.name == name);
-        found.unwrap_or(self.entries.len())
+        let found = self.0.iter().position(|e| e.name == name);
+        found.unwrap_or(self.0.len())
     }
 
     /// Draws what one panel tells, beginning behind `title`, at the height `top`; returns where it ends.
@@ -74,7 +74,7 @@ impl<'a> Legend<'a> {
     ) -> f64 {
         let line = canvas.font + 7.0;
         text(svg, "name", (left, top + canvas.font), "start", title);
-        if self.entries.len() + usize::from(self.stripes.is_some()) < 2 {
+        if self.0.len() < 2 {
             return top + line;
         }
         let (mut x, mut y) = (left, top);
@@ -91,30 +91,25 @@ impl<'a> Legend<'a> {
             (x - width - SPACE, y)
         };
         let mut end = top;
-        for (k, entry) in self
-            .entries
-            .iter()
-            .enumerate()
-            .filter(|(_, e)| e.panel == panel)
-        {
+        let entries = self.0.iter().enumerate();
+        for (k, entry) in entries.filter(|(_, e)| e.panel == panel) {
             let name = fitting(entry.name, canvas);
             let (x, y) = place(&name);
-            let class = entry.series[0].colour.class();
-            let _ = write!(svg, "<g class=\"key {class}\" data-k=\"{k}\">");
+            let middle = y + 0.5 * line - 1.0;
+            let first = entry.series.first();
+            let class = first.map_or(String::new(), |s| format!("key {}", s.colour.class()));
+            let _ = write!(svg, "<g class=\"{class}\" data-k=\"{k}\">");
+            if entry.series.is_empty() {
+                let top = middle - 6.0;
+                let _ = write!(
+                    svg,
+                    "<rect class=\"outage\" x=\"{x:.1}\" y=\"{top:.1}\" width=\"{SWATCH}\" height=\"12\"/>"
+                );
+            }
             let swatches = entry.series.iter().map(|s| &s.mark);
-            swatches.for_each(|mark| swatch(mark, (x, y + 0.5 * line - 1.0), svg));
+            swatches.for_each(|mark| swatch(mark, (x, middle), svg));
             text(svg, "", (x + SWATCH + 6.0, y + canvas.font), "start", &name);
             *svg += "</g>\n";
-            end = y;
-        }
-        if let Some(name) = self.stripes.filter(|_| panel == 0) {
-            let (x, y) = place(name);
-            let _ = write!(
-                svg,
-                "<rect class=\"outage\" x=\"{x:.1}\" y=\"{:.1}\" width=\"{SWATCH}\" height=\"12\"/>",
-                y + 0.5 * line - 7.0
-            );
-            text(svg, "", (x + SWATCH + 6.0, y + canvas.font), "start", name);
             end = y;
         }
         end + line

@@ -150,7 +150,7 @@ impl From<SignalsFile> for CurvesFile {
 }
 
 /// The curves behind a model, and what the model makes of them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Serialize, Deserialize)]
 pub(crate) struct CurvesFile {
     /// Layout version.
     pub schema_version: u32,
@@ -162,7 +162,7 @@ pub(crate) struct CurvesFile {
 
 /// A curve, the model fitted to it, and the replicates it is the average of. Only sensor, axis, tau_s, wv
 /// and edof are needed to fit a model to it again.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 pub(crate) struct FittedCurve {
     /// Sensor.
     pub sensor: Sensor,
@@ -201,7 +201,7 @@ pub(crate) struct FittedCurve {
 }
 
 /// The wavelet variance of one replicate: robust where the estimator is.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Serialize, Deserialize)]
 pub(crate) struct ReplicateCurve {
     /// Recording.
     pub file: String,

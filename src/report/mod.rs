@@ -11,12 +11,12 @@ pub(crate) use curves::{CurvesFile, FittedCurve, SignalsFile};
 pub use nav_sim_document::readable;
 pub(crate) use nav_sim_document::{seconds, six_digits};
 pub(crate) use tables::{gnss_csv, imu_csv, initial_toml};
-pub(crate) use trajectory::TrajectoryCheck;
-pub use trajectory::TrajectorySeries;
+
 pub(crate) use verdict::{reduction_doubt, reduction_line, tone, unexpected_line};
 
 pub(crate) mod comparison_table;
 #[cfg(test)]
+#[path = "sample_tests.rs"]
 pub(crate) mod sample;
 
 /// Characters of a line in a terminal.

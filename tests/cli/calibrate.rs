@@ -114,20 +114,6 @@ fn recordings_become_a_model_file_and_its_curves() {
         replicates.iter().all(|r| r["verdict"] == "normal"),
         "{replicates:?}"
     );
-    for replicate in replicates {
-        assert_eq!(
-            replicate["scores"]["y"]["noise"].as_array().unwrap().len(),
-            13
-        );
-        // Three estimators, four parameters each.
-        let left_out = replicate["left_out"].as_array().unwrap();
-        assert!(
-            left_out.len() == 3
-                && left_out
-                    .iter()
-                    .all(|l| l["parameters"].as_array().unwrap().len() == 4)
-        );
-    }
     let model = Composite::new(truth().to_vec());
     for estimator in ["awv", "sr-awv", "dr-awv"] {
         let file = nav_sim::io::model_file::read(&dir.path().join(format!("imu_{estimator}.toml")))
@@ -230,43 +216,6 @@ fn a_curve_written_is_a_curve_read() {
         );
     }
     assert_eq!(first["fits"][1]["axis"], "y");
-}
-
-/// Without the shortest recording there would be more scales; the diagnosis leaves it out at those of the whole: the fit of
-/// the others, to the optimiser's tolerance.
-#[test]
-fn a_short_recording_is_left_out_at_the_same_scales() {
-    let dir = tempfile::tempdir().unwrap();
-    recordings(dir.path(), 4);
-    let path = dir.path().join("runs/run3.csv");
-    let text = std::fs::read_to_string(&path).unwrap();
-    let short: Vec<&str> = text.lines().take(1 + SAMPLES / 10).collect();
-    std::fs::write(&path, short.join("\n") + "\n").unwrap();
-    let fit = |inputs: &[&str], scales: &[&str]| {
-        let flags = ["--model", "N1", "--estimator", "awv", "--weighting", "edof"];
-        json(
-            dir.path(),
-            &[&["calibrate"], inputs, &flags, scales].concat(),
-        )
-    };
-    let all = fit(&["runs"], &[]);
-    let moved = &all["replicates"][3]["left_out"][0]["parameters"];
-    let scales = all["fits"][0]["scales"].to_string();
-    let others = ["runs/run0.csv", "runs/run1.csv", "runs/run2.csv"];
-    let rest = fit(&others, &["--scales", &scales]);
-    for (i, (process, name)) in [(0, "sigma2"), (1, "phi"), (1, "sigma2")]
-        .into_iter()
-        .enumerate()
-    {
-        let expected = rest["fits"][0]["processes"][process][name]
-            .as_f64()
-            .unwrap();
-        let without = moved[i]["without"].as_f64().unwrap();
-        assert!(
-            (without / expected - 1.0).abs() < 1e-5,
-            "{name}: {without} {expected}"
-        );
-    }
 }
 
 /// The file of `wv` is a curve file: its classical curves are GMWM's, the robust ones RGMWM's.
@@ -501,14 +450,10 @@ fn wv_prints_the_curves_of_every_signal() {
             .success();
         String::from_utf8(output.get_output().stdout.clone()).unwrap()
     };
-    let (digest, all) = (text(&[]), text(&["--verbose"]));
+    let digest = text(&[]);
     assert!(
         digest.lines().count() <= 20 && digest.contains("gyro.x (rad/s)"),
         "{digest}"
-    );
-    assert!(
-        all.contains("gyro.x: Allan deviation (rad/s)") && all.contains("run0"),
-        "{all}"
     );
     assert_eq!(text(&["--format", "csv"]).lines().count(), 1 + 4 * 13);
     let stderr = refusal(

@@ -109,14 +109,18 @@ fn practitioners_parameters_are_those_of_export() {
     let exported = json(dir.path(), &["export", "m.toml", "--target", "kalibr"]);
     for fit in out["fits"].as_array().unwrap() {
         let own = &fit["figures"];
-        let of_export =
-            &exported["sensors"][fit["sensor"].as_str().unwrap()]["axes"]["x"]["white_and_walk"];
-        for (key, of_export) in [("N", &of_export["n"]), ("K", &of_export["k"])] {
-            for part in ["value", "unit"] {
-                assert_eq!(own[key][part], of_export["data_sheet"][part], "{fit}");
-            }
+        let sensor = fit["sensor"].as_str().unwrap();
+        let of_export = &exported["sensors"][sensor]["largest"]["walk"];
+        let [degrees, hour] = match sensor {
+            "gyro" => [180.0 / std::f64::consts::PI, 3600.0],
+            _ => [1.0, 1.0],
+        };
+        let density = of_export["density"].as_f64().unwrap();
+        let walk = of_export["walk"].as_f64().unwrap();
+        for (key, expected) in [("N", density * degrees), ("K", walk * degrees * hour)] {
+            let value = own[key]["value"].as_f64().unwrap();
+            assert!((value / (expected * 60.0) - 1.0).abs() < 1e-12, "{fit}");
         }
-        let density = of_export["n"]["value"].as_f64().unwrap();
         assert!(
             (density / (4e-6_f64 / 50.0).sqrt() - 1.0).abs() < 0.02,
             "{density}"

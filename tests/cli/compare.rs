@@ -6,7 +6,6 @@ use nav_sim::commands::run::{ModelNote, Navigation, RunAnswer, RunOrigin};
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::simulation::{EpochSums, OutageRecord, RunRecord, RunResult};
-use nav_sim::report::TrajectorySeries;
 use std::path::Path;
 
 const RUNS: u32 = 20;
@@ -91,7 +90,7 @@ fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest, &mut 
         navigation: Navigation::of_runs(result(factor), 7),
         origin,
         inputs,
-        track: TrajectorySeries::default(),
+        track: Vec::new(),
     };
     std::fs::create_dir_all(directory).unwrap();
     for file in answer.files() {

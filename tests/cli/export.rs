@@ -171,15 +171,13 @@ fn json_has_all_numbers_with_units() {
         "{entries:?}"
     );
     let gyro = &json["sensors"]["gyro"];
-    let n = &gyro["exported"]["n"];
-    let (si, sheet) = (
-        n["value"].as_f64().unwrap(),
-        n["data_sheet"]["value"].as_f64().unwrap(),
-    );
-    assert!((sheet / (si.to_degrees() * 60.0) - 1.0).abs() < 1e-12);
-    assert_eq!(n["data_sheet"]["unit"], "deg/sqrt(h)");
+    // a sample of the midpoint rule at f Hz has N sqrt(2f)
+    let n = gyro["exported"]["density"].as_f64().unwrap();
+    let sample = entries[1]["value"].as_f64().unwrap();
+    let rate_hz = json["rate_hz"].as_f64().unwrap();
+    assert!((sample / (n * (2.0 * rate_hz).sqrt()) - 1.0).abs() < 1e-12);
     // the minimum of N²/τ + K²τ/3, √3 N/K = 346 s, within the 10 000 s of a model that no calibration made
-    let minimum = gyro["axes"]["x"]["minimum"]["tau_s"].as_f64().unwrap();
+    let minimum = gyro["largest"]["minimum"]["tau_s"].as_f64().unwrap();
     assert!((minimum / 346.4 - 1.0).abs() < 0.05, "{minimum}");
     assert!(gyro["closure"]["highest"]["ratio"].is_f64());
 }

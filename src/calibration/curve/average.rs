@@ -3,6 +3,7 @@
 
 use super::sampling::variance_of_log;
 use crate::imu::{Axis, Channel, Recording, Sensor, Signal};
+use crate::units::Refused;
 use crate::wavelet::{
     Curve, Gappy, RobustVariance, Status, Tuning, WaveletError, both, default_levels, gappy,
     interval,
@@ -92,22 +93,20 @@ impl fmt::Display for Trim {
     }
 }
 
-/// A text that is no trim.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("not a number of replicates such as 2, or a percentage under 50 such as 30%")]
-pub struct TrimError;
-
 impl FromStr for Trim {
-    type Err = TrimError;
+    type Err = Refused;
 
-    fn from_str(text: &str) -> Result<Self, TrimError> {
-        match text.strip_suffix('%') {
-            None => text.parse().map(Self::Count).map_err(|_| TrimError),
-            Some(percent) => match percent.trim().parse() {
-                Ok(p) if (0.0..50.0).contains(&p) => Ok(Self::Fraction(p / 100.0)),
-                _ => Err(TrimError),
-            },
-        }
+    fn from_str(text: &str) -> Result<Self, Refused> {
+        let found = match text.strip_suffix('%') {
+            None => text.parse().ok().map(Self::Count),
+            Some(percent) => {
+                let percent = percent.trim().parse().ok();
+                let percent = percent.filter(|p| (0.0..50.0).contains(p));
+                percent.map(|p: f64| Self::Fraction(p / 100.0))
+            }
+        };
+        let expected = "not a number of replicates such as 2, or a percentage under 50 such as 30%";
+        found.ok_or_else(|| Refused(expected.to_owned()))
     }
 }
 
@@ -180,28 +179,44 @@ impl Replicate {
     }
 }
 
-/// Why replicates have no average.
+/// What a calibration fails by, where advice depends on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cause {
+    /// A signal too short for its scales.
+    TooShort,
+    /// A trim that leaves no replicate.
+    Trim,
+    /// Fewer scales than parameters.
+    TooFewScales,
+    /// A wavelet variance that is not positive has no logarithm, no weight, no meaning.
+    NotPositive,
+    /// Anything else.
+    Other,
+}
+
+/// Why there is no wavelet variance, no curve or no fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum AverageError {
-    /// No replicate, or none with a scale.
-    #[error("no replicates")]
-    None,
-    /// The trim leaves nothing.
-    #[error("trimming {trim} replicates at each end needs at least {} replicates; there are {replicates}", 2 * trim + 1)]
-    Trim {
-        /// Replicates dropped at each end.
-        trim: usize,
-        /// Replicates there are.
-        replicates: usize,
-    },
-    /// A single-replicate estimator was given several.
-    #[error("{estimator} takes one recording at a time; there are {replicates}")]
-    Single {
-        /// The estimator.
-        estimator: &'static str,
-        /// Replicates there are.
-        replicates: usize,
-    },
+#[error("{message}")]
+pub struct CalibrationError {
+    /// Its cause.
+    pub cause: Cause,
+    message: String,
+}
+
+impl CalibrationError {
+    pub(crate) fn new(cause: Cause, message: impl ToString) -> Self {
+        let message = message.to_string();
+        Self { cause, message }
+    }
+
+    pub(crate) fn other(message: impl ToString) -> Self {
+        Self::new(Cause::Other, message)
+    }
+
+    /// The same, of a group or a signal.
+    pub(crate) fn within(self, part: &str) -> Self {
+        Self::new(self.cause, format!("{part}: {}", self.message))
+    }
 }
 
 /// Number of levels that more than half of the replicates have: a few short ones cost the others nothing,
@@ -228,17 +243,15 @@ pub fn average(
     estimator: Estimator,
     trim: Trim,
     tuning: &Tuning,
-) -> Result<Curve, AverageError> {
+) -> Result<Curve, CalibrationError> {
     let count = replicates.len();
     if estimator.is_single() && count > 1 {
-        return Err(AverageError::Single {
-            estimator: estimator.name(),
-            replicates: count,
-        });
+        let message = format!("{estimator} takes one recording at a time; there are {count}");
+        return Err(CalibrationError::other(message));
     }
     let levels = majority(replicates);
     if levels == 0 {
-        return Err(AverageError::None);
+        return Err(CalibrationError::other("no replicates"));
     }
     let dropped = |count: usize| {
         if estimator == Estimator::DrAwv {
@@ -249,10 +262,12 @@ pub fn average(
     };
     let is_enough = |count: usize| count > 2 * dropped(count);
     if !is_enough(count) {
-        return Err(AverageError::Trim {
-            trim: dropped(count),
-            replicates: count,
-        });
+        let trim = dropped(count);
+        let least = 2 * trim + 1;
+        let message = format!(
+            "trimming {trim} replicates at each end needs at least {least} replicates; there are {count}"
+        );
+        return Err(CalibrationError::new(Cause::Trim, message));
     }
     let quantization = estimator.is_robust().then(|| *tuning.quantization());
     let kept_of_all = (count - 2 * dropped(count)) as f64;
@@ -449,6 +464,15 @@ pub struct Group {
 }
 
 impl Group {
+    /// Names the group and an estimator in an error.
+    pub(crate) fn named(
+        &self,
+        estimator: Estimator,
+    ) -> impl Fn(CalibrationError) -> CalibrationError + use<> {
+        let part = format!("{}, {estimator}", self.scope.name());
+        move |e| e.within(&part)
+    }
+
     /// Recordings that the replicates are of.
     pub(crate) fn recordings(&self) -> usize {
         let mut names: Vec<&str> = self.replicates.iter().map(|r| r.name.as_str()).collect();
@@ -469,18 +493,6 @@ pub enum Pool {
 
 nav_sim_signal::named!(Pool { Axes = "axes", Sensor = "sensor" }, in files);
 
-/// A signal without a wavelet variance.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{recording}, {channel}: {source}")]
-pub struct SignalError {
-    /// The recording.
-    pub recording: String,
-    /// The signal.
-    pub channel: Channel,
-    /// Why.
-    pub source: WaveletError,
-}
-
 /// The wavelet variances of all signals of a recording, in their order; missing samples are NaN. Without a number of levels there are as
 /// many as usual for its length.
 ///
@@ -490,14 +502,13 @@ pub fn replicates(
     recording: &Recording,
     levels: Option<u32>,
     tuning: &Tuning,
-) -> Result<Vec<(Channel, Replicate)>, SignalError> {
+) -> Result<Vec<(Channel, Replicate)>, CalibrationError> {
     let replicate = |signal: &Signal| {
         let (channel, samples) = (signal.channel, signal.samples.len());
         let levels = levels.unwrap_or_else(|| default_levels(samples));
-        let error = |source| SignalError {
-            recording: recording.name.clone(),
-            channel,
-            source,
+        let error = |e: WaveletError| {
+            let message = format!("{}, {channel}: {e}", recording.name);
+            CalibrationError::new(Cause::TooShort, message)
         };
         let (classical, robust, coverage) = if signal.samples.iter().any(|x| x.is_nan()) {
             let Gappy {
@@ -582,6 +593,13 @@ pub fn median(values: &[f64]) -> f64 {
         n if n % 2 == 1 => sorted[n / 2],
         n => 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]),
     }
+}
+
+/// Share of the statistics that are as large, the observed one among them: exchangeable with B draws it has any of B + 1 ranks
+/// with the same probability, so that P(p ≤ a) ≤ a ([Davison and Hinkley](crate::bibliography::DavisonHinkley97), eq. 4.11).
+pub(crate) fn p_value(observed: f64, draws: &[f64]) -> f64 {
+    let as_large = draws.iter().filter(|draw| **draw >= observed).count();
+    (1 + as_large) as f64 / (1 + draws.len()) as f64
 }
 
 #[cfg(test)]

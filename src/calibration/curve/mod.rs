@@ -5,9 +5,9 @@ pub(crate) mod sampling;
 mod stationarity;
 
 pub use average::{
-    AverageError, Estimator, Group, Pool, Replicate, Scope, SignalError, Trim, TrimError, average,
-    grouped, median, replicates, trend,
+    CalibrationError, Cause, Estimator, Group, Pool, Replicate, Scope, Trim, average, grouped,
+    median, replicates, trend,
 };
-pub(crate) use average::{MAD_TO_DEVIATION, falling_root};
+pub(crate) use average::{MAD_TO_DEVIATION, falling_root, p_value};
 pub use sampling::implied;
-pub use stationarity::{Beginning, Beginnings, Change, WarmUp, warm_up};
+pub use stationarity::{Beginning, Beginnings, WarmUp, warm_up};

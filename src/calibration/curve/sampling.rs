@@ -94,23 +94,22 @@ impl SamplingLaw {
 
     /// The law of the first so many levels.
     pub(crate) fn first(&self, levels: usize) -> Self {
-        let correlation = self.correlation.view((0, 0), (levels, levels)).into_owned();
-        // The leading block of a lower triangular factor is the factor of the leading block.
-        let factor = self.factor.view((0, 0), (levels, levels)).into_owned();
-        let per_coefficient = self.per_coefficient[..levels].to_vec();
-        let quantization = self.quantization[..levels].to_vec();
-        let autocorrelations = self.autocorrelations[..levels].to_vec();
-        let fourth = self.fourth[..levels].to_vec();
-        let shapes = self.shapes[..levels].to_vec();
-        Self {
+        let mut first = self.clone();
+        for matrix in [&mut first.correlation, &mut first.factor] {
+            *matrix = matrix.view((0, 0), (levels, levels)).into_owned();
+        }
+        let Self {
             per_coefficient,
             quantization,
-            autocorrelations,
             fourth,
-            shapes,
-            correlation,
-            factor,
+            ..
+        } = &mut first;
+        for list in [per_coefficient, quantization, fourth] {
+            list.truncate(levels);
         }
+        first.autocorrelations.truncate(levels);
+        first.shapes.truncate(levels);
+        first
     }
 
     /// Degrees of freedom of the classical wavelet variance of a signal of so many samples.
@@ -512,29 +511,6 @@ pub fn implied(model: &Composite, curve: &Curve) -> Vec<f64> {
     curve.levels.iter().map(at_level).collect()
 }
 
-/// Its derivatives with respect to all parameters of the model, level by level.
-pub(crate) fn implied_gradients(model: &Composite, curve: &Curve) -> Vec<Vec<f64>> {
-    let at_level = |level: &u32| {
-        let Some(response) = curve.response(*level) else {
-            return model.haar_wv_gradient(*level);
-        };
-        let scale = Response::new(response, quantization_share(model, *level));
-        let of_process = |process: &Process| {
-            let scale = if is_quantization(process) {
-                scale.quantization
-            } else {
-                scale.others
-            };
-            process
-                .haar_wv_gradient(*level)
-                .into_iter()
-                .map(move |slope| slope * scale)
-        };
-        model.processes.iter().flat_map(of_process).collect()
-    };
-    curve.levels.iter().map(at_level).collect()
-}
-
 /// Derivatives of nu·b(q/nu), q the variance of quantization noise and nu that of all: with respect to q and to that of
 /// any other process. nu·b is homogeneous, so that it is q times the first plus (nu − q) times the second.
 #[derive(Clone)]
@@ -633,7 +609,22 @@ mod implied_tests {
                 quantization,
                 ..Curve::default()
             };
-            let gradients = implied_gradients(&model(values), &curve);
+            let gradient = |level: &u32| -> Vec<f64> {
+                let (model, mut scale) = (model(values), Response::PLAIN);
+                if let Some(response) = curve.response(*level) {
+                    scale = Response::new(response, quantization_share(&model, *level));
+                }
+                let of_process = |process: &Process| {
+                    let scale = match is_quantization(process) {
+                        true => scale.quantization,
+                        false => scale.others,
+                    };
+                    let slopes = process.haar_wv_gradient(*level).into_iter();
+                    slopes.map(move |slope| slope * scale)
+                };
+                model.processes.iter().flat_map(of_process).collect()
+            };
+            let gradients: Vec<Vec<f64>> = levels.iter().map(gradient).collect();
             for p in 0..5 {
                 let step = 1e-5 * values[p];
                 let shifted = |sign: f64| {

@@ -8,7 +8,6 @@
 //! again, until nothing is out of place: whoever leaves out what is said is not told of more.
 
 use super::average::mean_about;
-use crate::imu::Channel;
 use crate::wavelet::interval::edof_eta3;
 use crate::wavelet::{Tuning, classical, default_levels, gappy};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -27,20 +26,9 @@ const LEVEL: f64 = 1e-4;
 pub struct WarmUp {
     /// Samples to leave out: what remains begins as it goes on.
     pub samples: usize,
-    /// The first part against the last eight, in their standard deviations.
-    pub deviations: f64,
-    /// Change by leaving them out; none where not even the later half begins as it goes on, and nothing is to
-    /// be left out.
-    pub change: Option<Change>,
-}
-
-/// Effect of a warm-up on the classical wavelet variance, at the scale where it is most certain.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Change {
-    /// Level.
-    pub level: u32,
-    /// Wavelet variance without the warm-up over that with it.
-    pub ratio: f64,
+    /// Wavelet variance (classical) without them over that with them, at the scale where the change is most certain; none
+    /// where not even the later half begins as it goes on, and nothing is to be left out.
+    pub change: Option<f64>,
 }
 
 /// Recording that does not begin as it goes on.
@@ -48,20 +36,10 @@ pub struct Change {
 pub struct Beginning {
     /// The recording.
     pub recording: String,
-    /// Its signals of which that is so.
-    pub signals: Vec<(Channel, WarmUp)>,
+    /// Those of its signals of which that is so.
+    pub signals: Vec<WarmUp>,
     /// Seconds to leave out from the beginning of the file; none where that does not help.
     pub skip_s: Option<f64>,
-}
-
-impl Beginning {
-    /// The signal that is furthest from its rest.
-    pub fn surest(&self) -> Option<(Channel, WarmUp)> {
-        self.signals
-            .iter()
-            .copied()
-            .max_by(|a, b| a.1.deviations.abs().total_cmp(&b.1.deviations.abs()))
-    }
 }
 
 /// Recordings of a calibration that do not begin as they go on.
@@ -76,29 +54,26 @@ pub struct Beginnings {
 /// Looks at a signal, again after what would be left out, until what remains begins as it goes on; none where it does from
 /// the start, or is too short to tell.
 pub fn warm_up(samples: &[f64]) -> Option<WarmUp> {
-    let first = look(samples)?;
-    let mut left = first.samples;
+    let mut left = look(samples)?;
     while left <= samples.len() / 2 {
-        match look(&samples[left..]) {
-            Some(more) => left += more.samples,
-            None => {
-                return Some(WarmUp {
-                    samples: left,
-                    change: change(samples, left),
-                    ..first
-                });
-            }
-        }
+        let Some(more) = look(&samples[left..]) else {
+            let change = change(samples, left);
+            return Some(WarmUp {
+                samples: left,
+                change,
+            });
+        };
+        left += more;
     }
     Some(WarmUp {
         samples: left,
-        ..first
+        change: None,
     })
 }
 
 /// The scale at which the wavelet variance without the first samples differs most from that with them, in standard
 /// deviations of the difference (the variance of a part less that of the whole).
-fn change(samples: &[f64], left: usize) -> Option<Change> {
+fn change(samples: &[f64], left: usize) -> Option<f64> {
     let part = &samples[left..];
     let levels = default_levels(part.len());
     let (with, without) = (variances(samples, levels)?, variances(part, levels)?);
@@ -109,13 +84,13 @@ fn change(samples: &[f64], left: usize) -> Option<Change> {
         let noise = 2.0 / edof_eta3(part.len(), level) - 2.0 / edof_eta3(samples.len(), level);
         (
             ratio.ln().abs() / noise.max(f64::MIN_POSITIVE).sqrt(),
-            Change { level, ratio },
+            ratio,
         )
     };
     let surest = (1..=levels).map(of_level).filter(|(z, _)| z.is_finite());
     surest
         .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, change)| change)
+        .map(|(_, ratio)| ratio)
 }
 
 fn variances(samples: &[f64], levels: u32) -> Option<Vec<f64>> {
@@ -126,8 +101,8 @@ fn variances(samples: &[f64], levels: u32) -> Option<Vec<f64>> {
     classical(samples, levels).ok()
 }
 
-/// One look: the parts that are out of place.
-fn look(samples: &[f64]) -> Option<WarmUp> {
+/// One look: the samples of the first parts that are out of place.
+fn look(samples: &[f64]) -> Option<usize> {
     let length = samples.len() / PARTS;
     if length < SHORTEST {
         return None;
@@ -148,31 +123,24 @@ fn look(samples: &[f64]) -> Option<WarmUp> {
     let mut found = None;
     // The parts that are compared with the last eight must not be among them; a step needs two parts.
     for first in 0..PARTS - LAST - 1 {
-        let out_of_place_in =
-            |values: &Vec<f64>| out_of_place(values[first], &values[values.len() - LAST..]);
-        let Some(deviations) = out_of_place_in(&steps).or_else(|| out_of_place_in(&noise)) else {
+        let is_out = |values: &[f64]| out_of_place(values[first], &values[values.len() - LAST..]);
+        if !is_out(&steps) && !is_out(&noise) {
             break;
-        };
-        // The first alarm is the one that is told; later ones only lengthen what is left out.
-        let deviations = found.map_or(deviations, |f: WarmUp| f.deviations);
-        found = Some(WarmUp {
-            samples: (first + 1) * length,
-            deviations,
-            change: None,
-        });
+        }
+        found = Some((first + 1) * length);
     }
     found
 }
 
-/// A value against others, in their standard deviations, if it is out of place.
-fn out_of_place(first: f64, others: &[f64]) -> Option<f64> {
+/// Whether a value is out of place among others.
+fn out_of_place(first: f64, others: &[f64]) -> bool {
     let count = others.len() as f64;
     let mean = others.iter().sum::<f64>() / count;
     let variance = others.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0);
     // The value is new: its own variance adds to that of the mean of the others.
     let t = (first - mean) / (variance * (1.0 + 1.0 / count)).sqrt();
-    let law = StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
-    (t.is_finite() && 2.0 * law.sf(t.abs()) < LEVEL).then_some(t)
+    let law = StudentsT::new(0.0, 1.0, count - 1.0);
+    t.is_finite() && law.is_ok_and(|law| 2.0 * law.sf(t.abs()) < LEVEL)
 }
 
 #[cfg(test)]
@@ -237,10 +205,7 @@ mod tests {
         assert_eq!(found.samples, SAMPLES / 8, "{found:?}");
         // An eighth with five times the variance at the first scale: without it 1/(1 + 4/8) = 0.67.
         let change = found.change.unwrap();
-        assert!(
-            change.level == 1 && (change.ratio - 0.67).abs() < 0.03,
-            "{change:?}"
-        );
+        assert!((change - 0.67).abs() < 0.03, "{change:?}");
     }
 
     /// What is advised is all there is to leave out.

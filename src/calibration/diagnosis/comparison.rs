@@ -1,7 +1,7 @@
 //! All recordings against one another, by one test.
 
-use super::contrasts::{Found, Noise, Table, alarms, scores};
-use super::diagnose::{Alarm, DriftAlarm};
+use super::contrasts::{Found, Noise, Table, alarms};
+use super::diagnose::Alarm;
 use crate::curve::sampling::{SamplingLaw, drift_share};
 use crate::curve::{Estimator, Group, Replicate};
 use crate::imu::{Axis, Sensor};
@@ -42,18 +42,30 @@ impl Comparison {
             };
             Noise::new(p.law.first(levels), p.replicates.iter().map(edof).collect())
         };
-        let above_only = test == Test::Outliers;
         let table = Table {
             logs: pieces.iter().map(of_piece).collect(),
-            above_only,
+            above_only: test == Test::Outliers,
         };
-        let noise: Vec<Noise> = pieces.iter().map(noise).collect();
-        let found = alarms(&table, &noise, sensor.name(), test.name());
+        let noise = pieces.iter().map(noise).collect();
+        let name = match test {
+            Test::Noise => "noise",
+            Test::Outliers => "outliers",
+        };
+        Self::of(pieces, table, noise, sensor, name)
+    }
+
+    fn of(
+        pieces: &[Piece<'_>],
+        table: Table,
+        noise: Vec<Noise>,
+        sensor: Sensor,
+        name: &str,
+    ) -> Self {
         Self {
             axes: pieces.iter().map(|p| p.axis).collect(),
+            found: alarms(&table, &noise, sensor.name(), name),
             table,
             noise,
-            found,
         }
     }
 
@@ -87,64 +99,21 @@ impl Comparison {
         let last = &between[between.len().saturating_sub(LONGEST_SCALES)..];
         let mean = last.iter().map(|b| b * b).sum::<f64>() / last.len().max(1) as f64;
         // Of the standard deviation, whose logarithm is half that of the variance.
-        let own = pieces
-            .iter()
-            .map(|_| Noise::normal(files, 0.5 * mean.sqrt()))
-            .collect::<Vec<_>>();
-        let found = alarms(&table, &own, sensor.name(), "drift");
-        Self {
-            axes: pieces.iter().map(|p| p.axis).collect(),
-            table,
-            noise: own,
-            found,
-        }
-    }
-
-    pub(super) fn drift_alarm(&self, file: usize, pieces: &[Piece<'_>]) -> Option<DriftAlarm> {
-        let found = self.found.iter().find(|f| f.file == file)?;
-        let deviations = found
-            .distance
-            .deviations
-            .iter()
-            .map(|(axis, z)| (self.axes[*axis], *z))
-            .collect();
-        let change = pieces
-            .iter()
-            .filter_map(|p| Some((p.axis, p.replicates[file]?.trend)))
-            .collect();
-        Some(DriftAlarm {
-            p_value: found.p_value,
-            change,
-            deviations,
-        })
+        let own = vec![Noise::normal(files, 0.5 * mean.sqrt()); pieces.len()];
+        Self::of(pieces, table, own, sensor, "drift")
     }
 
     pub(super) fn alarm(&self, file: usize, rate_hz: f64) -> Option<Alarm> {
         let found = self.found.iter().find(|f| f.file == file)?;
         let first = found.window.first as u32 + 1;
-        let named = found
-            .distance
-            .deviations
-            .iter()
-            .map(|(axis, z)| (self.axes[*axis], *z));
+        let scales = [first, first + found.window.width as u32 - 1];
+        let deviations = found.distance.deviations.iter();
         Some(Alarm {
             p_value: found.p_value,
-            tau_s: [first, first + found.window.width as u32 - 1]
-                .map(|level| tau_s(level, rate_hz)),
-            deviations: named.collect(),
+            tau_s: scales.map(|level| tau_s(level, rate_hz)).to_vec(),
+            change: Vec::new(),
+            deviations: deviations.map(|(axis, z)| (self.axes[*axis], *z)).collect(),
         })
-    }
-
-    /// Against the files that are not abnormal.
-    pub(super) fn scores(&self, file: usize) -> Vec<Vec<f64>> {
-        let files = self.table.logs.first().map_or(0, Vec::len);
-        let normal = |k: usize| k == file || self.found.iter().all(|f| f.file != k);
-        scores(
-            &self.table,
-            &self.noise,
-            &(0..files).map(normal).collect::<Vec<_>>(),
-            file,
-        )
     }
 }
 
@@ -283,12 +252,5 @@ impl Test {
                 .max()
         };
         pieces.iter().filter_map(of_piece).max().unwrap_or(0)
-    }
-
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Noise => "noise",
-            Self::Outliers => "outliers",
-        }
     }
 }

@@ -13,7 +13,7 @@ use rand_distr::StandardNormal;
 use rayon::prelude::*;
 
 /// Fewer recordings cannot say which of them is abnormal.
-pub(super) const FEWEST: usize = 4;
+pub const FEWEST: usize = 4;
 
 /// Fewest recordings of which one of the others may be passed over.
 const FEWEST_TO_PASS_OVER: usize = 6;
@@ -321,24 +321,6 @@ fn furthest(table: &Table, noise: &[Noise], active: &[bool]) -> Vec<Furthest> {
         }
     }
     all
-}
-
-/// Deviations of a file at every single scale, `[axis][level]`; 0 where nothing can be said.
-pub(super) fn scores(
-    table: &Table,
-    noise: &[Noise],
-    active: &[bool],
-    file: usize,
-) -> Vec<Vec<f64>> {
-    let levels = noise.first().map_or(0, Noise::levels);
-    let mut scores = vec![vec![0.0; levels]; table.logs.len()];
-    for j in 0..levels {
-        let contrasts = table.contrasts(noise, Window { first: j, width: 1 }, j, active);
-        for (axis, z) in distance(&contrasts, file, false).map_or(Vec::new(), |d| d.deviations) {
-            scores[axis][j] = z;
-        }
-    }
-    scores
 }
 
 // Scatter of recordings by noise alone, over windows of neighbouring scales.

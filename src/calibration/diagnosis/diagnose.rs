@@ -2,12 +2,10 @@
 
 use super::comparison::{Comparison, Piece, Test, axes, excess_of_classical};
 use super::contrasts::{FALSE_ALARM, FEWEST};
-use crate::curve::sampling::variance_of_log;
-use crate::curve::{Estimator, Group, Replicate, average};
+use crate::curve::{Group, Replicate};
 use crate::imu::{Axis, Sensor};
 use crate::noise::Process;
 use crate::outcome::{Outcome, Settings, tau_s};
-use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -45,24 +43,15 @@ fn of_sensor(
     let [noise, outliers] = [Test::Noise, Test::Outliers]
         .map(|test| Comparison::new(&pieces, sensor, test, settings.tuning.efficiency()));
     let drift = Comparison::drift(&pieces, sensor, &noise);
-    let without = |name: &str| {
-        let fits: Vec<_> = own
-            .iter()
-            .flat_map(|g| {
-                outcomes
-                    .iter()
-                    .filter(|o| o.scope == g.scope)
-                    .map(move |o| (*g, o))
-            })
-            .collect();
-        fits.into_par_iter()
-            .filter_map(|(g, o)| left_out(g, name, o, settings))
-            .collect()
-    };
     let diagnosis = |(index, name): (usize, &&str)| {
         let [of_noise, of_outliers] =
             [&noise, &outliers].map(|test| test.alarm(index, settings.rate_hz));
-        let of_drift = drift.drift_alarm(index, &pieces);
+        let change = |p: &Piece<'_>| Some((p.axis, p.replicates[index]?.trend));
+        let of_drift = drift.alarm(index, settings.rate_hz).map(|alarm| Alarm {
+            tau_s: Vec::new(),
+            change: pieces.iter().filter_map(change).collect(),
+            ..alarm
+        });
         let verdict = match (&of_noise, &of_outliers, &of_drift) {
             (Some(_), _, _) => Verdict::Noise,
             (None, Some(_), _) => Verdict::Outliers,
@@ -76,22 +65,10 @@ fn of_sensor(
             noise: of_noise,
             outliers: of_outliers,
             drift: of_drift,
-            scores: joined(&pieces, noise.scores(index), outliers.scores(index)),
             common: common.clone(),
-            left_out: without(name),
         }
     };
     names.iter().enumerate().map(diagnosis).collect()
-}
-
-fn joined(pieces: &[Piece<'_>], noise: Vec<Vec<f64>>, outliers: Vec<Vec<f64>>) -> Vec<AxisScores> {
-    let all = pieces.iter().zip(noise).zip(outliers);
-    all.map(|((piece, noise), outliers)| AxisScores {
-        axis: piece.axis,
-        noise,
-        outliers,
-    })
-    .collect()
 }
 
 // What all recordings have in common, which comparing one recording with the others does not show: outliers, steps of a
@@ -308,112 +285,6 @@ fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
     }
 }
 
-// Effect of leaving a recording out on each estimator: its curve, and every parameter.
-
-/// Movement of an estimator when one recording is left out.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct LeftOut {
-    /// The group, `accel` or `accel.x`.
-    #[serde(rename = "signals")]
-    pub group: String,
-    /// The estimator.
-    pub estimator: Estimator,
-    /// Scale (s) at which the curve moves most, in standard deviations of its own.
-    pub tau_s: f64,
-    /// nu without it over nu with it, less one, there.
-    pub change: f64,
-    /// The same in standard deviations of ln nu of the curve.
-    pub deviations: f64,
-    /// Movement of every parameter; empty where there is no fit without it.
-    pub parameters: Vec<Movement>,
-}
-
-/// Movement of one parameter.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct Movement {
-    /// Label of the process.
-    pub process: String,
-    /// Name of the parameter.
-    pub parameter: &'static str,
-    /// With all recordings (units of the parameter).
-    pub with: f64,
-    /// Without this recording (units of the parameter).
-    pub without: f64,
-}
-
-/// Movement of an outcome without the recording of that name; none if no curve is left.
-fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &Settings) -> Option<LeftOut> {
-    let mut rest: Vec<Replicate> = group
-        .replicates
-        .iter()
-        .filter(|r| r.name != name)
-        .cloned()
-        .collect();
-    // Without the shortest there would be more scales: another fit than this one.
-    for replicate in &mut rest {
-        replicate.classical.truncate(outcome.curve.levels.len());
-        replicate.robust.truncate(outcome.curve.levels.len());
-    }
-    let mut without = average(&rest, outcome.estimator, settings.trim, &settings.tuning).ok()?;
-    let with = &outcome.curve;
-    // The same scales in both fits: else the change of a parameter would be one of scales.
-    without.ignored.clone_from(&with.ignored);
-    without.classical.clone_from(&with.classical);
-    without.differing = with.differing;
-    let moves = with
-        .levels
-        .iter()
-        .zip(&with.wv)
-        .zip(&with.edof)
-        .zip(&without.wv);
-    let movement = |(((level, with), edof), without): (((&u32, &f64), &f64), &f64)| {
-        let ratio = without / with;
-        (
-            *level,
-            ratio - 1.0,
-            ratio.ln() / variance_of_log(*edof).sqrt(),
-        )
-    };
-    let (level, change, deviations) = moves
-        .map(movement)
-        .max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))?;
-    let parameters = outcome
-        .estimate_again(&without, settings)
-        .map_or(Vec::new(), |fit| movements(outcome, &fit.composite));
-    Some(LeftOut {
-        group: group.scope.name(),
-        estimator: outcome.estimator,
-        tau_s: tau_s(level, settings.rate_hz),
-        change,
-        deviations,
-        parameters,
-    })
-}
-
-fn movements(outcome: &Outcome, without: &crate::noise::Composite) -> Vec<Movement> {
-    let with = &outcome.fit.composite;
-    let of_process =
-        |((a, b), label): ((&crate::noise::Process, &crate::noise::Process), String)| {
-            let pairs = a.parameters().into_iter().zip(b.parameters());
-            let movement =
-                |((parameter, with), (_, without)): ((&'static str, f64), (&'static str, f64))| {
-                    Movement {
-                        process: label.clone(),
-                        parameter,
-                        with,
-                        without,
-                    }
-                };
-            pairs.map(movement).collect::<Vec<_>>()
-        };
-    with.processes
-        .iter()
-        .zip(&without.processes)
-        .zip(with.labels())
-        .flat_map(of_process)
-        .collect()
-}
-
 // Results of the diagnosis of each recording.
 
 /// Verdict on a recording.
@@ -442,46 +313,20 @@ fn by_axis<S: Serializer>(values: &[(Axis, f64)], to: S) -> Result<S::Ok, S::Err
     to.collect_map(values.iter().copied())
 }
 
-fn scores_by_axis<S: Serializer>(scores: &[AxisScores], to: S) -> Result<S::Ok, S::Error> {
-    to.collect_map(scores.iter().map(|of_axis| (of_axis.axis, of_axis)))
-}
-
-/// A drift that no other recording has.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DriftAlarm {
-    /// Probability that the most unusual of recordings that are alike is as unusual.
-    pub p_value: f64,
-    /// Mean of the later half less that of the earlier one, of each axis (units).
-    #[serde(serialize_with = "by_axis")]
-    pub change: Vec<(Axis, f64)>,
-    /// The same against the others, in standard deviations.
-    #[serde(serialize_with = "by_axis")]
-    pub deviations: Vec<(Axis, f64)>,
-}
-
 /// Why a recording is abnormal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alarm {
     /// Probability that the most unusual of recordings that are alike is as unusual.
     pub p_value: f64,
     /// First and last of the neighbouring scales (s) at which it is most unusual.
-    pub tau_s: [f64; 2],
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tau_s: Vec<f64>,
+    /// Of a drift: mean of the later half less that of the earlier one, of each axis (units).
+    #[serde(serialize_with = "by_axis", skip_serializing_if = "Vec::is_empty")]
+    pub change: Vec<(Axis, f64)>,
     /// Deviations from the others there, axis by axis, in standard deviations.
     #[serde(serialize_with = "by_axis")]
     pub deviations: Vec<(Axis, f64)>,
-}
-
-/// The scores of a recording at every scale, on one axis: against the mean of the others that are not abnormal, in
-/// standard deviations (those of the others, pooled over the axes, but no less than noise alone makes).
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct AxisScores {
-    /// Axis.
-    #[serde(skip)]
-    pub axis: Axis,
-    /// Of ln robust wavelet variance, level 1 first.
-    pub noise: Vec<f64>,
-    /// Of ln (classical / robust), of as many levels as have 30 degrees of freedom.
-    pub outliers: Vec<f64>,
 }
 
 /// One sensor of one recording against the others.
@@ -504,15 +349,10 @@ pub struct Diagnosis {
     /// Why there are outliers within it.
     pub outliers: Option<Alarm>,
     /// Why its level is said to drift.
-    pub drift: Option<DriftAlarm>,
+    pub drift: Option<Alarm>,
     /// Findings that most signals of this sensor have in common.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub common: Vec<CommonFinding>,
-    /// Scores; empty when there are fewer than four recordings.
-    #[serde(serialize_with = "scores_by_axis")]
-    pub scores: Vec<AxisScores>,
-    /// Effect of leaving it out on each fit.
-    pub left_out: Vec<LeftOut>,
 }
 
 #[cfg(test)]

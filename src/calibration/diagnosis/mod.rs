@@ -1,5 +1,5 @@
 //! "My six recordings disagree: which do I use?" Each recording is compared with the others, over neighbouring scales
-//! and the axes of a sensor, by the sampling distribution of the fitted model; and the effect of leaving it out.
+//! and the axes of a sensor, by the sampling distribution of the fitted model.
 //!
 //! There are three statistics: ln of the robust wavelet variance (does its noise differ?), ln of the ratio of the
 //! classical to the robust one (are there outliers within it?), and the change of the level from the earlier to the
@@ -12,10 +12,8 @@ mod comparison;
 mod contrasts;
 mod diagnose;
 
-pub use diagnose::{
-    Alarm, AxisScores, CommonCause, CommonFinding, Diagnosis, DriftAlarm, LeftOut, Movement,
-    Verdict, diagnose,
-};
+pub use contrasts::FEWEST as FEWEST_TO_COMPARE;
+pub use diagnose::{Alarm, CommonCause, CommonFinding, Diagnosis, Verdict, diagnose};
 
 #[cfg(test)]
 mod tests;

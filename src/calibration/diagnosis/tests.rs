@@ -213,38 +213,6 @@ fn outliers_and_another_noise_are_told_apart() {
 /// What spikes do to the parameters: 3 of 60² on two of three axes of 2048 samples make the sigma2 of AWV 1 +
 /// 2·5.3/21; without the recording it is 1 again. The others stay within four deviations of an eighth of the
 /// noise: √(2/2048/18) = 0.7 % and less.
-#[test]
-fn leaving_out_moves_what_it_should() {
-    let all = set(100, 7, NONE, |file, axis, signal| {
-        if file == 2 && axis != Axis::Z {
-            (0..3).for_each(|i| signal[100 + 600 * i] += 60.0);
-        }
-    });
-    let change_without = |file: usize, estimator: Estimator| {
-        let left = all[file]
-            .left_out
-            .iter()
-            .find(|l| l.estimator == estimator)
-            .unwrap();
-        let sigma2 = left
-            .parameters
-            .iter()
-            .find(|m| m.parameter == "sigma2")
-            .unwrap();
-        sigma2.without / sigma2.with - 1.0
-    };
-    assert!(
-        (change_without(2, Estimator::Awv) + 0.33).abs() < 0.1,
-        "{}",
-        change_without(2, Estimator::Awv)
-    );
-    assert!(
-        change_without(2, Estimator::SrAwv).abs() < 0.03
-            && change_without(2, Estimator::DrAwv).abs() < 0.03
-    );
-    assert!(change_without(3, Estimator::SrAwv).abs() < 0.03);
-}
-
 /// Two of eight with twice the variance at all scales.
 #[test]
 fn two_abnormal_recordings_do_not_hide_each_other() {
@@ -367,9 +335,6 @@ fn a_slow_drift_is_found() {
 #[test]
 fn three_recordings_cannot_say_which() {
     let all = set(7, 3, NONE, |_, _, _| ());
-    assert!(
-        all.iter()
-            .all(|d| d.scores.is_empty() && d.verdict == Verdict::Normal)
-    );
+    assert!(all.iter().all(|d| d.verdict == Verdict::Normal));
     assert!(set(7, 1, NONE, |_, _, _| ()).is_empty());
 }

@@ -18,14 +18,13 @@
 //! one where the local slope is nearest to the term's in which the slope is within 0.15 of it; the line of that slope
 //! through them, by least squares, is the term. AR1 and GM have no slope of their own.
 
-use super::least_squares::{Fit, FitError};
+use super::least_squares::{Fit, outside, too_few_scales};
 use super::search::Termination;
+use crate::curve::CalibrationError;
 use crate::model::ModelSpec;
-use crate::noise::{
-    Composite, Drift, FlickerNoise, Kind, Process, Quantization, RandomWalk, White,
-};
+use crate::noise::{Composite, Kind, Process};
 use crate::wavelet::Curve;
-use std::f64::consts::{LN_2, PI};
+use std::f64::consts::{LN_2, PI, SQRT_2};
 
 /// Slopes this near to a term's are taken as its own.
 const NEAR: f64 = 0.15;
@@ -34,26 +33,16 @@ const NEAR: f64 = 0.15;
 ///
 /// # Errors
 /// When a process has no slope of its own, or the curve has fewer than two scales.
-pub(crate) fn avlr(curve: &Curve, spec: &ModelSpec) -> Result<Fit, FitError> {
+pub(crate) fn avlr(curve: &Curve, spec: &ModelSpec) -> Result<Fit, CalibrationError> {
     let points: Vec<(f64, f64)> = curve
         .levels
         .iter()
         .zip(&curve.wv)
         // ln m with m = 2^(level − 1), and ln adev with adev² = 2 nu.
-        .map(|(level, nu)| {
-            (
-                (f64::from(*level) - 1.0) * std::f64::consts::LN_2,
-                0.5 * (2.0 * nu).ln(),
-            )
-        })
+        .map(|(level, nu)| ((f64::from(*level) - 1.0) * LN_2, 0.5 * (2.0 * nu).ln()))
         .collect();
     if points.len() < 2 {
-        let (spec, parameters) = (spec.to_string(), spec.parameters());
-        return Err(FitError::TooFewScales {
-            spec,
-            parameters: parameters.max(2),
-            scales: points.len(),
-        });
+        return Err(too_few_scales(spec, spec.parameters().max(2), points.len()));
     }
     let processes = spec
         .kinds()
@@ -95,30 +84,31 @@ pub(crate) fn avlr(curve: &Curve, spec: &ModelSpec) -> Result<Fit, FitError> {
     })
 }
 
-fn term(kind: Kind, points: &[(f64, f64)]) -> Result<Process, FitError> {
+fn term(kind: Kind, points: &[(f64, f64)]) -> Result<Process, CalibrationError> {
     // adev at m = 1 on the line of a slope.
     let at_one = |slope: f64| {
         let stretch = &points[stretch(points, slope)];
         // The least-squares intercept of a line of given slope is the mean of y − slope·x.
         (stretch.iter().map(|(x, y)| y - slope * x).sum::<f64>() / stretch.len() as f64).exp()
     };
-    Ok(match kind {
-        Kind::White => Process::White(White::new(at_one(-0.5).powi(2))?),
-        Kind::Quantization if !begins(points, -1.0) => {
-            Process::Quantization(Quantization::new(0.0)?)
-        }
-        Kind::Quantization => Process::Quantization(Quantization::new(at_one(-1.0).powi(2) / 3.0)?),
-        Kind::Flicker => {
-            Process::Flicker(FlickerNoise::new(at_one(0.0).powi(2) / (2.0 * LN_2 / PI))?)
-        }
-        Kind::RandomWalk => Process::RandomWalk(RandomWalk::new(3.0 * at_one(0.5).powi(2))?),
-        Kind::Drift => Process::Drift(Drift::new(std::f64::consts::SQRT_2 * at_one(1.0))?),
+    let value = match kind {
+        Kind::White => at_one(-0.5).powi(2),
+        Kind::Quantization if !begins(points, -1.0) => 0.0,
+        Kind::Quantization => at_one(-1.0).powi(2) / 3.0,
+        Kind::Flicker => at_one(0.0).powi(2) / (2.0 * LN_2 / PI),
+        Kind::RandomWalk => 3.0 * at_one(0.5).powi(2),
+        Kind::Drift => SQRT_2 * at_one(1.0),
         Kind::Ar1 | Kind::GaussMarkov | Kind::Ma1 => {
-            return Err(FitError::NoSlope {
-                process: kind.code(),
-            });
+            let code = kind.code();
+            return Err(CalibrationError::other(format!(
+                "{code} has no slope of its own in the Allan deviation: avlr cannot estimate it"
+            )));
         }
-    })
+    };
+    let process = kind.process(&[value], 1.0);
+    process
+        .expect("the kinds above have one parameter")
+        .map_err(outside)
 }
 
 /// Whether the first scales have a slope.
@@ -152,6 +142,7 @@ fn stretch(points: &[(f64, f64)], slope: f64) -> std::ops::Range<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::noise::{Drift, FlickerNoise, Quantization, RandomWalk, White};
     use approx::assert_relative_eq;
 
     fn curve(model: &Composite) -> Curve {

@@ -1,10 +1,11 @@
 //! Least squares: theta = argmin Σ Omega_j (nu_j − nu_j(theta))².
 
 use super::search::{Component, Effort, Found, Objective, Range, Termination, search};
-use crate::curve::implied;
+use crate::curve::{CalibrationError, Cause, implied};
 use crate::model::ModelSpec;
 use crate::noise::{Composite, Kind, ParameterError, Process};
 use crate::wavelet::Curve;
+use std::fmt::Display;
 
 /// Fits a model to a curve. The rate (Hz) is what a GM is sampled at.
 ///
@@ -18,7 +19,7 @@ pub fn fit(
     spec: &ModelSpec,
     rate_hz: f64,
     weighting: Weighting,
-) -> Result<Fit, FitError> {
+) -> Result<Fit, CalibrationError> {
     let observed = Weights {
         weighting,
         nu: curve.wv.clone(),
@@ -50,7 +51,12 @@ fn expected(curve: &Curve, fit: &Fit) -> Vec<f64> {
 }
 
 /// Fits with the weights of the last result until they are those of the result itself.
-fn settled(curve: &Curve, spec: &ModelSpec, rate_hz: f64, first: Fit) -> Result<Fit, FitError> {
+fn settled(
+    curve: &Curve,
+    spec: &ModelSpec,
+    rate_hz: f64,
+    first: Fit,
+) -> Result<Fit, CalibrationError> {
     let (mut visited, last) = reweighted(curve, spec, rate_hz, first, MOST_ROUNDS, Effort::WHOLE)?;
     if is_settled(curve, &last) {
         return Ok(last.at_own_weights(curve));
@@ -105,7 +111,7 @@ fn reweighted(
     first: Fit,
     rounds: usize,
     effort: Effort,
-) -> Result<(Vec<Fit>, Fit), FitError> {
+) -> Result<(Vec<Fit>, Fit), CalibrationError> {
     let (mut before, mut last) = (Vec::new(), first);
     while before.len() < rounds && !is_settled(curve, &last) {
         let weights = Weights {
@@ -156,7 +162,7 @@ pub(crate) fn refit(
     rate_hz: f64,
     weighting: Weighting,
     like: &Fit,
-) -> Result<Fit, FitError> {
+) -> Result<Fit, CalibrationError> {
     // The model of the curve that this one resembles is known better than one draw knows itself.
     let nu = match weighting {
         Weighting::Model => expected(curve, like),
@@ -195,7 +201,7 @@ fn fit_near(
     weights: Weights,
     effort: Effort,
     known: &[Vec<f64>],
-) -> Result<Fit, FitError> {
+) -> Result<Fit, CalibrationError> {
     check(curve, spec)?;
     let components = spec
         .kinds()
@@ -211,29 +217,36 @@ fn fit_near(
     })
 }
 
-fn check(curve: &Curve, spec: &ModelSpec) -> Result<(), FitError> {
+/// Error of a curve with fewer scales than parameters.
+pub(crate) fn too_few_scales(
+    spec: impl Display,
+    parameters: usize,
+    scales: usize,
+) -> CalibrationError {
+    let message = format!("{spec} has {parameters} parameters, the curve {scales} scales");
+    CalibrationError::new(Cause::TooFewScales, message)
+}
+
+fn check(curve: &Curve, spec: &ModelSpec) -> Result<(), CalibrationError> {
     let bad = |values: &[f64], (low, high): (f64, f64)| {
         values.iter().position(|v| !(*v >= low && *v <= high))
     };
     if let Some(i) = bad(&curve.wv, Curve::WV_RANGE) {
-        return Err(FitError::NotPositive {
-            level: curve.levels[i],
-            value: curve.wv[i],
-        });
+        let (level, value) = (curve.levels[i], curve.wv[i]);
+        let message = format!(
+            "the wavelet variance at scale 2^{level} is {value}: it must be a number from 1e-100 to 1e100"
+        );
+        return Err(CalibrationError::new(Cause::NotPositive, message));
     }
     if let Some(i) = bad(&curve.edof, Curve::EDOF_RANGE) {
-        return Err(FitError::NoWeight {
-            level: curve.levels[i],
-            value: curve.edof[i],
-        });
+        let (level, value) = (curve.levels[i], curve.edof[i]);
+        return Err(CalibrationError::other(format!(
+            "the degrees of freedom at scale 2^{level} are {value}: they must be a number from 1e-15 to 1e15"
+        )));
     }
     let (parameters, scales) = (spec.parameters(), curve.levels.len() - curve.ignored.len());
     if scales < parameters {
-        return Err(FitError::TooFewScales {
-            spec: spec.to_string(),
-            parameters,
-            scales,
-        });
+        return Err(too_few_scales(spec, parameters, scales));
     }
     Ok(())
 }
@@ -269,7 +282,12 @@ fn component(kind: Kind, curve: &Curve) -> Component {
 // From the solution of a search to the fitted model.
 
 /// The fit that a search has found, but for its weights.
-fn assemble(objective: &Objective, found: &Found, rate_hz: f64) -> Result<Fit, FitError> {
+/// Error of a result outside its domain: the numbers of the curve are out of range.
+pub(crate) fn outside(e: ParameterError) -> CalibrationError {
+    CalibrationError::other(format!("the fit left the domain of its parameters: {e}"))
+}
+
+fn assemble(objective: &Objective, found: &Found, rate_hz: f64) -> Result<Fit, CalibrationError> {
     let unit = objective.length * objective.length;
     let best = &found.ends[0];
     let solution = objective.solve(&best.coordinates);
@@ -279,7 +297,8 @@ fn assemble(objective: &Objective, found: &Found, rate_hz: f64) -> Result<Fit, F
     let processes = terms
         .iter()
         .map(|t| t.process(rate_hz))
-        .collect::<Result<_, _>>()?;
+        .collect::<Result<_, _>>()
+        .map_err(outside)?;
     let composite = Composite::new(processes);
     let those = |test: fn(&Term) -> bool| (0..terms.len()).filter(|i| test(&terms[*i])).collect();
     // Local minima differ by far more than 1e-6 of the objective; the ε² is for a curve that the model meets
@@ -412,26 +431,16 @@ nav_sim_signal::named!(
 impl Weighting {
     /// √Omega_j of each scale (1/units²), where its variance is taken to be `nu`.
     pub(crate) fn roots(self, curve: &Curve, nu: &[f64]) -> Vec<f64> {
-        // A classical variance has no protection of its own that its weight could keep.
-        if self == Self::Model && curve.quantization.is_some() {
-            let plain = inverse_deviations(curve, nu).into_iter();
-            let scales = curve.wv.iter().zip(nu).zip(&curve.edof);
-            return plain
-                .zip(scales)
-                .map(|(root, ((wv, nu), edof))| root * trust(wv / nu, *edof))
-                .collect();
-        }
-        let root = |((nu, edof), level): ((&f64, &f64), &u32)| match self {
-            _ if curve.ignored.contains(level) => 0.0,
-            // var nu_hat = 2 nu²/eta.
-            Self::Model => 1.0 / (nu * (2.0 / edof + curve.differing).sqrt()),
+        let plain = inverse_deviations(curve, nu);
+        let scales = plain.iter().zip(nu).zip(curve.wv.iter().zip(&curve.edof));
+        let root = |((plain, nu), (wv, edof)): ((&f64, &f64), (&f64, &f64))| match self {
+            _ if *plain == 0.0 => 0.0,
             Self::Edof => (0.5 * edof).sqrt() / nu,
+            // A classical variance has no protection of its own that its weight could keep.
+            Self::Model if curve.quantization.is_none() => *plain,
+            Self::Model => plain * trust(wv / nu, *edof),
         };
-        nu.iter()
-            .zip(&curve.edof)
-            .zip(&curve.levels)
-            .map(root)
-            .collect()
+        scales.map(root).collect()
     }
 }
 
@@ -502,50 +511,6 @@ pub struct Fit {
     pub(crate) weighted_for: Vec<f64>,
 }
 
-/// Why a curve has no fit.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum FitError {
-    /// Fewer scales than parameters.
-    #[error("{spec} has {parameters} parameters, the curve {scales} scales")]
-    TooFewScales {
-        /// The model.
-        spec: String,
-        /// Its free parameters.
-        parameters: usize,
-        /// Scales of the curve.
-        scales: usize,
-    },
-    /// A wavelet variance that is not positive has no logarithm, no weight, no meaning.
-    #[error(
-        "the wavelet variance at scale 2^{level} is {value}: it must be a number from 1e-100 to 1e100"
-    )]
-    NotPositive {
-        /// Level.
-        level: u32,
-        /// The value.
-        value: f64,
-    },
-    /// Degrees of freedom that weigh nothing.
-    #[error(
-        "the degrees of freedom at scale 2^{level} are {value}: they must be a number from 1e-15 to 1e15"
-    )]
-    NoWeight {
-        /// Level.
-        level: u32,
-        /// The value.
-        value: f64,
-    },
-    /// Nothing to be read off.
-    #[error("{process} has no slope of its own in the Allan deviation: avlr cannot estimate it")]
-    NoSlope {
-        /// Code of the process.
-        process: &'static str,
-    },
-    /// A result outside its domain: the numbers of the curve are out of range.
-    #[error("the fit left the domain of its parameters: {0}")]
-    Domain(#[from] ParameterError),
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -566,11 +531,15 @@ mod tests {
             fit(&curve, &"WN".parse().unwrap(), 1.0, Weighting::Edof).unwrap_err()
         };
         for value in [-1.0, 0.0, 1e101] {
+            let [variance, degrees] = [refused(value, 50.0), refused(0.5, value)];
             assert_eq!(
-                refused(value, 50.0),
-                FitError::NotPositive { level: 2, value }
+                (variance.cause, degrees.cause),
+                (Cause::NotPositive, Cause::Other)
             );
-            assert_eq!(refused(0.5, value), FitError::NoWeight { level: 2, value });
+            let place = format!("at scale 2^2 is {value}: ");
+            assert!(variance.to_string().contains(&place), "{variance}");
+            let place = format!("at scale 2^2 are {value}: ");
+            assert!(degrees.to_string().contains(&place), "{degrees}");
         }
     }
 

@@ -5,12 +5,12 @@ mod least_squares;
 mod search;
 
 pub(crate) use avlr::avlr;
-pub use least_squares::{Fit, FitError, Weighting, fit};
-pub(crate) use least_squares::{correlated, refit, score};
+pub use least_squares::{Fit, Weighting, fit};
+pub(crate) use least_squares::{correlated, refit, score, too_few_scales};
 pub(crate) use search::Range;
 pub use search::Termination;
 
-use crate::curve::Estimator;
+use crate::curve::{CalibrationError, Estimator};
 use crate::model::ModelSpec;
 use crate::wavelet::Curve;
 
@@ -24,7 +24,7 @@ pub fn estimate(
     spec: &ModelSpec,
     rate_hz: f64,
     weighting: Weighting,
-) -> Result<Fit, FitError> {
+) -> Result<Fit, CalibrationError> {
     match estimator {
         Estimator::Avlr => avlr(curve, spec),
         _ => fit(curve, spec, rate_hz, weighting),

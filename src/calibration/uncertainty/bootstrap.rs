@@ -11,18 +11,17 @@
 //! scatters by its own degrees of freedom.
 
 use super::intervals::{intervals, practical_intervals};
-use super::spread::{LEVEL as ALIKE_LEVEL, Spread, p_value as alike_p_value};
+use super::spread::{LEVEL as ALIKE_LEVEL, Spread, alike_p_value};
 use super::varying::{parameter_spreads, simpler};
-use crate::curve::sampling::{SamplingLaw, implied, implied_gradients};
-use crate::curve::{Estimator, Group, Replicate, average};
+use crate::curve::sampling::{SamplingLaw, implied};
+use crate::curve::{Estimator, Group, Replicate, average, median, p_value};
 use crate::fit::Fit;
-use crate::noise::{Composite, ParameterRef};
+use crate::noise::ParameterRef;
 use crate::outcome::{
     Advance, Bootstrap, Goodness, Indistinct, Inference, LevelSpread, Outcome, Settings, tau_s,
 };
 use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Curve, RobustVariance, Status};
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// Sources of scatter in the draws.
@@ -40,216 +39,135 @@ const LARGEST_BIAS: f64 = 0.2;
 
 /// Draws curves as a fitted model and the spread of the replicates would give them.
 pub(crate) struct CurveSampler<'a> {
+    /// Name of the group.
+    group: &'a str,
     replicates: &'a [Replicate],
     estimator: Estimator,
     /// The curve that was fitted.
     curve: &'a Curve,
+    settings: &'a Settings,
     pub(crate) law: SamplingLaw,
     /// Spread of the replicates; none for a curve from elsewhere.
     pub(crate) spread: Option<Spread>,
     /// The curve that the model implies.
     centre: Vec<f64>,
-    /// Relative bias of a robust variance times its degrees of freedom
-    /// ([`Tuning::bias`](crate::wavelet::Tuning::bias)).
-    bias_times_edof: f64,
 }
 
 impl<'a> CurveSampler<'a> {
+    /// A sampler of the curves of some replicates that the fit of an outcome would give.
     pub(crate) fn new(
+        group: &'a str,
+        replicates: &'a [Replicate],
+        outcome: &'a Outcome,
+        settings: &'a Settings,
+    ) -> Self {
+        let (estimator, curve) = (outcome.estimator, &outcome.curve);
+        Self::of_fit(group, replicates, estimator, curve, &outcome.fit, settings)
+    }
+
+    pub(crate) fn of_fit(
+        group: &'a str,
         replicates: &'a [Replicate],
         estimator: Estimator,
         curve: &'a Curve,
-        model: &Composite,
-        settings: &Settings,
+        fit: &Fit,
+        settings: &'a Settings,
     ) -> Self {
         let levels = curve.levels.iter().copied().max().unwrap_or(1) as usize;
-        let law = SamplingLaw::new(model, levels);
+        let law = SamplingLaw::new(&fit.composite, levels);
         let spread = (!replicates.is_empty())
             .then(|| Spread::new(replicates, estimator, &law, &settings.tuning));
-        let centre = implied(model, curve);
         Self {
+            group,
             replicates,
             estimator,
             curve,
+            settings,
             law,
             spread,
-            centre,
-            bias_times_edof: settings.tuning.bias(),
+            centre: implied(&fit.composite, curve),
         }
     }
 
-    /// A sampler of the curves that the fit of an outcome would give.
-    pub(crate) fn of_outcome(group: &'a Group, outcome: &'a Outcome, settings: &Settings) -> Self {
-        let Outcome {
-            estimator,
-            curve,
-            fit,
-            ..
-        } = outcome;
-        Self::new(
-            &group.replicates,
-            *estimator,
-            curve,
-            &fit.composite,
-            settings,
-        )
-    }
-
-    /// Covariance of curves as recorded, relative to the model: of no greater rank than replicates give.
-    fn covariance_as_recorded(
-        &self,
-        draws: usize,
-        group: &str,
-        settings: &Settings,
-    ) -> DMatrix<f64> {
-        let process = self.estimator.name();
-        // Relative to the model: absolute values differ by powers of ten from level to level.
-        let error = |run: usize| {
-            let key = StreamKey {
-                seed: 1,
-                scenario: "covariance",
-                run: run as u64,
-                source: group,
-                process,
-            };
-            let curve = self.draw_as_recorded(&key, settings)?;
-            Some(
-                curve
-                    .wv
-                    .iter()
-                    .zip(&self.centre)
-                    .map(|(nu, centre)| nu / centre - 1.0)
-                    .collect(),
-            )
+    /// Generator of a draw.
+    pub(crate) fn generator(&self, seed: u64, scenario: &str, run: usize) -> Generator {
+        let key = StreamKey {
+            seed,
+            scenario,
+            run: run as u64,
+            source: self.group,
+            process: self.estimator.name(),
         };
-        let errors: Vec<Vec<f64>> = (0..draws).filter_map(error).collect();
-        let count = errors.len() as f64;
-        let levels = self.centre.len();
-        let mean: Vec<f64> = (0..levels)
-            .map(|j| errors.iter().map(|e| e[j]).sum::<f64>() / count)
-            .collect();
-        let product = |i: usize, j: usize| {
-            errors
-                .iter()
-                .map(|e| (e[i] - mean[i]) * (e[j] - mean[j]))
-                .sum::<f64>()
-                / (count - 1.0)
-        };
-        DMatrix::from_fn(levels, levels, product)
+        key.generator()
     }
 
     /// A new curve of the same estimator, of replicates that scatter as the recorded ones do.
-    pub(crate) fn draw_as_recorded(
-        &self,
-        key: &StreamKey<'_>,
-        settings: &Settings,
-    ) -> Option<Curve> {
+    pub(crate) fn draw_as_recorded(&self, mut generator: Generator) -> Option<Curve> {
         match &self.spread {
-            Some(spread) if self.replicates.len() > 1 => {
-                self.curve(spread.draw(&mut key.generator()), settings)
-            }
-            _ => self.draw(key, settings),
+            Some(spread) if self.replicates.len() > 1 => self.curve(spread.draw(&mut generator)),
+            _ => self.draw(generator),
         }
     }
 
     /// A new curve of the same estimator, of replicates that scatter by the law and by what they differ beyond it.
-    pub(crate) fn draw(&self, key: &StreamKey<'_>, settings: &Settings) -> Option<Curve> {
-        let mut generator = key.generator();
+    pub(crate) fn draw(&self, mut generator: Generator) -> Option<Curve> {
         let Some(spread) = &self.spread else {
             return Some(self.elsewhere(&mut generator));
         };
         let mut between = spread.draw_between(&mut generator);
         between.iter_mut().flatten().for_each(|b| *b = b.exp());
-        self.curve(
-            self.scattered(&between, Scattering::All, &mut generator)?,
-            settings,
-        )
+        self.draw_with(generator, &between, Scattering::All)
     }
 
     /// A new curve of the same estimator, of replicates that differ by `between` (`[replicate][level]`, over the model)
     /// and, unless they are endless, scatter by the law.
     pub(crate) fn draw_with(
         &self,
-        key: &StreamKey<'_>,
+        mut generator: Generator,
         between: &[Vec<f64>],
         scattering: Scattering,
-        settings: &Settings,
     ) -> Option<Curve> {
-        let ratios = self.scattered(between, scattering, &mut key.generator())?;
-        self.curve(ratios, settings)
-    }
-
-    /// nu*/nu of new replicates that differ by `between`.
-    fn scattered(
-        &self,
-        between: &[Vec<f64>],
-        scattering: Scattering,
-        generator: &mut Generator,
-    ) -> Option<Vec<Vec<f64>>> {
         if scattering == Scattering::BetweenRecordings {
-            return Some(between.to_vec());
+            return self.curve(between.to_vec());
         }
         let of_recording = |(edof, between): (&Vec<f64>, &Vec<f64>)| {
-            let within = self.law.draw(edof, generator).into_iter();
+            let within = self.law.draw(edof, &mut generator).into_iter();
             within.zip(between).map(|(ratio, b)| ratio * b).collect()
         };
         let edof = &self.spread.as_ref()?.edof;
-        Some(edof.iter().zip(between).map(of_recording).collect())
+        self.curve(edof.iter().zip(between).map(of_recording).collect())
     }
 
     /// The estimator's curve of replicates of which nu*/nu is given.
-    fn curve(&self, ratios: Vec<Vec<f64>>, settings: &Settings) -> Option<Curve> {
+    fn curve(&self, ratios: Vec<Vec<f64>>) -> Option<Curve> {
+        let tuning = &self.settings.tuning;
         let edof = self.spread.iter().flat_map(|s| &s.edof);
         let drawn_replicate = |((replicate, ratios), edof): ((&Replicate, Vec<f64>), &Vec<f64>)| {
-            let levels = self
-                .centre
-                .iter()
-                .zip(ratios)
-                .zip(edof)
-                .take(replicate.levels())
-                .enumerate();
-            // The law gives ratios whose mean is 1; robust variances of few coefficients read high, and so
-            // must those drawn.
-            let bias = |j: usize, edof: f64| {
-                if replicate.is_robust(self.estimator, j) {
-                    self.bias(edof)
-                } else {
-                    0.0
-                }
+            let levels = self.centre.iter().zip(ratios).zip(edof);
+            let drawn = |(j, ((nu, ratio), edof)): (usize, ((&f64, f64), &f64))| {
+                // The law gives ratios whose mean is 1; robust variances of few coefficients read high, and so
+                // must those drawn.
+                let bias = match replicate.is_robust(self.estimator, j) {
+                    true => (tuning.bias() / edof).min(LARGEST_BIAS),
+                    false => 0.0,
+                };
+                nu * ratio * (1.0 + bias)
             };
-            like(
-                replicate,
-                levels
-                    .map(|(j, ((nu, ratio), edof))| nu * ratio * (1.0 + bias(j, *edof)))
-                    .collect(),
-            )
+            let levels = levels.take(replicate.levels()).enumerate();
+            like(replicate, levels.map(drawn).collect())
         };
-        let replicates: Vec<Replicate> = self
-            .replicates
-            .iter()
-            .zip(ratios)
-            .zip(edof)
-            .map(drawn_replicate)
-            .collect();
-        let curve = average(&replicates, self.estimator, settings.trim, &settings.tuning).ok()?;
+        let pairs = self.replicates.iter().zip(ratios).zip(edof);
+        let replicates: Vec<Replicate> = pairs.map(drawn_replicate).collect();
+        let curve = average(&replicates, self.estimator, self.settings.trim, tuning).ok()?;
         // The draws have a root everywhere; what the fit left out, it leaves out of every draw.
-        let Curve {
-            differing,
-            classical,
-            ignored,
-            ..
-        } = self.curve.clone();
+        let (wv, edof, levels) = (curve.wv, curve.edof, curve.levels);
         Some(Curve {
-            differing,
-            classical,
-            ignored,
-            ..curve
+            levels,
+            wv,
+            edof,
+            quantization: curve.quantization,
+            ..self.curve.clone()
         })
-    }
-
-    /// Relative bias of a robust variance with so many degrees of freedom.
-    fn bias(&self, edof: f64) -> f64 {
-        (self.bias_times_edof / edof).min(LARGEST_BIAS)
     }
 
     /// A curve from elsewhere, which scatters by its degrees of freedom.
@@ -319,61 +237,9 @@ fn goodness(outcome: &Outcome, draws: &[Fit]) -> Goodness {
     Goodness {
         statistic: fit.objective,
         dof: outcome.counted_levels().len().saturating_sub(parameters),
-        expected: crate::curve::median(&objectives),
+        expected: median(&objectives),
         p_value: p_value(fit.objective, &objectives),
     }
-}
-
-/// Share of the statistics that are as large, the observed one among them: exchangeable with B draws it has any of B + 1 ranks
-/// with the same probability, so that P(p ≤ a) ≤ a ([Davison and Hinkley](crate::bibliography::DavisonHinkley97), eq. 4.11).
-fn p_value(observed: f64, draws: &[f64]) -> f64 {
-    let as_large = draws.iter().filter(|draw| **draw >= observed).count();
-    (1 + as_large) as f64 / (1 + draws.len()) as f64
-}
-
-// Standard errors without a bootstrap: what a fit passes on, to first order, of the scatter of its curve.
-//
-// cov(theta) = A Sigma Aᵀ with A = (Jᵀ Omega J)⁻¹ Jᵀ Omega, J the derivatives of the model's wavelet variance, Sigma
-// the covariance of curves (the asymptotic covariance of [Guerrier](crate::bibliography::Guerrier13)). A parameter that stands at a
-// bound, or whose process has no amplitude, is taken as known. Slopes (AVLR) are no least squares: they have none.
-
-/// Standard errors of the parameters, in the order of the model and in their units; NaN where a
-/// parameter stands at a bound. `covariance` is that of curves, relative to the model.
-fn standard_errors(outcome: &Outcome, settings: &Settings, covariance: &DMatrix<f64>) -> Vec<f64> {
-    let (fit, curve) = (&outcome.fit, &outcome.curve);
-    let least_squares = outcome.estimator != Estimator::Avlr;
-    // Of each parameter: whether it moves, and its value.
-    let all: Vec<(bool, f64)> = fit
-        .composite
-        .parameters()
-        .map(|(of, value)| (least_squares && outcome.moves(of), value))
-        .collect();
-    let moving: Vec<usize> = (0..all.len()).filter(|p| all[*p].0).collect();
-    if moving.is_empty() {
-        return vec![f64::NAN; all.len()];
-    }
-    let levels = curve.levels.len();
-    let gradients = implied_gradients(&fit.composite, curve);
-    let centre = implied(&fit.composite, curve);
-    let roots = settings.weighting.roots(curve, &fit.weighted_for);
-    let weights = DMatrix::from_fn(levels, levels, |i, j| if i == j { roots[i] } else { 0.0 });
-    // Relative to the parameters, which are of very different sizes.
-    let jacobian = DMatrix::from_fn(levels, moving.len(), |j, m| {
-        gradients[j][moving[m]] * all[moving[m]].1
-    });
-    let scatter = DMatrix::from_fn(levels, levels, |i, j| {
-        covariance[(i, j)] * centre[i] * centre[j]
-    });
-    // (W J)⁺ W with WᵀW = Omega is (Jᵀ Omega J)⁻¹ Jᵀ Omega, without squaring the condition of J.
-    let relative = (&weights * jacobian)
-        .pseudo_inverse(f64::EPSILON)
-        .map(|inverse| inverse * weights)
-        .map(|passed_on| (&passed_on * scatter * passed_on.transpose()).diagonal());
-    let error = |p: usize| match (&relative, moving.iter().position(|m| *m == p)) {
-        (Ok(variances), Some(m)) => all[p].1.abs() * variances[m].max(0.0).sqrt(),
-        _ => f64::NAN,
-    };
-    (0..all.len()).map(error).collect()
 }
 
 // Uncertainty of a fit: intervals of its parameters, and whether the model describes the curve at all.
@@ -382,9 +248,6 @@ fn standard_errors(outcome: &Outcome, settings: &Settings, covariance: &DMatrix<
 //
 // Intervals of two replicates, known to one degree of freedom at every scale, cover less than they say (87 and 93 % of
 // 300 sets, white noise and random walk); of three and more 93 to 96 %.
-
-/// Curves drawn for the covariance behind the standard errors: known to √(2/1000) = 4 %.
-const CURVES: usize = 1000;
 
 /// The inference of an outcome; where alike processes cannot be told apart, with the intervals of the simpler model.
 pub(crate) fn inference(
@@ -423,17 +286,10 @@ fn by_bootstrap(
     bootstrap: Bootstrap,
     advance: Advance<'_>,
 ) -> Inference {
-    let sampler = CurveSampler::of_outcome(group, outcome, settings);
     let name = group.scope.name();
+    let sampler = CurveSampler::new(&name, &group.replicates, outcome, settings);
     let draw = |run: usize| {
-        let key = StreamKey {
-            seed: bootstrap.seed,
-            scenario: "bootstrap",
-            run: run as u64,
-            source: &name,
-            process: outcome.estimator.name(),
-        };
-        let curve = sampler.draw_as_recorded(&key, settings);
+        let curve = sampler.draw_as_recorded(sampler.generator(bootstrap.seed, "bootstrap", run));
         let fit = curve.and_then(|curve| outcome.estimate_again(&curve, settings).ok());
         advance(1);
         fit
@@ -442,14 +298,9 @@ fn by_bootstrap(
         .into_par_iter()
         .filter_map(draw)
         .collect();
-    let errors = standard_errors(
-        outcome,
-        settings,
-        &sampler.covariance_as_recorded(CURVES, &name, settings),
-    );
     let spread = sampler.spread.as_ref();
     let stretch = spread.map_or(1.0, Spread::student);
-    let intervals = intervals(outcome, &fits, stretch, &errors);
+    let intervals = intervals(outcome, &fits, stretch);
     let alike = spread
         .and_then(|s| alike_p_value(&group.replicates, outcome.estimator, s, &sampler.law, &name));
     let varying = match alike {
@@ -571,8 +422,7 @@ mod inference_tests {
     }
 
     /// 150 sets of 3, 4 and 8 signals: a frequency that is really 0.95 lies within 4·√(0.95·0.05/150) = 0.071 of it; the
-    /// test rejects in 5 % of them, within the same. The estimates scatter as the standard errors say: their standard
-    /// deviation is known to 1/√(2·150) = 5.8 %, four of which are allowed.
+    /// test rejects in 5 % of them, within the same.
     #[test]
     fn intervals_cover_and_the_j_test_keeps_its_level() {
         const SETS: u64 = 150;
@@ -584,7 +434,6 @@ mod inference_tests {
         for replicates in [3, 4, 8] {
             let mut covered = [0_u32; 2];
             let mut rejected = 0_u32;
-            let (mut errors, mut variances) = ([0.0; 2], [0.0; 2]);
             for set in 0..SETS {
                 let group = group(set, &vec![(1.0, 1e-3); replicates]);
                 let outcome = inferred(group, &settings, 99);
@@ -593,9 +442,6 @@ mod inference_tests {
                     let value = process.parameters()[0].1;
                     let interval = &inference.intervals[i];
                     covered[i] += u32::from(interval.low < value && value < interval.high);
-                    let estimate = outcome.fit.composite.processes[i].parameters()[0].1;
-                    errors[i] += (estimate - value).powi(2) / SETS as f64;
-                    variances[i] += interval.standard_error.powi(2) / SETS as f64;
                 }
                 rejected += u32::from(inference.goodness.unwrap().p_value <= 0.05);
             }
@@ -606,10 +452,6 @@ mod inference_tests {
                 "{replicates}: {shown:?}"
             );
             assert!((shown.2 - 0.05).abs() < 0.071, "{replicates}: {shown:?}");
-            for (error, variance) in errors.into_iter().zip(variances) {
-                let ratio: f64 = (variance / error).sqrt();
-                assert!((ratio - 1.0).abs() < 4.0 * 0.058, "{replicates}: {ratio}");
-            }
         }
     }
 

@@ -15,20 +15,15 @@ impl ParameterInterval {
     /// Puts the interval of another fit, of the same parameter, in place of this one, if it holds the estimate.
     pub(crate) fn replace(&mut self, other: &Self, value: f64) {
         [self.low, self.high] = holding(value, [other.low, other.high]);
-        (self.lost, self.standard_error) = (other.lost, other.standard_error);
+        self.lost = other.lost;
         let one_sided = self.low.is_nan().then_some(Undetermined::OneSided);
         self.absent = other.absent.clone().or(one_sided);
     }
 }
 
 /// The intervals of all parameters, in the order of the model. `stretch`: Student's quantile over
-/// the normal one, where the draws' own spread is known from few replicates. `standard_errors`: of the same parameters.
-pub(crate) fn intervals(
-    outcome: &Outcome,
-    fits: &[Fit],
-    stretch: f64,
-    standard_errors: &[f64],
-) -> Vec<ParameterInterval> {
+/// the normal one, where the draws' own spread is known from few replicates.
+pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<ParameterInterval> {
     let model = &outcome.fit.composite;
     let searched = correlated(&outcome.curve);
     let matched: Vec<Vec<Option<&Process>>> =
@@ -36,20 +31,47 @@ pub(crate) fn intervals(
     let mut intervals = Vec::new();
     for (i, process) in model.processes.iter().enumerate() {
         let there: Vec<&Process> = matched.iter().filter_map(|m| m[i]).collect();
-        let is_zero = outcome.fit.zero.contains(&i);
-        let lost = if is_zero {
-            1.0
-        } else {
-            1.0 - there.len() as f64 / fits.len() as f64
+        let lost = match outcome.fit.zero.contains(&i) {
+            true => 1.0,
+            false => 1.0 - there.len() as f64 / fits.len() as f64,
         };
-        let drawn = DrawnProcess {
-            index: i,
-            process,
-            drawn: there,
-            lost,
-            stretch,
+        let vanished = match lost {
+            1.0.. => Some(Undetermined::Zero),
+            lost if lost > TAIL => Some(Undetermined::Vanishes),
+            _ => None,
         };
-        let (mut own, quantiles) = drawn.intervals(&standard_errors[intervals.len()..]);
+        // By draws mirrored at the estimate, and the quantiles of the draws themselves.
+        let of_parameter = |(p, (&parameter, value)): (usize, (&Parameter, f64))| {
+            let drawn = there.iter().map(|process| process.values()[p]).collect();
+            let draws = Draws::new(parameter, drawn, stretch);
+            // Amplitudes are not negative.
+            let least = if parameter.is_shape() {
+                f64::NEG_INFINITY
+            } else {
+                0.0
+            };
+            let at_least = |end: f64| end.clamp(least, f64::INFINITY);
+            let [low, high] = match vanished {
+                // The quantile is that of what has vanished.
+                Some(_) => [f64::NAN; 2],
+                None => holding(value, draws.around(value)).map(at_least),
+            };
+            let one_sided = low.is_nan().then_some(Undetermined::OneSided);
+            let interval = ParameterInterval {
+                of: ParameterRef {
+                    process: i,
+                    parameter,
+                },
+                low,
+                high,
+                lost,
+                absent: vanished.clone().or(one_sided),
+            };
+            (interval, draws.stretched().map(at_least))
+        };
+        let parameters = process.kind().parameters().iter().zip(process.values());
+        let (mut own, quantiles): (Vec<_>, Vec<_>) =
+            parameters.enumerate().map(of_parameter).unzip();
         if own.iter().any(|i| leaves_search(searched, process, i)) {
             own.iter_mut()
                 .for_each(|i| i.refuse(Undetermined::BeyondSearch));
@@ -73,72 +95,6 @@ pub(crate) fn intervals(
         intervals.extend(own);
     }
     intervals
-}
-
-/// A process of a model, and what it is in the draws that have it.
-struct DrawnProcess<'a> {
-    /// Its position in the model.
-    index: usize,
-    process: &'a Process,
-    drawn: Vec<&'a Process>,
-    /// Share of the draws that do not have it.
-    lost: f64,
-    stretch: f64,
-}
-
-impl DrawnProcess<'_> {
-    /// The intervals of its parameters, by draws mirrored at the estimates, and the quantiles of the
-    /// draws themselves. `standard_errors`: of the same parameters.
-    fn intervals(&self, standard_errors: &[f64]) -> (Vec<ParameterInterval>, Vec<[f64; 2]>) {
-        let (mut intervals, mut quantiles) = (Vec::new(), Vec::new());
-        let parameters = self
-            .process
-            .kind()
-            .parameters()
-            .iter()
-            .zip(self.process.values());
-        for (p, (&parameter, value)) in parameters.enumerate() {
-            let of = ParameterRef {
-                process: self.index,
-                parameter,
-            };
-            let drawn = self
-                .drawn
-                .iter()
-                .map(|process| process.values()[p])
-                .collect();
-            let draws = Draws::new(parameter, drawn, self.stretch);
-            let [low, high] = match self.lost {
-                // The quantile is that of what has vanished.
-                lost if lost > TAIL => [f64::NAN; 2],
-                _ => holding(value, draws.around(value)),
-            };
-            // Amplitudes are not negative.
-            let least = if parameter.is_shape() {
-                f64::NEG_INFINITY
-            } else {
-                0.0
-            };
-            let at_least = |end: f64| end.clamp(least, f64::INFINITY);
-            let [low, high] = [low, high].map(at_least);
-            quantiles.push(draws.stretched().map(at_least));
-            let absent = match self.lost {
-                1.0.. => Some(Undetermined::Zero),
-                lost if lost > TAIL => Some(Undetermined::Vanishes),
-                _ => low.is_nan().then_some(Undetermined::OneSided),
-            };
-            let standard_error = standard_errors[intervals.len()];
-            intervals.push(ParameterInterval {
-                of,
-                low,
-                high,
-                lost: self.lost,
-                absent,
-                standard_error,
-            });
-        }
-        (intervals, quantiles)
-    }
 }
 
 /// Upper over lower quantile of the draws of an amplitude that say nothing any more; of its interval, which Student's quantile
@@ -175,7 +131,6 @@ fn holding(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
 /// them are paired as can be, the nearest.
 pub(super) fn matched<'a>(estimate: &Fit, fit: &'a Fit) -> Vec<Option<&'a Process>> {
     let (drawn, model) = (&fit.composite.processes, &estimate.composite.processes);
-    let is_present = |fit: &Fit, i: usize| !fit.zero.contains(&i) && !fit.at_end.contains(&i);
     let kinds: Vec<Kind> = model.iter().map(Process::kind).collect();
     let cost = |i: usize, d: usize| (log_time(&model[i]) - log_time(&drawn[d])).powi(2);
     let mut matched = vec![None; drawn.len()];
@@ -187,28 +142,19 @@ pub(super) fn matched<'a>(estimate: &Fit, fit: &'a Fit) -> Vec<Option<&'a Proces
         let own: Vec<usize> = (first..kinds.len())
             .filter(|i| kinds[*i] == *kind)
             .collect();
-        let items: Vec<usize> = own
-            .iter()
-            .copied()
-            .filter(|i| is_present(fit, *i))
-            .collect();
-        let places: Vec<usize> = own
-            .iter()
-            .copied()
-            .filter(|i| is_present(estimate, *i))
-            .collect();
+        let present = |of: &Fit| -> Vec<usize> {
+            let own = own.iter().copied();
+            own.filter(|i| !of.zero.contains(i) && !of.at_end.contains(i))
+                .collect()
+        };
+        let (items, places) = (present(fit), present(estimate));
         // Fits list alike processes by correlation time, and only their number may differ.
         let pairs: Vec<(usize, usize)> = if items.len() <= places.len() {
-            nearest(&places, &items, cost)
-                .into_iter()
-                .zip(items)
-                .collect()
+            let nearest = nearest(&places, &items, cost);
+            nearest.into_iter().zip(items).collect()
         } else {
-            places
-                .iter()
-                .copied()
-                .zip(nearest(&items, &places, |d, i| cost(i, d)))
-                .collect()
+            let nearest = nearest(&items, &places, |d, i| cost(i, d));
+            places.into_iter().zip(nearest).collect()
         };
         for (place, d) in pairs {
             matched[place] = Some(&drawn[d]);
@@ -286,41 +232,33 @@ impl Draws {
         }
     }
 
-    /// Distances of the quantiles from the median on that scale, stretched.
-    fn distances(&self) -> [f64; 2] {
-        self.quantiles
-            .map(|q| self.stretch * (self.parameter.scaled(q) - self.parameter.scaled(self.median)))
-    }
-
-    /// The quantiles, their distances stretched; as they are where one is at a bound.
-    fn stretched(&self) -> [f64; 2] {
-        let ends = self.distances().map(|d| {
-            self.parameter
-                .unscaled(self.parameter.scaled(self.median) + d)
-        });
-        if ends.iter().all(|e| e.is_finite()) {
+    /// The stretched distances of the quantiles from the median, times `sign`, from a centre on that scale; the quantiles
+    /// themselves where it or one of them is at a bound.
+    fn ends(&self, centre: f64, sign: f64) -> [f64; 2] {
+        let (parameter, median) = (self.parameter, self.parameter.scaled(self.median));
+        let distance = |q| self.stretch * (parameter.scaled(q) - median);
+        let mut ends = self
+            .quantiles
+            .map(|q| parameter.unscaled(centre + sign * distance(q)));
+        ends.sort_by(f64::total_cmp);
+        if centre.is_finite() && ends.iter().all(|e| e.is_finite()) {
             ends
         } else {
             self.quantiles
         }
     }
 
-    /// The 95 % interval.
-    fn around(&self, estimate: f64) -> [f64; 2] {
-        self.mirrored(estimate).unwrap_or(self.quantiles)
+    /// The quantiles, their distances stretched.
+    fn stretched(&self) -> [f64; 2] {
+        self.ends(self.parameter.scaled(self.median), 1.0)
     }
 
-    /// The quantiles mirrored at the estimate; none where it or one of them is at a bound.
-    fn mirrored(&self, estimate: f64) -> Option<[f64; 2]> {
+    /// The 95 % interval: the quantiles mirrored at the estimate.
+    fn around(&self, estimate: f64) -> [f64; 2] {
         // 2·estimate − quantile is the mirror image; written with the median, whose distance from the
         // quantiles is what is stretched.
-        let centre = 2.0 * self.parameter.scaled(estimate) - self.parameter.scaled(self.median);
-        let mut ends = self
-            .distances()
-            .map(|d| self.parameter.unscaled(centre - d));
-        ends.sort_by(f64::total_cmp);
-        (ends.iter().all(|e| e.is_finite()) && self.parameter.scaled(estimate).is_finite())
-            .then_some(ends)
+        let scaled = |x| self.parameter.scaled(x);
+        self.ends(2.0 * scaled(estimate) - scaled(self.median), -1.0)
     }
 }
 
@@ -397,50 +335,27 @@ pub(crate) fn practical_intervals(
     stretch: f64,
     rate_hz: f64,
 ) -> PracticalIntervals {
-    let none = PracticalIntervals::default();
     let Some(range_s) = observed_s(outcome, rate_hz) else {
-        return none;
+        return PracticalIntervals::default();
     };
-    let reading = |model: &Composite| Reading::of(model, rate_hz, range_s);
-    let Some(own) = reading(&outcome.fit.composite) else {
-        return none;
-    };
-    let drawn: Vec<Reading> = fits
-        .iter()
-        .filter_map(|fit| reading(&fit.composite))
-        .collect();
-    let interval = |value: &dyn Fn(&Reading) -> Option<f64>| {
-        let there: Vec<f64> = drawn
-            .iter()
-            .filter_map(value)
-            .filter(|x| *x > 0.0)
-            .collect();
-        scale_interval(value(&own)?, there, fits.len(), stretch)
-    };
-    PracticalIntervals {
-        density: interval(&|r| Some(r.density)),
-        walk: interval(&|r| Some(r.walk)),
-        instability: interval(&|r| r.instability),
-    }
-}
-
-/// N, K and B read off one model.
-struct Reading {
-    density: f64,
-    walk: f64,
-    instability: Option<f64>,
-}
-
-impl Reading {
-    fn of(model: &Composite, rate_hz: f64, range_s: f64) -> Option<Self> {
+    let read = |model: &Composite| -> Option<[Option<f64>; 3]> {
         let curve = Curve::largest(&[model], rate_hz, Horizon::default()).ok()?;
         let pair = curve.pair(Policy::Matched, Bias::Walk);
         let minimum = Minimum::of(&[model], rate_hz, range_s);
-        Some(Self {
-            density: pair.density,
-            walk: pair.walk,
-            instability: minimum.map(|m| m.bias_instability()),
-        })
+        let instability = minimum.map(|m| m.bias_instability());
+        Some([Some(pair.density), Some(pair.walk), instability])
+    };
+    let own = read(&outcome.fit.composite);
+    let drawn: Vec<_> = fits.iter().filter_map(|f| read(&f.composite)).collect();
+    let interval = |k: usize| {
+        let there = drawn.iter().filter_map(|r| r[k]).filter(|x| *x > 0.0);
+        scale_interval(own?[k]?, there.collect(), fits.len(), stretch)
+    };
+    let [density, walk, instability] = [0, 1, 2].map(interval);
+    PracticalIntervals {
+        density,
+        walk,
+        instability,
     }
 }
 
@@ -505,9 +420,9 @@ mod tests {
             let whole = (0..100 - lost_ones).map(|i| whole(0.8 + 0.4 * i as f64 / 99.0));
             whole.chain((0..lost_ones).map(|_| lost.clone())).collect()
         };
-        let all = intervals(&outcome, &draws(2), 1.0, &[f64::NAN; 4]);
+        let all = intervals(&outcome, &draws(2), 1.0);
         assert!(all.iter().all(|i| i.absent.is_none()), "{all:?}");
-        let all = intervals(&outcome, &draws(10), 1.0, &[f64::NAN; 4]);
+        let all = intervals(&outcome, &draws(10), 1.0);
         assert!(
             all[0].absent == Some(Undetermined::Vanishes) && (all[0].lost - 0.1).abs() < 1e-9,
             "{all:?}"

@@ -10,7 +10,7 @@
 //! freedom as there are recordings, less one, where `between` rules, and as there are signals, less one, where it does not.
 
 use crate::curve::sampling::{SamplingLaw, Shape, variance_of_log};
-use crate::curve::{Estimator, MAD_TO_DEVIATION, Replicate, falling_root, median};
+use crate::curve::{Estimator, MAD_TO_DEVIATION, Replicate, falling_root, median, p_value};
 use crate::imu::Axis;
 use crate::outcome::{AxesDiffer, LevelSpread, Outcome};
 use crate::rng::{Generator, StreamKey};
@@ -56,28 +56,8 @@ pub(super) struct Origin {
 
 /// Signals of one name are of one recording; a signal of its axis has the same position in every recording.
 pub(super) fn origins(replicates: &[Replicate]) -> Vec<Origin> {
-    let first = |is_same: &dyn Fn(&Replicate) -> bool| replicates.iter().position(is_same);
-    let ranked = |firsts: Vec<Option<usize>>| -> Vec<usize> {
-        let mut known = firsts.clone();
-        known.sort_unstable();
-        known.dedup();
-        firsts
-            .iter()
-            .map(|of| known.partition_point(|other| other < of))
-            .collect()
-    };
-    let recordings = ranked(
-        replicates
-            .iter()
-            .map(|r| first(&|other| other.name == r.name))
-            .collect(),
-    );
-    let positions = ranked(
-        replicates
-            .iter()
-            .map(|r| first(&|other| other.axis == r.axis))
-            .collect(),
-    );
+    let recordings = ranks(replicates.iter().map(|r| &r.name));
+    let positions = ranks(replicates.iter().map(|r| r.axis));
     let pairs = recordings.into_iter().zip(positions);
     pairs
         .map(|(recording, position)| Origin {
@@ -85,6 +65,19 @@ pub(super) fn origins(replicates: &[Replicate]) -> Vec<Origin> {
             position,
         })
         .collect()
+}
+
+/// Which of the different values each is, by first appearance.
+fn ranks<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<usize> {
+    let mut known = Vec::new();
+    let rank = |value| {
+        let found = known.iter().position(|k| *k == value);
+        found.unwrap_or_else(|| {
+            known.push(value);
+            known.len() - 1
+        })
+    };
+    values.map(rank).collect()
 }
 
 impl Spread {
@@ -177,33 +170,27 @@ impl Spread {
     /// because the variances are known from few replicates. 1 for a single replicate, whose variances are
     /// those of the law.
     pub(crate) fn student(&self) -> f64 {
-        self.student_where(&self.between)
+        self.stretch(&self.between, |_| 1.0)
     }
 
     /// The same where replicates differ by these standard deviations, times the median of the deviation that so few replicates show,
     /// over the true one: what half of all calibrations stretch the true scatter by, or less.
     pub(crate) fn stated_where(&self, between: &[f64]) -> f64 {
-        if self.units.len() < 2 {
-            return 1.0;
-        }
-        let freedom = self.left_of(self.freedom(between));
-        let median = ChiSquared::new(freedom).map_or(freedom, |law| law.inverse_cdf(0.5));
-        self.student_where(between) * (median / freedom).sqrt()
+        self.stretch(between, |freedom| {
+            let median = ChiSquared::new(freedom).map_or(freedom, |law| law.inverse_cdf(0.5));
+            (median / freedom).sqrt()
+        })
     }
 
-    fn student_where(&self, between: &[f64]) -> f64 {
+    fn stretch(&self, between: &[f64], shown: impl Fn(f64) -> f64) -> f64 {
         if self.units.len() < 2 {
             return 1.0;
         }
-        let freedom = self.left_of(self.freedom(between));
+        // Those that the estimator leaves.
+        let freedom = (self.share_of_freedom * self.freedom(between)).max(1.0);
         let student =
             StudentsT::new(0.0, 1.0, freedom).map_or(NORMAL_975, |law| law.inverse_cdf(0.975));
-        student / NORMAL_975
-    }
-
-    /// Degrees of freedom that the estimator leaves of so many.
-    fn left_of(&self, freedom: f64) -> f64 {
-        (self.share_of_freedom * freedom).max(1.0)
+        student / NORMAL_975 * shown(freedom)
     }
 
     /// Degrees of freedom of the variance of a mean: of its part that follows from the signals' own noise one less than
@@ -498,7 +485,7 @@ const SEED: u64 = 1;
 const LEAST: f64 = 4.0;
 
 /// Probability that replicates of one noise differ at some scale as much as these do; none of a single one.
-pub(crate) fn p_value(
+pub(crate) fn alike_p_value(
     replicates: &[Replicate],
     estimator: Estimator,
     spread: &Spread,
@@ -541,13 +528,8 @@ pub(crate) fn p_value(
             .collect();
         largest(&|i, j| ratios[i][j])
     };
-    let larger = (0..DRAWS)
-        .into_par_iter()
-        .filter(|run| draw(*run) >= observed)
-        .count();
-    // The observed set counts as one of the draws, all exchangeable if the fitted law holds: p is never 0,
-    // and the level is kept (Davison and Hinkley 1997, chapter 4).
-    Some((1 + larger) as f64 / (1 + DRAWS) as f64)
+    let drawn: Vec<f64> = (0..DRAWS).into_par_iter().map(draw).collect();
+    Some(p_value(observed, &drawn))
 }
 
 impl Outcome {
@@ -809,7 +791,7 @@ mod alike_tests {
         let differs = |seed: u64| {
             let replicates = set(seed, count, spread);
             let own = Spread::new(&replicates, estimator, &law, &tuning());
-            u32::from(p_value(&replicates, estimator, &own, &law, "accel").unwrap() <= LEVEL)
+            u32::from(alike_p_value(&replicates, estimator, &own, &law, "accel").unwrap() <= LEVEL)
         };
         (0..sets).into_par_iter().map(differs).sum()
     }
@@ -855,7 +837,9 @@ mod alike_tests {
             };
             let replicates: Vec<Replicate> = Axis::ALL.into_iter().flat_map(of_axis).collect();
             let own = Spread::new(&replicates, Estimator::Awv, &law, &tuning());
-            u32::from(p_value(&replicates, Estimator::Awv, &own, &law, "accel").unwrap() <= LEVEL)
+            u32::from(
+                alike_p_value(&replicates, Estimator::Awv, &own, &law, "accel").unwrap() <= LEVEL,
+            )
         };
         let told: u32 = (0..40).into_par_iter().map(differs).sum();
         assert!(told <= 5, "{told} of 40");
@@ -869,7 +853,10 @@ mod alike_tests {
         );
         let one = set(1, 1, 0.0);
         let own = Spread::new(&one, Estimator::Awv, &law, &tuning());
-        assert_eq!(p_value(&one, Estimator::Awv, &own, &law, "accel"), None);
+        assert_eq!(
+            alike_p_value(&one, Estimator::Awv, &own, &law, "accel"),
+            None
+        );
     }
 }
 

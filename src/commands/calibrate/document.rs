@@ -1,14 +1,14 @@
 //! The document of a calibration.
 
-use super::fits::{goodness, interval_of, intervals};
+use super::fits::{interval_of, intervals};
 use crate::commands::export::Quantity;
 use crate::report::comparison_table::in_order;
 use crate::report::curves::{CurvesFile, FittedCurve, recording_names};
 use crate::report::curves::{band, curve, scale_axis, sensor_name, variance_axis};
 use nav_sim_calibration::{
-    Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, Note, Outcome,
-    ParameterInterval, Ranking, Settings, TurnOnFinding, TurnOnSpread, Undetermined, Verdict,
-    WIDEST, duration, percent, tau_s,
+    Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE,
+    Outcome, ParameterInterval, Ranking, Settings, TurnOnFinding, TurnOnSpread, Undetermined,
+    Verdict, WIDEST, duration, percent, tau_s,
 };
 use nav_sim_document::{
     Axis as ChartAxis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone,
@@ -134,12 +134,12 @@ impl ShownCalibration<'_> {
     }
 
     fn tone(&self) -> Tone {
-        let is_rejected = |o: &&Outcome| goodness(o).is_some_and(|g| g.is_rejected());
+        let is_rejected = |o: &&Outcome| o.goodness().is_some_and(|g| g.is_rejected());
         if self.outcomes.iter().any(is_rejected) {
             return Tone::Bad;
         }
-        let misfits = self.outcomes.iter().filter_map(|o| o.misfit()).count();
-        match misfits > 0 || self.diagnoses.iter().any(is_abnormal) {
+        let is_misfit = |o: &&Outcome| o.departure().misfit.is_some();
+        match self.outcomes.iter().any(is_misfit) || self.diagnoses.iter().any(is_abnormal) {
             true => Tone::Doubtful,
             false => Tone::Good,
         }
@@ -183,10 +183,7 @@ impl ShownCalibration<'_> {
             note(Importance::Remark, head, text);
         }
         for outcome in fits {
-            let reasons = outcome
-                .ranking
-                .iter()
-                .flat_map(|r| reasons(r, settings.rate_hz));
+            let reasons = outcome.ranking.iter().flat_map(reasons);
             let name = fit_name(outcome, fits);
             for text in reasons.chain(fit_notes(outcome, settings)) {
                 note(Importance::Remark, &name, text);
@@ -232,15 +229,6 @@ fn recordings_section(json: &Value, document: &mut Document) {
         ("drift: p", "drift/p_value"),
     ];
     document.table(&Table::of(json, "/replicates/*", &columns).without_unknown());
-    let columns = [
-        ("without", "../../file"),
-        ("fit", "{signals} {estimator}"),
-        ("moves by", "change"),
-        ("at scale (s)", "tau_s"),
-        ("σ", "deviations"),
-    ];
-    let moved = Table::of(json, "/replicates/*/left_out/*", &columns);
-    document.folded("Fits without a recording", |inside| inside.table(&moved));
 }
 
 /// A row a parameter.
@@ -278,7 +266,7 @@ fn group_name(fitted: &FittedCurve) -> String {
 }
 
 /// The wavelet variance, and its ratio to that of the model.
-pub(crate) fn variance(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Chart {
+fn variance(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Chart {
     let FittedCurve {
         tau_s,
         wv,
@@ -444,9 +432,11 @@ fn some(names: &[String]) -> String {
 fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {
     let (spec, departure) = (&outcome.spec, outcome.departure());
     let at = |level| duration(tau_s(level, rate_hz));
-    let p = goodness(outcome).map_or(String::new(), |g| format!(" (p = {:.3})", g.p_value));
-    if let Some(misfit) = outcome.misfit() {
-        let (ratio, at) = (readable(misfit.worst.ratio), at(misfit.worst.level));
+    let p = outcome
+        .goodness()
+        .map_or(String::new(), |g| format!(" (p = {:.3})", g.p_value));
+    if let Some(worst) = departure.misfit {
+        let (ratio, at) = (readable(worst.ratio), at(worst.level));
         let (missed, scales) = (departure.missed.len(), departure.scales);
         return format!(
             "{name}: {spec} does not fit: data/model {ratio} at {at}; {missed} of {scales} scales off{p}"
@@ -470,9 +460,9 @@ fn recordings_line(outcomes: &[&Outcome], diagnoses: &[Diagnosis]) -> Option<Str
     if count == 0 {
         return None;
     }
-    if diagnoses.iter().all(|d| d.scores.is_empty()) {
+    if count < FEWEST_TO_COMPARE {
         return Some(format!(
-            "{count} recordings: too few to name an abnormal one (4 are needed)"
+            "{count} recordings: too few to name an abnormal one ({FEWEST_TO_COMPARE} are needed)"
         ));
     }
     let finding = |d: &Diagnosis| {
@@ -512,8 +502,8 @@ fn recordings_line(outcomes: &[&Outcome], diagnoses: &[Diagnosis]) -> Option<Str
 fn beginnings(found: &Beginnings) -> Option<(&'static str, String)> {
     const NOTABLE: f64 = 0.05;
     let matters = |b: &&Beginning| {
-        let mut changes = b.signals.iter().map(|(_, w)| w.change);
-        found.left_out || changes.any(|c| c.is_none_or(|c| c.ratio.ln().abs() > NOTABLE))
+        let mut changes = b.signals.iter().map(|w| w.change);
+        found.left_out || changes.any(|c| c.is_none_or(|ratio| ratio.ln().abs() > NOTABLE))
     };
     let told: Vec<&Beginning> = found.all.iter().filter(matters).collect();
     let names = recording_names(told.iter().map(|b| b.recording.as_str()));
@@ -538,79 +528,90 @@ pub(super) fn fit_name(outcome: &Outcome, outcomes: &[&Outcome]) -> String {
     }
 }
 
-/// The notes on a fit.
-fn fit_notes(outcome: &Outcome, settings: &Settings) -> impl Iterator<Item = String> {
-    let notes = outcome.notes(settings).into_iter();
-    notes.map(|note| note_line(&note, outcome))
-}
+/// An amplitude known to no better than this factor, either way, is told.
+const FACTOR: f64 = 3.0;
+/// The wavelet variance of an AR1 peaks at this many correlation times.
+const PEAK: f64 = 3.78;
 
-/// The notes on a fit, and why parameters have no interval.
-pub(super) fn all_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
-    fit_notes(outcome, settings)
-        .chain(without_interval(outcome))
-        .collect()
+/// Remarks on a fit, the most important first.
+pub(super) fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
+    let (fit, curve, rate_hz) = (&outcome.fit, &outcome.curve, settings.rate_hz);
+    let (model, labels) = (&fit.composite, fit.composite.labels());
+    let seconds = |level: &u32| tau_s(*level, rate_hz);
+    let mut notes = Vec::new();
+    notes.extend(outcome.axes_differ.map(|a| {
+        let (largest, ratio, smallest) = (a.largest, readable(a.ratio), a.smallest);
+        format!(
+            "axes differ: {largest} has up to {ratio} times the wavelet variance of {smallest}; --pool axes fits each"
+        )
+    }));
+    // A range that was asked for is no news.
+    if let ([first, ..], None) = (&curve.ignored[..], settings.fit_range) {
+        let last = curve.ignored.last().unwrap_or(first);
+        let scales = [first, last]
+            .map(|level| duration(seconds(level)))
+            .join(" to ");
+        notes.push(format!("scales {scales} are not fitted: too many outliers"));
+    }
+    let indistinct = outcome
+        .inference
+        .iter()
+        .filter_map(|i| i.indistinct.as_ref());
+    notes.extend(indistinct.map(|i| {
+        format!(
+            "{} describes the curve as well (p = {:.2})",
+            i.spec, i.p_value
+        )
+    }));
+    let amplitudes = intervals(outcome)
+        .iter()
+        .filter(|i| !i.of.parameter.is_shape() && i.absent.is_none());
+    for i in amplitudes.filter(|i| i.high > FACTOR * FACTOR * i.low) {
+        let name = model.name_of(i.of);
+        let factor = readable((i.high / i.low).sqrt());
+        notes.push(match i.low > 0.0 {
+            true => format!("{name} is known to a factor of {factor} only"),
+            false => format!("{name} may be zero"),
+        });
+    }
+    let zero = fit.zero.iter().map(|i| &labels[*i]);
+    notes.extend(zero.map(|label| format!("{label} is zero: not seen in these data")));
+    let longest_s = outcome.counted_levels().last().map_or(0.0, seconds);
+    for (i, label) in labels
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| !fit.zero.contains(i))
+    {
+        let Some(time_s) = model.processes[i].correlation_time_s(rate_hz) else {
+            continue;
+        };
+        let [time, longest] = [time_s, longest_s].map(duration);
+        if time_s * rate_hz < 1.0 {
+            notes.push(format!(
+                "{label}: correlation time {time} is below a sample, as of white noise"
+            ));
+        }
+        // Before its peak the curve of an AR1 rises as that of a random walk does: without the peak only sigma2 is known.
+        if PEAK * time_s > longest_s {
+            notes.push(format!(
+                "{label}: correlation time {time} is not identifiable from scales up to {longest}"
+            ));
+        }
+    }
+    notes
 }
 
 /// Why parameters have no interval.
-fn without_interval(outcome: &Outcome) -> impl Iterator<Item = String> {
+pub(super) fn without_interval(outcome: &Outcome) -> impl Iterator<Item = String> {
     let labels = outcome.fit.composite.labels();
-    intervals(outcome)
-        .iter()
-        .filter_map(move |i| undetermined(i, &labels))
+    let absent = intervals(outcome).iter();
+    let absent = absent.filter_map(|i| Some((i, i.absent.as_ref()?)));
+    absent.map(move |(interval, why)| undetermined(interval, why, &labels))
 }
 
-/// A note on a fit.
-fn note_line(note: &Note, outcome: &Outcome) -> String {
-    let labels = outcome.fit.composite.labels();
-    let named = |of| outcome.fit.composite.name_of(of);
-    let indistinct = outcome
-        .inference
-        .as_ref()
-        .and_then(|i| i.indistinct.as_ref());
-    match (note, outcome.axes_differ, indistinct) {
-        (Note::AxesDiffer, Some(a), _) => format!(
-            "axes differ: {} has up to {} times the wavelet variance of {}; --pool axes fits each",
-            a.largest,
-            readable(a.ratio),
-            a.smallest
-        ),
-        (Note::Indistinct, _, Some(i)) => {
-            format!(
-                "{} describes the curve as well (p = {:.2})",
-                i.spec, i.p_value
-            )
-        }
-        (Note::AxesDiffer | Note::Indistinct, ..) => String::new(),
-        (Note::LeftOut(ends), ..) => {
-            let scales = ends.map(duration).join(" to ");
-            format!("scales {scales} are not fitted: too many outliers")
-        }
-        (Note::Wide(of, Some(factor)), ..) => {
-            format!(
-                "{} is known to a factor of {} only",
-                named(*of),
-                readable(*factor)
-            )
-        }
-        (Note::Wide(of, None), ..) => format!("{} may be zero", named(*of)),
-        (Note::Zero(process), ..) => {
-            format!("{} is zero: not seen in these data", labels[*process])
-        }
-        (Note::LikeWhite(process, time_s), ..) => {
-            let (label, time) = (&labels[*process], duration(*time_s));
-            format!("{label}: correlation time {time} is below a sample, as of white noise")
-        }
-        (Note::LikeWalk(process, time_s, longest_s), ..) => {
-            let (label, [time, to]) = (&labels[*process], [*time_s, *longest_s].map(duration));
-            format!("{label}: correlation time {time} is not identifiable from scales up to {to}")
-        }
-    }
-}
-
-/// Why a parameter of a model with processes of these labels has no interval, if it has none.
-fn undetermined(interval: &ParameterInterval, labels: &[String]) -> Option<String> {
+fn undetermined(interval: &ParameterInterval, why: &Undetermined, labels: &[String]) -> String {
     let process = &labels[interval.of.process];
-    let why = match interval.absent.as_ref()? {
+    let why = match why {
         Undetermined::Zero => format!("{process} is zero"),
         Undetermined::Vanishes => format!(
             "{process} is zero in {} of the draws",
@@ -624,10 +625,8 @@ fn undetermined(interval: &ParameterInterval, labels: &[String]) -> Option<Strin
             format!("the data do not need both {}", alike.join(" and "))
         }
     };
-    Some(format!(
-        "{process} {}: no interval: {why}",
-        interval.of.parameter.name()
-    ))
+    let name = interval.of.parameter.name();
+    format!("{process} {name}: no interval: {why}")
 }
 
 /// Notes on the recordings of a sensor: on those that are abnormal, on what all have in common.
@@ -721,7 +720,7 @@ pub(super) fn turn_on_remark(found: &TurnOnSpread) -> String {
 }
 
 /// The reasons of a choice.
-pub(super) fn reasons(ranking: &Ranking, rate_hz: f64) -> Vec<String> {
+pub(super) fn reasons(ranking: &Ranking) -> Vec<String> {
     let (best, taken) = (&ranking.candidates[0], &ranking.candidates[ranking.chosen]);
     let wvic = |c: &Candidate| format!("{} {:.4}", c.spec, c.wvic());
     let (name, pair) = (&taken.spec, format!("{}, {}", wvic(taken), wvic(best)));
@@ -735,15 +734,7 @@ pub(super) fn reasons(ranking: &Ranking, rate_hz: f64) -> Vec<String> {
     if taken.is_rejected() {
         lines.push("the J-test rejects every candidate".to_owned());
     }
-    lines.extend(ranking.too_simple.iter().map(|simple| {
-        let (share, at) = (
-            percent(simple.share),
-            duration(tau_s(simple.level, rate_hz)),
-        );
-        format!(
-            "{} is too simple (p ≤ {:.3}): {share} of the difference is at {at}",
-            simple.spec, simple.p_value
-        )
-    }));
+    let simpler = ranking.too_simple.iter();
+    lines.extend(simpler.map(|(spec, p)| format!("{spec} is too simple (p ≤ {p:.3})")));
     lines
 }

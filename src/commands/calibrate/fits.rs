@@ -1,10 +1,10 @@
 //! A calibration as JSON: fits with their figures, recordings, turn-on biases.
 
-use super::document::{all_notes, fit_name, reasons, turn_on_remark};
+use super::document::{fit_name, fit_notes, reasons, turn_on_remark, without_interval};
 use crate::commands::export::Quantity;
 use nav_sim_calibration::{
-    Candidate, Estimator, Goodness, Miss, Outcome, ParameterInterval, ParameterSpread, Practical,
-    Ranking, Settings, Share, TURN_ON_LEVEL, TurnOnSpread, duration, percent, shares, tau_s,
+    Candidate, Estimator, Miss, Outcome, ParameterInterval, ParameterSpread, Practical, Ranking,
+    Settings, TURN_ON_LEVEL, TurnOnSpread, duration, percent, tau_s,
 };
 use nav_sim_document::readable;
 use nav_sim_signal::imu::Sensor;
@@ -15,8 +15,10 @@ use std::collections::BTreeMap;
 
 /// The facts of a fit that stand in the provenance of its model too; null where there are none.
 pub(super) fn fit_record(outcome: &Outcome, settings: &Settings) -> Map<String, Value> {
-    let (fit, goodness) = (&outcome.fit, goodness(outcome));
-    let worst = outcome.misfit().map(|misfit| misfit.worst);
+    let (fit, goodness) = (&outcome.fit, outcome.goodness());
+    let worst = outcome.departure().misfit;
+    let notes = fit_notes(outcome, settings).into_iter();
+    let notes: Vec<String> = notes.chain(without_interval(outcome)).collect();
     let is_trimmed = outcome.estimator == Estimator::DrAwv;
     object(json!({
         "signals": outcome.scope.name(),
@@ -36,7 +38,7 @@ pub(super) fn fit_record(outcome: &Outcome, settings: &Settings) -> Map<String, 
         "j_p_value": goodness.map(|g| g.p_value),
         "worst_ratio": worst.map(|miss| miss.ratio),
         "worst_tau_s": worst.map(|miss| tau_s(miss.level, settings.rate_hz)),
-        "notes": all_notes(outcome, settings),
+        "notes": notes,
     }))
 }
 
@@ -87,9 +89,9 @@ pub(super) fn fit_json(outcome: &Outcome, all: &[&Outcome], settings: &Settings)
         "axis": outcome.scope.axis.map_or("all", |axis| axis.name()),
         "estimator": outcome.estimator,
         "ranking": ranking.map_or(Vec::new(), candidates),
-        "reasons": ranking.map_or(Vec::new(), |r| reasons(r, rate_hz)),
+        "reasons": ranking.map_or(Vec::new(), reasons),
         "processes": processes(&fit.composite, intervals(outcome)),
-        "goodness": goodness(outcome),
+        "goodness": outcome.goodness(),
         "spread": inference.map_or(&[][..], |i| &i.spread),
         "spread_p_value": inference.and_then(|i| i.alike),
         "parameter_spread": laws,
@@ -100,10 +102,6 @@ pub(super) fn fit_json(outcome: &Outcome, all: &[&Outcome], settings: &Settings)
         "at_end": labelled(&fit.at_end),
     })));
     record.into()
-}
-
-pub(super) fn goodness(outcome: &Outcome) -> Option<Goodness> {
-    outcome.inference.as_ref().and_then(|i| i.goodness)
 }
 
 fn candidates(ranking: &Ranking) -> Vec<Value> {
@@ -132,7 +130,6 @@ fn processes(model: &Composite, intervals: &[ParameterInterval]) -> Vec<Value> {
     for i in intervals {
         let (entry, name) = (&mut all[i.of.process], i.of.parameter.name());
         entry[format!("{name}_ci95")] = json!(i.absent.is_none().then_some([i.low, i.high]));
-        entry[format!("{name}_se")] = json!(i.standard_error);
     }
     all
 }
@@ -167,8 +164,8 @@ pub(super) fn turn_on_json(found: &TurnOnSpread) -> Value {
 }
 
 /// A figure of a model, in the unit of data sheets.
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct Figure {
+#[derive(Serialize)]
+struct Figure {
     name: String,
     /// None where the data do not show it.
     value: Option<f64>,
@@ -209,9 +206,8 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Figure> {
     let practical = outcome.practical(rate_hz);
     let mut figures = practical.map_or_else(BTreeMap::new, |p| practical_figures(outcome, &p));
     let model = &outcome.fit.composite;
-    let shares = shares(model, &outcome.counted_levels());
     for (index, (process, label)) in model.processes.iter().zip(model.labels()).enumerate() {
-        let further = further_figure(process, outcome.scope.sensor, rate_hz);
+        let further = further_figure(process, outcome.scope.sensor);
         let Some((letter, name, unit, parameter, convert)) =
             further.filter(|_| !outcome.fit.zero.contains(&index))
         else {
@@ -219,13 +215,13 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Figure> {
         };
         let own = |of: ParameterRef| of.process == index && of.parameter == parameter;
         let interval = intervals(outcome).iter().find(|i| own(i.of)).map(|i| {
-            let mut ends = [i.low, i.high].map(&convert);
+            let mut ends = [i.low, i.high].map(|end| convert(end, rate_hz));
             ends.sort_by(f64::total_cmp);
             i.absent.is_none().then_some(ends)
         });
         let value = model.parameters().find(|(of, _)| own(*of));
-        let value = value.map(|(_, value)| convert(value)).ok_or("");
-        let averages = averages(&shares[index], rate_hz);
+        let value = value.map(|(_, value)| convert(value, rate_hz)).ok_or("");
+        let averages = averages(outcome, index, rate_hz);
         let figure = Figure::new((format!("{label} {name}"), unit), value, interval, averages);
         let key = match letter {
             "T" => format!("T_{label}"),
@@ -286,58 +282,62 @@ fn practical_figures(outcome: &Outcome, practical: &Practical) -> BTreeMap<Strin
     named.map(|(key, figure)| (key.to_owned(), figure)).into()
 }
 
+/// Letter, name and unit of what a process is known by beside N and K, the parameter that it follows from, and how, at a
+/// rate (Hz).
 type FurtherFigure = (
     &'static str,
     &'static str,
     &'static str,
     Parameter,
-    Box<dyn Fn(f64) -> f64>,
+    fn(f64, f64) -> f64,
 );
 
-/// Letter, name and unit of what a process is known by beside N and K, the parameter that it follows from, and how.
-fn further_figure(process: &Process, sensor: Sensor, rate_hz: f64) -> Option<FurtherFigure> {
+fn further_figure(process: &Process, sensor: Sensor) -> Option<FurtherFigure> {
     let [increment, ramp] = match sensor {
         Sensor::Accel => ["m/s", "m/s² per s"],
         Sensor::Gyro => ["rad", "rad/s per s"],
     };
     const TIME: &str = "correlation time T";
     Some(match process {
-        Process::Ar1(p) if p.phi() > 0.0 => (
-            "T",
-            TIME,
-            "s",
-            Parameter::Phi,
-            Box::new(move |phi| -1.0 / (phi.ln() * rate_hz)),
-        ),
-        Process::GaussMarkov(_) => ("T", TIME, "s", Parameter::Beta, Box::new(|beta| 1.0 / beta)),
+        Process::Ar1(p) if p.phi() > 0.0 => ("T", TIME, "s", Parameter::Phi, |phi, rate_hz| {
+            -1.0 / (phi.ln() * rate_hz)
+        }),
+        Process::GaussMarkov(_) => ("T", TIME, "s", Parameter::Beta, |beta, _| 1.0 / beta),
         // Of the increments over a sample, as IEEE 952 has it.
         Process::Quantization(_) => {
-            let of_increment = move |q2: f64| q2.sqrt() / rate_hz;
-            (
-                "Q",
-                "quantization Q",
-                increment,
-                Parameter::Q2,
-                Box::new(of_increment),
-            )
+            let name = "quantization Q";
+            ("Q", name, increment, Parameter::Q2, |q2, rate_hz| {
+                q2.sqrt() / rate_hz
+            })
         }
-        Process::Drift(_) => (
-            "R",
-            "ramp",
-            ramp,
-            Parameter::Slope,
-            Box::new(move |slope| slope * rate_hz),
-        ),
+        Process::Drift(_) => ("R", "ramp", ramp, Parameter::Slope, |slope, rate_hz| {
+            slope * rate_hz
+        }),
         _ => return None,
     })
 }
 
-/// Averaging times, half a scale each, at which a process is the largest part of the wavelet variance.
-fn averages(share: &Share, rate_hz: f64) -> String {
-    let time = |level: u32| duration(0.5 * tau_s(level, rate_hz));
-    match (share.leads.first(), share.leads.last()) {
-        (Some(first), Some(last)) if first == last => time(*first),
-        (Some(first), Some(last)) => format!("{} – {}", time(*first), time(*last)),
-        _ => format!("none ({} at most)", percent(share.largest.0)),
+/// Averaging times at which a process is the largest part of the model's wavelet variance.
+fn averages(outcome: &Outcome, index: usize, rate_hz: f64) -> String {
+    let model = &outcome.fit.composite;
+    let part = |process: &Process, level: u32| match process.haar_wv(level) / model.haar_wv(level) {
+        part if part.is_finite() => part,
+        // Of nothing nothing is a part.
+        _ => 0.0,
+    };
+    let largest_at = |level: u32| {
+        let parts = model.processes.iter().map(|p| part(p, level)).enumerate();
+        parts.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+    };
+    let levels = outcome.counted_levels();
+    let leads = || levels.iter().filter(|l| largest_at(**l) == Some(index));
+    let time = |level: &u32| duration(0.5 * tau_s(*level, rate_hz));
+    match (leads().next(), leads().next_back()) {
+        (Some(first), Some(last)) if first == last => time(first),
+        (Some(first), Some(last)) => format!("{} – {}", time(first), time(last)),
+        _ => {
+            let parts = levels.iter().map(|l| part(&model.processes[index], *l));
+            format!("none ({} at most)", percent(parts.fold(0.0, f64::max)))
+        }
     }
 }

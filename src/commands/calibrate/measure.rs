@@ -2,14 +2,15 @@
 
 use super::document::ShownCalibration;
 use super::fits::{fit_json, turn_on_json};
+use super::model_file::CalibrationNote;
 use crate::app::reading::note_report;
 use crate::app::{Context, Failure};
 use crate::io::recordings::{FileReport, ReadOptions, Report};
 use crate::io::{curve_file, hash, recordings};
 use crate::report::CurvesFile;
 use nav_sim_calibration::{
-    self, Advance, Beginning, Beginnings, Bootstrap, Diagnosis, Estimator, Group, Outcome, Pool,
-    Replicate, Scope, Settings, SignalError, TurnOnSpread, WarmUp, diagnose, fit_curve, grouped,
+    self, Advance, Beginning, Beginnings, Bootstrap, CalibrationError, Diagnosis, Estimator, Group,
+    Outcome, Pool, Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve, grouped,
     infer_telling, replicates, turn_on, warm_up,
 };
 use nav_sim_signal::imu::{Channel, Recording, Sensor, Signal};
@@ -126,10 +127,10 @@ impl Default for CalibrationOptions {
     }
 }
 
-/// Recordings that were measured and found to be replicates of one another.
+/// Recordings that were measured, none a copy of another.
 pub(crate) struct Measured {
     pub report: Report,
-    pub groups: Vec<Group>,
+    pub replicates: Vec<(Channel, Replicate)>,
     pub beginnings: Beginnings,
     pub settings: Settings,
 }
@@ -150,6 +151,8 @@ pub struct Calibration {
     pub turn_on: Vec<TurnOnSpread>,
     /// Each recording against the others.
     pub diagnoses: Vec<Diagnosis>,
+    /// What the model files record beside the fits.
+    pub(crate) note: CalibrationNote,
 }
 
 /// Calibrates recordings, or directories of them.
@@ -163,11 +166,12 @@ pub fn calibrate(
     context: &Context<'_>,
 ) -> Result<Calibration, Failure> {
     let Measured {
-        groups,
+        replicates,
         beginnings,
         settings,
         ..
     } = measure(paths, options, context)?;
+    let groups = grouped(replicates, options.pool.unwrap_or(settings.pool()));
     let bootstrap = options.bootstrap;
     let steps = settings.model.steps() + bootstrap.map_or(0, |bootstrap| bootstrap.draws as u64);
     let fits = (groups.len() * settings.estimators.len()) as u64;
@@ -220,10 +224,9 @@ pub(crate) fn measure(
     }
     let mut measured: Vec<_> = looks.into_iter().flat_map(|look| look.replicates).collect();
     one_switching_on(&report, &mut measured);
-    let groups = grouped(measured, pool.unwrap_or(settings.pool()));
     Ok(Measured {
         report,
-        groups,
+        replicates: measured,
         beginnings,
         settings,
     })
@@ -249,6 +252,7 @@ impl Calibration {
             turn_on: settings.estimators.iter().flat_map(of_estimator).collect(),
             diagnoses: diagnose(&groups, &outcomes, &settings),
             beginnings: Beginnings::default(),
+            note: CalibrationNote::default(),
             groups,
             outcomes,
             settings,
@@ -316,7 +320,7 @@ struct MeasuredRecording {
     recording: String,
     /// What tells the samples of each signal from others.
     signals: Vec<(Channel, String)>,
-    warm_ups: Vec<(Channel, WarmUp)>,
+    warm_ups: Vec<WarmUp>,
     replicates: Vec<(Channel, Replicate)>,
 }
 
@@ -326,7 +330,7 @@ impl MeasuredRecording {
         skip_warm_up: bool,
         levels: Option<u32>,
         tuning: &Tuning,
-    ) -> Result<Self, SignalError> {
+    ) -> Result<Self, CalibrationError> {
         let signals = recording
             .signals
             .par_iter()
@@ -392,21 +396,17 @@ fn beginnings(
 }
 
 /// Samples to leave out of a recording for all its signals; none where that does not help one of them.
-fn longest(signals: &[(Channel, WarmUp)]) -> Option<usize> {
-    let helps = signals.iter().all(|(_, w)| w.change.is_some());
-    signals
-        .iter()
-        .map(|(_, w)| w.samples)
-        .max()
-        .filter(|_| helps)
+fn longest(signals: &[WarmUp]) -> Option<usize> {
+    let helps = signals.iter().all(|w| w.change.is_some());
+    signals.iter().map(|w| w.samples).max().filter(|_| helps)
 }
 
 /// How the signals of a recording begin; if it is to be left out, the recording without that.
 pub(crate) fn without_warm_up(
     mut recording: Recording,
     leave_out: bool,
-) -> (Recording, Vec<(Channel, WarmUp)>) {
-    let begins_otherwise = |s: &Signal| warm_up(&s.samples).map(|w| (s.channel, w));
+) -> (Recording, Vec<WarmUp>) {
+    let begins_otherwise = |s: &Signal| warm_up(&s.samples);
     let found: Vec<_> = recording
         .signals
         .par_iter()
@@ -438,23 +438,16 @@ fn shortest(report: &Report, scales: Option<u32>, context: &Context<'_>) {
         found[(found.len() - 1) / 2],
         found[found.len() / 2],
     );
-    let short = found.iter().filter(|own| **own < used).count();
     if scales < usual {
-        context.warn(match short {
-            0 => format!(
+        context.warn(match scales < used {
+            false => format!(
                 "{recording}: its {samples} samples limit all recordings to {scales} scales; without it there \
                  would be more (half of them have {usual}): leave it out for those"
             ),
-            short => {
-                let others = match short {
-                    1 => String::new(),
-                    _ => format!(" ({} more are short)", short - 1),
-                };
-                format!(
-                    "{recording}: its {samples} samples have {scales} scales{others}; the longer ones, up to {used} \
-                     scales, are averaged over the longer recordings alone"
-                )
-            }
+            true => format!(
+                "{recording}: its {samples} samples have {scales} scales; the longer ones, up to {used} scales, are \
+                 averaged over the longer recordings alone"
+            ),
         });
     }
 }
@@ -462,15 +455,10 @@ fn shortest(report: &Report, scales: Option<u32>, context: &Context<'_>) {
 // Wavelet-variance curves that come from elsewhere → models.
 
 /// Curves of a file, each with what it is for.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub(crate) struct Curves {
-    curves: Vec<(Scope, Estimator, Curve)>,
-    /// How models are fitted: with the estimators and the rate of the curves.
-    pub settings: Settings,
-}
+pub(crate) type Curves = Vec<(Scope, Estimator, Curve)>;
 
-/// Reads curves. A rate (Hz) and a sensor are for those that do not say theirs.
+/// Reads curves, and the settings with their estimators and rate; whether one does not say its sensor. A rate (Hz)
+/// and a sensor are for those that do not say theirs.
 ///
 /// # Errors
 /// When the file cannot be read, says nothing of rate or sensor where nothing is given, or has two curves for one model.
@@ -479,7 +467,7 @@ pub(crate) fn read_curves(
     rate_hz: Option<f64>,
     sensor: Option<Sensor>,
     settings: &Settings,
-) -> Result<(Curves, bool), Failure> {
+) -> Result<(Curves, Settings, bool), Failure> {
     let named = curve_file::read(path)?;
     let path = || path.display().to_string();
     let rate_hz = match (named[0].rate_hz, rate_hz) {
@@ -499,7 +487,7 @@ pub(crate) fn read_curves(
         })?,
     };
     let mut is_unsaid = false;
-    let mut curves: Vec<(Scope, Estimator, Curve)> = Vec::new();
+    let mut curves = Curves::new();
     for named in named {
         let estimator = named.estimator.and_then(|name| name.parse().ok());
         let estimator = estimator.unwrap_or(Estimator::Given);
@@ -525,39 +513,37 @@ pub(crate) fn read_curves(
     }
     let has = |e: &Estimator| curves.iter().any(|(_, estimator, _)| estimator == e);
     let estimators = Estimator::ALL.into_iter().filter(has).collect();
-    let curves = Curves {
-        curves,
-        settings: Settings {
-            estimators,
-            rate_hz,
-            ..settings.clone()
-        },
+    let settings = Settings {
+        estimators,
+        rate_hz,
+        ..settings.clone()
     };
-    Ok((curves, is_unsaid))
+    Ok((curves, settings, is_unsaid))
 }
 
-impl Curves {
-    /// The models.
-    ///
-    /// # Errors
-    /// When a curve is too short for the model.
-    pub(crate) fn calibrate(self, bootstrap: Option<Bootstrap>) -> Result<Calibration, Failure> {
-        let Self { curves, settings } = self;
-        let (mut groups, mut outcomes) = (Vec::new(), Vec::new());
-        for (scope, estimator, curve) in curves {
-            let group = Group {
-                scope,
-                replicates: Vec::new(),
-            };
-            outcomes.push(fit_curve(&group, estimator, curve, &settings)?);
-            groups.push(group);
-        }
-        Ok(Calibration::new(
-            groups,
-            outcomes,
-            settings,
-            bootstrap,
-            &|_| {},
-        ))
+/// The models of curves.
+///
+/// # Errors
+/// When a curve is too short for the model.
+pub(crate) fn calibrate_curves(
+    curves: Curves,
+    settings: Settings,
+    bootstrap: Option<Bootstrap>,
+) -> Result<Calibration, Failure> {
+    let (mut groups, mut outcomes) = (Vec::new(), Vec::new());
+    for (scope, estimator, curve) in curves {
+        let group = Group {
+            scope,
+            replicates: Vec::new(),
+        };
+        outcomes.push(fit_curve(&group, estimator, curve, &settings, &|_| {})?);
+        groups.push(group);
     }
+    Ok(Calibration::new(
+        groups,
+        outcomes,
+        settings,
+        bootstrap,
+        &|_| {},
+    ))
 }

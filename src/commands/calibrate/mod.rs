@@ -26,7 +26,6 @@ mod fits;
 mod measure;
 mod model_file;
 
-pub(crate) use document::variance as variance_chart;
 pub use measure::{Calibration, CalibrationOptions, EstimatorChoice, calibrate};
 pub(crate) use measure::{Measured, measure, visit, without_warm_up};
 pub(crate) use model_file::CalibrationNote;
@@ -40,7 +39,7 @@ use crate::io::hash;
 use crate::io::model_file::ModelFile;
 use crate::parse;
 use crate::report;
-use measure::{Curves, read_curves};
+use measure::{Curves, calibrate_curves, read_curves};
 use nav_sim_calibration::{
     Bootstrap, Estimator, ModelChoice, ModelSpec, Pool, Settings, Trim, Weighting,
 };
@@ -158,14 +157,8 @@ const POOLS: [(&str, &str); 2] = [
     ),
 ];
 
-/// A calibration, and what is recorded of it.
-pub struct CalibrationAnswer {
-    calibration: Calibration,
-    note: CalibrationNote,
-}
-
 impl Command for Calibrate {
-    type Answer = CalibrationAnswer;
+    type Answer = Calibration;
     const NAME: &'static str = "calibrate";
     const OUT: Out = Out::File {
         kind: Written::Calibrated,
@@ -187,7 +180,7 @@ impl Command for Calibrate {
         let Some(path) = &self.curve else {
             return Ok(());
         };
-        let (_, is_unsaid) = self.curves(path, &self.settings()?)?;
+        let (.., is_unsaid) = self.curves(path, &self.settings()?)?;
         match is_unsaid {
             false => Ok(()),
             true => Err(Failure::input(format!(
@@ -203,18 +196,18 @@ impl Command for Calibrate {
         Ok(curve.chain(listed("recording", &self.inputs)?).collect())
     }
 
-    fn run(&self, context: &Context<'_>) -> Result<CalibrationAnswer> {
+    fn run(&self, context: &Context<'_>) -> Result<Calibration> {
         let settings = self.settings()?;
-        let calibration = match &self.curve {
+        let mut calibration = match &self.curve {
             Some(path) => {
-                let (curves, is_unsaid) = self.curves(path, &settings)?;
+                let (curves, settings, is_unsaid) = self.curves(path, &settings)?;
                 if is_unsaid {
                     context.remark(format!(
                         "{}: taken as of an accelerometer (--axes gyro: of a gyroscope)",
                         path.display()
                     ));
                 }
-                curves.calibrate(self.draws(context))?
+                calibrate_curves(curves, settings, self.draws(context))?
             }
             None => {
                 let options = CalibrationOptions {
@@ -229,34 +222,32 @@ impl Command for Calibrate {
                 calibrate(&self.inputs, &options, context)?
             }
         };
-        Ok(CalibrationAnswer {
-            note: self.note(&calibration.settings, context),
-            calibration,
-        })
+        calibration.note = CalibrationNote {
+            reading: self.reading(&calibration.settings),
+            seed: self.draws(context).map(|draws| draws.seed),
+            inputs: context.inputs().to_vec(),
+        };
+        Ok(calibration)
     }
 }
 
-impl Serialize for CalibrationAnswer {
-    fn serialize<S: serde::Serializer>(
-        &self,
-        serializer: S,
-    ) -> std::result::Result<S::Ok, S::Error> {
-        self.calibration.shown(None).json.serialize(serializer)
+impl Serialize for Calibration {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.shown(None).json.serialize(serializer)
     }
 }
 
-impl Answer for CalibrationAnswer {
+impl Answer for Calibration {
     fn document(&self) -> Document {
-        self.calibration.shown(None).document()
+        self.shown(None).document()
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {
-        let estimators = &self.calibration.settings.estimators;
+        let estimators = &self.settings.estimators;
         let of_estimator = |estimator: &Estimator| {
             let stem = stem_of(*estimator, estimators);
             let names = (model_ending(&stem), stem);
-            self.calibration
-                .files_of(*estimator, names, &self.note, None)
+            self.files_of(*estimator, names, None)
         };
         estimators.iter().flat_map(of_estimator).collect()
     }
@@ -264,7 +255,7 @@ impl Answer for CalibrationAnswer {
 
 impl Calibrate {
     /// How models are fitted, checked before any file is read.
-    pub(crate) fn settings(&self) -> Result<Settings> {
+    fn settings(&self) -> Result<Settings> {
         Ok(Settings {
             model: self.structure()?,
             trim: self.trim,
@@ -276,7 +267,7 @@ impl Calibrate {
     }
 
     /// The curves in the place of recordings, and whether they do not say of which sensor: then as of an accelerometer.
-    pub(crate) fn curves(&self, path: &Path, settings: &Settings) -> Result<(Curves, bool)> {
+    fn curves(&self, path: &Path, settings: &Settings) -> Result<(Curves, Settings, bool)> {
         let rate_hz = self.recordings.reading.rate_hz;
         read_curves(path, rate_hz, self.recordings.sensor(), settings)
     }
@@ -287,15 +278,6 @@ impl Calibrate {
             draws: self.bootstrap as usize,
             seed: context.seed_or(None),
         })
-    }
-
-    /// What is recorded of the calibration.
-    fn note(&self, settings: &Settings, context: &Context<'_>) -> CalibrationNote {
-        CalibrationNote {
-            reading: self.reading(settings),
-            seed: self.draws(context).map(|draws| draws.seed),
-            inputs: context.inputs().to_vec(),
-        }
     }
 
     /// How the recordings were read and grouped; of a curve nothing is known.
@@ -316,16 +298,15 @@ impl Calibrate {
 
     fn structure(&self) -> Result<ModelChoice> {
         let chosen: ModelChoice = self.model.parse().map_err(unknown_model)?;
-        if self.estimator == EstimatorChoice::One(Estimator::Avlr) && self.tuning.fitted().is_some()
-        {
+        if self.estimator != EstimatorChoice::One(Estimator::Avlr) {
+            return Ok(chosen);
+        }
+        if self.tuning.fitted().is_some() {
             let message =
                 "--scales FROM:TO with --estimator avlr: slopes are read where they are found";
             return Err(
                 Failure::input(message).hint("--estimator gmwm fits the same curve over a range")
             );
-        }
-        if self.estimator != EstimatorChoice::One(Estimator::Avlr) {
-            return Ok(chosen);
         }
         let without = match &chosen {
             ModelChoice::Given(spec) => spec
@@ -335,16 +316,13 @@ impl Calibrate {
                 .map(|k| k.code()),
             ModelChoice::Auto => Some("the AR1 of auto"),
         };
-        match without {
-            None => Ok(chosen),
-            Some(name) => {
-                let message = format!(
-                    "--estimator avlr: {name} has no slope of its own in the Allan deviation"
-                );
-                Err(Failure::input(message)
+        let Some(name) = without else {
+            return Ok(chosen);
+        };
+        let message =
+            format!("--estimator avlr: {name} has no slope of its own in the Allan deviation");
+        Err(Failure::input(message)
                 .hint("--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope); or --estimator gmwm"))
-            }
-        }
     }
 }
 
@@ -367,7 +345,7 @@ fn model_ending(stem: &str) -> String {
 }
 
 /// Endings and kinds of all files of these estimators.
-pub(crate) fn endings(estimators: &[Estimator]) -> Vec<(Cow<'static, str>, Written)> {
+fn endings(estimators: &[Estimator]) -> Vec<(Cow<'static, str>, Written)> {
     let of_estimator = |estimator: &Estimator| {
         let stem = stem_of(*estimator, estimators);
         [
@@ -388,12 +366,13 @@ impl Calibration {
         &self,
         estimator: Estimator,
         (model_name, stem): (String, String),
-        note: &CalibrationNote,
         inflated: Option<(&Model, &str)>,
     ) -> Vec<OutputFile<'static>> {
         let shown = self.shown(Some(estimator));
         let curves = report::json(&shown.curves);
-        let mut model = note.model_file(&shown, &hash::of_bytes(curves.as_bytes()));
+        let mut model = self
+            .note
+            .model_file(&shown, &hash::of_bytes(curves.as_bytes()));
         let mut draws = DrawsFile::of(&shown.outcomes, self.settings.rate_hz);
         if let Some((inflated, how)) = inflated {
             draws = None;

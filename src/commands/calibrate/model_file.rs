@@ -11,7 +11,7 @@ use nav_sim_signal::wavelet::Convention;
 use toml::{Table, Value};
 
 /// The facts of a calibration for its model files.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct CalibrationNote {
     /// Seed of the bootstrap, if there was one.
     pub seed: Option<u64>,

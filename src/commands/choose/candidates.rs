@@ -99,27 +99,24 @@ impl Candidate {
         inflations: &[Inflation],
     ) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
-        for (estimator, model) in estimators
-            .iter()
-            .flat_map(|e| models.iter().map(move |m| (*e, m)))
-        {
-            let model = match estimator == Estimator::Avlr && !is_of_slopes(model) {
-                true => ModelChoice::Given(white_and_walk()),
-                false => model.clone(),
-            };
-            for (filter, inflation) in filters
-                .iter()
-                .flat_map(|f| inflations.iter().map(move |i| (*f, *i)))
-            {
-                let model = model.clone();
-                let candidate = Self {
-                    estimator,
-                    model,
-                    filter,
-                    inflation,
+        for &estimator in estimators {
+            for model in models {
+                let model = match estimator == Estimator::Avlr && !is_of_slopes(model) {
+                    true => ModelChoice::Given(white_and_walk()),
+                    false => model.clone(),
                 };
-                if !all.contains(&candidate) {
-                    all.push(candidate);
+                for &filter in filters {
+                    for &inflation in inflations {
+                        let candidate = Self {
+                            estimator,
+                            model: model.clone(),
+                            filter,
+                            inflation,
+                        };
+                        if !all.contains(&candidate) {
+                            all.push(candidate);
+                        }
+                    }
                 }
             }
         }
@@ -127,7 +124,7 @@ impl Candidate {
     }
 
     /// Whether another one has the same model, before any inflation.
-    pub(crate) fn is_calibrated_as(&self, other: &Self) -> bool {
+    fn is_calibrated_as(&self, other: &Self) -> bool {
         self.estimator == other.estimator && self.model == other.model
     }
 
@@ -222,7 +219,7 @@ pub struct Laboratory {
 }
 
 /// The groups of recordings that were calibrated, their fits, and how these were made.
-pub(crate) type Calibrated = (Vec<Group>, Vec<Outcome>, Settings);
+type Calibrated = (Vec<Group>, Vec<Outcome>, Settings);
 
 impl Laboratory {
     /// Estimators and model of the settings count nothing: those of the candidates do.
@@ -271,7 +268,7 @@ impl Laboratory {
     }
 
     /// The recordings but one.
-    pub(super) fn others(&self, without: Option<usize>) -> impl Iterator<Item = usize> {
+    fn others(&self, without: Option<usize>) -> impl Iterator<Item = usize> {
         (0..self.units.len()).filter(move |k| Some(*k) != without)
     }
 
@@ -480,49 +477,46 @@ impl Drive {
     ) -> Result<Model, Failure> {
         match candidate.inflation {
             Inflation::None => Ok(model.clone()),
-            Inflation::Tenfold => Ok(tenfold(model)),
+            Inflation::Tenfold => {
+                let on_variance = 100.0;
+                let factor = |sensor| Factor {
+                    sensor,
+                    on_variance,
+                };
+                Ok(scaled(model, &Sensor::ALL.map(factor)))
+            }
             Inflation::Tuned => {
                 let truths = laboratory.others(without);
                 let truths = truths.map(|k| laboratory.models[k].clone().into());
-                self.tuned(candidate, model, &truths.collect::<Vec<_>>())
+                let full = self.scenario.with_full_noise();
+                let full = |model: &Model| full.belief(model, &self.outages, &self.track);
+                let task = Task {
+                    model,
+                    truths: &truths.collect::<Vec<TrueErrors>>(),
+                    drawn: None,
+                    track: &self.track,
+                    full: &full,
+                    // a reduced filter is made so that it is as honest as the full one
+                    filter: &full,
+                    aim: Aim::Mean,
+                    allow_smaller: true,
+                };
+                let factors = task.factors().map_err(|source| unfit(candidate, source))?;
+                Ok(scaled(model, &factors))
             }
         }
     }
 
-    fn tuned(
-        &self,
-        candidate: &Candidate,
-        model: &Model,
-        truths: &[TrueErrors],
-    ) -> Result<Model, Failure> {
-        let full = self.scenario.with_full_noise();
-        let full = |model: &Model| full.belief(model, &self.outages, &self.track);
-        let task = Task {
-            model,
-            truths,
-            drawn: None,
-            track: &self.track,
-            full: &full,
-            // a reduced filter is made so that it is as honest as the full one
-            filter: &full,
-            aim: Aim::Mean,
-            allow_smaller: true,
-        };
-        let factors = task.factors().map_err(|source| unfit(candidate, source))?;
-        Ok(scaled(model, &factors))
-    }
-
     /// What each candidate's filter believes.
     fn beliefs(&self, candidates: &[Candidate], models: &[Model]) -> Result<Vec<Belief>, Failure> {
-        let pairs: Vec<(&Candidate, &Model)> = candidates.iter().zip(models).collect();
-        let belief = |(candidate, model): &(&Candidate, &Model)| {
+        let belief = |(candidate, model): (&Candidate, &Model)| {
             let mut scenario = self.scenario.clone();
             scenario.filter.states = candidate.filter;
             scenario
                 .belief(model, &self.outages, &self.track)
                 .map_err(|source| unfit(candidate, source))
         };
-        pairs.par_iter().map(belief).collect()
+        candidates.par_iter().zip(models).map(belief).collect()
     }
 
     /// Every filter on the same fixes.
@@ -541,15 +535,6 @@ impl Drive {
         };
         beliefs.par_iter().map(score).collect()
     }
-}
-
-/// Ten times every standard deviation.
-fn tenfold(model: &Model) -> Model {
-    let factors = Sensor::ALL.map(|sensor| Factor {
-        sensor,
-        on_variance: 100.0,
-    });
-    scaled(model, &factors)
 }
 
 fn unfit(candidate: &Candidate, e: BeliefError) -> Failure {

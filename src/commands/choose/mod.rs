@@ -27,7 +27,7 @@ use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, mod
 use nav_sim_document::Document;
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_signal::imu::{Axis, Channel, Recording};
+use nav_sim_signal::imu::{Channel, Recording};
 use nav_sim_signal::noise::Model;
 use ranking::Ranking;
 use serde::Serialize;
@@ -106,8 +106,6 @@ pub struct ChoiceMade {
     #[serde(skip)]
     calibration: Calibration,
     #[serde(skip)]
-    note: CalibrationNote,
-    #[serde(skip)]
     estimator: Estimator,
     /// The winner's model, if it is inflated, and how.
     #[serde(skip)]
@@ -126,9 +124,7 @@ impl Answer for ChoiceMade {
             .inflated
             .as_ref()
             .map(|(model, how)| (model, how.name()));
-        let mut files = self
-            .calibration
-            .files_of(self.estimator, names, &self.note, inflated);
+        let mut files = self.calibration.files_of(self.estimator, names, inflated);
         files.push(OutputFile::whole("ranking.json", json(self)));
         files
     }
@@ -240,6 +236,11 @@ impl Command for Choose {
         let mut calibration =
             Calibration::new(groups, outcomes, settings, Some(bootstrap), &|_| {});
         calibration.turn_on.clear();
+        calibration.note = CalibrationNote {
+            reading: self.recordings.provenance(self.gaps),
+            seed: Some(seed),
+            inputs: context.inputs().to_vec(),
+        };
         let others = files
             .iter()
             .enumerate()
@@ -253,11 +254,6 @@ impl Command for Choose {
             ranking,
             abnormal: others.map(|(_, file)| file.file.clone()).collect(),
             calibration,
-            note: CalibrationNote {
-                reading: self.recordings.provenance(self.gaps),
-                seed: Some(seed),
-                inputs: context.inputs().to_vec(),
-            },
             estimator: winner.estimator,
             inflated: (winner.inflation != Inflation::None).then_some((model, winner.inflation)),
         })
@@ -321,24 +317,13 @@ fn nominal_hz(found_hz: f64, fix_hz: f64) -> f64 {
 
 /// The recordings, each with its signals' wavelet variances.
 fn units(measured: &Measured) -> Vec<Unit> {
-    let signals = || {
-        measured.groups.iter().flat_map(|group| {
-            let axis_of = move |axis: Option<Axis>| axis.or(group.scope.axis).unwrap_or(Axis::X);
-            let channel = move |axis| Channel {
-                sensor: group.scope.sensor,
-                axis: axis_of(axis),
-            };
-            group.replicates.iter().map(move |r| (channel(r.axis), r))
-        })
-    };
     let unit = |file: &FileReport| {
         let names: Vec<String> = file.recordings().map(|(name, _)| name).collect();
-        let replicates = signals()
-            .filter(|(_, r)| names.contains(&r.name))
-            .map(|(c, r)| (c, r.clone()));
+        let replicates = measured.replicates.iter();
+        let own = replicates.filter(|(_, r)| names.contains(&r.name));
         Unit {
             name: file.file.clone(),
-            replicates: replicates.collect(),
+            replicates: own.cloned().collect(),
         }
     };
     measured.report.files.iter().map(unit).collect()

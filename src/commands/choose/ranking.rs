@@ -8,7 +8,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 /// Fewest recordings of which an interval over recordings says anything: with three, its half-width is 2.5 times their
 /// standard deviation.
-pub(super) const FEWEST: usize = 4;
+const FEWEST: usize = 4;
 /// A recording whose errors are this many times as large in NEES as any filter believes is described by no candidate.
 const FAILS: f64 = 2.0 * 9.0;
 
@@ -115,22 +115,12 @@ impl Ranking {
             b.eligible.cmp(&a.eligible).then(order)
         });
         let without = |left_out: usize| {
-            let rest: Vec<&Fold> = all
-                .iter()
-                .enumerate()
-                .filter(|(k, _)| *k != left_out)
-                .map(|(_, f)| *f)
-                .collect();
+            let mut rest = all.clone();
+            rest.remove(left_out);
             best(&eligible, &rest).is_some_and(|other| other != winner)
         };
         let named = |k: usize| folds[k].0.clone();
-        let least = |fold: &Fold| {
-            fold.scores
-                .iter()
-                .map(|s| s.nees)
-                .fold(f64::INFINITY, f64::min)
-        };
-        let fails = |k: &usize| least(all[*k]) > FAILS;
+        let fails = |k: &usize| !all[*k].scores.iter().any(|s| s.nees <= FAILS);
         let tells = folds.len() >= FEWEST && placed.iter().any(|p| p.eligible && !p.tied);
         let tied = placed.iter().skip(1).filter(|p| p.place == "tied");
         Self {
@@ -476,13 +466,12 @@ impl Score {
             diverged,
             ..Self::of_ends(outages)
         };
-        Self {
-            log_score: if diverged > 0 {
-                f64::NEG_INFINITY
-            } else {
-                score.log_score
+        match diverged {
+            0 => score,
+            _ => Self {
+                log_score: f64::NEG_INFINITY,
+                ..score
             },
-            ..score
         }
     }
 

@@ -10,19 +10,19 @@ pub use targets::Target;
 pub(crate) use words::Quantity;
 
 use crate::app::inputs::files;
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Refuse, Result};
 use crate::io::atomic::Written;
 use crate::io::model_file;
 use crate::io::model_file::ModelFile;
 use crate::parse::{one_of, seconds_range};
 use nav_sim_document::{Document, Importance, Tone};
-use nav_sim_signal::imu::{Channel, Sensor};
+use nav_sim_signal::imu::{Axis, Sensor};
 use nav_sim_signal::noise::practical::{
     AxisParameters, Bias, Closure, Curve, Horizon, Pair, Policy, Ratio,
 };
-use nav_sim_signal::noise::{Composite, Model, Process};
+use nav_sim_signal::noise::{Composite, Process};
 use serde::Serialize;
-use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Longest averaging time at which a minimum is believed of a model that no calibration made (s).
@@ -59,11 +59,22 @@ fn horizon(text: &str) -> Result<Horizon, String> {
     Ok(Horizon { from_s, to_s })
 }
 
-/// The file of a target, and what is said of it.
+/// An export as it is printed and written; SI units in its JSON.
+#[derive(Serialize)]
 pub struct ExportAnswer {
+    schema_version: u32,
+    target: &'static str,
+    model: String,
+    rate_hz: f64,
+    policy: &'static str,
+    horizon_s: [f64; 2],
+    entries: Vec<Entry>,
+    sensors: BTreeMap<&'static str, SensorExport>,
+    warnings: Vec<String>,
+    #[serde(skip)]
+    summary: Vec<String>,
+    #[serde(skip)]
     text: String,
-    json: Value,
-    document: Document,
 }
 
 impl Command for ExportArgs {
@@ -84,32 +95,35 @@ impl Command for ExportArgs {
     fn run(&self, _: &Context<'_>) -> Result<ExportAnswer> {
         let file = model_file::read(&self.model)?;
         let shown = self.model.display().to_string();
-        let export = exported(&file, self.target, self.policy, self.horizon)
+        let export = Export::new(&file, self.target, self.policy, self.horizon)
             .map_err(|failure| failure.within(&shown))?;
-        let mut document = Document::new(self.target.name, Tone::Good, [""; 0]);
-        for line in export.summary() {
-            document.note(Importance::Remark, line);
-        }
-        for doubt in export.doubts() {
-            document.note(Importance::Warning, doubt);
-        }
         Ok(ExportAnswer {
+            schema_version: 1,
+            target: self.target.name,
+            rate_hz: export.rate_hz,
+            policy: self.policy.name(),
+            horizon_s: [self.horizon.from_s, self.horizon.to_s],
+            entries: export.filled(&[]).0,
+            warnings: export.doubts(),
+            summary: export.summary(),
             text: export.text(&shown),
-            json: export.json(&shown),
-            document,
+            model: shown,
+            sensors: export.sensors.map(|s| (s.sensor.name(), s)).into(),
         })
-    }
-}
-
-impl Serialize for ExportAnswer {
-    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        self.json.serialize(to)
     }
 }
 
 impl Answer for ExportAnswer {
     fn document(&self) -> Document {
-        self.document.clone()
+        let mut document = Document::new(self.target, Tone::Good, [""; 0]);
+        let mut note = |importance, lines: &[String]| {
+            lines
+                .iter()
+                .for_each(|line| document.note(importance, line));
+        };
+        note(Importance::Remark, &self.summary);
+        note(Importance::Warning, &self.warnings);
+        document
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {
@@ -117,24 +131,9 @@ impl Answer for ExportAnswer {
     }
 }
 
-/// Options for turning a model into parameters.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
-    /// Which pair stands for the model.
-    pub policy: Policy,
-    /// Over which averaging times.
-    pub horizon: Horizon,
-    /// Longest averaging time at which a minimum of the Allan deviation is believed (s).
-    pub range_s: f64,
-    /// Standard deviation of the turn-on bias of accelerometer (m/s²) and gyroscope (rad/s), where known.
-    pub turn_on: [Option<f64>; 2],
-    /// Disagreement of the model with its recordings, in words.
-    pub misfit: Option<String>,
-}
-
 /// One value of the exported file.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub(crate) struct Entry {
+#[derive(Serialize)]
+struct Entry {
     /// Key, as the target writes it.
     pub key: String,
     /// The value, in the target's unit.
@@ -149,11 +148,13 @@ pub(crate) struct Entry {
 }
 
 /// Known figures of one sensor.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 struct SensorExport {
+    #[serde(skip)]
     sensor: Sensor,
-    /// Parameters of each axis that the model has, and its Allan deviation at 1 s (units).
-    axes: Vec<(Channel, AxisParameters, f64)>,
+    /// Allan deviation at 1 s of each axis that the model has (units).
+    #[serde(skip)]
+    axes: Vec<(Axis, f64)>,
     /// Parameters of the largest axis at each averaging time: what is exported.
     largest: AxisParameters,
     /// The pair that the target is given.
@@ -165,6 +166,7 @@ struct SensorExport {
     bias_sd: f64,
     /// Standard deviation of the turn-on bias, where the model states one (units).
     turn_on: Option<f64>,
+    /// Largest share of the Allan variance that no pair has.
     left_out: Ratio,
 }
 
@@ -174,7 +176,10 @@ pub struct Export {
     target: Target,
     /// Sample rate of the model, for values per sample (Hz).
     rate_hz: f64,
-    settings: Settings,
+    policy: Policy,
+    horizon: Horizon,
+    /// Disagreement of the model with its recordings, in words.
+    misfit: Option<String>,
     /// Accelerometer and gyroscope.
     sensors: [SensorExport; 2],
 }
@@ -193,67 +198,63 @@ pub struct Export {
 /// # Errors
 /// As [`exported`].
 pub fn export(file: &ModelFile, name: &str, target: Target) -> Result<String, Failure> {
-    Ok(exported(file, target, Policy::Matched, Horizon::default())?.text(name))
-}
-
-/// The parameters of a model in the terms of a target: the pair of that policy, over averages of that horizon.
-///
-/// # Errors
-/// When a sensor is missing or has no noise over the horizon, or the target has not what a strict pair needs.
-pub fn exported(
-    file: &ModelFile,
-    target: Target,
-    policy: Policy,
-    horizon: Horizon,
-) -> Result<Export, Failure> {
-    let turn_on = file.turn_on.unwrap_or_default();
-    let settings = Settings {
-        policy,
-        horizon,
-        range_s: file.observed_s().unwrap_or(LONGEST_S).max(horizon.to_s),
-        turn_on: Sensor::ALL.map(|sensor| turn_on.sigma(sensor)),
-        misfit: file.misfit().map(|misfit| misfit.to_string()),
-    };
-    Export::new(target, &file.model, &file.missing, settings)
+    let export = Export::new(file, target, Policy::Matched, Horizon::default())?;
+    Ok(export.text(name))
 }
 
 impl Export {
-    /// The parameters of a model; axes in `missing` are not in it.
+    /// The parameters of a model in the terms of a target: the pair of that policy, over averages of that horizon.
     ///
     /// # Errors
-    /// When a sensor is missing or has no noise over the horizon, or the horizon does not suit the rate.
+    /// When a sensor is missing or has no noise over the horizon, or the target has not what a strict pair needs.
     pub fn new(
+        file: &ModelFile,
         target: Target,
-        model: &Model,
-        missing: &[Channel],
-        settings: Settings,
+        policy: Policy,
+        horizon: Horizon,
     ) -> Result<Self, Failure> {
-        let Settings {
-            policy, horizon, ..
-        } = settings;
+        let rate_hz = file.model.rate_hz;
+        let axes = |sensor: Sensor| -> Vec<(Axis, &Composite)> {
+            let own = file.present().filter(|c| c.sensor == sensor);
+            own.map(|c| (c.axis, file.model.axis(c))).collect()
+        };
         let mut curves = Vec::new();
         for sensor in Sensor::ALL {
-            let has = |c: &Channel| c.sensor == sensor && !missing.contains(c);
-            let axes: Vec<(Channel, &Composite)> = Channel::ALL
-                .into_iter()
-                .filter(has)
-                .map(|c| (c, model.axis(c)))
-                .collect();
-            let noise: Vec<&Composite> = axes.iter().map(|(_, noise)| *noise).collect();
+            let noise: Vec<&Composite> = axes(sensor).iter().map(|(_, noise)| *noise).collect();
             check(target, policy, sensor, &noise)?;
-            let curve = Curve::largest(&noise, model.rate_hz, horizon)
-                .map_err(|e| Failure::input(format!("{}: {e}", sensor.name())))?;
-            curves.push((axes, curve));
+            let curve = Curve::largest(&noise, rate_hz, horizon);
+            curves.push(curve.refuse_within(sensor)?);
         }
         let bias = if target.has_one_time && policy != Policy::Strict {
-            Bias::MarkovOf(curves[0].1.shared_correlation_time_s(&curves[1].1, policy))
+            Bias::MarkovOf(curves[0].shared_correlation_time_s(&curves[1], policy))
         } else {
             target.bias
         };
-        let of_sensor = |(axes, curve): &(Vec<(Channel, &Composite)>, Curve)| {
-            SensorExport::new(model.rate_hz, axes, curve, bias, &settings)
+        let range_s = file.observed_s().unwrap_or(LONGEST_S).max(horizon.to_s);
+        let second = (rate_hz.round() as u32).max(1);
+        let of_sensor = |sensor: Sensor| -> Result<SensorExport, Failure> {
+            let (curve, axes) = (&curves[sensor as usize], axes(sensor));
+            let noise: Vec<&Composite> = axes.iter().map(|(_, noise)| *noise).collect();
+            let largest = AxisParameters::of(&noise, rate_hz, horizon, policy, range_s);
+            let largest = largest.refuse_within(sensor)?;
+            let exported = curve.pair(policy, bias);
+            let turn_on = file.turn_on.unwrap_or_default().sigma(sensor);
+            // A random walk moves so far within the horizon.
+            let walked = largest.walk.walk * horizon.to_s.sqrt();
+            let spread = largest.markov.markov.map_or(walked, |m| m.sigma);
+            let deviation = |noise: &Composite| noise.allan_variance(second).sqrt();
+            Ok(SensorExport {
+                sensor,
+                axes: axes.iter().map(|(axis, n)| (*axis, deviation(n))).collect(),
+                largest,
+                exported,
+                closure: exported.closure(curve),
+                bias_sd: turn_on.unwrap_or(spread),
+                turn_on,
+                left_out: curve.left_out(),
+            })
         };
-        let sensors = [of_sensor(&curves[0])?, of_sensor(&curves[1])?];
+        let sensors = [of_sensor(Sensor::Accel)?, of_sensor(Sensor::Gyro)?];
         if let [Some(accel), Some(gyro)] = sensors.each_ref().map(|s| s.exported.markov)
             && target.has_one_time
             && (accel.t_corr_s / gyro.t_corr_s - 1.0).abs() > 1e-9
@@ -266,22 +267,18 @@ impl Export {
         }
         Ok(Self {
             target,
-            rate_hz: model.rate_hz,
-            settings,
+            rate_hz,
+            policy,
+            horizon,
+            misfit: file.misfit().map(|misfit| misfit.to_string()),
             sensors,
         })
     }
 
-    /// The file: a head of comments that says what it is and how good it is, then the parameters. `model` is the name of
-    /// the model file.
+    /// The text of the file; `model` is its name in the head.
     #[must_use]
     pub fn text(&self, model: &str) -> String {
         self.filled(&self.head(model)).1
-    }
-
-    /// The values of the file.
-    pub(crate) fn entries(&self) -> Vec<Entry> {
-        self.filled(&[]).0
     }
 }
 
@@ -316,53 +313,6 @@ fn check(
             Err(Failure::input(message).hint(MATCHED))
         }
         _ => Ok(()),
-    }
-}
-
-impl SensorExport {
-    fn new(
-        rate_hz: f64,
-        axes: &[(Channel, &Composite)],
-        curve: &Curve,
-        bias: Bias,
-        settings: &Settings,
-    ) -> Result<Self, Failure> {
-        let Settings {
-            policy,
-            horizon,
-            range_s,
-            turn_on,
-            ..
-        } = settings;
-        let sensor = axes[0].0.sensor;
-        let parameters = |axes: &[&Composite]| {
-            AxisParameters::of(axes, rate_hz, *horizon, *policy, *range_s)
-                .map_err(|e| Failure::input(format!("{}: {e}", sensor.name())))
-        };
-        let second = (rate_hz.round() as u32).max(1);
-        let axis = |(channel, noise): &(Channel, &Composite)| {
-            Ok((
-                *channel,
-                parameters(&[noise])?,
-                noise.allan_variance(second).sqrt(),
-            ))
-        };
-        let all: Vec<&Composite> = axes.iter().map(|(_, noise)| *noise).collect();
-        let largest = parameters(&all)?;
-        let exported = curve.pair(*policy, bias);
-        let turn_on = turn_on[sensor as usize];
-        let walked = largest.walk.walk * horizon.to_s.sqrt();
-        let spread = largest.markov.markov.map_or(walked, |m| m.sigma);
-        Ok(Self {
-            sensor,
-            axes: axes.iter().map(axis).collect::<Result<_, Failure>>()?,
-            largest,
-            exported,
-            closure: exported.closure(curve),
-            bias_sd: turn_on.unwrap_or(spread),
-            turn_on,
-            left_out: curve.left_out(),
-        })
     }
 }
 

@@ -1,6 +1,8 @@
 use super::targets::number;
 use super::*;
-use nav_sim_signal::noise::{Ar1, GaussMarkov, Process, Quantization, RandomWalk, White};
+use crate::io::model_file::TurnOn;
+use nav_sim_signal::imu::Channel;
+use nav_sim_signal::noise::{Ar1, GaussMarkov, Model, Process, Quantization, RandomWalk, White};
 use nav_sim_signal::units::{DEG, STANDARD_GRAVITY};
 
 const RATE: f64 = 200.0;
@@ -22,20 +24,25 @@ fn markov(sigma: f64, t_corr_s: f64) -> Process {
     Process::GaussMarkov(GaussMarkov::new(1.0 / t_corr_s, sigma * sigma, RATE).unwrap())
 }
 
-fn settings(policy: Policy) -> Settings {
-    let turn_on = [Some(0.05), Some(10.0 * DEG / 3600.0)];
-    Settings {
-        policy,
-        horizon: Horizon::default(),
-        range_s: 1e4,
-        turn_on,
-        misfit: None,
+/// A model with turn-on biases of 0.05 m/s² and 10 °/h.
+fn file(model: Model) -> ModelFile {
+    let turn_on = TurnOn {
+        accel_m_s2: Some([0.05; 3]),
+        gyro_rad_s: Some([10.0 * DEG / 3600.0; 3]),
+    };
+    ModelFile {
+        turn_on: Some(turn_on),
+        ..ModelFile::new(model)
     }
+}
+
+fn exported(target: &str, file: &ModelFile, policy: Policy) -> Result<Export, Failure> {
+    Export::new(file, target.parse().unwrap(), policy, Horizon::default())
 }
 
 fn export(target: &str, accel: Vec<Process>, gyro: Vec<Process>, policy: Policy) -> Export {
     let model = Model::pooled(RATE, &Composite::new(accel), &Composite::new(gyro));
-    Export::new(target.parse().unwrap(), &model, &[], settings(policy)).unwrap()
+    exported(target, &file(model), policy).unwrap()
 }
 
 fn walks(target: &str) -> Export {
@@ -62,7 +69,7 @@ fn markovs(target: &str) -> Export {
 }
 
 fn value(export: &Export, key: &str) -> f64 {
-    let found = export.entries().into_iter().find(|e| e.key == key);
+    let found = export.filled(&[]).0.into_iter().find(|e| e.key == key);
     found.unwrap_or_else(|| panic!("{key}")).value
 }
 
@@ -174,7 +181,7 @@ fn autopilots_grow_as_the_noise_does() {
 #[test]
 fn values_outside_documented_ranges_are_told() {
     let export = walks("px4");
-    let entries = export.entries();
+    let entries = export.filled(&[]).0;
     let accel = entries.iter().find(|e| e.key == "EKF2_ACC_NOISE").unwrap();
     assert!((accel.wanted.unwrap() / (N_A / 0.1) - 1.0).abs() < 1e-12);
     assert_eq!(accel.value, 0.01);
@@ -288,7 +295,7 @@ fn every_value_has_its_unit_on_its_line() {
             text.contains(" × the model") && text.contains("200 Hz"),
             "{text}"
         );
-        for entry in export.entries() {
+        for entry in export.filled(&[]).0 {
             let line = text.lines().find(|l| {
                 l.contains(entry.key.rsplit('.').next().unwrap())
                     && l.contains(&number(entry.value.abs()))
@@ -426,12 +433,8 @@ fn doubts_are_told() {
 #[test]
 fn a_walk_begins_with_what_it_reaches() {
     let axis = |n, k| Composite::new(vec![white(n), walk(k)]);
-    let unstated = Settings {
-        turn_on: [None; 2],
-        ..settings(Policy::Strict)
-    };
     let model = Model::pooled(RATE, &axis(N_A, K_A), &axis(N_G, K_G));
-    let export = Export::new("pyins".parse().unwrap(), &model, &[], unstated).unwrap();
+    let export = exported("pyins", &ModelFile::new(model), Policy::Strict).unwrap();
     for (key, k) in [("accel_bias_sd", K_A), ("gyro_bias_sd", K_G)] {
         assert!(
             (value(&export, key) / (10.0 * k) - 1.0).abs() < 1e-6,
@@ -447,27 +450,16 @@ fn axes_that_differ_are_told() {
     let gyro = Composite::new(vec![white(N_G), walk(K_G)]);
     let mut model = Model::pooled(RATE, &axis(1.0), &gyro);
     model.axes[2] = axis(2.0);
-    let export = Export::new(
-        "kalibr".parse().unwrap(),
-        &model,
-        &[],
-        settings(Policy::Strict),
-    )
-    .unwrap();
+    let mut file = file(model);
+    let export = exported("kalibr", &file, Policy::Strict).unwrap();
     assert_values(&export, &[("accelerometer_noise_density", 2.0 * N_A)]);
     let told = export.doubts().join("\n");
     assert!(
         told.contains("accel: axes differ (Allan deviation at 1 s: x 0.50, y 0.50, z 1.00)"),
         "{told}"
     );
-    let missing: Vec<Channel> = Channel::named("gyro");
-    let refused = Export::new(
-        "kalibr".parse().unwrap(),
-        &model,
-        &missing,
-        settings(Policy::Strict),
-    )
-    .unwrap_err();
+    file.missing = Channel::named("gyro");
+    let refused = exported("kalibr", &file, Policy::Strict).unwrap_err();
     assert_eq!(
         refused.to_string(),
         "the model has no gyro, and kalibr needs both sensors"
@@ -492,14 +484,8 @@ fn a_strict_pair_does_not_drop_the_bias() {
             &Composite::new(vec![white(N_A), bias()]),
             &Composite::new(vec![white(N_G), bias()]),
         );
-        Export::new(
-            target.parse().unwrap(),
-            &model,
-            &[],
-            settings(Policy::Strict),
-        )
-        .unwrap_err()
-        .to_string()
+        let refused = exported(target, &file(model), Policy::Strict);
+        refused.unwrap_err().to_string()
     };
     // what does not wander has nothing to drop
     export("kalibr", vec![white(N_A)], vec![white(N_G)], Policy::Strict);

@@ -1,12 +1,11 @@
 //! Head of an exported file, its warnings and its JSON.
 
-use super::{Entry, Export, SensorExport, Settings};
+use super::{Entry, Export, SensorExport};
 use nav_sim_calibration::percent;
 use nav_sim_document::readable;
 use nav_sim_signal::imu::Sensor;
-use nav_sim_signal::noise::practical::{AxisParameters, Markov, Pair, Policy, Ratio};
+use nav_sim_signal::noise::practical::{Pair, Policy, Ratio};
 use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
-use serde_json::{Map, Value, json};
 
 /// A pair is in doubt when its Allan deviation is off by more than this.
 const TOLERANCE: f64 = 1.5;
@@ -14,7 +13,6 @@ const TOLERANCE: f64 = 1.5;
 const NOTABLE: f64 = 0.1;
 
 /// A quantity of a sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Quantity {
     /// White noise density N: velocity or angle random walk.
     Density,
@@ -25,52 +23,32 @@ pub(crate) enum Quantity {
 }
 
 impl Quantity {
-    /// Its SI unit, the unit of data sheets in ASCII as `nav-sim datasheet` reads it, and how many of those one SI unit is.
-    const fn units(self, sensor: Sensor) -> (&'static str, &'static str, f64) {
+    /// Unit of data sheets, and the factor from SI to it.
+    pub(crate) const fn sheet(self, sensor: Sensor) -> (&'static str, f64) {
         const ROOT_HOUR: f64 = 60.0;
         match (self, sensor) {
-            (Self::Density, Sensor::Accel) => ("m/s^2/sqrt(Hz)", "m/s/sqrt(h)", ROOT_HOUR),
-            (Self::Density, Sensor::Gyro) => ("rad/s/sqrt(Hz)", "deg/sqrt(h)", ROOT_HOUR / DEG),
-            (Self::Walk, Sensor::Accel) => ("m/s^3/sqrt(Hz)", "m/s^2/sqrt(h)", ROOT_HOUR),
-            (Self::Walk, Sensor::Gyro) => (
-                "rad/s^2/sqrt(Hz)",
-                "deg/h/sqrt(h)",
-                ROOT_HOUR / DEG_PER_HOUR,
-            ),
-            (Self::Bias, Sensor::Accel) => ("m/s²", "ug", 1e6 / STANDARD_GRAVITY),
-            (Self::Bias, Sensor::Gyro) => ("rad/s", "deg/h", 1.0 / DEG_PER_HOUR),
+            (Self::Density, Sensor::Accel) => ("m/s/sqrt(h)", ROOT_HOUR),
+            (Self::Density, Sensor::Gyro) => ("deg/sqrt(h)", ROOT_HOUR / DEG),
+            (Self::Walk, Sensor::Accel) => ("m/s^2/sqrt(h)", ROOT_HOUR),
+            (Self::Walk, Sensor::Gyro) => ("deg/h/sqrt(h)", ROOT_HOUR / DEG_PER_HOUR),
+            (Self::Bias, Sensor::Accel) => ("ug", 1e6 / STANDARD_GRAVITY),
+            (Self::Bias, Sensor::Gyro) => ("deg/h", 1.0 / DEG_PER_HOUR),
         }
     }
 
-    /// Its unit on data sheets, and how many of them one SI unit is.
-    pub(crate) const fn sheet(self, sensor: Sensor) -> (&'static str, f64) {
-        let (_, unit, factor) = self.units(sensor);
-        (unit, factor)
-    }
-
-    /// As text in the unit of data sheets.
     fn text(self, x: f64, sensor: Sensor) -> String {
-        let (_, unit, factor) = self.units(sensor);
+        let (unit, factor) = self.sheet(sensor);
         format!("{} {unit}", readable(x * factor))
-    }
-
-    /// As JSON, in SI and in the unit of data sheets.
-    fn json(self, x: f64, sensor: Sensor) -> Value {
-        let (si, unit, factor) = self.units(sensor);
-        json!({ "value": x, "unit": si, "data_sheet": { "value": x * factor, "unit": unit } })
     }
 }
 
 impl Export {
     /// The comment at the head of the file.
     pub(super) fn head(&self, model: &str) -> Vec<String> {
-        let (horizon, name) = (self.settings.horizon, self.target.name);
+        let (horizon, name) = (self.horizon, self.target.name);
         let mut lines = vec![format!(
             "{name}: {model}, {} Hz, policy {} over averages of {} s to {} s (nav-sim export)",
-            self.rate_hz,
-            self.settings.policy.name(),
-            horizon.from_s,
-            horizon.to_s
+            self.rate_hz, self.policy, horizon.from_s, horizon.to_s
         )];
         lines.extend(self.summary());
         lines.extend(self.doubts().into_iter().map(|d| format!("Warning: {d}")));
@@ -92,13 +70,13 @@ impl Export {
 
     /// Warnings before pasting, the most important first.
     pub(crate) fn doubts(&self) -> Vec<String> {
-        let misfit = self.settings.misfit.iter();
+        let misfit = self.misfit.iter();
         let mut doubts: Vec<String> = misfit.map(|misfit| format!("the model {misfit}")).collect();
         for s in &self.sensors {
-            let own = s.doubts(self.settings.policy).into_iter();
+            let own = s.doubts(self.policy).into_iter();
             doubts.extend(own.map(|doubt| format!("{}: {doubt}", s.sensor.name())));
         }
-        doubts.extend(self.entries().iter().filter_map(|e| {
+        doubts.extend(self.filled(&[]).0.iter().filter_map(|e| {
             let (Entry { key, value, .. }, wanted) = (e, e.wanted?);
             Some(format!(
                 "{key} is {value:.3e}, the end of its range; the model says {wanted:.3e}"
@@ -110,25 +88,6 @@ impl Export {
             );
         }
         doubts
-    }
-
-    /// As a JSON document.
-    pub(crate) fn json(&self, model: &str) -> Value {
-        let Settings {
-            horizon, policy, ..
-        } = &self.settings;
-        let [accel, gyro] = self.sensors.each_ref().map(SensorExport::json);
-        json!({
-            "schema_version": 1,
-            "target": self.target.name,
-            "model": model,
-            "rate_hz": self.rate_hz,
-            "policy": policy.name(),
-            "horizon_s": [horizon.from_s, horizon.to_s],
-            "entries": self.entries(),
-            "sensors": { "accel": accel, "gyro": gyro },
-            "warnings": self.doubts(),
-        })
     }
 }
 
@@ -165,11 +124,8 @@ impl SensorExport {
                 "quantization noise or drift, {share} of the Allan variance at {at}, is left out"
             ));
         }
-        let largest = self.axes.iter().map(|(_, _, d)| *d).fold(0.0, f64::max);
-        let shares = self
-            .axes
-            .iter()
-            .map(|(channel, _, d)| (channel.axis, d / largest));
+        let largest = self.axes.iter().map(|(_, d)| *d).fold(0.0, f64::max);
+        let shares = self.axes.iter().map(|(axis, d)| (axis, d / largest));
         if shares.clone().any(|(_, share)| share < 1.0 - NOTABLE) {
             let shares: Vec<String> = shares.map(|(axis, d)| format!("{axis} {d:.2}")).collect();
             let shares = shares.join(", ");
@@ -205,59 +161,6 @@ impl SensorExport {
             figure(Quantity::Density, pair.density)
         )
     }
-
-    fn json(&self) -> Value {
-        let unit = self.sensor.unit();
-        let axes: Map<String, Value> = self
-            .axes
-            .iter()
-            .map(|(channel, found, deviation)| {
-                let mut value = parameters(found, self.sensor);
-                value["allan_deviation_at_1_s"] = json!({ "value": deviation, "unit": unit });
-                (channel.axis.name().to_owned(), value)
-            })
-            .collect();
-        let ratio = |r: Ratio| json!({ "ratio": r.ratio, "tau_s": r.tau_s });
-        json!({
-            "exported": pair(&self.exported, self.sensor),
-            "closure": { "lowest": ratio(self.closure.lowest), "highest": ratio(self.closure.highest) },
-            "bias_sd": { "value": self.bias_sd, "unit": unit },
-            "largest": parameters(&self.largest, self.sensor),
-            "axes": axes,
-        })
-    }
-}
-
-/// The parameters of an axis, each in SI and in the unit of data sheets.
-pub(crate) fn parameters(p: &AxisParameters, sensor: Sensor) -> Value {
-    let minimum = p.minimum.map(|m| {
-        let b = Quantity::Bias.json(m.bias_instability(), sensor);
-        json!({ "tau_s": m.tau_s, "allan_deviation": m.deviation, "bias_instability": b })
-    });
-    let correlated = p.correlated.iter().map(|c| {
-        let mut value = markov(&c.markov, sensor);
-        value["process"] = json!(c.label);
-        value
-    });
-    json!({
-        "white_and_walk": pair(&p.walk, sensor),
-        "white_and_markov": pair(&p.markov, sensor),
-        "minimum": minimum,
-        "correlated": correlated.collect::<Vec<_>>(),
-    })
-}
-
-fn pair(p: &Pair, sensor: Sensor) -> Value {
-    let crossover = p.crossover_s();
-    let mut n = Quantity::Density.json(p.density, sensor);
-    n["governs"] = json!({ "from_s": null, "to_s": crossover });
-    let mut k = Quantity::Walk.json(p.walk, sensor);
-    k["governs"] = json!({ "from_s": crossover, "to_s": null });
-    json!({ "n": n, "k": k, "markov": p.markov.as_ref().map(|m| markov(m, sensor)) })
-}
-
-fn markov(m: &Markov, sensor: Sensor) -> Value {
-    json!({ "sigma": Quantity::Bias.json(m.sigma, sensor), "t_corr_s": m.t_corr_s })
 }
 
 fn seconds(t_s: f64) -> String {

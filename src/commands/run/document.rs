@@ -1,6 +1,7 @@
 //! The document of a run: verdict, outages, notes, charts and tables.
 
 use super::{Navigation, RunAnswer};
+use crate::report::trajectory::track_map;
 use crate::report::verdict::requirement_line;
 use crate::report::verdict::verdict_lines;
 use crate::report::{reduction_doubt, reduction_line, tone, unexpected_line};
@@ -50,7 +51,10 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
     let mut page = Document::new(&format!("INS/GNSS {}", summary.method), tone, lines);
     notes(summary, answer, &mut page);
     page.facts(&assumptions(summary, answer));
-    page.chart(&answer.track.map("Reference trajectory", &windows), "");
+    page.chart(
+        &track_map(&answer.track, "Reference trajectory", &windows),
+        "",
+    );
     page.chart(&horizontal(epochs, summary), HORIZONTAL);
     page.chart(&fan_chart(fan, summary), FAN);
     let shown = largest(summary, OUTAGES);

@@ -15,7 +15,7 @@ use crate::io::scenario_file;
 use crate::parse;
 use crate::report::tables::{epochs_csv, fan_csv, runs_csv};
 use crate::report::verdict::requirement_line;
-use crate::report::{TrajectorySeries, json};
+use crate::report::{json, trajectory};
 use nav_sim_document::{Document, svg};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::metrics::{Requirement, Summary};
@@ -94,7 +94,7 @@ pub struct RunAnswer {
     pub inputs: Vec<Input>,
     /// The reference trajectory, drawn.
     #[serde(skip)]
-    pub track: TrajectorySeries,
+    pub track: Vec<(f64, [f64; 2])>,
 }
 
 fn throughput<S: serde::Serializer>(
@@ -439,7 +439,7 @@ impl PreparedRun<'_> {
             }
         }
         Ok(RunAnswer {
-            track: TrajectorySeries::of(&inputs.trajectory),
+            track: trajectory::track(&inputs.trajectory),
             inputs: context.inputs().to_vec(),
             navigation,
             origin,

@@ -57,6 +57,12 @@ pub struct ModelFile {
 }
 
 impl ModelFile {
+    /// Axes that the file has.
+    pub fn present(&self) -> impl Iterator<Item = Channel> {
+        let is_present = |channel: &Channel| !self.missing.contains(channel);
+        Channel::ALL.into_iter().filter(is_present)
+    }
+
     /// What is doubtful about the file at this path, in words.
     pub(crate) fn doubts(&self, path: &std::path::Path) -> Vec<String> {
         let shown = path.display();

@@ -79,7 +79,7 @@ pub enum Bias {
 }
 
 /// A Gauss-Markov process.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Markov {
     /// Standard deviation (units).
     pub sigma: f64,
@@ -95,7 +95,7 @@ impl Markov {
 }
 
 /// White noise and a bias: what is exported.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Pair {
     /// White noise density N (units/√Hz).
     pub density: f64,
@@ -157,7 +157,7 @@ impl Pair {
 }
 
 /// Ratio of Allan deviations, exported pair to model, at one averaging time.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Ratio {
     /// Allan deviation of the pair over that of the model.
     pub ratio: f64,
@@ -166,7 +166,7 @@ pub struct Ratio {
 }
 
 /// The closure certificate: how an exported pair compares with the model over the horizon.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Closure {
     /// Smallest ratio over the horizon.
     pub lowest: Ratio,
@@ -298,10 +298,8 @@ impl Curve {
         let density = largest(&|axis| white_density(axis.amplitude_of(Kind::White), self.rate_hz));
         let k = largest(&|axis| walk_density(axis.amplitude_of(Kind::RandomWalk), self.rate_hz));
         let slowest = self.axes.iter().filter_map(|axis| {
-            let of_axis = correlated(axis, self.rate_hz);
-            of_axis
-                .into_iter()
-                .map(|c| c.markov)
+            let own = axis.processes.iter();
+            own.filter_map(|p| markov_of(p, self.rate_hz))
                 .max_by(|a, b| a.t_corr_s.total_cmp(&b.t_corr_s))
         });
         // Of each axis the slowest, of these the largest: a filter has one bias state an axis, and one figure
@@ -560,7 +558,7 @@ fn least(low: f64, high: f64, steps: u32, f: impl Fn(f64) -> f64) -> (f64, f64) 
 // The parameters of one axis, each with the averaging times that it governs.
 
 /// A minimum of the Allan deviation.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Minimum {
     /// Averaging time (s).
     pub tau_s: f64,
@@ -597,17 +595,8 @@ impl Minimum {
     }
 }
 
-/// An AR1 or GM of the model, in continuous terms.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CorrelatedProcess {
-    /// Label within the model: "AR1_2".
-    pub label: String,
-    /// Standard deviation and correlation time.
-    pub markov: Markov,
-}
-
 /// Practitioners' parameters of an axis.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct AxisParameters {
     /// N and K of the policy: white noise and random walk.
     pub walk: Pair,
@@ -615,8 +604,6 @@ pub struct AxisParameters {
     pub markov: Pair,
     /// The lowest minimum of the Allan deviation within the range; none where it still falls, or rises from the start.
     pub minimum: Option<Minimum>,
-    /// The correlated processes of the model.
-    pub correlated: Vec<CorrelatedProcess>,
 }
 
 impl AxisParameters {
@@ -636,26 +623,8 @@ impl AxisParameters {
             walk: curve.pair(policy, Bias::Walk),
             markov: curve.pair(policy, Bias::Markov),
             minimum: Minimum::of(axes, rate_hz, range_s),
-            correlated: axes
-                .iter()
-                .take(1)
-                .flat_map(|axis| correlated(axis, rate_hz))
-                .collect(),
         })
     }
-}
-
-/// The AR1 and GM of an axis that have a correlation time.
-fn correlated(axis: &Composite, rate_hz: f64) -> Vec<CorrelatedProcess> {
-    let labelled = axis.labels().into_iter().zip(&axis.processes);
-    labelled
-        .filter_map(|(label, p)| {
-            Some(CorrelatedProcess {
-                label,
-                markov: markov_of(p, rate_hz)?,
-            })
-        })
-        .collect()
 }
 
 #[cfg(test)]

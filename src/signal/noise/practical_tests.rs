@@ -217,9 +217,6 @@ fn the_bias_instability_is_the_minimum_over_its_floor() {
     );
     assert_eq!(parameters(vec![wn(n)]).minimum, None);
     assert_eq!(parameters(vec![rw(n)]).minimum, None);
-    let correlated = parameters(vec![wn(n), gm(2e-4, 30.0)]).correlated;
-    assert_eq!(correlated.len(), 1);
-    assert!((correlated[0].markov.t_corr_s - 30.0).abs() < 1e-9 && correlated[0].label == "GM");
 }
 
 #[test]
