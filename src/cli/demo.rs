@@ -170,8 +170,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     drive::tell(&document, &document.terminal(WIDTH), session);
     atomic::write(&out.join("comparison.json"), report::json(&found))?;
     write_figures(&found, out, &figures, session)?;
-    let links = links();
-    atomic::write(&page, Comparison { links, ..found }.document().html())?;
+    let (mut document, links) = (document, links());
+    document.folded("Pages of the single results", |page| page.links(&links));
+    atomic::write(&page, document.html())?;
     session.say(format!("all results on one page: {}", page.display()));
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! `nav-sim compare`: run directories → ratios between runs.
 
-use crate::app::{Answer, Command, Context, Failure, Manifest, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Failure, Manifest, Out, OutputFile, Refuse, Result};
 use crate::commands::paper::PaperFigure;
 use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
@@ -8,16 +8,15 @@ use crate::io::atomic::Written;
 use crate::report::comparison_table::{CandidateResult, Label, layout, ratio_table, separate};
 use crate::report::csv::{csv, flat};
 use crate::report::json;
-use crate::report::verdict::{SPOKEN, axis_of, gravest, tone, verdict_counts};
+use crate::report::verdict::{SPOKEN, axis_of, tone, verdict_counts};
 use nav_sim_document::{
     Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
 };
-use nav_sim_navigation::metrics::{
-    self, ComparisonError, OutageComparison, PerState, StateRatio, Verdict,
-};
+use nav_sim_navigation::metrics::{self, OutageComparison, PerState, StateRatio};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use serde::Serialize;
+use serde_json::Value;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -133,7 +132,7 @@ pub(crate) fn between<'a>(
         paired: true,
         verdicts: vec![VerdictRow {
             run: name.to_owned(),
-            verdict: directory.verdict,
+            verdict: directory.summary["verdict"].clone(),
         }],
         rows: Vec::new(),
         consistency: Vec::new(),
@@ -142,7 +141,6 @@ pub(crate) fn between<'a>(
         doubts: Vec::new(),
         states,
         form: None,
-        links: Vec::new(),
     };
     for (run, candidate, is_reference) in runs {
         let differences = differences(candidate, directory);
@@ -169,7 +167,7 @@ pub(crate) fn between<'a>(
         if !candidate.is_reference {
             found.verdicts.push(VerdictRow {
                 run: candidate.run.clone(),
-                verdict: candidate.verdict,
+                verdict: candidate.verdict.clone(),
             });
         }
         for (outage, comparison) in candidate.outages.iter().enumerate() {
@@ -218,14 +216,15 @@ fn compared(
                 .hint("compare runs along one and the same trajectory file"),
         );
     }
-    let outages = metrics::compare(&candidate.experiment, &reference.experiment, is_paired);
-    let mut outages = outages.map_err(|e| {
-        let failure = Failure::input(format!("{run}: {e}"));
-        match e {
-            ComparisonError::Runs { .. } => failure.hint("make both with one number of --runs"),
-            _ => failure,
-        }
-    })?;
+    let runs = [candidate, reference].map(|side| side.experiment.runs.len());
+    if is_paired && runs[0] != runs[1] {
+        let [own, other] = runs;
+        let message =
+            format!("{run}: {own} runs against {other} of the reference, of the same seed");
+        return Err(Failure::input(message).hint("make both with one number of --runs"));
+    }
+    let mut outages = metrics::compare(&candidate.experiment, &reference.experiment, is_paired)
+        .refuse_within(&run)?;
     // the reference is itself, whatever its calibration leaves open
     if !is_reference {
         let open = candidate
@@ -249,7 +248,7 @@ fn compared(
         label,
         is_reference,
         is_paired,
-        verdict: candidate.verdict,
+        verdict: candidate.summary["verdict"].clone(),
         outages,
     })
 }
@@ -341,9 +340,6 @@ pub struct Comparison {
     /// Form in which the table alone is printed.
     #[serde(skip)]
     pub(crate) form: Option<TableForm>,
-    /// Pages of the single results, path and name.
-    #[serde(skip)]
-    pub(crate) links: Vec<(String, String)>,
 }
 
 /// Whether the filter of a run is as good as it believes.
@@ -353,7 +349,7 @@ pub(crate) struct VerdictRow {
     pub run: String,
     /// The verdict.
     #[serde(flatten)]
-    pub verdict: Verdict,
+    pub verdict: Value,
 }
 
 /// One state of one run in one outage, against the reference.
@@ -548,13 +544,12 @@ impl Answer for Comparison {
     }
 
     fn document(&self) -> Document {
-        let verdicts = || {
-            self.verdicts
-                .iter()
-                .map(|row| (row.run.as_str(), &row.verdict))
-        };
-        let lines = self.cost().into_iter().chain(verdict_counts(verdicts()));
-        let tone = tone(gravest(verdicts()));
+        let verdicts = self.verdicts.iter();
+        let verdicts: Vec<_> = verdicts
+            .map(|row| (row.run.as_str(), &row.verdict))
+            .collect();
+        let (gravest, counts) = verdict_counts(&verdicts);
+        let (lines, tone) = (self.cost().into_iter().chain(counts), tone(gravest));
         let mut document = Document::new("What the filters believe, compared", tone, lines);
         self.doubts
             .iter()
@@ -565,11 +560,6 @@ impl Answer for Comparison {
                 self.name_of_reference()
             ));
             document.lead(self.table());
-        }
-        if !self.links.is_empty() {
-            document.folded("Pages of the single results", |page| {
-                page.links(&self.links)
-            });
         }
         document.text(CAPTION);
         document.charts(&self.charts(), "");

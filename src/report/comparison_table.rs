@@ -2,8 +2,9 @@
 
 use super::verdict::axis_of;
 use nav_sim_document::{Cell, Table, short_names, window};
-use nav_sim_navigation::metrics::{OutageComparison, StateRatio, Verdict};
+use nav_sim_navigation::metrics::{OutageComparison, StateRatio};
 use nav_sim_navigation::simulation::REPORTED;
+use serde_json::Value;
 
 /// Estimators by the names their run directories end in.
 const ESTIMATORS: [&str; 6] = ["sr-awv", "dr-awv", "awv", "rgmwm", "gmwm", "avlr"];
@@ -64,7 +65,7 @@ pub(crate) struct CandidateResult {
     /// True if run k saw the same noise as that of the reference.
     pub is_paired: bool,
     /// The verdict on its filter.
-    pub verdict: Verdict,
+    pub verdict: Value,
     /// Outage by outage.
     pub outages: Vec<OutageComparison>,
     /// Time (s) and (ASEE ratio − 1)·100 of each reported state.
@@ -120,27 +121,17 @@ pub(crate) fn ratio_table(
 /// Gives each candidate a place of its own: those that would share one have rows of their names, and a number if even these are
 /// the same.
 pub(crate) fn separate(candidates: &mut [CandidateResult]) {
-    let before: Vec<Label> = candidates.iter().map(|c| c.label.clone()).collect();
+    let labels: Vec<Label> = candidates.iter().map(|c| c.label.clone()).collect();
     let runs: Vec<&str> = candidates.iter().map(|c| c.run.as_str()).collect();
     let names = short_names(&runs);
-    let is_shared = |label: &Label| before.iter().filter(|other| *other == label).count() > 1;
-    for (k, name) in names.into_iter().enumerate() {
-        if !is_shared(&before[k]) {
-            continue;
+    for (k, candidate) in candidates.iter_mut().enumerate() {
+        if labels.iter().filter(|label| **label == labels[k]).count() > 1 {
+            let name = &names[k];
+            candidate.label.scenario = match names[..k].iter().filter(|n| *n == name).count() {
+                0 => name.clone(),
+                before => format!("{name} ({})", before + 1),
+            };
         }
-        let is_taken = |label: &Label, there: &[CandidateResult]| {
-            there.iter().any(|c| c.label == *label) || before.contains(label) && !is_shared(label)
-        };
-        let mut label = Label {
-            scenario: name.clone(),
-            ..before[k].clone()
-        };
-        let mut number = 1;
-        while is_taken(&label, &candidates[..k]) {
-            number += 1;
-            label.scenario = format!("{name} ({number})");
-        }
-        candidates[k].label = label;
     }
 }
 
@@ -186,7 +177,7 @@ pub(crate) mod tests {
             coverage_mean_reference: 0.95,
         };
         let outages = vec![outage.clone(), outage];
-        let verdict = Verdict::of(&[], 2, None);
+        let verdict = Value::Null;
         let label = Label::of(run, None);
         CandidateResult {
             run: run.into(),

@@ -252,7 +252,7 @@ fn write_cell(
     result: Option<RunResult>,
     context: &Context<'_>,
 ) -> Result<()> {
-    let answer = run.navigate_with(result, context)?;
+    let answer = run.navigate(result, context)?;
     let mut asked = cell.asked.clone();
     asked.out = Some(place.cell(&cell.name));
     let written = asked.write(&answer, &answer.document(), cell.manifest.clone(), context);

@@ -42,11 +42,7 @@ impl FuseAnswer {
         document.chart(&innovations(solution, &outages), FIXES);
         document.chart(&nis(&solution.fixes, &outages), FIXES);
         document.checked(CHECKED);
-        if let Some(quality) = self
-            .reduction
-            .as_ref()
-            .and_then(|reduction| reduction.quality.as_ref())
-        {
+        if let Some(quality) = &self.reduction {
             match reduction_doubt(quality) {
                 Some(doubt) => document.note(Importance::Warning, doubt),
                 None => document.note(Importance::Remark, reduction_line(quality)),

@@ -20,7 +20,7 @@ use nav_sim_navigation::fusion::{
     rough_origin, vehicle_velocities, wheel_ratio,
 };
 use nav_sim_navigation::gnss::GnssFix;
-use nav_sim_navigation::metrics::{ReductionSummary, VerdictKind};
+use nav_sim_navigation::metrics::{ReductionQuality, VerdictKind};
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::gnss::GnssSettings;
 use nav_sim_navigation::sensors::outage::{FixedData, Outage, OutagePlan};
@@ -43,7 +43,7 @@ pub struct FuseAnswer {
     /// Verdict and figures: `summary.json`.
     pub summary: FuseSummary,
     /// Reduction of the model to the filter's states, where it loses something.
-    pub reduction: Option<ReductionSummary>,
+    pub reduction: Option<ReductionQuality>,
     /// Files by their roles.
     pub(super) inputs: Vec<Input>,
     /// Settings, for the manifest.
@@ -518,7 +518,7 @@ pub(super) fn belief(
     rate_hz: f64,
     gnss: &[GnssFix],
     outages: &[Outage],
-) -> Result<(Belief, Option<ReductionSummary>)> {
+) -> Result<(Belief, Option<ReductionQuality>)> {
     let model = at_rate(model, rate_hz).refuse_within("the model")?;
     let lengths: Vec<f64> = outages.iter().map(|o| o.end_s - o.start_s).collect();
     let steps = gnss.windows(2).map(|w| w[1].t_s - w[0].t_s);
@@ -543,10 +543,8 @@ pub(super) fn belief(
         .ok()
         .map(|full| full.with_initial(&beside(states, initial)));
     let made = (&model, &belief, full.as_ref());
-    let scales_s = [interval_s, window_s];
-    let summary = reduction_of(made, &track, scales_s, &Context::default());
-    let summary = summary.map_err(Failure::could_not)?;
-    Ok((belief, Some(summary)))
+    let quality = reduction_of(made, &track, &Context::default());
+    Ok((belief, quality))
 }
 
 /// The value in the middle, in order.

@@ -5,7 +5,7 @@ mod document;
 mod navigate;
 
 pub(crate) use navigate::reduction_of;
-pub use navigate::{NavigateError, NavigateInputs, Navigation, TrueImu, navigate};
+pub use navigate::{NavigateInputs, Navigation, TrueImu, navigate};
 
 use crate::app::inputs::{self, FilterArgs, SettingsArgs, files};
 use crate::app::{Answer, Command, Context, Failure, Input, Out, OutputFile, Refuse, Result};
@@ -17,13 +17,13 @@ use crate::report::tables::{epochs_csv, fan_csv, runs_csv};
 use crate::report::verdict::requirement_line;
 use crate::report::{TrajectorySeries, json};
 use nav_sim_document::{Document, svg};
-use nav_sim_navigation::ekf::FilterStates;
+use nav_sim_navigation::ekf::{Belief, FilterStates};
 use nav_sim_navigation::metrics::{Requirement, Summary};
 use nav_sim_navigation::monte_carlo;
 use nav_sim_navigation::scenario::{Method, Scenario};
-use nav_sim_navigation::sensors::imu::TruthError;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_navigation::simulation::{ExperimentError, Plan, RunResult};
+use nav_sim_navigation::simulation::lincov::Track;
+use nav_sim_navigation::simulation::{Plan, RunResult};
 use nav_sim_signal::noise::{Model, continuous};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -153,7 +153,7 @@ impl Command for Run {
     }
 
     fn run(&self, context: &Context<'_>) -> Result<RunAnswer> {
-        self.prepare(context)?.navigate(context)
+        self.prepare(context)?.navigate(None, context)
     }
 }
 
@@ -312,38 +312,6 @@ impl Run {
         };
         Ok((inputs, file, made_by))
     }
-
-    /// A navigation that cannot be done.
-    fn impossible(&self, e: NavigateError) -> Failure {
-        let failure = Failure::input(&e);
-        match e {
-            NavigateError::Experiment(ExperimentError::Truth(TruthError::TooShort { .. })) => {
-                failure.hint("each run takes a window as long as the trajectory: record for longer")
-            }
-            NavigateError::Experiment(ExperimentError::Truth(TruthError::Rate {
-                rate_hz, ..
-            })) => failure.hint(format!(
-                "set rate_hz = {rate_hz} in the [imu] section of a --scenario file"
-            )),
-            NavigateError::Experiment(_) => failure,
-            NavigateError::Belief(e) => {
-                let settings = self.gnss.as_deref().or(self.settings.file.scenario.as_deref());
-                let advice =
-                    "raise it, or take the full filter (--filter full), which reduces nothing";
-                inputs::no_filter(&e, &self.model, settings, advice)
-            }
-            NavigateError::Reduction(e) => Failure::could_not(e),
-            NavigateError::RecordedTruth => failure.hint(
-                "calibrate the recordings and give the model with --truth, or use --method monte-carlo",
-            ),
-            NavigateError::DrawnTruth => {
-                failure.hint("leave --spread out, or use --method monte-carlo")
-            }
-            NavigateError::Drawn(_) => failure.hint("leave it out, or use --method monte-carlo"),
-            NavigateError::NotFinite => Failure::could_not(e)
-                .hint("do the models fit the IMU, are [imu] and [initial] plausible?"),
-        }
-    }
 }
 
 /// Runs of this request that are summed together: the bytes of results depend on it alone, not on who computed them.
@@ -367,17 +335,8 @@ pub(crate) fn columns(
         context.advance(count * runs.len() as u64);
         return Ok(Some(runs.iter().map(|_| None).collect()));
     };
-    let outages = one.outages();
-    let belief = |run: &&PreparedRun<'_>| {
-        let track = run
-            .scenario
-            .track(&run.inputs.trajectory, &run.inputs.model, &outages)?;
-        Ok::<_, NavigateError>(run.scenario.belief(&run.inputs.model, &outages, &track)?)
-    };
-    let beliefs = runs
-        .iter()
-        .map(|run| belief(run).map_err(|e| run.request.impossible(e)));
-    let beliefs = beliefs.collect::<Result<Vec<_>>>()?;
+    let beliefs = runs.iter().map(|run| Ok(run.filter()?.1));
+    let (beliefs, outages) = (beliefs.collect::<Result<Vec<_>>>()?, one.outages());
     let inputs = &one.inputs;
     let experiment = one.scenario.experiment(
         &inputs.trajectory,
@@ -386,9 +345,7 @@ pub(crate) fn columns(
         &outages,
         one.seed,
     );
-    let plan = Plan::new(&experiment)
-        .map_err(|e| one.request.impossible(e.into()))?
-        .with_fan();
+    let plan = Plan::new(&experiment)?.with_fan();
     let progress = |done| context.advance(done * runs.len() as u64);
     let results = monte_carlo::run_range(&plan, first, count, &|| context.go_on(), &progress);
     Ok(results.map(|results| results.into_iter().map(Some).collect()))
@@ -409,17 +366,27 @@ impl PreparedRun<'_> {
         noise(self) == noise(other) && self.seed == other.seed
     }
 
-    fn navigate(self, context: &Context<'_>) -> Result<RunAnswer> {
-        self.navigate_with(None, context)
+    /// The track and the filter.
+    fn filter(&self) -> Result<(Track, Belief)> {
+        let (scenario, outages) = (&self.scenario, self.outages());
+        let (model, request) = (&self.inputs.model, self.request);
+        let track = scenario.track(&self.inputs.trajectory, model, &outages)?;
+        let belief = scenario.belief(model, &outages, &track).map_err(|e| {
+            let scenario = request.settings.file.scenario.as_deref();
+            let settings = request.gnss.as_deref().or(scenario);
+            let advice = "raise it, or take the full filter (--filter full), which reduces nothing";
+            inputs::no_filter(&e, &request.model, settings, advice)
+        })?;
+        Ok((track, belief))
     }
 
     /// Navigates; `sampled`: runs that were made already.
-    pub(crate) fn navigate_with(
+    pub(crate) fn navigate(
         self,
         sampled: Option<RunResult>,
         context: &Context<'_>,
     ) -> Result<RunAnswer> {
-        let outages = self.outages();
+        let (outages, (track, belief)) = (self.outages(), self.filter()?);
         let Self {
             request,
             inputs,
@@ -427,8 +394,9 @@ impl PreparedRun<'_> {
             mut origin,
             seed,
         } = self;
-        let found = navigate::with_runs(&inputs, &scenario, &outages, seed, sampled, context);
-        let mut navigation = found.map_err(|e| request.impossible(e))?;
+        let filter = (&track, &belief);
+        let mut navigation =
+            navigate::with_runs(&inputs, &scenario, &outages, filter, seed, sampled, context)?;
         let summary = &mut navigation.summary;
         summary.require = request.require.iter().map(|r| r.check(summary)).collect();
         if let Some(runs) = &navigation.runs {

@@ -1,14 +1,14 @@
 //! The main job: from a trajectory, the filter's noise model and the model of the true errors to navigation errors, by
 //! Monte-Carlo runs, by covariance analysis, or by both.
 
-use crate::app::{Context, Failure};
+use crate::app::{Context, Failure, OrHelp, Refuse, Result};
 use crate::io::draws_file::Draws;
 use crate::report::{reduction_doubt, reduction_line, unexpected_line};
 use nav_sim_calibration::derived_interval;
-use nav_sim_navigation::ekf::{Belief, BeliefError};
+use nav_sim_navigation::ekf::Belief;
 use nav_sim_navigation::metrics::{
-    Budget, EpochMetrics, Expected, FanEpoch, OutageSummary, PerState, ReductionQuality,
-    ReductionSummary, Summary, epochs, expected_fan, fan, horizontal_quantiles,
+    Budget, EpochMetrics, Expected, FanEpoch, OutageSummary, PerState, ReductionQuality, Summary,
+    epochs, expected_fan, fan, horizontal_quantiles,
 };
 use nav_sim_navigation::monte_carlo;
 use nav_sim_navigation::scenario::{Method, Scenario};
@@ -17,12 +17,11 @@ use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
     FilterPass, Instant, NamedSource, Track, TruthSide, assess, strapdown_over_sigma, weak_heading,
 };
-use nav_sim_navigation::simulation::{Experiment, ExperimentError, Plan, RunResult};
+use nav_sim_navigation::simulation::{Experiment, Plan, RunResult};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::{Recording, Sensor};
-use nav_sim_signal::noise::reduction::window_s;
-use nav_sim_signal::noise::{Model, ParameterError};
-use nav_sim_signal::units::SettingError;
+use nav_sim_signal::noise::Model;
+use nav_sim_signal::noise::reduction::is_exact;
 use rayon::prelude::*;
 
 /// Inputs of [`navigate()`].
@@ -71,41 +70,6 @@ pub struct Navigation {
     pub summary: Summary,
 }
 
-/// Error of [`navigate()`].
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum NavigateError {
-    /// The experiment does not fit together.
-    #[error(transparent)]
-    Experiment(#[from] ExperimentError),
-    /// The believed model has no such filter.
-    #[error(transparent)]
-    Belief(#[from] BeliefError),
-    /// The reduction of the model cannot be assessed.
-    #[error(transparent)]
-    Reduction(#[from] ParameterError),
-    /// Recordings have no covariance.
-    #[error(
-        "covariance analysis needs a model of what makes the errors; static recordings have none"
-    )]
-    RecordedTruth,
-    /// Each run has a truth of its own.
-    #[error("covariance analysis is of one truth; --spread draws one for each run")]
-    DrawnTruth,
-    /// A setting whose effect depends on what is drawn.
-    #[error(transparent)]
-    Drawn(#[from] SettingError),
-    /// Numbers ran away.
-    #[error("the covariance analysis did not stay finite and positive definite")]
-    NotFinite,
-}
-
-impl From<NavigateError> for Failure {
-    fn from(e: NavigateError) -> Self {
-        Self::input(e)
-    }
-}
-
 /// Navigates along a trajectory, with these outages and this seed.
 ///
 /// # Errors
@@ -116,87 +80,108 @@ pub fn navigate(
     outages: &[Outage],
     seed: u64,
     context: &Context<'_>,
-) -> Result<Navigation, NavigateError> {
-    with_runs(inputs, scenario, outages, seed, None, context)
+) -> Result<Navigation> {
+    let track = scenario.track(&inputs.trajectory, &inputs.model, outages)?;
+    let belief = scenario.belief(&inputs.model, outages, &track).refuse()?;
+    with_runs(
+        inputs,
+        scenario,
+        outages,
+        (&track, &belief),
+        seed,
+        None,
+        context,
+    )
 }
 
-/// The same with runs that were made already.
+/// The same of a filter along its track, with runs that were made already.
 pub(super) fn with_runs(
     inputs: &NavigateInputs,
     scenario: &Scenario,
     outages: &[Outage],
+    (track, belief): (&Track, &Belief),
     seed: u64,
     runs: Option<RunResult>,
     context: &Context<'_>,
-) -> Result<Navigation, NavigateError> {
+) -> Result<Navigation> {
     let method = scenario.run.method;
+    let possible = possible(inputs, scenario);
     if method != Method::MonteCarlo {
-        possible(inputs, scenario)?;
+        possible.clone()?;
     }
-    let track = scenario.track(&inputs.trajectory, &inputs.model, outages)?;
-    let belief = scenario.belief(&inputs.model, outages, &track)?;
-    doubt(inputs, &belief, scenario, context);
+    doubt(inputs, scenario, context);
     // Within 1e-3 the same in a quarter of the time: for what stands beside the figures.
     let merged = track.merged();
-    let reduction = reduction(inputs, scenario, outages, &belief, &merged, context)?;
+    let full = |model: &Model| {
+        let scenario = scenario.with_full_noise();
+        scenario.belief(model, outages, track).ok()
+    };
+    let reduction = scenario.filter.states.is_reduced().then(|| {
+        let full = full(&inputs.model);
+        reduction_of((&inputs.model, belief, full.as_ref()), &merged, context)
+    });
     // Where the motion hardly shows the heading, no filter of this kind is to be believed.
-    let yaw = FilterPass::new(&merged, &belief).yaw_while_measured();
+    let yaw = FilterPass::new(&merged, belief).yaw_while_measured();
     weak_heading(yaw.into_iter())
         .iter()
         .for_each(|doubt| context.warn(doubt));
     let experiment = scenario.experiment(
         &inputs.trajectory,
         inputs.truth(),
-        std::slice::from_ref(&belief),
+        std::slice::from_ref(belief),
         outages,
         seed,
     );
     let analysis = Analysis {
         experiment: &experiment,
-        track: &track,
-        belief: &belief,
+        track,
+        belief,
         model: inputs.truth_model(),
     };
-    let expected = match method {
-        // beside runs that were asked for alone it may be impossible
-        Method::MonteCarlo => possible(inputs, scenario)
-            .ok()
-            .and_then(|()| analysis.expected()),
-        Method::Lincov | Method::Both => Some(analysis.expected().ok_or(NavigateError::NotFinite)?),
-    };
+    // beside runs that were asked for alone it may be impossible
+    let expected = possible.ok().and_then(|()| analysis.expected());
+    if method != Method::MonteCarlo && expected.is_none() {
+        let message = "the covariance analysis did not stay finite and positive definite";
+        return Err(Failure::could_not(message)
+            .hint("do the models fit the IMU, are [imu] and [initial] plausible?"));
+    }
     let mut navigation = match (method, expected) {
-        (Method::Lincov, Some((epochs, mut summary))) => {
+        (
+            Method::Lincov,
+            Some(Expected {
+                epochs, summary, ..
+            }),
+        ) => Navigation {
+            runs: None,
+            epochs,
+            fan: analysis.fan(),
             // Nothing is drawn but outages; a seed that is given stays on record.
-            summary.seed = scenario.outage_random.map(|_| seed).or(scenario.run.seed);
-            Navigation {
-                runs: None,
-                epochs,
-                fan: analysis.fan(),
-                summary,
-            }
-        }
+            summary: Summary {
+                seed: scenario.outage_random.map(|_| seed).or(scenario.run.seed),
+                ..summary
+            },
+        },
         (method, expected) => {
-            let mut sampled = match runs {
-                Some(runs) => Navigation::of_runs(runs, seed),
-                None => {
-                    let block = block(&inputs.trajectory, scenario);
-                    sampled(&experiment, scenario.run.runs, block, seed, context)?
-                }
+            let runs = match runs {
+                Some(runs) => runs,
+                None => sampled(&experiment, scenario, &inputs.trajectory, context)?,
             };
+            let mut sampled = Navigation::of_runs(runs, seed);
             match expected {
-                Some((_, expected)) if method == Method::Both => {
-                    sampled = sampled.beside(expected, &analysis.fan());
+                Some(expected) if method == Method::Both => {
+                    sampled.summary.expect(expected.summary);
+                    for (own, expected) in sampled.fan.iter_mut().zip(analysis.fan()) {
+                        own.lincov_m = Some(expected.quantiles_m);
+                    }
                 }
-                Some((_, expected)) => {
-                    sampled.summary.compare_with(&expected);
-                }
+                Some(expected) => sampled.summary.compare_with(&expected.summary),
                 None => {}
             }
             sampled
         }
     };
-    navigation.summary.reduction = reduction;
-    let over_sigma = strapdown_over_sigma(&track, &belief);
+    navigation.summary.reduction = reduction.flatten();
+    let over_sigma = strapdown_over_sigma(track, belief);
     navigation.summary.strapdown_over_sigma = over_sigma;
     scenario
         .unexpected_integration(over_sigma)
@@ -211,45 +196,36 @@ pub(super) fn with_runs(
         .add_budgets(&mut navigation.summary);
     }
     if method == Method::Lincov {
-        let full = |model: &Model| {
-            scenario
-                .with_full_noise()
-                .belief(model, outages, &track)
-                .ok()
-        };
         analysis.add_intervals(&mut navigation.summary.outages, inputs, &full);
     }
     Ok(navigation)
 }
 
-/// Whether covariance analysis can do what is asked for.
-fn possible(inputs: &NavigateInputs, scenario: &Scenario) -> Result<(), NavigateError> {
+/// Refuses what covariance analysis cannot do.
+fn possible(inputs: &NavigateInputs, scenario: &Scenario) -> Result<()> {
     match inputs.truth {
-        TrueImu::Recordings(_) => return Err(NavigateError::RecordedTruth),
-        TrueImu::Drawn(_) => return Err(NavigateError::DrawnTruth),
-        TrueImu::AsBelieved | TrueImu::Model(_) => {}
+        TrueImu::Recordings(_) => Err(Failure::input(
+            "covariance analysis needs a model of what makes the errors; static recordings have none",
+        )
+        .hint("calibrate the recordings and give the model with --truth, or use --method monte-carlo")),
+        TrueImu::Drawn(_) => Err(Failure::input(
+            "covariance analysis is of one truth; --spread draws one for each run",
+        )
+        .hint("leave --spread out, or use --method monte-carlo")),
+        TrueImu::AsBelieved | TrueImu::Model(_) => scenario
+            .analysable()
+            .refuse()
+            .or_help("leave it out, or use --method monte-carlo"),
     }
-    Ok(scenario.analysable()?)
 }
 
-/// What speaks against the filter before anything was computed.
-fn doubt(inputs: &NavigateInputs, belief: &Belief, scenario: &Scenario, context: &Context<'_>) {
+/// Warns of what speaks against the filter before anything was computed.
+fn doubt(inputs: &NavigateInputs, scenario: &Scenario, context: &Context<'_>) {
     if let TrueImu::Recordings(recordings) = &inputs.truth {
         recordings
             .iter()
             .filter_map(motion)
             .for_each(|doubt| context.warn(doubt));
-    }
-    // A Gauss-Markov process of phi ≈ 1 may have any stationary variance: a filter that starts with it believes
-    // nothing of its first sensor readings.
-    for (sensor, limit) in [(Sensor::Accel, 1.0), (Sensor::Gyro, 0.1)] {
-        let sigma = belief.process_sigma(sensor);
-        if sigma > limit {
-            context.warn(format!(
-                "the filter starts with a bias of {sigma:.3} {} ({sensor}): an AR1 of phi near 1?",
-                sensor.unit()
-            ));
-        }
     }
     scenario
         .unexpected()
@@ -280,31 +256,6 @@ fn motion(recording: &Recording) -> Option<String> {
     })
 }
 
-/// The reduction of the model for these outages; none where nothing is reduced.
-fn reduction(
-    inputs: &NavigateInputs,
-    scenario: &Scenario,
-    outages: &[Outage],
-    belief: &Belief,
-    track: &Track,
-    context: &Context<'_>,
-) -> Result<Option<ReductionSummary>, NavigateError> {
-    if !scenario.filter.states.is_reduced() {
-        return Ok(None);
-    }
-    let longest = outages
-        .iter()
-        .map(|o| o.end_s - o.start_s)
-        .fold(0.0, f64::max);
-    let scales_s = [1.0 / scenario.gnss.rate_hz, window_s(longest)];
-    let full = scenario
-        .with_full_noise()
-        .belief(&inputs.model, outages, track)
-        .ok();
-    let made = (&inputs.model, belief, full.as_ref());
-    Ok(Some(reduction_of(made, track, scales_s, context)?))
-}
-
 /// Runs that are summed together: some ten seconds of work.
 pub(super) fn block(trajectory: &Trajectory, scenario: &Scenario) -> u64 {
     let samples = (trajectory.end_s() - trajectory.start_s()) * scenario.imu.rate_hz;
@@ -314,11 +265,11 @@ pub(super) fn block(trajectory: &Trajectory, scenario: &Scenario) -> u64 {
 /// All runs, block by block.
 fn sampled(
     experiment: &Experiment<'_>,
-    runs: u64,
-    block: u64,
-    seed: u64,
+    scenario: &Scenario,
+    trajectory: &Trajectory,
     context: &Context<'_>,
-) -> Result<Navigation, NavigateError> {
+) -> Result<RunResult> {
+    let (runs, block) = (scenario.run.runs, block(trajectory, scenario));
     context.begin("runs", runs);
     let plan = Plan::new(experiment)?.with_fan();
     let of_block = |first: u64| {
@@ -331,7 +282,7 @@ fn sampled(
         result.append(of_block(first));
     }
     context.end();
-    Ok(Navigation::of_runs(result, seed))
+    Ok(result)
 }
 
 /// What a covariance analysis is made of.
@@ -345,10 +296,9 @@ struct Analysis<'a> {
 }
 
 impl Analysis<'_> {
-    /// The expected figures; none where the covariance runs away.
-    fn expected(&self) -> Option<(Vec<EpochMetrics>, Summary)> {
-        let expected = Expected::along(self.track, self.experiment, self.belief, self.model?)?;
-        Some((expected.epochs, expected.summary))
+    /// The expected figures; none where the covariance runs away or nothing models the errors.
+    fn expected(&self) -> Option<Expected> {
+        Expected::along(self.track, self.experiment, self.belief, self.model?)
     }
 
     /// Quantiles of the horizontal error over time; none where nothing models what makes the errors.
@@ -412,15 +362,6 @@ impl Navigation {
             summary,
         }
     }
-
-    /// Runs beside what was expected of them.
-    fn beside(mut self, expected: Summary, fan: &[FanEpoch]) -> Self {
-        self.summary.expect(expected);
-        for (own, expected) in self.fan.iter_mut().zip(fan) {
-            own.lincov_m = Some(expected.quantiles_m);
-        }
-        self
-    }
 }
 
 impl NavigateInputs {
@@ -455,20 +396,15 @@ impl NavigateInputs {
     }
 }
 
-/// The reduction of a model to a filter of 15 states, and its quality, the model taken for the truth: one covariance analysis of
-/// the reduced and of the full filter, if the model has one. `scales_s`: time between fixes, longest time scale.
-///
-/// # Errors
-/// When a parameter of the belief is outside its domain.
+/// The quality of a filter of 15 states to which a model was reduced, the model taken for the truth: one covariance analysis of the
+/// reduced and of the full filter, if the model has one. None where nothing was lost.
 pub(crate) fn reduction_of(
     (model, belief, full): (&Model, &Belief, Option<&Belief>),
     track: &Track,
-    [interval_s, window_s]: [f64; 2],
     context: &Context<'_>,
-) -> Result<ReductionSummary, ParameterError> {
-    let mut summary = ReductionSummary::of(model, belief, interval_s, window_s)?;
-    if summary.is_exact() {
-        return Ok(summary);
+) -> Option<ReductionQuality> {
+    if model.axes.iter().all(is_exact) {
+        return None;
     }
     let full = full.map(|full| assess(track, full, model));
     let quality = ReductionQuality::of(&assess(track, belief, model), full.as_ref());
@@ -476,8 +412,7 @@ pub(crate) fn reduction_of(
     reduction_doubt(&quality)
         .iter()
         .for_each(|doubt| context.warn(doubt));
-    summary.quality = Some(quality);
-    Ok(summary)
+    Some(quality)
 }
 
 // What the calibration of a model leaves open in the figures of a covariance analysis.
@@ -490,8 +425,8 @@ pub(crate) fn reduction_of(
 // it *believes*: each draw has the filter that knows it, with a state for each process, since the reduction to 15 states
 // would have to be found anew for each; the interval is carried over as a ratio.
 
-/// Figures at the end of an outage.
-type Figures = Vec<f64>;
+/// Figures at the ends of outages.
+type Figures = Vec<Vec<f64>>;
 
 /// Probabilities of the quantiles of the horizontal error.
 const QUANTILES: [f64; 2] = [0.5, 0.95];
@@ -501,7 +436,7 @@ impl Analysis<'_> {
     fn errors(&self, truth: &Model, draws: &Draws, outages: &mut [OutageSummary]) {
         let track = self.track.coarse();
         let filter = FilterPass::new(&track, self.belief);
-        let figures = |model: &Model| -> Vec<Figures> {
+        let figures = |model: &Model| -> Figures {
             let truth = TruthSide::together(&TruthSide::sources(self.experiment, model));
             let ends = filter.errors_at_ends(&truth);
             let figures =
@@ -510,13 +445,12 @@ impl Analysis<'_> {
         };
         for (outage, interval) in outages.iter_mut().zip(intervals(truth, draws, &figures)) {
             let rmse = outage.rmse_end.0;
-            outage.rmse_end_ci95 = Some(PerState(std::array::from_fn(|i| {
-                interval.about(i, rmse[i])
-            })));
+            let about = |i: usize, value: f64| (value * interval[i].0, value * interval[i].1);
+            outage.rmse_end_ci95 = Some(PerState(std::array::from_fn(|i| about(i, rmse[i]))));
             let h = &mut outage.horizontal_error_end_m;
             let ends = |(low, high): (f64, f64)| (Some(low), Some(high));
-            h.p50_ci95 = ends(interval.about(rmse.len(), h.p50));
-            h.p95_ci95 = ends(interval.about(rmse.len() + 1, h.p95));
+            h.p50_ci95 = ends(about(rmse.len(), h.p50));
+            h.p95_ci95 = ends(about(rmse.len() + 1, h.p95));
         }
     }
 
@@ -530,7 +464,7 @@ impl Analysis<'_> {
         outages: &mut [OutageSummary],
     ) {
         let track = self.track.merged();
-        let figures = |model: &Model| -> Vec<Figures> {
+        let figures = |model: &Model| -> Figures {
             let Some(belief) = full(model) else {
                 return Vec::new();
             };
@@ -545,51 +479,33 @@ impl Analysis<'_> {
         };
         for (outage, interval) in outages.iter_mut().zip(intervals(model, draws, &figures)) {
             let (end, mean) = (outage.asee_end.0, outage.asee_mean.0);
-            outage.asee_end_ci95 =
-                Some(PerState(std::array::from_fn(|i| interval.about(i, end[i]))));
-            let of_mean = PerState(std::array::from_fn(|i| {
-                interval.about(end.len() + i, mean[i])
-            }));
+            let about = |i: usize, value: f64| (value * interval[i].0, value * interval[i].1);
+            outage.asee_end_ci95 = Some(PerState(std::array::from_fn(|i| about(i, end[i]))));
+            let of_mean = PerState(std::array::from_fn(|i| about(end.len() + i, mean[i])));
             // An outage between two reports has no mean.
             outage.asee_mean_ci95 = Some(of_mean).filter(|_| mean.iter().all(|x| x.is_finite()));
         }
     }
 }
 
-/// The figures of one outage: of the estimate, and of each draw.
-struct Drawn {
-    estimate: Figures,
-    draws: Vec<Figures>,
-    stretch: f64,
-}
-
-impl Drawn {
-    /// The interval of a figure, whose ends over the estimate are carried over to its value.
-    fn about(&self, figure: usize, value: f64) -> (f64, f64) {
-        let estimate = self.estimate[figure];
-        let drawn = self.draws.iter().map(|draw| draw[figure]).collect();
-        let [low, high] = derived_interval(estimate, drawn, self.stretch);
-        (value * (low / estimate), value * (high / estimate))
-    }
-}
-
-/// What the draws give beside the estimate, outage by outage.
+/// The ends of the interval that the draws give to each figure, over the estimate.
 fn intervals(
     estimate: &Model,
     draws: &Draws,
-    figures: &(dyn Fn(&Model) -> Vec<Figures> + Sync),
-) -> Vec<Drawn> {
-    let of_draws: Vec<Vec<Figures>> = draws.models.par_iter().map(figures).collect();
-    let of_outage = |(k, estimate): (usize, Figures)| Drawn {
-        estimate,
-        draws: of_draws
-            .iter()
-            .filter_map(|ends| ends.get(k).cloned())
-            .collect(),
-        stretch: draws.stretch,
+    figures: &(dyn Fn(&Model) -> Figures + Sync),
+) -> Vec<Vec<(f64, f64)>> {
+    let drawn: Vec<Figures> = draws.models.par_iter().map(figures).collect();
+    let of_figure = |k: usize, (i, x): (usize, &f64)| {
+        let all = drawn.iter().filter_map(|ends| Some(ends.get(k)?[i]));
+        let [low, high] = derived_interval(*x, all.collect(), draws.stretch);
+        (low / x, high / x)
+    };
+    let of_outage = |(k, own): (usize, &Vec<f64>)| {
+        let own = own.iter().enumerate();
+        own.map(|figure| of_figure(k, figure)).collect()
     };
     figures(estimate)
-        .into_iter()
+        .iter()
         .enumerate()
         .map(of_outage)
         .collect()
