@@ -9,7 +9,7 @@ use nav_sim_document::{
     seconds, window,
 };
 use nav_sim_navigation::earth::ned_difference;
-use nav_sim_navigation::fusion::{ClocksApart, Finding, FixRecord, Row, Solution, Use};
+use nav_sim_navigation::fusion::{ClocksApart, Finding, FixRecord, Row, Solution};
 use nav_sim_navigation::metrics::chi_square_band;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use std::path::Path;
@@ -25,6 +25,7 @@ impl FuseAnswer {
         let mut document = Document::new("INS/GNSS fusion of recorded data", tone, self.verdict());
         document.facts(&self.facts());
         let outages: Vec<_> = summary
+            .outcome
             .outages
             .iter()
             .map(|o| (o.outage.start_s, o.outage.end_s))
@@ -59,13 +60,14 @@ impl FuseAnswer {
         let verdict = &summary.verdict;
         let mut evidence = verdict.evidence.iter().map(evidence);
         let first = evidence.next().unwrap_or_else(|| {
-            let nees = summary
+            let outcome = &summary.outcome;
+            let nees = outcome
                 .reference
                 .map(|r| format!(", NEES {} (9 if right)", readable(r.nees_mean)));
-            let nis = readable(summary.nis_per_component);
+            let nis = readable(outcome.nis_per_component);
             format!(
                 "NIS {nis} per component over {} fixes{}",
-                summary.fixes.used,
+                outcome.fixes.used,
                 nees.unwrap_or_default()
             )
         });
@@ -84,7 +86,7 @@ impl FuseAnswer {
 
     /// What helps where the solution is overconfident.
     pub(crate) fn advice(&self) -> &'static str {
-        if self.summary.nis_per_component < 1.0 {
+        if self.summary.outcome.nis_per_component < 1.0 {
             "axes and clock of the reference may be others than those of the solution"
         } else {
             "check axes (--mounting), units, start (--initial), clocks (--gnss-delay) and antenna (--lever-arm)"
@@ -124,7 +126,7 @@ impl FuseAnswer {
         document.section("Figures");
         let mut rows = [
             (
-                "NIS per component, {fixes/used} fixes used, {fixes/withheld} withheld, {fixes/rejected} rejected",
+                "NIS per component, {fixes/used} fixes used, {fixes/withheld} withheld",
                 "nis_per_component -",
             ),
             (
@@ -151,15 +153,6 @@ impl FuseAnswer {
             let keys = format!("reference/{key} smoothed/reference/{key}");
             (title.to_owned(), keys)
         }));
-        for (k, o) in self.summary.outages.iter().enumerate() {
-            let window = window(o.outage.start_s, o.outage.end_s);
-            for end in ["fix", "reference"] {
-                rows.push((
-                    format!("end of outage {window}: error from the {end} (m)"),
-                    format!("outages/{k}/end_from_{end}/horizontal_m -"),
-                ));
-            }
-        }
         let rows: Vec<_> = rows
             .iter()
             .map(|(title, keys)| (title.as_str(), keys.as_str()))
@@ -281,7 +274,6 @@ fn evidence(finding: &Finding) -> String {
             readable(nis_per_component),
             nis_per_component.sqrt()
         ),
-        Finding::Rejected { rejected, of } => format!("{rejected} of {of} fixes were rejected"),
         Finding::Reference(c) => format!(
             "errors against the reference are {:.1} times as large as stated (NEES), {:.1} times in {}",
             c.error_over_sigma, c.worst_error_over_sigma, c.worst_state
@@ -455,15 +447,14 @@ pub(super) fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> 
 }
 
 /// Fates of fixes, and their colours.
-const FATES: [(Use, &str, Colour); 3] = [
-    (Use::Used, "used", Colour::BELIEVED),
-    (Use::Withheld, "withheld", Colour::Soft),
-    (Use::Rejected, "rejected", Colour::REAL),
+const FATES: [(bool, &str, Colour); 2] = [
+    (true, "used", Colour::BELIEVED),
+    (false, "withheld", Colour::Soft),
 ];
 
 /// A series for each fate of fixes.
 fn fixes(fixes: &[FixRecord], value: &dyn Fn(&FixRecord) -> f64) -> Vec<Series> {
-    let of_fate = |(fate, name, colour): (Use, &str, Colour)| {
+    let of_fate = |(fate, name, colour): (bool, &str, Colour)| {
         let of_fate: Vec<&FixRecord> = fixes.iter().filter(|f| f.used == fate).collect();
         let every = of_fate.len().div_ceil(MOST_FIXES).max(1);
         let points = of_fate

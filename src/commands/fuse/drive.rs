@@ -1,9 +1,7 @@
 //! From the files of a request to a solution and its figures.
 
-use super::summary::{
-    Cause, FixCorrelation, Fixes, FuseSummary, FuseVerdict, Initial, VehicleSummary,
-};
-use super::{Fuse, document};
+use super::summary::{Cause, FuseSummary, FuseVerdict, Initial, correlation, vehicle};
+use super::{Fuse, MountingChoice, document};
 use crate::app::{Context, Input, inputs};
 use crate::app::{Failure, Refuse, Result};
 use crate::commands::run::reduction_of;
@@ -13,11 +11,11 @@ use crate::io::trajectory_file::{self, load_reference};
 use nav_sim_document::{Importance, window};
 use nav_sim_navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
-use nav_sim_navigation::fusion::mounting::{self, Mounted, Mounting, MountingError};
+use nav_sim_navigation::fusion::mounting::{self, Mounting, MountingError};
 use nav_sim_navigation::fusion::{
     Assessment, ClocksApart, Recorded, Settings, Solution, Start, WheelSpeed, Whiteness, assess,
-    check_clocks, clocks_apart, displaced, earlier, fuse, fuse_correlated, outcome, rest_of_origin,
-    rough_origin, vehicle_velocities, wheel_ratio,
+    check_clocks, clocks_apart, displaced, earlier, fuse, fuse_correlated, interval_s, middle,
+    outcome, rest_of_origin, rough_origin, vehicle_velocities, wheel_ratio,
 };
 use nav_sim_navigation::gnss::GnssFix;
 use nav_sim_navigation::metrics::{ReductionQuality, VerdictKind};
@@ -30,30 +28,29 @@ use nav_sim_navigation::trajectory::reference::Reference;
 use nav_sim_signal::imu::ImuIncrement;
 use nav_sim_signal::noise::{Composite, Model, Process, continuous, reduction};
 use nav_sim_signal::units::DEG;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::ops::Range;
 
 /// Solution of a recorded drive.
-#[derive(Debug)]
+#[derive(Debug, Serialize)]
+#[serde(transparent)]
 #[non_exhaustive]
 pub struct FuseAnswer {
     /// States, standard deviations and innovations.
+    #[serde(skip)]
     pub solution: Solution,
     /// Verdict and figures: `summary.json`.
     pub summary: FuseSummary,
-    /// Reduction of the model to the filter's states, where it loses something.
+    /// Quality of the model reduced to the filter's states, where it loses something.
+    #[serde(skip)]
     pub reduction: Option<ReductionQuality>,
     /// Files by their roles.
+    #[serde(skip)]
     pub(super) inputs: Vec<Input>,
     /// Settings, for the manifest.
+    #[serde(skip)]
     pub(super) configuration: Value,
-}
-
-impl Serialize for FuseAnswer {
-    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        self.summary.serialize(to)
-    }
 }
 
 /// A drive that was read.
@@ -77,8 +74,8 @@ impl Drive {
     /// # Errors
     /// A setting out of range, a file that cannot be used.
     pub(crate) fn read(request: &Fuse, context: &Context<'_>) -> Result<Self> {
-        let settings = request.settings()?;
-        let (unsaid, gnss_sigma_factor) = request.fix_sigma();
+        let settings = request.settings();
+        let (unsaid, gnss_sigma_factor) = request.gnss_sigma.unwrap_or((None, [1.0; 2]));
         let [position, velocity] = gnss_sigma_factor;
         let topic = |k: usize| {
             request
@@ -138,7 +135,6 @@ impl Drive {
         });
         let mut configuration = json!({
             "settings": settings,
-            "mounted": request.mounted(),
             "filter": request.filter,
             "initial": expected,
             "gnss_sigma": unsaid,
@@ -192,12 +188,12 @@ impl Drive {
             .iter()
             .for_each(|remark| context.warn(remark));
         settings.outages = placed.windows;
-        let mounting = match self.request.mounted() {
-            Mounted::AsGiven => None,
-            Mounted::AsFound => {
+        let mounting = match self.request.mounting {
+            Some(MountingChoice::Auto) => {
                 let found = mounting::find(&recorded, &settings, &belief);
                 Some(found.map_err(|e| self.not_mounted(e, &recorded, &settings, &belief))?)
             }
+            _ => None,
         };
         if let Some(Mounting { q_s_b, sigma_b, .. }) = mounting {
             (settings.q_s_b, settings.mounting_sigma_b) = (q_s_b, sigma_b);
@@ -280,7 +276,6 @@ impl Drive {
             .flatten()
             .filter(|g| g.is_constant())
             .count();
-        let [used, withheld, rejected] = outcome.fixes;
         let rows = &weighed.solution.rows;
         let squares = rows
             .iter()
@@ -308,19 +303,10 @@ impl Drive {
                 self.request.initial_file().map(|path| path.as_path()),
             ),
             mounting: mounting.as_ref().map(Into::into),
-            fixes: Fixes {
-                used,
-                withheld,
-                rejected,
-            },
-            nis_per_component: outcome.nis_per_component,
             horizontal_sigma_rms_m: (squares.sum::<f64>() / rows.len() as f64).sqrt(),
-            gnss_correlation: FixCorrelation::of(&weighed),
-            vehicle: VehicleSummary::of(&weighed.solution, &aiding),
-            outages: outcome.outages,
-            ends: outcome.ends,
-            reference: outcome.reference,
-            smoothed: outcome.smoothed,
+            gnss_correlation: correlation(&weighed),
+            vehicle: vehicle(&weighed.solution, &aiding),
+            outcome,
         };
         Ok(FuseAnswer {
             solution: weighed.solution,
@@ -381,27 +367,19 @@ impl Drive {
         settings: &Settings,
         belief: &Belief,
     ) -> Failure {
-        let Some(clocks) = clocks_apart(recorded) else {
-            return e.into();
-        };
-        let gnss = earlier(recorded.gnss, clocks.delay_s);
-        let there = Recorded {
-            gnss: &gnss,
-            ..*recorded
-        };
-        let rest = || {
-            let found = mounting::find(&there, settings, belief).ok()?;
+        let rest = |there: &Recorded<'_>| {
+            let found = mounting::find(there, settings, belief).ok()?;
             let settings = Settings {
                 q_s_b: found.q_s_b,
                 mounting_sigma_b: found.sigma_b,
                 ..settings.clone()
             };
-            let start = coarse(&there, &settings, belief).ok()?.start;
-            displaced(&there, belief, &start, &settings)?.delay_s
+            let start = coarse(there, &settings, belief).ok()?.start;
+            displaced(there, belief, &start, &settings)?.delay_s
         };
-        let mut clocks = rest().map_or(clocks, |[delay_s, sigma_s]| {
-            clocks.refined(delay_s, sigma_s)
-        });
+        let Some(mut clocks) = clocks_apart(recorded, rest) else {
+            return e.into();
+        };
         clocks.delay_s += self.request.gnss_delay_s;
         Failure::input(e).hint(document::apart(&clocks))
     }
@@ -427,18 +405,10 @@ impl Scene<'_> {
     /// Clocks that are apart, where the innovations are smaller when they are not: the course of what walks or slips has
     /// other turns than its body.
     fn clocks(&self, recorded: &Recorded<'_>) -> Option<ClocksApart> {
-        let clocks = clocks_apart(recorded)?;
         // turns of the course tell it to tenths of a second, the innovations tell the rest
-        let gnss = earlier(recorded.gnss, clocks.delay_s);
-        let there = Recorded {
-            gnss: &gnss,
-            ..*recorded
-        };
-        let rest = displaced(&there, self.belief, &self.start(&there)?, self.settings)
-            .and_then(|d| d.delay_s);
-        let clocks = rest.map_or(clocks, |[delay_s, sigma_s]| {
-            clocks.refined(delay_s, sigma_s)
-        });
+        let clocks = clocks_apart(recorded, |there| {
+            displaced(there, self.belief, &self.start(there)?, self.settings)?.delay_s
+        })?;
         let gnss = earlier(recorded.gnss, clocks.delay_s);
         let without = self.nis(&Recorded {
             gnss: &gnss,
@@ -521,8 +491,7 @@ pub(super) fn belief(
 ) -> Result<(Belief, Option<ReductionQuality>)> {
     let model = at_rate(model, rate_hz).refuse_within("the model")?;
     let lengths: Vec<f64> = outages.iter().map(|o| o.end_s - o.start_s).collect();
-    let steps = gnss.windows(2).map(|w| w[1].t_s - w[0].t_s);
-    let interval_s = middle(steps.collect()).unwrap_or(1.0);
+    let interval_s = interval_s(gnss).unwrap_or(1.0);
     let window_s = reduction::window_s(lengths.iter().copied().fold(0.0, f64::max));
     let belief = Belief::new(&model, states, interval_s, window_s).refuse_within("the model")?;
     let drive = || {
@@ -545,12 +514,6 @@ pub(super) fn belief(
     let made = (&model, &belief, full.as_ref());
     let quality = reduction_of(made, &track, &Context::default());
     Ok((belief, quality))
-}
-
-/// The value in the middle, in order.
-fn middle(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 /// What a filter expects beside the model, with what its states say of scale factors.

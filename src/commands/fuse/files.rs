@@ -7,7 +7,7 @@ use crate::report::json;
 use nav_sim_document::shortest;
 use nav_sim_navigation::earth::radii;
 use nav_sim_navigation::frames::wrap_angle;
-use nav_sim_navigation::fusion::{Row, Solution, Use};
+use nav_sim_navigation::fusion::{Row, Solution};
 use nav_sim_navigation::simulation::{BIAS_NAMES, REPORTED_NAMES};
 use nav_sim_signal::units::DEG;
 use std::fmt::Write as _;
@@ -127,16 +127,9 @@ fn innovations_csv(solution: &Solution) -> String {
         ("", &["nis", "dof"]),
     ]);
     for fix in &solution.fixes {
-        let status = match fix.used {
-            Use::Used => "used",
-            Use::Withheld => "withheld",
-            Use::Rejected => "rejected",
-        };
-        let mut cells = vec![
-            fixed(fix.t_s, 6),
-            u8::from(fix.used == Use::Used).to_string(),
-            status.to_owned(),
-        ];
+        let status = if fix.used { "used" } else { "withheld" };
+        let used = u8::from(fix.used).to_string();
+        let mut cells = vec![fixed(fix.t_s, 6), used, status.to_owned()];
         for list in [&fix.innovation, &fix.sigma] {
             cells.extend((0..6).map(|i| list.get(i).map_or_else(String::new, |x| fixed(*x, 6))));
         }

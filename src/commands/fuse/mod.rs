@@ -6,7 +6,7 @@ mod files;
 mod summary;
 
 pub use drive::FuseAnswer;
-pub use summary::{Cause, FuseSummary, VehicleSummary};
+pub use summary::{Cause, FuseSummary};
 
 use crate::app::inputs::files;
 use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
@@ -17,7 +17,7 @@ use nav_sim_navigation::earth::GravityModel;
 use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
 use nav_sim_navigation::frames::RollPitchYaw;
 use nav_sim_navigation::fusion::alignment::AlignmentError;
-use nav_sim_navigation::fusion::mounting::{Mounted, MountingError};
+use nav_sim_navigation::fusion::mounting::MountingError;
 use nav_sim_navigation::fusion::{Correlation, FusionError, Heading, Settings};
 use nav_sim_navigation::gnss::FixSigma;
 use nav_sim_navigation::metrics::VerdictKind;
@@ -25,7 +25,6 @@ use nav_sim_navigation::sensors::gnss::MAX_LEVER_ARM_M;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_signal::units::DEG;
 use serde_json::json;
-use std::fmt::{self, Display, Formatter};
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -118,7 +117,7 @@ pub struct Fuse {
     )]
     pub initial: StartChoice,
     /// GNSS antenna from the IMU: front, right, down (m)
-    #[arg(long = "lever-arm", value_name = "X,Y,Z", value_parser = numbers::<3>, default_value = "0,0,0",
+    #[arg(long = "lever-arm", value_name = "X,Y,Z", value_parser = arm, default_value = "0,0,0",
         hide_default_value = true, allow_hyphen_values = true)]
     pub lever_arm_m: [f64; 3],
     /// Attitude of the IMU in the vehicle (degrees) if its axes are not front, right, down; after a colon the standard
@@ -164,7 +163,7 @@ pub struct Fuse {
     #[arg(long, value_name = "FILE")]
     pub odometer: Option<PathBuf>,
     /// Middle of the rear axle from the IMU: front, right, down (m)
-    #[arg(long = "rear-axle", value_name = "X,Y,Z", value_parser = numbers::<3>, default_value = "0,0,0",
+    #[arg(long = "rear-axle", value_name = "X,Y,Z", value_parser = arm, default_value = "0,0,0",
         hide_default_value = true, allow_hyphen_values = true)]
     pub rear_axle_m: [f64; 3],
     /// Names of the IMU's columns, for a file without a header or instead of it
@@ -188,33 +187,12 @@ impl Fuse {
         }
     }
 
-    /// Source of the mounting.
-    pub(super) fn mounted(&self) -> Mounted {
-        if self.mounting == Some(MountingChoice::Auto) {
-            Mounted::AsFound
-        } else {
-            Mounted::AsGiven
-        }
-    }
-
-    /// Standard deviations where the file states none, and factors of those that it states.
-    pub(super) fn fix_sigma(&self) -> (Option<FixSigma>, [f64; 2]) {
-        match self.gnss_sigma {
-            Some(GnssSigma::Unsaid(sigma)) => (Some(sigma), [1.0; 2]),
-            Some(GnssSigma::Times(factors)) => (None, factors),
-            None => (None, [1.0; 2]),
-        }
-    }
-
     /// Heading at the start, where it is given.
     pub(super) fn given_heading(&self) -> Option<Heading> {
-        let StartChoice::Heading { deg, sigma_deg } = self.initial else {
-            return None;
-        };
-        Some(Heading {
-            yaw: deg * DEG,
-            sigma: sigma_deg * DEG,
-        })
+        match self.initial {
+            StartChoice::Heading(heading) => Some(heading),
+            _ => None,
+        }
     }
 
     /// The filter's expectation of constant biases, over that of a file.
@@ -230,48 +208,20 @@ impl Fuse {
     }
 
     /// Settings of the filter's run.
-    ///
-    /// # Errors
-    /// A value that is out of its range.
-    pub(super) fn settings(&self) -> Result<Settings> {
-        let refuse = |message: String| Err(Failure::input(message));
-        for (option, arm) in [
-            ("--lever-arm", self.lever_arm_m),
-            ("--rear-axle", self.rear_axle_m),
-        ] {
-            if !arm.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
-                let [x, y, z] = arm;
-                return refuse(format!(
-                    "{option} {x},{y},{z}: more than {MAX_LEVER_ARM_M} m"
-                ));
-            }
-        }
+    pub(super) fn settings(&self) -> Settings {
         let (q_s_b, mounting_sigma_b) = match self.mounting {
-            Some(MountingChoice::Angles {
-                deg: [roll, pitch, yaw],
-                sigma_deg,
-            }) => (
-                RollPitchYaw {
-                    roll: roll * DEG,
-                    pitch: pitch * DEG,
-                    yaw: yaw * DEG,
-                }
-                .to_quat(),
-                DVec3::from(sigma_deg) * DEG,
-            ),
-            Some(MountingChoice::Axes(q_s_b)) => (q_s_b, DVec3::ZERO),
+            Some(MountingChoice::Given(q_s_b, sigma_b)) => (q_s_b, sigma_b),
             _ => (DQuat::IDENTITY, DVec3::ZERO),
         };
-        Ok(Settings {
+        Settings {
             q_s_b,
             mounting_sigma_b,
             lever_arm_b: self.lever_arm_m.into(),
             gravity: GravityModel::default(),
             outages: self.outages.clone(),
-            nis_gate: None,
             rows_hz: ROWS_HZ,
             smooth: self.smooth,
-        })
+        }
     }
 }
 
@@ -280,15 +230,8 @@ impl Fuse {
 pub enum MountingChoice {
     /// Found from the drive.
     Auto,
-    /// From axes with a name to front, right, down.
-    Axes(DQuat),
-    /// Given.
-    Angles {
-        /// Roll, pitch, yaw (degrees).
-        deg: [f64; 3],
-        /// Standard deviations about the vehicle's front, right, down (degrees).
-        sigma_deg: [f64; 3],
-    },
+    /// From its axes to front, right, down, and standard deviations about these (rad).
+    Given(DQuat, DVec3),
 }
 
 /// Largest standard deviation of an attitude that small angles describe (degrees).
@@ -298,7 +241,9 @@ impl FromStr for MountingChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let axes = |[x, y, z]: [DVec3; 3]| Self::Axes(DQuat::from_mat3(&DMat3::from_cols(x, y, z)));
+        let axes = |[x, y, z]: [DVec3; 3]| {
+            Self::Given(DQuat::from_mat3(&DMat3::from_cols(x, y, z)), DVec3::ZERO)
+        };
         match text {
             "auto" => return Ok(Self::Auto),
             "flu" => return Ok(axes([DVec3::X, DVec3::NEG_Y, DVec3::NEG_Z])),
@@ -308,10 +253,12 @@ impl FromStr for MountingChoice {
         // nobody mounts by less, and what a drive shows is known no better
         let (angles, sigma) = text.split_once(':').unwrap_or((text, "1,1,1"));
         match (list(angles), list(sigma)) {
-            (Some(deg), Some(sigma_deg))
+            (Some([roll, pitch, yaw]), Some(sigma_deg))
                 if sigma_deg.iter().all(|s: &f64| (0.0..=MAX_SIGMA_DEG).contains(s)) =>
             {
-                Ok(Self::Angles { deg, sigma_deg })
+                let [roll, pitch, yaw] = [roll, pitch, yaw].map(|angle: f64| angle * DEG);
+                let q_s_b = RollPitchYaw { roll, pitch, yaw }.to_quat();
+                Ok(Self::Given(q_s_b, DVec3::from(sigma_deg) * DEG))
             }
             _ => Err(
                 "expected degrees, such as -9.5,-60.8,-166.8 or -9.5,-60.8,-166.8:1.5,0.5,0.8, or flu, rfu, auto"
@@ -321,14 +268,8 @@ impl FromStr for MountingChoice {
     }
 }
 
-/// Standard deviations of fixes, as a user gives them.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum GnssSigma {
-    /// Where the file states none.
-    Unsaid(FixSigma),
-    /// Times what the file states, of position and of velocity.
-    Times([f64; 2]),
-}
+/// Standard deviations of fixes where the file states none, and factors of what it states, of position and of velocity.
+pub type GnssSigma = (Option<FixSigma>, [f64; 2]);
 
 /// Finite numbers between commas.
 fn list<const N: usize>(text: &str) -> Option<[f64; N]> {
@@ -343,8 +284,12 @@ pub(super) fn number(text: &str) -> Result<f64, &'static str> {
         .ok_or("not a finite number")
 }
 
-fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    list(text).ok_or_else(|| format!("expected {N} numbers between commas"))
+fn arm(text: &str) -> Result<[f64; 3], String> {
+    let arm: [f64; 3] = list(text).ok_or("expected 3 numbers between commas")?;
+    match arm.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
+        true => Ok(arm),
+        false => Err(format!("more than {MAX_LEVER_ARM_M} m")),
+    }
 }
 
 fn at_least_zero(text: &str) -> Result<[f64; 2], &'static str> {
@@ -366,12 +311,12 @@ fn correlation(text: &str) -> Result<Correlation, &'static str> {
 
 fn gnss_sigma(text: &str) -> Result<GnssSigma, &'static str> {
     let Some(factors) = text.strip_prefix('x') else {
-        return fix_sigma(text).map(GnssSigma::Unsaid);
+        return Ok((Some(fix_sigma(text)?), [1.0; 2]));
     };
     let (position, velocity) = factors.split_once(':').unwrap_or((factors, factors));
     let factor = |text: &str| number(text).ok().filter(|factor| *factor > 0.0);
     let both = factor(position).zip(factor(velocity));
-    both.map(|(position, velocity)| GnssSigma::Times([position, velocity]))
+    both.map(|(position, velocity)| (None, [position, velocity]))
         .ok_or("expected factors > 0: x3 or x3:2")
 }
 
@@ -400,14 +345,14 @@ mod request_tests {
     #[test]
     fn axes_of_loggers_are_rotations_to_front_right_down() {
         for (name, x, y) in [("flu", DVec3::X, DVec3::NEG_Y), ("rfu", DVec3::Y, DVec3::X)] {
-            let Ok(MountingChoice::Axes(q)) = name.parse() else {
+            let Ok(MountingChoice::Given(q, _)) = name.parse() else {
                 panic!("{name}");
             };
             let found = [DVec3::X, DVec3::Y, DVec3::Z].map(|v| (q * v).round());
             assert_eq!(found, [x, y, DVec3::NEG_Z], "{name}");
         }
         let asked = crate::app::Asked::<Fuse>::of(["imu.csv", "gnss.csv", "m.toml"]).unwrap();
-        let settings = asked.request.settings().unwrap();
+        let settings = asked.request.settings();
         assert_eq!(settings.q_s_b, DQuat::IDENTITY);
     }
 
@@ -432,12 +377,7 @@ pub enum StartChoice {
     /// Found in the data.
     Auto,
     /// Found in the data but for the heading.
-    Heading {
-        /// From north, clockwise (degrees).
-        deg: f64,
-        /// Standard deviation (degrees).
-        sigma_deg: f64,
-    },
+    Heading(Heading),
     /// Stated in a file.
     File(PathBuf),
 }
@@ -454,22 +394,13 @@ impl FromStr for StartChoice {
             Some((Ok(deg), Ok(sigma_deg)))
                 if sigma_deg > 0.0 && sigma_deg <= MAX_SIGMA_DEG && deg.abs() <= 360.0 =>
             {
-                Ok(Self::Heading { deg, sigma_deg })
+                let (yaw, sigma) = (deg * DEG, sigma_deg * DEG);
+                Ok(Self::Heading(Heading { yaw, sigma }))
             }
             Some((Ok(_), Ok(_))) => Err(format!(
                 "expected a heading and its standard deviation of up to {MAX_SIGMA_DEG}°, such as 90:5"
             )),
             _ => Ok(Self::File(text.into())),
-        }
-    }
-}
-
-impl Display for StartChoice {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Auto => f.write_str("auto"),
-            Self::Heading { deg, sigma_deg } => write!(f, "{deg}:{sigma_deg}"),
-            Self::File(path) => write!(f, "{}", path.display()),
         }
     }
 }

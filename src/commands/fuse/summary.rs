@@ -6,8 +6,8 @@ use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
 use nav_sim_navigation::fusion::mounting::Mounting;
 use nav_sim_navigation::fusion::{
-    AidInnovations, ClocksApart, Displaced, Ends, Finding, Found, FromReference, Levelling,
-    OutageDrift, SmoothedOutcome, Solution, Start, Weighed, aid_innovations, outcome,
+    ClocksApart, Displaced, Finding, Found, Levelling, Outcome, Solution, Start, Weighed,
+    aid_innovations, outcome,
 };
 use nav_sim_navigation::metrics::VerdictKind;
 use nav_sim_navigation::sensors::aiding::{
@@ -15,6 +15,7 @@ use nav_sim_navigation::sensors::aiding::{
 };
 use nav_sim_signal::units::DEG;
 use serde::Serialize;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -53,61 +54,17 @@ pub struct FuseSummary {
     pub(super) initial: Initial,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) mounting: Option<MountingRow>,
-    pub(super) fixes: Fixes,
-    /// Mean NIS of the fixes used, divided by their number of components: 1 if right.
-    pub nis_per_component: f64,
     /// Root mean square of the horizontal standard deviation of the filter (m).
     pub horizontal_sigma_rms_m: f64,
     /// Correlation of the innovations, and what the filter makes of it; none where fixes are few.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub gnss_correlation: Option<FixCorrelation>,
+    pub gnss_correlation: Option<Value>,
     /// What the vehicle knows, where that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub vehicle: Option<VehicleSummary>,
-    /// Errors at the ends of outages.
-    pub outages: Vec<OutageDrift>,
-    /// The ends of all outages and gaps.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ends: Option<Ends>,
-    /// Differences from the reference.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub reference: Option<FromReference>,
-    /// Figures of the smoothed solution.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub smoothed: Option<SmoothedOutcome>,
-}
-
-/// Errors of fixes that last.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct FixCorrelation {
-    /// Autocorrelation of the innovations of position from one fix to the next, standard deviations as stated.
-    pub lag_1: f64,
-    /// What white innovations exceed once in a thousand recordings, or what is worth a word.
-    pub limit: f64,
-    /// Whether they are correlated.
-    pub is_correlated: bool,
-    /// How many times the stated standard deviation of position the filter believes.
-    pub pos_sigma_factor: f64,
-    /// Mean NIS per component, standard deviations as stated.
-    pub nis_as_stated: f64,
-}
-
-impl FixCorrelation {
-    pub(super) fn of(weighed: &Weighed) -> Option<Self> {
-        let (white, nis_as_stated) = (
-            weighed.whiteness?,
-            outcome(weighed.judged(), &[]).nis_per_component,
-        );
-        let (lag_1, limit) = (white.lag_1, white.limit);
-        let (is_correlated, pos_sigma_factor) = (white.is_correlated(), weighed.pos_sigma_factor);
-        Some(Self {
-            lag_1,
-            limit,
-            is_correlated,
-            pos_sigma_factor,
-            nis_as_stated,
-        })
-    }
+    pub vehicle: Option<Value>,
+    /// Fixes, NIS, errors at the ends of outages and against the reference.
+    #[serde(flatten)]
+    pub outcome: Outcome,
 }
 
 /// Verdict on a solution.
@@ -148,13 +105,6 @@ pub(super) struct MountingRow {
     pub(super) yaw_deg: f64,
     pub(super) sigma_deg: [f64; 3],
     how: String,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(super) struct Fixes {
-    pub(super) used: usize,
-    pub(super) withheld: usize,
-    pub(super) rejected: usize,
 }
 
 impl Initial {
@@ -287,43 +237,36 @@ impl Fuse {
     }
 }
 
-/// Estimates at the end, and how the aids agree with the solution.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct VehicleSummary {
-    /// The wheel reads so much more than the speed (1).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub wheel_scale: Option<Known>,
-    /// Pitch of the vehicle's axes in those of the mounting (degrees).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mounting_pitch_deg: Option<Known>,
-    /// Yaw of these (degrees).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mounting_yaw_deg: Option<Known>,
-    /// Innovations of each aid that was used.
-    pub aids: Vec<AidInnovations>,
-}
-
-/// An estimate and its standard deviation.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Known {
-    /// Estimate.
-    pub value: f64,
-    /// Standard deviation.
-    pub sigma: f64,
-}
-
-impl VehicleSummary {
-    /// None where nothing was asked for.
-    pub(super) fn of(solution: &Solution, settings: &AidingSettings) -> Option<Self> {
-        let known = |i: usize, unit: f64| {
-            let [value, sigma] = solution.vehicle?.map(|estimates| estimates[i] / unit);
-            (settings.state_sigmas()[i] > 0.0).then_some(Known { value, sigma })
-        };
-        (!settings.is_none()).then(|| Self {
-            wheel_scale: known(0, 1.0),
-            mounting_pitch_deg: known(1, DEG),
-            mounting_yaw_deg: known(2, DEG),
-            aids: aid_innovations(&solution.aids),
-        })
+/// Estimates at the end, and how the aids agree with the solution; none where nothing was asked for.
+pub(super) fn vehicle(solution: &Solution, settings: &AidingSettings) -> Option<Value> {
+    if settings.is_none() {
+        return None;
     }
+    let mut found = json!({ "aids": aid_innovations(&solution.aids) });
+    let keys = [
+        ("wheel_scale", 1.0),
+        ("mounting_pitch_deg", DEG),
+        ("mounting_yaw_deg", DEG),
+    ];
+    for (i, (key, unit)) in keys.into_iter().enumerate() {
+        let known = solution
+            .vehicle
+            .filter(|_| settings.state_sigmas()[i] > 0.0);
+        if let Some([value, sigma]) = known.map(|v| v.map(|estimates| estimates[i] / unit)) {
+            found[key] = json!({ "value": value, "sigma": sigma });
+        }
+    }
+    Some(found)
+}
+
+/// Errors of fixes that last: the correlation of their innovations, standard deviations as stated, and the filter's answer.
+pub(super) fn correlation(weighed: &Weighed) -> Option<Value> {
+    let white = weighed.whiteness?;
+    Some(json!({
+        "lag_1": white.lag_1,
+        "limit": white.limit,
+        "is_correlated": white.is_correlated(),
+        "pos_sigma_factor": weighed.pos_sigma_factor,
+        "nis_as_stated": outcome(weighed.judged(), &[]).nis_per_component,
+    }))
 }

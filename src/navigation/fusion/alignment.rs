@@ -8,7 +8,7 @@
 //! contradict is given up for the next, and a heading that they move is not believed as well as it says.
 
 use super::outcome::{Finding, nis_bound};
-use super::{Found, Heading, Levelling, Recorded, Settings, Solution, Start, Use, fuse};
+use super::{Found, Heading, Levelling, Recorded, Settings, Solution, Start, fuse};
 use crate::earth::{gravity_down, radii};
 use crate::ekf::{Belief, InitialSettings};
 use crate::frames::{NavState, RollPitchYaw, wrap_angle};
@@ -828,7 +828,7 @@ fn agreement(
         nis: 0.0,
         components: 0,
     };
-    for fix in solution.fixes.iter().filter(|f| f.used == Use::Used) {
+    for fix in solution.fixes.iter().filter(|f| f.used) {
         // the sum of the logarithms stands for the determinant: the correlations of both starts are alike
         sum.cost += fix.nis + 2.0 * fix.sigma.iter().map(|s| s.ln()).sum::<f64>();
         sum.nis += fix.nis;

@@ -16,21 +16,9 @@ use crate::ekf::Belief;
 use crate::frames::RollPitchYaw;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
-use serde::{Deserialize, Serialize};
 
 /// Largest standard deviation of an angle that is still an answer (rad).
 const DETERMINED: f64 = 5.0 * DEG;
-
-/// Where it is known from how the IMU sits in the vehicle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Mounted {
-    /// From the settings.
-    #[default]
-    AsGiven,
-    /// From the drive.
-    AsFound,
-}
 
 /// A mounting that was found.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,13 +2,12 @@
 
 use super::{
     AidRecord, FixRecord, FusionError, Nine, Recorded, Row, RowError, Settings, Solution, Start,
-    Use, VehicleVelocity, check_clocks, spans,
+    VehicleVelocity, check_clocks, spans,
 };
 use crate::earth::{MAX_LATITUDE, geodetic_to_ecef};
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::{
-    Belief, BodyVelocity, Ekf, Fix, Snapshot, advance, nis_limit, settle, update,
-    update_body_velocity,
+    Belief, BodyVelocity, Ekf, Fix, Snapshot, advance, settle, update, update_body_velocity,
 };
 use crate::frames::{NavState, RollPitchYaw};
 use crate::gnss::GnssFix;
@@ -169,18 +168,9 @@ impl Run<'_> {
     fn fix(&mut self, fix: &GnssFix) -> Result<(), FusionError> {
         let mut record = self.filter.look_at(fix);
         record.error = self.error().map(|e| e.values);
-        let withheld = self.settings.outages.iter().any(|o| o.withholds(fix.t_s));
-        let limit = self
-            .settings
-            .nis_gate
-            .map(|p| nis_limit(p, record.innovation.len()));
-        record.used = match limit {
-            _ if withheld => Use::Withheld,
-            Some(limit) if record.nis > limit => Use::Rejected,
-            _ => Use::Used,
-        };
+        record.used = !self.settings.outages.iter().any(|o| o.withholds(fix.t_s));
         match &mut self.tape {
-            _ if record.used != Use::Used => {}
+            _ if !record.used => {}
             Some(tape) => tape.fix(&mut self.filter, self.now, |filter| filter.update(fix)),
             None => self.filter.update(fix),
         }
@@ -358,7 +348,7 @@ impl Filter {
             horizontal_nis,
             horizontal_sigma_m: (before.x + before.y).sqrt(),
             t_s: fix.t_s,
-            used: Use::Used,
+            used: true,
             innovation: z.as_slice().to_vec(),
             sigma,
             nis,
