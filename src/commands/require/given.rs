@@ -5,22 +5,19 @@ use super::{
     quantity_in_words,
 };
 use nav_sim_document::{Colour, Document, Mark, Series, Table, Tone, readable};
-use nav_sim_navigation::require::{Quantity, Worst};
+use nav_sim_navigation::require::{Margins, Quantity, Worst};
 use nav_sim_navigation::sensors::outage::Outage;
 use serde::Serialize;
 
 /// The longest outage that keeps the limits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Longest {
-    /// Its length (s); 0 where a limit is exceeded though every fix comes.
+    /// Its length (s).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub longest_s: Option<f64>,
     /// All that was looked at (s).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_least_s: Option<f64>,
-    /// The hardest limit just before a fix, where it is exceeded though every fix comes.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub with_all_fixes: Option<Worst>,
     pub text: String,
 }
 
@@ -32,15 +29,10 @@ impl Longest {
 
     fn in_words(&self) -> String {
         let text = &self.text;
-        match (self.at_least_s, &self.with_all_fixes) {
-            (Some(s), _) if s < LONGEST_S => format!("{text}, to the end of the trajectory"),
-            (Some(_), _) => format!("{text}, longer ones are not looked at"),
-            (None, Some(worst)) => format!(
-                "{text}; even without an outage {} is {} just before a fix",
-                worst.limit.quantity.name(),
-                readable(worst.value)
-            ),
-            (None, None) => text.clone(),
+        match self.at_least_s {
+            Some(s) if s < LONGEST_S => format!("{text}, to the end of the trajectory"),
+            Some(_) => format!("{text}, longer ones are not looked at"),
+            None => text.clone(),
         }
     }
 }
@@ -60,16 +52,7 @@ pub(crate) struct GivenImu {
     pub(super) aidings: Vec<Aided>,
     /// After the outage that was asked for; none where the longest is sought.
     #[serde(flatten)]
-    pub(super) judged: Option<Judged>,
-}
-
-#[derive(Debug, Clone, Serialize)]
-pub(super) struct Judged {
-    pub met: bool,
-    #[serde(flatten)]
-    pub worst: Worst,
-    /// The hardest limit of an IMU without errors.
-    pub without_imu_errors: Worst,
+    pub(super) judged: Option<Margins>,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -100,7 +83,7 @@ impl GivenImu {
         let word = if judged.met { "met" } else { "NOT met" };
         let times = readable(judged.worst.value / judged.worst.limit.most);
         let without = &judged.without_imu_errors;
-        let (name, left) = (without.limit.quantity.name(), readable(without.value));
+        let (name, left) = (without.limit.quantity, readable(without.value));
         vec![
             format!(
                 "{word}: {}, {times} times the limit",
@@ -141,7 +124,7 @@ impl GivenImu {
             document.lead(Table::of(self, "/aidings/*", &columns));
         }
         document.section("Error against the length of an outage");
-        for (limit, curve) in self.question.limits.iter().zip(&self.curves) {
+        for (k, (limit, curve)) in self.question.limits.iter().zip(&self.curves).enumerate() {
             let mut series = vec![Series::new("limit", Colour::RIGHT, Mark::Level(limit.most))];
             let points = points(&curve.points);
             series.extend(Series::dotted_line("this IMU", Colour::REAL, points));
@@ -150,11 +133,7 @@ impl GivenImu {
                 ("outage (s)", "outage_s"),
                 (quantity_in_words(limit.quantity), "value"),
             ];
-            let k = self
-                .curves
-                .iter()
-                .position(|other| other.quantity == curve.quantity);
-            let rows = format!("/curves/{}/points/*", k.unwrap_or_default());
+            let rows = format!("/curves/{k}/points/*");
             document.table(&Table::of(self, &rows, &columns));
         }
         document.checked(CHECKED);

@@ -59,7 +59,7 @@ pub struct Require {
     /// Limit at the end of the outage, as NAME<=LIMIT (repeatable): p50_m, p95_m, rmse_m (horizontal), roll_deg, pitch_deg,
     /// yaw_deg
     #[arg(id = "require", long = "require", value_name = "NAME<=LIMIT")]
-    pub limits: Vec<LimitFlag>,
+    pub limits: Vec<Limit>,
     /// Scenario file whose section gnss is used
     #[arg(long, value_name = "FILE")]
     pub gnss: Option<PathBuf>,
@@ -76,31 +76,6 @@ pub struct Require {
 
 /// Stands for the units that are known by name.
 const BUILT_IN: &str = "built-in";
-
-/// A value of `--require`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LimitFlag(pub Limit);
-
-impl FromStr for LimitFlag {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let limit = || {
-            let (name, most) = text.split_once("<=").or_else(|| text.split_once('<'))?;
-            let quantity = Quantity::ALL
-                .into_iter()
-                .find(|quantity| quantity.name() == name.trim())?;
-            Some(Self(Limit {
-                quantity,
-                most: parse::positive(most.trim()).ok()?,
-            }))
-        };
-        let names = Quantity::ALL.map(Quantity::name).join(", ");
-        limit().ok_or_else(|| {
-            format!("expected NAME<=LIMIT with a positive limit, NAME one of {names}")
-        })
-    }
-}
 
 impl FromStr for Ask {
     type Err = String;
@@ -158,7 +133,20 @@ impl Command for Require {
     }
 
     fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
-        self.possible()?;
+        if let (Ask::Window(outage), Some(start_s)) = (self.outage, self.start) {
+            let Outage {
+                start_s: from,
+                end_s: to,
+            } = outage;
+            let message = format!("--start {start_s} beside --outage {from}:{to}");
+            return Err(
+                Failure::input(message).hint("an outage of a length alone has an earliest start")
+            );
+        }
+        if self.model.is_none() && self.outage == Ask::Longest {
+            return Err(Failure::input("--outage longest needs a MODEL")
+                .hint("without one, give a length in seconds"));
+        }
         Ok(files("trajectory", [&self.trajectory])
             .chain(files("model", &self.model))
             .chain(files("scenario", &self.settings.scenario))
@@ -176,8 +164,7 @@ impl Command for Require {
                     true => catalogue(&asked)?,
                     false => units_of(directory, &asked, context)?,
                 };
-                let ranked = asked.ranked(&units).map_err(Failure::input)?;
-                Ok(of_others(Found::Ranked(ranked)))
+                Ok(of_others(Found::Ranked(asked.ranked(&units)?)))
             }
             (None, None) => {
                 let needed = sought(&asked)?;
@@ -205,63 +192,32 @@ impl Answer for RequireAnswer {
             .collect()
     }
 
-    fn unmet(&self) -> Option<Failure> {
-        self.found.unmet()
-    }
-}
-
-impl Found {
     /// The limits that are not kept.
     fn unmet(&self) -> Option<Failure> {
-        match self {
-            Self::Needed(_) => None,
-            Self::Given(judged) => {
+        match &self.found {
+            Found::Needed(_) => None,
+            Found::Given(judged) => {
                 let missed = judged.judged.as_ref().filter(|judged| !judged.met)?;
                 let Worst { limit, value, .. } = missed.worst;
                 let [value, most] = [value, limit.most].map(|x| limit.quantity.shown(x));
                 Some(Failure::bound(format!(
                     "{} is {value}, the limit is {most}",
-                    limit.quantity.name()
+                    limit.quantity
                 )))
             }
-            Self::Ranked(ranking) => (!ranking.is_met())
+            Found::Ranked(ranking) => (!ranking.is_met())
                 .then(|| Failure::bound("no unit keeps the limits by figures that are all stated")),
         }
     }
 }
 
 impl Require {
-    /// Refuses what contradicts itself.
-    fn possible(&self) -> Result<()> {
-        if let (Ask::Window(outage), Some(start_s)) = (self.outage, self.start) {
-            let message = format!(
-                "--start {start_s} beside --outage {}:{}",
-                outage.start_s, outage.end_s
-            );
-            return Err(
-                Failure::input(message).hint("an outage of a length alone has an earliest start")
-            );
-        }
-        if self.model.is_none() && self.outage == Ask::Longest {
-            return Err(Failure::input("--outage longest needs a MODEL")
-                .hint("without one, give a length in seconds"));
-        }
-        Ok(())
-    }
-
-    /// The limits that are given; at least one.
-    fn limits(&self) -> Result<Vec<Limit>> {
-        let limits: Vec<Limit> = self.limits.iter().map(|limit| limit.0).collect();
-        if limits.is_empty() {
+    /// What is asked, with the files read.
+    fn requirements(&self, context: &Context<'_>) -> Result<Requirements> {
+        if self.limits.is_empty() {
             let hint = "give one, such as --require 'p95_m<=5' or --require 'yaw_deg<=1'";
             return Err(Failure::input("no limit is given").hint(hint));
         }
-        Ok(limits)
-    }
-
-    /// What is asked, with the files read.
-    fn requirements(&self, context: &Context<'_>) -> Result<Requirements> {
-        let limits = self.limits()?;
         let mut scenario = self.settings.read()?;
         if let Some(path) = &self.gnss {
             scenario.gnss = scenario_file::read(path)?.gnss;
@@ -277,6 +233,7 @@ impl Require {
         }
         scenario.validate().map_err(Failure::input)?;
         let trajectory = inputs::trajectory(&self.trajectory, context)?;
+        let limits = self.limits.clone();
         Requirements::new(scenario, trajectory, limits, self.outage, self.start)
     }
 }
@@ -445,7 +402,7 @@ impl Question {
     }
 
     pub(super) fn limits_in_words(&self) -> String {
-        let limit = |l: &Limit| format!("{} ≤ {}", l.quantity.name(), readable(l.most));
+        let limit = |l: &Limit| format!("{} ≤ {}", l.quantity, readable(l.most));
         self.limits.iter().map(limit).collect::<Vec<_>>().join(", ")
     }
 
@@ -455,7 +412,7 @@ impl Question {
         let place = window(outage.start_s, outage.end_s);
         format!(
             "{} {} at the end of outage {place}",
-            worst.limit.quantity.name(),
+            worst.limit.quantity,
             readable(worst.value)
         )
     }
@@ -467,9 +424,9 @@ pub(super) const fn quantity_in_words(quantity: Quantity) -> &'static str {
         Quantity::P50 => "horizontal error, median (m)",
         Quantity::P95 => "horizontal error, 95 % quantile (m)",
         Quantity::Rmse => "horizontal error, RMSE (m)",
-        Quantity::Angle(0) => "roll, RMSE (°)",
-        Quantity::Angle(1) => "pitch, RMSE (°)",
-        Quantity::Angle(_) => "yaw, RMSE (°)",
+        Quantity::Roll => "roll, RMSE (°)",
+        Quantity::Pitch => "pitch, RMSE (°)",
+        Quantity::Yaw => "yaw, RMSE (°)",
     }
 }
 

@@ -1,12 +1,11 @@
 //! The IMU that a limit needs.
 
-use super::given::{Aided, GivenImu, Judged, LimitCurve, Longest};
+use super::given::{Aided, GivenImu, LimitCurve, Longest};
 use super::ranking::{RankedUnit, Ranking, stated_in_words};
 use super::{CHECKED, CURVE_S, DriftPoint, LONGEST_S, Question, note_beyond};
-use crate::app::{Failure, inputs};
+use crate::app::{Failure, Refuse, inputs};
 use crate::io::model_file::{ModelFile, PROGRAM, TurnOn};
 use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds};
-use nav_sim_navigation::ekf::BeliefError;
 use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{
     Answer as Bound, Course, Drift, IMU_PARAMETERS, ImuParameters, Limit, Margins, Need, Quantity,
@@ -273,7 +272,7 @@ impl Requirements {
         let long = self.long_outages();
         let course = self.course(&long)?;
         let curves = course.curves(scenario, model)?;
-        let longest = self.longest_of(&course, (scenario, model), &curves)?;
+        let longest = self.longest_of(&curves);
         let of_limit = |limit: &Limit| LimitCurve {
             quantity: limit.quantity,
             points: drift_curve(&curves, limit.quantity),
@@ -291,23 +290,15 @@ impl Requirements {
             let outages = self.outages();
             let margins = Margins::of(&self.course(&outages)?, scenario, model, &self.limits)?;
             let shown = outages[margins.worst.place];
-            let judged = Judged {
-                met: margins.met(),
-                worst: margins.worst,
-                without_imu_errors: margins.without_imu,
-            };
-            (Some(judged), outages, Some(shown))
+            (Some(margins), outages, Some(shown))
         };
-        let beyond_linear = match shown {
-            Some(outage) => self.beyond_linear(scenario, model, outage)?,
-            None => None,
-        };
+        let beyond_linear = shown.map(|outage| self.beyond_linear(scenario, model, outage));
         Ok(GivenImu {
             schema_version: 1,
             question: self.question(outages),
             outage: longest,
             curves: curve_of_limit,
-            beyond_linear,
+            beyond_linear: beyond_linear.transpose()?.flatten(),
             aidings: Vec::new(),
             judged,
         })
@@ -335,7 +326,7 @@ impl Requirements {
             let long = self.long_outages();
             let course = Course::new(&scenario, &self.trajectory, &long)?;
             let curves = course.curves(&scenario, model)?;
-            let longest = self.longest_of(&course, (&scenario, model), &curves)?;
+            let longest = self.longest_of(&curves);
             let length_s = if self.ask == Ask::Longest {
                 longest.length_s()
             } else {
@@ -373,16 +364,14 @@ impl Requirements {
     ///
     /// # Errors
     /// When a model has no filter, with its name, or the length is not a whole number of seconds.
-    pub(crate) fn ranked(&self, units: &[CatalogueUnit]) -> Result<Ranking, RequireError> {
+    pub(crate) fn ranked(&self, units: &[CatalogueUnit]) -> Result<Ranking, Failure> {
         let outages = self.long_outages();
         let course = self.course(&outages)?;
-        let named = |name: &str, e| RequireError::Unit {
-            name: name.to_owned(),
-            source: Box::new(e),
+        let ranked = |unit: &CatalogueUnit| {
+            let ranked = self.rank(&course, unit);
+            ranked.map_err(|e| e.within(&unit.name))
         };
-        let ranked =
-            |unit: &CatalogueUnit| self.rank(&course, unit).map_err(|e| named(&unit.name, e));
-        let ranked: Vec<Result<RankedUnit, RequireError>> = units.par_iter().map(ranked).collect();
+        let ranked: Vec<Result<RankedUnit, Failure>> = units.par_iter().map(ranked).collect();
         let mut units = ranked.into_iter().collect::<Result<Vec<_>, _>>()?;
         units.sort_by(|a, b| match [a, b].map(|unit| unit.not_stated.is_empty()) {
             [true, true] => b.worst.margin().total_cmp(&a.worst.margin()),
@@ -397,11 +386,13 @@ impl Requirements {
         })
     }
 
-    fn rank(&self, course: &Course<'_>, unit: &CatalogueUnit) -> Result<RankedUnit, RequireError> {
-        let curves = course.curves(&unit.scenario, &unit.model)?;
+    fn rank(&self, course: &Course<'_>, unit: &CatalogueUnit) -> Result<RankedUnit, Failure> {
+        let curves = course.curves(&unit.scenario, &unit.model).refuse()?;
         let length_s = self.ask.length_s();
         let worst = Worst::of(&self.limits, &after(&curves, length_s));
-        let worst = worst.ok_or(RequireError::PartOfASecond { length_s })?;
+        let worst = worst.ok_or_else(|| {
+            Failure::input(format!("{length_s} s is not a whole number of seconds"))
+        })?;
         let is_complete = unit.not_stated.is_empty();
         let kept = match worst.margin() >= 0.0 {
             true if is_complete => "met",
@@ -417,18 +408,15 @@ impl Requirements {
             not_stated: unit.not_stated.clone(),
             worst,
             curve: drift_curve(&curves, self.limits[0].quantity),
-            outage: self.longest_of(course, (&unit.scenario, &unit.model), &curves)?,
-            beyond_linear: self.beyond_linear(&unit.scenario, &unit.model, outage)?,
+            outage: self.longest_of(&curves),
+            beyond_linear: self
+                .beyond_linear(&unit.scenario, &unit.model, outage)
+                .refuse()?,
         })
     }
 
     /// The longest outage of which all places are within the limits, in whole seconds. The first place holds the longest.
-    fn longest_of(
-        &self,
-        course: &Course<'_>,
-        (scenario, model): (&Scenario, &Model),
-        curves: &[Vec<Drift>],
-    ) -> Result<Longest, BeliefError> {
+    fn longest_of(&self, curves: &[Vec<Drift>]) -> Longest {
         let first = curves.first().map_or(&[][..], Vec::as_slice);
         let lengths: Vec<f64> = first.iter().map(|d| d.after_s).collect();
         let is_missed = |length_s: &f64| {
@@ -437,26 +425,19 @@ impl Requirements {
                 .any(|drift| self.limits.iter().any(|l| drift.exceeds(l)))
         };
         let missed = lengths.iter().position(is_missed);
-        let with_all_fixes = match missed {
-            Some(0) => Worst::of(&self.limits, &course.with_all_fixes(scenario, model)?),
-            _ => None,
-        };
-        let with_all_fixes = with_all_fixes.filter(|worst| worst.margin() < 0.0);
         let longest_s = missed.map(|first| first.checked_sub(1).map_or(0.0, |last| lengths[last]));
         let at_least_s = lengths.last().copied().unwrap_or(0.0);
         let text = match longest_s {
-            _ if with_all_fixes.is_some() => "none".to_owned(),
             // curves begin with the first second: what is not kept then may be kept for a part of it
             Some(s) if s < 1.0 => "less than 1 s".to_owned(),
             Some(s) => format!("{} s", seconds(s)),
             None => format!("≥ {} s", seconds(at_least_s)),
         };
-        Ok(Longest {
+        Longest {
             longest_s,
             at_least_s: longest_s.is_none().then_some(at_least_s),
-            with_all_fixes,
             text,
-        })
+        }
     }
 
     /// A unit whose turn-on biases are there and expected; `model` is at the rate of the IMU.

@@ -46,17 +46,19 @@ impl Drift {
             Quantity::P50 => self.quantile(0.5),
             Quantity::P95 => self.quantile(0.95),
             Quantity::Rmse => self.square(quantity).sqrt(),
-            Quantity::Angle(i) => self.angles_deg[i],
+            Quantity::Roll => self.angles_deg[0],
+            Quantity::Pitch => self.angles_deg[1],
+            Quantity::Yaw => self.angles_deg[2],
         }
     }
 
     /// The mean square behind a quantity (m² or degrees²), in which the parts of independent sources add.
     pub(super) fn square(&self, quantity: Quantity) -> f64 {
-        match quantity {
-            Quantity::Angle(i) => self.angles_deg[i].powi(2),
+        match quantity.angle() {
+            Some(i) => self.angles_deg[i].powi(2),
             // The quantiles have no sum over sources: shares are of the mean square whatever quantile is
             // limited.
-            _ => (0..2)
+            None => (0..2)
                 .map(|i| self.covariance_m2[i][i] + self.mean_m[i].powi(2))
                 .sum(),
         }
@@ -67,7 +69,7 @@ impl Drift {
         match quantity {
             Quantity::P50 => self.quantile_bound(0.5),
             Quantity::P95 => self.quantile_bound(0.95),
-            Quantity::Rmse | Quantity::Angle(_) => self.value(quantity),
+            _ => self.value(quantity),
         }
     }
 
@@ -182,28 +184,6 @@ impl<'a> Course<'a> {
             curve
         };
         Ok(laws.into_iter().zip(&self.outages).map(curve).collect())
-    }
-
-    /// Errors where no outage is, just before the first fix from the beginning of each outage on: the largest between two
-    /// fixes.
-    ///
-    /// # Errors
-    /// When the model has no such filter.
-    pub fn with_all_fixes(
-        &self,
-        scenario: &Scenario,
-        model: &Model,
-    ) -> Result<Vec<Drift>, BeliefError> {
-        // What ends where it begins withholds no fix, and is looked at before the first fix from there on.
-        let empty: Vec<Outage> = self
-            .outages
-            .iter()
-            .map(|o| Outage {
-                end_s: o.start_s,
-                ..*o
-            })
-            .collect();
-        self.drifts_in(&empty, scenario, model)
     }
 
     /// The errors of each group of sources alone, under the gains of the filter that knows them all.

@@ -7,6 +7,7 @@ use crate::noise::{Composite, Flicker, Kind, Model, Process, White, continuous};
 use crate::scenario::Scenario;
 use crate::simulation::lincov::{Crossing, NamedSource};
 use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
+use serde::Serialize;
 
 /// How many intensities an IMU has here.
 pub const IMU_PARAMETERS: usize = 4;
@@ -306,12 +307,15 @@ impl Need<'_> {
 // How far a given IMU is from its limits, and what one without errors would leave.
 
 /// How an IMU stands to its limits.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Margins {
+    /// Whether the limits are kept.
+    pub met: bool,
     /// The hardest limit.
+    #[serde(flatten)]
     pub worst: Worst,
     /// The same for an IMU without errors: what GNSS and start leave.
-    pub without_imu: Worst,
+    pub without_imu_errors: Worst,
 }
 
 /// Correlation time of the biases of an IMU that has next to none (s): any would do.
@@ -329,20 +333,12 @@ impl Margins {
         limits: &[Limit],
     ) -> Result<Self, BeliefError> {
         let perfect = ImuParameters::perfect(SLOW_S).model(model.rate_hz);
+        let worst = course.worst(scenario, model, limits)?;
         Ok(Self {
-            worst: course.worst(scenario, model, limits)?,
-            without_imu: course.worst(&without_imu_errors(scenario), &perfect, limits)?,
+            met: worst.margin() >= 0.0,
+            worst,
+            without_imu_errors: course.worst(&without_imu_errors(scenario), &perfect, limits)?,
         })
-    }
-
-    /// Whether the limits are kept.
-    pub fn met(&self) -> bool {
-        self.worst.margin() >= 0.0
-    }
-
-    /// Whether any IMU keeps the limits.
-    pub fn an_imu_helps(&self) -> bool {
-        self.without_imu.margin() >= 0.0
     }
 }
 

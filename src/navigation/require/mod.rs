@@ -20,67 +20,50 @@ pub use imu::{Answer, IMU_PARAMETERS, ImuParameters, Margins, Need};
 
 use crate::ekf::BeliefError;
 use crate::simulation::ExperimentError;
-use serde::ser::SerializeStruct;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
+use std::str::FromStr;
 
 /// What is limited at the end of an outage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
-    /// Median of the horizontal error (m).
-    P50,
     /// 95 % quantile of the horizontal error (m).
     P95,
-    /// Root mean square of the horizontal error (m).
+    /// Its median (m).
+    P50,
+    /// Its root mean square (m).
     Rmse,
-    /// RMSE of roll, pitch or yaw (degrees): 0, 1, 2.
-    Angle(usize),
+    /// RMSE of roll (degrees).
+    Roll,
+    /// RMSE of pitch (degrees).
+    Pitch,
+    /// RMSE of yaw (degrees).
+    Yaw,
 }
 
+nav_sim_signal::named!(Quantity {
+    P95 = "p95_m",
+    P50 = "p50_m",
+    Rmse = "rmse_m",
+    Roll = "roll_deg",
+    Pitch = "pitch_deg",
+    Yaw = "yaw_deg",
+}, in files);
+
 impl Quantity {
-    /// All quantities.
-    pub const ALL: [Self; 6] = [
-        Self::P95,
-        Self::P50,
-        Self::Rmse,
-        Self::Angle(0),
-        Self::Angle(1),
-        Self::Angle(2),
-    ];
-
-    /// Its name, unit included.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::P50 => "p50_m",
-            Self::P95 => "p95_m",
-            Self::Rmse => "rmse_m",
-            Self::Angle(0) => "roll_deg",
-            Self::Angle(1) => "pitch_deg",
-            Self::Angle(_) => "yaw_deg",
-        }
-    }
-
-    /// Its unit.
-    pub const fn unit(self) -> &'static str {
-        match self {
-            Self::P50 | Self::P95 | Self::Rmse => "m",
-            Self::Angle(_) => "deg",
-        }
+    /// Roll, pitch or yaw, from 0.
+    fn angle(self) -> Option<usize> {
+        (self as usize).checked_sub(Self::Roll as usize)
     }
 
     /// A value with its unit, to a thousandth; a larger one, or a smaller, in powers of ten.
     pub fn shown(self, value: f64) -> String {
+        let unit = if self.angle().is_some() { "deg" } else { "m" };
         let rounded = (value * 1e3).round() / 1e3;
         if (1e-3..1e6).contains(&value) {
-            format!("{rounded} {}", self.unit())
+            format!("{rounded} {unit}")
         } else {
-            format!("{value:.2e} {}", self.unit())
+            format!("{value:.2e} {unit}")
         }
-    }
-}
-
-impl Serialize for Quantity {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
     }
 }
 
@@ -90,29 +73,40 @@ pub struct Limit {
     /// The quantity.
     pub quantity: Quantity,
     /// Its largest value allowed (m or degrees).
+    #[serde(rename = "limit")]
     pub most: f64,
 }
 
+impl FromStr for Limit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let read = || {
+            let (name, most) = text.split_once("<=").or_else(|| text.split_once('<'))?;
+            let most: f64 = most.trim().parse().ok()?;
+            let quantity = name.trim().parse().ok()?;
+            (most > 0.0 && most.is_finite()).then_some(Self { quantity, most })
+        };
+        let names = || Quantity::NAMES.join(", ");
+        read().ok_or_else(|| {
+            format!(
+                "expected NAME<=LIMIT with a positive limit, NAME one of {}",
+                names()
+            )
+        })
+    }
+}
+
 /// The limit that is the hardest to keep, and where.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Worst {
     /// The limit.
+    #[serde(flatten)]
     pub limit: Limit,
     /// The error there.
     pub value: f64,
     /// At which place of the outage, counted from 0.
     pub place: usize,
-}
-
-impl Serialize for Worst {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut entry = serializer.serialize_struct("Worst", 4)?;
-        entry.serialize_field("quantity", &self.limit.quantity)?;
-        entry.serialize_field("value", &self.value)?;
-        entry.serialize_field("limit", &self.limit.most)?;
-        entry.serialize_field("place", &self.place)?;
-        entry.end()
-    }
 }
 
 impl Worst {
@@ -133,12 +127,13 @@ impl Worst {
                 place,
             })
         };
-        let margins = |worst: &Self| (worst.margin(), worst.margin().is_nan());
-        limits.iter().filter_map(worst_of_limit).min_by(|a, b| {
-            let ((a, a_is_nan), (b, b_is_nan)) = (margins(a), margins(b));
-            // what is not a number is the hardest
-            b_is_nan.cmp(&a_is_nan).then(a.total_cmp(&b))
-        })
+        // what is not a number is the hardest
+        let margin = |worst: &Self| Some(worst.margin()).filter(|margin| !margin.is_nan());
+        let key = |worst: &Self| margin(worst).unwrap_or(f64::NEG_INFINITY);
+        limits
+            .iter()
+            .filter_map(worst_of_limit)
+            .min_by(|a, b| key(a).total_cmp(&key(b)))
     }
 }
 
@@ -162,20 +157,6 @@ pub enum RequireError {
         value: f64,
         /// That IMU.
         poorest: ImuParameters,
-    },
-    /// Curves have a value each second.
-    #[error("{length_s} s is not a whole number of seconds")]
-    PartOfASecond {
-        /// The length asked for (s).
-        length_s: f64,
-    },
-    /// A unit of several cannot be judged.
-    #[error("{name}: {source}")]
-    Unit {
-        /// Which.
-        name: String,
-        /// Why.
-        source: Box<RequireError>,
     },
     /// The model has no filter.
     #[error(transparent)]
