@@ -44,6 +44,10 @@ pub(crate) fn study_run(
         let outcome = pool.map_or_else(run, |pool| pool.install(run));
         (outcome, clerk.warnings())
     })?;
+    let outcome = outcome.and_then(|outcome| match outcome.unmet() {
+        Some(failure) if matches!(outcome, Outcome::Stopped { .. }) => Err(failure),
+        _ => Ok(outcome),
+    });
     Ok(match outcome.map_err(|e| error::of_failure(py, &e, ""))? {
         Outcome::Merged(answer) => {
             let json = serde_json::to_string(&*answer).unwrap_or_default();
@@ -52,6 +56,6 @@ pub(crate) fn study_run(
             (Some(answer), Vec::new(), warnings)
         }
         Outcome::Partial(missing) => (None, missing, warnings),
-        Outcome::Estimate(_) => (None, Vec::new(), warnings),
+        Outcome::Estimate(_) | Outcome::Stopped { .. } => (None, Vec::new(), warnings),
     })
 }

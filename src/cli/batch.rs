@@ -78,13 +78,17 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         .set
         .extend(session.asked_seed().map(|seed| format!("seed={seed}")));
     let variable = |name: &str| std::env::var(name).ok();
-    let outcome = match request.run(&variable, &Context::new(&watch, None)) {
-        Err(_) if watch.interrupted.load(Ordering::Relaxed) => {
-            return Err(Failure::interrupted("interrupted")
-                .hint("the same command goes on where this one stopped"));
-        }
-        outcome => outcome?,
-    };
+    let mut outcome = request.run(&variable, &Context::new(&watch, None));
+    if let Ok(Outcome::Stopped { is_resumable, .. }) = &mut outcome {
+        *is_resumable |= watch.terminated.load(Ordering::Relaxed);
+    }
+    if matches!(outcome, Err(_) | Ok(Outcome::Stopped { .. }))
+        && watch.interrupted.load(Ordering::Relaxed)
+    {
+        return Err(Failure::interrupted("interrupted")
+            .hint("the same command goes on where this one stopped"));
+    }
+    let outcome = outcome?;
     match &outcome {
         Outcome::Merged(answer) => {
             let document = answer.document();
@@ -101,6 +105,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         }
         Outcome::Partial(_) => session.say("own share done"),
         Outcome::Estimate(text) => session.result(text),
+        Outcome::Stopped { .. } => {}
     }
     outcome.unmet().map_or(Ok(()), Err)
 }

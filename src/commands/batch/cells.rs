@@ -1,14 +1,18 @@
 //! From a study to its cells: each a request of `run` without lists.
 
-use crate::app::{Asked, Command, Failure, Input, Manifest, OrHelp, Refuse, Result};
+use crate::app::inputs::merge;
+use crate::app::{
+    Asked, Command, Failure, Input, Manifest, OrHelp, Refuse, Result, argument, is_path,
+    is_repeated,
+};
 use crate::commands::run::Run;
 use crate::io::{input, source};
-use clap::{Arg, ArgAction, Args};
+use crate::report::comparison_table::in_order;
+use clap::Args;
 use nav_sim_navigation::scenario::{Method, Scenario};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Map;
-use std::any::TypeId;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -112,39 +116,25 @@ impl Study {
 
     /// The labels that references have: those of the study, else the first model.
     pub(crate) fn fixed(&self, cells: &[Cell]) -> Labels {
-        let given = self
-            .reference
-            .iter()
-            .map(|(axis, label)| (axis.clone(), text(label)));
-        let model = || {
-            cells
-                .iter()
-                .flat_map(|cell| &cell.labels)
-                .find(|(axis, _)| axis == "model")
-        };
-        let given: Labels = given.collect();
-        if given.is_empty() {
-            model().cloned().into_iter().collect()
-        } else {
-            given
+        let given = self.reference.iter();
+        let given: Labels = given
+            .map(|(axis, label)| (axis.clone(), text(label)))
+            .collect();
+        if !given.is_empty() {
+            return given;
         }
+        let mut labels = cells.iter().flat_map(|cell| &cell.labels);
+        let model = labels.find(|(axis, _)| axis == "model");
+        model.cloned().into_iter().collect()
     }
 
     fn check_reference(&self, all: &[(Labels, Table)]) -> Result<()> {
         for (axis, label) in &self.reference {
             let label = text(label);
-            let on_axis = || {
-                all.iter()
-                    .flat_map(|(labels, _)| labels)
-                    .filter(|(a, _)| a == axis)
-            };
-            if !on_axis().any(|(_, l)| *l == label) {
-                let mut known: Vec<&str> = Vec::new();
-                on_axis().for_each(|(_, l)| {
-                    if !known.contains(&l.as_str()) {
-                        known.push(l)
-                    }
-                });
+            let labels = all.iter().flat_map(|(labels, _)| labels);
+            let on_axis = labels.filter(|(other, _)| other == axis);
+            let known = in_order(on_axis.map(|(_, label)| label.as_str()));
+            if !known.contains(&label.as_str()) {
                 let message = format!("\"reference.{axis}\" = \"{label}\" is no label of an axis");
                 return Err(Failure::input(message).hint(format!("labels: {}", known.join(", "))));
             }
@@ -171,15 +161,8 @@ impl Door {
         }
     }
 
-    fn arg(&self, key: &str) -> Option<&Arg> {
-        let long = key.replace('_', "-");
-        let is_meant = |arg: &&Arg| arg.get_long() == Some(&long) || arg.get_id() == key;
-        self.command.get_arguments().find(is_meant)
-    }
-
     fn is_path(&self, key: &str) -> bool {
-        self.arg(key)
-            .is_some_and(|arg| arg.get_value_parser().type_id() == TypeId::of::<PathBuf>())
+        argument(&self.command, key).is_some_and(is_path)
     }
 
     /// Expands the first list that a single run would not take as it is.
@@ -214,15 +197,13 @@ impl Door {
         if let Some(known) = self.taken.get(&memory) {
             return *known;
         }
-        let takes = match self.arg(path) {
+        let takes = match argument(&self.command, path) {
             _ if path == "seed" => value.as_integer().is_some_and(|seed| seed >= 0),
             Some(arg) => {
-                let is_repeated = matches!(arg.get_action(), ArgAction::Append)
-                    || arg.get_num_args().is_some_and(|n| n.max_values() > 1);
                 let list = value.as_array();
                 // any text is a path: a list is none, and a list of lists is no list of paths
                 let is_nested = list.is_some_and(|list| list.iter().any(Value::is_array));
-                let is_one_path = self.is_path(path) && !is_repeated;
+                let is_one_path = is_path(arg) && !is_repeated(arg);
                 let mut request = Table::from_iter(
                     [("trajectory", "t"), ("model", "m"), ("static", "s")]
                         .map(|(k, v)| (k.to_owned(), v.into())),
@@ -400,15 +381,6 @@ fn nested(path: &str, value: Value) -> Table {
     match path.split_once('.') {
         Some((key, rest)) => Table::from_iter([(key.to_owned(), nested(rest, value).into())]),
         None => Table::from_iter([(path.to_owned(), value)]),
-    }
-}
-
-fn merge(into: &mut Table, over: Table) {
-    for (key, value) in over {
-        match (into.get_mut(&key), value) {
-            (Some(Value::Table(inner)), Value::Table(over)) => merge(inner, over),
-            (_, value) => _ = into.insert(key, value),
-        }
     }
 }
 

@@ -19,7 +19,6 @@ use results::{first_of, merge, withdraw};
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
 use units::{Place, Unit, assemble, units, work};
 
 /// Run a study: a run whose values may be lists
@@ -74,6 +73,13 @@ pub enum Outcome {
     Partial(Vec<String>),
     /// The estimate of a dry run.
     Estimate(String),
+    /// Stopped before the own share was done.
+    Stopped {
+        /// True if the same command goes on: something was finished, or a signal came.
+        is_resumable: bool,
+        /// Units left.
+        left: usize,
+    },
 }
 
 impl BatchRequest {
@@ -95,42 +101,43 @@ impl BatchRequest {
         context: &Context<'_>,
     ) -> Result<Outcome> {
         let study = Study::read(&self.study, &self.set)?;
-        study
-            .run_in(&self.study, self, variable, context)
-            .map_err(|e| match e.code() {
-                2 if e.file().is_none() => e.within(&self.study.display().to_string()),
-                _ => e,
-            })
+        let outcome = self.run_study(&study, variable, context);
+        outcome.map_err(|e| match e.code() {
+            2 if e.file().is_none() => e.within(&self.study.display().to_string()),
+            _ => e,
+        })
     }
-}
 
-impl Study {
-    fn run_in(
+    fn run_study(
         &self,
-        file: &Path,
-        o: &BatchRequest,
+        study: &Study,
         variable: &dyn Fn(&str) -> Option<String>,
         context: &Context<'_>,
     ) -> Result<Outcome> {
-        let directory = o.directory();
+        let directory = self.directory();
         let place = Place(&directory);
-        let cells = self.cells(file.parent().unwrap_or(Path::new("")))?;
-        if !self.run.contains_key("seed") {
+        let cells = study.cells(self.study.parent().unwrap_or(Path::new("")))?;
+        if !study.run.contains_key("seed") {
             context.remark("no seed in the study: 1");
         }
-        crate::commands::compare::states(&o.states)?;
-        let (share, from) = shard::find(o.shard, o.shards, variable)?;
-        if o.merge {
-            return self.merged(&cells, &place, o, context);
+        let states = crate::commands::compare::states(&self.states)?;
+        let (share, from) = shard::find(self.shard, self.shards, variable)?;
+        let merged = || {
+            let answer = merge(study, &cells, &place, &states, context)?;
+            answer.write(&place)?;
+            Ok(Outcome::Merged(Box::new(answer)))
+        };
+        if self.merge {
+            return merged();
         }
-        let changed = adopt(&place, &cells, o.dry_run, context);
-        if let (Some((name, what)), false) = (changed.first(), o.force || o.dry_run) {
+        let changed = adopt(&place, &cells, self.dry_run, context);
+        if let (Some((name, what)), false) = (changed.first(), self.force || self.dry_run) {
             let message = format!("cell {name} is of another study: {what}");
             return Err(Failure::input(message)
                 .hint("choose another directory with --out, or compute it again with --force"));
         }
         let units = units(&cells, context)?;
-        if o.dry_run {
+        if self.dry_run {
             let changed = changed.len();
             return estimate(&cells, &units, &place, changed, context).map(Outcome::Estimate);
         }
@@ -147,11 +154,8 @@ impl Study {
         let worked = work(&place, &own, context)?;
         for cell in &cells {
             let has_cell = |unit: &&Unit<'_>| unit.cells.iter().any(|own| own.name == cell.name);
-            let firsts: Vec<u64> = units
-                .iter()
-                .filter(has_cell)
-                .map(|unit| unit.first)
-                .collect();
+            let of_cell = units.iter().filter(has_cell);
+            let firsts: Vec<u64> = of_cell.map(|unit| unit.first).collect();
             if firsts.len() > 1 {
                 assemble(&place, cell, &firsts, context)?;
             }
@@ -168,24 +172,14 @@ impl Study {
         }
         let left = own.iter().filter(|unit| !place.has_unit(unit)).count();
         if left > 0 && !context.go_on() {
-            return Err(match worked.finished.load(Ordering::Relaxed) {
-                // the same command would end the same way: no code for "to be resumed"
-                0 => Failure::could_not(format!(
-                    "stopped before a single unit was done; {left} units left"
-                ))
-                .hint("a longer --time-limit"),
-                _ => Failure::stopped(format!("stopped; {left} units left"))
-                    .hint("the same command goes on where this one stopped"),
-            });
+            let is_resumable = worked.finished.into_inner() > 0;
+            return Ok(Outcome::Stopped { is_resumable, left });
         }
-        let missing: Vec<String> = cells
-            .iter()
-            .filter(|cell| !place.is_done(cell))
-            .map(|cell| cell.name.clone())
-            .collect();
+        let missing = cells.iter().filter(|cell| !place.is_done(cell));
+        let missing: Vec<String> = missing.map(|cell| cell.name.clone()).collect();
         if missing.is_empty() {
             drop(fs::remove_dir_all(directory.join("locks")));
-            return self.merged(&cells, &place, o, context);
+            return merged();
         }
         context.remark(format!(
             "{} of {} cells are missing: {}",
@@ -194,24 +188,6 @@ impl Study {
             first_of(&missing)
         ));
         Ok(Outcome::Partial(missing))
-    }
-
-    fn merged(
-        &self,
-        cells: &[Cell],
-        place: &Place<'_>,
-        o: &BatchRequest,
-        context: &Context<'_>,
-    ) -> Result<Outcome> {
-        let answer = merge(
-            self,
-            cells,
-            place,
-            &crate::commands::compare::states(&o.states)?,
-            context,
-        )?;
-        answer.write(place)?;
-        Ok(Outcome::Merged(Box::new(answer)))
     }
 }
 
@@ -222,39 +198,25 @@ fn adopt(
     is_dry: bool,
     context: &Context<'_>,
 ) -> Vec<(String, String)> {
-    let mut there: HashMap<String, (String, Manifest)> = HashMap::new();
-    for entry in fs::read_dir(place.0.join("cells"))
-        .into_iter()
-        .flatten()
-        .flatten()
-    {
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if name.ends_with(".damaged") {
-            continue;
-        }
-        if let Some(manifest) = place.manifest(&name) {
-            there.insert(manifest.key.clone(), (name, manifest));
-        }
-    }
-    let is_own = |name: &str| {
-        cells
-            .iter()
-            .any(|cell| cell.name == name && place.is_done(cell))
-    };
+    let entries = fs::read_dir(place.0.join("cells")).into_iter();
+    let names = entries.flatten().flatten();
+    let names = names.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let keyed = names
+        .filter(|name| !name.ends_with(".damaged"))
+        .filter_map(|name| Some((place.manifest(&name)?.key, name)));
+    let there: HashMap<String, String> = keyed.collect();
+    let named = |name: &str| cells.iter().find(|cell| cell.name == name);
     for cell in cells.iter().filter(|_| !is_dry) {
-        if let Some((name, _)) = there.get(&cell.manifest.key)
-            && *name != cell.name
-            && !is_own(name)
+        if let Some(name) = there.get(&cell.manifest.key)
+            && !named(name).is_some_and(|own| place.is_done(own))
             && !place.cell(&cell.name).exists()
         {
             drop(fs::rename(place.cell(name), place.cell(&cell.name)));
         }
     }
-    let mut others: Vec<String> = there
-        .values()
-        .map(|(name, _)| name.clone())
-        .filter(|name| place.cell(name).exists() && !cells.iter().any(|cell| cell.name == *name))
-        .collect();
+    let others = there.values();
+    let others = others.filter(|name| place.cell(name).exists() && named(name).is_none());
+    let mut others: Vec<&String> = others.collect();
     others.sort();
     if !others.is_empty() {
         context.remark(format!(
@@ -334,11 +296,23 @@ fn estimate(
 }
 
 impl Outcome {
-    /// What is missed: stated bounds, or cells of a merge that is to be resumed.
-    pub(crate) fn unmet(&self) -> Option<Failure> {
+    /// What is missed: stated bounds, or cells that are to be computed.
+    pub fn unmet(&self) -> Option<Failure> {
         match self {
             Self::Merged(answer) => answer.incomplete().or_else(|| answer.unmet()),
             Self::Partial(_) | Self::Estimate(_) => None,
+            Self::Stopped {
+                is_resumable: true,
+                left,
+            } => Some(
+                Failure::stopped(format!("stopped; {left} units left"))
+                    .hint("the same command goes on where this one stopped"),
+            ),
+            // the same command would end the same way: no code for "to be resumed"
+            Self::Stopped { left, .. } => {
+                let message = format!("stopped before a single unit was done; {left} units left");
+                Some(Failure::could_not(message).hint("a longer --time-limit"))
+            }
         }
     }
 }

@@ -186,15 +186,14 @@ fn compute(
             Err(failure) => failed(cell, failure),
         }
     }
-    while let Some((_, first, _)) = prepared.first() {
+    while !prepared.is_empty() {
         // turn-on biases that models state make other noise of cells that asked for the same
-        let shares = |run: &PreparedRun<'_>| run.shares_noise_with(first);
-        let together: Vec<bool> = prepared.iter().map(|(_, run, _)| shares(run)).collect();
-        let mut together = together.into_iter();
-        let (pass, rest): (Vec<_>, Vec<_>) = prepared
+        let first = prepared.remove(0);
+        let (mut pass, rest): (Vec<_>, Vec<_>) = prepared
             .into_iter()
-            .partition(|_| together.next() == Some(true));
+            .partition(|(_, run, _)| run.shares_noise_with(&first.1));
         prepared = rest;
+        pass.insert(0, first);
         let runs: Vec<&PreparedRun<'_>> = pass.iter().map(|(_, run, _)| run).collect();
         let results = match columns(&runs, unit.first, unit.runs, context) {
             Ok(Some(results)) => results,
