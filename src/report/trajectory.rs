@@ -5,9 +5,10 @@ use nav_sim_navigation::closure::{Bounds, Closure};
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::frames::RollPitchYaw;
 use nav_sim_navigation::trajectory::Trajectory;
-use nav_sim_navigation::trajectory::plausibility::{Excess, Limits, Quantity};
+use nav_sim_navigation::trajectory::plausibility::{Excess, Limits};
 use nav_sim_signal::units::DEG;
 use serde::Serialize;
+use serde_json::{Value, json};
 
 /// A trajectory in samples: one value an instant in every list.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -196,20 +197,12 @@ pub struct TrajectoryCheck {
     end_s: f64,
     points: usize,
     path_m: f64,
-    largest: Motion,
-    limits: Motion,
+    largest: Value,
+    limits: Value,
     beyond_limits: Vec<String>,
     warnings: Vec<String>,
     closure: Closed,
     bounds: Bounds,
-}
-
-#[derive(Debug, Serialize)]
-struct Motion {
-    speed_m_s: f64,
-    acceleration_m_s2: f64,
-    jerk_m_s3: f64,
-    rate_deg_s: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -227,25 +220,22 @@ impl TrajectoryCheck {
         (largest, beyond, limits): ([f64; 4], &[Excess], Limits),
         (closure, bounds): (Closure, Bounds),
     ) -> Self {
-        let shown = |q: Quantity| largest[q as usize] * q.display().2;
+        let motion = |[speed, acceleration, jerk, rate]: [f64; 4]| {
+            json!({
+                "speed_m_s": speed,
+                "acceleration_m_s2": acceleration,
+                "jerk_m_s3": jerk,
+                "rate_deg_s": rate / DEG,
+            })
+        };
         Self {
             file,
             start_s: trajectory.start_s(),
             end_s: trajectory.end_s(),
             points: trajectory.knots().len(),
             path_m: path_length(trajectory),
-            largest: Motion {
-                speed_m_s: shown(Quantity::Speed),
-                acceleration_m_s2: shown(Quantity::Acceleration),
-                jerk_m_s3: shown(Quantity::Jerk),
-                rate_deg_s: shown(Quantity::Rate),
-            },
-            limits: Motion {
-                speed_m_s: limits.speed,
-                acceleration_m_s2: limits.acceleration,
-                jerk_m_s3: limits.jerk,
-                rate_deg_s: limits.rate / DEG,
-            },
+            largest: motion(largest),
+            limits: motion([limits.speed, limits.acceleration, limits.jerk, limits.rate]),
             beyond_limits: beyond.iter().map(ToString::to_string).collect(),
             warnings,
             closure: Closed {

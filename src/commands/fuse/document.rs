@@ -10,7 +10,6 @@ use nav_sim_document::{
 };
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::fusion::{ClocksApart, Finding, FixRecord, Row, Solution};
-use nav_sim_navigation::metrics::chi_square_band;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use std::path::Path;
 
@@ -41,7 +40,6 @@ impl FuseAnswer {
         }
         document.section("Fixes");
         document.chart(&innovations(solution, &outages), FIXES);
-        document.chart(&nis(&solution.fixes, &outages), FIXES);
         document.checked(CHECKED);
         if let Some(quality) = &self.reduction {
             match reduction_doubt(quality) {
@@ -495,27 +493,4 @@ pub(super) fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart 
         .map(panel)
         .collect();
     Chart::over_time("Innovations of position, normalised", panels, outages)
-}
-
-pub(super) fn nis(records: &[FixRecord], outages: &[(f64, f64)]) -> Chart {
-    let dof = records
-        .iter()
-        .map(|f| f.innovation.len())
-        .max()
-        .unwrap_or(0);
-    let band = chi_square_band(dof, 1.0);
-    let mut series = vec![Series::new(
-        "95 % band of a right filter",
-        Colour::RIGHT,
-        Mark::Zone(band.lower, band.upper),
-    )];
-    series.extend(fixes(records, &|f| f.nis));
-    Chart::over_time(
-        "NIS",
-        vec![Panel::new(
-            Axis::log(&format!("NIS ({dof} if right)")),
-            series,
-        )],
-        outages,
-    )
 }

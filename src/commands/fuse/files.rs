@@ -24,15 +24,6 @@ pub(super) const FILES: [&str; 8] = [
     "summary.json",
 ];
 
-const COMPONENTS: [&str; 6] = [
-    "pos_n_m",
-    "pos_e_m",
-    "pos_d_m",
-    "vel_n_m_s",
-    "vel_e_m_s",
-    "vel_d_m_s",
-];
-
 /// The files of a fusion directory; `errors.csv` is empty but for its header without a
 /// reference.
 pub(super) fn directory(answer: &FuseAnswer) -> Vec<OutputFile<'static>> {
@@ -122,8 +113,8 @@ fn solution_csv(rows: &[Row]) -> String {
 fn innovations_csv(solution: &Solution) -> String {
     let mut text = header(&[
         ("", &["used", "status"]),
-        ("", &COMPONENTS),
-        ("sd_", &COMPONENTS),
+        ("", &REPORTED_NAMES[..6]),
+        ("sd_", &REPORTED_NAMES[..6]),
         ("", &["nis", "dof"]),
     ]);
     for fix in &solution.fixes {

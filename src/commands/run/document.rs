@@ -9,9 +9,7 @@ use nav_sim_document::{
     readable, window,
 };
 use nav_sim_navigation::ekf::FixUpdate;
-use nav_sim_navigation::metrics::{
-    Budget, EpochMetrics, FanEpoch, OutageSummary, Summary, VerdictKind,
-};
+use nav_sim_navigation::metrics::{EpochMetrics, FanEpoch, OutageSummary, Summary, VerdictKind};
 use nav_sim_navigation::scenario::{Method, Unexpected};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 
@@ -60,7 +58,7 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
     page.section("Consistency");
     page.chart(&nees(epochs, summary), CONSISTENCY);
     page.table(&consistency(answer));
-    budgets(summary, &shown, &mut page);
+    budgets(answer, &shown, &mut page);
     provenance(answer, &mut page);
     page.checked(
         "The filter's standard deviations agree to 2e-4 with an independent implementation; the NEES of filters whose model is right \
@@ -248,19 +246,30 @@ fn assumptions(summary: &Summary, answer: &RunAnswer) -> Vec<(&'static str, Stri
 }
 
 /// The sources of the errors at the ends of the outages that are shown, beside what the filter believes.
-fn budgets(summary: &Summary, shown: &[usize], page: &mut Document) {
-    let of_outage = |k: &usize| {
-        let o = &summary.outages[*k];
-        let kinds = [("true", &o.budget), ("believed", &o.believed_budget)];
-        kinds.into_iter().filter_map(|(kind, budget)| {
-            let name = format!("{}, {kind}", window(o.start_s, o.end_s));
-            Some((name, budget.as_ref()?))
-        })
-    };
-    let bars: Vec<(String, &Budget)> = shown.iter().flat_map(of_outage).collect();
-    if !bars.is_empty() {
-        page.section("Sources of errors");
-        page.chart(&budget_chart(&bars), "Shares in the mean square at the end of each outage, as in summary.json: of the true errors, by covariance analysis, and of those that the filter believes in.");
+fn budgets(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
+    let outages = &answer.navigation.summary.outages;
+    if shown.iter().all(|k| outages[*k].believed_budget.is_none()) {
+        return;
+    }
+    page.section("Sources of errors");
+    page.text("Shares in the mean square at the end of each outage: of the true errors, by covariance analysis, and of those that the filter believes in.");
+    let columns = [
+        ("source", "@"),
+        ("north", "pos_n_m"),
+        ("east", "pos_e_m"),
+        ("down", "pos_d_m"),
+        ("yaw", "yaw_deg"),
+    ];
+    for (k, (kind, key)) in shown
+        .iter()
+        .flat_map(|k| [("true", "budget"), ("believed", "believed_budget")].map(|kind| (k, kind)))
+    {
+        let table = Table::of(answer, &format!("/outages/{k}/{key}/*"), &columns);
+        let (start_s, end_s) = (outages[*k].start_s, outages[*k].end_s);
+        if !table.is_empty() {
+            let title = format!("{}, {kind}", window(start_s, end_s));
+            page.folded(&title, |page| page.table(&table));
+        }
     }
 }
 
@@ -396,54 +405,6 @@ pub(super) fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
     ];
     Chart::over_time("Consistency", panels, &windows(summary))
 }
-
-/// Sources with a colour of their own.
-const SOURCES_DRAWN: usize = 7;
-
-/// A bar an outage and kind, for horizontal position and for yaw.
-fn budget_chart(bars: &[(String, &Budget)]) -> Chart {
-    let mut weights: Vec<(&str, f64)> = Vec::new();
-    for (name, share) in bars
-        .iter()
-        .flat_map(|(_, b)| [b.ranked(&[0, 1]), b.ranked(&[8])].concat())
-    {
-        match weights.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, sum)) => *sum += share,
-            None => weights.push((name, share)),
-        }
-    }
-    weights.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let panel = |label: &str, states: &[usize]| {
-        let ranked: Vec<_> = bars.iter().map(|(_, b)| b.ranked(states)).collect();
-        let mut tops = vec![0.0; bars.len()];
-        let series = weights.iter().enumerate().map(|(k, (name, _))| {
-            let bar = |(x, top): (usize, &mut f64)| {
-                let share = ranked[x].iter().find(|(source, _)| source == name);
-                let from = *top;
-                *top += share.map_or(0.0, |(_, share)| 100.0 * share);
-                (x as f64, from, *top)
-            };
-            let mark = Mark::Bars(tops.iter_mut().enumerate().map(bar).collect());
-            match k < SOURCES_DRAWN {
-                true => Series::new(name, Colour::Hue(k), mark),
-                false => Series::new("others", Colour::Soft, mark),
-            }
-        });
-        let axis = Axis::linear(label).including(0.0, 100.0);
-        Panel {
-            height: 0.8,
-            ..Panel::new(axis, series.collect())
-        }
-    };
-    let names = bars.iter().map(|(name, _)| name.clone()).collect();
-    let panels = vec![
-        panel("horizontal position (%)", &[0, 1]),
-        panel("yaw (%)", &[8]),
-    ];
-    Chart::new("Sources of errors", Axis::names(names), panels)
-}
-
-// What helps a filter that is overconfident.
 
 /// Advice by what the belief lacks, where linear analysis finds the filter wrong already; errors that are large are then its
 /// consequence.

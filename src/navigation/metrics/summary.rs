@@ -274,46 +274,43 @@ fn count(epochs: &[EpochMetrics], windows: Option<f64>) -> f64 {
 
 fn nees(epochs: &[EpochMetrics], windows: Option<f64>) -> Consistency {
     let band = chi_square_band(NEES_DOF, count(epochs, windows));
-    let (mean, fraction_inside) = mean_and_inside(epochs, band, |e| e.nees.value);
+    let [mean, lower95, upper95, fraction_inside] = over_epochs(epochs, band, |e| e.nees.value);
     Consistency {
         dof: NEES_DOF,
         mean,
-        lower95: band.lower,
-        upper95: band.upper,
+        lower95,
+        upper95,
         fraction_inside,
     }
 }
 
 fn coverage(epochs: &[EpochMetrics], level: f64, windows: Option<f64>) -> Coverage {
     let band = coverage_band(level, count(epochs, windows));
-    let (mean, fraction_inside) = mean_and_inside(epochs, band, |e| e.coverage);
+    let [mean, lower95, upper95, fraction_inside] = over_epochs(epochs, band, |e| e.coverage);
     Coverage {
         level,
         mean,
-        lower95: band.lower,
-        upper95: band.upper,
+        lower95,
+        upper95,
         fraction_inside,
     }
 }
 
-fn mean_and_inside(
+/// Mean over the epochs, the band, and the share of epochs in it: none of expected values, which have no scatter.
+fn over_epochs(
     epochs: &[EpochMetrics],
     band: Band,
     value: impl Fn(&EpochMetrics) -> f64,
-) -> (f64, f64) {
+) -> [f64; 4] {
     let n = epochs.len() as f64;
     let inside = epochs.iter().filter(|e| band.contains(value(e))).count();
-    let mean = epochs.iter().map(value).sum::<f64>() / n;
-    // of expected values there is no scatter, and no band for it
-    let has_band = band.lower.is_finite();
-    (
-        mean,
-        if has_band {
-            inside as f64 / n
-        } else {
-            f64::NAN
-        },
-    )
+    let mean = epochs.iter().map(&value).sum::<f64>() / n;
+    let share = if band.lower.is_finite() {
+        inside as f64 / n
+    } else {
+        f64::NAN
+    };
+    [mean, band.lower, band.upper, share]
 }
 
 fn nis(result: &RunResult) -> Nis {
