@@ -222,7 +222,7 @@ fn compute(
 }
 
 /// Passes each warning of the cells on once; what they remark is for `--verbose`.
-pub(crate) struct OfCells<'a>(pub &'a Context<'a>, pub Mutex<HashSet<String>>);
+struct OfCells<'a>(pub &'a Context<'a>, pub Mutex<HashSet<String>>);
 
 impl Front for OfCells<'_> {
     fn note(&self, note: Note) {

@@ -325,9 +325,8 @@ const MOST_PLACES: usize = 400;
 /// Velocities of a reference that are known worse than this are not drawn: its positions jump (m/s).
 const UNEVEN: f64 = 0.5;
 
-pub(super) const POSITION: &str =
-    "Dashed: horizontal 1 σ stated. Line: distance from the reference.";
-pub(super) const ERRORS: &str = "Lines: estimate less reference. Bands: ± 1 σ.";
+const POSITION: &str = "Dashed: horizontal 1 σ stated. Line: distance from the reference.";
+const ERRORS: &str = "Lines: estimate less reference. Bands: ± 1 σ.";
 pub(super) const FIXES: &str = "Of a right filter 95 % of the used fixes are in the band.";
 
 /// Colour of what is smoothed.

@@ -235,7 +235,7 @@ pub enum MountingChoice {
 }
 
 /// Largest standard deviation of an attitude that small angles describe (degrees).
-pub(super) const MAX_SIGMA_DEG: f64 = 30.0;
+const MAX_SIGMA_DEG: f64 = 30.0;
 
 impl FromStr for MountingChoice {
     type Err = String;

@@ -94,16 +94,16 @@ pub(super) struct Initial {
     t_s: f64,
     state: BTreeMap<&'static str, f64>,
     sigma: InitialSettings,
-    pub(super) how: Vec<String>,
+    pub how: Vec<String>,
 }
 
 /// A mounting that was found: angles as `--mounting` takes them, standard deviations about front, right, down.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct MountingRow {
-    pub(super) roll_deg: f64,
-    pub(super) pitch_deg: f64,
-    pub(super) yaw_deg: f64,
-    pub(super) sigma_deg: [f64; 3],
+    pub roll_deg: f64,
+    pub pitch_deg: f64,
+    pub yaw_deg: f64,
+    pub sigma_deg: [f64; 3],
     how: String,
 }
 

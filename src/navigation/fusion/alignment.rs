@@ -344,12 +344,12 @@ impl Pace {
 
 /// A fix with its velocity and the standard deviations of it (m/s).
 pub(in crate::fusion) struct Moving {
-    pub(in crate::fusion) fix: GnssFix,
-    pub(in crate::fusion) v_n: DVec3,
-    pub(in crate::fusion) sigma_n: DVec3,
+    pub fix: GnssFix,
+    pub v_n: DVec3,
+    pub sigma_n: DVec3,
     /// Half the time between the two positions it comes from: it is as old as that (s); 0 as measured.
     lag_s: f64,
-    pub(in crate::fusion) pace: Pace,
+    pub pace: Pace,
 }
 
 impl Moving {
@@ -511,8 +511,8 @@ struct Level {
     roll: f64,
     pitch: f64,
     /// Standard deviation of both (rad).
-    pub(super) sigma: f64,
-    pub(super) from: Levelling,
+    pub sigma: f64,
+    pub from: Levelling,
 }
 
 /// Statistics of a window in the vehicle's axes.
@@ -778,7 +778,7 @@ struct Agreement {
     /// −2 ln(likelihood) of the innovations, up to a constant.
     cost: f64,
     /// Mean NIS per component, and of how many components.
-    pub(super) nis: f64,
+    pub nis: f64,
     components: usize,
 }
 

@@ -252,7 +252,7 @@ const BRIDGE_STEP_S: f64 = 0.1;
 
 /// The filter in the axes of the IMU.
 struct Filter {
-    pub(super) ekf: Ekf,
+    pub ekf: Ekf,
     q_s_b: DQuat,
     mounting_sigma_b: DVec3,
     lever_arm_s: DVec3,
