@@ -1,7 +1,6 @@
 //! Results of a study: `results.csv`, `summary.json`, `report.html`, made from the run directories of its cells.
 
-use super::cells::{Cell, Labels, Study};
-use super::units::Place;
+use super::{Cell, Labels, Place, Study};
 use crate::app::{Answer, Context, Failure, Result};
 use crate::commands::compare::{Comparison, between};
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
@@ -50,7 +49,7 @@ struct CellSummary {
 }
 
 /// Reads all cells that are there and compares them; a damaged one is set aside.
-pub(crate) fn merge(
+pub(super) fn merge(
     study: &Study,
     cells: &[Cell],
     place: &Place<'_>,
@@ -232,7 +231,7 @@ impl StudyAnswer {
     }
 
     /// Writes the results, all or none.
-    pub(crate) fn write(&self, place: &Place<'_>) -> Result<()> {
+    pub(super) fn write(&self, place: &Place<'_>) -> Result<()> {
         let mut files = AtomicDir::create(place.0)?;
         for (name, text) in
             FILES
@@ -246,7 +245,7 @@ impl StudyAnswer {
 }
 
 /// Removes results of before, where a cell is missing.
-pub(crate) fn withdraw(place: &Place<'_>) {
+pub(super) fn withdraw(place: &Place<'_>) {
     FILES
         .iter()
         .for_each(|name| drop(fs::remove_file(place.0.join(name))));
@@ -355,7 +354,7 @@ impl StudyAnswer {
 }
 
 /// The first names of a list.
-pub(crate) fn first_of(names: &[String]) -> String {
+pub(super) fn first_of(names: &[String]) -> String {
     let more = if names.len() > 3 { ", …" } else { "" };
     names
         .iter()

@@ -1,7 +1,6 @@
 //! A fusion as a document: verdict, figures, track, errors, innovations.
 
-use super::FuseAnswer;
-use super::summary::Cause;
+use super::{Cause, FuseAnswer};
 use crate::report::{reduction_doubt, reduction_line, tone};
 use glam::{DVec2, DVec3};
 use nav_sim_document::{

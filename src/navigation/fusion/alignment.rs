@@ -283,7 +283,7 @@ fn start(
 }
 
 /// Samples whose interval ends in (from, to].
-pub(in crate::fusion) fn between(imu: &[ImuIncrement], from: f64, to: f64) -> &[ImuIncrement] {
+pub(super) fn between(imu: &[ImuIncrement], from: f64, to: f64) -> &[ImuIncrement] {
     let first = imu.partition_point(|s| s.t_s <= from + 1e-9);
     let end = imu.partition_point(|s| s.t_s <= to + 1e-9);
     &imu[first..end.max(first)]
@@ -291,7 +291,7 @@ pub(in crate::fusion) fn between(imu: &[ImuIncrement], from: f64, to: f64) -> &[
 
 /// How far the IMU turns through the samples, from its axes then to those at the start, and the velocity that the
 /// specific force makes, in the axes at the start (m/s).
-pub(in crate::fusion) fn carried(samples: &[ImuIncrement]) -> (DQuat, DVec3) {
+pub(super) fn carried(samples: &[ImuIncrement]) -> (DQuat, DVec3) {
     let (mut q, mut dv) = (DQuat::IDENTITY, DVec3::ZERO);
     for s in samples {
         let half = DQuat::from_scaled_axis(s.dtheta * 0.5);
@@ -320,20 +320,20 @@ const ACCELERATION: f64 = 2.0;
 
 /// How a drive goes.
 #[derive(Clone, Copy, PartialEq)]
-pub(in crate::fusion) enum Pace {
+pub(super) enum Pace {
     Fast,
     Slow,
 }
 
 impl Pace {
     /// The speed from which a course is a heading, where velocities are known as well as `sigma` (m/s).
-    pub(in crate::fusion) fn needed(self, sigma: f64) -> f64 {
+    pub(super) fn needed(self, sigma: f64) -> f64 {
         let (least, sigmas) = if self == Self::Fast { FAST } else { SLOW };
         least.max(sigmas * sigma)
     }
 
     /// How far the axis is from the course at such a speed (rad).
-    pub(in crate::fusion) fn slip(self, speed: f64) -> f64 {
+    pub(super) fn slip(self, speed: f64) -> f64 {
         if self == Self::Fast {
             SLIP
         } else {
@@ -343,7 +343,7 @@ impl Pace {
 }
 
 /// A fix with its velocity and the standard deviations of it (m/s).
-pub(in crate::fusion) struct Moving {
+pub(super) struct Moving {
     pub fix: GnssFix,
     pub v_n: DVec3,
     pub sigma_n: DVec3,
@@ -353,21 +353,21 @@ pub(in crate::fusion) struct Moving {
 }
 
 impl Moving {
-    pub(in crate::fusion) fn speed(&self) -> f64 {
+    pub(super) fn speed(&self) -> f64 {
         self.v_n.truncate().length()
     }
 
-    pub(in crate::fusion) fn sigma(&self) -> f64 {
+    pub(super) fn sigma(&self) -> f64 {
         self.sigma_n.truncate().max_element()
     }
 
     /// The speed from which the course of this fix is a heading (m/s).
-    pub(in crate::fusion) fn needed(&self) -> f64 {
+    pub(super) fn needed(&self) -> f64 {
         self.pace.needed(self.sigma())
     }
 
     /// The direction in which it moves (rad from north).
-    pub(in crate::fusion) fn course(&self) -> f64 {
+    pub(super) fn course(&self) -> f64 {
         self.v_n.y.atan2(self.v_n.x)
     }
 
@@ -394,7 +394,7 @@ impl Moving {
 }
 
 /// The velocities within the IMU recording.
-pub(in crate::fusion) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<Moving> {
+pub(super) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<Moving> {
     let first = imu.first().map_or(f64::INFINITY, |s| s.t_s - s.dt_s);
     let last = imu.last().map_or(f64::NEG_INFINITY, |s| s.t_s);
     let inside = |m: &Moving| m.fix.t_s >= first && m.fix.t_s < last;
@@ -424,7 +424,7 @@ pub(in crate::fusion) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<
 }
 
 /// Fixes one after the other that are at least `apart_s` apart, with when their velocities were (s).
-pub(in crate::fusion) fn steps(courses: &[Moving], apart_s: f64) -> Vec<[(&Moving, f64); 2]> {
+pub(super) fn steps(courses: &[Moving], apart_s: f64) -> Vec<[(&Moving, f64); 2]> {
     let when = |m: &Moving| m.fix.t_s - m.lag_s;
     let mut all = Vec::new();
     let mut first = 0;
