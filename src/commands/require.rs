@@ -347,7 +347,7 @@ const DRIFT: &str =
     "The error at the end of an outage against its length, at the worst of the places.";
 
 /// The error after an outage; none where the trajectory is too short.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 struct DriftPoint {
     outage_s: u32,
     value: Option<f64>,
@@ -363,7 +363,7 @@ fn note_beyond(beyond: Option<Outage>, document: &mut Document) {
 }
 
 /// What was asked, and where.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Serialize)]
 struct Question {
     /// The limits.
     limits: Vec<Limit>,
@@ -453,7 +453,7 @@ fn points(curve: &[DriftPoint]) -> Vec<(f64, f64)> {
 // The IMU that a limit needs.
 
 /// The IMU that a limit needs.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Serialize)]
 struct NeededImu {
     schema_version: u32,
     question: Question,
@@ -471,13 +471,13 @@ struct NeededImu {
 }
 
 /// Turn-on biases that it has.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Serialize)]
 struct TurnOnBias {
     accel_m_s2: f64,
     gyro_rad_s: f64,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Serialize)]
 struct NeededFigure {
     figure: &'static str,
     /// With equal shares.
@@ -953,7 +953,6 @@ impl Requirements {
 }
 
 /// A unit to be ranked.
-#[derive(Debug, Clone)]
 struct CatalogueUnit {
     /// Its name.
     name: String,
@@ -991,7 +990,7 @@ fn drift_curve(curves: &[Vec<Drift>], quantity: Quantity) -> Vec<DriftPoint> {
 // A given IMU against its limits.
 
 /// The longest outage that keeps the limits.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Serialize)]
 struct Longest {
     /// Its length (s).
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -1019,7 +1018,7 @@ impl Longest {
 }
 
 /// A model against its limits.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Serialize)]
 struct GivenImu {
     schema_version: u32,
     question: Question,
@@ -1036,14 +1035,14 @@ struct GivenImu {
     judged: Option<Margins>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Serialize)]
 struct LimitCurve {
     quantity: Quantity,
     points: Vec<DriftPoint>,
 }
 
 /// Limits where the vehicle measures something of its own motion.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Serialize)]
 struct Aided {
     aiding: &'static str,
     /// The hardest limit; none where no place has an outage of that length.
@@ -1128,7 +1127,7 @@ impl GivenImu {
 const RULE: &str = "A figure that is missing counts as none: open means that the limit would be kept then. Turn-on bias is the repeatability from one switching-on to the next; an initial tolerance of the zero offset counts as removed before use. Figures named without a sensor are missing for both.";
 
 /// A unit of a catalogue.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Serialize)]
 struct RankedUnit {
     unit: String,
     /// True if the limits are kept by figures that are all stated.
@@ -1150,7 +1149,7 @@ struct RankedUnit {
 }
 
 /// Units against limits: those whose figures are all stated, the best first, then the others by name.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Serialize)]
 struct Ranking {
     schema_version: u32,
     question: Question,

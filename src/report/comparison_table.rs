@@ -10,7 +10,7 @@ use serde_json::Value;
 const ESTIMATORS: [&str; 6] = ["sr-awv", "dr-awv", "awv", "rgmwm", "gmwm", "avlr"];
 
 /// Where a run stands in Table I: its row (scenario) and column (estimator, may be empty).
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub(crate) struct Label {
     /// Row.
     pub scenario: String,

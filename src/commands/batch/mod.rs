@@ -333,7 +333,7 @@ impl Outcome {
 const MOST: usize = 100_000;
 
 /// A run whose values may be lists: nav-sim batch
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[derive(Default, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 #[schemars(title = "Study")]
 pub(crate) struct Study {

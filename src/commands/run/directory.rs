@@ -14,7 +14,6 @@ use serde_json::Value;
 use std::path::Path;
 
 /// A run directory.
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RunDirectory {
     /// Where it came from.
     pub manifest: Manifest,

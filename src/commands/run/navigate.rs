@@ -286,7 +286,6 @@ fn sampled(
 }
 
 /// What a covariance analysis is made of.
-#[derive(Clone, Copy)]
 struct Analysis<'a> {
     experiment: &'a Experiment<'a>,
     track: &'a Track,
