@@ -14,7 +14,7 @@ use crate::app::{
 };
 use crate::commands::run::{PreparedRun, Run, block_of, columns};
 use crate::io::{atomic, input, source};
-use crate::report::comparison_table::in_order;
+use crate::report::in_order;
 use clap::Args;
 use nav_sim_document::{Importance, Note};
 use nav_sim_navigation::scenario::{Method, Scenario};
