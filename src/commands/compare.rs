@@ -314,17 +314,17 @@ pub(crate) fn states(names: &[String]) -> Result<Vec<usize>> {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     /// Layout version.
-    pub(crate) schema_version: u32,
+    schema_version: u32,
     /// Run directory of the reference.
     pub(crate) reference: String,
     /// Whether run k saw the same noise everywhere, so that intervals are those of paired differences.
-    pub(crate) paired: bool,
+    paired: bool,
     /// One row a run, the reference first.
-    pub(crate) verdicts: Vec<VerdictRow>,
+    verdicts: Vec<VerdictRow>,
     /// One row a run, outage and state.
-    pub(crate) rows: Vec<Row>,
+    rows: Vec<Row>,
     /// One row a run and outage.
-    pub(crate) consistency: Vec<ConsistencyRow>,
+    consistency: Vec<ConsistencyRow>,
     /// The runs.
     #[serde(skip)]
     pub(crate) candidates: Vec<CandidateResult>,
@@ -333,66 +333,66 @@ pub struct Comparison {
     pub(crate) outages: Vec<(f64, f64)>,
     /// Why runs are not paired with the reference.
     #[serde(skip)]
-    pub(crate) doubts: Vec<String>,
+    doubts: Vec<String>,
     /// The states that are shown.
     #[serde(skip)]
-    pub(crate) states: Vec<usize>,
+    states: Vec<usize>,
     /// Form in which the table alone is printed.
     #[serde(skip)]
-    pub(crate) form: Option<TableForm>,
+    form: Option<TableForm>,
 }
 
 /// Whether the filter of a run is as good as it believes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct VerdictRow {
+struct VerdictRow {
     /// Run directory.
-    pub run: String,
+    run: String,
     /// The verdict.
     #[serde(flatten)]
-    pub verdict: Value,
+    verdict: Value,
 }
 
 /// One state of one run in one outage, against the reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Row {
+struct Row {
     /// Scenario and estimator.
     #[serde(flatten)]
-    pub label: Label,
+    label: Label,
     /// Run directory.
-    pub run: String,
+    run: String,
     /// Run directory of the reference.
-    pub reference: String,
+    reference: String,
     /// Start of the outage (s).
-    pub outage_start_s: f64,
+    outage_start_s: f64,
     /// Its end (s).
-    pub outage_end_s: f64,
+    outage_end_s: f64,
     /// State.
-    pub state: &'static str,
+    state: &'static str,
     /// Its ratios.
     #[serde(flatten)]
-    pub ratio: StateRatio,
+    ratio: StateRatio,
     /// True if run k saw the same noise as that of the reference, so that the intervals are those of paired differences.
-    pub paired: bool,
+    paired: bool,
     /// Outage, from 0.
-    pub outage: usize,
+    outage: usize,
 }
 
 /// Consistency of one run in one outage, beside the reference's.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct ConsistencyRow {
+struct ConsistencyRow {
     /// Run directory.
-    pub run: String,
+    run: String,
     /// Outage, from 0.
-    pub outage: usize,
+    outage: usize,
     /// Its start (s).
-    pub outage_start_s: f64,
+    outage_start_s: f64,
     /// Its end (s).
-    pub outage_end_s: f64,
+    outage_end_s: f64,
     /// NEES and coverage.
     #[serde(flatten)]
-    pub comparison: OutageComparison,
+    comparison: OutageComparison,
     /// (ratio − 1)·100 of the RMSE at its end.
-    pub rmse_end_ratio_error_pct: PerState<f64>,
+    rmse_end_ratio_error_pct: PerState<f64>,
 }
 
 impl Comparison {
@@ -591,11 +591,11 @@ const ESTIMATORS: [&str; 6] = ["sr-awv", "dr-awv", "awv", "rgmwm", "gmwm", "avlr
 
 /// Where a run stands in Table I: its row (scenario) and column (estimator, may be empty).
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub(crate) struct Label {
+struct Label {
     /// Row.
-    pub scenario: String,
+    scenario: String,
     /// Column.
-    pub estimator: String,
+    estimator: String,
 }
 
 impl Label {
@@ -639,7 +639,7 @@ pub(crate) struct CandidateResult {
     /// Run directory.
     pub run: String,
     /// Its place in the table.
-    pub label: Label,
+    label: Label,
     /// True of the reference itself.
     pub is_reference: bool,
     /// True if run k saw the same noise as that of the reference.

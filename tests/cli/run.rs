@@ -541,24 +541,6 @@ fn doubtful_requests_are_said() {
         "{}",
         ran.stderr
     );
-    fs::write(
-        place.path().join("wild.toml"),
-        MODEL.replace(
-            "phi = 0.9999, sigma2 = 1e-9",
-            "phi = 0.9999999, sigma2 = 1e-5",
-        ),
-    )
-    .unwrap();
-    let ran = done(
-        place.path(),
-        "run drive.toml wild.toml --outage none --runs 1 --seed 1 -o wild",
-    );
-    assert!(
-        ran.stderr
-            .contains("the filter starts with a bias of 7.071 m/s²"),
-        "{}",
-        ran.stderr
-    );
 }
 
 /// The manifest of another command is not replaced; that of a run is.

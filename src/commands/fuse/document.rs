@@ -150,6 +150,15 @@ impl FuseAnswer {
             let keys = format!("reference/{key} smoothed/reference/{key}");
             (title.to_owned(), keys)
         }));
+        for (k, o) in self.summary.outcome.outages.iter().enumerate() {
+            let window = window(o.outage.start_s, o.outage.end_s);
+            rows.extend(["fix", "reference"].map(|end| {
+                (
+                    format!("end of outage {window}: error from the {end} (m)"),
+                    format!("outages/{k}/end_from_{end}/horizontal_m -"),
+                )
+            }));
+        }
         let rows: Vec<_> = rows
             .iter()
             .map(|(title, keys)| (title.as_str(), keys.as_str()))
@@ -326,12 +335,12 @@ const UNEVEN: f64 = 0.5;
 
 const POSITION: &str = "Dashed: horizontal 1 σ stated. Line: distance from the reference.";
 const ERRORS: &str = "Lines: estimate less reference. Bands: ± 1 σ.";
-pub(super) const FIXES: &str = "Of a right filter 95 % of the used fixes are in the band.";
+const FIXES: &str = "Of a right filter 95 % of the used fixes are in the band.";
 
 /// Colour of what is smoothed.
 const SMOOTHED: Colour = Colour::Hue(2);
 
-pub(super) fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
+fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     let Some(first) = solution.rows.first() else {
         return Chart::map("Track", Vec::new());
     };
@@ -395,7 +404,7 @@ fn solutions(solution: &Solution) -> Vec<(&[Row], [&'static str; 2], [Colour; 2]
     }
 }
 
-pub(super) fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
+fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     let mut series = Vec::new();
     for (rows, [stated, error], [believed, real]) in solutions(solution) {
         let sigma = thinned(rows)
@@ -415,7 +424,7 @@ pub(super) fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     )
 }
 
-pub(super) fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
+fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
     let chart = |(i, name): (usize, &&str)| {
         let is_velocity = (3..6).contains(&i);
         let error = |row: &Row| {
@@ -463,7 +472,7 @@ fn fixes(fixes: &[FixRecord], value: &dyn Fn(&FixRecord) -> f64) -> Vec<Series> 
     FATES.into_iter().filter_map(of_fate).collect()
 }
 
-pub(super) fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
+fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     let panel = |(i, name): (usize, &str)| {
         let normalised = |f: &FixRecord| {
             f.innovation

@@ -276,7 +276,7 @@ fn budgets(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
 // The figures of a run.
 
 /// The outages (start, end) (s).
-pub(super) fn windows(summary: &Summary) -> Vec<(f64, f64)> {
+fn windows(summary: &Summary) -> Vec<(f64, f64)> {
     summary
         .outages
         .iter()
@@ -354,7 +354,7 @@ pub(super) fn fan_chart(fan: &[FanEpoch], summary: &Summary) -> Chart {
 }
 
 /// Every state: what the filter believes and how wrong it is.
-pub(super) fn states(epochs: &[EpochMetrics], outages: &[(f64, f64)]) -> Vec<Chart> {
+fn states(epochs: &[EpochMetrics], outages: &[(f64, f64)]) -> Vec<Chart> {
     let chart = |(i, state): (usize, &&str)| {
         let series = vec![
             Series::line(
@@ -427,8 +427,13 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], answer: &RunAnswer) -> S
             return "--filter full has a state for each process of the model".to_owned();
         }
         None if is_recorded || is_modelled || is_analysed && !is_far => {
-            return "the errors are not those of MODEL: nav-sim tune finds variances that cover them"
-                .to_owned();
+            let how = match is_recorded || is_modelled {
+                true => "",
+                false => " --scenario",
+            };
+            return format!(
+                "the errors are not those of MODEL: nav-sim tune{how} finds variances that cover them"
+            );
         }
         None => {}
     }

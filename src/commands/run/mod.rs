@@ -426,7 +426,7 @@ impl PreparedRun<'_> {
 
 impl RunAnswer {
     /// The hashes of the inputs of a role.
-    pub(crate) fn has_input(&self, role: &str) -> bool {
+    fn has_input(&self, role: &str) -> bool {
         self.inputs.iter().any(|input| input.role == role)
     }
 }

@@ -557,7 +557,7 @@ pub fn moves(imu: &[ImuIncrement]) -> bool {
 
 impl<'a> Scene<'a> {
     /// About a fix.
-    pub(super) fn new(
+    fn new(
         recorded: &Recorded<'a>,
         settings: &'a Settings,
         belief: &Belief,

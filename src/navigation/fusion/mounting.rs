@@ -195,7 +195,7 @@ struct Blocks {
 
 impl Blocks {
     /// Adds `value` of weight `weight` at a time, times in order.
-    pub(super) fn add(&mut self, t_s: f64, value: f64, weight: f64) {
+    fn add(&mut self, t_s: f64, value: f64, weight: f64) {
         let block = (t_s / BLOCK_S).floor() as i64;
         self.weight += weight;
         match self.sums.last_mut() {
@@ -208,14 +208,14 @@ impl Blocks {
         self.sums.len()
     }
 
-    pub(super) fn mean(&self) -> f64 {
+    fn mean(&self) -> f64 {
         self.sums.iter().map(|(_, sum)| sum).sum::<f64>() / self.weight
     }
 
     /// Standard deviation of a mean whose values have been reduced by it: from the scatter of the blocks, with the
     /// correlation of neighbours where that is positive (Newey and West's estimator of lag one), and wider where they
     /// are few, as Student's t is.
-    pub(super) fn sigma(&self) -> f64 {
+    fn sigma(&self) -> f64 {
         let count = self.count() as f64;
         let own: f64 = self.sums.iter().map(|(_, sum)| sum * sum).sum();
         let neighbours = self.sums.windows(2).filter(|w| w[1].0 == w[0].0 + 1);

@@ -259,7 +259,7 @@ struct Filter {
 }
 
 impl Filter {
-    pub(super) fn new(belief: &Belief, start: &Start, settings: &Settings) -> Self {
+    fn new(belief: &Belief, start: &Start, settings: &Settings) -> Self {
         let q_s_b = settings.q_s_b;
         let of_imu = NavState {
             q_b_n: start.state.q_b_n * q_s_b,
@@ -291,7 +291,7 @@ impl Filter {
     }
 
     /// Through `seconds` of a sample that bridges a gap, in steps, as uncertain as `Gap` says.
-    pub(super) fn cross(&mut self, bridge: &ImuIncrement, seconds: f64, spread: Spread) {
+    fn cross(&mut self, bridge: &ImuIncrement, seconds: f64, spread: Spread) {
         let steps = (seconds / BRIDGE_STEP_S).ceil().max(1.0);
         let step_s = seconds / steps;
         self.ekf.set_interval(step_s);
@@ -361,7 +361,7 @@ impl Filter {
     }
 
     /// Uses a velocity along the vehicle's axes.
-    pub(super) fn aid(&mut self, aid: &VehicleVelocity) -> AidRecord {
+    fn aid(&mut self, aid: &VehicleVelocity) -> AidRecord {
         let to_imu = self.q_s_b.inverse();
         let axes = aid.aid.axes();
         let measured = BodyVelocity {
@@ -382,7 +382,7 @@ impl Filter {
         }
     }
 
-    pub(super) fn update(&mut self, fix: &GnssFix) {
+    fn update(&mut self, fix: &GnssFix) {
         let fix = self.fix(fix);
         let _ = update(&mut self.ekf, &fix);
     }
@@ -542,7 +542,7 @@ struct Bridges<'a> {
 }
 
 impl<'a> Bridges<'a> {
-    pub(super) fn new(imu: &'a [ImuIncrement]) -> Self {
+    fn new(imu: &'a [ImuIncrement]) -> Self {
         let mut lengths: Vec<f64> = imu.iter().map(|s| s.dt_s).collect();
         lengths.sort_by(f64::total_cmp);
         let step_s = lengths.get(lengths.len() / 2).copied().unwrap_or(1.0);
@@ -649,7 +649,7 @@ impl Tape {
     ///
     /// # Errors
     /// When it would be too large.
-    pub(super) fn new(filter: &mut Filter, t_s: f64, marks: f64) -> Result<Self, FusionError> {
+    fn new(filter: &mut Filter, t_s: f64, marks: f64) -> Result<Self, FusionError> {
         let states = filter.ekf.p.lane(0).nrows();
         let bytes = marks * bytes_of_mark(states as f64);
         if bytes > MOST_BYTES {
@@ -687,7 +687,7 @@ impl Tape {
     }
 
     /// A fix is used here, by `update`.
-    pub(super) fn fix(&mut self, filter: &mut Filter, t_s: f64, update: impl FnOnce(&mut Filter)) {
+    fn fix(&mut self, filter: &mut Filter, t_s: f64, update: impl FnOnce(&mut Filter)) {
         self.mark(filter, t_s);
         update(filter);
         let Some(last) = self.marks.last_mut() else {
