@@ -411,7 +411,7 @@ fn smoothing_changes_nothing_that_it_should_not() {
         }];
         let free = run(
             imu,
-            &fixes,
+            fixes,
             start,
             &Settings {
                 smooth: true,
