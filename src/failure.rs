@@ -2,6 +2,7 @@
 
 use clap::error::ContextKind;
 use nav_sim_calibration::{CalibrationError, Cause};
+use nav_sim_navigation::sensors::imu::TruthError;
 use nav_sim_navigation::sensors::outage::OutageError;
 use nav_sim_navigation::simulation::ExperimentError;
 use nav_sim_signal::noise::ReplicateError;
@@ -430,9 +431,20 @@ impl From<OutageError> for Failure {
 
 impl From<ExperimentError> for Failure {
     fn from(e: ExperimentError) -> Self {
-        let is_rate = matches!(e, ExperimentError::BetweenSamples(_));
-        let hint = "the IMU has the rate of the recordings: another [gnss] rate_hz in --scenario";
-        Self::input(e).or_hint_if(is_rate.then(|| hint.to_owned()))
+        let hint = match &e {
+            ExperimentError::BetweenSamples(_) => Some(
+                "the IMU has the rate of the recordings: another [gnss] rate_hz in --scenario"
+                    .to_owned(),
+            ),
+            ExperimentError::Truth(TruthError::TooShort { .. }) => Some(
+                "each run takes a window as long as the trajectory: record for longer".to_owned(),
+            ),
+            ExperimentError::Truth(TruthError::Rate { rate_hz, .. }) => Some(format!(
+                "set rate_hz = {rate_hz} in the [imu] section of a --scenario file"
+            )),
+            _ => None,
+        };
+        Self::input(e).or_hint_if(hint)
     }
 }
 

@@ -43,6 +43,10 @@ pub(crate) fn study_run(
         let outcome = pool.map_or_else(run, |pool| pool.install(run));
         (outcome, meter.warnings())
     })?;
+    let outcome = outcome.and_then(|outcome| match outcome.unmet() {
+        Some(failure) if matches!(outcome, Outcome::Stopped { .. }) => Err(failure),
+        _ => Ok(outcome),
+    });
     let answer = match outcome.map_err(|e| error::of_failure(py, &e, ""))? {
         Outcome::Merged(answer) => {
             let answered = Answered {

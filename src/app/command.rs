@@ -235,7 +235,6 @@ impl<C: Command> FromArgMatches for Asked<C> {
 /// Options that decide the result, defaults included, without those that are files.
 fn options<C: Command>(matches: &ArgMatches) -> BTreeMap<String, Vec<String>> {
     let command = C::augment_args(clap::Command::new(C::NAME));
-    let is_path = |arg: &&Arg| arg.get_value_parser().type_id() == TypeId::of::<PathBuf>();
     let deciding = command
         .get_arguments()
         .filter(|arg| !is_path(arg) && !C::JUDGES.contains(&arg.get_id().as_str()));
@@ -249,6 +248,24 @@ fn options<C: Command>(matches: &ArgMatches) -> BTreeMap<String, Vec<String>> {
         ))
     };
     deciding.filter_map(values).collect()
+}
+
+/// The argument of a key, with `_` for `-`.
+pub(crate) fn argument<'a>(command: &'a clap::Command, key: &str) -> Option<&'a Arg> {
+    let long = key.replace('_', "-");
+    let is_meant = |arg: &&Arg| arg.get_long() == Some(&long) || arg.get_id() == key;
+    command.get_arguments().find(is_meant)
+}
+
+/// True of an argument that is the path of a file.
+pub(crate) fn is_path(arg: &Arg) -> bool {
+    arg.get_value_parser().type_id() == TypeId::of::<PathBuf>()
+}
+
+/// True of an argument that has several values.
+pub(crate) fn is_repeated(arg: &Arg) -> bool {
+    arg.get_num_args().is_some_and(|n| n.max_values() > 1)
+        || matches!(arg.get_action(), ArgAction::Append)
 }
 
 /// Numbers in their shortest form: `8.0:11` is `8:11`, `x2.0` is `x2`.
@@ -302,9 +319,7 @@ impl<C: Command> Asked<C> {
                 words.extend(set(settings, place)?);
                 continue;
             }
-            let option = key.replace('_', "-");
-            let is_meant = |arg: &&Arg| arg.get_long() == Some(&option) || arg.get_id() == key;
-            let Some(arg) = command.get_arguments().find(is_meant) else {
+            let Some(arg) = argument(&command, key) else {
                 let known = command.get_arguments().map(|arg| arg.get_id().as_str());
                 let message = format!("{}: there is no option {key}", C::NAME);
                 return Err(Failure::input(message).or_hint_if(
@@ -354,11 +369,9 @@ fn values(arg: &Arg, value: &Value) -> Vec<String> {
         Value::String(text) => text.clone(),
         other => other.to_string(),
     };
-    let is_repeated = arg.get_num_args().is_some_and(|n| n.max_values() > 1)
-        || matches!(arg.get_action(), ArgAction::Append);
     match value {
         Value::Null | Value::Bool(_) => Vec::new(),
-        Value::Array(list) if is_repeated => list.iter().map(text).collect(),
+        Value::Array(list) if is_repeated(arg) => list.iter().map(text).collect(),
         Value::Array(list) => vec![list.iter().map(text).collect::<Vec<_>>().join(",")],
         other => vec![text(other)],
     }

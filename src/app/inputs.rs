@@ -267,7 +267,8 @@ impl SettingsArgs {
     }
 }
 
-fn merge(into: &mut toml::Table, over: toml::Table) {
+/// Puts a table over another, key by key.
+pub(crate) fn merge(into: &mut toml::Table, over: toml::Table) {
     for (key, value) in over {
         match (into.get_mut(&key), value) {
             (Some(toml::Value::Table(inner)), toml::Value::Table(over)) => merge(inner, over),

@@ -11,5 +11,6 @@ pub(crate) use crate::failure::Refuse;
 pub use crate::failure::{Failure, Result};
 pub use crate::io::input::Input;
 pub use command::{Answer, Answered, Asked, Command, Out, OutputFile, answered};
+pub(crate) use command::{argument, is_path, is_repeated};
 pub use context::{Context, DEFAULT_SEED, Front};
 pub use manifest::Manifest;

@@ -32,7 +32,7 @@ pub(crate) fn run(args: &Args, mut session: Session) -> Result<(), Failure> {
     let (terminated, interrupted) = (flag(SIGTERM)?, flag(SIGINT)?);
     let limit = args.time_limit.map(Duration::try_from_secs_f64);
     let deadline = limit.and_then(|limit| Instant::now().checked_add(limit.ok()?));
-    let is_interrupted = Arc::clone(&interrupted);
+    let (is_terminated, is_interrupted) = (Arc::clone(&terminated), Arc::clone(&interrupted));
     session.go_on = Some(Box::new(move || {
         let is_stopped = [&terminated, &interrupted].map(|flag| flag.load(Ordering::Relaxed));
         is_stopped == [false; 2] && deadline.is_none_or(|d| Instant::now() < d)
@@ -42,13 +42,17 @@ pub(crate) fn run(args: &Args, mut session: Session) -> Result<(), Failure> {
     let seed = session.common.seed.map(|seed| format!("seed={seed}"));
     request.set.extend(seed);
     let variable = |name: &str| std::env::var(name).ok();
-    let outcome = match request.run(&variable, &Context::new(&session, None)) {
-        Err(_) if is_interrupted.load(Ordering::Relaxed) => {
-            return Err(Failure::interrupted("interrupted")
-                .hint("the same command goes on where this one stopped"));
-        }
-        outcome => outcome?,
-    };
+    let mut outcome = request.run(&variable, &Context::new(&session, None));
+    if let Ok(Outcome::Stopped { is_resumable, .. }) = &mut outcome {
+        *is_resumable |= is_terminated.load(Ordering::Relaxed);
+    }
+    if matches!(outcome, Err(_) | Ok(Outcome::Stopped { .. }))
+        && is_interrupted.load(Ordering::Relaxed)
+    {
+        return Err(Failure::interrupted("interrupted")
+            .hint("the same command goes on where this one stopped"));
+    }
+    let outcome = outcome?;
     match &outcome {
         Outcome::Merged(answer) => {
             session.show(&**answer, &answer.document(), None);
@@ -59,6 +63,7 @@ pub(crate) fn run(args: &Args, mut session: Session) -> Result<(), Failure> {
         }
         Outcome::Partial(_) => session.say("own share done"),
         Outcome::Estimate(text) => session.result(text),
+        Outcome::Stopped { .. } => {}
     }
     outcome.unmet().map_or(Ok(()), Err)
 }

@@ -1,22 +1,21 @@
 //! `nav-sim compare`: run directories → ratios between runs.
 
-use crate::app::{Answer, Command, Context, Failure, Manifest, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Failure, Manifest, Out, OutputFile, Refuse, Result};
 use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::io::atomic::Written;
-use crate::report::comparison_table::{CandidateResult, Label, layout, ratio_table, separate};
 use crate::report::csv::{csv, flat};
-use crate::report::json;
-use crate::report::verdict::{SPOKEN, axis_of, gravest, tone, verdict_counts};
+use crate::report::verdict::{SPOKEN, axis_of, tone, verdict_counts};
+use crate::report::{in_order, json};
 use nav_sim_document::{
-    Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
+    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
+    window,
 };
-use nav_sim_navigation::metrics::{
-    self, ComparisonError, OutageComparison, PerState, StateRatio, Verdict,
-};
+use nav_sim_navigation::metrics::{self, OutageComparison, PerState, StateRatio};
 use nav_sim_navigation::scenario::Method;
-use nav_sim_navigation::simulation::REPORTED_NAMES;
+use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 use serde::Serialize;
+use serde_json::Value;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -132,7 +131,7 @@ pub(crate) fn between<'a>(
         paired: true,
         verdicts: vec![VerdictRow {
             run: name.to_owned(),
-            verdict: directory.verdict,
+            verdict: directory.summary["verdict"].clone(),
         }],
         rows: Vec::new(),
         consistency: Vec::new(),
@@ -167,7 +166,7 @@ pub(crate) fn between<'a>(
         if !candidate.is_reference {
             found.verdicts.push(VerdictRow {
                 run: candidate.run.clone(),
-                verdict: candidate.verdict,
+                verdict: candidate.verdict.clone(),
             });
         }
         for (outage, comparison) in candidate.outages.iter().enumerate() {
@@ -216,14 +215,15 @@ fn compared(
                 .hint("compare runs along one and the same trajectory file"),
         );
     }
-    let outages = metrics::compare(&candidate.experiment, &reference.experiment, is_paired);
-    let mut outages = outages.map_err(|e| {
-        let failure = Failure::input(format!("{run}: {e}"));
-        match e {
-            ComparisonError::Runs { .. } => failure.hint("make both with one number of --runs"),
-            _ => failure,
-        }
-    })?;
+    let runs = [candidate, reference].map(|side| side.experiment.runs.len());
+    if is_paired && runs[0] != runs[1] {
+        let [own, other] = runs;
+        let message =
+            format!("{run}: {own} runs against {other} of the reference, of the same seed");
+        return Err(Failure::input(message).hint("make both with one number of --runs"));
+    }
+    let mut outages = metrics::compare(&candidate.experiment, &reference.experiment, is_paired)
+        .refuse_within(&run)?;
     // the reference is itself, whatever its calibration leaves open
     if !is_reference {
         let open = candidate
@@ -247,7 +247,7 @@ fn compared(
         label,
         is_reference,
         is_paired,
-        verdict: candidate.verdict,
+        verdict: candidate.summary["verdict"].clone(),
         outages,
     })
 }
@@ -313,17 +313,17 @@ pub(crate) fn states(names: &[String]) -> Result<Vec<usize>> {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     /// Layout version.
-    pub(crate) schema_version: u32,
+    schema_version: u32,
     /// Run directory of the reference.
     pub(crate) reference: String,
     /// Whether run k saw the same noise everywhere, so that intervals are those of paired differences.
-    pub(crate) paired: bool,
+    paired: bool,
     /// One row a run, the reference first.
-    pub(crate) verdicts: Vec<VerdictRow>,
+    verdicts: Vec<VerdictRow>,
     /// One row a run, outage and state.
-    pub(crate) rows: Vec<Row>,
+    rows: Vec<Row>,
     /// One row a run and outage.
-    pub(crate) consistency: Vec<ConsistencyRow>,
+    consistency: Vec<ConsistencyRow>,
     /// The runs.
     #[serde(skip)]
     pub(crate) candidates: Vec<CandidateResult>,
@@ -332,66 +332,66 @@ pub struct Comparison {
     pub(crate) outages: Vec<(f64, f64)>,
     /// Why runs are not paired with the reference.
     #[serde(skip)]
-    pub(crate) doubts: Vec<String>,
+    doubts: Vec<String>,
     /// The states that are shown.
     #[serde(skip)]
-    pub(crate) states: Vec<usize>,
+    states: Vec<usize>,
     /// Form in which the table alone is printed.
     #[serde(skip)]
-    pub(crate) form: Option<TableForm>,
+    form: Option<TableForm>,
 }
 
 /// Whether the filter of a run is as good as it believes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct VerdictRow {
+struct VerdictRow {
     /// Run directory.
-    pub run: String,
+    run: String,
     /// The verdict.
     #[serde(flatten)]
-    pub verdict: Verdict,
+    verdict: Value,
 }
 
 /// One state of one run in one outage, against the reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Row {
+struct Row {
     /// Scenario and estimator.
     #[serde(flatten)]
-    pub label: Label,
+    label: Label,
     /// Run directory.
-    pub run: String,
+    run: String,
     /// Run directory of the reference.
-    pub reference: String,
+    reference: String,
     /// Start of the outage (s).
-    pub outage_start_s: f64,
+    outage_start_s: f64,
     /// Its end (s).
-    pub outage_end_s: f64,
+    outage_end_s: f64,
     /// State.
-    pub state: &'static str,
+    state: &'static str,
     /// Its ratios.
     #[serde(flatten)]
-    pub ratio: StateRatio,
+    ratio: StateRatio,
     /// True if run k saw the same noise as that of the reference, so that the intervals are those of paired differences.
-    pub paired: bool,
+    paired: bool,
     /// Outage, from 0.
-    pub outage: usize,
+    outage: usize,
 }
 
 /// Consistency of one run in one outage, beside the reference's.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct ConsistencyRow {
+struct ConsistencyRow {
     /// Run directory.
-    pub run: String,
+    run: String,
     /// Outage, from 0.
-    pub outage: usize,
+    outage: usize,
     /// Its start (s).
-    pub outage_start_s: f64,
+    outage_start_s: f64,
     /// Its end (s).
-    pub outage_end_s: f64,
+    outage_end_s: f64,
     /// NEES and coverage.
     #[serde(flatten)]
-    pub comparison: OutageComparison,
+    comparison: OutageComparison,
     /// (ratio − 1)·100 of the RMSE at its end.
-    pub rmse_end_ratio_error_pct: PerState<f64>,
+    rmse_end_ratio_error_pct: PerState<f64>,
 }
 
 impl Comparison {
@@ -538,13 +538,12 @@ impl Answer for Comparison {
     }
 
     fn document(&self) -> Document {
-        let verdicts = || {
-            self.verdicts
-                .iter()
-                .map(|row| (row.run.as_str(), &row.verdict))
-        };
-        let lines = self.cost().into_iter().chain(verdict_counts(verdicts()));
-        let tone = tone(gravest(verdicts()));
+        let verdicts = self.verdicts.iter();
+        let verdicts: Vec<_> = verdicts
+            .map(|row| (row.run.as_str(), &row.verdict))
+            .collect();
+        let (gravest, counts) = verdict_counts(&verdicts);
+        let (lines, tone) = (self.cost().into_iter().chain(counts), tone(gravest));
         let mut document = Document::new("What the filters believe, compared", tone, lines);
         self.doubts
             .iter()
@@ -576,3 +575,247 @@ const CAPTION: &str = "ASEE (averaged standard estimation error) is the filter's
 
 const INTERVALS: &str =
     "± half the 95 % interval of Monte Carlo, and of the calibrations where they are known";
+
+// The layout of the paper's Table I: scenario by outage, state by estimator.
+
+/// Estimators by the names their run directories end in.
+const ESTIMATORS: [&str; 6] = ["sr-awv", "dr-awv", "awv", "rgmwm", "gmwm", "avlr"];
+
+/// Where a run stands in Table I: its row (scenario) and column (estimator, may be empty).
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+struct Label {
+    /// Row.
+    scenario: String,
+    /// Column.
+    estimator: String,
+}
+
+impl Label {
+    /// From a run directory's name: `II_sr-awv` or `II/sr-awv` is scenario II, estimator SR-AWV. A name
+    /// that ends in no estimator is a scenario of its own; the estimator is then the one the model was
+    /// made with, if known.
+    fn of(directory: &str, model_estimator: Option<&str>) -> Self {
+        let parts: Vec<&str> = directory
+            .split('/')
+            .filter(|p| !p.is_empty() && *p != ".")
+            .collect();
+        let name = parts.last().copied().unwrap_or(directory);
+        let lower = name.to_lowercase();
+        for estimator in ESTIMATORS {
+            let Some(head) = lower.strip_suffix(estimator) else {
+                continue;
+            };
+            let parent = parts.len().checked_sub(2).map_or("", |i| parts[i]);
+            let separated = head.ends_with(['_', '-', '.', ' ']);
+            let scenario = match head.len() {
+                0 => parent,
+                n if separated => name[..n].trim_end_matches(['_', '-', '.', ' ']),
+                _ => continue,
+            };
+            return Self {
+                scenario: scenario.to_owned(),
+                estimator: estimator.to_uppercase(),
+            };
+        }
+        let estimator = model_estimator.unwrap_or_default().to_uppercase();
+        Self {
+            scenario: name.to_owned(),
+            estimator,
+        }
+    }
+}
+
+/// A candidate and what the comparison with the reference found.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct CandidateResult {
+    /// Run directory.
+    pub run: String,
+    /// Its place in the table.
+    label: Label,
+    /// True of the reference itself.
+    pub is_reference: bool,
+    /// True if run k saw the same noise as that of the reference.
+    pub is_paired: bool,
+    /// The verdict on its filter.
+    pub verdict: Value,
+    /// Outage by outage.
+    pub outages: Vec<OutageComparison>,
+    /// Time (s) and (ASEE ratio − 1)·100 of each reported state.
+    pub curve: Vec<(f64, [f64; REPORTED])>,
+}
+
+/// Scenarios and estimators of candidates, in the order in which they were given.
+fn layout(candidates: &[CandidateResult]) -> [Vec<&str>; 2] {
+    let labels = || candidates.iter().map(|c| &c.label);
+    [
+        in_order(labels().map(|label| label.scenario.as_str())),
+        in_order(labels().map(|label| label.estimator.as_str())),
+    ]
+}
+
+/// The paper's Table I: a row a scenario and outage, a column a state and estimator; (ASEE ratio − 1)·100 with half its
+/// 95 % interval.
+fn ratio_table(candidates: &[CandidateResult], states: &[usize], outages: &[(f64, f64)]) -> Table {
+    let [scenarios, estimators] = layout(candidates);
+    let columns = || {
+        states
+            .iter()
+            .flat_map(|s| estimators.iter().map(move |e| (*s, *e)))
+    };
+    let name = |(s, e)| format!("{} {e}", axis_of(s)).trim_end().to_owned() + " (%)";
+    let mut table = Table::new(["scenario", "outage"])
+        .and(columns().map(name))
+        .with_keys(2);
+    for scenario in scenarios {
+        for (outage, (start_s, end_s)) in outages.iter().enumerate() {
+            let keys = [scenario.to_owned(), window(*start_s, *end_s)].map(Cell::from);
+            let cell = |(state, estimator): (usize, &str)| {
+                let is_here = |c: &&CandidateResult| {
+                    c.label.scenario == scenario && c.label.estimator == estimator
+                };
+                let text = match candidates.iter().find(is_here) {
+                    Some(c) if c.is_reference => "reference".to_owned(),
+                    Some(c) => signed(&c.outages[outage].states[state]),
+                    None => String::new(),
+                };
+                Cell::figures(text)
+            };
+            table.row(keys.into_iter().chain(columns().map(cell)));
+        }
+    }
+    table
+}
+
+/// Gives each candidate a place of its own: those that would share one have rows of their names, and a number if even these are
+/// the same.
+fn separate(candidates: &mut [CandidateResult]) {
+    let labels: Vec<Label> = candidates.iter().map(|c| c.label.clone()).collect();
+    let runs: Vec<&str> = candidates.iter().map(|c| c.run.as_str()).collect();
+    let names = short_names(&runs);
+    for (k, candidate) in candidates.iter_mut().enumerate() {
+        if labels.iter().filter(|label| **label == labels[k]).count() > 1 {
+            let name = &names[k];
+            candidate.label.scenario = match names[..k].iter().filter(|n| *n == name).count() {
+                0 => name.clone(),
+                before => format!("{name} ({})", before + 1),
+            };
+        }
+    }
+}
+
+/// A ratio's distance from unity with half its 95 % interval (%): none where runs are too few for one, or ratios equal.
+fn signed(ratio: &StateRatio) -> String {
+    let half = ratio.ci95_pct.map(|[low, high]| (high - low) / 2.0);
+    match half.filter(|half| (0.005..1e3).contains(half)) {
+        Some(half) => format!("{:+.2} ± {half:.2}", ratio.ratio_error_pct),
+        None => format!("{:+.2}", ratio.ratio_error_pct),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn candidate(run: &str, pct: f64, is_reference: bool) -> CandidateResult {
+        let ci95_pct = Some([pct - 0.5, pct + 0.5]);
+        let state = StateRatio {
+            ratio_error_pct: pct,
+            ci95_pct,
+            calibration_half_pct: None,
+            abs_ratio_error_pct: pct.abs() + 1.0,
+            rmse_end_ratio_error_pct: pct,
+            rmse_end_ci95_pct: ci95_pct,
+        };
+        let outage = OutageComparison {
+            states: [state; 9],
+            nees_mean: 9.5,
+            nees_mean_reference: 9.0,
+            coverage_mean: 0.9,
+            coverage_mean_reference: 0.95,
+        };
+        let outages = vec![outage.clone(), outage];
+        let verdict = Value::Null;
+        let label = Label::of(run, None);
+        CandidateResult {
+            run: run.into(),
+            label,
+            is_reference,
+            is_paired: true,
+            verdict,
+            outages,
+            curve: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn names_of_directories_are_places_in_the_table() {
+        let cases = [
+            ("runs/II_sr-awv", "II", "SR-AWV"),
+            ("II/dr-awv", "II", "DR-AWV"),
+            ("./III-AWV/", "III", "AWV"),
+            ("awv", "", "AWV"),
+            ("rgmwm", "", "RGMWM"),
+            ("city", "city", "GMWM"),
+            ("lawv", "lawv", "GMWM"),
+        ];
+        for (directory, scenario, estimator) in cases {
+            let label = Label::of(directory, Some("gmwm"));
+            assert_eq!(
+                (label.scenario.as_str(), label.estimator.as_str()),
+                (scenario, estimator),
+                "{directory}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_table_is_laid_out_as_the_papers() {
+        let all = [
+            candidate("I/awv", 0.0, true),
+            candidate("I/sr-awv", 0.96, false),
+            candidate("II/awv", -75.0, false),
+        ];
+        let outages = [(300.0, 390.0), (700.0, 790.0)];
+        let table = ratio_table(&all, &[1, 6], &outages).csv();
+        let rows: Vec<&str> = table.lines().collect();
+        assert_eq!(
+            rows[0],
+            "scenario,outage,East AWV (%),East SR-AWV (%),roll AWV (%),roll SR-AWV (%)"
+        );
+        assert_eq!(
+            rows[1],
+            "I,300–390 s,reference,+0.96 ± 0.50,reference,+0.96 ± 0.50"
+        );
+        assert_eq!(rows[4], "II,700–790 s,-75.00 ± 0.50,,-75.00 ± 0.50,");
+    }
+
+    #[test]
+    fn candidates_that_would_share_a_place_all_have_one() {
+        let runs = ["a/drive", "b/drive", "x/I_awv", "y/I_awv", "c", "c"];
+        let mut all: Vec<_> = (1..)
+            .zip(runs)
+            .map(|(k, run)| candidate(run, f64::from(k), false))
+            .collect();
+        separate(&mut all);
+        let table = ratio_table(&all, &[0], &[(1.0, 2.0), (3.0, 4.0)]).csv();
+        let rows: Vec<Vec<&str>> = table
+            .lines()
+            .skip(1)
+            .map(|line| line.split(',').collect())
+            .collect();
+        let names: Vec<&str> = rows.iter().step_by(2).map(|row| row[0]).collect();
+        assert_eq!(
+            names,
+            ["a/drive", "b/drive", "x/I_awv", "y/I_awv", "c", "c (2)"]
+        );
+        assert_eq!(rows.len(), 2 * all.len());
+        for (k, row) in rows.iter().enumerate() {
+            let shown = format!("+{}.00", k / 2 + 1);
+            assert_eq!(
+                row.iter().filter(|text| text.starts_with(&shown)).count(),
+                1,
+                "{row:?}"
+            );
+        }
+    }
+}

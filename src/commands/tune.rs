@@ -381,21 +381,22 @@ impl Tune {
 /// The scenario with the filter that has states for what the true IMU is stated to have beside its noise.
 fn knowing(scenario: &Scenario, imu: &ImuSettings) -> Scenario {
     let mut knowing = scenario.with_full_noise();
-    for sensor in Sensor::ALL {
+    let initial = &mut knowing.initial;
+    for (sensor, bias, scale) in [
+        (
+            Sensor::Accel,
+            &mut initial.accel_bias_sigma_m_s2,
+            &mut initial.accel_scale_sigma_ppm,
+        ),
+        (
+            Sensor::Gyro,
+            &mut initial.gyro_bias_sigma_rad_s,
+            &mut initial.gyro_scale_sigma_ppm,
+        ),
+    ] {
         let (_, ppm) = imu.deviations(sensor);
-        let known = (imu.turn_on_bias(sensor), Some(ppm).filter(|ppm| *ppm > 0.0));
-        let initial = &mut knowing.initial;
-        let (bias, scale) = match sensor {
-            Sensor::Accel => (
-                &mut initial.accel_bias_sigma_m_s2,
-                &mut initial.accel_scale_sigma_ppm,
-            ),
-            Sensor::Gyro => (
-                &mut initial.gyro_bias_sigma_rad_s,
-                &mut initial.gyro_scale_sigma_ppm,
-            ),
-        };
-        (*bias, *scale) = (known.0.or(*bias), known.1.or(*scale));
+        *bias = imu.turn_on_bias(sensor).or(*bias);
+        *scale = Some(ppm).filter(|ppm| *ppm > 0.0).or(*scale);
     }
     knowing
 }
@@ -517,11 +518,6 @@ impl TuneAnswer {
                 readable(factor)
             ),
         })
-    }
-
-    /// Whether no factor was needed.
-    fn is_unchanged(&self) -> bool {
-        !self.factors.iter().any(is_changed)
     }
 
     /// Why the factors are of no use, if they are not.
@@ -674,7 +670,9 @@ impl Answer for TuneAnswer {
         let found = kind(&self.after);
         let tone = match self.fault() {
             Some(_) => Tone::Bad,
-            None if self.is_unchanged() && found == VerdictKind::Consistent => Tone::Good,
+            None if !self.factors.iter().any(is_changed) && found == VerdictKind::Consistent => {
+                Tone::Good
+            }
             None => Tone::Doubtful,
         };
         let mut document = Document::new("Factors on a noise model", tone, self.verdict());
@@ -700,10 +698,24 @@ impl Answer for TuneAnswer {
         let truths: Vec<&str> = self.truths.iter().map(String::as_str).collect();
         document.facts(&[("truths", short_names(&truths).join(", "))]);
         document.section("Filters");
-        document.lead(self.table());
+        let nees = format!("NEES ({NEES_DOF})");
+        let columns = [
+            ("filter", "filter"),
+            ("verdict", "verdict"),
+            (nees.as_str(), "nees"),
+            ("RMSE/sigma", "largest_ratio"),
+            ("in", "place"),
+            ("RMSE {after_s} s (m)", "outage_end/*/horizontal_rmse_m"),
+        ];
+        document.lead(Table::of(self, "/filters/*", &columns));
         document.text("RMSE/sigma: largest error over what the filter states. RMSE: horizontal, at the end of an outage.");
         document.section("Factors");
-        document.table(&self.factor_table());
+        let columns = [
+            ("sensor", "sensor"),
+            ("factor on the variance", "on_variance"),
+            ("on the standard deviation", "on_sigma"),
+        ];
+        document.table(&Table::of(self, "/factors/*", &columns));
         document.checked("covariance analysis against 2000 Monte-Carlo runs: docs/validation.md.");
         document
     }
@@ -727,19 +739,6 @@ impl Answer for TuneAnswer {
 }
 
 impl TuneAnswer {
-    fn table(&self) -> Table {
-        let nees = format!("NEES ({NEES_DOF})");
-        let columns = [
-            ("filter", "filter"),
-            ("verdict", "verdict"),
-            (nees.as_str(), "nees"),
-            ("RMSE/sigma", "largest_ratio"),
-            ("in", "place"),
-            ("RMSE {after_s} s (m)", "outage_end/*/horizontal_rmse_m"),
-        ];
-        Table::of(self, "/filters/*", &columns)
-    }
-
     /// State, time and truth of the largest error.
     fn place(&self, found: &FilterConsistency) -> String {
         let mut place = REPORTED_NAMES[found.largest.state].to_owned();
@@ -755,15 +754,6 @@ impl TuneAnswer {
         } else {
             place
         }
-    }
-
-    fn factor_table(&self) -> Table {
-        let columns = [
-            ("sensor", "sensor"),
-            ("factor on the variance", "on_variance"),
-            ("on the standard deviation", "on_sigma"),
-        ];
-        Table::of(self, "/factors/*", &columns)
     }
 }
 

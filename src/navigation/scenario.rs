@@ -15,7 +15,7 @@ use crate::sensors::outage::{
     FixedData, Fixes, Outage, OutageError, OutagePlan, PeriodicOutages, PlacedOutages,
     RandomOutages,
 };
-use crate::simulation::lincov::{Alike, STRAPDOWN, Track, reduced_belief};
+use crate::simulation::lincov::{Alike, Track, reduced_belief};
 use crate::simulation::{Experiment, ExperimentError, samples_per};
 use crate::trajectory::Trajectory;
 use crate::units::{Probability, SettingError};
@@ -416,24 +416,6 @@ pub enum Unexpected {
         /// Its largest error over the sigma that the filter states.
         over_sigma: f64,
     },
-}
-
-impl Unexpected {
-    /// Its names among the sources of a [`Budget`](crate::metrics::Budget): their shares together are its own.
-    pub fn sources(&self) -> Vec<String> {
-        match self {
-            Self::TurnOnBias { sensor, .. } => vec![format!("{}.turn_on_bias", sensor.name())],
-            Self::Scale { sensor, .. } => vec![format!("{}.scale", sensor.name())],
-            Self::Defect(defect) => defect
-                .sensors
-                .iter()
-                .map(|s| format!("{}.{}", s.name(), defect.source))
-                .collect(),
-            Self::CorrelatedPositions { .. } => vec!["gnss.correlated".to_owned()],
-            Self::Aiding { source, .. } => vec![(*source).to_owned()],
-            Self::Integration { .. } => vec![STRAPDOWN.to_owned()],
-        }
-    }
 }
 
 #[cfg(test)]

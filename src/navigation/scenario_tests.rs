@@ -111,11 +111,20 @@ fn what_the_filter_does_not_expect_is_found_of_each_sensor() {
         let [found] = &found(setting)[..] else {
             panic!("{setting}")
         };
-        assert_eq!(found.sources(), sources);
+        let Unexpected::Defect(defect) = found else {
+            panic!("{setting}: {found:?}")
+        };
+        let named = defect.sensors.iter();
+        let named: Vec<String> = named
+            .map(|s| format!("{}.{}", s.name(), defect.source))
+            .collect();
+        assert_eq!(named, sources);
     }
     // white noise of 2 m is known to 0.2 m from the hundred fixes of the default correlation time
     let coloured = |m: f64| found(&format!("gnss.correlated_pos_sigma_m = [{m}, 0.0, 0.0]"));
-    assert!(coloured(0.09).is_empty() && coloured(0.11)[0].sources() == ["gnss.correlated"]);
+    let is_correlated =
+        |found: &Unexpected| matches!(found, Unexpected::CorrelatedPositions { .. });
+    assert!(coloured(0.09).is_empty() && is_correlated(&coloured(0.11)[0]));
 }
 
 /// Ten seconds at rest.

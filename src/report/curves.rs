@@ -328,9 +328,9 @@ pub(crate) fn band(tau_s: &[f64], low: &[f64], high: &[f64]) -> Mark {
 
 /// Values of one kind, one a row: value and interval; NaN: none.
 pub(crate) struct Dots<'a> {
-    pub(crate) name: &'a str,
-    pub(crate) colour: Colour,
-    pub(crate) points: Vec<[f64; 3]>,
+    pub name: &'a str,
+    pub colour: Colour,
+    pub points: Vec<[f64; 3]>,
 }
 
 /// A chart with a row for each name, from top to bottom; `level`: a value to compare with, and its name.

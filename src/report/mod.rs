@@ -14,7 +14,6 @@ pub(crate) use tables::{gnss_csv, imu_csv, initial_toml};
 
 pub(crate) use verdict::{reduction_doubt, reduction_line, tone, unexpected_line};
 
-pub(crate) mod comparison_table;
 #[cfg(test)]
 #[path = "sample_tests.rs"]
 pub(crate) mod sample;
@@ -26,4 +25,15 @@ pub(crate) const WIDTH: usize = 120;
 pub(crate) fn json(value: &impl serde::Serialize) -> String {
     serde_json::to_string_pretty(value).expect("plain structs with text keys are always JSON")
         + "\n"
+}
+
+/// Each name once, where it stood first.
+pub(crate) fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut unique = Vec::new();
+    for name in names {
+        if !unique.contains(&name) {
+            unique.push(name);
+        }
+    }
+    unique
 }

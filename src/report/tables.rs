@@ -1,18 +1,18 @@
 //! `epochs.csv`, `fan.csv` and `runs.csv` of a run directory.
 
+use super::csv::{csv, flat};
 use nav_sim_document::shortest;
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
 use nav_sim_navigation::gnss::GnssFix;
-use nav_sim_navigation::metrics::{EpochMetrics, FAN_LEVELS, FanEpoch, PerState};
+use nav_sim_navigation::metrics::{EpochMetrics, Estimate, FAN_LEVELS, FanEpoch, PerState};
 use nav_sim_navigation::simulation::{
     BIAS_NAMES, OutageRecord, REPORTED, REPORTED_NAMES, RunResult,
 };
 use nav_sim_signal::imu::{ImuIncrement, Sensor};
 use nav_sim_signal::units::DEG;
+use serde_json::json;
 use std::fmt::Write as _;
-
-const EPOCH_ENDS: [&str; 4] = ["mean_pos_err_m", "mean_att_err_deg", "nees", "coverage"];
 
 fn named(prefix: &str) -> impl Iterator<Item = String> {
     REPORTED_NAMES
@@ -20,62 +20,45 @@ fn named(prefix: &str) -> impl Iterator<Item = String> {
         .map(move |name| format!("{prefix}{name}"))
 }
 
-/// Columns of `epochs.csv`.
-fn epoch_columns() -> Vec<String> {
-    let states = ["asee_", "rmse_", "bias_"].into_iter().flat_map(named);
-    let ends = EPOCH_ENDS.map(str::to_owned);
-    let biases = BIAS_NAMES.iter().map(|name| format!("asee_{name}"));
-    ["t_s", "gnss"]
-        .map(str::to_owned)
-        .into_iter()
-        .chain(states)
-        .chain(ends)
-        .chain(biases)
-        .collect()
-}
-
 /// `epochs.csv`: one row a reporting epoch (1 Hz), means over runs.
 pub(crate) fn epochs_csv(epochs: &[EpochMetrics]) -> String {
-    let values =
-        |all: &PerState<nav_sim_navigation::metrics::Estimate>| all.0.map(|e| shortest(e.value));
+    let values = |all: &PerState<Estimate>| PerState(all.0.map(|e| e.value));
     let row = |e: &EpochMetrics| {
-        let mut row = vec![shortest(e.t_s), u8::from(e.gnss).to_string()];
-        row.extend([&e.asee, &e.rmse, &e.bias].into_iter().flat_map(values));
-        let ends = [
-            e.mean_pos_err_m.value,
-            e.mean_att_err_deg.value,
-            e.nees.value,
-            e.coverage,
-        ];
-        row.extend(ends.into_iter().chain(e.bias_asee).map(shortest));
-        row.join(",")
+        let mut row = flat(&json!({
+            "t_s": e.t_s,
+            "gnss": u8::from(e.gnss),
+            "asee": values(&e.asee),
+            "rmse": values(&e.rmse),
+            "bias": values(&e.bias),
+            "mean_pos_err_m": e.mean_pos_err_m.value,
+            "mean_att_err_deg": e.mean_att_err_deg.value,
+            "nees": e.nees.value,
+            "coverage": e.coverage,
+        }));
+        let biases = BIAS_NAMES.iter().zip(e.bias_asee);
+        row.extend(biases.map(|(name, asee)| (format!("asee_{name}"), asee.into())));
+        row
     };
-    lines(epoch_columns().join(","), epochs.iter().map(row))
+    csv(&epochs.iter().map(row).collect::<Vec<_>>())
 }
 
 /// `fan.csv`: quantiles of the horizontal error over time; with what covariance analysis expects of them where that stands
 /// beside runs.
 pub(crate) fn fan_csv(fan: &[FanEpoch]) -> String {
-    let has_lincov = fan.iter().any(|e| e.lincov_m.is_some());
-    let prefixes: &[&str] = if has_lincov { &["", "lincov_"] } else { &[""] };
-    let column = |prefix: &str, p: f64| format!("{prefix}p{:02.0}_m", 100.0 * p);
-    let quantiles = prefixes
-        .iter()
-        .flat_map(|prefix| FAN_LEVELS.map(|p| column(prefix, p)));
-    let header: Vec<String> = std::iter::once("t_s".to_owned()).chain(quantiles).collect();
     let row = |e: &FanEpoch| {
-        let quantiles = e
-            .quantiles_m
-            .into_iter()
-            .chain(e.lincov_m.into_iter().flatten());
-        // errors are kept in single precision: more digits would say what nobody knows
-        let quantiles = quantiles.map(|q| (q as f32).to_string());
-        std::iter::once(shortest(e.t_s))
-            .chain(quantiles)
-            .collect::<Vec<_>>()
-            .join(",")
+        let mut row = flat(&json!({ "t_s": e.t_s }));
+        for (prefix, quantiles) in [("", Some(e.quantiles_m)), ("lincov_", e.lincov_m)] {
+            let named = FAN_LEVELS.iter().zip(quantiles.into_iter().flatten());
+            // errors are kept in single precision: more digits would say what nobody knows
+            let cell = |(p, q): (&f64, f64)| {
+                let name = format!("{prefix}p{:02.0}_m", 100.0 * p);
+                (name, (q as f32).to_string().into())
+            };
+            row.extend(named.map(cell));
+        }
+        row
     };
-    lines(header.join(","), fan.iter().map(row))
+    csv(&fan.iter().map(row).collect::<Vec<_>>())
 }
 
 /// Columns of `runs.csv`.
@@ -149,15 +132,6 @@ fn outage_cells(outage: &OutageRecord) -> Vec<String> {
         outage.reconvergence_s,
     ];
     states.chain(&ends).copied().map(shortest).collect()
-}
-
-fn lines(header: String, rows: impl Iterator<Item = String>) -> String {
-    let mut text = header + "\n";
-    for row in rows {
-        text += &row;
-        text.push('\n');
-    }
-    text
 }
 
 // A simulated recording as the files that `fuse` reads.
@@ -255,7 +229,12 @@ mod tables_tests {
 
     #[test]
     fn the_columns_are_those_of_the_interface() {
-        let header = epoch_columns().join(", ");
+        let epochs = nav_sim_navigation::metrics::epochs(&crate::report::sample::result());
+        let header = epochs_csv(&epochs)
+            .lines()
+            .next()
+            .unwrap()
+            .replace(',', ", ");
         assert!(
             header.starts_with(
                 "t_s, gnss, asee_pos_n_m, asee_pos_e_m, asee_pos_d_m, asee_vel_n_m_s, "

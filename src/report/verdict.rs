@@ -3,11 +3,13 @@
 use nav_sim_document::{Tone, percent, readable, short_names, window};
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::metrics::{
-    ALL_STATES, Met, ReductionQuality, StateName, Summary, Verdict, VerdictKind,
+    ALL_STATES, Met, ReductionQuality, Summary, Verdict, VerdictKind,
 };
 use nav_sim_navigation::scenario::Unexpected;
 use nav_sim_navigation::sensors::defects::Defect;
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
+use serde::Deserialize;
+use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// Most characters of a line, of which "verdict: " takes some.
@@ -139,7 +141,7 @@ fn with_error(value: f64, error: f64) -> String {
 }
 
 /// A state, or all of them, in words.
-fn state_in_words(name: StateName) -> &'static str {
+fn state_in_words(name: &str) -> &str {
     if name == ALL_STATES {
         "all states together"
     } else {
@@ -147,47 +149,31 @@ fn state_in_words(name: StateName) -> &'static str {
     }
 }
 
-/// For a line among several: "NEES 1189, 34.6 × in yaw_deg"; of runs too few to decide, how many would:
-/// "NEES 8.7, 0.91 × in yaw_deg, 27 runs would decide".
-fn verdict_in_short(verdict: &Verdict) -> String {
-    let decide = verdict
-        .runs_to_decide
-        .map_or_else(String::new, |runs| format!(", {runs} runs would decide"));
-    let state = state_in_words(verdict.worst_state);
-    format!(
-        "NEES {}, {} × in {state}{decide}",
-        readable(verdict.nees),
-        readable(verdict.ratio)
-    )
-}
-
-/// The gravest of several, with names.
-pub(crate) fn gravest<'a>(verdicts: impl Iterator<Item = (&'a str, &'a Verdict)>) -> VerdictKind {
-    let kinds = verdicts.map(|(_, verdict)| verdict.kind);
-    kinds.max().unwrap_or(VerdictKind::Consistent)
-}
-
-/// A line a kind, the gravest first: `1 of 2 filters overconfident, most: b (NEES 24.1, 2.10 × in yaw_deg)`.
-pub(crate) fn verdict_counts<'a>(
-    verdicts: impl Iterator<Item = (&'a str, &'a Verdict)>,
-) -> Vec<String> {
-    let (runs, verdicts): (Vec<&str>, Vec<&Verdict>) = verdicts.unzip();
+/// The gravest of several verdicts with names, and a line a kind, the gravest first:
+/// `1 of 2 filters overconfident, most: b (NEES 24.1, 2.10 × in yaw_deg)`; of runs too few to decide, how many would.
+pub(crate) fn verdict_counts(verdicts: &[(&str, &Value)]) -> (VerdictKind, Vec<String>) {
+    let runs: Vec<&str> = verdicts.iter().map(|(run, _)| *run).collect();
     let names = short_names(&runs);
-    let mut kinds: BTreeMap<VerdictKind, Vec<(&String, &Verdict)>> = BTreeMap::new();
-    for (name, verdict) in names.iter().zip(&verdicts) {
-        kinds.entry(verdict.kind).or_default().push((name, verdict));
+    let mut kinds: BTreeMap<VerdictKind, Vec<(&String, &Value)>> = BTreeMap::new();
+    for (name, (_, verdict)) in names.iter().zip(verdicts) {
+        let kind = VerdictKind::deserialize(&verdict["kind"]).unwrap_or_default();
+        kinds.entry(kind).or_default().push((name, verdict));
     }
-    let line = |(kind, of_kind): (&VerdictKind, &Vec<(&String, &Verdict)>)| {
-        let worst = of_kind
-            .iter()
-            .max_by(|a, b| a.1.nees.total_cmp(&b.1.nees))?;
-        let (count, all, short) = (of_kind.len(), verdicts.len(), verdict_in_short(worst.1));
+    let number = |verdict: &Value, key: &str| verdict[key].as_f64().unwrap_or(f64::NAN);
+    let line = |(kind, of_kind): (&VerdictKind, &Vec<(&String, &Value)>)| {
+        let nees = |(_, verdict): &(&String, &Value)| number(verdict, "nees");
+        let (name, worst) = of_kind.iter().max_by(|a, b| nees(a).total_cmp(&nees(b)))?;
+        let (count, all) = (of_kind.len(), verdicts.len());
+        let [nees, ratio] = ["nees", "ratio"].map(|key| readable(number(worst, key)));
+        let state = state_in_words(worst["worst_state"].as_str().unwrap_or_default());
+        let decide = worst["runs_to_decide"].as_u64();
+        let decide = decide.map_or_else(String::new, |runs| format!(", {runs} runs would decide"));
         Some(format!(
-            "{count} of {all} filters {kind}, most: {} ({short})",
-            worst.0
+            "{count} of {all} filters {kind}, most: {name} (NEES {nees}, {ratio} × in {state}{decide})"
         ))
     };
-    kinds.iter().rev().filter_map(line).collect()
+    let gravest = kinds.keys().last().copied().unwrap_or_default();
+    (gravest, kinds.iter().rev().filter_map(line).collect())
 }
 
 // Limits that errors must keep, in words.

@@ -145,6 +145,17 @@ fn a_time_limit_and_sigterm_end_with_75_and_two_at_once_do_no_harm() {
         .status();
     assert!(kill.unwrap().success());
     assert_eq!(child.wait().unwrap().code(), Some(75));
+    // a signal before the first of its units is no time limit that is too short
+    let mut child = spawn(dir, "batch study.toml -o early --set runs=40000 -j 1");
+    while !dir.join("early/locks").exists() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let kill = std::process::Command::new("kill")
+        .args(["-TERM", &child.id().to_string()])
+        .status();
+    assert!(kill.unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(75));
+    assert!(cells(&dir.join("early")).is_empty());
     let mut twins = [0, 1].map(|_| spawn(dir, "batch study.toml -o out -j 1"));
     assert!(twins.iter_mut().all(|t| t.wait().unwrap().success()));
     ended(dir, "batch study.toml -o out", 0);

@@ -531,7 +531,7 @@ fn useless_fusions_are_refused_or_said() {
         initial,
         same,
         "--lever-arm 800,0,-1200",
-        &["--lever-arm 800,0,-1200: more than 100 m"],
+        &["--lever-arm='800,0,-1200': more than 100 m"],
     );
     refused(
         initial,

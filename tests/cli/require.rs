@@ -182,63 +182,6 @@ fn the_turn_on_biases_of_a_needed_imu_are_said_and_written() {
 
 /// A limit that is missed where every fix comes is told so, with the error just before a fix. With a fix every two seconds
 /// that is what `run` finds at the end of an outage where every other fix of one a second is withheld.
-#[test]
-fn a_limit_that_no_fix_keeps_is_told_with_the_error_without_an_outage() {
-    let dir = tempfile::tempdir().unwrap();
-    let file = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
-    file("rare.toml", "[gnss]\nrate_hz = 0.5\n");
-    file(
-        "every_other.toml",
-        "[outage_periodic]\nfirst_s = 1\nevery_s = 2\nduration_s = 1\n",
-    );
-    let model = format!("{ROOT}/calib_data/tactical.toml");
-    let asked = [
-        &model,
-        "--scenario",
-        "rare.toml",
-        "--outage",
-        "62:92",
-        "--require",
-        "p95_m<=0.5",
-    ];
-    let said = stdout(&require(dir.path(), &asked).code(3));
-    assert!(
-        said.contains("from the same starts: none; even without an outage p95_m is "),
-        "{said}"
-    );
-    let judged = stdout(&require(
-        dir.path(),
-        &[&asked[..], &["--format", "json"]].concat(),
-    ));
-    let judged: Value = serde_json::from_str(&judged).unwrap();
-    let drive = format!("{ROOT}/trajectories/figure_eight.toml");
-    let run = [
-        "run", &drive, &model, "--filter", "full", "--method", "lincov",
-    ];
-    let mut command = Command::cargo_bin("nav-sim").unwrap();
-    let command = command
-        .current_dir(dir.path())
-        .args(run)
-        .args(["--scenario", "every_other.toml"]);
-    command.args(["-o", "run"]).assert().success();
-    let summary = std::fs::read_to_string(dir.path().join("run/summary.json")).unwrap();
-    let summary: Value = serde_json::from_str(&summary).unwrap();
-    let outages = summary["outages"].as_array().unwrap();
-    let before_fix = outages
-        .iter()
-        .find(|outage| outage["end_s"] == 62.0)
-        .unwrap();
-    let expected = before_fix["horizontal_error_end_m"]["p95"]
-        .as_f64()
-        .unwrap();
-    let found = judged["outage"]["with_all_fixes"]["value"]
-        .as_f64()
-        .unwrap();
-    // steps of a second against those of a fifth: the reserve of the search
-    assert!((found / expected - 1.0).abs() < 2e-3, "{found} {expected}");
-    assert_eq!(judged["outage"]["longest_s"], 0.0);
-}
-
 /// The longest outage is looked for as far as the drive goes, not up to half of what is left of it.
 #[test]
 fn the_longest_outage_is_sought_to_the_end_of_a_short_drive() {

@@ -478,7 +478,7 @@ outage = [{ start_s = 30, end_s = 45 }]
     assert_eq!(kept["configuration"]["imu"]["scale_ppm_gyro"], 2000.0);
 }
 
-/// A model of several processes is reduced to 15 states: said, kept with its curves, and compared with the
+/// A model of several processes is reduced to 15 states: said, and compared with the
 /// full filter; a model that fits 15 states is left alone.
 #[test]
 fn the_reduction_of_the_model_is_said_and_kept() {
@@ -503,20 +503,14 @@ fn the_reduction_of_the_model_is_said_and_kept() {
         ran.stderr
     );
     let reduction = &json(&place.path().join("out/summary.json"))["reduction"];
-    assert_eq!(reduction["axes"].as_array().unwrap().len(), 6);
-    let ratio = reduction["quality"]["outage_end"][0]["pos_e_m"]
-        .as_f64()
-        .unwrap();
+    let ratio = reduction["outage_end"][0]["pos_e_m"].as_f64().unwrap();
     assert!((0.5..2.0).contains(&ratio), "{ratio}");
     let ran = done(
         place.path(),
         "run drive.toml imu.toml --runs 2 --outage 20:40 --seed 1 -o same",
     );
     assert!(!ran.stderr.contains("reduced"), "{}", ran.stderr);
-    assert_eq!(
-        json(&place.path().join("same/summary.json"))["reduction"]["axes"][0]["misfit"],
-        0.0
-    );
+    assert!(json(&place.path().join("same/summary.json"))["reduction"].is_null());
     done(
         place.path(),
         "run drive.toml two.toml --filter full --runs 2 --outage 20:40 --seed 1 -o full",
@@ -544,24 +538,6 @@ fn doubtful_requests_are_said() {
     assert!(
         ran.stderr
             .contains("warning: outage 50:70 is cut: the trajectory ends at 60 s"),
-        "{}",
-        ran.stderr
-    );
-    fs::write(
-        place.path().join("wild.toml"),
-        MODEL.replace(
-            "phi = 0.9999, sigma2 = 1e-9",
-            "phi = 0.9999999, sigma2 = 1e-5",
-        ),
-    )
-    .unwrap();
-    let ran = done(
-        place.path(),
-        "run drive.toml wild.toml --outage none --runs 1 --seed 1 -o wild",
-    );
-    assert!(
-        ran.stderr
-            .contains("the filter starts with a bias of 7.071 m/s²"),
         "{}",
         ran.stderr
     );

@@ -187,7 +187,6 @@ pub(crate) fn settings() -> Settings {
         lever_arm_b: DVec3::ZERO,
         gravity: GravityModel::default(),
         outages: Vec::new(),
-        nis_gate: None,
         rows_hz: 10.0,
         smooth: false,
     }

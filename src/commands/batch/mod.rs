@@ -3,24 +3,33 @@
 //! A cell is one request of `run`, and its directory a run directory. It is done when its manifest has its key: options and
 //! contents of inputs. Cells that differ in the filter alone share a pass of noise, and many runs are cut into blocks.
 
-mod cells;
 mod results;
-mod shard;
-mod units;
 
-pub(crate) use cells::Study;
 pub use results::StudyAnswer;
-pub(crate) use units::part_of;
 
-use crate::app::{Answer, Context, Failure, Manifest, Result};
-use crate::commands::run::columns;
-use cells::Cell;
-use results::{first_of, merge, withdraw};
-use std::collections::HashMap;
-use std::fs;
+use crate::app::inputs::merge;
+use crate::app::{
+    Answer, Asked, Command, Context, Failure, Front, Input, Manifest, Refuse, Result, argument,
+    is_path, is_repeated,
+};
+use crate::commands::run::{PreparedRun, Run, block_of, columns};
+use crate::io::{atomic, input, source};
+use crate::report::in_order;
+use clap::Args;
+use nav_sim_document::{Importance, Note};
+use nav_sim_navigation::scenario::{Method, Scenario};
+use nav_sim_navigation::simulation::RunResult;
+use rayon::prelude::*;
+use results::{first_of, withdraw};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_json::Map;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
-use units::{Place, Unit, assemble, units, work};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use toml::{Table, Value};
 
 /// Run a study: a run whose values may be lists
 ///
@@ -43,7 +52,7 @@ pub struct BatchRequest {
     pub out: Option<PathBuf>,
     /// Share of the work, from 0/N to N−1/N (default: from HQ_TASK_ID, SLURM_ARRAY_TASK_ID, PBS_ARRAY_INDEX or
     /// JOB_COMPLETION_INDEX, else what no other process has)
-    #[arg(long, value_name = "K/N", value_parser = shard::parse)]
+    #[arg(long, value_name = "K/N", value_parser = parse_shard)]
     pub shard: Option<(u64, u64)>,
     /// Number of shards, if only the index comes from the scheduler
     #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = clap::value_parser!(u64).range(1..))]
@@ -74,6 +83,13 @@ pub enum Outcome {
     Partial(Vec<String>),
     /// The estimate of a dry run.
     Estimate(String),
+    /// Stopped before the own share was done.
+    Stopped {
+        /// True if the same command goes on: something was finished, or a signal came.
+        is_resumable: bool,
+        /// Units left.
+        left: usize,
+    },
 }
 
 impl BatchRequest {
@@ -95,42 +111,43 @@ impl BatchRequest {
         context: &Context<'_>,
     ) -> Result<Outcome> {
         let study = Study::read(&self.study, &self.set)?;
-        study
-            .run_in(&self.study, self, variable, context)
-            .map_err(|e| match e.code() {
-                2 if e.file().is_none() => e.within(&self.study.display().to_string()),
-                _ => e,
-            })
+        let outcome = self.run_study(&study, variable, context);
+        outcome.map_err(|e| match e.code() {
+            2 if e.file().is_none() => e.within(&self.study.display().to_string()),
+            _ => e,
+        })
     }
-}
 
-impl Study {
-    fn run_in(
+    fn run_study(
         &self,
-        file: &Path,
-        o: &BatchRequest,
+        study: &Study,
         variable: &dyn Fn(&str) -> Option<String>,
         context: &Context<'_>,
     ) -> Result<Outcome> {
-        let directory = o.directory();
+        let directory = self.directory();
         let place = Place(&directory);
-        let cells = self.cells(file.parent().unwrap_or(Path::new("")))?;
-        if !self.run.contains_key("seed") {
+        let cells = study.cells(self.study.parent().unwrap_or(Path::new("")))?;
+        if !study.run.contains_key("seed") {
             context.remark("no seed in the study: 1");
         }
-        crate::commands::compare::states(&o.states)?;
-        let (share, from) = shard::find(o.shard, o.shards, variable)?;
-        if o.merge {
-            return self.merged(&cells, &place, o, context);
+        let states = crate::commands::compare::states(&self.states)?;
+        let (share, from) = find_shard(self.shard, self.shards, variable)?;
+        let merged = || {
+            let answer = results::merge(study, &cells, &place, &states, context)?;
+            answer.write(&place)?;
+            Ok(Outcome::Merged(Box::new(answer)))
+        };
+        if self.merge {
+            return merged();
         }
-        let changed = adopt(&place, &cells, o.dry_run, context);
-        if let (Some((name, what)), false) = (changed.first(), o.force || o.dry_run) {
+        let changed = adopt(&place, &cells, self.dry_run, context);
+        if let (Some((name, what)), false) = (changed.first(), self.force || self.dry_run) {
             let message = format!("cell {name} is of another study: {what}");
             return Err(Failure::input(message)
                 .hint("choose another directory with --out, or compute it again with --force"));
         }
         let units = units(&cells, context)?;
-        if o.dry_run {
+        if self.dry_run {
             let changed = changed.len();
             return estimate(&cells, &units, &place, changed, context).map(Outcome::Estimate);
         }
@@ -140,18 +157,15 @@ impl Study {
         let own = match share {
             Some(share) => {
                 context.remark(format!("shard {}/{} ({from})", share.0, share.1));
-                units::shard(&units, share)
+                shard(&units, share)
             }
             None => units.iter().collect(),
         };
         let worked = work(&place, &own, context)?;
         for cell in &cells {
             let has_cell = |unit: &&Unit<'_>| unit.cells.iter().any(|own| own.name == cell.name);
-            let firsts: Vec<u64> = units
-                .iter()
-                .filter(has_cell)
-                .map(|unit| unit.first)
-                .collect();
+            let of_cell = units.iter().filter(has_cell);
+            let firsts: Vec<u64> = of_cell.map(|unit| unit.first).collect();
             if firsts.len() > 1 {
                 assemble(&place, cell, &firsts, context)?;
             }
@@ -168,24 +182,14 @@ impl Study {
         }
         let left = own.iter().filter(|unit| !place.has_unit(unit)).count();
         if left > 0 && !context.go_on() {
-            return Err(match worked.finished.load(Ordering::Relaxed) {
-                // the same command would end the same way: no code for "to be resumed"
-                0 => Failure::could_not(format!(
-                    "stopped before a single unit was done; {left} units left"
-                ))
-                .hint("a longer --time-limit"),
-                _ => Failure::stopped(format!("stopped; {left} units left"))
-                    .hint("the same command goes on where this one stopped"),
-            });
+            let is_resumable = worked.finished.into_inner() > 0;
+            return Ok(Outcome::Stopped { is_resumable, left });
         }
-        let missing: Vec<String> = cells
-            .iter()
-            .filter(|cell| !place.is_done(cell))
-            .map(|cell| cell.name.clone())
-            .collect();
+        let missing = cells.iter().filter(|cell| !place.is_done(cell));
+        let missing: Vec<String> = missing.map(|cell| cell.name.clone()).collect();
         if missing.is_empty() {
             drop(fs::remove_dir_all(directory.join("locks")));
-            return self.merged(&cells, &place, o, context);
+            return merged();
         }
         context.remark(format!(
             "{} of {} cells are missing: {}",
@@ -194,24 +198,6 @@ impl Study {
             first_of(&missing)
         ));
         Ok(Outcome::Partial(missing))
-    }
-
-    fn merged(
-        &self,
-        cells: &[Cell],
-        place: &Place<'_>,
-        o: &BatchRequest,
-        context: &Context<'_>,
-    ) -> Result<Outcome> {
-        let answer = merge(
-            self,
-            cells,
-            place,
-            &crate::commands::compare::states(&o.states)?,
-            context,
-        )?;
-        answer.write(place)?;
-        Ok(Outcome::Merged(Box::new(answer)))
     }
 }
 
@@ -222,39 +208,25 @@ fn adopt(
     is_dry: bool,
     context: &Context<'_>,
 ) -> Vec<(String, String)> {
-    let mut there: HashMap<String, (String, Manifest)> = HashMap::new();
-    for entry in fs::read_dir(place.0.join("cells"))
-        .into_iter()
-        .flatten()
-        .flatten()
-    {
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if name.ends_with(".damaged") {
-            continue;
-        }
-        if let Some(manifest) = place.manifest(&name) {
-            there.insert(manifest.key.clone(), (name, manifest));
-        }
-    }
-    let is_own = |name: &str| {
-        cells
-            .iter()
-            .any(|cell| cell.name == name && place.is_done(cell))
-    };
+    let entries = fs::read_dir(place.0.join("cells")).into_iter();
+    let names = entries.flatten().flatten();
+    let names = names.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let keyed = names
+        .filter(|name| !name.ends_with(".damaged"))
+        .filter_map(|name| Some((place.manifest(&name)?.key, name)));
+    let there: HashMap<String, String> = keyed.collect();
+    let named = |name: &str| cells.iter().find(|cell| cell.name == name);
     for cell in cells.iter().filter(|_| !is_dry) {
-        if let Some((name, _)) = there.get(&cell.manifest.key)
-            && *name != cell.name
-            && !is_own(name)
+        if let Some(name) = there.get(&cell.manifest.key)
+            && !named(name).is_some_and(|own| place.is_done(own))
             && !place.cell(&cell.name).exists()
         {
             drop(fs::rename(place.cell(name), place.cell(&cell.name)));
         }
     }
-    let mut others: Vec<String> = there
-        .values()
-        .map(|(name, _)| name.clone())
-        .filter(|name| place.cell(name).exists() && !cells.iter().any(|cell| cell.name == *name))
-        .collect();
+    let others = there.values();
+    let others = others.filter(|name| place.cell(name).exists() && named(name).is_none());
+    let mut others: Vec<&String> = others.collect();
     others.sort();
     if !others.is_empty() {
         context.remark(format!(
@@ -334,11 +306,887 @@ fn estimate(
 }
 
 impl Outcome {
-    /// What is missed: stated bounds, or cells of a merge that is to be resumed.
-    pub(crate) fn unmet(&self) -> Option<Failure> {
+    /// What is missed: stated bounds, or cells that are to be computed.
+    pub fn unmet(&self) -> Option<Failure> {
         match self {
             Self::Merged(answer) => answer.incomplete().or_else(|| answer.unmet()),
             Self::Partial(_) | Self::Estimate(_) => None,
+            Self::Stopped {
+                is_resumable: true,
+                left,
+            } => Some(
+                Failure::stopped(format!("stopped; {left} units left"))
+                    .hint("the same command goes on where this one stopped"),
+            ),
+            // the same command would end the same way: no code for "to be resumed"
+            Self::Stopped { left, .. } => {
+                let message = format!("stopped before a single unit was done; {left} units left");
+                Some(Failure::could_not(message).hint("a longer --time-limit"))
+            }
         }
+    }
+}
+
+// From a study to its cells: each a request of `run` without lists.
+
+/// More cells than this are a mistake.
+const MOST: usize = 100_000;
+
+/// A run whose values may be lists: nav-sim batch
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+#[schemars(title = "Study")]
+pub(crate) struct Study {
+    /// Options of `run` as keys, and sections of a scenario; a list is an axis where a single run would not take it
+    #[schemars(with = "Map<String, serde_json::Value>")]
+    run: Table,
+    /// Axes by name: a list of labels, each in the place of `{NAME}`, or a table of a label's keys of `run`
+    #[schemars(with = "Map<String, serde_json::Value>")]
+    vary: Table,
+    /// Labels of the reference, by axis (default: the first model)
+    #[schemars(with = "Map<String, serde_json::Value>")]
+    reference: Table,
+}
+
+/// Axis and label, `[vary]` first, then lists, as written.
+type Labels = Vec<(String, String)>;
+
+/// One request.
+pub(crate) struct Cell {
+    /// Name of its run directory.
+    name: String,
+    /// Its place on each axis.
+    labels: Labels,
+    /// The command.
+    asked: Asked<Run>,
+    /// Seed of all random numbers.
+    seed: u64,
+    /// The manifest before the run: what its key is made of.
+    manifest: Manifest,
+    /// Monte-Carlo runs; 1 of a covariance analysis.
+    runs: u64,
+    /// All that the noise depends on: cells that share it differ in the filter alone.
+    noise: String,
+}
+
+impl Study {
+    /// Reads a study; `set` are keys of `[run]` over its own, as `KEY=VALUE`.
+    pub(crate) fn read(path: &Path, set: &[String]) -> Result<Self> {
+        let text = source::text(path).map_err(|e| crate::io::Failure::io(path, e))?;
+        let is_json = path.extension().is_some_and(|ending| ending == "json");
+        let mut study: Self = match is_json {
+            true => serde_json::from_str(&text).refuse_within(path.display())?,
+            false => toml::from_str(&text).refuse_within(path.display())?,
+        };
+        for assignment in set {
+            let (key, value) = assignment.split_once('=').unwrap_or((assignment, ""));
+            // a word without quotes is a text
+            let parsed = format!("{key} = {value}").parse::<Table>();
+            let quoted = || format!("{key} = {}", Value::from(value)).parse::<Table>();
+            let over = parsed.or_else(|_| quoted()).refuse_within("--set")?;
+            merge(&mut study.run, over);
+        }
+        Ok(study)
+    }
+
+    /// All cells, `[vary]` outermost; paths are relative to `beside`.
+    pub(crate) fn cells(&self, beside: &Path) -> Result<Vec<Cell>> {
+        let mut requests = vec![(Labels::new(), self.run.clone())];
+        for (axis, values) in &self.vary {
+            let values = named(axis, values)?;
+            let product = |(labels, run): &(Labels, Table)| -> Vec<(Labels, Table)> {
+                let with = |(label, keys): &(String, Table)| {
+                    let mut run = run.clone();
+                    merge(&mut run, keys.clone());
+                    (plus(labels, axis, label), run)
+                };
+                values.iter().map(with).collect()
+            };
+            requests = requests.iter().flat_map(product).collect();
+        }
+        let mut door = Door::new(beside);
+        let mut all = Vec::new();
+        for (labels, mut run) in requests {
+            for value in run.iter_mut().map(|(_, value)| value) {
+                fill(value, &labels)?;
+            }
+            door.expand(run, labels, &mut all)?;
+        }
+        self.check_reference(&all)?;
+        let mut names = HashSet::new();
+        let cells = all.into_iter().map(|(labels, run)| {
+            let name = name_of(&labels);
+            if !names.insert(name.to_lowercase()) {
+                return Err(Failure::input(format!("two cells have the name {name}"))
+                    .hint("name the values under [vary], a table of keys each"));
+            }
+            door.cell(name.clone(), labels, run)
+                .map_err(|e| e.within(&format!("cell {name}")))
+        });
+        cells.collect()
+    }
+
+    /// The labels that references have: those of the study, else the first model.
+    fn fixed(&self, cells: &[Cell]) -> Labels {
+        let given = self.reference.iter();
+        let given: Labels = given
+            .map(|(axis, label)| (axis.clone(), text(label)))
+            .collect();
+        if !given.is_empty() {
+            return given;
+        }
+        let mut labels = cells.iter().flat_map(|cell| &cell.labels);
+        let model = labels.find(|(axis, _)| axis == "model");
+        model.cloned().into_iter().collect()
+    }
+
+    fn check_reference(&self, all: &[(Labels, Table)]) -> Result<()> {
+        for (axis, label) in &self.reference {
+            let label = text(label);
+            let labels = all.iter().flat_map(|(labels, _)| labels);
+            let on_axis = labels.filter(|(other, _)| other == axis);
+            let known = in_order(on_axis.map(|(_, label)| label.as_str()));
+            if !known.contains(&label.as_str()) {
+                let message = format!("\"reference.{axis}\" = \"{label}\" is no label of an axis");
+                return Err(Failure::input(message).hint(format!("labels: {}", known.join(", "))));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What a single run takes: the parser of its options, and the reader of its scenario.
+struct Door {
+    command: clap::Command,
+    beside: PathBuf,
+    taken: HashMap<String, bool>,
+    inputs: HashMap<PathBuf, Input>,
+}
+
+impl Door {
+    fn new(beside: &Path) -> Self {
+        Self {
+            command: Asked::<Run>::augment_args(clap::Command::new(Run::NAME)),
+            beside: beside.to_owned(),
+            taken: HashMap::new(),
+            inputs: HashMap::new(),
+        }
+    }
+
+    fn is_path(&self, key: &str) -> bool {
+        argument(&self.command, key).is_some_and(is_path)
+    }
+
+    /// Expands the first list that a single run would not take as it is.
+    fn expand(&mut self, run: Table, labels: Labels, all: &mut Vec<(Labels, Table)>) -> Result<()> {
+        if all.len() > MOST {
+            return Err(Failure::input(format!("more than {MOST} cells")));
+        }
+        let is_new = |path: &str| !labels.iter().any(|(axis, _)| axis == path);
+        let mut leaves = leaves(&run, "").into_iter();
+        let Some((path, list)) = leaves.find_map(|(path, value)| {
+            let list = value.as_array()?;
+            let is_axis = is_new(&path)
+                && !self.takes(&path, value)
+                && list.iter().any(|one| self.takes(&path, one));
+            is_axis.then(|| (path, list.clone()))
+        }) else {
+            all.push((labels, run));
+            return Ok(());
+        };
+        for value in list {
+            let label = self.label(&path, &value)?;
+            let mut run = run.clone();
+            merge(&mut run, nested(&path, value));
+            self.expand(run, plus(&labels, &path, &label), all)?;
+        }
+        Ok(())
+    }
+
+    /// Whether a single run takes this value of a key.
+    fn takes(&mut self, path: &str, value: &Value) -> bool {
+        let memory = format!("{path}={value}");
+        if let Some(known) = self.taken.get(&memory) {
+            return *known;
+        }
+        let takes = match argument(&self.command, path) {
+            _ if path == "seed" => value.as_integer().is_some_and(|seed| seed >= 0),
+            Some(arg) => {
+                let list = value.as_array();
+                // any text is a path: a list is none, and a list of lists is no list of paths
+                let is_nested = list.is_some_and(|list| list.iter().any(Value::is_array));
+                let is_one_path = is_path(arg) && !is_repeated(arg);
+                let mut request = Table::from_iter(
+                    [("trajectory", "t"), ("model", "m"), ("static", "s")]
+                        .map(|(k, v)| (k.to_owned(), v.into())),
+                );
+                if path != "rate_hz" {
+                    request.remove("static");
+                }
+                request.insert(path.to_owned(), value.clone());
+                !(is_nested || is_one_path && list.is_some())
+                    && named_request(&request).is_ok_and(|r| Asked::<Run>::named(&r).is_ok())
+            }
+            None => nested(path, value.clone()).try_into::<Scenario>().is_ok(),
+        };
+        self.taken.insert(memory, takes);
+        takes
+    }
+
+    /// Label of a list's value: the stem of a file, else its text.
+    fn label(&self, path: &str, value: &Value) -> Result<String> {
+        let stem = |text: String| match self.is_path(path) {
+            true => Path::new(&text)
+                .file_stem()
+                .map_or(text.clone(), |stem| stem.to_string_lossy().into_owned()),
+            false => text,
+        };
+        match value {
+            Value::Array(list) => Ok(list
+                .iter()
+                .map(|one| stem(text(one)))
+                .collect::<Vec<_>>()
+                .join("+")),
+            Value::Table(_) => Err(
+                Failure::input(format!("\"run.{path}\" is a list of tables"))
+                    .hint(format!("name them: [vary.{path}] LABEL = {{ {path} = … }}")),
+            ),
+            one => Ok(stem(text(one))),
+        }
+    }
+
+    /// The command of a request.
+    fn cell(&mut self, name: String, labels: Labels, mut run: Table) -> Result<Cell> {
+        for key in ["out", "plot"] {
+            if run.contains_key(key) {
+                return Err(Failure::input(format!(
+                    "\"run.{key}\": a study has its own directory"
+                ))
+                .hint("name it with -o"));
+            }
+        }
+        let seed = match run.remove("seed") {
+            None => crate::app::DEFAULT_SEED,
+            Some(seed) => seed
+                .as_integer()
+                .and_then(|seed| u64::try_from(seed).ok())
+                .ok_or_else(|| {
+                    Failure::input(format!("\"run.seed\" = {seed} is not a whole number ≥ 0"))
+                })?,
+        };
+        let keys: Vec<String> = run.keys().cloned().collect();
+        for key in keys.iter().filter(|key| self.is_path(key)) {
+            let resolve = |value: &mut Value| {
+                if let Value::String(path) = value {
+                    *path = self.beside.join(&*path).display().to_string();
+                }
+            };
+            match run.get_mut(key.as_str()) {
+                Some(Value::Array(list)) => list.iter_mut().for_each(resolve),
+                Some(value) => resolve(value),
+                None => {}
+            }
+        }
+        let asked = Asked::<Run>::named(&named_request(&run)?)?;
+        let scenario = asked.request.scenario()?;
+        let mut inputs = Vec::new();
+        for (role, path) in asked.request.inputs()? {
+            if !self.inputs.contains_key(&path) {
+                let read = input::input(role, &path)
+                    .map_err(|e| e.hint("paths are relative to the study's file"))?;
+                self.inputs.insert(path.clone(), read);
+            }
+            inputs.push(Input {
+                role: role.to_owned(),
+                ..self.inputs[&path].clone()
+            });
+        }
+        let mut options = asked.options.clone();
+        options.insert("seed".to_owned(), vec![seed.to_string()]);
+        let manifest = Manifest::new(Run::NAME, options.clone(), inputs.clone());
+        // What the filter believes: its states, and its model where something else makes the errors.
+        options.remove("states");
+        if let Some(set) = options.get_mut("set") {
+            set.retain(|setting| !setting.starts_with("filter.states="));
+        }
+        if asked.request.truth.is_some() || !asked.request.recordings.is_empty() {
+            inputs.retain(|input| input.role != "model");
+        }
+        let noise = Manifest::new(Run::NAME, options, inputs).key;
+        let is_sampled = scenario.run.method != Method::Lincov;
+        let runs = if is_sampled { scenario.run.runs } else { 1 };
+        Ok(Cell {
+            name,
+            labels,
+            asked,
+            seed,
+            manifest,
+            runs,
+            noise,
+        })
+    }
+}
+
+/// Labels and their keys of an axis of `[vary]`.
+fn named(axis: &str, values: &Value) -> Result<Vec<(String, Table)>> {
+    let refused = |what: &str| {
+        Failure::input(format!("\"vary.{axis}\" {what}"))
+            .hint("a list of labels, or a table: LABEL = { keys of run }")
+    };
+    let values: Vec<(String, Table)> = match values {
+        Value::Array(labels) if !labels.iter().any(|l| l.is_array() || l.is_table()) => labels
+            .iter()
+            .map(|label| (text(label), Table::new()))
+            .collect(),
+        Value::Table(labels) => {
+            let keys = |(label, keys): (&String, &Value)| {
+                let keys = keys
+                    .as_table()
+                    .ok_or_else(|| refused("has a label without keys"))?;
+                Ok((label.clone(), keys.clone()))
+            };
+            labels.iter().map(keys).collect::<Result<_>>()?
+        }
+        _ => return Err(refused("is neither a list of labels nor a table")),
+    };
+    if values.is_empty() {
+        Err(refused("is empty"))
+    } else {
+        Ok(values)
+    }
+}
+
+/// Puts labels in the place of `{NAME}`.
+fn fill(value: &mut Value, labels: &Labels) -> Result<()> {
+    match value {
+        Value::String(text) => {
+            for (axis, label) in labels {
+                *text = text.replace(&format!("{{{axis}}}"), label);
+            }
+            match text
+                .split_once('{')
+                .and_then(|(_, rest)| rest.split_once('}'))
+            {
+                Some((unknown, _)) => Err(Failure::input(format!(
+                    "\"{text}\": there is no axis {unknown}"
+                ))
+                .hint("name it under [vary]")),
+                None => Ok(()),
+            }
+        }
+        Value::Array(list) => list.iter_mut().try_for_each(|one| fill(one, labels)),
+        Value::Table(table) => table.iter_mut().try_for_each(|(_, one)| fill(one, labels)),
+        _ => Ok(()),
+    }
+}
+
+/// Values that are no tables, with their paths: `gnss.rate_hz`.
+fn leaves<'a>(table: &'a Table, prefix: &str) -> Vec<(String, &'a Value)> {
+    let of_key = |(key, value): (&String, &'a Value)| match value {
+        Value::Table(inner) => leaves(inner, &format!("{prefix}{key}.")),
+        value => vec![(format!("{prefix}{key}"), value)],
+    };
+    table.iter().flat_map(of_key).collect()
+}
+
+fn nested(path: &str, value: Value) -> Table {
+    match path.split_once('.') {
+        Some((key, rest)) => Table::from_iter([(key.to_owned(), nested(rest, value).into())]),
+        None => Table::from_iter([(path.to_owned(), value)]),
+    }
+}
+
+fn named_request(run: &Table) -> Result<Map<String, serde_json::Value>> {
+    serde_json::to_value(run)
+        .and_then(serde_json::from_value)
+        .refuse_within("[run]")
+}
+
+fn plus(labels: &Labels, axis: &str, label: &str) -> Labels {
+    let own = [(axis.to_owned(), label.to_owned())];
+    labels.iter().cloned().chain(own).collect()
+}
+
+/// A label as text.
+fn text(value: &Value) -> String {
+    value
+        .as_str()
+        .map_or_else(|| value.to_string(), str::to_owned)
+}
+
+/// `I_dr-awv_length_s=5`: labels as written, numbers with their axis.
+fn name_of(labels: &Labels) -> String {
+    let part = |(axis, label): &(String, String)| match label.parse::<f64>() {
+        Ok(_) => format!("{}={label}", axis.rsplit('.').next().unwrap_or(axis)),
+        Err(_) => label.clone(),
+    };
+    let name = labels.iter().map(part).collect::<Vec<_>>().join("_");
+    let kept = |c: char| {
+        if c.is_alphanumeric() || "._+=-".contains(c) {
+            c
+        } else {
+            '-'
+        }
+    };
+    let name: String = name.chars().map(kept).collect();
+    if name.trim_matches('.').is_empty() {
+        "run".to_owned()
+    } else {
+        name
+    }
+}
+
+// Units of work: a block of runs of the cells that share their noise. Each is written whole, by rename, so that processes
+// may be killed, repeated and run beside one another.
+
+/// A block of runs of cells that share a pass.
+struct Unit<'a> {
+    cells: Vec<&'a Cell>,
+    first: u64,
+    runs: u64,
+    /// Runs of a cell: of one block, or of several.
+    whole: bool,
+}
+
+impl Unit<'_> {
+    /// Its size, for shards and the estimate of time.
+    fn cost(&self) -> u64 {
+        self.runs * self.cells.len() as u64
+    }
+}
+
+/// The directory of a study.
+struct Place<'a>(pub &'a Path);
+
+impl Place<'_> {
+    fn cell(&self, name: &str) -> PathBuf {
+        self.0.join("cells").join(name)
+    }
+
+    /// The manifest of a cell that is there.
+    fn manifest(&self, name: &str) -> Option<Manifest> {
+        let text = fs::read_to_string(self.cell(name).join("manifest.json")).ok()?;
+        serde_json::from_str(&text).ok()
+    }
+
+    fn is_done(&self, cell: &Cell) -> bool {
+        self.manifest(&cell.name)
+            .is_some_and(|there| there.key == cell.manifest.key)
+    }
+
+    fn part(&self, cell: &Cell, first: u64) -> PathBuf {
+        self.0
+            .join("parts")
+            .join(&cell.manifest.key[..32])
+            .join(format!("{first}.part"))
+    }
+
+    fn has(&self, unit: &Unit<'_>, cell: &Cell) -> bool {
+        self.is_done(cell) || (!unit.whole && read_part(&self.part(cell, unit.first)).is_some())
+    }
+
+    /// Whether nothing of a unit is missing.
+    fn has_unit(&self, unit: &Unit<'_>) -> bool {
+        unit.cells.iter().all(|cell| self.has(unit, cell))
+    }
+
+    /// The lock of a unit, which the kernel frees when its process ends; none where another process works on it. Without
+    /// locks (some shared disks) both compute the same bytes.
+    fn lock(&self, unit: &Unit<'_>) -> Result<Option<File>> {
+        let locks = self.0.join("locks");
+        let path = locks.join(format!("{}-{}", &unit.cells[0].noise[..32], unit.first));
+        let made = fs::create_dir_all(&locks).and_then(|()| File::create(&path));
+        let file = made.map_err(|e| Failure::io(&path, e))?;
+        Ok(match file.try_lock() {
+            Err(fs::TryLockError::WouldBlock) => None,
+            _ => Some(file),
+        })
+    }
+}
+
+/// All units, passes in the order of their first cells.
+fn units<'a>(cells: &'a [Cell], context: &Context<'_>) -> Result<Vec<Unit<'a>>> {
+    let mut passes: Vec<Vec<&Cell>> = Vec::new();
+    let mut places: HashMap<&str, usize> = HashMap::new();
+    for cell in cells {
+        let place = *places.entry(&cell.noise).or_insert(passes.len());
+        if place == passes.len() {
+            passes.push(Vec::new());
+        }
+        passes[place].push(cell);
+    }
+    let mut blocks: BTreeMap<PathBuf, u64> = BTreeMap::new();
+    let mut units = Vec::new();
+    for pass in passes {
+        let (request, runs) = (&pass[0].asked.request, pass[0].runs);
+        let block = match blocks.get(&request.trajectory) {
+            Some(block) => *block,
+            None => block_of(request, context)?,
+        };
+        blocks.insert(request.trajectory.clone(), block);
+        let unit = |first| Unit {
+            cells: pass.clone(),
+            first,
+            runs: block.min(runs - first),
+            whole: runs <= block,
+        };
+        units.extend((0..runs.max(1)).step_by(block as usize).map(unit));
+    }
+    Ok(units)
+}
+
+/// Units of shard `index` of `count`: contiguous, of equal cost.
+fn shard<'a, 'b>(units: &'b [Unit<'a>], (index, count): (u64, u64)) -> Vec<&'b Unit<'a>> {
+    let total: u64 = units.iter().map(Unit::cost).sum();
+    let mut before = 0;
+    let mut own = Vec::new();
+    for unit in units {
+        let middle = 2 * before + unit.cost();
+        if u128::from(middle) * u128::from(count) / u128::from(2 * total.max(1))
+            == u128::from(index)
+        {
+            own.push(unit);
+        }
+        before += unit.cost();
+    }
+    own
+}
+
+/// What a process did.
+#[derive(Default)]
+struct Worked {
+    finished: AtomicUsize,
+    failures: Mutex<Vec<(String, Failure)>>,
+}
+
+/// Computes the units that are not there and not in work elsewhere, small ones at once, until the context says stop.
+fn work(place: &Place<'_>, own: &[&Unit<'_>], context: &Context<'_>) -> Result<Worked> {
+    let (worked, front) = (Worked::default(), OfCells(context, Mutex::default()));
+    let todo: Vec<&&Unit<'_>> = own.iter().filter(|unit| !place.has_unit(unit)).collect();
+    context.begin("runs", todo.iter().map(|unit| unit.cost()).sum());
+    let at_once = |unit: &Unit<'_>| (128 * context.threads() as u64 / unit.runs.max(8)).max(1);
+    let mut rest = todo.as_slice();
+    while let (Some(first), true) = (rest.first(), context.go_on()) {
+        let (now, later) = rest.split_at(rest.len().min(at_once(first) as usize));
+        now.par_iter()
+            .try_for_each(|unit| compute(place, unit, &worked, context, &front))?;
+        rest = later;
+    }
+    context.end();
+    Ok(worked)
+}
+
+/// Computes what is missing of a unit. A cell that cannot be computed is named; others go on.
+fn compute(
+    place: &Place<'_>,
+    unit: &Unit<'_>,
+    worked: &Worked,
+    context: &Context<'_>,
+    front: &OfCells<'_>,
+) -> Result<()> {
+    let Some(_lock) = place.lock(unit)? else {
+        return Ok(());
+    };
+    let missing: Vec<&Cell> = unit
+        .cells
+        .iter()
+        .copied()
+        .filter(|cell| !place.has(unit, cell))
+        .collect();
+    let failed = |cell: &Cell, failure: Failure| {
+        worked
+            .failures
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push((cell.name.clone(), failure));
+    };
+    let contexts: Vec<Context<'_>> = missing.iter().map(|cell| context_of(cell, front)).collect();
+    let mut prepared = Vec::new();
+    for (cell, context) in missing.iter().zip(&contexts) {
+        match cell.asked.request.prepare(context) {
+            Ok(run) => prepared.push((*cell, run, context)),
+            Err(failure) => failed(cell, failure),
+        }
+    }
+    while !prepared.is_empty() {
+        // turn-on biases that models state make other noise of cells that asked for the same
+        let first = prepared.remove(0);
+        let (mut pass, rest): (Vec<_>, Vec<_>) = prepared
+            .into_iter()
+            .partition(|(_, run, _)| run.shares_noise_with(&first.1));
+        prepared = rest;
+        pass.insert(0, first);
+        let runs: Vec<&PreparedRun<'_>> = pass.iter().map(|(_, run, _)| run).collect();
+        let results = match columns(&runs, unit.first, unit.runs, context) {
+            Ok(Some(results)) => results,
+            Ok(None) => return Ok(()),
+            Err(failure) => {
+                pass.iter()
+                    .for_each(|(cell, _, _)| failed(cell, failure.clone()));
+                continue;
+            }
+        };
+        for ((cell, run, context), result) in pass.into_iter().zip(results) {
+            if unit.whole {
+                if let Err(failure) = write_cell(place, cell, run, result, context) {
+                    if failure.code() == 1 && failure.file().is_some() {
+                        return Err(failure);
+                    }
+                    failed(cell, failure);
+                }
+            } else if let Some(result) = result {
+                write_part(&place.part(cell, unit.first), &result)?;
+            }
+            worked.finished.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+    Ok(())
+}
+
+/// Passes each warning of the cells on once; what they remark is for `--verbose`.
+struct OfCells<'a>(pub &'a Context<'a>, pub Mutex<HashSet<String>>);
+
+impl Front for OfCells<'_> {
+    fn note(&self, note: Note) {
+        let Note { importance, text } = note;
+        if importance != Importance::Warning {
+            self.0.detail(text);
+        } else if self
+            .1
+            .lock()
+            .is_ok_and(|mut seen| seen.insert(text.clone()))
+        {
+            self.0.warn(text);
+        }
+    }
+}
+
+fn context_of<'a>(cell: &Cell, front: &'a OfCells<'_>) -> Context<'a> {
+    Context::new(front, Some(cell.seed)).reading(cell.manifest.inputs.clone())
+}
+
+/// Finishes a cell whose runs are all there and writes its directory.
+fn write_cell(
+    place: &Place<'_>,
+    cell: &Cell,
+    run: PreparedRun<'_>,
+    result: Option<RunResult>,
+    context: &Context<'_>,
+) -> Result<()> {
+    let answer = run.navigate(result, context)?;
+    let mut asked = cell.asked.clone();
+    asked.out = Some(place.cell(&cell.name));
+    let written = asked.write(&answer, &answer.document(), cell.manifest.clone(), context);
+    match written {
+        // another process has written the same meanwhile
+        Err(_) if place.is_done(cell) => Ok(()),
+        written => written.map(drop),
+    }
+}
+
+/// Puts the parts of a cell together, where all are there.
+fn assemble(place: &Place<'_>, cell: &Cell, firsts: &[u64], context: &Context<'_>) -> Result<()> {
+    if place.is_done(cell) {
+        return Ok(());
+    }
+    let mut whole: Option<RunResult> = None;
+    for first in firsts {
+        let Some(part) = read_part(&place.part(cell, *first)) else {
+            return Ok(());
+        };
+        match &mut whole {
+            Some(whole) => whole.append(part),
+            None => whole = Some(part),
+        }
+    }
+    let front = OfCells(context, Mutex::default());
+    let context = context_of(cell, &front);
+    let run = cell.asked.request.prepare(&context)?;
+    write_cell(place, cell, run, whole, &context)?;
+    if let Some(parts) = place.part(cell, 0).parent() {
+        drop(fs::remove_dir_all(parts));
+        // empty after the last
+        drop(fs::remove_dir(place.0.join("parts")));
+    }
+    Ok(())
+}
+
+/// The runs of a part: postcard of the result, BLAKE3 of that.
+fn write_part(path: &Path, result: &RunResult) -> Result<()> {
+    let mut bytes = postcard::to_allocvec(result).map_err(Failure::could_not)?;
+    let hash = blake3::hash(&bytes);
+    bytes.extend(hash.as_bytes());
+    match atomic::write(path, bytes) {
+        Err(_) if read_part(path).is_some() => Ok(()),
+        written => Ok(written?),
+    }
+}
+
+/// The runs of a part, if it is there and whole.
+fn read_part(path: &Path) -> Option<RunResult> {
+    part_of(&fs::read(path).ok()?)
+}
+
+/// A part from its bytes, if they are whole.
+pub(crate) fn part_of(bytes: &[u8]) -> Option<RunResult> {
+    let (content, hash) = bytes.split_at_checked(bytes.len().checked_sub(blake3::OUT_LEN)?)?;
+    let is_whole = blake3::hash(content).as_bytes() == hash;
+    is_whole
+        .then(|| postcard::from_bytes(content).ok())
+        .flatten()
+}
+
+// Which part of a plan a process does: by flag, or by what the scheduler says.
+
+/// `i/n`, i from 0.
+fn parse_shard(text: &str) -> Result<(u64, u64), String> {
+    let numbers = text
+        .split_once('/')
+        .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+    let shard = numbers.filter(|(index, count): &(u64, u64)| index < count);
+    shard.ok_or_else(|| "expected i/n with i from 0 to n − 1, such as 0/4".to_owned())
+}
+
+/// Variables that give an index, and those that give the first one, the step and how many there are.
+const SCHEDULERS: [(&str, Option<[&str; 3]>); 4] = [
+    ("HQ_TASK_ID", None),
+    (
+        "SLURM_ARRAY_TASK_ID",
+        Some([
+            "SLURM_ARRAY_TASK_MIN",
+            "SLURM_ARRAY_TASK_STEP",
+            "SLURM_ARRAY_TASK_COUNT",
+        ]),
+    ),
+    ("PBS_ARRAY_INDEX", None),
+    ("JOB_COMPLETION_INDEX", None),
+];
+
+/// The shard of this process and where it comes from; none without a flag and a scheduler. `shards` is how many there are,
+/// where the scheduler does not say.
+fn find_shard(
+    flag: Option<(u64, u64)>,
+    shards: Option<u64>,
+    variable: &dyn Fn(&str) -> Option<String>,
+) -> Result<(Option<(u64, u64)>, String), Failure> {
+    if flag.is_some() {
+        return Ok((flag, "--shard".to_owned()));
+    }
+    let set = SCHEDULERS
+        .iter()
+        .find_map(|(name, more)| Some((*name, *more, variable(name)?)));
+    let Some((name, more, text)) = set else {
+        return match shards {
+            None | Some(1) => Ok((None, "no scheduler".to_owned())),
+            Some(n) => {
+                let failure = Failure::input(format!(
+                    "--shards {n}: no scheduler says which of them this is"
+                ));
+                Err(failure.hint("give --shard i/n"))
+            }
+        };
+    };
+    let number = |name: &str, text: &str| {
+        text.trim()
+            .parse::<u64>()
+            .map_err(|_| Failure::input(format!("{name}={text} is not a number")))
+    };
+    let number_of = |name: &str| variable(name).map(|text| number(name, &text)).transpose();
+    // With --shards, tasks count from 0 whatever part of an array was submitted; without, the array says.
+    let [first, step, count] = match more.filter(|_| shards.is_none()) {
+        Some([min, step, count]) => [number_of(min)?, number_of(step)?, number_of(count)?],
+        None => [None; 3],
+    };
+    let id = number(name, &text)?;
+    let index = id
+        .checked_sub(first.unwrap_or(0))
+        .map(|i| i / step.unwrap_or(1).max(1));
+    let Some(count) = shards.or(count) else {
+        let failure = Failure::input(format!(
+            "{name}={id} says which shard this is, but not of how many"
+        ));
+        return Err(failure.hint("add --shards n (indices from 0 to n − 1)"));
+    };
+    match index.filter(|index| *index < count) {
+        Some(index) => Ok((Some((index, count)), format!("{name}={id}"))),
+        None => {
+            let failure = Failure::input(format!("{name}={id} is not one of {count} shards"));
+            Err(failure.hint(format!(
+                "number the tasks from 0 to {}",
+                count.saturating_sub(1)
+            )))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashMap;
+
+    fn found(
+        flag: Option<&str>,
+        shards: Option<u64>,
+        set: &[(&str, &str)],
+    ) -> Result<(u64, u64, String), String> {
+        let set: HashMap<&str, &str> = set.iter().copied().collect();
+        let variable = |name: &str| set.get(name).map(|v| (*v).to_owned());
+        let flag = flag.map(|f| parse_shard(f).unwrap());
+        find_shard(flag, shards, &variable)
+            .map(|(s, from)| (s.map_or((0, 1), |s| s), from))
+            .map(|((index, count), from)| (index, count, from))
+            .map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn schedulers_are_understood() {
+        let ok = |r: Result<(u64, u64, String), String>| r.unwrap();
+        assert_eq!(ok(found(None, None, &[])), (0, 1, "no scheduler".into()));
+        assert_eq!(
+            ok(found(Some("2/3"), None, &[("HQ_TASK_ID", "7")])),
+            (2, 3, "--shard".into())
+        );
+        assert_eq!(
+            ok(found(None, Some(8), &[("HQ_TASK_ID", "7")])),
+            (7, 8, "HQ_TASK_ID=7".into())
+        );
+        let slurm = [
+            ("SLURM_ARRAY_TASK_ID", "14"),
+            ("SLURM_ARRAY_TASK_MIN", "10"),
+            ("SLURM_ARRAY_TASK_STEP", "2"),
+            ("SLURM_ARRAY_TASK_COUNT", "4"),
+        ];
+        assert_eq!(
+            ok(found(None, None, &slurm)),
+            (2, 4, "SLURM_ARRAY_TASK_ID=14".into())
+        );
+        assert_eq!(
+            ok(found(None, Some(20), &slurm)),
+            (14, 20, "SLURM_ARRAY_TASK_ID=14".into())
+        );
+        assert_eq!(ok(found(None, Some(5), &[("PBS_ARRAY_INDEX", "0")])).0, 0);
+        assert_eq!(
+            ok(found(None, Some(5), &[("JOB_COMPLETION_INDEX", "4")])).0,
+            4
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_a_shard_is_refused() {
+        assert!(
+            parse_shard("3/3").is_err()
+                && parse_shard("1").is_err()
+                && parse_shard("-1/2").is_err()
+        );
+        let error = |r: Result<(u64, u64, String), String>| r.unwrap_err();
+        assert!(error(found(None, None, &[("HQ_TASK_ID", "7")])).contains("not of how many"));
+        assert!(
+            error(found(None, Some(7), &[("HQ_TASK_ID", "7")])).contains("is not one of 7 shards")
+        );
+        assert!(
+            error(found(None, Some(7), &[("PBS_ARRAY_INDEX", "x")]))
+                .contains("PBS_ARRAY_INDEX=x is not a number")
+        );
+        assert!(error(found(None, Some(7), &[])).contains("no scheduler"));
     }
 }

@@ -1,19 +1,16 @@
 //! Results of a study: `results.csv`, `summary.json`, `report.html`, made from the run directories of its cells.
 
-use super::cells::{Cell, Labels, Study};
-use super::units::Place;
+use super::{Cell, Labels, Place, Study};
 use crate::app::{Answer, Context, Failure, Result};
 use crate::commands::compare::{Comparison, between};
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::io::atomic::AtomicDir;
-use crate::io::source;
 use crate::report::csv::{csv, flat};
 use crate::report::json;
-use crate::report::verdict::{gravest, tone, verdict_counts};
+use crate::report::verdict::{tone, verdict_counts};
 use nav_sim_document::{
     Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke, Table, Tone,
 };
-use nav_sim_navigation::metrics::Verdict;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -46,13 +43,13 @@ struct CellSummary {
     name: String,
     labels: BTreeMap<String, String>,
     diverged: u64,
-    verdict: Verdict,
+    verdict: Value,
     /// Time, p50 and p95 of the horizontal error and NEES at the end of each outage.
     outages: Vec<Value>,
 }
 
 /// Reads all cells that are there and compares them; a damaged one is set aside.
-pub(crate) fn merge(
+pub(super) fn merge(
     study: &Study,
     cells: &[Cell],
     place: &Place<'_>,
@@ -122,7 +119,7 @@ pub(crate) fn merge(
             }
         }
         let of = reference.and_then(|r| read.iter().position(|(cell, _)| cell.name == r.name));
-        answer.add(place, &read, of, states)?;
+        answer.add(&read, of, states)?;
     }
     answer.complete = answer.missing.is_empty();
     Ok(answer)
@@ -132,7 +129,6 @@ impl StudyAnswer {
     /// Cells of one setting, against one of them.
     fn add(
         &mut self,
-        place: &Place<'_>,
         read: &[(&Cell, RunDirectory)],
         reference: Option<usize>,
         states: &[usize],
@@ -140,7 +136,7 @@ impl StudyAnswer {
         // without the reference each is alone
         let Some(i) = reference else {
             let mut alone = read.iter().map(std::slice::from_ref);
-            return alone.try_for_each(|one| self.add(place, one, Some(0), states));
+            return alone.try_for_each(|one| self.add(one, Some(0), states));
         };
         let runs = read.iter().enumerate();
         let runs = runs.map(|(k, (cell, found))| (cell.name.as_str(), found, k == i));
@@ -148,9 +144,7 @@ impl StudyAnswer {
         let comparison = between(runs, (&cell.name, found), states.to_vec())?;
         let is_compared = read.len() > 1;
         for ((cell, found), candidate) in read.iter().zip(&comparison.candidates) {
-            let text = source::text(&place.cell(&cell.name).join("summary.json"))
-                .map_err(Failure::could_not)?;
-            let summary: Value = serde_json::from_str(&text).map_err(Failure::could_not)?;
+            let summary = &found.summary;
             let outages = summary["outages"].as_array().into_iter().flatten();
             let mut ends = Vec::new();
             for (i, (outage, own)) in outages.zip(&candidate.outages).enumerate() {
@@ -217,7 +211,7 @@ impl StudyAnswer {
                 name: cell.name.clone(),
                 labels: cell.labels.iter().cloned().collect(),
                 diverged: summary["diverged"].as_u64().unwrap_or(0),
-                verdict: found.verdict,
+                verdict: summary["verdict"].clone(),
                 outages: ends,
             });
         }
@@ -237,7 +231,7 @@ impl StudyAnswer {
     }
 
     /// Writes the results, all or none.
-    pub(crate) fn write(&self, place: &Place<'_>) -> Result<()> {
+    pub(super) fn write(&self, place: &Place<'_>) -> Result<()> {
         let mut files = AtomicDir::create(place.0)?;
         for (name, text) in
             FILES
@@ -251,7 +245,7 @@ impl StudyAnswer {
 }
 
 /// Removes results of before, where a cell is missing.
-pub(crate) fn withdraw(place: &Place<'_>) {
+pub(super) fn withdraw(place: &Place<'_>) {
     FILES
         .iter()
         .for_each(|name| drop(fs::remove_file(place.0.join(name))));
@@ -259,15 +253,14 @@ pub(crate) fn withdraw(place: &Place<'_>) {
 
 impl Answer for StudyAnswer {
     fn document(&self) -> Document {
-        let verdicts = || {
-            self.cells
-                .iter()
-                .map(|cell| (cell.name.as_str(), &cell.verdict))
-        };
-        let mut lines = verdict_counts(verdicts());
+        let verdicts = self.cells.iter();
+        let verdicts: Vec<_> = verdicts
+            .map(|cell| (cell.name.as_str(), &cell.verdict))
+            .collect();
+        let (gravest, mut lines) = verdict_counts(&verdicts);
         lines.extend(self.incomplete().map(|failure| failure.to_string()));
         let tone = match self.complete {
-            true => tone(gravest(verdicts())),
+            true => tone(gravest),
             false => Tone::Undecided,
         };
         let mut document = Document::new("Study", tone, lines);
@@ -361,7 +354,7 @@ impl StudyAnswer {
 }
 
 /// The first names of a list.
-pub(crate) fn first_of(names: &[String]) -> String {
+pub(super) fn first_of(names: &[String]) -> String {
     let more = if names.len() > 3 { ", …" } else { "" };
     names
         .iter()

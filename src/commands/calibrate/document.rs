@@ -2,9 +2,9 @@
 
 use super::fits::{interval_of, intervals};
 use crate::commands::export::Quantity;
-use crate::report::comparison_table::in_order;
 use crate::report::curves::{CurvesFile, FittedCurve, recording_names};
 use crate::report::curves::{band, curve, scale_axis, sensor_name, variance_axis};
+use crate::report::in_order;
 use nav_sim_calibration::{
     Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE,
     Outcome, ParameterInterval, Ranking, Settings, TurnOnFinding, TurnOnSpread, Undetermined,

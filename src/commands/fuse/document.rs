@@ -1,7 +1,6 @@
 //! A fusion as a document: verdict, figures, track, errors, innovations.
 
-use super::FuseAnswer;
-use super::summary::Cause;
+use super::{Cause, FuseAnswer};
 use crate::report::{reduction_doubt, reduction_line, tone};
 use glam::{DVec2, DVec3};
 use nav_sim_document::{
@@ -9,8 +8,7 @@ use nav_sim_document::{
     seconds, window,
 };
 use nav_sim_navigation::earth::ned_difference;
-use nav_sim_navigation::fusion::{ClocksApart, Finding, FixRecord, Row, Solution, Use};
-use nav_sim_navigation::metrics::chi_square_band;
+use nav_sim_navigation::fusion::{ClocksApart, Finding, FixRecord, Row, Solution};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use std::path::Path;
 
@@ -25,6 +23,7 @@ impl FuseAnswer {
         let mut document = Document::new("INS/GNSS fusion of recorded data", tone, self.verdict());
         document.facts(&self.facts());
         let outages: Vec<_> = summary
+            .outcome
             .outages
             .iter()
             .map(|o| (o.outage.start_s, o.outage.end_s))
@@ -40,13 +39,8 @@ impl FuseAnswer {
         }
         document.section("Fixes");
         document.chart(&innovations(solution, &outages), FIXES);
-        document.chart(&nis(&solution.fixes, &outages), FIXES);
         document.checked(CHECKED);
-        if let Some(quality) = self
-            .reduction
-            .as_ref()
-            .and_then(|reduction| reduction.quality.as_ref())
-        {
+        if let Some(quality) = &self.reduction {
             match reduction_doubt(quality) {
                 Some(doubt) => document.note(Importance::Warning, doubt),
                 None => document.note(Importance::Remark, reduction_line(quality)),
@@ -63,13 +57,14 @@ impl FuseAnswer {
         let verdict = &summary.verdict;
         let mut evidence = verdict.evidence.iter().map(evidence);
         let first = evidence.next().unwrap_or_else(|| {
-            let nees = summary
+            let outcome = &summary.outcome;
+            let nees = outcome
                 .reference
                 .map(|r| format!(", NEES {} (9 if right)", readable(r.nees_mean)));
-            let nis = readable(summary.nis_per_component);
+            let nis = readable(outcome.nis_per_component);
             format!(
                 "NIS {nis} per component over {} fixes{}",
-                summary.fixes.used,
+                outcome.fixes.used,
                 nees.unwrap_or_default()
             )
         });
@@ -88,7 +83,7 @@ impl FuseAnswer {
 
     /// What helps where the solution is overconfident.
     pub(crate) fn advice(&self) -> &'static str {
-        if self.summary.nis_per_component < 1.0 {
+        if self.summary.outcome.nis_per_component < 1.0 {
             "axes and clock of the reference may be others than those of the solution"
         } else {
             "check axes (--mounting), units, start (--initial), clocks (--gnss-delay) and antenna (--lever-arm)"
@@ -128,7 +123,7 @@ impl FuseAnswer {
         document.section("Figures");
         let mut rows = [
             (
-                "NIS per component, {fixes/used} fixes used, {fixes/withheld} withheld, {fixes/rejected} rejected",
+                "NIS per component, {fixes/used} fixes used, {fixes/withheld} withheld",
                 "nis_per_component -",
             ),
             (
@@ -155,14 +150,14 @@ impl FuseAnswer {
             let keys = format!("reference/{key} smoothed/reference/{key}");
             (title.to_owned(), keys)
         }));
-        for (k, o) in self.summary.outages.iter().enumerate() {
+        for (k, o) in self.summary.outcome.outages.iter().enumerate() {
             let window = window(o.outage.start_s, o.outage.end_s);
-            for end in ["fix", "reference"] {
-                rows.push((
+            rows.extend(["fix", "reference"].map(|end| {
+                (
                     format!("end of outage {window}: error from the {end} (m)"),
                     format!("outages/{k}/end_from_{end}/horizontal_m -"),
-                ));
-            }
+                )
+            }));
         }
         let rows: Vec<_> = rows
             .iter()
@@ -285,7 +280,6 @@ fn evidence(finding: &Finding) -> String {
             readable(nis_per_component),
             nis_per_component.sqrt()
         ),
-        Finding::Rejected { rejected, of } => format!("{rejected} of {of} fixes were rejected"),
         Finding::Reference(c) => format!(
             "errors against the reference are {:.1} times as large as stated (NEES), {:.1} times in {}",
             c.error_over_sigma, c.worst_error_over_sigma, c.worst_state
@@ -339,15 +333,14 @@ const MOST_PLACES: usize = 400;
 /// Velocities of a reference that are known worse than this are not drawn: its positions jump (m/s).
 const UNEVEN: f64 = 0.5;
 
-pub(super) const POSITION: &str =
-    "Dashed: horizontal 1 σ stated. Line: distance from the reference.";
-pub(super) const ERRORS: &str = "Lines: estimate less reference. Bands: ± 1 σ.";
-pub(super) const FIXES: &str = "Of a right filter 95 % of the used fixes are in the band.";
+const POSITION: &str = "Dashed: horizontal 1 σ stated. Line: distance from the reference.";
+const ERRORS: &str = "Lines: estimate less reference. Bands: ± 1 σ.";
+const FIXES: &str = "Of a right filter 95 % of the used fixes are in the band.";
 
 /// Colour of what is smoothed.
 const SMOOTHED: Colour = Colour::Hue(2);
 
-pub(super) fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
+fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     let Some(first) = solution.rows.first() else {
         return Chart::map("Track", Vec::new());
     };
@@ -411,7 +404,7 @@ fn solutions(solution: &Solution) -> Vec<(&[Row], [&'static str; 2], [Colour; 2]
     }
 }
 
-pub(super) fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
+fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     let mut series = Vec::new();
     for (rows, [stated, error], [believed, real]) in solutions(solution) {
         let sigma = thinned(rows)
@@ -431,7 +424,7 @@ pub(super) fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     )
 }
 
-pub(super) fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
+fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
     let chart = |(i, name): (usize, &&str)| {
         let is_velocity = (3..6).contains(&i);
         let error = |row: &Row| {
@@ -459,15 +452,14 @@ pub(super) fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> 
 }
 
 /// Fates of fixes, and their colours.
-const FATES: [(Use, &str, Colour); 3] = [
-    (Use::Used, "used", Colour::BELIEVED),
-    (Use::Withheld, "withheld", Colour::Soft),
-    (Use::Rejected, "rejected", Colour::REAL),
+const FATES: [(bool, &str, Colour); 2] = [
+    (true, "used", Colour::BELIEVED),
+    (false, "withheld", Colour::Soft),
 ];
 
 /// A series for each fate of fixes.
 fn fixes(fixes: &[FixRecord], value: &dyn Fn(&FixRecord) -> f64) -> Vec<Series> {
-    let of_fate = |(fate, name, colour): (Use, &str, Colour)| {
+    let of_fate = |(fate, name, colour): (bool, &str, Colour)| {
         let of_fate: Vec<&FixRecord> = fixes.iter().filter(|f| f.used == fate).collect();
         let every = of_fate.len().div_ceil(MOST_FIXES).max(1);
         let points = of_fate
@@ -480,7 +472,7 @@ fn fixes(fixes: &[FixRecord], value: &dyn Fn(&FixRecord) -> f64) -> Vec<Series> 
     FATES.into_iter().filter_map(of_fate).collect()
 }
 
-pub(super) fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
+fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     let panel = |(i, name): (usize, &str)| {
         let normalised = |f: &FixRecord| {
             f.innovation
@@ -508,27 +500,4 @@ pub(super) fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart 
         .map(panel)
         .collect();
     Chart::over_time("Innovations of position, normalised", panels, outages)
-}
-
-pub(super) fn nis(records: &[FixRecord], outages: &[(f64, f64)]) -> Chart {
-    let dof = records
-        .iter()
-        .map(|f| f.innovation.len())
-        .max()
-        .unwrap_or(0);
-    let band = chi_square_band(dof, 1.0);
-    let mut series = vec![Series::new(
-        "95 % band of a right filter",
-        Colour::RIGHT,
-        Mark::Zone(band.lower, band.upper),
-    )];
-    series.extend(fixes(records, &|f| f.nis));
-    Chart::over_time(
-        "NIS",
-        vec![Panel::new(
-            Axis::log(&format!("NIS ({dof} if right)")),
-            series,
-        )],
-        outages,
-    )
 }

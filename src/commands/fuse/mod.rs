@@ -1,32 +1,49 @@
 //! `nav-sim fuse`: the filter on recorded data.
 
 mod document;
-mod drive;
-mod files;
-mod summary;
-
-pub use drive::FuseAnswer;
-pub use summary::{Cause, FuseSummary, VehicleSummary};
 
 use crate::app::inputs::files;
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
-use drive::Drive;
+use crate::app::{
+    Answer, Command, Context, Failure, Input, Out, OutputFile, Refuse, Result, inputs,
+};
+use crate::commands::run::reduction_of;
+use crate::io::fusion_files::{read_gnss, read_imu, read_initial, read_wheel};
+use crate::io::model_file::ModelFile;
+use crate::io::trajectory_file::{self, load_reference};
+use crate::report::json;
 use glam::{DMat3, DQuat, DVec3};
-use nav_sim_document::Document;
-use nav_sim_navigation::earth::GravityModel;
-use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
-use nav_sim_navigation::frames::RollPitchYaw;
-use nav_sim_navigation::fusion::alignment::AlignmentError;
-use nav_sim_navigation::fusion::mounting::{Mounted, MountingError};
-use nav_sim_navigation::fusion::{Correlation, FusionError, Heading, Settings};
-use nav_sim_navigation::gnss::FixSigma;
-use nav_sim_navigation::metrics::VerdictKind;
-use nav_sim_navigation::sensors::gnss::MAX_LEVER_ARM_M;
-use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_document::{Document, Importance, seconds, shortest, window};
+use nav_sim_navigation::earth::{GravityModel, radii};
+use nav_sim_navigation::ekf::{Belief, FilterStates, InitialSettings};
+use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
+use nav_sim_navigation::fusion::alignment::{Alignment, AlignmentError, coarse, towards};
+use nav_sim_navigation::fusion::mounting::{self, Mounting, MountingError};
+use nav_sim_navigation::fusion::{
+    Assessment, ClocksApart, Correlation, Displaced, Finding, Found, FusionError, Heading,
+    Levelling, Outcome, Recorded, Row, Settings, Solution, Start, Weighed, WheelSpeed, Whiteness,
+    aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier, fuse, fuse_correlated,
+    interval_s, middle, outcome, rest_of_origin, rough_origin, vehicle_velocities, wheel_ratio,
+};
+use nav_sim_navigation::gnss::{FixSigma, GnssFix};
+use nav_sim_navigation::metrics::{ReductionQuality, VerdictKind};
+use nav_sim_navigation::sensors::aiding::{
+    AidingSettings, NhcSettings, OdometerSettings, ZuptSettings,
+};
+use nav_sim_navigation::sensors::defects::ImuSettings;
+use nav_sim_navigation::sensors::gnss::{GnssSettings, MAX_LEVER_ARM_M};
+use nav_sim_navigation::sensors::outage::{FixedData, Outage, OutagePlan};
+use nav_sim_navigation::simulation::lincov::{HeadingDoubt, weak_heading};
+use nav_sim_navigation::simulation::{BIAS_NAMES, REPORTED_NAMES, lincov};
+use nav_sim_navigation::trajectory::reference::Reference;
+use nav_sim_signal::imu::ImuIncrement;
+use nav_sim_signal::noise::{Composite, Model, Process, continuous, reduction};
 use nav_sim_signal::units::DEG;
-use serde_json::json;
-use std::fmt::{self, Display, Formatter};
-use std::path::PathBuf;
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 impl Command for Fuse {
@@ -34,7 +51,7 @@ impl Command for Fuse {
     const NAME: &'static str = "fuse";
     const OUT: Out = Out::Directory {
         path: "out/fuse",
-        files: &self::files::FILES,
+        files: &FILES,
     };
     const PLOT: bool = false;
 
@@ -59,7 +76,7 @@ impl Answer for FuseAnswer {
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {
-        self::files::directory(self)
+        directory(self)
     }
 
     fn record(&self) -> serde_json::Value {
@@ -118,7 +135,7 @@ pub struct Fuse {
     )]
     pub initial: StartChoice,
     /// GNSS antenna from the IMU: front, right, down (m)
-    #[arg(long = "lever-arm", value_name = "X,Y,Z", value_parser = numbers::<3>, default_value = "0,0,0",
+    #[arg(long = "lever-arm", value_name = "X,Y,Z", value_parser = arm, default_value = "0,0,0",
         hide_default_value = true, allow_hyphen_values = true)]
     pub lever_arm_m: [f64; 3],
     /// Attitude of the IMU in the vehicle (degrees) if its axes are not front, right, down; after a colon the standard
@@ -164,7 +181,7 @@ pub struct Fuse {
     #[arg(long, value_name = "FILE")]
     pub odometer: Option<PathBuf>,
     /// Middle of the rear axle from the IMU: front, right, down (m)
-    #[arg(long = "rear-axle", value_name = "X,Y,Z", value_parser = numbers::<3>, default_value = "0,0,0",
+    #[arg(long = "rear-axle", value_name = "X,Y,Z", value_parser = arm, default_value = "0,0,0",
         hide_default_value = true, allow_hyphen_values = true)]
     pub rear_axle_m: [f64; 3],
     /// Names of the IMU's columns, for a file without a header or instead of it
@@ -180,7 +197,7 @@ pub struct Fuse {
 
 impl Fuse {
     /// The file of the initial state; none where it is found in the data.
-    pub(super) fn initial_file(&self) -> Option<&PathBuf> {
+    fn initial_file(&self) -> Option<&PathBuf> {
         if let StartChoice::File(path) = &self.initial {
             Some(path)
         } else {
@@ -188,37 +205,16 @@ impl Fuse {
         }
     }
 
-    /// Source of the mounting.
-    pub(super) fn mounted(&self) -> Mounted {
-        if self.mounting == Some(MountingChoice::Auto) {
-            Mounted::AsFound
-        } else {
-            Mounted::AsGiven
-        }
-    }
-
-    /// Standard deviations where the file states none, and factors of those that it states.
-    pub(super) fn fix_sigma(&self) -> (Option<FixSigma>, [f64; 2]) {
-        match self.gnss_sigma {
-            Some(GnssSigma::Unsaid(sigma)) => (Some(sigma), [1.0; 2]),
-            Some(GnssSigma::Times(factors)) => (None, factors),
-            None => (None, [1.0; 2]),
-        }
-    }
-
     /// Heading at the start, where it is given.
-    pub(super) fn given_heading(&self) -> Option<Heading> {
-        let StartChoice::Heading { deg, sigma_deg } = self.initial else {
-            return None;
-        };
-        Some(Heading {
-            yaw: deg * DEG,
-            sigma: sigma_deg * DEG,
-        })
+    fn given_heading(&self) -> Option<Heading> {
+        match self.initial {
+            StartChoice::Heading(heading) => Some(heading),
+            _ => None,
+        }
     }
 
     /// The filter's expectation of constant biases, over that of a file.
-    pub(super) fn expected(&self, of_file: InitialSettings) -> InitialSettings {
+    fn expected(&self, of_file: InitialSettings) -> InitialSettings {
         let Some([accel, gyro]) = self.turn_on_bias else {
             return of_file;
         };
@@ -230,48 +226,20 @@ impl Fuse {
     }
 
     /// Settings of the filter's run.
-    ///
-    /// # Errors
-    /// A value that is out of its range.
-    pub(super) fn settings(&self) -> Result<Settings> {
-        let refuse = |message: String| Err(Failure::input(message));
-        for (option, arm) in [
-            ("--lever-arm", self.lever_arm_m),
-            ("--rear-axle", self.rear_axle_m),
-        ] {
-            if !arm.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
-                let [x, y, z] = arm;
-                return refuse(format!(
-                    "{option} {x},{y},{z}: more than {MAX_LEVER_ARM_M} m"
-                ));
-            }
-        }
+    fn settings(&self) -> Settings {
         let (q_s_b, mounting_sigma_b) = match self.mounting {
-            Some(MountingChoice::Angles {
-                deg: [roll, pitch, yaw],
-                sigma_deg,
-            }) => (
-                RollPitchYaw {
-                    roll: roll * DEG,
-                    pitch: pitch * DEG,
-                    yaw: yaw * DEG,
-                }
-                .to_quat(),
-                DVec3::from(sigma_deg) * DEG,
-            ),
-            Some(MountingChoice::Axes(q_s_b)) => (q_s_b, DVec3::ZERO),
+            Some(MountingChoice::Given(q_s_b, sigma_b)) => (q_s_b, sigma_b),
             _ => (DQuat::IDENTITY, DVec3::ZERO),
         };
-        Ok(Settings {
+        Settings {
             q_s_b,
             mounting_sigma_b,
             lever_arm_b: self.lever_arm_m.into(),
             gravity: GravityModel::default(),
             outages: self.outages.clone(),
-            nis_gate: None,
             rows_hz: ROWS_HZ,
             smooth: self.smooth,
-        })
+        }
     }
 }
 
@@ -280,25 +248,20 @@ impl Fuse {
 pub enum MountingChoice {
     /// Found from the drive.
     Auto,
-    /// From axes with a name to front, right, down.
-    Axes(DQuat),
-    /// Given.
-    Angles {
-        /// Roll, pitch, yaw (degrees).
-        deg: [f64; 3],
-        /// Standard deviations about the vehicle's front, right, down (degrees).
-        sigma_deg: [f64; 3],
-    },
+    /// From its axes to front, right, down, and standard deviations about these (rad).
+    Given(DQuat, DVec3),
 }
 
 /// Largest standard deviation of an attitude that small angles describe (degrees).
-pub(super) const MAX_SIGMA_DEG: f64 = 30.0;
+const MAX_SIGMA_DEG: f64 = 30.0;
 
 impl FromStr for MountingChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let axes = |[x, y, z]: [DVec3; 3]| Self::Axes(DQuat::from_mat3(&DMat3::from_cols(x, y, z)));
+        let axes = |[x, y, z]: [DVec3; 3]| {
+            Self::Given(DQuat::from_mat3(&DMat3::from_cols(x, y, z)), DVec3::ZERO)
+        };
         match text {
             "auto" => return Ok(Self::Auto),
             "flu" => return Ok(axes([DVec3::X, DVec3::NEG_Y, DVec3::NEG_Z])),
@@ -308,10 +271,12 @@ impl FromStr for MountingChoice {
         // nobody mounts by less, and what a drive shows is known no better
         let (angles, sigma) = text.split_once(':').unwrap_or((text, "1,1,1"));
         match (list(angles), list(sigma)) {
-            (Some(deg), Some(sigma_deg))
+            (Some([roll, pitch, yaw]), Some(sigma_deg))
                 if sigma_deg.iter().all(|s: &f64| (0.0..=MAX_SIGMA_DEG).contains(s)) =>
             {
-                Ok(Self::Angles { deg, sigma_deg })
+                let [roll, pitch, yaw] = [roll, pitch, yaw].map(|angle: f64| angle * DEG);
+                let q_s_b = RollPitchYaw { roll, pitch, yaw }.to_quat();
+                Ok(Self::Given(q_s_b, DVec3::from(sigma_deg) * DEG))
             }
             _ => Err(
                 "expected degrees, such as -9.5,-60.8,-166.8 or -9.5,-60.8,-166.8:1.5,0.5,0.8, or flu, rfu, auto"
@@ -321,14 +286,8 @@ impl FromStr for MountingChoice {
     }
 }
 
-/// Standard deviations of fixes, as a user gives them.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum GnssSigma {
-    /// Where the file states none.
-    Unsaid(FixSigma),
-    /// Times what the file states, of position and of velocity.
-    Times([f64; 2]),
-}
+/// Standard deviations of fixes where the file states none, and factors of what it states, of position and of velocity.
+pub type GnssSigma = (Option<FixSigma>, [f64; 2]);
 
 /// Finite numbers between commas.
 fn list<const N: usize>(text: &str) -> Option<[f64; N]> {
@@ -336,15 +295,19 @@ fn list<const N: usize>(text: &str) -> Option<[f64; N]> {
     all?.try_into().ok()
 }
 
-pub(super) fn number(text: &str) -> Result<f64, &'static str> {
+fn number(text: &str) -> Result<f64, &'static str> {
     text.parse()
         .ok()
         .filter(|x: &f64| x.is_finite())
         .ok_or("not a finite number")
 }
 
-fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    list(text).ok_or_else(|| format!("expected {N} numbers between commas"))
+fn arm(text: &str) -> Result<[f64; 3], String> {
+    let arm: [f64; 3] = list(text).ok_or("expected 3 numbers between commas")?;
+    match arm.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
+        true => Ok(arm),
+        false => Err(format!("more than {MAX_LEVER_ARM_M} m")),
+    }
 }
 
 fn at_least_zero(text: &str) -> Result<[f64; 2], &'static str> {
@@ -366,12 +329,12 @@ fn correlation(text: &str) -> Result<Correlation, &'static str> {
 
 fn gnss_sigma(text: &str) -> Result<GnssSigma, &'static str> {
     let Some(factors) = text.strip_prefix('x') else {
-        return fix_sigma(text).map(GnssSigma::Unsaid);
+        return Ok((Some(fix_sigma(text)?), [1.0; 2]));
     };
     let (position, velocity) = factors.split_once(':').unwrap_or((factors, factors));
     let factor = |text: &str| number(text).ok().filter(|factor| *factor > 0.0);
     let both = factor(position).zip(factor(velocity));
-    both.map(|(position, velocity)| GnssSigma::Times([position, velocity]))
+    both.map(|(position, velocity)| (None, [position, velocity]))
         .ok_or("expected factors > 0: x3 or x3:2")
 }
 
@@ -392,52 +355,13 @@ fn fix_sigma(text: &str) -> Result<FixSigma, &'static str> {
     })
 }
 
-#[cfg(test)]
-mod request_tests {
-    use super::*;
-
-    /// At rest and level an accelerometer measures g upwards: −z of front, right, down.
-    #[test]
-    fn axes_of_loggers_are_rotations_to_front_right_down() {
-        for (name, x, y) in [("flu", DVec3::X, DVec3::NEG_Y), ("rfu", DVec3::Y, DVec3::X)] {
-            let Ok(MountingChoice::Axes(q)) = name.parse() else {
-                panic!("{name}");
-            };
-            let found = [DVec3::X, DVec3::Y, DVec3::Z].map(|v| (q * v).round());
-            assert_eq!(found, [x, y, DVec3::NEG_Z], "{name}");
-        }
-        let asked = crate::app::Asked::<Fuse>::of(["imu.csv", "gnss.csv", "m.toml"]).unwrap();
-        let settings = asked.request.settings().unwrap();
-        assert_eq!(settings.q_s_b, DQuat::IDENTITY);
-    }
-
-    #[test]
-    fn standard_deviations_of_a_receiver() {
-        let sigma = |text| fix_sigma(text).map(|s| (s.pos_m, s.vel_m_s));
-        assert_eq!(sigma("2"), Ok(([2.0; 3], None)));
-        assert_eq!(sigma("2,2,4:0.1"), Ok(([2.0, 2.0, 4.0], Some([0.1; 3]))));
-        assert_eq!(
-            sigma("1:0.1,0.1,0.2"),
-            Ok(([1.0; 3], Some([0.1, 0.1, 0.2])))
-        );
-        for bad in ["", "0", "1,2", "nan", "1:", "1:2:3", "1,2,-3"] {
-            assert!(sigma(bad).is_err(), "{bad}");
-        }
-    }
-}
-
 /// Start of a fusion.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StartChoice {
     /// Found in the data.
     Auto,
     /// Found in the data but for the heading.
-    Heading {
-        /// From north, clockwise (degrees).
-        deg: f64,
-        /// Standard deviation (degrees).
-        sigma_deg: f64,
-    },
+    Heading(Heading),
     /// Stated in a file.
     File(PathBuf),
 }
@@ -454,22 +378,13 @@ impl FromStr for StartChoice {
             Some((Ok(deg), Ok(sigma_deg)))
                 if sigma_deg > 0.0 && sigma_deg <= MAX_SIGMA_DEG && deg.abs() <= 360.0 =>
             {
-                Ok(Self::Heading { deg, sigma_deg })
+                let (yaw, sigma) = (deg * DEG, sigma_deg * DEG);
+                Ok(Self::Heading(Heading { yaw, sigma }))
             }
             Some((Ok(_), Ok(_))) => Err(format!(
                 "expected a heading and its standard deviation of up to {MAX_SIGMA_DEG}°, such as 90:5"
             )),
             _ => Ok(Self::File(text.into())),
-        }
-    }
-}
-
-impl Display for StartChoice {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Auto => f.write_str("auto"),
-            Self::Heading { deg, sigma_deg } => write!(f, "{deg}:{sigma_deg}"),
-            Self::File(path) => write!(f, "{}", path.display()),
         }
     }
 }
@@ -509,5 +424,1001 @@ impl From<MountingError> for Failure {
         Self::input(e).hint(
             "give --mounting ROLL,PITCH,YAW, or minutes of driving with braking and turns, and velocities in the fixes",
         )
+    }
+}
+
+// From the files of a request to a solution and its figures.
+
+/// Solution of a recorded drive.
+#[derive(Debug, Serialize)]
+#[serde(transparent)]
+#[non_exhaustive]
+pub struct FuseAnswer {
+    /// States, standard deviations and innovations.
+    #[serde(skip)]
+    pub solution: Solution,
+    /// Verdict and figures: `summary.json`.
+    pub summary: FuseSummary,
+    /// Quality of the model reduced to the filter's states, where it loses something.
+    #[serde(skip)]
+    pub reduction: Option<ReductionQuality>,
+    /// Files by their roles.
+    #[serde(skip)]
+    inputs: Vec<Input>,
+    /// Settings, for the manifest.
+    #[serde(skip)]
+    configuration: Value,
+}
+
+/// A drive that was read.
+struct Drive {
+    request: Fuse,
+    settings: Settings,
+    imu: Vec<ImuIncrement>,
+    imu_rate_hz: f64,
+    gnss: Vec<GnssFix>,
+    wheel: Vec<WheelSpeed>,
+    model: ModelFile,
+    expected: InitialSettings,
+    initial: Option<Start>,
+    reference: Option<Reference>,
+    configuration: Value,
+}
+
+impl Drive {
+    /// Reads the files of a request.
+    ///
+    /// # Errors
+    /// A setting out of range, a file that cannot be used.
+    fn read(request: &Fuse, context: &Context<'_>) -> Result<Self> {
+        let settings = request.settings();
+        let (unsaid, gnss_sigma_factor) = request.gnss_sigma.unwrap_or((None, [1.0; 2]));
+        let [position, velocity] = gnss_sigma_factor;
+        let topic = |k: usize| {
+            request
+                .topic
+                .get(k)
+                .map(String::as_str)
+                .filter(|t| !t.is_empty())
+        };
+        let imu = read_imu(&request.imu, request.columns.as_deref(), topic(0))?;
+        let span_s = imu
+            .samples
+            .first()
+            .zip(imu.samples.last())
+            .map(|(first, last)| (first.t_s, last.t_s));
+        let (mut gnss, remarks) = read_gnss(&request.gnss, unsaid.as_ref(), span_s, topic(1))?;
+        for fix in &mut gnss {
+            *fix = fix.with_sigmas_times(position, velocity);
+            fix.t_s -= request.gnss_delay_s;
+        }
+        for note in imu.remarks.into_iter().chain(remarks) {
+            match note.importance {
+                Importance::Warning => context.warn(note.text),
+                _ => context.remark(note.text),
+            }
+        }
+        let wheel = request
+            .odometer
+            .as_deref()
+            .map_or_else(|| Ok(Vec::new()), read_wheel)?;
+        let initial = request
+            .initial_file()
+            .map(|path| read_initial(path))
+            .transpose()?;
+        let model = inputs::model(&request.model, context)?;
+        if (model.model.rate_hz / imu.rate_hz - 1.0).abs() > 0.01 {
+            let (from, to) = (model.model.rate_hz, imu.rate_hz);
+            context.detail(format!(
+                "the model was converted from {from} Hz to {to:.3} Hz"
+            ));
+        }
+        let of_file = initial
+            .as_ref()
+            .map(|start| start.sigma.clone())
+            .unwrap_or_default();
+        let mut expected = request.expected(of_file);
+        inputs::expect_turn_on(&mut expected, &model, &request.model, context);
+        expected.validate().refuse()?;
+        let options = trajectory_file::Options::default();
+        let reference = request
+            .reference
+            .as_deref()
+            .map(|path| load_reference(path, &options))
+            .transpose()?;
+        let reference = reference.map(|(reference, warnings)| {
+            warnings.iter().for_each(|warning| context.warn(warning));
+            reference
+        });
+        let mut configuration = json!({
+            "settings": settings,
+            "filter": request.filter,
+            "initial": expected,
+            "gnss_sigma": unsaid,
+            "gnss_sigma_factor": gnss_sigma_factor,
+            "gnss_correlation": request.gnss_correlation,
+            "heading": request.given_heading(),
+            "gnss_delay_s": request.gnss_delay_s,
+        });
+        let aiding = request.aiding();
+        if !aiding.is_none() {
+            configuration["aiding"] = json!(aiding);
+        }
+        Ok(Self {
+            request: request.clone(),
+            settings,
+            imu: imu.samples,
+            imu_rate_hz: imu.rate_hz,
+            gnss,
+            wheel,
+            model,
+            expected,
+            initial,
+            reference,
+            configuration,
+        })
+    }
+
+    /// Fuses it. Outages are placed on the fixes, those before the start are left out.
+    ///
+    /// # Errors
+    /// Data and settings that do not fit together, or a filter that diverges.
+    fn fuse(mut self, context: &Context<'_>) -> Result<FuseAnswer> {
+        let origin_s = self.common_origin()?;
+        let mut recorded = Recorded {
+            imu: &self.imu,
+            gnss: &self.gnss,
+            aids: &[],
+        };
+        let mut settings = self.settings.clone();
+        let of_model = (&self.model.model, self.request.filter, &self.expected);
+        let (belief, reduction) =
+            belief(of_model, self.imu_rate_hz, &self.gnss, &settings.outages)?;
+        let plan = OutagePlan {
+            fixed: settings.outages,
+            ..OutagePlan::default()
+        };
+        let times_s: Vec<f64> = self.gnss.iter().map(|fix| fix.t_s).collect();
+        let placed = plan.on(&FixedData::recorded(&times_s), 0)?;
+        placed
+            .remarks
+            .iter()
+            .for_each(|remark| context.warn(remark));
+        settings.outages = placed.windows;
+        let mounting = match self.request.mounting {
+            Some(MountingChoice::Auto) => {
+                let found = mounting::find(&recorded, &settings, &belief);
+                Some(found.map_err(|e| self.not_mounted(e, &recorded, &settings, &belief))?)
+            }
+            _ => None,
+        };
+        if let Some(Mounting { q_s_b, sigma_b, .. }) = mounting {
+            (settings.q_s_b, settings.mounting_sigma_b) = (q_s_b, sigma_b);
+        }
+        let rest_s = origin_s.map_or(0.0, |_| rest_of_origin(&recorded, &belief, &settings));
+        let gnss = earlier(recorded.gnss, rest_s);
+        recorded.gnss = &gnss;
+        let delay_s = self.request.gnss_delay_s + origin_s.unwrap_or(0.0) + rest_s;
+        if origin_s.is_some() {
+            context.warn(format!(
+                "the clocks had nothing in common: fused with --gnss-delay={delay_s:.2}, from turns and innovations"
+            ));
+        }
+        let Alignment { start, doubts } = match (&self.initial, self.request.given_heading()) {
+            (Some(start), _) => Alignment {
+                start: beside_mounting(start.clone(), &settings),
+                doubts: Vec::new(),
+            },
+            (None, Some(heading)) => towards(&recorded, &settings, &belief, heading)?,
+            (None, None) => coarse(&recorded, &settings, &belief)?,
+        };
+        settings.outages.retain(|outage| {
+            let is_early = outage.end_s <= start.t_s;
+            if is_early {
+                let span = window(outage.start_s, outage.end_s);
+                context.warn(format!(
+                    "outage {span} ends before the start of the solution: it is left out"
+                ));
+            }
+            !is_early
+        });
+        // the start and the mounting are found without: they are what the vehicle's axes come from
+        let aiding = self.request.aiding();
+        self.check_wheel(&recorded, &settings.outages)?;
+        let aids = vehicle_velocities(&recorded, &self.wheel, &aiding, &settings.outages);
+        recorded.aids = &aids;
+        let belief = belief.with_vehicle(aiding.state_sigmas());
+        let asked = (self.reference.as_ref(), self.request.gnss_correlation);
+        let weighed = fuse_correlated(&recorded, &belief, &start, &settings, asked)?;
+        if self.reference.is_some() && weighed.solution.rows.iter().all(|row| row.error.is_none()) {
+            let message = "the reference and the solution have no time in common";
+            return Err(Failure::input(message).hint("both need one clock"));
+        }
+        doubt_heading(&weighed.solution, &settings.outages)
+            .iter()
+            .for_each(|doubt| context.warn(doubt));
+        let outcome = outcome(&weighed.solution, &settings.outages);
+        let Assessment { verdict, findings } = assess(&weighed, &outcome, &doubts);
+        let is_correlated = weighed
+            .whiteness
+            .as_ref()
+            .is_some_and(Whiteness::is_correlated);
+        let is_unexplained =
+            verdict >= VerdictKind::Doubtful || verdict == VerdictKind::Undecided && is_correlated;
+        let scene = Scene {
+            belief: &belief,
+            start: &start,
+            settings: &settings,
+            is_given: self.initial.is_some(),
+        };
+        let explained = is_unexplained
+            .then(|| {
+                scene.cause(&Recorded {
+                    gnss: &weighed.gnss,
+                    ..recorded
+                })
+            })
+            .flatten();
+        let cause = explained.map(|cause| cause.after(delay_s));
+        let kind = if cause.is_some() {
+            verdict.max(VerdictKind::Doubtful)
+        } else {
+            verdict
+        };
+        let against = |(verdict, finding)| (verdict > VerdictKind::Consistent).then_some(finding);
+        let evidence = findings.into_iter().filter_map(against).collect();
+        let constants = belief
+            .groups
+            .iter()
+            .flatten()
+            .filter(|g| g.is_constant())
+            .count();
+        let rows = &weighed.solution.rows;
+        let squares = rows
+            .iter()
+            .map(|row| row.sigma[0].powi(2) + row.sigma[1].powi(2));
+        let summary = FuseSummary {
+            schema_version: 1,
+            method: "fusion",
+            verdict: FuseVerdict {
+                kind,
+                evidence,
+                cause,
+            },
+            imu_samples: weighed.solution.samples,
+            imu_rate_hz: self.imu_rate_hz,
+            start_s: start.t_s,
+            end_s: weighed
+                .solution
+                .rows
+                .last()
+                .map_or(start.t_s, |row| row.t_s),
+            filter_states: belief.states,
+            turn_on_states: 3 * constants,
+            initial: Initial::new(
+                &start,
+                self.request.initial_file().map(|path| path.as_path()),
+            ),
+            mounting: mounting.as_ref().map(Into::into),
+            horizontal_sigma_rms_m: (squares.sum::<f64>() / rows.len() as f64).sqrt(),
+            gnss_correlation: fix_correlation(&weighed),
+            vehicle: vehicle(&weighed.solution, &aiding),
+            outcome,
+        };
+        Ok(FuseAnswer {
+            solution: weighed.solution,
+            summary,
+            reduction,
+            inputs: context.inputs().to_vec(),
+            configuration: self.configuration,
+        })
+    }
+}
+
+impl Drive {
+    /// Brings fixes to the clock of the IMU where the two have nothing in common and no delay is given; by how much (s).
+    fn common_origin(&mut self) -> Result<Option<f64>> {
+        let recorded = Recorded {
+            imu: &self.imu,
+            gnss: &self.gnss,
+            aids: &[],
+        };
+        let Err(apart) = check_clocks(&recorded) else {
+            return Ok(None);
+        };
+        let is_free = self.request.gnss_delay_s == 0.0;
+        let origin_s = is_free
+            .then(|| rough_origin(&recorded))
+            .flatten()
+            .ok_or(apart)?;
+        self.gnss = earlier(&self.gnss, origin_s);
+        Ok(Some(origin_s))
+    }
+
+    /// Refuses a wheel of another time or unit.
+    fn check_wheel(&self, recorded: &Recorded<'_>, outages: &[Outage]) -> Result<()> {
+        /// Tyres and speeds by noisy positions differ by less, units by more.
+        const RATIO: Range<f64> = 0.6..1.55;
+        let span = self.imu.first().zip(self.imu.last());
+        let is_within =
+            |w: &WheelSpeed| span.is_some_and(|(a, b)| (a.t_s..=b.t_s).contains(&w.t_s));
+        if !self.wheel.is_empty() && !self.wheel.iter().any(is_within) {
+            let message = "the wheel and the IMU have no time in common";
+            return Err(Failure::input(message).hint("both need one clock"));
+        }
+        match wheel_ratio(recorded, &self.wheel, outages) {
+            Some(ratio) if !RATIO.contains(&ratio) => {
+                let message = format!("the wheel reads {ratio:.2} times the speed of the fixes");
+                Err(Failure::input(message)
+                    .hint("check the unit in the header: _m_s, _km_h or _mph"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Why the mounting is not found: the clocks, where they are apart.
+    fn not_mounted(
+        &self,
+        e: MountingError,
+        recorded: &Recorded<'_>,
+        settings: &Settings,
+        belief: &Belief,
+    ) -> Failure {
+        let rest = |there: &Recorded<'_>| {
+            let found = mounting::find(there, settings, belief).ok()?;
+            let settings = Settings {
+                q_s_b: found.q_s_b,
+                mounting_sigma_b: found.sigma_b,
+                ..settings.clone()
+            };
+            let start = coarse(there, &settings, belief).ok()?.start;
+            displaced(there, belief, &start, &settings)?.delay_s
+        };
+        let Some(mut clocks) = clocks_apart(recorded, rest) else {
+            return e.into();
+        };
+        clocks.delay_s += self.request.gnss_delay_s;
+        Failure::input(e).hint(document::apart(&clocks))
+    }
+}
+
+/// What a cause is looked for with.
+struct Scene<'a> {
+    belief: &'a Belief,
+    start: &'a Start,
+    settings: &'a Settings,
+    /// Whether the start was given.
+    is_given: bool,
+}
+
+impl Scene<'_> {
+    /// Cause of innovations that are large or last: the clocks, else the antenna or a small delay.
+    fn cause(&self, recorded: &Recorded<'_>) -> Option<Cause> {
+        let small =
+            || displaced(recorded, self.belief, self.start, self.settings).map(Cause::Displaced);
+        self.clocks(recorded).map(Cause::Clocks).or_else(small)
+    }
+
+    /// Clocks that are apart, where the innovations are smaller when they are not: the course of what walks or slips has
+    /// other turns than its body.
+    fn clocks(&self, recorded: &Recorded<'_>) -> Option<ClocksApart> {
+        // turns of the course tell it to tenths of a second, the innovations tell the rest
+        let clocks = clocks_apart(recorded, |there| {
+            displaced(there, self.belief, &self.start(there)?, self.settings)?.delay_s
+        })?;
+        let gnss = earlier(recorded.gnss, clocks.delay_s);
+        let without = self.nis(&Recorded {
+            gnss: &gnss,
+            ..*recorded
+        })?;
+        self.nis(recorded)
+            .is_none_or(|now| without < now)
+            .then_some(clocks)
+    }
+
+    /// Mean NIS per component with a start of its own.
+    fn nis(&self, recorded: &Recorded<'_>) -> Option<f64> {
+        let solution = fuse(
+            recorded,
+            self.belief,
+            &self.start(recorded)?,
+            self.settings,
+            None,
+        )
+        .ok()?;
+        Some(outcome(&solution, &[]).nis_per_component).filter(|nis| nis.is_finite())
+    }
+
+    fn start(&self, recorded: &Recorded<'_>) -> Option<Start> {
+        if self.is_given {
+            Some(self.start.clone())
+        } else {
+            coarse(recorded, self.settings, self.belief)
+                .ok()
+                .map(|a| a.start)
+        }
+    }
+}
+
+impl Cause {
+    /// The same where the fixes were delayed already (s).
+    fn after(mut self, given_s: f64) -> Self {
+        match &mut self {
+            Self::Clocks(clocks) => clocks.delay_s += given_s,
+            Self::Displaced(found) => found
+                .delay_s
+                .iter_mut()
+                .for_each(|[delay_s, _]| *delay_s += given_s),
+        }
+        self
+    }
+}
+
+/// A start that states the attitude of the vehicle: that of the IMU is known no better than the mounting.
+fn beside_mounting(mut start: Start, settings: &Settings) -> Start {
+    let mounting_deg = (settings.mounting_sigma_b / DEG).to_array();
+    for (sigma, mounting) in start.sigma.att_sigma_deg.iter_mut().zip(mounting_deg) {
+        *sigma = sigma.hypot(mounting).min(30.0).max(*sigma);
+    }
+    start
+}
+
+/// Heading that the motion between outages hardly shows.
+fn doubt_heading(solution: &Solution, outages: &[Outage]) -> Option<HeadingDoubt> {
+    let start_s = solution.rows.first()?.t_s;
+    let fixed = solution
+        .rows
+        .iter()
+        .filter(|row| !outages.iter().any(|o| o.withholds(row.t_s)));
+    weak_heading(fixed.map(|row| (row.t_s - start_s, row.sigma[8])))
+}
+
+// The filter of a fusion: made for a recording whose trajectory is not known.
+
+/// The filter for an IMU of that rate, these fixes and outages. A reduced filter is made for a built-in drive with
+/// the receiver of the fixes; also what the reduction loses.
+///
+/// # Errors
+/// When the model cannot be converted to the rate, or has no such filter.
+fn belief(
+    (model, states, initial): (&Model, FilterStates, &InitialSettings),
+    rate_hz: f64,
+    gnss: &[GnssFix],
+    outages: &[Outage],
+) -> Result<(Belief, Option<ReductionQuality>)> {
+    let model = at_rate(model, rate_hz).refuse_within("the model")?;
+    let lengths: Vec<f64> = outages.iter().map(|o| o.end_s - o.start_s).collect();
+    let interval_s = interval_s(gnss).unwrap_or(1.0);
+    let window_s = reduction::window_s(lengths.iter().copied().fold(0.0, f64::max));
+    let belief = Belief::new(&model, states, interval_s, window_s).refuse_within("the model")?;
+    let drive = || {
+        lincov::drive(
+            &model,
+            &ImuSettings::default(),
+            &receiver(gnss, interval_s),
+            &lengths,
+        )
+    };
+    let Some(track) = states.is_reduced().then(drive).flatten() else {
+        return Ok((belief.with_initial(initial), None));
+    };
+    let belief =
+        lincov::reduced_belief(&model, belief, &track, lincov::Alike::All).with_initial(initial);
+    let full = Belief::new(&model, FilterStates::Full, interval_s, window_s);
+    let full = full
+        .ok()
+        .map(|full| full.with_initial(&beside(states, initial)));
+    let made = (&model, &belief, full.as_ref());
+    let quality = reduction_of(made, &track, &Context::default());
+    Ok((belief, quality))
+}
+
+/// What a filter expects beside the model, with what its states say of scale factors.
+fn beside(states: FilterStates, initial: &InitialSettings) -> InitialSettings {
+    let mut all = initial.clone();
+    let ppm = states.scale_sigma() * 1e6;
+    if ppm > 0.0 {
+        all.accel_scale_sigma_ppm.get_or_insert(ppm);
+        all.gyro_scale_sigma_ppm.get_or_insert(ppm);
+    }
+    all
+}
+
+/// The receiver of the fixes: medians.
+fn receiver(gnss: &[GnssFix], interval_s: f64) -> GnssSettings {
+    let defaults = GnssSettings::default();
+    let position = |i: usize| middle(gnss.iter().map(|fix| fix.pos_sigma_n[i]).collect());
+    let velocity = |i: usize| {
+        middle(
+            gnss.iter()
+                .filter_map(|fix| Some(fix.velocity?.sigma_n()[i]))
+                .collect(),
+        )
+    };
+    let velocities = [0, 1, 2].map(velocity);
+    let has_velocity = velocities.iter().all(Option::is_some);
+    GnssSettings {
+        rate_hz: 1.0 / interval_s,
+        pos_sigma_m: [0, 1, 2].map(|i| position(i).unwrap_or(defaults.pos_sigma_m[i])),
+        vel_sigma_m_s: has_velocity.then(|| velocities.map(Option::unwrap_or_default)),
+        ..defaults
+    }
+}
+
+/// At the rate of the recording, without quantization noise: the filter leaves it out, and it belongs to
+/// its own rate.
+fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, continuous::RateError> {
+    let kept = |axis: &Composite| {
+        let processes = axis
+            .processes
+            .iter()
+            .filter(|p| !matches!(p, Process::Quantization(_)));
+        Composite::new(processes.copied().collect())
+    };
+    let axes = std::array::from_fn(|i| kept(&model.axes[i]));
+    continuous::at_rate(
+        &Model {
+            rate_hz: model.rate_hz,
+            axes,
+        },
+        rate_hz,
+    )
+}
+
+// Verdict and figures of a fusion: `summary.json`.
+
+const STATE: [&str; 9] = [
+    "lat_deg",
+    "lon_deg",
+    "h_m",
+    "v_n_m_s",
+    "v_e_m_s",
+    "v_d_m_s",
+    "roll_deg",
+    "pitch_deg",
+    "yaw_deg",
+];
+
+/// `summary.json` of a fusion.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct FuseSummary {
+    schema_version: u32,
+    method: &'static str,
+    /// VerdictKind, evidence and cause.
+    pub verdict: FuseVerdict,
+    /// IMU samples used.
+    pub imu_samples: usize,
+    /// Their rate (Hz).
+    pub imu_rate_hz: f64,
+    /// First time of the solution (s).
+    pub start_s: f64,
+    /// Last time of the solution (s).
+    pub end_s: f64,
+    /// States of the filter, those of a turn-on bias included.
+    pub filter_states: usize,
+    /// States of a turn-on bias.
+    pub turn_on_states: usize,
+    initial: Initial,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mounting: Option<MountingRow>,
+    /// Root mean square of the horizontal standard deviation of the filter (m).
+    pub horizontal_sigma_rms_m: f64,
+    /// Correlation of the innovations, and what the filter makes of it; none where fixes are few.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gnss_correlation: Option<Value>,
+    /// What the vehicle knows, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vehicle: Option<Value>,
+    /// Fixes, NIS, errors at the ends of outages and against the reference.
+    #[serde(flatten)]
+    pub outcome: Outcome,
+}
+
+/// Verdict on a solution.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FuseVerdict {
+    /// In one word.
+    pub kind: VerdictKind,
+    /// Evidence against the solution, the gravest first.
+    pub evidence: Vec<Finding>,
+    /// Cause of large innovations, where one was found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cause: Option<Cause>,
+}
+
+/// Cause of large innovations.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cause {
+    /// The clocks of IMU and GNSS differ.
+    Clocks(ClocksApart),
+    /// The antenna is elsewhere, or the fixes are a little late.
+    Displaced(Displaced),
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Initial {
+    t_s: f64,
+    state: BTreeMap<&'static str, f64>,
+    sigma: InitialSettings,
+    how: Vec<String>,
+}
+
+/// A mounting that was found: angles as `--mounting` takes them, standard deviations about front, right, down.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct MountingRow {
+    roll_deg: f64,
+    pitch_deg: f64,
+    yaw_deg: f64,
+    sigma_deg: [f64; 3],
+    how: String,
+}
+
+impl Initial {
+    /// The start, from the data or from a file.
+    fn new(start: &Start, file: Option<&Path>) -> Self {
+        let how = match (&start.found, file) {
+            (Some(found), _) => how(start, found),
+            (None, file) => file
+                .iter()
+                .map(|file| format!("as {} says", file.display()))
+                .collect(),
+        };
+        let state = STATE.into_iter().zip(values(&start.state)).collect();
+        Self {
+            t_s: start.t_s,
+            state,
+            sigma: start.sigma.clone(),
+            how,
+        }
+    }
+}
+
+/// Sources of a start that was found.
+fn how(start: &Start, found: &Found) -> Vec<String> {
+    let [.., roll, pitch, yaw] = values(&start.state);
+    let [tilt_sigma, _, yaw_sigma] = start.sigma.att_sigma_deg;
+    let level = match found.level {
+        Levelling::AtRest(until_s) => {
+            format!("from levelling at rest until {until_s:.2} s, carried on by the gyroscopes")
+        }
+        Levelling::InMotion(seconds) => {
+            format!(
+                "from accelerations over the {seconds:.1} s after it (no better static window before)"
+            )
+        }
+    };
+    let (speed, sigma) = (start.state.v_n.truncate().length(), found.course_sigma_deg);
+    let reversing = if found.is_reversing {
+        ", reversing"
+    } else {
+        ""
+    };
+    let t_s = start.t_s;
+    let source = if found.is_given {
+        "as given".to_owned()
+    } else {
+        format!(
+            "from the course of the fix at {} s ({speed:.1} m/s{reversing})",
+            seconds(t_s)
+        )
+    };
+    let mut how = vec![
+        format!("roll {roll:.2}°, pitch {pitch:.2}° ± {tilt_sigma:.2}° {level}"),
+        format!("heading {yaw:.1}° ± {sigma:.1}° {source}"),
+        "biases start at zero".to_owned(),
+    ];
+    how.extend(found.moved_deg.map(|moved| {
+        format!(
+            "heading ± {yaw_sigma:.1}°: the fixes of the next minute move it by {moved:+.0}° (wind, slip)"
+        )
+    }));
+    how
+}
+
+impl From<&Mounting> for MountingRow {
+    fn from(found: &Mounting) -> Self {
+        // hundredths are what is printed; + 0 takes the sign from -0
+        let [roll_deg, pitch_deg, yaw_deg] = found
+            .angles_deg()
+            .map(|a| (a * 100.0).round() / 100.0 + 0.0);
+        let km = found.way_m / 1000.0;
+        let widened = match found.sigma_factor {
+            1.0 => String::new(),
+            factor => format!("; the fixes taken as {factor:.1} times as uncertain as they state"),
+        };
+        let how = format!(
+            "from gravity, accelerations and turns, and the attitude of the IMU beside the track over {km:.1} km; the roads taken as level across on average, the vehicle as going where it looks{widened}"
+        );
+        Self {
+            roll_deg,
+            pitch_deg,
+            yaw_deg,
+            sigma_deg: found.sigma_deg(),
+            how,
+        }
+    }
+}
+
+/// Position (degrees, m), velocity, roll, pitch, yaw (degrees).
+fn values(s: &NavState) -> [f64; 9] {
+    let rpy = RollPitchYaw::from_quat(s.q_b_n);
+    let [roll, pitch, yaw] = [rpy.roll, rpy.pitch, rpy.yaw].map(|a| a / DEG);
+    [
+        s.lat / DEG,
+        wrap_angle(s.lon) / DEG,
+        s.h,
+        s.v_n.x,
+        s.v_n.y,
+        s.v_n.z,
+        roll,
+        pitch,
+        yaw,
+    ]
+}
+
+// What the vehicle knows of its own motion: settings, figures, table.
+
+/// A road car's axes are known in the IMU's to a degree, its wheel's size to the wear and pressure of a tyre (1 σ).
+const MOUNTING_SIGMA_DEG: f64 = 1.0;
+const SCALE_SIGMA: f64 = 0.03;
+
+impl Fuse {
+    /// What is believed of the vehicle: nothing that was not asked for.
+    fn aiding(&self) -> AidingSettings {
+        let lever_arm_m = self.rear_axle_m;
+        AidingSettings {
+            nhc: self.nhc.then(|| NhcSettings {
+                mounting_sigma_deg: MOUNTING_SIGMA_DEG,
+                lever_arm_m,
+                ..NhcSettings::default()
+            }),
+            odometer: self.odometer.as_ref().map(|_| OdometerSettings {
+                scale_sigma: SCALE_SIGMA,
+                lever_arm_m,
+                ..OdometerSettings::default()
+            }),
+            zupt: self.zupt.then(ZuptSettings::default),
+            heading: None,
+        }
+    }
+}
+
+/// Estimates at the end, and how the aids agree with the solution; none where nothing was asked for.
+fn vehicle(solution: &Solution, settings: &AidingSettings) -> Option<Value> {
+    if settings.is_none() {
+        return None;
+    }
+    let mut found = json!({ "aids": aid_innovations(&solution.aids) });
+    let keys = [
+        ("wheel_scale", 1.0),
+        ("mounting_pitch_deg", DEG),
+        ("mounting_yaw_deg", DEG),
+    ];
+    for (i, (key, unit)) in keys.into_iter().enumerate() {
+        let known = solution
+            .vehicle
+            .filter(|_| settings.state_sigmas()[i] > 0.0);
+        if let Some([value, sigma]) = known.map(|v| v.map(|estimates| estimates[i] / unit)) {
+            found[key] = json!({ "value": value, "sigma": sigma });
+        }
+    }
+    Some(found)
+}
+
+/// Errors of fixes that last: the correlation of their innovations, standard deviations as stated, and the filter's answer.
+fn fix_correlation(weighed: &Weighed) -> Option<Value> {
+    let white = weighed.whiteness?;
+    Some(json!({
+        "lag_1": white.lag_1,
+        "limit": white.limit,
+        "is_correlated": white.is_correlated(),
+        "pos_sigma_factor": weighed.pos_sigma_factor,
+        "nis_as_stated": outcome(weighed.judged(), &[]).nis_per_component,
+    }))
+}
+
+// Files of a fusion directory: tables, track for maps, summary, page.
+
+/// Names of the files of a fusion directory. The smoothed ones are there where that was asked for.
+const FILES: [&str; 8] = [
+    "solution.csv",
+    "innovations.csv",
+    "errors.csv",
+    "solution.kml",
+    "smoothed.csv",
+    "errors_smoothed.csv",
+    "smoothed.kml",
+    "summary.json",
+];
+
+/// The files of a fusion directory; `errors.csv` is empty but for its header without a
+/// reference.
+fn directory(answer: &FuseAnswer) -> Vec<OutputFile<'static>> {
+    let FuseAnswer {
+        solution, summary, ..
+    } = answer;
+    let title = answer
+        .inputs
+        .first()
+        .map_or("solution", |imu| imu.path.as_str());
+    let smoothed = solution.smoothed.as_deref();
+    let contents = [
+        Some(solution_csv(&solution.rows)),
+        Some(innovations_csv(solution)),
+        Some(errors_csv(&solution.rows)),
+        Some(kml(&solution.rows, "solution", title)),
+        smoothed.map(solution_csv),
+        smoothed.map(errors_csv),
+        smoothed.map(|rows| kml(rows, "smoothed solution", title)),
+        Some(json(summary)),
+    ];
+    let files = FILES.into_iter().zip(contents);
+    files
+        .filter_map(|(name, text)| Some(OutputFile::whole(name, text?)))
+        .collect()
+}
+
+fn header(groups: &[(&str, &[&str])]) -> String {
+    let names = groups
+        .iter()
+        .flat_map(|(prefix, names)| names.iter().map(move |n| format!("{prefix}{n}")));
+    std::iter::once("t_s".to_owned())
+        .chain(names)
+        .collect::<Vec<_>>()
+        .join(",")
+        + "\n"
+}
+
+/// A number with as many digits as its size deserves: 1e-10 degrees are 0.01 mm.
+fn fixed(x: f64, digits: usize) -> String {
+    if x.is_finite() && x.abs() < 1e15 {
+        format!("{x:.digits$}")
+    } else {
+        shortest(x)
+    }
+}
+
+/// `solution.csv` and `smoothed.csv`: states, their standard deviations (those of latitude and longitude in degrees), bias
+/// estimates, the horizontal standard deviations in metres, and those of the biases.
+fn solution_csv(rows: &[Row]) -> String {
+    let mut text = header(&[
+        ("", &STATE),
+        ("sd_", &STATE),
+        ("", &BIAS_NAMES),
+        ("sd_", &["n_m", "e_m"]),
+        ("sd_", &BIAS_NAMES),
+    ]);
+    for row in rows {
+        let (state, sd) = (values(&row.state), &row.sigma);
+        let r = radii(row.state.lat.sin());
+        let sd_lat = sd[0] / (r.meridian + row.state.h) / DEG;
+        let sd_lon = sd[1] / ((r.transverse + row.state.h) * row.state.lat.cos()) / DEG;
+        let digits = [10, 10, 5, 6, 6, 6, 7, 7, 7];
+        let mut cells = vec![fixed(row.t_s, 6)];
+        cells.extend(state.iter().zip(digits).map(|(x, d)| fixed(*x, d)));
+        cells.extend([sd_lat, sd_lon].map(|x| format!("{x:.4e}")));
+        cells.extend(sd[2..].iter().map(|x| fixed(*x, 6)));
+        cells.extend(
+            row.bias
+                .iter()
+                .flat_map(|b| b.to_array())
+                .map(|x| fixed(x, 9)),
+        );
+        cells.extend(sd[..2].iter().map(|x| fixed(*x, 6)));
+        cells.extend(
+            row.bias_sigma
+                .iter()
+                .flat_map(|b| b.to_array())
+                .map(|x| fixed(x, 9)),
+        );
+        text += &(cells.join(",") + "\n");
+    }
+    text
+}
+
+/// `innovations.csv`: every fix; 1 where it was used, and why not where it was not.
+fn innovations_csv(solution: &Solution) -> String {
+    let mut text = header(&[
+        ("", &["used", "status"]),
+        ("", &REPORTED_NAMES[..6]),
+        ("sd_", &REPORTED_NAMES[..6]),
+        ("", &["nis", "dof"]),
+    ]);
+    for fix in &solution.fixes {
+        let status = if fix.used { "used" } else { "withheld" };
+        let used = u8::from(fix.used).to_string();
+        let mut cells = vec![fixed(fix.t_s, 6), used, status.to_owned()];
+        for list in [&fix.innovation, &fix.sigma] {
+            cells.extend((0..6).map(|i| list.get(i).map_or_else(String::new, |x| fixed(*x, 6))));
+        }
+        cells.extend([fixed(fix.nis, 4), fix.innovation.len().to_string()]);
+        text += &(cells.join(",") + "\n");
+    }
+    text
+}
+
+fn errors_csv(rows: &[Row]) -> String {
+    let mut text = header(&[("err_", &REPORTED_NAMES), ("", &["nees"])]);
+    for (row, error) in rows.iter().filter_map(|row| Some((row, row.error?))) {
+        let cells: Vec<String> = error.values.iter().map(|x| fixed(*x, 6)).collect();
+        let _ = writeln!(
+            text,
+            "{},{},{}",
+            fixed(row.t_s, 6),
+            cells.join(","),
+            fixed(error.nees, 4)
+        );
+    }
+    text
+}
+
+/// The way as a line on the map, a point a second at most.
+fn kml(rows: &[Row], name: &str, title: &str) -> String {
+    let mut line = String::new();
+    let mut last = f64::NEG_INFINITY;
+    for (k, row) in rows.iter().enumerate() {
+        if row.t_s - last >= 1.0 - 1e-6 || k + 1 == rows.len() {
+            let (lon, lat, h) = (
+                wrap_angle(row.state.lon) / DEG,
+                row.state.lat / DEG,
+                row.state.h,
+            );
+            let _ = write!(line, "{lon:.8},{lat:.8},{h:.2} ");
+            last = row.t_s;
+        }
+    }
+    let title = title.replace('&', "&amp;").replace('<', "&lt;");
+    let points = line.trim_end();
+    format!(
+        r#"<?xml version="1.0" encoding="UTF-8"?>
+<kml xmlns="http://www.opengis.net/kml/2.2">
+<Document>
+<name>{title}</name>
+<Placemark>
+<name>{name}</name>
+<Style><LineStyle><color>ff0050ff</color><width>3</width></LineStyle></Style>
+<LineString><tessellate>1</tessellate><altitudeMode>clampToGround</altitudeMode>
+<coordinates>{points}</coordinates>
+</LineString>
+</Placemark>
+</Document>
+</kml>
+"#
+    )
+}
+
+#[cfg(test)]
+mod request_tests {
+    use super::*;
+
+    /// At rest and level an accelerometer measures g upwards: −z of front, right, down.
+    #[test]
+    fn axes_of_loggers_are_rotations_to_front_right_down() {
+        for (name, x, y) in [("flu", DVec3::X, DVec3::NEG_Y), ("rfu", DVec3::Y, DVec3::X)] {
+            let Ok(MountingChoice::Given(q, _)) = name.parse() else {
+                panic!("{name}");
+            };
+            let found = [DVec3::X, DVec3::Y, DVec3::Z].map(|v| (q * v).round());
+            assert_eq!(found, [x, y, DVec3::NEG_Z], "{name}");
+        }
+        let asked = crate::app::Asked::<Fuse>::of(["imu.csv", "gnss.csv", "m.toml"]).unwrap();
+        let settings = asked.request.settings();
+        assert_eq!(settings.q_s_b, DQuat::IDENTITY);
+    }
+
+    #[test]
+    fn standard_deviations_of_a_receiver() {
+        let sigma = |text| fix_sigma(text).map(|s| (s.pos_m, s.vel_m_s));
+        assert_eq!(sigma("2"), Ok(([2.0; 3], None)));
+        assert_eq!(sigma("2,2,4:0.1"), Ok(([2.0, 2.0, 4.0], Some([0.1; 3]))));
+        assert_eq!(
+            sigma("1:0.1,0.1,0.2"),
+            Ok(([1.0; 3], Some([0.1, 0.1, 0.2])))
+        );
+        for bad in ["", "0", "1,2", "nan", "1:", "1:2:3", "1,2,-3"] {
+            assert!(sigma(bad).is_err(), "{bad}");
+        }
     }
 }

@@ -2,19 +2,18 @@
 
 use crate::app::Manifest;
 use crate::commands::run::RunOrigin;
-use crate::failure::{Failure, Place};
+use crate::failure::{Failure, Place, Result};
 use crate::io::run_tables::{REPEAT, parse_epochs, parse_runs};
 use crate::io::{hash, source};
-use nav_sim_navigation::metrics::{Measured, PerState, Verdict};
+use nav_sim_navigation::metrics::{Measured, PerState, VerdictKind};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::{OutageRecord, RunRecord};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
 use std::path::Path;
 
-/// Lower and upper end of each state's interval, where it is known.
-pub(crate) type OpenEnds = Option<PerState<(f64, f64)>>;
-
 /// A run directory.
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RunDirectory {
     /// Where it came from.
     pub manifest: Manifest,
@@ -22,24 +21,32 @@ pub(crate) struct RunDirectory {
     pub origin: RunOrigin,
     /// What was found.
     pub experiment: Measured,
-    /// Whether the filter is as good as it believes: as its own command found it, covariance analysis included.
-    pub verdict: Verdict,
+    /// Its summary, with the verdict as its own command found it, covariance analysis included.
+    pub summary: Value,
     /// 95 % interval of the mean ASEE over each outage by what the calibration leaves open, where it is known.
-    pub asee_mean_ci95: Vec<OpenEnds>,
+    pub asee_mean_ci95: Vec<Option<PerState<(f64, f64)>>>,
 }
 
 /// Reads a run directory.
 ///
 /// # Errors
 /// The file, and what is wrong with it.
-pub(crate) fn read(directory: &Path) -> Result<RunDirectory, Failure> {
-    let (manifest, origin) = manifest(directory)?;
-    let (path, epochs_text) = text(directory, "epochs.csv")?;
-    let epochs = parse_epochs(&path, &epochs_text)?;
-    as_written(directory, &manifest, "epochs.csv", &epochs_text)?;
-    let (path, summary) = text(directory, "summary.json")?;
-    let found: Found = serde_json::from_str(&summary).map_err(|e| not_json(&path, &e))?;
-    as_written(directory, &manifest, "summary.json", &summary)?;
+pub(crate) fn read(directory: &Path) -> Result<RunDirectory> {
+    let (path, json) = text(directory, "manifest.json")?;
+    let value: Value = from_json(&path, &json)?;
+    let (found, expected) = (&value["schema_version"], Manifest::SCHEMA_VERSION);
+    if *found != expected {
+        let message = format!("\"schema_version\" is {found}; this nav-sim reads {expected}");
+        let failure = Failure::contents(path, Place::Within, message);
+        return Err(failure.or_hint("repeat the run with this version"));
+    }
+    let manifest: Manifest = from_json(&path, &json)?;
+    let origin: RunOrigin = from_json(&path, &json)?;
+    let epochs = part(directory, &manifest, "epochs.csv", parse_epochs)?;
+    let (found, summary): (Found, Value) =
+        part(directory, &manifest, "summary.json", |path, text| {
+            Ok((from_json(path, text)?, from_json(path, text)?))
+        })?;
     let is_expected = origin.configuration.run.method == Method::Lincov;
     let runs = if is_expected {
         let known = |state: PerState<Option<f64>>| state.0.map(|x| x.unwrap_or(f64::NAN));
@@ -53,105 +60,83 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, Failure> {
             ..RunRecord::default()
         }]
     } else {
-        let (path, runs_text) = text(directory, "runs.csv")?;
-        let runs = parse_runs(&path, &runs_text)?;
-        as_written(directory, &manifest, "runs.csv", &runs_text)?;
-        runs
+        part(directory, &manifest, "runs.csv", parse_runs)?
     };
-    let outages = origin
-        .configuration
-        .outage
-        .iter()
-        .flatten()
-        .map(|o| (o.start_s, o.end_s))
-        .collect();
-    let independent_windows = origin.independent_windows;
-    let experiment = Measured {
-        epochs,
-        runs,
-        outages,
-        independent_windows,
-        is_expected,
-    };
+    let outages = origin.configuration.outage.iter().flatten();
     Ok(RunDirectory {
+        experiment: Measured {
+            epochs,
+            runs,
+            outages: outages.map(|o| (o.start_s, o.end_s)).collect(),
+            independent_windows: origin.independent_windows,
+            is_expected,
+        },
+        asee_mean_ci95: found.outages.iter().map(|o| o.asee_mean_ci95).collect(),
         manifest,
         origin,
-        experiment,
-        verdict: found.verdict,
-        asee_mean_ci95: found.outages.iter().map(|o| o.asee_mean_ci95).collect(),
+        summary,
     })
 }
 
-/// `summary.json`, as far as comparisons need it.
-#[derive(serde::Deserialize)]
+/// `summary.json`, as far as it must be right.
+#[derive(Deserialize)]
 struct Found {
-    verdict: Verdict,
+    #[expect(dead_code, reason = "words are made of it")]
+    verdict: FoundVerdict,
     outages: Vec<FoundOutage>,
 }
 
-#[derive(serde::Deserialize)]
+#[derive(Deserialize)]
+struct FoundVerdict {
+    #[expect(dead_code, reason = "words are made of it")]
+    kind: VerdictKind,
+}
+
+#[derive(Deserialize)]
 struct FoundOutage {
     asee_mean: PerState<Option<f64>>,
     rmse_end: PerState<Option<f64>>,
-    asee_mean_ci95: OpenEnds,
+    asee_mean_ci95: Option<PerState<(f64, f64)>>,
 }
 
-/// Refuses a file that is not the one the manifest tells of; what can be read of it was, for a more exact message.
-fn as_written(
+/// A file that is the one the manifest tells of; what can be read of another was, for a more exact message.
+fn part<T>(
     directory: &Path,
     manifest: &Manifest,
     name: &str,
-    text: &str,
-) -> Result<(), Failure> {
+    parse: impl Fn(&str, &str) -> Result<T>,
+) -> Result<T> {
+    let (path, text) = text(directory, name)?;
+    let found = parse(&path, &text)?;
     match manifest.outputs.get(name) {
         Some(blake3) if *blake3 != hash::of_bytes(text.as_bytes()) => {
-            let path = directory.join(name).display().to_string();
             let message =
                 "is not what its manifest.json says (BLAKE3): it is damaged, or was changed";
             Err(Failure::contents(path, Place::Within, message).or_hint(REPEAT))
         }
-        _ => Ok(()),
+        _ => Ok(found),
     }
 }
 
-fn manifest(directory: &Path) -> Result<(Manifest, RunOrigin), Failure> {
-    let (path, json) = text(directory, "manifest.json")?;
-    let value: serde_json::Value = serde_json::from_str(&json).map_err(|e| not_json(&path, &e))?;
-    let (found, expected) = (&value["schema_version"], Manifest::SCHEMA_VERSION);
-    if *found == expected {
-        let manifest: Manifest = serde_json::from_str(&json).map_err(|e| not_json(&path, &e))?;
-        let origin = serde_json::from_value(manifest.record.clone().into());
-        return match origin {
-            Ok(origin) => Ok((manifest, origin)),
-            Err(e) => Err(not_json(&path, &e)),
-        };
-    }
-    let message = format!("\"schema_version\" is {found}; this nav-sim reads {expected}");
-    Err(Failure::contents(path, Place::Within, message).or_hint("repeat the run with this version"))
+fn from_json<T: DeserializeOwned>(path: &str, json: &str) -> Result<T> {
+    serde_json::from_str(json).map_err(|e| {
+        let message = e.to_string();
+        let message = message.split(" at line ").next().unwrap_or_default();
+        Failure::contents(path, e.line(), message).or_hint(REPEAT)
+    })
 }
 
-fn not_json(path: &str, e: &serde_json::Error) -> Failure {
-    let message = e
-        .to_string()
-        .split(" at line ")
-        .next()
-        .unwrap_or_default()
-        .to_owned();
-    Failure::contents(path, e.line(), message).or_hint(REPEAT)
-}
-
-fn text(directory: &Path, name: &str) -> Result<(String, String), Failure> {
+fn text(directory: &Path, name: &str) -> Result<(String, String)> {
     let path = directory.join(name);
-    match source::text(&path) {
-        Ok(text) => Ok((path.display().to_string(), text)),
-        Err(source) => {
-            let unfinished = "not a finished run directory: make one with `nav-sim run … -o DIR`";
-            let is_missing = source.kind() == std::io::ErrorKind::NotFound;
-            let failure = Failure::io(&path, source);
-            Err(match is_missing {
-                true => failure.hint(unfinished),
-                false => failure,
-            })
+    let text = source::text(&path).map_err(|e| {
+        let is_missing = e.kind() == std::io::ErrorKind::NotFound;
+        let failure = Failure::io(&path, e);
+        match is_missing {
+            true => {
+                failure.hint("not a finished run directory: make one with `nav-sim run … -o DIR`")
+            }
+            false => failure,
         }
-    }
+    })?;
+    Ok((path.display().to_string(), text))
 }

@@ -10,9 +10,7 @@ use nav_sim_document::{
     readable, window,
 };
 use nav_sim_navigation::ekf::FixUpdate;
-use nav_sim_navigation::metrics::{
-    Budget, EpochMetrics, FanEpoch, OutageSummary, Summary, VerdictKind,
-};
+use nav_sim_navigation::metrics::{EpochMetrics, FanEpoch, OutageSummary, Summary, VerdictKind};
 use nav_sim_navigation::scenario::{Method, Unexpected};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 
@@ -64,7 +62,7 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
     page.section("Consistency");
     page.chart(&nees(epochs, summary), CONSISTENCY);
     page.table(&consistency(answer));
-    budgets(summary, &shown, &mut page);
+    budgets(answer, &shown, &mut page);
     provenance(answer, &mut page);
     page.checked(
         "The filter's standard deviations agree to 2e-4 with an independent implementation; the NEES of filters whose model is right \
@@ -91,11 +89,7 @@ fn notes(summary: &Summary, answer: &RunAnswer, page: &mut Document) {
     unexpected
         .iter()
         .for_each(|found| page.note(Importance::Detail, unexpected_line(found)));
-    let quality = summary
-        .reduction
-        .as_ref()
-        .and_then(|reduction| reduction.quality.as_ref());
-    if let Some(quality) = quality {
+    if let Some(quality) = &summary.reduction {
         page.note(Importance::Detail, reduction_line(quality));
         reduction_doubt(quality)
             .into_iter()
@@ -256,26 +250,37 @@ fn assumptions(summary: &Summary, answer: &RunAnswer) -> Vec<(&'static str, Stri
 }
 
 /// The sources of the errors at the ends of the outages that are shown, beside what the filter believes.
-fn budgets(summary: &Summary, shown: &[usize], page: &mut Document) {
-    let of_outage = |k: &usize| {
-        let o = &summary.outages[*k];
-        let kinds = [("true", &o.budget), ("believed", &o.believed_budget)];
-        kinds.into_iter().filter_map(|(kind, budget)| {
-            let name = format!("{}, {kind}", window(o.start_s, o.end_s));
-            Some((name, budget.as_ref()?))
-        })
-    };
-    let bars: Vec<(String, &Budget)> = shown.iter().flat_map(of_outage).collect();
-    if !bars.is_empty() {
-        page.section("Sources of errors");
-        page.chart(&budget_chart(&bars), "Shares in the mean square at the end of each outage, as in summary.json: of the true errors, by covariance analysis, and of those that the filter believes in.");
+fn budgets(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
+    let outages = &answer.navigation.summary.outages;
+    if shown.iter().all(|k| outages[*k].believed_budget.is_none()) {
+        return;
+    }
+    page.section("Sources of errors");
+    page.text("Shares in the mean square at the end of each outage: of the true errors, by covariance analysis, and of those that the filter believes in.");
+    let columns = [
+        ("source", "@"),
+        ("north", "pos_n_m"),
+        ("east", "pos_e_m"),
+        ("down", "pos_d_m"),
+        ("yaw", "yaw_deg"),
+    ];
+    for (k, (kind, key)) in shown
+        .iter()
+        .flat_map(|k| [("true", "budget"), ("believed", "believed_budget")].map(|kind| (k, kind)))
+    {
+        let table = Table::of(answer, &format!("/outages/{k}/{key}/*"), &columns);
+        let (start_s, end_s) = (outages[*k].start_s, outages[*k].end_s);
+        if !table.is_empty() {
+            let title = format!("{}, {kind}", window(start_s, end_s));
+            page.folded(&title, |page| page.table(&table));
+        }
     }
 }
 
 // The figures of a run.
 
 /// The outages (start, end) (s).
-pub(super) fn windows(summary: &Summary) -> Vec<(f64, f64)> {
+fn windows(summary: &Summary) -> Vec<(f64, f64)> {
     summary
         .outages
         .iter()
@@ -353,7 +358,7 @@ pub(super) fn fan_chart(fan: &[FanEpoch], summary: &Summary) -> Chart {
 }
 
 /// Every state: what the filter believes and how wrong it is.
-pub(super) fn states(epochs: &[EpochMetrics], outages: &[(f64, f64)]) -> Vec<Chart> {
+fn states(epochs: &[EpochMetrics], outages: &[(f64, f64)]) -> Vec<Chart> {
     let chart = |(i, state): (usize, &&str)| {
         let series = vec![
             Series::line(
@@ -405,153 +410,48 @@ pub(super) fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
     Chart::over_time("Consistency", panels, &windows(summary))
 }
 
-/// Sources with a colour of their own.
-const SOURCES_DRAWN: usize = 7;
-
-/// A bar an outage and kind, for horizontal position and for yaw.
-fn budget_chart(bars: &[(String, &Budget)]) -> Chart {
-    let mut weights: Vec<(&str, f64)> = Vec::new();
-    for (name, share) in bars
-        .iter()
-        .flat_map(|(_, b)| [b.ranked(&[0, 1]), b.ranked(&[8])].concat())
-    {
-        match weights.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, sum)) => *sum += share,
-            None => weights.push((name, share)),
-        }
-    }
-    weights.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let panel = |label: &str, states: &[usize]| {
-        let ranked: Vec<_> = bars.iter().map(|(_, b)| b.ranked(states)).collect();
-        let mut tops = vec![0.0; bars.len()];
-        let series = weights.iter().enumerate().map(|(k, (name, _))| {
-            let bar = |(x, top): (usize, &mut f64)| {
-                let share = ranked[x].iter().find(|(source, _)| source == name);
-                let from = *top;
-                *top += share.map_or(0.0, |(_, share)| 100.0 * share);
-                (x as f64, from, *top)
-            };
-            let mark = Mark::Bars(tops.iter_mut().enumerate().map(bar).collect());
-            match k < SOURCES_DRAWN {
-                true => Series::new(name, Colour::Hue(k), mark),
-                false => Series::new("others", Colour::Soft, mark),
-            }
-        });
-        let axis = Axis::linear(label).including(0.0, 100.0);
-        Panel {
-            height: 0.8,
-            ..Panel::new(axis, series.collect())
-        }
-    };
-    let names = bars.iter().map(|(name, _)| name.clone()).collect();
-    let panels = vec![
-        panel("horizontal position (%)", &[0, 1]),
-        panel("yaw (%)", &[8]),
-    ];
-    Chart::new("Sources of errors", Axis::names(names), panels)
-}
-
-// What helps a filter that is overconfident.
-
-const TOO_LARGE: &str =
-    "errors too large for a linear filter; another MODEL or nav-sim tune does not help";
-
-/// The same, with the update that helps: where errors are too large after fixes that follow an outage, not before them.
-fn too_large(summary: &Summary, answer: &RunAnswer) -> String {
+/// Advice by what the belief lacks, where linear analysis finds the filter wrong already; errors that are large are then its
+/// consequence.
+fn remedy(summary: &Summary, unexpected: &[Unexpected], answer: &RunAnswer) -> String {
     let verdict = &summary.verdict;
+    let [is_recorded, is_modelled] = ["static", "truth"].map(|role| answer.has_input(role));
+    let ratios = summary.reduction.iter().flat_map(|quality| {
+        let states = quality.outage_end.iter().chain([&quality.mean]);
+        states.flat_map(|state| state.0)
+    });
+    let is_far = verdict.beyond_linear.is_some();
+    let is_analysed = summary.method == Method::Lincov.name()
+        || verdict.by_covariance_analysis == Some(VerdictKind::Overconfident);
+    // what recordings contain is unknown, and so is whether linear analysis would find the filter wrong
+    match unexpected.first() {
+        _ if summary.is_contradicted || is_recorded && is_far => {}
+        Some(found) => return unexpected_line(found),
+        // where the reduced filter is right about the errors of its own model, the errors are of something else
+        None if ratios.fold(0.0, f64::max) > 1.0 + verdict.tolerance => {
+            return "--filter full has a state for each process of the model".to_owned();
+        }
+        None if is_recorded || is_modelled || is_analysed && !is_far => {
+            let how = match is_recorded || is_modelled {
+                true => "",
+                false => " --scenario",
+            };
+            return format!(
+                "the errors are not those of MODEL: nav-sim tune{how} finds variances that cover them"
+            );
+        }
+        None => {}
+    }
+    // the iterated update helps where errors are too large after fixes that follow an outage, not before them
     let is_after = |first: usize| {
         let is_met_again = summary.outages[first].reconvergence_s.p50.is_finite();
         is_met_again && verdict.worst_outage.is_none_or(|outage| outage > first)
     };
     let is_linear = answer.origin.configuration.filter.update == FixUpdate::Ekf;
-    match is_linear && verdict.beyond_linear.is_some_and(is_after) {
-        true => format!("{TOO_LARGE}; filter.update = \"iterated\" does"),
-        false => TOO_LARGE.to_owned(),
-    }
-}
-
-/// What helps: by what the belief lacks, where linear analysis finds the filter wrong already; errors that are large are then
-/// its consequence.
-pub(super) fn remedy(summary: &Summary, unexpected: &[Unexpected], answer: &RunAnswer) -> String {
-    let quality = summary
-        .reduction
-        .as_ref()
-        .and_then(|reduction| reduction.quality.as_ref());
-    let ratios = quality.into_iter().flat_map(|q| {
-        q.outage_end
-            .iter()
-            .chain([&q.mean])
-            .flat_map(|state| state.0)
-    });
-    if summary.is_contradicted {
-        return too_large(summary, answer);
-    }
-    if let Some(largest) = largest_unexpected(summary, unexpected) {
-        return largest;
-    }
-    let is_too_large = summary.verdict.beyond_linear.is_some();
-    let [is_recorded, is_modelled] = ["static", "truth"].map(|role| answer.has_input(role));
-    // what recordings contain is unknown, and so is whether linear analysis would find the filter wrong
-    if is_recorded && is_too_large {
-        return too_large(summary, answer);
-    }
-    // where the reduced filter is right about the errors of its own model, the errors are of something else
-    if ratios.fold(0.0, f64::max) > 1.0 + summary.verdict.tolerance {
-        return "--filter full has a state for each process of the model".to_owned();
-    }
-    if is_recorded || is_modelled {
-        return "the errors are not those of MODEL: nav-sim tune finds variances that cover them"
-            .to_owned();
-    }
-    // linear analysis, which draws nothing, finds the filter wrong already: it has no state for one of the errors
-    let is_expected = summary.method == Method::Lincov.name();
-    let is_analysed =
-        is_expected || summary.verdict.by_covariance_analysis == Some(VerdictKind::Overconfident);
-    match unexpected.first() {
-        Some(found) if is_analysed => unexpected_line(found),
-        None if is_expected && !is_too_large => beside_the_states(summary).to_owned(),
-        _ => too_large(summary, answer),
-    }
-}
-
-/// What covers an error that is in the budgets and that no state of the filter is for.
-fn beside_the_states(summary: &Summary) -> &'static str {
-    let sources = summary
-        .outages
-        .iter()
-        .filter_map(|o| o.budget.as_ref())
-        .flat_map(|budget| &budget.shares);
-    let no_filter_has = |name: &String| name.contains(".QN") || name.contains(".MA1");
-    if sources.map(|(name, _)| name).any(no_filter_has) {
-        return "MODEL has noise that no filter contains: nav-sim tune --truth MODEL covers it";
-    }
-    "the errors are not those of MODEL: nav-sim tune --scenario finds variances that cover them"
-}
-
-/// The error that the filter does not expect with the largest share in the worst error, where it makes at least half of what is
-/// too much there; without an outage, which has the shares, the first.
-fn largest_unexpected(summary: &Summary, unexpected: &[Unexpected]) -> Option<String> {
-    let verdict = &summary.verdict;
-    let outage = verdict
-        .worst_outage
-        .map_or(summary.outages.last(), |k| summary.outages.get(k));
-    let Some(budget) = outage.and_then(|outage| outage.budget.as_ref()) else {
-        return unexpected.first().map(unexpected_line);
+    let iterated = match is_linear && verdict.beyond_linear.is_some_and(is_after) {
+        true => "; filter.update = \"iterated\" does",
+        false => "",
     };
-    let worst = REPORTED_NAMES
-        .iter()
-        .position(|name| *name == verdict.worst_state);
-    let ranked = budget.ranked(&worst.map_or(vec![0, 1], |state| vec![state]));
-    let share = |cause: &Unexpected| {
-        let sources = cause.sources();
-        let of_cause = ranked
-            .iter()
-            .filter(|(name, _)| sources.iter().any(|source| source == name));
-        of_cause.map(|(_, share)| share).sum::<f64>()
-    };
-    let shares = unexpected.iter().map(|cause| (cause, share(cause)));
-    let (largest, share) = shares.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    // of a mean square that is ratio² times what is believed, this share is too much
-    let excess = 1.0 - verdict.ratio.powi(-2);
-    (share > 0.5 * excess).then(|| unexpected_line(largest))
+    format!(
+        "errors too large for a linear filter; another MODEL or nav-sim tune does not help{iterated}"
+    )
 }

@@ -277,16 +277,7 @@ impl Belief {
 
     /// Standard deviation of the biases of a sensor at the start: the largest of the three axes.
     pub fn initial_bias_sigma(&self, sensor: Sensor) -> f64 {
-        self.deviation(sensor, |_| true)
-    }
-
-    /// The part of it that the model's processes have, the unknown constant apart.
-    pub fn process_sigma(&self, sensor: Sensor) -> f64 {
-        self.deviation(sensor, |g| !g.is_constant())
-    }
-
-    fn deviation(&self, sensor: Sensor, counts: impl Fn(&BiasGroup) -> bool) -> f64 {
-        let groups = self.groups[sensor as usize].iter().filter(|g| counts(g));
+        let groups = self.groups[sensor as usize].iter();
         groups
             .map(|g| g.initial)
             .sum::<DVec3>()

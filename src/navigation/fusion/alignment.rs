@@ -8,7 +8,7 @@
 //! contradict is given up for the next, and a heading that they move is not believed as well as it says.
 
 use super::outcome::{Finding, nis_bound};
-use super::{Found, Heading, Levelling, Recorded, Settings, Solution, Start, Use, fuse};
+use super::{Found, Heading, Levelling, Recorded, Settings, Solution, Start, fuse};
 use crate::earth::{gravity_down, radii};
 use crate::ekf::{Belief, InitialSettings};
 use crate::frames::{NavState, RollPitchYaw, wrap_angle};
@@ -283,7 +283,7 @@ fn start(
 }
 
 /// Samples whose interval ends in (from, to].
-pub(in crate::fusion) fn between(imu: &[ImuIncrement], from: f64, to: f64) -> &[ImuIncrement] {
+pub(super) fn between(imu: &[ImuIncrement], from: f64, to: f64) -> &[ImuIncrement] {
     let first = imu.partition_point(|s| s.t_s <= from + 1e-9);
     let end = imu.partition_point(|s| s.t_s <= to + 1e-9);
     &imu[first..end.max(first)]
@@ -291,7 +291,7 @@ pub(in crate::fusion) fn between(imu: &[ImuIncrement], from: f64, to: f64) -> &[
 
 /// How far the IMU turns through the samples, from its axes then to those at the start, and the velocity that the
 /// specific force makes, in the axes at the start (m/s).
-pub(in crate::fusion) fn carried(samples: &[ImuIncrement]) -> (DQuat, DVec3) {
+pub(super) fn carried(samples: &[ImuIncrement]) -> (DQuat, DVec3) {
     let (mut q, mut dv) = (DQuat::IDENTITY, DVec3::ZERO);
     for s in samples {
         let half = DQuat::from_scaled_axis(s.dtheta * 0.5);
@@ -320,20 +320,20 @@ const ACCELERATION: f64 = 2.0;
 
 /// How a drive goes.
 #[derive(Clone, Copy, PartialEq)]
-pub(in crate::fusion) enum Pace {
+pub(super) enum Pace {
     Fast,
     Slow,
 }
 
 impl Pace {
     /// The speed from which a course is a heading, where velocities are known as well as `sigma` (m/s).
-    pub(in crate::fusion) fn needed(self, sigma: f64) -> f64 {
+    pub(super) fn needed(self, sigma: f64) -> f64 {
         let (least, sigmas) = if self == Self::Fast { FAST } else { SLOW };
         least.max(sigmas * sigma)
     }
 
     /// How far the axis is from the course at such a speed (rad).
-    pub(in crate::fusion) fn slip(self, speed: f64) -> f64 {
+    pub(super) fn slip(self, speed: f64) -> f64 {
         if self == Self::Fast {
             SLIP
         } else {
@@ -343,31 +343,31 @@ impl Pace {
 }
 
 /// A fix with its velocity and the standard deviations of it (m/s).
-pub(in crate::fusion) struct Moving {
-    pub(in crate::fusion) fix: GnssFix,
-    pub(in crate::fusion) v_n: DVec3,
-    pub(in crate::fusion) sigma_n: DVec3,
+pub(super) struct Moving {
+    pub fix: GnssFix,
+    pub v_n: DVec3,
+    pub sigma_n: DVec3,
     /// Half the time between the two positions it comes from: it is as old as that (s); 0 as measured.
     lag_s: f64,
-    pub(in crate::fusion) pace: Pace,
+    pub pace: Pace,
 }
 
 impl Moving {
-    pub(in crate::fusion) fn speed(&self) -> f64 {
+    pub(super) fn speed(&self) -> f64 {
         self.v_n.truncate().length()
     }
 
-    pub(in crate::fusion) fn sigma(&self) -> f64 {
+    pub(super) fn sigma(&self) -> f64 {
         self.sigma_n.truncate().max_element()
     }
 
     /// The speed from which the course of this fix is a heading (m/s).
-    pub(in crate::fusion) fn needed(&self) -> f64 {
+    pub(super) fn needed(&self) -> f64 {
         self.pace.needed(self.sigma())
     }
 
     /// The direction in which it moves (rad from north).
-    pub(in crate::fusion) fn course(&self) -> f64 {
+    pub(super) fn course(&self) -> f64 {
         self.v_n.y.atan2(self.v_n.x)
     }
 
@@ -394,7 +394,7 @@ impl Moving {
 }
 
 /// The velocities within the IMU recording.
-pub(in crate::fusion) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<Moving> {
+pub(super) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<Moving> {
     let first = imu.first().map_or(f64::INFINITY, |s| s.t_s - s.dt_s);
     let last = imu.last().map_or(f64::NEG_INFINITY, |s| s.t_s);
     let inside = |m: &Moving| m.fix.t_s >= first && m.fix.t_s < last;
@@ -424,7 +424,7 @@ pub(in crate::fusion) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<
 }
 
 /// Fixes one after the other that are at least `apart_s` apart, with when their velocities were (s).
-pub(in crate::fusion) fn steps(courses: &[Moving], apart_s: f64) -> Vec<[(&Moving, f64); 2]> {
+pub(super) fn steps(courses: &[Moving], apart_s: f64) -> Vec<[(&Moving, f64); 2]> {
     let when = |m: &Moving| m.fix.t_s - m.lag_s;
     let mut all = Vec::new();
     let mut first = 0;
@@ -511,8 +511,8 @@ struct Level {
     roll: f64,
     pitch: f64,
     /// Standard deviation of both (rad).
-    pub(super) sigma: f64,
-    pub(super) from: Levelling,
+    pub sigma: f64,
+    pub from: Levelling,
 }
 
 /// Statistics of a window in the vehicle's axes.
@@ -557,7 +557,7 @@ pub fn moves(imu: &[ImuIncrement]) -> bool {
 
 impl<'a> Scene<'a> {
     /// About a fix.
-    pub(super) fn new(
+    fn new(
         recorded: &Recorded<'a>,
         settings: &'a Settings,
         belief: &Belief,
@@ -778,7 +778,7 @@ struct Agreement {
     /// −2 ln(likelihood) of the innovations, up to a constant.
     cost: f64,
     /// Mean NIS per component, and of how many components.
-    pub(super) nis: f64,
+    pub nis: f64,
     components: usize,
 }
 
@@ -828,7 +828,7 @@ fn agreement(
         nis: 0.0,
         components: 0,
     };
-    for fix in solution.fixes.iter().filter(|f| f.used == Use::Used) {
+    for fix in solution.fixes.iter().filter(|f| f.used) {
         // the sum of the logarithms stands for the determinant: the correlations of both starts are alike
         sum.cost += fix.nis + 2.0 * fix.sigma.iter().map(|s| s.ln()).sum::<f64>();
         sum.nis += fix.nis;

@@ -43,23 +43,24 @@ pub struct ClocksApart {
     pub correlation: [f64; 2],
 }
 
-impl ClocksApart {
-    /// With what is left of the delay, and how well that is known (s).
-    pub fn refined(mut self, rest_s: f64, sigma_s: f64) -> Self {
-        (self.delay_s, self.sigma_s) = (self.delay_s + rest_s, Some(sigma_s));
-        self
-    }
-}
-
-/// The lag at which the turns agree; none where they agree as they are, or at no lag.
-pub fn clocks_apart(recorded: &Recorded<'_>) -> Option<ClocksApart> {
+/// The lag at which the turns agree; none where they agree as they are, or at no lag. `rest` is what the innovations say is left
+/// of the delay where the fixes are earlier by it, and its standard deviation (s).
+pub fn clocks_apart(
+    recorded: &Recorded<'_>,
+    rest: impl FnOnce(&Recorded<'_>) -> Option<[f64; 2]>,
+) -> Option<ClocksApart> {
     let [lag_s, best, now] = agreement(recorded)?;
     // 1 − r², for r < 0 more than 1: turns that go against each other explain less than nothing.
     let unexplained = |r: f64| 1.0 - r * r.abs();
     let is_other = unexplained(now) > UNEXPLAINED * unexplained(best).max(LEAST);
-    (is_other && lag_s.abs() >= SHORTEST_S).then_some(ClocksApart {
-        delay_s: -lag_s,
-        sigma_s: None,
+    if !is_other || lag_s.abs() < SHORTEST_S {
+        return None;
+    }
+    let gnss = earlier(recorded.gnss, -lag_s);
+    let rest = rest(&recorded.with_gnss(&gnss));
+    Some(ClocksApart {
+        delay_s: rest.map_or(0.0, |[rest_s, _]| rest_s) - lag_s,
+        sigma_s: rest.map(|[_, sigma_s]| sigma_s),
         correlation: [now, best],
     })
 }
@@ -192,10 +193,7 @@ pub fn rest_of_origin(recorded: &Recorded<'_>, belief: &Belief, settings: &Setti
     let to_s = recorded.gnss.first().map_or(0.0, |fix| fix.t_s) + MOST_S;
     let recorded = recorded.until(to_s);
     let fixes = recorded.gnss;
-    let settings = Settings {
-        nis_gate: settings.nis_gate,
-        ..settings.trial()
-    };
+    let settings = settings.trial();
     let tried = |k: i32| {
         let delay_s = f64::from(k) * TRIED.1;
         let gnss = earlier(fixes, delay_s);
@@ -244,6 +242,10 @@ pub fn earlier(gnss: &[GnssFix], seconds: f64) -> Vec<GnssFix> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn turns_apart(recorded: &Recorded<'_>) -> Option<ClocksApart> {
+        clocks_apart(recorded, |_| None)
+    }
     use crate::gnss::{GnssFix, GnssVelocity};
 
     /// A drive of ten minutes at 10 m/s whose course turns by `rate(t)`, an IMU at 50 Hz in any attitude, and fixes whose
@@ -299,7 +301,7 @@ mod tests {
     fn the_difference_of_the_clocks_is_found_with_its_sign() {
         for late_s in [18.0, -18.0, 2.0, -0.7] {
             let (imu, gnss) = drive(late_s, winding);
-            let apart = clocks_apart(&Recorded {
+            let apart = turns_apart(&Recorded {
                 imu: &imu,
                 gnss: &gnss,
                 aids: &[],
@@ -308,7 +310,7 @@ mod tests {
             assert!((apart.delay_s - late_s).abs() < 0.5 * STEP_S, "{apart:?}");
         }
         let (imu, gnss) = drive_at(10, 2.0, winding);
-        let apart = clocks_apart(&Recorded {
+        let apart = turns_apart(&Recorded {
             imu: &imu,
             gnss: &gnss,
             aids: &[],
@@ -321,7 +323,7 @@ mod tests {
     fn nothing_is_said_of_one_clock_nor_of_straight_roads_nor_of_turns_that_repeat() {
         let (imu, gnss) = drive(0.0, winding);
         assert_eq!(
-            clocks_apart(&Recorded {
+            turns_apart(&Recorded {
                 imu: &imu,
                 gnss: &gnss,
                 aids: &[]
@@ -330,7 +332,7 @@ mod tests {
         );
         let (imu, gnss) = drive(18.0, |_| 0.0);
         assert_eq!(
-            clocks_apart(&Recorded {
+            turns_apart(&Recorded {
                 imu: &imu,
                 gnss: &gnss,
                 aids: &[]
@@ -341,7 +343,7 @@ mod tests {
         let round = |t: f64| 0.3 * (std::f64::consts::PI * t / 10.0).sin();
         let (imu, gnss) = drive(0.0, round);
         assert_eq!(
-            clocks_apart(&Recorded {
+            turns_apart(&Recorded {
                 imu: &imu,
                 gnss: &gnss,
                 aids: &[]

@@ -6,7 +6,7 @@
 //! here). What was found is a cause only if the NIS of the filter, run with it, is smaller: an explanation is tested by
 //! taking the cause away.
 
-use super::{FixRecord, FusionError, Recorded, Settings, Solution, Start, Use, earlier, fuse};
+use super::{FixRecord, FusionError, Recorded, Settings, Solution, Start, earlier, fuse};
 use crate::ekf::Belief;
 use crate::gnss::GnssFix;
 use crate::trajectory::reference::Reference;
@@ -119,7 +119,7 @@ impl Scene<'_> {
             .fixes
             .into_iter()
             .enumerate()
-            .filter(|(_, f)| f.used == Use::Used)
+            .filter(|(_, f)| f.used)
         {
             of_fix[first + k] = Some(fix);
         }
@@ -278,7 +278,7 @@ pub struct Whiteness {
 impl Whiteness {
     /// Of the fixes used; none where they are few.
     pub fn of<'a>(fixes: impl IntoIterator<Item = &'a FixRecord>) -> Option<Self> {
-        let used = fixes.into_iter().filter(|f| f.used == Use::Used);
+        let used = fixes.into_iter().filter(|f| f.used);
         let position = |f: &FixRecord| [0, 1, 2].map(|i| f.innovation[i] / f.sigma[i]);
         let all: Vec<(f64, [f64; 3])> = used.map(|f| (f.t_s, position(f))).collect();
         Self::of_series(&all)
@@ -388,12 +388,12 @@ fn sigma_factor(lag_1: f64) -> f64 {
 }
 
 /// Median time from one fix to the next (s).
-fn interval_s(gnss: &[GnssFix]) -> Option<f64> {
+pub fn interval_s(gnss: &[GnssFix]) -> Option<f64> {
     middle(gnss.windows(2).map(|w| w[1].t_s - w[0].t_s).collect())
 }
 
 /// The value in the middle, in order.
-pub(super) fn middle(mut values: Vec<f64>) -> Option<f64> {
+pub fn middle(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
 }

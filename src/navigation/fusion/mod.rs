@@ -33,7 +33,6 @@
 //!     lever_arm_b: DVec3::ZERO,
 //!     gravity: GravityModel::Wgs84,
 //!     outages: vec![],
-//!     nis_gate: None,
 //!     rows_hz: 1.0,
 //!     smooth: false,
 //! };
@@ -56,10 +55,12 @@ mod vehicle;
 mod vehicle_tests;
 
 pub use clocks::{ClocksApart, clocks_apart, earlier, rest_of_origin, rough_origin};
-pub use displaced::{Correlation, Displaced, Weighed, Whiteness, displaced, fuse_correlated};
+pub use displaced::{
+    Correlation, Displaced, Weighed, Whiteness, displaced, fuse_correlated, interval_s, middle,
+};
 pub use outcome::{
-    Assessment, Confidence, Drift, Ends, Finding, FromReference, FusionError, OutageDrift, Outcome,
-    SmoothedOutage, SmoothedOutcome, assess, outcome,
+    Assessment, Confidence, Drift, Ends, Finding, FixCounts, FromReference, FusionError,
+    OutageDrift, Outcome, SmoothedOutage, SmoothedOutcome, assess, outcome,
 };
 pub use run::{LONGEST_GAP_S, bridged, fuse};
 pub use vehicle::{
@@ -113,7 +114,6 @@ impl Settings {
     /// For a trial, of which innovations are looked at and hardly a row.
     fn trial(&self) -> Self {
         Self {
-            nis_gate: None,
             rows_hz: 1e-3,
             smooth: false,
             ..self.clone()
@@ -143,8 +143,6 @@ pub struct Settings {
     pub gravity: GravityModel,
     /// When fixes are withheld.
     pub outages: Vec<Outage>,
-    /// A fix is refused whose NIS is above the chi-square quantile of this probability.
-    pub nis_gate: Option<f64>,
     /// Rows of the solution a second.
     pub rows_hz: f64,
     /// Whether every row is estimated a second time, from what was recorded before and after it.
@@ -231,24 +229,13 @@ pub struct RowError {
     pub nees: f64,
 }
 
-/// What became of a fix.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Use {
-    /// Used.
-    Used,
-    /// In an outage.
-    Withheld,
-    /// Its NIS was above the gate.
-    Rejected,
-}
-
 /// A fix as the filter saw it, before using it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FixRecord {
     /// Time (s).
     pub t_s: f64,
-    /// What became of it.
-    pub used: Use,
+    /// Whether it was used; in an outage it is not.
+    pub used: bool,
     /// Estimated less measured: position (m), velocity (m/s), north, east, down.
     pub innovation: Vec<f64>,
     /// Standard deviations of these, by the filter and the receiver together.

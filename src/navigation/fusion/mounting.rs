@@ -16,21 +16,9 @@ use crate::ekf::Belief;
 use crate::frames::RollPitchYaw;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
-use serde::{Deserialize, Serialize};
 
 /// Largest standard deviation of an angle that is still an answer (rad).
 const DETERMINED: f64 = 5.0 * DEG;
-
-/// Where it is known from how the IMU sits in the vehicle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Mounted {
-    /// From the settings.
-    #[default]
-    AsGiven,
-    /// From the drive.
-    AsFound,
-}
 
 /// A mounting that was found.
 #[derive(Debug, Clone, PartialEq)]
@@ -137,10 +125,10 @@ pub fn find(
     let gnss = settings.kept(recorded.gnss);
     let recorded = recorded.with_gnss(&gnss);
     let rough = along(&recorded, settings)?;
-    let (fine, sigma_factor) = refined(&recorded, settings, belief, &rough)?;
+    let found = refined(&recorded, settings, belief, &rough)?;
     let named = ["roll", "pitch", "yaw"]
         .into_iter()
-        .zip(fine.sigma_b.to_array());
+        .zip(found.sigma_b.to_array());
     // NaN is not determined either
     let worst = named
         .into_iter()
@@ -153,14 +141,7 @@ pub fn find(
             limit_deg,
         });
     }
-    let angles = RollPitchYaw::from_quat(fine.q_s_b * settings.q_s_b.inverse());
-    Ok(Mounting {
-        q_s_b: fine.q_s_b,
-        angles,
-        sigma_b: fine.sigma_b,
-        way_m: fine.way_m,
-        sigma_factor,
-    })
+    Ok(found)
 }
 
 /// Most that the standard deviations of fixes are widened by: what contradicts more is not the receiver's word.
@@ -172,7 +153,7 @@ fn refined(
     settings: &Settings,
     belief: &Belief,
     rough: &Rough,
-) -> Result<(Refined, f64), MountingError> {
+) -> Result<Mounting, MountingError> {
     let (mut gnss, mut factor) = (recorded.gnss.to_vec(), 1.0);
     loop {
         match through(&recorded.with_gnss(&gnss), settings, belief, rough) {
@@ -186,7 +167,13 @@ fn refined(
                     .map(|fix| fix.with_sigmas_times(factor, factor))
                     .collect();
             }
-            found => return Ok((found?, factor)),
+            found => {
+                let sigma_factor = factor;
+                return Ok(Mounting {
+                    sigma_factor,
+                    ..found?
+                });
+            }
         }
     }
 }
@@ -208,7 +195,7 @@ struct Blocks {
 
 impl Blocks {
     /// Adds `value` of weight `weight` at a time, times in order.
-    pub(super) fn add(&mut self, t_s: f64, value: f64, weight: f64) {
+    fn add(&mut self, t_s: f64, value: f64, weight: f64) {
         let block = (t_s / BLOCK_S).floor() as i64;
         self.weight += weight;
         match self.sums.last_mut() {
@@ -221,14 +208,14 @@ impl Blocks {
         self.sums.len()
     }
 
-    pub(super) fn mean(&self) -> f64 {
+    fn mean(&self) -> f64 {
         self.sums.iter().map(|(_, sum)| sum).sum::<f64>() / self.weight
     }
 
     /// Standard deviation of a mean whose values have been reduced by it: from the scatter of the blocks, with the
     /// correlation of neighbours where that is positive (Newey and West's estimator of lag one), and wider where they
     /// are few, as Student's t is.
-    pub(super) fn sigma(&self) -> f64 {
+    fn sigma(&self) -> f64 {
         let count = self.count() as f64;
         let own: f64 = self.sums.iter().map(|(_, sum)| sum * sum).sum();
         let neighbours = self.sums.windows(2).filter(|w| w[1].0 == w[0].0 + 1);
@@ -264,13 +251,6 @@ const BANKED: f64 = 8.0 * DEG;
 /// Share of the way in the lesser direction from which nobody knows which one is forwards.
 const UNDECIDED: f64 = 0.25;
 
-/// The mounting, its standard deviations (rad), the way it rests on (m).
-pub struct Refined {
-    q_s_b: DQuat,
-    sigma_b: DVec3,
-    way_m: f64,
-}
-
 /// The filter's yaw must be that of the accelerations: biases, which a filter may not expect, do not touch the latter.
 fn agreeing(mean: DQuat, sigma: f64) -> Result<(), MountingError> {
     let turn = (if mean.w < 0.0 { -mean } else { mean })
@@ -304,7 +284,8 @@ fn through(
     settings: &Settings,
     belief: &Belief,
     rough: &Rough,
-) -> Result<Refined, MountingError> {
+) -> Result<Mounting, MountingError> {
+    let named = settings.q_s_b.inverse();
     let loose = DVec3::Z * (LOOSE * rough.yaw_sigma);
     let settings = Settings {
         q_s_b: rough.q_s_b,
@@ -349,11 +330,13 @@ fn through(
     let scatter = DVec3::from_array(blocks.each_ref().map(Blocks::sigma));
     let sigma_b = (scatter.powf(2.0) + of_filter(&moments).powf(2.0) + UNSEEN.powf(2.0)).powf(0.5);
     agreeing(mean, rough.yaw_sigma.hypot(sigma_b.z))?;
-    let way_m = moments.iter().map(|m| m.way_m).sum();
-    Ok(Refined {
-        q_s_b: (mean * rough.q_s_b).normalize(),
+    let q_s_b = (mean * rough.q_s_b).normalize();
+    Ok(Mounting {
+        q_s_b,
+        angles: RollPitchYaw::from_quat(q_s_b * named),
         sigma_b,
-        way_m,
+        way_m: moments.iter().map(|m| m.way_m).sum(),
+        sigma_factor: 1.0,
     })
 }
 

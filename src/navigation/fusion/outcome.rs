@@ -1,9 +1,7 @@
 //! Figures of a fusion: fixes used, consistency, errors at the ends of outages. They serialize as `summary.json` has them.
 
 use super::displaced::middle;
-use super::{
-    AidInnovations, FixRecord, Nine, Row, RowError, Solution, Use, Weighed, aid_innovations,
-};
+use super::{AidInnovations, FixRecord, Nine, Row, RowError, Solution, Weighed, aid_innovations};
 use crate::metrics::{PerState, VerdictKind};
 use crate::sensors::outage::Outage;
 use crate::simulation::REPORTED_NAMES;
@@ -49,20 +47,32 @@ pub struct Ends {
     pub p_value: f64,
 }
 
+/// Fixes by what became of them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct FixCounts {
+    /// Used.
+    pub used: usize,
+    /// In an outage.
+    pub withheld: usize,
+}
+
 /// Figures of a solution.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Outcome {
-    /// Fixes used, withheld, rejected.
-    pub fixes: [usize; 3],
+    /// Fixes.
+    pub fixes: FixCounts,
     /// Mean NIS of the fixes used, divided by their number of components: 1 if all is as believed.
     pub nis_per_component: f64,
     /// Errors at the end of each outage.
     pub outages: Vec<OutageDrift>,
     /// The ends of all outages and gaps, where there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub ends: Option<Ends>,
     /// Differences of the rows from the reference, where one reaches them.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub reference: Option<FromReference>,
     /// Figures of the smoothed solution, where there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub smoothed: Option<SmoothedOutcome>,
 }
 
@@ -122,9 +132,12 @@ pub struct SmoothedOutage {
 
 /// The figures of a solution with these outages.
 pub fn outcome(solution: &Solution, outages: &[Outage]) -> Outcome {
-    let count = |kind: Use| solution.fixes.iter().filter(|f| f.used == kind).count();
+    let used = used(solution).count();
     Outcome {
-        fixes: [count(Use::Used), count(Use::Withheld), count(Use::Rejected)],
+        fixes: FixCounts {
+            used,
+            withheld: solution.fixes.len() - used,
+        },
         nis_per_component: nis_per_component(solution),
         outages: outages.iter().map(|o| drift(solution, *o)).collect(),
         ends: ends(solution),
@@ -142,11 +155,7 @@ const APART: (f64, f64) = (10.0, 5.0);
 /// The fixes that nothing was used before for so long. Their horizontal innovations are two normal numbers each, and the
 /// sum of m of their squares, normalised, is chi-square of 2m degrees.
 fn ends(solution: &Solution) -> Option<Ends> {
-    let known: Vec<&FixRecord> = solution
-        .fixes
-        .iter()
-        .filter(|f| f.used != Use::Withheld)
-        .collect();
+    let known: Vec<&FixRecord> = solution.fixes.iter().filter(|f| f.used).collect();
     let steps: Vec<f64> = known.windows(2).map(|w| w[1].t_s - w[0].t_s).collect();
     let apart_s = APART.0.max(APART.1 * middle(steps)?);
     let of_ends: Vec<f64> = known
@@ -166,8 +175,8 @@ fn ends(solution: &Solution) -> Option<Ends> {
 
 /// Mean NIS of the fixes used, divided by their number of components.
 pub(super) fn nis_per_component(solution: &Solution) -> f64 {
-    let used = || solution.fixes.iter().filter(|f| f.used == Use::Used);
-    used().map(|f| f.nis).sum::<f64>() / used().map(|f| f.innovation.len()).sum::<usize>() as f64
+    let components: usize = used(solution).map(|f| f.innovation.len()).sum();
+    used(solution).map(|f| f.nis).sum::<f64>() / components as f64
 }
 
 fn from_reference(rows: &[Row]) -> Option<FromReference> {
@@ -286,8 +295,6 @@ const FEWEST: usize = 50;
 /// Stretch in which the NIS is looked at by itself (s), and the share of bad ones that is too much.
 const STRETCH_S: f64 = 60.0;
 const BAD_STRETCHES: f64 = 0.1;
-/// Share of rejected fixes that is doubtful, and that is too much.
-const REJECTED: (f64, f64) = (0.1, 0.5);
 /// How improbable errors at the ends of outages are doubtful, and how many times the stated ones, then, are too much.
 const ENDS: (f64, f64) = (1e-3, 2.0);
 /// Root mean square of error over standard deviation, of all states together, that is not right: below and above.
@@ -346,13 +353,6 @@ pub enum Finding {
         aid: &'static str,
         /// Divided by the number of components: 1 if right.
         nis_per_component: f64,
-    },
-    /// Fixes rejected by the gate.
-    Rejected {
-        /// How many of them.
-        rejected: usize,
-        /// Those used and rejected.
-        of: usize,
     },
     /// Errors at the ends of outages and gaps.
     Ends(Ends),
@@ -437,7 +437,6 @@ pub fn assess(
     findings.extend(correlated.filter(|found| !findings.contains(found)));
     findings.extend(stretches(of_fixes));
     findings.extend(aids(of_fixes));
-    findings.extend(rejected(outcome));
     findings.extend(ends_finding(outcome));
     if let Some(reference) = outcome.reference {
         // the reference tells what fixes do not
@@ -485,7 +484,7 @@ fn correlated(weighed: &Weighed) -> Option<(VerdictKind, Finding)> {
 }
 
 fn used(solution: &Solution) -> impl Iterator<Item = &FixRecord> {
-    solution.fixes.iter().filter(|f| f.used == Use::Used)
+    solution.fixes.iter().filter(|f| f.used)
 }
 
 fn nis(solution: &Solution) -> (VerdictKind, Finding) {
@@ -567,19 +566,6 @@ fn far(fixes: &[&FixRecord]) -> Option<f64> {
     let components: usize = kept.iter().map(|(_, n)| n).sum();
     let nis = kept.iter().map(|(nis, _)| nis).sum::<f64>() / components.max(1) as f64;
     (components > 0 && nis > nis_bound(components)).then_some(nis)
-}
-
-fn rejected(outcome: &Outcome) -> Option<(VerdictKind, Finding)> {
-    let [used, _, rejected] = outcome.fixes;
-    let of = used + rejected;
-    let share = rejected as f64 / of.max(1) as f64;
-    let verdict = match share {
-        share if share > REJECTED.1 => VerdictKind::Overconfident,
-        // three of a short recording are no share
-        share if share > REJECTED.0 && rejected > 3 => VerdictKind::Doubtful,
-        _ => return None,
-    };
-    Some((verdict, Finding::Rejected { rejected, of }))
 }
 
 /// Errors at the ends of outages and gaps that are not as stated.
@@ -683,7 +669,7 @@ mod assessment_tests {
     fn solution(nis: impl Fn(usize) -> f64, seconds: usize) -> Solution {
         let fix = |k: usize| FixRecord {
             t_s: k as f64,
-            used: Use::Used,
+            used: true,
             innovation: vec![0.0; 3],
             sigma: vec![1.0; 3],
             nis: 3.0 * nis(k),
@@ -752,19 +738,6 @@ mod assessment_tests {
             judged(&solution(|k| if k == 77 { 200.0 } else { 0.5 }, 600)).verdict,
             VerdictKind::Consistent
         );
-    }
-
-    #[test]
-    fn a_solution_that_rejects_its_fixes_is_not_believed() {
-        let mut all = solution(|_| 1.0, 600);
-        all.fixes[..90]
-            .iter_mut()
-            .for_each(|f| f.used = Use::Rejected);
-        assert_eq!(judged(&all).verdict, VerdictKind::Doubtful);
-        all.fixes[..400]
-            .iter_mut()
-            .for_each(|f| f.used = Use::Rejected);
-        assert_eq!(judged(&all).verdict, VerdictKind::Overconfident);
     }
 
     /// Nine outages of ends 1.8 times as far as stated are doubtful, 2.5 times is too much, and 1.3 is chance: of chi-square

@@ -2,13 +2,12 @@
 
 use super::{
     AidRecord, FixRecord, FusionError, Nine, Recorded, Row, RowError, Settings, Solution, Start,
-    Use, VehicleVelocity, check_clocks, spans,
+    VehicleVelocity, check_clocks, spans,
 };
 use crate::earth::{MAX_LATITUDE, geodetic_to_ecef};
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::{
-    Belief, BodyVelocity, Ekf, Fix, Snapshot, advance, nis_limit, settle, update,
-    update_body_velocity,
+    Belief, BodyVelocity, Ekf, Fix, Snapshot, advance, settle, update, update_body_velocity,
 };
 use crate::frames::{NavState, RollPitchYaw};
 use crate::gnss::GnssFix;
@@ -169,18 +168,9 @@ impl Run<'_> {
     fn fix(&mut self, fix: &GnssFix) -> Result<(), FusionError> {
         let mut record = self.filter.look_at(fix);
         record.error = self.error().map(|e| e.values);
-        let withheld = self.settings.outages.iter().any(|o| o.withholds(fix.t_s));
-        let limit = self
-            .settings
-            .nis_gate
-            .map(|p| nis_limit(p, record.innovation.len()));
-        record.used = match limit {
-            _ if withheld => Use::Withheld,
-            Some(limit) if record.nis > limit => Use::Rejected,
-            _ => Use::Used,
-        };
+        record.used = !self.settings.outages.iter().any(|o| o.withholds(fix.t_s));
         match &mut self.tape {
-            _ if record.used != Use::Used => {}
+            _ if !record.used => {}
             Some(tape) => tape.fix(&mut self.filter, self.now, |filter| filter.update(fix)),
             None => self.filter.update(fix),
         }
@@ -262,14 +252,14 @@ const BRIDGE_STEP_S: f64 = 0.1;
 
 /// The filter in the axes of the IMU.
 struct Filter {
-    pub(super) ekf: Ekf,
+    pub ekf: Ekf,
     q_s_b: DQuat,
     mounting_sigma_b: DVec3,
     lever_arm_s: DVec3,
 }
 
 impl Filter {
-    pub(super) fn new(belief: &Belief, start: &Start, settings: &Settings) -> Self {
+    fn new(belief: &Belief, start: &Start, settings: &Settings) -> Self {
         let q_s_b = settings.q_s_b;
         let of_imu = NavState {
             q_b_n: start.state.q_b_n * q_s_b,
@@ -301,7 +291,7 @@ impl Filter {
     }
 
     /// Through `seconds` of a sample that bridges a gap, in steps, as uncertain as `Gap` says.
-    pub(super) fn cross(&mut self, bridge: &ImuIncrement, seconds: f64, spread: Spread) {
+    fn cross(&mut self, bridge: &ImuIncrement, seconds: f64, spread: Spread) {
         let steps = (seconds / BRIDGE_STEP_S).ceil().max(1.0);
         let step_s = seconds / steps;
         self.ekf.set_interval(step_s);
@@ -358,7 +348,7 @@ impl Filter {
             horizontal_nis,
             horizontal_sigma_m: (before.x + before.y).sqrt(),
             t_s: fix.t_s,
-            used: Use::Used,
+            used: true,
             innovation: z.as_slice().to_vec(),
             sigma,
             nis,
@@ -371,7 +361,7 @@ impl Filter {
     }
 
     /// Uses a velocity along the vehicle's axes.
-    pub(super) fn aid(&mut self, aid: &VehicleVelocity) -> AidRecord {
+    fn aid(&mut self, aid: &VehicleVelocity) -> AidRecord {
         let to_imu = self.q_s_b.inverse();
         let axes = aid.aid.axes();
         let measured = BodyVelocity {
@@ -392,7 +382,7 @@ impl Filter {
         }
     }
 
-    pub(super) fn update(&mut self, fix: &GnssFix) {
+    fn update(&mut self, fix: &GnssFix) {
         let fix = self.fix(fix);
         let _ = update(&mut self.ekf, &fix);
     }
@@ -552,7 +542,7 @@ struct Bridges<'a> {
 }
 
 impl<'a> Bridges<'a> {
-    pub(super) fn new(imu: &'a [ImuIncrement]) -> Self {
+    fn new(imu: &'a [ImuIncrement]) -> Self {
         let mut lengths: Vec<f64> = imu.iter().map(|s| s.dt_s).collect();
         lengths.sort_by(f64::total_cmp);
         let step_s = lengths.get(lengths.len() / 2).copied().unwrap_or(1.0);
@@ -659,7 +649,7 @@ impl Tape {
     ///
     /// # Errors
     /// When it would be too large.
-    pub(super) fn new(filter: &mut Filter, t_s: f64, marks: f64) -> Result<Self, FusionError> {
+    fn new(filter: &mut Filter, t_s: f64, marks: f64) -> Result<Self, FusionError> {
         let states = filter.ekf.p.lane(0).nrows();
         let bytes = marks * bytes_of_mark(states as f64);
         if bytes > MOST_BYTES {
@@ -697,7 +687,7 @@ impl Tape {
     }
 
     /// A fix is used here, by `update`.
-    pub(super) fn fix(&mut self, filter: &mut Filter, t_s: f64, update: impl FnOnce(&mut Filter)) {
+    fn fix(&mut self, filter: &mut Filter, t_s: f64, update: impl FnOnce(&mut Filter)) {
         self.mark(filter, t_s);
         update(filter);
         let Some(last) = self.marks.last_mut() else {

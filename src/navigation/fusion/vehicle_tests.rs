@@ -28,7 +28,6 @@ fn settings() -> Settings {
         lever_arm_b: DVec3::ZERO,
         gravity: crate::earth::GravityModel::default(),
         outages: Vec::new(),
-        nis_gate: None,
         rows_hz: 1.0,
         smooth: false,
     }

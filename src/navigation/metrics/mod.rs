@@ -23,10 +23,9 @@ mod verdict;
 pub use estimate::{Band, Estimate, PerState, QuadraticForm, SampleSize, chi_square_band};
 pub use expected::{Expected, horizontal_quantiles};
 pub use outage::{Budget, EpochMetrics, FAN_LEVELS, FanEpoch, epochs, expected_fan, fan};
-pub use ratio::{ComparisonError, EpochRow, Measured, OutageComparison, StateRatio, compare};
+pub use ratio::{EpochRow, Measured, OutageComparison, StateRatio, compare};
 pub use summary::{
-    AccuracySummary, AxisReduction, Consistency, Coverage, Met, Nis, OutageSummary, Recovery,
-    ReductionQuality, ReductionSummary, Requirement, Spread, Summary, TOLERANCE,
-    UnknownRequirement,
+    AccuracySummary, Consistency, Coverage, Met, Nis, OutageSummary, Recovery, ReductionQuality,
+    Requirement, Spread, Summary, TOLERANCE,
 };
 pub use verdict::{ALL_STATES, OutageVerdict, StateName, Verdict, VerdictKind};

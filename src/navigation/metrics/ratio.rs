@@ -35,29 +35,6 @@ pub struct Measured {
     pub is_expected: bool,
 }
 
-/// Why two experiments have no ratio.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ComparisonError {
-    /// Other outages or epochs.
-    #[error("the {what} differ: {candidate} against {reference} of the reference")]
-    Other {
-        /// Outages or epochs.
-        what: &'static str,
-        /// Those of the candidate, in words.
-        candidate: String,
-        /// Those of the reference, in words.
-        reference: String,
-    },
-    /// Other numbers of runs of the same noise: the epochs' statistics are of all runs, not of the common ones.
-    #[error("{candidate} runs against {reference} of the reference, of the same seed")]
-    Runs {
-        /// Runs of the candidate.
-        candidate: usize,
-        /// Runs of the reference.
-        reference: usize,
-    },
-}
-
 /// One state in one outage.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StateRatio {
@@ -99,58 +76,40 @@ pub struct OutageComparison {
 /// and b of the reference, by linearisation: with ρ = ā/b̄, ρ − E ρ ≈ mean(a − ρ b)/b̄.
 ///
 /// # Errors
-/// When epochs or outages differ, or the numbers of paired runs.
+/// When epochs or outages differ.
 pub fn compare(
     candidate: &Measured,
     reference: &Measured,
     paired: bool,
-) -> Result<Vec<OutageComparison>, ComparisonError> {
-    comparable(candidate, reference)?;
-    if paired && candidate.runs.len() != reference.runs.len() {
-        return Err(ComparisonError::Runs {
-            candidate: candidate.runs.len(),
-            reference: reference.runs.len(),
-        });
-    }
-    let ratio_of_outage =
-        |(i, window): (usize, &(f64, f64))| outage(candidate, reference, i, *window, paired);
-    Ok(reference
-        .outages
-        .iter()
-        .enumerate()
-        .map(ratio_of_outage)
-        .collect())
-}
-
-fn comparable(candidate: &Measured, reference: &Measured) -> Result<(), ComparisonError> {
-    let differ = |what, words: &dyn Fn(&Measured) -> String| {
-        Err(ComparisonError::Other {
-            what,
-            candidate: words(candidate),
-            reference: words(reference),
-        })
+) -> Result<Vec<OutageComparison>, String> {
+    let differ = |what: &str, words: &dyn Fn(&Measured) -> String| {
+        let [own, other] = [candidate, reference].map(words);
+        format!("the {what} differ: {own} against {other} of the reference")
     };
     if candidate.outages != reference.outages {
-        return differ("outages", &|e| match e.outages.as_slice() {
+        return Err(differ("outages", &|e| match e.outages.as_slice() {
             [] => "none".to_owned(),
             all => {
                 let windows = all.iter().map(|(a, b)| format!("{a}:{b}"));
                 windows.collect::<Vec<_>>().join(", ")
             }
-        });
+        }));
     }
     // To the last bit: epochs of the same schedule are equal, and ratios of unequal epochs would mean
     // nothing.
     let times =
         |e: &Measured| -> Vec<u64> { e.epochs.iter().map(|row| row.t_s.to_bits()).collect() };
     if times(candidate) != times(reference) {
-        return differ("reporting epochs", &|e| {
-            let [first, last] = [e.epochs.first(), e.epochs.last()];
-            let t_s = |row: Option<&EpochRow>| row.map_or(f64::NAN, |row| row.t_s);
-            format!("{} from {} to {} s", e.epochs.len(), t_s(first), t_s(last))
-        });
+        return Err(differ("reporting epochs", &|e| {
+            let ends = [e.epochs.first(), e.epochs.last()];
+            let [first, last] = ends.map(|row| row.map_or(f64::NAN, |row| row.t_s));
+            format!("{} from {first} to {last} s", e.epochs.len())
+        }));
     }
-    Ok(())
+    let outages = reference.outages.iter().enumerate();
+    let of_outage =
+        |(i, window): (usize, &(f64, f64))| outage(candidate, reference, i, *window, paired);
+    Ok(outages.map(of_outage).collect())
 }
 
 fn outage(

@@ -12,7 +12,7 @@
 
 use super::estimate::{Estimate, chi_square_interval};
 use crate::simulation::{NEES_DOF, OutageRecord, REPORTED, REPORTED_NAMES, RunRecord, TOLERANCE};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::Serialize;
 
 /// Probability at which a right filter is called wrong, all statistics together.
 const LEVEL: f64 = 0.01;
@@ -52,52 +52,42 @@ nav_sim_signal::named!(VerdictKind {
     Diverged = "diverged",
 }, in files);
 
-/// One of [`REPORTED_NAMES`], or [`ALL_STATES`]; `serde` would borrow what it saw as a reference.
+/// One of [`REPORTED_NAMES`], or [`ALL_STATES`].
 pub type StateName = &'static str;
 
 /// Stands for all states together, by their NEES, where they are off and no single one is.
 pub const ALL_STATES: StateName = "all";
 
 /// The verdict on the filter of an experiment.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Verdict {
     /// In one word.
     pub kind: VerdictKind,
     /// Mean NEES over epochs and runs; 9 if the filter is right.
-    #[serde(deserialize_with = "number")]
     pub nees: f64,
     /// Its Monte-Carlo standard error, from the scatter of the runs.
-    #[serde(deserialize_with = "number")]
     pub nees_std_error: f64,
     /// Mean share of epochs inside the filter's ellipsoid.
-    #[serde(deserialize_with = "number")]
     pub coverage: f64,
     /// Its Monte-Carlo standard error, from the scatter of the runs.
-    #[serde(deserialize_with = "number")]
     pub coverage_std_error: f64,
     /// The state that is farthest off in the direction of the verdict, or [`ALL_STATES`].
-    #[serde(deserialize_with = "state")]
     pub worst_state: StateName,
     /// The outage at whose end it is (from 0); none: over the whole run.
     pub worst_outage: Option<usize>,
     /// Root mean square there of error over standard deviation: 1 if the filter is right.
-    #[serde(deserialize_with = "number")]
     pub ratio: f64,
     /// Its Monte-Carlo standard error.
-    #[serde(deserialize_with = "number")]
     pub ratio_std_error: f64,
     /// Verdict by covariance analysis, where that was made beside the runs.
     pub by_covariance_analysis: Option<VerdictKind>,
     /// The first outage (from 0) in which errors are beyond linear theory, where covariance analysis does not hold.
     pub beyond_linear: Option<usize>,
     /// Runs that count as independent; infinitely many (null) of a covariance analysis.
-    #[serde(deserialize_with = "count")]
     pub independent_runs: f64,
     /// The error over standard deviation, common to all states, from which on these runs would tell it.
-    #[serde(deserialize_with = "number")]
     pub detectable_ratio: f64,
     /// The same of one state alone.
-    #[serde(deserialize_with = "number")]
     pub detectable_state_ratio: f64,
     /// Independent runs that would decide; none (null) where the verdict is decided.
     pub runs_to_decide: Option<u64>,
@@ -105,25 +95,6 @@ pub struct Verdict {
     pub level: f64,
     /// Errors that differ by less than this share from the filter's standard deviations are let pass.
     pub tolerance: f64,
-}
-
-/// A number as JSON has it: null if it is none.
-pub(super) fn number<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(value)?.unwrap_or(f64::NAN))
-}
-
-/// A count as JSON has it: null if it has no end.
-fn count<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(value)?.unwrap_or(f64::INFINITY))
-}
-
-fn state<'de, D: Deserializer<'de>>(value: D) -> Result<&'static str, D::Error> {
-    let name = String::deserialize(value)?;
-    let known = REPORTED_NAMES
-        .into_iter()
-        .chain([ALL_STATES])
-        .find(|known| *known == name);
-    known.ok_or_else(|| serde::de::Error::custom(format!("{name:?} is no state")))
 }
 
 /// The verdict on the filter at the end of one outage.

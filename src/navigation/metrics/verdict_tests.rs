@@ -88,11 +88,6 @@ fn states_that_are_wrong_together_only_are_named_together() {
         (verdict.ratio / 1.7_f64.sqrt() - 1.0).abs() < 5.0 * 0.5 * (2.0_f64 / 1800.0).sqrt(),
         "{verdict:?}"
     );
-    let text = serde_json::to_string(&verdict).unwrap();
-    assert_eq!(
-        serde_json::from_str::<Verdict>(&text).unwrap().worst_state,
-        ALL_STATES
-    );
 }
 
 #[test]

@@ -1092,7 +1092,7 @@ impl Sources {
 
 // The states beside the navigation error, and what they do over the steps of a track.
 
-/// The states `b` of a filter and `t` of the truth, as [`Joint`](super::pass::Joint) has them.
+/// The states `b` of a filter and `t` of the truth, as `Joint` has them.
 pub(super) struct Sides {
     pub(super) b: Sources,
     pub(super) t: Sources,

@@ -1,0 +1,1248 @@
+//! The IMU that a limit needs, what a given one makes of it, and a ranking of several.
+
+use crate::app::inputs::{self, ScenarioArgs, files};
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Refuse, Result};
+use crate::io::atomic::Written;
+use crate::io::datasheet::{self, CATALOGUE, Datasheet};
+use crate::io::file_kind::{self, FileKind};
+use crate::io::input::listed;
+use crate::io::model_file::{self, ModelFile, PROGRAM, TurnOn};
+use crate::io::scenario_file;
+use crate::parse;
+use nav_sim_document::{
+    Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone, readable, seconds,
+    window,
+};
+use nav_sim_navigation::metrics::Expected;
+use nav_sim_navigation::require::{
+    Answer as Bound, Course, Drift, IMU_PARAMETERS, ImuParameters, Limit, Margins, Need, Quantity,
+    RequireError, Worst, evenly,
+};
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::aiding::AidingSettings;
+use nav_sim_navigation::sensors::imu::Truth;
+use nav_sim_navigation::sensors::outage::{NotAnOutage, Outage};
+use nav_sim_navigation::simulation::ExperimentError;
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::noise::Model;
+use rayon::prelude::*;
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+// `nav-sim require`: which IMU a limit needs, and what a given one makes of it.
+
+/// Find the IMU that keeps the errors at the end of an outage within limits, or judge MODEL by them
+///
+/// Uses linear covariance analysis along TRAJECTORY of a filter that knows its IMU. Without MODEL it finds the white noise
+/// and bias instability that each sensor may have beside the turn-on biases of [imu] in --scenario. With MODEL it says
+/// whether the limits are kept (exit code 3: they are not), and the longest outage that it bridges.
+#[derive(clap::Args, Debug, Clone)]
+#[command(before_help = "\
+Examples:
+  nav-sim require trajectories/figure_eight.toml --outage 60 \\
+      --require 'p95_m<=50' -o needed.toml
+  nav-sim require trajectories/figure_eight.toml calib_data/tactical.toml \\
+      --outage 60:120 --require 'rmse_m<=100'
+  nav-sim require trajectories/figure_eight.toml calib_data/tactical.toml \\
+      --outage longest --require 'p95_m<=20'")]
+pub struct Require {
+    /// Trajectory: motion profile (.toml) or table (.csv)
+    pub trajectory: PathBuf,
+    /// Noise model of an IMU
+    pub model: Option<PathBuf>,
+    /// Outage: a length in seconds (tried from every second on), START:END, or "longest" (needs MODEL)
+    #[arg(long, value_name = "SECONDS")]
+    pub outage: Ask,
+    /// Earliest start of the outage in seconds [default: 300, less if the trajectory is short]
+    #[arg(long, value_name = "SECONDS", value_parser = parse::non_negative)]
+    pub start: Option<f64>,
+    /// Limit at the end of the outage, as NAME<=LIMIT (repeatable): p50_m, p95_m, rmse_m (horizontal), roll_deg, pitch_deg,
+    /// yaw_deg
+    #[arg(id = "require", long = "require", value_name = "NAME<=LIMIT")]
+    pub limits: Vec<Limit>,
+    /// Scenario file whose section gnss is used
+    #[arg(long, value_name = "FILE")]
+    pub gnss: Option<PathBuf>,
+    /// Receiver, start, IMU rate, aiding.
+    #[command(flatten)]
+    pub settings: ScenarioArgs,
+    /// What the vehicle knows of its own motion: a car moves neither sideways nor up; with MODEL, a table with and without
+    #[arg(long, value_name = "KIND", value_parser = ["car"])]
+    pub vehicle: Option<String>,
+    /// Rank the catalogued IMUs (`nav-sim datasheet --list`), or those of a directory of entries and model files
+    #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = BUILT_IN, conflicts_with = "model")]
+    pub catalogue: Option<PathBuf>,
+}
+
+/// Stands for the units that are known by name.
+const BUILT_IN: &str = "built-in";
+
+impl FromStr for Ask {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text {
+            "longest" => Ok(Self::Longest),
+            window if window.contains(':') => window
+                .parse()
+                .map(Self::Window)
+                .map_err(|e: NotAnOutage| e.to_string()),
+            length => parse::positive(length)
+                .map(Self::Length)
+                .map_err(|_| "expected a length in seconds, START:END or longest".to_owned()),
+        }
+    }
+}
+
+/// What is found.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+enum Found {
+    /// The IMU that is needed.
+    Needed(Box<NeededImu>),
+    /// What a given one makes of the limits.
+    Given(Box<GivenImu>),
+    /// Several of them, the best first.
+    Ranked(Ranking),
+}
+
+/// What a limit needs, or what one or several IMUs make of it.
+#[derive(Debug, Serialize)]
+#[serde(transparent)]
+pub struct RequireAnswer {
+    found: Found,
+    #[serde(skip)]
+    file: Option<ModelFile>,
+}
+
+impl Command for Require {
+    type Answer = RequireAnswer;
+    const NAME: &'static str = "require";
+    const OUT: Out = Out::File {
+        kind: Written::Required,
+        name: "needed.toml",
+        help: "Model file to write, of the required IMU",
+    };
+
+    fn check_out(&self) -> Result<()> {
+        if self.model.is_none() && self.catalogue.is_none() {
+            return Ok(());
+        }
+        let message = "--out is for the required IMU: it cannot be used with MODEL or --catalogue";
+        Err(Failure::input(message).hint("--plot FILE.html writes the page"))
+    }
+
+    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        if let (Ask::Window(outage), Some(start_s)) = (self.outage, self.start) {
+            let Outage {
+                start_s: from,
+                end_s: to,
+            } = outage;
+            let message = format!("--start {start_s} beside --outage {from}:{to}");
+            return Err(
+                Failure::input(message).hint("an outage of a length alone has an earliest start")
+            );
+        }
+        if self.model.is_none() && self.outage == Ask::Longest {
+            return Err(Failure::input("--outage longest needs a MODEL")
+                .hint("without one, give a length in seconds"));
+        }
+        Ok(files("trajectory", [&self.trajectory])
+            .chain(files("model", &self.model))
+            .chain(files("scenario", &self.settings.scenario))
+            .chain(files("gnss", &self.gnss))
+            .collect())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<RequireAnswer> {
+        let asked = self.requirements(context)?;
+        let of_others = |found| RequireAnswer { found, file: None };
+        match (&self.model, &self.catalogue) {
+            (Some(path), _) => given(path, &asked, self.vehicle.is_some(), context).map(of_others),
+            (None, Some(directory)) => {
+                let units = match directory.as_os_str() == BUILT_IN {
+                    true => catalogue(&asked)?,
+                    false => units_of(directory, &asked, context)?,
+                };
+                Ok(of_others(Found::Ranked(asked.ranked(&units)?)))
+            }
+            (None, None) => {
+                let needed = sought(&asked)?;
+                let file = Some(asked.model_file(&needed));
+                let found = Found::Needed(Box::new(needed));
+                Ok(RequireAnswer { found, file })
+            }
+        }
+    }
+}
+
+impl Answer for RequireAnswer {
+    fn document(&self) -> Document {
+        match &self.found {
+            Found::Needed(needed) => needed.document(),
+            Found::Given(given) => given.document(),
+            Found::Ranked(ranking) => ranking.document(),
+        }
+    }
+
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        let file = self.file.as_ref().map(model_file::to_toml);
+        file.map(|text| OutputFile::whole("", text))
+            .into_iter()
+            .collect()
+    }
+
+    /// The limits that are not kept.
+    fn unmet(&self) -> Option<Failure> {
+        match &self.found {
+            Found::Needed(_) => None,
+            Found::Given(judged) => {
+                let missed = judged.judged.as_ref().filter(|judged| !judged.met)?;
+                let Worst { limit, value, .. } = missed.worst;
+                let [value, most] = [value, limit.most].map(|x| limit.quantity.shown(x));
+                Some(Failure::bound(format!(
+                    "{} is {value}, the limit is {most}",
+                    limit.quantity
+                )))
+            }
+            Found::Ranked(ranking) => (!ranking.is_met())
+                .then(|| Failure::bound("no unit keeps the limits by figures that are all stated")),
+        }
+    }
+}
+
+impl Require {
+    /// What is asked, with the files read.
+    fn requirements(&self, context: &Context<'_>) -> Result<Requirements> {
+        if self.limits.is_empty() {
+            let hint = "give one, such as --require 'p95_m<=5' or --require 'yaw_deg<=1'";
+            return Err(Failure::input("no limit is given").hint(hint));
+        }
+        let mut scenario = self.settings.read()?;
+        if let Some(path) = &self.gnss {
+            scenario.gnss = scenario_file::read(path)?.gnss;
+        }
+        if self.vehicle.is_some() {
+            if !scenario.aiding.is_none() {
+                return Err(
+                    Failure::input("--vehicle car beside [aiding] of --scenario")
+                        .hint("give one of them"),
+                );
+            }
+            scenario.aiding = AidingSettings::car();
+        }
+        scenario.validate().map_err(Failure::input)?;
+        let trajectory = inputs::trajectory(&self.trajectory, context)?;
+        let limits = self.limits.clone();
+        Requirements::new(scenario, trajectory, limits, self.outage, self.start)
+    }
+}
+
+/// The IMU that is needed.
+fn sought(requirements: &Requirements) -> Result<NeededImu> {
+    requirements.needed().map_err(|e| {
+        let hint = match e {
+            RequireError::Loose { .. } => "a smaller limit, or a longer outage",
+            _ => "a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)",
+        };
+        Failure::input(e).hint(hint)
+    })
+}
+
+/// What a given IMU makes of the limits.
+fn given(
+    path: &Path,
+    requirements: &Requirements,
+    has_vehicle: bool,
+    context: &Context<'_>,
+) -> Result<Found> {
+    let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
+    let file = inputs::model(path, context)?;
+    let mut scenario = requirements.scenario.clone();
+    inputs::expect_turn_on(&mut scenario.initial, &file, path, context);
+    inputs::make_turn_on(&mut scenario.imu, &file, path, context);
+    let not_stated = stated_in_words(&file.not_stated());
+    if !not_stated.is_empty() {
+        let text = format!(
+            "{}: what is not stated counts as none: {not_stated}",
+            path.display()
+        );
+        context.warn(text);
+    }
+    let model = inputs::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
+    let mut judged = requirements.judged(&scenario, &model).map_err(unusable)?;
+    if has_vehicle {
+        judged.aidings = requirements.aidings(&scenario, &model).map_err(unusable)?;
+    }
+    Ok(Found::Given(Box::new(judged)))
+}
+
+/// The units that are known by name.
+fn catalogue(requirements: &Requirements) -> Result<Vec<CatalogueUnit>> {
+    let unit = |(name, _): &(&str, &str)| {
+        let sheet = datasheet::catalogued(name).expect("a name of the catalogue")?;
+        of_sheet((*name).to_owned(), &sheet, requirements)
+    };
+    CATALOGUE.iter().map(unit).collect()
+}
+
+/// The model files and catalogue entries of a directory.
+fn units_of(
+    directory: &Path,
+    asked: &Requirements,
+    context: &Context<'_>,
+) -> Result<Vec<CatalogueUnit>> {
+    if !directory.exists() {
+        let message = format!(
+            "--catalogue {}: there is no such directory",
+            directory.display()
+        );
+        return Err(Failure::input(message)
+            .hint("without a directory, --catalogue ranks the catalogued IMUs"));
+    }
+    let mut paths = listed(&[directory.to_owned()])?;
+    paths.retain(|p| p.extension().is_some_and(|e| e == "toml"));
+    if paths.is_empty() {
+        let message = format!("{}: no model file (.toml)", directory.display());
+        return Err(Failure::input(message)
+            .hint("make them with `nav-sim calibrate` or `nav-sim datasheet`"));
+    }
+    let unit = |path: &PathBuf| {
+        let name = path
+            .file_stem()
+            .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        if file_kind::of(path)? == FileKind::CatalogueEntry {
+            return of_sheet(name, &datasheet::read(path)?, asked);
+        }
+        let file = inputs::model(path, context)?;
+        let model = inputs::at_rate(path, &file.model, asked.scenario.imu.rate_hz, context)?;
+        Ok(asked.unit(name, &file, model))
+    };
+    paths.iter().map(unit).collect()
+}
+
+fn of_sheet(name: String, sheet: &Datasheet, requirements: &Requirements) -> Result<CatalogueUnit> {
+    let made = sheet.model_file(requirements.scenario.imu.rate_hz);
+    let file = made
+        .map_err(|e| Failure::input(format!("{name}: {e}")))?
+        .file;
+    Ok(requirements.unit(name, &file, file.model.clone()))
+}
+
+// Limits, the places of an outage, and what all answers share: curves of drift, doubts.
+
+/// Lengths of an outage on the curves of units (s).
+const CURVE_S: [u32; 7] = [1, 3, 10, 30, 60, 120, 300];
+/// Longest outage that is looked at (s).
+const LONGEST_S: f64 = 600.0;
+/// What confirms a figure of covariance analysis.
+const CONFIRM: &str = "confirm with nav-sim run --method both";
+/// Last line of each page.
+const CHECKED: &str = "covariance analysis against sampled runs: docs/validation.md.";
+/// Caption of drift curves.
+const DRIFT: &str =
+    "The error at the end of an outage against its length, at the worst of the places.";
+
+/// The error after an outage; none where the trajectory is too short.
+#[derive(Debug, Clone, Serialize)]
+struct DriftPoint {
+    outage_s: u32,
+    value: Option<f64>,
+}
+
+/// Warns of an outage in which errors are beyond linear theory.
+fn note_beyond(beyond: Option<Outage>, document: &mut Document) {
+    if let Some(Outage { start_s, end_s }) = beyond {
+        let place = window(start_s, end_s);
+        let text = format!("beyond linear theory in outage {place}: {CONFIRM}");
+        document.note(Importance::Warning, text);
+    }
+}
+
+/// What was asked, and where.
+#[derive(Debug, Serialize)]
+struct Question {
+    /// The limits.
+    limits: Vec<Limit>,
+    /// The places of the outage.
+    outages: Vec<Outage>,
+}
+
+impl Question {
+    /// `p95_m ≤ 5 after an outage of 60 s (the worst of 541 starts tried, 300 to 840 s)`
+    fn in_words(&self) -> String {
+        let first = self.outages[0];
+        let worst = if self.outages.len() > 1 {
+            "the worst of "
+        } else {
+            ""
+        };
+        let length = seconds(first.end_s - first.start_s);
+        format!(
+            "{} after an outage of {length} s ({worst}{})",
+            self.limits_in_words(),
+            self.starts()
+        )
+    }
+
+    /// Places where the outage was tried: `541 starts tried, 300 to 840 s`, or `from 300 s on`.
+    fn starts(&self) -> String {
+        let [first, last] =
+            [self.outages.first(), self.outages.last()].map(|o| o.map_or(0.0, |o| o.start_s));
+        if last > first {
+            format!(
+                "{} starts tried, {} to {} s",
+                self.outages.len(),
+                seconds(first),
+                seconds(last)
+            )
+        } else {
+            format!("from {} s on", seconds(first))
+        }
+    }
+
+    fn limits_in_words(&self) -> String {
+        let limit = |l: &Limit| format!("{} ≤ {}", l.quantity, readable(l.most));
+        self.limits.iter().map(limit).collect::<Vec<_>>().join(", ")
+    }
+
+    /// `p95_m 4.87 at the end of outage 300–360 s`
+    fn worst(&self, worst: &Worst) -> String {
+        let outage = self.outages.get(worst.place).unwrap_or(&self.outages[0]);
+        let place = window(outage.start_s, outage.end_s);
+        format!(
+            "{} {} at the end of outage {place}",
+            worst.limit.quantity,
+            readable(worst.value)
+        )
+    }
+}
+
+/// A quantity and its unit, for axes and heads.
+const fn quantity_in_words(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::P50 => "horizontal error, median (m)",
+        Quantity::P95 => "horizontal error, 95 % quantile (m)",
+        Quantity::Rmse => "horizontal error, RMSE (m)",
+        Quantity::Roll => "roll, RMSE (°)",
+        Quantity::Pitch => "pitch, RMSE (°)",
+        Quantity::Yaw => "yaw, RMSE (°)",
+    }
+}
+
+fn drift_chart(quantity: Quantity, series: Vec<Series>) -> Chart {
+    let panel = Panel {
+        height: 1.3,
+        ..Panel::new(Axis::log(quantity_in_words(quantity)), series)
+    };
+    Chart::new(
+        "Drift without fixes",
+        Axis::log("length of the outage (s)"),
+        vec![panel],
+    )
+}
+
+fn points(curve: &[DriftPoint]) -> Vec<(f64, f64)> {
+    let point = |p: &DriftPoint| (f64::from(p.outage_s), p.value.unwrap_or(f64::NAN));
+    curve.iter().map(point).collect()
+}
+
+// The IMU that a limit needs.
+
+/// The IMU that a limit needs.
+#[derive(Debug, Serialize)]
+struct NeededImu {
+    schema_version: u32,
+    question: Question,
+    t_corr_s: f64,
+    turn_on_bias: TurnOnBias,
+    figures: Vec<NeededFigure>,
+    /// The hardest limit, and where.
+    #[serde(flatten)]
+    worst: Worst,
+    /// The outage of the answer, where it is beyond linear theory.
+    beyond_linear: Option<Outage>,
+    /// With equal shares.
+    #[serde(skip)]
+    imu: ImuParameters,
+}
+
+/// Turn-on biases that it has.
+#[derive(Debug, Serialize)]
+struct TurnOnBias {
+    accel_m_s2: f64,
+    gyro_rad_s: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct NeededFigure {
+    figure: &'static str,
+    /// With equal shares.
+    allocated: f64,
+    /// If there were no other; `any`, or null where none will do.
+    alone: Value,
+    /// If the others are ten times better.
+    others_10_times_better: Value,
+}
+
+impl NeededImu {
+    /// The turn-on biases that the answer takes for granted.
+    fn turn_on_in_words(&self) -> String {
+        let TurnOnBias {
+            accel_m_s2,
+            gyro_rad_s,
+        } = self.turn_on_bias;
+        if accel_m_s2 == 0.0 && gyro_rad_s == 0.0 {
+            return "without turn-on bias ([imu] of --scenario states one)".to_owned();
+        }
+        let [accel, gyro] = [accel_m_s2, gyro_rad_s].map(readable);
+        format!("with turn-on biases of {accel} m/s² (accel) and {gyro} rad/s (gyro)")
+    }
+
+    /// Verdict, tables and charts.
+    fn document(&self) -> Document {
+        let lines = [
+            format!("needed for {}", self.question.in_words()),
+            format!("an IMU {}", self.turn_on_in_words()),
+            format!("hardest: {}", self.question.worst(&self.worst)),
+        ];
+        let mut document = Document::new("The IMU that a limit needs", Tone::Good, lines);
+        note_beyond(self.beyond_linear, &mut document);
+        let (from_s, to_s) = self.imu.floor_s();
+        let floor = format!(
+            "bias instability: floor of the Allan deviation, here {} to {} s",
+            readable(from_s),
+            readable(to_s)
+        );
+        document.note(Importance::Detail, floor);
+        document.section("Figures, at most");
+        document.text("If alone: without any other error of the IMU. Others 10 × better: every other figure ten times smaller.");
+        let columns = [
+            ("figure", "figure"),
+            ("at most, equal shares", "allocated"),
+            ("if alone", "alone"),
+            ("others 10 × better", "others_10_times_better"),
+        ];
+        document.lead(Table::of(self, "/figures/*", &columns));
+        document.checked(CHECKED);
+        document
+    }
+}
+
+fn bound(which: usize, found: &Bound) -> Value {
+    match found {
+        Bound::AtMost(value) => json!(ImuParameters::in_datasheets(which, *value)),
+        Bound::Any => json!("any"),
+        Bound::Never => Value::Null,
+    }
+}
+
+// Which IMU a limit on the errors after an outage needs, what a given one makes of it, and a ranking.
+
+/// The outage that is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Ask {
+    /// One of this length (s), from every second on.
+    Length(f64),
+    /// This one.
+    Window(Outage),
+    /// The longest within the limits.
+    Longest,
+}
+
+impl Ask {
+    /// How long it lasts at least (s).
+    fn length_s(self) -> f64 {
+        match self {
+            Self::Length(length_s) => length_s,
+            Self::Window(outage) => outage.end_s - outage.start_s,
+            Self::Longest => 1.0,
+        }
+    }
+}
+
+/// Correlation time of the biases of an IMU that is sought (s).
+const CORRELATION_TIME_S: f64 = 300.0;
+
+/// Earliest start of an outage where nothing else is said (s): by then a filter has aligned itself.
+const SETTLED_S: f64 = 300.0;
+/// An outage of which only the length is given begins at every whole second, at fewer where all of them together would
+/// last longer than this (s): the time that an answer takes is in proportion.
+const TOGETHER_S: f64 = 60_000.0;
+/// Beginnings at least.
+const BEGINNINGS: f64 = 16.0;
+
+/// What is asked of an IMU, and where.
+#[derive(Debug)]
+struct Requirements {
+    /// Receiver, start and rate.
+    scenario: Scenario,
+    /// The reference.
+    trajectory: Trajectory,
+    /// What the errors at the outage's end may be.
+    limits: Vec<Limit>,
+    ask: Ask,
+    first_s: f64,
+}
+
+impl Requirements {
+    /// `first_s`: the earliest start of an outage of which only the length is given (none: 300 s, less where the
+    /// trajectory is short).
+    ///
+    /// # Errors
+    /// When the outage does not lie on the trajectory.
+    fn new(
+        scenario: Scenario,
+        trajectory: Trajectory,
+        limits: Vec<Limit>,
+        ask: Ask,
+        first_s: Option<f64>,
+    ) -> Result<Self, Failure> {
+        let span_s = (trajectory.start_s(), trajectory.end_s());
+        let (lasts_s, length_s) = (span_s.1 - span_s.0, ask.length_s());
+        let settled_s = span_s.0 + SETTLED_S.min(0.5 * (lasts_s - length_s)).max(0.0);
+        let earlier = first_s.map_or("", |_| ", or an earlier --start");
+        let first_s = first_s.unwrap_or(settled_s);
+        let begins_s = match ask {
+            Ask::Window(outage) => outage.start_s,
+            _ => first_s,
+        };
+        if begins_s < span_s.0 || begins_s + length_s > span_s.1 {
+            let message = format!(
+                "an outage of {length_s} s from {begins_s} s on is not on the trajectory, which lasts from {} to {} s",
+                span_s.0, span_s.1
+            );
+            return Err(Failure::input(message).hint(format!("a shorter --outage{earlier}")));
+        }
+        Ok(Self {
+            scenario,
+            trajectory,
+            limits,
+            ask,
+            first_s,
+        })
+    }
+
+    /// The IMU that is needed.
+    ///
+    /// # Errors
+    /// When no IMU keeps the limits, or trajectory and rates do not fit together.
+    fn needed(&self) -> Result<NeededImu, RequireError> {
+        let outages = self.outages();
+        let course = self.course(&outages)?;
+        let scenario = &self.with_stated_turn_on();
+        let need = Need {
+            course: &course,
+            scenario,
+            limits: &self.limits,
+            t_corr_s: CORRELATION_TIME_S,
+        };
+        let imu = need.allocated()?;
+        let model = imu.model(self.scenario.imu.rate_hz);
+        let ends = course.drifts(scenario, &model)?;
+        let worst = Worst::of(&self.limits, &ends).expect("at least one limit and one place");
+        let figure = |i: usize| {
+            Ok::<_, RequireError>(NeededFigure {
+                figure: ImuParameters::NAMES[i],
+                allocated: ImuParameters::in_datasheets(i, imu.values[i]),
+                alone: bound(i, &need.quite_alone(&imu, i)?),
+                others_10_times_better: bound(i, &need.alone(&imu, i, 0.1)?),
+            })
+        };
+        let turn_on = |sensor| scenario.imu.turn_on_bias(sensor).unwrap_or(0.0);
+        Ok(NeededImu {
+            schema_version: 1,
+            t_corr_s: imu.t_corr_s,
+            turn_on_bias: TurnOnBias {
+                accel_m_s2: turn_on(Sensor::Accel),
+                gyro_rad_s: turn_on(Sensor::Gyro),
+            },
+            figures: (0..IMU_PARAMETERS).map(figure).collect::<Result<_, _>>()?,
+            beyond_linear: self.beyond_linear(scenario, &model, outages[worst.place])?,
+            question: self.question(outages),
+            worst,
+            imu,
+        })
+    }
+
+    /// The scenario with a filter that expects the turn-on biases that `[imu]` states, as it expects those of a model file.
+    fn with_stated_turn_on(&self) -> Scenario {
+        let mut scenario = self.scenario.clone();
+        inputs::expected_turn_on(&mut scenario.initial, &self.stated_turn_on());
+        scenario
+    }
+
+    fn stated_turn_on(&self) -> TurnOn {
+        let sigma = |sensor| {
+            self.scenario
+                .imu
+                .turn_on_bias(sensor)
+                .map(|sigma| [sigma; 3])
+        };
+        TurnOn {
+            accel_m_s2: sigma(Sensor::Accel),
+            gyro_rad_s: sigma(Sensor::Gyro),
+        }
+    }
+
+    /// What a model makes of the limits, and the longest outage that it bridges within them: at the places that the outage
+    /// asked for has, each as far as the trajectory goes. `scenario` is that of the unit, with its turn-on biases.
+    ///
+    /// # Errors
+    /// When the model has no filter.
+    fn judged(&self, scenario: &Scenario, model: &Model) -> Result<GivenImu, RequireError> {
+        let long = self.long_outages();
+        let course = self.course(&long)?;
+        let curves = course.curves(scenario, model)?;
+        let longest = self.longest_of(&curves);
+        let of_limit = |limit: &Limit| LimitCurve {
+            quantity: limit.quantity,
+            points: drift_curve(&curves, limit.quantity),
+        };
+        let curve_of_limit = self.limits.iter().map(of_limit).collect();
+        let (judged, outages, shown) = if self.ask == Ask::Longest {
+            let length_s = longest.length_s();
+            let worst = Worst::of(&self.limits, &after(&curves, length_s));
+            let shown = worst.map(|worst| Outage {
+                end_s: long[worst.place].start_s + length_s,
+                ..long[worst.place]
+            });
+            (None, long, shown)
+        } else {
+            let outages = self.outages();
+            let margins = Margins::of(&self.course(&outages)?, scenario, model, &self.limits)?;
+            let shown = outages[margins.worst.place];
+            (Some(margins), outages, Some(shown))
+        };
+        let beyond_linear = shown.map(|outage| self.beyond_linear(scenario, model, outage));
+        Ok(GivenImu {
+            schema_version: 1,
+            question: self.question(outages),
+            outage: longest,
+            curves: curve_of_limit,
+            beyond_linear: beyond_linear.transpose()?.flatten(),
+            aidings: Vec::new(),
+            judged,
+        })
+    }
+
+    /// The same limits without aiding, with what every car has, and with its wheel.
+    ///
+    /// # Errors
+    /// When the model has no filter.
+    fn aidings(&self, scenario: &Scenario, model: &Model) -> Result<Vec<Aided>, RequireError> {
+        let all = [
+            ("none", AidingSettings::default()),
+            ("nhc", AidingSettings::car()),
+            ("nhc, odometer", AidingSettings::car_with_odometer()),
+        ];
+        let aided = |(name, aiding): (&'static str, AidingSettings)| {
+            let scenario = Scenario {
+                aiding,
+                ..scenario.clone()
+            };
+            let long = self.long_outages();
+            let course = Course::new(&scenario, &self.trajectory, &long)?;
+            let curves = course.curves(&scenario, model)?;
+            let longest = self.longest_of(&curves);
+            let length_s = if self.ask == Ask::Longest {
+                longest.length_s()
+            } else {
+                self.ask.length_s()
+            };
+            Ok(Aided {
+                aiding: name,
+                worst: Worst::of(&self.limits, &after(&curves, length_s)),
+                outage: longest,
+            })
+        };
+        all.into_par_iter().map(aided).collect()
+    }
+
+    /// Whether `run` would say that the errors in an outage are beyond linear theory: by the covariance analysis that it
+    /// makes.
+    fn beyond_linear(
+        &self,
+        scenario: &Scenario,
+        model: &Model,
+        outage: Outage,
+    ) -> Result<Option<Outage>, RequireError> {
+        let (scenario, outages) = (scenario.with_full_noise(), [outage]);
+        let track = scenario.track(&self.trajectory, model, &outages)?;
+        let belief = scenario.belief(model, &outages, &track)?;
+        let experiment =
+            scenario.experiment(&self.trajectory, Truth::Model(model), &[], &outages, 0);
+        let expected = Expected::along(&track, &experiment, &belief, model);
+        let is_beyond = expected.is_some_and(|expected| expected.summary.outages[0].beyond_linear);
+        Ok(is_beyond.then_some(outage))
+    }
+
+    /// Units after the outage and after those of `CURVE_S`: those whose figures are all stated, the best first, then the others
+    /// by name.
+    ///
+    /// # Errors
+    /// When a model has no filter, with its name, or the length is not a whole number of seconds.
+    fn ranked(&self, units: &[CatalogueUnit]) -> Result<Ranking, Failure> {
+        let outages = self.long_outages();
+        let course = self.course(&outages)?;
+        let ranked = |unit: &CatalogueUnit| {
+            let ranked = self.rank(&course, unit);
+            ranked.map_err(|e| e.within(&unit.name))
+        };
+        let ranked: Vec<Result<RankedUnit, Failure>> = units.par_iter().map(ranked).collect();
+        let mut units = ranked.into_iter().collect::<Result<Vec<_>, _>>()?;
+        units.sort_by(|a, b| match [a, b].map(|unit| unit.not_stated.is_empty()) {
+            [true, true] => b.worst.margin().total_cmp(&a.worst.margin()),
+            [false, false] => a.unit.cmp(&b.unit),
+            [a, b] => b.cmp(&a),
+        });
+        Ok(Ranking {
+            schema_version: 1,
+            question: self.question(self.outages()),
+            curve_quantity: self.limits[0].quantity,
+            units,
+        })
+    }
+
+    fn rank(&self, course: &Course<'_>, unit: &CatalogueUnit) -> Result<RankedUnit, Failure> {
+        let curves = course.curves(&unit.scenario, &unit.model).refuse()?;
+        let length_s = self.ask.length_s();
+        let worst = Worst::of(&self.limits, &after(&curves, length_s));
+        let worst = worst.ok_or_else(|| {
+            Failure::input(format!("{length_s} s is not a whole number of seconds"))
+        })?;
+        let is_complete = unit.not_stated.is_empty();
+        let kept = match worst.margin() >= 0.0 {
+            true if is_complete => "met",
+            true => "open",
+            false => "not met",
+        };
+        let outage = self.outages()[worst.place];
+        Ok(RankedUnit {
+            unit: unit.name.clone(),
+            met: kept == "met",
+            kept,
+            missing: stated_in_words(&unit.not_stated),
+            not_stated: unit.not_stated.clone(),
+            worst,
+            curve: drift_curve(&curves, self.limits[0].quantity),
+            outage: self.longest_of(&curves),
+            beyond_linear: self
+                .beyond_linear(&unit.scenario, &unit.model, outage)
+                .refuse()?,
+        })
+    }
+
+    /// The longest outage of which all places are within the limits, in whole seconds. The first place holds the longest.
+    fn longest_of(&self, curves: &[Vec<Drift>]) -> Longest {
+        let first = curves.first().map_or(&[][..], Vec::as_slice);
+        let lengths: Vec<f64> = first.iter().map(|d| d.after_s).collect();
+        let is_missed = |length_s: &f64| {
+            after(curves, *length_s)
+                .iter()
+                .any(|drift| self.limits.iter().any(|l| drift.exceeds(l)))
+        };
+        let missed = lengths.iter().position(is_missed);
+        let longest_s = missed.map(|first| first.checked_sub(1).map_or(0.0, |last| lengths[last]));
+        let at_least_s = lengths.last().copied().unwrap_or(0.0);
+        let text = match longest_s {
+            // curves begin with the first second: what is not kept then may be kept for a part of it
+            Some(s) if s < 1.0 => "less than 1 s".to_owned(),
+            Some(s) => format!("{} s", seconds(s)),
+            None => format!("≥ {} s", seconds(at_least_s)),
+        };
+        Longest {
+            longest_s,
+            at_least_s: longest_s.is_none().then_some(at_least_s),
+            text,
+        }
+    }
+
+    /// A unit whose turn-on biases are there and expected; `model` is at the rate of the IMU.
+    #[must_use]
+    fn unit(&self, name: String, file: &ModelFile, model: Model) -> CatalogueUnit {
+        let mut scenario = self.scenario.clone();
+        let stated = file.turn_on.unwrap_or_default();
+        inputs::expected_turn_on(&mut scenario.initial, &stated);
+        inputs::made_turn_on(&mut scenario.imu, &stated);
+        CatalogueUnit {
+            name,
+            model,
+            scenario,
+            not_stated: file.not_stated(),
+        }
+    }
+
+    /// The model file of an IMU that is needed.
+    #[must_use]
+    fn model_file(&self, needed: &NeededImu) -> ModelFile {
+        let imu = &needed.imu;
+        let mut provenance = toml::Table::new();
+        let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
+        put("program", PROGRAM.into());
+        put("made_by", "require".into());
+        put("label", "what a limit needs: not a calibration".into());
+        put("question", needed.question.in_words().into());
+        put("turn_on_bias", needed.turn_on_in_words().into());
+        for (i, name) in ImuParameters::NAMES.iter().enumerate() {
+            put(name, ImuParameters::in_datasheets(i, imu.values[i]).into());
+        }
+        let stated = self.stated_turn_on();
+        let turn_on = (stated != TurnOn::default()).then_some(stated);
+        let model = imu.model(self.scenario.imu.rate_hz);
+        ModelFile {
+            provenance: Some(provenance),
+            turn_on,
+            ..ModelFile::new(model)
+        }
+    }
+
+    /// The places of the outage; those of one second where the longest is sought.
+    fn outages(&self) -> Vec<Outage> {
+        match self.ask {
+            Ask::Window(outage) => vec![outage],
+            ask => self.places(ask.length_s(), ask.length_s()),
+        }
+    }
+
+    /// An outage of this length at all its beginnings; fewer where outages of `mean_s` would together last too long.
+    fn places(&self, length_s: f64, mean_s: f64) -> Vec<Outage> {
+        let end_s = self.trajectory.end_s();
+        let seconds = (end_s - length_s - self.first_s).floor().max(0.0) + 1.0;
+        let count = seconds.min((TOGETHER_S / mean_s).max(BEGINNINGS));
+        evenly(self.first_s, end_s, length_s, count as u32)
+    }
+
+    /// The outage at the places that it is asked for, each as long as the trajectory allows.
+    fn long_outages(&self) -> Vec<Outage> {
+        let end_s = self.trajectory.end_s();
+        // The same places whatever is made of them: a unit is judged alike alone and in a ranking.
+        let lasting = |o: Outage| Outage {
+            end_s: end_s.min(o.start_s + LONGEST_S).max(o.end_s),
+            ..o
+        };
+        let places = match self.ask {
+            // Where the longest is sought every length is, at all places that leave room for it.
+            Ask::Longest => self.places(self.ask.length_s(), self.mean_length_s()),
+            _ => self.outages(),
+        };
+        places.into_iter().map(lasting).collect()
+    }
+
+    /// Mean length of outages that begin anywhere, each as long as the trajectory allows (s).
+    fn mean_length_s(&self) -> f64 {
+        let left_s = self.trajectory.end_s() - self.first_s;
+        let longest_s = left_s.min(LONGEST_S);
+        // All are the longest but those that begin later than that before the end, half as long in the mean.
+        longest_s * (1.0 - 0.5 * longest_s / left_s)
+    }
+
+    fn course(&self, outages: &[Outage]) -> Result<Course<'_>, ExperimentError> {
+        Course::new(&self.scenario, &self.trajectory, outages)
+    }
+
+    fn question(&self, outages: Vec<Outage>) -> Question {
+        Question {
+            limits: self.limits.clone(),
+            outages,
+        }
+    }
+}
+
+/// A unit to be ranked.
+struct CatalogueUnit {
+    /// Its name.
+    name: String,
+    /// At the rate of the IMU.
+    model: Model,
+    /// The scenario with its turn-on biases.
+    scenario: Scenario,
+    /// Figures that its datasheet does not state, and the model therefore has not.
+    not_stated: Vec<String>,
+}
+
+/// The errors after a time without fixes at every place where the outage lasts so long.
+fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
+    // Times come from samples: within a millisecond they are the same.
+    const SAME_S: f64 = 1e-3;
+    let drift_of_curve = |curve: &Vec<Drift>| {
+        let first = curve.partition_point(|d| d.after_s < length_s - SAME_S);
+        curve
+            .get(first)
+            .filter(|d| d.after_s < length_s + SAME_S)
+            .copied()
+    };
+    curves.iter().filter_map(drift_of_curve).collect()
+}
+
+/// The largest value of a quantity after each of [`CURVE_S`] without fixes.
+fn drift_curve(curves: &[Vec<Drift>], quantity: Quantity) -> Vec<DriftPoint> {
+    let point = |outage_s: u32| DriftPoint {
+        outage_s,
+        value: Drift::largest(&after(curves, f64::from(outage_s)), quantity).map(|(_, x)| x),
+    };
+    CURVE_S.map(point).to_vec()
+}
+
+// A given IMU against its limits.
+
+/// The longest outage that keeps the limits.
+#[derive(Debug, Serialize)]
+struct Longest {
+    /// Its length (s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    longest_s: Option<f64>,
+    /// All that was looked at (s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    at_least_s: Option<f64>,
+    text: String,
+}
+
+impl Longest {
+    /// Length that is bridged (s).
+    fn length_s(&self) -> f64 {
+        self.longest_s.or(self.at_least_s).unwrap_or_default()
+    }
+
+    fn in_words(&self) -> String {
+        let text = &self.text;
+        match self.at_least_s {
+            Some(s) if s < LONGEST_S => format!("{text}, to the end of the trajectory"),
+            Some(_) => format!("{text}, longer ones are not looked at"),
+            None => text.clone(),
+        }
+    }
+}
+
+/// A model against its limits.
+#[derive(Debug, Serialize)]
+struct GivenImu {
+    schema_version: u32,
+    question: Question,
+    outage: Longest,
+    /// The quantity of each limit, at its worst place, after outages of growing length.
+    curves: Vec<LimitCurve>,
+    /// The outage of the answer, where it is beyond linear theory.
+    beyond_linear: Option<Outage>,
+    /// With and without what the vehicle knows of its own motion; empty where that is not asked.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    aidings: Vec<Aided>,
+    /// After the outage that was asked for; none where the longest is sought.
+    #[serde(flatten)]
+    judged: Option<Margins>,
+}
+
+#[derive(Debug, Serialize)]
+struct LimitCurve {
+    quantity: Quantity,
+    points: Vec<DriftPoint>,
+}
+
+/// Limits where the vehicle measures something of its own motion.
+#[derive(Debug, Serialize)]
+struct Aided {
+    aiding: &'static str,
+    /// The hardest limit; none where no place has an outage of that length.
+    #[serde(flatten)]
+    worst: Option<Worst>,
+    outage: Longest,
+}
+
+impl GivenImu {
+    fn verdict(&self) -> Vec<String> {
+        let (question, longest) = (&self.question, self.outage.in_words());
+        let Some(judged) = &self.judged else {
+            let (limits, starts) = (question.limits_in_words(), question.starts());
+            return vec![format!(
+                "longest outage within {limits}: {longest} ({starts})"
+            )];
+        };
+        let word = if judged.met { "met" } else { "NOT met" };
+        let times = readable(judged.worst.value / judged.worst.limit.most);
+        let without = &judged.without_imu_errors;
+        let (name, left) = (without.limit.quantity, readable(without.value));
+        vec![
+            format!(
+                "{word}: {}, {times} times the limit",
+                question.worst(&judged.worst)
+            ),
+            format!("asked: {}", question.in_words()),
+            format!("longest outage within the limits, from the same starts: {longest}"),
+            match without.margin() >= 0.0 {
+                true => format!("an IMU without errors would leave {name} {left}"),
+                false => {
+                    format!("no IMU keeps the limit: GNSS and start alone leave {name} {left}")
+                }
+            },
+        ]
+    }
+
+    /// Verdict, tables and charts.
+    fn document(&self) -> Document {
+        let is_good = match &self.judged {
+            Some(judged) => judged.met,
+            None => self.outage.length_s() > 0.0,
+        };
+        let mut document = Document::new(
+            "An IMU against its limits",
+            Tone::from(is_good),
+            self.verdict(),
+        );
+        note_beyond(self.beyond_linear, &mut document);
+        if !self.aidings.is_empty() {
+            document.section("What the car knows of its own motion");
+            let columns = [
+                ("aiding", "aiding"),
+                ("error after the outage", "value"),
+                ("quantity", "quantity"),
+                ("limit", "limit"),
+                ("longest outage within the limits", "outage/text"),
+            ];
+            document.lead(Table::of(self, "/aidings/*", &columns));
+        }
+        document.section("Error against the length of an outage");
+        for (k, (limit, curve)) in self.question.limits.iter().zip(&self.curves).enumerate() {
+            let mut series = vec![Series::new("limit", Colour::RIGHT, Mark::Level(limit.most))];
+            let points = points(&curve.points);
+            series.extend(Series::dotted_line("this IMU", Colour::REAL, points));
+            document.chart(&drift_chart(limit.quantity, series), DRIFT);
+            let columns = [
+                ("outage (s)", "outage_s"),
+                (quantity_in_words(limit.quantity), "value"),
+            ];
+            let rows = format!("/curves/{k}/points/*");
+            document.table(&Table::of(self, &rows, &columns));
+        }
+        document.checked(CHECKED);
+        document
+    }
+}
+
+// Units of a catalogue against a limit.
+
+/// What a ranking takes for granted.
+const RULE: &str = "A figure that is missing counts as none: open means that the limit would be kept then. Turn-on bias is the repeatability from one switching-on to the next; an initial tolerance of the zero offset counts as removed before use. Figures named without a sensor are missing for both.";
+
+/// A unit of a catalogue.
+#[derive(Debug, Serialize)]
+struct RankedUnit {
+    unit: String,
+    /// True if the limits are kept by figures that are all stated.
+    met: bool,
+    /// `met`, `not met`, or `open` where figures are missing.
+    kept: &'static str,
+    /// Figures that its datasheet does not state: they count as zero.
+    not_stated: Vec<String>,
+    /// The same in words.
+    missing: String,
+    /// The hardest limit for the outage asked for.
+    #[serde(flatten)]
+    worst: Worst,
+    outage: Longest,
+    /// The quantity of the first limit, at its worst place, after outages of growing length.
+    curve: Vec<DriftPoint>,
+    /// The outage asked for, where it is beyond linear theory.
+    beyond_linear: Option<Outage>,
+}
+
+/// Units against limits: those whose figures are all stated, the best first, then the others by name.
+#[derive(Debug, Serialize)]
+struct Ranking {
+    schema_version: u32,
+    question: Question,
+    curve_quantity: Quantity,
+    units: Vec<RankedUnit>,
+}
+
+impl Ranking {
+    /// True if a unit keeps the limits, by figures that are all stated.
+    fn is_met(&self) -> bool {
+        self.units.iter().any(|unit| unit.met)
+    }
+
+    fn verdict(&self) -> Vec<String> {
+        let count = self.units.iter().filter(|u| u.met).count();
+        let answer = match self.units.iter().find(|u| u.met) {
+            None => "no unit keeps the limit by figures that are all stated".to_owned(),
+            Some(best) => format!(
+                "{} is the best of {count} units that keep the limit",
+                best.unit
+            ),
+        };
+        let mut lines = vec![answer, format!("asked: {}", self.question.in_words())];
+        let missing = self
+            .units
+            .iter()
+            .filter(|u| !u.not_stated.is_empty())
+            .count();
+        if missing > 0 {
+            lines.push(format!(
+                "{missing} units are not ranked: their data sheets leave figures out (--verbose lists them)"
+            ));
+        }
+        lines
+    }
+
+    fn curves(&self) -> Vec<Series> {
+        // more hues cannot be told apart
+        const COLOURED: usize = 6;
+        let curve =
+            |(k, unit): (usize, &RankedUnit)| match k < COLOURED && unit.not_stated.is_empty() {
+                true => Series::line(&unit.unit, Colour::Hue(k), points(&unit.curve)),
+                false => Series::thin("others", Colour::Soft, points(&unit.curve)),
+            };
+        let most = Mark::Level(self.question.limits[0].most);
+        // what stands behind is drawn first
+        std::iter::once(Series::new("limit", Colour::Ink, most))
+            .chain(self.units.iter().enumerate().rev().map(curve))
+            .collect()
+    }
+
+    /// Verdict, tables and charts.
+    fn document(&self) -> Document {
+        let tone = Tone::from(self.is_met());
+        let mut document = Document::new("IMUs against a limit", tone, self.verdict());
+        let beyond = self.units.iter().filter(|u| u.beyond_linear.is_some());
+        let names: Vec<&str> = beyond.map(|u| u.unit.as_str()).collect();
+        if !names.is_empty() {
+            let text = format!("beyond linear theory: {}: {CONFIRM}", names.join(", "));
+            document.note(Importance::Warning, text);
+        }
+        let quantity = quantity_in_words(self.curve_quantity);
+        let columns = format!(
+            "1 s … 300 s: {quantity} after such an outage; bridges: longest outage within the limits"
+        );
+        document.note(Importance::Remark, columns);
+        document.section("Ranking");
+        let columns = [
+            ("unit", "unit"),
+            ("limit", "kept"),
+            ("bridges", "outage/text"),
+            ("{outage_s} s", "curve/*/value"),
+        ];
+        document.lead(Table::of(self, "/units/*", &columns));
+        document.chart(&drift_chart(self.curve_quantity, self.curves()), DRIFT);
+        document.section("Figures that are missing");
+        let columns = [("unit", "unit"), ("not stated", "missing")];
+        document.table(&Table::of(self, "/units/*", &columns));
+        document.text(RULE);
+        document.checked(CHECKED);
+        document
+    }
+}
+
+/// `bias, accel turn-on`: figures that both sensors lack are named once.
+fn stated_in_words(not_stated: &[String]) -> String {
+    let mut words = not_stated.join(", ").replace('_', "-");
+    for figure in ["noise", "bias", "turn-on"] {
+        words = words.replace(&format!("accel {figure}, gyro {figure}"), figure);
+    }
+    words
+}
+
+#[cfg(test)]
+#[path = "require_tests.rs"]
+mod tests;

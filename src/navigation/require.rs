@@ -1,0 +1,843 @@
+//! The IMU that keeps the errors at the end of an outage within a limit, and the margin of a given IMU.
+//!
+//! Everything here is linear covariance analysis of a filter that knows its IMU: a state for every process, with the
+//! gains that follow. Errors grow with every noise intensity, so each answer is the zero of a monotone function.
+//!
+//! ```
+//! use nav_sim_navigation::require::{Limit, Quantity, Worst};
+//!
+//! let limit = Limit { quantity: Quantity::P95, most: 5.0 };
+//! let found = Worst { limit, value: 10.0, place: 0 };
+//! // Twice the error allowed.
+//! assert!((found.margin() + 2_f64.ln()).abs() < 1e-15);
+//! ```
+
+use crate::ekf::{Belief, BeliefError};
+use crate::imu::Sensor;
+use crate::metrics::QuadraticForm;
+use crate::noise::{Composite, Flicker, Kind, Model, Process, White, continuous};
+use crate::scenario::Scenario;
+use crate::sensors::imu::Truth;
+use crate::sensors::outage::Outage;
+use crate::simulation::ExperimentError;
+use crate::simulation::lincov::{
+    Crossing, Instant, Moments, NamedSource, Track, TruthSide, errors_in_outages,
+};
+use crate::trajectory::Trajectory;
+use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::str::FromStr;
+
+/// What is limited at the end of an outage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// 95 % quantile of the horizontal error (m).
+    P95,
+    /// Its median (m).
+    P50,
+    /// Its root mean square (m).
+    Rmse,
+    /// RMSE of roll (degrees).
+    Roll,
+    /// RMSE of pitch (degrees).
+    Pitch,
+    /// RMSE of yaw (degrees).
+    Yaw,
+}
+
+nav_sim_signal::named!(Quantity {
+    P95 = "p95_m",
+    P50 = "p50_m",
+    Rmse = "rmse_m",
+    Roll = "roll_deg",
+    Pitch = "pitch_deg",
+    Yaw = "yaw_deg",
+}, in files);
+
+impl Quantity {
+    /// Roll, pitch or yaw, from 0.
+    fn angle(self) -> Option<usize> {
+        (self as usize).checked_sub(Self::Roll as usize)
+    }
+
+    /// A value with its unit, to a thousandth; a larger one, or a smaller, in powers of ten.
+    pub fn shown(self, value: f64) -> String {
+        let unit = if self.angle().is_some() { "deg" } else { "m" };
+        let rounded = (value * 1e3).round() / 1e3;
+        if (1e-3..1e6).contains(&value) {
+            format!("{rounded} {unit}")
+        } else {
+            format!("{value:.2e} {unit}")
+        }
+    }
+}
+
+/// A quantity and the most it may be.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Limit {
+    /// The quantity.
+    pub quantity: Quantity,
+    /// Its largest value allowed (m or degrees).
+    #[serde(rename = "limit")]
+    pub most: f64,
+}
+
+impl FromStr for Limit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let read = || {
+            let (name, most) = text.split_once("<=").or_else(|| text.split_once('<'))?;
+            let most: f64 = most.trim().parse().ok()?;
+            let quantity = name.trim().parse().ok()?;
+            (most > 0.0 && most.is_finite()).then_some(Self { quantity, most })
+        };
+        let names = || Quantity::NAMES.join(", ");
+        read().ok_or_else(|| {
+            format!(
+                "expected NAME<=LIMIT with a positive limit, NAME one of {}",
+                names()
+            )
+        })
+    }
+}
+
+/// The limit that is the hardest to keep, and where.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Worst {
+    /// The limit.
+    #[serde(flatten)]
+    pub limit: Limit,
+    /// The error there.
+    pub value: f64,
+    /// At which place of the outage, counted from 0.
+    pub place: usize,
+}
+
+impl Worst {
+    /// Logarithm of limit over error: above 0 there is a reserve.
+    pub fn margin(&self) -> f64 {
+        // In logarithms limits of different units compare, and the margin is nearly linear in the logarithm
+        // of an intensity.
+        (self.limit.most / self.value).ln()
+    }
+
+    /// The hardest of some limits for the errors at several places; none without limits or places.
+    pub fn of(limits: &[Limit], drifts: &[Drift]) -> Option<Self> {
+        let worst_of_limit = |limit: &Limit| {
+            let (place, value) = Drift::largest(drifts, limit.quantity)?;
+            Some(Self {
+                limit: *limit,
+                value,
+                place,
+            })
+        };
+        // what is not a number is the hardest
+        let margin = |worst: &Self| Some(worst.margin()).filter(|margin| !margin.is_nan());
+        let key = |worst: &Self| margin(worst).unwrap_or(f64::NEG_INFINITY);
+        limits
+            .iter()
+            .filter_map(worst_of_limit)
+            .min_by(|a, b| key(a).total_cmp(&key(b)))
+    }
+}
+
+/// Why there is no answer.
+#[derive(Debug, thiserror::Error)]
+pub enum RequireError {
+    /// Not even an IMU without errors keeps a limit.
+    #[error("no IMU keeps {} ≤ {}: without any noise of it, the error is {}, from GNSS, the start and what else the scenario has", limit.quantity.name(), limit.quantity.shown(limit.most), limit.quantity.shown(*value))]
+    Floor {
+        /// The limit.
+        limit: Limit,
+        /// The error with a perfect IMU.
+        value: f64,
+    },
+    /// The poorest IMU that is sought keeps every limit.
+    #[error("no IMU is too poor for {} ≤ {}: any that is sought keeps it; with the poorest of the search the error is {} ({})", limit.quantity.name(), limit.quantity.shown(limit.most), limit.quantity.shown(*value), poorest.in_words())]
+    Loose {
+        /// The hardest limit.
+        limit: Limit,
+        /// The error with the poorest IMU.
+        value: f64,
+        /// That IMU.
+        poorest: ImuParameters,
+    },
+    /// The model has no filter.
+    #[error(transparent)]
+    Belief(#[from] BeliefError),
+    /// Trajectory, rates and fixes do not fit together.
+    #[error(transparent)]
+    Experiment(#[from] ExperimentError),
+}
+
+// The places of an outage along a trajectory, and the errors at its end.
+
+/// True errors at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drift {
+    /// How long the outage has lasted (s).
+    pub after_s: f64,
+    /// Mean of the position error, north and east (m).
+    pub mean_m: [f64; 2],
+    /// Its covariance (m²).
+    pub covariance_m2: [[f64; 2]; 2],
+    /// RMSE of roll, pitch, yaw (degrees).
+    pub angles_deg: [f64; 3],
+}
+
+impl Drift {
+    fn of(instant: &Instant, after_s: f64) -> Self {
+        let p = &instant.covariance;
+        let rmse = instant.rmse();
+        Self {
+            after_s,
+            mean_m: [instant.mean[0], instant.mean[1]],
+            covariance_m2: [[p[0][0], p[0][1]], [p[1][0], p[1][1]]],
+            angles_deg: [rmse[6], rmse[7], rmse[8]],
+        }
+    }
+
+    /// The value of a quantity (m or degrees).
+    pub fn value(&self, quantity: Quantity) -> f64 {
+        match quantity {
+            Quantity::P50 => self.quantile(0.5),
+            Quantity::P95 => self.quantile(0.95),
+            Quantity::Rmse => self.square(quantity).sqrt(),
+            Quantity::Roll => self.angles_deg[0],
+            Quantity::Pitch => self.angles_deg[1],
+            Quantity::Yaw => self.angles_deg[2],
+        }
+    }
+
+    /// The mean square behind a quantity (m² or degrees²), in which the parts of independent sources add.
+    fn square(&self, quantity: Quantity) -> f64 {
+        match quantity.angle() {
+            Some(i) => self.angles_deg[i].powi(2),
+            // The quantiles have no sum over sources: shares are of the mean square whatever quantile is
+            // limited.
+            None => (0..2)
+                .map(|i| self.covariance_m2[i][i] + self.mean_m[i].powi(2))
+                .sum(),
+        }
+    }
+
+    /// What a value is at most, at next to no cost.
+    fn bound(&self, quantity: Quantity) -> f64 {
+        match quantity {
+            Quantity::P50 => self.quantile_bound(0.5),
+            Quantity::P95 => self.quantile_bound(0.95),
+            _ => self.value(quantity),
+        }
+    }
+
+    /// The mean, and the quantile of a circular error whose variance on every axis is the largest of this one's.
+    fn quantile_bound(&self, probability: f64) -> f64 {
+        let [[north, both], [_, east]] = self.covariance_m2;
+        let largest = 0.5 * (north + east + (north - east).hypot(2.0 * both));
+        self.mean_m[0].hypot(self.mean_m[1]) + (-2.0 * (1.0 - probability).ln() * largest).sqrt()
+    }
+
+    /// Whether a limit is exceeded, or the value is not a number.
+    pub fn exceeds(&self, limit: &Limit) -> bool {
+        let is_within = |value: f64| value <= limit.most;
+        !is_within(self.bound(limit.quantity)) && !is_within(self.value(limit.quantity))
+    }
+
+    /// The largest value of a quantity and where it is; what is not a number is the largest.
+    pub fn largest(drifts: &[Self], quantity: Quantity) -> Option<(usize, f64)> {
+        let bound = |drift: &Self| {
+            Some(drift.bound(quantity))
+                .filter(|b| !b.is_nan())
+                .unwrap_or(f64::INFINITY)
+        };
+        let mut bounds: Vec<(usize, f64)> = drifts.iter().map(bound).enumerate().collect();
+        bounds.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let mut largest: Option<(usize, f64)> = None;
+        // A quantile is an integral: only those are computed that may be the largest.
+        for (place, bound) in bounds {
+            if largest.is_some_and(|(_, value)| bound <= value || value.is_nan()) {
+                break;
+            }
+            let value = drifts[place].value(quantity);
+            if largest.is_none_or(|(_, largest)| value > largest || value.is_nan()) {
+                largest = Some((place, value));
+            }
+        }
+        largest
+    }
+
+    fn quantile(&self, probability: f64) -> f64 {
+        let covariance = DMatrix::from_fn(2, 2, |i, j| self.covariance_m2[j][i]);
+        // North and east have unequal variances and are correlated: the horizontal error is neither Rayleigh
+        // nor normal.
+        QuadraticForm::of_square(&covariance, &self.mean_m)
+            .quantile(probability)
+            .sqrt()
+    }
+}
+
+/// A trajectory with an outage at several places, each alone.
+pub struct Course<'a> {
+    trajectory: &'a Trajectory,
+    track: Track,
+    outages: Vec<Outage>,
+}
+
+impl<'a> Course<'a> {
+    /// Linearises along the trajectory; of the scenario, receiver, barometer and start count. Outages may overlap.
+    ///
+    /// # Errors
+    /// When trajectory, rates and fixes do not fit together.
+    pub fn new(
+        scenario: &Scenario,
+        trajectory: &'a Trajectory,
+        outages: &[Outage],
+    ) -> Result<Self, ExperimentError> {
+        // The track is of the reference alone; the noise that is sought comes later, a hundred times over the
+        // same track.
+        let silent = Model {
+            rate_hz: scenario.imu.rate_hz,
+            axes: Default::default(),
+        };
+        let track = scenario.track(trajectory, &silent, &[])?.merged();
+        Ok(Self {
+            trajectory,
+            track,
+            outages: outages.to_vec(),
+        })
+    }
+
+    /// Errors at the outage's end, at each place, of the filter that knows the model.
+    ///
+    /// # Errors
+    /// When the model has no such filter.
+    pub fn drifts(&self, scenario: &Scenario, model: &Model) -> Result<Vec<Drift>, BeliefError> {
+        self.drifts_in(&self.outages, scenario, model)
+    }
+
+    /// Errors at every whole second of the outage, at each place.
+    ///
+    /// # Errors
+    /// When the model has no such filter.
+    pub fn curves(
+        &self,
+        scenario: &Scenario,
+        model: &Model,
+    ) -> Result<Vec<Vec<Drift>>, BeliefError> {
+        let belief = self.belief(scenario, model)?;
+        let all = TruthSide::together(&self.sources(scenario, model));
+        let laws = errors_in_outages(&self.track, &belief, &all, &self.outages, Moments::Reports);
+        let curve = |(instants, outage): (Vec<Instant>, &Outage)| {
+            // A report within the outage is what an outage would leave that ended there.
+            let drift = |instant: &Instant| Drift::of(instant, instant.t_s - outage.start_s);
+            let mut curve: Vec<Drift> = instants
+                .iter()
+                .map(drift)
+                .filter(|d| d.after_s > 0.0)
+                .collect();
+            if let Some(end) = curve.last_mut() {
+                end.after_s = outage.end_s - outage.start_s;
+            }
+            curve
+        };
+        Ok(laws.into_iter().zip(&self.outages).map(curve).collect())
+    }
+
+    /// The errors of each group of sources alone, under the gains of the filter that knows them all.
+    fn parts(
+        &self,
+        place: usize,
+        scenario: &Scenario,
+        model: &Model,
+        group: &(dyn Fn(&NamedSource) -> usize + Sync),
+        groups: usize,
+    ) -> Result<Vec<Drift>, BeliefError> {
+        let belief = self.belief(scenario, model)?;
+        let sources = self.sources(scenario, model);
+        let part = |g: usize| {
+            let own: Vec<NamedSource> = sources
+                .iter()
+                .filter(|source| group(source) == g)
+                .cloned()
+                .collect();
+            self.ends(
+                &self.outages[place..=place],
+                &belief,
+                &TruthSide::together(&own),
+            )[0]
+        };
+        Ok((0..groups).into_par_iter().map(part).collect())
+    }
+
+    /// The hardest limit of a filter that knows the model.
+    fn worst(
+        &self,
+        scenario: &Scenario,
+        model: &Model,
+        limits: &[Limit],
+    ) -> Result<Worst, BeliefError> {
+        let worst = Worst::of(limits, &self.drifts(scenario, model)?);
+        Ok(worst.expect("at least one limit and one place"))
+    }
+
+    /// Where the margin of the hardest limit falls to `reserve` along IMUs of a rising logarithm, each with the scenario
+    /// of a filter that knows it, as [`Crossing::from`] 0; the logarithm and what is left beyond the reserve.
+    ///
+    /// The search is at the places that were the worst so far; what it finds is held against all, and it goes on where
+    /// another is worse. The answer is that of all places, at the cost of a few.
+    fn crossing(
+        &self,
+        limits: &[Limit],
+        (crossing, reserve): (&Crossing, f64),
+        imu_at: impl Fn(f64) -> (Scenario, Model),
+    ) -> Result<(f64, f64), BeliefError> {
+        let worst_at = |ln: f64| {
+            let (scenario, model) = imu_at(ln);
+            self.worst(&scenario, &model, limits)
+        };
+        let mut places = vec![worst_at(0.0)?.place];
+        let mut start = 0.0;
+        loop {
+            let outages: Vec<Outage> = places.iter().map(|place| self.outages[*place]).collect();
+            let margin_there = |ln: f64| {
+                let (scenario, model) = imu_at(ln);
+                let worst = Worst::of(limits, &self.drifts_in(&outages, &scenario, &model)?);
+                Ok::<_, BeliefError>(
+                    worst.expect("at least one limit and one place").margin() - reserve,
+                )
+            };
+            let (ln, there) = crossing.from(start, margin_there)?;
+            let worst = worst_at(ln)?;
+            let everywhere = worst.margin() - reserve;
+            if everywhere >= there - crossing.exact || places.contains(&worst.place) {
+                return Ok((ln, everywhere));
+            }
+            places.push(worst.place);
+            start = ln;
+        }
+    }
+
+    fn drifts_in(
+        &self,
+        outages: &[Outage],
+        scenario: &Scenario,
+        model: &Model,
+    ) -> Result<Vec<Drift>, BeliefError> {
+        let all = TruthSide::together(&self.sources(scenario, model));
+        Ok(self.ends(outages, &self.belief(scenario, model)?, &all))
+    }
+
+    fn ends(&self, outages: &[Outage], belief: &Belief, truth: &TruthSide) -> Vec<Drift> {
+        let ends = errors_in_outages(&self.track, belief, truth, outages, Moments::End);
+        let drift = |(instants, outage): (Vec<Instant>, &Outage)| {
+            Drift::of(
+                instants.last().expect("every outage has an end"),
+                outage.end_s - outage.start_s,
+            )
+        };
+        ends.into_iter().zip(outages).map(drift).collect()
+    }
+
+    /// The filter that knows every process: the best that this IMU allows, whatever reduction is chosen later.
+    fn belief(&self, scenario: &Scenario, model: &Model) -> Result<Belief, BeliefError> {
+        scenario
+            .with_full_noise()
+            .belief(model, &self.outages, &self.track)
+    }
+
+    fn sources(&self, scenario: &Scenario, model: &Model) -> Vec<NamedSource> {
+        let truth = Truth::Model(model);
+        TruthSide::sources(
+            &scenario.experiment(self.trajectory, truth, &[], &self.outages, 0),
+            model,
+        )
+    }
+}
+
+/// Outages of one length at `places` times, the first at `first_s`, evenly to the end of the trajectory.
+pub fn evenly(first_s: f64, end_s: f64, length_s: f64, places: u32) -> Vec<Outage> {
+    let last_s = end_s - length_s;
+    let step = if places > 1 {
+        (last_s - first_s).max(0.0) / f64::from(places - 1)
+    } else {
+        0.0
+    };
+    let mut outages: Vec<Outage> = (0..places)
+        // Reports come at whole seconds: only from such a start are the errors within the outage those after
+        // 1, 2, 3 … s.
+        .map(|k| (first_s + f64::from(k) * step).floor())
+        .map(|start_s| Outage {
+            start_s,
+            end_s: start_s + length_s,
+        })
+        .collect();
+    outages.dedup();
+    outages
+}
+
+// The IMU that a limit needs: white noise and bias instability of each sensor, each with a quarter of the budget.
+
+/// How many intensities an IMU has here.
+pub const IMU_PARAMETERS: usize = 4;
+
+/// Intensities of an IMU, all axes alike.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImuParameters {
+    /// Velocity random walk (m/s/√s), bias instability of the accelerometer (m/s²), angle random walk (rad/√s), bias
+    /// instability of the gyroscope (rad/s).
+    pub values: [f64; IMU_PARAMETERS],
+    /// Longest correlation time of the biases (s).
+    pub t_corr_s: f64,
+}
+
+const HOUR_S: f64 = 3600.0;
+
+/// A consumer IMU, from which searches start.
+const START: [f64; IMU_PARAMETERS] = [1e-3, 3e-4, 5e-5, 1e-5];
+/// The poorest IMU that is sought has this times the intensities of the start (18 m/s/√h, 9.2 mg, 52 deg/√h, 620 deg/h):
+/// poorer than any that is sold. Beyond, errors are no longer small and the linear analysis means nothing.
+const POOREST: f64 = 300.0;
+/// An intensity times this is as good as none.
+const NONE: f64 = 1e-5;
+/// How far from the start an intensity is sought, as a logarithm: beyond, any will do.
+const RANGE: f64 = 9.0;
+/// A logarithm of limit over error that is left: the search ends on either side of what it aims at, within [`EXACT`], its
+/// steps of up to a second leave up to 0.12 % less than those of `run` (biases, in outages of 5 s; 0.01 % from 10 s on, in the
+/// drive of `tests/truth/require.rs`), and the IMU that is named is to keep the limit in both.
+const RESERVE: f64 = 1.5e-3;
+/// A logarithm of limit over error this close to the one sought counts as it.
+const EXACT: f64 = 1e-4;
+/// Rounds of the allocation, the share of a correction that is applied, and when it is done.
+const ROUNDS: usize = 25;
+const DAMPING: f64 = 0.35;
+const EVEN: f64 = 0.02;
+
+impl ImuParameters {
+    /// The processes.
+    const PROCESSES: [(Sensor, Kind); IMU_PARAMETERS] = [
+        (Sensor::Accel, Kind::White),
+        (Sensor::Accel, Kind::GaussMarkov),
+        (Sensor::Gyro, Kind::White),
+        (Sensor::Gyro, Kind::GaussMarkov),
+    ];
+
+    /// The noise model.
+    pub fn model(&self, rate_hz: f64) -> Model {
+        let [accel_white, accel_bias, gyro_white, gyro_bias] = self.values;
+        let axis = |density: f64, bias: f64| {
+            let white = White::new(continuous::white_sigma2(density, rate_hz));
+            let bias = Flicker {
+                floor: bias,
+                t_corr_s: self.t_corr_s,
+            }
+            .processes(rate_hz);
+            let mut processes = vec![Process::White(white.expect("a finite variance"))];
+            processes.extend(
+                bias.expect("finite variances")
+                    .into_iter()
+                    .map(Process::GaussMarkov),
+            );
+            Composite::new(processes)
+        };
+        Model::pooled(
+            rate_hz,
+            &axis(accel_white, accel_bias),
+            &axis(gyro_white, gyro_bias),
+        )
+    }
+
+    /// Between which averaging times the Allan deviation of a bias is nowhere below its bias instability (s).
+    pub fn floor_s(&self) -> (f64, f64) {
+        Flicker {
+            floor: 1.0,
+            t_corr_s: self.t_corr_s,
+        }
+        .range_s()
+    }
+
+    /// An intensity in the unit of datasheets.
+    pub fn in_datasheets(which: usize, value: f64) -> f64 {
+        match which {
+            0 => value * HOUR_S.sqrt(),
+            1 => value / STANDARD_GRAVITY * 1e6,
+            2 => value / DEG * HOUR_S.sqrt(),
+            _ => value / DEG_PER_HOUR,
+        }
+    }
+
+    /// Names and units of the intensities.
+    pub const NAMES: [&'static str; IMU_PARAMETERS] = [
+        "velocity random walk (m/s/√h)",
+        "accelerometer bias instability (µg)",
+        "angle random walk (deg/√h)",
+        "gyroscope bias instability (deg/h)",
+    ];
+
+    /// `velocity random walk (m/s/√h) 18.0, …`
+    fn in_words(&self) -> String {
+        let figure = |i: usize| {
+            let value = Self::in_datasheets(i, self.values[i]);
+            // Three digits: the figures are bounds of a search, not measurements.
+            let decimals = (2.0 - value.log10().floor()).max(0.0) as usize;
+            format!("{} {value:.decimals$}", Self::NAMES[i])
+        };
+        (0..IMU_PARAMETERS)
+            .map(figure)
+            .collect::<Vec<_>>()
+            .join(", ")
+    }
+
+    /// As good as without noise.
+    fn perfect(t_corr_s: f64) -> Self {
+        // 1e-5 of a consumer IMU, not zero: intensities are sought as logarithms.
+        Self {
+            values: START,
+            t_corr_s,
+        }
+        .times([NONE; IMU_PARAMETERS])
+    }
+
+    fn times(&self, factors: [f64; IMU_PARAMETERS]) -> Self {
+        Self {
+            values: std::array::from_fn(|i| self.values[i] * factors[i]),
+            ..*self
+        }
+    }
+}
+
+/// An intensity that keeps the limits, or none that matters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Answer {
+    /// At most this.
+    AtMost(f64),
+    /// Any value will do.
+    Any,
+    /// Not even zero is enough.
+    Never,
+}
+
+/// What is asked of an IMU.
+pub struct Need<'a> {
+    /// The trajectory and the places of the outage.
+    pub course: &'a Course<'a>,
+    /// Receiver, start and IMU rate.
+    pub scenario: &'a Scenario,
+    /// At least one.
+    pub limits: &'a [Limit],
+    /// Longest correlation time of the biases (s).
+    pub t_corr_s: f64,
+}
+
+impl Need<'_> {
+    /// The IMU that meets the limits with 1.5 thousandths in reserve, its four intensities with equal shares in the
+    /// variance that GNSS and start leave.
+    ///
+    /// # Errors
+    /// When not even a perfect IMU meets them, or the poorest that is sought does.
+    pub fn allocated(&self) -> Result<ImuParameters, RequireError> {
+        let start = ImuParameters {
+            values: START,
+            t_corr_s: self.t_corr_s,
+        };
+        let perfect = self.worst(&ImuParameters::perfect(self.t_corr_s))?;
+        if perfect.margin() <= RESERVE {
+            return Err(RequireError::Floor {
+                limit: perfect.limit,
+                value: perfect.value,
+            });
+        }
+        let poorest = start.times([POOREST; IMU_PARAMETERS]);
+        let worst = self.worst(&poorest)?;
+        if worst.margin() >= RESERVE {
+            return Err(RequireError::Loose {
+                limit: worst.limit,
+                value: worst.value,
+                poorest,
+            });
+        }
+        let mut imu = self.at_limit(&start, [1.0; IMU_PARAMETERS])?.1;
+        for _ in 0..ROUNDS {
+            let (worst, squares) = self.squares(&imu)?;
+            let total: f64 = squares.iter().sum();
+            // what the limit leaves when GNSS and start have taken their part
+            // The margin is ln(limit/error): squared, exp(2 margin) is what the mean square may grow by.
+            let allowed =
+                total * (2.0 * (worst.margin() - RESERVE)).exp() - squares[IMU_PARAMETERS];
+            // Where GNSS and start alone exceed the limit at this iterate the rest is negative: five per cent
+            // keep the logarithm finite until it is not.
+            let quarter = allowed.max(0.05 * total) / IMU_PARAMETERS as f64;
+            let off: [f64; IMU_PARAMETERS] = std::array::from_fn(|i| (quarter / squares[i]).ln());
+            if off.iter().all(|x| x.abs() < EVEN) {
+                break;
+            }
+            // Half of the logarithm of the squares would be the exact step of a source alone; less, since the
+            // filter's gains, and with them all four parts, change with every intensity.
+            imu = imu.times(off.map(|x| (DAMPING * x).clamp(-1.0, 1.0).exp()));
+        }
+        // The rounds end near the limit; one factor common to all then meets it exactly and leaves the shares
+        // as they are.
+        Ok(self.at_limit(&imu, [1.0; IMU_PARAMETERS])?.1)
+    }
+
+    /// What an intensity may be where the others are multiplied by `others`.
+    ///
+    /// # Errors
+    /// When the model has no filter.
+    pub fn alone(
+        &self,
+        imu: &ImuParameters,
+        which: usize,
+        others: f64,
+    ) -> Result<Answer, BeliefError> {
+        let base = imu.times(std::array::from_fn(
+            |i| if i == which { 1.0 } else { others },
+        ));
+        let mut varied = [0.0; IMU_PARAMETERS];
+        varied[which] = 1.0;
+        let (margin, found) = self.at_limit(&base, varied)?;
+        Ok(match margin {
+            // Regula falsi may end at a bracket without the last digit: ten times the tolerance is still a
+            // crossing.
+            m if m.abs() <= 10.0 * EXACT => Answer::AtMost(found.values[which]),
+            m if m > 0.0 => Answer::Any,
+            _ => Answer::Never,
+        })
+    }
+
+    /// As [`Self::alone`], the others as good as none.
+    ///
+    /// # Errors
+    /// When the model has no filter.
+    pub fn quite_alone(&self, imu: &ImuParameters, which: usize) -> Result<Answer, BeliefError> {
+        self.alone(imu, which, NONE)
+    }
+
+    fn worst(&self, imu: &ImuParameters) -> Result<Worst, BeliefError> {
+        self.course.worst(
+            self.scenario,
+            &imu.model(self.scenario.imu.rate_hz),
+            self.limits,
+        )
+    }
+
+    /// The IMU whose intensities with a weight are multiplied until the hardest limit is met with its reserve, and the
+    /// margin beyond that which is left: not zero where no factor within the range meets it.
+    fn at_limit(
+        &self,
+        imu: &ImuParameters,
+        weights: [f64; IMU_PARAMETERS],
+    ) -> Result<(f64, ImuParameters), BeliefError> {
+        let scaled = |ln: f64| imu.times(weights.map(|w| (w * ln).exp()));
+        let crossing = Crossing {
+            bounds: (-RANGE, RANGE),
+            step: 0.7,
+            exact: EXACT,
+        };
+        let imu_at = |ln: f64| {
+            (
+                self.scenario.clone(),
+                scaled(ln).model(self.scenario.imu.rate_hz),
+            )
+        };
+        let (ln, margin) = self
+            .course
+            .crossing(self.limits, (&crossing, RESERVE), imu_at)?;
+        Ok((margin, scaled(ln)))
+    }
+
+    /// Mean squares of the four sources and of everything else in what is limited the hardest.
+    fn squares(
+        &self,
+        imu: &ImuParameters,
+    ) -> Result<(Worst, [f64; IMU_PARAMETERS + 1]), BeliefError> {
+        let worst = self.worst(imu)?;
+        let model = imu.model(self.scenario.imu.rate_hz);
+        let group = |source: &NamedSource| {
+            let own = ImuParameters::PROCESSES
+                .iter()
+                .position(|process| source.process == Some(*process));
+            own.unwrap_or(IMU_PARAMETERS)
+        };
+        let parts = self.course.parts(
+            worst.place,
+            self.scenario,
+            &model,
+            &group,
+            IMU_PARAMETERS + 1,
+        )?;
+        Ok((
+            worst,
+            std::array::from_fn(|i| parts[i].square(worst.limit.quantity)),
+        ))
+    }
+}
+
+// How far a given IMU is from its limits, and what one without errors would leave.
+
+/// How an IMU stands to its limits.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Margins {
+    /// Whether the limits are kept.
+    pub met: bool,
+    /// The hardest limit.
+    #[serde(flatten)]
+    pub worst: Worst,
+    /// The same for an IMU without errors: what GNSS and start leave.
+    pub without_imu_errors: Worst,
+}
+
+/// Correlation time of the biases of an IMU that has next to none (s): any would do.
+const SLOW_S: f64 = 300.0;
+
+impl Margins {
+    /// The margins of the filter that knows the model.
+    ///
+    /// # Errors
+    /// When the model has no such filter.
+    pub fn of(
+        course: &Course<'_>,
+        scenario: &Scenario,
+        model: &Model,
+        limits: &[Limit],
+    ) -> Result<Self, BeliefError> {
+        let perfect = ImuParameters::perfect(SLOW_S).model(model.rate_hz);
+        let worst = course.worst(scenario, model, limits)?;
+        Ok(Self {
+            met: worst.margin() >= 0.0,
+            worst,
+            without_imu_errors: course.worst(&without_imu_errors(scenario), &perfect, limits)?,
+        })
+    }
+}
+
+/// A scenario whose IMU has no constant errors, and whose filter knows it.
+fn without_imu_errors(scenario: &Scenario) -> Scenario {
+    let mut scenario = scenario.clone();
+    let (imu, initial) = (&mut scenario.imu, &mut scenario.initial);
+    for sigma in [
+        &mut imu.turn_on_bias_accel_m_s2,
+        &mut imu.turn_on_bias_gyro_rad_s,
+        &mut initial.accel_bias_sigma_m_s2,
+        &mut initial.gyro_bias_sigma_rad_s,
+        &mut initial.accel_scale_sigma_ppm,
+        &mut initial.gyro_scale_sigma_ppm,
+    ] {
+        *sigma = sigma.map(|_| 0.0);
+    }
+    for size in [
+        &mut imu.scale_ppm_accel,
+        &mut imu.scale_ppm_gyro,
+        &mut imu.misalignment_rad,
+        &mut imu.g_sensitivity_rad_s_per_m_s2,
+    ] {
+        *size = 0.0;
+    }
+    imu.vibration
+        .iter_mut()
+        .for_each(|v| v.rectification_s2_m = 0.0);
+    imu.temperature.iter_mut().for_each(|t| t.multiply(0.0));
+    scenario
+}
