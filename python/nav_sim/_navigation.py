@@ -186,7 +186,8 @@ def lincov(
 ) -> Run:
     """The errors to expect of a navigation, by covariance analysis, without sampling: `nav-sim run --method lincov`.
 
-    Parameters as of `run`.
+    `trajectory`, `model`, `truth`, `outages`, `filter`, `turn_on_bias`, `scale_ppm`, `require`, `gnss`, `scenario`,
+    `threads` and `progress` as of `run`.
 
     Returns
     -------

@@ -9,7 +9,7 @@ use std::ffi::OsString;
 
 /// What `command` answers to a request. `hidden`: a directory that no text shows.
 #[pyfunction]
-#[pyo3(signature = (command, request, hidden, progress, threads))]
+#[pyo3(signature = (command, request, hidden, progress, threads=None))]
 pub(crate) fn answer(
     py: Python<'_>,
     command: String,

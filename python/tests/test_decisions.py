@@ -117,7 +117,7 @@ def test_a_study(short: Path, command: Command, tmp_path: Path) -> None:
         assert own == commands, name
     assert set(found.table["model"]) == {"tactical", "consumer"} and found.summary()
     assert (found.cell("length_s=5_tactical") / "runs.csv").exists()
-    with Client(processes=False, dashboard_address=None) as client:
+    with Client(processes=False, dashboard_address=None) as client:  # type: ignore[no-untyped-call]
         spread = nav_sim.Study(STUDY, tmp_path / "dask").run(client.get_executor())
     assert spread is not None and spread.data == found.data
     with pytest.raises(nav_sim.NavSimError, match="no such cell"):
