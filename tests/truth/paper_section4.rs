@@ -15,7 +15,6 @@ mod design {
     use nav_sim::signal::noise::*;
     use nav_sim::signal::noise::{Composite, Law, Process, Variation};
     use nav_sim::signal::rng::*;
-    use nav_sim::signal::wavelet::Convention;
     use nav_sim::signal::wavelet::*;
     use rand::{Rng, RngExt};
 
@@ -54,7 +53,7 @@ mod design {
             estimators: vec![Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv],
             spec: ModelSpec::n1(),
             trim: Trim::Count(1),
-            tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
+            tuning: Tuning::new(0.6).unwrap(),
             weighting: Weighting::Edof,
         }
     }

@@ -7,7 +7,6 @@ use crate::io::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn};
 use nav_sim_calibration::{Estimator, Outcome, ParameterSpread, Settings, model_of};
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::{Law, LognormalIntervals, Spread, Variation};
-use nav_sim_signal::wavelet::Convention;
 use toml::{Table, Value};
 
 /// The facts of a calibration for its model files.
@@ -84,7 +83,6 @@ impl CalibrationNote {
         }
         if estimator.is_robust() {
             put("efficiency", settings.tuning.efficiency().into());
-            put("efficiency_convention", Convention::Exact.name().into());
         }
         for (key, value) in &self.reading {
             put(key, value.clone());
