@@ -43,7 +43,6 @@ pub(crate) fn result() -> RunResult {
             reconvergence_s: 1.0 + f64::from(run),
         }],
         nis: (5.5 + 0.3 * f64::from(run), 8),
-        rejected: 0,
         nees_mean: 8.5 + 0.1 * f64::from(run),
         covered: 0.75,
         normalised_sq: [1.0 + 0.1 * f64::from(run); 9],

@@ -437,10 +437,10 @@ fn constants_of_the_true_imu_have_their_closed_forms() {
     assert!((rmse / mean.abs() - 1.0).abs() < 1e-12, "{rmse} {mean}");
 }
 
-/// Shares of every state sum to 1; together the sources make the mean squares of the whole truth, and those that
-/// the filter believes in make its own variances: covariances add over independent sources.
+/// Shares of every state sum to 1; together the sources make the mean squares of the whole truth: covariances add over
+/// independent sources.
 #[test]
-fn budgets_add_up_to_the_true_errors_and_to_the_believed_ones() {
+fn budgets_add_up_to_the_true_errors() {
     let text = "
         imu = { turn_on_bias_accel_m_s2 = 0.01, scale_ppm_gyro = 500, misalignment_rad = 1e-3 }
         gnss = { lever_arm_m = [1.0, -0.5, -1.2], correlated_pos_sigma_m = [3, 2, 5] }
@@ -460,21 +460,19 @@ fn budgets_add_up_to_the_true_errors_and_to_the_believed_ones() {
     let filter = FilterPass::new(&track, &beliefs[0]);
     let sources = TruthSide::sources(&experiment, &truth);
     let end = filter.errors(&TruthSide::together(&sources)).outage_ends[0];
-    let believed = TruthSide::believed(&experiment, &beliefs[0]);
-    for (sources, deviations) in [(&sources, end.errors.rmse()), (&believed, end.sigma())] {
-        let budget = &Budget::at_outage_ends(&filter, sources)[0];
-        for i in 0..9 {
-            let sum: f64 = budget.shares.iter().map(|(_, shares)| shares.0[i]).sum();
-            assert!((sum - 1.0).abs() < 1e-9, "state {i}: {sum}");
-            let ratio = budget.total[i] / deviations[i].powi(2);
-            assert!((ratio - 1.0).abs() < 1e-9, "state {i}: {ratio}");
-            assert!(
-                budget
-                    .shares
-                    .iter()
-                    .all(|(_, shares)| shares.0[i] >= -1e-12)
-            );
-        }
+    let deviations = end.errors.rmse();
+    let budget = &Budget::at_outage_ends(&filter, &sources)[0];
+    for i in 0..9 {
+        let sum: f64 = budget.shares.iter().map(|(_, shares)| shares.0[i]).sum();
+        assert!((sum - 1.0).abs() < 1e-9, "state {i}: {sum}");
+        let ratio = budget.total[i] / deviations[i].powi(2);
+        assert!((ratio - 1.0).abs() < 1e-9, "state {i}: {ratio}");
+        assert!(
+            budget
+                .shares
+                .iter()
+                .all(|(_, shares)| shares.0[i] >= -1e-12)
+        );
     }
     let names: Vec<&str> = sources.iter().map(|source| source.name.as_str()).collect();
     let expected = [

@@ -249,14 +249,14 @@ fn assumptions(summary: &Summary, answer: &RunAnswer) -> Vec<(&'static str, Stri
     facts
 }
 
-/// The sources of the errors at the ends of the outages that are shown, beside what the filter believes.
+/// The sources of the errors at the ends of the outages that are shown.
 fn budgets(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
     let outages = &answer.navigation.summary.outages;
-    if shown.iter().all(|k| outages[*k].believed_budget.is_none()) {
+    if shown.iter().all(|k| outages[*k].budget.is_none()) {
         return;
     }
     page.section("Sources of errors");
-    page.text("Shares in the mean square at the end of each outage: of the true errors, by covariance analysis, and of those that the filter believes in.");
+    page.text("Shares in the mean square at the end of each outage, by covariance analysis.");
     let columns = [
         ("source", "@"),
         ("north", "pos_n_m"),
@@ -264,16 +264,10 @@ fn budgets(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
         ("down", "pos_d_m"),
         ("yaw", "yaw_deg"),
     ];
-    for (k, (kind, key)) in shown
-        .iter()
-        .flat_map(|k| [("true", "budget"), ("believed", "believed_budget")].map(|kind| (k, kind)))
-    {
-        let table = Table::of(answer, &format!("/outages/{k}/{key}/*"), &columns);
-        let (start_s, end_s) = (outages[*k].start_s, outages[*k].end_s);
-        if !table.is_empty() {
-            let title = format!("{}, {kind}", window(start_s, end_s));
-            page.folded(&title, |page| page.table(&table));
-        }
+    for k in shown {
+        let table = Table::of(answer, &format!("/outages/{k}/budget/*"), &columns);
+        let title = window(outages[*k].start_s, outages[*k].end_s);
+        page.folded(&title, |page| page.table(&table));
     }
 }
 

@@ -21,7 +21,7 @@ use nav_sim_navigation::scenario::{Method, Scenario};
 use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
-    FilterPass, Instant, NamedSource, Track, TruthSide, assess, strapdown_over_sigma, weak_heading,
+    FilterPass, Instant, Track, TruthSide, assess, strapdown_over_sigma, weak_heading,
 };
 use nav_sim_navigation::simulation::{Experiment, Plan, RunResult};
 use nav_sim_navigation::trajectory::Trajectory;
@@ -591,7 +591,7 @@ fn with_runs(
     context: &Context<'_>,
 ) -> Result<Navigation> {
     let method = scenario.run.method;
-    let possible = possible(inputs, scenario);
+    let possible = possible(inputs);
     if method != Method::MonteCarlo {
         possible.clone()?;
     }
@@ -673,14 +673,11 @@ fn with_runs(
         .unexpected_integration(over_sigma)
         .iter()
         .for_each(|found| context.warn(unexpected_line(found)));
-    // Which fixes a gate refuses is drawn with the errors: the gains of such a filter are not those of the analysis.
-    if scenario.analysable().is_ok() {
-        Analysis {
-            track: &merged,
-            ..analysis
-        }
-        .add_budgets(&mut navigation.summary);
+    Analysis {
+        track: &merged,
+        ..analysis
     }
+    .add_budgets(&mut navigation.summary.outages);
     if method == Method::Lincov {
         analysis.add_intervals(&mut navigation.summary.outages, inputs, &full);
     }
@@ -688,7 +685,7 @@ fn with_runs(
 }
 
 /// Refuses what covariance analysis cannot do.
-fn possible(inputs: &NavigateInputs, scenario: &Scenario) -> Result<()> {
+fn possible(inputs: &NavigateInputs) -> Result<()> {
     match inputs.truth {
         TrueImu::Recordings(_) => Err(Failure::input(
             "covariance analysis needs a model of what makes the errors; static recordings have none",
@@ -698,10 +695,7 @@ fn possible(inputs: &NavigateInputs, scenario: &Scenario) -> Result<()> {
             "covariance analysis is of one truth; --spread draws one for each run",
         )
         .hint("leave --spread out, or use --method monte-carlo")),
-        TrueImu::AsBelieved | TrueImu::Model(_) => scenario
-            .analysable()
-            .refuse()
-            .map_err(|e| e.hint("leave it out, or use --method monte-carlo")),
+        TrueImu::AsBelieved | TrueImu::Model(_) => Ok(()),
     }
 }
 
@@ -818,18 +812,14 @@ impl Analysis<'_> {
         }
     }
 
-    /// What the errors at the ends of outages are made of, and what the filter believes they are.
-    fn add_budgets(&self, summary: &mut Summary) {
+    /// What the errors at the ends of outages are made of.
+    fn add_budgets(&self, outages: &mut [OutageSummary]) {
+        let Some(model) = self.model else { return };
         let filter = FilterPass::new(self.track, self.belief);
-        let at_ends =
-            |sources: &[NamedSource]| Budget::at_outage_ends(&filter, sources).into_iter();
-        let mut truth = self
-            .model
-            .map(|model| at_ends(&TruthSide::sources(self.experiment, model)));
-        let believed = at_ends(&TruthSide::believed(self.experiment, self.belief));
-        for (outage, believed) in summary.outages.iter_mut().zip(believed) {
-            outage.budget = truth.as_mut().and_then(Iterator::next);
-            outage.believed_budget = Some(believed);
+        let sources = TruthSide::sources(self.experiment, model);
+        let budgets = Budget::at_outage_ends(&filter, &sources);
+        for (outage, budget) in outages.iter_mut().zip(budgets) {
+            outage.budget = Some(budget);
         }
     }
 }

@@ -494,22 +494,18 @@ pub struct InitialSettings {
     /// Turn-on bias of the accelerometers that the filter expects beside the model's processes (m/s²): an
     /// unknown constant, one state an axis; without it, none.
     #[schemars(with = "Option<NonNegative>", range(max = 10.0))]
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub accel_bias_sigma_m_s2: Option<f64>,
     /// Turn-on bias of the gyroscopes that the filter expects beside the model's processes (rad/s): an unknown
     /// constant, one state an axis; without it, none.
     #[schemars(with = "Option<NonNegative>", range(max = 1.0))]
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub gyro_bias_sigma_rad_s: Option<f64>,
     /// Scale-factor error of the accelerometers that the filter expects (parts per million): an unknown
     /// constant, one state an axis; without it, 300 in the filter of 21 states and none in the others.
     #[schemars(with = "Option<NonNegative>", range(max = 1e5))]
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub accel_scale_sigma_ppm: Option<f64>,
     /// Scale-factor error of the gyroscopes that the filter expects (parts per million), as that of the
     /// accelerometers.
     #[schemars(with = "Option<NonNegative>", range(max = 1e5))]
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub gyro_scale_sigma_ppm: Option<f64>,
     /// Start exactly at the truth; the filter's covariance stays as given above.
     pub perfect: bool,

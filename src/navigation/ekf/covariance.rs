@@ -140,13 +140,6 @@ impl Covariance {
         }
     }
 
-    /// Takes the matrix of one lane from another covariance of the same size.
-    pub(super) fn copy_lane(&mut self, other: &Self, lane: usize) {
-        for (to, from) in self.p.iter_mut().zip(&other.p) {
-            to[lane] = from[lane];
-        }
-    }
-
     /// Sets the matrix of one lane to a symmetric one.
     pub(super) fn set_lane(&mut self, lane: usize, matrix: &nalgebra::DMatrix<f64>) {
         self.p

@@ -32,7 +32,6 @@ pub struct OutageDrift {
     /// Against the first fix after it (the last withheld one, when none follows).
     pub end_from_fix: Option<Drift>,
     /// Against the reference at that time.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub end_from_reference: Option<Drift>,
 }
 
@@ -66,13 +65,10 @@ pub struct Outcome {
     /// Errors at the end of each outage.
     pub outages: Vec<OutageDrift>,
     /// The ends of all outages and gaps, where there are any.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub ends: Option<Ends>,
     /// Differences of the rows from the reference, where one reaches them.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub reference: Option<FromReference>,
     /// Figures of the smoothed solution, where there is one.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub smoothed: Option<SmoothedOutcome>,
 }
 
@@ -103,10 +99,8 @@ pub struct SmoothedOutcome {
     /// The same of the filter's (m).
     horizontal_sigma_rms_filter_m: f64,
     /// Differences of the smoothed rows from the reference.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub reference: Option<FromReference>,
     /// Their verdict.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub confidence: Option<Confidence>,
     /// The outages in which there are rows.
     pub outages: Vec<SmoothedOutage>,
@@ -123,10 +117,8 @@ pub struct SmoothedOutage {
     /// The filter's (m).
     pub sigma_max_filter_m: f64,
     /// Smoothed horizontal distance from the reference (m).
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub horizontal_max_m: Option<f64>,
     /// The filter's (m).
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub horizontal_max_filter_m: Option<f64>,
 }
 

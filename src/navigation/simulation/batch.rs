@@ -6,8 +6,7 @@ use super::{BIASES, COVERAGE_DOF, EpochSums, NEES_DOF, OutageRecord, REPORTED, R
 use crate::earth::ned_difference;
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::{
-    BodyVelocity, Ekf, Fix, advance, nis_limit, settle, update, update_body_velocity,
-    update_height, update_within, update_yaw,
+    BodyVelocity, Ekf, advance, settle, update, update_body_velocity, update_height, update_yaw,
 };
 use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::Sensor;
@@ -73,10 +72,8 @@ struct Candidate {
     trace: Vec<EpochLanes>,
     /// A record for each outage and run.
     outages: Vec<[OutageRecord; LANES]>,
-    /// For each run: sum of the NIS of the fixes used, their number, fixes refused.
-    nis: [(f64, u64, u64); LANES],
-    /// Largest NIS of a fix that is used, if there is a gate.
-    limit: Option<f64>,
+    /// Sum of the NIS of the fixes, and their number.
+    nis: (Lanes, u64),
 }
 
 impl Candidate {
@@ -97,11 +94,7 @@ impl Candidate {
             live,
             trace: Vec::with_capacity(plan.events.len()),
             outages: plan.experiment.outages.iter().map(|_| outage()).collect(),
-            nis: [(0.0, 0, 0); LANES],
-            limit: plan
-                .experiment
-                .nis_gate
-                .map(|p| nis_limit(p, plan.experiment.gnss.components())),
+            nis: (Lanes::ZERO, 0),
         }
     }
 
@@ -110,7 +103,8 @@ impl Candidate {
         // Before the fix of the same instant: the end of an outage is where the error is largest.
         self.end_outages(plan, index, event);
         if let Some(fix) = &measured.fix {
-            self.use_fix(fix);
+            self.nis.0 += update(&mut self.ekf, fix);
+            self.nis.1 += 1;
         }
         if let (Some(h), Some(baro)) = (&measured.height, plan.experiment.baro) {
             let _ = update_height(&mut self.ekf, h, baro.sigma_m);
@@ -142,21 +136,6 @@ impl Candidate {
             vehicle_b: DVec3::AXES,
         };
         let _ = update_body_velocity(&mut self.ekf, &velocity);
-    }
-
-    fn use_fix(&mut self, fix: &Fix) {
-        let (nis, refused) = match self.limit {
-            Some(limit) => update_within(&mut self.ekf, fix, limit),
-            None => (update(&mut self.ekf, fix), [false; LANES]),
-        };
-        for (lane, (sum, used, rejected)) in self.nis.iter_mut().enumerate() {
-            if refused[lane] {
-                *rejected += 1;
-            } else {
-                *sum += nis[lane];
-                *used += 1;
-            }
-        }
     }
 
     /// Error and belief just before the first fix after an outage, or at the trajectory's end.
@@ -248,11 +227,7 @@ impl Candidate {
                 .iter()
                 .map(|records| records[lane].clone())
                 .collect(),
-            nis: (
-                self.nis[lane].0 / self.nis[lane].1.max(1) as f64,
-                self.nis[lane].1,
-            ),
-            rejected: self.nis[lane].2,
+            nis: (self.nis.0[lane] / self.nis.1.max(1) as f64, self.nis.1),
             nees_mean: mean(&|e| e.nees[lane]),
             covered: mean(&|e| f64::from(u8::from(e.covered[lane]))),
             normalised_sq: std::array::from_fn(|i| {

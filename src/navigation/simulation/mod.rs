@@ -114,8 +114,6 @@ pub struct RunRecord {
     pub outages: Vec<OutageRecord>,
     /// Mean NIS of its GNSS updates (per fix) and how many fixes.
     pub nis: (f64, u64),
-    /// Fixes refused by the gate on the NIS.
-    pub rejected: u64,
     /// Mean over its reporting epochs of the NEES over [`NEES_DOF`] states.
     pub nees_mean: f64,
     /// Share of its reporting epochs inside the filter's ellipsoid at the coverage level.

@@ -42,8 +42,6 @@ pub struct Experiment<'a> {
     pub aiding: &'a AidingSettings,
     /// How the filters use a fix.
     pub update: FixUpdate,
-    /// Probability of the gate on the NIS of fixes, if there is one.
-    pub nis_gate: Option<f64>,
     /// When fixes are missing.
     pub outages: &'a [Outage],
     /// Seed of all random numbers.

@@ -365,7 +365,6 @@ pub fn drive(
         baro: None,
         aiding: &AidingSettings::default(),
         update: FixUpdate::default(),
-        nis_gate: None,
         outages: &outages,
         seed: 0,
         scenario: "",

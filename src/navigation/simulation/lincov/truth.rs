@@ -1,9 +1,7 @@
 //! What makes the true errors: independent sources, alone or together.
 
-use super::track::{
-    CROSSED, Measured, Outer, PUSHED, RECTIFIED, SCALED, Source, Sources, WARMED, place,
-};
-use crate::ekf::{Belief, UnknownKind};
+use super::track::{CROSSED, Measured, Outer, PUSHED, RECTIFIED, SCALED, Source, Sources, WARMED};
+use crate::ekf::Belief;
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Kind, Model, Process};
 use crate::sensors::aiding::{AidError, AidingSettings};
@@ -105,7 +103,7 @@ impl TruthSide {
     /// sensor by sensor, the defects of the true IMU, start, receiver, barometer and aiding. All drifts are one source:
     /// they are the same in every run, so that their errors add, not their variances.
     pub fn sources(experiment: &Experiment<'_>, model: &Model) -> Vec<NamedSource> {
-        let mut parts = beside_the_imu(experiment, !experiment.initial.perfect);
+        let mut parts = beside_the_imu(experiment);
         let mut drifts = Vec::new();
         for sensor in Sensor::ALL {
             parts.extend(processes(model, sensor, &mut drifts));
@@ -124,17 +122,6 @@ impl TruthSide {
             integrates: true,
             ..Self::default()
         }
-    }
-
-    /// The sources that a filter believes in: its bias states instead of a model's processes.
-    pub fn believed(experiment: &Experiment<'_>, belief: &Belief) -> Vec<NamedSource> {
-        // The filter believes in an uncertain start, also where the true one is perfect.
-        let mut parts = beside_the_imu(experiment, true);
-        for sensor in Sensor::ALL {
-            parts.extend(believed_of(belief, sensor));
-        }
-        parts.extend(inertial("aiding".to_owned(), Sources::of_vehicle(belief)));
-        parts
     }
 
     /// The errors of a model, turn-on biases and scale factors as a filter expects them, start and receiver as it
@@ -202,7 +189,7 @@ impl TruthSide {
 }
 
 /// Start, receiver, barometer and what the vehicle measures of itself.
-fn beside_the_imu(experiment: &Experiment<'_>, starts_off: bool) -> Vec<NamedSource> {
+fn beside_the_imu(experiment: &Experiment<'_>) -> Vec<NamedSource> {
     // One kind of white noise at a time: a budget asks for the share of each.
     let noise = |at: usize| TruthSide {
         noise: std::array::from_fn(|i| i == at),
@@ -213,7 +200,7 @@ fn beside_the_imu(experiment: &Experiment<'_>, starts_off: bool) -> Vec<NamedSou
         ..TruthSide::default()
     };
     let all = [
-        ("initial".to_owned(), start, starts_off),
+        ("initial".to_owned(), start, !experiment.initial.perfect),
         ("gnss.position".to_owned(), noise(0), true),
         (
             "gnss.velocity".to_owned(),
@@ -345,52 +332,6 @@ fn lasting(aiding: &AidingSettings, imu_hz: f64) -> Vec<NamedSource> {
     sources
         .filter_map(|(name, states)| inertial(name.to_owned(), states))
         .collect()
-}
-
-/// What a filter believes of a sensor.
-fn believed_of(belief: &Belief, sensor: Sensor) -> Vec<NamedSource> {
-    let first = 3 * sensor as usize;
-    let mut white = Sources::default();
-    white.white[first..first + 3].copy_from_slice(&belief.white[sensor as usize].to_array());
-    let mut all = Vec::new();
-    if white.white.iter().any(|w| *w > 0.0) {
-        let side = TruthSide {
-            inertial: white,
-            ..TruthSide::default()
-        };
-        all.push(NamedSource::new(format!("{}.WN", sensor.name()), side));
-    }
-    let groups = &belief.groups[sensor as usize];
-    let biases = groups.iter().filter(|g| !g.is_constant()).count();
-    let mut number = 0;
-    for group in groups {
-        let name = if group.is_constant() {
-            "turn_on_bias".to_owned()
-        } else {
-            number += 1;
-            if biases == 1 {
-                "bias".to_owned()
-            } else {
-                format!("bias_{number}")
-            }
-        };
-        all.extend(inertial(
-            format!("{}.{name}", sensor.name()),
-            Sources::of_group(sensor, group),
-        ));
-    }
-    for (kind, name) in [
-        (UnknownKind::Drift, "drift"),
-        (UnknownKind::ScaleFactor, "scale"),
-    ] {
-        let states = Sources::multiplied(belief, &[kind]);
-        let of_sensor = states
-            .into_iter()
-            .filter(|s| place(s.signal).0 == sensor as usize)
-            .collect();
-        all.extend(inertial(format!("{}.{name}", sensor.name()), of_sensor));
-    }
-    all
 }
 
 // Whether the motion shows the heading.
