@@ -320,20 +320,9 @@ impl Filter {
         settle(&mut self.ekf);
         let measured = self.fix(fix);
         let components = fix.components();
-        let [position, velocity] = self.ekf.innovation(&measured);
-        let both = [position.lane(0).to_array(), velocity.lane(0).to_array()].concat();
-        let z = DVector::from_fn(components, |i, _| both[i]);
-        let sigma = [
-            measured.pos_sigma_m.to_array(),
-            measured.vel_sigma_m_s.to_array(),
-        ]
-        .concat();
-        let rows = self.ekf.measurement_rows(self.lever_arm_s);
-        let h = DMatrix::from_fn(components, self.ekf.p.dim(), |i, j| rows[i][j]);
-        let noise = DMatrix::from_fn(components, components, |i, j| {
-            if i == j { sigma[i].powi(2) } else { 0.0 }
-        });
-        let s = &h * self.ekf.p.lane(0) * h.transpose() + noise;
+        let (z, s) = self.ekf.innovation(&measured);
+        let z = z.rows(0, components).into_owned();
+        let s = s.view((0, 0), (components, components)).into_owned();
         let sigma = s.diagonal().map(f64::sqrt).as_slice().to_vec();
         let (north_east, of_these) = (
             z.rows(0, 2).into_owned(),

@@ -8,7 +8,7 @@ use crate::ekf::belief::{BiasGroup, psi_of_angles};
 use crate::ekf::covariance::{
     EARTH_STEP_S, EarthStep, EarthTerms, ErrorMap, NavError, PSI, R, Sample, V,
 };
-use crate::ekf::{Belief, UnknownKind, body_velocity_rows, dense_yaw_row, fix_rows};
+use crate::ekf::{Belief, UnknownKind, body_velocity_rows, fix_rows, yaw_row};
 use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::{Channel, Sensor};
 use crate::lanes::{Quat, Vec3};
@@ -381,7 +381,7 @@ impl Linearisation {
             ..Row::new(h, self.felt, r, Measured::Aid(aid, axis))
         };
         if aid == Aid::Heading {
-            rows.push(row(dense_yaw_row(&self.ins), 0));
+            rows.push(row(yaw_row(&self.ins), 0));
             return;
         }
         let [_, omega_ib_b] = self.felt.sample;
@@ -1094,8 +1094,9 @@ impl Sources {
 
 /// The states `b` of a filter and `t` of the truth, as `Joint` has them.
 pub(super) struct Sides {
-    pub(super) b: Sources,
-    pub(super) t: Sources,
+    pub(super) states: Vec<Source>,
+    /// How many of them are `b`, which come first.
+    pub(super) estimated: usize,
     /// Signals that they reach: most have neither scale factors nor what comes after them.
     pub(super) signals: usize,
     /// By the number of samples of a step; few numbers occur.
@@ -1105,33 +1106,32 @@ pub(super) struct Sides {
 impl Sides {
     /// A filter as it sees itself along a track: its biases are what makes its errors.
     pub(super) fn of_filter(believed: Sources, track: &Track) -> Self {
-        Self::new(believed, Sources::default(), track)
+        let estimated = believed.states.len();
+        Self::new(believed, estimated, track)
     }
 
     /// The estimates of a filter, and what truly makes its errors.
     pub(super) fn of_errors(believed: &Sources, truth: &Sources, track: &Track) -> Self {
-        Self::new(believed.estimates(), truth.clone(), track)
+        let mut sources = believed.estimates();
+        let estimated = sources.states.len();
+        sources.extend(truth);
+        Self::new(sources, estimated, track)
     }
 
-    fn new(b: Sources, t: Sources, track: &Track) -> Self {
+    fn new(sources: Sources, estimated: usize, track: &Track) -> Self {
         let mut inputs: Vec<(u32, Inputs)> = Vec::new();
         for step in &track.steps {
             if inputs.iter().all(|(samples, _)| *samples != step.samples) {
-                inputs.push((step.samples, Inputs::new(&b, &t, step.samples)));
+                inputs.push((step.samples, Inputs::new(&sources, step.samples)));
             }
         }
-        let signals = b
-            .states
-            .iter()
-            .chain(&t.states)
-            .map(|s| s.signal + 1)
-            .max()
-            .unwrap_or(0);
+        let signals = sources.states.iter().map(|s| s.signal + 1);
+        let signals = signals.max().unwrap_or(0);
         // What a track does not follow would be left out in silence.
         debug_assert!(track.steps.iter().all(|step| signals <= step.b.len()));
         Self {
-            b,
-            t,
+            states: sources.states,
+            estimated,
             signals,
             inputs,
         }
@@ -1149,8 +1149,7 @@ impl Sides {
 
 /// What sources do over steps of one length.
 pub(super) struct Inputs {
-    pub(super) b: Vec<StepOfSource>,
-    pub(super) t: Vec<StepOfSource>,
+    pub(super) sources: Vec<StepOfSource>,
     /// Variance of the white noise of a sample (units²).
     pub(super) white: [f64; BIASES],
     /// Variance of the part of a signal's mean over the step that is new in it: of white noise and states, of states
@@ -1159,27 +1158,21 @@ pub(super) struct Inputs {
 }
 
 impl Inputs {
-    /// The steps of the filter's states `b` and of the states `t` of the truth; white noise belongs to the side that
-    /// makes the errors.
-    fn new(b: &Sources, t: &Sources, samples: u32) -> Self {
-        let steps_of = |s: &Sources| -> Vec<StepOfSource> {
-            s.states.iter().map(|x| x.over(samples)).collect()
-        };
-        let (bs, ts) = (steps_of(b), steps_of(t));
-        let white: [f64; BIASES] = std::array::from_fn(|i| b.white[i] + t.white[i]);
+    fn new(all: &Sources, samples: u32) -> Self {
+        let sources: Vec<StepOfSource> = all.states.iter().map(|x| x.over(samples)).collect();
+        let white = all.white;
         let mut q_mean = [[0.0; SIGNALS]; 2];
         q_mean[0]
             .iter_mut()
             .zip(white)
             .for_each(|(q, white)| *q = white / f64::from(samples));
-        for source in bs.iter().chain(&ts) {
+        for source in &sources {
             q_mean
                 .iter_mut()
                 .for_each(|q| q[source.signal] += source.q_mean);
         }
         Self {
-            b: bs,
-            t: ts,
+            sources,
             white,
             q_mean,
         }
