@@ -258,7 +258,7 @@ impl Scenario {
     }
 
     /// The outages asked for: the paper's two when nothing is said.
-    pub(crate) fn outages(&self) -> OutagePlan {
+    fn outages(&self) -> OutagePlan {
         let said =
             self.outage.is_some() || self.outage_periodic.is_some() || self.outage_random.is_some();
         OutagePlan {

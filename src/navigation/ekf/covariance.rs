@@ -47,7 +47,7 @@ const CONSTANT_BIASES: [BiasGroup; 2 * MAX_BLOCKS + 1] =
 pub(super) struct Sources<'a> {
     /// The step of each block: biases of the accelerometer, of the gyroscope, unknowns of both, and what the vehicle's
     /// own measurements have, which moves nothing.
-    pub(super) steps: &'a [BiasGroup],
+    steps: &'a [BiasGroup],
     /// Bias groups of each sensor.
     pub(super) biases: [usize; 2],
     /// What the unknowns of each sensor are multiplied by.

@@ -470,13 +470,13 @@ pub struct Unknown {
 /// What an unknown constant is multiplied by in the last sample.
 #[derive(Debug, Clone)]
 pub(super) struct Regressor {
-    pub(super) kind: UnknownKind,
+    kind: UnknownKind,
     pub(super) value: Vec3,
 }
 
 impl Regressor {
     /// The regressor of an unknown before the first sample: zero.
-    pub(super) const fn of(unknown: &Unknown) -> Self {
+    const fn of(unknown: &Unknown) -> Self {
         Self {
             kind: unknown.kind,
             value: Vec3::ZERO,

@@ -216,7 +216,7 @@ struct Antenna<L> {
 
 impl<W: Real> Antenna<W> {
     #[inline(always)]
-    pub(super) fn new(ins: &Strapdown<W>, omega_ib_b: Vec3<W>, lever_arm_b: DVec3) -> Self {
+    fn new(ins: &Strapdown<W>, omega_ib_b: Vec3<W>, lever_arm_b: DVec3) -> Self {
         let c_b_n = ins.q_b_n.to_matrix();
         let arm_b = Vec3::splat(lever_arm_b);
         let arm_n = c_b_n * arm_b;
@@ -266,7 +266,7 @@ impl Antenna<Lanes> {
 }
 
 /// Coefficients of a measurement: errors of position, velocity and attitude, and of the gyroscope's rate.
-pub(crate) type Coefficients<L> = [L; NAV + 3];
+type Coefficients<L> = [L; NAV + 3];
 
 #[inline(always)]
 fn joined<L: Copy>(blocks: [Vec3<L>; 4]) -> Coefficients<L> {

@@ -318,7 +318,7 @@ fn pairs<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 2]>, D:
 }
 
 impl Temperature {
-    pub(super) fn validate(&self) -> Result<(), SettingError> {
+    fn validate(&self) -> Result<(), SettingError> {
         let key = "profile_c";
         if self.profile_c.len() < 2 {
             let requirement = "it must be two pairs of time (s) and temperature (°C), or more";
@@ -390,7 +390,7 @@ pub(crate) struct Surroundings {
     /// Specific force (m/s²) and angular rate (rad/s) in b.
     pub(crate) sample: [DVec3; 2],
     /// Mean square of the specific force along each axis, with the vibration, less that of the start ((m/s²)²).
-    pub(crate) square: DVec3,
+    square: DVec3,
     /// Temperature above that of the start (K).
     warming_k: f64,
 }

@@ -268,7 +268,7 @@ struct Assessment {
     /// The filter's own standard deviation of each reported state (m, m/s, degrees).
     see: [Lanes; REPORTED],
     /// Error of each reported state, estimate − truth (m, m/s, degrees).
-    pub(super) error: [Lanes; REPORTED],
+    error: [Lanes; REPORTED],
     /// Rotation from the true to the estimated attitude (degrees).
     att_error_deg: Lanes,
     /// Position (m), velocity (m/s) and attitude error (rad), in the order of the filter's states.
@@ -279,13 +279,13 @@ struct Assessment {
 
 impl Assessment {
     /// Logarithm of the density of the errors under the filter's belief.
-    pub(super) fn log_density(&self, ekf: &Ekf) -> Lanes {
+    fn log_density(&self, ekf: &Ekf) -> Lanes {
         ekf.p
             .log_density(std::array::from_fn(|i| i), self.navigation)
     }
 
     /// The assessment of the first `live` lanes against the reference; the other lanes are zero.
-    pub(super) fn of(ekf: &Ekf, live: usize, reference: &NavState) -> Self {
+    fn of(ekf: &Ekf, live: usize, reference: &NavState) -> Self {
         let jacobian = RollPitchYaw::from_quat(reference.q_b_n).jacobian_of_psi_n();
         let mut found = Self {
             see: standard_deviations(ekf, &jacobian),
@@ -323,7 +323,7 @@ struct EpochLanes {
     see: [Lanes; REPORTED],
     /// The filter's own standard deviation of each sensor's bias (m/s², rad/s).
     bias_see: [Lanes; BIASES],
-    pub(super) error: [Lanes; REPORTED],
+    error: [Lanes; REPORTED],
     att_error_deg: Lanes,
     nees: Lanes,
     covered: [bool; LANES],
@@ -331,7 +331,7 @@ struct EpochLanes {
 
 impl EpochLanes {
     /// What the first `live` lanes report at an event.
-    pub(super) fn of(ekf: &Ekf, live: usize, plan: &Plan<'_>, event: &Event) -> Self {
+    fn of(ekf: &Ekf, live: usize, plan: &Plan<'_>, event: &Event) -> Self {
         let found = Assessment::of(ekf, live, &event.reference);
         let states: [usize; COVERAGE_DOF] =
             std::array::from_fn(|i| if i < 3 { 3 * R + i } else { 3 * PSI + i - 3 });

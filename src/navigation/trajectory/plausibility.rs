@@ -53,7 +53,7 @@ pub enum Quantity {
 
 impl Quantity {
     /// All of them.
-    pub(crate) const ALL: [Self; 4] = [Self::Speed, Self::Acceleration, Self::Jerk, Self::Rate];
+    const ALL: [Self; 4] = [Self::Speed, Self::Acceleration, Self::Jerk, Self::Rate];
 
     /// Name, unit of display, and its factor from SI.
     pub const fn display(self) -> (&'static str, &'static str, f64) {

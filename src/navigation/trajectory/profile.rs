@@ -275,17 +275,17 @@ fn positive(key: &'static str, value: f64) -> Result<(), Problem> {
 /// The path so far.
 struct Path<'a> {
     profile: &'a Profile,
-    pub(super) t_s: f64,
+    t_s: f64,
     lat: f64,
     lon: f64,
-    pub(super) h: f64,
+    h: f64,
     heading: f64,
-    pub(super) speed: f64,
-    pub(super) samples: Vec<TrajectorySample>,
+    speed: f64,
+    samples: Vec<TrajectorySample>,
 }
 
 impl<'a> Path<'a> {
-    pub(super) fn new(profile: &'a Profile) -> Self {
+    fn new(profile: &'a Profile) -> Self {
         let Start {
             t_s,
             lat,
@@ -535,7 +535,7 @@ struct Shape {
 }
 
 impl Shape {
-    pub(in crate::trajectory) fn new(ramp: f64) -> Self {
+    fn new(ramp: f64) -> Self {
         Self {
             ramp: ramp.min(0.5),
         }
@@ -582,11 +582,11 @@ struct Piece {
     duration: f64,
     shape: Shape,
     /// Speed along the path at the start, and its change (m/s).
-    pub(super) speed: [f64; 2],
+    speed: [f64; 2],
     /// Heading at the start, and its change (rad).
     heading: [f64; 2],
     /// Height at the start, and its change (m).
-    pub(super) height: [f64; 2],
+    height: [f64; 2],
 }
 
 /// The motion at an instant.
@@ -600,7 +600,7 @@ struct Motion {
     /// Angle of the path above the horizon (rad).
     slope: f64,
     /// Height (m).
-    pub(super) h: f64,
+    h: f64,
 }
 
 impl Piece {
@@ -619,7 +619,7 @@ impl Piece {
         }
     }
 
-    pub(super) fn at(&self, x: f64) -> Motion {
+    fn at(&self, x: f64) -> Motion {
         let speed = self.speed[0] + self.speed[1] * self.shape.value(x);
         let (mut sin_slope, mut h) = (0.0, self.height[0]);
         if self.height[1] != 0.0 {

@@ -104,7 +104,7 @@ pub struct Instant {
     pub covariance: [Nav; NAV],
     /// Their mean.
     pub mean: Nav,
-    pub(super) jacobian: [DVec3; 3],
+    jacobian: [DVec3; 3],
 }
 
 /// A filter's errors at one instant, and what it states of them.
@@ -492,13 +492,13 @@ impl Track {
 /// A filter's own covariance and its true errors, side by side.
 #[derive(Clone)]
 struct Pass<'a> {
-    pub(super) filter: Joint<'a>,
-    pub(super) errors: Errors<'a>,
+    filter: Joint<'a>,
+    errors: Errors<'a>,
 }
 
 impl<'a> Pass<'a> {
     /// At the start of a track, of a filter's own states and those of its true errors.
-    pub(super) fn new(
+    fn new(
         track: &Track,
         own: &'a Sides,
         sides: &'a Sides,
@@ -700,7 +700,7 @@ impl<'a> Joint<'a> {
     }
 
     /// A measurement with white noise of variance `r`.
-    pub(super) fn innovation(&self, measured: &Column, r: f64) -> Innovation {
+    fn innovation(&self, measured: &Column, r: f64) -> Innovation {
         let with = self.covariance_with(measured);
         // hᵀ P h + r
         let s = r + measured.dot(&with);

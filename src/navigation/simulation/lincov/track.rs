@@ -74,7 +74,7 @@ impl Measured {
 pub(super) struct Row {
     pub(super) h: [f64; NAV + 3],
     /// What errors of the gyroscope are proportional to.
-    pub(super) felt: Surroundings,
+    felt: Surroundings,
     /// Variance of its white noise, as the filter believes.
     pub(super) r: f64,
     /// The same in truth.
@@ -127,7 +127,7 @@ impl Row {
 #[derive(Debug, Clone)]
 pub(super) struct Mark {
     /// Steps from the start until here.
-    pub(super) steps: usize,
+    steps: usize,
     /// Time from the start (s).
     pub(super) after_s: f64,
     /// Time on the trajectory (s).
@@ -148,7 +148,7 @@ pub(super) struct Mark {
 /// A trajectory with its fixes, ready for any number of passes.
 #[derive(Debug, Clone)]
 pub struct Track {
-    pub(super) steps: Vec<Step>,
+    steps: Vec<Step>,
     pub(super) marks: Vec<Mark>,
     pub(super) outages: usize,
     /// Covariance of the navigation error at the start, as the filter believes.
@@ -695,7 +695,7 @@ pub(super) const RECTIFIED: usize = 33;
 pub(super) const WARMED: usize = 36;
 
 /// Where a signal acts: sensor, axis, and what it is multiplied by.
-pub(super) const fn place(signal: usize) -> (usize, usize, Felt) {
+const fn place(signal: usize) -> (usize, usize, Felt) {
     match signal {
         0..SCALED => (signal / 3, signal % 3, Felt::Unit),
         SCALED..CROSSED => {
@@ -787,7 +787,7 @@ pub(super) struct StepOfSource {
     pub(super) ramp: f64,
     pub(super) decay: f64,
     /// Variance of w₁.
-    pub(super) q_mean: f64,
+    q_mean: f64,
     /// Covariance of w₁ and w₂.
     pub(super) q_cross: f64,
     /// Variance of w₂.
@@ -892,7 +892,7 @@ impl Source {
     }
 
     /// What the source does over a step of `samples` samples, exactly.
-    pub(super) fn over(&self, samples: u32) -> StepOfSource {
+    fn over(&self, samples: u32) -> StepOfSource {
         let n = f64::from(samples);
         let mut step = StepOfSource {
             signal: self.signal,
@@ -960,7 +960,7 @@ impl Sources {
     }
 
     /// What a filter estimates of them: nothing at the start, and nothing drives its estimates but corrections.
-    pub(super) fn estimates(&self) -> Self {
+    fn estimates(&self) -> Self {
         Self {
             states: self.states.iter().map(Source::estimate).collect(),
             ..Self::default()
@@ -987,7 +987,7 @@ impl Sources {
     }
 
     /// The bias states of a group.
-    pub(super) fn of_group(sensor: Sensor, group: &BiasGroup) -> Vec<Source> {
+    fn of_group(sensor: Sensor, group: &BiasGroup) -> Vec<Source> {
         let state = |axis: usize| {
             let (phi, q, initial) = (group.phi[axis], group.innovation[axis], group.initial[axis]);
             (initial != 0.0 || q != 0.0)
@@ -997,7 +997,7 @@ impl Sources {
     }
 
     /// Unknown constants of a belief that are multiplied.
-    pub(super) fn multiplied(belief: &Belief, kinds: &[UnknownKind]) -> Vec<Source> {
+    fn multiplied(belief: &Belief, kinds: &[UnknownKind]) -> Vec<Source> {
         let mut states = Vec::new();
         for (sensor, axis) in Sensor::ALL
             .into_iter()
@@ -1020,7 +1020,7 @@ impl Sources {
     }
 
     /// Wheel scale and mounting of a vehicle, as a filter believes in them.
-    pub(super) fn of_vehicle(belief: &Belief) -> Vec<Source> {
+    fn of_vehicle(belief: &Belief) -> Vec<Source> {
         let parts = [
             AidPart::WheelScale,
             AidPart::MountingPitch,
