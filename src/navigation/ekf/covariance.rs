@@ -49,9 +49,9 @@ pub(super) struct Sources<'a> {
     /// own measurements have, which moves nothing.
     steps: &'a [BiasGroup],
     /// Bias groups of each sensor.
-    pub(super) biases: [usize; 2],
+    pub biases: [usize; 2],
     /// What the unknowns of each sensor are multiplied by.
-    pub(super) regressors: [&'a [Regressor]; 2],
+    pub regressors: [&'a [Regressor]; 2],
 }
 
 impl<'a> Sources<'a> {

@@ -48,9 +48,9 @@ pub struct Ekf {
 /// Working vectors of the measurement update, one entry a state.
 #[derive(Debug, Clone)]
 pub(super) struct Scratch {
-    pub(super) ph: Vec<Lanes>,
-    pub(super) gain: Vec<Lanes>,
-    pub(super) error: Vec<Lanes>,
+    pub ph: Vec<Lanes>,
+    pub gain: Vec<Lanes>,
+    pub error: Vec<Lanes>,
 }
 
 impl Scratch {
@@ -471,7 +471,7 @@ pub struct Unknown {
 #[derive(Debug, Clone)]
 pub(super) struct Regressor {
     kind: UnknownKind,
-    pub(super) value: Vec3,
+    pub value: Vec3,
 }
 
 impl Regressor {

@@ -311,15 +311,15 @@ pub(super) fn dense(
 /// Velocity of a point of the vehicle along some of the vehicle's axes.
 pub(crate) struct BodyVelocity {
     /// Measured velocity along forward, right, down (m/s); read where `axes` has them.
-    pub(crate) value: Vec3,
+    pub value: Vec3,
     /// The axes that are measured.
-    pub(crate) axes: &'static [usize],
+    pub axes: &'static [usize],
     /// Variance of the white noise of each ((m/s)²).
-    pub(crate) variance: f64,
+    pub variance: f64,
     /// The point, from the IMU, in b (m).
-    pub(crate) lever_arm_b: DVec3,
+    pub lever_arm_b: DVec3,
     /// The vehicle's forward, right, down in b, where m is zero.
-    pub(crate) vehicle_b: [DVec3; 3],
+    pub vehicle_b: [DVec3; 3],
 }
 
 /// Uses a velocity along the vehicle's axes; returns the innovation of each of its axes in sequence.

@@ -276,8 +276,8 @@ impl AidingSettings {
 /// An error of an aid that lasts.
 #[derive(Clone, Copy)]
 pub(crate) struct AidError {
-    pub(crate) part: AidPart,
-    pub(crate) law: Law,
+    pub part: AidPart,
+    pub law: Law,
     /// True if the filter, with the states that it has, does not expect so large a one.
     is_felt: bool,
 }

@@ -388,7 +388,7 @@ pub(crate) enum Felt {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Surroundings {
     /// Specific force (m/s²) and angular rate (rad/s) in b.
-    pub(crate) sample: [DVec3; 2],
+    pub sample: [DVec3; 2],
     /// Mean square of the specific force along each axis, with the vibration, less that of the start ((m/s²)²).
     square: DVec3,
     /// Temperature above that of the start (K).

@@ -395,8 +395,8 @@ impl EpochLanes {
 
 /// Errors of a run in the reported states (m, m/s, degrees) and the attitude error vector (rad).
 pub(crate) struct ReportedError {
-    pub(crate) values: [f64; REPORTED],
-    pub(crate) psi_n: DVec3,
+    pub values: [f64; REPORTED],
+    pub psi_n: DVec3,
 }
 
 pub(crate) fn reported_error(estimate: &NavState, truth: &NavState) -> ReportedError {

@@ -74,23 +74,23 @@ fn refused<T>(message: String) -> Result<T, ExperimentError> {
 #[derive(Debug)]
 pub(super) struct Event {
     /// IMU samples from the start.
-    pub(super) sample: usize,
+    pub sample: usize,
     /// Time on the trajectory (s).
-    pub(super) t_s: f64,
+    pub t_s: f64,
     /// Reference state.
-    pub(super) reference: NavState,
+    pub reference: NavState,
     /// Reference position and velocity of the antenna: lat, lon (rad), h (m), v_n (m/s).
-    pub(super) antenna: (DVec3, DVec3),
+    pub antenna: (DVec3, DVec3),
     /// Whether the receiver has an epoch here.
-    pub(super) gnss_epoch: bool,
+    pub gnss_epoch: bool,
     /// Whether its fix is used.
-    pub(super) fix: bool,
+    pub fix: bool,
     /// Whether the barometer has a height here.
-    pub(super) baro: bool,
+    pub baro: bool,
     /// What the vehicle measures of itself here.
-    pub(super) aids: Vec<Aided>,
+    pub aids: Vec<Aided>,
     /// Whether the epoch is reported (1 Hz).
-    pub(super) report: bool,
+    pub report: bool,
 }
 
 /// The shared part of all runs.
@@ -392,13 +392,13 @@ const STANDS_RAD_S: f64 = 0.01 * DEG;
 /// A measurement of the vehicle by itself, as it would be without error.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Aided {
-    pub(super) aid: Aid,
+    pub aid: Aid,
     /// Velocity of the point that it belongs to, in b (m/s).
-    pub(super) v_b: DVec3,
+    pub v_b: DVec3,
     /// Acceleration of the vehicle with respect to the Earth, in b (m/s²).
-    pub(super) a_b: DVec3,
+    pub a_b: DVec3,
     /// Whether an outage withholds it.
-    pub(super) withheld: bool,
+    pub withheld: bool,
 }
 
 /// What the vehicle measures of itself, of these aids.

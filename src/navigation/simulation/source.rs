@@ -21,10 +21,10 @@ use std::ops::Range;
 
 /// What eight runs measure at an instant.
 pub(super) struct Measured {
-    pub(super) fix: Option<Fix>,
-    pub(super) height: Option<Lanes>,
+    pub fix: Option<Fix>,
+    pub height: Option<Lanes>,
     /// Velocities along the vehicle's axes (m/s); of a heading the first is the yaw (rad).
-    pub(super) aids: Vec<(Aid, Vec3)>,
+    pub aids: Vec<(Aid, Vec3)>,
 }
 
 /// Everything random of eight runs.

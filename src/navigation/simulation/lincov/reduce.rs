@@ -448,25 +448,25 @@ const TRIALS: usize = 8;
 
 /// A value of the cost.
 pub(super) struct Value {
-    pub(super) cost: f64,
-    pub(super) parts: Vec<Part>,
+    pub cost: f64,
+    pub parts: Vec<Part>,
 }
 
 /// A number that the variables change, and the second derivative of the cost with respect to it.
 #[derive(Clone, Copy)]
 pub(super) struct Part {
-    pub(super) value: f64,
-    pub(super) curvature: f64,
+    pub value: f64,
+    pub curvature: f64,
 }
 
 /// What is minimised, and how far.
 pub(super) struct Damped<'a> {
-    pub(super) value: &'a (dyn Fn(&[f64]) -> Value + Sync),
+    pub value: &'a (dyn Fn(&[f64]) -> Value + Sync),
     /// Smallest and largest value of every variable.
-    pub(super) bounds: (f64, f64),
-    pub(super) iterations: usize,
+    pub bounds: (f64, f64),
+    pub iterations: usize,
     /// A step that gains less is the last.
-    pub(super) enough: f64,
+    pub enough: f64,
 }
 
 impl Damped<'_> {

@@ -34,12 +34,12 @@ const STEP_S: f64 = 0.2;
 /// less truth) of the signals, their means over the step. Columns; `b` of the signals that the track follows.
 #[derive(Debug, Clone)]
 pub(super) struct Step {
-    pub(super) samples: u32,
-    pub(super) m: [Nav; NAV],
-    pub(super) b: Vec<Nav>,
+    pub samples: u32,
+    pub m: [Nav; NAV],
+    pub b: Vec<Nav>,
     /// Covariance of the navigation error for white noise of variance 1 in each sample of a signal, by signals that are not
     /// multiplied; none where it acts through its mean over the step, as that of a bias does.
-    pub(super) white: Vec<[Nav; NAV]>,
+    pub white: Vec<[Nav; NAV]>,
 }
 
 /// What is measured.
@@ -72,18 +72,18 @@ impl Measured {
 /// A scalar measurement: nine coefficients of the navigation error, three of the gyroscope's error.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
-    pub(super) h: [f64; NAV + 3],
+    pub h: [f64; NAV + 3],
     /// What errors of the gyroscope are proportional to.
     felt: Surroundings,
     /// Variance of its white noise, as the filter believes.
-    pub(super) r: f64,
+    pub r: f64,
     /// The same in truth.
-    pub(super) noise: f64,
-    pub(super) what: Measured,
+    pub noise: f64,
+    pub what: Measured,
     /// Velocity of the point of the vehicle (m/s) and acceleration (m/s²), in b.
     motion: [DVec3; 2],
     /// Whether outages withhold it.
-    pub(super) of_gnss: bool,
+    pub of_gnss: bool,
 }
 
 impl Row {
@@ -129,20 +129,20 @@ pub(super) struct Mark {
     /// Steps from the start until here.
     steps: usize,
     /// Time from the start (s).
-    pub(super) after_s: f64,
+    pub after_s: f64,
     /// Time on the trajectory (s).
-    pub(super) t_s: f64,
+    pub t_s: f64,
     /// Whether a fix is used.
-    pub(super) fix: bool,
+    pub fix: bool,
     /// Scalar measurements, in sequence.
-    pub(super) rows: Vec<Row>,
-    pub(super) report: bool,
+    pub rows: Vec<Row>,
+    pub report: bool,
     /// Outages that end here, before the measurements.
-    pub(super) outages: Vec<usize>,
+    pub outages: Vec<usize>,
     /// Roll, pitch, yaw errors (rad) from `psi_n` (rad), at the true attitude.
-    pub(super) jacobian: [DVec3; 3],
+    pub jacobian: [DVec3; 3],
     /// Error of the strapdown algorithm over the steps that lead here (m, m/s, rad), which no sensor makes.
-    pub(super) closure: Nav,
+    pub closure: Nav,
 }
 
 /// A trajectory with its fixes, ready for any number of passes.
@@ -740,7 +740,7 @@ const UNKNOWNS: [UnknownKind; 2] = [UnknownKind::Drift, UnknownKind::ScaleFactor
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Source {
     /// Which signal it is part of.
-    pub(super) signal: usize,
+    pub signal: usize,
     before: f64,
     after: f64,
     fresh: f64,
@@ -749,11 +749,11 @@ pub(super) struct Source {
     /// Growth of `after` with every sample: a ramp is its slope times the samples so far.
     ramp: f64,
     /// Variance of s at the start.
-    pub(super) initial: f64,
+    pub initial: f64,
     /// Mean of s at the start.
-    pub(super) level: f64,
+    pub level: f64,
     /// The measurement that it is part of; such a source is no inertial error.
-    pub(super) outer: Option<Outer>,
+    pub outer: Option<Outer>,
 }
 
 /// An error of measurements that lasts.
@@ -781,17 +781,17 @@ const NONE: Source = Source {
 
 /// What a source does over a step: the mean of its samples' errors is `mean`·s + w₁, and s⁺ = `decay`·s + w₂.
 pub(super) struct StepOfSource {
-    pub(super) signal: usize,
-    pub(super) mean: f64,
+    pub signal: usize,
+    pub mean: f64,
     /// Growth of `mean` with every sample before the step.
-    pub(super) ramp: f64,
-    pub(super) decay: f64,
+    pub ramp: f64,
+    pub decay: f64,
     /// Variance of w₁.
     q_mean: f64,
     /// Covariance of w₁ and w₂.
-    pub(super) q_cross: f64,
+    pub q_cross: f64,
     /// Variance of w₂.
-    pub(super) q_state: f64,
+    pub q_state: f64,
 }
 
 impl Source {
@@ -936,8 +936,8 @@ impl Source {
 /// The errors of an IMU: sources, and white noise of a sample on each signal.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Sources {
-    pub(super) states: Vec<Source>,
-    pub(super) white: [f64; BIASES],
+    pub states: Vec<Source>,
+    pub white: [f64; BIASES],
 }
 
 impl Default for Sources {
@@ -1094,11 +1094,11 @@ impl Sources {
 
 /// The states `b` of a filter and `t` of the truth, as `Joint` has them.
 pub(super) struct Sides {
-    pub(super) states: Vec<Source>,
+    pub states: Vec<Source>,
     /// How many of them are `b`, which come first.
-    pub(super) estimated: usize,
+    pub estimated: usize,
     /// Signals that they reach: most have neither scale factors nor what comes after them.
-    pub(super) signals: usize,
+    pub signals: usize,
     /// By the number of samples of a step; few numbers occur.
     inputs: Vec<(u32, Inputs)>,
 }
@@ -1149,12 +1149,12 @@ impl Sides {
 
 /// What sources do over steps of one length.
 pub(super) struct Inputs {
-    pub(super) sources: Vec<StepOfSource>,
+    pub sources: Vec<StepOfSource>,
     /// Variance of the white noise of a sample (units²).
-    pub(super) white: [f64; BIASES],
+    pub white: [f64; BIASES],
     /// Variance of the part of a signal's mean over the step that is new in it: of white noise and states, of states
     /// alone (units²).
-    pub(super) q_mean: [[f64; SIGNALS]; 2],
+    pub q_mean: [[f64; SIGNALS]; 2],
 }
 
 impl Inputs {

@@ -715,11 +715,11 @@ fn times(process: &Process, on_variance: f64, rate_hz: f64) -> Process {
 /// How a crossing is sought.
 pub(crate) struct Crossing {
     /// Where the variable may go.
-    pub(crate) bounds: (f64, f64),
+    pub bounds: (f64, f64),
     /// First step away from the start; it doubles until there is a bracket.
-    pub(crate) step: f64,
+    pub step: f64,
     /// A value this close to zero is zero.
-    pub(crate) exact: f64,
+    pub exact: f64,
 }
 
 /// Evaluations within a bracket. The Illinois rule gains a digit in two of them.
