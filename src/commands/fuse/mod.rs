@@ -22,9 +22,10 @@ use nav_sim_navigation::fusion::{
     Assessment, ClocksApart, Correlation, Displaced, Finding, Found, FusionError, Heading,
     Levelling, Outcome, Recorded, Row, Settings, Solution, Start, Weighed, WheelSpeed, Whiteness,
     aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier, fuse, fuse_correlated,
-    interval_s, middle, outcome, rest_of_origin, rough_origin, vehicle_velocities, wheel_ratio,
+    interval_s, outcome, rest_of_origin, rough_origin, vehicle_velocities, wheel_ratio,
 };
 use nav_sim_navigation::gnss::{FixSigma, GnssFix};
+use nav_sim_navigation::linalg::median;
 use nav_sim_navigation::metrics::{ReductionQuality, VerdictKind};
 use nav_sim_navigation::sensors::aiding::{
     AidingSettings, NhcSettings, OdometerSettings, ZuptSettings,
@@ -927,13 +928,10 @@ fn beside(states: FilterStates, initial: &InitialSettings) -> InitialSettings {
 /// The receiver of the fixes: medians.
 fn receiver(gnss: &[GnssFix], interval_s: f64) -> GnssSettings {
     let defaults = GnssSettings::default();
-    let position = |i: usize| middle(gnss.iter().map(|fix| fix.pos_sigma_n[i]).collect());
+    let position = |i: usize| median(gnss.iter().map(|fix| fix.pos_sigma_n[i]));
     let velocity = |i: usize| {
-        middle(
-            gnss.iter()
-                .filter_map(|fix| Some(fix.velocity?.sigma_n()[i]))
-                .collect(),
-        )
+        let sigmas = gnss.iter();
+        median(sigmas.filter_map(|fix| Some(fix.velocity?.sigma_n()[i])))
     };
     let velocities = [0, 1, 2].map(velocity);
     let has_velocity = velocities.iter().all(Option::is_some);

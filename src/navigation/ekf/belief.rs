@@ -529,34 +529,22 @@ impl Default for InitialSettings {
 impl InitialSettings {
     /// The turn-on bias that the filter expects of a sensor (m/s² or rad/s).
     pub const fn bias_sigma(&self, sensor: Sensor) -> Option<f64> {
-        match sensor {
-            Sensor::Accel => self.accel_bias_sigma_m_s2,
-            Sensor::Gyro => self.gyro_bias_sigma_rad_s,
-        }
+        [self.accel_bias_sigma_m_s2, self.gyro_bias_sigma_rad_s][sensor as usize]
     }
 
     /// The scale-factor error that the filter expects of a sensor (parts per million).
     pub const fn scale_sigma_ppm(&self, sensor: Sensor) -> Option<f64> {
-        match sensor {
-            Sensor::Accel => self.accel_scale_sigma_ppm,
-            Sensor::Gyro => self.gyro_scale_sigma_ppm,
-        }
+        [self.accel_scale_sigma_ppm, self.gyro_scale_sigma_ppm][sensor as usize]
     }
 
     /// The key of [`Self::bias_sigma`].
     pub const fn bias_key(sensor: Sensor) -> &'static str {
-        match sensor {
-            Sensor::Accel => "accel_bias_sigma_m_s2",
-            Sensor::Gyro => "gyro_bias_sigma_rad_s",
-        }
+        ["accel_bias_sigma_m_s2", "gyro_bias_sigma_rad_s"][sensor as usize]
     }
 
     /// The key of [`Self::scale_sigma_ppm`].
     pub const fn scale_key(sensor: Sensor) -> &'static str {
-        match sensor {
-            Sensor::Accel => "accel_scale_sigma_ppm",
-            Sensor::Gyro => "gyro_scale_sigma_ppm",
-        }
+        ["accel_scale_sigma_ppm", "gyro_scale_sigma_ppm"][sensor as usize]
     }
 
     /// Checks every value.

@@ -1,7 +1,7 @@
 //! Figures of a fusion: fixes used, consistency, errors at the ends of outages. They serialize as `summary.json` has them.
 
-use super::displaced::middle;
 use super::{AidInnovations, FixRecord, Nine, Row, RowError, Solution, Weighed, aid_innovations};
+use crate::linalg::median;
 use crate::metrics::{PerState, VerdictKind};
 use crate::sensors::outage::Outage;
 use crate::simulation::REPORTED_NAMES;
@@ -148,8 +148,8 @@ const APART: (f64, f64) = (10.0, 5.0);
 /// sum of m of their squares, normalised, is chi-square of 2m degrees.
 fn ends(solution: &Solution) -> Option<Ends> {
     let known: Vec<&FixRecord> = solution.fixes.iter().filter(|f| f.used).collect();
-    let steps: Vec<f64> = known.windows(2).map(|w| w[1].t_s - w[0].t_s).collect();
-    let apart_s = APART.0.max(APART.1 * middle(steps)?);
+    let steps = known.windows(2).map(|w| w[1].t_s - w[0].t_s);
+    let apart_s = APART.0.max(APART.1 * median(steps)?);
     let of_ends: Vec<f64> = known
         .windows(2)
         .filter(|w| w[1].t_s - w[0].t_s > apart_s)

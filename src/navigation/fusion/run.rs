@@ -13,7 +13,7 @@ use crate::frames::{NavState, RollPitchYaw};
 use crate::gnss::GnssFix;
 use crate::imu::{ImuIncrement, ImuSample, Sensor};
 use crate::lanes::{Lanes, Vec3};
-use crate::linalg::{Link, to_nalgebra};
+use crate::linalg::{Link, median, to_nalgebra};
 use crate::simulation::{ReportedError, reported_error};
 use crate::strapdown::Strapdown;
 use crate::trajectory::reference::Reference;
@@ -532,9 +532,7 @@ struct Bridges<'a> {
 
 impl<'a> Bridges<'a> {
     fn new(imu: &'a [ImuIncrement]) -> Self {
-        let mut lengths: Vec<f64> = imu.iter().map(|s| s.dt_s).collect();
-        lengths.sort_by(f64::total_cmp);
-        let step_s = lengths.get(lengths.len() / 2).copied().unwrap_or(1.0);
+        let step_s = median(imu.iter().map(|s| s.dt_s)).unwrap_or(1.0);
         Self {
             imu,
             step_s,

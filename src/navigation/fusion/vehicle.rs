@@ -2,10 +2,11 @@
 //! stands.
 
 use super::Recorded;
-use super::displaced::{Whiteness, middle};
+use super::Whiteness;
 use crate::earth::ned_difference;
 use crate::frames::NavState;
 use crate::imu::ImuIncrement;
+use crate::linalg::median;
 use crate::metrics::{Band, chi_square_band};
 use crate::sensors::aiding::{Aid, AidingSettings};
 use crate::sensors::outage::Outage;
@@ -119,7 +120,7 @@ pub fn vehicle_velocities(
     let scene = Scene {
         imu,
         speeds,
-        step_s: middle(imu.iter().map(|s| s.dt_s).collect()).unwrap_or(1.0),
+        step_s: median(imu.iter().map(|s| s.dt_s)).unwrap_or(1.0),
     };
     let test = settings.zupt.as_ref().and_then(|_| scene.test());
     let stands = |k: usize| test.is_some_and(|test| scene.stands(&test, k));
@@ -167,12 +168,7 @@ pub fn wheel_ratio(
         let is_near = turned.t_s - t_s < 0.5 * REACH_S && speed > 3.0 * SPEEDS.1;
         is_near.then(|| turned.m_s.abs() / speed)
     };
-    middle(
-        speeds(recorded, outages)
-            .into_iter()
-            .filter_map(ratio)
-            .collect(),
-    )
+    median(speeds(recorded, outages).into_iter().filter_map(ratio))
 }
 
 /// The first element of each interval of 1/`rate_hz`.

@@ -103,19 +103,13 @@ impl ImuSettings {
 
     /// Standard deviations of turn-on bias (m/s² or rad/s) and scale factor (parts per million) of a sensor.
     pub fn deviations(&self, sensor: Sensor) -> (f64, f64) {
-        let ppm = match sensor {
-            Sensor::Accel => self.scale_ppm_accel,
-            Sensor::Gyro => self.scale_ppm_gyro,
-        };
+        let ppm = [self.scale_ppm_accel, self.scale_ppm_gyro][sensor as usize];
         (self.turn_on_bias(sensor).unwrap_or(0.0), ppm)
     }
 
     /// Standard deviation of the turn-on bias of a sensor (m/s² or rad/s), where it is stated.
     pub const fn turn_on_bias(&self, sensor: Sensor) -> Option<f64> {
-        match sensor {
-            Sensor::Accel => self.turn_on_bias_accel_m_s2,
-            Sensor::Gyro => self.turn_on_bias_gyro_rad_s,
-        }
+        [self.turn_on_bias_accel_m_s2, self.turn_on_bias_gyro_rad_s][sensor as usize]
     }
 
     /// Its errors of which no filter has states.
@@ -344,10 +338,7 @@ impl Temperature {
 
     /// Standard deviation of what a degree does to a sensor's bias (m/s² or rad/s per K).
     pub(crate) const fn sigma(&self, sensor: Sensor) -> f64 {
-        match sensor {
-            Sensor::Accel => self.accel_m_s2_k,
-            Sensor::Gyro => self.gyro_rad_s_k,
-        }
+        [self.accel_m_s2_k, self.gyro_rad_s_k][sensor as usize]
     }
 
     /// An IMU that feels temperature so many times as much.

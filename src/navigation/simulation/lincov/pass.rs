@@ -498,12 +498,7 @@ struct Pass<'a> {
 
 impl<'a> Pass<'a> {
     /// At the start of a track, of a filter's own states and those of its true errors.
-    fn new(
-        track: &Track,
-        own: &'a Sides,
-        sides: &'a Sides,
-        truth: &'a TruthSide,
-    ) -> Self {
+    fn new(track: &Track, own: &'a Sides, sides: &'a Sides, truth: &'a TruthSide) -> Self {
         Self {
             filter: Joint::new(track.start, own),
             errors: Errors::at_start(track, sides, truth),
