@@ -115,7 +115,7 @@ fn numeric_transition(state: &NavState, omega: DVec3, f: DVec3, dt: f64) -> SMat
 
 /// The transition of one sample as the filter's block maps have it, and the Earth's part of F.
 fn filter_transition(state: &NavState, omega: DVec3, f: DVec3, dt: f64) -> SMatrix<f64, 9, 15> {
-    let mut ins = Strapdown::new(state, GravityModel::Wgs84);
+    let mut ins: Strapdown = Strapdown::new(state, GravityModel::Wgs84);
     let terms = EarthTerms::at(&ins);
     let trace = ins.step(Vec3::splat(omega * dt), Vec3::splat(f * dt), dt);
     let sample = Sample::new(&trace, dt);

@@ -113,7 +113,7 @@ fn rows_of_body_velocity_and_yaw_agree_with_central_differences() {
     let arm = DVec3::new(-1.4, 0.6, 0.9);
     for _ in 0..2000 {
         let (state, omega, _) = random_case(&mut g);
-        let ins = Strapdown::single(&state, GravityModel::Wgs84);
+        let ins = Strapdown::<f64>::new(&state, GravityModel::Wgs84);
         let (rows, yaw_row) = (body_velocity_rows(&ins, omega, arm), row_of_yaw(&ins));
         let measured = |s: &NavState, bias: DVec3| {
             let omega_eb_b = omega - bias - s.q_b_n.inverse() * earth::omega_ie_n(state.lat);

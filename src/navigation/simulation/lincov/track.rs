@@ -259,7 +259,7 @@ struct Linearisation {
 impl Linearisation {
     fn new(plan: &Plan<'_>, noise_hz: f64) -> Self {
         let experiment = plan.experiment;
-        let ins = Strapdown::single(&plan.start, experiment.gravity);
+        let ins = Strapdown::<f64>::new(&plan.start, experiment.gravity);
         let defects = Sensor::ALL
             .into_iter()
             .flat_map(|sensor| defects(experiment.defects, sensor));
