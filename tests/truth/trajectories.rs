@@ -55,18 +55,9 @@ fn closure(trajectory: &Trajectory, rate_hz: f64) -> Closure {
 fn shipped_trajectories_last_900_s_and_are_plausible() {
     // Speed (m/s), acceleration (m/s²), jerk (m/s³), rate (°/s): drives stay comfortable, the aircraft banks by 33°.
     for (name, limits) in [
-        (
-            "land_vehicle.toml",
-            [25.1, 3.0, 5.0, 17.2],
-        ),
-        (
-            "figure_eight.toml",
-            [12.1, 2.2, 3.0, 11.5],
-        ),
-        (
-            "fixed_wing.toml",
-            [70.1, 7.0, 5.0, 20.1],
-        ),
+        ("land_vehicle.toml", [25.1, 3.0, 5.0, 17.2]),
+        ("figure_eight.toml", [12.1, 2.2, 3.0, 11.5]),
+        ("fixed_wing.toml", [70.1, 7.0, 5.0, 20.1]),
     ] {
         let t = shipped(name);
         assert!(

@@ -211,6 +211,5 @@ fn record(epochs: &[EpochMetrics], law: &ErrorLaw, outages: &[OutageSummary]) ->
         normalised_sq: std::array::from_fn(|i| {
             mean(&|e| (e.rmse.0[i].value / e.asee.0[i].value).powi(2))
         }),
-        horizontal_m: Vec::new(),
     }
 }

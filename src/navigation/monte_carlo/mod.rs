@@ -125,8 +125,6 @@ fn empty(plan: &Plan<'_>, filter_states: usize) -> RunResult {
             .iter()
             .map(|o| (o.start_s, o.end_s))
             .collect(),
-        outage_fix_t_s: plan.outage_fix_t_s(),
-        fan_t_s: plan.fan_t_s(),
         filter_states,
         fix_components: experiment.gnss.components(),
         coverage_level: experiment.coverage_level,

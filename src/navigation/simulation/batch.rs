@@ -55,15 +55,8 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
         }
         done = event.sample;
     }
-    candidates
-        .into_iter()
-        .map(|c| c.finish(first, &plan.fan))
-        .collect()
+    candidates.into_iter().map(|c| c.finish(first)).collect()
 }
-
-/// Runs whose horizontal error is kept over time: those after them would no longer move a quantile to be seen, and memory
-/// is bounded.
-const FAN_RUNS: u64 = 100_000;
 
 /// One filter on eight runs, and what is kept of it.
 struct Candidate {
@@ -186,9 +179,8 @@ impl Candidate {
         }
     }
 
-    /// Sums over the runs that did not diverge, and a record of each run; `fan` lists the reports at which its
-    /// horizontal error is kept.
-    fn finish(self, first: u64, fan: &[usize]) -> Batch {
+    /// Sums over the runs that did not diverge, and a record of each run.
+    fn finish(self, first: u64) -> Batch {
         // Looked for at the reports alone: what has become NaN stays NaN, so that a divergence between two
         // reports is seen at the next.
         let diverged: [bool; LANES] = std::array::from_fn(|lane| {
@@ -207,18 +199,6 @@ impl Candidate {
         let mean = |value: &dyn Fn(&EpochLanes) -> f64| {
             self.trace.iter().map(value).sum::<f64>() / reports
         };
-        let horizontal = |lane: usize| {
-            let fan = if first + (lane as u64) < FAN_RUNS {
-                fan
-            } else {
-                &[]
-            };
-            let errors = fan.iter().map(|report| &self.trace[*report].error);
-            // f32: seven digits for a quantile plot, at half of the memory of 100 000 runs.
-            errors
-                .map(|error| error[0][lane].hypot(error[1][lane]) as f32)
-                .collect()
-        };
         let record = |lane: usize| RunRecord {
             run: first + lane as u64,
             diverged: diverged[lane],
@@ -233,7 +213,6 @@ impl Candidate {
             normalised_sq: std::array::from_fn(|i| {
                 mean(&|e| (e.error[i][lane] / e.see[i][lane]).powi(2))
             }),
-            horizontal_m: horizontal(lane),
         };
         Batch {
             epochs,

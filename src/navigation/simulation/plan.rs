@@ -107,8 +107,6 @@ pub struct Plan<'a> {
     pub(super) outages: Vec<(f64, usize)>,
     /// Quantile of the coverage statistic.
     pub(super) coverage_quantile: f64,
-    /// Reports at which the horizontal error is kept run by run.
-    pub(super) fan: Vec<usize>,
 }
 
 impl<'a> Plan<'a> {
@@ -176,33 +174,7 @@ impl<'a> Plan<'a> {
             events,
             outages,
             coverage_quantile,
-            fan: Vec::new(),
         })
-    }
-
-    /// The same with the horizontal error of every run kept over time, at `fan_epochs`.
-    pub fn with_fan(mut self) -> Self {
-        let times: Vec<f64> = self.reports().map(|e| e.t_s).collect();
-        self.fan = fan_epochs(&times, self.experiment.outages);
-        self
-    }
-
-    fn reports(&self) -> impl Iterator<Item = &Event> {
-        self.events.iter().filter(|e| e.report)
-    }
-
-    /// Times at which the horizontal error is kept run by run (s).
-    pub(crate) fn fan_t_s(&self) -> Vec<f64> {
-        let times: Vec<f64> = self.reports().map(|e| e.t_s).collect();
-        self.fan.iter().map(|i| times[*i]).collect()
-    }
-
-    /// Times of the first fix after each outage, or of the end of the trajectory (s).
-    pub(crate) fn outage_fix_t_s(&self) -> Vec<f64> {
-        self.outages
-            .iter()
-            .map(|(_, end)| self.events[*end].t_s)
-            .collect()
     }
 
     /// What was planned.
@@ -226,29 +198,6 @@ impl<'a> Plan<'a> {
     pub(crate) fn samples(&self) -> usize {
         self.ideal.len()
     }
-}
-
-/// Most reports of a fan, beside those around the ends of outages.
-const FAN_EPOCHS: usize = 400;
-
-/// Of reports at these times, those at which the horizontal error of every run is kept: every one, or every second,
-/// third …, so that they are few on a long drive, and those on both sides of the beginning and the end of each outage,
-/// between which errors are largest.
-pub(crate) fn fan_epochs(t_s: &[f64], outages: &[Outage]) -> Vec<usize> {
-    let step = t_s.len().div_ceil(FAN_EPOCHS).max(1);
-    let withheld: Vec<bool> = t_s
-        .iter()
-        .map(|t| outages.iter().any(|o| o.withholds(*t)))
-        .collect();
-    let changes = |i: usize| {
-        withheld
-            .get(i)
-            .zip(withheld.get(i + 1))
-            .is_some_and(|(a, b)| a != b)
-    };
-    let is_kept =
-        |i: &usize| i.is_multiple_of(step) || changes(*i) || i.checked_sub(1).is_some_and(changes);
-    (0..t_s.len()).filter(is_kept).collect()
 }
 
 fn effects(outage: &Outage, events: &[Event]) -> (f64, usize) {
