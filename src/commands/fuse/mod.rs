@@ -33,7 +33,7 @@ use nav_sim_navigation::sensors::aiding::{
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::gnss::{GnssSettings, MAX_LEVER_ARM_M};
 use nav_sim_navigation::sensors::outage::{FixedData, Outage, OutagePlan};
-use nav_sim_navigation::simulation::lincov::{HeadingDoubt, weak_heading};
+use nav_sim_navigation::simulation::lincov::weak_heading;
 use nav_sim_navigation::simulation::{BIAS_NAMES, REPORTED_NAMES, lincov};
 use nav_sim_navigation::trajectory::reference::Reference;
 use nav_sim_signal::imu::ImuIncrement;
@@ -865,7 +865,7 @@ fn beside_mounting(mut start: Start, settings: &Settings) -> Start {
 }
 
 /// Heading that the motion between outages hardly shows.
-fn doubt_heading(solution: &Solution, outages: &[Outage]) -> Option<HeadingDoubt> {
+fn doubt_heading(solution: &Solution, outages: &[Outage]) -> Option<String> {
     let start_s = solution.rows.first()?.t_s;
     let fixed = solution
         .rows

@@ -499,9 +499,7 @@ impl Track {
         Self {
             steps,
             marks,
-            outages: self.outages,
-            start: self.start,
-            perfect: self.perfect,
+            ..*self
         }
     }
 
@@ -539,9 +537,7 @@ impl Track {
         Self {
             steps,
             marks,
-            outages: self.outages,
-            start: self.start,
-            perfect: self.perfect,
+            ..*self
         }
     }
 
