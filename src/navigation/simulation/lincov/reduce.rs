@@ -9,9 +9,10 @@
 use super::pass::{Assessment, Consistency, ErrorLaw, FilterPass, Judged, assess};
 use super::track::{NAV, Track};
 use crate::earth::GravityModel;
+use crate::ekf::belief::white_of;
 use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings};
 use crate::imu::{Axis, Channel};
-use crate::noise::{Model, Process, reduction};
+use crate::noise::{Model, reduction};
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
@@ -103,7 +104,14 @@ impl Search<'_> {
             let (s, i) = (channel.sensor as usize, channel.axis as usize);
             // a factor needs something to act on: the wavelet fit may have put all white noise into the bias
             let first = self.alike.first_factor(channel);
-            let white = belief.white[s][i].max(white_of(self.model, channel));
+            let white = belief.white[s][i].max(
+                self.model
+                    .axis(channel)
+                    .processes
+                    .iter()
+                    .map(white_of)
+                    .sum(),
+            );
             belief.white[s][i] = white * ln[first].exp();
             let group = &mut belief.groups[s][0];
             group.innovation[i] *= ln[first + 1].exp();
@@ -305,16 +313,6 @@ pub(super) fn divergence(assessment: &Assessment, beside: impl Fn(&Consistency) 
     }
     let ends = mean(&assessment.outage_ends, &|c| c.divergence + beside(c));
     ENDS * ends + (1.0 - ENDS) * all
-}
-
-/// Long-run variance of the white and moving-average noise of the model (units² a sample).
-fn white_of(model: &Model, channel: Channel) -> f64 {
-    let white = |p: &Process| match p {
-        Process::White(p) => p.sigma2(),
-        Process::Ma1(p) => (1.0 + p.theta()).powi(2) * p.sigma2(),
-        _ => 0.0,
-    };
-    model.axis(channel).processes.iter().map(white).sum()
 }
 
 /// Time before the first outage, between the two and after them (s).

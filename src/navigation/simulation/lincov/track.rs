@@ -4,7 +4,7 @@ use super::pass::add_scaled;
 use super::truth::defects;
 use crate::closure::Bounds;
 use crate::earth::ned_difference;
-use crate::ekf::belief::{BiasGroup, psi_of_angles};
+use crate::ekf::belief::{BiasGroup, psi_of_angles, state_of};
 use crate::ekf::covariance::{
     EARTH_STEP_S, EarthStep, EarthTerms, ErrorMap, NavError, PSI, R, Sample, V,
 };
@@ -791,7 +791,7 @@ pub(super) struct StepOfSource {
 }
 
 impl Source {
-    fn bias(signal: usize, phi: f64, innovation: f64, initial: f64) -> Self {
+    fn bias(signal: usize, [phi, innovation, initial]: [f64; 3]) -> Self {
         Self {
             signal,
             after: 1.0,
@@ -804,7 +804,7 @@ impl Source {
 
     /// An unknown constant of a standard deviation.
     pub(super) fn constant(signal: usize, sigma: f64) -> Self {
-        Self::bias(signal, 1.0, 0.0, sigma * sigma)
+        Self::bias(signal, [1.0, 0.0, sigma * sigma])
     }
 
     /// A state that is nothing but the last innovation of standard deviation `sigma`: the error of a sample
@@ -987,7 +987,7 @@ impl Sources {
         let state = |axis: usize| {
             let (phi, q, initial) = (group.phi[axis], group.innovation[axis], group.initial[axis]);
             (initial != 0.0 || q != 0.0)
-                .then(|| Source::bias(3 * sensor as usize + axis, phi, q, initial))
+                .then(|| Source::bias(3 * sensor as usize + axis, [phi, q, initial]))
         };
         (0..3).filter_map(state).collect()
     }
@@ -1040,8 +1040,9 @@ impl Sources {
                 .iter()
                 .filter(|g| g.is_constant())
             {
-                let constant =
-                    |axis| Source::bias(3 * sensor as usize + axis, 1.0, 0.0, group.initial[axis]);
+                let constant = |axis| {
+                    Source::bias(3 * sensor as usize + axis, [1.0, 0.0, group.initial[axis]])
+                };
                 states.extend((0..3).map(constant).filter(|s| s.initial > 0.0));
             }
         }
@@ -1075,12 +1076,12 @@ impl Sources {
             // would grow.
             Process::Quantization(p) => Source::memory(signal, p.q2().sqrt(), 1.0, -1.0),
             Process::Ma1(p) => Source::memory(signal, p.sigma2().sqrt(), 1.0, p.theta()),
-            Process::Ar1(p) => Source::bias(signal, p.phi(), p.sigma2(), p.variance()),
-            Process::GaussMarkov(p) => {
-                Source::bias(signal, p.ar1().phi(), p.ar1().sigma2(), p.s2())
-            }
-            Process::RandomWalk(p) => Source::bias(signal, 1.0, p.gamma2(), 0.0),
             Process::Drift(p) => Source::ramp(signal, p.slope()),
+            other => {
+                let bias = state_of(other).map(|state| Source::bias(signal, state));
+                self.states.extend(bias);
+                return;
+            }
         };
         self.states.push(state);
     }
