@@ -32,7 +32,7 @@ Settings = Union[StrPath, Mapping[str, Any]]
 class Run(Answer):
     """Errors of a navigation, by Monte Carlo or covariance analysis: `nav-sim run`.
 
-    `epochs` and `fan` over time, `runs` run by run, `outages` outage by outage: dicts of columns. ASEE (averaged
+    `epochs` over time, `runs` run by run, `outages` outage by outage: dicts of columns. ASEE (averaged
     standard estimation error) is what the filter believes of its error, RMSE how wrong it is.
     """
 
@@ -41,11 +41,6 @@ class Run(Answer):
         """Once a second, after the fix: `t_s`, `asee_…`, `rmse_…`, `bias_…` of each state, `nees`, `coverage`;
         `asee_horizontal_m` and `rmse_horizontal_m` are the roots of the sums of squares of north and east."""
         return _with_horizontal(self.table("epochs.csv"), "")
-
-    @cached_property
-    def fan(self) -> Columns:
-        """Quantiles of the horizontal position error over time (m)."""
-        return self.table("fan.csv")
 
     @cached_property
     def runs(self) -> Columns:

@@ -12,7 +12,7 @@ import pytest
 from conftest import CONSUMER, DRIVE, TACTICAL, Command, table, without_times
 from nav_sim import Model, NavSimError, Trajectory, fuse, lincov, run
 
-FILES = ["epochs.csv", "fan.csv", "runs.csv"]
+FILES = ["epochs.csv", "runs.csv"]
 
 
 def test_a_run_is_that_of_the_command(command: Command, tmp_path: Path) -> None:

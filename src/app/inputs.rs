@@ -12,7 +12,7 @@ use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::outage::{NotAnOutage, Outage};
 use nav_sim_navigation::trajectory::Trajectory;
-use nav_sim_navigation::trajectory::plausibility::{Excess, Limits, examine};
+use nav_sim_navigation::trajectory::plausibility::{Excess, LIMITS, examine};
 use nav_sim_signal::imu::{Recording, Sensor};
 use nav_sim_signal::noise::{Model, continuous};
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ use std::str::FromStr;
 pub(crate) fn trajectory(path: &Path, context: &Context<'_>) -> Result<Trajectory> {
     let (trajectory, warnings) = trajectory_file::load(path, &trajectory_file::Options::default())?;
     warnings.iter().for_each(|doubt| context.warn(doubt));
-    let (_, beyond) = examine(&trajectory, &Limits::default());
+    let (_, beyond) = examine(&trajectory, &LIMITS);
     let farthest = |e: &&Excess| e.worst / e.limit;
     if let Some(worst) = beyond
         .iter()

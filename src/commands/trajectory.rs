@@ -14,9 +14,8 @@ use nav_sim_navigation::sensors::aiding::AidingSettings;
 use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::simulation::{Plan, record};
 use nav_sim_navigation::trajectory::Trajectory;
-use nav_sim_navigation::trajectory::plausibility::{Limits, examine};
+use nav_sim_navigation::trajectory::plausibility::{LIMITS, examine};
 use nav_sim_signal::noise::continuous;
-use nav_sim_signal::units::DEG;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -172,7 +171,7 @@ pub struct CheckTrajectory {
     #[arg(long, value_name = "M", default_value_t = Bounds::default().position_m, value_parser = parse::positive)]
     max_position_m: f64,
     /// Largest plausible speed (m/s)
-    #[arg(long, value_name = "M_S", default_value_t = Limits::default().speed, value_parser = parse::positive)]
+    #[arg(long, value_name = "M_S", default_value_t = LIMITS[0], value_parser = parse::positive)]
     limit_speed: f64,
 }
 
@@ -190,10 +189,8 @@ impl Command for CheckTrajectory {
 
     fn run(&self, context: &Context<'_>) -> Result<TrajectoryCheck> {
         let (trajectory, warnings) = self.source.read(context)?;
-        let limits = Limits {
-            speed: self.limit_speed,
-            ..Limits::default()
-        };
+        let mut limits = LIMITS;
+        limits[0] = self.limit_speed;
         let bounds = Bounds {
             position_m: self.max_position_m,
             ..Bounds::default()
@@ -211,18 +208,12 @@ impl Command for CheckTrajectory {
         }
         let closure = Closure::new(&trajectory, self.rate_hz, GravityModel::default())
             .map_err(|e| Failure::input(format!("{name}: {e}")).hint("give another --rate-hz"))?;
-        let motion = |[speed_m_s, acceleration_m_s2, jerk_m_s3, rate]: [f64; 4]| Motion {
+        let motion = |[speed_m_s, acceleration_m_s2, jerk_m_s3, rate_deg_s]: [f64; 4]| Motion {
             speed_m_s,
             acceleration_m_s2,
             jerk_m_s3,
-            rate_deg_s: rate / DEG,
+            rate_deg_s,
         };
-        let Limits {
-            speed,
-            acceleration,
-            jerk,
-            rate,
-        } = limits;
         let places = trajectory.knots().iter();
         let places: Vec<_> = places.map(|t| trajectory.kinematics(*t).r_e).collect();
         Ok(TrajectoryCheck {
@@ -232,7 +223,7 @@ impl Command for CheckTrajectory {
             points: places.len(),
             path_m: places.windows(2).map(|w| w[0].distance(w[1])).sum(),
             largest: motion(largest),
-            limits: motion([speed, acceleration, jerk, rate]),
+            limits: motion(limits),
             beyond_limits: beyond.iter().map(ToString::to_string).collect(),
             warnings,
             closure: Closed {

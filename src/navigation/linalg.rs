@@ -8,6 +8,13 @@ pub const fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a >= b { a } else { b }
 }
 
+/// The value in the middle, in order.
+pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
 /// glam vector to nalgebra.
 pub(crate) fn to_nalgebra(v: DVec3) -> Vector3<f64> {
     Vector3::new(v.x, v.y, v.z)

@@ -8,7 +8,7 @@ use crate::noise::Model;
 use crate::noise::reduction::{self, ReductionError};
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::check_bounds;
-use crate::sensors::defects::{Defect, ImuSettings, Output};
+use crate::sensors::defects::{Defect, ImuSettings};
 use crate::sensors::gnss::{BaroSettings, GnssSettings};
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::{
@@ -35,7 +35,6 @@ pub struct Scenario {
     /// The GNSS receiver.
     pub gnss: GnssSettings,
     /// A barometer, if there is one.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub baro: Option<BaroSettings>,
     /// What the vehicle knows of its own motion.
     #[serde(skip_serializing_if = "AidingSettings::is_none")]
@@ -43,13 +42,10 @@ pub struct Scenario {
     /// The start.
     pub initial: InitialSettings,
     /// Windows without fixes. Without this key and the two below: the two of the paper. An empty list: none.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub outage: Option<Vec<Outage>>,
     /// Regular outages.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub outage_periodic: Option<PeriodicOutages>,
     /// Random outages.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub outage_random: Option<RandomOutages>,
 }
 
@@ -64,7 +60,6 @@ pub struct RunSettings {
     #[schemars(range(min = 1, max = MAX_RUNS))]
     pub runs: u64,
     /// Seed of all random numbers; without it one is drawn and recorded.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
     /// How the statistics are found.
     pub method: Method,
@@ -111,11 +106,6 @@ pub struct FilterSettings {
     pub gravity: GravityModel,
     /// How the filter uses a fix.
     pub update: FixUpdate,
-    /// A fix is not used when its NIS is above the chi-square quantile of this probability; without it, every
-    /// fix is used.
-    #[schemars(with = "Option<Probability>")]
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub nis_gate: Option<f64>,
 }
 
 /// How a noise model is reduced to white noise and one Gauss-Markov bias per axis.
@@ -153,7 +143,6 @@ impl Scenario {
             baro: self.baro.as_ref(),
             aiding: &self.aiding,
             update: self.filter.update,
-            nis_gate: self.filter.nis_gate,
             outages,
             seed,
             scenario: "",
@@ -176,25 +165,6 @@ impl Scenario {
             self.meets_imu_samples(&format!("aiding.{}.rate_hz", aid.name()), rate_hz)?;
         }
         self.meets_imu_samples("gnss.rate_hz", self.gnss.rate_hz)
-    }
-
-    /// Refuses what covariance analysis cannot have: its gains and errors do not depend on what is drawn.
-    ///
-    /// # Errors
-    /// The key that is drawn upon.
-    pub fn analysable(&self) -> Result<(), SettingError> {
-        let because = "covariance analysis has no draws, on which its effect depends";
-        let output = self
-            .imu
-            .output
-            .as_ref()
-            .filter(|output| **output != Output::default());
-        let refusal = match (self.filter.nis_gate, output) {
-            (Some(p), _) => SettingError::new("filter.nis_gate", p, because),
-            (None, Some(_)) => SettingError::new("imu.output", "{…}", because),
-            (None, None) => return Ok(()),
-        };
-        Err(refusal.advising("leave it out, or sample with method = \"monte-carlo\""))
     }
 
     /// A measurement must fall on an IMU sample: one that does not would be used late or never.
@@ -288,7 +258,7 @@ impl Scenario {
     }
 
     /// The outages asked for: the paper's two when nothing is said.
-    pub(crate) fn outages(&self) -> OutagePlan {
+    fn outages(&self) -> OutagePlan {
         let said =
             self.outage.is_some() || self.outage_periodic.is_some() || self.outage_random.is_some();
         OutagePlan {

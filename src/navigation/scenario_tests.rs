@@ -299,7 +299,6 @@ fn refusals_name_section_and_key() {
         refused("imu.misalignment_rad = 0.5"),
         "imu.misalignment_rad"
     );
-    assert_eq!(refused("filter.nis_gate = 1"), "filter.nis_gate");
     assert_eq!(
         refused("gnss.correlation_time_s = 0"),
         "gnss.correlation_time_s"

@@ -67,24 +67,6 @@ pub struct StepTrace<L> {
 }
 
 impl Strapdown {
-    /// Starts every lane from the same state.
-    pub fn new(start: &NavState, gravity: GravityModel) -> Self {
-        Self {
-            lat: Lanes::splat(start.lat),
-            lon: Lanes::splat(start.lon),
-            h: Lanes::splat(start.h),
-            v_n: Vec3::splat(start.v_n),
-            q_b_n: Quat::splat(start.q_b_n),
-            // No sample before the first: its coning and sculling are those of a vehicle that has just begun
-            // to turn. A vehicle in steady rotation has no such correction (parallel increments), so nothing
-            // is lost at rest.
-            dtheta_before: Vec3::ZERO,
-            dv_before: Vec3::ZERO,
-            coriolis_before: Vec3::ZERO,
-            gravity,
-        }
-    }
-
     /// The state of one lane.
     pub fn lane(&self, i: usize) -> NavState {
         NavState {
@@ -133,25 +115,26 @@ impl Strapdown {
     }
 }
 
-impl Strapdown<f64> {
-    /// One run alone, from a state.
-    pub(crate) fn single(start: &NavState, gravity: GravityModel) -> Self {
+impl<L: Real> Strapdown<L> {
+    /// Starts every lane from the same state.
+    pub fn new(start: &NavState, gravity: GravityModel) -> Self {
         let zero = Vec3::splat(DVec3::ZERO);
         Self {
-            lat: start.lat,
-            lon: start.lon,
-            h: start.h,
+            lat: L::from(start.lat),
+            lon: L::from(start.lon),
+            h: L::from(start.h),
             v_n: Vec3::splat(start.v_n),
             q_b_n: Quat::splat(start.q_b_n),
+            // No sample before the first: its coning and sculling are those of a vehicle that has just begun
+            // to turn. A vehicle in steady rotation has no such correction (parallel increments), so nothing
+            // is lost at rest.
             dtheta_before: zero,
             dv_before: zero,
             coriolis_before: zero,
             gravity,
         }
     }
-}
 
-impl<L: Real> Strapdown<L> {
     /// The gravity model in use.
     pub(crate) const fn gravity(&self) -> GravityModel {
         self.gravity

@@ -43,17 +43,13 @@ pub(crate) fn result() -> RunResult {
             reconvergence_s: 1.0 + f64::from(run),
         }],
         nis: (5.5 + 0.3 * f64::from(run), 8),
-        rejected: 0,
         nees_mean: 8.5 + 0.1 * f64::from(run),
         covered: 0.75,
         normalised_sq: [1.0 + 0.1 * f64::from(run); 9],
-        horizontal_m: Vec::new(),
     };
     RunResult {
         epochs: (0..12).map(epoch).collect(),
         runs: (0..runs).map(run).collect(),
-        fan_t_s: Vec::new(),
-        outage_fix_t_s: Vec::new(),
         outages: vec![(4.0, 8.0)],
         filter_states: 15,
         fix_components: 6,

@@ -1,11 +1,11 @@
-//! `epochs.csv`, `fan.csv` and `runs.csv` of a run directory.
+//! `epochs.csv` and `runs.csv` of a run directory.
 
 use super::csv::{csv, flat};
 use nav_sim_document::shortest;
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
 use nav_sim_navigation::gnss::GnssFix;
-use nav_sim_navigation::metrics::{EpochMetrics, Estimate, FAN_LEVELS, FanEpoch, PerState};
+use nav_sim_navigation::metrics::{EpochMetrics, Estimate, PerState};
 use nav_sim_navigation::simulation::{
     BIAS_NAMES, OutageRecord, REPORTED, REPORTED_NAMES, RunResult,
 };
@@ -40,25 +40,6 @@ pub(crate) fn epochs_csv(epochs: &[EpochMetrics]) -> String {
         row
     };
     csv(&epochs.iter().map(row).collect::<Vec<_>>())
-}
-
-/// `fan.csv`: quantiles of the horizontal error over time; with what covariance analysis expects of them where that stands
-/// beside runs.
-pub(crate) fn fan_csv(fan: &[FanEpoch]) -> String {
-    let row = |e: &FanEpoch| {
-        let mut row = flat(&json!({ "t_s": e.t_s }));
-        for (prefix, quantiles) in [("", Some(e.quantiles_m)), ("lincov_", e.lincov_m)] {
-            let named = FAN_LEVELS.iter().zip(quantiles.into_iter().flatten());
-            // errors are kept in single precision: more digits would say what nobody knows
-            let cell = |(p, q): (&f64, f64)| {
-                let name = format!("{prefix}p{:02.0}_m", 100.0 * p);
-                (name, (q as f32).to_string().into())
-            };
-            row.extend(named.map(cell));
-        }
-        row
-    };
-    csv(&fan.iter().map(row).collect::<Vec<_>>())
 }
 
 /// Columns of `runs.csv`.

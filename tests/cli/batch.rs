@@ -27,7 +27,7 @@ fn parts_make_the_bytes_of_the_whole_and_cells_those_of_run() {
         "run drive.toml wrong.toml --truth imu.toml --outage 30:38 --runs 77 --seed 5 -o alone",
         0,
     );
-    for file in ["epochs.csv", "runs.csv", "fan.csv"] {
+    for file in ["epochs.csv", "runs.csv"] {
         let cell = dir.join("whole/cells/length_s=8_wrong").join(file);
         assert_eq!(
             fs::read(cell).unwrap(),

@@ -49,7 +49,6 @@ fn result(factor: f64) -> RunResult {
         nees_mean: 9.0,
         covered: 0.95,
         normalised_sq: [1.0; 9],
-        ..RunRecord::default()
     };
     RunResult {
         epochs: (0..10).map(epoch).collect(),

@@ -82,7 +82,7 @@ pub fn results(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
         .map(|name| dir.join(name))
         .to_vec();
     for cell in cells(dir) {
-        files.extend(["epochs.csv", "runs.csv", "fan.csv"].map(|name| cell.join(name)));
+        files.extend(["epochs.csv", "runs.csv"].map(|name| cell.join(name)));
     }
     let of_file = |path: PathBuf| {
         let bytes = std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));

@@ -3,12 +3,12 @@
 
 use nav_sim::navigation::earth::GravityModel;
 use nav_sim::navigation::ekf::FilterStates;
-use nav_sim::navigation::metrics::{Estimate, Expected, FanEpoch, epochs};
+use nav_sim::navigation::metrics::{Estimate, Expected, epochs};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
-use nav_sim::navigation::simulation::{Plan, RunRecord, RunResult};
+use nav_sim::navigation::simulation::RunResult;
 use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::navigation::trajectory::profile::{
     Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
@@ -17,10 +17,8 @@ use nav_sim::signal::noise::{
     Ar1, Composite, Drift, Model, Process, Quantization, RandomWalk, White,
 };
 use nav_sim_navigation::earth::gravity_down;
-use nav_sim_navigation::metrics::{Budget, FAN_LEVELS};
-use nav_sim_navigation::metrics::{expected_fan, fan};
+use nav_sim_navigation::metrics::Budget;
 use nav_sim_navigation::simulation::lincov::{FilterPass, TruthSide};
-use statrs::distribution::{Binomial, DiscreteCDF};
 
 const RATE_HZ: f64 = 100.0;
 const RUNS: u64 = 400;
@@ -106,13 +104,8 @@ fn assert_agree(name: &str, scenario: &str, truth: &Model) {
     let track = scenario.track(&path, &believed, &outages).unwrap();
     let beliefs = [scenario.belief(&believed, &outages, &track).unwrap()];
     let experiment = scenario.experiment(&path, Truth::Model(truth), &beliefs, &outages, 11);
-    let plan = Plan::new(&experiment).unwrap().with_fan();
-    let sampled = &monte_carlo::run_plan(&plan, RUNS, &|_| {})[0];
+    let sampled = &monte_carlo::run(&experiment, RUNS, &|_| {}).unwrap()[0];
     let expected = Expected::along(&track, &experiment, &beliefs[0], truth).unwrap();
-    let side = TruthSide::together(&TruthSide::sources(&experiment, truth));
-    let expected_fan = expected_fan(&FilterPass::new(&track, &beliefs[0]), &side, &outages);
-    let strangers = out_of_place(sampled, &expected_fan);
-    assert!(strangers.is_empty(), "{name}: {strangers:?}");
     assert_epochs_agree(name, sampled, &expected);
     assert_outage_agrees(name, sampled, &expected);
     let nis = Estimate::mean_of(sampled.runs.iter().map(|r| r.nis.0), None);
@@ -166,78 +159,6 @@ fn assert_epochs_agree(name: &str, sampled: &RunResult, expected: &Expected) {
             s.coverage,
             e.coverage,
             s.t_s
-        );
-    }
-}
-
-/// Quantiles over time that are not where they are expected: (time, probability, runs below).
-///
-/// Below the quantile at p lies a binomial number of runs (n, p), whatever the law of the errors: the quantile lies
-/// between the order statistics x_(l) and x_(u) of the runs unless fewer than l or at least u of them are below it. l and u
-/// leave 1e-3 to all 121 × 5 quantiles together (Bonferroni, so that it does not matter how instants hang together).
-fn out_of_place(sampled: &RunResult, expected: &[FanEpoch]) -> Vec<(f64, f64, usize)> {
-    let own = fan(sampled);
-    let rows = sampled.epochs.len() + sampled.outages.len();
-    assert_eq!((own.len(), expected.len()), (rows, rows));
-    let share = 1e-3 / (2 * FAN_LEVELS.len() * own.len()) as f64;
-    let mut found = Vec::new();
-    let (mut reports, mut ends) = (0.., 0..);
-    for (row, (own_row, expected)) in own.iter().zip(expected).enumerate() {
-        assert_eq!(own_row.t_s, expected.t_s);
-        // of two rows at one time the first is just before the fix
-        let is_end = own.get(row + 1).is_some_and(|next| next.t_s == own_row.t_s);
-        let k: usize = if is_end { ends.next() } else { reports.next() }.unwrap();
-        let error = |r: &RunRecord| match is_end {
-            true => r.outages[k].horizontal_error_end_m,
-            false => f64::from(r.horizontal_m[k]),
-        };
-        let mut errors: Vec<f64> = sampled.runs.iter().map(error).collect();
-        errors.sort_by(f64::total_cmp);
-        // a perfect start has no error but rounding
-        let known = FAN_LEVELS
-            .iter()
-            .zip(expected.quantiles_m)
-            .zip(own_row.quantiles_m);
-        for ((p, quantile), own) in known.filter(|((_, quantile), _)| *quantile > 1e-6) {
-            let binomial = Binomial::new(*p, RUNS).unwrap();
-            let [l, u] = [share, 1.0 - share].map(|q| binomial.inverse_cdf(q) as usize);
-            assert!(
-                errors[l - 1] <= own && own <= errors[u],
-                "the quantile of the runs is among them"
-            );
-            if quantile < errors[l - 1] || errors[u] < quantile {
-                found.push((
-                    expected.t_s,
-                    *p,
-                    errors.iter().filter(|e| **e <= quantile).count(),
-                ));
-            }
-        }
-    }
-    found
-}
-
-/// A truth half as large again in its standard deviations is found out at the end of an outage: of errors as a circle's
-/// (Rayleigh), shares of 1 − (1 − p)^(1/2.25) lie below the quantiles of the other, 0.265, 0.46 and 0.74 at p = 0.5, 0.75 and 0.95,
-/// which is 9, 13 and 20 binomial standard deviations of 400 runs from p. At 0.05 it is 2.5 of them: nothing to be seen.
-#[test]
-fn the_fan_of_another_truth_is_out_of_place() {
-    let (scenario, path, believed, outages) = (Scenario::default(), drive(), model(1.0), [OUTAGE]);
-    let track = scenario.track(&path, &believed, &outages).unwrap();
-    let beliefs = [scenario.belief(&believed, &outages, &track).unwrap()];
-    let truth = model(2.25);
-    let experiment = scenario.experiment(&path, Truth::Model(&truth), &beliefs, &outages, 11);
-    let plan = Plan::new(&experiment).unwrap().with_fan();
-    let sampled = &monte_carlo::run_plan(&plan, RUNS, &|_| {})[0];
-    let side = TruthSide::together(&TruthSide::sources(&experiment, &believed));
-    let matched = expected_fan(&FilterPass::new(&track, &beliefs[0]), &side, &outages);
-    let strangers = out_of_place(sampled, &matched);
-    for p in [0.5, 0.75, 0.95] {
-        assert!(
-            strangers
-                .iter()
-                .any(|(t_s, level, _)| (*t_s, *level) == (99.0, p)),
-            "{p}: {strangers:?}"
         );
     }
 }
@@ -437,10 +358,10 @@ fn constants_of_the_true_imu_have_their_closed_forms() {
     assert!((rmse / mean.abs() - 1.0).abs() < 1e-12, "{rmse} {mean}");
 }
 
-/// Shares of every state sum to 1; together the sources make the mean squares of the whole truth, and those that
-/// the filter believes in make its own variances: covariances add over independent sources.
+/// Shares of every state sum to 1; together the sources make the mean squares of the whole truth: covariances add over
+/// independent sources.
 #[test]
-fn budgets_add_up_to_the_true_errors_and_to_the_believed_ones() {
+fn budgets_add_up_to_the_true_errors() {
     let text = "
         imu = { turn_on_bias_accel_m_s2 = 0.01, scale_ppm_gyro = 500, misalignment_rad = 1e-3 }
         gnss = { lever_arm_m = [1.0, -0.5, -1.2], correlated_pos_sigma_m = [3, 2, 5] }
@@ -460,21 +381,19 @@ fn budgets_add_up_to_the_true_errors_and_to_the_believed_ones() {
     let filter = FilterPass::new(&track, &beliefs[0]);
     let sources = TruthSide::sources(&experiment, &truth);
     let end = filter.errors(&TruthSide::together(&sources)).outage_ends[0];
-    let believed = TruthSide::believed(&experiment, &beliefs[0]);
-    for (sources, deviations) in [(&sources, end.errors.rmse()), (&believed, end.sigma())] {
-        let budget = &Budget::at_outage_ends(&filter, sources)[0];
-        for i in 0..9 {
-            let sum: f64 = budget.shares.iter().map(|(_, shares)| shares.0[i]).sum();
-            assert!((sum - 1.0).abs() < 1e-9, "state {i}: {sum}");
-            let ratio = budget.total[i] / deviations[i].powi(2);
-            assert!((ratio - 1.0).abs() < 1e-9, "state {i}: {ratio}");
-            assert!(
-                budget
-                    .shares
-                    .iter()
-                    .all(|(_, shares)| shares.0[i] >= -1e-12)
-            );
-        }
+    let deviations = end.errors.rmse();
+    let budget = &Budget::at_outage_ends(&filter, &sources)[0];
+    for i in 0..9 {
+        let sum: f64 = budget.shares.iter().map(|(_, shares)| shares.0[i]).sum();
+        assert!((sum - 1.0).abs() < 1e-9, "state {i}: {sum}");
+        let ratio = budget.total[i] / deviations[i].powi(2);
+        assert!((ratio - 1.0).abs() < 1e-9, "state {i}: {ratio}");
+        assert!(
+            budget
+                .shares
+                .iter()
+                .all(|(_, shares)| shares.0[i] >= -1e-12)
+        );
     }
     let names: Vec<&str> = sources.iter().map(|source| source.name.as_str()).collect();
     let expected = [

@@ -45,7 +45,6 @@ sigma2 = 0.5
 
 const SCENARIO: &str = "
 run = { runs = 100, seed = 1, coverage_level = 0.9 }
-filter = { nis_gate = 0.99 }
 outage = [{ start_s = 1.0, end_s = 2.0 }]
 [imu]
 rate_hz = 100.0
@@ -57,7 +56,6 @@ misalignment_rad = 0.01
 g_sensitivity_rad_s_per_m_s2 = 0.0001
 vibration = { rms_m_s2 = 5.0, rectification_s2_m = 0.0001 }
 temperature = { profile_c = [[0.0, 20.0], [60.0, 40.0]], accel_m_s2_k = 0.001, gyro_rad_s_k = 0.00001 }
-output = { range_accel_m_s2 = 80.0, range_gyro_rad_s = 8.0, resolution_accel_m_s2 = 0.001, resolution_gyro_rad_s = 0.001 }
 [gnss]
 rate_hz = 1.0
 pos_sigma_m = [2.0, 2.0, 4.0]

@@ -22,9 +22,10 @@ use nav_sim_navigation::fusion::{
     Assessment, ClocksApart, Correlation, Displaced, Finding, Found, FusionError, Heading,
     Levelling, Outcome, Recorded, Row, Settings, Solution, Start, Weighed, WheelSpeed, Whiteness,
     aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier, fuse, fuse_correlated,
-    interval_s, middle, outcome, rest_of_origin, rough_origin, vehicle_velocities, wheel_ratio,
+    interval_s, outcome, rest_of_origin, rough_origin, vehicle_velocities, wheel_ratio,
 };
 use nav_sim_navigation::gnss::{FixSigma, GnssFix};
+use nav_sim_navigation::linalg::median;
 use nav_sim_navigation::metrics::{ReductionQuality, VerdictKind};
 use nav_sim_navigation::sensors::aiding::{
     AidingSettings, NhcSettings, OdometerSettings, ZuptSettings,
@@ -32,7 +33,7 @@ use nav_sim_navigation::sensors::aiding::{
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::gnss::{GnssSettings, MAX_LEVER_ARM_M};
 use nav_sim_navigation::sensors::outage::{FixedData, Outage, OutagePlan};
-use nav_sim_navigation::simulation::lincov::{HeadingDoubt, weak_heading};
+use nav_sim_navigation::simulation::lincov::weak_heading;
 use nav_sim_navigation::simulation::{BIAS_NAMES, REPORTED_NAMES, lincov};
 use nav_sim_navigation::trajectory::reference::Reference;
 use nav_sim_signal::imu::ImuIncrement;
@@ -864,7 +865,7 @@ fn beside_mounting(mut start: Start, settings: &Settings) -> Start {
 }
 
 /// Heading that the motion between outages hardly shows.
-fn doubt_heading(solution: &Solution, outages: &[Outage]) -> Option<HeadingDoubt> {
+fn doubt_heading(solution: &Solution, outages: &[Outage]) -> Option<String> {
     let start_s = solution.rows.first()?.t_s;
     let fixed = solution
         .rows
@@ -927,13 +928,10 @@ fn beside(states: FilterStates, initial: &InitialSettings) -> InitialSettings {
 /// The receiver of the fixes: medians.
 fn receiver(gnss: &[GnssFix], interval_s: f64) -> GnssSettings {
     let defaults = GnssSettings::default();
-    let position = |i: usize| middle(gnss.iter().map(|fix| fix.pos_sigma_n[i]).collect());
+    let position = |i: usize| median(gnss.iter().map(|fix| fix.pos_sigma_n[i]));
     let velocity = |i: usize| {
-        middle(
-            gnss.iter()
-                .filter_map(|fix| Some(fix.velocity?.sigma_n()[i]))
-                .collect(),
-        )
+        let sigmas = gnss.iter();
+        median(sigmas.filter_map(|fix| Some(fix.velocity?.sigma_n()[i])))
     };
     let velocities = [0, 1, 2].map(velocity);
     let has_velocity = velocities.iter().all(Option::is_some);

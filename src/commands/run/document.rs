@@ -10,7 +10,7 @@ use nav_sim_document::{
     readable, window,
 };
 use nav_sim_navigation::ekf::FixUpdate;
-use nav_sim_navigation::metrics::{EpochMetrics, FanEpoch, OutageSummary, Summary, VerdictKind};
+use nav_sim_navigation::metrics::{EpochMetrics, OutageSummary, Summary, VerdictKind};
 use nav_sim_navigation::scenario::{Method, Unexpected};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 
@@ -21,8 +21,6 @@ const SOURCES: usize = 3;
 
 const HORIZONTAL: &str = "Horizontal RMSE, and the filter's own standard deviation (ASEE, averaged standard estimation error; north and \
      east together) with the range up to three times that. Dots: median at the end of an outage, the bar up to the 95 % quantile.";
-const FAN: &str =
-    "Quantiles over time, as in fan.csv. Dashed: 5, 50 and 95 % by covariance analysis.";
 const STATES_SHOWN: &str = "RMSE: how wrong the filter is. ASEE: its own standard deviation. Their ratio is 1 if the filter is right.";
 const CONSISTENCY: &str = "NEES: normalised estimation error squared of position, velocity and attitude. Coverage: share of errors inside \
      the filter's ellipsoid of position and attitude.";
@@ -30,10 +28,7 @@ const CONSISTENCY: &str = "NEES: normalised estimation error squared of position
 /// The document of an answer.
 pub(super) fn document(answer: &RunAnswer) -> Document {
     let Navigation {
-        epochs,
-        fan,
-        summary,
-        ..
+        epochs, summary, ..
     } = &answer.navigation;
     let windows = windows(summary);
     let tone = match summary.require.iter().all(|met| met.met) {
@@ -54,7 +49,6 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
         "",
     );
     page.chart(&horizontal(epochs, summary), HORIZONTAL);
-    page.chart(&fan_chart(fan, summary), FAN);
     let shown = largest(summary, OUTAGES);
     outages(answer, &shown, &mut page);
     page.section("Errors over time");
@@ -249,14 +243,14 @@ fn assumptions(summary: &Summary, answer: &RunAnswer) -> Vec<(&'static str, Stri
     facts
 }
 
-/// The sources of the errors at the ends of the outages that are shown, beside what the filter believes.
+/// The sources of the errors at the ends of the outages that are shown.
 fn budgets(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
     let outages = &answer.navigation.summary.outages;
-    if shown.iter().all(|k| outages[*k].believed_budget.is_none()) {
+    if shown.iter().all(|k| outages[*k].budget.is_none()) {
         return;
     }
     page.section("Sources of errors");
-    page.text("Shares in the mean square at the end of each outage: of the true errors, by covariance analysis, and of those that the filter believes in.");
+    page.text("Shares in the mean square at the end of each outage, by covariance analysis.");
     let columns = [
         ("source", "@"),
         ("north", "pos_n_m"),
@@ -264,16 +258,10 @@ fn budgets(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
         ("down", "pos_d_m"),
         ("yaw", "yaw_deg"),
     ];
-    for (k, (kind, key)) in shown
-        .iter()
-        .flat_map(|k| [("true", "budget"), ("believed", "believed_budget")].map(|kind| (k, kind)))
-    {
-        let table = Table::of(answer, &format!("/outages/{k}/{key}/*"), &columns);
-        let (start_s, end_s) = (outages[*k].start_s, outages[*k].end_s);
-        if !table.is_empty() {
-            let title = format!("{}, {kind}", window(start_s, end_s));
-            page.folded(&title, |page| page.table(&table));
-        }
+    for k in shown {
+        let table = Table::of(answer, &format!("/outages/{k}/budget/*"), &columns);
+        let title = window(outages[*k].start_s, outages[*k].end_s);
+        page.folded(&title, |page| page.table(&table));
     }
 }
 
@@ -323,38 +311,6 @@ pub(super) fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
         ..Panel::new(Axis::log("horizontal error (m)"), series)
     };
     Chart::over_time("Horizontal position error", vec![panel], &windows(summary))
-}
-
-/// Quantiles of the horizontal error over time, those of a covariance analysis beside the runs dashed.
-pub(super) fn fan_chart(fan: &[FanEpoch], summary: &Summary) -> Chart {
-    let between = |low: usize, high: usize| -> Vec<(f64, f64, f64)> {
-        fan.iter()
-            .map(|e| (e.t_s, e.quantiles_m[low], e.quantiles_m[high]))
-            .collect()
-    };
-    let median = fan.iter().map(|e| (e.t_s, e.quantiles_m[2])).collect();
-    let mut series = vec![
-        Series::new("5 to 95 %", Colour::REAL, Mark::Band(between(0, 4))),
-        Series::new("25 to 75 %", Colour::REAL, Mark::InnerBand(between(1, 3))),
-        Series::line("median", Colour::REAL, median),
-    ];
-    if fan.iter().any(|e| e.lincov_m.is_some()) {
-        let expected = |i: usize| {
-            fan.iter()
-                .filter_map(|e| Some((e.t_s, e.lincov_m?[i])))
-                .collect()
-        };
-        // the outermost and the median: five more lines would hide the bands
-        series.extend(
-            [0, 2, 4].map(|i| Series::dashed("covariance analysis", Colour::BELIEVED, expected(i))),
-        );
-    }
-    let panel = Panel::new(Axis::log("horizontal error (m)"), series);
-    Chart::over_time(
-        "Percentiles of the horizontal position error",
-        vec![panel],
-        &windows(summary),
-    )
 }
 
 /// Every state: what the filter believes and how wrong it is.

@@ -6,22 +6,22 @@ use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::ModelFile;
 use crate::io::scenario_file;
 use crate::parse;
-use crate::report::tables::{epochs_csv, fan_csv, runs_csv};
+use crate::report::tables::{epochs_csv, runs_csv};
 use crate::report::verdict::requirement_line;
 use crate::report::{json, reduction_doubt, reduction_line, trajectory, unexpected_line};
 use nav_sim_calibration::derived_interval;
 use nav_sim_document::{Document, svg};
 use nav_sim_navigation::ekf::{Belief, FilterStates};
 use nav_sim_navigation::metrics::{
-    Budget, EpochMetrics, Expected, FanEpoch, OutageSummary, PerState, ReductionQuality,
-    Requirement, Summary, epochs, expected_fan, fan, horizontal_quantiles,
+    Budget, EpochMetrics, Expected, OutageSummary, PerState, ReductionQuality, Requirement,
+    Summary, epochs, horizontal_quantiles,
 };
 use nav_sim_navigation::monte_carlo;
 use nav_sim_navigation::scenario::{Method, Scenario};
 use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
-    FilterPass, Instant, NamedSource, Track, TruthSide, assess, strapdown_over_sigma, weak_heading,
+    FilterPass, Instant, Track, TruthSide, assess, strapdown_over_sigma, weak_heading,
 };
 use nav_sim_navigation::simulation::{Experiment, Plan, RunResult};
 use nav_sim_navigation::trajectory::Trajectory;
@@ -37,8 +37,7 @@ mod document;
 
 /// Navigate by INS/GNSS along TRAJECTORY with MODEL in the filter: Monte Carlo or covariance analysis
 ///
-/// Writes a run directory: epochs.csv (ASEE, RMSE, bias, NEES, coverage at 1 Hz), fan.csv (quantiles of the
-/// horizontal error), runs.csv, summary.json, report.html, manifest.json. The same seed gives every model the same
+/// Writes a run directory: epochs.csv (ASEE, RMSE, bias, NEES, coverage at 1 Hz), runs.csv, summary.json, report.html, manifest.json. The same seed gives every model the same
 /// noise, so that runs can be compared pair by pair (see `nav-sim compare`).
 #[derive(clap::Args, Debug, Clone)]
 #[command(before_help = "\
@@ -137,7 +136,7 @@ pub struct ModelNote {
 }
 
 /// Names of the tables and the summary of a run directory.
-pub(crate) const RUN_FILES: [&str; 4] = ["epochs.csv", "fan.csv", "runs.csv", "summary.json"];
+pub(crate) const RUN_FILES: [&str; 3] = ["epochs.csv", "runs.csv", "summary.json"];
 
 impl Command for Run {
     type Answer = RunAnswer;
@@ -351,7 +350,7 @@ pub(crate) fn columns(
         &outages,
         one.seed,
     );
-    let plan = Plan::new(&experiment)?.with_fan();
+    let plan = Plan::new(&experiment)?;
     let progress = |done| context.advance(done * runs.len() as u64);
     let results = monte_carlo::run_range(&plan, first, count, &|| context.go_on(), &progress);
     Ok(results.map(|results| results.into_iter().map(Some).collect()))
@@ -435,14 +434,10 @@ impl Answer for RunAnswer {
 
     fn svg(&self, _: &Document) -> String {
         let Navigation {
-            epochs,
-            fan,
-            summary,
-            ..
+            epochs, summary, ..
         } = &self.navigation;
         let shown = [
             document::horizontal(epochs, summary),
-            document::fan_chart(fan, summary),
             document::nees(epochs, summary),
         ];
         svg("Navigation errors", &shown)
@@ -450,14 +445,9 @@ impl Answer for RunAnswer {
 
     /// Without runs (covariance analysis) there is no table of them.
     fn files(&self) -> Vec<OutputFile<'_>> {
-        let [epochs_name, fan_name, runs_name, summary_name] = RUN_FILES;
-        let Navigation {
-            runs, epochs, fan, ..
-        } = &self.navigation;
-        let mut files = vec![
-            OutputFile::whole(epochs_name, epochs_csv(epochs)),
-            OutputFile::whole(fan_name, fan_csv(fan)),
-        ];
+        let [epochs_name, runs_name, summary_name] = RUN_FILES;
+        let Navigation { runs, epochs, .. } = &self.navigation;
+        let mut files = vec![OutputFile::whole(epochs_name, epochs_csv(epochs))];
         files.extend(runs.as_ref().map(|result| OutputFile {
             name: runs_name.into(),
             parts: Box::new(runs_csv(result)),
@@ -547,9 +537,6 @@ pub struct Navigation {
     /// Statistics at every reporting epoch: of the runs, if there are any.
     #[serde(skip)]
     pub epochs: Vec<EpochMetrics>,
-    /// Quantiles of the horizontal error over time: of the runs, if there are any.
-    #[serde(skip)]
-    pub fan: Vec<FanEpoch>,
     /// The summary.
     #[serde(flatten)]
     pub summary: Summary,
@@ -590,7 +577,7 @@ fn with_runs(
     context: &Context<'_>,
 ) -> Result<Navigation> {
     let method = scenario.run.method;
-    let possible = possible(inputs, scenario);
+    let possible = possible(inputs);
     if method != Method::MonteCarlo {
         possible.clone()?;
     }
@@ -639,7 +626,6 @@ fn with_runs(
         ) => Navigation {
             runs: None,
             epochs,
-            fan: analysis.fan(),
             // Nothing is drawn but outages; a seed that is given stays on record.
             summary: Summary {
                 seed: scenario.outage_random.map(|_| seed).or(scenario.run.seed),
@@ -655,9 +641,6 @@ fn with_runs(
             match expected {
                 Some(expected) if method == Method::Both => {
                     sampled.summary.expect(expected.summary);
-                    for (own, expected) in sampled.fan.iter_mut().zip(analysis.fan()) {
-                        own.lincov_m = Some(expected.quantiles_m);
-                    }
                 }
                 Some(expected) => sampled.summary.compare_with(&expected.summary),
                 None => {}
@@ -672,14 +655,11 @@ fn with_runs(
         .unexpected_integration(over_sigma)
         .iter()
         .for_each(|found| context.warn(unexpected_line(found)));
-    // Which fixes a gate refuses is drawn with the errors: the gains of such a filter are not those of the analysis.
-    if scenario.analysable().is_ok() {
-        Analysis {
-            track: &merged,
-            ..analysis
-        }
-        .add_budgets(&mut navigation.summary);
+    Analysis {
+        track: &merged,
+        ..analysis
     }
+    .add_budgets(&mut navigation.summary.outages);
     if method == Method::Lincov {
         analysis.add_intervals(&mut navigation.summary.outages, inputs, &full);
     }
@@ -687,7 +667,7 @@ fn with_runs(
 }
 
 /// Refuses what covariance analysis cannot do.
-fn possible(inputs: &NavigateInputs, scenario: &Scenario) -> Result<()> {
+fn possible(inputs: &NavigateInputs) -> Result<()> {
     match inputs.truth {
         TrueImu::Recordings(_) => Err(Failure::input(
             "covariance analysis needs a model of what makes the errors; static recordings have none",
@@ -697,10 +677,7 @@ fn possible(inputs: &NavigateInputs, scenario: &Scenario) -> Result<()> {
             "covariance analysis is of one truth; --spread draws one for each run",
         )
         .hint("leave --spread out, or use --method monte-carlo")),
-        TrueImu::AsBelieved | TrueImu::Model(_) => scenario
-            .analysable()
-            .refuse()
-            .map_err(|e| e.hint("leave it out, or use --method monte-carlo")),
+        TrueImu::AsBelieved | TrueImu::Model(_) => Ok(()),
     }
 }
 
@@ -756,7 +733,7 @@ fn sampled(
 ) -> Result<RunResult> {
     let (runs, block) = (scenario.run.runs, block(trajectory, scenario));
     context.begin("runs", runs);
-    let plan = Plan::new(experiment)?.with_fan();
+    let plan = Plan::new(experiment)?;
     let of_block = |first: u64| {
         let count = block.min(runs - first);
         let found = monte_carlo::run_range(&plan, first, count, &|| true, &|n| context.advance(n));
@@ -785,19 +762,6 @@ impl Analysis<'_> {
         Expected::along(self.track, self.experiment, self.belief, self.model?)
     }
 
-    /// Quantiles of the horizontal error over time; none where nothing models what makes the errors.
-    fn fan(&self) -> Vec<FanEpoch> {
-        let Some(model) = self.model else {
-            return Vec::new();
-        };
-        let truth = TruthSide::together(&TruthSide::sources(self.experiment, model));
-        expected_fan(
-            &FilterPass::new(self.track, self.belief),
-            &truth,
-            self.experiment.outages,
-        )
-    }
-
     /// What the calibrations leave open in the figures at the ends of outages.
     fn add_intervals(
         &self,
@@ -817,18 +781,14 @@ impl Analysis<'_> {
         }
     }
 
-    /// What the errors at the ends of outages are made of, and what the filter believes they are.
-    fn add_budgets(&self, summary: &mut Summary) {
+    /// What the errors at the ends of outages are made of.
+    fn add_budgets(&self, outages: &mut [OutageSummary]) {
+        let Some(model) = self.model else { return };
         let filter = FilterPass::new(self.track, self.belief);
-        let at_ends =
-            |sources: &[NamedSource]| Budget::at_outage_ends(&filter, sources).into_iter();
-        let mut truth = self
-            .model
-            .map(|model| at_ends(&TruthSide::sources(self.experiment, model)));
-        let believed = at_ends(&TruthSide::believed(self.experiment, self.belief));
-        for (outage, believed) in summary.outages.iter_mut().zip(believed) {
-            outage.budget = truth.as_mut().and_then(Iterator::next);
-            outage.believed_budget = Some(believed);
+        let sources = TruthSide::sources(self.experiment, model);
+        let budgets = Budget::at_outage_ends(&filter, &sources);
+        for (outage, budget) in outages.iter_mut().zip(budgets) {
+            outage.budget = Some(budget);
         }
     }
 }
@@ -840,7 +800,6 @@ impl Navigation {
         let epochs = epochs(&result);
         let summary = Summary::of(&result, &epochs, seed);
         Self {
-            fan: fan(&result),
             runs: Some(result),
             epochs,
             summary,

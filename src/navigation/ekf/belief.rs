@@ -23,10 +23,9 @@ use crate::sensors::check_bounds;
 use crate::units::{NonNegative, Positive, SettingError, exactly};
 use glam::{DQuat, DVec3};
 use nalgebra::Matrix3;
+use nav_sim_signal::names::UnknownName;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::fmt;
-use std::str::FromStr;
 
 /// Most bias states an axis.
 const MAX_GROUPS: usize = 8;
@@ -219,8 +218,7 @@ impl Belief {
                 self.groups[sensor].push(BiasGroup::default());
             }
             let group = &mut self.groups[sensor][g];
-            (group.phi[i], group.innovation[i], group.initial[i]) =
-                (bias.phi, bias.innovation, bias.initial);
+            [group.phi[i], group.innovation[i], group.initial[i]] = *bias;
         }
     }
 
@@ -295,15 +293,33 @@ fn drift(model: &Model, sensor: Sensor) -> DVec3 {
     DVec3::from_array(Axis::ALL.map(of_axis))
 }
 
-struct BiasState {
-    phi: f64,
-    innovation: f64,
-    initial: f64,
-}
-
 struct AxisBelief {
     white: f64,
     biases: Vec<BiasState>,
+}
+
+/// phi, innovation and initial variance of a bias of an axis.
+type BiasState = [f64; 3];
+
+/// The state that a process is; none of white noise, what is like it, and drifts.
+pub(crate) fn state_of(process: &Process) -> Option<BiasState> {
+    match process {
+        Process::Ar1(p) => Some([p.phi(), p.sigma2(), p.variance()]),
+        Process::GaussMarkov(p) => Some([p.ar1().phi(), p.ar1().sigma2(), p.s2()]),
+        // A random walk has no stationary variance. It is taken to start at zero; the turn-on bias is
+        // an unknown apart.
+        Process::RandomWalk(p) => Some([1.0, p.gamma2(), 0.0]),
+        _ => None,
+    }
+}
+
+/// Variance of the white noise that a filter which integrates feels: of an MA(1) its long-run variance.
+pub(crate) fn white_of(process: &Process) -> f64 {
+    match process {
+        Process::White(p) => p.sigma2(),
+        Process::Ma1(p) => (1.0 + p.theta()).powi(2) * p.sigma2(),
+        _ => 0.0,
+    }
 }
 
 impl AxisBelief {
@@ -313,28 +329,18 @@ impl AxisBelief {
             biases: vec![],
         };
         for process in &noise.processes {
-            match process {
-                // the parts have none of their own
-                Process::Flicker(p) => {
-                    let mut parts = Self::full(&Composite::new(p.parts(Ladder::FILTER)));
-                    let stationary: f64 = parts.biases.iter().map(|bias| bias.initial).sum();
-                    // what is slower still is as constant as the slowest
-                    if let Some(slowest) = parts.biases.last_mut() {
-                        slowest.initial += (p.initial_variance() - stationary).max(0.0);
-                    }
-                    axis.white += parts.white;
-                    axis.biases.extend(parts.biases);
+            // quantization is left out, a drift has a state of its own
+            axis.white += white_of(process);
+            axis.biases.extend(state_of(process));
+            if let Process::Flicker(p) = process {
+                let mut parts = Self::full(&Composite::new(p.parts(Ladder::FILTER)));
+                let stationary: f64 = parts.biases.iter().map(|[.., initial]| initial).sum();
+                // what is slower still is as constant as the slowest
+                if let Some([.., slowest]) = parts.biases.last_mut() {
+                    *slowest += (p.initial_variance() - stationary).max(0.0);
                 }
-                Process::White(p) => axis.white += p.sigma2(),
-                // its long-run variance: what a filter that integrates feels
-                Process::Ma1(p) => axis.white += (1.0 + p.theta()).powi(2) * p.sigma2(),
-                // left out, and a state of its own
-                Process::Quantization(_) | Process::Drift(_) => {}
-                Process::Ar1(p) => axis.push(p.phi(), p.sigma2(), p.variance()),
-                Process::GaussMarkov(p) => axis.push(p.ar1().phi(), p.ar1().sigma2(), p.s2()),
-                // A random walk has no stationary variance. It is taken to start at zero; the turn-on bias is
-                // an unknown apart.
-                Process::RandomWalk(p) => axis.push(1.0, p.gamma2(), 0.0),
+                axis.white += parts.white;
+                axis.biases.extend(parts.biases);
             }
         }
         axis
@@ -351,30 +357,21 @@ impl AxisBelief {
         if reduction::is_exact(noise) {
             let mut axis = Self::full(noise);
             if axis.biases.is_empty() {
-                axis.push(0.0, 0.0, 0.0);
+                axis.biases.push([0.0; 3]);
             }
             return Ok(axis);
         }
         let reduced = reduction::reduce(noise, model.rate_hz, interval_s, window_s)
             .map_err(|source| BeliefError::Reduction { channel, source })?;
-        let mut axis = Self {
-            white: reduced.white.sigma2(),
-            biases: vec![],
-        };
-        axis.push(
+        let bias = [
             reduced.bias.phi(),
             reduced.bias.sigma2(),
             reduced.initial_variance,
-        );
-        Ok(axis)
-    }
-
-    fn push(&mut self, phi: f64, innovation: f64, initial: f64) {
-        self.biases.push(BiasState {
-            phi,
-            innovation,
-            initial,
-        });
+        ];
+        Ok(Self {
+            white: reduced.white.sigma2(),
+            biases: vec![bias],
+        })
     }
 }
 
@@ -401,24 +398,9 @@ pub enum FilterStates {
     Full,
 }
 
-/// A word that is none of the filters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("expected \"15\", \"21\" or \"full\"")]
-pub struct UnknownStates;
+nav_sim_signal::named!(FilterStates { Reduced15 = "15", Reduced21 = "21", Full = "full" });
 
 impl FilterStates {
-    /// All, the smallest first.
-    pub const ALL: [Self; 3] = [Self::Reduced15, Self::Reduced21, Self::Full];
-
-    /// As it is written: `15`, `21` or `full`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Reduced15 => "15",
-            Self::Reduced21 => "21",
-            Self::Full => "full",
-        }
-    }
-
     /// Scale-factor error that the filter expects of both sensors where nothing else is said (1).
     pub const fn scale_sigma(self) -> f64 {
         match self {
@@ -433,23 +415,6 @@ impl FilterStates {
     }
 }
 
-impl fmt::Display for FilterStates {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for FilterStates {
-    type Err = UnknownStates;
-
-    fn from_str(text: &str) -> Result<Self, UnknownStates> {
-        Self::ALL
-            .into_iter()
-            .find(|states| states.name() == text)
-            .ok_or(UnknownStates)
-    }
-}
-
 /// In a file: a word, or a number for those that are one.
 #[derive(Deserialize)]
 #[serde(untagged, expecting = "\"15\", \"21\" or \"full\"")]
@@ -459,9 +424,9 @@ enum WrittenStates {
 }
 
 impl TryFrom<WrittenStates> for FilterStates {
-    type Error = UnknownStates;
+    type Error = UnknownName;
 
-    fn try_from(written: WrittenStates) -> Result<Self, UnknownStates> {
+    fn try_from(written: WrittenStates) -> Result<Self, UnknownName> {
         match written {
             WrittenStates::Number(number) => number.to_string().parse(),
             WrittenStates::Word(word) => word.parse(),
@@ -494,22 +459,18 @@ pub struct InitialSettings {
     /// Turn-on bias of the accelerometers that the filter expects beside the model's processes (m/s²): an
     /// unknown constant, one state an axis; without it, none.
     #[schemars(with = "Option<NonNegative>", range(max = 10.0))]
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub accel_bias_sigma_m_s2: Option<f64>,
     /// Turn-on bias of the gyroscopes that the filter expects beside the model's processes (rad/s): an unknown
     /// constant, one state an axis; without it, none.
     #[schemars(with = "Option<NonNegative>", range(max = 1.0))]
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub gyro_bias_sigma_rad_s: Option<f64>,
     /// Scale-factor error of the accelerometers that the filter expects (parts per million): an unknown
     /// constant, one state an axis; without it, 300 in the filter of 21 states and none in the others.
     #[schemars(with = "Option<NonNegative>", range(max = 1e5))]
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub accel_scale_sigma_ppm: Option<f64>,
     /// Scale-factor error of the gyroscopes that the filter expects (parts per million), as that of the
     /// accelerometers.
     #[schemars(with = "Option<NonNegative>", range(max = 1e5))]
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub gyro_scale_sigma_ppm: Option<f64>,
     /// Start exactly at the truth; the filter's covariance stays as given above.
     pub perfect: bool,
@@ -533,34 +494,22 @@ impl Default for InitialSettings {
 impl InitialSettings {
     /// The turn-on bias that the filter expects of a sensor (m/s² or rad/s).
     pub const fn bias_sigma(&self, sensor: Sensor) -> Option<f64> {
-        match sensor {
-            Sensor::Accel => self.accel_bias_sigma_m_s2,
-            Sensor::Gyro => self.gyro_bias_sigma_rad_s,
-        }
+        [self.accel_bias_sigma_m_s2, self.gyro_bias_sigma_rad_s][sensor as usize]
     }
 
     /// The scale-factor error that the filter expects of a sensor (parts per million).
     pub const fn scale_sigma_ppm(&self, sensor: Sensor) -> Option<f64> {
-        match sensor {
-            Sensor::Accel => self.accel_scale_sigma_ppm,
-            Sensor::Gyro => self.gyro_scale_sigma_ppm,
-        }
+        [self.accel_scale_sigma_ppm, self.gyro_scale_sigma_ppm][sensor as usize]
     }
 
     /// The key of [`Self::bias_sigma`].
     pub const fn bias_key(sensor: Sensor) -> &'static str {
-        match sensor {
-            Sensor::Accel => "accel_bias_sigma_m_s2",
-            Sensor::Gyro => "gyro_bias_sigma_rad_s",
-        }
+        ["accel_bias_sigma_m_s2", "gyro_bias_sigma_rad_s"][sensor as usize]
     }
 
     /// The key of [`Self::scale_sigma_ppm`].
     pub const fn scale_key(sensor: Sensor) -> &'static str {
-        match sensor {
-            Sensor::Accel => "accel_scale_sigma_ppm",
-            Sensor::Gyro => "gyro_scale_sigma_ppm",
-        }
+        ["accel_scale_sigma_ppm", "gyro_scale_sigma_ppm"][sensor as usize]
     }
 
     /// Checks every value.

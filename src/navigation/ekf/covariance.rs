@@ -47,11 +47,11 @@ const CONSTANT_BIASES: [BiasGroup; 2 * MAX_BLOCKS + 1] =
 pub(super) struct Sources<'a> {
     /// The step of each block: biases of the accelerometer, of the gyroscope, unknowns of both, and what the vehicle's
     /// own measurements have, which moves nothing.
-    pub(super) steps: &'a [BiasGroup],
+    steps: &'a [BiasGroup],
     /// Bias groups of each sensor.
-    pub(super) biases: [usize; 2],
+    pub biases: [usize; 2],
     /// What the unknowns of each sensor are multiplied by.
-    pub(super) regressors: [&'a [Regressor]; 2],
+    pub regressors: [&'a [Regressor]; 2],
 }
 
 impl<'a> Sources<'a> {
@@ -137,13 +137,6 @@ impl Covariance {
             for j in i..3 {
                 self.add(3 * block + i, 3 * block + j, m.0[i][j]);
             }
-        }
-    }
-
-    /// Takes the matrix of one lane from another covariance of the same size.
-    pub(super) fn copy_lane(&mut self, other: &Self, lane: usize) {
-        for (to, from) in self.p.iter_mut().zip(&other.p) {
-            to[lane] = from[lane];
         }
     }
 

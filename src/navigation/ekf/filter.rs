@@ -48,9 +48,9 @@ pub struct Ekf {
 /// Working vectors of the measurement update, one entry a state.
 #[derive(Debug, Clone)]
 pub(super) struct Scratch {
-    pub(super) ph: Vec<Lanes>,
-    pub(super) gain: Vec<Lanes>,
-    pub(super) error: Vec<Lanes>,
+    pub ph: Vec<Lanes>,
+    pub gain: Vec<Lanes>,
+    pub error: Vec<Lanes>,
 }
 
 impl Scratch {
@@ -470,13 +470,13 @@ pub struct Unknown {
 /// What an unknown constant is multiplied by in the last sample.
 #[derive(Debug, Clone)]
 pub(super) struct Regressor {
-    pub(super) kind: UnknownKind,
-    pub(super) value: Vec3,
+    kind: UnknownKind,
+    pub value: Vec3,
 }
 
 impl Regressor {
     /// The regressor of an unknown before the first sample: zero.
-    pub(super) const fn of(unknown: &Unknown) -> Self {
+    const fn of(unknown: &Unknown) -> Self {
         Self {
             kind: unknown.kind,
             value: Vec3::ZERO,

@@ -4,6 +4,7 @@
 mod measurements;
 
 use super::covariance::{EarthStep, EarthTerms, ErrorMap, PSI, R, Sample, V};
+use super::update::dense;
 use super::{Belief, Ekf, FilterStates, Fix, InitialSettings, advance, settle, update};
 use crate::earth::{self, GravityModel};
 use crate::frames::NavState;
@@ -114,7 +115,7 @@ fn numeric_transition(state: &NavState, omega: DVec3, f: DVec3, dt: f64) -> SMat
 
 /// The transition of one sample as the filter's block maps have it, and the Earth's part of F.
 fn filter_transition(state: &NavState, omega: DVec3, f: DVec3, dt: f64) -> SMatrix<f64, 9, 15> {
-    let mut ins = Strapdown::new(state, GravityModel::Wgs84);
+    let mut ins: Strapdown = Strapdown::new(state, GravityModel::Wgs84);
     let terms = EarthTerms::at(&ins);
     let trace = ins.step(Vec3::splat(omega * dt), Vec3::splat(f * dt), dt);
     let sample = Sample::new(&trace, dt);
@@ -246,6 +247,18 @@ pub(super) fn fix_at_nominal(ekf: &Ekf, pos_sigma_m: f64, vel_sigma_m_s: f64) ->
         vel_sigma_m_s: DVec3::splat(vel_sigma_m_s),
         lever_arm_b: DVec3::ZERO,
     }
+}
+
+/// The six rows (position, velocity) of an antenna in the first lane, dense.
+pub(super) fn measurement_rows(ekf: &Ekf, lever_arm_b: DVec3) -> Vec<Vec<f64>> {
+    let fix = Fix {
+        lever_arm_b,
+        ..fix_at_nominal(ekf, 1.0, 1.0)
+    };
+    let (h, ..) = dense(&ekf.scalars_of(&fix), 0, ekf.p.dim());
+    h.row_iter()
+        .map(|row| row.iter().copied().collect())
+        .collect()
 }
 
 /// Phi and Qd of one sample by [van Loan](crate::bibliography::VanLoan78) for F and G Q Gᵀ held constant.

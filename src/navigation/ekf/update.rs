@@ -1,6 +1,6 @@
 //! GNSS updates: position and velocity of an antenna on a lever arm, as scalars in sequence.
 
-use super::covariance::{BIAS, NAV, PSI, R, Sources, V};
+use super::covariance::{BIAS, NAV, PSI, R, V};
 use super::filter::{Ekf, apply_correction, settle};
 use crate::earth::{OMEGA_IE, radii};
 use crate::frames::wrap_angle;
@@ -12,7 +12,6 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use smallvec::{SmallVec, smallvec};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::TAU;
 
 /// A fix for each of eight runs; the standard deviations are the filter's belief and the same for all.
@@ -36,26 +35,45 @@ pub struct Fix {
 
 impl Ekf {
     /// The scalars of a fix: position, then velocity where it is measured.
-    fn scalars_of(&self, fix: &Fix) -> SmallVec<[Scalar; 6]> {
+    pub(super) fn scalars_of(&self, fix: &Fix) -> SmallVec<[Scalar; 6]> {
         let antenna = Antenna::new(&self.nominal, self.omega_ib_b, fix.lever_arm_b);
-        let z = antenna.innovation(&self.nominal, fix);
-        let sigmas = [fix.pos_sigma_m, fix.vel_sigma_m_s];
-        let count = if fix.v_n.is_some() { 6 } else { 3 };
-        let scalar = |i: usize| Scalar {
-            row: match i {
-                0..3 => antenna.position_row(i),
-                _ => antenna.velocity_row(i - 3, &self.sources()),
-            },
-            z: z[i / 3][i % 3],
-            variance: sigmas[i / 3][i % 3].powi(2),
-        };
-        (0..count).map(scalar).collect()
+        let (position, velocity) = antenna.innovation(&self.nominal, fix);
+        let z = [Some(position), velocity].into_iter().flatten();
+        let sigmas = [fix.pos_sigma_m, fix.vel_sigma_m_s].map(|s| s.to_array());
+        let rows = antenna.rows().into_iter().zip(sigmas.into_iter().flatten());
+        rows.zip(z.flat_map(|z| z.0))
+            .map(|((h, sigma), z)| Scalar {
+                row: self.row(&h),
+                z,
+                variance: sigma * sigma,
+            })
+            .collect()
     }
 
-    /// Estimated less measured position and velocity of the antenna: metres and m/s north, east, down; the
-    /// velocity zero where none is measured.
-    pub(crate) fn innovation(&self, fix: &Fix) -> [Vec3; 2] {
-        Antenna::new(&self.nominal, self.omega_ib_b, fix.lever_arm_b).innovation(&self.nominal, fix)
+    /// Estimated less measured position and velocity of the antenna in the first lane (m and m/s, north, east, down), and
+    /// their covariance.
+    pub(crate) fn innovation(&self, fix: &Fix) -> (DVector<f64>, DMatrix<f64>) {
+        let (h, z, noise) = dense(&self.scalars_of(fix), 0, self.p.dim());
+        (z, &h * self.p.lane(0) * h.transpose() + noise)
+    }
+
+    /// The states that a measurement depends on, and their coefficients.
+    fn row(&self, h: &Coefficients<Lanes>) -> Row {
+        let sources = self.sources();
+        let [_, gyro, unknown, gyro_unknown] = sources.starts();
+        // The rate is that of the last sample: its biases count all alike. Its white noise times the arm
+        // is left out: at 1 m it is mm/s beside the cm/s of a receiver.
+        let biases = (gyro..unknown).map(|state| (state, h[NAV + state % 3]));
+        let unknowns = sources.regressors[1]
+            .iter()
+            .zip((gyro_unknown..).step_by(3));
+        let unknowns = unknowns.flat_map(|(regressor, first)| {
+            (0..3).map(move |k| (first + k, h[NAV + k] * regressor.value[k]))
+        });
+        let all = h[..NAV].iter().copied().enumerate();
+        let all = all.chain(biases).chain(unknowns);
+        all.filter(|(_, coefficient)| *coefficient != Lanes::ZERO)
+            .collect()
     }
 
     /// One scalar; returns the innovation and its variance.
@@ -143,8 +161,8 @@ fn nis([z, s]: Innovation) -> Lanes {
 }
 
 /// A scalar measurement of eight runs.
-struct Scalar {
-    row: Row<Lanes>,
+pub(super) struct Scalar {
+    row: Row,
     /// Estimate less measured.
     z: Lanes,
     /// Variance of its white noise.
@@ -192,7 +210,6 @@ pub(crate) fn update_height(ekf: &mut Ekf, h: &Lanes, sigma_m: f64) -> Lanes {
 
 /// Where the antenna is and how it moves about the IMU, and the measurement rows that follow.
 struct Antenna<L> {
-    has_arm: bool,
     /// Lever arm in n (m).
     arm_n: Vec3<L>,
     /// Velocity of the antenna about the IMU, C (omega_eb_b × l), in n (m/s).
@@ -206,7 +223,7 @@ struct Antenna<L> {
 
 impl<W: Real> Antenna<W> {
     #[inline(always)]
-    pub(super) fn new(ins: &Strapdown<W>, omega_ib_b: Vec3<W>, lever_arm_b: DVec3) -> Self {
+    fn new(ins: &Strapdown<W>, omega_ib_b: Vec3<W>, lever_arm_b: DVec3) -> Self {
         let c_b_n = ins.q_b_n.to_matrix();
         let arm_b = Vec3::splat(lever_arm_b);
         let arm_n = c_b_n * arm_b;
@@ -214,7 +231,6 @@ impl<W: Real> Antenna<W> {
         let omega_ie_n = Vec3([c * OMEGA_IE, W::from(0.0), s * -OMEGA_IE]);
         let inertial_n = c_b_n * omega_ib_b.cross(arm_b);
         Self {
-            has_arm: lever_arm_b != DVec3::ZERO,
             arm_n,
             swing_n: inertial_n - omega_ie_n.cross(arm_n),
             // The error of omega_ie_n by latitude is left out: 7e-5 rad/s × 1e-6 rad × metres.
@@ -223,30 +239,25 @@ impl<W: Real> Antenna<W> {
         }
     }
 
-    /// Position of the antenna: delta r_n − \[C l ×\] psi_n.
-    fn position_row(&self, axis: usize) -> Row<W> {
-        let mut row = smallvec![(3 * R + axis, W::from(1.0))];
-        if self.has_arm {
-            row.extend(block(PSI, Mat3::skew(-self.arm_n).0[axis]));
-        }
-        row
+    /// Position of the antenna north, east, down, delta r_n − \[C l ×\] psi_n, then its velocity: delta v_n + `of_psi` psi_n +
+    /// C \[l ×\] times the error of the rate.
+    fn rows(&self) -> [Coefficients<W>; 6] {
+        let (zero, of_psi) = (Vec3::splat(DVec3::ZERO), Mat3::skew(-self.arm_n));
+        std::array::from_fn(|i| {
+            let (axis, unit) = (i % 3, Vec3::splat(DVec3::AXES[i % 3]));
+            let [position, velocity, rate] =
+                [&of_psi, &self.of_psi, &self.of_bias].map(|m| Vec3(m.0[axis]));
+            joined(match i {
+                0..3 => [unit, zero, position, zero],
+                _ => [zero, unit, velocity, rate],
+            })
+        })
     }
 }
 
 impl Antenna<Lanes> {
-    /// Velocity of the antenna: delta v_n + `of_psi` psi_n + C \[l ×\] (delta b_g + delta u ∘ regressor), u an
-    /// unknown of the gyroscope.
-    fn velocity_row(&self, axis: usize, sources: &Sources<'_>) -> Row<Lanes> {
-        let mut row = smallvec![(3 * V + axis, Lanes::splat(1.0))];
-        if self.has_arm {
-            row.extend(block(PSI, self.of_psi.0[axis]));
-            push_gyro(&mut row, self.of_bias.0[axis], sources);
-        }
-        row
-    }
-
     /// Estimated less measured position (m) and velocity (m/s) of the antenna, north, east, down.
-    fn innovation(&self, ins: &Strapdown, fix: &Fix) -> [Vec3; 2] {
+    fn innovation(&self, ins: &Strapdown, fix: &Fix) -> (Vec3, Option<Vec3>) {
         let (s, c) = ins.lat.sin_cos();
         let r = radii(s);
         // longitudes may differ by whole turns
@@ -257,70 +268,45 @@ impl Antenna<Lanes> {
             dlon * (r.transverse + ins.h) * c,
         );
         let velocity = fix.v_n.map(|v_n| ins.v_n + self.swing_n - v_n);
-        [
-            Vec3([north, east, fix.h - ins.h]) + self.arm_n,
-            velocity.unwrap_or(Vec3::ZERO),
-        ]
+        (Vec3([north, east, fix.h - ins.h]) + self.arm_n, velocity)
     }
 }
 
-/// The measurement rows of a fix about a nominal state: position north, east, down, then velocity. Twelve
-/// coefficients each: R, V, PSI, and the error of the gyroscope's bias.
+/// Coefficients of a measurement: errors of position, velocity and attitude, and of the gyroscope's rate.
+type Coefficients<L> = [L; NAV + 3];
+
+#[inline(always)]
+fn joined<L: Copy>(blocks: [Vec3<L>; 4]) -> Coefficients<L> {
+    std::array::from_fn(|i| blocks[i / 3][i % 3])
+}
+
+/// The measurement rows of a fix about a nominal state: position north, east, down, then velocity.
 pub(crate) fn fix_rows(
     ins: &Strapdown<f64>,
     omega_ib_b: DVec3,
     lever_arm_b: DVec3,
-) -> [[f64; 12]; 6] {
-    let antenna = Antenna::new(ins, Vec3::splat(omega_ib_b), lever_arm_b);
-    std::array::from_fn(|i| {
-        let mut dense = [0.0; 12];
-        if i < 3 {
-            let row = antenna.position_row(i);
-            row.iter().for_each(|(state, c)| dense[*state] = *c);
-        } else {
-            dense[3 * V + i - 3] = 1.0;
-            dense[3 * PSI..3 * BIAS].copy_from_slice(&antenna.of_psi.0[i - 3]);
-            dense[3 * BIAS..].copy_from_slice(&antenna.of_bias.0[i - 3]);
-        }
-        dense
-    })
+) -> [Coefficients<f64>; 6] {
+    Antenna::new(ins, Vec3::splat(omega_ib_b), lever_arm_b).rows()
 }
 
-/// A measurement row: states and their coefficients. Sixteen are those of an antenna beside the IMU and two groups of gyroscope biases: no allocation in the time loop.
-type Row<L> = SmallVec<[(usize, L); 16]>;
+/// A measurement row: states and their coefficients, on the stack for an antenna on a lever arm and two groups of biases.
+type Row = SmallVec<[(usize, Lanes); 16]>;
 
-/// The coefficients of the three states of a block.
-fn block<L>(block: usize, coefficients: [L; 3]) -> impl Iterator<Item = (usize, L)> {
-    (3 * block..).zip(coefficients)
-}
-
-/// What the error of the gyroscope's rate does, times these coefficients: its biases and its unknowns.
-fn push_gyro(row: &mut Row<Lanes>, of_bias: [Lanes; 3], sources: &Sources<'_>) {
-    let [_, gyro, unknown, gyro_unknown] = sources.starts();
-    // The rate is that of the last sample: its biases count all alike. Its white noise times the arm
-    // is left out: at 1 m it is mm/s beside the cm/s of a receiver.
-    for group in gyro / 3..unknown / 3 {
-        row.extend(block(group, of_bias));
+/// Rows, innovations and covariance of the noise of scalars in one run.
+pub(super) fn dense(
+    scalars: &[Scalar],
+    lane: usize,
+    states: usize,
+) -> (DMatrix<f64>, DVector<f64>, DMatrix<f64>) {
+    let mut h = DMatrix::zeros(scalars.len(), states);
+    for (i, scalar) in scalars.iter().enumerate() {
+        scalar.row.iter().for_each(|(k, c)| h[(i, *k)] = c[lane]);
     }
-    for (u, regressor) in sources.regressors[Sensor::Gyro as usize].iter().enumerate() {
-        let product = |axis| of_bias[axis] * regressor.value[axis];
-        row.extend(block(gyro_unknown / 3 + u, [0, 1, 2].map(product)));
-    }
-}
-
-impl Ekf {
-    /// The six measurement rows (position, velocity) of the first lane, dense.
-    pub(crate) fn measurement_rows(&self, lever_arm_b: DVec3) -> Vec<Vec<f64>> {
-        let antenna = Antenna::new(&self.nominal, self.omega_ib_b, lever_arm_b);
-        let position = (0..3).map(|axis| antenna.position_row(axis));
-        let velocity = (0..3).map(|axis| antenna.velocity_row(axis, &self.sources()));
-        let dense = |row: Row<Lanes>| {
-            let mut dense = vec![0.0; self.p.dim()];
-            row.iter().for_each(|(i, c)| dense[*i] += c[0]);
-            dense
-        };
-        position.chain(velocity).map(dense).collect()
-    }
+    let of = |value: &dyn Fn(&Scalar) -> f64| {
+        DVector::from_iterator(scalars.len(), scalars.iter().map(value))
+    };
+    let noise = DMatrix::from_diagonal(&of(&|s| s.variance));
+    (h, of(&|s| s.z[lane]), noise)
 }
 
 // Measurements that a vehicle makes of itself: velocity of a point along its own axes, and yaw.
@@ -332,15 +318,15 @@ impl Ekf {
 /// Velocity of a point of the vehicle along some of the vehicle's axes.
 pub(crate) struct BodyVelocity {
     /// Measured velocity along forward, right, down (m/s); read where `axes` has them.
-    pub(crate) value: Vec3,
+    pub value: Vec3,
     /// The axes that are measured.
-    pub(crate) axes: &'static [usize],
+    pub axes: &'static [usize],
     /// Variance of the white noise of each ((m/s)²).
-    pub(crate) variance: f64,
+    pub variance: f64,
     /// The point, from the IMU, in b (m).
-    pub(crate) lever_arm_b: DVec3,
+    pub lever_arm_b: DVec3,
     /// The vehicle's forward, right, down in b, where m is zero.
-    pub(crate) vehicle_b: [DVec3; 3],
+    pub vehicle_b: [DVec3; 3],
 }
 
 /// Uses a velocity along the vehicle's axes; returns the innovation of each of its axes in sequence.
@@ -356,7 +342,7 @@ pub(crate) fn update_yaw(ekf: &mut Ekf, yaw: &Lanes, variance: f64) -> Innovatio
     for lane in 0..LANES {
         z[lane] = wrap_angle(c.0[1][0][lane].atan2(c.0[0][0][lane]) - yaw[lane]);
     }
-    let row = block(PSI, yaw_row(&ekf.nominal).0).collect();
+    let row = ekf.row(&yaw_row(&ekf.nominal));
     use_scalars(ekf, &[Scalar { row, z, variance }])[0]
 }
 
@@ -384,11 +370,7 @@ impl Ekf {
         let scalar = |&axis: &usize| {
             let v = along(axis, estimates);
             let along_b = forward * v[0] + right * v[1] + down * v[2];
-            let [of_v, of_psi, of_gyro] = rows.along(along_b);
-            let mut row: Row<Lanes> = block(V, of_v.0).chain(block(PSI, of_psi.0)).collect();
-            if measured.lever_arm_b != DVec3::ZERO {
-                push_gyro(&mut row, of_gyro.0, &self.sources());
-            }
+            let mut row = self.row(&rows.along(along_b));
             if let Some(first) = states {
                 // wheel scale, pitch, yaw: of the forward velocity, as `along` has them
                 let (state, sign) = [(0, 1.0), (2, -1.0), (1, 1.0)][axis];
@@ -443,15 +425,16 @@ impl<L: Real> BodyRows<L> {
         }
     }
 
-    /// Coefficients of V, PSI and the error of the gyroscope's bias in the velocity along an axis given in b.
+    /// Coefficients of the velocity along an axis given in b.
     #[inline(always)]
-    fn along(&self, axis_b: Vec3<L>) -> [Vec3<L>; 3] {
+    fn along(&self, axis_b: Vec3<L>) -> Coefficients<L> {
         let axis_n = self.c_b_n * axis_b;
-        [
+        joined([
+            Vec3::splat(DVec3::ZERO),
             axis_n,
             times_transposed(&self.of_psi, axis_n),
             times_transposed(&self.of_gyro, axis_n),
-        ]
+        ])
     }
 }
 
@@ -464,80 +447,24 @@ fn times_transposed<L: Real>(m: &Mat3<L>, v: Vec3<L>) -> Vec3<L> {
 
 /// Yaw per psi_n (1): the turn of the projection of the body's axis on the horizontal.
 #[inline(always)]
-fn yaw_row<L: Real>(ins: &Strapdown<L>) -> Vec3<L> {
+pub(crate) fn yaw_row<L: Real>(ins: &Strapdown<L>) -> Coefficients<L> {
     let c = ins.q_b_n.to_matrix().0;
     let (n, e, d) = (c[0][0], c[1][0], c[2][0]);
     let slope = d / (n * n + e * e);
-    Vec3([-(n * slope), -(e * slope), L::from(1.0)])
+    let zero = Vec3::splat(DVec3::ZERO);
+    let of_psi = Vec3([-(n * slope), -(e * slope), L::from(1.0)]);
+    joined([zero, zero, of_psi, zero])
 }
 
-/// The rows of a velocity along forward, right and down about a nominal state: V, PSI and the error of the gyroscope's
-/// bias behind R, twelve coefficients each.
+/// The rows of a velocity along forward, right and down about a nominal state.
 pub(crate) fn body_velocity_rows(
     ins: &Strapdown<f64>,
     omega_ib_b: DVec3,
     lever_arm_b: DVec3,
-) -> [[f64; 12]; 3] {
+) -> [Coefficients<f64>; 3] {
     let point = Antenna::new(ins, Vec3::splat(omega_ib_b), lever_arm_b);
     let rows = BodyRows::new(&point, ins);
-    DVec3::AXES.map(|axis| {
-        let mut dense = [0.0; 12];
-        for (block, coefficients) in rows.along(Vec3::splat(axis)).into_iter().enumerate() {
-            dense[3 * (V + block)..3 * (V + block) + 3].copy_from_slice(&coefficients.0);
-        }
-        dense
-    })
-}
-
-/// The row of a yaw in the same form.
-pub(crate) fn dense_yaw_row(ins: &Strapdown<f64>) -> [f64; 12] {
-    let mut dense = [0.0; 12];
-    dense[3 * PSI..3 * PSI + 3].copy_from_slice(&yaw_row(ins).0);
-    dense
-}
-
-// Gating: a fix whose NIS is too large to be believed is not used.
-
-/// The NIS above which a fix of `components` is refused: the chi-square quantile of a probability
-/// ([Bar-Shalom](crate::bibliography::BarShalom01), sec. 5.4).
-pub(crate) fn nis_limit(probability: f64, components: usize) -> f64 {
-    ChiSquared::new(components as f64).map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(probability))
-}
-
-/// Uses a fix in the runs where its NIS is at most `limit`; the others stay as they were. Returns the NIS
-/// and which runs refused it. (A NIS that is not a number is not refused: such a run has diverged.)
-pub(crate) fn update_within(ekf: &mut Ekf, fix: &Fix, limit: f64) -> (Lanes, [bool; LANES]) {
-    // Before the copy: the age of the Earth terms is common to all lanes, and the update sets it to zero. A
-    // run put back to a copy made before would never get them.
-    super::settle(ekf);
-    let before = ekf.clone();
-    // The NIS comes out of the update itself; refusals are rare, and one lane cannot stop while seven go on.
-    let nis = update(ekf, fix);
-    let refused: [bool; LANES] = std::array::from_fn(|lane| nis[lane] > limit);
-    for lane in (0..LANES).filter(|lane| refused[*lane]) {
-        ekf.copy_lane(&before, lane);
-    }
-    (nis, refused)
-}
-
-impl Ekf {
-    /// Takes state, biases and covariance of one run from another filter of the same form.
-    fn copy_lane(&mut self, other: &Self, lane: usize) {
-        let (to, from) = (&mut self.nominal, &other.nominal);
-        for (to, from) in [
-            (&mut to.lat, &from.lat),
-            (&mut to.lon, &from.lon),
-            (&mut to.h, &from.h),
-        ] {
-            to[lane] = from[lane];
-        }
-        to.v_n.set_lane(lane, from.v_n.lane(lane));
-        to.q_b_n.set_lane(lane, from.q_b_n.lane(lane));
-        for (to, from) in self.estimates.iter_mut().zip(&other.estimates) {
-            to.set_lane(lane, from.lane(lane));
-        }
-        self.p.copy_lane(&other.p, lane);
-    }
+    DVec3::AXES.map(|axis| rows.along(Vec3::splat(axis)))
 }
 
 // Iterated update by a fix, in an error that stays nearly normal where attitude errors are no longer small.
@@ -556,23 +483,14 @@ const STEPS: usize = 4;
 fn update_iterated(ekf: &mut Ekf, fix: &Fix) -> Lanes {
     settle(ekf);
     let before = ekf.clone();
-    let variances = variances(fix);
     let mut lanes: Vec<Lane> = (0..LANES)
         .map(|lane| Lane::new(before.p.lane(lane)))
         .collect();
     let mut nis = Lanes::ZERO;
     for step in 0..STEPS {
-        let innovation = ekf.innovation(fix);
+        let scalars = ekf.scalars_of(fix);
         for (lane, run) in lanes.iter_mut().enumerate() {
-            let z = innovation
-                .iter()
-                .flat_map(|v| v.lane(lane).to_array())
-                .take(variances.len());
-            let square = run.step(
-                &rows(ekf, lane, fix, variances.len()),
-                &z.collect::<Vec<_>>(),
-                &variances,
-            );
+            let square = run.step(dense(&scalars, lane, ekf.p.dim()));
             if step == 0 {
                 nis[lane] = square;
             }
@@ -581,40 +499,11 @@ fn update_iterated(ekf: &mut Ekf, fix: &Fix) -> Lanes {
         ekf.return_to(&before, &lanes);
     }
     for (lane, run) in lanes.iter().enumerate() {
-        ekf.p.set_lane(lane, &run.posterior(&variances));
+        ekf.p.set_lane(lane, &run.posterior());
     }
     // The rate of the last sample belongs to the sample, as after any other update.
     ekf.omega_ib_b = before.omega_ib_b;
     nis
-}
-
-fn variances(fix: &Fix) -> Vec<f64> {
-    let velocity = fix.v_n.map(|_| fix.vel_sigma_m_s.to_array());
-    let sigmas = fix
-        .pos_sigma_m
-        .to_array()
-        .into_iter()
-        .chain(velocity.into_iter().flatten());
-    sigmas.map(|sigma| sigma * sigma).collect()
-}
-
-/// The measurement rows of one run at its present state, dense.
-fn rows(ekf: &Ekf, lane: usize, fix: &Fix, count: usize) -> DMatrix<f64> {
-    let ins = Strapdown::single(&ekf.nominal.lane(lane), ekf.nominal.gravity());
-    let twelve = fix_rows(&ins, ekf.omega_ib_b.lane(lane), fix.lever_arm_b);
-    let [_, gyro, unknown, gyro_unknown] = ekf.sources().starts();
-    let mut h = DMatrix::zeros(count, ekf.p.dim());
-    for (i, row) in twelve.iter().enumerate().take(count) {
-        (0..NAV).for_each(|k| h[(i, k)] = row[k]);
-        let of_rate = &row[NAV..];
-        // All biases of the gyroscope act alike, its unknowns each times what it is multiplied by.
-        (gyro..unknown).for_each(|k| h[(i, k)] = of_rate[k % 3]);
-        for (u, regressor) in ekf.regressors[Sensor::Gyro as usize].iter().enumerate() {
-            let value = regressor.value.lane(lane);
-            (0..3).for_each(|k| h[(i, gyro_unknown + 3 * u + k)] = of_rate[k] * value[k]);
-        }
-    }
-    h
 }
 
 /// One run at a fix.
@@ -622,8 +511,9 @@ struct Lane {
     /// Covariance of ξ before the fix.
     prior: DMatrix<f64>,
     xi: DVector<f64>,
-    /// Coefficients of ξ in the measurements, and gain, of the last step.
+    /// Coefficients of ξ in the measurements, covariance of their noise, and gain, of the last step.
     h: DMatrix<f64>,
+    noise: DMatrix<f64>,
     gain: DMatrix<f64>,
 }
 
@@ -635,17 +525,19 @@ impl Lane {
             prior,
             xi: DVector::zeros(n),
             h: none.clone(),
+            noise: none.clone(),
             gain: none,
         }
     }
 
     /// From rows and innovation at ξ to the next ξ; returns zᵀ S⁻¹ z, NaN where S is not positive definite.
-    fn step(&mut self, rows: &DMatrix<f64>, z: &[f64], variances: &[f64]) -> f64 {
+    fn step(&mut self, (rows, z, noise): (DMatrix<f64>, DVector<f64>, DMatrix<f64>)) -> f64 {
         self.h = rows * carried(&self.xi);
         let ph = &self.prior * self.h.transpose();
-        let s = &self.h * &ph + DMatrix::from_diagonal(&DVector::from_column_slice(variances));
+        let s = &self.h * &ph + &noise;
+        self.noise = noise;
         // The innovation as it would be at ξ = 0 of a linear measurement.
-        let z = DVector::from_column_slice(z) + &self.h * &self.xi;
+        let z = z + &self.h * &self.xi;
         let Some(s) = s.cholesky() else {
             self.xi.fill(f64::NAN);
             return f64::NAN;
@@ -657,13 +549,13 @@ impl Lane {
 
     /// Covariance of the error at the new estimate, in Joseph's form ([Bar-Shalom](crate::bibliography::BarShalom01),
     /// eq. 5.2.3-17).
-    fn posterior(&self, variances: &[f64]) -> DMatrix<f64> {
+    fn posterior(&self) -> DMatrix<f64> {
         if self.gain.is_empty() {
             return DMatrix::from_element(self.prior.nrows(), self.prior.nrows(), f64::NAN);
         }
         let rest = DMatrix::identity(self.xi.len(), self.xi.len()) - &self.gain * &self.h;
-        let noise = &self.gain * DMatrix::from_diagonal(&DVector::from_column_slice(variances));
-        let p = &rest * &self.prior * rest.transpose() + noise * self.gain.transpose();
+        let noise = &self.gain * &self.noise * self.gain.transpose();
+        let p = &rest * &self.prior * rest.transpose() + noise;
         let g = carried(&self.xi);
         let p = &g * p * g.transpose();
         // Rounding alone makes it asymmetric; both triangles are read.
@@ -763,68 +655,6 @@ fn by_psi(psi: &Vector3<f64>, rho: &Vector3<f64>) -> Matrix3<f64> {
     let products = rho.cross_matrix() * -a
         - (once.cross_matrix() + psi.cross_matrix() * rho.cross_matrix()) * b;
     products + (once * of_a + twice * of_b) * psi.transpose()
-}
-
-#[cfg(test)]
-mod gate_tests {
-    use super::*;
-    use crate::earth::GravityModel;
-    use crate::ekf::{Belief, FilterStates, InitialSettings};
-    use crate::frames::NavState;
-    use crate::noise::Model;
-    use crate::strapdown::Strapdown;
-    use glam::{DQuat, DVec3};
-
-    #[test]
-    fn the_run_that_refuses_stays_as_it_was_and_the_others_are_updated() {
-        let state = NavState {
-            lat: 0.8,
-            lon: 0.1,
-            h: 300.0,
-            v_n: DVec3::ZERO,
-            q_b_n: DQuat::IDENTITY,
-        };
-        let model = Model {
-            rate_hz: 100.0,
-            axes: Default::default(),
-        };
-        let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
-        let start = Strapdown::new(&state, GravityModel::Wgs84);
-        let before = Ekf::new(start, &belief, &state, &InitialSettings::default());
-        let mut fix = Fix {
-            lat: Lanes::splat(0.8 + 3e-7),
-            lon: Lanes::splat(0.1),
-            h: Lanes::splat(300.0),
-            v_n: None,
-            pos_sigma_m: DVec3::splat(2.0),
-            vel_sigma_m_s: DVec3::ONE,
-            lever_arm_b: DVec3::ZERO,
-        };
-        fix.lat[5] += 1e-4; // 640 m
-        let (mut gated, mut plain) = (before.clone(), before.clone());
-        let (nis, refused) = update_within(&mut gated, &fix, nis_limit(0.999, 3));
-        assert_eq!(refused, std::array::from_fn(|lane| lane == 5));
-        assert!(nis[5] > 1e4 && nis[0] < 1.0);
-        let _ = update(&mut plain, &fix);
-        for lane in 0..LANES {
-            let expected = if lane == 5 { &before } else { &plain };
-            assert_eq!(
-                gated.nominal.lane(lane),
-                expected.nominal.lane(lane),
-                "lane {lane}"
-            );
-            assert_eq!(gated.p.lane(lane), expected.p.lane(lane), "lane {lane}");
-        }
-    }
-
-    /// 95 % and 99.9 % of chi-square with 3 and 6 degrees of freedom, as tables have them.
-    #[test]
-    fn limits_are_chi_square_quantiles() {
-        assert!(
-            (nis_limit(0.95, 3) - 7.8147).abs() < 1e-4
-                && (nis_limit(0.999, 6) - 22.4577).abs() < 1e-4
-        );
-    }
 }
 
 #[cfg(test)]

@@ -37,7 +37,6 @@ pub struct ClocksApart {
     /// Time that the clock of the fixes is ahead of the IMU's (s).
     pub delay_s: f64,
     /// Its standard deviation (s), where the innovations tell it finer than the turns.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma_s: Option<f64>,
     /// Correlation of the turns, as the clocks are and without the delay.
     pub correlation: [f64; 2],

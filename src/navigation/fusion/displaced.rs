@@ -9,6 +9,7 @@
 use super::{FixRecord, FusionError, Recorded, Settings, Solution, Start, earlier, fuse};
 use crate::ekf::Belief;
 use crate::gnss::GnssFix;
+use crate::linalg::median;
 use crate::trajectory::reference::Reference;
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
@@ -286,7 +287,7 @@ impl Whiteness {
 
     /// Of times and normalised innovations.
     pub(super) fn of_series(series: &[(f64, impl AsRef<[f64]>)]) -> Option<Self> {
-        let interval_s = middle(series.windows(2).map(|w| w[1].0 - w[0].0).collect())?;
+        let interval_s = median(series.windows(2).map(|w| w[1].0 - w[0].0))?;
         let neighbours = series
             .windows(2)
             .filter(|w| w[1].0 - w[0].0 < APART * interval_s);
@@ -389,11 +390,5 @@ fn sigma_factor(lag_1: f64) -> f64 {
 
 /// Median time from one fix to the next (s).
 pub fn interval_s(gnss: &[GnssFix]) -> Option<f64> {
-    middle(gnss.windows(2).map(|w| w[1].t_s - w[0].t_s).collect())
-}
-
-/// The value in the middle, in order.
-pub fn middle(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+    median(gnss.windows(2).map(|w| w[1].t_s - w[0].t_s))
 }

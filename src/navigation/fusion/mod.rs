@@ -56,7 +56,7 @@ mod vehicle_tests;
 
 pub use clocks::{ClocksApart, clocks_apart, earlier, rest_of_origin, rough_origin};
 pub use displaced::{
-    Correlation, Displaced, Weighed, Whiteness, displaced, fuse_correlated, interval_s, middle,
+    Correlation, Displaced, Weighed, Whiteness, displaced, fuse_correlated, interval_s,
 };
 pub use outcome::{
     Assessment, Confidence, Drift, Ends, Finding, FixCounts, FromReference, FusionError,

@@ -1,7 +1,7 @@
 //! Figures of a fusion: fixes used, consistency, errors at the ends of outages. They serialize as `summary.json` has them.
 
-use super::displaced::middle;
 use super::{AidInnovations, FixRecord, Nine, Row, RowError, Solution, Weighed, aid_innovations};
+use crate::linalg::median;
 use crate::metrics::{PerState, VerdictKind};
 use crate::sensors::outage::Outage;
 use crate::simulation::REPORTED_NAMES;
@@ -32,7 +32,6 @@ pub struct OutageDrift {
     /// Against the first fix after it (the last withheld one, when none follows).
     pub end_from_fix: Option<Drift>,
     /// Against the reference at that time.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub end_from_reference: Option<Drift>,
 }
 
@@ -66,13 +65,10 @@ pub struct Outcome {
     /// Errors at the end of each outage.
     pub outages: Vec<OutageDrift>,
     /// The ends of all outages and gaps, where there are any.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub ends: Option<Ends>,
     /// Differences of the rows from the reference, where one reaches them.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub reference: Option<FromReference>,
     /// Figures of the smoothed solution, where there is one.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub smoothed: Option<SmoothedOutcome>,
 }
 
@@ -103,10 +99,8 @@ pub struct SmoothedOutcome {
     /// The same of the filter's (m).
     horizontal_sigma_rms_filter_m: f64,
     /// Differences of the smoothed rows from the reference.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub reference: Option<FromReference>,
     /// Their verdict.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub confidence: Option<Confidence>,
     /// The outages in which there are rows.
     pub outages: Vec<SmoothedOutage>,
@@ -123,10 +117,8 @@ pub struct SmoothedOutage {
     /// The filter's (m).
     pub sigma_max_filter_m: f64,
     /// Smoothed horizontal distance from the reference (m).
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub horizontal_max_m: Option<f64>,
     /// The filter's (m).
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub horizontal_max_filter_m: Option<f64>,
 }
 
@@ -156,8 +148,8 @@ const APART: (f64, f64) = (10.0, 5.0);
 /// sum of m of their squares, normalised, is chi-square of 2m degrees.
 fn ends(solution: &Solution) -> Option<Ends> {
     let known: Vec<&FixRecord> = solution.fixes.iter().filter(|f| f.used).collect();
-    let steps: Vec<f64> = known.windows(2).map(|w| w[1].t_s - w[0].t_s).collect();
-    let apart_s = APART.0.max(APART.1 * middle(steps)?);
+    let steps = known.windows(2).map(|w| w[1].t_s - w[0].t_s);
+    let apart_s = APART.0.max(APART.1 * median(steps)?);
     let of_ends: Vec<f64> = known
         .windows(2)
         .filter(|w| w[1].t_s - w[0].t_s > apart_s)

@@ -13,7 +13,7 @@ use crate::frames::{NavState, RollPitchYaw};
 use crate::gnss::GnssFix;
 use crate::imu::{ImuIncrement, ImuSample, Sensor};
 use crate::lanes::{Lanes, Vec3};
-use crate::linalg::{Link, to_nalgebra};
+use crate::linalg::{Link, median, to_nalgebra};
 use crate::simulation::{ReportedError, reported_error};
 use crate::strapdown::Strapdown;
 use crate::trajectory::reference::Reference;
@@ -320,20 +320,9 @@ impl Filter {
         settle(&mut self.ekf);
         let measured = self.fix(fix);
         let components = fix.components();
-        let [position, velocity] = self.ekf.innovation(&measured);
-        let both = [position.lane(0).to_array(), velocity.lane(0).to_array()].concat();
-        let z = DVector::from_fn(components, |i, _| both[i]);
-        let sigma = [
-            measured.pos_sigma_m.to_array(),
-            measured.vel_sigma_m_s.to_array(),
-        ]
-        .concat();
-        let rows = self.ekf.measurement_rows(self.lever_arm_s);
-        let h = DMatrix::from_fn(components, self.ekf.p.dim(), |i, j| rows[i][j]);
-        let noise = DMatrix::from_fn(components, components, |i, j| {
-            if i == j { sigma[i].powi(2) } else { 0.0 }
-        });
-        let s = &h * self.ekf.p.lane(0) * h.transpose() + noise;
+        let (z, s) = self.ekf.innovation(&measured);
+        let z = z.rows(0, components).into_owned();
+        let s = s.view((0, 0), (components, components)).into_owned();
         let sigma = s.diagonal().map(f64::sqrt).as_slice().to_vec();
         let (north_east, of_these) = (
             z.rows(0, 2).into_owned(),
@@ -543,9 +532,7 @@ struct Bridges<'a> {
 
 impl<'a> Bridges<'a> {
     fn new(imu: &'a [ImuIncrement]) -> Self {
-        let mut lengths: Vec<f64> = imu.iter().map(|s| s.dt_s).collect();
-        lengths.sort_by(f64::total_cmp);
-        let step_s = lengths.get(lengths.len() / 2).copied().unwrap_or(1.0);
+        let step_s = median(imu.iter().map(|s| s.dt_s)).unwrap_or(1.0);
         Self {
             imu,
             step_s,

@@ -2,14 +2,15 @@
 //! stands.
 
 use super::Recorded;
-use super::displaced::{Whiteness, middle};
-use crate::earth::ned_difference;
-use crate::frames::NavState;
+use super::Whiteness;
+use super::alignment::courses;
+use crate::gnss::GnssFix;
 use crate::imu::ImuIncrement;
+use crate::linalg::median;
 use crate::metrics::{Band, chi_square_band};
 use crate::sensors::aiding::{Aid, AidingSettings};
 use crate::sensors::outage::Outage;
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -119,7 +120,7 @@ pub fn vehicle_velocities(
     let scene = Scene {
         imu,
         speeds,
-        step_s: middle(imu.iter().map(|s| s.dt_s).collect()).unwrap_or(1.0),
+        step_s: median(imu.iter().map(|s| s.dt_s)).unwrap_or(1.0),
     };
     let test = settings.zupt.as_ref().and_then(|_| scene.test());
     let stands = |k: usize| test.is_some_and(|test| scene.stands(&test, k));
@@ -167,12 +168,7 @@ pub fn wheel_ratio(
         let is_near = turned.t_s - t_s < 0.5 * REACH_S && speed > 3.0 * SPEEDS.1;
         is_near.then(|| turned.m_s.abs() / speed)
     };
-    middle(
-        speeds(recorded, outages)
-            .into_iter()
-            .filter_map(ratio)
-            .collect(),
-    )
+    median(speeds(recorded, outages).into_iter().filter_map(ratio))
 }
 
 /// The first element of each interval of 1/`rate_hz`.
@@ -194,34 +190,10 @@ fn every<T>(all: &[T], t_s: impl Fn(&T) -> f64, rate_hz: f64) -> impl Iterator<I
 
 /// Horizontal speeds of the fixes: their own, or by positions a second apart.
 fn speeds(recorded: &Recorded<'_>, outages: &[Outage]) -> Vec<(f64, f64)> {
-    let known: Vec<_> = recorded
-        .gnss
-        .iter()
-        .filter(|f| !outages.iter().any(|o| o.withholds(f.t_s)))
-        .collect();
-    let of_velocity = |k: usize| known[k].velocity.map(|v| v.v_n().truncate().length());
-    let of_positions = |k: usize| {
-        let now = known[k];
-        let before = known[..k]
-            .iter()
-            .rev()
-            .find(|f| now.t_s - f.t_s >= REACH_S - 0.01)?;
-        let place = NavState {
-            lat: before.lat,
-            lon: before.lon,
-            h: before.h,
-            v_n: DVec3::ZERO,
-            q_b_n: DQuat::IDENTITY,
-        };
-        let metres = ned_difference(&place, now.lat, now.lon, now.h)
-            .truncate()
-            .length();
-        let seconds = now.t_s - before.t_s;
-        (seconds < 2.0 * REACH_S).then(|| metres / seconds)
-    };
-    (0..known.len())
-        .filter_map(|k| Some((known[k].t_s, of_velocity(k).or_else(|| of_positions(k))?)))
-        .collect()
+    let is_known = |f: &&GnssFix| !outages.iter().any(|o| o.withholds(f.t_s));
+    let known: Vec<GnssFix> = recorded.gnss.iter().filter(is_known).copied().collect();
+    let courses = courses(&known, recorded.imu).into_iter();
+    courses.map(|m| (m.fix.t_s, m.speed())).collect()
 }
 
 /// A recording that may stand.

@@ -323,7 +323,7 @@ impl QuadraticForm {
     }
 
     /// Expectation, c + Σ w (1 + d²).
-    pub(crate) fn mean(&self) -> f64 {
+    fn mean(&self) -> f64 {
         self.certain
             + self
                 .terms

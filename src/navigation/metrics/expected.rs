@@ -85,7 +85,6 @@ impl Expected {
                 lower95: f64::NAN,
                 upper95: f64::NAN,
                 fixes,
-                rejected: 0,
             },
             ..Summary::over(&epochs, verdict, experiment.coverage_level, None)
         };
@@ -206,13 +205,11 @@ fn record(epochs: &[EpochMetrics], law: &ErrorLaw, outages: &[OutageSummary]) ->
         diverged: false,
         outages: outages.iter().map(of_outage).collect(),
         nis: (law.nis.0 / law.nis.1.max(1) as f64, law.nis.1),
-        rejected: 0,
         nees_mean: mean(&|e| e.nees.value),
         covered: mean(&|e| e.coverage),
         // The mean of squares over the epochs, as runs have it; the root is taken by the verdict.
         normalised_sq: std::array::from_fn(|i| {
             mean(&|e| (e.rmse.0[i].value / e.asee.0[i].value).powi(2))
         }),
-        horizontal_m: Vec::new(),
     }
 }

@@ -22,7 +22,7 @@ mod verdict;
 
 pub use estimate::{Band, Estimate, PerState, QuadraticForm, SampleSize, chi_square_band};
 pub use expected::{Expected, horizontal_quantiles};
-pub use outage::{Budget, EpochMetrics, FAN_LEVELS, FanEpoch, epochs, expected_fan, fan};
+pub use outage::{Budget, EpochMetrics, epochs};
 pub use ratio::{EpochRow, Measured, OutageComparison, StateRatio, compare};
 pub use summary::{
     AccuracySummary, Consistency, Coverage, Met, Nis, OutageSummary, Recovery, ReductionQuality,

@@ -43,14 +43,12 @@ pub struct Summary {
     /// Share of runs inside the filter's ellipsoid of position and attitude.
     pub coverage: Coverage,
     /// What the reduction to 15 states costs; none where it loses nothing.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub reduction: Option<ReductionQuality>,
     /// Largest error that the strapdown alone makes at the IMU's rate, over the sigma that the filter states; 0 (and not in
     /// files) where the trajectory closes.
     #[serde(skip_serializing_if = "is_zero")]
     pub strapdown_over_sigma: f64,
     /// What covariance analysis expects, where it stands beside runs.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub lincov: Option<Box<Summary>>,
     /// Whether covariance analysis has another verdict, and figures that the runs contradict: errors are no longer small.
     #[serde(skip)]
@@ -103,13 +101,10 @@ pub struct OutageSummary {
     pub rmse_end_std_error: PerState<f64>,
     /// 95 % interval of the ASEE that the calibration of the model leaves: what a filter would state whose model were
     /// known for certain; of a covariance analysis whose model has its draws beside it.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub asee_end_ci95: Option<PerState<(f64, f64)>>,
     /// The same of the mean over the outage's epochs of the ASEE.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub asee_mean_ci95: Option<PerState<(f64, f64)>>,
     /// 95 % interval of the RMSE of this filter that the calibration of what makes the errors leaves; as above.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub rmse_end_ci95: Option<PerState<(f64, f64)>>,
     /// Mean NEES at the same instant.
     pub nees_end: f64,
@@ -128,11 +123,7 @@ pub struct OutageSummary {
     pub reconvergence_s: Recovery,
     /// Shares of the sources of the true errors in their mean squares just before the first fix after the outage,
     /// by covariance analysis; none where nothing models them.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub budget: Option<Budget>,
-    /// The same of what the filter believes in.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub believed_budget: Option<Budget>,
 }
 
 /// Quantiles of a distribution over runs, with distribution-free 95 % intervals (null: too few runs); of a covariance
@@ -144,7 +135,6 @@ pub struct Spread {
     /// 95 % quantile.
     pub p95: f64,
     /// 99.9 % quantile; of a covariance analysis only.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub p999: Option<f64>,
     /// Largest; NaN (null) of a covariance analysis, whose law has no end.
     pub max: f64,
@@ -193,8 +183,6 @@ pub struct Nis {
     pub upper95: f64,
     /// Fixes used.
     pub fixes: u64,
-    /// Fixes refused by the gate on the NIS.
-    pub rejected: u64,
 }
 
 /// Empirical coverage.
@@ -335,12 +323,6 @@ fn nis(result: &RunResult) -> Nis {
         lower95: band.lower,
         upper95: band.upper,
         fixes,
-        rejected: result
-            .runs
-            .iter()
-            .filter(|r| !r.diverged)
-            .map(|r| r.rejected)
-            .sum(),
     }
 }
 
@@ -419,7 +401,6 @@ pub struct ReductionQuality {
     /// Expected NEES, mean over all epochs after the start; 9 is right.
     pub nees: f64,
     /// True RMSE over that of the full filter at the end of each outage; none where the model has no full filter.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub rmse_over_full: Option<Vec<PerState<f64>>>,
 }
 

@@ -31,11 +31,9 @@
 
 use crate::lanes::LANES;
 use crate::simulation::{
-    Batch, EpochSums, Experiment, ExperimentError, Plan, REPORTED, RunRecord, RunResult, run_batch,
+    EpochSums, Experiment, ExperimentError, Plan, REPORTED, RunRecord, RunResult, run_batch,
 };
 use rayon::prelude::*;
-use std::collections::BTreeMap;
-use std::sync::{Mutex, PoisonError};
 
 /// Runs `0..runs` of an experiment, all candidates on the same noise; one result a candidate, in their
 /// order. `progress` is told how many runs have been completed.
@@ -64,58 +62,29 @@ pub fn run_range(
     go_on: &(dyn Fn() -> bool + Sync),
     progress: &(dyn Fn(u64) + Sync),
 ) -> Option<Vec<RunResult>> {
-    let experiment = plan.experiment();
-    let results = experiment
-        .beliefs
-        .iter()
-        .map(|b| empty(plan, b.states))
-        .collect();
-    let sums = Mutex::new(InOrder {
-        results,
-        next: 0,
-        waiting: BTreeMap::new(),
-    });
-    let batches = runs.div_ceil(LANES as u64);
-    // A bridge hands batches out one by one and in order, where splitting the range would have one thread
-    // begin in the middle: few results wait for their turn.
-    (0..batches).par_bridge().for_each(|batch| {
-        if !go_on() {
-            return;
-        }
-        let done = batch * LANES as u64;
-        let live = (runs - done).min(LANES as u64);
-        let computed = run_batch(plan, first + done, live as usize);
-        progress(live);
-        sums.lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .take(batch, computed, plan.samples());
-    });
-    let sums = sums.into_inner().unwrap_or_else(PoisonError::into_inner);
-    // A batch that was not run leaves all later ones waiting: the result is whole or none.
-    (sums.next == batches).then_some(sums.results)
-}
-
-/// The results so far, and the batches that came before their turn: one of each candidate.
-struct InOrder {
-    results: Vec<RunResult>,
-    next: u64,
-    waiting: BTreeMap<u64, Vec<Batch>>,
-}
-
-impl InOrder {
-    fn take(&mut self, batch: u64, computed: Vec<Batch>, samples: usize) {
-        self.waiting.insert(batch, computed);
-        // Floating-point sums depend on their order: they are made in the order of the runs, whoever finishes
-        // first.
-        while let Some(parts) = self.waiting.remove(&self.next) {
-            self.next += 1;
-            for (result, part) in self.results.iter_mut().zip(parts) {
-                result.run_epochs += (samples * part.runs.len()) as u64;
+    let beliefs = plan.experiment().beliefs.iter();
+    let mut results: Vec<RunResult> = beliefs.map(|b| empty(plan, b.states)).collect();
+    let all: Vec<u64> = (0..runs).step_by(LANES).collect();
+    for together in all.chunks(TOGETHER) {
+        let batch = |done: &u64| {
+            let live = (runs - done).min(LANES as u64);
+            let computed = go_on().then(|| run_batch(plan, first + done, live as usize))?;
+            progress(live);
+            Some(computed)
+        };
+        // Floating-point sums depend on their order: they are made in the order of the runs, whoever finishes first.
+        for parts in together.par_iter().map(batch).collect::<Option<Vec<_>>>()? {
+            for (result, part) in results.iter_mut().zip(parts) {
+                result.run_epochs += (plan.samples() * part.runs.len()) as u64;
                 result.add(part.epochs, part.runs);
             }
         }
     }
+    Some(results)
 }
+
+/// Batches that wait to be added: memory is bounded, and no thread waits long for the last of them.
+const TOGETHER: usize = 64;
 
 fn empty(plan: &Plan<'_>, filter_states: usize) -> RunResult {
     let experiment = plan.experiment();
@@ -125,8 +94,6 @@ fn empty(plan: &Plan<'_>, filter_states: usize) -> RunResult {
             .iter()
             .map(|o| (o.start_s, o.end_s))
             .collect(),
-        outage_fix_t_s: plan.outage_fix_t_s(),
-        fan_t_s: plan.fan_t_s(),
         filter_states,
         fix_components: experiment.gnss.components(),
         coverage_level: experiment.coverage_level,

@@ -8,7 +8,7 @@ use crate::imu::Channel;
 use crate::noise::{Ar1, Composite, Model, Process, RandomWalk, VirtualImu, White};
 use crate::rng::StreamKey;
 use crate::sensors::aiding::AidingSettings;
-use crate::sensors::defects::{Defects, ImuSettings, Output};
+use crate::sensors::defects::{Defects, ImuSettings};
 use crate::sensors::gnss::{BaroSettings, GnssSettings};
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
@@ -68,7 +68,6 @@ struct Setting {
     defects: ImuSettings,
     baro: Option<BaroSettings>,
     update: FixUpdate,
-    nis_gate: Option<f64>,
     seed: u64,
     aiding: AidingSettings,
 }
@@ -92,7 +91,6 @@ impl Setting {
             baro: None,
             aiding: AidingSettings::default(),
             update: FixUpdate::default(),
-            nis_gate: None,
         }
     }
 
@@ -109,7 +107,6 @@ impl Setting {
             baro: self.baro.as_ref(),
             aiding: &self.aiding,
             update: self.update,
-            nis_gate: self.nis_gate,
             outages: &self.outages,
             seed: self.seed,
             scenario: "",
@@ -291,37 +288,6 @@ fn dragster(a: f64, defects: ImuSettings) -> Setting {
     }
 }
 
-/// Of 12 m/s² an IMU of ±10 puts out 10; in steps of 0.5 it puts 2.5 out for 2.3 m/s², and 10 for gravity, which adds
-/// to the error in east as in the next test.
-#[test]
-fn samples_beyond_the_range_and_between_steps_err_as_in_closed_form() {
-    let ranged = Output {
-        range_accel_m_s2: Some(10.0),
-        ..Output::default()
-    };
-    let stepped = Output {
-        resolution_accel_m_s2: 0.5,
-        ..Output::default()
-    };
-    let gravity_step = crate::earth::GRAVITY_EQUATOR - 10.0;
-    for (a, output, east, down) in [(12.0, ranged, -2.0, 0.0), (2.3, stepped, 0.2, gravity_step)] {
-        let defects = ImuSettings {
-            output: Some(output),
-            ..ImuSettings::default()
-        };
-        let found = dragster(a, defects).run(1)[0].runs[0].outages[0].error_end[4];
-        let coriolis = crate::earth::OMEGA_IE * down * 400.0;
-        let (expected, bound) = (
-            20.0 * east + coriolis,
-            3e-4 * 20.0 * a + 0.1 * coriolis.abs(),
-        );
-        assert!(
-            (found - expected).abs() < bound,
-            "{found} m/s, {expected} m/s"
-        );
-    }
-}
-
 /// Without a single fix, a straight acceleration a over t seconds along x and east leaves a velocity error
 /// of (bias + scale · a) t, and by Coriolis Ω t² times the false acceleration down: run by run, what the run
 /// drew. (The tilt by the false transport rate takes g t²/(6 R) = 1e-4 of it, and transport is v/(R Ω) ≤ 9 %
@@ -395,36 +361,6 @@ fn a_barometer_holds_the_height() {
     let down = |r: &RunResult, runs: u64| r.epochs[59].see[2] / runs as f64;
     assert!(down(&with[0], runs) < 0.4 && down(&without[0], 8) > 2.0);
     assert_consistent(&with[0], runs, &[10, 30, 59, 75]);
-}
-
-/// A filter of matched models refuses one fix in a thousand at a gate of 0.999: binomial(8000, 0.001), between
-/// 0 and 24 with probability 1 − 1e-6; with a correlated error that it does not know it refuses more.
-#[test]
-fn the_gate_refuses_as_many_fixes_as_its_probability_says() {
-    let mut setting = Setting::new(100.0, &[1.0]);
-    setting.outages.clear();
-    setting.nis_gate = Some(0.999);
-    let rejected = |r: &RunResult| r.runs.iter().map(|run| run.rejected).sum::<u64>();
-    let matched = setting.run(80);
-    assert!(
-        rejected(&matched[0]) <= 24,
-        "{} of 8000",
-        rejected(&matched[0])
-    );
-    assert!(
-        matched[0]
-            .runs
-            .iter()
-            .all(|run| run.nis.1 + run.rejected == 100)
-    );
-    setting.gnss.correlated_pos_sigma_m = [6.0, 6.0, 6.0];
-    setting.gnss.correlation_time_s = 5.0;
-    let coloured = setting.run(80);
-    assert!(
-        rejected(&coloured[0]) > 200,
-        "{} of 8000",
-        rejected(&coloured[0])
-    );
 }
 
 /// Sums over runs are those of the runs one by one, in every field: 11 runs are two batches.

@@ -19,16 +19,12 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct AidingSettings {
     /// Non-holonomic constraint: a road vehicle moves neither sideways nor up.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub nhc: Option<NhcSettings>,
     /// Forward speed of a wheel.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub odometer: Option<OdometerSettings>,
     /// Zero velocity where the reference stands.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub zupt: Option<ZuptSettings>,
     /// Heading of a compass or of two antennas.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub heading: Option<HeadingSettings>,
 }
 
@@ -280,8 +276,8 @@ impl AidingSettings {
 /// An error of an aid that lasts.
 #[derive(Clone, Copy)]
 pub(crate) struct AidError {
-    pub(crate) part: AidPart,
-    pub(crate) law: Law,
+    pub part: AidPart,
+    pub law: Law,
     /// True if the filter, with the states that it has, does not expect so large a one.
     is_felt: bool,
 }
@@ -528,7 +524,6 @@ pub struct NhcSettings {
 pub struct NhcErrors {
     /// White noise of one measurement (m/s); unless given, what the filter believes.
     #[schemars(with = "Option<NonNegative>")]
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_sigma_m_s: Option<f64>,
     /// Pitch and yaw of the vehicle's axes in those of the IMU (1 σ, degrees), constant in a run.
     #[schemars(with = "NonNegative")]
@@ -571,7 +566,6 @@ pub struct OdometerSettings {
 pub struct OdometerErrors {
     /// White noise of one measurement (m/s); unless given, what the filter believes.
     #[schemars(with = "Option<NonNegative>")]
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_sigma_m_s: Option<f64>,
     /// Scale-factor error (1 σ), constant in a run: the tyre.
     #[schemars(with = "NonNegative")]
@@ -601,7 +595,6 @@ pub struct ZuptSettings {
 pub struct ZuptErrors {
     /// White noise of one measurement (m/s); unless given, what the filter believes.
     #[schemars(with = "Option<NonNegative>")]
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_sigma_m_s: Option<f64>,
     /// Forward velocity that is taken for standstill (1 σ, m/s), a Gauss-Markov process.
     #[schemars(with = "NonNegative")]
@@ -644,7 +637,6 @@ pub enum HeadingSource {
 pub struct HeadingErrors {
     /// White noise of one measurement (degrees); unless given, what the filter believes.
     #[schemars(with = "Option<NonNegative>")]
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_sigma_deg: Option<f64>,
     /// Offset (1 σ, degrees), constant in a run.
     #[schemars(with = "NonNegative")]

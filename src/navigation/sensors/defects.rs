@@ -23,11 +23,9 @@ pub struct ImuSettings {
     pub rate_hz: f64,
     /// Turn-on bias of the accelerometers (m/s²); without it that of the model's `[turn_on]`, or none.
     #[schemars(with = "Option<NonNegative>", range(max = MAX_BIAS_M_S2))]
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub turn_on_bias_accel_m_s2: Option<f64>,
     /// Turn-on bias of the gyroscopes (rad/s); without it that of the model's `[turn_on]`, or none.
     #[schemars(with = "Option<NonNegative>", range(max = MAX_BIAS_RAD_S))]
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub turn_on_bias_gyro_rad_s: Option<f64>,
     /// Scale-factor error of the accelerometers (parts per million).
     #[schemars(with = "NonNegative", range(max = MAX_SCALE_PPM))]
@@ -44,14 +42,9 @@ pub struct ImuSettings {
     #[serde(skip_serializing_if = "is_zero")]
     pub g_sensitivity_rad_s_per_m_s2: f64,
     /// What accelerometers rectify.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub vibration: Option<Vibration>,
     /// Its temperature, and what that does.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature: Option<Temperature>,
-    /// How it puts its samples out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub output: Option<Output>,
 }
 
 /// An error of the true IMU of which no filter has states.
@@ -92,7 +85,6 @@ impl Default for ImuSettings {
             g_sensitivity_rad_s_per_m_s2: 0.0,
             vibration: None,
             temperature: None,
-            output: None,
         }
     }
 }
@@ -111,19 +103,13 @@ impl ImuSettings {
 
     /// Standard deviations of turn-on bias (m/s² or rad/s) and scale factor (parts per million) of a sensor.
     pub fn deviations(&self, sensor: Sensor) -> (f64, f64) {
-        let ppm = match sensor {
-            Sensor::Accel => self.scale_ppm_accel,
-            Sensor::Gyro => self.scale_ppm_gyro,
-        };
+        let ppm = [self.scale_ppm_accel, self.scale_ppm_gyro][sensor as usize];
         (self.turn_on_bias(sensor).unwrap_or(0.0), ppm)
     }
 
     /// Standard deviation of the turn-on bias of a sensor (m/s² or rad/s), where it is stated.
     pub const fn turn_on_bias(&self, sensor: Sensor) -> Option<f64> {
-        match sensor {
-            Sensor::Accel => self.turn_on_bias_accel_m_s2,
-            Sensor::Gyro => self.turn_on_bias_gyro_rad_s,
-        }
+        [self.turn_on_bias_accel_m_s2, self.turn_on_bias_gyro_rad_s][sensor as usize]
     }
 
     /// Its errors of which no filter has states.
@@ -184,7 +170,7 @@ impl ImuSettings {
         all.into_iter().filter(|defect| defect.sigma > 0.0)
     }
 
-    /// Whether the true IMU has no error beside its noise, before its samples are put out.
+    /// Whether the true IMU has no error beside its noise.
     pub(crate) fn is_ideal(&self) -> bool {
         Self {
             rate_hz: self.rate_hz,
@@ -192,7 +178,6 @@ impl ImuSettings {
         } == Self {
             turn_on_bias_accel_m_s2: self.turn_on_bias_accel_m_s2.filter(|sigma| *sigma > 0.0),
             turn_on_bias_gyro_rad_s: self.turn_on_bias_gyro_rad_s.filter(|sigma| *sigma > 0.0),
-            output: None,
             ..self.clone()
         }
     }
@@ -327,7 +312,7 @@ fn pairs<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 2]>, D:
 }
 
 impl Temperature {
-    pub(super) fn validate(&self) -> Result<(), SettingError> {
+    fn validate(&self) -> Result<(), SettingError> {
         let key = "profile_c";
         if self.profile_c.len() < 2 {
             let requirement = "it must be two pairs of time (s) and temperature (°C), or more";
@@ -353,10 +338,7 @@ impl Temperature {
 
     /// Standard deviation of what a degree does to a sensor's bias (m/s² or rad/s per K).
     pub(crate) const fn sigma(&self, sensor: Sensor) -> f64 {
-        match sensor {
-            Sensor::Accel => self.accel_m_s2_k,
-            Sensor::Gyro => self.gyro_rad_s_k,
-        }
+        [self.accel_m_s2_k, self.gyro_rad_s_k][sensor as usize]
     }
 
     /// An IMU that feels temperature so many times as much.
@@ -397,9 +379,9 @@ pub(crate) enum Felt {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Surroundings {
     /// Specific force (m/s²) and angular rate (rad/s) in b.
-    pub(crate) sample: [DVec3; 2],
+    pub sample: [DVec3; 2],
     /// Mean square of the specific force along each axis, with the vibration, less that of the start ((m/s²)²).
-    pub(crate) square: DVec3,
+    square: DVec3,
     /// Temperature above that of the start (K).
     warming_k: f64,
 }
@@ -431,58 +413,6 @@ impl Surroundings {
             Felt::Sample(sensor, axis) => self.sample[sensor as usize][axis],
             Felt::Square(axis) => self.square[axis],
             Felt::Warming => self.warming_k,
-        }
-    }
-}
-
-// How an IMU puts its samples out: within a range, in steps.
-
-/// Least range of an accelerometer (m/s²): less than it is full at rest.
-const LEAST_RANGE_M_S2: f64 = 10.0;
-/// Largest steps (m/s², rad/s): 0.1 g and 6 °/s.
-const MAX_STEPS: [f64; 2] = [1.0, 0.1];
-
-/// `[imu.output]`: range and resolution of its samples. Only runs have them: what they do depends on what is drawn.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Output {
-    /// Largest magnitude of an accelerometer's sample (m/s²), above that of gravity: ±8 g are 78.5; without it, any.
-    #[schemars(range(min = LEAST_RANGE_M_S2))]
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub range_accel_m_s2: Option<f64>,
-    /// Largest magnitude of a gyroscope's sample (rad/s); without it, any.
-    #[schemars(with = "Option<Positive>")]
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub range_gyro_rad_s: Option<f64>,
-    /// Step of an accelerometer's samples (m/s²); 0: none.
-    #[schemars(with = "NonNegative", range(max = MAX_STEPS[0]))]
-    pub resolution_accel_m_s2: f64,
-    /// Step of a gyroscope's samples (rad/s); 0: none.
-    #[schemars(with = "NonNegative", range(max = MAX_STEPS[1]))]
-    pub resolution_gyro_rad_s: f64,
-}
-
-impl Output {
-    /// Range and resolution of a sensor (m/s² or rad/s).
-    fn of(&self, sensor: Sensor) -> (Option<f64>, f64) {
-        match sensor {
-            Sensor::Accel => (self.range_accel_m_s2, self.resolution_accel_m_s2),
-            Sensor::Gyro => (self.range_gyro_rad_s, self.resolution_gyro_rad_s),
-        }
-    }
-
-    /// What a sensor puts out for what it measures (m/s² or rad/s).
-    pub(crate) fn put(&self, sensor: Sensor, value: DVec3) -> DVec3 {
-        let (range, step) = self.of(sensor);
-        let within = range.map_or(value, |range| {
-            value.clamp(DVec3::splat(-range), DVec3::splat(range))
-        });
-        // A step too small for the division leaves the sample as it is.
-        let steps = within / step;
-        if steps.is_finite() {
-            steps.round() * step
-        } else {
-            within
         }
     }
 }
@@ -566,16 +496,6 @@ mod tests {
                     ..d.clone()
                 },
                 "temperature.profile_c",
-            ),
-            (
-                ImuSettings {
-                    output: Some(Output {
-                        range_accel_m_s2: Some(8.0),
-                        ..Output::default()
-                    }),
-                    ..d.clone()
-                },
-                "output.range_accel_m_s2",
             ),
         ];
         for (settings, key) in refused {
@@ -684,30 +604,5 @@ mod felt_tests {
         let warming =
             [0.0, 100.0, 150.0, 200.0, 250.0, 300.5, 1e9].map(|t_s| temperature.warming_k(t_s));
         assert_eq!(warming, [0.0, 0.0, 12.5, 25.0, 25.0, 7.5, -10.0]);
-    }
-}
-
-#[cfg(test)]
-mod output_tests {
-    use super::*;
-
-    #[test]
-    fn samples_are_whole_steps_within_the_range() {
-        let output = Output {
-            range_accel_m_s2: Some(2.0),
-            resolution_accel_m_s2: 0.5,
-            resolution_gyro_rad_s: f64::MIN_POSITIVE,
-            ..Output::default()
-        };
-        let put = |value| output.put(Sensor::Accel, value);
-        assert_eq!(
-            put(DVec3::new(-7.0, -0.8, 0.2)),
-            DVec3::new(-2.0, -1.0, 0.0)
-        );
-        assert_eq!(put(DVec3::new(0.3, 3.0, 1.1)), DVec3::new(0.5, 2.0, 1.0));
-        assert_eq!(
-            output.put(Sensor::Gyro, DVec3::splat(300.0)),
-            DVec3::splat(300.0)
-        );
     }
 }

@@ -5,7 +5,6 @@ use crate::units::{NonNegative, Positive, SettingError, exactly};
 use glam::DVec3;
 use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
-use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Longest lever arm (m): no vehicle is larger.
@@ -29,7 +28,7 @@ pub struct GnssSettings {
         serialize_with = "sigmas_or_none",
         deserialize_with = "parse_sigmas_or_none"
     )]
-    #[schemars(with = "SigmasOrNoneText")]
+    #[schemars(with = "SigmasOrNone")]
     pub vel_sigma_m_s: Option<[f64; 3]>,
     /// Antenna position with respect to the IMU, in b: front, right, down (m).
     #[schemars(inner(range(min = -MAX_LEVER_ARM_M, max = MAX_LEVER_ARM_M)))]
@@ -170,54 +169,33 @@ fn sigmas_or_none<S: Serializer>(
     sigmas: &Option<[f64; 3]>,
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
-    match sigmas {
-        Some(sigmas) => sigmas.serialize(serializer),
-        None => serializer.serialize_str("none"),
-    }
+    let none = SigmasOrNone::None(NoneText::None);
+    sigmas
+        .map_or(none, SigmasOrNone::Sigmas)
+        .serialize(serializer)
 }
 
 fn parse_sigmas_or_none<'de, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Option<[f64; 3]>, D::Error> {
-    deserializer.deserialize_any(SigmasOrNone)
+    Ok(match SigmasOrNone::deserialize(deserializer)? {
+        SigmasOrNone::Sigmas(sigmas) => Some(sigmas),
+        SigmasOrNone::None(_) => None,
+    })
 }
 
 /// How the velocity's standard deviations are written.
-#[derive(Serialize, JsonSchema)]
-#[serde(untagged)]
-#[expect(dead_code, reason = "a description of the text, never a value")]
-enum SigmasOrNoneText {
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected three numbers or \"none\"")]
+enum SigmasOrNone {
     Sigmas(#[schemars(with = "[Positive; 3]")] [f64; 3]),
     None(NoneText),
 }
 
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-#[expect(dead_code, reason = "a description of the text, never a value")]
 enum NoneText {
     None,
-}
-
-struct SigmasOrNone;
-
-impl<'de> Visitor<'de> for SigmasOrNone {
-    type Value = Option<[f64; 3]>;
-
-    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("three numbers or \"none\"")
-    }
-
-    fn visit_str<E: de::Error>(self, text: &str) -> Result<Self::Value, E> {
-        if text == "none" {
-            Ok(None)
-        } else {
-            Err(E::invalid_value(de::Unexpected::Str(text), &self))
-        }
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
-        exactly(de::value::SeqAccessDeserializer::new(seq)).map(Some)
-    }
 }
 
 // A barometric altimeter: height with white noise, as the R package `navigation` has it.

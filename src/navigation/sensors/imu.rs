@@ -198,7 +198,7 @@ impl<'a> ImuErrors<'a> {
     }
 
     /// Overwrites `out` with the next samples of a channel (m/s² or rad/s).
-    pub(crate) fn fill(&mut self, channel: Channel, out: &mut [f64]) {
+    fn fill(&mut self, channel: Channel, out: &mut [f64]) {
         match &mut self.channels[channel.index()] {
             ChannelErrors::Synthesised(synthesizer) => synthesizer.fill(out),
             ChannelErrors::Recorded(left, level) => {
@@ -275,7 +275,7 @@ pub struct Windows<'a> {
 
 impl<'a> Windows<'a> {
     /// The windows of recordings that have all six channels.
-    pub(super) fn new(recordings: &'a [Recording]) -> Self {
+    fn new(recordings: &'a [Recording]) -> Self {
         let spans_of = |recording: &Recording| {
             Channel::ALL.map(|channel| {
                 recording

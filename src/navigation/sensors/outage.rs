@@ -52,7 +52,7 @@ impl Outage {
     ///
     /// # Errors
     /// The key whose value is refused.
-    pub(crate) fn validate(&self) -> Result<(), SettingError> {
+    fn validate(&self) -> Result<(), SettingError> {
         super::check_bounds(self)?;
         if self.end_s > self.start_s {
             return Ok(());
@@ -167,7 +167,7 @@ impl<'a> FixedData<'a> {
     }
 
     /// An outage asked for by its times, cut where the data end.
-    pub(super) fn place(&self, asked: Outage) -> Result<Outage, OutageError> {
+    fn place(&self, asked: Outage) -> Result<Outage, OutageError> {
         let (start_s, end_s) = self.span_s;
         let refused = |reason: String| {
             Err(OutageError::Placed {
@@ -251,7 +251,7 @@ impl PeriodicOutages {
     ///
     /// # Errors
     /// The key whose value is refused.
-    pub(crate) fn validate(&self) -> Result<(), SettingError> {
+    fn validate(&self) -> Result<(), SettingError> {
         super::check_bounds(self)?;
         if self.duration_s < self.every_s {
             return Ok(());

@@ -6,8 +6,7 @@ use super::{BIASES, COVERAGE_DOF, EpochSums, NEES_DOF, OutageRecord, REPORTED, R
 use crate::earth::ned_difference;
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::{
-    BodyVelocity, Ekf, Fix, advance, nis_limit, settle, update, update_body_velocity,
-    update_height, update_within, update_yaw,
+    BodyVelocity, Ekf, advance, settle, update, update_body_velocity, update_height, update_yaw,
 };
 use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::Sensor;
@@ -56,15 +55,8 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
         }
         done = event.sample;
     }
-    candidates
-        .into_iter()
-        .map(|c| c.finish(first, &plan.fan))
-        .collect()
+    candidates.into_iter().map(|c| c.finish(first)).collect()
 }
-
-/// Runs whose horizontal error is kept over time: those after them would no longer move a quantile to be seen, and memory
-/// is bounded.
-const FAN_RUNS: u64 = 100_000;
 
 /// One filter on eight runs, and what is kept of it.
 struct Candidate {
@@ -73,10 +65,8 @@ struct Candidate {
     trace: Vec<EpochLanes>,
     /// A record for each outage and run.
     outages: Vec<[OutageRecord; LANES]>,
-    /// For each run: sum of the NIS of the fixes used, their number, fixes refused.
-    nis: [(f64, u64, u64); LANES],
-    /// Largest NIS of a fix that is used, if there is a gate.
-    limit: Option<f64>,
+    /// Sum of the NIS of the fixes, and their number.
+    nis: (Lanes, u64),
 }
 
 impl Candidate {
@@ -97,11 +87,7 @@ impl Candidate {
             live,
             trace: Vec::with_capacity(plan.events.len()),
             outages: plan.experiment.outages.iter().map(|_| outage()).collect(),
-            nis: [(0.0, 0, 0); LANES],
-            limit: plan
-                .experiment
-                .nis_gate
-                .map(|p| nis_limit(p, plan.experiment.gnss.components())),
+            nis: (Lanes::ZERO, 0),
         }
     }
 
@@ -110,7 +96,8 @@ impl Candidate {
         // Before the fix of the same instant: the end of an outage is where the error is largest.
         self.end_outages(plan, index, event);
         if let Some(fix) = &measured.fix {
-            self.use_fix(fix);
+            self.nis.0 += update(&mut self.ekf, fix);
+            self.nis.1 += 1;
         }
         if let (Some(h), Some(baro)) = (&measured.height, plan.experiment.baro) {
             let _ = update_height(&mut self.ekf, h, baro.sigma_m);
@@ -142,21 +129,6 @@ impl Candidate {
             vehicle_b: DVec3::AXES,
         };
         let _ = update_body_velocity(&mut self.ekf, &velocity);
-    }
-
-    fn use_fix(&mut self, fix: &Fix) {
-        let (nis, refused) = match self.limit {
-            Some(limit) => update_within(&mut self.ekf, fix, limit),
-            None => (update(&mut self.ekf, fix), [false; LANES]),
-        };
-        for (lane, (sum, used, rejected)) in self.nis.iter_mut().enumerate() {
-            if refused[lane] {
-                *rejected += 1;
-            } else {
-                *sum += nis[lane];
-                *used += 1;
-            }
-        }
     }
 
     /// Error and belief just before the first fix after an outage, or at the trajectory's end.
@@ -207,9 +179,8 @@ impl Candidate {
         }
     }
 
-    /// Sums over the runs that did not diverge, and a record of each run; `fan` lists the reports at which its
-    /// horizontal error is kept.
-    fn finish(self, first: u64, fan: &[usize]) -> Batch {
+    /// Sums over the runs that did not diverge, and a record of each run.
+    fn finish(self, first: u64) -> Batch {
         // Looked for at the reports alone: what has become NaN stays NaN, so that a divergence between two
         // reports is seen at the next.
         let diverged: [bool; LANES] = std::array::from_fn(|lane| {
@@ -228,18 +199,6 @@ impl Candidate {
         let mean = |value: &dyn Fn(&EpochLanes) -> f64| {
             self.trace.iter().map(value).sum::<f64>() / reports
         };
-        let horizontal = |lane: usize| {
-            let fan = if first + (lane as u64) < FAN_RUNS {
-                fan
-            } else {
-                &[]
-            };
-            let errors = fan.iter().map(|report| &self.trace[*report].error);
-            // f32: seven digits for a quantile plot, at half of the memory of 100 000 runs.
-            errors
-                .map(|error| error[0][lane].hypot(error[1][lane]) as f32)
-                .collect()
-        };
         let record = |lane: usize| RunRecord {
             run: first + lane as u64,
             diverged: diverged[lane],
@@ -248,17 +207,12 @@ impl Candidate {
                 .iter()
                 .map(|records| records[lane].clone())
                 .collect(),
-            nis: (
-                self.nis[lane].0 / self.nis[lane].1.max(1) as f64,
-                self.nis[lane].1,
-            ),
-            rejected: self.nis[lane].2,
+            nis: (self.nis.0[lane] / self.nis.1.max(1) as f64, self.nis.1),
             nees_mean: mean(&|e| e.nees[lane]),
             covered: mean(&|e| f64::from(u8::from(e.covered[lane]))),
             normalised_sq: std::array::from_fn(|i| {
                 mean(&|e| (e.error[i][lane] / e.see[i][lane]).powi(2))
             }),
-            horizontal_m: horizontal(lane),
         };
         Batch {
             epochs,
@@ -293,7 +247,7 @@ struct Assessment {
     /// The filter's own standard deviation of each reported state (m, m/s, degrees).
     see: [Lanes; REPORTED],
     /// Error of each reported state, estimate − truth (m, m/s, degrees).
-    pub(super) error: [Lanes; REPORTED],
+    error: [Lanes; REPORTED],
     /// Rotation from the true to the estimated attitude (degrees).
     att_error_deg: Lanes,
     /// Position (m), velocity (m/s) and attitude error (rad), in the order of the filter's states.
@@ -304,13 +258,13 @@ struct Assessment {
 
 impl Assessment {
     /// Logarithm of the density of the errors under the filter's belief.
-    pub(super) fn log_density(&self, ekf: &Ekf) -> Lanes {
+    fn log_density(&self, ekf: &Ekf) -> Lanes {
         ekf.p
             .log_density(std::array::from_fn(|i| i), self.navigation)
     }
 
     /// The assessment of the first `live` lanes against the reference; the other lanes are zero.
-    pub(super) fn of(ekf: &Ekf, live: usize, reference: &NavState) -> Self {
+    fn of(ekf: &Ekf, live: usize, reference: &NavState) -> Self {
         let jacobian = RollPitchYaw::from_quat(reference.q_b_n).jacobian_of_psi_n();
         let mut found = Self {
             see: standard_deviations(ekf, &jacobian),
@@ -348,7 +302,7 @@ struct EpochLanes {
     see: [Lanes; REPORTED],
     /// The filter's own standard deviation of each sensor's bias (m/s², rad/s).
     bias_see: [Lanes; BIASES],
-    pub(super) error: [Lanes; REPORTED],
+    error: [Lanes; REPORTED],
     att_error_deg: Lanes,
     nees: Lanes,
     covered: [bool; LANES],
@@ -356,7 +310,7 @@ struct EpochLanes {
 
 impl EpochLanes {
     /// What the first `live` lanes report at an event.
-    pub(super) fn of(ekf: &Ekf, live: usize, plan: &Plan<'_>, event: &Event) -> Self {
+    fn of(ekf: &Ekf, live: usize, plan: &Plan<'_>, event: &Event) -> Self {
         let found = Assessment::of(ekf, live, &event.reference);
         let states: [usize; COVERAGE_DOF] =
             std::array::from_fn(|i| if i < 3 { 3 * R + i } else { 3 * PSI + i - 3 });
@@ -420,8 +374,8 @@ impl EpochLanes {
 
 /// Errors of a run in the reported states (m, m/s, degrees) and the attitude error vector (rad).
 pub(crate) struct ReportedError {
-    pub(crate) values: [f64; REPORTED],
-    pub(crate) psi_n: DVec3,
+    pub values: [f64; REPORTED],
+    pub psi_n: DVec3,
 }
 
 pub(crate) fn reported_error(estimate: &NavState, truth: &NavState) -> ReportedError {

@@ -7,8 +7,8 @@ mod source;
 
 pub use batch::{Batch, run_batch};
 pub(crate) use batch::{ReportedError, reported_error};
+pub(crate) use plan::samples_per;
 pub use plan::{Experiment, ExperimentError, Plan};
-pub(crate) use plan::{fan_epochs, samples_per};
 pub use source::{Recording, record};
 
 use serde::{Deserialize, Serialize};
@@ -114,17 +114,12 @@ pub struct RunRecord {
     pub outages: Vec<OutageRecord>,
     /// Mean NIS of its GNSS updates (per fix) and how many fixes.
     pub nis: (f64, u64),
-    /// Fixes refused by the gate on the NIS.
-    pub rejected: u64,
     /// Mean over its reporting epochs of the NEES over [`NEES_DOF`] states.
     pub nees_mean: f64,
     /// Share of its reporting epochs inside the filter's ellipsoid at the coverage level.
     pub covered: f64,
     /// Mean over its reporting epochs of (error/SEE)² of each reported state.
     pub normalised_sq: [f64; REPORTED],
-    /// Its horizontal position error (m) at each of [`RunResult::fan_t_s`]; empty where it was not asked for, and of runs
-    /// after the first hundred thousand, which take 160 MB where outages are few.
-    pub horizontal_m: Vec<f32>,
 }
 
 /// All runs of one experiment, reduced in run order.
@@ -132,14 +127,10 @@ pub struct RunRecord {
 pub struct RunResult {
     /// Reporting epochs in time order.
     pub epochs: Vec<EpochSums>,
-    /// Times (s) of the horizontal errors that are kept run by run; empty where they were not asked for.
-    pub fan_t_s: Vec<f64>,
     /// Runs in run order.
     pub runs: Vec<RunRecord>,
     /// Outages (start, end) in seconds on the trajectory.
     pub outages: Vec<(f64, f64)>,
-    /// Times (s) of the first fix after each, or of the end of the trajectory.
-    pub outage_fix_t_s: Vec<f64>,
     /// States of the filter.
     pub filter_states: usize,
     /// Components of one fix: 3 (position) or 6 (and velocity): degrees of freedom of the NIS.

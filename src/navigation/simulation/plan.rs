@@ -42,8 +42,6 @@ pub struct Experiment<'a> {
     pub aiding: &'a AidingSettings,
     /// How the filters use a fix.
     pub update: FixUpdate,
-    /// Probability of the gate on the NIS of fixes, if there is one.
-    pub nis_gate: Option<f64>,
     /// When fixes are missing.
     pub outages: &'a [Outage],
     /// Seed of all random numbers.
@@ -76,23 +74,23 @@ fn refused<T>(message: String) -> Result<T, ExperimentError> {
 #[derive(Debug)]
 pub(super) struct Event {
     /// IMU samples from the start.
-    pub(super) sample: usize,
+    pub sample: usize,
     /// Time on the trajectory (s).
-    pub(super) t_s: f64,
+    pub t_s: f64,
     /// Reference state.
-    pub(super) reference: NavState,
+    pub reference: NavState,
     /// Reference position and velocity of the antenna: lat, lon (rad), h (m), v_n (m/s).
-    pub(super) antenna: (DVec3, DVec3),
+    pub antenna: (DVec3, DVec3),
     /// Whether the receiver has an epoch here.
-    pub(super) gnss_epoch: bool,
+    pub gnss_epoch: bool,
     /// Whether its fix is used.
-    pub(super) fix: bool,
+    pub fix: bool,
     /// Whether the barometer has a height here.
-    pub(super) baro: bool,
+    pub baro: bool,
     /// What the vehicle measures of itself here.
-    pub(super) aids: Vec<Aided>,
+    pub aids: Vec<Aided>,
     /// Whether the epoch is reported (1 Hz).
-    pub(super) report: bool,
+    pub report: bool,
 }
 
 /// The shared part of all runs.
@@ -109,8 +107,6 @@ pub struct Plan<'a> {
     pub(super) outages: Vec<(f64, usize)>,
     /// Quantile of the coverage statistic.
     pub(super) coverage_quantile: f64,
-    /// Reports at which the horizontal error is kept run by run.
-    pub(super) fan: Vec<usize>,
 }
 
 impl<'a> Plan<'a> {
@@ -178,33 +174,7 @@ impl<'a> Plan<'a> {
             events,
             outages,
             coverage_quantile,
-            fan: Vec::new(),
         })
-    }
-
-    /// The same with the horizontal error of every run kept over time, at `fan_epochs`.
-    pub fn with_fan(mut self) -> Self {
-        let times: Vec<f64> = self.reports().map(|e| e.t_s).collect();
-        self.fan = fan_epochs(&times, self.experiment.outages);
-        self
-    }
-
-    fn reports(&self) -> impl Iterator<Item = &Event> {
-        self.events.iter().filter(|e| e.report)
-    }
-
-    /// Times at which the horizontal error is kept run by run (s).
-    pub(crate) fn fan_t_s(&self) -> Vec<f64> {
-        let times: Vec<f64> = self.reports().map(|e| e.t_s).collect();
-        self.fan.iter().map(|i| times[*i]).collect()
-    }
-
-    /// Times of the first fix after each outage, or of the end of the trajectory (s).
-    pub(crate) fn outage_fix_t_s(&self) -> Vec<f64> {
-        self.outages
-            .iter()
-            .map(|(_, end)| self.events[*end].t_s)
-            .collect()
     }
 
     /// What was planned.
@@ -228,29 +198,6 @@ impl<'a> Plan<'a> {
     pub(crate) fn samples(&self) -> usize {
         self.ideal.len()
     }
-}
-
-/// Most reports of a fan, beside those around the ends of outages.
-const FAN_EPOCHS: usize = 400;
-
-/// Of reports at these times, those at which the horizontal error of every run is kept: every one, or every second,
-/// third …, so that they are few on a long drive, and those on both sides of the beginning and the end of each outage,
-/// between which errors are largest.
-pub(crate) fn fan_epochs(t_s: &[f64], outages: &[Outage]) -> Vec<usize> {
-    let step = t_s.len().div_ceil(FAN_EPOCHS).max(1);
-    let withheld: Vec<bool> = t_s
-        .iter()
-        .map(|t| outages.iter().any(|o| o.withholds(*t)))
-        .collect();
-    let changes = |i: usize| {
-        withheld
-            .get(i)
-            .zip(withheld.get(i + 1))
-            .is_some_and(|(a, b)| a != b)
-    };
-    let is_kept =
-        |i: &usize| i.is_multiple_of(step) || changes(*i) || i.checked_sub(1).is_some_and(changes);
-    (0..t_s.len()).filter(is_kept).collect()
 }
 
 fn effects(outage: &Outage, events: &[Event]) -> (f64, usize) {
@@ -394,13 +341,13 @@ const STANDS_RAD_S: f64 = 0.01 * DEG;
 /// A measurement of the vehicle by itself, as it would be without error.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Aided {
-    pub(super) aid: Aid,
+    pub aid: Aid,
     /// Velocity of the point that it belongs to, in b (m/s).
-    pub(super) v_b: DVec3,
+    pub v_b: DVec3,
     /// Acceleration of the vehicle with respect to the Earth, in b (m/s²).
-    pub(super) a_b: DVec3,
+    pub a_b: DVec3,
     /// Whether an outage withholds it.
-    pub(super) withheld: bool,
+    pub withheld: bool,
 }
 
 /// What the vehicle measures of itself, of these aids.

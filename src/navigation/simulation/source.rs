@@ -21,10 +21,10 @@ use std::ops::Range;
 
 /// What eight runs measure at an instant.
 pub(super) struct Measured {
-    pub(super) fix: Option<Fix>,
-    pub(super) height: Option<Lanes>,
+    pub fix: Option<Fix>,
+    pub height: Option<Lanes>,
     /// Velocities along the vehicle's axes (m/s); of a heading the first is the yaw (rad).
-    pub(super) aids: Vec<(Aid, Vec3)>,
+    pub aids: Vec<(Aid, Vec3)>,
 }
 
 /// Everything random of eight runs.
@@ -93,24 +93,14 @@ impl<'a> Source<'a> {
 
     /// The inertial errors of the next samples; idle lanes repeat the ideal.
     pub(super) fn errors(&mut self, plan: &Plan<'_>, samples: Range<usize>) -> &[[Vec3; 2]] {
-        let settings = plan.experiment.defects;
         let block = self.imu.next(samples.len());
         if !self.defects.is_empty() {
-            for (sample, k) in block.iter_mut().zip(samples.clone()) {
+            for (sample, k) in block.iter_mut().zip(samples) {
                 let felt = plan.felt(k);
                 for (lane, defects) in self.defects.iter().enumerate() {
                     for (error, more) in sample.iter_mut().zip(defects.error(&felt)) {
                         error.set_lane(lane, error.lane(lane) + more);
                     }
-                }
-            }
-        }
-        if let Some(output) = &settings.output {
-            for (sample, truth) in block.iter_mut().zip(&plan.ideal[samples]) {
-                for (lane, sensor) in (0..self.keys.len()).flat_map(|l| Sensor::ALL.map(|s| (l, s)))
-                {
-                    let (error, exact) = (&mut sample[sensor as usize], truth.of(sensor));
-                    error.set_lane(lane, output.put(sensor, exact + error.lane(lane)) - exact);
                 }
             }
         }

@@ -12,78 +12,26 @@ const JERK_WINDOW_S: f64 = 0.1;
 /// Excesses nearer than this to one another are one (s).
 const SAME_EVENT_S: f64 = 1.0;
 
-/// What no vehicle of the kind does.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
-    /// Speed (m/s).
-    pub speed: f64,
-    /// Acceleration (m/s²).
-    pub acceleration: f64,
-    /// Change of acceleration over 0.1 s, per second (m/s³).
-    pub jerk: f64,
-    /// Angular rate (rad/s).
-    pub rate: f64,
-}
+/// What has a limit, and its unit: speed, acceleration, change of acceleration over 0.1 s, angular rate.
+const QUANTITIES: [(&str, &str); 4] = [
+    ("speed", "m/s"),
+    ("acceleration", "m/s²"),
+    ("jump of acceleration", "m/s³"),
+    ("angular rate", "deg/s"),
+];
 
-impl Default for Limits {
-    /// A land vehicle or an aircraft that is not aerobatic: 350 m/s, 30 m/s², 35 m/s³, 200 deg/s. Recorded
-    /// drives stay below 25 m/s³ but for glitches of the recording.
-    fn default() -> Self {
-        Self {
-            speed: 350.0,
-            acceleration: 30.0,
-            jerk: 35.0,
-            rate: 200.0 * DEG,
-        }
-    }
-}
-
-/// The quantities that have a limit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
-    /// Speed (m/s).
-    Speed,
-    /// Acceleration (m/s²).
-    Acceleration,
-    /// Change of acceleration (m/s³).
-    Jerk,
-    /// Angular rate (rad/s).
-    Rate,
-}
-
-impl Quantity {
-    /// All of them.
-    pub(crate) const ALL: [Self; 4] = [Self::Speed, Self::Acceleration, Self::Jerk, Self::Rate];
-
-    /// Name, unit of display, and its factor from SI.
-    pub const fn display(self) -> (&'static str, &'static str, f64) {
-        match self {
-            Self::Speed => ("speed", "m/s", 1.0),
-            Self::Acceleration => ("acceleration", "m/s²", 1.0),
-            Self::Jerk => ("jump of acceleration", "m/s³", 1.0),
-            Self::Rate => ("angular rate", "deg/s", 1.0 / DEG),
-        }
-    }
-
-    /// The limit on it.
-    const fn limit(self, limits: &Limits) -> f64 {
-        match self {
-            Self::Speed => limits.speed,
-            Self::Acceleration => limits.acceleration,
-            Self::Jerk => limits.jerk,
-            Self::Rate => limits.rate,
-        }
-    }
-}
+/// What no land vehicle does, nor an aircraft that is not aerobatic: 350 m/s, 30 m/s², 35 m/s³, 200 deg/s. Recorded
+/// drives stay below 25 m/s³ but for glitches of the recording.
+pub const LIMITS: [f64; 4] = [350.0, 30.0, 35.0, 200.0];
 
 /// A stretch beyond a limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Excess {
-    /// The quantity.
-    pub quantity: Quantity,
-    /// The limit (SI).
+    /// The quantity and its unit.
+    pub quantity: (&'static str, &'static str),
+    /// The limit.
     pub limit: f64,
-    /// The largest value (SI) and its time (s).
+    /// The largest value.
     pub worst: f64,
     /// Time of the largest value (s).
     pub worst_s: f64,
@@ -95,12 +43,11 @@ pub struct Excess {
 
 impl fmt::Display for Excess {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (name, unit, factor) = self.quantity.display();
-        let (worst, limit) = (self.worst * factor, self.limit * factor);
+        let (name, unit) = self.quantity;
         write!(
             f,
-            "{name} {worst:.1} {unit} at {:.2} s, beyond {limit:.1} {unit}",
-            self.worst_s
+            "{name} {:.1} {unit} at {:.2} s, beyond {:.1} {unit}",
+            self.worst, self.worst_s, self.limit
         )?;
         if self.end_s > self.start_s {
             write!(
@@ -115,19 +62,19 @@ impl fmt::Display for Excess {
 
 /// The largest speed, acceleration, jerk and rate of a trajectory (SI), in the order of `Quantity::ALL`,
 /// and every stretch beyond the limits, in order of time.
-pub fn examine(trajectory: &Trajectory, limits: &Limits) -> ([f64; 4], Vec<Excess>) {
+pub fn examine(trajectory: &Trajectory, limits: &[f64; 4]) -> ([f64; 4], Vec<Excess>) {
     let (mut largest, mut found) = ([0.0_f64; 4], Vec::new());
     let mut open: [Option<Excess>; 4] = [None; 4];
     // Acceleration is linear between knots, so that its extremes are at knots.
     for &t_s in trajectory.knots() {
         for (i, value) in magnitudes(trajectory, t_s).into_iter().enumerate() {
             largest[i] = larger(largest[i], value);
-            let limit = Quantity::ALL[i].limit(limits);
+            let limit = limits[i];
             // NaN lies beyond every limit: it is to be reported, not passed over.
             // A motion made to reach the limit exactly does so to rounding.
             if value.is_nan() || value > limit * (1.0 + 1e-6) {
                 let event = Excess {
-                    quantity: Quantity::ALL[i],
+                    quantity: QUANTITIES[i],
                     limit,
                     worst: value,
                     worst_s: t_s,
@@ -168,7 +115,7 @@ fn magnitudes(trajectory: &Trajectory, t_s: f64) -> [f64; 4] {
         now.v_e.length(),
         now.a_e.length(),
         jerk,
-        now.omega_eb_b.length(),
+        now.omega_eb_b.length() / DEG,
     ]
 }
 
@@ -239,8 +186,7 @@ mod tests {
 
     #[test]
     fn a_smooth_motion_is_plausible() {
-        let ([speed, acceleration, jerk, rate], found) =
-            examine(&north(|_| 0.0), &Limits::default());
+        let ([speed, acceleration, jerk, rate], found) = examine(&north(|_| 0.0), &LIMITS);
         assert!(found.is_empty(), "{found:?}");
         assert!((speed - 10.0).abs() < 0.1 && acceleration < 1e-3 && jerk < 1e-3 && rate < 1e-4);
     }
@@ -249,17 +195,13 @@ mod tests {
     #[test]
     fn a_jump_is_found_where_it_is() {
         let t = north(|t| if t > 4.02 { 0.5 } else { 0.0 });
-        let (_, found) = examine(
-            &t,
-            &Limits {
-                speed: 15.0,
-                ..Limits::default()
-            },
-        );
-        let kinds: Vec<_> = found.iter().map(|e| e.quantity).collect();
+        let [_, others @ ..] = LIMITS;
+        let [acceleration, jerk, rate] = others;
+        let (_, found) = examine(&t, &[15.0, acceleration, jerk, rate]);
+        let kinds: Vec<_> = found.iter().map(|e| e.quantity.0).collect();
         assert_eq!(kinds.len(), 2, "{found:?}");
         assert!(
-            kinds.contains(&Quantity::Acceleration) && kinds.contains(&Quantity::Jerk),
+            kinds.contains(&"acceleration") && kinds.contains(&"jump of acceleration"),
             "{found:?}"
         );
         assert!(

@@ -151,7 +151,18 @@ impl Profile {
             segment: None,
             problem,
         };
-        self.check_start().map_err(at_start)?;
+        domain(
+            "lat_deg",
+            "a latitude within ±89.9°",
+            self.start.lat.abs() <= crate::earth::MAX_LATITUDE,
+        )
+        .map_err(at_start)?;
+        domain(
+            "segment",
+            "a list of at least one segment",
+            !self.segments.is_empty(),
+        )
+        .map_err(at_start)?;
         let mut path = Path::new(self);
         for (index, segment) in self.segments.iter().enumerate() {
             path.follow(segment).map_err(|problem| Error {
@@ -167,34 +178,6 @@ impl Profile {
             })
         };
         Trajectory::from_samples(&path.samples).map_err(no_trajectory)
-    }
-
-    fn check_start(&self) -> Result<(), Problem> {
-        let s = &self.start;
-        for (key, value) in [
-            ("t_s", s.t_s),
-            ("lon_deg", s.lon),
-            ("h_m", s.h),
-            ("heading_deg", s.heading),
-        ] {
-            domain(key, "a finite number", value.is_finite())?;
-        }
-        domain(
-            "lat_deg",
-            "a latitude within ±89.9°",
-            s.lat.abs() <= crate::earth::MAX_LATITUDE,
-        )?;
-        domain(
-            "speed_m_s",
-            "a speed ≥ 0",
-            s.speed.is_finite() && s.speed >= 0.0,
-        )?;
-        positive("ramp_s", self.ramp_s)?;
-        domain(
-            "segment",
-            "a list of at least one segment",
-            !self.segments.is_empty(),
-        )
     }
 }
 
@@ -268,24 +251,20 @@ fn domain(key: &'static str, domain: &'static str, holds: bool) -> Result<(), Pr
     }
 }
 
-fn positive(key: &'static str, value: f64) -> Result<(), Problem> {
-    domain(key, "a finite number > 0", value.is_finite() && value > 0.0)
-}
-
 /// The path so far.
 struct Path<'a> {
     profile: &'a Profile,
-    pub(super) t_s: f64,
+    t_s: f64,
     lat: f64,
     lon: f64,
-    pub(super) h: f64,
+    h: f64,
     heading: f64,
-    pub(super) speed: f64,
-    pub(super) samples: Vec<TrajectorySample>,
+    speed: f64,
+    samples: Vec<TrajectorySample>,
 }
 
 impl<'a> Path<'a> {
-    pub(super) fn new(profile: &'a Profile) -> Self {
+    fn new(profile: &'a Profile) -> Self {
         let Start {
             t_s,
             lat,
@@ -316,21 +295,17 @@ impl<'a> Path<'a> {
     }
 
     fn follow(&mut self, segment: &Segment) -> Result<(), Problem> {
-        domain("climb_m", "a finite number", segment.climb_m.is_finite())?;
         let ramp_s = segment.ramp_s.unwrap_or(self.profile.ramp_s);
-        positive("ramp_s", ramp_s)?;
         let climb = segment.climb_m;
         match &segment.kind {
             Kind::Straight(length) => self.straight(*length, climb, ramp_s),
             Kind::Accelerate { to_speed, by } => self.accelerate(*to_speed, *by, climb, ramp_s),
             Kind::Turn { angle, by } => {
-                domain("angle_deg", "a finite number", angle.is_finite())?;
                 let duration = self.turn_duration(*angle, *by, ramp_s)?;
                 self.push([duration, ramp_s], 0.0, *angle, climb)
             }
             Kind::Stop { duration, decel } => {
                 if self.speed > 0.0 {
-                    positive("decel_m_s2", *decel)?;
                     self.accelerate(0.0, Acceleration::Peak(*decel), 0.0, ramp_s)?;
                 }
                 self.straight(Length::Duration(*duration), climb, ramp_s)
@@ -341,14 +316,8 @@ impl<'a> Path<'a> {
 
     fn straight(&mut self, length: Length, climb: f64, ramp_s: f64) -> Result<(), Problem> {
         let duration = match length {
-            Length::Duration(s) => {
-                positive("duration_s", s)?;
-                s
-            }
-            Length::Distance(m) => {
-                positive("distance_m", m)?;
-                m / self.moving("distance_m")?
-            }
+            Length::Duration(s) => s,
+            Length::Distance(m) => m / self.moving("distance_m")?,
         };
         self.push([duration, ramp_s], 0.0, 0.0, climb)
     }
@@ -360,15 +329,10 @@ impl<'a> Path<'a> {
         climb: f64,
         ramp_s: f64,
     ) -> Result<(), Problem> {
-        domain("to_speed_m_s", "a speed ≥ 0", to.is_finite() && to >= 0.0)?;
         let change = to - self.speed;
         let duration = match by {
-            Acceleration::Duration(s) => {
-                positive("duration_s", s)?;
-                s
-            }
+            Acceleration::Duration(s) => s,
             Acceleration::Peak(a) => {
-                positive("accel_m_s2", a)?;
                 domain("to_speed_m_s", "another speed than before", change != 0.0)?;
                 duration_of(change, a, ramp_s)
             }
@@ -382,22 +346,10 @@ impl<'a> Path<'a> {
     fn turn_duration(&self, angle: f64, by: Turning, ramp_s: f64) -> Result<f64, Problem> {
         domain("angle_deg", "an angle other than 0", angle != 0.0)?;
         let rate = match by {
-            Turning::Duration(s) => {
-                positive("duration_s", s)?;
-                return Ok(s);
-            }
-            Turning::Rate(rate) => {
-                positive("rate_deg_s", rate)?;
-                rate
-            }
-            Turning::Radius(m) => {
-                positive("radius_m", m)?;
-                self.moving("radius_m")? / m
-            }
-            Turning::LateralAccel(a) => {
-                positive("lateral_accel_m_s2", a)?;
-                a / self.moving("lateral_accel_m_s2")?
-            }
+            Turning::Duration(s) => return Ok(s),
+            Turning::Rate(rate) => rate,
+            Turning::Radius(m) => self.moving("radius_m")? / m,
+            Turning::LateralAccel(a) => a / self.moving("lateral_accel_m_s2")?,
         };
         Ok(duration_of(angle, rate, ramp_s))
     }
@@ -535,7 +487,7 @@ struct Shape {
 }
 
 impl Shape {
-    pub(in crate::trajectory) fn new(ramp: f64) -> Self {
+    fn new(ramp: f64) -> Self {
         Self {
             ramp: ramp.min(0.5),
         }
@@ -582,11 +534,11 @@ struct Piece {
     duration: f64,
     shape: Shape,
     /// Speed along the path at the start, and its change (m/s).
-    pub(super) speed: [f64; 2],
+    speed: [f64; 2],
     /// Heading at the start, and its change (rad).
     heading: [f64; 2],
     /// Height at the start, and its change (m).
-    pub(super) height: [f64; 2],
+    height: [f64; 2],
 }
 
 /// The motion at an instant.
@@ -600,7 +552,7 @@ struct Motion {
     /// Angle of the path above the horizon (rad).
     slope: f64,
     /// Height (m).
-    pub(super) h: f64,
+    h: f64,
 }
 
 impl Piece {
@@ -619,7 +571,7 @@ impl Piece {
         }
     }
 
-    pub(super) fn at(&self, x: f64) -> Motion {
+    fn at(&self, x: f64) -> Motion {
         let speed = self.speed[0] + self.speed[1] * self.shape.value(x);
         let (mut sin_slope, mut h) = (0.0, self.height[0]);
         if self.height[1] != 0.0 {

@@ -259,10 +259,6 @@ fn what_cannot_be_followed_is_refused() {
     };
     let straight_s = |s| straight(Length::Duration(s));
     assert_eq!(
-        refused(1.0, straight_s(-4.0)),
-        "segment 1: \"duration_s\" is not a finite number > 0"
-    );
-    assert_eq!(
         refused(1.0, straight_s(1e300)),
         "segment 1: \"duration_s\" makes the trajectory 1.000e300 s long: more than a day"
     );
@@ -273,10 +269,6 @@ fn what_cannot_be_followed_is_refused() {
     assert_eq!(
         refused(0.0, turn(10.0, Turning::Radius(5.0))),
         "segment 1: \"radius_m\" needs a moving vehicle, but it stands still here"
-    );
-    assert_eq!(
-        refused(5.0, accelerate(-1.0, Acceleration::Peak(1.0))),
-        "segment 1: \"to_speed_m_s\" is not a speed ≥ 0"
     );
     assert_eq!(
         refused(
@@ -333,6 +325,7 @@ fn what_cannot_be_followed_is_refused() {
         p.build().unwrap_err().to_string(),
         "start: \"segment\" is not a list of at least one segment"
     );
+    p.segments.push(straight_s(1.0));
     p.start.lat = f64::NAN;
     assert_eq!(
         p.build().unwrap_err().to_string(),

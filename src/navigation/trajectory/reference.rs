@@ -4,6 +4,7 @@
 use super::{MAX_ROTATION, Trajectory, TrajectorySample};
 use crate::earth::geodetic_to_ecef;
 use crate::frames::NavState;
+use crate::linalg::median;
 use crate::units::DEG;
 use glam::DVec3;
 use std::fmt;
@@ -148,9 +149,7 @@ fn velocity_sigma(curve: &Trajectory) -> Vec<f64> {
             }
         })
         .collect();
-    let mut sorted = uneven.clone();
-    sorted.sort_by(f64::total_cmp);
-    let median = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    let median = median(uneven.iter().copied()).unwrap_or(0.0);
     // White errors σ of a position have 20 σ² in an axis of that difference times the step, and 1.39 σ² in the slope of
     // the spline, whose weights are 3 (√3 − 2)^k; the median of three axes is at 1.54.
     let white = (1.39_f64 / 20.0).sqrt() / 1.54 * median;
@@ -227,8 +226,6 @@ struct Steps<'a> {
 impl<'a> Steps<'a> {
     fn new(samples: &'a [TrajectorySample]) -> Self {
         let place = |s: &TrajectorySample| geodetic_to_ecef(s.lat, s.lon, s.h);
-        let mut seconds: Vec<f64> = samples.windows(2).map(|w| w[1].t_s - w[0].t_s).collect();
-        seconds.sort_by(f64::total_cmp);
         Self {
             samples,
             moved_e: samples
@@ -236,7 +233,7 @@ impl<'a> Steps<'a> {
                 .map(|w| place(&w[1]) - place(&w[0]))
                 .collect(),
             // The median is not moved by gaps, however long.
-            median_s: seconds.get(seconds.len() / 2).copied().unwrap_or(0.0),
+            median_s: median(samples.windows(2).map(|w| w[1].t_s - w[0].t_s)).unwrap_or(0.0),
         }
     }
 
@@ -276,11 +273,8 @@ impl<'a> Steps<'a> {
         let last = (index + NEIGHBOURS).min(self.samples.len() - 1);
         let near = || (first..=last).filter(|i| self.seconds(*i) > 0.0);
         let axis = |a: usize| {
-            let mut velocities: Vec<f64> = near()
-                .map(|i| self.moved_e[i - 1][a] / self.seconds(i))
-                .collect();
-            velocities.sort_by(f64::total_cmp);
-            velocities[velocities.len() / 2]
+            let velocities = near().map(|i| self.moved_e[i - 1][a] / self.seconds(i));
+            median(velocities).unwrap_or(f64::NAN)
         };
         let now = self.samples[index].t_s;
         let reach = (now - self.samples[first - 1].t_s).max(self.samples[last].t_s - now);

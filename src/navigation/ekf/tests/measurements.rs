@@ -2,7 +2,7 @@
 
 use super::super::update::update_height;
 use super::*;
-use crate::ekf::update::{body_velocity_rows, dense_yaw_row};
+use crate::ekf::update::{body_velocity_rows, yaw_row as row_of_yaw};
 use crate::frames::{RollPitchYaw, wrap_angle};
 
 /// H of position and velocity on a lever arm against central differences of the antenna itself.
@@ -23,7 +23,7 @@ fn lever_arm_rows_agree_with_central_differences() {
             let omega_eb_b = omega - bias - s.q_b_n.inverse() * earth::omega_ie_n(state.lat);
             (r, s.v_n + s.q_b_n * omega_eb_b.cross(arm))
         };
-        let rows = ekf.measurement_rows(arm);
+        let rows = measurement_rows(&ekf, arm);
         for column in 0..15 {
             let (block, axis) = (column / 3, column % 3);
             let size = [1.0, 1.0, 1e-5, 1.0, 1e-4][block];
@@ -113,8 +113,8 @@ fn rows_of_body_velocity_and_yaw_agree_with_central_differences() {
     let arm = DVec3::new(-1.4, 0.6, 0.9);
     for _ in 0..2000 {
         let (state, omega, _) = random_case(&mut g);
-        let ins = Strapdown::single(&state, GravityModel::Wgs84);
-        let (rows, yaw_row) = (body_velocity_rows(&ins, omega, arm), dense_yaw_row(&ins));
+        let ins = Strapdown::<f64>::new(&state, GravityModel::Wgs84);
+        let (rows, yaw_row) = (body_velocity_rows(&ins, omega, arm), row_of_yaw(&ins));
         let measured = |s: &NavState, bias: DVec3| {
             let omega_eb_b = omega - bias - s.q_b_n.inverse() * earth::omega_ie_n(state.lat);
             let v_b = s.q_b_n.inverse() * s.v_n + omega_eb_b.cross(arm);

@@ -41,7 +41,7 @@ pub use pass::{
 pub(crate) use pass::{Moments, errors_in_outages};
 pub use reduce::{Alike, drive, reduced_belief};
 pub use track::Track;
-pub use truth::{DRIFT, HeadingDoubt, NamedSource, STRAPDOWN, TrueErrors, TruthSide, weak_heading};
+pub use truth::{DRIFT, NamedSource, STRAPDOWN, TrueErrors, TruthSide, weak_heading};
 pub(crate) use tune::Crossing;
 pub use tune::{
     Aim, Departure, Factor, Filter, FilterConsistency, Task, UpperEnd, aiding_factor, scaled,

@@ -1,8 +1,6 @@
 //! One filter along a track, and what makes its true errors.
 
-use super::track::{
-    Inputs, Mark, NAV, Nav, Row, SIGNALS, Sides, Source, Sources, Step, StepOfSource, Track,
-};
+use super::track::{Mark, NAV, Nav, Row, SIGNALS, Sides, Sources, Step, StepOfSource, Track};
 use super::truth::{TrueErrors, TruthSide};
 use crate::ekf::Belief;
 use crate::ekf::covariance::PSI;
@@ -106,7 +104,7 @@ pub struct Instant {
     pub covariance: [Nav; NAV],
     /// Their mean.
     pub mean: Nav,
-    pub(super) jacobian: [DVec3; 3],
+    jacobian: [DVec3; 3],
 }
 
 /// A filter's errors at one instant, and what it states of them.
@@ -136,7 +134,7 @@ pub struct FilterPass<'a> {
     track: &'a Track,
     believed: Sources,
     /// The gain of every scalar measurement, in sequence, and the variance that the filter states for its innovation.
-    gains: Vec<(Gain, f64)>,
+    gains: Vec<(Column, f64)>,
     reports: Vec<[Nav; NAV]>,
     /// Standard deviations that the filter states of the biases, at every report.
     biases: Vec<[f64; BIASES]>,
@@ -147,7 +145,8 @@ pub struct FilterPass<'a> {
 impl<'a> FilterPass<'a> {
     /// Takes a filter along a track.
     pub fn new(track: &'a Track, belief: &Belief) -> Self {
-        let own = Sides::of_filter(Sources::of_belief(belief), track);
+        let believed = Sources::of_belief(belief);
+        let own = Sides::of_filter(believed.clone(), track);
         let mut filter = Joint::new(track.start, &own);
         let (mut gains, mut reports, mut biases) = (Vec::new(), Vec::new(), Vec::new());
         let mut ends = vec![[[0.0; NAV]; NAV]; track.outages];
@@ -169,7 +168,7 @@ impl<'a> FilterPass<'a> {
             reports,
             biases,
             ends,
-            believed: own.b,
+            believed,
         }
     }
 
@@ -493,18 +492,13 @@ impl Track {
 /// A filter's own covariance and its true errors, side by side.
 #[derive(Clone)]
 struct Pass<'a> {
-    pub(super) filter: Joint<'a>,
-    pub(super) errors: Errors<'a>,
+    filter: Joint<'a>,
+    errors: Errors<'a>,
 }
 
 impl<'a> Pass<'a> {
     /// At the start of a track, of a filter's own states and those of its true errors.
-    pub(super) fn new(
-        track: &Track,
-        own: &'a Sides,
-        sides: &'a Sides,
-        truth: &'a TruthSide,
-    ) -> Self {
+    fn new(track: &Track, own: &'a Sides, sides: &'a Sides, truth: &'a TruthSide) -> Self {
         Self {
             filter: Joint::new(track.start, own),
             errors: Errors::at_start(track, sides, truth),
@@ -538,76 +532,76 @@ impl<'a> Pass<'a> {
 struct Joint<'a> {
     sides: &'a Sides,
     xx: [Nav; NAV],
-    xb: Vec<Nav>,
-    /// Row-major.
-    bb: Vec<f64>,
-    xt: Vec<Nav>,
-    /// A row for each b.
-    bt: Vec<f64>,
+    /// Covariances of x with the states b, then t.
+    xs: Vec<Nav>,
+    /// A row for each b, with b and t.
+    bs: Vec<f64>,
     tt: Vec<f64>,
     /// Samples so far.
     elapsed: f64,
 }
 
 impl<'a> Joint<'a> {
-    pub(super) fn new(xx: [Nav; NAV], sides: &'a Sides) -> Self {
-        let (b, t) = (&sides.b, &sides.t);
-        let (nb, nt) = (b.states.len(), t.states.len());
-        let mut bb = vec![0.0; nb * nb];
-        for (i, source) in b.states.iter().enumerate() {
-            bb[i * nb + i] = source.initial;
+    fn new(xx: [Nav; NAV], sides: &'a Sides) -> Self {
+        let (states, nb) = (&sides.states, sides.estimated);
+        let mut bs = vec![0.0; nb * states.len()];
+        for (i, source) in states[..nb].iter().enumerate() {
+            bs[i * states.len() + i] = source.initial;
         }
         Self {
             sides,
             xx,
-            xb: vec![[0.0; NAV]; nb],
-            bb,
-            xt: vec![[0.0; NAV]; nt],
-            bt: vec![0.0; nb * nt],
-            tt: t.states.iter().map(|s| s.initial).collect(),
+            xs: vec![[0.0; NAV]; states.len()],
+            bs,
+            tt: states[nb..].iter().map(|s| s.initial).collect(),
             elapsed: 0.0,
         }
     }
 
     /// Variances of the biases of the signals: of the sum of the states b of each, drifts at their age.
     fn bias_variances(&self) -> [f64; BIASES] {
-        let states = &self.sides.b.states;
+        let states = &self.sides.states[..self.sides.estimated];
         let factors: Vec<f64> = states.iter().map(|s| s.share(self.elapsed)).collect();
-        let (nb, mut variances) = (factors.len(), [0.0; BIASES]);
+        let mut variances = [0.0; BIASES];
         for (i, a) in states.iter().enumerate().filter(|(_, a)| a.signal < BIASES) {
             let of_signal = states
                 .iter()
                 .enumerate()
                 .filter(|(_, b)| b.signal == a.signal);
             variances[a.signal] += of_signal
-                .map(|(j, _)| factors[i] * factors[j] * self.bb[i * nb + j])
+                .map(|(j, _)| factors[i] * factors[j] * self.between(i, j))
                 .sum::<f64>();
         }
         variances
     }
 
+    /// Covariance of two of the states b and t.
+    #[inline(always)]
+    fn between(&self, i: usize, j: usize) -> f64 {
+        let nb = self.sides.estimated;
+        match i.min(j) {
+            first if first < nb => self.bs[first * self.xs.len() + i.max(j)],
+            first if i == j => self.tt[first - nb],
+            _ => 0.0,
+        }
+    }
+
     /// Covariance of everything with a linear form of the states as they are now.
     fn covariance_with(&self, form: &Column) -> Column {
-        let (nb, nt) = (self.xb.len(), self.xt.len());
         let mut x = [0.0; NAV];
         for (column, h) in self.xx.iter().zip(&form.x) {
             add_scaled(&mut x, *h, column);
         }
         let product = |x: &Nav| -> f64 { x.iter().zip(&form.x).map(|(a, h)| a * h).sum() };
-        let mut b: Vec<f64> = self.xb.iter().map(product).collect();
-        let mut t: Vec<f64> = self.xt.iter().map(product).collect();
+        let mut s: Vec<f64> = self.xs.iter().map(product).collect();
         // Most measurements are of the navigation error alone.
-        for (j, h) in form.b.iter().enumerate().filter(|(_, h)| **h != 0.0) {
-            add_scaled(&mut x, *h, &self.xb[j]);
-            (0..nb).for_each(|i| b[i] += h * self.bb[i * nb + j]);
-            (0..nt).for_each(|i| t[i] += h * self.bt[j * nt + i]);
+        for (j, h) in form.s.iter().enumerate().filter(|(_, h)| **h != 0.0) {
+            add_scaled(&mut x, *h, &self.xs[j]);
+            for (i, s) in s.iter_mut().enumerate() {
+                *s += h * self.between(i, j);
+            }
         }
-        for (j, h) in form.t.iter().enumerate().filter(|(_, h)| **h != 0.0) {
-            add_scaled(&mut x, *h, &self.xt[j]);
-            (0..nb).for_each(|i| b[i] += h * self.bt[i * nt + j]);
-            t[j] += h * self.tt[j];
-        }
-        Column { x, b, t }
+        Column { x, s }
     }
 
     /// Over one step.
@@ -618,71 +612,41 @@ impl<'a> Joint<'a> {
     /// A P Aᵀ + Q in blocks.
     #[inline(always)]
     fn propagate(&mut self, step: &Step) {
-        let signals = self.sides.signals;
+        let (signals, nb) = (self.sides.signals, self.sides.estimated);
         let inputs = self.sides.over(step);
-        let (nb, nt) = (inputs.b.len(), inputs.t.len());
-        let elapsed = self.elapsed;
+        let (sources, elapsed) = (&inputs.sources, self.elapsed);
         let mean = |s: &StepOfSource| s.mean + s.ramp * elapsed;
-        // A P, rows of x. Column by column: M times the column's x part, B times the means of its biases.
-        let mut gx = [[0.0; NAV]; NAV];
-        for j in 0..NAV {
+        let of_column = |xs: &[Nav], j: usize| {
             let mut u = [0.0; SIGNALS];
-            inputs
-                .b
-                .iter()
-                .zip(&self.xb)
-                .for_each(|(s, x)| u[s.signal] += mean(s) * x[j]);
-            inputs
-                .t
-                .iter()
-                .zip(&self.xt)
-                .for_each(|(s, x)| u[s.signal] += mean(s) * x[j]);
-            // Into a copy: the cross terms below still need P before the step.
-            gx[j] = step.map(&self.xx[j], &u[..signals]);
-        }
-        for j in 0..nb {
+            let pairs = sources.iter().zip(xs);
+            pairs.for_each(|(s, x)| u[s.signal] += mean(s) * x[j]);
+            u
+        };
+        // A P, rows of x. Column by column: M times the column's x part, B times the means of its biases. Into a copy: the
+        // cross terms below still need P before the step.
+        let gx: [Nav; NAV] =
+            std::array::from_fn(|j| step.map(&self.xx[j], &of_column(&self.xs, j)[..signals]));
+        let n = sources.len();
+        for j in 0..n {
             let mut u = [0.0; SIGNALS];
-            inputs
-                .b
-                .iter()
-                .zip(&self.bb[j * nb..])
-                .for_each(|(s, p)| u[s.signal] += mean(s) * p);
-            inputs
-                .t
-                .iter()
-                .zip(&self.bt[j * nt..])
-                .for_each(|(s, p)| u[s.signal] += mean(s) * p);
-            self.xb[j] = step.map(&self.xb[j], &u[..signals]);
-        }
-        for j in 0..nt {
-            let mut u = [0.0; SIGNALS];
-            inputs
-                .b
-                .iter()
-                .enumerate()
-                .for_each(|(i, s)| u[s.signal] += mean(s) * self.bt[i * nt + j]);
-            // The states t are independent: of column j only its own variance feeds its signal.
-            u[inputs.t[j].signal] += mean(&inputs.t[j]) * self.tt[j];
-            self.xt[j] = step.map(&self.xt[j], &u[..signals]);
+            if j < nb {
+                let pairs = sources.iter().zip(&self.bs[j * n..]);
+                pairs.for_each(|(s, p)| u[s.signal] += mean(s) * p);
+            } else {
+                let own = sources[..nb].iter().enumerate();
+                own.for_each(|(i, s)| u[s.signal] += mean(s) * self.bs[i * n + j]);
+                // The states t are independent: of column j only its own variance feeds its signal.
+                u[sources[j].signal] += mean(&sources[j]) * self.tt[j - nb];
+            }
+            self.xs[j] = step.map(&self.xs[j], &u[..signals]);
         }
         // (A P) Aᵀ: the same map on the rows of A P.
         for i in 0..NAV {
             let row: Nav = std::array::from_fn(|j| gx[j][i]);
-            let mut u = [0.0; SIGNALS];
-            inputs
-                .b
-                .iter()
-                .zip(&self.xb)
-                .for_each(|(s, x)| u[s.signal] += mean(s) * x[i]);
-            inputs
-                .t
-                .iter()
-                .zip(&self.xt)
-                .for_each(|(s, x)| u[s.signal] += mean(s) * x[i]);
-            self.xx[i] = step.map(&row, &u[..signals]);
+            self.xx[i] = step.map(&row, &of_column(&self.xs, i)[..signals]);
         }
         // The states themselves last: the maps above are of their values at the beginning of the step.
-        self.step_biases(step, inputs);
+        self.step_biases(step, sources);
         self.elapsed += f64::from(step.samples);
         for (white, unit) in inputs.white.iter().zip(&step.white) {
             self.xx
@@ -700,49 +664,38 @@ impl<'a> Joint<'a> {
     }
 
     #[inline(always)]
-    fn step_biases(&mut self, step: &Step, inputs: &Inputs) {
-        let (nb, nt) = (inputs.b.len(), inputs.t.len());
-        let decay = |x: &mut Nav, s: &StepOfSource| {
+    fn step_biases(&mut self, step: &Step, sources: &[StepOfSource]) {
+        for (x, s) in self.xs.iter_mut().zip(sources) {
             x.iter_mut().for_each(|v| *v *= s.decay);
             // The w of the step moves the mean input and the state together: cov(x, s) = b q_cross.
-            step.b
-                .get(s.signal)
-                .into_iter()
-                .for_each(|b| add_scaled(x, s.q_cross, b));
-        };
-        self.xb
-            .iter_mut()
-            .zip(&inputs.b)
-            .for_each(|(x, s)| decay(x, s));
-        self.xt
-            .iter_mut()
-            .zip(&inputs.t)
-            .for_each(|(x, s)| decay(x, s));
-        for (i, s) in inputs.b.iter().enumerate() {
-            let (bb, bt) = (
-                &mut self.bb[i * nb..(i + 1) * nb],
-                &mut self.bt[i * nt..(i + 1) * nt],
-            );
-            bb.iter_mut()
-                .zip(&inputs.b)
-                .for_each(|(p, other)| *p *= s.decay * other.decay);
-            bt.iter_mut()
-                .zip(&inputs.t)
-                .for_each(|(p, other)| *p *= s.decay * other.decay);
-            bb[i] += s.q_state;
+            if let Some(b) = step.b.get(s.signal) {
+                add_scaled(x, s.q_cross, b);
+            }
         }
-        for (p, s) in self.tt.iter_mut().zip(&inputs.t) {
+        let (own, truth) = sources.split_at(self.sides.estimated);
+        for (i, s) in own.iter().enumerate() {
+            let row = &mut self.bs[i * sources.len()..][..sources.len()];
+            row.iter_mut()
+                .zip(sources)
+                .for_each(|(p, other)| *p *= s.decay * other.decay);
+            row[i] += s.q_state;
+        }
+        for (p, s) in self.tt.iter_mut().zip(truth) {
             *p = *p * s.decay * s.decay + s.q_state;
         }
     }
 
     /// What a row measures, as a linear form.
     fn measured(&self, row: &Row) -> Column {
-        Column::measured(row, self.sides, self.elapsed)
+        let coefficient = |source| row.coefficient(source, self.elapsed);
+        Column {
+            x: std::array::from_fn(|i| row.h[i]),
+            s: self.sides.states.iter().map(coefficient).collect(),
+        }
     }
 
     /// A measurement with white noise of variance `r`.
-    pub(super) fn innovation(&self, measured: &Column, r: f64) -> Innovation {
+    fn innovation(&self, measured: &Column, r: f64) -> Innovation {
         let with = self.covariance_with(measured);
         // hᵀ P h + r
         let s = r + measured.dot(&with);
@@ -751,21 +704,22 @@ impl<'a> Joint<'a> {
 
     /// Corrects by a measurement as the filter does whose own covariance this is; returns its gain, and the variance that it
     /// states for the innovation.
-    fn measure(&mut self, row: &Row) -> (Gain, f64) {
+    fn measure(&mut self, row: &Row) -> (Column, f64) {
         let y = self.innovation(&self.measured(row), row.r);
-        let gain = y.gain();
-        self.correct(&y, &gain);
+        // the gain that is best where the covariance is right
+        let own = y.with.s.iter().take(self.sides.estimated);
+        let gain = Column {
+            x: y.with.x.map(|c| c / y.s),
+            s: own.map(|c| c / y.s).collect(),
+        };
+        corrected(self, &y, &gain);
         (gain, y.s)
     }
 
     /// z ← z − k y for an innovation y; the gain belongs to a filter that need not be right.
-    pub(super) fn correct(&mut self, y: &Innovation, gain: &Gain) {
-        corrected(self, y, gain);
-    }
-
     #[inline(always)]
-    fn update(&mut self, y: &Innovation, gain: &Gain) {
-        let (nb, nt, with) = (self.xb.len(), self.xt.len(), &y.with);
+    fn update(&mut self, y: &Innovation, gain: &Column) {
+        let (n, nb, with) = (self.xs.len(), self.sides.estimated, &y.with);
         // P − k cᵀ − c kᵀ + k s kᵀ, by (s k − c) kᵀ − k cᵀ
         // With the optimal gain s k = c and the first term is zero. Here c is of the truth and k of the
         // filter.
@@ -774,25 +728,22 @@ impl<'a> Joint<'a> {
             add_scaled(&mut self.xx[j], gain.x[j], &rest_x);
             add_scaled(&mut self.xx[j], -with.x[j], &gain.x);
         }
-        let (mut bb, mut bt) = (
-            self.bb.chunks_exact_mut(nb.max(1)),
-            self.bt.chunks_exact_mut(nt.max(1)),
-        );
-        for (xb, (k, c)) in self.xb.iter_mut().zip(gain.b.iter().zip(&with.b)) {
-            add_scaled(xb, *k, &rest_x);
-            add_scaled(xb, -c, &gain.x);
+        for (x, k) in self.xs.iter_mut().zip(&gain.s) {
+            add_scaled(x, *k, &rest_x);
+        }
+        for (x, c) in self.xs.iter_mut().zip(&with.s) {
+            add_scaled(x, -c, &gain.x);
+        }
+        for (i, (k, c)) in gain.s.iter().zip(&with.s).enumerate() {
             let rest = y.s * k - c;
-            let row = bb.next().into_iter().flatten();
-            for (p, (other, with)) in row.zip(gain.b.iter().zip(&with.b)) {
+            let (own, truth) = self.bs[i * n..][..n].split_at_mut(nb);
+            for (p, (other, with)) in own.iter_mut().zip(gain.s.iter().zip(&with.s)) {
                 *p += rest * other - k * with;
             }
             // t has no gain: a measurement does not change what truly makes the errors, only the
             // estimate's relation to it.
-            let row = bt.next().into_iter().flatten();
-            row.zip(&with.t).for_each(|(p, with)| *p -= k * with);
-        }
-        for (xt, c) in self.xt.iter_mut().zip(&with.t) {
-            add_scaled(xt, -c, &gain.x);
+            let truth = truth.iter_mut().zip(&with.s[nb..]);
+            truth.for_each(|(p, with)| *p -= k * with);
         }
         self.symmetrise();
     }
@@ -807,11 +758,11 @@ impl<'a> Joint<'a> {
                 (self.xx[i][j], self.xx[j][i]) = (mean, mean);
             }
         }
-        let nb = self.xb.len();
-        for i in 0..nb {
+        let n = self.xs.len();
+        for i in 0..self.sides.estimated {
             for j in 0..i {
-                let mean = 0.5 * (self.bb[i * nb + j] + self.bb[j * nb + i]);
-                (self.bb[i * nb + j], self.bb[j * nb + i]) = (mean, mean);
+                let mean = 0.5 * (self.bs[i * n + j] + self.bs[j * n + i]);
+                (self.bs[i * n + j], self.bs[j * n + i]) = (mean, mean);
             }
         }
     }
@@ -822,23 +773,6 @@ struct Innovation {
     with: Column,
     /// Its variance.
     s: f64,
-}
-
-impl Innovation {
-    /// The gain that is best where the covariance is right.
-    fn gain(&self) -> Gain {
-        Gain {
-            x: self.with.x.map(|c| c / self.s),
-            b: self.with.b.iter().map(|c| c / self.s).collect(),
-        }
-    }
-}
-
-/// A filter's gain.
-#[derive(Debug, Clone)]
-struct Gain {
-    x: Nav,
-    pub(super) b: Vec<f64>,
 }
 
 impl Step {
@@ -862,7 +796,7 @@ fn over(joint: &mut Joint<'_>, step: &Step) {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2"))]
-fn corrected(joint: &mut Joint<'_>, y: &Innovation, gain: &Gain) {
+fn corrected(joint: &mut Joint<'_>, y: &Innovation, gain: &Column) {
     joint.update(y, gain);
 }
 
@@ -875,95 +809,19 @@ pub(super) fn add_scaled(to: &mut Nav, factor: f64, x: &Nav) {
 
 // One number for each state: a mean, covariances with something, or the coefficients of a linear form.
 
-/// A number for each state of z = \[navigation error `x`; bias states `b`\] and for each state `t` of the truth, as
-/// [`Joint`] has them.
-#[derive(Clone)]
+/// A number for each state of z = \[navigation error `x`; bias states b\] and for each state t of the truth (`s`), as
+/// [`Joint`] has them; a gain is of z alone.
+#[derive(Debug, Clone)]
 struct Column {
     x: Nav,
-    pub(super) b: Vec<f64>,
-    pub(super) t: Vec<f64>,
+    s: Vec<f64>,
 }
 
 impl Column {
-    /// What a row measures, as a linear form after `elapsed` samples.
-    fn measured(row: &Row, sides: &Sides, elapsed: f64) -> Self {
-        let coefficients = |sources: &[Source]| {
-            sources
-                .iter()
-                .map(|source| row.coefficient(source, elapsed))
-                .collect()
-        };
-        let x = std::array::from_fn(|i| row.h[i]);
-        Self {
-            x,
-            b: coefficients(&sides.b.states),
-            t: coefficients(&sides.t.states),
-        }
-    }
-
     /// The value of a linear form.
-    pub(super) fn dot(&self, other: &Self) -> f64 {
+    fn dot(&self, other: &Self) -> f64 {
         let sum = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-        sum(&self.x, &other.x) + sum(&self.b, &other.b) + sum(&self.t, &other.t)
-    }
-}
-
-// The mean of the true errors, which is the same in every run.
-
-/// Mean of z and of the truth's states, as [`Joint`] has their covariance.
-#[derive(Clone)]
-struct Mean<'a> {
-    sides: &'a Sides,
-    values: Column,
-    /// Samples so far.
-    elapsed: f64,
-}
-
-impl<'a> Mean<'a> {
-    /// Errors that are zero at the start.
-    pub(super) fn new(sides: &'a Sides) -> Self {
-        let (b, t) = (&sides.b, &sides.t);
-        let values = Column {
-            x: [0.0; NAV],
-            b: vec![0.0; b.states.len()],
-            t: t.states.iter().map(|s| s.level).collect(),
-        };
-        Self {
-            sides,
-            values,
-            elapsed: 0.0,
-        }
-    }
-
-    /// Over one step.
-    pub(super) fn step(&mut self, step: &Step) {
-        let (inputs, elapsed) = (self.sides.over(step), self.elapsed);
-        let mut error = [0.0; SIGNALS];
-        let mut add = |states: &mut [f64], steps: &[StepOfSource]| {
-            for (state, s) in states.iter_mut().zip(steps) {
-                // With the state at the beginning of the step, as in the covariance; it decays afterwards.
-                error[s.signal] += (s.mean + s.ramp * elapsed) * *state;
-                *state *= s.decay;
-            }
-        };
-        add(&mut self.values.b, &inputs.b);
-        add(&mut self.values.t, &inputs.t);
-        self.values.x = step.map(&self.values.x, &error);
-        self.elapsed += f64::from(step.samples);
-    }
-
-    /// z ← z − k y for an innovation whose mean is y.
-    pub(super) fn correct(&mut self, y: f64, gain: &Gain) {
-        self.values
-            .x
-            .iter_mut()
-            .zip(&gain.x)
-            .for_each(|(x, k)| *x -= k * y);
-        self.values
-            .b
-            .iter_mut()
-            .zip(&gain.b)
-            .for_each(|(b, k)| *b -= k * y);
+        sum(&self.x, &other.x) + sum(&self.s, &other.s)
     }
 }
 
@@ -974,7 +832,8 @@ impl<'a> Mean<'a> {
 struct Errors<'a> {
     truth: &'a TruthSide,
     joint: Joint<'a>,
-    mean: Option<Mean<'a>>,
+    /// Mean of the true errors, which is the same in every run.
+    mean: Option<Column>,
 }
 
 impl<'a> Errors<'a> {
@@ -986,9 +845,13 @@ impl<'a> Errors<'a> {
             [[0.0; NAV]; NAV]
         };
         // A mean is rare (drifts, a strapdown too slow for the motion): without one its propagation is spared.
-        let drifts = sides.t.states.iter().any(|s| s.level != 0.0);
+        let levels = || sides.states.iter().map(|s| s.level);
+        let drifts = levels().any(|level| level != 0.0);
         let is_off = truth.integrates && !track.is_closed();
-        let mean = (drifts || is_off).then(|| Mean::new(sides));
+        let mean = (drifts || is_off).then(|| Column {
+            x: [0.0; NAV],
+            s: levels().collect(),
+        });
         Self {
             truth,
             joint: Joint::new(begin, sides),
@@ -999,35 +862,44 @@ impl<'a> Errors<'a> {
     /// Over the steps that lead to a mark.
     fn follow(&mut self, steps: &[Step], mark: &Mark) {
         for step in steps {
+            self.step_mean(step);
             self.joint.step(step);
-            self.mean.iter_mut().for_each(|mean| mean.step(step));
         }
-        if self.truth.integrates {
-            self.mean
-                .iter_mut()
-                .for_each(|mean| add_scaled(&mut mean.values.x, 1.0, &mark.closure));
+        if let Some(mean) = self.mean.as_mut().filter(|_| self.truth.integrates) {
+            add_scaled(&mut mean.x, 1.0, &mark.closure);
         }
     }
 
+    fn step_mean(&mut self, step: &Step) {
+        let Some(mean) = &mut self.mean else { return };
+        let (inputs, elapsed) = (self.joint.sides.over(step), self.joint.elapsed);
+        let mut error = [0.0; SIGNALS];
+        for (state, s) in mean.s.iter_mut().zip(&inputs.sources) {
+            // With the state at the beginning of the step, as in the covariance; it decays afterwards.
+            error[s.signal] += (s.mean + s.ramp * elapsed) * *state;
+            *state *= s.decay;
+        }
+        mean.x = step.map(&mean.x, &error);
+    }
+
     /// Corrects by a measurement with the filter's gain; returns the expected square of the innovation.
-    fn measure(&mut self, row: &Row, gain: &Gain) -> f64 {
+    fn measure(&mut self, row: &Row, gain: &Column) -> f64 {
         // Without its noise where the source under study is another one: covariances of independent sources
         // add.
         let measured = self.joint.measured(row);
-        let y = self.joint.innovation(
-            &measured,
-            if self.truth.has_noise(row.what) {
-                row.noise
-            } else {
-                0.0
-            },
-        );
-        let mean = self
-            .mean
-            .as_ref()
-            .map_or(0.0, |mean| measured.dot(&mean.values));
-        self.joint.correct(&y, gain);
-        self.mean.iter_mut().for_each(|m| m.correct(mean, gain));
+        let noise = if self.truth.has_noise(row.what) {
+            row.noise
+        } else {
+            0.0
+        };
+        let y = self.joint.innovation(&measured, noise);
+        let mean = self.mean.as_ref().map_or(0.0, |mean| measured.dot(mean));
+        corrected(&mut self.joint, &y, gain);
+        if let Some(Column { x, s }) = &mut self.mean {
+            let states = x.iter_mut().chain(s);
+            let gains = gain.x.iter().chain(&gain.s);
+            states.zip(gains).for_each(|(state, k)| *state -= k * mean);
+        }
         y.s + mean * mean
     }
 
@@ -1045,7 +917,7 @@ impl<'a> Errors<'a> {
             measured: !mark.rows.is_empty(),
             fix: mark.fix,
             covariance: self.joint.xx,
-            mean: self.mean.as_ref().map_or([0.0; NAV], |mean| mean.values.x),
+            mean: self.mean.as_ref().map_or([0.0; NAV], |mean| mean.x),
             jacobian: mark.jacobian,
         }
     }

@@ -9,9 +9,10 @@
 use super::pass::{Assessment, Consistency, ErrorLaw, FilterPass, Judged, assess};
 use super::track::{NAV, Track};
 use crate::earth::GravityModel;
+use crate::ekf::belief::white_of;
 use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings};
 use crate::imu::{Axis, Channel};
-use crate::noise::{Model, Process, reduction};
+use crate::noise::{Model, reduction};
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
@@ -103,7 +104,14 @@ impl Search<'_> {
             let (s, i) = (channel.sensor as usize, channel.axis as usize);
             // a factor needs something to act on: the wavelet fit may have put all white noise into the bias
             let first = self.alike.first_factor(channel);
-            let white = belief.white[s][i].max(white_of(self.model, channel));
+            let white = belief.white[s][i].max(
+                self.model
+                    .axis(channel)
+                    .processes
+                    .iter()
+                    .map(white_of)
+                    .sum(),
+            );
             belief.white[s][i] = white * ln[first].exp();
             let group = &mut belief.groups[s][0];
             group.innovation[i] *= ln[first + 1].exp();
@@ -307,16 +315,6 @@ pub(super) fn divergence(assessment: &Assessment, beside: impl Fn(&Consistency) 
     ENDS * ends + (1.0 - ENDS) * all
 }
 
-/// Long-run variance of the white and moving-average noise of the model (units² a sample).
-fn white_of(model: &Model, channel: Channel) -> f64 {
-    let white = |p: &Process| match p {
-        Process::White(p) => p.sigma2(),
-        Process::Ma1(p) => (1.0 + p.theta()).powi(2) * p.sigma2(),
-        _ => 0.0,
-    };
-    model.axis(channel).processes.iter().map(white).sum()
-}
-
 /// Time before the first outage, between the two and after them (s).
 const LEAD_S: [f64; 3] = [300.0, 240.0, 60.0];
 /// Longest outage that is followed along the drive (s).
@@ -365,7 +363,6 @@ pub fn drive(
         baro: None,
         aiding: &AidingSettings::default(),
         update: FixUpdate::default(),
-        nis_gate: None,
         outages: &outages,
         seed: 0,
         scenario: "",
@@ -449,25 +446,25 @@ const TRIALS: usize = 8;
 
 /// A value of the cost.
 pub(super) struct Value {
-    pub(super) cost: f64,
-    pub(super) parts: Vec<Part>,
+    pub cost: f64,
+    pub parts: Vec<Part>,
 }
 
 /// A number that the variables change, and the second derivative of the cost with respect to it.
 #[derive(Clone, Copy)]
 pub(super) struct Part {
-    pub(super) value: f64,
-    pub(super) curvature: f64,
+    pub value: f64,
+    pub curvature: f64,
 }
 
 /// What is minimised, and how far.
 pub(super) struct Damped<'a> {
-    pub(super) value: &'a (dyn Fn(&[f64]) -> Value + Sync),
+    pub value: &'a (dyn Fn(&[f64]) -> Value + Sync),
     /// Smallest and largest value of every variable.
-    pub(super) bounds: (f64, f64),
-    pub(super) iterations: usize,
+    pub bounds: (f64, f64),
+    pub iterations: usize,
     /// A step that gains less is the last.
-    pub(super) enough: f64,
+    pub enough: f64,
 }
 
 impl Damped<'_> {

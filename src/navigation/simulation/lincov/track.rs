@@ -4,11 +4,11 @@ use super::pass::add_scaled;
 use super::truth::defects;
 use crate::closure::Bounds;
 use crate::earth::ned_difference;
-use crate::ekf::belief::{BiasGroup, psi_of_angles};
+use crate::ekf::belief::{BiasGroup, psi_of_angles, state_of};
 use crate::ekf::covariance::{
     EARTH_STEP_S, EarthStep, EarthTerms, ErrorMap, NavError, PSI, R, Sample, V,
 };
-use crate::ekf::{Belief, UnknownKind, body_velocity_rows, dense_yaw_row, fix_rows};
+use crate::ekf::{Belief, UnknownKind, body_velocity_rows, fix_rows, yaw_row};
 use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::{Channel, Sensor};
 use crate::lanes::{Quat, Vec3};
@@ -34,12 +34,12 @@ const STEP_S: f64 = 0.2;
 /// less truth) of the signals, their means over the step. Columns; `b` of the signals that the track follows.
 #[derive(Debug, Clone)]
 pub(super) struct Step {
-    pub(super) samples: u32,
-    pub(super) m: [Nav; NAV],
-    pub(super) b: Vec<Nav>,
+    pub samples: u32,
+    pub m: [Nav; NAV],
+    pub b: Vec<Nav>,
     /// Covariance of the navigation error for white noise of variance 1 in each sample of a signal, by signals that are not
     /// multiplied; none where it acts through its mean over the step, as that of a bias does.
-    pub(super) white: Vec<[Nav; NAV]>,
+    pub white: Vec<[Nav; NAV]>,
 }
 
 /// What is measured.
@@ -72,18 +72,18 @@ impl Measured {
 /// A scalar measurement: nine coefficients of the navigation error, three of the gyroscope's error.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
-    pub(super) h: [f64; NAV + 3],
+    pub h: [f64; NAV + 3],
     /// What errors of the gyroscope are proportional to.
-    pub(super) felt: Surroundings,
+    felt: Surroundings,
     /// Variance of its white noise, as the filter believes.
-    pub(super) r: f64,
+    pub r: f64,
     /// The same in truth.
-    pub(super) noise: f64,
-    pub(super) what: Measured,
+    pub noise: f64,
+    pub what: Measured,
     /// Velocity of the point of the vehicle (m/s) and acceleration (m/s²), in b.
     motion: [DVec3; 2],
     /// Whether outages withhold it.
-    pub(super) of_gnss: bool,
+    pub of_gnss: bool,
 }
 
 impl Row {
@@ -127,28 +127,28 @@ impl Row {
 #[derive(Debug, Clone)]
 pub(super) struct Mark {
     /// Steps from the start until here.
-    pub(super) steps: usize,
+    steps: usize,
     /// Time from the start (s).
-    pub(super) after_s: f64,
+    pub after_s: f64,
     /// Time on the trajectory (s).
-    pub(super) t_s: f64,
+    pub t_s: f64,
     /// Whether a fix is used.
-    pub(super) fix: bool,
+    pub fix: bool,
     /// Scalar measurements, in sequence.
-    pub(super) rows: Vec<Row>,
-    pub(super) report: bool,
+    pub rows: Vec<Row>,
+    pub report: bool,
     /// Outages that end here, before the measurements.
-    pub(super) outages: Vec<usize>,
+    pub outages: Vec<usize>,
     /// Roll, pitch, yaw errors (rad) from `psi_n` (rad), at the true attitude.
-    pub(super) jacobian: [DVec3; 3],
+    pub jacobian: [DVec3; 3],
     /// Error of the strapdown algorithm over the steps that lead here (m, m/s, rad), which no sensor makes.
-    pub(super) closure: Nav,
+    pub closure: Nav,
 }
 
 /// A trajectory with its fixes, ready for any number of passes.
 #[derive(Debug, Clone)]
 pub struct Track {
-    pub(super) steps: Vec<Step>,
+    steps: Vec<Step>,
     pub(super) marks: Vec<Mark>,
     pub(super) outages: usize,
     /// Covariance of the navigation error at the start, as the filter believes.
@@ -259,7 +259,7 @@ struct Linearisation {
 impl Linearisation {
     fn new(plan: &Plan<'_>, noise_hz: f64) -> Self {
         let experiment = plan.experiment;
-        let ins = Strapdown::single(&plan.start, experiment.gravity);
+        let ins = Strapdown::<f64>::new(&plan.start, experiment.gravity);
         let defects = Sensor::ALL
             .into_iter()
             .flat_map(|sensor| defects(experiment.defects, sensor));
@@ -381,7 +381,7 @@ impl Linearisation {
             ..Row::new(h, self.felt, r, Measured::Aid(aid, axis))
         };
         if aid == Aid::Heading {
-            rows.push(row(dense_yaw_row(&self.ins), 0));
+            rows.push(row(yaw_row(&self.ins), 0));
             return;
         }
         let [_, omega_ib_b] = self.felt.sample;
@@ -499,9 +499,7 @@ impl Track {
         Self {
             steps,
             marks,
-            outages: self.outages,
-            start: self.start,
-            perfect: self.perfect,
+            ..*self
         }
     }
 
@@ -539,9 +537,7 @@ impl Track {
         Self {
             steps,
             marks,
-            outages: self.outages,
-            start: self.start,
-            perfect: self.perfect,
+            ..*self
         }
     }
 
@@ -695,7 +691,7 @@ pub(super) const RECTIFIED: usize = 33;
 pub(super) const WARMED: usize = 36;
 
 /// Where a signal acts: sensor, axis, and what it is multiplied by.
-pub(super) const fn place(signal: usize) -> (usize, usize, Felt) {
+const fn place(signal: usize) -> (usize, usize, Felt) {
     match signal {
         0..SCALED => (signal / 3, signal % 3, Felt::Unit),
         SCALED..CROSSED => {
@@ -740,7 +736,7 @@ const UNKNOWNS: [UnknownKind; 2] = [UnknownKind::Drift, UnknownKind::ScaleFactor
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Source {
     /// Which signal it is part of.
-    pub(super) signal: usize,
+    pub signal: usize,
     before: f64,
     after: f64,
     fresh: f64,
@@ -749,11 +745,11 @@ pub(super) struct Source {
     /// Growth of `after` with every sample: a ramp is its slope times the samples so far.
     ramp: f64,
     /// Variance of s at the start.
-    pub(super) initial: f64,
+    pub initial: f64,
     /// Mean of s at the start.
-    pub(super) level: f64,
+    pub level: f64,
     /// The measurement that it is part of; such a source is no inertial error.
-    pub(super) outer: Option<Outer>,
+    pub outer: Option<Outer>,
 }
 
 /// An error of measurements that lasts.
@@ -781,21 +777,21 @@ const NONE: Source = Source {
 
 /// What a source does over a step: the mean of its samples' errors is `mean`·s + w₁, and s⁺ = `decay`·s + w₂.
 pub(super) struct StepOfSource {
-    pub(super) signal: usize,
-    pub(super) mean: f64,
+    pub signal: usize,
+    pub mean: f64,
     /// Growth of `mean` with every sample before the step.
-    pub(super) ramp: f64,
-    pub(super) decay: f64,
+    pub ramp: f64,
+    pub decay: f64,
     /// Variance of w₁.
-    pub(super) q_mean: f64,
+    q_mean: f64,
     /// Covariance of w₁ and w₂.
-    pub(super) q_cross: f64,
+    pub q_cross: f64,
     /// Variance of w₂.
-    pub(super) q_state: f64,
+    pub q_state: f64,
 }
 
 impl Source {
-    fn bias(signal: usize, phi: f64, innovation: f64, initial: f64) -> Self {
+    fn bias(signal: usize, [phi, innovation, initial]: [f64; 3]) -> Self {
         Self {
             signal,
             after: 1.0,
@@ -808,7 +804,7 @@ impl Source {
 
     /// An unknown constant of a standard deviation.
     pub(super) fn constant(signal: usize, sigma: f64) -> Self {
-        Self::bias(signal, 1.0, 0.0, sigma * sigma)
+        Self::bias(signal, [1.0, 0.0, sigma * sigma])
     }
 
     /// A state that is nothing but the last innovation of standard deviation `sigma`: the error of a sample
@@ -892,7 +888,7 @@ impl Source {
     }
 
     /// What the source does over a step of `samples` samples, exactly.
-    pub(super) fn over(&self, samples: u32) -> StepOfSource {
+    fn over(&self, samples: u32) -> StepOfSource {
         let n = f64::from(samples);
         let mut step = StepOfSource {
             signal: self.signal,
@@ -936,8 +932,8 @@ impl Source {
 /// The errors of an IMU: sources, and white noise of a sample on each signal.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Sources {
-    pub(super) states: Vec<Source>,
-    pub(super) white: [f64; BIASES],
+    pub states: Vec<Source>,
+    pub white: [f64; BIASES],
 }
 
 impl Default for Sources {
@@ -960,7 +956,7 @@ impl Sources {
     }
 
     /// What a filter estimates of them: nothing at the start, and nothing drives its estimates but corrections.
-    pub(super) fn estimates(&self) -> Self {
+    fn estimates(&self) -> Self {
         Self {
             states: self.states.iter().map(Source::estimate).collect(),
             ..Self::default()
@@ -987,17 +983,17 @@ impl Sources {
     }
 
     /// The bias states of a group.
-    pub(super) fn of_group(sensor: Sensor, group: &BiasGroup) -> Vec<Source> {
+    fn of_group(sensor: Sensor, group: &BiasGroup) -> Vec<Source> {
         let state = |axis: usize| {
             let (phi, q, initial) = (group.phi[axis], group.innovation[axis], group.initial[axis]);
             (initial != 0.0 || q != 0.0)
-                .then(|| Source::bias(3 * sensor as usize + axis, phi, q, initial))
+                .then(|| Source::bias(3 * sensor as usize + axis, [phi, q, initial]))
         };
         (0..3).filter_map(state).collect()
     }
 
     /// Unknown constants of a belief that are multiplied.
-    pub(super) fn multiplied(belief: &Belief, kinds: &[UnknownKind]) -> Vec<Source> {
+    fn multiplied(belief: &Belief, kinds: &[UnknownKind]) -> Vec<Source> {
         let mut states = Vec::new();
         for (sensor, axis) in Sensor::ALL
             .into_iter()
@@ -1020,7 +1016,7 @@ impl Sources {
     }
 
     /// Wheel scale and mounting of a vehicle, as a filter believes in them.
-    pub(super) fn of_vehicle(belief: &Belief) -> Vec<Source> {
+    fn of_vehicle(belief: &Belief) -> Vec<Source> {
         let parts = [
             AidPart::WheelScale,
             AidPart::MountingPitch,
@@ -1044,8 +1040,9 @@ impl Sources {
                 .iter()
                 .filter(|g| g.is_constant())
             {
-                let constant =
-                    |axis| Source::bias(3 * sensor as usize + axis, 1.0, 0.0, group.initial[axis]);
+                let constant = |axis| {
+                    Source::bias(3 * sensor as usize + axis, [1.0, 0.0, group.initial[axis]])
+                };
                 states.extend((0..3).map(constant).filter(|s| s.initial > 0.0));
             }
         }
@@ -1079,12 +1076,12 @@ impl Sources {
             // would grow.
             Process::Quantization(p) => Source::memory(signal, p.q2().sqrt(), 1.0, -1.0),
             Process::Ma1(p) => Source::memory(signal, p.sigma2().sqrt(), 1.0, p.theta()),
-            Process::Ar1(p) => Source::bias(signal, p.phi(), p.sigma2(), p.variance()),
-            Process::GaussMarkov(p) => {
-                Source::bias(signal, p.ar1().phi(), p.ar1().sigma2(), p.s2())
-            }
-            Process::RandomWalk(p) => Source::bias(signal, 1.0, p.gamma2(), 0.0),
             Process::Drift(p) => Source::ramp(signal, p.slope()),
+            other => {
+                let bias = state_of(other).map(|state| Source::bias(signal, state));
+                self.states.extend(bias);
+                return;
+            }
         };
         self.states.push(state);
     }
@@ -1094,10 +1091,11 @@ impl Sources {
 
 /// The states `b` of a filter and `t` of the truth, as `Joint` has them.
 pub(super) struct Sides {
-    pub(super) b: Sources,
-    pub(super) t: Sources,
+    pub states: Vec<Source>,
+    /// How many of them are `b`, which come first.
+    pub estimated: usize,
     /// Signals that they reach: most have neither scale factors nor what comes after them.
-    pub(super) signals: usize,
+    pub signals: usize,
     /// By the number of samples of a step; few numbers occur.
     inputs: Vec<(u32, Inputs)>,
 }
@@ -1105,33 +1103,32 @@ pub(super) struct Sides {
 impl Sides {
     /// A filter as it sees itself along a track: its biases are what makes its errors.
     pub(super) fn of_filter(believed: Sources, track: &Track) -> Self {
-        Self::new(believed, Sources::default(), track)
+        let estimated = believed.states.len();
+        Self::new(believed, estimated, track)
     }
 
     /// The estimates of a filter, and what truly makes its errors.
     pub(super) fn of_errors(believed: &Sources, truth: &Sources, track: &Track) -> Self {
-        Self::new(believed.estimates(), truth.clone(), track)
+        let mut sources = believed.estimates();
+        let estimated = sources.states.len();
+        sources.extend(truth);
+        Self::new(sources, estimated, track)
     }
 
-    fn new(b: Sources, t: Sources, track: &Track) -> Self {
+    fn new(sources: Sources, estimated: usize, track: &Track) -> Self {
         let mut inputs: Vec<(u32, Inputs)> = Vec::new();
         for step in &track.steps {
             if inputs.iter().all(|(samples, _)| *samples != step.samples) {
-                inputs.push((step.samples, Inputs::new(&b, &t, step.samples)));
+                inputs.push((step.samples, Inputs::new(&sources, step.samples)));
             }
         }
-        let signals = b
-            .states
-            .iter()
-            .chain(&t.states)
-            .map(|s| s.signal + 1)
-            .max()
-            .unwrap_or(0);
+        let signals = sources.states.iter().map(|s| s.signal + 1);
+        let signals = signals.max().unwrap_or(0);
         // What a track does not follow would be left out in silence.
         debug_assert!(track.steps.iter().all(|step| signals <= step.b.len()));
         Self {
-            b,
-            t,
+            states: sources.states,
+            estimated,
             signals,
             inputs,
         }
@@ -1149,37 +1146,30 @@ impl Sides {
 
 /// What sources do over steps of one length.
 pub(super) struct Inputs {
-    pub(super) b: Vec<StepOfSource>,
-    pub(super) t: Vec<StepOfSource>,
+    pub sources: Vec<StepOfSource>,
     /// Variance of the white noise of a sample (units²).
-    pub(super) white: [f64; BIASES],
+    pub white: [f64; BIASES],
     /// Variance of the part of a signal's mean over the step that is new in it: of white noise and states, of states
     /// alone (units²).
-    pub(super) q_mean: [[f64; SIGNALS]; 2],
+    pub q_mean: [[f64; SIGNALS]; 2],
 }
 
 impl Inputs {
-    /// The steps of the filter's states `b` and of the states `t` of the truth; white noise belongs to the side that
-    /// makes the errors.
-    fn new(b: &Sources, t: &Sources, samples: u32) -> Self {
-        let steps_of = |s: &Sources| -> Vec<StepOfSource> {
-            s.states.iter().map(|x| x.over(samples)).collect()
-        };
-        let (bs, ts) = (steps_of(b), steps_of(t));
-        let white: [f64; BIASES] = std::array::from_fn(|i| b.white[i] + t.white[i]);
+    fn new(all: &Sources, samples: u32) -> Self {
+        let sources: Vec<StepOfSource> = all.states.iter().map(|x| x.over(samples)).collect();
+        let white = all.white;
         let mut q_mean = [[0.0; SIGNALS]; 2];
         q_mean[0]
             .iter_mut()
             .zip(white)
             .for_each(|(q, white)| *q = white / f64::from(samples));
-        for source in bs.iter().chain(&ts) {
+        for source in &sources {
             q_mean
                 .iter_mut()
                 .for_each(|q| q[source.signal] += source.q_mean);
         }
         Self {
-            b: bs,
-            t: ts,
+            sources,
             white,
             q_mean,
         }

@@ -1,16 +1,13 @@
 //! What makes the true errors: independent sources, alone or together.
 
-use super::track::{
-    CROSSED, Measured, Outer, PUSHED, RECTIFIED, SCALED, Source, Sources, WARMED, place,
-};
-use crate::ekf::{Belief, UnknownKind};
+use super::track::{CROSSED, Measured, Outer, PUSHED, RECTIFIED, SCALED, Source, Sources, WARMED};
+use crate::ekf::Belief;
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Kind, Model, Process};
 use crate::sensors::aiding::{AidError, AidingSettings};
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::simulation::plan::Experiment;
-use std::fmt;
 use std::ops::Range;
 
 /// Kinds of white noise of measurements: positions and velocities of fixes apart.
@@ -105,7 +102,7 @@ impl TruthSide {
     /// sensor by sensor, the defects of the true IMU, start, receiver, barometer and aiding. All drifts are one source:
     /// they are the same in every run, so that their errors add, not their variances.
     pub fn sources(experiment: &Experiment<'_>, model: &Model) -> Vec<NamedSource> {
-        let mut parts = beside_the_imu(experiment, !experiment.initial.perfect);
+        let mut parts = beside_the_imu(experiment);
         let mut drifts = Vec::new();
         for sensor in Sensor::ALL {
             parts.extend(processes(model, sensor, &mut drifts));
@@ -124,17 +121,6 @@ impl TruthSide {
             integrates: true,
             ..Self::default()
         }
-    }
-
-    /// The sources that a filter believes in: its bias states instead of a model's processes.
-    pub fn believed(experiment: &Experiment<'_>, belief: &Belief) -> Vec<NamedSource> {
-        // The filter believes in an uncertain start, also where the true one is perfect.
-        let mut parts = beside_the_imu(experiment, true);
-        for sensor in Sensor::ALL {
-            parts.extend(believed_of(belief, sensor));
-        }
-        parts.extend(inertial("aiding".to_owned(), Sources::of_vehicle(belief)));
-        parts
     }
 
     /// The errors of a model, turn-on biases and scale factors as a filter expects them, start and receiver as it
@@ -202,7 +188,7 @@ impl TruthSide {
 }
 
 /// Start, receiver, barometer and what the vehicle measures of itself.
-fn beside_the_imu(experiment: &Experiment<'_>, starts_off: bool) -> Vec<NamedSource> {
+fn beside_the_imu(experiment: &Experiment<'_>) -> Vec<NamedSource> {
     // One kind of white noise at a time: a budget asks for the share of each.
     let noise = |at: usize| TruthSide {
         noise: std::array::from_fn(|i| i == at),
@@ -213,7 +199,7 @@ fn beside_the_imu(experiment: &Experiment<'_>, starts_off: bool) -> Vec<NamedSou
         ..TruthSide::default()
     };
     let all = [
-        ("initial".to_owned(), start, starts_off),
+        ("initial".to_owned(), start, !experiment.initial.perfect),
         ("gnss.position".to_owned(), noise(0), true),
         (
             "gnss.velocity".to_owned(),
@@ -347,52 +333,6 @@ fn lasting(aiding: &AidingSettings, imu_hz: f64) -> Vec<NamedSource> {
         .collect()
 }
 
-/// What a filter believes of a sensor.
-fn believed_of(belief: &Belief, sensor: Sensor) -> Vec<NamedSource> {
-    let first = 3 * sensor as usize;
-    let mut white = Sources::default();
-    white.white[first..first + 3].copy_from_slice(&belief.white[sensor as usize].to_array());
-    let mut all = Vec::new();
-    if white.white.iter().any(|w| *w > 0.0) {
-        let side = TruthSide {
-            inertial: white,
-            ..TruthSide::default()
-        };
-        all.push(NamedSource::new(format!("{}.WN", sensor.name()), side));
-    }
-    let groups = &belief.groups[sensor as usize];
-    let biases = groups.iter().filter(|g| !g.is_constant()).count();
-    let mut number = 0;
-    for group in groups {
-        let name = if group.is_constant() {
-            "turn_on_bias".to_owned()
-        } else {
-            number += 1;
-            if biases == 1 {
-                "bias".to_owned()
-            } else {
-                format!("bias_{number}")
-            }
-        };
-        all.extend(inertial(
-            format!("{}.{name}", sensor.name()),
-            Sources::of_group(sensor, group),
-        ));
-    }
-    for (kind, name) in [
-        (UnknownKind::Drift, "drift"),
-        (UnknownKind::ScaleFactor, "scale"),
-    ] {
-        let states = Sources::multiplied(belief, &[kind]);
-        let of_sensor = states
-            .into_iter()
-            .filter(|s| place(s.signal).0 == sensor as usize)
-            .collect();
-        all.extend(inertial(format!("{}.{name}", sensor.name()), of_sensor));
-    }
-    all
-}
-
 // Whether the motion shows the heading.
 
 /// Standard deviation of the heading from which an error-state filter is not to be believed (degrees): the sine
@@ -401,40 +341,23 @@ const LARGE_DEG: f64 = 5.0;
 /// Time that an alignment may take (s).
 const SETTLED_S: f64 = 120.0;
 
-/// A heading that is hardly observable.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HeadingDoubt {
-    /// Its largest standard deviation while there are fixes (degrees).
-    pub sigma_deg: f64,
-    /// When (s from the start).
-    pub after_s: f64,
-}
-
-impl fmt::Display for HeadingDoubt {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // beyond half a turn a linear deviation is only a large number
-        let sigma = if self.sigma_deg < 180.0 {
-            format!("{:.0}°", self.sigma_deg)
-        } else {
-            "over 180°".to_owned()
-        };
-        write!(
-            f,
-            "the heading is hardly observable: its standard deviation is {sigma} after {:.0} s although there are \
-             fixes (horizontal accelerations are too small to show it); there the filter's sigma of yaw may be \
-             several times too small, with any number of states",
-            self.after_s
-        )
-    }
-}
-
 /// Where the heading is hardly observable: `while_fixed` are the times from the start (s) at which fixes are used,
 /// and the standard deviations of yaw there (degrees). The first two minutes belong to the alignment.
-pub fn weak_heading(while_fixed: impl Iterator<Item = (f64, f64)>) -> Option<HeadingDoubt> {
+pub fn weak_heading(while_fixed: impl Iterator<Item = (f64, f64)>) -> Option<String> {
     let settled = while_fixed.filter(|(after_s, _)| *after_s >= SETTLED_S);
     let worst = settled.max_by(|a, b| a.1.total_cmp(&b.1));
     let (after_s, sigma_deg) = worst.filter(|(_, sigma_deg)| *sigma_deg > LARGE_DEG)?;
-    Some(HeadingDoubt { sigma_deg, after_s })
+    // beyond half a turn a linear deviation is only a large number
+    let sigma = if sigma_deg < 180.0 {
+        format!("{sigma_deg:.0}°")
+    } else {
+        "over 180°".to_owned()
+    };
+    Some(format!(
+        "the heading is hardly observable: its standard deviation is {sigma} after {after_s:.0} s although there are \
+         fixes (horizontal accelerations are too small to show it); there the filter's sigma of yaw may be \
+         several times too small, with any number of states"
+    ))
 }
 
 #[cfg(test)]
@@ -445,12 +368,6 @@ mod heading_tests {
     fn the_largest_deviation_after_the_alignment_decides() {
         assert_eq!(weak_heading([(10.0, 20.0), (200.0, 4.0)].into_iter()), None);
         let doubt = weak_heading([(10.0, 20.0), (200.0, 7.0), (300.0, 6.0)].into_iter());
-        assert_eq!(
-            doubt,
-            Some(HeadingDoubt {
-                sigma_deg: 7.0,
-                after_s: 200.0
-            })
-        );
+        assert!(doubt.is_some_and(|doubt| doubt.contains("is 7° after 200 s")));
     }
 }

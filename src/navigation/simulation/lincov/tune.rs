@@ -437,7 +437,7 @@ pub struct Departure {
 
 impl FilterConsistency {
     /// Of one filter under several truths.
-    pub(super) fn of(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> Self {
+    fn of(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> Self {
         let count = assessments.len() as f64;
         let mean =
             |a: &Assessment| a.reports.iter().map(|r| r.nees).sum::<f64>() / a.reports.len() as f64;
@@ -520,7 +520,7 @@ struct DrawFactors {
 
 impl DrawFactors {
     /// Of a filter under the first truth and its draws, whose consistency is known.
-    pub(super) fn of(
+    fn of(
         assessments: &[Assessment],
         drawn: &UpperEnd<'_>,
         consistency: &FilterConsistency,
@@ -645,7 +645,7 @@ impl Factor {
 const MAX_LN: f64 = 12.0;
 
 /// The factors of a model, all 1: of the sensors with noise that a filter models.
-pub(super) fn multiplied(model: &Model) -> Vec<Factor> {
+fn multiplied(model: &Model) -> Vec<Factor> {
     let has_noise = |sensor: &Sensor| {
         Channel::ALL
             .into_iter()
@@ -708,11 +708,11 @@ fn times(process: &Process, on_variance: f64, rate_hz: f64) -> Process {
 /// How a crossing is sought.
 pub(crate) struct Crossing {
     /// Where the variable may go.
-    pub(crate) bounds: (f64, f64),
+    pub bounds: (f64, f64),
     /// First step away from the start; it doubles until there is a bracket.
-    pub(crate) step: f64,
+    pub step: f64,
     /// A value this close to zero is zero.
-    pub(crate) exact: f64,
+    pub exact: f64,
 }
 
 /// Evaluations within a bracket. The Illinois rule gains a digit in two of them.
