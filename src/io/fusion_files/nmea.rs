@@ -4,9 +4,7 @@
 //! The layout of the sentences is that of the receivers' manuals (Trimble R6/R7/R8, appendix A; u-blox protocol
 //! specifications).
 
-use super::fixes::Fixes;
-use super::rtklib;
-use super::{doubt, remark};
+use super::{Fixes, clock, doubt, remark};
 use crate::io::{Failure as Error, help};
 use chrono::NaiveDate;
 use glam::{DVec2, DVec3};
@@ -54,7 +52,7 @@ struct Log {
 }
 
 /// Whether a text is such a log: one of its first lines has a sentence of a receiver in it.
-pub(in crate::io) fn is_nmea(text: &str) -> bool {
+pub(crate) fn is_nmea(text: &str) -> bool {
     let is_address = |word: &str| word.len() == 5 && word.bytes().all(|b| b.is_ascii_uppercase());
     let mut lines = text.lines().take(20).map(str::trim_end);
     lines.any(|line| body(line).is_ok_and(|body| body.split(',').next().is_some_and(is_address)))
@@ -149,7 +147,7 @@ impl Log {
             self.epochs.last()?.since_s(),
         );
         let is_of_day = imu_s.is_some_and(|imu| imu.0 <= last && first <= imu.1);
-        let clock = rtklib::clock((midnight_s + first, midnight_s + last), imu_s)?;
+        let clock = clock((midnight_s + first, midnight_s + last), imu_s)?;
         let is_meant = clock.origin_s == 0.0 || !is_of_day;
         is_meant.then_some((midnight_s - clock.origin_s, clock.name))
     }

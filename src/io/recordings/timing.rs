@@ -1,7 +1,6 @@
 //! Sample rate, unit of time, gaps and duplicates, from the time column or the packet counter.
 
-use super::report::FileReport;
-use super::{Gaps, ReadOptions, too_short};
+use super::{FileReport, Gaps, ReadOptions, too_short};
 use crate::io::table::{Column, Table};
 use crate::io::{Failure, Place, help};
 use crate::report::six_digits;
@@ -355,7 +354,7 @@ fn rounded(value: f64) -> f64 {
     }
 }
 
-pub(in crate::io) fn median_step(times: &[f64]) -> f64 {
+pub(crate) fn median_step(times: &[f64]) -> f64 {
     let mut steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
     if steps.is_empty() {
         return 0.0;
@@ -432,7 +431,7 @@ const UNITS: [(f64, &str); 4] = [(1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9,
 const UNIX_S: std::ops::Range<f64> = 9.4e8..4.2e9;
 
 /// The unit in which a step is that of 10 Hz … 10 kHz: the four ranges do not overlap.
-pub(in crate::io) fn unit_of_step(step: f64) -> (f64, &'static str) {
+pub(crate) fn unit_of_step(step: f64) -> (f64, &'static str) {
     UNITS[match step {
         s if s >= 1e5 => 3,
         s if s >= 100.0 => 2,

@@ -1,15 +1,11 @@
 //! Logs of PX4 (<https://docs.px4.io/main/en/dev_log/ulog_file_format.html>).
 
-mod layout;
-mod messages;
-mod topics;
-
+use crate::bytes::{Bytes, Number, text};
 use crate::channel::{Channel, Content, Each};
 use crate::error::Error;
 use crate::input::Input;
-use crate::sample::{Clock, Stamp};
-use messages::Messages;
-use std::collections::BTreeMap;
+use crate::sample::{Clock, Fix, ImuSample, Sample, Stamp, stated};
+use std::collections::{BTreeMap, HashMap};
 
 /// Counts the messages of each topic.
 pub(crate) fn survey(
@@ -22,8 +18,8 @@ pub(crate) fn survey(
             continue;
         };
         let new = || {
-            let (content, rank) = topics::content(&topic.name);
-            let sample = topics::sample(content, &topic.layout, &data, Stamp::Header);
+            let (content, rank) = content(&topic.name);
+            let sample = sample(content, &topic.layout, &data, Stamp::Header);
             let named = match topic.instance {
                 0 => topic.name.clone(),
                 instance => format!("{}.{instance}", topic.name),
@@ -58,12 +54,309 @@ pub(crate) fn read(
     let mut messages = Messages::new(input)?;
     while let Some(data) = messages.next_data(Some(channel.id))? {
         let topic = messages.topics.get(&data.id);
-        let sample =
-            topic.and_then(|topic| topics::sample(channel.content, &topic.layout, &data, stamp));
+        let sample = topic.and_then(|topic| sample(channel.content, &topic.layout, &data, stamp));
         let short = || Error::malformed(data.offset, "a message is shorter than its format");
         if let Some(sample) = sample.ok_or_else(short)? {
             each(data.offset, sample)?;
         }
     }
     Ok(())
+}
+
+// Fields of the messages of a topic.
+
+/// Formats within formats: deeper ones are not followed.
+const DEEPEST: usize = 8;
+
+/// Formats by their names, each a list of fields `type name;`.
+pub(super) type Formats = HashMap<String, String>;
+
+/// Places of a message's own fields; those of formats within it are passed over.
+#[derive(Default)]
+pub(super) struct Layout {
+    fields: HashMap<String, Field>,
+}
+
+/// Field of a message.
+#[derive(Clone, Copy)]
+struct Field {
+    at: usize,
+    number: Number,
+    count: usize,
+}
+
+/// The type of a name.
+fn number(name: &str) -> Option<Number> {
+    Some(match name {
+        "int8_t" => Number::Signed(1),
+        "uint8_t" | "bool" | "char" => Number::Unsigned(1),
+        "int16_t" => Number::Signed(2),
+        "uint16_t" => Number::Unsigned(2),
+        "int32_t" => Number::Signed(4),
+        "uint32_t" => Number::Unsigned(4),
+        "int64_t" => Number::Signed(8),
+        "uint64_t" => Number::Unsigned(8),
+        "float" => Number::Float(4),
+        "double" => Number::Float(8),
+        _ => return None,
+    })
+}
+
+impl Layout {
+    /// The layout of a format; none where it does not parse.
+    pub(super) fn new(name: &str, formats: &Formats) -> Option<Self> {
+        let mut layout = Self::default();
+        let mut at = 0_usize;
+        for (type_name, count, field) in fields(formats.get(name)?) {
+            if let Some(number) = number(type_name) {
+                let own = Field { at, number, count };
+                layout.fields.insert(field.to_owned(), own);
+            }
+            at = at.checked_add(size_of(type_name, formats, 0)?.checked_mul(count)?)?;
+        }
+        Some(layout)
+    }
+
+    /// A field of so many numbers.
+    fn field(&self, name: &str, count: usize) -> Option<Field> {
+        let field = self.fields.get(name).copied();
+        field.filter(|field| field.count == count)
+    }
+
+    /// Numbers of a field; none where the message is too short or the layout has no such field.
+    pub(super) fn numbers<const N: usize>(&self, name: &str, message: &[u8]) -> Option<[f64; N]> {
+        let field = self.field(name, N)?;
+        let mut bytes = Bytes::little(message.get(field.at..)?);
+        let mut values = [0.0; N];
+        for value in &mut values {
+            *value = field.number.read(&mut bytes)?;
+        }
+        Some(values)
+    }
+
+    /// Time (µs in the message) (ns); none beyond what can be a time.
+    pub(super) fn time_ns(&self, name: &str, message: &[u8]) -> Option<i64> {
+        let field = self.field(name, 1)?;
+        let field = (field.number == Number::Unsigned(8)).then_some(field)?;
+        let us = Bytes::little(message.get(field.at..)?).u64()?;
+        i64::try_from(us).ok()?.checked_mul(1000)
+    }
+}
+
+/// Bytes of a type, or of a format.
+fn size_of(name: &str, formats: &Formats, depth: usize) -> Option<usize> {
+    if let Some(number) = number(name) {
+        return Some(number.size());
+    }
+    let mut fields = fields(formats.get(name).filter(|_| depth <= DEEPEST)?);
+    fields.try_fold(0_usize, |sum, (type_name, count, _)| {
+        sum.checked_add(size_of(type_name, formats, depth + 1)?.checked_mul(count)?)
+    })
+}
+
+/// Type, number and name of each field: `float[3] gyro_rad;`.
+fn fields(format: &str) -> impl Iterator<Item = (&str, usize, &str)> {
+    format.split(';').filter_map(|field| {
+        let (type_name, name) = field.trim().split_once(' ')?;
+        let (type_name, count) = match type_name.split_once('[') {
+            Some((type_name, count)) => (type_name, count.trim_end_matches(']').parse().ok()?),
+            None => (type_name, 1),
+        };
+        Some((type_name, count, name))
+    })
+}
+
+// Messages of a log.
+
+const MAGIC: [u8; 7] = *b"ULog\x01\x12\x35";
+/// Flag of data that was appended after the log had ended (a crash dump), and all others.
+const APPENDED: u8 = 1;
+
+/// Message of a topic.
+pub(super) struct Data {
+    pub(super) id: u16,
+    pub(super) offset: u64,
+    pub(super) bytes: Vec<u8>,
+}
+
+/// Topic of a log.
+pub(super) struct Topic {
+    pub(super) name: String,
+    pub(super) instance: u8,
+    pub(super) layout: Layout,
+}
+
+/// Messages of a file.
+pub(super) struct Messages<'a> {
+    input: &'a mut Input,
+    formats: Formats,
+    /// Topics by their numbers.
+    pub(super) topics: HashMap<u16, Topic>,
+    /// Byte from which on data was appended: what comes before it may be cut, and it is no flight.
+    end: u64,
+}
+
+impl<'a> Messages<'a> {
+    pub(super) fn new(input: &'a mut Input) -> Result<Self, Error> {
+        if input.array()? != MAGIC {
+            return Err(Error::malformed(0, "not the start of a ULog file"));
+        }
+        // version and time of the start
+        input.skip(9)?;
+        Ok(Self {
+            input,
+            formats: Formats::new(),
+            topics: HashMap::new(),
+            end: u64::MAX,
+        })
+    }
+
+    /// The next message of a topic: of any, or of one.
+    pub(super) fn next_data(&mut self, only: Option<u32>) -> Result<Option<Data>, Error> {
+        loop {
+            let offset = self.input.position();
+            if self.input.left() == 0 || offset + 3 > self.end {
+                return Ok(None);
+            }
+            let (size, kind) = (self.input.u16()?, self.input.u8()?);
+            if self.input.position() + u64::from(size) > self.end {
+                return Ok(None);
+            }
+            self.input.expect(size.into())?;
+            if kind != b'D' {
+                self.other(kind, size, offset)?;
+                continue;
+            }
+            let size = u64::from(size);
+            let Some(rest) = size.checked_sub(2) else {
+                return Err(Error::malformed(
+                    offset,
+                    "a message of a topic without a number",
+                ));
+            };
+            let id = self.input.u16()?;
+            if only.is_none_or(|only| only == u32::from(id)) {
+                let bytes = self.input.bytes(rest, rest)?;
+                return Ok(Some(Data { id, offset, bytes }));
+            }
+            self.input.skip(rest)?;
+        }
+    }
+
+    /// Formats, subscriptions and flags.
+    fn other(&mut self, kind: u8, size: u16, offset: u64) -> Result<(), Error> {
+        if !matches!(kind, b'F' | b'A' | b'B') {
+            return self.input.skip(size.into());
+        }
+        let body = self.input.bytes(size.into(), size.into())?;
+        let fault = || {
+            Error::malformed(
+                offset,
+                format!("message {:?} does not parse", char::from(kind)),
+            )
+        };
+        match kind {
+            b'F' => {
+                let format = text(&body);
+                let (name, fields) = format.split_once(':').ok_or_else(fault)?;
+                self.formats.insert(name.to_owned(), fields.to_owned());
+            }
+            b'A' => {
+                let mut bytes = Bytes::little(&body);
+                let (instance, id) = bytes.u8().zip(bytes.u16()).ok_or_else(fault)?;
+                let name = text(&body[3..]);
+                if let Some(layout) = Layout::new(&name, &self.formats) {
+                    let topic = Topic {
+                        name,
+                        instance,
+                        layout,
+                    };
+                    self.topics.insert(id, topic);
+                }
+            }
+            _ => self.flags(&body, offset).ok_or_else(fault)??,
+        }
+        Ok(())
+    }
+
+    /// Flags that tell of data a reader has to know of.
+    fn flags(&mut self, body: &[u8], offset: u64) -> Option<Result<(), Error>> {
+        let mut bytes = Bytes::little(body);
+        bytes.take(8)?;
+        let incompatible = bytes.take(8)?;
+        if incompatible[0] & !APPENDED != 0 || incompatible[1..].iter().any(|flags| *flags != 0) {
+            return Some(Err(Error::encoding(
+                offset,
+                format!("ULog flags {incompatible:02x?}").as_bytes(),
+            )));
+        }
+        if incompatible[0] & APPENDED != 0 {
+            let offsets = [bytes.u64()?, bytes.u64()?, bytes.u64()?].into_iter();
+            self.end = offsets.filter(|at| *at > 0).min().unwrap_or(u64::MAX);
+        }
+        Some(Ok(()))
+    }
+}
+
+// Topics of PX4 that hold samples and fixes (the files `msg/*.msg` of PX4-Autopilot).
+
+/// Content of a topic, and its rank: what the autopilot fuses comes before what a single device measures.
+pub(super) fn content(name: &str) -> (Content, u8) {
+    match name {
+        "sensor_combined" => (Content::Imu, 0),
+        "vehicle_imu" => (Content::Imu, 1),
+        "vehicle_gps_position" => (Content::Fix, 0),
+        "sensor_gps" => (Content::Fix, 1),
+        _ => (Content::Other, 0),
+    }
+}
+
+/// A sample or fix, if the message has one; none at all where the message is too short.
+pub(super) fn sample(
+    content: Content,
+    layout: &Layout,
+    data: &Data,
+    stamp: Stamp,
+) -> Option<Option<Sample>> {
+    let message = &data.bytes;
+    let one = |name| layout.numbers::<1>(name, message).map(|[value]| value);
+    let three = |name| layout.numbers::<3>(name, message);
+    // 0 is a time that was not set
+    let measured = layout.time_ns("timestamp_sample", message);
+    let measured = measured.filter(|ns| *ns > 0 && stamp == Stamp::Header);
+    let stamp_ns = measured.or_else(|| layout.time_ns("timestamp", message))?;
+    if content == Content::Imu {
+        let rates = || Some((three("accelerometer_m_s2")?, three("gyro_rad")?));
+        let increments = || {
+            // before PX4 1.12 there was one interval
+            let seconds = |name| Some(one(name).or_else(|| one("dt"))? / 1e6);
+            let (dv_s, dtheta_s) = (seconds("delta_velocity_dt")?, seconds("delta_angle_dt")?);
+            let (dv, dtheta) = (three("delta_velocity")?, three("delta_angle")?);
+            Some((dv.map(|v| v / dv_s), dtheta.map(|a| a / dtheta_s)))
+        };
+        let (accel_m_s2, gyro_rad_s) = rates().or_else(increments)?;
+        return Some(Some(Sample::Imu(ImuSample {
+            stamp_ns,
+            accel_m_s2,
+            gyro_rad_s,
+        })));
+    }
+    const THREE_DIMENSIONS: f64 = 3.0;
+    // a field of `double`, since PX4 1.14, or the integer that was there before
+    let place = |name, integer, per_unit| one(name).or_else(|| Some(one(integer)? / per_unit));
+    let (horizontal, vertical) = (one("eph")?, one("epv")?);
+    // a standard deviation in spite of its name (SensorGps.msg: "speed accuracy estimate, (metres/sec)")
+    let speed = one("s_variance_m_s")?;
+    let has_velocity = one("vel_ned_valid")? != 0.0;
+    let velocity = [one("vel_n_m_s")?, one("vel_e_m_s")?, one("vel_d_m_s")?];
+    let fix = Fix {
+        stamp_ns,
+        lat_deg: place("latitude_deg", "lat", 1e7)?,
+        lon_deg: place("longitude_deg", "lon", 1e7)?,
+        h_m: place("altitude_ellipsoid_m", "alt_ellipsoid", 1e3)?,
+        sd_ned_m: stated([horizontal, horizontal, vertical]),
+        v_ned_m_s: has_velocity.then_some(velocity),
+        sd_v_ned_m_s: stated([speed; 3]).filter(|_| has_velocity),
+    };
+    Some((one("fix_type")? >= THREE_DIMENSIONS).then(|| Sample::Fix(Box::new(fix))))
 }
