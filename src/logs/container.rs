@@ -1,10 +1,10 @@
 //! Containers of messages in chunks, as MCAP and the bags of ROS 1 are.
 
-use crate::channel::Channel;
-use crate::error::Error;
-use crate::input::Input;
-use crate::unpack::Chunk;
-use std::collections::{BTreeMap, BTreeSet};
+use crate::channel::{Channel, Content, Each, Fix, ImuSample, NS, Sample, Stamp, stated};
+use crate::input::{Bytes, Error, Fault, Input, text};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::io;
+use std::io::Read;
 
 /// Record of a container.
 pub(crate) enum Record {
@@ -22,8 +22,8 @@ pub(crate) enum Record {
 
 /// Head of a message.
 pub(crate) struct Head {
-    pub(crate) channel: u32,
-    pub(crate) log_ns: i64,
+    channel: u32,
+    log_ns: i64,
     pub(crate) size: u64,
 }
 
@@ -41,7 +41,7 @@ pub(crate) trait Dialect: Default {
 
 /// Shows all records of a container to `each`, those within chunks too where these are opened. Who is shown a message reads
 /// its bytes or skips them.
-pub(crate) fn walk<D: Dialect>(
+fn walk<D: Dialect>(
     input: &mut Input,
     opens: bool,
     each: &mut dyn FnMut(Record, &mut Input) -> Result<(), Error>,
@@ -93,6 +93,11 @@ pub(crate) fn survey<D: Dialect>(
                 Record::Channel(id, [topic, type_name, encoding]) => {
                     let channel = channels.entry(id).or_default();
                     if channel.topic.is_empty() {
+                        channel.content = match type_name.as_str() {
+                            "sensor_msgs/msg/Imu" | "sensor_msgs/Imu" => Content::Imu,
+                            "sensor_msgs/msg/NavSatFix" | "sensor_msgs/NavSatFix" => Content::Fix,
+                            _ => Content::Other,
+                        };
                         (channel.topic, channel.type_name) = (topic, type_name);
                         channel.encoding = encoding;
                     }
@@ -117,4 +122,503 @@ pub(crate) fn survey<D: Dialect>(
         }
         outcome => outcome,
     }
+}
+
+// Chunks and their compressions.
+
+/// Largest chunk (bytes); writers end theirs at a few MB.
+const LARGEST_CHUNK: u64 = 256 << 20;
+
+/// Chunk of a container: where it stands, and how it is packed.
+pub(crate) struct Chunk {
+    /// Byte of its first packed byte.
+    pub(crate) offset: u64,
+    /// Name of the compression in the file.
+    compression: Vec<u8>,
+    packed: u64,
+    unpacked: u64,
+    /// CRC of the unpacked bytes; 0 where there is none.
+    crc: u32,
+}
+
+impl Chunk {
+    /// Unpacks it: the input stands at its first byte.
+    pub(crate) fn open(&self, input: &mut Input) -> Result<Input, Error> {
+        if self.unpacked > LARGEST_CHUNK {
+            let (bytes, limit) = (self.unpacked, LARGEST_CHUNK);
+            return Err(Error::at(self.offset, Fault::TooLarge { bytes, limit }));
+        }
+        let packed = input.bytes(self.packed, LARGEST_CHUNK)?;
+        let bytes = match self.compression.as_slice() {
+            b"" | b"none" => packed,
+            #[cfg(feature = "mcap")]
+            b"zstd" => self.unpack(|| {
+                ruzstd::decoding::StreamingDecoder::new(packed.as_slice()).map_err(io::Error::other)
+            })?,
+            b"lz4" => self.unpack(|| Ok(lz4_flex::frame::FrameDecoder::new(packed.as_slice())))?,
+            #[cfg(feature = "bag")]
+            b"bz2" => self.unpack(|| Ok(bzip2::read::MultiBzDecoder::new(packed.as_slice())))?,
+            unknown => return Err(Error::encoding(self.offset, unknown)),
+        };
+        if bytes.len() as u64 != self.unpacked {
+            return Err(Error::malformed(
+                self.offset,
+                "a chunk has not the length it states",
+            ));
+        }
+        #[cfg(feature = "mcap")]
+        match (self.crc, crc32fast::hash(&bytes)) {
+            (0, _) => {}
+            (stored, computed) if stored == computed => {}
+            (stored, computed) => {
+                return Err(Error::at(self.offset, Fault::Crc { stored, computed }));
+            }
+        }
+        Ok(Input::chunk(bytes, self.offset))
+    }
+
+    /// Unpacks at most a byte more than the chunk states; memory grows with what is unpacked, not with what is stated.
+    fn unpack<R: Read>(&self, decoder: impl FnOnce() -> io::Result<R>) -> Result<Vec<u8>, Error> {
+        let fault = |error: io::Error| {
+            Error::malformed(self.offset, format!("a chunk cannot be unpacked: {error}"))
+        };
+        let mut bytes = Vec::with_capacity(self.unpacked.min(8 * self.packed) as usize);
+        decoder()
+            .map_err(fault)?
+            .take(self.unpacked + 1)
+            .read_to_end(&mut bytes)
+            .map_err(fault)?;
+        Ok(bytes)
+    }
+}
+
+// Logs of ROS: topics of a container.
+
+/// Largest message that is read (bytes): an IMU's has 400.
+const LARGEST_MESSAGE: u64 = 1 << 20;
+
+/// Reads the messages of a topic, which may stand out of order in the file.
+pub(crate) fn read<D: Dialect>(
+    input: &mut Input,
+    channel: &Channel,
+    stamp: Stamp,
+    each: Each<'_>,
+) -> Result<(), Error> {
+    let mut found = Vec::new();
+    let outcome = walk::<D>(input, true, &mut |record, input| {
+        let Record::Message(head) = record else {
+            return Ok(());
+        };
+        if head.channel != channel.id {
+            return input.skip(head.size);
+        }
+        let message = Message {
+            log_ns: (stamp == Stamp::Log).then_some(head.log_ns),
+            offset: input.offset(),
+            data: input.bytes(head.size, LARGEST_MESSAGE)?,
+        };
+        let sample = match channel.content {
+            Content::Imu => imu(&channel.encoding, &message).map(Some)?,
+            _ => fix(&channel.encoding, &message)?,
+        };
+        found.extend(sample.map(|sample| (head.log_ns, message.offset, sample)));
+        Ok(())
+    });
+    found.sort_by_key(|(log_ns, ..)| *log_ns);
+    for (_, offset, sample) in found {
+        each(offset, sample)?;
+    }
+    outcome
+}
+
+/// Message of a channel.
+struct Message {
+    /// Time of arrival, where it is the one that counts.
+    log_ns: Option<i64>,
+    offset: u64,
+    data: Vec<u8>,
+}
+
+/// Body of a message, and its stamp. Behind the header: in ROS 1 a sequence number, the time, a name; in ROS 2 the same
+/// without the number.
+fn body<'a>(encoding: &str, message: &'a Message) -> Result<(Bytes<'a>, i64), Error> {
+    let mut bytes = match encoding {
+        "ros1" => Bytes::little(&message.data),
+        "cdr" => cdr(message)?,
+        other => return Err(Error::encoding(message.offset, other.as_bytes())),
+    };
+    let mut header = || {
+        if encoding == "ros1" {
+            bytes.u32()?;
+        }
+        let header_ns = i64::from(bytes.i32()?) * NS + i64::from(bytes.u32()?);
+        bytes.string()?;
+        Some(header_ns)
+    };
+    let header_ns = header().ok_or_else(|| short(message))?;
+    Ok((bytes, message.log_ns.unwrap_or(header_ns)))
+}
+
+/// Common Data Representation (OMG DDSI-RTPS 2.3, 10.2): the order of bytes, then numbers that are aligned from there
+/// on; in its second version to 4 bytes at most.
+fn cdr(message: &Message) -> Result<Bytes<'_>, Error> {
+    let (head, rest) = message
+        .data
+        .split_at_checked(4)
+        .ok_or_else(|| short(message))?;
+    let (is_big_endian, most) = match head[..2] {
+        [0, 0] => (true, 8),
+        [0, 1] => (false, 8),
+        [0, 6] => (true, 4),
+        [0, 7] => (false, 4),
+        _ => {
+            return Err(Error::encoding(
+                message.offset,
+                format!("CDR {:02x?}", &head[..2]).as_bytes(),
+            ));
+        }
+    };
+    Ok(Bytes::new(rest, is_big_endian, most))
+}
+
+fn short(message: &Message) -> Error {
+    Error::malformed(
+        message.offset,
+        format!("a message of {} bytes is too short", message.data.len()),
+    )
+}
+
+/// A sample of `sensor_msgs/Imu`: the orientation and the covariances are passed over.
+fn imu(encoding: &str, message: &Message) -> Result<Sample, Error> {
+    let (mut bytes, stamp_ns) = body(encoding, message)?;
+    let mut sample = || {
+        bytes.f64s::<{ 4 + 9 }>()?;
+        let gyro_rad_s = bytes.f64s()?;
+        bytes.f64s::<9>()?;
+        let accel_m_s2 = bytes.f64s()?;
+        bytes.f64s::<9>()?;
+        Some(Sample::Imu(ImuSample {
+            stamp_ns,
+            accel_m_s2,
+            gyro_rad_s,
+        }))
+    };
+    sample().ok_or_else(|| short(message))
+}
+
+/// A fix of `sensor_msgs/NavSatFix`; none where its status is below 0.
+fn fix(encoding: &str, message: &Message) -> Result<Option<Sample>, Error> {
+    let (mut bytes, stamp_ns) = body(encoding, message)?;
+    let mut rest = || {
+        let status = bytes.u8()?.cast_signed();
+        bytes.u16()?;
+        Some((status, bytes.f64s::<3>()?, bytes.f64s::<9>()?, bytes.u8()?))
+    };
+    let (status, place, covariance, covariance_type) = rest().ok_or_else(|| short(message))?;
+    let [lat_deg, lon_deg, h_m] = place;
+    // the covariance is that of east, north, up (m²); type 0 is unknown
+    let sd = [covariance[4], covariance[0], covariance[8]].map(f64::sqrt);
+    let is_fix = status >= 0 && place.iter().all(|v| v.is_finite());
+    Ok(is_fix.then(|| {
+        Sample::Fix(Box::new(Fix {
+            stamp_ns,
+            lat_deg,
+            lon_deg,
+            h_m,
+            sd_ned_m: stated(sd).filter(|_| covariance_type != 0),
+            v_ned_m_s: None,
+            sd_v_ned_m_s: None,
+        }))
+    }))
+}
+
+// Records of a ROS 1 bag (<https://wiki.ros.org/Bags/Format/2.0>).
+
+const BAG_MAGIC: [u8; 13] = *b"#ROSBAG V2.0\n";
+/// Longest header of a record (bytes).
+const LONGEST_HEADER: u64 = 1 << 20;
+/// Longest record that is read whole (bytes): a definition of messages, or the index of a chunk.
+
+/// Numbers of the kinds of records.
+mod bag_code {
+    pub(super) const MESSAGE: u8 = 0x02;
+    pub(super) const BAG: u8 = 0x03;
+    pub(super) const INDEX: u8 = 0x04;
+    pub(super) const CHUNK: u8 = 0x05;
+    pub(super) const CONNECTION: u8 = 0x07;
+}
+
+/// State of the reading.
+#[derive(Default)]
+pub(crate) struct Bag {
+    /// Byte of the index at the end; 0 until the bag is closed.
+    index: u64,
+}
+
+impl Dialect for Bag {
+    fn start(&mut self, input: &mut Input) -> Result<(), Error> {
+        let magic = input.array()?;
+        if magic == BAG_MAGIC {
+            Ok(())
+        } else {
+            Err(Error::encoding(0, magic.trim_ascii_end()))
+        }
+    }
+
+    fn record(&mut self, input: &mut Input) -> Result<Option<Record>, Error> {
+        if input.left() == 0 {
+            return Ok(None);
+        }
+        let offset = input.offset();
+        let length = u64::from(input.u32()?);
+        let header = input.bytes(length, LONGEST_HEADER)?;
+        let size = u64::from(input.u32()?);
+        input.expect(size)?;
+        let fault = || Error::malformed(offset, "a record of a bag does not parse");
+        let fields = Fields(&header);
+        match fields.bytes(b"op").ok_or_else(fault)? {
+            [bag_code::MESSAGE] => bag_message(fields, size).ok_or_else(fault).map(Some),
+            [bag_code::CHUNK] => {
+                let compression = fields.bytes(b"compression").ok_or_else(fault)?.to_vec();
+                let unpacked = fields.u32(b"size").ok_or_else(fault)?.into();
+                let offset = input.offset();
+                Ok(Some(Record::Chunk(Chunk {
+                    offset,
+                    compression,
+                    packed: size,
+                    unpacked,
+                    crc: 0,
+                })))
+            }
+            [bag_code::INDEX] => index(fields, &input.bytes(size, LARGEST_RECORD)?)
+                .ok_or_else(fault)
+                .map(Some),
+            [bag_code::CONNECTION] => {
+                let data = input.bytes(size, LARGEST_RECORD)?;
+                connection(fields, &data).ok_or_else(fault).map(Some)
+            }
+            code => {
+                input.skip(size)?;
+                self.note(code, fields, offset)?;
+                Ok(Some(Record::Other))
+            }
+        }
+    }
+
+    fn finish(&self, input: &Input) -> Result<(), Error> {
+        if self.index == 0 || self.index > input.length() {
+            return Err(Error::at(input.offset(), Fault::StillWritten));
+        }
+        Ok(())
+    }
+}
+
+impl Bag {
+    /// Counts of the start and of the end.
+    fn note(&mut self, code: &[u8], fields: Fields<'_>, offset: u64) -> Result<(), Error> {
+        if code == [bag_code::BAG] {
+            if let Some(name) = fields.bytes(b"encryptor").filter(|name| !name.is_empty()) {
+                return Err(Error::encoding(offset, name));
+            }
+            let index = fields.bytes(b"index_pos");
+            let index = index.and_then(|b| Bytes::little(b).u64());
+            let what = "the start of the bag does not parse";
+            self.index = index.ok_or_else(|| Error::malformed(offset, what))?;
+        }
+        Ok(())
+    }
+}
+
+/// Fields of a header: each is a length, then `name=value`.
+#[derive(Clone, Copy)]
+struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    fn bytes(self, name: &[u8]) -> Option<&'a [u8]> {
+        let mut bytes = Bytes::little(self.0);
+        while let Some(field) = bytes.string() {
+            if let Some(value) = field
+                .strip_prefix(name)
+                .and_then(|rest| rest.strip_prefix(b"="))
+            {
+                return Some(value);
+            }
+        }
+        None
+    }
+
+    fn u32(self, name: &[u8]) -> Option<u32> {
+        Bytes::little(self.bytes(name)?).u32()
+    }
+}
+
+/// Seconds and nanoseconds (ns).
+fn time_ns(bytes: &mut Bytes<'_>) -> Option<i64> {
+    Some(i64::from(bytes.u32()?) * NS + i64::from(bytes.u32()?))
+}
+
+fn bag_message(fields: Fields<'_>, size: u64) -> Option<Record> {
+    let log_ns = time_ns(&mut Bytes::little(fields.bytes(b"time")?))?;
+    Some(Record::Message(Head {
+        channel: fields.u32(b"conn")?,
+        log_ns,
+        size,
+    }))
+}
+
+/// Times and places of a connection's messages in the chunk before.
+fn index(fields: Fields<'_>, entries: &[u8]) -> Option<Record> {
+    let entries = entries.chunks_exact(12);
+    let times = entries.filter_map(|entry| time_ns(&mut Bytes::little(entry)));
+    Some(Record::Index(fields.u32(b"conn")?, times.collect()))
+}
+
+fn connection(fields: Fields<'_>, data: &[u8]) -> Option<Record> {
+    let (topic, type_name) = (fields.bytes(b"topic")?, Fields(data).bytes(b"type")?);
+    let named = [text(topic), text(type_name), "ros1".to_owned()];
+    Some(Record::Channel(fields.u32(b"conn")?, named))
+}
+
+// Records of MCAP (<https://mcap.dev/spec>).
+
+const MCAP_MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
+/// Largest record that is read whole (bytes): a schema, or the index of a chunk.
+const LARGEST_RECORD: u64 = 64 << 20;
+
+/// Numbers of the kinds of records.
+mod mcap_code {
+    pub(super) const FOOTER: u8 = 0x02;
+    pub(super) const SCHEMA: u8 = 0x03;
+    pub(super) const CHANNEL: u8 = 0x04;
+    pub(super) const MESSAGE: u8 = 0x05;
+    pub(super) const CHUNK: u8 = 0x06;
+    pub(super) const INDEX: u8 = 0x07;
+}
+
+/// State of the reading.
+#[derive(Default)]
+pub(crate) struct Mcap {
+    /// Types of the messages, by the numbers of their schemas.
+    types: HashMap<u16, String>,
+    has_footer: bool,
+}
+
+impl Dialect for Mcap {
+    fn start(&mut self, input: &mut Input) -> Result<(), Error> {
+        if input.array()? == MCAP_MAGIC {
+            Ok(())
+        } else {
+            Err(Error::malformed(0, "not the start of an MCAP file"))
+        }
+    }
+
+    fn record(&mut self, input: &mut Input) -> Result<Option<Record>, Error> {
+        let offset = input.offset();
+        if input.left() == 0 {
+            return Ok(None);
+        }
+        let (code, length) = (input.u8()?, input.u64()?);
+        input.expect(length)?;
+        let fault = || {
+            Error::malformed(
+                offset,
+                format!("record {code:#04x} of {length} bytes does not parse"),
+            )
+        };
+        match code {
+            0 => Err(Error::malformed(offset, "record of kind 0")),
+            mcap_code::CHUNK => mcap_chunk(input, length).map(|chunk| Some(Record::Chunk(chunk))),
+            mcap_code::MESSAGE => message(input, length, fault).map(Some),
+            mcap_code::SCHEMA | mcap_code::CHANNEL | mcap_code::INDEX => {
+                let body = input.bytes(length, LARGEST_RECORD)?;
+                self.body(code, &body).ok_or_else(fault).map(Some)
+            }
+            mcap_code::FOOTER => {
+                input.skip(length)?;
+                self.has_footer = input.array()? == MCAP_MAGIC;
+                if self.has_footer {
+                    Ok(None)
+                } else {
+                    Err(fault())
+                }
+            }
+            _ => {
+                input.skip(length)?;
+                Ok(Some(Record::Other))
+            }
+        }
+    }
+
+    fn finish(&self, input: &Input) -> Result<(), Error> {
+        if self.has_footer {
+            Ok(())
+        } else {
+            Err(Error::at(input.offset(), Fault::StillWritten))
+        }
+    }
+}
+
+impl Mcap {
+    /// A record that is read whole.
+    fn body(&mut self, code: u8, body: &[u8]) -> Option<Record> {
+        let mut bytes = Bytes::little(body);
+        let id = bytes.u16()?;
+        match code {
+            mcap_code::SCHEMA => {
+                self.types.insert(id, text(bytes.string()?));
+                Some(Record::Other)
+            }
+            mcap_code::CHANNEL => {
+                let type_name = self.types.get(&bytes.u16()?).cloned().unwrap_or_default();
+                let (topic, encoding) = (text(bytes.string()?), text(bytes.string()?));
+                Some(Record::Channel(id.into(), [topic, type_name, encoding]))
+            }
+            _ => {
+                // times and places of a channel's messages in the chunk before
+                let entries = bytes.string()?.chunks_exact(16);
+                let times = entries.filter_map(|entry| Bytes::little(entry).u64());
+                let times = times.map(u64::cast_signed).collect();
+                Some(Record::Index(id.into(), times))
+            }
+        }
+    }
+}
+
+/// A message behind its channel, number and two times.
+fn message(input: &mut Input, length: u64, fault: impl Fn() -> Error) -> Result<Record, Error> {
+    let size = length.checked_sub(22).ok_or_else(&fault)?;
+    let channel = u32::from(input.u16()?);
+    input.u32()?;
+    let log_ns = i64::try_from(input.u64()?).map_err(|_| fault())?;
+    input.u64()?;
+    Ok(Record::Message(Head {
+        channel,
+        log_ns,
+        size,
+    }))
+}
+
+/// A chunk behind its times, length, CRC and compression.
+fn mcap_chunk(input: &mut Input, length: u64) -> Result<Chunk, Error> {
+    const LONGEST_NAME: u64 = 64;
+    let start = input.position();
+    input.skip(16)?;
+    let (unpacked, crc) = (input.u64()?, input.u32()?);
+    let name = u64::from(input.u32()?);
+    let compression = input.bytes(name, LONGEST_NAME)?;
+    let packed = input.u64()?;
+    let offset = input.offset();
+    if (input.position() - start).checked_add(packed) != Some(length) {
+        return Err(Error::malformed(
+            offset,
+            "a chunk has not the length of its record",
+        ));
+    }
+    Ok(Chunk {
+        offset,
+        compression,
+        packed,
+        unpacked,
+        crc,
+    })
 }

@@ -1,9 +1,8 @@
 //! Arrays in NumPy's own format, `.npy` (`numpy.lib.format`).
 
-use crate::bytes::{Bytes, Number};
-use crate::error::{Error, Fault};
-use crate::input::Input;
-use std::io::{self, Read};
+use crate::input::{Bytes, Error, Fault, Input, Number};
+use std::io;
+use std::io::Read;
 use std::path::Path;
 
 /// Longest header (bytes).
@@ -99,7 +98,7 @@ fn header_text(from: &mut impl Read) -> io::Result<(String, u64)> {
     }
     let mut text = vec![0; length];
     from.read_exact(&mut text)?;
-    Ok((crate::bytes::text(&text), (before + length) as u64))
+    Ok((crate::input::text(&text), (before + length) as u64))
 }
 
 impl Header {

@@ -1,10 +1,7 @@
 //! Logs of PX4 (<https://docs.px4.io/main/en/dev_log/ulog_file_format.html>).
 
-use crate::bytes::{Bytes, Number, text};
-use crate::channel::{Channel, Content, Each};
-use crate::error::Error;
-use crate::input::Input;
-use crate::sample::{Clock, Fix, ImuSample, Sample, Stamp, stated};
+use crate::channel::{Channel, Clock, Content, Each, Fix, ImuSample, Sample, Stamp, stated};
+use crate::input::{Bytes, Error, Input, Number, text};
 use std::collections::{BTreeMap, HashMap};
 
 /// Counts the messages of each topic.
@@ -69,11 +66,11 @@ pub(crate) fn read(
 const DEEPEST: usize = 8;
 
 /// Formats by their names, each a list of fields `type name;`.
-pub(super) type Formats = HashMap<String, String>;
+type Formats = HashMap<String, String>;
 
 /// Places of a message's own fields; those of formats within it are passed over.
 #[derive(Default)]
-pub(super) struct Layout {
+struct Layout {
     fields: HashMap<String, Field>,
 }
 
@@ -124,7 +121,7 @@ impl Layout {
     }
 
     /// Numbers of a field; none where the message is too short or the layout has no such field.
-    pub(super) fn numbers<const N: usize>(&self, name: &str, message: &[u8]) -> Option<[f64; N]> {
+    fn numbers<const N: usize>(&self, name: &str, message: &[u8]) -> Option<[f64; N]> {
         let field = self.field(name, N)?;
         let mut bytes = Bytes::little(message.get(field.at..)?);
         let mut values = [0.0; N];
@@ -135,7 +132,7 @@ impl Layout {
     }
 
     /// Time (µs in the message) (ns); none beyond what can be a time.
-    pub(super) fn time_ns(&self, name: &str, message: &[u8]) -> Option<i64> {
+    fn time_ns(&self, name: &str, message: &[u8]) -> Option<i64> {
         let field = self.field(name, 1)?;
         let field = (field.number == Number::Unsigned(8)).then_some(field)?;
         let us = Bytes::little(message.get(field.at..)?).u64()?;
@@ -173,25 +170,25 @@ const MAGIC: [u8; 7] = *b"ULog\x01\x12\x35";
 const APPENDED: u8 = 1;
 
 /// Message of a topic.
-pub(super) struct Data {
+struct Data {
     pub(super) id: u16,
     pub(super) offset: u64,
     pub(super) bytes: Vec<u8>,
 }
 
 /// Topic of a log.
-pub(super) struct Topic {
-    pub(super) name: String,
-    pub(super) instance: u8,
-    pub(super) layout: Layout,
+struct Topic {
+    name: String,
+    instance: u8,
+    layout: Layout,
 }
 
 /// Messages of a file.
-pub(super) struct Messages<'a> {
+struct Messages<'a> {
     input: &'a mut Input,
     formats: Formats,
     /// Topics by their numbers.
-    pub(super) topics: HashMap<u16, Topic>,
+    topics: HashMap<u16, Topic>,
     /// Byte from which on data was appended: what comes before it may be cut, and it is no flight.
     end: u64,
 }
@@ -212,7 +209,7 @@ impl<'a> Messages<'a> {
     }
 
     /// The next message of a topic: of any, or of one.
-    pub(super) fn next_data(&mut self, only: Option<u32>) -> Result<Option<Data>, Error> {
+    fn next_data(&mut self, only: Option<u32>) -> Result<Option<Data>, Error> {
         loop {
             let offset = self.input.position();
             if self.input.left() == 0 || offset + 3 > self.end {
@@ -301,7 +298,7 @@ impl<'a> Messages<'a> {
 // Topics of PX4 that hold samples and fixes (the files `msg/*.msg` of PX4-Autopilot).
 
 /// Content of a topic, and its rank: what the autopilot fuses comes before what a single device measures.
-pub(super) fn content(name: &str) -> (Content, u8) {
+fn content(name: &str) -> (Content, u8) {
     match name {
         "sensor_combined" => (Content::Imu, 0),
         "vehicle_imu" => (Content::Imu, 1),
@@ -312,7 +309,7 @@ pub(super) fn content(name: &str) -> (Content, u8) {
 }
 
 /// A sample or fix, if the message has one; none at all where the message is too short.
-pub(super) fn sample(
+fn sample(
     content: Content,
     layout: &Layout,
     data: &Data,
