@@ -153,8 +153,9 @@ fn words(given: impl Iterator<Item = OsString>) -> Vec<OsString> {
 
 /// `--option` without a value.
 fn is_bare_option(word: &OsStr) -> bool {
-    let text = word.to_string_lossy();
-    text.len() > 2 && text.starts_with("--") && !text.contains('=')
+    let word = word.to_string_lossy();
+    let name = word.strip_prefix("--");
+    name.is_some_and(|name| !name.is_empty() && !name.contains('='))
 }
 
 /// Ends the program with help or version, or with the error in the words that requests by name get too.

@@ -264,22 +264,8 @@ pub enum Kind {
     Ubx,
     /// Arrays of NumPy in a zip archive.
     Npz,
-    /// Bag of ROS 2 in SQLite; not read.
-    Sqlite,
-    /// Log of ArduPilot; not read.
-    DataFlash,
-    /// MATLAB's format up to version 7; not read.
-    Mat5,
-    /// HDF5, as MATLAB's format of version 7.3 is; not read.
-    Hdf5,
-    /// Binary log of Xsens; not read.
-    Mtb,
-    /// Binary blocks of Septentrio; not read.
-    Sbf,
-    /// Observations or orbits in RINEX; not read.
-    Rinex,
-    /// Archive of anything but arrays; not read.
-    Zip,
+    /// One that is not read: its name, and the command that makes one that is.
+    Other(&'static str, &'static str),
 }
 
 impl Kind {
@@ -292,47 +278,63 @@ impl Kind {
             Self::Ulog => "a PX4 ULog",
             Self::Ubx => "a u-blox UBX log",
             Self::Npz => "a NumPy .npz",
-            Self::Sqlite => "a SQLite database, as rosbag2 writes (.db3)",
-            Self::DataFlash => "an ArduPilot DataFlash log",
-            Self::Mat5 => "a MATLAB .mat file",
-            Self::Hdf5 => "an HDF5 file, as MATLAB 7.3 writes",
-            Self::Mtb => "an Xsens .mtb log",
-            Self::Sbf => "a Septentrio SBF log",
-            Self::Rinex => "a RINEX file",
-            Self::Zip => "a zip archive",
+            Self::Other(name, _) => name,
         }
     }
 
     /// The command that makes a file that is read, for a format that is not.
     #[must_use]
     pub const fn conversion(self) -> Option<&'static str> {
-        Some(match self {
-            Self::Sqlite => "mcap convert FILE.db3 FILE.mcap",
-            Self::DataFlash => "mavlogdump.py --format csv --types IMU FILE.bin > imu.csv",
-            Self::Mat5 | Self::Hdf5 => "in MATLAB: writematrix(imu, 'imu.csv')",
-            Self::Mtb => "in MT Manager: File > Export, as ASCII (.txt)",
-            Self::Sbf => "bin2asc -f FILE.sbf -m PVTGeodetic2 -t",
-            Self::Rinex => "rnx2rtkp -o fixes.pos rover.obs base.obs FILE.nav",
-            Self::Zip => "unzip FILE.zip",
-            Self::Mcap | Self::Bag | Self::Ulog | Self::Ubx | Self::Npz => return None,
-        })
+        match self {
+            Self::Other(_, conversion) => Some(conversion),
+            _ => None,
+        }
     }
 }
 
+const MATLAB: &str = "in MATLAB: writematrix(imu, 'imu.csv')";
+const HDF5: Kind = Kind::Other("an HDF5 file, as MATLAB 7.3 writes", MATLAB);
 /// First bytes of the formats that have such.
 const MAGIC: [(&[u8], Kind); 10] = [
     (b"\x89MCAP0\r\n", Kind::Mcap),
     (b"#ROSBAG V", Kind::Bag),
     (b"ULog\x01\x12\x35", Kind::Ulog),
-    (b"SQLite format 3\0", Kind::Sqlite),
+    (
+        b"SQLite format 3\0",
+        Kind::Other(
+            "a SQLite database, as rosbag2 writes (.db3)",
+            "mcap convert FILE.db3 FILE.mcap",
+        ),
+    ),
     // a description of the description of messages comes first
-    (b"\xa3\x95\x80", Kind::DataFlash),
-    (b"MATLAB 5.0 MAT-file", Kind::Mat5),
-    (b"MATLAB 7.3 MAT-file", Kind::Hdf5),
-    (b"\x89HDF\r\n\x1a\n", Kind::Hdf5),
+    (
+        b"\xa3\x95\x80",
+        Kind::Other(
+            "an ArduPilot DataFlash log",
+            "mavlogdump.py --format csv --types IMU FILE.bin > imu.csv",
+        ),
+    ),
+    (
+        b"MATLAB 5.0 MAT-file",
+        Kind::Other("a MATLAB .mat file", MATLAB),
+    ),
+    (b"MATLAB 7.3 MAT-file", HDF5),
+    (b"\x89HDF\r\n\x1a\n", HDF5),
     // preamble of an Xbus message, and the bus itself
-    (b"\xfa\xff", Kind::Mtb),
-    (b"$@", Kind::Sbf),
+    (
+        b"\xfa\xff",
+        Kind::Other(
+            "an Xsens .mtb log",
+            "in MT Manager: File > Export, as ASCII (.txt)",
+        ),
+    ),
+    (
+        b"$@",
+        Kind::Other(
+            "a Septentrio SBF log",
+            "bin2asc -f FILE.sbf -m PVTGeodetic2 -t",
+        ),
+    ),
 ];
 /// First bytes of a zip archive with and without files.
 const ZIP: [&[u8]; 2] = [b"PK\x03\x04", b"PK\x05\x06"];
@@ -358,7 +360,7 @@ pub fn recognise(head: &[u8]) -> Option<Kind> {
         return Some(if first_name(head).is_some_and(|n| n.ends_with(b".npy")) {
             Kind::Npz
         } else {
-            Kind::Zip
+            Kind::Other("a zip archive", "unzip FILE.zip")
         });
     }
     // the label of the first line stands in its columns 61 to 80
@@ -366,7 +368,10 @@ pub fn recognise(head: &[u8]) -> Option<Kind> {
         .get(60..80)
         .is_some_and(|label| label == b"RINEX VERSION / TYPE")
     {
-        return Some(Kind::Rinex);
+        return Some(Kind::Other(
+            "a RINEX file",
+            "rnx2rtkp -o fixes.pos rover.obs base.obs FILE.nav",
+        ));
     }
     head.windows(2)
         .enumerate()

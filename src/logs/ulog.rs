@@ -309,12 +309,7 @@ fn content(name: &str) -> (Content, u8) {
 }
 
 /// A sample or fix, if the message has one; none at all where the message is too short.
-fn sample(
-    content: Content,
-    layout: &Layout,
-    data: &Data,
-    stamp: Stamp,
-) -> Option<Option<Sample>> {
+fn sample(content: Content, layout: &Layout, data: &Data, stamp: Stamp) -> Option<Option<Sample>> {
     let message = &data.bytes;
     let one = |name| layout.numbers::<1>(name, message).map(|[value]| value);
     let three = |name| layout.numbers::<3>(name, message);

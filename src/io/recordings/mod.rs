@@ -668,7 +668,6 @@ pub(super) fn recordings(
     raw.columns
         .sort_by_key(|c| channel_of(c).map(Channel::index));
     let factors = factors(&raw, timing.rate_hz)?;
-    clipped(&raw, &mut report);
     let pieces = pieces(&raw.path, raw.rows(), &timing, options, &mut report)?;
     let empty = |i| Recording {
         name: name_of(&raw.path, i, pieces.len()),
@@ -826,42 +825,6 @@ fn only_value(values: &[f64]) -> Option<f64> {
     let (first, rest) = values.split_first()?;
     let is_same = |value: &f64| value.to_bits() == first.to_bits();
     (!rest.is_empty() && rest.iter().all(is_same)).then_some(*first)
-}
-
-/// Warns of axes whose samples pile up at an end of their range. Noise that is quantized, however coarsely, has fewer
-/// values at its ends than next to them.
-fn clipped(raw: &Table, report: &mut FileReport) {
-    const SHARE: f64 = 0.01;
-    const FEWEST: usize = 20;
-    for column in &raw.columns {
-        let channel = column.quantity.name;
-        let rows = column.values.len() as f64;
-        let [high, low] = [1.0, -1.0].map(|side| outermost(&column.values, side));
-        let has_four_values = -low[1].0 < high[1].0;
-        for (side, [end, next]) in [(1.0, high), (-1.0, low)] {
-            let share = end.1 as f64 / rows;
-            if has_four_values && end.1 >= FEWEST && share > SHARE && end.1 > 4 * next.1 {
-                let (value, percent) = (side * end.0, 100.0 * share);
-                report.warn(format!(
-                    "{channel} is clipped: {percent:.0} % of the rows are {value}, its extreme"
-                ));
-            }
-        }
-    }
-}
-
-/// The two outermost values on a side (times ±1), and how often each comes.
-fn outermost(values: &[f64], side: f64) -> [(f64, usize); 2] {
-    let mut ends = [(f64::NEG_INFINITY, 0); 2];
-    for value in values.iter().map(|value| value * side) {
-        match ends.iter().position(|end| end.0 == value) {
-            Some(known) => ends[known].1 += 1,
-            None if value > ends[0].0 => ends = [(value, 1), ends[0]],
-            None if value > ends[1].0 => ends[1] = (value, 1),
-            None => {}
-        }
-    }
-    ends
 }
 
 /// Mean of values times a factor, summed about the first of them so that a large offset costs no digits.

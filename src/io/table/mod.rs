@@ -602,7 +602,11 @@ impl Head {
                 head.rate_hz = head.rate_hz.or_else(|| rate_in(comment));
                 continue;
             }
-            if text.is_empty() || text.to_lowercase().starts_with("sep=") {
+            if text.is_empty()
+                || text
+                    .get(..4)
+                    .is_some_and(|t| t.eq_ignore_ascii_case("sep="))
+            {
                 continue;
             }
             let inside = text.trim_start_matches(['#', '%']).trim();

@@ -8,8 +8,8 @@ use nav_sim_signal::units::SettingError;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer, StrDeserializer};
 use serde::de::{
-    DeserializeOwned, DeserializeSeed, Deserializer, EnumAccess, Error, Expected, IgnoredAny,
-    IntoDeserializer, MapAccess, SeqAccess, Unexpected, VariantAccess, Visitor,
+    DeserializeOwned, DeserializeSeed, Deserializer, Error as DeserializeError, Expected,
+    IgnoredAny, IntoDeserializer, MapAccess, SeqAccess, Unexpected, Visitor,
 };
 use serde::{Deserialize, Serialize, forward_to_deserialize_any};
 use std::borrow::Cow;
@@ -320,7 +320,7 @@ impl fmt::Display for Refusal {
 
 impl std::error::Error for Refusal {}
 
-impl Error for Refusal {
+impl DeserializeError for Refusal {
     fn custom<T: fmt::Display>(message: T) -> Self {
         let message = message.to_string();
         let words = match message.split(' ').next() {
@@ -345,12 +345,7 @@ impl Error for Refusal {
             other if other.starts_with("struct") => "a table",
             other => other,
         };
-        let verb = if words.starts_with("is ") {
-            ""
-        } else {
-            "is not "
-        };
-        What::Reason(format!("{verb}{words}")).into()
+        What::Reason(format!("is not {words}")).into()
     }
 
     fn invalid_value(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
@@ -447,7 +442,10 @@ impl<'de> Deserializer<'de> for Node<'_> {
     ) -> Result<V::Value, Refusal> {
         match self.0 {
             DeValue::String(word) => visitor.visit_enum(word.as_ref().into_deserializer()),
-            DeValue::Table(table) => visitor.visit_enum(Kind { table, passed: &[] }),
+            DeValue::Table(table) => {
+                let kind = Kind { table, passed: &[] };
+                visitor.visit_enum(MapAccessDeserializer::new(kind))
+            }
             _ => Err(What::Reason("is not a table".to_owned()).into()),
         }
     }
@@ -527,7 +525,7 @@ impl<'de> MapAccess<'de> for Keys<'_> {
         let Some((_, passed, table)) = self.rest.take() else {
             return Err(What::Reason("has no value".to_owned()).into());
         };
-        seed.deserialize(Kind { table, passed })
+        seed.deserialize(MapAccessDeserializer::new(Kind { table, passed }))
     }
 }
 
@@ -543,61 +541,26 @@ impl<'a> Kind<'a> {
     }
 }
 
-impl<'de> Deserializer<'de> for Kind<'_> {
+/// A map of the word and the keys of its kind.
+impl<'de> MapAccess<'de> for Kind<'_> {
     type Error = Refusal;
 
-    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-        visitor.visit_enum(self)
-    }
-
-    forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct tuple
-        tuple_struct map identifier ignored_any option newtype_struct seq struct enum
-    }
-}
-
-impl<'de> EnumAccess<'de> for Kind<'_> {
-    type Error = Refusal;
-    type Variant = Self;
-
-    fn variant_seed<V: DeserializeSeed<'de>>(self, seed: V) -> Result<(V::Value, Self), Refusal> {
+    fn next_key_seed<K: DeserializeSeed<'de>>(
+        &mut self,
+        seed: K,
+    ) -> Result<Option<K::Value>, Refusal> {
         let tag = self.tag().ok_or(What::Missing(TAGS[0]))?;
         let word = self.table.get(tag).and_then(|word| word.get_ref().as_str());
-        let word = word.ok_or_else(|| {
-            let what = What::Reason("is not a text in quotes".to_owned());
-            Refusal::from(what).within(tag)
-        })?;
-        let variant = seed.deserialize(StrDeserializer::new(word));
-        Ok((variant.map_err(|e: Refusal| e.within(tag))?, self))
-    }
-}
-
-impl<'de> VariantAccess<'de> for Kind<'_> {
-    type Error = Refusal;
-
-    fn unit_variant(self) -> Result<(), Refusal> {
-        Ok(())
+        let no_text = || What::Reason("is not a text in quotes".to_owned());
+        let variant = word.ok_or_else(|| no_text().into());
+        let variant = variant.and_then(|word| seed.deserialize(StrDeserializer::new(word)));
+        variant.map(Some).map_err(|e: Refusal| e.within(tag))
     }
 
-    fn newtype_variant_seed<T: DeserializeSeed<'de>>(self, seed: T) -> Result<T::Value, Refusal> {
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Refusal> {
         let tag = self.tag();
         let is_own = |key: &str| Some(key) != tag && !self.passed.contains(&key);
-        let keys = Keys::of(self.table, is_own);
-        seed.deserialize(serde::de::value::MapAccessDeserializer::new(keys))
-    }
-
-    fn tuple_variant<V: Visitor<'de>>(self, _: usize, _: V) -> Result<V::Value, Refusal> {
-        Err(What::Reason("is not a table".to_owned()).into())
-    }
-
-    fn struct_variant<V: Visitor<'de>>(
-        self,
-        _: &'static [&'static str],
-        visitor: V,
-    ) -> Result<V::Value, Refusal> {
-        let tag = self.tag();
-        let is_own = |key: &str| Some(key) != tag && !self.passed.contains(&key);
-        visitor.visit_map(Keys::of(self.table, is_own))
+        seed.deserialize(MapAccessDeserializer::new(Keys::of(self.table, is_own)))
     }
 }
 
@@ -749,11 +712,11 @@ impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Visitor<'de> for Either
         f.write_str("one value or a list of them")
     }
 
-    fn visit_i64<E: Error>(self, number: i64) -> Result<Self::Value, E> {
+    fn visit_i64<E: DeserializeError>(self, number: i64) -> Result<Self::Value, E> {
         One::deserialize(number.into_deserializer()).map(OneOrEach::One)
     }
 
-    fn visit_f64<E: Error>(self, number: f64) -> Result<Self::Value, E> {
+    fn visit_f64<E: DeserializeError>(self, number: f64) -> Result<Self::Value, E> {
         One::deserialize(number.into_deserializer()).map(OneOrEach::One)
     }
 
