@@ -8,14 +8,12 @@ use super::table::{Asked, Bare, Column, Dictionary, NONE, Quantity, SPEED, Table
 use super::toml_file::{Between, Finite, Source};
 use super::{Failure, Failure as Error, Place, help, logs, recordings, source, table};
 use chrono::{DateTime, NaiveDateTime};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use nav_sim_document::{Importance, Note};
 use nav_sim_logs::{Clock, Content, Fix, Stamp, in_seconds};
-use nav_sim_navigation::earth::{
-    A, MAX_LATITUDE, MAX_LATITUDE_DEG, ecef_to_geodetic, geodetic_to_ecef,
-};
+use nav_sim_navigation::earth::{MAX_LATITUDE, MAX_LATITUDE_DEG, geodetic_to_ecef};
 use nav_sim_navigation::ekf::InitialSettings;
-use nav_sim_navigation::frames::{NavState, RollPitchYaw, q_e_n};
+use nav_sim_navigation::frames::{NavState, RollPitchYaw};
 use nav_sim_navigation::fusion::{LONGEST_GAP_S, Start, WheelSpeed, bridged};
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
 use nav_sim_navigation::strapdown::MAX_ROTATION;
@@ -80,7 +78,7 @@ pub(crate) const WEEK_S: f64 = 604_800.0;
 const MAX_SPEED: f64 = 8000.0;
 
 /// Quantities of fixes; a deviation up is one down.
-static FIX_QUANTITIES: [Quantity; 21] = [
+static FIX_QUANTITIES: [Quantity; 15] = [
     Quantity::time(&["t", "time", "timestamp", "tow", "sow"]),
     Quantity::angle("lat_deg", &["lat", "latitude"]),
     Quantity::angle("lon_deg", &["lon", "lng", "longitude"]),
@@ -130,19 +128,10 @@ static FIX_QUANTITIES: [Quantity; 21] = [
     Quantity::speed("sd_ve_m_s", &["sd_ve", "sd_v_e", "vel_std_e", "sdve"]),
     Quantity::speed("sd_vd_m_s", &["sd_vd", "sd_v_d", "vel_std_d", "sdvu"]),
     Quantity::number("week", &["week", "gps_week"]),
-    Quantity::length("x_m", &["x", "x_ecef", "ecef_x", "pos_x"]),
-    Quantity::length("y_m", &["y", "y_ecef", "ecef_y", "pos_y"]),
-    Quantity::length("z_m", &["z", "z_ecef", "ecef_z", "pos_z"]),
-    Quantity::length("sd_x_m", &["sd_x", "sdx", "std_x", "sigma_x"]),
-    Quantity::length("sd_y_m", &["sd_y", "sdy", "std_y", "sigma_y"]),
-    Quantity::length("sd_z_m", &["sd_z", "sdz", "std_z", "sigma_z"]),
 ];
 const V_D: Quantity = Quantity::speed("v_d_m_s", &["v_d", "vd"]);
 const PLACE: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
 const PLACE_SIGMA: [&str; 3] = ["sd_n_m", "sd_e_m", "sd_d_m"];
-/// The same in the Earth's axes.
-const PLACE_E: [&str; 3] = ["x_m", "y_m", "z_m"];
-const PLACE_SIGMA_E: [&str; 3] = ["sd_x_m", "sd_y_m", "sd_z_m"];
 const VELOCITY: [&str; 3] = ["v_n_m_s", "v_e_m_s", "v_d_m_s"];
 const VELOCITY_SIGMA: [&str; 3] = ["sd_vn_m_s", "sd_ve_m_s", "sd_vd_m_s"];
 
@@ -171,7 +160,7 @@ const FIXES: Dictionary = Dictionary {
     bad_cell: |error, _| error.hint("remove the row: a fix that is not whole is no fix"),
     ..Dictionary::new(
         &FIX_QUANTITIES,
-        "columns: t_s, lat_deg, lon_deg, h_m (or x_m, y_m, z_m), sd_n_m, sd_e_m, sd_d_m; with velocity v_n_m_s … and \
+        "columns: t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m, sd_d_m; with velocity v_n_m_s … and \
              sd_vn_m_s …; without a header, as KF-GINS has it, 7 of them (t_s, latitude, longitude, height, three deviations) \
              or 13 (velocity behind the height)",
     )
@@ -185,22 +174,14 @@ fn of_rows(
     remarks: &mut Vec<Note>,
 ) -> Result<Vec<(u64, GnssFix)>, Error> {
     let any = |names: [&str; 3]| names.into_iter().any(|name| table.has(name));
-    // whether place, and its deviations, are in the Earth's axes
-    let is_earth = any(PLACE_E) && !table.has(PLACE[0]);
-    let is_sigma_earth = any(PLACE_SIGMA_E) && !table.has(PLACE_SIGMA[0]);
-    let place = if is_earth { PLACE_E } else { PLACE };
-    let place_sigma = match is_sigma_earth {
-        true => PLACE_SIGMA_E,
-        false => PLACE_SIGMA,
-    };
     let has_velocity = any(VELOCITY) || any(VELOCITY_SIGMA);
-    let own = ["t_s"].into_iter().chain(place);
+    let own = ["t_s"].into_iter().chain(PLACE);
     let own = own.chain(VELOCITY.into_iter().filter(|_| has_velocity));
     table.require(own, &FIXES)?;
     let mut sigmas = Vec::new();
     // what is missing in all of a position or velocity may be given for the whole file
-    if unsaid.is_none() || any(place_sigma) {
-        sigmas.extend(place_sigma);
+    if unsaid.is_none() || any(PLACE_SIGMA) {
+        sigmas.extend(PLACE_SIGMA);
     }
     let given_velocity = unsaid.and_then(|sigma| sigma.vel_m_s);
     if has_velocity && (given_velocity.is_none() || any(VELOCITY_SIGMA)) {
@@ -211,9 +192,9 @@ fn of_rows(
     found.map_err(|e| e.or(help::FIX_SIGMA))?;
     let ([time], place) = (
         table.columns(["t_s"], &FIXES)?,
-        table.columns(place, &FIXES)?,
+        table.columns(PLACE, &FIXES)?,
     );
-    let place_sigma = table.all(place_sigma);
+    let place_sigma = table.all(PLACE_SIGMA);
     let (velocity, velocity_sigma) = (table.all(VELOCITY), table.all(VELOCITY_SIGMA));
     if place_sigma.is_none() || velocity.is_some() && velocity_sigma.is_none() {
         remarks.push(remark("standard deviations as given for all fixes"));
@@ -224,15 +205,8 @@ fn of_rows(
     }
     let fix = |row: usize| {
         let triad = |columns: [&Column; 3]| DVec3::from(columns.map(|column| column.si(row)));
-        let r = triad(place);
-        let (lat, lon, h) = match is_earth {
-            false => (r.x, r.y, r.z),
-            true => ecef_to_geodetic(r),
-        };
-        let stated = place_sigma.map(|columns| match is_sigma_earth {
-            false => triad(columns),
-            true => sigma_of_earth(lat, lon, triad(columns)),
-        });
+        let [lat, lon, h] = place.map(|column| column.si(row));
+        let stated = place_sigma.map(triad);
         let given = unsaid.map(|s| DVec3::from(s.pos_m));
         let velocity = velocity.map(|columns| {
             let sigma = velocity_sigma
@@ -254,16 +228,8 @@ fn of_rows(
             "a fix needs the standard deviations its receiver believes; remove rows without";
         let sigmas = [place_sigma, velocity_sigma].into_iter().flatten();
         let [first, second, _] = place;
-        let is_far = (r.length() - A).abs() > BEYOND_EARTH_M;
         let is_longitude = (-180.0 * DEG - 1e-9..=360.0 * DEG + 1e-9).contains(&lon);
-        let (column, reason, advice) = if is_earth && is_far {
-            let advice = "the Earth's x, y, z in metres, 6.4e6 from its centre";
-            (
-                first,
-                "is not a place near the surface of the Earth",
-                advice,
-            )
-        } else if lat.abs() > 90.0 * DEG {
+        let (column, reason, advice) = if lat.abs() > 90.0 * DEG {
             (first, "is not a latitude", DEGREES)
         } else if !is_longitude {
             (second, "is not a longitude", DEGREES)
@@ -280,22 +246,6 @@ fn of_rows(
         Err(Error::cell(&table.path, line, &column.name, value, reason).or_hint(advice))
     };
     (0..table.rows()).map(fix).collect()
-}
-
-/// Distance from the Earth's equatorial radius beyond which nothing navigates (m): its flattening, and aircraft.
-const BEYOND_EARTH_M: f64 = 1e5;
-
-/// Standard deviations north, east, down of errors that are independent in the Earth's axes: the diagonal of
-/// C diag(σ²) Cᵀ.
-fn sigma_of_earth(lat: f64, lon: f64, sigma_e: DVec3) -> DVec3 {
-    let c_e_n = DMat3::from_quat(q_e_n(lat, lon));
-    let squared = |v: DVec3| v * v;
-    let variance = DMat3::from_cols(
-        squared(c_e_n.x_axis),
-        squared(c_e_n.y_axis),
-        squared(c_e_n.z_axis),
-    );
-    (variance * squared(sigma_e)).powf(0.5)
 }
 
 /// Reads fixes: a table with a header, or the text of KF-GINS (time, latitude, longitude (deg), height (m),
@@ -364,8 +314,6 @@ fn of_table(
             velocity.for_each(|name| drop(table.take(name)));
         }
     }
-    let mut own = Vec::new();
-    let fixes = of_rows(&table, unsaid, &mut own)?;
     let velocity = match table.has(VELOCITY[0]) {
         true => ", velocity",
         false => "",
@@ -381,7 +329,7 @@ fn of_table(
             "an RTKLIB solution: position{velocity} and standard deviations, in {clock}"
         ))
     }));
-    remarks.extend(own);
+    let fixes = of_rows(&table, unsaid, &mut remarks)?;
     remarks.extend(table.assumptions.iter().map(remark));
     let small =
         |(_, f): &(u64, GnssFix)| f.lat.abs() <= 0.5 * PI * DEG && f.lon.abs() <= 2.0 * PI * DEG;
@@ -480,35 +428,6 @@ mod fix_tests {
             "{e}"
         );
         assert_eq!(e.advice().unwrap(), "remove one of them");
-    }
-
-    /// On the equator at Greenwich x is up, y east and z north; equal deviations are equal in any axes.
-    #[test]
-    fn places_in_the_axes_of_the_earth_are_read() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("gnss.csv");
-        let read = |rows: &str| {
-            std::fs::write(&path, format!("t_s,X,Y,Z,sd_x,sd_y,sd_z\n{rows}")).unwrap();
-            read_gnss(&path, None, None, None).map(|(fixes, _)| fixes)
-        };
-        let r_e = geodetic_to_ecef(46.5 * DEG, 6.5 * DEG, 400.0);
-        let place = format!("1,{},{},{},2,2,2\n", r_e.x, r_e.y, r_e.z);
-        let [equator, alps] = ["0,6378237,0,0,3,2,1\n", &place].map(|row| read(row).unwrap()[0]);
-        assert!(
-            equator.lat.abs() < 1e-15 && equator.lon == 0.0 && (equator.h - 100.0).abs() < 1e-8
-        );
-        assert!((equator.pos_sigma_n - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12);
-        // a nanometre of rounding in 6.4e6 m
-        assert!((alps.lat - 46.5 * DEG).abs() < 1e-15 && (alps.lon - 6.5 * DEG).abs() < 1e-15);
-        assert!(
-            (alps.h - 400.0).abs() < 1e-8
-                && (alps.pos_sigma_n - DVec3::splat(2.0)).length() < 1e-12
-        );
-        let e = read("0,6378.2,0,0,3,2,1\n").unwrap_err().to_string();
-        assert!(
-            e.contains("column \"X\": 6378.2 is not a place near the surface"),
-            "{e}"
-        );
     }
 
     /// The sums are those of the independent writer of the file (`src/logs/tests/data/expected.csv`), in degrees and metres.
@@ -1114,34 +1033,25 @@ mod initial_tests {
 
 // Recorded speeds of a wheel.
 
-const fn of_words(name: &'static str, stems: &'static [&'static str]) -> Quantity {
-    Quantity {
-        of_words: true,
-        ..Quantity::new(name, stems, SPEED, Bare::Unknown)
-    }
-}
-
-/// Speeds by the words of their names, and what is no speed yet.
-static SPEED_QUANTITIES: [Quantity; 6] = [
+/// Speeds by the words of their names.
+static SPEED_QUANTITIES: [Quantity; 5] = [
     Quantity::time(OF_CLOCK),
     Quantity::time(STAMP),
     Quantity::time(OF_RECEIVER),
     Quantity::new("t_s", &["timeus"], NONE, Bare::Is(1e-6)),
-    of_words(
-        COUNTS,
-        &[
-            "tick", "ticks", "count", "counts", "pulse", "pulses", "encoder", "rpm", "rad",
-        ],
-    ),
-    of_words(
-        "speed",
-        &[
-            "speed", "velocity", "vel", "v", "wheel", "wheels", "odometer", "odo", "forward",
-            "rear",
-        ],
-    ),
+    Quantity {
+        of_words: true,
+        ..Quantity::new(
+            "speed",
+            &[
+                "speed", "velocity", "vel", "v", "wheel", "wheels", "odometer", "odo", "forward",
+                "rear",
+            ],
+            SPEED,
+            Bare::Unknown,
+        )
+    },
 ];
-const COUNTS: &str = "counts";
 
 const SPEEDS: Dictionary = Dictionary::new(
     &SPEED_QUANTITIES,
@@ -1192,12 +1102,6 @@ fn speed_columns(table: &Table) -> Result<Vec<&Column>, Error> {
     };
     for column in &chosen {
         let name = &column.name;
-        if column.quantity.name == COUNTS {
-            let message = format!("column \"{name}\" counts turns: a speed is needed");
-            return Err(table.refused(message).or_hint(
-                "ticks over ticks a turn, over seconds, times the wheel's circumference: wheel_m_s",
-            ));
-        }
         if column.factor.is_none() {
             let message = format!("column \"{name}\" has no unit of speed in its name");
             return Err(table
@@ -1257,13 +1161,13 @@ mod wheel_tests {
         for (text, said, hint) in [
             (
                 "# a\nt_s,wheel_ticks\n0,1\n",
-                "line 2: column \"wheel_ticks\" counts turns",
-                "circumference",
+                "line 2: column \"wheel_ticks\" has no unit",
+                "_m_s, _km_h or _mph",
             ),
             (
                 "t_s,wheel_rpm\n0,1\n",
-                "line 1: column \"wheel_rpm\" counts turns",
-                "circumference",
+                "line 1: column \"wheel_rpm\" has no unit",
+                "_m_s, _km_h or _mph",
             ),
             (
                 "t_s,wheel\n0,1\n",
