@@ -3,7 +3,6 @@
 
 use super::outputs::each_file;
 use super::{Context, Failure, Front, Refuse, Result};
-use crate::io::atomic::Written;
 use crate::io::suggest;
 use crate::parse;
 use clap::builder::ValueParser;
@@ -24,8 +23,6 @@ pub enum Out {
     Nothing,
     /// To a file, and files with other endings beside it.
     File {
-        /// Kind of the file.
-        kind: Written,
         /// Its name where none is given.
         name: &'static str,
         /// Help of `--out`.
@@ -90,12 +87,9 @@ pub trait Command: clap::Args + Send + Sync + 'static {
         }
     }
 
-    /// Endings and kinds of the files beside [`Out::File`], itself included: "" is the file itself.
-    fn endings(&self) -> Vec<(Cow<'static, str>, Written)> {
-        match Self::OUT {
-            Out::File { kind, .. } => vec![("".into(), kind)],
-            _ => Vec::new(),
-        }
+    /// Endings of the files beside [`Out::File`], itself included: "" is the file itself.
+    fn endings(&self) -> Vec<Cow<'static, str>> {
+        vec!["".into()]
     }
 }
 

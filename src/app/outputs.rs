@@ -2,7 +2,7 @@
 
 use super::command::{Answer, Asked, Command, Out, OutputFile, beside};
 use super::{Context, Failure, Input, Manifest, Result};
-use crate::io::atomic::{self, AtomicDir, Claim, Found, Written, claim_directory, claim_result};
+use crate::io::atomic::{self, AtomicDir, Claim, Found, claim_directory, claim_file};
 use crate::io::input;
 use crate::report::json;
 use flate2::{Compression, write::GzEncoder};
@@ -72,7 +72,8 @@ impl<C: Command> Asked<C> {
                     let mut others = names.iter().filter(|name| !is_own(name));
                     match others.any(|name| out.join(name.as_ref()).exists()) {
                         true => Found::Foreign,
-                        false => Found::result(there.key == manifest.key),
+                        false if there.key == manifest.key => Found::Same,
+                        false => Found::Other,
                     }
                 };
                 let own = [PAGE, MANIFEST].map(Cow::Borrowed);
@@ -88,18 +89,18 @@ impl<C: Command> Asked<C> {
                     let failure = Failure::input(format!("{} is not a file", out.display()));
                     return Err(failure.hint("name a file, such as model.toml"));
                 }
-                for (ending, kind) in endings {
-                    claims
-                        .own
-                        .push(claim_result(&beside(out, &ending), inputs(), kind, force)?);
+                for ending in endings {
+                    let claim = claim_file(&beside(out, &ending), inputs())?;
+                    claims.own.push(claim);
                 }
             }
             _ => {}
         }
         for path in &self.plots {
-            claims
-                .own
-                .push(claim_result(path, inputs(), kind_of_plot(path)?, force)?);
+            if !is_page(path) {
+                form(path)?;
+            }
+            claims.own.push(claim_file(path, inputs())?);
         }
         Ok(claims)
     }
@@ -197,14 +198,6 @@ fn packed(path: &Path, text: String) -> std::io::Result<Vec<u8>> {
 fn is_page(path: &Path) -> bool {
     path.extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("html"))
-}
-
-fn kind_of_plot(path: &Path) -> Result<Written> {
-    Ok(match is_page(path) {
-        true => Written::Page,
-        false if form(path)? == Form::Svg => Written::Svg,
-        false => Written::Png,
-    })
 }
 
 /// The form of a picture, by its name.

@@ -1,7 +1,6 @@
 //! `nav-sim trajectory`: reference trajectories.
 
 use crate::app::{Answer, Asked, Command, Context, Failure, Out, OutputFile, Result, inputs};
-use crate::io::atomic::Written;
 use crate::io::scenario_file;
 use crate::io::trajectory_file::{self, Instants, Options, parse_origin};
 use crate::parse;
@@ -127,7 +126,6 @@ impl Command for Convert {
     type Answer = TrajectoryTable;
     const NAME: &'static str = "trajectory convert";
     const OUT: Out = Out::File {
-        kind: Written::Trajectory,
         name: "trajectory.csv",
         help: "Table to write (.csv or .csv.gz); without it, standard output",
     };

@@ -44,7 +44,10 @@ fn a_demo_that_cannot_work_makes_nothing() {
         );
         assert!(!out.exists());
     };
-    refused(&["--samples", "89999"], "--samples='89999': 89999 is not in 90000..=1000000000");
+    refused(
+        &["--samples", "89999"],
+        "--samples='89999': 89999 is not in 90000..=1000000000",
+    );
     refused(&["--runs", "0"], "--runs='0': 0 is not in 1..=1000000");
 }
 
@@ -59,7 +62,8 @@ fn a_demo_replaces_no_file_of_others() {
         let ran = demo(&out, &["--force"]).output().unwrap();
         let said = String::from_utf8(ran.stderr).unwrap();
         assert!(
-            ran.status.code() == Some(2) && (said.contains("is not of this command") || said.contains("or of others")),
+            ran.status.code() == Some(2)
+                && (said.contains("is not of this command") || said.contains("or of others")),
             "{name}: {said}"
         );
         assert_eq!(std::fs::read_to_string(out.join(name)).unwrap(), "mine");
