@@ -218,7 +218,7 @@ fn longest_name(chart: &Chart, canvas: &Canvas) -> Option<f64> {
 fn values(mark: &Mark) -> (Vec<f64>, Vec<f64>) {
     match mark {
         Mark::Line(points, _) => points.iter().copied().unzip(),
-        Mark::Band(points) | Mark::InnerBand(points) | Mark::Bars(points) => {
+        Mark::Band(points) | Mark::InnerBand(points) => {
             let ends = points.iter().flat_map(|&(x, a, b)| [(x, a), (x, b)]);
             ends.unzip()
         }
@@ -237,11 +237,9 @@ fn values(mark: &Mark) -> (Vec<f64>, Vec<f64>) {
 /// How far beyond the main curves a logarithmic axis follows others.
 const BEYOND: f64 = 30.0;
 
-/// What a panel shows: what is far beyond the main curves is cut, so that it does not flatten them. Bands, bars and
+/// What a panel shows: what is far beyond the main curves is cut, so that it does not flatten them. Bands and
 /// auxiliary lines may leave the panel.
 fn y_range(panel: &Panel) -> Option<(f64, f64)> {
-    let has_bars = panel.series.iter().any(|s| matches!(s.mark, Mark::Bars(_)));
-    let air = if has_bars { 0.0 } else { 0.04 };
     let is_log = panel.y.scale == Scale::Log;
     let main = panel.series.iter().flat_map(|s| match &s.mark {
         Mark::Points(points) if is_log => points.iter().map(|p| p.y).collect(),
@@ -260,7 +258,7 @@ fn y_range(panel: &Panel) -> Option<(f64, f64)> {
     };
     let ys = panel.series.iter().flat_map(|s| values(&s.mark).1);
     let shown = ys.filter(|y| is_shown(*y, is_log));
-    range(&panel.y, shown.map(|y| y.clamp(low, high)), air)
+    range(&panel.y, shown.map(|y| y.clamp(low, high)), 0.04)
 }
 
 // Ranges, ticks and their labels.
@@ -299,11 +297,7 @@ fn is_shown(value: f64, is_log: bool) -> bool {
 }
 
 /// What an axis shows: the values with some air, none without a value.
-fn range(
-    axis: &Axis,
-    values: impl Iterator<Item = f64>,
-    air: f64,
-) -> Option<(f64, f64)> {
+fn range(axis: &Axis, values: impl Iterator<Item = f64>, air: f64) -> Option<(f64, f64)> {
     if let Scale::Names(names) = &axis.scale {
         return Some((-0.5, names.len() as f64 - 0.5));
     }
@@ -711,7 +705,6 @@ fn swatch(mark: &Mark, (x, y): (f64, f64), svg: &mut String) {
         Mark::Level(_) => ("line level", line),
         Mark::Band(_) | Mark::Zone(..) => ("area", square),
         Mark::InnerBand(_) => ("area inner", square),
-        Mark::Bars(_) => ("bar", square),
         Mark::Points(_) | Mark::Place(..) | Mark::Reading(..) => {
             ("dot", format!("M{:.1} {y:.1}h0", x + 0.5 * SWATCH))
         }
@@ -756,7 +749,6 @@ impl Frame {
             Mark::Band(points) => path(svg, "area", &self.band(points)),
             Mark::InnerBand(points) => path(svg, "area inner", &self.band(points)),
             Mark::Points(points) => self.points(points, svg),
-            Mark::Bars(bars) => path(svg, "bar", &self.bars(bars)),
             Mark::Level(y) => path(svg, "line level", &self.span(*y)),
             Mark::Zone(low, high) => {
                 let (a, b) = self.x.range;
@@ -833,19 +825,6 @@ impl Frame {
             .collect();
         dots.dedup();
         path(svg, class, &dots.concat());
-    }
-
-    /// As wide as 0.7 of the distance of two names.
-    fn bars(&self, bars: &[(f64, f64, f64)]) -> String {
-        let bar = |(x, from, to): &(f64, f64, f64)| {
-            let [left, right] = [x - 0.35, x + 0.35].map(|x| self.x.at(x));
-            let [low, high] = [*from, *to].map(|y| self.y.within(y));
-            format!("M{left:.1} {low:.1}H{right:.1}V{high:.1}H{left:.1}Z")
-        };
-        bars.iter()
-            .filter(|(_, from, to)| from != to)
-            .map(bar)
-            .collect()
     }
 
     fn span(&self, y: f64) -> String {
@@ -957,10 +936,6 @@ mod axis_tests {
         assert_eq!(
             frame(false).band(&[(1.0, 2.0, 3.0), (11.0, 2.0, 30.0)]),
             "M0.0 80.0L100.0 0.0L100.0 90.0L0.0 90.0Z"
-        );
-        assert_eq!(
-            frame(false).bars(&[(6.0, 1.0, 2.0), (7.0, 2.0, 2.0)]),
-            "M46.5 100.0H53.5V90.0H46.5Z"
         );
     }
 

@@ -136,10 +136,6 @@ operation = \"step\"
 amplitude = 1.0
 at_s = 10.0
 [[accel]]
-operation = \"step\"
-amplitude = 1.0
-at_samples = 10
-[[accel]]
 operation = \"drift\"
 amplitude = 1.0
 [[accel]]
@@ -149,7 +145,7 @@ sigma = 1.0
 mean = 0.5
 [[gyro]]
 operation = \"replace\"
-points = 7
+share = 0.07
 length_samples = 3
 sigma = 1.0
 [[gyro]]

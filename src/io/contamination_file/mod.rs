@@ -3,11 +3,11 @@
 //! ```toml
 //! schema = 1
 //! [[accel]]                        # or [[gyro]]: all axes of the sensor
-//! operation = "step"               # amplitude, at_share = 0.5 | at_samples | at_s
+//! operation = "step"               # amplitude, at_share = 0.5 | at_s
 //! replicates = [1, 2]              # default: every one
 //! amplitude = [0.004, 0.003]       # one number, or one for each replicate listed
 //! [[accel]]
-//! operation = "replace"            # share | points, sigma, mean (default: the signal's)
+//! operation = "replace"            # share, sigma, mean (default: the signal's)
 //! [[accel]]
 //! operation = "bursts"             # count = 5, length_samples = 500, spacing_samples = 90000, of_samples,
 //!                                  # amplitude, frequency_hz = 5
@@ -124,33 +124,22 @@ fn operation(
     rate_hz: f64,
 ) -> Result<Operation, Failure> {
     let refused = |name: &str, reason: String| source.refused(&format!("{key}.{name}"), reason);
-    // several ways to say the same
-    let at_most_one = |keys: &[(&str, bool)]| {
-        let mut given = keys.iter().filter(|(_, is_given)| *is_given);
-        match (given.next(), given.next()) {
-            (Some((first, _)), Some((second, _))) => {
-                Err(refused(second, format!("says again what \"{first}\" says")))
-            }
-            _ => Ok(()),
-        }
-    };
     Ok(match described {
         Described::Step {
             amplitude,
             at_share,
-            at_samples,
             at_s,
         } => {
-            at_most_one(&[
-                ("at_share", at_share.is_some()),
-                ("at_samples", at_samples.is_some()),
-                ("at_s", at_s.is_some()),
-            ])?;
-            let samples = at_s.as_ref().map(|s| (s.of(i) * rate_hz).round() as u64);
+            if at_share.is_some() && at_s.is_some() {
+                return Err(refused(
+                    "at_s",
+                    "says again what \"at_share\" says".to_owned(),
+                ));
+            }
             let share = at_share.as_ref().map_or(0.5, |share| share.of(i));
-            let samples = at_samples.or(samples).map(Extent::Samples);
+            let samples = at_s.as_ref().map(|s| (s.of(i) * rate_hz).round() as u64);
             Operation::Step {
-                at: samples.unwrap_or(Extent::Share(share)),
+                at: samples.map_or(Extent::Share(share), Extent::Samples),
                 amplitude: amplitude.of(i),
             }
         }
@@ -159,24 +148,18 @@ fn operation(
         },
         Described::Replace {
             share,
-            points,
             length_samples,
             sigma,
             mean,
-        } => {
-            at_most_one(&[("share", share.is_some()), ("points", points.is_some())])?;
-            let share = share.as_ref().map(|share| Extent::Share(share.of(i)));
-            let points = points.map(Extent::Samples).or(share);
-            Operation::Replace {
-                points: points.ok_or_else(|| source.missing(key, &["share", "points"]))?,
-                block: Extent::Samples(length_samples.map_or(1, NonZero::get)),
-                mean: match mean {
-                    None | Some(Mean::Kept(_)) => None,
-                    Some(Mean::Own(mean)) => Some(mean.of(i)),
-                },
-                sigma: sigma.of(i),
-            }
-        }
+        } => Operation::Replace {
+            points: Extent::Share(share.of(i)),
+            block: Extent::Samples(length_samples.map_or(1, NonZero::get)),
+            mean: match mean {
+                None | Some(Mean::Kept(_)) => None,
+                Some(Mean::Own(mean)) => Some(mean.of(i)),
+            },
+            sigma: sigma.of(i),
+        },
         Described::Bursts {
             count,
             length_samples,
@@ -332,7 +315,7 @@ mod tests {
 
     #[test]
     fn a_file_says_the_same_in_other_units() {
-        let text = "[[gyro]]\noperation = \"step\"\nat_s = 2\namplitude = 1\n[[gyro]]\noperation = \"replace\"\npoints = 7\nsigma = 1\nmean = 3.0\n";
+        let text = "[[gyro]]\noperation = \"step\"\nat_s = 2\namplitude = 1\n[[gyro]]\noperation = \"replace\"\nshare = 0.25\nsigma = 1\nmean = 3.0\n";
         let rules = parse(&Source::new("c.toml", text), 50.0).unwrap().rules;
         assert_eq!(
             rules[0].operation,
@@ -342,7 +325,7 @@ mod tests {
             }
         );
         assert_eq!(rules[0].replicate, None);
-        let (points, block) = (Extent::Samples(7), Extent::Samples(1));
+        let (points, block) = (Extent::Share(0.25), Extent::Samples(1));
         let replace = Operation::Replace {
             points,
             block,
@@ -385,7 +368,7 @@ mod tests {
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"replace\"\nsigma = 1\n"),
-            "c.toml, line 1: \"gyro[1].share\" or \"gyro[1].points\" is missing | add the key \"gyro[1].share\" or \"gyro[1].points\""
+            "c.toml, line 1: \"gyro[1].share\" is missing | add the key \"gyro[1].share\""
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"ar1\"\nphi = 1\nsigma2 = 1\n"),
@@ -397,7 +380,7 @@ mod tests {
         );
         assert_eq!(
             refusal(
-                "[[gyro]]\noperation = \"replace\"\npoints = 9\nsigma = 1\nlength_samples = 0\n"
+                "[[gyro]]\noperation = \"replace\"\nshare = 0.5\nsigma = 1\nlength_samples = 0\n"
             ),
             "c.toml, line 5: \"gyro[1].length_samples\" = 0 is not a whole number ≥ 1 | "
         );
@@ -445,8 +428,6 @@ enum Described {
         amplitude: OneOrEach<Finite>,
         /// Where in the record, as a share of it (default: 0.5)
         at_share: Option<OneOrEach<Share>>,
-        /// Where in the record (samples)
-        at_samples: Option<u64>,
         /// Where in the record (s)
         at_s: Option<OneOrEach<NonNegative>>,
     },
@@ -458,9 +439,7 @@ enum Described {
     /// Samples replaced by outliers
     Replace {
         /// Share of the samples
-        share: Option<OneOrEach<Share>>,
-        /// Number of samples
-        points: Option<u64>,
+        share: OneOrEach<Share>,
         /// Samples replaced together (default: 1)
         length_samples: Option<NonZero<u64>>,
         /// Standard deviation of what replaces them
