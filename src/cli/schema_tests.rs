@@ -1,6 +1,6 @@
 //! The ranges of schemas are those of the readers.
 
-use super::{Kind, schema};
+use super::{Kind, schema_of};
 use crate::io::{
     Failure, contamination_file, fusion_files, model_file, scenario_file, trajectory_file,
 };
@@ -353,7 +353,7 @@ fn schemas_have_the_bounds_of_their_readers() {
         };
         assert_eq!(refused(text.to_owned()), None, "{kind:?}");
         let sample = toml::Value::Table(text.parse().unwrap());
-        let root = schema(kind);
+        let root = schema_of(kind);
         let mut all = Vec::new();
         numbers(&sample, &[&root], &root, "", &mut all);
         for (at, said) in all
