@@ -27,32 +27,31 @@ pub(crate) struct Head {
     pub(crate) size: u64,
 }
 
-/// Records of a format.
-pub(crate) trait Dialect: Default {
-    /// Reads the start of the file.
-    fn start(&mut self, input: &mut Input) -> Result<(), Error>;
-
-    /// Reads the next record, of the file or of a chunk; none at its end.
-    fn record(&mut self, input: &mut Input) -> Result<Option<Record>, Error>;
-
-    /// Holds when the records were those of a complete file.
-    fn finish(&self, input: &Input) -> Result<(), Error>;
-}
-
 /// Shows all records of a container to `each`, those within chunks too where these are opened. Who is shown a message reads
 /// its bytes or skips them.
-fn walk<D: Dialect>(
+fn walk(
     input: &mut Input,
     opens: bool,
     each: &mut dyn FnMut(Record, &mut Input) -> Result<(), Error>,
 ) -> Result<(), Error> {
-    let mut dialect = D::default();
-    dialect.start(input)?;
-    while let Some(record) = dialect.record(input)? {
+    let mut records = Records::default();
+    let magic: [u8; 8] = input.array()?;
+    let next = match magic == MCAP_MAGIC {
+        true => Records::mcap,
+        false => {
+            let version: [u8; 5] = input.array()?;
+            let magic = [&magic[..], &version].concat();
+            if magic != BAG_MAGIC {
+                return Err(Error::encoding(0, magic.trim_ascii_end()));
+            }
+            Records::bag
+        }
+    };
+    while let Some(record) = next(&mut records, input)? {
         match record {
             Record::Chunk(chunk) if opens => {
                 let mut inside = chunk.open(input)?;
-                while let Some(record) = dialect.record(&mut inside)? {
+                while let Some(record) = next(&mut records, &mut inside)? {
                     if matches!(record, Record::Chunk(_)) {
                         return Err(Error::malformed(chunk.offset, "a chunk within a chunk"));
                     }
@@ -66,19 +65,23 @@ fn walk<D: Dialect>(
             record => each(record, input)?,
         }
     }
-    dialect.finish(input)
+    match records.end {
+        0 => Err(Error::at(input.offset(), Fault::StillWritten)),
+        end if end > input.length() => Err(Error::at(input.offset(), Fault::StillWritten)),
+        _ => Ok(()),
+    }
 }
 
 /// Finds the channels of a container. Chunks stay packed where an index counts their messages and all channels are defined
 /// outside of them.
-pub(crate) fn survey<D: Dialect>(
+pub(crate) fn survey(
     input: &mut Input,
     channels: &mut BTreeMap<u32, Channel>,
 ) -> Result<(), Error> {
     let mut look = |opens, input: &mut Input| {
         let (mut chunks, mut indexed) = (0, BTreeSet::new());
         channels.clear();
-        let outcome = walk::<D>(input, opens, &mut |record, input| {
+        let outcome = walk(input, opens, &mut |record, input| {
             match record {
                 Record::Chunk(_) => chunks += 1,
                 Record::Index(id, times) if !opens => {
@@ -198,14 +201,14 @@ impl Chunk {
 const LARGEST_MESSAGE: u64 = 1 << 20;
 
 /// Reads the messages of a topic, which may stand out of order in the file.
-pub(crate) fn read<D: Dialect>(
+pub(crate) fn read(
     input: &mut Input,
     channel: &Channel,
     stamp: Stamp,
     each: Each<'_>,
 ) -> Result<(), Error> {
     let mut found = Vec::new();
-    let outcome = walk::<D>(input, true, &mut |record, input| {
+    let outcome = walk(input, true, &mut |record, input| {
         let Record::Message(head) = record else {
             return Ok(());
         };
@@ -339,33 +342,18 @@ const BAG_MAGIC: [u8; 13] = *b"#ROSBAG V2.0\n";
 const LONGEST_HEADER: u64 = 1 << 20;
 /// Longest record that is read whole (bytes): a definition of messages, or the index of a chunk.
 
-/// Numbers of the kinds of records.
-mod bag_code {
-    pub(super) const MESSAGE: u8 = 0x02;
-    pub(super) const BAG: u8 = 0x03;
-    pub(super) const INDEX: u8 = 0x04;
-    pub(super) const CHUNK: u8 = 0x05;
-    pub(super) const CONNECTION: u8 = 0x07;
-}
-
 /// State of the reading.
 #[derive(Default)]
-pub(crate) struct Bag {
-    /// Byte of the index at the end; 0 until the bag is closed.
-    index: u64,
+struct Records {
+    /// Types of the messages of an MCAP file, by the numbers of their schemas.
+    types: HashMap<u16, String>,
+    /// Byte of what is written last, the index of a bag or the footer; 0 until it is known.
+    end: u64,
 }
 
-impl Dialect for Bag {
-    fn start(&mut self, input: &mut Input) -> Result<(), Error> {
-        let magic = input.array()?;
-        if magic == BAG_MAGIC {
-            Ok(())
-        } else {
-            Err(Error::encoding(0, magic.trim_ascii_end()))
-        }
-    }
-
-    fn record(&mut self, input: &mut Input) -> Result<Option<Record>, Error> {
+impl Records {
+    /// The next record of a bag, or of a chunk of it; none at its end.
+    fn bag(&mut self, input: &mut Input) -> Result<Option<Record>, Error> {
         if input.left() == 0 {
             return Ok(None);
         }
@@ -376,56 +364,41 @@ impl Dialect for Bag {
         input.expect(size)?;
         let fault = || Error::malformed(offset, "a record of a bag does not parse");
         let fields = Fields(&header);
-        match fields.bytes(b"op").ok_or_else(fault)? {
-            [bag_code::MESSAGE] => bag_message(fields, size).ok_or_else(fault).map(Some),
-            [bag_code::CHUNK] => {
+        let record = match fields.bytes(b"op").ok_or_else(fault)? {
+            // a message
+            [0x02] => bag_message(fields, size),
+            // the start of the bag
+            [0x03] => {
+                input.skip(size)?;
+                if let Some(name) = fields.bytes(b"encryptor").filter(|name| !name.is_empty()) {
+                    return Err(Error::encoding(offset, name));
+                }
+                let index = fields.bytes(b"index_pos");
+                let index = index.and_then(|b| Bytes::little(b).u64());
+                self.end = index.ok_or_else(fault)?;
+                Some(Record::Other)
+            }
+            // the index of the chunk before
+            [0x04] => index(fields, &input.bytes(size, LARGEST_RECORD)?),
+            [0x05] => {
                 let compression = fields.bytes(b"compression").ok_or_else(fault)?.to_vec();
                 let unpacked = fields.u32(b"size").ok_or_else(fault)?.into();
                 let offset = input.offset();
-                Ok(Some(Record::Chunk(Chunk {
+                Some(Record::Chunk(Chunk {
                     offset,
                     compression,
                     packed: size,
                     unpacked,
                     crc: 0,
-                })))
+                }))
             }
-            [bag_code::INDEX] => index(fields, &input.bytes(size, LARGEST_RECORD)?)
-                .ok_or_else(fault)
-                .map(Some),
-            [bag_code::CONNECTION] => {
-                let data = input.bytes(size, LARGEST_RECORD)?;
-                connection(fields, &data).ok_or_else(fault).map(Some)
-            }
-            code => {
+            [0x07] => connection(fields, &input.bytes(size, LARGEST_RECORD)?),
+            _ => {
                 input.skip(size)?;
-                self.note(code, fields, offset)?;
-                Ok(Some(Record::Other))
+                Some(Record::Other)
             }
-        }
-    }
-
-    fn finish(&self, input: &Input) -> Result<(), Error> {
-        if self.index == 0 || self.index > input.length() {
-            return Err(Error::at(input.offset(), Fault::StillWritten));
-        }
-        Ok(())
-    }
-}
-
-impl Bag {
-    /// Counts of the start and of the end.
-    fn note(&mut self, code: &[u8], fields: Fields<'_>, offset: u64) -> Result<(), Error> {
-        if code == [bag_code::BAG] {
-            if let Some(name) = fields.bytes(b"encryptor").filter(|name| !name.is_empty()) {
-                return Err(Error::encoding(offset, name));
-            }
-            let index = fields.bytes(b"index_pos");
-            let index = index.and_then(|b| Bytes::little(b).u64());
-            let what = "the start of the bag does not parse";
-            self.index = index.ok_or_else(|| Error::malformed(offset, what))?;
-        }
-        Ok(())
+        };
+        record.ok_or_else(fault).map(Some)
     }
 }
 
@@ -481,38 +454,16 @@ fn connection(fields: Fields<'_>, data: &[u8]) -> Option<Record> {
 
 // Records of MCAP (<https://mcap.dev/spec>).
 
+/// Numbers of kinds of records.
+const SCHEMA: u8 = 0x03;
+const CHANNEL: u8 = 0x04;
 const MCAP_MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 /// Largest record that is read whole (bytes): a schema, or the index of a chunk.
 const LARGEST_RECORD: u64 = 64 << 20;
 
-/// Numbers of the kinds of records.
-mod mcap_code {
-    pub(super) const FOOTER: u8 = 0x02;
-    pub(super) const SCHEMA: u8 = 0x03;
-    pub(super) const CHANNEL: u8 = 0x04;
-    pub(super) const MESSAGE: u8 = 0x05;
-    pub(super) const CHUNK: u8 = 0x06;
-    pub(super) const INDEX: u8 = 0x07;
-}
-
-/// State of the reading.
-#[derive(Default)]
-pub(crate) struct Mcap {
-    /// Types of the messages, by the numbers of their schemas.
-    types: HashMap<u16, String>,
-    has_footer: bool,
-}
-
-impl Dialect for Mcap {
-    fn start(&mut self, input: &mut Input) -> Result<(), Error> {
-        if input.array()? == MCAP_MAGIC {
-            Ok(())
-        } else {
-            Err(Error::malformed(0, "not the start of an MCAP file"))
-        }
-    }
-
-    fn record(&mut self, input: &mut Input) -> Result<Option<Record>, Error> {
+impl Records {
+    /// The next record of an MCAP file, or of a chunk of it; none at its end.
+    fn mcap(&mut self, input: &mut Input) -> Result<Option<Record>, Error> {
         let offset = input.offset();
         if input.left() == 0 {
             return Ok(None);
@@ -525,50 +476,41 @@ impl Dialect for Mcap {
                 format!("record {code:#04x} of {length} bytes does not parse"),
             )
         };
-        match code {
-            0 => Err(Error::malformed(offset, "record of kind 0")),
-            mcap_code::CHUNK => mcap_chunk(input, length).map(|chunk| Some(Record::Chunk(chunk))),
-            mcap_code::MESSAGE => message(input, length, fault).map(Some),
-            mcap_code::SCHEMA | mcap_code::CHANNEL | mcap_code::INDEX => {
-                let body = input.bytes(length, LARGEST_RECORD)?;
-                self.body(code, &body).ok_or_else(fault).map(Some)
-            }
-            mcap_code::FOOTER => {
+        let record = match code {
+            0x00 => return Err(Error::malformed(offset, "record of kind 0")),
+            // the footer
+            0x02 => {
                 input.skip(length)?;
-                self.has_footer = input.array()? == MCAP_MAGIC;
-                if self.has_footer {
-                    Ok(None)
-                } else {
-                    Err(fault())
+                if input.array()? != MCAP_MAGIC {
+                    return Err(fault());
                 }
+                self.end = input.position();
+                return Ok(None);
             }
+            SCHEMA | CHANNEL | 0x07 => {
+                let body = input.bytes(length, LARGEST_RECORD)?;
+                self.body(code, &body).ok_or_else(fault)?
+            }
+            0x05 => message(input, length, fault)?,
+            0x06 => Record::Chunk(mcap_chunk(input, length)?),
             _ => {
                 input.skip(length)?;
-                Ok(Some(Record::Other))
+                Record::Other
             }
-        }
+        };
+        Ok(Some(record))
     }
 
-    fn finish(&self, input: &Input) -> Result<(), Error> {
-        if self.has_footer {
-            Ok(())
-        } else {
-            Err(Error::at(input.offset(), Fault::StillWritten))
-        }
-    }
-}
-
-impl Mcap {
     /// A record that is read whole.
     fn body(&mut self, code: u8, body: &[u8]) -> Option<Record> {
         let mut bytes = Bytes::little(body);
         let id = bytes.u16()?;
         match code {
-            mcap_code::SCHEMA => {
+            SCHEMA => {
                 self.types.insert(id, text(bytes.string()?));
                 Some(Record::Other)
             }
-            mcap_code::CHANNEL => {
+            CHANNEL => {
                 let type_name = self.types.get(&bytes.u16()?).cloned().unwrap_or_default();
                 let (topic, encoding) = (text(bytes.string()?), text(bytes.string()?));
                 Some(Record::Channel(id.into(), [topic, type_name, encoding]))

@@ -63,15 +63,9 @@ impl Log {
         let kind = recognise(&input.bytes(head, head)?).ok_or(Error::Unknown)?;
         let (survey, read): (Survey, Read) = match kind {
             #[cfg(feature = "mcap")]
-            Kind::Mcap => (
-                container::survey::<container::Mcap>,
-                container::read::<container::Mcap>,
-            ),
+            Kind::Mcap => (container::survey, container::read),
             #[cfg(feature = "bag")]
-            Kind::Bag => (
-                container::survey::<container::Bag>,
-                container::read::<container::Bag>,
-            ),
+            Kind::Bag => (container::survey, container::read),
             #[cfg(feature = "ulog")]
             Kind::Ulog => (crate::ulog::survey, crate::ulog::read),
             #[cfg(feature = "ubx")]
