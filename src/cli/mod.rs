@@ -195,7 +195,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
         return 2;
     }
     let words = words(given.iter().cloned());
-    let known = command().version(&*version(&lossy(&words)).leak());
+    let known = command().long_version(&*version().leak());
     let matches = known
         .try_get_matches_from(&words)
         .unwrap_or_else(|e| end(&e));
@@ -423,18 +423,9 @@ fn drive<C: crate::app::Command>(asked: &Asked<C>, session: &Session) -> Result<
     answer.unmet().map_or(Ok(()), Err)
 }
 
-// `nav-sim --version`, and with `--verbose` what this program was built for and what it uses here.
-
-/// The version; more where the words of the command line ask for it.
-fn version(words: &[String]) -> String {
-    let number = env!("CARGO_PKG_VERSION").to_owned();
-    let is_version = |w: &String| w == "--version" || w == "-V";
-    let is_verbose = |w: &String| w == "--verbose" || w == "-v";
-    let short = words.iter().any(|w| matches!(w.as_str(), "-vV" | "-Vv"));
-    let asked = short || (words.iter().any(is_version) && words.iter().any(is_verbose));
-    if !asked {
-        return number;
-    }
+/// The version, what this program was built for, and what it uses here (`-V` is the version alone).
+fn version() -> String {
+    let number = env!("CARGO_PKG_VERSION");
     let either = |is: bool, yes, no| if is { yes } else { no };
     let library = either(cfg!(target_env = "musl"), "musl", "gnu");
     let linked = either(cfg!(target_feature = "crt-static"), "static", "dynamic");

@@ -222,6 +222,6 @@ mod tests {
 
     #[test]
     fn states_may_be_a_number() {
-        assert!(from_source(&Source::new("s.toml", "filter.states = 15"), |_| Ok(())).is_ok());
+        assert!(from_source(&Source::new("s.toml", "filter.states = 15")).is_ok());
     }
 }

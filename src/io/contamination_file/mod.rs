@@ -154,10 +154,7 @@ fn operation(
         } => Operation::Replace {
             points: Extent::Share(share.of(i)),
             block: Extent::Samples(length_samples.map_or(1, NonZero::get)),
-            mean: match mean {
-                None | Some(Mean::Kept(_)) => None,
-                Some(Mean::Own(mean)) => Some(mean.of(i)),
-            },
+            mean: mean.as_ref().map(|mean| mean.of(i)),
             sigma: sigma.of(i),
         },
         Described::Bursts {
@@ -445,7 +442,7 @@ enum Described {
         /// Standard deviation of what replaces them
         sigma: OneOrEach<NonNegative>,
         /// Mean of what replaces them (default: the signal's)
-        mean: Option<Mean>,
+        mean: Option<OneOrEach<Finite>>,
     },
     /// Bursts of vibration
     Bursts {
@@ -490,19 +487,6 @@ enum Described {
 /// Degrees of freedom with a variance.
 type AboveTwo = Between<2, { i64::MAX }, true>;
 type AtLeastOne = Between<1, { i64::MAX }, false>;
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "is neither a number nor \"signal\"")]
-enum Mean {
-    Own(OneOrEach<Finite>),
-    Kept(Signal),
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-enum Signal {
-    Signal,
-}
 
 /// The JSON schema of such a file.
 pub(crate) fn schema() -> serde_json::Value {
