@@ -364,12 +364,12 @@ impl Claim {
         let mut claimed = locked(&CLAIMED);
         if outputs.iter().any(|output| claimed.contains(output)) {
             let why = "is another output of the same command";
-            return Err(refused(shown, why).or(help::OUTPUT));
+            return Err(refused(shown, why).or_hint(help::OUTPUT));
         }
         let marked = fs::create_dir_all(parent_of(marker)).and_then(|()| Temporary::marker(marker));
         let Some((marker, is_left)) = marked.map_err(|e| Failure::unwritable(shown, e))? else {
             return Err(refused(shown, "is being written by another nav-sim")
-                .or(help::OUTPUT)
+                .or_hint(help::OUTPUT)
                 .or_hint("wait until that is done"));
         };
         claimed.extend(outputs.iter().cloned());
@@ -450,7 +450,7 @@ pub(crate) fn claim_file<'a>(
 
 fn foreign(path: &Path) -> Failure {
     let error = refused(path, "is not of this command: it is not replaced");
-    error.or(help::OUTPUT).or_hint("move it away")
+    error.or_hint(help::OUTPUT).or_hint("move it away")
 }
 
 /// Refuses an output that is one of the inputs, under whatever name.
@@ -464,7 +464,7 @@ fn guard_inputs<'a>(
         false => Ok(()),
         true => {
             let why = "is an input of this command and would be overwritten";
-            Err(refused(output, why).or(help::OUTPUT))
+            Err(refused(output, why).or_hint(help::OUTPUT))
         }
     }
 }
@@ -502,7 +502,8 @@ pub(crate) fn claim_directory<'a>(
         Found::Foreign => Err(foreign(directory)),
         Found::Other if !force => {
             let why = "holds the result of another configuration, other inputs or another seed";
-            Err(refused(directory, why).or(help::FORCE))
+            Err(refused(directory, why)
+                .or_hint("name another place for it, or replace it with --force"))
         }
         Found::Other | Found::Same => Ok(claim),
     }

@@ -189,7 +189,7 @@ fn of_rows(
     }
     // a receiver's log that has all but these
     let found = table.require(sigmas, &FIXES);
-    found.map_err(|e| e.or(help::FIX_SIGMA))?;
+    found.map_err(|e| e.or_option(help::FIX_SIGMA))?;
     let ([time], place) = (
         table.columns(["t_s"], &FIXES)?,
         table.columns(PLACE, &FIXES)?,
@@ -356,7 +356,7 @@ fn of_log(
     let read = log.fixes(channel, Stamp::default()).map_err(refused)?;
     let unstated = || {
         let message = "the fixes have no standard deviations";
-        Error::contents(path.display(), Place::Within, message).or(help::FIX_SIGMA)
+        Error::contents(path.display(), Place::Within, message).or_option(help::FIX_SIGMA)
     };
     let fixes = (1..)
         .zip(read)

@@ -157,7 +157,7 @@ pub(super) fn fixes(
         let pos_sigma_n = stated.or(given).ok_or_else(|| {
             let message =
                 "a fix without standard deviations: no GST sentence of its time states them";
-            Error::contents(path, epoch.line, message).or(help::FIX_SIGMA)
+            Error::contents(path, epoch.line, message).or_option(help::FIX_SIGMA)
         })?;
         let velocity = epoch.velocity.zip(vel_sigma);
         let velocity = velocity.map(|((horizontal, course), [n, e, _])| GnssVelocity {

@@ -229,7 +229,7 @@ pub(crate) const DICTIONARY: Dictionary = Dictionary {
             error.or_hint("write the time in seconds, from any instant on, and name the column t_s")
         }
         false => error
-            .or(help::REMOVE_LINE)
+            .or_hint("remove the line")
             .or_hint("record again: a sample that is made up would change the noise"),
     },
 };
@@ -284,7 +284,7 @@ pub(crate) fn load(
             .refused(message)
             .passing_over(NO_COLUMN)
             .or_hint(dictionary.advice)
-            .or(help::COLUMN_NAMES));
+            .or_option(help::COLUMN_NAMES));
     }
     Ok(table)
 }
@@ -299,7 +299,7 @@ fn no_unit(table: &Table, column: &str) -> Failure {
     table
         .refused(format!("column \"{column}\" has no unit in its name"))
         .or_hint(units)
-        .or(help::COLUMN_NAMES)
+        .or_option(help::COLUMN_NAMES)
 }
 
 /// Fewer samples than are needed.
@@ -751,7 +751,7 @@ fn pieces(
             "leaving out the first {skip_s} s leaves {longest} samples of {seconds} s, but {needed} are needed"
         );
         return Err(Failure::contents(path, Place::Within, message)
-            .or(help::SKIP)
+            .or_option(("skip-s", "a smaller --skip-s"))
             .or_hint("a longer recording"));
     }
     if longest < needed {
@@ -782,7 +782,7 @@ fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
                 column.name
             );
             return Err(Failure::contents(&raw.path, Place::Within, message)
-                .or(help::CHANNELS)
+                .or_option(help::CHANNELS)
                 .or_hint("record again"));
         }
         let per_sample = if column.quantity.per_sample {
@@ -863,7 +863,7 @@ fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Fa
         );
         return Err(Failure::contents(&report.file, Place::Within, message)
             .or_hint("without names the first three columns are the accelerometers")
-            .or(help::COLUMN_NAMES));
+            .or_option(help::COLUMN_NAMES));
     }
     if accel.len() == 3 {
         check_gravity(&report.file, norm(&accel))?;

@@ -22,7 +22,7 @@ pub(super) fn timing(
     report: &mut FileReport,
 ) -> Result<Timing, Failure> {
     let wrong_rate = |raw: &Table, message: String| {
-        Err(Failure::contents(&raw.path, Place::Within, message).or(help::WRONG_RATE))
+        Err(Failure::contents(&raw.path, Place::Within, message).or_option(help::WRONG_RATE))
     };
     if let Some(rate_hz) = options.rate_hz.filter(|r| !(r.is_finite() && *r > 0.0)) {
         return wrong_rate(raw, format!("{rate_hz} Hz is not a sample rate"));
@@ -76,7 +76,8 @@ pub(super) fn timing(
         }
         (None, _, None, None) => {
             let message = "no time column, and no rate is given";
-            return Err(Failure::contents(&raw.path, Place::Within, message).or(help::RATE));
+            return Err(Failure::contents(&raw.path, Place::Within, message)
+                .or_option(("rate-hz", "give the rate with --rate-hz")));
         }
     };
     clock.check(raw, options, report)
@@ -182,7 +183,7 @@ impl Clock {
                 "column \"{name}\" does not advance: its median step is 0"
             ));
             return Err(match *end > 0.0 {
-                true => error.or(help::GAPS).or(help::GAPS_ELSEWHERE),
+                true => error.or_option(help::GAPS).or_without(help::GAPS_ELSEWHERE),
                 false => error,
             });
         }
@@ -211,8 +212,8 @@ impl Clock {
             let step = rounded(self.median * self.unit_s);
             let message = format!("{what}, the median step is {step} s{more}");
             return Err(Failure::contents(&raw.path, line, message)
-                .or(help::GAPS)
-                .or(help::GAPS_ELSEWHERE));
+                .or_option(help::GAPS)
+                .or_without(help::GAPS_ELSEWHERE));
         }
         if let Some(means) = self.drift() {
             let [first, last] = means.map(|step| six_digits(self.rate_hz(step)));
@@ -234,7 +235,7 @@ impl Clock {
         let apart = (found_hz / rate_hz - 1.0).abs();
         if options.gaps != Gaps::Ignore && apart > DISAGREEING {
             let message = format!("the time column runs at {found} Hz, but {rate_hz} Hz is given");
-            return Err(refused(message).or(help::WRONG_RATE));
+            return Err(refused(message).or_option(help::WRONG_RATE));
         }
         report.rate_from = self.source;
         if apart > ROUNDED {

@@ -313,8 +313,8 @@ impl Table {
                 return Err(self
                     .refused(message)
                     .or_hint(format!("end its name in one of {}", endings.join(", ")))
-                    .or(help::COLUMN_NAMES)
-                    .or(help::CHANNELS));
+                    .or_option(help::COLUMN_NAMES)
+                    .or_option(help::CHANNELS));
             }
         }
         Ok(())
@@ -396,7 +396,7 @@ impl Table {
         let [needed, free] = [bytes(rows), free].map(|bytes| bytes.div_ceil(1 << 20));
         let message = format!("its samples need {needed} MiB of memory, and {free} MiB are free");
         let refusal = Failure::contents(&self.path, Place::Within, message);
-        Err(refusal.or(help::FEWER_CHANNELS))
+        Err(refusal.or_option(("axes", "take fewer signals at a time with --axes")))
     }
 
     /// Something wrong with the header.
@@ -760,7 +760,7 @@ fn no_header(
     refused(format!(
         "a header that names the columns is missing, found \"{found}\""
     ))
-    .or(help::COLUMN_NAMES)
+    .or_option(help::COLUMN_NAMES)
 }
 
 /// The rate in a comment such as `Update Rate: 100.0Hz`.
@@ -957,7 +957,7 @@ fn npy(path: &Path, dictionary: &Dictionary, asked: &Asked<'_>) -> Result<Column
             "an array of {count} columns, which names are not known"
         ))
         .or_hint(dictionary.advice)
-        .or(help::COLUMN_NAMES)
+        .or_option(help::COLUMN_NAMES)
     })?;
     let columns = (0..).zip(names);
     Ok(columns

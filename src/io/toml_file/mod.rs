@@ -3,7 +3,7 @@
 //! Keys have paths, `outage[2].end_s`; entries of lists of tables are counted from 1.
 
 use super::suggest::nearest;
-use super::{Failure, Place, help, source};
+use super::{Failure, Place, source};
 use nav_sim_signal::units::SettingError;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer, StrDeserializer};
@@ -64,7 +64,9 @@ impl Source {
             let kind = e.kind();
             let error = Failure::io(path, e);
             match kind {
-                ErrorKind::NotFound => error.or_hint("check the path").or(help::START_FILES),
+                ErrorKind::NotFound => error
+                    .or_hint("check the path")
+                    .or_hint("start from the files that nav-sim init makes"),
                 ErrorKind::InvalidData => error.or_hint("a TOML file is text in UTF-8"),
                 _ => error,
             }

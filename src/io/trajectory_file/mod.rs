@@ -4,7 +4,7 @@ use super::fusion_files::WEEK_S;
 use super::table::{
     Asked, Column, Dictionary, Numbers, Quantity, Table, normalised, parse as parse_text,
 };
-use super::{Failure, Failure as Error, Place, help, source};
+use super::{Failure, Failure as Error, Place, source};
 use chrono::{DateTime, NaiveDateTime, Utc};
 use glam::{DQuat, DVec3};
 use nav_sim_navigation::earth::{e_to_n, ecef_to_geodetic, geodetic_to_ecef};
@@ -453,8 +453,8 @@ fn origin(table: &Table, options: &Options) -> Result<[f64; 3], Error> {
         .ok_or_else(|| {
             let message = "a trajectory in local coordinates needs an origin on the Earth";
             Error::contents(&table.path, Place::Within, message)
-                .or(help::ORIGIN)
-                .or(help::ORIGIN_ELSEWHERE)
+                .or_option(("origin", "give --origin LAT_DEG,LON_DEG,H_M"))
+                .or_without(("origin", "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M"))
                 .or_hint("a first line \"# origin: LAT_DEG, LON_DEG, H_M\"")
         })
 }
