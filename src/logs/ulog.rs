@@ -9,14 +9,10 @@ pub(crate) fn survey(
     input: &mut Input,
     channels: &mut BTreeMap<u32, Channel>,
 ) -> Result<(), Error> {
-    let mut messages = Messages::new(input)?;
-    while let Some(data) = messages.next_data(None)? {
-        let Some(topic) = messages.topics.get(&data.id) else {
-            continue;
-        };
+    messages(input, &mut |topic, _, message| {
         let new = || {
             let (content, rank) = content(&topic.name);
-            let sample = sample(content, &topic.layout, &data, Stamp::Header);
+            let sample = sample(content, &topic.layout, message, Stamp::Header);
             let named = match topic.instance {
                 0 => topic.name.clone(),
                 instance => format!("{}.{instance}", topic.name),
@@ -28,17 +24,17 @@ pub(crate) fn survey(
                 content: sample.map_or(Content::Other, |_| content),
                 rank,
                 clock: Clock::Boot,
-                id: data.id.into(),
+                id: topic.id,
                 ..Channel::default()
             }
         };
-        let channel = channels.entry(data.id.into()).or_insert_with(new);
-        match topic.layout.time_ns("timestamp", &data.bytes) {
+        let channel = channels.entry(topic.id).or_insert_with(new);
+        match topic.layout.time_ns("timestamp", message) {
             Some(ns) => channel.count(ns),
             None => channel.messages += 1,
         }
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// Reads the samples or fixes of a topic.
@@ -48,16 +44,16 @@ pub(crate) fn read(
     stamp: Stamp,
     each: Each<'_>,
 ) -> Result<(), Error> {
-    let mut messages = Messages::new(input)?;
-    while let Some(data) = messages.next_data(Some(channel.id))? {
-        let topic = messages.topics.get(&data.id);
-        let sample = topic.and_then(|topic| sample(channel.content, &topic.layout, &data, stamp));
-        let short = || Error::malformed(data.offset, "a message is shorter than its format");
-        if let Some(sample) = sample.ok_or_else(short)? {
-            each(data.offset, sample)?;
+    messages(input, &mut |topic, offset, message| {
+        if topic.id != channel.id {
+            return Ok(());
         }
-    }
-    Ok(())
+        let sample = sample(channel.content, &topic.layout, message, stamp);
+        let short = || Error::malformed(offset, "a message is shorter than its format");
+        sample
+            .ok_or_else(short)?
+            .map_or(Ok(()), |sample| each(offset, sample))
+    })
 }
 
 // Fields of the messages of a topic.
@@ -101,7 +97,7 @@ fn number(name: &str) -> Option<Number> {
 
 impl Layout {
     /// The layout of a format; none where it does not parse.
-    pub(super) fn new(name: &str, formats: &Formats) -> Option<Self> {
+    fn new(name: &str, formats: &Formats) -> Option<Self> {
         let mut layout = Self::default();
         let mut at = 0_usize;
         for (type_name, count, field) in fields(formats.get(name)?) {
@@ -169,129 +165,83 @@ const MAGIC: [u8; 7] = *b"ULog\x01\x12\x35";
 /// Flag of data that was appended after the log had ended (a crash dump), and all others.
 const APPENDED: u8 = 1;
 
-/// Message of a topic.
-struct Data {
-    pub(super) id: u16,
-    pub(super) offset: u64,
-    pub(super) bytes: Vec<u8>,
-}
-
 /// Topic of a log.
 struct Topic {
+    id: u32,
     name: String,
     instance: u8,
     layout: Layout,
 }
 
-/// Messages of a file.
-struct Messages<'a> {
-    input: &'a mut Input,
-    formats: Formats,
-    /// Topics by their numbers.
-    topics: HashMap<u16, Topic>,
-    /// Byte from which on data was appended: what comes before it may be cut, and it is no flight.
-    end: u64,
-}
-
-impl<'a> Messages<'a> {
-    pub(super) fn new(input: &'a mut Input) -> Result<Self, Error> {
-        if input.array()? != MAGIC {
-            return Err(Error::malformed(0, "not the start of a ULog file"));
-        }
-        // version and time of the start
-        input.skip(9)?;
-        Ok(Self {
-            input,
-            formats: Formats::new(),
-            topics: HashMap::new(),
-            end: u64::MAX,
-        })
+/// Shows the messages of topics, each with its byte.
+fn messages(
+    input: &mut Input,
+    each: &mut dyn FnMut(&Topic, u64, &[u8]) -> Result<(), Error>,
+) -> Result<(), Error> {
+    if input.array()? != MAGIC {
+        return Err(Error::malformed(0, "not the start of a ULog file"));
     }
-
-    /// The next message of a topic: of any, or of one.
-    fn next_data(&mut self, only: Option<u32>) -> Result<Option<Data>, Error> {
-        loop {
-            let offset = self.input.position();
-            if self.input.left() == 0 || offset + 3 > self.end {
-                return Ok(None);
-            }
-            let (size, kind) = (self.input.u16()?, self.input.u8()?);
-            if self.input.position() + u64::from(size) > self.end {
-                return Ok(None);
-            }
-            self.input.expect(size.into())?;
-            if kind != b'D' {
-                self.other(kind, size, offset)?;
-                continue;
-            }
-            let size = u64::from(size);
-            let Some(rest) = size.checked_sub(2) else {
-                return Err(Error::malformed(
-                    offset,
-                    "a message of a topic without a number",
-                ));
-            };
-            let id = self.input.u16()?;
-            if only.is_none_or(|only| only == u32::from(id)) {
-                let bytes = self.input.bytes(rest, rest)?;
-                return Ok(Some(Data { id, offset, bytes }));
-            }
-            self.input.skip(rest)?;
+    // version and time of the start
+    input.skip(9)?;
+    let (mut formats, mut topics) = (Formats::new(), HashMap::new());
+    // byte from which on data was appended: what comes before it may be cut, and it is no flight
+    let mut end = u64::MAX;
+    loop {
+        let offset = input.position();
+        if input.left() == 0 || offset + 3 > end {
+            return Ok(());
         }
-    }
-
-    /// Formats, subscriptions and flags.
-    fn other(&mut self, kind: u8, size: u16, offset: u64) -> Result<(), Error> {
-        if !matches!(kind, b'F' | b'A' | b'B') {
-            return self.input.skip(size.into());
+        let (size, kind) = (u64::from(input.u16()?), input.u8()?);
+        if input.position() + size > end {
+            return Ok(());
         }
-        let body = self.input.bytes(size.into(), size.into())?;
+        let body = input.bytes(size, size)?;
         let fault = || {
-            Error::malformed(
-                offset,
-                format!("message {:?} does not parse", char::from(kind)),
-            )
+            let kind = char::from(kind);
+            Error::malformed(offset, format!("message {kind:?} does not parse"))
         };
+        let mut bytes = Bytes::little(&body);
         match kind {
+            b'D' => {
+                let id = bytes.u16().ok_or_else(fault)?;
+                if let Some(topic) = topics.get(&id) {
+                    each(topic, offset, &body[2..])?;
+                }
+            }
             b'F' => {
                 let format = text(&body);
                 let (name, fields) = format.split_once(':').ok_or_else(fault)?;
-                self.formats.insert(name.to_owned(), fields.to_owned());
+                formats.insert(name.to_owned(), fields.to_owned());
             }
             b'A' => {
-                let mut bytes = Bytes::little(&body);
                 let (instance, id) = bytes.u8().zip(bytes.u16()).ok_or_else(fault)?;
                 let name = text(&body[3..]);
-                if let Some(layout) = Layout::new(&name, &self.formats) {
+                if let Some(layout) = Layout::new(&name, &formats) {
                     let topic = Topic {
+                        id: id.into(),
                         name,
                         instance,
                         layout,
                     };
-                    self.topics.insert(id, topic);
+                    topics.insert(id, topic);
                 }
             }
-            _ => self.flags(&body, offset).ok_or_else(fault)??,
+            // flags that tell of data a reader has to know of
+            b'B' => {
+                bytes.take(8).ok_or_else(fault)?;
+                let flags = bytes.take(8).ok_or_else(fault)?;
+                if flags[0] & !APPENDED != 0 || flags[1..].iter().any(|flags| *flags != 0) {
+                    let flags = format!("ULog flags {flags:02x?}");
+                    return Err(Error::encoding(offset, flags.as_bytes()));
+                }
+                if flags[0] & APPENDED != 0 {
+                    let mut starts = || Some([bytes.u64()?, bytes.u64()?, bytes.u64()?]);
+                    let starts = starts().ok_or_else(fault)?.into_iter();
+                    end = starts.filter(|at| *at > 0).min().unwrap_or(u64::MAX);
+                }
+            }
+            _ => {}
         }
-        Ok(())
-    }
-
-    /// Flags that tell of data a reader has to know of.
-    fn flags(&mut self, body: &[u8], offset: u64) -> Option<Result<(), Error>> {
-        let mut bytes = Bytes::little(body);
-        bytes.take(8)?;
-        let incompatible = bytes.take(8)?;
-        if incompatible[0] & !APPENDED != 0 || incompatible[1..].iter().any(|flags| *flags != 0) {
-            return Some(Err(Error::encoding(
-                offset,
-                format!("ULog flags {incompatible:02x?}").as_bytes(),
-            )));
-        }
-        if incompatible[0] & APPENDED != 0 {
-            let offsets = [bytes.u64()?, bytes.u64()?, bytes.u64()?].into_iter();
-            self.end = offsets.filter(|at| *at > 0).min().unwrap_or(u64::MAX);
-        }
-        Some(Ok(()))
     }
 }
 
@@ -309,8 +259,12 @@ fn content(name: &str) -> (Content, u8) {
 }
 
 /// A sample or fix, if the message has one; none at all where the message is too short.
-fn sample(content: Content, layout: &Layout, data: &Data, stamp: Stamp) -> Option<Option<Sample>> {
-    let message = &data.bytes;
+fn sample(
+    content: Content,
+    layout: &Layout,
+    message: &[u8],
+    stamp: Stamp,
+) -> Option<Option<Sample>> {
     let one = |name| layout.numbers::<1>(name, message).map(|[value]| value);
     let three = |name| layout.numbers::<3>(name, message);
     // 0 is a time that was not set
