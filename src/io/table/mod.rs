@@ -69,7 +69,7 @@ pub(crate) struct Asked<'a> {
 }
 
 /// Columns of a file, before anything is decided about time and units.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Table {
     pub(crate) path: String,
     /// Line of the header, from 1; 0 where there is none.
@@ -227,14 +227,7 @@ impl Table {
         let mut table = Self {
             path: path.to_owned(),
             header_line,
-            columns: Vec::new(),
-            ignored: Vec::new(),
-            comments: Vec::new(),
-            rate_hz: None,
-            lines: Vec::new(),
-            is_bare: false,
-            assumptions: Vec::new(),
-            warnings: Vec::new(),
+            ..Self::default()
         };
         let unwanted = |quantity: &Quantity| asked.unwanted.is_some_and(|is| is(quantity));
         let mut places: Vec<usize> = Vec::new();
@@ -536,6 +529,7 @@ fn read_text(
 }
 
 /// Lines before the rows.
+#[derive(Default)]
 struct Head {
     names: Vec<String>,
     delimiter: u8,
@@ -562,16 +556,8 @@ impl Head {
         asked: &Asked<'_>,
     ) -> Result<Self, Failure> {
         let mut head = Self {
-            names: Vec::new(),
             delimiter: b',',
-            line: 0,
-            before: 0,
-            first_row: Vec::new(),
-            comments: Vec::new(),
-            is_xsens: false,
-            rate_hz: None,
-            is_bare: false,
-            is_latin_1: false,
+            ..Self::default()
         };
         // the first line of words, which is the header where none names a quantity
         let mut words: Option<(u64, Vec<String>)> = None;
