@@ -28,7 +28,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "T", default_value_t = 524_284, value_parser = value_parser!(u64).range(90_000..=1_000_000_000))]
     samples: u64,
     /// Monte-Carlo runs with each model
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u64).range(1..=1_000_000))]
     runs: u64,
     /// Print the commands, run nothing
     #[arg(long)]

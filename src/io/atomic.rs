@@ -527,6 +527,7 @@ const MARKS: [&str; 5] = [
     "class=\"chart wide\"",
     "Software\0nav-sim",
 ];
+const JSON: [&str; 2] = ["{\n  \"schema_version\"", "{\"schema_version\""];
 const TRAJECTORY: &str =
     "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n";
 
@@ -539,7 +540,7 @@ fn is_own(text: &str) -> bool {
         .into_iter()
         .flat_map(str::lines);
     text.is_empty()
-        || text.starts_with("{\n  \"schema_version\"")
+        || JSON.iter().any(|start| text.starts_with(start))
         || MARKS.iter().any(|mark| text.contains(mark))
         || rows
             .next()
