@@ -3,7 +3,7 @@
 
 use super::{Context, Failure, Front, Input, Refuse, Result};
 use crate::io::atomic::{AtomicDir, Claim, Found, claim_directory, claim_file};
-use crate::io::{atomic, hash, input, suggest};
+use crate::io::{atomic, input, suggest};
 use crate::parse;
 use crate::report::json;
 use clap::builder::ValueParser;
@@ -726,7 +726,7 @@ impl Manifest {
             NUMERICS,
         );
         let text = serde_json::to_string(&decides).expect("texts and numbers are always JSON");
-        manifest.key = hash::of_bytes(text.as_bytes());
+        manifest.key = input::hash_of(text.as_bytes());
         manifest
     }
 

@@ -34,7 +34,7 @@ use crate::app::inputs::{files, listed};
 use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
 use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
 use crate::io::draws_file::DrawsFile;
-use crate::io::hash;
+use crate::io::input;
 use crate::io::model_file::ModelFile;
 use crate::parse;
 use crate::report;
@@ -370,7 +370,7 @@ impl Calibration {
         let curves = report::json(&shown.curves);
         let mut model = self
             .note
-            .model_file(&shown, &hash::of_bytes(curves.as_bytes()));
+            .model_file(&shown, &input::hash_of(curves.as_bytes()));
         let mut draws = DrawsFile::of(&shown.outcomes, self.settings.rate_hz);
         if let Some((inflated, how)) = inflated {
             draws = None;
