@@ -558,8 +558,6 @@ pub struct FileReport {
     pub file: String,
     /// The file itself: its name need not be UTF-8.
     pub path: PathBuf,
-    /// Columns that became signals.
-    pub columns: Vec<(String, Channel)>,
     /// Columns passed over.
     pub ignored: Vec<String>,
     /// Sample rate (Hz).
@@ -587,14 +585,12 @@ fn name_of(file: &str, index: usize, count: usize) -> String {
 
 impl FileReport {
     pub(super) fn new(raw: &Table) -> Self {
-        let signal = |c: &Column| Some((c.name.clone(), channel_of(c)?));
         let mut assumptions = raw.assumptions.clone();
         if raw.columns.iter().any(|c| c.quantity.per_sample) {
             assumptions.push("increments divided by the sample interval".into());
         }
         Self {
             file: raw.path.clone(),
-            columns: raw.columns.iter().filter_map(signal).collect(),
             ignored: raw.ignored.clone(),
             assumptions,
             warnings: raw.warnings.clone(),
@@ -609,11 +605,6 @@ impl FileReport {
             .iter()
             .enumerate()
             .map(move |(i, samples)| (name_of(&self.file, i, count), *samples))
-    }
-
-    /// Samples of all its recordings.
-    fn count(&self) -> usize {
-        self.samples.iter().sum()
     }
 
     pub(super) fn warn(&mut self, text: String) {
@@ -633,7 +624,7 @@ impl FileReport {
 impl fmt::Display for FileReport {
     /// `a.csv: 524284 samples at 100 Hz (time column), 5242.84 s; means removed: accel x 0.02, …`
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let total = self.count();
+        let total: usize = self.samples.iter().sum();
         let (rate, from, seconds) = (
             six_digits(self.rate_hz),
             &self.rate_from,
