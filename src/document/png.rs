@@ -24,7 +24,7 @@ fn parsed(svg: &str) -> Result<usvg::Tree, String> {
 }
 
 /// The dots of an SVG picture.
-fn png(svg: &str) -> Result<Vec<u8>, String> {
+pub(crate) fn png(svg: &str) -> Result<Vec<u8>, String> {
     let picture = parsed(svg)?;
     let (width, height) = (picture.size().width(), picture.size().height());
     let zoom = (DENSITY / PIXELS_AN_INCH).min((MOST_DOTS / (width * height)).sqrt());

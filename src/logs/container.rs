@@ -340,8 +340,6 @@ fn fix(encoding: &str, message: &Message) -> Result<Option<Sample>, Error> {
 const BAG_MAGIC: [u8; 13] = *b"#ROSBAG V2.0\n";
 /// Longest header of a record (bytes).
 const LONGEST_HEADER: u64 = 1 << 20;
-/// Longest record that is read whole (bytes): a definition of messages, or the index of a chunk.
-
 /// State of the reading.
 #[derive(Default)]
 struct Records {
@@ -458,7 +456,7 @@ fn connection(fields: Fields<'_>, data: &[u8]) -> Option<Record> {
 const SCHEMA: u8 = 0x03;
 const CHANNEL: u8 = 0x04;
 const MCAP_MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
-/// Largest record that is read whole (bytes): a schema, or the index of a chunk.
+/// Largest record that is read whole (bytes): a definition of messages, a schema, the index of a chunk.
 const LARGEST_RECORD: u64 = 64 << 20;
 
 impl Records {

@@ -9,7 +9,7 @@ pub(crate) fn survey(
     input: &mut Input,
     channels: &mut BTreeMap<u32, Channel>,
 ) -> Result<(), Error> {
-    messages(input, &mut |topic, _, message| {
+    messages(input, |topic, _, message| {
         let new = || {
             let (content, rank) = content(&topic.name);
             let sample = sample(content, &topic.layout, message, Stamp::Header);
@@ -44,7 +44,7 @@ pub(crate) fn read(
     stamp: Stamp,
     each: Each<'_>,
 ) -> Result<(), Error> {
-    messages(input, &mut |topic, offset, message| {
+    messages(input, |topic, offset, message| {
         if topic.id != channel.id {
             return Ok(());
         }
@@ -176,7 +176,7 @@ struct Topic {
 /// Shows the messages of topics, each with its byte.
 fn messages(
     input: &mut Input,
-    each: &mut dyn FnMut(&Topic, u64, &[u8]) -> Result<(), Error>,
+    mut each: impl FnMut(&Topic, u64, &[u8]) -> Result<(), Error>,
 ) -> Result<(), Error> {
     if input.array()? != MAGIC {
         return Err(Error::malformed(0, "not the start of a ULog file"));
