@@ -23,7 +23,9 @@ pub(crate) fn wavelet<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     // a copy, so that Ctrl-C need not wait and nobody changes what is being read
     let signal = without_mean(x.as_array().to_vec());
-    let found = work(py, None, move |_| variances(&signal, scales, efficiency))?;
+    let found = work(py, None, None, move |_| {
+        variances(&signal, scales, efficiency)
+    })?;
     let found = found.map_err(|e| error::refused(py, &format!("x: {e}")))?;
     let columns = PyDict::new(py);
     for (name, values) in found {

@@ -257,7 +257,7 @@ mod target {
         };
         let n = 20_000_u32;
         let drawn: Vec<Composite> = (0..n)
-            .map(|i| spread.draw(&model, 3, i.into()).unwrap().axes[0].clone())
+            .map(|i| spread.draw(&model, 3, i.into()).axes[0].clone())
             .collect();
         for (j, exact) in (1..).zip(exact) {
             let nu: Vec<f64> = drawn.iter().map(|m| m.haar_wv(j)).collect();
@@ -338,7 +338,7 @@ mod target {
         };
         let n = 8000_u32;
         let first_scale = |run: u32| {
-            let drawn = spread.draw(&model, 1, run.into()).unwrap();
+            let drawn = spread.draw(&model, 1, run.into());
             let key = StreamKey {
                 seed: 1,
                 scenario: "",

@@ -259,7 +259,6 @@ impl Run {
         };
         let of_run = |run| {
             let drawn = spread.draw(&file.model, seed, run);
-            let drawn = drawn.expect("the spread was read with its model");
             continuous::at_rate(&drawn, scenario.imu.rate_hz)
                 .refuse_within(format!("a model drawn from the [spread] of {path}"))
         };

@@ -683,7 +683,7 @@ fn read_laws(
             .map_err(|e| refuse_law(source, &key, &e))?;
             if into
                 .iter()
-                .any(|v| v.process() == process && v.parameter() == parameter)
+                .any(|v| (v.process.as_str(), v.of.parameter.name()) == (process, parameter))
             {
                 let key = format!("{key}.parameter");
                 return Err(source.refused(&key, "of this process already has a law"));
@@ -817,7 +817,7 @@ fn laws(file: &ModelFile, channel: Channel) -> Option<Vec<String>> {
 }
 
 fn law(v: &Variation) -> String {
-    let constants = match v.law() {
+    let constants = match v.law {
         Law::Beta { a, b, low, width } => {
             format!(
                 "distribution = \"beta\"\na = {a:?}\nb = {b:?}\nlow = {low:?}\nwidth = {width:?}"
@@ -842,7 +842,7 @@ fn law(v: &Variation) -> String {
     };
     format!(
         "process = \"{}\"\nparameter = \"{}\"\n{constants}\n",
-        v.process(),
-        v.parameter()
+        v.process,
+        v.of.parameter.name()
     )
 }
